@@ -1,18 +1,18 @@
-//! Hands the memory map to the linker of the firmware images, and tells the library whether the
-//! processor has the DSP extension: a stable compiler does not show that feature to `cfg`.
+//! Build script. It passes the memory map of an image to the linker, and tells the library whether the processor has
+//! the DSP extension, which a stable compiler does not expose to `cfg`.
 
 use std::{env, fs, path::PathBuf};
 
-/// The part's memory regions.
+/// Memory regions of the STM32F405.
 const REGIONS: &str = "src/bin/stm32f405/regions.x";
-/// Memory maps of the boards without the DSP extension, by the feature that chooses one.
+/// Memory maps of the boards without the DSP extension, each with the Cargo feature that selects it.
 const SMALL: [(&str, &str); 2] = [
     ("CARGO_FEATURE_MICROBIT", "src/bin/small_core/microbit.x"),
     ("CARGO_FEATURE_LM3S6965EVB", "src/bin/small_core/lm3s6965evb.x"),
 ];
-/// Limits of the image that is flashed.
+/// Linker script with the flash limits of the `coprocessor` image.
 const SLOTS: &str = "src/bin/stm32f405/slots.x";
-/// Start of its code (`store::layout::CODE`).
+/// Start address of the code of `coprocessor` and `bringup` (`store::layout::CODE`).
 const CODE: &str = "0x08080000";
 
 fn main() {
@@ -31,17 +31,17 @@ fn main() {
         println!("cargo:rerun-if-changed={map}");
         if env::var_os(feature).is_some() && env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none") {
             let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-            fs::copy(map, out.join("regions.x")).expect("the board's map stands with the image");
+            fs::copy(map, out.join("regions.x")).expect("cannot copy the memory map of the board");
             println!("cargo:rustc-link-search={}", out.display());
         }
     }
-    // Not for the firmware of others that use the library: it has a memory map of its own.
+    // Only for the images of this package: firmware that uses the library has its own memory map.
     let image = env::var_os("CARGO_FEATURE_STM32F405").is_some();
     if image && env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none") {
-        // cortex-m-rt's link.x includes memory.x, and that regions.x, from the search path.
+        // cortex-m-rt's link.x includes memory.x from the search path, and memory.x includes regions.x.
         let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-        fs::copy("memory.x", out.join("memory.x")).expect("memory.x stands in the package root");
-        fs::copy(REGIONS, out.join("regions.x")).expect("the part's regions stand with its code");
+        fs::copy("memory.x", out.join("memory.x")).expect("cannot copy memory.x of the package");
+        fs::copy(REGIONS, out.join("regions.x")).expect("cannot copy the memory regions of the chip");
         println!("cargo:rustc-link-search={}", out.display());
         println!("cargo:rustc-link-arg-bin=coprocessor=-T{SLOTS}");
         for flashed in ["coprocessor", "bringup"] {
@@ -53,7 +53,7 @@ fn main() {
     }
 }
 
-/// ARMv7E-M always has it; ARMv8-M mainline where the flags name it or a core that has it.
+/// Returns whether the target has DSP: always on ARMv7E-M; on ARMv8-M mainline if RUSTFLAGS name it or such a core.
 fn has_dsp() -> bool {
     let target = env::var("TARGET").unwrap_or_default();
     let flags = env::var("CARGO_ENCODED_RUSTFLAGS").unwrap_or_default();

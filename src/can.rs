@@ -1,4 +1,4 @@
-//! These modules encode and decode the messages on the vehicle's bus, and carry them.
+//! These modules encode, decode, queue and transport the messages on the vehicle's bus.
 
 pub mod bosch;
 mod carry;

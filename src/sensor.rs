@@ -1,8 +1,8 @@
-//! These modules make samples from the bytes of a sensor.
+//! These modules decode the bytes of a sensor into samples.
 //!
 //! The pipeline sees only the samples of a part: [`ImuSample`] or [`FogSample`], in fixed point, with the part's own
-//! time unwrapped. [`Source`] is the common interface of all parts, so that firmware can be generic over the part. The
-//! image chooses at its start, by configuration, among the parts that it drives.
+//! time unwrapped. [`Source`] is the common interface of all parts, so that firmware can be generic over the part.
+//! The image selects one of its parts at the start, by configuration.
 //!
 //! | part | line | type | sample |
 //! |---|---|---|---|
@@ -15,20 +15,20 @@
 //! UART parts are read through [`serial::Serial`] over any port with the traits of `embedded-io`, and configured by
 //! [`serial::configure`]; SPI parts take an `embedded_hal::spi::SpiDevice`. Either way it is a [`Source`].
 //!
-//! # What a parser finds out about damage
+//! # Which errors a parser detects
 //!
-//! | frame | check | a flipped bit | what is not found |
+//! | frame | check | a flipped bit | undetected |
 //! |---|---|---|---|
-//! | MTData2 | sum of bytes, 8 bits | refused | one of 256 other damages |
-//! | DSP-1760 | CRC of 32 bits | refused | one of 4 x 10^9 |
-//! | ADIS164xx burst | sum of bytes, 16 bits | refused | bytes that change places |
-//! | DSP-3000 word | one parity bit | refused | every second damage of more bits |
-//! | DSP-3000 line | none, but its form | a digit may become another one | that digit |
-//! | ICM-42688 packet | none, but its header | a reading may be another one | that reading |
+//! | MTData2 | sum of bytes, 8 bits | refused | one in 256 other errors |
+//! | DSP-1760 | CRC of 32 bits | refused | one in 4 x 10^9 |
+//! | ADIS164xx burst | sum of bytes, 16 bits | refused | swapped bytes |
+//! | DSP-3000 word | one parity bit | refused | half of the errors of more bits |
+//! | DSP-3000 line | none, except its format | a digit may become another one | that digit |
+//! | ICM-42688 packet | none, except its header | a reading may be another one | that reading |
 //!
-//! The last two have no check on the wire at all: keep their lines short, and rely on the pipeline's own limits.
+//! The last two have no check on the wire: keep their lines short, and rely on the pipeline's own limits.
 //!
-//! `src/bin/PORTING.md` has the six steps that add a part.
+//! `src/bin/PORTING.md` lists the six steps to add a part.
 
 pub mod adis16465;
 #[doc(hidden)]
@@ -46,7 +46,7 @@ use crate::sample::{FogSample, ImuSample};
 
 /// Delivers the samples of a part.
 pub trait Source {
-    /// The type of its samples: [`ImuSample`] or [`FogSample`].
+    /// The type of the part's samples: [`ImuSample`] or [`FogSample`].
     type Sample;
     /// The error of a frame or a transfer.
     type Error: core::error::Error;
@@ -57,9 +57,9 @@ pub trait Source {
 
 /// Delivers the samples of a part that sends a stream of bytes.
 pub trait ByteSource: Source {
-    /// Takes one byte. Call [`Source::next_sample`] until `None` before the next one.
+    /// Accepts one byte. Call [`Source::next_sample`] until `None` before the next byte.
     fn receive(&mut self, byte: u8);
-    /// Returns the number of candidates whose checksum did not fit.
+    /// Returns the number of candidate frames whose checksum did not match.
     fn bad_checksums(&self) -> u32;
 }
 

@@ -1,8 +1,8 @@
-//! The device is what a person configures or examines: stored data, weights, calibration and the log of events.
+//! The device holds what a user configures or examines: stored data, weights, calibration and the log of events.
 //!
-//! [`Device`] owns the flash, executes [`Request`]s and reports its state; it does no input or output of its own. Testers
-//! reach it over diagnosis ([`crate::uds`]). Every request is checked whole before anything is written, and refused with
-//! a reason ([`message::Refusal`]).
+//! [`Device`] owns the flash, executes [`Request`]s and reports its state; it does no input or output of its own.
+//! Testers reach it over diagnosis ([`crate::uds`]). Every request is checked completely before anything is written;
+//! a refusal has a reason ([`message::Refusal`]).
 
 pub mod calibrate;
 mod conditions;

@@ -5,10 +5,10 @@
 //! | [`Configuration`], [`WheelSettings`](crate::can::wheel::WheelSettings), [`Calibration`], [`Learned`], [`Troubles`], which slot is used | two 16 KiB sectors, a [`Store`] | a new record behind the old one | the old record |
 //! | weight files | two 128 KiB sectors, [`slots`] | the slot that is not in use | the slot in use |
 //!
-//! It works because new data never overwrites the data in use: an interrupted write leaves the old record or slot
-//! whole. Records are found by key and protected by CRC-32; each carries the version of its layout, and every value is
-//! checked against its range when it is stored and when it is read. A weight file is used only after all checks of
-//! [`crate::model::Blob::new_checked`]. [`layout`] gives the places in flash.
+//! New data never overwrites the data in use, so an interrupted write leaves the old record or slot intact. Records
+//! are found by key and protected by CRC-32; each carries the version of its layout, and every value is checked
+//! against its range when it is stored and when it is read. A weight file is used only after all checks of
+//! [`crate::model::Blob::new_checked`]. [`layout`] defines the addresses in flash.
 
 pub mod access;
 pub mod calibration;
@@ -33,5 +33,5 @@ pub use learned::Learned;
 pub use place::{Place, Slot};
 pub use record::{Record, Store};
 pub use slots::Accepted;
-pub use troubles::{MOST_TROUBLES, Snapshot, StoredTrouble, Troubles};
+pub use troubles::{MAX_TROUBLES, Snapshot, StoredTrouble, Troubles};
 pub use upload::Upload;

@@ -1,7 +1,7 @@
-//! One GyroNet window on the host: integer kernels and f32 reference.
+//! Benchmark of one GyroNet window on the host: integer kernels and f32 reference.
 //!
-//! Compare with what others need for the same network on an x86 core: ONNX Runtime int8 50 us,
-//! RTNeural 54 us, ONNX Runtime f32 65 us, PyTorch 330 us.
+//! For comparison, the same network on an x86 core takes: ONNX Runtime int8 50 us, RTNeural 54 us, ONNX Runtime f32
+//! 65 us, PyTorch 330 us.
 
 use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
@@ -10,11 +10,11 @@ use gyronet_host_tests::noise::Noise;
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Rounds, of which the median counts, and windows in each.
+/// Number of rounds, of which the median is reported, and of windows in each.
 const ROUNDS: usize = 101;
 const WINDOWS: u32 = 100;
 
-/// A car's accelerations and rates, roughly: up to 1 m/s^2 and 0.02 rad/s of everything.
+/// Returns roughly a car's accelerations and rates: up to 1 m/s^2 and 0.02 rad/s on every axis.
 fn window() -> [Features; WINDOW] {
     let mut noise = Noise::new(1);
     let force = i64::from(SpecificForce::PER_METRE_PER_SEC2 as i32);

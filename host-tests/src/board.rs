@@ -1,8 +1,8 @@
-//! The virtual STM32F405 for tests: the image as it is flashed, on a model of the chip in Python (`board/README.md`).
+//! The virtual STM32F405 for tests: runs the image as flashed, on a model of the chip in Python (`board/README.md`).
 //!
-//! The model runs in a process of its own. Its time passes only in [`Board::run`] and [`Board::run_until`], so a test
-//! sees the same on any machine. Whatever the model refuses (an unmodelled register, a peripheral without its clock) is
-//! a panic with the model's own words.
+//! The model runs in a process of its own. Board time passes only in [`Board::run`] and the `run_until` methods, so a
+//! test behaves the same on any machine. Whatever the model refuses (an unmodelled register, a peripheral without its
+//! clock) is a panic with the model's error text.
 
 pub mod bus;
 mod event;
@@ -24,8 +24,8 @@ use std::time::Duration;
 /// Packages that the model needs.
 pub const PACKAGES: &[&str] = &["unicorn"];
 
-/// Returns the ELF file of an image for a board, named by its feature. The test is reported as skipped where the model
-/// cannot run, for which nothing is built, or the image cannot be built.
+/// Returns the ELF file of an image for a board, named by its feature. The test is reported as skipped if the model
+/// cannot run (then nothing is built) or the image cannot be built.
 #[must_use]
 pub fn firmware(board: &str, test: &str, scratch: &str, name: &str) -> Option<PathBuf> {
     require::python(test, PACKAGES)?;
@@ -48,14 +48,15 @@ pub struct Board {
 }
 
 impl Board {
-    /// A board without power, with the image in its flash. `None` (aloud) where the model's packages are missing.
+    /// Returns a board without power, with the image in its flash. Reports the test as skipped if the model's
+    /// packages are missing.
     #[must_use]
     pub fn unpowered(test: &str, image: &Path) -> Option<Self> {
         let python = require::python(test, PACKAGES)?;
         Some(Self { link: Link::open(&python, image) })
     }
 
-    /// A board that has just been switched on.
+    /// Returns a board that has just been switched on.
     #[must_use]
     pub fn boot(test: &str, image: &Path) -> Option<Self> {
         let mut board = Self::unpowered(test, image)?;
@@ -85,7 +86,7 @@ impl Board {
         self.power_on();
     }
 
-    /// Pulls the reset pin for a moment.
+    /// Pulls the reset pin low for a moment.
     pub fn reset_pin(&mut self) {
         self.ask("reset_pin", json!({}));
     }
@@ -102,13 +103,13 @@ impl Board {
         self.run_until_any(&[json!({ "event": event })], limit).map(|(_, time)| time)
     }
 
-    /// Lets board time pass until the board has so many bytes unread on a line; returns whether it has.
+    /// Lets board time pass until a line has this many unread bytes from the board; returns whether it has.
     #[must_use]
     pub fn run_until_sent(&mut self, usart: usize, bytes: usize, limit: Duration) -> bool {
         self.run_until_any(&[json!({ "usart": usart, "bytes": bytes })], limit).is_some()
     }
 
-    /// Lets board time pass until one of the model's conditions holds; returns which and when.
+    /// Lets board time pass until one of the model's conditions holds; returns its index and the time.
     #[must_use]
     pub fn run_until_any(&mut self, conditions: &[Value], limit: Duration) -> Option<(usize, Duration)> {
         let answer = self.ask("run", json!({ "until": conditions, "limit_us": micros(limit) }));
@@ -116,7 +117,7 @@ impl Board {
         Some((met, duration(&answer["time_us"])))
     }
 
-    /// Sends bytes to the board, from now on at the pace of the line.
+    /// Sends bytes to the board from now on, at the bit rate of the line.
     pub fn send(&mut self, usart: usize, bytes: &[u8]) {
         self.ask("usart_send", json!({ "usart": usart, "hex": hex(bytes) }));
     }
@@ -126,13 +127,13 @@ impl Board {
         self.ask("usart_send", json!({ "usart": usart, "hex": hex(bytes), "at_us": micros(time) }));
     }
 
-    /// Takes what the board has sent.
+    /// Takes the bytes that the board has sent.
     #[must_use]
     pub fn sent(&mut self, usart: usize) -> Vec<u8> {
         self.sent_chunks(usart).into_iter().flat_map(|(_, bytes)| bytes).collect()
     }
 
-    /// Takes what the board has sent, in pieces without a gap, with the time of each first byte.
+    /// Takes the bytes that the board has sent, in pieces without a gap, with the time of each first byte.
     #[must_use]
     pub fn sent_chunks(&mut self, usart: usize) -> Vec<(Duration, Vec<u8>)> {
         let answer = self.ask("usart_take", json!({ "usart": usart }));
@@ -142,29 +143,29 @@ impl Board {
             .collect()
     }
 
-    /// The CAN bus, for a tester.
+    /// Returns the CAN bus, for a tester.
     pub fn bus(&mut self) -> CanBus<'_> {
         CanBus(self)
     }
 
-    /// A line of the board, for code that reads and writes.
+    /// Returns a line of the board, for code that reads and writes.
     pub fn line(&mut self, usart: usize) -> Line<'_> {
         Line::new(self, usart)
     }
 
-    /// Puts a frame of another node on the bus.
+    /// Sends a frame of another node on the bus.
     pub fn can_send(&mut self, frame: &DataFrame) {
         self.ask("can_send", foreign(frame));
     }
 
-    /// Puts a frame of another node on the bus, not before a time.
+    /// Sends a frame of another node on the bus, not before a time.
     pub fn can_send_at(&mut self, frame: &DataFrame, time: Duration) {
         let mut arguments = foreign(frame);
         arguments["at_us"] = micros(time).into();
         self.ask("can_send", arguments);
     }
 
-    /// Takes the frames that the board got onto the bus whole, with the time of their end.
+    /// Takes the frames that the board has sent completely, with the time of their end.
     #[must_use]
     pub fn can_frames(&mut self) -> Vec<(Duration, DataFrame)> {
         let answer = self.ask("can_take", json!({}));
@@ -173,7 +174,7 @@ impl Board {
         frames.map(|entry| (duration(&entry["time_us"]), frame(entry))).collect()
     }
 
-    /// Sets a fault or a condition of the surroundings, such as `"RCC.crystal_hz"` to `null`.
+    /// Sets a fault or a condition of the environment, such as `"RCC.crystal_hz"` to `null`.
     pub fn configure(&mut self, name: &str, value: impl Into<Value>) {
         self.ask("set", json!({ "values": { name: value.into() } }));
     }
@@ -185,7 +186,7 @@ impl Board {
         list(&answer["events"]).iter().map(Event::new).collect()
     }
 
-    /// Puts the register accesses of a peripheral into the event log.
+    /// Switches the recording of a peripheral's register accesses in the event log on or off.
     pub fn trace(&mut self, peripheral: &str, on: bool) {
         self.ask("trace", json!({ "peripheral": peripheral, "on": on }));
     }
@@ -209,7 +210,7 @@ impl Board {
         (word(&answer["address"]), word(&answer["size"]))
     }
 
-    /// A register of the processor: `r0` to `r12`, `sp`, `lr`, `pc`, `xpsr`, `msp`, `psp`, `primask`, ...
+    /// Returns a register of the processor: `r0` to `r12`, `sp`, `lr`, `pc`, `xpsr`, `msp`, `psp`, `primask`, ...
     #[must_use]
     pub fn register(&mut self, name: &str) -> u32 {
         let answer = self.ask("registers", json!({}));
@@ -221,24 +222,23 @@ impl Board {
         self.ask("registers", json!({ "set": { name: value } }));
     }
 
-    /// Cuts the power after so many accesses to the flash controller's registers or the flash array, then some time
-    /// later.
+    /// Cuts the power a delay after this many accesses to the flash controller's registers or the flash array.
     pub fn cut_after(&mut self, accesses: usize, delay: Duration) {
         self.ask("cut_after", json!({ "accesses": accesses, "delay_us": micros(delay) }));
     }
 
-    /// Instructions, board time, time asleep, and the state of power and core.
+    /// Returns instructions, board time, time asleep, and the state of power and core.
     #[must_use]
     pub fn counts(&mut self) -> Counts {
         Counts::new(&self.ask("counts", json!({})))
     }
 
-    /// Keeps the state of the whole board under a name.
+    /// Saves the state of the whole board under a name.
     pub fn snapshot(&mut self, name: &str) {
         self.ask("snapshot", json!({ "name": name }));
     }
 
-    /// Puts a kept state back.
+    /// Restores a saved state.
     pub fn restore(&mut self, name: &str) {
         self.ask("restore", json!({ "name": name }));
     }

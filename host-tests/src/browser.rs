@@ -11,11 +11,11 @@ use std::time::Duration;
 
 /// The names under which Chromium is installed.
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
-/// The longest time without an answer.
+/// Timeout for an answer.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// Requests come on descriptor 3 and answers go to 4; Rust has only the first three.
+/// Chromium reads requests from descriptor 3 and writes answers to 4; Rust can pipe only the first three.
 const ONTO_PIPES: &str = r#"exec "$@" 3<&0 4>&1 </dev/null >/dev/null 2>&1"#;
-/// The page says one of these where something is wrong.
+/// Events that report a problem on the page.
 const COMPLAINTS: [&str; 3] = ["Runtime.consoleAPICalled", "Runtime.exceptionThrown", "Log.entryAdded"];
 
 /// Holds a browser with one page.
@@ -30,7 +30,7 @@ pub struct Browser {
 }
 
 impl Browser {
-    /// Starts a browser that keeps its files in a folder; without one reports that the test is skipped.
+    /// Starts a browser that keeps its files in a folder; without a browser, reports that the test is skipped.
     ///
     /// # Panics
     /// As [`wants`], and when the browser does not start.
@@ -42,7 +42,7 @@ impl Browser {
         let name = wants(test, Need::Browser, found)?;
         let mut process = Command::new("sh")
             .args(["-c", ONTO_PIPES, "sh", name, "--headless", "--remote-debugging-pipe"])
-            // As root, in a container, Chromium runs no other way; it opens our own pages only.
+            // Chromium needs this to run as root in a container; it opens only our own pages.
             .args(["--no-sandbox", "--disable-gpu"])
             .arg(format!("--user-data-dir={}", folder.display()))
             .stdin(Stdio::piped())
@@ -71,10 +71,10 @@ impl Browser {
         Some(browser)
     }
 
-    /// Opens a file in a window of that width.
+    /// Opens a file in a window of this width, and waits until it is loaded.
     ///
     /// # Panics
-    /// When the browser gives no answer.
+    /// When the browser does not answer.
     pub fn open(&mut self, page: &Path, width: u32, dark: bool) {
         let size = json!({ "width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600 });
         self.call("Emulation.setDeviceMetricsOverride", size);
@@ -88,8 +88,8 @@ impl Browser {
         }
     }
 
-    /// Returns what the page has written on the console since it was opened, errors among it, and the addresses that it
-    /// has asked for.
+    /// Returns what the page has written to the console since it was opened, including errors, and the addresses that
+    /// it has requested.
     pub fn complaints_and_requests(&self) -> (Vec<&Value>, Vec<&str>) {
         let complaints =
             self.events.iter().filter(|event| COMPLAINTS.iter().any(|name| event["method"] == *name));
@@ -148,7 +148,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // The shell has become the browser, whose other processes end with it.
+        // The browser has replaced the shell, and its other processes end with it.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }

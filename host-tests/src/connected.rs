@@ -21,22 +21,22 @@ const FOG: usize = 3;
 /// The number of USARTs that such a board needs.
 pub const USARTS: usize = qemu::SERVICE;
 /// The gyro sends this many messages in 10 ms.
-const MESSAGES: usize = 10;
+const MESSAGES_PER_ROW: usize = 10;
 /// The gyro has this resolution, rad.
-const STEP: f64 = 4e-8;
+const FOG_STEP: f64 = 4e-8;
 /// A sample of the MTi makes this many frames.
-const SET: usize = 6;
+const FRAMES_PER_SAMPLE: usize = 6;
 /// TX1 begins like this when the sensor is silent: no rate, failed.
-const SILENT: &[u8] = b"t1748008020FF0080";
+const SILENT_TX1: &[u8] = b"t1748008020FF0080";
 /// Wheel frames are this many samples apart.
-const WHEELS: usize = 2;
+const WHEEL_INTERVAL: usize = 2;
 /// The vehicle stands for this many samples.
-const STANDING: usize = 600;
+const STANDING_SAMPLES: usize = 600;
 
 /// Holds the inputs of 10 ms, in order.
 #[derive(Debug, Clone)]
 pub struct Step {
-    /// The frame of all four wheels, where one comes.
+    /// The frame of all four wheels, in the steps that have one.
     pub wheels: Option<DataFrame>,
     /// The message of the MTi.
     pub imu: MtData2,
@@ -47,12 +47,12 @@ pub struct Step {
 impl Step {
     /// Returns the inputs that belong to a row.
     #[must_use]
-    pub fn of(number: usize, row: &Row) -> Self {
-        let speed = if number < STANDING { 0.0 } else { 20.0 };
+    pub fn from_row(number: usize, row: &Row) -> Self {
+        let speed = if number < STANDING_SAMPLES { 0.0 } else { 20.0 };
         Self {
-            wheels: number.is_multiple_of(WHEELS).then(|| wheels(speed)),
+            wheels: number.is_multiple_of(WHEEL_INTERVAL).then(|| wheels(speed)),
             imu: replay::message(number, row),
-            fog: fog(number, reading(number, row)),
+            fog: fog_bytes(number, fog_reading(number, row)),
         }
     }
 
@@ -64,25 +64,25 @@ impl Step {
 
 /// Returns each of the gyro's readings in the 10 ms that end with a row, rad: a tenth of the turn.
 #[must_use]
-pub fn reading(number: usize, row: &Row) -> f32 {
+pub fn fog_reading(number: usize, row: &Row) -> f32 {
     // A gyro that repeats itself counts as stuck, so no reading equals the one before.
-    let noise = if number.is_multiple_of(2) { STEP / 4.0 } else { -STEP / 4.0 };
-    ((row.reference * 0.01 / MESSAGES as f64 / STEP).round() * STEP + noise) as f32
+    let noise = if number.is_multiple_of(2) { FOG_STEP / 4.0 } else { -FOG_STEP / 4.0 };
+    ((row.reference * 0.01 / MESSAGES_PER_ROW as f64 / FOG_STEP).round() * FOG_STEP + noise) as f32
 }
 
-/// Returns the bytes that the gyro sends in the 10 ms that end with a row. It begins with the message that ends with
-/// the first row, so that a set of ours always comes with the last message.
+/// Returns the bytes that the gyro sends in the 10 ms that end with a row. For the first row it sends only the last
+/// message, so that a message set always follows the last message of a row.
 #[must_use]
-pub fn fog(number: usize, reading: f32) -> Vec<u8> {
+pub fn fog_bytes(number: usize, reading: f32) -> Vec<u8> {
     let message = |part: usize| Message {
         rotation: [0.0, 0.0, reading],
         acceleration: [0.0; 3],
         extra: Extra::Temperature(25),
         validity: Validity::ALL,
-        sequence: ((number * MESSAGES + part) % 128) as u8,
+        sequence: ((number * MESSAGES_PER_ROW + part) % 128) as u8,
     };
-    let first = if number == 0 { MESSAGES - 1 } else { 0 };
-    (first..MESSAGES).flat_map(|part| message(part).emit().to_vec()).collect()
+    let first = if number == 0 { MESSAGES_PER_ROW - 1 } else { 0 };
+    (first..MESSAGES_PER_ROW).flat_map(|part| message(part).emit().to_vec()).collect()
 }
 
 /// Returns the frame of four wheels at the same speed, km/h.
@@ -92,7 +92,7 @@ fn wheels(speed: f64) -> DataFrame {
     DataFrame::new(id, &[code.to_be_bytes(); 4].concat()).expect("eight bytes")
 }
 
-/// Holds an input over one line.
+/// One input on one line.
 enum Input {
     Wheels(DataFrame),
     Imu(Vec<u8>),
@@ -100,24 +100,24 @@ enum Input {
 }
 
 impl Input {
-    /// Gives it to the host's board. Returns whether the frames show that all of it has been taken.
-    fn push(&self, host: &mut replay::Board) -> bool {
+    /// Passes the input to the host's board. Returns whether the frames show that all of it has been processed.
+    fn pass_to(&self, host: &mut replay::Board) -> bool {
         match self {
             Self::Wheels(frame) => host.wheel(frame),
             Self::Imu(bytes) => host.push(bytes),
             Self::Fog(bytes) => {
-                let taken = host.fog().samples;
-                let (last, before) = bytes.split_last().expect("the gyro sends all the time");
-                host.push_fog(before);
+                let before = host.fog().samples;
+                let (last, rest) = bytes.split_last().expect("the gyro sends all the time");
+                host.push_fog(rest);
                 let lines = host.lines.len();
                 host.push_fog(&[*last]);
-                return host.lines.len() > lines || host.fog().samples == taken;
+                return host.lines.len() > lines || host.fog().samples == before;
             }
         }
         true
     }
 
-    fn line(&self) -> (usize, Vec<u8>) {
+    fn usart_and_bytes(&self) -> (usize, Vec<u8>) {
         match self {
             Self::Wheels(frame) => (SLCAN, slcan::emit(frame).expect("a data frame").to_vec()),
             Self::Imu(bytes) => (IMU, bytes.clone()),
@@ -130,7 +130,7 @@ impl Input {
 pub struct Outcome {
     /// The host's board, which never finds its sensor silent.
     pub host: replay::Board,
-    /// The host's board that was silent where the emulated one was.
+    /// The host's board that was silent whenever the emulated one was.
     pub followed: replay::Board,
     /// The number of frames of the emulated board.
     pub sent: usize,
@@ -138,11 +138,11 @@ pub struct Outcome {
     pub counters: AllCounters,
 }
 
-/// Gives each input to the emulated board when it has taken the one before, since their order counts. Every frame must
-/// equal the host's.
+/// Passes each input to the emulated board once the board has processed the previous one, since their order matters.
+/// Every frame must equal the host's.
 ///
 /// # Panics
-/// When one is not, or frames are missing.
+/// When a frame differs or is missing.
 #[must_use]
 pub fn run(board: &mut qemu::Board, configuration: &Configuration, steps: &[Step]) -> Outcome {
     let mut device = board.device(LIMIT);
@@ -150,35 +150,35 @@ pub fn run(board: &mut qemu::Board, configuration: &Configuration, steps: &[Step
     let mut host = replay::Board::configured(configuration, weights());
     let mut answers = 0;
     let inputs: Vec<Input> = steps.iter().cloned().flat_map(Step::inputs).collect();
-    let mut said_silent = 0;
+    let mut host_silent = 0;
     for input in &inputs {
         let before = host.lines.len();
-        let seen = input.push(&mut host);
-        said_silent += host.lines[before..].iter().filter(|line| line.starts_with(SILENT)).count();
-        let (usart, bytes) = input.line();
+        let is_processed = input.pass_to(&mut host);
+        host_silent += host.lines[before..].iter().filter(|line| line.starts_with(SILENT_TX1)).count();
+        let (usart, bytes) = input.usart_and_bytes();
         board.send(usart, &bytes, LIMIT);
         answers += usize::from(usart == SLCAN);
         let awaited = host.lines.len() + answers;
         board.await_sent(SLCAN, LIMIT, |sent| {
             let lines = sent.split_inclusive(|byte| *byte == b'\r');
             let (all, silent) = lines.fold((0, 0), |(all, silent), line| {
-                (all + usize::from(line.ends_with(b"\r")), silent + usize::from(line.starts_with(SILENT)))
+                (all + usize::from(line.ends_with(b"\r")), silent + usize::from(line.starts_with(SILENT_TX1)))
             });
-            all + said_silent * SET >= awaited + silent * SET
+            all + host_silent * FRAMES_PER_SAMPLE >= awaited + silent * FRAMES_PER_SAMPLE
         });
         let until = Instant::now() + LIMIT;
-        while !seen && counters(&mut device).fog.samples != host.fog().samples {
+        while !is_processed && counters(&mut device).fog.samples != host.fog().samples {
             assert!(Instant::now() < until, "the gyro's messages are not taken");
         }
     }
     let counters = counters(&mut device);
     let sent = frames(&board.lines(SLCAN, b'\r', 0, LIMIT));
-    let mut followed = replay::Board::configured(configuration, weights()).beside(sent.clone());
+    let mut followed = replay::Board::configured(configuration, weights()).follow_lines(sent.clone());
     for input in &inputs {
-        input.push(&mut followed);
+        input.pass_to(&mut followed);
     }
     replay::assert_same(&sent, &followed.lines);
-    // Silences of a busy host are followed and compared like all else, but they must not be most of what is compared.
+    // Silences caused by a busy host are followed and compared too, but must not be most of what is compared.
     assert!(followed.followed < steps.len() as u64 / 2, "the host was busy: {}", followed.followed);
     Outcome { host, followed, sent: sent.len(), counters }
 }
@@ -194,7 +194,7 @@ pub fn counters(device: &mut qemu::Tester) -> AllCounters {
     device.counters().expect("counters")
 }
 
-/// Returns the host's board of a configuration after these steps.
+/// Returns a board on the host with this configuration, after these steps.
 ///
 /// # Panics
 /// When the library's own weights are refused.
@@ -203,7 +203,7 @@ pub fn on_host(configuration: &Configuration, steps: &[Step]) -> replay::Board {
     let weights = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
     let mut host = replay::Board::configured(configuration, weights);
     for input in steps.iter().cloned().flat_map(Step::inputs) {
-        input.push(&mut host);
+        input.pass_to(&mut host);
     }
     host
 }
@@ -214,7 +214,7 @@ fn frames(lines: &[Vec<u8>]) -> Vec<Vec<u8>> {
 }
 
 /// Returns the frames with an identifier of 11 bits among lines, each with the number of the MTi's sample before it.
-pub fn of(lines: &[Vec<u8>], id: u16) -> impl Iterator<Item = (usize, DataFrame)> {
+pub fn frames_with_id(lines: &[Vec<u8>], id: u16) -> impl Iterator<Item = (usize, DataFrame)> {
     let id = Id::Standard(StandardId::new(id).expect("11 bits"));
     let frames = lines.iter().map(|line| slcan::parse::<DataFrame>(line).expect("a frame"));
     let numbered = frames.scan(0, move |samples, frame| {
@@ -226,5 +226,6 @@ pub fn of(lines: &[Vec<u8>], id: u16) -> impl Iterator<Item = (usize, DataFrame)
 
 /// Returns the rates with an identifier, each with the number of the MTi's sample before it.
 pub fn rates(lines: &[Vec<u8>], id: u16) -> impl Iterator<Item = (usize, RateMessage)> {
-    of(lines, id).map(|(samples, frame)| (samples, RateMessage::parse(frame.data()).expect("a rate")))
+    frames_with_id(lines, id)
+        .map(|(samples, frame)| (samples, RateMessage::parse(frame.data()).expect("a rate")))
 }

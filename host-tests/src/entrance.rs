@@ -1,5 +1,5 @@
-//! This module lists every place where bytes from outside come in, as a function that takes any bytes and panics if the
-//! result breaks a promise.
+//! This module lists every entry point for bytes from outside, as a function that accepts any bytes and panics if the
+//! result breaks a guarantee.
 //!
 //! The fuzz targets of `host-tests/fuzz` run these under coverage; `tests/library/entrances.rs` runs them
 //! over the corpus and over damaged copies of it.
@@ -23,7 +23,7 @@ pub type Seed = (&'static str, Vec<u8>);
 pub struct Entrance {
     /// The name of its fuzz target and of its folder in the corpus.
     pub name: &'static str,
-    /// The function, which takes any bytes.
+    /// The function, which accepts any bytes.
     pub run: fn(&[u8]),
     /// The initial corpus, which is generated and not recorded.
     pub seeds: fn() -> Vec<Seed>,
@@ -60,20 +60,20 @@ pub const ALL: [Entrance; 17] = [
 /// Runs an entrance by its name.
 ///
 /// # Panics
-/// When there is none of that name, or when it breaks a promise.
+/// When there is no entrance of that name, or when it breaks a guarantee.
 pub fn run(name: &str, data: &[u8]) {
     let entrance = ALL.iter().find(|entrance| entrance.name == name).expect("an entrance of that name");
     (entrance.run)(data);
 }
 
-/// Takes bytes off the front; if there are fewer, it takes all.
+/// Takes `len` bytes off the front, or all if there are fewer.
 fn take<'d>(data: &mut &'d [u8], len: usize) -> &'d [u8] {
     let (head, tail) = data.split_at(len.min(data.len()));
     *data = tail;
     head
 }
 
-/// Takes a byte off the front; zero at the end.
+/// Takes a byte off the front, or zero at the end.
 fn byte(data: &mut &[u8]) -> u8 {
     take(data, 1).first().copied().unwrap_or_default()
 }

@@ -33,7 +33,7 @@ pub enum Cut {
 }
 
 impl Cut {
-    /// All ways, in the order of their effect.
+    /// All kinds of cut, in the order of their effect.
     pub const ALL: [Self; 5] = [Self::Before, Self::Front, Self::Anywhere, Self::Zeros, Self::After];
 
     const fn tears(self) -> bool {
@@ -115,12 +115,12 @@ impl F405 {
         bytemuck::cast_slice(&self.words)
     }
 
-    /// Changes a byte, as a fault of the part would.
+    /// Flips bits of a byte, as a fault of the part would.
     pub fn damage(&mut self, offset: usize, bits: u8) {
         bytemuck::cast_slice_mut::<u32, u8>(&mut self.words)[offset] ^= bits;
     }
 
-    /// Returns how far the next operation gets; `None` if it is completed.
+    /// Starts an operation; returns how a power cut hits it, or `None` if it is completed.
     fn step(&mut self) -> Result<Option<Cut>, MockError> {
         if !self.powered {
             return Err(MockError::PowerCut);
@@ -161,7 +161,7 @@ impl F405 {
             if erased {
                 self.words[word] = if hit == Some(Cut::Zeros) { 0 } else { u32::MAX };
             }
-            // After a torn erasure no word may be relied on to take a value.
+            // After a torn erasure no word can be programmed reliably.
             self.states[word] = if hit.is_some_and(Cut::tears) { Word::Programmed } else { Word::Erased };
         }
         if hit.is_some() { Err(MockError::PowerCut) } else { Ok(()) }
@@ -239,8 +239,8 @@ impl<const SECTOR: usize> NorFlash for Region<SECTOR> {
 
 /// Gives access to the weight files of a flash, which can also be read in place.
 ///
-/// [`MappedSlots::slots`] returns a copy of the content at the last operation: the
-/// mock's bytes are behind a cell.
+/// [`MappedSlots::slots`] returns a copy of the content after the last operation, because the mock's bytes are in a
+/// `RefCell`.
 #[derive(Debug)]
 pub struct MappedRegion {
     region: Region<RECORD_SECTOR>,
@@ -254,7 +254,7 @@ impl MappedRegion {
         Self { region: Region::new(flash, 0..BYTES as u32), copy: flash.borrow().words.clone() }
     }
 
-    /// The bytes of both slots.
+    /// Returns the bytes of both slots.
     #[must_use]
     pub fn current(&self) -> [&[u8]; 2] {
         self.bytes(SLOTS).split_at(SLOT_SIZE).into()

@@ -5,8 +5,8 @@ use safetensors::{Dtype, SafeTensors};
 
 /// Each file has this many windows.
 pub const WINDOWS: usize = 8;
-/// Values may differ by this: f32 sums of a few hundred products of order 1, twice over, are in another order than
-/// PyTorch's. A normalised input of 20 has an LSB of 2e-6; everything else stays within 1.
+/// Allowed difference: f32 sums of a few hundred products of order 1, twice over, are summed in another order than in
+/// PyTorch. A normalised input of 20 has an LSB of 2e-6; everything else stays within 1.
 const TOLERANCE: f32 = 1e-5;
 
 /// Holds a file of golden tensors.
@@ -17,7 +17,7 @@ impl Golden {
     /// Reads the tensors of a network, `gyronet` or `fognet`.
     ///
     /// # Panics
-    /// Unless it is in the repository.
+    /// When the file is not in the repository.
     #[must_use]
     pub fn read(network: &str) -> Self {
         let path = workspace().join(format!("tools/weights/{network}.golden.safetensors"));
@@ -27,7 +27,7 @@ impl Golden {
     /// Returns the values of a tensor, row-major.
     ///
     /// # Panics
-    /// Unless it is there, in f32 and of this shape.
+    /// When the tensor is missing, not f32, or of another shape.
     #[must_use]
     pub fn tensor(&self, name: &str, shape: &[usize]) -> Vec<f32> {
         let file = SafeTensors::deserialize(&self.0).expect("safetensors");

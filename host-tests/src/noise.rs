@@ -1,9 +1,9 @@
-//! This module makes random numbers from a seed for long streams, the same on every machine and every time; and the
+//! This module generates seeded random numbers for long streams, the same on every machine and in every run, and the
 //! settings of the property tests, whose seeds change from run to run.
 
 use proptest::test_runner::Config;
 
-/// Returns the settings for so many cases. Failed ones are not written beside the sources: the message has the input.
+/// Returns the settings for this many cases. Failed cases are not written to files, since the message has the input.
 #[must_use]
 pub fn cases(count: u32) -> Config {
     // Miri checks every access of a case, so a few cases are enough there.
@@ -38,7 +38,7 @@ impl Noise {
     /// Returns one of `from..=to`.
     pub fn int(&mut self, from: i64, to: i64) -> i64 {
         let span = to.abs_diff(from) as u128 + 1;
-        // The high half of a 64 x 64 bit product: even to one part in 2^64 / span.
+        // The high half of a 64 x 64 bit product: uniform to one part in 2^64 / span.
         from + ((u128::from(self.bits()) * span) >> 64) as i64
     }
 

@@ -1,5 +1,5 @@
-//! This module makes LSTM weights row by row and packs them as the documentation of `gyronet::nn::lstm` says; it was
-//! written from there, not from the quantiser, so that it can check both.
+//! This module creates LSTM weights row by row and packs them as documented in `gyronet::nn::lstm`. It was written
+//! from that documentation, not from the quantiser, so that it can check both.
 
 use crate::noise::Noise;
 use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT};
@@ -29,8 +29,8 @@ impl Row {
         sum(&self.input, input_max) + sum(&self.recurrent, HIDDEN_MAX) + i64::from(self.bias.unsigned_abs())
     }
 
-    /// Returns random weights up to `largest`, thinned until the row's bound stays below `limit`; the
-    /// bias may take all that is left.
+    /// Returns random weights up to `largest`, thinned until the row's bound stays below `limit`; the bias may use
+    /// all of the remaining range.
     fn random(
         noise: &mut Noise,
         inputs: usize,
@@ -60,7 +60,7 @@ impl Row {
 pub struct Rows(pub Vec<[Row; GATES]>);
 
 impl Rows {
-    /// Returns random rows within what the kernel can hold for inputs up to `input_max`.
+    /// Returns random rows within the range of the kernel for inputs up to `input_max`.
     #[must_use]
     pub fn random(noise: &mut Noise, inputs: usize, units: usize, input_max: i32) -> Self {
         let mut row = |gate: usize| {
@@ -77,7 +77,7 @@ impl Rows {
             Packed { units: self.0.len(), inputs: self.0[0][0].input.len(), ..Packed::default() };
         for unit in &self.0 {
             let [i, f, g, o] = unit.each_ref().map(|row| row.bias);
-            // 256 * high + low may exceed 32 bits: it is taken modulo 2^32.
+            // 256 * high + low may exceed 32 bits; the sum is taken modulo 2^32.
             let both = |low: i32, high: i32| 256 * i64::from(high) + i64::from(low);
             packed.input.extend([i.into(), both(i, f), g.into(), both(g, o)].map(|start: i64| start as u32));
             columns(&mut packed.input, unit.each_ref().map(|row| row.input.clone()), 2);
@@ -89,14 +89,14 @@ impl Rows {
     }
 }
 
-/// Packs two halfwords into a word, the first one lower.
+/// Packs two halfwords into a word, the first in the lower half.
 #[must_use]
 pub fn word(first: i16, second: i16) -> u32 {
     let ([a, b], [c, d]) = (first.to_le_bytes(), second.to_le_bytes());
     u32::from_le_bytes([a, b, c, d])
 }
 
-/// Returns the packed words of rows i, f, g, o, their columns filled up with zeros to a multiple.
+/// Appends the packed words of rows i, f, g, o, with their columns padded with zeros to a multiple.
 fn columns(out: &mut Vec<u32>, mut rows: [Vec<i8>; GATES], multiple: usize) {
     for row in &mut rows {
         row.resize(row.len().next_multiple_of(multiple), 0);
@@ -120,10 +120,10 @@ pub struct Packed {
 }
 
 impl Packed {
-    /// Returns the weights as the kernel takes them.
+    /// Returns the weights in the form that the kernel uses.
     ///
     /// # Panics
-    /// When the kernel does not take records of this size.
+    /// When the kernel does not accept records of this size.
     #[must_use]
     pub fn direction(&self) -> DirectionWeights<'_> {
         DirectionWeights::new(self.units, self.inputs, &self.input, &self.recurrent)

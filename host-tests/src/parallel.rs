@@ -14,7 +14,7 @@ pub fn table<T: Sync>(heading: &str, items: &[T], judge: impl Fn(&T) -> (String,
 /// Returns the results of `judge` for each item in their order; each item has a thread.
 ///
 /// # Panics
-/// When one of them does.
+/// When `judge` panics.
 pub fn map<T: Sync, R: Send>(items: &[T], judge: impl Fn(&T) -> R + Sync) -> Vec<R> {
     std::thread::scope(|scope| {
         let judge = &judge;

@@ -71,7 +71,7 @@ impl Board {
         sure(self.0.serve(n))
     }
 
-    /// Opens the service line, once the image listens to it, of a board with [`SERVICE`] USARTs.
+    /// Opens the service line of a board with [`SERVICE`] USARTs, once the image reads from it.
     #[must_use]
     pub fn device(&mut self, limit: Duration) -> Tester {
         self.send(SERVICE, b"\r", limit);

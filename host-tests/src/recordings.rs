@@ -52,10 +52,10 @@ pub struct Row {
     pub reference: f64,
 }
 
-/// Reads the rows of a recording. It is a reader of the tests' own, to compare the tools' one with.
+/// Reads the rows of a recording. The tests have this reader of their own, to compare with that of the tools.
 ///
 /// # Panics
-/// When the file is not of the layout of `wid_car`.
+/// When the file does not have the layout of `wid_car`.
 #[must_use]
 pub fn rows(path: &Path) -> Vec<Row> {
     let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));

@@ -1,5 +1,5 @@
 //! This module is the image's output task on the host: bytes of an Xsens MTi and a DSP-1760 and wheel frames go in,
-//! SLCAN lines come out. It is the input and output around the library's [`Coprocessor`], as the image is.
+//! SLCAN lines come out. Like the image, it does the input and output around the library's [`Coprocessor`].
 
 use crate::recordings::{self, Row, workspace};
 use gyronet::can::config::Config;
@@ -37,7 +37,7 @@ pub fn message(number: usize, row: &Row) -> MtData2 {
 /// Returns samples of the simulated drive as an MTi sends them, message by message.
 ///
 /// # Panics
-/// When the drive is shorter.
+/// When the drive has fewer samples.
 #[must_use]
 pub fn simulated_drive(samples: Range<usize>) -> Vec<Vec<u8>> {
     let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
@@ -56,10 +56,11 @@ pub fn assert_same(lines: &[Vec<u8>], expected: &[Vec<u8>]) {
     assert!(lines.len() >= expected.len(), "{} lines, {} expected", lines.len(), expected.len());
 }
 
-/// Returns the bytes that it sends when the vehicle is level and turns at `yaw_rate`, rad/s, 10 ms after 10 ms.
+/// Returns the bytes of message `number` of an MTi, one every 10 ms, when the vehicle is level and turns at
+/// `yaw_rate`, rad/s.
 #[must_use]
 pub fn turning(number: usize, yaw_rate: f32) -> Vec<u8> {
-    // The least bits of a real part always move.
+    // The lowest bits of a real part always change.
     let sign = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
     let (force, rate) = (2e-6 * sign, 8e-9 * sign);
     let row = Row {
@@ -90,11 +91,11 @@ pub struct Board {
     fog_network: FogNet<'static, 'static>,
     mti: Mti,
     dsp1760: Dsp1760,
-    /// The board's time: it passes while the sensor is silent, since bytes come at the host's pace.
+    /// Board time, which passes only while the sensor is silent, since bytes arrive at the host's pace.
     now: Micros,
     /// The lines that an emulated board has sent: see [`Board::following`].
-    heard: Vec<Vec<u8>>,
-    /// The sensor has been silent for so many message sets.
+    emulated_lines: Vec<Vec<u8>>,
+    /// Number of message sets for which the sensor has been silent.
     silent: u64,
     /// The number of message sets without a rate that were followed.
     pub followed: u64,
@@ -119,7 +120,7 @@ impl Board {
         Self::configured(&Configuration::DEFAULT, blob)
     }
 
-    /// Returns a board with another configuration, on other weights.
+    /// Returns a board with this configuration and these weights.
     ///
     /// # Panics
     /// When the configuration, or FoGNet's own weights, are refused.
@@ -144,28 +145,28 @@ impl Board {
             mti: Mti::new(),
             dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
             now: Micros(0),
-            heard: Vec::new(),
+            emulated_lines: Vec::new(),
             silent: 0,
             followed: 0,
             lines: Vec::new(),
         }
     }
 
-    /// Returns a board that follows an emulated one which has sent these lines. A busy host may delay its bytes for so
-    /// long that the emulated board finds the sensor silent, by its own clock, and reports that; this board then
-    /// reports it too. Everything else must be the same.
+    /// Returns a board that follows an emulated one, given the lines that it has sent. A busy host may delay bytes
+    /// for so long that the emulated board, by its own clock, finds the sensor silent and reports that; this board
+    /// then reports it too. Everything else must be the same.
     #[must_use]
     pub fn following(lines: Vec<Vec<u8>>) -> Self {
-        Self::new().beside(lines)
+        Self::new().follow_lines(lines)
     }
 
     /// Follows an emulated board that has sent these lines, as [`Board::following`].
     #[must_use]
-    pub fn beside(self, lines: Vec<Vec<u8>>) -> Self {
-        Self { heard: lines, ..self }
+    pub fn follow_lines(self, lines: Vec<Vec<u8>>) -> Self {
+        Self { emulated_lines: lines, ..self }
     }
 
-    /// Returns the board that has found something damaged at its start, perhaps the configuration itself.
+    /// Returns the board as if it had found damage in its storage at the start, which may include the configuration.
     #[must_use]
     pub fn damaged(self, configuration_lost: bool) -> Self {
         let storage = StorageFaults { damaged: true, configuration_lost };
@@ -184,7 +185,7 @@ impl Board {
             let set: Vec<Vec<u8>> =
                 std::iter::from_fn(|| coprocessor.next_frame()).map(|sent| line(&sent)).collect();
             let at = self.lines.len();
-            if self.heard.get(at..at + set.len()) != Some(&set[..]) {
+            if self.emulated_lines.get(at..at + set.len()) != Some(&set[..]) {
                 return;
             }
             (self.coprocessor, self.now) = (coprocessor, now);
@@ -200,7 +201,7 @@ impl Board {
         Micros(self.now.0 + if self.silent == 0 { first } else { PERIOD_US })
     }
 
-    /// Takes bytes of the inertial sensor.
+    /// Receives bytes of the inertial sensor.
     pub fn push(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.mti.receive(*byte);
@@ -215,13 +216,13 @@ impl Board {
         }
     }
 
-    /// Takes a wheel frame.
+    /// Receives a wheel frame.
     pub fn wheel(&mut self, frame: &DataFrame) {
         // A wrong frame shows as silent wheels.
         let _ = self.coprocessor.can(frame, self.now);
     }
 
-    /// Takes bytes of the fibre-optic gyro.
+    /// Receives bytes of the fibre-optic gyro.
     pub fn push_fog(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.dsp1760.receive(*byte);
@@ -238,13 +239,13 @@ impl Board {
         }
     }
 
-    /// Returns the numbers of events of the fibre-optic gyro.
+    /// Returns the counters of the fibre-optic gyro.
     #[must_use]
     pub fn fog(&self) -> &FogCounters {
         self.coprocessor.fog_counters()
     }
 
-    /// Lets the sensor be silent for so many message sets; if it has sent nothing yet, from the start.
+    /// Keeps the sensor silent for this many message sets; from the start if it has sent nothing yet.
     ///
     /// # Panics
     /// When the coprocessor does not report it.

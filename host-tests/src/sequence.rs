@@ -9,7 +9,7 @@ use tempfile::tempdir;
 /// Returns a sequence that is simulated, written and read back.
 ///
 /// # Panics
-/// When there is no room for its files.
+/// When its files cannot be written.
 #[must_use]
 pub fn simulate(spec: &Spec) -> Sequence {
     let parent = tempdir().expect("there is room");

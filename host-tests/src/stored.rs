@@ -1,6 +1,6 @@
-//! This module prepares the flash of an emulated board before it starts: the library's own store writes it to the mock
-//! of the F405's flash, and it is loaded into the emulator's memory, which is mapped although the emulator has no flash
-//! controller.
+//! This module prepares the flash of an emulated board before it starts: the library's own store writes to the mock
+//! of the F405's flash, and the content is loaded into the emulator's memory. That memory is mapped although the
+//! emulator has no flash controller.
 
 use crate::flash::{F405, Region};
 use crate::qemu;
@@ -28,7 +28,7 @@ pub fn slots(flash: &F405) -> [&[u8]; 2] {
     bytes.split_at(SLOT_SIZE).into()
 }
 
-/// Returns the place of FoGNet's file in a flash.
+/// Returns the content of the place of FoGNet's file in a flash.
 #[must_use]
 pub fn fognet(flash: &F405) -> &[u8] {
     &flash.bytes()[layout::FOGNET.start as usize..layout::FOGNET.end as usize]
@@ -51,8 +51,8 @@ pub fn upload(flash: &Rc<RefCell<F405>>, place: Place, file: &[u8]) -> Result<()
     store.set(&accepted.with(place, crc)).map_err(|e| text(&e))
 }
 
-/// Returns the built-in weights with these bits of the output's bias flipped (bits 8 to 15 of it), and a
-/// checksum that fits.
+/// Returns the built-in weights with these bits of the output bias flipped (within its bits 8 to 15), and a valid
+/// checksum.
 #[must_use]
 pub fn other_weights(bits: u8) -> Vec<u8> {
     let mut file = weights::GYRONET.0.to_vec();
@@ -107,8 +107,8 @@ impl Stored {
         self
     }
 
-    /// Copies it into a virtual board's flash.
-    pub fn lay(&self, board: &mut crate::board::Board) {
+    /// Copies the content into a virtual board's flash.
+    pub fn write_to(&self, board: &mut crate::board::Board) {
         let flash = self.0.borrow();
         for range in [layout::STORE, layout::FOGNET, layout::SLOTS] {
             let bytes = &flash.bytes()[range.start as usize..range.end as usize];
@@ -116,20 +116,20 @@ impl Stored {
         }
     }
 
-    /// Starts an emulated board with it in its memory; the files for that go to `folder`.
+    /// Starts an emulated board with this content in its memory; the files to load are written to `folder`.
     ///
     /// # Panics
     /// When they cannot be written, and as [`qemu::Board`].
     #[must_use]
     pub fn boot(&self, image: &Path, usarts: usize, folder: &str, test: &str) -> qemu::Board {
         let flash = self.0.borrow();
-        let lay = |Range { start, end }: Range<u32>| {
+        let loader = |Range { start, end }: Range<u32>| {
             let file = Path::new(folder).join(format!("{test}_{start:x}.bin"));
             std::fs::write(&file, &flash.bytes()[start as usize..end as usize]).expect("a file for QEMU");
             let address = FLASH_BASE + start;
             format!("loader,file={},addr={address:#x},force-raw=on", file.display())
         };
-        let [records, fognet, slots] = [layout::STORE, layout::FOGNET, layout::SLOTS].map(lay);
+        let [records, fognet, slots] = [layout::STORE, layout::FOGNET, layout::SLOTS].map(loader);
         qemu::Board::boot(image, usarts, &["-device", &records, "-device", &fognet, "-device", &slots])
     }
 }

@@ -7,7 +7,7 @@ use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::{DueWindow, Output, Pipeline, PipelineConfig};
 use gyronet::sample::ImuSample;
 
-/// Undisturbed, static initialisation is over from this tick on.
+/// First tick after static initialisation, if nothing disturbs it.
 pub const KNOWN: u64 = 300;
 
 /// Returns a pipeline with its defaults.
@@ -26,10 +26,10 @@ pub fn constant(correction: f64) -> impl FnMut(&DueWindow) -> Option<Estimate> {
     move |_| Some(Estimate { corrections: [rate(correction); WINDOW], scale: SCALE_MIN, ..Estimate::NONE })
 }
 
-/// Runs samples through a pipeline; estimates are delivered at once, and a `None` is not delivered.
+/// Runs samples through a pipeline; estimates are delivered at once, and for `None` nothing is delivered.
 ///
 /// # Panics
-/// When a sample has no place on the grid.
+/// When a sample does not fit the time grid.
 pub fn run(
     pipeline: &mut Pipeline,
     samples: impl IntoIterator<Item = ImuSample>,
@@ -37,7 +37,7 @@ pub fn run(
 ) -> Vec<Output> {
     let mut outputs = Vec::new();
     for sample in samples {
-        let output = pipeline.correct(sample).expect("a place on the grid");
+        let output = pipeline.correct(sample).expect("the sample is on the grid");
         if let Some(due) = &output.window
             && let Some(estimate) = network(due)
         {

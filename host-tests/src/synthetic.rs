@@ -1,4 +1,4 @@
-//! This module makes samples of a vehicle that stands, turns or shakes, in the codes of the pipeline.
+//! This module creates samples of a vehicle that stands, turns or shakes, in the pipeline's fixed-point units.
 
 use crate::noise::Noise;
 use gyronet::estimate::{VehicleSample, YawEstimate};
@@ -6,7 +6,7 @@ use gyronet::health::{Quality, Source};
 use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
 
-/// Returns the code of a rate, rad/s.
+/// Returns a rate, rad/s, in fixed point.
 ///
 /// # Panics
 /// Beyond +-16 rad/s.
@@ -15,7 +15,7 @@ pub fn rate(rad_per_sec: f64) -> AngularRate {
     AngularRate::from_rad_per_sec(rad_per_sec as f32).expect("a gyro's range")
 }
 
-/// Returns the code of a specific force, m/s^2.
+/// Returns a specific force, m/s^2, in fixed point.
 ///
 /// # Panics
 /// Beyond +-2048 m/s^2.
@@ -52,7 +52,7 @@ pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {
     sample
 }
 
-/// Returns a good rate with the yaw turned by then.
+/// Returns an estimate of good quality with this rate and yaw.
 #[must_use]
 pub fn estimate(rate: AngularRate, yaw: Yaw) -> YawEstimate {
     YawEstimate { rate, yaw, source: Source::GyroNet, quality: Quality::Good, ..YawEstimate::default() }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 /// Fills the rest of a frame.
 const PADDING: u8 = 0x55;
 
-/// Returns the frames of a message: a single one, or a first one and its consecutive ones.
+/// Returns the frames of a message: a single frame, or a first frame and its consecutive frames.
 #[must_use]
 pub fn segment(message: &[u8]) -> Vec<[u8; 8]> {
     if message.len() <= 7 {
@@ -17,7 +17,7 @@ pub fn segment(message: &[u8]) -> Vec<[u8; 8]> {
     std::iter::once(frame(&[0x10 | high, low], first)).chain(consecutive).collect()
 }
 
-/// Returns a frame of these bytes.
+/// Returns a frame of `head` and `bytes`, padded.
 #[must_use]
 pub fn frame(head: &[u8], bytes: &[u8]) -> [u8; 8] {
     let mut frame = [PADDING; 8];
@@ -25,17 +25,17 @@ pub fn frame(head: &[u8], bytes: &[u8]) -> [u8; 8] {
     frame
 }
 
-/// Asks a server on a bus: sends a request at the pace of the flow controls, grants all of the response, and returns
-/// its bytes. "Response pending" is waited out and counted.
+/// A tester: sends a request as the server's flow control allows, accepts the whole response, and returns its bytes.
+/// It waits on "response pending", and counts these responses.
 #[derive(Debug, Default)]
 pub struct Tester {
-    /// Times that "response pending" came.
+    /// Number of "response pending" messages received.
     pub pending: usize,
 }
 
 impl Tester {
-    /// Sends a request over `exchange`, which takes frames to the server and returns those that it has sent; it is
-    /// called until the response is whole, `turns` times at most.
+    /// Sends a request over `exchange`, which passes frames to the server and returns the frames that it has sent.
+    /// `exchange` is called until the response is complete, at most `turns` times.
     pub fn ask(
         &mut self,
         request: &[u8],
@@ -43,7 +43,7 @@ impl Tester {
         mut exchange: impl FnMut(&[[u8; 8]]) -> Vec<[u8; 8]>,
     ) -> Option<Vec<u8>> {
         let mut waiting: VecDeque<_> = segment(request).into();
-        // What may go out: the first frame.
+        // Number of frames that may be sent: the first frame.
         let mut granted = 1;
         let mut response: Option<(Vec<u8>, usize)> = None;
         let mut control = None;

@@ -1,11 +1,11 @@
-//! This module makes bytes of an Xsens MTi, and the samples that a part's driver delivers for bytes.
+//! This module creates bytes of an Xsens MTi, and collects the samples that a part's driver delivers for bytes.
 
 use gyronet::sample::ImuSample;
 use gyronet::sensor::ByteSource;
 use gyronet::sensor::xsens::{MtData2, Mti, XsensError};
 use std::borrow::Borrow;
 
-/// Reads bytes that are written in hexadecimal, with or without blanks between them.
+/// Parses bytes that are written in hexadecimal, with or without spaces between them.
 ///
 /// # Panics
 /// When they are not.

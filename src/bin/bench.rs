@@ -1,9 +1,9 @@
-//! Counts the kernels, networks and parsers on the target: one line each, `name cycles=N` from the
-//! DWT cycle counter on a board, `name ticks=N` from SysTick where there is none (QEMU).
+//! Benchmark of the kernels, networks and parsers on the target. Prints one line for each: `name cycles=N` from the
+//! DWT cycle counter on a board, `name ticks=N` from SysTick where that counter does not run (QEMU).
 //!
-//! Each measured region lies between two marker instructions that do nothing; an instruction
-//! counter in the emulator sums up between them (`tools/bench/m4count.c`). `cargo bench-target`
-//! runs all that and prints instructions and modelled cycles.
+//! Each measured region is enclosed by two marker instructions that do nothing; a plugin of the emulator counts the
+//! instructions between them (`tools/bench/m4count.c`). `cargo bench-target` runs all that and prints instructions
+//! and modelled cycles.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -88,7 +88,7 @@ mod firmware {
         let Ok(mut network) = GyroNet::with_state(blob, state) else { return };
         let mut numbers = Numbers::new(9);
         let mut window: [Features; WINDOW] = [[0; FEATURES]; WINDOW];
-        // The same work for any input: ten random windows, zeros, the ends of the range.
+        // Any input must cost the same: ten random windows, zeros, and the ends of the range.
         for n in 0..12 {
             for value in window.iter_mut().flatten() {
                 *value = match n {
@@ -122,7 +122,8 @@ mod firmware {
         }
     }
 
-    /// Counts a window of models with a linear part and fewer units, or none, and of the paper's, without a linear part.
+    /// Measures a window of models with a linear part and 0 to 32 units, of the paper's model, and of the default
+    /// one.
     fn sizes(meter: &mut Meter, state: &mut GyroNetState) {
         macro_rules! model {
             ($units:literal) => {{
@@ -131,7 +132,7 @@ mod firmware {
                 (concat!("units_", $units, "/window"), FILE.0.as_slice())
             }};
         }
-        // The flash has no room for a second one of the paper's size.
+        // Flash has no room for a second model of the paper's size.
         let paper = ("units_60/window", weights::GYRONET.0.as_slice());
         let default = ("default/window", weights::DEFAULT.0.as_slice());
         let models = [model!(0), model!(8), model!(16), model!(32), paper, default];
@@ -147,13 +148,13 @@ mod firmware {
         }
     }
 
-    /// Counts what the coprocessor does beside the network: five samples, each with a frame of wheels that stand and the
-    /// message set that it gives; one of them takes an estimate and hands out the next window.
+    /// Measures the coprocessor without the network: five samples, each with a frame of standing wheels and the
+    /// message set that the sample produces. One of the five takes the next window and delivers an estimate.
     fn coprocessor(meter: &mut Meter) {
         let Some(coprocessor) = cortex_m::singleton!(: Coprocessor = Coprocessor::START) else { return };
         let wheels = WheelReceiver::new(WheelSettings::TOYOTA).ok();
         coprocessor.configure(&Config { wheels, ..Config::DEFAULT });
-        // -67.67 + 0.01 x 6767 km/h.
+        // 0x1A6F is 6767: -67.67 + 0.01 x 6767 km/h is standstill.
         let Some(standing) = StandardId::new(0xAA)
             .and_then(|id| DataFrame::new(id, &[0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]))
         else {
@@ -189,12 +190,12 @@ mod firmware {
                 }
             }
         };
-        // Past static initialisation and the first windows.
+        // Run past static initialisation and the first windows.
         (0..80).for_each(|n| five_samples(5 * n));
         meter.run("coprocessor/five_samples", || five_samples(400));
     }
 
-    /// A signature that is right (RFC 8032 7.1, test 1), and the digest of a block of a download.
+    /// Measures the check of a valid signature (RFC 8032 7.1, test 1), and the digest of a block of a download.
     fn signature(meter: &mut Meter) {
         const PUBLIC: [u8; 32] = *b"\xd7\x5a\x98\x01\x82\xb1\x0a\xb7\xd5\x4b\xfe\xd3\xc9\x64\x07\x3a\x0e\xe1\x72\xf3\xda\xa6\x23\x25\xaf\x02\x1a\x68\xf7\x07\x51\x1a";
         const SIGNATURE: [u8; 64] = *b"\xe5\x56\x43\x00\xc3\x60\xac\x72\x90\x86\xe2\xcc\x80\x6e\x82\x8a\x84\x87\x7f\x1e\xb8\xe5\xd9\x74\xd8\x73\xe0\x65\x22\x49\x01\x55\x5f\xb8\x82\x15\x90\xa3\x3b\xac\xc6\x1e\x39\x70\x1c\xf9\xb4\x6b\xd2\x5b\xf5\xf0\x59\x5b\xbe\x24\x65\x51\x41\x43\x8e\x7a\x10\x0b";

@@ -1,5 +1,5 @@
-//! Counts FoGNet on the target, as `bench` does GyroNet: flash does not hold both networks beside
-//! the f32 checkpoint that `bench` has.
+//! Benchmark of FoGNet on the target, as `bench` is for GyroNet. It is an image of its own because flash cannot hold
+//! both networks and the f32 checkpoint of `bench`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -53,7 +53,7 @@ mod firmware {
         }
     }
 
-    /// Whole windows, all the pieces of one, and the longest piece.
+    /// Measures whole windows, the start of a window, and its longest piece.
     fn fognet(meter: &mut Meter, state: &mut FogNetState, minute: &mut Minute) {
         let Ok(blob) = FogBlob::new_checked(&weights::FOGNET.0) else {
             hprintln!("FAILED: FoGNet's weight file is refused");
@@ -77,7 +77,7 @@ mod firmware {
         }
         let Some(window) = minute.window(Padding::None) else { return };
         meter.run("fognet/start", || network.start(&window));
-        // Past both directions of layer 1, and the first piece of layer 2: the longest ones.
+        // Skip both directions of layer 1, and the first piece of layer 2: the pieces that follow are the longest.
         for _ in 0..=STEPS {
             network.advance();
         }

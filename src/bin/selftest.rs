@@ -1,7 +1,7 @@
-//! Self-test on the target's own instruction set: the kernels against their portable
-//! definition, bit for bit, and hashes of both networks' outputs that a host can recompute.
+//! Self-test on the target's own instruction set: compares the kernels with the portable code bit for bit, and prints
+//! hashes of both networks' outputs that a host can recompute.
 //!
-//! Runs in QEMU or on a board with semihosting; the exit status says whether all held.
+//! Runs in QEMU or on a board with semihosting; the exit status says whether the test passed.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -72,7 +72,7 @@ mod firmware {
         }
     }
 
-    /// Kernel against portable code, over inputs up to +-`limit` and at the ends of the range.
+    /// Counts differences of kernel and portable code, for inputs up to +-`limit` and at the ends of the range.
     fn compare<const U: usize, const W: usize>(
         name: &str,
         direction: &DirectionWeights<'_>,
@@ -83,7 +83,7 @@ mod firmware {
         let mut fast = Scratch::<U, W, 2>::ZERO;
         let mut plain = Scratch::<U, W, 2>::ZERO;
         for round in 0..ROUNDS {
-            // One pair of steps and two: the kernel reads weights where they lie, or copies them.
+            // With one pair of steps the kernel reads the weights in place; with two it copies them.
             let pairs = 1 + round as usize % 2;
             let mut x = [0; 2 * 180];
             let x = &mut x[..pairs * direction.inputs()];
@@ -128,7 +128,7 @@ mod firmware {
         differences
     }
 
-    /// CRC-32 over the corrections and scales of sixteen random windows.
+    /// Returns the CRC-32 of the corrections and scales of sixteen random windows.
     fn hash() -> Option<u32> {
         // Too large for the stack.
         let state = cortex_m::singleton!(: GyroNetState = GyroNetState::ZERO)?;
@@ -151,7 +151,7 @@ mod firmware {
         Some(digest.finalize())
     }
 
-    /// CRC-32 over the estimates of three random windows.
+    /// Returns the CRC-32 of the estimates of three random windows.
     fn fognet_hash((state, minute): &mut (FogNetState, Minute)) -> Option<u32> {
         let mut network = FogNet::new(FogBlob::new_checked(&weights::FOGNET.0).ok()?, state);
         let mut numbers = Numbers::new(8);

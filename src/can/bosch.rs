@@ -1,4 +1,4 @@
-//! The Bosch MM5.10 yaw-rate message, 0x174 at 100 Hz, makes the board a drop-in for sensors that are in cars.
+//! The Bosch MM5.10 yaw-rate message, 0x174 at 100 Hz, makes the board a drop-in replacement for production sensors.
 //!
 //! | bytes | signal | scale |
 //! |---|---|---|
@@ -7,17 +7,17 @@
 //! | 2, high nibble | YawRate_STAT | bit 0 not available, 1 failure, 2 initialising |
 //! | 3 | TEMP | 1 deg C, offset -50; 0xFF unknown |
 //! | 4-5 | AY, u16 LE | 0.000127465 g, zero at 0x8000 |
-//! | 6, low nibble | MSG_CNT | one up each 10 ms |
+//! | 6, low nibble | MSG_CNT | increments every 10 ms |
 //! | 6, high nibble | AY_STAT | as YawRate_STAT |
 //! | 7 | CRC | SAE J1850 over bytes 0 to 6 |
 //!
 //! The other two messages of the set have the same shape: [`LAYOUTS`].
 //!
-//! Source: Bosch's off_highway_mm7p10 receiver and the MM5.10 layout it shares. The CRC's
-//! polynomial is published nowhere; J1850 is our choice.
+//! Source: Bosch's off_highway_mm7p10 receiver, which uses the same layout as the MM5.10. The CRC polynomial is not
+//! published; J1850 is our choice.
 //!
-//! 0.005 deg/s is 18 deg/h: a rounded parked car would seem to turn by up to 9 deg/h for ever.
-//! [`YawRateSignal`] therefore carries each frame's rounding residual into the next one; the
+//! 0.005 deg/s is 18 deg/h: with plain rounding, a parked car would seem to turn at up to 9 deg/h indefinitely.
+//! [`YawRateSignal`] therefore carries each frame's rounding residual into the next one. The
 //! receiver's integral is then never off by more than half an LSB times one period.
 
 mod set;
@@ -33,16 +33,16 @@ pub const TX1_ID: StandardId = StandardId::new(0x174).unwrap();
 /// SAE J1850: polynomial 0x1D, start and final XOR 0xFF.
 pub static CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_SAE_J1850);
 
-/// This code stands for zero rate and zero acceleration.
+/// Code of zero rate and of zero acceleration.
 const ZERO: i32 = 0x8000;
-/// The LSB of the yaw rate is 0.005 deg/s, in units of 1e-9 deg/s x 2^-20.
+/// LSB of the yaw rate, 0.005 deg/s, in units of 1e-9 deg/s x 2^-20.
 const YAW_RATE_LSB: i64 = 5_000_000 << 20;
-/// A rate code is this in units of 1e-9 deg/s x 2^-20 (180e9 / pi / 2^27).
+/// One rate code in units of 1e-9 deg/s x 2^-20 (180e9 / pi / 2^27).
 const NANO_DEG_PER_CODE_Q20: i64 = 447_623_277;
-/// Acceleration codes per 2^-20 m/s^2 (1 / (0.000127465 * 9.80665 * 2^20)), times 2^32.
+/// Signal codes per acceleration code of 2^-20 m/s^2 (1 / (0.000127465 * 9.80665 * 2^20)), times 2^32.
 const AY_PER_CODE_Q32: i64 = 3_276_788;
 
-/// Holds the quality of one signal, as coded in its nibble.
+/// The status nibble of one signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SignalStatus(pub u8);
@@ -64,19 +64,19 @@ impl SignalStatus {
 pub struct Tx1 {
     /// Code of the yaw rate.
     pub yaw_rate: u16,
-    /// Its quality.
+    /// Status of the yaw rate.
     pub yaw_rate_status: SignalStatus,
     /// Code of the temperature.
     pub temperature: u8,
     /// Code of the lateral acceleration.
     pub lateral_acceleration: u16,
-    /// Its quality.
+    /// Status of the lateral acceleration.
     pub lateral_acceleration_status: SignalStatus,
-    /// 0 to 15.
+    /// Message counter, 0 to 15.
     pub counter: u8,
 }
 
-/// The reason why a frame is no valid TX1 message.
+/// The reason why a frame is not a valid TX1 message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -84,7 +84,7 @@ pub enum Tx1Error {
     /// The frame does not have eight bytes.
     #[error("TX1 has {0} bytes instead of 8")]
     Length(usize),
-    /// The checksum does not fit.
+    /// The checksum is wrong.
     #[error("TX1 checksum is {received:02x}, should be {computed:02x}")]
     Crc {
         /// The checksum of bytes 0 to 6.
@@ -95,7 +95,7 @@ pub enum Tx1Error {
 }
 
 impl Tx1 {
-    /// Returns the eight bytes.
+    /// Encodes the message as eight bytes.
     #[must_use]
     pub fn emit(&self) -> [u8; 8] {
         Message::from(*self).emit()
@@ -107,7 +107,7 @@ impl Tx1 {
         F::new(TX1_ID, &self.emit())
     }
 
-    /// Checks and reads eight bytes.
+    /// Decodes eight bytes after checking length and CRC.
     ///
     /// # Errors
     /// [`Tx1Error`] for a wrong length or checksum.
@@ -133,11 +133,11 @@ impl Tx1 {
 /// Carries the yaw rate's rounding residual from message to message.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct YawRateSignal {
-    /// Owed to the receiver, 1e-9 deg/s x 2^-20: fine enough that nothing is ever rounded away.
+    /// Sum of the exact rates minus the sum of the rates sent, in 1e-9 deg/s x 2^-20; exact at this resolution.
     residual: i64,
 }
 
-/// The rate does not fit the signal (+-163.84 deg/s); its code is the nearest limit.
+/// The error for a rate outside the signal's range (+-163.84 deg/s); it holds the code of the nearest limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OutOfRange(pub u16);
 
@@ -145,7 +145,7 @@ impl YawRateSignal {
     /// Starts without a rounding residual.
     pub const START: Self = Self { residual: 0 };
 
-    /// Returns the code of a rate, with the rounding residual of the earlier ones.
+    /// Encodes a rate, including the rounding residual of earlier rates.
     ///
     /// # Errors
     /// [`OutOfRange`]; the residual is then dropped, since the frame is marked bad.
@@ -182,7 +182,7 @@ pub fn encode_acceleration(force: SpecificForce) -> (u16, SignalStatus) {
     }
 }
 
-/// Returns the code of a temperature: whole degrees from -50, 0xC9 above 150, 0xFF where it is not known.
+/// Returns the code of a temperature: whole degrees from -50, 0xC9 above 150, 0xFF if unknown.
 #[must_use]
 #[doc(hidden)]
 pub fn encode_temperature(temperature: Option<CentiCelsius>) -> u8 {

@@ -1,7 +1,7 @@
-//! A coarser scale loses nothing in the sum, because each message's rounding residual is added to the next value.
+//! This module converts rates to a coarser scale and adds each message's rounding residual to the next value.
 //!
-//! Rounded one by one, the messages of a parked car with a constant rate are all wrong in the
-//! same direction. With the residual carried, the sum of the rates sent differs from the sum of the
+//! If each message were rounded on its own, a constant rate would give the same rounding error every time, and the
+//! errors would add up. With the residual carried, the sum of the rates sent differs from the sum of the
 //! exact rates by at most half an LSB. The arithmetic is exact: the scale
 //! is a fixed-point constant, and products are kept to their last bit.
 
@@ -10,17 +10,17 @@ use crate::units::AngularRate;
 /// Converts a rate code (LSB 2^-27 rad/s) to the code of a CAN signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scale {
-    /// Signal LSBs per rate code, times 2^32. It is at most 2^31: a signal whose LSB is below two rate codes gains
+    /// Signal LSBs per rate code, times 2^32; at most 2^31, because a signal LSB below two rate codes would gain
     /// nothing.
     pub factor_q32: i64,
-    /// Code of rate zero, times 2^32; it need not be a whole number. It is below 2^60.
+    /// Code of rate zero, times 2^32; below 2^60. The code need not be a whole number.
     pub zero_q32: i64,
 }
 
 impl Scale {
-    /// Scales to 1e-6 deg/s: 180 / pi / 2^27 / 1e-6, too small by 2.3e-10.
+    /// Scale for a signal LSB of 1e-6 deg/s: 180 / pi / 2^27 / 1e-6, too small by 2.3e-10.
     pub const MICRO_DEG_PER_SEC: Self = Self { factor_q32: 1_833_464_944, zero_q32: 0 };
-    /// Scales to 2e-4 deg/s.
+    /// Scale for a signal LSB of 2e-4 deg/s.
     pub const FIFTH_MILLI_DEG_PER_SEC: Self = Self { factor_q32: 9_167_325, zero_q32: 0 };
 }
 
@@ -28,18 +28,18 @@ impl Scale {
 #[derive(Debug, Clone, Copy)]
 pub struct RoundingCarry {
     scale: Scale,
-    /// The part that rounding has withheld from the receiver so far, in LSB x 2^-32.
+    /// Sum of the exact values minus the sum of the codes sent, in LSB x 2^-32.
     residual: i64,
 }
 
 impl RoundingCarry {
-    /// Begins without a residual.
+    /// Creates a carry with residual zero.
     #[must_use]
     pub const fn new(scale: Scale) -> Self {
         Self { scale, residual: 0 }
     }
 
-    /// Returns the nearest code to the rate plus the residual of earlier ones.
+    /// Returns the code nearest to the rate plus the residual of earlier rates.
     pub fn encode(&mut self, rate: AngularRate) -> i32 {
         // At most 2^62 + 2^60 + 2^31.
         let wanted = i64::from(rate.0) * self.scale.factor_q32 + self.scale.zero_q32 + self.residual;
@@ -48,7 +48,7 @@ impl RoundingCarry {
         sent as i32
     }
 
-    /// Drops the residual, after a message that was marked bad or at a new start.
+    /// Drops the residual. Call it after a message that was marked bad, or at a restart.
     pub fn reset(&mut self) {
         self.residual = 0;
     }

@@ -1,6 +1,6 @@
-//! A configuration says which messages go out, under which identifiers, how often, and how protected.
+//! A configuration defines which messages are sent, with their identifiers, periods and E2E protection.
 //!
-//! [`Settings`] is what a user writes; [`Config`] is what has been checked, once, at the start.
+//! [`Settings`] are what a user writes; a [`Config`] holds settings that have passed the check.
 
 mod error;
 mod settings;
@@ -18,18 +18,18 @@ use heapless::Vec;
 
 /// Period of the samples, and of the messages whose layout fixes it.
 pub(super) const SAMPLE_MS: u16 = (PERIOD_US / 1000) as u16;
-/// Longest period of a message: a receiver's time-out is a few of them.
+/// Longest period of a message, ms; a receiver's timeout is a few periods.
 const MAX_PERIOD_MS: u16 = 1000;
-/// Identifiers of diagnosis (ISO 15765-4), kept free for it.
+/// Identifiers reserved for diagnosis (ISO 15765-4).
 const DIAGNOSIS: core::ops::RangeInclusive<u16> = 0x7DF..=0x7EF;
 /// Highest J1939 source address; 254 and 255 have other meanings.
 const MAX_SOURCE: u8 = 253;
-/// Largest part of the bus at worst, 1/1000; beyond it others would wait too long.
+/// Highest worst-case bus load, 1/1000; above it other nodes would wait too long.
 const MAX_BUS_LOAD: u32 = 800;
-/// Most messages that a configuration can have.
+/// Largest number of messages in a configuration.
 pub const MAX_MESSAGES: usize = 7;
 
-/// The messages that are sent, their periods and their protection: [`Settings`] that have been checked.
+/// Checked [`Settings`]: the messages that are sent, their periods and their protection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
@@ -37,9 +37,9 @@ pub struct Config {
 }
 
 impl Config {
-    /// Uses [`Settings::DEFAULT`], which pass the check (as a test shows).
+    /// [`Settings::DEFAULT`], which pass the check (as a test shows).
     pub const DEFAULT: Self = Self { settings: Settings::DEFAULT };
-    /// Uses [`Settings::SLCAN_115200`], which pass the check, too.
+    /// [`Settings::SLCAN_115200`], which also pass the check.
     pub const SLCAN_115200: Self = Self { settings: Settings::SLCAN_115200 };
 
     /// Checks settings.
@@ -87,13 +87,13 @@ impl Config {
         });
         let mut messages = Vec::new();
         for message in bosch.chain(yaw).chain(vdc2) {
-            // There is room for all that can be configured.
+            // MAX_MESSAGES holds every message that can be configured.
             let _ = messages.push(message);
         }
         messages
     }
 
-    /// Checks identifiers of further messages, those of [`super::fog_encoder`]: none of them is ours.
+    /// Checks the identifiers of further messages (of [`super::fog_encoder`]) against those configured here.
     ///
     /// # Errors
     /// [`ConfigError::Identifier`], [`ConfigError::DuplicateIdentifier`].
@@ -102,19 +102,19 @@ impl Config {
         check_ids(ids, |id| self.sends(Id::Standard(id)))
     }
 
-    /// Returns whether one of our messages has this identifier; an input must not have it.
+    /// Returns whether one of our messages has this identifier; no input may use such an identifier.
     #[must_use]
     pub fn sends(&self, id: Id) -> bool {
         self.messages().iter().any(|message| message.id == id)
     }
 
-    /// Returns the share of the bus that the messages take with the most stuff bits possible, in 1/1000.
+    /// Returns the bus load of the messages in 1/1000, with the largest possible number of stuff bits.
     #[must_use]
     pub fn bus_load_per_mille(&self) -> u32 {
         per_mille(&self.messages(), Periodic::worst_case_bits, self.settings.bits_per_second)
     }
 
-    /// Returns the share of a serial line that the messages take as SLCAN, in 1/1000; above 1000 they do not fit.
+    /// Returns the load of the messages as SLCAN on a serial line, in 1/1000; above 1000 they do not fit.
     #[must_use]
     pub fn line_load_per_mille(&self, line_bits_per_second: u32, stamped: bool) -> u32 {
         per_mille(&self.messages(), |message| message.slcan_bits(stamped), line_bits_per_second)
@@ -167,7 +167,7 @@ fn check_e2e(e2e: &E2e) -> Result<(), ConfigError> {
             }
             distinct(*data_ids)
         }
-        // Either byte alone must tell the messages apart.
+        // Each byte alone must distinguish the messages.
         E2e::P01 { mode: DataIdMode::Alternating, data_ids } => {
             distinct(data_ids.map(|id| id & 0xFF)) && distinct(data_ids.map(|id| id >> 8))
         }

@@ -1,5 +1,5 @@
-//! AUTOSAR end-to-end protection (PRS E2E Protocol) adds a CRC, a counter and an identifier that is not sent, so that a
-//! receiver notices loss and damage on the path between two ECUs.
+//! AUTOSAR end-to-end protection (PRS E2E Protocol) adds a CRC and a counter to a message, so that a receiver detects
+//! lost and corrupt messages between two ECUs. The CRC also covers an identifier that is not sent.
 //!
 //! | profile | header | CRC | counter |
 //! |---|---|---|---|
@@ -8,13 +8,13 @@
 //! | [`P05`] | 3 bytes | 16 bit, 0x1021, start FFFF | 0 to 255 |
 //! | [`P11`] | 2 bytes | as P01 | 0 to 14 |
 //!
-//! What they promise over 8 bytes: every error of one or two bits fails the CRC (0x1D has order
-//! 255, 0x2F 127, 0x1021 32767 bits). Where the counter selects the identifier (P01 with
-//! [`DataIdMode::Alternating`], P02) an error in the counter exchanges the identifier too, and a
-//! second bit can hide it from the CRC; the counter is then out of sequence. A counter sees
-//! every loss but that of a whole multiple of its cycle: a receiver needs a time-out besides.
+//! Over 8 bytes, the CRC detects every error of one or two bits (0x1D has order
+//! 255, 0x2F 127, 0x1021 32767 bits). Two profiles are an exception, because their counter selects the identifier
+//! (P01 with [`DataIdMode::Alternating`], P02): an error in the counter also changes the identifier, and a
+//! second bit error can hide it from the CRC; the counter is then out of sequence. The counter detects
+//! every loss except that of a whole multiple of its cycle, so a receiver also needs a timeout.
 //!
-//! The header is at the start of the data in all of them.
+//! The header is at the start of the data in all profiles.
 
 mod header;
 mod p01;
@@ -29,15 +29,15 @@ pub use p05::P05;
 pub use p11::{P11, P11Mode};
 pub use sequence::{Sequence, Verdict};
 
-/// The reason why protected data are not to be used.
+/// The reason why protected data must not be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Fault {
-    /// Shorter than the header, or longer than the profile covers.
+    /// The data are shorter than the header, or longer than the profile allows.
     #[error("E2E: {0} bytes do not fit the profile")]
     Length(usize),
-    /// The CRC does not fit: damaged, or not the data that were meant (identifier).
+    /// The CRC is wrong: the data are corrupt, or belong to another identifier.
     #[error("E2E: CRC is {received:x}, should be {computed:x}")]
     Crc {
         /// The CRC of the received data.
@@ -45,18 +45,18 @@ pub enum Fault {
         /// The value as received.
         received: u16,
     },
-    /// The part of the identifier that is sent is another one.
-    #[error("E2E: identifier nibble {received:x} is foreign")]
+    /// The transmitted part of the identifier belongs to another message.
+    #[error("E2E: identifier nibble {received:x} belongs to another message")]
     DataId {
         /// The value as received.
         received: u8,
     },
-    /// A counter value that does not occur.
-    #[error("E2E: counter {0} does not occur")]
+    /// The counter value is outside the profile's range.
+    #[error("E2E: counter {0} is out of range")]
     Counter(u8),
 }
 
-/// One of the profiles with its identifier.
+/// An E2E profile and its data identifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -81,7 +81,7 @@ impl Profile {
         }
     }
 
-    /// Returns the bits of the frame that belong to the header: bit `8 * byte + bit` of the frame is that bit here.
+    /// Returns a mask of the header's bits; bit `8 * byte + bit` of the frame is the same bit of the mask.
     #[must_use]
     pub const fn header_mask(&self) -> u64 {
         match self {
@@ -92,7 +92,7 @@ impl Profile {
         }
     }
 
-    /// Returns the number of counter values; after the last one comes 0.
+    /// Returns the number of counter values; 0 follows the last one.
     #[must_use]
     pub const fn counters(&self) -> u16 {
         match self {
@@ -102,7 +102,7 @@ impl Profile {
         }
     }
 
-    /// Writes the header for the data behind it.
+    /// Writes the header for the data that follow it.
     ///
     /// # Errors
     /// [`Fault::Length`] and [`Fault::Counter`].
@@ -115,7 +115,7 @@ impl Profile {
         }
     }
 
-    /// Checks everything but the sequence; gives the counter.
+    /// Checks everything except the sequence, and returns the counter.
     ///
     /// # Errors
     /// [`Fault`].
@@ -137,16 +137,16 @@ pub struct Protector {
 }
 
 impl Protector {
-    /// Begins with counter 0.
+    /// Creates a protector whose counter starts at 0.
     #[must_use]
     pub const fn new(profile: Profile) -> Self {
         Self { profile, counter: 0 }
     }
 
-    /// Protects the next message: it sets the counter and the checksum.
+    /// Writes the header of the next message: its counter and its CRC.
     ///
     /// # Errors
-    /// [`Fault::Length`]; the counter stays.
+    /// [`Fault::Length`]; the counter does not advance.
     pub fn protect(&mut self, data: &mut [u8]) -> Result<(), Fault> {
         self.profile.protect(data, self.counter)?;
         self.counter = ((u16::from(self.counter) + 1) % self.profile.counters()) as u8;
@@ -162,15 +162,15 @@ pub struct Checker {
 }
 
 impl Checker {
-    /// Begins before the first message. `max_delta` is the largest step of the counter that still counts as loss
+    /// Creates a checker. `max_delta` is the largest counter step that still counts as loss
     /// (1: no message may be lost).
     #[must_use]
     pub const fn new(profile: Profile, max_delta: u8) -> Self {
         Self { profile, sequence: Sequence::new(profile.counters(), max_delta) }
     }
 
-    /// Judges one message. A damaged one says nothing of the sequence, so it counts as lost when
-    /// the next good one comes.
+    /// Checks one message. A corrupt message does not affect the sequence, so it counts as lost when
+    /// the next good message arrives.
     ///
     /// # Errors
     /// [`Fault`].

@@ -21,7 +21,7 @@ pub struct CanEncoder {
 }
 
 impl CanEncoder {
-    /// The encoder before it is configured: it sends no messages of our own.
+    /// The encoder before its configuration: it sends none of our own messages.
     pub const START: Self = Self {
         config: Config::DEFAULT,
         bosch: SetEncoder::START,
@@ -30,7 +30,7 @@ impl CanEncoder {
         out_of_range: 0,
     };
 
-    /// Begins before the first message.
+    /// Creates an encoder whose counters and residuals start at zero.
     #[must_use]
     pub fn new(config: Config) -> Self {
         let yaw = config.settings().yaw;
@@ -38,7 +38,7 @@ impl CanEncoder {
         Self { config, yaw, ..Self::START }
     }
 
-    /// Returns the number of messages that reported "failed" because a value does not fit its signal.
+    /// Returns the number of messages marked "failed" because a value was outside its signal's range.
     #[must_use]
     pub fn out_of_range(&self) -> u32 {
         self.out_of_range
@@ -52,12 +52,12 @@ impl CanEncoder {
             Quality::Initialising => (SignalStatus::INITIALISING, Validity::NotAvailable),
             Quality::Unusable => (SignalStatus::FAILURE, Validity::Error),
         };
-        // The accelerometer is in the same part as the gyro.
+        // The accelerometer is in the same sensor as the gyro.
         let unusable = sample.prompt.quality == Quality::Unusable;
         let force_status = if unusable { SignalStatus::FAILURE } else { SignalStatus::OK };
         let settings = *self.config.settings();
         let mut frames = Vec::new();
-        // MAX_MESSAGES is what a configuration can have at most.
+        // No configuration has more than MAX_MESSAGES messages.
         let mut send = |frame: Option<DataFrame>| frame.map(|frame| frames.push(frame).is_ok());
         if let Some(BoschSettings { tx1_only }) = settings.bosch {
             let messages = self.bosch.encode(&motion(sample, status, force_status));
@@ -82,8 +82,8 @@ impl CanEncoder {
     }
 }
 
-/// Collects the values of the Bosch set. The grid step is its counter, so that a receiver sees which samples are
-/// missing.
+/// Collects the values of the Bosch set. The message counter is the sample's grid step, so that a receiver sees which
+/// samples are missing.
 fn motion(sample: &VehicleSample, rate_status: SignalStatus, force_status: SignalStatus) -> Motion {
     Motion {
         angular_rate: [sample.roll_rate, sample.pitch_rate, sample.prompt.rate],

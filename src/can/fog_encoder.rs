@@ -1,5 +1,5 @@
-//! This encoder makes the yaw messages of a fibre-optic gyro. They are sent from its first sample on, or from the
-//! start where one is configured.
+//! This encoder makes the yaw messages of a fibre-optic gyro (FOG). They are sent from the FOG's first sample on, or
+//! from power-up if a FOG is configured.
 
 use super::DataFrame;
 use super::config::SAMPLE_MS;
@@ -10,8 +10,8 @@ use crate::estimate::YawEstimate;
 use embedded_can::{Id, StandardId};
 use heapless::Vec;
 
-/// Encodes rate, angle and detail for each step, under E2E profile 1. Each message's identifier is its
-/// data identifier too.
+/// Encodes rate, angle and detail messages for each step, with E2E profile 1. The CAN identifier of a message is also
+/// its data identifier.
 #[derive(Debug, Clone, Copy)]
 pub struct FogEncoder {
     encoder: YawEncoder,
@@ -19,14 +19,14 @@ pub struct FogEncoder {
 }
 
 impl FogEncoder {
-    /// Begins before the first message. `ids` are the identifiers (11 bits) of rate, angle and detail;
-    /// [`super::yaw::FOG_IDS`] as we use them.
+    /// Creates an encoder. `ids` are the identifiers (11 bits) of rate, angle and detail, by default
+    /// [`super::yaw::FOG_IDS`].
     #[must_use]
     pub const fn new(ids: [u16; 3]) -> Self {
         Self { encoder: YawEncoder::new(Self::profiles(ids), 1), ids }
     }
 
-    /// Returns the protection of each message.
+    /// Returns the E2E profile of each message.
     #[must_use]
     pub const fn profiles([rate, angle, detail]: [u16; 3]) -> [Profile; 3] {
         const fn profile(data_id: u16) -> Profile {
@@ -35,7 +35,7 @@ impl FogEncoder {
         [profile(rate), profile(angle), profile(detail)]
     }
 
-    /// Returns every message of the gyro; none for identifiers of over 11 bits.
+    /// Returns every message of the gyro, without those whose identifier has more than 11 bits.
     #[must_use]
     pub fn messages(ids: [u16; 3]) -> Vec<Periodic, 3> {
         let message = |id| Periodic { id: Id::Standard(id), period_ms: SAMPLE_MS };

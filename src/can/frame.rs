@@ -1,8 +1,8 @@
-//! This type is a classic CAN data frame for code that has no driver's own type.
+//! This module defines a classic CAN data frame for code that does not depend on a driver's frame type.
 
 use embedded_can::{Frame, Id};
 
-/// Identifier and up to eight bytes.
+/// A classic CAN data frame: identifier and up to eight bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DataFrame {
     id: Id,
@@ -11,7 +11,7 @@ pub struct DataFrame {
 }
 
 impl DataFrame {
-    /// Converts it to a driver's own type; `None` where the driver refuses it.
+    /// Converts the frame to a driver's own type; `None` if that type cannot hold the frame.
     #[must_use]
     pub fn convert<F: Frame>(&self) -> Option<F> {
         F::new(self.id(), self.data())

@@ -8,9 +8,9 @@
 //! | 5-6 | 1809 | lateral acceleration, u16 LE | 1/2048 m/s^2, -15.687 |
 //! | 7 | 1810 | longitudinal acceleration | 0.1 m/s^2, -12.5 |
 //!
-//! Up to FAFF (FA) a value, FE00 (FE) an error, FFFF (FF) not available. 1/8192 rad/s is 25
-//! deg/h, and zero lies between two codes (32112.64): plainly rounded, a parked car would turn
-//! by 9 deg/h for ever. The residual is carried.
+//! Codes up to FAFF (FA) are values; FE00 (FE) is an error, FFFF (FF) not available. 1/8192 rad/s is 25
+//! deg/h, and zero lies between two codes (32112.64): with plain rounding, a parked car would seem to turn
+//! at 9 deg/h indefinitely. The rounding residual is therefore carried.
 
 use super::carry::{RoundingCarry, Scale};
 use crate::units::{AngularRate, SpecificForce};
@@ -18,9 +18,9 @@ use embedded_can::{ExtendedId, Frame};
 
 /// Parameter group number of VDC2.
 pub const VDC2_PGN: u32 = 61_449;
-/// VDC2 has this default priority on the bus.
+/// Default priority of VDC2 on the bus.
 pub const VDC2_PRIORITY: u8 = 6;
-/// Largest code that is a value.
+/// Largest code that stands for a value.
 const MAX_CODE: i64 = 0xFAFF;
 const ERROR: u16 = 0xFE00;
 const LONGITUDINAL_ERROR: u8 = 0xFE;
@@ -31,7 +31,7 @@ const YAW_RATE: Scale = Scale { factor_q32: 1 << 18, zero_q32: 137_922_738_588_2
 /// 15.687 * 2048, times 2^9; 1/2048 m/s^2 is 2^9 acceleration codes.
 const LATERAL_ZERO_Q9: i64 = 16_449_012;
 
-/// Returns the 29-bit identifier of a broadcast parameter group, made of a priority of 0 to 7 and the sender's
+/// Returns the 29-bit identifier of a broadcast parameter group, for a priority of 0 to 7 and the sender's
 /// address.
 #[must_use]
 pub const fn broadcast_id(pgn: u32, priority: u8, source: u8) -> Option<ExtendedId> {
@@ -41,7 +41,7 @@ pub const fn broadcast_id(pgn: u32, priority: u8, source: u8) -> Option<Extended
     ExtendedId::new((priority as u32) << 26 | pgn << 8 | source as u32)
 }
 
-/// Holds the codes of the VDC2 signals that the coprocessor fills in; the frame's other bytes say "not available".
+/// The codes of the VDC2 signals that the coprocessor sends; the other bytes of the frame say "not available".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Vdc2 {
@@ -53,14 +53,14 @@ pub struct Vdc2 {
     pub longitudinal: u8,
 }
 
-/// The frame does not have eight bytes.
+/// The error for a frame that does not have eight bytes; it holds the length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("VDC2 has {} bytes instead of 8", .0)]
 pub struct Vdc2Length(pub usize);
 
 impl Vdc2 {
-    /// Returns the eight bytes.
+    /// Encodes the message as eight bytes.
     #[must_use]
     pub const fn emit(&self) -> [u8; 8] {
         let [yaw0, yaw1] = self.yaw_rate.to_le_bytes();
@@ -68,7 +68,7 @@ impl Vdc2 {
         [0xFF, 0xFF, 0xFF, yaw0, yaw1, lateral0, lateral1, self.longitudinal]
     }
 
-    /// Reads eight bytes.
+    /// Decodes eight bytes.
     ///
     /// # Errors
     /// [`Vdc2Length`].
@@ -92,14 +92,14 @@ impl Vdc2 {
         self.yaw_rate == ERROR || self.lateral == ERROR || self.longitudinal == LONGITUDINAL_ERROR
     }
 
-    /// Returns the yaw rate in rad/s, where the code stands for one.
+    /// Returns the yaw rate in rad/s; `None` if the code is not a value.
     #[must_use]
     pub fn yaw_rate_rad_per_sec(&self) -> Option<f64> {
         (i64::from(self.yaw_rate) <= MAX_CODE).then(|| f64::from(self.yaw_rate) / 8192.0 - 3.92)
     }
 }
 
-/// Says whether the rate is valid.
+/// Whether the rate is valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Validity {
@@ -128,8 +128,8 @@ impl Vdc2Encoder {
     /// Starts without a rounding residual.
     pub const START: Self = Self { yaw_rate: RoundingCarry::new(YAW_RATE) };
 
-    /// Encodes one sample; the specific force points forward, left, up. J1939 has no status beside a value, so a
-    /// value that is not valid, or does not fit, is not sent at all.
+    /// Encodes one sample; the axes of the specific force are forward, left, up. J1939 has no status next to a value,
+    /// so for a rate that is not valid, or a value out of range, a special code is sent instead.
     pub fn encode(&mut self, rate: AngularRate, validity: Validity, force: &[SpecificForce; 3]) -> Vdc2 {
         let [forward, left, _] = force;
         let yaw_rate = match validity {

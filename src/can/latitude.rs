@@ -1,45 +1,45 @@
-//! The receiver reads the latitude from a frame of the vehicle's bus, as a satellite receiver sends it.
+//! The receiver reads the latitude from a CAN frame that a GNSS receiver in the vehicle sends.
 //!
-//! A latitude is used once [`CONFIRM`] frames in a row agree. From then on one that is further away than a vehicle goes
-//! is refused and counted, and the one in use is contested until a frame agrees with it again; [`CONFIRM`] such frames
-//! that agree with each other replace it. A bus that falls silent changes nothing: an hour of driving changes the
-//! Earth's rate by 0.2 deg/h at most.
+//! A latitude is used once [`CONFIRM`] frames in a row agree. Afterwards, a latitude that the vehicle cannot have
+//! reached is refused and counted, and the latitude in use is contested until a frame agrees with it again.
+//! [`CONFIRM`] refused frames in a row that agree with each other replace the latitude in use. If the frames stop,
+//! the latitude stays in use: an hour of driving changes the Earth's rate by 0.2 deg/h at most.
 
 use super::signal::{BitField, ByteOrder};
 use crate::units::Micros;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 
-/// Frames that must agree before a latitude is used.
+/// Number of frames that must agree before a latitude is used.
 pub const CONFIRM: u8 = 10;
-/// Difference of two latitudes that agree, degrees: 2 km.
+/// Largest difference of two latitudes that agree, degrees: 2 km.
 const NEAR_DEG: f32 = 0.02;
-/// The fastest change, degrees per microsecond: 400 km/h.
+/// Fastest plausible change, degrees per microsecond: 400 km/h.
 const DEG_PER_US: f32 = 1e-9;
-/// The largest change that silence explains, degrees.
+/// Largest plausible change since the last accepted frame, however long ago, degrees.
 const LONGEST_DEG: f32 = 1.0;
 
-/// The place of the latitude on the bus.
+/// The frame and the bit field that carry the latitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LatitudeSettings {
     /// Identifier of the frame.
     pub id: u32,
-    /// The identifier has 29 bits.
+    /// Whether the identifier has 29 bits.
     pub extended: bool,
-    /// Start bit, as a DBC file gives it.
+    /// Start bit, as in a DBC file.
     pub start: u8,
     /// Number of bits, up to 32.
     pub bits: u8,
     /// Order of the bytes.
     pub order: ByteOrder,
-    /// The value has a sign.
+    /// Whether the value is signed.
     pub signed: bool,
-    /// Degrees for one bit, north positive.
+    /// Degrees per LSB, north positive.
     pub degrees_per_bit: f32,
-    /// Degrees at raw zero.
+    /// Degrees at raw value zero.
     pub offset_deg: f32,
-    /// The raw code that says "not valid".
+    /// Raw value that means "not valid".
     pub invalid: Option<u32>,
 }
 
@@ -49,22 +49,22 @@ pub struct LatitudeSettings {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum LatitudeConfigError {
-    /// More bits than an identifier has.
-    #[error("latitude frame {0:x} is no identifier")]
+    /// The identifier has too many bits.
+    #[error("latitude frame {0:x} is not a valid identifier")]
     Identifier(u32),
-    /// One of our own messages has it.
+    /// One of our own messages has the identifier.
     #[error("latitude frame {0:x} is one of our own messages")]
     Own(u32),
-    /// The value does not lie in a frame.
+    /// The bit field does not lie inside a frame.
     #[error("latitude: {bits} bits from bit {start} do not lie inside a frame")]
     Outside {
-        /// Start bit as given.
+        /// Configured start bit.
         start: u8,
-        /// Number of bits as given.
+        /// Configured number of bits.
         bits: u8,
     },
-    /// A scale or an offset that makes no latitude.
-    #[error("latitude: {0} degrees for a bit, or the offset, make no latitude")]
+    /// The scale or the offset cannot be that of a latitude.
+    #[error("latitude: {0} degrees per bit, or the offset, is not plausible")]
     Scale(f32),
 }
 
@@ -88,31 +88,31 @@ impl LatitudeSettings {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum LatitudeError {
-    /// It has too few bytes.
+    /// The frame has too few bytes.
     #[error("latitude frame of {0} bytes is too short")]
     Short(usize),
-    /// The sender says that it is not valid.
+    /// The sender marks the latitude as not valid.
     #[error("latitude is marked as not valid")]
     Invalid,
-    /// Beyond a pole.
+    /// The latitude is beyond +-90 degrees.
     #[error("latitude {0} is beyond a pole")]
     Range(f32),
-    /// Further from the latitude in use than a vehicle goes.
+    /// The latitude is further from the one in use than the vehicle can have driven.
     #[error("latitude jumps from {from} to {to}")]
     Jump {
         /// The latitude in use.
         from: f32,
-        /// The one that was received.
+        /// The latitude that was received.
         to: f32,
     },
 }
 
-/// A latitude that can be used.
+/// A latitude that has been accepted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReceivedLatitude {
     /// Degrees, north positive.
     pub degrees: f32,
-    /// The vehicle has moved there; else it is the first one, or the one before was wrong.
+    /// Whether it agrees with the latitude in use; otherwise it is the first one, or replaces a wrong one.
     pub moved: bool,
 }
 
@@ -123,12 +123,12 @@ pub struct LatitudeReceiver {
     id: Id,
     field: BitField,
     known: Option<(f32, Micros)>,
-    /// A latitude that is not used yet, and the frames that agree with it.
+    /// A latitude that is not used yet, and the number of frames that agree with it.
     candidate: Option<(f32, u8)>,
 }
 
 impl LatitudeReceiver {
-    /// Checks settings. `known` is a latitude from elsewhere, which frames have to agree with.
+    /// Checks the settings. `known` is a latitude from another source, with which frames must agree.
     ///
     /// # Errors
     /// [`LatitudeConfigError`].
@@ -157,10 +157,10 @@ impl LatitudeReceiver {
         self.known.is_some() && self.candidate.is_some()
     }
 
-    /// Takes a frame that was received now; `None` when it carries no latitude, or one that is not confirmed yet.
+    /// Processes a frame received at `now`; `None` if it carries no latitude, or one that is not confirmed yet.
     ///
     /// # Errors
-    /// [`LatitudeError`]: the latitude in use stays.
+    /// [`LatitudeError`]; the latitude in use does not change.
     pub fn decode(
         &mut self,
         frame: &impl Frame,
@@ -187,8 +187,8 @@ impl LatitudeReceiver {
 
     fn judge(&mut self, degrees: f32, now: Micros) -> Result<Option<ReceivedLatitude>, LatitudeError> {
         if let Some((from, at)) = self.known {
-            let way = (now.since(at).0 as f32 * DEG_PER_US).min(LONGEST_DEG);
-            if (degrees - from).abs() <= NEAR_DEG + way {
+            let reachable = (now.since(at).0 as f32 * DEG_PER_US).min(LONGEST_DEG);
+            if (degrees - from).abs() <= NEAR_DEG + reachable {
                 self.known = Some((degrees, now));
                 self.candidate = None;
                 return Ok(Some(ReceivedLatitude { degrees, moved: true }));

@@ -1,27 +1,27 @@
-//! These functions compute the load of messages: bits on the bus at worst, characters on a serial line.
+//! These functions compute the load of periodic messages on a CAN bus (worst case) and on a serial line.
 
 use embedded_can::Id;
 
 /// A classic data frame of eight bytes that is sent periodically.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Periodic {
-    /// Its identifier.
+    /// Identifier of the frame.
     pub id: Id,
-    /// Its period.
+    /// Period, ms.
     pub period_ms: u16,
 }
 
-/// Data bits of a frame; all of ours have eight bytes.
+/// Data bits of a frame; all our frames have eight bytes.
 const DATA_BITS: u32 = 64;
-/// Line bits per character: start, eight, stop.
+/// Line bits per character: start, eight data bits, stop.
 const BITS_PER_CHARACTER: u32 = 10;
 
 impl Periodic {
-    /// Returns the bits of one frame with the most stuff bits possible, interframe space included.
+    /// Returns the bits of one frame with the largest possible number of stuff bits, interframe space included.
     ///
     /// 13 bits are never stuffed (CRC delimiter, acknowledgement, end of frame, space); in the
-    /// others, of which 34 or 54 are no data, there is at most one stuff bit for every four
-    /// after the first (Davis et al., 2007).
+    /// others, of which 34 or 54 are not data, there is at most one stuff bit for every four
+    /// bits after the first (Davis et al., 2007).
     #[must_use]
     pub const fn worst_case_bits(&self) -> u32 {
         let stuffed = DATA_BITS
@@ -32,7 +32,7 @@ impl Periodic {
         stuffed + 13 + (stuffed - 1) / 4
     }
 
-    /// Returns the bits of the same frame as an SLCAN line, with a time stamp or without.
+    /// Returns the line bits of the same frame as an SLCAN line, with or without a time stamp.
     #[must_use]
     pub const fn slcan_bits(&self, stamped: bool) -> u32 {
         let identifier = match self.id {
@@ -45,7 +45,7 @@ impl Periodic {
     }
 }
 
-/// Returns the share of a bus or line that the messages take, in 1/1000, rounded up.
+/// Returns the load of the messages on a bus or line, in 1/1000, rounded up.
 #[must_use]
 pub fn per_mille(messages: &[Periodic], bits: impl Fn(&Periodic) -> u32, bits_per_second: u32) -> u32 {
     // Bits in 1000 s, exact for every period that divides 1,000,000 ms, rounded up for others.

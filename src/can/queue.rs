@@ -1,14 +1,14 @@
-//! Frames wait here for the bus, and old ones make way for new ones, because nobody needs a late rate.
+//! A queue holds frames for the bus and drops the oldest one when it is full.
 //!
-//! A bus that is off, full or gone must not stop the pipeline, and after it comes back nobody
-//! wants to know how the vehicle turned before. So putting a frame in never fails and never
-//! waits: when the queue is full the oldest frame is dropped and counted. A receiver sees the
-//! gap in the messages' counters.
+//! A bus that is off, overloaded or unplugged must not stop the pipeline, and a receiver has no use for stale
+//! rates after the bus has recovered. Enqueueing therefore never fails and never
+//! blocks: when the queue is full, the oldest frame is dropped and counted. A receiver sees the
+//! gap in the message counters.
 
 use embedded_can::nb::Can;
 use heapless::Deque;
 
-/// The frames that wait, `N` at most.
+/// A queue of at most `N` frames that drops the oldest frame when it is full.
 #[derive(Debug, Clone)]
 pub struct TransmitQueue<F, const N: usize> {
     frames: Deque<F, N>,
@@ -23,20 +23,20 @@ impl<F, const N: usize> Default for TransmitQueue<F, N> {
 }
 
 impl<F, const N: usize> TransmitQueue<F, N> {
-    /// Makes an empty queue.
+    /// Creates an empty queue.
     #[must_use]
     pub const fn new() -> Self {
         const { assert!(N > 0, "a queue holds at least one frame") };
         Self { frames: Deque::new(), dropped: 0, errors: 0 }
     }
 
-    /// Puts a frame at the end; the oldest one gives way.
+    /// Appends a frame; if the queue is full, drops the oldest one.
     pub fn enqueue(&mut self, frame: F) {
         if self.frames.is_full() {
             let _ = self.frames.pop_front();
             self.dropped = self.dropped.saturating_add(1);
         }
-        // There is room now.
+        // Cannot fail: the queue has room now.
         let _ = self.frames.push_back(frame);
     }
 
@@ -53,20 +53,19 @@ impl<F, const N: usize> TransmitQueue<F, N> {
         }
     }
 
-    /// Takes the oldest frame, for a transport that always takes it.
+    /// Removes and returns the oldest frame, for a transport that always accepts it.
     pub fn pop(&mut self) -> Option<F> {
         self.frames.pop_front()
     }
 
-    /// Gives frames to the controller until it takes no more; never waits. Gives how many it
-    /// took.
+    /// Passes frames to the controller until it accepts no more, and returns the number accepted. Never blocks.
     ///
-    /// A controller that lets a frame go for a more urgent one gives it back; it is then the
-    /// oldest again. An error ends the turn: the frame stays for the next one, where newer ones
-    /// may have pushed it out.
+    /// If the controller replaces a pending frame by a more urgent one, it returns the pending frame, which goes back
+    /// to the front of the queue. An error ends the call: the frame stays for the next call, unless newer frames
+    /// push it out before.
     pub fn service<C: Can<Frame = F>>(&mut self, controller: &mut C) -> usize {
         let mut taken = 0;
-        // One turn has as many tries as the queue places, whatever the controller gives back.
+        // At most N tries, whatever the controller returns.
         for _ in 0..N {
             let Some(frame) = self.frames.front() else { break };
             match controller.transmit(frame) {
@@ -76,7 +75,7 @@ impl<F, const N: usize> TransmitQueue<F, N> {
                 }
                 Ok(Some(returned)) => {
                     let _ = self.frames.pop_front();
-                    // The place that has just become free.
+                    // Cannot fail: a place has just become free.
                     let _ = self.frames.push_front(returned);
                 }
                 Err(nb::Error::WouldBlock) => break,
@@ -89,25 +88,25 @@ impl<F, const N: usize> TransmitQueue<F, N> {
         taken
     }
 
-    /// Returns the number of frames that wait.
+    /// Returns the number of waiting frames.
     #[must_use]
     pub fn len(&self) -> usize {
         self.frames.len()
     }
 
-    /// Returns whether no frame waits.
+    /// Returns whether the queue is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.frames.is_empty()
     }
 
-    /// Returns the number of frames that gave way to newer ones.
+    /// Returns the number of dropped frames.
     #[must_use]
     pub fn dropped(&self) -> u32 {
         self.dropped
     }
 
-    /// Returns the number of turns that ended with an error of the controller.
+    /// Returns the number of calls of [`Self::service`] that ended with an error of the controller.
     #[must_use]
     pub fn errors(&self) -> u32 {
         self.errors

@@ -1,6 +1,6 @@
-//! A bit field is the place of a value in a frame, as DBC files give it.
+//! A bit field describes the position of a value in a frame, as in a DBC file.
 
-/// Order of a value's bytes.
+/// The byte order of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -11,34 +11,34 @@ pub enum ByteOrder {
     Motorola,
 }
 
-/// The value does not lie inside eight bytes, or has no bits, or over 32.
+/// The error for a bit field that does not lie inside eight bytes, or whose length is not 1 to 32 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("{} bits from bit {} do not lie inside a frame", .len, .start)]
 pub struct OutsideFrame {
-    /// Start bit as given.
+    /// Requested start bit.
     pub start: u8,
-    /// Length as given.
+    /// Requested length in bits.
     pub len: u8,
 }
 
-/// Bits of a frame that are one value.
+/// The position, byte order and sign of a value in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Place", into = "Place"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BitField {
-    /// Bits to the right of the value, in the order of the bytes.
+    /// Number of bits below the value when the frame is read in its byte order.
     shift: u8,
     len: u8,
     order: ByteOrder,
     signed: bool,
-    /// Bytes that a frame needs.
+    /// Shortest frame that contains the value, bytes.
     bytes: u8,
 }
 
 impl BitField {
-    /// Makes a field from start bit and length, as a DBC file gives them.
+    /// Creates a field from start bit and length, as in a DBC file.
     ///
     /// # Errors
     /// [`OutsideFrame`].
@@ -47,7 +47,7 @@ impl BitField {
         if start > 63 || len == 0 || len > 32 {
             return outside;
         }
-        // Bits before the value when the frame is read in its order.
+        // Number of bits before the value when the frame is read in its byte order.
         let before = match order {
             ByteOrder::Intel => start,
             ByteOrder::Motorola => start / 8 * 8 + 7 - start % 8,
@@ -63,7 +63,7 @@ impl BitField {
         Ok(Self { shift, len, order, signed, bytes: end.div_ceil(8) })
     }
 
-    /// Returns the start bit, as a DBC file gives it.
+    /// Returns the start bit, as in a DBC file.
     #[must_use]
     pub const fn start(&self) -> u8 {
         match self.order {
@@ -75,19 +75,19 @@ impl BitField {
         }
     }
 
-    /// Returns the order of the value's bytes.
+    /// Returns the byte order of the value.
     #[must_use]
     pub const fn order(&self) -> ByteOrder {
         self.order
     }
 
-    /// Returns whether the value has a sign.
+    /// Returns whether the value is signed.
     #[must_use]
     pub const fn is_signed(&self) -> bool {
         self.signed
     }
 
-    /// Returns the bits of the frame that the value takes: bit `8 * byte + bit` of the frame is that bit here.
+    /// Returns a mask of the value's bits; bit `8 * byte + bit` of the frame is the same bit of the mask.
     #[must_use]
     pub const fn mask(&self) -> u64 {
         let mask = ((1 << self.len) - 1) << self.shift;
@@ -103,7 +103,7 @@ impl BitField {
         self.len
     }
 
-    /// Returns the bits as they are; `None` when the frame is too short.
+    /// Returns the raw bits, without sign extension; `None` if the frame is too short.
     #[must_use]
     pub fn raw(&self, data: &[u8]) -> Option<u32> {
         if data.len() < usize::from(self.bytes) {
@@ -120,7 +120,7 @@ impl BitField {
         Some((word >> self.shift & ((1 << self.len) - 1)) as u32)
     }
 
-    /// Returns the value with its sign.
+    /// Returns the value, sign-extended if the field is signed; `None` if the frame is too short.
     #[must_use]
     pub fn value(&self, data: &[u8]) -> Option<i64> {
         let raw = i64::from(self.raw(data)?);
@@ -129,7 +129,7 @@ impl BitField {
     }
 }
 
-/// A field as it is stored: the numbers of a DBC file, which are checked when they are read.
+/// The stored form of a field: the numbers of a DBC file, which are checked on deserialization.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Place {

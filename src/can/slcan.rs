@@ -1,4 +1,4 @@
-//! SLCAN carries CAN over a serial line, the Lawicel way (CAN232 manual): one frame is one line of ASCII.
+//! SLCAN carries CAN frames over a serial line in the Lawicel format (CAN232 manual): one line of ASCII per frame.
 
 #[doc(hidden)]
 pub mod assembler;
@@ -10,16 +10,16 @@ use crate::units::Micros;
 use embedded_can::{Frame, Id};
 use heapless::Vec;
 
-/// `T`, eight digits of identifier, length, sixteen digits of data, CR.
+/// Longest line: `T`, eight digits of identifier, length, sixteen digits of data, CR.
 pub const MAX_LINE: usize = 27;
-/// A frame as sent.
+/// An encoded frame.
 pub type Line = Vec<u8, MAX_LINE>;
 
-/// The same and four digits of time stamp.
+/// Longest line with a time stamp of four digits.
 pub const MAX_STAMPED_LINE: usize = MAX_LINE + 4;
-/// A frame as sent, with a time stamp.
+/// An encoded frame with a time stamp.
 pub type StampedLine = Vec<u8, MAX_STAMPED_LINE>;
-/// Time stamps count to a minute, in milliseconds.
+/// Time stamps are milliseconds modulo one minute.
 const STAMP_MODULUS: u64 = 60_000;
 
 const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
@@ -27,7 +27,7 @@ const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
 /// Encodes a frame as `tIIILDD..` for a standard identifier or `TIIIIIIIILDD..` for an extended one, with CR at the
 /// end.
 ///
-/// `None` for a frame that is no classic data frame (remote, or more than eight bytes).
+/// Returns `None` for a frame that is not a classic data frame (remote, or more than eight bytes).
 #[must_use]
 pub fn emit(frame: &impl Frame) -> Option<Line> {
     if frame.is_remote_frame() || frame.data().len() > 8 {
@@ -50,8 +50,8 @@ pub fn emit(frame: &impl Frame) -> Option<Line> {
     Some(line)
 }
 
-/// Encodes a frame as [`emit`] does, with milliseconds modulo a minute in four digits behind the data, as a host
-/// asks for with `Z1`.
+/// Encodes a frame as [`emit`] does, followed by a time stamp of four hexadecimal digits: milliseconds modulo one
+/// minute. A host enables time stamps with `Z1`.
 #[must_use]
 pub fn emit_stamped(frame: &impl Frame, time: Micros) -> Option<StampedLine> {
     let line = emit(frame)?;
@@ -65,12 +65,12 @@ pub fn emit_stamped(frame: &impl Frame, time: Micros) -> Option<StampedLine> {
     Some(stamped)
 }
 
-/// Writes a byte as two digits.
+/// Encodes a byte as two hexadecimal digits.
 fn hex(byte: u8) -> [u8; 2] {
     [DIGITS[usize::from(byte >> 4)], DIGITS[usize::from(byte & 0xF)]]
 }
 
-/// The reason why a line is no data frame.
+/// The reason why a line is not a data frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -79,24 +79,24 @@ pub enum SlcanError {
     #[error("not a data frame line")]
     Kind,
     /// A character is not a hexadecimal digit.
-    #[error("no hexadecimal digit at column {at}")]
+    #[error("not a hexadecimal digit at column {at}")]
     Digit {
-        /// The column in the line.
+        /// Index of the character in the line.
         at: usize,
     },
     /// The line is shorter or longer than its length digit says.
-    #[error("line length does not fit the frame")]
+    #[error("line length does not match the frame")]
     Length,
     /// The identifier is too large for its kind.
     #[error("identifier out of range")]
     Identifier,
 }
 
-/// Reads one data frame line with a time stamp, without its CR; gives the frame and its
+/// Parses a line with a time stamp, without its CR, and returns the frame and the time stamp in
 /// milliseconds.
 ///
 /// # Errors
-/// [`SlcanError`] for anything that [`emit_stamped`] would not write.
+/// [`SlcanError`] for a line that is not a data frame with a time stamp.
 pub fn parse_stamped<F: Frame>(line: &[u8]) -> Result<(F, u16), SlcanError> {
     let at = line.len().saturating_sub(4);
     let (line, digits) = line.split_at(at);
@@ -108,10 +108,10 @@ pub fn parse_stamped<F: Frame>(line: &[u8]) -> Result<(F, u16), SlcanError> {
     Ok((parse(line)?, stamp))
 }
 
-/// Reads one data frame line, without its CR.
+/// Parses a data frame line, without its CR.
 ///
 /// # Errors
-/// [`SlcanError`] for anything that [`emit`] would not write.
+/// [`SlcanError`] for a line that is not a data frame.
 pub fn parse<F: Frame>(line: &[u8]) -> Result<F, SlcanError> {
     let digits = match line.first() {
         Some(b't') => 3,

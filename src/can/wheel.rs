@@ -1,5 +1,5 @@
-//! The receiver reads wheel speeds from a vehicle's own frames, wherever they lie in them. Whether the vehicle
-//! stands is decided in `standstill`.
+//! The receiver decodes wheel speeds from the vehicle's frames, with a configurable layout. Module `standstill`
+//! decides whether the vehicle stands.
 
 mod layout;
 mod settings;
@@ -16,19 +16,19 @@ use crate::units::Micros;
 use embedded_can::Frame;
 use standstill::{StandstillRule, Wheels};
 
-/// Frames in, wheel speeds and standstill out.
+/// Decodes frames to wheel speeds and standstill.
 #[derive(Debug, Clone, Copy)]
 pub struct WheelReceiver {
     settings: WheelSettings,
     sequences: [Sequence; MAX_FRAMES],
     wheels: Wheels,
-    /// A good frame has come.
-    heard: bool,
+    /// Whether a good frame has been received.
+    has_received: bool,
     lost: u32,
 }
 
 impl WheelReceiver {
-    /// Checks settings; nothing received yet.
+    /// Checks the settings and creates a receiver.
     ///
     /// # Errors
     /// [`WheelConfigError`].
@@ -38,16 +38,16 @@ impl WheelReceiver {
         let wheels = Wheels::new(rule, settings.wheels()?);
         let sequences = settings.frames.map(|frame| {
             let counters = frame.map_or(1, |frame| frame.counters());
-            // Loss is counted, not refused: the speed itself is good.
+            // A lost frame is counted and the new one still accepted: its speed is good.
             Sequence::new(counters, u8::MAX)
         });
-        Ok(Self { settings, sequences, wheels, heard: false, lost: 0 })
+        Ok(Self { settings, sequences, wheels, has_received: false, lost: 0 })
     }
 
-    /// Takes a frame that was received now; `None` when it is not a wheel frame.
+    /// Processes a frame received at `now`; `None` if it is not a wheel frame.
     ///
     /// # Errors
-    /// [`WheelError`]; the wheels of the frame then keep their last speed until it is too old,
+    /// [`WheelError`]; the wheels of the frame then keep their last speed until it is stale,
     /// except those whose speed is not valid.
     pub fn decode(&mut self, frame: &impl Frame, now: Micros) -> Option<Result<WheelSample, WheelError>> {
         let id = frame.id();
@@ -57,18 +57,18 @@ impl WheelReceiver {
         self.wheels.expire(now);
         let result = self.take(index, &layout, frame.data(), now);
         self.wheels.judge(now);
-        self.heard |= result.is_ok();
+        self.has_received |= result.is_ok();
         Some(result.map(|()| self.wheels.sample(now)))
     }
 
-    /// Returns the newest speeds without a new frame; `None` before the first good one, because a vehicle that
-    /// sends none is not at fault.
+    /// Returns the newest speeds without a new frame; `None` before the first good frame, because a vehicle without
+    /// wheel frames is not a fault.
     pub fn poll(&mut self, now: Micros) -> Option<WheelSample> {
         self.wheels.expire(now);
-        self.heard.then(|| self.wheels.sample(now))
+        self.has_received.then(|| self.wheels.sample(now))
     }
 
-    /// Returns the number of frames that the counters show to be missing.
+    /// Returns the number of lost frames, from the message counters.
     #[must_use]
     pub fn lost(&self) -> u32 {
         self.lost

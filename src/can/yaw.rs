@@ -1,7 +1,7 @@
-//! Our own yaw messages carry the full resolution, the accumulated yaw, and the quality of both.
+//! Our own yaw messages carry rate and accumulated yaw at full resolution, with their quality.
 //!
-//! Three messages of eight bytes. Bytes 0 to 2 are the header: bytes 0 and 1, with profile 5
-//! also 2, belong to the E2E profile; with the others byte 2 is the sample counter, the same in
+//! There are three messages of eight bytes. Bytes 0 to 2 are the header: bytes 0 and 1, with profile 5
+//! also byte 2, belong to the E2E profile. With the other profiles byte 2 is the sample counter, the same in
 //! the three messages of one sample. Bytes 3 to 7, little-endian:
 //!
 //! | message | bytes | signal | scale |
@@ -11,29 +11,29 @@
 //! | | 7, bits 3-4 | [`Quality`] | |
 //! | angle | 3-6 | accumulated yaw, i32 | 360 deg / 2^32, wraps at half a turn |
 //! | | 7 | [`Faults`] | |
-//! | detail | 3-4 | correction that was taken off, i16 | 2e-4 deg/s |
+//! | detail | 3-4 | correction that was subtracted, i16 | 2e-4 deg/s |
 //! | | 5-6 | expected error (1 sigma), u16, rounded up | 1e-5 deg/s; FFFF unknown |
-//! | | 7 | latency, u8, rounded up | 0.5 ms; FE that or more, FF unknown |
+//! | | 7 | latency, u8, rounded up | 0.5 ms; FE also above, FF unknown |
 //!
-//! The accumulated yaw wraps where an angle does, so the difference of two readings, taken in 32
-//! bits, is the angle turned between them, and a receiver that missed messages misses no angle.
-//! The rate carries its rounding residual: summed up over the sensor's true periods, it is the
-//! accumulated yaw to half an LSB. Such a period is 10 ms unless the sensor's clock is found off the
+//! The accumulated yaw wraps at half a turn, so the 32-bit difference of two readings
+//! is the angle turned between them, and a receiver that missed messages loses no angle.
+//! The rate carries its rounding residual: its sum over the sensor's true periods is the
+//! accumulated yaw to half an LSB. A true period is 10 ms unless the sensor's clock is found to differ from the
 //! board's ([`crate::align::clock_ratio`]).
 
 pub use crate::health::{Faults, Quality, Source};
 
 use crate::units::{AngularRate, Yaw};
 
-/// Identifiers of the same three messages for a fibre-optic gyro, and their E2E data identifiers, where
-/// nothing else is configured. They are sent from when it is heard, or expected.
+/// Default identifiers of the same three messages for a fibre-optic gyro, and their E2E data identifiers.
+/// They are sent from its first sample on, or from power-up if it is configured.
 pub const FOG_IDS: [u16; 3] = [0x1A4, 0x1A5, 0x1A6];
 
-/// Rate code that says "not available".
+/// Rate code that means "not available".
 pub const RATE_NOT_AVAILABLE: i32 = i32::MIN;
-/// Expected error that says "unknown".
+/// Code of an unknown expected error.
 pub const SIGMA_UNKNOWN: u16 = u16::MAX;
-/// Latency that says "unknown".
+/// Code of an unknown latency.
 pub const LATENCY_UNKNOWN: u8 = u8::MAX;
 
 /// Codes of 360 deg / 2^32 per code of [`Yaw`] (0.32 / 2 pi), times 2^56.
@@ -41,7 +41,7 @@ const ANGLE_PER_YAW_Q56: i128 = 3_669_863_129_102_502;
 /// Codes of 1e-5 deg/s per rate code, times 2^32.
 const SIGMA_PER_CODE_Q32: u64 = 183_346_494;
 
-/// The reason why bytes are no yaw message. The E2E check comes before.
+/// The reason why bytes are not a yaw message. The E2E check is done before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -49,32 +49,32 @@ pub enum YawError {
     /// The frame does not have eight bytes.
     #[error("yaw message has {0} bytes instead of 8")]
     Length(usize),
-    /// A source that this version does not know.
+    /// The source is unknown to this version.
     #[error("yaw rate from an unknown source ({0})")]
     Source(u8),
 }
 
-/// Holds the rate message: the rate in 1e-6 deg/s a code, its source and its quality.
+/// The rate message: the rate (1e-6 deg/s per code), its source and its quality.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RateMessage {
     /// Code of the rate.
     pub rate: i32,
-    /// The origin of the rate.
+    /// Source of the rate.
     pub source: Source,
-    /// The quality of the rate.
+    /// Quality of the rate.
     pub quality: Quality,
 }
 
 impl RateMessage {
-    /// Returns the eight bytes with the header still empty.
+    /// Encodes the message as eight bytes with an empty header.
     #[must_use]
     pub const fn emit(&self) -> [u8; 8] {
         let [a, b, c, d] = self.rate.to_le_bytes();
         [0, 0, 0, a, b, c, d, self.source as u8 | (self.quality as u8) << 3]
     }
 
-    /// Reads the content behind the header.
+    /// Decodes the content after the header.
     ///
     /// # Errors
     /// [`YawError`].
@@ -106,25 +106,25 @@ impl RateMessage {
     }
 }
 
-/// Holds the angle message: accumulated yaw in 360 deg / 2^32 a code, and the faults.
+/// The angle message: accumulated yaw (360 deg / 2^32 per code) and the faults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AngleMessage {
     /// Code of the accumulated yaw.
     pub yaw: i32,
-    /// The present faults.
+    /// Faults since the previous message.
     pub faults: Faults,
 }
 
 impl AngleMessage {
-    /// Returns the eight bytes with the header still empty.
+    /// Encodes the message as eight bytes with an empty header.
     #[must_use]
     pub const fn emit(&self) -> [u8; 8] {
         let [a, b, c, d] = self.yaw.to_le_bytes();
         [0, 0, 0, a, b, c, d, self.faults.0]
     }
 
-    /// Reads the content behind the header.
+    /// Decodes the content after the header.
     ///
     /// # Errors
     /// [`YawError::Length`].
@@ -142,7 +142,7 @@ impl AngleMessage {
     }
 }
 
-/// The detail message: correction (2e-4 deg/s a code), expected error (1e-5 deg/s), latency (0.5 ms).
+/// The detail message: correction (2e-4 deg/s per code), expected error (1e-5 deg/s), latency (0.5 ms).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DetailMessage {
@@ -155,7 +155,7 @@ pub struct DetailMessage {
 }
 
 impl DetailMessage {
-    /// Returns the eight bytes with the header still empty.
+    /// Encodes the message as eight bytes with an empty header.
     #[must_use]
     pub const fn emit(&self) -> [u8; 8] {
         let [a, b] = self.correction.to_le_bytes();
@@ -163,7 +163,7 @@ impl DetailMessage {
         [0, 0, 0, a, b, c, d, self.latency]
     }
 
-    /// Reads the content behind the header.
+    /// Decodes the content after the header.
     ///
     /// # Errors
     /// [`YawError::Length`].
@@ -174,21 +174,21 @@ impl DetailMessage {
         Ok(Self { correction: i16::from_le_bytes([a, b]), sigma: u16::from_le_bytes([c, d]), latency })
     }
 
-    /// Returns the latency in ms; `None` when it is not known.
+    /// Returns the latency in ms; `None` if it is unknown.
     #[must_use]
     pub fn latency_ms(&self) -> Option<f64> {
         (self.latency != LATENCY_UNKNOWN).then(|| f64::from(self.latency) * 0.5)
     }
 }
 
-/// Returns the nearest code of an accumulated yaw, without whole turns.
+/// Returns the nearest code of an accumulated yaw; whole turns are dropped.
 #[must_use]
 #[doc(hidden)]
 pub const fn encode_angle(yaw: Yaw) -> i32 {
     ((yaw.0 as i128 * ANGLE_PER_YAW_Q56 + (1 << 55)) >> 56) as i32
 }
 
-/// Returns the code of an expected error, rounded up, so that it never promises too much.
+/// Returns the code of an expected error, rounded up, so that the error is never understated below saturation.
 #[must_use]
 #[doc(hidden)]
 pub const fn encode_sigma(sigma: Option<AngularRate>) -> u16 {

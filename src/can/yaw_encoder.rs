@@ -1,4 +1,4 @@
-//! This encoder makes three protected messages from each estimate.
+//! This encoder makes the three protected yaw messages (rate, angle, detail) from estimates.
 
 use super::DataFrame;
 use super::carry::{RoundingCarry, Scale};
@@ -11,10 +11,10 @@ use crate::estimate::YawEstimate;
 use crate::units::AngularRate;
 use embedded_can::{Frame, StandardId};
 
-/// The encoder of one set of messages for every `every` samples.
+/// The encoder of the three yaw messages; it emits one set per `every` samples.
 ///
-/// The rate and the correction are the mean over those samples: a receiver that multiplies by
-/// the period gets the whole angle, whatever the period.
+/// The rate and the correction are means over those samples: a receiver that multiplies the rate by
+/// the period gets the full angle, whatever the period.
 #[derive(Debug, Clone, Copy)]
 pub struct YawEncoder {
     protectors: [Protector; 3],
@@ -27,7 +27,7 @@ pub struct YawEncoder {
 }
 
 impl YawEncoder {
-    /// Begins before the first message. `profiles` are those of rate, angle and detail; `every` is the number of
+    /// Creates an encoder. The profiles are those of rate, angle and detail; `every` is the number of
     /// samples per set, at least one.
     #[must_use]
     pub const fn new([rate, angle, detail]: [Profile; 3], every: u8) -> Self {
@@ -42,18 +42,18 @@ impl YawEncoder {
         }
     }
 
-    /// Encodes a sample as frames under identifiers (11 bits) of rate, angle and detail, when they are due.
+    /// Adds a sample, and returns the frames when they are due; `ids` (11 bits) are of rate, angle and detail.
     pub fn frames(&mut self, sample: &YawEstimate, ids: [u16; 3]) -> impl Iterator<Item = DataFrame> {
         let messages = self.encode(sample).into_iter().flatten();
         messages.zip(ids).filter_map(|(message, id)| DataFrame::new(StandardId::new(id)?, &message))
     }
 
-    /// Takes a sample, and returns the messages of rate, angle and detail when they are due.
+    /// Adds a sample, and returns the messages of rate, angle and detail when they are due.
     #[inline(never)]
     pub fn encode(&mut self, sample: &YawEstimate) -> Option<[[u8; 8]; 3]> {
         self.rate.sum += i64::from(sample.rate.0);
         self.correction.sum += i64::from(sample.correction.0);
-        // A fault that lasted one sample must not fall between two messages.
+        // A fault that lasts one sample must be reported even if no message is due with it.
         self.faults = self.faults.with(sample.faults);
         self.samples += 1;
         if self.samples < self.every {
@@ -66,7 +66,7 @@ impl YawEncoder {
         let rate = match sample.quality {
             Quality::Good | Quality::Degraded => rate,
             Quality::Initialising => {
-                // Nobody sums these up.
+                // Receivers do not integrate rates from the initialisation.
                 self.rate.reset();
                 rate
             }
@@ -108,8 +108,8 @@ impl YawEncoder {
     }
 }
 
-/// Averages some samples without loss: the remainder of the division stays in the sum, and the rounding residual in the
-/// carry.
+/// The mean of some samples without loss: the remainder of the division stays in the sum, and the rounding residual
+/// in the carry.
 #[derive(Debug, Clone, Copy)]
 struct Mean {
     sum: i64,
@@ -124,7 +124,7 @@ impl Mean {
     fn take(&mut self, samples: u8) -> i32 {
         let mean = self.sum.checked_div_euclid(samples.into()).unwrap_or(0);
         self.sum -= mean * i64::from(samples);
-        // A mean of i32 is one.
+        // The mean of i32 values fits an i32.
         self.carry.encode(AngularRate(mean as i32))
     }
 

@@ -1,7 +1,7 @@
 //! This driver reads Analog Devices ADIS16465 and ADIS16470 over SPI (mode 3).
 //!
-//! One burst gives everything: the command 68 00, then the twenty bytes of a [`Burst`], at 1 MHz at most. This file
-//! fetches it; its content is parsed without I/O.
+//! One burst read returns all values: the command 68 00, then the twenty bytes of a [`Burst`], at 1 MHz at most. This
+//! file does the SPI transfer; `burst` parses the bytes without I/O.
 
 mod burst;
 
@@ -11,7 +11,7 @@ use crate::sample::ImuSample;
 use crate::units::Micros;
 use embedded_hal::spi::{Operation, SpiDevice};
 
-/// This command requests a burst.
+/// Command that requests a burst.
 const BURST_COMMAND: [u8; 2] = [0x68, 0x00];
 
 /// The error of a read.
@@ -27,29 +27,29 @@ pub enum AdisError<E> {
     Burst(BurstError),
 }
 
-/// Drives the part on its bus.
+/// The driver of the sensor.
 #[derive(Debug)]
 pub struct Adis16465<SPI> {
     spi: SPI,
     model: Model,
     last_counter: Option<u16>,
-    /// Readings that were not fetched, counted by the data counter.
+    /// Number of readings that were not fetched, from the data counter.
     lost: u32,
 }
 
 impl<SPI: SpiDevice> Adis16465<SPI> {
-    /// Makes a driver of the part as it is delivered; it needs no setting. Give it 300 ms after power-up.
+    /// Creates a driver for the sensor with its factory settings. Wait 300 ms after power-up before the first read.
     #[must_use]
     pub const fn new(spi: SPI, model: Model) -> Self {
         Self { spi, model, last_counter: None, lost: 0 }
     }
 
-    /// Returns the bus.
+    /// Releases the SPI device.
     pub fn destroy(self) -> SPI {
         self.spi
     }
 
-    /// Reads the newest values. The burst carries no time: `now` is the time of the data-ready signal.
+    /// Reads the newest values. The burst carries no time stamp: `now` is the time of the data-ready signal.
     ///
     /// # Errors
     /// [`AdisError`].
@@ -67,8 +67,8 @@ impl<SPI: SpiDevice> Adis16465<SPI> {
         burst.sample(self.model, now).map_err(AdisError::Burst)
     }
 
-    /// Returns the number of readings that were not fetched. At 2000 a second and 100 reads this grows by 19 a
-    /// read.
+    /// Returns the number of readings that were not fetched. At 2000 readings and 100 reads a second, it grows by 19
+    /// per read.
     #[must_use]
     pub fn lost(&self) -> u32 {
         self.lost

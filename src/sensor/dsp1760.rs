@@ -1,10 +1,10 @@
-//! This module reads the KVH DSP-1760 fibre-optic gyro (and the 1725, 1750, 1775 units, which use the same messages):
-//! RS-422, 921600 8N1 at 1000 messages a second.
+//! This module reads the KVH DSP-1760 fibre-optic gyro (and the 1725, 1750, 1775 units, which use the same
+//! messages): RS-422, 921600 baud 8N1 at 1000 messages a second.
 //!
-//! The bytes do not say whether rotations are increments or rates, radians or degrees: [`Dsp1760Config`] does. Formats
-//! A and C carry no time, only a sequence number; their time is the number of messages, lost ones included, times the
-//! period. The number wraps at 128, so it does not show a loss of 128 messages or more; the time stamps of format B
-//! show it, or the arrival times do ([`crate::align`]).
+//! A message does not say whether rotations are increments or rates, radians or degrees: [`Dsp1760Config`] does.
+//! Formats A and C carry no time stamp, only a sequence number; their time is the number of messages, lost ones
+//! included, times the period. The sequence number wraps at 128, so it does not reveal a loss of 128 messages or
+//! more. The time stamps of format B reveal it, or the arrival times do ([`crate::align`]).
 
 mod clock;
 #[doc(hidden)]
@@ -36,15 +36,15 @@ pub enum Dsp1760Error {
     /// The content of the frame is invalid.
     #[error(transparent)]
     Message(MessageError),
-    /// The sequence number equals the one before: the same message came twice.
-    #[error("DSP-1760: message {sequence} came twice")]
+    /// The sequence number equals the previous one: the message is repeated.
+    #[error("DSP-1760: message {sequence} is repeated")]
     Repeated {
         /// The sequence number.
         sequence: u8,
     },
 }
 
-/// Counts events; the counters saturate.
+/// The event counters; they saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Dsp1760Counters {
@@ -52,18 +52,18 @@ pub struct Dsp1760Counters {
     pub gaps: u32,
     /// Messages missing in these gaps.
     pub lost: u32,
-    /// Messages that came twice.
+    /// Repeated messages.
     pub repeated: u32,
     /// Built-in-test messages skipped.
     pub self_tests: u32,
-    /// Rotations marked as good but beyond what the gyro can measure.
+    /// Rotations marked as good but out of range.
     pub implausible: u32,
 }
 
-/// Faster rotations are rejected as implausible, rad/s; the part's own range ends at 490 deg/s.
+/// Largest plausible rate, rad/s; the gyro's own range ends at 490 deg/s.
 const MAX_RATE: f32 = 16.0;
 
-/// Turns the bytes of a DSP-1760 into increments with unwrapped time.
+/// The parser of a DSP-1760: converts bytes to increments with unwrapped time.
 #[derive(Debug, Clone)]
 pub struct Dsp1760 {
     config: Dsp1760Config,
@@ -77,7 +77,7 @@ pub struct Dsp1760 {
 }
 
 impl Dsp1760 {
-    /// Begins before the first byte.
+    /// Creates a parser that has received nothing.
     #[must_use]
     pub const fn new(config: Dsp1760Config) -> Self {
         Self {
@@ -90,14 +90,14 @@ impl Dsp1760 {
         }
     }
 
-    /// Takes one byte. Call [`Dsp1760::next_sample`] until `None` before the next one.
+    /// Processes one byte. Call [`Dsp1760::next_sample`] until it returns `None` before passing the next byte.
     #[inline]
     pub fn receive(&mut self, byte: u8) {
         self.framer.receive(byte);
     }
 
-    /// Takes at least one of some bytes, as many as belong together, and returns their number. Call
-    /// [`Dsp1760::next_sample`] until `None` before the next ones.
+    /// Processes one or more of `bytes`, at most to the end of a message, and returns their number. Call
+    /// [`Dsp1760::next_sample`] until it returns `None` before passing the rest.
     #[inline]
     pub fn receive_some(&mut self, bytes: &[u8]) -> usize {
         self.framer.receive_some(bytes)
@@ -126,7 +126,7 @@ impl Dsp1760 {
         }
     }
 
-    /// Returns the number of candidates whose checksum did not fit.
+    /// Returns the number of frame candidates with a wrong checksum.
     #[must_use]
     pub fn bad_checksums(&self) -> u32 {
         self.framer.bad_checksums()

@@ -1,13 +1,13 @@
-//! These modules read the KVH DSP-3000, a fibre-optic gyro with one axis, in its two variants.
+//! These modules read the two variants of the KVH DSP-3000, a single-axis fibre-optic gyro.
 //!
-//! One ([`ascii`]) sends 100 lines a second at 38400 8N1, `[-]ddd.dddddd y`; the other
-//! ([`binary`]) 1000 words of four bytes a second at 115200 8N1.
+//! One variant ([`ascii`]) sends 100 lines a second at 38400 baud 8N1, `[-]ddd.dddddd y`; the other
+//! ([`binary`]) sends 1000 words of four bytes a second at 115200 baud 8N1.
 //!
-//! Neither carries time or a counter, so only the arrival times show a lost reading. The part's own rate is off by up
-//! to some 3 %, so readings are placed on the grid by arrival ([`crate::align`]), not by number.
+//! Neither carries a time stamp or a counter, so only the arrival times reveal a lost reading. The gyro's output rate
+//! is off by up to about 3 %, so readings are placed on the grid by arrival time ([`crate::align`]), not by number.
 //!
-//! The reading includes the rotation of the Earth, 15.04 deg/h times the sine of the latitude, which is 300 times the
-//! part's bias. It is left in here, because the bias stage subtracts it.
+//! A reading includes the rotation of the Earth, 15.04 deg/h times the sine of the latitude, which is 300 times the
+//! gyro's bias. It is not removed here, because the bias stage subtracts it.
 
 pub mod ascii;
 pub mod binary;
@@ -15,19 +15,19 @@ pub mod binary;
 use crate::sample::FogSample;
 use crate::units::{Angle, Micros};
 
-/// Says what the number means; one letter sets it at the part.
+/// The kind of number that the gyro sends; a one-letter command selects it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Mode {
-    /// The number is an angular rate.
+    /// Angular rate.
     Rate,
-    /// The number is the angle since the last reading.
+    /// Angle since the last reading.
     Incremental,
-    /// The number is the angle since the start, or since it was zeroed.
+    /// Angle since the start, or since the last [`Command::Zero`].
     Integrated,
 }
 
-/// Names the commands of the part, one letter each.
+/// The commands of the gyro, one letter each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
@@ -62,8 +62,8 @@ impl Command {
     }
 }
 
-/// Makes a sample of a rate or an increment, in degrees, over the time before `now`. The part's only axis is the
-/// vertical one.
+/// Creates the sample of a rate (deg/s) or an increment (deg) over the `span` microseconds before `now`. The gyro's
+/// only axis is the vertical one.
 fn sample(mode: Mode, degrees: f32, valid: bool, now: Micros, span: u32) -> Option<FogSample> {
     let per_second = match mode {
         Mode::Rate => span as f32 * 1e-6,

@@ -1,31 +1,32 @@
-//! The framer finds frames in a byte stream that may begin, break and be damaged anywhere.
+//! The framer finds frames in a byte stream that may start in the middle of a frame and contain gaps and corrupt
+//! bytes.
 //!
-//! A header alone does not synchronise, because its bytes may occur in a payload; only header and checksum together do.
-//! So when a candidate fails its check, the search continues one byte after its start, inside the bytes already
-//! received: an intact frame behind a false header is found, and nothing but damaged frames is lost. At most one frame
-//! is held.
+//! A header alone does not synchronise, because its bytes may occur in a payload; only header and checksum together
+//! do. When a candidate fails its check, the search therefore continues one byte after its start, inside the bytes
+//! already received. An intact frame after a false header is thus found, and only corrupt frames are lost. The buffer
+//! holds at most one frame.
 
 use heapless::Vec;
 
-/// Describes a framed protocol.
+/// A protocol whose frames have a header and a checksum.
 pub trait Protocol {
-    /// The first bytes of a frame, this many, tell whether one begins and how long it is.
+    /// Number of bytes at the start of a frame that identify it and determine its length.
     const HEADER: usize;
-    /// Returns the length of the frame that begins with these [`Protocol::HEADER`] bytes, at least their own;
-    /// `None` when none does.
+    /// Returns the length of the frame that begins with these [`Protocol::HEADER`] bytes, header included;
+    /// `None` if the bytes are not a header.
     fn length(header: &[u8]) -> Option<usize>;
-    /// Checks a whole frame's checksum.
+    /// Returns whether the checksum of a whole frame is correct.
     fn check(frame: &[u8]) -> bool;
 }
 
-/// Finds the frames of a protocol, each at most `N` bytes long.
+/// The framer of a protocol whose frames are at most `N` bytes long.
 #[derive(Debug, Clone, Default)]
 pub struct Framer<P, const N: usize> {
     buffer: Vec<u8, N>,
-    /// Bytes of `buffer` that belonged to the frame handed out last.
+    /// Number of bytes at the start of `buffer` that belong to the frame returned last.
     used: usize,
-    /// With fewer bytes in `buffer` than this there is nothing new to find: a header is examined once, not at every
-    /// byte. 0 while a frame is handed out.
+    /// Number of bytes that `buffer` must hold before the next search, so that a header is examined once, not at
+    /// every byte. 0 after a frame was returned.
     needed: usize,
     bad_checksums: u32,
     skipped: u32,
@@ -33,7 +34,7 @@ pub struct Framer<P, const N: usize> {
 }
 
 impl<P: Protocol, const N: usize> Framer<P, N> {
-    /// Begins before the first byte.
+    /// Creates a framer that has received nothing.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -46,23 +47,23 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         }
     }
 
-    /// Takes one byte. Call [`Framer::next_frame`] until `None` before the next one.
+    /// Processes one byte. Call [`Framer::next_frame`] until it returns `None` before passing the next byte.
     #[inline]
     pub fn receive(&mut self, byte: u8) {
         if self.used > 0 {
             self.release();
         }
         if self.buffer.push(byte).is_err() {
-            // The buffer is full only when the caller left frames waiting: the oldest byte is dropped and counted.
+            // The buffer is full only if the caller has not fetched all frames: drop and count the oldest byte.
             self.skip(1);
             self.needed = 0;
             let _ = self.buffer.push(byte);
         }
     }
 
-    /// Takes the bytes that are needed before there is something to find, at most those given, and returns their number:
-    /// a frame costs two calls instead of one for each byte. Call [`Framer::next_frame`] until `None` before the next
-    /// ones.
+    /// Processes as many of `bytes` as are needed before the next search, and returns their number. A frame thus
+    /// costs two calls instead of one per byte. Call [`Framer::next_frame`] until it returns `None` before passing
+    /// the rest.
     #[inline]
     pub fn receive_some(&mut self, bytes: &[u8]) -> usize {
         if self.used > 0 {
@@ -84,21 +85,21 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         if self.is_waiting() { None } else { self.search() }
     }
 
-    /// Returns whether [`Framer::next_frame`] has nothing to return before more bytes come. A caller that checks this
-    /// first spends only a few instructions on most bytes.
+    /// Returns whether [`Framer::next_frame`] has nothing to return until more bytes arrive. A caller that checks
+    /// this first spends only a few instructions on most bytes.
     #[inline]
     #[must_use]
     pub fn is_waiting(&self) -> bool {
         self.buffer.len() < self.needed
     }
 
-    /// Returns the number of candidates whose checksum did not fit.
+    /// Returns the number of candidates with a wrong checksum.
     #[must_use]
     pub fn bad_checksums(&self) -> u32 {
         self.bad_checksums
     }
 
-    /// Returns the number of bytes that belonged to no intact frame.
+    /// Returns the number of skipped bytes, which belonged to no intact frame.
     #[must_use]
     pub fn skipped(&self) -> u32 {
         self.skipped
@@ -131,7 +132,7 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         self.buffer.get(..self.used)
     }
 
-    /// Drops the frame that was handed out.
+    /// Drops the frame that was returned.
     fn release(&mut self) {
         self.drop_front(self.used);
         self.used = 0;
@@ -146,7 +147,7 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
     fn drop_front(&mut self, count: usize) {
         let count = count.min(self.buffer.len());
         let left = self.buffer.len() - count;
-        // Nearly always everything is dropped, or nothing.
+        // Usually either everything or nothing is dropped.
         if count > 0 && left > 0 {
             self.buffer.copy_within(count.., 0);
         }

@@ -1,8 +1,9 @@
 //! This driver reads the TDK ICM-42688-P over SPI (mode 0 or 3, at most 24 MHz).
 //!
-//! [`packet`] parses the entries of its FIFO without I/O, [`registers`] names its registers, and this file talks to it.
-//! Every wait is bounded by counts of [`DelayNs`]. Each call for a sample reads back one register of the configuration,
-//! in turn, so that a part that has reset itself or lost a bit is noticed within [`SETTINGS`] calls.
+//! [`packet`] parses the entries of its FIFO without I/O, [`registers`] lists its registers, and this file does the
+//! SPI transfers. Every wait is a bounded number of [`DelayNs`] delays. Each call for a sample also reads back one
+//! register of the configuration, so that a reset or a flipped bit in the sensor is detected within [`SETTINGS`]
+//! calls.
 
 mod clock;
 mod config;
@@ -21,12 +22,12 @@ use embedded_hal::spi::{Operation, SpiDevice};
 use packet::{MAX_PACKET, Packet, PacketError};
 use registers::{self as reg, Register, Setting};
 
-/// The reset bit is polled at most this many times, 1 ms apart.
+/// Largest number of polls of the reset bit, 1 ms apart.
 const RESET_POLLS: u8 = 10;
-/// The gyro needs this long from being switched on to valid readings, ms.
+/// Start-up time of the gyro until its readings are valid, ms.
 const START_MS: u32 = 45;
 
-/// The error of the part or its bus.
+/// The error of the sensor or its bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -34,45 +35,45 @@ pub enum Icm42688Error<E> {
     /// The bus failed.
     #[error("ICM-42688: the bus failed: {0:?}")]
     Bus(E),
-    /// The part did not come back from its reset.
+    /// The sensor did not complete its reset.
     #[error("ICM-42688: no answer after the reset")]
     Reset,
-    /// A different part answers, or none.
-    #[error("ICM-42688: identity {got:02x}, not {:02x}", reg::IDENTITY)]
+    /// Another device answers, or none.
+    #[error("ICM-42688: identity is {got:02x}, should be {:02x}", reg::IDENTITY)]
     Identity {
-        /// The identity that it reports.
+        /// Identity that was read.
         got: u8,
     },
-    /// A register does not hold what was written: configure the part again.
+    /// A register does not hold the value that was written: configure the sensor again.
     #[error("ICM-42688: register {:02x} of bank {} holds {got:02x}, not {expected:02x}", .register.address, .register.bank)]
     Setting {
-        /// The register.
+        /// Register that was read.
         register: Register,
-        /// The bits that it holds.
+        /// Bits that the register holds.
         got: u8,
-        /// The bits that were written.
+        /// Bits that were written.
         expected: u8,
     },
     /// An axis of the packet has no reading.
-    #[error("ICM-42688: a packet in which an axis has no reading")]
+    #[error("ICM-42688: an axis of the packet has no reading")]
     NoReading,
     /// The bytes from the FIFO are not a packet; the FIFO was emptied.
     #[error(transparent)]
     Packet(PacketError),
 }
 
-/// Drives the configured part on its bus.
+/// The driver of a configured sensor.
 #[derive(Debug)]
 pub struct Icm42688<SPI> {
     spi: SPI,
     config: Icm42688Config,
-    /// The setting that is checked next.
+    /// Index of the setting to check next.
     next_check: usize,
     clock: Clock,
 }
 
 impl<SPI: SpiDevice> Icm42688<SPI> {
-    /// Resets the part, checks its identity, configures it and reads every setting back.
+    /// Resets the sensor, checks its identity, configures it and reads every setting back.
     ///
     /// # Errors
     /// `Bus`, `Reset`, `Identity` or `Setting`.
@@ -103,12 +104,12 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
         Ok(part)
     }
 
-    /// Returns the bus.
+    /// Releases the SPI device.
     pub fn destroy(self) -> SPI {
         self.spi
     }
 
-    /// Returns the oldest sample in the FIFO, if there is one, and checks one setting.
+    /// Returns the oldest sample in the FIFO, if any, and checks one setting.
     ///
     /// # Errors
     /// `Bus`, `Setting`, `NoReading` or `Packet`.
@@ -138,7 +139,7 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
         }
     }
 
-    /// Checks one register of the configuration, the next one each time.
+    /// Checks one register of the configuration; each call checks the next one.
     fn check_next_setting(&mut self) -> Result<(), Icm42688Error<SPI::Error>> {
         let settings = self.config.settings();
         let Setting { register, mask, value: expected } = settings[self.next_check % SETTINGS];
@@ -161,7 +162,7 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
         self.write(reg::SIGNAL_PATH_RESET.address, reg::FIFO_FLUSH)
     }
 
-    /// Runs an action in a register's bank and goes back to bank 0.
+    /// Runs an action in the bank of a register, and selects bank 0 again.
     fn in_bank<T>(
         &mut self,
         register: Register,

@@ -1,10 +1,11 @@
-//! This module connects parts on a serial line over the traits of `embedded-io`: the line itself, and the dialogue that
-//! configures a part for the pipeline. Nothing here depends on a particular part.
+//! This module connects sensors to a serial port through the traits of `embedded-io`: it reads samples, and runs the
+//! dialogue that configures a sensor for the pipeline. Nothing here depends on a particular sensor.
 //!
-//! No read blocks: a port must say whether bytes wait ([`ReadReady`]), so a silent part costs only a bounded time.
+//! No read blocks: a port must report whether bytes are waiting ([`ReadReady`]), so a silent sensor costs only a
+//! bounded time.
 //!
-//! There are no async shims. All parsers and dialogues take bytes and a time and do no input or output, so an async
-//! caller awaits its own read, pushes the bytes and polls; it needs nothing from this module.
+//! There are no async wrappers. All parsers and dialogues accept bytes and a time and do no I/O, so an async
+//! caller awaits its own read, passes the bytes and polls, without using this module.
 
 use super::{ByteSource, Source};
 use crate::units::Micros;
@@ -14,56 +15,56 @@ use heapless::Vec;
 
 /// Length of the longest message that a dialogue sends, bytes.
 pub const MAX_SENT: usize = 32;
-/// The line is polled this far apart, ms.
+/// Time between two polls of the port, ms.
 const POLL_MS: u32 = 1;
-/// Each poll reads at most this many bytes, more than arrive in that time at 921,600 baud.
+/// Largest number of bytes read per poll; more than arrive in that time at 921,600 baud.
 const CHUNK: usize = 128;
-/// One call of [`Serial::next_sample`] reads at most this many bytes.
+/// Largest number of bytes read by one call of [`Serial::next_sample`].
 const MAX_READ: usize = 1024;
 
-/// Names the action that a dialogue asks for.
+/// The action that a dialogue requests from its caller.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Action {
-    /// The caller sends these bytes.
+    /// Send these bytes.
     Send(Vec<u8, MAX_SENT>),
-    /// There is nothing to do; the caller polls again when bytes have come or time has passed.
+    /// Do nothing; poll again when bytes have arrived or time has passed.
     Wait,
-    /// The part is configured.
+    /// The sensor is configured.
     Done,
 }
 
-/// Holds a dialogue with a part: bytes and the time in, messages to send out. It ends after a bounded time, whatever
-/// the part does.
+/// A dialogue that configures a sensor. Its inputs are bytes and the time, its outputs are messages to send. It ends
+/// within a bounded time, whatever the sensor does.
 pub trait Dialogue {
-    /// The reason why a dialogue has failed to configure the part.
+    /// The reason why a dialogue has failed to configure the sensor.
     type Error: core::error::Error;
 
-    /// Takes one byte from the part.
+    /// Processes one byte from the sensor.
     fn receive(&mut self, byte: u8);
 
     /// Returns the next action at `now`.
     ///
     /// # Errors
-    /// The reason why the dialogue has failed; it is returned at each later call too.
+    /// The reason why the dialogue has failed; every later call returns the same error.
     fn poll(&mut self, now: Micros) -> Result<Action, Self::Error>;
 }
 
-/// The error of a line: of the port or of the part.
+/// The error of a serial sensor: of the port or of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SerialError<P, E> {
-    /// The port failed: an overrun, a framing error.
+    /// The port failed, for example by an overrun or a framing error.
     #[error("the serial port failed: {0:?}")]
     Port(P),
-    /// The part's data, or their absence, are wrong.
+    /// The data of the sensor are wrong, or missing.
     #[error(transparent)]
     Part(E),
 }
 
-/// Runs a dialogue to its end; `delay` measures the time.
+/// Runs a dialogue to its end; `delay` provides the time base.
 ///
 /// # Errors
-/// [`SerialError::Port`] at once, [`SerialError::Part`] when the dialogue gives up.
+/// [`SerialError::Port`] at once, [`SerialError::Part`] when the dialogue fails.
 pub fn configure<PORT: Read + Write + ReadReady, D: Dialogue>(
     port: &mut PORT,
     dialogue: &mut D,
@@ -88,7 +89,7 @@ pub fn configure<PORT: Read + Write + ReadReady, D: Dialogue>(
     }
 }
 
-/// Reads a part through a port, as a [`Source`].
+/// A sensor on a serial port, as a [`Source`].
 #[derive(Debug)]
 pub struct Serial<PORT, PART> {
     port: PORT,
@@ -96,18 +97,18 @@ pub struct Serial<PORT, PART> {
 }
 
 impl<PORT, PART> Serial<PORT, PART> {
-    /// Makes a source from a port and a configured part.
+    /// Creates a source from a port and the parser of a configured sensor.
     #[must_use]
     pub const fn new(port: PORT, part: PART) -> Self {
         Self { port, part }
     }
 
-    /// Returns the part, for its counters.
+    /// Returns the parser, for its counters.
     pub const fn part(&self) -> &PART {
         &self.part
     }
 
-    /// Returns port and part.
+    /// Releases port and parser.
     pub fn destroy(self) -> (PORT, PART) {
         (self.port, self.part)
     }
@@ -117,7 +118,7 @@ impl<PORT: Read + ReadReady, PART: ByteSource> Source for Serial<PORT, PART> {
     type Sample = PART::Sample;
     type Error = SerialError<PORT::Error, PART::Error>;
 
-    /// Reads the waiting bytes, a bounded number, up to the next sample.
+    /// Reads waiting bytes until they complete a sample; at most `MAX_READ` bytes.
     fn next_sample(&mut self) -> Option<Result<PART::Sample, Self::Error>> {
         for _ in 0..MAX_READ {
             if let Some(sample) = self.part.next_sample() {
@@ -133,7 +134,7 @@ impl<PORT: Read + ReadReady, PART: ByteSource> Source for Serial<PORT, PART> {
     }
 }
 
-/// Reads the bytes that are waiting at the port, as many as fit.
+/// Reads the bytes that are waiting at the port, up to the length of `to`.
 fn receive<'a, PORT: Read + ReadReady>(port: &mut PORT, to: &'a mut [u8]) -> Result<&'a [u8], PORT::Error> {
     let count = if port.read_ready()? { port.read(to)? } else { 0 };
     Ok(to.get(..count).unwrap_or_default())

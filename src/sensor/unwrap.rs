@@ -1,10 +1,10 @@
-//! This clock continues a clock of 32 bits beyond its wrap, by summing the signed differences of its stamps.
+//! This clock extends a 32-bit time stamp beyond its wrap, by summing the signed differences of successive stamps.
 
-/// Extends stamps of 32 bits (71 minutes of microseconds, 119 hours at 10 kHz) to ones that never wrap. A stamp that
-/// goes back by less than half the range is a step back, not a wrap.
+/// The extension of 32-bit stamps (71 minutes of microseconds, 119 hours at 10 kHz) to 64 bits, which never wrap. A
+/// stamp that is up to half the range smaller than the previous one is a step back, not a wrap.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct StampClock {
-    /// The last stamp and the time that it stands for.
+    /// Last stamp and its unwrapped time.
     last: Option<(u32, u64)>,
 }
 

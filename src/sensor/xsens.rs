@@ -1,7 +1,7 @@
 //! This module reads the Xsens MTi: MTData2 messages in Xbus frames (MT Low-Level Communication Protocol, MT0605P).
 //!
-//! Frames are in `xbus`, the measurements in a frame are [`MtData2`], the four forms of their numbers are in
-//! `precision`; `dialogue` configures a part for the pipeline.
+//! `xbus` finds the frames, [`MtData2`] holds the measurements of a frame, and `precision` decodes the four number
+//! formats; `dialogue` configures a sensor for the pipeline.
 
 #[doc(hidden)]
 pub mod dialogue;
@@ -21,10 +21,10 @@ use crate::sample::{ImuSample, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use mtdata2::id;
 
-/// These bits of the status word report clipping of accelerometer x, y, z and gyro x, y, z.
+/// Bits of the status word that report clipping of accelerometer x, y, z and gyro x, y, z.
 const STATUS_CLIPPED: u32 = 0x3F << 8;
 
-/// Turns the bytes of an MTi into samples with unwrapped time.
+/// The parser of an MTi: converts bytes to samples with unwrapped time.
 #[derive(Debug, Clone, Default)]
 pub struct Mti {
     framer: Framer<Xbus, MAX_FRAME>,
@@ -33,20 +33,20 @@ pub struct Mti {
 }
 
 impl Mti {
-    /// Begins before the first byte.
+    /// Creates a parser that has received nothing.
     #[must_use]
     pub const fn new() -> Self {
         Self { framer: Framer::new(), stamps: StampClock::START }
     }
 
-    /// Takes one byte. Call [`Mti::next_sample`] until `None` before the next one.
+    /// Processes one byte. Call [`Mti::next_sample`] until it returns `None` before passing the next byte.
     #[inline]
     pub fn receive(&mut self, byte: u8) {
         self.framer.receive(byte);
     }
 
-    /// Takes at least one of some bytes, as many as belong together, and returns their number. Call
-    /// [`Mti::next_sample`] until `None` before the next ones.
+    /// Processes one or more of `bytes`, at most to the end of a message, and returns their number. Call
+    /// [`Mti::next_sample`] until it returns `None` before passing the rest.
     #[inline]
     pub fn receive_some(&mut self, bytes: &[u8]) -> usize {
         self.framer.receive_some(bytes)
@@ -70,7 +70,7 @@ impl Mti {
         }
     }
 
-    /// Returns the number of candidates whose checksum did not fit.
+    /// Returns the number of frame candidates with a wrong checksum.
     #[must_use]
     pub fn bad_checksums(&self) -> u32 {
         self.framer.bad_checksums()
@@ -95,7 +95,7 @@ impl Mti {
     }
 }
 
-/// Returns hundredths of a degree; `None` if the reading is beyond the range or not a number.
+/// Converts degrees to hundredths; `None` if the reading is out of range or not a number.
 fn centi_celsius(degrees: f32) -> Option<CentiCelsius> {
     let code = libm::roundf(degrees * 100.0);
     (code >= f32::from(i16::MIN) && code <= f32::from(i16::MAX)).then_some(CentiCelsius(code as i16))

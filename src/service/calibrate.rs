@@ -3,34 +3,34 @@
 use crate::bias::{Rest, StaticConfig, StaticError, StaticInit};
 use crate::mounting::{LevelError, Rotation};
 use crate::sample::ImuSample;
+use crate::sqrt::sqrt;
 use crate::store::calibration::MAX_TILT_DEG;
 use crate::store::{Level, Mounting};
 use crate::units::SpecificForce;
 use serde::{Deserialize, Serialize};
 
-/// The result that a calibration looks for.
+/// The kind of calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Task {
-    /// The gyro's bias; the vehicle stands.
+    /// The gyro's bias, while the vehicle stands.
     Static,
-    /// Roll and pitch of the sensor; the vehicle stands on level ground.
+    /// Roll and pitch of the sensor, while the vehicle stands on level ground.
     Mounting,
 }
 
-/// The reason why a calibration has found nothing.
+/// The reason why a calibration has failed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CalibrationFault {
-    /// The vehicle moved; the axis that gave it away: 0 to 2 gyro, 3 to 5 accelerometer,
-    /// 6 the wheels.
+    /// The vehicle moved, as detected by gyro axis 0 to 2, accelerometer axis 3 to 5 (x, y, z), or 6, the wheels.
     Moving(u8),
-    /// The part was saturated.
+    /// The sensor was saturated.
     Clipped,
-    /// More than 45 deg from level: the configured rotation is wrong, deg.
+    /// The tilt from level, deg, is above 45: the configured rotation is wrong.
     Tilted(f32),
-    /// The mean specific force is not gravity, m/s^2.
+    /// The mean specific force, m/s^2, is not gravity.
     NotGravity(f32),
 }
 
@@ -41,15 +41,15 @@ pub enum State {
     /// No calibration was requested.
     #[default]
     Idle,
-    /// Collecting samples.
+    /// The calibration is collecting samples.
     Running(Task),
-    /// Found; not stored yet.
+    /// The calibration has a result, which is not stored yet.
     Found(Task),
-    /// Found nothing; what was known before is kept.
+    /// The calibration has failed; the previous values are kept.
     Failed(Task, CalibrationFault),
 }
 
-/// A calibration under way.
+/// A calibration in progress.
 #[derive(Debug, Clone)]
 pub(crate) struct Calibrator {
     task: Task,
@@ -57,19 +57,19 @@ pub(crate) struct Calibrator {
 }
 
 impl Calibrator {
-    /// Starts collecting.
+    /// Starts a calibration.
     #[must_use]
     pub fn new(task: Task, limits: StaticConfig) -> Self {
         Self { task, still: StaticInit::new(limits) }
     }
 
-    /// Returns the calibration that is under way.
+    /// Returns the kind of calibration.
     #[must_use]
     pub const fn task(&self) -> Task {
         self.task
     }
 
-    /// Takes a sample; with the last one returns the readings at rest.
+    /// Adds a sample; with the last one, returns the mean readings at rest.
     pub fn add(&mut self, sample: &ImuSample) -> Option<Result<Rest, CalibrationFault>> {
         if !sample.validity.is_good() {
             return Some(Err(CalibrationFault::Clipped));
@@ -91,13 +91,13 @@ fn fault(error: StaticError) -> CalibrationFault {
     })
 }
 
-/// Returns the roll and pitch that gravity shows, after the configured rotation.
+/// Returns roll and pitch from gravity, after the configured rotation.
 pub(crate) fn level(force: [SpecificForce; 3], mounting: &Mounting) -> Result<Level, CalibrationFault> {
-    // The angles have been checked to be finite.
+    // The angles are finite: they have been checked.
     let rotation = mounting.rotation().unwrap_or(Rotation::IDENTITY);
     let [x, y, z] = rotation.force(force).map(|axis| axis.0 as f32);
     let roll_deg = libm::atan2f(y, z).to_degrees();
-    let pitch_deg = libm::atan2f(-x, crate::root::sqrt(y * y + z * z)).to_degrees();
+    let pitch_deg = libm::atan2f(-x, sqrt(y * y + z * z)).to_degrees();
     let worst = libm::fabsf(roll_deg).max(libm::fabsf(pitch_deg));
     if worst > MAX_TILT_DEG {
         Err(CalibrationFault::Tilted(worst))

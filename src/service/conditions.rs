@@ -1,26 +1,26 @@
-//! This type gathers the present faults of the board for the memory of troubles.
+//! This module defines the fault conditions that the trouble memory observes.
 
 use crate::health::{Faults, Status};
 
-/// Holds the present faults and the state in which they are.
+/// The present faults of the board, and its state.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Conditions {
-    /// 10 ms steps of the sensor's time since the start.
+    /// Sensor time since the start, 10 ms steps.
     pub tick: u32,
     /// Status of the yaw rate.
     pub status: Status,
-    /// Its fault bits.
+    /// Fault bits of the yaw rate.
     pub faults: Faults,
-    /// The network runs on no weights.
+    /// GyroNet has no valid weights.
     pub no_weights: bool,
     /// The inertial sensor could not be set up.
     pub sensor_refused: bool,
-    /// The board does not run on its crystal.
+    /// The processor does not run on its crystal.
     pub clock_fault: bool,
-    /// The CAN controller does not take part in the bus.
+    /// The CAN controller did not start.
     pub can_fault: bool,
     /// The last start followed a crash.
     pub crashed: bool,
-    /// The last request was refused for want of access.
+    /// The last request was refused for lack of access.
     pub access_refused: bool,
 }

@@ -1,9 +1,9 @@
-//! A crash record says why and where the image stopped; it stays in RAM over the reset that follows.
+//! A crash record holds why and where the image stopped; it is kept in RAM across the reset that follows.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
-/// Bytes of a source file's path that are kept: its end.
+/// Number of bytes kept of a source file's path, from its end.
 pub const FILE: usize = 24;
 
 /// The reason why the image stopped.
@@ -15,7 +15,7 @@ pub enum CrashKind {
     Panic,
     /// A bus, usage or memory fault escalated to a hard fault.
     HardFault,
-    /// An exception or interrupt without a handler was raised; its number (ICSR.VECTACTIVE).
+    /// An exception or interrupt without a handler was raised, with this number (ICSR.VECTACTIVE).
     Unhandled(u16),
     /// The crystal stopped (clock security system, RM0090 7.2.7).
     CrystalStopped,
@@ -23,23 +23,23 @@ pub enum CrashKind {
     SupplyLow,
 }
 
-/// A crash of the image.
+/// The record of a crash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Crash {
-    /// The reason why the image stopped.
+    /// Reason why the image stopped.
     pub kind: CrashKind,
-    /// The program counter at a fault, or the line of a panic; 0 where neither is known.
+    /// Program counter at a fault, or line of a panic; 0 if neither is known.
     pub place: u32,
-    /// The link register at a fault: the caller, roughly.
+    /// Link register at a fault, which usually points into the caller.
     pub link: u32,
-    /// The fault status register CFSR (PM0214 4.4.10).
+    /// Fault status register CFSR (PM0214 4.4.10).
     pub status: u32,
-    /// The address that was accessed, where CFSR marks one as valid.
+    /// Address of the faulting access, if CFSR marks it as valid.
     pub address: u32,
-    /// The end of a panic's source file, padded with zeros.
+    /// End of the path of a panic's source file, padded with zeros.
     pub file: [u8; FILE],
-    /// Crashes since power came on.
+    /// Number of crashes since power-on.
     pub count: u32,
 }
 
@@ -68,6 +68,6 @@ impl fmt::Display for Crash {
             CrashKind::CrystalStopped => f.write_str("the crystal stopped")?,
             CrashKind::SupplyLow => f.write_str("the supply fell below 2.9 V")?,
         }
-        write!(f, ", {count} since power came on")
+        write!(f, ", {count} since power-on")
     }
 }

@@ -1,6 +1,6 @@
 //! The device holds the stored data and executes the requests that change them.
 //!
-//! Some functions are kept out of their callers: what they have on the stack, requests and records, is then there only
+//! Some functions are marked `inline(never)`, so that their large stack frames, with requests and records, exist only
 //! while they run.
 
 mod stored;
@@ -26,32 +26,32 @@ use crate::store::{
 use embedded_storage::nor_flash::NorFlash;
 use weights::Uploading;
 
-/// The hardware that an image drives; a configuration of anything else is refused.
+/// The hardware that an image supports; a configuration with other hardware is refused.
 #[derive(Debug)]
 pub struct SupportedHardware {
-    /// Inertial sensors.
+    /// Supported inertial sensors.
     pub imus: &'static [ImuPart],
-    /// Fibre-optic gyros.
+    /// Supported fibre-optic gyros.
     pub fogs: &'static [FogPart],
-    /// Bit rates of the bus.
+    /// Supported bit rates of the CAN bus, bit/s.
     pub bits_per_second: &'static [u32],
 }
 
-/// The state that the board keeps beside the pipeline.
+/// The state of the board apart from the pipeline: stored data, weights, calibration and event log.
 ///
-/// Owns the flash: records in `R`, weight files in `W`, `None` where nothing can be stored.
+/// The device owns the flash: records in `R`, weight files in `W`. Both are `None` if nothing can be stored.
 pub struct Device<R: NorFlash, W> {
     store: Option<Store<R>>,
     slots: Option<W>,
-    drives: &'static SupportedHardware,
+    supported: &'static SupportedHardware,
     identity: Identity,
     flash: FlashState,
     writable: bool,
-    /// Something that is stored is not used.
+    /// Whether stored data were refused.
     refused: bool,
     configuration: Configuration,
     configuration_origin: Origin,
-    /// The configuration that the next start will use.
+    /// Configuration that the next start will use.
     next_configuration: Configuration,
     wheels: WheelSettings,
     wheels_origin: Origin,
@@ -59,21 +59,21 @@ pub struct Device<R: NorFlash, W> {
     calibration_origin: Origin,
     learned: Learned,
     learner: Learner,
-    /// The sensor was found to be moved, and the coprocessor does not know yet.
+    /// Whether the sensor was found to have moved; cleared by [`Self::take_mount_moved`].
     mount_moved: bool,
     calibrator: Option<Calibrator>,
     calibration_state: State,
     accepted: Accepted,
     troubles: Troubles,
-    /// `None` where it could not be read: then nobody may write.
+    /// `None` if the record could not be read; nobody may write then.
     access: Option<Access>,
     access_counters: AccessCounters,
     weights: WeightSource,
     weights_crc: Option<u32>,
     refused_slots: [Option<SlotError>; 2],
-    /// The checksum of FoGNet's file, or why it does not run; `None` where it is off.
+    /// Checksum of FoGNet's file, or the reason why FoGNet does not run; `None` if FoGNet is off.
     fognet: Option<Result<u32, SlotError>>,
-    fognet_gone: bool,
+    fognet_unavailable: bool,
     uploading: Option<Uploading>,
     standstill: StandstillGate,
     sensor: Option<SensorFault>,
@@ -81,19 +81,19 @@ pub struct Device<R: NorFlash, W> {
     faults: Faults,
     tick: u32,
     log: EventLog,
-    /// The reason why the last request was refused.
+    /// Reason why the last request was refused.
     refusal: Option<Refusal>,
 }
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
-    /// Begins with built-in values, before [`Device::begin`]. It is a constant, so that it can be made in its
-    /// place.
+    /// Creates a device with built-in values, for use before [`Device::begin`]. The function is `const`, so that a
+    /// `static` can hold the device.
     #[must_use]
-    pub const fn new(drives: &'static SupportedHardware) -> Self {
+    pub const fn new(supported: &'static SupportedHardware) -> Self {
         Self {
             store: None,
             slots: None,
-            drives,
+            supported,
             identity: Identity::UNKNOWN,
             flash: FlashState::Absent,
             writable: false,
@@ -118,7 +118,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             weights_crc: None,
             refused_slots: [None; 2],
             fognet: None,
-            fognet_gone: false,
+            fognet_unavailable: false,
             uploading: None,
             standstill: StandstillGate::new(),
             sensor: None,
@@ -130,7 +130,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    /// Returns the configuration that the image runs with.
+    /// Returns the configuration in use.
     #[must_use]
     pub fn configuration(&self) -> &Configuration {
         &self.configuration
@@ -142,7 +142,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         &self.next_configuration
     }
 
-    /// Returns the wheel frames that the image receives.
+    /// Returns the settings of the wheel frames in use.
     #[must_use]
     pub fn wheels(&self) -> &WheelSettings {
         &self.wheels
@@ -160,19 +160,20 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         &self.learned
     }
 
-    /// Returns once whether the sensor was found to be moved since earlier drives, for
+    /// Returns `true` once after the sensor was found to have moved since earlier drives, for
     /// [`Coprocessor::mount_moved`](crate::Coprocessor::mount_moved).
     pub fn take_mount_moved(&mut self) -> bool {
         core::mem::take(&mut self.mount_moved)
     }
 
-    /// Returns where forward is in the configured axes, deg to the left of x, and its sigma: 0 where the mounting is right.
+    /// Returns the forward direction in the configured axes, as an angle to the left of x, and its sigma, deg. The
+    /// angle is 0 if the configured mounting is correct.
     #[must_use]
     pub fn forward_deg(&self) -> Option<[f32; 2]> {
         self.learned.yaw_deg(&self.configuration.mounting.rotation()?)
     }
 
-    /// Notes how setting the sensor up went; the same result again is not noted again.
+    /// Records the result of setting up the sensor. A repeated fault is logged only once.
     pub fn sensor(&mut self, result: Result<(), SensorFault>) {
         let fault = result.err();
         if fault.is_none() || fault != self.sensor {
@@ -181,8 +182,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.sensor = fault;
     }
 
-    /// Takes every sample of the sensor (`None` while it is silent), with the status and faults of what was made of it,
-    /// and the wheels.
+    /// Processes each sample of the sensor (`None` while the sensor is silent), the status and faults of the yaw
+    /// rate, and the wheels.
     pub fn observe(
         &mut self,
         sample: Option<&ImuSample>,
@@ -214,7 +215,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         let result = rest.and_then(|rest| {
             match task {
                 Task::Static => {
-                    // It holds for a sensor that was moved, too.
+                    // The result is also valid for a sensor that has moved.
                     self.learner.calibrated(&rest, sample.temperature, &mut self.learned);
                 }
                 Task::Mounting => {
@@ -260,13 +261,13 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    /// Returns the reason why the last request was refused; `None` where it was executed.
+    /// Returns the reason why the last request was refused; `None` if it was executed.
     #[must_use]
     pub fn refusal(&self) -> Option<Refusal> {
         self.refusal
     }
 
-    /// Notes why a request is refused, counts it, and returns the reason.
+    /// Records and counts a refusal, and returns it.
     pub(crate) fn refuse_request(&mut self, refusal: Refusal) -> Refusal {
         self.access_counters.count(&refusal);
         self.refusal = Some(refusal);
@@ -279,38 +280,38 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         &self.identity.serial
     }
 
-    /// Returns the key of those who may write, and what was stored with it; `None` where it could not be read.
+    /// Returns the access record: the key, and the counters stored with it; `None` if it could not be read.
     #[must_use]
     pub fn access(&self) -> Option<Access> {
         self.access
     }
 
-    /// Returns the numbers of requests that were refused for want of access.
+    /// Returns the counters of requests that were refused for lack of access.
     #[must_use]
     pub fn access_counters(&self) -> AccessCounters {
         self.access_counters
     }
 
-    /// Forgets why the last request was refused.
+    /// Clears the reason why the last request was refused.
     pub(crate) fn forget_refusal(&mut self) {
         self.refusal = None;
     }
 
-    /// Returns the events after a number; 0 for all.
+    /// Returns a page of the events after number `after`; 0 for all.
     #[must_use]
     pub fn events(&self, after: u32) -> LogPage {
         self.log.page(after)
     }
 
-    /// Returns the place of the upload under way, and the file's checksum, once it is checked.
+    /// Returns the place and the checksum of the uploaded file, once the file has been checked.
     #[must_use]
     pub fn uploaded(&self) -> Option<(Place, u32)> {
         let Uploading { upload, checked } = self.uploading?;
         Some((upload.place(), checked?))
     }
 
-    /// Returns whether the output may be interrupted: the vehicle is proven to stand. A board without a flash
-    /// controller is emulated, and nothing depends on it.
+    /// Returns whether the output may be interrupted, because the vehicle is proven to stand. A board without a flash
+    /// controller is emulated and may always be interrupted.
     pub(crate) fn may_interrupt(&self) -> bool {
         !self.writable || self.standstill.is_open()
     }
@@ -345,7 +346,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    /// Returns what the memory of troubles is updated from.
+    /// Returns the conditions that the trouble memory observes.
     pub(crate) fn conditions(&self) -> Conditions {
         Conditions {
             status: self.status,
@@ -356,11 +357,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             tick: self.tick,
             can_fault: self.identity.can_fault.is_some(),
             crashed: self.identity.crash.is_some(),
-            access_refused: self.refusal.is_some_and(|refusal| refusal.is_for_want_of_access()),
+            access_refused: self.refusal.is_some_and(|refusal| refusal.is_access_denied()),
         }
     }
 
-    /// Returns how a calibration goes.
+    /// Returns the progress of the calibration.
     #[must_use]
     pub fn calibration_state(&self) -> State {
         self.calibration_state

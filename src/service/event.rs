@@ -1,4 +1,4 @@
-//! The event log holds what has happened to the board, until it is overwritten.
+//! The event log holds the newest events of the board.
 
 use super::calibrate::CalibrationFault;
 pub use super::crash::{Crash, CrashKind};
@@ -8,50 +8,50 @@ use crate::store::{Place, Slot, StoreError, slots::SlotError};
 use heapless::{Deque, Vec};
 use serde::{Deserialize, Serialize};
 
-/// Events that are kept.
+/// Number of events that the log holds.
 pub const KEPT: usize = 32;
-/// Events of one page.
+/// Largest number of events in a page.
 pub const PAGE: usize = 8;
 
-/// The cause of the processor's start, as its reset flags report it (RM0090 7.3.21).
+/// The cause of the last reset, from the reset flags (RM0090 7.3.21).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ResetCause {
-    /// No flag is set: the emulator has none.
+    /// No flag is set, as in the emulator.
     Unknown,
-    /// Power came on.
+    /// Power-on reset.
     PowerOn,
-    /// Power was too low.
+    /// The supply voltage was too low.
     BrownOut,
-    /// The reset pin.
+    /// Reset pin.
     Pin,
-    /// The board was restarted by a request or by a crash: see [`Crash`].
+    /// Software reset, by a request or after a crash (see [`Crash`]).
     Software,
-    /// A watchdog.
+    /// Watchdog reset.
     Watchdog,
-    /// A forbidden low-power mode.
+    /// Reset by a forbidden low-power mode.
     LowPower,
 }
 
-/// The reason why a part on SPI gives no samples.
+/// The reason why a sensor on SPI could not be set up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SensorFault {
-    /// The controller did not answer.
+    /// The SPI controller did not answer.
     Bus,
-    /// The part did not come back from its reset.
+    /// The sensor did not complete its reset.
     Reset,
-    /// Another part answers, or none (0 or 255): its identity.
+    /// The identity that was read is not that of the sensor; 0 or 255: nothing answers.
     Identity(u8),
-    /// A register does not hold what was written.
+    /// A register does not hold the value that was written.
     Setting {
-        /// The address of the register.
+        /// Bank of the register.
         bank: u8,
-        /// The address in the bank.
+        /// Address of the register in its bank.
         address: u8,
-        /// The bits that it holds.
+        /// Bits that the register holds.
         got: u8,
     },
 }
@@ -63,23 +63,23 @@ pub enum SensorFault {
 pub enum EventKind {
     /// The image started.
     Started(ResetCause),
-    /// It had crashed before.
+    /// The last start followed a crash.
     Crashed(Crash),
-    /// The stored configuration is not used; the defaults are.
+    /// The stored configuration was refused; the default is used.
     ConfigurationRefused(StoreError),
-    /// The stored wheel settings are not used; the built-in ones are.
+    /// The stored wheel settings were refused; the built-in ones are used.
     WheelsRefused(StoreError),
-    /// The stored calibration is not used.
+    /// The stored calibration was refused.
     CalibrationRefused(StoreError),
-    /// The record of accepted weights is not used.
+    /// The record of accepted weights was refused.
     AcceptedRefused(StoreError),
-    /// A weight slot is not used.
+    /// The file in a weight slot was refused.
     SlotRefused(Slot, SlotError),
-    /// FoGNet's weights are not used.
+    /// FoGNet's weights were refused.
     FogNetRefused(SlotError),
-    /// No weights are good: the network is off.
+    /// No weights are valid: the network is off.
     NoWeights,
-    /// The status has changed.
+    /// The status of the yaw rate has changed.
     Status(Status),
     /// A configuration was stored.
     ConfigurationStored,
@@ -87,58 +87,58 @@ pub enum EventKind {
     WheelsStored,
     /// A calibration was stored.
     CalibrationStored,
-    /// A calibration ended; with why it found nothing.
+    /// A calibration ended, or failed for this reason.
     Calibrated(Option<CalibrationFault>),
-    /// The file in a place was accepted.
+    /// The weight file in this place was accepted.
     WeightsAccepted(Place),
-    /// The weights in use no longer fit their checksum: the network is off.
+    /// The weights in use no longer match their checksum: the network is off.
     WeightsDamaged,
-    /// Stored records are damaged: what is used is older, or built in.
+    /// Stored records are damaged: older or built-in ones are used.
     RecordsDamaged,
-    /// The part on SPI was set up; or why not: it is tried again every second.
+    /// The sensor on SPI was set up (`None`), or could not be; the board tries again every second.
     Sensor(Option<SensorFault>),
-    /// The memory of troubles could not be read or stored.
+    /// The trouble memory could not be read or stored.
     TroublesRefused(StoreError),
-    /// The record of who may write could not be read: nobody may.
+    /// The access record could not be read: nobody may write.
     AccessRefused(StoreError),
-    /// A key was stored, or another one: from now on what is written must be signed.
+    /// A key was stored or replaced: from now on written data must be signed.
     KeyStored,
     /// The key was removed: everyone may write.
     KeyRemoved,
-    /// What the board had learnt about its sensor could not be read or stored.
+    /// The record of what was learnt about the sensor could not be read or stored.
     LearnedRefused(StoreError),
-    /// What the board has learnt about its sensor was stored.
+    /// The record of what was learnt about the sensor was stored.
     LearnedStored,
-    /// The sensor is mounted otherwise than in earlier drives.
+    /// The mounting of the sensor has changed since earlier drives.
     MountMoved,
-    /// The start could not make room for new records.
+    /// At the start, no room could be made for new records.
     NoRoom(StoreError),
 }
 
-/// Something that happened.
+/// An entry of the event log.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Event {
-    /// Counted from 1 since the start.
+    /// Number of the event, from 1 at the start.
     pub number: u32,
-    /// 10 ms steps of the sensor's time.
+    /// Sensor time, 10 ms steps.
     pub tick: u32,
-    /// The event.
+    /// Kind of event.
     pub kind: EventKind,
 }
 
-/// A part of the log.
+/// A page of the log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LogPage {
-    /// The events in order.
+    /// Events in order.
     pub events: Vec<Event, PAGE>,
-    /// Events since the start.
+    /// Number of events since the start.
     pub total: u32,
-    /// The number of requested events that were overwritten before.
+    /// Number of requested events that have been overwritten.
     pub lost: u32,
 }
 
-/// The newest events; the oldest one gives way.
+/// The event log; when it is full, the oldest event is dropped.
 #[derive(Debug, Default)]
 pub(crate) struct EventLog {
     events: Deque<Event, KEPT>,
@@ -146,13 +146,13 @@ pub(crate) struct EventLog {
 }
 
 impl EventLog {
-    /// Makes an empty log.
+    /// Creates an empty log.
     #[must_use]
     pub const fn new() -> Self {
         Self { events: Deque::new(), total: 0 }
     }
 
-    /// Notes an event, and with feature `defmt` logs it.
+    /// Appends an event, and with feature `defmt` also prints it.
     pub fn record(&mut self, tick: u32, kind: EventKind) {
         self.total = self.total.saturating_add(1);
         if self.events.is_full() {
@@ -161,7 +161,7 @@ impl EventLog {
         let event = Event { number: self.total, tick, kind };
         #[cfg(feature = "defmt")]
         defmt::info!("{}", event);
-        // There is room.
+        // Cannot fail: the log has room now.
         let _ = self.events.push_back(event);
     }
 
@@ -171,7 +171,7 @@ impl EventLog {
         let oldest = self.events.front().map_or(1, |event| event.number);
         let mut events = Vec::new();
         for event in self.events.iter().filter(|event| event.number > after).take(PAGE) {
-            // There is room for a page.
+            // Cannot fail: at most a page of events is taken.
             let _ = events.push(*event);
         }
         let lost = oldest.saturating_sub(after.saturating_add(1));

@@ -1,34 +1,34 @@
-//! These are the faults that the board finds in its own hardware while it starts.
+//! This module defines the faults that the board detects in its own hardware at the start.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
-/// The reason why the board runs on its internal oscillator of 16 MHz, which is too inexact for CAN.
+/// The reason why the board runs on its internal 16 MHz oscillator, which is not accurate enough for CAN.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ClockFault {
     /// The board is emulated without a clock tree.
     Emulated,
-    /// The supply stayed below 3.0 V. The board restarts when it has risen.
+    /// The supply stayed below 3.0 V. The board restarts when the voltage has risen.
     SupplyLow,
-    /// The crystal did not start. The board restarts when it runs.
+    /// The crystal did not start. The board restarts when the crystal runs.
     NoCrystal,
-    /// The crystal has another frequency than the board's description says.
+    /// The frequency of the crystal differs from that in the board's description.
     CrystalFrequency {
-        /// The measured frequency, kHz, as exact as the internal oscillator; 0: it could not be measured.
+        /// Measured frequency, kHz, as accurate as the internal oscillator; 0 if it could not be measured.
         khz: u16,
     },
-    /// The PLL or the flash latency was not taken over.
+    /// The PLL did not lock, or the flash latency was not accepted.
     Pll,
 }
 
-/// The reason why the CAN controller does not take part in the bus.
+/// The reason why the CAN controller did not start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CanFault {
-    /// The clock is not exact enough.
+    /// The clock is not accurate enough.
     #[error("the clock is not exact enough")]
     Clock,
     /// The controller did not leave its sleep mode.

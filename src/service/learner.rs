@@ -1,9 +1,10 @@
-//! The board learns the sensor's bias by temperature at standstills that the wheels prove, and its mounting: up at
-//! standstills, forward while the vehicle drives.
+//! The learner estimates the sensor's bias over temperature at standstills that the wheels prove, and its mounting:
+//! up at standstills, forward while the vehicle drives.
 //!
-//! Without wheels a long straight can look like a standstill; then only static calibrations add to the curve. What three
-//! seconds at rest have shown is stored after the first time, the second, the fourth and so on, some ten times in a
-//! start, and the forward direction each time its sigma has become a third less, some six times in all.
+//! Without wheels, a long straight can look like a standstill, so only static calibrations add to the bias curve.
+//! What was learnt is stored after the first, second, fourth, ... period of three seconds at rest, about ten times
+//! per start. It is also stored each time the sigma of the forward direction has decreased by 30 %, about six times
+//! in total.
 
 use crate::bias::{CurveFilter, Rest, StaticConfig, StaticInit};
 use crate::mounting::{Forward, ForwardEstimator};
@@ -11,31 +12,32 @@ use crate::sample::{ImuSample, Standstill, WheelSample};
 use crate::store::Learned;
 use crate::units::CentiCelsius;
 
-/// A forward direction with this sigma is known, rad: 10 degrees. A wrong mounting by that much costs nothing.
+/// Largest sigma of a forward direction that is used, rad: 10 degrees. A mounting error of this size has no effect.
 const KNOWN: f32 = 0.175;
-/// The sensor was moved where the directions of two starts are this far apart, rad (25 degrees), and two sigmas more.
+/// Angle between the forward directions of two starts, in addition to two sigmas, above which the sensor has moved,
+/// rad: 25 degrees.
 const MOVED: f32 = 0.436;
-/// A direction replaces one with a sigma that is larger by more than this factor.
+/// Largest ratio of sigmas at which a new forward direction replaces the known one.
 const BETTER: f32 = 0.7;
 
-/// Learns from the rests and the drive of this start.
+/// The learner of one start; it learns from periods at rest and from driving.
 #[derive(Debug)]
 pub struct Learner {
     rest: Option<StaticInit>,
-    /// It exists from the first rest on.
+    /// `None` until the first period at rest.
     filter: Option<CurveFilter>,
     rests: u32,
-    /// This standstill's specific force has been taken.
+    /// Whether the specific force of this standstill has been used.
     has_stood: bool,
     forward: ForwardEstimator,
-    /// The sensor is mounted otherwise than in earlier drives: nothing is learnt.
+    /// Whether the mounting has changed since earlier drives; nothing is learnt then.
     is_moved: bool,
-    /// What is learnt differs from what is stored.
+    /// Whether there is something new to store.
     pub is_changed: bool,
 }
 
 impl Learner {
-    /// Starts with nothing shown.
+    /// Creates a learner without observations.
     #[must_use]
     pub const fn new() -> Self {
         let forward = ForwardEstimator::START;
@@ -50,8 +52,8 @@ impl Learner {
         }
     }
 
-    /// Takes a sample (`None` while the sensor is silent), the wheels, and the limits of a rest. Returns whether this has
-    /// shown that the sensor was moved since earlier drives.
+    /// Processes a sample (`None` while the sensor is silent) and the wheels; `limits` are those of a period at rest.
+    /// Returns `true` when it detects that the sensor has moved since earlier drives.
     pub fn observe(
         &mut self,
         sample: Option<&ImuSample>,
@@ -79,7 +81,8 @@ impl Learner {
         self.is_moved && !was_moved
     }
 
-    /// Takes three seconds at rest of a static calibration, which holds for a sensor that was moved, too.
+    /// Learns from the three seconds at rest of a static calibration, which are also valid for a sensor that has
+    /// moved.
     pub fn calibrated(&mut self, rest: &Rest, temperature: Option<CentiCelsius>, learned: &mut Learned) {
         (learned.specific_force, learned.forward) = (None, None);
         (self.forward, self.has_stood, self.is_moved) = (ForwardEstimator::START, false, false);
@@ -93,7 +96,7 @@ impl Learner {
             return;
         }
         if !core::mem::replace(&mut self.has_stood, true) {
-            learned.stood(rest.specific_force);
+            learned.add_standstill(rest.specific_force);
         }
         if let Some(temperature) = temperature {
             let filter = self.filter.get_or_insert_with(|| CurveFilter::new(&learned.bias_curve));
@@ -104,7 +107,7 @@ impl Learner {
         self.is_changed |= self.rests.is_power_of_two();
     }
 
-    /// Holds the direction of this start against the one that is known, and keeps the better one.
+    /// Compares the forward direction of this start with the known one, and keeps the better one.
     fn learn_forward(&mut self, forward: Forward, learned: &mut Learned) {
         let known = learned.forward;
         let moved = |known: Forward| {

@@ -1,4 +1,4 @@
-//! These types are the requests that change the board, and what it reports.
+//! This module defines the requests that change the board, and the reports of its state.
 
 use super::calibrate::Task;
 use super::event::{CanFault, ClockFault, Crash, ResetCause, SensorFault};
@@ -9,45 +9,45 @@ use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{Configuration, StoreError, UnitMap};
 use serde::{Deserialize, Serialize};
 
-/// The version of what is encoded as these types; it is raised when one changes.
+/// Version of the encoding of these types; every change of a type increments it.
 pub const PROTOCOL: u8 = 13;
-/// Most bytes of a block of weights.
+/// Size of a full block of a weight file, bytes.
 pub const BLOCK: usize = 256;
 
-/// The requests that change something.
+/// A request that changes the board.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "no heap to put the large ones on; one exists at a time")]
 pub enum Request<'a> {
-    /// A new configuration.
+    /// Store a configuration.
     SetConfiguration {
-        /// The version of its layout.
+        /// Layout version of the configuration.
         version: u8,
-        /// Whole.
+        /// The complete configuration.
         configuration: &'a Configuration,
     },
-    /// Other wheel frames.
+    /// Store the settings of the wheel frames.
     SetWheels(WheelSettings),
-    /// Something to do about the calibration.
+    /// Start, stop, store or erase a calibration.
     Calibrate(Calibrate),
-    /// A weight file will come.
+    /// Begin the upload of a weight file.
     WeightsBegin {
-        /// Of this network.
+        /// Network that the file is for.
         network: Network,
-        /// Its length, bytes.
+        /// Length of the file, bytes.
         length: u32,
     },
-    /// A part of it.
+    /// Write a block of the file.
     WeightsBlock {
-        /// Its place in the file.
+        /// Byte offset of the block in the file.
         offset: u32,
-        /// A whole number of words.
+        /// Content of the block, a whole number of words.
         bytes: &'a [u8],
     },
-    /// The file is complete.
+    /// Check the complete file.
     WeightsVerify,
-    /// Use it.
+    /// Use the checked file from the next start on.
     WeightsActivate,
-    /// Reset, which is up to the caller.
+    /// Restart the board. The device only checks that this is allowed; the caller does the reset.
     Restart,
 }
 
@@ -68,7 +68,7 @@ impl Request<'_> {
     }
 }
 
-/// The networks that have weight files.
+/// A network that has a weight file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Network {
     /// GyroNet.
@@ -77,18 +77,18 @@ pub enum Network {
     FogNet,
 }
 
-/// The action on the calibration.
+/// An action of [`Request::Calibrate`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Calibrate {
-    /// Begin.
+    /// Begin a calibration.
     Start(Task),
-    /// Stop without a result.
+    /// Stop the calibration without a result.
     Cancel,
-    /// Keep over the next start what was found.
+    /// Store the result of the calibration.
     Store,
-    /// Forget what the board has learnt about its sensor.
+    /// Erase what the board has learnt about its sensor.
     Forget,
-    /// Store the map of this unit's gyro, or none; it holds from the next start on.
+    /// Store gain and misalignment of this unit's gyro, or remove them; used from the next start on.
     SetUnit(Option<UnitMap>),
 }
 
@@ -96,49 +96,49 @@ pub enum Calibrate {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// Another layout of the configuration.
-    #[error("configuration layout {found}, the board has {expected}")]
+    /// The layout version of the configuration is not that of this firmware.
+    #[error("configuration layout {found}, but the board has {expected}")]
     Version {
-        /// The version in the request.
+        /// Version in the request.
         found: u8,
-        /// The version of this firmware.
+        /// Version of this firmware.
         expected: u8,
     },
-    /// The store refuses, or a value of the configuration is out of its range.
+    /// The store has failed, or a value is out of range.
     #[error(transparent)]
     Store(StoreError),
-    /// The weight slots refuse.
+    /// The weight file or its place was refused.
     #[error(transparent)]
     Slot(SlotError),
-    /// There is no result that could be stored.
-    #[error("no calibration has been found that could be stored")]
+    /// There is no calibration result to store.
+    #[error("there is no calibration result to store")]
     NothingFound,
-    /// The map of the gyro was found with other weights than the board runs.
-    #[error("found with the weights {found:08x}, the board runs {runs:08x}")]
+    /// The gain and misalignment were determined with weights other than those that the board runs.
+    #[error("calibrated with weights {found:08x}, but the board runs {runs:08x}")]
     OtherWeights {
-        /// The checksum of those.
+        /// Checksum of the weights in the request.
         found: u32,
-        /// The checksum of the board's.
+        /// Checksum of the board's weights.
         runs: u32,
     },
-    /// A key is needed, and this session has not proven to have it.
+    /// The board has a key, and this session has not proven that it has the private key.
     #[error("the board has a key, and this session has no access: give its private part with --key")]
     Locked,
     /// The data have no signature, and the board has a key.
-    #[error("the board has a key, and what is written is not signed: give --key or --signature")]
+    #[error("the board has a key, and the data are not signed: give --key or --signature")]
     Unsigned,
-    /// The answer to a challenge is none of the board's key.
-    #[error("the answer to the board's challenge is not one of its key: this is the key of another board")]
+    /// The answer to a challenge does not match the board's key.
+    #[error("the answer to the challenge does not match the board's key: this is the key of another board")]
     Answer,
-    /// The signature is none of the board's key, or is for another identifier, content or board.
-    #[error("the signature is not one of the board's key for this content, identifier and board")]
+    /// The signature does not match the board's key, or is for another identifier, content or board.
+    #[error("the signature does not match the board's key, or this content, identifier and board")]
     Signature,
-    /// The signature has been used, or a newer one has.
-    #[error("the signature's counter is {found}, and one of {newest} was accepted: sign with a greater one")]
+    /// The signature, or a newer one, has already been used.
+    #[error("the signature's counter is {found}, but {newest} was already accepted: sign with a greater one")]
     Counter {
-        /// The counter of the signature.
+        /// Counter of the signature.
         found: u32,
-        /// The newest one.
+        /// Newest counter that was accepted.
         newest: u32,
     },
     /// The vehicle is not proven to stand: writing the flash would interrupt the output.
@@ -147,9 +147,9 @@ pub enum Refusal {
 }
 
 impl Refusal {
-    /// Returns whether the request was refused because nobody has proven that it is the owner's.
+    /// Returns whether the request was refused for lack of access: no valid proof or signature.
     #[must_use]
-    pub const fn is_for_want_of_access(&self) -> bool {
+    pub const fn is_access_denied(&self) -> bool {
         matches!(self, Self::Locked | Self::Unsigned | Self::Answer | Self::Signature | Self::Counter { .. })
     }
 }
@@ -166,40 +166,40 @@ impl From<SlotError> for Refusal {
     }
 }
 
-/// The origin of a record.
+/// The origin of the settings in use.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Origin {
-    /// Built in: nothing is stored.
+    /// Built in, because nothing is stored.
     BuiltIn,
-    /// The record was read from flash.
+    /// Read from flash.
     Stored,
-    /// Built in: what is stored is refused.
+    /// Built in, because the stored record was refused.
     Refused(StoreError),
 }
 
-/// The board's identity when it starts.
+/// The board's identity, and what is known about its start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
-    /// The version of the firmware.
+    /// Version of the firmware.
     pub firmware: [u8; 3],
-    /// DBGMCU_IDCODE; `None` where it reads as zero, as in the emulator.
+    /// DBGMCU_IDCODE; `None` if it reads as zero, as in the emulator.
     pub device_id: Option<u32>,
-    /// The frequency of the processor, Hz.
+    /// Clock frequency of the processor, Hz.
     pub clock_hz: u32,
-    /// The unique number of the chip; zeros in the emulator.
+    /// Unique number of the chip; zeros in the emulator.
     pub serial: [u8; 12],
-    /// The reason why the clock is not the crystal's; `None` where it is.
+    /// Reason why the processor does not run on the crystal; `None` if it does.
     pub clock_fault: Option<ClockFault>,
-    /// The reason why frames go out as SLCAN alone; `None` where they go out on CAN too.
+    /// Reason why frames are sent only as SLCAN; `None` if they are also sent on CAN.
     pub can_fault: Option<CanFault>,
-    /// The cause of its start.
+    /// Cause of the last reset.
     pub reset: ResetCause,
-    /// Its last crash since power came on.
+    /// Last crash since power-on.
     pub crash: Option<Crash>,
 }
 
 impl Identity {
-    /// The state before anything is known.
+    /// Identity before the start.
     pub const UNKNOWN: Self = Self {
         firmware: [0; 3],
         device_id: None,
@@ -212,16 +212,16 @@ impl Identity {
     };
 }
 
-/// State of the flash.
+/// The state of the record store.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum FlashState {
-    /// There is none that this image can read.
+    /// There is no flash that this image can read.
     Absent,
-    /// All records are whole.
+    /// All records are intact.
     Ready,
-    /// A record is not whole; the one before it is used.
+    /// A record is damaged; the previous one is used.
     Damaged,
-    /// It cannot be read.
+    /// The flash cannot be read.
     Failed(StoreError),
 }
 
@@ -230,69 +230,69 @@ pub enum FlashState {
 pub struct Info {
     /// [`PROTOCOL`].
     pub protocol: u8,
-    /// Known since the start.
+    /// Identity of the board.
     pub identity: Identity,
-    /// Layout of the configuration and of the calibration.
+    /// Layout versions of configuration and calibration.
     pub record_versions: [u8; 2],
-    /// The state of the store.
+    /// State of the record store.
     pub flash: FlashState,
-    /// A controller answers, so that something can be stored; the emulator has none.
+    /// Whether data can be stored, because a flash controller answers; the emulator has none.
     pub writable: bool,
-    /// The origin of the configuration.
+    /// Origin of the configuration.
     pub configuration: Origin,
-    /// The origin of the wheel settings.
+    /// Origin of the wheel settings.
     pub wheels: Origin,
-    /// The origin of the calibration.
+    /// Origin of the calibration.
     pub calibration: Origin,
-    /// The weights that the network runs on.
+    /// Origin of the weights that GyroNet runs on.
     pub weights: WeightSource,
-    /// Their checksum.
+    /// Checksum of these weights.
     pub weights_crc: Option<u32>,
-    /// The reason why the sensor could not be set up, where the board does so.
+    /// Reason why the sensor could not be set up, if the board does so.
     pub sensor: Option<SensorFault>,
-    /// The reason why each slot that should be used is not.
+    /// Reasons why slots A and B were refused, if they were tried.
     pub refused_slots: [Option<SlotError>; 2],
-    /// The checksum of FoGNet's weights, or why they are not used; `None` where FoGNet is off.
+    /// Checksum of FoGNet's weights, or the reason why they are not used; `None` if FoGNet is off.
     pub fognet: Option<Result<u32, SlotError>>,
-    /// The status of the corrected yaw rate.
+    /// Status of the corrected yaw rate.
     pub status: Status,
 }
 
-/// Everything that is counted since the start.
+/// All event counters since the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct AllCounters {
-    /// The counters of the pipeline.
+    /// Counters of the pipeline.
     pub pipeline: Counters,
-    /// The counters of the sensor monitor.
+    /// Counters of the sensor monitor.
     pub watch: MonitorCounters,
-    /// The counters of the lines.
+    /// Counters of the serial lines and the CAN bus.
     pub lines: LineCounters,
-    /// The counters of the fibre-optic gyro.
+    /// Counters of the fibre-optic gyro.
     pub fog: FogCounters,
-    /// The counters of the coprocessor's inputs.
+    /// Counters of the coprocessor's inputs.
     pub inputs: InputCounters,
 }
 
-/// The numbers of requests that were refused for want of access since the start.
+/// The counters of requests that were refused for lack of access since the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct AccessCounters {
     /// Requests in a session without access.
     pub locked: u32,
-    /// Contents without a signature.
+    /// Written data without a signature.
     pub unsigned: u32,
     /// Wrong answers to a challenge.
     pub answers: u32,
     /// Wrong signatures.
     pub signatures: u32,
-    /// Signatures that had been used, or were older than one that had.
+    /// Signatures that had already been used, or were older than the newest one used.
     pub replayed: u32,
 }
 
 impl AccessCounters {
-    /// The counters before the first refusal.
+    /// All counters zero.
     pub const NONE: Self = Self { locked: 0, unsigned: 0, answers: 0, signatures: 0, replayed: 0 };
 
-    /// Counts a refusal, where it was for want of access.
+    /// Counts a refusal, if it was for lack of access.
     pub(crate) fn count(&mut self, refusal: &Refusal) {
         let counter = match refusal {
             Refusal::Locked => &mut self.locked,
@@ -306,26 +306,26 @@ impl AccessCounters {
     }
 }
 
-/// The numbers of errors on the lines.
+/// The error counters of the serial lines and the CAN bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct LineCounters {
-    /// Frames that the SLCAN line did not take.
+    /// Frames that were dropped on the SLCAN line.
     pub unsent: u32,
-    /// Bytes of the sensor and SLCAN lines that came damaged, or too fast.
+    /// Receive errors of the sensor and SLCAN lines: corrupt bytes and overruns.
     pub line_errors: u32,
-    /// Bytes that had to wait because a line's queue was full: what comes meanwhile is lost, where
-    /// the line cannot be made to wait.
+    /// Bytes that had to wait because a line's queue was full. Bytes that arrive meanwhile are lost if the line has
+    /// no flow control.
     pub held: u32,
-    /// Observations for which a task of lower priority had no time.
+    /// Observations that a task of lower priority missed for lack of time.
     pub overruns: u32,
-    /// Lines of the service line that were refused.
+    /// Text lines on the service line that were refused.
     pub service_errors: u32,
-    /// Frames of the CAN bus that passed the filters and found no room.
+    /// CAN frames that passed the filters but were lost because the queue was full.
     pub frames_lost: u32,
 }
 
 impl LineCounters {
-    /// The counters before the first event.
+    /// All counters zero.
     pub const NONE: Self =
         Self { unsent: 0, line_errors: 0, held: 0, overruns: 0, service_errors: 0, frames_lost: 0 };
 }

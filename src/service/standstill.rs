@@ -1,13 +1,13 @@
 //! The flash may be written only at standstill, because an erase stalls the processor for up to 2 s.
 //!
-//! Wheels prove standstill or motion. Without wheels the inertial sensor must have been as quiet as at
-//! static initialisation for three seconds. While the sensor is silent no rate is sent that a receiver
-//! could miss, so writing is allowed on a bench without a sensor.
+//! Wheels prove standstill or motion. Without wheels, the inertial sensor must have been as quiet as at static
+//! initialisation for three seconds. While the sensor is silent, no rate is sent that a receiver could miss, so
+//! writing is allowed: a bench without a sensor works.
 
 use crate::bias::{QuietConfig, QuietDetector, Rest, StaticConfig};
 use crate::sample::{ImuSample, Standstill};
 
-/// Judges standstill by what the output task observes.
+/// The gate that permits writing the flash; it observes the sensor and the wheels.
 #[derive(Debug)]
 pub struct StandstillGate {
     quiet: Option<QuietDetector>,
@@ -15,7 +15,7 @@ pub struct StandstillGate {
 }
 
 impl StandstillGate {
-    /// Starts open: no rate is valid yet.
+    /// Creates an open gate, because no rate is valid at the start.
     #[must_use]
     pub const fn new() -> Self {
         Self { quiet: None, open: true }
@@ -27,7 +27,7 @@ impl StandstillGate {
         self.open
     }
 
-    /// Takes a sample of the sensor, `None` while it is silent, and what the wheels show.
+    /// Processes a sample of the sensor (`None` while it is silent) and the standstill state of the wheels.
     pub fn observe(&mut self, sample: Option<&ImuSample>, wheels: Standstill, limits: &StaticConfig) {
         let quiet =
             self.quiet.get_or_insert_with(|| QuietDetector::new(QuietConfig::DEFAULT, limits, &ANY_REST));
@@ -46,7 +46,7 @@ impl Default for StandstillGate {
     }
 }
 
-/// A rest that leaves the limits of static initialisation as they are.
+/// Readings at rest that do not change the limits of static initialisation.
 const ANY_REST: Rest = Rest {
     angular_rate: [crate::units::AngularRate(0); 3],
     specific_force: [crate::units::SpecificForce(0); 3],

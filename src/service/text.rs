@@ -1,4 +1,4 @@
-//! The board's reports have a text here for the side that asks; the image prints none of it.
+//! This module formats the board's reports as text, for the host tools; the image does not use it.
 
 use super::calibrate::CalibrationFault;
 use super::event::{EventKind, ResetCause, SensorFault};
@@ -45,11 +45,11 @@ impl Display for SensorFault {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         match self {
             Self::Bus => f.write_str("the SPI controller did not answer"),
-            Self::Reset => f.write_str("the part did not come back from its reset"),
+            Self::Reset => f.write_str("the sensor did not restart after its reset"),
             Self::Identity(identity @ (0 | 0xFF)) => {
-                write!(f, "no part answers (identity {identity:#04x})")
+                write!(f, "no sensor answers (identity {identity:#04x})")
             }
-            Self::Identity(identity) => write!(f, "another part answers (identity {identity:#04x})"),
+            Self::Identity(identity) => write!(f, "another sensor answers (identity {identity:#04x})"),
             Self::Setting { bank, address, got } => {
                 write!(f, "register {address:#04x} of bank {bank} holds {got:#04x}, not what was written")
             }
@@ -62,7 +62,7 @@ impl Display for Origin {
         match self {
             Self::BuiltIn => f.write_str("built in"),
             Self::Stored => f.write_str("stored"),
-            Self::Refused(error) => write!(f, "built in; what is stored is refused: {error}"),
+            Self::Refused(error) => write!(f, "built in; the stored one is refused: {error}"),
         }
     }
 }
@@ -70,9 +70,9 @@ impl Display for Origin {
 impl Display for FlashState {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         match self {
-            Self::Absent => f.write_str("none that this image can read"),
+            Self::Absent => f.write_str("none that this image can use"),
             Self::Ready => f.write_str("ready"),
-            Self::Damaged => f.write_str("a record is damaged, the one before it is used"),
+            Self::Damaged => f.write_str("a record is damaged, the previous one is used"),
             Self::Failed(error) => write!(f, "cannot be read: {error}"),
         }
     }
@@ -84,7 +84,7 @@ impl Display for EventKind {
             Self::Started(cause) => write!(f, "started by {cause}"),
             Self::Crashed(crash) => write!(f, "crashed before: {crash}"),
             Self::WheelsRefused(error) => {
-                write!(f, "wheel settings not used: {error}; the built-in ones are")
+                write!(f, "stored wheel settings refused, built-in ones used: {error}")
             }
             Self::ConfigurationRefused(error) => {
                 write!(f, "stored configuration refused, defaults used: {error}")
@@ -93,25 +93,25 @@ impl Display for EventKind {
             Self::AcceptedRefused(error) => write!(f, "record of accepted weights refused: {error}"),
             Self::SlotRefused(slot, error) => write!(f, "slot {slot} not used: {error}"),
             Self::FogNetRefused(error) => write!(f, "FoGNet's weights not used: {error}"),
-            Self::NoWeights => f.write_str("no good weights: the network is off"),
+            Self::NoWeights => f.write_str("no valid weights: the network is off"),
             Self::Status(status) => write!(f, "status: {status}"),
             Self::ConfigurationStored => f.write_str("configuration stored"),
             Self::WheelsStored => f.write_str("wheel settings stored"),
             Self::CalibrationStored => f.write_str("calibration stored"),
             Self::Calibrated(None) => f.write_str("calibration done"),
-            Self::Calibrated(Some(fault)) => write!(f, "calibration found nothing: {fault}"),
+            Self::Calibrated(Some(fault)) => write!(f, "calibration failed: {fault}"),
             Self::WeightsAccepted(place) => write!(f, "weights in {place} accepted"),
             Self::WeightsDamaged => f.write_str("weights in use damaged: the network is off"),
             Self::RecordsDamaged => f.write_str("stored records damaged: older or built-in ones are used"),
             Self::Sensor(None) => f.write_str("sensor set up"),
-            Self::AccessRefused(error) => write!(f, "record of who may write refused, nobody may: {error}"),
-            Self::KeyStored => f.write_str("key stored: what is written must be signed"),
+            Self::AccessRefused(error) => write!(f, "access record refused, nobody may write: {error}"),
+            Self::KeyStored => f.write_str("key stored: written data must be signed"),
             Self::KeyRemoved => f.write_str("key removed: everyone may write"),
-            Self::LearnedRefused(error) => write!(f, "what was learnt not read or stored: {error}"),
-            Self::LearnedStored => f.write_str("what was learnt stored"),
-            Self::NoRoom(error) => write!(f, "no room made for new records: {error}"),
+            Self::LearnedRefused(error) => write!(f, "learned data not read or stored: {error}"),
+            Self::LearnedStored => f.write_str("learned data stored"),
+            Self::NoRoom(error) => write!(f, "cannot make room for new records: {error}"),
             Self::MountMoved => f.write_str("the sensor was moved since earlier drives"),
-            Self::TroublesRefused(error) => write!(f, "memory of troubles not read or stored: {error}"),
+            Self::TroublesRefused(error) => write!(f, "trouble memory not read or stored: {error}"),
             Self::Sensor(Some(fault)) => write!(f, "sensor not set up: {fault}"),
         }
     }

@@ -1,25 +1,25 @@
-//! The key of those who may write is a stored record, with what must never go back.
+//! The access record holds the key that authorises writing, and the counters that a restart must not reset.
 
 use super::error::FieldError;
 use super::record::Record;
 use serde::{Deserialize, Serialize};
 
-/// Bytes of an Ed25519 public key.
+/// Length of an Ed25519 public key, bytes.
 pub const KEY: usize = 32;
 
-/// Holds the key, and what stands against replayed and guessed answers.
+/// The key, and the counters against replayed signatures and guessed answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Access {
-    /// The public key; without one everyone may write.
+    /// Public key; without one, everyone may write.
     pub key: Option<[u8; KEY]>,
-    /// The counter of the newest signature that was accepted; older ones are refused.
+    /// Counter of the newest accepted signature; signatures whose counter is not greater are refused.
     pub counter: u32,
-    /// Wrong answers in a row to a challenge.
+    /// Number of successive wrong answers to a challenge.
     pub wrong: u8,
 }
 
 impl Access {
-    /// No key was stored.
+    /// Record without a key.
     pub const OPEN: Self = Self { key: None, counter: 0, wrong: 0 };
 }
 
@@ -27,7 +27,7 @@ impl Record for Access {
     const KEY: u8 = 6;
     const VERSION: u8 = 1;
 
-    /// A key that is no point of the curve verifies nothing.
+    /// Any key is accepted: with one that is not a point of the curve, no signature is valid.
     fn check(&self) -> Result<(), FieldError> {
         Ok(())
     }

@@ -1,14 +1,15 @@
-//! A calibration holds what measurements on request have shown about the board's own sensor: level and gain.
+//! A calibration holds the results of measurements on request for the board's own sensor: level, gain and
+//! misalignment.
 
 use super::error::{Field, FieldError, within};
 use super::record::Record;
 use crate::mounting::{GyroMap, Rotation};
 use serde::{Deserialize, Serialize};
 
-/// Furthest from level that a mounting calibration may find, deg; more is a wrong rotation.
+/// Largest tilt that a mounting calibration may find, deg; a larger one means a wrong rotation.
 pub(crate) const MAX_TILT_DEG: f32 = 45.0;
 
-/// Holds the tilt of the configured sensor frame against level ground.
+/// The tilt of the configured sensor frame against level ground.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Level {
@@ -19,38 +20,39 @@ pub struct Level {
 }
 
 impl Level {
-    /// Returns the rotation from the configured frame into the vehicle's; `None` when an angle is not finite.
+    /// Returns the rotation from the configured frame to the vehicle's; `None` if an angle is not finite.
     #[must_use]
     pub fn rotation(&self) -> Option<Rotation> {
         Rotation::from_mounting(self.roll_deg, self.pitch_deg, 0.0)
     }
 }
 
-/// Holds gain and mounting of the unit's gyro, as a drive with a reference yaw rate has shown them
+/// The gain and misalignment of the unit's gyro, determined from a drive with a reference yaw rate
 /// (`gyronet calibrate`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct UnitMap {
-    /// The map.
+    /// Matrix of gain and misalignment.
     pub gyro_map: GyroMap,
-    /// The checksum of the weights that corrected the drive; the map leaves out the errors that these weights correct.
+    /// Checksum of the weights that corrected the drive; the map excludes the errors that these weights correct.
     pub weights: u32,
 }
 
-/// Holds the level and the unit's map, as far as calibrations have found them.
+/// The results of calibrations, each `None` until determined: the level and the unit's map.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Calibration {
-    /// The result of the last mounting calibration.
+    /// Result of the last mounting calibration.
     pub level: Option<Level>,
-    /// The result of a calibration against a reference yaw rate.
+    /// Result of the last calibration against a reference yaw rate.
     pub unit: Option<UnitMap>,
 }
 
 impl Calibration {
-    /// This calibration is that of an unknown sensor.
+    /// Calibration of an unknown sensor.
     pub const NONE: Self = Self { level: None, unit: None };
 
-    /// Returns the map for a board that runs these weights; `None` if no map is stored, or one for other weights.
+    /// Returns the map for a board that runs these weights; `None` if no map is stored, or only one for other
+    /// weights.
     #[must_use]
     pub fn gyro_map(&self, weights: u32) -> Option<GyroMap> {
         self.unit.filter(|unit| unit.weights == weights).map(|unit| unit.gyro_map)

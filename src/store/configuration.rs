@@ -1,5 +1,5 @@
-//! The configuration holds everything that a user sets; it is checked when stored and when read, so that the code that
-//! uses it needs no checks.
+//! The configuration holds everything that a user sets. It is checked when stored and when read, so code that uses it
+//! needs no checks.
 
 use super::error::{Field, FieldError, within};
 use super::record::Record;
@@ -11,7 +11,7 @@ use crate::can::latitude::{LatitudeConfigError, LatitudeReceiver, LatitudeSettin
 use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
 use crate::coprocessor;
-use crate::fog::{FogConfig, FogErrors, FogNetUse, NotForThisGyro, Tilt, check_training};
+use crate::fog::{FogConfig, FogErrors, FogNetUse, GyroMismatch, Tilt, check_training};
 use crate::model::fognet_blob::{Gyro, Training};
 use crate::mounting::{GyroMap, Levelling, Rotation};
 use crate::pipeline::PipelineConfig;
@@ -19,7 +19,7 @@ use crate::units::AngularRate;
 use embedded_can::{Id, StandardId};
 use serde::{Deserialize, Serialize};
 
-/// Names the inertial sensor that is fitted.
+/// The inertial sensor that is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -32,7 +32,7 @@ pub enum ImuPart {
     Adis16465,
 }
 
-/// Names the fibre-optic gyro that is fitted.
+/// The fibre-optic gyro that is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -43,73 +43,74 @@ pub enum FogPart {
     Dsp3000,
 }
 
-/// Describes the rotation of the sensor against the vehicle: about x (forward), then y (left), then z (up).
+/// The rotation of the sensor against the vehicle: about x (forward), then y (left), then z (up).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mounting {
-    /// About x, -180 to 180 deg.
+    /// Rotation about x, -180 to 180 deg.
     pub roll_deg: f32,
-    /// About y, -90 to 90 deg.
+    /// Rotation about y, -90 to 90 deg.
     pub pitch_deg: f32,
-    /// About z, -180 to 180 deg.
+    /// Rotation about z, -180 to 180 deg.
     pub yaw_deg: f32,
 }
 
 impl Mounting {
-    /// Returns the rotation from the sensor's axes into the vehicle's; `None` when an angle is not finite.
+    /// Returns the rotation from the sensor's axes to the vehicle's; `None` if an angle is not finite.
     #[must_use]
     pub fn rotation(&self) -> Option<Rotation> {
         Rotation::from_mounting(self.roll_deg, self.pitch_deg, self.yaw_deg)
     }
 }
 
-/// Configures the correction of the fibre-optic gyro.
+/// The settings of the correction of the fibre-optic gyro.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogLane {
-    /// The angle between its axis and the vertical of the level vehicle, 0 to 45 deg.
+    /// Angle between the axis of the gyro and the vertical of the level vehicle, 0 to 45 deg.
     pub tilt_deg: f32,
-    /// The use of FoGNet.
+    /// Use of FoGNet.
     pub fognet: FogNetUse,
-    /// The frame that carries the vehicle's latitude, where there is one.
+    /// Frame that carries the vehicle's latitude, if any.
     pub latitude_frame: Option<LatitudeSettings>,
 }
 
-/// Holds everything that a user can set; a change takes effect at the next start.
+/// The complete configuration; a change takes effect at the next start.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Configuration {
-    /// Inertial sensor.
+    /// Inertial sensor that is fitted.
     pub imu: ImuPart,
-    /// Fibre-optic gyro, where one is fitted.
+    /// Fibre-optic gyro, if one is fitted.
     pub fog: Option<FogPart>,
-    /// Messages, identifiers, periods, protection.
+    /// Messages on the CAN bus: identifiers, periods, protection.
     pub can: Settings,
-    /// Latitude, -90 to 90 deg, north positive; with `None` the Earth's rate stays in the bias, and the rate of a
-    /// fibre-optic gyro is degraded until [`FogLane::latitude_frame`] brings a latitude.
+    /// Latitude, -90 to 90 deg, north positive. With `None` the Earth's rate stays in the bias, and the rate of a
+    /// fibre-optic gyro is degraded until a latitude arrives in [`FogLane::latitude_frame`].
     pub latitude_deg: Option<f32>,
-    /// The mounting of the sensor.
+    /// Mounting of the sensor.
     pub mounting: Mounting,
-    /// The limits by which the vehicle counts as standing.
+    /// Limits within which the vehicle counts as standing.
     pub static_init: StaticConfig,
-    /// The limits of a correction.
+    /// Mode, lag and limits of the correction.
     pub compensate: CompensateConfig,
     /// Identifiers (11 bits) of the fibre-optic gyro's messages: rate, angle, detail.
     pub fog_ids: [u16; 3],
-    /// The correction of the fibre-optic gyro.
+    /// Correction of the fibre-optic gyro.
     pub fog_lane: FogLane,
-    /// Wheel and latitude frames that a host sends over SLCAN are used, for a bench without a bus. On a vehicle they
-    /// would let whoever reaches that line move the rate.
+    /// Whether wheel and latitude frames from a host on SLCAN are used, for a bench without a bus. On a vehicle,
+    /// anyone with access to that line could then influence the rate.
     pub slcan_inputs: bool,
     /// Identifiers of diagnosis.
     pub diagnosis: DiagnosisIds,
-    /// Number of the fibre-optic gyro, 0 where it is not known: FoGNet's weights for one gyro run on that one alone.
+    /// Serial number of the fibre-optic gyro, 0 if unknown. FoGNet's weights that were trained for one unit run only
+    /// on that unit.
     pub fog_serial: u32,
-    /// The board learns the sensor's bias by temperature, and where forward is, and uses what it has learnt.
+    /// Whether the board learns the sensor's bias over temperature and the forward direction, and uses them.
     pub learn: bool,
 }
 
 impl Configuration {
-    /// By default the board has an Xsens MTi, mounted level in a car, and sends the Bosch set and our own messages.
+    /// Default: an Xsens MTi, mounted level in a car; the Bosch set and our own messages are sent.
     pub const DEFAULT: Self = Self {
         imu: ImuPart::XsensMti,
         fog: None,
@@ -128,12 +129,12 @@ impl Configuration {
 }
 
 impl Configuration {
-    /// Makes the pipeline's configuration from this one, a calibration and what the board has learnt. A level that was
-    /// found on level ground completes the mounting, and levelling by the street is off. The map of the gyro applies only
-    /// with the weights it was found with.
+    /// Returns the pipeline's configuration, from this one, a calibration and what the board has learnt. If the
+    /// calibration has a level, it is applied after the mounting, and no other levelling is done. The map of the gyro
+    /// is used only with the weights it was determined with.
     #[must_use]
     pub fn pipeline(&self, calibration: &Calibration, learned: &Learned, weights: u32) -> PipelineConfig {
-        // All angles have been checked to be finite.
+        // The angles are finite: they have been checked.
         let mounting = self.mounting.rotation().unwrap_or(Rotation::IDENTITY);
         let level = calibration.level.as_ref().and_then(Level::rotation);
         let learned = if self.learn { learned } else { &Learned::NOTHING };
@@ -156,7 +157,7 @@ impl Configuration {
         self.latitude_deg.and_then(Latitude::from_degrees)
     }
 
-    /// Returns the first of these identifiers that one of the board's own messages uses.
+    /// Returns the first of these identifiers that is also that of one of the board's own messages.
     pub(crate) fn own_identifier(&self, mut ids: impl Iterator<Item = Id>) -> Option<Id> {
         let can = Config::new(self.can).ok()?;
         let fog = self.fog_ids.map(|id| StandardId::new(id).map(Id::Standard));
@@ -180,8 +181,8 @@ impl Configuration {
     /// Checks that FoGNet's weights are for the gyro that is fitted.
     ///
     /// # Errors
-    /// [`NotForThisGyro`].
-    pub fn check_training(&self, trained: Training) -> Result<(), NotForThisGyro> {
+    /// [`GyroMismatch`].
+    pub fn check_training(&self, trained: Training) -> Result<(), GyroMismatch> {
         let part = match self.fog {
             Some(FogPart::Dsp3000) => Gyro::Dsp3000,
             Some(FogPart::Dsp1760) | None => Gyro::Dsp1760,
@@ -189,7 +190,7 @@ impl Configuration {
         check_training(trained, part, self.fog_serial, self.fog_lane.fognet)
     }
 
-    /// Makes the receiver of the vehicle's latitude; `None` where no frame carries it.
+    /// Creates the receiver of the vehicle's latitude; `None` if no frame is configured.
     ///
     /// # Errors
     /// [`LatitudeConfigError`].
@@ -198,8 +199,8 @@ impl Configuration {
         self.fog_lane.latitude_frame.map(make).transpose()
     }
 
-    /// Makes the configuration of a coprocessor that runs the weights with this checksum; the board adds the wheels,
-    /// the clock, the networks and damage found at the start.
+    /// Returns the configuration of a coprocessor that runs the weights with this checksum. The board adds the
+    /// wheels, the clock, the networks, and whether damage was found at the start.
     #[must_use]
     pub fn coprocessor(
         &self,
@@ -224,8 +225,8 @@ impl Record for Configuration {
     const KEY: u8 = 1;
     const VERSION: u8 = 6;
 
-    /// Returns the bytes that older layouts lack at their end: 1 ended before `fog_ids`, which were [`FOG_IDS`], here
-    /// as varints; 2 ended before `fog_lane`, 3 before `slcan_inputs`, 4 before `fog_serial`, 5 before
+    /// Returns the bytes that older layouts lack at their end. Layout 1 ended before `fog_ids`, whose value was
+    /// [`FOG_IDS`] (here as varints), 2 before `fog_lane`, 3 before `slcan_inputs`, 4 before `fog_serial`, 5 before
     /// `learn`.
     fn missing(version: u8) -> Option<&'static [u8]> {
         const ALL: &[u8] =
@@ -256,7 +257,7 @@ impl Record for Configuration {
         }
         let Mounting { roll_deg, pitch_deg, yaw_deg } = self.mounting;
         let StaticConfig { gyro_std, accel_std, gyro_drift, accel_drift, gyro_bias } = self.static_init;
-        // Modes and lags need no check: their types have no other values.
+        // Modes and lags need no check: all values of their types are valid.
         let CompensateConfig { mode: _, lag: _, max_mean, max_single, max_carry } = self.compensate;
         let rate = |rate: AngularRate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC;
         for (field, value, low, high) in [

@@ -1,11 +1,11 @@
-//! These errors say why something is not stored or not read, so that a user can mend it.
+//! This module defines the errors of the store, in terms that a user can act on.
 
 use crate::can::config::ConfigError;
 use crate::can::latitude::LatitudeConfigError;
 use crate::can::wheel::WheelConfigError;
 use serde::{Deserialize, Serialize};
 
-/// Names a value of the configuration or calibration that has a range.
+/// A value of a record that has a range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -32,7 +32,7 @@ pub enum Field {
 }
 
 impl Field {
-    /// Returns the field as a user writes it.
+    /// Returns the name of the field as a user writes it.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -66,17 +66,17 @@ pub enum FieldError {
     /// A value is not a number or outside its range.
     #[error("{}: {value} is not within {low} to {high}", .field.name())]
     Range {
-        /// The field.
+        /// Field that is out of range.
         field: Field,
-        /// The value.
+        /// Value of the field.
         value: f32,
-        /// The smallest valid value.
+        /// Smallest valid value.
         low: f32,
-        /// The largest valid value.
+        /// Largest valid value.
         high: f32,
     },
-    /// No sensor has these values.
-    #[error("{}: no sensor has these values", .0.name())]
+    /// The values are not plausible for any sensor.
+    #[error("{}: not plausible for any sensor", .0.name())]
     Implausible(Field),
     /// The configuration of the bus messages is invalid.
     #[error("can: {0}")]
@@ -87,10 +87,10 @@ pub enum FieldError {
     /// The configuration of the wheel frames is invalid.
     #[error("wheels: {0}")]
     Wheels(WheelConfigError),
-    /// This firmware image does not drive the part.
+    /// This firmware image does not support the sensor.
     #[error("sensor: this firmware image does not drive the part")]
     PartNotInImage,
-    /// This firmware image does not drive the bus at this rate, bit/s.
+    /// This firmware image does not support this bit rate of the bus, bit/s.
     #[error("can.bits_per_second: this firmware image does not drive the bus at {0} bit/s")]
     BitRateNotInImage(u32),
     /// An identifier of diagnosis has too many bits, or is used twice.
@@ -137,13 +137,13 @@ pub enum StoreError {
     /// The record has a layout that this firmware does not read.
     #[error("the record has layout {found}, this firmware reads {expected}")]
     Version {
-        /// The version as stored.
+        /// Version in the record.
         found: u8,
-        /// The version that this firmware reads.
+        /// Version that this firmware reads.
         expected: u8,
     },
-    /// The record's bytes do not decode as its version requires.
-    #[error("the record is not what its version says")]
+    /// The record does not decode as its layout version requires.
+    #[error("the record does not decode as its layout version requires")]
     Encoding,
     /// A value is out of its range.
     #[error(transparent)]

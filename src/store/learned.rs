@@ -1,4 +1,5 @@
-//! The record of what the board has learnt about its sensor: the bias by temperature, and where up and forward are.
+//! This record holds what the board has learnt about its sensor: the bias over temperature, and the up and forward
+//! directions.
 
 use super::error::{Field, FieldError};
 use super::record::Record;
@@ -7,33 +8,33 @@ use crate::mounting::{Forward, Rotation, is_moved};
 use crate::units::SpecificForce;
 use serde::{Deserialize, Serialize};
 
-/// A standstill changes the mean specific force by one part in so many.
+/// Weight of a new standstill in the mean specific force: 1 / `MEMORY`.
 const MEMORY: i64 = 8;
 
-/// Holds what standstills and drives have shown about the sensor, in its own axes.
+/// What the board has learnt about the sensor at standstills and while driving, in sensor axes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Learned {
-    /// The gyro's bias by temperature.
+    /// Bias of the gyro over temperature.
     pub bias_curve: BiasCurve,
-    /// Mean specific force; `None` before the first standstill.
+    /// Mean specific force at standstill; `None` before the first standstill.
     pub specific_force: Option<[SpecificForce; 3]>,
-    /// The vehicle's forward direction; `None` before a drive has shown it within 10 degrees.
+    /// Forward direction of the vehicle; `None` until it is known within 10 degrees.
     pub forward: Option<Forward>,
 }
 
 impl Learned {
-    /// Nothing is known.
+    /// Record before anything was learnt.
     pub const NOTHING: Self = Self { bias_curve: BiasCurve::UNKNOWN, specific_force: None, forward: None };
 
-    /// Returns whether a specific force at rest is that of a sensor that was moved.
+    /// Returns whether a specific force at rest shows that the sensor has moved.
     #[must_use]
     pub fn is_moved(&self, specific_force: &[SpecificForce; 3]) -> bool {
         self.specific_force.is_some_and(|known| is_moved(&known, specific_force))
     }
 
-    /// Takes the mean specific force of a standstill, once for each.
-    pub fn stood(&mut self, specific_force: [SpecificForce; 3]) {
+    /// Adds the mean specific force of a standstill. Call it once per standstill.
+    pub fn add_standstill(&mut self, specific_force: [SpecificForce; 3]) {
         let known = self.specific_force.get_or_insert(specific_force);
         for (mean, force) in known.iter_mut().zip(specific_force) {
             mean.0 += ((i64::from(force.0) - i64::from(mean.0)) / MEMORY) as i32;
@@ -42,8 +43,8 @@ impl Learned {
 }
 
 impl Learned {
-    /// Returns the angle from the x axis of a mounting to the forward direction, to the left, and its sigma, deg; 0 where
-    /// the mounting is right.
+    /// Returns the angle from the x axis of a mounting to the forward direction, left positive, and its sigma, deg.
+    /// The angle is 0 if the mounting is correct.
     #[must_use]
     pub fn yaw_deg(&self, mounting: &Rotation) -> Option<[f32; 2]> {
         let (forward, rest) = self.forward.zip(self.specific_force)?;
@@ -78,10 +79,10 @@ mod tests {
     fn a_sensor_that_was_moved_is_told_from_a_steep_street() {
         let mut learned = Learned::NOTHING;
         assert!(!learned.is_moved(&force(6.0, 7.7)), "nothing is known");
-        learned.stood(force(0.0, 9.8));
-        // A street of 15 degrees.
+        learned.add_standstill(force(0.0, 9.8));
+        // A road with a slope of 15 degrees.
         assert!(!learned.is_moved(&force(2.54, 9.47)));
-        learned.stood(force(2.54, 9.47));
+        learned.add_standstill(force(2.54, 9.47));
         assert!(learned.is_moved(&force(6.0, 7.7)));
     }
 }

@@ -1,10 +1,10 @@
-//! The places for weight files in the flash.
+//! This module defines the places for weight files in the flash.
 
 use super::layout::{FOGNET, SLOT_SIZE, SLOTS};
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
-/// Names one of the two slots.
+/// One of the two slots for GyroNet's weights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Slot {
@@ -27,7 +27,7 @@ impl Slot {
         }
     }
 
-    /// Returns the offset of the slot's first byte into the flash.
+    /// Returns the flash offset of the slot.
     #[must_use]
     pub const fn offset(self) -> u32 {
         match self {
@@ -36,7 +36,7 @@ impl Slot {
         }
     }
 
-    /// Returns this slot's element of a pair.
+    /// Returns this slot's element of a pair (A, B).
     pub(crate) const fn of<T: Copy>(self, [a, b]: [T; 2]) -> T {
         match self {
             Self::A => a,
@@ -51,18 +51,18 @@ impl core::fmt::Display for Slot {
     }
 }
 
-/// Names a place for a weight file.
+/// A place for a weight file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Place {
-    /// A slot for GyroNet's.
+    /// Slot for a file of GyroNet.
     Slot(Slot),
-    /// The place for FoGNet's.
+    /// Place for the file of FoGNet.
     FogNet,
 }
 
 impl Place {
-    /// Returns its offsets into the flash: whole sectors.
+    /// Returns the flash offsets of the place: whole sectors.
     #[must_use]
     pub const fn range(self) -> Range<u32> {
         match self {

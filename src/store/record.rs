@@ -1,18 +1,19 @@
-//! Records lie in two sectors of flash; each is found by its key, and the newest with a key is valid.
+//! The record store keeps records in two flash sectors; each record has a key, and the newest record of a key is
+//! valid.
 //!
-//! A sector is a header of two words, then records one behind the other:
+//! A sector contains a header of two words, followed by the records:
 //!
 //! | words | record | | header |
 //! |---|---|---|---|
-//! | 1 | key, version of its layout, length n (u16) | 1 | generation |
+//! | 1 | key, layout version, length n (u16) | 1 | generation |
 //! | n / 4, rounded up | postcard's encoding, then FF | 1 | CRC-32 of the generation |
 //! | 1 | CRC-32 of all words before it | | |
 //!
-//! All little-endian. Records are appended until the sector in use is full, or ends in a record that a power cut has
-//! torn. Then the *other* sector is erased, the newest record of each key is copied there with the new one, and the
-//! header comes last, with the next generation: only then does that sector take over. So the sector in use is never the
-//! one being erased or filled, and it does not matter in what state an interrupted erasure leaves the other. Where the
-//! configuration was damaged, a record of layout 0 says so there.
+//! All values are little-endian. Records are appended until the sector in use is full, or ends with a record that a
+//! power cut has torn. Then the *other* sector is erased, and the newest record of each key is copied there, together
+//! with the new one. The header is written last, with the next generation; only then does the other sector become the
+//! one in use. The sector in use is thus never erased or rewritten, and an erase that is interrupted does no harm. If
+//! the configuration was damaged, a record of layout 0 marks that in the new sector.
 
 use super::Configuration;
 use super::error::{FieldError, FlashFault, StoreError};
@@ -23,30 +24,30 @@ use serde::{Serialize, de::DeserializeOwned};
 
 const WORD: usize = 4;
 const WORD_U32: u32 = WORD as u32;
-/// Bytes of a sector's header.
+/// Length of the sector header, bytes.
 const HEADER: u32 = 2 * WORD_U32;
-/// Most bytes of an encoded record.
+/// Length of the longest encoded record, bytes.
 pub(crate) const MAX_LEN: usize = 248;
-/// The longest record, with its first and last word.
+/// Length of the longest record with its first and last word, bytes.
 const BUFFER: usize = MAX_LEN + 2 * WORD;
-/// Records of the longest kind that must fit after a start.
+/// Number of records of maximum length that must fit without an erase after a start.
 const FEW: u32 = 8;
-/// The layout of a record that was lost; those of records begin at 1.
+/// Layout version that marks a lost record; real layout versions begin at 1.
 const LOST: u8 = 0;
-/// Highest key.
+/// Highest key of a record.
 const MAX_KEY: u8 = 7;
-/// This mark in the header's checksum tells our sectors from other uses of the flash.
+/// Constant in the header's checksum that distinguishes our sectors from other uses of the flash.
 const FORMAT: u32 = u32::from_le_bytes(*b"GYR1");
 
-/// Gives a stored type its key, the version of its layout, and its ranges.
+/// A type that can be stored: its key, its layout version, and the check of its values.
 pub trait Record: Serialize + DeserializeOwned {
-    /// The key of this kind of record, 1 to 7; a key is never reused for another kind.
+    /// Key of this kind of record, 1 to 7; a key is never reused for another kind.
     const KEY: u8;
-    /// The version of the layout; every change raises it.
+    /// Version of the layout; every change increments it.
     const VERSION: u8;
 
-    /// Returns the bytes that a record of an older layout lacks at its end; `None` where this firmware does not
-    /// read that layout.
+    /// Returns the bytes that a record of an older layout lacks at its end; `None` if this firmware does not read
+    /// that layout.
     fn missing(_version: u8) -> Option<&'static [u8]> {
         None
     }
@@ -54,11 +55,11 @@ pub trait Record: Serialize + DeserializeOwned {
     /// Checks that all values are inside their ranges.
     ///
     /// # Errors
-    /// [`FieldError`], which names the first value that is not.
+    /// [`FieldError`], which names the first value out of range.
     fn check(&self) -> Result<(), FieldError>;
 }
 
-/// Holds a record as it lies in flash.
+/// A record as stored in flash.
 #[derive(Clone, Copy)]
 struct Raw {
     words: [u8; BUFFER],
@@ -72,11 +73,11 @@ impl Raw {
         2 * WORD + len.next_multiple_of(WORD)
     }
 
-    /// Encodes a record; `None` when it does not fit.
+    /// Encodes a record; `None` if it does not fit.
     fn encode<R: Record>(&mut self, record: &R) -> Option<()> {
         let (first, rest) = self.words.split_first_chunk_mut::<WORD>()?;
         let len = postcard::to_slice(record, rest.get_mut(..MAX_LEN)?).ok()?.len();
-        // The encoder may leave bytes behind its end.
+        // The encoder may have written beyond the end of the record.
         rest.get_mut(len..)?.fill(0xFF);
         let [low, high] = u16::try_from(len).ok()?.to_le_bytes();
         *first = [R::KEY, R::VERSION, low, high];
@@ -86,8 +87,8 @@ impl Raw {
         Some(())
     }
 
-    /// Makes the mark of a record that was lost.
-    fn lose(&mut self, key: u8) {
+    /// Writes the mark of a lost record.
+    fn mark_lost(&mut self, key: u8) {
         (self.words, self.len) = ([0xFF; BUFFER], 0);
         self.words[..WORD].copy_from_slice(&[key, LOST, 0, 0]);
         let crc = CRC.checksum(&self.words[..WORD]).to_le_bytes();
@@ -102,7 +103,7 @@ impl Raw {
         self.words[0]
     }
 
-    fn is_whole(&self) -> bool {
+    fn is_intact(&self) -> bool {
         let bytes = self.bytes();
         let content = bytes.get(..bytes.len().wrapping_sub(WORD));
         let crc = content.map(|content| CRC.checksum(content).to_le_bytes());
@@ -128,37 +129,37 @@ impl Raw {
     }
 }
 
-/// Describes what lies at a place in a sector.
+/// The content found at an offset in a sector.
 enum Place {
-    /// A record; it may be torn.
+    /// A record, which may be torn.
     Record,
-    /// The place is empty since its sector was erased.
+    /// Erased flash.
     Blank,
-    /// No record begins here: the bytes are not a record's, or no room is left.
+    /// No record: the bytes are not those of a record, or the sector ends here.
     End,
 }
 
-/// Keeps the newest record of each kind, in two flash sectors that are used in turn.
+/// The store of the newest record of each kind, in two flash sectors that are used alternately.
 pub struct Store<F> {
     flash: F,
     start: u32,
-    /// Flash that reads as zeros counts as never written, as in an emulator without a flash controller.
+    /// Whether flash that reads as zeros counts as erased, as in an emulator without a flash controller.
     zeros_are_blank: bool,
-    /// Sector in use and its generation.
+    /// Sector in use, and its generation.
     current: Option<(u32, u32)>,
-    /// The place of the next record, while there is room.
+    /// Offset of the next record, if one can be appended.
     free: Option<u32>,
     damaged: bool,
-    /// A damaged record may have been the configuration.
+    /// Whether a damaged record may have been the configuration.
     configuration_damaged: bool,
-    /// A header is neither valid nor blank: the newest sector may be lost.
+    /// Whether a header is neither valid nor blank; the newest sector may then be lost.
     header_damaged: bool,
 }
 
 impl<F: NorFlash> Store<F> {
-    /// Opens the two sectors from `start` on (an offset into `flash`); writes nothing. `zeros_are_blank` holds for an
-    /// emulator without a flash controller; a chip's erased flash reads as ones, and sectors of zeros are then reported
-    /// as damaged: a raw image of the flash has overwritten them.
+    /// Opens the store in the two sectors that begin at offset `start` of `flash`; writes nothing. Set
+    /// `zeros_are_blank` for an emulator without a flash controller. In a chip, erased flash reads as ones; sectors
+    /// of zeros were overwritten by a raw image of the flash, and are reported as damaged.
     ///
     /// # Errors
     /// [`StoreError::Flash`].
@@ -182,34 +183,35 @@ impl<F: NorFlash> Store<F> {
             }
         }
         if store.current.is_some() {
-            // No record has key 0: the walk goes to the end.
+            // No record has key 0, so the search reads all records.
             let mut nothing = Raw::EMPTY;
             store.find(0, &mut nothing)?;
         }
         Ok(store)
     }
 
-    /// Returns whether a damaged record or sector header was found: a power cut tore it, or the flash has lost
-    /// bits. The record before it is then read.
+    /// Returns whether a damaged record or sector header was found, because of a power cut or flipped bits. The
+    /// previous record is then used.
     #[must_use]
     pub fn damaged(&self) -> bool {
         self.damaged || self.header_damaged
     }
 
-    /// Returns the newest whole record; `None` before the first one.
+    /// Returns the newest intact record; `None` if there is none.
     ///
     /// # Errors
-    /// [`StoreError`] when the flash cannot be read, or the record has another layout, does not decode or has a value
-    /// out of its range.
+    /// [`StoreError`] if the flash cannot be read, or the record has an unknown layout, does not decode or has a
+    /// value out of range.
     pub fn get<R: Record>(&mut self) -> Result<Option<R>, StoreError> {
         let mut raw = Raw::EMPTY;
         if self.find(R::KEY, &mut raw)? { raw.decode().map(Some) } else { Ok(None) }
     }
 
-    /// Stores a record and reads it back; until it is whole the one before remains valid.
+    /// Stores a record and reads it back. Until the new record is complete, the previous one remains valid.
     ///
     /// # Errors
-    /// [`StoreError::Field`] for a value out of its range: nothing is written then.
+    /// [`StoreError::Field`] for a value out of range; nothing is written then. [`StoreError::Flash`] or
+    /// [`StoreError::Full`] if the record could not be written.
     #[inline(never)]
     pub fn set<R: Record>(&mut self, record: &R) -> Result<(), StoreError> {
         record.check()?;
@@ -224,14 +226,14 @@ impl<F: NorFlash> Store<F> {
         self.room() >= BUFFER as u32
     }
 
-    /// Returns the bytes that are free in the sector in use.
+    /// Returns the number of free bytes in the sector in use.
     fn room(&self) -> u32 {
         let end = self.current.map(|(sector, _)| self.range(sector).end);
         self.free.zip(end).map_or(0, |(at, end)| end.saturating_sub(at))
     }
 
-    /// Moves the newest records to the other sector, which needs an erase, where little room is left. Call it at the
-    /// start, when nothing is lost by an erase: what is stored while the vehicle drives has to fit without one.
+    /// If little room is left, erases the other sector and moves the newest records there. Call it at the start, when
+    /// an erase disturbs nothing: records stored while the vehicle drives must fit without an erase.
     ///
     /// # Errors
     /// [`StoreError::Flash`].
@@ -248,7 +250,8 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Writes an encoded record. It is separate from [`Store::set`], which is compiled once for each kind of record.
+    /// Writes an encoded record. It is not generic, unlike [`Store::set`], which is compiled once for each kind of
+    /// record.
     #[inline(never)]
     fn write(&mut self, raw: &Raw) -> Result<(), StoreError> {
         let appended = match (self.current, self.free) {
@@ -281,13 +284,13 @@ impl<F: NorFlash> Store<F> {
         let at = self.range(sector).start;
         let generation = u32::from_le_bytes(self.read(at)?);
         let crc = u32::from_le_bytes(self.read(at + WORD_U32)?);
-        let whole = crc == header_crc(generation);
+        let intact = crc == header_crc(generation);
         let blank = generation == crc && (crc == u32::MAX || self.zeros_are_blank && crc == 0);
-        self.header_damaged |= !whole && !blank;
-        Ok(whole.then_some(generation))
+        self.header_damaged |= !intact && !blank;
+        Ok(intact.then_some(generation))
     }
 
-    /// Reads the record at `at` into `raw`, if there is one.
+    /// Reads the record at offset `at` into `raw`, if there is one.
     fn place(&mut self, sector: u32, at: u32, raw: &mut Raw) -> Result<Place, StoreError> {
         let end = self.range(sector).end;
         if at + WORD_U32 > end {
@@ -308,8 +311,8 @@ impl<F: NorFlash> Store<F> {
         Ok(Place::Record)
     }
 
-    /// Copies the newest whole record of a key into `newest`; returns whether there is one. Also finds the place of the
-    /// next record.
+    /// Copies the newest intact record of a key into `newest`, and returns whether there is one. Also updates `free`
+    /// and the damage flags.
     #[inline(never)]
     fn find(&mut self, key: u8, newest: &mut Raw) -> Result<bool, StoreError> {
         let Some((sector, _)) = self.current else { return Ok(false) };
@@ -318,20 +321,20 @@ impl<F: NorFlash> Store<F> {
         let mut found = false;
         (self.damaged, self.configuration_damaged) = (false, false);
         loop {
-            // Each turn goes on by a record's length, of two words at least.
+            // Each iteration advances by the length of a record, at least two words.
             match self.place(sector, at, &mut raw)? {
                 Place::Record => {
                     at += Raw::size(raw.len) as u32;
-                    if !raw.is_whole() {
+                    if !raw.is_intact() {
                         self.damaged = true;
-                        // A power cut leaves the first word, which has the key; flipped bits may not.
+                        // A power cut leaves the first word intact, which holds the key; flipped bits may not.
                         self.configuration_damaged |= !(2..=MAX_KEY).contains(&raw.key());
                     } else if raw.key() == key {
                         *newest = raw;
                         found = true;
                     }
                 }
-                // No record is appended behind one that may be torn.
+                // No record is appended after one that may be torn.
                 Place::Blank => {
                     self.free = (!self.damaged()).then_some(at);
                     return Ok(found);
@@ -347,7 +350,7 @@ impl<F: NorFlash> Store<F> {
         }
     }
 
-    /// Writes a record at `at` and returns the place of the next one; `None` if there is no room for it.
+    /// Writes a record at offset `at` and returns the offset of the next one; `None` if the record does not fit.
     fn append(&mut self, sector: u32, at: u32, raw: &Raw) -> Result<Option<u32>, StoreError> {
         let end = at + raw.bytes().len() as u32;
         if end > self.range(sector).end {
@@ -361,8 +364,9 @@ impl<F: NorFlash> Store<F> {
         written.map(|()| Some(end))
     }
 
-    /// Starts the other sector with the newest record of each key, the given one among them. Of a configuration that was
-    /// damaged a mark stays, [`StoreError::Lost`], until one is stored: without it the vehicle's axes are not known.
+    /// Fills the other sector with the newest record of each key, including the given one, and switches to it. A mark
+    /// replaces a damaged configuration, which then reads as [`StoreError::Lost`] until a new one is stored: the
+    /// sensor's axes are unknown meanwhile.
     #[inline(never)]
     fn change_sector(&mut self, newest: &Raw) -> Result<(), StoreError> {
         let (sector, generation) = match self.current {
@@ -377,7 +381,7 @@ impl<F: NorFlash> Store<F> {
             let is_lost =
                 !self.find(key, &mut raw)? && key == Configuration::KEY && self.configuration_damaged;
             if is_lost {
-                raw.lose(key);
+                raw.mark_lost(key);
             } else if raw.key() != key {
                 continue;
             }
@@ -386,7 +390,7 @@ impl<F: NorFlash> Store<F> {
         let free = self.append(sector, at, newest)?.ok_or(StoreError::Full)?;
         self.flash.write(start, &generation.to_le_bytes()).map_err(fault)?;
         self.flash.write(start + WORD_U32, &header_crc(generation).to_le_bytes()).map_err(fault)?;
-        // The other sector's was good, if there was one.
+        // The header of the previous sector was good, if there was one.
         self.header_damaged &= self.current.is_none();
         (self.current, self.free) = (Some((sector, generation)), Some(free));
         Ok(())

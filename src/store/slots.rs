@@ -1,35 +1,35 @@
-//! Two slots take GyroNet's weight files, a third place takes FoGNet's, and a record names the files that the networks run
-//! on.
+//! This module selects weight files: two slots hold GyroNet's, a third place holds FoGNet's, and a record lists the
+//! accepted files.
 //!
-//! A file is uploaded, checked where it lies, and then accepted: a record names its place and checksum. GyroNet's goes to
-//! the slot that is not in use. At the next start [`select`] takes the first file that passes all checks: the accepted
-//! slot, the other slot if its file was once accepted, the built-in weights. So an upload that breaks off never harms the
-//! file in use: it touches the unused slot only. FoGNet has one place ([`super::layout`]): an upload that breaks off leaves
-//! no file there that was accepted, and the gyro is corrected without a network.
+//! A file is uploaded, checked in flash, and then accepted: the record stores its place and checksum. GyroNet's file
+//! is written to the unused slot. At the next start, [`select`] tries in this order and uses the first file that
+//! passes all checks: the active slot, the other slot if its file was accepted, the built-in weights. An interrupted
+//! upload thus never harms the file in use. FoGNet has only one place ([`super::layout`]): an interrupted upload
+//! leaves no accepted file there, and the gyro is corrected without a network.
 
 use super::error::{FieldError, FlashFault};
 use super::place::{Place, Slot};
 use super::record::Record;
-use crate::fog::NotForThisGyro;
+use crate::fog::GyroMismatch;
 use crate::model::{Blob, BlobError, FogBlob};
 use serde::{Deserialize, Serialize};
 
-/// Records the files that were accepted, and the one to use.
+/// The record of the accepted files, and of the slot to use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Accepted {
-    /// The slot to use; `None` selects the built-in weights.
+    /// Slot to use; `None` selects the built-in weights.
     pub active: Option<Slot>,
-    /// Checksum of the file that was accepted in each slot.
+    /// Checksum of the accepted file in each slot.
     pub files: [Option<u32>; 2],
-    /// Checksum of FoGNet's file that was accepted.
+    /// Checksum of FoGNet's accepted file.
     pub fognet: Option<u32>,
 }
 
 impl Accepted {
-    /// No file has been accepted.
+    /// Record without accepted files.
     pub const NONE: Self = Self { active: None, files: [None; 2], fognet: None };
 
-    /// Returns these without the file in a place: it is being replaced.
+    /// Returns the record without the file in a place, which is being replaced.
     #[must_use]
     pub const fn without(mut self, place: Place) -> Self {
         let [a, b] = self.files;
@@ -41,7 +41,7 @@ impl Accepted {
         self
     }
 
-    /// Returns the record with a checked file added in its place; a slot becomes the one to use.
+    /// Returns the record with the checksum `file` for a place; a slot also becomes the one to use.
     #[must_use]
     pub const fn with(mut self, place: Place, file: u32) -> Self {
         let [a, b] = self.files;
@@ -61,7 +61,7 @@ impl Record for Accepted {
     const KEY: u8 = 3;
     const VERSION: u8 = 2;
 
-    /// Returns what layout 1 lacks at its end: it had no place for FoGNet.
+    /// Returns the byte that layout 1 lacks at its end: `fognet`, which is `None`.
     fn missing(version: u8) -> Option<&'static [u8]> {
         (version == 1).then_some(&[0])
     }
@@ -82,36 +82,36 @@ pub enum SlotError {
     /// The flash reports an error.
     #[error("flash: {0}")]
     Flash(FlashFault),
-    /// The slot has not been written since it was erased.
+    /// The place is erased and holds no file.
     #[error("the slot is empty")]
     Empty,
-    /// The length is longer than its place, or not a whole number of words.
-    #[error("{0} bytes are no whole number of words that has room")]
+    /// The length exceeds the place, or is not a whole number of words.
+    #[error("{0} bytes are too many, or not a whole number of words")]
     Length(u32),
     /// The block does not continue the upload.
     #[error("the next block must begin at {expected}")]
     Offset {
-        /// The offset at which the next block must begin; the bytes before it are written.
+        /// Offset at which the next block must begin; all bytes before it are written.
         expected: u32,
     },
-    /// No upload is under way.
-    #[error("no upload is under way")]
+    /// No upload is in progress.
+    #[error("no upload is in progress")]
     NotBegun,
-    /// The upload has not reached its end.
-    #[error("only {written} bytes have come")]
+    /// The upload is not complete.
+    #[error("only {written} bytes have been received")]
     Incomplete {
-        /// Bytes written.
+        /// Number of bytes written.
         written: u32,
     },
-    /// The file's checksum is not the announced or accepted one.
+    /// The file's checksum is not that of the accepted file; the file has this checksum.
     #[error("file {0:08x} is not the one that was accepted")]
     NotAccepted(u32),
-    /// The file is refused.
+    /// The content of the file is invalid.
     #[error(transparent)]
     Blob(BlobError),
     /// FoGNet's file is not for the gyro that is fitted.
     #[error(transparent)]
-    Gyro(NotForThisGyro),
+    Gyro(GyroMismatch),
 }
 
 impl From<BlobError> for SlotError {
@@ -120,7 +120,7 @@ impl From<BlobError> for SlotError {
     }
 }
 
-/// Returns the bytes of the file in a place, by the length that it states.
+/// Returns the bytes of the file in a place, using the length in its header.
 ///
 /// # Errors
 /// [`SlotError::Empty`], [`SlotError::Length`].
@@ -134,7 +134,7 @@ pub fn bytes(slot: &[u8]) -> Result<&[u8], SlotError> {
     slot.get(..length as usize).ok_or(SlotError::Length(length))
 }
 
-/// Checks GyroNet's file in a slot. Slots begin on a word.
+/// Checks GyroNet's file in a slot, which must be aligned to words.
 ///
 /// # Errors
 /// [`SlotError::Empty`], [`SlotError::Length`], [`SlotError::Blob`].
@@ -145,21 +145,21 @@ pub fn file(slot: &[u8]) -> Result<Blob<'_>, SlotError> {
 /// Checks FoGNet's file in its place, and that it was accepted.
 ///
 /// # Errors
-/// As [`file()`], and [`SlotError::NotAccepted`].
+/// Those of [`file()`], and [`SlotError::NotAccepted`].
 pub fn fognet<'w>(accepted: &Accepted, place: &'w [u8]) -> Result<FogBlob<'w>, SlotError> {
     let blob = FogBlob::new_checked(bytes(place)?)?;
     if accepted.fognet == Some(blob.crc) { Ok(blob) } else { Err(SlotError::NotAccepted(blob.crc)) }
 }
 
-/// Says where the weights in use come from.
+/// The origin of the weights in use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WeightSource {
-    /// The weights come from a slot.
+    /// Weights from a slot.
     Slot(Slot),
-    /// The weights come from the image itself.
+    /// Weights built into the image.
     BuiltIn,
-    /// All weights are damaged: no network runs, and the rate is the gyro's less its bias.
+    /// No valid weights: the network is off, and the rate is that of the gyro minus its bias.
     None,
 }
 
@@ -173,14 +173,14 @@ impl core::fmt::Display for WeightSource {
     }
 }
 
-/// Holds the result of [`select`].
+/// The result of [`select`].
 #[derive(Debug, Clone, Copy)]
 pub struct Selection<'w> {
-    /// The weights to run on, if any passed.
+    /// Weights to use, if any passed the checks.
     pub weights: Option<Blob<'w>>,
-    /// The origin of the weights.
+    /// Origin of the weights.
     pub source: WeightSource,
-    /// The reasons why slots A and B were refused, for those that were tried.
+    /// Reasons why slots A and B were refused, if they were tried.
     pub refused: [Option<SlotError>; 2],
 }
 

@@ -1,17 +1,17 @@
-//! The troubles that a workshop has not cleared yet are a stored record, so that a restart does not hide them.
+//! This record holds the troubles that a workshop has not cleared yet, so that they survive a restart.
 
 use super::error::FieldError;
 use super::record::Record;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-/// Most troubles of a record.
-pub const MOST_TROUBLES: usize = 16;
+/// Capacity of the record.
+pub const MAX_TROUBLES: usize = 16;
 
-/// The state of the board when a trouble came.
+/// The state of the board when a trouble first appeared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Snapshot {
-    /// 10 ms steps of the sensor's time since the start.
+    /// Sensor time since the start, 10 ms steps.
     pub tick: u32,
     /// Status of the yaw rate, as on CAN.
     pub status: u8,
@@ -19,26 +19,26 @@ pub struct Snapshot {
     pub faults: u8,
 }
 
-/// A trouble in the memory.
+/// A stored trouble.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredTrouble {
-    /// Its code, three bytes.
+    /// Code of the trouble, three bytes.
     pub code: u32,
-    /// Times that it came since the memory was cleared; it stays at 255.
+    /// Number of times that the fault has appeared since the memory was cleared; saturates at 255.
     pub occurrences: u8,
-    /// The state when it came first.
+    /// State of the board when the fault first appeared.
     pub snapshot: Snapshot,
 }
 
-/// Holds the confirmed troubles.
+/// The confirmed troubles.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Troubles {
-    /// Each at most once.
-    pub confirmed: Vec<StoredTrouble, MOST_TROUBLES>,
+    /// Confirmed troubles, each at most once.
+    pub confirmed: Vec<StoredTrouble, MAX_TROUBLES>,
 }
 
 impl Troubles {
-    /// No trouble is confirmed.
+    /// Record without troubles.
     pub const NONE: Self = Self { confirmed: Vec::new() };
 }
 
@@ -46,7 +46,7 @@ impl Record for Troubles {
     const KEY: u8 = 5;
     const VERSION: u8 = 1;
 
-    /// Any value is a state that the board can have had.
+    /// Any value is valid.
     fn check(&self) -> Result<(), FieldError> {
         Ok(())
     }

@@ -1,4 +1,5 @@
-//! A weight file is uploaded block by block to its place in the flash; whole sectors are erased as the file reaches them.
+//! An upload writes a weight file block by block to its place in the flash, and erases each sector before the first
+//! block in it.
 
 use super::error::FlashFault;
 use super::layout::sector;
@@ -7,7 +8,7 @@ use super::slots::{SlotError, bytes, file};
 use crate::model::FogBlob;
 use embedded_storage::nor_flash::{NorFlash, NorFlashError};
 
-/// Tracks a file that is being uploaded.
+/// The state of an upload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Upload {
     place: Place,
@@ -25,9 +26,9 @@ impl Upload {
         if fits { Ok(()) } else { Err(SlotError::Length(length)) }
     }
 
-    /// Begins an upload and erases the first sector of its place; the others follow with the blocks that begin them. The
-    /// processor stands still meanwhile: one to two seconds on an F405 (its datasheet, 128 KiB sector). Offsets of `flash`
-    /// are those into the whole flash.
+    /// Begins an upload and erases the first sector of its place; each further sector is erased by the block that
+    /// begins it. An erase stalls the processor for one to two seconds on an F405 (its datasheet, 128 KiB sector).
+    /// Offsets in `flash` are from the start of the whole flash.
     ///
     /// # Errors
     /// [`SlotError::Length`], [`SlotError::Flash`].
@@ -41,9 +42,9 @@ impl Upload {
     /// Writes the next block, a whole number of words.
     ///
     /// # Errors
-    /// [`SlotError::Offset`] when it does not continue what is written, [`SlotError::Length`] when it is not a whole
-    /// number of words, goes beyond the announced end or over the end of a sector, [`SlotError::Flash`]; after a flash
-    /// error the upload must begin again.
+    /// [`SlotError::Offset`] if the block does not follow the previous one; [`SlotError::Length`] if it is not a
+    /// whole number of words, or extends beyond the end of the file or of a sector; [`SlotError::Flash`], after which
+    /// the upload must begin again.
     pub fn block<F: NorFlash>(&mut self, flash: &mut F, offset: u32, bytes: &[u8]) -> Result<(), SlotError> {
         if offset != self.written {
             return Err(SlotError::Offset { expected: self.written });
@@ -62,7 +63,7 @@ impl Upload {
         Ok(())
     }
 
-    /// Erases the sector that begins where the next block goes, if one does.
+    /// Erases the sector that begins at the offset of the next block, if one does.
     fn erase_sector<F: NorFlash>(&self, flash: &mut F) -> Result<(), SlotError> {
         let Some(sector) = sector(self.place.range().start + self.written) else { return Ok(()) };
         flash
@@ -70,7 +71,7 @@ impl Upload {
             .map_err(|error| SlotError::Flash(FlashFault::from(error.kind())))
     }
 
-    /// Checks the whole file where it lies and returns its checksum.
+    /// Checks the whole file in flash and returns its checksum.
     ///
     /// # Errors
     /// [`SlotError::Incomplete`], and the errors of [`file()`].
@@ -84,7 +85,7 @@ impl Upload {
         }
     }
 
-    /// Returns the place.
+    /// Returns the place of the file.
     #[must_use]
     pub const fn place(&self) -> Place {
         self.place

@@ -1,4 +1,4 @@
-//! The wheel settings are a stored record, so that another vehicle needs a configuration and not a new image.
+//! The wheel settings are a stored record, so that another vehicle needs new settings instead of a new image.
 
 use super::error::FieldError;
 use super::record::Record;

@@ -1,4 +1,4 @@
-//! These services control the server itself: session, restart, messages of the board, memory of troubles.
+//! These services control the server and the board: session, reset, communication, and the trouble memory.
 
 use super::response::{Nrc, Response, exactly, nrc, put};
 use super::services::Services;
@@ -8,12 +8,12 @@ use crate::service::{Device, MappedSlots};
 use automotive_diag::uds::ResetType;
 use embedded_storage::nor_flash::NorFlash;
 
-/// Longest time to a response, ms, and to one after "response pending", 10 ms (P2, P2*).
+/// P2 and P2*: longest time to a response (ms), and to the next one after "response pending" (units of 10 ms).
 const P2_MS: u16 = 50;
 const P2_STAR_10_MS: u16 = 500;
 
 impl Services {
-    /// Enters a session, which ends the one before.
+    /// Enters a session, which ends the previous one.
     pub(super) fn session_control(&mut self, sub: u8, rest: &[u8], out: &mut Response) -> Result<(), Nrc> {
         let [] = exactly(rest)?;
         let session = match sub {
@@ -27,7 +27,7 @@ impl Services {
         put(out, &[a, b, c, d])
     }
 
-    /// Has the board restart, once the response is out.
+    /// Requests a restart of the board, which follows once the response has been sent.
     pub(super) fn reset<R: NorFlash, W: MappedSlots>(
         &mut self,
         sub: u8,
@@ -44,13 +44,13 @@ impl Services {
         Ok(())
     }
 
-    /// Keeps the session.
+    /// Answers TesterPresent. Any frame of the tester keeps the session alive.
     pub(super) fn tester_present(sub: u8, rest: &[u8]) -> Result<(), Nrc> {
         let [] = exactly(rest)?;
         if sub == 0 { Ok(()) } else { Err(Nrc::SubFunctionNotSupported) }
     }
 
-    /// Stops the messages of the board, or lets them go out again.
+    /// Stops or resumes the messages of the board.
     pub(super) fn communication_control<R: NorFlash, W: MappedSlots>(
         &mut self,
         sub: u8,
@@ -63,7 +63,7 @@ impl Services {
             1 => true,
             _ => return Err(Nrc::SubFunctionNotSupported),
         };
-        // Normal messages, or they and those of a network management that this board has not got.
+        // Normal messages, alone or with those of network management, which this board does not have.
         if !matches!(kind, 1 | 3) {
             return Err(Nrc::RequestOutOfRange);
         }
@@ -75,7 +75,7 @@ impl Services {
         Ok(())
     }
 
-    /// Stops the memory of troubles, or lets it go on.
+    /// Stops or resumes the recording of troubles.
     pub(super) fn dtc_setting<R: NorFlash, W: MappedSlots>(
         &mut self,
         sub: u8,
@@ -90,7 +90,7 @@ impl Services {
         Ok(())
     }
 
-    /// Clears one trouble or all.
+    /// Clears one trouble, or all.
     pub(super) fn clear_troubles<R: NorFlash, W: MappedSlots>(
         &mut self,
         rest: &[u8],

@@ -1,35 +1,35 @@
-//! Data identifiers: what a tester reads and writes by number (ISO 14229-1 C.1).
+//! This module reads and writes the values behind the data identifiers (ISO 14229-1 C.1).
 //!
-//! | identifier | bytes | what | written |
+//! | identifier | bytes | content | writable in session |
 //! |---|---|---|---|
 //! | F186 | 1 | session: 1 default, 2 programming, 3 extended | |
 //! | F189 | 1, 1, 1 | version of the firmware | |
 //! | F18C | text | serial number of the chip, 24 hexadecimal digits | |
 //! | F197 | text | name of the system, "gyronet" | |
-//! | 0100 | 1, then the record | layout of the configuration, the configuration as it is stored (postcard) | extended |
-//! | 0101 | the record | wheel frames that are received, as they are stored (postcard) | extended |
-//! | 0102 | 1, then the record | layout of the calibration, the calibration as it is stored (postcard) | |
-//! | 0103 | 1, 4 | weights: 0 none, 1 built in, 2 slot A, 3 slot B; their CRC-32 | |
-//! | 0104 | 1, 1 | status of the yaw rate, fault bits, both as on CAN | |
+//! | 0100 | 1, then the record | layout version, then the stored configuration (postcard) | extended |
+//! | 0101 | the record | stored settings of the wheel frames (postcard) | extended |
+//! | 0102 | 1, then the record | layout version, then the stored calibration (postcard) | |
+//! | 0103 | 1, 4 | weights of GyroNet: 0 none, 1 built in, 2 slot A, 3 slot B; CRC-32 of the weights | |
+//! | 0104 | 1, 1 | status of the yaw rate and fault bits, as on CAN | |
 //! | 0105 | 4 each | counters of the pipeline, in the order of [`crate::health::Counters`] | |
-//! | 0106 | 4 each | counters of the sensor's monitor, of the inputs and of the lines, in the order of their types | |
-//! | 0107 | 4 each | conversations of diagnosis that went wrong, in the order of [`TransportErrors`] | |
-//! | 0108 | 4 | 10 ms steps of the sensor's time since the start | |
+//! | 0106 | 4 each | counters of the sensor monitor, of the inputs and of the lines, in the order of their types | |
+//! | 0107 | 4 each | failed diagnostic transfers, in the order of [`TransportErrors`] | |
+//! | 0108 | 4 | sensor time since the start, 10 ms steps | |
 //! | 0109 | 4 each | counters of the fibre-optic gyro's lane, in the order of [`FogCounters`] | |
 //! | 010A | postcard | versions, part, reset, clock, stored data, weights and status: [`crate::service::message::Info`] | |
-//! | 010B | postcard | the reason why the last request was refused, where it was: [`crate::service::message::Refusal`] | |
-//! | 010C | postcard | how a calibration goes: [`crate::service::calibrate::State`] | |
-//! | 010D | postcard | gain and mounting of this unit's gyro, or none: [`crate::store::UnitMap`] (read in 0102) | extended |
-//! | 0110 | 32 | public key of those who may write, zeros for none: see [`super::security`] | extended |
-//! | 0111 | 1, 4, 1, 4 | access: 0 open, 1 locked, 2 unlocked; newest counter; wrong answers; begin of the key | |
-//! | 0112 | 4 | messages of the fibre-optic gyro since the start, by themselves | |
-//! | 0113 | 4 each | requests that were refused for want of access, in the order of [`AccessCounters`] | |
-//! | 0114 | 1, 4 | FoGNet: 0 off, 1 its weights are used, 2 they are refused (why: 010A); their CRC-32 | |
-//! | 0115 | postcard | what standstills and drives have shown about the sensor: [`crate::store::Learned`] | |
+//! | 010B | postcard | the reason why the last request was refused, if it was: [`crate::service::message::Refusal`] | |
+//! | 010C | postcard | progress of a calibration: [`crate::service::calibrate::State`] | |
+//! | 010D | postcard | gain and misalignment of this unit's gyro, or none: [`crate::store::UnitMap`] (to read it, use 0102) | extended |
+//! | 0110 | 32 | public key that authorises writing, zeros for none: see [`super::security`] | extended |
+//! | 0111 | 1, 4, 1, 4 | access: 0 open, 1 locked, 2 unlocked; newest signature counter; wrong answers; first bytes of the key | |
+//! | 0112 | 4 | number of samples of the fibre-optic gyro since the start | |
+//! | 0113 | 4 each | requests that were refused for lack of access, in the order of [`AccessCounters`] | |
+//! | 0114 | 1, 4 | FoGNet: 0 off, 1 its weights are used, 2 they are refused (reason: 010A); CRC-32 of the weights | |
+//! | 0115 | postcard | what the board has learnt about the sensor: [`crate::store::Learned`] | |
 //! | 0116 | 1, 2, 2 | forward direction: 0 unknown, 1 within 10 deg, 2 within 3 deg; its angle to the left of the configured x axis, its sigma, both 1/100 deg | |
-//! | 0201 to 021E | | [`super::settings`], each by itself | extended |
+//! | 0201 to 021E | | single settings: [`super::settings`] | extended |
 //!
-//! Numbers are big-endian, as everywhere in ISO 14229.
+//! Numbers are big-endian, as is usual in ISO 14229.
 
 use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, decode, nrc, put, put_record};
@@ -43,10 +43,10 @@ use crate::store::slots::WeightSource;
 use crate::store::{Calibration, Configuration, Record, Slot};
 use embedded_storage::nor_flash::NorFlash;
 
-/// A forward direction with a smaller sigma is fine, others are coarse, deg.
+/// Largest sigma of a forward direction that is reported as 2 (within 3 deg), deg.
 const FINE_DEG: f32 = 3.0;
 
-/// Lists the fields of a type in this order; one that is left out does not compile.
+/// Lists the fields of a type in the given order; an omitted field is a compile error.
 macro_rules! words {
     ($from:expr => $type:ident { $($field:ident),* }) => {{
         let $type { $($field),* } = $from;
@@ -54,11 +54,11 @@ macro_rules! words {
     }};
 }
 
-/// Holds the sources of the values that are read.
+/// The sources of the values that are read.
 pub(super) struct Sources<'a, R: NorFlash, W> {
     pub device: &'a Device<R, W>,
     pub counters: &'a AllCounters,
-    /// Number of the session.
+    /// Number of the active session.
     pub session: u8,
     pub security: &'a Security,
     pub errors: TransportErrors,
@@ -164,7 +164,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
     }
 }
 
-/// Writes these bytes under an identifier. Each record has a function of its own, so that only one is on the stack.
+/// Writes the value of an identifier. Each record has its own function, so that only one record is on the stack.
 pub(super) fn write<R: NorFlash, W: MappedSlots>(
     id: u16,
     bytes: &[u8],

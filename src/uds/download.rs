@@ -1,8 +1,8 @@
-//! A download brings a weight file (services 0x34, 0x36, 0x37): to address 0 one of GyroNet's, which goes into the slot that
-//! is not in use, to address 1 one of FoGNet's.
+//! A download transfers a weight file (services 0x34, 0x36, 0x37). Address 0 is GyroNet's file, which is written to
+//! the unused slot; address 1 is FoGNet's file.
 //!
-//! The file is used only after routine FF01, and from the next start on. A download that ends anywhere before leaves
-//! GyroNet's old one in use; FoGNet's has one place, and FoGNet stays off.
+//! The file is used from the next start on, and only after routine FF01. If a download is interrupted before that,
+//! GyroNet keeps its old file. FoGNet's file has only one place, so FoGNet stays off.
 
 use super::response::{Nrc, Response, nrc, put};
 use super::signature::{Digest, Hasher};
@@ -12,22 +12,22 @@ use crate::store::layout::{FOGNET, sector};
 use crate::store::{Place, Slot};
 use embedded_storage::nor_flash::NorFlash;
 
-/// A download under way.
+/// A download in progress.
 #[derive(Debug)]
 pub(super) struct Download {
     network: Network,
     length: u32,
     offset: u32,
-    /// Number of the next block; it starts at 1 and wraps around through 0.
+    /// Number of the next block; it starts at 1 and wraps from 255 to 0.
     next: u8,
-    /// Hashes the file, for its signature.
+    /// Hash of the file so far, for the signature check.
     hasher: Hasher,
-    /// The digest of the whole file, once it was checked.
+    /// Digest of the whole file, once the file has been checked.
     digest: Option<Digest>,
 }
 
 impl Download {
-    /// Begins from the parameters of 0x34: no compression, the address, the length of the file.
+    /// Begins a download with the parameters of 0x34: no compression, the address, the length of the file.
     pub fn begin<R: NorFlash, W: MappedSlots>(
         parameters: &[u8],
         device: &mut Device<R, W>,
@@ -57,7 +57,7 @@ impl Download {
         Ok(Self { network, length, offset: 0, next: 1, hasher: Hasher::new(), digest: None })
     }
 
-    /// Takes a block. The last one again is answered again: its response may have been lost.
+    /// Writes a block. A repeated block is answered again, because its response may have been lost.
     pub fn block<R: NorFlash, W: MappedSlots>(
         &mut self,
         parameters: &[u8],
@@ -87,12 +87,14 @@ impl Download {
         Ok(())
     }
 
-    /// Returns whether the next block begins a sector, which is erased first. A slot is one sector, and 0x34 erases it.
+    /// Returns whether the next block begins a sector, which must be erased first. A slot is a single sector, which
+    /// 0x34 has already erased.
     pub fn erases_next(&self) -> bool {
         self.network == Network::FogNet && self.offset > 0 && sector(FOGNET.start + self.offset).is_some()
     }
 
-    /// Checks the whole file where it lies; its place (0 slot A, 1 slot B, 2 FoGNet's) and its checksum are the response.
+    /// Checks the whole file in flash. The response holds its place (0 slot A, 1 slot B, 2 FoGNet's) and its
+    /// checksum.
     pub fn finish<R: NorFlash, W: MappedSlots>(
         &mut self,
         device: &mut Device<R, W>,
@@ -117,7 +119,7 @@ impl Download {
         Ok(())
     }
 
-    /// Returns the digest of a file that was checked.
+    /// Returns the digest of the file, once the file has been checked.
     pub fn digest(&self) -> Option<&Digest> {
         self.digest.as_ref()
     }

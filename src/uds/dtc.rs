@@ -1,60 +1,60 @@
-//! The trouble memory holds the faults that the board has had, as a workshop reads them (ISO 14229-1 D.2).
+//! The trouble memory holds the faults that the board has had, for a workshop to read (ISO 14229-1 D.2).
 //!
-//! A fault is confirmed at once, because the pipeline has already waited as long as each needs; it stays in the memory
-//! until a tester clears it, also over a restart, so that one that comes and goes is found, too.
+//! A fault is confirmed at once, because the pipeline has already debounced it. The fault stays in the memory until a
+//! tester clears it, even after a restart, so that intermittent faults are found, too.
 //!
-//! | code | bytes | trouble | to look at |
+//! | code | bytes | trouble | check |
 //! |---|---|---|---|
 //! | C1A01-31 | 5A0131 | inertial sensor: no signal | supply and wires of the sensor, `imu` |
-//! | C1A01-2A | 5A012A | inertial sensor: readings stand still | the sensor |
-//! | C1A01-22 | 5A0122 | inertial sensor: saturated | its range, what it is screwed to |
+//! | C1A01-2A | 5A012A | inertial sensor: readings are stuck | the sensor |
+//! | C1A01-22 | 5A0122 | inertial sensor: saturated | its range, its mechanical mounting |
 //! | C1A01-62 | 5A0162 | inertial sensor: implausible, or its clock is off | mounting, `mounting` |
 //! | C1A01-49 | 5A0149 | inertial sensor: could not be set up | wires of SPI; `device info` has the register |
 //! | C1A01-38 | 5A0138 | inertial sensor: samples are missing | its wires, its output rate |
-//! | C1A02-44 | 5A0244 | stored data are damaged | `device log`; what is missing is stored again |
+//! | C1A02-44 | 5A0244 | stored data are damaged | `device log`; store the missing data again |
 //! | C1A02-46 | 5A0246 | no weights that can be used | `device weights` |
 //! | C1A03-47 | 5A0347 | the software crashed | `device info` has the reason |
 //! | C1A03-38 | 5A0338 | the processor's clock is not the crystal's | the crystal |
 //! | U1A01-88 | DA0188 | CAN: no bus, or frames were lost | wires, terminators, bit rate |
 //! | U1A01-49 | DA0149 | CAN: the controller does not start | the transceiver |
 //! | U1A02-87 | DA0287 | wheels: silent, or they contradict the gyro | wheel frames, radius, slip |
-//! | U1A03-81 | DA0381 | diagnosis: a request was refused for want of access | who has tried: data 0113 |
+//! | U1A03-81 | DA0381 | diagnosis: a request was refused: no access | the counters in data 0113 |
 
 use crate::health::{Faults, Status};
 use crate::service::Conditions;
-use crate::store::{MOST_TROUBLES, Snapshot, StoredTrouble, Troubles};
+use crate::store::{MAX_TROUBLES, Snapshot, StoredTrouble, Troubles};
 
-/// Bits of a trouble's status.
+/// The bits of a trouble's status.
 pub mod bit {
     /// The fault is present.
     pub const FAILED: u8 = 1;
-    /// It was present since the start.
+    /// The fault has been present since the start.
     pub const FAILED_THIS_CYCLE: u8 = 1 << 1;
-    /// It was present since the start, which is when an operation cycle begins.
+    /// The fault has been present in this operation cycle, which begins at the start.
     pub const PENDING: u8 = 1 << 2;
-    /// It is in the memory.
+    /// The fault is in the memory.
     pub const CONFIRMED: u8 = 1 << 3;
-    /// It has not been looked for since the memory was cleared.
+    /// The fault has not been tested since the memory was cleared.
     pub const UNTESTED_SINCE_CLEAR: u8 = 1 << 4;
-    /// It was present since the memory was cleared.
+    /// The fault has been present since the memory was cleared.
     pub const FAILED_SINCE_CLEAR: u8 = 1 << 5;
-    /// It has not been looked for since the start.
+    /// The fault has not been tested since the start.
     pub const UNTESTED_THIS_CYCLE: u8 = 1 << 6;
-    /// The bits that this server has.
+    /// Mask of the bits that this server supports.
     pub const AVAILABLE: u8 = 0x7F;
 }
 
-/// A trouble that can be in the memory.
+/// A trouble that the board can report.
 #[derive(Debug)]
 pub struct Trouble {
-    /// ISO 15031-6 code and failure type, three bytes.
+    /// Code (ISO 15031-6) and failure type, three bytes.
     pub code: u32,
     /// A short name.
     pub name: &'static str,
     cause: Cause,
 }
 
-/// Names the condition that a trouble stands for.
+/// The condition that causes a trouble.
 #[derive(Debug, Clone, Copy)]
 enum Cause {
     Status(Status),
@@ -82,10 +82,10 @@ impl Cause {
     }
 }
 
-/// All troubles, in the order of the documents.
+/// All troubles, in the order of the table in the module documentation.
 pub static TROUBLES: [Trouble; 14] = [
     trouble(0x5A01, 0x31, "inertial sensor: no signal", Cause::Status(Status::Silent)),
-    trouble(0x5A01, 0x2A, "inertial sensor: readings stand still", Cause::Status(Status::Stuck)),
+    trouble(0x5A01, 0x2A, "inertial sensor: readings are stuck", Cause::Status(Status::Stuck)),
     trouble(0x5A01, 0x22, "inertial sensor: saturated", Cause::Status(Status::Clipped)),
     trouble(
         0x5A01,
@@ -102,24 +102,24 @@ pub static TROUBLES: [Trouble; 14] = [
     trouble(0xDA01, 0x88, "CAN: no bus, or frames were lost", Cause::Fault(Faults::BUS)),
     trouble(0xDA01, 0x49, "CAN: the controller does not start", Cause::Can),
     trouble(0xDA02, 0x87, "wheels: silent, or they contradict the gyro", Cause::Fault(Faults::WHEELS)),
-    trouble(0xDA03, 0x81, "diagnosis: a request was refused for want of access", Cause::AccessRefused),
+    trouble(0xDA03, 0x81, "diagnosis: a request was refused: no access", Cause::AccessRefused),
 ];
 
-const _: () = assert!(TROUBLES.len() <= MOST_TROUBLES, "a record has room for all");
+const _: () = assert!(TROUBLES.len() <= MAX_TROUBLES, "the record has room for all troubles");
 
-/// Makes a trouble of a code (0x5A01 is C1A01, 0xDA01 is U1A01) and a failure type.
+/// Creates a trouble from a code (0x5A01 is C1A01, 0xDA01 is U1A01) and a failure type.
 const fn trouble(code: u16, failure: u8, name: &'static str, cause: Cause) -> Trouble {
     Trouble { code: (code as u32) << 8 | failure as u32, name, cause }
 }
 
-/// Holds the memory's record of one trouble.
+/// The entry of one trouble in the memory.
 #[derive(Debug, Clone, Copy)]
 pub struct Entry {
-    /// See [`bit`].
+    /// Status bits: see [`bit`].
     pub status: u8,
-    /// Times that it came, since the memory was cleared.
+    /// Number of times that the fault has appeared since the memory was cleared.
     pub occurrences: u8,
-    /// The state of the board when it came first.
+    /// State of the board when the fault first appeared.
     pub snapshot: Snapshot,
 }
 
@@ -135,24 +135,24 @@ impl From<&Conditions> for Snapshot {
     }
 }
 
-/// Holds an entry for each of [`TROUBLES`].
+/// The trouble memory: an entry for each of [`TROUBLES`].
 #[derive(Debug)]
 pub struct Memory {
     entries: [Entry; TROUBLES.len()],
-    /// A tester may stop the memory while it works on the vehicle.
+    /// Whether troubles are recorded; a tester may stop the recording.
     pub is_enabled: bool,
-    /// The confirmed troubles differ from those that are stored.
+    /// Whether the confirmed troubles differ from the stored ones.
     pub is_changed: bool,
 }
 
 impl Memory {
-    /// Makes an empty memory.
+    /// Creates an empty memory.
     #[must_use]
     pub const fn new() -> Self {
         Self { entries: [UNTESTED; TROUBLES.len()], is_enabled: true, is_changed: false }
     }
 
-    /// Notes the faults that are present now.
+    /// Records the faults that are present now.
     pub fn observe(&mut self, now: &Conditions) {
         if !self.is_enabled {
             return;
@@ -178,7 +178,7 @@ impl Memory {
         }
     }
 
-    /// Clears one trouble, or all for `0xFF_FFFF`. Returns whether there is such a one.
+    /// Clears one trouble, or all for `0xFF_FFFF`. Returns whether the code is known.
     pub fn clear(&mut self, code: u32) -> bool {
         let mut found = false;
         for (trouble, entry) in TROUBLES.iter().zip(&mut self.entries) {
@@ -191,7 +191,7 @@ impl Memory {
         found
     }
 
-    /// Takes over the troubles that were stored before the start; a code that this firmware does not have is left out.
+    /// Restores the troubles that were stored before the start; codes that this firmware does not have are ignored.
     pub fn restore(&mut self, stored: &Troubles) {
         for (trouble, entry) in TROUBLES.iter().zip(&mut self.entries) {
             let found = stored.confirmed.iter().find(|stored| stored.code == trouble.code);
@@ -202,13 +202,13 @@ impl Memory {
         }
     }
 
-    /// Returns the troubles that are to be stored.
+    /// Returns the confirmed troubles, which must be stored.
     #[must_use]
     pub fn confirmed(&self) -> Troubles {
         let mut troubles = Troubles::NONE;
         for (trouble, entry) in self.entries().filter(|(_, entry)| entry.status & bit::CONFIRMED != 0) {
             let Entry { occurrences, snapshot, .. } = *entry;
-            // There is room for all.
+            // Cannot fail: the record has room for all troubles.
             let _ = troubles.confirmed.push(StoredTrouble { code: trouble.code, occurrences, snapshot });
         }
         troubles

@@ -1,9 +1,10 @@
-//! ISO 15765-2 carries diagnostic messages of more than seven bytes in CAN frames, here with normal addressing.
+//! ISO 15765-2 (ISO-TP) carries diagnostic messages of more than seven bytes in CAN frames, here with normal
+//! addressing.
 //!
-//! [`Transport`] has one conversation at a time: it assembles a request, is given the response, and cuts it into
-//! frames at the pace that the tester asks for. It does no input or output and knows no clock; both come in as
-//! arguments. As receiver it grants [`BLOCK`] frames at a time, so that a queue of that length before it never
-//! overflows. Whatever breaks the order of a message ends it, is counted, and leaves room for the next one.
+//! [`Transport`] handles one exchange at a time: it assembles a request, receives the response from the caller, and
+//! splits it into frames at the pace that the tester requests. It does no I/O and has no clock; frames and the time
+//! are arguments. As receiver it grants [`BLOCK`] frames at a time, so that a queue of that length in front of it
+//! never overflows. A frame out of sequence ends the message and is counted; the next message can then begin.
 
 use super::signature::TRAILER;
 use crate::health::count;
@@ -11,55 +12,58 @@ use crate::service::message::BLOCK as DOWNLOAD_BLOCK;
 use crate::store::record::MAX_LEN;
 use heapless::Vec;
 
-/// Longest message, bytes: the longest record with its service, identifier, layout and trailer.
-pub const LONGEST: usize = 4 + MAX_LEN + TRAILER;
-const _: () =
-    assert!(LONGEST >= DOWNLOAD_BLOCK + 2, "a block of a download with its service and number fits");
-/// Frames that the tester may send before it waits for the next flow control.
+/// Longest message, bytes: the longest record with service, identifier, layout version and trailer.
+pub const MAX_MESSAGE: usize = 4 + MAX_LEN + TRAILER;
+const _: () = assert!(
+    MAX_MESSAGE >= DOWNLOAD_BLOCK + 2,
+    "a message has room for a block of a download, its service and its number"
+);
+/// Number of frames that the tester may send before it waits for the next flow control.
 pub const BLOCK: u8 = 8;
 /// Longest wait for the next frame of a message, or for a flow control, ms (N_Cr and N_Bs, ISO 15765-2 9.8).
 pub const TIMEOUT_MS: u32 = 1_000;
-/// Flow controls in a row that may ask us to wait (N_WFTmax).
-const MOST_WAITS: u8 = 10;
-/// Fills the rest of a frame (ISO 15765-2 10.4.2.1: fewest stuff bits).
+/// Largest number of successive flow controls with status "wait" (N_WFTmax).
+const MAX_WAITS: u8 = 10;
+/// Padding byte of short frames (ISO 15765-2 10.4.2.1: fewest stuff bits).
 const PADDING: u8 = 0xCC;
 
 /// The eight bytes of a frame.
 pub type Bytes = [u8; 8];
 
-/// Counts conversations that went wrong.
+/// The counters of failed transfers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TransportErrors {
-    /// Frames with a length, type or flow status that the standard does not have, or that nobody waited for.
+    /// Frames that were unexpected, or had an invalid length, type or flow status.
     pub unexpected: u32,
-    /// Messages with a frame missing or repeated.
+    /// Messages with a missing or repeated frame.
     pub sequence: u32,
-    /// Messages longer than [`LONGEST`], ours or the tester's.
+    /// Messages that were too long for us ([`MAX_MESSAGE`]) or for the tester.
     pub overflow: u32,
-    /// Messages whose next frame or flow control did not come in time.
+    /// Messages whose next frame or flow control did not arrive in time.
     pub timeout: u32,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     Idle,
-    /// Consecutive frames come, until a time.
+    /// Consecutive frames are due, the next one by `until`.
     Receiving {
         length: usize,
         sequence: u8,
         granted: u8,
         until: u32,
     },
-    /// The request is whole and waits for its response.
+    /// The request is complete and waits for its response.
     Received,
-    /// The flow control of the tester is due, by a time.
+    /// The flow control of the tester is due by `until`.
     Waiting {
         sent: usize,
         sequence: u8,
         until: u32,
         waits: u8,
     },
-    /// Consecutive frames go out, the next one not before a time; `left`: frames to the next flow control, 0 for all.
+    /// Consecutive frames are being sent, the next one not before `due`; `left` frames remain before the next flow
+    /// control, 0 means all.
     Sending {
         sent: usize,
         sequence: u8,
@@ -69,13 +73,13 @@ enum State {
     },
 }
 
-/// Holds one conversation with a tester.
+/// The transport layer of one exchange with a tester.
 #[derive(Debug)]
 pub struct Transport {
     state: State,
-    request: Vec<u8, LONGEST>,
-    response: Vec<u8, LONGEST>,
-    /// Goes out before anything else: a flow control, or an interim response.
+    request: Vec<u8, MAX_MESSAGE>,
+    response: Vec<u8, MAX_MESSAGE>,
+    /// Frame to send before any other: a flow control, or an interim response.
     urgent: Option<Bytes>,
     errors: TransportErrors,
 }
@@ -92,37 +96,37 @@ const WAIT: u8 = 0x31;
 const OVERFLOW: u8 = 0x32;
 
 impl Transport {
-    /// Makes an idle transport.
+    /// Creates an idle transport.
     #[must_use]
     pub const fn new() -> Self {
         let errors = TransportErrors { unexpected: 0, sequence: 0, overflow: 0, timeout: 0 };
         Self { state: State::Idle, request: Vec::new(), response: Vec::new(), urgent: None, errors }
     }
 
-    /// Returns the counts of conversations that went wrong.
+    /// Returns the counters of failed transfers.
     #[must_use]
     pub fn errors(&self) -> TransportErrors {
         self.errors
     }
 
-    /// Returns the request, once it is whole and until it is answered.
+    /// Returns the request once it is complete, until it is answered.
     #[must_use]
     pub fn request(&self) -> Option<&[u8]> {
         (self.state == State::Received).then_some(&*self.request)
     }
 
-    /// Returns whether no conversation is under way.
+    /// Returns whether no exchange is in progress.
     #[must_use]
     pub fn is_idle(&self) -> bool {
         self.state == State::Idle && self.urgent.is_none()
     }
 
-    /// Counts a frame that is not taken.
+    /// Counts a frame that was not accepted.
     pub fn refuse(&mut self) {
         count(&mut self.errors.unexpected, 1);
     }
 
-    /// Takes a frame's data at `now`, in milliseconds of a clock that wraps around.
+    /// Processes the data of a frame received at `now`, in milliseconds of a clock that wraps around.
     pub fn receive(&mut self, data: &[u8], now: u32) {
         match data {
             [head @ 0x00..=0x0F, rest @ ..] => self.single(*head, rest),
@@ -135,7 +139,7 @@ impl Transport {
 
     fn single(&mut self, head: u8, rest: &[u8]) {
         let length = usize::from(head);
-        let Some(bytes) = rest.get(..length).filter(|bytes| !bytes.is_empty() && self.takes_requests())
+        let Some(bytes) = rest.get(..length).filter(|bytes| !bytes.is_empty() && self.accepts_request())
         else {
             return count(&mut self.errors.unexpected, 1);
         };
@@ -147,9 +151,9 @@ impl Transport {
 
     fn first(&mut self, head: u8, low: u8, rest: &[u8], now: u32) {
         let length = usize::from(head & 0xF) << 8 | usize::from(low);
-        // Length 0 announces 32 bits of length: more than fits.
-        let fits = (8..=LONGEST).contains(&length);
-        if rest.len() != 6 || (1..8).contains(&length) || !self.takes_requests() {
+        // Length 0 means that a 32-bit length follows: longer than the buffer.
+        let fits = (8..=MAX_MESSAGE).contains(&length);
+        if rest.len() != 6 || (1..8).contains(&length) || !self.accepts_request() {
             return count(&mut self.errors.unexpected, 1);
         }
         self.state = State::Idle;
@@ -165,9 +169,9 @@ impl Transport {
         self.state = State::Receiving { length, sequence: 1, granted: BLOCK, until };
     }
 
-    /// Returns whether a new request may begin: one that comes takes the place of one that is not whole, and must wait
-    /// for the response to one that is.
-    fn takes_requests(&mut self) -> bool {
+    /// Returns whether a new request may begin. A new request replaces an incomplete one, but is refused while a
+    /// complete one waits for its response.
+    fn accepts_request(&mut self) -> bool {
         if matches!(self.state, State::Receiving { .. }) {
             count(&mut self.errors.sequence, 1);
             self.state = State::Idle;
@@ -209,7 +213,7 @@ impl Transport {
         };
         self.state = match status {
             CONTINUE => State::Sending { sent, sequence, left: block, gap_ms: gap_ms(gap), due: now },
-            WAIT if waits < MOST_WAITS => {
+            WAIT if waits < MAX_WAITS => {
                 State::Waiting { sent, sequence, until: now.wrapping_add(TIMEOUT_MS), waits: waits + 1 }
             }
             WAIT => {
@@ -227,7 +231,7 @@ impl Transport {
         };
     }
 
-    /// Ends a wait that has lasted too long.
+    /// Ends an exchange whose timeout has expired.
     pub fn expire(&mut self, now: u32) {
         if let State::Receiving { until, .. } | State::Waiting { until, .. } = self.state
             && now.wrapping_sub(until) as i32 >= 0
@@ -237,13 +241,13 @@ impl Transport {
         }
     }
 
-    /// Sends up to seven bytes now; the request stays and is still to be answered.
+    /// Sends up to seven bytes as an interim response; the request must still be answered.
     pub fn interim(&mut self, response: &[u8]) {
         self.urgent = Some(frame(&[response.len().min(7) as u8], response));
     }
 
-    /// Begins to send a message, as a tester does; the response comes as a request does. Returns whether it is not longer
-    /// than [`LONGEST`].
+    /// Begins to send a request, in the role of a tester; the response is then available as [`Self::request`].
+    /// Returns `false` if the message is longer than [`MAX_MESSAGE`].
     pub fn send(&mut self, message: &[u8]) -> bool {
         self.response.clear();
         let fits = self.response.extend_from_slice(message).is_ok();
@@ -253,9 +257,9 @@ impl Transport {
         fits
     }
 
-    /// Has `answer` write the response to the request, if there is one, and begins to send it; an empty one ends the
-    /// request without a response. Returns whether there was a request.
-    pub fn answer(&mut self, answer: impl FnOnce(&[u8], &mut Vec<u8, LONGEST>)) -> bool {
+    /// Calls `answer` to write the response to a complete request, and begins to send it. An empty response ends the
+    /// request without an answer. Returns whether there was a request.
+    pub fn answer(&mut self, answer: impl FnOnce(&[u8], &mut Vec<u8, MAX_MESSAGE>)) -> bool {
         if self.state != State::Received {
             return false;
         }
@@ -268,7 +272,7 @@ impl Transport {
         true
     }
 
-    /// Returns the next frame that is due, for the bus.
+    /// Returns the next frame to send, if one is due.
     pub fn next_frame(&mut self, now: u32) -> Option<Bytes> {
         if let Some(urgent) = self.urgent.take() {
             return Some(urgent);
@@ -304,20 +308,20 @@ impl Transport {
     }
 }
 
-/// Returns a flow control of this status: [`BLOCK`] frames, as fast as they come.
+/// Returns a flow control with this status, a block size of [`BLOCK`] and no separation time.
 const fn flow_control(status: u8) -> Bytes {
     [status, BLOCK, 0, PADDING, PADDING, PADDING, PADDING, PADDING]
 }
 
-/// Returns a frame with these bytes and padding.
+/// Returns a frame with these bytes, padded to eight.
 fn frame(head: &[u8], bytes: &[u8]) -> Bytes {
     let mut frame = [PADDING; 8];
     frame.iter_mut().zip(head.iter().chain(bytes)).for_each(|(place, byte)| *place = *byte);
     frame
 }
 
-/// Returns the separation time that a flow control asks for, rounded up to milliseconds; reserved values are the
-/// longest (ISO 15765-2 9.6.5.5).
+/// Returns the separation time in a flow control, rounded up to milliseconds; reserved codes mean the longest time
+/// (ISO 15765-2 9.6.5.5).
 fn gap_ms(code: u8) -> u32 {
     match code {
         0..=0x7F => u32::from(code),

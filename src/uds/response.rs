@@ -1,6 +1,7 @@
-//! Values are read from requests and written to responses by these, and refusals get the standard's codes (ISO 14229-1 A.1).
+//! These functions read values from requests, write values to responses, and map refusals to negative response codes
+//! (ISO 14229-1 A.1).
 
-use super::isotp::LONGEST;
+use super::isotp::MAX_MESSAGE;
 use crate::service::message::Refusal;
 use crate::store::StoreError;
 use crate::store::slots::SlotError;
@@ -9,20 +10,20 @@ use heapless::Vec;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// A response as it is written.
-pub(super) type Response = Vec<u8, LONGEST>;
+/// A response that is being written.
+pub(super) type Response = Vec<u8, MAX_MESSAGE>;
 
 /// Appends bytes to a response.
 pub(super) fn put(out: &mut Response, bytes: &[u8]) -> Result<(), Nrc> {
     out.extend_from_slice(bytes).map_err(|_| Nrc::ResponseTooLong)
 }
 
-/// Returns the bytes if there are `N`.
+/// Returns the bytes as an array if there are exactly `N`.
 pub(super) fn exactly<const N: usize>(bytes: &[u8]) -> Result<[u8; N], Nrc> {
     bytes.try_into().map_err(|_| Nrc::IncorrectMessageLengthOrInvalidFormat)
 }
 
-/// Decodes a value in postcard's encoding; no byte may be left.
+/// Decodes a value in postcard's encoding; trailing bytes are an error.
 pub(super) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Nrc> {
     match postcard::take_from_bytes(bytes) {
         Ok((value, [])) => Ok(value),
@@ -41,7 +42,7 @@ pub(super) fn put_record(out: &mut Response, record: &impl Serialize) -> Result<
     written.map(|_| ()).map_err(|_| Nrc::ResponseTooLong)
 }
 
-/// Returns the standard's code for a refusal.
+/// Returns the negative response code for a refusal.
 pub(super) fn nrc(refusal: Refusal) -> Nrc {
     match refusal {
         Refusal::Moving | Refusal::NothingFound => Nrc::ConditionsNotCorrect,

@@ -1,4 +1,5 @@
-//! Routines (service 0x31): calibrations, the log, a self-test, and the use of a download.
+//! This module runs the routines (service 0x31): calibrations, the log, a self-test, and the activation of a
+//! download.
 
 use super::download::Download;
 use super::response::{Nrc, Response, exactly, nrc, put, put_record};
@@ -11,17 +12,17 @@ use crate::service::{Device, MappedSlots};
 use automotive_diag::uds::RoutineControlType;
 use embedded_storage::nor_flash::NorFlash;
 
-/// Examines the parts of the board.
+/// Routine that tests the components of the board.
 const SELF_TEST: u16 = 0x0204;
-/// Forgets what the board has learnt about its sensor.
+/// Routine that erases what the board has learnt about its sensor.
 const FORGET: u16 = 0x0205;
-/// Reads the log.
+/// Routine that reads the log.
 const LOG: u16 = 0x0203;
-/// Has a download used.
+/// Routine that activates a download.
 const USE_DOWNLOAD: u16 = 0xFF01;
 
-/// Returns the parts of the board that fail, a bit each: 0 the processor's clock, 1 the CAN controller, 2 the inertial
-/// sensor's set-up, 3 stored data, 4 the weights, 5 the flash controller, 6 the random numbers.
+/// Returns a bit for each component that fails: 0 the processor's clock, 1 the CAN controller, 2 the inertial
+/// sensor's set-up, 3 stored data, 4 the weights, 5 the flash controller, 6 the random number generator.
 fn self_test<R: NorFlash, W: MappedSlots>(device: &Device<R, W>, has_random: bool) -> u8 {
     let now = device.conditions();
     let failures = [
@@ -37,7 +38,7 @@ fn self_test<R: NorFlash, W: MappedSlots>(device: &Device<R, W>, has_random: boo
 }
 
 impl Services {
-    /// Runs a routine; its number and, for a calibration, its state are the response.
+    /// Runs a routine. The response holds the identifier of the routine, then its result, if it has one.
     pub(super) fn routine<R: NorFlash, W: MappedSlots>(
         &mut self,
         sub: u8,
@@ -63,7 +64,7 @@ impl Services {
             _ => None,
         };
         if id == USE_DOWNLOAD && control == RoutineControlType::StartRoutine {
-            self.needs(Session::Programming)?;
+            self.require_session(Session::Programming)?;
             self.accept_download(option, device)?;
             return device.act(&Request::WeightsActivate).map(drop).map_err(nrc);
         }
@@ -101,7 +102,7 @@ impl Services {
         Ok(())
     }
 
-    /// Checks the signature of a download, where a key asks for one.
+    /// Checks the signature of a download, if the board has a key.
     fn accept_download<R: NorFlash, W: MappedSlots>(
         &self,
         trailer: &[u8],

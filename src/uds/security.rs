@@ -1,20 +1,21 @@
-//! Access by challenge and response (service 0x27), and signatures of what is written.
+//! This module controls access: challenge and response (service 0x27), and signatures of written data.
 //!
-//! Without a key everyone may write. With one, what is written is signed; whoever has the private part, and proves it once a
-//! session, may also restart, silence and calibrate the board, and clear its troubles. Wrong answers are stored before they are answered, so that a restart does not help to guess; from the third
-//! in a row on, each doubles a delay, which also runs after a restart.
-//! Refusals are counted (data 0113) and a trouble.
+//! Without a key everyone may write. With a key, written data must be signed. A tester that proves once per session
+//! that it has the private key may also restart, silence and calibrate the board, and clear its troubles. The number
+//! of wrong answers is stored before the response is sent, so a restart does not help an attacker to guess. From the
+//! third wrong answer in a row on, a delay follows each one and doubles each time; it also runs after a restart.
+//! Refusals are counted (data 0113) and reported as a trouble.
 //!
-//! | what | code |
+//! | refusal | code |
 //! |---|---|
 //! | no access in this session | 0x33 |
 //! | an answer without a challenge | 0x24 |
 //! | a wrong answer, a wrong signature, or one for another identifier, content or board | 0x35 |
 //! | the third wrong answer in a row, and each after it | 0x36 |
-//! | the delay runs | 0x37 |
+//! | the delay has not expired | 0x37 |
 //! | no trailer | 0x13 |
 //! | a counter that is not greater than that of the newest signature, or no public key | 0x31 |
-//! | no random numbers, the same again, or the vehicle may move | 0x22 |
+//! | no random numbers, a repeated random number, or the vehicle may move | 0x22 |
 
 use super::response::{Nrc, Response, exactly, nrc, put};
 use super::signature::{self, Digest, SEED, SERIAL, SIGNATURE, Statement, TRAILER};
@@ -23,23 +24,23 @@ use crate::service::{Device, MappedSlots};
 use crate::store::Access;
 use embedded_storage::nor_flash::NorFlash;
 
-/// A challenge.
+/// The random bytes of a challenge.
 pub type Seed = [u8; SEED];
 
-/// Wrong answers in a row without a delay.
-const FREE: u8 = 2;
-/// The first delay, ms; each wrong answer doubles it, up to 2^6 times.
+/// Number of successive wrong answers that cause no delay.
+const FREE_ATTEMPTS: u8 = 2;
+/// First delay, ms; each further wrong answer doubles it, at most to 2^6 times its length.
 const DELAY_MS: u32 = 10_000;
-const MOST_DOUBLED: u8 = 6;
+const MAX_DOUBLINGS: u8 = 6;
 
-/// The state of access in a session.
+/// The access state of a session.
 #[derive(Debug)]
 pub(super) struct Security {
     is_unlocked: bool,
     seed: Option<Seed>,
-    /// The newest challenge: one that comes twice is no random number.
+    /// Newest challenge; a repeated challenge shows that the random numbers have failed.
     newest: Seed,
-    /// The time of the last wrong answer, ms; before any, that of the start.
+    /// Time of the last wrong answer, or of the start, ms.
     wrong_at: u32,
 }
 
@@ -48,13 +49,13 @@ impl Security {
         Self { is_unlocked: false, seed: None, newest: [0; SEED], wrong_at: 0 }
     }
 
-    /// Ends the access: the session is over.
+    /// Ends the access, at the end of the session.
     pub fn end(&mut self) {
         self.is_unlocked = false;
         self.seed = None;
     }
 
-    /// Refuses what this session has no access to.
+    /// Refuses a request if the board has a key and this session is not unlocked.
     pub fn check<R: NorFlash, W: MappedSlots>(&self, device: &mut Device<R, W>) -> Result<(), Nrc> {
         match device.access() {
             Some(Access { key: None, .. }) => Ok(()),
@@ -63,7 +64,7 @@ impl Security {
         }
     }
 
-    /// Makes a challenge, or takes the answer to it.
+    /// Creates a challenge, or checks the answer to one.
     pub fn access<R: NorFlash, W: MappedSlots>(
         &mut self,
         sub: u8,
@@ -73,15 +74,15 @@ impl Security {
         out: &mut Response,
     ) -> Result<(), Nrc> {
         let access = device.access().ok_or(Nrc::SecurityAccessDenied)?;
-        let beyond = access.wrong.saturating_sub(FREE);
-        let delay = DELAY_MS << beyond.saturating_sub(1).min(MOST_DOUBLED);
+        let beyond = access.wrong.saturating_sub(FREE_ATTEMPTS);
+        let delay = DELAY_MS << beyond.saturating_sub(1).min(MAX_DOUBLINGS);
         if beyond > 0 && now.wrapping_sub(self.wrong_at) < delay {
             return Err(Nrc::RequiredTimeDelayNotExpired);
         }
         match sub {
             1 => {
                 let [] = exactly(answer)?;
-                // What is open has the challenge zero.
+                // The challenge is zero if no answer is needed.
                 let seed = match access.key {
                     Some(_) if !self.is_unlocked => {
                         let seed = entropy().filter(|seed| *seed != self.newest);
@@ -111,13 +112,14 @@ impl Security {
                 }
                 self.wrong_at = now;
                 device.refuse_request(Refusal::Answer);
-                Err(if wrong > FREE { Nrc::ExceedNumberOfAttempts } else { Nrc::InvalidKey })
+                Err(if wrong > FREE_ATTEMPTS { Nrc::ExceedNumberOfAttempts } else { Nrc::InvalidKey })
             }
             _ => Err(Nrc::SubFunctionNotSupported),
         }
     }
 
-    /// Stores a key where there is none, or one that is signed with that before; zeros remove it.
+    /// Stores a key. The caller has checked that the request is signed with the previous key, if there was one. Zeros
+    /// remove the key.
     pub fn write_key<R: NorFlash, W: MappedSlots>(
         &mut self,
         bytes: &[u8],
@@ -133,13 +135,14 @@ impl Security {
             return Err(Nrc::RequestOutOfRange);
         }
         device.store_access(Access { key, ..access }).map_err(nrc)?;
-        // Whoever has stored the first one goes on; a signature proves nothing of who carries it.
+        // The session that stores the first key stays unlocked. A signature does not prove that its sender has the
+        // private key.
         self.is_unlocked = key.is_some() && (self.is_unlocked || access.key.is_none());
         Ok(())
     }
 }
 
-/// Splits what is written under an identifier from its trailer, once that is right. Without a key there is none.
+/// Checks the trailer of written data, and returns the data without it. Without a key there is no trailer.
 pub(super) fn signed<'b, R: NorFlash, W: MappedSlots>(
     target: u16,
     bytes: &'b [u8],
@@ -155,7 +158,7 @@ pub(super) fn signed<'b, R: NorFlash, W: MappedSlots>(
     Ok(content)
 }
 
-/// Checks a trailer, and burns its counter: whatever happens next, it is never accepted again.
+/// Checks a trailer, and stores its counter, so that the same signature is never accepted again.
 #[inline(never)]
 pub(super) fn accept<R: NorFlash, W: MappedSlots>(
     target: u16,
@@ -186,8 +189,8 @@ pub(super) fn accept<R: NorFlash, W: MappedSlots>(
     device.store_access(Access { counter, ..access }).map_err(nrc)
 }
 
-/// Returns the state of access: 0 open, 1 locked, 2 unlocked; the newest counter; wrong answers in a row; the key's
-/// first four bytes.
+/// Appends the access state: 0 open, 1 locked, 2 unlocked; the newest counter; the number of successive wrong
+/// answers; the key's first four bytes.
 pub(super) fn state<R: NorFlash, W: MappedSlots>(
     security: &Security,
     device: &Device<R, W>,

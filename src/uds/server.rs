@@ -1,7 +1,7 @@
-//! The server passes requests from the transport to the services, and their responses back.
+//! The server passes requests from the transport to the services, and responses back.
 //!
-//! Before a request that may erase is executed, "response pending" goes out, because an erase stalls the processor for
-//! longer than a tester waits.
+//! Before the server executes a request that may erase flash, it sends "response pending", because an erase stalls
+//! the processor for longer than a tester waits.
 
 use super::isotp::{Bytes, Transport};
 use super::response::Nrc;
@@ -12,12 +12,12 @@ use crate::service::{Device, MappedSlots};
 use automotive_diag::uds::UdsCommand;
 use embedded_storage::nor_flash::NorFlash;
 
-/// Answers one tester.
+/// The diagnostic server for one tester at a time.
 #[derive(Debug)]
 pub struct Server {
     transport: Transport,
     services: Services,
-    /// "Response pending" has been sent for the request.
+    /// Whether "response pending" has been sent for the request.
     is_pending: bool,
 }
 
@@ -28,28 +28,28 @@ impl Default for Server {
 }
 
 impl Server {
-    /// Begins in the default session.
+    /// Creates a server in the default session.
     #[must_use]
     pub const fn new() -> Self {
         let services = Services::new();
         Self { transport: Transport::new(), services, is_pending: false }
     }
 
-    /// Takes the data of a frame to this server's own identifier.
+    /// Processes the data of a frame received on this server's own identifier.
     pub fn receive(&mut self, data: &[u8], now: u32) {
-        self.services.hear(now);
+        self.services.frame_received(now);
         self.transport.receive(data, now);
     }
 
-    /// Counts a frame of a tester that has to wait: another one is being served.
+    /// Counts a frame of a tester that is refused because another tester is being served.
     pub fn refuse(&mut self) {
         self.transport.refuse();
     }
 
-    /// Takes the data of a frame to all servers: one frame is the whole request. While another one is being answered
-    /// it only keeps the session.
+    /// Processes the data of a functional request, which is a single frame to all servers. While another request is
+    /// being answered, it only keeps the session alive.
     pub fn receive_functional(&mut self, data: &[u8], now: u32) {
-        self.services.hear(now);
+        self.services.frame_received(now);
         if self.transport.is_idle() && data.first().is_some_and(|head| *head < 0x10) {
             self.transport.receive(data, now);
             self.services.is_functional = self.transport.request().is_some();
@@ -58,7 +58,7 @@ impl Server {
         }
     }
 
-    /// Returns the next frame that is due, for the bus.
+    /// Returns the next frame to send, if one is due.
     pub fn next_frame(&mut self, now: u32) -> Option<Bytes> {
         self.transport.next_frame(now)
     }
@@ -75,15 +75,15 @@ impl Server {
         self.services.is_silenced
     }
 
-    /// Returns whether a tester has asked for a restart and has its response.
+    /// Returns whether a tester has requested a restart and its response has been sent.
     #[must_use]
     pub fn restart_is_due(&self) -> bool {
         self.services.is_restarting && self.is_idle()
     }
 
-    /// Notes present faults, ends what has timed out, and answers a request. `entropy` gives a challenge of random
-    /// numbers, or none.
-    pub fn turn<R: NorFlash, W: MappedSlots>(
+    /// Does the periodic work: records present faults, handles timeouts, and answers a complete request. `entropy`
+    /// returns a random challenge, or `None` without random numbers.
+    pub fn poll<R: NorFlash, W: MappedSlots>(
         &mut self,
         device: &mut Device<R, W>,
         counters: &AllCounters,
@@ -92,7 +92,7 @@ impl Server {
     ) {
         self.transport.expire(now);
         let services = &mut self.services;
-        services.remember(device);
+        services.update_troubles(device);
         services.expire(now);
         if let Some(request) = self.transport.request()
             && !self.is_pending
@@ -112,7 +112,7 @@ impl Server {
         if answered {
             self.is_pending = false;
             services.is_functional = false;
-            services.heard = now;
+            services.last_activity = now;
         }
     }
 }

@@ -1,7 +1,7 @@
-//! These are the services (ISO 14229-1) and the state between two requests.
+//! This module dispatches the services (ISO 14229-1) and holds the state between requests.
 //!
-//! They translate requests to those that the device knows, so that all lines refuse the same. A request that writes or
-//! silences the output needs a session other than the default one, and a vehicle that is proven to stand.
+//! Services translate UDS requests to requests of the device, so that the same rules apply on all lines. A request
+//! that writes data or silences the output needs a non-default session, and a vehicle that is proven to stand.
 
 use super::data::{self, Sources};
 use super::download::Download;
@@ -16,53 +16,53 @@ use crate::service::{Device, MappedSlots};
 use automotive_diag::uds::UdsCommand;
 use embedded_storage::nor_flash::NorFlash;
 
-/// Longest silence of a tester in a session other than the default one, ms (S3).
+/// Session timeout: longest silence of a tester in a non-default session, ms (S3).
 const SESSION_MS: u32 = 5_000;
-/// This bit of a sub-function suppresses the positive response.
+/// Bit of a sub-function that suppresses the positive response.
 const SUPPRESS: u8 = 0x80;
 
 /// First byte of a negative response.
 pub const NEGATIVE: u8 = 0x7F;
-/// Added to a service's number in a positive response.
+/// Offset from the service identifier of a request to that of a positive response.
 const POSITIVE: u8 = 0x40;
 
-/// The state between requests.
+/// The services and their state between requests.
 #[derive(Debug)]
 pub(super) struct Services {
     session: Session,
-    /// The time of the tester's last frame, ms.
-    pub heard: u32,
-    /// The request came for all servers.
+    /// Time of the tester's last frame, or of the last response, ms.
+    pub last_activity: u32,
+    /// Whether the request was addressed to all servers.
     pub is_functional: bool,
     pub(super) memory: Memory,
-    /// The memory has taken over what was stored before the start.
+    /// Whether the memory has been restored from flash.
     is_restored: bool,
-    /// The messages of the board are stopped.
+    /// Whether the messages of the board are stopped.
     pub is_silenced: bool,
-    /// A tester has asked for a restart.
+    /// Whether a tester has requested a restart.
     pub is_restarting: bool,
     pub(super) download: Option<Download>,
     pub(super) security: Security,
 }
 
-/// Holds what answers need beside the device.
+/// The inputs of a response apart from the device.
 pub(super) struct Surroundings<'a, E> {
     pub counters: &'a AllCounters,
     pub errors: TransportErrors,
-    /// "Response pending" has been sent.
+    /// Whether "response pending" has been sent.
     pub is_pending: bool,
     /// The time, ms.
     pub now: u32,
-    /// Gives a challenge that nobody can know before; `None` where there are no random numbers.
+    /// Source of an unpredictable challenge; it returns `None` if there are no random numbers.
     pub entropy: E,
 }
 
 impl Services {
-    /// Begins in the default session.
+    /// Creates the state in the default session.
     pub const fn new() -> Self {
         Self {
             session: Session::Default,
-            heard: 0,
+            last_activity: 0,
             is_functional: false,
             memory: Memory::new(),
             is_restored: false,
@@ -73,26 +73,26 @@ impl Services {
         }
     }
 
-    /// Ends a session in which the tester has been silent for too long.
+    /// Ends the session if the tester has been silent for longer than [`SESSION_MS`].
     pub fn expire(&mut self, now: u32) {
-        if self.session != Session::Default && now.wrapping_sub(self.heard) > SESSION_MS {
+        if self.session != Session::Default && now.wrapping_sub(self.last_activity) > SESSION_MS {
             self.enter(Session::Default);
         }
     }
 
-    /// Notes that the tester is there.
-    pub fn hear(&mut self, now: u32) {
+    /// Records that a frame of the tester was received.
+    pub fn frame_received(&mut self, now: u32) {
         self.expire(now);
-        self.heard = now;
+        self.last_activity = now;
     }
 
-    /// Notes present faults, and stores those that are new.
+    /// Records present faults, and stores new ones.
     #[inline(never)]
-    pub fn remember<R: NorFlash, W: MappedSlots>(&mut self, device: &mut Device<R, W>) {
+    pub fn update_troubles<R: NorFlash, W: MappedSlots>(&mut self, device: &mut Device<R, W>) {
         if !core::mem::replace(&mut self.is_restored, true) {
             self.memory.restore(device.troubles());
         }
-        device.store_what_was_learnt();
+        device.store_learned_if_due();
         self.memory.observe(&device.conditions());
         if self.memory.is_changed {
             let in_workshop = self.session != Session::Default;
@@ -110,7 +110,7 @@ impl Services {
         }
     }
 
-    /// Returns whether a request may erase the flash, or checks a whole file.
+    /// Returns whether a request takes long, because it may erase flash or checks a whole file.
     pub fn takes_long(&self, request: &[u8]) -> bool {
         self.session != Session::Default
             && matches!(
@@ -123,7 +123,7 @@ impl Services {
             || matches!(request, [0x36, ..]) && self.download.as_ref().is_some_and(Download::erases_next)
     }
 
-    /// Writes the response to a request; nothing where none is wanted.
+    /// Writes the response to a request; leaves `out` empty if no response is wanted.
     pub fn answer<R: NorFlash, W: MappedSlots>(
         &mut self,
         request: &[u8],
@@ -133,11 +133,11 @@ impl Services {
     ) {
         let Some((&service, rest)) = request.split_first() else { return };
         let is_pending = surroundings.is_pending;
-        // Room for a byte.
+        // Cannot fail: the response is empty.
         let _ = out.push(service.wrapping_add(POSITIVE));
         match self.serve(service, rest, device, surroundings, out) {
             Ok(true) => {}
-            // A tester that has read "response pending" waits for the response.
+            // After "response pending", a response must follow.
             Ok(false) if is_pending => {}
             Ok(false) => out.clear(),
             Err(nrc) => {
@@ -172,7 +172,7 @@ impl Services {
         if command != UdsCommand::ReadDataByIdentifier {
             device.forget_refusal();
         }
-        self.needs(session::needed(command, rest))?;
+        self.require_session(session::needed(command, rest))?;
         if !session::has_sub_function(command) {
             return self.serve_data(command, rest, device, surroundings, out).map(|()| true);
         }
@@ -245,13 +245,13 @@ impl Services {
         }
     }
 
-    /// Returns the download that has begun.
+    /// Returns the download in progress.
     fn under_way(&mut self) -> Result<&mut Download, Nrc> {
         self.download.as_mut().ok_or(Nrc::RequestSequenceError)
     }
 
-    /// Refuses what this session does not have.
-    pub(super) fn needs(&self, session: Session) -> Result<(), Nrc> {
+    /// Refuses a request that needs another session.
+    pub(super) fn require_session(&self, session: Session) -> Result<(), Nrc> {
         let has = session == Session::Default
             || self.session == session
             || (self.session, session) == (Session::Programming, Session::Extended);

@@ -1,8 +1,8 @@
-//! These tables say which session a service needs, and which services have sub-functions (ISO 14229-1).
+//! These functions define which session a service needs, and which services have sub-functions (ISO 14229-1).
 
 use automotive_diag::uds::UdsCommand;
 
-/// Begins a request for the log: start of routine 0203.
+/// First bytes of a request for the log: start of routine 0203.
 const READ_LOG: [u8; 3] = [1, 0x02, 0x03];
 
 /// A diagnostic session.
@@ -11,9 +11,9 @@ const READ_LOG: [u8; 3] = [1, 0x02, 0x03];
 pub enum Session {
     /// Data and troubles can be read.
     Default = 1,
-    /// Weights can be downloaded, too.
+    /// Weights can also be downloaded, and everything of [`Self::Extended`] is allowed.
     Programming = 2,
-    /// Settings can be written, and routines run.
+    /// Settings can also be written, and routines run.
     Extended = 3,
 }
 
@@ -34,7 +34,7 @@ pub(super) fn needed(command: UdsCommand, rest: &[u8]) -> Session {
     }
 }
 
-/// Returns whether a service has sub-functions: the first byte of its request and of its response.
+/// Returns whether a service has a sub-function, the first byte of its request and of its response.
 pub(super) fn has_sub_function(command: UdsCommand) -> bool {
     matches!(
         command,

@@ -1,8 +1,8 @@
-//! Settings as single data identifiers, for testers without the records of this library.
+//! This module makes each setting a data identifier, for testers that cannot decode the records of this library.
 //!
-//! Numbers are big-endian, real ones of IEEE 754; where a setting can be left out, "not a number" leaves it out. Structures
-//! are in postcard's encoding. What is written goes into the stored configuration, is checked with all of it, and is
-//! used from the next start on; what is read is what that start will use. `tools/README.md` has units and ranges.
+//! Numbers are big-endian, real ones in IEEE 754; NaN means that an optional setting is absent. Structures are in
+//! postcard's encoding. A write changes the stored configuration, which is checked as a whole and used from the next
+//! start on. A read returns the value for the next start. `tools/README.md` has units and ranges.
 
 use super::response::{Nrc, Response, decode, exactly, nrc, put, put_record};
 use crate::can::config::{BoschSettings, E2e, Vdc2Settings};
@@ -16,11 +16,11 @@ use crate::store::{Configuration, FogPart, ImuPart, Record};
 use crate::units::AngularRate;
 use embedded_storage::nor_flash::NorFlash;
 
-/// A value in the bytes of its data identifier.
+/// A setting, encoded as the value of its data identifier.
 trait Setting {
-    /// Appends it.
+    /// Appends the encoded value.
     fn put(&self, out: &mut Response) -> Result<(), Nrc>;
-    /// Replaces it.
+    /// Replaces the value by a decoded one.
     fn replace(&mut self, bytes: &[u8]) -> Result<(), Nrc>;
 }
 
@@ -86,7 +86,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
     put_setting(id, &mut { *device.next_configuration() }, out)
 }
 
-/// Stores the configuration with another value of a setting.
+/// Stores the configuration with a new value of one setting.
 #[inline(never)]
 pub(super) fn write<R: NorFlash, W: MappedSlots>(
     id: u16,
@@ -99,7 +99,7 @@ pub(super) fn write<R: NorFlash, W: MappedSlots>(
     device.act(&Request::SetConfiguration { version, configuration: &configuration }).map_err(nrc)
 }
 
-/// Has numbers of `to_be_bytes` and `from_be_bytes` as settings.
+/// Implements [`Setting`] for numbers with `to_be_bytes` and `from_be_bytes`.
 macro_rules! numbers {
     ($($type:ty),*) => {$(
         impl Setting for $type {
@@ -117,7 +117,8 @@ macro_rules! numbers {
 
 numbers!(f32, u32, u16);
 
-/// Has structures as settings, in postcard's encoding; of what has no content this is one byte, the number of the variant.
+/// Implements [`Setting`] for structures and enums, in postcard's encoding; a variant without content is one byte,
+/// its index.
 macro_rules! records {
     ($($type:ty),*) => {$(
         impl Setting for $type {
@@ -169,7 +170,7 @@ impl Setting for Option<f32> {
     }
 }
 
-/// Rates are in rad/s.
+/// A rate is encoded as f32 in rad/s.
 impl Setting for AngularRate {
     fn put(&self, out: &mut Response) -> Result<(), Nrc> {
         (self.rad_per_sec() as f32).put(out)
@@ -182,8 +183,8 @@ impl Setting for AngularRate {
     }
 }
 
-/// All at once, because no identifier may be there twice: a byte that is 1 for 29 bits, then requests, requests to all,
-/// and responses.
+/// The three identifiers are one setting, because they must differ: a byte that is 1 for 29 bits, then the
+/// identifiers of requests, functional requests, and responses.
 impl Setting for DiagnosisIds {
     fn put(&self, out: &mut Response) -> Result<(), Nrc> {
         put(out, &[u8::from(self.extended)])?;

@@ -1,32 +1,32 @@
-//! A signature says who has written something, for which identifier and board, and when (Ed25519, RFC 8032).
+//! A signature authenticates written data, for one data identifier, board and counter value (Ed25519, RFC 8032).
 //!
-//! Behind what is written stands a trailer of 69 bytes: 0 for this board alone or 1 for any board, a counter (4 bytes),
-//! and the signature (64 bytes). What is signed is made by [`message`]: text of its own, so that no answer to a
-//! challenge passes for a signature; the identifier that is written, or the routine that uses a download; the serial
-//! number of the board, or zeros; the counter; the length of the content and its SHA-512.
+//! Written data are followed by a trailer of 69 bytes: 0 for this board alone or 1 for any board, a counter (4
+//! bytes), and the signature (64 bytes). The signed bytes are those of [`message`]: a fixed text, so that no answer
+//! to a challenge is accepted as a signature; the identifier that is written, or the routine that activates a
+//! download; the serial number of the board, or zeros; the counter; the length of the content and its SHA-512.
 
 use crate::store::access::KEY;
 use salty::{CompressedY, EdwardsPoint, Scalar};
 use sha2::{Digest as _, Sha512};
 
-/// Bytes of a serial number.
+/// Length of a serial number, bytes.
 pub const SERIAL: usize = 12;
-/// Bytes of a signature.
+/// Length of a signature, bytes.
 pub const SIGNATURE: usize = 64;
-/// Bytes of a trailer.
+/// Length of a trailer, bytes.
 pub const TRAILER: usize = 1 + 4 + SIGNATURE;
-/// Bytes of a challenge.
+/// Length of a challenge, bytes.
 pub const SEED: usize = 32;
-/// Bytes of a digest.
+/// Length of a SHA-512 hash, bytes.
 const DIGEST: usize = 64;
 
 const CONTENT: [u8; 17] = *b"gyronet content 1";
 const ACCESS: [u8; 16] = *b"gyronet access 1";
-/// Bytes that are signed for a content, and for a challenge.
+/// Length of the message that is signed for a content, and for a challenge, bytes.
 const CONTENT_MESSAGE: usize = CONTENT.len() + 2 + SERIAL + 4 + 4 + DIGEST;
 const ACCESS_MESSAGE: usize = ACCESS.len() + SERIAL + SEED;
 
-/// Hashes a content as it comes.
+/// The hash of a content that arrives in parts.
 pub struct Hasher {
     hash: Sha512,
     length: u32,
@@ -52,20 +52,20 @@ impl core::fmt::Debug for Hasher {
 }
 
 impl Hasher {
-    /// Begins with nothing.
+    /// Creates the hash of an empty content.
     #[must_use]
     pub fn new() -> Self {
         Self { hash: Sha512::new(), length: 0 }
     }
 
-    /// Takes bytes that follow.
+    /// Adds the next bytes of the content.
     #[inline(never)]
     pub fn update(&mut self, bytes: &[u8]) {
         self.hash.update(bytes);
         self.length = self.length.wrapping_add(bytes.len() as u32);
     }
 
-    /// Returns the digest of all bytes, and begins again.
+    /// Returns the digest of all bytes, and resets the hash.
     #[inline(never)]
     pub fn finish(&mut self) -> Digest {
         let Self { hash, length } = core::mem::take(self);
@@ -82,14 +82,14 @@ pub fn digest(content: &[u8]) -> Digest {
     hasher.finish()
 }
 
-/// The statement that a signature is for.
+/// The scope of a signature: identifier, board and counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Statement {
-    /// The data identifier that is written, or the routine that uses a download.
+    /// Data identifier that is written, or routine that activates a download.
     pub target: u16,
-    /// The serial number of the board; zeros for any.
+    /// Serial number of the board; zeros for any board.
     pub serial: [u8; SERIAL],
-    /// Greater than that of any signature before.
+    /// Counter, greater than that of any earlier signature.
     pub counter: u32,
 }
 
@@ -106,7 +106,7 @@ pub fn message(statement: &Statement, digest: &Digest) -> [u8; CONTENT_MESSAGE] 
     ])
 }
 
-/// Returns the bytes that are signed for a challenge of a board.
+/// Returns the bytes that are signed to answer a challenge of a board.
 #[must_use]
 pub fn challenge(serial: &[u8; SERIAL], seed: &[u8; SEED]) -> [u8; ACCESS_MESSAGE] {
     joined([&ACCESS, serial, seed])
@@ -118,9 +118,9 @@ fn joined<const N: usize, const PARTS: usize>(parts: [&[u8]; PARTS]) -> [u8; N] 
     message
 }
 
-/// Returns whether a signature of a message was made with the private part of a key (RFC 8032 5.1.7, without the
-/// cofactor; S is below the group's order, so a signature has one form). Everything here is public, so it need not take
-/// the same time for all.
+/// Returns whether a signature of a message is valid for a public key (RFC 8032 5.1.7, without the cofactor). S must
+/// be below the group's order, so that a signature is not malleable. All inputs are public, so the function need not
+/// run in constant time.
 #[must_use]
 #[inline(never)]
 pub fn is_valid(key: &[u8; KEY], message: &[u8], signature: &[u8; SIGNATURE]) -> bool {
@@ -137,7 +137,8 @@ pub fn is_valid(key: &[u8; KEY], message: &[u8], signature: &[u8; SIGNATURE]) ->
     sum_of_products(s, k.as_bytes(), &-&point) == *r
 }
 
-/// Returns s B + k P, encoded, with B the base point: one pass over the bits of both from the highest down.
+/// Returns s B + k P, encoded, with B the base point, in one pass over the bits of both scalars from the highest
+/// down.
 #[inline(never)]
 fn sum_of_products(s: &[u8; 32], k: &[u8; 32], point: &EdwardsPoint) -> [u8; 32] {
     let base = EdwardsPoint::basepoint();
@@ -157,8 +158,8 @@ fn sum_of_products(s: &[u8; 32], k: &[u8; 32], point: &EdwardsPoint) -> [u8; 32]
     sum.compressed().0
 }
 
-/// Returns whether bytes are a public key: a point of the curve, and not one of the eight of low order, for which anyone
-/// can sign.
+/// Returns whether bytes are a public key: a point of the curve that is not one of the eight of low order, for which
+/// anyone can sign.
 #[must_use]
 #[inline(never)]
 pub fn is_key(key: &[u8; KEY]) -> bool {

@@ -1,10 +1,10 @@
-//! Service 0x19 reports the memory of troubles (ISO 14229-1 11.3).
+//! Service 0x19 reports the trouble memory (ISO 14229-1 11.3).
 
-use super::dtc::{Memory, bit};
+use super::dtc::{Entry, Memory, bit};
 use super::response::{Nrc, Response, exactly, put};
 use automotive_diag::uds::DtcSubFunction;
 
-/// Appends what a sub-function reports.
+/// Appends the report of a sub-function.
 pub(super) fn read(memory: &Memory, sub: u8, rest: &[u8], out: &mut Response) -> Result<(), Nrc> {
     let code = |code: u32| {
         let [_, a, b, c] = code.to_be_bytes();
@@ -31,11 +31,7 @@ pub(super) fn read(memory: &Memory, sub: u8, rest: &[u8], out: &mut Response) ->
             Ok(())
         }
         Some(DtcSubFunction::ReportDtcSnapshotRecordByDtcNumber) => {
-            let [a, b, c, record] = exactly(rest)?;
-            let wanted = u32::from_be_bytes([0, a, b, c]);
-            let known = memory.entries().find(|(trouble, _)| trouble.code == wanted);
-            let (_, entry) = known.filter(|_| matches!(record, 1 | 0xFF)).ok_or(Nrc::RequestOutOfRange)?;
-            put(out, &[a, b, c, entry.status])?;
+            let entry = put_entry(memory, rest, out)?;
             if entry.status & bit::CONFIRMED == 0 {
                 return Ok(());
             }
@@ -44,12 +40,19 @@ pub(super) fn read(memory: &Memory, sub: u8, rest: &[u8], out: &mut Response) ->
             put(out, &entry.snapshot.tick.to_be_bytes())
         }
         Some(DtcSubFunction::ReportDtcExtendedDataRecordByDtcNumber) => {
-            let [a, b, c, record] = exactly(rest)?;
-            let wanted = u32::from_be_bytes([0, a, b, c]);
-            let known = memory.entries().find(|(trouble, _)| trouble.code == wanted);
-            let (_, entry) = known.filter(|_| matches!(record, 1 | 0xFF)).ok_or(Nrc::RequestOutOfRange)?;
-            put(out, &[a, b, c, entry.status, 1, entry.occurrences])
+            let entry = put_entry(memory, rest, out)?;
+            put(out, &[1, entry.occurrences])
         }
         _ => Err(Nrc::SubFunctionNotSupported),
     }
+}
+
+/// Appends code and status of the trouble that a request names, with record number 1 or all; returns its entry.
+fn put_entry<'m>(memory: &'m Memory, rest: &[u8], out: &mut Response) -> Result<&'m Entry, Nrc> {
+    let [a, b, c, record] = exactly(rest)?;
+    let code = u32::from_be_bytes([0, a, b, c]);
+    let known = memory.entries().find(|(trouble, _)| trouble.code == code);
+    let (_, entry) = known.filter(|_| matches!(record, 1 | 0xFF)).ok_or(Nrc::RequestOutOfRange)?;
+    put(out, &[a, b, c, entry.status])?;
+    Ok(entry)
 }

@@ -2,6 +2,8 @@
 
 import unittest
 
+from virtual_board.memory import FLASH_KIB, Memory
+
 from .fake_board import FakeBoard
 
 
@@ -58,7 +60,7 @@ class Gpio(unittest.TestCase):
 
     def test_identity(self):
         self.assertEqual(self.board.read("DBGMCU", 0) & 0xFFF, 0x413)
-        self.assertEqual(self.board.read("SIGNATURE", 0x22, 2), 1024)
+        self.assertEqual(Memory(0).read(FLASH_KIB, 2), (1024).to_bytes(2, "little"))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Serves a board over standard input and output: a JSON object a line, answered by a JSON object a line.
+"""Serves a board over standard input and output: one JSON object per line, answered by one JSON object per line.
 
 Time passes only during the command `run`, so a test and the board are in lockstep.
 """

@@ -1,8 +1,8 @@
 """The board: memories, core, peripherals and time.
 
-Time is an integer number of picoseconds since power-on. It advances by the instructions that ran, by exceptions, and in
-jumps where the core does nothing: asleep, stalled by the flash, locked up, or without power. One instruction is taken as
-`CLOCKS_PER_INSTRUCTION` core clocks, a choice of the model: it knows neither wait states nor the pipeline.
+Time is an integer number of picoseconds since power-on. It advances with executed instructions, with exceptions, and in jumps
+while the core does nothing: asleep, stalled by the flash, locked up, or without power. An instruction is assumed to take
+`CLOCKS_PER_INSTRUCTION` core clocks, a simplification: the model has neither wait states nor a pipeline.
 """
 
 from unicorn.unicorn_const import UC_MEM_FETCH as FETCH
@@ -25,14 +25,14 @@ from .violation import Violation
 CLOCKS_PER_INSTRUCTION = 1.3
 #: Instructions of the shortest slice while an interrupt waits for PRIMASK or BASEPRI.
 MASKED_SLICE = 32
-#: Longest slice, so that other work of this process gets its turn.
+#: Longest slice, so that other work of this process can run.
 LONGEST_SLICE = 1 << 22
 #: A bit of SCR.
 SLEEPDEEP = 4
 
 
 class Board:
-    """A virtual STM32F405 with its surroundings."""
+    """A virtual STM32F405 with its environment."""
 
     def __init__(self, elf=None, create=lambda board: [], seed: int = 1):
         self.elf = elf
@@ -42,10 +42,10 @@ class Board:
         self.bus = Bus(self)
         self._now = 0
         self._base = 0
-        #: Whether instructions run at present.
+        #: Whether instructions are running now.
         self.in_slice = False
         self._reset_cause: str | None = None
-        #: Whether the current slice only has to come to its end: power, reset or a violation came.
+        #: Whether the current slice must end: the power failed, or a reset or a violation occurred.
         self.halted = True
         self.violation: Violation | None = None
         self.powered = False
@@ -56,7 +56,7 @@ class Board:
         self.slept = 0
         self.slices = 0
         self._masked = 0
-        #: Is called with every record, and with `None` after every scheduled call; its truth ends the run.
+        #: Called with every record, and with `None` after every scheduled call; a true result ends the run.
         self.watcher = None
         self._stop = False
         self.processor = Processor(self)
@@ -80,7 +80,7 @@ class Board:
 
     @property
     def now(self) -> int:
-        """Board time in picoseconds; within a slice that of the current instruction."""
+        """Returns the board time in picoseconds; within a slice, that of the current instruction."""
         if self.in_slice:
             return self._now + max(self.processor.executed.value - 1 - self._base, 0) * self._instruction_ps
         return self._now
@@ -94,7 +94,7 @@ class Board:
         return handle
 
     def spend(self, cost: tuple[int, int]) -> None:
-        """Lets time pass without an instruction: picoseconds, and the instructions that would have run."""
+        """Lets time pass without an instruction: picoseconds, and the number of instructions that would have run."""
         self._now += cost[0]
         if self.in_slice:
             limit = self.processor.limit
@@ -129,7 +129,7 @@ class Board:
         self._stop = True
         self.processor.end_slice()
 
-    # What peripherals ask of the core.
+    # Interface for the peripherals.
 
     def irq(self, number: int, level: bool) -> None:
         """Drives an interrupt line."""
@@ -140,7 +140,7 @@ class Board:
         self.nvic.pend(NMI)
 
     def interrupt_raised(self) -> None:
-        """Ends the slice where an exception may be due. One that the running handler keeps waiting is looked at with its return."""
+        """Ends the slice if an exception is due. One that the running handler blocks is checked when the handler returns."""
         if self.in_slice and self.nvic.preempting() is not None:
             self.processor.end_slice()
 
@@ -151,7 +151,7 @@ class Board:
         self.processor.end_slice()
 
     def stall(self, until_ps: int) -> None:
-        """Lets the core do nothing until a board time."""
+        """Stalls the core until a board time."""
         self.stalled_until = max(self.stalled_until, until_ps)
         self.processor.end_slice()
 
@@ -171,7 +171,7 @@ class Board:
         """Names the function that holds an address."""
         return self.elf.symbol_at(address & ~1) if self.elf else None
 
-    # What the core reports to the board.
+    # Interface for the core.
 
     def violate(self, violation: Violation) -> None:
         """Stops the run with a violation, with time and place added."""
@@ -184,7 +184,7 @@ class Board:
         self.processor.end_slice()
 
     def lock_up(self, why: str) -> None:
-        """Stands the core still until a reset; peripherals go on (DDI0403 B1.5.15)."""
+        """Stops the core until a reset; peripherals keep running (DDI0403 B1.5.15)."""
         self.locked_up = True
         pc = self.processor.get("pc")
         self.record("lockup", why=why, pc=pc, symbol=self.symbol_at(pc))
@@ -211,7 +211,7 @@ class Board:
             self._reset("por")
 
     def power_off(self) -> None:
-        """Removes power. Flash keeps its contents; what was scheduled does not happen."""
+        """Removes power. Flash keeps its contents; scheduled events are cancelled."""
         if self.powered:
             self.processor.end_slice()
             for peripheral in self.peripherals.values():
@@ -241,7 +241,7 @@ class Board:
     # The run.
 
     def run(self, until: int) -> None:
-        """Runs until a board time, or until `stop` is called. Raises a violation."""
+        """Runs until a board time, or until `stop` is called. Raises a pending violation."""
         self._stop = bool(self.watcher and self.watcher(None))
         events, nvic, dispatch = self.events, self.nvic, self.exceptions.dispatch
         while self._now < until:
@@ -290,7 +290,7 @@ class Board:
                 self._stop = True
 
     def _wakes(self) -> bool:
-        """Says whether a pending exception ends the sleep: PRIMASK does not hold it back (DDI0403 B1.5.17)."""
+        """Returns whether a pending exception ends the sleep, regardless of PRIMASK (DDI0403 B1.5.17)."""
         highest = self.nvic.highest_pending()
         if highest is None:
             return False
@@ -302,7 +302,7 @@ class Board:
         if self.nvic.preempting() is None:
             self._masked = 0
             return count
-        # PRIMASK or BASEPRI holds it back. They are looked at after a slice, which may be a quarter of the wait so far.
+        # PRIMASK or BASEPRI blocks it. They are checked again after a slice, which may be a quarter of the wait so far.
         length = max(MASKED_SLICE, self._masked // 4)
         self._masked += length
         return min(count, length)

@@ -1,7 +1,7 @@
-"""The bus: which register block an address belongs to, and what is refused.
+"""The bus: routes an access to the register block of its address, or refuses the access.
 
-A peripheral whose clock is off does not answer (RM0090 section 7.3), an address without a modelled register cannot be
-answered, and the bit-band aliases are not modelled: each is a violation.
+A peripheral whose clock is off does not answer (RM0090 section 7.3), an address without a modelled register cannot be answered,
+and the bit-band aliases are not modelled: each such access is a violation.
 """
 
 from .violation import Violation
@@ -20,7 +20,7 @@ class Fixed:
         return self.actlr if offset >= 4 else 2
 
     def write(self, offset: int, value: int, size: int) -> None:
-        """Writes ACTLR, whose bits change timing alone."""
+        """Writes ACTLR, whose bits only change timing."""
         if offset < 4:
             raise Violation("ICTR is read-only")
         self.actlr = value
@@ -35,7 +35,7 @@ class Bus:
         self.private: dict[int, object] = {}
         #: Names of peripherals whose accesses go to the event log.
         self.traced: set[str] = set()
-        #: Name of the peripheral whose accesses are counted, the count that is left, and what happens then.
+        #: Name of the peripheral whose accesses are counted, the number of accesses left, and the callback for the last one.
         self.counted: str | None = None
         self.left = 0
         self.on_count = None
@@ -114,11 +114,11 @@ class Bus:
             self.on_count()
 
     def count(self, name: str, accesses: int, callback) -> None:
-        """Calls back after so many accesses to a peripheral. Writes to the flash array count for FLASH."""
+        """Calls back after this many accesses to a peripheral. Writes to the flash array count for FLASH."""
         self.counted, self.left, self.on_count = name, accesses, callback
 
     def write_memory(self, address: int, value: int, size: int) -> None:
-        """Hands a write to the flash array to the flash controller."""
+        """Passes a write to the flash array to the flash controller."""
         if self.board.halted:
             return
         self.board.flash.program(address, value, size)

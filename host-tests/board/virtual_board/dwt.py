@@ -1,7 +1,7 @@
 """The cycle counter and the debug registers that software may read (DDI0403 C1.6 and C1.8).
 
-CYCCNT counts core clocks while DEMCR.TRCENA and DWT_CTRL.CYCCNTENA are set, and stands still while the core sleeps
-(FCLK goes on, but the STM32F405 gates HCLK in sleep; RM0090 section 5.3.2 leaves the counter open). No debugger is attached.
+CYCCNT counts core clocks while DEMCR.TRCENA and DWT_CTRL.CYCCNTENA are set, and stops while the core sleeps (FCLK runs on, but
+the STM32F405 gates HCLK in sleep; RM0090 section 5.3.2 does not mention the counter). No debugger is attached.
 """
 
 from .violation import Violation
@@ -33,13 +33,13 @@ class Dwt:
         return self.trace and bool(self.control & CYCCNTENA)
 
     def hold(self) -> None:
-        """Stores the count, so that a change of the clock or a sleep counts from here."""
+        """Stores the count, so that counting continues from here after a change of the clock or a sleep."""
         self.count = self.current()
         self.start = self.board.now
         self.hz = self.board.rcc.core_hz
 
     def skip(self, duration: int) -> None:
-        """Leaves a stretch of sleep out of the count."""
+        """Excludes a period of sleep from the count."""
         self.start += duration
 
     def current(self) -> int:
@@ -58,7 +58,7 @@ class Dwt:
         raise Violation(f"DWT: {size}-byte read at offset 0x{offset:X} is not modelled")
 
     def write(self, offset: int, value: int, size: int) -> None:
-        """Writes CTRL (CYCCNTENA alone) or CYCCNT."""
+        """Writes CTRL (only CYCCNTENA) or CYCCNT."""
         self.hold()
         if size == 4 and offset == 0 and not value & 0x0FFF_FFFE:
             self.control = value & CYCCNTENA
@@ -80,7 +80,7 @@ class CoreDebug:
         self.demcr = 0
 
     def power_on(self) -> None:
-        """Clears DEMCR, which only a power-on reset does."""
+        """Clears DEMCR, which only a power-on reset clears."""
         self.demcr = 0
 
     def read(self, offset: int, size: int) -> int:

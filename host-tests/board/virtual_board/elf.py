@@ -1,4 +1,4 @@
-"""Reads what the board needs of an ELF file: the loadable segments and the symbols (32-bit, little-endian, ARM)."""
+"""Reads the parts of an ELF file that the board needs: the loadable segments and the symbols (32-bit, little-endian, ARM)."""
 
 import bisect
 import struct
@@ -64,8 +64,8 @@ class Elf:
     def find(self, name: str) -> tuple[int, int]:
         """Returns address and size of a symbol.
 
-        The name is the full one, or a part of it that occurs in one symbol only; a path such as `crash::handler` fits
-        Rust's mangled names, where each part follows its length.
+        The name is the full one, or a part that occurs in only one symbol. A path such as `crash::handler` matches Rust's
+        mangled names, in which each part follows its length.
         """
         if name in self.symbols:
             return self.symbols[name]
@@ -77,7 +77,7 @@ class Elf:
 
 
 def readable(name: str) -> str:
-    """Takes the path out of a name that Rust has mangled the old way: `_ZN4core3fmt5write17h0123456789abcdefE`."""
+    """Extracts the path from a name in Rust's legacy mangling: `_ZN4core3fmt5write17h0123456789abcdefE`."""
     if not (name.startswith("_ZN") and name.endswith("E")):
         return name
     parts, rest = [], name[3:-1]

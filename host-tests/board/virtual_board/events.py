@@ -1,6 +1,6 @@
-"""The queue of what happens at a known board time.
+"""The queue of calls that are scheduled for a known board time.
 
-Times are integer picoseconds. Events of one time run in the order in which they were scheduled.
+Times are integer picoseconds. Calls with the same time run in the order in which they were scheduled.
 """
 
 from heapq import heappop, heappush
@@ -15,7 +15,7 @@ class Handle:
         self.callback = callback
 
     def cancel(self) -> None:
-        """Takes the call out of the queue. Nothing happens when it has run."""
+        """Removes the call from the queue. Has no effect after the call has run."""
         self.callback = None
 
 
@@ -42,7 +42,7 @@ class EventQueue:
         return heap[0][0] if heap else None
 
     def pop_due(self, now: int):
-        """Takes out the earliest call that is due and returns it, or `None`."""
+        """Removes the earliest call that is due and returns it, or `None`."""
         heap = self.heap
         while heap and heap[0][0] <= now:
             handle = heappop(heap)[2]
@@ -53,7 +53,7 @@ class EventQueue:
         return None
 
     def clear(self) -> None:
-        """Cancels everything."""
+        """Cancels all calls."""
         for _, _, handle in self.heap:
             handle.callback = None
         self.heap = []

@@ -1,8 +1,8 @@
 """Exception entry and return (DDI0403 B1.5.6 to B1.5.8) and faults (B1.5.14, B1.5.15).
 
-An entry stores the frame at once, with the FPU's registers when CONTROL.FPCA is set; the chip stores these lazily. A
-program sees the difference only in the time and in FPCCR.LSPACT. Tail-chaining is a return followed by an entry before
-any instruction runs.
+An entry stores the frame at once, with the FPU's registers if CONTROL.FPCA is set; the chip stores those lazily. A program sees
+the difference only in the timing and in FPCCR.LSPACT. Tail-chaining is a return followed by an entry before any instruction
+runs.
 """
 
 import struct
@@ -17,17 +17,17 @@ IBUSERR, PRECISERR, UNSTKERR, STKERR, BFARVALID = 1 << 8, 1 << 9, 1 << 11, 1 << 
 UNDEFINSTR, INVSTATE, INVPC, NOCP = 1 << 16, 1 << 17, 1 << 18, 1 << 19
 # Bits of HFSR.
 VECTTBL, FORCED, DEBUGEVT = 1 << 1, 1 << 30, 1 << 31
-# Bits of CONTROL. SFPA is ARMv8-M's. Unicorn takes its M4 for one in the secure state, and gives a program whose CONTROL has FPCA
-# without SFPA a new FPSCR with its next FPU instruction: both are set and cleared together.
+# Bits of CONTROL. SFPA belongs to ARMv8-M. Unicorn treats its M4 as an ARMv8-M in the secure state, and gives a program whose
+# CONTROL has FPCA without SFPA a new FPSCR with its next FPU instruction: both are set and cleared together.
 SPSEL, FPCA, SFPA = 2, 4, 8
 
 #: The values of LR that return from a handler.
 EXC_RETURNS = {0xFFFF_FFE1, 0xFFFF_FFE9, 0xFFFF_FFED, 0xFFFF_FFF1, 0xFFFF_FFF9, 0xFFFF_FFFD}
-#: Unicorn's numbers of what a program raises.
+#: Unicorn's numbers for the exceptions that a program raises.
 UC_SVC, UC_BKPT, UC_EXCEPTION_RETURN, UC_NOCP, UC_INVSTATE = 2, 7, 8, 17, 18
 #: A bit of SCR.
 SLEEPONEXIT = 2
-#: PRIMASK, BASEPRI and FAULTMASK where they hold nothing back.
+#: PRIMASK, BASEPRI and FAULTMASK when they block nothing.
 UNMASKED = (0, 0, 0)
 FRAME = struct.Struct("<8I")
 #: Core clocks from the last instruction to the first of the handler, and back (DDI0439 section 3.9.1, no wait states).
@@ -43,17 +43,17 @@ class Exceptions:
         self.frame = Batch(processor.handle, "r0 r1 r2 r3 r12 lr pc xpsr sp control primask basepri faultmask")
         self.enter_batch = Batch(processor.handle, "sp control all_xpsr apsr_nzcv lr pc")
         self.at_return = Batch(processor.handle, "pc control faultmask msp psp")
-        # The exception number goes first: in Thread mode CONTROL.SPSEL can be written, and then `sp` is the right one.
+        # The exception number is written first: in Thread mode CONTROL.SPSEL can be written, and then `sp` is the right one.
         self.leave = Batch(processor.handle, "all_xpsr control r0 r1 r2 r3 r12 lr sp apsr_nzcv pc")
         #: In the order and with the padding of the frame.
         self.fpu = Batch(processor.handle, " ".join(f"d{n}" for n in range(8)) + " fpscr")
         #: The exception number in IPSR.
         self.current = 0
-        #: The time that entry and return take: picoseconds, and instructions.
+        #: The time that entry and return take: picoseconds, and the equivalent number of instructions.
         self.entry = self.leaving = (0, 0)
 
     def reset(self) -> None:
-        """Forgets the handler that was running."""
+        """Clears the handler that was running."""
         self.current = 0
 
     def dispatch(self) -> bool:
@@ -75,7 +75,7 @@ class Exceptions:
         return self.board.nvic.execution_priority(primask, basepri, faultmask)
 
     def enter(self, number: int, registers: tuple[int, ...] | None = None) -> None:
-        """Stores the frame and begins the handler. `registers`: those of `frame`, where they have been read."""
+        """Stores the frame and begins the handler. `registers`: the values of `frame`, if they have been read."""
         board = self.board
         r0, r1, r2, r3, r12, lr, pc, xpsr, sp, control, *_ = registers or self.frame.read()
         extended = control & FPCA
@@ -97,8 +97,8 @@ class Exceptions:
     def _stacking_error(self, number: int, frame: int) -> int:
         """Returns the exception that is entered when the frame of `number` cannot be stored (B1.5.7, B1.5.15).
 
-        The frame is lost, the stack pointer moves all the same, and `number` stays pending behind the fault. HardFault
-        and NMI are entered in spite of it.
+        The frame is lost, the stack pointer moves anyway, and `number` stays pending after the fault. HardFault and NMI are
+        still entered.
         """
         nvic, scb = self.board.nvic, self.board.scb
         self.board.record("fault", what="the exception frame cannot be stored", sp=frame)
@@ -137,7 +137,7 @@ class Exceptions:
         board.sleeping = False
 
     def processor_event(self, number: int) -> None:
-        """Handles what unicorn reports while it runs: SVC, BKPT, the return from an exception, a missing coprocessor."""
+        """Handles what unicorn reports while it runs: SVC, BKPT, a return from an exception, a missing coprocessor."""
         if number == UC_EXCEPTION_RETURN:
             self._return()
             nvic = self.board.nvic
@@ -199,7 +199,7 @@ class Exceptions:
             board.sleep_on_exit()
 
     def _return_fault(self, excret: int, why: str, kind: int = USAGE_FAULT, bit: int = INVPC) -> None:
-        """Takes a fault of the return itself: the frame stays, and the handler's LR holds EXC_RETURN."""
+        """Takes a fault of the return itself: the frame stays on the stack, and the handler's LR holds EXC_RETURN."""
         board = self.board
         board.processor.set("lr", excret)
         self.current = 0 if excret & 8 else self.current
@@ -211,7 +211,7 @@ class Exceptions:
         self._begin(number, sp, xpsr, control, excret)
 
     def raise_synchronous(self, number: int) -> None:
-        """Takes an exception that an instruction asks for; one that may not preempt becomes a HardFault."""
+        """Takes an exception that an instruction requests; one that may not preempt becomes a HardFault."""
         nvic = self.board.nvic
         if nvic.group(nvic.priority[number]) < self.execution_priority():
             self.enter(number)
@@ -223,7 +223,7 @@ class Exceptions:
         self._fault(USAGE_FAULT, bit, why)
 
     def bus_fault(self, bit: int, address: int | None, why: str) -> None:
-        """Takes a BusFault; `address` goes to BFAR."""
+        """Takes a BusFault; `address` is stored in BFAR."""
         if address is not None:
             self.board.scb.bfar = address
             bit |= BFARVALID

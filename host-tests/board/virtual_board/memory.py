@@ -1,7 +1,7 @@
 """The memories of the STM32F405 (RM0090 section 2.3) as buffers that the processor and the model share.
 
-Flash is seen at 0x0800_0000 and, for a boot from flash, at address 0 (section 2.4). The core-coupled memory hangs on the
-data bus alone, so nothing can be fetched from it. RAM keeps its contents over a reset and holds noise after power-on.
+Flash is at 0x0800_0000 and, for a boot from flash, also at address 0 (section 2.4). The core-coupled memory is only on the data
+bus, so nothing can be fetched from it. RAM keeps its contents over a reset and holds noise after power-on.
 """
 
 import ctypes
@@ -25,7 +25,7 @@ FLASH_KIB = 0x1FFF_7A22
 
 
 class Region:
-    """A stretch of memory that can be read and written without side effects."""
+    """A range of memory that can be read and written without side effects."""
 
     def __init__(self, base: int, size: int, fill: int):
         self.base, self.size = base, size
@@ -44,7 +44,7 @@ class Memory:
         self.system = Region(SYSTEM, SYSTEM_SIZE, 0xFF)
         self.regions = (self.sram, self.flash, self.ccm, self.system)
         self.random = random.Random(seed)
-        #: Is called with an address and a length after a write to flash or SRAM: code translated from there must go.
+        #: Called with an address and a length after a write to flash or SRAM: code translated from there must be discarded.
         self.on_code_change = None
         self._set_system(UNIQUE_ID, b"\x31\x00\x2a\x00\x0fGYRONET")
         self._set_system(FLASH_KIB, (FLASH_SIZE >> 10).to_bytes(2, "little"))
@@ -59,7 +59,7 @@ class Memory:
             region.view[:] = self.random.randbytes(region.size)
 
     def region(self, address: int, length: int) -> Region | None:
-        """Returns the memory that holds all of a range."""
+        """Returns the memory that contains a whole range."""
         if address + length <= FLASH_SIZE:
             return self.flash
         for region in self.regions:
@@ -68,7 +68,7 @@ class Memory:
         return None
 
     def read(self, address: int, length: int) -> bytes | None:
-        """Reads a range, or returns `None` where no memory is."""
+        """Reads a range, or returns `None` if there is no memory."""
         offset = address - SRAM
         if 0 <= offset <= SRAM_SIZE - length:
             return bytes(self.sram.view[offset : offset + length])
@@ -79,7 +79,7 @@ class Memory:
         return bytes(region.view[offset : offset + length])
 
     def word(self, address: int) -> int | None:
-        """Reads 32 bits, or returns `None` where no memory is."""
+        """Reads 32 bits, or returns `None` if there is no memory."""
         if 0 <= address - FLASH <= FLASH_SIZE - 4:
             return WORD.unpack_from(self.flash.view, address - FLASH)[0]
         data = self.read(address, 4)
@@ -97,7 +97,7 @@ class Memory:
         return True
 
     def write_stack(self, address: int, data: bytes) -> bool:
-        """Writes an exception frame. Returns whether there is RAM; code is not looked for there."""
+        """Writes an exception frame. Returns whether there is RAM. Does not check for translated code there."""
         region = self.sram if address >= SRAM else self.ccm
         offset = address - region.base
         if offset < 0 or offset + len(data) > region.size:

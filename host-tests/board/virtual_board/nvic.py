@@ -1,8 +1,8 @@
 """The interrupt controller (DDI0403 B3.4) and the priorities of all exceptions (B1.5.4).
 
-Exceptions are numbered as in IPSR: 2 NMI, 3 HardFault, 11 SVCall, 14 PendSV, 15 SysTick, 16 onwards the external
-interrupts. Sets of exceptions are integers with one bit each. The STM32F405 has 82 interrupts and 4 priority bits
-(RM0090 section 12.1).
+Exceptions are numbered as in IPSR: 2 NMI, 3 HardFault, 11 SVCall, 14 PendSV, 15 SysTick, and from 16 on the external
+interrupts. Sets of exceptions are integers with one bit each. The STM32F405 has 82 interrupts and 4 priority bits (RM0090
+section 12.1).
 """
 
 from .violation import Violation
@@ -33,7 +33,7 @@ class Nvic:
         self.reset()
 
     def reset(self) -> None:
-        """Disables, ends and forgets everything. Lines keep their level: the peripherals drive them."""
+        """Disables, ends and clears all exceptions. Interrupt lines keep their level, since the peripherals drive them."""
         self.enabled = 1 << NMI | 1 << HARD_FAULT | 1 << SVCALL | 1 << PENDSV | 1 << SYSTICK
         self.pending = 0
         self.active = 0
@@ -43,12 +43,12 @@ class Nvic:
         self.priorities_changed()
 
     def priorities_changed(self) -> None:
-        """Forgets what has been worked out from the priorities."""
+        """Clears the cached levels, which depend on the priorities."""
         #: The execution priority without masks, by the set of active exceptions.
         self._levels: dict[int, int] = {0: LOWEST}
 
     def set_line(self, number: int, level: bool) -> None:
-        """Drives an interrupt line. A rising edge makes the interrupt pending, of an active one once more after its end."""
+        """Drives an interrupt line. A rising edge makes the interrupt pending; if it is active, it runs once more after its end."""
         bit = 1 << 16 + number
         if not 0 <= number < INTERRUPTS:
             raise ValueError(f"interrupt {number}")
@@ -65,7 +65,7 @@ class Nvic:
             self.board.interrupt_raised()
 
     def highest_pending(self) -> tuple[int, int] | None:
-        """Returns number and priority of the pending, enabled exception that comes first."""
+        """Returns number and priority of the pending, enabled exception that is taken first."""
         ready = self.pending & self.enabled
         if not ready:
             return None
@@ -75,7 +75,7 @@ class Nvic:
         return min(((self.priority[n], n) for n in bits(ready)))[::-1]
 
     def preempting(self) -> int | None:
-        """Returns the pending exception that comes before the active ones, if no mask holds it back."""
+        """Returns the pending exception that preempts the active ones, ignoring the masks."""
         ready = self.pending & self.enabled
         if not ready:
             return None
@@ -84,14 +84,14 @@ class Nvic:
         return number if self.group(self.priority[number]) < (self.level() if level is None else level) else None
 
     def level(self) -> int:
-        """Returns the execution priority that the active exceptions give."""
+        """Returns the execution priority that results from the active exceptions."""
         level = self._levels.get(self.active)
         if level is None:
             level = self._levels[self.active] = min(self.group(self.priority[n]) for n in bits(self.active))
         return level
 
     def execution_priority(self, primask: int, basepri: int, faultmask: int) -> int:
-        """Returns the priority that an exception must undercut to be taken."""
+        """Returns the priority below which an exception must be to be taken."""
         lowest = self.level()
         if basepri & PRIORITY_MASK:
             lowest = min(lowest, self.group(basepri & PRIORITY_MASK))
@@ -118,7 +118,7 @@ class Nvic:
         raise Violation(f"NVIC: {size}-byte read at offset 0x{offset:X} is not modelled")
 
     def write(self, offset: int, value: int, size: int) -> None:
-        """Writes the registers that `read` knows, and STIR."""
+        """Writes the registers that `read` supports, and STIR."""
         block, word = offset >> 7, offset >> 2 & 0x1F
         if block in (0, 1, 2, 3) and size == 4 and word < 16:
             chosen = (value << 16 + 32 * word) & ((1 << COUNT) - 1)

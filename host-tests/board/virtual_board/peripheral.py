@@ -1,7 +1,7 @@
 """The base class of every peripheral of the virtual board.
 
-A peripheral answers reads and writes of its registers, counted in bytes from its base. The board checks the clock gate
-before it calls either. Both raise `Violation` for a register or an access size that is not modelled.
+A peripheral handles reads and writes of its registers, at byte offsets from its base. The board checks the clock gate before it
+calls `read` or `write`. Both raise `Violation` for a register or an access size that is not modelled.
 """
 
 
@@ -18,7 +18,7 @@ class Peripheral:
         self.board = board
 
     def reset(self, cause: str) -> None:
-        """Is called at every reset. `cause`: por, bor, pin, software, iwdg, wwdg or lowpower."""
+        """Resets the registers. Called at every reset. `cause`: por, bor, pin, software, iwdg, wwdg or lowpower."""
 
     def read(self, offset: int, size: int) -> int:
         """Reads 1, 2 or 4 bytes."""
@@ -29,8 +29,8 @@ class Peripheral:
         raise NotImplementedError
 
     def catch_up(self) -> None:
-        """Does what is due by now, where DMA may do several steps at once. The DMA calls it before its registers are read."""
+        """Does what is due by now, where DMA may do several steps at once. The DMA calls this before its registers are read."""
 
     def configure(self, name: str, value) -> None:
-        """Sets a fault or a condition of the environment, such as the crystal's frequency."""
+        """Sets a fault or a condition of the environment, such as the frequency of the crystal."""
         raise KeyError(f"{self.name} has no setting {name!r}")

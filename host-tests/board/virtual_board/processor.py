@@ -1,15 +1,15 @@
 """The instruction set: a Cortex-M4 core of `unicorn` without interrupts, run in slices of a known number of instructions.
 
-Unicorn executes Thumb code and knows the special registers and both stack pointers. It has no NVIC, takes no exception
-and keeps no time; `Exceptions` and `Board` add these. What is used of it here was found in its 2.1.4 sources:
+Unicorn executes Thumb code and has the special registers and both stack pointers. It has no NVIC, takes no exception and keeps
+no time; `Exceptions` and `Board` add these. The following was found in the sources of unicorn 2.1.4:
 
-- An instruction count is kept by a call per instruction, which also sets the program counter. The count and its limit lie
-  side by side in unicorn's own structure. Their place is found at the start with known counts. Reading the count gives
-  the time of a register access to one instruction; lowering the limit ends the slice after the current instruction.
+- A call per instruction counts instructions and also sets the program counter. The count and its limit are adjacent in
+  unicorn's own structure; their offset is found at the start with known counts. Reading the count gives the time
+  of a register access to one instruction; lowering the limit ends the slice after the current instruction.
   (`uc_emu_stop` in a register access would execute the instruction twice.)
 - With its virtual TLB unicorn asks for the permissions of each page once. An access that they refuse stops precisely at
-  the instruction; one that unicorn's own map refuses would go on with a wrong value. RAM is handed out without execution
-  until it is executed, since stores to a page that holds code take a slow path.
+  the instruction; one that unicorn's own map refuses would continue with a wrong value. RAM pages get no permission
+  to execute until code runs there, since stores to a page that holds code take a slow path.
 - WFI ends the slice before the limit, without an error.
 """
 
@@ -30,9 +30,9 @@ PERIPHERALS_SIZE = 0x2000_0000
 PRIVATE = 0xE000_0000
 PRIVATE_SIZE = 0x10_0000
 
-#: Bytes of a page of the virtual TLB, at most.
+#: Largest page of the virtual TLB, bytes.
 PAGE = 4096
-#: Bytes of unicorn's structure that are looked at. It ends with jump buffers of more than 10,000 bytes.
+#: Bytes of unicorn's structure that are searched. It ends with jump buffers of more than 10,000 bytes.
 STRUCTURE = 6_000
 
 #: The bits of xPSR that hold the state of an IT block (DDI0403 B1.4.2).
@@ -62,16 +62,16 @@ BLOCK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint32
 
 
 def pointer(callback) -> ctypes.c_void_p:
-    """Returns a callback as `unicorn`'s prototypes want it. The callback itself must be kept."""
+    """Returns a callback in the form that `unicorn`'s prototypes need. The caller must keep the callback itself."""
     return ctypes.cast(callback, ctypes.c_void_p)
 
 
-#: The registers of a program, in the order in which they are shown.
+#: The general registers, in the order in which they are shown.
 GENERAL = "r0 r1 r2 r3 r4 r5 r6 r7 r8 r9 r10 r11 r12 sp lr xpsr"
 
 
 class Processor:
-    """Executes instructions, and hands register accesses, faults and exception returns to the board."""
+    """Executes instructions, and passes register accesses, faults and exception returns to the board."""
 
     def __init__(self, board):
         self.board = board
@@ -93,17 +93,17 @@ class Processor:
         self.masks = Batch(self.handle, "primask basepri faultmask xpsr")
         #: The kind of the access that was refused in this slice; its address is in `refused`.
         self.fault: int | None = None
-        #: The program counter, where an exception has just been entered and unicorn need not be asked.
+        #: The program counter after an exception entry, which then need not be read from unicorn.
         self.start_at: int | None = None
         self._singles: dict[str, Batch] = {}
         #: Whether blocks are reported before they run.
         self.watching = False
         self._block_hook = None
         self._block_callback = BLOCK(self._on_block)
-        #: A block with FPU instructions was reached while the FPU is off.
+        #: Whether a block with FPU instructions was reached while the FPU is off.
         self.fpu_ahead = False
         self._stale_code: list[tuple[int, int]] = []
-        #: Begins of pages of SRAM that were executed.
+        #: Start addresses of the pages of SRAM that were executed.
         self._code_pages: set[int] = set()
         self._fpu_blocks: dict[tuple[int, int], bool] = {}
         board.memory.on_code_change = self._on_code_change
@@ -111,7 +111,7 @@ class Processor:
     def _find_fields(self) -> None:
         """Finds the instruction count and its limit, and the address of the last refused access, in unicorn's structure."""
         scratch = 0x1000
-        # 0x7FE times NOP, a branch to itself; at the end LDR r0, [r1].
+        # 0x7FF times NOP, a branch to itself; at the end LDR r0, [r1].
         self.uc.mem_map(scratch, 0x2000)
         self.uc.mem_write(scratch, b"\x00\xbf" * 0x7FF + b"\xfe\xe7" + b"\x08\x68")
 
@@ -155,7 +155,7 @@ class Processor:
             (map_.SYSTEM, memory.system, fixed),
         ):
             self.uc.mem_map_ptr(base, region.size, every, ctypes.addressof(region.buffer))
-            # Only a change of the protection makes unicorn discard writes to memory that it was given.
+            # Only a change of the protection makes unicorn discard writes to memory that was passed to it.
             self.uc.mem_protect(base, region.size, access)
         for base, size in ((PERIPHERALS, PERIPHERALS_SIZE), (PRIVATE, PRIVATE_SIZE)):
             read, write = READ(self._reader(base)), WRITE(self._writer(base))
@@ -191,7 +191,7 @@ class Processor:
         return write
 
     def _guard(self, call, *arguments) -> None:
-        """Calls the model from a callback."""
+        """Calls the model from a callback, and ends the slice after an error."""
         try:
             call(*arguments)
         except BaseException as error:
@@ -222,14 +222,15 @@ class Processor:
         return True
 
     def _forget_condition(self) -> None:
-        """Clears the state of an IT block. Unicorn writes it when it fills its TLB, or asks for a write to protected memory,
-        within a block, and never clears it: the instructions behind the block would be conditional, too."""
+        """Clears the state of an IT block. Unicorn writes that state when it fills its TLB, or asks for a write to protected
+        memory, within a block, and never clears it: the instructions after the block would be conditional, too.
+        """
         xpsr = self.get("xpsr")
         if xpsr & IT_STATE:
             self.set("all_xpsr", xpsr & ~IT_STATE)
 
     def _permissions(self, address: int, kind: int) -> int | None:
-        """Returns what a page allows, or `None` when it refuses this access."""
+        """Returns the permissions of a page, or `None` when it refuses this access."""
         read, write, execute = const.UC_PROT_READ, const.UC_PROT_WRITE, const.UC_PROT_EXEC
         if map_.SRAM <= address < map_.SRAM + map_.SRAM_SIZE:
             if kind != const.UC_MEM_FETCH:
@@ -262,7 +263,7 @@ class Processor:
             self._stale_code.append((address, size))
 
     def forget_code(self) -> None:
-        """Drops all translated code."""
+        """Discards all translated code."""
         self.uc.ctl_flush_tb()
         self._stale_code.clear()
 
@@ -276,7 +277,7 @@ class Processor:
             self.end_slice()
 
     def watch_blocks(self, on: bool) -> None:
-        """Reports each block of instructions before it runs. Needed only while the FPU is off."""
+        """Reports each block of instructions before it runs, or stops doing so. Needed only while the FPU is off."""
         self.watching = on
         if on:
             self._block_hook = self._hook(const.UC_HOOK_BLOCK, self._block_callback)
@@ -293,13 +294,13 @@ class Processor:
             self.limit.value = self.executed.value
 
     def shorten(self, instructions: int) -> None:
-        """Lets at most so many more instructions run in this slice."""
+        """Lets at most this many more instructions run in this slice."""
         end = self.executed.value + max(instructions, 0)
         if self.limit.value > end:
             self.limit.value = end
 
     def run(self, count: int) -> int:
-        """Runs a slice and returns why it ended. `executed` then holds the instructions, corrected for the last one."""
+        """Runs a slice and returns why it ended. `executed` then holds the number of instructions, corrected for the last one."""
         if self._stale_code:
             for address, size in self._stale_code:
                 self.uc.ctl_remove_cache(address, address + size)
@@ -335,7 +336,7 @@ class Processor:
         return self._singles[name]
 
     def reset(self, sp: int, pc: int) -> None:
-        """Sets the registers as after a reset (DDI0403 B1.5.5). The general registers are left alone."""
+        """Sets the registers as after a reset (DDI0403 B1.5.5). The general registers are not changed."""
         for name in ("primask", "basepri", "faultmask", "fpscr"):
             self.set(name, 0)
         # Thread mode and the main stack pointer come first, so that `sp` is the main one.

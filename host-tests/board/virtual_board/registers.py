@@ -1,7 +1,7 @@
 """Sets of processor registers that are read or written with one call.
 
-A call through `ctypes` costs about a microsecond, so the registers of an exception frame travel together. `LIBRARY` gives the
-functions without the argument types that `unicorn` declares, whose conversions double that, and keeps Python's lock.
+A call through `ctypes` costs about a microsecond, so the registers of an exception frame are transferred together. `LIBRARY`
+has the functions without `unicorn`'s argument types, whose conversions double that cost, and keeps Python's lock.
 """
 
 import ctypes
@@ -22,9 +22,9 @@ IDS = {f"r{n}": getattr(arm, f"UC_ARM_REG_R{n}") for n in range(13)} | {
     "faultmask": arm.UC_ARM_REG_FAULTMASK,
     "control": arm.UC_ARM_REG_CONTROL,
     "fpscr": arm.UC_ARM_REG_FPSCR,
-    # The last two are for writing. All of xPSR with its GE bits:
+    # The last two are write-only. All of xPSR with its GE bits:
     "all_xpsr": arm.UC_ARM_REG_XPSR_NZCVQG,
-    # The condition flags; a write also makes unicorn look at the mode once more (thread or handler).
+    # The condition flags; a write also makes unicorn update its mode (thread or handler).
     "apsr_nzcv": arm.UC_ARM_REG_APSR_NZCV,
 } | {f"d{n}": getattr(arm, f"UC_ARM_REG_D{n}") for n in range(16)}
 
@@ -33,7 +33,7 @@ _read, _write = LIBRARY.uc_reg_read_batch, LIBRARY.uc_reg_write_batch
 
 
 class Batch:
-    """A list of registers, read and written in its order. Each has 64 bits where the first is one of `d0` to `d15`, else 32."""
+    """A list of registers, read and written in its order. Cells have 64 bits if the first register is one of `d0` to `d15`, else 32."""
 
     def __init__(self, handle, names: str):
         self.names = names.split()
@@ -49,21 +49,21 @@ class Batch:
         self._arguments = (handle, self._ids, self._pointers, count)
 
     def read(self) -> tuple[int, ...]:
-        """Reads all of them."""
+        """Reads all registers."""
         _read(*self._arguments)
         return self._layout.unpack(self.values)
 
     def read_bytes(self) -> bytes:
-        """Reads all of them as bytes in memory order."""
+        """Reads all registers as bytes in memory order."""
         _read(*self._arguments)
         return bytes(self.values)
 
     def write_bytes(self, data: bytes) -> None:
-        """Writes all of them from bytes in memory order."""
+        """Writes all registers from bytes in memory order."""
         ctypes.memmove(self.values, data, len(data))
         _write(*self._arguments)
 
     def write(self, *values: int) -> None:
-        """Writes all of them."""
+        """Writes all registers."""
         self._layout.pack_into(self.values, 0, *values)
         _write(*self._arguments)

@@ -1,7 +1,7 @@
 """The system control block (DDI0403 B3.2), the FPU's control registers (B3.2.20 on) and the MPU's (B3.5).
 
-What the model cannot honour is a violation: traps of unaligned access and of division by zero, the MPU, lazy stacking
-without automatic stacking, Stop mode.
+What the model does not support is a violation: traps for unaligned access and division by zero, the MPU, lazy stacking without
+automatic stacking, Stop mode.
 """
 
 import re
@@ -25,7 +25,7 @@ FPU_INSTRUCTION = re.compile(rb"[\x00-\xff][\xec-\xef\xfc-\xff][\x00-\xff][\x0a\
 
 
 class Scb:
-    """The registers from 0xE000_ED00, but for the debug registers."""
+    """The registers from 0xE000_ED00, except the debug registers."""
 
     base, size = 0xE000ED00, 0xF0
 
@@ -49,16 +49,16 @@ class Scb:
 
     @property
     def fpu_on(self) -> bool:
-        """Whether CPACR gives access to CP10."""
+        """Returns whether CPACR gives access to CP10."""
         return bool(self.cpacr >> 20 & 1)
 
     def block_has_fpu_instruction(self, address: int, size: int) -> bool:
-        """Says whether a block of code holds an FPU instruction; whole halfwords are looked at."""
+        """Returns whether a block of code may hold an FPU instruction; only halfword boundaries are searched."""
         code = self.board.memory.read(address, size) or b""
         return any(match.start() % 2 == 0 for match in FPU_INSTRUCTION.finditer(code))
 
     def next_is_fpu_instruction(self, address: int) -> bool:
-        """Says whether the instruction at an address belongs to the FPU."""
+        """Returns whether the instruction at an address is an FPU instruction."""
         code = self.board.memory.read(address, 4) or b""
         return bool(FPU_INSTRUCTION.fullmatch(code))
 
@@ -80,7 +80,7 @@ class Scb:
         return value
 
     def read(self, offset: int, size: int) -> int:
-        """Reads a register; of CFSR and SHPR also bytes and halfwords."""
+        """Reads a register; CFSR and SHPR also by bytes and halfwords."""
         at = 0xED00 + offset
         if 0xED18 <= at < 0xED24:
             priority = {register: self.board.nvic.priority[number] for number, register in SHPR.items()}
@@ -105,7 +105,7 @@ class Scb:
         raise Violation(f"SCB: the register at 0x{at:X} is not modelled")
 
     def write(self, offset: int, value: int, size: int) -> None:
-        """Writes a register; of CFSR and SHPR also bytes and halfwords."""
+        """Writes a register; CFSR and SHPR also by bytes and halfwords."""
         at, nvic = 0xED00 + offset, self.board.nvic
         if 0xED18 <= at < 0xED24:
             for number, register in SHPR.items():
@@ -177,9 +177,9 @@ class Scb:
 
 
 class FpuControl:
-    """FPCCR, FPCAR, FPDSCR and the FPU's feature registers, 0xE000_EF34 on.
+    """FPCCR, FPCAR, FPDSCR and the FPU's feature registers, from 0xE000_EF34 on.
 
-    The model stores the FPU's part of a frame at once, so LSPACT is never seen set.
+    The model stores the FPU's part of a frame at once, so LSPACT always reads as 0.
     """
 
     base, size = 0xE000EF34, 0x10
@@ -195,7 +195,7 @@ class FpuControl:
         return values[offset // 4]
 
     def write(self, offset: int, value: int, size: int) -> None:
-        """Accepts the reset values alone, and any FPCAR."""
+        """Accepts only the reset values, and any FPCAR."""
         if size == 4 and offset == 4:
             self.board.scb.fpcar = value & ~7
         elif size != 4 or value != (ASPEN_LSPEN, None, 0, None)[offset // 4]:

@@ -1,4 +1,4 @@
-"""The commands of the protocol: what a test does with a board.
+"""The commands of the protocol, with which a test controls a board.
 
 Each command is a method; its arguments are the fields of the JSON object beside `command`. Times are microseconds since
 power-on, data are hexadecimal digits. `README.md` lists the commands.
@@ -10,12 +10,12 @@ from .elf import Elf
 from .snapshot import Snapshot
 
 US = 1_000_000
-#: Bytes of one chunk of a serial line follow each other within this time.
+#: Bytes of one chunk of a serial line follow each other within this time, picoseconds.
 CHUNK_GAP = 300 * US
 
 
 class Session:
-    """A board under the command of a test."""
+    """A board that a test controls."""
 
     def __init__(self, image: str, seed: int):
         self.elf = Elf.open(image)
@@ -45,7 +45,7 @@ class Session:
         self.board.request_reset("pin")
 
     def run(self, us: float | None = None, until: list | None = None, limit_us: float = 10 * US) -> dict:
-        """Runs for a time, or until one of some conditions holds, and for `limit_us` at most."""
+        """Runs for a time, or until one of the conditions holds, for `limit_us` at most."""
         board = self.board
         conditions = [_condition(board, wanted) for wanted in until or ()]
         self._met = None
@@ -64,7 +64,7 @@ class Session:
         return self._met is not None
 
     def cut_after(self, accesses: int, peripheral: str = "FLASH", delay_us: float = 0) -> None:
-        """Cuts the power right after an access to a peripheral (for FLASH also to the array), or some time later."""
+        """Cuts the power after this many accesses to a peripheral (for FLASH also to the array), at once or after a delay."""
         board = self.board
 
         def cut():
@@ -76,15 +76,15 @@ class Session:
 
         board.bus.count(peripheral, accesses, cut)
 
-    # Lines to the outside.
+    # External lines.
 
     def usart_send(self, usart, hex: str, at_us: float | None = None) -> None:
-        """Sends bytes to the board, at the pace of the line."""
+        """Sends bytes to the board, at the bit rate of the line."""
         at = None if at_us is None else round(at_us * US)
         self._usart(usart).inject(bytes.fromhex(hex), at)
 
     def usart_take(self, usart) -> dict:
-        """Returns what the board has sent since the last call, in chunks with the time of each first and last byte."""
+        """Returns the bytes that the board has sent since the last call, in chunks with the time of each first and last byte."""
         chunks: list[dict] = []
         last = None
         for time, byte in self._usart(usart).take_sent():
@@ -100,12 +100,12 @@ class Session:
         return self.board.peripherals[name]
 
     def can_send(self, id: int, ext: bool = False, data: str = "", remote: bool = False, at_us: float | None = None) -> None:
-        """Another node sends a frame as soon as the bus lets it."""
+        """Sends a frame of another node as soon as the bus is free for it."""
         at = None if at_us is None else round(at_us * US)
         self.board.peripherals["CAN1"].bus.send(id, bytes.fromhex(data), ext, remote, at)
 
     def can_take(self) -> dict:
-        """Returns the frames on the bus since the last call: of the board and of others, whole and broken ones."""
+        """Returns the frames on the bus since the last call: of the board and of other nodes, complete and broken ones."""
         frames = []
         for entry in self.board.peripherals["CAN1"].bus.take_log():
             frame = entry.frame
@@ -124,7 +124,7 @@ class Session:
         return {"frames": frames}
 
     def set(self, values: dict) -> None:
-        """Sets faults and the environment: `{"RCC.crystal_hz": null}`."""
+        """Sets faults and conditions of the environment: `{"RCC.crystal_hz": null}`."""
         for name, value in values.items():
             peripheral, _, key = name.partition(".")
             if peripheral not in self.board.peripherals:
@@ -134,7 +134,7 @@ class Session:
     # Memory and registers.
 
     def symbol(self, name: str) -> dict:
-        """Returns where a symbol is."""
+        """Returns address and size of a symbol."""
         address, size = self.elf.find(name)
         return {"address": address, "size": size}
 
@@ -148,7 +148,7 @@ class Session:
         return {"hex": self.board.memory_read(self._address(address, symbol, offset), length).hex()}
 
     def memory_write(self, hex: str, address=None, symbol=None, offset: int = 0) -> None:
-        """Writes flash or RAM; of code, too."""
+        """Writes flash or RAM, code included."""
         self.board.memory_write(self._address(address, symbol, offset), bytes.fromhex(hex))
 
     def registers(self, set: dict | None = None) -> dict:
@@ -174,7 +174,7 @@ class Session:
         return {"events": log}
 
     def trace(self, peripheral: str, on: bool) -> None:
-        """Logs the register accesses of a peripheral."""
+        """Starts or stops logging the register accesses of a peripheral."""
         (self.board.bus.traced.add if on else self.board.bus.traced.discard)(peripheral)
 
     def counts(self) -> dict:
@@ -192,16 +192,16 @@ class Session:
         }
 
     def snapshot(self, name: str) -> None:
-        """Keeps the state of the board under a name."""
+        """Saves the state of the board under a name."""
         self.snapshots[name] = Snapshot(self.board)
 
     def restore(self, name: str) -> None:
-        """Puts a kept state back."""
+        """Restores a saved state."""
         self.snapshots[name].restore(self.board)
 
 
 def _condition(board, wanted):
-    """Turns a condition into a function of a log entry, or of `None` after any scheduled call."""
+    """Converts a condition to a function of a log entry, or of `None` after any scheduled call."""
     if isinstance(wanted, str):
         wanted = {"event": wanted}
     if "usart" in wanted:
@@ -218,7 +218,7 @@ def _condition(board, wanted):
 
 
 class _FrameCount:
-    """Says whether so many whole frames of the board are in the log of the bus. It looks at each entry once."""
+    """Tests whether the bus log has this many complete frames of the board. Each entry is read once."""
 
     def __init__(self, bus, wanted: int):
         self.bus, self.wanted = bus, wanted

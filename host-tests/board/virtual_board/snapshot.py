@@ -1,9 +1,8 @@
 """Snapshots of the whole board, so that a test boots once and then tries thousands of continuations.
 
-Peripherals are copied by their attributes in one deep copy, together with the queue of scheduled calls: a call that is a
-method of a part of a peripheral then belongs to the copied part. The board and the peripherals themselves stay the same
-objects, so a function that holds on to `self` of a peripheral goes on to work. (A lambda that holds on to an inner part
-of a peripheral would not.)
+Peripherals are copied by their attributes in one deep copy, together with the queue of scheduled calls, so that a call of a
+method of a part of a peripheral refers to the copied part. The board and the peripherals themselves stay the same objects, so a
+function that captured `self` of a peripheral still works. (A lambda that captured an inner part of a peripheral would not.)
 """
 
 import copy
@@ -12,7 +11,7 @@ BOARD_FIELDS = (
     "_now", "_base", "_reset_cause", "powered", "sleeping", "locked_up", "stalled_until", "instructions", "slept", "slices",
     "_masked", "_instruction_ps", "halted",
 )  # fmt: skip
-#: Memory is compared and put back in pieces of this size, so that translated code is kept where nothing changed.
+#: Memory is compared and restored in pieces of this size, so that translated code is kept where nothing changed.
 PIECE = 4096
 
 
@@ -31,7 +30,7 @@ class Snapshot:
         self.devices = _copy(board, _state(board))
 
     def restore(self, board) -> None:
-        """Puts the state back. The snapshot can be used again."""
+        """Restores the state. The snapshot can be used again."""
         state = _copy(board, self.devices)
         for name, value in self.fields.items():
             setattr(board, name, value)

@@ -1,8 +1,8 @@
-"""SysTick (DDI0403 B3.3): a 24-bit counter that is never stepped, only worked out from the board time.
+"""SysTick (DDI0403 B3.3): a 24-bit counter whose value is computed from the board time, never stepped.
 
-The counter takes the value RELOAD one clock after it stood at 0, so that a period is RELOAD + 1 clocks. It sets COUNTFLAG
-and, with TICKINT, makes the exception pending when it goes from 1 to 0. CALIB on the STM32F405 is fixed at 18750, which is
-1 ms at HCLK/8 with 150 MHz (PM0214 section 4.5.4 and RM0090 section 12.1.3).
+The counter takes the value RELOAD one clock after it was 0, so that a period is RELOAD + 1 clocks. It sets COUNTFLAG and, with
+TICKINT, makes the exception pending when it goes from 1 to 0. CALIB on the STM32F405 is fixed at 18750, which is 1 ms at HCLK/8
+with 150 MHz (PM0214 section 4.5.4 and RM0090 section 12.1.3).
 """
 
 from .nvic import SYSTICK
@@ -13,7 +13,7 @@ CALIBRATION = 0x4000_0000 | 18_750
 
 
 class SysTick:
-    """The counter. `start` is the board time at which it stood at `value`."""
+    """The counter. `start` is the board time at which it was at `value`."""
 
     base, size = 0xE000E010, 0x10
 
@@ -38,12 +38,12 @@ class SysTick:
         self.event = None
 
     def hold(self) -> None:
-        """Stores the counter's value, so that a change of the clock counts from here."""
+        """Stores the counter's value, so that counting continues from here after a change of the clock."""
         if self.control & ENABLE:
             self.value = self.current()
         self.start = self.board.now
         rcc = self.board.rcc
-        #: The duration of one clock, in picoseconds. It holds until the next call.
+        #: The duration of one clock, in picoseconds. Valid until the next call.
         self.period_ps = round(1e12 / (rcc.core_hz if self.control & CLKSOURCE else rcc.systick_external_hz))
 
     def current(self) -> int:

@@ -1,10 +1,10 @@
-"""The error that ends a run: the program did what the model does not cover, or what no board allows."""
+"""The error that ends a run: the program did something that the model does not cover, or that no board allows."""
 
 
 class Violation(Exception):
-    """Says what the program did, where, and why the model cannot go on.
+    """Holds what the program did, where, and why the model cannot continue.
 
-    Peripherals raise it with a text alone; the board adds the time, the program counter and the symbol.
+    Peripherals raise it with only a text; the board adds the time, the program counter and the symbol.
     """
 
     def __init__(self, what: str, address: int | None = None):

@@ -1,8 +1,8 @@
-//! The tests of monitor, CAN and sensors again, in one crate without the tools, because `cargo mutants` builds it for
-//! every mutant. Not run by `cargo test`, which has them already.
+//! The tests of monitor, CAN and sensors once more, in a crate without the tools, because `cargo mutants` builds it
+//! for every mutant. `cargo test` does not run this crate, because it runs the same tests already.
 #![cfg(test)]
 
-// The tests name the crate that they share.
+// The tests refer to the crate that they share by this name.
 extern crate self as gyronet_host_tests;
 
 #[path = "../../src/noise.rs"]
@@ -77,7 +77,7 @@ mod xsens_stream;
 #[path = "../../tests/library/yaw_encoder.rs"]
 mod yaw_encoder;
 
-// What the networks do with words, for Miri alone.
+// Word-level code of the networks, for Miri only.
 #[cfg(miri)]
 #[path = "../../tests/library/blob.rs"]
 mod blob;

@@ -1,4 +1,4 @@
-//! The virtual board's CAN bus for a tester: waiting lets board time pass.
+//! The virtual board's CAN bus, for a tester: receiving lets board time pass.
 
 use super::Board;
 use gyronet::can::DataFrame;
@@ -6,10 +6,10 @@ use gyronet_tools::client::bus::Bus;
 use std::io::Result;
 use std::time::Duration;
 
-/// Board time that passes with each look for frames.
+/// Board time that passes with each poll for frames.
 const TURN: Duration = Duration::from_millis(1);
 
-/// The bus of a board. Frames that the board sends are taken from it.
+/// The CAN bus of a board. Receiving takes the frames that the board has sent.
 #[derive(Debug)]
 pub struct CanBus<'a>(pub(super) &'a mut Board);
 

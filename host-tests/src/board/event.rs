@@ -1,4 +1,4 @@
-//! The model records events with their board time, and counts of a run.
+//! Events that the model records with their board time, and the counts of a run.
 
 use serde_json::Value;
 use std::time::Duration;
@@ -8,7 +8,7 @@ use std::time::Duration;
 pub struct Event {
     /// Board time.
     pub time: Duration,
-    /// Such as `reset`, `fault`, `lockup`, `flash_erase`, `cut`.
+    /// Kind of the event, such as `reset`, `fault`, `lockup`, `flash_erase`, `cut`.
     pub kind: String,
     fields: Value,
 }
@@ -22,19 +22,19 @@ impl Event {
         }
     }
 
-    /// A further field, as text: the `cause` of a `reset`. Empty when there is none.
+    /// Returns a further field as text: the `cause` of a `reset`. Empty if there is no such field.
     #[must_use]
     pub fn text(&self, name: &str) -> &str {
         self.fields[name].as_str().unwrap_or_default()
     }
 
-    /// A further field, as a list of whole numbers: the `sectors` of a `flash_erase`.
+    /// Returns a further field as a list of whole numbers: the `sectors` of a `flash_erase`.
     #[must_use]
     pub fn numbers(&self, name: &str) -> Vec<u64> {
         self.fields[name].as_array().into_iter().flatten().filter_map(Value::as_u64).collect()
     }
 
-    /// A further field, as a number.
+    /// Returns a further field as a number.
     #[must_use]
     pub fn number(&self, name: &str) -> Option<f64> {
         self.fields[name].as_f64()
@@ -48,7 +48,7 @@ pub struct Counts {
     pub instructions: u64,
     /// Board time.
     pub time: Duration,
-    /// Part of it that the core slept.
+    /// Board time during which the core slept.
     pub asleep: Duration,
     /// True while there is power.
     pub powered: bool,

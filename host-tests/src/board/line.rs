@@ -1,13 +1,13 @@
-//! A serial line of the virtual board for code that reads and writes: reading lets board time pass.
+//! A serial line of the virtual board, for code that reads and writes: reading lets board time pass.
 
 use super::Board;
 use std::collections::VecDeque;
 use std::io::{Error, ErrorKind, Read, Result, Write};
 use std::time::Duration;
 
-/// Board time that a read lets pass when nothing is there.
+/// Board time after which a read gives up when there is no byte.
 const WAIT: Duration = Duration::from_millis(50);
-/// Board time after the first byte, so that a read returns more than one.
+/// Board time that a read waits after the first byte, so that it returns more than one.
 const REST: Duration = Duration::from_millis(2);
 
 /// One line of a board.

@@ -1,4 +1,4 @@
-//! The process of the model: a JSON object a line goes in, and one comes back.
+//! The process of the model, which reads a JSON object per line and answers with one.
 
 use crate::recordings::workspace;
 use serde_json::Value;
@@ -6,7 +6,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-/// The model's process and its pipes. It ends with this value.
+/// The model's process and its pipes. Dropping this value ends the process.
 #[derive(Debug)]
 pub struct Link {
     child: Child,
@@ -33,10 +33,10 @@ impl Link {
         Self { child, input, output }
     }
 
-    /// Asks for one command.
+    /// Runs one command and returns the answer.
     ///
     /// # Errors
-    /// The model's words.
+    /// The model's error text, or the reason why there is no answer.
     pub fn ask(&mut self, command: &str, mut arguments: Value) -> Result<Value, String> {
         arguments["command"] = command.into();
         let gone = |error| format!("the model has ended: {error}");
@@ -53,21 +53,21 @@ impl Link {
 
 impl Drop for Link {
     fn drop(&mut self) {
-        // It may have ended by itself, and nothing depends on how it ends.
+        // The process may have ended already, and nothing depends on how it ends.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// Bytes as hexadecimal digits.
+/// Returns bytes as hexadecimal digits.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Bytes from hexadecimal digits of the model.
+/// Returns the bytes of hexadecimal digits from the model.
 ///
 /// # Panics
-/// When these are no digits.
+/// When these are not hexadecimal digits.
 pub fn unhex(digits: &Value) -> Vec<u8> {
     let digits = digits.as_str().expect("the model gives digits");
     let byte = |at| u8::from_str_radix(digits.get(at..at + 2).expect("two digits"), 16).expect("digits");

@@ -1,4 +1,4 @@
-//! This module reads frames from the vehicle bus: wheel speeds, and our own messages as a receiver reads them.
+//! This module parses frames from the vehicle bus: wheel speeds, and our own messages as a receiver parses them.
 
 use super::{Seed, byte, take};
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
@@ -12,8 +12,8 @@ use gyronet::can::yaw::{AngleMessage, DetailMessage, RateMessage};
 use gyronet::sample::Standstill;
 use gyronet::units::{Duration, Micros, WheelSpeed};
 
-const ID: Id = Id::Standard(StandardId::new(0xAA).expect("of eleven bits"));
-const OTHER: Id = Id::Extended(ExtendedId::new(0x18FE_BF0B).expect("of 29 bits"));
+const ID: Id = Id::Standard(StandardId::new(0xAA).expect("11 bits"));
+const OTHER: Id = Id::Extended(ExtendedId::new(0x18FE_BF0B).expect("29 bits"));
 const PROFILES: [Profile; 4] = [
     Profile::P01(P01 { data_id: 0x123, mode: DataIdMode::Both }),
     Profile::P02(P02 { data_ids: [7; 16] }),
@@ -21,9 +21,11 @@ const PROFILES: [Profile; 4] = [
     Profile::P11(P11 { data_id: 0x123, mode: P11Mode::Both }),
 ];
 
-/// The settings of two signed wheels from byte 3 on, with a counter in byte 7's upper half.
+/// Returns settings for two signed wheel speeds from byte 3 on, with a counter in byte 7's upper half.
 fn two_wheels(checksum: Checksum) -> WheelSettings {
-    let field = |start, len, signed| BitField::new(start, len, ByteOrder::Intel, signed).expect("inside");
+    let field = |start, len, signed| {
+        BitField::new(start, len, ByteOrder::Intel, signed).expect("a field inside the frame")
+    };
     let signal = |start| {
         let (factor_q16, offset) = (WheelSignal::per_bit_kmh(0.036), WheelSpeed(0));
         Some(WheelSignal {
@@ -43,8 +45,8 @@ fn two_wheels(checksum: Checksum) -> WheelSettings {
     }
 }
 
-/// Receives wheel frames: the first byte selects the settings; then come frames: a byte of time, a byte of kind (which
-/// identifier, how long, whether its protection is made to fit), eight bytes. No report of the wheels may be older than
+/// Receives wheel frames. The first byte selects the settings; each frame is a byte of time, a byte of kind (which
+/// identifier, how long, whether its protection is valid) and eight bytes. No report of the wheels may be older than
 /// its limit or contradict the speeds.
 pub fn wheels(mut data: &[u8]) {
     let choice = byte(&mut data);
@@ -56,7 +58,7 @@ pub fn wheels(mut data: &[u8]) {
         _ => Checksum::None,
     };
     let settings = if choice & 0x80 == 0 { two_wheels(checksum) } else { WheelSettings::TOYOTA };
-    let mut receiver = WheelReceiver::new(settings).expect("settings of ours");
+    let mut receiver = WheelReceiver::new(settings).expect("valid settings");
     let mut now = 0;
     while !data.is_empty() {
         now += u64::from(byte(&mut data)) * 1_000;
@@ -66,7 +68,7 @@ pub fn wheels(mut data: &[u8]) {
         content[..given.len()].copy_from_slice(given);
         if let (Checksum::E2e(profile), true) = (checksum, kind & 0x10 != 0) {
             let counter = u16::from(kind >> 5) % profile.counters();
-            profile.protect(&mut content, counter as u8).expect("eight bytes and a counter that occurs");
+            profile.protect(&mut content, counter as u8).expect("eight bytes and a valid counter");
         }
         let id = if kind & 0x0F == 0x0F { OTHER } else { ID };
         let len = if kind & 0x0F < 8 { usize::from(kind & 0x0F) + 1 } else { 8 };
@@ -106,8 +108,8 @@ pub fn wheel_seeds() -> Vec<Seed> {
     ]
 }
 
-/// Parses blocks of eight bytes and a last short one as every message there is, and through the checks of every
-/// profile; three bytes as a place of a signal in the block. A message that was read must be written as the same bytes.
+/// Parses blocks of eight bytes and a last short one as every message type, and with the checks of every profile; the
+/// first three bytes select a signal's bit field in the block. A parsed message must be emitted as the same bytes.
 pub fn messages(mut data: &[u8]) {
     let (start, len, kind) = (byte(&mut data), byte(&mut data), byte(&mut data));
     let order = if kind & 1 == 0 { ByteOrder::Intel } else { ByteOrder::Motorola };

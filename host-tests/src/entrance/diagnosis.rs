@@ -14,7 +14,7 @@ use gyronet::store::{FogPart, ImuPart, Record as _};
 use gyronet::uds::Server;
 use gyronet_tools::target::ram_flash::RamFlash;
 
-const DRIVES: SupportedHardware = SupportedHardware {
+const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
     imus: &[ImuPart::XsensMti],
     fogs: &[FogPart::Dsp1760],
     bits_per_second: &[250_000, 500_000],
@@ -30,18 +30,18 @@ struct Bench {
 }
 
 impl Bench {
-    /// Runs a turn; returns the frames that are sent in it.
-    fn turn(&mut self) -> Vec<[u8; 8]> {
-        self.server.turn(&mut self.board, &AllCounters::default(), self.now, || Some([7; 32]));
+    /// Polls the server; returns the frames that it sends.
+    fn poll(&mut self) -> Vec<[u8; 8]> {
+        self.server.poll(&mut self.board, &AllCounters::default(), self.now, || Some([7; 32]));
         std::iter::from_fn(|| self.server.next_frame(self.now)).collect()
     }
 }
 
-/// Takes commands: the time that passes, then a message in frames, or a frame as it is. Whatever came, the server
-/// answers a tester that then falls silent for a while and asks again.
+/// Runs commands: the time that passes, then a message in frames, or a raw frame. Whatever came before, the server
+/// must answer a tester that is silent for a while and then sends a request.
 pub fn frames(mut data: &[u8]) {
     let choice = byte(&mut data);
-    let mut board = Board::new(&DRIVES);
+    let mut board = Board::new(&SUPPORTED_HARDWARE);
     let (records, slots) = (RamFlash::new(&[]), (choice & 2 != 0).then(RamFlash::for_weights));
     board.begin((choice & 4 != 0).then_some(records), slots, choice & 8 == 0, Identity::UNKNOWN);
     let mut noise = Noise::new(1);
@@ -70,22 +70,22 @@ pub fn frames(mut data: &[u8]) {
     }
     for _ in 0..3 {
         bench.now = bench.now.wrapping_add(1_001);
-        bench.turn();
+        bench.poll();
     }
     bench.server.receive(&[2, 0x3E, 0], bench.now);
-    let answer = bench.turn();
+    let answer = bench.poll();
     assert!(matches!(answer[..], [[2, 0x7E, 0, ..]]), "{answer:02x?}");
-    bench.board.configuration().check().expect("what it runs with was checked");
+    bench.board.configuration().check().expect("the configuration in use is valid");
 }
 
-/// Gives a frame, and lets a response go on.
+/// Passes a frame to the server, and lets a response continue.
 fn give(bench: &mut Bench, functional: bool, frame: &[u8]) {
     match functional {
         true => bench.server.receive_functional(frame, bench.now),
         false => bench.server.receive(frame, bench.now),
     }
     for _ in 0..3 {
-        for sent in bench.turn() {
+        for sent in bench.poll() {
             let is_response = matches!(sent[0], 0x01..=0x07 | 0x10..=0x3F);
             assert!(is_response, "{sent:02x?}");
             if sent[0] & 0xF0 == 0x10 {

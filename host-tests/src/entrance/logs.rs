@@ -1,4 +1,4 @@
-//! Logs of other tools: whatever the bytes, what comes out is finite, in rising order of time, and counted.
+//! Reads logs of other tools: for any bytes, values must be finite, in rising order of time, and bounded in number.
 
 use super::Seed;
 use gyronet_tools::drive::vehicle::Columns;
@@ -17,10 +17,10 @@ BO_ 291 Kinds: 8 X
  SG_ Last : 56|8@1+ (1,0) [0|0] "" X
 "#;
 
-/// Reads any bytes as a log of the format that they begin with.
+/// Reads any bytes as a log of the format that their beginning indicates.
 ///
 /// # Panics
-/// When a value is not finite, or time does not rise.
+/// When a value is not finite, or time does not increase.
 pub fn file(data: &[u8]) {
     let bus = Bus::parse("a.dbc", DBC).expect("a DBC file");
     let Ok(log) = read_bytes("log", data, Some(&bus), &Columns::new()) else { return };
@@ -29,7 +29,7 @@ pub fn file(data: &[u8]) {
         samples += channel.len();
         let mut last = f64::NEG_INFINITY;
         for (seconds, value) in channel {
-            assert!(last < seconds, "time rises");
+            assert!(last < seconds, "time does not increase");
             last = seconds;
             let finite = match value {
                 Value::Imu(force, rate) => force.iter().chain(&rate).all(|value| value.is_finite()),
@@ -40,11 +40,11 @@ pub fn file(data: &[u8]) {
             assert!(finite && seconds.is_finite());
         }
     }
-    // Nothing is made up: a value takes at least a byte of the file, or of a chunk that it packs.
+    // No value is invented: each takes at least a byte of the file, or of a compressed chunk.
     assert!(samples <= 4_096 * (data.len() + 1), "{samples} of {} bytes", data.len());
 }
 
-/// One small file of each format, written here.
+/// Returns one small file of each format.
 pub fn seeds() -> Vec<Seed> {
     let text = |text: &str| text.as_bytes().to_vec();
     vec![
@@ -85,7 +85,7 @@ pub fn seeds() -> Vec<Seed> {
     ]
 }
 
-/// A length and the bytes.
+/// Returns the bytes with their length in front.
 fn block(bytes: &[u8]) -> Vec<u8> {
     [&(bytes.len() as u32).to_le_bytes(), bytes].concat()
 }
@@ -95,11 +95,11 @@ fn fields(fields: &[(&str, &[u8])]) -> Vec<u8> {
     block(&fields.iter().flat_map(field).collect::<Vec<u8>>())
 }
 
-/// An IMU message of ROS 1, or behind a header of CDR of ROS 2.
+/// Returns an IMU message of ROS 1, or one of ROS 2 with a CDR header.
 fn imu(ros_2: bool) -> Vec<u8> {
     let mut bytes = if ros_2 { vec![0, 1, 0, 0] } else { vec![1, 0, 0, 0] };
     bytes.extend([5, 0, 0, 0, 0, 0, 0, 0]);
-    // An empty frame name: with its zero in CDR, which aligns what follows.
+    // An empty frame name; in CDR with its terminating zero, and padding to align what follows.
     bytes.extend(if ros_2 { vec![1, 0, 0, 0, 0, 0, 0, 0] } else { vec![0; 4] });
     bytes.extend((0..37).flat_map(|k| (0.1 * f64::from(k)).to_le_bytes()));
     bytes
@@ -133,7 +133,7 @@ fn blf() -> Vec<u8> {
     bytes
 }
 
-/// An MCAP without chunks: head, schema, channel, message.
+/// Returns an MCAP file without chunks: header, schema, channel, message.
 fn mcap_of_one() -> Vec<u8> {
     let record = |op: u8, bytes: &[u8]| [&[op], &(bytes.len() as u64).to_le_bytes()[..], bytes].concat();
     let schema = [&[1, 0][..], &block(b"sensor_msgs/msg/Imu"), &block(b"ros2msg"), &[0; 4]].concat();

@@ -1,12 +1,12 @@
-//! This module reads recordings as CSV files, as a user of the tools gives them.
+//! This module reads recordings as CSV files, as a user passes them to the tools.
 
 use super::Seed;
 use gyronet::sample::PERIOD_US;
 use gyronet_tools::drive::recording::{Reader, Recording};
 use std::fmt::Write as _;
 
-/// Takes bytes as a file. Whatever rows are read have rising times and finite values, and errors can be
-/// printed.
+/// Reads bytes as a file. The rows that are read must have rising times and finite values, and an error must name the
+/// file.
 pub fn csv(data: &[u8]) {
     if let Err(error) = Recording::parse("fuzz.csv", data) {
         assert!(error.to_string().starts_with("fuzz.csv"));

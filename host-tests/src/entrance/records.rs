@@ -12,22 +12,22 @@ use gyronet::store::{Accepted, Calibration, Configuration, Learned, Level, Recor
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
 use gyronet_tools::target::ram_flash::RamFlash;
 
-/// A sector has this size, smaller than the part's, so that it is soon full.
+/// Size of a sector, smaller than the part's, so that it is soon full.
 pub const SECTOR: usize = 1024;
 type Flash = RamFlash<SECTOR>;
 
-/// Takes bytes as those of both sectors; or, behind an odd byte, as records (key, version, length, content) whose
-/// lengths, headers and checksums are made to fit. A record that is read must be inside its ranges and usable, and a
-/// stored record must be read again.
+/// Reads bytes as the content of both sectors or, if the first byte is odd, as records (key, version, length,
+/// content) with valid lengths, headers and checksums. A record that is read must be within its ranges and usable,
+/// and a stored record must be read back.
 pub fn flash(mut data: &[u8]) {
     let flash = if byte(&mut data) & 1 == 0 { Flash::new(data) } else { Flash::new(&fitting(data)) };
     let mut store = Store::open(flash, 0, false).expect("the flash answers");
     let calibration = store.get::<Calibration>().ok().flatten().unwrap_or_default();
-    calibration.check().expect("what is read was checked");
+    calibration.check().expect("the store checks what it reads");
     let learned = store.get::<Learned>().ok().flatten().unwrap_or(Learned::NOTHING);
-    learned.check().expect("what is read was checked");
+    learned.check().expect("the store checks what it reads");
     if let Ok(Some(configuration)) = store.get::<Configuration>() {
-        configuration.check().expect("what is read was checked");
+        configuration.check().expect("the store checks what it reads");
         run(&configuration, &calibration, &learned);
     }
     let _ = store.get::<Accepted>();
@@ -43,7 +43,7 @@ fn run(configuration: &Configuration, calibration: &Calibration, learned: &Learn
     for tick in 0..3 {
         let temperature = Some(CentiCelsius(2_300));
         let sample = ImuSample { temperature, ..turning(tick, AngularRate(1_000)) };
-        coprocessor.imu(sample, sample.time).expect("a place on the grid");
+        coprocessor.imu(sample, sample.time).expect("the sample is on the grid");
         while coprocessor.next_frame().is_some() {}
     }
 }
@@ -77,7 +77,7 @@ pub fn seeds() -> Vec<Seed> {
         specific_force: Some([SpecificForce(1 << 20); 3]),
         forward: Some(Forward { direction: [0.6, 0.8, 0.0], sigma: 0.05 }),
     };
-    // The first sector, as the flash has it.
+    // The first sector, as it is in flash.
     let mut raw = vec![0; 1 + SECTOR];
     let mut flash = Flash::new(&[]);
     let mut store = Store::open(&mut flash, 0, false);
@@ -86,7 +86,7 @@ pub fn seeds() -> Vec<Seed> {
         store.set(&calibration).and_then(|()| store.set(&learned)).expect("there is room");
     }
     drop(store);
-    flash.read(0, &mut raw[1..]).expect("inside");
+    flash.read(0, &mut raw[1..]).expect("a range inside the flash");
     while raw.last() == Some(&0xFF) {
         raw.pop();
     }

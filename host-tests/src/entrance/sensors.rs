@@ -1,4 +1,4 @@
-//! This module gives bytes to the parsers and dialogues of the five sensors.
+//! This module passes bytes to the parsers and dialogues of the five sensors.
 
 use super::Seed;
 use crate::wire::{bytes, feed, message, synthetic_frame};
@@ -18,7 +18,7 @@ use gyronet::sensor::xsens::precision::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti, xbus};
 use gyronet::units::Micros;
 
-/// Takes bytes as a stream from an MTi, to its dialogue, and as the data of a message.
+/// Passes bytes as a stream to the MTi's parser and dialogue, and as the data of a message.
 pub fn xsens(data: &[u8]) {
     let samples = feed(&mut Mti::new(), data);
     let mut dialogue = XsensDialogue::new();
@@ -26,7 +26,7 @@ pub fn xsens(data: &[u8]) {
         dialogue.receive(*byte);
         let _ = dialogue.poll(Micros(now * 10_000));
     }
-    // Taken several at a time, the same bytes give the same samples.
+    // Received several at a time, the same bytes give the same samples.
     let (mut rest, mut mti, mut again) = (data, Mti::new(), Vec::new());
     while !rest.is_empty() {
         rest = &rest[mti.receive_some(rest)..];
@@ -34,17 +34,18 @@ pub fn xsens(data: &[u8]) {
     }
     assert_eq!(format!("{again:?}"), format!("{samples:?}"));
     if let Ok(message) = MtData2::parse(data) {
-        // A message that was read is written and read as the same; NaN is not equal to itself.
+        // A parsed message must be parsed as the same again after it was emitted; bytes are compared, since NaN is
+        // not equal to itself.
         let frame = message.emit_as(Precision::Double);
-        let (_, again) = xbus::parse(&frame).expect("a frame of its own");
-        let again = MtData2::parse(again).expect("a message of its own");
+        let (_, again) = xbus::parse(&frame).expect("an emitted frame");
+        let again = MtData2::parse(again).expect("an emitted message");
         assert_eq!(again.emit_as(Precision::Double), frame);
     }
 }
 
 pub fn xsens_seeds() -> Vec<Seed> {
     let fixed = message(77).emit_as(Precision::Fixed1632);
-    let (_, data) = xbus::parse(&fixed).expect("a frame of its own");
+    let (_, data) = xbus::parse(&fixed).expect("an emitted frame");
     vec![
         ("stream", [synthetic_frame(), message(200).emit_as(Precision::Single).to_vec()].concat()),
         ("acks", bytes("fa ff 31 00 d0 fa ff 42 01 04 ba fa ff 11 00 f0")),
@@ -52,8 +53,7 @@ pub fn xsens_seeds() -> Vec<Seed> {
     ]
 }
 
-/// Takes bytes as a stream to the parser and to the dialogue, as a message, and as a message whose checksum
-/// is made to fit.
+/// Passes bytes as a stream to the parser and the dialogue, as a message, and as a message with a valid checksum.
 pub fn dsp1760(data: &[u8]) {
     let samples = feed(&mut Dsp1760::new(Dsp1760Config::DEFAULT), data);
     let mut dialogue = KvhDialogue::new(Dsp1760Config::DEFAULT);
@@ -72,7 +72,7 @@ pub fn dsp1760(data: &[u8]) {
     frame.extend(CRC_32_MPEG_2.checksum(data).to_be_bytes());
     for frame in [data, &frame] {
         if let Ok(message) = Message::parse(frame) {
-            let again = Message::parse(&message.emit()).expect("a message of its own");
+            let again = Message::parse(&message.emit()).expect("an emitted message");
             // They are compared by their bytes, because NaN is not equal to itself.
             assert_eq!(again.emit(), message.emit());
         }
@@ -94,7 +94,7 @@ pub fn dsp1760_seeds() -> Vec<Seed> {
     vec![("stream", extras.concat()), ("self_test", self_test), ("commands", commands.concat())]
 }
 
-/// Takes bytes as lines and as words.
+/// Parses bytes as lines and as words.
 pub fn dsp3000(data: &[u8]) {
     let mut lines = Dsp3000Ascii::new();
     let mut words = Dsp3000Binary::new(Mode::Rate, 0);
@@ -119,7 +119,7 @@ pub fn dsp3000_seeds() -> Vec<Seed> {
     ]
 }
 
-/// Takes bytes as packets of either kind.
+/// Parses bytes as packets of either kind.
 pub fn icm42688(data: &[u8]) {
     for resolution in [Resolution::Bits16, Resolution::Bits20] {
         for bytes in data.chunks(resolution.bytes()) {
@@ -138,7 +138,7 @@ pub fn icm42688_seeds() -> Vec<Seed> {
     vec![("packet_3", packet(Resolution::Bits16)), ("packet_4", packet(Resolution::Bits20))]
 }
 
-/// Takes bytes as bursts, as they are and with a sum that fits.
+/// Parses bytes as bursts, unchanged and with a valid sum.
 pub fn adis16465(data: &[u8]) {
     let (bursts, _) = data.as_chunks::<BURST>();
     for bytes in bursts {

@@ -1,4 +1,4 @@
-//! This module gives folders in the layouts of KAIST Urban and NCLT to the loaders.
+//! This module passes folders in the layouts of KAIST Urban and NCLT to the loaders.
 
 use super::Seed;
 use gyronet_tools::paper::sequence::{Sequence, write_csv};
@@ -16,7 +16,7 @@ const KAIST: [&str; 5] = [
 ];
 const NCLT: [&str; 4] = ["ms25.csv", "kvh.csv", "wheels.csv", "groundtruth_2012-01-08.csv"];
 
-/// Holds a folder for each thread; only changed files are written again.
+/// A folder for each thread; only changed files are written again.
 struct Folder {
     root: TempDir,
     files: Vec<Vec<u8>>,
@@ -24,9 +24,9 @@ struct Folder {
 
 impl Folder {
     fn new(name: &str, files: usize) -> Self {
-        let root = tempdir().expect("a folder of our own");
+        let root = tempdir().expect("a temporary folder");
         for sub in ["sensor_data", "calibration"].iter().take(if name == "kaist" { 2 } else { 0 }) {
-            fs::create_dir_all(root.path().join(sub)).expect("a folder of our own");
+            fs::create_dir_all(root.path().join(sub)).expect("a temporary folder");
         }
         Self { root, files: vec![vec![0]; files] }
     }
@@ -47,8 +47,8 @@ thread_local! {
         RefCell::new([Folder::new("kaist", KAIST.len()), Folder::new("nclt", NCLT.len())]);
 }
 
-/// Reads a folder: the first byte selects the layout, then come the files, a zero between them. Values that are read
-/// must be finite and can be written out; an error must name a file of the folder.
+/// Reads a folder. The first byte selects the layout; the files follow, separated by zeros. Values that are read must
+/// be finite and writable as CSV; an error must name a file of the folder.
 pub fn folder(data: &[u8]) {
     let Some((layout, data)) = data.split_first() else { return };
     let layout = usize::from(layout & 1);
@@ -57,7 +57,7 @@ pub fn folder(data: &[u8]) {
     content.resize(names.len(), b"");
     FOLDERS.with_borrow_mut(|folders| {
         let folder = &mut folders[layout];
-        folder.write(names, &content).expect("a folder of our own");
+        folder.write(names, &content).expect("a temporary folder");
         check(folder.root.path());
     });
 }
@@ -71,8 +71,8 @@ fn check(folder: &Path) {
                 let angles = [step.fog, step.yaw, step.vendor_yaw];
                 singles.copied().all(f32::is_finite) && doubles.copied().chain(angles).all(f64::is_finite)
             });
-            assert!(finite, "a value that is no number");
-            write_csv(&sequence, io::sink()).expect("a sink takes all");
+            assert!(finite, "a value is not a number");
+            write_csv(&sequence, io::sink()).expect("a sink accepts everything");
             let _ = sequence.recording();
         }
         Err(error) => assert!(error.to_string().starts_with(&folder.display().to_string()), "{error}"),

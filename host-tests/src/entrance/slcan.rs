@@ -16,8 +16,8 @@ use gyronet_tools::drive::candump::Log;
 /// The answers of a board besides frames.
 const ANSWERS: [&[u8]; 3] = [b"", b"V0101", b"NGYRO"];
 
-/// Takes bytes as a host's commands, while frames go out over a line that takes a few bytes now and then: the output
-/// must be whole lines, each an answer or the frame that was sent.
+/// Receives bytes as a host's commands, while frames are sent over a line that accepts a few bytes at a time. The
+/// output must be whole lines, each an answer or the frame that was sent.
 pub fn board(data: &[u8]) {
     let own = DataFrame::new(StandardId::MAX, &[1, 2, 3]).expect("a frame");
     let mut port = Port::<4>::new(500_000);
@@ -32,17 +32,17 @@ pub fn board(data: &[u8]) {
         }
         if let Some(outgoing) = port.outgoing() {
             assert!(!outgoing.is_empty());
-            let taken = outgoing.len().min(usize::from(byte & 7));
-            sent.extend_from_slice(&outgoing[..taken]);
-            port.sent(taken);
+            let accepted = outgoing.len().min(usize::from(byte & 7));
+            sent.extend_from_slice(&outgoing[..accepted]);
+            port.sent(accepted);
         }
     }
     while let Some(outgoing) = port.outgoing() {
         sent.extend_from_slice(outgoing);
-        let taken = outgoing.len();
-        port.sent(taken);
+        let len = outgoing.len();
+        port.sent(len);
     }
-    assert!(sent.last().is_none_or(|byte| matches!(byte, b'\r' | 7)), "a torn line");
+    assert!(sent.last().is_none_or(|byte| matches!(byte, b'\r' | 7)), "an incomplete line");
     for line in sent.split(|byte| matches!(byte, b'\r' | 7)) {
         let is_status = matches!(line, [b'F', _, _]);
         let is_own = parse(line) == Ok(own)
@@ -59,7 +59,7 @@ pub fn board_seeds() -> Vec<Seed> {
     ]
 }
 
-/// Takes bytes as those that a serial line or a log gives to the monitor. A frame that is read can be written again.
+/// Passes bytes to the monitor as from a serial line or a log. A parsed frame must survive emitting and parsing.
 pub fn host(data: &[u8]) {
     let mut splitter = Splitter::default();
     let mut monitor = Monitor::new(&Config::DEFAULT);
@@ -87,9 +87,9 @@ pub fn host_seeds() -> Vec<Seed> {
         for frame in encoder.encode(&sample) {
             plain.extend(emit(&frame).expect("a data frame"));
             stamped.extend(emit_stamped(&frame, time).expect("a data frame"));
-            candump.frame(time, &frame).expect("a vector takes all");
+            candump.frame(time, &frame).expect("a vector accepts everything");
         }
     }
-    candump.finish().expect("a vector takes all");
+    candump.finish().expect("a vector accepts everything");
     vec![("plain", plain), ("stamped", stamped), ("candump", log)]
 }

@@ -1,9 +1,9 @@
-//! This module reads trajectories of other programs, as a user of the tables gives them.
+//! This module reads trajectories of other programs, as a user passes them to the tables.
 
 use super::Seed;
 use gyronet_tools::paper::trajectory::Trajectory;
 
-/// Takes bytes as a file. Poses have rising times and finite values, and errors can be printed.
+/// Reads bytes as a file. Poses must have rising times and finite values, and an error must name the file.
 pub fn tum(data: &[u8]) {
     let Ok(text) = str::from_utf8(data) else { return };
     match Trajectory::parse("fuzz.txt".into(), text) {

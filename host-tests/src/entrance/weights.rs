@@ -1,4 +1,4 @@
-//! This module gives weight files of both networks to the checks of an upload.
+//! This module passes weight files of both networks to the checks of an upload.
 
 use super::{Seed, byte, take};
 use crate::models;
@@ -14,8 +14,8 @@ fn aligned(bytes: &[u8]) -> Vec<u32> {
     words
 }
 
-/// Returns the built-in file with places of it (three bytes of offset, one of length up to 15) written over and its
-/// checksum made to fit; `None` for data that are a file themselves.
+/// Returns `file` with patches from the data (three bytes of offset, one of length up to 15, then content) and a
+/// valid checksum; `None` if the data are a file themselves.
 fn patched(mut data: &[u8], file: &[u8]) -> Option<Vec<u32>> {
     if byte(&mut data) & 1 == 0 {
         return None;
@@ -36,12 +36,12 @@ fn patched(mut data: &[u8], file: &[u8]) -> Option<Vec<u32>> {
     Some(words)
 }
 
-/// A small model has this shape, with a linear part.
+/// Shape of a small model with a linear part.
 const SMALL: Shape = Shape { units: 8, linear: true };
 static SMALL_FILE: [u8; SMALL.file_len(0)] = models::file(SMALL, 5);
 
-/// Takes bytes as a file, or as changes of the built-in one or of a small one, as the first byte says. An accepted
-/// model must run at the limits of its inputs without an overflow (which panics where these checks run).
+/// Reads bytes as a file, or as patches to the built-in file or to a small one, as the first byte says. An accepted
+/// model must run at the limits of its inputs without an overflow (which panics in the builds of these checks).
 pub fn gyronet(data: &[u8]) {
     let file: &[u8] = match data {
         [first, ..] if first & 2 > 0 => &SMALL_FILE,
@@ -62,7 +62,7 @@ pub fn gyronet(data: &[u8]) {
     }
 }
 
-/// Takes bytes as [`gyronet`] does, for FoGNet; its kernels are the same.
+/// Reads bytes as [`gyronet`] does, for FoGNet; its kernels are the same.
 pub fn fognet(data: &[u8]) {
     let file = &weights::FOGNET.0;
     match patched(data, file) {

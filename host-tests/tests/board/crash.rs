@@ -33,8 +33,8 @@ fn hang_of_each_task() {
         "CAN1_TX",
         "UART4",
         "UART5",
-        "idle::Idle::turn",
-        "output::Output::turn",
+        "idle::Idle::step",
+        "output::Output::step",
     ];
     let Some(mut board) = boot("hang_of_each_task") else { return };
     let samples = drive(40);

@@ -87,7 +87,7 @@ impl Outside {
             rate_of_turn: sample.angular_rate.map(|rate| rate as f32),
             reference: sample.reference[2],
         };
-        let Step { wheels, imu, fog } = Step::of(number, &row);
+        let Step { wheels, imu, fog } = Step::from_row(number, &row);
         let begin = START + SAMPLE * number as u32;
         let message = imu.emit();
         board.send_at(IMU, &message, begin);

@@ -43,7 +43,7 @@ const FAULTS: [&str; 12] = [
 /// A board whose stored configuration names the part; without power.
 fn equipped(test: &str, configuration: Configuration) -> Option<Board> {
     let mut board = common::unpowered(test)?;
-    Stored::default().record(&Configuration { imu: ImuPart::Icm42688, ..configuration }).lay(&mut board);
+    Stored::default().record(&Configuration { imu: ImuPart::Icm42688, ..configuration }).write_to(&mut board);
     Some(board)
 }
 

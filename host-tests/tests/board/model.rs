@@ -53,7 +53,7 @@ fn image_sends_over_slcan_what_the_host_sends() {
     let sent = board.sent(SLCAN);
     let lines: Vec<_> =
         sent.split(|byte| *byte == b'\r').filter(|line| !line.is_empty()).map(<[u8]>::to_vec).collect();
-    let mut host = replay::Board::new().beside(lines.clone());
+    let mut host = replay::Board::new().follow_lines(lines.clone());
     host.push(&messages.concat());
     let text =
         |lines: &[Vec<u8>]| lines.iter().map(|line| line.escape_ascii().to_string()).collect::<Vec<_>>();

@@ -50,7 +50,7 @@ fn crc(file: &[u8]) -> u32 {
 fn used(test: &str, configurations: usize) -> Option<Board> {
     let mut board = common::unpowered(test)?;
     let stored = Stored::default().weights(Slot::A, &other_weights(2)).record(&calibration());
-    (1..=configurations).fold(stored, |stored, k| stored.record(&configuration(k))).lay(&mut board);
+    (1..=configurations).fold(stored, |stored, k| stored.record(&configuration(k))).write_to(&mut board);
     board.power_on();
     // The sensor's silence is in the memory of troubles before anything is cut.
     board.run(SILENCE);

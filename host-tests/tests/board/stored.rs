@@ -182,7 +182,7 @@ fn longest_erase_fits_the_watchdogs_limit_and_the_short_limit_returns() {
     // The sensor's silence is stored behind it.
     assert_eq!(erased_and_reset(&mut board), (vec![10, 1], Vec::new()));
     // Idle hangs.
-    board.patch(At::Symbol("idle::Idle::turn"), &[0xFE, 0xE7]);
+    board.patch(At::Symbol("idle::Idle::step"), &[0xFE, 0xE7]);
     let hung = board.counts().time;
     let reset =
         board.run_until("iwdg_expired", Duration::from_secs(1)).expect("the watchdog resets the board");
@@ -239,7 +239,7 @@ fn fognets_file_is_replaced_and_runs() {
     let configuration = Configuration { fog_lane, fog_serial: 1, ..Configuration::DEFAULT };
     let file = &weights::FOGNET.0;
     let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
-    Stored::default().record(&configuration).lay(&mut board);
+    Stored::default().record(&configuration).write_to(&mut board);
     board.run(START);
     assert_eq!(service::info(&mut board).fognet, Some(Err(SlotError::Empty)));
     let (done, took) = timed(&mut board, |board| upload(&mut on_bus(board), Network::FogNet, file, |_| {}));

@@ -158,7 +158,7 @@ fn diagnosis_with_29_bits_is_configured_over_itself() {
     let [request, functional, response] = ids.ids().expect("they are valid");
     for (id, answer) in [(request, Some(vec![0x7E, 0])), (functional, Some(vec![0x7E, 0])), (response, None)]
     {
-        let heard = Tester::default().ask(&[0x3E, 0], 100, |frames| {
+        let received = Tester::default().ask(&[0x3E, 0], 100, |frames| {
             let frame = |data: &[u8; 8]| DataFrame::new(id, data).expect("eight bytes");
             frames.iter().for_each(|data| board.can_send(&frame(data)));
             board.run(TURN);
@@ -166,7 +166,7 @@ fn diagnosis_with_29_bits_is_configured_over_itself() {
             let ours = sent.iter().filter(|frame| frame.id() == response);
             ours.map(|frame| frame.data().try_into().expect("eight bytes")).collect()
         });
-        assert_eq!(heard, answer, "{id:?}");
+        assert_eq!(received, answer, "{id:?}");
     }
 }
 

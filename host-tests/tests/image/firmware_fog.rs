@@ -30,7 +30,7 @@ fn both_networks_run_with_everything_connected() {
     let mut board = stored.boot(&elf, connected::USARTS, scratch, NAME);
     let start = Instant::now();
     let steps: Vec<Step> =
-        rows.iter().take(SAMPLES).enumerate().map(|(number, row)| Step::of(number, row)).collect();
+        rows.iter().take(SAMPLES).enumerate().map(|(number, row)| Step::from_row(number, row)).collect();
     let outcome = connected::run(&mut board, &configuration, &steps);
     let lines = &outcome.followed.lines;
     println!("{NAME}: {} frames in {:.1?}", outcome.sent, start.elapsed());
@@ -64,7 +64,7 @@ fn weights_for_another_gyro_do_not_run() {
     let Some(elf) = image::coprocessor(NAME, scratch) else { return };
     let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
     let steps: Vec<Step> =
-        rows.iter().take(40).enumerate().map(|(number, row)| Step::of(number, row)).collect();
+        rows.iter().take(40).enumerate().map(|(number, row)| Step::from_row(number, row)).collect();
     let fog_lane = FogLane { fognet: FogNetUse::Simulated, ..FogLane::default() };
     let configuration =
         Configuration { fog_lane, latitude_deg: Some(36.37), fog_serial: 2, ..Configuration::DEFAULT };
@@ -88,7 +88,7 @@ fn the_earth_comes_off_at_four_latitudes() {
     let Some(elf) = image::coprocessor(NAME, scratch) else { return };
     let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
     let steps: Vec<Step> =
-        rows.iter().take(AT_REST).enumerate().map(|(number, row)| Step::of(number, row)).collect();
+        rows.iter().take(AT_REST).enumerate().map(|(number, row)| Step::from_row(number, row)).collect();
     for degrees in [0.0f32, 60.0, -34.0, 36.37] {
         let configuration = Configuration { latitude_deg: Some(degrees), ..Configuration::DEFAULT };
         let stored = Stored::default().record(&configuration);
@@ -100,14 +100,14 @@ fn the_earth_comes_off_at_four_latitudes() {
         assert!(rates.iter().all(|rate| (rate.source, rate.quality) == (Source::EarthRate, Quality::Good)));
         let mean = rates.iter().filter_map(RateMessage::deg_per_sec).sum::<f64>() / rates.len() as f64;
         let reading =
-            steps.iter().enumerate().skip(10).map(|(k, _)| f64::from(connected::reading(k, &rows[k])));
+            steps.iter().enumerate().skip(10).map(|(k, _)| f64::from(connected::fog_reading(k, &rows[k])));
         // Ten readings in 10 ms.
         let read = (reading.sum::<f64>() / (AT_REST - 10) as f64 * 1_000.0).to_degrees();
         let earth = 15.041_07 / 3600.0 * f64::from(degrees).to_radians().sin();
         println!("{NAME}: {degrees} deg: read {read:.6} deg/s, sent {mean:.6} deg/s");
         // 1e-6 deg/s is 0.004 deg/h.
         assert!((read - earth - mean).abs() < 3e-6, "{degrees} deg: {read} less {earth} is not {mean}");
-        let detail = connected::of(lines, FOG_IDS[2]).last().expect("a detail message").1;
+        let detail = connected::frames_with_id(lines, FOG_IDS[2]).last().expect("a detail message").1;
         let detail = DetailMessage::parse(detail.data()).expect("eight bytes");
         assert!((1..SIGMA_UNKNOWN - 1).contains(&detail.sigma), "{detail:?}");
     }

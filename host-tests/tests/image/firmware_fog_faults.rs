@@ -43,7 +43,7 @@ impl Reported {
         let (end, all) = (BEGIN + samples, BEGIN + samples + RECOVERED);
         let rows = drive();
         let mut steps: Vec<Step> =
-            rows.iter().take(all).enumerate().map(|(number, row)| Step::of(number, row)).collect();
+            rows.iter().take(all).enumerate().map(|(number, row)| Step::from_row(number, row)).collect();
         let undamaged = Self(connected::on_host(&AT_THE_EQUATOR, &steps).lines);
         (BEGIN..end).zip(&mut steps[BEGIN..end]).for_each(|(number, step)| fail(number, step));
         let stored = Stored::default().record(&AT_THE_EQUATOR);
@@ -87,8 +87,8 @@ impl Reported {
 
     /// Returns the first and the last sample after the start with which a frame fulfils a condition.
     fn samples(&self, id: u16, is: impl Fn(&[u8]) -> bool) -> Option<(usize, usize)> {
-        let after =
-            connected::of(&self.0, id).filter(|(sample, frame)| *sample >= STARTED && is(frame.data()));
+        let after = connected::frames_with_id(&self.0, id)
+            .filter(|(sample, frame)| *sample >= STARTED && is(frame.data()));
         let samples: Vec<usize> = after.map(|(sample, _)| sample).collect();
         Some((*samples.first()?, *samples.last()?))
     }
@@ -138,8 +138,8 @@ fn garbage_from_the_fibre_optic_gyro_is_a_gap() {
 fn a_stuck_fibre_optic_gyro_is_reported_after_10_ms() {
     const STUCK: usize = 40;
     let rows = drive();
-    let held = connected::reading(BEGIN - 1, &rows[BEGIN - 1]);
-    let stuck = |number: usize, step: &mut Step| step.fog = connected::fog(number, held);
+    let held = connected::fog_reading(BEGIN - 1, &rows[BEGIN - 1]);
+    let stuck = |number: usize, step: &mut Step| step.fog = connected::fog_bytes(number, held);
     let Some(reported) = Reported::of("a_stuck_fibre_optic_gyro_is_reported_after_10_ms", STUCK, stuck)
     else {
         return;

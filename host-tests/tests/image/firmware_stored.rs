@@ -62,7 +62,7 @@ impl Started {
         alone.push(&bytes);
         board.send(IMU, &bytes, LIMIT);
         let lines = board.lines(SLCAN, b'\r', alone.lines.len(), LIMIT);
-        let mut host = host().beside(lines);
+        let mut host = host().follow_lines(lines);
         host.push(&bytes);
         let lines = board.lines(SLCAN, b'\r', host.lines.len(), LIMIT);
         replay::assert_same(&lines, &host.lines);
@@ -146,7 +146,7 @@ fn a_fibre_optic_gyro_is_sent_under_configured_identifiers() {
     let configuration = Configuration { fog_ids: [OTHER, OTHER + 1, OTHER + 2], ..Configuration::DEFAULT };
     let mut board = Stored::default().record(&configuration).boot(&elf, connected::USARTS, scratch, NAME);
     let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
-    let steps: Vec<Step> = rows.iter().take(50).enumerate().map(|(k, row)| Step::of(k, row)).collect();
+    let steps: Vec<Step> = rows.iter().take(50).enumerate().map(|(k, row)| Step::from_row(k, row)).collect();
     let outcome = connected::run(&mut board, &configuration, &steps);
     let sent = |id| connected::rates(&outcome.followed.lines, id).count();
     assert!(sent(OTHER) >= 48 && sent(FOG_IDS[0]) == 0, "{} {}", sent(OTHER), sent(FOG_IDS[0]));

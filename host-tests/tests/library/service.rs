@@ -25,7 +25,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 type Board = Device<Region<RECORD_SECTOR>, MappedRegion>;
-const DRIVES: SupportedHardware =
+const SUPPORTED_HARDWARE: SupportedHardware =
     SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760], bits_per_second: &[500_000] };
 const IDENTITY: Identity = Identity {
     firmware: [0, 1, 0],
@@ -48,7 +48,7 @@ const IDENTITY: Identity = Identity {
 
 fn start(flash: &Rc<RefCell<F405>>) -> Board {
     let records = Region::new(flash, layout::STORE);
-    let mut board = Board::new(&DRIVES);
+    let mut board = Board::new(&SUPPORTED_HARDWARE);
     board.begin(Some(records), Some(MappedRegion::new(flash)), true, IDENTITY);
     let slots = MappedRegion::new(flash);
     let blob = board.weights(Some(slots.current()), &DEFAULT.0);
@@ -59,7 +59,7 @@ fn start(flash: &Rc<RefCell<F405>>) -> Board {
 
 /// A board without a flash controller, as in the emulator.
 fn bare() -> Board {
-    let mut board = Board::new(&DRIVES);
+    let mut board = Board::new(&SUPPORTED_HARDWARE);
     board.begin(None, None, false, IDENTITY);
     board.weights(None, &DEFAULT.0);
     board

@@ -1,6 +1,6 @@
-//! The boards that an image can be built for: crystal, pins and bit rates, one file each.
+//! Descriptions of the boards that an image can be built for: crystal, pins and bit rates, one file each.
 //!
-//! A Cargo feature selects the board. Everything else in the images knows only this description.
+//! A Cargo feature selects the board. All other code of the images uses only this description.
 
 #[cfg(all(feature = "netduino-plus-2", not(feature = "olimex-stm32-h405")))]
 mod netduino_plus_2;
@@ -21,7 +21,7 @@ use crate::stm32f405::pins::Pin;
 
 /// Describes a board.
 pub struct Board {
-    /// Its name, as `bringup` prints it.
+    /// Name of the board, as `bringup` prints it.
     #[allow(dead_code, reason = "coprocessor does not print it")]
     pub name: &'static str,
     /// Frequency of the crystal at OSC_IN, Hz: 4 to 26 MHz, a whole number of MHz.

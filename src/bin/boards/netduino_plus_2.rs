@@ -3,7 +3,7 @@
 use super::{Board, Line};
 use crate::stm32f405::pins::Pin;
 
-/// The board.
+/// Description of the Netduino Plus 2.
 pub const BOARD: Board = Board {
     name: "Netduino Plus 2",
     crystal_hz: 25_000_000,

@@ -3,11 +3,11 @@
 use super::{Board, Line};
 use crate::stm32f405::pins::Pin;
 
-/// The board.
+/// Description of the Olimex STM32-H405.
 pub const BOARD: Board = Board {
     name: "Olimex STM32-H405",
     crystal_hz: 8_000_000,
-    // The LED hangs between the supply and the pin.
+    // The LED is connected between the supply and the pin, so a low level lights it.
     led: (Pin::new('C', 12), false),
     imu: Line { tx: Pin::new('A', 9), rx: Pin::new('A', 10), baud: 115_200, fallback_baud: 115_200 },
     slcan: Line { tx: Pin::new('A', 2), rx: Pin::new('A', 3), baud: 921_600, fallback_baud: 500_000 },

@@ -1,15 +1,15 @@
 //! This module handles the brown-out reset's level, an option byte (RM0090 3.6, 3.9.6).
 //!
-//! Below the level the chip is held in reset, so nothing runs or is programmed at a supply that it was not made
-//! for. A new chip has the lowest level, 1.8 V. The option byte is read when power comes on.
+//! Below the level the chip is held in reset, so no code runs and no flash is programmed while the supply is too low.
+//! A new chip has the lowest level, 1.8 V. The option byte is loaded at power-on.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
-use crate::stm32f405::{flash::FlashError, pac, supply};
+use crate::stm32f405::{flash::FlashError, pac, supply, wait_until};
 
 const KEYS: [u32; 2] = [0x0819_2A3B, 0x4C5D_6E7F];
 /// BOR_LEV = 00: level 3, 2.75 to 2.90 V falling (DS8626 table 21).
 const LEVEL_3: u8 = 0b00;
-/// Polls before the option bytes are given up; they take as long as an erase of 16 KiB.
+/// Polls before programming the option bytes times out; it takes as long as an erase of 16 KiB.
 const POLLS: u32 = 20_000_000;
 
 /// Returns whether the option byte holds level 3.
@@ -17,10 +17,10 @@ pub fn is_level_3(flash: &pac::FLASH) -> bool {
     flash.optcr().read().bor_lev().bits() == LEVEL_3
 }
 
-/// Programs level 3, which holds from the next time that power comes on.
+/// Programs level 3, which takes effect at the next power-on.
 ///
 /// # Errors
-/// [`FlashError`]; the option bytes are as they were.
+/// [`FlashError`] if the controller refuses the change or does not finish it, or level 3 does not read back.
 pub fn set_level_3(flash: &pac::FLASH) -> Result<(), FlashError> {
     if supply::is_low() {
         return Err(FlashError::SupplyLow);
@@ -35,7 +35,7 @@ pub fn set_level_3(flash: &pac::FLASH) -> Result<(), FlashError> {
     // SAFETY: one of the four levels; the other options keep their values.
     flash.optcr().modify(|_, w| unsafe { w.bor_lev().bits(LEVEL_3) });
     flash.optcr().modify(|_, w| w.optstrt().set_bit());
-    let done = (0..POLLS).any(|_| flash.sr().read().bsy().bit_is_clear());
+    let done = wait_until(POLLS, || flash.sr().read().bsy().bit_is_clear());
     flash.optcr().modify(|_, w| w.optlock().set_bit());
     if !done {
         Err(FlashError::Busy)

@@ -1,4 +1,4 @@
-//! The serial lines: bytes come back where a wire connects TX with RX, and an idle line is high.
+//! Checks the serial lines: where a wire connects TX with RX, every byte must return. An open RX is pulled high.
 
 #![allow(unsafe_code, reason = "memory that DMA reads; the block says why it is sound")]
 
@@ -7,12 +7,13 @@ use crate::report::Report;
 use crate::stm32f405::clocks::Clocks;
 use crate::stm32f405::pins::{self, Speed};
 use crate::stm32f405::usart::Usart;
+use crate::stm32f405::wait_until;
 
 static PATTERN: [u8; 4] = [0x55, 0xAA, 0x00, 0xFF];
-/// Polls for a byte: several byte times at 115200.
+/// Polls before a byte times out: several byte times at 115200 baud.
 const POLLS: u32 = 20_000;
 
-/// Checks the lines beside the one that reports.
+/// Checks the lines other than USART6, which carries the report, and both DMA controllers.
 pub fn check_all(report: &mut Report, clocks: &Clocks) {
     let lines = [
         ("USART1", &BOARD.imu, clocks.apb2_hz, Usart::one()),
@@ -28,21 +29,18 @@ pub fn check_all(report: &mut Report, clocks: &Clocks) {
             usart,
         );
     }
-    report.look(
-        "USART6",
-        format_args!("sends these lines; whoever reads them over RTT alone has not seen it send"),
-    );
+    report.manual_check("USART6", format_args!("sends these lines; reading them over RTT does not check it"));
     check_dma(report, [Usart::one(), Usart::two()]);
 }
 
-/// Lets one stream of each controller send the pattern.
+/// Sends the pattern with one stream of each controller.
 fn check_dma(report: &mut Report, usarts: [Usart; 2]) {
     for usart in usarts {
         usart.request_dma();
         // SAFETY: the pattern is a static.
         unsafe { usart.send_from(PATTERN.as_ptr(), PATTERN.len() as u16) };
-        if !(0..POLLS).any(|_| !usart.is_sending() && usart.status().sent()) {
-            return report.fail("DMA", format_args!("bytes stay"));
+        if !wait_until(POLLS, || !usart.is_sending() && usart.status().sent()) {
+            return report.fail("DMA", format_args!("bytes are not sent"));
         }
     }
     report.pass("DMA", format_args!("both controllers send"));
@@ -53,26 +51,27 @@ fn check(report: &mut Report, name: &str, line: &Line, (bus_hz, baud): (u32, u32
     line.rx.alternate(pins::USART_1_TO_3, Speed::Low);
     line.tx.alternate(pins::USART_1_TO_3, Speed::Low);
     usart.start(bus_hz, baud);
-    let mut came = 0;
+    let mut received = 0;
     for byte in PATTERN {
-        if !(0..POLLS).any(|_| usart.status().room()) {
-            return report.fail(name, format_args!("it takes no byte"));
+        if !wait_until(POLLS, || usart.status().room()) {
+            return report.fail(name, format_args!("it accepts no byte"));
         }
         usart.write(byte);
-        if !(0..POLLS).any(|_| usart.status().sent()) {
-            return report.fail(name, format_args!("a byte does not leave"));
+        if !wait_until(POLLS, || usart.status().sent()) {
+            return report.fail(name, format_args!("a byte is not sent"));
         }
-        if (0..POLLS).any(|_| usart.status().received()) {
+        if wait_until(POLLS, || usart.status().received()) {
             let damaged = usart.status().damaged();
             let got = usart.read();
             if damaged || got != byte {
                 return report.fail(name, format_args!("{byte:#04x} came back as {got:#04x}"));
             }
-            came += 1;
+            received += 1;
         }
     }
-    match came {
-        0 => report.look(name, format_args!("sends at {baud} baud; connect TX with RX to see it receive")),
+    match received {
+        0 => report
+            .manual_check(name, format_args!("sends at {baud} baud; connect TX with RX to see it receive")),
         n if n == PATTERN.len() => report.pass(name, format_args!("{baud} baud, looped")),
         n => report.fail(name, format_args!("{n} of {} bytes came back", PATTERN.len())),
     }

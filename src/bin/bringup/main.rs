@@ -1,10 +1,10 @@
-//! Tries every peripheral of a board once and prints a line for each: `PASS`, `FAIL` with the reason, or `----` where
-//! a person must look.
+//! Bring-up test: tries every peripheral of a board once and prints a line for each: `PASS`, `FAIL` with the reason,
+//! or `----` where a person must check.
 //!
-//! The lines go out on USART6 (115200 8N1) and over RTT. This
-//! is the first image for a new board: it needs no sensor, no bus and no host. The drivers are those of the
-//! coprocessor. The last check lets the watchdog reset the chip, so the image starts twice and reports that check the
-//! second time. It erases nothing but the last sector, and that only where it is blank.
+//! The lines are sent on USART6 (115200 8N1) and over RTT. Run this image first on a new board: it needs no sensor,
+//! no bus and no host. It uses the coprocessor's drivers. In the last check the watchdog resets the chip, so the
+//! image starts twice and reports that check the second time. It erases nothing but the last sector, and only if the
+//! first 64 bytes of that sector are blank.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -48,7 +48,7 @@ mod firmware {
         let chip = Chip::start(&p, BOARD.crystal_hz);
         let mut report = Report::start(&chip);
         if let Some(elapsed_us) = reset::elapsed(chip.reset) {
-            reset::judge(&mut report, elapsed_us);
+            reset::report_result(&mut report, elapsed_us);
             report.end();
         }
         peripherals::led(&mut report, &chip.clocks);
@@ -65,7 +65,7 @@ mod firmware {
 
     #[panic_handler]
     fn panic(info: &PanicInfo<'_>) -> ! {
-        Report::again().fail("bringup", format_args!("{info}"));
+        Report::attach().fail("bringup", format_args!("{info}"));
         cortex_m::peripheral::SCB::sys_reset()
     }
 }

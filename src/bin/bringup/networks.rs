@@ -1,4 +1,4 @@
-//! Cycles of the networks on this chip, by DWT_CYCCNT: the figures that the cycle model predicts.
+//! Measures the cycles of the networks on this chip with DWT_CYCCNT, to compare with the cycle model.
 #![allow(unsafe_code, reason = "memory by address; the block says why it is sound")]
 
 use crate::report::Report;
@@ -15,7 +15,7 @@ use gyronet::store::layout::FOGNET;
 use gyronet::store::slots::{self, SlotError};
 use gyronet::units::Angle;
 
-/// Counts a window of each network.
+/// Measures one window of each network.
 pub fn count(report: &mut Report, mut dcb: DCB, mut dwt: DWT) {
     dcb.enable_trace();
     dwt.enable_cycle_counter();
@@ -45,7 +45,7 @@ fn fognet(report: &mut Report) {
     let blob = match found {
         Ok(blob) => blob,
         Err(SlotError::Empty) => {
-            return report.look("FoGNet", format_args!("no weight file in its place: not tried"));
+            return report.manual_check("FoGNet", format_args!("no weight file in its place: not tried"));
         }
         Err(error) => return report.fail("FoGNet", format_args!("{error}")),
     };

@@ -1,4 +1,4 @@
-//! The checks of LED, clock, supply, CAN, sensor and flash.
+//! Checks of the LED, the clock, the supply, CAN, the sensor and the flash.
 
 use crate::boards::BOARD;
 use crate::brownout;
@@ -15,7 +15,7 @@ use gyronet::store::layout::{SLOT_SIZE, SLOTS};
 /// Register WHO_AM_I of an ICM-42688-P with the read bit, and its value (DS-000347 14.55).
 const WHO_AM_I: u8 = 0x75 | 0x80;
 const ICM_42688: u8 = 0x47;
-/// A frame at 500 kbit/s takes 0.25 ms.
+/// Time limit for the frames in loopback, us. A frame at 500 kbit/s takes 0.25 ms.
 const FRAME_US: u64 = 5_000;
 
 /// Blinks the LED.
@@ -26,7 +26,7 @@ pub fn led(report: &mut Report, clocks: &Clocks) {
         led.set(level);
         cortex_m::asm::delay(clocks.core_hz / 10);
     }
-    report.look("LED", format_args!("it has blinked twice"));
+    report.manual_check("LED", format_args!("it has blinked twice"));
 }
 
 /// Reports the clock, with the crystal measured against the internal oscillator.
@@ -62,7 +62,7 @@ pub fn supply(report: &mut Report, flash: &pac::FLASH) {
     }
 }
 
-/// Sends frames in loopback, through the filter, and one that the filter must stop.
+/// Sends two frames in loopback that must pass the filter, and one that the filter must stop.
 pub fn can(report: &mut Report, chip: &Chip, registers: pac::CAN1) {
     const NAME: &str = "CAN";
     if !chip.clocks.exact() {
@@ -82,11 +82,11 @@ pub fn can(report: &mut Report, chip: &Chip, registers: pac::CAN1) {
         }
     }
     let until = timer::micros() + FRAME_US;
-    let mut came = [None; 2];
-    for place in &mut came {
+    let mut received = [None; 2];
+    for place in &mut received {
         *place = loop {
-            if let Some(received) = can::receive() {
-                break received.frame;
+            if let Some(next) = can::receive() {
+                break next.frame;
             }
             if timer::micros() > until {
                 break None;
@@ -94,15 +94,15 @@ pub fn can(report: &mut Report, chip: &Chip, registers: pac::CAN1) {
         };
     }
     let due = [sent[1], sent[2]];
-    if came == due && can.state() == State::Active {
+    if received == due && can.state() == State::Active {
         report.pass(NAME, format_args!("2 frames in loopback, the filter stops a third"));
     } else {
-        let count = came.iter().flatten().count();
+        let count = received.iter().flatten().count();
         report.fail(NAME, format_args!("{count} of 2 frames came back as sent, {:?}", can.state()));
     }
 }
 
-/// Asks a sensor on SPI1 for its identity.
+/// Reads the identity of a sensor on SPI1.
 pub fn sensor(report: &mut Report, registers: &pac::SPI1) {
     const NAME: &str = "SPI1";
     let mut spi = spi::start(registers, BOARD.spi);
@@ -110,13 +110,12 @@ pub fn sensor(report: &mut Report, registers: &pac::SPI1) {
     match spi.transaction(&mut [Operation::Write(&[WHO_AM_I]), Operation::Read(&mut identity)]) {
         Err(error) => report.fail(NAME, format_args!("{error:?}")),
         Ok(()) if identity == [ICM_42688] => report.pass(NAME, format_args!("an ICM-42688-P answers")),
-        Ok(()) => {
-            report.look(NAME, format_args!("no ICM-42688-P answers (WHO_AM_I is {:#04x})", identity[0]))
-        }
+        Ok(()) => report
+            .manual_check(NAME, format_args!("no ICM-42688-P answers (WHO_AM_I is {:#04x})", identity[0])),
     }
 }
 
-/// Programs and erases the last sector, where it is blank.
+/// Programs and erases the last sector, if its first 64 bytes are blank.
 pub fn flash(report: &mut Report, registers: pac::FLASH) {
     const NAME: &str = "flash";
     let flash = Flash::new(registers);
@@ -124,7 +123,7 @@ pub fn flash(report: &mut Report, registers: pac::FLASH) {
     let mut first = [0; 64];
     flash.read(sector, &mut first);
     if first != [0xFF; 64] {
-        return report.look(NAME, format_args!("sector 11 holds a weight file: not tried"));
+        return report.manual_check(NAME, format_args!("sector 11 holds a weight file: not tried"));
     }
     let begin = timer::micros();
     let tried = try_sector(&flash, sector);
@@ -137,6 +136,6 @@ pub fn flash(report: &mut Report, registers: pac::FLASH) {
 
 fn try_sector(flash: &Flash, sector: u32) -> Result<(), FlashError> {
     flash.write(sector, &[0x55, 0xAA, 0x00, 0xF0, 1, 2, 3, 4])?;
-    // The driver checks that what it has erased reads as ones.
+    // The driver checks that the erased sector reads as ones.
     flash.erase(sector)
 }

@@ -3,13 +3,13 @@
 use crate::boards::BOARD;
 use crate::stm32f405::pins::{self, Speed};
 use crate::stm32f405::usart::Usart;
-use crate::stm32f405::{Chip, watchdog};
+use crate::stm32f405::{Chip, wait_until, watchdog};
 use core::fmt::{self, Write};
 
-/// Polls before a byte is given up: several byte times at 115200.
+/// Polls before a byte is dropped: several byte times at 115200 baud.
 const POLLS: u32 = 100_000;
 
-/// The place where lines go.
+/// Prints the results, and counts the checks that have failed.
 pub struct Report {
     usart: Usart,
     failed: u32,
@@ -23,7 +23,7 @@ impl Report {
         line.rx.pull_up();
         line.rx.alternate(pins::USART_6, Speed::Low);
         line.tx.alternate(pins::USART_6, Speed::Low);
-        let mut report = Self::again();
+        let mut report = Self::attach();
         let baud = if chip.clocks.exact() { line.baud } else { line.fallback_baud };
         report.usart.start(chip.clocks.apb2_hz, baud);
         report.print(format_args!(
@@ -36,8 +36,8 @@ impl Report {
         report
     }
 
-    /// Uses the outputs once more, for a panic.
-    pub fn again() -> Self {
+    /// Returns a report on the outputs without starting them; also for a panic.
+    pub fn attach() -> Self {
         Self { usart: Usart::six(), failed: 0 }
     }
 
@@ -45,7 +45,7 @@ impl Report {
     pub fn print(&mut self, text: fmt::Arguments<'_>) {
         watchdog::feed();
         rtt_target::rprintln!("{}", text);
-        // Neither output gives an error: a byte that is not taken in time is left out.
+        // Neither output reports errors: a byte that is not accepted in time is dropped.
         let _ = self.write_fmt(text);
         let _ = self.write_str("\r\n");
     }
@@ -61,17 +61,17 @@ impl Report {
         self.print(format_args!("{what:<12} FAIL  {text}"));
     }
 
-    /// Reports what a person must look at, or what needs a wire or a sensor.
-    pub fn look(&mut self, what: &str, text: fmt::Arguments<'_>) {
+    /// Reports what a person must check, or what needs a wire or a sensor.
+    pub fn manual_check(&mut self, what: &str, text: fmt::Arguments<'_>) {
         self.print(format_args!("{what:<12} ----  {text}"));
     }
 
-    /// The number of checks that have failed.
+    /// Returns the number of checks that have failed.
     pub fn failed(&self) -> u32 {
         self.failed
     }
 
-    /// Blinks for ever: everything has been reported.
+    /// Blinks forever, after everything has been reported.
     pub fn end(&mut self) -> ! {
         let (led, lit) = BOARD.led;
         led.output(!lit);
@@ -88,7 +88,7 @@ impl Report {
 impl Write for Report {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         for byte in text.bytes() {
-            if (0..POLLS).any(|_| self.usart.status().room()) {
+            if wait_until(POLLS, || self.usart.status().room()) {
                 self.usart.write(byte);
             }
         }

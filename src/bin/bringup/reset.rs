@@ -1,6 +1,6 @@
-//! The watchdog's check: the chip must reset when it is not fed, within the limit's tolerance.
+//! Check of the watchdog: it must reset a chip that does not feed it, within the tolerance of the limit.
 //!
-//! RAM that a reset does not clear keeps the results of the first start.
+//! The results of the first start are kept in RAM that a reset does not clear.
 #![allow(unsafe_code, reason = "memory without a value at the start; each block says why it is sound")]
 
 use crate::report::Report;
@@ -9,33 +9,33 @@ use core::mem::MaybeUninit;
 use core::ptr::{addr_of_mut, read_volatile, write_volatile};
 use gyronet::service::event::ResetCause;
 
-/// Marks a wait for the watchdog.
+/// Marks [`WAIT`] as valid: the image was waiting for the watchdog.
 const WAITING: u32 = 0xB0A2_D06E;
-/// Limits for 100 ms at 47 and 17 kHz, with the time until the new limit counts, us.
+/// Accepted times until the reset, us: 100 ms at 47 and 17 kHz, plus the time until the new limit takes effect.
 const LIMITS_US: core::ops::RangeInclusive<u32> = 60_000..=200_000;
-/// Checks that failed before are kept in the same word as the time: 24 bits of time.
+/// Bits of the second word that hold the time; the number of failed checks is in the bits above.
 const TIME_BITS: u32 = 24;
 
 #[unsafe(link_section = ".uninit.bringup")]
 static mut WAIT: MaybeUninit<[u32; 2]> = MaybeUninit::uninit();
 
 fn write(words: [u32; 2]) {
-    // SAFETY: nothing else uses it, and there are no interrupts.
+    // SAFETY: nothing else uses `WAIT`, and there are no interrupts.
     unsafe { write_volatile(addr_of_mut!(WAIT).cast(), words) };
 }
 
-/// The time that the chip waited for the watchdog before this start, us, with the failed checks above it;
-/// `None`: this is the first start.
+/// Returns the time that the chip waited for the watchdog before this start, us, with the number of failed checks in
+/// the upper bits; `None` at the first start.
 pub fn elapsed(cause: ResetCause) -> Option<u32> {
     // SAFETY: any bits are words; see `write`.
     let [mark, elapsed] = unsafe { read_volatile(addr_of_mut!(WAIT).cast::<[u32; 2]>()) };
     write([0; 2]);
-    // A watchdog that was held up resets a whole image by another cause, and that is then its first start.
+    // After a reset with another cause, the image runs all checks again.
     (mark == WAITING && matches!(cause, ResetCause::Watchdog)).then_some(elapsed)
 }
 
-/// Reports the watchdog, and how many checks have failed in all.
-pub fn judge(report: &mut Report, elapsed: u32) {
+/// Reports the watchdog check, and how many checks have failed in total.
+pub fn report_result(report: &mut Report, elapsed: u32) {
     let (us, failed) = (elapsed & ((1 << TIME_BITS) - 1), elapsed >> TIME_BITS);
     if LIMITS_US.contains(&us) {
         report.pass("watchdog", format_args!("reset the chip after {} ms (60 to 200)", us / 1_000));

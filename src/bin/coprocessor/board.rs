@@ -1,4 +1,4 @@
-//! This module holds the board's lines, and the state that it reports.
+//! This module holds the lines of the board, and the state that the board reports.
 #![allow(
     unsafe_code,
     clippy::undocumented_unsafe_blocks,
@@ -18,29 +18,29 @@ use gyronet::health::supervisor::Supervisor;
 use gyronet::service::event::CanFault;
 use gyronet::service::message::Identity;
 
-/// Collects which tasks have run.
+/// Records which tasks have run, for the watchdog.
 pub static SUPERVISOR: Supervisor = Supervisor::new();
 
-// SAFETY: each belongs to one line, which `Board::start` starts.
+// SAFETY: each element belongs to one line, which `Board::start` starts.
 static MEMORY: [serial::Memory; 4] = [const { unsafe { serial::Memory::new() } }; 4];
 
-/// The tasks' ends of everything.
+/// The parts of the board that the tasks own.
 pub struct Board {
     pub imu: serial::Port,
     pub fog: serial::Port,
     pub slcan: serial::Port,
     pub service: serial::Port,
-    /// The CAN controller; `None` where it does not answer, or the clock is not exact enough.
+    /// The CAN controller; `None` if it does not answer or the clock is not exact enough.
     pub can: Option<Can>,
     pub spi: Spi,
     /// True where the board is emulated without a clock tree: its sensors send at the host's pace.
     pub emulated: bool,
     pub clocks: Clocks,
-    /// The board's report of itself.
+    /// What the board reports about itself.
     pub identity: Identity,
 }
 
-/// The interrupts' ends; the tick's are `None` in the emulator.
+/// The parts of the lines that the interrupt handlers own; `receptions`, the tick's, are `None` in the emulator.
 pub struct Handlers {
     pub imu: serial::Handler,
     pub fog: serial::Handler,
@@ -50,7 +50,7 @@ pub struct Handlers {
 }
 
 impl Board {
-    /// Starts everything.
+    /// Starts the chip and everything on the board; returns what tasks and interrupt handlers own.
     pub fn start(p: pac::Peripherals, systick: SYST) -> (Self, Handlers) {
         let Chip { clocks, device_id, reset } = Chip::start(&p, BOARD.crystal_hz);
         assign_pins();
@@ -58,7 +58,7 @@ impl Board {
         let identity = Identity {
             firmware: version(),
             device_id,
-            // The emulator has no such memory.
+            // The emulator has no memory at that address.
             serial: device_id.map(|_| serial_number::read()).unwrap_or_default(),
             clock_hz: clocks.core_hz,
             clock_fault: clocks.fault,
@@ -87,10 +87,10 @@ impl Board {
     }
 }
 
-/// A line's USART, the frequency of its bus with its bit rate, and its memory.
+/// USART of a line, its bus frequency and bit rate, and its memory.
 type Line = (Usart, (u32, u32), &'static serial::Memory);
 
-/// Names what belongs to the lines, in the order IMU, SLCAN, fibre-optic gyro, service.
+/// Returns the lines in the order IMU, SLCAN, fibre-optic gyro, service.
 fn lines(clocks: &Clocks) -> [Line; 4] {
     let [imu, slcan, fog, service] = &MEMORY;
     // At 16 MHz, 921600 baud would be 2.1 % off before the oscillator's own error.
@@ -112,7 +112,7 @@ fn start_ticks(mut systick: SYST, clocks: &Clocks) {
     systick.enable_counter();
 }
 
-/// Hands the pins to USARTs and CAN. A line that hangs open reads as idle.
+/// Assigns the pins of USARTs, LED and CAN. An unconnected line reads as idle.
 fn assign_pins() {
     let lines = [
         (&BOARD.imu, pins::USART_1_TO_3),

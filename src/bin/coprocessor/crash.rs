@@ -1,8 +1,8 @@
-//! Keeps the reason of a crash in RAM that a reset does not clear.
+//! Keeps the reason for a crash in RAM that a reset does not clear.
 //!
-//! The handler of hard faults begins by setting the stack pointer to the top of the stack: after an
-//! overflow it points below the RAM, and the first push of a compiled function would lock the
-//! processor up (ARMv7-M, B1.5.15), so that only the watchdog would end it, without a reason.
+//! The HardFault handler first sets the stack pointer to the top of the stack. After an overflow the stack pointer is
+//! below the RAM, and the first push of a compiled function would lock up the processor (ARMv7-M, B1.5.15); the
+//! watchdog would then reset the chip without a recorded reason.
 #![allow(unsafe_code, reason = "memory without a value at the start, and exception handlers")]
 
 use core::arch::naked_asm;
@@ -13,12 +13,12 @@ use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
 use gyronet::service::crash::{Crash, CrashKind, FILE};
 
-/// Marks a record as one. After power-on the RAM holds anything.
+/// Marks a valid record: after power-on the RAM holds arbitrary bits.
 const MAGIC: u32 = 0x4752_4E44;
 /// Words of a record: magic, count of crashes, kind (0: none since the last start), place, link, status, address,
 /// file, check word.
 const WORDS: usize = 7 + FILE / 4 + 1;
-/// The RAM that a stack pointer can be in, and bytes of an exception frame.
+/// Addresses that a stack pointer can hold, and the size of an exception frame in bytes.
 const RAM: core::ops::Range<u32> = 0x2000_0000..0x2002_0000;
 const FRAME: u32 = 32;
 
@@ -27,14 +27,14 @@ type Words = [u32; WORDS];
 #[unsafe(link_section = ".uninit.crash")]
 static mut RECORD: MaybeUninit<Words> = MaybeUninit::uninit();
 
-/// The check word of a record.
+/// Returns the check word of a record.
 fn check(words: &Words) -> u32 {
     words.iter().take(WORDS - 1).fold(MAGIC, |check, word| check.rotate_left(5) ^ word)
 }
 
 fn read() -> Option<Words> {
-    // SAFETY: any bits are words. Nothing else runs: this is before the first interrupt, or the
-    // last thing that happens.
+    // SAFETY: any bits are words. Nothing else runs: this is before the first interrupt, or in a
+    // handler that ends in a reset.
     let words = unsafe { read_volatile(addr_of_mut!(RECORD).cast::<Words>()) };
     (words[0] == MAGIC && words[WORDS - 1] == check(&words)).then_some(words)
 }
@@ -46,7 +46,7 @@ fn write(mut words: Words) {
     unsafe { write_volatile(addr_of_mut!(RECORD).cast::<Words>(), words) };
 }
 
-/// Gives the crash that led to this start, if one did, and clears it.
+/// Returns the crash that caused this start, if any, and clears it.
 pub fn take() -> Option<Crash> {
     let words = read()?;
     let [_, count, kind, place, link, status, address, ..] = words;
@@ -68,7 +68,7 @@ pub fn take() -> Option<Crash> {
     Some(Crash { kind, place, link, status, address, file, count })
 }
 
-/// Keeps a crash and resets the chip.
+/// Records a crash and resets the chip.
 fn crash(kind: u32, [place, link, status, address]: [u32; 4], path: &str) -> ! {
     let mut words = [0; WORDS];
     words[1] = read().map_or(0, |words| words[1]).saturating_add(1);
@@ -88,7 +88,7 @@ fn crash(kind: u32, [place, link, status, address]: [u32; 4], path: &str) -> ! {
     SCB::sys_reset()
 }
 
-/// Ends the image because the supply has fallen; the start waits for it to rise.
+/// Resets the chip because the supply has fallen; the next start waits until the supply is high enough.
 pub fn supply_low() -> ! {
     crash(4, [0; 4], "")
 }
@@ -99,7 +99,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     crash(1, [line, 0, 0, 0], file)
 }
 
-/// The hard fault's vector. Puts the stack where it began, with the old stack pointer as the argument.
+/// Handles HardFault: sets the stack pointer to the top of the stack, and passes the old one to [`hard_fault`].
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 unsafe extern "C" fn HardFault() -> ! {
@@ -113,7 +113,7 @@ unsafe extern "C" fn HardFault() -> ! {
     )
 }
 
-/// Keeps the content of the exception frame, if the stack pointer still points into the RAM.
+/// Records the exception frame, if the stack pointer still points into the RAM.
 unsafe extern "C" fn hard_fault(stack: u32) -> ! {
     let inside = RAM.contains(&stack) && RAM.end - stack >= FRAME && stack.is_multiple_of(4);
     let word = |k: u32| {
@@ -128,7 +128,7 @@ unsafe extern "C" fn hard_fault(stack: u32) -> ! {
     crash(2, [word(6), word(5), status, address], "")
 }
 
-/// The NMI, which only the clock security system raises: the crystal has stopped, and the chip runs on the
+/// Handles the NMI, which only the clock security system raises: the crystal has stopped, and the chip runs on the
 /// internal oscillator.
 #[exception]
 unsafe fn NonMaskableInt() -> ! {

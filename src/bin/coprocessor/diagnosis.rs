@@ -1,8 +1,8 @@
-//! Frames of testers, from the lines to the diagnostic server in idle and back. The service line is SLCAN with nothing
-//! but these frames; its 115200 bit/s could not carry all messages of the board.
+//! Moves diagnostic frames between the lines and the diagnostic server, which runs in idle. The service line is SLCAN
+//! that carries only these frames; at 115200 bit/s it could not carry all messages of the board.
 //!
-//! A tester waits for a flow control after as many frames as a ring has places, so that none is lost however long idle
-//! is kept from its turn. Responses leave after the rates that wait.
+//! A tester waits for a flow control frame after as many frames as a ring can hold, so that none is lost however long
+//! idle is preempted. Responses are sent after the waiting rates.
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
 use crate::pause;
@@ -42,8 +42,8 @@ pub static RESPONSES: Ring<(Line, DataFrame), 16> =
     // SAFETY: idle writes, the output task reads.
     unsafe { Ring::new() };
 
-/// The identifiers of requests to this board, requests to all, and frames of this board, as [`pack`] makes them. Set
-/// before any task runs.
+/// Identifiers of requests to this board, of requests to all servers, and of this board's responses, as [`pack`]
+/// encodes them. Set before any task runs.
 static IDS: [AtomicU32; 3] = [const { AtomicU32::new(u32::MAX) }; 3];
 
 /// Sets the identifiers.
@@ -62,7 +62,7 @@ fn ids() -> [u32; 3] {
     [request, functional, response].map(|id| id.load(Ordering::Relaxed))
 }
 
-/// The mark of 29 bits.
+/// Marks an identifier of 29 bits.
 const EXTENDED: u32 = 1 << 31;
 
 fn pack(id: Id) -> u32 {
@@ -79,7 +79,7 @@ fn unpack(packed: u32) -> Option<Id> {
     }
 }
 
-/// A tester has stopped the messages of the board.
+/// True while a tester has stopped the messages of the board.
 static SILENCED: AtomicBool = AtomicBool::new(false);
 
 /// Returns whether a tester has stopped the messages of the board.
@@ -95,10 +95,10 @@ pub struct Diagnosis {
     port: Port<2>,
 }
 
-/// The server, and the tester that it talks to.
+/// The diagnostic server, and the line of its tester.
 struct Tester {
     server: Server,
-    /// The line of the conversation under way, or of the last one.
+    /// Line of the current conversation, or of the last one.
     line: Line,
 }
 
@@ -113,13 +113,13 @@ impl Diagnosis {
         self.port.refused()
     }
 
-    /// Takes the frames that have come, answers a request, and sends the frames that are due.
+    /// Processes the received frames, answers a request, and sends the frames that are due.
     #[inline(never)]
-    pub fn turn(&mut self, device: &mut Device<Records, Weights>, counters: &AllCounters) {
+    pub fn step(&mut self, device: &mut Device<Records, Weights>, counters: &AllCounters) {
         let now = timer::milliseconds();
         let Self { tester, service, port } = self;
         service.advance();
-        // A byte that the line lost is answered as a bad line, or missing in it.
+        // Errors need no handling: a line that lost a byte is answered as invalid, or just lacks that byte.
         let _ = port.service(service, |frame| {
             if is_request(frame.id()) {
                 tester.receive(Line::Service, &frame, now);
@@ -131,8 +131,8 @@ impl Diagnosis {
             }
         }
         let Tester { server, line } = tester;
-        // The emulator has no generator; it fails there as one without its clock.
-        server.turn(device, counters, now, rng::bytes);
+        // The emulator has no random number generator: `rng::bytes` fails there as if its clock had failed.
+        server.poll(device, counters, now, rng::bytes);
         SILENCED.store(server.is_silenced(), Ordering::Relaxed);
         while match line {
             Line::Service => port.outgoing().is_none(),
@@ -147,9 +147,9 @@ impl Diagnosis {
             }
         }
         if server.restart_is_due() && RESPONSES.is_empty() && port.outgoing().is_none() {
-            // Bounded; a response that does not get out does not hold up the restart.
+            // The flush is bounded: a response that cannot be sent does not delay the restart.
             let _ = service.flush();
-            pause::announced(SCB::sys_reset);
+            pause::with_silence_announced(SCB::sys_reset);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! FoGNet in idle time: a piece of its window with every turn.
+//! Runs FoGNet in idle time, one piece of a window per step.
 
 use gyronet::coprocessor::Coprocessor;
 use gyronet::model::FogNet;
@@ -8,17 +8,17 @@ use gyronet::model::seconds::WindowCopy;
 /// The network with its working memory.
 pub struct FogParts {
     pub network: FogNet<'static, 'static>,
-    /// The window that is due: the network loads it from here, since that takes longer than the output task may wait.
+    /// Copy of the window that is due, from which the network loads: that takes longer than `output` may wait.
     pub window: WindowCopy,
 }
 
-/// The network, and how far it is with its window.
+/// FoGNet, and its progress through a window.
 pub struct FogNetwork {
     parts: Option<&'static mut FogParts>,
     stage: Stage,
 }
 
-/// The window that is worked on, by its number.
+/// Progress through a window; the variants hold the number of the window.
 #[derive(Clone, Copy, PartialEq)]
 enum Stage {
     Waiting,
@@ -27,27 +27,27 @@ enum Stage {
 }
 
 impl FogNetwork {
-    /// Begins without a window; without weights none is ever taken.
+    /// Returns a network without a window; without `parts` it never takes one.
     pub fn new(parts: Option<&'static mut FogParts>) -> Self {
         Self { parts, stage: Stage::Waiting }
     }
 
-    /// Stops for good: its weights are being replaced.
+    /// Stops FoGNet until the next start, because its weights are being replaced.
     pub fn stop(&mut self) {
         *self = Self::new(None);
     }
 
-    /// Returns whether it could take a window.
+    /// Returns whether FoGNet can take a window.
     pub fn is_waiting(&self) -> bool {
         self.parts.is_some() && self.stage == Stage::Waiting
     }
 
-    /// Returns whether a window is being worked on.
+    /// Returns whether a window is in progress.
     pub fn is_running(&self) -> bool {
         self.stage != Stage::Waiting
     }
 
-    /// Copies the window that is due, if one is, which is all that it needs the coprocessor for.
+    /// Copies the window that is due, if any. Only this step needs the coprocessor.
     #[inline(never)]
     pub fn take(&mut self, coprocessor: &mut Coprocessor) {
         let (Some(parts), Some((number, window))) = (self.parts.as_mut(), coprocessor.fog_window()) else {
@@ -57,8 +57,8 @@ impl FogNetwork {
         self.stage = Stage::Copied(number);
     }
 
-    /// Does a piece (0.23 M modelled cycles at most, which anything may interrupt); gives the estimate
-    /// with the last one.
+    /// Computes a piece (0.23 M modelled cycles at most, which anything may interrupt); returns the estimate after
+    /// the last piece.
     #[inline(never)]
     pub fn advance(&mut self) -> Option<(u32, FogEstimate)> {
         let FogParts { network, window } = self.parts.as_mut()?;

@@ -15,12 +15,12 @@ use gyronet::service::Device;
 use gyronet::service::event::ClockFault;
 use gyronet::service::message::AllCounters;
 
-/// Interval at which a failed clock is tried again.
+/// Interval between checks of a failed clock, ms.
 const RETRY_MS: u32 = 1_000;
-/// The time that one pass over the weights takes.
+/// Duration of one pass over the weights, ms.
 const CHECK_MS: usize = 10_000;
 
-/// Reports a sample from the output task to idle.
+/// Passes a sample from the output task to idle.
 pub struct Observation {
     /// `None`: the sensor is silent.
     pub sample: Option<ImuSample>,
@@ -30,7 +30,7 @@ pub struct Observation {
     pub wheels: WheelSample,
 }
 
-/// Samples that idle has not looked at.
+/// Observations that idle has not processed yet.
 pub static OBSERVATIONS: Ring<Observation, 8> =
     // SAFETY: the output task writes, idle reads.
     unsafe { Ring::new() };
@@ -38,23 +38,23 @@ pub static OBSERVATIONS: Ring<Observation, 8> =
 /// Faults that the idle task has found, for the coprocessor.
 pub struct Found {
     weights_damaged: bool,
-    fognet_gone: bool,
+    fognet_unavailable: bool,
     mount_moved: bool,
 }
 
 impl Found {
     /// Returns whether there is anything to report.
-    pub fn is_something(&self) -> bool {
-        self.weights_damaged || self.fognet_gone || self.mount_moved
+    pub fn any(&self) -> bool {
+        self.weights_damaged || self.fognet_unavailable || self.mount_moved
     }
 
-    /// Reports it.
+    /// Reports the faults.
     pub fn report(&self, coprocessor: &mut Coprocessor) {
         if self.weights_damaged {
             coprocessor.weights_damaged();
         }
-        if self.fognet_gone {
-            coprocessor.fognet_gone();
+        if self.fognet_unavailable {
+            coprocessor.fognet_unavailable();
         }
         if self.mount_moved {
             coprocessor.mount_moved();
@@ -69,19 +69,19 @@ pub struct Idle {
     diagnosis: Diagnosis,
     fog_network: FogNetwork,
     bring_up: Option<BringUp>,
-    /// The reason why the internal oscillator runs, and the time of the last look whether that is over, ms.
+    /// The reason why the internal oscillator runs, and the time of the last check whether that reason is over, ms.
     clock_fault: Option<ClockFault>,
     retried: u32,
     milliseconds: u32,
 }
 
-/// The checks of the weights in use.
+/// Background checks of the weights in use.
 pub struct Checks {
     pub weights: Option<BackgroundCheck<'static>>,
     pub fognet: Option<BackgroundCheck<'static>>,
 }
 
-/// The stored data, and the checks.
+/// The device with its stored data, and the checks of the weights.
 pub type Stored = (&'static mut Device<Records, Weights>, Checks);
 
 impl Idle {
@@ -97,23 +97,23 @@ impl Idle {
         Self { device, checks, diagnosis, fog_network, bring_up, clock_fault, retried: 0, milliseconds: 0 }
     }
 
-    /// Does a bounded piece of work, and returns what it has found.
+    /// Does a bounded piece of work, and returns the faults that were found.
     #[inline(never)]
-    pub fn turn(&mut self, counters: &mut AllCounters) -> Found {
+    pub fn step(&mut self, counters: &mut AllCounters) -> Found {
         self.observe();
-        if let Some(result) = self.bring_up.as_mut().and_then(BringUp::turn) {
+        if let Some(result) = self.bring_up.as_mut().and_then(BringUp::step) {
             self.device.sensor(result);
         }
         counters.lines.service_errors = self.diagnosis.refused();
-        self.diagnosis.turn(self.device, counters);
+        self.diagnosis.step(self.device, counters);
         self.retry_clock();
         let weights_damaged = self.check();
-        let fognet_gone = self.device.take_fognet_gone();
-        if fognet_gone {
+        let fognet_unavailable = self.device.take_fognet_unavailable();
+        if fognet_unavailable {
             self.fog_network.stop();
             self.checks.fognet = None;
         }
-        Found { weights_damaged, fognet_gone, mount_moved: self.device.take_mount_moved() }
+        Found { weights_damaged, fognet_unavailable, mount_moved: self.device.take_mount_moved() }
     }
 
     #[inline(never)]
@@ -140,7 +140,7 @@ impl Idle {
         }
     }
 
-    /// Returns FoGNet, for the work that it shares with the output task.
+    /// Returns FoGNet, which gets its windows from the coprocessor and delivers its estimates there.
     pub fn fog_network(&mut self) -> &mut FogNetwork {
         &mut self.fog_network
     }

@@ -1,8 +1,7 @@
-//! The inertial sensor that is configured: an MTi on USART1, or an ICM-42688-P on SPI1.
+//! The configured inertial sensor: an MTi on USART1, or an ICM-42688-P on SPI1.
 //!
-//! The part on SPI is brought up in idle time, for that takes it 50 ms, and again every second
-//! for as long as it does not answer. Between the two ends it is handed over through [`READY`];
-//! [`WANTED`] says whose turn it is with the bus.
+//! Idle brings up the part on SPI, because that takes 50 ms, and retries every second while the part does not answer.
+//! It then passes the part to the output task through [`READY`]; [`WANTED`] says which of the two may use the bus.
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
 use crate::ring::Ring;
@@ -20,15 +19,15 @@ use gyronet::service::event::SensorFault;
 use gyronet::store::ImuPart;
 use gyronet::units::Micros;
 
-/// Bytes of a line in one turn: all that can wait.
-pub const TURN: usize = serial::RECEIVED;
-/// The bytes that a look at the part on SPI counts as: four looks a turn.
-const LOOK: usize = TURN / 4;
-/// The part is brought up again after this time, if an attempt fails.
+/// Bytes of a line that one step of the output task processes: as many as the ring can hold.
+pub const BYTES_PER_STEP: usize = serial::RECEIVED;
+/// Bytes that a poll of the part on SPI counts as: four polls per step.
+const BYTES_PER_POLL: usize = BYTES_PER_STEP / 4;
+/// Interval between attempts to bring up the part, ms.
 const RETRY_MS: u32 = 1_000;
-/// Looks at the time before a delay is given up, should it stand still: a millisecond has some ten
-/// thousand.
-const LOOKS_PER_MS: u32 = 1_000_000;
+/// Timer reads per millisecond before a delay gives up, in case the timer stands still; a millisecond normally has
+/// about ten thousand.
+const POLLS_PER_MS: u32 = 1_000_000;
 
 const ICM: Icm42688Config = Icm42688Config {
     rate: OutputRate::Hz100,
@@ -43,7 +42,7 @@ static READY: Ring<Part, 1> =
     unsafe { Ring::new() };
 static WANTED: AtomicBool = AtomicBool::new(true);
 
-/// The output task's end.
+/// The output task's end of the sensor.
 #[allow(clippy::large_enum_variant, reason = "no heap to put the large one on; there is one of them")]
 pub enum Imu {
     Line(serial::Port, Mti),
@@ -51,63 +50,65 @@ pub enum Imu {
 }
 
 impl Imu {
-    /// Returns the end of the part that is configured. A configuration names only parts that the image drives.
+    /// Returns the output task's end of the configured part. A configuration names only parts that the image
+    /// supports.
     #[inline]
     pub fn new(part: ImuPart, line: serial::Port) -> Self {
         if part == ImuPart::Icm42688 { Self::Spi(SpiPart::default()) } else { Self::Line(line, Mti::new()) }
     }
 
-    /// Returns the next sample, or an error where one was due and is damaged; `None` when nothing waits or the turn is
-    /// over.
-    pub fn next_sample(&mut self, turn: &mut usize) -> Option<Result<ImuSample, ()>> {
+    /// Returns the next sample, or an error for a damaged one; `None` if nothing is waiting or this step has used up
+    /// its `budget` of bytes.
+    pub fn next_sample(&mut self, budget: &mut usize) -> Option<Result<ImuSample, ()>> {
         match self {
             Self::Line(port, mti) => loop {
                 if let Some(sample) = mti.next_sample() {
                     return Some(sample.map_err(drop));
                 }
-                let taken = mti.receive_some(port.received());
-                if taken == 0 {
+                let accepted = mti.receive_some(port.received());
+                if accepted == 0 {
                     return None;
                 }
-                port.consume(taken);
-                *turn = turn.checked_sub(taken)?;
+                port.consume(accepted);
+                *budget = budget.checked_sub(accepted)?;
             },
             Self::Spi(part) => {
-                *turn = turn.checked_sub(LOOK)?;
-                part.look()
+                *budget = budget.checked_sub(BYTES_PER_POLL)?;
+                part.poll()
             }
         }
     }
 
-    /// Returns the numbers of bytes that came damaged and of bytes that had to wait.
+    /// Returns the number of bytes that were damaged or lost, and of bytes that had to wait.
     pub fn line_faults(&self) -> [u32; 2] {
         match self {
-            Self::Line(port, _) => [port.lost(), port.held()],
+            Self::Line(port, _) => [port.lost(), port.delayed()],
             Self::Spi(_) => [0; 2],
         }
     }
 }
 
-/// Reads the part on SPI.
+/// The part on SPI, as the output task reads it.
 ///
-/// Its clock begins at 0 with each reset of the part, so the first sample after one would be older than the newest one
-/// before. It is placed on the sensor's grid instead, as many steps after that one as the board's clock has counted.
+/// The part's clock starts at 0 with each reset of the part, so the first sample after a reset would be older than
+/// the newest one before. That sample is placed on the sensor's grid instead, as many periods after the newest one as
+/// the board's clock has counted.
 #[derive(Default)]
 pub struct SpiPart {
-    /// `None`: not brought up.
+    /// `None` until the part is brought up.
     part: Option<Part>,
-    /// No sample has come since the part was brought up.
+    /// True until the first sample after the part was brought up.
     is_fresh: bool,
-    /// The time that is added to the part's clock, microseconds.
+    /// Time that is added to the part's clock, microseconds.
     offset: u64,
-    /// The newest sample's time, and the board's time at which it came.
+    /// Time of the newest sample, and the board time of its arrival.
     newest: Option<(Micros, u64)>,
 }
 
 impl SpiPart {
-    /// Looks whether there is a sample.
+    /// Polls the part for a sample.
     #[inline(never)]
-    fn look(&mut self) -> Option<Result<ImuSample, ()>> {
+    fn poll(&mut self) -> Option<Result<ImuSample, ()>> {
         if self.part.is_none() {
             self.part = READY.pop();
             self.is_fresh = true;
@@ -115,7 +116,7 @@ impl SpiPart {
         match self.part.as_mut()?.next_sample().transpose()? {
             Ok(sample) => Some(Ok(self.placed(sample))),
             Err(Icm42688Error::Packet(_) | Icm42688Error::NoReading) => Some(Err(())),
-            // It must be set up again.
+            // The part must be brought up again.
             Err(_) => {
                 self.part = None;
                 WANTED.store(true, Ordering::Release);
@@ -124,11 +125,11 @@ impl SpiPart {
         }
     }
 
-    /// Returns the sample with a time that goes on from before the part's last reset.
+    /// Returns the sample with a time that continues across a reset of the part.
     fn placed(&mut self, sample: ImuSample) -> ImuSample {
         let now = timer::micros();
-        if let (true, Some((newest, came))) = (core::mem::take(&mut self.is_fresh), self.newest) {
-            let steps = (now.saturating_sub(came) + PERIOD_US / 2) / PERIOD_US;
+        if let (true, Some((newest, arrived))) = (core::mem::take(&mut self.is_fresh), self.newest) {
+            let steps = (now.saturating_sub(arrived) + PERIOD_US / 2) / PERIOD_US;
             self.offset = (newest.0 + steps.max(1) * PERIOD_US).wrapping_sub(sample.time.0);
         }
         let time = Micros(sample.time.0.wrapping_add(self.offset));
@@ -137,21 +138,21 @@ impl SpiPart {
     }
 }
 
-/// Idle's end of a part on SPI.
+/// Idle's end of a part on SPI: brings the part up.
 pub struct BringUp {
     spi: Spi,
     tried: Option<u32>,
 }
 
 impl BringUp {
-    /// Returns idle's end where such a part is configured.
+    /// Returns idle's end if such a part is configured.
     pub fn new(part: ImuPart, spi: Spi) -> Option<Self> {
         (part == ImuPart::Icm42688).then_some(Self { spi, tried: None })
     }
 
-    /// Tries to bring the part up, where it is not and it is time to.
+    /// Tries to bring the part up, if it is wanted and the last attempt is long enough ago.
     #[inline(never)]
-    pub fn turn(&mut self) -> Option<Result<(), SensorFault>> {
+    pub fn step(&mut self) -> Option<Result<(), SensorFault>> {
         let now = timer::milliseconds();
         let soon = |tried: u32| now.wrapping_sub(tried) < RETRY_MS;
         if !WANTED.load(Ordering::Acquire) || self.tried.is_some_and(soon) {
@@ -163,7 +164,7 @@ impl BringUp {
             Err(error) => return Some(Err(fault(error))),
         };
         WANTED.store(false, Ordering::Release);
-        // There is room: the part before was taken, or this one would not be wanted.
+        // There is room: the part is wanted only after the previous one was taken.
         let _ = READY.push(part);
         Some(Ok(()))
     }
@@ -180,7 +181,7 @@ fn fault<E>(error: Icm42688Error<E>) -> SensorFault {
     }
 }
 
-/// Waits by the board's clock. Idle counts as running meanwhile: the wait is bounded.
+/// Delays by the board's clock. Idle counts as running meanwhile, because the wait is bounded.
 struct Delay;
 
 impl DelayNs for Delay {
@@ -190,6 +191,6 @@ impl DelayNs for Delay {
             board::SUPERVISOR.report(Task::Idle);
             timer::micros() >= until
         };
-        let _ = (0..(ns / 1_000_000 + 1).saturating_mul(LOOKS_PER_MS)).any(over);
+        let _ = (0..(ns / 1_000_000 + 1).saturating_mul(POLLS_PER_MS)).any(over);
     }
 }

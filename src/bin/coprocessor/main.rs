@@ -1,8 +1,8 @@
-//! The coprocessor's firmware, for an STM32F405: sensor bytes in, CAN frames out.
+//! Firmware of the coprocessor, for an STM32F405: receives sensor bytes and sends CAN frames.
 //!
-//! Pins and bit rates are those of the board that it is built for (`boards`).
+//! Pins and bit rates are those of the board that the image is built for (`boards`).
 //!
-//! | line | what |
+//! | line | use |
 //! |---|---|
 //! | USART1 | Xsens MTi |
 //! | SPI1 | ICM-42688-P, where one is configured |
@@ -15,15 +15,15 @@
 //! | priority | task | when | what |
 //! |---|---|---|---|
 //! | 4 | `tick` | 1 ms | board time; counts the bytes that DMA has received |
-//! | 4, 3 | `imu_line`, `fog_line`, `slcan_line`; `service_line` | a damaged byte; in the emulator, a byte | counts it; moves it |
+//! | 4, 3 | `imu_line`, `fog_line`, `slcan_line`; `service_line` | a damaged byte; in the emulator, any byte | counts it; moves it |
 //! | 3 | `can_received`, `can_sent` | a frame | into and out of their queues |
-//! | 2 | `output` | pended by these | samples, frames, watchdog |
+//! | 2 | `output` | pended by `tick`, `can_sent`, `window` | samples, frames, watchdog |
 //! | 1 | `window` | pended by `output` | GyroNet |
-//! | 0 | `idle` | the rest | FoGNet in pieces, diagnosis, weights against their checksum; else it sleeps |
+//! | 0 | `idle` | the remaining time | FoGNet in pieces, diagnosis, checksums of the weights; otherwise sleep |
 //!
-//! The library's `Coprocessor` is shared by `output`, `window` and `idle`; the rest is handed over in queues of fixed
-//! length, and what does not fit is counted. An estimate is used two samples after its window, so the time at
-//! which it is ready changes no frame. A crash leaves its reason in RAM and resets.
+//! `output`, `window` and `idle` share the library's `Coprocessor`; everything else is passed on in queues of fixed
+//! length, and what does not fit is counted. An estimate is used two samples after its window, so the time at which
+//! it is ready changes no frame. A crash records its reason in RAM and resets the chip.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -69,8 +69,8 @@ mod start;
 #[path = "../stm32f405/mod.rs"]
 mod stm32f405;
 
-/// Lists the vector and priority of each task below as data, because the analysis of the stack reads them there
-/// and RTIC encodes them only in instructions. A test compares them with the running image.
+/// Vector and priority of each task below as data, because the stack analysis reads them there and RTIC encodes them
+/// only in instructions. A test compares them with the running image.
 #[cfg(target_os = "none")]
 #[allow(unsafe_code, reason = "a section that is not loaded")]
 #[used]
@@ -93,7 +93,7 @@ static PRIORITIES: [[u8; 2]; 10] = {
     ]
 };
 
-// The vectors of UART4 and UART5, which this board does not use, are pended by hand.
+// This board does not use UART4 and UART5; software pends their interrupts to run `output` and `window`.
 #[cfg(target_os = "none")]
 #[allow(unsafe_code, reason = "what RTIC generates; nothing in here is written with it")]
 #[rtic::app(device = crate::stm32f405::pac, peripherals = true)]
@@ -116,7 +116,7 @@ mod app {
     #[shared]
     struct Shared {
         coprocessor: &'static mut Coprocessor,
-        /// Idle answers testers with these.
+        /// Counters that idle reports to testers.
         counters: AllCounters,
     }
 
@@ -148,8 +148,8 @@ mod app {
         let service = board.service;
         let (bits_per_second, bring_up) = (output.bits_per_second, BringUp::new(output.part, board.spi));
         let ports = (board.imu, board.fog, board.slcan, board.can);
-        let sender = start::place(cx.local.sender_place, || output.connect(ports));
-        let rest = start::place(cx.local.rest_place, || {
+        let sender = start::init_static(cx.local.sender_place, || output.connect(ports));
+        let rest = start::init_static(cx.local.rest_place, || {
             let diagnosis = Diagnosis::new(service, bits_per_second);
             Idle::new(device, diagnosis, fog_network, bring_up, board.clocks.fault)
         });
@@ -158,8 +158,8 @@ mod app {
         (shared, Local { imu, fog_handler, slcan, service, receptions, sender, network, rest })
     }
 
-    // Short handlers end with a barrier: a store that is still on its way while the handler returns can make
-    // the processor take the wrong vector (Arm erratum 838869 of the Cortex-M4).
+    // Short handlers end with a barrier: a store that is still pending when the handler returns can make the
+    // processor take the wrong vector (Arm erratum 838869 of the Cortex-M4).
     #[task(binds = USART1, priority = 4, local = [imu])]
     #[unsafe(link_section = ".ram_code.imu_line")]
     fn imu_line(cx: imu_line::Context) {
@@ -211,7 +211,7 @@ mod app {
         dsb();
     }
 
-    /// The supply falls: the chip must not go on at this clock, nor change its flash.
+    /// Handles a falling supply: the chip must neither keep running at this clock nor change its flash.
     #[task(binds = PVD, priority = 4)]
     fn supply_low(_: supply_low::Context) {
         crash::supply_low();
@@ -220,7 +220,7 @@ mod app {
     #[task(binds = UART4, priority = 2, local = [sender], shared = [coprocessor, counters])]
     fn output(cx: output::Context) {
         (cx.shared.coprocessor, cx.shared.counters)
-            .lock(|coprocessor, counters| cx.local.sender.turn(coprocessor, counters));
+            .lock(|coprocessor, counters| cx.local.sender.step(coprocessor, counters));
         rtic::pend(Interrupt::UART5);
     }
 
@@ -229,7 +229,7 @@ mod app {
         let due = cx.shared.coprocessor.lock(|coprocessor| coprocessor.window());
         if let (Some(due), Some(network)) = (due, cx.local.network) {
             let estimate = network.estimate(&due.features);
-            // One that is late is counted.
+            // A late estimate is counted.
             let _ = cx.shared.coprocessor.lock(|coprocessor| coprocessor.deliver(due.end, estimate));
             rtic::pend(Interrupt::UART4);
         }
@@ -240,8 +240,8 @@ mod app {
     fn idle(mut cx: idle::Context) -> ! {
         loop {
             let mut counters = cx.shared.counters.lock(|counters| *counters);
-            let found = cx.local.rest.turn(&mut counters);
-            if found.is_something() {
+            let found = cx.local.rest.step(&mut counters);
+            if found.any() {
                 cx.shared.coprocessor.lock(|coprocessor| found.report(coprocessor));
             }
             let fog_network = cx.local.rest.fog_network();
@@ -249,12 +249,12 @@ mod app {
                 cx.shared.coprocessor.lock(|coprocessor| fog_network.take(coprocessor));
             }
             if let Some((number, estimate)) = fog_network.advance() {
-                // One that is late is counted.
+                // A late estimate is counted.
                 let _ = cx.shared.coprocessor.lock(|coprocessor| coprocessor.deliver_fog(number, estimate));
             }
             board::SUPERVISOR.report(Task::Idle);
             if !cx.local.rest.is_busy() {
-                // Every interrupt wakes it, the next tick at the latest.
+                // Every interrupt ends the sleep, the next tick at the latest.
                 cortex_m::asm::wfi();
             }
         }

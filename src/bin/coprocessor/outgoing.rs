@@ -1,4 +1,4 @@
-//! The two lines that frames leave by: SLCAN always, CAN where its controller is up.
+//! The two lines that carry the board's frames: SLCAN always, CAN if its controller works.
 
 use crate::diagnosis::{Line, RESPONSES};
 use crate::serial;
@@ -9,15 +9,15 @@ use gyronet::can::slcan::host::StatusFlags;
 use gyronet::can::slcan::port::Port;
 use gyronet::units::Micros;
 
-/// Frames that may wait for a line.
+/// Frames that can wait for each line.
 const QUEUE: usize = 24;
 
-/// Both lines and what waits for them.
+/// Both lines and the frames that wait for them.
 pub struct Outgoing {
     slcan: serial::Port,
     port: Port<QUEUE>,
     can: Option<Can>,
-    /// Frames for CAN, with the millisecond in which they were made.
+    /// Frames for CAN, each with the time at which it was made, ms.
     queue: TransmitQueue<(DataFrame, u32), QUEUE>,
     /// Board time, ms.
     now: u32,
@@ -28,7 +28,7 @@ impl Outgoing {
         Self { slcan, port: Port::new(bits_per_second), can, queue: TransmitQueue::new(), now: 0 }
     }
 
-    /// Takes part in the bus.
+    /// Joins the CAN bus.
     pub fn join(&self) {
         self.can.iter().for_each(Can::join);
     }
@@ -41,7 +41,7 @@ impl Outgoing {
         }
     }
 
-    /// Sends as much as the lines accept; passes on the frames that a host has sent over SLCAN.
+    /// Sends as much as the lines accept; passes the frames that a host has sent over SLCAN to `take`.
     pub fn service(&mut self, take: impl FnMut(DataFrame)) {
         self.port.set_bus(match self.state() {
             State::Active => StatusFlags::default(),
@@ -50,26 +50,25 @@ impl Outgoing {
             State::Off => StatusFlags::BUS_ERROR,
         });
         self.slcan.advance();
-        // One at a time, when the rates are out.
+        // One response at a time, after the rates have been sent.
         if let Some((Line::Slcan, frame)) = RESPONSES.oldest().first()
             && self.port.outgoing().is_none()
         {
             self.port.enqueue(*frame, Micros(1_000 * u64::from(self.now)));
             RESPONSES.drop_oldest(1);
         }
-        // A byte that the line lost is answered as a bad line, or missing in it.
+        // Errors need no handling: a line that lost a byte is answered as invalid, or just lacks that byte.
         let _ = self.port.service(&mut self.slcan, take);
         self.refill();
     }
 
-    /// Sets the time, ms, and looks after the controller. Called every millisecond.
+    /// Sets the time, ms, and polls the controller. Called every millisecond.
     pub fn tick(&mut self, now: u32) {
         self.now = now;
         self.can.iter_mut().for_each(|can| can.poll(now));
     }
 
-    /// Gives the controller the frames that it has room for. Stale ones are dropped, and all of them while
-    /// the controller is off the bus.
+    /// Passes frames to the controller while it has room. Stale frames are dropped; in bus-off, all of them.
     pub fn refill(&mut self) {
         let Some(can) = self.can.as_mut() else { return };
         let off = can.state() == State::Off;
@@ -83,7 +82,7 @@ impl Outgoing {
             }
         }
         while let Some((Line::Can, frame)) = RESPONSES.oldest().first() {
-            // Where the bus is off, the tester hears nothing either.
+            // In bus-off the response is dropped, since the tester could not receive it.
             if !off && (!self.queue.is_empty() || !can.transmit(frame, self.now)) {
                 break;
             }
@@ -91,18 +90,18 @@ impl Outgoing {
         }
     }
 
-    /// Frames that a line did not take in time.
+    /// Returns the number of frames that a line did not accept in time.
     pub fn dropped(&self) -> u32 {
         self.port.dropped().saturating_add(self.queue.dropped()).saturating_add(can::aborted())
     }
 
-    /// The CAN controller's state of error confinement; active where there is no controller.
+    /// Returns the CAN controller's error state, or [`State::Active`] without a controller.
     pub fn state(&self) -> State {
         self.can.as_ref().map_or(State::Active, Can::state)
     }
 
-    /// Bytes of the SLCAN line that came damaged, and bytes that had to wait.
+    /// Returns the number of bytes of the SLCAN line that were damaged or lost, and of bytes that had to wait.
     pub fn line_faults(&self) -> [u32; 2] {
-        [self.slcan.lost(), self.slcan.held()]
+        [self.slcan.lost(), self.slcan.delayed()]
     }
 }

@@ -1,10 +1,10 @@
-//! The output task: samples and frames between the lines and the coprocessor. Nothing in it waits.
+//! The output task: moves samples and frames between the lines and the coprocessor. Nothing in it waits.
 
 use crate::board::SUPERVISOR;
 use crate::boards::BOARD;
 use crate::diagnosis::{self, FROM_SLCAN};
 use crate::idle::{OBSERVATIONS, Observation};
-use crate::imu::{Imu, TURN};
+use crate::imu::{BYTES_PER_STEP, Imu};
 use crate::outgoing::Outgoing;
 use crate::pause;
 use crate::received::{self, FRAMES};
@@ -26,7 +26,7 @@ const BLINK_MS: u32 = 512;
 pub struct OutputParts {
     pub part: ImuPart,
     pub bits_per_second: u32,
-    /// Wheel and latitude frames of a host on SLCAN are used.
+    /// True if wheel and latitude frames of a host on SLCAN are used.
     pub slcan_inputs: bool,
 }
 
@@ -36,14 +36,14 @@ pub struct Output {
     fog: serial::Port,
     dsp1760: Dsp1760,
     outgoing: Outgoing,
-    /// The millisecond in which the other lines were looked at.
-    looked: u32,
+    /// Millisecond of the last poll of the other lines.
+    polled_at: u32,
     /// True once CAN takes part in the bus.
     joined: bool,
     lines: LineCounters,
-    /// Wheel and latitude frames of a host on SLCAN are used.
+    /// True if wheel and latitude frames of a host on SLCAN are used.
     slcan_inputs: bool,
-    /// Frames of a tester on SLCAN that found no room.
+    /// Number of tester frames on SLCAN that found no room.
     unread: u32,
 }
 
@@ -57,7 +57,7 @@ impl OutputParts {
             fog,
             dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
             outgoing: Outgoing::new(slcan, self.bits_per_second, can),
-            looked: 0,
+            polled_at: 0,
             joined: false,
             lines: LineCounters::NONE,
             slcan_inputs: self.slcan_inputs,
@@ -66,13 +66,14 @@ impl OutputParts {
     }
 }
 
-// The coprocessor counts the inputs that it refuses, so the task ignores errors from it.
+// The coprocessor counts the inputs that it refuses, so the task ignores its errors.
 impl Output {
-    /// Runs one turn of the output task.
+    /// Runs one step of the output task.
     #[inline(never)]
-    pub fn turn(&mut self, coprocessor: &mut Coprocessor, counters: &mut AllCounters) {
-        // A turn may follow each received byte. Other inputs are read once a tick (1 ms), or before a new sample is
-        // used. The CAN controller is refilled in every turn, because it takes only three frames at a time.
+    pub fn step(&mut self, coprocessor: &mut Coprocessor, counters: &mut AllCounters) {
+        // A step also follows each sent CAN frame and each estimate. Inputs other than the inertial sensor are read
+        // once a tick (1 ms), or before a new sample is used. The CAN controller is refilled in every step, because
+        // it accepts only three frames at a time.
         let now = Micros(timer::micros());
         let tick = (now.0 / 1_000) as u32;
         if !core::mem::replace(&mut self.joined, true) {
@@ -80,25 +81,25 @@ impl Output {
             self.outgoing.join();
             watchdog::set(watchdog::Limit::Short);
         }
-        let mut looked = core::mem::replace(&mut self.looked, tick) != tick;
-        if looked {
+        let mut polled = core::mem::replace(&mut self.polled_at, tick) != tick;
+        if polled {
             self.outgoing.tick(tick);
             // The LED blinks as long as this task runs.
             let (led, lit) = BOARD.led;
             led.set(lit == (tick & BLINK_MS != 0));
-            self.look(coprocessor, now);
+            self.poll_inputs(coprocessor, now);
         }
         coprocessor.pause(pause::is_requested());
         if pause::is_requested() {
             self.send(coprocessor, now);
             pause::announce();
         }
-        let mut turn = TURN;
+        let mut budget = BYTES_PER_STEP;
         while coprocessor.is_ready(now) {
-            match self.imu.next_sample(&mut turn) {
+            match self.imu.next_sample(&mut budget) {
                 Some(Ok(sample)) => {
-                    if !core::mem::replace(&mut looked, true) {
-                        self.look(coprocessor, now);
+                    if !core::mem::replace(&mut polled, true) {
+                        self.poll_inputs(coprocessor, now);
                     }
                     self.report_bus(coprocessor);
                     if let Ok(observation) = &coprocessor.imu(sample, now) {
@@ -110,7 +111,7 @@ impl Output {
                 None => break,
             }
         }
-        if !looked {
+        if !polled {
             self.outgoing.refill();
             return;
         }
@@ -131,18 +132,18 @@ impl Output {
         }
     }
 
-    /// Gives the coprocessor the waiting CAN frames and the fibre-optic gyro's bytes, and sends its frames.
+    /// Passes the waiting CAN frames and the fibre-optic gyro's bytes to the coprocessor, and sends its frames.
     #[inline(never)]
-    fn look(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
+    fn poll_inputs(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
         while let Some(frame) = FRAMES.pop() {
             let _ = coprocessor.can(&frame, now);
         }
         for _ in 0..serial::RECEIVED {
-            let taken = self.dsp1760.receive_some(self.fog.received());
-            if taken == 0 {
+            let accepted = self.dsp1760.receive_some(self.fog.received());
+            if accepted == 0 {
                 break;
             }
-            self.fog.consume(taken);
+            self.fog.consume(accepted);
             while let Some(sample) = self.dsp1760.next_sample() {
                 match sample {
                     Ok(sample) => {
@@ -193,8 +194,9 @@ impl Output {
                 let _ = coprocessor.can(&frame, now);
             }
         });
-        let ([lost, held], [slcan_lost, slcan_held]) = (self.imu.line_faults(), self.outgoing.line_faults());
+        let ([lost, delayed], [slcan_lost, slcan_delayed]) =
+            (self.imu.line_faults(), self.outgoing.line_faults());
         self.lines.line_errors = lost.saturating_add(self.fog.lost()).saturating_add(slcan_lost);
-        self.lines.held = held.saturating_add(self.fog.held()).saturating_add(slcan_held);
+        self.lines.held = delayed.saturating_add(self.fog.delayed()).saturating_add(slcan_delayed);
     }
 }

@@ -1,4 +1,4 @@
-//! The regions of the flash that are written: records and weight files.
+//! The regions of the flash that the image writes: records and weight files.
 #![allow(unsafe_code, reason = "memory by address; the block says why it is sound")]
 
 use crate::pause;
@@ -9,7 +9,7 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use gyronet::service::MappedSlots;
 use gyronet::store::layout::{FOGNET, RECORD_SECTOR, SLOT_SIZE, SLOTS, STORE, sector};
 
-/// Returns the range of so many bytes from an offset into the flash on, which is to lie in one of the regions.
+/// Returns the range of `len` bytes from an offset into the flash, if it lies in one of the regions.
 fn inside(regions: &[Range<u32>], offset: u32, len: usize) -> Result<Range<u32>, FlashError> {
     let end =
         u32::try_from(len).ok().and_then(|len| offset.checked_add(len)).ok_or(FlashError::OutOfBounds)?;
@@ -17,15 +17,15 @@ fn inside(regions: &[Range<u32>], offset: u32, len: usize) -> Result<Range<u32>,
     if regions.iter().any(holds) { Ok(offset..end) } else { Err(FlashError::OutOfBounds) }
 }
 
-/// Returns a range whose ends are multiples of a unit.
+/// Returns the range, if both of its ends are multiples of a unit.
 fn aligned(range: Range<u32>, unit: usize) -> Result<Range<u32>, FlashError> {
     let fits = (range.start as usize).is_multiple_of(unit) && range.len().is_multiple_of(unit);
     if fits { Ok(range) } else { Err(FlashError::NotAligned) }
 }
 
-/// Erases a range of whole sectors, once the buses have been told.
+/// Erases a range of whole sectors, after announcing the silence on the buses.
 fn erase(flash: &Flash, range: Range<u32>) -> Result<(), FlashError> {
-    pause::announced(|| {
+    pause::with_silence_announced(|| {
         let mut at = range.start;
         while at < range.end {
             let sector = sector(at).filter(|sector| sector.end <= range.end).ok_or(FlashError::NotAligned)?;
@@ -86,9 +86,9 @@ region!(
     STORE.start,
     [STORE],
     RECORD_SECTOR,
-    "The sectors of records; offsets count from their start."
+    "The sectors of the records; offsets count from their start."
 );
-region!(Weights, 0, [FOGNET, SLOTS], RECORD_SECTOR, "The weight files; offsets are those into the flash.");
+region!(Weights, 0, [FOGNET, SLOTS], RECORD_SECTOR, "The weight files, by offset into the flash.");
 
 impl MappedSlots for Weights {
     fn slots(&self) -> [&[u8]; 2] {
@@ -100,17 +100,17 @@ impl MappedSlots for Weights {
     }
 
     fn check<T>(&self, work: impl FnOnce() -> T) -> T {
-        watchdog::lengthened(work)
+        watchdog::with_long_limit(work)
     }
 }
 
-/// Gives both slots as they are. The one that the network runs on is not written while it does.
+/// Returns both slots. The slot that the network runs on is not written meanwhile.
 pub fn slots_at_start() -> [&'static [u8]; 2] {
     // SAFETY: inside the flash; see above.
     [SLOTS.start, SLOTS.start + SLOT_SIZE as u32].map(|offset| unsafe { Flash::mapped(offset, SLOT_SIZE) })
 }
 
-/// Gives the place of FoGNet's file as it is. Idle stops FoGNet before it does anything else once the file is written.
+/// Returns the place of FoGNet's file. Once the file is being written, idle stops FoGNet before anything else.
 pub fn fognet_at_start() -> &'static [u8] {
     // SAFETY: inside the flash; see above.
     unsafe { Flash::mapped(FOGNET.start, FOGNET.len()) }

@@ -1,9 +1,9 @@
-//! A ring of values from one task to another, without locks.
+//! A lock-free ring buffer from one task to another.
 //!
-//! Each end is moved by one task alone, so neither masks interrupts: a value is written before the end
-//! that releases it, and read before the end that frees its place. The ends count on and on; the
-//! length is a power of two, so a place is their low bits. One processor needs no barrier between its tasks:
-//! what the compiler must not reorder is fenced. Hardware may stand in for a task at either end.
+//! Each count is advanced by one task only, so neither task masks interrupts: a value is written before the count
+//! that releases it, and read before the count that frees its place. The counts run on without a reset; the length is
+//! a power of two, so their low bits are the index. On one processor the tasks need no barriers, only compiler
+//! fences. Hardware may replace the task at either end.
 #![allow(
     unsafe_code,
     reason = "places that are written and read by address; each block says why it is sound"
@@ -25,14 +25,15 @@ unsafe impl<T: Send, const N: usize> Sync for Ring<T, N> {}
 
 impl<T, const N: usize> Ring<T, N> {
     const MASK: usize = {
-        assert!(N.is_power_of_two(), "a place is the low bits of a count");
+        assert!(N.is_power_of_two(), "the index is the low bits of a count");
         N - 1
     };
 
-    /// Makes an empty ring.
+    /// Creates an empty ring.
     ///
     /// # Safety
-    /// One task alone calls [`Ring::push`], and one alone [`Ring::front`] and [`Ring::pop`].
+    /// Only one task calls the methods for the writing task, such as [`Ring::push`], and only one those for the
+    /// reading task, such as [`Ring::pop`].
     pub const unsafe fn new() -> Self {
         Self {
             places: [const { UnsafeCell::new(MaybeUninit::uninit()) }; N],
@@ -43,11 +44,11 @@ impl<T, const N: usize> Ring<T, N> {
 
     #[inline(always)]
     fn place(&self, count: usize) -> *mut T {
-        // The low bits are always inside; the compiler sees that, too.
+        // The low bits are always in range; the compiler sees that, too.
         self.places.get(count & Self::MASK).map_or(core::ptr::null_mut(), |place| place.get().cast())
     }
 
-    /// Returns how many values wait.
+    /// Returns the number of waiting values.
     #[inline(always)]
     pub fn len(&self) -> usize {
         let len = self.written.load(Ordering::Relaxed).wrapping_sub(self.read.load(Ordering::Relaxed));
@@ -55,13 +56,13 @@ impl<T, const N: usize> Ring<T, N> {
         len
     }
 
-    /// Puts a value at the end; whether there was room. For the writing task.
+    /// Appends a value; returns whether there was room. For the writing task.
     #[inline(always)]
     pub fn push(&self, value: T) -> bool {
         self.push_with(|| value)
     }
 
-    /// Makes a value and puts it at the end, where there is room; whether there was. For the writing task.
+    /// Calls `make` and appends its value, if there is room; returns whether there was. For the writing task.
     #[inline(always)]
     pub fn push_with(&self, make: impl FnOnce() -> T) -> bool {
         if self.len() >= N {
@@ -89,21 +90,20 @@ impl<T, const N: usize> Ring<T, N> {
         Some(value)
     }
 
-    /// Returns where the values lie, for hardware that writes or reads them in place of a task.
-    pub fn places(&self) -> *mut T {
+    /// Returns the address of the buffer, for hardware that writes or reads it in place of a task.
+    pub fn as_mut_ptr(&self) -> *mut T {
         self.place(0)
     }
 
-    /// Counts values that hardware has written at the end, also over values that were not read. In place of
-    /// [`Ring::push`].
+    /// Counts values that hardware has appended, even over unread values. Replaces [`Ring::push`].
     #[inline(always)]
-    pub fn written(&self, count: usize) {
+    pub fn advance_write(&self, count: usize) {
         compiler_fence(Ordering::Release);
         let written = self.written.load(Ordering::Relaxed);
         self.written.store(written.wrapping_add(count), Ordering::Relaxed);
     }
 
-    /// Returns the oldest values as far as they lie behind each other, for hardware that reads them.
+    /// Returns the oldest values, up to the end of the buffer, so that they can be read in place.
     pub fn oldest(&self) -> &[T] {
         let first = self.read.load(Ordering::Relaxed) & Self::MASK;
         let len = self.len().min(N - first);
@@ -112,7 +112,7 @@ impl<T, const N: usize> Ring<T, N> {
         unsafe { core::slice::from_raw_parts(self.place(first), len) }
     }
 
-    /// Drops values that have been read elsewhere, or must not be. For the reading task.
+    /// Drops values that have been read in place, or must not be read. For the reading task.
     #[inline(always)]
     pub fn drop_oldest(&self, count: usize) {
         compiler_fence(Ordering::Release);

@@ -1,5 +1,5 @@
-//! Serial lines: DMA moves bytes between the USART and two rings, and a port gives the other ends of the rings to a
-//! task. In the emulator, which has no DMA, interrupts move them.
+//! Serial lines: DMA moves bytes between the USART and two rings, and a task uses the other ends of the rings through
+//! a port. In the emulator, which has no DMA, interrupts move the bytes.
 #![allow(unsafe_code, reason = "memory that DMA reads and writes; each block says why it is sound")]
 
 mod handler;
@@ -12,18 +12,18 @@ use crate::ring::Ring;
 use crate::stm32f405::usart::Usart;
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 
-/// Bytes that may wait for a task: more than a sensor sends in the 20 ms that an estimate is waited for, and 4 ms of a
-/// line at 921600 baud.
+/// Received bytes that can wait for a task: more than a sensor sends in the 20 ms that the task may wait for an
+/// estimate, and 4 ms of a line at 921600 baud.
 pub const RECEIVED: usize = 512;
 /// At most this many bytes wait to be sent on a line.
 pub const SENDING: usize = 128;
-/// Places of a ring that DMA may write between two ticks: 92 bytes come at 921600 baud.
+/// Bytes that DMA may write between two ticks: 92 arrive at 921600 baud.
 const AHEAD: usize = 128;
 const _: () = assert!(RECEIVED >= 2 * AHEAD, "the stream must not overtake the reader unseen");
 /// Polls before a flush gives up: about ten byte times at 115200.
 const FLUSH_POLLS: u32 = 100_000;
 
-/// The statics of a line.
+/// Static buffers and counters of a line.
 pub struct Memory {
     pub received: Ring<u8, RECEIVED>,
     pub sending: Ring<u8, SENDING>,
@@ -31,32 +31,32 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Starts empty.
+    /// Creates empty buffers.
     ///
     /// # Safety
-    /// One line uses it, and its ends are moved by one task each.
+    /// Only one line uses the memory, and each end of its rings belongs to one task.
     pub const unsafe fn new() -> Self {
         // SAFETY: the caller's.
         unsafe { Self { received: Ring::new(), sending: Ring::new(), faults: Faults::new() } }
     }
 }
 
-/// A task's end of a line. It never waits: where nothing is ready it gives an error (`TimedOut`).
+/// A task's end of a line. Reads and writes never wait: if nothing is ready they return an error (`TimedOut`).
 pub struct Port {
     usart: Usart,
     memory: &'static Memory,
-    /// True where the interrupt moves the bytes.
+    /// True in the emulator, where the interrupt moves the bytes.
     emulated: bool,
     /// Bytes that DMA is sending.
     under_way: usize,
-    /// Bytes that were written over before they were read.
+    /// Received bytes that were overwritten before they were read.
     overwritten: u32,
 }
 
 /// The ends of a line: the interrupt's, the tick's where the line has DMA, and a task's.
 pub type Ends = (Handler, Option<Reception>, Port);
 
-/// Starts a line of which neither end has been used, at `now`, us.
+/// Starts a line whose ends have not been used yet, at `now`, us.
 pub fn start(
     usart: Usart,
     memory: &'static Memory,
@@ -67,7 +67,7 @@ pub fn start(
     let handler = Handler { usart, received, sending, faults, emulated, room_requested: false };
     let reception = (!emulated).then(|| {
         // SAFETY: the ring's writing end is the DMA's alone.
-        unsafe { usart.receive_to(received.places(), RECEIVED as u16) };
+        unsafe { usart.receive_to(received.as_mut_ptr(), RECEIVED as u16) };
         usart.request_dma();
         Reception::new(usart.receiver(), received, baud, now)
     });
@@ -79,13 +79,13 @@ pub fn start(
 }
 
 impl Port {
-    /// Received bytes that lie behind each other; none if none waits.
+    /// Returns the oldest received bytes, up to the end of the ring's buffer; empty if no byte is waiting.
     #[inline]
     pub fn received(&mut self) -> &[u8] {
         let received = &self.memory.received;
         let waiting = received.len();
         if !self.emulated && waiting > RECEIVED - AHEAD {
-            // The stream is, or soon will be, where the oldest bytes lie.
+            // The DMA stream is, or soon will be, overwriting the oldest bytes.
             received.drop_oldest(waiting);
             self.overwritten = self.overwritten.saturating_add(waiting as u32);
         }
@@ -102,17 +102,17 @@ impl Port {
         }
     }
 
-    /// Bytes that came damaged, or when there was no room for them.
+    /// Returns the number of bytes that were damaged or lost.
     pub fn lost(&self) -> u32 {
         self.memory.faults.lost().saturating_add(self.overwritten)
     }
 
-    /// Bytes that had to wait in the line's register because there was no room for them.
-    pub fn held(&self) -> u32 {
-        self.memory.faults.held()
+    /// Returns the number of bytes that had to wait in the USART's data register because the ring was full.
+    pub fn delayed(&self) -> u32 {
+        self.memory.faults.delayed()
     }
 
-    /// Sends on what waits, where DMA has sent what went before. A task that sends calls it at every turn.
+    /// Starts to send the waiting bytes, if DMA has sent the previous ones. A task that sends calls this in every step.
     pub fn advance(&mut self) {
         let sending = &self.memory.sending;
         if self.emulated {
@@ -162,12 +162,12 @@ impl WriteReady for Port {
 
 impl Write for Port {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
-        let taken = bytes.iter().take_while(|byte| self.memory.sending.push(**byte)).count();
-        if taken == 0 && !bytes.is_empty() {
+        let accepted = bytes.iter().take_while(|byte| self.memory.sending.push(**byte)).count();
+        if accepted == 0 && !bytes.is_empty() {
             return Err(ErrorKind::TimedOut);
         }
         self.advance();
-        Ok(taken)
+        Ok(accepted)
     }
 
     fn flush(&mut self) -> Result<(), ErrorKind> {

@@ -19,17 +19,17 @@ use gyronet::model::{Blob, FogBlob, FogNet, weights};
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::{Configuration, FogPart, ImuPart};
 
-/// The hardware that this image drives. It listens to a fibre-optic gyro whether one is configured or not.
-const DRIVES: SupportedHardware = SupportedHardware {
+/// The hardware that this image supports. The image listens to a fibre-optic gyro whether one is configured or not.
+const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
     imus: &[ImuPart::XsensMti, ImuPart::Icm42688],
     fogs: &[FogPart::Dsp1760],
     bits_per_second: &[BITS_PER_SECOND],
 };
 
-/// The weights that run where no slot has any that are good.
+/// Weights that are used if no slot has valid ones.
 const BUILT_IN: &[u8] = &weights::DEFAULT.0;
 
-/// Has CAN receive the frames that the configuration names.
+/// Makes CAN receive only the frames that the configuration names, and sets the identifiers of diagnosis.
 fn receive(board: &Board, configuration: &Configuration, wheels: &WheelSettings, config: &Config) {
     let wheels = wheels.frames.into_iter().flatten().map(|frame| frame.id);
     let latitude = config.latitude.map(|latitude| latitude.id());
@@ -42,26 +42,27 @@ fn receive(board: &Board, configuration: &Configuration, wheels: &WheelSettings,
     }
 }
 
-/// The parts that the tasks get.
+/// The resources of the tasks.
 pub struct Parts {
     pub output: OutputParts,
     pub config: Config,
-    /// The weights that the network is to use.
+    /// Weights for the network.
     pub weights: Option<Blob<'static>>,
     pub fog_network: Option<&'static mut FogParts>,
     pub device: Stored,
 }
 
-/// Makes the parts; `None` when they have been made before.
+/// Creates the parts; `None` if they have been created before.
 #[inline(never)]
 pub fn parts(board: &Board) -> Option<Parts> {
-    // SAFETY: the clock tree is done with the controller, and this runs once.
+    // SAFETY: the clock tree no longer uses the controller, and this runs once.
     let registers = unsafe { pac::FLASH::steal() };
     let flash = &*cortex_m::singleton!(: Flash = Flash::new(registers))?;
-    let device = cortex_m::singleton!(: Device<Records, Weights> = const { Device::new(&DRIVES) })?;
+    let device =
+        cortex_m::singleton!(: Device<Records, Weights> = const { Device::new(&SUPPORTED_HARDWARE) })?;
     device.begin(Some(Records(flash)), Some(Weights(flash)), flash.writable(), board.identity);
-    // Without good weights the pipeline still runs: the status says degraded, and the rate is
-    // the gyro's less its static bias.
+    // Without valid weights the pipeline still runs: the status says degraded, and the rate is the gyro's minus its
+    // static bias.
     let blob = device.weights(Some(regions::slots_at_start()), BUILT_IN);
     let fog_blob = device.fognet(regions::fognet_at_start());
     let check = Checks {
@@ -100,7 +101,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
     })
 }
 
-/// Makes FoGNet on its weights; `None` when it has been made before.
+/// Creates FoGNet with its weights; `None` if it has been created before.
 #[inline(never)]
 fn fog_network(blob: FogBlob<'static>) -> Option<&'static mut FogParts> {
     let state = cortex_m::singleton!(: FogNetState = FogNetState::ZERO)?;
@@ -108,8 +109,8 @@ fn fog_network(blob: FogBlob<'static>) -> Option<&'static mut FogParts> {
     cortex_m::singleton!(: FogParts = FogParts { network, window: WindowCopy::EMPTY })
 }
 
-/// Makes a value where it stays; what that takes of the stack is given back.
+/// Creates a value in its static. Not inlined, so that the stack that `make` uses is freed afterwards.
 #[inline(never)]
-pub fn place<T>(slot: &mut MaybeUninit<T>, make: impl FnOnce() -> T) -> &mut T {
+pub fn init_static<T>(slot: &mut MaybeUninit<T>, make: impl FnOnce() -> T) -> &mut T {
     slot.write(make())
 }

@@ -1,8 +1,8 @@
-//! Runs window models on a core without the DSP extension, emulated: a Cortex-M0 with 16 KiB of RAM (`microbit`), or a
-//! Cortex-M3 with 64 KiB (`lm3s6965evb`).
+//! Runs window models on an emulated core without the DSP extension: a Cortex-M0 with 16 KiB of RAM (`microbit`), or
+//! a Cortex-M3 with 64 KiB (`lm3s6965evb`).
 //!
-//! For each model it prints `NAME ticks=N` for a window, by SysTick, and a line of hexadecimal words for each of
-//! [`WINDOWS`] estimates, which a host can compute too.
+//! For each model the image prints `NAME bytes=N ticks=N wrapped=BOOL` for one window (SysTick), and a line of
+//! hexadecimal words for each of [`WINDOWS`] estimates, which a host can compute too.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -31,7 +31,7 @@ mod firmware {
     use gyronet::nn::Aligned;
     use panic_semihosting as _;
 
-    /// The most units that the board has memory for.
+    /// Largest number of units that fits the RAM of the board.
     #[cfg(not(feature = "lm3s6965evb"))]
     const UNITS: usize = 16;
     #[cfg(feature = "lm3s6965evb")]
@@ -39,10 +39,10 @@ mod firmware {
 
     type State = GyroNetState<UNITS, { UNITS / 2 }, { recurrent_words(UNITS) }>;
 
-    /// Windows that each model is compared on.
+    /// Number of windows that each model is compared on.
     const WINDOWS: u32 = 8;
 
-    /// A random model with a linear part, as a static.
+    /// Returns the name and the file of a random model with a linear part; the file is a static.
     macro_rules! model {
         ($units:literal) => {{
             const SHAPE: Shape = Shape { units: $units, linear: true };
@@ -80,7 +80,7 @@ mod firmware {
         Ok(())
     }
 
-    /// Counts a window of a model, and prints its estimates.
+    /// Measures the first window of a model, and prints all its estimates.
     fn compare((name, file): (&str, &[u8]), syst: &mut SYST, state: &mut State) -> Result<(), BlobError> {
         let mut network = GyroNet::with_state(Blob::new_checked(file)?, state)?;
         let mut numbers = Numbers::new(7);

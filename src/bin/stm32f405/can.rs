@@ -1,12 +1,11 @@
 //! This module drives bxCAN (RM0090 32) at 500 kbit/s.
 //!
-//! Nothing here waits except for initialisation mode, with a limit. A frame that a mailbox could not
-//! send within [`STALE_MS`] is aborted, so a bus that comes back does not get old values. After bus-off
-//! the controller is restarted at growing intervals: a node that is broken does not disturb the bus
-//! all the time.
+//! Nothing here waits except for the start of initialisation mode, with a limit. A frame that a mailbox could not
+//! send within [`STALE_MS`] is aborted, so no stale values are sent when the bus recovers. After bus-off the
+//! controller is restarted at growing intervals, so that a broken node does not disturb the bus all the time.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
-use super::pac;
+use super::{pac, wait_until};
 use core::sync::atomic::{AtomicU32, Ordering};
 use embedded_can::{ExtendedId, Frame as _, Id, StandardId};
 use gyronet::can::DataFrame;
@@ -19,10 +18,11 @@ pub const STALE_MS: u32 = 20;
 /// 42 MHz / 6 / (1 + 11 + 2) = 500 kbit/s, sampled at 85.7 %.
 const PRESCALER: u16 = 6;
 const SEGMENTS: [u8; 2] = [11, 2];
-/// Polls for a mode of the controller, which it enters within a frame's time.
+/// Polls before a change of mode times out; the controller needs a frame's time at most.
 const POLLS: u32 = 10_000;
 const MAILBOXES: usize = 3;
-/// TSR: RQCP, TXOK and ABRQ of mailbox 0; the others are 8 and 16 bits on. TME of mailbox 0; the others follow.
+/// Bits of TSR: RQCP, TXOK and ABRQ of mailbox 0 (the others are 8 and 16 bits higher), and TME of mailbox 0 (the
+/// others follow).
 const REQUEST_COMPLETED: u32 = 1;
 const TRANSMITTED: u32 = 1 << 1;
 const ABORT: u32 = 1 << 7;
@@ -32,22 +32,22 @@ const EMPTY: u32 = 1 << 26;
 const FIRST_RESTART_MS: u32 = 10;
 const LAST_RESTART_MS: u32 = 1_280;
 
-/// Frames that left a mailbox unsent. The transmit interrupt alone counts.
+/// Number of frames that left a mailbox unsent. Only the transmit interrupt counts.
 static ABORTED: AtomicU32 = AtomicU32::new(0);
 
-/// The way in which the controller takes part in the bus.
+/// How the controller takes part in the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
-    /// It sends and acknowledges as a node.
+    /// The controller sends and acknowledges as a node.
     Normal,
-    /// It hears its own frames and nothing else; the pin stays recessive.
+    /// The controller receives only its own frames; the pin stays recessive.
     Loopback,
 }
 
 /// The state of error confinement (ISO 11898-1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd)]
 pub enum State {
-    /// Few errors.
+    /// Both error counters are below 96.
     Active,
     /// An error counter has reached 96.
     Warning,
@@ -60,9 +60,9 @@ pub enum State {
 /// The state of the recovery from bus-off.
 #[derive(Debug, Clone, Copy)]
 enum Recovery {
-    /// The controller takes part in the bus since a time, ms.
+    /// The controller has been on the bus since a time, ms.
     On { since: u32 },
-    /// It is restarted at a time, ms.
+    /// The controller is restarted at a time, ms.
     Waits { until: u32 },
     /// Initialisation mode is requested; leaving it starts the recovery (RM0090 32.7.6).
     Restarts,
@@ -82,14 +82,14 @@ impl Can {
     /// [`Can::receive_only`] names.
     ///
     /// # Errors
-    /// The step that the controller does not confirm.
+    /// The change of mode that the controller does not confirm.
     pub fn start(can: pac::CAN1, mode: Mode) -> Result<Self, CanFault> {
-        // It sleeps after a reset, and does not initialise before it is woken (RM0090 32.4).
+        // The controller sleeps after a reset, and must be woken before initialisation (RM0090 32.4).
         can.mcr().modify(|_, w| w.sleep().clear_bit().inrq().set_bit());
-        if !within(|| can.msr().read().slak().bit_is_clear()) {
+        if !wait_until(POLLS, || can.msr().read().slak().bit_is_clear()) {
             return Err(CanFault::Sleeping);
         }
-        if !within(|| can.msr().read().inak().bit_is_set()) {
+        if !wait_until(POLLS, || can.msr().read().inak().bit_is_set()) {
             return Err(CanFault::NotInitialising);
         }
         let [before, after] = SEGMENTS;
@@ -111,13 +111,13 @@ impl Can {
         receive_only(&self.registers, ids);
     }
 
-    /// Takes part in the bus. The controller waits for 11 recessive bits by itself. Called when received frames
-    /// can be taken: a receive FIFO holds three.
+    /// Joins the bus. The controller waits for 11 recessive bits by itself. Called once received frames can be taken:
+    /// a receive FIFO holds three.
     pub fn join(&self) {
         self.registers.mcr().modify(|_, w| w.inrq().clear_bit());
     }
 
-    /// The state of error confinement.
+    /// Returns the state of error confinement.
     pub fn state(&self) -> State {
         let errors = self.registers.esr().read();
         if errors.boff().bit_is_set() || !matches!(self.recovery, Recovery::On { .. }) {
@@ -162,7 +162,7 @@ impl Can {
         };
     }
 
-    /// Aborts the frames whose time of request is chosen.
+    /// Aborts the pending frames whose time of request is `chosen`.
     fn abort(&self, chosen: impl Fn(u32) -> bool) {
         let pending = !self.registers.tsr().read().bits();
         let bits = |bits: u32, (k, requested): (usize, &u32)| {
@@ -177,7 +177,7 @@ impl Can {
         }
     }
 
-    /// Gives a frame to a mailbox; whether one was free. `now` is the time in milliseconds.
+    /// Writes a frame to a free mailbox; returns whether there was one. `now` is the time in milliseconds.
     pub fn transmit(&mut self, frame: &DataFrame, now: u32) -> bool {
         let status = self.registers.tsr().read().bits();
         let Some(index) = (0..MAILBOXES).find(|k| status & EMPTY << k != 0) else { return false };
@@ -201,11 +201,7 @@ impl Can {
     }
 }
 
-fn within(ready: impl Fn() -> bool) -> bool {
-    (0..POLLS).any(|_| ready())
-}
-
-/// Sets one filter bank for each identifier, as a list that names it twice; all else is not received.
+/// Sets one filter bank for each identifier, as a list that names it twice; other frames are not received.
 fn receive_only(can: &pac::CAN1, ids: impl Iterator<Item = Id>) {
     can.fmr().modify(|_, w| w.finit().set_bit());
     // SAFETY: one bit for each bank that CAN1 has; `take` keeps to them.
@@ -225,7 +221,7 @@ fn receive_only(can: &pac::CAN1, ids: impl Iterator<Item = Id>) {
     can.fmr().modify(|_, w| w.finit().clear_bit());
 }
 
-/// An identifier as mailboxes and filters hold it (RM0090 32.9.3).
+/// Returns an identifier in the layout of mailboxes and filters (RM0090 32.9.3).
 fn word(id: Id) -> u32 {
     match id {
         Id::Standard(id) => u32::from(id.as_raw()) << 21,
@@ -233,7 +229,7 @@ fn word(id: Id) -> u32 {
     }
 }
 
-/// Frames that left a mailbox unsent since the start.
+/// Returns the number of frames that left a mailbox unsent since the start.
 pub fn aborted() -> u32 {
     ABORTED.load(Ordering::Relaxed)
 }
@@ -260,13 +256,13 @@ pub fn transmitted() {
 /// Holds a frame from the receive FIFO.
 #[derive(Debug)]
 pub struct Received {
-    /// The frame; `None`: a remote frame.
+    /// The frame; `None` for a remote frame.
     pub frame: Option<DataFrame>,
     /// True where at least one frame was lost before it.
     pub lost: bool,
 }
 
-/// Takes the oldest frame that has come. Called by the receive interrupt alone.
+/// Takes the oldest received frame. Only the receive interrupt calls this.
 pub fn receive() -> Option<Received> {
     // SAFETY: the sending half touches none of these registers after `Can::start`.
     let can = unsafe { &*pac::CAN1::ptr() };
@@ -285,7 +281,7 @@ pub fn receive() -> Option<Received> {
     let data = (u64::from(words[1]) << 32 | u64::from(words[0])).to_le_bytes();
     let bytes = data.get(..usize::from(length.min(8))).unwrap_or_default();
     let frame = id.filter(|_| head.rtr().bit_is_clear()).and_then(|id| DataFrame::new(id, bytes));
-    // Written as a whole: the other bits are cleared by ones, and only those that were read.
+    // Written without reading: ones clear the flags, and FOVR is cleared only if it was seen above.
     can.rfr(0).write(|w| w.fovr().bit(lost).rfom().set_bit());
     Some(Received { frame, lost })
 }

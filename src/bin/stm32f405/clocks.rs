@@ -1,17 +1,17 @@
 //! This module sets the clock tree (RM0090 7): 168 MHz from the board's crystal, or the internal 16 MHz oscillator.
 //!
-//! Every wait has a limit. A crystal that does not start, has another frequency than the board says,
-//! or a supply that stays low leaves the chip on the internal oscillator: CAN stays off, since that
-//! oscillator can be 8 % wrong, and the reason is reported.
+//! Every wait has a limit. If the crystal does not start or has the wrong frequency, or the supply stays low, the
+//! chip stays on the internal oscillator: CAN stays off, since that oscillator can be 8 % wrong, and the reason is
+//! reported.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
 use super::crystal::{self, INTERNAL_HZ};
-use super::{pac, supply};
+use super::{pac, supply, wait_until};
 use gyronet::service::event::ClockFault;
 
 const FULL_HZ: u32 = 168_000_000;
 const MHZ: u32 = 1_000_000;
-/// Polls before a step is given up: above 25 ms at 16 MHz. A crystal takes 2 ms (DS8626 table 37).
+/// Polls before a step times out: above 25 ms at 16 MHz. A crystal takes 2 ms (DS8626 table 37).
 const POLLS: u32 = 80_000;
 /// The emulator's timers count at 1 GHz, whatever RCC holds.
 const EMULATED_TIMER_HZ: u32 = 1_000_000_000;
@@ -25,12 +25,12 @@ pub struct Clocks {
     pub apb1_hz: u32,
     /// USART1, USART6 and SPI1.
     pub apb2_hz: u32,
-    /// TIM5: twice APB1 where that is divided.
+    /// TIM5: twice APB1 if APB1 is divided.
     pub timer_hz: u32,
     /// The crystal's frequency as measured against the internal oscillator; 0 where it was not measured.
     #[allow(dead_code, reason = "bringup alone prints it")]
     pub measured_hz: u32,
-    /// The reason why the crystal does not drive them.
+    /// The reason why the clocks do not run from the crystal.
     pub fault: Option<ClockFault>,
 }
 
@@ -53,7 +53,7 @@ impl Clocks {
     pub const EMULATED: Self =
         Self { core_hz: FULL_HZ, timer_hz: EMULATED_TIMER_HZ, ..Self::internal(ClockFault::Emulated) };
 
-    /// Starts crystal and PLL; the internal oscillator where one of them does not come.
+    /// Starts crystal and PLL; falls back to the internal oscillator if one of them does not start.
     pub fn start(rcc: &pac::RCC, flash: &pac::FLASH, pwr: &pac::PWR, crystal_hz: u32) -> Self {
         to_internal(rcc);
         let started =
@@ -67,32 +67,27 @@ impl Clocks {
         }
     }
 
-    /// Returns whether the crystal drives them.
+    /// Returns whether the clocks run from the crystal.
     pub fn exact(&self) -> bool {
         self.fault.is_none()
     }
 }
 
-/// Waits for a step of the clock tree, in a bounded number of polls; whether it came.
-fn within(ready: impl Fn() -> bool) -> bool {
-    (0..POLLS).any(|_| ready())
-}
-
-/// Puts the chip on the internal oscillator and stops PLL and crystal: a bootloader may have left
-/// them on, and PLLCFGR is read-only while the PLL runs (RM0090 7.3.2).
+/// Switches the chip to the internal oscillator and stops PLL and crystal: a bootloader may have left them on, and
+/// PLLCFGR is read-only while the PLL runs (RM0090 7.3.2).
 fn to_internal(rcc: &pac::RCC) {
     rcc.cr().modify(|_, w| w.hsion().on());
-    within(|| rcc.cr().read().hsirdy().is_ready());
+    wait_until(POLLS, || rcc.cr().read().hsirdy().is_ready());
     rcc.cfgr().modify(|_, w| w.sw().hsi());
-    within(|| rcc.cfgr().read().sws().is_hsi());
+    wait_until(POLLS, || rcc.cfgr().read().sws().is_hsi());
     rcc.cfgr().modify(|_, w| w.hpre().div1().ppre1().div1().ppre2().div1());
     rcc.cr().modify(|_, w| w.csson().off().pllon().off().hseon().off());
-    within(|| rcc.cr().read().pllrdy().is_not_ready());
+    wait_until(POLLS, || rcc.cr().read().pllrdy().is_not_ready());
 }
 
 fn full(rcc: &pac::RCC, flash: &pac::FLASH, crystal_hz: u32) -> Result<u32, ClockFault> {
     rcc.cr().modify(|_, w| w.hseon().on());
-    if !within(|| rcc.cr().read().hserdy().is_ready()) {
+    if !wait_until(POLLS, || rcc.cr().read().hserdy().is_ready()) {
         return Err(ClockFault::NoCrystal);
     }
     let measured_hz = crystal::check(rcc, crystal_hz)?;
@@ -102,28 +97,28 @@ fn full(rcc: &pac::RCC, flash: &pac::FLASH, crystal_hz: u32) -> Result<u32, Cloc
         w.pllsrc().hse().pllm().bits((crystal_hz / MHZ) as u8).plln().bits(336).pllp().div2().pllq().bits(7)
     });
     rcc.cr().modify(|_, w| w.pllon().on());
-    if !within(|| rcc.cr().read().pllrdy().is_ready()) {
+    if !wait_until(POLLS, || rcc.cr().read().pllrdy().is_ready()) {
         return Err(ClockFault::Pll);
     }
     // Five wait states at 150 to 168 MHz and 2.7 to 3.6 V (RM0090 table 10), before the clock rises.
     flash.acr().modify(|_, w| w.latency().ws5().prften().enabled().icen().enabled().dcen().enabled());
-    if !within(|| flash.acr().read().latency().is_ws5()) {
+    if !wait_until(POLLS, || flash.acr().read().latency().is_ws5()) {
         return Err(ClockFault::Pll);
     }
     rcc.cfgr().modify(|_, w| w.hpre().div1().ppre1().div4().ppre2().div2());
     rcc.cfgr().modify(|_, w| w.sw().pll());
-    if !within(|| rcc.cfgr().read().sws().is_pll()) {
+    if !wait_until(POLLS, || rcc.cfgr().read().sws().is_pll()) {
         return Err(ClockFault::Pll);
     }
-    // A crystal that stops raises the NMI, which resets the chip and leaves the reason.
+    // A crystal that stops raises the NMI, which records the reason and resets the chip.
     rcc.cr().modify(|_, w| w.csson().on());
     Ok(measured_hz)
 }
 
-/// Tries once a second what failed at the start; whether a reset would now find it in order.
+/// Retries what failed at the start; returns whether it would succeed after a reset. Called once a second.
 ///
-/// Only the supply and a crystal that did not start can come back; the crystal is switched on by one
-/// call and looked at by the next.
+/// Only the supply and a crystal that did not start can recover. The crystal is switched on by one call and checked
+/// by the next.
 pub fn recovered(fault: ClockFault) -> bool {
     // SAFETY: called by the idle task alone, which is the only user of this register after the start.
     let cr = unsafe { &*pac::RCC::ptr() }.cr();

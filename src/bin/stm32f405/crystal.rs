@@ -1,9 +1,9 @@
 //! Measures the crystal against the internal oscillator (RM0090 7.2.11): TIM11 counts the internal
 //! 16 MHz and captures at every 248th period of the crystal.
 //!
-//! A crystal of another frequency still locks the PLL, and every bit rate would be wrong by the same
-//! factor. The internal oscillator is within -8 and +4.5 % from -40 to 105 degrees Celsius (DS8626
-//! table 39), so frequencies that differ by less than 10 % cannot be distinguished.
+//! With a crystal of the wrong frequency the PLL still locks, and every bit rate would be wrong by the same factor.
+//! The internal oscillator is within -8 and +4.5 % from -40 to 105 degrees Celsius (DS8626 table 39), so frequencies
+//! that differ by less than 10 % cannot be distinguished.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
 use super::{clock_delay, pac};
@@ -11,20 +11,20 @@ use gyronet::service::event::ClockFault;
 
 /// Frequency of the internal oscillator, Hz.
 pub const INTERNAL_HZ: u32 = 16_000_000;
-/// The crystal's divider ahead of the timer (RTCPRE), and captures are of every eighth edge.
+/// Divider of the crystal before the timer (RTCPRE), and edges for each capture.
 const DIVIDER: u8 = 31;
 const EDGES: u32 = 8;
-/// Captures that are counted over: 32 take 31,744 counts with a crystal of 4 MHz, and 65,536 fit.
+/// Captures in a measurement: 32 take 31,744 counts with a crystal of 4 MHz, and the timer can count 65,536.
 const CAPTURES: u32 = 32;
-/// Polls for all captures, twice as many as with a crystal of 4 MHz.
+/// Polls before the captures time out: twice as many as a crystal of 4 MHz needs.
 const POLLS: u32 = 20_000;
 /// Largest deviation, percent.
 const TOLERANCE: u32 = 10;
 
-/// Checks that the running crystal has a frequency, Hz, and gives what was measured.
+/// Checks that the running crystal has the expected frequency, Hz, and returns the measured one.
 ///
 /// # Errors
-/// [`ClockFault::CrystalFrequency`] with what was measured, kHz; 0 where nothing could be.
+/// [`ClockFault::CrystalFrequency`] with the measured frequency, kHz, or 0 if the measurement failed.
 pub fn check(rcc: &pac::RCC, expected_hz: u32) -> Result<u32, ClockFault> {
     let measured = measure(rcc).unwrap_or(0);
     let limit = expected_hz / 100 * TOLERANCE;
@@ -58,7 +58,7 @@ fn measure(rcc: &pac::RCC) -> Option<u32> {
     u32::try_from(hz).ok()
 }
 
-/// Counts of the timer over all captures; `None` when they do not come, or one was missed.
+/// Returns the counts of the timer over all captures; `None` if they time out or one was missed.
 fn count(timer: &pac::TIM11) -> Option<u16> {
     // The first one ends an unknown part of a period, so the second begins the count.
     let (mut seen, mut first) = (0, 0);

@@ -1,7 +1,7 @@
 //! A DMA stream (RM0090 10) between a peripheral's data register and bytes in SRAM, in direct mode.
 //!
-//! The streams raise no interrupt: their owners look at how far they are. The DMA reaches SRAM, not CCM
-//! (RM0090 2.3.1). No stream of DMA2 serves a peripheral of the AHB: beside APB2's, it could corrupt data (ES0182,
+//! The streams raise no interrupt: their owners poll how far they are. The DMA can access SRAM, but not CCM (RM0090
+//! 2.3.1). No stream of DMA2 serves a peripheral of the AHB: together with APB2's, it could corrupt data (ES0182,
 //! "DMA2 data corruption when managing AHB and APB2 peripherals in a concurrent way").
 #![allow(unsafe_code, reason = "registers by address; each block says why it is sound")]
 
@@ -21,11 +21,11 @@ pub struct Stream {
 unsafe impl Send for Stream {}
 
 impl Stream {
-    /// A stream's flags in its part of the status registers: all, and transfer complete.
+    /// Flags of a stream in its part of the status registers: all, and transfer complete.
     const FLAGS: u32 = 0x3D;
     const COMPLETE: u32 = 1 << 5;
 
-    /// Names a stream, 0 to 7, and a channel, 0 to 7, of a controller of the chip.
+    /// Returns the handle of a stream, 0 to 7, with a channel, 0 to 7, of a controller of the chip.
     pub const fn new(controller: *const RegisterBlock, number: usize, channel: u8) -> Self {
         Self { controller, number, channel }
     }
@@ -36,17 +36,16 @@ impl Stream {
     }
 
     fn stream(&self) -> &ST {
-        // Eight at most, as the compiler sees: there is no panic.
+        // The compiler sees that the number is in range, so there is no panic.
         self.controller().st(self.number % 8)
     }
 
-    /// The place of the stream's flags in a status register.
+    /// Returns the offset of the stream's flags in a status register, bits.
     fn shift(&self) -> u32 {
         [0, 6, 16, 22][self.number % 4]
     }
 
-    /// Starts to write every byte that the register receives to `len` bytes of memory, again and again from their
-    /// begin.
+    /// Starts to write every byte that the register receives to `len` bytes of memory, in circular mode.
     ///
     /// # Safety
     /// The register is one that the channel's peripheral receives with, and nothing else writes the memory from now on.
@@ -59,7 +58,7 @@ impl Stream {
         });
     }
 
-    /// Starts to give `len` bytes of memory to the register. The stream must have ended.
+    /// Starts to write `len` bytes of memory to the register. The stream must have ended.
     ///
     /// # Safety
     /// The register is one that the channel's peripheral sends with, and nothing writes the memory until the stream
@@ -83,12 +82,12 @@ impl Stream {
             stream.m0ar().write(|w| w.bits(memory as u32));
             stream.ndtr().write(|w| w.bits(len.into()));
         }
-        // What the processor has written to the memory comes before the stream's start.
+        // The processor's writes to the memory must complete before the stream starts.
         compiler_fence(Ordering::SeqCst);
         cortex_m::asm::dmb();
     }
 
-    /// Returns how many bytes are left until the end.
+    /// Returns the number of bytes left until the end.
     #[inline(always)]
     pub fn remaining(&self) -> usize {
         let left = self.stream().ndtr().read().bits() as u16;
@@ -96,13 +95,13 @@ impl Stream {
         left.into()
     }
 
-    /// Returns whether the stream has not ended.
+    /// Returns whether the stream is still running.
     #[inline(always)]
     pub fn is_running(&self) -> bool {
         self.stream().cr().read().en().is_enabled()
     }
 
-    /// Returns whether the end was reached since the last call.
+    /// Returns whether the end was reached since the last call that returned true.
     #[inline(always)]
     pub fn take_complete(&self) -> bool {
         let dma = self.controller();

@@ -1,13 +1,13 @@
 //! The flash controller (RM0090 3): erases sectors and programs words.
 //!
-//! Code runs from the same flash, so the processor stands still while an operation runs: 16 us a word,
-//! up to 2 s a sector of 128 KiB (DS8626 table 48). The watchdog gets its long limit for an erase.
+//! Code runs from the same flash, so the processor stalls while an operation runs: 16 us a word, up to 2 s a sector
+//! of 128 KiB (DS8626 table 48). The watchdog gets its long limit for an erase.
 //!
-//! The controller ignores what it is not unlocked for, and reports nothing then. Each operation is
-//! therefore checked by its effect: an erased sector reads as ones, a programmed word as written.
+//! A locked controller ignores operations without an error. Each operation is therefore checked by its effect: an
+//! erased sector reads as ones, a programmed word as written.
 #![allow(unsafe_code, reason = "flash is memory that is written by address; each block says why it is sound")]
 
-use super::{pac, supply, watchdog};
+use super::{pac, supply, wait_until, watchdog};
 use core::cell::RefCell;
 use embedded_storage::nor_flash::{NorFlashError, NorFlashErrorKind};
 use gyronet::store::layout::{FLASH_BASE, SECTORS, sector_at};
@@ -16,8 +16,8 @@ use gyronet::store::layout::{FLASH_BASE, SECTORS, sector_at};
 pub const WORD: usize = 4;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 const ERASED: u32 = u32::MAX;
-/// Polls before an operation is given up. The processor stands still while the controller is busy,
-/// so that more than one is hardly ever needed.
+/// Polls before an operation times out. The processor stalls while the controller is busy, so one poll is nearly
+/// always enough.
 const POLLS: u32 = 10_000_000;
 /// OPERR, WRPERR, PGAERR, PGPERR, PGSERR and EOP, which are cleared by ones (RM0090 3.9.4).
 const FLAGS: u32 = 0xF3;
@@ -26,19 +26,19 @@ const ERRORS: u32 = 0xF2;
 /// The reason why the flash was not changed, or not as requested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FlashError {
-    /// The region has no such bytes.
+    /// The range is outside the region.
     OutOfBounds,
-    /// A sector or a word does not begin or end there.
+    /// The range does not begin and end at the boundary of a sector or a word.
     NotAligned,
     /// An operation is running.
     Busy,
-    /// The controller does not take its keys; it refuses them until the next reset.
+    /// The controller did not accept its keys; it refuses them until the next reset.
     Locked,
     /// The supply is below 2.9 V: below 2.7 V programming is not reliable.
     SupplyLow,
     /// The controller reports an error: the flags of FLASH_SR.
     Refused(u8),
-    /// The sector, or the word at this offset, does not read back as it should.
+    /// The sector, or the word at this offset, does not read back as expected.
     NotVerified(u32),
 }
 
@@ -52,21 +52,21 @@ impl NorFlashError for FlashError {
     }
 }
 
-/// The controller, locked except while it works.
+/// The flash controller, which is locked except during an operation.
 pub struct Flash(RefCell<pac::FLASH>);
 
 impl Flash {
-    /// Takes the controller; the clock tree is done with it by then.
+    /// Takes ownership of the controller, which the clock tree no longer uses.
     pub const fn new(registers: pac::FLASH) -> Self {
         Self(RefCell::new(registers))
     }
 
-    /// Returns whether the controller answers. It is locked now; in an emulator without one the lock reads as open.
+    /// Returns whether there is a controller: it is locked now, while an emulator without one reads the lock as open.
     pub fn writable(&self) -> bool {
         self.0.try_borrow().is_ok_and(|registers| locked(&registers))
     }
 
-    /// Copies bytes from an offset on; the caller has checked that they are inside the flash.
+    /// Reads bytes from an offset on; the caller has checked that they are inside the flash.
     pub fn read(&self, offset: u32, bytes: &mut [u8]) {
         for (at, byte) in (FLASH_BASE + offset..).zip(bytes) {
             // SAFETY: inside the flash, which is always mapped and readable.
@@ -74,10 +74,10 @@ impl Flash {
         }
     }
 
-    /// Gives `len` bytes from an offset on as the processor reads them.
+    /// Returns `len` bytes from an offset on, in place.
     ///
     /// # Safety
-    /// They are inside the flash, and nobody writes them while the slice is used.
+    /// They are inside the flash, and nothing writes them while the slice is used.
     pub unsafe fn mapped(offset: u32, len: usize) -> &'static [u8] {
         // SAFETY: see above.
         unsafe { core::slice::from_raw_parts((FLASH_BASE + offset) as *const u8, len) }
@@ -87,7 +87,7 @@ impl Flash {
     pub fn erase(&self, offset: u32) -> Result<(), FlashError> {
         let sector = sector_at(offset).ok_or(FlashError::NotAligned)?;
         let len = SECTORS.get(usize::from(sector)).copied().unwrap_or_default();
-        watchdog::lengthened(|| {
+        watchdog::with_long_limit(|| {
             self.operate(|registers| {
                 // SAFETY: the number of a sector, and PSIZE = 10 for 32 bits (2.7 to 3.6 V, RM0090 table 7).
                 registers.cr().modify(|_, w| unsafe { w.ser().set_bit().snb().bits(sector).psize().bits(2) });
@@ -136,7 +136,7 @@ impl Flash {
         if supply::is_low() {
             return Err(FlashError::SupplyLow);
         }
-        // Flags of an operation before this one would be taken for its own.
+        // Clear the flags of an earlier operation, which would be taken for errors of this one.
         // SAFETY: ones clear their flags.
         registers.sr().write(|w| unsafe { w.bits(FLAGS) });
         if locked(&registers) {
@@ -164,16 +164,16 @@ fn locked(registers: &pac::FLASH) -> bool {
     registers.cr().read().lock().bit_is_set()
 }
 
-/// Waits until the controller is idle and gives the error that it reports.
+/// Waits until the controller is idle and returns the error that it reports.
 fn idle(registers: &pac::FLASH) -> Result<(), FlashError> {
-    if !(0..POLLS).any(|_| registers.sr().read().bsy().bit_is_clear()) {
+    if !wait_until(POLLS, || registers.sr().read().bsy().bit_is_clear()) {
         return Err(FlashError::Busy);
     }
     let errors = registers.sr().read().bits() & ERRORS;
     if errors == 0 { Ok(()) } else { Err(FlashError::Refused(errors as u8)) }
 }
 
-/// Drops what the caches hold of flash that has changed (RM0090 3.5.4): a cache is reset while it is off.
+/// Flushes the caches after flash has changed (RM0090 3.5.4): a cache is reset while it is off.
 fn flush_caches(registers: &pac::FLASH) {
     let acr = registers.acr();
     if acr.read().dcen().bit_is_set() {

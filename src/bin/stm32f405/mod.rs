@@ -1,8 +1,8 @@
-//! An STM32F405 (RM0090): its clocks, pins and peripherals, each driver in a file of its own.
+//! Drivers of the STM32F405 (RM0090): its clocks, pins and peripherals, one file each.
 //!
-//! Nothing in here waits without a limit, and what does not come is reported. A register that is
-//! written as a whole begins at its reset value (svd2rust's `write`), so lines that write one whose
-//! reset value is not zero say so, and a test holds them to it.
+//! Every wait in here has a limit, and a timeout is reported. A register that is written as a whole begins at its
+//! reset value (svd2rust's `write`), so a line that writes a register with a nonzero reset value states that value,
+//! and a test checks it.
 
 pub mod can;
 pub mod clocks;
@@ -24,9 +24,9 @@ pub use stm32f4::stm32f405 as pac;
 use clocks::Clocks;
 use gyronet::service::event::ResetCause;
 
-/// The chip's report of itself once its clocks run.
+/// State of the chip once its clocks run.
 pub struct Chip {
-    /// Frequencies, and why they are not the full ones.
+    /// Frequencies, and the reason if they are not the full ones.
     pub clocks: Clocks,
     /// DBGMCU_IDCODE (RM0090 38.6.1); `None` where it reads as zero, as in QEMU.
     pub device_id: Option<u32>,
@@ -51,11 +51,16 @@ impl Chip {
     }
 }
 
-/// Waits until a peripheral's clock that was switched on has come: 1 + 4 cycles of the slowest bus' prescaler
+/// Waits until a peripheral's clock that was switched on is running: 1 + 4 cycles of the slowest bus' prescaler
 /// (ES0182 2.1.13).
 pub fn clock_delay() {
     cortex_m::asm::dsb();
     cortex_m::asm::delay(16);
+}
+
+/// Waits until `is_ready`, for `polls` polls at most; returns whether it was.
+pub fn wait_until(polls: u32, is_ready: impl Fn() -> bool) -> bool {
+    (0..polls).any(|_| is_ready())
 }
 
 /// Switches on the clocks of ports and peripherals.

@@ -36,17 +36,17 @@ pub enum Speed {
 }
 
 impl Pin {
-    /// Names a pin.
+    /// Returns a pin, by the letter of its port and its number.
     ///
     /// # Panics
-    /// When there is no such port or pin, while the image is compiled.
+    /// If there is no such port or pin, when the image is compiled.
     pub const fn new(port: char, number: u8) -> Self {
         assert!(number < 16, "a port has 16 pins");
         let port = match port {
             'A' => Port::A,
             'B' => Port::B,
             'C' => Port::C,
-            _ => panic!("ports A, B and C have a clock here"),
+            _ => panic!("only ports A, B and C are clocked"),
         };
         Self { port, number }
     }
@@ -62,14 +62,14 @@ impl Pin {
         unsafe { &*port }
     }
 
-    /// Replaces the pin's field of `width` bits.
+    /// Returns `old` with the pin's field of `width` bits replaced.
     fn field(self, old: u32, width: u8, value: u32) -> u32 {
         let shift = (self.number * width) % 32;
         let mask = (1 << width) - 1;
         old & !(mask << shift) | (value & mask) << shift
     }
 
-    /// Hands the pin to a peripheral.
+    /// Assigns the pin to a peripheral.
     pub fn alternate(self, function: u8, speed: Speed) {
         let port = self.registers();
         // SAFETY: each field takes any value of its width.
@@ -84,7 +84,7 @@ impl Pin {
         }
     }
 
-    /// Makes an open input read as high.
+    /// Enables the pull-up, so that an open input reads as high.
     pub fn pull_up(self) {
         // SAFETY: the field takes any value of its width.
         self.registers().pupdr().modify(|r, w| unsafe { w.bits(self.field(r.bits(), 2, 0b01)) });
@@ -97,7 +97,7 @@ impl Pin {
         self.registers().moder().modify(|r, w| unsafe { w.bits(self.field(r.bits(), 2, 0b01)) });
     }
 
-    /// Drives an output.
+    /// Sets the level of an output.
     pub fn set(self, high: bool) {
         let bit = 1 << self.number;
         // SAFETY: ones set or reset their pin, zeros change nothing (RM0090 8.4.7).

@@ -1,12 +1,12 @@
-//! This module reads the reason of the last reset (RM0090 7.3.21).
+//! This module reads the cause of the last reset (RM0090 7.3.21).
 
 use super::pac;
 use gyronet::service::event::ResetCause;
 
 /// Reads the reset flags and clears them for the next reset.
 ///
-/// Every reset sets the pin's flag and power-on sets the brown-out's too, so the most specific cause
-/// is looked for first.
+/// Every reset sets the pin's flag and power-on sets the brown-out's too, so the most specific cause is checked
+/// first.
 pub fn cause(rcc: &pac::RCC) -> ResetCause {
     let flags = rcc.csr().read();
     let causes = [

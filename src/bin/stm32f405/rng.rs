@@ -1,20 +1,20 @@
-//! Random numbers of the chip's analogue noise (RNG, RM0090 24), 48 MHz from the PLL.
+//! Random numbers from the chip's analogue noise (RNG, RM0090 24), clocked at 48 MHz from the PLL.
 //!
-//! A number is used only where the generator reports no error, and where it differs from the one before; the first one
-//! after the start is not used (RM0090 24.3.1, FIPS 140-2).
+//! A number is used only if the generator reports no error and the number differs from the previous one; the first
+//! one after the start is not used (RM0090 24.3.1, FIPS 140-2).
 #![allow(unsafe_code, reason = "a peripheral that nothing else uses; the block says so")]
 
 use super::pac;
 
-/// Looks for a number, which comes after 40 periods of 48 MHz: several times that.
-const LOOKS: u32 = 2_000;
+/// Polls before a number times out: several times the 40 periods of 48 MHz that it takes.
+const POLLS: u32 = 2_000;
 
 /// Returns random bytes; `None` where the generator or its clock fails.
 #[inline(never)]
 pub fn bytes() -> Option<[u8; 32]> {
     // SAFETY: idle alone calls this, and no other code uses RNG.
     let rng = unsafe { pac::RNG::steal() };
-    // Enabled anew it has a new seed, and the flags of an earlier failure are gone.
+    // Enabling the generator gives it a new seed; the flags of an earlier failure are cleared first.
     rng.sr().write(|w| w.seis().clear_bit().ceis().clear_bit());
     rng.cr().write(|w| w.rngen().set_bit());
     let bytes = draw(&rng);
@@ -36,9 +36,9 @@ fn draw(rng: &pac::RNG) -> Option<[u8; 32]> {
     Some(bytes)
 }
 
-/// Waits for a number, for [`LOOKS`] at most.
+/// Waits for a number, for [`POLLS`] polls at most.
 fn number(rng: &pac::RNG) -> Option<u32> {
-    for _ in 0..LOOKS {
+    for _ in 0..POLLS {
         let status = rng.sr().read();
         if status.seis().bit() || status.ceis().bit() || status.secs().bit() || status.cecs().bit() {
             return None;

@@ -3,21 +3,21 @@
 //! Every wait has a limit, so a transaction ends whatever the controller does.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
-use super::pac;
 use super::pins::{self, Pin, Speed};
+use super::{pac, wait_until};
 use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
 
-/// Polls before a byte is given up. It takes 1.5 us, some 20 polls.
+/// Polls before a byte times out. A byte takes 1.5 us, about 20 polls.
 const POLLS: u32 = 1_000;
 
-/// The controller, which [`start`] has initialised. Whoever holds it uses it alone.
+/// A handle of the controller, which [`start`] has initialised. Its holder is the only user of the controller.
 #[derive(Debug, Clone, Copy)]
 pub struct Spi {
     select: Pin,
 }
 
-/// Starts mode 3 at 84 / 16 = 5.25 MHz (1 MHz on the internal oscillator); an ICM-42688-P takes 24 MHz. Pins are
-/// the clock, data in, data out, and the sensor's chip select.
+/// Starts mode 3 at 84 / 16 = 5.25 MHz (1 MHz on the internal oscillator); an ICM-42688-P allows 24 MHz. Pins are the
+/// clock, data in, data out, and the sensor's chip select.
 pub fn start(spi: &pac::SPI1, [clock, input, output, select]: [Pin; 4]) -> Spi {
     // At low speed the edges are too slow for 5 MHz, and the last bit of a transfer can be corrupted
     // (ES0182 2.11).
@@ -36,10 +36,10 @@ impl Spi {
     fn byte(self, byte: u8) -> Result<u8, ErrorKind> {
         // SAFETY: see the type.
         let spi = unsafe { &*pac::SPI1::ptr() };
-        within(|| spi.sr().read().txe().bit_is_set())?;
+        wait_for(|| spi.sr().read().txe().bit_is_set())?;
         // SAFETY: the data register takes any byte.
         spi.dr().write(|w| unsafe { w.bits(byte.into()) });
-        within(|| spi.sr().read().rxne().bit_is_set())?;
+        wait_for(|| spi.sr().read().rxne().bit_is_set())?;
         Ok(spi.dr().read().bits() as u8)
     }
 
@@ -50,7 +50,7 @@ impl Spi {
             Operation::TransferInPlace(bytes) => {
                 bytes.iter_mut().try_for_each(|byte| self.byte(*byte).map(|read| *byte = read))
             }
-            // No part of this image asks for them.
+            // No part of this image uses them.
             Operation::Transfer(..) | Operation::DelayNs(_) => Err(ErrorKind::Other),
         }
     }
@@ -69,6 +69,6 @@ impl SpiDevice for Spi {
     }
 }
 
-fn within(ready: impl Fn() -> bool) -> Result<(), ErrorKind> {
-    if (0..POLLS).any(|_| ready()) { Ok(()) } else { Err(ErrorKind::Other) }
+fn wait_for(is_ready: impl Fn() -> bool) -> Result<(), ErrorKind> {
+    wait_until(POLLS, is_ready).then_some(()).ok_or(ErrorKind::Other)
 }

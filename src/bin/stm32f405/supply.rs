@@ -1,29 +1,29 @@
 //! This module supervises the supply (RM0090 5.2): programmable voltage detector and brown-out reset.
 //!
-//! Flash is programmed in words, which needs 2.7 V, and 168 MHz at five wait states needs the same.
-//! The detector's level 6 falls at 2.85 to 2.99 V and rises at 3.10 V at most (DS8626 table 19), so the chip
-//! stops before either limit is reached, and a supply of 3.3 V - 5 % is above it. Level 5 can fall at 2.65 V, and
-//! level 7 can rise at 3.21 V.
+//! Programming flash in words needs 2.7 V, as does 168 MHz at five wait states. Level 6 of the detector trips at 2.85
+//! to 2.99 V when the supply falls, and clears at 3.10 V at most when it rises (DS8626 table 19). So the chip stops
+//! before either limit is reached, and a supply of 3.3 V - 5 % is above the level. Level 5 can trip at 2.65 V, and
+//! level 7 may clear only at 3.21 V.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
-use super::{clock_delay, pac};
+use super::{clock_delay, pac, wait_until};
 
 /// PLS for 3.03 V rising, 2.93 V falling.
 const LEVEL: u8 = 6;
 /// EXTI line of the detector's output.
 const LINE: u32 = 1 << 16;
-/// Looks at the detector in 100 ms at 16 MHz.
-const LOOKS: u32 = 100;
-const CYCLES_PER_LOOK: u32 = 16_000;
+/// Polls of the detector in 100 ms at 16 MHz.
+const POLLS: u32 = 100;
+const CYCLES_PER_POLL: u32 = 16_000;
 
-/// Starts the detector and waits up to 100 ms at the reset clock for the supply; whether it came.
+/// Starts the detector and waits up to 100 ms at the reset clock for the supply; returns whether it is high enough.
 pub fn wait(rcc: &pac::RCC, pwr: &pac::PWR) -> bool {
     rcc.apb1enr().modify(|_, w| w.pwren().enabled());
     clock_delay();
     // SAFETY: the level is one of the eight.
     pwr.cr().modify(|_, w| unsafe { w.pls().bits(LEVEL).pvde().set_bit() });
-    (0..LOOKS).any(|_| {
-        cortex_m::asm::delay(CYCLES_PER_LOOK);
+    wait_until(POLLS, || {
+        cortex_m::asm::delay(CYCLES_PER_POLL);
         !is_low()
     })
 }
@@ -34,7 +34,7 @@ pub fn is_low() -> bool {
     unsafe { &*pac::PWR::ptr() }.csr().read().pvdo().bit_is_set()
 }
 
-/// Lets a falling supply raise the interrupt PVD.
+/// Enables the interrupt PVD for a falling supply.
 pub fn watch(exti: &pac::EXTI) {
     // SAFETY: line 16 is the detector (RM0090 12.2.5). Its output rises when the supply falls.
     unsafe {

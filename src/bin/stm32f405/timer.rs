@@ -1,8 +1,8 @@
 //! Board time: TIM5 (RM0090 18) as a free-running 32-bit counter of microseconds.
 //!
-//! The counter goes on while an erase of the flash stalls the processor, so no time is lost by one.
-//! It wraps every 71.6 minutes. [`Time::tick`], called every millisecond, counts the half-wraps;
-//! a reader combines both and is right at any priority, as long as it is at most half a wrap late.
+//! The counter keeps running while an erase of the flash stalls the processor, so no time is lost. It wraps every
+//! 71.6 minutes. [`tick`], called every millisecond, counts the half-wraps; a reader combines both. The result is
+//! right at any priority, as long as the tick is at most half a wrap late.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
 use super::{clock_delay, clocks::Clocks, pac};
@@ -17,7 +17,7 @@ static HALVES: AtomicU32 = AtomicU32::new(0);
 pub fn start(rcc: &pac::RCC, timer: &pac::TIM5, clocks: &Clocks) {
     rcc.apb1enr().modify(|_, w| w.tim5en().enabled());
     clock_delay();
-    // SAFETY: any prescaler and any end of the count are valid; UG takes both over (RM0090 18.4.6).
+    // SAFETY: any prescaler and any end of the count are valid; UG loads both (RM0090 18.4.6).
     unsafe {
         timer.psc().write(|w| w.bits(clocks.timer_hz / HZ - 1));
         timer.arr().write(|w| w.bits(u32::MAX));
@@ -41,17 +41,17 @@ pub fn tick() -> u32 {
     count
 }
 
-/// Microseconds since the start.
+/// Returns the microseconds since the start.
 #[inline]
 pub fn micros() -> u64 {
-    // Read first: a half-wrap that is counted in between is then seen in the counter alone.
+    // Read first: a half-wrap that is counted between the two reads then shows in the counter only.
     let halves = HALVES.load(Ordering::Acquire);
     let count = counter();
-    // A counter in the other half than the count says has just entered the next one.
+    // If the counter is not in the half that the count says, it has just entered the next one.
     (u64::from(halves) << 31) + u64::from(count ^ (halves & 1) << 31)
 }
 
-/// Milliseconds since the start; they wrap.
+/// Returns the milliseconds since the start, which wrap.
 pub fn milliseconds() -> u32 {
     (micros() / 1_000) as u32
 }

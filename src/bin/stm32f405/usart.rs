@@ -8,7 +8,7 @@ use super::pac::{self, Interrupt, usart1::RegisterBlock};
 #[derive(Debug, Clone, Copy)]
 pub struct Usart {
     registers: *const RegisterBlock,
-    /// Raised by what was asked for: a byte that has come, room for one, a damaged byte.
+    /// Interrupt that is raised by the enabled events: a received byte, room for a byte, a damaged byte.
     pub interrupt: Interrupt,
     streams: [Stream; 2],
 }
@@ -17,7 +17,7 @@ pub struct Usart {
 // only read the status, or set a bit that the handler clears.
 unsafe impl Send for Usart {}
 
-/// The status register, read once.
+/// A value of the status register.
 #[derive(Debug, Clone, Copy)]
 pub struct Status(u16);
 
@@ -34,49 +34,49 @@ impl Status {
         self.0 & flags != 0
     }
 
-    /// Returns whether a byte has come, or one was lost because it was not taken in time.
+    /// Returns whether a byte was received, or lost because it was not read in time.
     pub fn received(self) -> bool {
         self.any(Self::RECEIVED | Self::OVERRUN)
     }
 
-    /// Returns whether the byte that has come is damaged, or one behind it was lost.
+    /// Returns whether the received byte is damaged, or the byte after it was lost.
     pub fn damaged(self) -> bool {
         self.any(Self::PARITY | Self::FRAMING | Self::NOISE | Self::OVERRUN)
     }
 
-    /// Returns whether the data register takes a byte.
+    /// Returns whether the data register has room for a byte.
     pub fn room(self) -> bool {
         self.any(Self::ROOM)
     }
 
-    /// Returns whether everything written has left the line.
+    /// Returns whether everything written has been sent.
     pub fn sent(self) -> bool {
         self.any(Self::SENT)
     }
 }
 
 impl Usart {
-    /// USART1, on APB2.
+    /// Returns USART1, on APB2.
     pub const fn one() -> Self {
         Self::new(pac::USART1::ptr(), Interrupt::USART1, [(pac::DMA2::ptr(), 2, 4), (pac::DMA2::ptr(), 7, 4)])
     }
 
-    /// USART2, on APB1.
+    /// Returns USART2, on APB1.
     pub const fn two() -> Self {
         Self::new(pac::USART2::ptr(), Interrupt::USART2, [(pac::DMA1::ptr(), 5, 4), (pac::DMA1::ptr(), 6, 4)])
     }
 
-    /// USART3, on APB1.
+    /// Returns USART3, on APB1.
     pub const fn three() -> Self {
         Self::new(pac::USART3::ptr(), Interrupt::USART3, [(pac::DMA1::ptr(), 1, 4), (pac::DMA1::ptr(), 3, 4)])
     }
 
-    /// USART6, on APB2.
+    /// Returns USART6, on APB2.
     pub const fn six() -> Self {
         Self::new(pac::USART6::ptr(), Interrupt::USART6, [(pac::DMA2::ptr(), 1, 5), (pac::DMA2::ptr(), 6, 5)])
     }
 
-    /// Streams are controller, number and channel.
+    /// Returns a USART; its streams are controller, number and channel.
     const fn new(
         registers: *const RegisterBlock,
         interrupt: Interrupt,
@@ -100,17 +100,17 @@ impl Usart {
         self.registers().cr1().write(|w| w.ue().enabled().te().enabled().re().enabled());
     }
 
-    /// Raises the interrupt with every byte that comes.
+    /// Enables the interrupt for every received byte.
     pub fn interrupt_with_bytes(&self) {
         self.registers().cr1().modify(|_, w| w.rxneie().enabled());
     }
 
-    /// Requests DMA for both directions, and raises the interrupt with every damaged byte (RM0090 30.3.13).
+    /// Enables DMA requests for both directions, and the interrupt for every damaged byte (RM0090 30.3.13).
     pub fn request_dma(&self) {
         self.registers().cr3().write(|w| w.dmar().enabled().dmat().enabled().eie().enabled());
     }
 
-    /// Lets DMA write every received byte to `len` bytes of memory, again and again from their begin.
+    /// Lets DMA write every received byte to `len` bytes of memory, in circular mode.
     ///
     /// # Safety
     /// Nothing else writes the memory from now on.
@@ -124,7 +124,7 @@ impl Usart {
     /// # Safety
     /// Nothing writes the memory until [`Usart::is_sending`] returns false.
     pub unsafe fn send_from(&self, memory: *const u8, len: u16) {
-        // The end of the last byte is not noticed otherwise (RM0090 30.3.13). Zeros clear flags, ones do nothing.
+        // Clears TC, or the last byte's end is not detected (RM0090 30.3.13). Zeros clear flags, ones do nothing.
         // SAFETY: see above; the stream is this USART's, and the rest is the caller's.
         unsafe {
             self.registers().sr().write(|w| w.bits(!Status::SENT)); // reset value: 0x00C0, every bit is written
@@ -132,7 +132,7 @@ impl Usart {
         }
     }
 
-    /// Returns whether DMA has not read all bytes of [`Usart::send_from`].
+    /// Returns whether DMA still has to read bytes of [`Usart::send_from`].
     pub fn is_sending(&self) -> bool {
         self.streams[1].is_running()
     }
@@ -152,13 +152,13 @@ impl Usart {
         Status(self.registers().sr().read().bits())
     }
 
-    /// Takes the byte that has come.
+    /// Reads the received byte.
     #[inline]
     pub fn read(&self) -> u8 {
         self.registers().dr().read().bits() as u8
     }
 
-    /// Sends a byte, when there is room.
+    /// Writes a byte to be sent; there must be room.
     #[inline]
     pub fn write(&self, byte: u8) {
         // SAFETY: the data register takes any byte.

@@ -1,14 +1,14 @@
-//! The independent watchdog (RM0090 21), which resets a board whose tasks no longer all run.
+//! The independent watchdog (RM0090 21), which resets a board if one of its tasks no longer runs.
 //!
-//! Its oscillator gives 17 to 47 kHz (DS8626 table 40). Prescaler and reload are taken over up to
-//! five of its cycles after the write, and a reload before that starts the count at the old value:
-//! [`set`] waits for both before it reloads.
+//! Its oscillator runs at 17 to 47 kHz (DS8626 table 40). Prescaler and reload value take effect up to five of its
+//! cycles after the write. A reload before that would start the count at the old value, so [`set`] waits for both
+//! before it reloads.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
-use super::pac;
+use super::{pac, wait_until};
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// Polls for a register to be taken over: above 300 us at 168 MHz and 17 kHz.
+/// Polls before the change of a register times out: above 300 us at 168 MHz, which 17 kHz needs.
 const POLLS: u32 = 10_000;
 
 /// Times until the reset, at 47, 32 and 17 kHz.
@@ -38,19 +38,19 @@ fn registers() -> &'static pac::iwdg::RegisterBlock {
     unsafe { &*pac::IWDG::ptr() }
 }
 
-/// Starts the watchdog with the long limit; it runs until the next reset. It stands still while a debugger
-/// has stopped the processor.
+/// Starts the watchdog with the long limit; it runs until the next reset. It is frozen while a debugger has stopped
+/// the processor.
 pub fn start(dbgmcu: &pac::DBGMCU) {
     dbgmcu.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
     registers().kr().write(|w| w.key().start());
     set(Limit::Long);
 }
 
-/// True while the long limit counts.
+/// True while the long limit is set.
 static LONG: AtomicBool = AtomicBool::new(true);
 
-/// Does something that takes up to 2 s with the long limit, and goes back to the limit before it.
-pub fn lengthened<T>(work: impl FnOnce() -> T) -> T {
+/// Runs `work`, which takes up to 2 s, with the long limit, and then restores the previous limit.
+pub fn with_long_limit<T>(work: impl FnOnce() -> T) -> T {
     let long = LONG.load(Ordering::Relaxed);
     set(Limit::Long);
     let result = work();
@@ -62,7 +62,7 @@ pub fn lengthened<T>(work: impl FnOnce() -> T) -> T {
 pub fn set(limit: Limit) {
     LONG.store(limit == Limit::Long, Ordering::Relaxed);
     let (prescaler, reload) = limit.settings();
-    taken_over();
+    wait_until_applied();
     // A reload by the output task in between would lock both registers again.
     // SAFETY: the key that unlocks both registers, and values within them (RM0090 21.4).
     cortex_m::interrupt::free(|_| unsafe {
@@ -71,13 +71,13 @@ pub fn set(limit: Limit) {
         // reset value: 0x0FFF, every bit is written
         registers().rlr().write(|w| w.bits(reload));
     });
-    taken_over();
+    wait_until_applied();
     feed();
 }
 
-/// Waits, in a bounded number of polls, until the last values count.
-fn taken_over() {
-    let _ = (0..POLLS).any(|_| {
+/// Waits until the last values have taken effect.
+fn wait_until_applied() {
+    wait_until(POLLS, || {
         let status = registers().sr().read();
         status.pvu().bit_is_clear() && status.rvu().bit_is_clear()
     });

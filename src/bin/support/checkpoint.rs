@@ -1,7 +1,7 @@
-//! The f32 checkpoint as it lies in flash, for the reference network.
+//! The f32 checkpoint in flash, for the reference network.
 //!
-//! A safetensors file is a length (u64), a JSON header and the tensors. The header is searched
-//! rather than parsed: this is our own file, and a bench.
+//! A safetensors file is a length (u64), a JSON header and the tensors. The header is searched rather than parsed,
+//! which is enough for our own file in a benchmark.
 
 use gyronet::model::gyronet_f32::{GyroNetF32, NetworkF32};
 use gyronet::nn::Aligned;
@@ -11,7 +11,7 @@ const BYTES: &[u8; include_bytes!("../../../tools/weights/gyronet.safetensors").
     include_bytes!("../../../tools/weights/gyronet.safetensors");
 static FILE: Aligned<[u8; BYTES.len()]> = Aligned(*BYTES);
 
-/// Returns the values of a tensor; `None` if the file does not have it as expected.
+/// Returns the values of a tensor; `None` if the file does not have the tensor in the expected form.
 fn tensor(name: &str) -> Option<&'static [f32]> {
     let (len, rest) = FILE.0.split_first_chunk::<8>()?;
     let (header, data) = rest.split_at_checked(u64::from_le_bytes(*len) as usize)?;
@@ -44,7 +44,7 @@ macro_rules! direction {
     };
 }
 
-/// The reference network.
+/// Returns the reference network; `None` if a tensor is missing.
 pub fn network() -> Option<GyroNetF32<'static>> {
     Some(GyroNetF32 {
         input_mean: tensor("\"input_mean\"")?.try_into().ok()?,

@@ -1,4 +1,4 @@
-//! Counts what a region costs, its stack included.
+//! Measures the time of a region of code, and its stack use.
 
 #![allow(unsafe_code, reason = "marker instructions and stack painting; each block says why it is sound")]
 
@@ -9,7 +9,7 @@ use cortex_m_semihosting::hprintln;
 const PAINT: u32 = 0xC0DE_57AC;
 
 unsafe extern "C" {
-    /// The end of the stack (memory.x); below it is no memory.
+    /// End of the stack (memory.x); there is no memory below it.
     static _stack_end: u32;
 }
 
@@ -32,11 +32,11 @@ impl Meter {
         dwt.enable_cycle_counter();
         let before = DWT::cycle_count();
         cortex_m::asm::delay(100);
-        // The emulator has the register, but it stands still.
+        // The emulator has the register, but the count does not change.
         Self { syst, dwt: DWT::cycle_count() != before }
     }
 
-    /// Runs `work` between the markers and prints its line, the stack it used included.
+    /// Runs `work` between the markers and prints a line with its time and the stack it used.
     #[inline(never)]
     pub fn run(&mut self, name: &str, mut work: impl FnMut()) {
         let frame = 0u32;
@@ -50,7 +50,7 @@ impl Meter {
         let cycles = DWT::cycle_count().wrapping_sub(cycles);
         let ticks = ticks.wrapping_sub(SYST::get_current()) & 0x00FF_FFFF;
         let wrapped = self.syst.has_wrapped();
-        let stack = core::ptr::from_ref(&frame).addr() - untouched();
+        let stack = core::ptr::from_ref(&frame).addr() - lowest_written();
         if self.dwt {
             hprintln!("{} cycles={} stack={}", name, cycles, stack);
         } else {
@@ -59,11 +59,11 @@ impl Meter {
     }
 }
 
-/// Fills what is left of the stack below the stack pointer.
+/// Fills the unused stack below the stack pointer with a pattern.
 #[inline(never)]
 fn paint() {
     let here = 0u32;
-    // Some way below this frame, so that the loop does not paint over itself.
+    // Start 64 bytes below this frame, so that the loop does not paint over itself.
     let top = core::ptr::from_ref(&here).addr() - 64;
     for address in (stack_end()..top).step_by(4) {
         // SAFETY: RAM between the stack's end and this frame, where nothing lives.
@@ -71,9 +71,9 @@ fn paint() {
     }
 }
 
-/// The lowest address that was written since.
+/// Returns the lowest stack address that was written since the last `paint`.
 #[inline(never)]
-fn untouched() -> usize {
+fn lowest_written() -> usize {
     let painted = |address: &usize| {
         // SAFETY: as in `paint`.
         unsafe { core::ptr::with_exposed_provenance::<u32>(*address).read_volatile() == PAINT }

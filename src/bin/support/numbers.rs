@@ -1,11 +1,11 @@
 //! Reproducible numbers, shared by the images.
 
-/// A generator for numbers that need to be varied, not good (xorshift32).
+/// A pseudo-random generator (xorshift32) for numbers that only need to vary.
 #[derive(Clone, Copy)]
 pub struct Numbers(u32);
 
 impl Numbers {
-    /// Begins with a seed, not zero.
+    /// Returns a generator with a seed, which must not be zero.
     pub const fn new(seed: u32) -> Self {
         Self(seed)
     }

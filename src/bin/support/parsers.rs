@@ -1,6 +1,5 @@
-//! The parsers' cost is counted with a frame of each kind, byte by byte as the output task takes them
-//! out of their queue. Each parser has taken a frame
-//! before, so that its clock and its counter run.
+//! Measures the parsers with a frame of each kind, byte by byte as the output task takes them out of their queue. A
+//! parser with a clock or a counter has parsed a frame before the measured one.
 
 use crate::meter::Meter;
 use core::hint::black_box;
@@ -31,7 +30,7 @@ pub fn run(meter: &mut Meter) {
     hprintln!("sensor/adis16465_burst_parser bytes={}", size_of::<Burst>());
 }
 
-/// The second of two frames through a parser.
+/// Measures the second of two frames through a parser.
 fn stream<P: ByteSource>(meter: &mut Meter, name: &str, part: &mut P, frames: [&[u8]; 2]) {
     let [first, second] = frames;
     let mut samples = 0;
@@ -107,7 +106,7 @@ fn dsp3000(meter: &mut Meter) {
     hprintln!("sensor/dsp3000_word bytes={}", word.len());
 }
 
-/// Parses the bytes of an SPI transfer into a sample.
+/// Measures the parsers of the bytes of an SPI transfer.
 fn bursts(meter: &mut Meter) {
     let packet = Packet {
         resolution: Resolution::Bits20,

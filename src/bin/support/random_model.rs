@@ -1,16 +1,17 @@
-//! Window models of any shape with random weights, and windows for them: the same on a board and on a host.
+//! Window models of any shape with random weights, and windows for them, the same on a board and a host.
 
 use super::numbers::Numbers;
 use gyronet::model::blob::{CRC, HEADER_LEN, LINEAR_INPUTS, MAGIC, Shape, VERSION};
 use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::nn::lstm::DirectionWeights;
 
-/// Limit of an input, Q10. With it and [`WEIGHT`] every row of a model of up to 60 units is inside its bound.
+/// Limit of an input, Q10. With this limit and [`WEIGHT`] every row of a model of up to 60 units stays within its
+/// bound.
 const CLAMP: i32 = 8_192;
 /// Limit of an int8 weight.
 const WEIGHT: i32 = 40;
 
-/// Bytes that are written one after the other.
+/// A weight file while it is being written.
 struct Writer<const LEN: usize> {
     bytes: [u8; LEN],
     at: usize,
@@ -53,7 +54,7 @@ impl<const LEN: usize> Writer<LEN> {
             self.columns(DirectionWeights::padded(units));
             let mut row = 0;
             while row < 4 {
-                // A scale that takes typical sums over the whole range of a gate.
+                // A multiplier that spreads typical sums over the whole range of a gate.
                 let multiplier = 400 + self.numbers.within(200);
                 self.halfword(multiplier);
                 row += 1;
@@ -62,7 +63,7 @@ impl<const LEN: usize> Writer<LEN> {
         }
     }
 
-    /// Two gates of each column in a halfword, two halfwords for each column.
+    /// Writes random columns, each as two halfwords of two gates.
     const fn columns(&mut self, count: usize) {
         let mut k = 0;
         while k < 2 * count {

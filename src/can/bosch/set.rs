@@ -1,4 +1,4 @@
-//! The whole MM5.10 set has three messages of one shape, each with one rate and one acceleration.
+//! The full MM5.10 set has three messages of the same layout, each with one rate and one acceleration.
 //!
 //! | message | identifier | rate | acceleration | byte 2, low nibble | byte 3 |
 //! |---|---|---|---|---|---|
@@ -6,9 +6,9 @@
 //! | TX2 | 0x178 | roll | longitudinal | - | - |
 //! | TX3 | 0x17C | pitch | vertical | HW_INDEX | - |
 //!
-//! A receiver takes the three as one sample only if they come in this order with the same
-//! counter. The part counts roll against the right-hand rule (Bosch's receiver turns it round
-//! again), so a drop-in must too.
+//! A receiver accepts the three as one sample only if they arrive in this order with the same
+//! counter. The Bosch sensor's roll rate has the opposite sign to the right-hand rule (Bosch's receiver negates it
+//! again), so a drop-in replacement must do the same.
 
 use super::{
     CRC, SignalStatus, TX1_ID, Tx1, Tx1Error, YawRateSignal, ZERO, encode_acceleration, encode_temperature,
@@ -16,18 +16,18 @@ use super::{
 use crate::units::{AngularRate, CentiCelsius, SpecificForce};
 use embedded_can::{Frame, StandardId};
 
-/// The content of one message of the set.
+/// The layout of one message of the set: which values it carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Identifier.
     pub id: StandardId,
     /// Axis of the rate: 0 roll, 1 pitch, 2 yaw.
     pub rate_axis: usize,
-    /// The rate is sent with the opposite sign.
+    /// Whether the rate is sent with the opposite sign.
     pub rate_negated: bool,
     /// Axis of the acceleration: 0 forward, 1 left, 2 up.
     pub force_axis: usize,
-    /// Byte 3 is the temperature.
+    /// Whether byte 3 is the temperature; otherwise 0.
     pub temperature: bool,
 }
 
@@ -56,7 +56,7 @@ pub const LAYOUTS: [Layout; 3] = [
 pub struct Message {
     /// Code of the rate.
     pub rate: u16,
-    /// Its quality.
+    /// Status of the rate.
     pub rate_status: SignalStatus,
     /// CLU_STAT in TX1, HW_INDEX in TX3, 0 in TX2.
     pub nibble: u8,
@@ -64,9 +64,9 @@ pub struct Message {
     pub temperature: u8,
     /// Code of the acceleration.
     pub acceleration: u16,
-    /// Its quality.
+    /// Status of the acceleration.
     pub acceleration_status: SignalStatus,
-    /// 0 to 15, the same in the three messages of one sample.
+    /// Message counter, 0 to 15, the same in the three messages of one sample.
     pub counter: u8,
 }
 
@@ -85,7 +85,7 @@ impl From<Tx1> for Message {
 }
 
 impl Message {
-    /// Returns the eight bytes.
+    /// Encodes the message as eight bytes.
     #[must_use]
     pub fn emit(&self) -> [u8; 8] {
         let [rate0, rate1] = self.rate.to_le_bytes();
@@ -97,7 +97,7 @@ impl Message {
         bytes
     }
 
-    /// Checks and reads eight bytes.
+    /// Decodes eight bytes after checking length and CRC.
     ///
     /// # Errors
     /// [`Tx1Error`] for a wrong length or checksum.
@@ -132,38 +132,38 @@ impl Message {
         f64::from(i32::from(self.acceleration) - ZERO) * 0.000_127_465
     }
 
-    /// Returns the frame under a layout's identifier, in a driver's own type; `None` only if that type cannot hold
-    /// it.
+    /// Returns the frame with a layout's identifier, in a driver's own type; `None` only if that type cannot hold
+    /// the frame.
     #[must_use]
     pub fn frame<F: Frame>(&self, layout: &Layout) -> Option<F> {
         F::new(layout.id, &self.emit())
     }
 }
 
-/// One sample of the vehicle's motion, forward, left, up, as the set takes it.
+/// One sample of the vehicle's motion (axes forward, left, up): the input of [`SetEncoder`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Motion {
-    /// About x (roll), y (pitch) and z (yaw).
+    /// Angular rates about x (roll), y (pitch) and z (yaw).
     pub angular_rate: [AngularRate; 3],
-    /// Along x, y, z.
+    /// Specific force along x, y, z.
     pub specific_force: [SpecificForce; 3],
-    /// The temperature of the part, where it is known.
+    /// Temperature of the sensor, if known.
     pub temperature: Option<CentiCelsius>,
-    /// Quality of the rates.
+    /// Status of the rates.
     pub rate_status: SignalStatus,
-    /// Quality of the accelerations.
+    /// Status of the accelerations.
     pub force_status: SignalStatus,
-    /// Low four bits are sent.
+    /// Message counter; its low four bits are sent.
     pub counter: u8,
 }
 
-/// Returns the message at a place of [`LAYOUTS`].
+/// Returns the value of one axis, or the default for an index above 2.
 fn axis<T: Copy + Default>(axes: &[T; 3], axis: usize) -> T {
     axes.get(axis).copied().unwrap_or_default()
 }
 
-/// Rounding residuals of the three rates.
+/// The encoder of the set; it holds the rounding residuals of the three rates.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SetEncoder {
     rates: [YawRateSignal; 3],
@@ -196,7 +196,7 @@ impl SetEncoder {
                 limit.0
             });
             if message.rate_status != SignalStatus::OK {
-                // Nobody sums these up.
+                // Receivers do not integrate rates that are marked bad.
                 signal.reset();
             }
         }

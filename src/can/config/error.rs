@@ -1,8 +1,8 @@
-//! This error names the reason why settings are refused.
+//! This module defines the reasons why settings are refused.
 
 use super::{MAX_PERIOD_MS, SAMPLE_MS};
 
-/// The reason why settings are no configuration.
+/// The reason why settings are refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -11,31 +11,31 @@ pub enum ConfigError {
     /// No message is configured.
     #[error("no message is configured")]
     Empty,
-    /// A classic CAN bus has no such bit rate.
-    #[error("{0} bit/s is no bit rate of a classic CAN bus")]
+    /// The bit rate is not one of a classic CAN bus.
+    #[error("{0} bit/s is not a bit rate of a classic CAN bus")]
     BitRate(u32),
-    /// More than 11 bits, or kept for diagnosis.
-    #[error("identifier {0:03x} is reserved or has over 11 bits")]
+    /// An identifier has more than 11 bits, or is reserved for diagnosis.
+    #[error("identifier {0:03x} is reserved or has more than 11 bits")]
     Identifier(u16),
-    /// Two messages under one identifier.
+    /// Two messages have the same identifier.
     #[error("identifier {0:03x} is used twice")]
     DuplicateIdentifier(u16),
-    /// The period is not a multiple of 10 ms, or over a second.
+    /// The period is zero, not a multiple of 10 ms, or longer than a second.
     #[error("period {0} ms is not a multiple of {SAMPLE_MS} up to {MAX_PERIOD_MS}")]
     Period(u16),
-    /// More bits than the mode sends, so that receivers could not tell it from another one.
-    #[error("E2E identifier {0:x} has over 12 bits")]
+    /// An E2E identifier has more bits than the mode uses, so receivers could confuse it with another.
+    #[error("E2E identifier {0:x} has more than 12 bits")]
     DataId(u16),
-    /// Two messages with one E2E identifier: exchanged, they would pass.
+    /// Two messages have the same E2E identifier; a receiver would not notice if they were swapped.
     #[error("an E2E identifier is used twice")]
     DuplicateDataId,
-    /// A J1939 node cannot have this address.
-    #[error("{0} is no J1939 source address")]
+    /// The source address is not valid for a J1939 node.
+    #[error("{0} is not a J1939 source address")]
     SourceAddress(u8),
-    /// The messages take over 80 % of the bus.
+    /// The worst-case bus load is above 80 %.
     #[error("the messages are {}.{} % of the bus", .per_mille / 10, .per_mille % 10)]
     Overload {
-        /// Bus load at worst, 1/1000.
+        /// Worst-case bus load, 1/1000.
         per_mille: u32,
     },
 }

@@ -1,34 +1,34 @@
-//! These are the settings of the bus that a user can change.
+//! This module defines the bus settings that a user can change.
 
 use crate::can::e2e::{DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
 
-/// E2E profile of the three yaw messages with their identifiers.
+/// The E2E profile of the three yaw messages, with their data identifiers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum E2e {
     /// Profile 1.
     P01 {
-        /// The way in which the identifier enters the CRC.
+        /// Bytes of the identifier that enter the CRC.
         mode: DataIdMode,
-        /// Rate, angle, detail.
+        /// Data identifiers of rate, angle, detail.
         data_ids: [u16; 3],
     },
     /// Profile 2.
     P02 {
-        /// Rate, angle, detail; one for each counter value.
+        /// Data identifiers of rate, angle, detail: one for each counter value.
         data_ids: [[u8; 16]; 3],
     },
     /// Profile 5.
     P05 {
-        /// Rate, angle, detail.
+        /// Data identifiers of rate, angle, detail.
         data_ids: [u16; 3],
     },
     /// Profile 11.
     P11 {
-        /// The way in which the identifier enters the CRC.
+        /// Bytes of the identifier that enter the CRC.
         mode: P11Mode,
-        /// Rate, angle, detail.
+        /// Data identifiers of rate, angle, detail.
         data_ids: [u16; 3],
     },
 }
@@ -51,7 +51,7 @@ impl E2e {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoschSettings {
-    /// TX1 alone, for receivers of the yaw rate only.
+    /// Whether only TX1 is sent, for receivers that use only the yaw rate.
     pub tx1_only: bool,
 }
 
@@ -62,18 +62,18 @@ pub struct BoschSettings {
 pub struct YawSettings {
     /// 11-bit identifiers of rate, angle, detail.
     pub ids: [u16; 3],
-    /// A multiple of 10 ms.
+    /// Period in ms, a multiple of 10.
     pub period_ms: u16,
-    /// Protection.
+    /// E2E protection.
     pub e2e: E2e,
 }
 
-/// J1939 VDC2; the standard fixes the period at 10 ms.
+/// The J1939 message VDC2; the standard fixes its period at 10 ms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Vdc2Settings {
-    /// Our address on the bus.
+    /// Our J1939 source address.
     pub source: u8,
 }
 
@@ -82,18 +82,18 @@ pub struct Vdc2Settings {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
-    /// Bit rate of the bus.
+    /// Bit rate of the bus, bit/s.
     pub bits_per_second: u32,
-    /// The drop-in set.
+    /// Bosch MM5.10 messages, if sent.
     pub bosch: Option<BoschSettings>,
-    /// Our own messages.
+    /// Our own yaw messages, if sent.
     pub yaw: Option<YawSettings>,
-    /// Trucks and machines.
+    /// J1939 VDC2 for trucks and machines, if sent.
     pub vdc2: Option<Vdc2Settings>,
 }
 
 impl Settings {
-    /// A car: the Bosch set and our own messages every 10 ms.
+    /// Settings for a car: the Bosch set and our own messages every 10 ms.
     pub const DEFAULT: Self = Self {
         bits_per_second: 500_000,
         bosch: Some(BoschSettings { tx1_only: false }),
@@ -105,8 +105,8 @@ impl Settings {
         vdc2: None,
     };
 
-    /// Settings that fit an SLCAN line of 115200 bit/s, time stamps included: our own messages go out five times
-    /// less often, and the mean over the period loses nothing.
+    /// Settings that fit an SLCAN line of 115200 bit/s, time stamps included. Our own messages are sent every
+    /// 50 ms instead of 10 ms; they carry the mean rate over the period, so no rotation is lost.
     pub const SLCAN_115200: Self = Self {
         yaw: match Self::DEFAULT.yaw {
             Some(yaw) => Some(YawSettings { period_ms: 50, ..yaw }),

@@ -1,19 +1,19 @@
-//! Profiles 1, 2 and 11 share a two-byte header: CRC in byte 0, counter in the low nibble of byte 1. What enters
-//! the CRC besides the data is the profile's own.
+//! Profiles 1, 2 and 11 share a two-byte header: CRC in byte 0, counter in the low nibble of byte 1. Each profile
+//! defines what enters the CRC in addition to the data.
 
 use super::Fault;
 
-/// The properties in which the profiles differ.
+/// The two-byte header, with the limits in which the profiles differ.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ShortHeader {
-    /// The longest data that the CRC covers, the header included.
+    /// Largest number of bytes that the CRC covers, header included.
     pub max_len: usize,
-    /// Values of the counter: 0 up to this.
+    /// Number of counter values; the counter stays below it.
     pub counters: u16,
 }
 
 impl ShortHeader {
-    /// Writes the header; `nibble` replaces the high one of byte 1, which is data otherwise.
+    /// Writes the header. `nibble`, if given, replaces the high nibble of byte 1, which is data otherwise.
     pub fn protect(
         &self,
         data: &mut [u8],
@@ -35,8 +35,8 @@ impl ShortHeader {
         Ok(())
     }
 
-    /// Checks CRC and counter; gives the counter and the high nibble of byte 1. `crc` gets the
-    /// counter and what stands behind the CRC.
+    /// Checks CRC and counter, and returns the counter and the high nibble of byte 1. `crc` gets the
+    /// counter and the bytes after the CRC.
     pub fn check(&self, data: &[u8], crc: impl FnOnce(u8, &[u8]) -> u8) -> Result<(u8, u8), Fault> {
         let [received, behind @ ..] = data else { return Err(Fault::Length(data.len())) };
         let Some(header) = behind.first() else { return Err(Fault::Length(data.len())) };

@@ -1,13 +1,13 @@
-//! Profile 1 has its CRC in byte 0, its counter in the low nibble of byte 1, and four ways to include the
-//! identifier.
+//! Profile 1 has its CRC in byte 0 and its counter in the low nibble of byte 1. It has four modes of including the
+//! identifier in the CRC.
 //!
-//! AUTOSAR describes the CRC by the interface of its CRC library, whose start and final XOR
-//! values cancel: what is on the bus is polynomial 0x1D with start 0 and no final XOR.
+//! AUTOSAR defines the CRC by calls of its CRC library, whose start and final XOR
+//! values cancel. The CRC on the bus has polynomial 0x1D, start 0 and no final XOR.
 
 use super::Fault;
 use super::header::ShortHeader;
 
-/// The CRC has start 0 and final XOR 0; it is not the J1850 CRC of other messages, although it has the same polynomial.
+/// CRC with start 0 and final XOR 0; unlike the J1850 CRC of other messages, although the polynomial is the same.
 pub(super) const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::Algorithm {
     width: 8,
     poly: 0x1D,
@@ -19,13 +19,13 @@ pub(super) const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::Algorithm {
     residue: 0,
 });
 
-/// The counter takes 15 values; 15 itself marks an invalid one.
+/// Number of counter values, 0 to 14; 15 marks an invalid counter.
 pub(super) const COUNTERS: u16 = 15;
-/// The longest message has 240 bits; beyond 255 the CRC would miss two-bit errors.
+/// Longest message, bytes: 240 bits. Above 255 bits the CRC would miss two-bit errors.
 const MAX_LEN: usize = 30;
 const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 
-/// Says which bytes of the 16-bit identifier enter the CRC.
+/// The choice of bytes of the 16-bit identifier that enter the CRC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -45,7 +45,7 @@ pub enum DataIdMode {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct P01 {
-    /// Identifier, known to both sides. With [`DataIdMode::Nibble`] it has 12 bits.
+    /// Data identifier, known to both sides. With [`DataIdMode::Nibble`] it has 12 bits.
     pub data_id: u16,
     /// The bytes of the identifier that enter the CRC.
     pub mode: DataIdMode,
@@ -61,7 +61,7 @@ impl P01 {
         HEADER.protect(data, counter, nibble, |behind| self.crc(counter, behind))
     }
 
-    /// Checks CRC, identifier and that the counter can occur; gives the counter.
+    /// Checks CRC, identifier and range of the counter, and returns the counter.
     ///
     /// # Errors
     /// [`Fault`].

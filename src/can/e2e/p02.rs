@@ -1,14 +1,14 @@
-//! Profile 2 has its CRC in byte 0 and its counter in the low nibble of byte 1; the counter selects one of sixteen
-//! identifiers, which enters the CRC last. Profile 22 puts the same bytes on the bus.
+//! Profile 2 has its CRC in byte 0 and its counter in the low nibble of byte 1. The counter selects one of sixteen
+//! identifiers, which enters the CRC last. Profile 22 sends the same bytes.
 
 use super::Fault;
 use super::header::ShortHeader;
 
 /// CRC-8-AUTOSAR (8H2F): polynomial 0x2F, start and final XOR FF.
 const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_AUTOSAR);
-/// The counter takes all values of the nibble.
+/// Number of counter values: all of a nibble.
 pub(super) const COUNTERS: u16 = 16;
-/// The longest message: with the identifier it has at most 127 bits, the order of the polynomial.
+/// Longest message, bytes: with the identifier at most 127 bits, the order of the polynomial.
 const MAX_LEN: usize = 14;
 const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 
@@ -17,7 +17,7 @@ const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS }
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct P02 {
-    /// Identifier for each counter value.
+    /// Data identifier for each counter value.
     pub data_ids: [u8; 16],
 }
 
@@ -30,7 +30,7 @@ impl P02 {
         HEADER.protect(data, counter, None, |behind| self.crc(counter, behind))
     }
 
-    /// Checks the CRC; gives the counter.
+    /// Checks the CRC and returns the counter.
     ///
     /// # Errors
     /// [`Fault`].

@@ -4,9 +4,9 @@ use super::Fault;
 
 /// CRC-16-CCITT-FALSE: polynomial 0x1021, start FFFF, no final XOR.
 const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_IBM_3740);
-/// The counter takes all values of a byte.
+/// Number of counter values: all of a byte.
 pub(super) const COUNTERS: u16 = 256;
-/// The specification's limit, 4096 bytes, is one bit more than the CRC covers; CAN needs 64.
+/// Longest message, bytes. The specification's limit of 4096 is one bit more than the CRC covers; CAN needs 64.
 const MAX_LEN: usize = 64;
 
 /// Protects and checks one message with profile 5.
@@ -14,7 +14,7 @@ const MAX_LEN: usize = 64;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct P05 {
-    /// Identifier, known to both sides; it enters the CRC last, low byte first.
+    /// Data identifier, known to both sides; it enters the CRC last, low byte first.
     pub data_id: u16,
 }
 
@@ -34,7 +34,7 @@ impl P05 {
         Ok(())
     }
 
-    /// Checks the CRC; gives the counter.
+    /// Checks the CRC and returns the counter.
     ///
     /// # Errors
     /// [`Fault`].

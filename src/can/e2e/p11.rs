@@ -3,7 +3,7 @@
 use super::Fault;
 use super::p01::{DataIdMode, P01};
 
-/// Says which bytes of the identifier enter the CRC.
+/// The choice of bytes of the identifier that enter the CRC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -19,7 +19,7 @@ pub enum P11Mode {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct P11 {
-    /// Identifier, known to both sides. With [`P11Mode::Nibble`] it has 12 bits.
+    /// Data identifier, known to both sides. With [`P11Mode::Nibble`] it has 12 bits.
     pub data_id: u16,
     /// The bytes of the identifier that enter the CRC.
     pub mode: P11Mode,
@@ -42,7 +42,7 @@ impl P11 {
         self.as_p01().protect(data, counter)
     }
 
-    /// Checks CRC, identifier and that the counter can occur; gives the counter.
+    /// Checks CRC, identifier and range of the counter, and returns the counter.
     ///
     /// # Errors
     /// [`Fault`].

@@ -1,33 +1,33 @@
 //! A message counter shows whether messages before it were lost or repeated.
 
-/// Judgement of an undamaged message by its counter.
+/// The result of checking the counter of an intact message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
-    /// No message came before it; its counter is only noted.
+    /// The first message; its counter is the reference for the next one.
     First,
-    /// The one expected.
+    /// The expected counter.
     Ok,
-    /// The same counter again: a repetition, or a sender that stands still.
+    /// The same counter again: a repeated message, or a sender whose counter does not advance.
     Repeated,
-    /// Good, but so many before it are missing.
+    /// A good message, after this number of lost ones.
     Lost(u8),
-    /// Too far from the one before it: reordered, or more lost than allowed.
+    /// Too large a step from the previous counter: messages are reordered, or more are lost than allowed.
     WrongSequence {
-        /// Step of the counter, modulo its cycle.
+        /// Counter step, modulo its cycle.
         delta: u8,
     },
 }
 
 impl Verdict {
-    /// Returns whether the message's content may be used.
+    /// Returns whether the content of the message may be used.
     #[must_use]
     pub const fn usable(self) -> bool {
         matches!(self, Self::First | Self::Ok | Self::Lost(_))
     }
 }
 
-/// Remembers the counter of the last message.
+/// The sequence check of one message; it holds the last counter.
 #[derive(Debug, Clone, Copy)]
 pub struct Sequence {
     counters: u16,
@@ -36,18 +36,18 @@ pub struct Sequence {
 }
 
 impl Sequence {
-    /// Makes a check of a counter with `counters` values; steps up to `max_delta` are loss, larger ones disorder.
+    /// Creates a check for `counters` values. Steps up to `max_delta` count as loss, larger ones as a wrong sequence.
     #[must_use]
     pub const fn new(counters: u16, max_delta: u8) -> Self {
         Self { counters, max_delta, last: None }
     }
 
-    /// Judges the next counter and takes it as the new reference, whatever the verdict: a
-    /// sender that was restarted is believed again from its second message on.
+    /// Checks the next counter and makes it the new reference, whatever the verdict. After a restart of the
+    /// sender, messages are therefore accepted again from the second one on.
     pub fn check(&mut self, counter: u8) -> Verdict {
         let Some(last) = self.last.replace(counter) else { return Verdict::First };
         let step = u16::from(counter) + self.counters - u16::from(last);
-        // Of no values at all each one is the same.
+        // With zero values, every counter counts as repeated.
         let delta = step.checked_rem(self.counters).unwrap_or(0) as u8;
         match delta {
             0 => Verdict::Repeated,

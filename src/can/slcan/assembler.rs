@@ -1,14 +1,14 @@
-//! The assembler makes lines from bytes, each up to CR and of bounded length.
+//! The assembler splits a byte stream into lines of bounded length, each ended by CR.
 
 use heapless::Vec;
 
-/// Longest line that a host has reason to send, without its CR.
+/// Longest line that is accepted from a host, without its CR.
 pub const MAX_HOST_LINE: usize = 32;
 
-/// A line longer than [`MAX_HOST_LINE`]; none of it was kept.
+/// The error for a line longer than [`MAX_HOST_LINE`]; the line is discarded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[error("line of over {MAX_HOST_LINE} characters")]
+#[error("line has more than {MAX_HOST_LINE} characters")]
 pub struct TooLong;
 
 /// Collects the characters of one line.
@@ -16,19 +16,19 @@ pub struct TooLong;
 pub struct LineAssembler {
     line: Vec<u8, MAX_HOST_LINE>,
     too_long: bool,
-    /// The line was handed out and begins again with the next character.
+    /// Whether the line was returned; the next character begins a new one.
     done: bool,
 }
 
 impl LineAssembler {
-    /// Begins before the first character.
+    /// Creates an assembler with an empty line.
     #[must_use]
     pub const fn new() -> Self {
         Self { line: Vec::new(), too_long: false, done: false }
     }
 
-    /// Takes a character; gives the line, without its CR, when it is complete. LF is passed
-    /// over, so that a terminal can be used.
+    /// Processes a character, and returns the line without its CR when it is complete. LF is
+    /// ignored, so that a terminal can be used.
     pub fn receive(&mut self, byte: u8) -> Option<Result<&[u8], TooLong>> {
         if core::mem::take(&mut self.done) {
             self.line.clear();

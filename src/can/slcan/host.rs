@@ -1,13 +1,13 @@
-//! A session executes the commands of a host on an SLCAN line and makes the answers that it expects.
+//! A session executes the SLCAN commands of a host and generates the answers.
 //!
 //! python-can sends `C`, `S6`, an empty line and `O` and reads frames; slcand writes `C`, `S6`,
-//! `O` and hands the line to the kernel. Neither waits for the answers, but both stumble over an
-//! answer in the middle of a frame: answers are whole lines, sent between frames.
+//! `O` and passes the line to the kernel. Neither waits for the answers, but both fail on an
+//! answer in the middle of a frame. Answers are therefore whole lines, sent between frames.
 //!
-//! The output goes on whatever the host says: the vehicle does not depend on a laptop, and a
-//! logger that was plugged in late should see frames without knowing any of this. `C` is
-//! therefore answered and otherwise ignored. `S` is confirmed only for the bit rate that the
-//! bus has; it cannot be changed from here.
+//! A host cannot stop the output: the vehicle must not depend on a laptop, and a
+//! logger that is plugged in later should see frames without sending a command. `C` is
+//! therefore answered and otherwise ignored. `S` is confirmed only for the current bit rate of the
+//! bus, which a host cannot change.
 
 use super::SlcanError;
 use crate::can::DataFrame;
@@ -15,14 +15,14 @@ use heapless::Vec;
 
 /// Longest answer: `V`, four digits, CR.
 pub const MAX_ANSWER: usize = 6;
-/// An answer as sent.
+/// An encoded answer.
 pub type Answer = Vec<u8, MAX_ANSWER>;
 
 const OK: &[u8] = b"\r";
 const ERROR: &[u8] = b"\x07";
-/// Hardware and software version, two digits each.
+/// Answer to `V`: hardware and software version, two digits each.
 const VERSION: &[u8] = b"V0101\r";
-/// Four characters in place of a serial number.
+/// Answer to `N`: four characters in place of a serial number.
 const SERIAL: &[u8] = b"NGYRO\r";
 
 /// Status byte of the command `F` (CAN232 manual).
@@ -43,7 +43,7 @@ impl StatusFlags {
     pub const BUS_ERROR: Self = Self(1 << 7);
 }
 
-/// Holds the effect of a line from the host.
+/// The result of executing a line from the host.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reaction {
     /// The answer to send before the next frame.
@@ -54,12 +54,12 @@ pub struct Reaction {
 
 impl Reaction {
     fn answer(text: &[u8]) -> Self {
-        // All texts are six characters at most.
+        // Every answer has at most MAX_ANSWER bytes.
         Self { answer: Vec::from_slice(text).unwrap_or_default(), frame: None }
     }
 }
 
-/// Returns the digit of the command `S` for a bit rate.
+/// Returns the digit of the command `S` for a bit rate; `None` if the command has none for it.
 #[must_use]
 pub const fn bit_rate_digit(bits_per_second: u32) -> Option<u8> {
     Some(match bits_per_second {
@@ -76,7 +76,7 @@ pub const fn bit_rate_digit(bits_per_second: u32) -> Option<u8> {
     })
 }
 
-/// The device's end of the conversation.
+/// The device side of an SLCAN session.
 #[derive(Debug, Clone, Copy)]
 pub struct Session {
     bit_rate: Option<u8>,
@@ -85,13 +85,13 @@ pub struct Session {
 }
 
 impl Session {
-    /// Begins without time stamps, as hosts expect at first.
+    /// Creates a session without time stamps, the state that hosts expect at first.
     #[must_use]
     pub const fn new(bits_per_second: u32) -> Self {
         Self { bit_rate: bit_rate_digit(bits_per_second), stamped: false, refused: 0 }
     }
 
-    /// Returns whether the host wants time stamps behind the frames.
+    /// Returns whether the host has enabled time stamps.
     #[must_use]
     pub const fn stamped(&self) -> bool {
         self.stamped
@@ -103,10 +103,10 @@ impl Session {
         self.refused
     }
 
-    /// Takes a line without its CR.
+    /// Executes a line, passed without its CR.
     pub fn execute(&mut self, line: &[u8], status: StatusFlags) -> Reaction {
         match line {
-            // An empty line is how hosts clear what may be left in a buffer.
+            // Hosts send an empty line to flush an incomplete command.
             [] | [b'C' | b'O' | b'L'] => Reaction::answer(OK),
             [b'S', digit] if Some(*digit) == self.bit_rate => Reaction::answer(OK),
             [b'Z', flag @ (b'0' | b'1')] => {
@@ -124,7 +124,7 @@ impl Session {
         }
     }
 
-    /// Answers a line that could not be read at all.
+    /// Returns the error answer, for a line that could not be received.
     pub fn refuse(&mut self) -> Reaction {
         self.refused = self.refused.saturating_add(1);
         Reaction::answer(ERROR)

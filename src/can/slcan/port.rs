@@ -1,9 +1,9 @@
-//! A port is the device's end of an SLCAN line: it sends frames and executes commands.
+//! A port is the device side of an SLCAN line: it sends frames and executes commands.
 //!
-//! [`Port`] keeps the bytes and does no I/O; [`Port::service`] moves them over any line that can
-//! say whether it is ready (`embedded_io`'s `ReadReady` and `WriteReady`). It never waits: what
-//! the line does not take stays, and when the queue is full the oldest frame gives way. A line
-//! that was begun is always finished first, so a stalled host reads no torn frame afterwards.
+//! [`Port`] buffers the bytes. [`Port::service`] moves them to and from any serial line that
+//! reports whether it is ready (`embedded_io`'s `ReadReady` and `WriteReady`). It never blocks: bytes that
+//! the line does not accept stay buffered, and when the queue is full the oldest frame is dropped. A text line
+//! that was begun is always finished first, so a host that stalls never reads a partial frame afterwards.
 
 use super::assembler::{LineAssembler, TooLong};
 use super::host::{Session, StatusFlags};
@@ -15,14 +15,17 @@ use crate::units::Micros;
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::Vec;
 
-/// Characters of answers that may wait: several hosts' greetings.
+/// Capacity of the buffer for waiting answers, bytes: enough for the start-up commands of several hosts.
 const MAX_ANSWERS: usize = 64;
-/// Bytes taken from the host in one turn, so that a flood cannot hold up the output.
+/// Most bytes read from the host in one call, so that a flood of input cannot delay the output.
 const MAX_RECEIVED: usize = 64;
 
-const _: () = assert!(MAX_ANSWERS > MAX_STAMPED_LINE, "answers are sent the way lines are");
+const _: () = assert!(
+    MAX_ANSWERS > MAX_STAMPED_LINE,
+    "an answer also has room for a line, since both are sent the same way"
+);
 
-/// The frames that wait, `N` at most.
+/// The device side of an SLCAN line, with a queue of at most `N` frames.
 #[derive(Debug, Clone)]
 pub struct Port<const N: usize> {
     session: Session,
@@ -30,16 +33,16 @@ pub struct Port<const N: usize> {
     queue: TransmitQueue<(DataFrame, Micros), N>,
     answers: Vec<u8, MAX_ANSWERS>,
     unanswered: u32,
-    /// The line that is being sent, and the number of its bytes that have gone out.
+    /// The text line or answers being sent; `taken` bytes of it have been sent.
     line: Vec<u8, MAX_ANSWERS>,
     taken: usize,
-    /// Drops that have been reported to the host.
+    /// Number of dropped frames when `F` was last answered.
     reported: u32,
     bus: StatusFlags,
 }
 
 impl<const N: usize> Port<N> {
-    /// Begins for a bus of this bit rate, with nothing sent.
+    /// Creates a port for a bus of this bit rate, with empty buffers.
     #[must_use]
     pub const fn new(bits_per_second: u32) -> Self {
         Self {
@@ -55,18 +58,18 @@ impl<const N: usize> Port<N> {
         }
     }
 
-    /// Sets the state of the bus that the command `F` reports; frames that this line dropped are added.
+    /// Sets the bus state that the command `F` reports, in addition to the frames that this port dropped.
     pub fn set_bus(&mut self, flags: StatusFlags) {
         self.bus = flags;
     }
 
-    /// Puts a frame at the end; the oldest one gives way. `time` is its stamp, should the host
-    /// want one.
+    /// Appends a frame; if the queue is full, drops the oldest one. `time` is the frame's time stamp, which is sent
+    /// if the host has enabled time stamps.
     pub fn enqueue(&mut self, frame: DataFrame, time: Micros) {
         self.queue.enqueue((frame, time));
     }
 
-    /// Takes a byte from the host; gives the frame that it completes.
+    /// Processes a byte from the host, and returns the frame that it completes.
     pub fn receive(&mut self, byte: u8) -> Option<DataFrame> {
         let dropped = self.queue.dropped();
         let reaction = match self.assembler.receive(byte)? {
@@ -78,13 +81,13 @@ impl<const N: usize> Port<N> {
             }
             Err(TooLong) => self.session.refuse(),
         };
-        // A host that asks on and on without reading gets no answer, not half of one.
+        // A host that keeps sending commands without reading gets no answer rather than a partial one.
         let fits = self.answers.extend_from_slice(&reaction.answer).is_ok();
         count(&mut self.unanswered, u32::from(!fits));
         reaction.frame
     }
 
-    /// Returns the bytes to send next: the rest of the line under way, else answers, else the oldest frame.
+    /// Returns the bytes to send next: the rest of the current line, else answers, else the oldest frame.
     pub fn outgoing(&mut self) -> Option<&[u8]> {
         if self.taken == self.line.len() {
             self.taken = 0;
@@ -92,21 +95,21 @@ impl<const N: usize> Port<N> {
         }
         while self.line.is_empty() {
             let (frame, time) = self.queue.pop()?;
-            // A frame that SLCAN cannot express is none of ours.
+            // All our frames fit SLCAN; any other is skipped.
             self.line = self.format(&frame, time).unwrap_or_default();
         }
         self.line.get(self.taken..)
     }
 
-    /// Removes bytes of [`Port::outgoing`] that the line has taken.
+    /// Removes bytes of [`Port::outgoing`] that have been sent.
     pub fn sent(&mut self, bytes: usize) {
         self.taken = self.taken.saturating_add(bytes).min(self.line.len());
     }
 
-    /// Moves as many bytes from and to the line as it gives and takes without waiting; `frame` gets the host's frames.
+    /// Reads and writes as many bytes as the line allows without blocking; `frame` is called with the host's frames.
     ///
     /// # Errors
-    /// The line's own error; only the byte that the line lost is lost.
+    /// The error of the serial line. No buffered byte is lost.
     pub fn service<L>(&mut self, line: &mut L, mut frame: impl FnMut(DataFrame)) -> Result<(), L::Error>
     where
         L: Read + ReadReady + Write + WriteReady,
@@ -130,13 +133,13 @@ impl<const N: usize> Port<N> {
         Ok(())
     }
 
-    /// Returns the number of frames that gave way to newer ones.
+    /// Returns the number of dropped frames.
     #[must_use]
     pub fn dropped(&self) -> u32 {
         self.queue.dropped()
     }
 
-    /// Returns the number of the host's lines that were refused, and of answers that found no room.
+    /// Returns the number of refused lines from the host plus the number of answers for which there was no room.
     #[must_use]
     pub fn refused(&self) -> u32 {
         self.session.refused().saturating_add(self.unanswered)

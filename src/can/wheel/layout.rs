@@ -1,4 +1,4 @@
-//! A layout gives the places of wheel speeds in a frame, and the frame's protection.
+//! A layout describes the positions of wheel speeds in a frame, and the protection of the frame.
 
 use crate::can::bosch;
 use crate::can::e2e::{Fault, Profile};
@@ -6,25 +6,25 @@ use crate::can::signal::BitField;
 use crate::units::WheelSpeed;
 use embedded_can::Id;
 
-/// One wheel's speed in a frame.
+/// The position and scale of one wheel's speed in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WheelSignal {
-    /// The frame that carries it: its place in [`WheelSettings::frames`](super::WheelSettings::frames).
+    /// Index of the frame that carries the speed, in [`WheelSettings::frames`](super::WheelSettings::frames).
     pub frame: u8,
-    /// The place of its bits.
+    /// Position of the raw value in the frame.
     pub field: BitField,
-    /// Speed codes (2^-16 m/s) for one bit, times 2^16: see [`WheelSignal::per_bit_kmh`].
+    /// Speed codes (2^-16 m/s) per LSB, times 2^16: see [`WheelSignal::per_bit_kmh`].
     pub factor_q16: i32,
-    /// Speed at raw zero.
+    /// Speed at raw value zero.
     pub offset: WheelSpeed,
-    /// Raw code that says "not valid".
+    /// Raw value that means "not valid".
     pub invalid: Option<u32>,
 }
 
 impl WheelSignal {
-    /// Converts the factor of a DBC file in km/h to [`WheelSignal::factor_q16`]; it is below 1000 km/h per bit.
+    /// Converts a DBC factor in km/h per LSB, below 1000, to [`WheelSignal::factor_q16`].
     #[must_use]
     pub const fn per_bit_kmh(factor: f64) -> i32 {
         (factor / 3.6 * 4_294_967_296.0) as i32
@@ -36,35 +36,35 @@ impl WheelSignal {
             return Err(WheelError::Invalid { wheel });
         }
         let value = self.field.value(data).ok_or(short)?;
-        // 2^32 x 2^31 at most, and the offset.
+        // The product is at most 2^32 x 2^31.
         let code = ((value * i64::from(self.factor_q16)) >> 16) + i64::from(self.offset.0);
         i32::try_from(code).map(WheelSpeed).map_err(|_| WheelError::Invalid { wheel })
     }
 }
 
-/// The protection of a frame of wheel speeds, if it has one.
+/// The protection of a wheel frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Checksum {
     /// The frame is not protected.
     None,
-    /// SAE J1850 in one byte, over all the others in their order.
+    /// SAE J1850 CRC in one byte, over all other bytes in order.
     J1850 {
-        /// The byte that holds it.
+        /// Index of the checksum byte.
         at: usize,
     },
-    /// Exclusive or in one byte, of all the others.
+    /// Exclusive or of all other bytes, in one byte.
     Xor {
-        /// The byte that holds it.
+        /// Index of the checksum byte.
         at: usize,
     },
-    /// Sum modulo 256 in one byte, of all the others.
+    /// Sum of all other bytes modulo 256, in one byte.
     Sum {
-        /// The byte that holds it.
+        /// Index of the checksum byte.
         at: usize,
     },
-    /// AUTOSAR E2E; its counter is used.
+    /// AUTOSAR E2E; the counter of the profile is used.
     E2e(Profile),
 }
 
@@ -72,16 +72,16 @@ pub enum Checksum {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelFrame {
-    /// Its identifier.
+    /// Identifier of the frame.
     #[cfg_attr(feature = "serde", serde(with = "stored_id"))]
     pub id: Id,
-    /// A message counter of up to 8 bits, cycling through all values.
+    /// Message counter of up to 8 bits that cycles through all values, if there is one.
     pub counter: Option<BitField>,
-    /// Its protection.
+    /// Protection of the frame.
     pub checksum: Checksum,
 }
 
-/// Stores an identifier as a number; bit 31 marks one of 29 bits.
+/// These functions store an identifier as a number; bit 31 marks an identifier of 29 bits.
 #[cfg(feature = "serde")]
 mod stored_id {
     use embedded_can::{ExtendedId, Id, StandardId};
@@ -112,32 +112,32 @@ mod stored_id {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WheelError {
-    /// It has too few bytes.
+    /// The frame has too few bytes.
     #[error("wheel frame of {0} bytes is too short")]
     Short(usize),
-    /// The checksum does not fit.
-    #[error("wheel frame's checksum does not fit")]
+    /// The checksum is wrong.
+    #[error("wheel frame has a wrong checksum")]
     Checksum,
     /// The E2E check failed.
     #[error("wheel frame: {0}")]
     E2e(Fault),
-    /// The same counter again: an old frame.
-    #[error("wheel frame is a repetition")]
+    /// The counter equals the previous one: an old frame.
+    #[error("wheel frame is repeated")]
     Repeated,
-    /// A wheel's speed is marked, or cannot be.
+    /// A wheel's speed is marked as not valid, or is out of range.
     #[error("wheel {wheel}: speed is not valid")]
     Invalid {
-        /// The wheel.
+        /// Index of the wheel.
         wheel: usize,
     },
 }
 
 impl WheelFrame {
-    /// Returns the bits of the frame that its protection takes.
+    /// Returns a mask of the bits that the protection uses.
     pub(super) fn protected_mask(&self) -> u64 {
         match self.checksum {
             Checksum::None => 0,
-            // At most 7: checked with the settings.
+            // At most 7: the settings are checked.
             Checksum::J1850 { at } | Checksum::Xor { at } | Checksum::Sum { at } => 0xFF << (8 * at.min(7)),
             Checksum::E2e(profile) => profile.header_mask(),
         }
@@ -152,7 +152,7 @@ impl WheelFrame {
         }
     }
 
-    /// Checks a frame's protection; gives its counter where it has one.
+    /// Checks the protection of a frame, and returns its counter if it has one.
     pub(super) fn check(&self, data: &[u8]) -> Result<Option<u8>, WheelError> {
         let short = WheelError::Short(data.len());
         let others =
@@ -176,7 +176,7 @@ impl WheelFrame {
 
     fn counter(&self, data: &[u8]) -> Result<Option<u8>, WheelError> {
         let Some(field) = self.counter else { return Ok(None) };
-        // At most 8 bits: checked with the settings.
+        // At most 8 bits: the settings are checked.
         field.raw(data).map(|raw| Some(raw as u8)).ok_or(WheelError::Short(data.len()))
     }
 }

@@ -1,4 +1,4 @@
-//! The settings name the frames that carry the wheel speeds.
+//! The settings describe the frames that carry the wheel speeds, and when the vehicle counts as standing.
 
 use super::layout::{Checksum, WheelFrame, WheelSignal};
 use crate::can::signal::{BitField, ByteOrder};
@@ -6,67 +6,67 @@ use crate::sample::WHEELS;
 use crate::units::{Duration, WheelSpeed};
 use embedded_can::{Id, StandardId};
 
-/// Most frames that wheel speeds may be spread over.
+/// Largest number of frames that carry wheel speeds.
 pub const MAX_FRAMES: usize = WHEELS;
 
-/// The time-out and the standing time are at most this.
+/// Longest timeout and longest `still_for`, microseconds.
 const LONGEST_US: u64 = 10_000_000;
 
-/// Everything that can be set.
+/// The settings of [`WheelReceiver`](super::WheelReceiver).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelSettings {
-    /// The frames.
+    /// Frames that carry wheel speeds.
     pub frames: [Option<WheelFrame>; MAX_FRAMES],
-    /// The signal of each wheel: front left, front right, rear left, rear right.
+    /// Signal of each wheel: front left, front right, rear left, rear right.
     pub signals: [Option<WheelSignal>; WHEELS],
-    /// A speed that is older says nothing.
+    /// Age above which a speed is stale.
     pub timeout: Duration,
-    /// Up to this speed a wheel may stand still.
+    /// Highest speed at which a wheel counts as still.
     pub still_speed: WheelSpeed,
-    /// The time for which all wheels must be that slow.
+    /// Time for which all wheels must be that slow before the vehicle counts as standing.
     pub still_for: Duration,
 }
 
-/// The reason why wheel settings are no configuration.
+/// The reason why wheel settings are refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WheelConfigError {
-    /// There are not two or four wheels.
+    /// The number of wheels is neither two nor four.
     #[error("{0} wheels instead of two or four")]
     Wheels(usize),
-    /// The signal of a wheel is in a frame that is not there.
-    #[error("wheel {0} is in a frame that is not there")]
+    /// The signal of a wheel refers to a frame that is not configured.
+    #[error("wheel {0} refers to a frame that is not configured")]
     Wheel(usize),
-    /// Two frames under one identifier.
-    #[error("wheel frame {0:x} is there twice")]
+    /// Two frames have the same identifier.
+    #[error("wheel frame {0:x} is configured twice")]
     DuplicateIdentifier(u32),
-    /// A counter of over 8 bits.
-    #[error("wheel counter of {0} bits, over 8")]
+    /// A counter has more than 8 bits.
+    #[error("wheel counter has {0} bits, more than 8")]
     Counter(u8),
-    /// A checksum beyond byte 7.
-    #[error("wheel checksum in byte {0}, beyond 7")]
+    /// A checksum is beyond byte 7.
+    #[error("wheel checksum is in byte {0}, beyond byte 7")]
     Checksum(usize),
-    /// Two of a frame's speeds, its counter and its protection have bits in common.
+    /// Two fields of a frame (speeds, counter, protection) overlap.
     #[error("wheel frame {0:x}: two values overlap")]
     Overlap(u32),
     /// One of the board's own messages has the identifier.
     #[error("wheel frame {0:x} is one of our own messages")]
     Own(u32),
-    /// A factor of zero.
-    #[error("wheel {0}: every code is the same speed")]
+    /// The factor of a wheel is zero.
+    #[error("wheel {0}: the factor is zero")]
     Factor(usize),
-    /// A time-out or a standing time of zero, or above 10 s.
+    /// The timeout or `still_for` is zero, or above 10 s.
     #[error("wheel times: {0} us is not above 0 and at most 10 s")]
     Time(u64),
 }
 
 impl WheelSettings {
-    /// Wheel speeds as many cars of one large maker send them: identifier 0xAA, four big-endian
+    /// The wheel-speed frame of many Toyota cars: identifier 0xAA, four big-endian
     /// values of 0.01 km/h from -67.67, front right, front left, rear right, rear left (opendbc,
-    /// `WHEEL_SPEEDS`). Still below 0.1 km/h for half a second, silent after 0.1 s.
+    /// `WHEEL_SPEEDS`). The vehicle stands after 0.5 s below 0.1 km/h; a speed is stale after 0.1 s.
     pub const TOYOTA: Self = Self {
         frames: [Some(TOYOTA), None, None, None],
         signals: [toyota(23), toyota(7), toyota(55), toyota(39)],
@@ -75,7 +75,7 @@ impl WheelSettings {
         still_for: Duration::from_millis(500),
     };
 
-    /// Checks the settings, and returns the wheels that they name.
+    /// Checks the settings, and returns which wheels have a signal.
     pub(super) fn wheels(&self) -> Result<[bool; WHEELS], WheelConfigError> {
         for time in [self.timeout, self.still_for] {
             if time.0 == 0 || time.0 > LONGEST_US {
@@ -121,7 +121,7 @@ impl WheelSettings {
     }
 }
 
-/// Takes bits of a frame for a value.
+/// Marks bits of a frame as used by a value.
 fn take(taken: &mut u64, mask: u64, frame: Option<WheelFrame>) -> Result<(), WheelConfigError> {
     if *taken & mask != 0 {
         return Err(WheelConfigError::Overlap(frame.map_or(0, |frame| raw_id(frame.id))));

@@ -1,43 +1,43 @@
-//! The wheels decide whether the vehicle stands.
+//! This module derives standstill from the wheel speeds.
 //!
-//! Standing still is decided here, because a bias estimator that trusts the gyro alone takes a
-//! slow turn for bias. It is asserted late and dropped at once: all wheels must have been fresh
-//! and slow for a while, and one wheel that moves, is silent or not valid ends it. Wheel
-//! sensors of the passive kind show zero below walking pace, hence the while.
+//! Standstill is derived from the wheels because a bias estimator that relies on the gyro alone mistakes a
+//! slow turn for bias. It is reported late and withdrawn at once: all wheels must have been fresh
+//! and slow for some time, and a single wheel that moves, is stale or not valid ends it. The delay is needed because
+//! passive wheel sensors read zero below walking pace.
 
 use crate::sample::{Standstill, WHEELS, WheelSample};
 use crate::units::{Duration, Micros, WheelSpeed};
 
-/// The limits by which wheels count as standing, and as silent.
+/// The limits for a wheel that is still and for a speed that is stale.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StandstillRule {
-    /// A speed that is older says nothing.
+    /// Age above which a speed is stale.
     pub timeout: Duration,
-    /// Up to this speed a wheel may stand still.
+    /// Highest speed at which a wheel counts as still.
     pub still_speed: WheelSpeed,
-    /// The time for which all wheels must be that slow.
+    /// Time for which all wheels must be that slow.
     pub still_for: Duration,
 }
 
-/// The wheels of a vehicle: the newest speed of each, and since when they have been slow.
+/// The newest speed of each wheel, and the time since which all have been slow.
 #[derive(Debug, Clone, Copy)]
 pub struct Wheels {
     rule: StandstillRule,
-    /// Wheels that there are.
+    /// Wheels that have a signal.
     expected: [bool; WHEELS],
     speeds: [Option<(WheelSpeed, Micros)>; WHEELS],
     still_since: Option<Micros>,
 }
 
 impl Wheels {
-    /// Begins before the first speed.
+    /// Creates the state before the first speed.
     #[must_use]
     pub const fn new(rule: StandstillRule, expected: [bool; WHEELS]) -> Self {
         Self { rule, expected, speeds: [None; WHEELS], still_since: None }
     }
 
-    /// Drops speeds that are too old. Call it before new speeds are taken.
+    /// Drops stale speeds. Call it before setting new speeds.
     pub fn expire(&mut self, now: Micros) {
         for slot in &mut self.speeds {
             if let Some((_, at)) = slot
@@ -51,14 +51,14 @@ impl Wheels {
         }
     }
 
-    /// Takes a wheel's speed; `None` where it is marked as not valid.
+    /// Sets the speed of a wheel; `None` if it is marked as not valid.
     pub fn set(&mut self, wheel: usize, speed: Option<WheelSpeed>, now: Micros) {
         if let Some(slot) = self.speeds.get_mut(wheel) {
             *slot = speed.map(|speed| (speed, now));
         }
     }
 
-    /// Judges standing or moving by the speeds that have been set.
+    /// Updates the standstill state from the speeds that have been set.
     pub fn judge(&mut self, now: Micros) {
         let limit = self.rule.still_speed.0.unsigned_abs();
         let slow = self.speeds.iter().flatten().all(|(speed, _)| speed.0.unsigned_abs() <= limit);

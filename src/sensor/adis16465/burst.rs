@@ -9,18 +9,18 @@
 //! | 16 | data counter |
 //! | 18 | sum of the 18 bytes before, modulo 2^16 |
 //!
-//! Eighteen zeros have the sum zero, so the checksum alone would accept them. All-zero and all-one bursts are therefore
-//! refused: a part without power or a cut line reads like that.
+//! Eighteen zeros have the sum zero, so the checksum alone would accept them. All-zero and all-one bursts are
+//! therefore refused: an unpowered sensor or a broken line reads like that.
 
 use crate::sample::{ImuSample, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, RangeError, STANDARD_GRAVITY, SpecificForce};
 
-/// Length of a burst behind its command, bytes.
+/// Length of a burst without the command, bytes.
 pub const BURST: usize = 20;
-/// The checksum covers this many bytes.
+/// Number of bytes that the checksum covers.
 const SUMMED: usize = 18;
 
-/// Names the part, which determines the scales.
+/// The sensor model, which determines the scales.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Model {
@@ -55,15 +55,15 @@ impl Model {
     }
 }
 
-/// Holds the part's report of its own state; reading it clears it.
+/// The diagnostic flags of the sensor; reading clears them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DiagStat(pub u16);
 
 impl DiagStat {
-    /// Data were not fetched in time or overwritten.
+    /// Data were not fetched in time, or were overwritten.
     pub const OVERRUN: Self = Self(1 << 1);
-    /// A write to the part's flash failed.
+    /// A write to the sensor's flash failed.
     pub const FLASH_UPDATE: Self = Self(1 << 2);
     /// A transfer had a wrong number of clocks.
     pub const SPI: Self = Self(1 << 3);
@@ -71,12 +71,12 @@ impl DiagStat {
     pub const STANDBY: Self = Self(1 << 4);
     /// The self-test of the sensors failed.
     pub const SELF_TEST: Self = Self(1 << 5);
-    /// The part's program memory is damaged.
+    /// The sensor's program memory is corrupt.
     pub const MEMORY: Self = Self(1 << 6);
     /// The clocks disagree.
     pub const CLOCK: Self = Self(1 << 7);
-    /// These bits make readings useless. An overrun, a failed write to flash or a transfer error concerns a different
-    /// transfer, since the sum of this one fits.
+    /// The bits that make readings unusable. An overrun, a failed write to flash or an SPI error concerns another
+    /// transfer, because the checksum of this one is correct.
     pub const FATAL: Self = Self(Self::STANDBY.0 | Self::SELF_TEST.0 | Self::MEMORY.0 | Self::CLOCK.0);
 
     /// Returns whether any of these bits is set.
@@ -91,7 +91,7 @@ impl DiagStat {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum BurstError {
-    /// The sum does not fit.
+    /// The checksum is wrong.
     #[error("ADIS164xx: the bytes add up to {computed:04x}, but the burst says {stored:04x}")]
     Checksum {
         /// The sum computed over the bytes.
@@ -99,41 +99,41 @@ pub enum BurstError {
         /// The sum in the burst.
         stored: u16,
     },
-    /// The bytes are all zeros or all ones: no part answers.
-    #[error("ADIS164xx: no part answers")]
+    /// The bytes are all zeros or all ones: no sensor answers.
+    #[error("ADIS164xx: no sensor answers")]
     Silent,
-    /// The part reports that its readings are useless.
+    /// The sensor reports that its readings are unusable.
     #[error("ADIS164xx: DIAG_STAT {:04x}", .0.0)]
     Diagnosis(DiagStat),
-    /// The data counter has not advanced: these are the same readings again.
-    #[error("ADIS164xx: the data counter stands still at {counter}")]
+    /// The data counter has not advanced: the readings are the same as before.
+    #[error("ADIS164xx: the data counter did not advance from {counter}")]
     Repeated {
         /// The counter.
         counter: u16,
     },
-    /// A reading is beyond what a part of this kind can measure.
+    /// A reading is out of range.
     #[error("ADIS164xx: a reading is {0}")]
     Reading(RangeError),
 }
 
-/// Holds a burst in the part's own counts.
+/// A burst in raw counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Burst {
-    /// The part's report of its own state.
+    /// Diagnostic flags.
     pub diagnosis: DiagStat,
-    /// Rate about x, y, z.
+    /// Angular rate about x, y, z.
     pub rate: [i16; 3],
     /// Specific force along x, y, z.
     pub acceleration: [i16; 3],
     /// Temperature, 0.1 deg C.
     pub temperature: i16,
-    /// The part's count of readings; it wraps.
+    /// Data counter; it wraps.
     pub counter: u16,
 }
 
 impl Burst {
-    /// Reads a burst.
+    /// Parses a burst.
     ///
     /// # Errors
     /// `Checksum` or `Silent`.
@@ -156,7 +156,7 @@ impl Burst {
         })
     }
 
-    /// Returns the burst's bytes.
+    /// Encodes the burst.
     #[must_use]
     pub fn emit(&self) -> [u8; BURST] {
         let ([gx, gy, gz], [ax, ay, az]) = (self.rate, self.acceleration);

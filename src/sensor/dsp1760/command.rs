@@ -1,7 +1,7 @@
 //! The commands of the DSP-1760 are lines of ASCII, ended by LF.
 //!
-//! Settings are taken in configuration mode only. Whether the part sends radians or degrees is
-//! set at the part and cannot be read from a frame; no command for it is known here.
+//! Settings are accepted only in configuration mode. Whether the gyro sends radians or degrees is
+//! set in the gyro and cannot be read from a frame; we know of no command for it.
 
 use super::{Dsp1760Config, OutputRate, Rotation, TemperatureUnit};
 use core::fmt::Write;
@@ -10,26 +10,26 @@ use heapless::String;
 /// Length of the longest line, bytes.
 pub const MAX_LINE: usize = 20;
 
-/// Names a command to the part: one line.
+/// A command to the gyro: one line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
     /// Enters (true) or leaves configuration mode.
     Configure(bool),
-    /// Sets the messages per second. The two messages after the change are invalid.
+    /// Sets the message rate. The two messages after the change are invalid.
     Rate(OutputRate),
-    /// Selects increments or rates.
+    /// Selects increments or rates as rotations.
     Rotation(Rotation),
-    /// Returns to the part's default for rotations.
+    /// Restores the gyro's default for rotations.
     ResetRotation,
     /// Sets the unit of the temperature field.
     Temperature(TemperatureUnit),
-    /// Asks for the rate: [`Reply::Rate`] answers.
+    /// Requests the message rate; the answer is [`Reply::Rate`].
     QueryRate,
 }
 
 impl Command {
-    /// Returns the line, LF included.
+    /// Encodes the line, LF included.
     #[must_use]
     pub fn emit(&self) -> String<MAX_LINE> {
         let mut line = String::new();
@@ -48,7 +48,7 @@ impl Command {
         line
     }
 
-    /// Reads a line, as the part does: case and the blanks around it do not matter.
+    /// Parses a line as the gyro does: case and surrounding blanks do not matter.
     #[must_use]
     pub fn parse(line: &[u8]) -> Option<Self> {
         let line = core::str::from_utf8(line).ok()?.trim();
@@ -78,8 +78,8 @@ impl Command {
     }
 }
 
-/// Returns the lines that configure a part, in order. Its messages stop meanwhile. [`super::dialogue`] sends them and
-/// checks that they were received.
+/// Returns the commands that configure a gyro, in order. The gyro sends no messages meanwhile. [`super::dialogue`]
+/// sends the commands and checks that they took effect.
 #[must_use]
 pub const fn setup(config: &Dsp1760Config) -> [Command; 5] {
     [
@@ -91,7 +91,7 @@ pub const fn setup(config: &Dsp1760Config) -> [Command; 5] {
     ]
 }
 
-/// Holds a line from the part.
+/// A reply line from the gyro.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reply {
@@ -100,7 +100,7 @@ pub enum Reply {
 }
 
 impl Reply {
-    /// Reads a line such as `DR,1000`; `None` for any other.
+    /// Parses a line such as `DR,1000`; `None` for any other.
     #[must_use]
     pub fn parse(line: &[u8]) -> Option<Self> {
         let (name, value) = core::str::from_utf8(line).ok()?.trim().split_once(',')?;
@@ -108,7 +108,7 @@ impl Reply {
         if name.eq_ignore_ascii_case("dr") { rate() } else { None }
     }
 
-    /// Returns the line, CR and LF included.
+    /// Encodes the line, CR and LF included.
     #[must_use]
     pub fn emit(&self) -> String<MAX_LINE> {
         let mut line = String::new();

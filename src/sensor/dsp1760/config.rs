@@ -1,52 +1,52 @@
-//! The configuration of a DSP-1760 holds the settings that its messages do not state: without them rotation and time
-//! cannot be computed.
+//! The configuration of a DSP-1760 holds the settings that its messages do not contain, but that are needed to
+//! compute rotation and time.
 
-/// Says whether a rotation is an increment or a rate.
+/// Whether a rotation is an increment or a rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Rotation {
-    /// Rotations are angles since the last message; this is the part's default, and better, since no turn between
-    /// messages is lost.
+    /// Rotations are angles since the last message. This is the gyro's default, and better, because no rotation
+    /// between messages is lost.
     #[default]
     Delta,
     /// Rotations are angular rates.
     Rate,
 }
 
-/// Gives the unit of the rotation.
+/// The unit of the rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AngleUnit {
-    /// rad or rad/s; the part's default.
+    /// rad or rad/s; the gyro's default.
     #[default]
     Radians,
     /// deg or deg/s.
     Degrees,
 }
 
-/// Unit of the temperature.
+/// The unit of the temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TemperatureUnit {
-    /// deg C; the part's default.
+    /// deg C; the gyro's default.
     #[default]
     Whole,
     /// 1/100 deg C.
     Hundredths,
 }
 
-/// Holds the number of messages per second, one of those that the part offers.
+/// The number of messages per second, one of [`OutputRate::OFFERED`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OutputRate(u16);
 
 impl OutputRate {
-    /// The rates that the part offers.
+    /// Rates that the gyro offers, messages per second.
     pub const OFFERED: [u16; 10] = [1, 5, 10, 25, 50, 100, 250, 500, 750, 1000];
-    /// The part sends 1000 messages a second.
+    /// 1000 messages per second.
     pub const HZ_1000: Self = Self(1000);
 
-    /// Makes a rate; `None` when the part does not offer it.
+    /// Creates a rate; `None` if the gyro does not offer it.
     #[must_use]
     pub fn new(hertz: u16) -> Option<Self> {
         Self::OFFERED.contains(&hertz).then_some(Self(hertz))
@@ -59,7 +59,7 @@ impl OutputRate {
     }
 }
 
-/// Holds the settings that the messages do not state.
+/// The settings that the messages do not contain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Dsp1760Config {
@@ -74,7 +74,7 @@ pub struct Dsp1760Config {
 }
 
 impl Dsp1760Config {
-    /// The default is 1000 messages a second, otherwise as the part is delivered.
+    /// The factory settings of the gyro, at 1000 messages per second.
     pub const DEFAULT: Self = Self {
         rate: OutputRate::HZ_1000,
         rotation: Rotation::Delta,

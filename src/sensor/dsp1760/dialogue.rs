@@ -1,14 +1,14 @@
 //! This dialogue configures a DSP-1760.
 //!
-//! The part acknowledges no setting, so its settings are queried afterwards: the dialogue sends the lines of [`setup`],
+//! The gyro acknowledges no setting, so the dialogue queries the rate afterwards: it sends the lines of [`setup`],
 //! then the query for the rate, and leaves configuration mode only after the answer. The rules:
-//! - Lines follow each other [`PAUSE`] apart.
-//! - Without an answer for [`TIMEOUT`], or with another rate, all of it is sent again,
-//!   [`ATTEMPTS`] times in all.
-//! - Bytes before an answer in its line (from messages that still come in) are skipped.
+//! - Lines are sent [`PAUSE`] apart.
+//! - Without an answer within [`TIMEOUT`], or if the answer is another rate, all lines are sent again,
+//!   up to [`ATTEMPTS`] times in total.
+//! - Bytes before an answer in its line (from messages that still arrive) are skipped.
 //!
-//! The dialogue needs no port and no clock: bytes and the time come in, lines to send come out. Make the parser
-//! ([`super::Dsp1760::new`]) afterwards, with the rate that was set.
+//! The dialogue does no I/O and has no clock: bytes and the time are inputs, lines to send are outputs. Create the
+//! parser ([`super::Dsp1760::new`]) afterwards, with the rate that was set.
 
 use super::command::{Command, MAX_LINE, Reply, setup};
 use super::config::{Dsp1760Config, OutputRate};
@@ -16,14 +16,14 @@ use crate::sensor::serial::{self, Action};
 use crate::units::{Duration, Micros};
 use heapless::Vec;
 
-/// Two lines are sent this far apart.
+/// Time between two lines.
 pub const PAUSE: Duration = Duration::from_millis(20);
-/// The answer may take this long.
+/// Longest wait for the answer.
 pub const TIMEOUT: Duration = Duration::from_millis(500);
-/// The dialogue gives up after this many attempts.
+/// Number of attempts before the dialogue fails.
 pub const ATTEMPTS: u8 = 3;
 
-/// The reason why the dialogue has failed to configure the part.
+/// The reason why the dialogue has failed to configure the gyro.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -31,36 +31,36 @@ pub enum DialogueError {
     /// No query was answered.
     #[error("DSP-1760: no answer after {ATTEMPTS} attempts")]
     Silent,
-    /// The last answer reported a different rate from the one that was set.
+    /// The last answer reported a rate other than the one that was set.
     #[error("DSP-1760: the rate stays at {} Hz", .got.hertz())]
     Rate {
-        /// The rate that the part reports.
+        /// Rate that the gyro reports.
         got: OutputRate,
     },
 }
 
-/// Holds the state of the dialogue with one part.
+/// The dialogue with one gyro.
 #[derive(Debug, Clone)]
 pub struct Dialogue {
     config: Dsp1760Config,
     /// The newest bytes of the line being received.
     line: Vec<u8, MAX_LINE>,
-    /// Number of the line that is sent next.
+    /// Index of the line to send next.
     next: usize,
     due: Micros,
     attempts: u8,
-    /// The part's last answer to the query.
+    /// Last answer to the query.
     answer: Option<OutputRate>,
 }
 
 impl Dialogue {
-    /// Begins before the first line is sent.
+    /// Creates a dialogue that has sent nothing.
     #[must_use]
     pub const fn new(config: Dsp1760Config) -> Self {
         Self { config, line: Vec::new(), next: 0, due: Micros(0), attempts: 1, answer: None }
     }
 
-    /// Returns all lines in order. The last one is sent when the query has been answered.
+    /// Returns all lines in order. The last line is sent once the query has been answered.
     fn lines(&self) -> [Command; 6] {
         let [enter, rate, rotation, temperature, leave] = setup(&self.config);
         [enter, rate, rotation, temperature, Command::QueryRate, leave]
@@ -75,7 +75,7 @@ impl serial::Dialogue for Dialogue {
             if self.line.is_full() {
                 self.line.remove(0);
             }
-            // The buffer now has room.
+            // Cannot fail: the buffer has room now.
             let _ = self.line.push(byte);
             return;
         }

@@ -1,22 +1,22 @@
-//! A data message has one of three layouts, which its fourth byte announces; some fields exist only in some of them.
+//! A data message has one of three formats, selected by its fourth byte; some fields exist only in some formats.
 
-/// Every data message begins with these bytes; the format byte follows.
+/// First bytes of every data message; the format byte follows.
 pub(super) const PREFIX: [u8; 3] = [0xFE, 0x81, 0xFF];
 
-/// Names the layout of a message.
+/// The format of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Format {
-    /// The message has no time stamp.
+    /// Message without a time stamp.
     A,
-    /// The message has a time stamp.
+    /// Message with a time stamp.
     B,
-    /// The message has one of four slow readings in turn.
+    /// Message with one of four slow readings, which alternate.
     C,
 }
 
 impl Format {
-    /// Returns the format that the first four bytes announce.
+    /// Returns the format that the first four bytes select.
     #[must_use]
     pub const fn of(header: [u8; 4]) -> Option<Self> {
         match header {
@@ -27,7 +27,7 @@ impl Format {
         }
     }
 
-    /// Returns the number of bytes of a whole message.
+    /// Returns the length of a whole message, bytes.
     #[must_use]
     pub const fn length(self) -> usize {
         match self {
@@ -46,18 +46,18 @@ impl Format {
     }
 }
 
-/// Marks the good readings, one bit each; bits 3 and 7 are 0.
+/// The status bits of the readings, 1 for good; bits 3 and 7 are 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Validity(pub u8);
 
 impl Validity {
-    /// All three gyro axes are good.
+    /// Bits of the three gyro axes.
     pub const GYRO: Self = Self(0x07);
-    /// All gyro and accelerometer axes are good.
+    /// Bits of all gyro and accelerometer axes.
     pub const ALL: Self = Self(0x77);
 
-    /// Returns whether the gyro about `axis` (0 to 2) is good: the part drops the bit in saturation.
+    /// Returns whether the gyro about `axis` (0 to 2) is good; the bit is 0 when the gyro is saturated.
     #[must_use]
     pub const fn gyro(self, axis: usize) -> bool {
         axis < 3 && self.0 & 1 << axis != 0
@@ -70,19 +70,19 @@ impl Validity {
     }
 }
 
-/// Holds the fields that only some formats have.
+/// The fields that only some formats have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Extra {
-    /// Format A has a temperature, in the unit that the part is set to.
+    /// Temperature of format A, in the configured unit.
     Temperature(i16),
-    /// Format B has a time stamp and a temperature.
+    /// Time stamp and temperature of format B.
     Timed {
         /// Time, microseconds; it wraps.
         time: u32,
-        /// Temperature, in the unit that the part is set to.
+        /// Temperature, in the configured unit.
         temperature: i16,
     },
-    /// Format C has a temperature or the magnetic field x, y, z, by sequence number modulo 4.
+    /// Slow reading of format C: temperature or magnetic field x, y, z, by sequence number modulo 4.
     Slow(f32),
 }

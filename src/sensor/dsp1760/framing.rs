@@ -1,10 +1,10 @@
-//! This protocol finds the messages of the DSP-1760 in its bytes, by header and CRC.
+//! This protocol finds DSP-1760 messages in a byte stream, by header and CRC.
 
 use super::message::Format;
 use crate::sensor::crc::CRC_32_MPEG_2;
 use crate::sensor::framer::Protocol;
 
-/// Frames data messages, and the built-in-test messages among them.
+/// The framing of data messages and built-in-test messages.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Kvh;
 
@@ -13,9 +13,9 @@ pub(super) fn is_self_test(frame: &[u8]) -> bool {
     frame.get(2) == Some(&0x00)
 }
 
-/// Returns the length of header and status of a built-in-test message; its long form has eight status bytes instead of
-/// six. The checksum is left out, because its rule is not known. So its byte is skipped like any other that begins no
-/// frame, and a damaged message of this kind cannot take the first byte of an intact one with it.
+/// Returns the length of header and status of a built-in-test message; its long form has eight status bytes instead
+/// of six. The checksum byte is not part of the frame, because its algorithm is unknown. The framer skips that byte,
+/// so a corrupt message of this kind cannot consume the first byte of an intact one.
 const fn bit_length(kind: u8) -> Option<usize> {
     match kind {
         0xAA => Some(4 + 6),
@@ -37,7 +37,7 @@ impl Protocol for Kvh {
 
     fn check(frame: &[u8]) -> bool {
         match frame {
-            // Status bytes have seven bits each, so no header can hide in them.
+            // Status bytes have seven bits each, so they cannot contain a header.
             [_, _, _, _, status @ ..] if is_self_test(frame) => status.iter().all(|byte| byte & 0x80 == 0),
             _ => CRC_32_MPEG_2.checksum(frame) == 0,
         }

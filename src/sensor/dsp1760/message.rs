@@ -10,9 +10,9 @@
 //! | 32 | CRC | status, sequence, i16 temperature | status, sequence |
 //! | end | | CRC at 36 | CRC at 34 |
 //!
-//! Everything is big-endian. Format C's length is an inference: no recorded frame of it was available, its fields add
-//! up to 38 bytes, and a test script for these parts counts as many. If it is wrong, no frame of that format passes its
-//! CRC, so no wrong reading comes out.
+//! All values are big-endian. The length of format C is inferred: no recorded frame was available, its fields add up
+//! to 38 bytes, and a test script for these gyros uses the same length. If it is wrong, no frame of format C passes
+//! its CRC, so no wrong reading results.
 
 pub use super::format::{Extra, Format, Validity};
 
@@ -31,50 +31,50 @@ pub const MAX_SEQUENCE: u8 = 127;
 #[non_exhaustive]
 pub enum MessageError {
     /// The bytes do not begin with the header of a data message.
-    #[error("DSP-1760: no header of a data message")]
+    #[error("DSP-1760: not the header of a data message")]
     Header,
-    /// The message is not as long as the header announces.
+    /// The length of the message is not that of its format.
     #[error("DSP-1760: {got} bytes where the header announces {expected}")]
     Length {
-        /// Bytes given.
+        /// Number of bytes given.
         got: usize,
-        /// Bytes announced.
+        /// Number of bytes in the format.
         expected: usize,
     },
-    /// The checksum does not fit.
+    /// The CRC is wrong.
     #[error("DSP-1760: CRC {computed:08x}, but the message carries {stored:08x}")]
     Crc {
-        /// The CRC of the bytes before it.
+        /// CRC computed over the bytes.
         computed: u32,
-        /// The CRC in the message.
+        /// CRC in the message.
         stored: u32,
     },
     /// The sequence number is above [`MAX_SEQUENCE`].
     #[error("DSP-1760: sequence number {got}, above {MAX_SEQUENCE}")]
     Sequence {
-        /// The sequence number.
+        /// Sequence number in the message.
         got: u8,
     },
 }
 
-/// Holds a data message as it stands on the wire.
+/// A data message, in the units of the wire format.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Message {
-    /// Increment or rate about x, y, z, in the unit that the part is set to.
+    /// Increment or rate about x, y, z, in the configured unit.
     pub rotation: [f32; 3],
-    /// Specific force x, y, z in g; the DSP-1760 has none, the 17xx units do.
+    /// Specific force x, y, z in g; only the 17xx units measure it, not the DSP-1760.
     pub acceleration: [f32; 3],
-    /// The fields that the format adds.
+    /// Fields that only this format has.
     pub extra: Extra,
-    /// The good readings.
+    /// Status bits of the readings.
     pub validity: Validity,
     /// Sequence number, 0 to [`MAX_SEQUENCE`].
     pub sequence: u8,
 }
 
 impl Message {
-    /// Returns the layout that this message is sent in.
+    /// Returns the format of the message.
     #[must_use]
     pub const fn format(&self) -> Format {
         match self.extra {
@@ -84,7 +84,7 @@ impl Message {
         }
     }
 
-    /// Reads a whole message. A reading that is not finite loses its valid bit.
+    /// Parses a whole message. The valid bit of a reading that is not finite is cleared.
     ///
     /// # Errors
     /// [`MessageError`].
@@ -102,7 +102,7 @@ impl Message {
         Self::parse_checked(frame)
     }
 
-    /// Parses a frame whose CRC is known to fit, so that it is computed once.
+    /// Parses a frame whose CRC has already been checked.
     pub(super) fn parse_checked(frame: &[u8]) -> Result<Self, MessageError> {
         let format = frame.first_chunk().copied().and_then(Format::of).ok_or(MessageError::Header)?;
         let length = MessageError::Length { got: frame.len(), expected: format.length() };
@@ -132,11 +132,11 @@ impl Message {
         Ok(Self { rotation, acceleration, extra, validity, sequence })
     }
 
-    /// Returns the message's bytes, CRC included.
+    /// Encodes the message, CRC included.
     #[must_use]
     pub fn emit(&self) -> Vec<u8, MAX_MESSAGE> {
         let mut frame = Vec::new();
-        // Every format has room in MAX_MESSAGE bytes.
+        // MAX_MESSAGE bytes hold every format.
         let mut put = |bytes: &[u8]| drop(frame.extend_from_slice(bytes));
         put(&PREFIX);
         put(&[self.format().header_byte()]);

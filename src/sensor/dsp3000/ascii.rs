@@ -1,8 +1,8 @@
 //! This module parses the variant of the DSP-3000 that sends lines of text.
 //!
-//! A line is a decimal number, blanks and `1` (valid) or `0` (fault), ended by CR and LF. Implementations differ in the
-//! width of the line, so blanks are trimmed and the line end is the only framing. There is no checksum: a damaged digit
-//! gives a wrong number. Everything that does not have exactly this form is refused, and the caller must also check
+//! A line is a decimal number, blanks and `1` (valid) or `0` (fault), ended by CR and LF. Implementations differ in
+//! the width of the line, so blanks are trimmed and the line end is the only framing. There is no checksum: a corrupt
+//! digit gives a wrong number. Lines of any other form are refused, and the caller must also check
 //! that a reading is plausible.
 
 use super::Mode;
@@ -11,18 +11,18 @@ use crate::units::Micros;
 use core::fmt::Write;
 use heapless::{String, Vec};
 
-/// The line buffer has this many bytes, more than any line that the part sends.
+/// Size of the line buffer, bytes; longer than any line that the gyro sends.
 pub const MAX_LINE: usize = 32;
-/// The last digit counts millionths.
+/// Units of the last digit per deg or deg/s.
 const MILLIONTHS: u32 = 1_000_000;
 
-/// Holds a number as the part sends it: deg/s, deg, or deg modulo 360, by [`super::Mode`].
+/// A number as the gyro sends it: deg/s, deg, or deg modulo 360, depending on [`super::Mode`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reading {
-    /// The value in millionths of the unit, exact.
+    /// Value in millionths of the unit, exact.
     pub millionths: i32,
-    /// Says whether the part marks the reading as valid.
+    /// Whether the gyro marks the reading as valid.
     pub valid: bool,
 }
 
@@ -32,15 +32,15 @@ pub struct Reading {
 #[non_exhaustive]
 pub enum LineError {
     /// The line is not of the form `[-]ddd.dddddd y`.
-    #[error("DSP-3000: a line that is no number with a validity")]
+    #[error("DSP-3000: the line is not a number and a validity flag")]
     Form,
     /// The line is longer than [`MAX_LINE`].
-    #[error("DSP-3000: a line without an end")]
+    #[error("DSP-3000: the line is too long")]
     TooLong,
 }
 
 impl Reading {
-    /// Reads a line without its CR and LF.
+    /// Parses a line without its CR and LF.
     ///
     /// # Errors
     /// [`LineError::Form`].
@@ -68,15 +68,15 @@ impl Reading {
         Ok(Self { millionths: sign * millionths as i32, valid })
     }
 
-    /// Makes the sample of a rate or increment that arrived at `now` and covers `span` microseconds. `None` for an
-    /// integrated angle: set the part to increments instead.
+    /// Creates the sample of a rate or increment that arrived at `now` and covers `span` microseconds. `None` for an
+    /// integrated angle: set the gyro to increments instead.
     #[must_use]
     pub fn sample(&self, mode: Mode, now: Micros, span: u32) -> Option<FogSample> {
         super::sample(mode, self.millionths as f32 * 1e-6, self.valid, now, span)
     }
 
-    /// Encodes the line with CR and LF; a number with more than three digits before the point is cut to the largest
-    /// one that fits.
+    /// Encodes the line with CR and LF; a number with more than three digits before the point is clamped to the
+    /// largest one that fits.
     #[must_use]
     pub fn emit(&self) -> String<MAX_LINE> {
         let mut line = String::new();
@@ -88,7 +88,7 @@ impl Reading {
     }
 }
 
-/// Reads at most six digits.
+/// Parses at most six digits.
 fn decimal(digits: &[u8]) -> Result<u32, LineError> {
     digits.iter().try_fold(0, |value, byte| match byte {
         b'0'..=b'9' => Ok(value * 10 + u32::from(byte - b'0')),
@@ -96,23 +96,24 @@ fn decimal(digits: &[u8]) -> Result<u32, LineError> {
     })
 }
 
-/// Assembles lines from bytes and parses them.
+/// The parser: assembles lines from bytes and parses them.
 #[derive(Debug, Clone, Default)]
 pub struct Dsp3000Ascii {
     line: Vec<u8, MAX_LINE>,
-    /// The line has outgrown its buffer and is ignored until it ends.
+    /// Whether the current line is too long; it is ignored until it ends.
     too_long: bool,
 }
 
 impl Dsp3000Ascii {
-    /// Begins before the first byte.
+    /// Creates a parser that has received nothing.
     #[must_use]
     pub const fn new() -> Self {
         Self { line: Vec::new(), too_long: false }
     }
 
-    /// Takes one byte; if it ends a line, returns a reading or an error. Empty lines are skipped. The first line may be
-    /// incomplete and still parse as a number: drop it if the part was already sending when the port was opened.
+    /// Processes one byte; if it ends a line, returns a reading or an error. Empty lines are skipped. The first line
+    /// may be incomplete and still parse as a number: drop it if the gyro was already sending when the port was
+    /// opened.
     pub fn receive(&mut self, byte: u8) -> Option<Result<Reading, LineError>> {
         if byte != b'\r' && byte != b'\n' {
             self.too_long |= self.line.push(byte).is_err();

@@ -8,43 +8,43 @@
 //! | 26 | odd parity over all 32 bits |
 //! | 25-0 | two's complement; integrated: 25-23 turns, 22-0 angle within a turn |
 //!
-//! One parity bit is a weak check, so a byte more or less would give wrong numbers half of the time. Two things keep
-//! the parser in step. The part is silent for 0.65 of every millisecond: a caller that then calls
-//! [`Dsp3000Binary::pause`] gets no wrong word from a lost byte. And a part sends one type: [`Dsp3000Binary`] accepts a
-//! phase of the four bytes only after [`LOCK`] good words of the expected type and sync in a row, and searches again
-//! after one bad word. Without the pauses a lost byte gives wrong readings until a word fails, and there is no bound on
-//! how many: a test saw four.
+//! One parity bit is a weak check: after a lost or extra byte, half of the wrong words would pass. Two things keep
+//! the parser in step. First, the gyro is silent for 0.65 of every millisecond: if the caller then calls
+//! [`Dsp3000Binary::pause`], a lost byte gives no wrong word. Second, a gyro sends only one type: [`Dsp3000Binary`]
+//! accepts a phase of the four bytes only after [`LOCK`] good words of the expected type and sync in a row, and
+//! searches again after one bad word. Without the pauses, a lost byte gives wrong readings until a word fails. Their
+//! number has no bound: a test saw four.
 
 use super::Mode;
 use crate::sample::FogSample;
 use crate::units::Micros;
 use heapless::Vec;
 
-/// The last bit of a rate, deg/s.
+/// LSB of a rate, deg/s.
 pub const RATE_LSB: f64 = 60e-6;
-/// The last bit of an increment, deg.
+/// LSB of an increment, deg.
 pub const INCREMENT_LSB: f64 = 6e-6;
-/// The last bit of an integrated angle, deg: 360 / 2^23.
+/// LSB of an integrated angle, deg: 360 / 2^23.
 pub const ANGLE_LSB: f64 = 360.0 / (1 << 23) as f64;
-/// The phase is accepted after this many good words in a row.
+/// Number of good words in a row after which a phase is accepted.
 pub const LOCK: u8 = 4;
 
 const VALID: u32 = 1 << 31;
 const PARITY: u32 = 1 << 26;
 const VALUE_MASK: u32 = PARITY - 1;
 
-/// Holds the content of a word.
+/// The content of a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Word {
-    /// Says whether the part marks the value as valid.
+    /// Whether the gyro marks the value as valid.
     pub valid: bool,
     /// Sync bits, 0 to 3.
     pub sync: u8,
-    /// The meaning of the value.
+    /// Kind of the value.
     pub mode: Mode,
-    /// Value of 26 bits, two's complement. For [`Mode::Integrated`] it is turns and angle together: the bits above 22
-    /// count turns, so it is an angle that wraps after eight turns.
+    /// Value of 26 bits, two's complement. For [`Mode::Integrated`] it is an angle that wraps after eight turns: the
+    /// bits above 22 count turns.
     pub value: i32,
 }
 
@@ -60,7 +60,7 @@ pub enum WordError {
         word: u32,
     },
     /// The word has type 3, which does not exist.
-    #[error("DSP-3000: word {word:08x} is of no known type")]
+    #[error("DSP-3000: word {word:08x} has an unknown type")]
     Type {
         /// The word.
         word: u32,
@@ -68,7 +68,7 @@ pub enum WordError {
 }
 
 impl Word {
-    /// Reads a word.
+    /// Parses a word.
     ///
     /// # Errors
     /// [`WordError`].
@@ -87,7 +87,7 @@ impl Word {
         Ok(Self { valid: word & VALID != 0, sync: (word >> 29 & 3) as u8, mode, value })
     }
 
-    /// Encodes the word's bytes. The low 26 bits of the value are sent.
+    /// Encodes the word; of the value, only the low 26 bits are sent.
     #[must_use]
     pub const fn emit(&self) -> [u8; 4] {
         let mode = match self.mode {
@@ -101,14 +101,14 @@ impl Word {
         (word | parity).to_be_bytes()
     }
 
-    /// Makes the sample of a rate or increment that arrived at `now` and covers `span` microseconds. `None` for an
-    /// integrated angle: set the part to increments instead.
+    /// Creates the sample of a rate or increment that arrived at `now` and covers `span` microseconds. `None` for an
+    /// integrated angle: set the gyro to increments instead.
     #[must_use]
     pub fn sample(&self, now: Micros, span: u32) -> Option<FogSample> {
         super::sample(self.mode, self.degrees() as f32, self.valid, now, span)
     }
 
-    /// Returns the rate in deg/s, or the increment or angle in deg; an angle contains its turns.
+    /// Returns the rate in deg/s, or the increment or angle in deg; an angle includes whole turns.
     #[must_use]
     pub fn degrees(&self) -> f64 {
         let lsb = match self.mode {
@@ -120,26 +120,26 @@ impl Word {
     }
 }
 
-/// Assembles words from bytes and parses them.
+/// The parser: assembles words from bytes and parses them.
 #[derive(Debug, Clone)]
 pub struct Dsp3000Binary {
     mode: Mode,
     sync: u8,
     bytes: Vec<u8, 4>,
-    /// Good words in a row.
+    /// Number of good words in a row, at most [`LOCK`].
     good: u8,
-    /// Times that the phase was lost.
+    /// Number of times that the phase was lost.
     losses: u32,
 }
 
 impl Dsp3000Binary {
-    /// Makes a parser for a part that is set to send this type with these sync bits.
+    /// Creates a parser for a gyro that sends this type with these sync bits.
     #[must_use]
     pub const fn new(mode: Mode, sync: u8) -> Self {
         Self { mode, sync: sync & 3, bytes: Vec::new(), good: 0, losses: 0 }
     }
 
-    /// Takes one byte; returns a word if it completes a good one in an accepted phase.
+    /// Processes one byte; returns a word if the byte completes a good one in an accepted phase.
     pub fn receive(&mut self, byte: u8) -> Option<Word> {
         // At most three bytes are kept between calls.
         let _ = self.bytes.push(byte);
@@ -159,8 +159,8 @@ impl Dsp3000Binary {
         }
     }
 
-    /// Drops the word under way, because the line has been silent for longer than a few bytes take (more than 0.3
-    /// ms); the next byte begins a word.
+    /// Drops an incomplete word; the next byte begins a word. Call it when the line has been silent for more than
+    /// 0.3 ms, longer than a few bytes take.
     pub fn pause(&mut self) {
         if !self.bytes.is_empty() {
             self.losses = self.losses.saturating_add(u32::from(self.good == LOCK));
@@ -169,7 +169,7 @@ impl Dsp3000Binary {
         }
     }
 
-    /// Returns the number of times that an accepted phase turned out wrong.
+    /// Returns the number of times that an accepted phase was lost.
     #[must_use]
     pub fn losses(&self) -> u32 {
         self.losses

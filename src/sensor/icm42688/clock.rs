@@ -1,21 +1,21 @@
-//! This module turns the ICM-42688-P's 16-bit time stamps into microseconds that never wrap.
+//! This module converts the ICM-42688-P's 16-bit time stamps to microseconds that never wrap.
 //!
-//! Without a clock on CLKIN the part counts in units of 32/30 us, though TMST_RES says 1 us (DS-000347, 12.7): the 10
-//! ms between two samples at 100 Hz read as 9,375 counts. The counts are summed unscaled, and the sum is scaled by
-//! 16/15. A time is thus within half a microsecond of the exact one however long the part has run, and a difference of
-//! two times within one microsecond.
+//! Without a clock on CLKIN the sensor counts in units of 32/30 us, although TMST_RES is 1 us (DS-000347, 12.7): the
+//! 10 ms between two samples at 100 Hz are 9,375 counts. The counts are summed unscaled, and the sum is scaled by
+//! 16/15. A time is thus within half a microsecond of the exact one, however long the sensor has run, and a
+//! difference of two times within one microsecond.
 //!
-//! The counter wraps every 65,536 counts, 69.9 ms: a time is right as long as two samples are less
-//! than that apart. A longer silence shows in the arrival times ([`crate::align`]).
+//! The counter wraps every 65,536 counts, 69.9 ms: a time is correct only if successive samples are less
+//! than that apart. A longer gap is detected by the arrival times ([`crate::align`]).
 
 use crate::units::Micros;
 
-/// `COUNTS` counts are this many microseconds: 32/30 us each.
+/// Microseconds in `COUNTS` counts of 32/30 us.
 const MICROS: u64 = 16;
-/// `MICROS` microseconds are this many counts.
+/// Counts in `MICROS` microseconds.
 const COUNTS: u64 = 15;
 
-/// Sums the part's counts.
+/// The sum of the sensor's counts.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Clock {
     last: Option<u16>,
@@ -23,12 +23,12 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// Takes a packet's time stamp, counts modulo 2^16, and returns its time.
+    /// Adds a packet's time stamp, in counts modulo 2^16, and returns its time.
     pub(super) fn unwrap(&mut self, stamp: u16) -> Micros {
         let since = stamp.wrapping_sub(self.last.unwrap_or(0));
         self.counts += u64::from(since);
         self.last = Some(stamp);
-        // The nearest microsecond; 2^60 counts are 39,000 years.
+        // Rounded to the nearest microsecond; the product overflows after 2^60 counts, 39,000 years.
         Micros((self.counts * MICROS + COUNTS / 2) / COUNTS)
     }
 }
@@ -38,20 +38,20 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// Gives the clock stamps taken after so many counts each, and returns their times.
+    /// Passes these counter values to the clock, and returns the times.
     fn times(counts: impl IntoIterator<Item = u64>) -> Vec<u64> {
         let mut clock = Clock::default();
         counts.into_iter().map(|counts| clock.unwrap(counts as u16).0).collect()
     }
 
-    /// Returns the differences of neighbours.
+    /// Returns the differences of successive times.
     fn periods(times: &[u64]) -> Vec<u64> {
         times.windows(2).map(|pair| pair[1] - pair[0]).collect()
     }
 
     #[test]
     fn ten_milliseconds_read_as_ten_milliseconds() {
-        // Eight samples are more than one turn of the counter.
+        // The counter wraps within eight samples.
         let times = times((0..20).map(|n| 500 + n * 9_375));
         assert_eq!(times[0], 533);
         assert_eq!(periods(&times), [10_000; 19]);
@@ -59,7 +59,7 @@ mod tests {
 
     #[test]
     fn one_millisecond_reads_as_one_millisecond() {
-        // The part counts 937 or 938 of its units, for 937.5 are 1 ms.
+        // The sensor counts 937 or 938 units, because 1 ms is 937.5.
         let times = times((0..1_000).map(|n| n * 9_375 / 10));
         assert!(times.iter().enumerate().all(|(n, time)| time.abs_diff(n as u64 * 1_000) <= 1));
     }

@@ -1,9 +1,9 @@
-//! This module turns the configuration of an ICM-42688-P into register values.
+//! This module converts the configuration of an ICM-42688-P to register values.
 //!
-//! The part's filters run at 400 Hz where the output rate is lower, and every fourth value is output at 100 Hz
-//! (DS-000347, 5.5): whatever the last filter passes above 50 Hz folds back, and vibration near 100 Hz looks like a
-//! turn. After a reset that filter has a bandwidth of 92.3 Hz. The driver sets its third order, and by default
-//! [`Bandwidth::Sixteenth`]. At 100 Hz:
+//! The sensor's filters run at 400 Hz or more, and at an output rate of 100 Hz every fourth value is output
+//! (DS-000347, 5.5). What the last filter passes above 50 Hz is therefore aliased, and vibration near 100 Hz appears
+//! as rotation. After a reset that filter has a bandwidth of 92.3 Hz. The driver selects its third order, and by
+//! default [`Bandwidth::Sixteenth`]. At 100 Hz:
 //!
 //! | bandwidth | code | -3 dB, Hz | group delay, ms | at 50 Hz, dB | at 100 Hz, dB |
 //! |---|---|---|---|---|---|
@@ -13,24 +13,24 @@
 //! | [`Bandwidth::Twentieth`] | 6 | 18.7 | 20.4 | -25.6 | -43.7 |
 //! | [`Bandwidth::Fortieth`] | 7 | 10.1 | 35.2 | -41.7 | -59.7 |
 //!
-//! Bandwidth and group delay are the data sheet's (tables of 5.5). It gives no attenuation: the last two columns are
-//! those of a Butterworth filter of that order and bandwidth. Vibration that would fold at 400 Hz first passes the
-//! anti-alias filter (258 Hz) and the filter of the decimation (104.8 Hz).
+//! Bandwidth and group delay are from the data sheet (tables of 5.5). It gives no attenuation: the last two columns
+//! are those of a Butterworth filter of that order and bandwidth. Vibration that would be aliased at 400 Hz first
+//! passes the anti-alias filter (258 Hz) and the decimation filter (104.8 Hz).
 //!
-//! A mean of ten samples at 1 kHz would be late by 4.5 ms only and have its zeros where it folds, for ten times the
-//! traffic on SPI and a decimator in the driver. It is not needed: the filter leaves 1.4 % at 100 Hz.
+//! A mean of ten samples at 1 kHz would have a delay of only 4.5 ms and zeros at the frequencies that are aliased,
+//! but would need ten times the SPI traffic and a decimator in the driver. At 100 Hz our filter leaves only 1.4 %.
 
 use super::packet::Resolution;
 use super::registers::{self as reg, Register, Setting, aaf_258_hz};
 
-/// Gives the samples per second.
+/// The output rate of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum OutputRate {
-    /// The part delivers 100 samples per second.
+    /// 100 samples per second.
     #[default]
     Hz100,
-    /// The part delivers 1000 samples per second.
+    /// 1000 samples per second.
     Hz1000,
 }
 
@@ -44,8 +44,8 @@ impl OutputRate {
     }
 }
 
-/// Sets the -3 dB point of both sensors' last filter, as a share of the rate at which it runs: the output rate, but at
-/// least 400 Hz. The wider settings of the part are left out, because with them vibration folds back at 100 Hz.
+/// The -3 dB point of the last filter of gyro and accelerometer, as a fraction of the filter's rate: the output rate,
+/// but at least 400 Hz. Wider settings are not offered, because with them vibration is aliased at 100 Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Bandwidth {
@@ -72,21 +72,21 @@ impl Bandwidth {
     }
 }
 
-/// Holds the settings of the part.
+/// The settings of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Icm42688Config {
     /// Samples per second.
     pub rate: OutputRate,
-    /// The last filter's bandwidth.
+    /// Bandwidth of the last filter.
     pub bandwidth: Bandwidth,
-    /// The resolution of the FIFO's packets.
+    /// Resolution of the FIFO packets.
     pub resolution: Resolution,
 }
 
 impl Icm42688Config {
-    /// Returns the values that the registers must hold, in the order in which they are written: filters and ranges
-    /// before the sensors are switched on.
+    /// Returns the register values in the order in which they are written: filters and ranges
+    /// before gyro and accelerometer are switched on.
     #[must_use]
     pub const fn settings(&self) -> [Setting; SETTINGS] {
         const fn set(register: Register, mask: u8, value: u8) -> Setting {
@@ -120,5 +120,5 @@ impl Icm42688Config {
     }
 }
 
-/// This many registers are set, and checked in turn.
+/// Number of registers that are set, and checked one after the other.
 pub const SETTINGS: usize = 17;

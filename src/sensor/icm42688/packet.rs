@@ -8,8 +8,8 @@
 //! | 13 | i8 temperature, t / 2.07 + 25 deg C | i16 temperature, t / 132.48 + 25 deg C |
 //! | end | u16 time, 32/30 us | u16 time, 32/30 us, then bits 3-0 for x, y, z: acceleration high, rate low nibble |
 //!
-//! Bit 7 of the header means that the FIFO was empty. The most negative value (-524288 of 20 bits) marks an absent
-//! reading. There is no checksum: a bit flipped on the bus gives a wrong reading, except in the header.
+//! Bit 7 of the header means that the FIFO was empty. The most negative value (-524288 for 20 bits) marks a missing
+//! reading. There is no checksum: a bit error on the bus gives a wrong reading, unless it is in the header.
 
 use heapless::Vec;
 
@@ -18,24 +18,24 @@ pub const MAX_PACKET: usize = 20;
 const EMPTY: u8 = 0x80;
 const HEADER_16: u8 = 0x68;
 const HEADER_20: u8 = 0x78;
-/// These bits of the header tell the content; the two below say that a rate has changed.
+/// Header bits that identify the content; the two bits below signal a changed output rate.
 const CONTENT: u8 = 0xFC;
 const NO_READING_16: i32 = -32_768;
 const NO_READING_20: i32 = -524_288;
 
-/// Selects the packet, and so the resolution of its readings.
+/// The kind of packet, which determines the resolution of its readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Resolution {
-    /// Packet 3 has 16 bits for a reading, over the range that is set.
+    /// Packet 3: 16 bits per reading, over the configured range.
     Bits16,
-    /// Packet 4 has 20 bits for a reading, always over the largest range.
+    /// Packet 4: 20 bits per reading, always over the largest range.
     #[default]
     Bits20,
 }
 
 impl Resolution {
-    /// Returns the number of bytes of a packet.
+    /// Returns the length of a packet, bytes.
     #[must_use]
     pub const fn bytes(self) -> usize {
         match self {
@@ -50,30 +50,30 @@ impl Resolution {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum PacketError {
-    /// The number of bytes is not that of the packet.
+    /// The number of bytes is not the length of a packet.
     #[error("ICM-42688: {got} bytes for a packet of {expected}")]
     Length {
-        /// Bytes given.
+        /// Number of bytes given.
         got: usize,
-        /// Bytes of the packet.
+        /// Length of the packet.
         expected: usize,
     },
     /// The FIFO was empty.
     #[error("ICM-42688: the FIFO was empty")]
     Empty,
-    /// The header announces other content than was set: the packets are out of step, or a setting is lost.
-    #[error("ICM-42688: header {got:02x} is not what was set")]
+    /// The header is not that of the configured packet: reading is out of step, or a setting is lost.
+    #[error("ICM-42688: header {got:02x} is not that of the configured packet")]
     Header {
         /// The header.
         got: u8,
     },
 }
 
-/// Holds a packet's readings in the part's own counts; `None` is an absent one.
+/// The readings of a packet in raw counts; `None` is a missing reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Packet {
-    /// The kind of packet.
+    /// Kind of packet.
     pub resolution: Resolution,
     /// Acceleration x, y, z, 16 or 20 bits.
     pub acceleration: [Option<i32>; 3],
@@ -81,12 +81,12 @@ pub struct Packet {
     pub rate: [Option<i32>; 3],
     /// Temperature, 8 or 16 bits.
     pub temperature: Option<i16>,
-    /// The part's time stamp, counts of 32/30 us modulo 2^16.
+    /// Time stamp, counts of 32/30 us modulo 2^16.
     pub time: u16,
 }
 
 impl Packet {
-    /// Reads a packet.
+    /// Parses a packet.
     ///
     /// # Errors
     /// [`PacketError`].
@@ -128,7 +128,7 @@ impl Packet {
         })
     }
 
-    /// Encodes the packet's bytes, with the bits that each reading has there.
+    /// Encodes the packet; each reading is truncated to the bits of its field.
     #[must_use]
     pub fn emit(&self) -> Vec<u8, MAX_PACKET> {
         let mut bytes = Vec::new();

@@ -1,6 +1,6 @@
-//! The driver uses these registers of the ICM-42688-P, and writes these values to them.
+//! These are the registers of the ICM-42688-P that the driver uses, and the values that it writes.
 
-/// Names a register by its bank and its address there.
+/// A register: its bank and its address in the bank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Register {
@@ -10,15 +10,15 @@ pub struct Register {
     pub address: u8,
 }
 
-/// Gives the content that a register of the configuration must have.
+/// The value that a register of the configuration must hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Setting {
-    /// The register.
+    /// Register to write.
     pub register: Register,
-    /// The bits that are written; the others stay as they are after a reset.
+    /// Bits that are written; the other bits keep their reset values.
     pub mask: u8,
-    /// The value of these bits.
+    /// Value of these bits.
     pub value: u8,
 }
 
@@ -29,11 +29,11 @@ const fn bank0(address: u8) -> Register {
 /// Bit 7 of an address marks a read.
 pub const READ: u8 = 0x80;
 
-/// Bit 0 resets the part.
+/// Bit 0 resets the sensor.
 pub const DEVICE_CONFIG: Register = bank0(0x11);
 /// Sets how the FIFO treats an overflow.
 pub const FIFO_CONFIG: Register = bank0(0x16);
-/// Holds the number of bytes in the FIFO, high byte; the low one follows.
+/// Holds the high byte of the number of bytes in the FIFO; the low byte follows.
 pub const FIFO_COUNTH: Register = bank0(0x2E);
 /// Reads from the front of the FIFO.
 pub const FIFO_DATA: Register = bank0(0x30);
@@ -55,7 +55,7 @@ pub const GYRO_CONFIG1: Register = bank0(0x51);
 pub const GYRO_ACCEL_CONFIG0: Register = bank0(0x52);
 /// Sets the order of the accelerometer's last filter.
 pub const ACCEL_CONFIG1: Register = bank0(0x53);
-/// Selects the data that go into the FIFO.
+/// Selects the data in the FIFO packets.
 pub const FIFO_CONFIG1: Register = bank0(0x5F);
 /// Reads as [`IDENTITY`].
 pub const WHO_AM_I: Register = bank0(0x75);
@@ -76,9 +76,9 @@ pub const ACCEL_CONFIG_STATIC3: Register = Register { bank: 2, address: 0x04 };
 /// Holds BITSHIFT and the high bits of DELTSQR of the accelerometer's anti-alias filter.
 pub const ACCEL_CONFIG_STATIC4: Register = Register { bank: 2, address: 0x05 };
 
-/// The content that [`WHO_AM_I`] must have.
+/// Value of [`WHO_AM_I`].
 pub const IDENTITY: u8 = 0x47;
-/// Written to [`DEVICE_CONFIG`], resets the part.
+/// Written to [`DEVICE_CONFIG`], resets the sensor.
 pub const RESET: u8 = 0x01;
 /// Written to [`SIGNAL_PATH_RESET`], empties the FIFO.
 pub const FIFO_FLUSH: u8 = 0x02;
@@ -87,12 +87,12 @@ pub const FIFO_STREAM: u8 = 0x40;
 /// Written to [`INTF_CONFIG0`], selects a count in bytes and big-endian order, as after a reset.
 pub const BIG_ENDIAN: u8 = 0x30;
 /// Written to [`INTF_CONFIG1`], switches AFSR off (bits 7-6 = 01). With AFSR on, the gyro repeats samples for a
-/// millisecond or two above some 100 deg/s.
+/// millisecond or two above about 100 deg/s.
 pub const AFSR_OFF: u8 = 0x40;
 /// Written to [`PWR_MGMT0`], switches gyro and accelerometer on in low-noise mode.
 pub const LOW_NOISE: u8 = 0x0F;
-/// Written to [`GYRO_CONFIG0`], sets the range of 250 deg/s. A car turns at less than 100 deg/s, and finer steps are
-/// worth more than range.
+/// Written to [`GYRO_CONFIG0`], sets the range of 250 deg/s. A car turns at less than 100 deg/s, so resolution
+/// matters more than range.
 pub const GYRO_250_DPS: u8 = 3 << 5;
 /// Written to [`ACCEL_CONFIG0`], sets the range of 16 g.
 pub const ACCEL_16_G: u8 = 0 << 5;
@@ -102,15 +102,15 @@ pub const GYRO_THIRD_ORDER: u8 = 2 << 2;
 pub const ACCEL_THIRD_ORDER: u8 = 2 << 3;
 /// Written to [`FIFO_CONFIG1`], puts temperature, gyro and accelerometer into the FIFO.
 pub const FIFO_16_BIT: u8 = 0x07;
-/// Written to [`FIFO_CONFIG1`], does the same with readings of 20 bits.
+/// Written to [`FIFO_CONFIG1`], puts the same values into the FIFO with readings of 20 bits.
 pub const FIFO_20_BIT: u8 = 0x17;
 
-/// These three numbers set the anti-alias filter to 258 Hz; they are from the data sheet's table of bandwidths.
+/// Settings of the anti-alias filter for 258 Hz, from the data sheet's table of bandwidths.
 pub mod aaf_258_hz {
-    /// The value for [`super::GYRO_CONFIG_STATIC3`].
+    /// Value for [`super::GYRO_CONFIG_STATIC3`].
     pub const DELT: u8 = 6;
-    /// The square of `DELT`, for the two registers behind.
+    /// Square of `DELT`, for the next two registers.
     pub const DELTSQR: u16 = 36;
-    /// The value for the high nibble of [`super::GYRO_CONFIG_STATIC5`].
+    /// Value for the high nibble of [`super::GYRO_CONFIG_STATIC5`].
     pub const BITSHIFT: u8 = 10;
 }

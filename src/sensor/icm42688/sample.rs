@@ -5,24 +5,24 @@ use crate::sample::{ImuSample, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, STANDARD_GRAVITY, SpecificForce};
 
 impl Resolution {
-    /// Returns the counts per deg/s, at the range that the driver sets.
+    /// Returns the counts per deg/s in the range that the driver sets.
     #[must_use]
     pub const fn counts_per_dps(self) -> f32 {
         match self {
-            // At 250 deg/s eight times the 16.4 counts per deg/s that there are at 2000.
+            // The range is 250 deg/s: eight times the 16.4 counts per deg/s of the range of 2000 deg/s.
             Self::Bits16 => 131.0,
-            // The lowest bit is always 0: halved, readings have 131 counts per deg/s.
+            // Twice 131, because the lowest bit is always 0.
             Self::Bits20 => 262.0,
         }
     }
 
-    /// Returns the counts per g, at the range that the driver sets.
+    /// Returns the counts per g in the range that the driver sets.
     #[must_use]
     pub const fn counts_per_g(self) -> f32 {
         match self {
             // The range is 16 g.
             Self::Bits16 => 2048.0,
-            // The lowest two bits are always 0: quartered, readings have 8192 counts per g.
+            // Four times 8192, because the lowest two bits are always 0.
             Self::Bits20 => 32_768.0,
         }
     }
@@ -63,12 +63,12 @@ impl Packet {
     }
 }
 
-/// Returns whether a reading is an end of the range. With FIFO_HOLD_LAST_DATA_EN = 0, as after a reset, the lowest
-/// reading is -32,766 of 16 bits and -524,256 of 20, because those below mark an absent reading (DS-000347, 12.8).
+/// Returns whether a reading is at an end of the range. With FIFO_HOLD_LAST_DATA_EN = 0, as after a reset, the lowest
+/// reading is -32,766 for 16 bits and -524,256 for 20, because lower codes mark a missing reading (DS-000347, 12.8).
 const fn clipped(resolution: Resolution, reading: i32) -> bool {
     match resolution {
         Resolution::Bits16 => reading <= -32_766 || reading >= 32_767,
-        // The lowest of 20 bits is always 0 in a rate, and the lowest two in an acceleration.
+        // Of 20 bits, the lowest is always 0 in a rate, and the lowest two in an acceleration.
         Resolution::Bits20 => reading <= -524_256 || reading >= 524_284,
     }
 }

@@ -1,17 +1,17 @@
 //! This dialogue configures an MTi to send what the pipeline needs.
 //!
-//! It sends GoToConfig, SetOutputConfiguration and GoToMeasurement; the part answers each with its identifier plus one.
-//! The rules:
-//! - A message without an answer for [`TIMEOUT`] is sent again, [`ATTEMPTS`] times in all.
+//! It sends GoToConfig, SetOutputConfiguration and GoToMeasurement; the sensor answers each with its identifier plus
+//! one. The rules:
+//! - A message without an answer within [`TIMEOUT`] is sent again, up to [`ATTEMPTS`] times in total.
 //! - An error frame counts as an attempt, and the message is sent again at once.
-//! - The part may set other outputs than asked for, and says so in its acknowledgement: an
+//! - The sensor may set outputs other than those requested, and reports them in its acknowledgement. An
 //!   acceleration or rate of turn at another rate ends the dialogue.
-//! - A part that wakes up (MID 3E) is answered within 500 ms if the caller polls that often; it
-//!   is in configuration mode then. The dialogue gives up a part that keeps restarting, as it
-//!   does one that does not answer.
-//! - Measurements that still come in are skipped.
+//! - A sensor that wakes up (MID 3E) must be answered within 500 ms, so poll at least that often; it
+//!   is then in configuration mode. The dialogue fails if a sensor keeps restarting, as it
+//!   does if a sensor does not answer.
+//! - Measurements that still arrive are skipped.
 //!
-//! The dialogue needs no port and no clock: bytes and the time come in, frames to send come out.
+//! The dialogue does no I/O and has no clock: bytes and the time are inputs, frames to send are outputs.
 
 pub use super::setup::{OUTPUTS, Output, Step, mid};
 pub use crate::sensor::serial::Action;
@@ -22,11 +22,11 @@ use crate::sensor::framer::Framer;
 use crate::sensor::serial;
 use crate::units::{Duration, Micros};
 
-/// An answer may take this long.
+/// Longest wait for an answer.
 pub const TIMEOUT: Duration = Duration::from_millis(500);
-/// A message is sent this many times before the dialogue gives up.
+/// Number of times that a message is sent before the dialogue fails.
 pub const ATTEMPTS: u8 = 3;
-/// The reason why the dialogue has failed to configure the part.
+/// The reason why the dialogue has failed to configure the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -34,52 +34,52 @@ pub enum DialogueError {
     /// No attempt was answered.
     #[error("MTi: no answer to {step:?} after {ATTEMPTS} attempts")]
     Silent {
-        /// The step that was not answered.
+        /// Step that was not answered.
         step: Step,
     },
-    /// The last attempt was answered by an error frame.
-    #[error("MTi: {step:?} is refused with error {code}")]
+    /// The last attempt was answered with an error frame.
+    #[error("MTi: {step:?} was refused with error {code}")]
     Refused {
-        /// The step that was refused.
+        /// Step that was refused.
         step: Step,
-        /// The part's error code.
+        /// Error code of the sensor.
         code: u8,
     },
-    /// The part has woken up more than [`ATTEMPTS`] times: its supply fails, or it resets itself.
+    /// The sensor has restarted more than [`ATTEMPTS`] times: its supply is unstable, or it resets itself.
     #[error("MTi: restarted more than {ATTEMPTS} times")]
     Restarts,
-    /// The part has set a different rate from the one requested, or left the output out (rate 0).
+    /// The sensor has set a rate other than the requested one, or has omitted the output (rate 0).
     #[error("MTi: output {id:04x} is set to {rate} Hz")]
     Output {
         /// Data identifier.
         id: u16,
-        /// The rate that the part has set, Hz.
+        /// Rate that the sensor has set, Hz.
         rate: u16,
     },
 }
 
-/// Holds the step of the dialogue and how far it is.
+/// The current step of the dialogue and its progress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
-    /// The message of this step is to be sent.
+    /// The message of this step must be sent.
     Due(Step),
-    /// The message was sent, and its answer is due by this time.
+    /// The message was sent; the answer is due by this time.
     Sent(Step, Micros),
     Done,
     Failed(DialogueError),
 }
 
-/// Holds the state of the dialogue with one part.
+/// The dialogue with one sensor.
 #[derive(Debug, Clone)]
 pub struct Dialogue {
     framer: Framer<Xbus, MAX_FRAME>,
     state: State,
-    /// Attempts at the current step.
+    /// Number of attempts at the current step.
     attempts: u8,
     last_error: Option<u8>,
-    /// The part has woken up and waits for the answer.
+    /// Whether the sensor has woken up and waits for the acknowledgement.
     woken: bool,
-    /// Times that the part has woken up.
+    /// Number of times that the sensor has woken up.
     starts: u8,
 }
 
@@ -90,14 +90,14 @@ impl Default for Dialogue {
 }
 
 impl Dialogue {
-    /// Begins before the first message is sent.
+    /// Creates a dialogue that has sent nothing.
     #[must_use]
     pub const fn new() -> Self {
         let state = State::Due(Step::GoToConfig);
         Self { framer: Framer::new(), state, attempts: 0, last_error: None, woken: false, starts: 0 }
     }
 
-    /// Takes one byte from the part.
+    /// Processes one byte from the sensor.
     pub fn receive(&mut self, byte: u8) {
         self.framer.receive(byte);
         while let Some((mid, reply)) = self.framer.next_frame().and_then(xbus::parse).map(Reply::new) {
@@ -108,7 +108,7 @@ impl Dialogue {
     /// Returns the next action at `now`.
     ///
     /// # Errors
-    /// [`DialogueError`], which is returned at each later call too: the dialogue is over.
+    /// [`DialogueError`]; every later call returns the same error.
     pub fn poll(&mut self, now: Micros) -> Result<Action, DialogueError> {
         if core::mem::take(&mut self.woken) {
             return Ok(Action::Send(xbus::emit(mid::WAKE_UP_ACK, &[]).unwrap_or_default()));
@@ -184,11 +184,11 @@ impl serial::Dialogue for Dialogue {
     }
 }
 
-/// Holds the relevant part of a frame's data, whatever its message is.
+/// The relevant data of a received frame, for any message.
 struct Reply {
-    /// The code of an error frame.
+    /// Code of an error frame.
     code: u8,
-    /// The first required output whose rate differs from the request.
+    /// First required output whose rate differs from the request.
     different: Option<Output>,
 }
 

@@ -1,31 +1,31 @@
 //! MTData2 (MID 36) consists of packets `ID ID LEN DATA..`, big-endian. The low nibble of an ID gives precision and
-//! coordinate system. The coordinate system concerns orientations; the readings used here are in the axes of the part.
+//! coordinate system. The coordinate system affects only orientations; the readings used here are in sensor axes.
 
 use super::precision::Precision;
 use super::xbus;
 use crate::units::RangeError;
 use heapless::Vec;
 
-/// MTData2 has this message identifier.
+/// Message identifier of MTData2.
 pub const MID_MT_DATA2: u8 = 0x36;
-/// Length of the longest frame that [`MtData2::emit_as`] makes, bytes.
+/// Length of the longest frame that [`MtData2::emit_as`] returns, bytes.
 pub const MAX_EMITTED: usize = 96;
 
-/// These are the data identifiers, with precision and coordinate system masked out.
+/// The data identifiers, without precision and coordinate system.
 pub mod id {
-    /// Selects an identifier without precision and coordinate system.
+    /// Mask that removes precision and coordinate system.
     pub const MASK: u16 = 0xFFF0;
-    /// Counts messages: u16, wraps.
+    /// Message counter: u16, wraps.
     pub const PACKET_COUNTER: u16 = 0x1020;
-    /// Holds the part's time: u32, 10 kHz ticks, wraps.
+    /// Time of the sensor: u32, 10 kHz ticks, wraps.
     pub const SAMPLE_TIME_FINE: u16 = 0x1060;
-    /// Holds the temperature, deg C.
+    /// Temperature, deg C.
     pub const TEMPERATURE: u16 = 0x0810;
-    /// Holds the specific force x, y, z, m/s^2.
+    /// Specific force x, y, z, m/s^2.
     pub const ACCELERATION: u16 = 0x4020;
-    /// Holds the angular rate x, y, z, rad/s.
+    /// Angular rate x, y, z, rad/s.
     pub const RATE_OF_TURN: u16 = 0x8020;
-    /// Holds the status of self-test, filter and clipping: u32.
+    /// Status of self-test, filter and clipping: u32.
     pub const STATUS_WORD: u16 = 0xE020;
 }
 
@@ -40,8 +40,8 @@ pub enum XsensError {
         /// Identifier of the packet.
         id: u16,
     },
-    /// A packet that is used does not have the length of its precision.
-    #[error("MTData2: packet {id:04x} is not as long as its precision asks for")]
+    /// A packet that is used does not have the length of its format.
+    #[error("MTData2: packet {id:04x} does not have the length of its precision")]
     Format {
         /// Identifier of the packet.
         id: u16,
@@ -52,17 +52,17 @@ pub enum XsensError {
         /// Identifier of the packet.
         id: u16,
     },
-    /// A reading is beyond what a part of this kind can measure.
+    /// A reading is out of range.
     #[error("MTData2: packet {id:04x}: {error}")]
     Reading {
         /// Identifier of the packet.
         id: u16,
-        /// The error of the reading.
+        /// Error of the reading.
         error: RangeError,
     },
 }
 
-/// Holds the used content of an MTData2 message.
+/// The content of an MTData2 message, as far as it is used.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MtData2 {
     /// Message counter, wraps.
@@ -80,7 +80,7 @@ pub struct MtData2 {
 }
 
 impl MtData2 {
-    /// Reads the packets of a message; unknown ones are skipped.
+    /// Parses the packets of a message; unknown packets are skipped.
     ///
     /// # Errors
     /// [`XsensError::Truncated`] and [`XsensError::Format`].
@@ -109,14 +109,14 @@ impl MtData2 {
         if data.is_empty() { Ok(message) } else { Err(XsensError::Truncated { id: 0 }) }
     }
 
-    /// Encodes the whole frame of this message in single precision, without absent packets.
+    /// Encodes the whole frame in single precision; fields that are `None` are omitted.
     #[must_use]
     pub fn emit(&self) -> Vec<u8, 72> {
         // 72 bytes hold all six packets.
         xbus::emit(MID_MT_DATA2, &self.data(Precision::Single)).unwrap_or_default()
     }
 
-    /// Encodes the whole frame with its numbers in another precision.
+    /// Encodes the whole frame with its numbers in the given precision.
     #[must_use]
     pub fn emit_as(&self, precision: Precision) -> Vec<u8, MAX_EMITTED> {
         xbus::emit(MID_MT_DATA2, &self.data(precision)).unwrap_or_default()
@@ -125,7 +125,7 @@ impl MtData2 {
     /// Encodes all packets that are present.
     fn data(&self, precision: Precision) -> Vec<u8, MAX_EMITTED> {
         let mut data = Vec::new();
-        // MAX_EMITTED bytes hold all six packets in double precision, the longest.
+        // MAX_EMITTED bytes hold all six packets in the longest precision, double.
         let mut packet = |id: u16, bytes: &[u8]| {
             let _ = data.extend_from_slice(&id.to_be_bytes());
             let _ = data.push(bytes.len() as u8);

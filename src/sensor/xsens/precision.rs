@@ -1,8 +1,8 @@
-//! A number in MTData2 has one of four forms, which bits 0 and 1 of the data identifier distinguish.
+//! A number in MTData2 has one of four formats, selected by bits 0 and 1 of the data identifier.
 
 use heapless::Vec;
 
-/// Names the encoding of a number, big-endian.
+/// The format of a number; all are big-endian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Precision {
@@ -10,14 +10,14 @@ pub enum Precision {
     Single,
     /// i32 with 20 bits of fraction.
     Fixed1220,
-    /// 48 bits, 32 of them fraction; the fraction comes first, the integer behind it.
+    /// 48 bits with 32 bits of fraction; the 32 fraction bits are sent before the 16 integer bits.
     Fixed1632,
     /// f64.
     Double,
 }
 
 impl Precision {
-    /// Returns the precision in a data identifier.
+    /// Returns the precision that a data identifier selects.
     #[must_use]
     pub const fn of(id: u16) -> Self {
         match id & 3 {
@@ -28,7 +28,7 @@ impl Precision {
         }
     }
 
-    /// Returns the identifier with this precision in it.
+    /// Returns the data identifier for this precision.
     #[must_use]
     pub const fn mark(self, id: u16) -> u16 {
         id & !3
@@ -40,7 +40,7 @@ impl Precision {
             }
     }
 
-    /// Returns the number of bytes of a number.
+    /// Returns the length of a number, bytes.
     #[must_use]
     pub const fn bytes(self) -> usize {
         match self {
@@ -50,7 +50,7 @@ impl Precision {
         }
     }
 
-    /// Decodes the number in exactly these bytes; f64 holds every one exactly.
+    /// Decodes a number, exactly; `None` if the length of `bytes` is wrong.
     #[must_use]
     pub fn parse(self, bytes: &[u8]) -> Option<f64> {
         match (self, bytes) {
@@ -68,13 +68,13 @@ impl Precision {
         }
     }
 
-    /// Decodes the number rounded once to f32, without f64 where the form needs none, for a target that computes
-    /// f64 in software.
+    /// Decodes a number and rounds it once to f32. Where possible no f64 arithmetic is used, because some targets
+    /// compute f64 in software.
     #[must_use]
     pub fn parse_f32(self, bytes: &[u8]) -> Option<f32> {
         match (self, bytes) {
             (Self::Single, &[a, b, c, d]) => Some(f32::from_be_bytes([a, b, c, d])),
-            // Conversion rounds; the division by a power of two does not.
+            // The conversion rounds; the division by a power of two is exact.
             (Self::Fixed1220, &[a, b, c, d]) => {
                 Some(i32::from_be_bytes([a, b, c, d]) as f32 / (1 << 20) as f32)
             }
@@ -82,11 +82,11 @@ impl Precision {
         }
     }
 
-    /// Encodes the nearest number; the fixed-point forms clamp to their ends.
+    /// Encodes the nearest number; the fixed-point formats clamp to their range.
     #[must_use]
     pub fn emit(self, value: f64) -> Vec<u8, 8> {
         let mut bytes = Vec::new();
-        // Eight bytes hold each form; a float to integer cast clamps.
+        // Eight bytes hold each format; a cast from float to integer clamps.
         let _ = match self {
             Self::Single => bytes.extend_from_slice(&(value as f32).to_be_bytes()),
             Self::Fixed1220 => {

@@ -1,32 +1,32 @@
-//! These messages configure an MTi to send what the pipeline needs.
+//! These are the messages that configure an MTi to send what the pipeline needs.
 
 use super::mtdata2::id;
 use super::xbus;
 use crate::sensor::serial::MAX_SENT;
 use heapless::Vec;
 
-/// These are the message identifiers; an acknowledgement has the next higher one.
+/// The message identifiers; an acknowledgement has the next higher one.
 pub mod mid {
-    /// Asks for the device identifier.
+    /// Requests the device identifier.
     pub const REQ_DID: u8 = 0x00;
     /// Starts measuring.
     pub const GO_TO_MEASUREMENT: u8 = 0x10;
     /// Stops measuring.
     pub const GO_TO_CONFIG: u8 = 0x30;
-    /// The part has started.
+    /// Reports that the sensor has started.
     pub const WAKE_UP: u8 = 0x3E;
-    /// Answers a wake-up.
+    /// Acknowledges [`WAKE_UP`].
     pub const WAKE_UP_ACK: u8 = 0x3F;
-    /// The part refuses a message; one byte says why.
+    /// Reports that the sensor refused a message; one byte is the error code.
     pub const ERROR: u8 = 0x42;
     /// Sets the outputs and their rates.
     pub const SET_OUTPUT_CONFIGURATION: u8 = 0xC0;
 }
 
-/// Counters and time stamps are sent with every message; this rate stands for that.
+/// Rate code of outputs that are sent with every message, such as counters and time stamps.
 const EVERY_MESSAGE: u16 = 0xFFFF;
 
-/// Describes one output of the part.
+/// One output of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Output {
@@ -36,7 +36,7 @@ pub struct Output {
     pub rate: u16,
 }
 
-/// The pipeline needs these outputs: 100 Hz, all in single precision.
+/// The outputs that the pipeline needs: 100 Hz, all in single precision.
 pub const OUTPUTS: [Output; 6] = [
     Output { id: id::PACKET_COUNTER, rate: EVERY_MESSAGE },
     Output { id: id::SAMPLE_TIME_FINE, rate: EVERY_MESSAGE },
@@ -46,15 +46,15 @@ pub const OUTPUTS: [Output; 6] = [
     Output { id: id::STATUS_WORD, rate: EVERY_MESSAGE },
 ];
 
-/// Names a message of the dialogue.
+/// A step of the dialogue: one message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Step {
-    /// The part stops measuring.
+    /// Stop measuring.
     GoToConfig,
-    /// The part is to send [`OUTPUTS`].
+    /// Set the outputs to [`OUTPUTS`].
     SetOutputConfiguration,
-    /// The part starts measuring.
+    /// Start measuring.
     GoToMeasurement,
 }
 
@@ -67,7 +67,7 @@ impl Step {
         }
     }
 
-    /// Returns the step's frame.
+    /// Encodes the frame of the step.
     #[must_use]
     pub fn emit(self) -> Vec<u8, MAX_SENT> {
         let mut data = Vec::<u8, 24>::new();

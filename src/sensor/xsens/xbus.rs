@@ -5,14 +5,14 @@ use heapless::Vec;
 
 const PREAMBLE: u8 = 0xFA;
 const BUS_ID: u8 = 0xFF;
-/// A LEN of this value announces an extended length, which no message here needs.
+/// Value of LEN that marks an extended length, which no message here needs.
 const EXTENDED_LENGTH: u8 = 0xFF;
-/// Bytes of a frame around its data.
+/// Bytes of a frame in addition to its data.
 const OVERHEAD: usize = 5;
 /// Length of the longest frame, bytes.
 pub const MAX_FRAME: usize = 254 + OVERHEAD;
 
-/// Frames Xbus messages.
+/// The framing of Xbus messages.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Xbus;
 
@@ -42,7 +42,7 @@ pub fn parse(frame: &[u8]) -> Option<(u8, &[u8])> {
     }
 }
 
-/// Encodes the frame of a message. `None` when it is longer than `N` bytes or than an Xbus frame.
+/// Encodes the frame of a message; `None` if it is longer than `N` bytes or than an Xbus frame.
 #[must_use]
 pub fn emit<const N: usize>(mid: u8, data: &[u8]) -> Option<Vec<u8, N>> {
     let len = u8::try_from(data.len()).ok().filter(|len| *len != EXTENDED_LENGTH)?;

@@ -1,4 +1,4 @@
-//! Configuration, calibration and the choice of weights are read at the start and stored on request.
+//! This module reads the stored records at the start, and stores them on request.
 
 use super::{Device, MappedSlots, SupportedHardware};
 use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};
@@ -11,12 +11,12 @@ use crate::store::{
 use embedded_storage::nor_flash::NorFlash;
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
-    /// Reads what is stored; what is not whole or not in its range is not used and noted.
-    /// `writable`: a controller answers; without one what is stored can be read all the same.
+    /// Reads the stored records; records that are damaged or out of range are logged and not used. `writable` is
+    /// whether a flash controller answers; without one, records can still be read.
     pub fn begin(&mut self, records: Option<R>, slots: Option<W>, writable: bool, identity: Identity) {
         self.identity = identity;
         self.writable = writable;
-        // What can only be read is read here; later neither is there to be changed.
+        // Without a flash controller, records are read only here, and nothing is kept for writing.
         self.slots = slots.filter(|_| writable);
         self.note(EventKind::Started(identity.reset));
         if let Some(crash) = identity.crash {
@@ -43,7 +43,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.refused || self.records_damaged()
     }
 
-    /// Returns whether a configuration was stored and none is used: the sensor's axes are then not known.
+    /// Returns whether a stored configuration could not be used; the sensor's axes are then unknown.
     #[must_use]
     pub fn configuration_lost(&self) -> bool {
         match self.configuration_origin {
@@ -55,8 +55,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     fn load(&mut self, mut store: Store<R>) {
         let found = store.get::<Configuration>();
-        let drivable = |found: Configuration| self.drivable(&found).map(|()| found);
-        let found = found.and_then(|found| found.map(drivable).transpose());
+        let supported = |found: Configuration| self.check_supported(&found).map(|()| found);
+        let found = found.and_then(|found| found.map(supported).transpose());
         let (configuration, origin) = self.take(found, EventKind::ConfigurationRefused);
         (self.configuration, self.configuration_origin) =
             (configuration.unwrap_or(Configuration::DEFAULT), origin);
@@ -86,7 +86,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.store = self.writable.then_some(store);
     }
 
-    /// Returns a record that was read, and its origin.
+    /// Returns the record that was read, if valid, and its origin.
     fn take<T>(
         &mut self,
         found: Result<Option<T>, StoreError>,
@@ -102,8 +102,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    fn drivable(&self, configuration: &Configuration) -> Result<(), StoreError> {
-        let SupportedHardware { imus, fogs, bits_per_second } = self.drives;
+    fn check_supported(&self, configuration: &Configuration) -> Result<(), StoreError> {
+        let SupportedHardware { imus, fogs, bits_per_second } = self.supported;
         if !imus.contains(&configuration.imu) || configuration.fog.is_some_and(|fog| !fogs.contains(&fog)) {
             return Err(StoreError::Field(FieldError::PartNotInImage));
         }
@@ -128,9 +128,9 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         if found != expected {
             return Err(Refusal::Version { found, expected });
         }
-        // Where nothing can be stored, a bad value is named all the same.
+        // Check the values first, so that a bad value is reported even if nothing can be stored.
         configuration.check().map_err(StoreError::from)?;
-        self.drivable(configuration)?;
+        self.check_supported(configuration)?;
         self.store()?.set(configuration)?;
         self.next_configuration = *configuration;
         self.note(EventKind::ConfigurationStored);
@@ -189,17 +189,17 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         Ok(())
     }
 
-    /// Returns the troubles as they were stored last.
+    /// Returns the troubles that were read at the start.
     pub(crate) fn troubles(&self) -> &Troubles {
         &self.troubles
     }
 
-    /// Stores what the sensor has shown since it was stored, where that needs no erase and the vehicle stands.
+    /// Stores what was learnt about the sensor, if it has changed, no erase is needed and the vehicle stands.
     #[inline(never)]
-    pub(crate) fn store_what_was_learnt(&mut self) {
+    pub(crate) fn store_learned_if_due(&mut self) {
         let has_room = self.store.as_ref().is_some_and(Store::has_room);
         if self.learner.is_changed && has_room && self.standstill.is_open() {
-            // One that the flash refuses is not tried again and again.
+            // If the flash refuses the record, do not try again each time.
             self.learner.is_changed = false;
             if let Err(Refusal::Store(error)) = self.store_learned() {
                 self.note(EventKind::LearnedRefused(error));
@@ -207,8 +207,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    /// Stores the troubles, which needs an erase now and then: that waits for `may_erase` and standstill. Returns
-    /// whether they are stored, or cannot be.
+    /// Stores the troubles. If an erase is needed, it waits for `may_erase` and standstill. Returns `false` if the
+    /// caller must try again.
     #[inline(never)]
     pub(crate) fn store_troubles(&mut self, troubles: &Troubles, may_erase: bool) -> bool {
         let may_erase = may_erase && self.standstill.is_open();
@@ -216,7 +216,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         if !store.has_room() && !may_erase {
             return false;
         }
-        // One that the flash refuses is not tried again and again.
+        // If the flash refuses the record, do not try again each time.
         if let Err(error) = store.set(troubles) {
             self.note(EventKind::TroublesRefused(error));
         }

@@ -1,5 +1,5 @@
-//! GyroNet runs on one weight file, while another one is written to the slot that is not in use. FoGNet's file has one
-//! place, and FoGNet stops when another one is written there.
+//! This module selects and uploads weight files. A new file for GyroNet is written to the unused slot while GyroNet
+//! runs. FoGNet's file has only one place, so FoGNet stops when a new file is written.
 
 use super::Device;
 use crate::fog::FogNetUse;
@@ -10,20 +10,22 @@ use crate::store::slots::{self, Selection, SlotError, WeightSource, select};
 use crate::store::{Place, Slot, Upload};
 use embedded_storage::nor_flash::NorFlash;
 
-/// The flash of the weight files, which the processor can also read in place. Offsets are those into the whole flash.
+/// The flash of the weight files, which is also memory-mapped for reading. Offsets are from the start of the whole
+/// flash.
 pub trait MappedSlots: NorFlash {
-    /// Returns both slots, each on a word boundary.
+    /// Returns both slots, aligned to words.
     fn slots(&self) -> [&[u8]; 2];
-    /// Returns the place of FoGNet's file, on a word boundary.
+    /// Returns the place of FoGNet's file, aligned to words.
     fn fognet(&self) -> &[u8];
 
-    /// Checks a file: a tenth of a second, for which a board may have to lengthen its watchdog.
+    /// Runs the check of a file, which takes a tenth of a second. A board may override this to extend its watchdog
+    /// timeout.
     fn check<T>(&self, work: impl FnOnce() -> T) -> T {
         work()
     }
 }
 
-/// An upload, and its file's checksum once checked.
+/// An upload in progress, and the checksum of its file once checked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Uploading {
     pub(super) upload: Upload,
@@ -31,7 +33,7 @@ pub(super) struct Uploading {
 }
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
-    /// Selects the weights to run on from `slots` as the processor reads them, the image's own last.
+    /// Selects the weights to run from `slots`, as the processor reads them, else from the image itself.
     pub fn weights<'w>(&mut self, slots: Option<[&'w [u8]; 2]>, built_in: &'w [u8]) -> Option<Blob<'w>> {
         let Selection { weights, source, refused } =
             select(&self.accepted, slots.unwrap_or_default(), built_in);
@@ -49,8 +51,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         weights
     }
 
-    /// Selects FoGNet's weights from its place as the processor reads it; `None` where FoGNet is off, or the file is
-    /// refused, which is noted.
+    /// Selects FoGNet's weights from `place`, as the processor reads it. Returns `None` if FoGNet is off, or the file
+    /// is refused, which is logged.
     pub fn fognet<'w>(&mut self, place: &'w [u8]) -> Option<FogBlob<'w>> {
         if self.configuration.fog_lane.fognet == FogNetUse::Off {
             return None;
@@ -63,13 +65,14 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         found.map_err(|error| self.refuse(EventKind::FogNetRefused(error))).ok()
     }
 
-    /// Returns once whether FoGNet's file has been erased or damaged since the start: what runs on it must stop, and
-    /// [`Coprocessor::fognet_gone`](crate::Coprocessor::fognet_gone).
-    pub fn take_fognet_gone(&mut self) -> bool {
-        core::mem::take(&mut self.fognet_gone)
+    /// Returns `true` once after FoGNet's file was erased or found damaged: its use must stop at once. See
+    /// [`Coprocessor::fognet_unavailable`](crate::Coprocessor::fognet_unavailable).
+    pub fn take_fognet_unavailable(&mut self) -> bool {
+        core::mem::take(&mut self.fognet_unavailable)
     }
 
-    /// Notes that FoGNet's file no longer fits its checksum; it is not used until the next start, which checks it again.
+    /// Records that FoGNet's file no longer matches its checksum. The file is not used until the next start, which
+    /// checks it again.
     pub fn fognet_damaged(&mut self) {
         if let Some(Ok(crc)) = self.fognet {
             self.lose_fognet(SlotError::NotAccepted(crc));
@@ -79,10 +82,10 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     fn lose_fognet(&mut self, why: SlotError) {
         self.fognet = self.fognet.map(|_| Err(why));
-        self.fognet_gone = true;
+        self.fognet_unavailable = true;
     }
 
-    /// Notes that the weights in use no longer fit their checksum; they are not used until the next start, which
+    /// Records that the weights in use no longer match their checksum. They are not used until the next start, which
     /// checks all files again.
     pub fn weights_damaged(&mut self) {
         self.weights = WeightSource::None;
@@ -90,11 +93,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.note(EventKind::WeightsDamaged);
     }
 
-    /// Returns the slot that the network does not run on.
+    /// Returns the slot to overwrite: one that GyroNet does not run on.
     fn unused_slot(&self) -> Slot {
         match self.weights {
             WeightSource::Slot(slot) => slot.other(),
-            // The network runs on neither; the file accepted last is spared all the same.
+            // GyroNet runs on neither slot; keep the file that was accepted last.
             WeightSource::BuiltIn | WeightSource::None => self.accepted.active.map_or(Slot::A, Slot::other),
         }
     }
@@ -109,14 +112,14 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         if self.slots.is_none() {
             return Err(SlotError::NoFlash.into());
         }
-        // What was accepted there is no more: whoever uploads can give a file any checksum.
+        // Withdraw the acceptance of the old file: a new file could have the same checksum by intent.
         let accepted = self.accepted.without(place);
         if accepted != self.accepted {
             self.store.as_mut().ok_or(SlotError::NoFlash)?.set(&accepted)?;
             self.accepted = accepted;
         }
         if network == Network::FogNet {
-            // An erase that fails may have erased a part.
+            // A failed erase may have erased a part of the file.
             self.lose_fognet(SlotError::Empty);
         }
         let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
@@ -128,8 +131,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     pub(super) fn weights_block(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
         let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
         let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
-        // Every block but the last one is full, so a block that is there already ends where the
-        // next one begins.
+        // A block that ends where the next one begins is a repetition.
         let written = uploading.upload.written();
         let repeated = bytes.len() <= BLOCK && offset.checked_add(bytes.len() as u32) == Some(written);
         if repeated {

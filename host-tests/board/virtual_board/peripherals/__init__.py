@@ -3,7 +3,7 @@
 from .backup import BackupSram, Rtc
 from .bxcan import BxCan
 from .crc_unit import CrcUnit
-from .dbgmcu import Dbgmcu, Signature
+from .dbgmcu import Dbgmcu
 from .dma import Dma
 from .exti import Exti
 from .flash import Flash
@@ -21,14 +21,14 @@ from .wwdg import Wwdg
 
 
 def create(board):
-    """All modelled peripherals, with the inertial sensor soldered to SPI1 and PA4.
+    """Creates all modelled peripherals, with the inertial sensor soldered to SPI1 and PA4.
 
-    The clock tree comes first, because the others ask it for their clocks.
+    The clock tree comes first, because the others read their clocks from it.
     """
     ports = [Gpio(board, letter) for letter in "ABCDEFGHI"]
     serial = spis(board)
     serial[0].attach(Icm42688(board), ports[0], 4)
-    return [Rcc(board), Pwr(board), Flash(board), Exti(board), Syscfg(board), *ports, Dbgmcu(board), Signature(board),
+    return [Rcc(board), Pwr(board), Flash(board), Exti(board), Syscfg(board), *ports, Dbgmcu(board),
             Iwdg(board), *usarts(board), *timers(board), BxCan(board), *serial,
             Dma(board, "DMA1", 0x4002_6000), Dma(board, "DMA2", 0x4002_6400), Rtc(board), BackupSram(board), Wwdg(board),
             CrcUnit(board), Rng(board)]

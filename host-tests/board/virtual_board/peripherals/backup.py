@@ -1,7 +1,7 @@
 """Backup domain: the twenty backup registers of the RTC and the 4 KiB of backup SRAM (RM0090 sections 5.1.2 and 26.6.20).
 
-Both survive every reset but that of the power, for the battery pin is taken as tied to the supply unless `battery` is set.
-Left out: the calendar, alarms, tamper detection and the wake-up timer.
+Both survive every reset except a power-on reset, since the battery pin is assumed to be tied to the supply unless `battery` is
+set.
 
 Settings: `battery` (True: the contents survive a loss of the supply).
 """
@@ -13,7 +13,7 @@ BACKUP = range(0x50, 0xA0)
 
 
 class Rtc(Peripheral):
-    """BKP0R to BKP19R; writing them wants PWR_CR.DBP."""
+    """BKP0R to BKP19R; writing them requires PWR_CR.DBP."""
 
     name, base = "RTC", 0x4000_2800
 
@@ -27,7 +27,7 @@ class Rtc(Peripheral):
             self.backup_reset()
 
     def backup_reset(self):
-        """BDRST, or a loss of all supplies, clears the registers (section 26.6.20)."""
+        """Clears the registers after BDRST or a loss of all supplies (section 26.6.20)."""
         self.values = [0] * 20
 
     def read(self, offset, size):
@@ -52,7 +52,7 @@ class Rtc(Peripheral):
 
 
 class BackupSram(Peripheral):
-    """Four KiB that BDRST does not clear; without the backup regulator they are lost with the supply."""
+    """Four KiB that BDRST does not clear. Without the backup regulator the contents are lost with the supply."""
 
     name, base, size, clock = "BKPSRAM", 0x4002_4000, 0x1000, "BKPSRAM"
 

@@ -2,7 +2,7 @@
 
 The bus behind it is `can_bus.CanBus`, reached as `bus`; the filters are `can_filters.Filters`.
 Left out: time stamps (time-triggered mode can be set, and reading a stamp then ends the run), the debug freeze, CAN2.
-Rests on the manual's silence: a receive pin without its alternate function reads dominant, so the controller does not synchronise;
+Assumed where the manual is silent: a receive pin without its alternate function reads dominant, so the controller does not synchronise;
 mailboxes keep their requests in initialisation and in bus-off; MSR.RX shows the level between frames; entering initialisation or Sleep
 outside of a frame takes one bit.
 
@@ -30,7 +30,7 @@ MCR_RESET, BTR_RESET = 0x0001_0002, 0x0123_0000
 TX_PINS = (("A", 12), ("B", 9), ("D", 1))
 RX_PINS = (("A", 11), ("B", 8), ("D", 0), ("I", 9))
 FUNCTION = 9
-#: The lengths of the mailboxes, whose upper halves are the frames' time stamps in time-triggered mode.
+#: The registers with the lengths of the mailboxes, whose upper halves are the frames' time stamps in time-triggered mode.
 STAMPED = (0x184, 0x194, 0x1A4, 0x1B4, 0x1C4)
 RECOVERY_SEQUENCES, SEQUENCE_BITS = 128, 11
 
@@ -59,7 +59,7 @@ class BxCan(Peripheral):
         self.fifo_flags = [0, 0]
         self.output = [(0, 0, 0, 0), (0, 0, 0, 0)]
         self.filters = Filters()
-        # Good frames of other nodes that no filter let in, for tests.
+        # Number of good frames of other nodes that no filter accepted, for tests.
         self.filtered = 0
         self.suspended_until = 0
         self.last_status = 0
@@ -82,23 +82,23 @@ class BxCan(Peripheral):
             self.bus.wake()
 
     def power_off(self):
-        """The board's events are gone with its power."""
+        """Drops the scheduled events, which are lost with the power."""
         self.mode_event = self.recovery = self.loop_event = None
         self.bus.power_off()
 
     # -- modes (section 32.4) ----------------------------------------------------------------------------------------
 
     def _bit_time(self):
-        """Bit time from BTR and PCLK1 (section 32.7.7)."""
+        """Returns the bit time from BTR and PCLK1 (section 32.7.7)."""
         quanta = 3 + (self.btr >> 16 & 15) + (self.btr >> 20 & 7)
         return ((self.btr & 0x3FF) + 1) * quanta * PS // self.board.rcc.clock_hz("PCLK1")
 
     def clocks_changed(self):
-        """The bit time follows the bus clock."""
+        """Updates the bit time after a change of the bus clock."""
         self.bit_ps = self._bit_time()
 
     def _request_mode(self):
-        """The mode that MCR asks for, by the state diagram of figure 336."""
+        """Starts the transition to the mode that MCR requests, by the state diagram of figure 336."""
         if self.mcr & SLEEP and (self.state == "sleep" or not self.mcr & INRQ):
             wanted = "sleep"
         elif self.mcr & INRQ:
@@ -108,7 +108,7 @@ class BxCan(Peripheral):
         wanted = None if wanted == self.state else wanted
         if self.mode_event:
             if wanted == self.wanted:
-                # What is under way goes on.
+                # A transition in progress continues.
                 return
             self.mode_event.cancel()
             self.mode_event = None
@@ -117,12 +117,12 @@ class BxCan(Peripheral):
             self._synchronise()
         elif self.wanted:
             delay = self.bit_ps
-            if self.bus.flight and self.state == "normal" and self.listens():
+            if self.bus.in_progress and self.state == "normal" and self.listens():
                 delay = max(self.bus.free_at - self.board.now, delay)
             self.mode_event = self.board.schedule(delay, self._acknowledge_mode)
 
     def _synchronise(self):
-        """Normal mode begins after eleven recessive bits (section 32.4.2)."""
+        """Enters Normal mode after eleven recessive bits (section 32.4.2)."""
         self.bit_ps = self._bit_time()
         if self.btr & LBKM:
             delay = SEQUENCE_BITS * self.bit_ps
@@ -149,14 +149,14 @@ class BxCan(Peripheral):
             self._wake_transmitter()
 
     def bus_recovered(self):
-        """The bus is recessive again; a start that waited for it goes on."""
+        """Handles the return of the bus to recessive: a start that waited for it continues."""
         if self.wanted == "normal" and self.mode_event is None:
             self._synchronise()
         if self.recovering and self.recovery is None and self.state == "normal":
             self._await_recovery()
 
     def activity(self, source):
-        """A start of frame wakes a sleeping controller (section 32.4.3)."""
+        """Wakes a sleeping controller at a start of frame (section 32.4.3)."""
         if self.state == "sleep" and source != "board" and self.bus.connected and connected(self.board, RX_PINS, FUNCTION):
             self.flags |= WKUI
             if self.mcr & AWUM:
@@ -173,7 +173,7 @@ class BxCan(Peripheral):
         return self.mailboxes.next(self.mcr & TXFP)
 
     def contender(self, now):
-        """The frame with which the controller enters arbitration now, or None."""
+        """Returns the frame with which the controller enters arbitration now, or None."""
         if not self._ready() or self.btr & (SILM | LBKM) or now < self.suspended_until:
             return None
         box = self._next()
@@ -183,7 +183,7 @@ class BxCan(Peripheral):
         return box.frame()
 
     def not_before(self, now):
-        """The end of the suspended transmission of an error-passive node, where a frame waits for it."""
+        """Returns the end of the suspended transmission of an error-passive node, if a frame waits for it."""
         if self.suspended_until > now and self._ready() and self._next() is not None:
             return self.suspended_until
         return None
@@ -200,7 +200,7 @@ class BxCan(Peripheral):
             self.bus.wake()
 
     def _looped(self):
-        """Loop-back: the frame is received by its sender, and a missing acknowledgement does not matter (section 32.5.2)."""
+        """Ends a loop-back: the sender receives its own frame, and a missing acknowledgement does not matter (section 32.5.2)."""
         self.loop_event = None
         frame = self.sending.frame()
         if not self.btr & SILM and connected(self.board, TX_PINS, FUNCTION):
@@ -210,11 +210,11 @@ class BxCan(Peripheral):
         self._wake_transmitter()
 
     def arbitration_lost(self):
-        """Another node had the better identifier."""
+        """Handles lost arbitration: another node had an identifier of higher priority."""
         self._attempt_failed(ALST)
 
     def transmission_done(self):
-        """The frame was acknowledged by another node, or looped back."""
+        """Handles a frame that another node acknowledged, or that was looped back."""
         box, self.sending = self.sending, None
         box.end(TXOK)
         self.tec = max(self.tec - 1, 0)
@@ -223,7 +223,7 @@ class BxCan(Peripheral):
         self._interrupts()
 
     def transmission_failed(self, code):
-        """An error ended the attempt; without an acknowledgement an error-passive node counts nothing (ISO 11898-1 12.1.4.2)."""
+        """Handles an error during transmission; an error-passive node does not count a missing acknowledgement (ISO 11898-1 12.1.4.2)."""
         if not (code == ACKNOWLEDGE_ERROR and self.tec > 127):
             self.tec += 8
         self._attempt_failed(TERR)
@@ -241,23 +241,23 @@ class BxCan(Peripheral):
             self._interrupts()
 
     def _suspend(self):
-        """An error-passive node waits eight bits after the intermission before it sends again."""
+        """Makes an error-passive node wait eight bits after the intermission before it sends again."""
         if self.tec > 127 or self.rec > 127:
             self.suspended_until = self.bus.free_at + 8 * self.bit_ps
 
     # -- reception (sections 32.7.3 and 32.7.4) ----------------------------------------------------------------------
 
     def listens(self):
-        """The controller takes part in what happens on the bus."""
+        """Returns whether the controller takes part in the traffic on the bus."""
         return (self.state == "normal" and not self.bus_off and not self.btr & LBKM and self.bus.connected
                 and connected(self.board, RX_PINS, FUNCTION))
 
     def disturbs(self):
-        """An error-active controller that is not silent destroys what it cannot read."""
+        """Returns whether the controller destroys frames that it cannot read: it is error-active and not silent."""
         return not self.btr & SILM and self.tec <= 127 and self.rec <= 127
 
     def received(self, frame):
-        """A good frame has ended; the filters decide."""
+        """Handles a good frame, which the filters accept or not."""
         if self.listens():
             self._accept(frame)
 
@@ -287,14 +287,14 @@ class BxCan(Peripheral):
             stored[2] = entry
 
     def reception_failed(self, code):
-        """A frame of another node was unreadable."""
+        """Handles an unreadable frame of another node."""
         if self.listens():
             self.rec = min(self.rec + 1, 255)
             self._error_changed(code)
             self._interrupts()
 
     def count_dominant(self, transmitting):
-        """Eight more dominant bits; False when they change nothing any more."""
+        """Counts eight more dominant bits; returns False when they no longer change anything."""
         if self.bus_off or self.state != "normal":
             return False
         if transmitting:
@@ -308,12 +308,12 @@ class BxCan(Peripheral):
     # -- errors (section 32.7.6) -------------------------------------------------------------------------------------
 
     def _status(self):
-        """EWGF, EPVF and BOFF from the counters."""
+        """Returns EWGF, EPVF and BOFF from the counters."""
         worst = max(self.tec, self.rec)
         return (EWGF if worst >= 96 else 0) | (EPVF if worst > 127 else 0) | (BOFF if self.bus_off else 0)
 
     def _error_changed(self, code):
-        """The counters have moved: bus-off, the flags of CAN_ESR and ERRI follow."""
+        """Updates bus-off, the flags of CAN_ESR and ERRI after the counters have changed."""
         if self.tec > 255 and not self.bus_off:
             self.bus_off = True
             self.board.record("bus_off")
@@ -328,7 +328,9 @@ class BxCan(Peripheral):
             self.flags |= ERRI
 
     def _recover(self):
-        """Bus-off ends after 128 times eleven recessive bits, with ABOM or after software left initialisation (section 32.7.6)."""
+        """Starts the recovery from bus-off: 128 x 11 recessive bits, with ABOM or after software left initialisation (section
+        32.7.6).
+        """
         if self.recovery is None:
             self.recovering = True
             self.recovery_left = RECOVERY_SEQUENCES
@@ -341,7 +343,7 @@ class BxCan(Peripheral):
         self.recovery = self.board.schedule(delay, self._check_recovery)
 
     def _check_recovery(self):
-        """A free bus gives a sequence every eleven bits, a frame one at its end."""
+        """Counts the sequences so far: one every eleven bits on a free bus, and one at the end of each frame."""
         self.recovery = None
         if self.state != "normal" or not self.bus.recessive:
             return
@@ -414,8 +416,8 @@ class BxCan(Peripheral):
         value = self.flags | {"sleep": SLAK, "init": INAK, "normal": 0}[self.state]
         if self.bus.recessive:
             value |= SAMP | RX
-        if self.bus.flight and self.state == "normal":
-            value |= TXM if self.bus.flight[2] == "board" else RXM
+        if self.bus.in_progress and self.state == "normal":
+            value |= TXM if self.bus.in_progress[2] == "board" else RXM
         return value
 
     def write(self, offset, value, size):
@@ -425,7 +427,7 @@ class BxCan(Peripheral):
         elif offset in (0x0C, 0x10):
             self._write_fifo((offset - 0x0C) // 4, value)
         elif offset == 0x08:
-            self.mailboxes.write_tsr(value, self.sending if self.bus.flight or self.loop_event else None)
+            self.mailboxes.write_tsr(value, self.sending if self.bus.in_progress or self.loop_event else None)
         elif offset == 0x00:
             self._write_mcr(value)
         elif offset == 0x04:

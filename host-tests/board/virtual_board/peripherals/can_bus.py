@@ -1,11 +1,11 @@
 """The CAN bus and the other nodes on it: arbitration, acknowledgement, errors and faults (ISO 11898-1).
 
-Frames follow each other on one time line. When the bus is free, the best frame of the board and those of the other nodes that are
-due contend, and the lower arbitration field wins. A frame lasts exactly its bits, stuff bits included, at the sender's bit rate.
-The other nodes work at `bit_rate`; a board whose rate differs by more than 0.5 % gets and causes error frames.
+Frames follow each other on one time line. When the bus is free, the first frame of the board and the due frames of the other nodes
+contend, and the lowest arbitration field wins. A frame lasts exactly as long as its bits, stuff bits included, at the sender's bit rate.
+The other nodes use `bit_rate`; a board whose rate differs by more than 0.5 % receives and causes error frames.
 
-Faults: `acknowledge` False (nobody else listens), `connected` False (the board is alone on its line), `short` "recessive" (CAN_H on
-CAN_L: the board reads recessive whatever it sends, which ends in bus-off) or "dominant" (nothing can be sent; a frame under way ends
+Faults: `acknowledge` False (no other node listens), `connected` False (the board is alone on its line), `short` "recessive" (CAN_H on
+CAN_L: the board reads recessive whatever it sends, which ends in bus-off) or "dominant" (nothing can be sent; a frame in progress ends
 in bus-off), `babble` (another node fills the bus with frames of the highest priority).
 Left out: overload frames, bit errors of the medium, propagation delay, and error frames of other nodes among themselves.
 """
@@ -20,7 +20,7 @@ PS = 1_000_000_000_000
 RATE_TOLERANCE = 0.005
 #: Error flag and delimiter, alone and with the echo of other nodes.
 ERROR_BITS_ALONE, ERROR_BITS = 6 + 8, 12 + 8
-#: A receiver at another rate finds a violation of the stuffing within the first bits.
+#: A receiver at another rate detects a stuffing violation within the first bits.
 MISMATCH_BITS = 20
 #: Codes of CAN_ESR.LEC (section 32.9.2).
 STUFF_ERROR, ACKNOWLEDGE_ERROR, RECESSIVE_ERROR, DOMINANT_ERROR = 1, 3, 4, 5
@@ -28,7 +28,7 @@ BABBLE = Frame.of(0, bytes(8))
 
 
 class Logged(NamedTuple):
-    """One frame or error frame as an observer of the bus sees it; `error` is None where the frame was good."""
+    """One frame or error frame as an observer of the bus sees it; `error` is None for a good frame."""
 
     start_ps: int
     end_ps: int
@@ -38,7 +38,7 @@ class Logged(NamedTuple):
 
 
 def _rank(entry):
-    """Frames of other nodes go by priority, equal ones in the order in which they were given."""
+    """Orders the frames of other nodes by priority, and equal ones in the order in which they were sent."""
     return priority(entry[1]), entry[0]
 
 
@@ -57,26 +57,26 @@ class CanBus:
         self.order = 0
         self.free_at = 0
         self.event = None
-        self.flight = None
+        self.in_progress = None
         self.tick = None
         self.busy_ps = self.frames = 0
 
-    # -- what a test does --------------------------------------------------------------------------------------------
+    # -- for tests ---------------------------------------------------------------------------------------------------
 
     def send(self, identifier, data=b"", extended=False, remote=False, at_ps=None):
-        """Another node sends a frame as soon as it can, not before `at_ps`."""
+        """Sends a frame of another node as soon as possible, not before `at_ps`."""
         self.order += 1
         at = self.board.now if at_ps is None else at_ps
         heapq.heappush(self.waiting, (at, self.order, Frame.of(identifier, data, extended, remote)))
         self.wake()
 
     def take_log(self):
-        """Everything that was on the bus since the last call."""
+        """Returns everything that was on the bus since the last call."""
         log, self.log = self.log, []
         return log
 
     def configure(self, key, value):
-        """A fault begins or ends."""
+        """Starts or ends a fault."""
         if key == "short":
             self._short(value)
         elif key == "babble":
@@ -90,21 +90,21 @@ class CanBus:
 
     @property
     def bit_ps(self):
-        """Bit time of the other nodes."""
+        """Returns the bit time of the other nodes."""
         return PS // self.bit_rate
 
     @property
     def recessive(self):
-        """The level that the board's receiver sees outside of frames."""
+        """Returns whether the board's receiver sees a recessive level outside of frames."""
         return self.short != "dominant"
 
     @property
     def shared(self):
-        """Other nodes hear the board and answer it."""
+        """Returns whether other nodes receive the board's frames and acknowledge them."""
         return self.connected and self.acknowledge
 
     def idle_delay(self, bits):
-        """Time until so many recessive bits in a row have been seen, if nothing else is sent; None: never."""
+        """Returns the time until this many recessive bits in a row, if nothing else is sent; None if never."""
         if not self.recessive:
             return None
         if self.free_at > self.board.now:
@@ -112,8 +112,8 @@ class CanBus:
         return bits * self.node.bit_ps
 
     def wake(self):
-        """Someone has a frame, or a fault has ended: the bus looks for the next frame when it is free."""
-        if self.flight is not None:
+        """Schedules the next frame for when the bus is free, after a node has a frame or a fault has ended."""
+        if self.in_progress is not None:
             return
         if self.event:
             self.event.cancel()
@@ -142,7 +142,7 @@ class CanBus:
                 self.event = self.board.schedule(max(min(later) - now, 0), self._start)
 
     def _other(self, now):
-        """The best frame that another node has ready, and who sends it."""
+        """Returns the best frame that another node has ready, and its source."""
         while self.waiting and self.waiting[0][0] <= now:
             self.ready.append(heapq.heappop(self.waiting)[1:])
         if not self.connected or self.short:
@@ -154,13 +154,13 @@ class CanBus:
         return (best[1], "other") if best else (None, None)
 
     def _taken(self, frame):
-        """The frame of another node has got through and leaves its queue."""
+        """Removes a frame of another node, which was sent completely, from its queue."""
         best = min((entry for entry in self.ready if entry[1] == frame), default=None)
         if best is not None:
             self.ready.remove(best)
 
     def mismatched(self):
-        """The board's bit rate does not fit the bus."""
+        """Returns whether the board's bit rate does not match the bus."""
         return abs(self.node.bit_ps * self.bit_rate / PS - 1) > RATE_TOLERANCE
 
     def _send_own(self, frame):
@@ -172,28 +172,28 @@ class CanBus:
             bits, error, code = MISMATCH_BITS + ERROR_BITS, "bit rate", RECESSIVE_ERROR
         else:
             bits, error, code = frame_bits(frame), None, 0
-        self._fly(frame, "board", bits * self.node.bit_ps, error, code)
+        self._transmit(frame, "board", bits * self.node.bit_ps, error, code)
 
     def _send_other(self, frame, source):
         heard = self.node.listens()
         if heard and self.mismatched():
             error = "bit rate" if self.node.disturbs() else None
             bits = MISMATCH_BITS + ERROR_BITS if error else frame_bits(frame)
-            self._fly(frame, source, bits * self.bit_ps, error, STUFF_ERROR)
+            self._transmit(frame, source, bits * self.bit_ps, error, STUFF_ERROR)
         else:
-            self._fly(frame, source, frame_bits(frame) * self.bit_ps, None, 0)
+            self._transmit(frame, source, frame_bits(frame) * self.bit_ps, None, 0)
 
-    def _fly(self, frame, source, duration, error, code):
+    def _transmit(self, frame, source, duration, error, code):
         now = self.board.now
-        self.flight = (now, frame, source, error, code)
+        self.in_progress = (now, frame, source, error, code)
         bit = self.node.bit_ps if source == "board" else self.bit_ps
         self.free_at = now + duration + INTERMISSION_BITS * bit
         self.node.activity(source)
         self.event = self.board.schedule(duration, self._end)
 
     def _end(self):
-        start, frame, source, error, code = self.flight
-        self.event = self.flight = None
+        start, frame, source, error, code = self.in_progress
+        self.event = self.in_progress = None
         if source == "board" and error is None and not self.shared:
             error, code = "acknowledge", ACKNOWLEDGE_ERROR
         self._note(start, frame, source, error)
@@ -218,17 +218,17 @@ class CanBus:
             self.log.append(Logged(start, self.board.now, frame, source, error))
 
     def observe_loopback(self, start, frame):
-        """A frame in loop-back mode is seen on the transmit line, though the controller ignores the bus."""
+        """Logs a frame in loop-back mode: it is on the transmit line, though the controller ignores the bus."""
         self._note(start, frame, "board", None)
 
     # -- faults ------------------------------------------------------------------------------------------------------
 
     def cut(self, why):
-        """The board's frame under way ends in the middle: a reset, or a line that fails."""
-        if self.flight and self.flight[2] == "board":
-            start, frame, _, _, _ = self.flight
+        """Ends the board's frame in progress: a reset, or a line that fails. Returns whether there was one."""
+        if self.in_progress and self.in_progress[2] == "board":
+            start, frame, _, _, _ = self.in_progress
             self.event.cancel()
-            self.flight = self.event = None
+            self.in_progress = self.event = None
             self._note(start, frame, "board", why)
             self.free_at = self.board.now + ERROR_BITS * self.bit_ps
             return True
@@ -242,9 +242,9 @@ class CanBus:
             self.tick.cancel()
             self.tick = None
         transmitting = kind is not None and self.cut("short")
-        if kind is not None and self.flight:
+        if kind is not None and self.in_progress:
             self.event.cancel()
-            self.flight = self.event = None
+            self.in_progress = self.event = None
         if transmitting:
             self.node.transmission_failed(RECESSIVE_ERROR if kind == "dominant" else DOMINANT_ERROR)
         if kind == "dominant":
@@ -257,17 +257,17 @@ class CanBus:
             self.wake()
 
     def _dominant(self, transmitting):
-        """Each further eight dominant bits after an error flag count eight errors (ISO 11898-1 section 12.1.4.2)."""
+        """Counts eight errors for each further eight dominant bits after an error flag (ISO 11898-1 section 12.1.4.2)."""
         self.tick = None
         if self.node.count_dominant(transmitting):
             self.tick = self.board.schedule(8 * self.node.bit_ps, partial(self._dominant, transmitting))
 
     def power_off(self):
-        """The board loses its power: what it was sending breaks off; the other nodes go on without it."""
-        self.event = self.flight = self.tick = None
+        """Aborts what the board was sending when its power fails; the other nodes continue without it."""
+        self.event = self.in_progress = self.tick = None
 
     def power_on(self):
-        """Frames that were due meanwhile went past the board."""
+        """Drops the frames that were due while the board had no power."""
         while self.waiting and self.waiting[0][0] < self.board.now:
             heapq.heappop(self.waiting)
         self.free_at = self.board.now

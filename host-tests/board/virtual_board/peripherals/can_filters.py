@@ -7,19 +7,19 @@ _ALL = (1 << BANKS) - 1
 
 
 def identifier_word(frame):
-    """Identifier, IDE and RTR as they stand in CAN_RIxR and in a filter of 32 bits."""
+    """Returns identifier, IDE and RTR in the layout of CAN_RIxR and of a 32-bit filter."""
     if frame.extended:
         return frame.identifier << 3 | 4 | frame.remote << 1
     return frame.identifier << 21 | frame.remote << 1
 
 
 def _half(word):
-    """The same in the layout of a filter of 16 bits: STID, RTR, IDE, EXID[17:15]."""
+    """Returns the identifier word in the layout of a 16-bit filter: STID, RTR, IDE, EXID[17:15]."""
     return (word >> 21) << 5 | (word >> 1 & 1) << 4 | (word >> 2 & 1) << 3 | word >> 18 & 7
 
 
 class Filters:
-    """The filter registers; only banks below CAN2SB serve CAN1."""
+    """The filter registers; CAN1 uses only banks below CAN2SB."""
 
     def __init__(self):
         self.fmr = FMR_RESET
@@ -28,13 +28,13 @@ class Filters:
         self.known = {}
 
     def read(self, offset):
-        """The value of a filter register, or None where there is none."""
+        """Returns the value of a filter register, or None if there is no such register."""
         if 0x240 <= offset < 0x240 + 8 * BANKS:
             return self.banks[(offset - 0x240) // 4]
         return {0x200: self.fmr, 0x204: self.mode, 0x20C: self.scale, 0x214: self.fifo, 0x21C: self.active}.get(offset)
 
     def write(self, offset, value):
-        """A store; False where the register's lock makes the hardware ignore it, None where there is no register."""
+        """Writes a register; returns False if its lock makes the hardware ignore the write, None if there is no such register."""
         self.known = {}
         open_ = bool(self.fmr & FINIT)
         if 0x240 <= offset < 0x240 + 8 * BANKS:
@@ -55,7 +55,7 @@ class Filters:
         return True
 
     def match(self, word):
-        """(FIFO, filter match index) for the identifier word of a frame, or None where no filter lets it in."""
+        """Returns (FIFO, filter match index) for the identifier word of a frame, or None if no filter accepts it."""
         if self.fmr & FINIT:
             return None
         if word not in self.known:
@@ -63,7 +63,7 @@ class Filters:
         return self.known[word]
 
     def _match(self, word):
-        """The best match: 32 bits before 16, list before mask, then the lower number (section 32.7.4, filter priority rules)."""
+        """Returns the best match: 32 bits before 16, list before mask, then the lower number (section 32.7.4, filter priority rules)."""
         best = None
         numbers = [0, 0]
         end = self.fmr >> 8 & 0x3F

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Frame(NamedTuple):
-    """One frame; `length` is the DLC, which a remote frame has without data."""
+    """One frame; `length` is the DLC, which a remote frame has although it carries no data."""
 
     identifier: int
     data: bytes = b""
@@ -16,12 +16,12 @@ class Frame(NamedTuple):
 
     @classmethod
     def of(cls, identifier, data=b"", extended=False, remote=False):
-        """A frame whose DLC is the number of its data bytes."""
+        """Returns a frame whose DLC is the number of its data bytes."""
         return cls(identifier, bytes(data), extended, remote, len(data))
 
 
 def priority(frame):
-    """The arbitration field as a number; the lower one wins the bus."""
+    """Returns the arbitration field as a number; the lower one wins the bus."""
     if frame.extended:
         base, rest = frame.identifier >> 18, frame.identifier & 0x3_FFFF
         return base << 21 | 3 << 19 | rest << 1 | frame.remote
@@ -41,7 +41,7 @@ RUNS = re.compile("0+|1+")
 
 @lru_cache(maxsize=4096)
 def stuffed_bits(frame):
-    """Number of bits from the start of frame to the end of the CRC, stuff bits included."""
+    """Returns the number of bits from the start of frame to the end of the CRC, stuff bits included."""
     bits = "0"
     if frame.extended:
         bits += f"{frame.identifier >> 18:011b}11{frame.identifier & 0x3_FFFF:018b}{int(frame.remote)}00"
@@ -51,7 +51,7 @@ def stuffed_bits(frame):
     if not frame.remote:
         bits += "".join(f"{byte:08b}" for byte in frame.data)
     bits += f"{_crc(bits):015b}"
-    # After five equal bits comes a stuff bit, which is the first of those that follow it.
+    # After five equal bits a stuff bit is inserted, which starts the next run of equal bits.
     stuffed, first = len(bits), 0
     for run in RUNS.finditer(bits):
         equal = first + run.end() - run.start()
@@ -61,7 +61,7 @@ def stuffed_bits(frame):
 
 
 def _crc(bits):
-    """CRC-15 with the polynomial 0x4599, which begins at 0, so that leading zeros change nothing."""
+    """Returns the CRC-15 with the polynomial 0x4599, which begins at 0, so that leading zeros change nothing."""
     crc = 0
     for byte in int(bits, 2).to_bytes(len(bits) // 8 + 1, "big"):
         crc = crc << 8 & 0x7FFF ^ CRC_TABLE[crc >> 7 ^ byte]
@@ -74,5 +74,5 @@ INTERMISSION_BITS = 3
 
 
 def frame_bits(frame):
-    """Number of bits from the start of frame to the end of frame."""
+    """Returns the number of bits from the start of frame to the end of frame."""
     return stuffed_bits(frame) + TAIL_BITS

@@ -15,13 +15,13 @@ class Mailbox:
         self.order = 0
 
     def frame(self):
-        """The frame that the registers describe."""
+        """Returns the frame that the registers describe."""
         extended, remote, length = bool(self.tir & 4), bool(self.tir & 2), min(self.tdtr & 15, 8)
         data = b"" if remote else (self.tdlr | self.tdhr << 32).to_bytes(8, "little")[:length]
         return Frame(self.tir >> 3 if extended else self.tir >> 21, data, extended, remote, length)
 
     def end(self, status):
-        """The request is over, with TXOK, or with what ended it."""
+        """Ends the request, with TXOK or with what ended it."""
         self.pending = self.abort = False
         self.status = RQCP | status
 
@@ -34,7 +34,7 @@ class Mailboxes:
         self.requests = 0
 
     def request(self, box):
-        """TXRQ is set: the status of the last request is forgotten."""
+        """Handles TXRQ: the status of the last request is cleared."""
         box.pending, box.status = True, 0
         self.requests += 1
         box.order = self.requests
@@ -44,18 +44,18 @@ class Mailboxes:
         return box.order if by_request else (priority(box.frame()), number)
 
     def next(self, by_request):
-        """The mailbox that is sent first, or None."""
+        """Returns the mailbox that is sent first, or None."""
         numbers = [number for number in range(3) if self.boxes[number].pending]
         if not numbers:
             return None
         return self.boxes[min(numbers, key=lambda number: self._rank(number, by_request))]
 
     def completed(self):
-        """A request has ended and was not acknowledged by software."""
+        """Returns whether a request has ended and software has not cleared it."""
         return any(box.status & RQCP for box in self.boxes)
 
     def tsr(self, by_request):
-        """CAN_TSR: CODE is the next free mailbox or, with none free, the one sent last; LOW marks that one among several."""
+        """Returns CAN_TSR. CODE is the next free mailbox or, with none free, the one sent last; LOW marks that one among several."""
         value, pending = 0, []
         for number, box in enumerate(self.boxes):
             value |= (box.status | (ABRQ if box.abort else 0)) << 8 * number
@@ -70,7 +70,7 @@ class Mailboxes:
         return value | code << 24
 
     def write_tsr(self, value, in_flight):
-        """RQCP is cleared by a one, with its companions; ABRQ takes back a request, at once unless it is being sent."""
+        """Handles a write: a one in RQCP clears it and its companions; ABRQ cancels a request, at once unless it is being sent."""
         for number, box in enumerate(self.boxes):
             bits = value >> 8 * number
             if bits & RQCP:

@@ -5,7 +5,7 @@ from . import registers
 
 
 class CrcUnit(Peripheral):
-    """DR, IDR and CR of section 4.4; a word takes four bus cycles, which are not counted."""
+    """DR, IDR and CR of section 4.4. A word takes four bus cycles, which are not modelled."""
 
     name, base, clock = "CRC", 0x4002_3000, "CRC"
 

@@ -1,8 +1,9 @@
 """DMA controllers in direct mode (RM0090 section 10): requests of peripherals move items between a data register and memory.
 
-A request is served at once; what requests raise no interrupt may come several at a time, before anyone can see it. CCM RAM is not on the DMA's bus: an access there is a transfer error (section 2.3.1).
+A request is served at once; requests that raise no interrupt may be served several at a time, before anything can observe them. CCM
+RAM is not on the DMA's bus: an access there is a transfer error (section 2.3.1).
 Left out: the FIFO (DMDIS = 1), bursts, memory to memory, PINCOS, peripheral flow control, different sizes on both sides, priorities.
-Rests on the manual's silence: a stream that is enabled with old flags set starts all the same, and `dma_flags` is recorded.
+Assumed where the manual is silent: a stream that is enabled with old flags set starts anyway, and `dma_flags` is recorded.
 """
 
 from ..peripheral import Peripheral
@@ -27,7 +28,7 @@ INTERRUPTS = {"DMA1": (11, 12, 13, 14, 15, 16, 17, 47), "DMA2": (56, 57, 58, 59,
 
 
 class Stream:
-    """The registers of one stream and the place it has reached."""
+    """The registers of one stream and its progress."""
 
     def __init__(self):
         self.cr = self.ndtr = self.par = self.m0ar = self.m1ar = 0
@@ -39,7 +40,7 @@ class Stream:
 
     @property
     def width(self):
-        """Bytes of an item."""
+        """Returns the size of an item in bytes."""
         return 1 << (self.cr >> 11 & 3)
 
 
@@ -66,9 +67,9 @@ class Dma(Peripheral):
     # -- transfers ---------------------------------------------------------------------------------------------------
 
     def request(self, name):
-        """A peripheral asks for one transfer; False where no enabled stream listens.
+        """Serves one transfer for a peripheral; returns False if no enabled stream handles the request.
 
-        The bridge to the peripheral makes a word of an item of any size.
+        The bus bridge converts an item of any size to a word.
         """
         number = self.by_request.get(name)
         if number is None:
@@ -117,7 +118,7 @@ class Dma(Peripheral):
             self._interrupt(number)
 
     def take(self, name, data):
-        """Writes bytes that a stream that serves silently is given one after the other."""
+        """Writes bytes to memory for a stream that serves silently, as if they had been requested one by one."""
         stream = self.streams[self.by_request[name]]
         while data:
             part, data = data[:stream.left], data[stream.left:]
@@ -130,7 +131,7 @@ class Dma(Peripheral):
                 stream.left = stream.total
 
     def serves_silently(self, name):
-        """Whether a stream writes bytes to memory, again and again, without an interrupt."""
+        """Returns whether a stream writes bytes to memory in circular mode without an interrupt."""
         number = self.by_request.get(name)
         if number is None:
             return False

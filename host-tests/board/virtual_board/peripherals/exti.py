@@ -1,7 +1,7 @@
 """External interrupt and event controller (RM0090 section 12).
 
-An edge sets its bit of PR whether or not IMR lets the interrupt through; the manual's block diagram leaves that open. Left out: events
-(EMR keeps its value; WFE is woken by interrupts alone).
+An edge sets its bit of PR whether or not IMR enables the interrupt; the manual's block diagram does not say. Left out: events
+(EMR keeps its value; only interrupts wake WFE).
 """
 
 from ..peripheral import Peripheral
@@ -15,7 +15,7 @@ _SHARED = {number: sum(1 << line for line, other in INTERRUPTS.items() if other 
 
 
 class Exti(Peripheral):
-    """The registers of section 12.3; `line` is how pins and the voltage detector reach them."""
+    """The registers of section 12.3; pins and the voltage detector drive them through `line`."""
 
     name, base = "EXTI", 0x4001_3C00
 
@@ -29,7 +29,7 @@ class Exti(Peripheral):
         self._interrupts()
 
     def line(self, number, level):
-        """The input of a line takes a level; a selected edge makes the line pending."""
+        """Sets the input level of a line; a selected edge makes the line pending."""
         bit = 1 << number
         if bool(self.levels & bit) == bool(level):
             return

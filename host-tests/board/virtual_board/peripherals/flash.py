@@ -1,15 +1,15 @@
-"""Embedded flash interface (RM0090 section 3): keys, erase, programming, option bytes and what a cut of the power leaves behind.
+"""Embedded flash interface (RM0090 section 3): keys, erase, programming, option bytes, and the content after a power cut.
 
-The array itself belongs to the board: it calls `program` for each store into the flash and is stalled until an operation ends,
-because code runs from flash and a read during an operation waits for it (section 3.6). The stall begins with the operation even
-where the code runs from RAM; that is stricter than the part.
+The array itself belongs to the board, which calls `program` for each store into the flash. The board is stalled until an
+operation ends, because code runs from flash and a read during an operation waits for its end (section 3.6). The stall begins
+with the operation even if the code runs from RAM; that is stricter than the part.
 Times are those of DS8626 tables 39 and 40 for the parallelism in PSIZE, typical unless `time_factor` is set (2 gives the maximum).
 
-Left out: read protection, the one-time programmable area, x64 (it wants an external voltage on VPP), read-while-write, stale cache
-lines. Rests on the manual's silence: a STRT with neither SER nor MER does nothing; error flags that are still set do not stop the
-next operation; PG stays in force after LOCK is set; a key written while FLASH_CR is open is ignored.
+Left out: read protection, the one-time programmable area, x64 (it needs an external voltage on VPP), read-while-write, stale cache
+lines. Assumed where the manual is silent: a STRT with neither SER nor MER does nothing; error flags that are still set do not stop
+the next operation; PG stays in force after LOCK is set; a key written while FLASH_CR is unlocked is ignored.
 
-Settings: `time_factor`, `seed` (what a cut leaves), `option_bytes` (OPTCR as loaded at reset).
+Settings: `time_factor`, `seed` (of the content after a power cut), `option_bytes` (OPTCR as loaded at reset).
 """
 
 import random
@@ -60,7 +60,7 @@ class Flash(Peripheral):
 
     @property
     def bor_level(self):
-        """BOR_LEV as loaded from the option bytes at the last reset."""
+        """Returns BOR_LEV as loaded from the option bytes at the last reset."""
         return self.loaded_bor
 
     def reset(self, cause):
@@ -71,7 +71,7 @@ class Flash(Peripheral):
         self.board.irq(4, False)
 
     def power_off(self):
-        """The supply fails; what was being erased or programmed stays half done."""
+        """Handles a power failure: what was being erased or programmed stays half done."""
         if self.operation:
             self._interrupted()
 
@@ -171,7 +171,7 @@ class Flash(Peripheral):
         self.board.irq(4, bool(self.sr & EOP and self.cr & EOPIE or failed))
 
     def _refuse(self, flag):
-        """An operation that cannot run sets its flag, and OPERR where error interrupts are enabled (section 3.9.4)."""
+        """Sets the flag of an operation that cannot run, and OPERR if error interrupts are enabled (section 3.9.4)."""
         self.sr |= flag | (OPERR if self.cr & ERRIE else 0)
         self.board.record("flash_error", flag=flag)
         self._interrupt()
@@ -182,7 +182,7 @@ class Flash(Peripheral):
         return not self.optcr >> (16 + sector) & 1
 
     def _parallelism(self):
-        """PSIZE, and whether the supply carries it (table 7)."""
+        """Returns PSIZE, and whether the supply is sufficient for it (table 7)."""
         size = self.cr >> 8 & 3
         if size == 3:
             raise Violation("FLASH: PSIZE x64 wants an external VPP (section 3.6.2)")
@@ -212,7 +212,7 @@ class Flash(Peripheral):
         self._begin(("erase", tuple(chosen), enough), ERASE_MS[psize][kind] * MS)
 
     def program(self, address, value, size):
-        """The core stores `size` bytes at `address` in the array (section 3.6.4)."""
+        """Handles a store of `size` bytes by the core at `address` in the array (section 3.6.4)."""
         if self.operation:
             self._finish()
         if not self.cr & PG:
@@ -262,7 +262,7 @@ class Flash(Peripheral):
         self.sr &= ~BSY
 
     def _interrupted(self):
-        """A reset or a loss of power during an operation leaves a mixture of the old contents and the new (section 3.6.1)."""
+        """Leaves a mixture of old and new contents after a reset or a loss of power during an operation (section 3.6.1)."""
         kind, what, _, begun, duration = self.operation
         self._end()
         share = (self.board.now - begun) / duration if duration else 1.0
@@ -279,7 +279,7 @@ class Flash(Peripheral):
             self.board.memory_write(address, mixed.to_bytes(size, "little"))
 
     def _bits(self, count, share):
-        """A word of `count` bits of which about `share` are ones, to one part in 256."""
+        """Returns a word of `count` bits of which about `share` are ones, to one part in 256."""
         bits = 0
         for place in range(8):
             word = self.random.getrandbits(count)
@@ -292,7 +292,7 @@ class Flash(Peripheral):
         elif key == "seed":
             self.random = random.Random(value)
         elif key == "error_flags":
-            # What an operation before this program has left in SR.
+            # Flags that an operation before this program has left in SR.
             self.sr |= value & FLAGS & ~EOP
         elif key == "option_bytes":
             self.options = value & 0x0FFF_FFED

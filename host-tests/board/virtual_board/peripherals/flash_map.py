@@ -9,7 +9,7 @@ SIZE = sum(_LENGTHS)
 
 
 def sector_of(address):
-    """Number of the sector that holds an address."""
+    """Returns the number of the sector that holds an address."""
     for number, (start, length) in enumerate(SECTORS):
         if start <= address < start + length:
             return number

@@ -1,6 +1,6 @@
 """General-purpose I/O ports A to I (RM0090 section 8).
 
-Pins have a level, an alternate function and a speed; other models ask for them, and a listener is called when an output changes.
+Pins have a level, an alternate function and a speed, which other models read; a listener is called when a pin's level changes.
 Left out: analog levels (an analog pin reads 0), shorts between two outputs, and the time that an edge takes.
 
 Settings: `drive` ((pin, level) from outside; level None lets the pin float), `watch` (pins whose output changes are recorded as `pin`).
@@ -38,7 +38,7 @@ class Gpio(Peripheral):
         self._find_functions()
 
     def _find_functions(self):
-        #: What `alternate` answers for each pin.
+        #: The result of `alternate` for each pin.
         self.functions = [self.afr[pin >> 3] >> 4 * (pin & 7) & 15 if self.mode(pin) == ALTERNATE else None
                           for pin in range(16)]
 
@@ -46,30 +46,30 @@ class Gpio(Peripheral):
         self._registers()
         self._changed()
 
-    # -- what other models ask ---------------------------------------------------------------------------------------
+    # -- for other models --------------------------------------------------------------------------------------------
 
     def mode(self, pin):
-        """0 input, 1 output, 2 alternate function, 3 analog."""
+        """Returns 0 for an input, 1 for an output, 2 for an alternate function, 3 for analog."""
         return self.moder >> 2 * pin & 3
 
     def alternate(self, pin):
-        """The number of the pin's alternate function, or None where the pin is in another mode."""
+        """Returns the number of the pin's alternate function, or None if the pin is in another mode."""
         return self.functions[pin]
 
     def speed(self, pin):
-        """OSPEEDR: 0 low (2 MHz), 1 medium (25 MHz), 2 high (50 MHz), 3 very high (100 MHz)."""
+        """Returns OSPEEDR: 0 low (2 MHz), 1 medium (25 MHz), 2 high (50 MHz), 3 very high (100 MHz)."""
         return self.ospeedr >> 2 * pin & 3
 
     def level(self, pin):
-        """The pin's level as the outside sees it."""
+        """Returns the pin's level as seen from outside."""
         return bool(self._levels() >> pin & 1)
 
     def listen(self, pin, callback):
-        """`callback(level)` is called when the pin's level changes."""
+        """Registers `callback(level)` for changes of the pin's level."""
         self.listeners.setdefault(pin, []).append(callback)
 
     def drive_lines(self):
-        """The EXTI lines that SYSCFG gives to this port take the pins' levels."""
+        """Drives the EXTI lines that SYSCFG assigns to this port with the pins' levels."""
         syscfg, exti = self.board.peripherals.get("SYSCFG"), self.board.peripherals.get("EXTI")
         if syscfg and exti:
             levels = self._levels()
@@ -78,7 +78,7 @@ class Gpio(Peripheral):
                     exti.line(pin, bool(levels >> pin & 1))
 
     def _levels(self):
-        """Outputs give ODR, other pins what drives them from outside, else their pull (a floating pin reads 0)."""
+        """Returns all levels: ODR for outputs; otherwise what drives the pin from outside, else its pull (a floating pin reads 0)."""
         levels = 0
         for pin in range(16):
             mode = self.moder >> 2 * pin & 3
@@ -136,7 +136,7 @@ class Gpio(Peripheral):
         return registers.cut(value, offset, size)
 
     def _kept(self, old, new, width):
-        """Locked pins keep their configuration until the next reset (section 8.3.4)."""
+        """Returns the new configuration, in which locked pins keep the old one until the next reset (section 8.3.4)."""
         if not self.lckr & LCKK:
             return new
         mask = sum(((1 << width) - 1) << pin * width for pin in range(16) if self.lckr >> pin & 1)
@@ -173,7 +173,7 @@ class Gpio(Peripheral):
         self._changed()
 
     def _lock(self, value):
-        """LCKK is written 1, 0, 1 with the same pins; a step out of order starts again (section 8.4.8)."""
+        """Handles the lock sequence: LCKK is written 1, 0, 1 with the same pins; a step out of order starts again (section 8.4.8)."""
         if self.lckr & LCKK:
             return
         pins, key = value & 0xFFFF, bool(value & LCKK)
@@ -202,7 +202,7 @@ class Gpio(Peripheral):
 
 
 def connected(board, pins, function):
-    """One of the pins, given as (port letter, number), carries the alternate function."""
+    """Returns whether one of the pins, given as (port letter, number), has the alternate function."""
     for letter, number in pins:
         port = board.peripherals.get("GPIO" + letter)
         if port is not None and port.functions[number] == function:

@@ -1,20 +1,20 @@
 """ICM-42688-P, an inertial sensor on SPI (DS-000347): registers, power modes, FIFO, time stamps and its own oscillator.
 
-Samples are made when somebody looks: at each access those that fell due are computed, unless the INT1 pin is wired, for which
-each sample is an event. The part keeps its state through a reset of the microcontroller and loses it with the power.
+Samples are computed on demand: each access computes those that are due. If the INT1 pin is wired, each sample is an event
+instead. The part keeps its state through a reset of the microcontroller and loses it with the power.
 
 Time: the part runs on its own oscillator, `oscillator_error_percent` fast. Without CLKIN its time stamps count units of 32/30 us
 (section 12.7), or sixteen times that with TMST_RES.
 Filters: a tone passes the UI filter of GYRO_ACCEL_CONFIG0 with the gain of a Butterworth low-pass of the order in GYRO_CONFIG1
-(section 5.5) and is then sampled, so what is above half the output rate folds back. Slow motion passes as it is, without delay.
+(section 5.5) and is then sampled, so frequencies above half the output rate alias. Slow motion passes unchanged, without delay.
 Noise: white, of the data sheet's density (tables 1 and 2) within the filter's bandwidth, times `noise`.
-Left out: anti-alias and notch filters, their delay, I2C and I3C, APEX, FSYNC, self-test, INT2, full-scale switching by itself
+Left out: anti-alias and notch filters, their delay, I2C and I3C, APEX, FSYNC, self-test, INT2, automatic full-scale switching
 (AFSR), different output rates of the two sensors.
-Rests on the data sheet's silence: accesses within 1 ms of a reset read 0 and write nothing; a write within 200 us of leaving OFF is
-ignored; the part gives the time-stamp counter's low 16 bits.
+Assumed where the data sheet is silent: accesses within 1 ms of a reset read 0 and write nothing; a write within 200 us of leaving OFF is
+ignored; packets hold the low 16 bits of the time-stamp counter.
 
 Settings (JSON values): `rates_dps`, `acceleration_g` ([x, y, z]), `temperature_c`, `tones` ([[axis, hz, dps], ...]), `motion`
-([[time_us, rates, acceleration], ...], interpolated), `samples` ([[rates, acceleration], ...], one each output, without noise),
+([[time_us, rates, acceleration], ...], interpolated), `samples` ([[rates, acceleration], ...], one per output, without noise),
 `noise` (a factor, 0 for none), `oscillator_error_percent`, `int1` ([port letter, pin] or None), `who_am_i`.
 """
 
@@ -56,12 +56,12 @@ class Icm42688:
     # -- power and reset (sections 4.16 and 14.1) --------------------------------------------------------------------
 
     def power_on(self):
-        """The supply has come; registers answer after 1 ms (section 3.2)."""
+        """Handles power-on; registers answer after 1 ms (section 3.2)."""
         self.powered = True
         self._reset(self.board.now)
 
     def power_off(self):
-        """The supply has gone."""
+        """Handles the loss of power."""
         self.powered = False
         self.event = None
 
@@ -86,19 +86,19 @@ class Icm42688:
     # -- time --------------------------------------------------------------------------------------------------------
 
     def _output_code(self):
-        """The output rate: the gyro's while it is on, otherwise the accelerometer's."""
+        """Returns the code of the output rate: the gyro's while it is on, otherwise the accelerometer's."""
         bank = self.banks[0]
         if self.gyro_on is not None:
             return bank[reg.GYRO_CONFIG0] & 15
         return bank[reg.ACCEL_CONFIG0] & 15
 
     def _sample_time(self, index):
-        """Board time of an output since the rate was last set."""
+        """Returns the board time of an output, counted since the rate was last set."""
         rate = OUTPUT_MILLIHERTZ.get(self._output_code(), 1_000_000) * self.clock_ppm
         return self.started + index * PS * 1_000_000_000 // rate
 
     def time_stamp(self, at):
-        """The time-stamp counter in units of 32/30 us, or 16 times that (section 12.7)."""
+        """Returns the time-stamp counter in units of 32/30 us, or 16 times that (section 12.7)."""
         config = self.banks[0][reg.TMST_CONFIG]
         if not config & 1:
             return 0
@@ -106,12 +106,12 @@ class Icm42688:
         return (at - self.epoch) * 30 * self.clock_ppm // (32 * US * 1_000_000 * unit)
 
     def _restart(self):
-        """The rate or the mode has changed: the next output comes one period from now."""
+        """Restarts the outputs after a change of rate or mode: the next one is due one period from now."""
         self.started, self.made = self.board.now, 0
         self._plan()
 
     def _catch_up(self):
-        """All outputs that fell due are made."""
+        """Computes all outputs that are due."""
         if self.gyro_on is None and self.accel_on is None:
             return
         now = self.board.now
@@ -120,7 +120,7 @@ class Icm42688:
             self._output(self._sample_time(self.made))
 
     def _plan(self):
-        """Each output is an event while INT1 is wired."""
+        """Schedules the next output as an event if INT1 is wired."""
         if self.event:
             self.event.cancel()
             self.event = None
@@ -135,7 +135,7 @@ class Icm42688:
     # -- outputs -----------------------------------------------------------------------------------------------------
 
     def _truth(self, at):
-        """Rates in degrees per second and acceleration in g at a board time."""
+        """Returns rates in degrees per second and acceleration in g at a board time."""
         if self.samples:
             rates, acceleration = self.samples[0] if len(self.samples) == 1 else self.samples.pop(0)
             return list(rates), list(acceleration)
@@ -144,7 +144,7 @@ class Icm42688:
         return list(self.rates), list(self.acceleration)
 
     def bandwidth_hz(self):
-        """The gyro's 3 dB bandwidth by GYRO_UI_FILT_BW in low-noise mode (section 14.42)."""
+        """Returns the gyro's 3 dB bandwidth by GYRO_UI_FILT_BW in low-noise mode (section 14.42)."""
         code = self.banks[0][reg.GYRO_ACCEL_CONFIG0] & 15
         rate = OUTPUT_MILLIHERTZ.get(self.banks[0][reg.GYRO_CONFIG0] & 15, 1_000_000) / 1000
         if code == 0:
@@ -216,7 +216,7 @@ class Icm42688:
             self.status |= reg.FIFO_THRESHOLD
 
     def _count(self):
-        """The count in FIFO_COUNT: bytes, or records with FIFO_COUNT_REC."""
+        """Returns the count in FIFO_COUNT: bytes, or records with FIFO_COUNT_REC."""
         if self.banks[0][reg.INTF_CONFIG0] & 0x40:
             return len(self.fifo)
         return sum(map(len, self.fifo)) - self.read_from
@@ -231,7 +231,7 @@ class Icm42688:
             self.board.schedule(100 * US, self._end_pulse)
 
     def _end_pulse(self):
-        """A pulsed interrupt ends after 100 us, or 8 us with INT_TPULSE_DURATION, which the model does not distinguish (section 14.52)."""
+        """Ends a pulsed interrupt after 100 us (8 us with INT_TPULSE_DURATION, which the model does not distinguish; section 14.52)."""
         if self.int1:
             idle = not self.banks[0][reg.INT_CONFIG] & 1
             self.board.peripherals["GPIO" + self.int1[0]].configure("drive", (self.int1[1], idle))
@@ -239,18 +239,18 @@ class Icm42688:
     # -- serial interface (section 9) --------------------------------------------------------------------------------
 
     def select(self):
-        """CS falls: the next byte is an address."""
+        """Handles a falling CS: the next byte is an address."""
         self.address = None
 
     def deselect(self):
-        """CS rises; a packet that was read in part is kept whole, unless reading may resume."""
+        """Handles a rising CS: a packet that was read in part is kept whole, unless reading may resume."""
         if self.read_from and not self.banks[0][reg.FIFO_CONFIG1] & 0x40:
             self.board.record("fifo_partial_read", read=self.read_from)
             self.read_from = 0
         self.address = None
 
     def transfer(self, byte, mode, hz):
-        """One byte each way."""
+        """Transfers one byte in each direction."""
         if not self.powered:
             return 0xFF
         inverted = bool(self.banks[0][reg.DEVICE_CONFIG] & 0x10)
@@ -303,7 +303,7 @@ class Icm42688:
         return self.banks[self.bank].get(address, 0)
 
     def _read_count(self, address):
-        """Reading FIFO_COUNTH latches both bytes (section 14.28)."""
+        """Reads FIFO_COUNTH, which latches both bytes, or FIFO_COUNTL (section 14.28)."""
         if address == reg.FIFO_COUNTH:
             self.count_latch = self._count()
         big = bool(self.banks[0][reg.INTF_CONFIG0] & 0x20)
@@ -352,7 +352,7 @@ class Icm42688:
             self.board.record("sensor_bandwidth", hz=self.bandwidth_hz())
 
     def _power_modes(self, value):
-        """PWR_MGMT0 switches the sensors; no register may be written for 200 us after leaving OFF (section 14.36)."""
+        """Switches the sensors by PWR_MGMT0; no register may be written for 200 us after leaving OFF (section 14.36)."""
         now = self.board.now
         was_off = self.gyro_on is None and self.accel_on is None
         gyro, accel = value >> 2 & 3 == 3, value & 3 >= 2
@@ -377,7 +377,7 @@ class Icm42688:
     # -- environment -------------------------------------------------------------------------------------------------
 
     def configure(self, key, value):
-        """Motion and faults."""
+        """Sets motion or a fault."""
         if self.powered:
             self._catch_up()
         if key == "oscillator_error_percent":
@@ -407,7 +407,7 @@ def _words(values, order):
 
 
 def _interpolated(table, time_us):
-    """Motion between the two rows of the table around a time; before the first and after the last it stays."""
+    """Returns the motion interpolated between the two rows around a time; constant before the first and after the last row."""
     index = bisect_right(table, time_us, key=lambda row: row[0])
     if index in (0, len(table)):
         row = table[min(index, len(table) - 1)]

@@ -1,8 +1,8 @@
-"""Independent watchdog (RM0090 section 21), counted by the LSI and by nothing else.
+"""Independent watchdog (RM0090 section 21), clocked only by the LSI.
 
-The counter is computed from the board's time; one event is kept for the moment at which it would reach its end. A new prescaler or
-reload value is taken over five LSI periods after its write and only while the LSI runs; until then the old value counts.
-Rests on the manual's silence: a prescaler that is taken over keeps the counter's value, and the takeover takes the full five periods.
+The counter is computed from board time; one event is scheduled for the moment at which it would reach its end. A new prescaler or
+reload value takes effect five LSI periods after its write and only while the LSI runs; until then the old value is used.
+Assumed where the manual is silent: a new prescaler keeps the counter's value, and the update takes the full five periods.
 """
 
 from ..peripheral import Peripheral
@@ -46,11 +46,11 @@ class Iwdg(Peripheral):
         self.end, self.takeover = None, {}
 
     def _tick_ps(self):
-        """One step of the counter in picoseconds times the LSI's frequency: a divider of 4 to 256 (section 21.4.2)."""
+        """Returns one step of the counter in picoseconds times the LSI's frequency: a divider of 4 to 256 (section 21.4.2)."""
         return PS * (4 << min(self.prescaler, 6))
 
     def _count(self):
-        """The counter's value now; the phase within a step is kept in `since`."""
+        """Updates the counter to its value now; `since` keeps the phase within a step."""
         if not self.running or self.waiting:
             return
         steps = (self.board.now - self.since) * self.hz // self._tick_ps()
@@ -80,7 +80,7 @@ class Iwdg(Peripheral):
             self.lsi_ready()
 
     def lsi_ready(self):
-        """The LSI has begun to swing: counting starts, and writes that waited for it are taken over."""
+        """Handles the start of the LSI: counting starts, and pending updates begin."""
         self.hz = self.board.rcc.lsi_hz
         if self.waiting:
             self.waiting = False
@@ -91,7 +91,7 @@ class Iwdg(Peripheral):
                 self._schedule_takeover(flag)
 
     def clocks_changed(self):
-        """The LSI's frequency has changed; what has been counted so far is kept."""
+        """Handles a change of the LSI's frequency; what was counted so far is kept."""
         if self.hz != self.board.rcc.lsi_hz:
             self._count()
             self.hz = self.board.rcc.lsi_hz

@@ -2,7 +2,7 @@
 
 Thresholds are those of DS8626 table 19 (embedded reset and power control block); the setting `column` chooses min, typ or max.
 Left out: Stop and Standby, the backup regulator, and the time that the voltage detector needs to start (the manual gives none).
-VOSRDY is set 50 us after the regulator's scale was written; the manual gives no time.
+VOSRDY is set 50 us after the regulator's scale was changed; the manual gives no time.
 
 Settings: `supply_mv`, `column`.
 """
@@ -45,12 +45,12 @@ class Pwr(Peripheral):
 
     @property
     def scale_1(self):
-        """The regulator's scale 1 allows 168 MHz, scale 2 only 144 MHz (section 5.1.3)."""
+        """Returns whether the regulator has scale 1, which allows 168 MHz; scale 2 allows only 144 MHz (section 5.1.3)."""
         return bool(self.cr & VOS)
 
     @property
     def backup_writable(self):
-        """DBP opens the RTC, its backup registers and RCC_BDCR (section 5.1.2)."""
+        """Returns whether DBP makes the RTC, its backup registers and RCC_BDCR writable (section 5.1.2)."""
         return bool(self.cr & DBP)
 
     def reset(self, cause):
@@ -61,7 +61,7 @@ class Pwr(Peripheral):
             self.board.stall(self.board.now + UNTIL_THE_SUPPLY_RETURNS)
 
     def power_off(self):
-        """The board is without power; the next start is the board's."""
+        """Cancels the hold; the board handles the next start."""
         self.held = self.release = None
 
     def read(self, offset, size):
@@ -87,7 +87,7 @@ class Pwr(Peripheral):
             raise registers.unmodelled(self, offset, "write")
 
     def _detect(self):
-        """PVDO compares the supply with the selected level, with hysteresis, and drives EXTI line 16 (section 5.2.3)."""
+        """Updates PVDO by comparing the supply with the selected level, with hysteresis, and drives EXTI line 16 (section 5.2.3)."""
         falling, rising = PVD[self.cr >> 5 & 7]
         if not self.cr & PVDE:
             low = False
@@ -104,7 +104,7 @@ class Pwr(Peripheral):
         return BOR.get(self.board.peripherals["FLASH"].bor_level)
 
     def _monitor(self):
-        """The reset monitors hold the part while the supply is too low and let it start when it has returned."""
+        """Holds the part in reset while the supply is too low, and lets it start when the supply has returned."""
         brown_out = self._brown_out()
         column, supply = self.column, self.supply_mv
         cause = None

@@ -1,14 +1,14 @@
 """Reset and clock control (RM0090 section 7): oscillators, PLL, prescalers, clock gates and reset flags.
 
-Every frequency of the board follows from these registers and from the environment: the crystal that is fitted, or none, the error
+Every frequency of the board follows from these registers and from the environment: the crystal, if one is fitted, the error
 of the HSI oscillator and the frequency of the LSI. Times are those of DS8626 (tables 33 to 43).
 
 Left out: the I2S PLL, spread spectrum, HSI trimming, the clock outputs MCO1 and MCO2, gates in Sleep mode (the LPENR registers keep
 their values and gate nothing), and the LSE crystal unless a test fits one.
 
-Settings: `hsi_error_percent`, `crystal_hz` (None: no crystal), `crystal_stop` (True stops it; False lets it start again, though a core
-that it stopped stays so until a reset), `lsi_hz`,
-`lse_hz`, `hse_startup_us`, `pll_lock_us`, `strict` (False records a broken limit as `limit` and carries on).
+Settings: `hsi_error_percent`, `crystal_hz` (None: no crystal), `crystal_stop` (True stops the crystal; False lets it start again,
+though a core that it stopped stays stopped until a reset), `lsi_hz`, `lse_hz`, `hse_startup_us`, `pll_lock_us`, `strict`
+(False records a broken limit as `limit` and continues).
 """
 
 from ..peripheral import Peripheral
@@ -32,13 +32,13 @@ CFGR_WRITABLE = 0xFFFF_FCF3
 AHB_SHIFT = {8: 1, 9: 2, 10: 3, 11: 4, 12: 6, 13: 7, 14: 8, 15: 9}
 APB_SHIFT = {4: 1, 5: 2, 6: 3, 7: 4}
 BUS_OF_ENABLE = {0x30: "HCLK", 0x34: "HCLK", 0x38: "HCLK", 0x40: "PCLK1", 0x44: "PCLK2"}
-#: A register of the STM32F42x, which embassy-stm32 writes on this part too; here it reads 0 and takes nothing.
+#: A register of the STM32F42x, which embassy-stm32 writes on this part too; here it reads 0 and ignores writes.
 DCKCFGR = 0x8C
 OSCILLATOR_SWITCH_PS = 200_000
 
 
 class Rcc(Peripheral):
-    """The clock tree of section 7.2 with the gates and flags that hang on it."""
+    """The clock tree of section 7.2 with its gates and flags."""
 
     name, base = "RCC", 0x4002_3800
 
@@ -57,10 +57,10 @@ class Rcc(Peripheral):
         self.bdcr = 0
         self._power_on()
 
-    # -- what other parts of the board ask ---------------------------------------------------------------------------
+    # -- for other parts of the board --------------------------------------------------------------------------------
 
     def enabled(self, name):
-        """The gate's state for an access made now; an access within two bus cycles of the enabling write is recorded (ES0182)."""
+        """Returns the gate's state for an access now. An access within two bus cycles of the enabling write is recorded (ES0182)."""
         if self.settle_until:
             now = self.board.now
             until = self.settling.get(name, 0)
@@ -72,32 +72,32 @@ class Rcc(Peripheral):
         return name in self.gates
 
     def is_on(self, name):
-        """The gate's state, without counting as an access."""
+        """Returns the gate's state, without counting as an access."""
         return name in self.gates
 
     def clock_hz(self, name):
-        """A bus or timer clock in hertz: HCLK, PCLK1, PCLK2, TIM_APB1 or TIM_APB2."""
+        """Returns a bus or timer clock in hertz: HCLK, PCLK1, PCLK2, TIM_APB1 or TIM_APB2."""
         return self.hz[name]
 
     @property
     def nmi_line(self):
-        """The clock security system holds the NMI line as long as CSSF is set (section 7.2.7)."""
+        """Returns the NMI line, which the clock security system holds high as long as CSSF is set (section 7.2.7)."""
         return bool(self.cir & CSSF)
 
     @property
     def hse_hz(self):
-        """The oscillator's frequency while it swings, otherwise 0."""
+        """Returns the HSE frequency while the oscillator runs, otherwise 0."""
         swings = self.crystal_hz and not self.crystal_stopped and self.cr & HSERDY
         return self.crystal_hz if swings else 0
 
     def hse_rtc_hz(self):
-        """HSE divided by RTCPRE in hertz as (numerator, denominator); (0, 1) where nothing comes (section 7.3.3)."""
+        """Returns HSE divided by RTCPRE in hertz as (numerator, denominator); (0, 1) if there is no output (section 7.3.3)."""
         divider = (self.cfgr >> 16) & 0x1F
         return (self.hse_hz, divider) if divider >= 2 else (0, 1)
 
     @property
     def lsi_runs(self):
-        """The LSI runs where LSION asks for it or the independent watchdog has been started (section 7.2.5)."""
+        """Returns whether the LSI runs: LSION requests it, or the independent watchdog has been started (section 7.2.5)."""
         return bool(self.csr & LSION) or self.lsi_forced
 
     # -- resets ------------------------------------------------------------------------------------------------------
@@ -127,7 +127,7 @@ class Rcc(Peripheral):
         self.board.irq(5, False)
 
     def _open_gates(self):
-        #: Gates that an access need not look at; `None` stands for a block that is always clocked.
+        #: Gates that need no check at an access; `None` stands for a block that is always clocked.
         self.open = {None}
         self.settle_until = max(self.settle_until, 1)
         self.gates = {name for offset, names in ENABLE.items() for bit, name in names.items()
@@ -140,14 +140,14 @@ class Rcc(Peripheral):
     # -- frequencies -------------------------------------------------------------------------------------------------
 
     def pll_hz(self, output="p"):
-        """An output of the PLL in hertz from its nominal input: P for the system, Q for PLL48CLK (section 7.3.2)."""
+        """Returns an output of the PLL in hertz from its nominal input: P for the system, Q for PLL48CLK (section 7.3.2)."""
         source = self.crystal_hz if self.pllcfgr & PLLSRC_HSE else HSI_NOMINAL
         m, n = self.pllcfgr & 0x3F, (self.pllcfgr >> 6) & 0x1FF
         divider = 2 * ((self.pllcfgr >> 16 & 3) + 1) if output == "p" else self.pllcfgr >> 24 & 15
         return (source or 0) * n // (m * divider)
 
     def _compute(self):
-        """All clocks follow from the source and the prescalers; the limits are held against nominal frequencies."""
+        """Computes all clocks from the source and the prescalers, also the nominal frequencies, with which the limits are compared."""
         if self.source == "PLL":
             nominal, of_hsi = self.pll_hz(), not self.pllcfgr & PLLSRC_HSE
         elif self.source == "HSE":
@@ -165,7 +165,7 @@ class Rcc(Peripheral):
         self.systick_external_hz = self.core_hz // 8
 
     def check_limits(self):
-        """The clocks are held against DS8626 table 14 and the flash latency against RM0090 table 10 (2.7 to 3.6 V)."""
+        """Checks the clocks against DS8626 table 14 and the flash latency against RM0090 table 10 (2.7 to 3.6 V)."""
         flash, power = self.board.peripherals.get("FLASH"), self.board.peripherals.get("PWR")
         top = 168_000_000 if power is None or power.scale_1 else 144_000_000
         for name, most in (("HCLK", top), ("PCLK1", 42_000_000), ("PCLK2", 84_000_000)):
@@ -187,7 +187,7 @@ class Rcc(Peripheral):
         self.board.clocks_changed()
 
     def _update(self):
-        """The tree is computed again after a change of source or prescaler, and everyone who counts is called."""
+        """Computes the tree again after a change of source or prescaler, and calls everything that counts."""
         before = self.hz
         self._compute()
         self.check_limits()
@@ -251,7 +251,7 @@ class Rcc(Peripheral):
         self._try_switch()
 
     def _uses(self, oscillator):
-        """The oscillator is the system clock, directly or through the PLL."""
+        """Returns whether the oscillator is the system clock, directly or through the PLL."""
         through = "HSE" if self.pllcfgr & PLLSRC_HSE else "HSI"
         return self.source == oscillator or (self.source == "PLL" and through == oscillator)
 
@@ -269,7 +269,7 @@ class Rcc(Peripheral):
             self._update()
 
     def _crystal_lost(self):
-        """The crystal stops: with CSS the part falls back to HSI (section 7.2.7), without it what HSE feeds stands still."""
+        """Handles a stopped crystal: with CSS the part falls back to HSI (section 7.2.7), without it what HSE clocks stops."""
         self._drop("hse")
         was_ready = self.cr & HSERDY
         self.cr &= ~HSERDY
@@ -450,7 +450,7 @@ class Rcc(Peripheral):
         self._lsi_changed()
 
     def force_lsi(self):
-        """The independent watchdog has been started and keeps the LSI on (section 21.3)."""
+        """Keeps the LSI on, after the independent watchdog has been started (section 21.3)."""
         self.lsi_forced = True
         self._lsi_changed()
 

@@ -1,4 +1,4 @@
-"""Accesses narrower than a register are cut out of its 32-bit word, and checked against the sizes that the manual allows."""
+"""Helpers for accesses narrower than a 32-bit register, and for the access sizes that the manual allows."""
 
 from ..violation import Violation
 
@@ -9,20 +9,20 @@ _MASK = {1: 0xFF, 2: 0xFFFF, 4: 0xFFFF_FFFF}
 
 
 def check(peripheral, offset, size, allowed):
-    """An access of a size that the register's section does not allow raises `Violation`."""
+    """Raises `Violation` for an access of a size that the register's section does not allow."""
     if size not in allowed:
         raise Violation(f"{peripheral.name}: access of {size} bytes at offset {offset:#x}; allowed are {allowed}")
 
 
 def cut(word, offset, size):
-    """A load of `size` bytes at `offset` sees this part of the register's word."""
+    """Returns the part of the register's word that a load of `size` bytes at `offset` reads."""
     if size == 4:
         return word
     return (word >> (8 * (offset & 3))) & _MASK[size]
 
 
 def merge(old, value, offset, size):
-    """A store of `size` bytes at `offset` leaves this word in the register."""
+    """Returns the register's word after a store of `size` bytes at `offset`."""
     if size == 4:
         return value
     shift = 8 * (offset & 3)
@@ -31,5 +31,5 @@ def merge(old, value, offset, size):
 
 
 def unmodelled(peripheral, offset, access):
-    """An access to a register that does not exist or is left out becomes this `Violation`."""
+    """Returns the `Violation` for an access to a register that does not exist or is not modelled."""
     return Violation(f"{peripheral.name}: {access} of offset {offset:#x}, which is reserved or not modelled")

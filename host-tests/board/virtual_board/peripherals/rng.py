@@ -1,7 +1,7 @@
 """Random number generator (RM0090 section 24): a number of 32 bits every 40 periods of the 48 MHz clock of the PLL.
 
-Settings: `seed` of the noise, `seed_error` (the noise is a constant: SECS), `stuck` (a number that comes again and again, or
-None), `clock_error` (its clock has failed: CECS). The noise goes on through resets, as an analogue source does.
+Settings: `seed` of the noise, `seed_error` (the noise is a constant: SECS), `stuck` (a number that is repeated forever, or
+None), `clock_error` (its clock has failed: CECS). The noise continues through resets, as that of an analogue source does.
 """
 
 from random import Random
@@ -17,7 +17,7 @@ HASH_RNG = 80
 
 
 class Rng(Peripheral):
-    """CR, SR and DR of section 24.4. What DR holds while no number is ready is not said; here it is what was read last."""
+    """CR, SR and DR of section 24.4. The manual does not say what DR holds while no number is ready; here, the last number read."""
 
     name, base, clock = "RNG", 0x5006_0800, "RNG"
 
@@ -37,7 +37,7 @@ class Rng(Peripheral):
         self.pending = None
 
     def _clock_hz(self):
-        """PLL48CLK: the PLL's VCO divided by Q (section 7.3.2); 0 while the PLL is not ready."""
+        """Returns PLL48CLK: the PLL's VCO divided by Q (section 7.3.2); 0 while the PLL is not ready."""
         rcc = self.board.rcc
         if not rcc.cr & PLLRDY:
             return 0
@@ -51,7 +51,7 @@ class Rng(Peripheral):
             self.pending = self.board.schedule(PERIODS * 10**12 // self._clock_hz(), self._generated)
 
     def _errors(self):
-        """Errors that last, which also set their flags (section 24.3.2)."""
+        """Returns the current errors, and sets their flags (section 24.3.2)."""
         if not self.cr & RNGEN:
             return 0
         current = (SECS if self.seed_error else 0) | (CECS if self._clock_error() else 0)

@@ -1,11 +1,11 @@
 """SPI master with slaves behind chip-select pins (RM0090 section 28).
 
-A frame takes its bits at the bus clock divided by BR. Data reach the slave only if SCK and MOSI carry the alternate function, and come
-back only if MISO does. `slow_pin` is recorded where SCK or MOSI has OSPEEDR 00 above 2 MHz (section 8.4.3; ES0182, corrupted last bit).
+A frame takes its number of bits at the bus clock divided by BR. Data reach the slave only if SCK and MOSI have the alternate
+function, and come back only if MISO has it. `slow_pin`: SCK or MOSI has OSPEEDR 00 above 2 MHz (section 8.4.3; ES0182, corrupted last bit).
 Left out: slave mode, receive-only and one-wire modes, CRC, TI mode, I2S.
-Rests on the manual's silence: a chip-select line has a pull-up on the board, so a pin that is not yet an output does not select.
+Assumed: a chip-select line has a pull-up on the board, so a pin that is not yet an output does not select.
 
-Settings: `fitted` (False: no slave answers, MISO floats high); those that begin with `imu_` go to the ICM-42688-P behind SPI1.
+Settings: `fitted` (False: no slave answers, MISO floats high); settings that begin with `imu_` are passed to the ICM-42688-P on SPI1.
 """
 
 from ..peripheral import Peripheral
@@ -54,20 +54,20 @@ class Spi(Peripheral):
                 slave.power_on()
 
     def power_off(self):
-        """The board's events are gone with its power."""
+        """Drops the scheduled events, which are lost with the power."""
         self.departure = None
         self.selected = []
         for slave in self.slaves:
             slave.power_off()
 
     def attach(self, slave, port, pin):
-        """A slave is soldered to the bus, with its chip select, active low and pulled up, at a pin of a port."""
+        """Adds a slave to the bus, with its chip select, active low and pulled up, at a pin of a port."""
         port.configure("drive", (pin, True))
         port.listen(pin, Select(self, len(self.slaves)))
         self.slaves.append(slave)
 
     def select(self, index, active):
-        """A chip select changes."""
+        """Handles a change of a chip select."""
         slave = self.slaves[index]
         if active:
             self.selected = [*self.selected, slave]
@@ -84,7 +84,7 @@ class Spi(Peripheral):
 
     @property
     def bit_hz(self):
-        """The serial clock."""
+        """Returns the frequency of the serial clock in hertz."""
         return self.board.rcc.clock_hz(self.bus) >> (self.cr1 >> 3 & 7) + 1
 
     def _load(self):
@@ -113,7 +113,7 @@ class Spi(Peripheral):
             self.serve_dma()
 
     def _exchange(self, word):
-        """The word that comes back on MISO; a line that nobody drives is high."""
+        """Returns the word that MISO delivers; a line without a driver is high."""
         if not connected(self.board, self.sck, self.function):
             return 0xFFFF if self.cr1 & DFF else 0xFF
         if self.bit_hz > SLOW_PIN_HZ and not self.slow_noted and self._slow():
@@ -142,7 +142,7 @@ class Spi(Peripheral):
         return False
 
     def serve_dma(self):
-        """The streams that are wired to this SPI move data as long as RXNE or TXE asks for it."""
+        """Lets the DMA streams of this SPI move data as long as RXNE or TXE requests it."""
         if not self.cr2 & (RXDMAEN | TXDMAEN):
             return
         dma = self.board.peripherals[self.dma]
@@ -238,7 +238,7 @@ class Spi(Peripheral):
             self.serve_dma()
 
     def _master_fault(self):
-        """A low internal NSS takes a master off the bus (section 28.3.10): SSI with SSM, otherwise the pin."""
+        """Takes a master with a low internal NSS off the bus (section 28.3.10): SSI with SSM, otherwise the pin."""
         if not self.cr1 & MSTR or not self.cr1 & SPE:
             return
         if self.cr1 & SSM:
@@ -279,7 +279,7 @@ class Select:
 
 
 def spis(board):
-    """The three SPIs of the STM32F405 with their candidate pins."""
+    """Creates the three SPIs of the STM32F405 with their candidate pins."""
     one = ((("A", 4), ("A", 15)), (("A", 5), ("B", 3)), (("A", 6), ("B", 4)), (("A", 7), ("B", 5)))
     two = ((("B", 9), ("B", 12)), (("B", 10), ("B", 13)), (("B", 14), ("C", 2)), (("B", 15), ("C", 3)))
     three = ((("A", 4), ("A", 15)), (("B", 3), ("C", 10)), (("B", 4), ("C", 11)), (("B", 5), ("C", 12)))

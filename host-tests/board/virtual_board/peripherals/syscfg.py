@@ -20,7 +20,7 @@ class Syscfg(Peripheral):
         self.exticr = [0, 0, 0, 0]
 
     def selects(self, line, port):
-        """EXTI line `line` listens to the pin of port number `port` (A is 0)."""
+        """Returns whether EXTI line `line` is connected to the pin of port number `port` (A is 0)."""
         return self.exticr[line >> 2] >> 4 * (line & 3) & 15 == port
 
     def read(self, offset, size):

@@ -1,7 +1,7 @@
 """General-purpose timers as up-counters with compare and capture (RM0090 sections 18 and 19).
 
-The counter is computed from the board's time; an event is kept only while DIER lets something interrupt. TIM11 channel 1 captures HSE
-divided by RTCPRE and TIM5 channel 4 the LSI (sections 19.5.11 and 18.4.20), which is how software measures an oscillator.
+The counter is computed from board time; an event is scheduled only while DIER enables an interrupt. TIM11 channel 1 captures HSE
+divided by RTCPRE and TIM5 channel 4 the LSI (sections 19.5.11 and 18.4.20), which lets software measure an oscillator.
 Left out: counting down, PWM outputs and the preload of CCR, slave mode, encoder, DMA requests, captures of a pin.
 """
 
@@ -48,7 +48,7 @@ class Timer(Peripheral):
     # -- counting ----------------------------------------------------------------------------------------------------
 
     def _steps(self, now):
-        """Steps of the counter since `since`; a blocked counter (ARR = 0) makes none (section 18.3.1)."""
+        """Returns the steps of the counter since `since`; a blocked counter (ARR = 0) makes none (section 18.3.1)."""
         if not self.cr1 & CEN or not self.arr or not self.hz:
             return 0
         return (now - self.since) * self.hz // (PS * (self.prescaler + 1))
@@ -57,12 +57,12 @@ class Timer(Peripheral):
         return (self.arr if self.counter <= self.arr else self.mask) - self.counter + 1
 
     def _after(self, steps):
-        """The counter's value `steps` after `since`."""
+        """Returns the counter's value `steps` after `since`."""
         first = self._to_overflow()
         return self.counter + steps if steps < first else (steps - first) % (self.arr + 1)
 
     def _sync(self):
-        """Everything that has happened up to now enters the flags and the counter."""
+        """Updates the flags and the counter with everything that has happened up to now."""
         now = self.board.now
         self._capture(now)
         steps = self._steps(now)
@@ -84,7 +84,7 @@ class Timer(Peripheral):
             self._advance(steps)
 
     def _steady(self):
-        """No overflow changes how the counter goes on, so its value follows from the time alone."""
+        """Returns whether the counter's value follows from the time alone, since no overflow changes how it counts."""
         return self.prescaler_written == self.prescaler and self.arr_written == self.arr and not self.cr1 & OPM
 
     def _counted(self):
@@ -97,7 +97,7 @@ class Timer(Peripheral):
         self.counter = value
 
     def _matches(self, steps):
-        """A compare channel whose value the counter passes sets its flag (section 18.3.7)."""
+        """Sets the flag of each compare channel whose value the counter passes (section 18.3.7)."""
         for channel in range(self.channels):
             if self._selection(channel):
                 continue
@@ -105,7 +105,7 @@ class Timer(Peripheral):
                 self.sr |= 2 << channel
 
     def _distance(self, value):
-        """Steps until the counter next takes a value; more than any count where it never does."""
+        """Returns the steps until the counter next takes a value; more than any count if it never does."""
         first = self._to_overflow()
         if self.counter < value < self.counter + first:
             return value - self.counter
@@ -115,7 +115,7 @@ class Timer(Peripheral):
         return self.ccmr[channel >> 1] >> 8 * (channel & 1) & 3
 
     def _capture(self, now):
-        """Edges of the internal source since the last look leave the last one's time in CCR."""
+        """Stores the time of the last edge of the internal source in CCR, if there were edges since the last call."""
         if self.remap is None:
             return
         channel, _, selector = self.remap
@@ -145,7 +145,7 @@ class Timer(Peripheral):
         return now * numerator // (denominator * PS)
 
     def clocks_changed(self):
-        """The timer's clock has changed; what it has counted at the old one is kept."""
+        """Handles a change of the timer's clock; what was counted at the old one is kept."""
         hz = self.board.rcc.clock_hz(self.bus)
         if hz != self.hz:
             self._sync()
@@ -162,7 +162,7 @@ class Timer(Peripheral):
             self.board.irq(self.interrupt, level)
 
     def _arm(self):
-        """One event is kept for the next flag that may interrupt."""
+        """Schedules one event for the next flag that may interrupt."""
         if self.event:
             self.event.cancel()
             self.event = None
@@ -291,12 +291,12 @@ class Timer(Peripheral):
         self._arm()
 
     def _stored(self, word):
-        """The word that a half-word store is merged into, without the effects of a read."""
+        """Returns the word into which a half-word store is merged, without the side effects of a read."""
         return {0x24: self.counter, 0x2C: self.arr_written, 0x34: self.ccr[0], 0x38: self.ccr[1], 0x3C: self.ccr[2],
                 0x40: self.ccr[3]}.get(word, 0)
 
     def _generate(self, value):
-        """UG starts the counter and the prescaler again and takes over the preloaded values (section 18.4.6)."""
+        """Handles UG, which restarts counter and prescaler and loads the preloaded values (section 18.4.6)."""
         if value & UIF:
             self.counter, self.since = 0, self.board.now
             if not self.cr1 & UDIS:
@@ -316,18 +316,18 @@ class Timer(Peripheral):
 
 
 def _hse_rtc(timer):
-    """TI1_RMP = 10 connects HSE divided by RTCPRE to channel 1 of TIM11 (section 19.5.11)."""
+    """Returns the frequency of HSE divided by RTCPRE, which TI1_RMP = 10 connects to channel 1 of TIM11 (section 19.5.11)."""
     return timer.board.rcc.hse_rtc_hz() if timer.option & 3 == 2 else (0, 1)
 
 
 def _lsi(timer):
-    """TI4_RMP = 01 connects the LSI to channel 4 of TIM5 (section 18.4.20)."""
+    """Returns the frequency of the LSI, which TI4_RMP = 01 connects to channel 4 of TIM5 (section 18.4.20)."""
     rcc = timer.board.rcc
     return (rcc.lsi_hz, 1) if timer.option >> 6 & 3 == 1 and rcc.csr & 2 else (0, 1)
 
 
 def timers(board):
-    """The timers that are modelled."""
+    """Creates the modelled timers."""
     return [Timer(board, "TIM2", 0x4000_0000, 28, "TIM_APB1", 32, 4),
             Timer(board, "TIM3", 0x4000_0400, 29, "TIM_APB1", 16, 4),
             Timer(board, "TIM4", 0x4000_0800, 30, "TIM_APB1", 16, 4),

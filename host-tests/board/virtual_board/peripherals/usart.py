@@ -1,12 +1,12 @@
-"""USARTs in asynchronous mode (RM0090 section 30) with a line to the outside that has a baud rate of its own.
+"""USARTs in asynchronous mode (RM0090 section 30), each with an external line that has its own baud rate.
 
-A byte takes the time that BRR and the peripheral clock give it. The outside sends and listens at `baud`; where the two differ by more
-than 3.5 % the receiver samples wrong bits and reports a framing error, and the outside gets wrong bytes (table 140: receiver tolerance).
-A byte reaches a pin only if one of the port pins of the USART has the alternate function (DS8626 table 9).
+The duration of a byte follows from BRR and the peripheral clock. The external device sends and listens at `baud`; if the rates differ
+by more than 3.5 % the receiver samples wrong bits and reports a framing error, and the device gets wrong bytes (table 140: receiver
+tolerance). A byte reaches a pin only if one of the port pins of the USART has the alternate function (DS8626 table 9).
 Left out: synchronous, LIN, IrDA, smartcard and half-duplex modes, flow control, multiprocessor mute, the break character, noise.
-Rests on the manual's silence: a frame that had begun before RE was set is lost whole.
+Assumed where the manual is silent: a frame that began before RE was set is lost completely.
 
-Settings: `baud` (of the outside), `outside_stop_bits`. Calls of a test: `inject`, `take_sent`.
+Settings: `baud` (of the external device), `outside_stop_bits`. Calls of a test: `inject`, `take_sent`.
 """
 
 from collections import deque
@@ -26,7 +26,7 @@ SBK, RWU, RE, TE, IDLEIE, RXNEIE, PEIE, PS_ODD, PCE, M, UE, OVER8 = (
 EIE, DMAR, DMAT = 1 << 0, 1 << 6, 1 << 7
 TOLERANCE = 0.035
 STOP_HALVES = (2, 1, 4, 3)
-#: Bytes that come within this time, in picoseconds, may arrive at once where DMA alone notices.
+#: Bytes that arrive within this time, in picoseconds, may be received at once if only DMA notices them.
 AT_ONCE = 500_000_000
 
 
@@ -45,7 +45,7 @@ class Usart(Peripheral):
         self.line = deque()
         self.line_free = 0
         self.arrival = self.departure = self.idle_event = None
-        #: Whether bytes arrive several at a time.
+        #: Whether several bytes are received at a time.
         self.at_once = False
         self.lost = 0
         self.noted = {}
@@ -76,13 +76,13 @@ class Usart(Peripheral):
             self._await()
 
     def power_off(self):
-        """The board's events are gone with its power; bytes that come meanwhile go past it."""
+        """Drops the scheduled events, which are lost with the power; bytes that arrive meanwhile are lost."""
         self.arrival = self.departure = self.idle_event = None
 
     # -- timing ------------------------------------------------------------------------------------------------------
 
     def clocks_changed(self):
-        """Bit and frame times follow from BRR and the bus clock (section 30.3.4)."""
+        """Computes bit and frame times from BRR and the bus clock (section 30.3.4)."""
         if self.cr1 & OVER8:
             divider = (self.brr >> 4) * 8 + (self.brr & 7)
         else:
@@ -94,14 +94,14 @@ class Usart(Peripheral):
         self._compare()
 
     def _compare(self):
-        """What a byte costs follows from both sides' rates: the time to the middle of its stop bit, and the difference of rates."""
+        """Computes, from both sides' rates, the time to the middle of a byte's stop bit, and the relative difference of the rates."""
         bit = self.bit_ps or PS // self.baud
         self.sampled_ps = (10 if self.cr1 & M else 9) * bit + bit // 2
-        #: The relative difference between the USART's bit time and the outside's.
+        #: The relative difference between the USART's bit time and the external device's.
         self.mismatch = self.bit_ps * self.baud / PS - 1
 
     def _note_mismatch(self, direction, error):
-        """The first byte at each pair of rates is recorded."""
+        """Records the first byte at each pair of rates."""
         if self.noted.get(direction) != error:
             self.noted[direction] = error
             self.board.record("baud_mismatch", usart=self.name, direction=direction, error=error)
@@ -109,7 +109,7 @@ class Usart(Peripheral):
     # -- transmitter -------------------------------------------------------------------------------------------------
 
     def _load(self):
-        """The data register's byte moves into the shift register, which sets TXE (section 30.3.2)."""
+        """Moves the data register's byte into the shift register, which sets TXE (section 30.3.2)."""
         self.shift, self.tdr = self.tdr, None
         self.sr |= TXE
         start = max(self.board.now, self.preamble_until)
@@ -134,14 +134,14 @@ class Usart(Peripheral):
             self.serve_dma()
 
     def take_sent(self):
-        """The bytes that left the TX pin since the last call: (end of the stop bit in picoseconds, byte)."""
+        """Returns the bytes that left the TX pin since the last call: (end of the stop bit in picoseconds, byte)."""
         sent, self.sent = self.sent, []
         return sent
 
     # -- receiver ----------------------------------------------------------------------------------------------------
 
     def inject(self, data, at_ps=None):
-        """The outside sends bytes back to back, not before `at_ps` and after all it was given earlier."""
+        """Sends bytes from the external device back to back, not before `at_ps` and after all bytes injected earlier."""
         start = max(self.line_free, self.board.now if at_ps is None else at_ps)
         frame = (9 + self.outside_stop_bits) * PS // self.baud
         for byte in data:
@@ -162,12 +162,12 @@ class Usart(Peripheral):
             self.arrival = None
 
     def _only_dma_notices(self):
-        """Whether bytes raise no interrupt on their way to memory."""
+        """Returns whether bytes go to memory without an interrupt."""
         return bool(self.cr3 & DMAR and not self.cr1 & (RXNEIE | IDLEIE | M | PCE) and abs(self.mismatch) <= 0.02
                     and self.board.peripherals[self.dma].serves_silently(self.name + "_RX"))
 
     def _arrived(self):
-        """The receiver has sampled the middle of a stop bit."""
+        """Handles the sampling of the middle of a stop bit."""
         self.arrival = None
         self._take_due()
         self._await()
@@ -175,7 +175,7 @@ class Usart(Peripheral):
             self._watch_idle()
 
     def catch_up(self):
-        """Receives what has come while DMA alone notices, and plans again where more than that is wanted now."""
+        """Receives what has arrived while only DMA notices, and schedules the next reception again if that has changed."""
         if self.at_once:
             self._take_due()
             if self.arrival and not self._only_dma_notices():
@@ -206,7 +206,7 @@ class Usart(Peripheral):
         self.at_once = at_once
 
     def _listens(self, start):
-        """Whether a byte that begins at `start` is received."""
+        """Returns whether a byte that begins at `start` is received."""
         since = self.listening_since
         return since is not None and since <= start and connected(self.board, self.rx_pins, self.function)
 
@@ -240,7 +240,7 @@ class Usart(Peripheral):
         return value, framing
 
     def _detect_idle(self, now):
-        """A whole frame of ones after the last byte sets IDLE once (section 30.3.3)."""
+        """Sets IDLE once after a whole frame of ones since the last byte (section 30.3.3)."""
         if self.idle_armed and now >= self.last_end + self.frame_ps:
             self.idle_armed = False
             self.sr |= IDLE
@@ -269,7 +269,7 @@ class Usart(Peripheral):
             self.board.irq(self.interrupt, level)
 
     def serve_dma(self):
-        """The stream that is wired to this USART moves bytes as long as RXNE or TXE asks for it."""
+        """Lets the DMA stream of this USART move bytes as long as RXNE or TXE requests it."""
         if not self.cr3 & (DMAR | DMAT):
             return
         dma = self.board.peripherals[self.dma]
@@ -281,7 +281,7 @@ class Usart(Peripheral):
     def read(self, offset, size):
         if self.at_once:
             self.catch_up()
-        # Section 30.6 asks for half-words or words; the bridge to the bus makes words of all reads, as it does for DMA.
+        # Section 30.6 requires half-words or words; the bus bridge converts all reads to words, as it does for DMA.
         if size == 1 and offset != 0x04:
             registers.check(self, offset, size, registers.HALF_WORD)
         if offset == 0x00:
@@ -393,7 +393,7 @@ class Usart(Peripheral):
 
 
 def _sampled(byte, sampler_bit_ps, sender_bit_ps):
-    """The byte and the framing error that a receiver sees which samples the middle of its own bits."""
+    """Returns the byte and the framing error of a receiver that samples the middle of its own bits."""
     levels = [0, *(byte >> bit & 1 for bit in range(8)), 1]
     value, stop = 0, 1
     for bit in range(1, 10):
@@ -407,7 +407,7 @@ def _sampled(byte, sampler_bit_ps, sender_bit_ps):
 
 
 def usarts(board):
-    """The six USARTs and UARTs of the STM32F405 with their candidate pins."""
+    """Creates the six USARTs and UARTs of the STM32F405 with their candidate pins."""
     table = (("USART1", 0x4001_1000, 37, "PCLK2", 7, (("A", 9), ("B", 6)), (("A", 10), ("B", 7))),
              ("USART2", 0x4000_4400, 38, "PCLK1", 7, (("A", 2), ("D", 5)), (("A", 3), ("D", 6))),
              ("USART3", 0x4000_4800, 39, "PCLK1", 7, (("B", 10), ("C", 10), ("D", 8)), (("B", 11), ("C", 11), ("D", 9))),

@@ -39,7 +39,7 @@ class Wwdg(Peripheral):
         return self.counter - steps & 0x7F
 
     def _arm(self):
-        """The counter reaches 0x40, which warns, and then 0x3F, which resets."""
+        """Schedules the warning at counter value 0x40, and the reset at 0x3F."""
         self._cancel()
         if not self.active:
             return
@@ -58,7 +58,7 @@ class Wwdg(Peripheral):
         self.board.request_reset("wwdg")
 
     def clocks_changed(self):
-        """The bus clock has changed: the steps that are left last as long as the new clock says."""
+        """Handles a change of the bus clock: the remaining steps are timed with the new clock."""
         if self.active and self.events:
             self._arm()
 

@@ -9,7 +9,7 @@ use gyronet::service::Request;
 use gyronet::service::calibrate::{CalibrationFault, State, Task};
 use gyronet::service::message::{Calibrate, Refusal};
 use gyronet::store::{Configuration, Learned, Mounting, UnitMap};
-use gyronet::uds::isotp::LONGEST;
+use gyronet::uds::isotp::MAX_MESSAGE;
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
 use gyronet_host_tests::flash::F405;
 use gyronet_host_tests::stored::open;
@@ -105,7 +105,7 @@ fn what_was_learnt_fits_a_response_and_a_record() {
         forward: Some(Forward { direction: [-0.577; 3], sigma: 0.171 }),
     };
     let record = postcard::to_stdvec(&learned).expect("there is room");
-    assert!(record.len() + 4 <= LONGEST, "{} bytes", record.len());
+    assert!(record.len() + 4 <= MAX_MESSAGE, "{} bytes", record.len());
     let flash = Rc::new(RefCell::new(F405::default()));
     assert_eq!(open(&flash).expect("an empty flash").set(&learned), Ok(()));
 }

@@ -1,6 +1,6 @@
 //! The configuration is stored whole, at standstill alone, and refused where it is wrong.
 
-use super::{Board, DRIVES, IDENTITY, ask, bare, info, sample, set, start};
+use super::{Board, IDENTITY, SUPPORTED_HARDWARE, ask, bare, info, sample, set, start};
 use embedded_can::{Id, StandardId};
 use gyronet::can::config::{ConfigError, Settings};
 use gyronet::can::diagnosis::DiagnosisIds;
@@ -125,7 +125,7 @@ fn what_is_stored_is_read_without_a_controller() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
     assert_eq!(ask(&mut start(&flash), &set(&wanted)), Ok(()));
-    let mut board = Board::new(&DRIVES);
+    let mut board = Board::new(&SUPPORTED_HARDWARE);
     let records = Region::new(&flash, layout::STORE);
     board.begin(Some(records), Some(MappedRegion::new(&flash)), false, IDENTITY);
     assert_eq!(*board.configuration(), wanted);

@@ -1,6 +1,6 @@
 //! Messages of more than seven bytes in CAN frames (ISO 15765-2), and every way to break their order.
 
-use gyronet::uds::isotp::{BLOCK, LONGEST, TIMEOUT_MS, Transport};
+use gyronet::uds::isotp::{BLOCK, MAX_MESSAGE, TIMEOUT_MS, Transport};
 use gyronet_host_tests::tester::{frame, segment};
 
 /// Gives a whole request to a transport; returns the number of flow controls that it took.
@@ -23,7 +23,7 @@ fn long(length: usize) -> Vec<u8> {
 #[test]
 fn short_and_long_requests_arrive_whole() {
     let mut transport = Transport::new();
-    for length in (1..=LONGEST).chain([7, 8]) {
+    for length in (1..=MAX_MESSAGE).chain([7, 8]) {
         let request = long(length);
         let consecutive = request.len().saturating_sub(6).div_ceil(7);
         let controls = give(&mut transport, &request);
@@ -89,7 +89,7 @@ fn a_frame_out_of_order_ends_the_request_and_the_next_one_is_taken() {
 #[test]
 fn a_request_that_is_too_long_is_refused_by_its_first_frame() {
     let mut transport = Transport::new();
-    let [high, low] = (LONGEST as u16 + 1).to_be_bytes();
+    let [high, low] = (MAX_MESSAGE as u16 + 1).to_be_bytes();
     let too_long = [0x10 | high, low, 0, 0, 0, 0, 0, 0];
     // 4 GB less one, in the long form.
     let four_gb = [0x10, 0x00, 0xFF, 0xFF, 0xFF, 0xFF, 0x36, 1];

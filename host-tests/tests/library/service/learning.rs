@@ -179,7 +179,7 @@ fn how_far_a_sensor_must_be_moved_depends_on_how_well_forward_was_known() {
         [(1.0, 20.0, false), (1.0, 35.0, true), (9.0, 35.0, false), (9.0, 90.0, true)]
     {
         let mut learned = Learned::NOTHING;
-        learned.stood(sample(0, LEVEL, 0.0).specific_force);
+        learned.add_standstill(sample(0, LEVEL, 0.0).specific_force);
         let known = Forward { direction: [1.0, 0.0, 0.0], sigma: f32::to_radians(sigma_deg) };
         learned.forward = Some(known);
         let (mut learner, limits) = (Learner::new(), StaticConfig::DEFAULT);

@@ -48,7 +48,7 @@ fn serve(name: &str, stop: &AtomicBool) {
                 _ => {}
             }
         }
-        server.turn(&mut board, &AllCounters::default(), now, || None);
+        server.poll(&mut board, &AllCounters::default(), now, || None);
         while let Some(data) = server.next_frame(now) {
             let _ = line.send(&frame(0x7E8, &data));
         }

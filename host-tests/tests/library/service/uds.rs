@@ -43,7 +43,7 @@ impl Bench {
         let Self { server, board, now, tester, seeds } = self;
         tester.ask(request, 400, |frames| {
             frames.iter().for_each(|data| server.receive(data, *now));
-            server.turn(board, &AllCounters::default(), *now, || seeds.pop());
+            server.poll(board, &AllCounters::default(), *now, || seeds.pop());
             *now += 1;
             std::iter::from_fn(|| server.next_frame(*now)).collect()
         })
@@ -69,7 +69,7 @@ impl Bench {
 
     fn fail(&mut self, status: Status, faults: Faults) {
         self.board.observe(None, 0, (status, faults), &WheelSample::without_speeds(Standstill::Unknown));
-        self.server.turn(&mut self.board, &AllCounters::default(), self.now, || None);
+        self.server.poll(&mut self.board, &AllCounters::default(), self.now, || None);
     }
 }
 
@@ -152,7 +152,7 @@ fn requests_to_all_servers_are_refused_in_silence() {
     let mut functional = |request: &[u8]| {
         let Bench { server, board, now, .. } = &mut bench;
         server.receive_functional(&frame(&[request.len() as u8], request), *now);
-        server.turn(board, &AllCounters::default(), *now, || None);
+        server.poll(board, &AllCounters::default(), *now, || None);
         server.next_frame(*now).map(|data| data[1..=usize::from(data[0])].to_vec())
     };
     assert_eq!(functional(&[0x3E, 0]), Some(vec![0x7E, 0]));
@@ -220,7 +220,7 @@ fn a_trouble_survives_a_restart_with_the_state_in_which_it_came() {
         &WheelSample::without_speeds(Standstill::Unknown),
     );
     let operations = flash.borrow().operations();
-    bench.server.turn(&mut bench.board, &AllCounters::default(), 0, || None);
+    bench.server.poll(&mut bench.board, &AllCounters::default(), 0, || None);
     assert!(flash.borrow().operations() > operations);
     // It is stored once, whatever it does afterwards.
     let operations = flash.borrow().operations();

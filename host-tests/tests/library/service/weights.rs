@@ -1,7 +1,7 @@
 //! Weights are uploaded block by block, checked, and used after the next start.
 
 use super::{Board, ask, info, start};
-use gyronet::fog::{FogNetUse, NotForThisGyro};
+use gyronet::fog::{FogNetUse, GyroMismatch};
 use gyronet::model::fognet_blob::{BlobError, FOGNET};
 use gyronet::model::{FogBlob, weights};
 use gyronet::service::Request;
@@ -125,7 +125,7 @@ fn fognets_weights_run_on_the_gyro_that_they_were_trained_for() {
     let mut board = start(&flash);
     upload(&mut board, &weights::FOGNET.0);
     assert_eq!(board.uploaded(), Some((Place::FogNet, crc)));
-    assert!(board.take_fognet_gone() && !board.take_fognet_gone(), "once");
+    assert!(board.take_fognet_unavailable() && !board.take_fognet_unavailable(), "once");
     // It is there, but nobody has accepted it.
     assert_eq!(fognet(&flash, &own), Some(Err(SlotError::NotAccepted(crc))));
     let mut board = start(&flash);
@@ -149,10 +149,7 @@ fn fognets_weights_run_on_the_gyro_that_they_were_trained_for() {
         ),
     ] {
         let refused = fognet(&flash, &other).expect("it is asked for").expect_err("for another gyro");
-        assert!(matches!(
-            refused,
-            SlotError::Gyro(NotForThisGyro::Other { .. } | NotForThisGyro::Simulated(_))
-        ));
+        assert!(matches!(refused, SlotError::Gyro(GyroMismatch::Other { .. } | GyroMismatch::Simulated(_))));
         assert_eq!(refused.to_string(), why);
         assert!(start(&flash).stored_damaged(), "the status reports it");
     }
@@ -213,7 +210,7 @@ fn an_upload_that_is_refused_stops_nothing() {
         assert_eq!(ask(&mut board, &request), Err(Refusal::Slot(SlotError::Length(length))));
     }
     assert_eq!((info(&mut board).fognet, flash.borrow().operations()), (running, before));
-    assert!(!board.take_fognet_gone());
+    assert!(!board.take_fognet_unavailable());
     // One that begins stops it, and damage does.
     let request = Request::WeightsBegin { network: Network::FogNet, length: 64 };
     let mut damaged = start(&flash);
@@ -222,7 +219,7 @@ fn an_upload_that_is_refused_stops_nothing() {
     for (mut board, why) in [(board, None), (damaged, running.and_then(Result::ok))] {
         let why = why.map_or(SlotError::Empty, SlotError::NotAccepted);
         assert_eq!(info(&mut board).fognet, Some(Err(why)));
-        assert!(board.take_fognet_gone());
+        assert!(board.take_fognet_unavailable());
     }
 }
 

@@ -8,31 +8,31 @@ use crate::stm32f405::usart::{Status, Usart};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::NVIC;
 
-/// Counts a line's faults since the start. The handler alone counts.
+/// Counts a line's faults since the start. Only the handler counts.
 pub struct Faults {
     lost: AtomicU32,
-    held: AtomicU32,
-    /// A byte waits in the register, and the handler has been switched off.
+    delayed: AtomicU32,
+    /// True while a byte waits in the register and the interrupt is masked.
     holding: AtomicBool,
 }
 
 impl Faults {
-    /// Starts at zero.
+    /// Creates counters at zero.
     pub const fn new() -> Self {
-        Self { lost: AtomicU32::new(0), held: AtomicU32::new(0), holding: AtomicBool::new(false) }
+        Self { lost: AtomicU32::new(0), delayed: AtomicU32::new(0), holding: AtomicBool::new(false) }
     }
 
-    /// Bytes that came damaged, or while one waited in the register.
+    /// Returns the number of bytes that were damaged, or lost while another byte waited in the register.
     pub fn lost(&self) -> u32 {
         self.lost.load(Ordering::Relaxed)
     }
 
-    /// Bytes that had to wait in the register.
-    pub fn held(&self) -> u32 {
-        self.held.load(Ordering::Relaxed)
+    /// Returns the number of bytes that had to wait in the register.
+    pub fn delayed(&self) -> u32 {
+        self.delayed.load(Ordering::Relaxed)
     }
 
-    /// Lets the handler go on where it was switched off: there is room again.
+    /// Unmasks the interrupt if it was masked, because there is room again.
     pub fn release(&self, usart: &Usart) {
         if self.holding.swap(false, Ordering::Relaxed) {
             raise(usart);
@@ -40,10 +40,10 @@ impl Faults {
     }
 }
 
-/// Runs the handler, even where it was switched off. Pended by hand: the emulated line raises no interrupt when it can
-/// send, nor a second time for a byte that came while the one before was read.
+/// Runs the handler, even if its interrupt is masked. The emulated line raises no interrupt when it can send, nor a
+/// second one for a byte that arrived while the previous one was read.
 pub fn raise(usart: &Usart) {
-    // SAFETY: the handler shares nothing but the rings, and nobody masks an interrupt to keep it from them.
+    // SAFETY: the handler shares only the rings, and no code masks an interrupt to protect them.
     unsafe { NVIC::unmask(usart.interrupt) };
     NVIC::pend(usart.interrupt);
 }
@@ -52,7 +52,7 @@ fn count(counter: &AtomicU32) {
     counter.store(counter.load(Ordering::Relaxed).saturating_add(1), Ordering::Relaxed);
 }
 
-/// The interrupt's end of a line.
+/// The interrupt handler's end of a line.
 pub struct Handler {
     pub usart: Usart,
     pub received: &'static Ring<u8, RECEIVED>,
@@ -78,12 +78,12 @@ impl Handler {
         }
     }
 
-    /// Moves a byte each way. The interrupt is raised again for the next one by hand: the emulated USART has all bytes
-    /// of the host at once, and raises it for the first.
+    /// Moves a byte in each direction, and pends the interrupt for the next one: the emulated USART has all bytes of
+    /// the host at once, and raises the interrupt only for the first.
     #[inline(always)]
     fn move_bytes(&mut self, status: Status) {
         let took = status.received() && self.take(status);
-        // Also where there was no room for a byte: a task that waits to send would never make room.
+        // Send even if a received byte found no room: otherwise a task that waits to send would never make room.
         let gave = status.room() && self.give();
         let wanted = !self.sending.is_empty();
         if wanted != self.room_requested {
@@ -95,7 +95,7 @@ impl Handler {
         }
     }
 
-    /// Takes the byte that has come; whether there was room for it.
+    /// Takes the received byte; returns whether there was room for it.
     #[inline(always)]
     fn take(&mut self, status: Status) -> bool {
         if !self.received.push_with(|| self.usart.read()) {
@@ -108,17 +108,17 @@ impl Handler {
         true
     }
 
-    /// Leaves the byte in the register until there is room; the line then reports an overrun. The interrupt is
-    /// masked in the NVIC: the emulated USART keeps it raised whatever its own enable bit says.
+    /// Leaves the byte in the register until there is room; the line then reports an overrun. The interrupt is masked
+    /// in the NVIC, because the emulated USART keeps it raised whatever its own enable bit says.
     #[cold]
     fn hold(&self) {
         NVIC::mask(self.usart.interrupt);
         if !self.faults.holding.swap(true, Ordering::Relaxed) {
-            count(&self.faults.held);
+            count(&self.faults.delayed);
         }
     }
 
-    /// Gives the line the next byte; whether there was one.
+    /// Writes the next byte to the USART; returns whether there was one.
     #[inline(always)]
     fn give(&mut self) -> bool {
         let byte = self.sending.pop();
