@@ -39,28 +39,33 @@ pub fn lstm<const I: usize, const H: usize, const W: usize>(
     offset: usize,
 ) {
     let units = weights.units();
-    let inputs = weights.weight_ih.len() / (GATES * units).max(1);
-    let mut h = [0.0; H];
-    let mut s = [0.0; H];
+    let [mut h, mut next, mut s] = [[0.0; H]; 3];
     for n in 0..x.len() {
         let t = if backward { x.len() - 1 - n } else { n };
-        let mut next = [0.0; H];
-        for u in 0..units {
-            let preactivation = |gate: usize| {
-                let row = gate * units + u;
-                let (ih, hh) = (row * inputs..(row + 1) * inputs, row * units..(row + 1) * units);
-                let input = dense(&weights.weight_ih[ih], weights.bias_ih[row], &x[t]);
-                input + dense(&weights.weight_hh[hh], weights.bias_hh[row], &h)
-            };
-            let i = sigmoid(preactivation(0)); // Eq. 8
-            let f = sigmoid(preactivation(1)); // Eq. 9
-            let g = libm::tanhf(preactivation(2)); // Eq. 7
-            let o = sigmoid(preactivation(3)); // Eq. 10
-            s[u] = g * i + s[u] * f; // Eq. 11
-            next[u] = libm::tanhf(s[u]) * o; // Eq. 12
-        }
+        step(weights, &x[t], &h, &mut s, &mut next);
         h = next;
         output[t][offset..offset + units].copy_from_slice(&h[..units]);
+    }
+}
+
+/// Computes one time step of all units: from the input `x` (I), the hidden state `h` (H) and the cell state `s` (H) the
+/// next hidden state (H).
+fn step(weights: &LstmWeights<'_>, x: &[f32], h: &[f32], s: &mut [f32], next: &mut [f32]) {
+    let units = weights.units();
+    let inputs = weights.weight_ih.len() / (GATES * units).max(1);
+    for u in 0..units {
+        let preactivation = |gate: usize| {
+            let row = gate * units + u;
+            let (ih, hh) = (row * inputs..(row + 1) * inputs, row * units..(row + 1) * units);
+            let input = dense(&weights.weight_ih[ih], weights.bias_ih[row], x);
+            input + dense(&weights.weight_hh[hh], weights.bias_hh[row], h)
+        };
+        let i = sigmoid(preactivation(0)); // Eq. 8
+        let f = sigmoid(preactivation(1)); // Eq. 9
+        let g = libm::tanhf(preactivation(2)); // Eq. 7
+        let o = sigmoid(preactivation(3)); // Eq. 10
+        s[u] = g * i + s[u] * f; // Eq. 11
+        next[u] = libm::tanhf(s[u]) * o; // Eq. 12
     }
 }
 

@@ -96,30 +96,27 @@ impl Rates {
         let run = |network: &mut Network<'_>, tick: &mut dyn FnMut()| {
             Replay::run(&recording, &PipelineConfig::DEFAULT, wheels.clone(), network, tick)
         };
-        // The f32 network takes as long as all others.
-        let [float, integer] = std::thread::scope(|scope| {
+        // The f32 network takes longer than all others together.
+        let (float, integer, default, sent) = std::thread::scope(|scope| {
             let float = scope.spawn(|| run(&mut networks.float, &mut || {}));
-            let integer = run(&mut networks.integer, &mut tick);
-            [float.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), integer]
+            let mut timed = |network: &mut Network<'_>| {
+                let start = Instant::now();
+                run(network, &mut tick).map(|drive| (drive, start.elapsed()))
+            };
+            let integer = timed(&mut networks.integer);
+            let default = timed(&mut networks.default);
+            let sent = networks.sent.as_mut().map(timed);
+            (float.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), integer, default, sent)
         });
-        let [float, integer] = [float?, integer?];
-        let mut start = Instant::now();
-        let default = run(&mut networks.default, &mut tick)?;
+        let (float, (integer, _), default) = (float?, integer?, default?);
         let settled = |drive: &Replay| drive.settled().map(|rate| rate.rad_per_sec()).collect::<Vec<f64>>();
-        let linear = settled(&default);
+        let linear = settled(&default.0);
         let shapes = Shapes {
             float: networks.float.shape,
             integer: networks.integer.shape,
             sent: networks.sent.as_ref().unwrap_or(&networks.default).shape,
         };
-        let drive = match &mut networks.sent {
-            Some(sent) => {
-                start = Instant::now();
-                run(sent, &mut tick)?
-            }
-            None => default,
-        };
-        let run_time = start.elapsed();
+        let (drive, run_time) = sent.transpose()?.unwrap_or(default);
 
         let compared = || drive.steps[drive.compared()].iter();
         let row = |row: usize| &recording.rows[row];
