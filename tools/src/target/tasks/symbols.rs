@@ -8,7 +8,7 @@ use std::path::Path;
 /// Function that the output task runs for each sample.
 const WATCHED: &str = "gyronet::coprocessor::Coprocessor::imu";
 /// Function that the output task runs to check all lines.
-const LOOKING: &str = "output::Output::look";
+const LOOKING: &str = "output::Output::poll_inputs";
 /// The exception numbers and names of the handlers (RM0090, table 62), and the data register that a serial line's
 /// handler reads and writes (RM0090, table 1 and 30.6.2).
 const VECTORS: [(usize, &str, u32); 10] = [
