@@ -4,11 +4,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const PAGES: [&str; 19] = [
+const PAGES: [&str; 20] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "host-tests/README.md",
+    "host-tests/RELEASES.md",
     "host-tests/board/README.md",
     "host-tests/board/PERIPHERALS.md",
     "src/SAFETY.md",
