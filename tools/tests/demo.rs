@@ -18,7 +18,8 @@ fn demo(name: &str, arguments: &[&str]) -> (PathBuf, String) {
 
 #[test]
 fn the_page_needs_nothing_else_and_says_what_the_json_says() {
-    let (folder, json) = demo("demo-page", &["--json"]);
+    let drive = concat!(env!("CARGO_MANIFEST_DIR"), "/data/simulated_drive.csv");
+    let (folder, json) = demo("demo-page", &[drive, "--json"]);
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     let page = std::fs::read_to_string(folder.join("demo.html")).unwrap();
     for outside in ["http://", "https://", "src=", "href=", "@import", "url("] {
@@ -27,7 +28,7 @@ fn the_page_needs_nothing_else_and_says_what_the_json_says() {
     for section in ["Yaw", "Path", "Methods", "On the bus", "On the board", "Time and memory"] {
         assert!(page.contains(&format!("<h2>{section}</h2>")), "{section}");
     }
-    assert!(page.contains("Simulated drive."));
+    assert!(!page.contains("Simulated drive."), "it is a file like any other");
     assert_eq!(page.matches("<svg").count(), 3);
     // Six methods and the reference, six errors, three paths and the reference.
     assert_eq!(page.matches("<polyline").count(), 17);
@@ -50,7 +51,9 @@ fn the_page_needs_nothing_else_and_says_what_the_json_says() {
 
 #[test]
 fn the_readme_has_the_table_that_the_demo_prints() {
-    let (_, text) = demo("demo-text", &[]);
+    let (folder, text) = demo("demo-text", &[]);
+    let page = std::fs::read_to_string(folder.join("demo.html")).unwrap();
+    assert!(text.starts_with("A SIMULATED drive") && page.contains("Simulated drive."));
     let table = text.split("\n\n").find(|part| part.starts_with("heading error")).expect("a table");
     let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md")).unwrap();
     assert!(readme.contains(table), "{table}");

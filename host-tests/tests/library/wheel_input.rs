@@ -204,6 +204,16 @@ fn e2e_protected_frames_are_checked() {
 }
 
 #[test]
+fn settings_without_frames_read_no_wheels() {
+    let none = WheelSettings { frames: [None; 4], signals: [None; 4], ..WheelSettings::TOYOTA };
+    let mut receiver = WheelReceiver::new(none).expect("valid");
+    for k in 0..100 {
+        assert_eq!(receiver.decode(&at_kmh(0.0), Micros(k * 20 * MS)), None, "no frame is a wheel frame");
+        assert_eq!(receiver.poll(Micros(k * 20 * MS)), None, "and no wheel stands");
+    }
+}
+
+#[test]
 fn settings_that_cannot_be_are_refused() {
     let refused = |frame| WheelReceiver::new(settings(frame)).expect_err("refused");
     let [first, second, third, _] = settings(car()).signals;

@@ -12,7 +12,7 @@ pub const MAX_FRAMES: usize = WHEELS;
 /// Longest timeout and longest `still_for`, microseconds.
 const LONGEST_US: u64 = 10_000_000;
 
-/// The settings of [`WheelReceiver`](super::WheelReceiver).
+/// The settings of [`WheelReceiver`](super::WheelReceiver). Without frames and signals the board reads no wheel speeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelSettings {
@@ -34,7 +34,7 @@ pub struct WheelSettings {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WheelConfigError {
-    /// The number of wheels is neither two nor four.
+    /// The number of wheels is neither two nor four, and there are frames.
     #[error("{0} wheels instead of two or four")]
     Wheels(usize),
     /// The signal of a wheel refers to a frame that is not configured.
@@ -115,6 +115,7 @@ impl WheelSettings {
             }
         }
         match self.signals.iter().flatten().count() {
+            0 if frames().next().is_none() => Ok([false; WHEELS]),
             2 | 4 => Ok(self.signals.map(|signal| signal.is_some())),
             count => Err(WheelConfigError::Wheels(count)),
         }

@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_said_with_the_name() {
         for (message, start) in [
-            (refused(|bytes| bytes[0] = b'X'), "w.blob: weight file: this is none"),
+            (refused(|bytes| bytes[0] = b'X'), "w.blob: weight file: it begins with [58, 59"),
             (refused(|bytes| bytes[4] = 9), "w.blob: weight file: format version 9"),
             (refused(|bytes| bytes.truncate(70_001)), "w.blob: weight file: 70001 bytes"),
             (refused(Vec::clear), "w.blob: weight file: "),

@@ -98,7 +98,7 @@ pub struct WheelFile {
     /// Time for which all wheels must stand before the vehicle counts as standing, ms.
     #[serde(default = "still_for_ms")]
     pub still_for_ms: u32,
-    /// The frames.
+    /// The frames; `frame = []` for a vehicle without wheel speeds on its bus.
     pub frame: Vec<Frame>,
 }
 
@@ -461,6 +461,15 @@ signal = [
         let text = toml::to_string(&file).unwrap();
         let again = WheelFile::parse("car.toml", &text).unwrap().settings("car.toml").unwrap();
         assert_eq!(again, WheelSettings::TOYOTA);
+    }
+
+    #[test]
+    fn a_file_may_switch_wheels_off_but_not_by_omission() {
+        let settings = WheelFile::parse("none.toml", "frame = []").unwrap().settings("none.toml").unwrap();
+        assert_eq!((settings.frames, settings.signals), ([None; MAX_FRAMES], [None; WHEELS]));
+        let text = toml::to_string(&WheelFile::of(&settings)).unwrap();
+        assert_eq!(WheelFile::parse("none.toml", &text).unwrap().settings("none.toml").unwrap(), settings);
+        assert!(error("timeout_ms = 100").contains("missing field `frame`"));
     }
 
     #[test]
