@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// Weight of a new standstill in the mean specific force: 1 / `MEMORY`.
 const MEMORY: i64 = 8;
 
-/// What the board has learnt about the sensor at standstills and while driving, in sensor axes.
+/// The sensor data that the board learns at standstills and while driving, in sensor axes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Learned {

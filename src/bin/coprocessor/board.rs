@@ -36,7 +36,7 @@ pub struct Board {
     /// True where the board is emulated without a clock tree: its sensors send at the host's pace.
     pub emulated: bool,
     pub clocks: Clocks,
-    /// What the board reports about itself.
+    /// The identity that the board reports: firmware version, chip, clock and serial number.
     pub identity: Identity,
 }
 

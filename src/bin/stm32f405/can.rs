@@ -35,7 +35,7 @@ const LAST_RESTART_MS: u32 = 1_280;
 /// Number of frames that left a mailbox unsent. Only the transmit interrupt counts.
 static ABORTED: AtomicU32 = AtomicU32::new(0);
 
-/// How the controller takes part in the bus.
+/// The mode in which the controller runs on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
     /// The controller sends and acknowledges as a node.

@@ -63,7 +63,7 @@ impl fmt::Display for DataError {
     }
 }
 
-/// What is wrong with a file.
+/// The fault of a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each fault names its fields")]
@@ -155,7 +155,7 @@ pub enum DataFault {
     Marker(#[from] serde_json::Error),
 }
 
-/// What is wrong with one field.
+/// The fault of one field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValueError {
