@@ -1,4 +1,4 @@
-//! The virtual STM32F405 for tests: runs the image as flashed, on a model of the chip in Python (`board/README.md`).
+//! The virtual STM32F405 for tests: runs the image as flashed, on a model of the chip in Python (`host-tests/README.md`).
 //!
 //! The model runs in a process of its own. Board time passes only in [`Board::run`] and the `run_until` methods, so a
 //! test behaves the same on any machine. Whatever the model refuses (an unmodelled register, a peripheral without its

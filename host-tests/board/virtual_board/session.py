@@ -1,7 +1,10 @@
 """The commands of the protocol, with which a test controls a board.
 
 Each command is a method; its arguments are the fields of the JSON object beside `command`. Times are microseconds since
-power-on, data are hexadecimal digits. `README.md` lists the commands.
+power-on, data are hexadecimal digits.
+
+A condition of `until` is an event (`"lockup"`, `{"event": "reset", "cause": "iwdg"}`), or a number of bytes or frames that the board has
+sent and nobody has taken: `{"usart": 2, "bytes": 10}`, `{"can": 6}`.
 """
 
 from . import peripherals

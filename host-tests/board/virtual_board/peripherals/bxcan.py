@@ -4,7 +4,7 @@ The bus behind it is `can_bus.CanBus`, reached as `bus`; the filters are `can_fi
 Left out: time stamps (time-triggered mode can be set, and reading a stamp then ends the run), the debug freeze, CAN2.
 Assumed where the manual is silent: a receive pin without its alternate function reads dominant, so the controller does not synchronise;
 mailboxes keep their requests in initialisation and in bus-off; MSR.RX shows the level between frames; entering initialisation or Sleep
-outside of a frame takes one bit.
+outside of a frame takes one bit; each failed attempt sets ALST and TERR; only software clears FULL.
 
 Settings: those of `CanBus`: `bit_rate`, `acknowledge`, `connected`, `short`, `babble`, `keep_log`.
 """

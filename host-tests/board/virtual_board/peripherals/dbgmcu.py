@@ -1,6 +1,7 @@
 """MCU debug component (RM0090 section 38.16).
 
-DBGMCU_CR and the freeze registers keep their values and freeze nothing, since no debugger halts this board.
+DBGMCU_CR and the freeze registers keep their values and freeze nothing, since no debugger halts this board. IDCODE
+is that of revision Y.
 """
 
 from ..peripheral import Peripheral

@@ -7,7 +7,8 @@ Times are those of DS8626 tables 39 and 40 for the parallelism in PSIZE, typical
 
 Left out: read protection, the one-time programmable area, x64 (it needs an external voltage on VPP), read-while-write, stale cache
 lines. Assumed where the manual is silent: a STRT with neither SER nor MER does nothing; error flags that are still set do not stop
-the next operation; PG stays in force after LOCK is set; a key written while FLASH_CR is unlocked is ignored.
+the next operation; PG stays in force after LOCK is set; a key written while FLASH_CR is unlocked is ignored; OPTCR takes the time of a
+16 KiB erase. An interrupted erase has set, and an interrupted word has cleared, about the share of the bits by which it had advanced.
 
 Settings: `time_factor`, `seed` (of the content after a power cut), `option_bytes` (OPTCR as loaded at reset).
 """

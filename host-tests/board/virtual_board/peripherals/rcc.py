@@ -5,6 +5,8 @@ of the HSI oscillator and the frequency of the LSI. Times are those of DS8626 (t
 
 Left out: the I2S PLL, spread spectrum, HSI trimming, the clock outputs MCO1 and MCO2, gates in Sleep mode (the LPENR registers keep
 their values and gate nothing), and the LSE crystal unless a test fits one.
+Assumed where the manual is silent: the reserved word at 0x8C reads 0 and ignores writes; without CSS a core that runs from a dead crystal
+stops until a reset; a system clock changes 0.2 us after its source is ready.
 
 Settings: `hsi_error_percent`, `crystal_hz` (None: no crystal), `crystal_stop` (True stops the crystal; False lets it start again,
 though a core that it stopped stays stopped until a reset), `lsi_hz`, `lse_hz`, `hse_startup_us`, `pll_lock_us`, `strict`

@@ -3,7 +3,8 @@
 A frame takes its number of bits at the bus clock divided by BR. Data reach the slave only if SCK and MOSI have the alternate
 function, and come back only if MISO has it. `slow_pin`: SCK or MOSI has OSPEEDR 00 above 2 MHz (section 8.4.3; ES0182, corrupted last bit).
 Left out: slave mode, receive-only and one-wire modes, CRC, TI mode, I2S.
-Assumed: a chip-select line has a pull-up on the board, so a pin that is not yet an output does not select.
+Assumed: a chip-select line has a pull-up on the board, so a pin that is not yet an output does not select; MISO without its alternate
+function reads 0, and a line that no slave drives reads 1.
 
 Settings: `fitted` (False: no slave answers, MISO floats high); settings that begin with `imu_` are passed to the ICM-42688-P on SPI1.
 """
