@@ -4,35 +4,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const PAGES: [&str; 20] = [
-    "README.md",
-    "CONTRIBUTING.md",
-    "CHANGELOG.md",
-    "host-tests/README.md",
-    "host-tests/RELEASES.md",
-    "host-tests/board/README.md",
-    "host-tests/board/PERIPHERALS.md",
-    "src/SAFETY.md",
-    "src/bin/README.md",
-    "src/GLOSSARY.md",
-    "src/bin/FOUND.md",
-    "src/bin/GETTING_STARTED.md",
-    "src/bin/PORTING.md",
-    "src/bin/SECURITY.md",
-    "src/bin/TROUBLE.md",
-    "src/can/README.md",
-    "tools/README.md",
-    "tools/MEASUREMENTS.md",
-    "tools/PAPER.md",
-    "tools/train/README.md",
-];
-
 #[test]
 fn no_link_is_dead() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut seen = 0;
-    for page in PAGES {
-        let path = root.join(page);
+    for path in pages() {
+        let page = path.display();
         for link in links(&fs::read_to_string(&path).unwrap()) {
             if link.starts_with("http") {
                 continue;
@@ -53,10 +29,11 @@ fn no_link_is_dead() {
 /// Criterion: a page names a test as `binary::module::test` in backticks, and that module's file has such a function.
 #[test]
 fn tests_that_pages_name_exist() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let root = root();
     let mut seen = 0;
-    for page in PAGES {
-        let text = fs::read_to_string(root.join(page)).unwrap();
+    for path in pages() {
+        let page = path.display();
+        let text = fs::read_to_string(&path).unwrap();
         for name in text.split('`').skip(1).step_by(2) {
             let parts: Vec<&str> = name.split("::").collect();
             let [binary @ ("board" | "image" | "library" | "tools" | "soak"), modules @ .., test] =
@@ -73,7 +50,29 @@ fn tests_that_pages_name_exist() {
             seen += 1;
         }
     }
-    assert!(seen > 30, "{seen} names found in all pages: are they read at all?");
+    assert!(seen > 5, "{seen} names found in all pages: are they read at all?");
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// The repository's pages: every `.md` file, without what is built or downloaded.
+fn pages() -> Vec<PathBuf> {
+    let mut folders = vec![root()];
+    let mut pages = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            if path.is_dir() && !name.starts_with('.') && name != "target" {
+                folders.push(path);
+            } else if name.ends_with(".md") {
+                pages.push(path);
+            }
+        }
+    }
+    pages
 }
 
 /// Returns the targets in the round brackets of `[text](link)`.
