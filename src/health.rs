@@ -1,5 +1,7 @@
 //! These types report the state of the board: status, source and one counter for each kind of event.
 
+pub mod states;
+
 use crate::sample::Validity;
 
 #[cfg(target_has_atomic = "8")]
@@ -8,22 +10,7 @@ pub mod supervisor;
 
 /// The state of the corrected yaw rate, as one state machine. No state needs a restart to leave it, except that with
 /// damaged weights the state is `Degraded` at best.
-///
-/// In a fault state there is no yaw rate: our own messages report "not available", Bosch's set "failed" and VDC2
-/// "error", each with the fault bit.
-///
-/// | state | status | entered when | yaw rate on CAN | left when | counter |
-/// |---|---|---|---|---|---|
-/// | init | `Init` | start; the clock jumped before the bias was known | raw gyro, marked initialising | 3 s at rest | `moving` |
-/// | degraded | `Degraded` | start, where earlier drives have shown the bias | gyro less the bias curve | 3 s at rest | `moving` |
-/// | degraded | `Degraded` | the bias is known; a gap, a late or implausible window, saturation, damaged weights | gyro less bias | a window is accepted | `missing`, `late`, `implausible` |
-/// | ready | `Ready` | an accepted window covers the recent samples | gyro less bias and correction | as above | `windows` |
-/// | fault | `Clipped` | the part reports saturation | none, `CLIPPED` | 50 ms after the last such sample | `invalid`, `held` |
-/// | fault | `Clipped` | a reading that no vehicle can have ([`crate::monitor`]) | none, `IMPLAUSIBLE` | a reading near the last good one, or the fourth in a row | `wrong` |
-/// | fault | `Stuck` | samples equal to the one before, as [`crate::monitor`] counts them | none, `STUCK` | a sample that differs | `stuck` |
-/// | fault | `Silent` | 29 ms without a sample, by the board's clock; 2 s after the start without the first | none, every 10 ms, `GAP` | the next sample | `silences` |
-///
-/// From a fault the state returns to init where no bias is known, otherwise to degraded.
+/// [`states::STATES`] says when each state is entered and left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

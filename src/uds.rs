@@ -31,7 +31,6 @@ pub mod security;
 mod server;
 mod services;
 mod session;
-pub mod settings;
 pub mod signature;
 mod troubles;
 

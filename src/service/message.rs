@@ -10,7 +10,7 @@ use crate::store::{Configuration, StoreError, UnitMap};
 use serde::{Deserialize, Serialize};
 
 /// Version of the encoding of these types; every change of a type increments it.
-pub const PROTOCOL: u8 = 13;
+pub const PROTOCOL: u8 = 14;
 /// Size of a full block of a weight file, bytes.
 pub const BLOCK: usize = 256;
 
@@ -141,6 +141,11 @@ pub enum Refusal {
         /// Newest counter that was accepted.
         newest: u32,
     },
+    /// A single setting was written; only the whole configuration can be.
+    #[error(
+        "single settings (data 0201 to 021E) were retired: write the configuration, data 0100, as `gyronet device set` does"
+    )]
+    SingleSetting,
     /// The vehicle is not proven to stand: writing the flash would interrupt the output.
     #[error("the vehicle is not proven to stand still")]
     Moving,

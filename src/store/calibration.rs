@@ -65,8 +65,8 @@ impl Record for Calibration {
 
     fn check(&self) -> Result<(), FieldError> {
         if let Some(Level { roll_deg, pitch_deg }) = self.level {
-            within(Field::CalibrationRollDeg, roll_deg, -MAX_TILT_DEG, MAX_TILT_DEG)?;
-            within(Field::CalibrationPitchDeg, pitch_deg, -MAX_TILT_DEG, MAX_TILT_DEG)?;
+            within(Field::CalibrationRollDeg, roll_deg)?;
+            within(Field::CalibrationPitchDeg, pitch_deg)?;
         }
         if self.unit.is_some_and(|unit| !unit.gyro_map.is_plausible()) {
             return Err(FieldError::Implausible(Field::CalibrationGyroMap));

@@ -260,22 +260,22 @@ impl Record for Configuration {
         // Modes and lags need no check: all values of their types are valid.
         let CompensateConfig { mode: _, lag: _, max_mean, max_single, max_carry } = self.compensate;
         let rate = |rate: AngularRate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC;
-        for (field, value, low, high) in [
-            (Field::LatitudeDeg, self.latitude_deg.unwrap_or(0.0), -90.0, 90.0),
-            (Field::FogTiltDeg, self.fog_lane.tilt_deg, 0.0, 45.0),
-            (Field::MountingRollDeg, roll_deg, -180.0, 180.0),
-            (Field::MountingPitchDeg, pitch_deg, -90.0, 90.0),
-            (Field::MountingYawDeg, yaw_deg, -180.0, 180.0),
-            (Field::StaticGyroStd, gyro_std, 1e-5, 1.0),
-            (Field::StaticAccelStd, accel_std, 1e-4, 20.0),
-            (Field::StaticGyroDrift, gyro_drift, 1e-5, 0.1),
-            (Field::StaticAccelDrift, accel_drift, 1e-4, 2.0),
-            (Field::StaticGyroBias, gyro_bias, 1e-5, 1.0),
-            (Field::CompensateMaxMean, rate(max_mean), 0.0, 0.5),
-            (Field::CompensateMaxSingle, rate(max_single), 0.0, 5.0),
-            (Field::CompensateMaxCarry, rate(max_carry), 0.0, 0.5),
+        for (field, value) in [
+            (Field::LatitudeDeg, self.latitude_deg.unwrap_or(0.0)),
+            (Field::FogTiltDeg, self.fog_lane.tilt_deg),
+            (Field::MountingRollDeg, roll_deg),
+            (Field::MountingPitchDeg, pitch_deg),
+            (Field::MountingYawDeg, yaw_deg),
+            (Field::StaticGyroStd, gyro_std),
+            (Field::StaticAccelStd, accel_std),
+            (Field::StaticGyroDrift, gyro_drift),
+            (Field::StaticAccelDrift, accel_drift),
+            (Field::StaticGyroBias, gyro_bias),
+            (Field::CompensateMaxMean, rate(max_mean)),
+            (Field::CompensateMaxSingle, rate(max_single)),
+            (Field::CompensateMaxCarry, rate(max_carry)),
         ] {
-            within(field, value, low, high)?;
+            within(field, value)?;
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! This module defines the errors of the store, in terms that a user can act on.
 
+use super::calibration::MAX_TILT_DEG;
 use crate::can::config::ConfigError;
 use crate::can::latitude::LatitudeConfigError;
 use crate::can::wheel::WheelConfigError;
@@ -56,6 +57,24 @@ impl Field {
             Self::Forward => "forward",
         }
     }
+
+    /// Smallest and largest valid value; `None` for a value that is checked in another way.
+    #[must_use]
+    pub const fn range(self) -> Option<[f32; 2]> {
+        Some(match self {
+            Self::LatitudeDeg | Self::MountingPitchDeg => [-90.0, 90.0],
+            Self::FogTiltDeg => [0.0, 45.0],
+            Self::MountingRollDeg | Self::MountingYawDeg => [-180.0, 180.0],
+            Self::StaticGyroStd | Self::StaticGyroBias => [1e-5, 1.0],
+            Self::StaticAccelStd => [1e-4, 20.0],
+            Self::StaticGyroDrift => [1e-5, 0.1],
+            Self::StaticAccelDrift => [1e-4, 2.0],
+            Self::CompensateMaxMean | Self::CompensateMaxCarry => [0.0, 0.5],
+            Self::CompensateMaxSingle => [0.0, 5.0],
+            Self::CalibrationRollDeg | Self::CalibrationPitchDeg => [-MAX_TILT_DEG, MAX_TILT_DEG],
+            Self::CalibrationGyroMap | Self::BiasCurve | Self::Forward => return None,
+        })
+    }
 }
 
 /// The reason why a configuration or calibration is refused.
@@ -99,7 +118,8 @@ pub enum FieldError {
 }
 
 /// Checks that a value is inside its range.
-pub(super) fn within(field: Field, value: f32, low: f32, high: f32) -> Result<(), FieldError> {
+pub(super) fn within(field: Field, value: f32) -> Result<(), FieldError> {
+    let [low, high] = field.range().ok_or(FieldError::Implausible(field))?;
     // NaN is inside no range.
     if (low..=high).contains(&value) { Ok(()) } else { Err(FieldError::Range { field, value, low, high }) }
 }

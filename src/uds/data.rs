@@ -1,47 +1,130 @@
-//! This module reads and writes the values behind the data identifiers (ISO 14229-1 C.1).
+//! The values behind the data identifiers (ISO 14229-1 C.1), and the list of identifiers.
 //!
-//! | identifier | bytes | content | writable in session |
-//! |---|---|---|---|
-//! | F186 | 1 | session: 1 default, 2 programming, 3 extended | |
-//! | F189 | 1, 1, 1 | version of the firmware | |
-//! | F18C | text | serial number of the chip, 24 hexadecimal digits | |
-//! | F197 | text | name of the system, "gyronet" | |
-//! | 0100 | 1, then the record | layout version, then the stored configuration (postcard) | extended |
-//! | 0101 | the record | stored settings of the wheel frames (postcard) | extended |
-//! | 0102 | 1, then the record | layout version, then the stored calibration (postcard) | |
-//! | 0103 | 1, 4 | weights of GyroNet: 0 none, 1 built in, 2 slot A, 3 slot B; CRC-32 of the weights | |
-//! | 0104 | 1, 1 | status of the yaw rate and fault bits, as on CAN | |
-//! | 0105 | 4 each | counters of the pipeline, in the order of [`crate::health::Counters`] | |
-//! | 0106 | 4 each | counters of the sensor monitor, of the inputs and of the lines, in the order of their types | |
-//! | 0107 | 4 each | failed diagnostic transfers, in the order of [`TransportErrors`] | |
-//! | 0108 | 4 | sensor time since the start, 10 ms steps | |
-//! | 0109 | 4 each | counters of the fibre-optic gyro's lane, in the order of [`FogCounters`] | |
-//! | 010A | postcard | versions, part, reset, clock, stored data, weights and status: [`crate::service::message::Info`] | |
-//! | 010B | postcard | the reason why the last request was refused, if it was: [`crate::service::message::Refusal`] | |
-//! | 010C | postcard | progress of a calibration: [`crate::service::calibrate::State`] | |
-//! | 010D | postcard | gain and misalignment of this unit's gyro, or none: [`crate::store::UnitMap`] (to read it, use 0102) | extended |
-//! | 0110 | 32 | public key that authorises writing, zeros for none: see [`super::security`] | extended |
-//! | 0111 | 1, 4, 1, 4 | access: 0 open, 1 locked, 2 unlocked; newest signature counter; wrong answers; first bytes of the key | |
-//! | 0112 | 4 | number of samples of the fibre-optic gyro since the start | |
-//! | 0113 | 4 each | requests that were refused for lack of access, in the order of [`AccessCounters`] | |
-//! | 0114 | 1, 4 | FoGNet: 0 off, 1 its weights are used, 2 they are refused (reason: 010A); CRC-32 of the weights | |
-//! | 0115 | postcard | what the board has learnt about the sensor: [`crate::store::Learned`] | |
-//! | 0116 | 1, 2, 2 | forward direction: 0 unknown, 1 within 10 deg, 2 within 3 deg; its angle to the left of the configured x axis, its sigma, both 1/100 deg | |
-//! | 0201 to 021E | | single settings: [`super::settings`] | extended |
+//! [`IDENTIFIERS`] lists them; `gyronet reference identifiers` prints the list.
 //!
 //! Numbers are big-endian, as is usual in ISO 14229.
 
 use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, decode, nrc, put, put_record};
 use super::security::{self, Security};
-use super::settings;
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters};
-use crate::service::message::{AccessCounters, AllCounters, Calibrate, LineCounters, Request};
+use crate::service::message::{AccessCounters, AllCounters, Calibrate, LineCounters, Refusal, Request};
 use crate::service::{Device, MappedSlots};
 use crate::store::slots::WeightSource;
 use crate::store::{Calibration, Configuration, Record, Slot};
 use embedded_storage::nor_flash::NorFlash;
+
+/// Identifiers of single settings, which were retired for the configuration (0100).
+const RETIRED_FIRST: u16 = 0x0201;
+const RETIRED_LAST: u16 = 0x021E;
+
+/// A data identifier, as a tester sees it.
+#[derive(Debug)]
+pub struct Identifier {
+    /// Number of the identifier.
+    pub id: u16,
+    /// Name, as in `tools/gyronet_uds.yaml`.
+    pub name: &'static str,
+    /// Length of each value in bytes, or its encoding.
+    pub bytes: &'static str,
+    /// Meaning of the value.
+    pub content: &'static str,
+    /// Services that accept the identifier.
+    pub access: Access,
+}
+
+/// The services that accept an identifier; writing needs the extended session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Access {
+    /// Service 0x22.
+    Read,
+    /// Services 0x22 and 0x2E.
+    ReadWrite,
+    /// Service 0x2E.
+    Write,
+}
+
+const fn read_only(id: u16, name: &'static str, bytes: &'static str, content: &'static str) -> Identifier {
+    Identifier { id, name, bytes, content, access: Access::Read }
+}
+
+const fn writable(id: u16, name: &'static str, bytes: &'static str, content: &'static str) -> Identifier {
+    Identifier { access: Access::ReadWrite, ..read_only(id, name, bytes, content) }
+}
+
+const fn write_only(id: u16, name: &'static str, bytes: &'static str, content: &'static str) -> Identifier {
+    Identifier { access: Access::Write, ..read_only(id, name, bytes, content) }
+}
+
+/// All data identifiers.
+pub const IDENTIFIERS: [Identifier; 25] = [
+    read_only(0xF186, "session", "1", "session: 1 default, 2 programming, 3 extended"),
+    read_only(0xF189, "firmware_version", "1, 1, 1", "version of the firmware"),
+    read_only(0xF18C, "serial_number", "text", "serial number of the chip, 24 hexadecimal digits"),
+    read_only(0xF197, "system_name", "text", "name of the system, \"gyronet\""),
+    writable(0x0100, "configuration", "1, then postcard", "layout version, then the configuration"),
+    writable(0x0101, "wheels", "postcard", "settings of the wheel frames"),
+    read_only(0x0102, "calibration", "1, then postcard", "layout version, then the calibration"),
+    read_only(
+        0x0103,
+        "weights",
+        "1, 4",
+        "weights of GyroNet: 0 none, 1 built in, 2 slot A, 3 slot B; CRC-32 of the weights",
+    ),
+    read_only(
+        0x0104,
+        "state",
+        "1, 1",
+        "status of the yaw rate (`gyronet reference states`), fault bits as on CAN",
+    ),
+    read_only(0x0105, "pipeline_counters", "4 each", "counters of the pipeline"),
+    read_only(
+        0x0106,
+        "input_counters",
+        "4 each",
+        "counters of the sensor monitor, of the inputs and of the lines",
+    ),
+    read_only(0x0107, "diagnosis_errors", "4 each", "failed diagnostic transfers"),
+    read_only(0x0108, "tick", "4", "sensor time since the start, 10 ms steps"),
+    read_only(0x0109, "fog_counters", "4 each", "counters of the fibre-optic gyro"),
+    read_only(0x010A, "info", "postcard", "versions, part, reset, clock, stored data, weights and status"),
+    read_only(0x010B, "last_refusal", "postcard", "the reason why the last request was refused, if it was"),
+    read_only(0x010C, "calibration_state", "postcard", "progress of a calibration"),
+    write_only(
+        0x010D,
+        "unit_map",
+        "postcard",
+        "gain and misalignment of this unit's gyro, or none; 0102 contains it",
+    ),
+    write_only(0x0110, "public_key", "32", "public key that authorises writing, zeros for none"),
+    read_only(
+        0x0111,
+        "access",
+        "1, 4, 1, 4",
+        "0 open, 1 locked, 2 unlocked; newest signature counter; wrong answers; first bytes of the key",
+    ),
+    read_only(0x0112, "fog_messages", "4", "number of messages of the fibre-optic gyro since the start"),
+    read_only(
+        0x0113,
+        "access_refusals",
+        "4 each",
+        "requests refused for lack of access: locked, unsigned, wrong answers, wrong signatures, replayed",
+    ),
+    read_only(
+        0x0114,
+        "fognet",
+        "1, 4",
+        "FoGNet: 0 off, 1 its weights are used, 2 they are refused (reason: 010A); CRC-32 of the weights",
+    ),
+    read_only(0x0115, "learned", "postcard", "what the board has learnt about the sensor"),
+    read_only(
+        0x0116,
+        "forward",
+        "1, 2, 2",
+        "forward direction: 0 unknown, 1 within 10 deg, 2 within 3 deg; its angle to the left of the configured x axis, its sigma, both 1/100 deg",
+    ),
+];
 
 /// Largest sigma of a forward direction that is reported as 2 (within 3 deg), deg.
 const FINE_DEG: f32 = 3.0;
@@ -160,7 +243,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             put(out, &yaw.to_be_bytes())?;
             put(out, &sigma.to_be_bytes())
         }
-        _ => settings::read(id, device, out),
+        _ => Err(Nrc::RequestOutOfRange),
     }
 }
 
@@ -174,7 +257,8 @@ pub(super) fn write<R: NorFlash, W: MappedSlots>(
         0x0100 => write_configuration(bytes, device),
         0x0101 => write_wheels(bytes, device),
         0x010D => write_unit(bytes, device),
-        _ => settings::write(id, bytes, device),
+        RETIRED_FIRST..=RETIRED_LAST => Err(nrc(device.refuse_request(Refusal::SingleSetting))),
+        _ => Err(Nrc::RequestOutOfRange),
     }
 }
 

@@ -2,23 +2,7 @@
 //!
 //! A fault is confirmed at once, because the pipeline has already debounced it. The fault stays in the memory until a
 //! tester clears it, even after a restart, so that intermittent faults are found, too.
-//!
-//! | code | bytes | trouble | check |
-//! |---|---|---|---|
-//! | C1A01-31 | 5A0131 | inertial sensor: no signal | supply and wires of the sensor, `imu` |
-//! | C1A01-2A | 5A012A | inertial sensor: readings are stuck | the sensor |
-//! | C1A01-22 | 5A0122 | inertial sensor: saturated | its range, its mechanical mounting |
-//! | C1A01-62 | 5A0162 | inertial sensor: implausible, or its clock is off | mounting, `mounting` |
-//! | C1A01-49 | 5A0149 | inertial sensor: could not be set up | wires of SPI; `device info` has the register |
-//! | C1A01-38 | 5A0138 | inertial sensor: samples are missing | its wires, its output rate |
-//! | C1A02-44 | 5A0244 | stored data are damaged | `device log`; store the missing data again |
-//! | C1A02-46 | 5A0246 | no weights that can be used | `device weights` |
-//! | C1A03-47 | 5A0347 | the software crashed | `device info` has the reason |
-//! | C1A03-38 | 5A0338 | the processor's clock is not the crystal's | the crystal |
-//! | U1A01-88 | DA0188 | CAN: no bus, or frames were lost | wires, terminators, bit rate |
-//! | U1A01-49 | DA0149 | CAN: the controller does not start | the transceiver |
-//! | U1A02-87 | DA0287 | wheels: silent, or they contradict the gyro | wheel frames, radius, slip |
-//! | U1A03-81 | DA0381 | diagnosis: a request was refused: no access | the counters in data 0113 |
+//! [`TROUBLES`] lists them; `gyronet reference troubles` prints the list.
 
 use crate::health::{Faults, Status};
 use crate::service::Conditions;
@@ -51,7 +35,19 @@ pub struct Trouble {
     pub code: u32,
     /// A short name.
     pub name: &'static str,
+    /// What a workshop checks.
+    pub check: &'static str,
     cause: Cause,
+}
+
+impl Trouble {
+    /// Returns the code as a workshop reads it (SAE J2012-DA), such as `C1A01-31`.
+    #[must_use]
+    pub fn display(&self) -> impl core::fmt::Display {
+        let system = ['P', 'C', 'B', 'U'][(self.code >> 22 & 3) as usize];
+        let (code, failure) = (self.code >> 8 & 0x3FFF, self.code as u8);
+        core::fmt::from_fn(move |f| write!(f, "{system}{code:04X}-{failure:02X}"))
+    }
 }
 
 /// The condition that causes a trouble.
@@ -82,34 +78,83 @@ impl Cause {
     }
 }
 
-/// All troubles, in the order of the table in the module documentation.
+/// All troubles.
 pub static TROUBLES: [Trouble; 14] = [
-    trouble(0x5A01, 0x31, "inertial sensor: no signal", Cause::Status(Status::Silent)),
-    trouble(0x5A01, 0x2A, "inertial sensor: readings are stuck", Cause::Status(Status::Stuck)),
-    trouble(0x5A01, 0x22, "inertial sensor: saturated", Cause::Status(Status::Clipped)),
+    trouble(
+        0x5A01,
+        0x31,
+        "inertial sensor: no signal",
+        "supply and wires of the sensor, setting `imu`",
+        Cause::Status(Status::Silent),
+    ),
+    trouble(0x5A01, 0x2A, "inertial sensor: readings are stuck", "the sensor", Cause::Status(Status::Stuck)),
+    trouble(
+        0x5A01,
+        0x22,
+        "inertial sensor: saturated",
+        "its range, its mechanical mounting",
+        Cause::Status(Status::Clipped),
+    ),
     trouble(
         0x5A01,
         0x62,
         "inertial sensor: implausible, or its clock is off",
+        "the mounting, settings `mounting`",
         Cause::Fault(Faults::IMPLAUSIBLE),
     ),
-    trouble(0x5A01, 0x49, "inertial sensor: could not be set up", Cause::SensorRefused),
-    trouble(0x5A01, 0x38, "inertial sensor: samples are missing", Cause::Fault(Faults::GAP)),
-    trouble(0x5A02, 0x44, "stored data are damaged", Cause::Fault(Faults::STORED)),
-    trouble(0x5A02, 0x46, "no weights that can be used", Cause::NoWeights),
-    trouble(0x5A03, 0x47, "the software crashed", Cause::Crash),
-    trouble(0x5A03, 0x38, "the processor's clock is not the crystal's", Cause::Clock),
-    trouble(0xDA01, 0x88, "CAN: no bus, or frames were lost", Cause::Fault(Faults::BUS)),
-    trouble(0xDA01, 0x49, "CAN: the controller does not start", Cause::Can),
-    trouble(0xDA02, 0x87, "wheels: silent, or they contradict the gyro", Cause::Fault(Faults::WHEELS)),
-    trouble(0xDA03, 0x81, "diagnosis: a request was refused: no access", Cause::AccessRefused),
+    trouble(
+        0x5A01,
+        0x49,
+        "inertial sensor: could not be set up",
+        "wires of SPI; `device info` has the register",
+        Cause::SensorRefused,
+    ),
+    trouble(
+        0x5A01,
+        0x38,
+        "inertial sensor: samples are missing",
+        "its wires, its output rate",
+        Cause::Fault(Faults::GAP),
+    ),
+    trouble(
+        0x5A02,
+        0x44,
+        "stored data are damaged",
+        "`device log`; store the missing data again",
+        Cause::Fault(Faults::STORED),
+    ),
+    trouble(0x5A02, 0x46, "no weights that can be used", "`device info`; upload weights", Cause::NoWeights),
+    trouble(0x5A03, 0x47, "the software crashed", "`device info` has the reason", Cause::Crash),
+    trouble(0x5A03, 0x38, "the processor's clock is not the crystal's", "the crystal", Cause::Clock),
+    trouble(
+        0xDA01,
+        0x88,
+        "CAN: no bus, or frames were lost",
+        "wires, terminators, bit rate",
+        Cause::Fault(Faults::BUS),
+    ),
+    trouble(0xDA01, 0x49, "CAN: the controller does not start", "the transceiver", Cause::Can),
+    trouble(
+        0xDA02,
+        0x87,
+        "wheels: silent, or they contradict the gyro",
+        "wheel frames, radius, slip",
+        Cause::Fault(Faults::WHEELS),
+    ),
+    trouble(
+        0xDA03,
+        0x81,
+        "diagnosis: a request was refused: no access",
+        "the counters in data 0113",
+        Cause::AccessRefused,
+    ),
 ];
 
 const _: () = assert!(TROUBLES.len() <= MAX_TROUBLES, "the record has room for all troubles");
 
 /// Creates a trouble from a code (0x5A01 is C1A01, 0xDA01 is U1A01) and a failure type.
-const fn trouble(code: u16, failure: u8, name: &'static str, cause: Cause) -> Trouble {
-    Trouble { code: (code as u32) << 8 | failure as u32, name, cause }
+const fn trouble(code: u16, failure: u8, name: &'static str, check: &'static str, cause: Cause) -> Trouble {
+    Trouble { code: (code as u32) << 8 | failure as u32, name, check, cause }
 }
 
 /// The entry of one trouble in the memory.

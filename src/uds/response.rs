@@ -46,7 +46,9 @@ pub(super) fn put_record(out: &mut Response, record: &impl Serialize) -> Result<
 pub(super) fn nrc(refusal: Refusal) -> Nrc {
     match refusal {
         Refusal::Moving | Refusal::NothingFound => Nrc::ConditionsNotCorrect,
-        Refusal::Version { .. } | Refusal::OtherWeights { .. } => Nrc::RequestOutOfRange,
+        Refusal::Version { .. } | Refusal::OtherWeights { .. } | Refusal::SingleSetting => {
+            Nrc::RequestOutOfRange
+        }
         Refusal::Store(
             StoreError::Field(_) | StoreError::Version { .. } | StoreError::Encoding | StoreError::Lost,
         ) => Nrc::RequestOutOfRange,

@@ -20,6 +20,7 @@ mod paint;
 pub mod paper;
 mod progress;
 pub mod quantize;
+pub mod reference;
 #[cfg(feature = "logs")]
 pub mod replay;
 pub mod sign;

@@ -11,7 +11,7 @@
 //! drive <- evaluate <- paper -> plot, simulate
 //! train -> evaluate, plot      python
 //! warm_up -> drive, plot, simulate
-//! target -> simulate      network      client      wheels
+//! target -> simulate      network      client <- reference      wheels
 //! demo -> everything above
 //! ```
 
@@ -32,6 +32,7 @@ pub mod parts;
 pub mod plot;
 pub mod python;
 mod random;
+pub mod reference;
 pub mod signing;
 pub mod simulate;
 pub mod target;

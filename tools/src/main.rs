@@ -70,6 +70,7 @@ enum Command {
     Device(commands::device::Args),
     Keys(commands::keys::Args),
     Sign(commands::sign::Args),
+    Reference(commands::reference::Args),
     #[cfg(feature = "logs")]
     Wheels(commands::wheels::Args),
     Size(commands::size::Args),
@@ -89,6 +90,7 @@ fn main() -> ExitCode {
         Command::Campaign(args) => commands::campaign::run(args, common),
         Command::Keys(args) => commands::keys::run(args, common),
         Command::Sign(args) => commands::sign::run(args, common),
+        Command::Reference(args) => commands::reference::run(args, common),
         Command::Simulate(args) => commands::simulate::run(args, common),
         #[cfg(feature = "logs")]
         Command::Import(args) => commands::import::run(args, common),

@@ -9,6 +9,7 @@ use gyronet::service::event::SensorFault;
 use gyronet::service::message::{AllCounters, Refusal};
 use gyronet::store::{Configuration, Field, FieldError, Record, StoreError};
 use gyronet::uds::Server;
+use gyronet::uds::data::{Access, IDENTIFIERS, Identifier};
 use gyronet::uds::dtc::{TROUBLES, bit};
 use gyronet_host_tests::flash::F405;
 use gyronet_host_tests::recordings::workspace;
@@ -402,75 +403,42 @@ fn crc(file: &[u8]) -> [u8; 4] {
     u32::from_le_bytes(*file.last_chunk().expect("a checksum")).to_be_bytes()
 }
 
-/// Single settings are written into the stored configuration one after the other, and read as the next start will use
-/// them.
 #[test]
-fn settings_are_read_and_written_one_by_one() {
-    let (flash, mut bench) = bench();
+fn a_single_setting_is_refused_and_the_successor_named() {
+    let (_, mut bench) = bench();
     bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
     bench.stand();
-    let real = |id: u8, value: f32| [&[0x2E, 2, id][..], &value.to_be_bytes()].concat();
-    bench.expect(&real(0x04, -33.5), &[0x6E, 2, 0x04]);
-    bench.expect(&real(0x0C, 90.0), &[0x6E, 2, 0x0C]);
-    bench.expect(&[0x2E, 2, 0x19, 2, 0xB0, 2, 0xB1, 2, 0xB2], &[0x6E, 2, 0x19]);
-    bench.expect(&[0x22, 2, 0x0C], &[&[0x62, 2, 0x0C][..], &90f32.to_be_bytes()].concat());
-    let ids = [0, 0, 0, 7, 0, 0, 0, 7, 0xDF, 0, 0, 7, 8];
-    bench.expect(&[&[0x2E, 2, 0x09][..], &ids].concat(), &[0x6E, 2, 0x09]);
-    bench.expect(&real(0x14, 0.05), &[0x6E, 2, 0x14]);
-    let stored = *start(&flash).configuration();
-    assert_eq!((stored.latitude_deg, stored.mounting.yaw_deg), (Some(-33.5), 90.0));
-    assert_eq!(stored.can.yaw.map(|yaw| yaw.ids), Some([0x2B0, 0x2B1, 0x2B2]));
-    assert_eq!((stored.diagnosis.request, stored.diagnosis.response), (0x700, 0x708));
-    assert!((stored.compensate.max_mean.rad_per_sec() - 0.05).abs() < 1e-8);
-    let rest = Configuration {
-        latitude_deg: None,
-        mounting: Configuration::DEFAULT.mounting,
-        can: Configuration::DEFAULT.can,
-        diagnosis: Configuration::DEFAULT.diagnosis,
-        compensate: Configuration::DEFAULT.compensate,
-        ..stored
-    };
-    assert_eq!(rest, Configuration::DEFAULT, "nothing else has changed");
-    bench.expect(&real(0x04, f32::NAN), &[0x6E, 2, 0x04]);
-    assert_eq!(start(&flash).configuration().latitude_deg, None);
-    // Out of range, of another length, of no meaning; and nothing that is written is lost.
-    bench.expect(&real(0x04, 91.0), &[0x7F, 0x2E, 0x31]);
-    bench.expect(&[0x2E, 2, 0x04, 0, 0], &[0x7F, 0x2E, 0x13]);
-    bench.expect(&[0x2E, 2, 0x01, 9], &[0x7F, 0x2E, 0x13]);
-    bench.expect(&[0x2E, 2, 0x00, 0], &[0x7F, 0x2E, 0x31]);
-    bench.expect(&[0x2E, 2, 0x1F, 0], &[0x7F, 0x2E, 0x31]);
-    assert_eq!(start(&flash).configuration().mounting.yaw_deg, 90.0);
+    for id in [0x01, 0x0C, 0x1E] {
+        bench.expect(&[0x22, 2, id], &[0x7F, 0x22, 0x31]);
+        bench.expect(&[0x2E, 2, id, 0x42, 0xB4, 0, 0], &[0x7F, 0x2E, 0x31]);
+        let refusal = bench.board.refusal().expect("a reason");
+        assert_eq!(refusal, Refusal::SingleSetting);
+        assert!(refusal.to_string().contains("device set"), "{refusal}");
+    }
+    // Neither was ever one.
+    for id in [0x00, 0x1F] {
+        bench.expect(&[0x2E, 2, id, 0], &[0x7F, 0x2E, 0x31]);
+        assert_eq!(bench.board.refusal(), None);
+    }
 }
 
-/// Every setting that can be read can be written as it was read, and is in the table of settings and in the description.
+/// Every identifier of the list answers, and is in the description for testers under the same name.
 #[test]
-fn every_setting_has_a_data_identifier() {
-    let (flash, mut bench) = bench();
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    bench.stand();
-    let read = |name: &str| std::fs::read_to_string(workspace().join(name)).expect("it is there");
-    let (description, table) = (read("tools/gyronet_uds.yaml"), read("tools/README.md"));
-    for id in 0x01..=0x1D {
-        let value = bench.ask(&[0x22, 2, id]).expect("a response");
-        assert_eq!(value[..3], [0x62, 2, id]);
-        bench.expect(&[&[0x2E, 2, id][..], &value[3..]].concat(), &[0x6E, 2, id]);
-        let line = description.lines().find(|line| line.starts_with(&format!("  0x02{id:02X}: {{name: ")));
-        let name = line.expect("it is described").split([' ', ',']).nth(4).expect("a name");
-        assert!(table.contains(&format!("| `{name}")), "{name}");
-        bench.stand();
+fn the_list_of_identifiers_is_that_of_the_server_and_of_the_description() {
+    let (_, mut bench) = bench();
+    let description =
+        std::fs::read_to_string(workspace().join("tools/gyronet_uds.yaml")).expect("it is there");
+    let data = description.split_once("data:").expect("data").1.split_once("routines:").expect("routines").0;
+    for Identifier { id, name, access, .. } in &IDENTIFIERS {
+        let [high, low] = id.to_be_bytes();
+        let response = bench.ask(&[0x22, high, low]).expect("a response");
+        let positive = response.starts_with(&[0x62, high, low]);
+        assert_eq!(positive, *access != Access::Write, "{id:04X}: {response:02x?}");
+        let multi = format!("  0x{id:04X}:\n    name: {name}\n");
+        let single = format!("  0x{id:04X}: {{name: {name}, ");
+        assert!(data.contains(&multi) || data.contains(&single), "{id:04X} {name}");
     }
-    assert_eq!(*start(&flash).configuration(), Configuration::DEFAULT);
-    let known: Vec<&str> = description
-        .lines()
-        .filter_map(|line| line.strip_prefix("  0x02")?.split([' ', ',']).nth(2))
-        .collect();
-    let rows = table.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());
-    let settings: Vec<&str> =
-        rows.skip_while(|name| *name != "imu").take_while(|name| *name != "can.vdc2").collect();
-    assert!(settings.len() > 30, "{settings:?}");
-    for setting in settings {
-        assert!(known.iter().any(|known| setting.starts_with(known)), "{setting}");
-    }
+    assert_eq!(data.matches("\n  0x").count(), IDENTIFIERS.len());
 }
 
 #[test]

@@ -1,0 +1,128 @@
+//! The states of the corrected yaw rate, as the board reports them.
+
+use super::Status;
+
+/// A state, or a condition that leaves the state as it is.
+#[derive(Debug)]
+pub struct State {
+    /// Status that the board reports, and the number that data 0104 has for it; `None` if the status does not change.
+    pub status: Option<Status>,
+    /// Name of the state.
+    pub name: &'static str,
+    /// Condition that the state begins with.
+    pub entered: &'static str,
+    /// Yaw rate and fault bits on CAN.
+    pub rate: &'static str,
+    /// Condition that the state ends with.
+    pub left: &'static str,
+    /// Counter of the pipeline or of the sensor monitor that counts it, if any.
+    pub counter: &'static str,
+}
+
+const fn state(
+    status: Status,
+    name: &'static str,
+    entered: &'static str,
+    rate: &'static str,
+    left: &'static str,
+    counter: &'static str,
+) -> State {
+    State { status: Some(status), name, entered, rate, left, counter }
+}
+
+const fn remark(
+    name: &'static str,
+    entered: &'static str,
+    rate: &'static str,
+    left: &'static str,
+    counter: &'static str,
+) -> State {
+    State { status: None, name, entered, rate, left, counter }
+}
+
+/// All states. In a fault state there is no yaw rate: our own messages report "not available", Bosch's set "failed"
+/// and VDC2 "error".
+///
+/// From a fault the state returns to init where no bias is known, otherwise to degraded.
+pub const STATES: [State; 10] = [
+    state(
+        Status::Init,
+        "init",
+        "the start; a jump of the clock before the bias was known",
+        "gyro without correction, marked initialising (VDC2: not available)",
+        "3 s at rest",
+        "`moving`",
+    ),
+    state(
+        Status::Degraded,
+        "degraded",
+        "the start, if earlier drives have shown the bias",
+        "gyro less bias curve",
+        "3 s at rest",
+        "`moving`",
+    ),
+    state(
+        Status::Degraded,
+        "degraded",
+        "the bias is known; a gap, a late or implausible window, saturation, damaged weights",
+        "gyro less bias",
+        "a window is accepted",
+        "`missing`, `late`, `implausible`",
+    ),
+    state(
+        Status::Ready,
+        "ready",
+        "an accepted window covers the recent samples",
+        "gyro less bias and correction",
+        "one of the other states",
+        "`windows`",
+    ),
+    state(
+        Status::Silent,
+        "fault: silent",
+        "29 ms without a sample, by the board's clock; 2 s after the start without the first one",
+        "none, every 10 ms; GAP",
+        "the next sample",
+        "`silences`",
+    ),
+    state(
+        Status::Stuck,
+        "fault: stuck",
+        "seven samples (70 ms) in which all gyro axes, all accelerometer axes, or one axis that seldom repeats \
+         itself do not change; thirty in which any axis does not",
+        "none; STUCK",
+        "a sample that differs",
+        "`stuck`",
+    ),
+    state(
+        Status::Clipped,
+        "fault: saturated",
+        "the sensor reports saturation",
+        "none; CLIPPED",
+        "50 ms after the last such sample",
+        "`invalid`, `held`",
+    ),
+    state(
+        Status::Clipped,
+        "fault: wrong",
+        "a reading changes by more in 10 ms than a vehicle can (1 rad/s, 30 m/s^2)",
+        "none; IMPLAUSIBLE",
+        "a reading near the last good one, or the fourth such reading in a row",
+        "`wrong`",
+    ),
+    remark(
+        "sensor moved",
+        "its up or forward direction differs from earlier drives",
+        "as in the present state, whose quality does not change; IMPLAUSIBLE",
+        "the next start, or `calibrate static` or `calibrate forget`",
+        "`moved_mounts`",
+    ),
+    remark(
+        "clock off",
+        "the sensor's clock differs from the board's crystal by more than 4 %; the yaw is then accumulated by the \
+         sensor's clock",
+        "as in the present state; IMPLAUSIBLE",
+        "the clocks agree again",
+        "`clock_off`",
+    ),
+];

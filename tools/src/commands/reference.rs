@@ -1,0 +1,36 @@
+//! `gyronet reference` prints the tables of settings, data identifiers, troubles and states.
+
+use super::Common;
+use clap::ValueEnum;
+use gyronet_tools::reference;
+use std::io::{self, Write};
+
+/// Print a table of the settings, data identifiers, troubles or states of a board, as Markdown.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[arg(value_enum)]
+    table: Name,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Name {
+    /// Settings of `device get` and `device set`, with ranges and defaults.
+    Settings,
+    /// Data identifiers of diagnosis.
+    Identifiers,
+    /// Trouble codes of diagnosis.
+    Troubles,
+    /// States of the yaw rate.
+    States,
+}
+
+pub fn run(args: &Args, common: Common) -> super::Result {
+    let table = match args.table {
+        Name::Settings => reference::settings(),
+        Name::Identifiers => reference::identifiers(),
+        Name::Troubles => reference::troubles(),
+        Name::States => reference::states(),
+    };
+    let out = &mut io::stdout().lock();
+    if common.json { super::print_json(out, &table.json()) } else { Ok(write!(out, "{table}")?) }
+}

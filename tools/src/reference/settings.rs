@@ -1,0 +1,160 @@
+//! The settings of a board: names and defaults are those of the configuration, ranges those of its check.
+
+use super::Table;
+use crate::client::device::settings::{flat, to_value};
+use gyronet::store::{Configuration, Field};
+use std::collections::BTreeMap;
+
+/// What a setting takes: a number in the range of its check, or what the text says.
+enum Takes {
+    Number(&'static str, Field, &'static str),
+    Other(&'static str, &'static str),
+}
+use Takes::{Number, Other};
+
+const SETTINGS: &[(&str, Takes)] = &[
+    ("imu", Other("", "`XsensMti` or `Icm42688`; the image refuses `Adis16465`")),
+    (
+        "fog",
+        Other(
+            "",
+            "`null` or `Dsp1760`; the image refuses `Dsp3000`. The board reports a configured gyro that is silent \
+             from the start",
+        ),
+    ),
+    ("can.bits_per_second", Other("bit/s", "500000")),
+    (
+        "can.bosch.tx1_only",
+        Other(
+            "",
+            "`true` sends the first message of Bosch's set only; `can.bosch=null` sends none of the set",
+        ),
+    ),
+    ("can.yaw.ids", Other("", "as `fog_ids`; `can.yaw=null` sends none of the three")),
+    ("can.yaw.period_ms", Other("ms", "10 to 1000, multiples of 10")),
+    ("can.yaw.e2e.P01.mode", Other("", "`Both`, `Alternating`, `Low`, `Nibble`")),
+    (
+        "can.yaw.e2e.P01.data_ids",
+        Other("", "three different E2E identifiers; `can.yaw.e2e` also `P02`, `P05`, `P11`"),
+    ),
+    ("can.vdc2", Other("", "`null`, or `{\"source\":ADDRESS}` with a J1939 address of 0 to 253")),
+    (
+        "latitude_deg",
+        Number(
+            "deg",
+            Field::LatitudeDeg,
+            "north positive; `null` leaves the Earth's rate in the bias, and a fibre-optic gyro's rate is degraded",
+        ),
+    ),
+    ("mounting.roll_deg", Number("deg", Field::MountingRollDeg, "")),
+    ("mounting.pitch_deg", Number("deg", Field::MountingPitchDeg, "")),
+    ("mounting.yaw_deg", Number("deg", Field::MountingYawDeg, "90: x points to the left")),
+    ("static_init.gyro_std", Number("rad/s", Field::StaticGyroStd, "standard deviation at rest")),
+    ("static_init.accel_std", Number("m/s^2", Field::StaticAccelStd, "standard deviation at rest")),
+    ("static_init.gyro_drift", Number("rad/s", Field::StaticGyroDrift, "spread of one-second means at rest")),
+    (
+        "static_init.accel_drift",
+        Number("m/s^2", Field::StaticAccelDrift, "spread of one-second means at rest"),
+    ),
+    ("static_init.gyro_bias", Number("rad/s", Field::StaticGyroBias, "largest bias")),
+    ("compensate.mode.Overlap.hop", Other("samples", "1 to 10; `compensate.mode` also `Newest`, `Middle`")),
+    ("compensate.lag", Other("samples", "0 to 11: delay of the navigation rate")),
+    ("compensate.max_mean", Number("rad/s", Field::CompensateMaxMean, "largest mean correction of a window")),
+    ("compensate.max_single", Number("rad/s", Field::CompensateMaxSingle, "largest single correction")),
+    (
+        "compensate.max_carry",
+        Number("rad/s", Field::CompensateMaxCarry, "largest part of a revision that is added to one rate"),
+    ),
+    (
+        "fog_ids",
+        Other(
+            "",
+            "three different identifiers of up to 11 bits, outside 0x7DF to 0x7EF: rate, angle, detail",
+        ),
+    ),
+    (
+        "fog_lane.tilt_deg",
+        Number("deg", Field::FogTiltDeg, "from the gyro's axis to the vertical of the level vehicle"),
+    ),
+    (
+        "fog_lane.fognet",
+        Other(
+            "",
+            "`Off`; `Recorded` runs FoGNet with weights that were trained on recordings of this gyro; `Simulated` \
+             also allows weights of simulated drives, and the rate is then degraded at best",
+        ),
+    ),
+    ("fog_lane.latitude_frame", Other("", "`null`, or the frame that carries the latitude")),
+    (
+        "slcan_inputs",
+        Other("", "`true` accepts wheel and latitude frames that a host sends over SLCAN: for a bench only"),
+    ),
+    ("diagnosis.extended", Other("", "`true`: the three identifiers have 29 bits")),
+    (
+        "diagnosis.request",
+        Other("", "identifier of diagnostic requests to this board; the three must differ"),
+    ),
+    ("diagnosis.functional", Other("", "identifier of requests to all ECUs")),
+    ("diagnosis.response", Other("", "identifier of the board's diagnostic frames")),
+    (
+        "fog_serial",
+        Other(
+            "",
+            "serial number of the fibre-optic gyro, 0 if it is not known: FoGNet's weights for one gyro run on \
+             that gyro only",
+        ),
+    ),
+    (
+        "learn",
+        Other("", "`true`: the board learns and uses the sensor's bias by temperature and its mounting"),
+    ),
+];
+
+/// The settings that `gyronet device get` prints.
+#[must_use]
+pub fn settings() -> Table {
+    let mut table = Table::new(&["setting", "unit", "range", "default"]);
+    let defaults = defaults();
+    for (name, takes) in SETTINGS {
+        let (unit, range) = match takes {
+            Number(unit, field, text) => (unit, range(*field, text)),
+            Other(unit, text) => (unit, (*text).to_owned()),
+        };
+        let default = defaults.get(*name).map(|default| format!("`{default}`")).unwrap_or_default();
+        table.row([&format!("`{name}`"), unit, &range, &default]);
+    }
+    table
+}
+
+fn defaults() -> BTreeMap<String, String> {
+    let defaults = to_value(&Configuration::DEFAULT).expect("a configuration is JSON");
+    flat(&defaults).into_iter().collect()
+}
+
+fn range(field: Field, text: &str) -> String {
+    let [low, high] = field.range().expect("a number has a range");
+    let separator = if text.is_empty() { "" } else { "; " };
+    format!("{low} to {high}{separator}{text}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_setting_of_the_configuration_is_in_the_table_once() {
+        let mut names: Vec<&str> = SETTINGS.iter().map(|(name, _)| *name).collect();
+        names.sort_unstable();
+        assert_eq!(names, defaults().keys().collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_number_has_the_range_of_the_field_with_its_name() {
+        for (name, takes) in SETTINGS {
+            if let Number(_, field, _) = takes {
+                assert_eq!(field.name(), *name);
+                assert!(field.range().is_some(), "{name}");
+            }
+        }
+    }
+}
