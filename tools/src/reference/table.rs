@@ -3,6 +3,7 @@
 use serde_json::{Map, Value};
 use std::fmt;
 
+/// Rows of text under column names; displayed as Markdown.
 pub struct Table {
     columns: &'static [&'static str],
     rows: Vec<Vec<String>>,
