@@ -16,7 +16,9 @@ mod firmware {
     use gyronet::model::gyronet::{GyroNetState, recurrent_words};
     use gyronet::sample::Validity;
     use gyronet::units::SpecificForce;
-    use gyronet::{AngularRate, Blob, Coprocessor, GyroNet, ImuSample, Micros, WindowNetwork, weights};
+    use gyronet::{
+        AngularRate, Blob, Coprocessor, GyroNet, ImuSample, Micros, TimedFrame, WindowNetwork, weights,
+    };
     use panic_semihosting as _;
 
     /// Units of the default model's Bi-LSTM.
@@ -49,13 +51,13 @@ mod firmware {
         let mut last = None;
         for number in 0..500 {
             let now = Micros(10_000 * u64::from(number));
-            last = coprocessor.imu(read(number, now), now).ok();
+            // Pass the frames to your CAN controller here.
+            let mut send = |sent: TimedFrame| {
+                core::hint::black_box(sent.frame);
+            };
+            last = coprocessor.imu(read(number, now), now, &mut send).ok();
             if let Some(window) = coprocessor.window() {
                 let _ = coprocessor.deliver(window.end, network.estimate(&window.features));
-            }
-            while let Some(sent) = coprocessor.next_frame() {
-                // Pass the frame to your CAN controller here.
-                core::hint::black_box(sent.frame);
             }
         }
         let Some(rate) = last.map(|last| last.vehicle.prompt) else { return false };

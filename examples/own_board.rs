@@ -13,17 +13,14 @@ pub fn poll<CAN: Can>(
     now: Micros,
 ) {
     match imu.next_sample() {
-        Some(Ok(sample)) => drop(coprocessor.imu(sample, now)),
+        Some(Ok(sample)) => drop(coprocessor.imu(sample, now, queue)),
         Some(Err(_)) => coprocessor.imu_error(),
         // This also reports a silent sensor.
-        None => drop(coprocessor.poll(now)),
+        None => drop(coprocessor.poll(now, queue)),
     }
     // This can run in a task of lower priority: the estimate is used two samples later, not before.
     if let Some(window) = coprocessor.window() {
         let _ = coprocessor.deliver(window.end, network.estimate(&window.features));
-    }
-    while let Some(sent) = coprocessor.next_frame() {
-        sent.frame.convert().into_iter().for_each(|frame| queue.enqueue(frame));
     }
     queue.service(can);
 }

@@ -71,12 +71,9 @@ mod app {
         let (queue, now) = (cx.local.queue, *cx.local.now);
         let errors = cx.shared.coprocessor.lock(|coprocessor| {
             match cx.local.imu.next_sample() {
-                Some(Ok(sample)) => drop(coprocessor.imu(sample, now)),
+                Some(Ok(sample)) => drop(coprocessor.imu(sample, now, queue)),
                 Some(Err(_)) => coprocessor.imu_error(),
-                None => drop(coprocessor.poll(now)),
-            }
-            while let Some(sent) = coprocessor.next_frame() {
-                queue.enqueue(sent.frame);
+                None => drop(coprocessor.poll(now, queue)),
             }
             coprocessor.input_counters().imu_errors + queue.dropped()
         });

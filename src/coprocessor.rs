@@ -9,9 +9,9 @@
 //! Use it in this order:
 //!
 //! 1. Pass in the inputs that have arrived: [`Coprocessor::imu`], [`Coprocessor::fog`], [`Coprocessor::can`]. Call
-//!    [`Coprocessor::poll`] about every millisecond, because it detects a silent sensor.
-//! 2. After each of these calls, send the frames that [`Coprocessor::next_frame`] returns, until it returns `None`.
-//! 3. Run the windows of [`Coprocessor::window`] and [`Coprocessor::fog_window`] through the networks, at once or in
+//!    [`Coprocessor::poll`] about every millisecond, because it detects a silent sensor. The frames go to the
+//!    [`Sink`] that each call gets.
+//! 2. Run the windows of [`Coprocessor::window`] and [`Coprocessor::fog_window`] through the networks, at once or in
 //!    a task of lower priority, and pass the estimates to [`Coprocessor::deliver`] and [`Coprocessor::deliver_fog`].
 //!
 //! A window's estimate is used [`crate::compensate::Mode::delay`] samples after the window, however early it arrives,
@@ -20,20 +20,21 @@
 
 mod config;
 mod handover;
+mod sink;
 mod timeline;
 
 pub use crate::pipeline::DueWindow;
 pub use config::{Clock, Config, InputError, StorageFaults};
+pub use sink::{Sink, TimedFrame};
 
 use crate::bias::{Latitude, StaticError};
 use crate::can::DataFrame;
-use crate::can::config::MAX_MESSAGES;
 use crate::can::encoder::CanEncoder;
 use crate::can::fog_encoder::FogEncoder;
 use crate::can::latitude::LatitudeReceiver;
 use crate::can::wheel::WheelReceiver;
 use crate::compensate::Settled;
-use crate::estimate::{VehicleSample, YawEstimate};
+use crate::estimate::VehicleSample;
 use crate::fog::{FogCounters, FogPipeline};
 use crate::health::{BoardFaults, InputCounters, MonitorCounters, count};
 use crate::model::Estimate;
@@ -44,21 +45,7 @@ use crate::pipeline::Pipeline;
 use crate::sample::{FogSample, ImuSample, WheelSample};
 use crate::units::{CentiCelsius, Micros};
 use handover::Handover;
-use heapless::Deque;
 use timeline::Timeline;
-
-/// Capacity of the queue that [`Coprocessor::next_frame`] empties: the frames of a sample and of a step of the
-/// fibre-optic gyro.
-const FRAMES: usize = MAX_MESSAGES + 3;
-
-/// A frame to send.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TimedFrame {
-    /// The frame.
-    pub frame: DataFrame,
-    /// Time stamp of the frame's sample, by the sensor's clock.
-    pub time: Micros,
-}
 
 /// The results of one sample, or of its absence, for a log or diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,11 +86,8 @@ pub struct Coprocessor {
     known_wheels: Option<WheelSample>,
     fog: FogPipeline,
     latitude: Option<LatitudeReceiver>,
-    /// The newest rate of the fibre-optic gyro.
-    fog_estimate: Option<YawEstimate>,
     encoder: CanEncoder,
     fog_encoder: FogEncoder,
-    frames: Deque<TimedFrame, FRAMES>,
     /// The newest sample's time stamp, and the time at which it arrived.
     sample_time: Micros,
     heard: Micros,
@@ -131,10 +115,8 @@ impl Coprocessor {
             known_wheels: None,
             fog: FogPipeline::new(CONFIG.fog, CONFIG.has_fognet),
             latitude: None,
-            fog_estimate: None,
             encoder: CanEncoder::START,
             fog_encoder: FogEncoder::new(CONFIG.fog_ids),
-            frames: Deque::new(),
             sample_time: Micros(0),
             heard: Micros(0),
             temperature: None,
@@ -169,13 +151,18 @@ impl Coprocessor {
         self.fog_encoder = FogEncoder::new(config.fog_ids);
     }
 
-    /// Processes a sample of the inertial sensor that arrived at `now`.
+    /// Processes a sample of the inertial sensor that arrived at `now`; its frames go to `sink`.
     ///
     /// # Errors
     /// [`InputError::Imu`] when its time stamp has no place on the grid, [`InputError::ClockWentBack`]. The sample is
     /// counted and not used, and no frame is sent for it; the samples that follow report a gap.
     #[inline(never)]
-    pub fn imu(&mut self, sample: ImuSample, now: Micros) -> Result<Observation, InputError> {
+    pub fn imu(
+        &mut self,
+        sample: ImuSample,
+        now: Micros,
+        sink: &mut impl Sink,
+    ) -> Result<Observation, InputError> {
         let now = self.advance(now)?;
         self.sample_time = sample.time;
         if let Some(wheels) = self.poll_wheels() {
@@ -188,7 +175,8 @@ impl Coprocessor {
         let output = self.pipeline.correct(sample).map_err(InputError::Imu)?;
         self.monitor.heard(sample.time, now);
         self.heard = now;
-        self.send(&output.vehicle, sample.time);
+        self.send(&output.vehicle, sample.time, sink);
+        self.step_fog(sink);
         if let Some(window) = output.window {
             let replaced = self.handover.offer(window, now);
             count(&mut self.counters.replaced_windows, u32::from(replaced));
@@ -203,14 +191,17 @@ impl Coprocessor {
         count(&mut self.counters.imu_errors, 1);
     }
 
-    /// Processes a sample of the fibre-optic gyro that arrived at `now`.
+    /// Processes a sample of the fibre-optic gyro that arrived at `now`; the frames of the steps that it completes go
+    /// to `sink`.
     ///
     /// # Errors
     /// [`InputError::Fog`] when it is a duplicate or out of order, [`InputError::ClockWentBack`]; the sample is
     /// counted and not used.
-    pub fn fog(&mut self, sample: FogSample, now: Micros) -> Result<(), InputError> {
+    pub fn fog(&mut self, sample: FogSample, now: Micros, sink: &mut impl Sink) -> Result<(), InputError> {
         self.advance(now)?;
-        self.fog.add(self.time(), sample).map_err(InputError::Fog)
+        let added = self.fog.add(self.time(), sample).map_err(InputError::Fog);
+        self.step_fog(sink);
+        added
     }
 
     /// Counts an input of the fibre-optic gyro that was not a valid sample.
@@ -257,18 +248,21 @@ impl Coprocessor {
         }
     }
 
-    /// Does the work that is due at `now` without an input: it sends the messages of a silent sensor.
+    /// Does the work that is due at `now` without an input: it sends the messages of silent sensors to `sink`.
     ///
     /// # Errors
     /// [`InputError::ClockWentBack`]; the error is counted.
-    pub fn poll(&mut self, now: Micros) -> Result<Option<Observation>, InputError> {
+    pub fn poll(&mut self, now: Micros, sink: &mut impl Sink) -> Result<Option<Observation>, InputError> {
         let now = self.advance(now)?;
-        let Some(steps) = self.monitor.poll(now) else { return Ok(None) };
-        self.report_board();
-        let vehicle = self.pipeline.silent(steps);
-        self.send(&vehicle, Micros(self.sample_time.0.saturating_add(now.0 - self.heard.0)));
-        let wheels = self.known_wheels.unwrap_or_default();
-        Ok(Some(Observation { sample: None, vehicle, wheels, settled: None, refused: None }))
+        let observation = self.monitor.poll(now).map(|steps| {
+            self.report_board();
+            let vehicle = self.pipeline.silent(steps);
+            self.send(&vehicle, Micros(self.sample_time.0.saturating_add(now.0 - self.heard.0)), sink);
+            let wheels = self.poll_wheels().unwrap_or_default();
+            Observation { sample: None, vehicle, wheels, settled: None, refused: None }
+        });
+        self.step_fog(sink);
+        Ok(observation)
     }
 
     /// Returns whether the next sample of the inertial sensor can be processed at `now`. If not, the sample needs an
@@ -280,15 +274,6 @@ impl Coprocessor {
             self.monitor.hold(now);
         }
         !waits
-    }
-
-    /// Returns the next frame to send. Call it until `None` after every input, because it also processes the steps of
-    /// the fibre-optic gyro, one at a time.
-    pub fn next_frame(&mut self) -> Option<TimedFrame> {
-        if self.frames.is_empty() {
-            self.step_fog();
-        }
-        self.frames.pop_front()
     }
 
     /// Returns the window that is due for GyroNet, once.
@@ -348,12 +333,6 @@ impl Coprocessor {
         &self.pipeline
     }
 
-    /// Returns the rate of the fibre-optic gyro that the newest frames of [`Coprocessor::next_frame`] belong to.
-    #[must_use]
-    pub fn fog_estimate(&self) -> Option<&YawEstimate> {
-        self.fog_estimate.as_ref()
-    }
-
     /// Returns the fault counters of the sensor monitor.
     #[must_use]
     pub fn monitor_counters(&self) -> &MonitorCounters {
@@ -368,12 +347,12 @@ impl Coprocessor {
 
     /// Withholds the rates, or sends them again. The first call that withholds them sends a message set without a
     /// rate, and so does each later sample. The caller does this before it stops sending to erase flash.
-    pub fn pause(&mut self, paused: bool) {
+    pub fn pause(&mut self, paused: bool, sink: &mut impl Sink) {
         let begins = paused && !self.paused;
         self.paused = paused;
         if begins {
             let vehicle = self.pipeline.silent(0);
-            self.send(&vehicle, self.sample_time);
+            self.send(&vehicle, self.sample_time, sink);
         }
     }
 
@@ -404,17 +383,21 @@ impl Coprocessor {
         self.known_wheels
     }
 
-    /// Processes the next step of the fibre-optic gyro, if it is complete or due.
-    fn step_fog(&mut self) {
+    /// Sends the rates of the fibre-optic gyro's steps that are complete or due.
+    #[inline(never)]
+    fn step_fog<SINK: Sink>(&mut self, sink: &mut SINK) {
         let time = self.time();
-        let wheels = self.poll_wheels();
-        let silent = self.timeline.now().0.saturating_sub(self.heard.0) >= TIMEOUT_US;
-        let fresh = self.clock == Clock::Sensor || !silent;
-        let inertial = self.pipeline.inertial().filter(|_| fresh);
-        let Some(estimate) = self.fog.next_step(time, inertial, wheels.as_ref()) else { return };
-        self.fog_estimate = Some(estimate);
-        for frame in &self.fog_encoder.encode(&estimate) {
-            self.queue(*frame, self.sample_time);
+        while self.fog.is_due(time) {
+            let wheels = self.poll_wheels();
+            let silent = self.timeline.now().0.saturating_sub(self.heard.0) >= TIMEOUT_US;
+            let fresh = self.clock == Clock::Sensor || !silent;
+            let inertial = self.pipeline.inertial().filter(|_| fresh);
+            let Some(estimate) = self.fog.next_step(time, inertial, wheels.as_ref()) else { return };
+            sink.fog_rate(&estimate);
+            let time = self.sample_time;
+            if SINK::TAKES_FRAMES {
+                self.fog_encoder.send(&estimate, |frame| sink.frame(TimedFrame { frame, time }));
+            }
         }
     }
 
@@ -427,23 +410,14 @@ impl Coprocessor {
         self.pipeline.set_clock_ratio(self.monitor.clock_ratio());
     }
 
-    fn send(&mut self, vehicle: &VehicleSample, time: Micros) {
+    fn send<SINK: Sink>(&mut self, vehicle: &VehicleSample, time: Micros, sink: &mut SINK) {
         let withheld = self.paused.then(|| self.pipeline.silent(0));
-        for frame in &self.encoder.encode(withheld.as_ref().unwrap_or(vehicle)) {
-            self.queue(*frame, time);
+        if SINK::TAKES_FRAMES {
+            let vehicle = withheld.as_ref().unwrap_or(vehicle);
+            self.encoder.send(vehicle, |frame| sink.frame(TimedFrame { frame, time }));
+            self.counters.out_of_range = self.encoder.out_of_range();
         }
-        self.counters.out_of_range = self.encoder.out_of_range();
         self.bus.reported = self.bus.lost;
-    }
-
-    /// Queues a frame; drops the oldest one if the queue is full.
-    fn queue(&mut self, frame: DataFrame, time: Micros) {
-        if self.frames.is_full() {
-            self.frames.pop_front();
-            count(&mut self.counters.replaced_frames, 1);
-        }
-        // There is room now.
-        let _ = self.frames.push_back(TimedFrame { frame, time });
     }
 
     fn claim(&mut self, wanted: bool, end: u32) -> Result<(), InputError> {

@@ -274,8 +274,6 @@ pub struct InputCounters {
     pub unclaimed_estimates: u32,
     /// Windows that had not been taken when the next one was due.
     pub replaced_windows: u32,
-    /// Frames dropped because the output queue was full.
-    pub replaced_frames: u32,
     /// Messages that reported "failed" because a value does not fit its signal.
     pub out_of_range: u32,
 }
@@ -290,7 +288,6 @@ impl InputCounters {
         clock_back: 0,
         unclaimed_estimates: 0,
         replaced_windows: 0,
-        replaced_frames: 0,
         out_of_range: 0,
     };
 }

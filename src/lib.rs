@@ -139,7 +139,7 @@ mod sqrt;
 mod vector;
 
 pub use can::{DataFrame, queue::TransmitQueue};
-pub use coprocessor::{Clock, Config, Coprocessor, InputError, Observation, TimedFrame};
+pub use coprocessor::{Clock, Config, Coprocessor, InputError, Observation, Sink, TimedFrame};
 pub use estimate::{VehicleSample, YawEstimate};
 pub use model::{Blob, FogNet, GyroNet, WindowNetwork, weights};
 pub use sample::{FogSample, ImuSample};

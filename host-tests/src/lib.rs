@@ -16,6 +16,7 @@ pub mod qemu;
 pub mod recordings;
 pub mod replay;
 pub mod require;
+pub mod sent;
 pub mod sequence;
 pub mod stored;
 pub mod stream;

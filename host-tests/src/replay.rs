@@ -179,11 +179,10 @@ impl Board {
         loop {
             let mut coprocessor = self.coprocessor.clone();
             let now = self.next_silence();
-            if !matches!(coprocessor.poll(now), Ok(Some(_))) {
+            let mut set = Vec::new();
+            if !matches!(coprocessor.poll(now, &mut |sent: TimedFrame| set.push(line(&sent))), Ok(Some(_))) {
                 return;
             }
-            let set: Vec<Vec<u8>> =
-                std::iter::from_fn(|| coprocessor.next_frame()).map(|sent| line(&sent)).collect();
             let at = self.lines.len();
             if self.emulated_lines.get(at..at + set.len()) != Some(&set[..]) {
                 return;
@@ -208,10 +207,12 @@ impl Board {
             while let Some(sample) = self.mti.next_sample() {
                 let Ok(sample) = sample else { continue };
                 self.follow();
-                if self.coprocessor.imu(sample, self.now).is_ok() {
+                let Self { coprocessor, lines, .. } = self;
+                if coprocessor.imu(sample, self.now, &mut |sent: TimedFrame| lines.push(line(&sent))).is_ok()
+                {
                     self.silent = 0;
                 }
-                self.send();
+                self.estimate();
             }
         }
     }
@@ -231,9 +232,11 @@ impl Board {
                     // Silence may come before this sample or after it.
                     self.follow();
                     // A sample without a place in time is counted.
-                    let _ = self.coprocessor.fog(sample, self.now);
+                    let Self { coprocessor, lines, .. } = self;
+                    let _ =
+                        coprocessor.fog(sample, self.now, &mut |sent: TimedFrame| lines.push(line(&sent)));
+                    self.estimate();
                     self.follow();
-                    self.send();
                 }
             }
         }
@@ -252,21 +255,19 @@ impl Board {
     pub fn silence(&mut self, sets: u64) {
         for _ in 0..sets {
             self.now = self.next_silence();
-            let observation = self.coprocessor.poll(self.now).expect("time goes on");
-            assert!(observation.is_some(), "the sensor is silent");
+            let Self { coprocessor, lines, .. } = self;
+            let observation = coprocessor.poll(self.now, &mut |sent: TimedFrame| lines.push(line(&sent)));
+            assert!(observation.expect("time goes on").is_some(), "the sensor is silent");
             self.silent += 1;
-            self.send();
+            self.estimate();
         }
     }
 
-    /// Sends the waiting frames, and runs the windows that are due.
-    fn send(&mut self) {
-        while let Some(sent) = self.coprocessor.next_frame() {
-            self.lines.push(line(&sent));
-            if let Some((number, window)) = self.coprocessor.fog_window() {
-                let estimate = self.fog_network.estimate(&window);
-                self.coprocessor.deliver_fog(number, estimate).expect("the window that is due");
-            }
+    /// Runs the windows that are due.
+    fn estimate(&mut self) {
+        if let Some((number, window)) = self.coprocessor.fog_window() {
+            let estimate = self.fog_network.estimate(&window);
+            self.coprocessor.deliver_fog(number, estimate).expect("the window that is due");
         }
         if let Some(due) = self.coprocessor.window() {
             let estimate = self.network.estimate(&due.features);

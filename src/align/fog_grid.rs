@@ -51,6 +51,14 @@ impl FogGrid {
         Ok(())
     }
 
+    /// Returns whether the next step is complete or due, or so old that the grid restarts.
+    #[must_use]
+    pub fn is_due(&self, now: Micros) -> bool {
+        self.next.is_some_and(|next| {
+            self.increments.has_reached(Micros(next)) || now.0.saturating_sub(next) >= MAX_DELAY_US
+        })
+    }
+
     /// Returns the next step, if it is complete or due. Call it until `None` after every sample, and at least every
     /// few milliseconds.
     #[inline(never)]
@@ -63,10 +71,10 @@ impl FogGrid {
             self.increments.clear();
             return None;
         }
-        let time = Micros(next);
-        if !self.increments.has_reached(time) && waited < MAX_DELAY_US {
+        if !self.is_due(now) {
             return None;
         }
+        let time = Micros(next);
         self.next = Some(next + PERIOD_US);
         Some(Step { time, turn: self.increments.take(time) })
     }

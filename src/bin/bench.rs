@@ -47,7 +47,7 @@ mod firmware {
     use gyronet::sample::{ImuSample, PERIOD_US, Validity};
     use gyronet::uds::signature::{self, Hasher};
     use gyronet::units::{AngularRate, Micros, SpecificForce};
-    use gyronet::{Config, Coprocessor};
+    use gyronet::{Config, Coprocessor, TimedFrame};
     use panic_semihosting as _;
     #[expect(unused_imports, reason = "brings the interrupt vectors to the linker")]
     use stm32f4::stm32f405 as _;
@@ -176,10 +176,10 @@ mod firmware {
                     validity: Validity::Good,
                 };
                 let _ = black_box(coprocessor.can(black_box(&standing), time));
-                let _ = black_box(coprocessor.imu(black_box(sample), time));
-                while let Some(sent) = coprocessor.next_frame() {
+                let mut send = |sent: TimedFrame| {
                     black_box(sent);
-                }
+                };
+                let _ = black_box(coprocessor.imu(black_box(sample), time, &mut send));
                 if let Some(due) = coprocessor.window() {
                     let estimate = Estimate {
                         corrections: [AngularRate(1_000); WINDOW],

@@ -44,9 +44,19 @@ impl CanEncoder {
         self.out_of_range
     }
 
-    /// Encodes the frames of one sample.
-    #[inline(never)]
+    /// The frames of one sample, for a caller without a queue of its own.
     pub fn encode(&mut self, sample: &VehicleSample) -> Vec<DataFrame, MAX_MESSAGES> {
+        let mut frames = Vec::new();
+        self.send(sample, |frame| {
+            // No configuration has more than MAX_MESSAGES messages.
+            let _ = frames.push(frame);
+        });
+        frames
+    }
+
+    /// Encodes the frames of one sample and passes each to `send`.
+    #[inline(never)]
+    pub fn send(&mut self, sample: &VehicleSample, mut send: impl FnMut(DataFrame)) {
         let (status, validity) = match sample.prompt.quality {
             Quality::Good | Quality::Degraded => (SignalStatus::OK, Validity::Valid),
             Quality::Initialising => (SignalStatus::INITIALISING, Validity::NotAvailable),
@@ -56,29 +66,23 @@ impl CanEncoder {
         let unusable = sample.prompt.quality == Quality::Unusable;
         let force_status = if unusable { SignalStatus::FAILURE } else { SignalStatus::OK };
         let settings = *self.config.settings();
-        let mut frames = Vec::new();
-        // No configuration has more than MAX_MESSAGES messages.
-        let mut send = |frame: Option<DataFrame>| frame.map(|frame| frames.push(frame).is_ok());
         if let Some(BoschSettings { tx1_only }) = settings.bosch {
             let messages = self.bosch.encode(&motion(sample, status, force_status));
             let sent = if tx1_only { 1 } else { LAYOUTS.len() };
             for (message, layout) in messages.iter().zip(&LAYOUTS).take(sent) {
                 let fits = message.rate_status == status && message.acceleration_status == force_status;
                 count(&mut self.out_of_range, u32::from(!fits));
-                send(message.frame(layout));
+                message.frame(layout).into_iter().for_each(&mut send);
             }
         }
         if let (Some(feed), Some(yaw)) = (self.yaw.as_mut(), settings.yaw) {
-            for frame in feed.frames(&sample.navigation, yaw.ids) {
-                send(Some(frame));
-            }
+            feed.frames(&sample.navigation, yaw.ids).for_each(&mut send);
         }
         if let Some(vdc2) = settings.vdc2 {
             let message = self.vdc2.encode(sample.prompt.rate, validity, &sample.specific_force);
             count(&mut self.out_of_range, u32::from(validity != Validity::Error && message.has_error()));
-            send(message.frame(vdc2.source));
+            message.frame(vdc2.source).into_iter().for_each(send);
         }
-        frames
     }
 }
 

@@ -42,14 +42,9 @@ impl FogEncoder {
         ids.into_iter().filter_map(StandardId::new).map(message).collect()
     }
 
-    /// Encodes the frames of one step.
+    /// Encodes the frames of one step and passes each to `send`.
     #[inline(never)]
-    pub fn encode(&mut self, sample: &YawEstimate) -> Vec<DataFrame, 3> {
-        let mut frames = Vec::new();
-        for frame in self.encoder.frames(sample, self.ids) {
-            // There is room for three.
-            let _ = frames.push(frame);
-        }
-        frames
+    pub fn send(&mut self, sample: &YawEstimate, send: impl FnMut(DataFrame)) {
+        self.encoder.frames(sample, self.ids).for_each(send);
     }
 }

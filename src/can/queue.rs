@@ -40,6 +40,11 @@ impl<F, const N: usize> TransmitQueue<F, N> {
         let _ = self.frames.push_back(frame);
     }
 
+    /// Counts a frame that the queue cannot hold as dropped.
+    pub(crate) fn refuse(&mut self) {
+        self.dropped = self.dropped.saturating_add(1);
+    }
+
     /// Returns the oldest frame.
     #[must_use]
     pub fn front(&self) -> Option<&F> {

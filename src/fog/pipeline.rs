@@ -191,6 +191,12 @@ impl FogPipeline {
         Ok(())
     }
 
+    /// Returns whether the next 10 ms are complete, or due at `now`.
+    #[must_use]
+    pub fn is_due(&self, now: Micros) -> bool {
+        self.grid.is_due(now)
+    }
+
     /// Returns the rate of the next 10 ms, if they are complete or due; `None` before the first sample,
     /// unless [`FogPipeline::start_without_sample`] was called. Also call it every few milliseconds, because it detects silence.
     #[inline(never)]

@@ -195,7 +195,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
                 words!(counters.watch => MonitorCounters { silences, stuck, held, wrong, clock_off });
             let inputs = words!(counters.inputs => InputCounters {
                 imu_errors, fog_errors, wheel_errors, latitude_errors, clock_back, unclaimed_estimates,
-                replaced_windows, replaced_frames, out_of_range
+                replaced_windows, out_of_range
             });
             let lines = words!(counters.lines => LineCounters {
                 unsent, line_errors, held, overruns, service_errors, frames_lost

@@ -104,7 +104,7 @@ fn a_fibre_optic_gyro_is_a_second_block() {
         ..YawEstimate::default()
     };
     let mut all = frames(100);
-    all.extend((0..100).flat_map(|tick| feed.encode(&sample(tick))));
+    (0..100).for_each(|tick| feed.send(&sample(tick), |frame| all.push(frame)));
     // An angle of it.
     all.remove(600 + 3 * 50 + 1);
     let log = log("fog.log", &all);

@@ -28,7 +28,7 @@ use embassy_time::{Duration, Instant, Timer, with_timeout};
 use gyronet::coprocessor::DueWindow;
 use gyronet::model::{Estimate, gyronet::GyroNetState};
 use gyronet::sensor::xsens::Mti;
-use gyronet::{Blob, Config, Coprocessor, GyroNet, Micros, WindowNetwork, weights};
+use gyronet::{Blob, Config, Coprocessor, GyroNet, Micros, TimedFrame, WindowNetwork, weights};
 use static_cell::ConstStaticCell;
 
 bind_interrupts!(struct Interrupts {
@@ -61,7 +61,7 @@ async fn correct(coprocessor: &'static mut Coprocessor, mut uart: RingBufferedUa
                     mti.receive(*byte);
                     while let Some(sample) = mti.next_sample() {
                         match sample {
-                            Ok(sample) => drop(coprocessor.imu(sample, now)),
+                            Ok(sample) => drop(coprocessor.imu(sample, now, &mut send)),
                             Err(_) => coprocessor.imu_error(),
                         }
                         hand_over(coprocessor);
@@ -72,19 +72,21 @@ async fn correct(coprocessor: &'static mut Coprocessor, mut uart: RingBufferedUa
             // A late estimate is counted.
             Either3::Second((end, estimate)) => drop(coprocessor.deliver(end, estimate)),
             // A silent sensor is reported.
-            Either3::Third(()) => drop(coprocessor.poll(now)),
+            Either3::Third(()) => drop(coprocessor.poll(now, &mut send)),
         }
         hand_over(coprocessor);
     }
 }
 
-/// Passes frames to the bus and a window to the network.
-fn hand_over(coprocessor: &mut Coprocessor) {
-    while let Some(sent) = coprocessor.next_frame() {
-        if sent.frame.convert().is_none_or(|frame| FRAMES.try_send(frame).is_err()) {
-            LOST.fetch_add(1, Relaxed);
-        }
+/// Passes a frame to the bus.
+fn send(sent: TimedFrame) {
+    if sent.frame.convert().is_none_or(|frame| FRAMES.try_send(frame).is_err()) {
+        LOST.fetch_add(1, Relaxed);
     }
+}
+
+/// Passes a window to the network.
+fn hand_over(coprocessor: &mut Coprocessor) {
     if let Some(window) = coprocessor.window() {
         WINDOW.signal(window);
     }
@@ -92,7 +94,7 @@ fn hand_over(coprocessor: &mut Coprocessor) {
 
 /// Sends the frames. If the bus has not accepted a frame for 20 ms, all are dropped, because old rates are useless.
 #[embassy_executor::task]
-async fn send(mut can: Can<'static>) {
+async fn transmit(mut can: Can<'static>) {
     can.enable().await;
     let (mut can, _) = can.split();
     loop {
@@ -150,7 +152,7 @@ fn main() -> ! {
     interrupt::UART5.set_priority(Priority::P7);
     let above = ABOVE.start(interrupt::UART4);
     above.spawn(correct(COPROCESSOR.take(), uart).expect("its only one"));
-    above.spawn(send(can).expect("its only one"));
+    above.spawn(transmit(can).expect("its only one"));
     BELOW.start(interrupt::UART5).spawn(compute(network).expect("its only one"));
     loop {
         cortex_m::asm::wfi();

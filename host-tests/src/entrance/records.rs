@@ -1,6 +1,7 @@
 //! This module reads records in flash: configuration, calibration, what was learnt, and the accepted weights.
 
 use super::{Seed, byte, take};
+use crate::sent::Sent;
 use crate::synthetic::turning;
 use embedded_storage::nor_flash::ReadNorFlash;
 use gyronet::Coprocessor;
@@ -43,8 +44,7 @@ fn run(configuration: &Configuration, calibration: &Calibration, learned: &Learn
     for tick in 0..3 {
         let temperature = Some(CentiCelsius(2_300));
         let sample = ImuSample { temperature, ..turning(tick, AngularRate(1_000)) };
-        coprocessor.imu(sample, sample.time).expect("the sample is on the grid");
-        while coprocessor.next_frame().is_some() {}
+        coprocessor.imu(sample, sample.time, &mut Sent::default()).expect("the sample is on the grid");
     }
 }
 

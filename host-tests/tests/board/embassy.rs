@@ -4,7 +4,7 @@
 use crate::common::{IMU, SAMPLE, SET, drive, frames};
 use gyronet::can::DataFrame;
 use gyronet::sensor::xsens::Mti;
-use gyronet::{Blob, Config, Coprocessor, GyroNet, Micros, WindowNetwork, weights};
+use gyronet::{Blob, Config, Coprocessor, GyroNet, Micros, TimedFrame, WindowNetwork, weights};
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::recordings::workspace;
 use std::path::{Path, PathBuf};
@@ -36,8 +36,8 @@ fn host(samples: &[Vec<u8>]) -> Vec<DataFrame> {
         mti.receive(*byte);
         while let Some(sample) = mti.next_sample() {
             let now = Micros(10_000 * k as u64);
-            coprocessor.imu(sample.expect("a sample"), now).expect("in order");
-            made.extend(std::iter::from_fn(|| coprocessor.next_frame()).map(|sent| sent.frame));
+            let mut send = |sent: TimedFrame| made.push(sent.frame);
+            coprocessor.imu(sample.expect("a sample"), now, &mut send).expect("in order");
             if let Some(window) = coprocessor.window() {
                 coprocessor
                     .deliver(window.end, network.estimate(&window.features))

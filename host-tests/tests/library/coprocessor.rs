@@ -19,6 +19,7 @@ use gyronet::sample::{FogSample, PERIOD_US, Standstill};
 use gyronet::units::{Angle, AngularRate, Duration, Micros};
 use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::sent::Sent;
 use gyronet_host_tests::synthetic::idling;
 
 const NOTHING: Estimate =
@@ -45,33 +46,29 @@ fn fog(millisecond: u64) -> FogSample {
     FogSample { time: Micros(millisecond * 1_000), span: 1_000, lost: 0, increment, temperature: None }
 }
 
-fn frames(coprocessor: &mut Coprocessor) -> Vec<DataFrame> {
-    std::iter::from_fn(|| coprocessor.next_frame()).map(|sent| sent.frame).collect()
-}
-
 /// A parked car; whoever runs the network is up to the test.
 struct Car {
     coprocessor: Coprocessor,
     noise: Noise,
     tick: u64,
+    sent: Sent,
 }
 
 impl Car {
     fn new(config: Config) -> Self {
-        Self { coprocessor: Coprocessor::new(config), noise: Noise::new(5), tick: 0 }
+        Self { coprocessor: Coprocessor::new(config), noise: Noise::new(5), tick: 0, sent: Sent::default() }
     }
 
     fn sample(&mut self) -> Observation {
         let sample = idling(self.tick, 0.001, &mut self.noise);
         self.tick += 1;
-        self.coprocessor.imu(sample, at(self.tick)).expect("in time")
+        self.coprocessor.imu(sample, at(self.tick), &mut self.sent).expect("in time")
     }
 
     /// Samples until the next window is due.
     fn until_window(&mut self) -> DueWindow {
         loop {
             self.sample();
-            frames(&mut self.coprocessor);
             if let Some(window) = self.coprocessor.window() {
                 return window;
             }
@@ -92,10 +89,8 @@ fn a_sample_gives_its_frames_once_and_an_observation() {
         (observation.vehicle.prompt.status, observation.wheels.standstill),
         (Status::Init, Standstill::Unknown)
     );
-    let sent: Vec<_> = std::iter::from_fn(|| car.coprocessor.next_frame()).collect();
-    assert_eq!(sent.len(), SET);
-    assert!(sent.iter().all(|frame| frame.time == Micros(0)), "stamped with the sample's time");
-    assert_eq!(car.coprocessor.next_frame(), None);
+    assert_eq!(car.sent.frames.len(), SET);
+    assert!(car.sent.frames.iter().all(|frame| frame.time == Micros(0)), "stamped with the sample's time");
     assert_eq!(car.counted(), InputCounters::default());
 }
 
@@ -138,16 +133,16 @@ fn a_sample_out_of_order_is_an_error_and_the_next_ones_report_a_gap() {
     for _ in 0..400 {
         let _ = car.sample();
     }
-    frames(&mut car.coprocessor);
+    car.sent.frames.clear();
     let old = idling(300, 0.001, &mut car.noise);
-    let error = car.coprocessor.imu(old, at(car.tick)).expect_err("an old one");
+    let error = car.coprocessor.imu(old, at(car.tick), &mut car.sent).expect_err("an old one");
     let backwards = AlignError::Backwards { last: at(399), at: at(300) };
     assert_eq!(error, InputError::Imu(backwards));
-    assert_eq!(frames(&mut car.coprocessor), [], "no frame is sent for it");
+    assert_eq!(car.sent.frames, [], "no frame is sent for it");
     assert_eq!(car.coprocessor.pipeline().counters().misplaced, 1);
     assert!(car.sample().vehicle.navigation.faults.contains(Faults::GAP));
-    car.coprocessor.fog(fog(10), at(car.tick)).expect("the first one");
-    let again = car.coprocessor.fog(fog(10), at(car.tick));
+    car.coprocessor.fog(fog(10), at(car.tick), &mut ()).expect("the first one");
+    let again = car.coprocessor.fog(fog(10), at(car.tick), &mut ());
     assert_eq!(again, Err(InputError::Fog(ClockError::Duplicate { at: Micros(10_000) })));
     assert_eq!(car.coprocessor.fog_counters().misplaced, 1);
 }
@@ -159,30 +154,23 @@ fn a_clock_that_goes_back_is_an_error_and_followed_from_there() {
         let _ = car.sample();
     }
     let back = Err(InputError::ClockWentBack { by: Duration(1_000_000) });
-    assert_eq!(car.coprocessor.poll(Micros(at(car.tick).0 - 1_000_000)), back);
+    assert_eq!(car.coprocessor.poll(Micros(at(car.tick).0 - 1_000_000), &mut ()), back);
     assert_eq!(car.counted().clock_back, 1);
     // 20 ms later by the clock that was set back nothing is missing yet; 30 ms later the sensor is silent.
     let set_back = |ms: u64| Micros(at(400).0 - 1_000_000 + ms * 1_000);
-    assert_eq!(car.coprocessor.poll(set_back(20)), Ok(None));
-    assert!(matches!(car.coprocessor.poll(set_back(30)), Ok(Some(_))));
+    assert_eq!(car.coprocessor.poll(set_back(20), &mut ()), Ok(None));
+    assert!(matches!(car.coprocessor.poll(set_back(30), &mut ()), Ok(Some(_))));
     for time in [0, u64::MAX, 0, u64::MAX, 7] {
-        let _ = car.coprocessor.poll(Micros(time));
-        let _ = car.coprocessor.imu(idling(400, 0.001, &mut car.noise), Micros(time));
-        let _ = car.coprocessor.fog(fog(time % 1_000), Micros(time));
+        let _ = car.coprocessor.poll(Micros(time), &mut ());
+        let _ = car.coprocessor.imu(idling(400, 0.001, &mut car.noise), Micros(time), &mut ());
+        let _ = car.coprocessor.fog(fog(time % 1_000), Micros(time), &mut ());
         let _ = car.coprocessor.can(&wheel_frame(&STANDS), Micros(time));
-        frames(&mut car.coprocessor);
     }
 }
 
 #[test]
-fn what_nobody_takes_is_replaced_and_counted() {
+fn a_window_that_nobody_takes_is_replaced_and_counted() {
     let mut car = Car::new(Config::DEFAULT);
-    for _ in 0..3 {
-        let _ = car.sample();
-    }
-    // Places for the frames of a sample and of a step of the fibre-optic gyro.
-    let kept = frames(&mut car.coprocessor).len();
-    assert_eq!((kept, car.counted().replaced_frames as usize), (10, 3 * SET - 10));
     while car.counted().replaced_windows == 0 {
         car.sample();
     }
@@ -199,7 +187,7 @@ fn the_next_sample_waits_for_the_estimate_until_it_is_late() {
     let now = at(car.tick);
     assert!(car.coprocessor.is_ready(now), "the next sample does not want it yet");
     let early = idling(car.tick, 0.001, &mut car.noise);
-    car.coprocessor.imu(early, now).expect("in time");
+    car.coprocessor.imu(early, now, &mut ()).expect("in time");
     assert!(!car.coprocessor.is_ready(now));
     assert!(!car.coprocessor.is_ready(Micros(now.0 + u64::from(DELAY) * PERIOD_US - 1)));
     let mut waited = car.coprocessor.clone();
@@ -208,7 +196,7 @@ fn the_next_sample_waits_for_the_estimate_until_it_is_late() {
     let late = Micros(now.0 + u64::from(DELAY) * PERIOD_US);
     assert!(car.coprocessor.is_ready(late));
     // A sensor whose samples wait is not silent.
-    assert_eq!(waited.poll(Micros(now.0 + 10)), Ok(None));
+    assert_eq!(waited.poll(Micros(now.0 + 10), &mut ()), Ok(None));
 }
 
 #[test]
@@ -235,7 +223,8 @@ fn wheels_are_judged_by_the_clock_that_is_configured() {
             // Samples that come at ten times their pace.
             let now = Micros(at(*tick).0 / pace);
             coprocessor.can(&wheel_frame(&STANDS), now).expect("a wheel frame");
-            let observation = coprocessor.imu(idling(*tick, 0.001, &mut noise), now).expect("in time");
+            let observation =
+                coprocessor.imu(idling(*tick, 0.001, &mut noise), now, &mut ()).expect("in time");
             observation.wheels.standstill == Standstill::Still
         });
         let expected = if clock == Clock::Outside && pace == 10 { None } else { Some(50) };
@@ -284,11 +273,11 @@ fn a_fibre_optic_gyro_sends_its_own_messages_and_hands_out_its_own_windows() {
             car.tick = millisecond / 10 - 1;
             car.sample();
         }
-        car.coprocessor.fog(fog(millisecond), now).expect("in order");
+        car.coprocessor.fog(fog(millisecond), now, &mut car.sent).expect("in order");
         let own = |frame: &DataFrame| {
             FOG_IDS.iter().any(|id| frame.id() == Id::Standard(StandardId::new(*id).expect("11 bits")))
         };
-        sent += frames(&mut car.coprocessor).iter().filter(|frame| own(frame)).count();
+        sent += car.sent.frames.drain(..).filter(|sent| own(&sent.frame)).count();
         if let Some((number, window)) = car.coprocessor.fog_window() {
             assert_eq!(window.iter().count(), STEPS);
             windows += 1;
@@ -300,7 +289,7 @@ fn a_fibre_optic_gyro_sends_its_own_messages_and_hands_out_its_own_windows() {
     assert_eq!(sent, 3 * 599, "a set of three messages every 10 ms");
     // The inertial sensor is known after three seconds, then there is a window every second.
     assert!((1..=2).contains(&windows), "{windows}");
-    let estimate = *car.coprocessor.fog_estimate().expect("it was heard");
+    let estimate = *car.sent.fog.last().expect("it was heard");
     assert_eq!(estimate.faults, Faults::NONE);
 }
 
@@ -312,9 +301,9 @@ fn a_fibre_optic_gyro_does_not_use_old_wheels() {
     car.sample();
     let mut silent = None;
     for millisecond in 11..400_u64 {
-        car.coprocessor.fog(fog(millisecond), Micros(millisecond * 1_000)).expect("in order");
-        frames(&mut car.coprocessor);
-        let faults = car.coprocessor.fog_estimate().map_or(Faults::NONE, |estimate| estimate.faults);
+        let now = Micros(millisecond * 1_000);
+        car.coprocessor.fog(fog(millisecond), now, &mut car.sent).expect("in order");
+        let faults = car.sent.fog.last().map_or(Faults::NONE, |estimate| estimate.faults);
         silent = silent.or(faults.contains(Faults::WHEELS).then_some(millisecond));
     }
     // The last frame came at 10 ms and is good for 100 ms, though no sample of the other sensor has come since.

@@ -52,7 +52,7 @@ fn frames() -> Vec<DataFrame> {
     let settings = Settings { vdc2: Some(Vdc2Settings { source: 0x80 }), ..Settings::DEFAULT };
     let mut encoder = CanEncoder::new(Config::new(settings).expect("checked"));
     let mut frames: Vec<DataFrame> = encoder.encode(&sample).iter().copied().collect();
-    frames.extend(FogEncoder::new(FOG_IDS).encode(&yaw(-1.0)));
+    FogEncoder::new(FOG_IDS).send(&yaw(-1.0), |frame| frames.push(frame));
     frames
 }
 

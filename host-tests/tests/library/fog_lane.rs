@@ -15,6 +15,7 @@ use gyronet::model::fognet::FogEstimate;
 use gyronet::sample::{FogSample, PERIOD_US, Standstill, WheelSample};
 use gyronet::units::{Angle, Micros, WheelSpeed};
 use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::sent::Sent;
 
 const DEG_PER_HOUR: f64 = std::f64::consts::PI / 180.0 / 3600.0;
 const EARTH: f64 = 7.292_115e-5;
@@ -269,12 +270,11 @@ fn the_coprocessor_takes_the_latitude_from_the_bus() {
     let receiver = LatitudeReceiver::new(settings(), None).expect("checked settings");
     let mut coprocessor = Coprocessor::new(Config { latitude: Some(receiver), ..Config::DEFAULT });
     let mut gyro = Gyro::new(7, -34.0, 0.0);
-    let mut sources = Vec::new();
+    let (mut rates, mut sources) = (Sent::default(), Vec::new());
     for step in 0..400 {
         let sample = gyro.sample();
-        coprocessor.fog(sample, sample.time).expect("in order");
-        while coprocessor.next_frame().is_some() {}
-        sources.extend(coprocessor.fog_estimate().map(|yaw| yaw.source));
+        coprocessor.fog(sample, sample.time, &mut rates).expect("in order");
+        sources.extend(rates.fog.drain(..).map(|yaw| yaw.source));
         if step >= 200 && step % 10 == 0 {
             coprocessor.can(&position(-34.0), sample.time).expect("a latitude");
         }
@@ -285,8 +285,7 @@ fn the_coprocessor_takes_the_latitude_from_the_bus() {
     assert!(matches!(jump, Err(InputError::Latitude(LatitudeError::Jump { .. }))), "{jump:?}");
     assert_eq!(coprocessor.input_counters().latitude_errors, 1);
     let sample = gyro.sample();
-    coprocessor.fog(sample, sample.time).expect("in order");
-    while coprocessor.next_frame().is_some() {}
-    let contested = coprocessor.fog_estimate().expect("a rate");
+    coprocessor.fog(sample, sample.time, &mut rates).expect("in order");
+    let contested = rates.fog.last().expect("a rate");
     assert!(contested.faults.contains(Faults::IMPLAUSIBLE) && contested.quality == Quality::Degraded);
 }

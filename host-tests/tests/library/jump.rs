@@ -27,7 +27,7 @@ impl Drive {
         let mut last = idling(0, 0.001, &mut noise);
         for tick in 0..400 {
             last = idling(tick, 0.001, &mut noise);
-            coprocessor.imu(last, Micros(last.time.0)).expect("in time");
+            coprocessor.imu(last, Micros(last.time.0), &mut ()).expect("in time");
         }
         assert_eq!(coprocessor.monitor_counters().wrong, 0, "no reading of an idling engine is doubted");
         Self { coprocessor, noise, tick: 399, last }
@@ -53,7 +53,7 @@ impl Drive {
     fn send(&mut self, sample: ImuSample) -> Observation {
         self.tick += 1;
         let time = Micros(self.tick * PERIOD_US);
-        self.coprocessor.imu(ImuSample { time, ..sample }, time).expect("in time")
+        self.coprocessor.imu(ImuSample { time, ..sample }, time, &mut ()).expect("in time")
     }
 }
 

@@ -26,7 +26,7 @@ fn fed(samples: u64) -> (Coprocessor, Noise) {
     let (mut coprocessor, mut noise) = (coprocessor(), Noise::new(3));
     for tick in 0..samples {
         let observation = sample(&mut coprocessor, idling(tick, 0.001, &mut noise), tick);
-        assert_eq!(coprocessor.poll(at(tick)), Ok(None));
+        assert_eq!(coprocessor.poll(at(tick), &mut ()), Ok(None));
         assert!(matches!(observation.vehicle.prompt.status, Status::Init | Status::Degraded));
     }
     (coprocessor, noise)
@@ -38,17 +38,17 @@ fn at(tick: u64) -> Micros {
 
 fn sample(coprocessor: &mut Coprocessor, sample: ImuSample, tick: u64) -> Observation {
     let sample = ImuSample { time: Micros(tick * PERIOD_US), ..sample };
-    coprocessor.imu(sample, at(tick)).expect("in time")
+    coprocessor.imu(sample, at(tick), &mut ()).expect("in time")
 }
 
 #[test]
 fn silence_has_no_rate_and_ends_with_a_sample() {
     let (mut coprocessor, mut noise) = fed(400);
     let quiet = at(399).0;
-    assert_eq!(coprocessor.poll(Micros(quiet + TIMEOUT_US - 1)), Ok(None));
+    assert_eq!(coprocessor.poll(Micros(quiet + TIMEOUT_US - 1), &mut ()), Ok(None));
     let mut sets = Vec::new();
     for millisecond in TIMEOUT_US / 1_000..TIMEOUT_US / 1_000 + 100 {
-        sets.extend(coprocessor.poll(Micros(quiet + millisecond * 1_000)).expect("time goes on"));
+        sets.extend(coprocessor.poll(Micros(quiet + millisecond * 1_000), &mut ()).expect("time goes on"));
     }
     assert_eq!(sets.len(), 10, "one every 10 ms");
     for (set, tick) in sets.iter().map(|set| set.vehicle).zip(402..) {
@@ -59,14 +59,15 @@ fn silence_has_no_rate_and_ends_with_a_sample() {
     assert_eq!(coprocessor.monitor_counters().silences, 1);
     let set = sample(&mut coprocessor, idling(412, 0.001, &mut noise), 412).vehicle;
     assert_eq!((set.prompt.tick, set.prompt.status), (412, Status::Degraded), "the bias is kept");
-    assert_eq!(coprocessor.poll(at(413)), Ok(None));
+    assert_eq!(coprocessor.poll(at(413), &mut ()), Ok(None));
 }
 
 #[test]
 fn silence_keeps_the_yaw() {
     let (mut coprocessor, mut noise) = fed(400);
     let last = sample(&mut coprocessor, idling(400, 0.001, &mut noise), 400).vehicle.navigation;
-    let set = coprocessor.poll(Micros(at(400).0 + TIMEOUT_US)).expect("time goes on").expect("a set");
+    let set =
+        coprocessor.poll(Micros(at(400).0 + TIMEOUT_US), &mut ()).expect("time goes on").expect("a set");
     let silent = set.vehicle.navigation;
     assert_ne!(silent.yaw.0, 0);
     assert_eq!((silent.yaw, silent.source, set.sample), (last.yaw, Source::Raw, None));
@@ -75,8 +76,8 @@ fn silence_keeps_the_yaw() {
 #[test]
 fn a_part_has_time_to_start() {
     let mut coprocessor = coprocessor();
-    assert_eq!(coprocessor.poll(Micros(START_US - 1)), Ok(None));
-    let set = coprocessor.poll(Micros(START_US)).expect("time goes on").expect("a set");
+    assert_eq!(coprocessor.poll(Micros(START_US - 1), &mut ()), Ok(None));
+    let set = coprocessor.poll(Micros(START_US), &mut ()).expect("time goes on").expect("a set");
     assert_eq!(set.vehicle.navigation.quality, Quality::Unusable);
 }
 
@@ -183,7 +184,7 @@ fn every_round_of_the_background_check_sees_a_flipped_bit() {
 fn a_late_poll_sends_one_set_and_catches_up_none() {
     let (mut coprocessor, _) = fed(400);
     let late = at(399).0 + TIMEOUT_US + 45_000;
-    let mut sets = |now| usize::from(coprocessor.poll(Micros(now)).expect("time goes on").is_some());
+    let mut sets = |now| usize::from(coprocessor.poll(Micros(now), &mut ()).expect("time goes on").is_some());
     assert_eq!(sets(late), 1);
     assert_eq!([1, 5_000, 9_999].map(|after| sets(late + after)), [0; 3]);
     assert_eq!(sets(late + PERIOD_US), 1);

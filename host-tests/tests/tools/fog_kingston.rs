@@ -2,7 +2,8 @@
 //! car's own speed, and the heading of a survey-grade system as reference.
 
 use gyronet::bias::Latitude;
-use gyronet::coprocessor::{Config, Coprocessor};
+use gyronet::coprocessor::{Config, Coprocessor, Sink, TimedFrame};
+use gyronet::estimate::YawEstimate;
 use gyronet::fog::{FogConfig, FogErrors};
 use gyronet::sample::FogSample;
 use gyronet::units::{Angle, Micros};
@@ -39,6 +40,19 @@ fn at(table: &[Vec<f64>], column: usize, time: f64) -> f64 {
     before[column] + share * (after[column] - before[column])
 }
 
+/// The sum of the rates that are sent, rad.
+struct Turned(f64);
+
+impl Sink for Turned {
+    const TAKES_FRAMES: bool = false;
+
+    fn frame(&mut self, _frame: TimedFrame) {}
+
+    fn fog_rate(&mut self, rate: &YawEstimate) {
+        self.0 += 0.01 * rate.rate.rad_per_sec();
+    }
+}
+
 /// Yaw by the board after each row of the gyro, rad.
 fn yaw(gyro: &[Vec<f64>], speed: &[Vec<f64>], latitude: f64) -> Vec<f64> {
     let latitude = Latitude::from_degrees(latitude as f32);
@@ -49,7 +63,7 @@ fn yaw(gyro: &[Vec<f64>], speed: &[Vec<f64>], latitude: f64) -> Vec<f64> {
         ..Config::DEFAULT
     });
     let mut yaw = vec![0.0; gyro.len()];
-    let mut sum = 0.0;
+    let mut turned = Turned(0.0);
     for (row, place) in gyro.iter().zip(&mut yaw) {
         for step in 0..STEPS {
             // The unit gives one reading in 100 ms; a gyro whose increments are equal would be stuck.
@@ -66,17 +80,9 @@ fn yaw(gyro: &[Vec<f64>], speed: &[Vec<f64>], latitude: f64) -> Vec<f64> {
             let turn = Angle(((0.01 * row[6] + flicker) * f64::from(Angle::PER_RAD)).round() as i64);
             let increment = [None, None, Some(turn)];
             let sample = FogSample { time: now, span: 10_000, lost: 0, increment, temperature: None };
-            coprocessor.fog(sample, now).expect("in order");
-            let mut newest = None;
-            while coprocessor.next_frame().is_some() {
-                let estimate = coprocessor.fog_estimate().expect("its frames are sent");
-                if newest != Some(estimate.tick) {
-                    sum += 0.01 * estimate.rate.rad_per_sec();
-                    newest = Some(estimate.tick);
-                }
-            }
+            coprocessor.fog(sample, now, &mut turned).expect("in order");
         }
-        *place = sum;
+        *place = turned.0;
     }
     yaw
 }

@@ -1,18 +1,19 @@
 //! The two lines that carry the board's frames: SLCAN always, CAN if its controller works.
 
-use crate::diagnosis::{Line, RESPONSES};
+use crate::diagnosis::{self, Line, RESPONSES};
 use crate::serial;
 use crate::stm32f405::can::{self, Can, STALE_MS, State};
 use gyronet::can::DataFrame;
 use gyronet::can::queue::TransmitQueue;
 use gyronet::can::slcan::host::StatusFlags;
 use gyronet::can::slcan::port::Port;
+use gyronet::coprocessor::{Sink, TimedFrame};
 use gyronet::units::Micros;
 
 /// Frames that can wait for each line.
 const QUEUE: usize = 24;
 
-/// Both lines and the frames that wait for them.
+/// Both lines and the frames that wait for them; a [`Sink`] of the coprocessor's frames.
 pub struct Outgoing {
     slcan: serial::Port,
     port: Port<QUEUE>,
@@ -31,14 +32,6 @@ impl Outgoing {
     /// Joins the CAN bus.
     pub fn join(&self) {
         self.can.iter().for_each(Can::join);
-    }
-
-    /// Queues a frame; `stamp` is the time of its measurement.
-    pub fn push(&mut self, frame: DataFrame, stamp: Micros) {
-        self.port.enqueue(frame, stamp);
-        if self.can.is_some() {
-            self.queue.enqueue((frame, self.now));
-        }
     }
 
     /// Sends as much as the lines accept; passes the frames that a host has sent over SLCAN to `take`.
@@ -103,5 +96,19 @@ impl Outgoing {
     /// Returns the number of bytes of the SLCAN line that were damaged or lost, and of bytes that had to wait.
     pub fn line_faults(&self) -> [u32; 2] {
         [self.slcan.lost(), self.slcan.delayed()]
+    }
+}
+
+impl Sink for Outgoing {
+    /// Queues a frame for both lines, unless a tester has silenced the board.
+    #[inline(never)]
+    fn frame(&mut self, TimedFrame { frame, time }: TimedFrame) {
+        if diagnosis::is_silenced() {
+            return;
+        }
+        self.port.enqueue(frame, time);
+        if self.can.is_some() {
+            self.queue.enqueue((frame, self.now));
+        }
     }
 }

@@ -89,7 +89,7 @@ impl Output {
             led.set(lit == (tick & BLINK_MS != 0));
             self.poll_inputs(coprocessor, now);
         }
-        coprocessor.pause(pause::is_requested());
+        coprocessor.pause(pause::is_requested(), &mut self.outgoing);
         if pause::is_requested() {
             self.send(coprocessor, now);
             pause::announce();
@@ -102,7 +102,7 @@ impl Output {
                         self.poll_inputs(coprocessor, now);
                     }
                     self.report_bus(coprocessor);
-                    if let Ok(observation) = &coprocessor.imu(sample, now) {
+                    if let Ok(observation) = &coprocessor.imu(sample, now, &mut self.outgoing) {
                         self.note(observation);
                     }
                     self.send(coprocessor, now);
@@ -116,7 +116,7 @@ impl Output {
             return;
         }
         self.report_bus(coprocessor);
-        if let Ok(Some(observation)) = &coprocessor.poll(now) {
+        if let Ok(Some(observation)) = &coprocessor.poll(now, &mut self.outgoing) {
             self.note(observation);
         }
         self.send(coprocessor, now);
@@ -132,7 +132,7 @@ impl Output {
         }
     }
 
-    /// Passes the waiting CAN frames and the fibre-optic gyro's bytes to the coprocessor, and sends its frames.
+    /// Passes the waiting CAN frames and the fibre-optic gyro's bytes to the coprocessor.
     #[inline(never)]
     fn poll_inputs(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
         while let Some(frame) = FRAMES.pop() {
@@ -147,8 +147,7 @@ impl Output {
             while let Some(sample) = self.dsp1760.next_sample() {
                 match sample {
                     Ok(sample) => {
-                        let _ = coprocessor.fog(sample, now);
-                        self.queue(coprocessor);
+                        let _ = coprocessor.fog(sample, now, &mut self.outgoing);
                     }
                     Err(_) => coprocessor.fog_error(),
                 }
@@ -174,18 +173,9 @@ impl Output {
         count(&mut self.lines.overruns, u32::from(!OBSERVATIONS.push(note)));
     }
 
-    fn queue(&mut self, coprocessor: &mut Coprocessor) {
-        while let Some(sent) = coprocessor.next_frame() {
-            if !diagnosis::is_silenced() {
-                self.outgoing.push(sent.frame, sent.time);
-            }
-        }
-    }
-
-    /// Sends the coprocessor's frames, and takes the frames that a host has sent over SLCAN.
+    /// Sends the queued frames, and takes the frames that a host has sent over SLCAN.
     #[inline(never)]
     fn send(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
-        self.queue(coprocessor);
         let (unread, takes_inputs) = (&mut self.unread, self.slcan_inputs);
         self.outgoing.service(|frame| {
             if diagnosis::is_request(frame.id()) {

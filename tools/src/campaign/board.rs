@@ -15,7 +15,8 @@ use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::bias::Latitude;
 use gyronet::can::slcan::port::Port;
 use gyronet::can::yaw::FOG_IDS;
-use gyronet::coprocessor::{Config, Coprocessor, TimedFrame};
+use gyronet::coprocessor::{Config, Coprocessor, Sink, TimedFrame};
+use gyronet::estimate::YawEstimate;
 use gyronet::fog::FogConfig;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
@@ -73,19 +74,21 @@ impl Board {
         match message.line {
             Line::Sensor | Line::Gyro => {
                 for delivered in self.input.receive(message, now) {
+                    let row = if let Delivered::Imu(Some(_)) = delivered { message.row } else { self.row };
+                    let mut sent = Sending { port: &mut self.port, out, now, row, fog_row: None };
                     match delivered {
                         // The coprocessor counts refused samples.
                         Delivered::Imu(Some(sample)) => {
-                            self.row = message.row;
-                            let _ = self.coprocessor.imu(sample, now);
+                            self.row = row;
+                            let _ = self.coprocessor.imu(sample, now, &mut sent);
                         }
                         Delivered::Fog(Some(sample)) => {
-                            let _ = self.coprocessor.fog(sample, now);
+                            let _ = self.coprocessor.fog(sample, now, &mut sent);
                         }
                         Delivered::Imu(None) => self.coprocessor.imu_error(),
                         Delivered::Fog(None) => self.coprocessor.fog_error(),
                     }
-                    self.send(now, networks, out);
+                    self.run(networks);
                 }
             }
             Line::Wheels => {
@@ -100,10 +103,12 @@ impl Board {
 
     /// Polls the board at `now`, during this row of the drive, without an incoming byte.
     pub fn poll(&mut self, now: Micros, row: usize, networks: &mut impl Networks, out: &mut Vec<Message>) {
-        if let Ok(Some(_)) = self.coprocessor.poll(now) {
+        // Frames of the inertial sensor without a sample are those of its silence.
+        let mut sent = Sending { port: &mut self.port, out, now, row, fog_row: None };
+        if let Ok(Some(_)) = self.coprocessor.poll(now, &mut sent) {
             self.row = row;
         }
-        self.send(now, networks, out);
+        self.run(networks);
     }
 
     /// Returns the sum of all counters of errors on the board.
@@ -142,17 +147,8 @@ impl Board {
         all.iter().map(|count| u64::from(*count)).sum()
     }
 
-    /// Sends the waiting frames, and runs the windows that are due.
-    fn send(&mut self, now: Micros, networks: &mut impl Networks, out: &mut Vec<Message>) {
-        while let Some(sent) = self.coprocessor.next_frame() {
-            let row = self.row_of(&sent);
-            self.port.enqueue(sent.frame, now);
-            while let Some(line) = self.port.outgoing() {
-                let bytes = line.to_vec();
-                self.port.sent(bytes.len());
-                out.push(Message { line: Line::Out, row, at: now.0, bytes });
-            }
-        }
+    /// Runs the windows that are due.
+    fn run(&mut self, networks: &mut impl Networks) {
         if let Some(due) = self.coprocessor.window() {
             let estimate = networks.window(&due.features);
             self.coprocessor.deliver(due.end, estimate).expect("the window that is due");
@@ -163,16 +159,32 @@ impl Board {
             self.coprocessor.deliver_fog(number, estimate).expect("the window that is due");
         }
     }
+}
 
-    /// Returns the row of the drive that a frame belongs to. The ticks of the fibre-optic gyro's frames follow the
-    /// board's clock.
-    fn row_of(&self, sent: &TimedFrame) -> usize {
+/// The way of the frames of one input: through the SLCAN port at once.
+struct Sending<'a> {
+    port: &'a mut Port<QUEUE>,
+    out: &'a mut Vec<Message>,
+    now: Micros,
+    /// Row of the drive that the inertial sensor's frames belong to.
+    row: usize,
+    /// That of the fibre-optic gyro's frames, whose ticks follow the board's clock.
+    fog_row: Option<usize>,
+}
+
+impl Sink for Sending<'_> {
+    fn frame(&mut self, sent: TimedFrame) {
         let is_fog = |id: Id| FOG_IDS.iter().any(|own| matches!(id, Id::Standard(id) if id.as_raw() == *own));
-        match self.coprocessor.fog_estimate() {
-            Some(estimate) if is_fog(sent.frame.id()) => {
-                (u64::from(estimate.tick).saturating_sub(START_US / PERIOD_US + 1)) as usize
-            }
-            _ => self.row,
+        let row = self.fog_row.filter(|_| is_fog(sent.frame.id())).unwrap_or(self.row);
+        self.port.enqueue(sent.frame, self.now);
+        while let Some(line) = self.port.outgoing() {
+            let bytes = line.to_vec();
+            self.port.sent(bytes.len());
+            self.out.push(Message { line: Line::Out, row, at: self.now.0, bytes });
         }
+    }
+
+    fn fog_rate(&mut self, rate: &YawEstimate) {
+        self.fog_row = Some((u64::from(rate.tick).saturating_sub(START_US / PERIOD_US + 1)) as usize);
     }
 }

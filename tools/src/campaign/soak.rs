@@ -11,7 +11,7 @@ use crate::client::monitor::{Counts, Monitor};
 use crate::drive::wheel_frames;
 use crate::simulate::{Config as Simulated, Sample, Simulation};
 use gyronet::can::slcan::emit_stamped;
-use gyronet::coprocessor::{Config, Coprocessor};
+use gyronet::coprocessor::{Config, Coprocessor, TimedFrame};
 use gyronet::fog::FogCounters;
 use gyronet::health::{Counters, MonitorCounters, Status};
 use gyronet::model::WindowNetwork;
@@ -33,6 +33,13 @@ const FRAMES: u64 = 6;
 const FOG_FRAMES: u64 = 3;
 /// At most this many steps of the fibre-optic gyro may be lost at the ends of the drive.
 const FOG_ENDS: u64 = 3;
+/// Passes a frame to the receiver as SLCAN text.
+fn take(monitor: &mut Monitor, sent: &TimedFrame) {
+    let line = emit_stamped(&sent.frame, sent.time).expect("a data frame");
+    let line = std::str::from_utf8(&line).expect("ASCII").trim_end();
+    monitor.take_line(line, 0.0);
+}
+
 /// The board polls its inputs every millisecond.
 const LOOK_US: u64 = 1_000;
 /// Largest number of samples before the first corrected one, with a margin.
@@ -161,14 +168,16 @@ impl Drive {
         let now = Micros(u64::from(self.starts[1]) + u64::from(k) * PERIOD_US + LOOK_US);
         if k > 0 {
             for look in (now.0 - PERIOD_US + LOOK_US..now.0).step_by(LOOK_US as usize) {
-                let silent = self.coprocessor.poll(Micros(look)).expect("time goes on");
+                let silent = self.coprocessor.poll(Micros(look), &mut ()).expect("time goes on");
                 assert!(silent.is_none(), "the sensor is not silent");
             }
         }
         self.gyro(k, sample, now);
         let wheels = wheel_frames::frame([Some(3.6 * sample.speed); WHEELS]).expect("four speeds");
         self.coprocessor.can(&wheels, now).expect("a good wheel frame");
-        let vehicle = self.coprocessor.imu(received, now).expect("a place on the grid").vehicle;
+        let Self { coprocessor, monitor, .. } = self;
+        let mut send = |sent: TimedFrame| take(monitor, &sent);
+        let vehicle = coprocessor.imu(received, now, &mut send).expect("a place on the grid").vehicle;
         if let Some(due) = self.coprocessor.window() {
             let estimate = network.estimate(&due.features);
             self.coprocessor.deliver(due.end, estimate).expect("the window that is due");
@@ -179,11 +188,6 @@ impl Drive {
             Status::Ready => self.statuses[2] += 1,
             // The sensor monitor counts any other status.
             _ => {}
-        }
-        while let Some(sent) = self.coprocessor.next_frame() {
-            let line = emit_stamped(&sent.frame, sent.time).expect("a data frame");
-            let line = std::str::from_utf8(&line).expect("ASCII").trim_end();
-            self.monitor.take_line(line, 0.0);
         }
         if matches!(vehicle.prompt.status, Status::Degraded | Status::Ready) {
             let received = self.monitor.drop_in.unwrap_or(f64::NAN);
@@ -214,7 +218,9 @@ impl Drive {
                     self.gyro_lost += received.lost;
                     let sent = u64::from(self.starts[2]) + u64::from(k) * PERIOD_US;
                     self.gyro_clock_error_us = received.time.0 as i64 - sent as i64;
-                    self.coprocessor.fog(received, now).expect("in order");
+                    let Self { coprocessor, monitor, .. } = self;
+                    let mut send = |sent: TimedFrame| take(monitor, &sent);
+                    coprocessor.fog(received, now, &mut send).expect("in order");
                 }
                 Err(_) => self.gyro_lost += 1,
             }

@@ -109,8 +109,7 @@ impl Replay {
                 let until = time.0.min(now.0 + SILENCE_US);
                 for look in (now.0 + LOOK_US..until).step_by(LOOK_US as usize) {
                     // Time advances to this row; messages about a silent sensor precede the messages of this row.
-                    let _ = coprocessor.poll(Micros(look));
-                    last.frames.extend(std::iter::from_fn(|| coprocessor.next_frame()));
+                    let _ = coprocessor.poll(Micros(look), &mut |frame: TimedFrame| last.frames.push(frame));
                 }
             }
             now = now.max(time);
@@ -119,12 +118,13 @@ impl Replay {
                 let _ = coprocessor.can(&frame, now);
             }
             // A row whose time stamp does not fit the grid gives no frame and is counted.
-            let Ok(observation) = coprocessor.imu(row.sample, now) else { continue };
+            let mut frames = Vec::new();
+            let sent = coprocessor.imu(row.sample, now, &mut |frame: TimedFrame| frames.push(frame));
+            let Ok(observation) = sent else { continue };
             if let Some(source) = observation.refused {
                 let path = recording.path.clone();
                 return Err(ReplayError::StartsMoving { path, line: row.line, source });
             }
-            let frames = std::iter::from_fn(|| coprocessor.next_frame()).collect();
             if let Some(window) = coprocessor.window() {
                 let estimate = network.estimate(&window.features);
                 coprocessor.deliver(window.end, estimate).expect("the window that is due");

@@ -6,7 +6,7 @@ use crate::drive::wheel_frames;
 use crate::paper::sequence::{Sequence, Step};
 use crate::simulate::layout::Layout;
 use gyronet::bias::Latitude;
-use gyronet::coprocessor::{Clock, Config, Coprocessor};
+use gyronet::coprocessor::{Clock, Config, Coprocessor, Sink, TimedFrame};
 use gyronet::estimate::YawEstimate;
 use gyronet::fog::{
     FogConfig, FogCorrector, FogCounters, FogErrors, FogNetUse, GyroMismatch, check_training,
@@ -121,7 +121,7 @@ pub fn run_board(
         ..Config::DEFAULT
     });
     let mut way = [0.0; 2];
-    let mut sent = vec![YawEstimate::default(); sequence.steps.len()];
+    let mut sent = Rates(vec![YawEstimate::default(); sequence.steps.len()]);
     for (number, step) in sequence.steps.iter().enumerate() {
         let time = Micros((number as u64 + 1) * PERIOD_US);
         for (way, of_step) in way.iter_mut().zip(step.wheels) {
@@ -144,24 +144,33 @@ pub fn run_board(
                 validity: Validity::Good,
             };
             // Times ascend, so no sample is refused.
-            let _ = coprocessor.imu(sample, time);
+            let _ = coprocessor.imu(sample, time, &mut ());
         }
         let increment = [None, None, Some(angle(step.fog))];
         let sample = FogSample { time, span: PERIOD_US as u32, lost: 0, increment, temperature: None };
-        let _ = coprocessor.fog(sample, time);
-        while coprocessor.next_frame().is_some() {
-            let Some(estimate) = coprocessor.fog_estimate() else { continue };
-            // Grid step 1 is that of the first row.
-            let place = (estimate.tick as usize).checked_sub(1).and_then(|row| sent.get_mut(row));
-            place.into_iter().for_each(|place| *place = *estimate);
-        }
+        let _ = coprocessor.fog(sample, time, &mut sent);
         if let (Some(network), Some((number, window))) = (&mut fognet, coprocessor.fog_window()) {
             let estimate = network.estimate(&window);
             // The estimate is in time, so it is not refused.
             let _ = coprocessor.deliver_fog(number, estimate);
         }
     }
-    (sent, *coprocessor.fog_counters())
+    (sent.0, *coprocessor.fog_counters())
+}
+
+/// The rate that is sent for each step.
+struct Rates(Vec<YawEstimate>);
+
+impl Sink for Rates {
+    const TAKES_FRAMES: bool = false;
+
+    fn frame(&mut self, _frame: TimedFrame) {}
+
+    fn fog_rate(&mut self, rate: &YawEstimate) {
+        // Grid step 1 is that of the first row.
+        let place = (rate.tick as usize).checked_sub(1).and_then(|row| self.0.get_mut(row));
+        place.into_iter().for_each(|place| *place = *rate);
+    }
 }
 
 /// Returns the sequence with the Earth's rate and the bias subtracted from the gyro, as the board computes it and
