@@ -1,6 +1,5 @@
 //! This module collects the results of one drive, for the summary that `gyronet demo` prints and for its page.
 
-pub mod board;
 mod can_excerpt;
 mod costs;
 mod page;
@@ -12,7 +11,6 @@ use crate::drive::recording::Recording;
 use crate::evaluate::methods::PerMethod;
 use crate::evaluate::rates::Rates;
 use crate::evaluate::report::{Comparisons, DriveErrors, Row};
-use board::Outcome;
 use gyronet::can::config::Config;
 use serde::Serialize;
 
@@ -40,8 +38,6 @@ pub struct Demo<'a> {
     pub costs: Vec<Cost>,
     /// Messages of the whole drive.
     pub frames: u64,
-    /// The firmware image on the same drive.
-    pub board: Outcome,
 }
 
 /// Holds the results for JSON.
@@ -61,7 +57,6 @@ pub struct Summary<'a> {
     frames: u64,
     excerpt: &'a [Message],
     costs: &'a [Cost],
-    board: &'a Outcome,
 }
 
 impl<'a> Demo<'a> {
@@ -73,7 +68,6 @@ impl<'a> Demo<'a> {
         rates: &'a Rates,
         errors: Option<&'a DriveErrors>,
         (config, frames): (Config, u64),
-        board: Outcome,
     ) -> Self {
         Self {
             recording,
@@ -82,9 +76,8 @@ impl<'a> Demo<'a> {
             errors,
             trajectories: Trajectories::new(recording, rates),
             excerpt: can_excerpt::fastest_turn(&rates.drive, config),
-            costs: costs::all(recording, rates, &config, &board),
+            costs: costs::all(recording, rates, &config),
             frames,
-            board,
         }
     }
 
@@ -103,7 +96,6 @@ impl<'a> Demo<'a> {
             frames: self.frames,
             excerpt: &self.excerpt,
             costs: &self.costs,
-            board: &self.board,
         }
     }
 

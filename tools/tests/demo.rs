@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Runs the demo without the board, which other tests run.
 fn demo(name: &str, arguments: &[&str]) -> (PathBuf, String) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let output = Command::new(env!("CARGO_BIN_EXE_gyronet"))
@@ -25,7 +24,7 @@ fn the_page_needs_nothing_else_and_says_what_the_json_says() {
     for outside in ["http://", "https://", "src=", "href=", "@import", "url("] {
         assert!(!page.contains(outside), "{outside}");
     }
-    for section in ["Yaw", "Path", "Methods", "On the bus", "On the board", "Time and memory"] {
+    for section in ["Yaw", "Path", "Methods", "On the bus", "Time and memory"] {
         assert!(page.contains(&format!("<h2>{section}</h2>")), "{section}");
     }
     assert!(!page.contains("Simulated drive."), "it is a file like any other");
@@ -46,7 +45,13 @@ fn the_page_needs_nothing_else_and_says_what_the_json_says() {
         assert!(page.contains(data) && log.contains(&format!("{id}#{}", data.replace(' ', ""))), "{message}");
     }
     assert_eq!(json["frames"], log.lines().count());
-    assert_eq!(json["board"]["why"], "--image runs it in QEMU");
+}
+
+#[test]
+fn the_retired_image_flag_names_its_successor() {
+    let output = Command::new(env!("CARGO_BIN_EXE_gyronet")).args(["demo", "--image"]).output().unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && error.contains("--test board"), "{error}");
 }
 
 #[test]

@@ -7,7 +7,6 @@ use gyronet_host_tests::browser::Browser;
 use gyronet_host_tests::recordings::{trial, workspace};
 use gyronet_tools::bundled;
 use gyronet_tools::demo::Demo;
-use gyronet_tools::demo::board::Outcome;
 use gyronet_tools::doctor::{Doctor, page};
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::evaluate::rates::{Network, Networks, Rates};
@@ -52,9 +51,8 @@ fn demo_and_train(recording: &Recording) -> [String; 2] {
     let rates = Rates::new(recording, &mut networks, || {}).unwrap();
     let errors = || DriveErrors::new(recording, &rates).unwrap();
     let train = train(recording, &[errors(), errors()]);
-    let board = Outcome::NotRun { why: "a test".into() };
     let frames = rates.drive.frames().count() as u64;
-    let demo = Demo::new(recording, true, &rates, Some(&errors()), (Config::DEFAULT, frames), board).page();
+    let demo = Demo::new(recording, true, &rates, Some(&errors()), (Config::DEFAULT, frames)).page();
     [demo, train]
 }
 

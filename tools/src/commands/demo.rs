@@ -1,16 +1,12 @@
 //! `gyronet demo`: all results of one drive.
 
-use super::{Common, WriteError, print_json, progress, read_drive, weights, write_log};
+use super::{Common, WriteError, print_json, read_drive, weights, write_log};
 use gyronet::can::config::Config;
-use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
-use gyronet_tools::demo::board::{Agreement, BoardError, Figures, Outcome};
 use gyronet_tools::demo::picture;
 use gyronet_tools::demo::{Demo, ShortTable};
-use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::evaluate::report::{DriveErrors, EvaluateError};
 use gyronet_tools::plot::page::grouped;
-use gyronet_tools::target::bench;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -19,15 +15,11 @@ use std::path::{Path, PathBuf};
 /// The page (demo.html) needs only a browser. It has charts of yaw, errors and path that can be zoomed, the table
 /// of methods, decoded CAN messages, time and memory. Without FILE the command takes the simulated drive that
 /// comes with it.
-///
-/// With --image the firmware image is built and run in QEMU (qemu-system-arm) on the first 10 s of the drive. The exit
-/// status is 1 if one byte differs from the library's on this machine.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet demo                                  # the simulated drive
-  gyronet demo drive.csv --out report           # yours; see `gyronet --help` for its columns
-  gyronet demo --image                          # and the firmware in QEMU")]
+  gyronet demo drive.csv --out report           # yours; see `gyronet --help` for its columns")]
 pub struct Args {
     /// Recorded drive (CSV, 100 Hz); errors need its column ref_gyr_z or ref_yaw, and a path needs wheelN_rate.
     #[arg(value_name = "FILE")]
@@ -35,8 +27,7 @@ pub struct Args {
     /// Folder for demo.html, yaw.svg and can.log [default: target/demo].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Build the firmware image as well, a minute the first time, and run it in QEMU.
-    #[arg(long)]
+    #[arg(long, hide = true)]
     image: bool,
     #[command(flatten)]
     networks: weights::Files,
@@ -44,7 +35,11 @@ pub struct Args {
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let weights = args.networks.weights()?;
+    if args.image {
+        return Err("--image is gone: the image as flashed runs on the virtual board, `cargo test -p gyronet-host-tests \
+                    --test board`; `gyronet size` prints its size and `gyronet bench-target` its instructions"
+            .into());
+    }
     let (recording, title) = match &args.file {
         Some(path) => {
             let recording = read_drive(path, common)?;
@@ -66,9 +61,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let [log, picture, page] = ["can.log", "yaw.svg", "demo.html"].map(|name| folder.join(name));
     let frames = write_log(&rates.drive, &log)?;
     std::fs::write(&picture, picture::svg(&title, &rates)?).map_err(WriteError::to(&picture))?;
-    let board = board(args, common, &recording, &mut GyroNet::new(weights.blob()?))?;
     let simulated = args.file.is_none();
-    let demo = Demo::new(&recording, simulated, &rates, errors.as_ref(), (Config::DEFAULT, frames), board);
+    let demo = Demo::new(&recording, simulated, &rates, errors.as_ref(), (Config::DEFAULT, frames));
     std::fs::write(&page, demo.page()).map_err(WriteError::to(&page))?;
 
     let mut out = std::io::stdout().lock();
@@ -76,7 +70,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         let mut json = serde_json::to_value(demo.summary())?;
         json["files"] = serde_json::json!({ "page": page, "picture": picture, "log": log });
         print_json(&mut out, &json)?;
-        return verdict(&demo);
+        return Ok(());
     }
     let seconds = recording.seconds();
     if simulated {
@@ -101,44 +95,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         format!("{} CAN frames", grouped(frames)),
         log.display()
     )?;
-    writeln!(out, "firmware image            {}", demo.board)?;
-    verdict(&demo)
-}
-
-fn verdict(demo: &Demo<'_>) -> super::Result {
-    if demo.board.differs() {
-        Err("the firmware image sends other bytes than the library".into())
-    } else {
-        Ok(())
-    }
-}
-
-/// The firmware image on the beginning of the drive, where it can be run here.
-fn board(
-    args: &Args,
-    common: Common,
-    recording: &Recording,
-    network: &mut GyroNet<'_>,
-) -> Result<Outcome, BoardError> {
-    if !args.image {
-        return Ok(Outcome::NotRun { why: "--image runs it in QEMU".into() });
-    }
-    if args.networks.weights.is_some() {
-        return Ok(Outcome::NotRun {
-            why: "the image carries weights of its own, not those of --weights".into(),
-        });
-    }
-    if let Some(missing) = Outcome::missing() {
-        return Ok(missing);
-    }
-    let waiting =
-        progress::waiting(common, "the firmware image: building (minutes, the first time), running in QEMU");
-    let build = |image| bench::build(&bench::workspace(), image, &bench::target_folder());
-    let (image, bench) = (build("coprocessor")?, build("bench")?);
-    let agreement = Agreement::new(&image, recording, network)?;
-    let figures = Figures::new(&image, &bench)?;
-    waiting.finish_and_clear();
-    Ok(Outcome::Run { agreement, figures })
+    Ok(())
 }
 
 /// Returns `target/demo` of the workspace when cargo runs the command, else of the working directory.

@@ -1,9 +1,7 @@
 //! This module writes the page of a drive.
 
-use super::board::Outcome;
 use super::trajectory::Trajectories;
 use super::{Cost, Demo, Message};
-use crate::drive::DT;
 use crate::evaluate::heading_error::Reference;
 use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
@@ -48,8 +46,6 @@ pub fn page(demo: &Demo<'_>) -> String {
     body += &methods(demo);
     body += "<h2>On the bus</h2>\n";
     body += &excerpt(demo);
-    body += "<h2>On the board</h2>\n";
-    body += &board(&demo.board);
     body += "<h2>Time and memory</h2>\n";
     body += &costs(&demo.costs);
     document(&format!("gyronet demo: {name}"), &body)
@@ -69,12 +65,6 @@ fn facts(demo: &Demo<'_>) -> String {
         facts.extend(sent.rms_rad.map(|rad| ("its RMS over the drive", mrad(rad))));
     }
     facts.push(("CAN messages", grouped(demo.frames)));
-    let verdict = match &demo.board {
-        Outcome::NotRun { .. } => "not run".to_owned(),
-        outcome if outcome.differs() => "<span class=\"differs\">other bytes</span>".to_owned(),
-        Outcome::Run { .. } => "<span class=\"agrees\">same bytes</span>".to_owned(),
-    };
-    facts.push(("firmware image in QEMU", verdict));
     let rows = facts.iter().map(|(name, figure)| format!("<div><dt>{name}</dt><dd>{figure}</dd></div>\n"));
     format!("<dl class=\"facts\">\n{}</dl>\n", rows.collect::<String>())
 }
@@ -188,35 +178,6 @@ fn excerpt(demo: &Demo<'_>) -> String {
         );
     }
     html + "</tbody></table></div>\n"
-}
-
-fn board(outcome: &Outcome) -> String {
-    let agreement = match outcome {
-        Outcome::NotRun { why } => return format!("<p>Not run: {}.</p>\n", escaped(why)),
-        Outcome::Run { agreement, .. } => agreement,
-    };
-    let drive = format!(
-        "The firmware image for the STM32F405 ran in QEMU on the first {:.0} s of this drive, as {} bytes of an Xsens MTi \
-         on its serial line, without wheels: {} messages with {} payload bytes came back in {:.1} s.",
-        agreement.samples as f64 * DT,
-        grouped(agreement.sent_bytes),
-        grouped(agreement.frames),
-        grouped(agreement.payload_bytes),
-        agreement.seconds,
-    );
-    match &agreement.difference {
-        None => format!(
-            "<p>{drive} <b class=\"agrees\">Every identifier and every byte is the same as from the library on this \
-             machine.</b></p>\n"
-        ),
-        Some(difference) => format!(
-            "<p>{drive} <b class=\"differs\">Message {} differs:</b> <code>{}</code> from the board, <code>{}</code> from \
-             the library.</p>\n",
-            difference.number,
-            escaped(&difference.board),
-            escaped(&difference.host)
-        ),
-    }
 }
 
 fn costs(costs: &[Cost]) -> String {
