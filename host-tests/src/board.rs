@@ -217,6 +217,13 @@ impl Board {
         word(&answer["registers"][name])
     }
 
+    /// Returns the priority bytes of all exceptions, by number, as SHPR and NVIC_IPR hold them.
+    #[must_use]
+    pub fn priorities(&mut self) -> Vec<i64> {
+        let answer = self.ask("registers", json!({}));
+        list(&answer["priorities"]).iter().filter_map(Value::as_i64).collect()
+    }
+
     /// Changes a register of the processor.
     pub fn set_register(&mut self, name: &str, value: u32) {
         self.ask("registers", json!({ "set": { name: value } }));

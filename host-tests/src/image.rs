@@ -1,6 +1,5 @@
 //! This module builds the firmware images as `cargo fw` does, so that the tests run the same code as a board.
 
-use crate::qemu;
 use crate::recordings::workspace;
 use crate::require::{self, Need};
 use gyronet_tools::target::bench;
@@ -8,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Returns the ELF file of an image (`coprocessor`, `bringup`, `selftest`, `bench`) for the emulated board; the test is
+/// Returns the ELF file of an image (`coprocessor`, `bringup`, `selftest`, `bench`) for the Netduino Plus 2; the test is
 /// reported as skipped where the target's standard library is not installed.
 ///
 /// Each image is built once in a process, under `scratch` (a test's `env!("CARGO_TARGET_TMPDIR")`): the
@@ -49,11 +48,4 @@ pub fn firmware_for(
     std::fs::copy(fresh, &elf).expect("there is room");
     built.insert(name, elf.clone());
     Some(elf)
-}
-
-/// Returns the ELF file of the image that is flashed; the test is reported as skipped where it cannot be built or run.
-#[must_use]
-pub fn coprocessor(test: &str, scratch: &str) -> Option<PathBuf> {
-    qemu::available(test)?;
-    firmware(test, scratch, "coprocessor")
 }

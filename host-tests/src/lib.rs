@@ -1,13 +1,13 @@
 //! This crate holds the parts that the host tests share: how a test gets QEMU or the recordings or reports that it is
-//! skipped, the emulated board and its image, and every generator of bytes, samples, streams and weights.
+//! skipped, the virtual board and its image, and every generator of bytes, samples, streams and weights.
 
 pub mod board;
 pub mod browser;
-pub mod connected;
 pub mod entrance;
 pub mod flash;
 pub mod golden;
 pub mod image;
+pub mod inputs;
 pub mod models;
 pub mod noise;
 pub mod packing;

@@ -1,16 +1,12 @@
-//! This module prepares the flash of an emulated board before it starts: the library's own store writes to the mock
-//! of the F405's flash, and the content is loaded into the emulator's memory. That memory is mapped although the
-//! emulator has no flash controller.
+//! The flash of a board before it starts: the library's own store writes to the mock of the F405's flash, and the
+//! content is copied into the virtual board's.
 
 use crate::flash::{F405, Region};
-use crate::qemu;
 use gyronet::model::blob::CRC;
 use gyronet::model::weights;
 use gyronet::store::layout::{self, FLASH_BASE, RECORD_SECTOR, SLOT_SIZE};
 use gyronet::store::{Accepted, Place, Record, Slot, Store, StoreError, Upload};
 use std::cell::RefCell;
-use std::ops::Range;
-use std::path::Path;
 use std::rc::Rc;
 
 /// Opens the records of a flash.
@@ -18,7 +14,7 @@ use std::rc::Rc;
 /// # Errors
 /// [`StoreError`].
 pub fn open(flash: &Rc<RefCell<F405>>) -> Result<Store<Region<RECORD_SECTOR>>, StoreError> {
-    Store::open(Region::new(flash, layout::STORE), 0, false)
+    Store::open(Region::new(flash, layout::STORE), 0)
 }
 
 /// Returns both weight slots of a flash.
@@ -114,22 +110,5 @@ impl Stored {
             let bytes = &flash.bytes()[range.start as usize..range.end as usize];
             board.patch(crate::board::At::Address(FLASH_BASE + range.start), bytes);
         }
-    }
-
-    /// Starts an emulated board with this content in its memory; the files to load are written to `folder`.
-    ///
-    /// # Panics
-    /// When they cannot be written, and as [`qemu::Board`].
-    #[must_use]
-    pub fn boot(&self, image: &Path, usarts: usize, folder: &str, test: &str) -> qemu::Board {
-        let flash = self.0.borrow();
-        let loader = |Range { start, end }: Range<u32>| {
-            let file = Path::new(folder).join(format!("{test}_{start:x}.bin"));
-            std::fs::write(&file, &flash.bytes()[start as usize..end as usize]).expect("a file for QEMU");
-            let address = FLASH_BASE + start;
-            format!("loader,file={},addr={address:#x},force-raw=on", file.display())
-        };
-        let [records, fognet, slots] = [layout::STORE, layout::FOGNET, layout::SLOTS].map(loader);
-        qemu::Board::boot(image, usarts, &["-device", &records, "-device", &fognet, "-device", &slots])
     }
 }

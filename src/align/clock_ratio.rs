@@ -26,7 +26,7 @@
 //! A step of J in either clock, wherever it falls among the points, and a late point at either end bend the line by
 //! at least J / 2 in its middle; so an undetected step is below 2 [`JITTER_US`], 188 ppm of 32 s.
 //!
-//! Where the sensor's own time is the only one (a recording, the emulator, whose bytes arrive at the host's pace)
+//! Where the sensor's own time is the only one (a recording, whose bytes arrive at the host's pace)
 //! there is no estimator, and [`ClockRatio::ONE`] is used.
 
 use crate::units::{AngularRate, Micros};

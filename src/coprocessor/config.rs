@@ -18,7 +18,7 @@ pub enum Clock {
     /// `now` is an independent clock, and inputs arrive when they are measured: a board in a vehicle.
     #[default]
     Outside,
-    /// Inputs arrive at another pace than they were measured at (an emulator, a recorded drive), so only the time
+    /// Inputs arrive at another pace than they were measured at (a recorded drive), so only the time
     /// stamps of the inertial sensor are meaningful. They are used for the wheels, the latitude and the fibre-optic
     /// gyro; `now` is still used to detect a silent sensor and a late window.
     Sensor,

@@ -310,10 +310,9 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         Some((upload.place(), checked?))
     }
 
-    /// Returns whether the output may be interrupted, because the vehicle is proven to stand. A board without a flash
-    /// controller is emulated and may always be interrupted.
+    /// Returns whether the output may be interrupted, because the vehicle is proven to stand.
     pub(crate) fn may_interrupt(&self) -> bool {
-        !self.writable || self.standstill.is_open()
+        self.standstill.is_open()
     }
 
     fn refuse(&mut self, kind: EventKind) {

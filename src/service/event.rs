@@ -4,7 +4,7 @@ use super::calibrate::CalibrationFault;
 pub use super::crash::{Crash, CrashKind};
 pub use super::hardware::{CanFault, ClockFault};
 use crate::health::Status;
-use crate::store::{Place, Slot, StoreError, slots::SlotError};
+use crate::store::{FlashFault, Place, Slot, StoreError, slots::SlotError};
 use heapless::{Deque, Vec};
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ pub const PAGE: usize = 8;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ResetCause {
-    /// No flag is set, as in the emulator.
+    /// No flag is set.
     Unknown,
     /// Power-on reset.
     PowerOn,
@@ -113,6 +113,8 @@ pub enum EventKind {
     MountMoved,
     /// At the start, no room could be made for new records.
     NoRoom(StoreError),
+    /// The flash controller is not in order at the start: nothing is written.
+    FlashRefused(FlashFault),
 }
 
 /// An entry of the event log.

@@ -8,8 +8,6 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ClockFault {
-    /// The board is emulated without a clock tree.
-    Emulated,
     /// The supply stayed below 3.0 V. The board restarts when the voltage has risen.
     SupplyLow,
     /// The crystal did not start. The board restarts when the crystal runs.
@@ -42,7 +40,6 @@ pub enum CanFault {
 impl fmt::Display for ClockFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Emulated => f.write_str("the board is emulated without a clock tree"),
             Self::SupplyLow => f.write_str("the supply is below 3.0 V"),
             Self::NoCrystal => f.write_str("the crystal did not start"),
             Self::CrystalFrequency { khz: 0 } => f.write_str("the crystal's frequency could not be measured"),

@@ -10,7 +10,7 @@ use crate::store::{Configuration, StoreError, UnitMap};
 use serde::{Deserialize, Serialize};
 
 /// Version of the encoding of these types; every change of a type increments it.
-pub const PROTOCOL: u8 = 14;
+pub const PROTOCOL: u8 = 15;
 /// Size of a full block of a weight file, bytes.
 pub const BLOCK: usize = 256;
 
@@ -187,11 +187,11 @@ pub enum Origin {
 pub struct Identity {
     /// Version of the firmware.
     pub firmware: [u8; 3],
-    /// DBGMCU_IDCODE; `None` if it reads as zero, as in the emulator.
+    /// DBGMCU_IDCODE; `None` where the board cannot tell.
     pub device_id: Option<u32>,
     /// Clock frequency of the processor, Hz.
     pub clock_hz: u32,
-    /// Unique number of the chip; zeros in the emulator.
+    /// Unique number of the chip.
     pub serial: [u8; 12],
     /// Reason why the processor does not run on the crystal; `None` if it does.
     pub clock_fault: Option<ClockFault>,
@@ -241,7 +241,7 @@ pub struct Info {
     pub record_versions: [u8; 2],
     /// State of the record store.
     pub flash: FlashState,
-    /// Whether data can be stored, because a flash controller answers; the emulator has none.
+    /// Whether data can be stored: the board has a flash, and its controller is in order.
     pub writable: bool,
     /// Origin of the configuration.
     pub configuration: Origin,
@@ -318,9 +318,6 @@ pub struct LineCounters {
     pub unsent: u32,
     /// Receive errors of the sensor and SLCAN lines: corrupt bytes and overruns.
     pub line_errors: u32,
-    /// Bytes that had to wait because a line's queue was full. Bytes that arrive meanwhile are lost if the line has
-    /// no flow control.
-    pub held: u32,
     /// Observations that a task of lower priority missed for lack of time.
     pub overruns: u32,
     /// Text lines on the service line that were refused.
@@ -331,6 +328,5 @@ pub struct LineCounters {
 
 impl LineCounters {
     /// All counters zero.
-    pub const NONE: Self =
-        Self { unsent: 0, line_errors: 0, held: 0, overruns: 0, service_errors: 0, frames_lost: 0 };
+    pub const NONE: Self = Self { unsent: 0, line_errors: 0, overruns: 0, service_errors: 0, frames_lost: 0 };
 }

@@ -113,6 +113,7 @@ impl Display for EventKind {
             Self::MountMoved => f.write_str("the sensor was moved since earlier drives"),
             Self::TroublesRefused(error) => write!(f, "trouble memory not read or stored: {error}"),
             Self::Sensor(Some(fault)) => write!(f, "sensor not set up: {fault}"),
+            Self::FlashRefused(fault) => write!(f, "nothing is stored until a restart: flash: {fault}"),
         }
     }
 }

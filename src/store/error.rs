@@ -138,6 +138,9 @@ pub enum FlashFault {
     /// The flash refused the operation, or did not finish it in time.
     #[error("did not take or finish the operation")]
     Refused,
+    /// The controller is unlocked although no operation runs.
+    #[error("its controller is unlocked although no operation runs")]
+    Unlocked,
 }
 
 /// The reason why the store has failed.
@@ -145,8 +148,8 @@ pub enum FlashFault {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum StoreError {
-    /// No flash controller answers (the emulator has none): nothing can be stored.
-    #[error("no flash controller answers: nothing can be stored")]
+    /// The board has no flash that it may write.
+    #[error("the board has no flash that it may write: nothing can be stored")]
     NoFlash,
     /// The flash reports an error.
     #[error("flash: {0}")]

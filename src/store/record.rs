@@ -143,8 +143,6 @@ enum Place {
 pub struct Store<F> {
     flash: F,
     start: u32,
-    /// Whether flash that reads as zeros counts as erased, as in an emulator without a flash controller.
-    zeros_are_blank: bool,
     /// Sector in use, and its generation.
     current: Option<(u32, u32)>,
     /// Offset of the next record, if one can be appended.
@@ -157,18 +155,16 @@ pub struct Store<F> {
 }
 
 impl<F: NorFlash> Store<F> {
-    /// Opens the store in the two sectors that begin at offset `start` of `flash`; writes nothing. Set
-    /// `zeros_are_blank` for an emulator without a flash controller. In a chip, erased flash reads as ones; sectors
-    /// of zeros were overwritten by a raw image of the flash, and are reported as damaged.
+    /// Opens the store in the two sectors that begin at offset `start` of `flash`; writes nothing. Erased flash reads
+    /// as ones; sectors of zeros were overwritten by a raw image of the flash, and are reported as damaged.
     ///
     /// # Errors
     /// [`StoreError::Flash`].
-    pub fn open(flash: F, start: u32, zeros_are_blank: bool) -> Result<Self, StoreError> {
+    pub fn open(flash: F, start: u32) -> Result<Self, StoreError> {
         const { assert!(F::READ_SIZE <= WORD && WORD.is_multiple_of(F::WRITE_SIZE)) };
         let mut store = Self {
             flash,
             start,
-            zeros_are_blank,
             current: None,
             free: None,
             damaged: false,
@@ -285,7 +281,7 @@ impl<F: NorFlash> Store<F> {
         let generation = u32::from_le_bytes(self.read(at)?);
         let crc = u32::from_le_bytes(self.read(at + WORD_U32)?);
         let intact = crc == header_crc(generation);
-        let blank = generation == crc && (crc == u32::MAX || self.zeros_are_blank && crc == 0);
+        let blank = generation == u32::MAX && crc == u32::MAX;
         self.header_damaged |= !intact && !blank;
         Ok(intact.then_some(generation))
     }

@@ -76,8 +76,8 @@ impl Record for Accepted {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SlotError {
-    /// No flash controller answers (the emulator has none).
-    #[error("no flash controller answers: nothing can be stored")]
+    /// The board has no flash that it may write.
+    #[error("the board has no flash that it may write: nothing can be stored")]
     NoFlash,
     /// The flash reports an error.
     #[error("flash: {0}")]

@@ -198,7 +198,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
                 replaced_windows, out_of_range
             });
             let lines = words!(counters.lines => LineCounters {
-                unsent, line_errors, held, overruns, service_errors, frames_lost
+                unsent, line_errors, overruns, service_errors, frames_lost
             });
             put_words(out, &monitor)?;
             put_words(out, &inputs)?;

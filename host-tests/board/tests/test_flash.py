@@ -54,6 +54,11 @@ class Flash(unittest.TestCase):
         self.unlock()
         self.assertFalse(self.read(CR) & LOCK)
 
+    def test_a_controller_that_a_reset_does_not_lock(self):
+        self.flash.configure("starts_unlocked", True)
+        self.board.reset("software")
+        self.assertEqual(self.read(CR), 0)
+
     def test_sector_erase_takes_its_time_and_stalls(self):
         self.board.memory_write(SECTOR_1, bytes(0x4000))
         self.unlock()

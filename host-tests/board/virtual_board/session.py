@@ -155,7 +155,7 @@ class Session:
         self.board.memory_write(self._address(address, symbol, offset), bytes.fromhex(hex))
 
     def registers(self, set: dict | None = None) -> dict:
-        """Sets processor registers, and returns them all."""
+        """Sets processor registers, and returns them all and the priorities of all exceptions."""
         processor, board = self.board.processor, self.board
         for name, value in (set or {}).items():
             processor.set("all_xpsr" if name == "xpsr" else name, value | 1 if name == "pc" else value)
@@ -163,6 +163,7 @@ class Session:
         values = {name: processor.get(name) for name in names}
         return {
             "registers": values,
+            "priorities": board.nvic.priority,
             "symbol": board.symbol_at(values["pc"]),
             "cfsr": board.scb.cfsr,
             "hfsr": board.scb.hfsr,

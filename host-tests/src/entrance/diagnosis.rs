@@ -10,7 +10,7 @@ use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::message::{AllCounters, Identity};
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::layout::RECORD_SECTOR;
-use gyronet::store::{FogPart, ImuPart, Record as _};
+use gyronet::store::{FlashFault, FogPart, ImuPart, Record as _};
 use gyronet::uds::Server;
 use gyronet_tools::target::ram_flash::RamFlash;
 
@@ -43,7 +43,8 @@ pub fn frames(mut data: &[u8]) {
     let choice = byte(&mut data);
     let mut board = Board::new(&SUPPORTED_HARDWARE);
     let (records, slots) = (RamFlash::new(&[]), (choice & 2 != 0).then(RamFlash::for_weights));
-    board.begin((choice & 4 != 0).then_some(records), slots, choice & 8 == 0, Identity::UNKNOWN);
+    let controller = if choice & 8 == 0 { Ok(()) } else { Err(FlashFault::Unlocked) };
+    board.begin((choice & 4 != 0).then_some(records), slots, controller, Identity::UNKNOWN);
     let mut noise = Noise::new(1);
     for tick in 0..if choice & 1 != 0 { 310 } else { 0 } {
         let sample = idling(tick, 0.001, &mut noise);

@@ -22,7 +22,7 @@ type Flash = RamFlash<SECTOR>;
 /// and a stored record must be read back.
 pub fn flash(mut data: &[u8]) {
     let flash = if byte(&mut data) & 1 == 0 { Flash::new(data) } else { Flash::new(&fitting(data)) };
-    let mut store = Store::open(flash, 0, false).expect("the flash answers");
+    let mut store = Store::open(flash, 0).expect("the flash answers");
     let calibration = store.get::<Calibration>().ok().flatten().unwrap_or_default();
     calibration.check().expect("the store checks what it reads");
     let learned = store.get::<Learned>().ok().flatten().unwrap_or(Learned::NOTHING);
@@ -80,7 +80,7 @@ pub fn seeds() -> Vec<Seed> {
     // The first sector, as it is in flash.
     let mut raw = vec![0; 1 + SECTOR];
     let mut flash = Flash::new(&[]);
-    let mut store = Store::open(&mut flash, 0, false);
+    let mut store = Store::open(&mut flash, 0);
     if let Ok(store) = &mut store {
         store.set(&configuration).expect("there is room");
         store.set(&calibration).and_then(|()| store.set(&learned)).expect("there is room");

@@ -9,11 +9,11 @@ use gyronet::can::yaw::{AngleMessage, RateMessage};
 use gyronet::health::{Faults, Quality};
 use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
-use gyronet_host_tests::recordings::workspace;
-use gyronet_host_tests::require;
+use gyronet_host_tests::recordings::{self, workspace};
+use gyronet_host_tests::{replay, require};
 use std::io::Write;
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const MS: Duration = Duration::from_millis(1);
 /// Age at which a frame no longer goes out, with the time that the frames before it take.
@@ -79,17 +79,35 @@ fn disturbed(
 
 #[test]
 fn frames_are_those_of_the_host_byte_for_byte() {
-    const TEST: &str = "frames_are_those_of_the_host_byte_for_byte";
-    const SAMPLES: usize = 600;
-    let Some(mut board) = boot(TEST) else { return };
-    let samples = drive(SAMPLES);
-    common::send(&mut board, &samples, START);
-    board.run(START + SAMPLE * SAMPLES as u32);
+    compare("frames_are_those_of_the_host_byte_for_byte", &drive(600));
+}
+
+#[test]
+fn frames_of_a_real_drive_are_those_of_the_host() {
+    const TEST: &str = "frames_of_a_real_drive_are_those_of_the_host";
+    let Some(path) = recordings::trial(TEST, 11) else { return };
+    let rows = recordings::rows(&path).into_iter().take(3_000).enumerate();
+    let samples: Vec<Vec<u8>> = rows.map(|(k, row)| replay::message(k, &row).emit().to_vec()).collect();
+    compare(TEST, &samples);
+}
+
+/// Sends samples to a board, and compares its frames with the host's.
+fn compare(test: &str, samples: &[Vec<u8>]) {
+    let Some(mut board) = boot(test) else { return };
+    common::send(&mut board, samples, START);
+    let begun = Instant::now();
+    board.run(START + SAMPLE * samples.len() as u32);
+    let (took, instructions) = (begun.elapsed().as_secs_f64(), board.counts().instructions as f64);
+    println!(
+        "{test}: {} samples in {took:.1} s, {:.1} M instructions/s",
+        samples.len(),
+        instructions / took * 1e-6
+    );
     let sent = board.can_frames();
-    let made = host(&samples);
-    println!("{TEST}: first frame {:?} after the first sample began", sent[0].0 - START);
+    let made = host(samples);
+    println!("{test}: first frame {:?} after the first sample began", sent[0].0 - START);
     assert!(sent[0].0 - START < 10 * MS);
-    assert!(sent.len() >= SET * (SAMPLES - 1), "{} frames", sent.len());
+    assert!(sent.len() >= SET * (samples.len() - 1), "{} frames", sent.len());
     assert!(frames(&sent) == made[..sent.len()], "in order, and the same");
     // A sample's six frames are out before the next sample comes, one behind the other.
     for (k, set) in sent.chunks_exact(SET).enumerate() {
@@ -103,7 +121,7 @@ fn frames_are_those_of_the_host_byte_for_byte() {
     }
     let counters = counters(&mut board);
     assert_eq!((counters.lines.unsent, counters.lines.line_errors, counters.lines.overruns), (0, 0, 0));
-    sums(TEST, &sent);
+    sums(test, &sent);
 }
 
 /// cantools reads the log: the sum of the rates is the accumulated angle.

@@ -17,7 +17,7 @@ use gyronet::health::InputCounters;
 use gyronet::service::message::{AllCounters, LineCounters};
 use gyronet::uds::isotp::Transport;
 use gyronet_host_tests::board::{At, Board};
-use gyronet_host_tests::connected::Step;
+use gyronet_host_tests::inputs::Step;
 use gyronet_host_tests::recordings::Row;
 use gyronet_host_tests::replay;
 use gyronet_host_tests::tester::segment;

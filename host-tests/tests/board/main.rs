@@ -1,4 +1,4 @@
-//! The images as they are flashed, on the virtual board: hardware that QEMU does not have, and its faults.
+//! The images as they are flashed, on the virtual board: their frames, their hardware and its faults.
 
 mod access;
 mod bringup;
@@ -8,11 +8,14 @@ mod common;
 mod crash;
 mod embassy;
 mod endurance;
+mod faults;
 mod icm42688;
 mod model;
 mod power_cut;
 mod service;
+mod slcan;
 mod stored;
+mod stored_start;
 mod supply;
 mod uds;
 mod wheels;

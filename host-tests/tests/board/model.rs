@@ -6,6 +6,7 @@ use gyronet::service::message::{FlashState, Identity, Info, Origin};
 use gyronet_host_tests::board::{self, At, Board, PACKAGES};
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::{replay, require};
+use gyronet_tools::target::stack::priorities;
 use std::process::Command;
 use std::time::Duration;
 
@@ -59,6 +60,25 @@ fn image_sends_over_slcan_what_the_host_sends() {
         |lines: &[Vec<u8>]| lines.iter().map(|line| line.escape_ascii().to_string()).collect::<Vec<_>>();
     assert!(host.lines.len() > 5 * SAMPLES, "{} lines", host.lines.len());
     assert_eq!(text(&lines[..host.lines.len()]), text(&host.lines));
+}
+
+/// The image's own list of priorities, which the bound of the stack rests on, is what its code sets.
+#[test]
+fn priorities_are_those_that_the_stack_bound_rests_on() {
+    const TEST: &str = "priorities_are_those_that_the_stack_bound_rests_on";
+    let Some(elf) = board::firmware("netduino-plus-2", TEST, env!("CARGO_TARGET_TMPDIR"), "coprocessor")
+    else {
+        return;
+    };
+    let Some(mut board) = Board::boot(TEST, &elf) else { return };
+    board.run(START);
+    let set = board.priorities();
+    let listed = priorities(&std::fs::read(&elf).expect("it was just built")).expect("a firmware image");
+    assert!(!listed.is_empty());
+    for (number, priority) in listed {
+        // The STM32F4 has the upper four bits of each byte; RTIC's 1 is the least urgent, 15.
+        assert_eq!(16 - (set[number] >> 4), i64::from(priority), "exception {number}");
+    }
 }
 
 #[test]

@@ -2,8 +2,7 @@
 
 use gyronet_host_tests::{image, qemu};
 use gyronet_tools::target::size::{BUDGETS, ImageSize};
-use gyronet_tools::target::stack::{ImageStack, functions, handlers_without_barrier, priorities};
-use std::time::Duration;
+use gyronet_tools::target::stack::{ImageStack, functions, handlers_without_barrier};
 
 fn elf(test: &str, name: &str) -> Option<Vec<u8>> {
     let path = image::firmware(test, env!("CARGO_TARGET_TMPDIR"), name)?;
@@ -56,26 +55,4 @@ fn budgets_hold() {
     println!("{size:?}");
     let measured = [size.flash, size.static_ram, stack.worst().into()];
     assert!(measured.iter().zip(BUDGETS).all(|(bytes, budget)| *bytes <= budget), "{measured:?} {stack:?}");
-}
-
-/// The image's own list of priorities, which the bound rests on, is what its code sets.
-#[test]
-fn priorities_are_what_they_are_said_to_be() {
-    const NAME: &str = "priorities_are_what_they_are_said_to_be";
-    let Some(path) = image::coprocessor(NAME, env!("CARGO_TARGET_TMPDIR")) else { return };
-    let listed = priorities(&std::fs::read(&path).expect("it was just built")).expect("a firmware image");
-    println!("{listed:?}");
-    let mut board = qemu::Board::boot(&path, 2, &[]);
-    // When a receiver is on, RTIC has set all priorities but not yet released the interrupts.
-    board.send(1, &[0], Duration::from_secs(20));
-    let mut urgent = |number: usize| {
-        // SHPR1 for exceptions 4 to 15, NVIC_IPR0 for interrupts (ARMv7-M, B3.2.10 and B3.4.7). The
-        // STM32F4 has the upper four bits of each byte; RTIC's 1 is the least urgent, 15.
-        let address = if number < 16 { 0xE000_ED18 + number - 4 } else { 0xE000_E400 + number - 16 };
-        let word = board.word(address as u32 & !3);
-        16 - (word.to_le_bytes()[address % 4] >> 4)
-    };
-    for (number, priority) in listed {
-        assert_eq!(urgent(number), priority, "exception {number}");
-    }
 }

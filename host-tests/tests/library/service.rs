@@ -49,7 +49,7 @@ const IDENTITY: Identity = Identity {
 fn start(flash: &Rc<RefCell<F405>>) -> Board {
     let records = Region::new(flash, layout::STORE);
     let mut board = Board::new(&SUPPORTED_HARDWARE);
-    board.begin(Some(records), Some(MappedRegion::new(flash)), true, IDENTITY);
+    board.begin(Some(records), Some(MappedRegion::new(flash)), Ok(()), IDENTITY);
     let slots = MappedRegion::new(flash);
     let blob = board.weights(Some(slots.current()), &DEFAULT.0);
     assert!(blob.is_some());
@@ -57,10 +57,10 @@ fn start(flash: &Rc<RefCell<F405>>) -> Board {
     board
 }
 
-/// A board without a flash controller, as in the emulator.
+/// A board without flash.
 fn bare() -> Board {
     let mut board = Board::new(&SUPPORTED_HARDWARE);
-    board.begin(None, None, false, IDENTITY);
+    board.begin(None, None, Ok(()), IDENTITY);
     board.weights(None, &DEFAULT.0);
     board
 }

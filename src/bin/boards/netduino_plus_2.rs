@@ -1,4 +1,4 @@
-//! This module describes the Netduino Plus 2: STM32F405RG, 25 MHz crystal. QEMU's `netduinoplus2` is this board.
+//! This module describes the Netduino Plus 2: STM32F405RG, 25 MHz crystal.
 
 use super::{Board, Line};
 use crate::stm32f405::pins::Pin;

@@ -1,4 +1,4 @@
-//! This module describes the Olimex STM32-H405: STM32F405RG, 8 MHz crystal. QEMU's `olimex-stm32-h405` is this board.
+//! This module describes the Olimex STM32-H405: STM32F405RG, 8 MHz crystal.
 
 use super::{Board, Line};
 use crate::stm32f405::pins::Pin;

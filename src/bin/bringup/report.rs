@@ -30,7 +30,7 @@ impl Report {
             "\ngyronet bringup {}, {}, STM32F405 {:#010x}, started by {}",
             env!("CARGO_PKG_VERSION"),
             BOARD.name,
-            chip.device_id.unwrap_or_default(),
+            chip.device_id,
             chip.reset
         ));
         report

@@ -33,20 +33,18 @@ pub struct Board {
     /// The CAN controller; `None` if it does not answer or the clock is not exact enough.
     pub can: Option<Can>,
     pub spi: Spi,
-    /// True where the board is emulated without a clock tree: its sensors send at the host's pace.
-    pub emulated: bool,
     pub clocks: Clocks,
     /// The identity that the board reports: firmware version, chip, clock and serial number.
     pub identity: Identity,
 }
 
-/// The parts of the lines that the interrupt handlers own; `receptions`, the tick's, are `None` in the emulator.
+/// The parts of the lines that the interrupt handlers own; `receptions` are the tick's.
 pub struct Handlers {
     pub imu: serial::Handler,
     pub fog: serial::Handler,
     pub slcan: serial::Handler,
     pub service: serial::Handler,
-    pub receptions: [Option<serial::Reception>; 4],
+    pub receptions: [serial::Reception; 4],
 }
 
 impl Board {
@@ -57,9 +55,8 @@ impl Board {
         let can = if clocks.exact() { Can::start(p.CAN1, Mode::Normal) } else { Err(CanFault::Clock) };
         let identity = Identity {
             firmware: version(),
-            device_id,
-            // The emulator has no memory at that address.
-            serial: device_id.map(|_| serial_number::read()).unwrap_or_default(),
+            device_id: Some(device_id),
+            serial: serial_number::read(),
             clock_hz: clocks.core_hz,
             clock_fault: clocks.fault,
             can_fault: can.as_ref().err().copied(),
@@ -67,8 +64,8 @@ impl Board {
             crash: crash::take(),
         };
         let now = timer::micros() as u32;
-        let [imu, slcan, fog, service] = lines(&clocks)
-            .map(|(usart, rates, memory)| serial::start(usart, memory, rates, (device_id.is_none(), now)));
+        let [imu, slcan, fog, service] =
+            lines(&clocks).map(|(usart, rates, memory)| serial::start(usart, memory, rates, now));
         let spi = spi::start(&p.SPI1, BOARD.spi);
         if clocks.exact() {
             supply::watch(&p.EXTI);
@@ -82,8 +79,7 @@ impl Board {
             service: service.0,
         };
         let (imu, slcan, fog, service) = (imu.2, slcan.2, fog.2, service.2);
-        let emulated = device_id.is_none();
-        (Self { imu, fog, slcan, service, can: can.ok(), spi, emulated, clocks, identity }, handlers)
+        (Self { imu, fog, slcan, service, can: can.ok(), spi, clocks, identity }, handlers)
     }
 }
 

@@ -131,7 +131,6 @@ impl Diagnosis {
             }
         }
         let Tester { server, line } = tester;
-        // The emulator has no random number generator: `rng::bytes` fails there as if its clock had failed.
         server.poll(device, counters, now, rng::bytes);
         SILENCED.store(server.is_silenced(), Ordering::Relaxed);
         while match line {

@@ -79,11 +79,11 @@ impl Imu {
         }
     }
 
-    /// Returns the number of bytes that were damaged or lost, and of bytes that had to wait.
-    pub fn line_faults(&self) -> [u32; 2] {
+    /// Returns the number of bytes that were damaged or lost.
+    pub fn lost(&self) -> u32 {
         match self {
-            Self::Line(port, _) => [port.lost(), port.delayed()],
-            Self::Spi(_) => [0; 2],
+            Self::Line(port, _) => port.lost(),
+            Self::Spi(_) => 0,
         }
     }
 }

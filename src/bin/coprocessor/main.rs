@@ -15,7 +15,7 @@
 //! | priority | task | when | what |
 //! |---|---|---|---|
 //! | 4 | `tick` | 1 ms | board time; counts the bytes that DMA has received |
-//! | 4, 3 | `imu_line`, `fog_line`, `slcan_line`; `service_line` | a damaged byte; in the emulator, any byte | counts it; moves it |
+//! | 4, 3 | `imu_line`, `fog_line`, `slcan_line`; `service_line` | a damaged byte | counts it |
 //! | 3 | `can_received`, `can_sent` | a frame | into and out of their queues |
 //! | 2 | `output` | pended by `tick`, `can_sent`, `window` | samples, frames, watchdog |
 //! | 1 | `window` | pended by `output` | GyroNet |
@@ -126,7 +126,7 @@ mod app {
         fog_handler: serial::Handler,
         slcan: serial::Handler,
         service: serial::Handler,
-        receptions: [Option<serial::Reception>; 4],
+        receptions: [serial::Reception; 4],
         sender: &'static mut Output,
         network: Option<GyroNet<'static, &'static mut GyroNetState>>,
         rest: &'static mut Idle,
@@ -178,7 +178,7 @@ mod app {
     #[unsafe(link_section = ".ram_code.tick")]
     fn tick(cx: tick::Context) {
         let now = timer::tick();
-        cx.local.receptions.iter_mut().flatten().for_each(|reception| reception.count(now));
+        cx.local.receptions.iter_mut().for_each(|reception| reception.count(now));
         board::SUPERVISOR.report(Task::Tick);
         rtic::pend(Interrupt::UART4);
         dsb();

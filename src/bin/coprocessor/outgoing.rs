@@ -93,9 +93,9 @@ impl Outgoing {
         self.can.as_ref().map_or(State::Active, Can::state)
     }
 
-    /// Returns the number of bytes of the SLCAN line that were damaged or lost, and of bytes that had to wait.
-    pub fn line_faults(&self) -> [u32; 2] {
-        [self.slcan.lost(), self.slcan.delayed()]
+    /// Returns the number of bytes of the SLCAN line that were damaged or lost.
+    pub fn lost(&self) -> u32 {
+        self.slcan.lost()
     }
 }
 

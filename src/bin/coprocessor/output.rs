@@ -184,9 +184,7 @@ impl Output {
                 let _ = coprocessor.can(&frame, now);
             }
         });
-        let ([lost, delayed], [slcan_lost, slcan_delayed]) =
-            (self.imu.line_faults(), self.outgoing.line_faults());
-        self.lines.line_errors = lost.saturating_add(self.fog.lost()).saturating_add(slcan_lost);
-        self.lines.held = delayed.saturating_add(self.fog.delayed()).saturating_add(slcan_delayed);
+        let lost = [self.imu.lost(), self.fog.lost(), self.outgoing.lost()];
+        self.lines.line_errors = lost.into_iter().fold(0, u32::saturating_add);
     }
 }

@@ -1,15 +1,14 @@
 //! Serial lines: DMA moves bytes between the USART and two rings, and a task uses the other ends of the rings through
-//! a port. In the emulator, which has no DMA, interrupts move the bytes.
+//! a port.
 #![allow(unsafe_code, reason = "memory that DMA reads and writes; each block says why it is sound")]
 
-mod handler;
 mod reception;
 
-pub use handler::{Faults, Handler};
 pub use reception::Reception;
 
 use crate::ring::Ring;
 use crate::stm32f405::usart::Usart;
+use core::sync::atomic::{AtomicU32, Ordering};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 
 /// Received bytes that can wait for a task: more than a sensor sends in the 20 ms that the task may wait for an
@@ -25,9 +24,10 @@ const FLUSH_POLLS: u32 = 100_000;
 
 /// Static buffers and counters of a line.
 pub struct Memory {
-    pub received: Ring<u8, RECEIVED>,
-    pub sending: Ring<u8, SENDING>,
-    pub faults: Faults,
+    received: Ring<u8, RECEIVED>,
+    sending: Ring<u8, SENDING>,
+    /// Damaged bytes since the start. Only the interrupt counts.
+    damaged: AtomicU32,
 }
 
 impl Memory {
@@ -37,7 +37,7 @@ impl Memory {
     /// Only one line uses the memory, and each end of its rings belongs to one task.
     pub const unsafe fn new() -> Self {
         // SAFETY: the caller's.
-        unsafe { Self { received: Ring::new(), sending: Ring::new(), faults: Faults::new() } }
+        unsafe { Self { received: Ring::new(), sending: Ring::new(), damaged: AtomicU32::new(0) } }
     }
 }
 
@@ -45,37 +45,43 @@ impl Memory {
 pub struct Port {
     usart: Usart,
     memory: &'static Memory,
-    /// True in the emulator, where the interrupt moves the bytes.
-    emulated: bool,
     /// Bytes that DMA is sending.
     under_way: usize,
     /// Received bytes that were overwritten before they were read.
     overwritten: u32,
 }
 
-/// The ends of a line: the interrupt's, the tick's where the line has DMA, and a task's.
-pub type Ends = (Handler, Option<Reception>, Port);
+/// The ends of a line: the interrupt's, the tick's, and a task's.
+pub type Ends = (Handler, Reception, Port);
 
 /// Starts a line whose ends have not been used yet, at `now`, us.
-pub fn start(
-    usart: Usart,
-    memory: &'static Memory,
-    (clock_hz, baud): (u32, u32),
-    (emulated, now): (bool, u32),
-) -> Ends {
-    let Memory { received, sending, faults } = memory;
-    let handler = Handler { usart, received, sending, faults, emulated, room_requested: false };
-    let reception = (!emulated).then(|| {
-        // SAFETY: the ring's writing end is the DMA's alone.
-        unsafe { usart.receive_to(received.as_mut_ptr(), RECEIVED as u16) };
-        usart.request_dma();
-        Reception::new(usart.receiver(), received, baud, now)
-    });
+pub fn start(usart: Usart, memory: &'static Memory, (clock_hz, baud): (u32, u32), now: u32) -> Ends {
+    let Memory { received, damaged, .. } = memory;
+    // SAFETY: the ring's writing end is the DMA's alone.
+    unsafe { usart.receive_to(received.as_mut_ptr(), RECEIVED as u16) };
+    usart.request_dma();
+    let reception = Reception::new(usart.receiver(), received, baud, now);
     usart.start(clock_hz, baud);
-    if emulated {
-        usart.interrupt_with_bytes();
+    (Handler { usart, damaged }, reception, Port { usart, memory, under_way: 0, overwritten: 0 })
+}
+
+/// The interrupt handler's end of a line: counts the bytes that arrived damaged.
+pub struct Handler {
+    usart: Usart,
+    damaged: &'static AtomicU32,
+}
+
+impl Handler {
+    /// Serves the line's interrupt without waiting.
+    #[inline(always)]
+    pub fn serve(&mut self) {
+        if self.usart.status().damaged() {
+            let damaged = self.damaged.load(Ordering::Relaxed).saturating_add(1);
+            self.damaged.store(damaged, Ordering::Relaxed);
+            // Clears the errors (RM0090 30.6.1). The DMA has taken the byte.
+            let _ = self.usart.read();
+        }
     }
-    (handler, reception, Port { usart, memory, emulated, under_way: 0, overwritten: 0 })
 }
 
 impl Port {
@@ -84,7 +90,7 @@ impl Port {
     pub fn received(&mut self) -> &[u8] {
         let received = &self.memory.received;
         let waiting = received.len();
-        if !self.emulated && waiting > RECEIVED - AHEAD {
+        if waiting > RECEIVED - AHEAD {
             // The DMA stream is, or soon will be, overwriting the oldest bytes.
             received.drop_oldest(waiting);
             self.overwritten = self.overwritten.saturating_add(waiting as u32);
@@ -95,32 +101,17 @@ impl Port {
     /// Drops received bytes that have been used.
     #[inline]
     pub fn consume(&mut self, count: usize) {
-        let Memory { received, faults, .. } = self.memory;
-        received.drop_oldest(count);
-        if self.emulated {
-            faults.release(&self.usart);
-        }
+        self.memory.received.drop_oldest(count);
     }
 
     /// Returns the number of bytes that were damaged or lost.
     pub fn lost(&self) -> u32 {
-        self.memory.faults.lost().saturating_add(self.overwritten)
-    }
-
-    /// Returns the number of bytes that had to wait in the USART's data register because the ring was full.
-    pub fn delayed(&self) -> u32 {
-        self.memory.faults.delayed()
+        self.memory.damaged.load(Ordering::Relaxed).saturating_add(self.overwritten)
     }
 
     /// Starts to send the waiting bytes, if DMA has sent the previous ones. A task that sends calls this in every step.
     pub fn advance(&mut self) {
         let sending = &self.memory.sending;
-        if self.emulated {
-            if !sending.is_empty() {
-                handler::raise(&self.usart);
-            }
-            return;
-        }
         if self.usart.is_sending() {
             return;
         }

@@ -60,7 +60,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
     let flash = &*cortex_m::singleton!(: Flash = Flash::new(registers))?;
     let device =
         cortex_m::singleton!(: Device<Records, Weights> = const { Device::new(&SUPPORTED_HARDWARE) })?;
-    device.begin(Some(Records(flash)), Some(Weights(flash)), flash.writable(), board.identity);
+    device.begin(Some(Records(flash)), Some(Weights(flash)), flash.check(), board.identity);
     // Without valid weights the pipeline still runs: the status says degraded, and the rate is the gyro's minus its
     // static bias.
     let blob = device.weights(Some(regions::slots_at_start()), BUILT_IN);
@@ -77,7 +77,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
         wheels: WheelReceiver::new(*device.wheels()).ok(),
         has_gyronet: blob.is_some(),
         has_fognet: fog_network.is_some(),
-        clock: if board.emulated { Clock::Sensor } else { Clock::Outside },
+        clock: Clock::Outside,
         clock_ratio: board.clocks.exact().then_some(ClockRatioConfig::DEFAULT),
         storage: StorageFaults {
             damaged: device.stored_damaged() || of_other_weights,
@@ -88,12 +88,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
     receive(board, configuration, device.wheels(), &config);
     let (part, bits_per_second) = (configuration.imu, config.can.settings().bits_per_second);
     Some(Parts {
-        // In the emulator SLCAN is the only bus.
-        output: OutputParts {
-            part,
-            bits_per_second,
-            slcan_inputs: board.emulated || configuration.slcan_inputs,
-        },
+        output: OutputParts { part, bits_per_second, slcan_inputs: configuration.slcan_inputs },
         config,
         weights: blob,
         fog_network,

@@ -13,8 +13,6 @@ const FULL_HZ: u32 = 168_000_000;
 const MHZ: u32 = 1_000_000;
 /// Polls before a step times out: above 25 ms at 16 MHz. A crystal takes 2 ms (DS8626 table 37).
 const POLLS: u32 = 80_000;
-/// The emulator's timers count at 1 GHz, whatever RCC holds.
-const EMULATED_TIMER_HZ: u32 = 1_000_000_000;
 
 /// Holds the frequencies, Hz.
 #[derive(Debug, Clone, Copy)]
@@ -48,10 +46,6 @@ impl Clocks {
         let hz = INTERNAL_HZ;
         Self { core_hz: hz, apb1_hz: hz, apb2_hz: hz, timer_hz: hz, measured_hz: 0, fault: Some(fault) }
     }
-
-    /// The frequencies of an emulator that has no RCC.
-    pub const EMULATED: Self =
-        Self { core_hz: FULL_HZ, timer_hz: EMULATED_TIMER_HZ, ..Self::internal(ClockFault::Emulated) };
 
     /// Starts crystal and PLL; falls back to the internal oscillator if one of them does not start.
     pub fn start(rcc: &pac::RCC, flash: &pac::FLASH, pwr: &pac::PWR, crystal_hz: u32) -> Self {

@@ -10,6 +10,7 @@
 use super::{pac, supply, wait_until, watchdog};
 use core::cell::RefCell;
 use embedded_storage::nor_flash::{NorFlashError, NorFlashErrorKind};
+use gyronet::store::FlashFault;
 use gyronet::store::layout::{FLASH_BASE, SECTORS, sector_at};
 
 /// Bytes that are programmed at once.
@@ -61,9 +62,14 @@ impl Flash {
         Self(RefCell::new(registers))
     }
 
-    /// Returns whether there is a controller: it is locked now, while an emulator without one reads the lock as open.
-    pub fn writable(&self) -> bool {
-        self.0.try_borrow().is_ok_and(|registers| locked(&registers))
+    /// Checks that the controller is locked, as every reset and every operation leaves it. One that is not may be
+    /// writing what other code has begun, or its registers do not work.
+    pub fn check(&self) -> Result<(), FlashFault> {
+        if self.0.try_borrow().is_ok_and(|registers| locked(&registers)) {
+            Ok(())
+        } else {
+            Err(FlashFault::Unlocked)
+        }
     }
 
     /// Reads bytes from an offset on; the caller has checked that they are inside the flash.

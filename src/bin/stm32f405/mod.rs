@@ -28,8 +28,8 @@ use gyronet::service::event::ResetCause;
 pub struct Chip {
     /// Frequencies, and the reason if they are not the full ones.
     pub clocks: Clocks,
-    /// DBGMCU_IDCODE (RM0090 38.6.1); `None` where it reads as zero, as in QEMU.
-    pub device_id: Option<u32>,
+    /// DBGMCU_IDCODE (RM0090 38.6.1).
+    pub device_id: u32,
     /// The reason why the chip has started.
     pub reset: ResetCause,
 }
@@ -38,13 +38,9 @@ impl Chip {
     /// Starts the watchdog, the clock tree, board time and the clocks of all peripherals in use.
     pub fn start(p: &pac::Peripherals, crystal_hz: u32) -> Self {
         watchdog::start(&p.DBGMCU);
-        let id = p.DBGMCU.idcode().read().bits();
-        let device_id = (id != 0).then_some(id);
+        let device_id = p.DBGMCU.idcode().read().bits();
         let reset = reset::cause(&p.RCC);
-        let clocks = match device_id {
-            Some(_) => Clocks::start(&p.RCC, &p.FLASH, &p.PWR, crystal_hz),
-            None => Clocks::EMULATED,
-        };
+        let clocks = Clocks::start(&p.RCC, &p.FLASH, &p.PWR, crystal_hz);
         timer::start(&p.RCC, &p.TIM5, &clocks);
         enable_peripherals(&p.RCC);
         Self { clocks, device_id, reset }

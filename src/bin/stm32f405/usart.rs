@@ -2,14 +2,12 @@
 #![allow(unsafe_code, reason = "registers by address; each block says why it is sound")]
 
 use super::dma::Stream;
-use super::pac::{self, Interrupt, usart1::RegisterBlock};
+use super::pac::{self, usart1::RegisterBlock};
 
-/// A USART of the chip, its interrupt, and its DMA streams in the order receive, send (RM0090 tables 42 and 43).
+/// A USART of the chip, and its DMA streams in the order receive, send (RM0090 tables 42 and 43).
 #[derive(Debug, Clone, Copy)]
 pub struct Usart {
     registers: *const RegisterBlock,
-    /// Interrupt that is raised by the enabled events: a received byte, room for a byte, a damaged byte.
-    pub interrupt: Interrupt,
     streams: [Stream; 2],
 }
 
@@ -21,6 +19,7 @@ unsafe impl Send for Usart {}
 #[derive(Debug, Clone, Copy)]
 pub struct Status(u16);
 
+#[allow(dead_code, reason = "coprocessor leaves single bytes to DMA; bringup does not")]
 impl Status {
     const PARITY: u16 = 1;
     const FRAMING: u16 = 1 << 1;
@@ -58,33 +57,32 @@ impl Status {
 impl Usart {
     /// Returns USART1, on APB2.
     pub const fn one() -> Self {
-        Self::new(pac::USART1::ptr(), Interrupt::USART1, [(pac::DMA2::ptr(), 2, 4), (pac::DMA2::ptr(), 7, 4)])
+        Self::new(pac::USART1::ptr(), [(pac::DMA2::ptr(), 2, 4), (pac::DMA2::ptr(), 7, 4)])
     }
 
     /// Returns USART2, on APB1.
     pub const fn two() -> Self {
-        Self::new(pac::USART2::ptr(), Interrupt::USART2, [(pac::DMA1::ptr(), 5, 4), (pac::DMA1::ptr(), 6, 4)])
+        Self::new(pac::USART2::ptr(), [(pac::DMA1::ptr(), 5, 4), (pac::DMA1::ptr(), 6, 4)])
     }
 
     /// Returns USART3, on APB1.
     pub const fn three() -> Self {
-        Self::new(pac::USART3::ptr(), Interrupt::USART3, [(pac::DMA1::ptr(), 1, 4), (pac::DMA1::ptr(), 3, 4)])
+        Self::new(pac::USART3::ptr(), [(pac::DMA1::ptr(), 1, 4), (pac::DMA1::ptr(), 3, 4)])
     }
 
     /// Returns USART6, on APB2.
     pub const fn six() -> Self {
-        Self::new(pac::USART6::ptr(), Interrupt::USART6, [(pac::DMA2::ptr(), 1, 5), (pac::DMA2::ptr(), 6, 5)])
+        Self::new(pac::USART6::ptr(), [(pac::DMA2::ptr(), 1, 5), (pac::DMA2::ptr(), 6, 5)])
     }
 
     /// Returns a USART; its streams are controller, number and channel.
     const fn new(
         registers: *const RegisterBlock,
-        interrupt: Interrupt,
         [receiver, sender]: [(*const pac::dma2::RegisterBlock, usize, u8); 2],
     ) -> Self {
         let streams =
             [Stream::new(receiver.0, receiver.1, receiver.2), Stream::new(sender.0, sender.1, sender.2)];
-        Self { registers, interrupt, streams }
+        Self { registers, streams }
     }
 
     fn registers(&self) -> &RegisterBlock {
@@ -98,11 +96,6 @@ impl Usart {
         // SAFETY: any 16-bit value is a valid divider (RM0090 30.3.4).
         self.registers().brr().write(|w| unsafe { w.bits(divider as u16) });
         self.registers().cr1().write(|w| w.ue().enabled().te().enabled().re().enabled());
-    }
-
-    /// Enables the interrupt for every received byte.
-    pub fn interrupt_with_bytes(&self) {
-        self.registers().cr1().modify(|_, w| w.rxneie().enabled());
     }
 
     /// Enables DMA requests for both directions, and the interrupt for every damaged byte (RM0090 30.3.13).
@@ -159,15 +152,10 @@ impl Usart {
     }
 
     /// Writes a byte to be sent; there must be room.
+    #[allow(dead_code, reason = "coprocessor sends by DMA alone")]
     #[inline]
     pub fn write(&self, byte: u8) {
         // SAFETY: the data register takes any byte.
         self.registers().dr().write(|w| unsafe { w.bits(byte.into()) });
-    }
-
-    /// Selects whether room for a byte raises the interrupt.
-    #[inline]
-    pub fn request_room(&self, wanted: bool) {
-        self.registers().cr1().modify(|_, w| w.txeie().bit(wanted));
     }
 }

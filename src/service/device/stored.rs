@@ -5,25 +5,35 @@ use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};
 use crate::service::event::EventKind;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
 use crate::store::{
-    Accepted, Access, Calibration, Configuration, FieldError, Learned, Record, Store, StoreError, Troubles,
-    UnitMap,
+    Accepted, Access, Calibration, Configuration, FieldError, FlashFault, Learned, Record, Store, StoreError,
+    Troubles, UnitMap,
 };
 use embedded_storage::nor_flash::NorFlash;
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
-    /// Reads the stored records; records that are damaged or out of range are logged and not used. `writable` is
-    /// whether a flash controller answers; without one, records can still be read.
-    pub fn begin(&mut self, records: Option<R>, slots: Option<W>, writable: bool, identity: Identity) {
+    /// Reads the stored records; records that are damaged or out of range are logged and not used. `controller` is
+    /// what the check of the flash controller has found: after a fault, which is reported as damaged stored data,
+    /// records are read but nothing is written.
+    pub fn begin(
+        &mut self,
+        records: Option<R>,
+        slots: Option<W>,
+        controller: Result<(), FlashFault>,
+        identity: Identity,
+    ) {
         self.identity = identity;
-        self.writable = writable;
-        // Without a flash controller, records are read only here, and nothing is kept for writing.
-        self.slots = slots.filter(|_| writable);
+        self.writable = controller.is_ok() && records.is_some();
+        // After a fault, records are read only here, and nothing is kept for writing.
+        self.slots = slots.filter(|_| controller.is_ok());
         self.note(EventKind::Started(identity.reset));
+        if let Err(fault) = controller {
+            self.refuse(EventKind::FlashRefused(fault));
+        }
         if let Some(crash) = identity.crash {
             self.note(EventKind::Crashed(crash));
         }
         if let Some(records) = records {
-            match Store::open(records, 0, !writable) {
+            match Store::open(records, 0) {
                 Ok(store) => self.load(store),
                 Err(error) => (self.flash, self.access) = (FlashState::Failed(error), None),
             }

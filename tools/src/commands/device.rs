@@ -205,7 +205,7 @@ fn print_info(info: &Info, access: &str) -> io::Result<()> {
     writeln!(out, "firmware      {major}.{minor}.{patch}, protocol {}", info.protocol)?;
     match identity.device_id {
         Some(id) => writeln!(out, "part          {:#05x} revision {:#06x}", id & 0xFFF, id >> 16)?,
-        None => writeln!(out, "part          unknown (emulator)")?,
+        None => writeln!(out, "part          unknown")?,
     }
     writeln!(out, "clock         {:.3} MHz", f64::from(identity.clock_hz) / 1e6)?;
     let bus = match identity.can_fault {
@@ -221,7 +221,7 @@ fn print_info(info: &Info, access: &str) -> io::Result<()> {
     if let Some(fault) = info.sensor {
         writeln!(out, "sensor        {fault}")?;
     }
-    let writable = if info.writable { "" } else { ", no flash controller: nothing can be stored" };
+    let writable = if info.writable { "" } else { ", no flash that may be written: nothing can be stored" };
     writeln!(out, "flash         {}{writable}", info.flash)?;
     let open = if access == "open" { ": no key is stored, anyone may write at standstill" } else { "" };
     writeln!(out, "access        {access}{open}")?;

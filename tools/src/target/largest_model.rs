@@ -35,7 +35,7 @@ pub fn arguments(folder: &Path) -> Result<Vec<String>, PrepareError> {
     }
     let file = upload.verify(weights.slots(), weights.fognet())?;
     let mut records = RamFlash::<RECORD_SECTOR>::new(&[]);
-    Store::open(&mut records, 0, false)?.set(&Accepted::NONE.with(upload.place(), file))?;
+    Store::open(&mut records, 0)?.set(&Accepted::NONE.with(upload.place(), file))?;
     let slots = weights.slots().concat();
     let mut arguments = Vec::new();
     for (start, bytes) in [(STORE.start, records.bytes()), (SLOTS.start, &slots)] {

@@ -50,11 +50,12 @@ class Flash(Peripheral):
         self.operation = None
         self.done = None
         self.loaded_bor = self.options >> 2 & 3
+        self.starts_unlocked = False
         self._registers()
 
     def _registers(self):
         self.acr, self.latency = 0, 0
-        self.sr, self.cr = 0, LOCK
+        self.sr, self.cr = 0, 0 if self.starts_unlocked else LOCK
         self.key_step, self.key_failed = 0, False
         self.option_step, self.option_failed = 0, False
         self.optcr = self.options | OPTLOCK
@@ -295,6 +296,9 @@ class Flash(Peripheral):
         elif key == "error_flags":
             # Flags that an operation before this program has left in SR.
             self.sr |= value & FLAGS & ~EOP
+        elif key == "starts_unlocked":
+            # A controller that a reset does not lock: a fault of the chip.
+            self.starts_unlocked = bool(value)
         elif key == "option_bytes":
             self.options = value & 0x0FFF_FFED
             self.loaded_bor = value >> 2 & 3

@@ -412,7 +412,7 @@ fn keys_that_come_and_go_are_in_the_log() {
 #[test]
 fn a_record_that_cannot_be_read_locks_and_is_reported() {
     let (flash, _, _) = locked();
-    let mut store = Store::open(Region::<RECORD_SECTOR>::new(&flash, STORE), 0, false).expect("it is whole");
+    let mut store = Store::open(Region::<RECORD_SECTOR>::new(&flash, STORE), 0).expect("it is whole");
     store.set(&Later(0)).expect("there is room");
     let mut bench = Bench::new(&flash);
     assert_eq!(access(&mut bench).0, 1);

@@ -12,7 +12,7 @@ use gyronet::service::event::EventKind;
 use gyronet::service::message::{Calibrate, FlashState, Network, Origin, Refusal};
 use gyronet::store::layout;
 use gyronet::store::slots::{SlotError, WeightSource};
-use gyronet::store::{Configuration, Field, FieldError, FogPart, ImuPart, Mounting, StoreError};
+use gyronet::store::{Configuration, Field, FieldError, FlashFault, FogPart, ImuPart, Mounting, StoreError};
 use gyronet_host_tests::flash::{F405, MappedRegion, Region};
 use std::cell::RefCell;
 use std::ops::Range;
@@ -119,23 +119,30 @@ fn a_torn_record_of_something_else_heals_at_the_next_start() {
     assert!(!board.stored_damaged() && !board.configuration_lost());
 }
 
-/// The flash is mapped but has no controller, as in the emulator.
 #[test]
-fn what_is_stored_is_read_without_a_controller() {
+fn nothing_is_written_with_an_unlocked_controller_and_the_standstill_gate_holds() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
     assert_eq!(ask(&mut start(&flash), &set(&wanted)), Ok(()));
     let mut board = Board::new(&SUPPORTED_HARDWARE);
     let records = Region::new(&flash, layout::STORE);
-    board.begin(Some(records), Some(MappedRegion::new(&flash)), false, IDENTITY);
+    board.begin(Some(records), Some(MappedRegion::new(&flash)), Err(FlashFault::Unlocked), IDENTITY);
     assert_eq!(*board.configuration(), wanted);
     let about = info(&mut board);
     assert_eq!((about.flash, about.writable), (FlashState::Ready, false));
+    assert!(board.stored_damaged() && !board.configuration_lost());
+    let events = board.events(0).events;
+    assert!(
+        events.iter().any(|event| event.kind == EventKind::FlashRefused(FlashFault::Unlocked)),
+        "{events:?}"
+    );
     let before = flash.borrow().operations();
     let no_flash = Err(Refusal::Store(StoreError::NoFlash));
     assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), no_flash);
     let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
     assert_eq!(ask(&mut board, &Request::WeightsBegin { network: Network::GyroNet, length: 64 }), no_slot);
+    assert!(!storable(&mut board, 0..1, 0.0, Standstill::Moving));
+    assert_eq!(ask(&mut board, &Request::Restart), Err(Refusal::Moving));
     assert_eq!(flash.borrow().operations(), before);
 }
 

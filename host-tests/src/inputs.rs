@@ -1,0 +1,72 @@
+//! The inputs of a board with everything connected: an MTi, a fibre-optic gyro that is simulated from the reference,
+//! and wheel frames.
+
+use crate::recordings::Row;
+use crate::replay;
+use embedded_can::{Frame, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
+use gyronet::sensor::xsens::MtData2;
+
+/// The gyro sends this many messages in 10 ms.
+const MESSAGES_PER_ROW: usize = 10;
+/// The gyro has this resolution, rad.
+const FOG_STEP: f64 = 4e-8;
+/// Wheel frames are this many samples apart.
+const WHEEL_INTERVAL: usize = 2;
+/// The vehicle stands for this many samples.
+const STANDING_SAMPLES: usize = 600;
+
+/// Holds the inputs of 10 ms, in order.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// The frame of all four wheels, in the steps that have one.
+    pub wheels: Option<DataFrame>,
+    /// The message of the MTi.
+    pub imu: MtData2,
+    /// The bytes of the fibre-optic gyro.
+    pub fog: Vec<u8>,
+}
+
+impl Step {
+    /// Returns the inputs that belong to a row.
+    #[must_use]
+    pub fn from_row(number: usize, row: &Row) -> Self {
+        let speed = if number < STANDING_SAMPLES { 0.0 } else { 20.0 };
+        Self {
+            wheels: number.is_multiple_of(WHEEL_INTERVAL).then(|| wheels(speed)),
+            imu: replay::message(number, row),
+            fog: fog_bytes(number, fog_reading(number, row)),
+        }
+    }
+}
+
+/// Returns each of the gyro's readings in the 10 ms that end with a row, rad: a tenth of the turn.
+#[must_use]
+pub fn fog_reading(number: usize, row: &Row) -> f32 {
+    // A gyro that repeats itself counts as stuck, so no reading equals the one before.
+    let noise = if number.is_multiple_of(2) { FOG_STEP / 4.0 } else { -FOG_STEP / 4.0 };
+    ((row.reference * 0.01 / MESSAGES_PER_ROW as f64 / FOG_STEP).round() * FOG_STEP + noise) as f32
+}
+
+/// Returns the bytes that the gyro sends in the 10 ms that end with a row. For the first row it sends only the last
+/// message, so that a message set always follows the last message of a row.
+#[must_use]
+pub fn fog_bytes(number: usize, reading: f32) -> Vec<u8> {
+    let message = |part: usize| Message {
+        rotation: [0.0, 0.0, reading],
+        acceleration: [0.0; 3],
+        extra: Extra::Temperature(25),
+        validity: Validity::ALL,
+        sequence: ((number * MESSAGES_PER_ROW + part) % 128) as u8,
+    };
+    let first = if number == 0 { MESSAGES_PER_ROW - 1 } else { 0 };
+    (first..MESSAGES_PER_ROW).flat_map(|part| message(part).emit().to_vec()).collect()
+}
+
+/// Returns the frame of four wheels at the same speed, km/h.
+fn wheels(speed: f64) -> DataFrame {
+    let code = ((speed + 67.67) * 100.0).round() as u16;
+    let id = StandardId::new(0xAA).expect("11 bits");
+    DataFrame::new(id, &[code.to_be_bytes(); 4].concat()).expect("eight bytes")
+}
