@@ -1,9 +1,9 @@
 //! This module simulates sequences, and does dead reckoning of them with turns from any source.
 
 use gyronet::odometry::Track;
+use gyronet_paper::sequence::Sequence;
+use gyronet_paper::simulate::{self, Spec};
 use gyronet_tools::evaluate::trajectory_error::TrajectoryError;
-use gyronet_tools::paper::sequence::Sequence;
-use gyronet_tools::simulate::layout::{self, Spec};
 use tempfile::tempdir;
 
 /// Returns a sequence that is simulated, written and read back.
@@ -14,8 +14,8 @@ use tempfile::tempdir;
 pub fn simulate(spec: &Spec) -> Sequence {
     let parent = tempdir().expect("there is room");
     let folder = parent.path().join(&spec.name);
-    layout::write(spec, &folder, || {}).expect("there is room");
-    Sequence::read(&folder, |_| {}).expect("it has just been written")
+    simulate::write(spec, &folder).expect("there is room");
+    Sequence::read(&folder).expect("it has just been written")
 }
 
 /// Returns the root mean square distance from the true path of dead reckoning with these turns, m.

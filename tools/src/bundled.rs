@@ -1,13 +1,9 @@
-//! Data built into the binary, so that it runs from any folder: the simulated drive, the f32 checkpoint of GyroNet
-//! and the weights of FoGNet.
+//! Data built into the binary, so that it runs from any folder: the simulated drive and the f32 checkpoint of GyroNet.
 
 use crate::drive::error::DataError;
 use crate::drive::recording::Recording;
 use crate::network::checkpoint::{Checkpoint, CheckpointError, GyroNet};
-use crate::network::weight_file::WeightFileError;
 use crate::simulate::{Config, csv};
-use gyronet::model::FogBlob;
-use gyronet::model::weights::FOGNET;
 
 /// The drive that `gyronet simulate --seconds 90 --seed 1` writes.
 pub const SIMULATED_DRIVE: &str = include_str!("../data/simulated_drive.csv");
@@ -40,15 +36,6 @@ pub fn demo_drive() -> Result<Recording, DataError> {
 /// Never, unless the built-in file is corrupt.
 pub fn checkpoint() -> Result<Checkpoint<GyroNet>, CheckpointError> {
     Checkpoint::parse("gyronet.safetensors", CHECKPOINT)
-}
-
-/// Returns FoGNet's weights.
-///
-/// # Errors
-/// Never, unless the built-in file is corrupt.
-pub fn fog_blob() -> Result<FogBlob<'static>, WeightFileError> {
-    FogBlob::new_checked(&FOGNET.0)
-        .map_err(|source| WeightFileError::Blob { path: String::from("built-in FoGNet weights"), source })
 }
 
 #[cfg(test)]

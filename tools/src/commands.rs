@@ -17,18 +17,16 @@ pub mod import;
 pub mod keys;
 pub mod monitor;
 mod paint;
-pub mod paper;
 mod progress;
 pub mod quantize;
 pub mod reference;
 #[cfg(feature = "logs")]
 pub mod replay;
+pub mod retired;
 pub mod sign;
 pub mod simulate;
 pub mod size;
 pub mod soak;
-#[cfg(feature = "logs")]
-pub mod tables;
 pub mod train;
 pub mod warm_up;
 mod weights;

@@ -8,7 +8,7 @@
 //! drive <- calibrate
 //! drive <- import -> wheels
 //! drive <- doctor -> import, plot
-//! drive <- evaluate <- paper -> plot, simulate
+//! drive <- evaluate
 //! train -> evaluate, plot      python
 //! warm_up -> drive, plot, simulate
 //! target -> simulate      network      client <- reference      wheels
@@ -27,11 +27,10 @@ pub mod evaluate;
 #[cfg(feature = "logs")]
 pub mod import;
 pub mod network;
-pub mod paper;
 pub mod parts;
 pub mod plot;
 pub mod python;
-mod random;
+pub mod random;
 pub mod reference;
 pub mod signing;
 pub mod simulate;

@@ -60,9 +60,6 @@ enum Command {
     #[cfg(feature = "logs")]
     Doctor(commands::doctor::Args),
     Train(commands::train::Args),
-    #[cfg(feature = "logs")]
-    Tables(commands::tables::Args),
-    Paper(commands::paper::Args),
     Quantize(commands::quantize::Args),
     Monitor(commands::monitor::Args),
     Bus(commands::bus::Args),
@@ -80,7 +77,13 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let Cli { command, common } = Cli::parse();
+    let Cli { command, common } = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => match commands::retired::line(&error) {
+            Some(line) => return fail(&line, 2),
+            None => error.exit(),
+        },
+    };
     let result = match &command {
         Command::Demo(args) => commands::demo::run(args, common),
         Command::Evaluate(args) => commands::evaluate::run(args, common),
@@ -97,9 +100,6 @@ fn main() -> ExitCode {
         #[cfg(feature = "logs")]
         Command::Doctor(args) => commands::doctor::run(args, common),
         Command::Train(args) => commands::train::run(args, common),
-        #[cfg(feature = "logs")]
-        Command::Tables(args) => commands::tables::run(args, common),
-        Command::Paper(args) => commands::paper::run(args, common),
         Command::Quantize(args) => commands::quantize::run(args, common),
         Command::Bus(args) => commands::bus::run(args, common),
         Command::Monitor(args) => commands::monitor::run(args, common),
@@ -118,8 +118,12 @@ fn main() -> ExitCode {
     if error.downcast_ref().is_some_and(closed) {
         return ExitCode::SUCCESS;
     }
+    fail(&error, 1)
+}
+
+fn fail(error: &dyn std::fmt::Display, status: u8) -> ExitCode {
     // If even stderr is closed, the error cannot be reported.
     let mark = console::style("error:").for_stderr().red().bold();
     let _ = writeln!(std::io::stderr(), "{mark} {error}");
-    ExitCode::FAILURE
+    ExitCode::from(status)
 }

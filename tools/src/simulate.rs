@@ -2,11 +2,9 @@
 //! known errors measures the motion. The true yaw rate is known exactly.
 //!
 //! [`route`] generates the route, [`car`] moves on a plane with grade, bank and suspension, [`vibration`] shakes the
-//! sensor, [`mems`] adds the sensor's own errors, and [`csv`] writes the recording. [`layout`] writes sequences of a
-//! drive through a [`town`] in the formats of the data sets KAIST and NCLT, with a fibre-optic gyro ([`fog`]) and
-//! wheels ([`odometer`]); [`vehicles`] lists every parameter with its source. The truth is the reading of a perfect
-//! sensor at the same position without vibration: vibration does not change the car's heading, and counts as an
-//! error.
+//! sensor, [`mems`] adds the sensor's own errors, and [`csv`] writes the recording. The truth is the
+//! reading of a perfect sensor at the same position without vibration: vibration does not change the car's heading,
+//! and counts as an error.
 //!
 //! The simulation does not model a particular sensor or car. It shows that everything works, and how well static
 //! initialisation performs; only recordings of a real car show whether a network helps.
@@ -16,17 +14,11 @@
 
 pub mod car;
 pub mod csv;
-pub mod fog;
-pub mod layout;
 pub mod leg;
 pub mod mems;
-pub mod odometer;
-mod purpose;
+pub mod purpose;
 pub mod route;
-pub mod town;
-pub mod vehicles;
 pub mod vibration;
-pub mod world;
 
 use crate::drive::DT;
 use car::Car;
@@ -121,7 +113,9 @@ impl Iterator for Simulation {
     }
 }
 
-fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+/// The sum of two vectors.
+#[must_use]
+pub fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| a[axis] + b[axis])
 }
 

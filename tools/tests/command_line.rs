@@ -57,7 +57,6 @@ fn wrong_arguments_are_status_2_and_failures_1() {
         &["simulate", "--out", "a.csv", "--seconds", "1"],
         &["device", "info"],
         &["evaluate", "a.csv", "--lags", "--ablation"],
-        &["tables", "urban14", "--method", "mine"],
     ] {
         let output = gyronet(wrong);
         assert_eq!(output.status.code(), Some(2), "{wrong:?}: {}", text(&output.stderr));
@@ -69,9 +68,6 @@ fn wrong_arguments_are_status_2_and_failures_1() {
         &["replay", "/nowhere/drive.csv"],
         &["simulate", "--out", "/nowhere/drive.csv"],
         &["import", "kaist", "/nowhere"],
-        &["tables", "/nowhere"],
-        &["tables", "urban14", "--method", "mine=/nowhere"],
-        &["paper", "/nowhere", "--out", "/nowhere/out"],
         &["quantize", "/nowhere/a.safetensors", "--out", "/nowhere/a.blob"],
         &["monitor", "/nowhere/can.log"],
         &["size", "--elf", "/nowhere/image"],
@@ -150,20 +146,17 @@ fn bash_completes() {
 }
 
 #[test]
-fn tables_fit_to_training_sequences_and_take_other_methods() {
-    let folder = tempfile::tempdir().unwrap();
-    let [sequence, methods] = ["one", "methods"].map(|name| folder.path().join(name).display().to_string());
-    std::fs::create_dir_all(&methods).unwrap();
-    let made = gyronet(&["simulate", "--layout", "kaist", "--minutes", "1", "--out", &sequence]);
-    assert_eq!(made.status.code(), Some(0), "{}", text(&made.stderr));
-    let mine = format!("mine={methods}");
-    let output = gyronet(&["tables", &sequence, "--train", &sequence, "--method", &mine]);
-    let (tables, errors) = (text(&output.stdout), text(&output.stderr));
-    assert_eq!(output.status.code(), Some(0), "{errors}");
-    assert!(tables.contains("FoG and wheels are fitted on one: "), "{tables}");
-    assert!(tables.contains("mine: 1 of 1 sequences left out\n    "), "{tables}");
-    assert!(tables.contains("one.txt: missing"), "{tables}");
-    let twice = gyronet(&["tables", &sequence, "--method", &mine, "--method", &mine]);
-    assert_eq!(twice.status.code(), Some(1));
-    assert!(text(&twice.stderr).contains("given twice"), "{}", text(&twice.stderr));
+fn retired_names_say_what_does_their_work() {
+    for (retired, successor) in [
+        (&["paper", "KAIST", "--out", "OUT"][..], "make -f tools/paper/Makefile"),
+        (&["tables", "SEQUENCES"], "cargo paper tables"),
+        (&["simulate", "--layout", "kaist", "--out", "OUT"], "cargo paper simulate"),
+        (&["import", "urban06", "--training", "--out", "a.csv"], "cargo paper import"),
+        (&["import", "kaist", "urban06"], "cargo paper import urban06"),
+    ] {
+        let output = gyronet(retired);
+        let error = text(&output.stderr);
+        assert!(!output.status.success() && error.contains(successor), "{retired:?}: {error}");
+        assert_eq!(error.lines().count(), 1, "{retired:?}: {error}");
+    }
 }

@@ -1,7 +1,7 @@
 //! This module passes folders in the layouts of KAIST Urban and NCLT to the loaders.
 
 use super::Seed;
-use gyronet_tools::paper::sequence::{Sequence, write_csv};
+use gyronet_paper::sequence::{Sequence, write_csv};
 use std::cell::RefCell;
 use std::path::Path;
 use std::{fs, io};
@@ -63,7 +63,7 @@ pub fn folder(data: &[u8]) {
 }
 
 fn check(folder: &Path) {
-    match Sequence::read(folder, |_| {}) {
+    match Sequence::read(folder) {
         Ok(sequence) => {
             let finite = sequence.steps.iter().all(|step| {
                 let singles = step.specific_force.iter().chain(&step.angular_rate);

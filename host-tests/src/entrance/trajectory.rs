@@ -1,7 +1,7 @@
 //! This module reads trajectories of other programs, as a user passes them to the tables.
 
 use super::Seed;
-use gyronet_tools::paper::trajectory::Trajectory;
+use gyronet_paper::trajectory::Trajectory;
 
 /// Reads bytes as a file. Poses must have rising times and finite values, and an error must name the file.
 pub fn tum(data: &[u8]) {

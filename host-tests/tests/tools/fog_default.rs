@@ -2,10 +2,10 @@
 //! what standstills add to the Earth's rate, and whether the expected errors are as large as the true ones.
 
 use gyronet_host_tests::sequence::{path_error, simulate};
-use gyronet_tools::paper::fog_replay::{default_config, run_board};
-use gyronet_tools::simulate::fog::{self, Fog};
-use gyronet_tools::simulate::layout::{Layout, Set, Spec};
-use gyronet_tools::simulate::world::EARTH_RATE;
+use gyronet_paper::fog_replay::{default_config, run_board};
+use gyronet_paper::simulate::fog::{self, Fog};
+use gyronet_paper::simulate::world::EARTH_RATE;
+use gyronet_paper::simulate::{Layout, Set, Spec};
 
 /// Devices of each part. One device says little: its scale, 200 ppm, makes as much of a drive's net turn as its bias.
 const DEVICES: u64 = 16;

@@ -9,8 +9,8 @@ use gyronet::sample::FogSample;
 use gyronet::units::{Angle, Micros};
 use gyronet_host_tests::recordings;
 use gyronet_host_tests::require::{self, Need};
+use gyronet_paper::simulate::world::EARTH_RATE;
 use gyronet_tools::drive::wheel_frames;
-use gyronet_tools::simulate::world::EARTH_RATE;
 use std::path::Path;
 
 /// The last part of the drive, which nothing has been chosen on.

@@ -1,14 +1,14 @@
 //! FoGNet on the board, on simulated sequences that training has not seen: on its own gyro it must make the turns of
-//! minutes better, on another one it must not run. The figures of whole sequences are a report: `cargo gyronet tables`.
+//! minutes better, on another one it must not run. The figures of whole sequences are a report: `cargo paper tables`.
 
 use gyronet::estimate::YawEstimate;
 use gyronet::fog::GyroMismatch;
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
 use gyronet::model::{FogBlob, FogNet, weights};
 use gyronet_host_tests::sequence::simulate;
-use gyronet_tools::paper::fog_replay::{check_weights, default_config, run_board};
-use gyronet_tools::paper::sequence::Sequence;
-use gyronet_tools::simulate::layout::{Layout, Spec};
+use gyronet_paper::fog_replay::{check_weights, default_config, run_board};
+use gyronet_paper::sequence::Sequence;
+use gyronet_paper::simulate::{Layout, Spec};
 
 const SECONDS: u32 = 10 * 60;
 /// Runs of the gyro that FoGNet was trained for; none of them is in a set.

@@ -1,17 +1,17 @@
-//! `gyronet tables --method`: another program's trajectories in the tables, on simulated sequences. The truth has no
+//! `gyronet-paper tables --method`: another program's trajectories in the tables, on simulated sequences. The truth has no
 //! error, a known error is found, evo finds the same, and what cannot be compared is named and never a number.
 
 use gyronet::odometry::Track;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require::python;
 use gyronet_host_tests::sequence::simulate;
+use gyronet_paper::sequence::Sequence;
+use gyronet_paper::simulate::{Layout, Spec};
+use gyronet_paper::tables::estimates::Estimates;
+use gyronet_paper::tables::given::Given;
+use gyronet_paper::tables::results::{Errors, Results, SequenceErrors};
+use gyronet_paper::tables::table;
 use gyronet_tools::evaluate::trajectory_error::Point;
-use gyronet_tools::paper::sequence::Sequence;
-use gyronet_tools::paper::tables::estimates::Estimates;
-use gyronet_tools::paper::tables::given::Given;
-use gyronet_tools::paper::tables::results::{Errors, Results, SequenceErrors};
-use gyronet_tools::paper::tables::table;
-use gyronet_tools::simulate::layout::{Layout, Spec};
 use std::fmt::Write;
 use std::fs;
 use std::path::PathBuf;

@@ -1,21 +1,14 @@
-//! `gyronet import` converts logs of other tools, or a sequence of a data set, to one drive.
+//! `gyronet import` converts logs of other tools to one drive.
 
-use super::{Common, WriteError, print_json, progress, remark};
-use clap::ValueEnum;
-use gyronet_tools::drive::error::DataError;
+use super::{Common, WriteError, print_json};
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::vehicle::Vehicle;
 use gyronet_tools::import::drive::{Logs, Request, Seen};
-use gyronet_tools::paper::fog_replay;
-use gyronet_tools::paper::sequence::{self, Sequence};
-use gyronet_tools::paper::tables::pictures;
-use gyronet_tools::simulate::layout::Layout;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
-/// Convert logs of other tools, or a sequence of a data set, to one drive.
+/// Convert logs of other tools to one drive.
 ///
 /// The input is one or more logs: ROS 1 bags, MCAP (ROS 1 and 2), PX4 ULog, candump, Vector ASC and BLF, PEAK TRC,
 /// Xsens MT text and CSV. The command prints what it found and the number of unusable records. With --out it writes
@@ -26,20 +19,13 @@ use std::time::Instant;
 /// the first log `drive.bag`, or `vehicle.toml`, unless --vehicle names another. A copy is written beside the drive,
 /// with the drive's name and .toml; every command that reads the drive uses it. The clocks of several files are
 /// aligned by the yaw rates that the files have in common.
-///
-/// A sequence of KAIST Urban or NCLT is given by its layout and its folder. KAIST has
-/// sensor_data/{xsens_imu,fog,encoder}.csv, calibration/EncoderParameter.txt and global_pose.csv; NCLT has ms25.csv,
-/// kvh.csv, wheels.csv and groundtruth_*.csv. Missing files, wrong columns, fields that are not numbers, and time
-/// that goes backwards are errors. Rows with NaN, repeated stamps, gaps and encoder resets are counted and reported.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet import drive.bag --out drive.csv
-  gyronet import drive.mcap bus.blf --dbc car.dbc --vehicle car.toml --out drive.csv
-  gyronet import kaist urban14 --out urban14.csv
-  gyronet import nclt 2012-01-08 --stamps stamps.svg")]
+  gyronet import drive.mcap bus.blf --dbc car.dbc --vehicle car.toml --out drive.csv")]
 pub struct Args {
-    /// Logs of one drive; or `kaist` or `nclt` and the folder of a sequence.
+    /// Logs of one drive.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// Write the drive to this file, at 100 Hz.
@@ -66,33 +52,15 @@ pub struct Args {
     /// Skip this many seconds at the start.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     from: f64,
-    /// Write a training drive from a sequence: without the steps in a gap of any file, and with the Earth's rate and
-    /// the bias subtracted from the fibre-optic gyro, as FoGNet receives it. A sequence that starts moving is an
-    /// error.
-    #[arg(long, requires = "out")]
-    training: bool,
-    /// Plot the time between stamps in each file of a sequence to this file (the paper's Fig. 11).
-    #[arg(long, value_name = "FILE.svg")]
-    stamps: Option<PathBuf>,
 }
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     if let [layout, folder] = &args.files[..]
-        && let Some(layout) = layout.to_str().and_then(|name| Layout::from_str(name, true).ok())
+        && ["kaist", "nclt"].iter().any(|name| layout.as_os_str() == *name)
     {
-        return run_sequence(args, layout, folder, common);
-    }
-    run_logs(args, common)
-}
-
-/// Imports logs.
-fn run_logs(args: &Args, common: Common) -> super::Result {
-    if args.stamps.is_some() {
-        return Err("--stamps is for sequences of KAIST Urban or NCLT".into());
-    }
-    if args.training {
-        return Err("--training is for sequences of KAIST Urban or NCLT".into());
+        let folder = folder.display();
+        return Err(format!("a sequence of a data set is imported by `cargo paper import {folder}`").into());
     }
     if !(0.0..1e6).contains(&args.from) {
         return Err("--from must be a number of seconds after the first sample, 0 or more".into());
@@ -173,75 +141,4 @@ fn vehicle(args: &Args) -> Result<Vehicle, Box<dyn std::error::Error>> {
         *name = argument.clone().or(name.take());
     }
     Ok(vehicle)
-}
-
-/// Imports a sequence of a data set.
-fn run_sequence(args: &Args, layout: Layout, folder: &Path, common: Common) -> super::Result {
-    let started = Instant::now();
-    let found = sequence::layout(folder)?;
-    if found != layout {
-        return Err(format!("{}: has the layout of {found:?}", folder.display()).into());
-    }
-    let sequence = read(folder, common)?;
-    let mut out = std::io::stdout().lock();
-    if common.json {
-        let [imu, fog, wheels, truth] = &sequence.files;
-        print_json(
-            &mut out,
-            &serde_json::json!({
-                "name": sequence.name,
-                "simulated": sequence.simulated,
-                "seconds": sequence.seconds(),
-                "files": { "imu": imu, "fog": fog, "wheels": wheels, "truth": truth },
-                "steps_in_gap": sequence.in_gap,
-            }),
-        )?;
-        return write(args, common, &sequence);
-    }
-    let simulated = if sequence.simulated.is_some() { " (simulated)" } else { "" };
-    writeln!(out, "{}{simulated}: {:.2} s on the 100 Hz grid", sequence.name, sequence.seconds())?;
-    for (file, in_gap) in sequence.files.iter().zip(sequence.in_gap) {
-        write!(out, "  {file}")?;
-        if in_gap > 0 {
-            write!(out, ", {in_gap} steps in gaps over {:.0} ms", 1e3 * sequence::MAX_GAP)?;
-        }
-        writeln!(out)?;
-    }
-    write(args, common, &sequence)?;
-    Ok(remark(common, format_args!("{:.2} s", started.elapsed().as_secs_f64()))?)
-}
-
-/// Writes the requested files.
-fn write(args: &Args, common: Common, sequence: &Sequence) -> super::Result {
-    if let Some(path) = &args.out {
-        sequence.needs_gyro()?;
-        if args.training {
-            sequence.needs_standstill()?;
-        }
-        let error = WriteError::to(path);
-        let file = File::create(path).map_err(&error)?;
-        let out = BufWriter::new(file);
-        let rows = if args.training {
-            sequence::write_whole(&fog_replay::after_lane(sequence), out)
-        } else {
-            sequence::write_csv(sequence, out)
-        };
-        let rows = rows.map_err(&error)?;
-        let mut vehicle = Vehicle::default();
-        vehicle.wheels.radius_m = Some(sequence.layout.vehicle().world.car.wheel_radius);
-        let beside = write_vehicle(vehicle, path)?;
-        remark(common, format_args!("{}: {rows} rows; {} beside it", path.display(), beside.display()))?;
-    }
-    if let Some(path) = &args.stamps {
-        std::fs::write(path, pictures::stamps(sequence)?).map_err(WriteError::to(path))?;
-    }
-    Ok(())
-}
-
-/// Reads a sequence and shows a progress bar.
-pub(super) fn read(folder: &Path, common: Common) -> Result<Sequence, DataError> {
-    let bar = progress::bar(common, sequence::size(folder) as usize, &folder.display().to_string());
-    let sequence = Sequence::read(folder, |bytes| bar.set_position(bytes));
-    bar.finish_and_clear();
-    sequence
 }

@@ -1,18 +1,14 @@
 //! `gyronet quantize` converts an f32 checkpoint to a weight file for the integer kernels.
 
 use super::{Common, WriteError, print_json, read_drive};
-use gyronet::fog::FogConfig;
-use gyronet::model::fognet::FogNetState;
-use gyronet::model::{FogNet, GyroNet};
+use gyronet::model::GyroNet;
 use gyronet::pipeline::PipelineConfig;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::replay::Replay;
 use gyronet_tools::network::checkpoint::{self, Checkpoint};
-use gyronet_tools::network::quantization_error::{Both, QuantizationError};
-use gyronet_tools::network::quantize::{Report, fognet, quantize};
+use gyronet_tools::network::quantization_error::Both;
+use gyronet_tools::network::quantize::{Report, quantize};
 use gyronet_tools::network::weight_file::WeightFile;
-use gyronet_tools::paper::fog_replay;
-use gyronet_tools::paper::sequence::Sequence;
 use serde::Serialize;
 use std::fmt;
 use std::io::Write;
@@ -20,24 +16,23 @@ use std::path::PathBuf;
 
 /// Convert an f32 checkpoint to an int8 weight file for the board.
 ///
-/// The input is a checkpoint of GyroNet or FoGNet (safetensors, from tools/train). The weight file has int8 rows,
+/// The input is a checkpoint of GyroNet (safetensors, from tools/train). The weight file has int8 rows,
 /// packed in the order in which the kernels read them, with its provenance and a CRC-32.
 ///
 /// The command also prints the error that quantisation adds: the RMS of the difference between integer and f32
-/// output, divided by the RMS of the f32 output. It is measured on the given drives; for GyroNet the default is the
+/// output, divided by the RMS of the f32 output. It is measured on the given drives; the default is the
 /// simulated drive that comes with the tools.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  gyronet quantize gyronet.safetensors --out gyronet.blob --drives trial08.csv
-  gyronet quantize fognet.safetensors --out fognet.blob --drives sequences/train08")]
+  gyronet quantize gyronet.safetensors --out gyronet.blob --drives trial08.csv")]
 pub struct Args {
     /// Checkpoint (safetensors).
     checkpoint: PathBuf,
     /// Weight file to write.
     #[arg(long, short, value_name = "BLOB")]
     out: PathBuf,
-    /// Drives on which the error is measured; for FoGNet, folders in the layout of KAIST or NCLT.
+    /// Drives on which the error is measured.
     #[arg(long, num_args = 1.., value_name = "PATH")]
     drives: Vec<PathBuf>,
 }
@@ -48,27 +43,31 @@ struct Added {
     drive: String,
     windows: u64,
     relative_rms: f64,
-    /// Relative error of the scale output; only GyroNet has one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    scale_rms: Option<f64>,
+    /// Relative error of the scale output.
+    scale_rms: f64,
     clamped_inputs: u64,
 }
 
 impl fmt::Display for Added {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { drive, windows, relative_rms, scale_rms, clamped_inputs } = self;
-        write!(f, "{drive}: quantisation adds {:.2} % RMS", 100.0 * relative_rms)?;
-        if let Some(scale) = scale_rms {
-            write!(f, " ({:.2} % to the scale)", 100.0 * scale)?;
-        }
-        write!(f, " over {windows} windows, {clamped_inputs} inputs clamped")
+        write!(
+            f,
+            "{drive}: quantisation adds {:.2} % RMS ({:.2} % to the scale) over {windows} windows, {clamped_inputs} inputs \
+             clamped",
+            100.0 * relative_rms,
+            100.0 * scale_rms
+        )
     }
 }
 
 /// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let (bytes, report, added) =
-        if Checkpoint::is_in(&args.checkpoint)? { fognet(args)? } else { gyronet(args, common)? };
+    if Checkpoint::is_in(&args.checkpoint)? {
+        let path = args.checkpoint.display();
+        return Err(format!("{path}: a checkpoint of FoGNet, which `cargo paper quantize` converts").into());
+    }
+    let (bytes, report, added) = convert(args, common)?;
     std::fs::write(&args.out, &bytes).map_err(WriteError::to(&args.out))?;
     let Report { rows, raised, largest_raise, bytes } = report;
     let mut out = std::io::stdout().lock();
@@ -90,7 +89,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 /// The bytes of a weight file, the quantisation's report, and the error that it adds on each drive.
 type Made = Result<(Vec<u8>, Report, Vec<Added>), Box<dyn std::error::Error>>;
 
-fn gyronet(args: &Args, common: Common) -> Made {
+fn convert(args: &Args, common: Common) -> Made {
     let checkpoint = Checkpoint::<checkpoint::GyroNet>::read(&args.checkpoint)?;
     let (bytes, report) = quantize(&checkpoint)?;
     let weights = WeightFile::parse(&args.out.display().to_string(), &bytes)?;
@@ -105,37 +104,13 @@ fn gyronet(args: &Args, common: Common) -> Made {
         let mut both = Both::new(&mut integer, &mut reference);
         Replay::run(drive, &PipelineConfig::DEFAULT, None, &mut both, || {})?;
         let error = both.error();
-        added.push(Added { scale_rms: Some(error.scale_rms()), ..Added::new(drive.name(), &error) });
-    }
-    Ok((bytes, report, added))
-}
-
-fn fognet(args: &Args) -> Made {
-    let checkpoint = Checkpoint::<checkpoint::FogNet>::read(&args.checkpoint)?;
-    let (bytes, report) = fognet::quantize(&checkpoint)?;
-    let weights = WeightFile::parse_fognet(&args.out.display().to_string(), &bytes)?;
-    let mut added = Vec::new();
-    for path in &args.drives {
-        let sequence = Sequence::read(path, |_| {})?;
-        let mut state = FogNetState::ZERO;
-        let (mut integer, mut reference) =
-            (FogNet::new(weights.fog_blob()?, &mut state), checkpoint.network());
-        let mut both = Both::new(&mut integer, &mut reference);
-        fog_replay::run(&sequence, &mut both, FogConfig::DEFAULT, || {});
-        added.push(Added::new(&sequence.name, &both.error()));
-    }
-    Ok((bytes, report, added))
-}
-
-impl Added {
-    fn new(drive: &str, error: &QuantizationError) -> Self {
-        let QuantizationError { windows, clamped_inputs, .. } = *error;
-        Self {
-            drive: drive.into(),
-            windows,
+        added.push(Added {
+            drive: drive.name().into(),
+            windows: error.windows,
             relative_rms: error.relative_rms(),
-            scale_rms: None,
-            clamped_inputs,
-        }
+            scale_rms: error.scale_rms(),
+            clamped_inputs: error.clamped_inputs,
+        });
     }
+    Ok((bytes, report, added))
 }

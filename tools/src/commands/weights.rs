@@ -14,27 +14,19 @@ use std::path::{Path, PathBuf};
 /// The weights of the integer network.
 pub struct Weights {
     file: Option<WeightFile>,
-    built_in: &'static [u8],
 }
 
 impl Weights {
     /// Opens a file, or chooses the default weights.
     pub fn open(path: Option<&Path>) -> Result<Self, WeightFileError> {
-        let file = path.map(WeightFile::read).transpose()?;
-        Ok(Self { file, built_in: &weights::DEFAULT.0 })
-    }
-
-    /// Opens a file, or chooses the weights of the paper's GyroNet.
-    #[cfg(feature = "logs")]
-    pub fn of_the_paper(path: Option<&Path>) -> Result<Self, WeightFileError> {
-        Ok(Self { built_in: &weights::GYRONET.0, ..Self::open(path)? })
+        Ok(Self { file: path.map(WeightFile::read).transpose()? })
     }
 
     /// Checks the weights and returns them.
     pub fn blob(&self) -> Result<Blob<'_>, WeightFileError> {
         match &self.file {
             Some(file) => file.blob(),
-            None => Blob::new_checked(self.built_in)
+            None => Blob::new_checked(&weights::DEFAULT.0)
                 .map_err(|source| WeightFileError::Blob { path: String::from("built-in weights"), source }),
         }
     }

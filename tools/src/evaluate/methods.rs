@@ -88,8 +88,7 @@ impl Method {
     pub const PSEUDO_FOG: Self = mems("pseudo_fog", "FoGNet on GyroNet's rate");
     /// The yaw rate from the travel difference of the left and right wheels over the track.
     pub const WHEELS: Self = Self { key: "wheels", name: "wheels alone", gyro: Gyro::Wheels };
-    /// The fibre-optic gyro and the wheels with four numbers fitted to training sequences
-    /// ([`crate::paper::tables::joint`]).
+    /// The fibre-optic gyro and the wheels with four numbers fitted to training sequences.
     pub const FOG_WHEELS: Self = fog("fog_wheels", "FoG and wheels, fitted");
     /// FoGNet; the first minute is padded.
     pub const FOGNET: Self = fog("fognet", "FoGNet");

@@ -61,7 +61,7 @@ pub fn integral(rates: &[f64]) -> Vec<f64> {
 }
 
 /// Wraps an angle to -pi to pi.
-pub(crate) fn wrap(angle: f64) -> f64 {
+pub fn wrap(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }
 

@@ -7,12 +7,12 @@
 use super::DT;
 use super::leg::Leg;
 use super::purpose::Purpose;
-use super::route::{Route, Way};
+use super::route::Route;
 use crate::random::Random;
 use std::f64::consts::TAU;
 
 /// Standard gravity, m/s^2.
-pub(super) const GRAVITY: f64 = 9.80665;
+pub const GRAVITY: f64 = 9.80665;
 
 /// Holds the parameters of a car and its driver.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -131,11 +131,11 @@ impl Slope {
     }
 }
 
-/// Simulates a car that follows a route.
+/// A car that follows a route.
 #[derive(Debug, Clone)]
-pub struct Car {
+pub struct Car<W = Route> {
     config: Config,
-    way: Way,
+    way: W,
     leg: Leg,
     next: Leg,
     /// Position in the leg: metres on a road, seconds of a wait.
@@ -154,14 +154,16 @@ impl Car {
     /// Starts at rest on the short course of [`Route`].
     #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
-        Self::on(config, Way::Course(Route::new(seed)), seed)
+        Self::on(config, Route::new(seed), seed)
     }
+}
 
-    /// Starts at rest on a route.
+impl<W: Iterator<Item = Leg>> Car<W> {
+    /// Starts at rest on a route, and waits at its end.
     #[must_use]
-    pub fn on(config: &Config, mut way: Way, seed: u64) -> Self {
+    pub fn on(config: &Config, mut way: W, seed: u64) -> Self {
         let mut road = Purpose::Road.stream(seed);
-        let (first, second) = (way.next_leg(), way.next_leg());
+        let (first, second) = (next_leg(&mut way), next_leg(&mut way));
         Self {
             config: *config,
             way,
@@ -249,13 +251,19 @@ impl Car {
 
     fn turn_to_next_leg(&mut self) {
         self.leg = self.next;
-        self.next = self.way.next_leg();
+        self.next = next_leg(&mut self.way);
         self.along = 0.0;
     }
 }
 
+/// The next leg of a route; after the last one, an endless wait.
+fn next_leg(way: &mut impl Iterator<Item = Leg>) -> Leg {
+    way.next().unwrap_or(Leg::Stand { seconds: f64::INFINITY })
+}
+
 /// Converts a vector from the level frame to the axes of a body that is pitched, then rolled.
-pub(super) fn turned_in([x, y, z]: [f64; 3], pitch: f64, roll: f64) -> [f64; 3] {
+#[must_use]
+pub fn turned_in([x, y, z]: [f64; 3], pitch: f64, roll: f64) -> [f64; 3] {
     let (sp, cp, sr, cr) = (libm::sin(pitch), libm::cos(pitch), libm::sin(roll), libm::cos(roll));
     let (x, z) = (x * cp - z * sp, x * sp + z * cp);
     [x, y * cr + z * sr, -y * sr + z * cr]

@@ -64,7 +64,7 @@ struct Triad {
 }
 
 /// Draws the matrix of scale and misalignment that three axes apply to a vector.
-pub(super) fn axes(scale: f64, misalignment: f64, random: &mut Random) -> [[f64; 3]; 3] {
+pub fn axes(scale: f64, misalignment: f64, random: &mut Random) -> [[f64; 3]; 3] {
     std::array::from_fn(|row| {
         std::array::from_fn(|column| {
             let deviation = random.normal();
@@ -74,7 +74,7 @@ pub(super) fn axes(scale: f64, misalignment: f64, random: &mut Random) -> [[f64;
 }
 
 /// Returns a vector as three axes measure it.
-pub(super) fn seen(matrix: &[[f64; 3]; 3], vector: [f64; 3]) -> [f64; 3] {
+pub fn seen(matrix: &[[f64; 3]; 3], vector: [f64; 3]) -> [f64; 3] {
     matrix.map(|row| row.iter().zip(vector).map(|(m, v)| m * v).sum())
 }
 

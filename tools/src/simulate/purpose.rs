@@ -5,7 +5,8 @@ use crate::random::Random;
 
 /// The purpose of a stream of random numbers.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Purpose {
+#[allow(missing_docs, reason = "the names say it")]
+pub enum Purpose {
     Route,
     Road,
     Wheels,

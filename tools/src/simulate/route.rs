@@ -4,29 +4,8 @@
 
 use super::leg::Leg;
 use super::purpose::Purpose;
-use super::town::Town;
 use crate::random::Random;
 use std::f64::consts::FRAC_PI_2;
-
-/// The source of the legs of a drive.
-#[derive(Debug, Clone)]
-pub enum Way {
-    /// The short course of [`Route`].
-    Course(Route),
-    /// A route through a town.
-    Town(Town),
-}
-
-impl Way {
-    /// Returns the next leg; after the last one, an endless wait.
-    pub(super) fn next_leg(&mut self) -> Leg {
-        let next = match self {
-            Self::Course(route) => route.next(),
-            Self::Town(town) => town.next(),
-        };
-        next.unwrap_or(Leg::Stand { seconds: f64::INFINITY })
-    }
-}
 
 /// An endless iterator over the legs of a route.
 #[derive(Debug, Clone)]

@@ -8,7 +8,7 @@ truth of the rows that they repeat. The learning rate follows one cycle, weights
 steps, and the best epoch on the validation drive is kept. If the gyro's bias is known, the constant part of
 the correction is removed at the end. Test drives are never read.
 
-LAYOUT drives: files that `gyronet import kaist --training` or `nclt` wrote, with the Earth's rate and the
+LAYOUT drives: files that `gyronet-paper import --training` wrote, with the Earth's rate and the
 bias subtracted from the gyro; a file with gaps is used in pieces. LAYOUT kingston: the first 60 % of the
 Kingston 2008 recording; the last sixth of these validates.
 """

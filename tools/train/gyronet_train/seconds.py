@@ -67,7 +67,7 @@ def kaist_files(folder: Path):
 
 
 def load_grid(path: Path, rates: Path | None = None) -> list[Seconds]:
-    """Reads a drive that `gyronet import kaist` or `nclt` wrote: the pieces of whole seconds between its gaps, counted
+    """Reads a drive that `gyronet-paper import` wrote: the pieces of whole seconds between its gaps, counted
     from its first row. If `rates` is given, the navigation rates of `gyronet replay --csv` replace the fibre-optic
     gyro: the paper's pseudo-FoG. Raises ValueError with the reason."""
     mounting = read_mounting(path)

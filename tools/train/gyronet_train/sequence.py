@@ -1,7 +1,7 @@
 """Sequences in the layout of KAIST Urban: windows of one second on a 100 Hz grid, and the true poses.
 
 The grid begins at the first row of the inertial sensor at which all other files have begun, as in
-`gyronet tables`, and has whole seconds only. Distances and turns are interpolated as sums, so that no
+`gyronet-paper tables`, and has whole seconds only. Distances and turns are interpolated as sums, so that no
 increment is lost or counted twice; the inertial sensor's values are means over a step. The gyro's mean
 over the first three seconds, at standstill, is subtracted from the gyro.
 """

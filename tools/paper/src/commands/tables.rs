@@ -1,0 +1,156 @@
+//! `gyronet-paper tables` computes the paper's tables and figures on given sequences.
+
+use super::{print_json, remark};
+use gyronet::model::fognet::FogNetState;
+use gyronet::model::weights::{FOGNET, GYRONET};
+use gyronet::model::{FogNet, GyroNet};
+use gyronet_paper::sequence::{self, Sequence};
+use gyronet_paper::simulate::Layout;
+use gyronet_paper::tables::given::Given;
+use gyronet_paper::tables::joint::{Fit, Joint};
+use gyronet_paper::tables::results::{Results, SequenceErrors};
+use gyronet_paper::tables::{estimates, html, pictures, table};
+use gyronet_tools::drive::error::DataError;
+use gyronet_tools::network::weight_file::WeightFile;
+use std::fs;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Compute the paper's tables and figures on sequences of KAIST Urban or NCLT.
+///
+/// The input is sequences: folders in the layout of KAIST Complex Urban or NCLT, recorded or written by
+/// `gyronet-paper simulate`. The command prints Tables I to VII beside the paper's own results, except tables that these
+/// sequences have no results for. With --out it also draws Figs. 6, 7, 9, 10 and 11. Results of simulated sequences
+/// are marked. If the vehicle does not stand still for the first 3 s, methods that need static initialisation are
+/// left out, and the reason is printed.
+///
+/// --method adds another program's method: a folder of trajectories in the format of TUM's RGB-D benchmark (rows of
+/// time x y z qx qy qz qw, as evo writes them), one for each sequence, named SEQUENCE.txt. A trajectory starts from
+/// the true pose, in the truth's frame and on the clock of the sequence's files, and ends within 1 s of the
+/// sequence's end. A trajectory that is missing or cannot be compared is left out; the tables say how many were left
+/// out, and why.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet-paper simulate --layout kaist --set test --out sequences && gyronet-paper tables sequences --out report
+  gyronet-paper tables urban14 urban15 --json
+  gyronet-paper tables sequences --method lwoi=OUT/model --method mine=trajectories")]
+pub struct Args {
+    /// Folders of sequences, or folders that contain such folders.
+    #[arg(required = true, value_name = "DIR")]
+    folders: Vec<PathBuf>,
+    /// Write report.html (one page with all tables and pictures) and each picture as SVG to this folder.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Fit the fibre-optic gyro and the wheels to this sequence, or to the sequences in this folder, and show the fit
+    /// as a method. May be repeated.
+    #[arg(long, value_name = "DIR")]
+    train: Vec<PathBuf>,
+    /// Add the trajectories of a folder to the tables under this name. May be repeated.
+    #[arg(long = "method", value_name = "NAME=FOLDER")]
+    methods: Vec<Given>,
+    /// Weight file of GyroNet [default: the library's].
+    #[arg(long, value_name = "BLOB")]
+    weights: Option<PathBuf>,
+    /// Weight file of FoGNet [default: the library's].
+    #[arg(long, value_name = "BLOB")]
+    fog_weights: Option<PathBuf>,
+    /// Weight file of a FoGNet that was trained on GyroNet's rate, for pseudo_fog [default: that of --fog-weights].
+    #[arg(long, value_name = "BLOB")]
+    pseudo_fog_weights: Option<PathBuf>,
+}
+
+/// Returns a unique name for a sequence's pictures: folders of different data sets may have the same name.
+fn title(sequence: &Sequence, number: usize) -> String {
+    let layout = match sequence.layout {
+        Layout::Kaist => "kaist",
+        Layout::Nclt => "nclt",
+    };
+    format!("{:02}-{layout}-{}", number + 1, sequence.name)
+}
+
+/// Fits the fibre-optic gyro and the wheels to the sequences of each data set's layout.
+fn fit(folders: &[PathBuf]) -> super::Result<Vec<(Layout, Joint)>> {
+    let mut fits: Vec<(Layout, Fit)> = Vec::new();
+    for folder in folders {
+        for path in sequence::find(folder)? {
+            let sequence = Sequence::read(&path)?;
+            let known = fits.iter().position(|(layout, _)| *layout == sequence.layout);
+            let at = known.unwrap_or_else(|| {
+                fits.push((sequence.layout, Fit::default()));
+                fits.len() - 1
+            });
+            fits[at].1.add(&sequence);
+        }
+    }
+    let solved =
+        fits.into_iter().map(|(layout, fit)| Some((layout, fit.solve()?))).collect::<Option<Vec<_>>>();
+    solved.ok_or_else(|| "--train: these sequences turn or move too little for a fit".into())
+}
+
+/// Runs the subcommand.
+pub fn run(args: &Args, json: bool) -> super::Result {
+    for (k, given) in args.methods.iter().enumerate() {
+        if args.methods[..k].iter().any(|other| other.method == given.method) {
+            return Err(format!("--method {}: this name is given twice", given.method.name).into());
+        }
+        // A trajectory that is missing from the folder is not an error; a missing folder is.
+        fs::read_dir(&given.folder).map_err(|source| DataError::open(given.folder.display(), source))?;
+    }
+    let weights = match &args.weights {
+        Some(path) => WeightFile::read(path)?,
+        None => WeightFile::parse("built-in weights", &GYRONET.0)?,
+    };
+    let fog_weights = match &args.fog_weights {
+        Some(path) => WeightFile::read_fognet(path)?,
+        None => WeightFile::parse_fognet("built-in weights", &FOGNET.0)?,
+    };
+    let pseudo_weights = args.pseudo_fog_weights.as_deref().map(WeightFile::read_fognet).transpose()?;
+    let mut network = GyroNet::new(weights.blob()?);
+    let fog_blob = fog_weights.fog_blob()?;
+    let pseudo_blob = pseudo_weights.as_ref().unwrap_or(&fog_weights).fog_blob()?;
+    let mut fog_state = FogNetState::ZERO;
+    let mut fognet = FogNet::new(fog_blob, &mut fog_state);
+    let mut pseudo_state = FogNetState::ZERO;
+    let mut pseudo_fog = FogNet::new(pseudo_blob, &mut pseudo_state);
+    let mut folders = Vec::new();
+    for folder in &args.folders {
+        folders.extend(sequence::find(folder)?);
+    }
+    let joint = fit(&args.train)?;
+    let (mut all, mut drawn) = (Vec::new(), Vec::new());
+    for folder in &folders {
+        let sequence = Sequence::read(folder)?;
+        let mut estimates = estimates::run(&sequence, &mut network);
+        estimates.add_fognet(&sequence, &mut fognet, fog_blob.training);
+        estimates.add_pseudo_fog(&sequence, &mut pseudo_fog);
+        if let Some((_, joint)) = joint.iter().find(|(layout, _)| *layout == sequence.layout) {
+            estimates.add_joint(&sequence, joint);
+        }
+        args.methods.iter().for_each(|given| estimates.add_given(&sequence, given));
+        let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
+        remark(format_args!("{}: {:.0} s of driving", errors.name, errors.seconds))?;
+        if args.out.is_some() {
+            drawn.push((title(&sequence, drawn.len()), pictures::draw(&sequence, &errors, &paths)?));
+        }
+        all.push(errors);
+    }
+    let results = Results::new(all);
+    let files = [args.weights.as_deref(), args.fog_weights.as_deref()];
+    let tables: Vec<_> = table::tables(&results).into_iter().map(|table| table.with_weights(files)).collect();
+    if json {
+        print_json(&results)?;
+    } else {
+        let mut out = std::io::stdout().lock();
+        tables.iter().try_for_each(|table| writeln!(out, "{table}"))?;
+    }
+    let Some(folder) = &args.out else { return Ok(()) };
+    fs::create_dir_all(folder).map_err(super::named(folder))?;
+    super::write(&folder.join("report.html"), html::page(&tables, &drawn))?;
+    for (sequence, pictures) in &drawn {
+        for picture in pictures {
+            super::write(&folder.join(format!("{sequence}-{}.svg", picture.kind)), &picture.svg)?;
+        }
+    }
+    Ok(remark(format_args!("{}", folder.join("report.html").display()))?)
+}

@@ -1,0 +1,243 @@
+//! This module runs a sequence through the coprocessor, to get the rates that the board sends with or without FoGNet,
+//! and through FoGNet alone, to correct the turns of the sequence.
+
+use crate::sequence::{Sequence, Step};
+use crate::simulate::Layout;
+use gyronet::bias::Latitude;
+use gyronet::coprocessor::{Clock, Config, Coprocessor, Sink, TimedFrame};
+use gyronet::estimate::YawEstimate;
+use gyronet::fog::{
+    FogConfig, FogCorrector, FogCounters, FogErrors, FogNetUse, GyroMismatch, check_training,
+};
+use gyronet::model::fognet::MinuteNetwork;
+use gyronet::model::fognet_blob::{Gyro, Training};
+use gyronet::model::seconds::FogFrame;
+use gyronet::model::window::Features;
+use gyronet::sample::{FogSample, ImuSample, PERIOD_US, RATE_HZ, Validity};
+use gyronet::units::{Angle, AngularRate, Micros, SpecificForce, WheelSpeed};
+use gyronet_tools::drive::DT;
+use gyronet_tools::drive::wheel_frames;
+
+/// Number of steps of static initialisation: 3 s.
+const STATIC_STEPS: usize = 300;
+
+/// Holds the results of FoGNet on a sequence.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FogReplay {
+    /// Corrected turn of each step, rad.
+    pub turns: Vec<f64>,
+    /// Steps with a correction.
+    pub corrected: u64,
+    /// Number of windows that FoGNet estimated.
+    pub windows: u64,
+    /// Input values that were clamped.
+    pub clamped_inputs: u64,
+    /// Estimates that were rejected as implausible.
+    pub implausible: u64,
+    /// Windows broken by a gap.
+    pub broken: u64,
+}
+
+/// Runs a sequence through FoGNet alone.
+pub fn run(sequence: &Sequence, network: &mut impl MinuteNetwork, config: FogConfig) -> FogReplay {
+    let inertial = features(sequence);
+    let mut corrector = FogCorrector::new(config);
+    let mut drive = FogReplay::default();
+    for (step, inertial) in sequence.steps.iter().zip(inertial) {
+        let wheels = step.wheels.map(|way| {
+            let speed = way * f64::from(RATE_HZ) * f64::from(1u32 << WheelSpeed::FRACTION_BITS);
+            // The cast saturates only beyond the speed of sound.
+            WheelSpeed(speed.round() as i32)
+        });
+        let frame = FogFrame {
+            turn: Some(angle(step.fog)),
+            inertial: inertial.filter(|_| !step.imu_gap),
+            wheels: Some(wheels),
+        };
+        let output = corrector.correct(&frame);
+        if let (Some(number), Some(window)) = (output.due, corrector.window()) {
+            let estimate = network.estimate(&window);
+            drive.windows += 1;
+            drive.clamped_inputs += u64::from(estimate.clamped_inputs);
+            corrector.deliver(number, estimate);
+        }
+        drive.turns.push(output.turn.map_or(0.0, Angle::rad));
+        drive.corrected += u64::from(output.corrected);
+        drive.implausible += u64::from(output.implausible.is_some());
+        drive.broken += u64::from(output.broken.is_some());
+    }
+    drive
+}
+
+/// Returns the default configuration for a sequence's gyro and latitude.
+#[must_use]
+pub fn default_config(sequence: &Sequence) -> FogConfig {
+    let errors = match sequence.layout {
+        Layout::Kaist => FogErrors::DSP1760,
+        Layout::Nclt => FogErrors::DSP3000,
+    };
+    let latitude = Latitude::from_degrees(sequence.latitude_deg() as f32);
+    FogConfig { errors, latitude, ..FogConfig::DEFAULT }
+}
+
+/// Checks that weights are for the gyro of a sequence. A simulated gyro has its device number as serial number; a
+/// recorded gyro is assumed to have the serial number that the weights name.
+///
+/// # Errors
+/// [`GyroMismatch`].
+pub fn check_weights(sequence: &Sequence, trained: Training) -> Result<(), GyroMismatch> {
+    let part = match sequence.layout {
+        Layout::Kaist => Gyro::Dsp1760,
+        Layout::Nclt => Gyro::Dsp3000,
+    };
+    let serial = sequence.simulated.as_ref().map_or(trained.serial, |spec| spec.device as u32);
+    check_training(trained, part, serial, FogNetUse::Simulated)
+}
+
+/// Runs a sequence through the coprocessor, with wheel speeds in frames as the board receives them, and with FoGNet
+/// if it is given. Returns the rate sent for each step (zero for the first, whose begin no sample marks), and the
+/// counters.
+#[must_use]
+pub fn run_board(
+    sequence: &Sequence,
+    config: FogConfig,
+    mut fognet: Option<&mut dyn MinuteNetwork>,
+) -> (Vec<YawEstimate>, FogCounters) {
+    let mut coprocessor = Coprocessor::new(Config {
+        fog: FogConfig {
+            fognet: if fognet.is_some() { FogNetUse::Simulated } else { FogNetUse::Off },
+            ..config
+        },
+        wheels: Some(wheel_frames::receiver()),
+        has_fognet: fognet.is_some(),
+        has_gyronet: false,
+        clock: Clock::Sensor,
+        ..Config::DEFAULT
+    });
+    let mut way = [0.0; 2];
+    let mut sent = Rates(vec![YawEstimate::default(); sequence.steps.len()]);
+    for (number, step) in sequence.steps.iter().enumerate() {
+        let time = Micros((number as u64 + 1) * PERIOD_US);
+        for (way, of_step) in way.iter_mut().zip(step.wheels) {
+            *way += of_step;
+        }
+        if number % wheel_frames::FRAME_ROWS == 0 {
+            let [left, right] = way.map(|way| Some(way.abs() / (wheel_frames::FRAME_ROWS as f64 * DT) * 3.6));
+            way = [0.0; 2];
+            if let Some(frame) = wheel_frames::frame([left, right, left, right]) {
+                // A speed that does not fit a frame gives no frame, so the wheels are silent.
+                let _ = coprocessor.can(&frame, time);
+            }
+        }
+        if let Some([fx, fy, fz, rx, ry, rz]) = codes(step).filter(|_| !step.imu_gap) {
+            let sample = ImuSample {
+                time,
+                specific_force: [fx, fy, fz].map(SpecificForce),
+                angular_rate: [rx, ry, rz].map(AngularRate),
+                temperature: None,
+                validity: Validity::Good,
+            };
+            // Times ascend, so no sample is refused.
+            let _ = coprocessor.imu(sample, time, &mut ());
+        }
+        let increment = [None, None, Some(angle(step.fog))];
+        let sample = FogSample { time, span: PERIOD_US as u32, lost: 0, increment, temperature: None };
+        let _ = coprocessor.fog(sample, time, &mut sent);
+        if let (Some(network), Some((number, window))) = (&mut fognet, coprocessor.fog_window()) {
+            let estimate = network.estimate(&window);
+            // The estimate is in time, so it is not refused.
+            let _ = coprocessor.deliver_fog(number, estimate);
+        }
+    }
+    (sent.0, *coprocessor.fog_counters())
+}
+
+/// The rate that is sent for each step.
+struct Rates(Vec<YawEstimate>);
+
+impl Sink for Rates {
+    const TAKES_FRAMES: bool = false;
+
+    fn frame(&mut self, _frame: TimedFrame) {}
+
+    fn fog_rate(&mut self, rate: &YawEstimate) {
+        // Grid step 1 is that of the first row.
+        let place = (rate.tick as usize).checked_sub(1).and_then(|row| self.0.get_mut(row));
+        place.into_iter().for_each(|place| *place = *rate);
+    }
+}
+
+/// Returns the sequence with the Earth's rate and the bias subtracted from the gyro, as the board computes it and
+/// FoGNet receives it.
+#[must_use]
+pub fn after_lane(sequence: &Sequence) -> Sequence {
+    let (sent, _) = run_board(sequence, default_config(sequence), None);
+    let mut corrected = sequence.clone();
+    for (step, sent) in corrected.steps.iter_mut().zip(sent) {
+        step.fog = sent.rate.rad_per_sec() * DT;
+    }
+    corrected
+}
+
+/// Returns the inertial sensor's reading in codes; `None` if it is beyond the range of all parts.
+fn codes(step: &Step) -> Option<Features> {
+    let [fx, fy, fz] = step.specific_force.map(|f| SpecificForce::from_metre_per_sec2(f).ok());
+    let [rx, ry, rz] = step.angular_rate.map(|rate| AngularRate::from_rad_per_sec(rate).ok());
+    Some([fx?.0, fy?.0, fz?.0, rx?.0, ry?.0, rz?.0])
+}
+
+/// Returns the inertial sensor's features of each step, with the gyro's mean over the first 3 s subtracted; `None`
+/// for a reading beyond the range of all parts.
+fn features(sequence: &Sequence) -> Vec<Option<Features>> {
+    let mut features: Vec<Option<Features>> = sequence.steps.iter().map(codes).collect();
+    let first = || features.iter().take(STATIC_STEPS).flatten();
+    let count = first().count().max(1) as i64;
+    let bias: [i64; 3] = std::array::from_fn(|axis| {
+        first().map(|features| i64::from(features[3 + axis])).sum::<i64>() / count
+    });
+    for features in features.iter_mut().flatten() {
+        for (rate, bias) in features[3..].iter_mut().zip(bias) {
+            *rate = (i64::from(*rate) - bias).clamp(i32::MIN.into(), i32::MAX.into()) as i32;
+        }
+    }
+    features
+}
+
+/// Returns the nearest code of an angle in rad; an f64 has more bits than the gyro.
+fn angle(rad: f64) -> Angle {
+    Angle((rad * f64::from(Angle::PER_RAD)).round() as i64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::{self, Layout, Spec};
+    use gyronet::model::fognet::FogEstimate;
+    use gyronet::model::seconds::SecondsWindow;
+
+    /// Estimates a constant bias and no other error.
+    struct Bias;
+
+    impl MinuteNetwork for Bias {
+        fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {
+            assert_eq!(window.iter().count(), 60);
+            FogEstimate { correction: angle(6e-4), linear: Angle::ZERO, gain: 0, clamped_inputs: 0 }
+        }
+    }
+
+    #[test]
+    fn a_constant_bias_comes_off_every_corrected_step() {
+        let folder = tempfile::tempdir().unwrap();
+        let spec =
+            Spec { layout: Layout::Kaist, name: String::from("short"), seconds: 40, device: 1, run: 1 };
+        simulate::write(&spec, folder.path()).unwrap();
+        let sequence = Sequence::read(folder.path()).unwrap();
+        let fog = run(&sequence, &mut Bias, FogConfig::DEFAULT);
+        assert_eq!((fog.windows, fog.broken), (39, 0));
+        let raw: f64 = sequence.steps.iter().map(|step| step.fog).sum();
+        // 1e-7 rad in each corrected step, whatever the gyro reads.
+        let taken = 1e-7 * fog.corrected as f64;
+        let off = raw - fog.turns.iter().sum::<f64>();
+        assert!((off - taken).abs() < 1e-9 && fog.corrected > 3_000, "{off} {taken}");
+    }
+}

@@ -1,0 +1,342 @@
+//! This module reads sequences of KAIST Complex Urban and NCLT, real or simulated: it merges several files of different
+//! rates into one drive on a 100 Hz grid.
+//!
+//! Files are read in parallel, one row at a time: an hour of a 1 kHz gyro needs no more memory than its 100 Hz steps.
+//! The grid begins with the first row of the inertial sensor for which all other files have data, and ends where the
+//! first file ends. Values in between are interpolated linearly. Angles of the gyro and distances of the wheels are
+//! interpolated as sums, so that nothing is lost or counted twice.
+
+mod export;
+mod kaist;
+mod nclt;
+mod rows;
+mod summary;
+mod track;
+mod utm;
+
+pub use export::{HEADER, write_csv, write_whole};
+pub(super) use kaist::yaw;
+pub use summary::{Seen, Spread, StreamSummary};
+
+use crate::simulate::{Layout, MARKER, Spec};
+use gyronet::bias::STATIC_SAMPLES;
+use gyronet::sample::{ImuSample, PERIOD_US, Validity};
+use gyronet::units::{AngularRate, Micros, SpecificForce};
+use gyronet_tools::drive::DT;
+use gyronet_tools::drive::error::{DataError, DataFault};
+use gyronet_tools::drive::recording::{Recording, Row as RecordingRow};
+use gyronet_tools::drive::vehicle::Vehicle;
+use std::fs;
+use std::path::{Path, PathBuf};
+use track::Stream;
+
+/// A value interpolated across a longer gap than this is marked, s.
+pub const MAX_GAP: f64 = 0.1;
+/// Largest distance that the wheels may roll during static initialisation, m.
+const STANDING: f64 = 0.01;
+/// Minimum length of a sequence, s: static initialisation and one second.
+const NEEDED: f64 = 4.0;
+
+/// A step of the grid. Axes are x forward, y left, z up; heading is counter-clockwise from east.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Specific force, m/s^2.
+    pub specific_force: [f32; 3],
+    /// Angular rate, rad/s.
+    pub angular_rate: [f32; 3],
+    /// True if the inertial sensor was silent around this step for longer than [`MAX_GAP`].
+    pub imu_gap: bool,
+    /// True if the fibre-optic gyro, the wheels or the truth were silent around this step for longer than
+    /// [`MAX_GAP`].
+    pub other_gap: bool,
+    /// Angle turned since the previous step by the fibre-optic gyro, rad.
+    pub fog: f64,
+    /// Distances of the left and the right wheel since the previous step, m.
+    pub wheels: [f64; 2],
+    /// True position relative to the first step, m, east and north.
+    pub position: [f64; 2],
+    /// True heading, not wrapped, rad.
+    pub yaw: f64,
+    /// Heading by the filter of the inertial sensor's vendor, not wrapped, rad.
+    pub vendor_yaw: f64,
+}
+
+/// Holds a drive on the 100 Hz grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sequence {
+    /// Name of the sequence's folder.
+    pub name: String,
+    /// Path of the sequence's folder.
+    pub path: PathBuf,
+    /// The data set whose layout the files have.
+    pub layout: Layout,
+    /// The specification of a simulated sequence; `None` for a recorded one.
+    pub simulated: Option<Spec>,
+    /// Says whether [`Step::specific_force`] and [`Step::angular_rate`] were measured; otherwise they are zero.
+    pub has_gyro: bool,
+    /// Says whether [`Step::vendor_yaw`] comes from a vendor's filter.
+    pub has_vendor: bool,
+    /// Distance between the left and the right wheel, m, if the data contain it.
+    pub wheel_base: Option<f64>,
+    /// Latitude of the first pose, deg, if poses are in UTM.
+    pub latitude: Option<f64>,
+    /// The time of the first step, s since 1970.
+    pub start_s: f64,
+    /// Position of the first step in the truth's frame, m, east and north.
+    pub origin: [f64; 2],
+    /// The steps, 10 ms apart.
+    pub steps: Vec<Step>,
+    /// Numbers of steps in a gap of the inertial sensor, the gyro, the wheels and the truth.
+    pub in_gap: [u64; 4],
+    /// The summaries of the files: inertial sensor, gyro, wheels, truth.
+    pub files: [StreamSummary; 4],
+}
+
+/// Holds the open files of either layout.
+struct Files {
+    /// Time zero of the streams, s since 1970.
+    epoch_s: f64,
+    imu: Box<dyn Stream<7>>,
+    fog: Box<dyn Stream<1>>,
+    wheels: Box<dyn Stream<2>>,
+    truth: Box<dyn Stream<3>>,
+    has_gyro: bool,
+    has_vendor: bool,
+    wheel_base: Option<f64>,
+}
+
+/// Returns the data set whose layout a folder has.
+///
+/// # Errors
+/// [`DataFault::UnknownLayout`], or [`DataFault::Io`] if there is no folder.
+pub fn layout(folder: &Path) -> Result<Layout, DataError> {
+    if folder.join("sensor_data").is_dir() {
+        Ok(Layout::Kaist)
+    } else if folder.join("kvh.csv").is_file() || folder.join("ms25.csv").is_file() {
+        Ok(Layout::Nclt)
+    } else {
+        let fault = fs::metadata(folder).map_or_else(DataFault::Io, |_| DataFault::UnknownLayout);
+        Err(DataError::of(folder.display(), fault))
+    }
+}
+
+/// Finds the sequences of a folder: the folder itself, or the folders directly below it, sorted by name.
+///
+/// # Errors
+/// [`DataError`] if neither is a sequence.
+pub fn find(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
+    if layout(folder).is_ok() {
+        return Ok(vec![folder.to_owned()]);
+    }
+    let error = |fault| DataError::of(folder.display(), fault);
+    let entries = fs::read_dir(folder).map_err(|source| error(source.into()))?;
+    let mut found: Vec<PathBuf> = entries
+        .filter_map(|entry| entry.ok().map(|e| e.path()))
+        .filter(|path| layout(path).is_ok())
+        .collect();
+    found.sort();
+    if found.is_empty() { Err(error(DataFault::UnknownLayout)) } else { Ok(found) }
+}
+
+impl Sequence {
+    /// Reads the sequence in a folder.
+    ///
+    /// # Errors
+    /// [`DataError`], which names the file and, where there is one, the line.
+    pub fn read(folder: &Path) -> Result<Self, DataError> {
+        let layout = layout(folder)?;
+        let simulated = marker(folder)?;
+        let mut files = match layout {
+            Layout::Kaist => kaist::open(folder)?,
+            Layout::Nclt => nclt::open(folder)?,
+        };
+        // The heading beside the sensor's data in a simulated sequence does not come from a vendor's filter.
+        let has_vendor = files.has_vendor && simulated.is_none();
+        let begin = files.begin()?;
+        let mut steps = Vec::new();
+        let mut in_gap = [0; 4];
+        let mut last = None;
+        while let Some((now, gaps)) = files.at(begin + steps.len() as f64 * DT)? {
+            for (count, gap) in in_gap.iter_mut().zip(gaps) {
+                *count += u64::from(gap);
+            }
+            steps.push(now.step(last.as_ref().unwrap_or(&now), gaps));
+            last = Some(now);
+        }
+        let seconds = steps.len() as f64 * DT;
+        if seconds < NEEDED {
+            let fault = DataFault::TooLittleInCommon { seconds, needed: NEEDED };
+            return Err(DataError::of(folder.display(), fault));
+        }
+        let [x, y] = steps.first().map_or([0.0; 2], |step: &Step| step.position);
+        let latitude = (layout == Layout::Kaist).then(|| utm::latitude_deg([x, y])).flatten();
+        for step in &mut steps {
+            step.position = [step.position[0] - x, step.position[1] - y];
+        }
+        let (wheel_base, has_gyro, start_s) = (files.wheel_base, files.has_gyro, files.epoch_s + begin);
+        let Files { imu, fog, wheels, truth, .. } = files;
+        let files = [imu.finish()?, fog.finish()?, wheels.finish()?, truth.finish()?];
+        let name = folder.canonicalize().ok().and_then(|path| Some(path.file_name()?.to_str()?.to_owned()));
+        let name = name.unwrap_or_else(|| folder.display().to_string());
+        let path = folder.to_owned();
+        Ok(Self {
+            name,
+            path,
+            layout,
+            simulated,
+            has_gyro,
+            has_vendor,
+            wheel_base,
+            latitude,
+            start_s,
+            origin: [x, y],
+            steps,
+            in_gap,
+            files,
+        })
+    }
+
+    /// Returns the length of the sequence, s.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.steps.len() as f64 * DT
+    }
+
+    /// Returns the latitude for the Earth's rate: that of the simulation, or of the place where the data set was
+    /// recorded.
+    #[must_use]
+    pub fn latitude_deg(&self) -> f64 {
+        let made = self.layout.vehicle().world.latitude_deg;
+        // A simulated world rotates as at the latitude of its settings, whatever the position of its map.
+        self.latitude.filter(|_| self.simulated.is_none()).unwrap_or(made)
+    }
+
+    /// Returns the true change of heading in each step, rad; zero in the first.
+    #[must_use]
+    pub fn turns(&self) -> Vec<f64> {
+        let first = self.steps.first().map_or(0.0, |step| step.yaw);
+        let mut last = first;
+        self.steps.iter().map(|step| step.yaw - std::mem::replace(&mut last, step.yaw)).collect()
+    }
+
+    /// Returns the rates of the left and the right wheel in a step, rad/s, by the wheel radius of the data set's
+    /// vehicle.
+    #[must_use]
+    pub fn wheel_rates(&self, step: &Step) -> [f64; 2] {
+        let radius = self.layout.vehicle().world.car.wheel_radius;
+        step.wheels.map(|way| way / DT / radius)
+    }
+
+    /// Converts the drive to a recording, as the other commands use it. Steps in a gap of the inertial sensor are left
+    /// out, because a board would not receive them. The wheels become the rear right and rear left ones.
+    ///
+    /// # Errors
+    /// [`DataFault::NoGyro`].
+    pub fn recording(&self) -> Result<Recording, DataError> {
+        self.needs_gyro()?;
+        let turns = self.turns();
+        let steps = self.steps.iter().zip(&turns).enumerate().filter(|(_, (step, _))| !step.imu_gap);
+        let rows = steps.filter_map(|(k, (step, turn))| {
+            let [fx, fy, fz] = step.specific_force.map(SpecificForce::from_metre_per_sec2);
+            let [wx, wy, wz] = step.angular_rate.map(AngularRate::from_rad_per_sec);
+            let sample = ImuSample {
+                time: Micros(k as u64 * PERIOD_US),
+                // A reading beyond the range of all parts gives no sample, and the pipeline counts a gap.
+                specific_force: [fx.ok()?, fy.ok()?, fz.ok()?],
+                angular_rate: [wx.ok()?, wy.ok()?, wz.ok()?],
+                temperature: None,
+                validity: Validity::Good,
+            };
+            let [left, right] = self.wheel_rates(step).map(Some);
+            let wheels = [None, right, None, left];
+            let reference = Some(turn / DT);
+            Some(RecordingRow { line: k as u64 + 1, sample, reference, course: None, wheels })
+        });
+        let path = self.path.display().to_string();
+        Ok(Recording { path, rows: rows.collect(), missing: 0, vehicle: Vehicle::default() })
+    }
+
+    /// Checks that the vehicle stands during static initialisation.
+    ///
+    /// # Errors
+    /// [`DataFault::Rolling`].
+    pub fn needs_standstill(&self) -> Result<(), DataError> {
+        let steps = self.steps.iter().take(STATIC_SAMPLES as usize);
+        let metres = steps.map(|step| (step.wheels[0] + step.wheels[1]) / 2.0).sum::<f64>().abs();
+        let fault = DataFault::Rolling { metres, most: STANDING };
+        if metres > STANDING { Err(DataError::of(self.path.display(), fault)) } else { Ok(()) }
+    }
+
+    /// Checks that the sequence has an inertial sensor.
+    ///
+    /// # Errors
+    /// [`DataFault::NoGyro`].
+    pub fn needs_gyro(&self) -> Result<(), DataError> {
+        self.has_gyro.then_some(()).ok_or_else(|| DataError::of(self.path.display(), DataFault::NoGyro))
+    }
+}
+
+/// Holds the values of all files at one time.
+#[derive(Debug, Clone, Copy)]
+struct Values {
+    imu: [f64; 7],
+    fog: f64,
+    wheels: [f64; 2],
+    truth: [f64; 3],
+}
+
+impl Values {
+    fn step(&self, last: &Self, [imu_gap, others @ ..]: [bool; 4]) -> Step {
+        let [fx, fy, fz, wx, wy, wz, vendor_yaw] = self.imu;
+        let [x, y, yaw] = self.truth;
+        Step {
+            specific_force: [fx, fy, fz].map(|value| value as f32),
+            angular_rate: [wx, wy, wz].map(|value| value as f32),
+            imu_gap,
+            other_gap: others.contains(&true),
+            fog: self.fog - last.fog,
+            wheels: [self.wheels[0] - last.wheels[0], self.wheels[1] - last.wheels[1]],
+            position: [x, y],
+            yaw,
+            vendor_yaw,
+        }
+    }
+}
+
+impl Files {
+    /// Returns the time of the first row of the inertial sensor for which all files have data.
+    fn begin(&mut self) -> Result<f64, DataError> {
+        let others = [self.fog.first(), self.wheels.first(), self.truth.first()];
+        let begin = others.into_iter().fold(self.imu.first(), f64::max);
+        self.imu.at(begin)?;
+        Ok(self.imu.reached().max(begin))
+    }
+
+    /// Returns the values at a time, and which of them are in a gap; `None` if a file has ended.
+    fn at(&mut self, time: f64) -> Result<Option<(Values, [bool; 4])>, DataError> {
+        let Some(imu) = self.imu.at(time)? else { return Ok(None) };
+        let Some(fog) = self.fog.at(time)? else { return Ok(None) };
+        let Some(wheels) = self.wheels.at(time)? else { return Ok(None) };
+        let Some(truth) = self.truth.at(time)? else { return Ok(None) };
+        let gaps = [imu.gap, fog.gap, wheels.gap, truth.gap].map(|gap| gap > MAX_GAP);
+        let [fog] = fog.values;
+        Ok(Some((Values { imu: imu.values, fog, wheels: wheels.values, truth: truth.values }, gaps)))
+    }
+}
+
+/// Reads the specification of a simulated sequence; `None` for a recorded one.
+///
+/// # Errors
+/// [`DataError`].
+fn marker(folder: &Path) -> Result<Option<Spec>, DataError> {
+    let path = folder.join(MARKER);
+    let error = |fault| DataError::of(path.display(), fault);
+    match fs::read(&path) {
+        Ok(bytes) => serde_json::from_slice(&bytes).map(Some).map_err(|source| error(source.into())),
+        Err(source) if source.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(error(source.into())),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,131 @@
+//! This module reads rows of numbers from a file without a header, one row at a time. A row is a stamp and fields.
+
+use super::summary::StreamSummary;
+use csv::ByteRecord;
+use gyronet_tools::drive::error::{DataError, DataFault, ValueError};
+use std::fs::File;
+use std::path::Path;
+
+/// A value beyond this is refused: UTM coordinates are about 4e6 m, and no sensor reads as much.
+const MAX_VALUE: f64 = 1e12;
+/// A file with a longer gap is not a single drive, s.
+const MAX_SILENCE: f64 = 600.0;
+
+/// Describes the format of a file.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Format<const N: usize> {
+    /// Number of columns, including that of the stamp.
+    pub columns: usize,
+    /// Indices of the used columns; the stamp is column 0.
+    pub used: [usize; N],
+    /// Stamp units per second.
+    pub stamps_per_second: f64,
+    /// The nominal number of samples per second.
+    pub nominal_hz: f64,
+}
+
+/// Holds a row: its stamp, and the used fields.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row<const N: usize> {
+    pub line: u64,
+    pub stamp: i64,
+    pub fields: [f64; N],
+}
+
+/// Reads a file row by row.
+pub(super) struct Rows<const N: usize> {
+    path: String,
+    format: Format<N>,
+    csv: csv::Reader<File>,
+    record: ByteRecord,
+    last: Option<i64>,
+    pub summary: StreamSummary,
+}
+
+impl<const N: usize> Rows<N> {
+    pub fn open(path: &Path, format: Format<N>) -> Result<Self, DataError> {
+        let name = path.display().to_string();
+        let file = File::open(path).map_err(|source| DataError::open(&name, source))?;
+        let csv = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .buffer_capacity(1 << 16)
+            .from_reader(file);
+        let summary = StreamSummary::new(path, format.stamps_per_second, format.nominal_hz);
+        let record = ByteRecord::new();
+        Ok(Self { path: name, format, csv, record, last: None, summary })
+    }
+
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// Converts stamps to seconds.
+    pub fn seconds(&self, stamps: i64) -> f64 {
+        stamps as f64 / self.format.stamps_per_second
+    }
+
+    /// Returns the next good row. Skipped rows are counted in the summary.
+    pub fn next_row(&mut self) -> Result<Option<Row<N>>, DataError> {
+        loop {
+            let io = |error: csv::Error| DataError::of(&self.path, std::io::Error::other(error).into());
+            if !self.csv.read_byte_record(&mut self.record).map_err(io)? {
+                return Ok(None);
+            }
+            let line = self.record.position().map_or(0, csv::Position::line);
+            let found = self.record.len();
+            if found != self.format.columns {
+                let fault = DataFault::Columns { found, expected: self.format.columns };
+                return Err(DataError::at(&self.path, line, fault));
+            }
+            let stamp: i64 = self.field(line, 0)?;
+            if stamp < 0 {
+                return Err(self.value(line, 0, ValueError::OutOfRange));
+            }
+            let mut fields = [0.0_f64; N];
+            for (field, column) in fields.iter_mut().zip(self.format.used) {
+                *field = self.field(line, column)?;
+            }
+            if fields.iter().any(|field| !field.is_finite()) {
+                self.summary.not_finite.count(line);
+                continue;
+            }
+            if let Some(k) = fields.iter().position(|field| field.abs() > MAX_VALUE) {
+                return Err(self.value(line, self.format.used[k], ValueError::OutOfRange));
+            }
+            if let Some(last) = self.last {
+                if stamp == last {
+                    self.summary.duplicates.count(line);
+                    continue;
+                }
+                if stamp < last {
+                    return Err(DataError::at(&self.path, line, DataFault::Backwards { last, at: stamp }));
+                }
+                let seconds = self.seconds(stamp - last);
+                if seconds > MAX_SILENCE {
+                    let fault = DataFault::Silent { seconds, most: MAX_SILENCE };
+                    return Err(DataError::at(&self.path, line, fault));
+                }
+            }
+            self.last = Some(stamp);
+            self.summary.row(stamp);
+            return Ok(Some(Row { line, stamp, fields }));
+        }
+    }
+
+    fn field<T: std::str::FromStr>(&self, line: u64, column: usize) -> Result<T, DataError> {
+        let text = std::str::from_utf8(self.bytes(column)).unwrap_or_default();
+        let error = if self.bytes(column).is_empty() { ValueError::Empty } else { ValueError::NotANumber };
+        text.parse().map_err(|_| self.value(line, column, error))
+    }
+
+    fn bytes(&self, column: usize) -> &[u8] {
+        self.record.get(column).unwrap_or_default()
+    }
+
+    fn value(&self, line: u64, column: usize, error: ValueError) -> DataError {
+        let text = String::from_utf8_lossy(self.bytes(column));
+        DataError::value(&self.path, line, column + 1, &text, error)
+    }
+}

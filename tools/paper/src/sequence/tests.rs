@@ -1,0 +1,308 @@
+use super::*;
+use crate::simulate;
+use tempfile::{TempDir, tempdir};
+
+/// A sequence in its own folder.
+struct Scratch(TempDir);
+
+impl Scratch {
+    fn new(name: &str, layout: Layout, seconds: u32) -> Self {
+        let folder = tempdir().unwrap();
+        let spec = Spec { layout, name: name.into(), seconds, device: 1, run: 5 };
+        simulate::write(&spec, folder.path()).unwrap();
+        Self(folder)
+    }
+
+    /// Changes the lines of a file.
+    fn edit(&self, file: &str, change: impl FnOnce(&mut Vec<String>)) {
+        let path = self.0.path().join(file);
+        let mut lines: Vec<String> = fs::read_to_string(&path).unwrap().lines().map(Into::into).collect();
+        change(&mut lines);
+        fs::write(path, lines.join("\n") + "\n").unwrap();
+    }
+
+    fn read(&self) -> Result<Sequence, DataError> {
+        Sequence::read(self.0.path())
+    }
+
+    fn error(&self) -> String {
+        self.read().unwrap_err().to_string()
+    }
+}
+
+const FOG: &str = "sensor_data/fog.csv";
+const IMU: &str = "sensor_data/xsens_imu.csv";
+const ENCODER: &str = "sensor_data/encoder.csv";
+
+/// Replaces a field of a line.
+fn set(line: &mut String, column: usize, to: &str) {
+    let mut fields: Vec<&str> = line.split(',').collect();
+    fields[column] = to;
+    *line = fields.join(",");
+}
+
+#[test]
+fn kaist_is_read_whole() {
+    let scratch = Scratch::new("whole", Layout::Kaist, 60);
+    let sequence = scratch.read().unwrap();
+    assert!((sequence.seconds() - 60.0).abs() < 0.05, "{}", sequence.seconds());
+    assert_eq!(sequence.files.each_ref().map(|file| file.rows), [6_000, 60_000, 6_000, 6_000]);
+    assert_eq!(sequence.in_gap, [0; 4]);
+    assert_eq!(sequence.simulated.as_ref().map(|spec| spec.run), Some(5));
+    assert!(!sequence.has_vendor, "the heading of a simulation is no vendor's");
+    // The gyro's turn is the sum of its file.
+    let text = fs::read_to_string(scratch.0.path().join(FOG)).unwrap();
+    let all: f64 = text.lines().map(|l| l.rsplit(',').next().unwrap().parse::<f64>().unwrap()).sum();
+    let steps: f64 = sequence.steps.iter().map(|step| step.fog).sum();
+    assert!((all - steps).abs() < 2e-4, "but for both ends: {all} {steps}");
+    // The truth turns as much as the inertial sensor's gyro, except for bias and noise.
+    let truth = sequence.steps[5_900].yaw - sequence.steps[0].yaw;
+    let fog: f64 = sequence.steps[1..=5_900].iter().map(|step| step.fog).sum();
+    assert!((truth - fog).abs() < 0.01, "{truth} {fog}");
+    let gyro: f64 = sequence.steps[1..=5_900].iter().map(|step| f64::from(step.angular_rate[2]) * DT).sum();
+    assert!((truth - gyro).abs() < 0.6, "{truth} {gyro}");
+    let way: f64 = sequence.steps.iter().map(|step| (step.wheels[0] + step.wheels[1]) / 2.0).sum();
+    assert!(way > 50.0, "{way}");
+}
+
+#[test]
+fn nclt_turns_into_the_axes_of_kaist() {
+    let scratch = Scratch::new("nclt", Layout::Nclt, 120);
+    let sequence = scratch.read().unwrap();
+    let last = sequence.steps.len() - 1;
+    let truth = sequence.steps[last].yaw - sequence.steps[0].yaw;
+    let fog: f64 = sequence.steps[1..].iter().map(|step| step.fog).sum();
+    let gyro: f64 = sequence.steps[1..].iter().map(|step| f64::from(step.angular_rate[2]) * DT).sum();
+    assert!((truth - fog).abs() < 0.05 && (truth - gyro).abs() < 0.8, "{truth} {fog} {gyro}");
+    let up = sequence.steps.iter().map(|step| f64::from(step.specific_force[2])).sum::<f64>() / last as f64;
+    assert!((up - 9.8).abs() < 0.1, "{up}");
+    let ways = sequence.steps.iter().map(|step| (step.wheels[0] + step.wheels[1]) / 2.0);
+    let moved: f64 = ways.sum();
+    let length: f64 = sequence
+        .steps
+        .windows(2)
+        .map(|pair| {
+            let [x, y] = [0, 1].map(|k| pair[1].position[k] - pair[0].position[k]);
+            (x * x + y * y).sqrt()
+        })
+        .sum();
+    assert!((moved / length - 1.0).abs() < 0.05, "{moved} {length}");
+}
+
+#[test]
+fn it_runs_as_a_recording() {
+    let scratch = Scratch::new("recording", Layout::Kaist, 30);
+    let sequence = scratch.read().unwrap();
+    let recording = sequence.recording().unwrap();
+    assert_eq!(recording.rows.len(), sequence.steps.len());
+    let mut csv = Vec::new();
+    write_csv(&sequence, &mut csv).unwrap();
+    let parsed = Recording::parse("a.csv", csv.as_slice()).unwrap();
+    for (a, b) in recording.rows.iter().zip(&parsed.rows) {
+        assert_eq!((a.sample, a.reference), (b.sample, b.reference));
+    }
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    for (layout, file) in [
+        (Layout::Kaist, IMU),
+        (Layout::Kaist, FOG),
+        (Layout::Kaist, ENCODER),
+        (Layout::Kaist, "global_pose.csv"),
+        (Layout::Kaist, "calibration/EncoderParameter.txt"),
+        (Layout::Nclt, "kvh.csv"),
+        (Layout::Nclt, "wheels.csv"),
+        (Layout::Nclt, "groundtruth_missing.csv"),
+    ] {
+        let scratch = Scratch::new("missing", layout, 10);
+        fs::remove_file(scratch.0.path().join(file)).unwrap();
+        let (error, name) = (scratch.error(), file.split(['_', '.']).next().unwrap());
+        assert!(error.contains(name) && error.ends_with(": missing"), "{error}");
+    }
+}
+
+#[test]
+fn columns_are_counted() {
+    let scratch = Scratch::new("columns", Layout::Kaist, 10);
+    scratch.edit(FOG, |lines| lines[41].push_str(",0.5"));
+    assert!(scratch.error().ends_with("fog.csv: line 42: 5 columns, expected 4"), "{}", scratch.error());
+    scratch.edit(FOG, |lines| lines[41] = lines[0].clone());
+    scratch.edit(IMU, |lines| lines[1].push_str(",0.5"));
+    assert!(scratch.error().ends_with("xsens_imu.csv: line 2: 18 columns, expected 17"));
+}
+
+#[test]
+fn the_early_sequences_have_no_gyro() {
+    let scratch = Scratch::new("early", Layout::Kaist, 10);
+    scratch.edit(IMU, |lines| {
+        for line in lines {
+            *line = line.split(',').take(8).collect::<Vec<_>>().join(",");
+        }
+    });
+    fs::remove_file(scratch.0.path().join(MARKER)).unwrap();
+    let sequence = scratch.read().unwrap();
+    assert!(!sequence.has_gyro && sequence.has_vendor && sequence.simulated.is_none());
+    let error = sequence.recording().unwrap_err().to_string();
+    assert!(error.ends_with("xsens_imu.csv has 8 columns: no gyro and no accelerometer"), "{error}");
+    let [first, last] = [&sequence.steps[0], &sequence.steps[sequence.steps.len() - 1]];
+    assert!((last.vendor_yaw - last.yaw - first.vendor_yaw + first.yaw).abs() < 0.1);
+}
+
+#[test]
+fn text_for_a_number_is_an_error() {
+    let scratch = Scratch::new("text", Layout::Kaist, 10);
+    scratch.edit(ENCODER, |lines| set(&mut lines[6], 2, "x7"));
+    assert!(scratch.error().ends_with("encoder.csv: line 7, column 3: \"x7\" is not a number"));
+    scratch.edit(ENCODER, |lines| set(&mut lines[6], 2, ""));
+    assert!(scratch.error().ends_with("encoder.csv: line 7, column 3: \"\" is empty"));
+    let scratch = Scratch::new("float-stamp", Layout::Kaist, 10);
+    scratch.edit(FOG, |lines| set(&mut lines[2], 0, "1.5e18"));
+    assert!(scratch.error().ends_with("fog.csv: line 3, column 1: \"1.5e18\" is not a number"));
+}
+
+#[test]
+fn time_must_not_go_back() {
+    let scratch = Scratch::new("back", Layout::Kaist, 10);
+    scratch.edit(FOG, |lines| lines.swap(500, 501));
+    let error = scratch.error();
+    assert!(error.contains("fog.csv: line 502: time goes backwards from 15240"), "{error}");
+}
+
+#[test]
+fn a_stamp_far_off_is_an_error_and_no_endless_grid() {
+    let scratch = Scratch::new("far", Layout::Kaist, 10);
+    scratch.edit("global_pose.csv", |lines| set(&mut lines[900], 0, "9223372036854775807"));
+    let error = scratch.error();
+    assert!(error.contains("global_pose.csv: line 901: silent for 76993720"), "{error}");
+    let scratch = Scratch::new("before", Layout::Kaist, 10);
+    scratch.edit(FOG, |lines| set(&mut lines[0], 0, "-9223372036854775808"));
+    let error = scratch.error();
+    assert!(
+        error.ends_with("fog.csv: line 1, column 1: \"-9223372036854775808\" is out of range"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_value_beyond_sense_is_an_error_and_no_nan() {
+    let scratch = Scratch::new("huge", Layout::Kaist, 10);
+    scratch.edit(FOG, |lines| {
+        for line in &mut lines[10..12] {
+            set(line, 3, "1.7e308");
+        }
+    });
+    assert!(scratch.error().ends_with("fog.csv: line 11, column 4: \"1.7e308\" is out of range"));
+}
+
+#[test]
+fn an_empty_file_is_an_error() {
+    let scratch = Scratch::new("empty", Layout::Kaist, 10);
+    fs::write(scratch.0.path().join(ENCODER), "").unwrap();
+    assert!(scratch.error().ends_with("encoder.csv: holds no samples"));
+    let scratch = Scratch::new("short", Layout::Kaist, 10);
+    scratch.edit(ENCODER, |lines| lines.truncate(200));
+    let error = scratch.error();
+    assert!(error.contains("in common, needed are 4 s"), "{error}");
+}
+
+#[test]
+fn a_bad_calibration_is_an_error() {
+    let scratch = Scratch::new("calibration", Layout::Kaist, 10);
+    scratch
+        .edit("calibration/EncoderParameter.txt", |lines| lines[2] = "Encoder left wheel diameter: 0".into());
+    assert!(scratch.error().ends_with("no usable parameter \"Encoder left wheel diameter\""));
+}
+
+#[test]
+fn nan_and_duplicates_are_counted_and_bridged() {
+    let scratch = Scratch::new("nan", Layout::Kaist, 20);
+    let whole = scratch.read().unwrap();
+    scratch.edit("global_pose.csv", |lines| {
+        set(&mut lines[99], 4, "nan");
+        set(&mut lines[100], 4, "inf");
+        let twice = lines[300].clone();
+        lines.insert(301, twice);
+    });
+    let sequence = scratch.read().unwrap();
+    let [.., pose] = &sequence.files;
+    assert_eq!((pose.not_finite.count, pose.not_finite.first_line), (2, Some(100)));
+    assert_eq!((pose.duplicates.count, pose.duplicates.first_line), (1, Some(302)));
+    assert_eq!(pose.gaps, 1, "30 ms");
+    let text = pose.to_string();
+    assert!(text.contains("2 rows with NaN skipped (first: line 100)"), "{text}");
+    assert!(text.contains("1 duplicate stamps skipped (first: line 302)"), "{text}");
+    assert_eq!(sequence.steps.len(), whole.steps.len());
+    // The NaN of the gyro loses no angle: the neighbouring rows contain it.
+    scratch.edit(FOG, |lines| set(&mut lines[0], 3, "NaN"));
+    assert_eq!(scratch.read().unwrap().files[1].not_finite.count, 1);
+}
+
+#[test]
+fn an_encoder_reset_is_counted_and_bridged() {
+    let scratch = Scratch::new("reset", Layout::Kaist, 60);
+    let way = |sequence: &Sequence| sequence.steps.iter().map(|step| step.wheels[0]).sum::<f64>();
+    let whole = way(&scratch.read().unwrap());
+    scratch.edit(ENCODER, |lines| {
+        let first: Vec<i64> = lines[4_000].split(',').skip(1).map(|f| f.parse().unwrap()).collect();
+        for line in &mut lines[4_000..] {
+            let fields: Vec<i64> = line.split(',').map(|f| f.parse().unwrap()).collect();
+            *line = format!("{},{},{}", fields[0], fields[1] - first[0], fields[2] - first[1]);
+        }
+    });
+    let sequence = scratch.read().unwrap();
+    let [_, _, encoder, _] = &sequence.files;
+    assert_eq!((encoder.resets.count, encoder.resets.first_line), (1, Some(4_001)));
+    assert!((way(&sequence) - whole).abs() < 0.05, "{} {whole}", way(&sequence));
+}
+
+#[test]
+fn a_silent_sensor_is_marked() {
+    let scratch = Scratch::new("silent", Layout::Kaist, 20);
+    scratch.edit(IMU, |lines| {
+        lines.drain(1_000..1_050);
+    });
+    let sequence = scratch.read().unwrap();
+    let marked = sequence.steps.iter().filter(|step| step.imu_gap).count();
+    assert!((50..=51).contains(&marked), "{marked}");
+    assert_eq!(sequence.in_gap[0], marked as u64);
+    assert_eq!(sequence.recording().unwrap().rows.len(), sequence.steps.len() - marked);
+}
+
+#[test]
+fn neither_data_set() {
+    let empty = tempdir().unwrap();
+    assert!(matches!(Sequence::read(empty.path()), Err(DataError { fault: DataFault::UnknownLayout, .. })));
+    assert!(matches!(find(empty.path()), Err(DataError { fault: DataFault::UnknownLayout, .. })));
+}
+
+#[test]
+fn a_training_drive_has_no_step_in_a_gap_and_no_start_on_the_move() {
+    let scratch = tempdir().unwrap();
+    let folder = scratch.path().join("urban06");
+    let spec = Spec { layout: Layout::Kaist, name: "urban06".into(), seconds: 60, device: 1, run: 1 };
+    simulate::write(&spec, &folder).unwrap();
+    let steps = Sequence::read(&folder).unwrap().steps.len();
+    let path = folder.join("sensor_data/encoder.csv");
+    let rows: Vec<String> = fs::read_to_string(&path).unwrap().lines().map(str::to_owned).collect();
+    let (stamp, _) = rows[1000].split_once(',').unwrap();
+    let odd = format!("{stamp},nan,nan");
+    // Half a second without wheels, a row that is not a number, and a repeated row.
+    let cut = [&rows[..1000], &[odd], &rows[1001..2000], &rows[1999..2000], &rows[2050..]].concat();
+    fs::write(&path, cut.join("\n")).unwrap();
+    let sequence = Sequence::read(&folder).unwrap();
+    sequence.needs_standstill().unwrap();
+    assert_eq!(
+        (sequence.steps.len(), sequence.files[2].duplicates.count, sequence.files[2].not_finite.count),
+        (steps, 1, 1)
+    );
+    let whole = write_whole(&sequence, std::io::sink()).unwrap() as usize;
+    assert!((steps - 53..=steps - 48).contains(&whole), "{whole} of {steps}");
+    assert_eq!(write_csv(&sequence, std::io::sink()).unwrap() as usize, steps);
+    let count = |row: &str| row.split(',').nth(1).unwrap().parse::<f64>().unwrap();
+    // The file now begins where the wheel has turned ten times: the vehicle is driving.
+    let driving = rows.iter().position(|row| (count(row) - count(&rows[0])).abs() > 40_960.0).unwrap();
+    fs::write(&path, rows[driving..].join("\n")).unwrap();
+    let error = Sequence::read(&folder).unwrap().needs_standstill().unwrap_err().to_string();
+    assert!(error.contains("urban06: starts moving: its wheels roll"), "{error}");
+}

@@ -1,0 +1,93 @@
+//! This module writes the layout of KAIST Complex Urban: no headers, nanoseconds since 1970.
+
+use super::delay::Delay;
+use super::text::Rows;
+use super::{Drive, Spec};
+use crate::simulate::odometer;
+use gyronet_tools::drive::DT;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// Start time of a sequence, in 2018.
+const START_NS: i64 = 1_524_000_000_000_000_000;
+/// Encoder counts per revolution.
+const RESOLUTION: f64 = 4096.0;
+/// Number of increments that the fibre-optic gyro sends in 10 ms.
+const INCREMENTS: u32 = 10;
+/// Start position of a sequence in UTM, m.
+const ORIGIN: [f64; 3] = [355_000.0, 4_025_000.0, 60.0];
+/// The Earth's magnetic field, east, north, up, normalised, and the noise of the magnetometer.
+const FIELD: ([f64; 3], f64) = ([0.0, 0.6, -0.8], 0.003);
+
+pub(super) fn write(spec: &Spec, mut drive: Drive, folder: &Path) -> io::Result<()> {
+    let vehicle = spec.layout.vehicle();
+    let data = folder.join("sensor_data");
+    fs::create_dir_all(&data)?;
+    calibration(&vehicle.wheels, &folder.join("calibration"))?;
+    let mut imu_rows = Rows::create(&data.join("xsens_imu.csv"))?;
+    let mut fog_rows = Rows::create(&data.join("fog.csv"))?;
+    let mut encoder_rows = Rows::create(&data.join("encoder.csv"))?;
+    let mut pose_rows = Rows::create(&folder.join("global_pose.csv"))?;
+    let [mut imu_delay, mut fog_delay, mut encoder_delay] =
+        [1, 2, 3].map(|stream| Delay::new(vehicle.delays, spec.run, stream));
+    let stamp = |seconds: f64| START_NS + (seconds * 1e9).round() as i64;
+    let mut heading = None;
+    for _ in 0..drive.ticks {
+        let Some(truth) = drive.world.next() else { break };
+        let motion = truth.motion;
+        let rate = gyronet_tools::simulate::add(truth.inertial_rate, truth.shake.angular_rate);
+        let span = DT / f64::from(INCREMENTS);
+        for k in 1..=INCREMENTS {
+            let time = truth.seconds + f64::from(k) * span;
+            let increment = drive.fog.increment(rate, span);
+            fog_rows.int(stamp(fog_delay.arrival(time))).singles(increment).end()?;
+        }
+        drive.fog.wander(DT);
+        drive.odometer.step(motion.speed, motion.acceleration, motion.heading_rate, DT);
+
+        let now = truth.seconds + DT;
+        let (force, rate) = drive.imu(&truth);
+        // The vendor's filter is unknown, so this heading is the integral of the gyro.
+        let yaw = heading.get_or_insert(truth.yaw);
+        *yaw += rate[2] * DT;
+        let attitude = [motion.roll, motion.pitch, *yaw];
+        let magnetic = drive.magnetic(&truth, FIELD.0, FIELD.1);
+        imu_rows.int(stamp(imu_delay.arrival(now))).singles(quaternion(attitude)).singles(attitude);
+        imu_rows.singles(rate).singles(force).singles(magnetic).end()?;
+
+        let counts = drive.odometer.turns().map(|turns| (turns * RESOLUTION).floor() as i64);
+        encoder_rows.int(stamp(encoder_delay.arrival(now))).int(counts[0]).int(counts[1]).end()?;
+
+        pose_rows.int(stamp(now));
+        for (row, place) in truth.rotation().iter().zip(0..3) {
+            pose_rows.doubles(*row).double(ORIGIN[place] + truth.position[place]);
+        }
+        pose_rows.end()?;
+    }
+    [imu_rows, fog_rows, encoder_rows, pose_rows].into_iter().try_for_each(Rows::finish)
+}
+
+fn calibration(wheels: &odometer::Config, folder: &Path) -> io::Result<()> {
+    fs::create_dir_all(folder)?;
+    let [left, right] = wheels.diameter;
+    let text = format!(
+        "Encoder calibrated parameter\nEncoder resolution: {RESOLUTION}\n\
+         Encoder left wheel diameter: {left}\nEncoder right wheel diameter: {right}\n\
+         Encoder wheel base: {}\n",
+        wheels.base
+    );
+    fs::write(folder.join("EncoderParameter.txt"), text)
+}
+
+/// Returns the quaternion x, y, z, w of roll, pitch and yaw, turned in the order yaw, pitch, roll.
+fn quaternion([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
+    let half = |angle: f64| (libm::sin(angle / 2.0), libm::cos(angle / 2.0));
+    let ((sr, cr), (sp, cp), (sy, cy)) = (half(roll), half(pitch), half(yaw));
+    [
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    ]
+}

@@ -1,0 +1,34 @@
+//! This module defines the estimate of a method on a sequence: the turns, and the source of the positions.
+
+use gyronet_tools::evaluate::methods::Method;
+use gyronet_tools::evaluate::trajectory_error::Point;
+
+/// The estimate of a method on a sequence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// The method.
+    pub method: Method,
+    /// Angle turned in each step, from the first compared step on, rad.
+    pub turns: Vec<f64>,
+    /// Source of the positions after these turns.
+    pub places: Places,
+    /// Run time on this machine, s, if it was measured.
+    pub run_time: Option<f64>,
+}
+
+/// The source of an estimate's positions.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Places {
+    /// Dead reckoning with the wheels' distances times a scale.
+    Reckoned {
+        /// The scale.
+        scale: f64,
+    },
+    /// A given trajectory: the position after each turn, relative to that of the first step, m.
+    Given(Vec<Point>),
+}
+
+impl Places {
+    /// Dead reckoning with the unscaled distances.
+    pub const RECKONED: Self = Self::Reckoned { scale: 1.0 };
+}

@@ -1,0 +1,226 @@
+//! This module runs the methods that the paper's tables compare: each computes from a sequence the angle turned in
+//! every 10 ms.
+//!
+//! The paper's vendor filter runs inside the sensor and is not available. If the data have no vendor's heading,
+//! [`Method::VQF`] replaces it: an orientation filter of the same kind (gyro integrated, levelled by the
+//! accelerometer, bias learnt at rest; Laidig and Seel, VQF, Information Fusion 91, 2023), without a magnetometer. It
+//! runs once with its published defaults, and once with rest thresholds that a standing vehicle with its engine
+//! running stays below.
+
+use super::estimate::{Estimate, Places};
+use super::given::Given;
+use super::joint::Joint;
+use crate::fog_replay;
+use crate::sequence::{self, Sequence};
+use crate::simulate::world::EARTH_RATE;
+use gyronet::bias::{STATIC_SAMPLES, StaticConfig};
+use gyronet::fog::FogConfig;
+use gyronet::model::WindowNetwork;
+use gyronet::model::fognet::MinuteNetwork;
+use gyronet::model::fognet_blob::Training;
+use gyronet::model::seconds::Padding;
+use gyronet::pipeline::PipelineConfig;
+use gyronet::sample::PERIOD_US;
+use gyronet::units::AngularRate;
+use gyronet_tools::drive::DT;
+use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::replay::{Replay, Step};
+use gyronet_tools::drive::wheel_frames::WheelFrames;
+use gyronet_tools::evaluate::fir::LowPass;
+use gyronet_tools::evaluate::methods::Method;
+use gyronet_tools::evaluate::vqf;
+use std::time::Instant;
+
+/// Holds the estimates of all methods on a sequence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimates {
+    /// Index of the first compared step, after static initialisation.
+    pub start: usize,
+    /// The estimates of the methods that could be run.
+    pub methods: Vec<Estimate>,
+    /// The methods whose given trajectory cannot be compared, with the reason.
+    pub left_out: Vec<(Method, String)>,
+    /// Text with the numbers of [`Method::FOG_WHEELS`] and the sequences that they were fitted to.
+    pub fitted: Option<String>,
+    /// The reasons why some methods could not be run.
+    pub refused: Option<String>,
+}
+
+/// Runs every method.
+pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork) -> Estimates {
+    let start = (STATIC_SAMPLES as usize).min(sequence.steps.len());
+    let mut estimates =
+        Estimates { start, methods: Vec::new(), left_out: Vec::new(), fitted: None, refused: None };
+    match sequence.recording() {
+        Ok(recording) => estimates.inertial(sequence, &recording, network),
+        Err(error) => estimates.refused = Some(error.to_string()),
+    }
+    if sequence.has_vendor {
+        estimates.add(Method::VENDOR, || rates(sequence.steps.iter().map(|step| step.vendor_yaw)));
+    }
+    if let Some(base) = sequence.wheel_base {
+        let turn = |step: &sequence::Step| (step.wheels[1] - step.wheels[0]) / base;
+        estimates.add(Method::WHEELS, || sequence.steps.iter().map(|step| turn(step) / DT).collect());
+    }
+    let fog: Vec<f64> = sequence.steps.iter().map(|step| step.fog / DT).collect();
+    estimates.add(Method::FOG, || fog.clone());
+    let earth = EARTH_RATE * libm::sin(sequence.latitude_deg().to_radians());
+    estimates.add(Method::FOG_EARTH, || fog.iter().map(|rate| rate - earth).collect());
+    estimates.add(Method::FOG_DEFAULT, || {
+        let (sent, _) = fog_replay::run_board(sequence, fog_replay::default_config(sequence), None);
+        sent.iter().map(|sent| sent.rate.rad_per_sec()).collect()
+    });
+    estimates
+}
+
+impl Estimates {
+    /// Adds the rates that the board sends with FoGNet, with and without padding, if there is an inertial sensor. The
+    /// board does not run weights for another gyro.
+    pub fn add_fognet(&mut self, sequence: &Sequence, network: &mut impl MinuteNetwork, trained: Training) {
+        if !sequence.has_gyro {
+            return;
+        }
+        let fits = fog_replay::check_weights(sequence, trained);
+        if let Err(error) = fits {
+            let before = self.refused.take().map(|before| before + "; ").unwrap_or_default();
+            self.refused = Some(format!("{before}FoGNet's weights were not run: {error}"));
+        }
+        for (method, padding) in
+            [(Method::FOGNET, FogConfig::DEFAULT.padding), (Method::FOGNET_NOPAD, Padding::None)]
+        {
+            let config = FogConfig { padding, ..fog_replay::default_config(sequence) };
+            let network: Option<&mut dyn MinuteNetwork> = if fits.is_ok() { Some(network) } else { None };
+            self.add(method, || {
+                let (sent, _) = fog_replay::run_board(sequence, config, network);
+                sent.iter().map(|sent| sent.rate.rad_per_sec()).collect()
+            });
+        }
+    }
+
+    /// Adds FoGNet on GyroNet's rate, if GyroNet was run.
+    pub fn add_pseudo_fog(&mut self, sequence: &Sequence, network: &mut impl MinuteNetwork) {
+        let looped = self.methods.iter().find(|estimate| estimate.method == Method::GYRONET_LOOP);
+        let Some((looped, looped_s)) = looped.and_then(|looped| Some((looped, looped.run_time?))) else {
+            return;
+        };
+        let mut sequence = sequence.clone();
+        for (step, turn) in sequence.steps.iter_mut().skip(self.start).zip(&looped.turns) {
+            step.fog = *turn;
+        }
+        let (drive, run_time) = timed(|| fog_replay::run(&sequence, network, FogConfig::DEFAULT));
+        self.push(Method::PSEUDO_FOG, drive.turns[self.start..].to_vec(), looped_s + run_time);
+    }
+
+    /// Runs the methods that start from the inertial sensor.
+    fn inertial(&mut self, sequence: &Sequence, recording: &Recording, network: &mut impl WindowNetwork) {
+        let gyro: Vec<f64> = sequence.steps.iter().map(|step| f64::from(step.angular_rate[2])).collect();
+        let constant = |rate: f64| gyro.iter().map(|z| z - rate).collect::<Vec<f64>>();
+        // This is the paper's network alone, without zero-rate updates.
+        let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
+        let (drive, alone_s) = timed(|| Replay::run(recording, &config, None, network, || {}));
+        let wheels = WheelFrames::new(recording);
+        let (looped, looped_s) =
+            timed(|| Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network, || {}));
+        self.add(Method::RAW, || constant(0.0));
+        match drive.and_then(|drive| Ok((drive, looped?))) {
+            Ok((drive, looped)) => {
+                let still = &gyro[..self.start];
+                let bias = still.iter().sum::<f64>() / still.len().max(1) as f64;
+                self.add(Method::STATIC, || constant(bias));
+                self.add(Method::FIR, || LowPass::chosen().filter(&constant(bias)));
+                for (method, run_time, rates) in [
+                    (Method::GYRONET, alone_s, corrected(&drive, &gyro, |step| step.settled)),
+                    (
+                        Method::GYRONET_ONLINE,
+                        alone_s,
+                        corrected(&drive, &gyro, |step| step.vehicle.prompt.rate),
+                    ),
+                    // The navigation rates of the drive's last steps have not been sent yet.
+                    (
+                        Method::GYRONET_LOOP,
+                        looped_s,
+                        corrected(&looped, &gyro, |step| {
+                            step.navigation.map_or(step.settled, |sent| sent.rate)
+                        }),
+                    ),
+                ] {
+                    self.push(method, self.turns(&rates), run_time);
+                }
+            }
+            Err(error) => self.refused = Some(error.to_string()),
+        }
+        let samples = || {
+            sequence
+                .steps
+                .iter()
+                .map(|step| (step.angular_rate.map(f64::from), step.specific_force.map(f64::from)))
+        };
+        self.add(Method::VQF, || vqf::rates(vqf::published(), samples()));
+        self.add(Method::VQF_VEHICLE, || {
+            let mut filter = vqf::published();
+            // The thresholds are three times the spread that static initialisation allows, because VQF checks each
+            // sample.
+            let StaticConfig { gyro_std, accel_std, .. } = StaticConfig::DEFAULT;
+            let (gyro, accel) = (f64::from(gyro_std).to_degrees(), f64::from(accel_std));
+            filter.set_rest_detection_thresholds(3.0 * gyro, 3.0 * accel);
+            vqf::rates(filter, samples())
+        });
+    }
+
+    /// Adds a method from the rates of all steps, rad/s.
+    fn add(&mut self, method: Method, rates: impl FnOnce() -> Vec<f64>) {
+        let (rates, run_time) = timed(rates);
+        self.push(method, self.turns(&rates), run_time);
+    }
+
+    /// Returns the turns of the compared steps, from the rates of all steps.
+    fn turns(&self, rates: &[f64]) -> Vec<f64> {
+        rates[self.start..].iter().map(|rate| rate * DT).collect()
+    }
+
+    fn push(&mut self, method: Method, turns: Vec<f64>, run_time: f64) {
+        self.methods.push(Estimate { method, turns, places: Places::RECKONED, run_time: Some(run_time) });
+    }
+
+    /// Adds the fit of wheels and fibre-optic gyro.
+    pub fn add_joint(&mut self, sequence: &Sequence, joint: &Joint) {
+        self.methods.push(joint.estimate(sequence, self.start));
+        self.fitted = Some(joint.to_string());
+    }
+
+    /// Adds another program's trajectory, or the reason why it cannot be compared.
+    pub fn add_given(&mut self, sequence: &Sequence, given: &Given) {
+        match given.estimate(sequence, self.start) {
+            Ok(estimate) => self.methods.push(estimate),
+            Err(error) => self.left_out.push((given.method, error.to_string())),
+        }
+    }
+}
+
+/// Returns the result of some work and its run time, s.
+fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let started = Instant::now();
+    let result = work();
+    (result, started.elapsed().as_secs_f64())
+}
+
+/// Returns one of the rates of each step. For a step without a sample this is the interpolated gyro minus the last
+/// correction.
+fn corrected(drive: &Replay, gyro: &[f64], which: impl Fn(&Step) -> AngularRate) -> Vec<f64> {
+    let mut steps = drive.steps.iter().peekable();
+    let mut taken_off = 0.0;
+    let rate = |(k, gyro): (usize, &f64)| {
+        // A sample has the time of its step.
+        while let Some(step) = steps.next_if(|step| step.time.0 <= k as u64 * PERIOD_US) {
+            taken_off = gyro - which(step).rad_per_sec();
+        }
+        gyro - taken_off
+    };
+    gyro.iter().enumerate().map(rate).collect()
+}
+
+/// Returns the rates of an unwrapped heading; zero in the first step.
+fn rates(headings: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut last = None;
+    headings.map(|yaw| (yaw - last.replace(yaw).unwrap_or(yaw)) / DT).collect()
+}

@@ -1,0 +1,139 @@
+//! This module compares another program's trajectories with our methods: those of a folder, one file for each
+//! sequence, named `SEQUENCE.txt`.
+//!
+//! A trajectory is compared without alignment, so it must be in the truth's frame (KAIST: that of `global_pose.csv`;
+//! NCLT: x east, y north, heading counter-clockwise from east) and on the clock of the sequence's files. It must
+//! cover the sequence from the end of static initialisation, where our methods start, to within [`MISSING_END`] of
+//! the end. Poses at the sequence's steps are interpolated. A trajectory that cannot be compared is an error and
+//! gives no numbers.
+
+use super::estimate::{Estimate, Places};
+use crate::sequence::Sequence;
+use crate::trajectory::{Pose, Trajectory};
+use gyronet_tools::drive::DT;
+use gyronet_tools::drive::error::{DataError, DataFault};
+use gyronet_tools::evaluate::methods::Method;
+use gyronet_tools::evaluate::metrics::wrap;
+use gyronet_tools::evaluate::trajectory_error::Point;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// A trajectory may end this much before the sequence, s, because some programs write only whole seconds.
+pub const MISSING_END: f64 = 1.0;
+/// Largest time between two poses, s: a car in a sharp turn (3 m/s^2) then deviates 15 mm from the straight line.
+pub const MAX_STEP: f64 = 0.2;
+/// Largest distance, m, and angle, rad, of a trajectory from the true pose where our methods start.
+pub const START_TOLERANCE: (f64, f64) = (1.0, 0.1);
+/// A pose has diverged if its distance from the truth exceeds twice the distance driven plus this, m: no path of the
+/// vehicle's length reaches it.
+pub const DIVERGED: f64 = 100.0;
+
+/// Holds the folder of another program's trajectories.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Given {
+    /// The method's name in tables and in JSON.
+    pub method: Method,
+    /// Folder of the trajectories.
+    pub folder: PathBuf,
+}
+
+/// The error of a `NAME=FOLDER` that cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NameError {
+    /// The name or the folder is missing.
+    #[error("expected NAME=FOLDER")]
+    Form,
+    /// The name is that of one of our own methods.
+    #[error("{0:?} is a method of our own")]
+    Taken(String),
+}
+
+impl FromStr for Given {
+    type Err = NameError;
+
+    fn from_str(text: &str) -> Result<Self, NameError> {
+        let parts = text.split_once('=').filter(|(name, folder)| !name.is_empty() && !folder.is_empty());
+        let (name, folder) = parts.ok_or(NameError::Form)?;
+        if Method::ON_A_SEQUENCE.iter().any(|own| own.key == name || own.name == name) {
+            return Err(NameError::Taken(name.to_owned()));
+        }
+        Ok(Self { method: Method::given(name), folder: PathBuf::from(folder) })
+    }
+}
+
+impl Given {
+    /// Reads the trajectory of a sequence and returns the estimate from the step `start` on.
+    ///
+    /// # Errors
+    /// [`DataError`], which names the file and, where there is one, the line.
+    pub fn estimate(&self, sequence: &Sequence, start: usize) -> Result<Estimate, DataError> {
+        let trajectory = Trajectory::read(&self.folder.join(format!("{}.txt", sequence.name)))?;
+        let (turns, places) = compared(&trajectory, sequence, start)?;
+        Ok(Estimate { method: self.method, turns, places: Places::Given(places), run_time: None })
+    }
+}
+
+/// Returns the turn of each compared step and the position after it, in the frame of the sequence's steps. The first
+/// turn begins from the true heading, as for every method.
+fn compared(
+    trajectory: &Trajectory,
+    sequence: &Sequence,
+    start: usize,
+) -> Result<(Vec<f64>, Vec<Point>), DataError> {
+    let fault = |line, fault| DataError::at(&trajectory.path, line, fault);
+    let time = |step: usize| sequence.start_s + step as f64 * DT;
+    let first = start.saturating_sub(1);
+    let end = time(sequence.steps.len().saturating_sub(1)) - MISSING_END;
+    let way: f64 = sequence.steps.iter().map(|step| (step.wheels[0] + step.wheels[1]).abs() / 2.0).sum();
+    let most = 2.0 * way + DIVERGED;
+    let (mut turns, mut places, mut last) = (Vec::new(), Vec::new(), 0.0);
+    let mut poses = trajectory.poses.windows(2).peekable();
+    for (number, truth) in sequence.steps.iter().enumerate().skip(first) {
+        let now = time(number);
+        // Skip the poses before this step.
+        while poses.next_if(|pair| pair[1].time < now).is_some() {}
+        let Some([before, after]) = poses.peek() else { break };
+        if before.time > now {
+            break;
+        }
+        let seconds = after.time - before.time;
+        if seconds > MAX_STEP {
+            return Err(fault(after.line, DataFault::FarApart { seconds, most: MAX_STEP }));
+        }
+        let pose = between(before, after, now);
+        let place = [0, 1].map(|axis| pose.position[axis] - sequence.origin[axis]);
+        let metres = libm::hypot(place[0] - truth.position[0], place[1] - truth.position[1]);
+        if number == first {
+            let turned = wrap(pose.yaw - truth.yaw);
+            if metres > START_TOLERANCE.0 || turned.abs() > START_TOLERANCE.1 {
+                return Err(fault(
+                    pose.line,
+                    DataFault::Frame { metres, degrees: turned.abs().to_degrees() },
+                ));
+            }
+            last = pose.yaw - turned;
+            continue;
+        }
+        if metres > most {
+            return Err(fault(after.line, DataFault::Diverged { metres, most }));
+        }
+        turns.push(pose.yaw - std::mem::replace(&mut last, pose.yaw));
+        places.push(place);
+    }
+    let covered = time(first + places.len());
+    if places.is_empty() || covered < end {
+        let span = |poses: &[Pose]| Some((poses.first()?.time, poses.last()?.time));
+        let (from_s, to_s) = span(&trajectory.poses).unwrap_or_default();
+        let fault = DataFault::Span { from_s, to_s, begin_s: time(first), end_s: end };
+        return Err(DataError::of(&trajectory.path, fault));
+    }
+    Ok((turns, places))
+}
+
+/// Returns the pose at a time, interpolated linearly between two poses.
+fn between(before: &Pose, after: &Pose, time: f64) -> Pose {
+    let part = (time - before.time) / (after.time - before.time);
+    let on = |from: f64, to: f64| from + (to - from) * part;
+    let position = [0, 1].map(|axis| on(before.position[axis], after.position[axis]));
+    Pose { line: before.line, time, position, yaw: on(before.yaw, after.yaw) }
+}

@@ -1,0 +1,42 @@
+//! This module writes one self-contained HTML page with all tables and pictures.
+
+use super::pictures::Picture;
+use super::table::{Row, Table};
+use gyronet_tools::plot::page::{self, document, escaped};
+use std::fmt::Write;
+
+/// Returns the page; `pictures` holds the pictures of each sequence with its name.
+#[must_use]
+pub fn page(tables: &[Table], pictures: &[(String, Vec<Picture>)]) -> String {
+    let mut html = String::from("<h1>The paper's tables</h1>\n");
+    html += "<p class=\"lead\">X. Zhao et al., <i>Learning to Compensate for the Drift and Error of Gyroscope in \
+             Vehicle Localization</i>; written by <code>gyronet-paper tables</code>.</p>\n";
+    for table in tables {
+        let simulated = if table.simulated { " <span class=\"simulated\">simulated</span>" } else { "" };
+        // Writing to a string cannot fail.
+        let _ = writeln!(html, "<h2>{}{simulated}</h2>", escaped(&table.title));
+        let ours = if table.simulated { "here, simulated" } else { "here" };
+        html += &block(ours, &table.columns, &table.rows, table.decimals);
+        html += &block("in the paper", &table.paper_columns, &table.paper_rows, table.decimals);
+        for note in &table.notes {
+            let _ = writeln!(html, "<p class=\"note\">{}</p>", escaped(note));
+        }
+    }
+    for (k, (name, pictures)) in pictures.iter().enumerate() {
+        let open = if k == 0 { " open" } else { "" };
+        let _ = writeln!(html, "<details{open}><summary>{}</summary>", escaped(name));
+        for picture in pictures {
+            let caption = escaped(&picture.caption);
+            let _ = writeln!(html, "<figure>{}<figcaption>{caption}</figcaption></figure>", picture.svg);
+        }
+        html += "</details>\n";
+    }
+    document("gyronet: the paper's tables", &html)
+}
+
+fn block(caption: &str, columns: &[String], rows: &[Row], decimals: usize) -> String {
+    let header: Vec<&str> = [""].into_iter().chain(columns.iter().map(String::as_str)).collect();
+    let figure = |figure: &Option<f64>| figure.map_or("-".into(), |figure| format!("{figure:.decimals$}"));
+    let cells = |row: &Row| [row.name.clone()].into_iter().chain(row.figures.iter().map(figure)).collect();
+    page::table("figures", caption, &header, rows.iter().map(cells).collect::<Vec<Vec<String>>>())
+}

@@ -1,0 +1,113 @@
+//! This module compensates wheels and fibre-optic gyro together, which the paper names as future work. It fits four
+//! numbers to the truth of training sequences by least squares over spans of 10 s.
+//!
+//! The turn is the sum of a share of the gyro's turn, a share of the difference of the wheels' distances (which
+//! contains the wheel base and the diameters), and a constant rate (which contains the Earth's rate and the gyro's
+//! bias). The distance is that of the wheels times a scale. The fit shows how much of a network's gain four numbers
+//! achieve.
+
+use super::estimate::{Estimate, Places};
+use crate::sequence::{Sequence, Step};
+use gyronet_tools::drive::DT;
+use gyronet_tools::evaluate::methods::Method;
+use nalgebra::{Matrix3, Vector3};
+use std::fmt;
+
+/// Number of steps in a span of the fit: 10 s, in which the accumulated errors exceed an encoder's resolution.
+const SPAN: usize = 1_000;
+
+/// Holds the sums of a least-squares fit.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Fit {
+    normal: Matrix3<f64>,
+    turned: Vector3<f64>,
+    way_squared: f64,
+    way_true: f64,
+    names: Vec<String>,
+}
+
+impl Fit {
+    /// Adds a training sequence.
+    pub fn add(&mut self, sequence: &Sequence) {
+        let turns = sequence.turns();
+        for (k, steps) in sequence.steps.chunks_exact(SPAN).enumerate() {
+            let inputs = steps.iter().map(inputs).sum::<Vector3<f64>>();
+            let turned: f64 = turns[k * SPAN..][..SPAN].iter().sum();
+            self.normal += inputs * inputs.transpose();
+            self.turned += inputs * turned;
+            // The first step of a span begins in the previous span.
+            let way = steps[1..].iter().map(way).sum::<f64>();
+            let along: f64 = steps.windows(2).map(|pair| along(&pair[0], &pair[1])).sum();
+            self.way_squared += way * way;
+            self.way_true += way * along;
+        }
+        self.names.push(sequence.name.clone());
+    }
+
+    /// Returns the numbers with the least squared errors; `None` if the sequences turn or move too little for a fit.
+    #[must_use]
+    pub fn solve(&self) -> Option<Joint> {
+        let inverse = self.normal.try_inverse()?;
+        let [gyro, difference, constant] = (inverse * self.turned).into();
+        let way = self.way_true / self.way_squared;
+        let is_finite = [gyro, difference, constant, way].iter().all(|number| number.is_finite());
+        is_finite.then(|| Joint { gyro, difference, constant, way, names: self.names.clone() })
+    }
+}
+
+/// Holds the fitted numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Joint {
+    /// Share of the gyro's turn.
+    pub gyro: f64,
+    /// Turn for each metre that the right wheel goes farther than the left, rad/m.
+    pub difference: f64,
+    /// Constant rate, rad/s.
+    pub constant: f64,
+    /// Scale of the wheels' distance.
+    pub way: f64,
+    /// Names of the sequences that the numbers were fitted to.
+    pub names: Vec<String>,
+}
+
+impl Joint {
+    /// Returns the estimate for a sequence from the step `start`.
+    #[must_use]
+    pub fn estimate(&self, sequence: &Sequence, start: usize) -> Estimate {
+        let shares = Vector3::new(self.gyro, self.difference, self.constant);
+        let turns = sequence.steps[start..].iter().map(|step| shares.dot(&inputs(step))).collect();
+        let places = Places::Reckoned { scale: self.way };
+        Estimate { method: Method::FOG_WHEELS, turns, places, run_time: None }
+    }
+}
+
+impl fmt::Display for Joint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "FoG and wheels are fitted on {}: {:.6} of the FoG's turn, {:.4} mrad for each metre of the wheels' difference, \
+             {:.6} mrad/s, {:.6} of the distance.",
+            self.names.join(", "),
+            self.gyro,
+            1e3 * self.difference,
+            1e3 * self.constant,
+            self.way
+        )
+    }
+}
+
+/// Returns the inputs of the fit for a step: the gyro's turn, the difference of the wheels' distances, and the time.
+fn inputs(step: &Step) -> Vector3<f64> {
+    Vector3::new(step.fog, step.wheels[1] - step.wheels[0], DT)
+}
+
+fn way(step: &Step) -> f64 {
+    (step.wheels[0] + step.wheels[1]) / 2.0
+}
+
+/// Returns the true distance of a step along its heading, which the noise of the true positions does not lengthen.
+fn along(before: &Step, after: &Step) -> f64 {
+    let (sin, cos) = libm::sincos((before.yaw + after.yaw) / 2.0);
+    let [x, y] = [0, 1].map(|axis| after.position[axis] - before.position[axis]);
+    x * cos + y * sin
+}

@@ -1,0 +1,227 @@
+//! This module computes the errors of every method on every sequence, and their means, for the tables and the JSON.
+
+use super::estimate::{Estimate, Places};
+use super::estimates::Estimates;
+use super::group::Group;
+use crate::sequence::Sequence;
+use crate::simulate::Layout;
+use gyronet::odometry::Track;
+use gyronet_tools::evaluate::methods::Method;
+use gyronet_tools::evaluate::metrics::YawError;
+use gyronet_tools::evaluate::trajectory_error::{Point, TrajectoryError};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Holds the errors of a method on a sequence, or the mean over several.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Errors {
+    /// Mean error of the yaw change in 1 s, rad.
+    pub mean_1s_rad: f64,
+    /// Error of the final yaw, wrapped, rad.
+    pub final_rad: f64,
+    /// Error of the final yaw, not wrapped, rad.
+    pub final_unwrapped_rad: f64,
+    /// Absolute trajectory error with odometry, RMS, m.
+    pub ate_m: f64,
+    /// Mean distance from the true path with odometry, m.
+    pub ate_mean_m: f64,
+    /// Absolute trajectory error after alignment, RMS, m.
+    pub aligned_ate_m: f64,
+    /// Mean distance from the true path after alignment, m.
+    pub aligned_ate_mean_m: f64,
+    /// Run time on this machine, s; `None` for a given trajectory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub run_time_s: Option<f64>,
+}
+
+/// Maps the key of a method to its errors.
+pub type ByMethod = BTreeMap<&'static str, Errors>;
+
+/// Holds the path of a method, or the true path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    /// The method; `None` for the true path.
+    pub method: Option<Method>,
+    /// Heading at each step, not wrapped, rad.
+    pub yaw: Vec<f64>,
+    /// The points of the path, m.
+    pub points: Vec<Point>,
+}
+
+/// Holds the errors on one sequence.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SequenceErrors {
+    /// The sequence's name.
+    pub name: String,
+    /// The data set whose layout it has.
+    pub layout: Layout,
+    /// Says whether the sequence is simulated.
+    pub simulated: bool,
+    /// The group that the sequence is averaged with.
+    pub group: Group,
+    /// Length of the compared part, s.
+    pub seconds: f64,
+    /// Distance measured by the wheels, m.
+    pub metres: f64,
+    /// The reason why some methods could not be run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refused: Option<String>,
+    /// The errors of each method.
+    pub methods: ByMethod,
+    /// The reasons why given trajectories could not be compared, by the key of the method.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub left_out: BTreeMap<&'static str, String>,
+    /// Text with the fitted numbers of wheels and fibre-optic gyro, and the sequences they were fitted to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fitted: Option<String>,
+    /// The methods in the order of the tables.
+    #[serde(skip)]
+    pub order: Vec<Method>,
+}
+
+impl SequenceErrors {
+    /// Compares the estimates with the truth; also returns the paths for pictures, the truth's first.
+    #[must_use]
+    pub fn new(sequence: &Sequence, estimates: &Estimates) -> (Self, Vec<Path>) {
+        let steps = &sequence.steps[estimates.start..];
+        let turns = &sequence.turns()[estimates.start..];
+        let truth: Vec<Point> = steps.iter().map(|step| step.position).collect();
+        // The heading before the first compared turn.
+        let heading = steps.first().map_or(0.0, |step| step.yaw) - turns.first().copied().unwrap_or(0.0);
+        let begin = estimates.start.checked_sub(1).map_or([0.0; 2], |k| sequence.steps[k].position);
+        let (mut methods, mut order) = (ByMethod::new(), Vec::new());
+        let mut paths =
+            vec![Path { method: None, yaw: steps.iter().map(|step| step.yaw).collect(), points: truth }];
+        for estimate in &estimates.methods {
+            let scale = if let Places::Reckoned { scale } = estimate.places { scale } else { 1.0 };
+            let mut track = Track { position: begin, yaw: heading };
+            let (yaw, mut points): (Vec<f64>, Vec<Point>) = steps
+                .iter()
+                .zip(&estimate.turns)
+                .map(|(step, turned)| {
+                    track.step(step.wheels.map(|way| scale * way), *turned);
+                    (track.yaw, track.position)
+                })
+                .unzip();
+            if let Places::Given(places) = &estimate.places {
+                points.clone_from(places);
+            }
+            if let Some(errors) = Errors::new(turns, estimate, &points, &paths[0].points) {
+                methods.insert(estimate.method.key, errors);
+                order.push(estimate.method);
+            }
+            paths.push(Path { method: Some(estimate.method), yaw, points });
+        }
+        let errors = Self {
+            name: sequence.name.clone(),
+            layout: sequence.layout,
+            simulated: sequence.simulated.is_some(),
+            group: Group::of(sequence),
+            seconds: steps.len() as f64 * gyronet_tools::drive::DT,
+            metres: steps.iter().map(|step| (step.wheels[0] + step.wheels[1]).abs() / 2.0).sum(),
+            refused: estimates.refused.clone(),
+            left_out: estimates.left_out.iter().map(|(method, why)| (method.key, why.clone())).collect(),
+            fitted: estimates.fitted.clone(),
+            methods,
+            order,
+        };
+        (errors, paths)
+    }
+}
+
+impl Errors {
+    fn new(turns: &[f64], estimate: &Estimate, points: &[Point], truth: &[Point]) -> Option<Self> {
+        // A given trajectory may end before the sequence.
+        let (turns, truth) = (turns.get(..points.len())?, truth.get(..points.len())?);
+        let rates =
+            |turns: &[f64]| turns.iter().map(|turn| turn / gyronet_tools::drive::DT).collect::<Vec<f64>>();
+        let yaw = YawError::new(&rates(&estimate.turns), &rates(turns))?;
+        let ate = TrajectoryError::new(points, truth)?;
+        let aligned = TrajectoryError::aligned(points, truth)?;
+        Some(Self {
+            mean_1s_rad: yaw.mean_1s_rad,
+            final_rad: yaw.final_rad,
+            final_unwrapped_rad: yaw.final_unwrapped_rad,
+            ate_m: ate.rmse_m,
+            ate_mean_m: ate.mean_m,
+            aligned_ate_m: aligned.rmse_m,
+            aligned_ate_mean_m: aligned.mean_m,
+            run_time_s: estimate.run_time,
+        })
+    }
+
+    fn mean(errors: &[Self]) -> Self {
+        let mean = |of: fn(&Self) -> f64| errors.iter().map(of).sum::<f64>() / errors.len() as f64;
+        Self {
+            mean_1s_rad: mean(|e| e.mean_1s_rad),
+            final_rad: mean(|e| e.final_rad),
+            final_unwrapped_rad: mean(|e| e.final_unwrapped_rad),
+            ate_m: mean(|e| e.ate_m),
+            ate_mean_m: mean(|e| e.ate_mean_m),
+            aligned_ate_m: mean(|e| e.aligned_ate_m),
+            aligned_ate_mean_m: mean(|e| e.aligned_ate_mean_m),
+            run_time_s: errors
+                .iter()
+                .map(|e| e.run_time_s)
+                .sum::<Option<f64>>()
+                .map(|sum| sum / errors.len() as f64),
+        }
+    }
+}
+
+/// Returns the mean errors of each method that could be run on all sequences.
+#[must_use]
+pub fn mean<'a>(sequences: impl Iterator<Item = &'a SequenceErrors>) -> ByMethod {
+    let mut all: BTreeMap<&'static str, Vec<Errors>> = BTreeMap::new();
+    let mut count = 0;
+    for sequence in sequences {
+        count += 1;
+        for (key, errors) in &sequence.methods {
+            all.entry(key).or_default().push(*errors);
+        }
+    }
+    // Means over different numbers of sequences cannot be compared.
+    all.into_iter().filter(|(_, e)| e.len() == count).map(|(key, e)| (key, Errors::mean(&e))).collect()
+}
+
+/// Holds all results, as in the JSON.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Results {
+    /// Says whether at least one sequence is simulated.
+    pub simulated: bool,
+    /// One entry for each sequence.
+    pub sequences: Vec<SequenceErrors>,
+    /// The means over all sequences, for the methods that were run on all of them.
+    pub mean: ByMethod,
+    /// The means over the sequences of each data set's layout.
+    pub mean_of_layout: BTreeMap<&'static str, ByMethod>,
+    /// GyroNet's mean error in 1 s relative to that of static initialisation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyronet_to_static: Option<f64>,
+    /// The same ratio in the paper's Table I.
+    pub gyronet_to_static_paper: f64,
+}
+
+impl Results {
+    /// Computes the means of the sequences' errors.
+    #[must_use]
+    pub fn new(sequences: Vec<SequenceErrors>) -> Self {
+        let mean_all = mean(sequences.iter());
+        let of = |layout| sequences.iter().filter(move |sequence| sequence.layout == layout);
+        let mean_of_layout = [("kaist", Layout::Kaist), ("nclt", Layout::Nclt)]
+            .into_iter()
+            .filter(|(_, layout)| of(*layout).next().is_some())
+            .map(|(name, layout)| (name, mean(of(layout))))
+            .collect();
+        let error = |key: &str| mean_all.get(key).map(|errors| errors.mean_1s_rad);
+        let gyronet_to_static = error("gyronet").zip(error("static")).map(|(network, still)| network / still);
+        Self {
+            simulated: sequences.iter().any(|sequence| sequence.simulated),
+            mean: mean_all,
+            mean_of_layout,
+            gyronet_to_static,
+            gyronet_to_static_paper: super::paper::GYRONET_TO_STATIC,
+            sequences,
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! Commands and options that have gone: a user of one is told what does its work now.
+
+use clap::error::{ContextKind, ContextValue};
+
+const RETIRED: [(&str, &str); 6] = [
+    ("paper", "`make -f tools/paper/Makefile`"),
+    ("tables", "`cargo paper tables`"),
+    ("--layout", "`cargo paper simulate`"),
+    ("--set", "`cargo paper simulate`"),
+    ("--training", "`cargo paper import`"),
+    ("--stamps", "`cargo paper import`"),
+];
+
+/// The line about a retired name, if that is what the arguments are wrong about.
+pub fn line(error: &clap::Error) -> Option<String> {
+    let kinds = [ContextKind::InvalidSubcommand, ContextKind::InvalidArg];
+    let ContextValue::String(word) = kinds.into_iter().find_map(|kind| error.get(kind))? else { return None };
+    let (name, successor) = RETIRED.iter().find(|(name, _)| name == word)?;
+    Some(format!("{name} has gone; {successor} does its work"))
+}
