@@ -62,12 +62,10 @@ fn trials(test: &str) -> Option<&'static [Trial]> {
 
 /// The README's rows: how each begins, its method, and the place among its numbers of the ratio of both drives to static
 /// initialisation, behind which stand those of each drive.
-const ROWS: [(&str, Method, usize); 2] = [
-    ("| gyronet, sent at once |", Method::PROMPT, 1),
-    ("| gyronet, sent for navigation |", Method::NAVIGATION, 1),
-];
+const ROWS: [(&str, Method, usize); 2] =
+    [("| gyronet, live rate |", Method::PROMPT, 1), ("| gyronet, delayed rate |", Method::NAVIGATION, 1)];
 /// The sentence that begins so has the ratio to the best classical method as its first number.
-const OVER_BEST_CLASSICAL: &str = "The navigation rate has";
+const OVER_BEST_CLASSICAL: &str = "The delayed rate has";
 
 /// Returns the numbers in the README's row that begins so: `(0.78 (0.95 and 0.72)` gives all three.
 fn readme_numbers(row: &str) -> Vec<f64> {

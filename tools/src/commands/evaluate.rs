@@ -17,15 +17,15 @@ use std::path::{Path, PathBuf};
 /// over a minute and more. Wheel rates in a drive replace the wheel frames of the vehicle's bus. A drive with a
 /// course that starts moving gets a simulated standstill, and the output says so.
 ///
-/// For each drive, and as a mean of each folder, the command first prints the error of the navigation rate, relative
+/// For each drive, and as a mean of each folder, the command first prints the error of the delayed rate, relative
 /// to that of the best classical method with the same inputs and no more delay. The classical methods are the raw
 /// gyro, static initialisation, zero-rate updates, a linear-phase low pass, and VQF.
 ///
 /// One row for each method follows: the error over 1 s, 10 s, 60 s and the drive (rad; RMS and at the end), its ratio
 /// to that of static initialisation (1 s, or RMS against a course), the mean correction beyond static initialisation
-/// and zero-rate updates, multiplications per sample, and delay. GyroNet and the linear window are settled estimates
-/// after static initialisation. The last two rows are the rates that the board sends: the prompt rate, with the
-/// sample (Bosch TX1, J1939 VDC2), and the navigation rate, some samples later in its own yaw messages.
+/// and zero-rate updates, multiplications per sample, and delay. GyroNet and the linear window are estimates of all windows
+/// after static initialisation. The last two rows are the rates that the board sends: the live rate, with the
+/// sample (Bosch TX1, J1939 VDC2), and the delayed rate, some samples later in its own yaw messages.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -41,7 +41,7 @@ pub struct Args {
     /// two and three sigma, and the reference's own error at standstill.
     #[arg(long, conflicts_with = "lags")]
     ablation: bool,
-    /// Print the error of the navigation rate at every lag from 0 to 110 ms (the board's default is 70).
+    /// Print the error of the delayed rate at every lag from 0 to 110 ms (the board's default is 70).
     #[arg(long)]
     lags: bool,
     /// Calibration file from `gyronet calibrate`, applied to the gyro of every method. It corrects only the gain and

@@ -127,7 +127,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         writeln!(stdout, "  {:<26}{}", ratio.method, ratio.all)?;
     }
     if let Some(ours) = held_out.over_best_classical {
-        writeln!(stdout, "navigation rate, relative to the best classical method: {ours}")?;
+        writeln!(stdout, "delayed rate, relative to the best classical method: {ours}")?;
     }
     writeln!(
         stdout,

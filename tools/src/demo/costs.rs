@@ -43,7 +43,7 @@ pub fn all(recording: &Recording, rates: &Rates, config: &Config) -> Vec<Cost> {
         Cost {
             what: "from sample to message",
             figure: format!("0 and {lag} ms"),
-            how: "the rate sent at once, and the one for navigation".into(),
+            how: "the live and the delayed rate".into(),
         },
         Cost {
             what: "CAN",

@@ -61,7 +61,7 @@ fn facts(demo: &Demo<'_>) -> String {
                 .push(("error over that of the best classical method", format!("{:.2}", ours.default.ratio)));
         }
         let mrad = |rad: f64| format!("{:.3} <small>mrad</small>", 1e3 * rad);
-        facts.extend(sent.mean_1s_rad.map(|rad| ("error in 1 s, sent for navigation", mrad(rad))));
+        facts.extend(sent.mean_1s_rad.map(|rad| ("error in 1 s, delayed rate", mrad(rad))));
         facts.extend(sent.rms_rad.map(|rad| ("its RMS over the drive", mrad(rad))));
     }
     facts.push(("CAN messages", grouped(demo.frames)));
@@ -148,7 +148,7 @@ fn methods(demo: &Demo<'_>) -> String {
     let Some(errors) = demo.errors else {
         return "<p>The drive has no reference, so there are no errors.</p>\n".into();
     };
-    let ours = errors.over_best_classical.map(|ours| format!("<p>Sent for navigation: {ours}.</p>\n"));
+    let ours = errors.over_best_classical.map(|ours| format!("<p>Delayed rate: {ours}.</p>\n"));
     let rows = columns(&errors.methods).map(|(_, columns)| columns.to_vec());
     format!(
         "{}{}<p class=\"note\">Heading error over {:.1} s against <code>{}</code>: mean over windows of 1, 10 and 60 s, RMS \

@@ -60,10 +60,10 @@ impl Method {
     pub const GYRONET_F32: Self = mems("gyronet_f32", "GyroNet, f32");
     /// The same as [`Method::LINEAR`] with the paper's GyroNet in integers.
     pub const GYRONET_INT: Self = mems("gyronet_int", "GyroNet, integer");
-    /// The prompt rate, which the board sends at once: Bosch TX1, VDC2.
-    pub const PROMPT: Self = mems("prompt", "sent at once");
-    /// The navigation rate, which the board sends in its own yaw messages, some samples later.
-    pub const NAVIGATION: Self = mems("default", "sent for navigation");
+    /// The live rate, which the board sends at once: Bosch TX1, VDC2.
+    pub const PROMPT: Self = mems("prompt", "live rate");
+    /// The delayed rate, which the board sends in its own yaw messages, some samples later.
+    pub const NAVIGATION: Self = mems("default", "delayed rate");
     /// The orientation filter VQF ([`crate::evaluate::vqf`]). On a drive it starts from static initialisation; in the
     /// paper's tables it replaces the vendor's filter and estimates the bias itself.
     pub const VQF: Self = mems("vqf", "VQF filter");

@@ -147,7 +147,7 @@ impl fmt::Display for Comparisons {
         let Self { default, prompt } = self;
         write!(
             f,
-            "{:.2} of the best classical method ({}); sent at once {:.2} ({})",
+            "{:.2} of the best classical method ({}); live rate {:.2} ({})",
             default.ratio, default.best_classical, prompt.ratio, prompt.best_classical
         )
     }
@@ -302,7 +302,7 @@ impl fmt::Display for Report {
 
 fn table(f: &mut fmt::Formatter<'_>, ours: Option<Comparisons>, rows: &PerMethod<Row>) -> fmt::Result {
     if let Some(ours) = ours {
-        writeln!(f, "  sent for navigation: {ours}")?;
+        writeln!(f, "  delayed rate: {ours}")?;
     }
     let mut line = |columns: [&str; 10]| {
         write!(f, "  {:<26}", columns[0])?;

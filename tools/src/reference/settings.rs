@@ -58,7 +58,7 @@ const SETTINGS: &[(&str, Takes)] = &[
     ),
     ("static_init.gyro_bias", Number("rad/s", Field::StaticGyroBias, "largest bias")),
     ("compensate.mode.Overlap.hop", Other("samples", "1 to 10; `compensate.mode` also `Newest`, `Middle`")),
-    ("compensate.lag", Other("samples", "0 to 11: delay of the navigation rate")),
+    ("compensate.lag", Other("samples", "0 to 11, of 10 ms: how late the delayed rate is sent")),
     ("compensate.max_mean", Number("rad/s", Field::CompensateMaxMean, "largest mean correction of a window")),
     ("compensate.max_single", Number("rad/s", Field::CompensateMaxSingle, "largest single correction")),
     (
