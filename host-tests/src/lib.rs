@@ -13,6 +13,7 @@ pub mod noise;
 pub mod packing;
 pub mod parallel;
 pub mod qemu;
+pub mod ram_flash;
 pub mod recordings;
 pub mod replay;
 pub mod require;

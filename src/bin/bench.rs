@@ -1,5 +1,5 @@
-//! Benchmark of the kernels, networks and parsers on the target. Prints one line for each: `name cycles=N` from the
-//! DWT cycle counter on a board, `name ticks=N` from SysTick where that counter does not run (QEMU).
+//! Benchmark of the kernels, networks and parsers on the target. Prints one line for each: `name stack=N`, with
+//! `cycles=N` from the DWT cycle counter where that runs (on a board).
 //!
 //! Each measured region is enclosed by two marker instructions that do nothing; a plugin of the emulator counts the
 //! instructions between them (`tools/bench/m4count.c`). `cargo bench-target` runs all that and prints instructions
@@ -58,7 +58,7 @@ mod firmware {
     #[cortex_m_rt::entry]
     fn main() -> ! {
         if let Some(p) = cortex_m::Peripherals::take() {
-            run(&mut Meter::new(p.SYST, p.DCB, p.DWT));
+            run(&mut Meter::new(p.DCB, p.DWT));
         }
         debug::exit(debug::EXIT_SUCCESS);
         loop {

@@ -38,7 +38,7 @@ mod firmware {
     #[cortex_m_rt::entry]
     fn main() -> ! {
         if let Some(p) = cortex_m::Peripherals::take() {
-            let mut meter = Meter::new(p.SYST, p.DCB, p.DWT);
+            let mut meter = Meter::new(p.DCB, p.DWT);
             cortex_m::interrupt::free(|cs| {
                 let (state, minute) = (STATE.borrow(cs), MINUTE.borrow(cs));
                 fognet(&mut meter, &mut state.borrow_mut(), &mut minute.borrow_mut());

@@ -15,52 +15,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* What the cost of the next instruction depends on. */
 enum insn_class {
-    CLASS_ALU,
-    CLASS_MUL,
-    CLASS_DSP_MAC,
-    CLASS_DIV,
+    CLASS_OTHER,
     CLASS_LDR,
-    CLASS_LDRD,
-    CLASS_LDM,
-    CLASS_STR,
-    CLASS_STM,
     CLASS_BRANCH,
-    CLASS_INDIRECT,
     CLASS_FP_ALU,
     CLASS_FP_FMA,
     CLASS_FP_DIV,
     CLASS_VLDR,
-    CLASS_VLDM,
     CLASS_VSTR,
-    CLASS_VSTM,
-    CLASS_MVE,
-    CLASS_MARKER,
-    CLASSES,
-};
-
-/* The names of the classes in the histogram. */
-static const char *const class_names[CLASSES] = {
-    [CLASS_ALU] = "alu",
-    [CLASS_MUL] = "mul/mla",
-    [CLASS_DSP_MAC] = "smlad/dsp-mac",
-    [CLASS_DIV] = "div",
-    [CLASS_LDR] = "ldr",
-    [CLASS_LDRD] = "ldrd",
-    [CLASS_LDM] = "ldm/pop",
-    [CLASS_STR] = "str/strd",
-    [CLASS_STM] = "stm/push",
-    [CLASS_BRANCH] = "branch",
-    [CLASS_INDIRECT] = "branch-ind",
-    [CLASS_FP_ALU] = "fp-alu",
-    [CLASS_FP_FMA] = "fp-fma",
-    [CLASS_FP_DIV] = "fp-div/sqrt",
-    [CLASS_VLDR] = "vldr",
-    [CLASS_VLDM] = "vldm/vpop",
-    [CLASS_VSTR] = "vstr",
-    [CLASS_VSTM] = "vstm/vpush",
-    [CLASS_MVE] = "mve",
-    [CLASS_MARKER] = "mark",
 };
 
 enum {
@@ -72,8 +36,6 @@ enum {
     REFILL_INDIRECT = 2,
     /* Assumption: the TRM has 2 to 12, depending on the operands (TRM 3-1). */
     DIVISION = 7,
-    /* Assumption: no Cortex-M4 has MVE. An MVE instruction has four beats; here two run per cycle. */
-    VECTOR = 2,
     /* TRM 3-1 and 7-1: a load of one register that is not pipelined. */
     LOAD = 2,
     /* Assumption: for any misalignment; TRM 3.3.2 has 2 for a word at an odd address. */
@@ -84,7 +46,6 @@ enum {
 enum condition {
     ALWAYS,
     IF_WHOLE,
-    IF_VECTOR,
 };
 
 /* Cycles that are added to a rule's cycles. */
@@ -107,19 +68,14 @@ struct rule {
 
 /* The first rule that matches applies. */
 static const struct rule rules[] = {
-    /* Vectors. */
-    {"v",      IF_VECTOR, CLASS_MVE,      VECTOR, NOTHING},               /* assumption */
-    {"vctp",   ALWAYS,    CLASS_MVE,      VECTOR, NOTHING},               /* assumption */
-    {"vpst",   ALWAYS,    CLASS_MVE,      VECTOR, NOTHING},               /* assumption */
-    {"vpt",    ALWAYS,    CLASS_MVE,      VECTOR, NOTHING},               /* assumption */
     /* Floating point. Assumption: integer instructions do not overtake vdiv and vsqrt; vmov between
      * a core and a floating-point register (TRM 7-1: 2) takes 1 cycle. */
     {"vldr",   ALWAYS,    CLASS_VLDR,     LOAD, IF_DOUBLE},               /* TRM 7-1: 2, double 3 */
     {"vstr",   ALWAYS,    CLASS_VSTR,     2, IF_DOUBLE},                  /* TRM 7-1: 2, double 3 */
-    {"vldm",   ALWAYS,    CLASS_VLDM,     1, LISTED},                     /* TRM 7-1: 1+N, 1+2N */
-    {"vpop",   ALWAYS,    CLASS_VLDM,     1, LISTED},                     /* TRM 7-1: 1+N, 1+2N */
-    {"vstm",   ALWAYS,    CLASS_VSTM,     1, LISTED},                     /* TRM 7-1: 1+N, 1+2N */
-    {"vpush",  ALWAYS,    CLASS_VSTM,     1, LISTED},                     /* TRM 7-1: 1+N, 1+2N */
+    {"vldm",   ALWAYS,    CLASS_OTHER,    1, LISTED},                     /* TRM 7-1: 1+N, 1+2N */
+    {"vpop",   ALWAYS,    CLASS_OTHER,    1, LISTED},                     /* TRM 7-1: 1+N, 1+2N */
+    {"vstm",   ALWAYS,    CLASS_OTHER,    1, LISTED},                     /* TRM 7-1: 1+N, 1+2N */
+    {"vpush",  ALWAYS,    CLASS_OTHER,    1, LISTED},                     /* TRM 7-1: 1+N, 1+2N */
     {"vdiv",   ALWAYS,    CLASS_FP_DIV,   14, NOTHING},                   /* TRM 7-1 */
     {"vsqrt",  ALWAYS,    CLASS_FP_DIV,   14, NOTHING},                   /* TRM 7-1 */
     {"vfma",   ALWAYS,    CLASS_FP_FMA,   3, NOTHING},                    /* TRM 7-1 */
@@ -131,53 +87,34 @@ static const struct rule rules[] = {
     {"v",      ALWAYS,    CLASS_FP_ALU,   1, NOTHING},                    /* TRM 7-1 */
     /* Loads and stores. ldrd and strd are not pipelined; a store with an immediate offset completes
      * while the next instruction runs (both TRM 3.3.2). */
-    {"ldrd",   ALWAYS,    CLASS_LDRD,     3, NOTHING},                    /* TRM 3-1: 1+N */
-    {"strd",   ALWAYS,    CLASS_STR,      3, NOTHING},                    /* TRM 3-1: 1+N */
-    {"ldm",    ALWAYS,    CLASS_LDM,      1, LISTED_REFILL_IF_PC},        /* TRM 3-1: 1+N, 1+N+P */
-    {"pop",    ALWAYS,    CLASS_LDM,      1, LISTED_REFILL_IF_PC},        /* TRM 3-1: 1+N, 1+N+P */
-    {"stm",    ALWAYS,    CLASS_STM,      1, LISTED},                     /* TRM 3-1: 1+N */
-    {"push",   ALWAYS,    CLASS_STM,      1, LISTED},                     /* TRM 3-1: 1+N */
+    {"ldrd",   ALWAYS,    CLASS_OTHER,    3, NOTHING},                    /* TRM 3-1: 1+N */
+    {"strd",   ALWAYS,    CLASS_OTHER,    3, NOTHING},                    /* TRM 3-1: 1+N */
+    {"ldm",    ALWAYS,    CLASS_OTHER,    1, LISTED_REFILL_IF_PC},        /* TRM 3-1: 1+N, 1+N+P */
+    {"pop",    ALWAYS,    CLASS_OTHER,    1, LISTED_REFILL_IF_PC},        /* TRM 3-1: 1+N, 1+N+P */
+    {"stm",    ALWAYS,    CLASS_OTHER,    1, LISTED},                     /* TRM 3-1: 1+N */
+    {"push",   ALWAYS,    CLASS_OTHER,    1, LISTED},                     /* TRM 3-1: 1+N */
     {"ldr",    ALWAYS,    CLASS_LDR,      LOAD, REFILL_IF_PC},            /* TRM 3-1: 2, 2+P */
-    {"str",    ALWAYS,    CLASS_STR,      1, IF_REGISTER_OFFSET},         /* TRM 3-1: 2; 3.3.2: 1 */
-    /* Multiplication and division. TRM 3-1 has the multiplications of 32 and 64 bits; 3-2 has those
-     * of halfwords, those of the most significant word, and umaal. */
-    {"sdiv",   ALWAYS,    CLASS_DIV,      DIVISION, NOTHING},             /* assumption */
-    {"udiv",   ALWAYS,    CLASS_DIV,      DIVISION, NOTHING},             /* assumption */
-    {"smlad",  ALWAYS,    CLASS_DSP_MAC,  1, NOTHING},                    /* TRM 3-2 */
-    {"smuad",  ALWAYS,    CLASS_DSP_MAC,  1, NOTHING},                    /* TRM 3-2 */
-    {"smlald", ALWAYS,    CLASS_DSP_MAC,  1, NOTHING},                    /* TRM 3-2 */
-    {"smlsd",  ALWAYS,    CLASS_DSP_MAC,  1, NOTHING},                    /* TRM 3-2 */
-    {"smusd",  ALWAYS,    CLASS_DSP_MAC,  1, NOTHING},                    /* TRM 3-2 */
-    {"mul",    ALWAYS,    CLASS_MUL,      1, NOTHING},                    /* TRM 3-1 */
-    {"mla",    ALWAYS,    CLASS_MUL,      1, NOTHING},                    /* TRM 3-1 */
-    {"mls",    ALWAYS,    CLASS_MUL,      1, NOTHING},                    /* TRM 3-1 */
-    {"smul",   ALWAYS,    CLASS_MUL,      1, NOTHING},                    /* TRM 3-1, 3-2 */
-    {"smla",   ALWAYS,    CLASS_MUL,      1, NOTHING},                    /* TRM 3-1, 3-2 */
-    {"umul",   ALWAYS,    CLASS_MUL,      1, NOTHING},                    /* TRM 3-1 */
-    {"umla",   ALWAYS,    CLASS_MUL,      1, NOTHING},                    /* TRM 3-1 */
-    {"uma",    ALWAYS,    CLASS_MUL,      1, NOTHING},                    /* TRM 3-2 */
-    {"smm",    ALWAYS,    CLASS_MUL,      1, NOTHING},                    /* TRM 3-2 */
+    {"str",    ALWAYS,    CLASS_OTHER,    1, IF_REGISTER_OFFSET},         /* TRM 3-1: 2; 3.3.2: 1 */
+    /* Division. */
+    {"sdiv",   ALWAYS,    CLASS_OTHER,    DIVISION, NOTHING},             /* assumption */
+    {"udiv",   ALWAYS,    CLASS_OTHER,    DIVISION, NOTHING},             /* assumption */
     /* Branches to an address in a register or in memory. Assumption: a conditional bx (bxeq) costs
      * as much as any other branch. */
-    {"tbb",    ALWAYS,    CLASS_INDIRECT, 2 + REFILL_INDIRECT, NOTHING},  /* TRM 3-1: 2+P */
-    {"tbh",    ALWAYS,    CLASS_INDIRECT, 2 + REFILL_INDIRECT, NOTHING},  /* TRM 3-1: 2+P */
-    {"bx",     IF_WHOLE,  CLASS_INDIRECT, 1 + REFILL_INDIRECT, NOTHING},  /* TRM 3-1: 1+P */
-    {"blx",    ALWAYS,    CLASS_INDIRECT, 1 + REFILL_INDIRECT, NOTHING},  /* TRM 3-1: 1+P */
+    {"tbb",    ALWAYS,    CLASS_OTHER,    2 + REFILL_INDIRECT, NOTHING},  /* TRM 3-1: 2+P */
+    {"tbh",    ALWAYS,    CLASS_OTHER,    2 + REFILL_INDIRECT, NOTHING},  /* TRM 3-1: 2+P */
+    {"bx",     IF_WHOLE,  CLASS_OTHER,    1 + REFILL_INDIRECT, NOTHING},  /* TRM 3-1: 1+P */
+    {"blx",    ALWAYS,    CLASS_OTHER,    1 + REFILL_INDIRECT, NOTHING},  /* TRM 3-1: 1+P */
     /* Mnemonics that begin like a branch but are not one: bic, bfc and bfi, bkpt. */
-    {"bic",    ALWAYS,    CLASS_ALU,      1, NOTHING},                    /* TRM 3-1 */
-    {"bf",     ALWAYS,    CLASS_ALU,      1, NOTHING},                    /* TRM 3-1 */
-    {"bk",     ALWAYS,    CLASS_ALU,      1, NOTHING},                    /* assumption */
-    /* Other branches. If a branch is taken, cycles_behind() adds the refill to the next instruction.
-     * The loop instructions of ARMv8.1-M (le, wls, dls) count as branches. */
+    {"bic",    ALWAYS,    CLASS_OTHER,    1, NOTHING},                    /* TRM 3-1 */
+    {"bf",     ALWAYS,    CLASS_OTHER,    1, NOTHING},                    /* TRM 3-1 */
+    {"bk",     ALWAYS,    CLASS_OTHER,    1, NOTHING},                    /* assumption */
+    /* Other branches. If a branch is taken, cycles_behind() adds the refill to the next instruction. */
     {"b",      ALWAYS,    CLASS_BRANCH,   1, NOTHING},                    /* TRM 3-1: 1, 1+P */
     {"cbz",    ALWAYS,    CLASS_BRANCH,   1, NOTHING},                    /* TRM 3-1: 1, 1+P */
     {"cbnz",   ALWAYS,    CLASS_BRANCH,   1, NOTHING},                    /* TRM 3-1: 1, 1+P */
-    {"le",     ALWAYS,    CLASS_BRANCH,   1, NOTHING},                    /* assumption */
-    {"wls",    ALWAYS,    CLASS_BRANCH,   1, NOTHING},                    /* assumption */
-    {"dls",    ALWAYS,    CLASS_BRANCH,   1, NOTHING},                    /* assumption */
-    /* All other instructions. Assumption: this includes barriers (1+B), waits (1+W), msr, mrs and cps
+    /* All other instructions, multiplications among them. Assumption: this includes barriers (1+B), waits (1+W), msr, mrs and cps
      * (1 or 2), and arithmetic that writes the pc (1+P). */
-    {"",       ALWAYS,    CLASS_ALU,      1, NOTHING},                    /* TRM 3-1, 3-2 */
+    {"",       ALWAYS,    CLASS_OTHER,    1, NOTHING},                    /* TRM 3-1, 3-2 */
 };
 
 /* The properties of an instruction that the model uses. */
@@ -202,17 +139,6 @@ static bool names_register(const char *operands, const char *name)
             return true;
         }
         at += length;
-    }
-    return false;
-}
-
-static bool names_vector(const char *operands)
-{
-    static const char *const vectors[] = {"q0", "q1", "q2", "q3", "q4", "q5", "q6", "q7"};
-    for (size_t k = 0; k < sizeof vectors / sizeof *vectors; k++) {
-        if (names_register(operands, vectors[k])) {
-            return true;
-        }
     }
     return false;
 }
@@ -266,7 +192,7 @@ static bool has_register_offset(const char *operands)
     return *offset != '#';
 }
 
-static const struct rule *rule_for(const char *mnemonic, size_t length, const char *operands)
+static const struct rule *rule_for(const char *mnemonic, size_t length)
 {
     const struct rule *rule = rules;
     for (;; rule++) {
@@ -276,9 +202,6 @@ static const struct rule *rule_for(const char *mnemonic, size_t length, const ch
             continue;
         }
         if (rule->condition == IF_WHOLE && length != beginning) {
-            continue;
-        }
-        if (rule->condition == IF_VECTOR && !names_vector(operands)) {
             continue;
         }
         return rule;
@@ -316,7 +239,7 @@ static struct cost cost_of(const char *text)
         first = sizeof cost.first - 1;
     }
     memcpy(cost.first, cost.operands, first);
-    const struct rule *rule = rule_for(text, mnemonic, cost.operands);
+    const struct rule *rule = rule_for(text, mnemonic);
     cost.class = rule->class;
     cost.cycles = rule->cycles + extra_cycles(rule->extra, &cost);
     return cost;

@@ -1,4 +1,4 @@
-/* A translated instruction: its cost, and its effect on handlers and interrupt locks. */
+/* A translated instruction: its place, its cost, and whether it is a marker. */
 #ifndef M4INSN_H
 #define M4INSN_H
 
@@ -12,31 +12,11 @@ enum marker {
     REGION_ENDS,
 };
 
-/* The effect on interrupts: PRIMASK masks all of them, BASEPRI some. */
-enum lock_change {
-    LOCK_UNCHANGED,
-    ALL_OFF,
-    ALL_ON,
-    SOME_OFF,
-    SOME_ON,
-};
-
-enum { NO_HANDLER = -1 };
-
 struct insn {
     uint32_t pc;
     uint32_t size;
     struct cost cost;
     enum marker marker;
-    enum lock_change lock_change;
-    bool returns; /* is a return instruction, perhaps a conditional one */
-    bool watched; /* is the instruction at watch=ADDR */
-    int enters; /* the handler that begins here, or NO_HANDLER */
-    int leaves; /* the handler that ends here, or NO_HANDLER */
-    unsigned device_wait; /* wait states, once it was seen to access a peripheral register */
-    const char *text;
-    uint64_t executed; /* number of executions in the region */
-    uint64_t waited;   /* wait states in the region, cycles */
 };
 
 static uint32_t halfword(const uint8_t *bytes)
@@ -63,39 +43,6 @@ static enum marker marker_of(uint32_t first, uint32_t second)
     return NO_MARKER;
 }
 
-/* Assumption: PRIMASK is written only to unmask interrupts, and BASEPRI only to restore its value from
- * before BASEPRI_MAX was raised. The written value is not checked. */
-static enum lock_change lock_change_of(uint32_t first, uint32_t second)
-{
-    if (first == 0xB672) { /* cpsid i */
-        return ALL_OFF;
-    }
-    if (first == 0xB662) { /* cpsie i */
-        return ALL_ON;
-    }
-    if ((first & 0xFFF0) != 0xF380) { /* msr */
-        return LOCK_UNCHANGED;
-    }
-    switch (second) {
-    case 0x8810: /* primask */
-        return ALL_ON;
-    case 0x8812: /* basepri_max */
-        return SOME_OFF;
-    case 0x8811: /* basepri */
-        return SOME_ON;
-    default:
-        return LOCK_UNCHANGED;
-    }
-}
-
-static bool is_return(uint32_t first, uint32_t second)
-{
-    return first == 0x4770                             /* bx lr */
-        || (first & 0xFF00) == 0xBD00                  /* pop {.., pc} */
-        || (first == 0xE8BD && (second & 0x8000) != 0) /* pop.w {.., pc} */
-        || (first == 0xF85D && second == 0xFB04);      /* ldr pc, [sp], #4 */
-}
-
 /* Decodes an instruction from its encoding and its text; the text must outlive the instruction. */
 static void decode(struct insn *insn, uint32_t pc, const uint8_t *bytes, const char *text)
 {
@@ -104,13 +51,7 @@ static void decode(struct insn *insn, uint32_t pc, const uint8_t *bytes, const c
     uint32_t first = halfword(bytes);
     uint32_t second = insn->size == 4 ? halfword(bytes + 2) : 0;
     insn->marker = marker_of(first, second);
-    insn->lock_change = lock_change_of(first, second);
-    insn->returns = is_return(first, second);
-    insn->text = text;
     insn->cost = cost_of(text);
-    if (insn->marker != NO_MARKER) {
-        insn->cost.class = CLASS_MARKER;
-    }
 }
 
 static bool jumps(const struct insn *insn, const struct insn *previous)

@@ -49,6 +49,16 @@ fn a_reader_that_has_gone_is_no_failure() {
 }
 
 #[test]
+fn a_bench_that_cannot_run_says_what_to_use_or_fetch() {
+    for (arguments, named) in [(["--policies"], "cargo bringup")] {
+        let output = gyronet(&[&["bench-target"][..], &arguments].concat());
+        let err = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{err}");
+        assert!(err.contains(named) && err.trim_end().lines().count() == 1, "{err}");
+    }
+}
+
+#[test]
 fn wrong_arguments_are_status_2_and_failures_1() {
     for wrong in [
         &["nonsense"][..],

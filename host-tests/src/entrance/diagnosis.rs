@@ -3,6 +3,7 @@
 use super::records::SECTOR;
 use super::{Seed, byte, take};
 use crate::noise::Noise;
+use crate::ram_flash::RamFlash;
 use crate::synthetic::idling;
 use crate::tester::segment;
 use gyronet::health::{Faults, Status};
@@ -12,7 +13,6 @@ use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::layout::RECORD_SECTOR;
 use gyronet::store::{FlashFault, FogPart, ImuPart, Record as _};
 use gyronet::uds::Server;
-use gyronet_tools::target::ram_flash::RamFlash;
 
 const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
     imus: &[ImuPart::XsensMti],

@@ -1,6 +1,7 @@
 //! This module reads records in flash: configuration, calibration, what was learnt, and the accepted weights.
 
 use super::{Seed, byte, take};
+use crate::ram_flash::RamFlash;
 use crate::sent::Sent;
 use crate::synthetic::turning;
 use embedded_storage::nor_flash::ReadNorFlash;
@@ -11,7 +12,6 @@ use gyronet::mounting::Forward;
 use gyronet::sample::ImuSample;
 use gyronet::store::{Accepted, Calibration, Configuration, Learned, Level, Record, Store};
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
-use gyronet_tools::target::ram_flash::RamFlash;
 
 /// Size of a sector, smaller than the part's, so that it is soon full.
 pub const SECTOR: usize = 1024;

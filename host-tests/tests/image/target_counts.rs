@@ -1,25 +1,14 @@
 //! The kernels and the parsers cost no more on the target than the bars that the project has set itself, counted in
-//! the emulator, and they are right there. Instructions are exact where a C
-//! compiler is found (QEMU plugin), else good to six; modelled cycles need the compiler, and a
-//! test without one says that it left them out.
+//! the emulator (instructions, and modelled cycles at zero wait states), and they are right there.
 
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
 use gyronet::model::seconds::{Minute, Padding, STEPS, Second};
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
 use gyronet::units::Angle;
-use gyronet_host_tests::require::{Need, wants};
 use gyronet_host_tests::{image, qemu};
 use gyronet_tools::target::bench::{self, Counts};
-use gyronet_tools::target::parser_load::{FRAMES, ParserLoad};
 use gyronet_tools::target::size::ImageSize;
-
-/// Largest part of the processor's time that a part's frames may take, at 5 wait states.
-const SHARES: [(&str, f64); 3] = [
-    ("sensor/dsp1760_frame", 0.025),
-    ("sensor/dsp1760_timed_frame", 0.025),
-    ("sensor/mtdata2_frame", 0.0025),
-];
 
 /// The largest frame of each parser, and what it may hold beside it: clock, counters, settings.
 const PARSERS: [(&str, u64, u64); 6] = [
@@ -35,19 +24,20 @@ struct Bar {
     name: &'static str,
     instructions: u64,
     cycles: u64,
-    cycles_5ws: u64,
 }
 
 /// CMSIS-NN s8 takes 3,484,464 instructions and 4,382,365 modelled cycles for a whole window.
-const BARS: [Bar; 4] = [
-    Bar { name: "gyronet/window", instructions: 1_350_000, cycles: 1_570_000, cycles_5ws: 1_620_000 },
-    Bar { name: "gyronet/newest", instructions: 950_000, cycles: 1_100_000, cycles_5ws: 1_150_000 },
-    Bar { name: "fognet/window", instructions: 23_800_000, cycles: 26_100_000, cycles_5ws: 32_000_000 },
+const BARS: [Bar; 6] = [
+    Bar { name: "gyronet/window", instructions: 1_350_000, cycles: 1_570_000 },
+    Bar { name: "gyronet/newest", instructions: 950_000, cycles: 1_100_000 },
+    Bar { name: "fognet/window", instructions: 23_800_000, cycles: 26_100_000 },
     // What keeps a task of the same priority waiting.
-    Bar { name: "fognet/piece", instructions: 210_000, cycles: 230_000, cycles_5ws: 280_000 },
+    Bar { name: "fognet/piece", instructions: 210_000, cycles: 230_000 },
+    // A thousand of them in a second are 2 % of 168 MHz.
+    Bar { name: "sensor/dsp1760_timed_frame", instructions: 2_200, cycles: 3_360 },
+    // A hundred of them are 0.2 %.
+    Bar { name: "sensor/mtdata2_frame", instructions: 2_500, cycles: 3_360 },
 ];
-
-const NO_PLUGIN: &str = "cycles cannot be counted: no C compiler, or an emulator without plugins";
 
 #[test]
 fn kernels_and_parsers_cost_no_more_than_their_bars() {
@@ -59,17 +49,10 @@ fn kernels_and_parsers_cost_no_more_than_their_bars() {
         let counted = bench::measure(&bench::workspace(), &bench);
         counts.extend(counted.unwrap_or_else(|error| panic!("{name}: {error}")));
     }
-    let counted = if counts.exact() { Ok(()) } else { Err(NO_PLUGIN.to_owned()) };
-    let modelled = wants(test, Need::Qemu, counted).is_some();
-    for Bar { name, instructions, cycles, cycles_5ws } in BARS {
+    for Bar { name, instructions, cycles } in BARS {
         let count = counts.get(name).expect(name);
         println!("{count:?}");
-        assert!(count.instructions <= instructions, "{count:?}");
-        let within = |counted: Option<u64>, bar: u64| counted.is_some_and(|counted| counted <= bar);
-        assert!(
-            !modelled || within(count.cycles, cycles) && within(count.cycles_5ws, cycles_5ws),
-            "{count:?}"
-        );
+        assert!(count.instructions <= instructions && count.cycles <= cycles, "{count:?}");
     }
     // Ten random windows, zeros, the ends of the range: the same work to the instruction.
     assert_eq!(counts.starting_with("gyronet/window").count(), 12);
@@ -81,21 +64,10 @@ fn kernels_and_parsers_cost_no_more_than_their_bars() {
     assert!(size("fognet/state") <= 36_000);
     let stack = counts.get("gyronet/window").expect("measured").stack;
     assert!(stack <= 1_280, "{stack} bytes of stack for a window");
-    parsers(&counts);
-}
-
-fn parsers(counts: &Counts) {
-    let loads = ParserLoad::all(counts);
-    assert_eq!(loads.len(), FRAMES.len(), "{loads:?}");
-    for (name, limit) in SHARES {
-        let load = loads.iter().find(|load| load.name == name).expect(name);
-        println!("{load}");
-        assert!(load.share().is_none_or(|share| share <= limit), "{load}");
-    }
     for (name, frame, beside) in PARSERS {
-        let (_, bytes) = counts.sizes.iter().find(|(n, _)| n == name).expect(name);
+        let bytes = size(name);
         println!("{name}: {bytes} bytes");
-        assert!(*bytes <= frame + beside, "{name}: {bytes} bytes");
+        assert!(bytes <= frame + beside, "{name}: {bytes} bytes");
     }
 }
 

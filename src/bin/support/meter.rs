@@ -3,7 +3,7 @@
 #![allow(unsafe_code, reason = "marker instructions and stack painting; each block says why it is sound")]
 
 use core::arch::asm;
-use cortex_m::peripheral::{DCB, DWT, SYST, syst::SystClkSource};
+use cortex_m::peripheral::{DCB, DWT};
 use cortex_m_semihosting::hprintln;
 
 const PAINT: u32 = 0xC0DE_57AC;
@@ -18,43 +18,36 @@ fn stack_end() -> usize {
 }
 
 pub struct Meter {
-    syst: SYST,
     dwt: bool,
 }
 
 impl Meter {
-    pub fn new(mut syst: SYST, mut dcb: DCB, mut dwt: DWT) -> Self {
-        syst.set_clock_source(SystClkSource::Core);
-        syst.set_reload(0x00FF_FFFF);
-        syst.clear_current();
-        syst.enable_counter();
+    pub fn new(mut dcb: DCB, mut dwt: DWT) -> Self {
         dcb.enable_trace();
         dwt.enable_cycle_counter();
         let before = DWT::cycle_count();
         cortex_m::asm::delay(100);
         // The emulator has the register, but the count does not change.
-        Self { syst, dwt: DWT::cycle_count() != before }
+        Self { dwt: DWT::cycle_count() != before }
     }
 
-    /// Runs `work` between the markers and prints a line with its time and the stack it used.
+    /// Runs `work` between the markers and prints a line with the stack it used and, on a board, its cycles.
     #[inline(never)]
     pub fn run(&mut self, name: &str, mut work: impl FnMut()) {
         let frame = 0u32;
         paint();
-        let (ticks, cycles) = (SYST::get_current(), DWT::cycle_count());
+        let cycles = DWT::cycle_count();
         // SAFETY: DBG is a hint; without a debugger that listens it does nothing.
         unsafe { asm!(".inst.w 0xF3AF80F1") };
         work();
         // SAFETY: as above.
         unsafe { asm!(".inst.w 0xF3AF80F2") };
         let cycles = DWT::cycle_count().wrapping_sub(cycles);
-        let ticks = ticks.wrapping_sub(SYST::get_current()) & 0x00FF_FFFF;
-        let wrapped = self.syst.has_wrapped();
         let stack = core::ptr::from_ref(&frame).addr() - lowest_written();
         if self.dwt {
             hprintln!("{} cycles={} stack={}", name, cycles, stack);
         } else {
-            hprintln!("{} ticks={} wrapped={} stack={}", name, ticks, wrapped, stack);
+            hprintln!("{} stack={}", name, stack);
         }
     }
 }

@@ -1,8 +1,7 @@
-//! This module runs the bench image in the emulator and reads the counts in its output.
+//! The bench images in the emulator, and the counts in their output.
 //!
-//! With a C compiler, QEMU's plugin `tools/bench/m4count.c` counts instructions exactly and models Cortex-M4 cycles.
-//! Without one, the image counts instructions with its own SysTick under `-icount shift=0`, where an instruction
-//! takes a nanosecond. That count is accurate to 6 instructions.
+//! QEMU's plugin `tools/bench/m4count.c` counts instructions exactly and models Cortex-M4 cycles at zero wait states. It
+//! is built with the C compiler that Rust's linker needs anyway.
 
 use std::ffi::OsStr;
 use std::io::Read;
@@ -11,8 +10,6 @@ use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// SysTick ticks of the emulated STM32F405 per 1000 instructions (168 MHz, 1 instruction/ns).
-const TICKS_PER_1000: u64 = 168;
 /// Timeout of an image's run or a build.
 const LIMIT: Duration = Duration::from_secs(900);
 const POLL: Duration = Duration::from_millis(5);
@@ -62,10 +59,8 @@ pub struct Count {
     pub name: String,
     /// Number of executed instructions.
     pub instructions: u64,
-    /// Modelled Cortex-M4 cycles at zero wait states; `None` without the plugin.
-    pub cycles: Option<u64>,
-    /// Modelled cycles on an STM32F405 at 168 MHz: flash with 5 wait states, empty caches at the start.
-    pub cycles_5ws: Option<u64>,
+    /// Modelled Cortex-M4 cycles at zero wait states.
+    pub cycles: u64,
     /// Bytes of stack used below the caller.
     pub stack: u64,
 }
@@ -92,20 +87,13 @@ impl Counts {
         self.regions.iter().find(|count| count.name == name)
     }
 
-    /// Returns whether instructions were counted exactly; otherwise the counts are accurate to six.
-    #[must_use]
-    pub fn exact(&self) -> bool {
-        self.regions.iter().all(|count| count.cycles.is_some())
-    }
-
     /// Returns whether all windows of a network have the same instruction count, as they must for any input.
     #[must_use]
     pub fn constant(&self) -> bool {
-        let tolerance = if self.exact() { 0 } else { 12 };
         ["gyronet/window", "fognet/window"].into_iter().all(|network| {
             let mut windows = self.starting_with(network).map(|count| count.instructions);
             let first = windows.next();
-            windows.all(|other| first.is_some_and(|first| first.abs_diff(other) <= tolerance))
+            windows.all(|other| first == Some(other))
         })
     }
 
@@ -184,60 +172,12 @@ pub fn build_for(
     Ok(folder.join(target).join("release").join(image))
 }
 
-/// Runs the bench image with the plugin that counts instructions, or without it if it cannot be built or loaded.
+/// Runs the bench image with the plugin and combines its output with the plugin's counts.
 ///
 /// # Errors
-/// [`BenchError`].
+/// [`BenchError`], also without a C compiler or where QEMU was built without plugins.
 pub fn measure(workspace: &Path, image: &Path) -> Result<Counts, BenchError> {
-    match plugin(workspace) {
-        // An emulator built without plugins refuses the argument.
-        Some(plugin) => count(image, Some(&plugin)).or_else(|_| count(image, None)),
-        None => count(image, None),
-    }
-}
-
-/// The policies of the flash accelerator that ST's manual leaves open, with the plugin's options for each. The model
-/// uses the first one.
-pub const POLICIES: [(&str, &str); 4] = [
-    ("least recently used", ""),
-    ("first in, first out", ",policy=fifo"),
-    ("prefetched lines kept", ",prefetched=kept"),
-    ("both", ",policy=fifo,prefetched=kept"),
-];
-
-/// Returns the counts of the bench image under each of [`POLICIES`].
-///
-/// # Errors
-/// [`BenchError`], also without a C compiler.
-pub fn measure_policies(workspace: &Path, image: &Path) -> Result<Vec<Counts>, BenchError> {
-    let plugin = plugin(workspace).ok_or_else(|| BenchError::Line("no instruction counter".into()))?;
-    let counts = POLICIES.iter().map(|(_, options)| {
-        let mut plugin = plugin.clone().into_os_string();
-        plugin.push(options);
-        count(image, Some(Path::new(&plugin)))
-    });
-    counts.collect()
-}
-
-/// Compiles the plugin that counts instructions; returns `None` without a C compiler.
-pub fn plugin(workspace: &Path) -> Option<PathBuf> {
-    let folder = workspace.join("target");
-    std::fs::create_dir_all(&folder).ok()?;
-    let library = folder.join("m4count.so");
-    let source = workspace.join("tools/bench/m4count.c");
-    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_owned());
-    let mut cc = Command::new(compiler);
-    cc.args(["-O2", "-shared", "-fPIC", "-o"]).arg(&library).arg(source);
-    run(&mut cc).is_ok().then_some(library)
-}
-
-/// Runs the bench image and combines its output with the plugin's counts.
-fn count(image: &Path, plugin: Option<&Path>) -> Result<Counts, BenchError> {
-    let (stdout, stderr) = match plugin {
-        Some(plugin) => emulate(MACHINE, image, &["-plugin", &plugin.display().to_string()])?,
-        None => emulate(MACHINE, image, &["-icount", "shift=0"])?,
-    };
-    let mut regions = stderr.lines().filter(|line| line.starts_with("REGION"));
+    let (stdout, mut regions) = regions(workspace, MACHINE, image)?;
     let mut counts = Counts::default();
     for line in stdout.lines() {
         let unexpected = || BenchError::Line(line.to_owned());
@@ -247,19 +187,42 @@ fn count(image: &Path, plugin: Option<&Path>) -> Result<Counts, BenchError> {
             continue;
         }
         let stack = field(line, "stack=").ok_or_else(unexpected)?;
-        let (instructions, cycles) = if plugin.is_some() {
-            let region = regions.next().ok_or_else(unexpected)?;
-            let instructions = field(region, "insns=").ok_or_else(unexpected)?;
-            let cycles = field(region, "m4cycles~").ok_or_else(unexpected)?;
-            let waited = field(region, "waited~").ok_or_else(unexpected)?;
-            (instructions, Some((cycles, waited)))
-        } else {
-            (field(line, "ticks=").ok_or_else(unexpected)? * 1000 / TICKS_PER_1000, None)
-        };
-        let (cycles, cycles_5ws) = cycles.unzip();
-        counts.regions.push(Count { name: name.to_owned(), instructions, cycles, cycles_5ws, stack });
+        let (instructions, cycles) = regions.next().ok_or_else(unexpected)?;
+        counts.regions.push(Count { name: name.to_owned(), instructions, cycles, stack });
     }
     Ok(counts)
+}
+
+/// Runs an image with the plugin; returns the image's output, and instructions and cycles of each region.
+pub(super) fn regions(
+    workspace: &Path,
+    machine: &str,
+    image: &Path,
+) -> Result<(String, impl Iterator<Item = (u64, u64)>), BenchError> {
+    let plugin = plugin(workspace)?;
+    let (stdout, stderr) = emulate(machine, image, &["-plugin", &plugin.display().to_string()])?;
+    let counts = stderr.lines().filter(|line| line.starts_with("REGION"));
+    let counts = counts.filter_map(|line| Some((field(line, "insns=")?, field(line, "m4cycles~")?)));
+    Ok((stdout, counts.collect::<Vec<_>>().into_iter()))
+}
+
+/// Compiles the plugin that counts instructions.
+fn plugin(workspace: &Path) -> Result<PathBuf, BenchError> {
+    let library = scratch(workspace)?.join("m4count.so");
+    let source = workspace.join("tools/bench/m4count.c");
+    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_owned());
+    let mut cc = Command::new(compiler);
+    cc.args(["-O2", "-shared", "-fPIC", "-o"]).arg(&library).arg(source);
+    run(&mut cc)?;
+    Ok(library)
+}
+
+/// Returns the folder for what the bench compiles from C.
+pub(super) fn scratch(workspace: &Path) -> Result<PathBuf, BenchError> {
+    let folder = workspace.join("target");
+    let program = || format!("a bench in {}", folder.display());
+    std::fs::create_dir_all(&folder).map_err(|source| BenchError::Start { program: program(), source })?;
+    Ok(folder)
 }
 
 /// Runs an image on an emulated machine until it ends by itself; returns what the image and the emulator printed.
@@ -274,13 +237,13 @@ pub fn emulate(machine: &str, image: &Path, arguments: &[&str]) -> Result<(Strin
 }
 
 /// Returns the number after `key` in a line.
-pub(crate) fn field(line: &str, key: &str) -> Option<u64> {
+fn field(line: &str, key: &str) -> Option<u64> {
     let (_, rest) = line.split_once(key)?;
     rest.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
 }
 
 /// Runs a program to its end; returns its output, or its error output as an error.
-fn run(command: &mut Command) -> Result<(String, String), BenchError> {
+pub(super) fn run(command: &mut Command) -> Result<(String, String), BenchError> {
     let program = command.get_program().to_string_lossy().into_owned();
     let start = |source| BenchError::Start { program: program.clone(), source };
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
