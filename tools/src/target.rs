@@ -1,6 +1,8 @@
 //! The firmware's cost on its processor. [`mod@bench`] counts instructions and models cycles of the networks and
-//! parsers in QEMU. [`size`] and [`stack`] read the image's ELF file.
+//! parsers in QEMU, [`cmsis_nn`] those of the same network by CMSIS-NN. [`size`] and [`stack`] read the image's ELF
+//! file.
 
 pub mod bench;
+pub mod cmsis_nn;
 pub mod size;
 pub mod stack;

@@ -50,8 +50,11 @@ fn a_reader_that_has_gone_is_no_failure() {
 
 #[test]
 fn a_bench_that_cannot_run_says_what_to_use_or_fetch() {
-    for (arguments, named) in [(["--policies"], "cargo bringup")] {
-        let output = gyronet(&[&["bench-target"][..], &arguments].concat());
+    for (arguments, named) in [
+        (&["--policies"][..], "cargo bringup"),
+        (&["--cmsis-nn", "/nowhere"], "git clone --depth 1 https://"),
+    ] {
+        let output = gyronet(&[&["bench-target"], arguments].concat());
         let err = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{err}");
         assert!(err.contains(named) && err.trim_end().lines().count() == 1, "{err}");

@@ -2,7 +2,9 @@
 
 use super::Common;
 use gyronet_tools::target::bench::{self, Count, Counts};
+use gyronet_tools::target::cmsis_nn::{self, Region};
 use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 
 /// Count instructions and model cycles of the firmware on a Cortex-M4F, in QEMU.
 ///
@@ -12,9 +14,15 @@ use std::io::{self, Write};
 /// It prints one line for each kernel, network and sensor parser: `name instructions=N cycles=N stack=BYTES`. Sizes
 /// follow: of states, weights, parsers, and of the frames that the parsers got.
 ///
+/// With --cmsis-nn it prints GyroNet's network by CMSIS-NN beside ours, in the same emulator with the same counter. That
+/// needs arm-none-eabi-gcc, and the sources: git clone --depth 1 https://github.com/ARM-software/CMSIS-NN
+///
 /// The exit status is 1 if the instruction count of a network's window depends on its input.
 #[derive(Debug, clap::Args)]
 pub struct Args {
+    /// Compare GyroNet with CMSIS-NN, whose sources are in DIR.
+    #[arg(long, value_name = "DIR")]
+    cmsis_nn: Option<PathBuf>,
     /// Was: cycles with flash wait states under four cache policies.
     #[arg(long, hide = true)]
     policies: bool,
@@ -29,6 +37,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     let workspace = bench::workspace();
     let folder = bench::target_folder();
+    if let Some(sources) = &args.cmsis_nn {
+        return compare(&workspace, &folder, sources, common);
+    }
     let mut counts = Counts::default();
     for image in bench::IMAGES {
         let image = bench::build(&workspace, image, &folder)?;
@@ -60,4 +71,38 @@ fn json(counts: &Counts) -> serde_json::Value {
         "regions": counts.regions.iter().map(region).collect::<Vec<_>>(),
         "sizes": sizes.collect::<serde_json::Map<_, _>>(),
     })
+}
+
+/// Prints GyroNet's window, and its newest output alone, by our kernels and by CMSIS-NN's.
+fn compare(workspace: &Path, folder: &Path, sources: &Path, common: Common) -> super::Result {
+    // CMSIS-NN first: where its sources or its compiler are missing, nothing of ours is built.
+    let (theirs, compiler) = cmsis_nn::measure(workspace, sources)?;
+    let counts = bench::measure(workspace, &bench::build(workspace, bench::IMAGES[0], folder)?)?;
+    let rows = ["window", "newest"].map(|extent| {
+        let ours = counts.get(&format!("gyronet/{extent}"));
+        let theirs: Vec<&Region> = theirs.iter().filter(|region| region.name.ends_with(extent)).collect();
+        (ours, theirs)
+    });
+    let out = &mut io::stdout().lock();
+    if common.json {
+        let row = |name: &str, instructions: u64, cycles: u64| serde_json::json!({ "name": name, "instructions": instructions, "cycles": cycles });
+        let rows = rows.iter().flat_map(|(ours, theirs)| {
+            let ours = ours.iter().map(|ours| row(&ours.name, ours.instructions, ours.cycles));
+            ours.chain(theirs.iter().map(|region| row(&region.name, region.instructions, region.cycles)))
+        });
+        writeln!(out, "{}", rows.collect::<serde_json::Value>())?;
+        return Ok(());
+    }
+    writeln!(out, "GyroNet's network on a Cortex-M4, zero wait states; CMSIS-NN by gcc {compiler} -O3")?;
+    for (ours, theirs) in rows {
+        let Some(Count { name, instructions, cycles, .. }) = ours else { continue };
+        writeln!(out, "{name} instructions={instructions} cycles={cycles}")?;
+        for region in theirs {
+            let [more, longer] = [(region.instructions, *instructions), (region.cycles, *cycles)]
+                .map(|(theirs, ours)| theirs as f64 / ours.max(1) as f64);
+            let Region { name, instructions, cycles } = region;
+            writeln!(out, "{name} instructions={instructions} ({more:.2}x) cycles={cycles} ({longer:.2}x)")?;
+        }
+    }
+    Ok(())
 }
