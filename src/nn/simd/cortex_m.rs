@@ -39,14 +39,16 @@
 //! cell, hidden state and the jump to the next unit.
 //!
 //! # Expected and modelled cycles
-//! Modelled cycles per multiply-accumulate (`cargo bench-target`):
+//! Modelled cycles per multiply-accumulate at zero wait states (`cargo bench-target`):
 //!
-//! | kernel | multiply-accumulates | inner loop alone | zero wait states | flash at 5 |
-//! |---|---|---|---|---|
-//! | `kernel/project_120x60`: one pair of steps, weights from flash | 57,600 | 0.94 | 1.03 | 1.23 |
-//! | `kernel/project_120x60x5`: five pairs, each weight copied once | 288,000 | 0.94 | 1.08 | 1.12 |
-//! | `kernel/step_60`: weights from flash; gates and states included | 14,400 | 1.19 | 1.54 | 1.90 |
-//! | `kernel/step_60_from_ram`: the same, weights copied before | 14,400 | 1.19 | 1.54 | 1.55 |
+//! | kernel | multiply-accumulates | inner loop alone | whole kernel |
+//! |---|---|---|---|
+//! | `kernel/project_120x60`: one pair of steps, weights from flash | 57,600 | 0.94 | 1.03 |
+//! | `kernel/project_120x60x5`: five pairs, each weight copied once | 288,000 | 0.94 | 1.08 |
+//! | `kernel/step_60`, gates and states included | 14,400 | 1.19 | 1.54 |
+//!
+//! Copying weights to RAM takes 5 % of a window's cycles there. By a model of the flash accelerator, an STM32F405 at 168
+//! MHz saves 10 % with it.
 
 #![allow(unsafe_code, reason = "assembly; the only such file of the library")]
 
@@ -74,6 +76,8 @@ macro_rules! cpu {
 const PROJECT_UNROLL: usize = 12;
 /// Bytes of code for one of them: 4 loads of 2 bytes and 10 instructions of 4; the last one has 4 more.
 const PROJECT_BYTES: usize = 48;
+/// A record of this size fits in the flash accelerator's eight lines for data (RM0090 3.5.2), wherever it begins.
+const CACHED_BYTES: usize = 7 * 16;
 /// The unrolled loop of the recurrent step has this many double column pairs.
 const STEP_UNROLL: usize = 8;
 /// Bytes of code for one of them: 4 loads of 2 bytes and 14 instructions of 4; the last one has 2 more.
@@ -135,9 +139,12 @@ pub(in crate::nn) fn project<const U: usize>(
     if projection.is_empty() || x.len() != inputs * projection.len() || weights.units() > U {
         return;
     }
-    // A record is read for each pair of steps: from the second pair on, reading a copy is faster.
+    // A record is read for each pair of steps: from the second pair on, reading a copy is faster, unless the record
+    // stays in the cache for data.
     let mut record = MaybeUninit::<[u32; BIAS_WORDS + MAX_INPUTS]>::uninit();
-    let copy = if projection.len() > 1 { record.as_mut_ptr().cast() } else { core::ptr::null_mut() };
+    let record_bytes = size_of::<Accumulators>() + 4 * inputs;
+    let copies = projection.len() > 1 && record_bytes > CACHED_BYTES;
+    let copy = if copies { record.as_mut_ptr().cast() } else { core::ptr::null_mut() };
     let first = projection.as_mut_ptr().cast::<Accumulators>();
     let skipped = entry(inputs / 2, PROJECT_UNROLL);
     let call = ProjectCall {
@@ -146,7 +153,7 @@ pub(in crate::nn) fn project<const U: usize>(
         projection: first,
         projection_end: first.wrapping_add(weights.units()),
         record: copy,
-        record_bytes: size_of::<Accumulators>() + 4 * inputs,
+        record_bytes,
         entry: skipped * PROJECT_BYTES,
         skipped: 8 * skipped,
         step_bytes: size_of::<[Accumulators; U]>(),
