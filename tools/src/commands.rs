@@ -4,7 +4,6 @@
 pub mod bench_target;
 pub mod bus;
 pub mod calibrate;
-pub mod campaign;
 pub mod completions;
 pub mod demo;
 pub mod device;
@@ -26,7 +25,6 @@ pub mod retired;
 pub mod sign;
 pub mod simulate;
 pub mod size;
-pub mod soak;
 pub mod train;
 pub mod warm_up;
 mod weights;

@@ -4,7 +4,7 @@
 //! these modules.
 //!
 //! ```text
-//! drive <- parts <- campaign -> plot, client, simulate
+//! drive <- parts
 //! drive <- calibrate
 //! drive <- import -> wheels
 //! drive <- doctor -> import, plot
@@ -17,7 +17,6 @@
 
 pub mod bundled;
 pub mod calibrate;
-pub mod campaign;
 pub mod client;
 pub mod demo;
 #[cfg(feature = "logs")]

@@ -53,7 +53,6 @@ enum Command {
     Calibrate(commands::calibrate::Args),
     #[cfg(feature = "logs")]
     Replay(commands::replay::Args),
-    Campaign(commands::campaign::Args),
     Simulate(commands::simulate::Args),
     #[cfg(feature = "logs")]
     Import(commands::import::Args),
@@ -72,7 +71,6 @@ enum Command {
     Wheels(commands::wheels::Args),
     Size(commands::size::Args),
     Completions(commands::completions::Args),
-    Soak(commands::soak::Args),
     WarmUp(commands::warm_up::Args),
 }
 
@@ -90,7 +88,6 @@ fn main() -> ExitCode {
         Command::Calibrate(args) => commands::calibrate::run(args, common),
         #[cfg(feature = "logs")]
         Command::Replay(args) => commands::replay::run(args, common),
-        Command::Campaign(args) => commands::campaign::run(args, common),
         Command::Keys(args) => commands::keys::run(args, common),
         Command::Sign(args) => commands::sign::run(args, common),
         Command::Reference(args) => commands::reference::run(args, common),
@@ -109,7 +106,6 @@ fn main() -> ExitCode {
         Command::Wheels(args) => commands::wheels::run(args, common),
         Command::Size(args) => commands::size::run(args, common),
         Command::Completions(args) => commands::completions::run(args, Cli::command()),
-        Command::Soak(args) => commands::soak::run(args, common),
         Command::WarmUp(args) => commands::warm_up::run(args, common),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };

@@ -1,7 +1,7 @@
 //! These modules simulate the sensor parts that a vehicle may have, byte by byte.
 //!
 //! The samples of a recording are encoded as the part would send them, and decoded by the parser that the board runs.
-//! The fault campaign corrupts the same bytes.
+//! The fault harness of `host-tests` corrupts the same bytes.
 //!
 //! | part | what is sent | what is rounded |
 //! |---|---|---|
@@ -10,11 +10,11 @@
 //! | ICM-42688-P | one 20-bit FIFO packet per row, over a simulated SPI bus | 1/131 deg/s, 1/8192 g |
 //! | ADIS16465-2 | one burst per row, over a simulated SPI bus | 1/40 deg/s, 1/4000 g |
 
-pub(crate) mod adis16465;
+pub mod adis16465;
 pub mod compare;
-pub(crate) mod dsp1760;
-pub(crate) mod icm42688;
-pub(crate) mod xsens;
+pub mod dsp1760;
+pub mod icm42688;
+pub mod xsens;
 
 use crate::drive::recording::{Recording, Row};
 use gyronet::sample::ImuSample;

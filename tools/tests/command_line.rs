@@ -161,7 +161,9 @@ fn bash_completes() {
 #[test]
 fn retired_names_say_what_does_their_work() {
     for (retired, successor) in [
-        (&["paper", "KAIST", "--out", "OUT"][..], "make -f tools/paper/Makefile"),
+        (&["campaign", "--upsets"][..], "--bin faults"),
+        (&["--json", "soak"], "--bin faults"),
+        (&["paper", "KAIST", "--out", "OUT"], "make -f tools/paper/Makefile"),
         (&["tables", "SEQUENCES"], "cargo paper tables"),
         (&["simulate", "--layout", "kaist", "--out", "OUT"], "cargo paper simulate"),
         (&["import", "urban06", "--training", "--out", "a.csv"], "cargo paper import"),

@@ -36,7 +36,7 @@ fn tests_that_pages_name_exist() {
         let text = fs::read_to_string(&path).unwrap();
         for name in text.split('`').skip(1).step_by(2) {
             let parts: Vec<&str> = name.split("::").collect();
-            let [binary @ ("board" | "image" | "library" | "tools" | "soak"), modules @ .., test] =
+            let [binary @ ("board" | "image" | "library" | "tools" | "faults"), modules @ .., test] =
                 &parts[..]
             else {
                 continue;

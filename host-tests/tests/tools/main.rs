@@ -1,7 +1,6 @@
 //! Tests of the library with the tools: recordings, simulated drives, reports.
 
 mod accuracy;
-mod campaign;
 mod course_reference;
 mod doctor;
 mod fir_choice;
@@ -28,5 +27,4 @@ mod tables_methods;
 mod trajectory_evo;
 mod turns;
 mod unit_transfer;
-mod upsets;
 mod warm_up;

@@ -2,7 +2,10 @@
 
 use clap::error::{ContextKind, ContextValue};
 
-const RETIRED: [(&str, &str); 6] = [
+const FAULTS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin faults`";
+const RETIRED: [(&str, &str); 8] = [
+    ("campaign", FAULTS),
+    ("soak", FAULTS),
     ("paper", "`make -f tools/paper/Makefile`"),
     ("tables", "`cargo paper tables`"),
     ("--layout", "`cargo paper simulate`"),

@@ -18,7 +18,7 @@ const READ_BYTES: u64 = 2 + BURST as u64;
 /// The reported temperature, counts of 0.1 deg C: room temperature.
 const TEMPERATURE: i16 = 250;
 
-pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
+pub(super) fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let bus = Bus::default();
     let mut part = Adis16465::new(bus.clone(), MODEL);
     let mut samples = Vec::with_capacity(recording.rows.len());
@@ -33,7 +33,7 @@ pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
 }
 
 /// Returns the steps of a rate in rad/s and of an acceleration in m/s^2.
-pub fn steps() -> [f64; 2] {
+pub(super) fn steps() -> [f64; 2] {
     let [per_rad, per_force] = counts();
     [1.0 / per_rad, 1.0 / per_force]
 }

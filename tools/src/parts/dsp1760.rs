@@ -19,7 +19,7 @@ pub const MESSAGES: u64 = 10;
 /// Time from one message to the next, microseconds.
 pub const MESSAGE_US: u64 = PERIOD_US / MESSAGES;
 
-pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
+pub(super) fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let mut gyro = Gyro { part: Dsp1760::new(Dsp1760Config::DEFAULT), bytes: 0 };
     let mut grid = FogGrid::START;
     let mut samples = Vec::with_capacity(recording.rows.len());

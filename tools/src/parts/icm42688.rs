@@ -28,7 +28,7 @@ const WRAP: u64 = 1 << 16;
 /// Time after which the counter wraps, microseconds; a count is 32/30 us.
 pub const WRAP_US: f64 = WRAP as f64 * 32.0 / 30.0;
 
-pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
+pub(super) fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let bus = Bus::default();
     let no_start = |why: String| ViaError::NoStart { part: Part::Icm42688, why };
     let mut part = Icm42688::new(bus.clone(), Icm42688Config::default(), &mut NoDelay)

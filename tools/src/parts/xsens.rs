@@ -13,7 +13,7 @@ const GOOD: u32 = 3;
 /// Length of a tick of SampleTimeFine, microseconds.
 const TICK_US: u64 = 100;
 
-pub fn send(recording: &Recording) -> Result<Sent, ViaError> {
+pub(super) fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let mut mti = Mti::new();
     let (mut samples, mut bytes) = (Vec::with_capacity(recording.rows.len()), 0);
     // The part's 32-bit tick counter does not contain the earlier wraps of the recording's time.

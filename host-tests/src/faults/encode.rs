@@ -1,24 +1,21 @@
-//! This module encodes a reading as the messages of a part: those of [`crate::parts`], with the effects of a fault.
+//! Readings as the messages of a part: those of [`gyronet_tools::parts`], with the effects of a fault.
 
 use super::drive::Reading;
 use super::fault::Line;
-use super::wire::Message;
-use crate::parts::dsp1760::{MESSAGE_US, MESSAGES, message};
-use crate::parts::icm42688::{ENDS, packet};
-use crate::parts::{Part, adis16465, xsens};
-use crate::random::Random;
+use super::line::Message;
 use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::sensor::adis16465::{Burst, DiagStat};
 use gyronet::sensor::dsp1760::message::{Extra, Validity};
 use gyronet::sensor::xsens::MtData2;
 use gyronet::units::Micros;
+use gyronet_tools::parts::dsp1760::{MESSAGE_US, MESSAGES, message};
+use gyronet_tools::parts::icm42688::{ENDS, packet};
+use gyronet_tools::parts::{Part, adis16465, xsens};
+use gyronet_tools::random::Random;
 
 /// Full scale of an MTi, rad/s and m/s^2.
 const XSENS_LARGEST: [f32; 2] = [7.85, 98.0];
-/// The parts' clocks start at this time, microseconds, to differ from the board's clock.
-const PART_EPOCH_US: u64 = 77_000_000;
 
-/// Appends the messages that a part sends for a row.
 pub fn encode(part: Part, row: usize, reading: &Reading, out: &mut Vec<Message>) {
     let message = |line, at, bytes: &[u8]| Message { line, row, at, bytes: bytes.to_vec() };
     match part {
@@ -40,9 +37,9 @@ pub fn encode(part: Part, row: usize, reading: &Reading, out: &mut Vec<Message>)
     }
 }
 
-/// Returns the time stamp by the part's own clock.
+/// The time stamp by the part's own clock.
 fn stamp(reading: &Reading) -> u64 {
-    (PART_EPOCH_US + reading.sample.time.0).saturating_add_signed(reading.stamp_us)
+    (reading.epoch_us + reading.sample.time.0).saturating_add_signed(reading.stamp_us)
 }
 
 fn mtdata2(row: usize, reading: &Reading) -> MtData2 {
@@ -63,7 +60,6 @@ fn mtdata2(row: usize, reading: &Reading) -> MtData2 {
     message
 }
 
-/// Returns a value that is not a valid reading.
 const fn no_number(form: usize) -> f32 {
     match form {
         0 => f32::NAN,

@@ -1,12 +1,14 @@
-//! This module judges a run by comparing it with the undamaged run and with the truth.
+//! The judgement of a run: every second that is marked good, against the undamaged run and against the truth.
 
 use super::receiver::{Reports, Seen};
 use gyronet::sample::RATE_HZ;
-use serde::Serialize;
 
 /// Number of rows over which yaw is compared: a second.
 const SECOND: usize = RATE_HZ as usize;
-/// Holds the error limits of undamaged drives against the truth, and of undetected faults.
+/// Number of rows after a report that are not judged: their rates still compensate for estimates of bad samples.
+const PAID: usize = 20;
+const RADIANS: f64 = std::f64::consts::TAU / 4_294_967_296.0;
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Largest yaw that may move in a second before the first report, whatever expected error is sent, rad. It also
@@ -21,17 +23,13 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Limits of a MEMS part: `moved` is twice the expected error of a rate that the network has not corrected.
+    /// A MEMS part: `moved` is twice the expected error of a rate that the network has not corrected.
     pub const INERTIAL: Self = Self { moved: 5e-4, mean: 5e-4, largest: 2.5e-3, inside_sigma: [0.25, 0.85] };
-    /// Limits of a fibre-optic gyro, which states no error: `moved` is twice the error of its undamaged drives.
+    /// A fibre-optic gyro, which states no error: `moved` is twice the error of its undamaged drives.
     pub const FIBRE_OPTIC: Self = Self { moved: 1e-4, mean: 1e-4, largest: 2e-4, inside_sigma: [0.0, 1.0] };
 }
 
-/// Number of rows after a report that are not judged: their rates still compensate for estimates of bad samples.
-const PAID: usize = 20;
-const RADIANS: f64 = std::f64::consts::TAU / 4_294_967_296.0;
-
-/// Holds the messages of the undamaged run, row by row.
+/// The messages of the undamaged run, row by row.
 #[derive(Debug, Clone)]
 pub struct Baseline {
     rows: Vec<Row>,
@@ -47,23 +45,20 @@ struct Row {
     sigma: Option<f64>,
     /// Consecutive good rows up to this one.
     good: usize,
-    events: u64,
 }
 
-/// Holds the outcome of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Outcome {
     /// Time from the fault's first effect to the first message, or first missing message, that reports it, s.
     pub reported_after: Option<f64>,
-    /// Says whether the board has counted an event, which a diagnosis would see.
-    pub counted: bool,
     /// Largest yaw moved in a second that is all marked good, before the first report, rad.
     pub moved: f64,
     /// Largest ratio of the moved yaw to its limit: the smaller of [`Limits::moved`] and the expected error that was
     /// sent with it.
     pub moved_limits: f64,
     /// Largest growth of a good second's error over the same undamaged second, from 0.2 s after the last report on,
-    /// rad; without a reference, the largest yaw moved.
+    /// rad; without a reference, the largest yaw moved. The yaw itself is not compared there: the windows then begin
+    /// at another sample, and two equally good estimates need not be equal.
     pub grown: f64,
     /// Largest ratio of the growth to the limit.
     pub grown_limits: f64,
@@ -71,28 +66,23 @@ pub struct Outcome {
     pub error: f64,
     /// Time from the end of the fault to its last report, s; 0 if the last report was earlier.
     pub recovery: f64,
-    /// Says whether the fault was still reported at the end.
+    /// The fault was still reported at the end, though it was over.
     pub not_recovered: bool,
 }
 
 impl Outcome {
-    /// Returns whether the fault moved yaw by more than the limit before anything was reported.
-    #[must_use]
     pub fn is_undetected(&self) -> bool {
         self.moved_limits > 1.0
     }
 
-    /// Returns whether the fault was not reported and did not move yaw by more than the limit.
-    #[must_use]
     pub fn is_harmless(&self) -> bool {
         self.reported_after.is_none() && !self.is_undetected()
     }
 }
 
-/// Holds the errors of the undamaged run against the drive's reference, over whole good seconds.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+/// The errors of the undamaged run against the drive's reference, over whole good seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct AgainstTruth {
-    /// Seconds compared.
     pub seconds: usize,
     /// Mean error of a second, rad.
     pub mean: f64,
@@ -100,11 +90,10 @@ pub struct AgainstTruth {
     pub largest: f64,
     /// Share of the errors inside the expected error that was sent; `None` where none is sent.
     pub inside_sigma: Option<f64>,
-    /// Says whether all these errors are within [`Limits`].
+    /// All these errors are within [`Limits`].
     pub in_order: bool,
 }
 
-/// Holds the times of one run and of its faults.
 #[derive(Debug, Clone, Copy)]
 pub struct Times {
     /// First row of the run.
@@ -118,18 +107,12 @@ pub struct Times {
 }
 
 impl Baseline {
-    /// Collects the observations of the undamaged run, and the board's event count after each row.
-    #[must_use]
-    pub fn new(count: usize, seen: &[Seen], events: &[u64], truth: Option<Vec<f64>>, limits: Limits) -> Self {
+    pub fn new(count: usize, seen: &[Seen], truth: Option<Vec<f64>>, limits: Limits) -> Self {
         let mut rows = vec![Row::default(); count];
-        for (row, events) in rows.iter_mut().zip(events) {
-            row.events = *events;
-        }
         for seen in seen {
             let Some(set) = seen.set else { continue };
-            rows[set.row].reports = seen.reports;
-            rows[set.row].yaw = Some(set.yaw);
-            rows[set.row].sigma = set.sigma;
+            let (yaw, sigma, good) = (Some(set.yaw), set.sigma, 0);
+            rows[set.row] = Row { reports: seen.reports, yaw, sigma, good };
         }
         let mut good = 0;
         for row in &mut rows {
@@ -139,14 +122,7 @@ impl Baseline {
         Self { rows, truth, limits }
     }
 
-    /// Returns the board's event count at the end of a row.
-    #[must_use]
-    pub fn events(&self, row: usize) -> u64 {
-        self.rows.get(row).map_or(0, |row| row.events)
-    }
-
     /// Compares the undamaged run with the truth, second by second; `None` without a truth.
-    #[must_use]
     pub fn against_truth(&self) -> Option<AgainstTruth> {
         let truth = self.truth.as_ref()?;
         let mut found = AgainstTruth::default();
@@ -175,8 +151,6 @@ impl Baseline {
         Some(found)
     }
 
-    /// Judges the observations of a damaged run.
-    #[must_use]
     pub fn judge(&self, seen: &[Seen], times: Times) -> Outcome {
         let mut outcome = Outcome::default();
         // The yaw moved up to each row, and the yaw of each row; `None` for a row without a set.

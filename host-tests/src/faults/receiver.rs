@@ -1,12 +1,10 @@
-//! This module models an ECU that reads the board's yaw messages, of the inertial sensor or of the fibre-optic gyro,
-//! and collects the faults that they report.
+//! An ECU that reads the board's yaw messages, of the inertial sensor or of the fibre-optic gyro, and collects the
+//! faults that they report.
 //!
 //! The ECU checks E2E, accepts a set of rate, angle and detail only if all three carry the same sample counter, and
 //! treats silence as a fault.
 
-use super::fault::Line;
-use super::wire::Message;
-use crate::parts::Part;
+use super::line::Message;
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::config::Config;
 use gyronet::can::e2e::{Checker, Verdict};
@@ -14,18 +12,18 @@ use gyronet::can::fog_encoder::FogEncoder;
 use gyronet::can::slcan::assembler::LineAssembler;
 use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Quality, RateMessage, SIGMA_UNKNOWN};
 use gyronet::can::{DataFrame, slcan};
+use gyronet_tools::parts::Part;
 
 /// The sender counts as silent after this time without a complete set, microseconds: three and a half periods.
 pub const TIMEOUT_US: u64 = 35_000;
 /// Up to this many consecutive missing messages count as lost; more count as out of sequence.
 const MAX_DELTA: u8 = 10;
 
-/// Holds the reports of a receiver, one bit each; bits 0 to 7 are the fault byte.
+/// Reports of a receiver, one bit each; bits 0 to 7 are the fault byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Reports(pub u32);
 
 impl Reports {
-    /// The quality is not good.
     pub const NOT_GOOD: Self = Self(1 << 8);
     /// The quality is "not to be used".
     pub const UNUSABLE: Self = Self(1 << 9);
@@ -36,14 +34,10 @@ impl Reports {
     /// No set arrived for [`TIMEOUT_US`].
     pub const SILENT: Self = Self(1 << 12);
 
-    /// Returns the reports of `self` that are not in `other`.
-    #[must_use]
     pub const fn beyond(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }
 
-    /// Returns whether there is no report.
-    #[must_use]
     pub const fn is_nothing(self) -> bool {
         self.0 == 0
     }
@@ -53,7 +47,7 @@ impl Reports {
     }
 }
 
-/// Holds the values of a complete set of messages.
+/// The values of a complete set of messages.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Set {
     /// Row of the sample with which the set was sent.
@@ -64,18 +58,15 @@ pub struct Set {
     pub sigma: Option<f64>,
 }
 
-/// An observation by the receiver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Seen {
-    /// Time of the observation, microseconds of the board's clock.
+    /// Microseconds of the board's clock.
     pub at: u64,
-    /// The reports.
     pub reports: Reports,
     /// The set that the observed message completed, if any.
     pub set: Option<Set>,
 }
 
-/// Reads messages as an ECU does.
 #[derive(Debug, Clone)]
 pub struct Receiver {
     messages: Vec<(Id, Checker)>,
@@ -86,8 +77,7 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// Creates a receiver of the messages that the board sends for this part.
-    #[must_use]
+    /// A receiver of the messages that the board sends for this part.
     pub fn new(part: Part) -> Self {
         let own = || Config::DEFAULT.settings().yaw.map(|yaw| (yaw.ids, yaw.e2e.profiles()));
         let fog = || Some((FOG_IDS, FogEncoder::profiles(FOG_IDS)));
@@ -96,18 +86,12 @@ impl Receiver {
             let ids = ids.map(|id| StandardId::new(id).map(Id::Standard));
             ids.into_iter().flatten().zip(profiles.map(|profile| Checker::new(profile, MAX_DELTA)))
         });
-        Self {
-            messages: checked.collect(),
-            assembler: LineAssembler::new(),
-            rate: None,
-            angle: None,
-            last: None,
-        }
+        let messages = checked.collect();
+        Self { messages, assembler: LineAssembler::new(), rate: None, angle: None, last: None }
     }
 
     /// Reads bytes from the board's CAN line and appends the observations.
     pub fn receive(&mut self, message: &Message, seen: &mut Vec<Seen>) {
-        debug_assert_eq!(message.line, Line::Out);
         self.time(message.at, seen);
         for byte in &message.bytes {
             let Some(line) = self.assembler.receive(*byte) else { continue };
@@ -161,11 +145,10 @@ impl Receiver {
 
     fn set(&mut self, counter: u8, data: &[u8], row: usize, mut seen: Seen) -> Option<Seen> {
         let detail = DetailMessage::parse(data).ok()?;
-        let (rate, angle) = (self.rate.take()?, self.angle.take()?);
-        if [rate.0, angle.0] != [counter; 2] {
+        let ((rate_counter, rate), (angle_counter, angle)) = (self.rate.take()?, self.angle.take()?);
+        if [rate_counter, angle_counter] != [counter; 2] {
             return None;
         }
-        let ((_, rate), (_, angle)) = (rate, angle);
         self.last = Some(seen.at);
         seen.reports.add(Reports(angle.faults.0.into()));
         if rate.quality != Quality::Good {

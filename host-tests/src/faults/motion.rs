@@ -1,9 +1,9 @@
-//! This module applies faults to the measurements: in the sensor, in its clock, at the wheels.
+//! Faults of the measurements: in the sensor, in its clock, at the wheels.
 
 use super::drive::Reading;
 use super::fault::{Fault, Kind};
-use crate::parts::Part;
 use gyronet::units::{AngularRate, SpecificForce};
+use gyronet_tools::parts::Part;
 
 /// Applies a fault to the readings of the rows from `first_row` on and returns the time of its first effect.
 /// `gyro_bias` is the part of the readings that is not motion; a clock drift does not scale it.
@@ -14,11 +14,10 @@ pub fn disturb(
     part: Part,
     gyro_bias: [AngularRate; 3],
 ) -> Option<u64> {
-    let begin = readings.get(fault.from - first_row).copied();
+    let begin = *readings.get(fault.from - first_row)?;
     let mut draw = fault.draw_on();
     let mut first = None;
     for (row, reading) in (first_row..).zip(readings.iter_mut()).filter(|(row, _)| fault.holds(*row)) {
-        let Some(begin) = begin else { break };
         if fault.kind == Kind::NotANumber && row > fault.from && !draw.chance(fault.share) {
             continue;
         }
@@ -28,9 +27,8 @@ pub fn disturb(
             Kind::ClockJump => reading.stamp_us += fault.size as i64,
             Kind::Stuck => hold(reading, &begin, fault, part),
             Kind::Saturation => {
-                for (axis, saturated) in reading.saturated.iter_mut().enumerate() {
-                    *saturated |= fault.axes.contains(axis);
-                }
+                let axes = reading.saturated.iter_mut().enumerate();
+                axes.for_each(|(axis, saturated)| *saturated |= fault.axes.contains(axis));
             }
             Kind::BiasStep => shift(reading, fault, part),
             Kind::NotANumber => {
@@ -47,22 +45,14 @@ pub fn disturb(
                     _ => [rr, rl, fr, fl],
                 };
             }
-            // These faults affect bytes on a line.
-            Kind::Drop
-            | Kind::Duplicate
-            | Kind::BitFlip
-            | Kind::Burst
-            | Kind::Truncation
-            | Kind::Reordering
-            | Kind::Stall
-            | Kind::CanLoss => break,
+            _ => break,
         }
         first.get_or_insert(at);
     }
     first
 }
 
-/// Drifts a part's clock: a part whose clock is fast by a share samples more often by that share.
+/// A part whose clock is fast by a share samples more often by that share.
 ///
 /// The rows then show a vehicle that moves the same way in less time, and turns faster by that share. Row n of the
 /// disturbed drive has thus turned as far as row n of the undisturbed drive, so the two can be compared. Increments
@@ -81,12 +71,11 @@ fn drift(reading: &mut Reading, begin: &Reading, share: f64, part: Part, gyro_bi
     }
 }
 
-/// Returns the gyro of the part: the fibre-optic gyro if the part has one.
+/// The fibre-optic gyro if the part has one.
 fn gyro(reading: &mut Reading, part: Part) -> &mut [AngularRate; 3] {
     if part == Part::Dsp1760 { &mut reading.fog } else { &mut reading.sample.angular_rate }
 }
 
-/// Holds the readings at their values when the fault began.
 fn hold(reading: &mut Reading, begin: &Reading, fault: &Fault, part: Part) {
     let mut begin = *begin;
     for axis in 0..3 {

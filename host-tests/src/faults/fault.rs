@@ -1,12 +1,9 @@
-//! This module lists the kinds of faults and draws faults from a seed.
+//! Kinds of faults, and faults drawn from a seed.
 
-use crate::parts::Part;
-use crate::random::Random;
-use serde::Serialize;
+use gyronet_tools::parts::Part;
+use gyronet_tools::random::Random;
 
-/// Names a kind of fault.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kind {
     /// Messages are lost.
     Drop,
@@ -14,11 +11,11 @@ pub enum Kind {
     Duplicate,
     /// One bit of a message is wrong.
     BitFlip,
-    /// A series of bytes is replaced by noise.
+    /// A series of bytes is replaced by noise, which does not stop at the end of a message.
     Burst,
     /// The end of a message is lost.
     Truncation,
-    /// A message overtakes those before it.
+    /// Later messages of a line overtake a message.
     Reordering,
     /// The line is silent for a while; then all its messages arrive at once, or are lost.
     Stall,
@@ -43,95 +40,34 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All kinds.
-    pub const ALL: [Self; 16] = [
-        Self::Drop,
-        Self::Duplicate,
-        Self::BitFlip,
-        Self::Burst,
-        Self::Truncation,
-        Self::Reordering,
-        Self::Stall,
-        Self::ClockDrift,
-        Self::ClockJump,
-        Self::Stuck,
-        Self::Saturation,
-        Self::BiasStep,
-        Self::NotANumber,
-        Self::WheelSlip,
-        Self::SwappedWheels,
-        Self::CanLoss,
-    ];
-
-    /// Returns the name in tables.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Drop => "drop",
-            Self::Duplicate => "duplicate",
-            Self::BitFlip => "bit flip",
-            Self::Burst => "burst",
-            Self::Truncation => "truncation",
-            Self::Reordering => "reordering",
-            Self::Stall => "stall",
-            Self::ClockDrift => "clock drift",
-            Self::ClockJump => "clock jump",
-            Self::Stuck => "stuck value",
-            Self::Saturation => "saturation",
-            Self::BiasStep => "bias step",
-            Self::NotANumber => "not a number",
-            Self::WheelSlip => "wheel slip",
-            Self::SwappedWheels => "swapped wheels",
-            Self::CanLoss => "CAN loss",
-        }
-    }
-
-    /// Returns whether the fault damages bytes on a line rather than the measurements.
-    #[must_use]
+    /// The fault damages bytes on a line rather than the measurements.
     pub const fn is_on_a_line(self) -> bool {
-        matches!(
-            self,
-            Self::Drop
-                | Self::Duplicate
-                | Self::BitFlip
-                | Self::Burst
-                | Self::Truncation
-                | Self::Reordering
-                | Self::Stall
-                | Self::CanLoss
-        )
+        use Kind::{BitFlip, Burst, CanLoss, Drop, Duplicate, Reordering, Stall, Truncation};
+        matches!(self, Drop | Duplicate | BitFlip | Burst | Truncation | Reordering | Stall | CanLoss)
     }
 }
 
-/// Names a line that carries bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Line {
-    /// The line of the inertial sensor.
+    /// The inertial sensor's.
     Sensor,
-    /// The line of the fibre-optic gyro.
+    /// The fibre-optic gyro's.
     Gyro,
-    /// The line of the incoming wheel speeds, SLCAN.
+    /// Incoming wheel speeds, SLCAN.
     Wheels,
-    /// The line of the outgoing frames, SLCAN.
+    /// Outgoing frames, SLCAN.
     Out,
 }
 
-/// Names the axes that a fault affects.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axes {
-    /// All six axes.
     All,
-    /// The three axes of the gyro.
     Gyro,
-    /// One axis: 0 to 2 are gyro x, y, z; 3 to 5 are accelerometer x, y, z.
+    /// 0 to 2 are gyro x, y, z; 3 to 5 are accelerometer x, y, z.
     One(usize),
 }
 
 impl Axes {
-    /// Returns whether gyro axis 0 to 2 or accelerometer axis 3 to 5 is among them.
-    #[must_use]
     pub fn contains(self, axis: usize) -> bool {
         match self {
             Self::All => true,
@@ -141,23 +77,19 @@ impl Axes {
     }
 }
 
-/// Describes a fault.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fault {
-    /// The kind of fault.
     pub kind: Kind,
-    /// The line that the fault affects, for a fault on a line.
+    /// The line that a fault on a line affects.
     pub line: Line,
     /// First affected row of the drive.
     pub from: usize,
-    /// Number of affected rows.
     pub rows: usize,
     /// Share of the messages that the fault hits.
     pub share: f64,
-    /// Size of the fault: microseconds of a clock jump, ppm of a drift, rad/s or m/s^2 of a bias, bytes of a burst,
-    /// places of a reordering, factor on the wheels' speed.
+    /// Microseconds of a clock jump, ppm of a drift, rad/s or m/s^2 of a bias, bytes of a burst, messages that
+    /// overtake a late one, factor on the wheels' speed.
     pub size: f64,
-    /// The affected axes of the sensor.
     pub axes: Axes,
     /// One of four forms of the same kind; the code that applies the fault says which.
     pub form: usize,
@@ -165,10 +97,9 @@ pub struct Fault {
     pub seed: u64,
 }
 
-/// Holds the rows of a drive that a run covers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+/// The rows of a drive that a run covers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Span {
-    /// First row.
     pub from: usize,
     /// The row after the last one.
     pub to: usize,
@@ -177,12 +108,10 @@ pub struct Span {
 }
 
 impl Fault {
-    /// Draws a fault of a kind.
-    #[must_use]
     pub fn draw(kind: Kind, part: Part, span: Span, draw: &mut Random) -> Self {
         let lines: &[Line] = match (kind, part) {
             (Kind::CanLoss, _) => &[Line::Wheels, Line::Out],
-            // The campaign is mainly about the part's own messages: every second fault is on its line.
+            // Every second fault is on the line of the part itself.
             (_, Part::Dsp1760) => &[Line::Gyro, Line::Gyro, Line::Sensor, Line::Wheels, Line::Out],
             _ => &[Line::Sensor, Line::Sensor, Line::Wheels, Line::Out],
         };
@@ -234,28 +163,17 @@ impl Fault {
         fault
     }
 
-    /// Returns whether the fault is present in a row.
-    #[must_use]
     pub fn holds(&self, row: usize) -> bool {
         (self.from..self.from + self.rows).contains(&row)
     }
 
-    /// Returns the stream of random numbers for the effects of the fault.
-    #[must_use]
+    /// The messages of a stalled line are lost, and do not arrive late.
+    pub fn is_lost(&self) -> bool {
+        self.form.is_multiple_of(2)
+    }
+
+    /// Random numbers for the effects of the fault.
     pub fn draw_on(&self) -> Random {
         Random::new(self.seed, 0)
-    }
-}
-
-impl std::fmt::Display for Fault {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { kind, line, from, rows, share, size, axes, form, .. } = self;
-        write!(f, "{}", kind.name())?;
-        if kind.is_on_a_line() {
-            write!(f, " on line {line:?}, {:.0} % of the messages", 100.0 * share)?;
-        } else {
-            write!(f, " of {axes:?}")?;
-        }
-        write!(f, ", size {size:.3e}, form {form}, rows {from} to {}", from + rows)
     }
 }

@@ -1,44 +1,36 @@
-//! This module is the board's end of a sensor's line: the library's parsers turn bytes into samples.
+//! The board's end of a sensor's line: the library's parsers turn bytes into samples.
 
 use super::fault::Line;
-use super::wire::Message;
-use crate::parts::icm42688::{Bus, NoDelay};
-use crate::parts::{Part, adis16465};
+use super::line::Message;
 use gyronet::sample::{FogSample, ImuSample};
 use gyronet::sensor::adis16465::{Adis16465, BURST};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
 use gyronet::sensor::xsens::Mti;
 use gyronet::units::Micros;
+use gyronet_tools::parts::icm42688::{Bus, NoDelay};
+use gyronet_tools::parts::{Part, adis16465};
 
 /// The board fetches at most this many packets from a FIFO at once.
 const MAX_FETCHED: usize = 32;
 
-/// Holds a parser or driver, with its state.
 #[derive(Debug, Clone)]
 pub enum Input {
-    /// The parser of an MTi.
     Xsens(Box<Mti>),
-    /// The parser of a DSP-1760, and that of the MTi beside it.
+    /// A DSP-1760 and the MTi beside it.
     Dsp1760(Box<(Dsp1760, Mti)>),
-    /// The driver of an ICM-42688-P.
     Icm42688(Fifo),
-    /// The driver of an ADIS16465.
     Adis16465(Bursts),
 }
 
-/// Holds the result of parsing some bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Delivered {
-    /// The bytes were for the inertial sensor; `None` if they gave no sample.
+    /// `None` if the bytes gave no sample.
     Imu(Option<ImuSample>),
-    /// The bytes were for the fibre-optic gyro; `None` if they gave no sample.
     Fog(Option<FogSample>),
 }
 
 impl Input {
-    /// Creates the input before its first byte.
-    #[must_use]
     pub fn new(part: Part) -> Self {
         match part {
             Part::Xsens => Self::Xsens(Box::default()),
@@ -48,7 +40,6 @@ impl Input {
         }
     }
 
-    /// Parses a message that arrives at `now`.
     pub fn receive(&mut self, message: &Message, now: Micros) -> Vec<Delivered> {
         let mut delivered = Vec::new();
         match self {
@@ -67,8 +58,7 @@ impl Input {
         delivered
     }
 
-    /// Returns the number of damaged or lost frames that the parsers have counted.
-    #[must_use]
+    /// Damaged or lost frames that the parsers have counted.
     pub fn bad_frames(&self) -> u32 {
         match self {
             Self::Xsens(mti) => mti.bad_checksums(),
