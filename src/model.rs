@@ -47,6 +47,12 @@ pub trait WindowNetwork {
     fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate;
 }
 
+impl<N: WindowNetwork + ?Sized> WindowNetwork for &mut N {
+    fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate {
+        (**self).estimate(window)
+    }
+}
+
 /// Holds the result of a window: the gyro's error in each sample, and the expected error of the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

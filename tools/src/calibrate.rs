@@ -11,11 +11,14 @@ mod fit;
 mod spans;
 pub mod unit_file;
 
-use crate::drive::recording::Recording;
-use crate::drive::replay::{Replay, ReplayError};
+use crate::board::Board;
+use crate::drive::replay::{ReplayError, Steps, initialise};
+use crate::drive::stream::Drive;
 use fit::Fit;
+use gyronet::model::WindowNetwork;
 use gyronet::mounting::GyroMap;
-use spans::Span;
+use gyronet::units::AngularRate;
+use spans::{Span, Spans};
 use unit_file::UnitFile;
 
 /// Shortest reference that a drive needs after static initialisation, s.
@@ -29,7 +32,7 @@ const MAX_GAIN_SIGMA: f64 = 0.005;
 const MAX_RESIDUAL_RAD: f64 = 0.05;
 
 /// The reason why a drive gives no calibration.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrateError {
     /// The drive cannot be replayed.
@@ -82,12 +85,36 @@ pub struct Share {
     pub refused: Option<&'static str>,
 }
 
-/// A drive, replayed with the weights that the board runs.
-pub struct Drive<'a> {
-    /// The recording.
-    pub recording: &'a Recording,
-    /// The replay of the recording, without a map.
-    pub replay: Replay,
+/// A drive, replayed with the weights that the board runs and cut into spans.
+#[derive(Debug)]
+pub struct Cut {
+    path: String,
+    name: String,
+    /// The gyro's static bias, rad/s.
+    gyro_bias: [f64; 3],
+    spans: Vec<Span>,
+}
+
+impl Cut {
+    /// Runs a drive on a board that applies no map; `tick` is called for each step. The drive is read twice: its
+    /// beginning for the static bias, then as a whole.
+    ///
+    /// # Errors
+    /// [`CalibrateError`].
+    pub fn new(
+        drive: &Drive<'_>,
+        board: Board<impl WindowNetwork>,
+        mut tick: impl FnMut(),
+    ) -> Result<Self, CalibrateError> {
+        let gyro_bias = initialise(drive)?.map(AngularRate::rad_per_sec);
+        let mut spans = Spans::default();
+        for step in Steps::new(drive, board)? {
+            tick();
+            spans.add(&step?, &gyro_bias);
+        }
+        let spans = spans.finish(&drive.path)?;
+        Ok(Self { path: drive.path.clone(), name: drive.name().to_owned(), gyro_bias, spans })
+    }
 }
 
 /// Name of each share, its largest sigma, and the reason for a refusal.
@@ -101,8 +128,8 @@ const SHARES: [(&str, f64, &str); 3] = [
 ///
 /// # Errors
 /// [`CalibrateError`].
-pub fn calibrate(drives: &[Drive<'_>], weights: u32) -> Result<UnitFile, CalibrateError> {
-    let spans: Vec<Vec<Span>> = drives.iter().map(spans::of).collect::<Result<_, _>>()?;
+pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, CalibrateError> {
+    let spans: Vec<&[Span]> = drives.iter().map(|drive| drive.spans.as_slice()).collect();
     // A share that the drives hardly show makes the others uncertain, so the least certain one is removed first.
     let (mut fitted, mut refused) = ([true; 3], [None; 3]);
     let fit = loop {
@@ -123,7 +150,7 @@ pub fn calibrate(drives: &[Drive<'_>], weights: u32) -> Result<UnitFile, Calibra
     });
     for (drive, deviation) in drives.iter().zip(&fit.deviations) {
         if *deviation > MAX_RESIDUAL_RAD {
-            let path = drive.recording.path.clone();
+            let path = drive.path.clone();
             return Err(CalibrateError::Contradiction { path, rad: *deviation });
         }
     }
@@ -141,11 +168,11 @@ pub fn calibrate(drives: &[Drive<'_>], weights: u32) -> Result<UnitFile, Calibra
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::{Config, csv};
+    use crate::drive::recording::Recording;
+    use crate::simulate::{self, csv};
+    use gyronet::coprocessor::Config;
+    use gyronet::model::Estimate;
     use gyronet::model::window::{Features, WINDOW};
-    use gyronet::model::{Estimate, WindowNetwork};
-    use gyronet::pipeline::PipelineConfig;
-    use gyronet::units::AngularRate;
 
     struct Nothing;
 
@@ -159,7 +186,8 @@ mod tests {
     /// sigma of 0.02 rad. It is missing for a minute, and ends at the sample `end`.
     fn by_course(end: usize) -> Result<UnitFile, CalibrateError> {
         let mut bytes = Vec::new();
-        csv::write(&Config { seconds: 1_200, seed: 5, ..Config::DEFAULT }, &mut bytes).unwrap();
+        csv::write(&simulate::Config { seconds: 1_200, seed: 5, ..simulate::Config::DEFAULT }, &mut bytes)
+            .unwrap();
         let mut recording = Recording::parse("course.csv", &bytes[..]).unwrap();
         let mut random = crate::random::Random::new(1, 0);
         let mut heading = 0.0;
@@ -171,8 +199,10 @@ mod tests {
             let yaw_rate = &mut row.sample.angular_rate[2];
             *yaw_rate = AngularRate((f64::from(yaw_rate.0) * 1.02) as i32);
         }
-        let replay = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Nothing, || {}).unwrap();
-        calibrate(&[Drive { recording: &recording, replay }], 0)
+        calibrate(
+            &[Cut::new(&Drive::from(&recording), Board::new(Config::DEFAULT, None, Nothing), || {})?],
+            0,
+        )
     }
 
     #[test]

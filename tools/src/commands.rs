@@ -31,15 +31,14 @@ mod weights;
 #[cfg(feature = "logs")]
 pub mod wheels;
 
-use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::replay::Replay;
-use std::fs::File;
-use std::io::BufWriter;
+use gyronet_tools::drive::error::DataError;
+use gyronet_tools::drive::stream::Drive;
+use std::error::Error;
 use std::path::Path;
 
 /// The result of a subcommand. The library's errors are typed; here an error only needs to print as one clear line
 /// that names the file.
-pub type Result = std::result::Result<(), Box<dyn std::error::Error>>;
+pub type Result = std::result::Result<(), Box<dyn Error>>;
 
 /// Writes a value as pretty-printed JSON and a newline.
 fn print_json(out: &mut impl std::io::Write, value: &impl serde::Serialize) -> Result {
@@ -53,22 +52,14 @@ fn remark(common: Common, line: std::fmt::Arguments<'_>) -> std::io::Result<()> 
     if common.quiet { Ok(()) } else { writeln!(std::io::stderr(), "{line}") }
 }
 
-/// Reads a drive, and prints a remark if it has a vehicle file beside it.
-fn read_drive(
-    path: &std::path::Path,
-    common: Common,
-) -> std::result::Result<Recording, Box<dyn std::error::Error>> {
-    let recording = Recording::read(path)?;
-    remark_vehicle(&recording, common)?;
-    Ok(recording)
-}
-
-/// Prints the path of the vehicle file beside a drive, if there is one.
-fn remark_vehicle(recording: &Recording, common: Common) -> std::io::Result<()> {
-    if let Some(vehicle) = &recording.vehicle.path {
-        remark(common, format_args!("{}: vehicle file {}", recording.path, vehicle.display()))?;
+/// Opens a drive, and prints a remark if it has a vehicle file beside it.
+fn read_drive(path: &Path, common: Common) -> std::result::Result<Drive<'static>, DataError> {
+    let drive = Drive::open(path)?;
+    if let Some(vehicle) = &drive.vehicle.path {
+        remark(common, format_args!("{}: vehicle file {}", drive.path, vehicle.display()))
+            .map_err(|error| DataError::of("standard error", error.into()))?;
     }
-    Ok(())
+    Ok(drive)
 }
 
 /// The options of all subcommands.
@@ -95,11 +86,4 @@ impl WriteError {
         let path = path.display().to_string();
         move |source| Self { path: path.clone(), source }
     }
-}
-
-/// Writes the CAN log of a replayed drive to a file; returns the number of frames.
-fn write_log(drive: &Replay, path: &Path) -> std::result::Result<u64, WriteError> {
-    let error = WriteError::to(path);
-    let file = File::create(path).map_err(&error)?;
-    drive.log(BufWriter::new(file)).map_err(&error)
 }

@@ -1,4 +1,4 @@
-//! This module collects the results of one drive, for the summary that `gyronet demo` prints and for its page.
+//! The results of one drive, for the summary that `gyronet demo` prints and for its page.
 
 mod can_excerpt;
 mod costs;
@@ -7,14 +7,14 @@ pub mod picture;
 mod short_table;
 mod trajectory;
 
-use crate::drive::recording::Recording;
+use crate::drive::stream::Drive;
 use crate::evaluate::methods::PerMethod;
 use crate::evaluate::rates::Rates;
 use crate::evaluate::report::{Comparisons, DriveErrors, Row};
 use gyronet::can::config::Config;
 use serde::Serialize;
 
-pub use can_excerpt::Message;
+pub use can_excerpt::{Message, Sent};
 pub use costs::Cost;
 pub use short_table::ShortTable;
 pub use trajectory::{Path, Trajectories};
@@ -23,7 +23,7 @@ pub use trajectory::{Path, Trajectories};
 #[derive(Debug)]
 pub struct Demo<'a> {
     /// The drive.
-    pub recording: &'a Recording,
+    pub drive: &'a Drive<'a>,
     /// Says whether the drive is simulated.
     pub simulated: bool,
     /// Its yaw rates.
@@ -60,24 +60,24 @@ pub struct Summary<'a> {
 }
 
 impl<'a> Demo<'a> {
-    /// Computes the results that the rates do not contain. `config` is that of the bus.
+    /// Computes the results that the rates do not contain.
     #[must_use]
     pub fn new(
-        recording: &'a Recording,
+        drive: &'a Drive<'a>,
         simulated: bool,
         rates: &'a Rates,
         errors: Option<&'a DriveErrors>,
-        (config, frames): (Config, u64),
+        sent: &Sent,
     ) -> Self {
         Self {
-            recording,
+            drive,
             simulated,
             rates,
             errors,
-            trajectories: Trajectories::new(recording, rates),
-            excerpt: can_excerpt::fastest_turn(&rates.drive, config),
-            costs: costs::all(recording, rates, &config),
-            frames,
+            trajectories: Trajectories::new(drive, rates),
+            excerpt: can_excerpt::in_words(sent.fastest.as_ref(), drive.facts.first, Config::DEFAULT),
+            costs: costs::all(drive.facts.rows, sent.run_time, &Config::DEFAULT),
+            frames: sent.frames,
         }
     }
 
@@ -85,11 +85,11 @@ impl<'a> Demo<'a> {
     #[must_use]
     pub fn summary(&self) -> Summary<'_> {
         Summary {
-            name: self.recording.name(),
+            name: self.drive.name(),
             simulated: self.simulated,
-            seconds: self.recording.seconds(),
-            samples: self.recording.rows.len(),
-            missing: self.recording.missing,
+            seconds: self.drive.facts.seconds(),
+            samples: self.drive.facts.rows,
+            missing: self.drive.facts.missing,
             over_best_classical: self.errors.and_then(|errors| errors.over_best_classical),
             methods: self.errors.map(|errors| &errors.methods),
             paths: self.trajectories.as_ref().map(|trajectories| trajectories.paths.as_slice()),

@@ -23,15 +23,10 @@ pub use mounting::Mounting;
 pub use page::page;
 
 use crate::drive::error::DataError;
-use crate::drive::recording::Recording;
-use crate::drive::replay::Replay;
-use crate::evaluate::ablation::Uncorrected;
-use gyronet::pipeline::PipelineConfig;
+use crate::drive::replay::initialise;
+use crate::drive::stream::Drive;
 use recording::Rows;
 use std::path::Path;
-
-/// Rows that are enough for static initialisation.
-const STARTED: usize = 400;
 
 /// The results of examining a recording.
 #[derive(Debug)]
@@ -110,9 +105,7 @@ impl Doctor {
 /// Runs the beginning of the drive through the pipeline and reports whether static initialisation succeeds.
 fn start(path: &Path) -> Finding {
     let run = || -> Result<(), Box<dyn std::error::Error>> {
-        let mut recording = Recording::read(path)?;
-        recording.rows.truncate(STARTED);
-        Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Uncorrected, || {})?;
+        initialise(&Drive::open(path)?)?;
         Ok(())
     };
     match run() {

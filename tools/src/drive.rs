@@ -1,7 +1,7 @@
-//! These modules handle recorded drives. [`recording`] reads a drive, [`vehicle`] reads the vehicle file beside the
-//! drive, and [`wheel_frames`] turns wheel speeds into CAN frames. [`replay`] runs the drive through the coprocessor
-//! as the board would. [`candump`] writes the frames that were sent, [`foxglove`] everything for Foxglove, and
-//! [`export`] tables and paths.
+//! Recorded drives. [`stream`] reads a drive row by row, [`recording`] keeps one in memory, [`vehicle`] reads the
+//! vehicle file beside it, and [`wheel_frames`] turns wheel speeds into CAN frames. [`replay`] runs the drive through
+//! the board. [`candump`] writes the frames that were sent, [`foxglove`] everything for Foxglove, and [`export`]
+//! tables and paths.
 
 pub mod candump;
 pub mod error;
@@ -10,6 +10,7 @@ pub mod export;
 pub mod foxglove;
 pub mod recording;
 pub mod replay;
+pub mod stream;
 pub mod vehicle;
 pub mod wheel_frames;
 

@@ -4,7 +4,7 @@
 //! these modules.
 //!
 //! ```text
-//! drive <- parts
+//! board <- drive <- parts
 //! drive <- calibrate
 //! drive <- import -> wheels
 //! drive <- doctor -> import, plot
@@ -15,6 +15,7 @@
 //! demo -> everything above
 //! ```
 
+pub mod board;
 pub mod bundled;
 pub mod calibrate;
 pub mod client;

@@ -9,7 +9,7 @@ use gyronet::units::AngularRate;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::synthetic::{idling, rate};
 use gyronet_host_tests::{parallel, recordings};
-use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::ablation::{self, Score};
 use std::path::Path;
 
@@ -93,7 +93,7 @@ const TRIALS: [u32; 2] = [9, 11];
 
 /// The rate sent for navigation, default configuration.
 fn score(path: &Path) -> Score {
-    let recording = Recording::read(path).expect("a recording");
+    let recording = Drive::open(path).expect("a recording");
     let mut network =
         GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
     let variants: Vec<_> = ablation::parts().into_iter().rev().take(1).collect();

@@ -3,9 +3,9 @@
 
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet_host_tests::{parallel, recordings};
-use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::methods::{Method, PerMethod};
-use gyronet_tools::evaluate::rates::{Network, Networks, Rates};
+use gyronet_tools::evaluate::rates::{Network, Networks};
 use gyronet_tools::evaluate::report::{DriveErrors, Report, Row};
 use gyronet_tools::network::quantization_error::{Both, QuantizationError};
 use std::path::Path;
@@ -33,7 +33,7 @@ struct Trial {
 impl Trial {
     fn new(number: u32, path: &Path) -> Self {
         let checkpoint = gyronet_tools::bundled::checkpoint().expect("the committed checkpoint");
-        let recording = Recording::read(path).expect("a recording");
+        let recorded = Drive::open(path).expect("a recording");
         let blob = Blob::new_checked(&weights::GYRONET.0).expect("they come with the library");
         let (mut integer, mut float, mut beside) =
             (GyroNet::new(blob), checkpoint.network(), checkpoint.network());
@@ -42,13 +42,15 @@ impl Trial {
         let mut default = GyroNet::new(blob);
         let of_default = default.blob().shape;
         let mut networks = Networks {
-            float: Network::new(&mut float, checkpoint.shape()),
-            integer: Network::new(&mut both, checkpoint.shape()),
             default: Network::new(&mut default, of_default),
             sent: None,
+            paper: Some([
+                Network::new(&mut float, checkpoint.shape()),
+                Network::new(&mut both, checkpoint.shape()),
+            ]),
         };
-        let rates = Rates::new(&recording, &mut networks, || {}).expect("it stands still first");
-        let drive = DriveErrors::new(&recording, &rates).expect("the trials have a reference");
+        let drive =
+            DriveErrors::of(&recorded, &mut networks, |_| {}).expect("it stands first, with a reference");
         Self { number, drive, quantization: both.error() }
     }
 }

@@ -2,11 +2,11 @@
 //! that cannot be used.
 
 use gyronet::model::blob::Shape;
-use gyronet::model::window::{Features, WINDOW};
-use gyronet::model::{Estimate, WindowNetwork};
 use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::stream::Drive;
+use gyronet_tools::evaluate::ablation::Uncorrected;
 use gyronet_tools::evaluate::methods::Method;
-use gyronet_tools::evaluate::rates::{Network, Networks, Rates};
+use gyronet_tools::evaluate::rates::{Network, Networks, Rates, Sample};
 use gyronet_tools::evaluate::report::{DriveErrors, EvaluateError};
 use std::fmt::Write;
 
@@ -16,15 +16,6 @@ const ROWS: usize = 13_000;
 const BIAS: f64 = 0.002;
 /// The gyro's error after 10 s, rad/s.
 const DRIFT: f64 = 0.001;
-
-/// A network that corrects nothing.
-struct Uncorrected;
-
-impl WindowNetwork for Uncorrected {
-    fn estimate(&mut self, _window: &[Features; WINDOW]) -> Estimate {
-        Estimate::NONE
-    }
-}
 
 /// The true yaw rate: still for `still` rows, then turns to the left and to the right.
 fn yaw_rate(k: usize, still: usize) -> f64 {
@@ -48,19 +39,18 @@ fn drive(still: usize, sign: f64, column: &str) -> Recording {
     Recording::parse("made/up.csv", text.as_bytes()).expect("a drive")
 }
 
-fn rates(recording: &Recording) -> Rates {
-    let [mut float, mut integer, mut linear] = [Uncorrected, Uncorrected, Uncorrected];
+fn run(recording: &Recording, visit: impl FnMut(&Sample)) -> Result<DriveErrors, EvaluateError> {
+    let mut default = Uncorrected;
     let mut networks = Networks {
-        float: Network::new(&mut float, Shape::PAPER),
-        integer: Network::new(&mut integer, Shape::PAPER),
-        default: Network::new(&mut linear, Shape { units: 0, linear: true }),
+        default: Network::new(&mut default, Shape { units: 0, linear: true }),
         sent: None,
+        paper: None,
     };
-    Rates::new(recording, &mut networks, || {}).expect("it stands first, or has a course")
+    DriveErrors::of(&Drive::from(recording), &mut networks, visit)
 }
 
 fn errors(recording: &Recording) -> Result<DriveErrors, EvaluateError> {
-    DriveErrors::new(recording, &rates(recording))
+    run(recording, |_| {})
 }
 
 #[test]
@@ -88,7 +78,9 @@ fn a_drive_that_starts_moving_gets_a_simulated_standstill() {
     let error = errors.methods[Method::STATIC].error.rms_rad.expect("a figure");
     assert!(error < 0.01, "{error}");
     assert!(errors.methods[Method::RAW].error.rms_rad.expect("a figure") > 0.1);
-    let seconds = rates(&recording).seconds;
+    let mut rates = Rates::of(&Drive::from(&recording));
+    run(&recording, |sample| rates.add(sample)).expect("enough course");
+    let seconds = rates.seconds;
     assert!((seconds[0] - 3.0).abs() < 1e-9 && seconds.len() + 10 > ROWS, "{}", seconds.len());
 }
 

@@ -33,7 +33,7 @@ impl Drive {
     fn error(&self, rates: &[f64]) -> f64 {
         let behind = |rates: &[f64]| rates[STATIC_SAMPLES as usize..].to_vec();
         let errors = Reference::Rate(behind(&self.reference)).errors(&behind(rates)).expect("whole seconds");
-        errors.figures().mean_1s_rad.expect("whole seconds")
+        errors.figures.mean_1s_rad.expect("whole seconds")
     }
 }
 

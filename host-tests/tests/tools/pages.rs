@@ -1,14 +1,13 @@
 //! The pages of `gyronet demo`, `gyronet doctor` and `gyronet train` in a real browser: no errors, nothing asked of the network, nothing cut
 //! or beside the window on a desk and on a phone, light and dark, and all that can be used can be used from the keyboard.
 
-use gyronet::can::config::Config;
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet_host_tests::browser::Browser;
 use gyronet_host_tests::recordings::{trial, workspace};
-use gyronet_tools::bundled;
-use gyronet_tools::demo::Demo;
+use gyronet_tools::demo::{Demo, Sent};
 use gyronet_tools::doctor::{Doctor, page};
 use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::rates::{Network, Networks, Rates};
 use gyronet_tools::evaluate::report::DriveErrors;
 use gyronet_tools::train::examine::{Examined, Refusal};
@@ -37,22 +36,15 @@ const USABLE: &str = "[...document.querySelectorAll('button, .plot')].filter(e =
 
 /// Returns the pages of `gyronet demo` and `gyronet train` on a drive.
 fn demo_and_train(recording: &Recording) -> [String; 2] {
-    let checkpoint = bundled::checkpoint().unwrap();
-    let mut float = checkpoint.network();
-    let blobs = [&weights::GYRONET.0[..], &weights::DEFAULT.0[..]];
-    let [mut integer, mut default] = blobs.map(|blob| GyroNet::new(Blob::new_checked(blob).unwrap()));
-    let [of_integer, of_default] = [&integer, &default].map(|network| network.blob().shape);
-    let mut networks = Networks {
-        float: Network::new(&mut float, checkpoint.shape()),
-        integer: Network::new(&mut integer, of_integer),
-        default: Network::new(&mut default, of_default),
-        sent: None,
-    };
-    let rates = Rates::new(recording, &mut networks, || {}).unwrap();
-    let errors = || DriveErrors::new(recording, &rates).unwrap();
-    let train = train(recording, &[errors(), errors()]);
-    let frames = rates.drive.frames().count() as u64;
-    let demo = Demo::new(recording, true, &rates, Some(&errors()), (Config::DEFAULT, frames)).page();
+    let network = || GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).unwrap());
+    let (drive, mut default) = (Drive::from(recording), network());
+    let shape = default.blob().shape;
+    let mut networks = Networks { default: Network::new(&mut default, shape), sent: None, paper: None };
+    let mut rates = Rates::of(&drive);
+    let errors = DriveErrors::of(&drive, &mut networks, |sample| rates.add(sample)).unwrap();
+    let train = train(recording, &[errors.clone(), errors.clone()]);
+    let sent = Sent::run(&drive, network(), std::io::sink()).unwrap();
+    let demo = Demo::new(&drive, true, &rates, Some(&errors), &sent).page();
     [demo, train]
 }
 

@@ -1,13 +1,15 @@
 //! The MCAP of a replayed drive opens in the reference reader, fits its own schemas, and has the frames of the log.
 
+use gyronet::coprocessor::Config;
 use gyronet::model::{Blob, GyroNet, weights};
-use gyronet::pipeline::PipelineConfig;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require::python;
+use gyronet_tools::board::Board;
 use gyronet_tools::bundled;
+use gyronet_tools::drive::candump::Log;
 use gyronet_tools::drive::foxglove;
-use gyronet_tools::drive::replay::Replay;
-use gyronet_tools::drive::wheel_frames::WheelFrames;
+use gyronet_tools::drive::replay::Steps;
+use gyronet_tools::drive::stream::Drive;
 use std::path::Path;
 use std::process::Command;
 
@@ -17,11 +19,20 @@ fn the_reference_reader_finds_every_frame_and_state() {
     let Some(python) = python(test, &["mcap", "lz4"]) else { return };
     let mut recording = bundled::simulated_drive().unwrap();
     recording.rows.truncate(1_500);
-    let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).unwrap());
-    let (config, wheels) = (PipelineConfig::DEFAULT, WheelFrames::new(&recording));
-    let replay = Replay::run(&recording, &config, wheels, &mut network, || {}).unwrap();
+    let network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).unwrap());
+    let drive = Drive::from(&recording);
+    let board = Board::new(Config::DEFAULT, drive.wheels(), network);
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("replay.mcap");
-    let messages = foxglove::write(&recording, &replay, std::fs::File::create(&path).unwrap()).unwrap();
+    let mut file = foxglove::Recorder::new(std::fs::File::create(&path).unwrap()).unwrap();
+    let (mut lines, mut yaw) = (Vec::new(), 0.0);
+    let mut log = Log::new(&mut lines);
+    for step in Steps::new(&drive, board).unwrap() {
+        let step = step.unwrap();
+        file.step(&step).unwrap();
+        step.frames.iter().for_each(|sent| log.frame(sent.time, &sent.frame).unwrap());
+        yaw = step.vehicle.navigation.yaw.rad();
+    }
+    let messages = file.finish().unwrap();
 
     let script = workspace().join("host-tests/tests/clients/read_replay.py");
     let output = Command::new(python).arg(script).arg(&path).output().unwrap();
@@ -38,14 +49,12 @@ fn the_reference_reader_finds_every_frame_and_state() {
     );
     assert_eq!(read["statuses"][0], "init");
     assert!(read["statuses"].as_array().unwrap().iter().any(|status| status == "ready"));
-    let yaw = replay.steps.last().unwrap().vehicle.navigation.yaw.rad();
     assert!((read["yaw"].as_f64().unwrap() - yaw).abs() < 1e-12 && yaw != 0.0);
     // Line by line what the log in candump's format has.
-    let mut log = Vec::new();
-    replay.log(&mut log).unwrap();
+    log.finish().unwrap();
     let frames: Vec<&str> =
         read["frames"].as_array().unwrap().iter().map(|frame| frame.as_str().unwrap()).collect();
-    assert_eq!(frames, String::from_utf8(log).unwrap().lines().collect::<Vec<_>>());
+    assert_eq!(frames, String::from_utf8(lines).unwrap().lines().collect::<Vec<_>>());
 }
 
 #[test]

@@ -13,15 +13,18 @@
 //! estimates of the unmodified drive, held as they were (`unmoved`). There the network must not add
 //! to it: the error stays within 10 % of `unmoved`, and is not within 10 % of the unmodified drive's.
 
+use gyronet::coprocessor::Config;
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, Estimate, GyroNet, WindowNetwork, weights};
 use gyronet::mounting::GyroMap;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::units::{AngularRate, SpecificForce};
 use gyronet_host_tests::{parallel, recordings};
-use gyronet_tools::calibrate::{self, Drive};
+use gyronet_tools::board::Board;
+use gyronet_tools::calibrate::{self, Cut};
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::replay::{Replay, Step};
+use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::metrics::YawError;
 use std::path::Path;
 
@@ -138,8 +141,12 @@ impl Rates {
     }
 }
 
+fn network() -> GyroNet<'static> {
+    GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("they come with the library"))
+}
+
 fn replay(recording: &Recording, seen: Unit, gyro_map: GyroMap) -> Replay {
-    let network = GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("they come with the library"));
+    let network = network();
     let config = PipelineConfig { gyro_map, ..PipelineConfig::DEFAULT };
     Replay::run(recording, &config, None, &mut Seen(network, seen), || {}).expect("it stands still first")
 }
@@ -205,9 +212,9 @@ fn one_drive_calibrates_another_unit() {
     let all = Unit { name: "all, 2 deg about x", bias: BIAS, gain: 1.01, mounting: [TILT, 0.0, 0.0] };
     for unit in [all, Unit { name: "all, 2 deg about y", mounting: [0.0, TILT, 0.0], ..all }] {
         let recording = unit.recording(&shown);
-        let replay = replay(&recording, SAME, GyroMap::IDENTITY);
-        let found =
-            calibrate::calibrate(&[Drive { recording: &recording, replay }], 0).expect("it turns and tilts");
+        let board = Board::new(Config::DEFAULT, None, network());
+        let cut = Cut::new(&Drive::from(&recording), board, || {}).expect("it turns and tilts");
+        let found = calibrate::calibrate(&[cut], 0).expect("it turns and tilts");
         println!("{}: {:?}", unit.name, found.shares);
         for trial in TRIALS {
             let Some(path) = recordings::trial(TEST, trial) else { return };

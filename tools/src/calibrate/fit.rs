@@ -32,7 +32,7 @@ pub struct Fit {
 
 impl Fit {
     /// Fits the shares that `fitted` names, and a constant for each drive.
-    pub fn new(drives: &[Vec<Span>], fitted: [bool; 3]) -> Self {
+    pub fn new(drives: &[&[Span]], fitted: [bool; 3]) -> Self {
         let all = |_: usize, _: usize| true;
         let (shares, biases) = solve(drives, fitted, all);
         let mut left_out = Vec::new();
@@ -71,11 +71,7 @@ fn deviation(mut residuals: Vec<f64>) -> f64 {
 }
 
 /// Solves for the shares and each drive's constant over the spans that `keep` accepts.
-fn solve(
-    drives: &[Vec<Span>],
-    fitted: [bool; 3],
-    keep: impl Fn(usize, usize) -> bool,
-) -> ([f64; 3], Vec<f64>) {
+fn solve(drives: &[&[Span]], fitted: [bool; 3], keep: impl Fn(usize, usize) -> bool) -> ([f64; 3], Vec<f64>) {
     let columns = 3 + drives.len();
     let kept: Vec<(usize, &Span)> = drives
         .iter()
@@ -133,7 +129,7 @@ mod tests {
     fn known_shares_are_found_within_their_sigma() {
         let shares = [-0.006, 0.029, 0.001];
         let drives = [spans(shares, 2e-4, 1, 0.05), spans(shares, -1e-4, 2, 0.05)];
-        let fit = Fit::new(&drives, [true; 3]);
+        let fit = Fit::new(&drives.each_ref().map(Vec::as_slice), [true; 3]);
         for (k, share) in shares.into_iter().enumerate() {
             let error = (fit.shares[k] - share).abs();
             assert!(error < 4.0 * fit.sigmas[k] && fit.sigmas[k] < 0.003, "{k}: {error} {}", fit.sigmas[k]);
@@ -144,6 +140,7 @@ mod tests {
     #[test]
     fn a_drive_without_turns_has_no_gain() {
         let drives = [spans([0.0, 0.0, 0.01], 0.0, 3, 1e-4)];
+        let drives = drives.each_ref().map(Vec::as_slice);
         assert!(Fit::new(&drives, [true; 3]).sigmas[2] > super::super::MAX_GAIN_SIGMA);
         assert_eq!(Fit::new(&drives, [true, true, false]).shares[2], 0.0);
     }

@@ -4,10 +4,13 @@
 //! A reference yaw rate gives one span per second. A GNSS course is noisy from one second to the next, so its spans
 //! reach from the median of ten seconds to the median of the next ten.
 
-use super::{CalibrateError, Drive, SHORTEST_S};
+use super::{CalibrateError, SHORTEST_S};
+use crate::board::Step;
 use crate::drive::DT;
-use crate::evaluate::heading_error::{BLOCK_S, medians, off_course};
+use crate::evaluate::heading_error::{BLOCK_S, Blocks, OffCourse};
+use gyronet::health::Status;
 use gyronet::sample::RATE_HZ;
+use gyronet::units::AngularRate;
 
 /// Samples of a span with a yaw rate as reference: one second.
 const RATE_SPAN: usize = RATE_HZ as usize;
@@ -25,84 +28,124 @@ pub struct Span {
     pub seconds: f64,
 }
 
-/// One sample of a drive.
-struct Sample {
-    /// Corrected yaw rate, rad/s.
-    corrected: f64,
-    /// Turns about x, y and z by the gyro, rad.
-    turns: [f64; 3],
-    /// The true yaw rate, rad/s.
-    reference: Option<f64>,
-    /// The true course, rad.
-    course: Option<f64>,
+/// The spans of a drive in progress: by its reference yaw rate, and by its course.
+#[derive(Debug, Default)]
+pub struct Spans {
+    started: bool,
+    ended: bool,
+    by_rate: ByRate,
+    by_course: ByCourse,
 }
 
-/// Cuts a drive into spans by its reference yaw rate, or else by its course.
-///
-/// # Errors
-/// [`CalibrateError::NoReference`], [`CalibrateError::TooShort`].
-pub fn of(Drive { recording, replay }: &Drive<'_>) -> Result<Vec<Span>, CalibrateError> {
-    let path = || recording.path.clone();
-    let bias = replay.gyro_bias.map(|bias| bias.rad_per_sec());
-    let samples = replay.steps[replay.compared()].iter().map(|step| {
-        let row = &recording.rows[step.row];
-        let rates = row.sample.angular_rate.map(|rate| rate.rad_per_sec());
-        Sample {
-            corrected: step.settled.rad_per_sec(),
-            turns: std::array::from_fn(|axis| (rates[axis] - bias[axis]) * DT),
-            reference: row.reference,
-            course: row.course,
+impl Spans {
+    /// Adds a step of the board that has run the drive with this static bias.
+    pub fn add(&mut self, step: &Step, bias: &[f64; 3]) {
+        self.started |= step.vehicle.prompt.status != Status::Init;
+        self.ended |= self.started && step.navigation.is_none();
+        if !self.started || self.ended {
+            return;
         }
-    });
-    let samples: Vec<Sample> = samples.collect();
-    let spans = if samples.iter().any(|sample| sample.reference.is_some()) {
-        samples.chunks_exact(RATE_SPAN).filter_map(by_rate).collect()
-    } else if samples.iter().any(|sample| sample.course.is_some()) {
-        by_course(&samples)
-    } else {
-        return Err(CalibrateError::NoReference { path: path(), columns: "ref_gyr_z and no ref_yaw" });
-    };
-    let seconds = spans.iter().map(|span| span.seconds).sum::<f64>();
-    if seconds < SHORTEST_S {
-        return Err(CalibrateError::TooShort { path: path(), seconds });
+        let row = &step.input;
+        let rates = row.sample.angular_rate.map(AngularRate::rad_per_sec);
+        let turns = std::array::from_fn(|axis| (rates[axis] - bias[axis]) * DT);
+        let corrected = step.settled.rad_per_sec();
+        self.by_rate.add(corrected, turns, row.reference);
+        self.by_course.add(corrected, turns, row.course);
     }
-    Ok(spans)
+
+    /// The spans by the reference yaw rate, or else by the course.
+    ///
+    /// # Errors
+    /// [`CalibrateError::NoReference`], [`CalibrateError::TooShort`].
+    pub fn finish(mut self, path: &str) -> Result<Vec<Span>, CalibrateError> {
+        let path = || path.to_owned();
+        let spans = if self.by_rate.is_known {
+            self.by_rate.spans
+        } else if self.by_course.is_known {
+            self.by_course.end();
+            self.by_course.spans
+        } else {
+            return Err(CalibrateError::NoReference { path: path(), columns: "ref_gyr_z and no ref_yaw" });
+        };
+        let seconds = spans.iter().map(|span| span.seconds).sum::<f64>();
+        if seconds < SHORTEST_S {
+            return Err(CalibrateError::TooShort { path: path(), seconds });
+        }
+        Ok(spans)
+    }
 }
 
-/// Sums up the samples of a span; `None` if one of them has no reference.
-fn by_rate(samples: &[Sample]) -> Option<Span> {
-    let mut span = Span { error: 0.0, turns: [0.0; 3], seconds: samples.len() as f64 * DT };
-    for Sample { corrected, turns, reference, .. } in samples {
-        span.error += ((*reference)? - corrected) * DT;
-        span.turns.iter_mut().zip(turns).for_each(|(sum, turn)| *sum += turn);
-    }
-    Some(span)
+/// Spans of whole seconds in which every sample has a reference.
+#[derive(Debug, Default)]
+struct ByRate {
+    is_known: bool,
+    samples: usize,
+    /// The error and the turns of the second in progress.
+    error: Option<f64>,
+    turns: [f64; 3],
+    spans: Vec<Span>,
 }
 
-/// Returns the spans between neighbouring blocks with a known course, between the middles of the blocks.
-fn by_course(samples: &[Sample]) -> Vec<Span> {
-    let corrected: Vec<f64> = samples.iter().map(|sample| sample.corrected).collect();
-    let course: Vec<Option<f64>> = samples.iter().map(|sample| sample.course).collect();
-    let off: Vec<Option<f64>> = medians(&off_course(&corrected, &course)).collect();
-    // The mean over each block of the turn since the start, to match the blocks' median errors.
-    let mut sum = [0.0; 3];
-    let turned: Vec<[f64; 3]> = samples
-        .chunks(COURSE_SPAN)
-        .map(|block| {
-            let mut mean = [0.0; 3];
-            for sample in block {
-                for axis in 0..3 {
-                    sum[axis] += sample.turns[axis];
-                    mean[axis] += sum[axis] / block.len() as f64;
-                }
-            }
-            mean
-        })
-        .collect();
-    let between = |(off, turned): (&[Option<f64>], &[[f64; 3]])| {
-        let ([before, after], [from, to]) = (off, turned) else { return None };
-        let turns = std::array::from_fn(|axis| to[axis] - from[axis]);
-        Some(Span { error: (*before)? - (*after)?, turns, seconds: COURSE_SPAN as f64 * DT })
-    };
-    off.windows(2).zip(turned.windows(2)).filter_map(between).collect()
+impl ByRate {
+    fn add(&mut self, corrected: f64, turns: [f64; 3], reference: Option<f64>) {
+        self.is_known |= reference.is_some();
+        if self.samples == 0 {
+            (self.error, self.turns) = (Some(0.0), [0.0; 3]);
+        }
+        self.error = self.error.zip(reference).map(|(error, truth)| error + (truth - corrected) * DT);
+        self.turns.iter_mut().zip(turns).for_each(|(sum, turn)| *sum += turn);
+        self.samples += 1;
+        if self.samples == RATE_SPAN {
+            let (turns, seconds) = (self.turns, RATE_SPAN as f64 * DT);
+            self.spans.extend(self.error.map(|error| Span { error, turns, seconds }));
+            self.samples = 0;
+        }
+    }
+}
+
+/// Spans between neighbouring blocks with a known course, between the middles of the blocks.
+#[derive(Debug, Default)]
+struct ByCourse {
+    is_known: bool,
+    off: OffCourse,
+    blocks: Blocks,
+    /// The turn since the start, and its sum over the block in progress, to match the block's median error.
+    turned: [f64; 3],
+    sum: [f64; 3],
+    samples: usize,
+    /// The median error and the mean turn of the block before.
+    before: Option<(Option<f64>, [f64; 3])>,
+    spans: Vec<Span>,
+}
+
+impl ByCourse {
+    fn add(&mut self, corrected: f64, turns: [f64; 3], course: Option<f64>) {
+        self.is_known |= course.is_some();
+        for axis in 0..3 {
+            self.turned[axis] += turns[axis];
+            self.sum[axis] += self.turned[axis];
+        }
+        self.samples += 1;
+        let off = self.off.add(corrected, course);
+        if let Some(median) = self.blocks.add(off) {
+            self.block(median);
+        }
+    }
+
+    fn end(&mut self) {
+        if let Some(median) = self.blocks.end() {
+            self.block(median);
+        }
+    }
+
+    fn block(&mut self, median: Option<f64>) {
+        let samples = std::mem::take(&mut self.samples) as f64;
+        let mean = std::mem::take(&mut self.sum).map(|sum| sum / samples);
+        if let Some((before, from)) = self.before.replace((median, mean))
+            && let Some((before, after)) = before.zip(median)
+        {
+            let turns = std::array::from_fn(|axis| mean[axis] - from[axis]);
+            self.spans.push(Span { error: before - after, turns, seconds: COURSE_SPAN as f64 * DT });
+        }
+    }
 }

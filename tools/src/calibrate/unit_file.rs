@@ -1,6 +1,6 @@
 //! The calibration file of a unit holds the map for the board and the uncertainty of the map.
 
-use super::{Drive, Share, fit::Fit};
+use super::{Cut, Share, fit::Fit};
 use gyronet::mounting::GyroMap;
 use gyronet::store::UnitMap;
 use serde::{Deserialize, Serialize};
@@ -127,14 +127,14 @@ pub fn read_for(path: &Path, runs: u32) -> Result<GyroMap, UnitFileError> {
 }
 
 /// Returns the results of the fit for each drive.
-pub(super) fn drives(drives: &[Drive<'_>], fit: &Fit) -> Vec<DriveFit> {
+pub(super) fn drives(drives: &[Cut], fit: &Fit) -> Vec<DriveFit> {
     let fits = fit.biases.iter().zip(&fit.deviations);
     drives
         .iter()
         .zip(fits)
         .map(|(drive, (bias, deviation))| DriveFit {
-            name: drive.recording.name().to_owned(),
-            gyro_bias_rad_per_s: drive.replay.gyro_bias.map(|bias| bias.rad_per_sec()),
+            name: drive.name.clone(),
+            gyro_bias_rad_per_s: drive.gyro_bias,
             yaw_rate_bias_rad_per_s: *bias,
             deviation_rad: *deviation,
         })

@@ -1,13 +1,13 @@
 //! `gyronet calibrate` fits gain and mounting of a unit's gyro to drives with a reference yaw rate or course.
 
-use super::weights::Weights;
+use super::weights::Sent;
 use super::{Common, WriteError, print_json, progress, read_drive};
-use gyronet::model::GyroNet;
-use gyronet::pipeline::PipelineConfig;
-use gyronet_tools::calibrate::{Drive, Share, calibrate};
-use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::replay::Replay;
-use gyronet_tools::drive::wheel_frames::WheelFrames;
+use gyronet::coprocessor::Config;
+use gyronet::model::{Blob, GyroNet};
+use gyronet_tools::board::Board;
+use gyronet_tools::calibrate::{Cut, Share, calibrate};
+use gyronet_tools::drive::stream::Drive;
+use std::error::Error;
 use std::io::{Write, stdout};
 use std::path::PathBuf;
 
@@ -32,30 +32,16 @@ pub struct Args {
     /// Write the calibration to this file.
     #[arg(long, value_name = "FILE.json")]
     out: Option<PathBuf>,
-    /// Weight file [default: the library's default model].
-    #[arg(long, value_name = "BLOB")]
-    weights: Option<PathBuf>,
+    #[command(flatten)]
+    sent: Sent,
 }
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let weights = Weights::open(args.weights.as_deref())?;
+    let weights = args.sent.open()?;
     let blob = weights.blob()?;
-    let recordings: Vec<Recording> =
-        args.files.iter().map(|file| read_drive(file, common)).collect::<Result<_, _>>()?;
-    let mut drives = Vec::new();
-    for recording in &recordings {
-        let bar = progress::bar(common, recording.rows.len(), recording.name());
-        let replay = Replay::run(
-            recording,
-            &PipelineConfig::DEFAULT,
-            WheelFrames::new(recording),
-            &mut GyroNet::new(blob),
-            || bar.inc(1),
-        );
-        bar.finish_and_clear();
-        drives.push(Drive { recording, replay: replay? });
-    }
+    let drives = args.files.iter().map(|file| cut(&read_drive(file, common)?, blob, common));
+    let drives = drives.collect::<Result<Vec<Cut>, Box<dyn Error>>>()?;
     let unit = calibrate(&drives, blob.crc)?;
     if let Some(path) = &args.out {
         let text = serde_json::to_string_pretty(&unit.json())? + "\n";
@@ -80,4 +66,13 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         )?;
     }
     Ok(())
+}
+
+/// Runs a drive on the board with these weights, with a progress bar.
+pub fn cut(drive: &Drive<'_>, blob: Blob<'_>, common: Common) -> Result<Cut, Box<dyn Error>> {
+    let bar = progress::bar(common, drive.facts.rows, drive.name());
+    let board = Board::new(Config::DEFAULT, drive.wheels(), GyroNet::new(blob));
+    let cut = Cut::new(drive, board, || bar.inc(1));
+    bar.finish_and_clear();
+    Ok(cut?)
 }

@@ -1,13 +1,16 @@
 //! `gyronet demo`: all results of one drive.
 
-use super::{Common, WriteError, print_json, read_drive, weights, write_log};
-use gyronet::can::config::Config;
+use super::{Common, WriteError, print_json, progress, read_drive, weights};
+use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
 use gyronet_tools::demo::picture;
-use gyronet_tools::demo::{Demo, ShortTable};
-use gyronet_tools::evaluate::report::{DriveErrors, EvaluateError};
+use gyronet_tools::demo::{Demo, Sent, ShortTable};
+use gyronet_tools::drive::stream::Drive;
+use gyronet_tools::evaluate::rates::Rates;
+use gyronet_tools::evaluate::report::EvaluateError;
 use gyronet_tools::plot::page::grouped;
-use std::io::Write;
+use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Show all results of one drive: a table of errors, a page, a CAN log.
@@ -30,7 +33,7 @@ pub struct Args {
     #[arg(long, hide = true)]
     image: bool,
     #[command(flatten)]
-    networks: weights::Files,
+    sent: weights::Sent,
 }
 
 /// Runs the subcommand.
@@ -40,29 +43,38 @@ pub fn run(args: &Args, common: Common) -> super::Result {
                     --test board`; `gyronet size` prints its size and `gyronet bench-target` its instructions"
             .into());
     }
-    let (recording, title) = match &args.file {
+    let weights = args.sent.open()?;
+    let bundled = bundled::demo_drive()?;
+    let (drive, title) = match &args.file {
         Some(path) => {
-            let recording = read_drive(path, common)?;
-            let title = format!("Yaw of a recorded drive, {}", recording.name());
-            (recording, title)
+            let drive = read_drive(path, common)?;
+            let title = format!("Yaw of a recorded drive, {}", drive.name());
+            (drive, title)
         }
-        None => (bundled::demo_drive()?, String::from("Yaw of a simulated drive")),
+        None => (Drive::from(&bundled), String::from("Yaw of a simulated drive")),
     };
-    let rates = args.networks.rates(&recording, common)?;
-    let errors = match DriveErrors::new(&recording, &rates) {
+    let bar = progress::bar(common, drive.facts.rows, drive.name());
+    let mut rates = Rates::of(&drive);
+    let errors = args.sent.errors(&drive, None, |sample| {
+        rates.add(sample);
+        bar.inc(1);
+    });
+    bar.finish_and_clear();
+    let errors = match errors {
         Ok(errors) => Some(errors),
         // A drive without a reference still has its log and its picture.
-        Err(EvaluateError::NoReference { .. }) => None,
-        Err(error) => return Err(error.into()),
+        Err(error) if matches!(error.downcast_ref(), Some(EvaluateError::NoReference { .. })) => None,
+        Err(error) => return Err(error),
     };
 
     let folder = args.out.clone().unwrap_or_else(default_folder);
     std::fs::create_dir_all(&folder).map_err(WriteError::to(&folder))?;
     let [log, picture, page] = ["can.log", "yaw.svg", "demo.html"].map(|name| folder.join(name));
-    let frames = write_log(&rates.drive, &log)?;
+    let file = File::create(&log).map_err(WriteError::to(&log))?;
+    let sent = Sent::run(&drive, GyroNet::new(weights.blob()?), BufWriter::new(file))?;
     std::fs::write(&picture, picture::svg(&title, &rates)?).map_err(WriteError::to(&picture))?;
     let simulated = args.file.is_none();
-    let demo = Demo::new(&recording, simulated, &rates, errors.as_ref(), (Config::DEFAULT, frames));
+    let demo = Demo::new(&drive, simulated, &rates, errors.as_ref(), &sent);
     std::fs::write(&page, demo.page()).map_err(WriteError::to(&page))?;
 
     let mut out = std::io::stdout().lock();
@@ -72,7 +84,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         print_json(&mut out, &json)?;
         return Ok(());
     }
-    let seconds = recording.seconds();
+    let seconds = drive.facts.seconds();
     if simulated {
         let mark = console::style("A SIMULATED drive").yellow().bold();
         writeln!(
@@ -81,7 +93,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         )?;
         writeln!(out, "does, not what you gain. Your own drive: cargo demo DRIVE.csv\n")?;
     } else {
-        writeln!(out, "{}, {seconds:.0} s\n", recording.name())?;
+        writeln!(out, "{}, {seconds:.0} s\n", drive.name())?;
     }
     match &errors {
         Some(errors) => writeln!(out, "{}", ShortTable(errors))?,
@@ -92,7 +104,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     writeln!(
         out,
         "{:<25} {} (cargo gyronet monitor FILE decodes it)",
-        format!("{} CAN frames", grouped(frames)),
+        format!("{} CAN frames", grouped(sent.frames)),
         log.display()
     )?;
     Ok(())

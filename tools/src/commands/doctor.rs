@@ -1,15 +1,13 @@
 //! `gyronet doctor` checks a recording and writes a page about it.
 
-use super::{Common, WriteError, print_json, progress, read_drive, weights};
-use gyronet::model::GyroNet;
-use gyronet::pipeline::PipelineConfig;
-use gyronet_tools::calibrate::{Drive, Share, calibrate};
+use super::calibrate::cut;
+use super::weights::Sent;
+use super::{Common, WriteError, print_json, read_drive};
+use gyronet_tools::calibrate::{Share, calibrate};
 use gyronet_tools::doctor::{Doctor, Finding, Verdict, page};
-use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::replay::Replay;
-use gyronet_tools::drive::wheel_frames::WheelFrames;
+use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::methods::Method;
-use gyronet_tools::evaluate::report::DriveErrors;
+use std::error::Error;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -34,7 +32,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.html")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    networks: weights::Files,
+    sent: Sent,
 }
 
 /// Runs the subcommand.
@@ -78,24 +76,20 @@ fn gains(args: &Args, common: Common) -> Vec<(&'static str, String)> {
         let reason = reason.strip_prefix(&format!("{}: ", args.file.display())).unwrap_or(&reason);
         format!("Unknown: {reason}.")
     };
-    let recording = match read_drive(&args.file, common) {
-        Ok(recording) => recording,
+    let drive = match read_drive(&args.file, common) {
+        Ok(drive) => drive,
         Err(error) => return vec![("calibration and training", refused(&error))],
     };
-    let calibration = unit(args, &recording, common).unwrap_or_else(|error| refused(&error));
-    let training = trained(args, &recording, common).unwrap_or_else(|error| refused(&error));
+    let calibration = unit(args, &drive, common).unwrap_or_else(|error| refused(&error));
+    let training = trained(args, &drive).unwrap_or_else(|error| refused(&error));
     vec![("gyronet calibrate", calibration), ("training", training)]
 }
 
 /// Returns the shares of a unit's calibration, fitted to this drive alone.
-fn unit(args: &Args, recording: &Recording, common: Common) -> Result<String, Box<dyn std::error::Error>> {
-    let weights = args.networks.weights()?;
+fn unit(args: &Args, drive: &Drive<'_>, common: Common) -> Result<String, Box<dyn Error>> {
+    let weights = args.sent.open()?;
     let blob = weights.blob()?;
-    let bar = progress::bar(common, recording.rows.len(), recording.name());
-    let (config, wheels) = (PipelineConfig::DEFAULT, WheelFrames::new(recording));
-    let replay = Replay::run(recording, &config, wheels, &mut GyroNet::new(blob), || bar.inc(1));
-    bar.finish_and_clear();
-    let unit = calibrate(&[Drive { recording, replay: replay? }], blob.crc)?;
+    let unit = calibrate(&[cut(drive, blob, common)?], blob.crc)?;
     let shares = unit.shares.iter().map(|Share { name, value, sigma, refused }| match refused {
         None if value.abs() > 2.0 * sigma => {
             format!("{name} {value:+.4} (sigma {sigma:.4}): significant")
@@ -111,9 +105,8 @@ fn unit(args: &Args, recording: &Recording, common: Common) -> Result<String, Bo
 
 /// Returns the error of the sent rates with the weights in use, relative to static initialisation. Training must
 /// lower this ratio.
-fn trained(args: &Args, recording: &Recording, common: Common) -> Result<String, Box<dyn std::error::Error>> {
-    let rates = args.networks.rates(recording, common)?;
-    let errors = DriveErrors::new(recording, &rates)?;
+fn trained(args: &Args, drive: &Drive<'_>) -> Result<String, Box<dyn Error>> {
+    let errors = args.sent.errors(drive, None, |_| {}).map_err(|error| -> Box<dyn Error> { error })?;
     let figure = |method: Method| {
         let error = errors.methods[method].error;
         error.mean_1s_rad.or(error.rms_rad)

@@ -1,11 +1,13 @@
 //! `gyronet evaluate` computes the heading errors of each method on recorded drives.
 
-use super::{Common, drives, paint, print_json, progress, remark_vehicle, weights};
+use super::{Common, drives, paint, print_json, progress, read_drive, weights};
 use gyronet::model::GyroNet;
+use gyronet_tools::bundled;
 use gyronet_tools::calibrate::unit_file;
-use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::ablation::{self, Floor, Score, Variant};
-use gyronet_tools::evaluate::report::{DriveErrors, Report};
+use gyronet_tools::evaluate::report::Report;
+use gyronet_tools::network::checkpoint::Checkpoint;
 use indicatif::ProgressBar;
 use std::error::Error;
 use std::io::Write;
@@ -23,9 +25,9 @@ use std::path::{Path, PathBuf};
 ///
 /// One row for each method follows: the error over 1 s, 10 s, 60 s and the drive (rad; RMS and at the end), its ratio
 /// to that of static initialisation (1 s, or RMS against a course), the mean correction beyond static initialisation
-/// and zero-rate updates, multiplications per sample, and delay. GyroNet and the linear window are estimates of all windows
-/// after static initialisation. The last two rows are the rates that the board sends: the live rate, with the
-/// sample (Bosch TX1, J1939 VDC2), and the delayed rate, some samples later in its own yaw messages.
+/// and zero-rate updates, multiplications per sample, and delay. The linear window (and GyroNet, with --all) is an
+/// estimate of all windows after static initialisation. The last two rows are the rates that the board sends: the live
+/// rate, with the sample (Bosch TX1, J1939 VDC2), and the delayed rate, some samples later in its own yaw messages.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -48,22 +50,24 @@ pub struct Args {
     /// mounting errors that remain after the weights' correction, for the classical methods too.
     #[arg(long, value_name = "FILE.json")]
     calibration: Option<PathBuf>,
+    /// Add rows for the paper's GyroNet, in f32 and in integers; they take twenty times as long as all others together.
+    #[arg(long, conflicts_with_all = ["ablation", "lags"])]
+    all: bool,
+    /// Checkpoint of the f32 network (safetensors) [default: the one that comes with the tools].
+    #[arg(long, value_name = "FILE", requires = "all")]
+    checkpoint: Option<PathBuf>,
     #[command(flatten)]
-    networks: weights::Files,
+    sent: weights::Sent,
 }
 
 impl Args {
-    /// Reads a drive, and applies the calibration if one is given.
-    fn recording(&self, file: &Path, common: Common) -> Result<Recording, Box<dyn Error + Send + Sync>> {
-        let mut recording = Recording::read(file)?;
-        remark_vehicle(&recording, common)?;
+    /// Opens a drive, and applies the calibration if one is given.
+    fn drive(&self, file: &Path, common: Common) -> Result<Drive<'static>, Box<dyn Error + Send + Sync>> {
+        let mut drive = read_drive(file, common)?;
         if let Some(path) = &self.calibration {
-            let map = unit_file::read_for(path, self.networks.weights()?.blob()?.crc)?;
-            for row in &mut recording.rows {
-                row.sample.angular_rate = map.rate(row.sample.angular_rate);
-            }
+            drive.gyro_map = Some(unit_file::read_for(path, self.sent.open()?.blob()?.crc)?);
         }
-        Ok(recording)
+        Ok(drive)
     }
 }
 
@@ -75,10 +79,13 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if args.lags {
         return compare(args, common, &ablation::lags());
     }
+    let checkpoint =
+        args.all.then(|| args.checkpoint.as_deref().map_or_else(bundled::checkpoint, Checkpoint::read));
+    let checkpoint = checkpoint.transpose()?;
     let judge = |file: &Path, bar: &ProgressBar| {
-        let recording = args.recording(file, common)?;
-        let rates = args.networks.rates_with(&recording, bar)?;
-        Ok(DriveErrors::new(&recording, &rates)?)
+        let drive = args.drive(file, common)?;
+        bar.set_length(drive.facts.rows as u64);
+        args.sent.errors(&drive, checkpoint.as_ref(), |_| bar.inc(1))
     };
     let report = Report::new(drives::errors(&args.files, common, judge)?);
     let mut out = std::io::stdout().lock();
@@ -98,19 +105,19 @@ struct Scored {
 }
 
 fn compare(args: &Args, common: Common, variants: &[Variant]) -> super::Result {
-    let weights = args.networks.weights()?;
+    let weights = args.sent.open()?;
     let mut network = GyroNet::new(weights.blob()?);
     let mut drives = Vec::new();
     for file in &args.files {
-        let recording = args.recording(file, common).map_err(|error| -> Box<dyn Error> { error })?;
-        let bar = progress::bar(common, variants.len() * recording.rows.len(), recording.name());
-        let scores = ablation::run(&recording, &mut network, variants, || bar.inc(1));
+        let drive = args.drive(file, common).map_err(|error| -> Box<dyn Error> { error })?;
+        let bar = progress::bar(common, variants.len() * drive.facts.rows, drive.name());
+        let scores = ablation::run(&drive, &mut network, variants, || bar.inc(1));
         bar.finish_and_clear();
         let scores = scores?;
         if scores.is_empty() {
-            return Err(format!("{}: no reference yaw rate, which evaluation needs", recording.path).into());
+            return Err(format!("{}: no reference yaw rate, which evaluation needs", drive.path).into());
         }
-        let (name, reference_at_standstill) = (recording.name().to_owned(), ablation::floor(&recording));
+        let (name, reference_at_standstill) = (drive.name().to_owned(), ablation::floor(&drive)?);
         drives.push(Scored { name, scores, reference_at_standstill });
     }
     let scores: Vec<Vec<Score>> = drives.iter().map(|drive| drive.scores.clone()).collect();

@@ -1,7 +1,7 @@
 //! `gyronet import` converts logs of other tools to one drive.
 
 use super::{Common, WriteError, print_json};
-use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::drive::vehicle::Vehicle;
 use gyronet_tools::import::drive::{Logs, Request, Seen};
 use std::fs::File;
@@ -81,7 +81,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         let beside = write_vehicle(vehicle, path)?;
         report.push(format!("{}: {rows} rows; {} beside it", path.display(), beside.display()));
         // Check the drive as other commands read it, to report its faults now.
-        if let Err(error) = Recording::check(path) {
+        if let Err(error) = Drive::open(path) {
             report.push(format!("other commands will refuse it: {error}"));
         }
     }

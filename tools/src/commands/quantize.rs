@@ -1,10 +1,12 @@
 //! `gyronet quantize` converts an f32 checkpoint to a weight file for the integer kernels.
 
 use super::{Common, WriteError, print_json, read_drive};
+use gyronet::coprocessor::Config;
 use gyronet::model::GyroNet;
-use gyronet::pipeline::PipelineConfig;
+use gyronet_tools::board::Board;
 use gyronet_tools::bundled;
-use gyronet_tools::drive::replay::Replay;
+use gyronet_tools::drive::replay::{Steps, initialise};
+use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::network::checkpoint::{self, Checkpoint};
 use gyronet_tools::network::quantization_error::Both;
 use gyronet_tools::network::quantize::{Report, quantize};
@@ -93,8 +95,9 @@ fn convert(args: &Args, common: Common) -> Made {
     let checkpoint = Checkpoint::<checkpoint::GyroNet>::read(&args.checkpoint)?;
     let (bytes, report) = quantize(&checkpoint)?;
     let weights = WeightFile::parse(&args.out.display().to_string(), &bytes)?;
-    let drives = if args.drives.is_empty() {
-        vec![bundled::simulated_drive()?]
+    let bundled = bundled::simulated_drive()?;
+    let drives: Vec<Drive<'_>> = if args.drives.is_empty() {
+        vec![Drive::from(&bundled)]
     } else {
         args.drives.iter().map(|path| read_drive(path, common)).collect::<Result<_, _>>()?
     };
@@ -102,7 +105,9 @@ fn convert(args: &Args, common: Common) -> Made {
     for drive in &drives {
         let (mut integer, mut reference) = (GyroNet::new(weights.blob()?), checkpoint.network());
         let mut both = Both::new(&mut integer, &mut reference);
-        Replay::run(drive, &PipelineConfig::DEFAULT, None, &mut both, || {})?;
+        initialise(drive)?;
+        Steps::new(drive, Board::new(Config::DEFAULT, None, &mut both))?
+            .try_for_each(|step| step.map(drop))?;
         let error = both.error();
         added.push(Added {
             drive: drive.name().into(),

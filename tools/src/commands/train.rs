@@ -1,9 +1,8 @@
 //! `gyronet train` trains weights on a folder of drives, and measures what they gain.
 
-use super::weights::Files;
+use super::weights::Sent;
 use super::{Common, WriteError, drives, print_json, remark};
-use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::evaluate::report::DriveErrors;
+use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::network::checkpoint::{Checkpoint, GyroNet};
 use gyronet_tools::network::quantize::quantize;
 use gyronet_tools::python;
@@ -99,8 +98,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let (bytes, _) = quantize(&Checkpoint::<GyroNet>::read(&checkpoint)?)?;
     std::fs::write(&blob, &bytes).map_err(WriteError::to(&blob))?;
     let history = History::read(&history)?;
-    let networks = Files { weights: Some(blob.clone()), checkpoint: Some(checkpoint) };
-    let gain = |drives: &[Examined]| gain(drives, &networks, common);
+    let sent = Sent { weights: Some(blob.clone()) };
+    let gain = |drives: &[Examined]| gain(drives, &sent, common);
     let (held_out, validation) = (gain(&roles.held_out)?, gain(std::slice::from_ref(&roles.validate))?);
     let name = args.folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let training = Training {
@@ -175,12 +174,12 @@ fn python_training(args: &Args, common: Common, roles: &Roles, out: &Path) -> su
 }
 
 /// Computes what the weights gain on some drives.
-fn gain(drives: &[Examined], networks: &Files, common: Common) -> Result<Gain, Box<dyn Error>> {
+fn gain(drives: &[Examined], sent: &Sent, common: Common) -> Result<Gain, Box<dyn Error>> {
     let files: Vec<PathBuf> = drives.iter().map(|drive| drive.path.clone()).collect();
     let errors = drives::errors(&files, common, |file, bar| {
-        let recording = Recording::read(file)?;
-        let rates = networks.rates_with(&recording, bar)?;
-        Ok(DriveErrors::new(&recording, &rates)?)
+        let drive = Drive::open(file)?;
+        bar.set_length(drive.facts.rows as u64);
+        sent.errors(&drive, None, |_| bar.inc(1))
     })?;
     Ok(Gain::new(&errors))
 }

@@ -1,12 +1,19 @@
-//! This module puts the messages of one sample into words.
+//! The messages of a drive, and those of one sample in words.
 
-use crate::drive::replay::Replay;
+use crate::board::{Board, Step};
+use crate::drive::candump::Log;
+use crate::drive::replay::Steps;
+use crate::drive::stream::Drive;
 use embedded_can::{Frame, Id};
 use gyronet::can::bosch::{self, LAYOUTS};
 use gyronet::can::config::Config;
 use gyronet::can::yaw::{AngleMessage, DetailMessage, RateMessage, SIGMA_UNKNOWN};
 use gyronet::can::{DataFrame, j1939::Vdc2};
+use gyronet::coprocessor::{self, TimedFrame};
+use gyronet::model::WindowNetwork;
+use gyronet::units::Micros;
 use serde::Serialize;
+use std::time::{Duration, Instant};
 
 /// Describes a message in words.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -23,14 +30,52 @@ pub struct Message {
     pub says: String,
 }
 
-/// Returns the messages that are sent when the vehicle turns fastest.
-#[must_use]
-pub fn fastest_turn(drive: &Replay, config: Config) -> Vec<Message> {
-    let rate = |index: &usize| drive.steps[*index].vehicle.prompt.rate.0.unsigned_abs();
-    let Some(chosen) = drive.compared().max_by_key(rate) else { return Vec::new() };
-    let first = drive.steps.first().map_or(0, |step| step.time.0);
-    let step = &drive.steps[chosen];
-    let time = format!("{:.2}", (step.time.0 - first) as f64 * 1e-6);
+/// What the board sends on a drive.
+#[derive(Debug, Default)]
+pub struct Sent {
+    /// The step with the fastest turn after static initialisation.
+    pub fastest: Option<Step>,
+    /// Number of frames.
+    pub frames: u64,
+    /// The time that this machine took for the board alone.
+    pub run_time: Duration,
+}
+
+impl Sent {
+    /// Runs the board on a drive and writes its frames.
+    ///
+    /// # Errors
+    /// Those of the drive, and the writer's.
+    pub fn run(
+        drive: &Drive<'_>,
+        network: impl WindowNetwork,
+        out: impl std::io::Write,
+    ) -> Result<Self, Box<dyn std::error::Error>> {
+        let (mut sent, mut log) = (Self::default(), Log::new(out));
+        let mut steps = Steps::new(drive, Board::new(coprocessor::Config::DEFAULT, drive.wheels(), network))?;
+        loop {
+            let began = Instant::now();
+            let step = steps.next();
+            sent.run_time += began.elapsed();
+            let Some(step) = step.transpose()? else { break };
+            for TimedFrame { frame, time } in &step.frames {
+                log.frame(*time, frame)?;
+            }
+            let rate = |step: &Step| step.vehicle.prompt.rate.0.unsigned_abs();
+            let fastest = sent.fastest.as_ref().is_none_or(|fastest| rate(&step) >= rate(fastest));
+            if step.navigation.is_some() && fastest {
+                sent.fastest = Some(step);
+            }
+        }
+        sent.frames = log.finish()?;
+        Ok(sent)
+    }
+}
+
+/// The messages of a step in words; `first` is the time of the drive's first sample.
+pub fn in_words(step: Option<&Step>, first: Micros, config: Config) -> Vec<Message> {
+    let Some(step) = step else { return Vec::new() };
+    let time = format!("{:.2}", (step.time.0 - first.0) as f64 * 1e-6);
     let message = |frame: &DataFrame| {
         let (name, says) = read(frame, &config)?;
         let id = match frame.id() {
@@ -98,24 +143,22 @@ mod tests {
     use super::*;
     use crate::bundled;
     use gyronet::model::{Blob, GyroNet, weights};
-    use gyronet::pipeline::PipelineConfig;
 
     #[test]
     fn the_two_rates_of_one_sample_are_read_from_the_bytes() {
         let recording = bundled::simulated_drive().unwrap();
-        let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).unwrap());
-        let drive = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut network, || {}).unwrap();
-        let messages = fastest_turn(&drive, Config::DEFAULT);
+        let network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).unwrap());
+        let drive = Drive::from(&recording);
+        let sent = Sent::run(&drive, network, std::io::sink()).unwrap();
+        let messages = in_words(sent.fastest.as_ref(), drive.facts.first, Config::DEFAULT);
         let names: Vec<&str> = messages.iter().map(|message| message.name.as_str()).collect();
         assert_eq!(
             names,
             ["MM5_10_TX1", "MM5_10_TX2", "MM5_10_TX3", "GyroNet_Rate", "GyroNet_Angle", "GyroNet_Detail"]
         );
-        let fastest = drive.steps[drive.compared()]
-            .iter()
-            .map(|step| step.vehicle.prompt.rate)
-            .max_by_key(|r| r.0.abs());
-        let degrees = fastest.unwrap().rad_per_sec().to_degrees();
+        let fastest = sent.fastest.unwrap().vehicle.prompt.rate;
+        assert!(fastest.rad_per_sec().abs() > 0.3);
+        let degrees = fastest.rad_per_sec().to_degrees();
         let said: f64 = messages[0].says.split(' ').nth(2).unwrap().parse().unwrap();
         assert!((said - degrees).abs() < 0.01, "{said} {degrees}");
     }

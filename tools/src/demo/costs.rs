@@ -1,7 +1,5 @@
 //! The figures of time and memory.
 
-use crate::drive::recording::Recording;
-use crate::evaluate::rates::Rates;
 use crate::plot::page::grouped;
 use gyronet::can::config::Config;
 use gyronet::model::fognet::FogNetState;
@@ -10,6 +8,7 @@ use gyronet::model::weights;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
 use serde::Serialize;
+use std::time::Duration;
 
 /// Holds a figure of time or memory.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -24,9 +23,8 @@ pub struct Cost {
 
 /// Returns the figures of a drive.
 #[must_use]
-pub fn all(recording: &Recording, rates: &Rates, config: &Config) -> Vec<Cost> {
-    let samples = recording.rows.len().max(1) as f64;
-    let micros = rates.run_time.as_secs_f64() * 1e6 / samples;
+pub fn all(samples: usize, run_time: Duration, config: &Config) -> Vec<Cost> {
+    let micros = run_time.as_secs_f64() * 1e6 / samples.max(1) as f64;
     let lag = PipelineConfig::DEFAULT.compensate.lag.samples() as u64 * PERIOD_US / 1_000;
     let per_second: u32 = config.messages().iter().map(|message| 1_000 / u32::from(message.period_ms)).sum();
     let load = config.bus_load_per_mille();

@@ -2,7 +2,6 @@
 
 use super::trajectory::Trajectories;
 use super::{Cost, Demo, Message};
-use crate::evaluate::heading_error::Reference;
 use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
 use crate::evaluate::report::{COLUMNS, columns};
@@ -11,24 +10,18 @@ use crate::plot::page::{HINT, document, escaped, grouped, table};
 use gyronet::sample::RATE_HZ;
 
 /// The curves of these methods are drawn, from back to front.
-const DRAWN: [Method; 6] = [
-    Method::RAW,
-    Method::STATIC,
-    Method::STATIC_ZERO_RATE,
-    Method::PROMPT,
-    Method::GYRONET_INT,
-    Method::NAVIGATION,
-];
+const DRAWN: [Method; 5] =
+    [Method::RAW, Method::STATIC, Method::STATIC_ZERO_RATE, Method::PROMPT, Method::NAVIGATION];
 /// The class and the name of the reference.
 const REFERENCE: &str = "reference";
 
 pub fn page(demo: &Demo<'_>) -> String {
-    let name = demo.recording.name();
+    let name = demo.drive.name();
     let mut body = format!("<h1>{}</h1>\n", escaped(name));
     body += &format!(
         "<p class=\"lead\">{} s at {RATE_HZ} Hz through the integer code of the firmware, beside other methods. \
          Written by <code>gyronet demo</code> {}.</p>\n",
-        format_args!("{:.0}", demo.recording.seconds()),
+        format_args!("{:.0}", demo.drive.facts.seconds()),
         env!("CARGO_PKG_VERSION"),
     );
     if demo.simulated {
@@ -40,7 +33,7 @@ pub fn page(demo: &Demo<'_>) -> String {
     body += &yaw(demo);
     if let Some(trajectories) = &demo.trajectories {
         body += "<h2>Path</h2>\n";
-        body += &paths(trajectories, demo.recording.vehicle.radius_m());
+        body += &paths(trajectories, demo.drive.vehicle.radius_m());
     }
     body += "<h2>Methods</h2>\n";
     body += &methods(demo);
@@ -73,7 +66,7 @@ fn facts(demo: &Demo<'_>) -> String {
 fn yaw(demo: &Demo<'_>) -> String {
     let rates = demo.rates;
     let points = |values: Vec<f64>| rates.seconds.iter().copied().zip(values).collect::<Vec<(f64, f64)>>();
-    let truth = rates.reference.as_ref().and_then(Reference::rate).map(integral);
+    let truth = rates.reference.as_deref().map(integral);
     let mut angles: Vec<Curve> = Vec::new();
     let mut errors: Vec<Curve> = Vec::new();
     for method in DRAWN {
@@ -153,8 +146,8 @@ fn methods(demo: &Demo<'_>) -> String {
     format!(
         "{}{}<p class=\"note\">Heading error over {:.1} s against <code>{}</code>: mean over windows of 1, 10 and 60 s, RMS \
          and value at the end. To static: the error in 1 s (the RMS where the reference is a course) over that of static \
-         initialisation. Mean: the mean correction beyond static initialisation and zero-rate updates. GyroNet and the \
-         linear window are settled estimates after static initialisation. The last two rows are the rates that the board \
+         initialisation. Mean: the mean correction beyond static initialisation and zero-rate updates. The linear \
+         window is a settled estimate after static initialisation. The last two rows are the rates that the board \
          sends: with the sample (Bosch TX1, VDC2), and in its own messages some samples later.</p>\n",
         ours.unwrap_or_default(),
         table("methods", "", &COLUMNS, rows),

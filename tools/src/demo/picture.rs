@@ -1,6 +1,5 @@
 //! This module draws one picture of a drive: the yaw of each method, and below it the error of each.
 
-use crate::evaluate::heading_error::Reference;
 use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
 use crate::evaluate::rates::Rates;
@@ -13,12 +12,11 @@ const SIZE: (u32, u32) = (1200, 930);
 const AIR: f64 = 0.06;
 /// Lists the colours and widths of the methods. The wider line is drawn first, so that a line under another remains
 /// visible.
-const STYLES: [(Method, Color, u32); 6] = [
+const STYLES: [(Method, Color, u32); 5] = [
     (Method::RAW, COLORS[4], 2),
     (Method::STATIC, COLORS[0], 2),
     (Method::STATIC_ZERO_RATE, COLORS[3], 2),
     (Method::PROMPT, COLORS[6], 1),
-    (Method::GYRONET_INT, COLORS[2], 4),
     (Method::NAVIGATION, COLORS[1], 2),
 ];
 
@@ -31,7 +29,7 @@ pub fn svg(title: &str, rates: &Rates) -> Result<String, PlotError> {
     let degrees = |yaw: &[f64]| -> Vec<(f64, f64)> {
         points(&yaw.iter().map(|rad| rad.to_degrees()).collect::<Vec<f64>>())
     };
-    let truth = rates.reference.as_ref().and_then(Reference::rate).map(integral);
+    let truth = rates.reference.as_deref().map(integral);
     let (mut legend, mut angles, mut errors) = (Vec::new(), Vec::new(), Vec::new());
     // The corrected methods set the scale; a method that keeps its bias may leave it.
     let mut scale = Vec::new();

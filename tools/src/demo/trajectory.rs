@@ -1,9 +1,7 @@
 //! This module computes the path of the vehicle by each method, from its yaw rate and the speeds of the wheels.
 
 use crate::drive::DT;
-use crate::drive::recording::Recording;
-use crate::drive::wheel_frames::Speeds;
-use crate::evaluate::heading_error::Reference;
+use crate::drive::stream::Drive;
 use crate::evaluate::methods::Method;
 use crate::evaluate::rates::Rates;
 use crate::evaluate::trajectory_error::{Point, TrajectoryError};
@@ -46,11 +44,9 @@ pub struct Trajectories {
 impl Trajectories {
     /// Computes the paths; `None` for a drive without wheels.
     #[must_use]
-    pub fn new(recording: &Recording, rates: &Rates) -> Option<Self> {
-        let Speeds { wheels, metre_per_sec } = Speeds::new(recording)?;
-        let drive = &rates.drive;
-        let ways: Vec<f64> =
-            drive.steps[drive.compared()].iter().map(|step| metre_per_sec[step.row] * DT).collect();
+    pub fn new(drive: &Drive<'_>, rates: &Rates) -> Option<Self> {
+        let ways: Vec<f64> = rates.speeds.as_ref()?.iter().map(|speed| speed * DT).collect();
+        let wheels = drive.speeds()?.wheels();
         let path = |rates: &[f64]| {
             let mut track = Track::default();
             let step = |(way, rate): (&f64, &f64)| {
@@ -59,7 +55,7 @@ impl Trajectories {
             };
             ways.iter().zip(rates).map(step).collect::<Vec<Point>>()
         };
-        let truth = rates.reference.as_ref().and_then(Reference::rate).map(path);
+        let truth = rates.reference.as_deref().map(path);
         let mut paths = Vec::new();
         for method in METHODS {
             let points = path(&rates.rates[method]);

@@ -1,27 +1,46 @@
-//! This module exports a replayed drive for other programs: a table of its rates, and its path in TUM format.
+//! Tables and paths of a replayed drive for other programs: its rates, and its path in TUM format.
 
 use super::DT;
-use super::recording::Recording;
-use super::replay::Replay;
 use super::wheel_frames::Speeds;
+use crate::board::Step;
+use gyronet::health::Status;
 use gyronet::odometry::Track;
 use gyronet::units::AngularRate;
 use std::io::{self, Write};
 
-/// Writes a line for each sample after static initialisation: time, s; the yaw rate of the gyro, the prompt rate, the
-/// navigation rate and its expected error, rad/s; the yaw of the navigation rate, rad; and the status of the prompt
+/// A table with a line for each step after static initialisation: time, s; the yaw rate of the gyro, the prompt rate,
+/// the navigation rate and its expected error, rad/s; the yaw of the navigation rate, rad; and the status of the prompt
 /// rate. An empty field is unknown.
-///
-/// # Errors
-/// The writer's.
-pub fn csv(recording: &Recording, replay: &Replay, mut out: impl Write) -> io::Result<()> {
-    writeln!(out, "t_s,gyro,prompt,navigation,sigma,yaw,status")?;
-    for step in &replay.steps[replay.start..] {
-        let [.., gyro] = recording.rows[step.row].sample.angular_rate;
+#[derive(Debug)]
+pub struct Table<W> {
+    out: W,
+    started: bool,
+}
+
+impl<W: Write> Table<W> {
+    /// Writes the header.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn new(mut out: W) -> io::Result<Self> {
+        writeln!(out, "t_s,gyro,prompt,navigation,sigma,yaw,status")?;
+        Ok(Self { out, started: false })
+    }
+
+    /// Writes a step.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn step(&mut self, step: &Step) -> io::Result<()> {
+        self.started |= step.vehicle.prompt.status != Status::Init;
+        if !self.started {
+            return Ok(());
+        }
+        let [.., gyro] = step.input.sample.angular_rate;
         let known = |value: Option<f64>| value.map(|value| format!("{value:.7}")).unwrap_or_default();
         let sent = step.navigation;
         writeln!(
-            out,
+            self.out,
             "{:.4},{:.7},{:.7},{},{},{},{}",
             seconds(step.time.0),
             gyro.rad_per_sec(),
@@ -30,25 +49,56 @@ pub fn csv(recording: &Recording, replay: &Replay, mut out: impl Write) -> io::R
             known(sent.and_then(|sent| sent.sigma).map(AngularRate::rad_per_sec)),
             known(sent.map(|sent| sent.yaw.rad())),
             format!("{:?}", step.vehicle.prompt.status).to_lowercase(),
-        )?;
+        )
     }
-    out.flush()
+
+    /// Flushes the writer.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn finish(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
 }
 
-/// Writes the poses from dead reckoning with the navigation rate, from the end of static initialisation on: time of
-/// the recording, s, x forward and y left of the first pose, m, and the heading as a quaternion.
-///
-/// # Errors
-/// The writer's.
-pub fn tum(replay: &Replay, speeds: &Speeds, mut out: impl Write) -> io::Result<()> {
-    let mut track = Track::default();
-    for (step, sent) in replay.steps[replay.compared()].iter().zip(replay.navigation()) {
-        let way = speeds.metre_per_sec[step.row] * DT;
-        track.step([way; 2], sent.rate.rad_per_sec() * DT);
-        let ([x, y], (sin, cos)) = (track.position, (0.5 * track.yaw).sin_cos());
-        writeln!(out, "{:.4} {x:.4} {y:.4} 0 0 0 {sin:.9} {cos:.9}", seconds(step.time.0))?;
+/// The poses from dead reckoning with the navigation rate, from the end of static initialisation on: time of the
+/// recording, s, x forward and y left of the first pose, m, and the heading as a quaternion.
+#[derive(Debug)]
+pub struct Tum<W> {
+    out: W,
+    speeds: Speeds,
+    track: Track,
+    started: bool,
+    ended: bool,
+}
+
+impl<W: Write> Tum<W> {
+    /// Starts at the first pose.
+    pub fn new(speeds: Speeds, out: W) -> Self {
+        Self { out, speeds, track: Track::default(), started: false, ended: false }
     }
-    out.flush()
+
+    /// Writes the pose of a step.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn step(&mut self, step: &Step) -> io::Result<()> {
+        let way = self.speeds.next(&step.input) * DT;
+        self.started |= step.vehicle.prompt.status != Status::Init;
+        self.ended |= self.started && step.navigation.is_none();
+        let Some(sent) = step.navigation.filter(|_| self.started && !self.ended) else { return Ok(()) };
+        self.track.step([way; 2], sent.rate.rad_per_sec() * DT);
+        let ([x, y], (sin, cos)) = (self.track.position, (0.5 * self.track.yaw).sin_cos());
+        writeln!(self.out, "{:.4} {x:.4} {y:.4} 0 0 0 {sin:.9} {cos:.9}", seconds(step.time.0))
+    }
+
+    /// Flushes the writer.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn finish(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
 }
 
 fn seconds(micros: u64) -> f64 {
@@ -58,24 +108,30 @@ fn seconds(micros: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::board::Board;
     use crate::bundled;
-    use crate::drive::wheel_frames::WheelFrames;
+    use crate::drive::replay::Steps;
+    use crate::drive::stream::Drive;
     use crate::evaluate::ablation::Uncorrected;
-    use gyronet::pipeline::PipelineConfig;
+    use gyronet::coprocessor::Config;
     use std::f64::consts::TAU;
 
     #[test]
     fn table_and_path_say_the_same() {
         let recording = bundled::simulated_drive().unwrap();
-        let wheels = WheelFrames::new(&recording);
-        let replay =
-            Replay::run(&recording, &PipelineConfig::DEFAULT, wheels, &mut Uncorrected, || {}).unwrap();
-        let (mut table, mut path) = (Vec::new(), Vec::new());
-        csv(&recording, &replay, &mut table).unwrap();
-        tum(&replay, &Speeds::new(&recording).unwrap(), &mut path).unwrap();
+        let drive = Drive::from(&recording);
+        let board = Board::new(Config::DEFAULT, drive.wheels(), Uncorrected);
+        let mut table = Table::new(Vec::new()).unwrap();
+        let mut path = Tum::new(drive.speeds().unwrap(), Vec::new());
+        for step in Steps::new(&drive, board).unwrap() {
+            let step = step.unwrap();
+            table.step(&step).unwrap();
+            path.step(&step).unwrap();
+        }
+        let (table, path) = (table.out, path.out);
         let table = String::from_utf8(table).unwrap();
         let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
-        assert_eq!(rows.len(), replay.steps.len() - replay.start);
+        assert_eq!(rows.len(), recording.rows.len() - 300);
         assert!(rows.iter().any(|row| row[6] == "ready"));
         let unknown = rows.iter().filter(|row| row[3].is_empty()).count();
         assert_eq!(unknown, 7, "the last navigation rates are never sent");

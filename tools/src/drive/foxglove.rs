@@ -4,8 +4,7 @@
 //! The heading is a `foxglove.PoseInFrame` and a change of state a `foxglove.Log`; Foxglove has panels for both. The
 //! other messages are numbers to plot. Times are those of the recording.
 
-use super::recording::Recording;
-use super::replay::{Replay, Step};
+use crate::board::Step;
 use embedded_can::{Frame, Id};
 use gyronet::coprocessor::TimedFrame;
 use gyronet::health::Status;
@@ -33,23 +32,38 @@ struct Channels {
     can: u16,
 }
 
-/// Writes a drive, and returns the number of messages.
-///
-/// # Errors
-/// The writer's.
-pub fn write(recording: &Recording, replay: &Replay, out: impl Write + Seek) -> Result<u64, McapError> {
-    let options = WriteOptions::new()
-        .compression(Some(Compression::Lz4))
-        .library(concat!("gyronet ", env!("CARGO_PKG_VERSION")));
-    let mut file = File { writer: Writer::with_options(out, options)?, messages: 0 };
-    let channels = channels(&mut file.writer)?;
-    let mut last: Option<Status> = None;
-    for step in &replay.steps {
+/// A file in progress.
+pub struct Recorder<W: Write + Seek> {
+    writer: Writer<W>,
+    channels: Channels,
+    last: Option<Status>,
+    messages: u64,
+}
+
+impl<W: Write + Seek> Recorder<W> {
+    /// Starts a file.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn new(out: W) -> Result<Self, McapError> {
+        let options = WriteOptions::new()
+            .compression(Some(Compression::Lz4))
+            .library(concat!("gyronet ", env!("CARGO_PKG_VERSION")));
+        let mut writer = Writer::with_options(out, options)?;
+        let channels = channels(&mut writer)?;
+        Ok(Self { writer, channels, last: None, messages: 0 })
+    }
+
+    /// Writes a step.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn step(&mut self, step: &Step) -> Result<(), McapError> {
         let time = step.time;
-        let row = &recording.rows[step.row];
+        let row = &step.input;
         let sample = &row.sample;
-        file.message(
-            channels.input,
+        self.message(
+            self.channels.input,
             time,
             &json!({
                 "timestamp": stamp(time),
@@ -58,10 +72,10 @@ pub fn write(recording: &Recording, replay: &Replay, out: impl Write + Seek) -> 
                 "wheels": row.wheels,
             }),
         )?;
-        file.message(channels.rate, time, &rate(step, row.reference))?;
+        self.message(self.channels.rate, time, &rate(step, row.reference))?;
         let half = 0.5 * step.vehicle.navigation.yaw.rad();
-        file.message(
-            channels.pose,
+        self.message(
+            self.channels.pose,
             time,
             &json!({
                 "timestamp": stamp(time),
@@ -73,10 +87,10 @@ pub fn write(recording: &Recording, replay: &Replay, out: impl Write + Seek) -> 
             }),
         )?;
         let status = step.vehicle.prompt.status;
-        if last != Some(status) {
+        if self.last != Some(status) {
             let level = if status == Status::Ready { INFO } else { WARNING };
-            file.message(
-                channels.status,
+            self.message(
+                self.channels.status,
                 time,
                 &json!({
                     "timestamp": stamp(time),
@@ -88,7 +102,7 @@ pub fn write(recording: &Recording, replay: &Replay, out: impl Write + Seek) -> 
                 }),
             )?;
         }
-        last = Some(status);
+        self.last = Some(status);
         for TimedFrame { frame, time } in &step.frames {
             let (id, extended) = match frame.id() {
                 Id::Standard(id) => (u32::from(id.as_raw()), false),
@@ -99,8 +113,8 @@ pub fn write(recording: &Recording, replay: &Replay, out: impl Write + Seek) -> 
                 let _ = write!(text, "{byte:02X}");
                 text
             });
-            file.message(
-                channels.can,
+            self.message(
+                self.channels.can,
                 *time,
                 &json!({
                     "timestamp": stamp(*time),
@@ -110,9 +124,24 @@ pub fn write(recording: &Recording, replay: &Replay, out: impl Write + Seek) -> 
                 }),
             )?;
         }
+        Ok(())
     }
-    file.writer.finish()?;
-    Ok(file.messages)
+
+    /// Ends the file, and returns the number of messages.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn finish(&mut self) -> Result<u64, McapError> {
+        self.writer.finish()?;
+        Ok(self.messages)
+    }
+
+    fn message(&mut self, channel_id: u16, time: Micros, value: &Value) -> Result<(), McapError> {
+        let nanos = 1_000 * time.0;
+        let header = MessageHeader { channel_id, sequence: 0, log_time: nanos, publish_time: nanos };
+        self.messages += 1;
+        self.writer.write_to_known_channel(&header, value.to_string().as_bytes())
+    }
 }
 
 /// Returns the message with the rates of a step and the reference.
@@ -130,20 +159,6 @@ fn rate(step: &Step, reference: Option<f64>) -> Value {
         "standstill": format!("{:?}", step.standstill).to_lowercase(),
         "reference": reference,
     })
-}
-
-struct File<W: Write + Seek> {
-    writer: Writer<W>,
-    messages: u64,
-}
-
-impl<W: Write + Seek> File<W> {
-    fn message(&mut self, channel_id: u16, time: Micros, value: &Value) -> Result<(), McapError> {
-        let nanos = 1_000 * time.0;
-        let header = MessageHeader { channel_id, sequence: 0, log_time: nanos, publish_time: nanos };
-        self.messages += 1;
-        self.writer.write_to_known_channel(&header, value.to_string().as_bytes())
-    }
 }
 
 fn channels(writer: &mut Writer<impl Write + Seek>) -> Result<Channels, McapError> {

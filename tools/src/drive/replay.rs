@@ -1,30 +1,31 @@
-//! This module runs a recorded drive through the coprocessor. The board runs the same code, so the frames are those
-//! that the board would send.
+//! A recorded drive on the board, step by step ([`Steps`]) or as a whole ([`Replay`]).
 
+pub use crate::board::Step;
+
+use crate::board::Board;
 use crate::drive::candump::Log;
+use crate::drive::error::DataError;
 use crate::drive::recording::Recording;
-use crate::drive::wheel_frames::{self, WheelFrames};
+use crate::drive::stream::{Drive, Rows};
+use crate::drive::wheel_frames::WheelFrames;
+use crate::evaluate::ablation::Uncorrected;
 use gyronet::bias::StaticError;
-use gyronet::coprocessor::{Clock, Config, Coprocessor, TimedFrame};
-use gyronet::estimate::{VehicleSample, YawEstimate};
+use gyronet::coprocessor::{Config, TimedFrame};
+use gyronet::estimate::YawEstimate;
 use gyronet::health::{Counters, Status};
 use gyronet::model::WindowNetwork;
 use gyronet::pipeline::PipelineConfig;
-use gyronet::sample::Standstill;
-use gyronet::units::{AngularRate, Micros, Yaw};
+use gyronet::units::{AngularRate, Yaw};
 use std::io::{self, Write};
 use std::ops::Range;
 
-/// Period at which the replayed board polls its inputs, microseconds.
-const LOOK_US: u64 = 1_000;
-/// Longest part of a gap in which the board's messages about a silent sensor are replayed, microseconds; the rest of
-/// the gap is skipped.
-const SILENCE_US: u64 = 60_000_000;
-
-/// The reason why a recording cannot be replayed.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+/// The reason why a drive cannot be replayed.
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReplayError {
+    /// The drive cannot be read.
+    #[error(transparent)]
+    Data(#[from] DataError),
     /// The vehicle does not stand still during static initialisation.
     #[error("{path}: starts moving: line {line}: {source}")]
     StartsMoving {
@@ -43,28 +44,65 @@ pub enum ReplayError {
     },
 }
 
-/// The results of one row.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Step {
-    /// Index of the row in the recording.
-    pub row: usize,
-    /// The sample's time stamp.
-    pub time: Micros,
-    /// Whether the vehicle stands, by its wheels.
-    pub standstill: Standstill,
-    /// The estimates that were sent with this row.
-    pub vehicle: VehicleSample,
-    /// The navigation rate of this row's sample, which is sent some samples later; `None` during static
-    /// initialisation and for the last samples of the drive.
-    pub navigation: Option<YawEstimate>,
-    /// The gyro less static bias less the network's settled estimate, which is known some samples later; the prompt
-    /// rate if there is no settled estimate.
-    pub settled: AngularRate,
-    /// The frames that were sent with this row, and those sent while the sensor was silent after it.
-    pub frames: Vec<TimedFrame>,
+/// The steps of a drive, one at a time.
+pub struct Steps<'d, N> {
+    path: &'d str,
+    rows: std::iter::Fuse<Rows<'d>>,
+    board: Board<N>,
 }
 
-/// A drive with its corrected yaw rates.
+impl<'d, N: WindowNetwork> Steps<'d, N> {
+    /// Starts a board on a drive.
+    ///
+    /// # Errors
+    /// [`ReplayError::Data`].
+    pub fn new(drive: &'d Drive<'_>, board: Board<N>) -> Result<Self, ReplayError> {
+        Ok(Self { path: &drive.path, rows: drive.rows()?.fuse(), board })
+    }
+
+    /// The board, with its counters.
+    #[must_use]
+    pub fn board(&self) -> &Board<N> {
+        &self.board
+    }
+}
+
+impl<N: WindowNetwork> Iterator for Steps<'_, N> {
+    type Item = Result<Step, ReplayError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            let Some(row) = self.rows.next() else { return self.board.end().map(Ok) };
+            let step = row.map_err(ReplayError::Data).and_then(|row| {
+                self.board.row(&row).map_err(|source| {
+                    let path = self.path.to_owned();
+                    ReplayError::StartsMoving { path, line: row.line, source }
+                })
+            });
+            if let Some(step) = step.transpose() {
+                return Some(step);
+            }
+        }
+    }
+}
+
+/// Replays the beginning of a drive until static initialisation has finished, and returns the gyro's bias.
+///
+/// # Errors
+/// [`ReplayError`], if static initialisation does not succeed at its first attempt.
+pub fn initialise(drive: &Drive<'_>) -> Result<[AngularRate; 3], ReplayError> {
+    let mut steps = Steps::new(drive, Board::new(Config::DEFAULT, drive.wheels(), Uncorrected))?;
+    loop {
+        let ended = steps.next().transpose()?.is_none();
+        match steps.board.coprocessor().pipeline().gyro_bias() {
+            Some(bias) => return Ok(bias),
+            None if ended => return Err(ReplayError::NeverInitialised { path: drive.path.clone() }),
+            None => {}
+        }
+    }
+}
+
+/// A whole drive in memory with its corrected yaw rates.
 #[derive(Debug, Clone)]
 pub struct Replay {
     /// One step for each row that has a place on the grid.
@@ -90,63 +128,24 @@ impl Replay {
     pub fn run(
         recording: &Recording,
         config: &PipelineConfig,
-        mut wheels: Option<WheelFrames>,
+        wheels: Option<WheelFrames>,
         network: &mut impl WindowNetwork,
         mut tick: impl FnMut(),
     ) -> Result<Self, ReplayError> {
-        let mut coprocessor = Coprocessor::new(Config {
-            pipeline: *config,
-            wheels: wheels.as_ref().map(|_| wheel_frames::receiver()),
-            clock: Clock::Sensor,
-            ..Config::DEFAULT
-        });
+        let config = Config { pipeline: *config, ..Config::DEFAULT };
+        let mut board = Board::new(config, wheels, network);
         let mut steps: Vec<Step> = Vec::with_capacity(recording.rows.len());
-        let (mut start, mut now) = (None, Micros(0));
-        for (index, row) in recording.rows.iter().enumerate() {
+        for row in &recording.rows {
             tick();
-            let time = row.sample.time;
-            if let Some(last) = steps.last_mut() {
-                let until = time.0.min(now.0 + SILENCE_US);
-                for look in (now.0 + LOOK_US..until).step_by(LOOK_US as usize) {
-                    // Time advances to this row; messages about a silent sensor precede the messages of this row.
-                    let _ = coprocessor.poll(Micros(look), &mut |frame: TimedFrame| last.frames.push(frame));
-                }
-            }
-            now = now.max(time);
-            if let Some(frame) = wheels.as_mut().and_then(|wheels| wheels.next(row)) {
-                // A speed that does not fit the frame is counted as not valid.
-                let _ = coprocessor.can(&frame, now);
-            }
-            // A row whose time stamp does not fit the grid gives no frame and is counted.
-            let mut frames = Vec::new();
-            let sent = coprocessor.imu(row.sample, now, &mut |frame: TimedFrame| frames.push(frame));
-            let Ok(observation) = sent else { continue };
-            if let Some(source) = observation.refused {
+            let step = board.row(row).map_err(|source| {
                 let path = recording.path.clone();
-                return Err(ReplayError::StartsMoving { path, line: row.line, source });
-            }
-            if let Some(window) = coprocessor.window() {
-                let estimate = network.estimate(&window.features);
-                coprocessor.deliver(window.end, estimate).expect("the window that is due");
-            }
-            let vehicle = observation.vehicle;
-            if start.is_none() && vehicle.prompt.status != Status::Init {
-                start = Some(steps.len());
-            }
-            let settled = vehicle.prompt.rate;
-            let standstill = observation.wheels.standstill;
-            steps.push(Step { row: index, time, standstill, vehicle, navigation: None, settled, frames });
-            if vehicle.navigation.status != Status::Init
-                && let Some(step) = earlier(&mut steps, vehicle.navigation.tick)
-            {
-                step.navigation = Some(vehicle.navigation);
-            }
-            if let Some(settled) = observation.settled
-                && let Some(step) = earlier(&mut steps, settled.tick)
-            {
-                step.settled = AngularRate(settled.rate.0.saturating_sub(settled.correction.0));
-            }
+                ReplayError::StartsMoving { path, line: row.line, source }
+            })?;
+            steps.extend(step);
         }
+        steps.extend(std::iter::from_fn(|| board.end()));
+        let start = steps.iter().position(|step| step.vehicle.prompt.status != Status::Init);
+        let coprocessor = board.coprocessor();
         let pipeline = coprocessor.pipeline();
         let gyro_bias = pipeline
             .gyro_bias()
@@ -198,11 +197,6 @@ impl Replay {
             (status, self.steps.iter().filter(|step| step.vehicle.prompt.status == status).count())
         })
     }
-}
-
-/// Returns the step of a recent sample.
-fn earlier(steps: &mut [Step], tick: u32) -> Option<&mut Step> {
-    steps.iter_mut().rev().find(|step| step.vehicle.prompt.tick == tick)
 }
 
 #[cfg(test)]
@@ -291,6 +285,6 @@ mod tests {
         let recording = recording(400, |_| 0.01, 200);
         let error =
             Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap_err();
-        assert_eq!(error, ReplayError::NeverInitialised { path: "a.csv".into() });
+        assert!(matches!(error, ReplayError::NeverInitialised { .. }), "{error:?}");
     }
 }

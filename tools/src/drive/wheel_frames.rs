@@ -53,7 +53,13 @@ impl WheelFrames {
     /// Creates the encoder, before the first row; `None` if the recording has no wheels.
     #[must_use]
     pub fn new(recording: &Recording) -> Option<Self> {
-        let recorded = |wheel: &usize| recording.rows.iter().any(|row| row.wheels[*wheel].is_some());
+        Self::of(recording.facts().wheels, recording.vehicle.radius_m())
+    }
+
+    /// Creates the encoder for the wheels that a drive has, with their rolling radius.
+    #[must_use]
+    pub fn of(wheels: [bool; WHEELS], radius: f64) -> Option<Self> {
+        let recorded = |wheel: &usize| wheels[*wheel];
         let any = (0..WHEELS).find(recorded)?;
         let mut source = [any; WHEELS];
         for (wheel, place) in PLACES.iter().enumerate() {
@@ -61,7 +67,7 @@ impl WheelFrames {
             let own = [wheel, axle[0], axle[1]].into_iter().find(recorded);
             source[*place] = own.unwrap_or(any);
         }
-        Some(Self { source, newest: [None; WHEELS], row: 0, radius: recording.vehicle.radius_m() })
+        Some(Self { source, newest: [None; WHEELS], row: 0, radius })
     }
 
     /// Advances by a row and returns the known speed of each wheel in km/h. A wheel that turns too slowly to be told
@@ -85,32 +91,38 @@ impl WheelFrames {
     }
 }
 
-/// The speed of the vehicle at each row of a recording, for dead reckoning.
+/// The speed of the vehicle at each row of a drive, for dead reckoning: the mean of the rear wheels, which do not
+/// steer, or else of the front ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Speeds {
-    /// The number of wheels that are averaged.
-    pub wheels: usize,
-    /// The speed at each row, m/s, forward positive; a wheel keeps its last known rate.
-    pub metre_per_sec: Vec<f64>,
+    wheels: Vec<usize>,
+    /// A wheel keeps its last known rate.
+    last: [f64; WHEELS],
+    radius: f64,
 }
 
 impl Speeds {
-    /// Computes the mean speed of the rear wheels, which do not steer, or else of the front ones; `None` if the
-    /// recording has no wheels.
+    /// Creates the speeds for the wheels that a drive has, with their rolling radius; `None` without wheels.
     #[must_use]
-    pub fn new(recording: &Recording) -> Option<Self> {
-        let recorded = |wheel: &usize| recording.rows.iter().any(|row| row.wheels[*wheel].is_some());
-        let axle = |axle: [usize; 2]| axle.into_iter().filter(recorded).collect::<Vec<usize>>();
+    pub fn of(wheels: [bool; WHEELS], radius: f64) -> Option<Self> {
+        let axle = |axle: [usize; 2]| axle.into_iter().filter(|wheel| wheels[*wheel]).collect::<Vec<usize>>();
         let wheels = [REAR, FRONT].map(axle).into_iter().find(|wheels| !wheels.is_empty())?;
-        let (mut last, radius) = ([0.0; WHEELS], recording.vehicle.radius_m());
-        let speed = |row: &Row| {
-            for wheel in &wheels {
-                last[*wheel] = row.wheels[*wheel].unwrap_or(last[*wheel]);
-            }
-            radius * wheels.iter().map(|wheel| last[*wheel]).sum::<f64>() / wheels.len() as f64
-        };
-        let metre_per_sec = recording.rows.iter().map(speed).collect();
-        Some(Self { wheels: wheels.len(), metre_per_sec })
+        Some(Self { wheels, last: [0.0; WHEELS], radius })
+    }
+
+    /// The number of wheels that are averaged.
+    #[must_use]
+    pub fn wheels(&self) -> usize {
+        self.wheels.len()
+    }
+
+    /// The speed at the next row, m/s, forward positive.
+    pub fn next(&mut self, row: &Row) -> f64 {
+        for wheel in &self.wheels {
+            self.last[*wheel] = row.wheels[*wheel].unwrap_or(self.last[*wheel]);
+        }
+        let sum = self.wheels.iter().map(|wheel| self.last[*wheel]).sum::<f64>();
+        self.radius * sum / self.wheels.len() as f64
     }
 }
 
@@ -154,9 +166,11 @@ mod tests {
             format!("{:.2},0,0,9.8,0,0,0,{one},{two},{four}\n", 0.01 * k as f64)
         };
         let text = (0..402).map(row).fold(text, |text, row| text + &row);
-        let speeds = Speeds::new(&Recording::parse("a.csv", text.as_bytes()).unwrap()).unwrap();
-        assert_eq!((speeds.wheels, speeds.metre_per_sec[399]), (2, 0.0));
-        assert_eq!(speeds.metre_per_sec[400..], [3.0 * RADIUS; 2]);
+        let recording = Recording::parse("a.csv", text.as_bytes()).unwrap();
+        let mut speeds = Speeds::of(recording.facts().wheels, RADIUS).unwrap();
+        let all: Vec<f64> = recording.rows.iter().map(|row| speeds.next(row)).collect();
+        assert_eq!((speeds.wheels(), all[399]), (2, 0.0));
+        assert_eq!(all[400..], [RADIUS * 6.0 / 2.0; 2]);
     }
 
     #[test]

@@ -1,12 +1,13 @@
-//! This module measures what each part of the compensation contributes. It computes the error of the navigation rate
+//! What each part of the compensation contributes: the error of the navigation rate
 //! with different configurations, all of which the board can run.
 
-use crate::drive::recording::Recording;
-use crate::drive::replay::{Replay, ReplayError, Step};
-use crate::drive::wheel_frames::WheelFrames;
-use crate::evaluate::metrics::{WINDOW, YawError};
+use crate::board::{Board, Step};
+use crate::drive::replay::{ReplayError, Steps};
+use crate::drive::stream::Drive;
+use crate::evaluate::metrics::{WINDOW, YawError, YawSums};
+use crate::evaluate::rates::silent;
 use gyronet::compensate::{CompensateConfig, Lag, Mode};
-use gyronet::estimate::YawEstimate;
+use gyronet::health::Status;
 use gyronet::model::window::Features;
 use gyronet::model::{Estimate, WindowNetwork};
 use gyronet::pipeline::PipelineConfig;
@@ -34,7 +35,8 @@ impl Variant {
 }
 
 /// A network whose corrections are zero.
-pub(crate) struct Uncorrected;
+#[derive(Debug, Clone, Copy)]
+pub struct Uncorrected;
 
 impl WindowNetwork for Uncorrected {
     fn estimate(&mut self, _window: &[Features; gyronet::model::window::WINDOW]) -> Estimate {
@@ -113,35 +115,29 @@ pub struct Floor {
     pub bias_rad_per_s: f64,
 }
 
-/// Runs the variants on one drive; `tick` is called for each row of each run.
+/// Runs the variants on one drive, one after the other; `tick` is called for each step of each run. Returns no score if
+/// a compared sample has no reference.
 ///
 /// # Errors
 /// [`ReplayError`].
 pub fn run(
-    recording: &Recording,
+    drive: &Drive<'_>,
     network: &mut impl WindowNetwork,
     variants: &[Variant],
     mut tick: impl FnMut(),
 ) -> Result<Vec<Score>, ReplayError> {
-    variants
-        .iter()
-        .filter_map(|Variant { name, config, network: with_network, wheels }| {
-            let wheels = wheels.then(|| WheelFrames::new(recording)).flatten();
-            let drive = if *with_network {
-                Replay::run(recording, config, wheels, network, &mut tick)
-            } else {
-                Replay::run(recording, config, wheels, &mut Uncorrected, &mut tick)
-            };
-            let drive = match drive {
-                Ok(drive) => drive,
-                Err(error) => return Some(Err(error)),
-            };
-            let compared = drive.steps[drive.compared()].iter();
-            let reference: Vec<f64> =
-                compared.map(|step| recording.rows[step.row].reference).collect::<Option<_>>()?;
-            Some(Ok(score(name, &drive.navigation().collect::<Vec<_>>(), &reference)?))
-        })
-        .collect()
+    let mut scores = Vec::new();
+    for Variant { name, config, network: with_network, wheels } in variants {
+        let wheels = wheels.then(|| drive.wheels()).flatten();
+        let network: &mut dyn WindowNetwork = if *with_network { network } else { &mut Uncorrected };
+        let mut sums = Sums::default();
+        for step in Steps::new(drive, Board::new(silent(*config), wheels, network))? {
+            tick();
+            sums.add(&step?);
+        }
+        scores.extend(sums.score(name));
+    }
+    Ok(scores)
 }
 
 /// Returns the means over drives with equal weights; `None` without drives.
@@ -165,45 +161,87 @@ pub fn mean(drives: &[Vec<Score>]) -> Option<Vec<Score>> {
 }
 
 /// Returns the reference's error while the wheels stand; `None` if the drive has no wheels or they never stand.
-#[must_use]
-pub fn floor(recording: &Recording) -> Option<Floor> {
-    let wheels = Some(WheelFrames::new(recording)?);
-    let drive = Replay::run(recording, &PipelineConfig::DEFAULT, wheels, &mut Uncorrected, || {}).ok()?;
-    let reference =
-        |step: &Step| recording.rows[step.row].reference.filter(|_| step.standstill == Standstill::Still);
-    let still: Vec<Option<f64>> = drive.steps.iter().map(reference).collect();
-    let whole =
-        still.chunks_exact(WINDOW).filter_map(|second| second.iter().copied().collect::<Option<Vec<_>>>());
-    let means: Vec<f64> = whole.map(|second| second.iter().sum::<f64>() / WINDOW as f64).collect();
-    let count = (!means.is_empty()).then_some(means.len() as f64)?;
-    Some(Floor {
-        seconds: means.len(),
-        mean_1s_rad: means.iter().map(|mean| mean.abs()).sum::<f64>() / count,
-        bias_rad_per_s: means.iter().sum::<f64>() / count,
-    })
+///
+/// # Errors
+/// [`ReplayError`].
+pub fn floor(drive: &Drive<'_>) -> Result<Option<Floor>, ReplayError> {
+    let Some(wheels) = drive.wheels() else { return Ok(None) };
+    let board = Board::new(silent(PipelineConfig::DEFAULT), Some(wheels), Uncorrected);
+    // The sum of the second in progress, while the wheels have stood in all of it.
+    let (mut sum, mut samples) = (Some(0.0), 0);
+    let (mut seconds, mut magnitudes, mut means) = (0, 0.0, 0.0);
+    for step in Steps::new(drive, board)? {
+        let Step { input, standstill, .. } = step?;
+        let still = input.reference.filter(|_| standstill == Standstill::Still);
+        sum = sum.zip(still).map(|(sum, rate)| sum + rate);
+        samples += 1;
+        if samples == WINDOW {
+            if let Some(sum) = sum {
+                let mean: f64 = sum / WINDOW as f64;
+                (seconds, magnitudes, means) = (seconds + 1, magnitudes + mean.abs(), means + mean);
+            }
+            (sum, samples) = (Some(0.0), 0);
+        }
+    }
+    let count = seconds as f64;
+    Ok((seconds > 0).then(|| Floor {
+        seconds,
+        mean_1s_rad: magnitudes / count,
+        bias_rad_per_s: means / count,
+    }))
 }
 
-fn score(name: &str, rates: &[YawEstimate], reference: &[f64]) -> Option<Score> {
-    let rate: Vec<f64> = rates.iter().map(|rate| rate.rate.rad_per_sec()).collect();
-    let error = YawError::new(&rate, reference)?;
-    let errors: Vec<f64> = rate.iter().zip(reference).map(|(rate, truth)| rate - truth).collect();
-    let rms = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
-    let (mut inside, mut sigmas, mut seconds) = ([0.0; 3], 0.0, 0.0);
-    for (errors, rates) in errors.chunks_exact(WINDOW).zip(rates.chunks_exact(WINDOW)) {
-        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / WINDOW as f64;
-        let error = mean(&mut errors.iter().copied()).abs();
-        let sigma = mean(&mut rates.iter().filter_map(|rate| rate.sigma).map(|sigma| sigma.rad_per_sec()));
-        for (n, inside) in (1..).zip(&mut inside) {
-            *inside += f64::from(u8::from(error <= f64::from(n) * sigma));
+/// A score in progress.
+#[derive(Default)]
+struct Sums {
+    started: bool,
+    ended: bool,
+    has_gap: bool,
+    yaw: YawSums,
+    squares: f64,
+    samples: usize,
+    /// The error and the sigma of the second in progress.
+    error: f64,
+    sigma: f64,
+    inside: [f64; 3],
+    sigmas: f64,
+    seconds: f64,
+}
+
+impl Sums {
+    fn add(&mut self, step: &Step) {
+        self.started |= step.vehicle.prompt.status != Status::Init;
+        self.ended |= self.started && step.navigation.is_none();
+        let Some(sent) = step.navigation.filter(|_| self.started && !self.ended) else { return };
+        let Some(truth) = step.input.reference else {
+            self.has_gap = true;
+            return;
+        };
+        let rate = sent.rate.rad_per_sec();
+        self.yaw.add(rate, truth);
+        self.squares += (rate - truth) * (rate - truth);
+        self.error += rate - truth;
+        self.sigma += sent.sigma.map_or(0.0, AngularRate::rad_per_sec);
+        self.samples += 1;
+        if self.samples.is_multiple_of(WINDOW) {
+            let [error, sigma] =
+                [&mut self.error, &mut self.sigma].map(|sum| std::mem::take(sum) / WINDOW as f64);
+            for (n, inside) in (1..).zip(&mut self.inside) {
+                *inside += f64::from(u8::from(error.abs() <= f64::from(n) * sigma));
+            }
+            self.sigmas += sigma;
+            self.seconds += 1.0;
         }
-        sigmas += sigma;
-        seconds += 1.0;
     }
-    Some(Score {
-        name: name.to_owned(),
-        error,
-        rms_rad_per_s: rms,
-        inside_sigma: inside.map(|count| count / seconds),
-        sigma_rad: sigmas / seconds,
-    })
+
+    fn score(&self, name: &str) -> Option<Score> {
+        let error = self.yaw.error().filter(|_| !self.has_gap)?;
+        Some(Score {
+            name: name.to_owned(),
+            error,
+            rms_rad_per_s: (self.squares / self.samples as f64).sqrt(),
+            inside_sigma: self.inside.map(|count| count / self.seconds),
+            sigma_rad: self.sigmas / self.seconds,
+        })
+    }
 }

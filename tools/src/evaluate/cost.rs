@@ -1,4 +1,4 @@
-//! This module computes the cost of a method, its multiplications and its delay, from its structure.
+//! The cost of a method, its multiplications and its delay, from its structure.
 
 use super::fir::LowPass;
 use super::methods::Method;
@@ -21,21 +21,19 @@ pub struct Cost {
 /// The shapes of the networks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shapes {
-    /// GyroNet in f32.
-    pub float: Shape,
-    /// GyroNet in integers.
-    pub integer: Shape,
     /// The model of the rates that are sent.
     pub sent: Shape,
+    /// The paper's GyroNet in f32 and in integers, if they run.
+    pub paper: Option<[Shape; 2]>,
 }
 
 /// The linear part alone.
 const LINEAR: Shape = Shape { units: 0, linear: true };
 
 impl Cost {
-    /// Returns the cost of a method of [`Method::ON_A_DRIVE`].
+    /// Returns the cost of a method of [`Method::ON_A_DRIVE`]; `None` if it does not run.
     #[must_use]
-    pub fn new(method: Method, shapes: &Shapes) -> Self {
+    pub fn new(method: Method, shapes: &Shapes) -> Option<Self> {
         let CompensateConfig { mode, lag, .. } = CompensateConfig::DEFAULT;
         let low_pass = LowPass::chosen();
         let windows = |shape| multiplications(shape) as f64 / f64::from(mode.hop());
@@ -44,14 +42,14 @@ impl Cost {
             Method::FIR | Method::FIR_ZERO_RATE => (low_pass.multiplications() as f64, low_pass.delay()),
             Method::VQF => (vqf::MULTIPLICATIONS as f64, 0),
             Method::LINEAR => (windows(LINEAR), settled),
-            Method::GYRONET_F32 => (windows(shapes.float), settled),
-            Method::GYRONET_INT => (windows(shapes.integer), settled),
+            Method::GYRONET_F32 => (windows(shapes.paper?[0]), settled),
+            Method::GYRONET_INT => (windows(shapes.paper?[1]), settled),
             Method::PROMPT => (windows(shapes.sent), 0),
             Method::NAVIGATION => (windows(shapes.sent), lag.samples()),
             // The other methods only subtract a bias from the gyro.
             _ => (0.0, 0),
         };
-        Self { multiplications_per_sample, delay_ms: samples as u64 * PERIOD_US / 1_000 }
+        Some(Self { multiplications_per_sample, delay_ms: samples as u64 * PERIOD_US / 1_000 })
     }
 }
 
@@ -80,8 +78,8 @@ mod tests {
     #[test]
     fn delays_are_those_of_the_pipeline() {
         let shape = Shape::PAPER;
-        let shapes = Shapes { float: shape, integer: shape, sent: shape };
-        let delays = Method::ON_A_DRIVE.map(|method| Cost::new(method, &shapes).delay_ms);
+        let shapes = Shapes { sent: shape, paper: Some([shape; 2]) };
+        let delays = Method::ON_A_DRIVE.map(|method| Cost::new(method, &shapes).unwrap().delay_ms);
         assert_eq!(delays, [0, 0, 0, 50, 50, 0, 110, 110, 110, 0, 70]);
     }
 }

@@ -1,10 +1,11 @@
-//! This module is the classical baseline: a linear-phase low pass after static initialisation.
+//! The classical baseline: a linear-phase low pass after static initialisation.
 //!
 //! The filter is a sinc with a Hamming window. Its delay of half its length is compensated, as that of the navigation
 //! rate is. So it shows what smoothing alone gains with the same inputs and no more delay. Length and corner
 //! frequency are the best on the training drives (`host-tests/tests/tools/fir_choice.rs` compares them with a grid).
 
 use gyronet::sample::RATE_HZ;
+use std::collections::VecDeque;
 use std::f64::consts::PI;
 
 /// A symmetric low pass with an odd number of taps.
@@ -53,14 +54,67 @@ impl LowPass {
         self.taps.len() / 2 + 1
     }
 
-    /// Returns the filtered values, each at the time of its input: the delay is compensated. The first and the last
-    /// value are repeated beyond the ends.
+    /// Returns the filtered values, each at the time of its input ([`Line`]).
     #[must_use]
     pub fn filter(&self, input: &[f64]) -> Vec<f64> {
-        let Some(last) = input.len().checked_sub(1) else { return Vec::new() };
-        let at = |now: usize, k: usize| input[(now + k).saturating_sub(self.delay()).min(last)];
-        let sum = |now| self.taps.iter().enumerate().map(|(k, tap)| tap * at(now, k)).sum();
-        (0..input.len()).map(sum).collect()
+        let mut line = Line::new(self.clone());
+        let mut filtered: Vec<f64> = input.iter().filter_map(|value| line.next(*value)).collect();
+        filtered.extend(std::iter::from_fn(|| line.end()));
+        filtered
+    }
+}
+
+/// A low pass at work. Its delay is compensated: a value comes out [`LowPass::delay`] inputs after its own input. The
+/// first and the last value are repeated beyond the ends.
+#[derive(Debug, Clone)]
+pub struct Line {
+    filter: LowPass,
+    /// The newest inputs, as many as there are taps.
+    inputs: VecDeque<f64>,
+    /// Inputs whose values have not come out.
+    due: usize,
+}
+
+impl Line {
+    /// Starts before the first input.
+    #[must_use]
+    pub fn new(filter: LowPass) -> Self {
+        let inputs = VecDeque::with_capacity(filter.taps.len() + 1);
+        Self { filter, inputs, due: 0 }
+    }
+
+    /// Adds an input; returns the value that comes out.
+    pub fn next(&mut self, input: f64) -> Option<f64> {
+        self.due += 1;
+        if self.inputs.is_empty() {
+            self.inputs.extend(std::iter::repeat_n(input, self.filter.delay()));
+        }
+        self.add(input)
+    }
+
+    /// The values that remain after the last input, one at a time.
+    pub fn end(&mut self) -> Option<f64> {
+        while self.due > 0 {
+            let last = *self.inputs.back()?;
+            let value = self.add(last);
+            if value.is_some() {
+                return value;
+            }
+        }
+        None
+    }
+
+    fn add(&mut self, input: f64) -> Option<f64> {
+        let taps = &self.filter.taps;
+        self.inputs.push_back(input);
+        if self.inputs.len() > taps.len() {
+            self.inputs.pop_front();
+        }
+        if self.inputs.len() < taps.len() {
+            return None;
+        }
+        self.due -= 1;
+        Some(taps.iter().zip(&self.inputs).map(|(tap, value)| tap * value).sum())
     }
 }
 

@@ -1,14 +1,18 @@
-//! This module computes the heading error of a yaw rate over 1 s, 10 s, 60 s and a whole drive, against a reference
-//! yaw rate or a course.
+//! The heading error of a yaw rate over 1 s, 10 s, 60 s and a whole drive, against a reference yaw rate or a course.
 //!
 //! A reference yaw rate gives every figure. A course over ground (GNSS) is the direction of travel, not the heading:
 //! latency, side slip and noise give it errors of 0.05 to 0.1 rad from one second to the next. So errors against a
 //! course are medians over 10 s, which still scatter by 0.02 rad. A course cannot judge 1 s and 10 s.
+//!
+//! The figures are computed sample by sample, and nothing older than a minute is kept: means and squares are sums, the
+//! medians against a course are over ten and twenty seconds. Only the median error in 10 s over the whole drive
+//! ([`Errors::typical_10s`]) is counted in classes of 5 mrad.
 
-use super::metrics::{integral, wrap};
+use super::metrics::wrap;
 use crate::drive::DT;
 use gyronet::sample::RATE_HZ;
 use serde::Serialize;
+use std::collections::VecDeque;
 
 /// Samples per second.
 const SECOND: usize = RATE_HZ as usize;
@@ -16,10 +20,12 @@ const SECOND: usize = RATE_HZ as usize;
 pub const BLOCK_S: usize = 10;
 /// Fewest values of the course for a median.
 const BLOCK_VALUES: usize = 3;
-/// Seconds of known course over whose median both headings are aligned.
-const ALIGNED_S: usize = 20;
-/// Largest [`HeadingErrorSeries::typical_10s`] that a bias can explain, rad.
+/// Samples of known course over whose median both headings are aligned: 20 s.
+const ALIGNED: usize = 20 * SECOND;
+/// Largest [`Errors::typical_10s`] that a bias can explain, rad.
 pub const PLAUSIBLE_10S_RAD: f64 = 0.5;
+/// Lengths of the windows over which the heading change is judged, s.
+const WINDOWS_S: [usize; 3] = [1, 10, 60];
 
 /// The reference of a drive.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,16 +37,7 @@ pub enum Reference {
 }
 
 impl Reference {
-    /// Returns the name of the reference's column.
-    #[must_use]
-    pub fn column(&self) -> &'static str {
-        match self {
-            Self::Rate(_) => "ref_gyr_z",
-            Self::Course(_) => "ref_yaw",
-        }
-    }
-
-    /// Returns the yaw rates; `None` for a course.
+    /// The yaw rates; `None` for a course.
     #[must_use]
     pub fn rate(&self) -> Option<&[f64]> {
         match self {
@@ -49,28 +46,34 @@ impl Reference {
         }
     }
 
-    /// Returns the heading error of an estimated yaw rate over time; `None` for less than a second of yaw rate or
-    /// less than 20 s of course.
+    /// The heading error of an estimated yaw rate; `None` for less than a second of yaw rate or less than 20 s of
+    /// course, or another number of samples.
     #[must_use]
-    pub fn errors(&self, estimate: &[f64]) -> Option<HeadingErrorSeries> {
+    pub fn errors(&self, estimate: &[f64]) -> Option<Errors> {
         match self {
-            Self::Rate(reference) => against_rate(estimate, reference),
-            Self::Course(course) => against_course(estimate, course),
+            Self::Rate(reference) if reference.len() == estimate.len() => {
+                let mut against = AgainstRate::new();
+                reference.iter().zip(estimate).for_each(|(truth, rate)| against.add(*rate, *truth));
+                against.errors()
+            }
+            Self::Course(course) if course.len() == estimate.len() => {
+                let mut against = AgainstCourse::new();
+                course.iter().zip(estimate).for_each(|(course, rate)| against.add(*rate, *course));
+                against.errors()
+            }
+            _ => None,
         }
     }
 }
 
-/// The heading error over a drive.
-#[derive(Debug, Clone, PartialEq)]
-pub struct HeadingErrorSeries {
-    /// Seconds from one error to the next.
-    step_s: usize,
-    /// The shortest window that the reference can judge, s.
-    shortest_s: usize,
-    /// The errors, rad; `None` while the reference is unknown.
-    errors: Vec<Option<f64>>,
-    /// The error at the end, rad.
-    last: f64,
+/// The heading error of one yaw rate on one drive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Errors {
+    /// The figures.
+    pub figures: HeadingError,
+    /// The median absolute change of the error in 10 s, rad, to 5 mrad. It is large if rate and reference differ in
+    /// sign or unit, or are not from the same drive.
+    pub typical_10s: Option<f64>,
 }
 
 /// The figures of a heading error; `None` if the reference cannot give a figure, or the drive is too short for it.
@@ -88,45 +91,14 @@ pub struct HeadingError {
     pub final_rad: Option<f64>,
 }
 
-impl HeadingErrorSeries {
-    /// Returns the figures.
-    #[must_use]
-    pub fn figures(&self) -> HeadingError {
-        let over = |seconds: usize| {
-            let known = seconds >= self.shortest_s;
-            mean(self.changes(seconds).filter(|_| known).map(f64::abs))
-        };
-        HeadingError {
-            mean_1s_rad: over(1),
-            mean_10s_rad: over(10),
-            mean_60s_rad: over(60),
-            rms_rad: mean(self.errors.iter().flatten().map(|error| error * error)).map(f64::sqrt),
-            final_rad: Some(wrap(self.last).abs()),
-        }
-    }
-
-    /// Returns the median absolute change of the error in 10 s, rad. It is large if rate and reference differ in sign
-    /// or unit, or are not from the same drive.
-    #[must_use]
-    pub fn typical_10s(&self) -> Option<f64> {
-        median(self.changes(10).map(f64::abs).collect())
-    }
-
-    /// Returns the changes of the error over windows of this length, one from each step.
-    fn changes(&self, seconds: usize) -> impl Iterator<Item = f64> {
-        let later = self.errors.iter().skip(seconds / self.step_s);
-        self.errors.iter().zip(later).filter_map(|(from, to)| Some((*to)? - (*from)?))
-    }
-}
-
 impl HeadingError {
-    /// Returns the figure by which methods are compared: the 1 s error, or the RMS over the drive if there is none.
+    /// The figure by which methods are compared: the 1 s error, or the RMS over the drive if there is none.
     #[must_use]
     pub fn compared(&self) -> Option<f64> {
         self.mean_1s_rad.or(self.rms_rad)
     }
 
-    /// Returns the mean of each figure over the drives that have it.
+    /// The mean of each figure over the drives that have it.
     #[must_use]
     pub fn mean(errors: &[Self]) -> Self {
         let mean = |of: fn(&Self) -> Option<f64>| mean(errors.iter().filter_map(of));
@@ -140,64 +112,28 @@ impl HeadingError {
     }
 }
 
-fn against_rate(estimate: &[f64], reference: &[f64]) -> Option<HeadingErrorSeries> {
-    if estimate.len() != reference.len() || estimate.len() < SECOND {
-        return None;
+/// A mean in progress.
+#[derive(Debug, Clone, Copy, Default)]
+struct Mean {
+    count: f64,
+    sum: f64,
+}
+
+impl Mean {
+    fn add(&mut self, value: f64) {
+        self.count += 1.0;
+        self.sum += value;
     }
-    let off: Vec<f64> = estimate.iter().zip(reference).map(|(estimate, truth)| estimate - truth).collect();
-    let each = integral(&off);
-    let seconds = each.iter().skip(SECOND - 1).step_by(SECOND).map(|error| Some(*error));
-    let errors = std::iter::once(Some(0.0)).chain(seconds).collect();
-    Some(HeadingErrorSeries { step_s: 1, shortest_s: 1, errors, last: *each.last()? })
+
+    fn get(&self) -> Option<f64> {
+        (self.count > 0.0).then_some(self.sum / self.count)
+    }
 }
 
-fn against_course(estimate: &[f64], course: &[Option<f64>]) -> Option<HeadingErrorSeries> {
-    let off = off_course(estimate, course);
-    let known: Vec<(usize, f64)> = off.iter().enumerate().filter_map(|(k, off)| Some((k, (*off)?))).collect();
-    let (first, _) = known.first()?;
-    let begin = known.iter().take_while(|(k, _)| k - first < ALIGNED_S * SECOND).map(|(_, off)| *off);
-    let aligned = median(begin.collect())?;
-    let errors: Vec<Option<f64>> = medians(&off).map(|off| Some(off? - aligned)).collect();
-    let last = errors.iter().rev().find_map(|error| *error)?;
-    let (end, _) = known.last()?;
-    let enough = end - first + SECOND >= ALIGNED_S * SECOND;
-    enough.then_some(HeadingErrorSeries { step_s: BLOCK_S, shortest_s: 6 * BLOCK_S, errors, last })
-}
-
-/// Returns the integral of a yaw rate less the course, where the course is known. The difference is unwrapped instead
-/// of the course, because the difference changes slowly even if the vehicle turns while the course is unknown.
-#[must_use]
-pub fn off_course(estimate: &[f64], course: &[Option<f64>]) -> Vec<Option<f64>> {
-    let mut last = None;
-    let off = |(yaw, course): (f64, &Option<f64>)| {
-        let off = yaw - (*course)?;
-        let near = last.unwrap_or(off);
-        last = Some(near + wrap(off - near));
-        last
-    };
-    integral(estimate).into_iter().zip(course).map(off).collect()
-}
-
-/// Returns the median of each block of [`BLOCK_S`] seconds; `None` if too few values are known.
-pub fn medians(off: &[Option<f64>]) -> impl Iterator<Item = Option<f64>> {
-    off.chunks(BLOCK_S * SECOND).map(|block| {
-        let values: Vec<f64> = block.iter().flatten().copied().collect();
-        if values.len() < BLOCK_VALUES { None } else { median(values) }
-    })
-}
-
-/// Returns the mean bias of a gyro over a drive, rad/s: the slope of its heading less the course. Returns `None` if
-/// less than 20 s of course are known.
-#[must_use]
-pub fn bias_by_course(gyro: &[f64], course: &[Option<f64>]) -> Option<f64> {
-    let off = off_course(gyro, course);
-    let known = || off.iter().enumerate().filter_map(|(k, off)| Some((k as f64 * DT, (*off)?)));
-    let (first, last) = (known().next()?.0, known().next_back()?.0);
-    let time = mean(known().map(|(time, _)| time))?;
-    let (both, square) = known().fold((0.0, 0.0), |(both, square), (at, off)| {
-        (both + (at - time) * off, square + (at - time) * (at - time))
-    });
-    (last - first >= ALIGNED_S as f64).then_some(both / square)
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut mean = Mean::default();
+    values.for_each(|value| mean.add(value));
+    mean.get()
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {
@@ -205,9 +141,299 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     values.get(values.len() / 2).copied()
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (count, sum) = values.fold((0.0, 0.0), |(count, sum), value| (count + 1.0, sum + value));
-    (count > 0.0).then_some(sum / count)
+/// A median of magnitudes in progress, by counting classes of 5 mrad up to 50 rad.
+#[derive(Debug, Clone)]
+struct Typical {
+    classes: Vec<u64>,
+    count: u64,
+}
+
+impl Typical {
+    const CLASS: f64 = 0.005;
+
+    fn new() -> Self {
+        Self { classes: vec![0; 10_001], count: 0 }
+    }
+
+    fn add(&mut self, value: f64) {
+        // A value at the upper end of a class belongs to it.
+        let class = (value / Self::CLASS).ceil() as usize;
+        let last = self.classes.len() - 1;
+        self.classes[class.min(last)] += 1;
+        self.count += 1;
+    }
+
+    fn median(&self) -> Option<f64> {
+        let mut below = 0;
+        let class = self.classes.iter().position(|count| {
+            below += count;
+            below > self.count / 2
+        })?;
+        Some(class as f64 * Self::CLASS)
+    }
+}
+
+/// The changes of an error over windows of different length, from one step to a later one.
+#[derive(Debug, Clone)]
+struct Changes {
+    /// Seconds from one error to the next.
+    step_s: usize,
+    /// The shortest window that the reference can judge, s.
+    shortest_s: usize,
+    /// The errors of the last minute, rad; `None` while the reference is unknown.
+    recent: VecDeque<Option<f64>>,
+    windows: [Mean; WINDOWS_S.len()],
+    squares: Mean,
+    typical: Typical,
+}
+
+impl Changes {
+    fn new(step_s: usize, shortest_s: usize) -> Self {
+        let (recent, typical) = (VecDeque::with_capacity(64), Typical::new());
+        Self { step_s, shortest_s, recent, windows: Default::default(), squares: Mean::default(), typical }
+    }
+
+    fn add(&mut self, error: Option<f64>) {
+        for (seconds, mean) in WINDOWS_S.into_iter().zip(&mut self.windows) {
+            let Some(steps) = (seconds / self.step_s).checked_sub(1) else { continue };
+            let earlier = self.recent.iter().rev().nth(steps).copied().flatten();
+            let Some(change) = error.zip(earlier).map(|(to, from)| (to - from).abs()) else { continue };
+            mean.add(change);
+            if seconds == 10 {
+                self.typical.add(change);
+            }
+        }
+        error.into_iter().for_each(|error| self.squares.add(error * error));
+        self.recent.push_back(error);
+        if self.recent.len() > WINDOWS_S[2] / self.step_s {
+            self.recent.pop_front();
+        }
+    }
+
+    fn errors(&self, last: f64) -> Errors {
+        let mut figures = self
+            .windows
+            .iter()
+            .zip(WINDOWS_S)
+            .map(|(mean, seconds)| if seconds >= self.shortest_s { mean.get() } else { None });
+        let mut next = || figures.next().flatten();
+        let figures = HeadingError {
+            mean_1s_rad: next(),
+            mean_10s_rad: next(),
+            mean_60s_rad: next(),
+            rms_rad: self.squares.get().map(f64::sqrt),
+            final_rad: Some(wrap(last).abs()),
+        };
+        Errors { figures, typical_10s: self.typical.median() }
+    }
+}
+
+/// The heading error against a reference yaw rate, in progress.
+#[derive(Debug, Clone)]
+pub struct AgainstRate {
+    angle: f64,
+    samples: usize,
+    changes: Changes,
+}
+
+impl Default for AgainstRate {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl AgainstRate {
+    /// Starts before the first sample.
+    #[must_use]
+    pub fn new() -> Self {
+        let mut changes = Changes::new(1, 1);
+        changes.add(Some(0.0));
+        Self { angle: 0.0, samples: 0, changes }
+    }
+
+    /// Adds a sample: the estimated and the true yaw rate, rad/s.
+    pub fn add(&mut self, rate: f64, truth: f64) {
+        self.angle += (rate - truth) * DT;
+        self.samples += 1;
+        if self.samples.is_multiple_of(SECOND) {
+            self.changes.add(Some(self.angle));
+        }
+    }
+
+    /// The errors so far; `None` for less than a second.
+    #[must_use]
+    pub fn errors(&self) -> Option<Errors> {
+        (self.samples >= SECOND).then(|| self.changes.errors(self.angle))
+    }
+}
+
+/// The integral of a yaw rate less the course, where the course is known. The difference is unwrapped instead of the
+/// course, because the difference changes slowly even if the vehicle turns while the course is unknown.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct OffCourse {
+    yaw: f64,
+    last: Option<f64>,
+}
+
+impl OffCourse {
+    /// Adds a sample; returns the difference if the course is known.
+    pub fn add(&mut self, rate: f64, course: Option<f64>) -> Option<f64> {
+        self.yaw += rate * DT;
+        let off = self.yaw - course?;
+        let near = self.last.unwrap_or(off);
+        self.last = Some(near + wrap(off - near));
+        self.last
+    }
+}
+
+/// The median of each block of [`BLOCK_S`] seconds; `None` if too few values are known.
+#[derive(Debug, Clone, Default)]
+pub struct Blocks {
+    known: Vec<f64>,
+    samples: usize,
+}
+
+impl Blocks {
+    /// Adds a sample; returns the median of the block that ends with it.
+    pub fn add(&mut self, value: Option<f64>) -> Option<Option<f64>> {
+        self.known.extend(value);
+        self.samples += 1;
+        if self.samples == BLOCK_S * SECOND { self.end() } else { None }
+    }
+
+    /// Ends the block, if it has begun.
+    pub fn end(&mut self) -> Option<Option<f64>> {
+        let Self { known, samples } = std::mem::take(self);
+        (samples > 0).then(|| if known.len() < BLOCK_VALUES { None } else { median(known) })
+    }
+}
+
+/// The heading error against a course, in progress.
+#[derive(Debug, Clone)]
+pub struct AgainstCourse {
+    off: OffCourse,
+    blocks: Blocks,
+    samples: usize,
+    /// The first and the last sample with a course.
+    known: Option<(usize, usize)>,
+    /// The values over whose median both headings are aligned, and the median once it is known.
+    begin: Vec<f64>,
+    aligned: Option<f64>,
+    /// Medians of blocks that wait for the alignment.
+    waiting: Vec<Option<f64>>,
+    last: Option<f64>,
+    changes: Changes,
+}
+
+impl Default for AgainstCourse {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl AgainstCourse {
+    /// Starts before the first sample.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            off: OffCourse::default(),
+            blocks: Blocks::default(),
+            samples: 0,
+            known: None,
+            begin: Vec::new(),
+            aligned: None,
+            waiting: Vec::new(),
+            last: None,
+            changes: Changes::new(BLOCK_S, 6 * BLOCK_S),
+        }
+    }
+
+    /// Adds a sample: the estimated yaw rate, rad/s, and the course, rad.
+    pub fn add(&mut self, rate: f64, course: Option<f64>) {
+        let off = self.off.add(rate, course);
+        let at = self.samples;
+        self.samples += 1;
+        if let Some(off) = off {
+            let (first, _) = self.known.unwrap_or((at, at));
+            self.known = Some((first, at));
+            if at - first < ALIGNED {
+                self.begin.push(off);
+            }
+        }
+        let median = self.blocks.add(off);
+        if self.aligned.is_none() && self.known.is_some_and(|(first, _)| at + 1 - first >= ALIGNED) {
+            self.align();
+        }
+        median.into_iter().for_each(|median| self.block(median));
+    }
+
+    /// The errors so far; `None` for less than 20 s of course.
+    #[must_use]
+    pub fn errors(mut self) -> Option<Errors> {
+        let (first, last) = self.known?;
+        if self.aligned.is_none() {
+            self.align();
+        }
+        let median = self.blocks.end();
+        median.into_iter().for_each(|median| self.block(median));
+        let enough = last - first + SECOND >= ALIGNED;
+        Some(self.changes.errors(self.last?)).filter(|_| enough)
+    }
+
+    fn align(&mut self) {
+        self.aligned = median(std::mem::take(&mut self.begin));
+        for median in std::mem::take(&mut self.waiting) {
+            self.block(median);
+        }
+    }
+
+    fn block(&mut self, median: Option<f64>) {
+        let error = match (median, self.aligned) {
+            // A block without a course needs no alignment, unless one before it waits.
+            (None, _) if self.waiting.is_empty() => None,
+            (median, None) => return self.waiting.push(median),
+            (median, Some(aligned)) => median.map(|median| median - aligned),
+        };
+        self.last = error.or(self.last);
+        self.changes.add(error);
+    }
+}
+
+/// The mean bias of a gyro over a drive, in progress: the slope of its heading less the course.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct BiasByCourse {
+    off: OffCourse,
+    samples: usize,
+    first: Option<f64>,
+    last: f64,
+    count: f64,
+    mean: [f64; 2],
+    both: f64,
+    square: f64,
+}
+
+impl BiasByCourse {
+    /// Adds a sample.
+    pub fn add(&mut self, gyro: f64, course: Option<f64>) {
+        let time = self.samples as f64 * DT;
+        self.samples += 1;
+        let Some(off) = self.off.add(gyro, course) else { return };
+        self.first = self.first.or(Some(time));
+        self.last = time;
+        self.count += 1.0;
+        let before = time - self.mean[0];
+        self.mean[0] += before / self.count;
+        self.mean[1] += (off - self.mean[1]) / self.count;
+        self.square += before * (time - self.mean[0]);
+        self.both += before * (off - self.mean[1]);
+    }
+
+    /// The bias, rad/s; `None` if less than 20 s of course are known.
+    #[must_use]
+    pub fn get(&self) -> Option<f64> {
+        let known = self.last - self.first?;
+        (known >= ALIGNED as f64 * DT).then_some(self.both / self.square)
+    }
 }
 
 #[cfg(test)]
@@ -219,10 +445,16 @@ mod tests {
         assert!((figure - due).abs() < 1e-9, "{figure} is not {due}");
     }
 
+    fn bias(gyro: f64, course: &[Option<f64>]) -> Option<f64> {
+        let mut bias = BiasByCourse::default();
+        course.iter().for_each(|course| bias.add(gyro, *course));
+        bias.get()
+    }
+
     #[test]
     fn a_constant_bias_grows_with_the_window() {
         let error =
-            Reference::Rate(vec![0.3; 12_050]).errors(&vec![0.301; 12_050]).expect("whole seconds").figures();
+            Reference::Rate(vec![0.3; 12_050]).errors(&vec![0.301; 12_050]).expect("whole seconds").figures;
         close(error.mean_1s_rad, 0.001);
         close(error.mean_10s_rad, 0.01);
         close(error.mean_60s_rad, 0.06);
@@ -233,7 +465,7 @@ mod tests {
 
     #[test]
     fn a_short_drive_has_no_long_window() {
-        let error = Reference::Rate(vec![0.0; 500]).errors(&vec![0.0; 500]).expect("five seconds").figures();
+        let error = Reference::Rate(vec![0.0; 500]).errors(&vec![0.0; 500]).expect("five seconds").figures;
         assert_eq!((error.mean_1s_rad, error.mean_10s_rad, error.mean_60s_rad), (Some(0.0), None, None));
         assert_eq!(Reference::Rate(vec![0.0; 99]).errors(&[0.0; 99]), None);
         assert_eq!(Reference::Rate(vec![0.0; 200]).errors(&[0.0; 199]), None);
@@ -252,7 +484,7 @@ mod tests {
             })
             .collect();
         let error =
-            Reference::Course(course).errors(&vec![turn + bias; 12_000]).expect("enough course").figures();
+            Reference::Course(course).errors(&vec![turn + bias; 12_000]).expect("enough course").figures;
         assert_eq!((error.mean_1s_rad, error.mean_10s_rad), (None, None));
         let near = |figure: Option<f64>, due: f64| {
             let figure = figure.expect("a figure");
@@ -273,14 +505,14 @@ mod tests {
         assert_eq!(Reference::Course(course(10)).errors(&[0.0; 6_000]), None);
         assert!(Reference::Course(course(20)).errors(&[0.0; 6_000]).is_some());
         assert_eq!(Reference::Course(vec![None; 6_000]).errors(&[0.0; 6_000]), None);
-        assert_eq!(bias_by_course(&[0.1; 6_000], &course(15)), None);
+        assert_eq!(bias(0.1, &course(15)), None);
     }
 
     #[test]
     fn the_bias_is_the_slope() {
         let course: Vec<Option<f64>> =
             (0..6_000).map(|k| (k % 10 == 0).then(|| wrap(0.02 * f64::from(k)))).collect();
-        let bias = bias_by_course(&vec![2.003; 6_000], &course).expect("a minute");
+        let bias = bias(2.003, &course).expect("a minute");
         assert!((bias - 0.003).abs() < 1e-9, "{bias}");
     }
 
@@ -289,7 +521,7 @@ mod tests {
         let rate: Vec<f64> = (0..6_000).map(|k| 0.4 * (f64::from(k) * 0.002).sin()).collect();
         let other: Vec<f64> = rate.iter().map(|rate| -rate).collect();
         let typical =
-            |reference: Vec<f64>| Reference::Rate(reference).errors(&rate).and_then(|e| e.typical_10s());
+            |reference: Vec<f64>| Reference::Rate(reference).errors(&rate).and_then(|e| e.typical_10s);
         assert!(typical(other).is_some_and(|off| off > PLAUSIBLE_10S_RAD));
         assert_eq!(typical(rate.clone()), Some(0.0));
     }

@@ -1,4 +1,4 @@
-//! This module lists the compared methods of computing a yaw rate, with one set of names for the tables of drives and
+//! The compared methods of computing a yaw rate, with one set of names for the tables of drives and
 //! for the paper's tables.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -136,32 +136,42 @@ impl Method {
         [Self::RAW, Self::STATIC, Self::STATIC_ZERO_RATE, Self::FIR, Self::FIR_ZERO_RATE, Self::VQF];
 }
 
-/// A value for each method of [`Method::ON_A_DRIVE`].
+/// A value for each method of [`Method::ON_A_DRIVE`] that was run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PerMethod<T>([T; Method::ON_A_DRIVE.len()]);
+pub struct PerMethod<T>([Option<T>; Method::ON_A_DRIVE.len()]);
 
 impl<T> PerMethod<T> {
+    /// The values in the order of [`Method::ON_A_DRIVE`].
+    pub fn of(values: [Option<T>; Method::ON_A_DRIVE.len()]) -> Self {
+        Self(values)
+    }
+
     /// Computes a value for each method.
-    pub fn new(of: impl FnMut(Method) -> T) -> Self {
+    pub fn new(of: impl FnMut(Method) -> Option<T>) -> Self {
         Self(Method::ON_A_DRIVE.map(of))
     }
 
     /// Returns the methods and their values in the order of the table.
     pub fn each(&self) -> impl Iterator<Item = (Method, &T)> {
-        Method::ON_A_DRIVE.into_iter().zip(&self.0)
+        Method::ON_A_DRIVE
+            .into_iter()
+            .zip(&self.0)
+            .filter_map(|(method, value)| Some((method, value.as_ref()?)))
     }
 
-    /// Converts every value.
-    pub fn map<U>(&self, mut of: impl FnMut(&T) -> U) -> PerMethod<U> {
-        PerMethod::new(|method| of(&self[method]))
+    /// The values in the order of [`Method::ON_A_DRIVE`].
+    pub fn values(&self) -> &[Option<T>; Method::ON_A_DRIVE.len()] {
+        &self.0
     }
-}
 
-impl<T: Copy> PerMethod<Option<T>> {
-    /// Returns all values, or `None` if one is missing.
-    pub fn all(self) -> Option<PerMethod<T>> {
-        let values: Option<Vec<T>> = self.0.into_iter().collect();
-        values?.try_into().ok().map(PerMethod)
+    /// The values in the order of [`Method::ON_A_DRIVE`], to change them.
+    pub fn values_mut(&mut self) -> &mut [Option<T>; Method::ON_A_DRIVE.len()] {
+        &mut self.0
+    }
+
+    /// The value of a method, if it was run.
+    pub fn get(&self, method: Method) -> Option<&T> {
+        self.each().find(|(own, _)| *own == method).map(|(_, value)| value)
     }
 }
 
@@ -169,14 +179,13 @@ impl<T> std::ops::Index<Method> for PerMethod<T> {
     type Output = T;
 
     fn index(&self, method: Method) -> &T {
-        let at = Method::ON_A_DRIVE.iter().position(|own| *own == method);
-        &self.0[at.unwrap_or_else(|| panic!("{} is no method of a drive", method.key))]
+        self.get(method).unwrap_or_else(|| panic!("{} was not run on the drive", method.key))
     }
 }
 
 impl<T: Serialize> Serialize for PerMethod<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(Method::ON_A_DRIVE.len()))?;
+        let mut map = serializer.serialize_map(None)?;
         for (method, value) in self.each() {
             map.serialize_entry(method.key, value)?;
         }

@@ -1,4 +1,4 @@
-//! This module computes the yaw errors of the paper's Table I: over one second, and at the end of the drive.
+//! The yaw errors of the paper's Table I: over one second, and at the end of the drive.
 
 use crate::drive::DT;
 use gyronet::sample::RATE_HZ;
@@ -26,15 +26,9 @@ impl YawError {
     /// Returns `None` if there is no complete window, or the two differ in length.
     #[must_use]
     pub fn new(estimate: &[f64], reference: &[f64]) -> Option<Self> {
-        if estimate.len() != reference.len() || estimate.len() < WINDOW {
-            return None;
-        }
-        let error: Vec<f64> = estimate.iter().zip(reference).map(|(e, r)| (e - r) * DT).collect();
-        let windows = error.chunks_exact(WINDOW);
-        let count = windows.len() as f64;
-        let mean_1s_rad = windows.map(|window| window.iter().sum::<f64>().abs()).sum::<f64>() / count;
-        let unwrapped: f64 = error.iter().sum();
-        Some(Self { mean_1s_rad, final_rad: wrap(unwrapped).abs(), final_unwrapped_rad: unwrapped.abs() })
+        let mut sums = YawSums::default();
+        estimate.iter().zip(reference).for_each(|(rate, truth)| sums.add(*rate, *truth));
+        sums.error().filter(|_| estimate.len() == reference.len())
     }
 
     /// Returns the mean of each error over several drives; `None` without drives.
@@ -46,6 +40,39 @@ impl YawError {
             mean_1s_rad: mean(|error| error.mean_1s_rad),
             final_rad: mean(|error| error.final_rad),
             final_unwrapped_rad: mean(|error| error.final_unwrapped_rad),
+        })
+    }
+}
+
+/// A [`YawError`] in progress.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct YawSums {
+    samples: usize,
+    window: f64,
+    windows: f64,
+    total: f64,
+}
+
+impl YawSums {
+    /// Adds a sample: the estimated and the true yaw rate, rad/s.
+    pub fn add(&mut self, rate: f64, truth: f64) {
+        let error = (rate - truth) * DT;
+        self.samples += 1;
+        self.total += error;
+        self.window += error;
+        if self.samples.is_multiple_of(WINDOW) {
+            self.windows += std::mem::take(&mut self.window).abs();
+        }
+    }
+
+    /// The error so far; `None` without a complete window.
+    #[must_use]
+    pub fn error(&self) -> Option<YawError> {
+        let count = (self.samples >= WINDOW).then_some((self.samples / WINDOW) as f64)?;
+        Some(YawError {
+            mean_1s_rad: self.windows / count,
+            final_rad: wrap(self.total).abs(),
+            final_unwrapped_rad: self.total.abs(),
         })
     }
 }

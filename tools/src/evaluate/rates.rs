@@ -1,21 +1,31 @@
-//! This module computes the yaw rates of one drive with each method, from the same samples and in the same pipeline.
+//! The yaw rates of one drive by each method, sample by sample: all methods run side by side, from the same samples
+//! and in the same pipeline.
+//!
+//! The drive is read more than once, and never kept: first for its facts ([`Drive::open`]), then its beginning for the
+//! static bias, which the classical methods subtract from the first sample on, and then as a whole. A drive that begins
+//! in motion is read once more before that, for the best constant bias ([`super::rest`]).
 
-use crate::drive::recording::{Recording, Row};
-use crate::drive::replay::{Replay, ReplayError};
-use crate::drive::wheel_frames::WheelFrames;
+use crate::board::{Board, Step};
+use crate::drive::replay::{ReplayError, initialise};
+use crate::drive::stream::Drive;
+use crate::drive::wheel_frames::Speeds;
 use crate::evaluate::ablation::{Uncorrected, with_lag};
 use crate::evaluate::cost::{Cost, Shapes};
-use crate::evaluate::fir::LowPass;
-use crate::evaluate::heading_error::Reference;
-use crate::evaluate::methods::{Method, PerMethod};
+use crate::evaluate::fir::{Line, LowPass};
+use crate::evaluate::methods::PerMethod;
 use crate::evaluate::{rest, vqf};
+use gyronet::can;
 use gyronet::compensate::Lag;
+use gyronet::coprocessor::Config;
+use gyronet::estimate::YawEstimate;
+use gyronet::health::Status;
 use gyronet::model::blob::Shape;
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Estimate, WindowNetwork};
 use gyronet::pipeline::PipelineConfig;
+use gyronet::units::{AngularRate, Micros, SpecificForce};
 use std::borrow::Cow;
-use std::time::{Duration, Instant};
+use std::collections::VecDeque;
 
 /// A network of any kind and its shape.
 pub struct Network<'a> {
@@ -38,134 +48,229 @@ impl WindowNetwork for Network<'_> {
 
 /// The networks that the methods run.
 pub struct Networks<'a> {
-    /// GyroNet in f32.
-    pub float: Network<'a>,
-    /// GyroNet in integers.
-    pub integer: Network<'a>,
     /// The model of the default weights, whose linear part corrects the rate.
     pub default: Network<'a>,
     /// The model of the rates that are sent, if it is not the default.
     pub sent: Option<Network<'a>>,
+    /// The paper's GyroNet in f32 and in integers, for the rows of the same names.
+    pub paper: Option<[Network<'a>; 2]>,
 }
 
-/// The yaw rates of one drive with each method, from the first sample after static initialisation.
+/// One sample of a comparison.
+#[derive(Debug, Clone)]
+pub struct Sample {
+    /// The step of the board whose rates are sent.
+    pub step: Step,
+    /// Whether it is compared: after static initialisation, and before the first sample without a navigation rate.
+    pub is_compared: bool,
+    /// The rates by each method, rad/s.
+    pub rates: PerMethod<f64>,
+}
+
+/// What holds for the whole drive.
+#[derive(Debug, Clone)]
+pub struct Comparison {
+    /// The cost of each method.
+    pub costs: PerMethod<Cost>,
+    /// Whether the drive begins in motion, so that a simulated standstill was inserted before it.
+    pub simulated_rest: bool,
+    /// Number of grid steps without a sample.
+    pub missing: u32,
+}
+
+/// A configuration whose board sends nothing: only its rates are compared.
+pub(super) fn silent(pipeline: PipelineConfig) -> Config {
+    Config { pipeline, can: can::config::Config::SILENT, ..Config::DEFAULT }
+}
+
+/// Runs every method, and passes each sample to `visit`. All networks run in the same pipeline; the pipeline without a
+/// network is [`STATIC_ZERO_RATE`](crate::evaluate::methods::Method::STATIC_ZERO_RATE).
+///
+/// # Errors
+/// [`ReplayError`], if static initialisation fails and there is no course with which to simulate a standstill.
+pub fn run(
+    drive: &Drive<'_>,
+    networks: &mut Networks<'_>,
+    mut visit: impl FnMut(&Sample),
+) -> Result<Comparison, ReplayError> {
+    let (drive, bias, simulated_rest) = match initialise(drive) {
+        Ok(bias) => (Cow::Borrowed(drive), bias, false),
+        Err(error) => {
+            let rested = rest::before(drive)?.ok_or(error)?;
+            let bias = initialise(&rested)?;
+            (Cow::Owned(rested), bias, true)
+        }
+    };
+    let drive = &*drive;
+    let shapes = Shapes {
+        sent: networks.sent.as_ref().unwrap_or(&networks.default).shape,
+        paper: networks.paper.as_ref().map(|[float, integer]| [float.shape, integer.shape]),
+    };
+    let board = |network| Board::new(silent(PipelineConfig::DEFAULT), drive.wheels(), network);
+    let mut boards: Vec<Board<&mut Network<'_>>> = vec![board(&mut networks.default)];
+    boards.extend(networks.sent.as_mut().map(board));
+    let sent = boards.len() - 1;
+    boards.extend(networks.paper.iter_mut().flatten().map(board));
+    let at_once = silent(with_lag(PipelineConfig::DEFAULT, Lag::NONE));
+    let mut zero_rate = Board::new(at_once, drive.wheels(), Uncorrected);
+    let mut side_by_side = SideBySide::new(bias);
+    let mut rows = drive.rows()?;
+    loop {
+        let row = rows.next().transpose()?;
+        let refused =
+            |line| move |source| ReplayError::StartsMoving { path: drive.path.clone(), line, source };
+        let next = |board: &mut Board<_>| match &row {
+            Some(row) => board.row(row).map_err(refused(row.line)),
+            None => Ok(board.end()),
+        };
+        // Every board takes the row before any step is used.
+        let steps: Vec<Option<Step>> = boards.iter_mut().map(next).collect::<Result<_, _>>()?;
+        let steps: Option<Vec<Step>> = steps.into_iter().collect();
+        let updated = match &row {
+            Some(row) => zero_rate.row(row).map_err(refused(row.line))?,
+            None => zero_rate.end(),
+        };
+        match steps.zip(updated) {
+            Some((steps, updated)) => {
+                let paper = [1, 2].map(|after| steps.get(sent + after).map(|step| step.settled));
+                let known = Known { updated: updated.navigation, linear: steps[0].settled, paper };
+                let step = steps.into_iter().nth(sent).unwrap_or(updated);
+                side_by_side.step(step, &known).iter().for_each(&mut visit);
+            }
+            None if row.is_none() => break,
+            None => {}
+        }
+    }
+    while let Some(sample) = side_by_side.end() {
+        visit(&sample);
+    }
+    let costs = PerMethod::new(|method| Cost::new(method, &shapes));
+    let missing = boards[sent].coprocessor().pipeline().counters().missing;
+    Ok(Comparison { costs, simulated_rest, missing })
+}
+
+/// The rates that other boards have found for a step.
+struct Known {
+    updated: Option<YawEstimate>,
+    linear: AngularRate,
+    paper: [Option<AngularRate>; 2],
+}
+
+/// The filters beside the board, from the start of the drive on.
+struct SideBySide {
+    bias: [f64; 3],
+    fir: [Line; 2],
+    vqf: vqf::Heading,
+    /// Samples that wait for the low passes.
+    waiting: VecDeque<Sample>,
+    started: bool,
+    ended: bool,
+}
+
+impl SideBySide {
+    fn new(bias: [AngularRate; 3]) -> Self {
+        Self {
+            bias: bias.map(AngularRate::rad_per_sec),
+            fir: [LowPass::chosen(), LowPass::chosen()].map(Line::new),
+            vqf: vqf::Heading::new(vqf::on_a_vehicle()),
+            waiting: VecDeque::new(),
+            started: false,
+            ended: false,
+        }
+    }
+
+    /// Adds a step; returns the sample before it that is complete with it.
+    fn step(&mut self, step: Step, known: &Known) -> Option<Sample> {
+        let sample = &step.input.sample;
+        let gyro = sample.angular_rate.map(AngularRate::rad_per_sec);
+        let [x, y, still] = [0, 1, 2].map(|axis| gyro[axis] - self.bias[axis]);
+        // The static rate is used before the first navigation rate and after the last one.
+        let updated = known.updated.map_or(still, |sent| sent.rate.rad_per_sec());
+        let vqf = self.vqf.rate([x, y, still], sample.specific_force.map(SpecificForce::metre_per_sec2));
+        let navigation = step.navigation.map(|sent| sent.rate.rad_per_sec());
+        self.started |= step.vehicle.prompt.status != Status::Init;
+        self.ended |= self.started && navigation.is_none();
+        let [float, integer] = known.paper.map(|rate| rate.map(AngularRate::rad_per_sec));
+        // In the order of Method::ON_A_DRIVE; the low passes' rates come later.
+        let rates = PerMethod::of([
+            Some(gyro[2]),
+            Some(still),
+            Some(updated),
+            None,
+            None,
+            Some(vqf),
+            Some(known.linear.rad_per_sec()),
+            float,
+            integer,
+            Some(step.vehicle.prompt.rate.rad_per_sec()),
+            navigation,
+        ]);
+        self.waiting.push_back(Sample { step, is_compared: self.started && !self.ended, rates });
+        let filtered = [self.fir[0].next(still), self.fir[1].next(updated)];
+        self.complete(filtered)
+    }
+
+    /// Returns the next sample after the last step, until `None`.
+    fn end(&mut self) -> Option<Sample> {
+        let filtered = [self.fir[0].end(), self.fir[1].end()];
+        self.complete(filtered)
+    }
+
+    fn complete(&mut self, [fir, fir_zero_rate]: [Option<f64>; 2]) -> Option<Sample> {
+        let (fir, fir_zero_rate) = fir.zip(fir_zero_rate)?;
+        let mut sample = self.waiting.pop_front()?;
+        let [_, _, _, first, second, ..] = sample.rates.values_mut();
+        (*first, *second) = (Some(fir), Some(fir_zero_rate));
+        Some(sample)
+    }
+}
+
+/// The rates of the compared samples of a drive in memory, for its curves.
 #[derive(Debug, Clone)]
 pub struct Rates {
     /// Time of each sample since the first sample of the recording, s.
     pub seconds: Vec<f64>,
     /// The rates by each method, rad/s.
     pub rates: PerMethod<Vec<f64>>,
-    /// The cost of each method.
-    pub costs: PerMethod<Cost>,
-    /// The reference of the drive.
-    pub reference: Option<Reference>,
-    /// Whether the drive begins in motion, so that a simulated standstill was inserted before it.
-    pub simulated_rest: bool,
-    /// The drive as the board would run it.
-    pub drive: Replay,
-    /// The run time of [`Rates::drive`] on this machine.
-    pub run_time: Duration,
+    /// The true yaw rate of each sample, rad/s; `None` if one has none.
+    pub reference: Option<Vec<f64>>,
+    /// The speed of the vehicle at each sample, m/s; `None` without wheels.
+    pub speeds: Option<Vec<f64>>,
+    first: Micros,
+    wheels: Option<Speeds>,
 }
-
-/// Most replays of a recording by [`Rates::new`] that call `tick`.
-pub const RUNS: usize = 4;
 
 impl Rates {
-    /// Runs every method. All networks run in the same pipeline; the pipeline without a network is
-    /// [`Method::STATIC_ZERO_RATE`]. `tick` is called for each row of each run but the f32 network's, which has a thread of
-    /// its own.
-    ///
-    /// # Errors
-    /// [`ReplayError`], if static initialisation fails and there is no course with which to simulate a standstill.
-    pub fn new(
-        recording: &Recording,
-        networks: &mut Networks<'_>,
-        mut tick: impl FnMut(),
-    ) -> Result<Self, ReplayError> {
-        let at_once = with_lag(PipelineConfig::DEFAULT, Lag::NONE);
-        let wheels = WheelFrames::new(recording);
-        let run = Replay::run(recording, &at_once, wheels.clone(), &mut Uncorrected, &mut tick);
-        let (recording, zero_rate, simulated_rest) = match run {
-            Ok(zero_rate) => (Cow::Borrowed(recording), zero_rate, false),
-            Err(error) => {
-                let rested = rest::before(recording).ok_or(error)?;
-                let run = Replay::run(&rested, &at_once, wheels.clone(), &mut Uncorrected, &mut tick)?;
-                (Cow::Owned(rested), run, true)
-            }
-        };
-        let run = |network: &mut Network<'_>, tick: &mut dyn FnMut()| {
-            Replay::run(&recording, &PipelineConfig::DEFAULT, wheels.clone(), network, tick)
-        };
-        // The f32 network takes longer than all others together.
-        let (float, integer, default, sent) = std::thread::scope(|scope| {
-            let float = scope.spawn(|| run(&mut networks.float, &mut || {}));
-            let mut timed = |network: &mut Network<'_>| {
-                let start = Instant::now();
-                run(network, &mut tick).map(|drive| (drive, start.elapsed()))
-            };
-            let integer = timed(&mut networks.integer);
-            let default = timed(&mut networks.default);
-            let sent = networks.sent.as_mut().map(timed);
-            (float.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), integer, default, sent)
-        });
-        let (float, (integer, _), default) = (float?, integer?, default?);
-        let settled = |drive: &Replay| drive.settled().map(|rate| rate.rad_per_sec()).collect::<Vec<f64>>();
-        let linear = settled(&default.0);
-        let shapes = Shapes {
-            float: networks.float.shape,
-            integer: networks.integer.shape,
-            sent: networks.sent.as_ref().unwrap_or(&networks.default).shape,
-        };
-        let (drive, run_time) = sent.transpose()?.unwrap_or(default);
-
-        let compared = || drive.steps[drive.compared()].iter();
-        let row = |row: usize| &recording.rows[row];
-        let [.., bias] = drive.gyro_bias.map(|bias| bias.rad_per_sec());
-        // The filters run from the start of the recording.
-        let raw: Vec<f64> = drive.steps.iter().map(|step| gyro(row(step.row))[2]).collect();
-        let still: Vec<f64> = raw.iter().map(|rate| rate - bias).collect();
-        let updated: Vec<f64> = zero_rate
-            .steps
-            .iter()
-            .zip(&still)
-            // The static rate is used before the first navigation rate and after the last one.
-            .map(|(step, still)| step.navigation.map_or(*still, |sent| sent.rate.rad_per_sec()))
-            .collect();
-        let rates = PerMethod::new(|method| match method {
-            Method::RAW => raw[drive.compared()].to_vec(),
-            Method::STATIC => still[drive.compared()].to_vec(),
-            Method::STATIC_ZERO_RATE => updated[drive.compared()].to_vec(),
-            Method::FIR => LowPass::chosen().filter(&still)[drive.compared()].to_vec(),
-            Method::FIR_ZERO_RATE => LowPass::chosen().filter(&updated)[drive.compared()].to_vec(),
-            Method::VQF => {
-                let samples = drive.steps.iter().map(|step| unbiased(&drive, row(step.row)));
-                vqf::rates(vqf::on_a_vehicle(), samples)[drive.compared()].to_vec()
-            }
-            Method::GYRONET_F32 => settled(&float),
-            Method::GYRONET_INT => settled(&integer),
-            Method::LINEAR => linear.clone(),
-            Method::PROMPT => compared().map(|step| step.vehicle.prompt.rate.rad_per_sec()).collect(),
-            // The remaining method is `Method::NAVIGATION`.
-            _ => drive.navigation().map(|rate| rate.rate.rad_per_sec()).collect(),
-        });
-        let costs = PerMethod::new(|method| Cost::new(method, &shapes));
-        let first = recording.rows.first().map_or(0, |row| row.sample.time.0);
-        let seconds = compared().map(|step| (step.time.0 - first) as f64 * 1e-6).collect();
-        let rate: Option<Vec<f64>> = compared().map(|step| row(step.row).reference).collect();
-        let course: Vec<Option<f64>> = compared().map(|step| row(step.row).course).collect();
-        let course = course.iter().any(Option::is_some).then_some(Reference::Course(course));
-        let reference = rate.map(Reference::Rate).or(course);
-        Ok(Self { seconds, rates, costs, reference, simulated_rest, drive, run_time })
+    /// Starts before the first sample of a drive.
+    #[must_use]
+    pub fn of(drive: &Drive<'_>) -> Self {
+        let wheels = drive.speeds();
+        Self {
+            seconds: Vec::new(),
+            rates: PerMethod::new(|_| None),
+            reference: Some(Vec::new()),
+            speeds: wheels.as_ref().map(|_| Vec::new()),
+            first: drive.facts.first,
+            wheels,
+        }
     }
-}
 
-fn gyro(row: &Row) -> [f64; 3] {
-    row.sample.angular_rate.map(|rate| rate.rad_per_sec())
-}
-
-/// Returns a row's gyro less its static bias, and its specific force.
-fn unbiased(drive: &Replay, row: &Row) -> ([f64; 3], [f64; 3]) {
-    let (gyro, bias) = (gyro(row), drive.gyro_bias.map(|bias| bias.rad_per_sec()));
-    let force = row.sample.specific_force.map(|force| force.metre_per_sec2());
-    (std::array::from_fn(|axis| gyro[axis] - bias[axis]), force)
+    /// Adds a sample.
+    pub fn add(&mut self, Sample { step, is_compared, rates }: &Sample) {
+        let speed = self.wheels.as_mut().map(|wheels| wheels.next(&step.input));
+        if !is_compared {
+            return;
+        }
+        self.seconds.push((step.time.0 - self.first.0) as f64 * 1e-6);
+        self.speeds.iter_mut().zip(speed).for_each(|(speeds, speed)| speeds.push(speed));
+        match (&mut self.reference, step.input.reference) {
+            (Some(reference), Some(rate)) => reference.push(rate),
+            (reference, _) => *reference = None,
+        }
+        for (all, rate) in self.rates.values_mut().iter_mut().zip(rates.values()) {
+            if let Some(rate) = rate {
+                all.get_or_insert_default().push(*rate);
+            }
+        }
+    }
 }

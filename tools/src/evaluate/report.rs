@@ -1,20 +1,23 @@
-//! This module reports the errors and costs of each method on each drive, as a table and as JSON.
+//! The errors and costs of each method on each drive, as a table and as JSON.
 
 use crate::drive::DT;
-use crate::drive::recording::Recording;
+use crate::drive::replay::ReplayError;
+use crate::drive::stream::Drive;
 use crate::evaluate::cost::Cost;
-use crate::evaluate::heading_error::{HeadingError, PLAUSIBLE_10S_RAD};
+use crate::evaluate::heading_error::{AgainstCourse, AgainstRate, Errors, HeadingError, PLAUSIBLE_10S_RAD};
 use crate::evaluate::methods::{Method, PerMethod};
-use crate::evaluate::metrics::integral;
-use crate::evaluate::rates::Rates;
+use crate::evaluate::rates::{self, Networks, Sample};
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 
 /// The reason why a drive cannot be evaluated.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvaluateError {
+    /// The drive cannot be read or replayed.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
     /// The drive has no reference.
     #[error(
         "{path}: line {line}: no reference to evaluate against: neither a yaw rate (ref_gyr_z, in every row) nor a \
@@ -177,45 +180,100 @@ pub struct DriveErrors {
 }
 
 impl DriveErrors {
-    /// Compares a drive's rates with its reference.
+    /// Runs every method on a drive and compares the rates with its reference. Each sample is passed to `visit`.
     ///
     /// # Errors
     /// [`EvaluateError`], which names the file.
-    pub fn new(recording: &Recording, rates: &Rates) -> Result<Self, EvaluateError> {
-        let path = || recording.path.clone();
-        let drive = &rates.drive;
-        let Some(reference) = &rates.reference else {
-            let mut rows = drive.steps[drive.compared()].iter().map(|step| &recording.rows[step.row]);
-            let line = rows.find(|row| row.reference.is_none()).map_or(1, |row| row.line);
-            return Err(EvaluateError::NoReference { path: path(), line });
+    pub fn of(
+        drive: &Drive<'_>,
+        networks: &mut Networks<'_>,
+        mut visit: impl FnMut(&Sample),
+    ) -> Result<Self, EvaluateError> {
+        let mut judges = Judges::default();
+        let comparison = rates::run(drive, networks, |sample| {
+            judges.add(sample);
+            visit(sample);
+        })?;
+        let path = || drive.path.clone();
+        let Judges { samples, without_rate, has_course, methods } = judges;
+        let seconds = samples as f64 * DT;
+        let (reference, judged): (_, [Option<Errors>; _]) = match without_rate {
+            None => ("ref_gyr_z", methods.each_ref().map(|method| method.rate.errors())),
+            Some(_) if has_course => {
+                ("ref_yaw", methods.each_ref().map(|method| method.course.clone().errors()))
+            }
+            Some(line) => return Err(EvaluateError::NoReference { path: path(), line }),
         };
-        let (column, seconds) = (reference.column(), rates.seconds.len() as f64 * DT);
-        let errors = rates.rates.map(|rate| reference.errors(rate));
-        let still = errors[Method::STATIC].as_ref().and_then(|errors| errors.typical_10s());
-        if let Some(rad) = still.filter(|rad| *rad > PLAUSIBLE_10S_RAD) {
-            return Err(EvaluateError::Disagrees { path: path(), column, rad });
+        let errors = PerMethod::of(judged);
+        if let Some(rad) = errors.get(Method::STATIC).and_then(|errors| errors.typical_10s)
+            && rad > PLAUSIBLE_10S_RAD
+        {
+            return Err(EvaluateError::Disagrees { path: path(), column: reference, rad });
         }
-        let yaw = |method: Method| integral(&rates.rates[method]).last().copied().unwrap_or(0.0);
-        let updated = yaw(Method::STATIC_ZERO_RATE);
-        let row = |method: Method| {
-            let error = errors[method].as_ref()?.figures();
-            let mean_correction_deg_h = (yaw(method) - updated).to_degrees() / seconds * 3600.0;
-            Some(Row { error, mean_correction_deg_h, cost: rates.costs[method] })
-        };
-        let methods = PerMethod::new(row).all();
-        let methods = methods.ok_or_else(|| EvaluateError::TooShort { path: path(), column, seconds })?;
-        let set = Path::new(&recording.path).parent().and_then(Path::file_name).unwrap_or_default();
+        let yaw = PerMethod::of(methods.map(|method| Some(method.yaw)));
+        let methods = PerMethod::new(|method| {
+            let mean_correction_deg_h =
+                (yaw[method] - yaw[Method::STATIC_ZERO_RATE]).to_degrees() / seconds * 3600.0;
+            let (error, cost) = (errors.get(method)?.figures, *comparison.costs.get(method)?);
+            Some(Row { error, mean_correction_deg_h, cost })
+        });
+        if methods.each().count() < comparison.costs.each().count() {
+            return Err(EvaluateError::TooShort { path: path(), column: reference, seconds });
+        }
+        let set = Path::new(&drive.path).parent().and_then(Path::file_name).unwrap_or_default();
         Ok(Self {
-            name: recording.name().to_owned(),
+            name: drive.name().to_owned(),
             set: set.to_string_lossy().into_owned(),
             seconds,
-            missing: drive.counters.missing,
-            reference: column,
-            wheels: recording.rows.iter().any(|row| row.wheels.iter().any(Option::is_some)),
-            simulated_rest: rates.simulated_rest,
+            missing: comparison.missing,
+            reference,
+            wheels: drive.facts.has_wheels(),
+            simulated_rest: comparison.simulated_rest,
             over_best_classical: Comparisons::new(&methods),
             methods,
         })
+    }
+}
+
+/// The errors of all methods in progress.
+#[derive(Default)]
+struct Judges {
+    /// Number of compared samples.
+    samples: usize,
+    /// The first line without a true yaw rate.
+    without_rate: Option<u64>,
+    has_course: bool,
+    methods: [Judge; Method::ON_A_DRIVE.len()],
+}
+
+/// The errors of one method in progress, against either reference.
+#[derive(Default)]
+struct Judge {
+    rate: AgainstRate,
+    course: AgainstCourse,
+    /// The integral of the rate.
+    yaw: f64,
+}
+
+impl Judges {
+    fn add(&mut self, sample: &Sample) {
+        if !sample.is_compared {
+            return;
+        }
+        let row = &sample.step.input;
+        self.samples += 1;
+        if row.reference.is_none() {
+            self.without_rate = self.without_rate.or(Some(row.line));
+        }
+        self.has_course |= row.course.is_some();
+        for (judge, rate) in self.methods.iter_mut().zip(sample.rates.values()) {
+            let Some(rate) = *rate else { continue };
+            judge.yaw += rate * DT;
+            if let Some(truth) = row.reference {
+                judge.rate.add(rate, truth);
+            }
+            judge.course.add(rate, row.course);
+        }
     }
 }
 
@@ -236,10 +294,11 @@ impl Mean {
     fn new(set: &str, drives: &[&DriveErrors]) -> Option<Self> {
         let count = (!drives.is_empty()).then_some(drives.len() as f64)?;
         let methods = PerMethod::new(|method| {
-            let rows: Vec<Row> = drives.iter().map(|drive| drive.methods[method]).collect();
+            let rows: Vec<Row> =
+                drives.iter().map(|drive| drive.methods.get(method).copied()).collect::<Option<_>>()?;
             let error = HeadingError::mean(&rows.iter().map(|row| row.error).collect::<Vec<_>>());
             let mean_correction_deg_h = rows.iter().map(|row| row.mean_correction_deg_h).sum::<f64>() / count;
-            Row { error, mean_correction_deg_h, cost: rows[0].cost }
+            Some(Row { error, mean_correction_deg_h, cost: rows[0].cost })
         });
         let over_best_classical = Comparisons::new(&methods);
         Some(Self { set: set.to_owned(), drives: drives.len(), over_best_classical, methods })
@@ -344,11 +403,11 @@ mod tests {
                 Method::NAVIGATION => 70,
                 _ => 0,
             };
-            Row {
+            Some(Row {
                 error,
                 mean_correction_deg_h: -3.0,
                 cost: Cost { multiplications_per_sample: 6.0, delay_ms },
-            }
+            })
         });
         DriveErrors {
             name: format!("drive{k}"),

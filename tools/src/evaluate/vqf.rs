@@ -1,4 +1,4 @@
-//! This module computes the heading of the orientation filter VQF: D. Laidig and T. Seel, VQF: Highly accurate IMU
+//! The heading of the orientation filter VQF: D. Laidig and T. Seel, VQF: Highly accurate IMU
 //! orientation estimation with bias estimation and magnetic disturbance rejection, Information Fusion 91 (2023),
 //! 187-204.
 //!
@@ -26,18 +26,33 @@ pub const MULTIPLICATIONS: usize = (6 * LOW_PASS + 2 * 3)
     + (ROTATION + 3 * LOW_PASS)
     + (ROTATION + 6 + 4 + QUATERNION);
 
-/// Runs a filter over gyro (rad/s) and specific force (m/s^2), and returns the rate of its heading at each sample,
-/// rad/s. The first rate is zero.
-pub fn rates(mut filter: VQF, samples: impl Iterator<Item = ([f64; 3], [f64; 3])>) -> Vec<f64> {
-    let mut last = None;
-    samples
-        .map(|(gyro, force)| {
-            filter.update(gyro, force, None);
-            let Quaternion(w, x, y, z) = filter.quat_6d();
-            let yaw = libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
-            wrap(yaw - last.replace(yaw).unwrap_or(yaw)) / DT
-        })
-        .collect()
+/// A filter at work, and its newest heading.
+pub struct Heading {
+    filter: VQF,
+    yaw: Option<f64>,
+}
+
+impl Heading {
+    /// Starts a filter.
+    #[must_use]
+    pub fn new(filter: VQF) -> Self {
+        Self { filter, yaw: None }
+    }
+
+    /// Adds a sample of the gyro (rad/s) and the specific force (m/s^2), and returns the rate of the heading, rad/s.
+    /// The first rate is zero.
+    pub fn rate(&mut self, gyro: [f64; 3], force: [f64; 3]) -> f64 {
+        self.filter.update(gyro, force, None);
+        let Quaternion(w, x, y, z) = self.filter.quat_6d();
+        let yaw = libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
+        wrap(yaw - self.yaw.replace(yaw).unwrap_or(yaw)) / DT
+    }
+}
+
+/// Runs a filter over all samples ([`Heading::rate`]).
+pub fn rates(filter: VQF, samples: impl Iterator<Item = ([f64; 3], [f64; 3])>) -> Vec<f64> {
+    let mut heading = Heading::new(filter);
+    samples.map(|(gyro, force)| heading.rate(gyro, force)).collect()
 }
 
 /// Returns a filter with the published parameters.

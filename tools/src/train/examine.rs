@@ -3,11 +3,10 @@
 use crate::drive::DT;
 use crate::drive::error::DataError;
 use crate::drive::recording::{Recording, Row};
-use crate::drive::replay::{Replay, ReplayError};
-use crate::evaluate::ablation::Uncorrected;
+use crate::drive::replay::{ReplayError, initialise};
+use crate::drive::stream::Drive;
 use crate::evaluate::heading_error::{PLAUSIBLE_10S_RAD, Reference};
 use gyronet::bias::STATIC_SAMPLES;
-use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::{PERIOD_US, RATE_HZ};
 use std::path::{Path, PathBuf};
 
@@ -17,8 +16,6 @@ pub const SHORTEST_S: f64 = 30.0;
 const JITTER_US: u64 = 1_000;
 /// Least angle of the reference in a second that counts as turning, rad; noise at rest must not count.
 const TURNING_RAD: f64 = 0.02;
-/// Rows that are enough for static initialisation.
-const STARTED: usize = STATIC_SAMPLES as usize + RATE_HZ as usize;
 
 /// The reason why a drive cannot be trained on.
 #[derive(Debug, thiserror::Error)]
@@ -93,7 +90,7 @@ pub struct Examined {
 /// # Errors
 /// [`Refusal`], which names the file and, if known, the line.
 pub fn examine(path: &Path) -> Result<Examined, Refusal> {
-    let mut recording = Recording::read(path)?;
+    let recording = Recording::read(path)?;
     let named = || recording.path.clone();
     if let Some(row) = recording.rows.iter().find(|row| row.reference.is_none()) {
         let course = recording.rows.iter().any(|row| row.course.is_some());
@@ -112,15 +109,13 @@ pub fn examine(path: &Path) -> Result<Examined, Refusal> {
     }
     let gyro: Vec<f64> = moving.iter().map(|row| row.sample.angular_rate[2].rad_per_sec()).collect();
     let reference: Vec<f64> = moving.iter().filter_map(|row| row.reference).collect();
-    recording.rows.truncate(STARTED);
-    let start = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Uncorrected, || {})?;
-    let bias = start.gyro_bias[2].rad_per_sec();
+    let bias = initialise(&Drive::from(&recording))?[2].rad_per_sec();
     let still: Vec<f64> = gyro.iter().map(|rate| rate - bias).collect();
     let seconds_turned =
         reference.chunks_exact(RATE_HZ as usize).map(|second| second.iter().sum::<f64>().abs() * DT);
     let turned_rad =
         seconds_turned.filter(|turned| *turned > TURNING_RAD).fold(0.0, |sum, turned| sum + turned);
-    let typical = Reference::Rate(reference).errors(&still).and_then(|errors| errors.typical_10s());
+    let typical = Reference::Rate(reference).errors(&still).and_then(|errors| errors.typical_10s);
     if let Some(rad) = typical.filter(|rad| *rad > PLAUSIBLE_10S_RAD) {
         return Err(Refusal::Disagrees { path: recording.path, rad });
     }

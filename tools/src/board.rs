@@ -1,0 +1,150 @@
+//! The board on the host: the library's coprocessor, driven by the rows of a recorded drive.
+//!
+//! The board runs the code of the firmware, so its frames are those that a board in the vehicle would send. A step is
+//! given out [`HOLD`] rows after its row, when its navigation rate and its settled rate are known; nothing older is
+//! kept, so a long drive needs no more memory than a short one.
+
+use crate::drive::recording::Row;
+use crate::drive::wheel_frames::{self, WheelFrames};
+use gyronet::bias::StaticError;
+use gyronet::compensate::Lag;
+use gyronet::coprocessor::{Clock, Config, Coprocessor, TimedFrame};
+use gyronet::estimate::{VehicleSample, YawEstimate};
+use gyronet::health::Status;
+use gyronet::model::WindowNetwork;
+use gyronet::monitor::TIMEOUT_US;
+use gyronet::sample::Standstill;
+use gyronet::units::{AngularRate, Micros};
+use std::collections::VecDeque;
+
+/// Steps that are held back. No rate is sent or revised later than this.
+pub const HOLD: usize = Lag::MAX.samples() + 1;
+/// Period at which the board polls its inputs, microseconds.
+const POLL_US: u64 = 1_000;
+/// Longest part of a gap in which the board's messages about a silent sensor are replayed, microseconds; the rest of
+/// the gap is skipped.
+const SILENCE_US: u64 = 60_000_000;
+
+/// The results of one row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// Index of the row in the recording.
+    pub row: usize,
+    /// The row itself.
+    pub input: Row,
+    /// The sample's time stamp.
+    pub time: Micros,
+    /// Whether the vehicle stands, by its wheels.
+    pub standstill: Standstill,
+    /// The estimates that were sent with this row.
+    pub vehicle: VehicleSample,
+    /// The navigation rate of this row's sample, which is sent some samples later; `None` during static
+    /// initialisation and for the last samples of the drive.
+    pub navigation: Option<YawEstimate>,
+    /// The gyro less static bias less the network's settled estimate, which is known some samples later; the prompt
+    /// rate if there is no settled estimate.
+    pub settled: AngularRate,
+    /// The frames that were sent with this row, and those sent while the sensor was silent after it.
+    pub frames: Vec<TimedFrame>,
+}
+
+/// A board with its network and the wheels of its vehicle.
+#[derive(Debug, Clone)]
+pub struct Board<N> {
+    coprocessor: Coprocessor,
+    wheels: Option<WheelFrames>,
+    network: N,
+    rows: usize,
+    now: Micros,
+    /// The time from which on the board finds the sensor silent.
+    silent_from: Micros,
+    held: VecDeque<Step>,
+}
+
+impl<N: WindowNetwork> Board<N> {
+    /// Creates a board before its first row. `wheels` replaces the vehicle's bus; the estimate of each window is
+    /// delivered without delay.
+    #[must_use]
+    pub fn new(config: Config, wheels: Option<WheelFrames>, network: N) -> Self {
+        let receiver = wheels.as_ref().map(|_| wheel_frames::receiver());
+        let coprocessor = Coprocessor::new(Config { wheels: receiver, clock: Clock::Sensor, ..config });
+        let held = VecDeque::with_capacity(HOLD + 1);
+        Self { coprocessor, wheels, network, rows: 0, now: Micros(0), silent_from: Micros(0), held }
+    }
+
+    /// The coprocessor, to read its state.
+    #[must_use]
+    pub fn coprocessor(&self) -> &Coprocessor {
+        &self.coprocessor
+    }
+
+    /// Processes a row, and gives out the step of the row [`HOLD`] steps before it. A row whose time stamp does not
+    /// fit the grid gives no step and is counted.
+    ///
+    /// # Errors
+    /// The vehicle moves during static initialisation.
+    pub fn row(&mut self, row: &Row) -> Result<Option<Step>, StaticError> {
+        let (index, time) = (self.rows, row.sample.time);
+        self.rows += 1;
+        self.wait(time);
+        self.now = self.now.max(time);
+        if let Some(frame) = self.wheels.as_mut().and_then(|wheels| wheels.next(row)) {
+            // A speed that does not fit the frame is counted as not valid.
+            let _ = self.coprocessor.can(&frame, self.now);
+        }
+        let mut frames = Vec::new();
+        let sent = self.coprocessor.imu(row.sample, self.now, &mut |frame: TimedFrame| frames.push(frame));
+        let Ok(observation) = sent else { return Ok(None) };
+        if let Some(refused) = observation.refused {
+            return Err(refused);
+        }
+        self.silent_from = Micros(self.now.0 + TIMEOUT_US);
+        if let Some(window) = self.coprocessor.window() {
+            let estimate = self.network.estimate(&window.features);
+            self.coprocessor.deliver(window.end, estimate).expect("the window that is due");
+        }
+        let vehicle = observation.vehicle;
+        self.held.push_back(Step {
+            row: index,
+            input: *row,
+            time,
+            standstill: observation.wheels.standstill,
+            vehicle,
+            navigation: None,
+            settled: vehicle.prompt.rate,
+            frames,
+        });
+        if vehicle.navigation.status != Status::Init
+            && let Some(step) = self.held(vehicle.navigation.tick)
+        {
+            step.navigation = Some(vehicle.navigation);
+        }
+        if let Some(settled) = observation.settled
+            && let Some(step) = self.held(settled.tick)
+        {
+            step.settled = AngularRate(settled.rate.0.saturating_sub(settled.correction.0));
+        }
+        Ok(if self.held.len() > HOLD { self.held.pop_front() } else { None })
+    }
+
+    /// Gives out the next of the steps that are still held; call it until `None` after the last row.
+    pub fn end(&mut self) -> Option<Step> {
+        self.held.pop_front()
+    }
+
+    /// Lets time pass until the next row. The messages about a silent sensor precede those of the row.
+    fn wait(&mut self, row: Micros) {
+        let Some(last) = self.held.back_mut() else { return };
+        let until = row.0.min(self.now.0 + SILENCE_US);
+        // Until then a poll finds nothing to do.
+        let quiet = self.silent_from.0.saturating_sub(self.now.0 + 1) / POLL_US * POLL_US;
+        for now in (self.now.0 + quiet + POLL_US..until).step_by(POLL_US as usize) {
+            let _ = self.coprocessor.poll(Micros(now), &mut |frame: TimedFrame| last.frames.push(frame));
+        }
+    }
+
+    /// The held step of a sample.
+    fn held(&mut self, tick: u32) -> Option<&mut Step> {
+        self.held.iter_mut().rev().find(|step| step.vehicle.prompt.tick == tick)
+    }
+}

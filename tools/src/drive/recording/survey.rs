@@ -1,0 +1,129 @@
+//! The first reading of a drive: it checks the drive as a whole, and notes what a replay must know before its first
+//! row.
+
+use super::{PERIOD_TOLERANCE_US, Row, WHEEL_STANDS, WHEELS};
+use crate::drive::error::{DataError, DataFault};
+use gyronet::bias::STATIC_SAMPLES;
+use gyronet::sample::{PERIOD_US, RATE_HZ};
+use gyronet::units::Micros;
+use std::collections::BTreeMap;
+
+/// What a drive has.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Facts {
+    /// Number of rows.
+    pub rows: usize,
+    /// Time of the first row.
+    pub first: Micros,
+    /// Time of the last row.
+    pub last: Micros,
+    /// Number of rows that are missing in gaps.
+    pub missing: u64,
+    /// Whether each wheel is recorded in any row.
+    pub wheels: [bool; WHEELS],
+}
+
+impl Facts {
+    /// What these rows have, whether they can be replayed or not.
+    #[must_use]
+    pub fn of(rows: &[Row]) -> Self {
+        let mut survey = Survey::default();
+        rows.iter().for_each(|row| survey.row(row));
+        survey.facts
+    }
+
+    /// Time from the first sample to the end of the last one, s.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        (self.last.0 - self.first.0 + PERIOD_US) as f64 * 1e-6
+    }
+
+    /// Whether any wheel is recorded.
+    #[must_use]
+    pub fn has_wheels(&self) -> bool {
+        self.wheels.contains(&true)
+    }
+}
+
+/// A survey in progress.
+#[derive(Debug, Default)]
+pub struct Survey {
+    facts: Facts,
+    /// The rows of static initialisation, in which the wheels must stand.
+    beginning: Vec<Row>,
+    /// How often each sample period occurs. Different periods add up to the length of the drive, so their number grows
+    /// with its square root at most.
+    periods: BTreeMap<u64, u64>,
+}
+
+impl Survey {
+    /// Adds the next row.
+    pub fn row(&mut self, row: &Row) {
+        let (facts, time) = (&mut self.facts, row.sample.time);
+        if facts.rows == 0 {
+            facts.first = time;
+        } else {
+            let period = time.0 - facts.last.0;
+            *self.periods.entry(period).or_default() += 1;
+            facts.missing += ((period + PERIOD_US / 2) / PERIOD_US).saturating_sub(1);
+        }
+        facts.last = time;
+        facts.rows += 1;
+        for (recorded, rate) in facts.wheels.iter_mut().zip(row.wheels) {
+            *recorded |= rate.is_some();
+        }
+        if self.beginning.len() < STATIC_SAMPLES as usize {
+            self.beginning.push(*row);
+        }
+    }
+
+    /// Checks that the drive can be replayed: at least 3 s long, at 100 Hz, with any wheels at rest in the first 3 s.
+    ///
+    /// # Errors
+    /// [`DataError`] with this path.
+    pub fn finish(self, path: &str) -> Result<Facts, DataError> {
+        if self.facts.rows == 0 {
+            return Err(DataError::of(path, DataFault::Empty));
+        }
+        let (seconds, needed) = (self.facts.seconds(), f64::from(STATIC_SAMPLES) / f64::from(RATE_HZ));
+        if seconds < needed {
+            return Err(DataError::of(path, DataFault::TooShort { seconds, needed }));
+        }
+        let median = self.median_period().unwrap_or(PERIOD_US);
+        if median.abs_diff(PERIOD_US) > PERIOD_TOLERANCE_US {
+            return Err(DataError::of(path, DataFault::Rate { hz: 1e6 / median as f64 }));
+        }
+        self.check_wheels(path)?;
+        Ok(self.facts)
+    }
+
+    fn median_period(&self) -> Option<u64> {
+        let middle = self.periods.values().sum::<u64>() / 2;
+        let mut shorter = 0;
+        let found = self.periods.iter().find(|(_, count)| {
+            shorter += **count;
+            shorter > middle
+        });
+        found.map(|(period, _)| *period)
+    }
+
+    /// Checks that the wheels stand in each of the first three seconds. Each second is checked on its own, so that a
+    /// car that pulls away in the last one is found.
+    fn check_wheels(&self, path: &str) -> Result<(), DataError> {
+        for second in self.beginning.chunks(RATE_HZ as usize) {
+            for wheel in 0..WHEELS {
+                let rates = || second.iter().filter_map(|row| row.wheels[wheel]);
+                let mean = rates().sum::<f64>() / rates().count().max(1) as f64;
+                if mean.abs() <= WHEEL_STANDS {
+                    continue;
+                }
+                let turns = |row: &&Row| row.wheels[wheel].is_some_and(|rate| rate.abs() > WHEEL_STANDS);
+                // At least one rate is above the limit, since the mean is.
+                let line = second.iter().find(turns).map_or(0, |row| row.line);
+                let fault = DataFault::Moving { line, wheel: wheel + 1, rate: mean };
+                return Err(DataError::of(path, fault));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,145 @@
+//! A drive whose rows are read from its file each time they are needed, so that a long drive takes no more memory than
+//! a short one.
+
+use super::error::DataError;
+use super::recording::{Facts, Reader, Recording, Row, Survey};
+use super::vehicle::Vehicle;
+use super::wheel_frames::{Speeds, WheelFrames};
+use gyronet::mounting::GyroMap;
+use gyronet::sample::PERIOD_US;
+use std::borrow::Cow;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// The rows of a drive in order, or the fault at which they end.
+pub type Rows<'a> = Box<dyn Iterator<Item = Result<Row, DataError>> + 'a>;
+
+/// A complete drive, which can be read again and again.
+#[derive(Debug, Clone)]
+pub struct Drive<'a> {
+    /// The path of the file, for messages.
+    pub path: String,
+    /// Contents of the vehicle file beside the drive; the rows are in the vehicle's axes.
+    pub vehicle: Cow<'a, Vehicle>,
+    /// What the first reading has found.
+    pub facts: Facts,
+    /// A map that is applied to the gyro of each row.
+    pub gyro_map: Option<GyroMap>,
+    /// Rows before those of the file.
+    before: Vec<Row>,
+    source: Source<'a>,
+}
+
+/// Where the rows come from.
+#[derive(Debug, Clone)]
+enum Source<'a> {
+    File(PathBuf),
+    Memory(Cow<'a, [Row]>),
+}
+
+impl Drive<'static> {
+    /// Reads a file and the vehicle file beside it, and checks both. What cannot be read twice (a pipe) is kept in
+    /// memory.
+    ///
+    /// # Errors
+    /// [`DataError`], which names the file and, where there is one, the line.
+    pub fn open(path: &Path) -> Result<Self, DataError> {
+        let name = path.display().to_string();
+        let file = File::open(path).map_err(|source| DataError::of(&name, source.into()))?;
+        let vehicle = Vehicle::of_drive(path)?;
+        let again = file.metadata().is_ok_and(|metadata| metadata.is_file());
+        let (mut survey, mut kept) = (Survey::default(), Vec::new());
+        for row in Reader::new(&name, file)?.mounted(&vehicle) {
+            let row = row?;
+            survey.row(&row);
+            if !again {
+                kept.push(row);
+            }
+        }
+        let facts = survey.finish(&name)?;
+        let source = if again { Source::File(path.to_owned()) } else { Source::Memory(Cow::Owned(kept)) };
+        Ok(Self {
+            path: name,
+            vehicle: Cow::Owned(vehicle),
+            facts,
+            gyro_map: None,
+            before: Vec::new(),
+            source,
+        })
+    }
+}
+
+impl<'a> From<&'a Recording> for Drive<'a> {
+    /// A drive that is in memory.
+    fn from(recording: &'a Recording) -> Self {
+        Self {
+            path: recording.path.clone(),
+            vehicle: Cow::Borrowed(&recording.vehicle),
+            facts: recording.facts(),
+            gyro_map: None,
+            before: Vec::new(),
+            source: Source::Memory(Cow::Borrowed(&recording.rows)),
+        }
+    }
+}
+
+impl<'a> Drive<'a> {
+    /// The drive with these rows before its own, which come later by as much.
+    #[must_use]
+    pub fn after(&self, before: Vec<Row>) -> Drive<'a> {
+        Drive { before, ..self.clone() }
+    }
+}
+
+impl Drive<'_> {
+    /// The rows from the first one on.
+    ///
+    /// # Errors
+    /// [`DataError`]: the file cannot be opened again.
+    pub fn rows(&self) -> Result<Rows<'_>, DataError> {
+        let rows: Rows<'_> = match &self.source {
+            Source::Memory(rows) => Box::new(rows.iter().copied().map(Ok)),
+            Source::File(path) => {
+                let file = File::open(path).map_err(|source| DataError::of(&self.path, source.into()))?;
+                Box::new(Reader::new(&self.path, file)?.mounted(&self.vehicle))
+            }
+        };
+        if self.gyro_map.is_none() && self.before.is_empty() {
+            return Ok(rows);
+        }
+        let (map, later) = (self.gyro_map, self.before.len() as u64 * PERIOD_US);
+        let placed = rows.map(move |row| {
+            row.map(|mut row| {
+                row.sample.time.0 += later;
+                if let Some(map) = map {
+                    row.sample.angular_rate = map.rate(row.sample.angular_rate);
+                }
+                row
+            })
+        });
+        Ok(Box::new(self.before.iter().copied().map(Ok).chain(placed)))
+    }
+
+    /// The file's name without folder and extension, for tables.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        name(&self.path)
+    }
+
+    /// The wheels of the vehicle's bus, as the drive has them.
+    #[must_use]
+    pub fn wheels(&self) -> Option<WheelFrames> {
+        WheelFrames::of(self.facts.wheels, self.vehicle.radius_m())
+    }
+
+    /// The speed of the vehicle, from its wheels.
+    #[must_use]
+    pub fn speeds(&self) -> Option<Speeds> {
+        Speeds::of(self.facts.wheels, self.vehicle.radius_m())
+    }
+}
+
+/// The name of a file without folder and extension.
+pub(super) fn name(path: &str) -> &str {
+    Path::new(path).file_stem().and_then(|stem| stem.to_str()).unwrap_or(path)
+}
