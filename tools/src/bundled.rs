@@ -19,12 +19,15 @@ pub fn simulated_drive() -> Result<Recording, DataError> {
     Recording::parse("simulated_drive.csv", SIMULATED_DRIVE.as_bytes())
 }
 
+/// Length of the drive of `gyronet demo`, s.
+pub const DEMO_SECONDS: u32 = 600;
+
 /// Returns the drive of `gyronet demo`: ten minutes of the same vehicle (`gyronet simulate --seconds 600 --seed 1`).
 ///
 /// # Errors
 /// [`DataError`] never, unless the simulation writes what cannot be read.
 pub fn demo_drive() -> Result<Recording, DataError> {
-    let config = Config { seconds: 600, seed: 1, ..Config::DEFAULT };
+    let config = Config { seconds: DEMO_SECONDS, seed: 1, ..Config::DEFAULT };
     let mut bytes = Vec::new();
     csv::write(&config, &mut bytes).expect("a vector takes all bytes");
     Recording::parse("simulated_drive.csv", &bytes[..])

@@ -11,7 +11,6 @@
 //! | ADIS16465-2 | one burst per row, over a simulated SPI bus | 1/40 deg/s, 1/4000 g |
 
 pub mod adis16465;
-pub mod compare;
 pub mod dsp1760;
 pub mod icm42688;
 pub mod xsens;

@@ -66,7 +66,7 @@ fn wrong_arguments_are_status_2_and_failures_1() {
     for wrong in [
         &["nonsense"][..],
         &["evaluate"],
-        &["replay", "a.csv", "--via", "nothing"],
+        &["replay", "a.csv", "--via", "icm42688"],
         &["simulate", "--out", "a.csv", "--seconds", "1"],
         &["device", "info"],
         &["evaluate", "a.csv", "--lags", "--ablation"],

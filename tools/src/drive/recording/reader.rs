@@ -1,4 +1,4 @@
-//! This module reads a recording row by row, so that a long drive needs no more memory than a short one.
+//! The rows of a recording, one at a time.
 
 use super::{Row, WHEELS};
 use crate::drive::error::{DataError, DataFault, ValueError};
@@ -20,11 +20,14 @@ const WHEEL: [&str; WHEELS] = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "whe
 const TICKS_PER_SECOND: f64 = 1e4;
 const MICROS_PER_TICK: u64 = 100;
 
+/// Bytes that are read from a file at once.
+const BUFFER: usize = 1 << 16;
+
 /// Name and index of a column.
 type Column = (&'static str, usize);
 
 /// The columns of a recording.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 struct Columns {
     time: Column,
     force: [Column; 3],
@@ -63,7 +66,8 @@ impl Columns {
 pub struct Reader<R> {
     path: String,
     columns: Columns,
-    records: csv::StringRecordsIntoIter<R>,
+    csv: csv::Reader<R>,
+    record: StringRecord,
     fields: usize,
     last: Option<Micros>,
     rotation: Option<Rotation>,
@@ -75,7 +79,8 @@ impl<R: std::io::Read> Reader<R> {
     /// # Errors
     /// [`DataError`]: there is no header, or a required column is missing.
     pub fn new(path: &str, input: R) -> Result<Self, DataError> {
-        let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(input);
+        let mut csv =
+            csv::ReaderBuilder::new().trim(csv::Trim::Headers).buffer_capacity(BUFFER).from_reader(input);
         let header = csv.headers().map_err(|error| csv_error(path, error))?;
         if header.is_empty() {
             return Err(DataError::of(path, DataFault::Empty));
@@ -85,7 +90,8 @@ impl<R: std::io::Read> Reader<R> {
         Ok(Self {
             path: path.to_owned(),
             columns,
-            records: csv.into_records(),
+            csv,
+            record: StringRecord::new(),
             fields,
             last: None,
             rotation: None,
@@ -98,10 +104,11 @@ impl<R: std::io::Read> Reader<R> {
         Self { rotation: vehicle.mounting.rotation(), ..self }
     }
 
-    fn row(&mut self, record: &StringRecord) -> Result<Row, DataError> {
-        let line = record.position().map_or(0, csv::Position::line);
-        let Columns { time, force, rate, reference, course, wheels } = self.columns.clone();
-        let fields = Fields { path: &self.path, line, record };
+    /// The row of the record that was read last.
+    fn row(&mut self) -> Result<Row, DataError> {
+        let line = self.record.position().map_or(0, csv::Position::line);
+        let Columns { time, force, rate, reference, course, wheels } = self.columns;
+        let fields = Fields { path: &self.path, line, record: &self.record };
         let time = fields.time(time)?;
         if let Some(last) = self.last
             && time <= last
@@ -133,8 +140,9 @@ impl<R: std::io::Read> Iterator for Reader<R> {
     type Item = Result<Row, DataError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        Some(match self.records.next()? {
-            Ok(record) => self.row(&record),
+        Some(match self.csv.read_record(&mut self.record) {
+            Ok(true) => self.row(),
+            Ok(false) => return None,
             Err(error) => Err(match *error.kind() {
                 csv::ErrorKind::UnequalLengths { ref pos, len, .. } => {
                     let line = pos.as_ref().map_or(0, csv::Position::line);
@@ -155,13 +163,17 @@ struct Fields<'a> {
 }
 
 impl Fields<'_> {
-    fn error(&self, (column, at): Column, error: ValueError) -> DataError {
-        DataError::value(self.path, self.line, column, self.record.get(at).unwrap_or_default(), error)
+    fn error(&self, column: Column, error: ValueError) -> DataError {
+        DataError::value(self.path, self.line, column.0, self.text(column), error)
+    }
+
+    fn text(&self, (_, at): Column) -> &str {
+        self.record.get(at).unwrap_or_default().trim()
     }
 
     /// Returns the number, which may still be NaN or infinite; `None` for an empty field.
     fn number<T: FromStr>(&self, column: Column) -> Result<Option<T>, DataError> {
-        match self.record.get(column.1).unwrap_or_default() {
+        match self.text(column) {
             "" => Ok(None),
             text => text.parse().map(Some).map_err(|_| self.error(column, ValueError::NotANumber)),
         }
