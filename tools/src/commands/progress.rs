@@ -2,7 +2,6 @@
 
 use super::Common;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::time::Duration;
 
 fn target(common: Common) -> ProgressDrawTarget {
     if common.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() }
@@ -19,13 +18,5 @@ pub fn bar(common: Common, samples: usize, doing: &str) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(samples as u64), target(common))
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
     bar.set_message(doing.to_owned());
-    bar
-}
-
-/// Returns a spinner for work of unknown length; it is invisible with `--quiet` and without a terminal.
-pub fn waiting(common: Common, doing: &str) -> ProgressBar {
-    let bar = if common.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
-    bar.set_message(doing.to_owned());
-    bar.enable_steady_tick(Duration::from_millis(100));
     bar
 }
