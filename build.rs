@@ -12,7 +12,7 @@ const SMALL: [(&str, &str); 2] = [
 ];
 /// Linker script with the flash limits of the `coprocessor` image.
 const SLOTS: &str = "src/bin/stm32f405/slots.x";
-/// Start address of the code of `coprocessor` and `bringup` (`store::layout::CODE`).
+/// Start address of the code of `coprocessor` and `bringup` (`store::layout::FIRMWARE_A`).
 const CODE: &str = "0x08080000";
 
 fn main() {

@@ -17,8 +17,8 @@ mod error;
 #[doc(hidden)]
 pub mod layout;
 mod learned;
-mod place;
 pub(crate) mod record;
+mod slot;
 #[doc(hidden)]
 pub mod slots;
 mod troubles;
@@ -30,8 +30,8 @@ pub use calibration::{Calibration, Level, UnitMap};
 pub use configuration::{Configuration, FogLane, FogPart, ImuPart, Mounting};
 pub use error::{Field, FieldError, FlashFault, StoreError};
 pub use learned::Learned;
-pub use place::{Place, Slot};
 pub use record::{Record, Store};
+pub use slot::Slot;
 pub use slots::Accepted;
 pub use troubles::{MAX_TROUBLES, Snapshot, StoredTrouble, Troubles};
 pub use upload::Upload;

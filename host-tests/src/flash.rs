@@ -8,7 +8,7 @@
 use crate::noise::Noise;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use gyronet::service::MappedSlots;
-use gyronet::store::layout::{FOGNET, RECORD_SECTOR, SLOT_SIZE, SLOTS, sector};
+use gyronet::store::layout::{RECORD_SECTOR, SLOT_SIZE, SLOTS, sector};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::rc::Rc;
@@ -273,10 +273,6 @@ impl MappedRegion {
 impl MappedSlots for MappedRegion {
     fn slots(&self) -> [&[u8]; 2] {
         self.current()
-    }
-
-    fn fognet(&self) -> &[u8] {
-        self.bytes(FOGNET)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use gyronet::service::MappedSlots;
-use gyronet::store::layout::{FOGNET, SLOT_SIZE, SLOTS};
+use gyronet::store::layout::{SLOT_SIZE, SLOTS};
 
 /// Simulates a flash; its smallest sectors are `SECTOR` bytes long.
 #[derive(Debug, Clone)]
@@ -86,9 +86,5 @@ impl<const SECTOR: usize> NorFlash for RamFlash<SECTOR> {
 impl<const SECTOR: usize> MappedSlots for RamFlash<SECTOR> {
     fn slots(&self) -> [&[u8]; 2] {
         self.bytes()[SLOTS.start as usize..SLOTS.end as usize].split_at(SLOT_SIZE).into()
-    }
-
-    fn fognet(&self) -> &[u8] {
-        &self.bytes()[FOGNET.start as usize..FOGNET.end as usize]
     }
 }

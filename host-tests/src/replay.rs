@@ -7,9 +7,7 @@ use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::coprocessor::{self, Clock, Coprocessor, StorageFaults, TimedFrame};
 use gyronet::fog::FogCounters;
-use gyronet::fog::FogNetUse;
-use gyronet::model::fognet::{FogNetState, MinuteNetwork};
-use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
+use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::monitor::{START_US, TIMEOUT_US};
 use gyronet::sample::PERIOD_US;
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
@@ -88,7 +86,6 @@ pub struct Board {
     config: coprocessor::Config,
     coprocessor: Coprocessor,
     network: GyroNet<'static>,
-    fog_network: FogNet<'static, 'static>,
     mti: Mti,
     dsp1760: Dsp1760,
     /// Board time, which passes only while the sensor is silent, since bytes arrive at the host's pace.
@@ -123,25 +120,20 @@ impl Board {
     /// Returns a board with this configuration and these weights.
     ///
     /// # Panics
-    /// When the configuration, or FoGNet's own weights, are refused.
+    /// When the configuration is refused.
     #[must_use]
     pub fn configured(configuration: &Configuration, blob: Blob<'static>) -> Self {
-        let fog_blob = FogBlob::new_checked(&weights::FOGNET.0).expect("they come with the library");
         let wheels = WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings");
-        let has_fognet = configuration.check_training(fog_blob.training).is_ok();
-        let is_refused = configuration.fog_lane.fognet != FogNetUse::Off && !has_fognet;
         let config = coprocessor::Config {
             wheels: Some(wheels),
             clock: Clock::Sensor,
-            has_fognet,
-            storage: StorageFaults { damaged: is_refused, configuration_lost: false },
+            has_fognet: false,
             ..configuration.coprocessor(&Calibration::NONE, &Learned::NOTHING, 0)
         };
         Self {
             coprocessor: Coprocessor::new(config),
             config,
             network: GyroNet::new(blob),
-            fog_network: FogNet::new(fog_blob, Box::leak(Box::new(FogNetState::ZERO))),
             mti: Mti::new(),
             dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
             now: Micros(0),
@@ -265,10 +257,6 @@ impl Board {
 
     /// Runs the windows that are due.
     fn estimate(&mut self) {
-        if let Some((number, window)) = self.coprocessor.fog_window() {
-            let estimate = self.fog_network.estimate(&window);
-            self.coprocessor.deliver_fog(number, estimate).expect("the window that is due");
-        }
         if let Some(due) = self.coprocessor.window() {
             let estimate = self.network.estimate(&due.features);
             self.coprocessor.deliver(due.end, estimate).expect("the window that is due");

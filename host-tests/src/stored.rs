@@ -5,7 +5,7 @@ use crate::flash::{F405, Region};
 use gyronet::model::blob::CRC;
 use gyronet::model::weights;
 use gyronet::store::layout::{self, FLASH_BASE, RECORD_SECTOR, SLOT_SIZE};
-use gyronet::store::{Accepted, Place, Record, Slot, Store, StoreError, Upload};
+use gyronet::store::{Accepted, Record, Slot, Store, StoreError, Upload};
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -24,27 +24,21 @@ pub fn slots(flash: &F405) -> [&[u8]; 2] {
     bytes.split_at(SLOT_SIZE).into()
 }
 
-/// Returns the content of the place of FoGNet's file in a flash.
-#[must_use]
-pub fn fognet(flash: &F405) -> &[u8] {
-    &flash.bytes()[layout::FOGNET.start as usize..layout::FOGNET.end as usize]
-}
-
-/// Uploads a file to a place, checks it and accepts it, as the board does.
+/// Uploads a file to a slot, checks it and accepts it, as the board does.
 ///
 /// # Errors
 /// The error of the slot or the store.
-pub fn upload(flash: &Rc<RefCell<F405>>, place: Place, file: &[u8]) -> Result<(), String> {
+pub fn upload(flash: &Rc<RefCell<F405>>, slot: Slot, file: &[u8]) -> Result<(), String> {
     let text = |error: &dyn std::error::Error| error.to_string();
     let mut region = Region::<RECORD_SECTOR>::new(flash, 0..1 << 20);
-    let mut upload = Upload::begin(&mut region, place, file.len() as u32).map_err(|e| text(&e))?;
+    let mut upload = Upload::begin(&mut region, slot, file.len() as u32).map_err(|e| text(&e))?;
     for (block, offset) in file.chunks(256).zip((0..).step_by(256)) {
         upload.block(&mut region, offset, block).map_err(|e| text(&e))?;
     }
-    let crc = upload.verify(slots(&flash.borrow()), fognet(&flash.borrow())).map_err(|e| text(&e))?;
+    let crc = upload.verify(slots(&flash.borrow())).map_err(|e| text(&e))?;
     let mut store = open(flash).map_err(|e| text(&e))?;
     let accepted = store.get::<Accepted>().map_err(|e| text(&e))?.unwrap_or(Accepted::NONE);
-    store.set(&accepted.with(place, crc)).map_err(|e| text(&e))
+    store.set(&accepted.with(slot, crc)).map_err(|e| text(&e))
 }
 
 /// Returns the built-in weights with these bits of the output bias flipped (within its bits 8 to 15), and a valid
@@ -82,17 +76,7 @@ impl Stored {
     /// When it is refused.
     #[must_use]
     pub fn weights(self, slot: Slot, file: &[u8]) -> Self {
-        upload(&self.0, Place::Slot(slot), file).expect("it is accepted");
-        self
-    }
-
-    /// Stores an accepted weight file of FoGNet.
-    ///
-    /// # Panics
-    /// When it is refused.
-    #[must_use]
-    pub fn fognet(self, file: &[u8]) -> Self {
-        upload(&self.0, Place::FogNet, file).expect("it is accepted");
+        upload(&self.0, slot, file).expect("it is accepted");
         self
     }
 
@@ -106,7 +90,7 @@ impl Stored {
     /// Copies the content into a virtual board's flash.
     pub fn write_to(&self, board: &mut crate::board::Board) {
         let flash = self.0.borrow();
-        for range in [layout::STORE, layout::FOGNET, layout::SLOTS] {
+        for range in [layout::STORE, layout::SLOTS] {
             let bytes = &flash.bytes()[range.start as usize..range.end as usize];
             board.patch(crate::board::At::Address(FLASH_BASE + range.start), bytes);
         }

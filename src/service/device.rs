@@ -21,7 +21,7 @@ use crate::health::{Faults, Status};
 use crate::sample::{ImuSample, WheelSample};
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{
-    Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Learned, Place, Record, Store, Troubles,
+    Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Learned, Record, Slot, Store, Troubles,
 };
 use embedded_storage::nor_flash::NorFlash;
 use weights::Uploading;
@@ -71,9 +71,6 @@ pub struct Device<R: NorFlash, W> {
     weights: WeightSource,
     weights_crc: Option<u32>,
     refused_slots: [Option<SlotError>; 2],
-    /// Checksum of FoGNet's file, or the reason why FoGNet does not run; `None` if FoGNet is off.
-    fognet: Option<Result<u32, SlotError>>,
-    fognet_unavailable: bool,
     uploading: Option<Uploading>,
     standstill: StandstillGate,
     sensor: Option<SensorFault>,
@@ -117,8 +114,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             weights: WeightSource::None,
             weights_crc: None,
             refused_slots: [None; 2],
-            fognet: None,
-            fognet_unavailable: false,
             uploading: None,
             standstill: StandstillGate::new(),
             sensor: None,
@@ -253,7 +248,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             }
             Request::SetWheels(wheels) => self.set_wheels(wheels),
             Request::Calibrate(what) => self.calibrate(*what),
-            Request::WeightsBegin { network, length } => self.weights_begin(*network, *length),
+            Request::WeightsBegin { length } => self.weights_begin(*length),
             Request::WeightsBlock { offset, bytes } => self.weights_block(*offset, bytes),
             Request::WeightsVerify => self.weights_verify(),
             Request::WeightsActivate => self.weights_activate(),
@@ -303,11 +298,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.log.page(after)
     }
 
-    /// Returns the place and the checksum of the uploaded file, once the file has been checked.
+    /// Returns the slot and the checksum of the uploaded file, once the file has been checked.
     #[must_use]
-    pub fn uploaded(&self) -> Option<(Place, u32)> {
+    pub fn uploaded(&self) -> Option<(Slot, u32)> {
         let Uploading { upload, checked } = self.uploading?;
-        Some((upload.place(), checked?))
+        Some((upload.slot(), checked?))
     }
 
     /// Returns whether the output may be interrupted, because the vehicle is proven to stand.
@@ -340,7 +335,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             weights_crc: self.weights_crc,
             sensor: self.sensor,
             refused_slots: self.refused_slots,
-            fognet: self.fognet,
             status: self.status,
         }
     }

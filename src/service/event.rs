@@ -4,7 +4,7 @@ use super::calibrate::CalibrationFault;
 pub use super::crash::{Crash, CrashKind};
 pub use super::hardware::{CanFault, ClockFault};
 use crate::health::Status;
-use crate::store::{FlashFault, Place, Slot, StoreError, slots::SlotError};
+use crate::store::{FlashFault, Slot, StoreError, slots::SlotError};
 use heapless::{Deque, Vec};
 use serde::{Deserialize, Serialize};
 
@@ -75,8 +75,6 @@ pub enum EventKind {
     AcceptedRefused(StoreError),
     /// The file in a weight slot was refused.
     SlotRefused(Slot, SlotError),
-    /// FoGNet's weights were refused.
-    FogNetRefused(SlotError),
     /// No weights are valid: the network is off.
     NoWeights,
     /// The status of the yaw rate has changed.
@@ -89,8 +87,8 @@ pub enum EventKind {
     CalibrationStored,
     /// A calibration ended, or failed for this reason.
     Calibrated(Option<CalibrationFault>),
-    /// The weight file in this place was accepted.
-    WeightsAccepted(Place),
+    /// The weight file in this slot was accepted.
+    WeightsAccepted(Slot),
     /// The weights in use no longer match their checksum: the network is off.
     WeightsDamaged,
     /// Stored records are damaged: older or built-in ones are used.

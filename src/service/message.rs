@@ -31,8 +31,6 @@ pub enum Request<'a> {
     Calibrate(Calibrate),
     /// Begin the upload of a weight file.
     WeightsBegin {
-        /// Network that the file is for.
-        network: Network,
         /// Length of the file, bytes.
         length: u32,
     },
@@ -66,15 +64,6 @@ impl Request<'_> {
             Self::Calibrate(Calibrate::Start(_) | Calibrate::Cancel) | Self::WeightsVerify => false,
         }
     }
-}
-
-/// A network that has a weight file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Network {
-    /// GyroNet.
-    GyroNet,
-    /// FoGNet.
-    FogNet,
 }
 
 /// An action of [`Request::Calibrate`].
@@ -146,6 +135,9 @@ pub enum Refusal {
         "single settings (data 0201 to 021E) were retired: write the configuration, data 0100, as `gyronet device set` does"
     )]
     SingleSetting,
+    /// A file of FoGNet was offered, which this board does not run.
+    #[error("FoGNet no longer runs on this board: address 0 takes GyroNet's weights")]
+    FogNet,
     /// The vehicle is not proven to stand: writing the flash would interrupt the output.
     #[error("the vehicle is not proven to stand still")]
     Moving,
@@ -257,8 +249,6 @@ pub struct Info {
     pub sensor: Option<SensorFault>,
     /// Reasons why slots A and B were refused, if they were tried.
     pub refused_slots: [Option<SlotError>; 2],
-    /// Checksum of FoGNet's weights, or the reason why they are not used; `None` if FoGNet is off.
-    pub fognet: Option<Result<u32, SlotError>>,
     /// Status of the corrected yaw rate.
     pub status: Status,
 }

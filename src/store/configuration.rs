@@ -11,8 +11,7 @@ use crate::can::latitude::{LatitudeConfigError, LatitudeReceiver, LatitudeSettin
 use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
 use crate::coprocessor;
-use crate::fog::{FogConfig, FogErrors, FogNetUse, GyroMismatch, Tilt, check_training};
-use crate::model::fognet_blob::{Gyro, Training};
+use crate::fog::{FogConfig, FogErrors, Tilt};
 use crate::mounting::{GyroMap, Levelling, Rotation};
 use crate::pipeline::PipelineConfig;
 use crate::units::AngularRate;
@@ -69,8 +68,6 @@ impl Mounting {
 pub struct FogLane {
     /// Angle between the axis of the gyro and the vertical of the level vehicle, 0 to 45 deg.
     pub tilt_deg: f32,
-    /// Use of FoGNet.
-    pub fognet: FogNetUse,
     /// Frame that carries the vehicle's latitude, if any.
     pub latitude_frame: Option<LatitudeSettings>,
 }
@@ -102,9 +99,6 @@ pub struct Configuration {
     pub slcan_inputs: bool,
     /// Identifiers of diagnosis.
     pub diagnosis: DiagnosisIds,
-    /// Serial number of the fibre-optic gyro, 0 if unknown. FoGNet's weights that were trained for one unit run only
-    /// on that unit.
-    pub fog_serial: u32,
     /// Whether the board learns the sensor's bias over temperature and the forward direction, and uses them.
     pub learn: bool,
 }
@@ -120,10 +114,9 @@ impl Configuration {
         static_init: StaticConfig::DEFAULT,
         compensate: CompensateConfig::DEFAULT,
         fog_ids: FOG_IDS,
-        fog_lane: FogLane { tilt_deg: 0.0, fognet: FogNetUse::Off, latitude_frame: None },
+        fog_lane: FogLane { tilt_deg: 0.0, latitude_frame: None },
         slcan_inputs: false,
         diagnosis: DiagnosisIds::DEFAULT,
-        fog_serial: 0,
         learn: true,
     };
 }
@@ -173,21 +166,8 @@ impl Configuration {
             latitude: self.latitude(),
             // A stored configuration has been checked.
             tilt: Tilt::from_degrees(self.fog_lane.tilt_deg).unwrap_or(Tilt::NONE),
-            fognet: self.fog_lane.fognet,
             ..FogConfig::DEFAULT
         }
-    }
-
-    /// Checks that FoGNet's weights are for the gyro that is fitted.
-    ///
-    /// # Errors
-    /// [`GyroMismatch`].
-    pub fn check_training(&self, trained: Training) -> Result<(), GyroMismatch> {
-        let part = match self.fog {
-            Some(FogPart::Dsp3000) => Gyro::Dsp3000,
-            Some(FogPart::Dsp1760) | None => Gyro::Dsp1760,
-        };
-        check_training(trained, part, self.fog_serial, self.fog_lane.fognet)
     }
 
     /// Creates the receiver of the vehicle's latitude; `None` if no frame is configured.
@@ -223,23 +203,7 @@ impl Configuration {
 
 impl Record for Configuration {
     const KEY: u8 = 1;
-    const VERSION: u8 = 6;
-
-    /// Returns the bytes that older layouts lack at their end. Layout 1 ended before `fog_ids`, whose value was
-    /// [`FOG_IDS`] (here as varints), 2 before `fog_lane`, 3 before `slcan_inputs`, 4 before `fog_serial`, 5 before
-    /// `learn`.
-    fn missing(version: u8) -> Option<&'static [u8]> {
-        const ALL: &[u8] =
-            &[0xA4, 3, 0xA5, 3, 0xA6, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0xE0, 0x0F, 0xDF, 0x0F, 0xE8, 0x0F, 0, 1];
-        match version {
-            1 => Some(ALL),
-            2 => ALL.get(6..),
-            3 => ALL.get(12..),
-            4 => ALL.get(20..),
-            5 => ALL.get(21..),
-            _ => None,
-        }
-    }
+    const VERSION: u8 = 7;
 
     fn check(&self) -> Result<(), FieldError> {
         let config = Config::new(self.can).map_err(FieldError::Can)?;

@@ -1,16 +1,17 @@
-//! This module defines the flash layout of an STM32F405xG (RM0090 table 5): 1 MiB, twelve sectors.
+//! Flash layout of an STM32F405xG (RM0090 table 5): 1 MiB, twelve sectors.
 //!
 //! | sectors | size | content |
 //! |---|---|---|
 //! | 0 | 16 KiB | vector table |
-//! | 1, 2 | 2 x 16 KiB | records ([`STORE`]) |
-//! | 3 to 7 | 16 + 64 + 3 x 128 KiB | FoGNet's weight file ([`FOGNET`]) |
-//! | 8, 9 | 2 x 128 KiB | code and constants, GyroNet's built-in weights among them |
+//! | 1, 2 | 2 x 16 KiB | records ([`STORE`]): configuration, keys, calibration, what was learnt, troubles |
+//! | 3 to 5 | 16 + 64 + 128 KiB | not used |
+//! | 6, 7 | 2 x 128 KiB | reserved for a second firmware image ([`FIRMWARE_B`]) |
+//! | 8, 9 | 2 x 128 KiB | firmware: code and constants, GyroNet's built-in weights among them ([`FIRMWARE_A`]) |
 //! | 10, 11 | 2 x 128 KiB | GyroNet's weight slots ([`SLOTS`]) |
 //!
-//! Records need small sectors of equal size, and the processor needs its vectors in sector 0. FoGNet's file has 393
-//! KiB, so there is room for only one: while a new file is uploaded, the gyro is corrected without a network. The
-//! image's `regions.x` and `slots.x` give the linker the same layout, and a test compares them.
+//! Records need small sectors of equal size, and the processor needs its vectors in sector 0. Both firmware slots have
+//! whole sectors of one size, so that an image fits into either. The image's `regions.x` and `slots.x` give the linker
+//! the same layout, and a test compares them.
 
 use core::ops::Range;
 
@@ -31,16 +32,16 @@ pub const SECTORS: [u32; 12] = {
 pub const RECORD_SECTOR: usize = 16 << 10;
 /// Flash offsets of the records.
 pub const STORE: Range<u32> = 0x4000..0xC000;
-/// Flash offsets of FoGNet's weight file.
-pub const FOGNET: Range<u32> = 0xC000..0x8_0000;
-/// Flash offset of the code.
-pub const CODE: u32 = 0x8_0000;
-/// Flash offset of the end of the code.
-pub const CODE_END: u32 = 0xC_0000;
+/// Largest size of a firmware image without its vector table, bytes.
+pub const FIRMWARE_SIZE: u32 = 256 << 10;
+/// Flash offsets that are reserved for a second firmware image. Nothing writes there yet.
+pub const FIRMWARE_B: Range<u32> = 0x4_0000..0x4_0000 + FIRMWARE_SIZE;
+/// Flash offsets of the firmware.
+pub const FIRMWARE_A: Range<u32> = FIRMWARE_B.end..FIRMWARE_B.end + FIRMWARE_SIZE;
 /// Size of a weight slot, one sector, bytes.
 pub const SLOT_SIZE: usize = 128 << 10;
 /// Flash offsets of both weight slots.
-pub const SLOTS: Range<u32> = 0xC_0000..0x10_0000;
+pub const SLOTS: Range<u32> = FIRMWARE_A.end..0x10_0000;
 
 /// Returns the number of the sector that begins at `offset`; `None` if none does.
 #[must_use]

@@ -46,12 +46,6 @@ pub trait Record: Serialize + DeserializeOwned {
     /// Version of the layout; every change increments it.
     const VERSION: u8;
 
-    /// Returns the bytes that a record of an older layout lacks at its end; `None` if this firmware does not read
-    /// that layout.
-    fn missing(_version: u8) -> Option<&'static [u8]> {
-        None
-    }
-
     /// Checks that all values are inside their ranges.
     ///
     /// # Errors
@@ -115,11 +109,10 @@ impl Raw {
         if found == LOST {
             return Err(StoreError::Lost);
         }
-        let missing = if found == R::VERSION { Some(&[][..]) } else { R::missing(found) };
-        let missing = missing.ok_or(StoreError::Version { found, expected: R::VERSION })?;
-        let mut content = self.words;
-        let content = content.get_mut(WORD..WORD + self.len + missing.len()).ok_or(StoreError::Encoding)?;
-        content.get_mut(self.len..).ok_or(StoreError::Encoding)?.copy_from_slice(missing);
+        if found != R::VERSION {
+            return Err(StoreError::Version { found, expected: R::VERSION });
+        }
+        let content = self.words.get(WORD..WORD + self.len).ok_or(StoreError::Encoding)?;
         let (record, rest) = postcard::take_from_bytes::<R>(content).map_err(|_| StoreError::Encoding)?;
         if !rest.is_empty() {
             return Err(StoreError::Encoding);

@@ -1,17 +1,14 @@
-//! This module selects weight files: two slots hold GyroNet's, a third place holds FoGNet's, and a record lists the
-//! accepted files.
+//! Selection of GyroNet's weight file: two slots hold one each, and a record lists the accepted files.
 //!
-//! A file is uploaded, checked in flash, and then accepted: the record stores its place and checksum. GyroNet's file
-//! is written to the unused slot. At the next start, [`select`] tries in this order and uses the first file that
-//! passes all checks: the active slot, the other slot if its file was accepted, the built-in weights. An interrupted
-//! upload thus never harms the file in use. FoGNet has only one place ([`super::layout`]): an interrupted upload
-//! leaves no accepted file there, and the gyro is corrected without a network.
+//! A file is uploaded to the unused slot, checked in flash, and then accepted: the record stores its slot and
+//! checksum. At the next start, [`select`] tries in this order and uses the first file that passes all checks: the
+//! active slot, the other slot if its file was accepted, the built-in weights. An interrupted upload thus never harms
+//! the file in use.
 
 use super::error::{FieldError, FlashFault};
-use super::place::{Place, Slot};
 use super::record::Record;
-use crate::fog::GyroMismatch;
-use crate::model::{Blob, BlobError, FogBlob};
+use super::slot::Slot;
+use crate::model::{Blob, BlobError};
 use serde::{Deserialize, Serialize};
 
 /// The record of the accepted files, and of the slot to use.
@@ -21,50 +18,39 @@ pub struct Accepted {
     pub active: Option<Slot>,
     /// Checksum of the accepted file in each slot.
     pub files: [Option<u32>; 2],
-    /// Checksum of FoGNet's accepted file.
-    pub fognet: Option<u32>,
 }
 
 impl Accepted {
     /// Record without accepted files.
-    pub const NONE: Self = Self { active: None, files: [None; 2], fognet: None };
+    pub const NONE: Self = Self { active: None, files: [None; 2] };
 
-    /// Returns the record without the file in a place, which is being replaced.
+    /// Returns the record without the file in a slot, which is being replaced.
     #[must_use]
-    pub const fn without(mut self, place: Place) -> Self {
+    pub const fn without(mut self, slot: Slot) -> Self {
         let [a, b] = self.files;
-        match place {
-            Place::Slot(Slot::A) => self.files = [None, b],
-            Place::Slot(Slot::B) => self.files = [a, None],
-            Place::FogNet => self.fognet = None,
-        }
+        self.files = match slot {
+            Slot::A => [None, b],
+            Slot::B => [a, None],
+        };
         self
     }
 
-    /// Returns the record with the checksum `file` for a place; a slot also becomes the one to use.
+    /// Returns the record with the checksum `file` for a slot, which becomes the one to use.
     #[must_use]
-    pub const fn with(mut self, place: Place, file: u32) -> Self {
+    pub const fn with(mut self, slot: Slot, file: u32) -> Self {
         let [a, b] = self.files;
-        match place {
-            Place::Slot(Slot::A) => self.files = [Some(file), b],
-            Place::Slot(Slot::B) => self.files = [a, Some(file)],
-            Place::FogNet => self.fognet = Some(file),
-        }
-        if let Place::Slot(slot) = place {
-            self.active = Some(slot);
-        }
+        self.files = match slot {
+            Slot::A => [Some(file), b],
+            Slot::B => [a, Some(file)],
+        };
+        self.active = Some(slot);
         self
     }
 }
 
 impl Record for Accepted {
     const KEY: u8 = 3;
-    const VERSION: u8 = 2;
-
-    /// Returns the byte that layout 1 lacks at its end: `fognet`, which is `None`.
-    fn missing(version: u8) -> Option<&'static [u8]> {
-        (version == 1).then_some(&[0])
-    }
+    const VERSION: u8 = 3;
 
     fn check(&self) -> Result<(), FieldError> {
         Ok(())
@@ -82,10 +68,10 @@ pub enum SlotError {
     /// The flash reports an error.
     #[error("flash: {0}")]
     Flash(FlashFault),
-    /// The place is erased and holds no file.
+    /// The slot is erased and holds no file.
     #[error("the slot is empty")]
     Empty,
-    /// The length exceeds the place, or is not a whole number of words.
+    /// The length exceeds the slot, or is not a whole number of words.
     #[error("{0} bytes are too many, or not a whole number of words")]
     Length(u32),
     /// The block does not continue the upload.
@@ -109,9 +95,6 @@ pub enum SlotError {
     /// The content of the file is invalid.
     #[error(transparent)]
     Blob(BlobError),
-    /// FoGNet's file is not for the gyro that is fitted.
-    #[error(transparent)]
-    Gyro(GyroMismatch),
 }
 
 impl From<BlobError> for SlotError {
@@ -120,7 +103,7 @@ impl From<BlobError> for SlotError {
     }
 }
 
-/// Returns the bytes of the file in a place, using the length in its header.
+/// Returns the bytes of the file in a slot, using the length in its header.
 ///
 /// # Errors
 /// [`SlotError::Empty`], [`SlotError::Length`].
@@ -140,15 +123,6 @@ pub fn bytes(slot: &[u8]) -> Result<&[u8], SlotError> {
 /// [`SlotError::Empty`], [`SlotError::Length`], [`SlotError::Blob`].
 pub fn file(slot: &[u8]) -> Result<Blob<'_>, SlotError> {
     Ok(Blob::new_checked(bytes(slot)?)?)
-}
-
-/// Checks FoGNet's file in its place, and that it was accepted.
-///
-/// # Errors
-/// Those of [`file()`], and [`SlotError::NotAccepted`].
-pub fn fognet<'w>(accepted: &Accepted, place: &'w [u8]) -> Result<FogBlob<'w>, SlotError> {
-    let blob = FogBlob::new_checked(bytes(place)?)?;
-    if accepted.fognet == Some(blob.crc) { Ok(blob) } else { Err(SlotError::NotAccepted(blob.crc)) }
 }
 
 /// The origin of the weights in use.

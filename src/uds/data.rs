@@ -58,7 +58,7 @@ const fn write_only(id: u16, name: &'static str, bytes: &'static str, content: &
 }
 
 /// All data identifiers.
-pub const IDENTIFIERS: [Identifier; 25] = [
+pub const IDENTIFIERS: [Identifier; 24] = [
     read_only(0xF186, "session", "1", "session: 1 default, 2 programming, 3 extended"),
     read_only(0xF189, "firmware_version", "1, 1, 1", "version of the firmware"),
     read_only(0xF18C, "serial_number", "text", "serial number of the chip, 24 hexadecimal digits"),
@@ -110,12 +110,6 @@ pub const IDENTIFIERS: [Identifier; 25] = [
         "access_refusals",
         "4 each",
         "requests refused for lack of access: locked, unsigned, wrong answers, wrong signatures, replayed",
-    ),
-    read_only(
-        0x0114,
-        "fognet",
-        "1, 4",
-        "FoGNet: 0 off, 1 its weights are used, 2 they are refused (reason: 010A); CRC-32 of the weights",
     ),
     read_only(0x0115, "learned", "postcard", "what the board has learnt about the sensor"),
     read_only(
@@ -226,15 +220,6 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
                 locked, unsigned, answers, signatures, replayed
             }),
         ),
-        0x0114 => {
-            let (state, crc) = match device.info().fognet {
-                None => (0, 0),
-                Some(Ok(crc)) => (1, crc),
-                Some(Err(_)) => (2, 0),
-            };
-            put(out, &[state])?;
-            put(out, &crc.to_be_bytes())
-        }
         0x0115 => put_record(out, device.learned()),
         0x0116 => {
             let known = device.forward_deg();

@@ -1,21 +1,21 @@
-//! A download transfers a weight file (services 0x34, 0x36, 0x37). Address 0 is GyroNet's file, which is written to
-//! the unused slot; address 1 is FoGNet's file.
+//! Download of GyroNet's weight file (services 0x34, 0x36, 0x37) to address 0, which is the unused slot.
 //!
 //! The file is used from the next start on, and only after routine FF01. If a download is interrupted before that,
-//! GyroNet keeps its old file. FoGNet's file has only one place, so FoGNet stays off.
+//! GyroNet keeps its old file.
 
 use super::response::{Nrc, Response, nrc, put};
 use super::signature::{Digest, Hasher};
-use crate::service::message::{BLOCK, Network, Request};
+use crate::service::message::{BLOCK, Refusal, Request};
 use crate::service::{Device, MappedSlots};
-use crate::store::layout::{FOGNET, sector};
-use crate::store::{Place, Slot};
+use crate::store::Slot;
 use embedded_storage::nor_flash::NorFlash;
+
+/// Address that took FoGNet's file, which this board no longer runs.
+const FOGNET: u32 = 1;
 
 /// A download in progress.
 #[derive(Debug)]
 pub(super) struct Download {
-    network: Network,
     length: u32,
     offset: u32,
     /// Number of the next block; it starts at 1 and wraps from 255 to 0.
@@ -45,16 +45,16 @@ impl Download {
         }
         let (address, length) = rest.split_at(address_bytes);
         let number = |bytes: &[u8]| bytes.iter().fold(0u32, |sum, byte| sum << 8 | u32::from(*byte));
-        let network = match number(address) {
-            0 => Network::GyroNet,
-            1 => Network::FogNet,
+        match number(address) {
+            0 => {}
+            FOGNET => return Err(nrc(device.refuse_request(Refusal::FogNet))),
             _ => return Err(Nrc::RequestOutOfRange),
-        };
+        }
         let length = number(length);
-        device.act(&Request::WeightsBegin { network, length }).map_err(nrc)?;
+        device.act(&Request::WeightsBegin { length }).map_err(nrc)?;
         let [high, low] = (BLOCK as u16 + 2).to_be_bytes();
         put(out, &[0x20, high, low])?;
-        Ok(Self { network, length, offset: 0, next: 1, hasher: Hasher::new(), digest: None })
+        Ok(Self { length, offset: 0, next: 1, hasher: Hasher::new(), digest: None })
     }
 
     /// Writes a block. A repeated block is answered again, because its response may have been lost.
@@ -87,14 +87,7 @@ impl Download {
         Ok(())
     }
 
-    /// Returns whether the next block begins a sector, which must be erased first. A slot is a single sector, which
-    /// 0x34 has already erased.
-    pub fn erases_next(&self) -> bool {
-        self.network == Network::FogNet && self.offset > 0 && sector(FOGNET.start + self.offset).is_some()
-    }
-
-    /// Checks the whole file in flash. The response holds its place (0 slot A, 1 slot B, 2 FoGNet's) and its
-    /// checksum.
+    /// Checks the whole file in flash. The response holds its slot (0 A, 1 B) and its checksum.
     pub fn finish<R: NorFlash, W: MappedSlots>(
         &mut self,
         device: &mut Device<R, W>,
@@ -104,13 +97,12 @@ impl Download {
             return Err(Nrc::RequestSequenceError);
         }
         device.act(&Request::WeightsVerify).map_err(nrc)?;
-        let (place, crc) = device.uploaded().ok_or(Nrc::GeneralProgrammingFailure)?;
+        let (slot, crc) = device.uploaded().ok_or(Nrc::GeneralProgrammingFailure)?;
         put(
             out,
-            &[match place {
-                Place::Slot(Slot::A) => 0,
-                Place::Slot(Slot::B) => 1,
-                Place::FogNet => 2,
+            &[match slot {
+                Slot::A => 0,
+                Slot::B => 1,
             }],
         )?;
         put(out, &crc.to_be_bytes())?;

@@ -46,7 +46,7 @@ pub(super) fn put_record(out: &mut Response, record: &impl Serialize) -> Result<
 pub(super) fn nrc(refusal: Refusal) -> Nrc {
     match refusal {
         Refusal::Moving | Refusal::NothingFound => Nrc::ConditionsNotCorrect,
-        Refusal::Version { .. } | Refusal::OtherWeights { .. } | Refusal::SingleSetting => {
+        Refusal::Version { .. } | Refusal::OtherWeights { .. } | Refusal::SingleSetting | Refusal::FogNet => {
             Nrc::RequestOutOfRange
         }
         Refusal::Store(
@@ -64,8 +64,8 @@ pub(super) fn nrc(refusal: Refusal) -> Nrc {
             Nrc::RequestSequenceError
         }
         Refusal::Slot(SlotError::Length(_)) => Nrc::UploadDownloadNotAccepted,
-        Refusal::Slot(
-            SlotError::Empty | SlotError::NotAccepted(_) | SlotError::Blob(_) | SlotError::Gyro(_),
-        ) => Nrc::GeneralProgrammingFailure,
+        Refusal::Slot(SlotError::Empty | SlotError::NotAccepted(_) | SlotError::Blob(_)) => {
+            Nrc::GeneralProgrammingFailure
+        }
     }
 }

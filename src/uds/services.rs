@@ -120,7 +120,6 @@ impl Services {
                     | [0x31, 1, 0x02, 0x02 | 0x05]
                     | [0x31, 1, 0xFF, 0x01, ..]
             )
-            || matches!(request, [0x36, ..]) && self.download.as_ref().is_some_and(Download::erases_next)
     }
 
     /// Writes the response to a request; leaves `out` empty if no response is wanted.

@@ -31,6 +31,12 @@ fn values_are_set_by_name() {
     };
     assert_eq!(refused("imu"), "imu: not NAME=VALUE");
     assert!(refused("latitude=1").contains("no such setting"));
+    for retired in ["fog_lane.fognet=Simulated", "fog_serial=1"] {
+        assert!(refused(retired).contains("retired, because FoGNet"), "{}", refused(retired));
+    }
+    let mut old = value.clone();
+    old["fog_lane"]["fognet"] = "Simulated".into();
+    assert!(from_value(old).unwrap_err().to_string().starts_with("fog_lane.fognet: retired"));
     // The board's own code for 3 deg/s.
     assert_eq!(refused("compensate.max_mean=7027624"), "compensate.max_mean: 7027624 is not a rate in rad/s");
     assert!(refused("imu=None").starts_with("no configuration: unknown variant"));

@@ -3,7 +3,7 @@
 use crate::common::{self, START};
 use crate::service::{self, on_bus};
 use embedded_can::{Frame, Id, StandardId};
-use gyronet::service::message::{Network, Refusal};
+use gyronet::service::message::Refusal;
 use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::stored::other_weights;
@@ -33,14 +33,14 @@ fn signed_weights_run_after_a_restart_and_unsigned_ones_do_not() {
     let Some((mut board, key)) = locked(TEST) else { return };
     let file = other_weights(1);
     let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
-    match upload(&mut on_bus(&mut board), Network::GyroNet, &file, |_| {}) {
+    match upload(&mut on_bus(&mut board), &file, |_| {}) {
         Err(DeviceError::Refused(Refusal::Unsigned)) => {}
         other => panic!("{other:?}"),
     }
     let begin = board.counts().time;
     let mut device = on_bus(&mut board);
     device.authorise(again(&key));
-    upload(&mut device, Network::GyroNet, &file, |_| {}).expect("it is signed");
+    upload(&mut device, &file, |_| {}).expect("it is signed");
     device.restart().expect("access is proven");
     board.run(START);
     let took = board.counts().time - begin;

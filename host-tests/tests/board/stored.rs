@@ -4,15 +4,14 @@
 use crate::common::{self, IMU, START};
 use crate::service::{self, ask, on_bus, storing};
 use gyronet::can::{DataFrame, slcan};
-use gyronet::fog::FogNetUse;
 use gyronet::model::{Blob, weights};
-use gyronet::service::message::{FlashState, Network, Origin, Refusal};
+use gyronet::service::message::{FlashState, Origin, Refusal};
 use gyronet::store::layout::{FLASH_BASE, STORE};
-use gyronet::store::slots::{SlotError, WeightSource};
-use gyronet::store::{Configuration, Field, FieldError, FogLane, Place, Slot, StoreError};
+use gyronet::store::slots::WeightSource;
+use gyronet::store::{Configuration, Field, FieldError, Slot, StoreError};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::replay;
-use gyronet_host_tests::stored::{Stored, other_weights};
+use gyronet_host_tests::stored::other_weights;
 use gyronet_tools::client::device::error::DeviceError;
 use gyronet_tools::client::device::upload::{Uploaded, upload};
 use std::time::Duration;
@@ -198,8 +197,8 @@ fn uploaded_weights_run_from_their_slot() {
     board.run(START);
     let file = other_weights(1);
     let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
-    let (done, took) = timed(&mut board, |board| upload(&mut on_bus(board), Network::GyroNet, &file, |_| {}));
-    assert_eq!(done.expect("it is taken"), Uploaded { place: Place::Slot(Slot::A), crc });
+    let (done, took) = timed(&mut board, |board| upload(&mut on_bus(board), &file, |_| {}));
+    assert_eq!(done.expect("it is taken"), Uploaded { slot: Slot::A, crc });
     println!("{TEST}: {} bytes in {took:?}", file.len());
     assert_eq!(service::info(&mut board).weights, WeightSource::BuiltIn);
     restart(&mut board);
@@ -228,35 +227,4 @@ fn uploaded_weights_run_from_their_slot() {
     assert!(sent.len() >= common::SET * (SAMPLES - 1), "{} frames", sent.len());
     assert!(sent == new[..sent.len()], "the frames are those of the new weights");
     assert!(sent != old[..sent.len()], "the old weights give others");
-}
-
-/// FoGNet's file takes five sectors, each erased when the file reaches it, while FoGNet on the old file stops.
-#[test]
-fn fognets_file_is_replaced_and_runs() {
-    const TEST: &str = "fognets_file_is_replaced_and_runs";
-    let Some(mut board) = common::boot(TEST) else { return };
-    let fog_lane = FogLane { fognet: FogNetUse::Simulated, ..FogLane::default() };
-    let configuration = Configuration { fog_lane, fog_serial: 1, ..Configuration::DEFAULT };
-    let file = &weights::FOGNET.0;
-    let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
-    Stored::default().record(&configuration).write_to(&mut board);
-    board.run(START);
-    assert_eq!(service::info(&mut board).fognet, Some(Err(SlotError::Empty)));
-    let (done, took) = timed(&mut board, |board| upload(&mut on_bus(board), Network::FogNet, file, |_| {}));
-    assert_eq!(done.expect("it is taken"), Uploaded { place: Place::FogNet, crc });
-    println!("{TEST}: {} bytes in {took:?}", file.len());
-    assert!(took < Duration::from_secs(60), "{took:?}");
-    restart(&mut board);
-    let info = service::info(&mut board);
-    assert_eq!((info.fognet, info.flash), (Some(Ok(crc)), FlashState::Ready));
-    assert_eq!(info.weights, WeightSource::BuiltIn);
-    let (erased, _) = erased_and_reset(&mut board);
-    assert_eq!(erased[..5], [3, 4, 5, 6, 7]);
-    // The next upload stops it, and that is reported, before anything new is accepted.
-    let (done, _) =
-        timed(&mut board, |board| upload(&mut on_bus(board), Network::FogNet, &file[..256], |_| {}));
-    assert!(done.is_err(), "no whole file");
-    assert_eq!(service::info(&mut board).fognet, Some(Err(SlotError::Empty)));
-    restart(&mut board);
-    assert!(matches!(service::info(&mut board).fognet, Some(Err(_))));
 }

@@ -16,7 +16,7 @@ use gyronet::sample::{ImuSample, PERIOD_US, Validity};
 use gyronet::service::crash::FILE;
 use gyronet::service::event::{Crash, CrashKind, ResetCause};
 use gyronet::service::message::{Identity, Info, Refusal};
-use gyronet::service::{Device, MappedSlots, Request, SupportedHardware};
+use gyronet::service::{Device, Request, SupportedHardware};
 use gyronet::store::layout::{self, RECORD_SECTOR};
 use gyronet::store::{Configuration, FogPart, ImuPart, Record};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
@@ -53,7 +53,6 @@ fn start(flash: &Rc<RefCell<F405>>) -> Board {
     let slots = MappedRegion::new(flash);
     let blob = board.weights(Some(slots.current()), &DEFAULT.0);
     assert!(blob.is_some());
-    let _ = board.fognet(slots.fognet());
     board
 }
 

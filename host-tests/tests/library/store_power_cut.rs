@@ -4,7 +4,7 @@
 use gyronet::model::weights;
 use gyronet::store::layout::{self, SLOT_SIZE};
 use gyronet::store::slots::{Selection, WeightSource, select};
-use gyronet::store::{Accepted, Configuration, Learned, Place, Record, Slot};
+use gyronet::store::{Accepted, Configuration, Learned, Record, Slot};
 use gyronet::units::SpecificForce;
 use gyronet_host_tests::flash::{Cut, F405};
 use gyronet_host_tests::stored::{open, other_weights, slots, upload};
@@ -26,7 +26,7 @@ fn starts<R: Record>(make: fn(usize) -> R) -> Vec<(F405, usize, u64)> {
     let flash = Rc::new(RefCell::new(F405::default()));
     // The other records must survive too.
     let mut store = open(&flash).expect("an empty flash");
-    store.set(&Accepted::NONE.with(Place::Slot(Slot::B), 7)).expect("it is stored");
+    store.set(&Accepted::NONE.with(Slot::B, 7)).expect("it is stored");
     store.set(&learned(1)).expect("it is stored");
     store.set(&configuration(1)).expect("it is stored");
     store.set(&make(1)).expect("it is stored");
@@ -61,7 +61,7 @@ fn whole<R: Record + PartialEq + std::fmt::Debug>(
     let found = store.get::<R>().unwrap_or_else(|error| panic!("{at}: {error}"));
     assert!(found == Some(make(k - 1)) || found == Some(make(k)), "{at}: {found:?}");
     let accepted = store.get::<Accepted>().unwrap_or_else(|error| panic!("{at}: {error}"));
-    assert_eq!(accepted, Some(Accepted::NONE.with(Place::Slot(Slot::B), 7)), "{at}");
+    assert_eq!(accepted, Some(Accepted::NONE.with(Slot::B, 7)), "{at}");
     if R::KEY == Configuration::KEY {
         assert_eq!(store.get::<Learned>(), Ok(Some(learned(1))), "{at}");
     } else {
@@ -129,10 +129,10 @@ fn a_cut_during_the_upload_of_weights_leaves_the_accepted_ones() {
     let crc = |file: &[u8]| u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
     let flash = Rc::new(RefCell::new(F405::default()));
     assert_eq!(running(&flash), (WeightSource::BuiltIn, crc(&old)));
-    upload(&flash, Place::Slot(Slot::A), &old).expect("it is accepted");
+    upload(&flash, Slot::A, &old).expect("it is accepted");
     assert_eq!(running(&flash), (WeightSource::Slot(Slot::A), crc(&old)));
     let start = flash.borrow().clone();
-    upload(&flash, Place::Slot(Slot::B), &new).expect("it is accepted");
+    upload(&flash, Slot::B, &new).expect("it is accepted");
     assert_eq!(running(&flash), (WeightSource::Slot(Slot::B), crc(&new)));
     let operations = flash.borrow().operations() - start.operations();
     let mut cuts = 0;
@@ -144,7 +144,7 @@ fn a_cut_during_the_upload_of_weights_leaves_the_accepted_ones() {
         for cut in Cut::ALL.into_iter().filter(|cut| edge(after) || *cut == turn) {
             let flash = Rc::new(RefCell::new(start.clone()));
             flash.borrow_mut().cut_after(after, cut);
-            assert!(upload(&flash, Place::Slot(Slot::B), &new).is_err());
+            assert!(upload(&flash, Slot::B, &new).is_err());
             assert!(flash.borrow_mut().restore());
             cuts += 1;
             let found = running(&flash);

@@ -2,7 +2,6 @@
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
 use crate::diagnosis::Diagnosis;
-use crate::fog_network::{FogNetwork, FogParts};
 use crate::imu::BringUp;
 use crate::regions::{Records, Weights};
 use crate::ring::Ring;
@@ -38,23 +37,19 @@ pub static OBSERVATIONS: Ring<Observation, 8> =
 /// Faults that the idle task has found, for the coprocessor.
 pub struct Found {
     weights_damaged: bool,
-    fognet_unavailable: bool,
     mount_moved: bool,
 }
 
 impl Found {
     /// Returns whether there is anything to report.
     pub fn any(&self) -> bool {
-        self.weights_damaged || self.fognet_unavailable || self.mount_moved
+        self.weights_damaged || self.mount_moved
     }
 
     /// Reports the faults.
     pub fn report(&self, coprocessor: &mut Coprocessor) {
         if self.weights_damaged {
             coprocessor.weights_damaged();
-        }
-        if self.fognet_unavailable {
-            coprocessor.fognet_unavailable();
         }
         if self.mount_moved {
             coprocessor.mount_moved();
@@ -65,9 +60,9 @@ impl Found {
 /// Holds the state of the idle task.
 pub struct Idle {
     device: &'static mut Device<Records, Weights>,
-    checks: Checks,
+    /// Background check of the weights in use.
+    weights: Option<BackgroundCheck<'static>>,
     diagnosis: Diagnosis,
-    fog_network: FogNetwork,
     bring_up: Option<BringUp>,
     /// The reason why the internal oscillator runs, and the time of the last check whether that reason is over, ms.
     clock_fault: Option<ClockFault>,
@@ -75,26 +70,18 @@ pub struct Idle {
     milliseconds: u32,
 }
 
-/// Background checks of the weights in use.
-pub struct Checks {
-    pub weights: Option<BackgroundCheck<'static>>,
-    pub fognet: Option<BackgroundCheck<'static>>,
-}
-
-/// The device with its stored data, and the checks of the weights.
-pub type Stored = (&'static mut Device<Records, Weights>, Checks);
+/// The device with its stored data, and the check of the weights.
+pub type Stored = (&'static mut Device<Records, Weights>, Option<BackgroundCheck<'static>>);
 
 impl Idle {
     #[inline(never)]
     pub fn new(
-        (device, checks): Stored,
+        (device, weights): Stored,
         diagnosis: Diagnosis,
-        fog_network: Option<&'static mut FogParts>,
         bring_up: Option<BringUp>,
         clock_fault: Option<ClockFault>,
     ) -> Self {
-        let fog_network = FogNetwork::new(fog_network);
-        Self { device, checks, diagnosis, fog_network, bring_up, clock_fault, retried: 0, milliseconds: 0 }
+        Self { device, weights, diagnosis, bring_up, clock_fault, retried: 0, milliseconds: 0 }
     }
 
     /// Does a bounded piece of work, and returns the faults that were found.
@@ -108,12 +95,7 @@ impl Idle {
         self.diagnosis.step(self.device, counters);
         self.retry_clock();
         let weights_damaged = self.check();
-        let fognet_unavailable = self.device.take_fognet_unavailable();
-        if fognet_unavailable {
-            self.fog_network.stop();
-            self.checks.fognet = None;
-        }
-        Found { weights_damaged, fognet_unavailable, mount_moved: self.device.take_mount_moved() }
+        Found { weights_damaged, mount_moved: self.device.take_mount_moved() }
     }
 
     #[inline(never)]
@@ -121,11 +103,6 @@ impl Idle {
         while let Some(Observation { sample, tick, status, faults, wheels }) = OBSERVATIONS.pop() {
             self.device.observe(sample.as_ref(), tick, (status, faults), &wheels);
         }
-    }
-
-    /// Returns whether there is more to do before the next interrupt.
-    pub fn is_busy(&self) -> bool {
-        self.fog_network.is_running()
     }
 
     /// Restarts the board once the fault that keeps it on the internal oscillator is over.
@@ -140,31 +117,17 @@ impl Idle {
         }
     }
 
-    /// Returns FoGNet, which gets its windows from the coprocessor and delivers its estimates there.
-    pub fn fog_network(&mut self) -> &mut FogNetwork {
-        &mut self.fog_network
-    }
-
-    /// Checks a piece of the weights in use, and returns whether GyroNet's were found to be damaged.
+    /// Checks a piece of the weights in use, and returns whether they were found to be damaged.
     fn check(&mut self) -> bool {
         let now = timer::milliseconds();
         if now == self.milliseconds {
             return false;
         }
         self.milliseconds = now;
-        let is_damaged = |check: &mut Option<BackgroundCheck<'static>>| {
-            let pass = check.as_mut().and_then(|check| check.advance(check.len() / CHECK_MS + 1));
-            let damaged = pass.is_some_and(|pass| pass.is_err());
-            if damaged {
-                *check = None;
-            }
-            damaged
-        };
-        if is_damaged(&mut self.checks.fognet) {
-            self.device.fognet_damaged();
-        }
-        let damaged = is_damaged(&mut self.checks.weights);
+        let pass = self.weights.as_mut().and_then(|check| check.advance(check.len() / CHECK_MS + 1));
+        let damaged = pass.is_some_and(|pass| pass.is_err());
         if damaged {
+            self.weights = None;
             self.device.weights_damaged();
         }
         damaged

@@ -19,7 +19,7 @@
 //! | 3 | `can_received`, `can_sent` | a frame | into and out of their queues |
 //! | 2 | `output` | pended by `tick`, `can_sent`, `window` | samples, frames, watchdog |
 //! | 1 | `window` | pended by `output` | GyroNet |
-//! | 0 | `idle` | the remaining time | FoGNet in pieces, diagnosis, checksums of the weights; otherwise sleep |
+//! | 0 | `idle` | the remaining time | diagnosis, checksums of the weights; otherwise sleep |
 //!
 //! `output`, `window` and `idle` share the library's `Coprocessor`; everything else is passed on in queues of fixed
 //! length, and what does not fit is counted. An estimate is used two samples after its window, so the time at which
@@ -44,7 +44,6 @@ mod crash;
 #[cfg(target_os = "none")]
 mod diagnosis;
 #[cfg(target_os = "none")]
-mod fog_network;
 #[cfg(target_os = "none")]
 mod idle;
 #[cfg(target_os = "none")]
@@ -141,7 +140,7 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let (board, handlers) = board::Board::start(cx.device, cx.core.SYST);
         let Some(parts) = start::parts(&board) else { cortex_m::peripheral::SCB::sys_reset() };
-        let start::Parts { output, config, weights, fog_network, device } = parts;
+        let start::Parts { output, config, weights, device } = parts;
         let coprocessor = cx.local.coprocessor;
         coprocessor.configure(&config);
         let network = weights.and_then(|blob| GyroNet::with_state(blob, cx.local.network_state).ok());
@@ -151,7 +150,7 @@ mod app {
         let sender = start::init_static(cx.local.sender_place, || output.connect(ports));
         let rest = start::init_static(cx.local.rest_place, || {
             let diagnosis = Diagnosis::new(service, bits_per_second);
-            Idle::new(device, diagnosis, fog_network, bring_up, board.clocks.fault)
+            Idle::new(device, diagnosis, bring_up, board.clocks.fault)
         });
         let board::Handlers { imu, fog: fog_handler, slcan, service, receptions } = handlers;
         let shared = Shared { coprocessor, counters: AllCounters::default() };
@@ -244,19 +243,9 @@ mod app {
             if found.any() {
                 cx.shared.coprocessor.lock(|coprocessor| found.report(coprocessor));
             }
-            let fog_network = cx.local.rest.fog_network();
-            if fog_network.is_waiting() {
-                cx.shared.coprocessor.lock(|coprocessor| fog_network.take(coprocessor));
-            }
-            if let Some((number, estimate)) = fog_network.advance() {
-                // A late estimate is counted.
-                let _ = cx.shared.coprocessor.lock(|coprocessor| coprocessor.deliver_fog(number, estimate));
-            }
             board::SUPERVISOR.report(Task::Idle);
-            if !cx.local.rest.is_busy() {
-                // Every interrupt ends the sleep, the next tick at the latest.
-                cortex_m::asm::wfi();
-            }
+            // Every interrupt ends the sleep, the next tick at the latest.
+            cortex_m::asm::wfi();
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::stm32f405::watchdog;
 use core::ops::Range;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use gyronet::service::MappedSlots;
-use gyronet::store::layout::{FOGNET, RECORD_SECTOR, SLOT_SIZE, SLOTS, STORE, sector};
+use gyronet::store::layout::{RECORD_SECTOR, SLOT_SIZE, SLOTS, STORE, sector};
 
 /// Returns the range of `len` bytes from an offset into the flash, if it lies in one of the regions.
 fn inside(regions: &[Range<u32>], offset: u32, len: usize) -> Result<Range<u32>, FlashError> {
@@ -88,15 +88,11 @@ region!(
     RECORD_SECTOR,
     "The sectors of the records; offsets count from their start."
 );
-region!(Weights, 0, [FOGNET, SLOTS], RECORD_SECTOR, "The weight files, by offset into the flash.");
+region!(Weights, 0, [SLOTS], SLOT_SIZE, "The weight slots, by offset into the flash.");
 
 impl MappedSlots for Weights {
     fn slots(&self) -> [&[u8]; 2] {
         slots_at_start()
-    }
-
-    fn fognet(&self) -> &[u8] {
-        fognet_at_start()
     }
 
     fn check<T>(&self, work: impl FnOnce() -> T) -> T {
@@ -108,10 +104,4 @@ impl MappedSlots for Weights {
 pub fn slots_at_start() -> [&'static [u8]; 2] {
     // SAFETY: inside the flash; see above.
     [SLOTS.start, SLOTS.start + SLOT_SIZE as u32].map(|offset| unsafe { Flash::mapped(offset, SLOT_SIZE) })
-}
-
-/// Returns the place of FoGNet's file. Once the file is being written, idle stops FoGNet before anything else.
-pub fn fognet_at_start() -> &'static [u8] {
-    // SAFETY: inside the flash; see above.
-    unsafe { Flash::mapped(FOGNET.start, FOGNET.len()) }
 }

@@ -3,8 +3,7 @@
 
 use crate::board::Board;
 use crate::diagnosis;
-use crate::fog_network::FogParts;
-use crate::idle::{Checks, Stored};
+use crate::idle::Stored;
 use crate::output::OutputParts;
 use crate::regions::{self, Records, Weights};
 use crate::stm32f405::{can::BITS_PER_SECOND, flash::Flash, pac};
@@ -13,9 +12,7 @@ use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::coprocessor::{Clock, Config, StorageFaults};
 use gyronet::model::background::BackgroundCheck;
-use gyronet::model::fognet::FogNetState;
-use gyronet::model::seconds::WindowCopy;
-use gyronet::model::{Blob, FogBlob, FogNet, weights};
+use gyronet::model::{Blob, weights};
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::{Configuration, FogPart, ImuPart};
 
@@ -48,7 +45,6 @@ pub struct Parts {
     pub config: Config,
     /// Weights for the network.
     pub weights: Option<Blob<'static>>,
-    pub fog_network: Option<&'static mut FogParts>,
     pub device: Stored,
 }
 
@@ -64,19 +60,14 @@ pub fn parts(board: &Board) -> Option<Parts> {
     // Without valid weights the pipeline still runs: the status says degraded, and the rate is the gyro's minus its
     // static bias.
     let blob = device.weights(Some(regions::slots_at_start()), BUILT_IN);
-    let fog_blob = device.fognet(regions::fognet_at_start());
-    let check = Checks {
-        weights: blob.as_ref().map(|blob| BackgroundCheck::new(blob.content, blob.crc)),
-        fognet: fog_blob.as_ref().map(|blob| BackgroundCheck::new(blob.content, blob.crc)),
-    };
-    let fog_network = fog_blob.and_then(fog_network);
+    let check = blob.as_ref().map(|blob| BackgroundCheck::new(blob.content, blob.crc));
     let configuration = device.configuration();
     let weights = blob.map_or(0, |blob| blob.crc);
     let of_other_weights = device.calibration().unit.is_some_and(|unit| unit.weights != weights);
     let config = Config {
         wheels: WheelReceiver::new(*device.wheels()).ok(),
         has_gyronet: blob.is_some(),
-        has_fognet: fog_network.is_some(),
+        has_fognet: false,
         clock: Clock::Outside,
         clock_ratio: board.clocks.exact().then_some(ClockRatioConfig::DEFAULT),
         storage: StorageFaults {
@@ -91,17 +82,8 @@ pub fn parts(board: &Board) -> Option<Parts> {
         output: OutputParts { part, bits_per_second, slcan_inputs: configuration.slcan_inputs },
         config,
         weights: blob,
-        fog_network,
         device: (device, check),
     })
-}
-
-/// Creates FoGNet with its weights; `None` if it has been created before.
-#[inline(never)]
-fn fog_network(blob: FogBlob<'static>) -> Option<&'static mut FogParts> {
-    let state = cortex_m::singleton!(: FogNetState = FogNetState::ZERO)?;
-    let network = FogNet::new(blob, state);
-    cortex_m::singleton!(: FogParts = FogParts { network, window: WindowCopy::EMPTY })
 }
 
 /// Creates a value in its static. Not inlined, so that the stack that `make` uses is freed afterwards.

@@ -1,13 +1,11 @@
-//! This module selects and uploads weight files. A new file for GyroNet is written to the unused slot while GyroNet
-//! runs. FoGNet's file has only one place, so FoGNet stops when a new file is written.
+//! Selection and upload of weight files. A new file is written to the unused slot while GyroNet runs.
 
 use super::Device;
-use crate::fog::FogNetUse;
-use crate::model::{Blob, FogBlob};
+use crate::model::Blob;
 use crate::service::event::EventKind;
-use crate::service::message::{BLOCK, Network, Refusal};
-use crate::store::slots::{self, Selection, SlotError, WeightSource, select};
-use crate::store::{Place, Slot, Upload};
+use crate::service::message::{BLOCK, Refusal};
+use crate::store::slots::{Selection, SlotError, WeightSource, select};
+use crate::store::{Slot, Upload};
 use embedded_storage::nor_flash::NorFlash;
 
 /// The flash of the weight files, which is also memory-mapped for reading. Offsets are from the start of the whole
@@ -15,8 +13,6 @@ use embedded_storage::nor_flash::NorFlash;
 pub trait MappedSlots: NorFlash {
     /// Returns both slots, aligned to words.
     fn slots(&self) -> [&[u8]; 2];
-    /// Returns the place of FoGNet's file, aligned to words.
-    fn fognet(&self) -> &[u8];
 
     /// Runs the check of a file, which takes a tenth of a second. A board may override this to extend its watchdog
     /// timeout.
@@ -51,40 +47,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         weights
     }
 
-    /// Selects FoGNet's weights from `place`, as the processor reads it. Returns `None` if FoGNet is off, or the file
-    /// is refused, which is logged.
-    pub fn fognet<'w>(&mut self, place: &'w [u8]) -> Option<FogBlob<'w>> {
-        if self.configuration.fog_lane.fognet == FogNetUse::Off {
-            return None;
-        }
-        let found = slots::fognet(&self.accepted, place).and_then(|blob| {
-            let fits = self.configuration.check_training(blob.training);
-            fits.map(|()| blob).map_err(SlotError::Gyro)
-        });
-        self.fognet = Some(found.map(|blob| blob.crc));
-        found.map_err(|error| self.refuse(EventKind::FogNetRefused(error))).ok()
-    }
-
-    /// Returns `true` once after FoGNet's file was erased or found damaged: its use must stop at once. See
-    /// [`Coprocessor::fognet_unavailable`](crate::Coprocessor::fognet_unavailable).
-    pub fn take_fognet_unavailable(&mut self) -> bool {
-        core::mem::take(&mut self.fognet_unavailable)
-    }
-
-    /// Records that FoGNet's file no longer matches its checksum. The file is not used until the next start, which
-    /// checks it again.
-    pub fn fognet_damaged(&mut self) {
-        if let Some(Ok(crc)) = self.fognet {
-            self.lose_fognet(SlotError::NotAccepted(crc));
-            self.note(EventKind::WeightsDamaged);
-        }
-    }
-
-    fn lose_fognet(&mut self, why: SlotError) {
-        self.fognet = self.fognet.map(|_| Err(why));
-        self.fognet_unavailable = true;
-    }
-
     /// Records that the weights in use no longer match their checksum. They are not used until the next start, which
     /// checks all files again.
     pub fn weights_damaged(&mut self) {
@@ -102,28 +64,21 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    pub(super) fn weights_begin(&mut self, network: Network, length: u32) -> Result<(), Refusal> {
-        let place = match network {
-            Network::GyroNet => Place::Slot(self.unused_slot()),
-            Network::FogNet => Place::FogNet,
-        };
-        Upload::check(place, length)?;
+    pub(super) fn weights_begin(&mut self, length: u32) -> Result<(), Refusal> {
+        let slot = self.unused_slot();
+        Upload::check(slot, length)?;
         self.uploading = None;
         if self.slots.is_none() {
             return Err(SlotError::NoFlash.into());
         }
         // Withdraw the acceptance of the old file: a new file could have the same checksum by intent.
-        let accepted = self.accepted.without(place);
+        let accepted = self.accepted.without(slot);
         if accepted != self.accepted {
             self.store.as_mut().ok_or(SlotError::NoFlash)?.set(&accepted)?;
             self.accepted = accepted;
         }
-        if network == Network::FogNet {
-            // A failed erase may have erased a part of the file.
-            self.lose_fognet(SlotError::Empty);
-        }
         let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
-        let upload = Upload::begin(flash, place, length)?;
+        let upload = Upload::begin(flash, slot, length)?;
         self.uploading = Some(Uploading { upload, checked: None });
         Ok(())
     }
@@ -150,18 +105,18 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         let flash = self.slots.as_ref().ok_or(SlotError::NoFlash)?;
         let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
         let upload = &uploading.upload;
-        uploading.checked = Some(flash.check(|| upload.verify(flash.slots(), flash.fognet()))?);
+        uploading.checked = Some(flash.check(|| upload.verify(flash.slots()))?);
         Ok(())
     }
 
     pub(super) fn weights_activate(&mut self) -> Result<(), Refusal> {
         let Uploading { upload, checked } = self.uploading.ok_or(SlotError::NotBegun)?;
         let file = checked.ok_or(SlotError::Incomplete { written: upload.written() })?;
-        let accepted = self.accepted.with(upload.place(), file);
+        let accepted = self.accepted.with(upload.slot(), file);
         self.store()?.set(&accepted)?;
         self.accepted = accepted;
         self.uploading = None;
-        self.note(EventKind::WeightsAccepted(upload.place()));
+        self.note(EventKind::WeightsAccepted(upload.slot()));
         Ok(())
     }
 }

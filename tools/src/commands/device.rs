@@ -6,9 +6,9 @@ mod settings;
 use super::Common;
 use clap::Subcommand;
 use gyronet::can::diagnosis::DiagnosisIds;
+use gyronet::model::Blob;
 use gyronet::model::fognet_blob::FOGNET;
-use gyronet::model::{Blob, FogBlob};
-use gyronet::service::message::{AccessCounters, Info, Network};
+use gyronet::service::message::{AccessCounters, Info};
 use gyronet_tools::client::bus::{self, Bus};
 use gyronet_tools::client::device::settings::{flat, value as value_of};
 use gyronet_tools::client::device::upload::upload;
@@ -84,7 +84,7 @@ enum Action {
     Log,
     /// Print all counters since the board started.
     Counters,
-    /// Upload a weight file of GyroNet or FoGNet; the board checks it and uses it after a restart.
+    /// Upload a weight file; the board checks it and uses it after a restart.
     Weights {
         /// Weight file, as `gyronet quantize` writes it.
         file: PathBuf,
@@ -230,11 +230,6 @@ fn print_info(info: &Info, access: &str) -> io::Result<()> {
     writeln!(out, "calibration   {}, layout {}", info.calibration, info.record_versions[1])?;
     let crc = info.weights_crc.map(|crc| format!(", checksum {crc:08x}")).unwrap_or_default();
     writeln!(out, "weights       {}{crc}", info.weights)?;
-    match info.fognet {
-        None => {}
-        Some(Ok(crc)) => writeln!(out, "FoGNet        runs on checksum {crc:08x}")?,
-        Some(Err(error)) => writeln!(out, "FoGNet        not used: {error}")?,
-    }
     for (slot, refused) in ["A", "B"].into_iter().zip(info.refused_slots) {
         if let Some(error) = refused {
             writeln!(out, "slot {slot}        not used: {error}")?;
@@ -271,20 +266,21 @@ fn weights(device: &mut Board, path: &std::path::Path, json: bool, common: Commo
     // Run the board's own check here, before the board erases its flash.
     let words: Vec<u32> = file.chunks(4).map(|word| word.try_into().map_or(0, u32::from_le_bytes)).collect();
     let words = bytemuck::cast_slice(&words);
-    let is_fognet = file.get(6..8) == Some(&FOGNET.to_le_bytes()[..]);
-    let (network, checked) = if is_fognet {
-        (Network::FogNet, FogBlob::new_checked(words).map(drop))
-    } else {
-        (Network::GyroNet, Blob::new_checked(words).map(drop))
-    };
-    checked.map_err(|error| format!("{}: {error}", path.display()))?;
+    if file.get(6..8) == Some(&FOGNET.to_le_bytes()[..]) {
+        let name = path.display();
+        return Err(format!(
+            "{name}: FoGNet no longer runs on this board; `gyronet tables` runs it on recordings"
+        )
+        .into());
+    }
+    Blob::new_checked(words).map_err(|error| format!("{}: {error}", path.display()))?;
     let bar = super::progress::bar(common, file.len(), "upload");
-    let uploaded = upload(device, network, &file, |written| bar.set_position(written as u64))?;
+    let uploaded = upload(device, &file, |written| bar.set_position(written as u64))?;
     bar.finish_and_clear();
     if json {
-        print_json(&serde_json::json!({ "place": uploaded.place, "crc": uploaded.crc }))
+        print_json(&serde_json::json!({ "slot": uploaded.slot, "crc": uploaded.crc }))
     } else {
-        let (place, crc) = (uploaded.place, uploaded.crc);
-        Ok(writeln!(io::stdout(), "{place} holds file {crc:08x}; the board uses it after a restart")?)
+        let (slot, crc) = (uploaded.slot, uploaded.crc);
+        Ok(writeln!(io::stdout(), "slot {slot} holds file {crc:08x}; the board uses it after a restart")?)
     }
 }

@@ -76,14 +76,6 @@ const SETTINGS: &[(&str, Takes)] = &[
         "fog_lane.tilt_deg",
         Number("deg", Field::FogTiltDeg, "from the gyro's axis to the vertical of the level vehicle"),
     ),
-    (
-        "fog_lane.fognet",
-        Other(
-            "",
-            "`Off`; `Recorded` runs FoGNet with weights that were trained on recordings of this gyro; `Simulated` \
-             also allows weights of simulated drives, and the rate is then degraded at best",
-        ),
-    ),
     ("fog_lane.latitude_frame", Other("", "`null`, or the frame that carries the latitude")),
     (
         "slcan_inputs",
@@ -96,14 +88,6 @@ const SETTINGS: &[(&str, Takes)] = &[
     ),
     ("diagnosis.functional", Other("", "identifier of requests to all ECUs")),
     ("diagnosis.response", Other("", "identifier of the board's diagnostic frames")),
-    (
-        "fog_serial",
-        Other(
-            "",
-            "serial number of the fibre-optic gyro, 0 if it is not known: FoGNet's weights for one gyro run on \
-             that gyro only",
-        ),
-    ),
     (
         "learn",
         Other("", "`true`: the board learns and uses the sensor's bias by temperature and its mounting"),

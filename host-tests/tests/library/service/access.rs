@@ -36,7 +36,7 @@ fn locked() -> (Rc<RefCell<F405>>, Bench, PrivateKey) {
 
 fn configuration(k: u8) -> Configuration {
     // Its last byte is no scope of a trailer.
-    Configuration { latitude_deg: Some(f32::from(k)), fog_serial: 300, ..Configuration::DEFAULT }
+    Configuration { latitude_deg: Some(f32::from(k)), ..Configuration::DEFAULT }
 }
 
 /// The content of a request that writes a configuration.

@@ -9,7 +9,7 @@ use gyronet::health::{Faults, Status};
 use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::Request;
 use gyronet::service::event::EventKind;
-use gyronet::service::message::{Calibrate, FlashState, Network, Origin, Refusal};
+use gyronet::service::message::{Calibrate, FlashState, Origin, Refusal};
 use gyronet::store::layout;
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, Field, FieldError, FlashFault, FogPart, ImuPart, Mounting, StoreError};
@@ -50,7 +50,7 @@ fn configuration_is_kept_whole() {
     let with_fog = Configuration { fog: Some(FogPart::Dsp3000), ..wanted };
     assert_eq!(ask(&mut board, &set(&with_fog)), refused(FieldError::PartNotInImage));
     let request = Request::SetConfiguration { version: 9, configuration: &wanted };
-    assert_eq!(ask(&mut board, &request), Err(Refusal::Version { found: 9, expected: 6 }));
+    assert_eq!(ask(&mut board, &request), Err(Refusal::Version { found: 9, expected: 7 }));
     assert_eq!(*start(&flash).configuration(), wanted);
 }
 
@@ -140,7 +140,7 @@ fn nothing_is_written_with_an_unlocked_controller_and_the_standstill_gate_holds(
     let no_flash = Err(Refusal::Store(StoreError::NoFlash));
     assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), no_flash);
     let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
-    assert_eq!(ask(&mut board, &Request::WeightsBegin { network: Network::GyroNet, length: 64 }), no_slot);
+    assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 64 }), no_slot);
     assert!(!storable(&mut board, 0..1, 0.0, Standstill::Moving));
     assert_eq!(ask(&mut board, &Request::Restart), Err(Refusal::Moving));
     assert_eq!(flash.borrow().operations(), before);
@@ -155,7 +155,7 @@ fn nothing_is_stored_without_flash() {
     let no_flash = Err(Refusal::Store(StoreError::NoFlash));
     assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), no_flash);
     let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
-    assert_eq!(ask(&mut board, &Request::WeightsBegin { network: Network::GyroNet, length: 64 }), no_slot);
+    assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 64 }), no_slot);
     assert_eq!(ask(&mut board, &Request::WeightsVerify), no_slot);
     assert_eq!(ask(&mut board, &Request::WeightsActivate), Err(Refusal::Slot(SlotError::NotBegun)));
 }
@@ -224,7 +224,7 @@ fn flash_is_written_at_standstill_alone() {
         &WheelSample::without_speeds(Standstill::Moving),
     );
     for request in [
-        Request::WeightsBegin { network: Network::GyroNet, length: 64 },
+        Request::WeightsBegin { length: 64 },
         Request::WeightsBlock { offset: 0, bytes: &[] },
         Request::WeightsActivate,
         Request::Calibrate(Calibrate::Store),

@@ -85,8 +85,7 @@ fn diagnose(name: &str) {
     assert!(device.log(0).expect("a response").total > 0);
     device.counters().expect("a response");
     let (file, from) = (other_weights(2), Instant::now());
-    let network = gyronet::service::message::Network::GyroNet;
-    upload(&mut device, network, &file, |_| {}).expect("it is accepted");
+    upload(&mut device, &file, |_| {}).expect("it is accepted");
     let took = from.elapsed().as_secs_f64();
     println!("upload: {} bytes in {took:.1} s of this machine", file.len());
     device.restart().expect("a response");

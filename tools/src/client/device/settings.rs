@@ -10,6 +10,8 @@ use serde_json::Value;
 
 /// Names inside `compensate` of the rates that a record stores as codes.
 const RATES: [&str; 3] = ["max_mean", "max_single", "max_carry"];
+/// Settings that chose FoGNet, with their paths in a configuration.
+const RETIRED: [(&str, &str); 2] = [("fog_lane.fognet", "/fog_lane/fognet"), ("fog_serial", "/fog_serial")];
 /// Decimals, in rad/s, that distinguish any two codes.
 const RATE_DECIMALS: usize = 9;
 
@@ -22,6 +24,11 @@ pub enum SettingError {
     /// No setting has this name.
     #[error("{0}: there is no such setting; see `device get`")]
     Name(String),
+    /// The setting was retired.
+    #[error(
+        "{0}: retired, because FoGNet no longer runs on this board (`gyronet tables` runs it on recordings)"
+    )]
+    Retired(&'static str),
     /// The value is not a rate, or out of range.
     #[error("compensate.{name}: {value} is not a rate in rad/s")]
     Rate {
@@ -54,8 +61,11 @@ pub fn to_value(configuration: &Configuration) -> Result<Value, SettingError> {
 /// Converts names and values to a configuration; ranges are not checked.
 ///
 /// # Errors
-/// [`SettingError::Rate`], [`SettingError::Json`].
+/// [`SettingError::Retired`], [`SettingError::Rate`], [`SettingError::Json`].
 pub fn from_value(mut value: Value) -> Result<Configuration, SettingError> {
+    if let Some((name, _)) = RETIRED.iter().find(|(_, path)| value.pointer(path).is_some()) {
+        return Err(SettingError::Retired(name));
+    }
     for name in RATES {
         // `serde_json` reports a missing rate below.
         let Some(rate) = value.pointer_mut(&format!("/compensate/{name}")) else { continue };
@@ -68,9 +78,12 @@ pub fn from_value(mut value: Value) -> Result<Configuration, SettingError> {
 /// Sets one value from `name=value`, where the value is JSON.
 ///
 /// # Errors
-/// [`SettingError::NoAssignment`], [`SettingError::Name`].
+/// [`SettingError::NoAssignment`], [`SettingError::Retired`], [`SettingError::Name`].
 pub fn assign(configuration: &mut Value, setting: &str) -> Result<(), SettingError> {
     let (name, text) = setting.split_once('=').ok_or_else(|| SettingError::NoAssignment(setting.into()))?;
+    if let Some((name, _)) = RETIRED.iter().find(|(retired, _)| *retired == name) {
+        return Err(SettingError::Retired(name));
+    }
     let place = name.split('.').try_fold(configuration, |value, key| match key.parse::<usize>() {
         Ok(index) => value.get_mut(index),
         Err(_) => value.get_mut(key),

@@ -1,6 +1,6 @@
-//! This module defines the places for weight files in the flash.
+//! The two places for weight files in the flash.
 
-use super::layout::{FOGNET, SLOT_SIZE, SLOTS};
+use super::layout::{SLOT_SIZE, SLOTS};
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +36,12 @@ impl Slot {
         }
     }
 
+    /// Returns the flash offsets of the slot: a whole sector.
+    #[must_use]
+    pub const fn range(self) -> Range<u32> {
+        self.offset()..self.offset() + SLOT_SIZE as u32
+    }
+
     /// Returns this slot's element of a pair (A, B).
     pub(crate) const fn of<T: Copy>(self, [a, b]: [T; 2]) -> T {
         match self {
@@ -48,35 +54,5 @@ impl Slot {
 impl core::fmt::Display for Slot {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(Self::of(*self, ["A", "B"]))
-    }
-}
-
-/// A place for a weight file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Place {
-    /// Slot for a file of GyroNet.
-    Slot(Slot),
-    /// Place for the file of FoGNet.
-    FogNet,
-}
-
-impl Place {
-    /// Returns the flash offsets of the place: whole sectors.
-    #[must_use]
-    pub const fn range(self) -> Range<u32> {
-        match self {
-            Self::Slot(slot) => slot.offset()..slot.offset() + SLOT_SIZE as u32,
-            Self::FogNet => FOGNET,
-        }
-    }
-}
-
-impl core::fmt::Display for Place {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Slot(slot) => write!(f, "slot {slot}"),
-            Self::FogNet => f.write_str("FoGNet's place"),
-        }
     }
 }
