@@ -1,6 +1,6 @@
 //! The device holds what a user configures or examines: stored data, weights, calibration and the log of events.
 //!
-//! [`Device`] owns the flash, executes [`Request`]s and reports its state; it does no input or output of its own.
+//! [`Device`] owns the flash, changes it on request and reports its state; it does no input or output of its own.
 //! Testers reach it over diagnosis ([`crate::uds`]). Every request is checked completely before anything is written;
 //! a refusal has a reason ([`message::Refusal`]).
 
@@ -21,4 +21,3 @@ mod text;
 pub use conditions::Conditions;
 pub use device::{Device, MappedSlots, SupportedHardware};
 pub use learner::Learner;
-pub use message::Request;

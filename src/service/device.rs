@@ -1,4 +1,4 @@
-//! The device holds the stored data and executes the requests that change them.
+//! The device holds the stored data, and changes them on request.
 //!
 //! Some functions are marked `inline(never)`, so that their large stack frames, with requests and records, exist only
 //! while they run.
@@ -12,9 +12,7 @@ use super::calibrate::{Calibrator, State, Task, level};
 use super::conditions::Conditions;
 use super::event::{EventKind, EventLog, LogPage, SensorFault};
 use super::learner::Learner;
-use super::message::{
-    AccessCounters, Calibrate, FlashState, Identity, Info, Origin, PROTOCOL, Refusal, Request,
-};
+use super::message::{AccessCounters, FlashState, Identity, Info, Origin, PROTOCOL, Refusal};
 use super::standstill::StandstillGate;
 use crate::can::wheel::WheelSettings;
 use crate::health::{Faults, Status};
@@ -25,6 +23,9 @@ use crate::store::{
 };
 use embedded_storage::nor_flash::NorFlash;
 use weights::Uploading;
+
+/// A request that writes the flash or restarts the board, and so interrupts the output.
+const INTERRUPTS: bool = true;
 
 /// The hardware that an image supports; a configuration with other hardware is refused.
 #[derive(Debug)]
@@ -227,33 +228,24 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.note(EventKind::Calibrated(result.err()));
     }
 
-    /// Executes a request.
-    ///
-    /// # Errors
-    /// [`Refusal`]; nothing has changed then.
-    #[inline(never)]
-    pub fn act(&mut self, request: &Request<'_>) -> Result<(), Refusal> {
-        let result = self.execute(request);
+    /// Carries out a request, unless it interrupts the output of a vehicle that is not proven to stand, and keeps the
+    /// reason of a refusal for testers.
+    fn request(
+        &mut self,
+        interrupts: bool,
+        work: impl FnOnce(&mut Self) -> Result<(), Refusal>,
+    ) -> Result<(), Refusal> {
+        let result = if interrupts && !self.may_interrupt() { Err(Refusal::Moving) } else { work(self) };
         self.refusal = result.err();
         result
     }
 
-    fn execute(&mut self, request: &Request<'_>) -> Result<(), Refusal> {
-        if request.interrupts() && !self.may_interrupt() {
-            return Err(Refusal::Moving);
-        }
-        match request {
-            Request::SetConfiguration { version, configuration } => {
-                self.set_configuration(*version, configuration)
-            }
-            Request::SetWheels(wheels) => self.set_wheels(wheels),
-            Request::Calibrate(what) => self.calibrate(*what),
-            Request::WeightsBegin { length } => self.weights_begin(*length),
-            Request::WeightsBlock { offset, bytes } => self.weights_block(*offset, bytes),
-            Request::WeightsVerify => self.weights_verify(),
-            Request::WeightsActivate => self.weights_activate(),
-            Request::Restart => Ok(()),
-        }
+    /// Checks that the board may restart; the caller does the reset.
+    ///
+    /// # Errors
+    /// [`Refusal::Moving`].
+    pub fn restart(&mut self) -> Result<(), Refusal> {
+        self.request(INTERRUPTS, |_| Ok(()))
     }
 
     /// Returns the reason why the last request was refused; `None` if it was executed.
@@ -360,34 +352,47 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.calibration_state
     }
 
-    fn calibrate(&mut self, what: Calibrate) -> Result<(), Refusal> {
-        match what {
-            Calibrate::Start(task) => self.start_calibration(task),
-            Calibrate::Cancel => {
-                self.calibrator = None;
-                self.calibration_state = State::Idle;
-            }
-            Calibrate::Store => {
-                match self.calibration_state {
-                    State::Found(Task::Static) => self.store_learned()?,
-                    State::Found(Task::Mounting) => self.store_calibration()?,
-                    _ => return Err(Refusal::NothingFound),
-                }
-                self.calibration_state = State::Idle;
-            }
-            Calibrate::Forget => {
-                let before = core::mem::replace(&mut self.learned, Learned::NOTHING);
-                self.store_learned().inspect_err(|_| self.learned = before)?;
-                self.learner = Learner::new();
-            }
-            Calibrate::SetUnit(unit) => self.set_unit(unit)?,
-        }
-        Ok(())
-    }
-
+    /// Starts a calibration.
     #[inline(never)]
-    fn start_calibration(&mut self, task: Task) {
+    pub fn start_calibration(&mut self, task: Task) {
+        self.forget_refusal();
         self.calibrator = Some(Calibrator::new(task, self.configuration.static_init));
         self.calibration_state = State::Running(task);
+    }
+
+    /// Stops the calibration without a result.
+    pub fn cancel_calibration(&mut self) {
+        self.forget_refusal();
+        self.calibrator = None;
+        self.calibration_state = State::Idle;
+    }
+
+    /// Stores the result of the calibration.
+    ///
+    /// # Errors
+    /// [`Refusal::NothingFound`], [`Refusal::Store`], [`Refusal::Moving`].
+    pub fn store_result(&mut self) -> Result<(), Refusal> {
+        self.request(INTERRUPTS, |device| {
+            match device.calibration_state {
+                State::Found(Task::Static) => device.store_learned()?,
+                State::Found(Task::Mounting) => device.store_calibration()?,
+                _ => return Err(Refusal::NothingFound),
+            }
+            device.calibration_state = State::Idle;
+            Ok(())
+        })
+    }
+
+    /// Erases what the board has learnt about its sensor.
+    ///
+    /// # Errors
+    /// [`Refusal::Store`], [`Refusal::Moving`].
+    pub fn forget_learned(&mut self) -> Result<(), Refusal> {
+        self.request(INTERRUPTS, |device| {
+            let before = core::mem::replace(&mut device.learned, Learned::NOTHING);
+            device.store_learned().inspect_err(|_| device.learned = before)?;
+            device.learner = Learner::new();
+            Ok(())
+        })
     }
 }

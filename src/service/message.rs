@@ -1,85 +1,16 @@
-//! This module defines the requests that change the board, and the reports of its state.
+//! Refusals of requests, and reports of the board's state.
 
-use super::calibrate::Task;
 use super::event::{CanFault, ClockFault, Crash, ResetCause, SensorFault};
-use crate::can::wheel::WheelSettings;
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters, Status};
+use crate::store::StoreError;
 use crate::store::slots::{SlotError, WeightSource};
-use crate::store::{Configuration, StoreError, UnitMap};
 use serde::{Deserialize, Serialize};
 
 /// Version of the encoding of these types; every change of a type increments it.
 pub const PROTOCOL: u8 = 15;
 /// Size of a full block of a weight file, bytes.
 pub const BLOCK: usize = 256;
-
-/// A request that changes the board.
-#[derive(Debug, Clone, PartialEq)]
-#[allow(clippy::large_enum_variant, reason = "no heap to put the large ones on; one exists at a time")]
-pub enum Request<'a> {
-    /// Store a configuration.
-    SetConfiguration {
-        /// Layout version of the configuration.
-        version: u8,
-        /// The complete configuration.
-        configuration: &'a Configuration,
-    },
-    /// Store the settings of the wheel frames.
-    SetWheels(WheelSettings),
-    /// Start, stop, store or erase a calibration.
-    Calibrate(Calibrate),
-    /// Begin the upload of a weight file.
-    WeightsBegin {
-        /// Length of the file, bytes.
-        length: u32,
-    },
-    /// Write a block of the file.
-    WeightsBlock {
-        /// Byte offset of the block in the file.
-        offset: u32,
-        /// Content of the block, a whole number of words.
-        bytes: &'a [u8],
-    },
-    /// Check the complete file.
-    WeightsVerify,
-    /// Use the checked file from the next start on.
-    WeightsActivate,
-    /// Restart the board. The device only checks that this is allowed; the caller does the reset.
-    Restart,
-}
-
-impl Request<'_> {
-    /// Returns whether the request interrupts the output, because it writes the flash or restarts the board.
-    #[must_use]
-    pub const fn interrupts(&self) -> bool {
-        match self {
-            Self::SetConfiguration { .. }
-            | Self::SetWheels(_)
-            | Self::Calibrate(Calibrate::Store | Calibrate::Forget | Calibrate::SetUnit(_))
-            | Self::WeightsBegin { .. }
-            | Self::WeightsBlock { .. }
-            | Self::WeightsActivate
-            | Self::Restart => true,
-            Self::Calibrate(Calibrate::Start(_) | Calibrate::Cancel) | Self::WeightsVerify => false,
-        }
-    }
-}
-
-/// An action of [`Request::Calibrate`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Calibrate {
-    /// Begin a calibration.
-    Start(Task),
-    /// Stop the calibration without a result.
-    Cancel,
-    /// Store the result of the calibration.
-    Store,
-    /// Erase what the board has learnt about its sensor.
-    Forget,
-    /// Store gain and misalignment of this unit's gyro, or remove them; used from the next start on.
-    SetUnit(Option<UnitMap>),
-}
 
 /// The reason why a request is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]

@@ -3,7 +3,6 @@
 use super::response::{Nrc, Response, exactly, nrc, put};
 use super::services::Services;
 use super::session::Session;
-use crate::service::message::Request;
 use crate::service::{Device, MappedSlots};
 use automotive_diag::uds::ResetType;
 use embedded_storage::nor_flash::NorFlash;
@@ -39,7 +38,7 @@ impl Services {
             return Err(Nrc::SubFunctionNotSupported);
         }
         self.security.check(device)?;
-        device.act(&Request::Restart).map_err(nrc)?;
+        device.restart().map_err(nrc)?;
         self.is_restarting = true;
         Ok(())
     }

@@ -9,7 +9,7 @@ use super::response::{Nrc, Response, decode, nrc, put, put_record};
 use super::security::{self, Security};
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters};
-use crate::service::message::{AccessCounters, AllCounters, Calibrate, LineCounters, Refusal, Request};
+use crate::service::message::{AccessCounters, AllCounters, LineCounters, Refusal};
 use crate::service::{Device, MappedSlots};
 use crate::store::slots::WeightSource;
 use crate::store::{Calibration, Configuration, Record, Slot};
@@ -252,22 +252,22 @@ fn write_configuration<R: NorFlash, W: MappedSlots>(
     bytes: &[u8],
     device: &mut Device<R, W>,
 ) -> Result<(), Nrc> {
-    let (&version, record) = bytes.split_first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
-    if version != Configuration::VERSION {
-        return Err(Nrc::RequestOutOfRange);
+    let (&found, record) = bytes.split_first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+    let expected = Configuration::VERSION;
+    if found != expected {
+        return Err(nrc(device.refuse_request(Refusal::Version { found, expected })));
     }
-    let configuration = decode(record)?;
-    device.act(&Request::SetConfiguration { version, configuration: &configuration }).map_err(nrc)
+    device.set_configuration(&decode(record)?).map_err(nrc)
 }
 
 #[inline(never)]
 fn write_wheels<R: NorFlash, W: MappedSlots>(bytes: &[u8], device: &mut Device<R, W>) -> Result<(), Nrc> {
-    device.act(&Request::SetWheels(decode(bytes)?)).map_err(nrc)
+    device.set_wheels(&decode(bytes)?).map_err(nrc)
 }
 
 #[inline(never)]
 fn write_unit<R: NorFlash, W: MappedSlots>(bytes: &[u8], device: &mut Device<R, W>) -> Result<(), Nrc> {
-    device.act(&Request::Calibrate(Calibrate::SetUnit(decode(bytes)?))).map_err(nrc)
+    device.set_unit(decode(bytes)?).map_err(nrc)
 }
 
 fn hex(byte: u8) -> [u8; 2] {

@@ -5,7 +5,7 @@
 
 use super::response::{Nrc, Response, nrc, put};
 use super::signature::{Digest, Hasher};
-use crate::service::message::{BLOCK, Refusal, Request};
+use crate::service::message::{BLOCK, Refusal};
 use crate::service::{Device, MappedSlots};
 use crate::store::Slot;
 use embedded_storage::nor_flash::NorFlash;
@@ -51,7 +51,7 @@ impl Download {
             _ => return Err(Nrc::RequestOutOfRange),
         }
         let length = number(length);
-        device.act(&Request::WeightsBegin { length }).map_err(nrc)?;
+        device.weights_begin(length).map_err(nrc)?;
         let [high, low] = (BLOCK as u16 + 2).to_be_bytes();
         put(out, &[0x20, high, low])?;
         Ok(Self { length, offset: 0, next: 1, hasher: Hasher::new(), digest: None })
@@ -80,7 +80,7 @@ impl Download {
         if bytes.len() != expected || expected == 0 {
             return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
         }
-        device.act(&Request::WeightsBlock { offset: self.offset, bytes }).map_err(nrc)?;
+        device.weights_block(self.offset, bytes).map_err(nrc)?;
         self.hasher.update(bytes);
         self.offset += expected as u32;
         self.next = self.next.wrapping_add(1);
@@ -96,7 +96,7 @@ impl Download {
         if self.offset < self.length {
             return Err(Nrc::RequestSequenceError);
         }
-        device.act(&Request::WeightsVerify).map_err(nrc)?;
+        device.weights_verify().map_err(nrc)?;
         let (slot, crc) = device.uploaded().ok_or(Nrc::GeneralProgrammingFailure)?;
         put(
             out,

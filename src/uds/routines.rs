@@ -7,7 +7,7 @@ use super::security::{self, Seed};
 use super::services::Services;
 use super::session::Session;
 use crate::service::calibrate::{State, Task};
-use crate::service::message::{Calibrate, Refusal, Request};
+use crate::service::message::Refusal;
 use crate::service::{Device, MappedSlots};
 use automotive_diag::uds::RoutineControlType;
 use embedded_storage::nor_flash::NorFlash;
@@ -66,7 +66,7 @@ impl Services {
         if id == USE_DOWNLOAD && control == RoutineControlType::StartRoutine {
             self.require_session(Session::Programming)?;
             self.accept_download(option, device)?;
-            return device.act(&Request::WeightsActivate).map(drop).map_err(nrc);
+            return device.weights_activate().map_err(nrc);
         }
         let [] = exactly(option)?;
         if control != RoutineControlType::RequestRoutineResult {
@@ -74,10 +74,10 @@ impl Services {
         }
         match (id, task, control) {
             (_, Some(task), RoutineControlType::StartRoutine) => {
-                device.act(&Request::Calibrate(Calibrate::Start(task))).map_err(nrc)?;
+                device.start_calibration(task);
             }
             (_, Some(_), RoutineControlType::StopRoutine) => {
-                device.act(&Request::Calibrate(Calibrate::Cancel)).map_err(nrc)?;
+                device.cancel_calibration();
             }
             (_, Some(task), RoutineControlType::RequestRoutineResult) => {
                 let state = match device.calibration_state() {
@@ -89,10 +89,10 @@ impl Services {
                 put(out, &[state])?;
             }
             (0x0202, None, RoutineControlType::StartRoutine) => {
-                device.act(&Request::Calibrate(Calibrate::Store)).map_err(nrc)?;
+                device.store_result().map_err(nrc)?;
             }
             (FORGET, None, RoutineControlType::StartRoutine) => {
-                device.act(&Request::Calibrate(Calibrate::Forget)).map_err(nrc)?;
+                device.forget_learned().map_err(nrc)?;
             }
             (0x0202 | FORGET | SELF_TEST | USE_DOWNLOAD, None, _) => {
                 return Err(Nrc::SubFunctionNotSupported);

@@ -15,10 +15,10 @@ use gyronet::model::weights::DEFAULT;
 use gyronet::sample::{ImuSample, PERIOD_US, Validity};
 use gyronet::service::crash::FILE;
 use gyronet::service::event::{Crash, CrashKind, ResetCause};
-use gyronet::service::message::{Identity, Info, Refusal};
-use gyronet::service::{Device, Request, SupportedHardware};
+use gyronet::service::message::{Identity, Info};
+use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::layout::{self, RECORD_SECTOR};
-use gyronet::store::{Configuration, FogPart, ImuPart, Record};
+use gyronet::store::{FogPart, ImuPart};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use gyronet_host_tests::flash::{F405, MappedRegion, Region};
 use std::cell::RefCell;
@@ -64,19 +64,8 @@ fn bare() -> Board {
     board
 }
 
-/// Executes a request.
-fn ask(board: &mut Board, request: &Request) -> Result<(), Refusal> {
-    let result = board.act(request);
-    assert_eq!(board.refusal(), result.err());
-    result
-}
-
 fn info(board: &mut Board) -> Info {
     board.info()
-}
-
-fn set(configuration: &Configuration) -> Request<'_> {
-    Request::SetConfiguration { version: Configuration::VERSION, configuration }
 }
 
 fn sample(k: u64, force: [f32; 3], rate: f32) -> ImuSample {

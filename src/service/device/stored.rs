@@ -1,6 +1,6 @@
 //! This module reads the stored records at the start, and stores them on request.
 
-use super::{Device, MappedSlots, SupportedHardware};
+use super::{Device, INTERRUPTS, MappedSlots, SupportedHardware};
 use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};
 use crate::service::event::EventKind;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
@@ -129,47 +129,60 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.store.as_mut().ok_or(StoreError::NoFlash)
     }
 
-    pub(super) fn set_configuration(
-        &mut self,
-        found: u8,
-        configuration: &Configuration,
-    ) -> Result<(), Refusal> {
-        let expected = Configuration::VERSION;
-        if found != expected {
-            return Err(Refusal::Version { found, expected });
-        }
-        // Check the values first, so that a bad value is reported even if nothing can be stored.
-        configuration.check().map_err(StoreError::from)?;
-        self.check_supported(configuration)?;
-        self.store()?.set(configuration)?;
-        self.next_configuration = *configuration;
-        self.note(EventKind::ConfigurationStored);
-        Ok(())
+    /// Stores a configuration, which the next start uses.
+    ///
+    /// # Errors
+    /// [`Refusal::Store`], [`Refusal::Moving`].
+    #[inline(never)]
+    pub fn set_configuration(&mut self, configuration: &Configuration) -> Result<(), Refusal> {
+        self.request(INTERRUPTS, |device| {
+            // Check the values first, so that a bad value is reported even if nothing can be stored.
+            configuration.check().map_err(StoreError::from)?;
+            device.check_supported(configuration)?;
+            device.store()?.set(configuration)?;
+            device.next_configuration = *configuration;
+            device.note(EventKind::ConfigurationStored);
+            Ok(())
+        })
     }
 
-    pub(super) fn set_wheels(&mut self, wheels: &WheelSettings) -> Result<(), Refusal> {
-        wheels.check().map_err(StoreError::from)?;
-        let own = self.configuration.own_identifier(wheels.frames.iter().flatten().map(|frame| frame.id));
-        if let Some(id) = own {
-            let error = WheelConfigError::Own(raw_id(id));
-            return Err(StoreError::Field(FieldError::Wheels(error)).into());
-        }
-        self.store()?.set(wheels)?;
-        self.note(EventKind::WheelsStored);
-        Ok(())
+    /// Stores the settings of the wheel frames, which the next start uses.
+    ///
+    /// # Errors
+    /// [`Refusal::Store`], [`Refusal::Moving`].
+    #[inline(never)]
+    pub fn set_wheels(&mut self, wheels: &WheelSettings) -> Result<(), Refusal> {
+        self.request(INTERRUPTS, |device| {
+            wheels.check().map_err(StoreError::from)?;
+            let ids = wheels.frames.iter().flatten().map(|frame| frame.id);
+            if let Some(id) = device.configuration.own_identifier(ids) {
+                let error = WheelConfigError::Own(raw_id(id));
+                return Err(StoreError::Field(FieldError::Wheels(error)).into());
+            }
+            device.store()?.set(wheels)?;
+            device.note(EventKind::WheelsStored);
+            Ok(())
+        })
     }
 
-    pub(super) fn set_unit(&mut self, unit: Option<UnitMap>) -> Result<(), Refusal> {
-        let runs = self.weights_crc.unwrap_or(0);
-        if let Some(UnitMap { weights: found, .. }) = unit
-            && found != runs
-        {
-            return Err(Refusal::OtherWeights { found, runs });
-        }
-        let calibration = Calibration { unit, ..self.calibration };
-        calibration.check().map_err(StoreError::from)?;
-        self.calibration = calibration;
-        self.store_calibration()
+    /// Stores gain and misalignment of this unit's gyro, or removes them; used from the next start on.
+    ///
+    /// # Errors
+    /// [`Refusal::OtherWeights`], [`Refusal::Store`], [`Refusal::Moving`].
+    #[inline(never)]
+    pub fn set_unit(&mut self, unit: Option<UnitMap>) -> Result<(), Refusal> {
+        self.request(INTERRUPTS, |device| {
+            let runs = device.weights_crc.unwrap_or(0);
+            if let Some(UnitMap { weights: found, .. }) = unit
+                && found != runs
+            {
+                return Err(Refusal::OtherWeights { found, runs });
+            }
+            let calibration = Calibration { unit, ..device.calibration };
+            calibration.check().map_err(StoreError::from)?;
+            device.calibration = calibration;
+            device.store_calibration()
+        })
     }
 
     pub(super) fn store_learned(&mut self) -> Result<(), Refusal> {

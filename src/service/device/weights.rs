@@ -1,6 +1,6 @@
 //! Selection and upload of weight files. A new file is written to the unused slot while GyroNet runs.
 
-use super::Device;
+use super::{Device, INTERRUPTS};
 use crate::model::Blob;
 use crate::service::event::EventKind;
 use crate::service::message::{BLOCK, Refusal};
@@ -64,59 +64,85 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    pub(super) fn weights_begin(&mut self, length: u32) -> Result<(), Refusal> {
-        let slot = self.unused_slot();
-        Upload::check(slot, length)?;
-        self.uploading = None;
-        if self.slots.is_none() {
-            return Err(SlotError::NoFlash.into());
-        }
-        // Withdraw the acceptance of the old file: a new file could have the same checksum by intent.
-        let accepted = self.accepted.without(slot);
-        if accepted != self.accepted {
-            self.store.as_mut().ok_or(SlotError::NoFlash)?.set(&accepted)?;
-            self.accepted = accepted;
-        }
-        let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
-        let upload = Upload::begin(flash, slot, length)?;
-        self.uploading = Some(Uploading { upload, checked: None });
-        Ok(())
-    }
-
-    pub(super) fn weights_block(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
-        let flash = self.slots.as_mut().ok_or(SlotError::NoFlash)?;
-        let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
-        // A block that ends where the next one begins is a repetition.
-        let written = uploading.upload.written();
-        let repeated = bytes.len() <= BLOCK && offset.checked_add(bytes.len() as u32) == Some(written);
-        if repeated {
-            return Ok(());
-        }
-        uploading.upload.block(flash, offset, bytes).map_err(|error| {
-            if let SlotError::Flash(_) = error {
-                self.uploading = None;
+    /// Begins the upload of a weight file of this length, bytes, and erases the unused slot.
+    ///
+    /// # Errors
+    /// [`Refusal::Slot`], [`Refusal::Store`], [`Refusal::Moving`].
+    #[inline(never)]
+    pub fn weights_begin(&mut self, length: u32) -> Result<(), Refusal> {
+        self.request(INTERRUPTS, |device| {
+            let slot = device.unused_slot();
+            Upload::check(slot, length)?;
+            device.uploading = None;
+            if device.slots.is_none() {
+                return Err(SlotError::NoFlash.into());
             }
-            error.into()
+            // Withdraw the acceptance of the old file: a new file could have the same checksum by intent.
+            let accepted = device.accepted.without(slot);
+            if accepted != device.accepted {
+                device.store.as_mut().ok_or(SlotError::NoFlash)?.set(&accepted)?;
+                device.accepted = accepted;
+            }
+            let flash = device.slots.as_mut().ok_or(SlotError::NoFlash)?;
+            let upload = Upload::begin(flash, slot, length)?;
+            device.uploading = Some(Uploading { upload, checked: None });
+            Ok(())
         })
     }
 
-    #[inline(never)]
-    pub(super) fn weights_verify(&mut self) -> Result<(), Refusal> {
-        let flash = self.slots.as_ref().ok_or(SlotError::NoFlash)?;
-        let uploading = self.uploading.as_mut().ok_or(SlotError::NotBegun)?;
-        let upload = &uploading.upload;
-        uploading.checked = Some(flash.check(|| upload.verify(flash.slots()))?);
-        Ok(())
+    /// Writes a block of the file, a whole number of words, at its offset. A repetition of the last block does no harm.
+    ///
+    /// # Errors
+    /// [`Refusal::Slot`], [`Refusal::Moving`].
+    pub fn weights_block(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
+        self.request(INTERRUPTS, |device| {
+            let flash = device.slots.as_mut().ok_or(SlotError::NoFlash)?;
+            let uploading = device.uploading.as_mut().ok_or(SlotError::NotBegun)?;
+            // A block that ends where the next one begins is a repetition.
+            let written = uploading.upload.written();
+            let repeated = bytes.len() <= BLOCK && offset.checked_add(bytes.len() as u32) == Some(written);
+            if repeated {
+                return Ok(());
+            }
+            uploading.upload.block(flash, offset, bytes).map_err(|error| {
+                if let SlotError::Flash(_) = error {
+                    device.uploading = None;
+                }
+                error.into()
+            })
+        })
     }
 
-    pub(super) fn weights_activate(&mut self) -> Result<(), Refusal> {
-        let Uploading { upload, checked } = self.uploading.ok_or(SlotError::NotBegun)?;
-        let file = checked.ok_or(SlotError::Incomplete { written: upload.written() })?;
-        let accepted = self.accepted.with(upload.slot(), file);
-        self.store()?.set(&accepted)?;
-        self.accepted = accepted;
-        self.uploading = None;
-        self.note(EventKind::WeightsAccepted(upload.slot()));
-        Ok(())
+    /// Checks the complete file.
+    ///
+    /// # Errors
+    /// [`Refusal::Slot`].
+    #[inline(never)]
+    pub fn weights_verify(&mut self) -> Result<(), Refusal> {
+        self.request(false, |device| {
+            let flash = device.slots.as_ref().ok_or(SlotError::NoFlash)?;
+            let uploading = device.uploading.as_mut().ok_or(SlotError::NotBegun)?;
+            let upload = &uploading.upload;
+            uploading.checked = Some(flash.check(|| upload.verify(flash.slots()))?);
+            Ok(())
+        })
+    }
+
+    /// Uses the checked file from the next start on.
+    ///
+    /// # Errors
+    /// [`Refusal::Slot`], [`Refusal::Store`], [`Refusal::Moving`].
+    #[inline(never)]
+    pub fn weights_activate(&mut self) -> Result<(), Refusal> {
+        self.request(INTERRUPTS, |device| {
+            let Uploading { upload, checked } = device.uploading.ok_or(SlotError::NotBegun)?;
+            let file = checked.ok_or(SlotError::Incomplete { written: upload.written() })?;
+            let accepted = device.accepted.with(upload.slot(), file);
+            device.store()?.set(&accepted)?;
+            device.accepted = accepted;
+            device.uploading = None;
+            device.note(EventKind::WeightsAccepted(upload.slot()));
+            Ok(())
+        })
     }
 }

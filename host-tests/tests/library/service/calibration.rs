@@ -1,13 +1,12 @@
 //! A calibration runs at standstill, and its result is stored when that is asked for.
 
-use super::{Board, ask, sample, set, start};
+use super::{Board, sample, start};
 use gyronet::bias::{BiasCurve, CurveFilter};
 use gyronet::health::{Faults, Status};
 use gyronet::mounting::{Forward, GyroMap};
 use gyronet::sample::{Standstill, WheelSample};
-use gyronet::service::Request;
 use gyronet::service::calibrate::{CalibrationFault, State, Task};
-use gyronet::service::message::{Calibrate, Refusal};
+use gyronet::service::message::Refusal;
 use gyronet::store::{Configuration, Learned, Mounting, UnitMap};
 use gyronet::uds::isotp::MAX_MESSAGE;
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
@@ -18,7 +17,7 @@ use std::rc::Rc;
 
 /// Runs a calibration to its end.
 fn calibrate(board: &mut Board, task: Task, force: [f32; 3], wobble: f32) -> State {
-    assert_eq!(ask(board, &Request::Calibrate(Calibrate::Start(task))), Ok(()));
+    board.start_calibration(task);
     for k in 0..301u64 {
         let rate = 0.01 + if k % 2 == 0 { wobble } else { -wobble };
         board.observe(
@@ -35,21 +34,20 @@ fn calibrate(board: &mut Board, task: Task, force: [f32; 3], wobble: f32) -> Sta
 fn calibration_is_found_and_kept() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
-    let store = Request::Calibrate(Calibrate::Store);
-    assert_eq!(ask(&mut board, &store), Err(Refusal::NothingFound));
+    assert_eq!(board.store_result(), Err(Refusal::NothingFound));
     let level = [0.0, 0.0, 9.81];
     assert_eq!(
         calibrate(&mut board, Task::Static, level, 0.3),
         State::Failed(Task::Static, CalibrationFault::Moving(0))
     );
-    assert_eq!(ask(&mut board, &store), Err(Refusal::NothingFound));
+    assert_eq!(board.store_result(), Err(Refusal::NothingFound));
     let mut board = start(&flash);
     assert_eq!(calibrate(&mut board, Task::Static, level, 0.001), State::Found(Task::Static));
-    assert_eq!(ask(&mut board, &store), Ok(()));
+    assert_eq!(board.store_result(), Ok(()));
     // Rolled by 30 deg: gravity shows on y.
     let tilted = [0.0, 9.81 * 0.5, 9.81 * 0.866_025_4];
     assert_eq!(calibrate(&mut board, Task::Mounting, tilted, 0.001), State::Found(Task::Mounting));
-    assert_eq!(ask(&mut board, &store), Ok(()));
+    assert_eq!(board.store_result(), Ok(()));
     assert_eq!(
         calibrate(&mut board, Task::Mounting, [9.81, 0.0, 0.0], 0.001),
         State::Failed(Task::Mounting, CalibrationFault::Tilted(90.0))
@@ -68,10 +66,10 @@ fn the_map_of_a_unit_is_kept_for_the_weights_it_was_found_with() {
     let runs = board.info().weights_crc.unwrap_or(0);
     let elements = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.006, 0.029, 1.001]];
     let gyro_map = GyroMap::from_elements(elements).expect("a unit's");
-    let set = |weights| Request::Calibrate(Calibrate::SetUnit(Some(UnitMap { gyro_map, weights })));
+    let unit = |weights| Some(UnitMap { gyro_map, weights });
     let refused = Refusal::OtherWeights { found: runs ^ 1, runs };
-    assert_eq!(ask(&mut board, &set(runs ^ 1)), Err(refused));
-    assert_eq!(ask(&mut board, &set(runs)), Ok(()));
+    assert_eq!(board.set_unit(unit(runs ^ 1)), Err(refused));
+    assert_eq!(board.set_unit(unit(runs)), Ok(()));
     let board = start(&flash);
     assert_eq!(board.calibration().gyro_map(runs), Some(gyro_map));
     let of =
@@ -85,7 +83,10 @@ fn the_map_of_a_unit_is_kept_for_the_weights_it_was_found_with() {
 fn configured_rotation_comes_first() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mounting = Mounting { roll_deg: 180.0, pitch_deg: 0.0, yaw_deg: 90.0 };
-    assert_eq!(ask(&mut start(&flash), &set(&Configuration { mounting, ..Configuration::DEFAULT })), Ok(()));
+    assert_eq!(
+        start(&flash).set_configuration(&Configuration { mounting, ..Configuration::DEFAULT }),
+        Ok(())
+    );
     let mut board = start(&flash);
     // Upside down and turned: gravity shows as -z, and the small force along the sensor's -x is
     // the vehicle's -y.

@@ -1,15 +1,14 @@
 //! The configuration is stored whole, at standstill alone, and refused where it is wrong.
 
-use super::{Board, IDENTITY, SUPPORTED_HARDWARE, ask, bare, info, sample, set, start};
+use super::{Board, IDENTITY, SUPPORTED_HARDWARE, bare, info, sample, start};
 use embedded_can::{Id, StandardId};
 use gyronet::can::config::{ConfigError, Settings};
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::wheel::{WheelConfigError, WheelFrame, WheelSettings};
 use gyronet::health::{Faults, Status};
 use gyronet::sample::{Standstill, WheelSample};
-use gyronet::service::Request;
 use gyronet::service::event::EventKind;
-use gyronet::service::message::{Calibrate, FlashState, Origin, Refusal};
+use gyronet::service::message::{FlashState, Origin, Refusal};
 use gyronet::store::layout;
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, Field, FieldError, FlashFault, FogPart, ImuPart, Mounting, StoreError};
@@ -24,13 +23,13 @@ fn configuration_is_kept_whole() {
     let mut board = start(&flash);
     assert_eq!(info(&mut board).configuration, Origin::BuiltIn);
     let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
-    assert_eq!(ask(&mut board, &set(&wanted)), Ok(()));
+    assert_eq!(board.set_configuration(&wanted), Ok(()));
     let mut board = start(&flash);
     assert_eq!(info(&mut board).configuration, Origin::Stored);
     assert_eq!(*board.configuration(), wanted);
     // Refused, and named, and the old one stays.
     let wild = Configuration { mounting: Mounting { pitch_deg: 91.0, ..Mounting::default() }, ..wanted };
-    match ask(&mut board, &set(&wild)) {
+    match board.set_configuration(&wild) {
         Err(Refusal::Store(StoreError::Field(FieldError::Range { field, value, .. }))) => {
             assert_eq!((field, value), (Field::MountingPitchDeg, 91.0));
         }
@@ -38,19 +37,17 @@ fn configuration_is_kept_whole() {
     }
     let refused = |error| Err(Refusal::Store(StoreError::Field(error)));
     let other_part = Configuration { imu: ImuPart::Adis16465, ..wanted };
-    assert_eq!(ask(&mut board, &set(&other_part)), refused(FieldError::PartNotInImage));
+    assert_eq!(board.set_configuration(&other_part), refused(FieldError::PartNotInImage));
     let can = Settings { bits_per_second: 250_000, ..wanted.can };
     assert_eq!(
-        ask(&mut board, &set(&Configuration { can, ..wanted })),
+        board.set_configuration(&Configuration { can, ..wanted }),
         refused(FieldError::BitRateNotInImage(250_000))
     );
     let twice = Configuration { fog_ids: [0x1A0, 0x1A5, 0x1A6], ..wanted };
     let duplicate = FieldError::Can(ConfigError::DuplicateIdentifier(0x1A0));
-    assert_eq!(ask(&mut board, &set(&twice)), refused(duplicate));
+    assert_eq!(board.set_configuration(&twice), refused(duplicate));
     let with_fog = Configuration { fog: Some(FogPart::Dsp3000), ..wanted };
-    assert_eq!(ask(&mut board, &set(&with_fog)), refused(FieldError::PartNotInImage));
-    let request = Request::SetConfiguration { version: 9, configuration: &wanted };
-    assert_eq!(ask(&mut board, &request), Err(Refusal::Version { found: 9, expected: 7 }));
+    assert_eq!(board.set_configuration(&with_fog), refused(FieldError::PartNotInImage));
     assert_eq!(*start(&flash).configuration(), wanted);
 }
 
@@ -66,11 +63,11 @@ fn wheel_frames_are_kept_and_none_may_be_the_board_s_own() {
         let frame = WheelSettings::TOYOTA.frames[0].map(|frame| WheelFrame { id, ..frame });
         WheelSettings { frames: [frame, None, None, None], ..WheelSettings::TOYOTA }
     };
-    assert_eq!(ask(&mut board, &Request::SetWheels(with_id(0xAB))), Ok(()));
+    assert_eq!(board.set_wheels(&with_id(0xAB)), Ok(()));
     for own in [0x1A0, Configuration::DEFAULT.fog_ids[1]] {
         let error = FieldError::Wheels(WheelConfigError::Own(own.into()));
         let refused = Err(Refusal::Store(StoreError::Field(error)));
-        assert_eq!(ask(&mut board, &Request::SetWheels(with_id(own))), refused);
+        assert_eq!(board.set_wheels(&with_id(own)), refused);
     }
     assert_eq!(known(&mut board), built_in, "from the next start on");
     let mut board = start(&flash);
@@ -81,9 +78,9 @@ fn wheel_frames_are_kept_and_none_may_be_the_board_s_own() {
 fn damaged_record_is_noted() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
-    assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), Ok(()));
+    assert_eq!(board.set_configuration(&Configuration::DEFAULT), Ok(()));
     // Another record is whole.
-    assert_eq!(ask(&mut board, &Request::SetWheels(WheelSettings::TOYOTA)), Ok(()));
+    assert_eq!(board.set_wheels(&WheelSettings::TOYOTA), Ok(()));
     flash.borrow_mut().damage(layout::STORE.start as usize + 20, 4);
     let mut board = start(&flash);
     assert_eq!(info(&mut board).flash, FlashState::Damaged);
@@ -96,9 +93,9 @@ fn damaged_record_is_noted() {
         let mut board = start(&flash);
         assert_eq!(info(&mut board).configuration, Origin::Refused(StoreError::Lost));
         assert!(board.stored_damaged() && board.configuration_lost());
-        assert_eq!(ask(&mut board, &Request::SetWheels(WheelSettings::TOYOTA)), Ok(()));
+        assert_eq!(board.set_wheels(&WheelSettings::TOYOTA), Ok(()));
     }
-    assert_eq!(ask(&mut start(&flash), &set(&Configuration::DEFAULT)), Ok(()));
+    assert_eq!(start(&flash).set_configuration(&Configuration::DEFAULT), Ok(()));
     let board = start(&flash);
     assert!(!board.stored_damaged() && !board.configuration_lost());
 }
@@ -109,7 +106,7 @@ fn a_torn_record_of_something_else_heals_at_the_next_start() {
     // No configuration is stored. Of two records of the wheels the second one is torn: its checksum is missing.
     let mut board = start(&flash);
     for _ in 0..2 {
-        assert_eq!(ask(&mut board, &Request::SetWheels(WheelSettings::TOYOTA)), Ok(()));
+        assert_eq!(board.set_wheels(&WheelSettings::TOYOTA), Ok(()));
     }
     let first = layout::STORE.start as usize + 8;
     let size = 8 + usize::from(flash.borrow().bytes()[first + 2]).next_multiple_of(4);
@@ -123,7 +120,7 @@ fn a_torn_record_of_something_else_heals_at_the_next_start() {
 fn nothing_is_written_with_an_unlocked_controller_and_the_standstill_gate_holds() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
-    assert_eq!(ask(&mut start(&flash), &set(&wanted)), Ok(()));
+    assert_eq!(start(&flash).set_configuration(&wanted), Ok(()));
     let mut board = Board::new(&SUPPORTED_HARDWARE);
     let records = Region::new(&flash, layout::STORE);
     board.begin(Some(records), Some(MappedRegion::new(&flash)), Err(FlashFault::Unlocked), IDENTITY);
@@ -138,11 +135,11 @@ fn nothing_is_written_with_an_unlocked_controller_and_the_standstill_gate_holds(
     );
     let before = flash.borrow().operations();
     let no_flash = Err(Refusal::Store(StoreError::NoFlash));
-    assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), no_flash);
+    assert_eq!(board.set_configuration(&Configuration::DEFAULT), no_flash);
     let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
-    assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 64 }), no_slot);
+    assert_eq!(board.weights_begin(64), no_slot);
     assert!(!storable(&mut board, 0..1, 0.0, Standstill::Moving));
-    assert_eq!(ask(&mut board, &Request::Restart), Err(Refusal::Moving));
+    assert_eq!(board.restart(), Err(Refusal::Moving));
     assert_eq!(flash.borrow().operations(), before);
 }
 
@@ -153,11 +150,11 @@ fn nothing_is_stored_without_flash() {
     assert_eq!((about.flash, about.weights), (FlashState::Absent, WeightSource::BuiltIn));
     assert_eq!(about.identity, IDENTITY);
     let no_flash = Err(Refusal::Store(StoreError::NoFlash));
-    assert_eq!(ask(&mut board, &set(&Configuration::DEFAULT)), no_flash);
+    assert_eq!(board.set_configuration(&Configuration::DEFAULT), no_flash);
     let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
-    assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 64 }), no_slot);
-    assert_eq!(ask(&mut board, &Request::WeightsVerify), no_slot);
-    assert_eq!(ask(&mut board, &Request::WeightsActivate), Err(Refusal::Slot(SlotError::NotBegun)));
+    assert_eq!(board.weights_begin(64), no_slot);
+    assert_eq!(board.weights_verify(), no_slot);
+    assert_eq!(board.weights_activate(), Err(Refusal::Slot(SlotError::NotBegun)));
 }
 
 #[test]
@@ -165,7 +162,7 @@ fn identifiers_of_diagnosis_are_three_that_nobody_else_uses() {
     let mut board = start(&Rc::new(RefCell::new(F405::default())));
     let mut ask = |extended, [request, functional, response]: [u32; 3]| {
         let diagnosis = DiagnosisIds { extended, request, functional, response };
-        ask(&mut board, &set(&Configuration { diagnosis, ..Configuration::DEFAULT }))
+        board.set_configuration(&Configuration { diagnosis, ..Configuration::DEFAULT })
     };
     assert_eq!(ask(false, [0x700, 0x7DF, 0x708]), Ok(()));
     assert_eq!(ask(true, [0x18DA_10F1, 0x18DB_33F1, 0x18DA_F110]), Ok(()));
@@ -193,7 +190,7 @@ fn storable(board: &mut Board, samples: Range<u64>, wobble: f32, wheels: Standst
             &WheelSample::without_speeds(wheels),
         );
     }
-    match ask(board, &set(&Configuration::DEFAULT)) {
+    match board.set_configuration(&Configuration::DEFAULT) {
         Ok(()) => true,
         Err(Refusal::Moving) => false,
         other => panic!("{other:?}"),
@@ -223,13 +220,18 @@ fn flash_is_written_at_standstill_alone() {
         (Status::Silent, Faults::NONE),
         &WheelSample::without_speeds(Standstill::Moving),
     );
-    for request in [
-        Request::WeightsBegin { length: 64 },
-        Request::WeightsBlock { offset: 0, bytes: &[] },
-        Request::WeightsActivate,
-        Request::Calibrate(Calibrate::Store),
-        Request::Restart,
-    ] {
-        assert_eq!(ask(&mut board, &request), Err(Refusal::Moving), "{request:?}");
+    let requests: [fn(&mut Board) -> Result<(), Refusal>; 8] = [
+        |board| board.set_wheels(&WheelSettings::TOYOTA),
+        |board| board.set_unit(None),
+        |board| board.weights_begin(64),
+        |board| board.weights_block(0, &[]),
+        Board::weights_activate,
+        Board::store_result,
+        Board::forget_learned,
+        Board::restart,
+    ];
+    for (number, request) in requests.into_iter().enumerate() {
+        assert_eq!(request(&mut board), Err(Refusal::Moving), "{number}");
+        assert_eq!(board.refusal(), Some(Refusal::Moving), "testers can read it");
     }
 }

@@ -2,16 +2,15 @@
 //! both over a restart, and forgets them on request.
 
 use super::uds::{Bench, bench};
-use super::{Board, ask, sample, set, start};
+use super::{Board, sample, start};
 use gyronet::bias::StaticConfig;
 use gyronet::health::{Faults, Status};
 use gyronet::mounting::Forward;
 use gyronet::sample::{ImuSample, Standstill, WheelSample};
 
+use gyronet::service::Learner;
 use gyronet::service::calibrate::Task;
 use gyronet::service::event::EventKind;
-use gyronet::service::message::Calibrate;
-use gyronet::service::{Learner, Request};
 use gyronet::store::{Calibration, Configuration, Learned};
 use gyronet::units::{CentiCelsius, WheelSpeed};
 use gyronet_host_tests::flash::F405;
@@ -70,7 +69,7 @@ fn a_standstill_that_the_wheels_prove_is_learnt_from() {
 fn what_was_learnt_survives_a_restart_and_is_used_where_the_configuration_wants_it() {
     let (flash, mut bench) = bench();
     // Without anything stored yet an erase would be needed, which only a session may ask for.
-    assert_eq!(ask(&mut bench.board, &set(&Configuration::DEFAULT)), Ok(()));
+    assert_eq!(bench.board.set_configuration(&Configuration::DEFAULT), Ok(()));
     observe(&mut bench.board, 4, (0.01, 20), LEVEL, Standstill::Still);
     bench.expect(&[0x3E, 0], &[0x7E, 0]);
     let mut bench = Bench::new(&flash);
@@ -82,7 +81,7 @@ fn what_was_learnt_survives_a_restart_and_is_used_where_the_configuration_wants_
     assert!(is_near(used(Configuration::DEFAULT, &bench.board), 0.01));
     let off = Configuration { learn: false, ..Configuration::DEFAULT };
     assert_eq!(used(off, &bench.board), None);
-    assert_eq!(ask(&mut bench.board, &set(&off)), Ok(()));
+    assert_eq!(bench.board.set_configuration(&off), Ok(()));
     let (mut board, before) = (start(&flash), *bench.board.learned());
     observe(&mut board, 4, (0.05, 40), LEVEL, Standstill::Still);
     assert_eq!(*board.learned(), before, "off");
@@ -103,7 +102,7 @@ fn a_tester_reads_what_was_learnt_and_has_it_forgotten() {
     bench.expect(&[0x31, 1, 0x02, 0x05], &[0x71, 1, 0x02, 0x05]);
     assert_eq!(learned(&bench.board, 20.0), None);
     assert_eq!(learned(&start(&flash), 20.0), None);
-    assert_eq!(ask(&mut bench.board, &Request::Calibrate(Calibrate::Forget)), Ok(()));
+    assert_eq!(bench.board.forget_learned(), Ok(()));
 }
 
 /// A drive with the sensor's x axis this far to the left of forward, deg: speed and yaw rate change in waves.
@@ -135,7 +134,7 @@ fn moved_events(board: &Board) -> usize {
 #[test]
 fn a_drive_shows_where_forward_is_and_that_the_sensor_was_moved() {
     let (flash, mut bench) = bench();
-    assert_eq!(ask(&mut bench.board, &set(&Configuration::DEFAULT)), Ok(()));
+    assert_eq!(bench.board.set_configuration(&Configuration::DEFAULT), Ok(()));
     bench.expect(&[0x22, 0x01, 0x16], &[0x62, 0x01, 0x16, 0, 0, 0, 0, 0]);
     drive(&mut bench.board, 60, 20.0);
     assert_eq!(bench.board.forward_deg(), None, "where up is only a standstill shows");
@@ -164,9 +163,9 @@ fn a_drive_shows_where_forward_is_and_that_the_sensor_was_moved() {
 
     // After the next start its owner says that this is right.
     let mut board = start(&flash);
-    assert_eq!(ask(&mut board, &Request::Calibrate(Calibrate::Start(Task::Static))), Ok(()));
+    board.start_calibration(Task::Static);
     observe(&mut board, 4, (0.01, 20), LEVEL, Standstill::Still);
-    assert_eq!(ask(&mut board, &Request::Calibrate(Calibrate::Store)), Ok(()));
+    assert_eq!(board.store_result(), Ok(()));
     let mut board = start(&flash);
     drive(&mut board, 120, 80.0);
     let [yaw, sigma] = board.forward_deg().expect("a drive");
@@ -210,7 +209,7 @@ fn a_minute_on_a_ramp_is_one_standstill() {
 fn a_board_that_must_not_learn_does_not_look_for_forward() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let off = Configuration { learn: false, ..Configuration::DEFAULT };
-    assert_eq!(ask(&mut start(&flash), &set(&off)), Ok(()));
+    assert_eq!(start(&flash).set_configuration(&off), Ok(()));
     let mut board = start(&flash);
     observe(&mut board, 4, (0.01, 20), LEVEL, Standstill::Still);
     drive(&mut board, 120, 20.0);

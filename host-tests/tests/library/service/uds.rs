@@ -213,7 +213,7 @@ fn a_trouble_is_kept_when_its_cause_is_over_and_until_it_is_cleared() {
 fn a_trouble_survives_a_restart_with_the_state_in_which_it_came() {
     let (flash, mut bench) = bench();
     // Something has been stored before: there is room without an erase.
-    assert_eq!(super::ask(&mut bench.board, &super::set(&Configuration::DEFAULT)), Ok(()));
+    assert_eq!(bench.board.set_configuration(&Configuration::DEFAULT), Ok(()));
     bench.board.observe(
         None,
         1_234,
@@ -317,6 +317,11 @@ fn a_configuration_is_read_changed_and_written_at_standstill() {
     bench.expect(&write, &[0x6E, 1, 0]);
     assert_eq!(bench.tester.pending, 2, "a write may erase");
     assert_eq!(start(&flash).configuration(), &changed);
+    write[3] += 1;
+    bench.expect(&write, &[0x7F, 0x2E, 0x31]);
+    let expected = Configuration::VERSION;
+    assert_eq!(bench.board.refusal(), Some(Refusal::Version { found: expected + 1, expected }));
+    write[3] = expected;
     let far = Configuration { latitude_deg: Some(99.0), ..found };
     write.truncate(4);
     write.extend(postcard::to_stdvec(&far).expect("it fits"));

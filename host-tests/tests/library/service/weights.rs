@@ -1,8 +1,7 @@
 //! Weights are uploaded block by block, checked, and used after the next start.
 
-use super::{Board, ask, info, start};
+use super::{Board, info, start};
 use gyronet::model::weights;
-use gyronet::service::Request;
 use gyronet::service::message::Refusal;
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Accepted, Slot};
@@ -11,11 +10,6 @@ use gyronet_host_tests::stored::{open, other_weights};
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// The request that begins the upload of a file.
-fn begin(file: &[u8]) -> Request<'static> {
-    Request::WeightsBegin { length: file.len() as u32 }
-}
-
 #[test]
 fn weights_are_replaced() {
     let flash = Rc::new(RefCell::new(F405::default()));
@@ -23,35 +17,33 @@ fn weights_are_replaced() {
     let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
     for (round, slot) in [Slot::A, Slot::B, Slot::A].into_iter().enumerate() {
         let mut board = start(&flash);
-        assert_eq!(ask(&mut board, &begin(file)), Ok(()));
+        assert_eq!(board.weights_begin(file.len() as u32), Ok(()));
         for (block, offset) in file.chunks(256).zip((0u32..).step_by(256)) {
-            let request = Request::WeightsBlock { offset, bytes: block };
             let written = offset + block.len() as u32;
-            assert_eq!(ask(&mut board, &request), Ok(()));
+            assert_eq!(board.weights_block(offset, block), Ok(()));
             // The answer was lost: the same again does no harm.
-            assert_eq!(ask(&mut board, &request), Ok(()));
+            assert_eq!(board.weights_block(offset, block), Ok(()));
             if offset == 512 {
-                let gap = Request::WeightsBlock { offset: 4096, bytes: &[] };
                 let expected = Err(Refusal::Slot(SlotError::Offset { expected: written }));
-                assert_eq!(ask(&mut board, &gap), expected);
+                assert_eq!(board.weights_block(4096, &[]), expected);
                 let early = Err(Refusal::Slot(SlotError::Incomplete { written }));
-                assert_eq!(ask(&mut board, &Request::WeightsVerify), early);
-                assert_eq!(ask(&mut board, &Request::WeightsActivate), early);
+                assert_eq!(board.weights_verify(), early);
+                assert_eq!(board.weights_activate(), early);
             }
         }
         assert_eq!(board.uploaded(), None);
-        assert_eq!(ask(&mut board, &Request::WeightsVerify), Ok(()));
+        assert_eq!(board.weights_verify(), Ok(()));
         assert_eq!(board.uploaded(), Some((slot, crc)));
-        assert_eq!(ask(&mut board, &Request::WeightsActivate), Ok(()));
+        assert_eq!(board.weights_activate(), Ok(()));
         let about = info(&mut start(&flash));
         assert_eq!((about.weights, about.weights_crc), (WeightSource::Slot(slot), Some(crc)), "{round}");
     }
     // A bad file is not accepted, and what ran before runs on.
     let mut board = start(&flash);
-    assert_eq!(ask(&mut board, &Request::WeightsBegin { length: 256 }), Ok(()));
-    assert_eq!(ask(&mut board, &Request::WeightsBlock { offset: 0, bytes: &[0x55; 256] }), Ok(()));
-    assert!(matches!(ask(&mut board, &Request::WeightsVerify), Err(Refusal::Slot(_))));
-    assert!(matches!(ask(&mut board, &Request::WeightsActivate), Err(Refusal::Slot(_))));
+    assert_eq!(board.weights_begin(256), Ok(()));
+    assert_eq!(board.weights_block(0, &[0x55; 256]), Ok(()));
+    assert!(matches!(board.weights_verify(), Err(Refusal::Slot(_))));
+    assert!(matches!(board.weights_activate(), Err(Refusal::Slot(_))));
     assert_eq!(info(&mut start(&flash)).weights, WeightSource::Slot(Slot::A));
     // The slot in use damaged, and nothing accepted in the other: the built-in weights, and it is named.
     flash.borrow_mut().damage(Slot::A.offset() as usize + 70_000, 0x10);
@@ -63,11 +55,11 @@ fn weights_are_replaced() {
 
 /// Uploads a file and has it checked.
 fn upload(board: &mut Board, file: &[u8]) {
-    assert_eq!(ask(board, &begin(file)), Ok(()));
+    assert_eq!(board.weights_begin(file.len() as u32), Ok(()));
     for (block, offset) in file.chunks(256).zip((0u32..).step_by(256)) {
-        assert_eq!(ask(board, &Request::WeightsBlock { offset, bytes: block }), Ok(()));
+        assert_eq!(board.weights_block(offset, block), Ok(()));
     }
-    assert_eq!(ask(board, &Request::WeightsVerify), Ok(()));
+    assert_eq!(board.weights_verify(), Ok(()));
 }
 
 /// The upload itself touches the unused slot alone (`store_power_cut`); here the board changes over to it.
@@ -76,7 +68,7 @@ fn a_power_cut_during_activation_leaves_the_old_or_the_new_weights() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
     upload(&mut board, &other_weights(1));
-    assert_eq!(ask(&mut board, &Request::WeightsActivate), Ok(()));
+    assert_eq!(board.weights_activate(), Ok(()));
     let before = flash.borrow().clone();
     let mut cuts = 0;
     let changed_over = loop {
@@ -84,7 +76,7 @@ fn a_power_cut_during_activation_leaves_the_old_or_the_new_weights() {
         let mut board = start(&flash);
         upload(&mut board, &other_weights(2));
         flash.borrow_mut().cut_after(cuts, Cut::ALL[cuts as usize % Cut::ALL.len()]);
-        let answer = ask(&mut board, &Request::WeightsActivate);
+        let answer = board.weights_activate();
         if !flash.borrow_mut().restore() {
             break answer;
         }
@@ -105,7 +97,7 @@ fn a_file_with_the_checksum_of_an_accepted_one_is_not_accepted_with_it() {
     let mut board = start(&flash);
     for _ in 0..2 {
         upload(&mut board, file);
-        assert_eq!(ask(&mut board, &Request::WeightsActivate), Ok(()));
+        assert_eq!(board.weights_activate(), Ok(()));
         board = start(&flash);
     }
     let accepted = || open(&flash).unwrap().get::<Accepted>().unwrap().unwrap();
@@ -120,11 +112,10 @@ fn an_upload_that_is_refused_erases_nothing() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
     upload(&mut board, &weights::GYRONET.0);
-    assert_eq!(ask(&mut board, &Request::WeightsActivate), Ok(()));
+    assert_eq!(board.weights_activate(), Ok(()));
     let (mut board, before) = (start(&flash), flash.borrow().operations());
     for length in [0, 3, u32::MAX] {
-        let request = Request::WeightsBegin { length };
-        assert_eq!(ask(&mut board, &request), Err(Refusal::Slot(SlotError::Length(length))));
+        assert_eq!(board.weights_begin(length), Err(Refusal::Slot(SlotError::Length(length))));
     }
     assert_eq!(flash.borrow().operations(), before);
 }
@@ -135,15 +126,15 @@ fn a_file_of_fognet_is_refused() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let file = &weights::FOGNET.0;
     let too_long = Err(Refusal::Slot(SlotError::Length(file.len() as u32)));
-    assert_eq!(ask(&mut start(&flash), &begin(file)), too_long);
+    assert_eq!(start(&flash).weights_begin(file.len() as u32), too_long);
     // A small one.
     let mut board = start(&flash);
     let file = &file[..4096];
-    assert_eq!(ask(&mut board, &begin(file)), Ok(()));
+    assert_eq!(board.weights_begin(file.len() as u32), Ok(()));
     for (bytes, offset) in file.chunks(256).zip((0u32..).step_by(256)) {
-        assert_eq!(ask(&mut board, &Request::WeightsBlock { offset, bytes }), Ok(()));
+        assert_eq!(board.weights_block(offset, bytes), Ok(()));
     }
-    let refused = ask(&mut board, &Request::WeightsVerify);
+    let refused = board.weights_verify();
     assert!(matches!(refused, Err(Refusal::Slot(SlotError::Blob(_) | SlotError::Length(_)))), "{refused:?}");
     let (_, mut bench) = super::uds::bench();
     bench.expect(&[0x10, 2], &[0x50, 2, 0, 50, 0x01, 0xF4]);
