@@ -269,7 +269,7 @@ fn weights(device: &mut Board, path: &std::path::Path, json: bool, common: Commo
     if file.get(6..8) == Some(&FOGNET.to_le_bytes()[..]) {
         let name = path.display();
         return Err(format!(
-            "{name}: FoGNet no longer runs on this board; `gyronet tables` runs it on recordings"
+            "{name}: FoGNet no longer runs on this board; `cargo paper tables` runs it on recordings"
         )
         .into());
     }

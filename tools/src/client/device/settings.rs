@@ -26,7 +26,7 @@ pub enum SettingError {
     Name(String),
     /// The setting was retired.
     #[error(
-        "{0}: retired, because FoGNet no longer runs on this board (`gyronet tables` runs it on recordings)"
+        "{0}: retired, because FoGNet no longer runs on this board (`cargo paper tables` runs it on recordings)"
     )]
     Retired(&'static str),
     /// The value is not a rate, or out of range.
