@@ -20,6 +20,7 @@ pub mod queue;
 #[doc(hidden)]
 pub mod signal;
 pub mod slcan;
+pub mod status;
 pub mod wheel;
 pub mod yaw;
 #[doc(hidden)]

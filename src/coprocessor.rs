@@ -415,6 +415,9 @@ impl Coprocessor {
         if SINK::TAKES_FRAMES {
             let vehicle = withheld.as_ref().unwrap_or(vehicle);
             self.encoder.send(vehicle, |frame| sink.frame(TimedFrame { frame, time }));
+            if let Some(frame) = self.encoder.status(|| self.pipeline.status()) {
+                sink.frame(TimedFrame { frame, time });
+            }
             self.counters.out_of_range = self.encoder.out_of_range();
         }
         self.bus.reported = self.bus.lost;

@@ -1,5 +1,7 @@
 //! These types report the state of the board: status, source and one counter for each kind of event.
 
+#[doc(hidden)]
+pub mod slow;
 pub mod states;
 
 use crate::sample::Validity;

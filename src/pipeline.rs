@@ -14,6 +14,7 @@ mod initialised;
 mod output;
 mod report;
 mod sensor_bias;
+mod status;
 mod uncertainty;
 mod wheels;
 mod windows;
@@ -66,6 +67,8 @@ struct State {
     tick: u32,
     /// Samples until the last gap is a whole window in the past.
     gap_within: u32,
+    /// Gaps since the yaw began to accumulate.
+    yaw_gaps: u32,
     /// The newest sample as the networks see it.
     inertial: Option<Features>,
     /// The sensor is mounted differently than in earlier drives.
@@ -103,6 +106,7 @@ impl Pipeline {
             clock_ratio: ClockRatio::ONE,
             tick: 0,
             gap_within: 0,
+            yaw_gaps: 0,
             inertial: None,
             moved: false,
             board: BoardFaults::NONE,
@@ -253,6 +257,7 @@ impl Pipeline {
         self.state.gap_within = WINDOW as u32;
         self.break_window();
         if let Some(known) = &mut self.state.initialised {
+            count(&mut self.state.yaw_gaps, 1);
             known.quiet.restart();
             known.zero_rate.as_mut().map(ZeroRate::restart);
         }

@@ -220,6 +220,12 @@ impl ZeroRate {
         self.source == StandstillSource::Wheels && self.refused
     }
 
+    /// The evidence that the vehicle stands; none where the gyro contradicts it.
+    #[must_use]
+    pub fn evidence(&self) -> StandstillSource {
+        if self.refused { StandstillSource::None } else { self.source }
+    }
+
     /// Returns the largest turn of a second at standstill, rad.
     fn wheels_gate(&self) -> f32 {
         self.config.max_step.max(10.0 * self.sigma())

@@ -7,11 +7,12 @@ mod settings;
 
 pub use super::e2e::{DataIdMode, P11Mode};
 pub use error::ConfigError;
-pub use settings::{BoschSettings, E2e, Settings, Vdc2Settings, YawSettings};
+pub use settings::{BoschSettings, E2e, Settings, StatusSettings, Vdc2Settings, YawSettings};
 
 use super::bosch::LAYOUTS;
 use super::j1939::{VDC2_PGN, VDC2_PRIORITY, broadcast_id};
 use super::load::{Periodic, per_mille};
+use super::status;
 use crate::sample::PERIOD_US;
 use embedded_can::{Id, StandardId};
 use heapless::Vec;
@@ -27,7 +28,7 @@ const MAX_SOURCE: u8 = 253;
 /// Highest worst-case bus load, 1/1000; above it other nodes would wait too long.
 const MAX_BUS_LOAD: u32 = 800;
 /// Largest number of messages in a configuration.
-pub const MAX_MESSAGES: usize = 7;
+pub const MAX_MESSAGES: usize = 8;
 
 /// Checked [`Settings`]: the messages that are sent, their periods and their protection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,6 +62,10 @@ impl Config {
         {
             return Err(ConfigError::SourceAddress(source));
         }
+        if let Some(StatusSettings { id }) = settings.status {
+            let others = Self { settings: Settings { status: None, ..settings } };
+            check_ids([id], |id| others.sends(Id::Standard(id)))?;
+        }
         let config = Self { settings };
         if config.messages().is_empty() {
             return Err(ConfigError::Empty);
@@ -78,7 +83,7 @@ impl Config {
     /// Returns every message that is sent, in the order of sending.
     #[must_use]
     pub fn messages(&self) -> Vec<Periodic, MAX_MESSAGES> {
-        let Settings { bosch, yaw, vdc2, .. } = self.settings;
+        let Settings { bosch, yaw, vdc2, status, .. } = self.settings;
         let bosch = bosch_ids(bosch).map(|id| Periodic { id: Id::Standard(id), period_ms: SAMPLE_MS });
         let yaw = yaw.into_iter().flat_map(|yaw| {
             let message = move |id| Some(Periodic { id: Id::Standard(id?), period_ms: yaw.period_ms });
@@ -88,8 +93,10 @@ impl Config {
             let id = broadcast_id(VDC2_PGN, VDC2_PRIORITY, vdc2.source)?;
             Some(Periodic { id: Id::Extended(id), period_ms: SAMPLE_MS })
         });
+        let status = status.and_then(|status| StandardId::new(status.id));
+        let status = status.map(|id| Periodic { id: Id::Standard(id), period_ms: status::PERIOD_MS });
         let mut messages = Vec::new();
-        for message in bosch.chain(yaw).chain(vdc2) {
+        for message in bosch.chain(yaw).chain(vdc2).chain(status) {
             // MAX_MESSAGES holds every message that can be configured.
             let _ = messages.push(message);
         }
@@ -149,7 +156,7 @@ fn check_yaw(yaw: &YawSettings, bosch: Option<BoschSettings>) -> Result<(), Conf
 }
 
 /// Checks that all identifiers are valid, and that none equals another one or `taken`.
-fn check_ids(ids: [u16; 3], taken: impl Fn(StandardId) -> bool) -> Result<(), ConfigError> {
+fn check_ids<const N: usize>(ids: [u16; N], taken: impl Fn(StandardId) -> bool) -> Result<(), ConfigError> {
     for (k, raw) in ids.into_iter().enumerate() {
         let id = StandardId::new(raw).filter(|_| !DIAGNOSIS.contains(&raw));
         let id = id.ok_or(ConfigError::Identifier(raw))?;

@@ -4,6 +4,7 @@ use super::DataFrame;
 use super::bosch::{LAYOUTS, Motion, SetEncoder, SignalStatus};
 use super::config::{BoschSettings, Config, MAX_MESSAGES};
 use super::j1939::{Validity, Vdc2Encoder};
+use super::status::{SlowStatus, StatusEncoder};
 use super::yaw::Quality;
 use super::yaw_encoder::YawEncoder;
 use crate::estimate::VehicleSample;
@@ -17,6 +18,7 @@ pub struct CanEncoder {
     bosch: SetEncoder,
     yaw: Option<YawEncoder>,
     vdc2: Vdc2Encoder,
+    status: Option<StatusEncoder>,
     out_of_range: u32,
 }
 
@@ -27,6 +29,7 @@ impl CanEncoder {
         bosch: SetEncoder::START,
         yaw: None,
         vdc2: Vdc2Encoder::START,
+        status: None,
         out_of_range: 0,
     };
 
@@ -35,7 +38,8 @@ impl CanEncoder {
     pub fn new(config: Config) -> Self {
         let yaw = config.settings().yaw;
         let yaw = yaw.map(|yaw| YawEncoder::new(yaw.e2e.profiles(), config.samples_per_yaw()));
-        Self { config, yaw, ..Self::START }
+        let status = config.settings().status.and_then(|status| StatusEncoder::new(status.id));
+        Self { config, yaw, status, ..Self::START }
     }
 
     /// Returns the number of messages marked "failed" because a value was outside its signal's range.
@@ -83,6 +87,13 @@ impl CanEncoder {
             count(&mut self.out_of_range, u32::from(validity != Validity::Error && message.has_error()));
             message.frame(vdc2.source).into_iter().for_each(send);
         }
+    }
+}
+
+impl CanEncoder {
+    /// Counts a sample, and returns the frame of the slow status message when it is due and configured.
+    pub fn status(&mut self, status: impl FnOnce() -> SlowStatus) -> Option<DataFrame> {
+        self.status.as_mut()?.frame(status)
     }
 }
 

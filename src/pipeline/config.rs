@@ -2,6 +2,7 @@
 
 use crate::bias::{BiasCurve, EarthRate, QuietConfig, StaticConfig, ZeroRateConfig};
 use crate::compensate::CompensateConfig;
+use crate::health::slow::Knowledge;
 use crate::mounting::{GyroMap, Levelling, Rotation};
 use crate::pipeline::uncertainty::UncertaintyConfig;
 use crate::units::SpecificForce;
@@ -15,6 +16,8 @@ pub struct PipelineConfig {
     pub bias_curve: BiasCurve,
     /// Mean specific force at standstill, in the sensor's axes, where earlier drives have shown it.
     pub rest_force: Option<[SpecificForce; 3]>,
+    /// How well earlier drives have shown the forward direction.
+    pub forward: Knowledge,
     /// The correction of the gain and of the remaining mounting error of this unit's gyro.
     pub gyro_map: GyroMap,
     /// The condition under which the accelerometer corrects the mounting.
@@ -39,6 +42,7 @@ impl PipelineConfig {
         mounting: Rotation::IDENTITY,
         bias_curve: BiasCurve::UNKNOWN,
         rest_force: None,
+        forward: Knowledge::Unknown,
         gyro_map: GyroMap::IDENTITY,
         levelling: Levelling::DEFAULT,
         static_init: StaticConfig::DEFAULT,

@@ -85,6 +85,11 @@ impl SensorBias {
         !before
     }
 
+    /// Returns whether a bias of earlier drives is subtracted.
+    pub(super) fn is_known(&self) -> bool {
+        self.newest.is_some()
+    }
+
     /// Compares a second's mean specific force with that of earlier drives: a single sample also shows bumps and
     /// braking.
     fn end_second(&mut self) {

@@ -15,6 +15,7 @@ use super::learner::Learner;
 use super::message::{AccessCounters, FlashState, Identity, Info, Origin, PROTOCOL, Refusal};
 use super::standstill::StandstillGate;
 use crate::can::wheel::WheelSettings;
+use crate::health::slow::Knowledge;
 use crate::health::{Faults, Status};
 use crate::sample::{ImuSample, WheelSample};
 use crate::store::slots::{SlotError, WeightSource};
@@ -167,6 +168,13 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     #[must_use]
     pub fn forward_deg(&self) -> Option<[f32; 2]> {
         self.learned.yaw_deg(&self.configuration.mounting.rotation()?)
+    }
+
+    /// How well drives have shown the forward direction.
+    #[must_use]
+    pub fn forward_knowledge(&self) -> Knowledge {
+        let mounting = self.configuration.mounting.rotation();
+        mounting.map_or(Knowledge::Unknown, |mounting| self.learned.forward_knowledge(&mounting))
     }
 
     /// Records the result of setting up the sensor. A repeated fault is logged only once.

@@ -135,6 +135,7 @@ impl Configuration {
             bias_curve: learned.bias_curve,
             rest_force: learned.specific_force,
             mounting: level.map_or(mounting, |level| mounting.then(&level)),
+            forward: learned.forward_knowledge(&mounting),
             gyro_map: calibration.gyro_map(weights).unwrap_or(GyroMap::IDENTITY),
             levelling: if level.is_some() { Levelling::Off } else { Levelling::DEFAULT },
             static_init: self.static_init,
@@ -203,7 +204,7 @@ impl Configuration {
 
 impl Record for Configuration {
     const KEY: u8 = 1;
-    const VERSION: u8 = 7;
+    const VERSION: u8 = 8;
 
     fn check(&self) -> Result<(), FieldError> {
         let config = Config::new(self.can).map_err(FieldError::Can)?;

@@ -4,12 +4,15 @@
 use super::error::{Field, FieldError};
 use super::record::Record;
 use crate::bias::BiasCurve;
+use crate::health::slow::Knowledge;
 use crate::mounting::{Forward, Rotation, is_moved};
 use crate::units::SpecificForce;
 use serde::{Deserialize, Serialize};
 
 /// Weight of a new standstill in the mean specific force: 1 / `MEMORY`.
 const MEMORY: i64 = 8;
+/// Largest sigma of a forward direction that is known well, deg.
+const FINE_DEG: f32 = 3.0;
 
 /// The sensor data that the board learns at standstills and while driving, in sensor axes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -49,6 +52,16 @@ impl Learned {
     pub fn yaw_deg(&self, mounting: &Rotation) -> Option<[f32; 2]> {
         let (forward, rest) = self.forward.zip(self.specific_force)?;
         Some([forward.yaw(mounting, rest), forward.sigma].map(f32::to_degrees))
+    }
+
+    /// How well drives have shown the forward direction.
+    #[must_use]
+    pub fn forward_knowledge(&self, mounting: &Rotation) -> Knowledge {
+        match self.yaw_deg(mounting) {
+            None => Knowledge::Unknown,
+            Some([_, sigma]) if sigma <= FINE_DEG => Knowledge::Fine,
+            Some(_) => Knowledge::Coarse,
+        }
     }
 }
 

@@ -120,9 +120,6 @@ pub const IDENTIFIERS: [Identifier; 24] = [
     ),
 ];
 
-/// Largest sigma of a forward direction that is reported as 2 (within 3 deg), deg.
-const FINE_DEG: f32 = 3.0;
-
 /// Lists the fields of a type in the given order; an omitted field is a compile error.
 macro_rules! words {
     ($from:expr => $type:ident { $($field:ident),* }) => {{
@@ -224,7 +221,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
         0x0116 => {
             let known = device.forward_deg();
             let [yaw, sigma] = known.unwrap_or_default().map(|angle| libm::roundf(100.0 * angle) as i16);
-            put(out, &[known.map_or(0, |[_, sigma]| if sigma <= FINE_DEG { 2 } else { 1 })])?;
+            put(out, &[device.forward_knowledge() as u8])?;
             put(out, &yaw.to_be_bytes())?;
             put(out, &sigma.to_be_bytes())
         }

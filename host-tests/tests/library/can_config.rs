@@ -1,9 +1,12 @@
 //! The configuration of the vehicle bus: what is refused, what it costs, what goes out.
 
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
-use gyronet::can::config::{BoschSettings, Config, ConfigError, E2e, Settings, Vdc2Settings, YawSettings};
+use gyronet::can::config::{
+    BoschSettings, Config, ConfigError, E2e, Settings, StatusSettings, Vdc2Settings, YawSettings,
+};
 use gyronet::can::e2e::{DataIdMode, P11Mode};
 use gyronet::can::encoder::CanEncoder;
+use gyronet::can::status::STATUS_ID;
 use gyronet::can::yaw::Quality;
 use gyronet::estimate::VehicleSample;
 use gyronet::units::{AngularRate, Yaw};
@@ -78,6 +81,10 @@ fn settings_that_cannot_be_are_refused() {
     let vdc2 = |source| Settings { vdc2: Some(Vdc2Settings { source }), ..Settings::DEFAULT };
     assert_eq!(refused(vdc2(254)), ConfigError::SourceAddress(254));
     assert!(Config::new(vdc2(253)).is_ok());
+    let status = |id| Settings { status: Some(StatusSettings { id }), ..Settings::DEFAULT };
+    assert_eq!(refused(status(0x1A2)), ConfigError::DuplicateIdentifier(0x1A2));
+    assert_eq!(refused(status(0x7E0)), ConfigError::Identifier(0x7E0));
+    assert!(Config::new(status(STATUS_ID)).is_ok());
     let slow = refused(Settings { bits_per_second: 100_000, ..ALL });
     assert_eq!(slow, ConfigError::Overload { per_mille: 970 });
     assert_eq!(slow.to_string(), "the messages are 97.0 % of the bus");

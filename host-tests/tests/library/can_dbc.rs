@@ -4,11 +4,12 @@ use can_dbc::{AttributeValue, ByteOrder, Dbc, Message, MessageId, NumericValue, 
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::bosch;
-use gyronet::can::config::{Config, Settings, Vdc2Settings};
+use gyronet::can::config::{Config, Settings, StatusSettings, Vdc2Settings};
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::encoder::CanEncoder;
 use gyronet::can::j1939::Vdc2;
 use gyronet::can::load::Periodic;
+use gyronet::can::status::{Evidence, Knowledge, STATUS_ID, SlowStatus, StatusEncoder, Verdict};
 use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Faults, Quality, RateMessage, Source};
 use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
@@ -16,7 +17,11 @@ use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-const ALL: Settings = Settings { vdc2: Some(Vdc2Settings { source: 0x80 }), ..Settings::DEFAULT };
+const ALL: Settings = Settings {
+    vdc2: Some(Vdc2Settings { source: 0x80 }),
+    status: Some(StatusSettings { id: STATUS_ID }),
+    ..Settings::DEFAULT
+};
 
 static DBC: LazyLock<Dbc> =
     LazyLock::new(|| Dbc::try_from(include_str!("../../../tools/gyronet.dbc")).expect("a DBC file"));
@@ -168,6 +173,44 @@ fn each_fault_has_its_bit() {
             decoded.iter().filter(|(name, (raw, _))| name.starts_with("Fault_") && *raw == 1).collect();
         assert_eq!(set.len(), 1);
         assert_eq!(set[0].0, name);
+    }
+}
+
+/// The file decodes each value of the slow status message, which the codes and its value tables name.
+#[test]
+fn the_slow_status_means_what_the_file_says() {
+    let table = |name: &str| -> Vec<(i64, String)> {
+        let table = DBC.value_descriptions_for_signal(MessageId::Standard(STATUS_ID), name).expect("a table");
+        table.iter().map(|value| (value.id, value.description.clone())).collect()
+    };
+    let knowledge = [Knowledge::Unknown, Knowledge::Coarse, Knowledge::Fine, Knowledge::Refused];
+    let verdicts = [Verdict::Unknown, Verdict::Standing, Verdict::Moving];
+    let evidence = [Evidence::None, Evidence::Wheels, Evidence::Inertial];
+    let mut encoder = StatusEncoder::new(STATUS_ID).expect("11 bits");
+    let mut check = |status: SlowStatus, gaps: i64| {
+        let frame = (0..100).find_map(|_| encoder.frame(|| status)).expect("one in a hundred");
+        let decoded = decode(&frame);
+        let named = |name: &str, value: &dyn std::fmt::Debug| {
+            let code = decoded[name].0;
+            assert!(table(name).contains(&(code, format!("{value:?}").to_lowercase())), "{name} {code}");
+        };
+        named("Standstill", &status.verdict);
+        named("StandstillEvidence", &status.evidence);
+        named("BiasKnowledge", &status.bias);
+        named("GainKnowledge", &status.gain);
+        named("MountingKnowledge", &status.mounting);
+        assert_eq!(decoded["YawGaps"].0, gaps);
+        // What nothing finds yet is not available.
+        assert_eq!((decoded["SecondSourceDoubt"].0, decoded["YawDoubt"].0), (7, 0xFFFF));
+    };
+    for (gaps, code) in [(None, 255), (Some(0), 0), (Some(253), 253), (Some(254), 254), (Some(u32::MAX), 254)]
+    {
+        check(SlowStatus { gaps, ..SlowStatus::default() }, code);
+    }
+    for k in 0..12 {
+        let [bias, gain, mounting] = [k, k / 2, k / 3].map(|k| knowledge[k % 4]);
+        let (verdict, evidence) = (verdicts[k % 3], evidence[k / 4]);
+        check(SlowStatus { verdict, evidence, bias, gain, mounting, gaps: Some(k as u32) }, k as i64);
     }
 }
 

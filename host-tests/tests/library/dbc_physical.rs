@@ -7,6 +7,7 @@ use gyronet::can::DataFrame;
 use gyronet::can::config::{Config, Settings, Vdc2Settings};
 use gyronet::can::encoder::CanEncoder;
 use gyronet::can::fog_encoder::FogEncoder;
+use gyronet::can::status::{STATUS_ID, SlowStatus, StatusEncoder};
 use gyronet::can::yaw::FOG_IDS;
 use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::health::{Faults, Quality, Source};
@@ -53,12 +54,13 @@ fn frames() -> Vec<DataFrame> {
     let mut encoder = CanEncoder::new(Config::new(settings).expect("checked"));
     let mut frames: Vec<DataFrame> = encoder.encode(&sample).iter().copied().collect();
     FogEncoder::new(FOG_IDS).send(&yaw(-1.0), |frame| frames.push(frame));
+    frames.extend(StatusEncoder::new(STATUS_ID).and_then(|mut encoder| encoder.frame(SlowStatus::default)));
     frames
 }
 
 /// The values in the signals' units, written from the sample above and the conventions of the messages:
 /// the Bosch part's roll rate is against the right-hand rule, its forces are in g.
-const EXPECTED: [Expected; 21] = [
+const EXPECTED: [Expected; 22] = [
     ("MM5_10_TX1", "YawRate", 12.34, 0.005),
     ("MM5_10_TX1", "TEMP", 31.0, 1.0),
     ("MM5_10_TX1", "AY", -2.0 / 9.806_65, 1.274_65e-4),
@@ -72,6 +74,8 @@ const EXPECTED: [Expected; 21] = [
     // Rounded up: 0.01234 or 0.01235, as f32 takes the one for a little more.
     ("GyroNet_Detail", "ExpectedError", 0.012_345, 1e-5),
     ("GyroNet_Detail", "Latency", 70.0, 0.5),
+    // Not available.
+    ("GyroNet_Status", "YawDoubt", 655.35, 0.01),
     ("GyroNet_FogRate", "Rate", 7.654_321, 1e-6),
     ("GyroNet_FogAngle", "Yaw", -123.456, 8.4e-8),
     ("GyroNet_FogDetail", "Correction", -0.1234, 2e-4),

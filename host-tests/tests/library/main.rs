@@ -48,6 +48,7 @@ mod service;
 mod slcan;
 mod slcan_command;
 mod slcan_port;
+mod slow_status;
 mod store;
 mod store_power_cut;
 mod supervisor;

@@ -77,6 +77,15 @@ pub struct Vdc2Settings {
     pub source: u8,
 }
 
+/// The slow status message ([`crate::can::status`]), which is sent once a second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct StatusSettings {
+    /// 11-bit identifier, which is also the E2E data identifier; [`crate::can::status::STATUS_ID`] is free by default.
+    pub id: u16,
+}
+
 /// The messages on the bus; [`super::Config::new`] checks them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -90,6 +99,8 @@ pub struct Settings {
     pub yaw: Option<YawSettings>,
     /// J1939 VDC2 for trucks and machines, if sent.
     pub vdc2: Option<Vdc2Settings>,
+    /// Slow status message, if sent.
+    pub status: Option<StatusSettings>,
 }
 
 impl Settings {
@@ -103,6 +114,7 @@ impl Settings {
             e2e: E2e::P01 { mode: DataIdMode::Both, data_ids: [0x1A0, 0x1A1, 0x1A2] },
         }),
         vdc2: None,
+        status: None,
     };
 
     /// Settings that fit an SLCAN line of 115200 bit/s, time stamps included. Our own messages are sent every

@@ -39,6 +39,13 @@ const SETTINGS: &[(&str, Takes)] = &[
     ),
     ("can.vdc2", Other("", "`null`, or `{\"source\":ADDRESS}` with a J1939 address of 0 to 253")),
     (
+        "can.status",
+        Other(
+            "",
+            "`null`, or `{\"id\":419}` to send the slow status message once a second, with a free identifier",
+        ),
+    ),
+    (
         "latitude_deg",
         Number(
             "deg",

@@ -1,0 +1,105 @@
+//! The slow status message of a coprocessor: once a second where it is configured, and no more than the board knows.
+
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::can::config::{self, Settings, StatusSettings};
+use gyronet::can::e2e::{Checker, DataIdMode, P01, Profile, Verdict as Received};
+use gyronet::can::status::{Evidence, Knowledge, STATUS_ID, SlowStatus, Verdict, emit};
+use gyronet::can::wheel::{WheelReceiver, WheelSettings};
+use gyronet::coprocessor::TimedFrame;
+use gyronet::sample::PERIOD_US;
+use gyronet::units::Micros;
+use gyronet::{Config, Coprocessor};
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::synthetic::idling;
+
+/// Wheels of the built-in settings at 0 and at 3.6 km/h.
+const STANDS: [u8; 8] = [0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F];
+const DRIVES: [u8; 8] = [0x1B, 0xD7, 0x1B, 0xD7, 0x1B, 0xD7, 0x1B, 0xD7];
+
+fn coprocessor(status: Option<StatusSettings>, wheels: bool) -> Coprocessor {
+    let can = config::Config::new(Settings { status, ..Settings::DEFAULT }).expect("checked");
+    let wheels = wheels.then(|| WheelReceiver::new(WheelSettings::TOYOTA).expect("checked"));
+    Coprocessor::new(Config { can, wheels, ..Config::DEFAULT })
+}
+
+/// Feeds samples of a car at rest, with a wheel frame before each where one is given; returns the status frames.
+fn run(
+    coprocessor: &mut Coprocessor,
+    ticks: std::ops::Range<u64>,
+    wheels: Option<[u8; 8]>,
+) -> Vec<DataFrame> {
+    let (mut noise, mut found) = (Noise::new(7), Vec::new());
+    for tick in ticks {
+        let now = Micros((tick + 1) * PERIOD_US);
+        if let Some(data) = wheels {
+            let id = StandardId::new(0xAA).expect("11 bits");
+            coprocessor.can(&DataFrame::new(id, &data).expect("8 bytes"), now).expect("a wheel frame");
+        }
+        let mut sink = |sent: TimedFrame| {
+            if matches!(sent.frame.id(), Id::Standard(id) if id.as_raw() == STATUS_ID) {
+                found.push(sent.frame);
+            }
+        };
+        coprocessor.imu(idling(tick, 0.001, &mut noise), now, &mut sink).expect("in time");
+    }
+    found
+}
+
+fn assert_says(frame: &DataFrame, status: SlowStatus) {
+    assert_eq!(frame.data()[3..], emit(&status)[3..], "not {status:?}");
+}
+
+#[test]
+fn it_is_sent_once_a_second_and_protected_where_it_is_configured() {
+    assert!(run(&mut coprocessor(None, false), 0..500, None).is_empty());
+    let frames = run(&mut coprocessor(Some(StatusSettings { id: STATUS_ID }), false), 0..500, None);
+    assert_eq!(frames.len(), 5);
+    let mut checker = Checker::new(Profile::P01(P01 { data_id: STATUS_ID, mode: DataIdMode::Both }), 1);
+    for (number, frame) in (0u8..).zip(&frames) {
+        let verdict = checker.check(frame.data()).expect("whole");
+        assert!(number == 0 || verdict == Received::Ok, "{number}: {verdict:?}");
+        assert_eq!(frame.data()[2], number);
+        let mut damaged = frame.data().to_vec();
+        damaged[5] ^= 1;
+        assert!(checker.check(&damaged).is_err());
+    }
+}
+
+#[test]
+fn it_says_what_the_board_knows() {
+    let mut board = coprocessor(Some(StatusSettings { id: STATUS_ID }), false);
+    let nothing = SlowStatus::default();
+    let frames = run(&mut board, 0..901, None);
+    assert_says(&frames[0], nothing);
+    // After static initialisation, without wheels: the quiet sensor shows that the car stands.
+    let known = SlowStatus { bias: Knowledge::Fine, gaps: Some(0), ..nothing };
+    let still = SlowStatus { verdict: Verdict::Standing, evidence: Evidence::Inertial, ..known };
+    assert_says(frames.last().expect("the newest"), still);
+    // Samples are missing twice; the sensor is found moved.
+    run(&mut board, 910..920, None);
+    board.mount_moved();
+    let frames = run(&mut board, 925..1_900, None);
+    let moved = SlowStatus { gaps: Some(2), mounting: Knowledge::Refused, ..still };
+    assert_says(frames.last().expect("the newest"), moved);
+}
+
+#[test]
+fn wheels_decide_where_they_are_known() {
+    let mut board = coprocessor(Some(StatusSettings { id: STATUS_ID }), true);
+    let frames = run(&mut board, 0..501, Some(STANDS));
+    let stands = SlowStatus {
+        verdict: Verdict::Standing,
+        evidence: Evidence::Wheels,
+        bias: Knowledge::Fine,
+        gaps: Some(0),
+        ..SlowStatus::default()
+    };
+    assert_says(frames.last().expect("the newest"), stands);
+    let frames = run(&mut board, 501..701, Some(DRIVES));
+    assert_says(frames.last().expect("the newest"), SlowStatus { verdict: Verdict::Moving, ..stands });
+    // Silent wheels: the sensor's quiet is not believed instead.
+    let frames = run(&mut board, 701..1201, None);
+    let silent = SlowStatus { verdict: Verdict::Unknown, evidence: Evidence::None, ..stands };
+    assert_says(frames.last().expect("the newest"), silent);
+}

@@ -1,0 +1,56 @@
+//! What changes slowly: whether the vehicle stands, and how well the board knows its sensor.
+
+/// Whether the vehicle stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Verdict {
+    /// Neither is shown, or the gyro contradicts the wheels.
+    #[default]
+    Unknown = 0,
+    /// The vehicle stands.
+    Standing = 1,
+    /// The vehicle moves.
+    Moving = 2,
+}
+
+/// What a verdict rests on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Evidence {
+    /// Nothing.
+    #[default]
+    None = 0,
+    /// The wheel speeds.
+    Wheels = 1,
+    /// A quiet inertial sensor.
+    Inertial = 2,
+}
+
+/// How well a property of the sensor is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Knowledge {
+    /// Not at all: the configured or built-in value is in use.
+    #[default]
+    Unknown = 0,
+    /// From earlier drives, and not confirmed yet; a mounting within 10 deg.
+    Coarse = 1,
+    /// Measured; a mounting within 3 deg.
+    Fine = 2,
+    /// Measurements contradict what was known.
+    Refused = 3,
+}
+
+/// All of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SlowStatus {
+    /// Whether the vehicle stands.
+    pub verdict: Verdict,
+    /// What the verdict rests on.
+    pub evidence: Evidence,
+    /// Knowledge of the gyro's bias.
+    pub bias: Knowledge,
+    /// Knowledge of the gyro's gain and misalignment.
+    pub gain: Knowledge,
+    /// Knowledge of the sensor's mounting.
+    pub mounting: Knowledge,
+    /// Gaps in the accumulated yaw; `None` before it begins.
+    pub gaps: Option<u32>,
+}
