@@ -26,7 +26,6 @@ pub mod sign;
 pub mod simulate;
 pub mod size;
 pub mod train;
-pub mod warm_up;
 mod weights;
 #[cfg(feature = "logs")]
 pub mod wheels;

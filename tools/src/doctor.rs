@@ -74,7 +74,7 @@ impl Doctor {
             allan::finding(noise.as_ref(), longest),
             Finding::note(
                 "temperature",
-                "A drive has no temperature column: a bias that follows temperature cannot be told from one that drifts.",
+                "Not examined: a bias that follows temperature cannot be told from one that drifts.",
             ),
             mounting::finding(mounting.as_ref()),
             forward::finding(rows, mounting.as_ref()),

@@ -10,7 +10,6 @@
 //! drive <- doctor -> import, plot
 //! drive <- evaluate
 //! train -> evaluate, plot      python
-//! warm_up -> drive, plot, simulate
 //! target -> simulate      network      client <- reference      wheels
 //! demo -> everything above
 //! ```
@@ -36,5 +35,4 @@ pub mod signing;
 pub mod simulate;
 pub mod target;
 pub mod train;
-pub mod warm_up;
 pub mod wheels;

@@ -24,6 +24,7 @@ use std::process::ExitCode;
 ///   ref_gyr_z              true yaw rate, rad/s; optional
 ///   ref_yaw                course over ground by GNSS, rad, left positive;
 ///                          optional, empty where unknown
+///   temp_c                 temperature of the sensor, deg C; optional
 ///   wheel1_rate ..4        wheel rates, rad/s; optional
 ///                          (front right, rear right, front left, rear left)
 ///
@@ -71,7 +72,6 @@ enum Command {
     Wheels(commands::wheels::Args),
     Size(commands::size::Args),
     Completions(commands::completions::Args),
-    WarmUp(commands::warm_up::Args),
 }
 
 fn main() -> ExitCode {
@@ -106,7 +106,6 @@ fn main() -> ExitCode {
         Command::Wheels(args) => commands::wheels::run(args, common),
         Command::Size(args) => commands::size::run(args, common),
         Command::Completions(args) => commands::completions::run(args, Cli::command()),
-        Command::WarmUp(args) => commands::warm_up::run(args, common),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
     // The reader of our output has closed the pipe: `gyronet replay FILE | head`.

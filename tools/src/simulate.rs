@@ -19,11 +19,14 @@ pub mod mems;
 pub mod purpose;
 pub mod route;
 pub mod vibration;
+pub mod warming;
 
 use crate::drive::DT;
 use car::Car;
 use mems::Mems;
+use route::Route;
 use vibration::Vibration;
+use warming::{Trip, Warming};
 
 /// Holds the parameters of a simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +41,8 @@ pub struct Config {
     pub vibration: vibration::Config,
     /// The part.
     pub mems: mems::Config,
+    /// A trip on which the part warms up; it replaces the part's bias.
+    pub warming: Option<warming::Config>,
 }
 
 impl Config {
@@ -48,6 +53,7 @@ impl Config {
         car: car::Config::DEFAULT,
         vibration: vibration::Config::DEFAULT,
         mems: mems::Config::DEFAULT,
+        warming: None,
     };
 }
 
@@ -66,6 +72,8 @@ pub struct Sample {
     pub wheels: [f64; 4],
     /// Speed, forward positive, m/s.
     pub speed: f64,
+    /// Temperature of a part that warms up, deg C.
+    pub celsius: Option<f64>,
 }
 
 /// An endless iterator over the samples of a drive.
@@ -74,6 +82,7 @@ pub struct Simulation {
     car: Car,
     vibration: Vibration,
     mems: Mems,
+    warming: Option<Warming>,
     tick: u32,
 }
 
@@ -81,10 +90,19 @@ impl Simulation {
     /// Starts at rest.
     #[must_use]
     pub fn new(config: &Config) -> Self {
+        let (seed, warming) = (config.seed, config.warming);
+        let route = match warming.map(|warming| warming.trip) {
+            Some(Trip::Motorway) => Route::onto_motorway(seed),
+            Some(Trip::Town) | None => Route::new(seed),
+        };
         Self {
-            car: Car::new(&config.car, config.seed),
-            vibration: Vibration::new(&config.vibration, config.seed),
-            mems: Mems::new(&config.mems, config.seed),
+            car: Car::on(&config.car, route, seed),
+            vibration: Vibration::new(&config.vibration, seed),
+            mems: match warming {
+                Some(warming) => Mems::of_device(&warming::PART, warming.device, seed),
+                None => Mems::new(&config.mems, seed),
+            },
+            warming: warming.map(|warming| Warming::new(&warming, seed)),
             tick: 0,
         }
     }
@@ -101,7 +119,11 @@ impl Iterator for Simulation {
         // The truth is tilted too, because it is that of a perfect part with the same mounting.
         let reference = self.mems.tilt(motion.angular_rate);
         let force = add(self.mems.tilt(motion.specific_force), shake.specific_force);
-        let (specific_force, angular_rate) = self.mems.measure(force, add(reference, shake.angular_rate));
+        let (specific_force, mut angular_rate) = self.mems.measure(force, add(reference, shake.angular_rate));
+        let warm = self.warming.as_mut().map(|warming| warming.step(seconds, motion.speed));
+        if let Some((_, bias)) = warm {
+            angular_rate = add(angular_rate, bias);
+        }
         Some(Sample {
             seconds,
             specific_force,
@@ -109,6 +131,7 @@ impl Iterator for Simulation {
             reference,
             wheels: self.car.wheels(&motion),
             speed: motion.speed,
+            celsius: warm.map(|(celsius, _)| celsius),
         })
     }
 }

@@ -165,6 +165,7 @@ fn retired_names_say_what_does_their_work() {
         (&["--json", "soak"], "--bin faults"),
         (&["paper", "KAIST", "--out", "OUT"], "make -f tools/paper/Makefile"),
         (&["tables", "SEQUENCES"], "cargo paper tables"),
+        (&["warm-up"], "gyronet simulate --trip motorway"),
         (&["simulate", "--layout", "kaist", "--out", "OUT"], "cargo paper simulate"),
         (&["import", "urban06", "--training", "--out", "a.csv"], "cargo paper import"),
         (&["import", "kaist", "urban06"], "cargo paper import urban06"),

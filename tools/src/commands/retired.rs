@@ -3,11 +3,12 @@
 use clap::error::{ContextKind, ContextValue};
 
 const FAULTS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin faults`";
-const RETIRED: [(&str, &str); 8] = [
+const RETIRED: [(&str, &str); 9] = [
     ("campaign", FAULTS),
     ("soak", FAULTS),
     ("paper", "`make -f tools/paper/Makefile`"),
     ("tables", "`cargo paper tables`"),
+    ("warm-up", "`gyronet simulate --trip motorway` with `gyronet evaluate`"),
     ("--layout", "`cargo paper simulate`"),
     ("--set", "`cargo paper simulate`"),
     ("--training", "`cargo paper import`"),

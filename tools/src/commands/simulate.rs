@@ -1,6 +1,7 @@
 //! `gyronet simulate` writes simulated drives.
 
 use super::{Common, WriteError, print_json, remark};
+use gyronet_tools::simulate::warming::{self, Trip};
 use gyronet_tools::simulate::{Config, csv};
 use std::fs::File;
 use std::io::BufWriter;
@@ -12,11 +13,15 @@ use std::path::PathBuf;
 ///
 /// The CSV file has the columns that the other commands read, and the true rates in ref_gyr_*. The same seed gives the
 /// same file on every machine.
+///
+/// With --trip the sensor warms up, its bias follows its temperature (temp_c), and each device has a bias of its own.
+/// Half an hour on a motorway without a stop shows how far the heading drifts meanwhile.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet simulate --out drive.csv
-  gyronet simulate --seconds 600 --seed 7 --out drive.csv")]
+  gyronet simulate --seconds 600 --seed 7 --out drive.csv
+  gyronet simulate --trip motorway --device 3 --seconds 2160 --out motorway.csv")]
 pub struct Args {
     /// Write the drive to this file.
     #[arg(long, value_name = "FILE.csv")]
@@ -27,11 +32,18 @@ pub struct Args {
     /// Seed of the route, the road, the noise and the bias at power-on.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Let the sensor warm up on this trip.
+    #[arg(long)]
+    trip: Option<Trip>,
+    /// Seed of the errors that all trips of a sensor share.
+    #[arg(long, default_value_t = 1, requires = "trip")]
+    device: u64,
 }
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let config = Config { seconds: args.seconds, seed: args.seed, ..Config::DEFAULT };
+    let warming = args.trip.map(|trip| warming::Config { trip, device: args.device });
+    let config = Config { warming, seconds: args.seconds, seed: args.seed, ..Config::DEFAULT };
     let error = WriteError::to(&args.out);
     let file = File::create(&args.out).map_err(&error)?;
     let samples = csv::write(&config, BufWriter::new(file)).map_err(&error)?;

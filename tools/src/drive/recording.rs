@@ -9,6 +9,7 @@
 //! | `gyr_x`, `gyr_y`, `gyr_z` | rad/s | angular rate |
 //! | `ref_gyr_z` | rad/s | optional: the true yaw rate; empty if unknown |
 //! | `ref_yaw` | rad | optional: the true course, to the left; empty if unknown |
+//! | `temp_c` | deg C | optional: temperature of the sensor; empty if not recorded |
 //! | `wheel1_rate` .. `wheel4_rate` | rad/s | optional: rate of a wheel; empty if not recorded |
 //!
 //! Values are converted to the codes of [`gyronet::units`] through f32, and times through 10 kHz ticks, as the sensor

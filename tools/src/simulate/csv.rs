@@ -13,7 +13,8 @@ pub const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_x,ref_
 /// # Errors
 /// The writer's error.
 pub fn write(config: &Config, mut out: impl Write) -> io::Result<u32> {
-    writeln!(out, "{HEADER}")?;
+    let temperature = if config.warming.is_some() { ",temp_c" } else { "" };
+    writeln!(out, "{HEADER}{temperature}")?;
     let samples = config.seconds * RATE_HZ;
     for sample in Simulation::new(config).take(samples as usize) {
         row(&sample, &mut out)?;
@@ -29,6 +30,9 @@ fn row(sample: &Sample, out: &mut impl Write) -> io::Result<()> {
         // Adding zero makes a rounded -0 a 0.
         write!(out, ",{:.6}", (value * 1e6).round() / 1e6 + 0.0)?;
     }
+    if let Some(celsius) = sample.celsius {
+        write!(out, ",{celsius:.2}")?;
+    }
     writeln!(out)
 }
 
@@ -36,6 +40,8 @@ fn row(sample: &Sample, out: &mut impl Write) -> io::Result<()> {
 mod tests {
     use super::*;
     use crate::drive::recording::Recording;
+    use crate::simulate::warming::{self, Trip};
+    use gyronet::units::CentiCelsius;
 
     #[test]
     fn what_is_written_can_be_read() {
@@ -49,5 +55,23 @@ mod tests {
         assert!((row.sample.angular_rate[2].rad_per_sec() - sample.angular_rate[2]).abs() < 1e-6);
         assert!((row.reference.unwrap() - sample.reference[2]).abs() < 1e-6);
         assert!((row.wheels[3].unwrap() - sample.wheels[3]).abs() < 1e-6);
+        assert_eq!((row.sample.temperature, sample.celsius), (None, None));
+    }
+
+    #[test]
+    fn a_trip_has_the_temperature_of_its_sensor() {
+        let mut bytes = Vec::new();
+        let warming = Some(warming::Config { trip: Trip::Town, device: 2 });
+        let config = Config { seconds: 20, warming, ..Config::DEFAULT };
+        write(&config, &mut bytes).unwrap();
+        let recording = Recording::parse("a.csv", &bytes[..]).unwrap();
+        let celsius = Simulation::new(&config).nth(1_234).unwrap().celsius.unwrap();
+        let CentiCelsius(code) = recording.rows[1_234].sample.temperature.unwrap();
+        assert!((f64::from(code) / 100.0 - celsius).abs() < 0.0051, "{code} {celsius}");
+        let text = String::from_utf8(bytes).unwrap();
+        let hot = text.lines().take(400).map(|line| line.to_owned() + "\n").collect::<String>()
+            + "4.00,0,0,9.8,0,0,0,0,0,0,0,0,0,0,400\n";
+        let error = Recording::parse("a.csv", hot.as_bytes()).unwrap_err().to_string();
+        assert!(error.contains("temp_c") && error.contains("out of range"), "{error}");
     }
 }

@@ -17,6 +17,8 @@ pub enum Purpose {
     Odometer,
     Stamps,
     Magnetometer,
+    DeviceWarming,
+    Warming,
 }
 
 impl Purpose {

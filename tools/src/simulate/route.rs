@@ -14,6 +14,8 @@ pub struct Route {
     legs: u32,
     /// Side of the next corner: +1 is left.
     side: f64,
+    /// Number of legs before the motorway.
+    streets: u32,
 }
 
 impl Route {
@@ -22,7 +24,13 @@ impl Route {
     pub fn new(seed: u64) -> Self {
         let mut random = Purpose::Route.stream(seed);
         let side = if random.between(0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
-        Self { random, legs: 0, side }
+        Self { random, legs: 0, side, streets: u32::MAX }
+    }
+
+    /// Streets with four stops, then a motorway without a stop.
+    #[must_use]
+    pub fn onto_motorway(seed: u64) -> Self {
+        Self { streets: 24, ..Self::new(seed) }
     }
 }
 
@@ -33,6 +41,13 @@ impl Iterator for Route {
     fn next(&mut self) -> Option<Leg> {
         let between = |random: &mut Random, low, high| random.between(low, high);
         let random = &mut self.random;
+        if self.legs >= self.streets {
+            return Some(Leg::Road {
+                metres: between(random, 600.0, 1500.0),
+                speed: between(random, 26.0, 34.0),
+                turn: between(random, -0.35, 0.35),
+            });
+        }
         let place = self.legs % 6;
         self.legs += 1;
         Some(match place {

@@ -6,7 +6,7 @@ use crate::drive::vehicle::Vehicle;
 use csv::StringRecord;
 use gyronet::mounting::Rotation;
 use gyronet::sample::{ImuSample, Validity};
-use gyronet::units::{AngularRate, Micros, SpecificForce};
+use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use std::str::FromStr;
 
 const TIME: &str = "t_s";
@@ -14,6 +14,7 @@ const FORCE: [&str; 3] = ["acc_x", "acc_y", "acc_z"];
 const RATE: [&str; 3] = ["gyr_x", "gyr_y", "gyr_z"];
 const REFERENCE: &str = "ref_gyr_z";
 const COURSE: &str = "ref_yaw";
+const TEMPERATURE: &str = "temp_c";
 const WHEEL: [&str; WHEELS] = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"];
 
 /// Rate of the sensor's time counter, Hz.
@@ -34,6 +35,7 @@ struct Columns {
     rate: [Column; 3],
     reference: Option<Column>,
     course: Option<Column>,
+    temperature: Option<Column>,
     wheels: [Option<Column>; WHEELS],
 }
 
@@ -56,6 +58,7 @@ impl Columns {
             rate: three(RATE)?,
             reference: optional(REFERENCE),
             course: optional(COURSE),
+            temperature: optional(TEMPERATURE),
             wheels: WHEEL.map(optional),
         })
     }
@@ -107,7 +110,7 @@ impl<R: std::io::Read> Reader<R> {
     /// The row of the record that was read last.
     fn row(&mut self) -> Result<Row, DataError> {
         let line = self.record.position().map_or(0, csv::Position::line);
-        let Columns { time, force, rate, reference, course, wheels } = self.columns;
+        let Columns { time, force, rate, reference, course, temperature, wheels } = self.columns;
         let fields = Fields { path: &self.path, line, record: &self.record };
         let time = fields.time(time)?;
         if let Some(last) = self.last
@@ -125,7 +128,7 @@ impl<R: std::io::Read> Reader<R> {
             time,
             specific_force: [fx?, fy?, fz?],
             angular_rate: [wx?, wy?, wz?],
-            temperature: None,
+            temperature: temperature.map_or(Ok(None), |column| fields.temperature(column))?,
             validity: Validity::Good,
         };
         let sample = self.rotation.map_or(sample, |rotation| rotation.sample(&sample));
@@ -184,6 +187,14 @@ impl Fields<'_> {
             Some(value) if !value.is_finite() => Err(self.error(column, ValueError::NotFinite)),
             value => Ok(value),
         }
+    }
+
+    fn temperature(&self, column: Column) -> Result<Option<CentiCelsius>, DataError> {
+        let Some(celsius) = self.optional(column)? else { return Ok(None) };
+        if celsius.abs() > 300.0 {
+            return Err(self.error(column, ValueError::OutOfRange));
+        }
+        Ok(Some(CentiCelsius((100.0 * celsius).round() as i16)))
     }
 
     fn quantity<T>(
