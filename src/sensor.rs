@@ -12,8 +12,8 @@
 //! | TDK ICM-42688-P | SPI | [`icm42688::Icm42688`] | [`ImuSample`] |
 //! | ADI ADIS16465, 16470 | SPI | [`adis16465::Adis16465`] | [`ImuSample`], timed by data ready |
 //!
-//! UART parts are read through [`serial::Serial`] over any port with the traits of `embedded-io`, and configured by
-//! [`serial::configure`]; SPI parts take an `embedded_hal::spi::SpiDevice`. Either way it is a [`Source`].
+//! UART parts are read through [`serial::Serial`] over any port with the traits of `embedded-io`; the maker's tool sets
+//! them up once. SPI parts take an `embedded_hal::spi::SpiDevice`. Either way it is a [`Source`].
 //!
 //! # Which errors a parser detects
 //!

@@ -7,11 +7,7 @@
 //! more. The time stamps of format B reveal it, or the arrival times do ([`crate::align`]).
 
 mod clock;
-#[doc(hidden)]
-pub mod command;
 mod config;
-#[doc(hidden)]
-pub mod dialogue;
 mod format;
 mod framing;
 pub mod message;

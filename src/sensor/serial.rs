@@ -1,53 +1,16 @@
-//! This module connects sensors to a serial port through the traits of `embedded-io`: it reads samples, and runs the
-//! dialogue that configures a sensor for the pipeline. Nothing here depends on a particular sensor.
+//! A sensor on a serial port, through the traits of `embedded-io`. Nothing here depends on a particular sensor.
 //!
 //! No read blocks: a port must report whether bytes are waiting ([`ReadReady`]), so a silent sensor costs only a
 //! bounded time.
 //!
-//! There are no async wrappers. All parsers and dialogues accept bytes and a time and do no I/O, so an async
-//! caller awaits its own read, passes the bytes and polls, without using this module.
+//! There are no async wrappers. All parsers accept bytes and do no I/O, so an async caller awaits its own read and
+//! passes the bytes, without using this module.
 
 use super::{ByteSource, Source};
-use crate::units::Micros;
-use embedded_hal::delay::DelayNs;
-use embedded_io::{Read, ReadReady, Write};
-use heapless::Vec;
+use embedded_io::{Read, ReadReady};
 
-/// Length of the longest message that a dialogue sends, bytes.
-pub const MAX_SENT: usize = 32;
-/// Time between two polls of the port, ms.
-const POLL_MS: u32 = 1;
-/// Largest number of bytes read per poll; more than arrive in that time at 921,600 baud.
-const CHUNK: usize = 128;
 /// Largest number of bytes read by one call of [`Serial::next_sample`].
 const MAX_READ: usize = 1024;
-
-/// The action that a dialogue requests from its caller.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Action {
-    /// Send these bytes.
-    Send(Vec<u8, MAX_SENT>),
-    /// Do nothing; poll again when bytes have arrived or time has passed.
-    Wait,
-    /// The sensor is configured.
-    Done,
-}
-
-/// A dialogue that configures a sensor. Its inputs are bytes and the time, its outputs are messages to send. It ends
-/// within a bounded time, whatever the sensor does.
-pub trait Dialogue {
-    /// The reason why a dialogue has failed to configure the sensor.
-    type Error: core::error::Error;
-
-    /// Processes one byte from the sensor.
-    fn receive(&mut self, byte: u8);
-
-    /// Returns the next action at `now`.
-    ///
-    /// # Errors
-    /// The reason why the dialogue has failed; every later call returns the same error.
-    fn poll(&mut self, now: Micros) -> Result<Action, Self::Error>;
-}
 
 /// The error of a serial sensor: of the port or of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -59,34 +22,6 @@ pub enum SerialError<P, E> {
     /// The data of the sensor are wrong, or missing.
     #[error(transparent)]
     Part(E),
-}
-
-/// Runs a dialogue to its end; `delay` provides the time base.
-///
-/// # Errors
-/// [`SerialError::Port`] at once, [`SerialError::Part`] when the dialogue fails.
-pub fn configure<PORT: Read + Write + ReadReady, D: Dialogue>(
-    port: &mut PORT,
-    dialogue: &mut D,
-    delay: &mut impl DelayNs,
-) -> Result<(), SerialError<PORT::Error, D::Error>> {
-    let mut now = Micros(0);
-    loop {
-        match dialogue.poll(now).map_err(SerialError::Part)? {
-            Action::Done => return Ok(()),
-            Action::Send(bytes) => {
-                port.write_all(&bytes).and_then(|()| port.flush()).map_err(SerialError::Port)?;
-            }
-            Action::Wait => {
-                let mut chunk = [0; CHUNK];
-                for byte in receive(port, &mut chunk).map_err(SerialError::Port)? {
-                    dialogue.receive(*byte);
-                }
-                delay.delay_ms(POLL_MS);
-                now.0 += u64::from(POLL_MS) * 1_000;
-            }
-        }
-    }
 }
 
 /// A sensor on a serial port, as a [`Source`].

@@ -1,14 +1,11 @@
 //! This module reads the Xsens MTi: MTData2 messages in Xbus frames (MT Low-Level Communication Protocol, MT0605P).
 //!
 //! `xbus` finds the frames, [`MtData2`] holds the measurements of a frame, and `precision` decodes the four number
-//! formats; `dialogue` configures a sensor for the pipeline.
+//! formats.
 
-#[doc(hidden)]
-pub mod dialogue;
 mod mtdata2;
 #[doc(hidden)]
 pub mod precision;
-mod setup;
 #[doc(hidden)]
 pub mod xbus;
 

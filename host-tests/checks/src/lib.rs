@@ -68,8 +68,6 @@ mod transmit_queue;
 mod wheel_input;
 #[path = "../../tests/library/xsens.rs"]
 mod xsens;
-#[path = "../../tests/library/xsens_config.rs"]
-mod xsens_config;
 #[path = "../../tests/library/xsens_formats.rs"]
 mod xsens_formats;
 #[path = "../../tests/library/xsens_stream.rs"]

@@ -1,31 +1,22 @@
-//! This module passes bytes to the parsers and dialogues of the five sensors.
+//! This module passes bytes to the parsers of the five sensors.
 
 use super::Seed;
 use crate::wire::{bytes, feed, message, synthetic_frame};
 use gyronet::sensor::adis16465::{BURST, Burst, Model};
 use gyronet::sensor::crc::CRC_32_MPEG_2;
-use gyronet::sensor::dsp1760::command::{Command, Reply, setup};
-use gyronet::sensor::dsp1760::dialogue::Dialogue as KvhDialogue;
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::dsp3000::Mode;
 use gyronet::sensor::dsp3000::ascii::{Dsp3000Ascii, Reading};
 use gyronet::sensor::dsp3000::binary::{Dsp3000Binary, LOCK, Word};
 use gyronet::sensor::icm42688::packet::{Packet, Resolution};
-use gyronet::sensor::serial::Dialogue as _;
-use gyronet::sensor::xsens::dialogue::Dialogue as XsensDialogue;
 use gyronet::sensor::xsens::precision::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti, xbus};
 use gyronet::units::Micros;
 
-/// Passes bytes as a stream to the MTi's parser and dialogue, and as the data of a message.
+/// Passes bytes as a stream to the MTi's parser, and as the data of a message.
 pub fn xsens(data: &[u8]) {
     let samples = feed(&mut Mti::new(), data);
-    let mut dialogue = XsensDialogue::new();
-    for (now, byte) in (0..).zip(data) {
-        dialogue.receive(*byte);
-        let _ = dialogue.poll(Micros(now * 10_000));
-    }
     // Received several at a time, the same bytes give the same samples.
     let (mut rest, mut mti, mut again) = (data, Mti::new(), Vec::new());
     while !rest.is_empty() {
@@ -48,26 +39,19 @@ pub fn xsens_seeds() -> Vec<Seed> {
     let (_, data) = xbus::parse(&fixed).expect("an emitted frame");
     vec![
         ("stream", [synthetic_frame(), message(200).emit_as(Precision::Single).to_vec()].concat()),
-        ("acks", bytes("fa ff 31 00 d0 fa ff 42 01 04 ba fa ff 11 00 f0")),
         ("fixed_data", data.to_vec()),
     ]
 }
 
-/// Passes bytes as a stream to the parser and the dialogue, as a message, and as a message with a valid checksum.
+/// Passes bytes as a stream to the parser, as a message, and as a message with a valid checksum.
 pub fn dsp1760(data: &[u8]) {
     let samples = feed(&mut Dsp1760::new(Dsp1760Config::DEFAULT), data);
-    let mut dialogue = KvhDialogue::new(Dsp1760Config::DEFAULT);
-    for (now, byte) in (0..).zip(data) {
-        dialogue.receive(*byte);
-        let _ = dialogue.poll(Micros(now * 10_000));
-    }
     let (mut rest, mut part, mut again) = (data, Dsp1760::new(Dsp1760Config::DEFAULT), Vec::new());
     while !rest.is_empty() {
         rest = &rest[part.receive_some(rest)..];
         again.extend(core::iter::from_fn(|| part.next_sample()));
     }
     assert_eq!(format!("{again:?}"), format!("{samples:?}"));
-    let _ = (Command::parse(data), Reply::parse(data));
     let mut frame = data.to_vec();
     frame.extend(CRC_32_MPEG_2.checksum(data).to_be_bytes());
     for frame in [data, &frame] {
@@ -90,8 +74,7 @@ pub fn dsp1760_seeds() -> Vec<Seed> {
         message(3, Extra::Slow(25.0)),
         [bytes("fe 81 00 aa 7f 7f 7f 7f 7f 7f 55"), message(4, Extra::Temperature(25))].concat(),
     ];
-    let commands = setup(&Dsp1760Config::DEFAULT).map(|command| command.emit().into_bytes().to_vec());
-    vec![("stream", extras.concat()), ("self_test", self_test), ("commands", commands.concat())]
+    vec![("stream", extras.concat()), ("self_test", self_test)]
 }
 
 /// Parses bytes as lines and as words.

@@ -3,7 +3,6 @@
 use gyronet::sample::FogSample;
 use gyronet::sensor::ByteSource;
 use gyronet::sensor::crc::CRC_32_MPEG_2;
-use gyronet::sensor::dsp1760::command::{Command, Reply, setup};
 use gyronet::sensor::dsp1760::message::{Extra, Format, Message, MessageError, Validity};
 use gyronet::sensor::dsp1760::{
     AngleUnit, Dsp1760, Dsp1760Config, Dsp1760Error, OutputRate, Rotation, TemperatureUnit,
@@ -219,31 +218,6 @@ fn errors_say_where() {
 fn crc_has_its_check_value() {
     assert_eq!(CRC_32_MPEG_2.checksum(b"123456789"), 0x0376_E6E7);
     assert_eq!(CRC_32_MPEG_2.checksum(&bytes(RECORDED)), 0);
-}
-
-#[test]
-fn commands_equal_those_of_the_manual() {
-    let config = Dsp1760Config { temperature: TemperatureUnit::Hundredths, ..Dsp1760Config::DEFAULT };
-    let lines: Vec<_> = setup(&config).iter().map(|command| command.emit().to_string()).collect();
-    assert_eq!(lines, ["=config,1\n", "=dr,1000\n", "=rotfmt,delta\n", "=tempunits,C_100\n", "=config,0\n"]);
-    let every = [
-        Command::Configure(true),
-        Command::Configure(false),
-        Command::Rotation(Rotation::Delta),
-        Command::Rotation(Rotation::Rate),
-        Command::ResetRotation,
-        Command::Temperature(TemperatureUnit::Whole),
-        Command::Temperature(TemperatureUnit::Hundredths),
-        Command::QueryRate,
-    ];
-    let rates = OutputRate::OFFERED.map(|hertz| Command::Rate(OutputRate::new(hertz).expect("offered")));
-    for command in every.into_iter().chain(rates) {
-        assert_eq!(Command::parse(command.emit().as_bytes()), Some(command));
-    }
-    assert_eq!(Command::parse(b"=dr,999\n"), None);
-    assert_eq!(Reply::parse(b"DR,1000\r\n"), Some(Reply::Rate(OutputRate::HZ_1000)));
-    assert_eq!(Reply::Rate(OutputRate::HZ_1000).emit(), "DR,1000\r\n");
-    assert_eq!(Reply::parse(b"DR,1001"), None);
 }
 
 /// A message with any readings, finite ones so that it compares.

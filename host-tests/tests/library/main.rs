@@ -57,7 +57,6 @@ mod uncertainty;
 mod wheel_input;
 mod window_model;
 mod xsens;
-mod xsens_config;
 mod xsens_formats;
 mod xsens_stream;
 mod yaw_encoder;
