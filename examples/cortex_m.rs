@@ -1,7 +1,7 @@
 //! `own_board.rs` as an image for a Cortex-M: replace the port and the controller of `parked_car.rs` with those of your
 //! HAL, and the clock with your timer.
 //!
-//! `cargo run -p gyronet --example cortex_m --features stm32f405 --target thumbv7em-none-eabihf` runs it in QEMU: four
+//! `cargo run -p gyronet-images --example cortex_m --features stm32f405 --target thumbv7em-none-eabihf` runs it in QEMU: four
 //! seconds of a parked car; the exit status reports whether every frame was sent.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 

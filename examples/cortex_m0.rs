@@ -1,6 +1,6 @@
 //! The coprocessor on a Cortex-M0 with 16 KiB of RAM, with the default model.
 //!
-//! `cargo run -p gyronet --release --example cortex_m0 --features microbit --target thumbv6m-none-eabi` runs it in
+//! `cargo run -p gyronet-images --release --example cortex_m0 --features microbit --target thumbv6m-none-eabi` runs it in
 //! QEMU: a parked car and a turn; the exit status reports whether the last rate is that of the turn.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 

@@ -1,6 +1,6 @@
 //! The coprocessor under RTIC: samples and frames in one task, the model in a task of lower priority.
 //!
-//! `cargo run -p gyronet --example rtic --features stm32f405 --target thumbv7em-none-eabihf` runs it in QEMU: four
+//! `cargo run -p gyronet-images --example rtic --features stm32f405 --target thumbv7em-none-eabihf` runs it in QEMU: four
 //! seconds of a parked car; the exit status reports whether every frame was sent. Replace the port and the
 //! controller of `parked_car.rs` with those of your HAL. The firmware of the repository (`src/bin/coprocessor`) is the
 //! complete application.

@@ -82,7 +82,7 @@ fn layout_is_the_linker_s() {
         .expect("it is in the repository");
     assert!(text.contains(&format!("FLASH : ORIGIN = {:#010x}, LENGTH = 1024K", layout::FLASH_BASE)));
     let code = format!("const CODE: &str = \"{:#010x}\";", layout::FLASH_BASE + layout::FIRMWARE_A.start);
-    let build = std::fs::read_to_string(workspace().join("build.rs")).expect("it is too");
+    let build = std::fs::read_to_string(workspace().join("src/bin/build.rs")).expect("it is too");
     assert!(build.contains(&code), "{code}");
     let limit = std::fs::read_to_string(workspace().join("src/bin/stm32f405/slots.x")).expect("it is too");
     assert!(limit.contains(&format!("ORIGIN(FLASH) + {}K,", layout::FIRMWARE_A.end >> 10)));

@@ -162,7 +162,15 @@ pub fn build_for(
     folder: &Path,
 ) -> Result<PathBuf, BenchError> {
     let mut cargo = Command::new(std::env::var_os("CARGO").as_deref().unwrap_or(OsStr::new("cargo")));
-    cargo.current_dir(workspace).args(["build", "--release", "--quiet", "-p", "gyronet", "--bin", image]);
+    cargo.current_dir(workspace).args([
+        "build",
+        "--release",
+        "--quiet",
+        "-p",
+        "gyronet-images",
+        "--bin",
+        image,
+    ]);
     if FLASHED.contains(&image) {
         // As `cargo fw` and `cargo bringup` build them.
         cargo.args(["--config", "profile.release.opt-level='s'"]);
