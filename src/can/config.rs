@@ -25,6 +25,8 @@ const MAX_PERIOD_MS: u16 = 1000;
 const DIAGNOSIS: core::ops::RangeInclusive<u16> = 0x7DF..=0x7EF;
 /// Highest J1939 source address; 254 and 255 have other meanings.
 const MAX_SOURCE: u8 = 253;
+/// The bit rates of the bus, bit/s.
+pub const BIT_RATES: [u32; 4] = [125_000, 250_000, 500_000, 1_000_000];
 /// Highest worst-case bus load, 1/1000; above it other nodes would wait too long.
 const MAX_BUS_LOAD: u32 = 800;
 /// Largest number of messages in a configuration.
@@ -51,7 +53,7 @@ impl Config {
     /// # Errors
     /// [`ConfigError`].
     pub fn new(settings: Settings) -> Result<Self, ConfigError> {
-        if !matches!(settings.bits_per_second, 100_000 | 125_000 | 250_000 | 500_000 | 800_000 | 1_000_000) {
+        if !BIT_RATES.contains(&settings.bits_per_second) {
             return Err(ConfigError::BitRate(settings.bits_per_second));
         }
         if let Some(yaw) = &settings.yaw {
@@ -70,8 +72,20 @@ impl Config {
         if config.messages().is_empty() {
             return Err(ConfigError::Empty);
         }
-        let per_mille = config.bus_load_per_mille();
-        if per_mille > MAX_BUS_LOAD { Err(ConfigError::Overload { per_mille }) } else { Ok(config) }
+        config.check_load(&[])?;
+        Ok(config)
+    }
+
+    /// Checks the worst-case load of the messages and of further ones.
+    fn check_load(&self, further: &[Periodic]) -> Result<(), ConfigError> {
+        let bits_per_second = self.settings.bits_per_second;
+        let load = |messages: &[Periodic]| per_mille(messages, Periodic::worst_case_bits, bits_per_second);
+        let per_mille = load(&self.messages()) + load(further);
+        if per_mille > MAX_BUS_LOAD {
+            Err(ConfigError::Overload { per_mille, bits_per_second })
+        } else {
+            Ok(())
+        }
     }
 
     /// Returns the checked settings.
@@ -110,6 +124,14 @@ impl Config {
     #[doc(hidden)]
     pub fn check_further(&self, ids: [u16; 3]) -> Result<(), ConfigError> {
         check_ids(ids, |id| self.sends(Id::Standard(id)))
+    }
+
+    /// Checks the load with three further messages of 11-bit identifiers, one for each sample.
+    ///
+    /// # Errors
+    /// [`ConfigError::Overload`].
+    pub(crate) fn check_further_load(&self) -> Result<(), ConfigError> {
+        self.check_load(&[Periodic { id: Id::Standard(StandardId::ZERO), period_ms: SAMPLE_MS }; 3])
     }
 
     /// Returns whether one of our messages has this identifier; no input may use such an identifier.

@@ -35,8 +35,6 @@ pub struct SupportedHardware {
     pub imus: &'static [ImuPart],
     /// Supported fibre-optic gyros.
     pub fogs: &'static [FogPart],
-    /// Supported bit rates of the CAN bus, bit/s.
-    pub bits_per_second: &'static [u32],
 }
 
 /// The state of the board apart from the pipeline: stored data, weights, calibration and event log.

@@ -27,8 +27,6 @@ pub enum ImuPart {
     XsensMti,
     /// TDK ICM-42688-P on SPI.
     Icm42688,
-    /// ADI ADIS16465 or 16470 on SPI.
-    Adis16465,
 }
 
 /// The fibre-optic gyro that is fitted.
@@ -38,8 +36,6 @@ pub enum ImuPart {
 pub enum FogPart {
     /// KVH DSP-1760 or 17xx.
     Dsp1760,
-    /// KVH DSP-3000.
-    Dsp3000,
 }
 
 /// The rotation of the sensor against the vehicle: about x (forward), then y (left), then z (up).
@@ -160,10 +156,7 @@ impl Configuration {
 
     fn fog(&self) -> FogConfig {
         FogConfig {
-            errors: match self.fog {
-                Some(FogPart::Dsp3000) => FogErrors::DSP3000,
-                Some(FogPart::Dsp1760) | None => FogErrors::DSP1760,
-            },
+            errors: FogErrors::DSP1760,
             latitude: self.latitude(),
             // A stored configuration has been checked.
             tilt: Tilt::from_degrees(self.fog_lane.tilt_deg).unwrap_or(Tilt::NONE),
@@ -209,6 +202,9 @@ impl Record for Configuration {
     fn check(&self) -> Result<(), FieldError> {
         let config = Config::new(self.can).map_err(FieldError::Can)?;
         config.check_further(self.fog_ids).map_err(FieldError::Can)?;
+        if self.fog.is_some() {
+            config.check_further_load().map_err(FieldError::Can)?;
+        }
         if let Some(receiver) = self.latitude_receiver().map_err(FieldError::Latitude)?
             && self.own_identifier([receiver.id()].into_iter()).is_some()
         {

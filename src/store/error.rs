@@ -109,9 +109,6 @@ pub enum FieldError {
     /// This firmware image does not support the sensor.
     #[error("sensor: this firmware image does not drive the part")]
     PartNotInImage,
-    /// This firmware image does not support this bit rate of the bus, bit/s.
-    #[error("can.bits_per_second: this firmware image does not drive the bus at {0} bit/s")]
-    BitRateNotInImage(u32),
     /// An identifier of diagnosis has too many bits, or is used twice.
     #[error("diagnosis: identifier {0:#x} has too many bits, or is used twice")]
     Diagnosis(u32),

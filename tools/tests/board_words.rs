@@ -11,11 +11,10 @@ use gyronet::store::{FieldError, FlashFault, StoreError};
 
 #[test]
 fn states_are_sentences() {
-    let rate = StoreError::Field(FieldError::BitRateNotInImage(250_000));
+    let part = StoreError::Field(FieldError::PartNotInImage);
     assert_eq!(
-        Origin::Refused(rate).to_string(),
-        "built in; the stored one is refused: can.bits_per_second: this firmware image does not drive the bus \
-         at 250000 bit/s"
+        Origin::Refused(part).to_string(),
+        "built in; the stored one is refused: sensor: this firmware image does not drive the part"
     );
     assert_eq!(
         FlashState::Failed(StoreError::Full).to_string(),

@@ -14,11 +14,8 @@ use gyronet::store::layout::RECORD_SECTOR;
 use gyronet::store::{FlashFault, FogPart, ImuPart, Record as _};
 use gyronet::uds::Server;
 
-const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
-    imus: &[ImuPart::XsensMti],
-    fogs: &[FogPart::Dsp1760],
-    bits_per_second: &[250_000, 500_000],
-};
+const SUPPORTED_HARDWARE: SupportedHardware =
+    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760] };
 
 type Board = Device<RamFlash<SECTOR>, RamFlash<RECORD_SECTOR>>;
 

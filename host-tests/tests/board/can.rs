@@ -5,11 +5,13 @@ use crate::common::{self, SAMPLE, SET, SLCAN, START, boot, counters, drive, fram
 use crate::service;
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::DataFrame;
+use gyronet::can::config::{BIT_RATES, Settings};
 use gyronet::can::yaw::{AngleMessage, RateMessage};
 use gyronet::health::{Faults, Quality};
 use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::recordings::{self, workspace};
+use gyronet_host_tests::stored::Stored;
 use gyronet_host_tests::{replay, require};
 use std::io::Write;
 use std::process::{Command, Stdio};
@@ -122,6 +124,45 @@ fn compare(test: &str, samples: &[Vec<u8>]) {
     let counters = counters(&mut board);
     assert_eq!((counters.lines.unsent, counters.lines.line_errors, counters.lines.overruns), (0, 0, 0));
     sums(test, &sent);
+}
+
+/// A bus at each bit rate that can be configured: frames out as the host's, wheel frames in; at another rate none.
+#[test]
+fn every_bit_rate_is_the_configured_one() {
+    const TEST: &str = "every_bit_rate_is_the_configured_one";
+    const SAMPLES: usize = 30;
+    let wheel = DataFrame::new(StandardId::new(0xAA).expect("11 bits"), &[0x1A, 0x6F].repeat(4)).expect("8");
+    let made = host(&drive(SAMPLES));
+    for bits_per_second in BIT_RATES {
+        for bus in [bits_per_second, bits_per_second / 2] {
+            let can = Settings { bits_per_second, ..Settings::DEFAULT };
+            let configuration = Configuration { can, ..Configuration::DEFAULT };
+            let Some(mut board) = common::unpowered(TEST) else { return };
+            Stored::default().record(&configuration).write_to(&mut board);
+            board.configure("CAN1.bit_rate", bus);
+            board.power_on();
+            common::send(&mut board, &drive(SAMPLES), START);
+            for k in 0..SAMPLES as u32 {
+                board.can_send_at(&wheel, START + SAMPLE * k);
+            }
+            board.run(START + SAMPLE * SAMPLES as u32);
+            let sent = frames(&board.can_frames());
+            println!("{TEST}: {bits_per_second} on a bus of {bus}: {} frames", sent.len());
+            if bus != bits_per_second {
+                assert_eq!(sent, [], "{bits_per_second} on {bus}");
+                continue;
+            }
+            assert!(sent.len() >= SET * (SAMPLES - 2), "{}", sent.len());
+            let own = |frames: &[DataFrame]| {
+                let rates = frames.iter().filter(|frame| frame.id() != id(ANGLE));
+                rates.copied().collect::<Vec<_>>()
+            };
+            // The host has no wheels, which the angle message reports.
+            assert!(own(&sent) == own(&made[..sent.len()]), "{bits_per_second}");
+            let missed = flags(&sent).iter().filter(|faults| has(**faults, Faults::WHEELS)).count();
+            assert!(missed < 3, "{missed} sets without wheels at {bits_per_second}");
+        }
+    }
 }
 
 /// cantools reads the log: the sum of the rates is the accumulated angle.

@@ -12,7 +12,7 @@ use gyronet::service::event::EventKind;
 use gyronet::service::message::{FlashState, Info, Origin, Refusal};
 use gyronet::store::layout::{FLASH_BASE, SLOT_SIZE, STORE};
 use gyronet::store::slots::{SlotError, WeightSource};
-use gyronet::store::{Configuration, FieldError, FlashFault, FogPart, ImuPart, Slot, StoreError};
+use gyronet::store::{Configuration, FlashFault, FogPart, Slot, StoreError};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::stored::{Stored, other_weights};
 use gyronet_tools::client::device::error::DeviceError;
@@ -81,8 +81,6 @@ fn a_stored_configuration_takes_effect() {
 #[test]
 fn a_configuration_that_cannot_be_used_is_reported() {
     let good = || Stored::default().record(&Configuration::DEFAULT);
-    let other = Configuration { imu: ImuPart::Adis16465, ..Configuration::DEFAULT };
-    let refused = StoreError::Field(FieldError::PartNotInImage);
     for (test, stored, flash, event) in [
         (
             "corrupt content",
@@ -95,12 +93,6 @@ fn a_configuration_that_cannot_be_used_is_reported() {
             good().damaged(STORE.start + 1, 0x80),
             FlashState::Damaged,
             EventKind::RecordsDamaged,
-        ),
-        (
-            "another image's",
-            Stored::default().record(&other),
-            FlashState::Ready,
-            EventKind::ConfigurationRefused(refused),
         ),
     ] {
         let Some(started) = Started::with(test, &stored, |_| ()) else { return };

@@ -85,9 +85,10 @@ fn settings_that_cannot_be_are_refused() {
     assert_eq!(refused(status(0x1A2)), ConfigError::DuplicateIdentifier(0x1A2));
     assert_eq!(refused(status(0x7E0)), ConfigError::Identifier(0x7E0));
     assert!(Config::new(status(STATUS_ID)).is_ok());
-    let slow = refused(Settings { bits_per_second: 100_000, ..ALL });
-    assert_eq!(slow, ConfigError::Overload { per_mille: 970 });
-    assert_eq!(slow.to_string(), "the messages are 97.0 % of the bus");
+    for bits_per_second in [100_000, 800_000] {
+        let refusal = ConfigError::BitRate(bits_per_second);
+        assert_eq!(refused(Settings { bits_per_second, ..ALL }), refusal);
+    }
 }
 
 #[test]

@@ -25,8 +25,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 type Board = Device<Region<RECORD_SECTOR>, MappedRegion>;
-const SUPPORTED_HARDWARE: SupportedHardware =
-    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760], bits_per_second: &[500_000] };
+const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[] };
 const IDENTITY: Identity = Identity {
     firmware: [0, 1, 0],
     device_id: Some(0x413),

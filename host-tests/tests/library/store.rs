@@ -218,15 +218,7 @@ fn another_layout_is_named() {
 fn an_older_layout_is_refused_by_its_number() {
     let content = postcard::to_stdvec(&Configuration::DEFAULT).expect("it fits");
     for version in 1..Configuration::VERSION {
-        let flash = Flash::default();
-        let mut record = vec![Configuration::KEY, version, content.len() as u8, 0];
-        record.extend(&content);
-        record.resize(record.len().next_multiple_of(4), 0xFF);
-        record.extend(CRC.checksum(&record).to_le_bytes());
-        let header = CRC.checksum(&(1 ^ u32::from_le_bytes(*b"GYR1")).to_le_bytes());
-        let sector = [&1_u32.to_le_bytes()[..], &header.to_le_bytes(), &record].concat();
-        region(&flash).write(0, &sector).expect("it is blank");
-        let mut store = open(&flash);
+        let mut store = open(&written(version, &content));
         let refused = StoreError::Version { found: version, expected: Configuration::VERSION };
         assert_eq!(store.get::<Configuration>(), Err(refused));
         assert_eq!(
@@ -235,8 +227,33 @@ fn an_older_layout_is_refused_by_its_number() {
         );
         // A new one takes its place.
         store.set(&Configuration::DEFAULT).expect("it is stored");
-        assert_eq!(open(&flash).get(), Ok(Some(Configuration::DEFAULT)));
+        assert_eq!(store.get(), Ok(Some(Configuration::DEFAULT)));
     }
+}
+
+/// A flash with a configuration of this layout and content.
+fn written(version: u8, content: &[u8]) -> Flash {
+    let flash = Flash::default();
+    let mut record = vec![Configuration::KEY, version, content.len() as u8, 0];
+    record.extend(content);
+    record.resize(record.len().next_multiple_of(4), 0xFF);
+    record.extend(CRC.checksum(&record).to_le_bytes());
+    let header = CRC.checksum(&(1 ^ u32::from_le_bytes(*b"GYR1")).to_le_bytes());
+    let sector = [&1_u32.to_le_bytes()[..], &header.to_le_bytes(), &record].concat();
+    region(&flash).write(0, &sector).expect("it is blank");
+    flash
+}
+
+/// Parts that settings could once name, and no image has ever read: an ADIS16465 and a DSP-3000.
+#[test]
+fn a_stored_part_that_is_gone_is_refused() {
+    let default = postcard::to_stdvec(&Configuration::DEFAULT).expect("it fits");
+    let content = |parts: &[u8]| [parts, &default[2..]].concat();
+    let stored = |parts| open(&written(Configuration::VERSION, &content(parts))).get::<Configuration>();
+    assert_eq!(stored(&[2, 0]), Err(StoreError::Encoding));
+    assert_eq!(stored(&[0, 1, 1]), Err(StoreError::Encoding));
+    let known = stored(&[0, 1, 0]).expect("the parts are known");
+    assert_eq!(known.and_then(|known| known.fog), Some(gyronet::store::FogPart::Dsp1760));
 }
 
 #[test]

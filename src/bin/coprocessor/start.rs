@@ -6,7 +6,7 @@ use crate::diagnosis;
 use crate::idle::Stored;
 use crate::output::OutputParts;
 use crate::regions::{self, Records, Weights};
-use crate::stm32f405::{can::BITS_PER_SECOND, flash::Flash, pac};
+use crate::stm32f405::{flash::Flash, pac};
 use core::mem::MaybeUninit;
 use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
@@ -17,16 +17,14 @@ use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::{Configuration, FogPart, ImuPart};
 
 /// The hardware that this image supports. The image listens to a fibre-optic gyro whether one is configured or not.
-const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
-    imus: &[ImuPart::XsensMti, ImuPart::Icm42688],
-    fogs: &[FogPart::Dsp1760],
-    bits_per_second: &[BITS_PER_SECOND],
-};
+const SUPPORTED_HARDWARE: SupportedHardware =
+    SupportedHardware { imus: &[ImuPart::XsensMti, ImuPart::Icm42688], fogs: &[FogPart::Dsp1760] };
 
 /// Weights that are used if no slot has valid ones.
 const BUILT_IN: &[u8] = &weights::DEFAULT.0;
 
-/// Makes CAN receive only the frames that the configuration names, and sets the identifiers of diagnosis.
+/// Sets the bit rate of CAN and the identifiers of diagnosis, and makes CAN receive only the frames that the
+/// configuration names.
 fn receive(board: &Board, configuration: &Configuration, wheels: &WheelSettings, config: &Config) {
     let wheels = wheels.frames.into_iter().flatten().map(|frame| frame.id);
     let latitude = config.latitude.map(|latitude| latitude.id());
@@ -35,6 +33,7 @@ fn receive(board: &Board, configuration: &Configuration, wheels: &WheelSettings,
     ids.into_iter().for_each(diagnosis::set_ids);
     let requests = ids.into_iter().flat_map(|[request, functional, _]| [request, functional]);
     if let Some(can) = &board.can {
+        can.set_bit_rate(configuration.can.bits_per_second);
         can.receive_only(requests.into_iter().chain(wheels).chain(latitude));
     }
 }

@@ -1,4 +1,4 @@
-//! This module drives bxCAN (RM0090 32) at 500 kbit/s.
+//! bxCAN (RM0090 32) at 125, 250, 500 and 1000 kbit/s.
 //!
 //! Nothing here waits except for the start of initialisation mode, with a limit. A frame that a mailbox could not
 //! send within [`STALE_MS`] is aborted, so no stale values are sent when the bus recovers. After bus-off the
@@ -11,13 +11,26 @@ use embedded_can::{ExtendedId, Frame as _, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::service::event::CanFault;
 
-/// Bit rate of the segments below.
-pub const BITS_PER_SECOND: u32 = 500_000;
+/// Clock of the controller: APB1 while the chip runs on its crystal. On the internal oscillator, which may be 8 % wrong,
+/// the controller stays off: nodes of a CAN bus may differ by 1.5 % at most.
+const CLOCK_HZ: u32 = 42_000_000;
+/// The bit rates, of which the clock is a whole number of quanta: 42 MHz / 24, 12, 6, 3 / (1 + 11 + 2).
+#[allow(dead_code, reason = "bringup keeps the default")]
+pub const BIT_RATES: [u32; 4] = [125_000, 250_000, 500_000, 1_000_000];
+/// Bit rate until another one is set.
+const DEFAULT_BIT_RATE: u32 = 500_000;
 /// Age at which a frame that waits for the bus is dropped, ms.
 pub const STALE_MS: u32 = 20;
-/// 42 MHz / 6 / (1 + 11 + 2) = 500 kbit/s, sampled at 85.7 %.
-const PRESCALER: u16 = 6;
+/// Quanta before and after the sample point, besides the one that synchronises: sampled at 12 of 14, 85.7 %.
 const SEGMENTS: [u8; 2] = [11, 2];
+const QUANTA: u32 = 1 + SEGMENTS[0] as u32 + SEGMENTS[1] as u32;
+const _: () = {
+    let mut rates: &[u32] = &BIT_RATES;
+    while let [rate, rest @ ..] = rates {
+        assert!(CLOCK_HZ.is_multiple_of(QUANTA * *rate), "every bit has a whole number of clocks");
+        rates = rest;
+    }
+};
 /// Polls before a change of mode times out; the controller needs a frame's time at most.
 const POLLS: u32 = 10_000;
 const MAILBOXES: usize = 3;
@@ -96,7 +109,14 @@ impl Can {
         let loopback = mode == Mode::Loopback;
         // SAFETY: fields hold the value less one (RM0090 32.9.2).
         can.btr().write(|w| unsafe {
-            w.brp().bits(PRESCALER - 1).ts1().bits(before - 1).ts2().bits(after - 1).sjw().bits(0);
+            w.brp()
+                .bits(prescaler(DEFAULT_BIT_RATE) - 1)
+                .ts1()
+                .bits(before - 1)
+                .ts2()
+                .bits(after - 1)
+                .sjw()
+                .bits(0);
             w.lbkm().bit(loopback).silm().bit(loopback)
         });
         can.ier().write(|w| w.fmpie0().set_bit().tmeie().set_bit());
@@ -104,6 +124,13 @@ impl Can {
         can.mcr().modify(|_, w| w.txfp().set_bit());
         let recovery = Recovery::On { since: 0 };
         Ok(Self { registers: can, requested: [0; MAILBOXES], recovery, interval_ms: FIRST_RESTART_MS })
+    }
+
+    /// Sets the bit rate, one of [`BIT_RATES`]. The controller takes it only before [`Can::join`].
+    #[allow(dead_code, reason = "bringup keeps the default")]
+    pub fn set_bit_rate(&self, bits_per_second: u32) {
+        // SAFETY: the field holds the value less one (RM0090 32.9.2).
+        self.registers.btr().modify(|_, w| unsafe { w.brp().bits(prescaler(bits_per_second) - 1) });
     }
 
     /// Receives the frames of up to 14 identifiers, and nothing else.
@@ -198,6 +225,14 @@ impl Can {
             mailbox.tir().write(|w| w.bits(word(frame.id())).txrq().set_bit());
         }
         true
+    }
+}
+
+/// Returns the clocks of a quantum.
+const fn prescaler(bits_per_second: u32) -> u16 {
+    match (CLOCK_HZ / QUANTA).checked_div(bits_per_second) {
+        Some(clocks @ 1..=1024) => clocks as u16,
+        _ => 1024,
     }
 }
 

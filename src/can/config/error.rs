@@ -1,6 +1,6 @@
 //! This module defines the reasons why settings are refused.
 
-use super::{MAX_PERIOD_MS, SAMPLE_MS};
+use super::{BIT_RATES, MAX_BUS_LOAD, MAX_PERIOD_MS, SAMPLE_MS};
 
 /// The reason why settings are refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -11,8 +11,8 @@ pub enum ConfigError {
     /// No message is configured.
     #[error("no message is configured")]
     Empty,
-    /// The bit rate is not one of a classic CAN bus.
-    #[error("{0} bit/s is not a bit rate of a classic CAN bus")]
+    /// The bit rate is not one of [`BIT_RATES`].
+    #[error("bits_per_second: {0} is not one of {BIT_RATES:?}")]
     BitRate(u32),
     /// An identifier has more than 11 bits, or is reserved for diagnosis.
     #[error("identifier {0:03x} is reserved or has more than 11 bits")]
@@ -33,9 +33,14 @@ pub enum ConfigError {
     #[error("{0} is not a J1939 source address")]
     SourceAddress(u8),
     /// The worst-case bus load is above 80 %.
-    #[error("the messages are {}.{} % of the bus", .per_mille / 10, .per_mille % 10)]
+    #[error(
+        "the messages are {}.{} % of the bus at {} kbit/s, above {} %",
+        .per_mille / 10, .per_mille % 10, .bits_per_second / 1_000, MAX_BUS_LOAD / 10
+    )]
     Overload {
         /// Worst-case bus load, 1/1000.
         per_mille: u32,
+        /// Bit rate of the bus, bit/s.
+        bits_per_second: u32,
     },
 }

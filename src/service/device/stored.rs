@@ -113,16 +113,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     fn check_supported(&self, configuration: &Configuration) -> Result<(), StoreError> {
-        let SupportedHardware { imus, fogs, bits_per_second } = self.supported;
+        let SupportedHardware { imus, fogs } = self.supported;
         if !imus.contains(&configuration.imu) || configuration.fog.is_some_and(|fog| !fogs.contains(&fog)) {
             return Err(StoreError::Field(FieldError::PartNotInImage));
         }
-        let rate = configuration.can.bits_per_second;
-        if bits_per_second.contains(&rate) {
-            Ok(())
-        } else {
-            Err(StoreError::Field(FieldError::BitRateNotInImage(rate)))
-        }
+        Ok(())
     }
 
     pub(super) fn store(&mut self) -> Result<&mut Store<R>, StoreError> {

@@ -13,16 +13,16 @@ enum Takes {
 use Takes::{Number, Other};
 
 const SETTINGS: &[(&str, Takes)] = &[
-    ("imu", Other("", "`XsensMti` or `Icm42688`; the image refuses `Adis16465`")),
+    ("imu", Other("", "`XsensMti` or `Icm42688`")),
     (
         "fog",
         Other(
             "",
-            "`null` or `Dsp1760`; the image refuses `Dsp3000`. The board reports a configured gyro that is silent \
+            "`null` or `Dsp1760`. The board reports a configured gyro that is silent \
              from the start",
         ),
     ),
-    ("can.bits_per_second", Other("bit/s", "500000")),
+    ("can.bits_per_second", Other("bit/s", "125000, 250000, 500000 or 1000000")),
     (
         "can.bosch.tx1_only",
         Other(

@@ -36,17 +36,25 @@ fn configuration_is_kept_whole() {
         other => panic!("{other:?}"),
     }
     let refused = |error| Err(Refusal::Store(StoreError::Field(error)));
-    let other_part = Configuration { imu: ImuPart::Adis16465, ..wanted };
+    let other_part = Configuration { imu: ImuPart::Icm42688, ..wanted };
     assert_eq!(board.set_configuration(&other_part), refused(FieldError::PartNotInImage));
-    let can = Settings { bits_per_second: 250_000, ..wanted.can };
+    let slow = |bits_per_second| Settings { bits_per_second, ..wanted.can };
+    let other_rate = Configuration { can: slow(100_000), ..wanted };
+    let refusal = FieldError::Can(ConfigError::BitRate(100_000));
+    assert_eq!(board.set_configuration(&other_rate), refused(refusal));
     assert_eq!(
-        board.set_configuration(&Configuration { can, ..wanted }),
-        refused(FieldError::BitRateNotInImage(250_000))
+        refusal.to_string(),
+        "can: bits_per_second: 100000 is not one of [125000, 250000, 500000, 1000000]"
     );
+    let fog = Some(FogPart::Dsp1760);
+    let too_much = Configuration { can: slow(125_000), fog, ..wanted };
+    let refusal = FieldError::Can(ConfigError::Overload { per_mille: 972, bits_per_second: 125_000 });
+    assert_eq!(board.set_configuration(&too_much), refused(refusal));
+    assert_eq!(refusal.to_string(), "can: the messages are 97.2 % of the bus at 125 kbit/s, above 80 %");
     let twice = Configuration { fog_ids: [0x1A0, 0x1A5, 0x1A6], ..wanted };
     let duplicate = FieldError::Can(ConfigError::DuplicateIdentifier(0x1A0));
     assert_eq!(board.set_configuration(&twice), refused(duplicate));
-    let with_fog = Configuration { fog: Some(FogPart::Dsp3000), ..wanted };
+    let with_fog = Configuration { fog, ..wanted };
     assert_eq!(board.set_configuration(&with_fog), refused(FieldError::PartNotInImage));
     assert_eq!(*start(&flash).configuration(), wanted);
 }
