@@ -10,6 +10,7 @@ mod embassy;
 mod endurance;
 mod faults;
 mod icm42688;
+mod minimal;
 mod model;
 mod power_cut;
 mod service;

@@ -2,24 +2,28 @@
 //!
 //! A Cargo feature selects the board. All other code of the images uses only this description.
 
-#[cfg(all(feature = "netduino-plus-2", not(feature = "olimex-stm32-h405")))]
+#[cfg(feature = "netduino-plus-2")]
 mod netduino_plus_2;
-#[cfg(all(feature = "netduino-plus-2", not(feature = "olimex-stm32-h405")))]
+#[cfg(feature = "netduino-plus-2")]
 pub use netduino_plus_2::BOARD;
-#[cfg(all(feature = "olimex-stm32-h405", not(feature = "netduino-plus-2")))]
+#[cfg(feature = "olimex-stm32-h405")]
 mod olimex_stm32_h405;
-#[cfg(all(feature = "olimex-stm32-h405", not(feature = "netduino-plus-2")))]
+#[cfg(feature = "olimex-stm32-h405")]
 pub use olimex_stm32_h405::BOARD;
+#[cfg(feature = "minimal-board")]
+mod minimal;
+#[cfg(feature = "minimal-board")]
+pub use minimal::BOARD;
 
-#[cfg(any(
-    all(feature = "netduino-plus-2", feature = "olimex-stm32-h405"),
-    not(any(feature = "netduino-plus-2", feature = "olimex-stm32-h405"))
-))]
-compile_error!("an image is built for one board: --features netduino-plus-2 or olimex-stm32-h405");
+// Two boards at once define BOARD twice, which the compiler says by itself.
+#[cfg(not(any(feature = "netduino-plus-2", feature = "olimex-stm32-h405", feature = "minimal-board")))]
+compile_error!(
+    "an image is built for one board: --features netduino-plus-2, olimex-stm32-h405 or minimal-board"
+);
 
 use crate::stm32f405::pins::Pin;
 
-/// Describes a board.
+/// Describes a board. What a board does not have is left out of its file.
 pub struct Board {
     /// Name of the board, as `bringup` prints it.
     #[allow(dead_code, reason = "coprocessor does not print it")]
@@ -27,19 +31,26 @@ pub struct Board {
     /// Frequency of the crystal at OSC_IN, Hz: 4 to 26 MHz, a whole number of MHz.
     pub crystal_hz: u32,
     /// The LED, and the level that lights it.
-    pub led: (Pin, bool),
+    pub led: Option<(Pin, bool)>,
     /// USART1: the inertial sensor.
-    pub imu: Line,
+    pub imu: Option<Line>,
     /// USART2: SLCAN.
-    pub slcan: Line,
+    pub slcan: Option<Line>,
     /// USART3: the fibre-optic gyro.
-    pub fog: Line,
+    pub fog: Option<Line>,
     /// USART6: the service line.
     pub service: Line,
     /// CAN1, receive and transmit.
     pub can: [Pin; 2],
     /// SPI1: clock, data in, data out, and the sensor's chip select.
-    pub spi: [Pin; 4],
+    pub spi: Option<[Pin; 4]>,
+}
+
+impl Board {
+    /// Describes a board with nothing but the service line and CAN. A board's file adds what it has.
+    pub const fn new(name: &'static str, crystal_hz: u32, service: Line, can: [Pin; 2]) -> Self {
+        Self { name, crystal_hz, led: None, imu: None, slcan: None, fog: None, service, can, spi: None }
+    }
 }
 
 /// Pins and bit rate of a serial line.

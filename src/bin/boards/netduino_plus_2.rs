@@ -1,18 +1,18 @@
-//! This module describes the Netduino Plus 2: STM32F405RG, 25 MHz crystal.
+//! Netduino Plus 2: STM32F405RG, 25 MHz crystal.
 
 use super::{Board, Line};
 use crate::stm32f405::pins::Pin;
 
 /// Description of the Netduino Plus 2.
 pub const BOARD: Board = Board {
-    name: "Netduino Plus 2",
-    crystal_hz: 25_000_000,
-    led: (Pin::new('A', 10), true),
+    led: Some((Pin::new('A', 10), true)),
     // The LED is on PA10, so USART1 is on the shield's SCL and SDA pins.
-    imu: Line { tx: Pin::new('B', 6), rx: Pin::new('B', 7), baud: 115_200, fallback_baud: 115_200 },
-    slcan: Line { tx: Pin::new('A', 2), rx: Pin::new('A', 3), baud: 921_600, fallback_baud: 500_000 },
-    fog: Line { tx: Pin::new('B', 10), rx: Pin::new('B', 11), baud: 921_600, fallback_baud: 921_600 },
-    service: Line { tx: Pin::new('C', 6), rx: Pin::new('C', 7), baud: 115_200, fallback_baud: 115_200 },
-    can: [Pin::new('B', 8), Pin::new('B', 9)],
-    spi: [Pin::new('A', 5), Pin::new('A', 6), Pin::new('A', 7), Pin::new('A', 4)],
+    imu: Some(Line { tx: Pin::new('B', 6), rx: Pin::new('B', 7), baud: 115_200, fallback_baud: 115_200 }),
+    slcan: Some(Line { tx: Pin::new('A', 2), rx: Pin::new('A', 3), baud: 921_600, fallback_baud: 500_000 }),
+    fog: Some(Line { tx: Pin::new('B', 10), rx: Pin::new('B', 11), baud: 921_600, fallback_baud: 921_600 }),
+    spi: Some([Pin::new('A', 5), Pin::new('A', 6), Pin::new('A', 7), Pin::new('A', 4)]),
+    ..Board::new("Netduino Plus 2", 25_000_000, SERVICE, [Pin::new('B', 8), Pin::new('B', 9)])
 };
+
+const SERVICE: Line =
+    Line { tx: Pin::new('C', 6), rx: Pin::new('C', 7), baud: 115_200, fallback_baud: 115_200 };

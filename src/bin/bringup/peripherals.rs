@@ -20,7 +20,9 @@ const FRAME_US: u64 = 5_000;
 
 /// Blinks the LED.
 pub fn led(report: &mut Report, clocks: &Clocks) {
-    let (led, lit) = BOARD.led;
+    let Some((led, lit)) = BOARD.led else {
+        return report.manual_check("LED", format_args!("the board has none"));
+    };
     led.output(!lit);
     for level in [lit, !lit, lit, !lit] {
         led.set(level);
@@ -105,7 +107,10 @@ pub fn can(report: &mut Report, chip: &Chip, registers: pac::CAN1) {
 /// Reads the identity of a sensor on SPI1.
 pub fn sensor(report: &mut Report, registers: &pac::SPI1) {
     const NAME: &str = "SPI1";
-    let mut spi = spi::start(registers, BOARD.spi);
+    let Some(pins) = BOARD.spi else {
+        return report.manual_check(NAME, format_args!("the board has no sensor there"));
+    };
+    let mut spi = spi::start(registers, pins);
     let mut identity = [0];
     match spi.transaction(&mut [Operation::Write(&[WHO_AM_I]), Operation::Read(&mut identity)]) {
         Err(error) => report.fail(NAME, format_args!("{error:?}")),

@@ -73,11 +73,14 @@ impl Report {
 
     /// Blinks forever, after everything has been reported.
     pub fn end(&mut self) -> ! {
-        let (led, lit) = BOARD.led;
-        led.output(!lit);
+        if let Some((led, lit)) = BOARD.led {
+            led.output(!lit);
+        }
         loop {
-            for level in [lit, !lit] {
-                led.set(level);
+            for on in [true, false] {
+                if let Some((led, lit)) = BOARD.led {
+                    led.set(lit == on);
+                }
                 watchdog::feed();
                 cortex_m::asm::delay(10_000_000);
             }

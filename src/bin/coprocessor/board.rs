@@ -32,7 +32,7 @@ pub struct Board {
     pub service: serial::Port,
     /// The CAN controller; `None` if it does not answer or the clock is not exact enough.
     pub can: Option<Can>,
-    pub spi: Spi,
+    pub spi: Option<Spi>,
     pub clocks: Clocks,
     /// The identity that the board reports: firmware version, chip, clock and serial number.
     pub identity: Identity,
@@ -44,7 +44,7 @@ pub struct Handlers {
     pub fog: serial::Handler,
     pub slcan: serial::Handler,
     pub service: serial::Handler,
-    pub receptions: [serial::Reception; 4],
+    pub receptions: [Option<serial::Reception>; 4],
 }
 
 impl Board {
@@ -66,7 +66,7 @@ impl Board {
         let now = timer::micros() as u32;
         let [imu, slcan, fog, service] =
             lines(&clocks).map(|(usart, rates, memory)| serial::start(usart, memory, rates, now));
-        let spi = spi::start(&p.SPI1, BOARD.spi);
+        let spi = BOARD.spi.map(|pins| spi::start(&p.SPI1, pins));
         if clocks.exact() {
             supply::watch(&p.EXTI);
         }
@@ -83,19 +83,21 @@ impl Board {
     }
 }
 
-/// USART of a line, its bus frequency and bit rate, and its memory.
-type Line = (Usart, (u32, u32), &'static serial::Memory);
+/// USART of a line, its bus frequency and bit rate where the board has the line, and its memory.
+type Line = (Usart, Option<(u32, u32)>, &'static serial::Memory);
 
 /// Returns the lines in the order IMU, SLCAN, fibre-optic gyro, service.
 fn lines(clocks: &Clocks) -> [Line; 4] {
     let [imu, slcan, fog, service] = &MEMORY;
     // At 16 MHz, 921600 baud would be 2.1 % off before the oscillator's own error.
-    let baud = |line: &boards::Line| if clocks.exact() { line.baud } else { line.fallback_baud };
+    let rates = |bus_hz, line: &Option<boards::Line>| {
+        line.as_ref().map(|line| (bus_hz, if clocks.exact() { line.baud } else { line.fallback_baud }))
+    };
     [
-        (Usart::one(), (clocks.apb2_hz, baud(&BOARD.imu)), imu),
-        (Usart::two(), (clocks.apb1_hz, baud(&BOARD.slcan)), slcan),
-        (Usart::three(), (clocks.apb1_hz, baud(&BOARD.fog)), fog),
-        (Usart::six(), (clocks.apb2_hz, baud(&BOARD.service)), service),
+        (Usart::one(), rates(clocks.apb2_hz, &BOARD.imu), imu),
+        (Usart::two(), rates(clocks.apb1_hz, &BOARD.slcan), slcan),
+        (Usart::three(), rates(clocks.apb1_hz, &BOARD.fog), fog),
+        (Usart::six(), rates(clocks.apb2_hz, &Some(BOARD.service)), service),
     ]
 }
 
@@ -110,19 +112,16 @@ fn start_ticks(mut systick: SYST, clocks: &Clocks) {
 
 /// Assigns the pins of USARTs, LED and CAN. An unconnected line reads as idle.
 fn assign_pins() {
-    let lines = [
-        (&BOARD.imu, pins::USART_1_TO_3),
-        (&BOARD.slcan, pins::USART_1_TO_3),
-        (&BOARD.fog, pins::USART_1_TO_3),
-        (&BOARD.service, pins::USART_6),
-    ];
+    let lines = [BOARD.imu, BOARD.slcan, BOARD.fog].into_iter().flatten();
+    let lines = lines.map(|line| (line, pins::USART_1_TO_3)).chain([(BOARD.service, pins::USART_6)]);
     for (line, function) in lines {
         line.rx.pull_up();
         line.rx.alternate(function, Speed::Low);
         line.tx.alternate(function, Speed::Low);
     }
-    let (led, lit) = BOARD.led;
-    led.output(!lit);
+    if let Some((led, lit)) = BOARD.led {
+        led.output(!lit);
+    }
     for pin in BOARD.can {
         pin.alternate(pins::CAN_1, Speed::Fast);
     }

@@ -146,8 +146,8 @@ pub struct BringUp {
 
 impl BringUp {
     /// Returns idle's end if such a part is configured.
-    pub fn new(part: ImuPart, spi: Spi) -> Option<Self> {
-        (part == ImuPart::Icm42688).then_some(Self { spi, tried: None })
+    pub fn new(part: ImuPart, spi: Option<Spi>) -> Option<Self> {
+        spi.filter(|_| part == ImuPart::Icm42688).map(|spi| Self { spi, tried: None })
     }
 
     /// Tries to bring the part up, if it is wanted and the last attempt is long enough ago.

@@ -125,7 +125,7 @@ mod app {
         fog_handler: serial::Handler,
         slcan: serial::Handler,
         service: serial::Handler,
-        receptions: [serial::Reception; 4],
+        receptions: [Option<serial::Reception>; 4],
         sender: &'static mut Output,
         network: Option<GyroNet<'static, &'static mut GyroNetState>>,
         rest: &'static mut Idle,
@@ -177,7 +177,7 @@ mod app {
     #[unsafe(link_section = ".ram_code.tick")]
     fn tick(cx: tick::Context) {
         let now = timer::tick();
-        cx.local.receptions.iter_mut().for_each(|reception| reception.count(now));
+        cx.local.receptions.iter_mut().flatten().for_each(|reception| reception.count(now));
         board::SUPERVISOR.report(Task::Tick);
         rtic::pend(Interrupt::UART4);
         dsb();

@@ -85,8 +85,9 @@ impl Output {
         if polled {
             self.outgoing.tick(tick);
             // The LED blinks as long as this task runs.
-            let (led, lit) = BOARD.led;
-            led.set(lit == (tick & BLINK_MS != 0));
+            if let Some((led, lit)) = BOARD.led {
+                led.set(lit == (tick & BLINK_MS != 0));
+            }
             self.poll_inputs(coprocessor, now);
         }
         coprocessor.pause(pause::is_requested(), &mut self.outgoing);

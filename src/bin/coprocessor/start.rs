@@ -2,6 +2,7 @@
 #![allow(unsafe_code, reason = "a peripheral that is taken; the block says why it is sound")]
 
 use crate::board::Board;
+use crate::boards::BOARD;
 use crate::diagnosis;
 use crate::idle::Stored;
 use crate::output::OutputParts;
@@ -16,9 +17,17 @@ use gyronet::model::{Blob, weights};
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::{Configuration, FogPart, ImuPart};
 
-/// The hardware that this image supports. The image listens to a fibre-optic gyro whether one is configured or not.
-const SUPPORTED_HARDWARE: SupportedHardware =
-    SupportedHardware { imus: &[ImuPart::XsensMti, ImuPart::Icm42688], fogs: &[FogPart::Dsp1760] };
+/// The hardware that this image supports: what the board has the lines for. The image listens to a fibre-optic gyro
+/// whether one is configured or not.
+const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
+    imus: match (BOARD.imu.is_some(), BOARD.spi.is_some()) {
+        (true, true) => &[ImuPart::XsensMti, ImuPart::Icm42688],
+        (true, false) => &[ImuPart::XsensMti],
+        (false, true) => &[ImuPart::Icm42688],
+        (false, false) => &[],
+    },
+    fogs: if BOARD.fog.is_some() { &[FogPart::Dsp1760] } else { &[] },
+};
 
 /// Weights that are used if no slot has valid ones.
 const BUILT_IN: &[u8] = &weights::DEFAULT.0;

@@ -1,0 +1,46 @@
+//! A board whose file leaves out the LED, SLCAN, the fibre-optic gyro and SPI: it measures and sends, and refuses what it
+//! has no line for.
+
+use crate::common::{self, SAMPLE, SET, SLCAN, START};
+use crate::service::{self, on_bus};
+use gyronet::service::message::Refusal;
+use gyronet::store::{Configuration, FieldError, FogPart, ImuPart, StoreError};
+use gyronet_host_tests::board::{self, Board};
+use gyronet_tools::client::device::error::DeviceError;
+
+#[test]
+fn board_without_led_slcan_gyro_and_spi_sends_the_hosts_frames() {
+    const TEST: &str = "board_without_led_slcan_gyro_and_spi_sends_the_hosts_frames";
+    const SAMPLES: usize = 50;
+    let Some(elf) = board::firmware("minimal-board", TEST, env!("CARGO_TARGET_TMPDIR"), "coprocessor") else {
+        return;
+    };
+    let Some(mut board) = Board::unpowered(TEST, &elf) else { return };
+    board.configure("RCC.crystal_hz", 8_000_000);
+    board.power_on();
+    let samples = common::drive(SAMPLES);
+    common::send(&mut board, &samples, START);
+    board.run(START + SAMPLE * SAMPLES as u32);
+    let sent = common::frames(&board.can_frames());
+    let made = common::host(&samples);
+    assert!(sent.len() >= SET * (SAMPLES - 1) && sent == made[..sent.len()], "{} frames", sent.len());
+    assert!(board.sent(SLCAN).is_empty());
+    let counters = common::counters(&mut board);
+    assert_eq!((counters.lines.unsent, counters.lines.line_errors), (0, 0));
+    let wrong = |kind: &str| ["early_access", "slow_pin", "ignored_write"].contains(&kind);
+    let wrong: Vec<_> = board.events().into_iter().filter(|event| wrong(&event.kind)).collect();
+    assert!(wrong.is_empty(), "{wrong:?}");
+    let none = Refusal::Store(StoreError::Field(FieldError::PartNotInImage));
+    for configuration in [
+        Configuration { imu: ImuPart::Icm42688, ..Configuration::DEFAULT },
+        Configuration { fog: Some(FogPart::Dsp1760), ..Configuration::DEFAULT },
+    ] {
+        match on_bus(&mut board).set_configuration(&configuration) {
+            Err(DeviceError::Refused(refusal)) => assert_eq!(refusal, none),
+            other => panic!("{other:?}"),
+        }
+    }
+    on_bus(&mut board).restart().expect("a response");
+    board.run(START);
+    assert_eq!(service::configuration(&mut board), Configuration::DEFAULT);
+}
