@@ -1,12 +1,11 @@
 //! This module is the image's output task on the host: bytes of an Xsens MTi and a DSP-1760 and wheel frames go in,
 //! SLCAN lines come out. Like the image, it does the input and output around the library's [`Coprocessor`].
 
-use crate::recordings::{self, Row, workspace};
+use crate::recordings::Row;
 use gyronet::can::config::Config;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::coprocessor::{self, Clock, Coprocessor, StorageFaults, TimedFrame};
-use gyronet::fog::FogCounters;
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::monitor::{START_US, TIMEOUT_US};
 use gyronet::sample::PERIOD_US;
@@ -14,7 +13,6 @@ use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::store::{Calibration, Configuration, Learned};
 use gyronet::units::Micros;
-use std::ops::Range;
 
 /// The image sends these messages.
 pub const CONFIG: Config = Config::DEFAULT;
@@ -30,16 +28,6 @@ pub fn message(number: usize, row: &Row) -> MtData2 {
         temperature: None,
         status: Some(3),
     }
-}
-
-/// Returns samples of the simulated drive as an MTi sends them, message by message.
-///
-/// # Panics
-/// When the drive has fewer samples.
-#[must_use]
-pub fn simulated_drive(samples: Range<usize>) -> Vec<Vec<u8>> {
-    let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
-    samples.map(|number| message(number, &rows[number]).emit().to_vec()).collect()
 }
 
 /// Compares what a board has sent with what it must send, line by line.
@@ -83,15 +71,14 @@ pub fn lines(bytes: &[u8]) -> Vec<Vec<u8>> {
 
 /// Runs the board's output task on the host.
 pub struct Board {
-    config: coprocessor::Config,
     coprocessor: Coprocessor,
     network: GyroNet<'static>,
     mti: Mti,
     dsp1760: Dsp1760,
     /// Board time, which passes only while the sensor is silent, since bytes arrive at the host's pace.
     now: Micros,
-    /// The lines that an emulated board has sent: see [`Board::following`].
-    emulated_lines: Vec<Vec<u8>>,
+    /// The lines that another board has sent: see [`Board::following`].
+    board_lines: Vec<Vec<u8>>,
     /// Number of message sets for which the sensor has been silent.
     silent: u64,
     /// The number of message sets without a rate that were followed.
@@ -132,41 +119,31 @@ impl Board {
         };
         Self {
             coprocessor: Coprocessor::new(config),
-            config,
             network: GyroNet::new(blob),
             mti: Mti::new(),
             dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
             now: Micros(0),
-            emulated_lines: Vec::new(),
+            board_lines: Vec::new(),
             silent: 0,
             followed: 0,
             lines: Vec::new(),
         }
     }
 
-    /// Returns a board that follows an emulated one, given the lines that it has sent. A busy host may delay bytes
-    /// for so long that the emulated board, by its own clock, finds the sensor silent and reports that; this board
-    /// then reports it too. Everything else must be the same.
+    /// Returns a board that follows another one, given the lines that it has sent. Where the other board, by its own
+    /// clock, finds the sensor silent and reports that, this board reports it too. Everything else must be the same.
     #[must_use]
     pub fn following(lines: Vec<Vec<u8>>) -> Self {
         Self::new().follow_lines(lines)
     }
 
-    /// Follows an emulated board that has sent these lines, as [`Board::following`].
+    /// Follows another board that has sent these lines, as [`Board::following`].
     #[must_use]
     pub fn follow_lines(self, lines: Vec<Vec<u8>>) -> Self {
-        Self { emulated_lines: lines, ..self }
+        Self { board_lines: lines, ..self }
     }
 
-    /// Returns the board as if it had found damage in its storage at the start, which may include the configuration.
-    #[must_use]
-    pub fn damaged(self, configuration_lost: bool) -> Self {
-        let storage = StorageFaults { damaged: true, configuration_lost };
-        let config = coprocessor::Config { storage, ..self.config };
-        Self { coprocessor: Coprocessor::new(config), config, ..self }
-    }
-
-    /// Sends the message sets without a rate that the emulated board has sent before the next sample.
+    /// Sends the message sets without a rate that the other board has sent before the next sample.
     fn follow(&mut self) {
         loop {
             let mut coprocessor = self.coprocessor.clone();
@@ -176,7 +153,7 @@ impl Board {
                 return;
             }
             let at = self.lines.len();
-            if self.emulated_lines.get(at..at + set.len()) != Some(&set[..]) {
+            if self.board_lines.get(at..at + set.len()) != Some(&set[..]) {
                 return;
             }
             (self.coprocessor, self.now) = (coprocessor, now);
@@ -231,27 +208,6 @@ impl Board {
                     self.follow();
                 }
             }
-        }
-    }
-
-    /// Returns the counters of the fibre-optic gyro.
-    #[must_use]
-    pub fn fog(&self) -> &FogCounters {
-        self.coprocessor.fog_counters()
-    }
-
-    /// Keeps the sensor silent for this many message sets; from the start if it has sent nothing yet.
-    ///
-    /// # Panics
-    /// When the coprocessor does not report it.
-    pub fn silence(&mut self, sets: u64) {
-        for _ in 0..sets {
-            self.now = self.next_silence();
-            let Self { coprocessor, lines, .. } = self;
-            let observation = coprocessor.poll(self.now, &mut |sent: TimedFrame| lines.push(line(&sent)));
-            assert!(observation.expect("time goes on").is_some(), "the sensor is silent");
-            self.silent += 1;
-            self.estimate();
         }
     }
 

@@ -18,7 +18,7 @@ use gyronet::service::event::{Crash, CrashKind, ResetCause};
 use gyronet::service::message::{Identity, Info};
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::layout::{self, RECORD_SECTOR};
-use gyronet::store::{FogPart, ImuPart};
+use gyronet::store::ImuPart;
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use gyronet_host_tests::flash::{F405, MappedRegion, Region};
 use std::cell::RefCell;
