@@ -5,7 +5,7 @@ use crate::recordings::Row;
 use gyronet::can::config::Config;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::can::{DataFrame, slcan};
-use gyronet::coprocessor::{self, Clock, Coprocessor, StorageFaults, TimedFrame};
+use gyronet::coprocessor::{self, Clock, Coprocessor, TimedFrame};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::monitor::{START_US, TIMEOUT_US};
 use gyronet::sample::PERIOD_US;
