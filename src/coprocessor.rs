@@ -156,8 +156,22 @@ impl Coprocessor {
     /// # Errors
     /// [`InputError::Imu`] when its time stamp has no place on the grid, [`InputError::ClockWentBack`]. The sample is
     /// counted and not used, and no frame is sent for it; the samples that follow report a gap.
-    #[inline(never)]
     pub fn imu(
+        &mut self,
+        sample: ImuSample,
+        now: Micros,
+        sink: &mut impl Sink,
+    ) -> Result<Observation, InputError> {
+        let observation = self.take_imu(sample, now, sink);
+        if observation.is_ok() {
+            self.step_fog(sink);
+        }
+        observation
+    }
+
+    /// Not inlined, so that its stack frame is gone when the fibre-optic gyro steps.
+    #[inline(never)]
+    fn take_imu(
         &mut self,
         sample: ImuSample,
         now: Micros,
@@ -176,7 +190,6 @@ impl Coprocessor {
         self.monitor.heard(sample.time, now);
         self.heard = now;
         self.send(&output.vehicle, sample.time, sink);
-        self.step_fog(sink);
         if let Some(window) = output.window {
             let replaced = self.handover.offer(window, now);
             count(&mut self.counters.replaced_windows, u32::from(replaced));
