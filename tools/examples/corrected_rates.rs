@@ -6,7 +6,6 @@
 //! navigation rate, which is sent 70 ms later, and its expected error, rad/s. An empty field is unknown.
 
 use gyronet::coprocessor::Config;
-use gyronet::health::Status;
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet_tools::board::Board;
 use gyronet_tools::drive::replay::Steps;
@@ -24,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("t_s,gyro,prompt,navigation,sigma");
     for step in Steps::new(&drive, board)? {
         let step = step?;
-        if step.vehicle.prompt.status == Status::Init {
+        if !step.is_initialised {
             continue;
         }
         let [.., gyro] = step.input.sample.angular_rate;

@@ -46,6 +46,11 @@ pub struct Step {
     pub settled: AngularRate,
     /// The frames that were sent with this row, and those sent while the sensor was silent after it.
     pub frames: Vec<TimedFrame>,
+    /// Static initialisation has finished.
+    pub is_initialised: bool,
+    /// The rates of this step are compared with others: after static initialisation, and before the first step without
+    /// a navigation rate.
+    pub is_compared: bool,
 }
 
 /// A board with its network and the wheels of its vehicle.
@@ -59,6 +64,9 @@ pub struct Board<N> {
     /// The time from which on the board finds the sensor silent.
     silent_from: Micros,
     held: VecDeque<Step>,
+    /// Whether a step that was given out is initialised, and whether one after that has no navigation rate.
+    initialised: bool,
+    ended: bool,
 }
 
 impl<N: WindowNetwork> Board<N> {
@@ -69,7 +77,9 @@ impl<N: WindowNetwork> Board<N> {
         let receiver = wheels.as_ref().map(|_| wheel_frames::receiver());
         let coprocessor = Coprocessor::new(Config { wheels: receiver, clock: Clock::Sensor, ..config });
         let held = VecDeque::with_capacity(HOLD + 1);
-        Self { coprocessor, wheels, network, rows: 0, now: Micros(0), silent_from: Micros(0), held }
+        let [now, silent_from] = [Micros(0); 2];
+        let [initialised, ended] = [false; 2];
+        Self { coprocessor, wheels, network, rows: 0, now, silent_from, held, initialised, ended }
     }
 
     /// The coprocessor, to read its state.
@@ -113,6 +123,8 @@ impl<N: WindowNetwork> Board<N> {
             navigation: None,
             settled: vehicle.prompt.rate,
             frames,
+            is_initialised: false,
+            is_compared: false,
         });
         if vehicle.navigation.status != Status::Init
             && let Some(step) = self.held(vehicle.navigation.tick)
@@ -124,12 +136,17 @@ impl<N: WindowNetwork> Board<N> {
         {
             step.settled = AngularRate(settled.rate.0.saturating_sub(settled.correction.0));
         }
-        Ok(if self.held.len() > HOLD { self.held.pop_front() } else { None })
+        Ok(if self.held.len() > HOLD { self.end() } else { None })
     }
 
     /// Gives out the next of the steps that are still held; call it until `None` after the last row.
     pub fn end(&mut self) -> Option<Step> {
-        self.held.pop_front()
+        let mut step = self.held.pop_front()?;
+        self.initialised |= step.vehicle.prompt.status != Status::Init;
+        self.ended |= self.initialised && step.navigation.is_none();
+        step.is_initialised = self.initialised;
+        step.is_compared = self.initialised && !self.ended;
+        Some(step)
     }
 
     /// Lets time pass until the next row. The messages about a silent sensor precede those of the row.

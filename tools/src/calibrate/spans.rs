@@ -8,7 +8,6 @@ use super::{CalibrateError, SHORTEST_S};
 use crate::board::Step;
 use crate::drive::DT;
 use crate::evaluate::heading_error::{BLOCK_S, Blocks, OffCourse};
-use gyronet::health::Status;
 use gyronet::sample::RATE_HZ;
 use gyronet::units::AngularRate;
 
@@ -31,8 +30,6 @@ pub struct Span {
 /// The spans of a drive in progress: by its reference yaw rate, and by its course.
 #[derive(Debug, Default)]
 pub struct Spans {
-    started: bool,
-    ended: bool,
     by_rate: ByRate,
     by_course: ByCourse,
 }
@@ -40,9 +37,7 @@ pub struct Spans {
 impl Spans {
     /// Adds a step of the board that has run the drive with this static bias.
     pub fn add(&mut self, step: &Step, bias: &[f64; 3]) {
-        self.started |= step.vehicle.prompt.status != Status::Init;
-        self.ended |= self.started && step.navigation.is_none();
-        if !self.started || self.ended {
+        if !step.is_compared {
             return;
         }
         let row = &step.input;

@@ -63,7 +63,7 @@ impl Sent {
             }
             let rate = |step: &Step| step.vehicle.prompt.rate.0.unsigned_abs();
             let fastest = sent.fastest.as_ref().is_none_or(|fastest| rate(&step) >= rate(fastest));
-            if step.navigation.is_some() && fastest {
+            if step.is_compared && fastest {
                 sent.fastest = Some(step);
             }
         }

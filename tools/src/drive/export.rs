@@ -3,7 +3,6 @@
 use super::DT;
 use super::wheel_frames::Speeds;
 use crate::board::Step;
-use gyronet::health::Status;
 use gyronet::odometry::Track;
 use gyronet::units::AngularRate;
 use std::io::{self, Write};
@@ -14,7 +13,6 @@ use std::io::{self, Write};
 #[derive(Debug)]
 pub struct Table<W> {
     out: W,
-    started: bool,
 }
 
 impl<W: Write> Table<W> {
@@ -24,7 +22,7 @@ impl<W: Write> Table<W> {
     /// The writer's.
     pub fn new(mut out: W) -> io::Result<Self> {
         writeln!(out, "t_s,gyro,prompt,navigation,sigma,yaw,status")?;
-        Ok(Self { out, started: false })
+        Ok(Self { out })
     }
 
     /// Writes a step.
@@ -32,8 +30,7 @@ impl<W: Write> Table<W> {
     /// # Errors
     /// The writer's.
     pub fn step(&mut self, step: &Step) -> io::Result<()> {
-        self.started |= step.vehicle.prompt.status != Status::Init;
-        if !self.started {
+        if !step.is_initialised {
             return Ok(());
         }
         let [.., gyro] = step.input.sample.angular_rate;
@@ -68,14 +65,12 @@ pub struct Tum<W> {
     out: W,
     speeds: Speeds,
     track: Track,
-    started: bool,
-    ended: bool,
 }
 
 impl<W: Write> Tum<W> {
     /// Starts at the first pose.
     pub fn new(speeds: Speeds, out: W) -> Self {
-        Self { out, speeds, track: Track::default(), started: false, ended: false }
+        Self { out, speeds, track: Track::default() }
     }
 
     /// Writes the pose of a step.
@@ -84,9 +79,7 @@ impl<W: Write> Tum<W> {
     /// The writer's.
     pub fn step(&mut self, step: &Step) -> io::Result<()> {
         let way = self.speeds.next(&step.input) * DT;
-        self.started |= step.vehicle.prompt.status != Status::Init;
-        self.ended |= self.started && step.navigation.is_none();
-        let Some(sent) = step.navigation.filter(|_| self.started && !self.ended) else { return Ok(()) };
+        let Some(sent) = step.navigation.filter(|_| step.is_compared) else { return Ok(()) };
         self.track.step([way; 2], sent.rate.rad_per_sec() * DT);
         let ([x, y], (sin, cos)) = (self.track.position, (0.5 * self.track.yaw).sin_cos());
         writeln!(self.out, "{:.4} {x:.4} {y:.4} 0 0 0 {sin:.9} {cos:.9}", seconds(step.time.0))

@@ -3,20 +3,18 @@
 pub use crate::board::Step;
 
 use crate::board::Board;
-use crate::drive::candump::Log;
 use crate::drive::error::DataError;
 use crate::drive::recording::Recording;
 use crate::drive::stream::{Drive, Rows};
 use crate::drive::wheel_frames::WheelFrames;
 use crate::evaluate::ablation::Uncorrected;
 use gyronet::bias::StaticError;
-use gyronet::coprocessor::{Config, TimedFrame};
+use gyronet::coprocessor::Config;
 use gyronet::estimate::YawEstimate;
-use gyronet::health::{Counters, Status};
+use gyronet::health::Counters;
 use gyronet::model::WindowNetwork;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::units::{AngularRate, Yaw};
-use std::io::{self, Write};
 use std::ops::Range;
 
 /// The reason why a drive cannot be replayed.
@@ -115,8 +113,6 @@ pub struct Replay {
     pub owed: Yaw,
     /// The event counters of the pipeline.
     pub counters: Counters,
-    /// Number of messages that reported "failed" because a value did not fit its signal.
-    pub out_of_range: u32,
 }
 
 impl Replay {
@@ -144,64 +140,33 @@ impl Replay {
             steps.extend(step);
         }
         steps.extend(std::iter::from_fn(|| board.end()));
-        let start = steps.iter().position(|step| step.vehicle.prompt.status != Status::Init);
-        let coprocessor = board.coprocessor();
-        let pipeline = coprocessor.pipeline();
+        let start = steps.iter().position(|step| step.is_initialised);
+        let pipeline = board.coprocessor().pipeline();
         let gyro_bias = pipeline
             .gyro_bias()
             .ok_or_else(|| ReplayError::NeverInitialised { path: recording.path.clone() })?;
         let start = start.unwrap_or(steps.len());
         let (owed, counters) = (pipeline.owed().navigation, *pipeline.counters());
-        let out_of_range = coprocessor.input_counters().out_of_range;
-        Ok(Self { steps, start, gyro_bias, owed, counters, out_of_range })
+        Ok(Self { steps, start, gyro_bias, owed, counters })
     }
 
     /// Returns the range of the steps that have a navigation rate: from the end of static initialisation on.
     #[must_use]
     pub fn compared(&self) -> Range<usize> {
-        let sent = self.steps[self.start..].iter().take_while(|step| step.navigation.is_some()).count();
-        self.start..self.start + sent
+        let compared = self.steps.iter().filter(|step| step.is_compared).count();
+        self.start..self.start + compared
     }
 
     /// Returns the navigation rates of the compared steps.
     pub fn navigation(&self) -> impl Iterator<Item = YawEstimate> {
         self.steps[self.compared()].iter().filter_map(|step| step.navigation)
     }
-
-    /// Returns the settled rates of the compared steps ([`Step::settled`]).
-    pub fn settled(&self) -> impl Iterator<Item = AngularRate> {
-        self.steps[self.compared()].iter().map(|step| step.settled)
-    }
-
-    /// Returns the frames of the whole drive.
-    pub fn frames(&self) -> impl Iterator<Item = &TimedFrame> {
-        self.steps.iter().flat_map(|step| &step.frames)
-    }
-
-    /// Writes the frames of the whole drive as a candump log, and returns their number.
-    ///
-    /// # Errors
-    /// The writer's error.
-    pub fn log(&self, out: impl Write) -> io::Result<u64> {
-        let mut log = Log::new(out);
-        for TimedFrame { frame, time } in self.frames() {
-            log.frame(*time, frame)?;
-        }
-        log.finish()
-    }
-
-    /// Returns the number of steps with each status.
-    #[must_use]
-    pub fn status_counts(&self) -> [(Status, usize); 4] {
-        [Status::Init, Status::Degraded, Status::Ready, Status::Clipped].map(|status| {
-            (status, self.steps.iter().filter(|step| step.vehicle.prompt.status == status).count())
-        })
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gyronet::health::Status;
     use gyronet::model::window::{Features, WINDOW};
     use gyronet::model::{Estimate, SCALE_MIN};
     use std::fmt::Write;
@@ -242,9 +207,10 @@ mod tests {
         assert_eq!((drive.compared(), sent), (300..993, 0));
         // What remains is the variation of the last seven samples.
         assert_eq!(drive.owed, Yaw(-(1 << 14)));
-        let [(_, init), (_, degraded), (_, ready), (_, clipped)] = drive.status_counts();
-        assert_eq!((init, clipped), (300, 0));
-        assert_eq!(degraded + ready, 700);
+        let count = |status| drive.steps.iter().filter(|step| step.vehicle.prompt.status == status).count();
+        assert_eq!((count(Status::Init), count(Status::Clipped)), (300, 0));
+        let degraded = count(Status::Degraded);
+        assert_eq!(degraded + count(Status::Ready), 700);
         assert!(degraded < 20, "{degraded}");
     }
 

@@ -7,7 +7,6 @@ use crate::drive::stream::Drive;
 use crate::evaluate::metrics::{WINDOW, YawError, YawSums};
 use crate::evaluate::rates::silent;
 use gyronet::compensate::{CompensateConfig, Lag, Mode};
-use gyronet::health::Status;
 use gyronet::model::window::Features;
 use gyronet::model::{Estimate, WindowNetwork};
 use gyronet::pipeline::PipelineConfig;
@@ -194,8 +193,6 @@ pub fn floor(drive: &Drive<'_>) -> Result<Option<Floor>, ReplayError> {
 /// A score in progress.
 #[derive(Default)]
 struct Sums {
-    started: bool,
-    ended: bool,
     has_gap: bool,
     yaw: YawSums,
     squares: f64,
@@ -210,9 +207,7 @@ struct Sums {
 
 impl Sums {
     fn add(&mut self, step: &Step) {
-        self.started |= step.vehicle.prompt.status != Status::Init;
-        self.ended |= self.started && step.navigation.is_none();
-        let Some(sent) = step.navigation.filter(|_| self.started && !self.ended) else { return };
+        let Some(sent) = step.navigation.filter(|_| step.is_compared) else { return };
         let Some(truth) = step.input.reference else {
             self.has_gap = true;
             return;

@@ -18,7 +18,6 @@ use gyronet::can;
 use gyronet::compensate::Lag;
 use gyronet::coprocessor::Config;
 use gyronet::estimate::YawEstimate;
-use gyronet::health::Status;
 use gyronet::model::blob::Shape;
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Estimate, WindowNetwork};
@@ -61,8 +60,6 @@ pub struct Networks<'a> {
 pub struct Sample {
     /// The step of the board whose rates are sent.
     pub step: Step,
-    /// Whether it is compared: after static initialisation, and before the first sample without a navigation rate.
-    pub is_compared: bool,
     /// The rates by each method, rad/s.
     pub rates: PerMethod<f64>,
 }
@@ -163,8 +160,6 @@ struct SideBySide {
     vqf: vqf::Heading,
     /// Samples that wait for the low passes.
     waiting: VecDeque<Sample>,
-    started: bool,
-    ended: bool,
 }
 
 impl SideBySide {
@@ -174,8 +169,6 @@ impl SideBySide {
             fir: [LowPass::chosen(), LowPass::chosen()].map(Line::new),
             vqf: vqf::Heading::new(vqf::on_a_vehicle()),
             waiting: VecDeque::new(),
-            started: false,
-            ended: false,
         }
     }
 
@@ -188,8 +181,6 @@ impl SideBySide {
         let updated = known.updated.map_or(still, |sent| sent.rate.rad_per_sec());
         let vqf = self.vqf.rate([x, y, still], sample.specific_force.map(SpecificForce::metre_per_sec2));
         let navigation = step.navigation.map(|sent| sent.rate.rad_per_sec());
-        self.started |= step.vehicle.prompt.status != Status::Init;
-        self.ended |= self.started && navigation.is_none();
         let [float, integer] = known.paper.map(|rate| rate.map(AngularRate::rad_per_sec));
         // In the order of Method::ON_A_DRIVE; the low passes' rates come later.
         let rates = PerMethod::of([
@@ -205,7 +196,7 @@ impl SideBySide {
             Some(step.vehicle.prompt.rate.rad_per_sec()),
             navigation,
         ]);
-        self.waiting.push_back(Sample { step, is_compared: self.started && !self.ended, rates });
+        self.waiting.push_back(Sample { step, rates });
         let filtered = [self.fir[0].next(still), self.fir[1].next(updated)];
         self.complete(filtered)
     }
@@ -256,9 +247,9 @@ impl Rates {
     }
 
     /// Adds a sample.
-    pub fn add(&mut self, Sample { step, is_compared, rates }: &Sample) {
+    pub fn add(&mut self, Sample { step, rates }: &Sample) {
         let speed = self.wheels.as_mut().map(|wheels| wheels.next(&step.input));
-        if !is_compared {
+        if !step.is_compared {
             return;
         }
         self.seconds.push((step.time.0 - self.first.0) as f64 * 1e-6);

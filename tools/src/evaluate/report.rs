@@ -257,7 +257,7 @@ struct Judge {
 
 impl Judges {
     fn add(&mut self, sample: &Sample) {
-        if !sample.is_compared {
+        if !sample.step.is_compared {
             return;
         }
         let row = &sample.step.input;
