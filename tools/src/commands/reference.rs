@@ -5,7 +5,7 @@ use clap::ValueEnum;
 use gyronet_tools::reference;
 use std::io::{self, Write};
 
-/// Print a table of the settings, data identifiers, troubles or states of a board, as Markdown.
+/// Print a Markdown table of settings, data identifiers, troubles or states.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[arg(value_enum)]
