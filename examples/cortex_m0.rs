@@ -11,23 +11,15 @@ fn main() {
 
 #[cfg(target_os = "none")]
 mod firmware {
+    use core::convert::Infallible;
     use cortex_m_semihosting::{debug, hprintln};
     use gyronet::health::{Source, Status};
-    use gyronet::model::gyronet::{GyroNetState, recurrent_words};
-    use gyronet::sample::Validity;
-    use gyronet::units::SpecificForce;
-    use gyronet::{
-        AngularRate, Blob, Coprocessor, GyroNet, ImuSample, Micros, TimedFrame, WindowNetwork, weights,
-    };
+    use gyronet::model::GyroNetState;
+    use gyronet::sample::TestSignal;
+    use gyronet::{Blob, Bus, Config, Coprocessor, DataFrame, GyroNet, Sink, TimedFrame, weights};
     use panic_semihosting as _;
 
-    /// Units of the default model's Bi-LSTM.
-    const UNITS: usize = 4;
-    const HALF: usize = UNITS / 2;
-    const RECURRENT: usize = recurrent_words(UNITS);
-    /// The state of the default model, without room for a larger one; it is not on the stack.
-    type State = GyroNetState<UNITS, HALF, RECURRENT>;
-    type Model = GyroNet<'static, &'static mut State, UNITS, HALF, RECURRENT>;
+    type Model = GyroNet<'static, &'static mut GyroNetState>;
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
@@ -41,43 +33,48 @@ mod firmware {
     /// Creates both over statics, because they are too large for the stack.
     fn parts() -> Option<(&'static mut Coprocessor, Model)> {
         let blob = Blob::new_checked(&weights::DEFAULT.0).ok()?;
-        let state = cortex_m::singleton!(: State = GyroNetState::ZERO)?;
-        let coprocessor = cortex_m::singleton!(: Coprocessor = Coprocessor::START)?;
+        let state = cortex_m::singleton!(: GyroNetState = GyroNetState::ZERO)?;
+        let coprocessor = cortex_m::singleton!(: Coprocessor = const { Coprocessor::new(Config::DEFAULT) })?;
         Some((coprocessor, Model::with_state(blob, state).ok()?))
     }
 
-    /// Corrects five seconds of samples. Returns whether the last rate is the network's, and within 1 % of the turn's.
+    /// Corrects five seconds of samples: a car that is parked for four and then turns at 6 deg/s, by a gyro with a bias of
+    /// 0.5 deg/s. Returns whether the last rate is the network's, and within 1 % of the turn's.
     fn run(coprocessor: &mut Coprocessor, mut network: Model) -> bool {
+        let mut can = NoBus;
         let mut last = None;
         for number in 0..500 {
-            let now = Micros(10_000 * u64::from(number));
-            // Pass the frames to your CAN controller here.
-            let mut send = |sent: TimedFrame| {
-                core::hint::black_box(sent.frame);
-            };
-            last = coprocessor.imu(read(number, now), now, &mut send).ok();
-            if let Some(window) = coprocessor.window() {
-                let _ = coprocessor.deliver(window.end, network.estimate(&window.features));
-            }
+            let signal = TestSignal::turning(if number < 400 { 0.5 } else { 6.5 });
+            let sample = signal.sample(number);
+            // Replace it with what your sensor has given: a sample, an error, or nothing.
+            let mut reading = Some(Ok::<_, Infallible>(sample));
+            last = coprocessor.step(sample.time, &mut reading, &mut can, Some(&mut network)).observation;
         }
         let Some(rate) = last.map(|last| last.vehicle.prompt) else { return false };
-        hprintln!("corrected yaw rate {}e-6 rad/s", (1e6 * rate.rate.rad_per_sec()) as i32);
+        let deg_per_sec = rate.rate.rad_per_sec().to_degrees();
+        hprintln!("corrected yaw rate {}e-3 deg/s", (1e3 * deg_per_sec) as i32);
         let good = rate.status == Status::Ready && rate.source == Source::GyroNet;
-        good && (rate.rate.rad_per_sec() - 0.1).abs() < 0.001
+        good && (deg_per_sec - 6.0).abs() < 0.06
     }
 
-    /// Stands in for your sensor: it has a bias of 0.01 rad/s, on a car that is parked for four seconds and then
-    /// turns at 0.1 rad/s.
-    fn read(number: u32, time: Micros) -> ImuSample {
-        // One bit of noise: the monitor reports an axis without noise as stuck.
-        let noise = (number % 2) as i32;
-        let yaw_rate = if number < 400 { 1_342_177 } else { 14_763_950 };
-        ImuSample {
-            time,
-            specific_force: [noise, noise, 10_286_531 + noise].map(SpecificForce),
-            angular_rate: [noise, noise, yaw_rate + noise].map(AngularRate),
-            temperature: None,
-            validity: Validity::Good,
+    /// Stands in for your CAN controller; [`gyronet::QueuedCan`] is one over the traits of `embedded-can`.
+    struct NoBus;
+
+    impl Sink for NoBus {
+        fn frame(&mut self, sent: TimedFrame) {
+            core::hint::black_box(sent.frame);
+        }
+    }
+
+    impl Bus for NoBus {
+        fn receive(&mut self) -> Option<DataFrame> {
+            None
+        }
+
+        fn flush(&mut self) {}
+
+        fn lost(&self) -> u32 {
+            0
         }
     }
 }

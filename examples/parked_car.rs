@@ -1,26 +1,34 @@
 //! The two ends of the Cortex-M examples: a serial port that receives a parked car's samples, and a CAN controller that
-//! counts frames. Your HAL has the real ones.
+//! counts frames and receives those of the wheels. Your HAL has the real ones.
 
 use core::convert::Infallible;
 use cortex_m_semihosting::{debug, hprintln};
-use embedded_can::Frame;
+use embedded_can::{Frame, StandardId};
 use embedded_io::{ErrorType, Read, ReadReady};
 use gyronet::Micros;
 use gyronet::can::DataFrame;
 use gyronet::can::bosch::{SignalStatus, TX1_ID, Tx1};
+use gyronet::health::InputCounters;
+use gyronet::sample::TestSignal;
 use gyronet::sensor::xsens::MtData2;
 
 /// The length of the run, in samples.
 const SAMPLES: u32 = 400;
 /// The period of the samples, us.
 pub const PERIOD_US: u64 = 10_000;
+/// The gyro has a bias of 0.5 deg/s.
+const PARKED: TestSignal = TestSignal::turning(0.5);
+/// Four wheels at 0 km/h, as a Toyota sends them.
+const STANDING: [u8; 8] = [0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F];
 
 /// A serial port that has received one message of an MTi at each poll.
 #[derive(Default)]
 pub struct Port {
-    message: heapless::Vec<u8, 64>,
+    message: heapless::Vec<u8, 72>,
     read: usize,
-    sent: u32,
+    number: u32,
+    /// Nothing was waiting at the last poll, so the next message is.
+    has_paused: bool,
 }
 
 impl ErrorType for Port {
@@ -32,21 +40,12 @@ impl ReadReady for Port {
         if self.read < self.message.len() {
             return Ok(true);
         }
-        // A bias, and one bit of noise: the monitor reports an axis without noise as stuck.
-        let noise = 0.001 * (self.sent % 2) as f32;
-        let message = MtData2 {
-            packet_counter: Some(self.sent as u16),
-            sample_time_fine: Some(100 * self.sent),
-            acceleration: Some([noise, noise, 9.81 + noise]),
-            rate_of_turn: Some([noise, noise, 0.01 + noise]),
-            temperature: None,
-            status: Some(3),
-        };
-        // A message of these fields has 54 bytes.
-        self.message.clear();
-        let _ = self.message.extend_from_slice(&message.emit());
-        (self.read, self.sent) = (0, self.sent + 1);
-        Ok(true)
+        self.has_paused = !self.has_paused;
+        if self.has_paused {
+            self.message = MtData2::of(&PARKED.sample(self.number), self.number as u16).emit();
+            (self.read, self.number) = (0, self.number + 1);
+        }
+        Ok(self.has_paused)
     }
 }
 
@@ -60,14 +59,15 @@ impl Read for Port {
     }
 }
 
-/// A CAN controller that counts frames and keeps the last yaw rate.
+/// A CAN controller that counts frames, keeps the last yaw rate, and has received a wheel frame at each poll.
 #[derive(Default)]
-pub struct Bus {
+pub struct Controller {
     frames: u32,
     last: Option<Tx1>,
+    received: bool,
 }
 
-impl embedded_can::nb::Can for Bus {
+impl embedded_can::nb::Can for Controller {
     type Frame = DataFrame;
     type Error = Infallible;
 
@@ -80,21 +80,23 @@ impl embedded_can::nb::Can for Bus {
     }
 
     fn receive(&mut self) -> nb::Result<DataFrame, Infallible> {
-        Err(nb::Error::WouldBlock)
+        self.received = !self.received;
+        let frame = StandardId::new(0xAA).and_then(|id| DataFrame::new(id, &STANDING));
+        frame.filter(|_| self.received).ok_or(nb::Error::WouldBlock)
     }
 }
 
 /// Ends the run with the last sample, which arrives at `now`. The exit status is 0 when all frames of every sample were
-/// sent, the last rate is valid and `errors` is 0.
-pub fn exit_at_the_end(now: Micros, bus: &Bus, errors: u32) {
+/// sent, the last rate is valid and nothing was refused.
+pub fn exit_at_the_end(now: Micros, can: &Controller, inputs: &InputCounters) {
     if now.0 < u64::from(SAMPLES - 1) * PERIOD_US {
         return;
     }
-    let complete = bus.frames == 6 * SAMPLES && errors == 0;
-    let good = bus.last.as_ref().filter(|tx1| complete && tx1.yaw_rate_status == SignalStatus::OK);
+    let complete = can.frames == 6 * SAMPLES && *inputs == InputCounters::NONE;
+    let good = can.last.as_ref().filter(|tx1| complete && tx1.yaw_rate_status == SignalStatus::OK);
     if let Some(tx1) = good {
         let milli_deg = (1e3 * tx1.yaw_rate_deg_per_sec()) as i32;
-        hprintln!("{} frames; corrected yaw rate {}e-3 deg/s", bus.frames, milli_deg);
+        hprintln!("{} frames; corrected yaw rate {}e-3 deg/s", can.frames, milli_deg);
     }
     debug::exit(if good.is_some() { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
 }

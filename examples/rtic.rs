@@ -18,14 +18,12 @@ mod parked_car;
 #[allow(unsafe_code, reason = "RTIC generates it; none is written here")]
 #[rtic::app(device = stm32f4::stm32f405, peripherals = false)]
 mod app {
-    use crate::parked_car::{Bus, PERIOD_US, Port, exit_at_the_end};
+    use crate::parked_car::{Controller, PERIOD_US, Port, exit_at_the_end};
     use cortex_m::peripheral::SYST;
     use cortex_m::peripheral::syst::SystClkSource;
-    use gyronet::model::gyronet::GyroNetState;
-    use gyronet::sensor::{Source, serial::Serial, xsens::Mti};
-    use gyronet::{
-        Blob, Config, Coprocessor, DataFrame, GyroNet, Micros, TransmitQueue, WindowNetwork, weights,
-    };
+    use gyronet::model::GyroNetState;
+    use gyronet::sensor::{serial::Serial, xsens::Mti};
+    use gyronet::{Config, Coprocessor, GyroNet, Micros, QueuedCan, WindowNetwork};
     use panic_semihosting as _;
     use stm32f4::stm32f405::Interrupt;
 
@@ -40,21 +38,18 @@ mod app {
     #[local]
     struct Local {
         imu: Serial<Port, Mti>,
-        queue: TransmitQueue<DataFrame, 24>,
-        can: Bus,
+        can: QueuedCan<Controller>,
         now: Micros,
-        network: Option<GyroNet<'static, &'static mut GyroNetState>>,
+        network: Option<GyroNet<'static, GyroNetState>>,
     }
 
-    #[init(local = [coprocessor: Coprocessor = Coprocessor::START, state: GyroNetState = GyroNetState::ZERO])]
+    #[init(local = [coprocessor: Coprocessor = Coprocessor::new(Config::DEFAULT)])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let coprocessor = cx.local.coprocessor;
-        coprocessor.configure(&Config::DEFAULT);
-        let blob = Blob::new_checked(&weights::DEFAULT.0).ok();
-        let network = blob.and_then(|blob| GyroNet::with_state(blob, cx.local.state).ok());
+        let network = GyroNet::shipped().ok();
         start(cx.core.SYST);
-        let (imu, queue) = (Serial::new(Port::default(), Mti::new()), TransmitQueue::new());
-        (Shared { coprocessor }, Local { imu, queue, can: Bus::default(), now: Micros(0), network })
+        let (imu, can) = (Serial::new(Port::default(), Mti::new()), QueuedCan::new(Controller::default()));
+        (Shared { coprocessor }, Local { imu, can, now: Micros(0), network })
     }
 
     /// Starts a timer with the period of the samples. On a board 1 ms reports a silent sensor sooner.
@@ -65,20 +60,15 @@ mod app {
         timer.enable_counter();
     }
 
-    /// Corrects a sample and sends its frames. Errors are counted and reported on the bus.
-    #[task(binds = SysTick, priority = 2, local = [imu, queue, can, now], shared = [coprocessor])]
+    /// Corrects a sample and sends its frames; the window that becomes due is left to the task below.
+    #[task(binds = SysTick, priority = 2, local = [imu, can, now], shared = [coprocessor])]
     fn output(mut cx: output::Context) {
-        let (queue, now) = (cx.local.queue, *cx.local.now);
-        let errors = cx.shared.coprocessor.lock(|coprocessor| {
-            match cx.local.imu.next_sample() {
-                Some(Ok(sample)) => drop(coprocessor.imu(sample, now, queue)),
-                Some(Err(_)) => coprocessor.imu_error(),
-                None => drop(coprocessor.poll(now, queue)),
-            }
-            coprocessor.input_counters().imu_errors + queue.dropped()
+        let (imu, can, now) = (cx.local.imu, cx.local.can, *cx.local.now);
+        let inputs = cx.shared.coprocessor.lock(|coprocessor| {
+            coprocessor.step(now, imu, can, None);
+            *coprocessor.input_counters()
         });
-        queue.service(cx.local.can);
-        exit_at_the_end(now, cx.local.can, errors);
+        exit_at_the_end(now, can.controller(), &inputs);
         cx.local.now.0 += PERIOD_US;
         // The task below has the vector of a peripheral that this board does not use.
         rtic::pend(Interrupt::UART5);

@@ -71,9 +71,9 @@ impl CompensateConfig {
             Some(lag) => lag,
             None => Lag::MAX,
         },
-        max_mean: AngularRate(7_027_624),
-        max_single: AngularRate(70_276_240),
-        max_carry: AngularRate(2_342_541),
+        max_mean: AngularRate::from_deg_per_sec(3.0),
+        max_single: AngularRate(10 * AngularRate::from_deg_per_sec(3.0).0),
+        max_carry: AngularRate::from_deg_per_sec(1.0),
     };
 }
 
@@ -195,11 +195,6 @@ impl Compensator {
             held: [0; HELD_QUARTERS],
             held_until: 0,
         }
-    }
-
-    /// Sets the configuration, before the first sample.
-    pub fn configure(&mut self, config: CompensateConfig) {
-        self.config = config;
     }
 
     /// Revises the samples of the window that ended [`Mode::delay`] samples before the next one.

@@ -18,14 +18,17 @@
 //! so the frames do not depend on the speed of the machine. If samples arrive faster than 100 times a second,
 //! [`Coprocessor::is_ready`] tells when the next one has to wait for an estimate.
 
+mod clock;
 mod config;
 mod handover;
 mod sink;
-mod timeline;
+mod step;
 
 pub use crate::pipeline::DueWindow;
-pub use config::{Clock, Config, InputError, StorageFaults};
+pub use clock::Clock;
+pub use config::{Config, InputError, StorageFaults};
 pub use sink::{Sink, TimedFrame};
+pub use step::{Bus, MAX_SAMPLES, QueuedCan, Step};
 
 use crate::bias::{Latitude, StaticError};
 use crate::can::DataFrame;
@@ -40,12 +43,12 @@ use crate::health::{BoardFaults, InputCounters, MonitorCounters, count};
 use crate::model::Estimate;
 use crate::model::fognet::FogEstimate;
 use crate::model::seconds::SecondsWindow;
-use crate::monitor::{SensorMonitor, TIMEOUT_US};
-use crate::pipeline::Pipeline;
+use crate::monitor::SensorMonitor;
+use crate::pipeline::{BoardState, Pipeline};
 use crate::sample::{FogSample, ImuSample, WheelSample};
 use crate::units::{CentiCelsius, Micros};
+use clock::Timeline;
 use handover::Handover;
-use timeline::Timeline;
 
 /// The results of one sample, or of its absence, for a log or diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,7 +67,7 @@ pub struct Observation {
 
 /// The state of the bus, as the caller reports it.
 #[derive(Debug, Clone, Copy)]
-struct Bus {
+struct BusState {
     lost: u32,
     is_off: bool,
     /// The number of lost frames that the messages have reported.
@@ -74,23 +77,17 @@ struct Bus {
 /// Runs the coprocessor of one vehicle.
 #[derive(Debug, Clone)]
 pub struct Coprocessor {
-    clock: Clock,
     storage: StorageFaults,
-    bus: Bus,
+    bus: BusState,
     timeline: Timeline,
     monitor: SensorMonitor,
     pipeline: Pipeline,
     handover: Handover,
     wheels: Option<WheelReceiver>,
-    /// The newest report of the wheels.
-    known_wheels: Option<WheelSample>,
     fog: FogPipeline,
     latitude: Option<LatitudeReceiver>,
     encoder: CanEncoder,
     fog_encoder: FogEncoder,
-    /// The newest sample's time stamp, and the time at which it arrived.
-    sample_time: Micros,
-    heard: Micros,
     /// The newest temperature: some parts send it with one sample in a hundred.
     temperature: Option<CentiCelsius>,
     /// Rates are withheld.
@@ -99,56 +96,31 @@ pub struct Coprocessor {
 }
 
 impl Coprocessor {
-    /// The initial value for a static: the default configuration at time 0. Configure it before the first input. It
-    /// is about 10 KB, which [`Coprocessor::new`] would return on the stack.
-    pub const START: Self = {
-        const CONFIG: Config = Config::DEFAULT;
+    /// Creates a coprocessor before its first input, at time 0. It is about 10 KB: on a board with a small stack make it
+    /// in a static.
+    #[must_use]
+    #[inline]
+    pub const fn new(config: Config) -> Self {
+        let clock_ratio = match config.clock {
+            Clock::Outside => config.clock_ratio,
+            Clock::Sensor => None,
+        };
         Self {
-            clock: CONFIG.clock,
-            storage: CONFIG.storage,
-            bus: Bus { lost: 0, is_off: false, reported: 0 },
-            timeline: Timeline::START,
-            monitor: SensorMonitor::new(CONFIG.clock_ratio),
-            handover: Handover::new(CONFIG.has_gyronet, CONFIG.pipeline.compensate.mode.delay()),
-            pipeline: Pipeline::new(CONFIG.pipeline),
-            wheels: CONFIG.wheels,
-            known_wheels: None,
-            fog: FogPipeline::new(CONFIG.fog, CONFIG.has_fognet),
-            latitude: None,
-            encoder: CanEncoder::START,
-            fog_encoder: FogEncoder::new(CONFIG.fog_ids),
-            sample_time: Micros(0),
-            heard: Micros(0),
+            storage: config.storage,
+            bus: BusState { lost: 0, is_off: false, reported: 0 },
+            timeline: Timeline::new(config.clock),
+            monitor: SensorMonitor::new(clock_ratio),
+            handover: Handover::new(config.has_gyronet, config.pipeline.compensate.mode.delay()),
+            pipeline: Pipeline::new(config.pipeline),
+            wheels: config.wheels,
+            fog: FogPipeline::new(config.fog, config.has_fognet, config.fog_expected),
+            latitude: config.latitude,
+            encoder: CanEncoder::new(config.can),
+            fog_encoder: FogEncoder::new(config.fog_ids),
             temperature: None,
             paused: false,
             counters: InputCounters::NONE,
         }
-    };
-
-    /// Creates a coprocessor before its first input, at time 0.
-    #[must_use]
-    pub fn new(config: Config) -> Self {
-        let mut coprocessor = Self::START;
-        coprocessor.configure(&config);
-        coprocessor
-    }
-
-    /// Sets the configuration of [`Coprocessor::START`], once and before the first input.
-    #[inline(never)]
-    pub fn configure(&mut self, config: &Config) {
-        self.clock = config.clock;
-        self.storage = config.storage;
-        self.monitor = SensorMonitor::new(config.clock_ratio.filter(|_| config.clock == Clock::Outside));
-        self.handover = Handover::new(config.has_gyronet, config.pipeline.compensate.mode.delay());
-        self.pipeline.configure(config.pipeline);
-        self.wheels = config.wheels;
-        self.fog.configure(config.fog, config.has_fognet);
-        self.latitude = config.latitude;
-        if config.fog_expected {
-            self.fog.start_without_sample(Micros(0));
-        }
-        self.encoder = CanEncoder::new(config.can);
-        self.fog_encoder = FogEncoder::new(config.fog_ids);
     }
 
     /// Processes a sample of the inertial sensor that arrived at `now`; its frames go to `sink`.
@@ -162,40 +134,35 @@ impl Coprocessor {
         now: Micros,
         sink: &mut impl Sink,
     ) -> Result<Observation, InputError> {
-        let observation = self.take_imu(sample, now, sink);
-        if observation.is_ok() {
-            self.step_fog(sink);
-        }
+        let observation = self.correct(sample, now, sink);
+        self.step_fog(sink);
         observation
     }
 
-    /// Not inlined, so that its stack frame is gone when the fibre-optic gyro steps.
+    // Not inlined, so that its large frame is gone before the step of the fibre-optic gyro.
     #[inline(never)]
-    fn take_imu(
+    fn correct(
         &mut self,
         sample: ImuSample,
         now: Micros,
         sink: &mut impl Sink,
     ) -> Result<Observation, InputError> {
         let now = self.advance(now)?;
-        self.sample_time = sample.time;
-        if let Some(wheels) = self.poll_wheels() {
-            self.pipeline.wheels(wheels);
-        }
+        self.timeline.sample = sample.time;
+        let wheels = self.poll_wheels();
         self.temperature = sample.temperature.or(self.temperature);
         let validity = self.monitor.judge(&sample);
         let sample = ImuSample { validity, temperature: self.temperature, ..sample };
-        self.report_board();
-        let output = self.pipeline.correct(sample).map_err(InputError::Imu)?;
+        let board = self.board_state();
+        let output = self.pipeline.correct(sample, wheels.as_ref(), &board).map_err(InputError::Imu)?;
         self.monitor.heard(sample.time, now);
-        self.heard = now;
         self.send(&output.vehicle, sample.time, sink);
-        if let Some(window) = output.window {
+        if let Some(window) = &output.window {
             let replaced = self.handover.offer(window, now);
             count(&mut self.counters.replaced_windows, u32::from(replaced));
         }
         let (settled, refused) = (output.settled, output.refused);
-        let wheels = self.known_wheels.unwrap_or_default();
+        let wheels = wheels.unwrap_or_default();
         Ok(Observation { sample: Some(sample), vehicle: output.vehicle, wheels, settled, refused })
     }
 
@@ -212,7 +179,7 @@ impl Coprocessor {
     /// counted and not used.
     pub fn fog(&mut self, sample: FogSample, now: Micros, sink: &mut impl Sink) -> Result<(), InputError> {
         self.advance(now)?;
-        let added = self.fog.add(self.time(), sample).map_err(InputError::Fog);
+        let added = self.fog.add(self.timeline.time(), sample).map_err(InputError::Fog);
         self.step_fog(sink);
         added
     }
@@ -231,7 +198,7 @@ impl Coprocessor {
     /// while, which is reported; the latitude in use is kept.
     pub fn can(&mut self, frame: &DataFrame, now: Micros) -> Result<(), InputError> {
         self.advance(now)?;
-        let time = self.time();
+        let time = self.timeline.time();
         match self.wheels.as_mut().and_then(|wheels| wheels.decode(frame, time)) {
             Some(Err(error)) => {
                 count(&mut self.counters.wheel_errors, 1);
@@ -268,9 +235,8 @@ impl Coprocessor {
     pub fn poll(&mut self, now: Micros, sink: &mut impl Sink) -> Result<Option<Observation>, InputError> {
         let now = self.advance(now)?;
         let observation = self.monitor.poll(now).map(|steps| {
-            self.report_board();
-            let vehicle = self.pipeline.silent(steps);
-            self.send(&vehicle, Micros(self.sample_time.0.saturating_add(now.0 - self.heard.0)), sink);
+            let vehicle = self.pipeline.silent(steps, &self.board_state());
+            self.send(&vehicle, self.monitor.time_at(now), sink);
             let wheels = self.poll_wheels().unwrap_or_default();
             Observation { sample: None, vehicle, wheels, settled: None, refused: None }
         });
@@ -337,7 +303,7 @@ impl Coprocessor {
     /// Notes the number of frames lost on the bus since the start, and whether the controller is off the bus. The next
     /// messages report it.
     pub fn bus(&mut self, lost: u32, is_off: bool) {
-        self.bus = Bus { lost, is_off, ..self.bus };
+        self.bus = BusState { lost, is_off, ..self.bus };
     }
 
     /// Returns the pipeline, to read its state.
@@ -364,8 +330,8 @@ impl Coprocessor {
         let begins = paused && !self.paused;
         self.paused = paused;
         if begins {
-            let vehicle = self.pipeline.silent(0);
-            self.send(&vehicle, self.sample_time, sink);
+            let vehicle = self.pipeline.silent(0, &self.board_state());
+            self.send(&vehicle, self.timeline.sample, sink);
         }
     }
 
@@ -382,58 +348,63 @@ impl Coprocessor {
         })
     }
 
-    /// Returns the time that is used for the wheels, the latitude and the fibre-optic gyro.
-    fn time(&self) -> Micros {
-        match self.clock {
-            Clock::Outside => self.timeline.now(),
-            Clock::Sensor => self.sample_time.min(timeline::END),
-        }
-    }
-
     fn poll_wheels(&mut self) -> Option<WheelSample> {
-        let time = self.time();
-        self.known_wheels = self.wheels.as_mut().and_then(|wheels| wheels.poll(time));
-        self.known_wheels
+        let time = self.timeline.time();
+        self.wheels.as_mut().and_then(|wheels| wheels.poll(time))
     }
 
     /// Sends the rates of the fibre-optic gyro's steps that are complete or due.
     #[inline(never)]
     fn step_fog<SINK: Sink>(&mut self, sink: &mut SINK) {
-        let time = self.time();
+        let time = self.timeline.time();
         while self.fog.is_due(time) {
             let wheels = self.poll_wheels();
-            let silent = self.timeline.now().0.saturating_sub(self.heard.0) >= TIMEOUT_US;
-            let fresh = self.clock == Clock::Sensor || !silent;
+            let fresh = self.timeline.is_sensors() || !self.monitor.is_stale(self.timeline.now());
             let inertial = self.pipeline.inertial().filter(|_| fresh);
             let Some(estimate) = self.fog.next_step(time, inertial, wheels.as_ref()) else { return };
             sink.fog_rate(&estimate);
-            let time = self.sample_time;
+            let time = self.timeline.sample;
             if SINK::TAKES_FRAMES {
                 self.fog_encoder.send(&estimate, |frame| sink.frame(TimedFrame { frame, time }));
             }
         }
     }
 
-    fn report_board(&mut self) {
+    fn board_state(&self) -> BoardState {
         let stored = self.storage.damaged || !self.handover.has_network();
         let configuration_lost = self.storage.configuration_lost;
         let bus = self.bus.is_off || self.bus.lost != self.bus.reported;
         let clock = self.monitor.is_clock_off();
-        self.pipeline.board(BoardFaults { bus, clock, stored, configuration_lost });
-        self.pipeline.set_clock_ratio(self.monitor.clock_ratio());
+        let faults = BoardFaults { bus, clock, stored, configuration_lost };
+        BoardState { faults, clock_ratio: self.monitor.clock_ratio() }
     }
 
     fn send<SINK: Sink>(&mut self, vehicle: &VehicleSample, time: Micros, sink: &mut SINK) {
-        let withheld = self.paused.then(|| self.pipeline.silent(0));
+        if self.paused {
+            self.withhold(time, sink);
+        } else {
+            self.encode(vehicle, time, sink);
+        }
+        self.bus.reported = self.bus.lost;
+    }
+
+    /// Sends a message set without a rate.
+    #[inline(never)]
+    fn withhold<SINK: Sink>(&mut self, time: Micros, sink: &mut SINK) {
+        let vehicle = self.pipeline.silent(0, &self.board_state());
+        self.encode(&vehicle, time, sink);
+    }
+
+    fn encode<SINK: Sink>(&mut self, vehicle: &VehicleSample, time: Micros, sink: &mut SINK) {
         if SINK::TAKES_FRAMES {
-            let vehicle = withheld.as_ref().unwrap_or(vehicle);
             self.encoder.send(vehicle, |frame| sink.frame(TimedFrame { frame, time }));
-            if let Some(frame) = self.encoder.status(|| self.pipeline.status()) {
+            let Self { encoder, pipeline, wheels, timeline, .. } = self;
+            let mut standstill = || Some(wheels.as_mut()?.poll(timeline.time())?.standstill);
+            if let Some(frame) = encoder.status(|| pipeline.status(standstill())) {
                 sink.frame(TimedFrame { frame, time });
             }
             self.counters.out_of_range = self.encoder.out_of_range();
         }
-        self.bus.reported = self.bus.lost;
     }
 
     fn claim(&mut self, wanted: bool, end: u32) -> Result<(), InputError> {

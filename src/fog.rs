@@ -130,7 +130,7 @@ impl FogConfig {
         shake: [6e-5, 1.7e-4],
         fognet: FogNetUse::Off,
         padding: Padding::Repeat,
-        max_correction: Angle(351_843_720_888),
+        max_correction: Angle((0.02 * Angle::PER_RAD as f64) as i64),
     };
 }
 
@@ -193,11 +193,6 @@ impl FogCorrector {
             linear_rest: 0,
             spread_rest: 0,
         }
-    }
-
-    /// Sets the configuration, before the first frame.
-    pub fn configure(&mut self, config: FogConfig) {
-        self.config = config;
     }
 
     /// Corrects the turn of one frame of 10 ms.

@@ -19,13 +19,12 @@
 //!
 //! # On a board of your own
 //!
-//! This is everything except the board itself (`examples/own_board.rs`). `examples/cortex_m.rs` builds the same code
-//! as an image for a Cortex-M.
+//! [`Coprocessor::step`] is the whole loop. `examples/own_board.rs` is this program as an image for a Cortex-M, with wheel
+//! speeds received from the bus.
 //!
 //! ```
-#![doc = include_str!("../examples/own_board.rs")]
 //! # // A port that holds four seconds of a parked car's samples, and a controller that counts.
-//! # use embedded_can::{Frame, nb};
+//! # use embedded_can::nb;
 //! # struct Port(std::collections::VecDeque<u8>);
 //! # impl embedded_io::ErrorType for Port { type Error = core::convert::Infallible; }
 //! # impl embedded_io::Read for Port {
@@ -39,39 +38,41 @@
 //! #     fn read_ready(&mut self) -> Result<bool, Self::Error> { Ok(!self.0.is_empty()) }
 //! # }
 //! # #[derive(Default)]
-//! # struct Controller(std::rc::Rc<std::cell::RefCell<Vec<gyronet::can::DataFrame>>>);
+//! # struct Controller(Vec<gyronet::DataFrame>);
 //! # impl nb::Can for Controller {
-//! #     type Frame = gyronet::can::DataFrame;
+//! #     type Frame = gyronet::DataFrame;
 //! #     type Error = core::convert::Infallible;
 //! #     fn transmit(&mut self, frame: &Self::Frame) -> ::nb::Result<Option<Self::Frame>, Self::Error> {
-//! #         self.0.borrow_mut().push(*frame);
+//! #         self.0.push(*frame);
 //! #         Ok(None)
 //! #     }
 //! #     fn receive(&mut self) -> ::nb::Result<Self::Frame, Self::Error> { Err(::nb::Error::WouldBlock) }
 //! # }
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # use gyronet::sensor::xsens::MtData2;
+//! # use embedded_can::Frame;
+//! # use gyronet::{sample::TestSignal, sensor::xsens::MtData2};
 //! use gyronet::sensor::{serial::Serial, xsens::Mti};
-//! use gyronet::{Blob, Config, GyroNet, weights};
-//! # let messages = (0..400_u32).flat_map(|k| { let noise = 0.001 * (k % 2) as f32; MtData2 {
-//! #     packet_counter: Some(k as u16), sample_time_fine: Some(100 * k), temperature: None, status: Some(3),
-//! #     acceleration: Some([noise, noise, 9.81 + noise]), rate_of_turn: Some([noise, noise, 0.01 + noise]),
-//! # } .emit().to_vec() });
-//! # let (uart, mut can) = (Port(messages.collect()), Controller::default());
-//! # let frames = can.0.clone();
+//! use gyronet::{Config, Coprocessor, GyroNet, Micros, QueuedCan};
+//!
+//! # let messages = (0..400).flat_map(|k| MtData2::of(&TestSignal::turning(0.5).sample(k), k as u16).emit().to_vec());
+//! # let (uart, controller) = (Port(messages.collect()), Controller::default());
+//! # let mut now = Micros(0);
+//! # let mut timer = || { now.0 += 10_000; now };
 //! let mut coprocessor = Coprocessor::new(Config::DEFAULT);
-//! let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0)?);
+//! let mut network = GyroNet::shipped()?;
 //! let mut imu = Serial::new(uart, Mti::new()); // an Xsens MTi on your serial port
-//! let mut queue = TransmitQueue::new(); // a CAN controller has fewer mailboxes than a sample has frames
-//! # for _ in 0..400 {
-//! poll(&mut coprocessor, &mut network, &mut imu, &mut queue, &mut can, Micros(0));
+//! let mut can = QueuedCan::<_>::new(controller); // a CAN controller has fewer mailboxes than a sample has frames
+//! # for _ in 0..100 {
+//! // In your loop, about every millisecond:
+//! coprocessor.step(timer(), &mut imu, &mut can, Some(&mut network));
 //! # }
-//! # assert_eq!((frames.borrow().len(), coprocessor.input_counters().imu_errors), (6 * 400, 0));
-//! # let last = gyronet::can::bosch::Tx1::parse(frames.borrow()[6 * 399].data())?;
+//! # let frames = &can.controller().0;
+//! # assert_eq!((frames.len(), coprocessor.input_counters().imu_errors), (6 * 400, 0));
+//! # let last = gyronet::can::bosch::Tx1::parse(frames[6 * 399].data())?;
 //! # assert_eq!(last.yaw_rate_status, gyronet::can::bosch::SignalStatus::OK);
 //! # assert!(last.yaw_rate_deg_per_sec().abs() < 0.05, "the bias is off: {}", last.yaw_rate_deg_per_sec());
-//! # poll(&mut coprocessor, &mut network, &mut imu, &mut queue, &mut can, Micros(1_000_000));
-//! # assert_eq!(frames.borrow().len(), 6 * 401, "silence is reported");
+//! # for _ in 0..4 { coprocessor.step(timer(), &mut imu, &mut can, Some(&mut network)); }
+//! # assert_eq!(can.controller().0.len(), 6 * 402, "silence is reported");
 //! # Ok(())
 //! # }
 //! ```
@@ -139,7 +140,9 @@ mod sqrt;
 mod vector;
 
 pub use can::{DataFrame, queue::TransmitQueue};
-pub use coprocessor::{Clock, Config, Coprocessor, InputError, Observation, Sink, TimedFrame};
+pub use coprocessor::{
+    Bus, Clock, Config, Coprocessor, InputError, Observation, QueuedCan, Sink, TimedFrame,
+};
 pub use estimate::{VehicleSample, YawEstimate};
 pub use model::{Blob, FogNet, GyroNet, WindowNetwork, weights};
 pub use sample::{FogSample, ImuSample};

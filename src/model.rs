@@ -27,7 +27,7 @@ pub mod window;
 pub use blob::{Blob, BlobError};
 pub use fognet::FogNet;
 pub use fognet_blob::FogBlob;
-pub use gyronet::GyroNet;
+pub use gyronet::{GyroNet, GyroNetState};
 pub use window::{FEATURES, Features, WINDOW};
 
 use crate::nn::linear::Linear;

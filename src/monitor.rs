@@ -15,16 +15,15 @@
 //! [`Status::Clipped`]: crate::health::Status::Clipped
 //! [`Status::Stuck`]: crate::health::Status::Stuck
 
-mod jump;
-mod stuck;
+mod readings;
 
-pub use jump::{JUMP_FORCE, JUMP_PATIENCE, JUMP_RATE};
-pub use stuck::{AXIS_STUCK_AFTER, STUCK_AFTER};
+pub use readings::{AXIS_STUCK_AFTER, JUMP_FORCE, JUMP_PATIENCE, JUMP_RATE, STUCK_AFTER};
 
 use crate::align::clock_ratio::{ClockRatio, ClockRatioConfig, RatioEstimator};
 use crate::health::{MonitorCounters, count};
 use crate::sample::{ImuSample, PERIOD_US, Validity};
 use crate::units::Micros;
+use readings::{Jump, Repeats};
 
 /// The sensor counts as silent after this time without a sample, microseconds: two samples are missing, and the silence
 /// is reported before the third one would come.
@@ -38,12 +37,14 @@ pub const HOLD: u8 = 5;
 /// Judges each reading of the sensor, and reports silence and clock faults.
 #[derive(Debug, Clone)]
 pub struct SensorMonitor {
-    repeats: stuck::Repeats,
-    jump: jump::Jump,
+    repeats: Repeats,
+    jump: Jump,
     stuck: bool,
     /// Samples until the part has recovered from saturation.
     recovering: u8,
-    /// The time of the newest sample by the outside clock.
+    /// Time stamp and arrival of the newest sample that was used.
+    newest: Option<(Micros, Micros)>,
+    /// The time from which silence is counted: of that arrival, or of a later look at samples that wait.
     heard: Option<Micros>,
     /// The time at which the next message set without a sample is due.
     due: Option<u64>,
@@ -57,10 +58,11 @@ impl SensorMonitor {
     #[must_use]
     pub const fn new(clock: Option<ClockRatioConfig>) -> Self {
         Self {
-            repeats: stuck::Repeats::new(),
-            jump: jump::Jump::new(),
+            repeats: Repeats::new(),
+            jump: Jump::new(),
             stuck: false,
             recovering: 0,
+            newest: None,
             heard: None,
             due: None,
             clock: match clock {
@@ -100,6 +102,7 @@ impl SensorMonitor {
 
     /// Notes that a sample with time stamp `time` arrived at `now` and was used.
     pub fn heard(&mut self, time: Micros, now: Micros) {
+        self.newest = Some((time, now));
         self.heard = Some(now);
         self.due = None;
         if let Some(clock) = &mut self.clock {
@@ -119,6 +122,20 @@ impl SensorMonitor {
     #[must_use]
     pub fn is_clock_off(&self) -> bool {
         self.clock.as_ref().is_some_and(RatioEstimator::fault)
+    }
+
+    /// Returns whether the newest sample is so old that its reading says nothing about `now`.
+    #[must_use]
+    pub fn is_stale(&self, now: Micros) -> bool {
+        let arrival = self.newest.map_or(0, |(_, arrival)| arrival.0);
+        now.0.saturating_sub(arrival) >= TIMEOUT_US
+    }
+
+    /// Returns the sensor's time at `now`, as if its clock had gone on since the newest sample.
+    #[must_use]
+    pub fn time_at(&self, now: Micros) -> Micros {
+        let (time, arrival) = self.newest.unwrap_or_default();
+        Micros(time.0.saturating_add(now.0.saturating_sub(arrival.0)))
     }
 
     /// Notes that samples are waiting to be read, so the sensor is not silent.

@@ -11,32 +11,70 @@
 
 mod config;
 mod initialised;
-mod output;
 mod report;
 mod sensor_bias;
 mod status;
-mod uncertainty;
-mod wheels;
 mod windows;
 
 pub use config::PipelineConfig;
-pub use output::{DueWindow, Output, Owed};
-pub use uncertainty::{Uncertainty, UncertaintyConfig};
+pub use report::{Uncertainty, UncertaintyConfig};
+pub use windows::DueWindow;
 
 use crate::align::clock_ratio::ClockRatio;
 use crate::align::{AlignError, Aligner};
-use crate::bias::{StandstillSource, StaticInit, ZeroPoint, ZeroRate, ZeroRateOutcome};
+use crate::bias::{StandstillSource, StaticError, StaticInit, ZeroPoint, ZeroRate, ZeroRateOutcome};
 use crate::compensate::{Compensated, Compensator, Implausible, Settled};
+use crate::estimate::VehicleSample;
 use crate::health::{BoardFaults, Counters, Faults, count};
 use crate::model::Estimate;
-use crate::sample::{Frame, ImuSample, Standstill, WheelSample};
+use crate::sample::{Frame, ImuSample, Standstill, WHEELS, WheelSample};
 
 use crate::model::window::{self, Features, WINDOW};
 use crate::units::{AngularRate, Yaw};
 use initialised::Initialised;
 use sensor_bias::SensorBias;
-use wheels::Wheels;
 use windows::Windows;
+
+/// What a sample's rates depend on besides the sensors: the faults and the clock of the board.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoardState {
+    /// The faults other than those of the sensor.
+    pub faults: BoardFaults,
+    /// The true length of the steps of the sensor's clock, by which the rates are summed.
+    pub clock_ratio: ClockRatio,
+}
+
+impl BoardState {
+    /// No fault, and a sensor whose clock is right.
+    pub const GOOD: Self = Self { faults: BoardFaults::NONE, clock_ratio: ClockRatio::ONE };
+}
+
+/// Holds the results of one sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Output {
+    /// Both rates and everything else that is sent, for [`crate::can::encoder::CanEncoder`].
+    pub vehicle: VehicleSample,
+    /// The sample whose estimate is final with this one.
+    pub settled: Option<Settled>,
+    /// A window that is due: run it through the network and [`Pipeline::deliver`] the estimate before the sample
+    /// [`crate::compensate::Mode::delay`] steps later.
+    pub window: Option<DueWindow>,
+    /// The reason why static initialisation failed with this sample and started again.
+    pub refused: Option<StaticError>,
+    /// The reason why the estimate due with this sample was rejected.
+    pub implausible: Option<Implausible>,
+}
+
+/// Holds the corrections that [`crate::estimate::YawEstimate::yaw`] does not contain yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Owed {
+    /// Missing from the prompt yaw: revisions that have not been carried over yet.
+    pub prompt: Yaw,
+    /// Missing from the navigation yaw: revisions that have not been carried over yet, and the samples whose rates
+    /// are not sent yet.
+    pub navigation: Yaw,
+}
 
 /// Turns the samples of one vehicle's sensor into corrected rates.
 #[derive(Debug, Clone)]
@@ -55,14 +93,13 @@ struct State {
     windows: Windows,
     compensator: Compensator,
     uncertainty: Uncertainty,
-    wheels: Wheels,
+    /// Wheels that have had a speed.
+    wheels_seen: [bool; WHEELS],
     /// Samples for which the vehicle has stood; zero while it moves.
     stood: u32,
     /// The sums of the rates that were sent.
     prompt_yaw: Yaw,
     navigation_yaw: Yaw,
-    /// True length of a sensor clock step, by which both rates are summed.
-    clock_ratio: ClockRatio,
     /// Grid step of the newest message set.
     tick: u32,
     /// Samples until the last gap is a whole window in the past.
@@ -73,7 +110,6 @@ struct State {
     inertial: Option<Features>,
     /// The sensor is mounted differently than in earlier drives.
     moved: bool,
-    board: BoardFaults,
     counters: Counters,
 }
 
@@ -99,37 +135,37 @@ impl Pipeline {
             windows: Windows::START,
             compensator: Compensator::new(config.compensate),
             uncertainty: Uncertainty::new(config.uncertainty),
-            wheels: Wheels::START,
+            wheels_seen: [false; WHEELS],
             stood: 0,
             prompt_yaw: Yaw(0),
             navigation_yaw: Yaw(0),
-            clock_ratio: ClockRatio::ONE,
             tick: 0,
             gap_within: 0,
             yaw_gaps: 0,
             inertial: None,
             moved: false,
-            board: BoardFaults::NONE,
             counters: Counters::NONE,
         };
         Self { config, state }
     }
 
-    /// Sets the configuration, before the first sample.
-    pub fn configure(&mut self, config: PipelineConfig) {
-        self.state.sensor_bias = SensorBias::START;
-        self.state.static_init = StaticInit::new(config.static_init);
-        self.state.compensator.configure(config.compensate);
-        self.state.uncertainty = Uncertainty::new(config.uncertainty);
-        self.config = config;
-    }
-
-    /// Corrects one sample of the inertial sensor; its validity must have been set ([`crate::monitor`]).
+    /// Corrects one sample of the inertial sensor; its validity must have been set ([`crate::monitor`]). `wheels` is the
+    /// newest report of [`crate::can::wheel::WheelReceiver`], `None` before its first frame.
     ///
     /// # Errors
     /// [`AlignError`] when its time stamp has no place on the grid; the sample is counted and not used. Unless it was
     /// a duplicate, the samples that follow report [`Faults::GAP`] for as long as after a missing one.
-    pub fn correct(&mut self, sample: ImuSample) -> Result<Output, AlignError> {
+    pub fn correct(
+        &mut self,
+        sample: ImuSample,
+        wheels: Option<&WheelSample>,
+        board: &BoardState,
+    ) -> Result<Output, AlignError> {
+        if let Some(WheelSample { speeds, .. }) = wheels {
+            let seen = self.state.wheels_seen.iter_mut().zip(speeds);
+            seen.for_each(|(seen, speed)| *seen |= speed.is_some());
+        }
+        let standstill = wheels.map(|wheels| wheels.standstill);
         let mut frame = self.state.aligner.align(sample).inspect_err(|error| self.refuse(*error))?;
         let mut sample = sample;
         let initialised = self.state.initialised.is_some();
@@ -152,42 +188,26 @@ impl Pipeline {
         let quiet = initialised.is_some_and(|known| known.quiet.observe(&frame.sample));
         let (rates, refused) = match self.level(&mut frame.sample) {
             None => {
-                let refused = self.initialise(&frame);
+                let refused = self.initialise(&frame, standstill == Some(Standstill::Moving));
                 let early = self.state.sensor_bias.early(&sample);
                 if let Some((levelling, _)) = early {
                     frame.sample = levelling.sample(&frame.sample);
                 }
                 (Rates { early_sigma: early.map(|(_, sigma)| sigma), ..Rates::default() }, refused)
             }
-            Some(zero) => (self.estimate_rates(&frame, &zero, quiet), None),
+            Some(zero) => (self.estimate_rates(&frame, &zero, standstill, quiet), None),
         };
-        let vehicle = self.report(&frame, &rates);
+        let vehicle = self.report(&frame, &rates, wheels, board);
         let hop = self.config.compensate.mode.hop();
         let window = self.state.windows.due(frame.tick, hop);
         self.state.gap_within = self.state.gap_within.saturating_sub(1);
         Ok(Output { vehicle, settled: rates.settled, window, refused, implausible })
     }
 
-    /// Sets the newest wheel report of [`crate::can::wheel::WheelReceiver`]. Call it before each sample where wheel
-    /// speeds are configured, since the report also shows that the wheels are silent.
-    pub fn wheels(&mut self, wheels: WheelSample) {
-        self.state.wheels.update(wheels);
-    }
-
-    /// Sets the faults of the board other than the sensor's; they are reported with every message set from now on.
-    pub fn board(&mut self, faults: BoardFaults) {
-        self.state.board = faults;
-    }
-
     /// Notes that the sensor was moved since earlier drives; it is reported with every message set from now on.
     pub fn mount_moved(&mut self) {
         count(&mut self.state.counters.moved_mounts, u32::from(!self.state.moved));
         self.state.moved = true;
-    }
-
-    /// Sets the true length of the steps of the sensor's clock, for the samples that follow.
-    pub fn set_clock_ratio(&mut self, ratio: ClockRatio) {
-        self.state.clock_ratio = ratio;
     }
 
     /// Accepts the estimate of a window that [`Output::window`] announced. Returns whether it will be used: not if no
@@ -238,6 +258,13 @@ impl Pipeline {
 
     fn zero_rate(&self) -> Option<&ZeroRate> {
         self.state.initialised.as_ref()?.zero_rate.as_ref()
+    }
+
+    /// Levels a sample and returns the gyro's reading at rest; does nothing and returns `None` before initialisation.
+    fn level(&mut self, sample: &mut ImuSample) -> Option<ZeroPoint> {
+        let known = self.state.initialised.as_ref()?;
+        *sample = known.levelling.sample(sample);
+        Some(known.zero)
     }
 
     fn refuse(&mut self, error: AlignError) {
@@ -298,13 +325,19 @@ impl Pipeline {
     }
 
     #[inline(never)]
-    fn estimate_rates(&mut self, frame: &Frame, zero: &ZeroPoint, quiet: bool) -> Rates {
+    fn estimate_rates(
+        &mut self,
+        frame: &Frame,
+        zero: &ZeroPoint,
+        standstill: Option<Standstill>,
+        quiet: bool,
+    ) -> Rates {
         let sample = &frame.sample;
         let features = window::features(sample, &zero.reading());
         let [_, _, _, rates @ ..] = features.map(AngularRate);
         let [.., rate] = rates;
         let good = sample.validity.is_good();
-        let drives = self.state.wheels.standstill() == Some(Standstill::Moving);
+        let drives = standstill == Some(Standstill::Moving);
         let mounting_mismatch = self.state.compensator.add(frame.tick, rates, sample.validity, drives);
         count(&mut self.state.counters.foreign_mountings, u32::from(mounting_mismatch));
         self.state.inertial = good.then_some(features);
@@ -312,7 +345,14 @@ impl Pipeline {
             self.state.windows.add(features);
         }
         let settled = self.state.compensator.settled();
-        self.update_bias(settled.as_ref(), good.then_some(rate), quiet);
+        let source = match standstill {
+            Some(Standstill::Still) => StandstillSource::Wheels,
+            // Where wheel speeds are available, they decide.
+            Some(_) => StandstillSource::None,
+            None if quiet => StandstillSource::Inertial,
+            None => StandstillSource::None,
+        };
+        self.update_bias(settled.as_ref(), good.then_some(rate), source);
         let bias = self.bias();
         let stands = self.state.stood as usize > self.config.compensate.lag.samples();
         let prompt = self.state.compensator.prompt(bias);
@@ -320,14 +360,12 @@ impl Pipeline {
         Rates { prompt, navigation, settled, early_sigma: None }
     }
 
-    fn update_bias(&mut self, settled: Option<&Settled>, rate: Option<AngularRate>, quiet: bool) {
-        let source = match self.state.wheels.standstill() {
-            Some(Standstill::Still) => StandstillSource::Wheels,
-            // Where wheel speeds are available, they decide.
-            Some(_) => StandstillSource::None,
-            None if quiet => StandstillSource::Inertial,
-            None => StandstillSource::None,
-        };
+    fn update_bias(
+        &mut self,
+        settled: Option<&Settled>,
+        rate: Option<AngularRate>,
+        source: StandstillSource,
+    ) {
         let State { initialised, compensator, stood, counters, sensor_bias, .. } = &mut self.state;
         let zero_rate = initialised.as_mut().and_then(|known| known.zero_rate.as_mut());
         let (Some(zero_rate), Some(settled)) = (zero_rate, settled) else { return };

@@ -54,6 +54,42 @@ impl Validity {
     }
 }
 
+/// Constant readings for a test, with the least noise that a real part has: one bit.
+///
+/// The monitor takes readings that never change for those of a part that is stuck, so a test of a board needs this
+/// noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TestSignal {
+    /// Specific force x, y, z.
+    pub specific_force: [SpecificForce; 3],
+    /// Angular rate about x, y, z.
+    pub angular_rate: [AngularRate; 3],
+}
+
+impl TestSignal {
+    /// A level sensor that turns about the vertical at `deg_per_sec`.
+    #[must_use]
+    pub const fn turning(deg_per_sec: f64) -> Self {
+        Self {
+            specific_force: [SpecificForce(0), SpecificForce(0), SpecificForce::STANDARD_GRAVITY],
+            angular_rate: [AngularRate::ZERO, AngularRate::ZERO, AngularRate::from_deg_per_sec(deg_per_sec)],
+        }
+    }
+
+    /// Returns the sample with this number, 100 a second.
+    #[must_use]
+    pub fn sample(&self, number: u32) -> ImuSample {
+        let noise = (number % 2) as i32;
+        ImuSample {
+            time: Micros(u64::from(number) * PERIOD_US),
+            specific_force: self.specific_force.map(|force| SpecificForce(force.0.saturating_add(noise))),
+            angular_rate: self.angular_rate.map(|rate| AngularRate(rate.0.saturating_add(noise))),
+            temperature: None,
+            validity: Validity::Good,
+        }
+    }
+}
+
 /// Holds the angle through which a fibre-optic gyro has turned since its previous message: x forward, y left, z up
 /// (FLU).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

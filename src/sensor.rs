@@ -55,6 +55,16 @@ pub trait Source {
     fn next_sample(&mut self) -> Option<Result<Self::Sample, Self::Error>>;
 }
 
+/// The result of a read, as a source that delivers it once.
+impl<S, E: core::error::Error> Source for Option<Result<S, E>> {
+    type Sample = S;
+    type Error = E;
+
+    fn next_sample(&mut self) -> Option<Result<S, E>> {
+        self.take()
+    }
+}
+
 /// Delivers the samples of a part that sends a stream of bytes.
 pub trait ByteSource: Source {
     /// Accepts one byte. Call [`Source::next_sample`] until `None` before the next byte.

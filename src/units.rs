@@ -37,6 +37,13 @@ impl AngularRate {
     /// The rate of no rotation.
     pub const ZERO: Self = Self(0);
 
+    /// Returns the nearest code to a rate in deg/s, for constants; beyond +-916 deg/s the code saturates.
+    #[must_use]
+    pub const fn from_deg_per_sec(value: f64) -> Self {
+        let code = value * (core::f64::consts::PI / 180.0) * (1u32 << Self::FRACTION_BITS) as f64;
+        Self((code + if code < 0.0 { -0.5 } else { 0.5 }) as i32)
+    }
+
     /// Returns the nearest code to a reading in rad/s.
     ///
     /// # Errors
@@ -63,6 +70,8 @@ impl SpecificForce {
     pub const FRACTION_BITS: u32 = 20;
     /// Codes per m/s^2.
     pub const PER_METRE_PER_SEC2: f32 = (1u32 << Self::FRACTION_BITS) as f32;
+    /// Standard gravity, 9.80665 m/s^2.
+    pub const STANDARD_GRAVITY: Self = Self(10_283_018);
 
     /// Returns the nearest code to a reading in m/s^2.
     ///

@@ -4,7 +4,7 @@ use crate::synthetic::{rate, turning};
 use gyronet::health::{Faults, Status};
 use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SCALE_MIN};
-use gyronet::pipeline::{DueWindow, Output, Pipeline, PipelineConfig};
+use gyronet::pipeline::{BoardState, DueWindow, Output, Pipeline, PipelineConfig};
 use gyronet::sample::ImuSample;
 
 /// First tick after static initialisation, if nothing disturbs it.
@@ -37,7 +37,7 @@ pub fn run(
 ) -> Vec<Output> {
     let mut outputs = Vec::new();
     for sample in samples {
-        let output = pipeline.correct(sample).expect("the sample is on the grid");
+        let output = pipeline.correct(sample, None, &BoardState::GOOD).expect("the sample is on the grid");
         if let Some(due) = &output.window
             && let Some(estimate) = network(due)
         {

@@ -34,8 +34,12 @@ pub struct FogGrid {
 }
 
 impl FogGrid {
-    /// The state before the first sample.
-    pub const START: Self = Self { clock: PartClock::START, increments: Increments::EMPTY, next: None };
+    /// The state before the first sample. Where one is `expected`, steps are due from time 0 on, and empty until it comes.
+    #[must_use]
+    pub const fn new(expected: bool) -> Self {
+        let next = if expected { Some(0) } else { None };
+        Self { clock: PartClock::START, increments: Increments::EMPTY, next }
+    }
 
     /// Adds a sample that arrived at `now`.
     ///
@@ -46,7 +50,7 @@ impl FogGrid {
         if board.jumped {
             self.increments.disconnect();
         }
-        self.begin(board.time);
+        self.next.get_or_insert(board.time.0.next_multiple_of(PERIOD_US));
         self.increments.add(board.time, &sample);
         Ok(())
     }
@@ -89,11 +93,5 @@ impl FogGrid {
     #[must_use]
     pub fn increments(&self) -> &IncrementCounters {
         self.increments.counters()
-    }
-
-    /// Starts the grid at the next step from `time` on, unless it has started. The first sample does that, too; a
-    /// caller that expects a sample starts the grid earlier, and gets empty steps until the sample arrives.
-    pub fn begin(&mut self, time: Micros) {
-        self.next.get_or_insert(time.0.next_multiple_of(PERIOD_US));
     }
 }

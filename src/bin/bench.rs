@@ -33,10 +33,12 @@ mod firmware {
     use crate::support::Numbers;
     use crate::support::random_model;
     use core::hint::black_box;
+    use core::mem::MaybeUninit;
     use cortex_m_semihosting::{debug, hprintln};
     use embedded_can::{Frame, StandardId};
     use gyronet::can::DataFrame;
     use gyronet::can::wheel::{WheelReceiver, WheelSettings};
+    use gyronet::model::blob::HIDDEN;
     use gyronet::model::blob::Shape;
     use gyronet::model::gyronet::GyroNetState;
     use gyronet::model::window::{FEATURES, Features, WINDOW};
@@ -73,7 +75,7 @@ mod firmware {
         kernels(meter);
         crate::parsers::run(meter);
         signature(meter);
-        hprintln!("gyronet/state bytes={}", size_of::<GyroNetState>());
+        hprintln!("gyronet/state bytes={}", size_of::<GyroNetState<HIDDEN>>());
         hprintln!("gyronet/weights bytes={}", weights::GYRONET.0.len());
     }
 
@@ -83,7 +85,7 @@ mod firmware {
             return;
         };
         // Too large for the stack.
-        let Some(state) = cortex_m::singleton!(: GyroNetState = GyroNetState::ZERO) else { return };
+        let Some(state) = cortex_m::singleton!(: GyroNetState<HIDDEN> = GyroNetState::ZERO) else { return };
         sizes(meter, state);
         let Ok(mut network) = GyroNet::with_state(blob, state) else { return };
         let mut numbers = Numbers::new(9);
@@ -124,7 +126,7 @@ mod firmware {
 
     /// Measures a window of models with a linear part and 0 to 32 units, of the paper's model, and of the default
     /// one.
-    fn sizes(meter: &mut Meter, state: &mut GyroNetState) {
+    fn sizes(meter: &mut Meter, state: &mut GyroNetState<HIDDEN>) {
         macro_rules! model {
             ($units:literal) => {{
                 const SHAPE: Shape = Shape { units: $units, linear: true };
@@ -151,9 +153,11 @@ mod firmware {
     /// Measures the coprocessor without the network: five samples, each with a frame of standing wheels and the
     /// message set that the sample produces. One of the five takes the next window and delivers an estimate.
     fn coprocessor(meter: &mut Meter) {
-        let Some(coprocessor) = cortex_m::singleton!(: Coprocessor = Coprocessor::START) else { return };
+        let Some(place) = cortex_m::singleton!(: MaybeUninit<Coprocessor> = MaybeUninit::uninit()) else {
+            return;
+        };
         let wheels = WheelReceiver::new(WheelSettings::TOYOTA).ok();
-        coprocessor.configure(&Config { wheels, ..Config::DEFAULT });
+        let coprocessor = place.write(Coprocessor::new(Config { wheels, ..Config::DEFAULT }));
         // 0x1A6F is 6767: -67.67 + 0.01 x 6767 km/h is standstill.
         let Some(standing) = StandardId::new(0xAA)
             .and_then(|id| DataFrame::new(id, &[0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]))

@@ -90,7 +90,7 @@ impl Config {
 
     /// Returns the checked settings.
     #[must_use]
-    pub fn settings(&self) -> &Settings {
+    pub const fn settings(&self) -> &Settings {
         &self.settings
     }
 
@@ -154,9 +154,12 @@ impl Config {
 
     /// Returns the number of samples for each set of our own messages.
     #[must_use]
-    pub(crate) fn samples_per_yaw(&self) -> u8 {
-        // At most 1000 / 10.
-        self.settings.yaw.map_or(1, |yaw| (yaw.period_ms / SAMPLE_MS) as u8)
+    pub(crate) const fn samples_per_yaw(&self) -> u8 {
+        match &self.settings.yaw {
+            // At most 1000 / 10.
+            Some(yaw) => (yaw.period_ms / SAMPLE_MS) as u8,
+            None => 1,
+        }
     }
 }
 

@@ -23,23 +23,18 @@ pub struct CanEncoder {
 }
 
 impl CanEncoder {
-    /// The encoder before its configuration: it sends none of our own messages.
-    pub const START: Self = Self {
-        config: Config::DEFAULT,
-        bosch: SetEncoder::START,
-        yaw: None,
-        vdc2: Vdc2Encoder::START,
-        status: None,
-        out_of_range: 0,
-    };
-
     /// Creates an encoder whose counters and residuals start at zero.
     #[must_use]
-    pub fn new(config: Config) -> Self {
-        let yaw = config.settings().yaw;
-        let yaw = yaw.map(|yaw| YawEncoder::new(yaw.e2e.profiles(), config.samples_per_yaw()));
-        let status = config.settings().status.and_then(|status| StatusEncoder::new(status.id));
-        Self { config, yaw, status, ..Self::START }
+    pub const fn new(config: Config) -> Self {
+        let yaw = match config.settings().yaw {
+            Some(yaw) => Some(YawEncoder::new(yaw.e2e.profiles(), config.samples_per_yaw())),
+            None => None,
+        };
+        let status = match config.settings().status {
+            Some(status) => StatusEncoder::new(status.id),
+            None => None,
+        };
+        Self { config, bosch: SetEncoder::START, yaw, vdc2: Vdc2Encoder::START, status, out_of_range: 0 }
     }
 
     /// Returns the number of messages marked "failed" because a value was outside its signal's range.

@@ -1,5 +1,6 @@
 //! These types are the configuration of a coprocessor, and the errors of its inputs.
 
+use super::clock::Clock;
 use crate::align::AlignError;
 use crate::align::clock::ClockError;
 use crate::align::clock_ratio::ClockRatioConfig;
@@ -10,19 +11,6 @@ use crate::can::yaw::FOG_IDS;
 use crate::fog::FogConfig;
 use crate::pipeline::PipelineConfig;
 use crate::units::Duration;
-
-/// The clock that `now` comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Clock {
-    /// `now` is an independent clock, and inputs arrive when they are measured: a board in a vehicle.
-    #[default]
-    Outside,
-    /// Inputs arrive at another pace than they were measured at (a recorded drive), so only the time
-    /// stamps of the inertial sensor are meaningful. They are used for the wheels, the latitude and the fibre-optic
-    /// gyro; `now` is still used to detect a silent sensor and a late window.
-    Sensor,
-}
 
 /// Stored data that was found damaged at the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

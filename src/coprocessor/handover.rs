@@ -31,12 +31,15 @@ impl Handover {
     }
 
     /// Stores a window that is due. Returns true if it replaces a window that was not taken, which is then late.
-    pub fn offer(&mut self, window: DueWindow, now: Micros) -> bool {
+    pub fn offer(&mut self, window: &DueWindow, now: Micros) -> bool {
         if !self.has_network {
             return false;
         }
         self.out = Some((window.end, now.0.saturating_add(u64::from(self.delay) * PERIOD_US)));
-        self.due.replace(window).is_some()
+        // Without a copy of the old window on the stack.
+        let replaces = self.due.is_some();
+        self.due = Some(*window);
+        replaces
     }
 
     /// Returns the window that is due, once.

@@ -46,22 +46,25 @@ pub struct Lane {
     tilt_rest: i128,
     latitude: Option<Latitude>,
     rest: RestReading,
-    /// The angle that is subtracted from each step.
-    reading: Angle,
+    /// The angle that is subtracted from each step; `None` before the first one.
+    reading: Option<Angle>,
 }
 
 impl Lane {
-    /// Creates a lane before its first step, without a latitude.
+    /// Creates a lane before its first step.
     #[must_use]
-    pub const fn new(errors: FogErrors, tilt: Tilt) -> Self {
-        Self { tilt, tilt_rest: 0, latitude: None, rest: RestReading::new(errors), reading: Angle::ZERO }
+    pub const fn new(errors: FogErrors, tilt: Tilt, latitude: Option<Latitude>) -> Self {
+        let earth = match latitude {
+            Some(latitude) => Some(earth_rate(latitude)),
+            None => None,
+        };
+        Self { tilt, tilt_rest: 0, latitude, rest: RestReading::new(errors, earth), reading: None }
     }
 
     /// Sets the latitude. If the vehicle has `moved` there, the gyro's bias is kept.
     pub fn set_latitude(&mut self, latitude: Option<Latitude>, moved: bool) {
-        let earth = |latitude: Latitude| latitude.step_turn().0 as f32 * (RATE_HZ as f32 / Angle::PER_RAD);
         self.latitude = latitude;
-        self.rest.set_earth(latitude.map(earth), moved);
+        self.rest.set_earth(latitude.map(earth_rate), moved);
         self.renew();
     }
 
@@ -83,7 +86,8 @@ impl Lane {
         if outcome == Some(RestOutcome::Used) {
             self.renew();
         }
-        (turn.map(|turn| Angle(turn.0.saturating_sub(self.reading.0))), outcome)
+        let reading = self.reading.unwrap_or_else(|| self.renew());
+        (turn.map(|turn| Angle(turn.0.saturating_sub(reading.0))), outcome)
     }
 
     /// Returns the expected error of the mean rate over a second, 1 sigma, while the vehicle turns at `rate` and shakes
@@ -107,10 +111,15 @@ impl Lane {
         Angle(turn.0.saturating_add((added >> TILT_FRACTION_BITS) as i64))
     }
 
-    fn renew(&mut self) {
+    fn renew(&mut self) -> Angle {
         let reading = self.rest.reading() / RATE_HZ as f32 * Angle::PER_RAD;
-        self.reading = Angle(libm::roundf(reading) as i64);
+        *self.reading.insert(Angle(libm::roundf(reading) as i64))
     }
+}
+
+/// Returns the Earth's rate about the vertical, rad/s.
+const fn earth_rate(latitude: Latitude) -> f32 {
+    latitude.step_turn().0 as f32 * (RATE_HZ as f32 / Angle::PER_RAD)
 }
 
 #[cfg(test)]
@@ -120,7 +129,7 @@ mod tests {
     #[test]
     fn the_earth_comes_off_to_the_resolution_of_an_increment() {
         for degrees in [90.0, 60.0, 0.0, -34.0, -90.0f32] {
-            let mut lane = Lane::new(FogErrors::DSP1760, Tilt::NONE);
+            let mut lane = Lane::new(FogErrors::DSP1760, Tilt::NONE, None);
             lane.set_latitude(Latitude::from_degrees(degrees), false);
             let (turn, _) = lane.correct(Some(Angle::ZERO), Standstill::Moving);
             let taken = -turn.unwrap().rad() * 100.0;
@@ -133,7 +142,7 @@ mod tests {
     #[test]
     fn a_tilted_gyro_shows_the_whole_turn() {
         let tilt = Tilt::from_degrees(5.0).unwrap();
-        let mut lane = Lane::new(FogErrors::DSP1760, tilt);
+        let mut lane = Lane::new(FogErrors::DSP1760, tilt, None);
         // A full turn in 20 s.
         let turn = core::f64::consts::TAU / 2_000.0 * 5f64.to_radians().cos();
         let code = Angle((turn * f64::from(Angle::PER_RAD)).round() as i64);

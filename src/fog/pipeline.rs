@@ -15,7 +15,7 @@
 //! | FoGNet is configured, the latitude is known, and an estimate is in use | also less the correction | FoGNet | as without; degraded with weights from simulated drives | |
 //! | standstills show that FoGNet makes the rate worse: it is dropped until the next start | as without FoGNet | | | |
 //! | FoGNet's estimate is late, rejected, or there are no weights for this gyro | as without FoGNet | | degraded | LATE, IMPLAUSIBLE, STORED |
-//! | increments are missing in the step, or none have come yet ([`FogPipeline::start_without_sample`]) | not available | raw | unusable | GAP |
+//! | increments are missing in the step, or none have come yet from a gyro that is expected | not available | raw | unusable | GAP |
 //! | increments repeat themselves ([`STUCK_AFTER`], [`STUCK_US`]), until one differs | not available | raw | unusable | STUCK |
 //!
 //! Increments are compared as the gyro sends them, not as they are summed. An increment that straddles two steps of
@@ -122,11 +122,12 @@ pub struct FogPipeline {
 
 impl FogPipeline {
     /// Creates a pipeline before its first sample. Without a network no window is due, and the messages report that.
+    /// Where a gyro is `expected`, rates are sent from time 0 on, and its silence is reported.
     #[must_use]
-    pub const fn new(config: FogConfig, has_network: bool) -> Self {
+    pub const fn new(config: FogConfig, has_network: bool, expected: bool) -> Self {
         Self {
-            grid: FogGrid::START,
-            lane: Lane::new(config.errors, config.tilt),
+            grid: FogGrid::new(expected),
+            lane: Lane::new(config.errors, config.tilt, config.latitude),
             latitude_contested: false,
             shake: config.shake,
             corrector: FogCorrector::new(config),
@@ -145,16 +146,6 @@ impl FogPipeline {
         }
     }
 
-    /// Sets the configuration, before the first sample.
-    pub fn configure(&mut self, config: FogConfig, has_network: bool) {
-        self.lane = Lane::new(config.errors, config.tilt);
-        self.lane.set_latitude(config.latitude, false);
-        self.shake = config.shake;
-        self.corrector.configure(config);
-        self.fognet = config.fognet;
-        self.has_network = has_network;
-    }
-
     /// Sets the latitude. If the vehicle has `moved` there, the gyro's bias is kept; otherwise the latitude before
     /// was wrong, or there was none.
     pub fn set_latitude(&mut self, latitude: Latitude, moved: bool) {
@@ -164,12 +155,6 @@ impl FogPipeline {
     /// Notes whether the latitude on the bus contradicts the one in use.
     pub fn contest_latitude(&mut self, contested: bool) {
         self.latitude_contested = contested;
-    }
-
-    /// Starts before the first sample of a gyro that is fitted: messages are sent from `now` on, and its silence is
-    /// reported.
-    pub fn start_without_sample(&mut self, now: Micros) {
-        self.grid.begin(now);
     }
 
     /// Adds a sample that arrived at `now`. Call [`FogPipeline::next_step`] until `None` after it.
@@ -197,8 +182,8 @@ impl FogPipeline {
         self.grid.is_due(now)
     }
 
-    /// Returns the rate of the next 10 ms, if they are complete or due; `None` before the first sample,
-    /// unless [`FogPipeline::start_without_sample`] was called. Also call it every few milliseconds, because it detects silence.
+    /// Returns the rate of the next 10 ms, if they are complete or due; `None` before the first sample, unless one is
+    /// expected. Also call it every few milliseconds, because it detects silence.
     #[inline(never)]
     pub fn next_step(
         &mut self,

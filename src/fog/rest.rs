@@ -108,12 +108,12 @@ pub struct RestReading {
 }
 
 impl RestReading {
-    /// Creates a filter before its first step, without a latitude.
+    /// Creates a filter before its first step, with the Earth's rate about the vertical, rad/s, where it is known.
     #[must_use]
-    pub const fn new(errors: FogErrors) -> Self {
+    pub const fn new(errors: FogErrors, earth: Option<f32>) -> Self {
         Self {
             errors,
-            earth: None,
+            earth,
             measured: Estimate { mean: 0.0, variance: UNKNOWN * UNKNOWN },
             bias_variance: errors.bias * errors.bias,
             second: Second::EMPTY,
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn ten_minutes_of_standstill_leave_the_angle_random_walk() {
-        let mut rest = RestReading::new(FogErrors::DSP1760);
+        let mut rest = RestReading::new(FogErrors::DSP1760, None);
         rest.set_earth(Some(9.0 * DEG_PER_HOUR), false);
         stand(&mut rest, 9.4 * DEG_PER_HOUR, 600);
         assert!((rest.reading() / DEG_PER_HOUR - 9.4).abs() < 0.02, "{}", rest.reading() / DEG_PER_HOUR);
@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn a_standstill_finds_bias_and_earth_without_a_latitude() {
-        let mut rest = RestReading::new(FogErrors::DSP1760);
+        let mut rest = RestReading::new(FogErrors::DSP1760, None);
         assert!(rest.sigma(0.0, 0.0) > 8.0 * DEG_PER_HOUR && !rest.is_measured());
         stand(&mut rest, -12.0 * DEG_PER_HOUR, 60);
         assert!((rest.reading() / DEG_PER_HOUR + 12.0).abs() < 0.05, "{}", rest.reading() / DEG_PER_HOUR);
@@ -272,7 +272,7 @@ mod tests {
 
     #[test]
     fn shaking_leaves_nearly_nothing() {
-        let mut rest = RestReading::new(FogErrors::DSP1760);
+        let mut rest = RestReading::new(FogErrors::DSP1760, None);
         rest.set_earth(Some(0.0), false);
         for step in 0..300 * RATE_HZ {
             // 3e-4 rad/s at 13.7 Hz: 60 deg/h, plainly averaged over a second.
@@ -286,7 +286,7 @@ mod tests {
 
     #[test]
     fn strong_shaking_takes_nothing_from_the_earths_rate() {
-        let mut rest = RestReading::new(FogErrors::DSP1760);
+        let mut rest = RestReading::new(FogErrors::DSP1760, None);
         rest.set_earth(Some(9.0 * DEG_PER_HOUR), false);
         for step in 0..60 * RATE_HZ {
             // 1.2 deg/s at 10 Hz: a second holds whole periods.
@@ -300,7 +300,7 @@ mod tests {
 
     #[test]
     fn a_turn_on_standing_wheels_is_refused() {
-        let mut rest = RestReading::new(FogErrors::DSP1760);
+        let mut rest = RestReading::new(FogErrors::DSP1760, None);
         rest.set_earth(Some(0.0), false);
         assert_eq!(stand(&mut rest, 60.0 * DEG_PER_HOUR, 60), Some(RestOutcome::Refused));
         assert!(rest.is_contradicted() && !rest.is_measured() && rest.reading() == 0.0);

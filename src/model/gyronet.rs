@@ -6,29 +6,99 @@
 
 use super::blob::{Blob, BlobError, HIDDEN};
 use super::input::load_step;
+use super::weights;
 use super::{Estimate, SCALE_MAX, SCALE_MIN, SteadyGain, WindowNetwork};
 use crate::model::window::{FEATURES, Features, WINDOW};
 use crate::nn::bilstm::{self, Direction, Pass, Run};
 use crate::nn::lstm::{DirectionWeights, Scratch};
 use crate::nn::{dense::Dense, exp2::times_exp2, linear::Linear};
 use crate::units::AngularRate;
-use core::borrow::BorrowMut;
 
-/// Words of the recurrent weights of one direction.
-#[must_use]
-pub const fn recurrent_words(units: usize) -> usize {
-    DirectionWeights::recurrent_words(units)
+/// The working memory of one window, for networks of up to `UNITS` units a direction: 0, 4, 8 and so on up to
+/// [`HIDDEN`]. By default it has the size of the library's default model. With 0, a linear part alone has room.
+#[derive(Debug, Clone)]
+pub struct GyroNetState<const UNITS: usize = { weights::DEFAULT_UNITS }>(<Units<UNITS> as Size>::Arrays)
+where
+    Units<UNITS>: Size;
+
+impl<const UNITS: usize> GyroNetState<UNITS>
+where
+    Units<UNITS>: Size,
+{
+    /// A state without a window in progress. A window leaves nothing in the state for the next one. The state is all
+    /// zeros, so that it needs no initial value in flash.
+    pub const ZERO: Self = Self(<Units<UNITS> as Size>::ZERO);
 }
 
-/// Holds the working memory of one window, for networks of up to `U` units a direction: `W` is half of them, `R`
-/// their [`recurrent_words`]. An image whose networks are smaller than the paper's can use a smaller state than the
-/// default; for a linear part alone `GyroNetState<0, 0, 0>` is enough.
+/// A state of a network, or a reference to one.
+pub trait Memory {
+    /// The most units a direction that there is room for.
+    const UNITS: usize;
+    /// The arrays of this size.
+    type Arrays: WindowRun;
+
+    /// Returns the arrays.
+    fn arrays(&mut self) -> &mut Self::Arrays;
+}
+
+impl<const UNITS: usize> Memory for GyroNetState<UNITS>
+where
+    Units<UNITS>: Size,
+{
+    const UNITS: usize = UNITS;
+    type Arrays = <Units<UNITS> as Size>::Arrays;
+
+    fn arrays(&mut self) -> &mut Self::Arrays {
+        &mut self.0
+    }
+}
+
+impl<M: Memory> Memory for &mut M {
+    const UNITS: usize = M::UNITS;
+    type Arrays = M::Arrays;
+
+    fn arrays(&mut self) -> &mut M::Arrays {
+        (**self).arrays()
+    }
+}
+
+/// A number of units a direction.
+#[derive(Debug, Clone, Copy)]
+pub struct Units<const UNITS: usize>;
+
+/// A number of units that a network can have.
+pub trait Size {
+    /// The arrays of a state.
+    type Arrays: WindowRun + Clone + core::fmt::Debug;
+    /// The arrays, all zeros.
+    const ZERO: Self::Arrays;
+}
+
+macro_rules! sizes {
+    ($($units:literal)*) => {
+        $(impl Size for Units<$units> {
+            type Arrays = Arrays<$units, { $units / 2 }, { DirectionWeights::recurrent_words($units) }>;
+            const ZERO: Self::Arrays = Arrays::ZERO;
+        })*
+    };
+}
+sizes!(0 4 8 12 16 20 24 28 32 36 40 44 48 52 56 60);
+
+/// A window of a network in arrays of some size.
+pub trait WindowRun {
+    /// Loads a window and runs the linear part on it.
+    fn start(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]);
+    /// Runs a piece of the window; returns the estimate with the last one.
+    fn advance(&mut self, blob: &Blob<'_>, steady_gain: SteadyGain) -> Option<Estimate>;
+    /// Runs a whole window for its newest correction alone.
+    fn newest(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]) -> (AngularRate, u16);
+    /// Drops the window in progress.
+    fn stop(&mut self);
+}
+
+/// The arrays for up to `U` units a direction: `W` is half of them, `R` the words of their recurrent weights.
 #[derive(Debug, Clone)]
-pub struct GyroNetState<
-    const U: usize = HIDDEN,
-    const W: usize = { HIDDEN / 2 },
-    const R: usize = { recurrent_words(HIDDEN) },
-> {
+pub struct Arrays<const U: usize, const W: usize, const R: usize> {
     input: [u32; WINDOW * FEATURES / 2],
     layer1: [[u32; U]; WINDOW],
     /// The projections of all steps of a direction, so that each weight of its input is read once a window.
@@ -45,11 +115,8 @@ pub struct GyroNetState<
     under_way: bool,
 }
 
-impl<const U: usize, const W: usize, const R: usize> GyroNetState<U, W, R> {
-    /// A state without a window in progress. A window leaves nothing in the state for the next one. The state is all
-    /// zeros, so that it needs no initial value in flash.
-    pub const ZERO: Self = {
-        assert!(U.is_multiple_of(4) && U <= HIDDEN && R == recurrent_words(U), "no network has these sizes");
+impl<const U: usize, const W: usize, const R: usize> Arrays<U, W, R> {
+    const ZERO: Self = {
         Self {
             input: [0; _],
             layer1: [[0; U]; _],
@@ -64,75 +131,20 @@ impl<const U: usize, const W: usize, const R: usize> GyroNetState<U, W, R> {
     };
 }
 
-/// Runs the integer network. It reads the weights in place. It owns its state, or borrows the caller's (`S` a
-/// reference) where a state is too large to move on a small stack.
-#[derive(Debug, Clone)]
-pub struct GyroNet<
-    'w,
-    S = GyroNetState,
-    const U: usize = HIDDEN,
-    const W: usize = { HIDDEN / 2 },
-    const R: usize = { recurrent_words(HIDDEN) },
-> {
-    blob: Blob<'w>,
-    steady_gain: SteadyGain,
-    state: S,
-}
-
-impl<'w> GyroNet<'w> {
-    /// Creates a network over checked weights.
-    #[must_use]
-    pub fn new(blob: Blob<'w>) -> Self {
-        // The state has room for the largest network.
-        Self { blob, steady_gain: steady_gain(&blob), state: GyroNetState::ZERO }
-    }
-}
-
-impl<'w, S, const U: usize, const W: usize, const R: usize> GyroNet<'w, S, U, W, R>
-where
-    S: BorrowMut<GyroNetState<U, W, R>>,
-{
-    /// Creates a network over checked weights that works in the caller's state. A window in progress in that state is
-    /// dropped.
-    ///
-    /// # Errors
-    /// [`BlobError::Units`]: the state is too small for this network.
-    pub fn with_state(blob: Blob<'w>, mut state: S) -> Result<Self, BlobError> {
-        let found = blob.shape.units;
-        if usize::from(found) > U {
-            return Err(BlobError::Units { found, largest: U as u16 });
-        }
-        state.borrow_mut().under_way = false;
-        Ok(Self { blob, steady_gain: steady_gain(&blob), state })
-    }
-
-    /// Returns the network's weights.
-    #[must_use]
-    pub fn blob(&self) -> &Blob<'w> {
-        &self.blob
-    }
-
-    /// Loads a window and runs the linear part on it; [`GyroNet::advance`] then runs the Bi-LSTMs piece by piece. A
-    /// window in progress is dropped.
-    pub fn start(&mut self, window: &[Features; WINDOW]) {
-        let Self { blob, state, .. } = self;
-        let state = state.borrow_mut();
-        state.clamped_inputs = load(blob, window, &mut state.input);
-        state.linear = [0; _];
-        for (output, row) in state.linear.iter_mut().zip(blob.linear.iter().flat_map(Linear::rows)) {
+impl<const U: usize, const W: usize, const R: usize> WindowRun for Arrays<U, W, R> {
+    fn start(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]) {
+        self.clamped_inputs = load(blob, window, &mut self.input);
+        self.linear = [0; _];
+        for (output, row) in self.linear.iter_mut().zip(blob.linear.iter().flat_map(Linear::rows)) {
             *output = Linear::output(row, window.as_flattened());
         }
-        state.sums = [[blob.gyro_error.bias, blob.log_scale.bias]; WINDOW];
-        state.run = Run::new();
-        state.under_way = true;
+        self.sums = [[blob.gyro_error.bias, blob.log_scale.bias]; WINDOW];
+        self.run = Run::new();
+        self.under_way = true;
     }
 
-    /// Runs a bounded piece of the window (one direction of one layer, a third of it or less); returns the estimate
-    /// with the last piece, `None` before that and when no window is in progress.
-    pub fn advance(&mut self) -> Option<Estimate> {
-        let Self { blob, steady_gain, state } = self;
-        let GyroNetState { input, layer1, scratch, recurrent, linear, sums, clamped_inputs, run, under_way } =
-            state.borrow_mut();
+    fn advance(&mut self, blob: &Blob<'_>, steady_gain: SteadyGain) -> Option<Estimate> {
+        let Self { input, layer1, scratch, recurrent, linear, sums, clamped_inputs, run, under_way } = self;
         if !*under_way {
             return None;
         }
@@ -159,15 +171,11 @@ where
         let log_scale =
             sums.iter().fold(0, |sum: i32, [_, log]| sum.saturating_add(blob.log_scale.scale(*log)));
         let scale = AngularRate(times_exp2(blob.scale_unit, log_scale)).clamp(SCALE_MIN, SCALE_MAX);
-        Some(Estimate { corrections, scale, clamped_inputs: *clamped_inputs, steady_gain: *steady_gain })
+        Some(Estimate { corrections, scale, clamped_inputs: *clamped_inputs, steady_gain })
     }
 
-    /// Returns the newest sample's correction without a scale, and the clamped inputs. The backward half of layer 2
-    /// needs only its first step for that, which saves a third of the work; the result equals the last correction of
-    /// [`WindowNetwork::estimate`], bit for bit.
-    pub fn estimate_newest(&mut self, window: &[Features; WINDOW]) -> (AngularRate, u16) {
-        let Self { blob, state, .. } = self;
-        let GyroNetState { input, layer1, scratch, recurrent, .. } = state.borrow_mut();
+    fn newest(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]) -> (AngularRate, u16) {
+        let Self { input, layer1, scratch, recurrent, .. } = self;
         let clamped_inputs = load(blob, window, input);
         let newest = blob.linear.and_then(|linear| linear.rows().last());
         let linear = newest.map_or(0, |row| Linear::output(row, window.as_flattened()));
@@ -203,6 +211,78 @@ where
         }
         (AngularRate(blob.gyro_error.scale(sum).saturating_add(linear)), clamped_inputs)
     }
+
+    fn stop(&mut self) {
+        self.under_way = false;
+    }
+}
+
+/// Runs the integer network. It reads the weights in place. It owns its state, or borrows the caller's (`S` a
+/// reference) where a state is too large to move on a small stack.
+#[derive(Debug, Clone)]
+pub struct GyroNet<'w, S = GyroNetState<HIDDEN>> {
+    blob: Blob<'w>,
+    steady_gain: SteadyGain,
+    state: S,
+}
+
+impl<'w> GyroNet<'w> {
+    /// Creates a network over checked weights, with a state for the largest network: 27 KB.
+    #[must_use]
+    pub fn new(blob: Blob<'w>) -> Self {
+        Self { blob, steady_gain: steady_gain(&blob), state: GyroNetState::ZERO }
+    }
+}
+
+impl GyroNet<'static, GyroNetState> {
+    /// Creates the library's default model with a state of its size.
+    ///
+    /// # Errors
+    /// [`BlobError`] if the flash is damaged.
+    pub fn shipped() -> Result<Self, BlobError> {
+        Self::with_state(Blob::new_checked(&weights::DEFAULT.0)?, GyroNetState::ZERO)
+    }
+}
+
+impl<'w, S: Memory> GyroNet<'w, S> {
+    /// Creates a network over checked weights that works in the caller's state. A window in progress in that state is
+    /// dropped.
+    ///
+    /// # Errors
+    /// [`BlobError::Units`]: the state is too small for this network.
+    pub fn with_state(blob: Blob<'w>, mut state: S) -> Result<Self, BlobError> {
+        let found = blob.shape.units;
+        if usize::from(found) > S::UNITS {
+            return Err(BlobError::Units { found, largest: S::UNITS as u16 });
+        }
+        state.arrays().stop();
+        Ok(Self { blob, steady_gain: steady_gain(&blob), state })
+    }
+
+    /// Returns the network's weights.
+    #[must_use]
+    pub fn blob(&self) -> &Blob<'w> {
+        &self.blob
+    }
+
+    /// Loads a window and runs the linear part on it; [`GyroNet::advance`] then runs the Bi-LSTMs piece by piece. A
+    /// window in progress is dropped.
+    pub fn start(&mut self, window: &[Features; WINDOW]) {
+        self.state.arrays().start(&self.blob, window);
+    }
+
+    /// Runs a bounded piece of the window (one direction of one layer, a third of it or less); returns the estimate
+    /// with the last piece, `None` before that and when no window is in progress.
+    pub fn advance(&mut self) -> Option<Estimate> {
+        self.state.arrays().advance(&self.blob, self.steady_gain)
+    }
+
+    /// Returns the newest sample's correction without a scale, and the clamped inputs. The backward half of layer 2
+    /// needs only its first step for that, which saves a third of the work; the result equals the last correction of
+    /// [`WindowNetwork::estimate`], bit for bit.
+    pub fn estimate_newest(&mut self, window: &[Features; WINDOW]) -> (AngularRate, u16) {
+        self.state.arrays().newest(&self.blob, window)
+    }
 }
 
 /// Returns the linear part's gains for constant rates, averaged over its outputs.
@@ -232,10 +312,7 @@ fn load(blob: &Blob<'_>, window: &[Features; WINDOW], input: &mut [u32]) -> u16 
     clamped
 }
 
-impl<S, const U: usize, const W: usize, const R: usize> WindowNetwork for GyroNet<'_, S, U, W, R>
-where
-    S: BorrowMut<GyroNetState<U, W, R>>,
-{
+impl<S: Memory> WindowNetwork for GyroNet<'_, S> {
     fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate {
         self.start(window);
         loop {

@@ -4,7 +4,7 @@ use crate::bias::{BiasCurve, EarthRate, QuietConfig, StaticConfig, ZeroRateConfi
 use crate::compensate::CompensateConfig;
 use crate::health::slow::Knowledge;
 use crate::mounting::{GyroMap, Levelling, Rotation};
-use crate::pipeline::uncertainty::UncertaintyConfig;
+use crate::pipeline::UncertaintyConfig;
 use crate::units::SpecificForce;
 
 /// Holds all settings of the pipeline.

@@ -4,7 +4,7 @@ use super::{Pipeline, PipelineConfig};
 use crate::bias::{QuietDetector, Rest, StaticError, ZeroPoint, ZeroRate};
 use crate::health::count;
 use crate::mounting::{Rotation, is_moved};
-use crate::sample::{Frame, ImuSample, Standstill};
+use crate::sample::Frame;
 
 /// Holds the results of static initialisation, and the detectors that start from them.
 #[derive(Debug, Clone)]
@@ -17,17 +17,11 @@ pub(super) struct Initialised {
 }
 
 impl Pipeline {
-    /// Levels a sample and returns the gyro's reading at rest; does nothing and returns `None` before initialisation.
-    pub(super) fn level(&mut self, sample: &mut ImuSample) -> Option<ZeroPoint> {
-        let known = self.state.initialised.as_ref()?;
-        *sample = known.levelling.sample(sample);
-        Some(known.zero)
-    }
-
-    /// Adds a sample to static initialisation; returns the reason if this sample makes it fail.
+    /// Adds a sample to static initialisation, of a vehicle that the wheels show to move or not. Returns the reason if
+    /// this sample makes it fail.
     #[inline(never)]
-    pub(super) fn initialise(&mut self, frame: &Frame) -> Option<StaticError> {
-        let judged = if self.state.wheels.standstill() == Some(Standstill::Moving) {
+    pub(super) fn initialise(&mut self, frame: &Frame, moves: bool) -> Option<StaticError> {
+        let judged = if moves {
             self.state.static_init.refuse_wheels().map(Err)
         } else if frame.sample.validity.is_good() {
             self.state.static_init.add(&frame.sample)

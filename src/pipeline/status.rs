@@ -7,10 +7,10 @@ use crate::mounting::GyroMap;
 use crate::sample::Standstill;
 
 impl Pipeline {
-    /// The content of the slow status message now.
+    /// The content of the slow status message now, with what the wheels show; `None` before their first report.
     #[must_use]
-    pub fn status(&self) -> SlowStatus {
-        let (verdict, evidence) = self.standstill();
+    pub fn status(&self, wheels: Option<Standstill>) -> SlowStatus {
+        let (verdict, evidence) = self.standstill(wheels);
         let known = self.state.initialised.is_some();
         let bias = match (known, self.state.sensor_bias.is_known()) {
             (true, _) => Knowledge::Fine,
@@ -24,9 +24,9 @@ impl Pipeline {
         SlowStatus { verdict, evidence, bias, gain, mounting, gaps }
     }
 
-    fn standstill(&self) -> (Verdict, Evidence) {
+    fn standstill(&self, wheels: Option<Standstill>) -> (Verdict, Evidence) {
         let contradicted = self.zero_rate().is_some_and(ZeroRate::contradicted);
-        match self.state.wheels.standstill() {
+        match wheels {
             Some(Standstill::Still) if contradicted => (Verdict::Unknown, Evidence::Wheels),
             Some(Standstill::Still) => (Verdict::Standing, Evidence::Wheels),
             Some(Standstill::Moving) => (Verdict::Moving, Evidence::Wheels),

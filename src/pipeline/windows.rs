@@ -1,10 +1,18 @@
 //! This module tracks GyroNet's windows: the samples of the next one, the one handed out, and whether the newest
 //! estimate is in use.
 
-use super::DueWindow;
 use crate::health::Faults;
 use crate::model::Estimate;
-use crate::model::window::{Features, Window};
+use crate::model::window::{Features, WINDOW, Window};
+
+/// Holds a window that is due for the network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DueWindow {
+    /// Tick of the newest sample.
+    pub end: u32,
+    /// Features of the samples, oldest first.
+    pub features: [Features; WINDOW],
+}
 
 /// Holds the samples of the next window and the state of the last one.
 #[derive(Debug, Clone)]

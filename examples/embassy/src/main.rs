@@ -26,9 +26,9 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::{channel::Channel, signal::Signal};
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 use gyronet::coprocessor::DueWindow;
-use gyronet::model::{Estimate, gyronet::GyroNetState};
+use gyronet::model::{Estimate, GyroNetState};
 use gyronet::sensor::xsens::Mti;
-use gyronet::{Blob, Config, Coprocessor, GyroNet, Micros, TimedFrame, WindowNetwork, weights};
+use gyronet::{Config, Coprocessor, GyroNet, Micros, TimedFrame, WindowNetwork};
 use static_cell::ConstStaticCell;
 
 bind_interrupts!(struct Interrupts {
@@ -49,7 +49,6 @@ static LOST: AtomicU32 = AtomicU32::new(0);
 /// Corrects the samples in the bytes of the sensor.
 #[embassy_executor::task]
 async fn correct(coprocessor: &'static mut Coprocessor, mut uart: RingBufferedUartRx<'static>) {
-    coprocessor.configure(&Config::DEFAULT);
     let (mut mti, mut bytes) = (Mti::new(), [0; 64]);
     loop {
         let event = select3(uart.read(&mut bytes), ESTIMATE.wait(), Timer::after_millis(1)).await;
@@ -110,7 +109,7 @@ async fn transmit(mut can: Can<'static>) {
 
 /// Computes the windows, below all other tasks.
 #[embassy_executor::task]
-async fn compute(mut network: GyroNet<'static, &'static mut GyroNetState>) {
+async fn compute(mut network: GyroNet<'static, GyroNetState>) {
     loop {
         let window = WINDOW.wait().await;
         ESTIMATE.signal((window.end, network.estimate(&window.features)));
@@ -135,8 +134,8 @@ unsafe fn UART5() {
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static COPROCESSOR: ConstStaticCell<Coprocessor> = ConstStaticCell::new(Coprocessor::START);
-    static STATE: ConstStaticCell<GyroNetState> = ConstStaticCell::new(GyroNetState::ZERO);
+    static COPROCESSOR: ConstStaticCell<Coprocessor> = 
+        ConstStaticCell::new(Coprocessor::new(Config::DEFAULT));
     static RECEIVED: ConstStaticCell<[u8; 256]> = ConstStaticCell::new([0; 256]);
 
     let parts = embassy_stm32::init(clocks());
@@ -145,8 +144,7 @@ fn main() -> ! {
         .into_ring_buffered(RECEIVED.take());
     let mut can = Can::new(parts.CAN1, parts.PB8, parts.PB9, Interrupts);
     can.set_bitrate(500_000);
-    let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
-    let network = GyroNet::with_state(blob, STATE.take()).expect("a state of their size");
+    let network = GyroNet::shipped().expect("it comes with the library");
 
     interrupt::UART4.set_priority(Priority::P6);
     interrupt::UART5.set_priority(Priority::P7);

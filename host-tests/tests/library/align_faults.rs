@@ -50,7 +50,7 @@ impl Cable {
     /// Returns what the grid makes of it, asked for steps every 100 us.
     fn run(mut self) -> Run {
         self.0.sort_by_key(|arrival| arrival.now);
-        let mut grid = FogGrid::START;
+        let mut grid = FogGrid::new(false);
         let mut arrivals = self.0.iter().peekable();
         let (mut steps, mut events) = (Vec::new(), Vec::new());
         for now in (0..END_US).step_by(100) {

@@ -3,7 +3,7 @@
 
 use gyronet::bias::{BiasCurve, CurveFilter};
 use gyronet::health::{Faults, Quality, Status};
-use gyronet::pipeline::{Output, Pipeline, PipelineConfig, UncertaintyConfig};
+use gyronet::pipeline::{BoardState, Output, Pipeline, PipelineConfig, UncertaintyConfig};
 use gyronet::sample::{ImuSample, Standstill, WHEELS, WheelSample};
 use gyronet::units::{CentiCelsius, WheelSpeed};
 use gyronet::{Config, Coprocessor};
@@ -57,8 +57,8 @@ fn run(
         let sample = ImuSample { temperature, ..sample };
         let standstill = if drives { Standstill::Moving } else { Standstill::Still };
         let speeds = [Some(WheelSpeed(0)); WHEELS];
-        pipeline.wheels(WheelSample { time: sample.time, speeds, standstill });
-        pipeline.correct(sample).expect("a place on the grid")
+        let wheels = WheelSample { time: sample.time, speeds, standstill };
+        pipeline.correct(sample, Some(&wheels), &BoardState::GOOD).expect("a place on the grid")
     });
     let outputs = outputs.collect();
     (pipeline, outputs)
@@ -101,8 +101,13 @@ fn hard_braking_is_no_sensor_that_was_moved() {
         sample.angular_rate[0].0 += tick as i32 % 3;
         // 0.8 g for two seconds.
         sample.specific_force[0].0 -= if (400..600).contains(&tick) { force(7.8).0 } else { 0 };
-        pipeline.wheels(WheelSample::without_speeds(Standstill::Moving));
-        pipeline.correct(sample).expect("a place on the grid").vehicle.navigation.status
+        let wheels = WheelSample::without_speeds(Standstill::Moving);
+        pipeline
+            .correct(sample, Some(&wheels), &BoardState::GOOD)
+            .expect("a place on the grid")
+            .vehicle
+            .navigation
+            .status
     });
     assert!(statuses.skip(100).all(|status| status == Status::Degraded));
 }
@@ -121,9 +126,9 @@ fn a_first_stop_shows_the_bias_at_its_own_temperature() {
             sample.specific_force[axis].0 += force(0.02 * noise.normal()).0;
         }
         let standstill = if stands { Standstill::Still } else { Standstill::Moving };
-        pipeline.wheels(WheelSample::without_speeds(standstill));
+        let wheels = WheelSample::without_speeds(standstill);
         let sample = ImuSample { temperature: Some(CentiCelsius(100 * celsius)), ..sample };
-        last = Some(pipeline.correct(sample).expect("a place on the grid"));
+        last = Some(pipeline.correct(sample, Some(&wheels), &BoardState::GOOD).expect("a place on the grid"));
     }
     assert!(pipeline.gyro_bias().is_some(), "it has stood");
     let sigma = bias_sigma(&last.expect("samples"));
@@ -177,7 +182,11 @@ fn a_sensor_that_was_moved_is_reported() {
     // A drive has shown it.
     (0..2).for_each(|_| pipeline.mount_moved());
     assert_eq!(pipeline.counters().moved_mounts, 1);
-    let next = pipeline.correct(turning(501, rate(0.0))).expect("in order").vehicle.navigation;
+    let next = pipeline
+        .correct(turning(501, rate(0.0)), None, &BoardState::GOOD)
+        .expect("in order")
+        .vehicle
+        .navigation;
     assert!(next.faults.contains(Faults::IMPLAUSIBLE));
     assert!(outputs.iter().all(|output| !output.vehicle.navigation.faults.contains(Faults::IMPLAUSIBLE)));
 }
@@ -185,7 +194,8 @@ fn a_sensor_that_was_moved_is_reported() {
 #[test]
 fn a_part_without_a_temperature_is_not_corrected_by_the_curve() {
     let mut pipeline = Pipeline::new(known());
-    let output = pipeline.correct(turning(0, rate(0.01))).expect("a place on the grid");
+    let output =
+        pipeline.correct(turning(0, rate(0.01)), None, &BoardState::GOOD).expect("a place on the grid");
     assert!((output.vehicle.navigation.rate.rad_per_sec() - 0.01).abs() < 1e-6);
     assert_eq!(output.vehicle.navigation.status, Status::Init);
 }

@@ -5,7 +5,7 @@ use gyronet::compensate::{CompensateConfig, Compensator, Hop, Lag, Mode};
 use gyronet::health::Status;
 use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SteadyGain};
-use gyronet::pipeline::{Owed, Pipeline, PipelineConfig};
+use gyronet::pipeline::{BoardState, Owed, Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::units::{AngularRate, Yaw};
 use gyronet_host_tests::noise::Noise;
@@ -117,7 +117,7 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
             ImuSample { validity: Validity::reported(clipped), ..idling(tick, 0.003, &mut noise) };
         sample.angular_rate[2].0 += if moving { rate(0.4).0 } else { 0 };
         let broken = ledger.samples.last_key_value().map(|(last, _)| *last);
-        let output = pipeline.correct(sample).expect("a place on the grid");
+        let output = pipeline.correct(sample, None, &BoardState::GOOD).expect("a place on the grid");
         let (prompt, navigation) = (output.vehicle.prompt, output.vehicle.navigation);
         let Some(bias) = pipeline.gyro_bias().filter(|_| prompt.status != Status::Init) else {
             continue;

@@ -19,7 +19,7 @@ fn drain(grid: &mut FogGrid, now: u64) -> Vec<Step> {
 #[test]
 fn increments_are_neither_lost_nor_made_up() {
     for phase in [0, 1, 300, 999] {
-        let mut grid = FogGrid::START;
+        let mut grid = FogGrid::new(false);
         let mut steps = Vec::new();
         for n in 1..=2_000u64 {
             let angle = (n * n % 1_000_003) as i64 * 1_000_001 - 500_000_000_000;
@@ -63,7 +63,7 @@ proptest! {
 
 #[test]
 fn lost_increments_are_marked() {
-    let mut grid = FogGrid::START;
+    let mut grid = FogGrid::new(false);
     let mut steps = Vec::new();
     for n in 1..=100u64 {
         if (43..=45).contains(&n) {
@@ -86,7 +86,7 @@ fn lost_increments_are_marked() {
 #[test]
 fn no_step_is_later_than_ten_milliseconds() {
     // The gyro is silent for every other 100 ms.
-    let mut grid = FogGrid::START;
+    let mut grid = FogGrid::new(false);
     let (mut steps, mut worst) = (Vec::new(), 0);
     for now in (0..2_000_000u64).step_by(100) {
         if now % 1_000 == 300 && now / 100_000 % 2 == 0 {
@@ -175,7 +175,7 @@ proptest! {
         wild in any::<Option<u64>>(),
         pauses in prop::collection::vec(any::<prop::sample::Index>(), 0..3),
     ) {
-        let mut grid = FogGrid::START;
+        let mut grid = FogGrid::new(false);
         let pauses: Vec<usize> = pauses.iter().map(|pause| pause.index(events.len().max(1))).collect();
         let (mut now, mut last) = (1_000_000u64, None);
         for (n, (passed, off, kind)) in events.into_iter().enumerate() {

@@ -75,8 +75,7 @@ impl Gyro {
 
 fn lane(latitude_deg: Option<f32>) -> FogPipeline {
     let config = FogConfig { latitude: latitude_deg.and_then(Latitude::from_degrees), ..FogConfig::DEFAULT };
-    let mut fog = FogPipeline::new(config, true);
-    fog.configure(config, true);
+    let fog = FogPipeline::new(config, true, false);
     fog
 }
 
@@ -146,8 +145,7 @@ fn constant(deg_per_hour: f64) -> Angle {
 
 fn with_fognet(fognet: FogNetUse) -> FogPipeline {
     let config = FogConfig { latitude: Latitude::from_degrees(36.37), fognet, ..FogConfig::DEFAULT };
-    let mut fog = FogPipeline::new(config, true);
-    fog.configure(config, true);
+    let fog = FogPipeline::new(config, true, false);
     fog
 }
 
@@ -187,8 +185,7 @@ fn fognet_stays_where_it_does_no_harm() {
 #[test]
 fn without_a_latitude_fognet_changes_nothing() {
     let config = FogConfig { fognet: FogNetUse::Simulated, ..FogConfig::DEFAULT };
-    let mut fog = FogPipeline::new(config, true);
-    fog.configure(config, true);
+    let mut fog = FogPipeline::new(config, true, false);
     let mut gyro = Gyro::new(7, 36.37, 0.0);
     gyro.correction = constant(2.0);
     gyro.standstill = Standstill::Moving;

@@ -15,11 +15,13 @@ const NOTHING: FogEstimate =
 
 /// A gyro with FoGNet at the equator, where the Earth's rate adds nothing.
 fn with_fognet(has_network: bool) -> FogPipeline {
+    fognet_on(has_network, false)
+}
+
+fn fognet_on(has_network: bool, expected: bool) -> FogPipeline {
     let latitude = Latitude::from_degrees(0.0);
     let config = FogConfig { latitude, fognet: FogNetUse::Simulated, ..FogConfig::DEFAULT };
-    let mut fog = FogPipeline::new(config, has_network);
-    fog.configure(config, has_network);
-    fog
+    FogPipeline::new(config, has_network, expected)
 }
 
 fn sample(step: u64) -> FogSample {
@@ -152,8 +154,7 @@ fn a_stuck_gyro_is_found_while_its_clock_drifts() {
 fn a_gyro_that_is_expected_is_missed_from_the_start() {
     let mut fog = with_fognet(true);
     assert_eq!(run(&mut fog, 0..101, |_| false), []);
-    let mut fog = with_fognet(true);
-    fog.start_without_sample(Micros(0));
+    let mut fog = fognet_on(true, true);
     let sent = run(&mut fog, 0..501, |step| step > 100);
     // Step 0 is due 10 ms on; each of silence is no rate.
     assert_eq!(sent.len(), 501);

@@ -42,7 +42,7 @@ fn bytes(increments: &[f64]) -> impl Iterator<Item = (Micros, Vec<u8>)> {
 /// Returns the angle of each step of the grid, as the board finds it.
 fn turns(increments: &[f64]) -> Vec<Angle> {
     let mut part = Dsp1760::new(Dsp1760Config::DEFAULT);
-    let mut grid = FogGrid::START;
+    let mut grid = FogGrid::new(false);
     let mut turns = Vec::new();
     for (now, message) in bytes(increments) {
         for byte in message {

@@ -49,6 +49,7 @@ mod slcan;
 mod slcan_command;
 mod slcan_port;
 mod slow_status;
+mod step;
 mod store;
 mod store_power_cut;
 mod supervisor;

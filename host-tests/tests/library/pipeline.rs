@@ -6,7 +6,7 @@ use gyronet::estimate::VehicleSample;
 use gyronet::health::Status::{Clipped, Degraded, Init, Ready};
 use gyronet::health::{Faults, Quality, judge};
 use gyronet::model::window::WINDOW;
-use gyronet::pipeline::Output;
+use gyronet::pipeline::{BoardState, Output};
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::units::AngularRate;
 use gyronet_host_tests::noise::Noise;
@@ -145,7 +145,7 @@ fn misplaced_samples_are_a_gap_and_change_no_rate() {
             misplaced.time.0 =
                 sample.time.0.saturating_sub(noise.int(0, 900_000) as u64) + noise.int(0, 1) as u64 * 5_000;
             misplaced.time.0 = misplaced.time.0.min(sample.time.0 + 5_000);
-            assert!(pipeline.correct(misplaced).is_err());
+            assert!(pipeline.correct(misplaced, None, &BoardState::GOOD).is_err());
         }
     }
     assert!(pipeline.counters().misplaced > 400);
@@ -157,7 +157,7 @@ fn the_same_sample_again_changes_nothing() {
     let mut pipeline = new();
     let mut twice = |sample| {
         let outputs = run(&mut pipeline, [sample], constant(0.004));
-        assert!(pipeline.correct(sample).is_err());
+        assert!(pipeline.correct(sample, None, &BoardState::GOOD).is_err());
         outputs
     };
     let outputs: Vec<Output> = drive(0..600).flat_map(&mut twice).collect();
@@ -170,7 +170,7 @@ fn a_misplaced_sample_starts_static_initialisation_again() {
     let standing = |ticks: core::ops::Range<u64>| ticks.map(|tick| turning(tick, rate(0.001)));
     let mut pipeline = new();
     run(&mut pipeline, standing(0..200), constant(0.0));
-    assert!(pipeline.correct(turning(198, rate(3.0))).is_err());
+    assert!(pipeline.correct(turning(198, rate(3.0)), None, &BoardState::GOOD).is_err());
     let outputs = run(&mut pipeline, standing(200..600), constant(0.0));
     assert_eq!(statuses(&outputs)[0], (Init, KNOWN as usize));
 }
@@ -188,7 +188,8 @@ fn a_clock_that_jumps_by_a_few_milliseconds_is_a_gap() {
             sample.time.0 = sample.time.0.strict_add_signed(jump_us);
             sample
         });
-        let outputs: Vec<Output> = stamped.filter_map(|sample| pipeline.correct(sample).ok()).collect();
+        let outputs: Vec<Output> =
+            stamped.filter_map(|sample| pipeline.correct(sample, None, &BoardState::GOOD).ok()).collect();
         let counters = pipeline.counters();
         let counted = counters.missing + counters.misplaced + counters.clock_jumps;
         let within = jump_us.abs() <= 2_000;
@@ -202,7 +203,7 @@ fn a_clock_jump_is_counted_and_survived() {
     let mut pipeline = new();
     run(&mut pipeline, drive(0..400), constant(0.0));
     let later = |tick: u64| tick + 1_000_000;
-    assert!(pipeline.correct(drive([later(0)]).next().unwrap()).is_err());
+    assert!(pipeline.correct(drive([later(0)]).next().unwrap(), None, &BoardState::GOOD).is_err());
     let outputs = run(&mut pipeline, drive((1..100).map(later)), constant(0.0));
     assert_eq!(statuses(&outputs), [(Degraded, 11), (Ready, 88)]);
     assert_eq!((pipeline.counters().clock_jumps, pipeline.counters().missing), (1, 0));

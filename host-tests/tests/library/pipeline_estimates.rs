@@ -11,7 +11,7 @@ use gyronet::health::Faults;
 use gyronet::health::Status::{Degraded, Init, Ready};
 use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SCALE_MIN};
-use gyronet::pipeline::{DueWindow, Output};
+use gyronet::pipeline::{BoardState, DueWindow, Output};
 use gyronet::units::{AngularRate, Yaw};
 use gyronet_host_tests::stream::{constant, drive, faults, new, run, statuses};
 use gyronet_host_tests::synthetic::{rate, turning};
@@ -27,7 +27,7 @@ fn an_estimate_that_is_late_or_missing_is_counted() {
         let mut pipeline = new();
         let mut waiting: Vec<(usize, DueWindow)> = Vec::new();
         for (now, sample) in drive(0..400).enumerate() {
-            let output = pipeline.correct(sample).expect("a place on the grid");
+            let output = pipeline.correct(sample, None, &BoardState::GOOD).expect("a place on the grid");
             waiting.retain(|(since, due)| {
                 let deliver = now - since >= lateness;
                 if deliver {
@@ -49,7 +49,7 @@ fn an_estimate_that_is_late_or_missing_is_counted() {
     let mut pipeline = new();
     let mut waiting: Option<DueWindow> = None;
     for sample in drive(0..400) {
-        let output = pipeline.correct(sample).expect("a place on the grid");
+        let output = pipeline.correct(sample, None, &BoardState::GOOD).expect("a place on the grid");
         if let Some(due) = waiting.take() {
             pipeline.deliver(due.end, constant(0.01)(&due).expect("an estimate"));
         }
@@ -74,7 +74,7 @@ fn a_network_that_dies_leaves_the_gyro_less_its_bias() {
 fn an_estimate_for_another_window_is_not_used() {
     let mut pipeline = new();
     for sample in drive(0..400) {
-        let output = pipeline.correct(sample).expect("a place on the grid");
+        let output = pipeline.correct(sample, None, &BoardState::GOOD).expect("a place on the grid");
         if let Some(due) = output.window {
             pipeline.deliver(due.end.wrapping_sub(5), constant(0.01)(&due).expect("an estimate"));
             pipeline.deliver(due.end + 1, constant(0.01)(&due).expect("an estimate"));

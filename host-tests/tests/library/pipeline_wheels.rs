@@ -7,7 +7,7 @@ use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{Checksum, WheelFrame, WheelReceiver, WheelSettings, WheelSignal};
 use gyronet::health::Faults;
 use gyronet::health::Status::{Degraded, Init};
-use gyronet::pipeline::Output;
+use gyronet::pipeline::{BoardState, Output};
 use gyronet::sample::PERIOD_US;
 use gyronet::units::{Duration, Micros, WheelSpeed};
 use gyronet_host_tests::stream::{faults, new, statuses};
@@ -44,10 +44,10 @@ fn run(ticks: u64, mut wheels: impl FnMut(u64) -> Option<u16>) -> Vec<Output> {
             let frame = DataFrame::new(ID, &[low, high, low, high]).expect("four bytes");
             receiver.decode(&frame, now).expect("a wheel frame").expect("a good one");
         }
-        if let Some(known) = receiver.poll(now) {
-            pipeline.wheels(known);
-        }
-        pipeline.correct(turning(tick, rate(0.001))).expect("a place on the grid")
+        let known = receiver.poll(now);
+        pipeline
+            .correct(turning(tick, rate(0.001)), known.as_ref(), &BoardState::GOOD)
+            .expect("a place on the grid")
     };
     (0..ticks).map(step).collect()
 }

@@ -3,7 +3,7 @@
 
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::model::{Blob, GyroNet, weights};
-use gyronet::pipeline::{Pipeline, PipelineConfig};
+use gyronet::pipeline::{BoardState, Pipeline, PipelineConfig};
 use gyronet::pipeline::{Uncertainty, UncertaintyConfig};
 use gyronet::units::AngularRate;
 use gyronet_host_tests::noise::Noise;
@@ -76,7 +76,8 @@ fn the_pipeline_sends_the_expected_error() {
     let mut pipeline = Pipeline::new(PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT });
     let mut noise = Noise::new(1);
     for tick in 0..u64::from(STATIC_SAMPLES) + 5 {
-        let output = pipeline.correct(idling(tick, 0.001, &mut noise)).expect("in time");
+        let output =
+            pipeline.correct(idling(tick, 0.001, &mut noise), None, &BoardState::GOOD).expect("in time");
         let known = tick >= u64::from(STATIC_SAMPLES);
         assert_eq!(output.vehicle.prompt.sigma.is_some(), known, "sample {tick}");
         if let Some(sigma) = output.vehicle.prompt.sigma {

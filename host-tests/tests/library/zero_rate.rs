@@ -3,7 +3,7 @@
 use gyronet::bias::{StandstillSource, ZeroRate, ZeroRateConfig, ZeroRateOutcome};
 use gyronet::estimate::YawEstimate;
 use gyronet::health::{Faults, Status};
-use gyronet::pipeline::{Output, Pipeline, PipelineConfig};
+use gyronet::pipeline::{BoardState, Output, Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, RATE_HZ, Standstill, WHEELS, WheelSample};
 use gyronet::units::{AngularRate, WheelSpeed};
 use gyronet_host_tests::noise::Noise;
@@ -52,10 +52,9 @@ fn run_with(
     for tick in 0..ticks {
         let mut sample = parked(tick, &mut noise);
         sample.angular_rate[2].0 += rate(turn(tick)).0;
-        if let Some(standstill) = standstill(tick) {
-            pipeline.wheels(wheels(&sample, standstill));
-        }
-        let output = pipeline.correct(sample).expect("a place on the grid");
+        let report = standstill(tick).map(|standstill| wheels(&sample, standstill));
+        let output =
+            pipeline.correct(sample, report.as_ref(), &BoardState::GOOD).expect("a place on the grid");
         if let Some(due) = &output.window {
             pipeline.deliver(due.end, network(due).expect("an estimate"));
         }

@@ -3,7 +3,7 @@
 use gyronet::bias::{QuietConfig, QuietDetector, STATIC_SAMPLES, StaticConfig, StaticInit};
 use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SCALE_MIN};
-use gyronet::pipeline::{Pipeline, PipelineConfig};
+use gyronet::pipeline::{BoardState, Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, PERIOD_US, Standstill, Validity, WHEELS, WheelSample};
 use gyronet::units::{AngularRate, Micros, WheelSpeed};
 use gyronet_host_tests::recordings;
@@ -39,12 +39,10 @@ fn stand(text: &str, config: PipelineConfig, wheels: bool) -> (f64, f64, u32) {
     let (mut largest, mut last) = (0.0f64, 0.0);
     for (tick, line) in (0..).zip(text.lines().skip(1)) {
         let sample = sample(tick, line);
-        let standstill = Standstill::Still;
-        if wheels {
-            let speeds = [Some(WheelSpeed(0)); WHEELS];
-            pipeline.wheels(WheelSample { time: sample.time, speeds, standstill });
-        }
-        let output = pipeline.correct(sample).expect("a place on the grid");
+        let (speeds, standstill) = ([Some(WheelSpeed(0)); WHEELS], Standstill::Still);
+        let wheels = wheels.then_some(WheelSample { time: sample.time, speeds, standstill });
+        let output =
+            pipeline.correct(sample, wheels.as_ref(), &BoardState::GOOD).expect("a place on the grid");
         assert_eq!(output.refused, None);
         // No network has been trained for this part.
         if let Some(due) = output.window {

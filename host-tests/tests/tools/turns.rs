@@ -4,7 +4,7 @@
 
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
-use gyronet::pipeline::{Pipeline, PipelineConfig};
+use gyronet::pipeline::{BoardState, Pipeline, PipelineConfig};
 use gyronet::units::{AngularRate, SpecificForce};
 use gyronet_host_tests::recordings;
 use gyronet_tools::bundled;
@@ -24,7 +24,8 @@ const LARGEST: f64 = 0.001;
 /// Returns every twentieth window of the pipeline.
 fn windows(recording: &Recording) -> Vec<[Features; WINDOW]> {
     let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
-    let outputs = recording.rows.iter().filter_map(|row| pipeline.correct(row.sample).ok());
+    let outputs =
+        recording.rows.iter().filter_map(|row| pipeline.correct(row.sample, None, &BoardState::GOOD).ok());
     outputs.filter_map(|output| output.window).map(|due| due.features).step_by(20).collect()
 }
 

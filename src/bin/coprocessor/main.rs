@@ -108,6 +108,7 @@ mod app {
     use cortex_m::asm::dsb;
     use gyronet::coprocessor::Coprocessor;
     use gyronet::health::supervisor::Task;
+    use gyronet::model::blob::HIDDEN;
     use gyronet::model::gyronet::GyroNetState;
     use gyronet::model::{GyroNet, WindowNetwork};
     use gyronet::service::message::AllCounters;
@@ -127,13 +128,13 @@ mod app {
         service: serial::Handler,
         receptions: [Option<serial::Reception>; 4],
         sender: &'static mut Output,
-        network: Option<GyroNet<'static, &'static mut GyroNetState>>,
+        network: Option<GyroNet<'static, &'static mut GyroNetState<HIDDEN>>>,
         rest: &'static mut Idle,
     }
 
     #[init(local = [
-        network_state: GyroNetState = GyroNetState::ZERO,
-        coprocessor: Coprocessor = Coprocessor::START,
+        network_state: GyroNetState<HIDDEN> = GyroNetState::ZERO,
+        coprocessor_place: MaybeUninit<Coprocessor> = MaybeUninit::uninit(),
         sender_place: MaybeUninit<Output> = MaybeUninit::uninit(),
         rest_place: MaybeUninit<Idle> = MaybeUninit::uninit(),
     ])]
@@ -141,8 +142,7 @@ mod app {
         let (board, handlers) = board::Board::start(cx.device, cx.core.SYST);
         let Some(parts) = start::parts(&board) else { cortex_m::peripheral::SCB::sys_reset() };
         let start::Parts { output, config, weights, device } = parts;
-        let coprocessor = cx.local.coprocessor;
-        coprocessor.configure(&config);
+        let coprocessor = start::init_static(cx.local.coprocessor_place, || Coprocessor::new(config));
         let network = weights.and_then(|blob| GyroNet::with_state(blob, cx.local.network_state).ok());
         let service = board.service;
         let (bits_per_second, bring_up) = (output.bits_per_second, BringUp::new(output.part, board.spi));

@@ -26,7 +26,7 @@ mod firmware {
     use cortex_m::peripheral::{SYST, syst::SystClkSource};
     use cortex_m_semihosting::{debug, hprint, hprintln};
     use gyronet::model::blob::Shape;
-    use gyronet::model::gyronet::{GyroNetState, recurrent_words};
+    use gyronet::model::gyronet::GyroNetState;
     use gyronet::model::{Blob, BlobError, GyroNet, WindowNetwork};
     use gyronet::nn::Aligned;
     use panic_semihosting as _;
@@ -37,7 +37,7 @@ mod firmware {
     #[cfg(feature = "lm3s6965evb")]
     const UNITS: usize = 60;
 
-    type State = GyroNetState<UNITS, { UNITS / 2 }, { recurrent_words(UNITS) }>;
+    type State = GyroNetState<UNITS>;
 
     /// Number of windows that each model is compared on.
     const WINDOWS: u32 = 8;

@@ -36,12 +36,16 @@ pub enum E2e {
 impl E2e {
     /// Returns the profile of each message.
     #[must_use]
-    pub fn profiles(&self) -> [Profile; 3] {
+    pub const fn profiles(&self) -> [Profile; 3] {
+        [self.profile(0), self.profile(1), self.profile(2)]
+    }
+
+    const fn profile(&self, message: usize) -> Profile {
         match *self {
-            Self::P01 { mode, data_ids } => data_ids.map(|data_id| Profile::P01(P01 { data_id, mode })),
-            Self::P02 { data_ids } => data_ids.map(|data_ids| Profile::P02(P02 { data_ids })),
-            Self::P05 { data_ids } => data_ids.map(|data_id| Profile::P05(P05 { data_id })),
-            Self::P11 { mode, data_ids } => data_ids.map(|data_id| Profile::P11(P11 { data_id, mode })),
+            Self::P01 { mode, data_ids } => Profile::P01(P01 { data_id: data_ids[message], mode }),
+            Self::P02 { data_ids } => Profile::P02(P02 { data_ids: data_ids[message] }),
+            Self::P05 { data_ids } => Profile::P05(P05 { data_id: data_ids[message] }),
+            Self::P11 { mode, data_ids } => Profile::P11(P11 { data_id: data_ids[message], mode }),
         }
     }
 }

@@ -4,8 +4,7 @@
 //! AUTOSAR defines the CRC by calls of its CRC library, whose start and final XOR
 //! values cancel. The CRC on the bus has polynomial 0x1D, start 0 and no final XOR.
 
-use super::Fault;
-use super::header::ShortHeader;
+use super::{Fault, ShortHeader};
 
 /// CRC with start 0 and final XOR 0; unlike the J1850 CRC of other messages, although the polynomial is the same.
 pub(super) const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::Algorithm {

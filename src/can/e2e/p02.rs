@@ -1,8 +1,7 @@
 //! Profile 2 has its CRC in byte 0 and its counter in the low nibble of byte 1. The counter selects one of sixteen
 //! identifiers, which enters the CRC last. Profile 22 sends the same bytes.
 
-use super::Fault;
-use super::header::ShortHeader;
+use super::{Fault, ShortHeader};
 
 /// CRC-8-AUTOSAR (8H2F): polynomial 0x2F, start and final XOR FF.
 const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_AUTOSAR);

@@ -3,6 +3,7 @@
 
 use super::precision::Precision;
 use super::xbus;
+use crate::sample::ImuSample;
 use crate::units::RangeError;
 use heapless::Vec;
 
@@ -107,6 +108,19 @@ impl MtData2 {
             }
         }
         if data.is_empty() { Ok(message) } else { Err(XsensError::Truncated { id: 0 }) }
+    }
+
+    /// The message of a sample, as an MTi sends it.
+    #[must_use]
+    pub fn of(sample: &ImuSample, number: u16) -> Self {
+        Self {
+            packet_counter: Some(number),
+            sample_time_fine: Some((sample.time.0 / 100) as u32),
+            acceleration: Some(sample.specific_force.map(|force| force.metre_per_sec2() as f32)),
+            rate_of_turn: Some(sample.angular_rate.map(|rate| rate.rad_per_sec() as f32)),
+            temperature: sample.temperature.map(|temperature| f32::from(temperature.0) / 100.0),
+            status: Some(3),
+        }
     }
 
     /// Encodes the whole frame in single precision; fields that are `None` are omitted.

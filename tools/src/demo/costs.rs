@@ -2,6 +2,7 @@
 
 use crate::plot::page::grouped;
 use gyronet::can::config::Config;
+use gyronet::model::blob::HIDDEN;
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::gyronet::GyroNetState;
 use gyronet::model::weights;
@@ -60,7 +61,7 @@ pub fn all(samples: usize, run_time: Duration, config: &Config) -> Vec<Cost> {
         },
         Cost {
             what: "GyroNet, working memory",
-            figure: bytes(size_of::<GyroNetState>()),
+            figure: bytes(size_of::<GyroNetState<HIDDEN>>()),
             how: "size of its state on this machine".into(),
         },
         Cost {

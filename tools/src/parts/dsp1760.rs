@@ -21,7 +21,7 @@ pub const MESSAGE_US: u64 = PERIOD_US / MESSAGES;
 
 pub(super) fn send(recording: &Recording) -> Result<Sent, ViaError> {
     let mut gyro = Gyro { part: Dsp1760::new(Dsp1760Config::DEFAULT), bytes: 0 };
-    let mut grid = FogGrid::START;
+    let mut grid = FogGrid::new(false);
     let mut samples = Vec::with_capacity(recording.rows.len());
     // The grid begins one step before the first row, so that the first row's increments have their time.
     let mut last = recording.rows.first().map_or(0, |row| row.sample.time.0);
@@ -32,7 +32,7 @@ pub(super) fn send(recording: &Recording) -> Result<Sent, ViaError> {
         last = row.sample.time.0;
         if steps > u64::from(MAX_GAP) {
             // The pipeline restarts after such a gap, and so does the board's grid.
-            grid = FogGrid::START;
+            grid = FogGrid::new(false);
         } else {
             // The board keeps polling while no message arrives.
             for missing in 1..steps {

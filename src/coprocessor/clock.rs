@@ -1,4 +1,4 @@
-//! The timeline turns an outside clock into a time that never goes back.
+//! The clock of a coprocessor: an outside one, made one that never goes back, or the inertial sensor's.
 //!
 //! All limits (silence, late windows, old wheel speeds) are measured against the newest time. A clock that is set
 //! back must neither make these differences negative nor stall them until it has caught up, so its times are shifted
@@ -7,18 +7,36 @@
 use crate::units::{Duration, Micros};
 
 /// Time ends here, after 146,000 years, so that sums of times and limits do not overflow.
-pub(super) const END: Micros = Micros(1 << 62);
+const END: Micros = Micros(1 << 62);
 
-/// Keeps the newest time, and the shift that is added to the clock.
-#[derive(Debug, Clone, Copy, Default)]
+/// The clock that `now` comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Clock {
+    /// `now` is an independent clock, and inputs arrive when they are measured: a board in a vehicle.
+    #[default]
+    Outside,
+    /// Inputs arrive at another pace than they were measured at (a recorded drive), so only the time
+    /// stamps of the inertial sensor are meaningful. They are used for the wheels, the latitude and the fibre-optic
+    /// gyro; `now` is still used to detect a silent sensor and a late window.
+    Sensor,
+}
+
+/// Keeps the newest time of both clocks, and the shift that is added to the outside one.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Timeline {
+    clock: Clock,
     now: Micros,
     shift_us: u64,
+    /// Time stamp of the newest sample of the inertial sensor.
+    pub sample: Micros,
 }
 
 impl Timeline {
-    /// The timeline at time 0.
-    pub const START: Self = Self { now: Micros(0), shift_us: 0 };
+    /// Both clocks at time 0.
+    pub const fn new(clock: Clock) -> Self {
+        Self { clock, now: Micros(0), shift_us: 0, sample: Micros(0) }
+    }
 
     /// Advances to the clock's time and returns the shifted time.
     ///
@@ -39,9 +57,22 @@ impl Timeline {
         Micros(clock.0.saturating_add(self.shift_us)).min(END).max(self.now)
     }
 
-    /// Returns the newest time.
+    /// Returns the newest outside time.
     pub const fn now(&self) -> Micros {
         self.now
+    }
+
+    /// Returns the time that is used for the wheels, the latitude and the fibre-optic gyro.
+    pub fn time(&self) -> Micros {
+        match self.clock {
+            Clock::Outside => self.now,
+            Clock::Sensor => self.sample.min(END),
+        }
+    }
+
+    /// Returns whether the outside clock tells nothing about the age of a reading.
+    pub fn is_sensors(&self) -> bool {
+        self.clock == Clock::Sensor
     }
 }
 
@@ -51,7 +82,7 @@ mod tests {
 
     #[test]
     fn a_clock_that_goes_back_is_reported_once_and_followed() {
-        let mut timeline = Timeline::default();
+        let mut timeline = Timeline::new(Clock::Outside);
         assert_eq!(timeline.advance(Micros(1_000)), Ok(Micros(1_000)));
         assert_eq!(timeline.advance(Micros(1_000)), Ok(Micros(1_000)));
         assert_eq!(timeline.advance(Micros(400)), Err(Duration(600)));

@@ -1,0 +1,147 @@
+//! A board's loop in one call: what it reads, receives, estimates, sends and reports.
+
+use embedded_can::{Frame, StandardId, nb::Can};
+use gyronet::can::DataFrame;
+use gyronet::can::wheel::{WheelReceiver, WheelSettings};
+use gyronet::coprocessor::{Bus, Config, Coprocessor, QueuedCan, Step};
+use gyronet::health::{Faults, Status};
+use gyronet::model::{GyroNet, WindowNetwork};
+use gyronet::sample::{ImuSample, PERIOD_US, Standstill, TestSignal};
+use gyronet::units::{Micros, RangeError};
+use std::collections::VecDeque;
+use std::convert::Infallible;
+
+/// Frames of a sample.
+const SET: usize = 6;
+/// Places in the queue before the controller.
+const QUEUE: usize = 24;
+
+/// A controller that takes frames unless it is blocked, and has received some.
+#[derive(Debug, Default)]
+struct Controller {
+    sent: Vec<DataFrame>,
+    received: VecDeque<DataFrame>,
+    is_blocked: bool,
+}
+
+impl Can for Controller {
+    type Frame = DataFrame;
+    type Error = Infallible;
+
+    fn transmit(&mut self, frame: &DataFrame) -> nb::Result<Option<DataFrame>, Infallible> {
+        if self.is_blocked {
+            return Err(nb::Error::WouldBlock);
+        }
+        self.sent.push(*frame);
+        Ok(None)
+    }
+
+    fn receive(&mut self) -> nb::Result<DataFrame, Infallible> {
+        self.received.pop_front().ok_or(nb::Error::WouldBlock)
+    }
+}
+
+/// A parked car on a board; the reading of each step is up to the test.
+struct Car {
+    coprocessor: Coprocessor,
+    network: GyroNet<'static, gyronet::model::GyroNetState>,
+    number: u32,
+}
+
+type Reading = Option<Result<ImuSample, RangeError>>;
+
+impl Car {
+    fn new() -> Self {
+        let wheels = Some(WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings"));
+        let coprocessor = Coprocessor::new(Config { wheels, ..Config::DEFAULT });
+        Self { coprocessor, network: GyroNet::shipped().expect("it comes with the library"), number: 0 }
+    }
+
+    fn step(&mut self, mut reading: Reading, bus: &mut impl Bus) -> Step<RangeError> {
+        let now = Micros(u64::from(self.number) * PERIOD_US);
+        self.number += 1;
+        self.coprocessor.step(now, &mut reading, bus, Some(&mut self.network))
+    }
+
+    fn sample(&mut self, bus: &mut impl Bus) -> Step<RangeError> {
+        let sample = TestSignal::turning(0.5).sample(self.number);
+        self.step(Some(Ok(sample)), bus)
+    }
+}
+
+fn standing() -> DataFrame {
+    let id = StandardId::new(0xAA).expect("11 bits");
+    DataFrame::new(id, &[0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]).expect("eight bytes")
+}
+
+#[test]
+fn constant_readings_of_a_test_become_good_rates() {
+    let (mut car, mut can) = (Car::new(), QueuedCan::<_>::new(Controller::default()));
+    let last = (0..400).map(|_| car.sample(&mut can)).last().expect("steps");
+    let prompt = last.observation.expect("a message set").vehicle.prompt;
+    assert_eq!((prompt.status, prompt.faults, last.imu_error), (Status::Ready, Faults::NONE, None));
+    assert!(prompt.rate.rad_per_sec().abs() < 1e-4, "{}", prompt.rate.rad_per_sec());
+    assert_eq!(can.controller().sent.len(), 400 * SET);
+}
+
+#[test]
+fn the_network_may_run_elsewhere() {
+    let (mut here, mut elsewhere) = (Car::new(), Car::new());
+    let mut buses = [0, 1].map(|_| QueuedCan::<_>::new(Controller::default()));
+    for number in 0..500 {
+        here.sample(&mut buses[0]);
+        let mut reading: Reading = Some(Ok(TestSignal::turning(0.5).sample(number)));
+        let now = Micros(u64::from(number) * PERIOD_US);
+        elsewhere.coprocessor.step(now, &mut reading, &mut buses[1], None);
+        if let Some(due) = elsewhere.coprocessor.window() {
+            let estimate = elsewhere.network.estimate(&due.features);
+            elsewhere.coprocessor.deliver(due.end, estimate).expect("in time");
+        }
+    }
+    assert_eq!(buses[0].controller().sent, buses[1].controller().sent);
+}
+
+#[test]
+fn a_sensor_that_fails_to_read_is_counted_and_reported_as_silent() {
+    let (mut car, mut can) = (Car::new(), QueuedCan::<_>::new(Controller::default()));
+    for _ in 0..400 {
+        car.sample(&mut can);
+    }
+    let failing: Vec<Step<RangeError>> =
+        (0..5).map(|_| car.step(Some(Err(RangeError::NotFinite)), &mut can)).collect();
+    assert!(failing.iter().all(|step| step.imu_error == Some(RangeError::NotFinite)));
+    assert_eq!(car.coprocessor.input_counters().imu_errors, 5);
+    let silent = failing.iter().filter_map(|step| step.observation);
+    let statuses: Vec<Status> = silent.map(|observation| observation.vehicle.prompt.status).collect();
+    // 30 ms after the last sample, then every 10 ms.
+    assert_eq!(statuses, [Status::Silent; 3]);
+    assert_eq!(can.controller().sent.len(), 403 * SET);
+    let next = car.sample(&mut can).observation.map(|seen| seen.vehicle.prompt.status);
+    assert_eq!(next, Some(Status::Degraded), "until the next window");
+}
+
+#[test]
+fn frames_that_the_bus_does_not_take_are_lost_and_reported() {
+    let controller = Controller { is_blocked: true, ..Controller::default() };
+    let (mut car, mut can) = (Car::new(), QueuedCan::<_, QUEUE>::new(controller));
+    let faults: Vec<Faults> = (0..6)
+        .map(|_| car.sample(&mut can).observation.expect("a message set").vehicle.prompt.faults)
+        .collect();
+    assert_eq!(can.lost() as usize, 6 * SET - QUEUE);
+    // The fifth set pushes out the first, which the sixth reports.
+    assert_eq!(faults, [Faults::NONE, Faults::NONE, Faults::NONE, Faults::NONE, Faults::NONE, Faults::BUS]);
+}
+
+#[test]
+fn received_wheel_frames_are_used_and_damaged_ones_counted() {
+    let controller = Controller { received: [standing()].into(), ..Controller::default() };
+    let (mut car, mut can) = (Car::new(), QueuedCan::<_>::new(controller));
+    let seen = car.sample(&mut can).observation.expect("a message set");
+    assert!(seen.wheels.speeds.iter().all(Option::is_some));
+    assert_eq!(seen.wheels.standstill, Standstill::Unknown, "for half a second");
+    let short = DataFrame::new(standing().id(), &standing().data()[..3]).expect("three bytes");
+    let controller = Controller { received: [short].into(), ..Controller::default() };
+    let (mut car, mut can) = (Car::new(), QueuedCan::<_>::new(controller));
+    car.sample(&mut can);
+    assert_eq!(car.coprocessor.input_counters().wheel_errors, 1);
+}
