@@ -26,7 +26,6 @@ pub const PACKAGES: &[&str] = &["unicorn"];
 
 /// Returns the ELF file of an image for a board, named by its feature. The test is reported as skipped if the model
 /// cannot run (then nothing is built) or the image cannot be built.
-#[must_use]
 pub fn firmware(board: &str, test: &str, scratch: &str, name: &str) -> Option<PathBuf> {
     require::python(test, PACKAGES)?;
     image::firmware_for((board, bench::TARGET), test, scratch, name)
@@ -50,14 +49,12 @@ pub struct Board {
 impl Board {
     /// Returns a board without power, with the image in its flash. Reports the test as skipped if the model's
     /// packages are missing.
-    #[must_use]
     pub fn unpowered(test: &str, image: &Path) -> Option<Self> {
         let python = require::python(test, PACKAGES)?;
         Some(Self { link: Link::open(&python, image) })
     }
 
     /// Returns a board that has just been switched on.
-    #[must_use]
     pub fn boot(test: &str, image: &Path) -> Option<Self> {
         let mut board = Self::unpowered(test, image)?;
         board.power_on();
@@ -98,19 +95,16 @@ impl Board {
     }
 
     /// Lets board time pass until an event of this kind, and returns its time; `None` after the limit.
-    #[must_use]
     pub fn run_until(&mut self, event: &str, limit: Duration) -> Option<Duration> {
         self.run_until_any(&[json!({ "event": event })], limit).map(|(_, time)| time)
     }
 
     /// Lets board time pass until a line has this many unread bytes from the board; returns whether it has.
-    #[must_use]
     pub fn run_until_sent(&mut self, usart: usize, bytes: usize, limit: Duration) -> bool {
         self.run_until_any(&[json!({ "usart": usart, "bytes": bytes })], limit).is_some()
     }
 
     /// Lets board time pass until one of the model's conditions holds; returns its index and the time.
-    #[must_use]
     pub fn run_until_any(&mut self, conditions: &[Value], limit: Duration) -> Option<(usize, Duration)> {
         let answer = self.ask("run", json!({ "until": conditions, "limit_us": micros(limit) }));
         let met = usize::try_from(answer["met"].as_u64()?).ok()?;
@@ -128,13 +122,11 @@ impl Board {
     }
 
     /// Takes the bytes that the board has sent.
-    #[must_use]
     pub fn sent(&mut self, usart: usize) -> Vec<u8> {
         self.sent_chunks(usart).into_iter().flat_map(|(_, bytes)| bytes).collect()
     }
 
     /// Takes the bytes that the board has sent, in pieces without a gap, with the time of each first byte.
-    #[must_use]
     pub fn sent_chunks(&mut self, usart: usize) -> Vec<(Duration, Vec<u8>)> {
         let answer = self.ask("usart_take", json!({ "usart": usart }));
         list(&answer["chunks"])
@@ -166,7 +158,6 @@ impl Board {
     }
 
     /// Takes the frames that the board has sent completely, with the time of their end.
-    #[must_use]
     pub fn can_frames(&mut self) -> Vec<(Duration, DataFrame)> {
         let answer = self.ask("can_take", json!({}));
         let own = |entry: &&Value| entry["source"] == "board" && entry["error"].is_null();
@@ -180,7 +171,6 @@ impl Board {
     }
 
     /// Takes the event log.
-    #[must_use]
     pub fn events(&mut self) -> Vec<Event> {
         let answer = self.ask("events_take", json!({}));
         list(&answer["events"]).iter().map(Event::new).collect()
@@ -192,7 +182,6 @@ impl Board {
     }
 
     /// Reads flash or RAM.
-    #[must_use]
     pub fn read(&mut self, at: At, length: usize) -> Vec<u8> {
         let answer = self.ask("memory_read", place(at, json!({ "length": length })));
         unhex(&answer["hex"])
@@ -204,21 +193,18 @@ impl Board {
     }
 
     /// Returns the address of a symbol and its size in bytes.
-    #[must_use]
     pub fn symbol(&mut self, name: &str) -> (u32, u32) {
         let answer = self.ask("symbol", json!({ "name": name }));
         (word(&answer["address"]), word(&answer["size"]))
     }
 
     /// Returns a register of the processor: `r0` to `r12`, `sp`, `lr`, `pc`, `xpsr`, `msp`, `psp`, `primask`, ...
-    #[must_use]
     pub fn register(&mut self, name: &str) -> u32 {
         let answer = self.ask("registers", json!({}));
         word(&answer["registers"][name])
     }
 
     /// Returns the priority bytes of all exceptions, by number, as SHPR and NVIC_IPR hold them.
-    #[must_use]
     pub fn priorities(&mut self) -> Vec<i64> {
         let answer = self.ask("registers", json!({}));
         list(&answer["priorities"]).iter().filter_map(Value::as_i64).collect()
@@ -235,7 +221,6 @@ impl Board {
     }
 
     /// Returns instructions, board time, time asleep, and the state of power and core.
-    #[must_use]
     pub fn counts(&mut self) -> Counts {
         Counts::new(&self.ask("counts", json!({})))
     }

@@ -18,7 +18,6 @@ const ONTO_PIPES: &str = r#"exec "$@" 3<&0 4>&1 </dev/null >/dev/null 2>&1"#;
 /// Events that report a problem on the page.
 const COMPLAINTS: [&str; 3] = ["Runtime.consoleAPICalled", "Runtime.exceptionThrown", "Log.entryAdded"];
 
-/// Holds a browser with one page.
 #[derive(Debug)]
 pub struct Browser {
     process: Child,
@@ -31,10 +30,6 @@ pub struct Browser {
 
 impl Browser {
     /// Starts a browser that keeps its files in a folder; without a browser, reports that the test is skipped.
-    ///
-    /// # Panics
-    /// As [`wants`], and when the browser does not start.
-    #[must_use]
     pub fn start(test: &str, folder: &Path) -> Option<Self> {
         let runs = |name: &&&str| Command::new(name).arg("--version").output().is_ok();
         let found =
@@ -72,9 +67,6 @@ impl Browser {
     }
 
     /// Opens a file in a window of this width, and waits until it is loaded.
-    ///
-    /// # Panics
-    /// When the browser does not answer.
     pub fn open(&mut self, page: &Path, width: u32, dark: bool) {
         let size = json!({ "width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600 });
         self.call("Emulation.setDeviceMetricsOverride", size);
@@ -99,9 +91,6 @@ impl Browser {
     }
 
     /// Returns the value of an expression on the page.
-    ///
-    /// # Panics
-    /// When the expression throws.
     pub fn evaluate(&mut self, expression: &str) -> Value {
         let answer =
             self.call("Runtime.evaluate", json!({ "expression": expression, "returnByValue": true }));

@@ -15,7 +15,6 @@ mod slcan;
 mod trajectory;
 mod weights;
 
-/// Holds a named input.
 pub type Seed = (&'static str, Vec<u8>);
 
 /// Describes one entrance.
@@ -58,9 +57,6 @@ pub const ALL: [Entrance; 17] = [
 ];
 
 /// Runs an entrance by its name.
-///
-/// # Panics
-/// When there is no entrance of that name, or when it breaks a guarantee.
 pub fn run(name: &str, data: &[u8]) {
     let entrance = ALL.iter().find(|entrance| entrance.name == name).expect("an entrance of that name");
     (entrance.run)(data);

@@ -78,7 +78,6 @@ pub struct F405 {
 }
 
 impl Default for F405 {
-    /// Returns an erased flash.
     fn default() -> Self {
         Self {
             words: vec![u32::MAX; BYTES / WORD],
@@ -93,7 +92,6 @@ impl Default for F405 {
 
 impl F405 {
     /// Returns the number of operations (words programmed, sectors erased) so far.
-    #[must_use]
     pub fn operations(&self) -> u64 {
         self.operations
     }
@@ -109,8 +107,6 @@ impl F405 {
         !std::mem::replace(&mut self.powered, true)
     }
 
-    /// Returns the content.
-    #[must_use]
     pub fn bytes(&self) -> &[u8] {
         bytemuck::cast_slice(&self.words)
     }
@@ -176,8 +172,6 @@ pub struct Region<const SECTOR: usize> {
 }
 
 impl<const SECTOR: usize> Region<SECTOR> {
-    /// Returns a range of a flash.
-    #[must_use]
     pub fn new(flash: &Rc<RefCell<F405>>, range: Range<u32>) -> Self {
         Self { flash: Rc::clone(flash), range: range.start as usize..range.end as usize }
     }
@@ -248,14 +242,10 @@ pub struct MappedRegion {
 }
 
 impl MappedRegion {
-    /// Returns the weight files of a flash.
-    #[must_use]
     pub fn new(flash: &Rc<RefCell<F405>>) -> Self {
         Self { region: Region::new(flash, 0..BYTES as u32), copy: flash.borrow().words.clone() }
     }
 
-    /// Returns the bytes of both slots.
-    #[must_use]
     pub fn current(&self) -> [&[u8]; 2] {
         self.bytes(SLOTS).split_at(SLOT_SIZE).into()
     }

@@ -9,26 +9,17 @@ pub const WINDOWS: usize = 8;
 /// PyTorch. A normalised input of 20 has an LSB of 2e-6; everything else stays within 1.
 const TOLERANCE: f32 = 1e-5;
 
-/// Holds a file of golden tensors.
 #[derive(Debug)]
 pub struct Golden(Vec<u8>);
 
 impl Golden {
     /// Reads the tensors of a network, `gyronet` or `fognet`.
-    ///
-    /// # Panics
-    /// When the file is not in the repository.
-    #[must_use]
     pub fn read(network: &str) -> Self {
         let path = workspace().join(format!("tools/weights/{network}.golden.safetensors"));
         Self(std::fs::read(path).expect("the committed tensors"))
     }
 
     /// Returns the values of a tensor, row-major.
-    ///
-    /// # Panics
-    /// When the tensor is missing, not f32, or of another shape.
-    #[must_use]
     pub fn tensor(&self, name: &str, shape: &[usize]) -> Vec<f32> {
         let file = SafeTensors::deserialize(&self.0).expect("safetensors");
         let view = file.tensor(name).expect(name);
@@ -37,9 +28,6 @@ impl Golden {
     }
 
     /// Compares a layer's outputs with the tensor of its name.
-    ///
-    /// # Panics
-    /// Where they differ by more than rounding explains, or the tensor is all zeros.
     pub fn compare(&self, name: &str, shape: &[usize], ours: &[f32]) {
         let theirs = self.tensor(name, shape);
         assert_eq!(ours.len(), theirs.len(), "{name}");

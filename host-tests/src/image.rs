@@ -12,19 +12,11 @@ use std::sync::{Mutex, PoisonError};
 ///
 /// Each image is built once in a process, under `scratch` (a test's `env!("CARGO_TARGET_TMPDIR")`): the
 /// build folder of `cargo test` itself may be locked.
-///
-/// # Panics
-/// When the build fails: that is an error, not a missing tool.
-#[must_use]
 pub fn firmware(test: &str, scratch: &str, image: &str) -> Option<PathBuf> {
     firmware_for(("netduino-plus-2", bench::TARGET), test, scratch, image)
 }
 
 /// Returns the ELF file of an image for another board, named by its feature, and its target.
-///
-/// # Panics
-/// As [`firmware`].
-#[must_use]
 pub fn firmware_for(
     (board, target): (&str, &str),
     test: &str,

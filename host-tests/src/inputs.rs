@@ -3,10 +3,10 @@
 
 use crate::recordings::Row;
 use crate::replay;
-use embedded_can::{Frame, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::xsens::MtData2;
+use gyronet_tools::drive::wheel_frames;
 
 /// The gyro sends this many messages in 10 ms.
 const MESSAGES_PER_ROW: usize = 10;
@@ -29,8 +29,6 @@ pub struct Step {
 }
 
 impl Step {
-    /// Returns the inputs that belong to a row.
-    #[must_use]
     pub fn from_row(number: usize, row: &Row) -> Self {
         let speed = if number < STANDING_SAMPLES { 0.0 } else { 20.0 };
         Self {
@@ -42,7 +40,6 @@ impl Step {
 }
 
 /// Returns each of the gyro's readings in the 10 ms that end with a row, rad: a tenth of the turn.
-#[must_use]
 pub fn fog_reading(number: usize, row: &Row) -> f32 {
     // A gyro that repeats itself counts as stuck, so no reading equals the one before.
     let noise = if number.is_multiple_of(2) { FOG_STEP / 4.0 } else { -FOG_STEP / 4.0 };
@@ -51,7 +48,6 @@ pub fn fog_reading(number: usize, row: &Row) -> f32 {
 
 /// Returns the bytes that the gyro sends in the 10 ms that end with a row. For the first row it sends only the last
 /// message, so that a message set always follows the last message of a row.
-#[must_use]
 pub fn fog_bytes(number: usize, reading: f32) -> Vec<u8> {
     let message = |part: usize| Message {
         rotation: [0.0, 0.0, reading],
@@ -64,9 +60,7 @@ pub fn fog_bytes(number: usize, reading: f32) -> Vec<u8> {
     (first..MESSAGES_PER_ROW).flat_map(|part| message(part).emit().to_vec()).collect()
 }
 
-/// Returns the frame of four wheels at the same speed, km/h.
-fn wheels(speed: f64) -> DataFrame {
-    let code = ((speed + 67.67) * 100.0).round() as u16;
-    let id = StandardId::new(0xAA).expect("11 bits");
-    DataFrame::new(id, &[code.to_be_bytes(); 4].concat()).expect("eight bytes")
+/// The frame of wheels that all turn at this speed, km/h.
+pub fn wheels(speed: f64) -> DataFrame {
+    wheel_frames::frame([Some(speed); 4]).expect("a frame")
 }

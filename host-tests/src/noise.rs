@@ -4,7 +4,6 @@
 use proptest::test_runner::Config;
 
 /// Returns the settings for this many cases. Failed cases are not written to files, since the message has the input.
-#[must_use]
 pub fn cases(count: u32) -> Config {
     // Miri checks every access of a case, so a few cases are enough there.
     let cases = if cfg!(miri) { count.min(4) } else { count };
@@ -16,8 +15,6 @@ pub fn cases(count: u32) -> Config {
 pub struct Noise(u64);
 
 impl Noise {
-    /// Returns the stream of a seed.
-    #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -30,7 +27,6 @@ impl Noise {
         z ^ (z >> 31)
     }
 
-    /// Returns a random byte.
     pub fn byte(&mut self) -> u8 {
         self.bits().to_le_bytes()[7]
     }

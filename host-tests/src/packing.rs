@@ -21,7 +21,6 @@ pub struct Row {
 impl Row {
     /// Returns the largest sum that inputs up to `input_max` and any hidden state can give, bias
     /// included.
-    #[must_use]
     pub fn bound(&self, input_max: i32) -> i64 {
         let sum = |row: &[i8], max: i32| {
             row.iter().map(|w| i64::from(w.unsigned_abs())).sum::<i64>() * i64::from(max)
@@ -61,7 +60,6 @@ pub struct Rows(pub Vec<[Row; GATES]>);
 
 impl Rows {
     /// Returns random rows within the range of the kernel for inputs up to `input_max`.
-    #[must_use]
     pub fn random(noise: &mut Noise, inputs: usize, units: usize, input_max: i32) -> Self {
         let mut row = |gate: usize| {
             let largest = [127, 40, 3][noise.int(0, 2) as usize];
@@ -70,8 +68,6 @@ impl Rows {
         Self((0..units).map(|_| std::array::from_fn(&mut row)).collect())
     }
 
-    /// Returns the packed words in reading order.
-    #[must_use]
     pub fn pack(&self) -> Packed {
         let mut packed =
             Packed { units: self.0.len(), inputs: self.0[0][0].input.len(), ..Packed::default() };
@@ -90,7 +86,6 @@ impl Rows {
 }
 
 /// Packs two halfwords into a word, the first in the lower half.
-#[must_use]
 pub fn word(first: i16, second: i16) -> u32 {
     let ([a, b], [c, d]) = (first.to_le_bytes(), second.to_le_bytes());
     u32::from_le_bytes([a, b, c, d])
@@ -121,10 +116,6 @@ pub struct Packed {
 
 impl Packed {
     /// Returns the weights in the form that the kernel uses.
-    ///
-    /// # Panics
-    /// When the kernel does not accept records of this size.
-    #[must_use]
     pub fn direction(&self) -> DirectionWeights<'_> {
         DirectionWeights::new(self.units, self.inputs, &self.input, &self.recurrent)
             .expect("records of the stated size")

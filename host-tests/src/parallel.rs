@@ -1,9 +1,6 @@
 //! This module processes recordings side by side, because each of them keeps a core busy for seconds.
 
 /// Prints a table of the lines that `judge` returns for each item, with the failures that it reports.
-///
-/// # Panics
-/// When an item fails.
 pub fn table<T: Sync>(heading: &str, items: &[T], judge: impl Fn(&T) -> (String, Vec<String>) + Sync) {
     let (lines, failures): (Vec<_>, Vec<_>) = map(items, judge).into_iter().unzip();
     let table = format!("{heading}\n{}", lines.concat());
@@ -12,9 +9,6 @@ pub fn table<T: Sync>(heading: &str, items: &[T], judge: impl Fn(&T) -> (String,
 }
 
 /// Returns the results of `judge` for each item in their order; each item has a thread.
-///
-/// # Panics
-/// When `judge` panics.
 pub fn map<T: Sync, R: Send>(items: &[T], judge: impl Fn(&T) -> R + Sync) -> Vec<R> {
     std::thread::scope(|scope| {
         let judge = &judge;

@@ -4,7 +4,6 @@ use crate::require::{self, Need};
 use std::process::Command;
 
 /// Checks for QEMU; without it reports that the test is skipped.
-#[must_use]
 pub fn available(test: &str) -> Option<()> {
     let version = Command::new("qemu-system-arm").arg("--version").output();
     require::wants(test, Need::Qemu, version.map(drop).map_err(|error| format!("qemu-system-arm: {error}")))

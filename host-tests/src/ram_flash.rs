@@ -11,14 +11,11 @@ pub struct RamFlash<const SECTOR: usize> {
 }
 
 impl<const SECTOR: usize> RamFlash<SECTOR> {
-    /// Creates an erased flash for weight files.
-    #[must_use]
     pub fn for_weights() -> Self {
         Self { words: vec![u32::MAX; SLOTS.end as usize / 4] }
     }
 
     /// Creates a flash of two sectors that begins with these bytes and is erased after them.
-    #[must_use]
     pub fn new(content: &[u8]) -> Self {
         let mut flash = Self { words: vec![u32::MAX; 2 * SECTOR / 4] };
         let len = content.len().min(2 * SECTOR);
@@ -26,8 +23,6 @@ impl<const SECTOR: usize> RamFlash<SECTOR> {
         flash
     }
 
-    /// Returns the content.
-    #[must_use]
     pub fn bytes(&self) -> &[u8] {
         bytemuck::cast_slice(&self.words)
     }

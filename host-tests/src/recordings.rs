@@ -7,22 +7,18 @@ use std::path::{Path, PathBuf};
 /// The environment variable that names the folder with `wid_car/`.
 pub const VARIABLE: &str = "GYRONET_DATA";
 
-/// Returns the repository's root.
-#[must_use]
 pub fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("host-tests lies in the workspace")
 }
 
 /// Returns the folder of the recordings: [`VARIABLE`], from the repository's root if relative, else `shared/data`
 /// beside the repository.
-#[must_use]
 pub fn folder() -> PathBuf {
     let beside = || workspace().parent().unwrap_or(workspace()).join("shared/data");
     std::env::var_os(VARIABLE).map_or_else(beside, |folder| workspace().join(folder))
 }
 
 /// Returns the file of one drive of `wid_car`; without it reports that the test is skipped.
-#[must_use]
 pub fn trial(test: &str, number: u32) -> Option<PathBuf> {
     let path = folder().join(format!("wid_car/trial{number:02}_100hz.csv"));
     let found = if path.is_file() {
@@ -34,7 +30,6 @@ pub fn trial(test: &str, number: u32) -> Option<PathBuf> {
 }
 
 /// Returns the files of these drives; where one is missing, reports that the test is skipped.
-#[must_use]
 pub fn trials(test: &str, numbers: &[u32]) -> Option<Vec<PathBuf>> {
     numbers.iter().map(|number| trial(test, *number)).collect()
 }
@@ -53,10 +48,6 @@ pub struct Row {
 }
 
 /// Reads the rows of a recording. The tests have this reader of their own, to compare with that of the tools.
-///
-/// # Panics
-/// When the file does not have the layout of `wid_car`.
-#[must_use]
 pub fn rows(path: &Path) -> Vec<Row> {
     let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let mut lines = text.lines();

@@ -18,7 +18,6 @@ use gyronet::units::Micros;
 pub const CONFIG: Config = Config::DEFAULT;
 
 /// Returns the message that an MTi would send for a row.
-#[must_use]
 pub fn message(number: usize, row: &Row) -> MtData2 {
     MtData2 {
         packet_counter: Some(number as u16),
@@ -31,9 +30,6 @@ pub fn message(number: usize, row: &Row) -> MtData2 {
 }
 
 /// Compares what a board has sent with what it must send, line by line.
-///
-/// # Panics
-/// Where a line differs or is missing.
 pub fn assert_same(lines: &[Vec<u8>], expected: &[Vec<u8>]) {
     let text = |line: &[u8]| line.escape_ascii().to_string();
     for (number, (line, expected)) in lines.iter().zip(expected).enumerate() {
@@ -44,7 +40,6 @@ pub fn assert_same(lines: &[Vec<u8>], expected: &[Vec<u8>]) {
 
 /// Returns the bytes of message `number` of an MTi, one every 10 ms, when the vehicle is level and turns at
 /// `yaw_rate`, rad/s.
-#[must_use]
 pub fn turning(number: usize, yaw_rate: f32) -> Vec<u8> {
     // The lowest bits of a real part always change.
     let sign = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -59,10 +54,6 @@ pub fn turning(number: usize, yaw_rate: f32) -> Vec<u8> {
 }
 
 /// Returns the lines that the board must send for these bytes, without the CR.
-///
-/// # Panics
-/// When the library's own weights are refused.
-#[must_use]
 pub fn lines(bytes: &[u8]) -> Vec<Vec<u8>> {
     let mut board = Board::new();
     board.push(bytes);
@@ -95,20 +86,12 @@ impl Default for Board {
 
 impl Board {
     /// Returns a board that has received nothing yet.
-    ///
-    /// # Panics
-    /// When the library's own weights are refused.
-    #[must_use]
     pub fn new() -> Self {
         let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
         Self::configured(&Configuration::DEFAULT, blob)
     }
 
     /// Returns a board with this configuration and these weights.
-    ///
-    /// # Panics
-    /// When the configuration is refused.
-    #[must_use]
     pub fn configured(configuration: &Configuration, blob: Blob<'static>) -> Self {
         let wheels = WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings");
         let config = coprocessor::Config {
@@ -132,13 +115,11 @@ impl Board {
 
     /// Returns a board that follows another one, given the lines that it has sent. Where the other board, by its own
     /// clock, finds the sensor silent and reports that, this board reports it too. Everything else must be the same.
-    #[must_use]
     pub fn following(lines: Vec<Vec<u8>>) -> Self {
         Self::new().follow_lines(lines)
     }
 
     /// Follows another board that has sent these lines, as [`Board::following`].
-    #[must_use]
     pub fn follow_lines(self, lines: Vec<Vec<u8>>) -> Self {
         Self { board_lines: lines, ..self }
     }

@@ -28,7 +28,6 @@ impl Need {
         [("qemu", Self::Qemu), ("data", Self::Data), ("python", Self::Python), ("browser", Self::Browser)];
 }
 
-/// Holds the requirements that must be met.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Required(Vec<Need>);
 
@@ -51,9 +50,6 @@ impl Required {
     }
 
     /// Returns what was found, or `None` with a line on `out` that names the skipped test and the reason.
-    ///
-    /// # Panics
-    /// When it was not found and is required.
     pub fn wants<T>(
         &self,
         test: &str,
@@ -83,18 +79,11 @@ fn say(test: &str, why: &str, out: &mut impl Write) {
 }
 
 /// Returns what was found, or reports on standard error that the test is skipped.
-///
-/// # Panics
-/// When it was not found and is required, or the list has an unknown word.
 pub fn wants<T>(test: &str, need: Need, found: Result<T, String>) -> Option<T> {
     Required::from_env().wants(test, need, found, &mut std::io::stderr())
 }
 
 /// Returns the Python with these packages: `GYRONET_PYTHON`, or `python3`.
-///
-/// # Panics
-/// As [`wants`].
-#[must_use]
 pub fn python(test: &str, packages: &[&str]) -> Option<String> {
     let python = std::env::var("GYRONET_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let packages = packages.join(", ");

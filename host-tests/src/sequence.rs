@@ -7,10 +7,6 @@ use gyronet_tools::evaluate::trajectory_error::TrajectoryError;
 use tempfile::tempdir;
 
 /// Returns a sequence that is simulated, written and read back.
-///
-/// # Panics
-/// When its files cannot be written.
-#[must_use]
 pub fn simulate(spec: &Spec) -> Sequence {
     let parent = tempdir().expect("there is room");
     let folder = parent.path().join(&spec.name);
@@ -19,10 +15,6 @@ pub fn simulate(spec: &Spec) -> Sequence {
 }
 
 /// Returns the root mean square distance from the true path of dead reckoning with these turns, m.
-///
-/// # Panics
-/// When the sequence has no step, or there are fewer turns than steps.
-#[must_use]
 pub fn path_error(sequence: &Sequence, turns: impl Iterator<Item = f64>) -> f64 {
     let yaw = sequence.steps.first().expect("it has steps").yaw;
     let mut track = Track { yaw, ..Track::default() };

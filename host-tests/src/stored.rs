@@ -18,7 +18,6 @@ pub fn open(flash: &Rc<RefCell<F405>>) -> Result<Store<Region<RECORD_SECTOR>>, S
 }
 
 /// Returns both weight slots of a flash.
-#[must_use]
 pub fn slots(flash: &F405) -> [&[u8]; 2] {
     let bytes = &flash.bytes()[layout::SLOTS.start as usize..layout::SLOTS.end as usize];
     bytes.split_at(SLOT_SIZE).into()
@@ -43,7 +42,6 @@ pub fn upload(flash: &Rc<RefCell<F405>>, slot: Slot, file: &[u8]) -> Result<(), 
 
 /// Returns the built-in weights with these bits of the output bias flipped (within its bits 8 to 15), and a valid
 /// checksum.
-#[must_use]
 pub fn other_weights(bits: u8) -> Vec<u8> {
     let mut file = weights::GYRONET.0.to_vec();
     let end = file.len() - 4;
@@ -61,27 +59,18 @@ pub struct Stored(Rc<RefCell<F405>>);
 
 impl Stored {
     /// Stores a record.
-    ///
-    /// # Panics
-    /// When it is refused.
-    #[must_use]
     pub fn record<R: Record>(self, record: &R) -> Self {
         open(&self.0).and_then(|mut store| store.set(record)).expect("it is stored");
         self
     }
 
     /// Stores an accepted weight file; the last one is used.
-    ///
-    /// # Panics
-    /// When it is refused.
-    #[must_use]
     pub fn weights(self, slot: Slot, file: &[u8]) -> Self {
         upload(&self.0, slot, file).expect("it is accepted");
         self
     }
 
     /// Flips bits of a byte at an offset into the flash.
-    #[must_use]
     pub fn damaged(self, offset: u32, bits: u8) -> Self {
         self.0.borrow_mut().damage(offset as usize, bits);
         self

@@ -10,8 +10,6 @@ use gyronet::sample::ImuSample;
 /// First tick after static initialisation, if nothing disturbs it.
 pub const KNOWN: u64 = 300;
 
-/// Returns a pipeline with its defaults.
-#[must_use]
 pub fn new() -> Pipeline {
     Pipeline::new(PipelineConfig::DEFAULT)
 }
@@ -27,9 +25,6 @@ pub fn constant(correction: f64) -> impl FnMut(&DueWindow) -> Option<Estimate> {
 }
 
 /// Runs samples through a pipeline; estimates are delivered at once, and for `None` nothing is delivered.
-///
-/// # Panics
-/// When a sample does not fit the time grid.
 pub fn run(
     pipeline: &mut Pipeline,
     samples: impl IntoIterator<Item = ImuSample>,
@@ -49,7 +44,6 @@ pub fn run(
 }
 
 /// Returns the runs of equal status of the prompt rate: each with its number of samples.
-#[must_use]
 pub fn statuses(outputs: &[Output]) -> Vec<(Status, usize)> {
     outputs
         .chunk_by(|a, b| a.vehicle.prompt.status == b.vehicle.prompt.status)
@@ -58,7 +52,6 @@ pub fn statuses(outputs: &[Output]) -> Vec<(Status, usize)> {
 }
 
 /// Returns the runs of equal faults: each with its number of samples.
-#[must_use]
 pub fn faults(outputs: &[Output]) -> Vec<(Faults, usize)> {
     let faults = |output: &Output| output.vehicle.navigation.faults;
     outputs.chunk_by(|a, b| faults(a) == faults(b)).map(|run| (faults(&run[0]), run.len())).collect()

@@ -7,25 +7,16 @@ use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
 
 /// Returns a rate, rad/s, in fixed point.
-///
-/// # Panics
-/// Beyond +-16 rad/s.
-#[must_use]
 pub fn rate(rad_per_sec: f64) -> AngularRate {
     AngularRate::from_rad_per_sec(rad_per_sec as f32).expect("a gyro's range")
 }
 
 /// Returns a specific force, m/s^2, in fixed point.
-///
-/// # Panics
-/// Beyond +-2048 m/s^2.
-#[must_use]
 pub fn force(metre_per_sec2: f64) -> SpecificForce {
     SpecificForce::from_metre_per_sec2(metre_per_sec2 as f32).expect("an accelerometer's range")
 }
 
 /// Returns a sample of a level vehicle at grid step `tick` that turns at `yaw_rate` and does not move otherwise.
-#[must_use]
 pub fn turning(tick: u64, yaw_rate: AngularRate) -> ImuSample {
     ImuSample {
         time: Micros(tick * PERIOD_US),
@@ -38,7 +29,6 @@ pub fn turning(tick: u64, yaw_rate: AngularRate) -> ImuSample {
 
 /// Returns a sample of a vehicle that stands with its engine running: a 27 Hz shake and its overtone on every axis,
 /// with some noise; `bias` (rad/s) on every gyro axis.
-#[must_use]
 pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {
     let phase = std::f64::consts::TAU * 27.0 * tick as f64 / f64::from(RATE_HZ);
     let mut shake = |axis: usize| {
@@ -53,13 +43,11 @@ pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {
 }
 
 /// Returns an estimate of good quality with this rate and yaw.
-#[must_use]
 pub fn estimate(rate: AngularRate, yaw: Yaw) -> YawEstimate {
     YawEstimate { rate, yaw, source: Source::GyroNet, quality: Quality::Good, ..YawEstimate::default() }
 }
 
 /// Returns the output for a vehicle that turns at `rate`, has turned by `yaw`, and has no fault.
-#[must_use]
 pub fn vehicle(tick: u32, rate: AngularRate, yaw: Yaw) -> VehicleSample {
     VehicleSample {
         prompt: YawEstimate { rate, quality: Quality::Good, ..YawEstimate::default() },

@@ -6,7 +6,6 @@ use std::collections::VecDeque;
 const PADDING: u8 = 0x55;
 
 /// Returns the frames of a message: a single frame, or a first frame and its consecutive frames.
-#[must_use]
 pub fn segment(message: &[u8]) -> Vec<[u8; 8]> {
     if message.len() <= 7 {
         return vec![frame(&[message.len() as u8], message)];
@@ -18,7 +17,6 @@ pub fn segment(message: &[u8]) -> Vec<[u8; 8]> {
 }
 
 /// Returns a frame of `head` and `bytes`, padded.
-#[must_use]
 pub fn frame(head: &[u8], bytes: &[u8]) -> [u8; 8] {
     let mut frame = [PADDING; 8];
     frame.iter_mut().zip(head.iter().chain(bytes)).for_each(|(place, byte)| *place = *byte);

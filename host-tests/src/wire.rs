@@ -6,10 +6,6 @@ use gyronet::sensor::xsens::{MtData2, Mti, XsensError};
 use std::borrow::Borrow;
 
 /// Parses bytes that are written in hexadecimal, with or without spaces between them.
-///
-/// # Panics
-/// When they are not.
-#[must_use]
 pub fn bytes(hex: &str) -> Vec<u8> {
     let digits: String = hex.split_whitespace().collect();
     let byte = |at| u8::from_str_radix(&digits[at..at + 2], 16).expect("hex");
@@ -17,7 +13,6 @@ pub fn bytes(hex: &str) -> Vec<u8> {
 }
 
 /// Returns a frame of a real MTi with 98 bytes of payload.
-#[must_use]
 pub fn real_frame() -> Vec<u8> {
     bytes(
         "fa ff 36 62 10 20 02 a9 86 10 60 04 03 14 ed 53 10 10 0c 07 44 0b e0 07 e3 01 14 0d 2f 18 37 e0 20 04 01 \
@@ -27,7 +22,6 @@ pub fn real_frame() -> Vec<u8> {
 }
 
 /// Returns a made-up frame: az 9.81 m/s^2, gz 10 deg/s, counter 1, time 100, status 3.
-#[must_use]
 pub fn synthetic_frame() -> Vec<u8> {
     bytes(
         "fa ff 36 31 10 20 02 00 01 10 60 04 00 00 00 64 40 20 0c 00 00 00 00 00 00 00 00 41 1c f5 c3 80 20 0c 00 \
@@ -36,7 +30,6 @@ pub fn synthetic_frame() -> Vec<u8> {
 }
 
 /// Returns a message whose readings differ with its time (10 kHz).
-#[must_use]
 pub fn message(time: u32) -> MtData2 {
     MtData2 {
         packet_counter: Some(time as u16),

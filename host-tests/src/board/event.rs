@@ -23,19 +23,15 @@ impl Event {
     }
 
     /// Returns a further field as text: the `cause` of a `reset`. Empty if there is no such field.
-    #[must_use]
     pub fn text(&self, name: &str) -> &str {
         self.fields[name].as_str().unwrap_or_default()
     }
 
     /// Returns a further field as a list of whole numbers: the `sectors` of a `flash_erase`.
-    #[must_use]
     pub fn numbers(&self, name: &str) -> Vec<u64> {
         self.fields[name].as_array().into_iter().flatten().filter_map(Value::as_u64).collect()
     }
 
-    /// Returns a further field as a number.
-    #[must_use]
     pub fn number(&self, name: &str) -> Option<f64> {
         self.fields[name].as_f64()
     }

@@ -16,9 +16,6 @@ pub struct Link {
 
 impl Link {
     /// Starts the model with an image in its flash.
-    ///
-    /// # Panics
-    /// When the process cannot be started.
     pub fn open(python: &str, image: &Path) -> Self {
         let mut child = Command::new(python)
             .args(["-m", "virtual_board", "--elf"])
@@ -65,9 +62,6 @@ pub fn hex(bytes: &[u8]) -> String {
 }
 
 /// Returns the bytes of hexadecimal digits from the model.
-///
-/// # Panics
-/// When these are not hexadecimal digits.
 pub fn unhex(digits: &Value) -> Vec<u8> {
     let digits = digits.as_str().expect("the model gives digits");
     let byte = |at| u8::from_str_radix(digits.get(at..at + 2).expect("two digits"), 16).expect("digits");

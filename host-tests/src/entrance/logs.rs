@@ -18,9 +18,6 @@ BO_ 291 Kinds: 8 X
 "#;
 
 /// Reads any bytes as a log of the format that their beginning indicates.
-///
-/// # Panics
-/// When a value is not finite, or time does not increase.
 pub fn file(data: &[u8]) {
     let bus = Bus::parse("a.dbc", DBC).expect("a DBC file");
     let Ok(log) = read_bytes("log", data, Some(&bus), &Columns::new()) else { return };
@@ -85,7 +82,6 @@ pub fn seeds() -> Vec<Seed> {
     ]
 }
 
-/// Returns the bytes with their length in front.
 fn block(bytes: &[u8]) -> Vec<u8> {
     [&(bytes.len() as u32).to_le_bytes(), bytes].concat()
 }

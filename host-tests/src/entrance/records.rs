@@ -48,7 +48,6 @@ fn run(configuration: &Configuration, calibration: &Calibration, learned: &Learn
     }
 }
 
-/// Returns a sector of valid records.
 fn fitting(mut data: &[u8]) -> Vec<u8> {
     let generation = 1_u32;
     let header = CRC.checksum(&(generation ^ u32::from_le_bytes(*b"GYR1")).to_le_bytes());

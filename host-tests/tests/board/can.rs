@@ -12,7 +12,7 @@ use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::stored::Stored;
-use gyronet_host_tests::{replay, require};
+use gyronet_host_tests::{inputs, replay, require};
 use std::io::Write;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -322,8 +322,7 @@ fn an_erase_is_announced_and_costs_no_time() {
     const TEST: &str = "an_erase_is_announced_and_costs_no_time";
     let Some(mut board) = boot(TEST) else { return };
     // Wheels that stand prove that the vehicle does, whatever the gyro says.
-    let still = DataFrame::new(StandardId::new(0xAA).expect("11 bits"), &[0x1A, 0x6F].repeat(4))
-        .expect("eight bytes");
+    let still = inputs::wheels(0.0);
     let samples = drive(400);
     common::send(&mut board, &samples, START);
     for _ in 0..300 {

@@ -3,16 +3,15 @@
 use crate::common::{self, SLCAN, START};
 use crate::service;
 use embedded_can::{Frame, Id};
-use gyronet::can::DataFrame;
 use gyronet::can::yaw::{AngleMessage, Quality, RateMessage};
 use gyronet::service::event::{EventKind, SensorFault};
 use gyronet::service::message::AllCounters;
 use gyronet::store::{Configuration, ImuPart, Learned};
 use gyronet::units::AngularRate;
 use gyronet_host_tests::board::Board;
+use gyronet_host_tests::inputs::wheels;
 use gyronet_host_tests::stored::Stored;
 use gyronet_tools::client::monitor::line::parse_line;
-use gyronet_tools::drive::wheel_frames;
 use serde_json::json;
 use std::time::Duration;
 
@@ -255,11 +254,6 @@ fn yaw_is_right_though_the_parts_oscillator_is_one_percent_off() {
     assert!((turned / expected - 1.0).abs() < 1e-3, "{turned} deg of {expected}");
     assert_eq!(common::counters(&mut board).watch.clock_off, 0);
     assert_driven_well(&mut board);
-}
-
-/// The frame of wheels that all turn at this speed, km/h.
-fn wheels(speed: f64) -> DataFrame {
-    wheel_frames::frame([Some(speed); 4]).expect("a frame")
 }
 
 /// Runs with a wheel frame every 20 ms.

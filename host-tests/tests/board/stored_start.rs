@@ -14,6 +14,7 @@ use gyronet::store::layout::{FLASH_BASE, SLOT_SIZE, STORE};
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, FlashFault, FogPart, Slot, StoreError};
 use gyronet_host_tests::board::{At, Board};
+use gyronet_host_tests::inputs;
 use gyronet_host_tests::stored::{Stored, other_weights};
 use gyronet_tools::client::device::error::DeviceError;
 use std::time::Duration;
@@ -151,8 +152,7 @@ fn nothing_is_written_with_an_unlocked_flash_controller() {
     let stores = on_bus(board).set_configuration(&Configuration::DEFAULT);
     assert_eq!(refused(stores), Refusal::Store(StoreError::NoFlash));
     // The wheels turn.
-    let turning = DataFrame::new(StandardId::new(0xAA).expect("11 bits"), &[0x22, 0x3F].repeat(4));
-    let turning = turning.expect("eight bytes");
+    let turning = inputs::wheels(20.0);
     let now = board.counts().time;
     for (k, sample) in common::drive(100).iter().enumerate() {
         board.send_at(IMU, sample, now + SAMPLE * k as u32);

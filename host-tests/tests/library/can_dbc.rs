@@ -123,6 +123,28 @@ fn signals_lie_apart_and_their_ranges_are_what_their_bits_hold() {
 }
 
 #[test]
+fn a_fibre_optic_gyros_messages_have_the_layout_of_the_inertial_sensors() {
+    let layout = |id: u16| {
+        let signals = &message(Id::Standard(StandardId::new(id).expect("11 bits"))).signals;
+        let of = |signal: &Signal| {
+            let name = signal.name.replace("Fog", "");
+            (
+                name,
+                signal.start_bit,
+                signal.size,
+                signal.value_type,
+                signal.factor,
+                signal.offset,
+                signal.unit.clone(),
+            )
+        };
+        signals.iter().map(of).collect::<Vec<_>>()
+    };
+    let own = ALL.yaw.expect("sent by default").ids;
+    assert_eq!(FOG_IDS.map(layout), own.map(layout));
+}
+
+#[test]
 fn value_tables_are_our_enumerations() {
     let table = |id: u16, name: &str| -> Vec<(i64, String)> {
         let table = DBC.value_descriptions_for_signal(MessageId::Standard(id), name).expect("a table");
@@ -202,6 +224,7 @@ fn the_slow_status_means_what_the_file_says() {
         assert_eq!(decoded["YawGaps"].0, gaps);
         // What nothing finds yet is not available.
         assert_eq!((decoded["SecondSourceDoubt"].0, decoded["YawDoubt"].0), (7, 0xFFFF));
+        close(decoded["YawDoubt"].1, 655.35, 1e-9);
     };
     for (gaps, code) in [(None, 255), (Some(0), 0), (Some(253), 253), (Some(254), 254), (Some(u32::MAX), 254)]
     {

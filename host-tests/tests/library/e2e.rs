@@ -179,6 +179,18 @@ fn a_foreign_identifier_is_noticed() {
     assert_eq!(p01(DataIdMode::Nibble).check(&data), Err(Fault::DataId { received: 4 }));
 }
 
+#[test]
+fn a_flipped_bit_gives_no_message_with_the_counter_that_was_sent() {
+    for profile in all() {
+        let mut sent = [0x5A; 8];
+        profile.protect(&mut sent, 9).expect("eight bytes");
+        for bit in 0..64 {
+            let damaged = (u64::from_le_bytes(sent) ^ 1 << bit).to_le_bytes();
+            assert_ne!(profile.check(&damaged), Ok(9), "{profile:?}, bit {bit}");
+        }
+    }
+}
+
 /// `count` messages in order.
 fn messages(profile: Profile, count: usize) -> Vec<[u8; 8]> {
     let mut protector = Protector::new(profile);

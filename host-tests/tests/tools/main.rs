@@ -26,5 +26,4 @@ mod still_stretches;
 mod tables_methods;
 mod trajectory_evo;
 mod turns;
-mod unit_transfer;
 mod warm_up;
