@@ -29,8 +29,8 @@ fn the_page_needs_nothing_else_and_says_what_the_json_says() {
     }
     assert!(!page.contains("Simulated drive."), "it is a file like any other");
     assert_eq!(page.matches("<svg").count(), 3);
-    // Six methods and the reference, six errors, three paths and the reference.
-    assert_eq!(page.matches("<polyline").count(), 17);
+    // Five methods and the reference, five errors, three paths and the reference.
+    assert_eq!(page.matches("<polyline").count(), 15);
     let ours = &json["methods"]["default"];
     for (figure, decimals) in [("mean_1s_rad", 6), ("final_rad", 6)] {
         let figure = ours[figure].as_f64().unwrap();
