@@ -1,4 +1,4 @@
-//! This module assigns each sample to a step of the common 100 Hz grid by its time stamp.
+//! Assigns each sample to a step of the common 100 Hz grid by its time stamp.
 //!
 //! The first sample sets the grid. A later sample belongs to the step nearest to its time stamp, and must lie within
 //! [`TOLERANCE_US`] of that step. The grid then follows the sample, so a clock that is some percent slow or fast

@@ -1,4 +1,4 @@
-//! These modules estimate the gyro's reading at rest, and the uncertainty of that estimate.
+//! Estimators of the gyro's reading at rest, and the uncertainty of that estimate.
 //!
 //! `static_init` takes the mean of the first three seconds. `zero_rate` continues whenever the vehicle stands: it
 //! estimates the rate that remains after the network, so that the loop is closed around gyro and network together.

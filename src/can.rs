@@ -1,4 +1,4 @@
-//! These modules encode, decode, queue and transport the messages on the vehicle's bus.
+//! Encoding, decoding, queueing and transport of the messages on the vehicle's bus.
 
 pub mod bosch;
 mod carry;

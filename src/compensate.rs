@@ -1,4 +1,4 @@
-//! This module computes corrected rates from the network's estimates.
+//! Computes corrected rates from the network's estimates.
 //!
 //! A sample's best estimate is the mean of the estimates of all windows that cover it ([`Mode`]). It is complete only
 //! some samples later, so two rates are sent for every sample:

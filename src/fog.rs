@@ -1,4 +1,4 @@
-//! This module corrects the turns of a fibre-optic gyro, frame by frame: it subtracts the Earth's rate and the gyro's
+//! Corrects the turns of a fibre-optic gyro, frame by frame: it subtracts the Earth's rate and the gyro's
 //! bias (`lane`), and, if the configuration selects FoGNet, its estimate of the remaining error.
 //!
 //! # FoGNet

@@ -99,6 +99,7 @@
 //!
 #![doc = include_str!("GLOSSARY.md")]
 #![cfg_attr(not(test), no_std)]
+#![warn(missing_docs)]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub mod can;

@@ -1,4 +1,4 @@
-//! These modules hold the networks of the paper: their topology and weight files, on top of the arithmetic of
+//! The networks of the paper: their topology and weight files, on top of the arithmetic of
 //! [`crate::nn`].
 
 #[doc(hidden)]

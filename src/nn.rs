@@ -1,4 +1,4 @@
-//! These modules compute recurrent networks in integers, so that every machine gets the same bits, and in f32 as the
+//! Recurrent networks in integers, so that every machine gets the same bits, and in f32 as the
 //! reference.
 //!
 //! Weights are immutable slices, separate from the state, which the caller owns: one set of weights can drive many

@@ -1,4 +1,4 @@
-//! These modules decode the bytes of a sensor into samples.
+//! Decoders of the bytes of a sensor into samples.
 //!
 //! The pipeline sees only the samples of a part: [`ImuSample`] or [`FogSample`], in fixed point, with the part's own
 //! time unwrapped. [`Source`] is the common interface of all parts, so that firmware can be generic over the part.

@@ -1,4 +1,4 @@
-//! This module computes with vectors of f32.
+//! Computes with vectors of f32.
 
 /// Returns the dot product.
 pub(crate) fn dot<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {

@@ -34,7 +34,6 @@ pub fn firmware(board: &str, test: &str, scratch: &str, name: &str) -> Option<Pa
 /// A place in memory.
 #[derive(Debug, Clone, Copy)]
 pub enum At<'a> {
-    /// An address.
     Address(u32),
     /// A symbol of the image: its full name, or a part that fits only one, such as `app::idle`.
     Symbol(&'a str),
@@ -116,7 +115,6 @@ impl Board {
         self.ask("usart_send", json!({ "usart": usart, "hex": hex(bytes) }));
     }
 
-    /// Sends bytes to the board, not before a time.
     pub fn send_at(&mut self, usart: usize, bytes: &[u8], time: Duration) {
         self.ask("usart_send", json!({ "usart": usart, "hex": hex(bytes), "at_us": micros(time) }));
     }
@@ -135,12 +133,10 @@ impl Board {
             .collect()
     }
 
-    /// Returns the CAN bus, for a tester.
     pub fn bus(&mut self) -> CanBus<'_> {
         CanBus(self)
     }
 
-    /// Returns a line of the board, for code that reads and writes.
     pub fn line(&mut self, usart: usize) -> Line<'_> {
         Line::new(self, usart)
     }

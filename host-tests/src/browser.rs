@@ -1,4 +1,4 @@
-//! This module drives a headless Chromium through its debugging pipe, so that a test sees what a page does in a real
+//! Drives a headless Chromium through its debugging pipe, so that a test sees what a page does in a real
 //! browser.
 
 use crate::require::{Need, wants};
@@ -90,7 +90,6 @@ impl Browser {
         (complaints.collect(), requests.filter_map(address).collect())
     }
 
-    /// Returns the value of an expression on the page.
     pub fn evaluate(&mut self, expression: &str) -> Value {
         let answer =
             self.call("Runtime.evaluate", json!({ "expression": expression, "returnByValue": true }));

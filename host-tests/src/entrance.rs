@@ -1,4 +1,4 @@
-//! This module lists every entry point for bytes from outside, as a function that accepts any bytes and panics if the
+//! Lists every entry point for bytes from outside, as a function that accepts any bytes and panics if the
 //! result breaks a guarantee.
 //!
 //! The fuzz targets of `host-tests/fuzz` run these under coverage; `tests/library/entrances.rs` runs them
@@ -17,7 +17,6 @@ mod weights;
 
 pub type Seed = (&'static str, Vec<u8>);
 
-/// Describes one entrance.
 #[derive(Debug, Clone, Copy)]
 pub struct Entrance {
     /// The name of its fuzz target and of its folder in the corpus.
@@ -30,7 +29,6 @@ pub struct Entrance {
     pub mutations: u64,
 }
 
-/// All entrances.
 pub const ALL: [Entrance; 17] = [
     Entrance { name: "xsens", run: sensors::xsens, seeds: sensors::xsens_seeds, mutations: 20_000 },
     Entrance { name: "dsp1760", run: sensors::dsp1760, seeds: sensors::dsp1760_seeds, mutations: 20_000 },
@@ -56,7 +54,6 @@ pub const ALL: [Entrance; 17] = [
     Entrance { name: "trajectory", run: trajectory::tum, seeds: trajectory::seeds, mutations: 20_000 },
 ];
 
-/// Runs an entrance by its name.
 pub fn run(name: &str, data: &[u8]) {
     let entrance = ALL.iter().find(|entrance| entrance.name == name).expect("an entrance of that name");
     (entrance.run)(data);

@@ -98,7 +98,6 @@ pub fn scenes(drives: &[Drive], threads: usize) -> Vec<Scene<'_>> {
     on_threads(threads, of.len(), |networks, n| Scene::new(of[n].0, of[n].1, networks))
 }
 
-/// Runs the plan and returns the runs in order.
 pub fn run(plan: Plan, scenes: &[Scene<'_>]) -> Vec<Run> {
     on_threads(plan.threads, plan.runs, |networks, number| one(plan.seed, number, scenes, networks))
 }

@@ -1,4 +1,4 @@
-//! This module is a mock of the STM32F405's flash: its sectors, its rules, and a power cut at any operation.
+//! A mock of the STM32F405's flash: its sectors, its rules, and a power cut at any operation.
 //!
 //! The rules (RM0090 3.5, 3.6): a sector is erased as a whole, and the sectors are of unequal sizes; a word that has
 //! been programmed is not programmed again until its sector has been erased, and programming only clears bits. Breaking

@@ -1,4 +1,4 @@
-//! This module builds the firmware images as `cargo fw` does, so that the tests run the same code as a board.
+//! Builds the firmware images as `cargo fw` does, so that the tests run the same code as a board.
 
 use crate::recordings::workspace;
 use crate::require::{self, Need};

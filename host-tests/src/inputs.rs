@@ -20,7 +20,6 @@ const STANDING_SAMPLES: usize = 600;
 /// Holds the inputs of 10 ms, in order.
 #[derive(Debug, Clone)]
 pub struct Step {
-    /// The frame of all four wheels, in the steps that have one.
     pub wheels: Option<DataFrame>,
     /// The message of the MTi.
     pub imu: MtData2,

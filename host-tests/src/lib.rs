@@ -1,6 +1,5 @@
 //! This crate holds the parts that the host tests share: how a test gets QEMU or the recordings or reports that it is
 //! skipped, the virtual board and its image, and every generator of bytes, samples, streams and weights.
-#![allow(missing_docs, reason = "nobody imports this crate")]
 
 pub mod board;
 pub mod browser;

@@ -1,4 +1,4 @@
-//! This module creates window models of any shape with random weights, and windows for them, with the code of the
+//! Creates window models of any shape with random weights, and windows for them, with the code of the
 //! firmware's images.
 
 #[path = "../../src/bin/support/numbers.rs"]

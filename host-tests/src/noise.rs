@@ -1,4 +1,4 @@
-//! This module generates seeded random numbers for long streams, the same on every machine and in every run, and the
+//! Generates seeded random numbers for long streams, the same on every machine and in every run, and the
 //! settings of the property tests, whose seeds change from run to run.
 
 use proptest::test_runner::Config;

@@ -1,4 +1,4 @@
-//! This module creates LSTM weights row by row and packs them as documented in `gyronet::nn::lstm`. It was written
+//! Creates LSTM weights row by row and packs them as documented in `gyronet::nn::lstm`. It was written
 //! from that documentation, not from the quantiser, so that it can check both.
 
 use crate::noise::Noise;

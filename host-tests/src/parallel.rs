@@ -1,4 +1,4 @@
-//! This module processes recordings side by side, because each of them keeps a core busy for seconds.
+//! Processes recordings side by side, because each of them keeps a core busy for seconds.
 
 /// Prints a table of the lines that `judge` returns for each item, with the failures that it reports.
 pub fn table<T: Sync>(heading: &str, items: &[T], judge: impl Fn(&T) -> (String, Vec<String>) + Sync) {

@@ -1,4 +1,4 @@
-//! This module simulates a flash in RAM. It is fast enough for fuzzing and does not check the rules of a real flash.
+//! Simulates a flash in RAM. It is fast enough for fuzzing and does not check the rules of a real flash.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use gyronet::service::MappedSlots;

@@ -1,4 +1,4 @@
-//! This module finds the recordings of real drives; a test without them is skipped. They are not part of the
+//! Finds the recordings of real drives; a test without them is skipped. They are not part of the
 //! repository, because their licence does not allow it.
 
 use crate::require::{self, Need};
@@ -34,7 +34,6 @@ pub fn trials(test: &str, numbers: &[u32]) -> Option<Vec<PathBuf>> {
     numbers.iter().map(|number| trial(test, *number)).collect()
 }
 
-/// Holds one row of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
     /// The time, s.

@@ -1,4 +1,4 @@
-//! This module is the image's output task on the host: bytes of an Xsens MTi and a DSP-1760 and wheel frames go in,
+//! The image's output task on the host: bytes of an Xsens MTi and a DSP-1760 and wheel frames go in,
 //! SLCAN lines come out. Like the image, it does the input and output around the library's [`Coprocessor`].
 
 use crate::recordings::Row;
@@ -119,7 +119,6 @@ impl Board {
         Self::new().follow_lines(lines)
     }
 
-    /// Follows another board that has sent these lines, as [`Board::following`].
     pub fn follow_lines(self, lines: Vec<Vec<u8>>) -> Self {
         Self { board_lines: lines, ..self }
     }
@@ -167,7 +166,6 @@ impl Board {
         }
     }
 
-    /// Receives a wheel frame.
     pub fn wheel(&mut self, frame: &DataFrame) {
         // A wrong frame shows as silent wheels.
         let _ = self.coprocessor.can(frame, self.now);

@@ -1,4 +1,4 @@
-//! This module handles the requirements of a test beyond Rust: the test gets them, or is reported as skipped, or fails.
+//! Handles the requirements of a test beyond Rust: the test gets them, or is reported as skipped, or fails.
 //!
 //! `GYRONET_REQUIRE=qemu,data` makes tests that need these fail where they are missing; without it they print
 //! `SKIPPED name: why` and pass. The line goes straight to the process's standard error, which the test harness does
@@ -32,10 +32,6 @@ impl Need {
 pub struct Required(Vec<Need>);
 
 impl Required {
-    /// Reads the list.
-    ///
-    /// # Errors
-    /// The word that is not a [`Need`]: otherwise a misspelt one would require nothing.
     pub fn parse(list: &str) -> Result<Self, String> {
         let words = list.split(',').map(str::trim).filter(|word| !word.is_empty());
         let need = |word: &str| {

@@ -1,4 +1,4 @@
-//! This module simulates sequences, and does dead reckoning of them with turns from any source.
+//! Simulates sequences, and does dead reckoning of them with turns from any source.
 
 use gyronet::odometry::Track;
 use gyronet_paper::sequence::Sequence;

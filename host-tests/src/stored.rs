@@ -9,10 +9,6 @@ use gyronet::store::{Accepted, Record, Slot, Store, StoreError, Upload};
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// Opens the records of a flash.
-///
-/// # Errors
-/// [`StoreError`].
 pub fn open(flash: &Rc<RefCell<F405>>) -> Result<Store<Region<RECORD_SECTOR>>, StoreError> {
     Store::open(Region::new(flash, layout::STORE), 0)
 }
@@ -24,9 +20,6 @@ pub fn slots(flash: &F405) -> [&[u8]; 2] {
 }
 
 /// Uploads a file to a slot, checks it and accepts it, as the board does.
-///
-/// # Errors
-/// The error of the slot or the store.
 pub fn upload(flash: &Rc<RefCell<F405>>, slot: Slot, file: &[u8]) -> Result<(), String> {
     let text = |error: &dyn std::error::Error| error.to_string();
     let mut region = Region::<RECORD_SECTOR>::new(flash, 0..1 << 20);
@@ -58,7 +51,6 @@ pub fn other_weights(bits: u8) -> Vec<u8> {
 pub struct Stored(Rc<RefCell<F405>>);
 
 impl Stored {
-    /// Stores a record.
     pub fn record<R: Record>(self, record: &R) -> Self {
         open(&self.0).and_then(|mut store| store.set(record)).expect("it is stored");
         self

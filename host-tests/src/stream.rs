@@ -1,4 +1,4 @@
-//! This module runs samples through a pipeline with a network of the test's own.
+//! Runs samples through a pipeline with a network of the test's own.
 
 use crate::synthetic::{rate, turning};
 use gyronet::health::{Faults, Status};

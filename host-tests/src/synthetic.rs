@@ -1,4 +1,4 @@
-//! This module creates samples of a vehicle that stands, turns or shakes, in the pipeline's fixed-point units.
+//! Creates samples of a vehicle that stands, turns or shakes, in the pipeline's fixed-point units.
 
 use crate::noise::Noise;
 use gyronet::estimate::{VehicleSample, YawEstimate};
@@ -42,7 +42,6 @@ pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {
     sample
 }
 
-/// Returns an estimate of good quality with this rate and yaw.
 pub fn estimate(rate: AngularRate, yaw: Yaw) -> YawEstimate {
     YawEstimate { rate, yaw, source: Source::GyroNet, quality: Quality::Good, ..YawEstimate::default() }
 }

@@ -1,4 +1,4 @@
-//! This module is a diagnostic tester written from ISO 15765-2, apart from the library's own transport.
+//! A diagnostic tester written from ISO 15765-2, apart from the library's own transport.
 
 use std::collections::VecDeque;
 
@@ -16,7 +16,6 @@ pub fn segment(message: &[u8]) -> Vec<[u8; 8]> {
     std::iter::once(frame(&[0x10 | high, low], first)).chain(consecutive).collect()
 }
 
-/// Returns a frame of `head` and `bytes`, padded.
 pub fn frame(head: &[u8], bytes: &[u8]) -> [u8; 8] {
     let mut frame = [PADDING; 8];
     frame.iter_mut().zip(head.iter().chain(bytes)).for_each(|(place, byte)| *place = *byte);

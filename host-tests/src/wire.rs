@@ -1,4 +1,4 @@
-//! This module creates bytes of an Xsens MTi, and collects the samples that a part's driver delivers for bytes.
+//! Creates bytes of an Xsens MTi, and collects the samples that a part's driver delivers for bytes.
 
 use gyronet::sample::ImuSample;
 use gyronet::sensor::ByteSource;

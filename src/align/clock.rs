@@ -1,4 +1,4 @@
-//! This module translates the time stamps of a part's clock to the board's clock.
+//! Translates the time stamps of a part's clock to the board's clock.
 //!
 //! A time stamp is the time of a reading by a clock that started at another time and runs at another speed than the
 //! board's. The arrival is timed by the board's clock, but with a varying delay. The arrival with the least delay is

@@ -1,4 +1,4 @@
-//! This module measures how fast an inertial sensor's clock runs against the board's.
+//! Measures how fast an inertial sensor's clock runs against the board's.
 //!
 //! A sensor paces its samples by its own oscillator: that of an ICM-42688-P is up to 1.5 % off at 25 deg C and 2 %
 //! more over temperature (DS-000347, table 4). Its rate is correct in rad/s of true time, and so is the rate that is

@@ -1,4 +1,4 @@
-//! This module puts the increments of a fibre-optic gyro on a grid of the board's clock.
+//! Puts the increments of a fibre-optic gyro on a grid of the board's clock.
 //!
 //! Grid steps are the multiples of 10 ms of the board's clock. A step is emitted as soon as the increments have passed
 //! it, and at the latest [`MAX_DELAY_US`] after its time, with the increments that have arrived by then. Later ones are

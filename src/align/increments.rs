@@ -1,4 +1,4 @@
-//! This module sums the increments of a fibre-optic gyro from one grid step to the next.
+//! Sums the increments of a fibre-optic gyro from one grid step to the next.
 //!
 //! The rules:
 //! - An increment belongs to the time since the one before it. One that straddles a grid step is split there in

@@ -1,4 +1,4 @@
-//! This module detects standstill by the inertial sensors where no wheel speeds are available, within tighter limits
+//! Detects standstill by the inertial sensors where no wheel speeds are available, within tighter limits
 //! than at the start.
 //!
 //! A steady turn looks like a bias, so an estimator that trusts a quiet gyro takes slow turns for bias and drifts

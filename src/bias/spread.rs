@@ -1,4 +1,4 @@
-//! This module computes mean and spread of a run of readings in one pass, so that no reading is kept.
+//! Computes mean and spread of a run of readings in one pass, so that no reading is kept.
 
 use crate::sqrt::sqrt;
 

@@ -1,4 +1,4 @@
-//! This module converts rates to a coarser scale and adds each message's rounding residual to the next value.
+//! Converts rates to a coarser scale and adds each message's rounding residual to the next value.
 //!
 //! If each message were rounded on its own, a constant rate would give the same rounding error every time, and the
 //! errors would add up. With the residual carried, the sum of the rates sent differs from the sum of the

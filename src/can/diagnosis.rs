@@ -1,4 +1,4 @@
-//! This module defines the CAN identifiers of diagnosis (ISO 15765-2, normal addressing).
+//! Defines the CAN identifiers of diagnosis (ISO 15765-2, normal addressing).
 
 use embedded_can::{ExtendedId, Id, StandardId};
 

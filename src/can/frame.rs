@@ -1,4 +1,4 @@
-//! This module defines a classic CAN data frame for code that does not depend on a driver's frame type.
+//! Defines a classic CAN data frame for code that does not depend on a driver's frame type.
 
 use embedded_can::{Frame, Id};
 

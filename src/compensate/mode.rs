@@ -1,4 +1,4 @@
-//! This module defines which outputs of a window are used, the samples between windows, and the lag of the rate.
+//! Defines which outputs of a window are used, the samples between windows, and the lag of the rate.
 
 use crate::model::window::WINDOW;
 use core::ops::Range;

@@ -1,4 +1,4 @@
-//! This module holds the errors of fibre-optic gyros, from their data sheets.
+//! Holds the errors of fibre-optic gyros, from their data sheets.
 
 /// The errors of a part, without the Earth's rate, 1 sigma.
 #[derive(Debug, Clone, Copy, PartialEq)]

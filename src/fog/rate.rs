@@ -1,4 +1,4 @@
-//! This module converts increments to rates without an error in the sum.
+//! Converts increments to rates without an error in the sum.
 
 use crate::sample::RATE_HZ;
 use crate::units::{Angle, AngularRate};

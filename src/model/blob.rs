@@ -1,4 +1,4 @@
-//! This module checks GyroNet's weight file before use and reads it in place, without a copy.
+//! Checks GyroNet's weight file before use and reads it in place, without a copy.
 //!
 //! A file holds a linear part, two layers of Bi-LSTMs, or both ([`Shape`]). It begins with the header of
 //! `model::file`, followed by:

@@ -1,4 +1,4 @@
-//! This module runs FoGNet in integers: from the last minute it computes the error of the gyro's turn in that minute.
+//! Runs FoGNet in integers: from the last minute it computes the error of the gyro's turn in that minute.
 //!
 //! ```text
 //! 60 x 9 -> LSTM1, 2 x 90 both ways -> FC1 -> f1 (60)

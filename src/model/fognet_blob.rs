@@ -1,4 +1,4 @@
-//! This module checks FoGNet's weight file before use and reads it in place, without a copy.
+//! Checks FoGNet's weight file before use and reads it in place, without a copy.
 //!
 //! The file begins with the header of `model::file`, followed by:
 //!

@@ -1,4 +1,4 @@
-//! This module computes FoGNet in f32 from PyTorch's tensors; it defines what the integer network approximates.
+//! Computes FoGNet in f32 from PyTorch's tensors; it defines what the integer network approximates.
 
 use super::fognet::{FogEstimate, GAIN_FRACTION_BITS, MinuteNetwork};
 use super::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};

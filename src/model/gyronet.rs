@@ -1,4 +1,4 @@
-//! This module runs GyroNet in integers: from ten samples it estimates the yaw gyro's error at each of them, and the
+//! Runs GyroNet in integers: from ten samples it estimates the yaw gyro's error at each of them, and the
 //! uncertainty of these estimates.
 //!
 //! The error is the sum of a linear part, computed from the features' codes without rounding them, and of the output

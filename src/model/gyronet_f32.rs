@@ -1,4 +1,4 @@
-//! This module computes GyroNet in f32 from the tensors of training; it defines what the integer network approximates.
+//! Computes GyroNet in f32 from the tensors of training; it defines what the integer network approximates.
 
 use super::blob::{HIDDEN, LINEAR_INPUTS};
 use super::{Estimate, SCALE_MAX, SCALE_MIN, SteadyGain, WindowNetwork};

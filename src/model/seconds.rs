@@ -1,4 +1,4 @@
-//! This module builds FoGNet's input: the last minute in steps of a second.
+//! Builds FoGNet's input: the last minute in steps of a second.
 //!
 //! Over a second, increments (gyro, wheels) are summed and the inertial sensor is averaged, in integers, so that no bit
 //! of the gyro's angle is lost. A gap in the gyro ends the window, because the angle turned in it would be missing from

@@ -1,4 +1,4 @@
-//! This module runs a bidirectional LSTM layer over a whole sequence in resumable pieces.
+//! Runs a bidirectional LSTM layer over a whole sequence in resumable pieces.
 //!
 //! Steps run in pairs: one input projection serves two of them. The backward direction runs the pairs, and the steps
 //! inside a pair, in reverse. Both start from a zero state, so the first step has no recurrent product.

@@ -1,4 +1,4 @@
-//! This module computes powers of two in integers: a cubic over one octave, then a shift. Every input takes the same
+//! Computes powers of two in integers: a cubic over one octave, then a shift. Every input takes the same
 //! steps.
 
 /// Fraction bits of the exponent.

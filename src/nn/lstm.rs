@@ -1,4 +1,4 @@
-//! This module computes one LSTM direction in integers: the input projection of pairs of steps, and one recurrent step.
+//! Computes one LSTM direction in integers: the input projection of pairs of steps, and one recurrent step.
 //!
 //! The portable code here is the definition of the result (formats and packing: [`crate::nn`]). Where the processor
 //! has a faster kernel (`nn/simd/`), [`project`] and [`step`] use it; the bits are the same.

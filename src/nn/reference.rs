@@ -1,4 +1,4 @@
-//! This module computes the layers in plain f32, the reference for the integer code; it is never optimised.
+//! Computes the layers in plain f32, the reference for the integer code; it is never optimised.
 //!
 //! It follows equations 7 to 12 of Zhao et al., with the weights as PyTorch lays them out: the rows of `weight_ih` (4H,
 //! I) and `weight_hh` (4H, H) are the gates i, f, g, o in that order, H rows each, and there are two bias vectors (4H).

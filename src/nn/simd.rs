@@ -1,4 +1,4 @@
-//! This module selects the kernel for the processor; all kernels give the same bits as the portable one.
+//! Selects the kernel for the processor; all kernels give the same bits as the portable one.
 
 #[cfg(gyronet_dsp)]
 mod cortex_m;

@@ -1,4 +1,4 @@
-//! This module subtracts from each reading the bias that earlier drives have shown at the sensor's temperature,
+//! Subtracts from each reading the bias that earlier drives have shown at the sensor's temperature,
 //! before any other stage. So the rate can be used before the vehicle has stood.
 
 use super::PipelineConfig;

@@ -1,4 +1,4 @@
-//! This module tracks GyroNet's windows: the samples of the next one, the one handed out, and whether the newest
+//! Tracks GyroNet's windows: the samples of the next one, the one handed out, and whether the newest
 //! estimate is in use.
 
 use crate::health::Faults;

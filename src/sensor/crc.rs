@@ -1,4 +1,4 @@
-//! This module holds the checksums that several sensors share.
+//! Holds the checksums that several sensors share.
 
 /// CRC-32/MPEG-2, as the KVH gyros send it: polynomial 04C11DB7, start FFFFFFFF, no reflection, no final
 /// inversion. It differs from the CRC-32 of zip and Ethernet. Over a whole frame, its CRC included, the result is 0.

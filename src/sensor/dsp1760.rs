@@ -1,4 +1,4 @@
-//! This module reads the KVH DSP-1760 fibre-optic gyro (and the 1725, 1750, 1775 units, which use the same
+//! Reads the KVH DSP-1760 fibre-optic gyro (and the 1725, 1750, 1775 units, which use the same
 //! messages): RS-422, 921600 baud 8N1 at 1000 messages a second.
 //!
 //! A message does not say whether rotations are increments or rates, radians or degrees: [`Dsp1760Config`] does.

@@ -1,4 +1,4 @@
-//! These modules read the two variants of the KVH DSP-3000, a single-axis fibre-optic gyro.
+//! Parsers of the two variants of the KVH DSP-3000, a single-axis fibre-optic gyro.
 //!
 //! One variant ([`ascii`]) sends 100 lines a second at 38400 baud 8N1, `[-]ddd.dddddd y`; the other
 //! ([`binary`]) sends 1000 words of four bytes a second at 115200 baud 8N1.

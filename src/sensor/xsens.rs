@@ -1,4 +1,4 @@
-//! This module reads the Xsens MTi: MTData2 messages in Xbus frames (MT Low-Level Communication Protocol, MT0605P).
+//! Reads the Xsens MTi: MTData2 messages in Xbus frames (MT Low-Level Communication Protocol, MT0605P).
 //!
 //! `xbus` finds the frames, [`MtData2`] holds the measurements of a frame, and `precision` decodes the four number
 //! formats.

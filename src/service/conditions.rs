@@ -1,4 +1,4 @@
-//! This module defines the fault conditions that the trouble memory observes.
+//! Defines the fault conditions that the trouble memory observes.
 
 use crate::health::{Faults, Status};
 

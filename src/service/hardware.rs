@@ -1,4 +1,4 @@
-//! This module defines the faults that the board detects in its own hardware at the start.
+//! Defines the faults that the board detects in its own hardware at the start.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! This module formats the board's reports as text, for the host tools; the image does not use it.
+//! Formats the board's reports as text, for the host tools; the image does not use it.
 
 use super::calibrate::CalibrationFault;
 use super::event::{EventKind, ResetCause, SensorFault};

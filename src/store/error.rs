@@ -1,4 +1,4 @@
-//! This module defines the errors of the store, in terms that a user can act on.
+//! Defines the errors of the store, in terms that a user can act on.
 
 use super::calibration::MAX_TILT_DEG;
 use crate::can::config::ConfigError;

@@ -1,4 +1,4 @@
-//! This module runs the routines (service 0x31): calibrations, the log, a self-test, and the activation of a
+//! Runs the routines (service 0x31): calibrations, the log, a self-test, and the activation of a
 //! download.
 
 use super::download::Download;

@@ -1,4 +1,4 @@
-//! This module controls access: challenge and response (service 0x27), and signatures of written data.
+//! Controls access: challenge and response (service 0x27), and signatures of written data.
 //!
 //! Without a key everyone may write. With a key, written data must be signed. A tester that proves once per session
 //! that it has the private key may also restart, silence and calibrate the board, and clear its troubles. The number

@@ -1,4 +1,4 @@
-//! This module dispatches the services (ISO 14229-1) and holds the state between requests.
+//! Dispatches the services (ISO 14229-1) and holds the state between requests.
 //!
 //! Services translate UDS requests to requests of the device, so that the same rules apply on all lines. A request
 //! that writes data or silences the output needs a non-default session, and a vehicle that is proven to stand.

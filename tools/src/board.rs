@@ -72,7 +72,6 @@ pub struct Board<N> {
 impl<N: WindowNetwork> Board<N> {
     /// Creates a board before its first row. `wheels` replaces the vehicle's bus; the estimate of each window is
     /// delivered without delay.
-    #[must_use]
     pub fn new(config: Config, wheels: Option<WheelFrames>, network: N) -> Self {
         let receiver = wheels.as_ref().map(|_| wheel_frames::receiver());
         let coprocessor = Coprocessor::new(Config { wheels: receiver, clock: Clock::Sensor, ..config });
@@ -83,16 +82,12 @@ impl<N: WindowNetwork> Board<N> {
     }
 
     /// The coprocessor, to read its state.
-    #[must_use]
     pub fn coprocessor(&self) -> &Coprocessor {
         &self.coprocessor
     }
 
     /// Processes a row, and gives out the step of the row [`HOLD`] steps before it. A row whose time stamp does not
     /// fit the grid gives no step and is counted.
-    ///
-    /// # Errors
-    /// The vehicle moves during static initialisation.
     pub fn row(&mut self, row: &Row) -> Result<Option<Step>, StaticError> {
         let (index, time) = (self.rows, row.sample.time);
         self.rows += 1;
@@ -160,7 +155,6 @@ impl<N: WindowNetwork> Board<N> {
         }
     }
 
-    /// The held step of a sample.
     fn held(&mut self, tick: u32) -> Option<&mut Step> {
         self.held.iter_mut().rev().find(|step| step.vehicle.prompt.tick == tick)
     }

@@ -8,13 +8,8 @@ use crate::simulate::{Config, csv};
 /// The drive that `gyronet simulate --seconds 90 --seed 1` writes.
 pub const SIMULATED_DRIVE: &str = include_str!("../data/simulated_drive.csv");
 
-/// The checkpoint from which [`gyronet::model::weights::GYRONET`] was quantised.
 const CHECKPOINT: &[u8] = include_bytes!("../weights/gyronet.safetensors");
 
-/// Returns the simulated drive.
-///
-/// # Errors
-/// Never, unless the built-in file is corrupt.
 pub fn simulated_drive() -> Result<Recording, DataError> {
     Recording::parse("simulated_drive.csv", SIMULATED_DRIVE.as_bytes())
 }
@@ -23,9 +18,6 @@ pub fn simulated_drive() -> Result<Recording, DataError> {
 pub const DEMO_SECONDS: u32 = 600;
 
 /// Returns the drive of `gyronet demo`: ten minutes of the same vehicle (`gyronet simulate --seconds 600 --seed 1`).
-///
-/// # Errors
-/// [`DataError`] never, unless the simulation writes what cannot be read.
 pub fn demo_drive() -> Result<Recording, DataError> {
     let config = Config { seconds: DEMO_SECONDS, seed: 1, ..Config::DEFAULT };
     let mut bytes = Vec::new();
@@ -34,9 +26,6 @@ pub fn demo_drive() -> Result<Recording, DataError> {
 }
 
 /// Returns the f32 checkpoint of GyroNet.
-///
-/// # Errors
-/// Never, unless the built-in file is corrupt.
 pub fn checkpoint() -> Result<Checkpoint<GyroNet>, CheckpointError> {
     Checkpoint::parse("gyronet.safetensors", CHECKPOINT)
 }

@@ -1,4 +1,4 @@
-//! This module calibrates the gain and the mounting of one unit's gyro, from drives with a heading reference.
+//! Calibrates the gain and the mounting of one unit's gyro, from drives with a heading reference.
 //!
 //! The yaw rate that the coprocessor has corrected still contains a share of the roll rate and of the pitch rate (the
 //! sensor or the reference is not level in the vehicle) and a share of itself (gain). Over a second or more these
@@ -25,7 +25,6 @@ use unit_file::UnitFile;
 const SHORTEST_S: f64 = 30.0;
 /// Largest sigma of the share of the roll or pitch rate: 1.1 deg of mounting.
 const MAX_CROSS_SIGMA: f64 = 0.02;
-/// Largest sigma of the gain.
 const MAX_GAIN_SIGMA: f64 = 0.005;
 /// Largest robust deviation of the spans' angles from the fit, rad. No corrected gyro has an error that large in that
 /// time.
@@ -75,7 +74,6 @@ pub enum CalibrateError {
 /// A share that the fit has found, with its sigma.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Share {
-    /// The name of the share.
     pub name: &'static str,
     /// The value; 0 if the share is refused.
     pub value: f64,
@@ -98,9 +96,6 @@ pub struct Cut {
 impl Cut {
     /// Runs a drive on a board that applies no map; `tick` is called for each step. The drive is read twice: its
     /// beginning for the static bias, then as a whole.
-    ///
-    /// # Errors
-    /// [`CalibrateError`].
     pub fn new(
         drive: &Drive<'_>,
         board: Board<impl WindowNetwork>,
@@ -125,9 +120,6 @@ const SHARES: [(&str, f64, &str); 3] = [
 ];
 
 /// Fits the map of a unit to its drives.
-///
-/// # Errors
-/// [`CalibrateError`].
 pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, CalibrateError> {
     let spans: Vec<&[Span]> = drives.iter().map(|drive| drive.spans.as_slice()).collect();
     // A share that the drives hardly show makes the others uncertain, so the least certain one is removed first.

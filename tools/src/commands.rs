@@ -39,7 +39,6 @@ use std::path::Path;
 /// that names the file.
 pub type Result = std::result::Result<(), Box<dyn Error>>;
 
-/// Writes a value as pretty-printed JSON and a newline.
 fn print_json(out: &mut impl std::io::Write, value: &impl serde::Serialize) -> Result {
     serde_json::to_writer_pretty(&mut *out, value).map_err(std::io::Error::from)?;
     Ok(writeln!(out)?)

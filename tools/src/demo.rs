@@ -22,13 +22,11 @@ pub use trajectory::{Path, Trajectories};
 /// Holds the results of one drive.
 #[derive(Debug)]
 pub struct Demo<'a> {
-    /// The drive.
     pub drive: &'a Drive<'a>,
     /// Says whether the drive is simulated.
     pub simulated: bool,
     /// Its yaw rates.
     pub rates: &'a Rates,
-    /// Their errors, where the drive has a reference.
     pub errors: Option<&'a DriveErrors>,
     /// The path of the vehicle by each method, where the drive has wheels.
     pub trajectories: Option<Trajectories>,
@@ -61,7 +59,6 @@ pub struct Summary<'a> {
 
 impl<'a> Demo<'a> {
     /// Computes the results that the rates do not contain.
-    #[must_use]
     pub fn new(
         drive: &'a Drive<'a>,
         simulated: bool,
@@ -82,7 +79,6 @@ impl<'a> Demo<'a> {
     }
 
     /// Returns the results for JSON.
-    #[must_use]
     pub fn summary(&self) -> Summary<'_> {
         Summary {
             name: self.drive.name(),
@@ -100,7 +96,6 @@ impl<'a> Demo<'a> {
     }
 
     /// Returns the page as HTML.
-    #[must_use]
     pub fn page(&self) -> String {
         page::page(self)
     }

@@ -35,7 +35,6 @@ pub struct Doctor {
     pub name: String,
     /// The time from the first row to the last, s.
     pub seconds: f64,
-    /// The findings.
     pub findings: Vec<Finding>,
     /// Begin and end of each standstill, s.
     pub standstills: Vec<(f64, f64)>,
@@ -51,9 +50,6 @@ pub struct Doctor {
 
 impl Doctor {
     /// Examines a recording.
-    ///
-    /// # Errors
-    /// [`DataError`]: the file is not a drive.
     pub fn examine(path: &Path) -> Result<Self, DataError> {
         let mut doctor = Self::of(&Rows::read(path)?);
         doctor.findings.insert(0, start(path));
@@ -96,7 +92,6 @@ impl Doctor {
     }
 
     /// Returns the finding about a subject.
-    #[must_use]
     pub fn finding(&self, what: &str) -> Option<&Finding> {
         self.findings.iter().find(|finding| finding.what == what)
     }

@@ -91,7 +91,6 @@ impl Part {
     pub const ALL: [Self; 4] = [Self::Xsens, Self::Dsp1760, Self::Icm42688, Self::Adis16465];
 
     /// Returns the name in tables.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Xsens => "Xsens MTi",
@@ -101,10 +100,6 @@ impl Part {
         }
     }
 
-    /// Sends a recording through the part.
-    ///
-    /// # Errors
-    /// [`ViaError`].
     pub fn send(self, recording: &Recording) -> Result<Via, ViaError> {
         let (samples, bytes) = match self {
             Self::Xsens => xsens::send(recording)?,
@@ -155,7 +150,6 @@ impl Part {
 }
 
 /// Returns the message that an Xsens MTi would send for each row of a recording.
-#[must_use]
 pub fn mti_bytes(recording: &Recording) -> Vec<Vec<u8>> {
     xsens::messages(recording).collect()
 }

@@ -10,7 +10,6 @@ pub enum PythonError {
     /// A program cannot be started.
     #[error("{}: {source}", program.display())]
     Start {
-        /// Path of the program.
         program: PathBuf,
         /// The system's error.
         source: std::io::Error,
@@ -37,9 +36,6 @@ pub enum PythonError {
 
 /// Returns an interpreter that can import all `packages`: `given`, or else that of the virtual environment. A missing
 /// or incomplete environment is created and `requirements` are installed. pip prints to standard error.
-///
-/// # Errors
-/// [`PythonError`].
 pub fn interpreter(
     given: Option<&Path>,
     environment: &Path,

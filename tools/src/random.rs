@@ -10,8 +10,6 @@ use rand_distr::{Distribution, StandardNormal, StandardUniform};
 pub struct Random(ChaCha8Rng);
 
 impl Random {
-    /// Creates one stream of a seed.
-    #[must_use]
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(stream);

@@ -11,7 +11,6 @@ use gyronet::uds::data::{Access, IDENTIFIERS};
 use gyronet::uds::dtc::TROUBLES;
 
 /// Data identifiers of diagnosis.
-#[must_use]
 pub fn identifiers() -> Table {
     let mut table = Table::new(&["identifier", "name", "bytes", "content", "services"]);
     for of in &IDENTIFIERS {
@@ -26,7 +25,6 @@ pub fn identifiers() -> Table {
 }
 
 /// Trouble codes (DTCs).
-#[must_use]
 pub fn troubles() -> Table {
     let mut table = Table::new(&["code", "bytes", "trouble", "check"]);
     for trouble in &TROUBLES {
@@ -37,7 +35,6 @@ pub fn troubles() -> Table {
 }
 
 /// States of the yaw rate.
-#[must_use]
 pub fn states() -> Table {
     let mut table =
         Table::new(&["state", "status in data 0104", "when", "yaw rate on CAN", "until", "counter"]);

@@ -38,15 +38,11 @@ pub enum KeyError {
     Random(getrandom::Error),
 }
 
-/// A private key.
 #[derive(Clone)]
 pub struct PrivateKey(SigningKey);
 
 impl PrivateKey {
     /// Creates a key from the system's random numbers.
-    ///
-    /// # Errors
-    /// [`KeyError::Random`].
     pub fn generate() -> Result<Self, KeyError> {
         let mut secret = [0; 32];
         getrandom::fill(&mut secret).map_err(KeyError::Random)?;
@@ -54,17 +50,11 @@ impl PrivateKey {
     }
 
     /// Reads `NAME.key`.
-    ///
-    /// # Errors
-    /// [`KeyError`].
     pub fn read(path: &Path) -> Result<Self, KeyError> {
         Ok(Self(SigningKey::from_bytes(&read(path, PRIVATE)?)))
     }
 
     /// Writes `NAME.key`, which only its owner can read, and `NAME.pub`. Neither file may exist.
-    ///
-    /// # Errors
-    /// [`KeyError::File`].
     pub fn write(&self, name: &Path) -> Result<[PathBuf; 2], KeyError> {
         let paths = ["key", "pub"].map(|end| {
             let mut path = name.as_os_str().to_owned();
@@ -82,14 +72,11 @@ impl PrivateKey {
         Ok(paths)
     }
 
-    /// Returns the public key.
-    #[must_use]
     pub fn public(&self) -> [u8; 32] {
         self.0.verifying_key().to_bytes()
     }
 
     /// Returns the trailer that makes the board with this serial number, or any board, accept `content`.
-    #[must_use]
     pub fn trailer(
         &self,
         target: u16,
@@ -107,22 +94,17 @@ impl PrivateKey {
     }
 
     /// Returns the response to a board's challenge.
-    #[must_use]
     pub fn answer(&self, serial: &[u8; SERIAL], seed: &[u8; SEED]) -> [u8; SIGNATURE] {
         self.0.sign(&signature::challenge(serial, seed)).to_bytes()
     }
 }
 
 /// Reads `NAME.pub`.
-///
-/// # Errors
-/// [`KeyError`].
 pub fn read_public(path: &Path) -> Result<[u8; 32], KeyError> {
     read(path, PUBLIC)
 }
 
 /// Returns bytes as hexadecimal digits.
-#[must_use]
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut text, byte| {
         let _ = write!(text, "{byte:02X}");
@@ -131,7 +113,6 @@ pub fn hex(bytes: &[u8]) -> String {
 }
 
 /// Parses 2 `N` hexadecimal digits as `N` bytes; `None` for any other text.
-#[must_use]
 pub fn unhex<const N: usize>(text: &str) -> Option<[u8; N]> {
     let digits: Option<Vec<u8>> =
         text.trim().chars().map(|c| c.to_digit(16).map(|digit| digit as u8)).collect();

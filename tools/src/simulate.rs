@@ -1,4 +1,4 @@
-//! This module simulates a drive: a car stands, pulls away, follows bends, turns and stops, and a MEMS sensor with
+//! Simulates a drive: a car stands, pulls away, follows bends, turns and stops, and a MEMS sensor with
 //! known errors measures the motion. The true yaw rate is known exactly.
 //!
 //! [`route`] generates the route, [`car`] moves on a plane with grade, bank and suspension, [`vibration`] shakes the
@@ -35,9 +35,7 @@ pub struct Config {
     pub seconds: u32,
     /// Seed of the route, the road and the part.
     pub seed: u64,
-    /// The car.
     pub car: car::Config,
-    /// The vibration.
     pub vibration: vibration::Config,
     /// The part.
     pub mems: mems::Config,
@@ -88,7 +86,6 @@ pub struct Simulation {
 
 impl Simulation {
     /// Starts at rest.
-    #[must_use]
     pub fn new(config: &Config) -> Self {
         let (seed, warming) = (config.seed, config.warming);
         let route = match warming.map(|warming| warming.trip) {
@@ -137,7 +134,6 @@ impl Iterator for Simulation {
 }
 
 /// The sum of two vectors.
-#[must_use]
 pub fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| a[axis] + b[axis])
 }

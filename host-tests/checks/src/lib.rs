@@ -1,7 +1,6 @@
 //! The tests of monitor, CAN and sensors once more, in a crate without the tools, because `cargo mutants` builds it
 //! for every mutant. `cargo test` does not run this crate, because it runs the same tests already.
 #![cfg(test)]
-#![allow(missing_docs, reason = "nobody imports this crate")]
 
 // The tests refer to the crate that they share by this name.
 extern crate self as gyronet_host_tests;

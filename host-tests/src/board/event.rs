@@ -6,7 +6,6 @@ use std::time::Duration;
 /// An entry of the event log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
-    /// Board time.
     pub time: Duration,
     /// Kind of the event, such as `reset`, `fault`, `lockup`, `flash_erase`, `cut`.
     pub kind: String,
@@ -42,7 +41,6 @@ impl Event {
 pub struct Counts {
     /// Instructions that ran.
     pub instructions: u64,
-    /// Board time.
     pub time: Duration,
     /// Board time during which the core slept.
     pub asleep: Duration,

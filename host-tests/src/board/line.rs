@@ -10,7 +10,6 @@ const WAIT: Duration = Duration::from_millis(50);
 /// Board time that a read waits after the first byte, so that it returns more than one.
 const REST: Duration = Duration::from_millis(2);
 
-/// One line of a board.
 #[derive(Debug)]
 pub struct Line<'a> {
     board: &'a mut Board,

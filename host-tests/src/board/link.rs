@@ -31,9 +31,6 @@ impl Link {
     }
 
     /// Runs one command and returns the answer.
-    ///
-    /// # Errors
-    /// The model's error text, or the reason why there is no answer.
     pub fn ask(&mut self, command: &str, mut arguments: Value) -> Result<Value, String> {
         arguments["command"] = command.into();
         let gone = |error| format!("the model has ended: {error}");

@@ -1,4 +1,4 @@
-//! This module parses frames from the vehicle bus: wheel speeds, and our own messages as a receiver parses them.
+//! Parses frames from the vehicle bus: wheel speeds, and our own messages as a receiver parses them.
 
 use super::{Seed, byte, take};
 use embedded_can::{ExtendedId, Frame, Id, StandardId};

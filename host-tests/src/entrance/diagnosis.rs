@@ -1,4 +1,4 @@
-//! This module tests the diagnostic server: any frames, at any times, on a board with or without flash.
+//! Tests the diagnostic server: any frames, at any times, on a board with or without flash.
 
 use super::records::SECTOR;
 use super::{Seed, byte, take};

@@ -1,4 +1,4 @@
-//! This module reads recordings as CSV files, as a user passes them to the tools.
+//! Reads recordings as CSV files, as a user passes them to the tools.
 
 use super::Seed;
 use gyronet::sample::PERIOD_US;

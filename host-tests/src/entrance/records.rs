@@ -1,4 +1,4 @@
-//! This module reads records in flash: configuration, calibration, what was learnt, and the accepted weights.
+//! Reads records in flash: configuration, calibration, what was learnt, and the accepted weights.
 
 use super::{Seed, byte, take};
 use crate::ram_flash::RamFlash;

@@ -1,4 +1,4 @@
-//! This module passes bytes to the parsers of the five sensors.
+//! Passes bytes to the parsers of the five sensors.
 
 use super::Seed;
 use crate::wire::{bytes, feed, message, synthetic_frame};

@@ -1,4 +1,4 @@
-//! This module passes folders in the layouts of KAIST Urban and NCLT to the loaders.
+//! Passes folders in the layouts of KAIST Urban and NCLT to the loaders.
 
 use super::Seed;
 use gyronet_paper::sequence::{Sequence, write_csv};

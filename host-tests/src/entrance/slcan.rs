@@ -1,4 +1,4 @@
-//! This module tests SLCAN: a host's commands to the board, and the bytes that the monitor reads from a line or a log.
+//! Tests SLCAN: a host's commands to the board, and the bytes that the monitor reads from a line or a log.
 
 use super::Seed;
 use crate::synthetic::{rate, vehicle};

@@ -1,4 +1,4 @@
-//! This module reads trajectories of other programs, as a user passes them to the tables.
+//! Reads trajectories of other programs, as a user passes them to the tables.
 
 use super::Seed;
 use gyronet_paper::trajectory::Trajectory;

@@ -1,4 +1,4 @@
-//! This module passes weight files of both networks to the checks of an upload.
+//! Passes weight files of both networks to the checks of an upload.
 
 use super::{Seed, byte, take};
 use crate::models;
@@ -36,7 +36,6 @@ fn patched(mut data: &[u8], file: &[u8]) -> Option<Vec<u32>> {
     Some(words)
 }
 
-/// Shape of a small model with a linear part.
 const SMALL: Shape = Shape { units: 8, linear: true };
 static SMALL_FILE: [u8; SMALL.file_len(0)] = models::file(SMALL, 5);
 

@@ -30,7 +30,6 @@ pub struct Board {
     port: Port<QUEUE>,
     /// Row of the newest sample.
     row: usize,
-    /// What the newest sample has given.
     pub newest: Option<VehicleSample>,
 }
 

@@ -87,7 +87,6 @@ impl<'d> Scene<'d> {
     }
 }
 
-/// Wraps the messages in each of the faults that damage a line.
 fn damaged<'a>(
     messages: Vec<Message>,
     faults: &[&Fault],

@@ -13,7 +13,6 @@ use gyronet_tools::client::device::upload::upload;
 use gyronet_tools::signing::PrivateKey;
 use std::time::Duration;
 
-/// A board with a key.
 fn locked(test: &str) -> Option<(Board, PrivateKey)> {
     let mut board = common::boot(test)?;
     board.run(START);
@@ -97,7 +96,6 @@ fn challenges_never_repeat_and_fail_with_the_generator() {
     device.restart().expect("access is proven");
 }
 
-/// The check of a signature takes board time, while the rates go out.
 #[test]
 fn a_signature_is_checked_while_the_rates_go_out() {
     const TEST: &str = "a_signature_is_checked_while_the_rates_go_out";

@@ -53,7 +53,6 @@ pub fn send(board: &mut Board, samples: &[Vec<u8>], from: Duration) {
     }
 }
 
-/// The frames that the host's replay makes of samples.
 pub fn host(samples: &[Vec<u8>]) -> Vec<DataFrame> {
     let lines = replay::lines(&samples.concat());
     lines.iter().map(|line| slcan::parse(line).expect("a frame")).collect()
@@ -69,7 +68,6 @@ pub fn info(board: &mut Board) -> Info {
     service::info(board)
 }
 
-/// The board's counters.
 pub fn counters(board: &mut Board) -> AllCounters {
     service::on_line(board).counters().expect("a response")
 }

@@ -24,7 +24,6 @@ fn elf() -> PathBuf {
     folder.join(TARGET).join("release/gyronet-embassy")
 }
 
-/// The frames of these samples.
 fn host(samples: &[Vec<u8>]) -> Vec<DataFrame> {
     let mut coprocessor = Coprocessor::new(Config::DEFAULT);
     let mut network =

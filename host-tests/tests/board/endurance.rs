@@ -58,7 +58,6 @@ const STACK_SIZE: u32 = 0x8000;
 const STACK_BUDGET: usize = 12 << 10;
 const PAINT: u8 = 0xA5;
 
-/// Returns a frame to the board as a line.
 fn line(data: &[u8; 8]) -> Vec<u8> {
     let id = StandardId::new(0x7E0).expect("11 bits");
     slcan::emit(&DataFrame::new(id, data).expect("eight bytes")).expect("a data frame").to_vec()

@@ -65,7 +65,6 @@ fn keep(board: &mut Board, name: &str) {
     board.snapshot(name);
 }
 
-/// The board's answers after a cut.
 struct After {
     configuration: Configuration,
     info: Info,

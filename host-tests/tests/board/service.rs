@@ -19,7 +19,6 @@ const BLOCK_TIME: Duration = Duration::from_millis(5);
 /// Board time that a response may take: an erase of a record sector at the data sheet's maximum.
 pub const ANSWER: Duration = Duration::from_millis(700);
 
-/// A tester on the service line.
 pub fn on_line(board: &mut Board) -> Device<SlcanBus<Line<'_>>> {
     Device::new(SlcanBus::new(board.line(SERVICE)), "the virtual board")
 }
@@ -34,12 +33,10 @@ pub fn info(board: &mut Board) -> Info {
     on_line(board).info().expect("a response")
 }
 
-/// The configuration that the board was started with.
 pub fn configuration(board: &mut Board) -> Configuration {
     on_line(board).configuration().expect("a response")
 }
 
-/// The request that stores a configuration.
 pub fn storing(configuration: &Configuration) -> Vec<u8> {
     let record = postcard::to_stdvec(configuration).expect("there is room");
     [&[0x2E, 0x01, 0x00, Configuration::VERSION][..], &record].concat()
@@ -82,7 +79,6 @@ pub fn ask(board: &mut Board, request: &[u8]) -> Vec<u8> {
     answer(board, ANSWER).unwrap_or_else(|| panic!("no response to {request:02x?}"))
 }
 
-/// Enters a session.
 pub fn enter(board: &mut Board, session: u8) {
     assert_eq!(ask(board, &[0x10, session])[..2], [0x50, session]);
 }

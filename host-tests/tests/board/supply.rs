@@ -54,7 +54,6 @@ fn falling_while_the_image_runs() {
     assert_eq!(identity.clock_fault, None);
 }
 
-/// A configuration whose mounting holds a number.
 fn numbered(number: u16) -> Configuration {
     let [tens, units] = [number / 100, number % 100].map(f32::from);
     let mounting = Mounting { roll_deg: 0.0, pitch_deg: tens, yaw_deg: units };

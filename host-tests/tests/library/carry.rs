@@ -26,7 +26,6 @@ struct Ledger {
     navigation: i64,
 }
 
-/// One sample.
 struct Sample {
     /// Gyro less bias.
     gyro: i64,

@@ -57,7 +57,6 @@ fn estimator() -> RatioEstimator {
     RatioEstimator::new(ClockRatioConfig::DEFAULT)
 }
 
-/// The ratio as a number.
 fn number(ratio: ClockRatio) -> f64 {
     f64::from(ratio.0) / f64::from(ClockRatio::ONE.0)
 }

@@ -65,7 +65,6 @@ impl Car {
         self.coprocessor.imu(sample, at(self.tick), &mut self.sent).expect("in time")
     }
 
-    /// Samples until the next window is due.
     fn until_window(&mut self) -> DueWindow {
         loop {
             self.sample();

@@ -191,7 +191,6 @@ fn a_flipped_bit_gives_no_message_with_the_counter_that_was_sent() {
     }
 }
 
-/// `count` messages in order.
 fn messages(profile: Profile, count: usize) -> Vec<[u8; 8]> {
     let mut protector = Protector::new(profile);
     (0..count)

@@ -15,7 +15,6 @@ fn corpus(entrance: &Entrance) -> PathBuf {
     workspace().join("host-tests/fuzz/corpus").join(entrance.name)
 }
 
-/// The files of a folder, by name.
 fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let entries = fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
     let mut files: Vec<_> = entries
@@ -28,7 +27,6 @@ fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
     files
 }
 
-/// `cargo test -p gyronet-host-tests --test library entrances -- --ignored` writes the corpus.
 #[test]
 #[ignore = "writes into the repository"]
 fn write_corpus() {

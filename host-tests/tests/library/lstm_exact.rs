@@ -51,7 +51,6 @@ fn naive_direction(rows: &Rows, way: Direction, x: &[Vec<i16>]) -> Vec<Vec<i16>>
     output
 }
 
-/// Values as words of two.
 fn words(values: &[i16]) -> Vec<u32> {
     values.chunks(2).map(|pair| word(pair[0], pair.get(1).copied().unwrap_or(0))).collect()
 }

@@ -89,7 +89,6 @@ fn the_pipeline_sends_the_expected_error() {
 /// Shares that `cargo gyronet evaluate --ablation` prints of both test drives together, and the largest departure from
 /// each.
 const BANDS: [(f64, f64); 3] = [(0.694, 0.03), (0.948, 0.02), (1.0, 0.008)];
-/// The test trials.
 const TRIALS: [u32; 2] = [9, 11];
 
 /// The rate sent for navigation, default configuration.

@@ -19,7 +19,6 @@ fn intel(start: u8, len: u8) -> BitField {
     BitField::new(start, len, ByteOrder::Intel, false).expect("inside a frame")
 }
 
-/// The wheel speed frame of a common car.
 fn car() -> WheelFrame {
     WheelSettings::TOYOTA.frames[0].expect("one frame")
 }

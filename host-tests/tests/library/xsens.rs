@@ -8,7 +8,6 @@ use gyronet_host_tests::noise::cases;
 use gyronet_host_tests::wire::{feed_new, message, real_frame, synthetic_frame};
 use proptest::prelude::*;
 
-/// A frame around packets.
 fn frame(packets: &[(u16, &[u8])]) -> Vec<u8> {
     let mut data = Vec::new();
     for (id, packet) in packets {

@@ -14,7 +14,6 @@ use gyronet_host_tests::synthetic::{force, rate, turning};
 const BIAS: f64 = 0.003;
 const NETWORK: f64 = 0.0002;
 
-/// Returns the report of the wheels with a sample.
 fn wheels(sample: &ImuSample, standstill: Standstill) -> WheelSample {
     WheelSample { time: sample.time, speeds: [Some(WheelSpeed(0)); WHEELS], standstill }
 }

@@ -11,7 +11,6 @@ use gyronet_tools::network::quantization_error::{Both, QuantizationError};
 use std::path::Path;
 use std::sync::OnceLock;
 
-/// The test trials.
 const TRIALS: [u32; 2] = [9, 11];
 /// Largest departure of the integer network's 1 s yaw error from the f32 network's.
 const YAW_ERROR: f64 = 0.03;

@@ -6,7 +6,6 @@ use gyronet_tools::import::error::ImportError;
 /// Holds a drive that was made.
 #[derive(Debug)]
 pub struct Imported {
-    /// Its rows.
     pub rows: Vec<Row>,
     /// What a user is told.
     pub report: Vec<String>,

@@ -157,7 +157,6 @@ fn pages_work_in_a_browser_on_desk_and_phone() {
     }
 }
 
-/// A page with every fault that the other test looks for.
 #[test]
 fn the_faults_of_a_page_are_seen() {
     let Some((mut browser, folder)) = browser("the_faults_of_a_page_are_seen") else { return };

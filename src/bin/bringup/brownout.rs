@@ -1,4 +1,4 @@
-//! This module handles the brown-out reset's level, an option byte (RM0090 3.6, 3.9.6).
+//! Handles the brown-out reset's level, an option byte (RM0090 3.6, 3.9.6).
 //!
 //! Below the level the chip is held in reset, so no code runs and no flash is programmed while the supply is too low.
 //! A new chip has the lowest level, 1.8 V. The option byte is loaded at power-on.

@@ -1,4 +1,4 @@
-//! This module holds the lines of the board, and the state that the board reports.
+//! Holds the lines of the board, and the state that the board reports.
 #![allow(
     unsafe_code,
     clippy::undocumented_unsafe_blocks,

@@ -1,4 +1,4 @@
-//! This module sets the clock tree (RM0090 7): 168 MHz from the board's crystal, or the internal 16 MHz oscillator.
+//! Sets the clock tree (RM0090 7): 168 MHz from the board's crystal, or the internal 16 MHz oscillator.
 //!
 //! Every wait has a limit. If the crystal does not start or has the wrong frequency, or the supply stays low, the
 //! chip stays on the internal oscillator: CAN stays off, since that oscillator can be 8 % wrong, and the reason is

@@ -1,4 +1,4 @@
-//! This module reads the cause of the last reset (RM0090 7.3.21).
+//! Reads the cause of the last reset (RM0090 7.3.21).
 
 use super::pac;
 use gyronet::service::event::ResetCause;

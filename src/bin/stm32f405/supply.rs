@@ -1,4 +1,4 @@
-//! This module supervises the supply (RM0090 5.2): programmable voltage detector and brown-out reset.
+//! Supervises the supply (RM0090 5.2): programmable voltage detector and brown-out reset.
 //!
 //! Programming flash in words needs 2.7 V, as does 168 MHz at five wait states. Level 6 of the detector trips at 2.85
 //! to 2.99 V when the supply falls, and clears at 3.10 V at most when it rises (DS8626 table 19). So the chip stops

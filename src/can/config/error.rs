@@ -1,4 +1,4 @@
-//! This module defines the reasons why settings are refused.
+//! Defines the reasons why settings are refused.
 
 use super::{BIT_RATES, MAX_BUS_LOAD, MAX_PERIOD_MS, SAMPLE_MS};
 

@@ -1,4 +1,4 @@
-//! This module defines the bus settings that a user can change.
+//! Defines the bus settings that a user can change.
 
 use crate::can::e2e::{DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
 

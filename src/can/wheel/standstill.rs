@@ -1,4 +1,4 @@
-//! This module derives standstill from the wheel speeds.
+//! Derives standstill from the wheel speeds.
 //!
 //! Standstill is derived from the wheels because a bias estimator that relies on the gyro alone mistakes a
 //! slow turn for bias. It is reported late and withdrawn at once: all wheels must have been fresh

@@ -1,4 +1,4 @@
-//! This module parses and encodes the data messages of the DSP-1760, field by field.
+//! Parses and encodes the data messages of the DSP-1760, field by field.
 //!
 //! | offset | format A, 36 bytes | format B, 40 bytes | format C, 38 bytes |
 //! |---|---|---|---|

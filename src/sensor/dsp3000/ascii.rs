@@ -1,4 +1,4 @@
-//! This module parses the variant of the DSP-3000 that sends lines of text.
+//! Parses the variant of the DSP-3000 that sends lines of text.
 //!
 //! A line is a decimal number, blanks and `1` (valid) or `0` (fault), ended by CR and LF. Implementations differ in
 //! the width of the line, so blanks are trimmed and the line end is the only framing. There is no checksum: a corrupt

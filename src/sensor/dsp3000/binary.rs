@@ -1,4 +1,4 @@
-//! This module parses the variant of the DSP-3000 that sends words of 32 bits, most significant byte first.
+//! Parses the variant of the DSP-3000 that sends words of 32 bits, most significant byte first.
 //!
 //! | bit | content |
 //! |---|---|

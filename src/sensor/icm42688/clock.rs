@@ -1,4 +1,4 @@
-//! This module converts the ICM-42688-P's 16-bit time stamps to microseconds that never wrap.
+//! Converts the ICM-42688-P's 16-bit time stamps to microseconds that never wrap.
 //!
 //! Without a clock on CLKIN the sensor counts in units of 32/30 us, although TMST_RES is 1 us (DS-000347, 12.7): the
 //! 10 ms between two samples at 100 Hz are 9,375 counts. The counts are summed unscaled, and the sum is scaled by

@@ -1,4 +1,4 @@
-//! This module converts the configuration of an ICM-42688-P to register values.
+//! Converts the configuration of an ICM-42688-P to register values.
 //!
 //! The sensor's filters run at 400 Hz or more, and at an output rate of 100 Hz every fourth value is output
 //! (DS-000347, 5.5). What the last filter passes above 50 Hz is therefore aliased, and vibration near 100 Hz appears

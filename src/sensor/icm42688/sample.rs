@@ -1,4 +1,4 @@
-//! This module converts a packet's counts to the pipeline's units.
+//! Converts a packet's counts to the pipeline's units.
 
 use super::packet::{Packet, Resolution};
 use crate::sample::{ImuSample, Validity};

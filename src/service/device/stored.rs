@@ -1,4 +1,4 @@
-//! This module reads the stored records at the start, and stores them on request.
+//! Reads the stored records at the start, and stores them on request.
 
 use super::{Device, INTERRUPTS, MappedSlots, SupportedHardware};
 use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};

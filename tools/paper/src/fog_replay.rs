@@ -1,4 +1,4 @@
-//! This module runs a sequence through the coprocessor, to get the rates that the board sends with or without FoGNet,
+//! Runs a sequence through the coprocessor, to get the rates that the board sends with or without FoGNet,
 //! and through FoGNet alone, to correct the turns of the sequence.
 
 use crate::sequence::{Sequence, Step};
@@ -30,7 +30,6 @@ pub struct FogReplay {
     pub corrected: u64,
     /// Number of windows that FoGNet estimated.
     pub windows: u64,
-    /// Input values that were clamped.
     pub clamped_inputs: u64,
     /// Estimates that were rejected as implausible.
     pub implausible: u64,
@@ -70,7 +69,6 @@ pub fn run(sequence: &Sequence, network: &mut impl MinuteNetwork, config: FogCon
 }
 
 /// Returns the default configuration for a sequence's gyro and latitude.
-#[must_use]
 pub fn default_config(sequence: &Sequence) -> FogConfig {
     let errors = match sequence.layout {
         Layout::Kaist => FogErrors::DSP1760,
@@ -82,9 +80,6 @@ pub fn default_config(sequence: &Sequence) -> FogConfig {
 
 /// Checks that weights are for the gyro of a sequence. A simulated gyro has its device number as serial number; a
 /// recorded gyro is assumed to have the serial number that the weights name.
-///
-/// # Errors
-/// [`GyroMismatch`].
 pub fn check_weights(sequence: &Sequence, trained: Training) -> Result<(), GyroMismatch> {
     let part = match sequence.layout {
         Layout::Kaist => Gyro::Dsp1760,
@@ -97,7 +92,6 @@ pub fn check_weights(sequence: &Sequence, trained: Training) -> Result<(), GyroM
 /// Runs a sequence through the coprocessor, with wheel speeds in frames as the board receives them, and with FoGNet
 /// if it is given. Returns the rate sent for each step (zero for the first, whose begin no sample marks), and the
 /// counters.
-#[must_use]
 pub fn run_board(
     sequence: &Sequence,
     config: FogConfig,
@@ -169,7 +163,6 @@ impl Sink for Rates {
 
 /// Returns the sequence with the Earth's rate and the bias subtracted from the gyro, as the board computes it and
 /// FoGNet receives it.
-#[must_use]
 pub fn after_lane(sequence: &Sequence) -> Sequence {
     let (sent, _) = run_board(sequence, default_config(sequence), None);
     let mut corrected = sequence.clone();

@@ -1,4 +1,4 @@
-//! This module reads sequences of KAIST Complex Urban and NCLT, real or simulated: it merges several files of different
+//! Reads sequences of KAIST Complex Urban and NCLT, real or simulated: it merges several files of different
 //! rates into one drive on a 100 Hz grid.
 //!
 //! Files are read in parallel, one row at a time: an hour of a 1 kHz gyro needs no more memory than its 100 Hz steps.
@@ -105,10 +105,6 @@ struct Files {
     wheel_base: Option<f64>,
 }
 
-/// Returns the data set whose layout a folder has.
-///
-/// # Errors
-/// [`DataFault::UnknownLayout`], or [`DataFault::Io`] if there is no folder.
 pub fn layout(folder: &Path) -> Result<Layout, DataError> {
     if folder.join("sensor_data").is_dir() {
         Ok(Layout::Kaist)
@@ -121,9 +117,6 @@ pub fn layout(folder: &Path) -> Result<Layout, DataError> {
 }
 
 /// Finds the sequences of a folder: the folder itself, or the folders directly below it, sorted by name.
-///
-/// # Errors
-/// [`DataError`] if neither is a sequence.
 pub fn find(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
     if layout(folder).is_ok() {
         return Ok(vec![folder.to_owned()]);
@@ -139,10 +132,6 @@ pub fn find(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
 }
 
 impl Sequence {
-    /// Reads the sequence in a folder.
-    ///
-    /// # Errors
-    /// [`DataError`], which names the file and, where there is one, the line.
     pub fn read(folder: &Path) -> Result<Self, DataError> {
         let layout = layout(folder)?;
         let simulated = marker(folder)?;
@@ -197,14 +186,12 @@ impl Sequence {
     }
 
     /// Returns the length of the sequence, s.
-    #[must_use]
     pub fn seconds(&self) -> f64 {
         self.steps.len() as f64 * DT
     }
 
     /// Returns the latitude for the Earth's rate: that of the simulation, or of the place where the data set was
     /// recorded.
-    #[must_use]
     pub fn latitude_deg(&self) -> f64 {
         let made = self.layout.vehicle().world.latitude_deg;
         // A simulated world rotates as at the latitude of its settings, whatever the position of its map.
@@ -212,7 +199,6 @@ impl Sequence {
     }
 
     /// Returns the true change of heading in each step, rad; zero in the first.
-    #[must_use]
     pub fn turns(&self) -> Vec<f64> {
         let first = self.steps.first().map_or(0.0, |step| step.yaw);
         let mut last = first;
@@ -221,7 +207,6 @@ impl Sequence {
 
     /// Returns the rates of the left and the right wheel in a step, rad/s, by the wheel radius of the data set's
     /// vehicle.
-    #[must_use]
     pub fn wheel_rates(&self, step: &Step) -> [f64; 2] {
         let radius = self.layout.vehicle().world.car.wheel_radius;
         step.wheels.map(|way| way / DT / radius)
@@ -229,9 +214,6 @@ impl Sequence {
 
     /// Converts the drive to a recording, as the other commands use it. Steps in a gap of the inertial sensor are left
     /// out, because a board would not receive them. The wheels become the rear right and rear left ones.
-    ///
-    /// # Errors
-    /// [`DataFault::NoGyro`].
     pub fn recording(&self) -> Result<Recording, DataError> {
         self.needs_gyro()?;
         let turns = self.turns();
@@ -257,9 +239,6 @@ impl Sequence {
     }
 
     /// Checks that the vehicle stands during static initialisation.
-    ///
-    /// # Errors
-    /// [`DataFault::Rolling`].
     pub fn needs_standstill(&self) -> Result<(), DataError> {
         let steps = self.steps.iter().take(STATIC_SAMPLES as usize);
         let metres = steps.map(|step| (step.wheels[0] + step.wheels[1]) / 2.0).sum::<f64>().abs();
@@ -268,9 +247,6 @@ impl Sequence {
     }
 
     /// Checks that the sequence has an inertial sensor.
-    ///
-    /// # Errors
-    /// [`DataFault::NoGyro`].
     pub fn needs_gyro(&self) -> Result<(), DataError> {
         self.has_gyro.then_some(()).ok_or_else(|| DataError::of(self.path.display(), DataFault::NoGyro))
     }
@@ -325,9 +301,6 @@ impl Files {
 }
 
 /// Reads the specification of a simulated sequence; `None` for a recorded one.
-///
-/// # Errors
-/// [`DataError`].
 fn marker(folder: &Path) -> Result<Option<Spec>, DataError> {
     let path = folder.join(MARKER);
     let error = |fault| DataError::of(path.display(), fault);

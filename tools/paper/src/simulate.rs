@@ -45,7 +45,6 @@ pub enum Layout {
 
 impl Layout {
     /// Returns the data set's vehicle.
-    #[must_use]
     pub fn vehicle(self) -> Vehicle {
         match self {
             Self::Kaist => vehicles::KAIST,
@@ -85,7 +84,6 @@ pub const SECONDS: u32 = 20 * 60;
 
 impl Set {
     /// Returns the specifications of the set's sequences. No run is in two sets.
-    #[must_use]
     pub fn specs(self, layout: Layout) -> Vec<Spec> {
         let (word, count, device, first) = match self {
             Self::Train => ("train", 8u64, 1, 101),
@@ -139,9 +137,6 @@ impl Drive {
 }
 
 /// Creates a folder and writes a sequence into it.
-///
-/// # Errors
-/// The file system's error.
 pub fn write(spec: &Spec, folder: &Path) -> io::Result<()> {
     std::fs::create_dir_all(folder)?;
     std::fs::write(folder.join(MARKER), serde_json::to_string_pretty(spec)? + "\n")?;

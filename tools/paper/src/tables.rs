@@ -1,4 +1,4 @@
-//! These modules compute the paper's tables for given sequences, beside the paper's own results.
+//! The paper's tables for given sequences, beside the paper's own results.
 //!
 //! [`estimates`] computes an [`estimate`] of a sequence by each method, [`given`] reads other programs' trajectories,
 //! and [`joint`] fits wheels and gyro. [`results`] compares all of them with the truth and averages over a [`group`].

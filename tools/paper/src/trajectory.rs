@@ -1,4 +1,4 @@
-//! This module reads trajectories in the format of TUM's RGB-D benchmark, as evo reads and writes them. A row is
+//! Reads trajectories in the format of TUM's RGB-D benchmark, as evo reads and writes them. A row is
 //! `time x y z qx qy qz qw`, separated by spaces: time in s since 1970, ascending, position in m, and attitude as a
 //! quaternion. Rows that begin with # are comments.
 
@@ -34,15 +34,11 @@ pub struct Pose {
 pub struct Trajectory {
     /// Path of the file.
     pub path: String,
-    /// The poses.
     pub poses: Vec<Pose>,
 }
 
 impl Trajectory {
     /// Reads a file.
-    ///
-    /// # Errors
-    /// [`DataError`], which names the file and, where there is one, the line.
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
         let text = fs::read_to_string(path).map_err(|source| DataError::open(&name, source))?;
@@ -50,9 +46,6 @@ impl Trajectory {
     }
 
     /// Reads the text of a file.
-    ///
-    /// # Errors
-    /// As [`Self::read`].
     pub fn parse(path: String, text: &str) -> Result<Self, DataError> {
         let mut poses: Vec<Pose> = Vec::new();
         for (line, row) in (1..).zip(text.lines()) {

@@ -1,4 +1,4 @@
-//! This module fits the shares to the spans of all drives by robust least squares.
+//! Fits the shares to the spans of all drives by robust least squares.
 //!
 //! Huber's weights (1.345 robust deviations) give little weight to a span whose reference was lost. The sigmas come
 //! from leaving out one block of time after the other (jackknife), so they hold for errors that last for seconds.

@@ -49,9 +49,6 @@ impl Spans {
     }
 
     /// The spans by the reference yaw rate, or else by the course.
-    ///
-    /// # Errors
-    /// [`CalibrateError::NoReference`], [`CalibrateError::TooShort`].
     pub fn finish(mut self, path: &str) -> Result<Vec<Span>, CalibrateError> {
         let path = || path.to_owned();
         let spans = if self.by_rate.is_known {

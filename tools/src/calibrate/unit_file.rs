@@ -15,11 +15,9 @@ pub struct UnitFile {
     pub shares: [Share; 3],
     /// The checksum of the weights that corrected the drives.
     pub weights: u32,
-    /// The fit on each drive.
     pub drives: Vec<DriveFit>,
 }
 
-/// The fit on one drive.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DriveFit {
     /// The name of the recording.
@@ -39,7 +37,6 @@ pub enum UnitFileError {
     /// The file cannot be read.
     #[error("{path}: {source}")]
     Read {
-        /// The file.
         path: String,
         /// The reason.
         source: std::io::Error,
@@ -47,21 +44,16 @@ pub enum UnitFileError {
     /// The file is not a calibration file.
     #[error("{path}: {source}")]
     Json {
-        /// The file.
         path: String,
         /// The reason.
         source: serde_json::Error,
     },
     /// The map is too far from the identity for a real unit.
     #[error("{path}: gyro_map: an element is too far from the identity")]
-    Implausible {
-        /// The file.
-        path: String,
-    },
+    Implausible { path: String },
     /// The calibration was computed with other weights.
     #[error("{path}: computed with the weights {found:08x}, but {runs:08x} are in use")]
     OtherWeights {
-        /// The file.
         path: String,
         /// The checksum of the weights that the calibration was computed with.
         found: u32,
@@ -83,7 +75,6 @@ struct Content {
 
 impl UnitFile {
     /// Returns the content as JSON.
-    #[must_use]
     pub fn json(&self) -> serde_json::Value {
         let shares = self.shares.map(|Share { name, value, sigma, refused }| {
             (String::from(name), serde_json::json!({ "value": value, "sigma": sigma, "refused": refused }))
@@ -98,10 +89,6 @@ impl UnitFile {
     }
 }
 
-/// Reads the map of a file.
-///
-/// # Errors
-/// [`UnitFileError`], which names the file.
 pub fn read(path: &Path) -> Result<UnitMap, UnitFileError> {
     let name = || path.display().to_string();
     let text =
@@ -114,9 +101,6 @@ pub fn read(path: &Path) -> Result<UnitMap, UnitFileError> {
 }
 
 /// Reads the map of a file, which must have been computed with weights of the checksum `runs`.
-///
-/// # Errors
-/// [`UnitFileError`], which names the file.
 pub fn read_for(path: &Path, runs: u32) -> Result<GyroMap, UnitFileError> {
     let UnitMap { gyro_map, weights: found } = read(path)?;
     if found == runs {
@@ -126,7 +110,6 @@ pub fn read_for(path: &Path, runs: u32) -> Result<GyroMap, UnitFileError> {
     }
 }
 
-/// Returns the results of the fit for each drive.
 pub(super) fn drives(drives: &[Cut], fit: &Fit) -> Vec<DriveFit> {
     let fits = fit.biases.iter().zip(&fit.deviations);
     drives

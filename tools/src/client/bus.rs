@@ -18,16 +18,9 @@ const INTERFACE: &str = "can:";
 
 /// A connection that carries CAN frames.
 pub trait Bus {
-    /// Sends a frame.
-    ///
-    /// # Errors
-    /// The system's error.
     fn send(&mut self, frame: &DataFrame) -> Result<()>;
 
     /// Returns the received frames; if there are none, waits for at most [`WAIT`].
-    ///
-    /// # Errors
-    /// The system's error.
     fn receive(&mut self) -> Result<Vec<DataFrame>>;
 
     /// Returns the time since an arbitrary but fixed moment.
@@ -49,9 +42,6 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
 }
 
 /// Opens a Linux CAN interface (`can:can0`) or an SLCAN line (`host:port`, or a serial port at `baud`).
-///
-/// # Errors
-/// [`ConnectError`].
 pub fn open(name: &str, baud: u32) -> std::result::Result<Box<dyn Bus>, ConnectError> {
     match name.strip_prefix(INTERFACE) {
         #[cfg(target_os = "linux")]

@@ -14,7 +14,6 @@ pub enum ConnectError {
     /// The name is neither host:port nor a serial port that can be opened.
     #[error("{name}: not host:port, and not a serial port that can be opened: {source}")]
     Serial {
-        /// The name as given.
         name: String,
         /// The system's error.
         source: serialport::Error,
@@ -22,7 +21,6 @@ pub enum ConnectError {
     /// The host does not accept the connection.
     #[error("{name}: cannot connect: {source}")]
     Tcp {
-        /// The name as given.
         name: String,
         /// The system's error.
         source: io::Error,
@@ -37,15 +35,11 @@ pub enum ConnectError {
     },
     /// This system has no CAN interfaces.
     #[error("can:{name}: CAN interfaces work only on Linux")]
-    NoInterfaces {
-        /// The name as given.
-        name: String,
-    },
+    NoInterfaces { name: String },
 }
 
 /// An open line. Its reads time out after the time that it was opened with.
 pub enum Connection {
-    /// A serial port of this machine.
     Serial(Box<dyn serialport::SerialPort>),
     /// A TCP socket.
     Tcp(TcpStream),
@@ -53,9 +47,6 @@ pub enum Connection {
 
 impl Connection {
     /// Opens `host:port`, or a serial port by its name at `baud`; a read waits for at most `wait`.
-    ///
-    /// # Errors
-    /// [`ConnectError`].
     pub fn open(name: &str, baud: u32, wait: Duration) -> Result<Self, ConnectError> {
         if is_address(name) {
             let named = |source| ConnectError::Tcp { name: name.into(), source };
@@ -90,7 +81,6 @@ fn connect(name: &str, wait: Duration) -> io::Result<TcpStream> {
 }
 
 /// Returns whether an error of a read only means that no bytes arrived in time.
-#[must_use]
 pub fn is_silence(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }

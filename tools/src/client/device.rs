@@ -57,9 +57,6 @@ pub enum Authority {
 
 impl<B: Bus> Device<B> {
     /// Creates a device with these CAN identifiers; `name` is the line's name in errors.
-    ///
-    /// # Errors
-    /// [`DeviceError::Identifier`].
     pub fn with_ids(bus: B, name: &str, ids: &DiagnosisIds) -> Result<Self, DeviceError> {
         let [request, _, response] = ids.ids().map_err(DeviceError::Identifier)?;
         Ok(Self { bus, name: name.to_owned(), request, response, authority: Authority::None })
@@ -71,9 +68,6 @@ impl<B: Bus> Device<B> {
     }
 
     /// Sends a request, up to three times, and returns the positive response without its first byte.
-    ///
-    /// # Errors
-    /// [`DeviceError`]; a refusal is an error too.
     pub fn ask(&mut self, request: &[u8]) -> Result<Vec<u8>, DeviceError> {
         let service = request.first().copied().unwrap_or_default();
         match self.exchange(request)? {

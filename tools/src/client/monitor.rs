@@ -69,7 +69,6 @@ pub struct Monitor {
 impl Monitor {
     /// Creates a monitor for the messages of a configuration; those of a fibre-optic gyro have the identifiers of
     /// [`FOG_IDS`].
-    #[must_use]
     pub fn new(config: &Config) -> Self {
         Self {
             own_set: config.settings().yaw.map(|yaw| YawSet::new(yaw.ids, yaw.e2e.profiles())),
@@ -130,13 +129,11 @@ impl Monitor {
     }
 
     /// Returns the newest time stamp of a line, in seconds, if lines have one.
-    #[must_use]
     pub fn stamp(&self) -> Option<f64> {
         self.stamp
     }
 
     /// Returns the rate of all frames, 1/s, once a second has passed.
-    #[must_use]
     pub fn frames_per_second(&self) -> Option<f64> {
         self.frames_per_second
     }

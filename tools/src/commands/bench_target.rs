@@ -28,7 +28,6 @@ pub struct Args {
     policies: bool,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
     if args.policies {
         return Err(

@@ -125,7 +125,6 @@ fn identifiers(text: &str) -> Result<DiagnosisIds, String> {
     ids.ids().map(|_| ids).map_err(|id| format!("{id:X} has too many bits, or is given twice"))
 }
 
-/// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let Some(port) = args.port.as_deref() else {
         let why = "no board is given: use --port /dev/ttyUSB1, --port host:port, or --port can:can0\n";
@@ -186,7 +185,6 @@ fn print_json(value: &impl Serialize) -> super::Result {
     super::print_json(&mut io::stdout().lock(), value)
 }
 
-/// Prints a record as JSON, or as one line for each value.
 fn print_value(value: &impl Serialize, json: bool) -> super::Result {
     if json {
         return print_json(value);

@@ -19,7 +19,6 @@ pub struct Args {
     name: PathBuf,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let key = PrivateKey::generate()?;
     let [private, public] = key.write(&args.name)?;

@@ -63,7 +63,6 @@ impl fmt::Display for Added {
     }
 }
 
-/// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
     if Checkpoint::is_in(&args.checkpoint)? {
         let path = args.checkpoint.display();

@@ -47,7 +47,6 @@ enum Target {
     Key,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let name = args.file.display().to_string();
     let read = || std::fs::read(&args.file).map_err(|error| format!("{name}: {error}"));

@@ -20,7 +20,6 @@ pub struct Args {
     elf: Option<PathBuf>,
 }
 
-/// Runs the command.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let workspace = bench::workspace();
     let elf = match &args.elf {

@@ -15,7 +15,6 @@ pub struct Weights {
 }
 
 impl Weights {
-    /// Opens a file, or chooses the default weights.
     pub fn open(path: Option<&Path>) -> Result<Self, WeightFileError> {
         Ok(Self { file: path.map(WeightFile::read).transpose()? })
     }
@@ -39,7 +38,6 @@ pub struct Sent {
 }
 
 impl Sent {
-    /// Opens the weights.
     pub fn open(&self) -> Result<Weights, WeightFileError> {
         Weights::open(self.weights.as_deref())
     }

@@ -43,9 +43,6 @@ pub struct Sent {
 
 impl Sent {
     /// Runs the board on a drive and writes its frames.
-    ///
-    /// # Errors
-    /// Those of the drive, and the writer's.
     pub fn run(
         drive: &Drive<'_>,
         network: impl WindowNetwork,

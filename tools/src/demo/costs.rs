@@ -23,7 +23,6 @@ pub struct Cost {
 }
 
 /// Returns the figures of a drive.
-#[must_use]
 pub fn all(samples: usize, run_time: Duration, config: &Config) -> Vec<Cost> {
     let micros = run_time.as_secs_f64() * 1e6 / samples.max(1) as f64;
     let lag = PipelineConfig::DEFAULT.compensate.lag.samples() as u64 * PERIOD_US / 1_000;

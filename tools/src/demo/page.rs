@@ -1,4 +1,4 @@
-//! This module writes the page of a drive.
+//! Writes the page of a drive.
 
 use super::trajectory::Trajectories;
 use super::{Cost, Demo, Message};

@@ -1,4 +1,4 @@
-//! This module draws one picture of a drive: the yaw of each method, and below it the error of each.
+//! Draws one picture of a drive: the yaw of each method, and below it the error of each.
 
 use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
@@ -21,9 +21,6 @@ const STYLES: [(Method, Color, u32); 5] = [
 ];
 
 /// Draws a drive as SVG.
-///
-/// # Errors
-/// [`PlotError`], when the library refuses.
 pub fn svg(title: &str, rates: &Rates) -> Result<String, PlotError> {
     let points = |values: &[f64]| rates.seconds.iter().copied().zip(values.iter().copied()).collect();
     let degrees = |yaw: &[f64]| -> Vec<(f64, f64)> {

@@ -1,4 +1,4 @@
-//! This module prints the heading errors that matter most, in degrees; `gyronet evaluate` prints all of them.
+//! Prints the heading errors that matter most, in degrees; `gyronet evaluate` prints all of them.
 
 use crate::evaluate::methods::Method;
 use crate::evaluate::report::DriveErrors;

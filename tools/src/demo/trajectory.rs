@@ -1,4 +1,4 @@
-//! This module computes the path of the vehicle by each method, from its yaw rate and the speeds of the wheels.
+//! Computes the path of the vehicle by each method, from its yaw rate and the speeds of the wheels.
 
 use crate::drive::DT;
 use crate::drive::stream::Drive;
@@ -43,7 +43,6 @@ pub struct Trajectories {
 
 impl Trajectories {
     /// Computes the paths; `None` for a drive without wheels.
-    #[must_use]
     pub fn new(drive: &Drive<'_>, rates: &Rates) -> Option<Self> {
         let ways: Vec<f64> = rates.speeds.as_ref()?.iter().map(|speed| speed * DT).collect();
         let wheels = drive.speeds()?.wheels();

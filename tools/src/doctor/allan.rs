@@ -1,4 +1,4 @@
-//! This module computes a gyro's Allan deviation at rest, angular random walk and bias instability.
+//! Computes a gyro's Allan deviation at rest, angular random walk and bias instability.
 //!
 //! Averages of neighbouring spans of length tau differ by white noise and by bias changes. White noise falls as one
 //! over the root of tau; its value at 1 s is the angular random walk. Bias changes do not average out: the flat
@@ -37,7 +37,6 @@ pub struct Noise {
 
 impl Allan {
     /// Computes the deviation of rates at 100 Hz from overlapping spans; fewer than 10 rates give no point.
-    #[must_use]
     pub fn new(rates: &[f64]) -> Self {
         let mut angle = Vec::with_capacity(rates.len() + 1);
         let mut sum = 0.0;
@@ -66,7 +65,6 @@ impl Allan {
     }
 
     /// Returns the noise figures of the curve; `None` for less than a second.
-    #[must_use]
     pub fn noise(&self) -> Option<Noise> {
         // Below 0.1 s a sensor's own filter hides the noise.
         let white = self.points.iter().filter(|(tau, _)| (0.1..=1.0).contains(tau));

@@ -13,7 +13,6 @@ pub enum Verdict {
 
 impl Verdict {
     /// Returns the word for the page, the terminal and JSON.
-    #[must_use]
     pub fn word(self) -> &'static str {
         match self {
             Self::Good => "good",
@@ -23,7 +22,6 @@ impl Verdict {
     }
 }
 
-/// One finding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     /// The subject.

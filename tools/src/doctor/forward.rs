@@ -1,4 +1,4 @@
-//! This module finds the sensor's forward direction with the library's estimator, from wheels and accelerometer.
+//! Finds the sensor's forward direction with the library's estimator, from wheels and accelerometer.
 
 use super::Mounting;
 use super::finding::Finding;

@@ -1,4 +1,4 @@
-//! This module computes the roll and pitch of the sensor's mounting from gravity at rest.
+//! Computes the roll and pitch of the sensor's mounting from gravity at rest.
 
 use super::finding::Finding;
 

@@ -1,4 +1,4 @@
-//! This module writes the page about an examined recording.
+//! Writes the page about an examined recording.
 
 use super::{Allan, Doctor, Noise, Verdict};
 use crate::plot::page::chart::{Chart, Curve};
@@ -8,7 +8,6 @@ use crate::plot::page::{HINT, document, escaped, table};
 const AXES: [(&str, &str); 3] = [("static", "x"), ("prompt", "y"), ("default", "z")];
 
 /// Returns the page; `gains` says what calibration and training would gain, or why that is not known.
-#[must_use]
 pub fn page(doctor: &Doctor, gains: &[(&str, String)]) -> String {
     let mut body = format!(
         "<h1>{}</h1>\n<p class=\"lead\">Examination of a recording of {:.0} s. Written by <code>gyronet \

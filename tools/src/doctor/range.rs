@@ -1,4 +1,4 @@
-//! This module finds saturated readings and stuck readings.
+//! Finds saturated readings and stuck readings.
 
 use super::finding::Finding;
 use super::recording::Rows;

@@ -1,4 +1,4 @@
-//! This module reads the rows of a recording unchecked; rows that cannot be read are counted.
+//! Reads the rows of a recording unchecked; rows that cannot be read are counted.
 
 use crate::drive::error::DataError;
 use crate::drive::recording::{Reader, Row, WHEELS};
@@ -35,9 +35,6 @@ pub struct Rows {
 
 impl Rows {
     /// Reads a file.
-    ///
-    /// # Errors
-    /// [`DataError`]: the file cannot be opened, or has no header of a drive.
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let shown = path.display().to_string();
         let file = File::open(path).map_err(|source| DataError::open(&shown, source))?;

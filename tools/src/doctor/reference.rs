@@ -1,4 +1,4 @@
-//! This module examines the reference, a true yaw rate or a course.
+//! Examines the reference, a true yaw rate or a course.
 
 use super::finding::{Finding, Verdict};
 use super::recording::{Rows, SECOND};

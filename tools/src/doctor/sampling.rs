@@ -1,4 +1,4 @@
-//! This module examines the sample rate, the gaps, and the rows that cannot be read.
+//! Examines the sample rate, the gaps, and the rows that cannot be read.
 
 use super::finding::{Finding, Verdict};
 use super::recording::{Rows, sorted};

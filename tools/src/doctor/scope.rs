@@ -1,4 +1,4 @@
-//! This module reports what a recording can and cannot judge, by its turns, stops and length.
+//! Reports what a recording can and cannot judge, by its turns, stops and length.
 
 use super::finding::Finding;
 use super::recording::{Rows, SECOND};

@@ -1,4 +1,4 @@
-//! This module finds the standstills of a recording: whole seconds with a quiet gyro and, if recorded, standing
+//! Finds the standstills of a recording: whole seconds with a quiet gyro and, if recorded, standing
 //! wheels.
 
 use super::finding::Finding;
@@ -13,7 +13,6 @@ const QUIET: (f64, f64) = (2.5, 0.0866);
 /// The mean yaw rate of a second at rest may differ by this much from the median of all quiet seconds, rad/s.
 const RESTING_RATE: f64 = 0.01;
 
-/// Returns the standstills as ranges of rows.
 pub fn find(rows: &Rows) -> Vec<Range<usize>> {
     let seconds = || (0..rows.len() / SECOND).map(|k| k * SECOND..(k + 1) * SECOND);
     let spreads: Vec<f64> = seconds().map(|second| spread(&rows.rate[second])).collect();

@@ -1,4 +1,4 @@
-//! This module compares wheels and gyro: the speed difference of right and left, over the track, is the yaw rate.
+//! Compares wheels and gyro: the speed difference of right and left, over the track, is the yaw rate.
 
 use super::finding::Finding;
 use super::recording::{Rows, SECOND};

@@ -1,4 +1,4 @@
-//! This module writes CAN frames as text, one per line, in the format of can-utils' `candump -L`, which `canplayer`
+//! Writes CAN frames as text, one per line, in the format of can-utils' `candump -L`, which `canplayer`
 //! and python-can read: `(seconds.micros) interface ID#DATA`.
 
 use embedded_can::{Frame, Id};
@@ -22,9 +22,6 @@ impl<W: Write> Log<W> {
     }
 
     /// Writes one data frame with its time stamp.
-    ///
-    /// # Errors
-    /// The writer's error.
     pub fn frame(&mut self, time: Micros, frame: &impl Frame) -> io::Result<()> {
         let Micros(us) = time;
         write!(self.out, "({}.{:06}) {INTERFACE} ", us / 1_000_000, us % 1_000_000)?;
@@ -40,9 +37,6 @@ impl<W: Write> Log<W> {
     }
 
     /// Flushes the writer and returns the number of frames.
-    ///
-    /// # Errors
-    /// The writer's error.
     pub fn finish(mut self) -> io::Result<u64> {
         self.out.flush()?;
         Ok(self.frames)

@@ -11,25 +11,20 @@ pub struct DataError {
     pub line: Option<u64>,
     /// The name or the number of the column.
     pub column: Option<String>,
-    /// The fault.
     pub fault: DataFault,
 }
 
 impl DataError {
     /// Returns an error that concerns a whole file.
-    #[must_use]
     pub fn of(path: impl fmt::Display, fault: DataFault) -> Self {
         Self { path: path.to_string(), line: None, column: None, fault }
     }
 
-    /// Returns an error that concerns one line.
-    #[must_use]
     pub fn at(path: impl fmt::Display, line: u64, fault: DataFault) -> Self {
         Self { line: Some(line), ..Self::of(path, fault) }
     }
 
     /// Returns an error that concerns one field.
-    #[must_use]
     pub fn value(
         path: impl fmt::Display,
         line: u64,
@@ -42,7 +37,6 @@ impl DataError {
     }
 
     /// Returns the error of a file that cannot be opened.
-    #[must_use]
     pub fn open(path: impl fmt::Display, source: std::io::Error) -> Self {
         let missing = source.kind() == std::io::ErrorKind::NotFound;
         Self::of(path, if missing { DataFault::Missing } else { DataFault::Io(source) })
@@ -66,7 +60,6 @@ impl fmt::Display for DataError {
 /// The fault of a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-#[expect(missing_docs, reason = "the message of each fault names its fields")]
 pub enum DataFault {
     /// The file cannot be read.
     #[error(transparent)]
@@ -77,7 +70,6 @@ pub enum DataFault {
     /// A file that the data set needs does not exist.
     #[error("missing")]
     Missing,
-    /// The folder belongs to neither data set.
     #[error(
         "neither a KAIST Urban sequence (a folder with sensor_data in it) nor an NCLT one (with kvh.csv or ms25.csv)"
     )]

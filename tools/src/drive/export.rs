@@ -17,18 +17,11 @@ pub struct Table<W> {
 
 impl<W: Write> Table<W> {
     /// Writes the header.
-    ///
-    /// # Errors
-    /// The writer's.
     pub fn new(mut out: W) -> io::Result<Self> {
         writeln!(out, "t_s,gyro,prompt,navigation,sigma,yaw,status")?;
         Ok(Self { out })
     }
 
-    /// Writes a step.
-    ///
-    /// # Errors
-    /// The writer's.
     pub fn step(&mut self, step: &Step) -> io::Result<()> {
         if !step.is_initialised {
             return Ok(());
@@ -50,9 +43,6 @@ impl<W: Write> Table<W> {
     }
 
     /// Flushes the writer.
-    ///
-    /// # Errors
-    /// The writer's.
     pub fn finish(&mut self) -> io::Result<()> {
         self.out.flush()
     }
@@ -74,9 +64,6 @@ impl<W: Write> Tum<W> {
     }
 
     /// Writes the pose of a step.
-    ///
-    /// # Errors
-    /// The writer's.
     pub fn step(&mut self, step: &Step) -> io::Result<()> {
         let way = self.speeds.next(&step.input) * DT;
         let Some(sent) = step.navigation.filter(|_| step.is_compared) else { return Ok(()) };
@@ -86,9 +73,6 @@ impl<W: Write> Tum<W> {
     }
 
     /// Flushes the writer.
-    ///
-    /// # Errors
-    /// The writer's.
     pub fn finish(&mut self) -> io::Result<()> {
         self.out.flush()
     }

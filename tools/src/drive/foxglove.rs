@@ -1,4 +1,4 @@
-//! This module writes a replayed drive as an MCAP file for Foxglove: inputs, rates, heading, states, CAN frames
+//! Writes a replayed drive as an MCAP file for Foxglove: inputs, rates, heading, states, CAN frames
 //! (JSON).
 //!
 //! The heading is a `foxglove.PoseInFrame` and a change of state a `foxglove.Log`; Foxglove has panels for both. The
@@ -42,9 +42,6 @@ pub struct Recorder<W: Write + Seek> {
 
 impl<W: Write + Seek> Recorder<W> {
     /// Starts a file.
-    ///
-    /// # Errors
-    /// The writer's.
     pub fn new(out: W) -> Result<Self, McapError> {
         let options = WriteOptions::new()
             .compression(Some(Compression::Lz4))
@@ -54,10 +51,6 @@ impl<W: Write + Seek> Recorder<W> {
         Ok(Self { writer, channels, last: None, messages: 0 })
     }
 
-    /// Writes a step.
-    ///
-    /// # Errors
-    /// The writer's.
     pub fn step(&mut self, step: &Step) -> Result<(), McapError> {
         let time = step.time;
         let row = &step.input;
@@ -128,9 +121,6 @@ impl<W: Write + Seek> Recorder<W> {
     }
 
     /// Ends the file, and returns the number of messages.
-    ///
-    /// # Errors
-    /// The writer's.
     pub fn finish(&mut self) -> Result<u64, McapError> {
         self.writer.finish()?;
         Ok(self.messages)
@@ -144,7 +134,6 @@ impl<W: Write + Seek> Recorder<W> {
     }
 }
 
-/// Returns the message with the rates of a step and the reference.
 fn rate(step: &Step, reference: Option<f64>) -> Value {
     let (prompt, navigation) = (&step.vehicle.prompt, step.navigation);
     json!({

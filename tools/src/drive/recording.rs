@@ -34,7 +34,6 @@ pub const WHEEL_STANDS: f64 = 0.3;
 /// Largest difference of the median sample period from 10 ms, microseconds.
 const PERIOD_TOLERANCE_US: u64 = 2_000;
 
-/// One row of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
     /// Line number in the file; the header is line 1.
@@ -64,9 +63,6 @@ pub struct Recording {
 
 impl Recording {
     /// Reads a file, and the vehicle file beside it.
-    ///
-    /// # Errors
-    /// [`DataError`], which names the file and, where there is one, the line.
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
         let file = File::open(path).map_err(|source| DataError::of(&name, source.into()))?;
@@ -74,9 +70,6 @@ impl Recording {
     }
 
     /// Parses a recording from any reader; `path` is its name in errors.
-    ///
-    /// # Errors
-    /// [`DataError`] with that path.
     pub fn parse(path: &str, input: impl std::io::Read) -> Result<Self, DataError> {
         Self::of(path, input, Vehicle::default())
     }
@@ -93,19 +86,16 @@ impl Recording {
     }
 
     /// What the rows have.
-    #[must_use]
     pub fn facts(&self) -> Facts {
         Facts::of(&self.rows)
     }
 
     /// Returns the file's name without folder and extension, for tables.
-    #[must_use]
     pub fn name(&self) -> &str {
         super::stream::name(&self.path)
     }
 
     /// Returns the time from the first sample to the end of the last one, s.
-    #[must_use]
     pub fn seconds(&self) -> f64 {
         self.facts().seconds()
     }

@@ -42,7 +42,6 @@ pub enum ReplayError {
     },
 }
 
-/// The steps of a drive, one at a time.
 pub struct Steps<'d, N> {
     path: &'d str,
     rows: std::iter::Fuse<Rows<'d>>,
@@ -50,16 +49,11 @@ pub struct Steps<'d, N> {
 }
 
 impl<'d, N: WindowNetwork> Steps<'d, N> {
-    /// Starts a board on a drive.
-    ///
-    /// # Errors
-    /// [`ReplayError::Data`].
     pub fn new(drive: &'d Drive<'_>, board: Board<N>) -> Result<Self, ReplayError> {
         Ok(Self { path: &drive.path, rows: drive.rows()?.fuse(), board })
     }
 
     /// The board, with its counters.
-    #[must_use]
     pub fn board(&self) -> &Board<N> {
         &self.board
     }
@@ -85,9 +79,6 @@ impl<N: WindowNetwork> Iterator for Steps<'_, N> {
 }
 
 /// Replays the beginning of a drive until static initialisation has finished, and returns the gyro's bias.
-///
-/// # Errors
-/// [`ReplayError`], if static initialisation does not succeed at its first attempt.
 pub fn initialise(drive: &Drive<'_>) -> Result<[AngularRate; 3], ReplayError> {
     let mut steps = Steps::new(drive, Board::new(Config::DEFAULT, drive.wheels(), Uncorrected))?;
     loop {
@@ -118,9 +109,6 @@ pub struct Replay {
 impl Replay {
     /// Replays a recording; the estimate of each window is delivered without delay. `tick` is called for each row.
     /// `wheels` replaces the vehicle's bus.
-    ///
-    /// # Errors
-    /// [`ReplayError`], if static initialisation does not succeed at its first attempt.
     pub fn run(
         recording: &Recording,
         config: &PipelineConfig,
@@ -151,7 +139,6 @@ impl Replay {
     }
 
     /// Returns the range of the steps that have a navigation rate: from the end of static initialisation on.
-    #[must_use]
     pub fn compared(&self) -> Range<usize> {
         let compared = self.steps.iter().filter(|step| step.is_compared).count();
         self.start..self.start + compared

@@ -40,9 +40,6 @@ enum Source<'a> {
 impl Drive<'static> {
     /// Reads a file and the vehicle file beside it, and checks both. What cannot be read twice (a pipe) is kept in
     /// memory.
-    ///
-    /// # Errors
-    /// [`DataError`], which names the file and, where there is one, the line.
     pub fn open(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
         let file = File::open(path).map_err(|source| DataError::of(&name, source.into()))?;
@@ -85,7 +82,6 @@ impl<'a> From<&'a Recording> for Drive<'a> {
 
 impl<'a> Drive<'a> {
     /// The drive with these rows before its own, which come later by as much.
-    #[must_use]
     pub fn after(&self, before: Vec<Row>) -> Drive<'a> {
         Drive { before, ..self.clone() }
     }
@@ -93,9 +89,6 @@ impl<'a> Drive<'a> {
 
 impl Drive<'_> {
     /// The rows from the first one on.
-    ///
-    /// # Errors
-    /// [`DataError`]: the file cannot be opened again.
     pub fn rows(&self) -> Result<Rows<'_>, DataError> {
         let rows: Rows<'_> = match &self.source {
             Source::Memory(rows) => Box::new(rows.iter().copied().map(Ok)),
@@ -121,19 +114,16 @@ impl Drive<'_> {
     }
 
     /// The file's name without folder and extension, for tables.
-    #[must_use]
     pub fn name(&self) -> &str {
         name(&self.path)
     }
 
     /// The wheels of the vehicle's bus, as the drive has them.
-    #[must_use]
     pub fn wheels(&self) -> Option<WheelFrames> {
         WheelFrames::of(self.facts.wheels, self.vehicle.radius_m())
     }
 
     /// The speed of the vehicle, from its wheels.
-    #[must_use]
     pub fn speeds(&self) -> Option<Speeds> {
         Speeds::of(self.facts.wheels, self.vehicle.radius_m())
     }

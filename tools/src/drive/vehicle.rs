@@ -36,11 +36,9 @@ pub struct Vehicle {
     pub wheels: Wheels,
     /// The channels to use if several fit.
     pub signals: Signals,
-    /// The files that describe the CAN bus.
     pub bus: BusFiles,
     /// The columns of a text table.
     pub columns: Columns,
-    /// The path of the vehicle file.
     #[serde(skip)]
     pub path: Option<PathBuf>,
 }
@@ -52,7 +50,6 @@ pub type Columns = BTreeMap<String, Column>;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Column {
-    /// The name of the column in the file.
     pub name: String,
     /// The unit of the column; SI if absent.
     pub unit: Option<String>,
@@ -104,7 +101,6 @@ pub struct Signals {
     pub reference_rate: Option<String>,
 }
 
-/// The files that describe the CAN bus.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BusFiles {
@@ -114,9 +110,6 @@ pub struct BusFiles {
 
 impl Vehicle {
     /// Reads a vehicle file.
-    ///
-    /// # Errors
-    /// [`DataError`].
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|source| DataError::open(&name, source))?;
@@ -128,23 +121,17 @@ impl Vehicle {
         Ok(vehicle)
     }
 
-    /// Returns the path of a drive's vehicle file.
-    #[must_use]
     pub fn beside(drive: &Path) -> PathBuf {
         drive.with_extension("toml")
     }
 
     /// Reads the vehicle file of a drive; returns the defaults if there is none.
-    ///
-    /// # Errors
-    /// [`DataError`].
     pub fn of_drive(drive: &Path) -> Result<Self, DataError> {
         let path = Self::beside(drive);
         if path.is_file() { Self::read(&path) } else { Ok(Self::default()) }
     }
 
     /// Returns the vehicle without the names of channels, columns and bus files.
-    #[must_use]
     pub fn without_names(self) -> Self {
         let Wheels { radius_m, track_m, .. } = self.wheels;
         let wheels = Wheels { radius_m, track_m, ..Wheels::default() };
@@ -152,15 +139,10 @@ impl Vehicle {
     }
 
     /// Returns the rolling radius of the wheels, m; [`RADIUS`] if the file gives none.
-    #[must_use]
     pub fn radius_m(&self) -> f64 {
         self.wheels.radius_m.unwrap_or(RADIUS)
     }
 
-    /// Parses the text of a vehicle file.
-    ///
-    /// # Errors
-    /// [`DataError`], also for an unknown key.
     pub fn parse(path: &str, text: &str) -> Result<Self, DataError> {
         let error = |reason: String| DataError::of(path, DataFault::Vehicle { reason });
         let vehicle: Self = toml::from_str(text).map_err(|cause| {
@@ -182,7 +164,6 @@ impl Vehicle {
 
 impl Mounting {
     /// Returns the rotation that the rows of a drive still need, as the board computes it; `None` if they need none.
-    #[must_use]
     pub fn rotation(&self) -> Option<Rotation> {
         let [roll, pitch, yaw] = [self.roll_deg, self.pitch_deg, self.yaw_deg].map(|angle| angle as f32);
         let rotation = Rotation::from_mounting(roll, pitch, yaw)?;
@@ -190,7 +171,6 @@ impl Mounting {
     }
 
     /// Rotates a vector from the sensor's axes to the vehicle's, unless the rows are already in the vehicle's axes.
-    #[must_use]
     pub fn turn(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         if self.applied {
             return [x, y, z];

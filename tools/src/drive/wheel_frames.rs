@@ -1,4 +1,4 @@
-//! This module creates wheel speed CAN frames, of a recorded drive or of given speeds.
+//! Creates wheel speed CAN frames, of a recorded drive or of given speeds.
 
 use crate::drive::recording::{Recording, Row, WHEEL_STANDS};
 use embedded_can::{Frame, StandardId};
@@ -20,14 +20,12 @@ const SILENT_ROWS: usize = 10;
 ///
 /// # Panics
 /// Never: the settings are constants of the library.
-#[must_use]
 pub fn receiver() -> WheelReceiver {
     WheelReceiver::new(WheelSettings::TOYOTA).expect("settings that come with the library")
 }
 
 /// Encodes four wheel speeds in km/h (front left, front right, rear left, rear right) as a frame in the layout of
 /// [`WheelSettings::TOYOTA`]; `None` if one is unknown.
-#[must_use]
 pub fn frame([front_left, front_right, rear_left, rear_right]: [Option<f64>; WHEELS]) -> Option<DataFrame> {
     let mut data = [0; 8];
     for (bytes, speed) in data.chunks_exact_mut(2).zip([front_right, front_left, rear_right, rear_left]) {
@@ -37,7 +35,6 @@ pub fn frame([front_left, front_right, rear_left, rear_right]: [Option<f64>; WHE
     DataFrame::new(StandardId::new(0xAA)?, &data)
 }
 
-/// An encoder of the wheel frames of one recorded drive.
 #[derive(Debug, Clone)]
 pub struct WheelFrames {
     /// The recorded wheel that each wheel's speed is taken from: the wheel itself, or another if it was not recorded.
@@ -51,13 +48,10 @@ pub struct WheelFrames {
 
 impl WheelFrames {
     /// Creates the encoder, before the first row; `None` if the recording has no wheels.
-    #[must_use]
     pub fn new(recording: &Recording) -> Option<Self> {
         Self::of(recording.facts().wheels, recording.vehicle.radius_m())
     }
 
-    /// Creates the encoder for the wheels that a drive has, with their rolling radius.
-    #[must_use]
     pub fn of(wheels: [bool; WHEELS], radius: f64) -> Option<Self> {
         let recorded = |wheel: &usize| wheels[*wheel];
         let any = (0..WHEELS).find(recorded)?;
@@ -83,7 +77,6 @@ impl WheelFrames {
             .map(|wheel| self.newest[wheel].filter(|(_, at)| now - at < SILENT_ROWS).map(|(speed, _)| speed))
     }
 
-    /// Advances by a row and returns its frame: one every [`FRAME_ROWS`] rows, if all wheels are known.
     pub fn next(&mut self, row: &Row) -> Option<DataFrame> {
         let is_due = self.row.is_multiple_of(FRAME_ROWS);
         let speeds = self.speeds(row);
@@ -102,8 +95,6 @@ pub struct Speeds {
 }
 
 impl Speeds {
-    /// Creates the speeds for the wheels that a drive has, with their rolling radius; `None` without wheels.
-    #[must_use]
     pub fn of(wheels: [bool; WHEELS], radius: f64) -> Option<Self> {
         let axle = |axle: [usize; 2]| axle.into_iter().filter(|wheel| wheels[*wheel]).collect::<Vec<usize>>();
         let wheels = [REAR, FRONT].map(axle).into_iter().find(|wheels| !wheels.is_empty())?;
@@ -111,7 +102,6 @@ impl Speeds {
     }
 
     /// The number of wheels that are averaged.
-    #[must_use]
     pub fn wheels(&self) -> usize {
         self.wheels.len()
     }

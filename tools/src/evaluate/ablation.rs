@@ -58,7 +58,6 @@ pub(crate) fn with_lag(config: PipelineConfig, lag: Lag) -> PipelineConfig {
 }
 
 /// Returns the variants that show the parts of the compensation.
-#[must_use]
 pub fn parts() -> Vec<Variant> {
     let alone = |config| PipelineConfig { zero_rate: None, ..config };
     let overlap = CompensateConfig::DEFAULT.mode;
@@ -76,7 +75,6 @@ pub fn parts() -> Vec<Variant> {
 }
 
 /// Returns the default configuration at every lag.
-#[must_use]
 pub fn lags() -> Vec<Variant> {
     (0..)
         .map_while(Lag::new)
@@ -92,7 +90,6 @@ pub fn lags() -> Vec<Variant> {
 pub struct Score {
     /// The variant's name.
     pub name: String,
-    /// The yaw error.
     #[serde(flatten)]
     pub error: YawError,
     /// RMS error of a sample, rad/s.
@@ -116,9 +113,6 @@ pub struct Floor {
 
 /// Runs the variants on one drive, one after the other; `tick` is called for each step of each run. Returns no score if
 /// a compared sample has no reference.
-///
-/// # Errors
-/// [`ReplayError`].
 pub fn run(
     drive: &Drive<'_>,
     network: &mut impl WindowNetwork,
@@ -140,7 +134,6 @@ pub fn run(
 }
 
 /// Returns the means over drives with equal weights; `None` without drives.
-#[must_use]
 pub fn mean(drives: &[Vec<Score>]) -> Option<Vec<Score>> {
     let first = drives.first()?;
     let count = drives.len() as f64;
@@ -160,9 +153,6 @@ pub fn mean(drives: &[Vec<Score>]) -> Option<Vec<Score>> {
 }
 
 /// Returns the reference's error while the wheels stand; `None` if the drive has no wheels or they never stand.
-///
-/// # Errors
-/// [`ReplayError`].
 pub fn floor(drive: &Drive<'_>) -> Result<Option<Floor>, ReplayError> {
     let Some(wheels) = drive.wheels() else { return Ok(None) };
     let board = Board::new(silent(PipelineConfig::DEFAULT), Some(wheels), Uncorrected);

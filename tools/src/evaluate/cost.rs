@@ -12,7 +12,6 @@ use serde::Serialize;
 /// The cost of one sample, without the work that is done once a second at standstill.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cost {
-    /// Multiplications per sample.
     pub multiplications_per_sample: f64,
     /// Delay from the sample to its rate, ms.
     pub delay_ms: u64,
@@ -32,7 +31,6 @@ const LINEAR: Shape = Shape { units: 0, linear: true };
 
 impl Cost {
     /// Returns the cost of a method of [`Method::ON_A_DRIVE`]; `None` if it does not run.
-    #[must_use]
     pub fn new(method: Method, shapes: &Shapes) -> Option<Self> {
         let CompensateConfig { mode, lag, .. } = CompensateConfig::DEFAULT;
         let low_pass = LowPass::chosen();
@@ -54,7 +52,6 @@ impl Cost {
 }
 
 /// Returns the multiply-accumulates of one window: the linear part, the gates of two Bi-LSTMs, and the layer on top.
-#[must_use]
 pub fn multiplications(Shape { units, linear }: Shape) -> usize {
     let units = usize::from(units);
     let layer = |inputs: usize| 2 * 4 * units * (inputs + units);

@@ -22,13 +22,11 @@ impl LowPass {
     pub const CORNER_HZ: f64 = 5.0;
 
     /// Creates the filter that the tables use.
-    #[must_use]
     pub fn chosen() -> Self {
         Self::new(Self::HALF, Self::CORNER_HZ)
     }
 
     /// Creates a filter with `half` taps on either side of the middle one.
-    #[must_use]
     pub fn new(half: usize, corner_hz: f64) -> Self {
         let tap = |k: usize| {
             let from_middle = k as f64 - half as f64;
@@ -43,19 +41,16 @@ impl LowPass {
     }
 
     /// Returns the delay, samples.
-    #[must_use]
     pub fn delay(&self) -> usize {
         self.taps.len() / 2
     }
 
     /// Returns the multiplications per sample, when samples with equal taps are added first.
-    #[must_use]
     pub fn multiplications(&self) -> usize {
         self.taps.len() / 2 + 1
     }
 
     /// Returns the filtered values, each at the time of its input ([`Line`]).
-    #[must_use]
     pub fn filter(&self, input: &[f64]) -> Vec<f64> {
         let mut line = Line::new(self.clone());
         let mut filtered: Vec<f64> = input.iter().filter_map(|value| line.next(*value)).collect();
@@ -77,7 +72,6 @@ pub struct Line {
 
 impl Line {
     /// Starts before the first input.
-    #[must_use]
     pub fn new(filter: LowPass) -> Self {
         let inputs = VecDeque::with_capacity(filter.taps.len() + 1);
         Self { filter, inputs, due: 0 }

@@ -38,7 +38,6 @@ pub enum Reference {
 
 impl Reference {
     /// The yaw rates; `None` for a course.
-    #[must_use]
     pub fn rate(&self) -> Option<&[f64]> {
         match self {
             Self::Rate(rate) => Some(rate),
@@ -48,7 +47,6 @@ impl Reference {
 
     /// The heading error of an estimated yaw rate; `None` for less than a second of yaw rate or less than 20 s of
     /// course, or another number of samples.
-    #[must_use]
     pub fn errors(&self, estimate: &[f64]) -> Option<Errors> {
         match self {
             Self::Rate(reference) if reference.len() == estimate.len() => {
@@ -69,7 +67,6 @@ impl Reference {
 /// The heading error of one yaw rate on one drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
-    /// The figures.
     pub figures: HeadingError,
     /// The median absolute change of the error in 10 s, rad, to 5 mrad. It is large if rate and reference differ in
     /// sign or unit, or are not from the same drive.
@@ -93,13 +90,11 @@ pub struct HeadingError {
 
 impl HeadingError {
     /// The figure by which methods are compared: the 1 s error, or the RMS over the drive if there is none.
-    #[must_use]
     pub fn compared(&self) -> Option<f64> {
         self.mean_1s_rad.or(self.rms_rad)
     }
 
     /// The mean of each figure over the drives that have it.
-    #[must_use]
     pub fn mean(errors: &[Self]) -> Self {
         let mean = |of: fn(&Self) -> Option<f64>| mean(errors.iter().filter_map(of));
         Self {
@@ -244,7 +239,6 @@ impl Default for AgainstRate {
 
 impl AgainstRate {
     /// Starts before the first sample.
-    #[must_use]
     pub fn new() -> Self {
         let mut changes = Changes::new(1, 1);
         changes.add(Some(0.0));
@@ -261,7 +255,6 @@ impl AgainstRate {
     }
 
     /// The errors so far; `None` for less than a second.
-    #[must_use]
     pub fn errors(&self) -> Option<Errors> {
         (self.samples >= SECOND).then(|| self.changes.errors(self.angle))
     }
@@ -301,14 +294,12 @@ impl Blocks {
         if self.samples == BLOCK_S * SECOND { self.end() } else { None }
     }
 
-    /// Ends the block, if it has begun.
     pub fn end(&mut self) -> Option<Option<f64>> {
         let Self { known, samples } = std::mem::take(self);
         (samples > 0).then(|| if known.len() < BLOCK_VALUES { None } else { median(known) })
     }
 }
 
-/// The heading error against a course, in progress.
 #[derive(Debug, Clone)]
 pub struct AgainstCourse {
     off: OffCourse,
@@ -333,7 +324,6 @@ impl Default for AgainstCourse {
 
 impl AgainstCourse {
     /// Starts before the first sample.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             off: OffCourse::default(),
@@ -368,7 +358,6 @@ impl AgainstCourse {
     }
 
     /// The errors so far; `None` for less than 20 s of course.
-    #[must_use]
     pub fn errors(mut self) -> Option<Errors> {
         let (first, last) = self.known?;
         if self.aligned.is_none() {
@@ -429,7 +418,6 @@ impl BiasByCourse {
     }
 
     /// The bias, rad/s; `None` if less than 20 s of course are known.
-    #[must_use]
     pub fn get(&self) -> Option<f64> {
         let known = self.last - self.first?;
         (known >= ALIGNED as f64 * DT).then_some(self.both / self.square)

@@ -3,7 +3,6 @@
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-/// The gyro that a method starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gyro {
     /// The gyro of the inertial sensor.
@@ -23,7 +22,6 @@ pub struct Method {
     pub key: &'static str,
     /// The name in tables.
     pub name: &'static str,
-    /// The gyro that the method starts from.
     pub gyro: Gyro,
 }
 
@@ -37,7 +35,6 @@ const fn fog(key: &'static str, name: &'static str) -> Method {
 
 impl Method {
     /// Returns the method of another program. The name is leaked; a command line has only a few.
-    #[must_use]
     pub fn given(name: &str) -> Self {
         let name = String::leak(name.to_owned());
         Self { key: name, name, gyro: Gyro::Given }
@@ -69,7 +66,6 @@ impl Method {
     pub const VQF: Self = mems("vqf", "VQF filter");
     /// VQF with wider limits of rest, for a vehicle that vibrates at standstill.
     pub const VQF_VEHICLE: Self = mems("vqf_vehicle", "VQF filter, vehicle's limits of rest");
-    /// The vendor's own heading.
     pub const VENDOR: Self = mems("vendor", "vendor's filter");
     /// GyroNet alone, integer, settled estimates.
     pub const GYRONET: Self = mems("gyronet", "GyroNet");
@@ -131,17 +127,14 @@ impl Method {
         Self::FOG_WHEELS,
     ];
 
-    /// The classical methods of a drive.
     pub const CLASSICAL: [Self; 6] =
         [Self::RAW, Self::STATIC, Self::STATIC_ZERO_RATE, Self::FIR, Self::FIR_ZERO_RATE, Self::VQF];
 }
 
-/// A value for each method of [`Method::ON_A_DRIVE`] that was run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PerMethod<T>([Option<T>; Method::ON_A_DRIVE.len()]);
 
 impl<T> PerMethod<T> {
-    /// The values in the order of [`Method::ON_A_DRIVE`].
     pub fn of(values: [Option<T>; Method::ON_A_DRIVE.len()]) -> Self {
         Self(values)
     }
@@ -159,7 +152,6 @@ impl<T> PerMethod<T> {
             .filter_map(|(method, value)| Some((method, value.as_ref()?)))
     }
 
-    /// The values in the order of [`Method::ON_A_DRIVE`].
     pub fn values(&self) -> &[Option<T>; Method::ON_A_DRIVE.len()] {
         &self.0
     }

@@ -24,7 +24,6 @@ impl YawError {
     /// Compares a yaw rate with the true one, sample by sample, both in rad/s.
     ///
     /// Returns `None` if there is no complete window, or the two differ in length.
-    #[must_use]
     pub fn new(estimate: &[f64], reference: &[f64]) -> Option<Self> {
         let mut sums = YawSums::default();
         estimate.iter().zip(reference).for_each(|(rate, truth)| sums.add(*rate, *truth));
@@ -32,7 +31,6 @@ impl YawError {
     }
 
     /// Returns the mean of each error over several drives; `None` without drives.
-    #[must_use]
     pub fn mean(errors: &[Self]) -> Option<Self> {
         let count = (!errors.is_empty()).then_some(errors.len() as f64)?;
         let mean = |of: fn(&Self) -> f64| errors.iter().map(of).sum::<f64>() / count;
@@ -66,7 +64,6 @@ impl YawSums {
     }
 
     /// The error so far; `None` without a complete window.
-    #[must_use]
     pub fn error(&self) -> Option<YawError> {
         let count = (self.samples >= WINDOW).then_some((self.samples / WINDOW) as f64)?;
         Some(YawError {
@@ -78,7 +75,6 @@ impl YawSums {
 }
 
 /// Returns the angle after each sample of a rate, rad.
-#[must_use]
 pub fn integral(rates: &[f64]) -> Vec<f64> {
     let step = |angle: &mut f64, rate: &f64| {
         *angle += rate * DT;

@@ -33,7 +33,6 @@ pub struct Network<'a> {
 }
 
 impl<'a> Network<'a> {
-    /// Creates a network from an implementation and its shape.
     pub fn new(run: &'a mut (dyn WindowNetwork + Send), shape: Shape) -> Self {
         Self { run, shape }
     }
@@ -67,7 +66,6 @@ pub struct Sample {
 /// What holds for the whole drive.
 #[derive(Debug, Clone)]
 pub struct Comparison {
-    /// The cost of each method.
     pub costs: PerMethod<Cost>,
     /// Whether the drive begins in motion, so that a simulated standstill was inserted before it.
     pub simulated_rest: bool,
@@ -82,9 +80,6 @@ pub(super) fn silent(pipeline: PipelineConfig) -> Config {
 
 /// Runs every method, and passes each sample to `visit`. All networks run in the same pipeline; the pipeline without a
 /// network is [`STATIC_ZERO_RATE`](crate::evaluate::methods::Method::STATIC_ZERO_RATE).
-///
-/// # Errors
-/// [`ReplayError`], if static initialisation fails and there is no course with which to simulate a standstill.
 pub fn run(
     drive: &Drive<'_>,
     networks: &mut Networks<'_>,
@@ -233,7 +228,6 @@ pub struct Rates {
 
 impl Rates {
     /// Starts before the first sample of a drive.
-    #[must_use]
     pub fn of(drive: &Drive<'_>) -> Self {
         let wheels = drive.speeds();
         Self {
@@ -246,7 +240,6 @@ impl Rates {
         }
     }
 
-    /// Adds a sample.
     pub fn add(&mut self, Sample { step, rates }: &Sample) {
         let speed = self.wheels.as_mut().map(|wheels| wheels.next(&step.input));
         if !step.is_compared {

@@ -18,7 +18,6 @@ pub enum EvaluateError {
     /// The drive cannot be read or replayed.
     #[error(transparent)]
     Replay(#[from] ReplayError),
-    /// The drive has no reference.
     #[error(
         "{path}: line {line}: no reference to evaluate against: neither a yaw rate (ref_gyr_z, in every row) nor a \
         course (ref_yaw)"
@@ -29,7 +28,6 @@ pub enum EvaluateError {
         /// The first line without a reference.
         line: u64,
     },
-    /// The reference is known for too short a time after static initialisation.
     #[error(
         "{path}: {column} is known for too short a time in the {seconds:.2} s after static initialisation: at least 1 s of \
         yaw rate or 20 s of course is needed"
@@ -42,7 +40,6 @@ pub enum EvaluateError {
         /// Length of the drive after static initialisation, s.
         seconds: f64,
     },
-    /// The gyro and the reference disagree.
     #[error(
         "{path}: {column} disagrees with the gyro by {rad:.2} rad in 10 s: wrong unit or sign (rad, positive to the left), \
         or another drive"
@@ -60,7 +57,6 @@ pub enum EvaluateError {
 /// The errors and the cost of a method.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Row {
-    /// The errors.
     #[serde(flatten)]
     pub error: HeadingError,
     /// The mean of the corrections beyond static initialisation and zero-rate updates, deg/h.
@@ -70,7 +66,6 @@ pub struct Row {
     pub cost: Cost,
 }
 
-/// The headings of the columns that [`columns`] returns.
 pub const COLUMNS: [&str; 10] = [
     "heading error, rad",
     "in 1 s",
@@ -131,7 +126,6 @@ pub struct Comparisons {
 
 impl Comparisons {
     /// Compares the rates; `None` if there is no error to compare.
-    #[must_use]
     pub fn new(rows: &PerMethod<Row>) -> Option<Self> {
         let compare = |ours: Method| {
             let Row { error, cost, .. } = rows[ours];
@@ -175,15 +169,11 @@ pub struct DriveErrors {
     pub simulated_rest: bool,
     /// Our rates compared with the best classical method.
     pub over_best_classical: Option<Comparisons>,
-    /// The errors and the cost of each method.
     pub methods: PerMethod<Row>,
 }
 
 impl DriveErrors {
     /// Runs every method on a drive and compares the rates with its reference. Each sample is passed to `visit`.
-    ///
-    /// # Errors
-    /// [`EvaluateError`], which names the file.
     pub fn of(
         drive: &Drive<'_>,
         networks: &mut Networks<'_>,
@@ -319,7 +309,6 @@ pub struct Report {
 
 impl Report {
     /// Creates a report of the drives and computes the means.
-    #[must_use]
     pub fn new(drives: Vec<DriveErrors>) -> Self {
         let mut names: Vec<&String> = Vec::new();
         for drive in &drives {

@@ -17,9 +17,6 @@ const FLICKER: f64 = 1e-3;
 
 /// Reads the drive for its means, and returns it with the simulated standstill before it; `None` without 20 s of
 /// course.
-///
-/// # Errors
-/// [`DataError`].
 pub fn before<'a>(drive: &Drive<'a>) -> Result<Option<Drive<'a>>, DataError> {
     let (mut first, mut count, mut force, mut rate) = (None, 0.0, [0.0; 3], [0.0; 3]);
     let mut course = BiasByCourse::default();

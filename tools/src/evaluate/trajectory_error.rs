@@ -1,4 +1,4 @@
-//! This module computes the absolute trajectory error (ATE) of a dead-reckoned path, with and without alignment.
+//! Computes the absolute trajectory error (ATE) of a dead-reckoned path, with and without alignment.
 //!
 //! The paper says "using evo" but not whether rmse or mean, so both are computed. Alignment is Umeyama's (IEEE PAMI
 //! 13(4), 1991) without scale, in the plane: with the centred points as vectors, the rotation is
@@ -22,7 +22,6 @@ pub struct TrajectoryError {
 
 impl TrajectoryError {
     /// Compares two paths point by point; `None` if there are no points, or the paths differ in length.
-    #[must_use]
     pub fn new(estimate: &[Point], truth: &[Point]) -> Option<Self> {
         if estimate.len() != truth.len() || estimate.is_empty() {
             return None;
@@ -40,7 +39,6 @@ impl TrajectoryError {
     }
 
     /// Compares after the estimate is aligned with the truth ([`Alignment`]).
-    #[must_use]
     pub fn aligned(estimate: &[Point], truth: &[Point]) -> Option<Self> {
         let alignment = Alignment::new(estimate, truth)?;
         let laid: Vec<Point> = estimate.iter().map(|point| alignment.apply(*point)).collect();
@@ -60,7 +58,6 @@ pub struct Alignment {
 impl Alignment {
     /// Computes the alignment with the least squared distances; its rotation is zero if all points are the same.
     /// Returns `None` if there are no points, or the paths differ in length.
-    #[must_use]
     pub fn new(estimate: &[Point], truth: &[Point]) -> Option<Self> {
         if estimate.len() != truth.len() || estimate.is_empty() {
             return None;
@@ -78,7 +75,6 @@ impl Alignment {
     }
 
     /// Returns the aligned position of a point of the estimate.
-    #[must_use]
     pub fn apply(&self, [x, y]: Point) -> Point {
         let (sin, cos) = (libm::sin(self.yaw), libm::cos(self.yaw));
         [x * cos - y * sin + self.shift[0], x * sin + y * cos + self.shift[1]]

@@ -34,7 +34,6 @@ pub struct Heading {
 
 impl Heading {
     /// Starts a filter.
-    #[must_use]
     pub fn new(filter: VQF) -> Self {
         Self { filter, yaw: None }
     }
@@ -49,20 +48,17 @@ impl Heading {
     }
 }
 
-/// Runs a filter over all samples ([`Heading::rate`]).
 pub fn rates(filter: VQF, samples: impl Iterator<Item = ([f64; 3], [f64; 3])>) -> Vec<f64> {
     let mut heading = Heading::new(filter);
     samples.map(|(gyro, force)| heading.rate(gyro, force)).collect()
 }
 
 /// Returns a filter with the published parameters.
-#[must_use]
 pub fn published() -> VQF {
     VQF::new(DT, None, None, None)
 }
 
 /// Returns a filter that estimates the bias at rest only.
-#[must_use]
 pub fn on_a_vehicle() -> VQF {
     let mut filter = published();
     filter.set_motion_bias_est_enabled(false);

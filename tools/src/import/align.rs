@@ -1,4 +1,4 @@
-//! This module finds the offset between the clocks of two files, by cross-correlation of a yaw rate in each.
+//! Finds the offset between the clocks of two files, by cross-correlation of a yaw rate in each.
 //!
 //! Both rates are resampled to 2 Hz, and every lag with enough overlap is tried. Around the best lag they are
 //! compared again at 100 Hz, and a parabola through the best three lags gives the fraction. The correlation
@@ -23,14 +23,9 @@ pub const LONGEST: f64 = 8_192.0;
 pub struct Offset {
     /// Time to add to the times of the second clock, s.
     pub seconds: f64,
-    /// The correlation coefficient at that offset.
     pub coefficient: f64,
 }
 
-/// Returns the offset that aligns the second rate with the first.
-///
-/// # Errors
-/// The reason why no offset is found.
 pub fn offset(first: &Rate, second: &Rate) -> Result<Offset, String> {
     let (first, second) = (beginning(first), beginning(second));
     let (Some(one), Some(two)) = (on_grid(first, STEPS[0]), on_grid(second, STEPS[0])) else {

@@ -1,4 +1,4 @@
-//! This module reads Vector's binary log (BLF): a sequence of objects, most in zlib-compressed containers.
+//! Reads Vector's binary log (BLF): a sequence of objects, most in zlib-compressed containers.
 //!
 //! The crate `ablf` is not used. It decodes only one of the four objects that hold a frame, and prints to standard
 //! output when an object does not begin where it expects.
@@ -22,9 +22,6 @@ const CAN_FD: u32 = 100;
 const CAN_FD_64: u32 = 101;
 
 /// Reads a file, including its magic.
-///
-/// # Errors
-/// The reader's error. Damage is not an error; it is counted.
 pub fn read(input: &mut Input<'_>, bus: Option<&Bus>, log: &mut Log) -> std::io::Result<()> {
     let head = read_up_to(input, 8)?;
     let len = u32_at(&head, 4).unwrap_or_default() as usize;

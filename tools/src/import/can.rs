@@ -1,4 +1,4 @@
-//! This module decodes the signals of CAN frames with a DBC file.
+//! Decodes the signals of CAN frames with a DBC file.
 
 use super::error::ImportError;
 use super::log::Log;
@@ -8,7 +8,6 @@ use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, SignalExtendedValue
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// A CAN frame of a log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Frame<'a> {
     pub(super) seconds: f64,
@@ -55,9 +54,6 @@ enum Kind {
 
 impl Bus {
     /// Reads a DBC file.
-    ///
-    /// # Errors
-    /// [`ImportError`].
     pub fn read(path: &Path) -> Result<Self, ImportError> {
         let name = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|source| ImportError::Io { path: name.clone(), source })?;
@@ -65,9 +61,6 @@ impl Bus {
     }
 
     /// Parses the text of a DBC file.
-    ///
-    /// # Errors
-    /// [`ImportError`].
     pub fn parse(path: &str, text: &str) -> Result<Self, ImportError> {
         let error = |reason: String| ImportError::Dbc { path: path.to_owned(), reason };
         let dbc = Dbc::try_from(text).map_err(|cause| error(cause.to_string()))?;

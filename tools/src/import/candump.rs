@@ -1,4 +1,4 @@
-//! This module reads CAN logs in text form: candump, Vector ASC and PEAK TRC.
+//! Reads CAN logs in text form: candump, Vector ASC and PEAK TRC.
 
 use super::can::{Bus, Frame, add};
 use super::input::{Input, read_line};
@@ -34,9 +34,6 @@ pub fn dialect(head: &[u8]) -> Option<Dialect> {
 }
 
 /// Reads a log.
-///
-/// # Errors
-/// The reader's error. A line that is neither a frame nor a comment is counted.
 pub fn read(
     dialect: Dialect,
     input: &mut Input<'_>,
@@ -226,7 +223,6 @@ impl State {
     }
 }
 
-/// Returns the name of a bus; the first bus has none.
 fn bus_name(bus: &str) -> &str {
     if bus == "1" { "" } else { bus }
 }

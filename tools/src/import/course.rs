@@ -1,4 +1,4 @@
-//! This module computes the GNSS course over ground and its uncertainty, for the column `ref_yaw`.
+//! Computes the GNSS course over ground and its uncertainty, for the column `ref_yaw`.
 //!
 //! A receiver that gives a velocity has the better course, by Doppler. From positions alone, the course at a fix is
 //! the direction of the chord between a fix before it and a fix after it. They are so far apart that the chord is
@@ -31,7 +31,6 @@ pub struct Course {
     pub speed: f64,
 }
 
-/// Returns the course at each fix that has one.
 pub fn courses(fixes: &[(f64, Fix)]) -> Vec<Course> {
     let doppler = fixes.iter().any(|(_, fix)| fix.velocity.is_some());
     let mut courses: Vec<Course> = if doppler {

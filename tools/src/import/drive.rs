@@ -1,4 +1,4 @@
-//! This module makes one drive from one or more logs. It chooses the channels, aligns the clocks and resamples
+//! Makes one drive from one or more logs. It chooses the channels, aligns the clocks and resamples
 //! everything to a 100 Hz grid on the clock of the IMU's file, with one row in memory at a time.
 
 mod clocks;
@@ -31,7 +31,6 @@ pub struct Request {
     pub files: Vec<PathBuf>,
     /// Contents of the vehicle file.
     pub vehicle: Vehicle,
-    /// All files have the same clock.
     pub same_clock: bool,
     /// Time to skip at the beginning, s.
     pub from: f64,
@@ -52,7 +51,6 @@ pub struct Row {
     pub wheels: [Option<f64>; 4],
 }
 
-/// The logs of a drive.
 #[derive(Debug)]
 pub struct Logs {
     files: Vec<File>,
@@ -62,10 +60,6 @@ pub struct Logs {
 }
 
 impl Logs {
-    /// Reads the requested logs.
-    ///
-    /// # Errors
-    /// [`ImportError`].
     pub fn read(request: &Request) -> Result<Self, ImportError> {
         let bus = request.vehicle.bus.dbc.as_deref().map(Bus::read).transpose()?;
         let mut files = Vec::new();
@@ -91,10 +85,6 @@ impl Logs {
         Ok(Self { files, report, dropped })
     }
 
-    /// Makes one drive of the logs.
-    ///
-    /// # Errors
-    /// [`ImportError`].
     pub fn drive<'a>(&'a self, request: &'a Request) -> Result<Drive<'a>, ImportError> {
         let mut report = self.report.clone();
         let selection = select(&self.files, &request.vehicle)?;
@@ -164,7 +154,6 @@ pub struct Drive<'a> {
     pub seen: Seen,
 }
 
-/// Returns all channels of a selection.
 fn channels<'s>(selection: &'s Selection<'_>) -> impl Iterator<Item = &'s Channel<'s>> {
     let others = [&selection.odometry, &selection.position, &selection.reference_rate];
     std::iter::once(&selection.imu)

@@ -3,7 +3,6 @@
 /// The reason why logs cannot be imported.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-#[expect(missing_docs, reason = "the message of each names its fields")]
 pub enum ImportError {
     /// The file cannot be read.
     #[error("{path}: {source}")]

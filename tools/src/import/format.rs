@@ -1,4 +1,4 @@
-//! This module detects the format of a file by its first bytes, and says how to convert formats that cannot be read.
+//! Detects the format of a file by its first bytes, and says how to convert formats that cannot be read.
 
 use super::can::Bus;
 use super::error::ImportError;
@@ -26,9 +26,6 @@ const REFUSED: [(&[u8], &str); 3] = [
 ];
 
 /// Reads a file. `bus` decodes CAN frames, `columns` names the columns of a text table.
-///
-/// # Errors
-/// [`ImportError`]: the file or its format cannot be read.
 pub fn read_file(path: &Path, bus: Option<&Bus>, columns: &Columns) -> Result<Log, ImportError> {
     read_into(path, bus, columns, Log::default())
 }
@@ -48,9 +45,6 @@ pub fn read_into(path: &Path, bus: Option<&Bus>, columns: &Columns, log: Log) ->
 }
 
 /// Reads bytes as the contents of a file of that name.
-///
-/// # Errors
-/// As [`read_file`].
 pub fn read_bytes(
     name: &str,
     mut bytes: &[u8],

@@ -1,4 +1,4 @@
-//! This module resamples samples of any rate to the 100 Hz grid.
+//! Resamples samples of any rate to the 100 Hz grid.
 //!
 //! From 150 Hz on, a row is the mean of the samples within 5 ms of it, which preserves the integral and averages the
 //! noise. Below 150 Hz, a row is interpolated between its neighbours, if they are at most 2.5 periods apart. A row in

@@ -1,4 +1,4 @@
-//! This module reads MCAP files with ROS 1 or ROS 2 messages.
+//! Reads MCAP files with ROS 1 or ROS 2 messages.
 
 use super::input::Input;
 use super::log::Log;

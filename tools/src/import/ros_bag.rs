@@ -1,4 +1,4 @@
-//! This module reads ROS 1 bags, version 2.0: a sequence of records, with messages in compressed chunks.
+//! Reads ROS 1 bags, version 2.0: a sequence of records, with messages in compressed chunks.
 //!
 //! The `rosbag` crate maps the whole file and finds its chunks by the index at the end, which a truncated recording
 //! does not have. This module reads the records in order and does not need the index.
@@ -18,9 +18,6 @@ const MAX_RECORD: u32 = 256 << 20;
 type Connections = BTreeMap<u32, (String, String)>;
 
 /// Reads a bag after its magic.
-///
-/// # Errors
-/// The reader's error. A file that ends within a record is not an error; it is counted.
 pub fn read(input: &mut Input<'_>, log: &mut Log) -> std::io::Result<()> {
     let mut connections = Connections::new();
     loop {
@@ -81,7 +78,6 @@ fn unpack(fields: &Fields<'_>, data: Vec<u8>) -> Result<Vec<u8>, &'static str> {
     Ok(unpacked)
 }
 
-/// Reads the records of a chunk.
 fn records(mut chunk: &[u8], connections: &mut Connections, log: &mut Log) {
     while !chunk.is_empty() {
         let (Some(header), Some(data)) = (block(&mut chunk), block(&mut chunk)) else {

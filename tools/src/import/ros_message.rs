@@ -1,4 +1,4 @@
-//! This module parses ROS messages of the types that a drive can need, in ROS 1 serialisation and in CDR (ROS 2).
+//! Parses ROS messages of the types that a drive can need, in ROS 1 serialisation and in CDR (ROS 2).
 //!
 //! The two differ in three ways: CDR aligns each number to its size, ends a string with a zero, and names its byte
 //! order; a ROS 1 header begins with a sequence number.

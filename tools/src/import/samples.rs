@@ -30,9 +30,6 @@ pub struct Samples {
 
 impl Samples {
     /// Creates the storage with a first sample. Unless `kept`, only both ends and the count are stored.
-    ///
-    /// # Errors
-    /// The error of the temporary file.
     pub(super) fn new(first: Sample, kept: bool) -> io::Result<Self> {
         let mut samples = Self {
             ends: [first; 2],
@@ -47,9 +44,6 @@ impl Samples {
     }
 
     /// Adds a sample of the same kind as the first one.
-    ///
-    /// # Errors
-    /// The error of the temporary file.
     pub(super) fn push(&mut self, sample: Sample) -> io::Result<()> {
         self.ends[1] = sample;
         self.count += 1;
@@ -70,33 +64,25 @@ impl Samples {
         Ok(())
     }
 
-    /// Returns the kind of all samples.
-    #[must_use]
     pub fn kind(&self) -> Kind {
         self.ends[0].1.kind()
     }
 
-    /// Returns the first sample.
-    #[must_use]
     pub fn first(&self) -> Sample {
         self.ends[0]
     }
 
-    /// Returns the last sample.
-    #[must_use]
     pub fn last(&self) -> Sample {
         self.ends[1]
     }
 
     /// Returns the number of samples.
-    #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "a channel begins with a sample")]
     pub fn len(&self) -> usize {
         self.count
     }
 
     /// Returns the samples that are kept.
-    #[must_use]
     pub fn iter(&self) -> Iter<'_> {
         let file =
             self.file.as_ref().map(|file| file.reopen().map(|file| BufReader::with_capacity(1 << 16, file)));
@@ -113,7 +99,6 @@ impl Samples {
     }
 
     /// Returns the reason why [`Samples::iter`] ended early, if it did.
-    #[must_use]
     pub fn failure(&self) -> Option<io::Error> {
         self.failed.get().map(|error| io::Error::new(error.kind(), format!("temporary file: {error}")))
     }

@@ -1,4 +1,4 @@
-//! This module chooses the channels of a drive from several files: by type if only one fits, by name if several fit.
+//! Chooses the channels of a drive from several files: by type if only one fits, by name if several fit.
 
 use super::error::ImportError;
 use super::grid::Stream;
@@ -49,9 +49,6 @@ pub fn numbers(vehicle: &Vehicle) -> Vec<String> {
 }
 
 /// Chooses the channels.
-///
-/// # Errors
-/// [`ImportError`], which lists the candidates.
 pub fn select<'a>(files: &'a [File], vehicle: &'a Vehicle) -> Result<Selection<'a>, ImportError> {
     let signals = &vehicle.signals;
     let imu = by_type(files, Kind::Imu, "imu", signals.imu.as_deref())?;

@@ -1,4 +1,4 @@
-//! This module reads text tables: a CSV with any column names, by a column map, and exports of Xsens MT Manager.
+//! Reads text tables: a CSV with any column names, by a column map, and exports of Xsens MT Manager.
 //!
 //! Each column of numbers becomes a channel. Three gyro columns and three accelerometer columns become an IMU;
 //! latitude and longitude become a position.
@@ -87,10 +87,6 @@ impl Time {
     }
 }
 
-/// Reads a table.
-///
-/// # Errors
-/// [`TableError`]. A row that is truncated or has text instead of a number is counted.
 pub fn read(input: &mut Input<'_>, columns: &Columns, log: &mut Log) -> Result<(), TableError> {
     let (header, rate) = header(input)?;
     let (header, separator) = header;

@@ -1,4 +1,4 @@
-//! This module reads PX4 ULog files with the `px4-ulog` crate: the combined IMU, GNSS and wheel encoders.
+//! Reads PX4 ULog files with the `px4-ulog` crate: the combined IMU, GNSS and wheel encoders.
 //!
 //! PX4's body axes are x forward, y right, z down; they are converted to y left, z up.
 
@@ -17,9 +17,6 @@ const HEAD: usize = 16;
 ///
 /// The crate panics on records that are too short, so it gets only the kinds of records that a drive needs, one at a
 /// time, after a check of their length.
-///
-/// # Errors
-/// The reader's error.
 pub fn read(input: &mut Input<'_>, log: &mut Log) -> std::io::Result<()> {
     let mut take = |message: &DataMessage<'_>| add(message, log);
     let mut parser = LogParser::default();
@@ -80,7 +77,6 @@ fn add(message: &DataMessage<'_>, log: &mut Log) {
     }
 }
 
-/// The fields of a message, by name.
 struct Fields<'a>(&'a DataMessage<'a>);
 
 impl Fields<'_> {

@@ -38,8 +38,6 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Returns the name of the kind for messages.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Imu => "IMU",
@@ -52,7 +50,6 @@ impl Kind {
 
 impl Value {
     /// Returns the kind of channel that has such values.
-    #[must_use]
     pub fn kind(&self) -> Kind {
         match self {
             Self::Imu(..) => Kind::Imu,

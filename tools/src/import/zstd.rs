@@ -1,4 +1,4 @@
-//! This module decompresses the zstd chunks of an MCAP file with `ruzstd`; the MCAP crate uses a C library.
+//! Decompresses the zstd chunks of an MCAP file with `ruzstd`; the MCAP crate uses a C library.
 
 use mcap::sans_io::decompressor::{DecompressResult, Decompressor};
 use mcap::{McapError, McapResult};

@@ -1,4 +1,4 @@
-//! This module reads the f32 checkpoints of GyroNet and FoGNet that `tools/train` exports.
+//! Reads the f32 checkpoints of GyroNet and FoGNet that `tools/train` exports.
 
 pub use super::tensors::CheckpointError;
 
@@ -77,23 +77,14 @@ pub struct Checkpoint<N> {
 
 impl<N: Network> Checkpoint<N> {
     /// Reads a file.
-    ///
-    /// # Errors
-    /// [`CheckpointError`], which names the file and the tensor.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
         Ok(Self { tensors: Tensors::read(path, N::shapes)?, network: PhantomData })
     }
 
-    /// Parses the bytes of a checkpoint; `name` is its name in errors.
-    ///
-    /// # Errors
-    /// [`CheckpointError`] with that name.
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self, CheckpointError> {
         Ok(Self { tensors: Tensors::parse(name, bytes, N::shapes)?, network: PhantomData })
     }
 
-    /// Returns all tensors.
-    #[must_use]
     pub fn tensors(&self) -> &Tensors {
         &self.tensors
     }
@@ -108,14 +99,12 @@ const LINEAR: &str = "linear.weight";
 
 impl Checkpoint<GyroNet> {
     /// Returns the shape of the network: the units of the Bi-LSTMs, and whether it has a linear part.
-    #[must_use]
     pub fn shape(&self) -> blob::Shape {
         let units = self.bilstms().map_or(0, |network| network.lstm1[0].units());
         blob::Shape { units: units as u16, linear: self.linear().is_some() }
     }
 
     /// Returns the weights of the linear part.
-    #[must_use]
     pub fn linear(&self) -> Option<&[f32]> {
         self.tensors.has(LINEAR).then(|| self.tensors.tensor(LINEAR))
     }
@@ -131,13 +120,11 @@ impl Checkpoint<GyroNet> {
     }
 
     /// Returns the weights of layer 1 or 2, forward or backward.
-    #[must_use]
     pub fn direction(&self, layer: usize, backward: bool) -> LstmWeights<'_> {
         self.tensors.direction(&format!("lstm{layer}"), 0, backward)
     }
 
     /// Returns the f32 network over these tensors.
-    #[must_use]
     pub fn network(&self) -> GyroNetF32<'_> {
         GyroNetF32 {
             input_mean: self.features("input_mean"),
@@ -151,15 +138,11 @@ impl Checkpoint<GyroNet> {
 
 impl Checkpoint<FogNet> {
     /// Returns whether a file is a checkpoint of FoGNet, by the names of its tensors.
-    ///
-    /// # Errors
-    /// [`CheckpointError`], which names the file.
     pub fn is_in(path: &Path) -> Result<bool, CheckpointError> {
         Tensors::names(path).map(|names| names.iter().any(|name| name == "fc4.weight"))
     }
 
     /// Returns the f32 network over these tensors.
-    #[must_use]
     pub fn network(&self) -> FogNetF32<'_> {
         let dense = |name: &str| {
             let [weight, bias] =

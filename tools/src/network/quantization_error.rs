@@ -1,4 +1,4 @@
-//! This module measures the error that quantisation adds, by comparing the integer and the f32 network on each
+//! Measures the error that quantisation adds, by comparing the integer and the f32 network on each
 //! window.
 
 use gyronet::model::fognet::{FogEstimate, MinuteNetwork};
@@ -19,7 +19,6 @@ pub struct Both<'n, I, F> {
 pub struct QuantizationError {
     /// Number of windows that were compared.
     pub windows: u64,
-    /// Number of inputs that the integer network clamped.
     pub clamped_inputs: u64,
     squared_difference: f64,
     squared_reference: f64,
@@ -28,7 +27,6 @@ pub struct QuantizationError {
 
 impl QuantizationError {
     /// Returns the RMS of the difference over the RMS of the f32 output; zero before the first window.
-    #[must_use]
     pub fn relative_rms(&self) -> f64 {
         if self.squared_reference > 0.0 {
             (self.squared_difference / self.squared_reference).sqrt()
@@ -38,7 +36,6 @@ impl QuantizationError {
     }
 
     /// Returns the RMS of the ratio of the scales less one; zero before the first window.
-    #[must_use]
     pub fn scale_rms(&self) -> f64 {
         if self.windows > 0 { (self.squared_scale / self.windows as f64).sqrt() } else { 0.0 }
     }
@@ -51,7 +48,6 @@ impl<'n, I, F> Both<'n, I, F> {
     }
 
     /// Returns the error so far.
-    #[must_use]
     pub fn error(&self) -> QuantizationError {
         self.error
     }

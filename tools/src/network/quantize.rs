@@ -1,4 +1,4 @@
-//! This module quantises an f32 checkpoint to a weight file with int8 rows, packed in the order in which the kernels
+//! Quantises an f32 checkpoint to a weight file with int8 rows, packed in the order in which the kernels
 //! read.
 //!
 //! Each gate row has one scale. It is chosen so that the largest weight becomes at most 127 and the multiplier is an
@@ -39,10 +39,8 @@ pub enum QuantizeError {
     Constant {
         /// The name of the constant.
         what: String,
-        /// Its value.
         value: f64,
     },
-    /// The provenance does not name the gyro that FoGNet was trained for.
     #[error(
         "the checkpoint does not name its gyro: train with --gyro, and with --serial if the weights are for one gyro only"
     )]
@@ -72,9 +70,6 @@ impl Report {
 }
 
 /// Quantises a checkpoint of GyroNet; returns the weight file and its figures.
-///
-/// # Errors
-/// [`QuantizeError`].
 pub fn quantize(checkpoint: &Checkpoint<GyroNet>) -> Result<(Vec<u8>, Report), QuantizeError> {
     let mut report = Report::new();
     let clamp = (INPUT_CLAMP_STD * f64::from(HIDDEN_MAX)) as i32;

@@ -1,4 +1,4 @@
-//! This module reads a checkpoint file (safetensors) and checks that a network's tensors exist, fit and are
+//! Reads a checkpoint file (safetensors) and checks that a network's tensors exist, fit and are
 //! finite.
 
 use gyronet::nn::reference::LstmWeights;
@@ -26,12 +26,10 @@ pub enum CheckpointError {
         /// The reader's error.
         source: safetensors::SafeTensorError,
     },
-    /// A tensor that the network needs is missing.
     #[error("{name}: tensor {tensor} is missing")]
     Missing {
         /// The file.
         name: String,
-        /// The tensor.
         tensor: String,
     },
     /// A tensor does not have the shape and element type that the network needs.
@@ -39,7 +37,6 @@ pub enum CheckpointError {
     Shape {
         /// The file.
         name: String,
-        /// The tensor.
         tensor: String,
         /// Type and shape as found.
         found: String,
@@ -51,7 +48,6 @@ pub enum CheckpointError {
     NotFinite {
         /// The file.
         name: String,
-        /// The tensor.
         tensor: String,
         /// Index of the element.
         at: usize,
@@ -92,7 +88,6 @@ pub(crate) fn dense(name: &str, inputs: usize, outputs: usize) -> [Shape; 2] {
     [tensor(&format!("{name}.weight"), &[outputs, inputs]), tensor(&format!("{name}.bias"), &[outputs])]
 }
 
-/// The tensors of a network.
 #[derive(Debug, Clone)]
 pub struct Tensors {
     tensors: BTreeMap<String, Vec<f32>>,
@@ -103,7 +98,6 @@ pub struct Tensors {
 }
 
 impl Tensors {
-    /// Returns the names of all tensors in a file.
     pub(crate) fn names(path: &Path) -> Result<Vec<String>, CheckpointError> {
         let bytes =
             std::fs::read(path).map_err(|source| CheckpointError::Io { path: path.to_owned(), source })?;
@@ -158,12 +152,10 @@ impl Tensors {
     ///
     /// # Panics
     /// If the network has no tensor of this name.
-    #[must_use]
     pub fn tensor(&self, name: &str) -> &[f32] {
         self.tensors.get(name).unwrap_or_else(|| panic!("the network has no tensor {name}"))
     }
 
-    /// Returns the weights of one layer of an LSTM, forward or backward.
     pub(crate) fn direction(&self, lstm: &str, layer: usize, backward: bool) -> LstmWeights<'_> {
         let tensor = |what: &str| {
             self.tensor(&format!("{lstm}.{what}_l{layer}{}", if backward { "_reverse" } else { "" }))

@@ -1,4 +1,4 @@
-//! This module reads a weight file (`.blob`) from disk into memory with the alignment that the library needs.
+//! Reads a weight file (`.blob`) from disk into memory with the alignment that the library needs.
 
 use gyronet::model::{Blob, BlobError, FogBlob};
 use std::path::Path;
@@ -10,7 +10,6 @@ pub enum WeightFileError {
     /// The file cannot be read.
     #[error("{path}: {source}")]
     Io {
-        /// The file.
         path: String,
         /// The system's error.
         source: std::io::Error,
@@ -18,7 +17,6 @@ pub enum WeightFileError {
     /// The library rejects the file.
     #[error("{path}: {source}")]
     Blob {
-        /// The file.
         path: String,
         /// The reason.
         source: BlobError,
@@ -36,25 +34,16 @@ pub struct WeightFile {
 
 impl WeightFile {
     /// Reads and checks a weight file of GyroNet.
-    ///
-    /// # Errors
-    /// [`WeightFileError`], which names the file.
     pub fn read(path: &Path) -> Result<Self, WeightFileError> {
         Self::parse(&path.display().to_string(), &bytes(path)?)
     }
 
     /// Reads and checks a weight file of FoGNet.
-    ///
-    /// # Errors
-    /// [`WeightFileError`], which names the file.
     pub fn read_fognet(path: &Path) -> Result<Self, WeightFileError> {
         Self::parse_fognet(&path.display().to_string(), &bytes(path)?)
     }
 
     /// Checks the bytes of a weight file of GyroNet; `path` is its name in errors.
-    ///
-    /// # Errors
-    /// [`WeightFileError::Blob`] with that path.
     pub fn parse(path: &str, bytes: &[u8]) -> Result<Self, WeightFileError> {
         let file = Self::copy(path, bytes);
         file.blob()?;
@@ -62,9 +51,6 @@ impl WeightFile {
     }
 
     /// Checks the bytes of a weight file of FoGNet; `path` is its name in errors.
-    ///
-    /// # Errors
-    /// [`WeightFileError::Blob`] with that path.
     pub fn parse_fognet(path: &str, bytes: &[u8]) -> Result<Self, WeightFileError> {
         let file = Self::copy(path, bytes);
         file.fog_blob()?;
@@ -72,17 +58,11 @@ impl WeightFile {
     }
 
     /// Returns GyroNet's weights.
-    ///
-    /// # Errors
-    /// [`WeightFileError::Blob`]; never, once [`WeightFile::parse`] has succeeded.
     pub fn blob(&self) -> Result<Blob<'_>, WeightFileError> {
         Blob::new_checked(self.bytes()).map_err(|source| self.refused(source))
     }
 
     /// Returns FoGNet's weights.
-    ///
-    /// # Errors
-    /// [`WeightFileError::Blob`]; never, once [`WeightFile::parse_fognet`] has succeeded.
     pub fn fog_blob(&self) -> Result<FogBlob<'_>, WeightFileError> {
         FogBlob::new_checked(self.bytes()).map_err(|source| self.refused(source))
     }

@@ -1,4 +1,4 @@
-//! This module sends bursts of an ADIS16465-2 through the driver and a simulated SPI bus.
+//! Sends bursts of an ADIS16465-2 through the driver and a simulated SPI bus.
 //!
 //! The part sends 16 bits of each reading and no time: the driver stamps a sample with the time of its read.
 

@@ -1,4 +1,4 @@
-//! This module sends increments of a three-axis fibre-optic gyro at 1 kHz; [`FogGrid`] sums them on the grid. The
+//! Sends increments of a three-axis fibre-optic gyro at 1 kHz; [`FogGrid`] sums them on the grid. The
 //! recorded accelerometer is used with it, since the part has none.
 //!
 //! A row's rate is taken as that of the 10 ms before it: ten messages in format B with a tenth of its angle each. The

@@ -1,4 +1,4 @@
-//! This module sends 20-bit FIFO packets through the driver and a simulated SPI bus: reset, identity, settings,
+//! Sends 20-bit FIFO packets through the driver and a simulated SPI bus: reset, identity, settings,
 //! packets, and the register that is checked with each packet.
 
 use super::{Part, Sent, ViaError};

@@ -1,4 +1,4 @@
-//! This module sends MTData2 messages in single precision through the parser, byte by byte.
+//! Sends MTData2 messages in single precision through the parser, byte by byte.
 
 use super::{Part, Sent, ViaError};
 use crate::drive::recording::Recording;

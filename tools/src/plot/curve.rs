@@ -1,4 +1,4 @@
-//! This module thins the points of a curve and finds their range.
+//! Thins the points of a curve and finds their range.
 
 /// Returns every n-th point so that at most `most` are left, and the last point.
 pub fn thinned(

@@ -1,4 +1,4 @@
-//! This module writes an HTML page that loads no other files. The page is readable without a script; the script adds
+//! Writes an HTML page that loads no other files. The page is readable without a script; the script adds
 //! zooming.
 
 pub mod chart;
@@ -7,11 +7,9 @@ use std::fmt::{Display, Write};
 
 const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/zoom.js");
-/// The hint of a page with charts.
 pub const HINT: &str = "Drag over a chart, or press + and - on it, to zoom; tap a name to hide its curve.";
 
 /// Returns a complete page around its body.
-#[must_use]
 pub fn document(title: &str, body: &str) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\">\
@@ -23,7 +21,6 @@ pub fn document(title: &str, body: &str) -> String {
 }
 
 /// Returns a table; an empty caption is left out. The first column is text, the others are figures.
-#[must_use]
 pub fn table<C: Display>(
     class: &str,
     caption: &str,
@@ -51,13 +48,11 @@ pub fn table<C: Display>(
 }
 
 /// Returns text with the special characters of HTML escaped.
-#[must_use]
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// Formats a count with thousands separators: 1,162,256.
-#[must_use]
 pub fn grouped(count: u64) -> String {
     let digits = count.to_string();
     let mut text = String::new();

@@ -1,4 +1,4 @@
-//! This module draws figures as SVG: panels of lines, bars or dots under a title and a legend.
+//! Draws figures as SVG: panels of lines, bars or dots under a title and a legend.
 //!
 //! The caller gives points, ranges and names. Lines are thinned to about one point per pixel, and cut at the edges of
 //! their panel, because SVG would draw them beyond it.
@@ -47,11 +47,9 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    /// The stroke of the truth: black.
     pub const TRUTH: Self = Self::solid(BLACK, 3);
 
     /// Returns a solid line of a width in pixels.
-    #[must_use]
     pub const fn solid(color: Color, width: u32) -> Self {
         Self { color, width, dash: None }
     }
@@ -90,7 +88,6 @@ pub struct Axis<'a> {
 
 impl<'a> Axis<'a> {
     /// Returns an axis of plain numbers.
-    #[must_use]
     pub fn new(label: &'a str, range: (f64, f64)) -> Self {
         Self { label, range, ticks: 10, format: &number, room: 66 }
     }
@@ -116,15 +113,10 @@ pub struct Figure<'a> {
     pub side_by_side: bool,
     /// The name and stroke of each line.
     pub legend: Vec<(String, Stroke)>,
-    /// The panels.
     pub panels: Vec<Panel<'a>>,
 }
 
 impl Figure<'_> {
-    /// Returns the figure as SVG.
-    ///
-    /// # Errors
-    /// [`PlotError`], if the plotting library fails.
     pub fn svg(&self) -> Result<String, PlotError> {
         let mut svg = String::new();
         self.draw(&mut svg)?;

@@ -102,7 +102,6 @@ const SETTINGS: &[(&str, Takes)] = &[
 ];
 
 /// The settings that `gyronet device get` prints.
-#[must_use]
 pub fn settings() -> Table {
     let mut table = Table::new(&["setting", "unit", "range", "default"]);
     let defaults = defaults();

@@ -19,7 +19,6 @@ impl Table {
     }
 
     /// An object for each row, with the columns as keys.
-    #[must_use]
     pub fn json(&self) -> Value {
         let object = |row: &Vec<String>| {
             let cells = self.columns.iter().zip(row);

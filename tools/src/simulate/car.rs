@@ -1,4 +1,4 @@
-//! This module simulates the motion of the car on a plane, with road grade and bank and a body on springs.
+//! Simulates the motion of the car on a plane, with road grade and bank and a body on springs.
 //!
 //! Axes are x forward, y left, z up; rotations are heading, pitch and roll in that order. The sensor is at the
 //! centre, without a lever arm. The formulas are in any text on vehicle dynamics, for example Rajamani, Vehicle
@@ -131,7 +131,6 @@ impl Slope {
     }
 }
 
-/// A car that follows a route.
 #[derive(Debug, Clone)]
 pub struct Car<W = Route> {
     config: Config,
@@ -152,7 +151,6 @@ pub struct Car<W = Route> {
 
 impl Car {
     /// Starts at rest on the short course of [`Route`].
-    #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
         Self::on(config, Route::new(seed), seed)
     }
@@ -160,7 +158,6 @@ impl Car {
 
 impl<W: Iterator<Item = Leg>> Car<W> {
     /// Starts at rest on a route, and waits at its end.
-    #[must_use]
     pub fn on(config: &Config, mut way: W, seed: u64) -> Self {
         let mut road = Purpose::Road.stream(seed);
         let (first, second) = (next_leg(&mut way), next_leg(&mut way));
@@ -262,14 +259,12 @@ fn next_leg(way: &mut impl Iterator<Item = Leg>) -> Leg {
 }
 
 /// Converts a vector from the level frame to the axes of a body that is pitched, then rolled.
-#[must_use]
 pub fn turned_in([x, y, z]: [f64; 3], pitch: f64, roll: f64) -> [f64; 3] {
     let (sp, cp, sr, cr) = (libm::sin(pitch), libm::cos(pitch), libm::sin(roll), libm::cos(roll));
     let (x, z) = (x * cp - z * sp, x * sp + z * cp);
     [x, y * cr + z * sr, -y * sr + z * cr]
 }
 
-/// Returns the body rates from the heading rate and the (angle, rate) of pitch and roll.
 fn body_rates(heading: f64, (pitch, pitch_rate): (f64, f64), (roll, roll_rate): (f64, f64)) -> [f64; 3] {
     let (sp, cp, sr, cr) = (libm::sin(pitch), libm::cos(pitch), libm::sin(roll), libm::cos(roll));
     [roll_rate - heading * sp, pitch_rate * cr + heading * cp * sr, -pitch_rate * sr + heading * cp * cr]

@@ -1,4 +1,4 @@
-//! This module writes a simulated drive in the layout of [`crate::drive::recording`].
+//! Writes a simulated drive in the layout of [`crate::drive::recording`].
 
 use super::{Config, Sample, Simulation};
 use gyronet::sample::RATE_HZ;
@@ -9,9 +9,6 @@ pub const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_x,ref_
                           wheel1_rate,wheel2_rate,wheel3_rate,wheel4_rate";
 
 /// Writes a complete drive; returns the number of samples.
-///
-/// # Errors
-/// The writer's error.
 pub fn write(config: &Config, mut out: impl Write) -> io::Result<u32> {
     let temperature = if config.warming.is_some() { ",temp_c" } else { "" };
     writeln!(out, "{HEADER}{temperature}")?;

@@ -21,7 +21,6 @@ pub enum Leg {
 
 impl Leg {
     /// Returns the highest speed in the leg, m/s.
-    #[must_use]
     pub fn speed(&self) -> f64 {
         match *self {
             Self::Stand { .. } => 0.0,
@@ -31,7 +30,6 @@ impl Leg {
 
     /// Returns the curvature at a distance along the leg, 1/m. It is a sine squared: the driver steers in and back
     /// smoothly.
-    #[must_use]
     pub fn curvature(&self, along: f64) -> f64 {
         match *self {
             Self::Stand { .. } => 0.0,

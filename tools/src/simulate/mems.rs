@@ -1,4 +1,4 @@
-//! This module adds the errors of the MEMS sensor: bias random walk, white noise, scale error, misalignment.
+//! Adds the errors of the MEMS sensor: bias random walk, white noise, scale error, misalignment.
 //!
 //! The model is the paper's sensor model (equations 1 and 2) with scale error, misalignment and, if configured, the
 //! gyro's sensitivity to specific force.
@@ -108,7 +108,6 @@ pub struct Mems {
 
 impl Mems {
     /// Creates the part of a seed.
-    #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
         let mut random = Purpose::Mems.stream(seed);
         let mut triad = |noise, walk, bias| {
@@ -122,7 +121,6 @@ impl Mems {
 
     /// Creates the part of a device seed in one run: scale, misalignment and the gyro's sensitivity to force come
     /// from the device, bias at power-on and noise from the run.
-    #[must_use]
     pub fn of_device(config: &Config, device: u64, run: u64) -> Self {
         let mut fixed = Purpose::Device.stream(device);
         let mut random = Purpose::Mems.stream(run);
@@ -137,7 +135,6 @@ impl Mems {
     }
 
     /// Converts a vector from the car's axes to the part's nominal axes.
-    #[must_use]
     pub fn tilt(&self, vector: [f64; 3]) -> [f64; 3] {
         let [pitch, roll] = self.mount;
         turned_in(vector, pitch, roll)

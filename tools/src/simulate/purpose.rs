@@ -5,7 +5,6 @@ use crate::random::Random;
 
 /// The purpose of a stream of random numbers.
 #[derive(Debug, Clone, Copy)]
-#[allow(missing_docs, reason = "the names say it")]
 pub enum Purpose {
     Route,
     Road,
@@ -22,7 +21,6 @@ pub enum Purpose {
 }
 
 impl Purpose {
-    /// Starts the stream of this purpose.
     pub fn stream(self, seed: u64) -> Random {
         Random::new(seed, self as u64)
     }

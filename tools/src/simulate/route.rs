@@ -1,4 +1,4 @@
-//! This module generates the driver's route: streets with bends, wide corners and stops, one after another.
+//! Generates the driver's route: streets with bends, wide corners and stops, one after another.
 //!
 //! The car turns at no more than about 0.3 rad/s, as in the recordings, and never parks.
 
@@ -19,8 +19,6 @@ pub struct Route {
 }
 
 impl Route {
-    /// Creates the route of a seed.
-    #[must_use]
     pub fn new(seed: u64) -> Self {
         let mut random = Purpose::Route.stream(seed);
         let side = if random.between(0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
@@ -28,7 +26,6 @@ impl Route {
     }
 
     /// Streets with four stops, then a motorway without a stop.
-    #[must_use]
     pub fn onto_motorway(seed: u64) -> Self {
         Self { streets: 24, ..Self::new(seed) }
     }

@@ -1,4 +1,4 @@
-//! This module simulates the vibration of the sensor by the idling engine and by the road.
+//! Simulates the vibration of the sensor by the idling engine and by the road.
 //!
 //! Each source is a narrow band of noise (a damped oscillator driven by white noise) that moves all axes, each with
 //! its own amplitude and phase. The source defines the angle; the rate is the change of the angle from sample to
@@ -10,7 +10,6 @@ use super::purpose::Purpose;
 use crate::random::Random;
 use std::f64::consts::{PI, TAU};
 
-/// Describes a source of vibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Source {
     /// Centre frequency of the band, Hz.
@@ -131,7 +130,6 @@ impl Shaker {
     }
 }
 
-/// Simulates the vibration of the vehicle.
 #[derive(Debug, Clone)]
 pub struct Vibration {
     random: Random,
@@ -142,7 +140,6 @@ pub struct Vibration {
 
 impl Vibration {
     /// Starts with the engine running.
-    #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
         let mut random = Purpose::Vibration.stream(seed);
         let engine = Shaker::new(config.engine, &mut random);

@@ -8,8 +8,6 @@
 //! | town | the sensor warms up by 15 K with a time constant of 10 min, from 5 to 25 deg C | assumed |
 //! | motorway | 10 K in half an hour, and a drift of 0.01 deg/s per hour from another cause | assumed |
 
-#![allow(missing_docs, reason = "the names say it")]
-
 use super::mems;
 use super::purpose::Purpose;
 
@@ -48,7 +46,6 @@ pub struct Warming {
 }
 
 impl Warming {
-    #[must_use]
     pub fn new(config: &Config, run: u64) -> Self {
         let mut device = Purpose::DeviceWarming.stream(config.device);
         let mut axis = || [0.25 * DEG, 0.005 * DEG, 0.03 * DEG / 900.0].map(|sigma| sigma * device.normal());

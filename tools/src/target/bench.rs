@@ -28,25 +28,16 @@ pub enum BenchError {
     /// A program could not be started.
     #[error("{program} cannot be started: {source}")]
     Start {
-        /// The program.
         program: String,
         /// The system's error.
         source: std::io::Error,
     },
     /// A program ended with an error.
     #[error("{program} failed:\n{output}")]
-    Failed {
-        /// The program.
-        program: String,
-        /// Its error output.
-        output: String,
-    },
+    Failed { program: String, output: String },
     /// A program did not end.
     #[error("{program} did not end within {LIMIT:?}")]
-    TooLong {
-        /// The program.
-        program: String,
-    },
+    TooLong { program: String },
     /// The image printed an unexpected line.
     #[error("the bench image printed an unexpected line: {0}")]
     Line(String),
@@ -82,13 +73,11 @@ impl Counts {
     }
 
     /// Returns the first region of a name.
-    #[must_use]
     pub fn get(&self, name: &str) -> Option<&Count> {
         self.regions.iter().find(|count| count.name == name)
     }
 
     /// Returns whether all windows of a network have the same instruction count, as they must for any input.
-    #[must_use]
     pub fn constant(&self) -> bool {
         ["gyronet/window", "fognet/window"].into_iter().all(|network| {
             let mut windows = self.starting_with(network).map(|count| count.instructions);
@@ -104,7 +93,6 @@ impl Counts {
 }
 
 /// Returns the root of the workspace that this crate was built in; images are built from there.
-#[must_use]
 pub fn workspace() -> PathBuf {
     let tools = Path::new(env!("CARGO_MANIFEST_DIR"));
     tools.parent().unwrap_or(tools).to_owned()
@@ -112,7 +100,6 @@ pub fn workspace() -> PathBuf {
 
 /// Returns cargo's target folder. It is the folder that contains this program if cargo built the program there, so
 /// that `cargo fw` and the commands share one build; otherwise it is the workspace's.
-#[must_use]
 pub fn target_folder() -> PathBuf {
     let program = std::env::current_exe().ok();
     let folder = program.as_deref().and_then(|program| program.ancestors().nth(2));
@@ -122,9 +109,6 @@ pub fn target_folder() -> PathBuf {
 }
 
 /// Checks that rustc has a standard library for the target.
-///
-/// # Errors
-/// A message that says what is missing.
 pub fn target_installed(target: &str) -> Result<(), String> {
     if !workspace().join("memory.x").is_file() {
         return Err("the repository that this program was built in no longer exists".into());
@@ -144,17 +128,11 @@ pub fn target_installed(target: &str) -> Result<(), String> {
 }
 
 /// Builds an image of the firmware for the emulated board under `folder` and returns its path.
-///
-/// # Errors
-/// [`BenchError`] with the compiler's output.
 pub fn build(workspace: &Path, image: &str, folder: &Path) -> Result<PathBuf, BenchError> {
     build_for(("netduino-plus-2", TARGET), workspace, image, folder)
 }
 
 /// Builds an image for a board, named by its features, and its target.
-///
-/// # Errors
-/// [`BenchError`] with the compiler's output.
 pub fn build_for(
     (board, target): (&str, &str),
     workspace: &Path,
@@ -181,9 +159,6 @@ pub fn build_for(
 }
 
 /// Runs the bench image with the plugin and combines its output with the plugin's counts.
-///
-/// # Errors
-/// [`BenchError`], also without a C compiler or where QEMU was built without plugins.
 pub fn measure(workspace: &Path, image: &Path) -> Result<Counts, BenchError> {
     let (stdout, mut regions) = regions(workspace, MACHINE, image)?;
     let mut counts = Counts::default();
@@ -234,9 +209,6 @@ pub(super) fn scratch(workspace: &Path) -> Result<PathBuf, BenchError> {
 }
 
 /// Runs an image on an emulated machine until it ends by itself; returns what the image and the emulator printed.
-///
-/// # Errors
-/// [`BenchError`], also when the image reports a failure.
 pub fn emulate(machine: &str, image: &Path, arguments: &[&str]) -> Result<(String, String), BenchError> {
     let mut qemu = Command::new("qemu-system-arm");
     qemu.args(["-machine", machine, "-nographic", "-monitor", "none"]);

@@ -52,7 +52,6 @@ pub enum CmsisError {
     Output(String),
 }
 
-/// A region of CMSIS-NN's image.
 #[derive(Debug)]
 pub struct Region {
     /// Activations and extent, such as `cmsis-nn/s8/window`.

@@ -1,4 +1,4 @@
-//! This module reads the flash and RAM of a firmware image from its ELF file.
+//! Reads the flash and RAM of a firmware image from its ELF file.
 
 use object::{Object, ObjectSection, ObjectSymbol};
 use std::path::Path;
@@ -42,9 +42,6 @@ pub enum SizeError {
 
 impl ImageSize {
     /// Measures an image.
-    ///
-    /// # Errors
-    /// [`SizeError`] with the file's name.
     pub fn read(path: &Path) -> Result<Self, SizeError> {
         let name = || path.display().to_string();
         let bytes = std::fs::read(path).map_err(|source| SizeError::Io { path: name(), source })?;

@@ -1,4 +1,4 @@
-//! This module computes the deepest stack that a firmware image can need, from its machine code alone.
+//! Computes the deepest stack that a firmware image can need, from its machine code alone.
 //!
 //! A function's own stack use is the sum of its pushes and subtractions from the stack pointer; its calls are read
 //! from its branches. An indirect call may go to any function whose address is anywhere in the image. Recursion, and
@@ -39,7 +39,6 @@ pub enum StackError {
     /// The stack pointer is moved by a register.
     #[error("{function} moves the stack pointer by a register at {address:#010x}")]
     Dynamic {
-        /// The function.
         function: String,
         /// The address of the instruction.
         address: u32,
@@ -47,7 +46,6 @@ pub enum StackError {
     /// A call goes to an address where no function begins.
     #[error("{function} calls {target:#010x}, where no function begins")]
     Target {
-        /// The function.
         function: String,
         /// The called address.
         target: u32,
@@ -77,7 +75,6 @@ pub struct ImageStack {
     pub start: u32,
     /// The nested interrupt and exception handlers, the most urgent one first.
     pub handlers: Vec<Handler>,
-    /// Number of indirect calls.
     pub indirect_calls: usize,
     /// The deepest call chain while interrupts are still off.
     pub deepest: Way,
@@ -87,21 +84,15 @@ pub struct ImageStack {
 
 impl ImageStack {
     /// Returns the worst-case stack, bytes.
-    #[must_use]
     pub fn worst(&self) -> u32 {
         self.start.max(self.main + self.handlers())
     }
 
     /// Returns the bytes of all nested handlers together.
-    #[must_use]
     pub fn handlers(&self) -> u32 {
         self.handlers.iter().map(|handler| handler.bytes).sum()
     }
 
-    /// Computes the stack of an image.
-    ///
-    /// # Errors
-    /// [`StackError`].
     pub fn read(elf: &[u8]) -> Result<Self, StackError> {
         let code = Code::read(elf)?;
         let mut depths = HashMap::new();
@@ -126,17 +117,10 @@ impl ImageStack {
 }
 
 /// Returns the numbers and priorities of the exceptions that an image lists; higher is more urgent.
-///
-/// # Errors
-/// [`StackError::Format`].
 pub fn priorities(elf: &[u8]) -> Result<BTreeMap<usize, u8>, StackError> {
     Ok(Code::read(elf)?.vectors.priorities)
 }
 
-/// Returns the names of the functions in an image.
-///
-/// # Errors
-/// [`StackError::Format`].
 pub fn functions(elf: &[u8]) -> Result<Vec<String>, StackError> {
     Ok(Code::read(elf)?.functions.into_values().map(|function| function.name).collect())
 }

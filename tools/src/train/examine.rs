@@ -1,4 +1,4 @@
-//! This module checks whether a drive can be trained on.
+//! Checks whether a drive can be trained on.
 
 use crate::drive::DT;
 use crate::drive::error::DataError;
@@ -46,7 +46,6 @@ pub enum Refusal {
         /// The time since the previous row, ms.
         ms: f64,
     },
-    /// The drive is too short.
     #[error("{path}: {seconds:.0} s after the 3 s at rest; training needs {SHORTEST_S:.0} s")]
     TooShort {
         /// The recording.
@@ -86,9 +85,6 @@ pub struct Examined {
 }
 
 /// Examines a drive.
-///
-/// # Errors
-/// [`Refusal`], which names the file and, if known, the line.
 pub fn examine(path: &Path) -> Result<Examined, Refusal> {
     let recording = Recording::read(path)?;
     let named = || recording.path.clone();

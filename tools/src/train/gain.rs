@@ -1,4 +1,4 @@
-//! This module computes what weights gain on drives that had no part in their training.
+//! Computes what weights gain on drives that had no part in their training.
 
 use crate::evaluate::methods::Method;
 use crate::evaluate::report::DriveErrors;
@@ -7,7 +7,6 @@ use serde::Serialize;
 /// The mean over drives and the standard deviation between them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
-    /// The mean.
     pub mean: f64,
     /// The standard deviation; `None` for one drive.
     pub deviation: Option<f64>,
@@ -15,7 +14,6 @@ pub struct Spread {
 
 impl Spread {
     /// Returns the spread of some values; `None` if there are none.
-    #[must_use]
     pub fn of(values: &[f64]) -> Option<Self> {
         let count = (!values.is_empty()).then_some(values.len() as f64)?;
         let mean = values.iter().sum::<f64>() / count;
@@ -37,7 +35,6 @@ impl std::fmt::Display for Spread {
 pub struct Ratio {
     /// The method's name.
     pub method: &'static str,
-    /// The ratio on each drive.
     pub drives: Vec<f64>,
     /// The spread over the drives.
     pub all: Spread,
@@ -66,7 +63,6 @@ impl Gain {
     ];
 
     /// Computes the gain on some drives.
-    #[must_use]
     pub fn new(drives: &[DriveErrors]) -> Self {
         let over_static = Self::METHODS.into_iter().filter_map(|method| {
             let ratio = |drive: &DriveErrors| {
@@ -86,7 +82,6 @@ impl Gain {
     }
 
     /// Returns the ratio of the navigation rate.
-    #[must_use]
     pub fn sent(&self) -> Option<Spread> {
         self.over_static.iter().find(|ratio| ratio.method == Method::NAVIGATION.name).map(|ratio| ratio.all)
     }

@@ -1,22 +1,19 @@
-//! This module reads the history of a training: the JSON file that `tools/train` writes beside the checkpoint.
+//! Reads the history of a training: the JSON file that `tools/train` writes beside the checkpoint.
 
 use crate::drive::error::{DataError, DataFault};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The history of a training.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct History {
     /// The 1 s error of static initialisation on the validation drive, rad.
     pub static_1s_rad: f64,
     /// The seed whose network was kept.
     pub seed: u64,
-    /// The history of each seed.
     pub seeds: BTreeMap<u64, Seed>,
 }
 
-/// The history of one seed.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Seed {
     /// The best epoch, from 1.
@@ -31,9 +28,6 @@ pub struct Seed {
 
 impl History {
     /// Reads the file.
-    ///
-    /// # Errors
-    /// [`DataError`], which names the file.
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let shown = path.display();
         let text = std::fs::read(path).map_err(|source| DataError::open(&shown, source))?;
@@ -41,7 +35,6 @@ impl History {
     }
 
     /// Returns the training time of all seeds, s.
-    #[must_use]
     pub fn seconds(&self) -> f64 {
         self.seeds.values().map(|seed| seed.seconds).sum()
     }

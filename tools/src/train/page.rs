@@ -1,4 +1,4 @@
-//! This module writes the page about a training.
+//! Writes the page about a training.
 
 use super::examine::Examined;
 use super::gain::Gain;
@@ -17,7 +17,6 @@ pub struct Training<'a> {
     pub name: String,
     /// The drives and their roles.
     pub roles: &'a Roles,
-    /// The history of the training.
     pub history: &'a History,
     /// The gain on the held-out drives.
     pub gain: &'a Gain,
@@ -27,8 +26,6 @@ pub struct Training<'a> {
     pub bytes: usize,
 }
 
-/// Returns the page.
-#[must_use]
 pub fn page(training: &Training<'_>) -> String {
     let Training { name, roles, history, gain, validation, bytes } = training;
     let mut body = format!(

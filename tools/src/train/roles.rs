@@ -1,4 +1,4 @@
-//! This module chooses the role of each drive of a folder: training, validation (chooses the epoch), or held out.
+//! Chooses the role of each drive of a folder: training, validation (chooses the epoch), or held out.
 
 use super::examine::{Examined, Refusal, examine};
 use std::path::{Path, PathBuf};
@@ -16,7 +16,6 @@ pub enum RolesError {
     /// The folder cannot be listed.
     #[error("{folder}: {source}")]
     Folder {
-        /// The folder.
         folder: String,
         /// The reason.
         source: std::io::Error,
@@ -24,7 +23,6 @@ pub enum RolesError {
     /// Too few drives can be used.
     #[error("{folder}: {usable} drives can be used, but {needed} are needed{}", listed(refused))]
     TooFew {
-        /// The folder.
         folder: String,
         /// The number of drives that can be used.
         usable: usize,
@@ -39,21 +37,18 @@ pub enum RolesError {
         listed(refused)
     )]
     TooShort {
-        /// The folder.
         folder: String,
         /// Length of the training drives together, s.
         seconds: f64,
         /// The drives left out.
         refused: Vec<Refusal>,
     },
-    /// The training drives turn too little.
     #[error(
     "{folder}: too few turns: the training drives turn by {:.0} degrees together, but {:.0} are needed",
         turned_rad.to_degrees(),
         LEAST_TURNED_RAD.to_degrees()
     )]
     NoTurns {
-        /// The folder.
         folder: String,
         /// Turns of the training drives together, rad.
         turned_rad: f64,
@@ -61,9 +56,7 @@ pub enum RolesError {
     /// A name on the command line matches no drive, or several.
     #[error("{folder}: {found} drives match the name {name:?}{}", listed(refused))]
     Name {
-        /// The folder.
         folder: String,
-        /// The name.
         name: String,
         /// The number of drives that match the name.
         found: usize,
@@ -93,9 +86,6 @@ pub struct Roles {
 impl Roles {
     /// Examines the drives of a folder and chooses their roles. By default the last quarter by name is held out, the
     /// drive before it validates, and the others train. With `shards` no drive of the folder trains.
-    ///
-    /// # Errors
-    /// [`RolesError`].
     pub fn choose(
         folder: &Path,
         shards: bool,

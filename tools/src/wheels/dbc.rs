@@ -1,4 +1,4 @@
-//! This module creates wheel settings from a DBC file and the names of the signals that carry the speeds.
+//! Creates wheel settings from a DBC file and the names of the signals that carry the speeds.
 //!
 //! A DBC file has the position, factor, offset and unit of a signal. It has no standard way to describe the
 //! protection of a frame, so the user must add checksum and counter to the settings.
@@ -36,7 +36,6 @@ pub enum DbcError {
     Missing {
         /// The file.
         path: String,
-        /// The name.
         name: String,
         /// Signals in the file with a similar name.
         similar: Vec<String>,
@@ -46,9 +45,7 @@ pub enum DbcError {
     Ambiguous {
         /// The file.
         path: String,
-        /// The name.
         name: String,
-        /// The messages.
         messages: Vec<String>,
     },
     /// The signal is not a plain number in a frame of eight bytes.
@@ -56,7 +53,6 @@ pub enum DbcError {
     Kind {
         /// The file.
         path: String,
-        /// The name.
         name: String,
         /// The reason why it cannot be used.
         reason: String,
@@ -70,10 +66,6 @@ fn near(similar: &[String]) -> String {
 /// Names of the signals, SIGNAL or MESSAGE.SIGNAL, by wheel: front left, front right, rear left, rear right.
 pub type Signals<'a> = [Option<&'a str>; 4];
 
-/// Creates wheel settings from a DBC file.
-///
-/// # Errors
-/// [`DbcError`].
 pub fn from_dbc(path: &str, text: &str, signals: Signals<'_>) -> Result<WheelFile, DbcError> {
     let dbc = Dbc::try_from(text)
         .map_err(|error| DbcError::Format { path: path.to_owned(), reason: error.to_string() })?;

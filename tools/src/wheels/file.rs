@@ -1,4 +1,4 @@
-//! This module reads and writes wheel settings (TOML), with speeds in km/h and start bits as in DBC files.
+//! Reads and writes wheel settings (TOML), with speeds in km/h and start bits as in DBC files.
 
 use embedded_can::{ExtendedId, Id, StandardId};
 use gyronet::can::e2e::{DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
@@ -22,7 +22,6 @@ pub enum WheelFileError {
     /// The file is not TOML, or a key or value is unknown.
     #[error("{path}: {source}")]
     Toml {
-        /// The file.
         path: String,
         /// The place and the reason.
         source: Box<toml::de::Error>,
@@ -30,7 +29,6 @@ pub enum WheelFileError {
     /// The file has too many frames.
     #[error("{path}: {found} frames, at most {MAX_FRAMES} are allowed")]
     Frames {
-        /// The file.
         path: String,
         /// The number of frames.
         found: usize,
@@ -38,7 +36,6 @@ pub enum WheelFileError {
     /// The identifier of a frame is too large.
     #[error("{path}: frame {id:#x}: not an identifier of {} bits", if *.extended { 29 } else { 11 })]
     Identifier {
-        /// The file.
         path: String,
         /// The identifier.
         id: u32,
@@ -47,16 +44,10 @@ pub enum WheelFileError {
     },
     /// A wheel has two signals.
     #[error("{path}: {wheel:?} has two signals")]
-    Twice {
-        /// The file.
-        path: String,
-        /// The wheel.
-        wheel: Wheel,
-    },
+    Twice { path: String, wheel: Wheel },
     /// A value is outside a frame of eight bytes.
     #[error("{path}: frame {id:#x}: {source}")]
     Place {
-        /// The file.
         path: String,
         /// The frame.
         id: u32,
@@ -66,11 +57,8 @@ pub enum WheelFileError {
     /// A number is out of the range of the board's codes.
     #[error("{path}: {key} = {value}: must be {range}")]
     Range {
-        /// The file.
         path: String,
-        /// The key.
         key: &'static str,
-        /// The value.
         value: f64,
         /// The allowed values.
         range: &'static str,
@@ -78,7 +66,6 @@ pub enum WheelFileError {
     /// The library rejects the settings.
     #[error("{path}: {source}")]
     Settings {
-        /// The file.
         path: String,
         /// The reason.
         source: WheelConfigError,
@@ -114,7 +101,6 @@ const fn still_for_ms() -> u32 {
     500
 }
 
-/// A frame with wheel speeds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Frame {
@@ -123,13 +109,11 @@ pub struct Frame {
     /// Whether the identifier has 29 bits.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub extended: bool,
-    /// The protection of the frame, if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub checksum: Option<Protection>,
     /// The position of the message counter; absent if there is none, or if it is part of an AUTOSAR profile.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub counter: Option<Place>,
-    /// The wheel speeds in the frame.
     pub signal: Vec<Signal>,
 }
 
@@ -185,7 +169,6 @@ pub enum Protection {
 /// The position of a value in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Place {
-    /// Start bit, as in a DBC file.
     pub start_bit: u8,
     /// Number of bits, 1 to 32.
     pub bits: u8,
@@ -210,20 +193,15 @@ pub enum Order {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Wheel {
-    /// Front left.
     FrontLeft,
-    /// Front right.
     FrontRight,
-    /// Rear left.
     RearLeft,
-    /// Rear right.
     RearRight,
 }
 
 /// The speed of a wheel in a frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Signal {
-    /// The wheel.
     pub wheel: Wheel,
     /// The position of the speed in the frame.
     #[serde(flatten)]
@@ -239,17 +217,12 @@ pub struct Signal {
 }
 
 impl WheelFile {
-    /// Parses the text of a file.
-    ///
-    /// # Errors
-    /// [`WheelFileError::Toml`], which names the line.
     pub fn parse(path: &str, text: &str) -> Result<Self, WheelFileError> {
         toml::from_str(text)
             .map_err(|source| WheelFileError::Toml { path: path.to_owned(), source: Box::new(source) })
     }
 
     /// Creates the file contents from a board's settings.
-    #[must_use]
     pub fn of(settings: &WheelSettings) -> Self {
         let frames = (0..).zip(&settings.frames);
         let frames = frames.filter_map(|(k, frame)| Some(Frame::of(settings, k, frame.as_ref()?)));
@@ -263,9 +236,6 @@ impl WheelFile {
     }
 
     /// Converts to the board's settings, with the checks of the board.
-    ///
-    /// # Errors
-    /// [`WheelFileError`].
     pub fn settings(&self, path: &str) -> Result<WheelSettings, WheelFileError> {
         let found = self.frame.len();
         if found > MAX_FRAMES {
@@ -428,7 +398,6 @@ fn speed(path: &str, key: &'static str, kmh: f64) -> Result<WheelSpeed, WheelFil
 mod tests {
     use super::*;
 
-    /// The contents of [`WheelSettings::TOYOTA`] as a file.
     const TOYOTA: &str = r#"
 [[frame]]
 id = 0xAA

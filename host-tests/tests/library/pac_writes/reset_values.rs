@@ -1,4 +1,4 @@
-//! This module reads the reset values of all registers from the source that svd2rust generated.
+//! Reads the reset values of all registers from the source that svd2rust generated.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -8,9 +8,6 @@ use std::process::Command;
 const PART: &str = "stm32f405";
 
 /// Returns the folder of the part's module in the source of the `stm32f4` crate that the workspace uses.
-///
-/// # Errors
-/// The reason why there is none.
 pub fn source(workspace: &Path) -> Result<PathBuf, String> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--offline", "--format-version", "1", "--features", PART])
@@ -40,9 +37,6 @@ pub struct ResetValues {
 
 impl ResetValues {
     /// Reads the folder of [`source`].
-    ///
-    /// # Errors
-    /// The file that cannot be read, or that is not as svd2rust writes it.
     pub fn read(folder: &Path) -> Result<Self, String> {
         let mut modules = BTreeMap::new();
         for line in text(&folder.join("mod.rs"))?.lines() {

@@ -1,4 +1,4 @@
-//! This module finds the whole writes of registers in a source file and complains of those that do not
+//! Finds the whole writes of registers in a source file and complains of those that do not
 //! say which reset value they begin with.
 
 use super::reset_values::{ResetValues, hexadecimal};
@@ -18,9 +18,6 @@ pub struct Found {
 }
 
 /// Finds the writes of a file's text that are not explained.
-///
-/// # Errors
-/// The line at which the text is no Rust.
 pub fn unexplained(text: &str, values: &ResetValues) -> Result<Found, String> {
     let file = syn::parse_file(text).map_err(|error| format!("{}: {error}", error.span().start().line))?;
     let mut visitor = Visitor { values, writes: Vec::new(), peripherals: BTreeSet::new() };

@@ -53,7 +53,6 @@ fn weights_are_replaced() {
     assert!(matches!(about.refused_slots, [Some(SlotError::Blob(_)), None]), "{:?}", about.refused_slots);
 }
 
-/// Uploads a file and has it checked.
 fn upload(board: &mut Board, file: &[u8]) {
     assert_eq!(board.weights_begin(file.len() as u32), Ok(()));
     for (block, offset) in file.chunks(256).zip((0u32..).step_by(256)) {

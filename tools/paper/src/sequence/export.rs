@@ -1,4 +1,4 @@
-//! This module writes a sequence as one CSV file, with the columns of [`gyronet_tools::drive::recording`] and further columns
+//! Writes a sequence as one CSV file, with the columns of [`gyronet_tools::drive::recording`] and further columns
 //! that only a sequence has.
 
 use super::{Sequence, Step};
@@ -11,17 +11,11 @@ pub const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,whee
                           fog_rad,left_m,right_m,ref_x_m,ref_y_m,ref_yaw_rad,vendor_yaw_rad";
 
 /// Writes all steps except those in a gap of the inertial sensor; returns the number of rows.
-///
-/// # Errors
-/// The writer's error.
 pub fn write_csv(sequence: &Sequence, out: impl Write) -> io::Result<u64> {
     write(sequence, out, |step| !step.imu_gap)
 }
 
 /// Writes the steps that are not in a gap of any file; returns the number of rows.
-///
-/// # Errors
-/// The writer's error.
 pub fn write_whole(sequence: &Sequence, out: impl Write) -> io::Result<u64> {
     write(sequence, out, |step| !step.imu_gap && !step.other_gap)
 }

@@ -1,4 +1,4 @@
-//! This module reads KAIST Complex Urban: `sensor_data/{xsens_imu,fog,encoder}.csv`,
+//! Reads KAIST Complex Urban: `sensor_data/{xsens_imu,fog,encoder}.csv`,
 //! `calibration/EncoderParameter.txt`, `global_pose.csv`. Files have no headers; stamps are nanoseconds since 1970; x
 //! forward, y left, z up. The early sequences (campus00, urban00 to 05) have no gyro: 8 columns in xsens_imu.csv
 //! instead of 17.
@@ -36,7 +36,6 @@ const POSE: Format<4> =
 /// A wheel speed above this means that the wheel's counter was reset, m/s.
 const IMPOSSIBLE_SPEED: f64 = 100.0;
 
-/// Path of the calibration of the encoders.
 pub(super) const CALIBRATION: &str = "calibration/EncoderParameter.txt";
 /// Paths of the other files.
 pub(super) const PATHS: [&str; 4] =

@@ -1,4 +1,4 @@
-//! This module reads NCLT: `ms25.csv`, `kvh.csv`, `wheels.csv`, `groundtruth_DATE.csv`. Files have no headers; stamps
+//! Reads NCLT: `ms25.csv`, `kvh.csv`, `wheels.csv`, `groundtruth_DATE.csv`. Files have no headers; stamps
 //! are microseconds since 1970; axes are x forward, y right, z down, heading clockwise from north. The output is x
 //! forward, y left, z up, heading counter-clockwise from east, as in KAIST.
 //!

@@ -1,4 +1,4 @@
-//! This module reads rows of numbers from a file without a header, one row at a time. A row is a stamp and fields.
+//! Reads rows of numbers from a file without a header, one row at a time. A row is a stamp and fields.
 
 use super::summary::StreamSummary;
 use csv::ByteRecord;
@@ -18,7 +18,6 @@ pub(super) struct Format<const N: usize> {
     pub columns: usize,
     /// Indices of the used columns; the stamp is column 0.
     pub used: [usize; N],
-    /// Stamp units per second.
     pub stamps_per_second: f64,
     /// The nominal number of samples per second.
     pub nominal_hz: f64,
@@ -32,7 +31,6 @@ pub(super) struct Row<const N: usize> {
     pub fields: [f64; N],
 }
 
-/// Reads a file row by row.
 pub(super) struct Rows<const N: usize> {
     path: String,
     format: Format<N>,
@@ -61,7 +59,6 @@ impl<const N: usize> Rows<N> {
         &self.path
     }
 
-    /// Converts stamps to seconds.
     pub fn seconds(&self, stamps: i64) -> f64 {
         stamps as f64 / self.format.stamps_per_second
     }

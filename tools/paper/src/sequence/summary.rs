@@ -1,4 +1,4 @@
-//! This module summarises a sequence's files and counts the skipped rows.
+//! Summarises a sequence's files and counts the skipped rows.
 
 use serde::Serialize;
 use std::fmt;

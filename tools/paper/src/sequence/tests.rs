@@ -13,7 +13,6 @@ impl Scratch {
         Self(folder)
     }
 
-    /// Changes the lines of a file.
     fn edit(&self, file: &str, change: impl FnOnce(&mut Vec<String>)) {
         let path = self.0.path().join(file);
         let mut lines: Vec<String> = fs::read_to_string(&path).unwrap().lines().map(Into::into).collect();

@@ -1,4 +1,4 @@
-//! This module interpolates streams. A stream returns its value at any time, in ascending order, by linear
+//! Interpolates streams. A stream returns its value at any time, in ascending order, by linear
 //! interpolation between the rows before and after.
 //!
 //! Increments (angle of a gyro, distance of a wheel) are streams of their sums, so that nothing is lost or counted

@@ -1,4 +1,4 @@
-//! This module computes the latitude of a position in UTM, the coordinates of KAIST Urban's poses. The latitude
+//! Computes the latitude of a position in UTM, the coordinates of KAIST Urban's poses. The latitude
 //! matters because the Earth's rate is 300 times a fibre-optic gyro's bias, and the data set's drives are up to a
 //! degree apart.
 //!

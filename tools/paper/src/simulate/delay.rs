@@ -1,4 +1,4 @@
-//! This module delays messages, because the stamps in a data set are the logger's, not the sensor's.
+//! Delays messages, because the stamps in a data set are the logger's, not the sensor's.
 
 use crate::simulate::vehicles::Delays;
 use gyronet_tools::random::Random;

@@ -1,4 +1,4 @@
-//! This module simulates a fibre-optic gyro with angle random walk, bias random walk, scale error and misalignment.
+//! Simulates a fibre-optic gyro with angle random walk, bias random walk, scale error and misalignment.
 
 use gyronet_tools::random::Random;
 use gyronet_tools::simulate::mems::{axes, seen};
@@ -32,7 +32,6 @@ pub struct Fog {
 
 impl Fog {
     /// Creates the gyro with the seed `device`, in the run with the seed `run`.
-    #[must_use]
     pub fn of_device(config: &Config, device: u64, run: u64) -> Self {
         // This stream differs from that of the MEMS part with the same device seed.
         let mut fixed = Purpose::Fog.stream(device);

@@ -1,4 +1,4 @@
-//! This module writes the layout of KAIST Complex Urban: no headers, nanoseconds since 1970.
+//! Writes the layout of KAIST Complex Urban: no headers, nanoseconds since 1970.
 
 use super::delay::Delay;
 use super::text::Rows;

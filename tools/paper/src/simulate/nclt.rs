@@ -1,4 +1,4 @@
-//! This module writes the layout of NCLT: no headers, microseconds since 1970, x forward, y right, z down; heading
+//! Writes the layout of NCLT: no headers, microseconds since 1970, x forward, y right, z down; heading
 //! clockwise from north.
 
 use super::delay::Delay;

@@ -1,4 +1,4 @@
-//! This module simulates the wheel encoders of a rear axle. The wheels' diameters differ from the calibration, and
+//! Simulates the wheel encoders of a rear axle. The wheels' diameters differ from the calibration, and
 //! the wheels slip when they drive or brake.
 //!
 //! Slip is proportional to the force: slip = a / (g k), with the normalised stiffness k of the tyres
@@ -35,7 +35,6 @@ pub struct Odometer {
 
 impl Odometer {
     /// Draws the true diameters for one run, because pressure and load change from day to day.
-    #[must_use]
     pub fn new(config: &Config, run: u64) -> Self {
         let mut random = Purpose::Odometer.stream(run);
         let common = config.common_error * random.normal();
@@ -53,13 +52,11 @@ impl Odometer {
     }
 
     /// Returns the revolutions since the start, left and right.
-    #[must_use]
     pub fn turns(&self) -> [f64; 2] {
         self.turns
     }
 
     /// Returns the distance since the start, left and right, computed from the revolutions with the calibration, m.
-    #[must_use]
     pub fn metres(&self) -> [f64; 2] {
         std::array::from_fn(|wheel| self.turns[wheel] * PI * self.config.diameter[wheel])
     }

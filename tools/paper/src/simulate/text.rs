@@ -1,4 +1,4 @@
-//! This module writes rows of numbers fast, because a sequence has one and a half million rows.
+//! Writes rows of numbers fast, because a sequence has one and a half million rows.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};

@@ -1,4 +1,4 @@
-//! This module generates a route through a town: blocks of streets with different speed limits, some curved, and
+//! Generates a route through a town: blocks of streets with different speed limits, some curved, and
 //! junctions where the driver waits, drives straight on, or turns.
 //!
 //! The speed in a corner follows from the curvature at its tightest point and the comfortable lateral acceleration.
@@ -42,7 +42,6 @@ pub struct Town {
 
 impl Town {
     /// Creates the route of a seed.
-    #[must_use]
     pub fn new(config: &Config, seed: u64) -> Self {
         let mut random = Purpose::Route.stream(seed);
         let [from, to] = config.before;

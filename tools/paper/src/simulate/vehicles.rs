@@ -1,4 +1,4 @@
-//! This module defines the vehicles and sensors of the two data sets, with the source of every parameter.
+//! Defines the vehicles and sensors of the two data sets, with the source of every parameter.
 //!
 //! No parameter was tuned to a result. (M) marks values recalled from a data sheet that was not available; (A) marks
 //! assumptions where nothing is published.
@@ -60,13 +60,11 @@ pub struct Delays {
 pub struct Vehicle {
     /// The vehicle's motion and environment.
     pub world: world::Config,
-    /// The town that the vehicle drives in.
     pub town: town::Config,
     /// The inertial sensor.
     pub mems: mems::Config,
     /// The fibre-optic gyro.
     pub fog: fog::Config,
-    /// The wheels.
     pub wheels: odometer::Config,
     /// The logger's delays.
     pub delays: Delays,

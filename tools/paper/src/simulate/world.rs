@@ -1,4 +1,4 @@
-//! This module computes the truth: position and heading of the vehicle, and the readings of perfect sensors.
+//! Computes the truth: position and heading of the vehicle, and the readings of perfect sensors.
 //!
 //! The world's axes are x east, y north, z up. Heading is counted from east to the left, pitch is nose down, roll is
 //! left side up, in that order. Rates are constant over each 10 ms, so the truth at the grid steps is exact: the yaw is
@@ -20,7 +20,6 @@ pub const EARTH_RATE: f64 = 7.292_115e-5;
 pub struct Config {
     /// The vehicle.
     pub car: car::Config,
-    /// The vibration.
     pub vibration: vibration::Config,
     /// Normalised cornering stiffness of the rear axle: lateral acceleration over g for 1 rad.
     pub cornering_stiffness: f64,
@@ -47,14 +46,12 @@ pub struct Truth {
 
 impl Truth {
     /// Converts a vector from the world's axes to the vehicle's.
-    #[must_use]
     pub fn in_vehicle(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let (sin, cos) = (libm::sin(self.yaw), libm::cos(self.yaw));
         car::turned_in([x * cos + y * sin, y * cos - x * sin, z], self.motion.pitch, self.motion.roll)
     }
 
     /// Returns the rotation from the vehicle's axes to the world's, row by row.
-    #[must_use]
     pub fn rotation(&self) -> [[f64; 3]; 3] {
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| self.in_vehicle(axis))
     }
@@ -73,7 +70,6 @@ pub struct World {
 
 impl World {
     /// Starts at rest with the heading `yaw`.
-    #[must_use]
     pub fn new(config: &Config, way: Town, yaw: f64, run: u64) -> Self {
         Self {
             config: *config,

@@ -1,4 +1,4 @@
-//! This module defines the estimate of a method on a sequence: the turns, and the source of the positions.
+//! Defines the estimate of a method on a sequence: the turns, and the source of the positions.
 
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::trajectory_error::Point;
@@ -6,7 +6,6 @@ use gyronet_tools::evaluate::trajectory_error::Point;
 /// The estimate of a method on a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
-    /// The method.
     pub method: Method,
     /// Angle turned in each step, from the first compared step on, rad.
     pub turns: Vec<f64>,
@@ -20,10 +19,7 @@ pub struct Estimate {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Places {
     /// Dead reckoning with the wheels' distances times a scale.
-    Reckoned {
-        /// The scale.
-        scale: f64,
-    },
+    Reckoned { scale: f64 },
     /// A given trajectory: the position after each turn, relative to that of the first step, m.
     Given(Vec<Point>),
 }

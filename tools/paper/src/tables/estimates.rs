@@ -1,4 +1,4 @@
-//! This module runs the methods that the paper's tables compare: each computes from a sequence the angle turned in
+//! Runs the methods that the paper's tables compare: each computes from a sequence the angle turned in
 //! every 10 ms.
 //!
 //! The paper's vendor filter runs inside the sensor and is not available. If the data have no vendor's heading,

@@ -1,4 +1,4 @@
-//! This module compares another program's trajectories with our methods: those of a folder, one file for each
+//! Compares another program's trajectories with our methods: those of a folder, one file for each
 //! sequence, named `SEQUENCE.txt`.
 //!
 //! A trajectory is compared without alignment, so it must be in the truth's frame (KAIST: that of `global_pose.csv`;
@@ -62,10 +62,6 @@ impl FromStr for Given {
 }
 
 impl Given {
-    /// Reads the trajectory of a sequence and returns the estimate from the step `start` on.
-    ///
-    /// # Errors
-    /// [`DataError`], which names the file and, where there is one, the line.
     pub fn estimate(&self, sequence: &Sequence, start: usize) -> Result<Estimate, DataError> {
         let trajectory = Trajectory::read(&self.folder.join(format!("{}.txt", sequence.name)))?;
         let (turns, places) = compared(&trajectory, sequence, start)?;

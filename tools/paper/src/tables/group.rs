@@ -1,4 +1,4 @@
-//! This module groups the sequences that are averaged together.
+//! Groups the sequences that are averaged together.
 
 use crate::sequence::Sequence;
 use crate::simulate::Layout;
@@ -17,8 +17,6 @@ pub enum Group {
 }
 
 impl Group {
-    /// Returns the group of a sequence.
-    #[must_use]
     pub fn of(sequence: &Sequence) -> Self {
         if let Some(spec) = &sequence.simulated {
             return if spec.device == 1 { Self::First } else { Self::OtherDevices };

@@ -1,12 +1,10 @@
-//! This module writes one self-contained HTML page with all tables and pictures.
+//! Writes one self-contained HTML page with all tables and pictures.
 
 use super::pictures::Picture;
 use super::table::{Row, Table};
 use gyronet_tools::plot::page::{self, document, escaped};
 use std::fmt::Write;
 
-/// Returns the page; `pictures` holds the pictures of each sequence with its name.
-#[must_use]
 pub fn page(tables: &[Table], pictures: &[(String, Vec<Picture>)]) -> String {
     let mut html = String::from("<h1>The paper's tables</h1>\n");
     html += "<p class=\"lead\">X. Zhao et al., <i>Learning to Compensate for the Drift and Error of Gyroscope in \

@@ -1,4 +1,4 @@
-//! This module compensates wheels and fibre-optic gyro together, which the paper names as future work. It fits four
+//! Compensates wheels and fibre-optic gyro together, which the paper names as future work. It fits four
 //! numbers to the truth of training sequences by least squares over spans of 10 s.
 //!
 //! The turn is the sum of a share of the gyro's turn, a share of the difference of the wheels' distances (which
@@ -27,7 +27,6 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Adds a training sequence.
     pub fn add(&mut self, sequence: &Sequence) {
         let turns = sequence.turns();
         for (k, steps) in sequence.steps.chunks_exact(SPAN).enumerate() {
@@ -45,7 +44,6 @@ impl Fit {
     }
 
     /// Returns the numbers with the least squared errors; `None` if the sequences turn or move too little for a fit.
-    #[must_use]
     pub fn solve(&self) -> Option<Joint> {
         let inverse = self.normal.try_inverse()?;
         let [gyro, difference, constant] = (inverse * self.turned).into();
@@ -71,8 +69,6 @@ pub struct Joint {
 }
 
 impl Joint {
-    /// Returns the estimate for a sequence from the step `start`.
-    #[must_use]
     pub fn estimate(&self, sequence: &Sequence, start: usize) -> Estimate {
         let shares = Vector3::new(self.gyro, self.difference, self.constant);
         let turns = sequence.steps[start..].iter().map(|step| shares.dot(&inputs(step))).collect();

@@ -1,17 +1,15 @@
-//! This module writes the remarks below the tables: the differences from the paper, and the omitted trajectories.
+//! Writes the remarks below the tables: the differences from the paper, and the omitted trajectories.
 
 use super::paper;
 use super::results::{ByMethod, SequenceErrors};
 use gyronet_tools::evaluate::methods::{Gyro, Method};
 use std::collections::BTreeSet;
 
-/// The remarks on the bundled weights.
 pub const BUNDLED: [&str; 2] = [
     "GyroNet's bundled weights were trained on real drives of another car with another sensor.",
     "FoGNet's bundled weights were trained on simulated sequences of KAIST's layout.",
 ];
 
-/// The remarks on every table with FoGNet in it.
 const FOGNET: [&str; 3] = [
     "FoGNet corrects the error that remains after the Earth's rate and the bias. It runs only on the gyro that its weights \
      were trained for; elsewhere its row equals the default's.",

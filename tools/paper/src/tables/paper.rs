@@ -1,10 +1,8 @@
-//! This module holds the results that the paper prints, and computes the means of its rows (X. Zhao et al., Learning
+//! Holds the results that the paper prints, and computes the means of its rows (X. Zhao et al., Learning
 //! to Compensate for the Drift and Error of Gyroscope in Vehicle Localization).
 
-/// Holds a line of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
-    /// Name of the line in the paper.
     pub name: &'static str,
     /// Numbers of the line, one for each column.
     pub figures: &'static [f64],
@@ -75,7 +73,6 @@ pub const NCLT: [Line; 2] =
     [line("FoG + odometry", &[41.98, 18.15]), line("FoGNet + odometry", &[38.64, 16.66])];
 
 /// Returns the average of lines, column by column.
-#[must_use]
 pub fn average(lines: &[Line]) -> Vec<f64> {
     let columns = lines.first().map_or(0, |line| line.figures.len());
     let mean = |k: usize| lines.iter().map(|line| line.figures[k]).sum::<f64>() / lines.len() as f64;

@@ -1,4 +1,4 @@
-//! This module draws the paper's figures 6, 7, 9, 10 and 11 for a sequence.
+//! Draws the paper's figures 6, 7, 9, 10 and 11 for a sequence.
 
 use super::results::{Path, SequenceErrors};
 use crate::sequence::Sequence;
@@ -32,14 +32,9 @@ pub struct Picture {
     pub kind: &'static str,
     /// Caption, with the corresponding figure of the paper.
     pub caption: String,
-    /// SVG text of the picture.
     pub svg: String,
 }
 
-/// Draws all pictures of a sequence.
-///
-/// # Errors
-/// [`PlotError`] if the plotting library fails.
 pub fn draw(sequence: &Sequence, errors: &SequenceErrors, paths: &[Path]) -> Result<Vec<Picture>, PlotError> {
     let simulated = if errors.simulated { " (simulated)" } else { "" };
     let name = format!("{}{simulated}", errors.name);
@@ -119,9 +114,6 @@ fn draw_curves(labels: &Labels<'_>, curves: Vec<Curve<'_>>) -> Result<String, Pl
 }
 
 /// Plots the time between the stamps of each file: the smallest and the largest of each second.
-///
-/// # Errors
-/// [`PlotError`] if the plotting library fails.
 pub fn stamps(sequence: &Sequence) -> Result<String, PlotError> {
     let simulated = if sequence.simulated.is_some() { " (simulated)" } else { "" };
     let title = format!("{}{simulated}: time between stamps, least and most of each second", sequence.name);

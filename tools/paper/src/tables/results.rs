@@ -1,4 +1,4 @@
-//! This module computes the errors of every method on every sequence, and their means, for the tables and the JSON.
+//! Computes the errors of every method on every sequence, and their means, for the tables and the JSON.
 
 use super::estimate::{Estimate, Places};
 use super::estimates::Estimates;
@@ -34,7 +34,6 @@ pub struct Errors {
     pub run_time_s: Option<f64>,
 }
 
-/// Maps the key of a method to its errors.
 pub type ByMethod = BTreeMap<&'static str, Errors>;
 
 /// Holds the path of a method, or the true path.
@@ -48,16 +47,13 @@ pub struct Path {
     pub points: Vec<Point>,
 }
 
-/// Holds the errors on one sequence.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SequenceErrors {
-    /// The sequence's name.
     pub name: String,
     /// The data set whose layout it has.
     pub layout: Layout,
     /// Says whether the sequence is simulated.
     pub simulated: bool,
-    /// The group that the sequence is averaged with.
     pub group: Group,
     /// Length of the compared part, s.
     pub seconds: f64,
@@ -66,7 +62,6 @@ pub struct SequenceErrors {
     /// The reason why some methods could not be run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refused: Option<String>,
-    /// The errors of each method.
     pub methods: ByMethod,
     /// The reasons why given trajectories could not be compared, by the key of the method.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -74,14 +69,12 @@ pub struct SequenceErrors {
     /// Text with the fitted numbers of wheels and fibre-optic gyro, and the sequences they were fitted to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitted: Option<String>,
-    /// The methods in the order of the tables.
     #[serde(skip)]
     pub order: Vec<Method>,
 }
 
 impl SequenceErrors {
     /// Compares the estimates with the truth; also returns the paths for pictures, the truth's first.
-    #[must_use]
     pub fn new(sequence: &Sequence, estimates: &Estimates) -> (Self, Vec<Path>) {
         let steps = &sequence.steps[estimates.start..];
         let turns = &sequence.turns()[estimates.start..];
@@ -169,8 +162,6 @@ impl Errors {
     }
 }
 
-/// Returns the mean errors of each method that could be run on all sequences.
-#[must_use]
 pub fn mean<'a>(sequences: impl Iterator<Item = &'a SequenceErrors>) -> ByMethod {
     let mut all: BTreeMap<&'static str, Vec<Errors>> = BTreeMap::new();
     let mut count = 0;
@@ -204,7 +195,6 @@ pub struct Results {
 
 impl Results {
     /// Computes the means of the sequences' errors.
-    #[must_use]
     pub fn new(sequences: Vec<SequenceErrors>) -> Self {
         let mean_all = mean(sequences.iter());
         let of = |layout| sequences.iter().filter(move |sequence| sequence.layout == layout);

@@ -1,4 +1,4 @@
-//! This module builds the paper's tables with our results, as rows of text and numbers that [`super::text`] and
+//! Builds the paper's tables with our results, as rows of text and numbers that [`super::text`] and
 //! [`super::html`] print.
 
 use super::group::Group;
@@ -9,16 +9,13 @@ use crate::simulate::Layout;
 use gyronet_tools::evaluate::methods::{Gyro, Method};
 use std::path::Path;
 
-/// Holds a row of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Name of the row.
     pub name: String,
     /// One number for each column; `None` if it is missing.
     pub figures: Vec<Option<f64>>,
 }
 
-/// Holds a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     /// Number of the table in the paper, and its subject.
@@ -33,7 +30,6 @@ pub struct Table {
     pub rows: Vec<Row>,
     /// Names of the columns of the paper's rows.
     pub paper_columns: Vec<String>,
-    /// The paper's rows.
     pub paper_rows: Vec<Row>,
     /// Remarks below the table.
     pub notes: Vec<String>,
@@ -41,7 +37,6 @@ pub struct Table {
 
 impl Table {
     /// Replaces the remarks on bundled weights by the names of the weight files of GyroNet and FoGNet, if given.
-    #[must_use]
     pub fn with_weights(mut self, files: [Option<&Path>; 2]) -> Self {
         for ((bundled, network), file) in notes::BUNDLED.iter().zip(["GyroNet", "FoGNet"]).zip(files) {
             let Some(file) = file else { continue };
@@ -53,8 +48,6 @@ impl Table {
     }
 }
 
-/// Returns all tables that the sequences have results for.
-#[must_use]
 pub fn tables(results: &Results) -> Vec<Table> {
     let kaist: Vec<&SequenceErrors> =
         results.sequences.iter().filter(|sequence| sequence.layout == Layout::Kaist).collect();

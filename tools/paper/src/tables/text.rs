@@ -1,4 +1,4 @@
-//! This module prints tables as text.
+//! Prints tables as text.
 
 use super::table::{Row, Table};
 use std::fmt;

@@ -35,16 +35,12 @@ pub struct SlcanBus<L> {
 
 impl SlcanBus<Connection> {
     /// Opens `host:port`, or a serial port by its name at `baud`.
-    ///
-    /// # Errors
-    /// [`ConnectError`].
     pub fn open(name: &str, baud: u32) -> std::result::Result<Self, ConnectError> {
         Ok(Self::new(Connection::open(name, baud, WAIT)?))
     }
 }
 
 impl<L: Line> SlcanBus<L> {
-    /// Creates a bus on an open line.
     pub fn new(line: L) -> Self {
         Self { line, text: Vec::new(), is_clean: false }
     }

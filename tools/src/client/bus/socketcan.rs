@@ -15,10 +15,6 @@ pub struct Interface {
 }
 
 impl Interface {
-    /// Opens an interface that is up, by its name.
-    ///
-    /// # Errors
-    /// [`ConnectError::Interface`].
     pub fn open(name: &str) -> std::result::Result<Self, ConnectError> {
         let open = || {
             let socket = CanSocket::open(name)?;

@@ -23,10 +23,6 @@ pub struct AccessState {
 }
 
 impl<B: Bus> Device<B> {
-    /// Returns the state of the access control.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn access(&mut self) -> Result<AccessState, DeviceError> {
         let state = self.read(ACCESS)?;
         let [state, a, b, c, d, wrong_answers, key @ ..] =
@@ -71,9 +67,6 @@ impl<B: Bus> Device<B> {
     }
 
     /// Stores the public key that controls who may write; zeros remove the key.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn set_key(&mut self, key: &[u8; 32]) -> Result<(), DeviceError> {
         self.write(super::requests::KEY, key)
     }

@@ -9,9 +9,6 @@ use serde_json::{Value, json};
 const TEMPERATURES: [f32; 6] = [-20.0, 0.0, 20.0, 40.0, 60.0, 80.0];
 
 /// Returns both as JSON, whose names contain the units, with the forward direction and its sigma, deg.
-///
-/// # Errors
-/// [`serde_json::Error`], which does not occur for a calibration.
 pub fn to_value(
     calibration: &Calibration,
     learned: &Learned,

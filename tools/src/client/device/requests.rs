@@ -35,7 +35,6 @@ pub const ACCESS: u16 = 0x0111;
 const ACCESS_COUNTERS: u16 = 0x0113;
 const LEARNED: u16 = 0x0115;
 const FORWARD: u16 = 0x0116;
-/// The request for all counters.
 pub const COUNTERS: [u8; 7] = {
     let [a, b] = PIPELINE_COUNTERS.to_be_bytes();
     let [c, d] = INPUT_COUNTERS.to_be_bytes();
@@ -63,9 +62,6 @@ impl<B: Bus> Device<B> {
     }
 
     /// Returns the board's identity and state.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn info(&mut self) -> Result<Info> {
         let record = self.read(INFO)?;
         if record.first() != Some(&PROTOCOL) {
@@ -75,58 +71,36 @@ impl<B: Bus> Device<B> {
     }
 
     /// Returns the configuration that the board was started with.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn configuration(&mut self) -> Result<Configuration> {
         versioned::<Configuration>(&self.read(CONFIGURATION)?)
     }
 
     /// Stores a configuration, which takes effect after a restart.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn set_configuration(&mut self, configuration: &Configuration) -> Result<()> {
         self.write(CONFIGURATION, &configuration_content(configuration)?)
     }
 
     /// Returns the settings of the wheel frames that the board receives.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn wheels(&mut self) -> Result<WheelSettings> {
         decode(&self.read(WHEELS)?)
     }
 
     /// Stores the settings of the wheel frames, which take effect after a restart.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn set_wheels(&mut self, wheels: &WheelSettings) -> Result<()> {
         self.write(WHEELS, &content(wheels)?)
     }
 
-    /// Returns the calibration.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn calibration(&mut self) -> Result<Calibration> {
         versioned::<Calibration>(&self.read(CALIBRATION)?)
     }
 
     /// Returns what the board has learnt about its sensor at standstills.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn learned(&mut self) -> Result<Learned> {
         decode(&self.read(LEARNED)?)
     }
 
     /// Returns the forward direction in the configured axes, deg to the left of x, and its sigma; `None` until drives
     /// have shown it.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn forward_deg(&mut self) -> Result<Option<[f32; 2]>> {
         match *self.read(FORWARD)?.as_slice() {
             [0, ..] => Ok(None),
@@ -139,75 +113,44 @@ impl<B: Bus> Device<B> {
     }
 
     /// Makes the board forget what it has learnt about its sensor.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn forget_learned(&mut self) -> Result<()> {
         self.routine(START, FORGET)
     }
 
     /// Stores the map of this unit's gyro, or removes it; this takes effect after a restart.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn set_unit(&mut self, unit: Option<UnitMap>) -> Result<()> {
         self.write(UNIT, &content(&unit)?)
     }
 
-    /// Starts a calibration.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn start_calibration(&mut self, task: Task) -> Result<()> {
         self.routine(START, routine(task))
     }
 
     /// Stops a calibration without a result.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn cancel_calibration(&mut self) -> Result<()> {
         self.routine(STOP, STATIC)
     }
 
-    /// Returns the state of the calibration.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn calibration_state(&mut self) -> Result<State> {
         decode(&self.read(CALIBRATION_STATE)?)
     }
 
-    /// Stores the result of a calibration.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn store_calibration(&mut self) -> Result<()> {
         self.routine(START, STORE_CALIBRATION)
     }
 
     /// Returns the events after an event number, at most one page.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn log(&mut self, after: u32) -> Result<LogPage> {
         let [high, low] = LOG.to_be_bytes();
         let request = [&[0x31, START, high, low][..], &after.to_be_bytes()].concat();
         decode(self.ask(&request)?.get(3..).unwrap_or_default())
     }
 
-    /// Returns all counters.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn counters(&mut self) -> Result<AllCounters> {
         counters(&self.ask(&COUNTERS)?)
     }
 
     /// Returns the counts of requests that were refused for lack of access since the board started.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn access_counters(&mut self) -> Result<AccessCounters> {
         let words = self.read(ACCESS_COUNTERS)?;
         let mut words = Words(&words);
@@ -215,18 +158,12 @@ impl<B: Bus> Device<B> {
     }
 
     /// Restarts the board.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn restart(&mut self) -> Result<()> {
         self.enter(Session::Extended)?;
         self.ask(&[0x11, 1]).map(drop)
     }
 
     /// Returns the value of a data identifier.
-    ///
-    /// # Errors
-    /// [`DeviceError`].
     pub fn read(&mut self, id: u16) -> Result<Vec<u8>> {
         let id = id.to_be_bytes();
         let response = self.ask(&[0x22, id[0], id[1]])?;
@@ -248,17 +185,11 @@ impl<B: Bus> Device<B> {
 }
 
 /// Encodes a record as it is written to a board, and signed.
-///
-/// # Errors
-/// [`DeviceError::TooLong`].
 pub fn content(record: &impl serde::Serialize) -> Result<Vec<u8>> {
     postcard::to_stdvec(record).map_err(|_| DeviceError::TooLong)
 }
 
 /// Encodes a configuration as it is written to a board, and signed: the version of its layout, then the record.
-///
-/// # Errors
-/// [`DeviceError::TooLong`].
 pub fn configuration_content(configuration: &Configuration) -> Result<Vec<u8>> {
     Ok([&[Configuration::VERSION][..], &content(configuration)?].concat())
 }
@@ -283,9 +214,6 @@ fn versioned<R: Record>(bytes: &[u8]) -> Result<R> {
 }
 
 /// Decodes all counters from a response to [`COUNTERS`] without its first byte.
-///
-/// # Errors
-/// [`DeviceError::Mismatch`].
 pub fn counters(response: &[u8]) -> Result<AllCounters> {
     let mut words = Words(response);
     words.identifier(PIPELINE_COUNTERS)?;

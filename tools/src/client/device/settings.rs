@@ -21,10 +21,8 @@ pub enum SettingError {
     /// The text is not `NAME=VALUE`.
     #[error("{0}: not NAME=VALUE")]
     NoAssignment(String),
-    /// No setting has this name.
     #[error("{0}: there is no such setting; see `device get`")]
     Name(String),
-    /// The setting was retired.
     #[error(
         "{0}: retired, because FoGNet no longer runs on this board (`cargo paper tables` runs it on recordings)"
     )]
@@ -43,9 +41,6 @@ pub enum SettingError {
 }
 
 /// Converts a configuration to names and values, with rates in rad/s.
-///
-/// # Errors
-/// [`SettingError::Json`], which does not occur for a configuration.
 pub fn to_value(configuration: &Configuration) -> Result<Value, SettingError> {
     let mut value = value(configuration)?;
     for name in RATES {
@@ -59,9 +54,6 @@ pub fn to_value(configuration: &Configuration) -> Result<Value, SettingError> {
 }
 
 /// Converts names and values to a configuration; ranges are not checked.
-///
-/// # Errors
-/// [`SettingError::Retired`], [`SettingError::Rate`], [`SettingError::Json`].
 pub fn from_value(mut value: Value) -> Result<Configuration, SettingError> {
     if let Some((name, _)) = RETIRED.iter().find(|(_, path)| value.pointer(path).is_some()) {
         return Err(SettingError::Retired(name));
@@ -75,10 +67,6 @@ pub fn from_value(mut value: Value) -> Result<Configuration, SettingError> {
     Ok(serde_json::from_value(value)?)
 }
 
-/// Sets one value from `name=value`, where the value is JSON.
-///
-/// # Errors
-/// [`SettingError::NoAssignment`], [`SettingError::Retired`], [`SettingError::Name`].
 pub fn assign(configuration: &mut Value, setting: &str) -> Result<(), SettingError> {
     let (name, text) = setting.split_once('=').ok_or_else(|| SettingError::NoAssignment(setting.into()))?;
     if let Some((name, _)) = RETIRED.iter().find(|(retired, _)| *retired == name) {
@@ -95,15 +83,11 @@ pub fn assign(configuration: &mut Value, setting: &str) -> Result<(), SettingErr
 }
 
 /// Converts a value to JSON by way of text, so that floats have no more digits than they need.
-///
-/// # Errors
-/// [`serde_json::Error`] if JSON cannot represent the value.
 pub fn value(of: &impl Serialize) -> serde_json::Result<Value> {
     serde_json::from_str(&serde_json::to_string(of)?)
 }
 
 /// Returns every value with its name.
-#[must_use]
 pub fn flat(value: &Value) -> Vec<(String, String)> {
     let mut lines = Vec::new();
     walk("", value, &mut lines);

@@ -18,9 +18,6 @@ pub struct Uploaded {
 
 /// Transfers a weight file to the board, which checks it and uses it after a restart. `progress` is called
 /// with the number of bytes transferred so far.
-///
-/// # Errors
-/// [`DeviceError`]. The weights in use are then unchanged.
 pub fn upload<B: Bus>(
     device: &mut Device<B>,
     file: &[u8],

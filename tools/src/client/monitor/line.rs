@@ -12,9 +12,6 @@ const MAX_LINE: usize = 128;
 pub struct NoFrame;
 
 /// Parses one line. The time stamp is in seconds: a log's own, or SLCAN's, which wraps every minute.
-///
-/// # Errors
-/// [`NoFrame`], also for answers to commands and empty lines.
 pub fn parse_line(line: &str) -> Result<(Option<f64>, DataFrame), NoFrame> {
     let line = line.trim();
     if let Some(rest) = line.strip_prefix('(') {

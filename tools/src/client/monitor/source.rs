@@ -24,7 +24,6 @@ pub enum SourceError {
     /// The file cannot be opened.
     #[error("{name}: {source}")]
     Open {
-        /// The name as given.
         name: String,
         /// The system's error.
         source: io::Error,
@@ -32,7 +31,6 @@ pub enum SourceError {
     /// Reading from or writing to the source failed.
     #[error("{name}: {source}")]
     Read {
-        /// The name as given.
         name: String,
         /// The system's error.
         source: io::Error,
@@ -69,9 +67,6 @@ impl fmt::Debug for Source {
 impl Source {
     /// Opens a source: a file is a log, `host:port` a socket, anything else a serial port at `baud` bit/s. A line
     /// gets SLCAN's commands to set the bit rate and open, which adapters need; a board does not.
-    ///
-    /// # Errors
-    /// [`SourceError`].
     pub fn open(name: &str, baud: u32, bus_bits_per_second: u32) -> Result<Self, SourceError> {
         let kind = if Path::new(name).is_file() {
             let open = |source| SourceError::Open { name: name.into(), source };
@@ -88,15 +83,11 @@ impl Source {
     }
 
     /// Returns whether the source is a log, whose time stamps are the only clock.
-    #[must_use]
     pub fn is_log(&self) -> bool {
         matches!(self.kind, Kind::Log(_))
     }
 
     /// Returns the received lines, after at most [`WAIT`].
-    ///
-    /// # Errors
-    /// [`SourceError::Read`].
     pub fn read(&mut self) -> Result<Lines, SourceError> {
         let mut bytes = [0; 4096];
         let count = match self.kind.read(&mut bytes) {

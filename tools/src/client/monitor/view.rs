@@ -16,8 +16,6 @@ const FAULTS: [(Faults, &str); 8] = [
     (Faults::BUS, "bus"),
 ];
 
-/// Returns the names of the faults, or `none`.
-#[must_use]
 pub fn fault_names(faults: Faults) -> String {
     let present = FAULTS.iter().filter(|(fault, _)| faults.0 & fault.0 != 0).map(|(_, name)| *name);
     let names: Vec<&str> = present.collect();
@@ -34,7 +32,6 @@ fn rounded(value: Option<f64>, decimals: usize) -> Option<f64> {
     value.and_then(|value| format!("{value:.decimals$}").parse().ok())
 }
 
-/// Returns the values of a set of messages as JSON.
 fn values(state: &State) -> serde_json::Value {
     let (source, quality) = judgement(state);
     serde_json::json!({
@@ -57,7 +54,6 @@ impl Monitor {
                                unreadable";
 
     /// Returns the newest values as one line of a CSV file; unknown values are empty.
-    #[must_use]
     pub fn row(&self, time: f64) -> String {
         let known = |value: Option<f64>, decimals: usize| {
             value.map(|value| format!("{value:.decimals$}")).unwrap_or_default()
@@ -79,7 +75,6 @@ impl Monitor {
 
     /// Returns the newest values, those of a fibre-optic gyro too, and all counts as JSON. Names, units and decimals
     /// are those of [`Monitor::row`]; unknown values are null.
-    #[must_use]
     pub fn json(&self, time: f64) -> serde_json::Value {
         let Counts { frames, foreign, lost, repeated, out_of_sequence, damaged, unreadable } = self.counts;
         let mut all = values(&self.state);
@@ -102,7 +97,6 @@ impl Monitor {
     }
 
     /// Returns the newest values as one line of readable text.
-    #[must_use]
     pub fn line(&self, time: f64) -> String {
         let (source, quality) = judgement(&self.state);
         let Counts { lost, repeated, out_of_sequence, damaged, unreadable, .. } = self.counts;

@@ -11,7 +11,6 @@ use gyronet::can::yaw::{SIGMA_UNKNOWN, Source};
 pub struct State {
     /// Corrected rate, deg/s; `None` if not available.
     pub rate: Option<f64>,
-    /// The source of the rate, and its quality.
     pub judgement: Option<(Source, Quality)>,
     /// Yaw turned since the first angle message, deg, not wrapped.
     pub yaw: Option<f64>,

@@ -27,7 +27,6 @@ const BUFFER: usize = 1 << 16;
 /// Name and index of a column.
 type Column = (&'static str, usize);
 
-/// The columns of a recording.
 #[derive(Debug, Clone, Copy)]
 struct Columns {
     time: Column,
@@ -78,9 +77,6 @@ pub struct Reader<R> {
 
 impl<R: std::io::Read> Reader<R> {
     /// Reads the header; `path` is for messages.
-    ///
-    /// # Errors
-    /// [`DataError`]: there is no header, or a required column is missing.
     pub fn new(path: &str, input: R) -> Result<Self, DataError> {
         let mut csv =
             csv::ReaderBuilder::new().trim(csv::Trim::Headers).buffer_capacity(BUFFER).from_reader(input);
@@ -102,12 +98,10 @@ impl<R: std::io::Read> Reader<R> {
     }
 
     /// Rotates the rows into the vehicle's axes.
-    #[must_use]
     pub fn mounted(self, vehicle: &Vehicle) -> Self {
         Self { rotation: vehicle.mounting.rotation(), ..self }
     }
 
-    /// The row of the record that was read last.
     fn row(&mut self) -> Result<Row, DataError> {
         let line = self.record.position().map_or(0, csv::Position::line);
         let Columns { time, force, rate, reference, course, temperature, wheels } = self.columns;

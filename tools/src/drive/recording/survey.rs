@@ -25,7 +25,6 @@ pub struct Facts {
 
 impl Facts {
     /// What these rows have, whether they can be replayed or not.
-    #[must_use]
     pub fn of(rows: &[Row]) -> Self {
         let mut survey = Survey::default();
         rows.iter().for_each(|row| survey.row(row));
@@ -33,13 +32,11 @@ impl Facts {
     }
 
     /// Time from the first sample to the end of the last one, s.
-    #[must_use]
     pub fn seconds(&self) -> f64 {
         (self.last.0 - self.first.0 + PERIOD_US) as f64 * 1e-6
     }
 
     /// Whether any wheel is recorded.
-    #[must_use]
     pub fn has_wheels(&self) -> bool {
         self.wheels.contains(&true)
     }
@@ -78,9 +75,6 @@ impl Survey {
     }
 
     /// Checks that the drive can be replayed: at least 3 s long, at 100 Hz, with any wheels at rest in the first 3 s.
-    ///
-    /// # Errors
-    /// [`DataError`] with this path.
     pub fn finish(self, path: &str) -> Result<Facts, DataError> {
         if self.facts.rows == 0 {
             return Err(DataError::of(path, DataFault::Empty));

@@ -1,4 +1,4 @@
-//! This module aligns the clocks of several files with the clock of the IMU's file, by the yaw rates that both have.
+//! Aligns the clocks of several files with the clock of the IMU's file, by the yaw rates that both have.
 
 use super::{Request, channels};
 use crate::drive::DT;

@@ -1,13 +1,10 @@
-//! This module writes an imported drive as the CSV that every command reads.
+//! Writes an imported drive as the CSV that every command reads.
 
 use super::{Drive, Seen, channels};
 use std::io::{self, Write};
 
 impl Drive<'_> {
     /// Writes the drive as CSV; columns that are empty in every row are left out.
-    ///
-    /// # Errors
-    /// The writer's error, or that of a temporary file.
     pub fn write_csv(&self, mut out: impl Write) -> io::Result<()> {
         let Seen { reference, course, wheels, .. } = self.seen;
         write!(out, "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z")?;

@@ -1,4 +1,4 @@
-//! This module writes FoGNet's weight file. The part that is linear in the gyro's increments is multiplied out in f64
+//! Writes FoGNet's weight file. The part that is linear in the gyro's increments is multiplied out in f64
 //! and not quantised to int8 ([`gyronet::model::fognet`]); the LSTMs are quantised as GyroNet's.
 
 use super::{QuantizeError, Report, fixed, header, provenance, rows, seal};
@@ -14,9 +14,6 @@ use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 pub const INPUT_CLAMP_STD: f64 = 16.0;
 
 /// Quantises a checkpoint of FoGNet; returns the weight file and its figures.
-///
-/// # Errors
-/// [`QuantizeError`].
 pub fn quantize(checkpoint: &Checkpoint<FogNet>) -> Result<(Vec<u8>, Report), QuantizeError> {
     let mut report = Report::new();
     let clamp = (INPUT_CLAMP_STD * f64::from(HIDDEN_MAX)) as i32;

@@ -1,4 +1,4 @@
-//! This module writes LSTM directions and output rows in int8 and int16, in the order in which the kernels read them.
+//! Writes LSTM directions and output rows in int8 and int16, in the order in which the kernels read them.
 
 use super::{QuantizeError, Report, fixed};
 use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT};

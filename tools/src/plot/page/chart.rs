@@ -1,4 +1,4 @@
-//! This module writes charts that fill the width of the page. The curves stretch; the text does not.
+//! Writes charts that fill the width of the page. The curves stretch; the text does not.
 //!
 //! The curves are an SVG without a fixed aspect ratio; axes and names are HTML text beside the SVG. So the chart is
 //! readable on a desktop and on a phone, and the script can zoom by changing the SVG's view box.
@@ -14,7 +14,6 @@ const POINTS: usize = 2_000;
 /// Limits of the width over the height of a chart with the same scale on both axes.
 const ASPECTS: (f64, f64) = (1.5, 2.6);
 
-/// A curve of a chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     /// The class in the style sheet, which gives the colour.
@@ -32,7 +31,6 @@ pub struct Curve {
 /// A chart of curves with common axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart<'a> {
-    /// The title above the chart.
     pub title: &'a str,
     /// The text after the title: the quantities and units of the axes.
     pub axes: &'a str,
@@ -43,14 +41,11 @@ pub struct Chart<'a> {
 }
 
 impl Chart<'_> {
-    /// Returns the chart as HTML.
-    #[must_use]
     pub fn html(&self) -> String {
         self.draw(if self.same_scale { "map" } else { "time" })
     }
 
     /// Returns a chart whose points are decimal logarithms; the axes show the numbers themselves.
-    #[must_use]
     pub fn log_html(&self) -> String {
         self.draw("map log")
     }

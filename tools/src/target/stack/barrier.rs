@@ -1,4 +1,4 @@
-//! This module checks that no interrupt handler returns before its own stores are complete.
+//! Checks that no interrupt handler returns before its own stores are complete.
 //!
 //! Otherwise a Cortex-M4 can take the wrong vector next (Arm erratum 838869). A `DSB` after the last store prevents
 //! this. Between the `DSB` and the return there may be only instructions that do not store, and no branch may enter
@@ -15,9 +15,6 @@ const DEPTH: usize = 4;
 const DSB: (u16, Option<u16>) = (0xF3BF, Some(0x8F4F));
 
 /// Returns the names of those of the given exceptions' handlers that can return after a store without a barrier.
-///
-/// # Errors
-/// [`StackError::Format`], also if an exception has no handler.
 pub fn handlers_without_barrier(elf: &[u8], exceptions: &[usize]) -> Result<Vec<String>, StackError> {
     let code = Code::read(elf)?;
     let mut without = Vec::new();

@@ -1,4 +1,4 @@
-//! This module reads the functions of an image, with the stack use and the calls of each.
+//! Reads the functions of an image, with the stack use and the calls of each.
 
 use super::priority::{self, Vectors};
 use super::thumb::{self, Effect, Instruction};

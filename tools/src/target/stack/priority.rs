@@ -1,4 +1,4 @@
-//! This module reads the priorities of handlers, which determine which handlers can interrupt each other.
+//! Reads the priorities of handlers, which determine which handlers can interrupt each other.
 //!
 //! Handlers of one priority cannot (ARMv7-M Architecture Reference Manual, B1.5.4). An image lists its priorities in
 //! a section that is not loaded: for each task the vector number and the priority, one byte each, higher is more
@@ -24,9 +24,6 @@ pub type Group = (Option<u8>, BTreeSet<u32>);
 
 impl Vectors {
     /// Reads the priorities of an image.
-    ///
-    /// # Errors
-    /// [`StackError::Format`] if a byte is left over, or a vector is listed twice.
     pub fn prioritise(&mut self, section: &[u8]) -> Result<(), StackError> {
         let refused = || StackError::Format(format!("{SECTION} is no list of vectors and priorities"));
         let (entries, []) = section.as_chunks::<2>() else { return Err(refused()) };

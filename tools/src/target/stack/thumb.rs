@@ -1,4 +1,4 @@
-//! This module decodes the effect of a Thumb-2 instruction on the stack pointer and on the control flow.
+//! Decodes the effect of a Thumb-2 instruction on the stack pointer and on the control flow.
 //!
 //! Only instructions that affect one of them are decoded (ARMv7-M Architecture Reference Manual, A7.7); all others
 //! are [`Effect::None`].
@@ -60,7 +60,6 @@ pub fn instructions(body: &[u8], start: u32, is_data: impl Fn(u32) -> bool) -> V
     instructions
 }
 
-/// Returns the effect of the instruction at an address.
 pub fn effect(first: u16, second: Option<u16>, address: u32) -> Effect {
     match second {
         Some(second) => wide(first, second, address),
@@ -142,7 +141,6 @@ fn wide(first: u16, second: u16, address: u32) -> Effect {
     }
 }
 
-/// Sign-extends a value with this many bits.
 fn sign(value: u32, bits: u32) -> i32 {
     (value << (32 - bits)) as i32 >> (32 - bits)
 }
