@@ -1,17 +1,24 @@
-//! The trainer's own unit tests, as far as they want no PyTorch: readers of drives and sequences, vehicle files, filters of
-//! the rivals, errors of trajectories.
+//! The unit tests of the Python packages. The trainer's, as far as they want no PyTorch: readers of drives and sequences,
+//! vehicle files, filters of the rivals, errors of trajectories. Those of the import of logs.
 
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require;
 use std::process::Command;
 
-/// Tests that need no PyTorch, at least.
-const LEAST: usize = 52;
-
 #[test]
 fn the_trainers_unit_tests_pass() {
-    let test = "the_trainers_unit_tests_pass";
-    let Some(python) = require::python(test, &["numpy", "scipy"]) else { return };
+    pass("the_trainers_unit_tests_pass", "tools/train", &["numpy", "scipy"], 52);
+}
+
+#[test]
+fn the_unit_tests_of_the_import_in_python_pass() {
+    let packages = ["asammdf", "can", "cantools", "mcap", "numpy", "pyulog", "rosbags"];
+    pass("the_unit_tests_of_the_import_in_python_pass", "tools/python", &packages, 36);
+}
+
+/// Runs the unit tests of a folder, of which `least` must not be skipped.
+fn pass(test: &str, folder: &str, packages: &[&str], least: usize) {
+    let Some(python) = require::python(test, packages) else { return };
     let output = Command::new(python)
         .args([
             "-B",
@@ -23,7 +30,7 @@ fn the_trainers_unit_tests_pass() {
             "--top-level-directory",
             ".",
         ])
-        .current_dir(workspace().join("tools/train"))
+        .current_dir(workspace().join(folder))
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
@@ -35,7 +42,7 @@ fn the_trainers_unit_tests_pass() {
         .split_once("skipped=")
         .map_or(0, |(_, count)| count.trim_end().trim_end_matches(')').parse().unwrap());
     if skipped > 0 {
-        require::skipped(test, &format!("{skipped} modules of the trainer's want PyTorch"));
+        require::skipped(test, &format!("{skipped} of {folder} want what is not here"));
     }
-    assert!(ran - skipped >= LEAST, "{said}");
+    assert!(ran - skipped >= least, "{said}");
 }

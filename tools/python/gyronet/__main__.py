@@ -1,0 +1,128 @@
+"""The command `gyronet-logs`: import, and wheels from-dbc. Exit status 1: refused, with the reason on standard error."""
+
+import argparse
+import json
+import logging
+import os
+import sys
+from pathlib import Path
+
+from gyronet.refused import Refused
+
+
+def parser():
+    top = argparse.ArgumentParser(prog="gyronet-logs", description="Make a drive for gyronet of logs of other tools, and wheel settings of a DBC file.")
+    commands = top.add_subparsers(dest="command", required=True)
+    log = commands.add_parser("import", help="convert logs to one drive", description=(
+        "Convert logs to one drive, a CSV file at 100 Hz: ROS 1 and 2 bags (folders, SQLite, MCAP, split, compressed), PX4 ULog, MDF, candump, "
+        "Vector ASC and BLF, PEAK TRC, Xsens MT text, EuRoC, CSV. A vehicle file holds what a log does not contain; a copy is written beside the drive."))
+    log.add_argument("files", nargs="+", metavar="FILE", help="logs of one drive, or bag folders")
+    log.add_argument("--out", metavar="FILE.csv", help="write the drive to this file")
+    log.add_argument("--vehicle", metavar="FILE.toml", help="vehicle file [default: the first log's name with .toml, or vehicle.toml beside it]")
+    log.add_argument("--dbc", metavar="FILE.dbc", help="DBC file of the CAN frames")
+    log.add_argument("--imu", metavar="CHANNEL", help="channel of gyro and accelerometer, or GYRO+ACCEL")
+    log.add_argument("--odometry", metavar="CHANNEL", help="channel whose speed replaces the wheels; none for no odometry")
+    log.add_argument("--position", metavar="CHANNEL", help="channel of the GNSS position; none for no position")
+    log.add_argument("--unit", action="append", default=[], metavar="NAME=UNIT", help="unit of a channel or column, such as WHEELS.FL=km/h")
+    log.add_argument("--offset", action="append", default=[], metavar="NAME=SECONDS", help="time to add to the stamps of a channel")
+    log.add_argument("--rate", type=float, metavar="HZ", help="samples per second of a table that counts samples")
+    log.add_argument("--stamps", choices=["header", "recorded"], default="header", help="which times of a bag's messages are used")
+    log.add_argument("--same-clock", action="store_true", help="use the stamps as they are: the files have one clock")
+    log.add_argument("--from", dest="start", type=float, default=0.0, metavar="SECONDS", help="skip this much after the first sample")
+    log.add_argument("--to", type=float, metavar="SECONDS", help="end this long after the first sample")
+    log.add_argument("--json", action="store_true", help="print the report as JSON")
+    wheels = commands.add_parser("wheels", help="wheel settings of a vehicle").add_subparsers(dest="action", required=True)
+    dbc = wheels.add_parser("from-dbc", help="create wheel settings from a DBC file", description=(
+        "Create the settings of wheel frames from a DBC file and the names of its signals, SIGNAL or MESSAGE.SIGNAL. Without names it lists the "
+        "signals that could be wheel speeds and writes nothing."))
+    dbc.add_argument("file", metavar="FILE.dbc")
+    for wheel in ("front-left", "front-right", "rear-left", "rear-right"):
+        dbc.add_argument(f"--{wheel}", metavar="SIGNAL")
+    dbc.add_argument("--out", metavar="FILE.toml", help="write to this file instead of standard output")
+    return top
+
+
+def vehicle_of(args):
+    """The vehicle file's content, in which arguments replace what the file gives."""
+    from gyronet.logs.vehicle import Vehicle
+
+    first = Path(args.files[0]).resolve()
+    own, shared = first.with_suffix(".toml"), first.with_name("vehicle.toml")
+    own = own if not args.vehicle and own.is_file() else None
+    path = own or args.vehicle or (shared if shared.is_file() else None)
+    vehicle = Vehicle.read(path) if path else Vehicle()
+    # Only a drive's own file says that its rows are turned already; its names are those of the original logs.
+    vehicle.mounting["applied"] = vehicle.mounting["applied"] and own is not None
+    if vehicle.mounting["applied"]:
+        vehicle.forget_names()
+    if args.out:
+        written = [Path(args.out).resolve(), Path(args.out).with_suffix(".toml").resolve()]
+        for read in [*args.files, *([vehicle.path] if vehicle.path else [])]:
+            if Path(read).resolve() in written:
+                raise Refused(f"{read}: --out would overwrite it; give the drive another name")
+        if Path(args.out).suffix == ".toml":
+            raise Refused(f"{args.out}: the drive is a CSV file; its vehicle file has that suffix")
+    if dbc := args.dbc or vehicle.bus["dbc"]:
+        vehicle.bus["dbc"] = os.path.abspath(dbc)
+    for name in ("imu", "odometry", "position"):
+        vehicle.signals[name] = getattr(args, name) or vehicle.signals[name]
+    return vehicle
+
+
+def run_import(args):
+    from gyronet.logs import Drive, Request
+    from gyronet.logs.units import Flags
+
+    if not 0 <= args.start < 1e6 or args.to is not None and not args.start < args.to:
+        raise Refused("--from and --to are seconds after the first sample, --from below --to")
+    if args.rate is not None and not 0 < args.rate < 1e5:
+        raise Refused("--rate must be a number of samples per second")
+    offsets = {}
+    for flag in args.offset:
+        name, equals, seconds = flag.rpartition("=")
+        try:
+            offsets[name] = float(seconds)
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise Refused(f"--offset {flag}: write NAME=SECONDS")
+    vehicle = vehicle_of(args)
+    flags = Flags(args.unit)
+    for name in [name for name in flags if isinstance(name, str)]:
+        vehicle.columns.setdefault(name, {"name": name, "unit": flags[name]})
+    drive = Drive(Request(args.files, vehicle, args.same_clock, args.stamps == "recorded", args.start, args.to, flags, offsets, args.rate))
+    report, start, dropped = drive.report, drive.start_time, sum(drive.dropped.values())
+    if args.out:
+        beside = drive.write(args.out)
+        report.append(f"{args.out}: {drive.rows} rows; {beside} beside it")
+    if args.json:
+        print(json.dumps({"seconds": round(drive.seconds, 2), "rows": drive.rows, "dropped": dropped, "start": start, "report": report,
+                          "warnings": drive.warnings, "dropped_by_reason": drive.dropped}))
+        return
+    print(f"{drive.seconds:.2f} s, {drive.rows} rows, {dropped} records dropped")
+    for line in [next(drive.remarks()), *(f"dropped {count}: {reason}" for reason, count in drive.dropped.items()), *report]:
+        print(f"  {line}")
+    for warning in drive.warnings:
+        print(f"  warning: {warning}")
+
+
+def main(arguments=None):
+    args = parser().parse_args(arguments)
+    logging.disable(logging.CRITICAL)  # the libraries' own remarks; ours are in the report
+    sys.unraisablehook = lambda _: None  # a reader that could not be opened complains again when it is thrown away
+    try:
+        if args.command == "import":
+            run_import(args)
+        else:
+            from gyronet.wheels import run
+            run(args)
+    except Refused as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,250 @@
+"""One drive from one or more logs, at 100 Hz on the clock of the gyro's file, and the CSV that every gyronet command reads."""
+
+import os
+from contextlib import suppress
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from pathlib import Path
+
+import numpy as np
+
+from gyronet.logs import clocks, course, grid, opened, select
+from gyronet.logs.can import Bus
+from gyronet.logs.units import Flags
+from gyronet.logs.used import Used
+from gyronet.logs.vehicle import RADIUS, WHEELS, Vehicle
+from gyronet.refused import Refused
+
+SHORTEST, LONGEST = 3.0, 86_400.0
+RATES = (24.5, 1_020.0)
+CHUNK = 50_000  # rows in memory
+DAY = 1e9  # s: later stamps are times of day
+ROLES = [f"wheel {name.replace('_', ' ')}" for name in WHEELS]
+
+
+@dataclass
+class Request:
+    files: list
+    vehicle: Vehicle = field(default_factory=Vehicle)
+    same_clock: bool = False
+    recorded: bool = False  # the recording times of a bag in place of the header stamps
+    start: float = 0.0  # s after the first sample
+    to: float | None = None
+    units: Flags = field(default_factory=Flags)
+    offsets: dict = field(default_factory=dict)
+    rate: float | None = None
+
+    def wanted(self):
+        names = [self.vehicle.wheels[wheel] for wheel in WHEELS] + [self.vehicle.signals["reference_rate"]]
+        return [name for name in names if name] + [*select.COLUMNS, "ref_gyr_z"]
+
+
+def merged(logs):
+    """Joins the parts of a split recording: the same channels, one after the other."""
+    logs = sorted(logs, key=lambda log: min([channel.first for channel in log.channels.values()], default=0.0))
+    whole = []
+    for log in logs:
+        before = next((other for other in whole if _goes_on(other, log)), None)
+        if before is None:
+            whole.append(log)
+            continue
+        before.notes.append(f"{log.path} goes on where {before.path} ends")
+        for name, channel in log.channels.items():
+            if name in before.channels:
+                before.channels[name].append(channel)
+            else:
+                before.channels[name] = channel
+        before.dropped.update(log.dropped)
+        before.passed.update(log.passed)
+    return whole
+
+
+def _goes_on(before, log):
+    common = set(before.channels) & set(log.channels)
+    same = common and not common & {"imu", "gyro", "accel", "position"}
+    return same and all(log.channels[name].first >= before.channels[name].last - 1.0 for name in common)
+
+
+class Drive:
+    def __init__(self, request):
+        self.request, self.vehicle = request, request.vehicle
+        self.report, self.warnings = [], []
+        bus = Bus(self.vehicle.bus["dbc"], request.wanted())
+        paths = opened.expand(request.files)
+        logs = merged([opened.read(path, request, bus, len(paths) > 1) for path in paths])
+        self.logs = logs
+        self.dropped = {f"{log.path}: {reason}": count for log in logs for reason, count in log.dropped.items()}
+        files = select.Files(logs, bus)
+        self.choose(files)
+        for log in logs:
+            self.report += [f"{log.path}: {note}" for note in log.notes]
+            passed = {kind: count for kind, count in log.passed.items() if count}
+            if passed:
+                self.report.append(f"{log.path}: {sum(passed.values())} records that this drive does not need: " + ", ".join(list(passed)[:6]))
+        self.report += bus.notes + files.notes
+        self.span()
+        clocks.settle(self, logs, request)
+        self.place_courses()
+        self.count_rows()
+        self.start_of_day()
+
+    def choose(self, files):
+        signals, request = self.vehicle.signals, self.request
+        gyro, accel = files.imu(signals["imu"])
+        if gyro is accel:
+            self.gyro = self.accel = Used("imu", gyro, request)
+        else:
+            self.gyro, self.accel = Used("gyro", gyro, request, "rate"), Used("accelerometer", accel, request, "acceleration")
+        self.accel.check_gravity()
+        wheels = files.wheels(self.vehicle)
+        self.wheels = [Used(role, entry, request) if entry else None for role, entry in zip(ROLES, wheels)]
+        name = signals["reference_rate"] or ("ref_gyr_z" if any(c.name == "ref_gyr_z" for _, c in files.all) else None)
+        entry = files.named("the reference rate", name, ("number", "imu", "gyro", "odometry")) if name else None
+        self.reference = Used("reference rate", entry, request) if entry else None
+        # If wheels are found, no odometry is needed.
+        entry = None if any(wheels) and not signals["odometry"] else files.one("odometry", "odometry", ("odometry",), signals["odometry"])
+        self.odometry = Used("odometry", entry, request) if entry else None
+        entry = files.one("position", "position", ("position",), signals["position"])
+        self.position = Used("position", entry, request) if entry else None
+        self.courses = course.courses(np.array(self.position.rows)) if self.position else np.empty((0, 4))
+        names = {channel.name for _, channel in files.all}
+        for name in request.offsets:
+            if name not in names:
+                raise Refused(f"--offset {name}: no such channel" + files.listed(files.all))
+        request.units.check()
+
+    def used(self):
+        roles = [self.gyro, self.accel, self.reference, self.odometry, self.position, *self.wheels]
+        return list(dict.fromkeys(used for used in roles if used))
+
+    def span(self):
+        request, (first, last) = self.request, self.gyro.span()
+        if self.accel is not self.gyro:
+            begin, end = self.accel.span()
+            first = max(first, min(begin, last))
+            if begin > last or end < first:
+                raise Refused(self.apart(self.accel) + "; one clock is needed")
+        self.start = first + request.start
+        last = min(last, first + request.to) if request.to is not None else last
+        seconds = last - self.start
+        if not SHORTEST <= seconds < LONGEST:
+            raise Refused(f"{self.gyro.name}: {seconds:.2f} s, but a drive is 3 s to a day long; --from and --to choose a part")
+        for used in (self.gyro, self.accel):
+            if not RATES[0] <= used.hz <= RATES[1]:
+                raise Refused(f"{used.name}: {used.hz:.1f} Hz by the median period, {used.channel.rate:.1f} Hz by count and span, "
+                              "but an IMU needs 25 to 1000 Hz; is the time's unit right? --unit t_s=ms")
+        self.count = int(seconds / grid.DT) + 1
+
+    def apart(self, used):
+        (a, b), (c, d) = self.gyro.span(), used.span()
+        return (f"{used.name} does not overlap with {self.gyro.name} in time: {self.gyro.name} spans {a:.2f} to {b:.2f} s, "
+                f"{used.name} {c:.2f} to {d:.2f} s")
+
+    def place_courses(self):
+        at = (self.courses[:, 0] + (self.position.offset if self.position else 0) - self.start) / grid.DT
+        at = np.sign(at) * np.floor(np.abs(at) + 0.5)
+        near = (at >= 0) & (at < self.count)
+        self.course_rows, self.course_values = at[near].astype(int), self.courses[near, 1:]
+
+    def chunks(self):
+        """Rows by the thousand: t_s, six of the IMU, reference, three of the course, four wheels; NaN is unknown."""
+        for first in range(0, self.count, CHUNK):
+            index = np.arange(first, min(first + CHUNK, self.count))
+            times = self.start + grid.DT * index
+            table = np.full((len(index), 15), np.nan)
+            table[:, 0] = grid.DT * index
+            gyro = self.gyro.at(times)
+            force = gyro[:, :3] if self.accel is self.gyro else self.accel.at(times)
+            table[:, 1:4], table[:, 4:7] = self.vehicle.turn(force), self.vehicle.turn(gyro[:, -3:])
+            if self.reference:
+                table[:, 7] = self.reference.at(times)[:, 0]
+            here = (self.course_rows >= first) & (self.course_rows <= index[-1])
+            table[self.course_rows[here] - first, 8:11] = self.course_values[here]
+            for k, wheel in enumerate(self.wheels):
+                if wheel:
+                    table[:, 11 + k] = wheel.at(times)[:, 0] * (1.0 if wheel.dimension == "rate" else 1.0 / self.vehicle.radius)
+            if self.odometry:
+                speed, turn = self.odometry.at(times).T
+                half, known = 0.5 * (self.vehicle.wheels["track_m"] or 0.0), np.isfinite(speed)
+                table[known, 11], table[known, 13] = np.nan, np.nan
+                table[known, 12] = (speed + half * turn)[known] / self.vehicle.radius
+                table[known, 14] = (speed - half * turn)[known] / self.vehicle.radius
+            yield table[np.isfinite(table[:, 1:7]).all(axis=1)]
+
+    def count_rows(self):
+        filled, self.rows, self.seconds = np.zeros(15, int), 0, 0.0
+        for table in self.chunks():
+            filled += np.isfinite(table).sum(axis=0)
+            self.rows += len(table)
+            self.seconds = float(table[-1, 0]) if len(table) else self.seconds
+        if not self.rows:
+            raise Refused(f"{self.gyro.name}: no row has gyro and accelerometer: {self.apart(self.accel)}")
+        self.seen = filled > 0
+        places = [(self.gyro, 4), (self.accel, 1), (self.reference, 7), (self.odometry, 12), (self.position, 8),
+                  *((wheel, 11 + k) for k, wheel in enumerate(self.wheels))]
+        for used, column in places:
+            if not used:
+                continue
+            used.filled = int(filled[column])
+            begin, end = used.span()
+            beyond = begin > self.start + self.count * grid.DT or end < self.start
+            if not used.filled and (beyond or used is not self.position):
+                flag = {"odometry": "--odometry none", "position": "--position none"}.get(used.role, "another name in the vehicle file")
+                raise Refused(f"{self.apart(used)}, so it fills no row; without it: {flag}; a known offset: --offset {used.name}=SECONDS"
+                              + ("" if self.request.recorded else "; a bag's recording times: --stamps recorded"))
+            if not used.filled:
+                used.remarks.append("no course: it stands, is too slow or too noisy")
+        for used in self.used():
+            self.report.append(used.line(self.start, self.rows))
+        self.report.append(f"imu: {self.gyro.hz:.1f} Hz to 100 Hz: {grid.method(self.gyro.hz)}")
+        if (self.odometry or any(wheel and wheel.dimension == "speed" for wheel in self.wheels)) and not self.vehicle.wheels["radius_m"]:
+            self.report.append(f"wheels: radius {RADIUS} m is assumed; set wheels.radius_m")
+        if self.count > self.rows:
+            self.report.append(f"imu: {self.count - self.rows} of {self.count} rows are in gaps and left out")
+
+    def start_of_day(self):
+        """The time of day of row 0, s since 1970, by whichever clock has it."""
+        self.start_time = self.start if self.start > DAY else None
+        for used in self.used():
+            epoch = self.logs[used.file].epoch
+            if self.start_time is None and epoch is not None:
+                self.start_time = self.start - used.offset + epoch
+            elif self.start_time is None and used.seconds[0] > DAY:
+                self.start_time = self.start - used.offset
+
+    def remarks(self):
+        start = "unknown: no clock of the logs is a time of day"
+        if self.start_time is not None:
+            start = f"{self.start_time:.6f} ({datetime.fromtimestamp(self.start_time, timezone.utc).isoformat(timespec='microseconds')})"
+        yield f"start = {start}"
+        yield from (f"unit of {used.name} = {used.unit}" for used in self.used())
+        yield from (f"dropped {count}: {reason}" for reason, count in self.dropped.items())
+
+    def write(self, out):
+        """Writes the drive and its vehicle file; on an error neither is left behind."""
+        out = Path(out)
+        beside = out.with_suffix(".toml")
+        halves = [(path, path.with_name(f".{path.name}.{os.getpid()}")) for path in (out, beside)]
+        try:
+            with open(halves[0][1], "w", encoding="utf-8", newline="\n") as file:
+                self.write_csv(file)
+            halves[1][1].write_text(self.vehicle.text(self.remarks()), encoding="utf-8")
+            for path, half in halves:
+                os.replace(half, path)
+        except OSError as error:
+            raise Refused(f"{error.filename or out}: {error.strerror}") from None
+        finally:
+            for _, half in halves:
+                with suppress(OSError):
+                    half.unlink()
+        return beside
+
+    def write_csv(self, file):
+        names = "t_s acc_x acc_y acc_z gyr_x gyr_y gyr_z ref_gyr_z ref_yaw ref_yaw_sigma gnss_speed wheel1_rate wheel2_rate wheel3_rate wheel4_rate"
+        columns = [k for k in range(15) if k < 7 or self.seen[k]]
+        file.write(",".join(names.split()[k] for k in columns) + "\n")
+        form = ",".join(["%.2f"] + ["%.7f"] * 6 + ["%.6f"] * (len(columns) - 7)) + "\n"
+        for table in self.chunks():
+            for row in table[:, columns].tolist():
+                line = form % tuple(row)
+                file.write(line.replace("nan", "") if "nan" in line else line)

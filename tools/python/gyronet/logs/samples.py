@@ -1,0 +1,140 @@
+"""Channels of a log: timed samples, the older ones in a temporary file, with a record of what was wrong with their stamps."""
+
+import tempfile
+from array import array
+from collections import Counter
+
+import numpy as np
+
+WIDTH = {"imu": 6, "gyro": 3, "accel": 3, "odometry": 2, "position": 6, "number": 1}
+NAMES = {"imu": "IMU", "number": "signal"}
+BLOCK = 1 << 16  # numbers in memory, of each channel
+STEP = 0.5  # s: a step back that is more than messages out of order
+
+
+class Channel:
+    def __init__(self, log, name, kind, unit="", kept=True):
+        self.log, self.name, self.kind, self.unit, self.kept = log, name, kind, unit, kept
+        self.width = 1 + WIDTH[kind]
+        self.buffer, self.file = array("d"), None
+        self.count, self.first, self.last = 0, None, -np.inf
+        self.given = 0
+        self.seen = np.zeros(WIDTH[kind], bool)  # columns that were ever other than zero
+        self.gap = (0.0, 0.0)  # the longest pause between samples and its place, s
+        self.back = None  # size, place and cost of the steps back
+
+    def add(self, seconds, values):
+        self.buffer.append(seconds)
+        self.buffer.extend(values)
+        if len(self.buffer) >= BLOCK:
+            self.flush()
+
+    def flush(self):
+        if self.buffer:
+            block, self.buffer = self.buffer, array("d")
+            self.extend(np.frombuffer(block).reshape(-1, self.width))
+
+    def extend(self, block):
+        """Adds rows of time and values; what is not finite or does not rise in time is counted and left out."""
+        self.given += len(block)
+        good = np.isfinite(block[:, 0])
+        values = block[:, 1:3] if self.kind == "position" else block[:, 1:]
+        good &= np.isfinite(values).all(axis=1)
+        if self.kind == "position":
+            good &= (np.abs(block[:, 1]) <= 90) & (np.abs(block[:, 2]) <= 360)
+        self.drop("not a finite number", len(block) - np.count_nonzero(good))
+        block = block[good]
+        if not len(block):
+            return
+        seconds = block[:, 0]
+        before = np.maximum.accumulate(np.concatenate([[self.last], seconds[:-1]]))
+        rises = seconds > before
+        self.first = seconds[0] if self.first is None else self.first
+        if not rises.all():
+            falls = ~rises
+            self.drop("stamps that stand still", np.count_nonzero(seconds[falls] == before[falls]))
+            self.drop("stamps that step back", np.count_nonzero(seconds[falls] < before[falls]))
+            far = before - seconds > STEP
+            if far.any():
+                size, place = (before - seconds)[far].max(), (before - self.first)[far][0]
+                old = self.back or (0.0, place, 0)
+                self.back = (max(size, old[0]), old[1], old[2] + np.count_nonzero(far))
+        kept, before = block[rises], before[rises]
+        if not len(kept):
+            return
+        pauses = np.where(np.isfinite(before), kept[:, 0] - before, 0.0)
+        at = int(np.argmax(pauses))
+        if pauses[at] > self.gap[0]:
+            self.gap = (float(pauses[at]), float(before[at] - self.first))
+        self.count, self.last = self.count + len(kept), float(kept[-1, 0])
+        self.seen |= (kept[:, 1:] != 0).any(axis=0)
+        if self.kept:
+            self.file = self.file or tempfile.TemporaryFile()
+            self.file.write(np.ascontiguousarray(kept).tobytes())
+
+    def append(self, other):
+        """Adds the samples of the same channel in the next part of a recording."""
+        if other.count and other.file:
+            rows = np.memmap(other.file, np.float64, "r", shape=(other.count, other.width))
+            for first in range(0, other.count, BLOCK):
+                self.extend(np.array(rows[first : first + BLOCK]))
+        self.close()
+
+    def drop(self, reason, count):
+        if count:
+            self.log.dropped[f"{self.name}: {reason}"] += int(count)
+
+    def close(self):
+        """Ends the writing; an IMU one of whose halves is zero throughout is a gyro or an accelerometer."""
+        self.flush()
+        if self.file:
+            self.file.flush()
+        if self.kind == "imu" and self.count:
+            force, rate = self.seen[:3].any(), self.seen[3:].any()
+            if force != rate:
+                self.kind = "accel" if force else "gyro"
+
+    def rows(self):
+        """All samples, as a mapped array of time and values."""
+        if not self.count or not self.file:
+            return np.empty((0, 1 + WIDTH[self.kind]))
+        rows = np.memmap(self.file, np.float64, "r", shape=(self.count, self.width))
+        if self.width == 7 and self.kind in ("gyro", "accel"):
+            return np.column_stack([rows[:, 0], rows[:, 4:] if self.kind == "gyro" else rows[:, 1:4]])
+        return rows
+
+    @property
+    def rate(self):
+        return (self.count - 1) / max(self.last - self.first, 1e-9) if self.count else 0.0
+
+    def __str__(self):
+        return f"{self.name} ({NAMES.get(self.kind, self.kind)}, {self.rate:.1f} Hz)"
+
+
+class Log:
+    """The channels of one file, and counts of what was not used."""
+
+    def __init__(self, path, wanted=None, recorded=False):
+        self.path, self.wanted, self.recorded = path, wanted, recorded
+        self.channels, self.dropped, self.passed, self.notes = {}, Counter(), Counter(), []
+        self.epoch = None  # time of day at time 0, s, where the log gives it
+
+    def channel(self, name, kind, unit=""):
+        channel = self.channels.get(name)
+        if channel is None:
+            kept = kind != "number" or self.wanted is None or any(want.endswith(name) for want in self.wanted)
+            channel = self.channels[name] = Channel(self, name, kind, unit, kept)
+        return channel
+
+    def add(self, name, kind, seconds, values, unit=""):
+        channel = self.channel(name, kind, unit)
+        if channel.kind != kind:
+            self.dropped[f"{name}: another type under the same name"] += 1
+        else:
+            channel.add(seconds, values)
+
+    def close(self):
+        for channel in self.channels.values():
+            channel.close()
+        self.channels = {name: channel for name, channel in self.channels.items() if channel.count}
+        return self

@@ -1,0 +1,95 @@
+"""The channels of a drive: by kind where one fits, by name where several do."""
+
+from pathlib import Path
+
+from gyronet.logs.vehicle import WHEELS
+from gyronet.refused import Refused, listed
+
+COLUMNS = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"]
+# Of these two only the first is a drive's: every PX4 log since 1.13 has both.
+PREFERRED = ("vehicle_gps_position", "sensor_gps")
+
+
+class Files:
+    def __init__(self, logs, bus):
+        self.logs, self.bus = logs, bus
+        self.notes = []
+        self.all = [(file, channel) for file, log in enumerate(logs) for channel in log.channels.values()]
+
+    def of(self, *kinds):
+        return [(file, channel) for file, channel in self.all if channel.kind in kinds]
+
+    def label(self, file, channel):
+        same = sum(other.name == channel.name for _, other in self.all) > 1
+        return f"{Path(self.logs[file].path).name}:{channel.name}" if same else channel.name
+
+    def listed(self, channels):
+        return listed([f"{self.label(file, channel)} {str(channel)[len(channel.name):].strip()}" for file, channel in channels])
+
+    def passed(self):
+        """What was passed over and dropped, for an error."""
+        passed = [f"{count} {kind}" for log in self.logs for kind, count in log.passed.most_common(6) if count]
+        dropped = [f"{count} {reason}" for log in self.logs for reason, count in log.dropped.most_common(3)]
+        return listed(passed, "; passed over: ", 6) + listed(dropped, "; dropped: ", 6)
+
+    def named(self, role, name, kinds):
+        """The channel of a name, NAME or FILE:NAME."""
+        found = [(file, channel) for file, channel in self.of(*kinds)
+                 if name in (channel.name, f"{Path(self.logs[file].path).name}:{channel.name}")]
+        if len(found) > 1:
+            raise Refused(f"several files have {name}: write FILE:{name}" + self.listed(found))
+        if found:
+            return found[0]
+        why = self.bus.missing(name.partition(":")[2] or name) if self.bus.path else ""
+        others = self.of(*kinds)
+        seen = sorted(set(self.bus.candidates())) if kinds != ("imu",) and self.bus.path else []
+        raise Refused(f"no channel {name} for {role}{why}" + (self.listed(others) or listed(seen)) + ("" if why else self.passed()))
+
+    def one(self, role, flag, kinds, name):
+        """The only channel of a kind, or the one of a name."""
+        if name == "none":
+            return None
+        if name:
+            return self.named(role, name, kinds)
+        found = self.of(*kinds)
+        names = [channel.name for _, channel in found]
+        if len(found) == 2 and sorted(names) == sorted(PREFERRED):
+            self.notes.append(f"{role}: {PREFERRED[0]} is taken, not {PREFERRED[1]} (--{flag} {PREFERRED[1]} takes the other)")
+            found = [entry for entry in found if entry[1].name == PREFERRED[0]]
+        if len(found) > 1:
+            raise Refused(f"several channels fit as {role}: name one in the vehicle file or with --{flag}" + self.listed(found))
+        return found[0] if found else None
+
+    def imu(self, name):
+        """Gyro and accelerometer: the same channel twice, or one of each, as --imu GYRO+ACCEL names them."""
+        if name and "+" in name:
+            gyro, accel = (part.strip() for part in name.split("+", 1))
+            return self.named("the gyro", gyro, ("gyro", "imu")), self.named("the accelerometer", accel, ("accel", "imu"))
+        if name:
+            found = self.named("imu", name, ("imu", "gyro", "accel"))
+            if found[1].kind != "imu":
+                other = "accel" if found[1].kind == "gyro" else "gyro"
+                raise Refused(f"{name} has no {'accelerometer' if other == 'accel' else 'gyro'} (it is zero or absent throughout): "
+                              f"--imu GYRO+ACCEL joins two channels" + self.listed(self.of(other, "imu")))
+            return found, found
+        found = self.one("imu", "imu", ("imu",), None)
+        if found:
+            return found, found
+        gyros, accels = self.of("gyro"), self.of("accel")
+        if len(gyros) == 1 and len(accels) == 1:
+            return gyros[0], accels[0]
+        if gyros and accels:
+            raise Refused("several gyros or accelerometers: name two with --imu GYRO+ACCEL; the columns of two tables are named apart as "
+                          "FILE:COLUMN in the vehicle file" + self.listed(gyros + accels))
+        if len(gyros) > 1 or len(accels) > 1:
+            raise Refused("no gyro and accelerometer apart; name the columns of each file in the vehicle file, such as "
+                          '[columns] acc_x = { name = "Accelerometer.csv:x" }' + self.listed(gyros + accels))
+        lacks = "no gyro in the files" if accels else "no accelerometer in the files" if gyros else "no IMU in the files"
+        raise Refused(lacks + self.listed(self.all) + self.passed())
+
+    def wheels(self, vehicle):
+        names = [vehicle.wheels[wheel] for wheel in WHEELS]
+        if names == [None] * 4:
+            have = {channel.name for _, channel in self.of("number")}
+            names = [name if name in have else None for name in COLUMNS]
+        return [self.named("a wheel", name, ("number",)) if name else None for name in names]

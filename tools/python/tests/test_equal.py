@@ -1,0 +1,130 @@
+"""Equality with the reference libraries: what lies in a channel is what they read from the same file."""
+
+import os
+import random
+import shutil
+import tempfile
+import unittest
+from pathlib import Path
+
+import asammdf
+import can
+import cantools
+import numpy as np
+from pyulog import ULog
+from rosbags.highlevel import AnyReader
+
+from gyronet.logs import opened
+from gyronet.logs.can import Bus
+from gyronet.logs.drive import Request
+from tests import made
+
+DATA = Path(os.environ.get("GYRONET_DATA", "/nonexistent")) / "logs"
+
+
+def channels(path, bus=None):
+    return opened.read(Path(path), Request([path]), bus or Bus(None, []), False).channels
+
+
+class Equal(unittest.TestCase):
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def test_random_dbc_files_as_cantools(self):
+        rng = random.Random(36)
+        for number in range(300):
+            path = self.folder / "car.dbc"
+            length, at, signals, names = 8, 0, [], []
+            while at < 60:
+                bits = min(rng.randint(1, 20), 64 - at)
+                sign = rng.choice("+-") if bits > 1 else "+"
+                motorola = rng.random() < 0.4
+                start = 8 * (at // 8) + 7 - at % 8 if motorola else at
+                if not motorola or at % 8 + bits <= 8:  # of both orders in one message only what cannot overlap
+                    name = f"S{len(names)}"
+                    signals.append(f' SG_ {name} : {start}|{bits}@{0 if motorola else 1}{sign} ({rng.choice([1, 0.01, -0.5, 3e-3])},{rng.choice([0, -40, 12.5])}) [0|0] "m" E')
+                    names.append(name)
+                at += bits + rng.randint(0, 5) + (8 - at % 8 if motorola else 0)
+            if not signals:
+                continue
+            made.dbc(path, 0x100 + number, name="M", length=length, signals=signals)
+            bus, log = Bus(str(path), [f"M.{name}" for name in names]), opened.Log("x")
+            reference = cantools.database.load_file(path, strict=False)
+            for k in range(20):
+                data = rng.randbytes(8)
+                bus.add(log, float(k + 1), "", 0x100 + number, False, data)
+                expected = reference.decode_message(0x100 + number, data, decode_choices=False)
+                log_values = {}
+                for name in names:
+                    channel = log.channels[f"M.{name}"]
+                    channel.flush()
+                    log_values[name] = channel.rows()[-1, 1] if channel.file and not channel.file.flush() else None
+                self.assertEqual(log_values, expected, path.read_text())
+
+    def test_can_logs_as_python_can(self):
+        files = sorted(DATA.glob("*.blf")) + sorted(DATA.glob("*.asc")) + sorted(DATA.glob("*.trc"))
+        for suffix in (".blf", ".log", ".asc", ".mf4"):
+            path = self.folder / f"made{suffix}"
+            made.bus(path, made.frames(2.0))
+            files.append(path)
+
+        class Seen(Bus):
+            def add(self, log, seconds, bus, identifier, extended, data):
+                self.frames.append((seconds, identifier, extended, data))
+
+        for path in files:
+            bus = Seen(None, [])
+            bus.frames = []
+            opened.read(path, Request([path]), bus, False)
+            with can.LogReader(path) as reader:
+                frames = [(m.timestamp, m.arbitration_id, m.is_extended_id, bytes(m.data)) for m in reader
+                          if not (m.is_error_frame or m.is_remote_frame)]
+            self.assertEqual(bus.frames, frames, path)
+            self.assertTrue(frames, path)
+
+    def test_bags_as_rosbags(self):
+        t = made.times()
+        made.bag2(self.folder / "lite", made.imu_messages(t, made.imu(t)))
+        made.bag1(self.folder / "one.bag", made.imu_messages(t, made.imu(t), made.STORE1))
+        for path in [self.folder / "lite", self.folder / "one.bag", *sorted(DATA.glob("*.bag"))]:
+            expected = {}
+            with AnyReader([path], default_typestore=made.STORE) as reader:
+                for connection, _, data in reader.messages([c for c in reader.connections if c.msgtype == "sensor_msgs/msg/Imu"]):
+                    m = reader.deserialize(data, connection.msgtype)
+                    f, w, s = m.linear_acceleration, m.angular_velocity, m.header.stamp
+                    expected.setdefault(connection.topic, []).append((s.sec + 1e-9 * s.nanosec, f.x, f.y, f.z, w.x, w.y, w.z))
+            found = channels(path)
+            for topic, rows in expected.items():
+                rows = np.array(rows)
+                rises = np.append(True, rows[1:, 0] > np.maximum.accumulate(rows[:-1, 0]))
+                np.testing.assert_array_equal(found[topic].rows(), rows[rises])
+            self.assertTrue(expected)
+
+    def test_ulogs_as_pyulog(self):
+        for path in sorted(DATA.glob("*.ulg")):
+            found = channels(path)["sensor_combined"].rows()
+            data = ULog(str(path), ["sensor_combined"]).get_dataset("sensor_combined").data
+            rows = np.column_stack([1e-6 * data["timestamp"], *(data[f"accelerometer_m_s2[{k}]"] for k in range(3)), *(data[f"gyro_rad[{k}]"] for k in range(3))])
+            np.testing.assert_array_equal(found, rows * [1, 1, -1, -1, 1, -1, -1])
+
+    def test_mdf_as_asammdf_also_unfinished(self):
+        path, t, rows = self.folder / "d.mf4", made.times(), made.imu(made.times())
+        names = ["acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z"]
+        mdf = asammdf.MDF()
+        mdf.append([asammdf.Signal(rows[:, k], t, name=name, unit="m/s^2" if k < 3 else "deg/s") for k, name in enumerate(names)])
+        mdf.save(path, overwrite=True)
+        for begins in (b"MDF     ", b"UnFinMF "):
+            path.write_bytes(begins + path.read_bytes()[8:])
+            found = channels(path)
+            np.testing.assert_allclose(found["gyro"].rows()[:, 1:], np.radians(rows[:, 3:]), rtol=1e-12)
+            np.testing.assert_array_equal(found["accel"].rows()[:, 1:], rows[:, :3])
+        self.assertEqual(made.run(self.folder, "import", "d.mf4")[0], 0)
+        path.write_bytes(path.read_bytes()[:600])
+        status, text = made.run(self.folder, "import", "d.mf4", "--out", "out.csv")
+        self.assertEqual((status, text.count("\n")), (1, 1), text)
+        self.assertIn("asammdf cannot read this MDF file", text)
+
+
+if __name__ == "__main__":
+    unittest.main()
