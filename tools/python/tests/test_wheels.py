@@ -1,0 +1,68 @@
+"""Wheel settings from DBC files."""
+
+import shutil
+import tempfile
+import tomllib
+import unittest
+from pathlib import Path
+
+from tests import made
+
+REAR = ["--rear-left", "RL", "--rear-right", "RR"]
+REFUSED = [
+    (dict(length=24), "24 bytes (CAN FD)"),
+    (dict(unit="knots"), 'the unit "knots" is not km/h, m/s or mph'),
+    (dict(signals=[' SG_ M M : 0|4@1+ (1,0) [0|9] "" E', ' SG_ RL m1 : 8|16@1+ (0.01,0) [0|9] "km/h" E', ' SG_ RR : 24|16@1+ (0.01,0) [0|9] "km/h" E']), "is multiplexed"),
+    (dict(signals=[' SG_ RL : 0|32@1- (1,0) [0|9] "km/h" E', ' SG_ RR : 32|16@1+ (0.01,0) [0|9] "km/h" E'], extra="SIG_VALTYPE_ 1200 RL : 1;\n"), "floating-point"),
+    (dict(signals=[' SG_ RL : 0|40@1+ (1,0) [0|9] "km/h" E', ' SG_ RR : 40|16@1+ (0.01,0) [0|9] "km/h" E']), "40 bits"),
+    (dict(signals=[' SG_ RR : 40|16@1+ (0.01,0) [0|9] "km/h" E']), "no signal RL; there are WHEELS.RR"),
+]
+
+
+class FromDbc(unittest.TestCase):
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def run_(self, *arguments, **more):
+        made.dbc(self.folder / "car.dbc", **more)
+        status, text = made.run(self.folder, "wheels", "from-dbc", "car.dbc", *arguments)
+        out = self.folder / "w.toml"
+        return status, text, tomllib.loads(out.read_text()) if out.exists() else None
+
+    def test_signs_orders_units_and_codes(self):
+        signals = [' SG_ RL : 7|15@0- (0.01,-100) [0|9] "m/s" E', ' SG_ RR : 23|15@0- (0.01,-100) [0|9] "m/s" E', ' SG_ RL_Valid : 40|1@1+ (1,0) [0|1] "" E',
+                   ' SG_ RR_Direction : 41|2@1+ (1,0) [0|3] "" E', ' SG_ Crc : 56|8@1+ (1,0) [0|1] "" E']
+        extra = 'VAL_ 2566844926 RL 16382 "Init" 16383 "Fehler" 0 "stands" ;\nVAL_ 2566844926 RR -16384 "SNA" ;\n'
+        status, text, file = self.run_(*REAR, "--out", "w.toml", identifier=2566844926, signals=signals, extra=extra)
+        self.assertEqual(status, 0, text)
+        frame = file["frame"][0]
+        self.assertEqual((len(file["frame"]), frame["id"], frame["extended"]), (1, 0x18FEF1FE, True))
+        left, right = frame["signal"]
+        self.assertEqual(left, {"wheel": "rear-left", "start_bit": 7, "bits": 15, "order": "motorola", "signed": True, "factor_kmh": 0.036,
+                                "offset_kmh": -360.0, "invalid": 16383})
+        self.assertEqual(right["invalid"], 0x4000)
+        for words in ("0x3ffe (Init) is no speed either", "RL_Valid (bit 40, 1 bits) seems to be validity", "RR_Direction (bit 41, 2 bits) seems to be a direction",
+                      "a checksum or a counter", "address FE stands for any sender"):
+            self.assertIn(words, text)
+
+    def test_bit_31_that_is_missing(self):
+        status, text, file = self.run_(*REAR, "--out", "w.toml", identifier=0x10630040)
+        self.assertEqual((status, file["frame"][0]["id"], file["frame"][0]["extended"]), (0, 0x10630040, True), text)
+
+    def test_what_the_board_cannot_read_is_refused(self):
+        for more, words in REFUSED:
+            status, text, file = self.run_(*REAR, "--out", "w.toml", **more)
+            self.assertEqual((status, file), (1, None), text)
+            self.assertIn(words, text)
+        self.assertIn("both wheels of an axle", self.run_("--rear-left", "RL", "--out", "w.toml")[1])
+
+    def test_without_signals_they_are_listed_and_nothing_is_written(self):
+        status, text, file = self.run_("--out", "w.toml", extra='VAL_ 1200 FL 65535 "SNA" ;\n')
+        self.assertEqual((status, file), (1, None))
+        for words in ("WHEELS (0x4b0, 8 bytes)", 'WHEELS.FL: 16 bits from 0, x 0.01 +0 "km/h", 65535 "SNA"', "nothing is written"):
+            self.assertIn(words, text)
+
+
+if __name__ == "__main__":
+    unittest.main()
