@@ -11,14 +11,27 @@ from gyronet.refused import Refused
 
 
 def parser():
-    top = argparse.ArgumentParser(prog="gyronet-logs", description="Make a drive for gyronet of logs of other tools, and wheel settings of a DBC file.")
+    top = argparse.ArgumentParser(
+        prog="gyronet-logs",
+        description="Make a drive for gyronet of logs of other tools, and wheel settings of a DBC file.",
+    )
     commands = top.add_subparsers(dest="command", required=True)
-    log = commands.add_parser("import", help="convert logs to one drive", description=(
-        "Convert logs to one drive, a CSV file at 100 Hz: ROS 1 and 2 bags (folders, SQLite, MCAP, split, compressed), PX4 ULog, MDF, candump, "
-        "Vector ASC and BLF, PEAK TRC, Xsens MT text, EuRoC, CSV. A vehicle file holds what a log does not contain; a copy is written beside the drive."))
+    log = commands.add_parser(
+        "import",
+        help="convert logs to one drive",
+        description=(
+            "Convert logs to one drive, a CSV file at 100 Hz: ROS 1 and 2 bags (folders, SQLite, MCAP, split,"
+            " compressed), PX4 ULog, MDF, candump, Vector ASC and BLF, PEAK TRC, Xsens MT text, EuRoC, CSV. A vehicle"
+            " file holds what a log does not contain; a copy is written beside the drive."
+        ),
+    )
     log.add_argument("files", nargs="+", metavar="FILE", help="logs of one drive, or bag folders")
     log.add_argument("--out", metavar="FILE.csv", help="write the drive to this file")
-    log.add_argument("--vehicle", metavar="FILE.toml", help="vehicle file [default: the first log's name with .toml, or vehicle.toml beside it]")
+    log.add_argument(
+        "--vehicle",
+        metavar="FILE.toml",
+        help="vehicle file [default: the first log's name with .toml, or vehicle.toml beside it]",
+    )
     log.add_argument("--dbc", metavar="FILE.dbc", help="DBC file of the CAN frames")
     log.add_argument("--imu", metavar="CHANNEL", help="channel of gyro and accelerometer, or GYRO+ACCEL")
     log.add_argument("--odometry", metavar="CHANNEL", help="channel whose speed replaces the wheels; none for no odometry")
@@ -32,9 +45,14 @@ def parser():
     log.add_argument("--to", type=float, metavar="SECONDS", help="end this long after the first sample")
     log.add_argument("--json", action="store_true", help="print the report as JSON")
     wheels = commands.add_parser("wheels", help="wheel settings of a vehicle").add_subparsers(dest="action", required=True)
-    dbc = wheels.add_parser("from-dbc", help="create wheel settings from a DBC file", description=(
-        "Create the settings of wheel frames from a DBC file and the names of its signals, SIGNAL or MESSAGE.SIGNAL. Without names it lists the "
-        "signals that could be wheel speeds and writes nothing."))
+    dbc = wheels.add_parser(
+        "from-dbc",
+        help="create wheel settings from a DBC file",
+        description=(
+            "Create the settings of wheel frames from a DBC file and the names of its signals, SIGNAL or"
+            " MESSAGE.SIGNAL. Without names it lists the signals that could be wheel speeds and writes nothing."
+        ),
+    )
     dbc.add_argument("file", metavar="FILE.dbc")
     for wheel in ("front-left", "front-right", "rear-left", "rear-right"):
         dbc.add_argument(f"--{wheel}", metavar="SIGNAL")
@@ -119,6 +137,8 @@ def main(arguments=None):
     except Refused as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
+    except BrokenPipeError:  # a pager that was left
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     except KeyboardInterrupt:
         return 130
     return 0

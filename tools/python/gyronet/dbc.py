@@ -8,9 +8,12 @@ from gyronet.refused import Refused
 
 # Descriptions of raw values that are no measurement, as DBC files of several makers write them.
 NO_VALUE = re.compile(
-    r"inval|not[ _]?valid|not[ _]?avail|\bsna\b|^sna|\bn/?a\b|unavail|err|fehl|fault|fail|init|undervolt|unterspann|unknown|undefin"
-    r"|ung(ue|ü)ltig|nicht|defekt|reserv|no[ _]?(data|value|signal)|missing|default|not[ _]?(used|def|known|support)|unplaus|implaus|timeout",
-    re.IGNORECASE)
+    r"inval|not[ _]?valid|not["
+    r" _]?avail|\bsna\b|^sna|\bn/?a\b|unavail|err|fehl|fault|fail|init|undervolt|unterspann|unknown|undefin"
+    r"|ung(ue|ü)ltig|nicht|defekt|reserv|no[ _]?(data|value|signal)|missing|default|not["
+    r" _]?(used|def|known|support)|unplaus|implaus|timeout",
+    re.IGNORECASE,
+)
 
 
 def load(path, notes=None):

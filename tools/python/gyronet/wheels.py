@@ -24,7 +24,9 @@ def from_dbc(path, signals):
     for wheel in WHEELS:
         if wheel in signals:
             message, signal = find(path, database, signals[wheel])
-            frames.setdefault((message.frame_id, message.is_extended_frame), (message, []))[1].append(entry(path, wheel, message, signal, remarks))
+            frames.setdefault((message.frame_id, message.is_extended_frame), (message, []))[1].append(
+                entry(path, wheel, message, signal, remarks)
+            )
     lines = ["timeout_ms = 100", "still_speed_kmh = 0.1", "still_for_ms = 500"]
     for (identifier, extended), (message, entries) in frames.items():
         lines += ["", f"[[frame]] # {message.name}", f"id = {identifier:#x}", *(["extended = true"] if extended else [])]
@@ -70,9 +72,15 @@ def entry(path, wheel, message, signal, remarks):
     factor, offset = (round(number * kmh, 12) for number in (signal.scale, signal.offset))
     if not 0 < abs(factor) < 100:
         refuse(f"a factor of {factor} km/h; the board takes below 100, not 0")
-    result = {"wheel": f'"{wheel}"', "start_bit": signal.start, "bits": signal.length,
-              "order": '"intel"' if signal.byte_order == "little_endian" else '"motorola"', **({"signed": "true"} if signal.is_signed else {}),
-              "factor_kmh": float(factor), "offset_kmh": float(offset)}
+    result = {
+        "wheel": f'"{wheel}"',
+        "start_bit": signal.start,
+        "bits": signal.length,
+        "order": '"intel"' if signal.byte_order == "little_endian" else '"motorola"',
+        **({"signed": "true"} if signal.is_signed else {}),
+        "factor_kmh": float(factor),
+        "offset_kmh": float(offset),
+    }
     codes = {raw & (1 << signal.length) - 1: text for raw, text in sorted(dbc.codes(signal).items())}
     if codes:
         result["invalid"] = hex(max(codes))
@@ -86,7 +94,10 @@ def entry(path, wheel, message, signal, remarks):
 def about(database, message):
     """What the DBC file says of a message beyond its speeds, and the settings cannot."""
     if dbc.is_j1939(database, message) and message.frame_id & 0xFF == 0xFE:
-        yield f"{message.name}: address FE stands for any sender, but the board compares the whole identifier: set the sender's address in id"
+        yield (
+            f"{message.name}: address FE stands for any sender, but the board compares the whole identifier: set the"
+            " sender's address in id"
+        )
     for signal in message.signals:
         if signal.length <= 4 and (SAYS_VALID.search(signal.name) or SAYS_DIRECTION.search(signal.name)):
             what = "a direction" if SAYS_DIRECTION.search(signal.name) else "validity"

@@ -9,8 +9,7 @@ LATE = 0.5  # s: an offset on one clock that is worth a word
 
 
 def thinned(rate):
-    """A rate whose values that are closer than 5 ms are averaged, as far as it is compared."""
-    rate = rate[rate[:, 0] - rate[0, 0] < align.LONGEST] if len(rate) else rate
+    """A rate whose values that are closer than 5 ms are averaged."""
     if len(rate) < 2 or np.median(np.diff(rate[:, 0])) >= 0.5 * grid.DT:
         return rate
     slot = np.floor((rate[:, 0] - rate[0, 0]) / (0.5 * grid.DT)).astype(int)
@@ -22,7 +21,7 @@ def yaw_sources(drive):
     """Yaw rates beside the gyro's: (channel, what it is, times and rate)."""
     for used in (drive.reference, drive.odometry):
         if used:
-            yield used, used.name, thinned(used.yaw(drive.vehicle))
+            yield used, used.name, thinned(used.yaw(drive.vehicle, align.LONGEST))
     for right, left in ((drive.wheels[1], drive.wheels[3]), (drive.wheels[0], drive.wheels[2])):
         if right and left and right.file == left.file and len(right.seconds) > 1:
             begin, end = max(right.span()[0], left.span()[0]), min(right.span()[1], left.span()[1])
@@ -43,8 +42,9 @@ def yaw_sources(drive):
 
 def settle(drive, logs, request):
     """Offsets of the other files, and remarks about sources that disagree with the gyro in time or scale."""
-    gyro, done = thinned(drive.gyro.yaw(drive.vehicle)), set()
+    gyro, done = None, set()
     for used, what, rate in yaw_sources(drive):
+        gyro = thinned(drive.gyro.yaw(drive.vehicle, align.LONGEST)) if gyro is None else gyro
         found, why = align.offset(gyro, rate) if len(rate) > 2 else (None, "the yaw rates are too short")
         foreign = used.file != drive.gyro.file and not request.same_clock and used.file not in done
         if foreign and found is None:
@@ -59,15 +59,22 @@ def settle(drive, logs, request):
             for other in drive.used():
                 if other.file == used.file and other.name not in request.offsets:
                     other.offset += seconds
-            drive.report.append(f"{logs[used.file].path}: clock moved by {seconds:+.3f} s, where {what} agrees with the gyro (correlation {correlation:.3f})")
+            drive.report.append(
+                f"{logs[used.file].path}: clock moved by {seconds:+.3f} s, where {what} agrees with the gyro"
+                f" (correlation {correlation:.3f})"
+            )
         elif used.file not in done and abs(seconds) > LATE and correlation > 0.9 and used.role != "reference rate":
             hint = " (GPS time against UTC?)" if 17.0 < abs(seconds) < 19.0 else ""
-            drive.warnings.append(f"{used.name}: {what} agrees with the gyro only when moved by {seconds:+.2f} s{hint} (correlation {correlation:.3f}): "
-                                  f"--offset {used.name}={seconds:.2f}")
+            drive.warnings.append(
+                f"{used.name}: {what} agrees with the gyro only when moved by {seconds:+.2f} s{hint} (correlation"
+                f" {correlation:.3f}): --offset {used.name}={seconds:.2f}"
+            )
     lost = {used.file for used in drive.used()} - done - {drive.gyro.file}
     if lost and not request.same_clock:
-        raise Refused(f"{logs[min(lost)].path}: the clock cannot be aligned with that of {logs[drive.gyro.file].path}: it has no yaw rate to "
-                      "compare; name a channel with one, or pass --same-clock")
+        raise Refused(
+            f"{logs[min(lost)].path}: the clock cannot be aligned with that of {logs[drive.gyro.file].path}: it has no"
+            " yaw rate to compare; name a channel with one, or pass --same-clock"
+        )
 
 
 def check_degrees(drive, what, scale):

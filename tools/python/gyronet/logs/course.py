@@ -25,7 +25,7 @@ def courses(rows):
 
 
 def by_velocity(rows):
-    seconds, _, _, _, speed, clockwise, sigma = np.array(rows).T
+    seconds, _, _, _, speed, clockwise, sigma = rows.T
     good = (speed >= SLOWEST) & (sigma > 0) & (sigma < WORST) & np.isfinite(clockwise)
     return np.column_stack([seconds, -clockwise, sigma, speed])[good]
 
@@ -34,7 +34,7 @@ def by_positions(rows):
     if not len(rows):
         return []
     east = METRES * math.cos(math.radians(rows[0, 1]))
-    x, y, times = east * (rows[:, 2] - rows[0, 2]), METRES * (rows[:, 1] - rows[0, 1]), np.array(rows[:, 0])
+    x, y, times = east * (rows[:, 2] - rows[0, 2]), METRES * (rows[:, 1] - rows[0, 1]), rows[:, 0]
     noise, found = scatter(x, y), []
     for k in range(1, len(rows) - 1):
         for reach in range(1, min(k, len(rows) - 1 - k) + 1):

@@ -80,7 +80,10 @@ class Drive:
             self.report += [f"{log.path}: {note}" for note in log.notes]
             passed = {kind: count for kind, count in log.passed.items() if count}
             if passed:
-                self.report.append(f"{log.path}: {sum(passed.values())} records that this drive does not need: " + ", ".join(list(passed)[:6]))
+                self.report.append(
+                    f"{log.path}: {sum(passed.values())} records that this drive does not need: "
+                    + ", ".join(list(passed)[:6])
+                )
         self.report += bus.notes + files.notes
         self.span()
         clocks.settle(self, logs, request)
@@ -94,7 +97,7 @@ class Drive:
         if gyro is accel:
             self.gyro = self.accel = Used("imu", gyro, request)
         else:
-            self.gyro, self.accel = Used("gyro", gyro, request, "rate"), Used("accelerometer", accel, request, "acceleration")
+            self.gyro, self.accel = Used("gyro", gyro, request), Used("accelerometer", accel, request)
         self.accel.check_gravity()
         wheels = files.wheels(self.vehicle)
         self.wheels = [Used(role, entry, request) if entry else None for role, entry in zip(ROLES, wheels)]
@@ -106,7 +109,7 @@ class Drive:
         self.odometry = Used("odometry", entry, request) if entry else None
         entry = files.one("position", "position", ("position",), signals["position"])
         self.position = Used("position", entry, request) if entry else None
-        self.courses = course.courses(np.array(self.position.rows)) if self.position else np.empty((0, 4))
+        self.courses = course.courses(self.position.channel.rows()) if self.position else np.empty((0, 4))
         names = {channel.name for _, channel in files.all}
         for name in request.offsets:
             if name not in names:
@@ -240,7 +243,10 @@ class Drive:
         return beside
 
     def write_csv(self, file):
-        names = "t_s acc_x acc_y acc_z gyr_x gyr_y gyr_z ref_gyr_z ref_yaw ref_yaw_sigma gnss_speed wheel1_rate wheel2_rate wheel3_rate wheel4_rate"
+        names = (
+            "t_s acc_x acc_y acc_z gyr_x gyr_y gyr_z ref_gyr_z ref_yaw ref_yaw_sigma gnss_speed wheel1_rate wheel2_rate"
+            " wheel3_rate wheel4_rate"
+        )
         columns = [k for k in range(15) if k < 7 or self.seen[k]]
         file.write(",".join(names.split()[k] for k in columns) + "\n")
         form = ",".join(["%.2f"] + ["%.7f"] * 6 + ["%.6f"] * (len(columns) - 7)) + "\n"

@@ -23,15 +23,14 @@ def method(hz):
     return "interpolated to the row's time, no filter" if abs(hz - 100) < 0.5 else "linear interpolation, no filter"
 
 
-def resample(rows, hz, times, offset=0.0, seconds=None):
-    """Values of a channel at rising times. `seconds` replaces the channel's own stamps; the offset is added to them."""
-    stamps = rows[:, 0] if seconds is None else seconds
+def resample(stamps, read, hz, times, offset=0.0):
+    """Values at rising times, of samples with these stamps plus the offset; `read` gives the values of a range of samples."""
     low, high = np.searchsorted(stamps, [times[0] - offset - 2.0, times[-1] - offset + 2.0])
     # One sample beyond each end, so that interpolation has both neighbours.
-    part = slice(max(int(low) - 1, 0), int(high) + 1)
-    stamps, values = np.array(stamps[part]) + offset, np.array(rows[part, 1:])
+    low, high = max(int(low) - 1, 0), min(int(high) + 1, len(stamps))
+    stamps, values = stamps[low:high] + offset, read(low, high)
     if not len(stamps):
-        return np.full((len(times), rows.shape[1] - 1), np.nan)
+        return np.full((len(times), values.shape[1]), np.nan)
     return means(stamps, values, times) if hz >= AVERAGED_HZ else between(stamps, values, times, GAP_PERIODS / hz)
 
 

@@ -109,5 +109,8 @@ def can_kind(head, text):
         return "screen"
     if first.startswith(("date ", "base ")):
         return "asc"
-    is_trc = any(";$fileversion" in line or "message number" in line or "pcan" in line or "time offset of message" in line for line in lines)
+    is_trc = any(
+        ";$fileversion" in line or "message number" in line or "pcan" in line or "time offset of message" in line
+        for line in lines
+    )
     return "trc" if first.startswith(";") and is_trc else None

@@ -1,5 +1,6 @@
 """Channels of a log: timed samples, the older ones in a temporary file, with a record of what was wrong with their stamps."""
 
+import os
 import tempfile
 from array import array
 from collections import Counter
@@ -21,6 +22,7 @@ class Channel:
         self.given = 0
         self.seen = np.zeros(WIDTH[kind], bool)  # columns that were ever other than zero
         self.gap = (0.0, 0.0)  # the longest pause between samples and its place, s
+        self.falls = {}  # counts and first places of stamps that do not rise
         self.back = None  # size, place and cost of the steps back
 
     def add(self, seconds, values):
@@ -52,8 +54,9 @@ class Channel:
         self.first = seconds[0] if self.first is None else self.first
         if not rises.all():
             falls = ~rises
-            self.drop("stamps that stand still", np.count_nonzero(seconds[falls] == before[falls]))
-            self.drop("stamps that step back", np.count_nonzero(seconds[falls] < before[falls]))
+            for reason, which in (("stand still", seconds == before), ("step back", seconds < before)):
+                if which.any():
+                    self.falls.setdefault(reason, [0, before[which][0] - self.first])[0] += np.count_nonzero(which)
             far = before - seconds > STEP
             if far.any():
                 size, place = (before - seconds)[far].max(), (before - self.first)[far][0]
@@ -75,9 +78,8 @@ class Channel:
     def append(self, other):
         """Adds the samples of the same channel in the next part of a recording."""
         if other.count and other.file:
-            rows = np.memmap(other.file, np.float64, "r", shape=(other.count, other.width))
             for first in range(0, other.count, BLOCK):
-                self.extend(np.array(rows[first : first + BLOCK]))
+                self.extend(other.rows(first, first + BLOCK))
         self.close()
 
     def drop(self, reason, count):
@@ -89,19 +91,25 @@ class Channel:
         self.flush()
         if self.file:
             self.file.flush()
+        for reason, (count, place) in self.falls.items():
+            self.drop(f"stamps that {reason}, first at {place:.2f} s", count)
+        self.falls = {}
         if self.kind == "imu" and self.count:
             force, rate = self.seen[:3].any(), self.seen[3:].any()
             if force != rate:
                 self.kind = "accel" if force else "gyro"
 
-    def rows(self):
-        """All samples, as a mapped array of time and values."""
-        if not self.count or not self.file:
-            return np.empty((0, 1 + WIDTH[self.kind]))
-        rows = np.memmap(self.file, np.float64, "r", shape=(self.count, self.width))
-        if self.width == 7 and self.kind in ("gyro", "accel"):
-            return np.column_stack([rows[:, 0], rows[:, 4:] if self.kind == "gyro" else rows[:, 1:4]])
-        return rows
+    def rows(self, first=0, behind=None):
+        """Samples of a range, as rows of time and values; read, not mapped, so that the memory stays bounded."""
+        behind = min(self.count if behind is None else behind, self.count)
+        if not self.file or behind <= first:
+            return np.empty((0, self.width))
+        size = 8 * self.width
+        return np.frombuffer(os.pread(self.file.fileno(), size * (behind - first), size * first)).reshape(-1, self.width)
+
+    def stamps(self):
+        blocks = [self.rows(first, first + BLOCK)[:, 0].copy() for first in range(0, self.count if self.file else 0, BLOCK)]
+        return np.concatenate(blocks or [np.empty(0)])
 
     @property
     def rate(self):

@@ -3,20 +3,21 @@
 import numpy as np
 
 from gyronet.logs import grid, units
+from gyronet.logs.samples import BLOCK
 from gyronet.refused import Refused
 
 GRAVITY = 9.80665
+IMU = {"imu": [("acceleration", "m/s^2"), ("rate", "rad/s")], "gyro": [("rate", "rad/s")], "accelerometer": [("acceleration", "m/s^2")]}
 
 
 class Used:
-    def __init__(self, role, entry, request, half=None):
+    def __init__(self, role, entry, request):
         self.role, (self.file, self.channel) = role, entry
         self.name, self.filled, self.remarks = self.channel.name, 0, []
-        self.rows = self.channel.rows()
-        self.seconds = np.array(self.rows[:, 0])
+        self.seconds = self.channel.stamps()
         self.offset = request.offsets.get(self.name, 0.0)
-        self.columns, self.scales, self.unit, self.dimension = self.pick(request, half)
-        if role in ("imu", "gyro", "accelerometer"):
+        self.columns, self.scales, self.unit, self.dimension = self.pick(request)
+        if role in IMU:
             even, remark = grid.spread_bursts(self.seconds)
             if remark:
                 self.seconds = even
@@ -26,31 +27,27 @@ class Used:
             self.remarks.append(f"stamps jump by {self.channel.gap[0]:.2f} s at {self.channel.gap[1]:.2f} s")
         self.check_back(request)
 
-    def pick(self, request, half):
+    def pick(self, request):
         """Columns of the samples, their scales, the unit's name and its dimension."""
-        kind, name = self.channel.kind, self.name
-        if self.role in ("imu", "gyro", "accelerometer"):
-            given = {what: request.units.get((name, what)) for what in ("acceleration", "rate")}
-            scale = {what: units.find(unit)[1] if unit else 1.0 for what, unit in given.items()}
-            said = ", ".join(given[what] or units.KNOWN[4 if what == "acceleration" else 7][2].split("|")[0] for what in
-                             {"imu": ("acceleration", "rate"), "gyro": ("rate",), "accelerometer": ("acceleration",)}[self.role])
-            said = said if any(given.values()) else {"imu": "m/s^2, rad/s", "gyro": "rad/s", "accelerometer": "m/s^2"}[self.role]
-            if self.role == "imu":
-                return slice(0, 6), [scale["acceleration"]] * 3 + [scale["rate"]] * 3, said, None
-            first = 3 if kind == "imu" and half == "rate" else 0
-            return slice(first, first + 3), [scale["rate" if half == "rate" else "acceleration"]] * 3, said, None
+        kind, name, width = self.channel.kind, self.name, self.channel.width
+        if self.role in IMU:
+            given = [request.units.get((name, dimension)) for dimension, _ in IMU[self.role]]
+            scales = [units.find(unit)[1] if unit else 1.0 for unit in given]
+            said = ", ".join(unit or own for unit, (_, own) in zip(given, IMU[self.role]))
+            # A channel of the kind imu holds both halves also where one of them is zero throughout.
+            first = 3 if self.role == "gyro" and width == 7 else 0
+            return slice(first, first + 3 * len(given)), np.repeat(scales, 3), said, None
         if self.role == "odometry":
-            return slice(0, 2), [1.0, 1.0], "m/s, rad/s", None
+            return slice(0, 2), 1.0, "m/s, rad/s", None
         if self.role == "position":
-            return slice(0, 6), [1.0] * 6, "deg", None
+            return slice(0, 6), 1.0, "deg", None
         if kind != "number":
-            at = {"imu": 5, "gyro": 2, "odometry": 1}[kind]
             unit = request.units.get((name, "rate"))
-            return slice(at, at + 1), [units.find(unit)[1] if unit else 1.0], unit or "rad/s", "rate"
+            return slice(width - 2, width - 1), units.find(unit)[1] if unit else 1.0, unit or "rad/s", "rate"
         wheel = self.role.startswith("wheel")
         unit = request.units.get(name) or request.vehicle.unit_of(name) or self.channel.unit
         scale, dimension, said = units.scale(name, unit, ["speed", "rate"] if wheel else ["rate"], "wheel speed" if wheel else "yaw rate")
-        return slice(0, 1), [scale], said, dimension
+        return slice(0, 1), scale, said, dimension
 
     def check_back(self, request):
         if not self.channel.back:
@@ -62,17 +59,21 @@ class Used:
                           + ("" if request.recorded else ", or use the recording times: --stamps recorded (bags)"))
         self.remarks.append(said)
 
+    def values(self, first, behind):
+        return self.channel.rows(first, behind)[:, 1:][:, self.columns] * self.scales
+
     def at(self, times):
         """Values at the rows' times; NaN where there is none."""
-        return grid.resample(self.rows[:, [0, *range(1 + self.columns.start, 1 + self.columns.stop)]], self.hz, times, self.offset,
-                             self.seconds) * self.scales
+        return grid.resample(self.seconds, self.values, self.hz, times, self.offset)
 
-    def yaw(self, vehicle):
-        """Times and yaw rate, for the comparison of clocks."""
-        values = np.array(self.rows[:, 1:][:, self.columns]) * self.scales
-        if self.role in ("imu", "gyro"):
-            values = vehicle.turn(values[:, -3:])
-        return np.column_stack([self.seconds + self.offset, values[:, -1]])
+    def yaw(self, vehicle, longest):
+        """Times and yaw rate of the first part, for the comparison of clocks."""
+        seconds = self.seconds[: np.searchsorted(self.seconds, self.seconds[0] + longest)]
+        rates = []
+        for first in range(0, len(seconds), BLOCK):
+            values = self.values(first, min(first + BLOCK, len(seconds)))
+            rates.append(vehicle.turn(values[:, -3:])[:, 2] if self.role in IMU else values[:, -1])
+        return np.column_stack([seconds + self.offset, np.concatenate(rates)])
 
     def span(self):
         return self.seconds[0] + self.offset, self.seconds[-1] + self.offset
@@ -84,8 +85,10 @@ class Used:
                 f"{self.filled} of {rows} rows" + "".join(f"; {remark}" for remark in self.remarks))
 
     def check_gravity(self):
-        force = np.array(self.rows[:10_000, 1:][:, self.columns])[:, :3] * self.scales[:3]
-        size = float(np.median(np.linalg.norm(force, axis=1)))
+        size = float(np.median(np.linalg.norm(self.values(0, 10_000)[:, :3], axis=1)))
         if 0.8 < size < 1.25 or 800 < size < 1250:
             unit = "g" if size < 2 else "mg"
-            raise Refused(f"{self.name}: the specific force is {size:.2f}, where gravity is {GRAVITY:.2f} m/s^2: {unit}? --unit {self.name}={unit}")
+            raise Refused(
+                f"{self.name}: the specific force is {size:.2f}, where gravity is {GRAVITY:.2f} m/s^2: {unit}? --unit"
+                f" {self.name}={unit}"
+            )

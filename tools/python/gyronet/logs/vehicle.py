@@ -46,7 +46,10 @@ class Vehicle:
                 if not isinstance(value, kind) or numeric and isinstance(value, bool):
                     raise Refused(f"{path}: {table}.{key} = {value!r}: not a {'number' if numeric else kind.__name__}")
                 if key.endswith("_m") and not 0.01 <= value < 10 or key.endswith("_deg") and not abs(value) <= 360:
-                    raise Refused(f"{path}: {table}.{key} = {value}: must be {'0.01 to 10 m' if key.endswith('_m') else 'at most 360 degrees'}")
+                    raise Refused(
+                        f"{path}: {table}.{key} = {value}: must be"
+                        f" {'0.01 to 10 m' if key.endswith('_m') else 'at most 360 degrees'}"
+                    )
                 getattr(vehicle, table)[key] = value
         if vehicle.bus["dbc"]:
             vehicle.bus["dbc"] = str(path.parent / vehicle.bus["dbc"])
