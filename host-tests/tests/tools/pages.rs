@@ -1,4 +1,4 @@
-//! The pages of `gyronet demo`, `gyronet doctor` and `gyronet train` in a real browser: no errors, nothing asked of the network, nothing cut
+//! The pages of `gyronet demo` and `gyronet doctor` in a real browser: no errors, nothing asked of the network, nothing cut
 //! or beside the window on a desk and on a phone, light and dark, and all that can be used can be used from the keyboard.
 
 use gyronet::model::{Blob, GyroNet, weights};
@@ -10,11 +10,6 @@ use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::rates::{Network, Networks, Rates};
 use gyronet_tools::evaluate::report::DriveErrors;
-use gyronet_tools::train::examine::{Examined, Refusal};
-use gyronet_tools::train::gain::Gain;
-use gyronet_tools::train::history::{History, Seed};
-use gyronet_tools::train::roles::Roles;
-use gyronet_tools::train::{Training, page as train_page};
 use std::path::{Path, PathBuf};
 
 /// Texts that reach beyond the window, or beyond what scrolls inside the page.
@@ -34,42 +29,16 @@ const OVER: &str = r"['.plot .x b', '.plot .y b', '.legend .key', 'h2, figcaptio
 /// This script lists the controls that are shown.
 const USABLE: &str = "[...document.querySelectorAll('button, .plot')].filter(e => e.offsetParent)";
 
-/// Returns the pages of `gyronet demo` and `gyronet train` on a drive.
-fn demo_and_train(recording: &Recording) -> [String; 2] {
+/// Returns the page of `gyronet demo` on a drive.
+fn demo(recording: &Recording) -> String {
     let network = || GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).unwrap());
     let (drive, mut default) = (Drive::from(recording), network());
     let shape = default.blob().shape;
     let mut networks = Networks { default: Network::new(&mut default, shape), sent: None, paper: None };
     let mut rates = Rates::of(&drive);
     let errors = DriveErrors::of(&drive, &mut networks, |sample| rates.add(sample)).unwrap();
-    let train = train(recording, &[errors.clone(), errors.clone()]);
     let sent = Sent::run(&drive, network(), std::io::sink()).unwrap();
-    let demo = Demo::new(&drive, true, &rates, Some(&errors), &sent).page();
-    [demo, train]
-}
-
-/// Returns the page of a training whose course is made up, and whose gain is that of the library's weights.
-fn train(recording: &Recording, errors: &[DriveErrors]) -> String {
-    let drive =
-        |name: &str| Examined { path: name.into(), name: name.to_owned(), seconds: 612.0, turned_rad: 40.0 };
-    let short = Refusal::TooShort { path: "drives/to the bakery.csv".into(), seconds: 12.0 };
-    let roles = Roles {
-        train: vec![drive("2024-03-01_a_name_that_is_rather_long"), drive("monday")],
-        validate: drive("sunday"),
-        held_out: vec![drive(recording.name()), drive("saturday")],
-        refused: vec![short],
-    };
-    let seed = |best: f64| Seed {
-        best: 3,
-        seconds: 63.0,
-        loss: vec![0.9, 0.5, 0.4, 0.39],
-        mean_1s_rad: vec![0.00015, 0.00012, best, 0.00011],
-    };
-    let seeds = [(1, seed(0.0001)), (2, seed(0.000_105))].into_iter().collect();
-    let history = History { static_1s_rad: 0.00018, seed: 1, seeds };
-    let (gain, validation) = (&Gain::new(errors), &Gain::new(&errors[..1]));
-    let name = "drives of <a> fleet".to_owned();
-    train_page(&Training { name, roles: &roles, history: &history, gain, validation, bytes: 2_412 })
+    Demo::new(&drive, true, &rates, Some(&errors), &sent).page()
 }
 
 fn doctor(path: &Path) -> String {
@@ -143,8 +112,7 @@ fn pages_work_in_a_browser_on_desk_and_phone() {
     let simulated = workspace().join("tools/data/simulated_drive.csv");
     for drive in [simulated].into_iter().chain(trial(test, 11)) {
         let recording = Recording::read(&drive).unwrap();
-        let [demo, train] = demo_and_train(&recording);
-        for (name, html) in [("demo", demo), ("train", train), ("doctor", doctor(&drive))] {
+        for (name, html) in [("demo", demo(&recording)), ("doctor", doctor(&drive))] {
             let path = folder.join(format!("{name}-{}.html", recording.name()));
             std::fs::write(&path, html).unwrap();
             for (width, dark) in [(390, false), (390, true), (1280, false), (1280, true)] {

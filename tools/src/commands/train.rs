@@ -1,18 +1,15 @@
 //! `gyronet train` trains weights on a folder of drives, and measures what they gain.
 
 use super::weights::Sent;
-use super::{Common, WriteError, drives, print_json, remark};
+use super::{Common, WriteError, drives, paint, print_json, remark};
 use gyronet_tools::drive::stream::Drive;
+use gyronet_tools::evaluate::report::Report;
 use gyronet_tools::network::checkpoint::{Checkpoint, GyroNet};
 use gyronet_tools::network::quantize::quantize;
 use gyronet_tools::python;
 use gyronet_tools::target::bench;
 use gyronet_tools::train::examine::Examined;
-use gyronet_tools::train::gain::Gain;
-use gyronet_tools::train::history::History;
 use gyronet_tools::train::roles::Roles;
-use gyronet_tools::train::{Training, page};
-use std::error::Error;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -24,9 +21,8 @@ use std::process::{Command, Stdio};
 /// the drive before it chooses the epoch. --hold-out and --validate select others. A drive that cannot be used is
 /// left out, and the reason is printed; a folder with too little data is an error.
 ///
-/// The output is a weight file, a checkpoint and an HTML page. The command also prints the error on the held-out
-/// drives, relative to that of static initialisation and of the best classical method, with the spread between
-/// drives.
+/// The output is a weight file and a checkpoint. The command also prints the errors on the held-out drives, as
+/// `gyronet evaluate` does.
 ///
 /// To continue a training that was stopped or killed, run the same command again.
 #[derive(Debug, Clone, clap::Args)]
@@ -40,7 +36,7 @@ pub struct Args {
     /// Folder of drives.
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
-    /// Folder for gyronet.blob, gyronet.safetensors, train.html and the training state [default: target/train].
+    /// Folder for gyronet.blob, gyronet.safetensors and the training state [default: target/train].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Drives that are held out for the final evaluation, by name or a unique part of it.
@@ -92,49 +88,32 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     std::fs::create_dir_all(&out).map_err(WriteError::to(&out))?;
     python_training(args, common, &roles, &out)?;
 
-    let [checkpoint, blob, history, report] =
-        ["gyronet.safetensors", "gyronet.blob", "gyronet.history.json", "train.html"]
-            .map(|name| out.join(name));
+    let [checkpoint, blob] = ["gyronet.safetensors", "gyronet.blob"].map(|name| out.join(name));
     let (bytes, _) = quantize(&Checkpoint::<GyroNet>::read(&checkpoint)?)?;
     std::fs::write(&blob, &bytes).map_err(WriteError::to(&blob))?;
-    let history = History::read(&history)?;
     let sent = Sent { weights: Some(blob.clone()) };
-    let gain = |drives: &[Examined]| gain(drives, &sent, common);
-    let (held_out, validation) = (gain(&roles.held_out)?, gain(std::slice::from_ref(&roles.validate))?);
-    let name = args.folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let training = Training {
-        name,
-        roles: &roles,
-        history: &history,
-        gain: &held_out,
-        validation: &validation,
-        bytes: bytes.len(),
-    };
-    std::fs::write(&report, page(&training)).map_err(WriteError::to(&report))?;
+    let files: Vec<PathBuf> = roles.held_out.iter().map(|drive| drive.path.clone()).collect();
+    let report = Report::new(drives::errors(&files, common, |file, bar| {
+        let drive = Drive::open(file)?;
+        bar.set_length(drive.facts.rows as u64);
+        sent.errors(&drive, None, |_| bar.inc(1))
+    })?);
     let mut stdout = std::io::stdout().lock();
     if common.json {
         let refused: Vec<String> = roles.refused.iter().map(ToString::to_string).collect();
         let json = serde_json::json!({
             "train": names(&roles.train), "validate": roles.validate.name, "refused": refused,
-            "held_out": held_out, "validation": validation, "seconds": history.seconds(),
-            "files": { "weights": blob, "page": report },
+            "held_out": report, "files": { "weights": blob },
         });
         return print_json(&mut stdout, &json);
     }
-    writeln!(stdout, "1 s error relative to static initialisation on {}:", held_out.drives.join(", "))?;
-    for ratio in &held_out.over_static {
-        writeln!(stdout, "  {:<26}{}", ratio.method, ratio.all)?;
-    }
-    if let Some(ours) = held_out.over_best_classical {
-        writeln!(stdout, "delayed rate, relative to the best classical method: {ours}")?;
-    }
-    writeln!(
+    write!(stdout, "{}", paint::report(&report))?;
+    Ok(writeln!(
         stdout,
         "weights: {} ({} bytes; `gyronet device weights` uploads them to a board)",
         blob.display(),
         bytes.len()
-    )?;
-    Ok(writeln!(stdout, "page: {}", report.display())?)
+    )?)
 }
 
 /// Trains in Python, whose progress bar and lines are shown on standard error.
@@ -171,15 +150,4 @@ fn python_training(args: &Args, common: Common, roles: &Roles, out: &Path) -> su
     } else {
         Err(format!("training stopped ({status}); the reason is printed above").into())
     }
-}
-
-/// Computes what the weights gain on some drives.
-fn gain(drives: &[Examined], sent: &Sent, common: Common) -> Result<Gain, Box<dyn Error>> {
-    let files: Vec<PathBuf> = drives.iter().map(|drive| drive.path.clone()).collect();
-    let errors = drives::errors(&files, common, |file, bar| {
-        let drive = Drive::open(file)?;
-        bar.set_length(drive.facts.rows as u64);
-        sent.errors(&drive, None, |_| bar.inc(1))
-    })?;
-    Ok(Gain::new(&errors))
 }
