@@ -3,7 +3,6 @@
 mod can_excerpt;
 mod costs;
 mod page;
-pub mod picture;
 mod short_table;
 mod trajectory;
 

@@ -1,5 +1,5 @@
-//! The doctor examines a recording before its results are trusted: how the sensor behaves, what the recording can
-//! judge, and what a calibration or a training could gain.
+//! The doctor examines a recording before its results are trusted: how the sensor behaves, and what the recording can
+//! judge.
 //!
 //! The recording is read row by row and not rejected for its defects: a defect for which other commands would reject
 //! the recording is reported as a finding.

@@ -44,10 +44,10 @@ fn a_good_line_has_nothing_to_count() {
     assert!((monitor.frames_per_second().expect("ten seconds") - 600.0).abs() < 1.0);
     assert!((monitor.state.rate.expect("known") - 50.0).abs() < 1e-5);
     assert!((monitor.drop_in.expect("known") - 50.0).abs() < 0.006);
-    let row = monitor.row(9.99);
-    assert_eq!(row.split(',').count(), Monitor::HEADING.split(',').count());
-    assert!(row.contains(",GyroNet,good,none,0.0000,,,"), "{row}");
-    println!("{}\n{row}\n{monitor}", Monitor::HEADING);
+    let json = monitor.json(9.99);
+    assert_eq!((&json["source"], &json["quality"]), (&"GyroNet".into(), &"good".into()));
+    assert_eq!((&json["faults"], &json["correction_deg_per_s"]), (&"none".into(), &0.0.into()));
+    println!("{json}\n{monitor}");
 }
 
 #[test]

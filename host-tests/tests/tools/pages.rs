@@ -42,7 +42,7 @@ fn demo(recording: &Recording) -> String {
 }
 
 fn doctor(path: &Path) -> String {
-    page(&Doctor::examine(path).unwrap(), &[("training", "Cannot be said: this is a test.".to_owned())])
+    page(&Doctor::examine(path).unwrap())
 }
 
 /// Opens a page and returns what is wrong with it.

@@ -3,7 +3,6 @@
 use super::{Common, WriteError, print_json, progress, read_drive, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
-use gyronet_tools::demo::picture;
 use gyronet_tools::demo::{Demo, Sent, ShortTable};
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::rates::Rates;
@@ -27,7 +26,7 @@ pub struct Args {
     /// Recorded drive (CSV, 100 Hz); errors need its column ref_gyr_z or ref_yaw, and a path needs wheelN_rate.
     #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
-    /// Folder for demo.html, yaw.svg and can.log [default: target/demo].
+    /// Folder for demo.html and can.log [default: target/demo].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[arg(long, hide = true)]
@@ -45,13 +44,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     let weights = args.sent.open()?;
     let bundled = bundled::demo_drive()?;
-    let (drive, title) = match &args.file {
-        Some(path) => {
-            let drive = read_drive(path, common)?;
-            let title = format!("Yaw of a recorded drive, {}", drive.name());
-            (drive, title)
-        }
-        None => (Drive::from(&bundled), String::from("Yaw of a simulated drive")),
+    let drive = match &args.file {
+        Some(path) => read_drive(path, common)?,
+        None => Drive::from(&bundled),
     };
     let bar = progress::bar(common, drive.facts.rows, drive.name());
     let mut rates = Rates::of(&drive);
@@ -62,17 +57,16 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     bar.finish_and_clear();
     let errors = match errors {
         Ok(errors) => Some(errors),
-        // A drive without a reference still has its log and its picture.
+        // A drive without a reference still has its log and its page.
         Err(error) if matches!(error.downcast_ref(), Some(EvaluateError::NoReference { .. })) => None,
         Err(error) => return Err(error),
     };
 
     let folder = args.out.clone().unwrap_or_else(default_folder);
     std::fs::create_dir_all(&folder).map_err(WriteError::to(&folder))?;
-    let [log, picture, page] = ["can.log", "yaw.svg", "demo.html"].map(|name| folder.join(name));
+    let [log, page] = ["can.log", "demo.html"].map(|name| folder.join(name));
     let file = File::create(&log).map_err(WriteError::to(&log))?;
     let sent = Sent::run(&drive, GyroNet::new(weights.blob()?), BufWriter::new(file))?;
-    std::fs::write(&picture, picture::svg(&title, &rates)?).map_err(WriteError::to(&picture))?;
     let simulated = args.file.is_none();
     let demo = Demo::new(&drive, simulated, &rates, errors.as_ref(), &sent);
     std::fs::write(&page, demo.page()).map_err(WriteError::to(&page))?;
@@ -80,7 +74,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let mut out = std::io::stdout().lock();
     if common.json {
         let mut json = serde_json::to_value(demo.summary())?;
-        json["files"] = serde_json::json!({ "page": page, "picture": picture, "log": log });
+        json["files"] = serde_json::json!({ "page": page, "log": log });
         print_json(&mut out, &json)?;
         return Ok(());
     }
@@ -100,7 +94,6 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         None => writeln!(out, "No reference (ref_gyr_z or ref_yaw), so no errors.\n")?,
     }
     writeln!(out, "every result, as a page   {}", page.display())?;
-    writeln!(out, "yaw and its error         {}", picture.display())?;
     writeln!(
         out,
         "{:<25} {} (cargo gyronet monitor FILE decodes it)",

@@ -1,13 +1,11 @@
 //! `gyronet monitor` shows the CAN messages as a receiver sees them.
 
-use super::{Common, WriteError};
+use super::Common;
 use console::Term;
 use gyronet::can::config::Config;
 use gyronet_tools::client::monitor::Monitor;
 use gyronet_tools::client::monitor::source::{Lines, Source};
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -26,14 +24,13 @@ const ONCE: Duration = Duration::from_secs(10);
 /// summarised. Ctrl-C ends with the summary and exit status 0. The exit status is 1 if a log has no CAN frame, or if
 /// --once finds no messages.
 ///
-/// The messages of a fibre-optic gyro are a second block, and `fog` in JSON; the table of --csv leaves them out.
-/// Identifiers and E2E protection are those of the default configuration. Times are the input's own time stamps if it
+/// The messages of a fibre-optic gyro are a second block, and `fog` in JSON. Identifiers and E2E protection are those of the default configuration. Times are the input's own time stamps if it
 /// has any; otherwise they count from the start.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet monitor /dev/ttyUSB0
-  gyronet monitor localhost:3000 --for 60 --csv yaw.csv
+  gyronet monitor localhost:3000 --for 60 --json
   gyronet monitor can.log --json")]
 pub struct Args {
     /// Serial port with SLCAN (/dev/ttyUSB0, COM3), TCP socket with SLCAN (host:port), or a
@@ -43,9 +40,6 @@ pub struct Args {
     /// Baud rate of a serial port.
     #[arg(long, value_name = "BIT/S", default_value_t = 921_600)]
     baud: u32,
-    /// Write each set of messages to this CSV file, one line per set.
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
     /// Show the first complete set of messages and end; fail if none arrives within 10 s.
     #[arg(long)]
     once: bool,
@@ -72,7 +66,6 @@ enum MonitorError {
 pub fn run(args: &Args, common: Common) -> super::Result {
     let config = Config::DEFAULT;
     let mut source = Source::open(&args.source, args.baud, config.settings().bits_per_second)?;
-    let mut table = args.csv.as_deref().map(Table::create).transpose()?;
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))?;
@@ -86,9 +79,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         let Lines::Some(lines) = source.read()? else { break };
         let elapsed = start.elapsed().as_secs_f64();
         for line in &lines {
-            if let Some(time) = monitor.take_line(line, elapsed) {
+            if monitor.take_line(line, elapsed).is_some() {
                 sets += 1;
-                table.as_mut().map_or(Ok(()), |table| table.row(&monitor, time))?;
                 if args.once {
                     break;
                 }
@@ -106,34 +98,10 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if args.once && sets == 0 {
         return Err(MonitorError::Nothing(args.source.clone()).into());
     }
-    table.map_or(Ok(()), Table::finish)?;
     // A log is read faster than it was recorded, so use its own time stamps.
     let time = monitor.stamp().unwrap_or_else(|| start.elapsed().as_secs_f64());
     view.finish(&monitor, time)?;
     Ok(())
-}
-
-/// The CSV file of --csv.
-struct Table {
-    path: PathBuf,
-    out: BufWriter<File>,
-}
-
-impl Table {
-    fn create(path: &Path) -> Result<Self, WriteError> {
-        let error = WriteError::to(path);
-        let mut out = BufWriter::new(File::create(path).map_err(&error)?);
-        writeln!(out, "{}", Monitor::HEADING).map_err(&error)?;
-        Ok(Self { path: path.into(), out })
-    }
-
-    fn row(&mut self, monitor: &Monitor, time: f64) -> Result<(), WriteError> {
-        writeln!(self.out, "{}", monitor.row(time)).map_err(WriteError::to(&self.path))
-    }
-
-    fn finish(mut self) -> Result<(), WriteError> {
-        self.out.flush().map_err(WriteError::to(&self.path))
-    }
 }
 
 /// The display while frames arrive, and the summary at the end.

@@ -3,12 +3,16 @@
 use clap::error::{ContextKind, ContextValue};
 
 const FAULTS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin faults`";
-const RETIRED: [(&str, &str); 9] = [
+const RETIRED: [(&str, &str); 13] = [
     ("campaign", FAULTS),
     ("soak", FAULTS),
     ("paper", "`make -f tools/paper/Makefile`"),
     ("tables", "`cargo paper tables`"),
     ("warm-up", "`gyronet simulate --trip motorway` with `gyronet evaluate`"),
+    ("completions", "`gyronet help`"),
+    ("--tum", "`gyronet replay --csv` (the yaw, beside the drive's wheels)"),
+    ("--csv", "`gyronet monitor --json`, or can-utils' candump with tools/gyronet.dbc,"),
+    ("--weights", "`gyronet evaluate --weights`"),
     ("--layout", "`cargo paper simulate`"),
     ("--set", "`cargo paper simulate`"),
     ("--training", "`cargo paper import`"),

@@ -7,8 +7,7 @@ use crate::plot::page::{HINT, document, escaped, table};
 /// Class of each axis's curve in the style sheet, and the name of the axis.
 const AXES: [(&str, &str); 3] = [("static", "x"), ("prompt", "y"), ("default", "z")];
 
-/// Returns the page; `gains` says what calibration and training would gain, or why that is not known.
-pub fn page(doctor: &Doctor, gains: &[(&str, String)]) -> String {
+pub fn page(doctor: &Doctor) -> String {
     let mut body = format!(
         "<h1>{}</h1>\n<p class=\"lead\">Examination of a recording of {:.0} s. Written by <code>gyronet \
          doctor</code> {}.</p>\n",
@@ -47,13 +46,6 @@ pub fn page(doctor: &Doctor, gains: &[(&str, String)]) -> String {
         (Some(allan), Some(noise)) => allan_section(allan, noise),
         _ => "<p>No standstill is long enough.</p>\n".to_owned(),
     };
-    body += "<h2>What could be gained</h2>\n";
-    body += &table(
-        "costs",
-        "",
-        &["by", "", "gain"],
-        gains.iter().map(|(by, text)| vec![(*by).to_owned(), String::new(), text.clone()]),
-    );
     document(&format!("gyronet doctor: {}", doctor.name), &body)
 }
 

@@ -142,9 +142,6 @@ pub enum DataFault {
     /// The vehicle file cannot be used.
     #[error("not a valid vehicle file: {reason}")]
     Vehicle { reason: String },
-    /// A JSON file cannot be parsed: the marker of a simulated sequence, or the history of a training.
-    #[error(transparent)]
-    Marker(#[from] serde_json::Error),
 }
 
 /// The fault of one field.

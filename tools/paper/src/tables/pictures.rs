@@ -3,10 +3,10 @@
 use super::results::{Path, SequenceErrors};
 use crate::sequence::Sequence;
 use crate::simulate::Layout;
+use crate::svg::{Axis, COLORS, Figure, Marks, Panel, PlotError, Stroke};
 use gyronet_tools::drive::DT;
 use gyronet_tools::evaluate::methods::{Gyro, Method};
 use gyronet_tools::plot::curve::range;
-use gyronet_tools::plot::svg::{Axis, COLORS, Figure, Marks, Panel, PlotError, Stroke};
 
 /// Width and height of a picture, pixels.
 const SIZE: (u32, u32) = (1000, 640);

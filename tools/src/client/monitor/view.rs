@@ -1,4 +1,4 @@
-//! Formats the newest values as text, as a table row and as JSON.
+//! Formats the newest values as text and as JSON.
 
 use super::{Counts, Monitor, State};
 use gyronet::can::yaw::Faults;
@@ -48,33 +48,8 @@ fn judgement(state: &State) -> (String, String) {
 }
 
 impl Monitor {
-    /// Header of the CSV file whose lines [`Monitor::row`] returns.
-    pub const HEADING: &str = "time_s,rate_deg_per_s,yaw_deg,source,quality,faults,correction_deg_per_s,\
-                               sigma_deg_per_s,latency_ms,drop_in_deg_per_s,lost,repeated,out_of_sequence,damaged,\
-                               unreadable";
-
-    /// Returns the newest values as one line of a CSV file; unknown values are empty.
-    pub fn row(&self, time: f64) -> String {
-        let known = |value: Option<f64>, decimals: usize| {
-            value.map(|value| format!("{value:.decimals$}")).unwrap_or_default()
-        };
-        let (source, quality) = judgement(&self.state);
-        let State { rate, yaw, faults, correction, sigma, latency, .. } = self.state;
-        let Counts { lost, repeated, out_of_sequence, damaged, unreadable, .. } = self.counts;
-        format!(
-            "{time:.6},{},{},{source},{quality},{},{},{},{},{},{lost},{repeated},{out_of_sequence},{damaged},{unreadable}",
-            known(rate, 6),
-            known(yaw, 8),
-            fault_names(faults),
-            known(correction, 4),
-            known(sigma, 5),
-            known(latency, 1),
-            known(self.drop_in, 3),
-        )
-    }
-
-    /// Returns the newest values, those of a fibre-optic gyro too, and all counts as JSON. Names, units and decimals
-    /// are those of [`Monitor::row`]; unknown values are null.
+    /// Returns the newest values, those of a fibre-optic gyro too, and all counts as JSON; unknown values
+    /// are null.
     pub fn json(&self, time: f64) -> serde_json::Value {
         let Counts { frames, foreign, lost, repeated, out_of_sequence, damaged, unreadable } = self.counts;
         let mut all = values(&self.state);

@@ -3,7 +3,7 @@
 //! The caller gives points, ranges and names. Lines are thinned to about one point per pixel, and cut at the edges of
 //! their panel, because SVG would draw them beyond it.
 
-use super::curve::thinned;
+use gyronet_tools::plot::curve::thinned;
 use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
