@@ -7,6 +7,7 @@
 //! interpolated as sums, so that nothing is lost or counted twice.
 
 mod export;
+mod fault;
 mod kaist;
 mod nclt;
 mod rows;
@@ -19,6 +20,7 @@ pub(super) use kaist::yaw;
 pub use summary::{Seen, Spread, StreamSummary};
 
 use crate::simulate::{Layout, MARKER, Spec};
+pub use fault::SequenceFault;
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::{ImuSample, PERIOD_US, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce};
@@ -111,7 +113,7 @@ pub fn layout(folder: &Path) -> Result<Layout, DataError> {
     } else if folder.join("kvh.csv").is_file() || folder.join("ms25.csv").is_file() {
         Ok(Layout::Nclt)
     } else {
-        let fault = fs::metadata(folder).map_or_else(DataFault::Io, |_| DataFault::UnknownLayout);
+        let fault = fs::metadata(folder).map_or_else(DataFault::Io, |_| SequenceFault::UnknownLayout.into());
         Err(DataError::of(folder.display(), fault))
     }
 }
@@ -128,7 +130,7 @@ pub fn find(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
         .filter(|path| layout(path).is_ok())
         .collect();
     found.sort();
-    if found.is_empty() { Err(error(DataFault::UnknownLayout)) } else { Ok(found) }
+    if found.is_empty() { Err(error(SequenceFault::UnknownLayout.into())) } else { Ok(found) }
 }
 
 impl Sequence {
@@ -154,7 +156,7 @@ impl Sequence {
         }
         let seconds = steps.len() as f64 * DT;
         if seconds < NEEDED {
-            let fault = DataFault::TooLittleInCommon { seconds, needed: NEEDED };
+            let fault = SequenceFault::TooLittleInCommon { seconds, needed: NEEDED }.into();
             return Err(DataError::of(folder.display(), fault));
         }
         let [x, y] = steps.first().map_or([0.0; 2], |step: &Step| step.position);
@@ -242,13 +244,15 @@ impl Sequence {
     pub fn needs_standstill(&self) -> Result<(), DataError> {
         let steps = self.steps.iter().take(STATIC_SAMPLES as usize);
         let metres = steps.map(|step| (step.wheels[0] + step.wheels[1]) / 2.0).sum::<f64>().abs();
-        let fault = DataFault::Rolling { metres, most: STANDING };
+        let fault = SequenceFault::Rolling { metres, most: STANDING }.into();
         if metres > STANDING { Err(DataError::of(self.path.display(), fault)) } else { Ok(()) }
     }
 
     /// Checks that the sequence has an inertial sensor.
     pub fn needs_gyro(&self) -> Result<(), DataError> {
-        self.has_gyro.then_some(()).ok_or_else(|| DataError::of(self.path.display(), DataFault::NoGyro))
+        self.has_gyro
+            .then_some(())
+            .ok_or_else(|| DataError::of(self.path.display(), SequenceFault::NoGyro.into()))
     }
 }
 
@@ -305,7 +309,9 @@ fn marker(folder: &Path) -> Result<Option<Spec>, DataError> {
     let path = folder.join(MARKER);
     let error = |fault| DataError::of(path.display(), fault);
     match fs::read(&path) {
-        Ok(bytes) => serde_json::from_slice(&bytes).map(Some).map_err(|source| error(source.into())),
+        Ok(bytes) => serde_json::from_slice(&bytes)
+            .map(Some)
+            .map_err(|source| error(SequenceFault::Marker(source).into())),
         Err(source) if source.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(source) => Err(error(source.into())),
     }

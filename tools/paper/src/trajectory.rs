@@ -3,6 +3,7 @@
 //! quaternion. Rows that begin with # are comments.
 
 use super::sequence::yaw;
+use crate::sequence::SequenceFault;
 use gyronet_tools::drive::error::{DataError, DataFault, ValueError};
 use gyronet_tools::evaluate::metrics::wrap;
 use gyronet_tools::evaluate::trajectory_error::Point;
@@ -62,7 +63,7 @@ impl Trajectory {
 fn pose(path: &str, line: u64, row: &str, last: Option<&Pose>) -> Result<Pose, DataError> {
     let fault = |fault| DataError::at(path, line, fault);
     let fields: Vec<&str> = row.split_whitespace().collect();
-    let columns = || DataFault::Columns { found: fields.len(), expected: COLUMNS.len() };
+    let columns = || SequenceFault::Columns { found: fields.len(), expected: COLUMNS.len() }.into();
     let fields: [&str; COLUMNS.len()] = fields.as_slice().try_into().map_err(|_| fault(columns()))?;
     let mut values = [0.0; COLUMNS.len()];
     for ((value, text), column) in values.iter_mut().zip(fields).zip(COLUMNS) {
@@ -71,7 +72,7 @@ fn pose(path: &str, line: u64, row: &str, last: Option<&Pose>) -> Result<Pose, D
     let [time, x, y, _, qx, qy, qz, qw] = values;
     let norm = libm::sqrt(qx * qx + qy * qy + qz * qz + qw * qw);
     if (norm - 1.0).abs() > NORM_TOLERANCE {
-        return Err(fault(DataFault::Quaternion { norm }));
+        return Err(fault(SequenceFault::Quaternion { norm }.into()));
     }
     if let Some(last) = last.filter(|last| time <= last.time) {
         return Err(fault(DataFault::Time { last_s: last.time, at_s: time }));

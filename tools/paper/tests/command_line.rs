@@ -51,3 +51,18 @@ fn tables_fit_to_training_sequences_and_take_other_methods() {
     assert_eq!(twice.status.code(), Some(1));
     assert!(text(&twice.stderr).contains("given twice"), "{}", text(&twice.stderr));
 }
+
+#[test]
+fn an_imported_sequence_comes_with_its_radius() {
+    let folder = tempfile::tempdir().unwrap();
+    let [sequence, drive] = ["nclt", "robot.csv"].map(|name| folder.path().join(name).display().to_string());
+    for arguments in [
+        &["simulate", "--layout", "nclt", "--minutes", "1", "--out", &sequence][..],
+        &["import", &sequence, "--out", &drive],
+    ] {
+        let output = paper(arguments);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+    }
+    let vehicle = std::fs::read_to_string(folder.path().join("robot.toml")).unwrap();
+    assert!(vehicle.contains("radius_m = 0.24"), "its wheels are smaller than the recorded car's: {vehicle}");
+}

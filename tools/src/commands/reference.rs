@@ -7,6 +7,10 @@ use std::io::{self, Write};
 
 /// Print a Markdown table of settings, data identifiers, troubles or states.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet reference settings
+  gyronet reference troubles --json")]
 pub struct Args {
     #[arg(value_enum)]
     table: Name,

@@ -9,8 +9,9 @@ use super::Files;
 use super::rows::{Format, Row, Rows};
 use super::summary::StreamSummary;
 use super::track::{Stream, Track, Unwrap};
+use crate::sequence::SequenceFault;
 use gyronet::sample::RATE_HZ;
-use gyronet_tools::drive::error::{DataError, DataFault};
+use gyronet_tools::drive::error::DataError;
 use std::f64::consts::PI;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -152,7 +153,7 @@ impl EncoderParameters {
                 .and_then(|line| line.split_whitespace().last())
                 .and_then(|word| word.parse().ok())
                 .filter(|value: &f64| value.is_finite() && *value > 0.0);
-            value.ok_or_else(|| DataError::of(&name, DataFault::Parameter(parameter)))
+            value.ok_or_else(|| DataError::of(&name, SequenceFault::Parameter(parameter).into()))
         };
         Ok(Self {
             resolution: number("Encoder resolution", "resolution:")?,

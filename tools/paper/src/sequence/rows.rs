@@ -1,8 +1,9 @@
 //! Reads rows of numbers from a file without a header, one row at a time. A row is a stamp and fields.
 
 use super::summary::StreamSummary;
+use crate::sequence::SequenceFault;
 use csv::ByteRecord;
-use gyronet_tools::drive::error::{DataError, DataFault, ValueError};
+use gyronet_tools::drive::error::{DataError, ValueError};
 use std::fs::File;
 use std::path::Path;
 
@@ -73,7 +74,7 @@ impl<const N: usize> Rows<N> {
             let line = self.record.position().map_or(0, csv::Position::line);
             let found = self.record.len();
             if found != self.format.columns {
-                let fault = DataFault::Columns { found, expected: self.format.columns };
+                let fault = SequenceFault::Columns { found, expected: self.format.columns }.into();
                 return Err(DataError::at(&self.path, line, fault));
             }
             let stamp: i64 = self.field(line, 0)?;
@@ -97,11 +98,15 @@ impl<const N: usize> Rows<N> {
                     continue;
                 }
                 if stamp < last {
-                    return Err(DataError::at(&self.path, line, DataFault::Backwards { last, at: stamp }));
+                    return Err(DataError::at(
+                        &self.path,
+                        line,
+                        SequenceFault::Backwards { last, at: stamp }.into(),
+                    ));
                 }
                 let seconds = self.seconds(stamp - last);
                 if seconds > MAX_SILENCE {
-                    let fault = DataFault::Silent { seconds, most: MAX_SILENCE };
+                    let fault = SequenceFault::Silent { seconds, most: MAX_SILENCE }.into();
                     return Err(DataError::at(&self.path, line, fault));
                 }
             }

@@ -9,9 +9,10 @@
 
 use super::estimate::{Estimate, Places};
 use crate::sequence::Sequence;
+use crate::sequence::SequenceFault;
 use crate::trajectory::{Pose, Trajectory};
 use gyronet_tools::drive::DT;
-use gyronet_tools::drive::error::{DataError, DataFault};
+use gyronet_tools::drive::error::DataError;
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::metrics::wrap;
 use gyronet_tools::evaluate::trajectory_error::Point;
@@ -94,7 +95,7 @@ fn compared(
         }
         let seconds = after.time - before.time;
         if seconds > MAX_STEP {
-            return Err(fault(after.line, DataFault::FarApart { seconds, most: MAX_STEP }));
+            return Err(fault(after.line, SequenceFault::FarApart { seconds, most: MAX_STEP }.into()));
         }
         let pose = between(before, after, now);
         let place = [0, 1].map(|axis| pose.position[axis] - sequence.origin[axis]);
@@ -104,14 +105,14 @@ fn compared(
             if metres > START_TOLERANCE.0 || turned.abs() > START_TOLERANCE.1 {
                 return Err(fault(
                     pose.line,
-                    DataFault::Frame { metres, degrees: turned.abs().to_degrees() },
+                    SequenceFault::Frame { metres, degrees: turned.abs().to_degrees() }.into(),
                 ));
             }
             last = pose.yaw - turned;
             continue;
         }
         if metres > most {
-            return Err(fault(after.line, DataFault::Diverged { metres, most }));
+            return Err(fault(after.line, SequenceFault::Diverged { metres, most }.into()));
         }
         turns.push(pose.yaw - std::mem::replace(&mut last, pose.yaw));
         places.push(place);
@@ -120,7 +121,7 @@ fn compared(
     if places.is_empty() || covered < end {
         let span = |poses: &[Pose]| Some((poses.first()?.time, poses.last()?.time));
         let (from_s, to_s) = span(&trajectory.poses).unwrap_or_default();
-        let fault = DataFault::Span { from_s, to_s, begin_s: time(first), end_s: end };
+        let fault = SequenceFault::Span { from_s, to_s, begin_s: time(first), end_s: end }.into();
         return Err(DataError::of(&trajectory.path, fault));
     }
     Ok((turns, places))
