@@ -13,7 +13,7 @@ fn the_trainers_unit_tests_pass() {
 #[test]
 fn the_unit_tests_of_the_import_in_python_pass() {
     let packages = ["asammdf", "can", "cantools", "mcap", "numpy", "pyulog", "rosbags"];
-    pass("the_unit_tests_of_the_import_in_python_pass", "tools/python", &packages, 40);
+    pass("the_unit_tests_of_the_import_in_python_pass", "tools/python", &packages, 41);
 }
 
 /// Runs the unit tests of a folder, of which `least` must not be skipped.

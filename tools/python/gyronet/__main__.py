@@ -135,7 +135,7 @@ def main(arguments=None):
             from gyronet.wheels import run
             run(args)
     except Refused as error:
-        print(f"error: {error}", file=sys.stderr)
+        print("error:", " ".join(str(error).split()), file=sys.stderr)
         return 1
     except BrokenPipeError:  # a pager that was left
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)

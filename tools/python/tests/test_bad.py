@@ -1,6 +1,7 @@
 """Bad input: one clear line each, and nothing left behind."""
 
 import os
+import random
 import shutil
 import subprocess
 import sys
@@ -75,6 +76,21 @@ class Bad(unittest.TestCase):
         for arguments, words in ARGUMENTS:
             with self.subTest(arguments):
                 self.refused(arguments if "--out" in arguments else [*arguments, "--out", "out.csv"], words)
+
+    def test_damaged_bytes_never_end_in_a_traceback(self):
+        t, rng = made.times(5.0), random.Random(36)
+        made.mcap(self.folder / "d.mcap", made.imu_messages(t, made.imu(t)))
+        made.bag1(self.folder / "d.bag", made.imu_messages(t, made.imu(t), made.STORE1))
+        made.bus(self.folder / "d.blf", made.frames(5.0))
+        for name in ["d.mcap", "d.bag", "d.blf", "d.csv"]:
+            whole = (self.folder / name).read_bytes()
+            for _ in range(60):
+                damaged = bytearray(whole[: rng.randrange(1, 2 * len(whole))])
+                for _ in range(rng.randrange(8)):
+                    damaged[rng.randrange(len(damaged))] = rng.randrange(256)
+                (self.folder / name).write_bytes(damaged)
+                status, text = made.run(self.folder, "import", name)
+                self.assertTrue(status == 0 or text.count("\n") == 1, (name, text))
 
     def test_a_wrong_suffix_does_not_matter(self):
         made.mcap(self.folder / "d.log", made.imu_messages(made.times(), made.imu(made.times())))

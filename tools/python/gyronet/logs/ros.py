@@ -4,7 +4,7 @@ import math
 import sqlite3
 from pathlib import Path
 
-from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 from gyronet.logs.progress import Progress
@@ -47,15 +47,13 @@ def read_bag(path, log, bus):
                 progress.step()
                 taken.add(connection.topic, connection.msgtype, lambda c=connection, d=data: reader.deserialize(d, c.msgtype), recorded)
             progress.end()
-    except AnyReaderError as error:
-        remedy = REINDEX if path.is_dir() else "a bag that was not closed: rosbag reindex FILE; of version 1.x: rosbag fix OLD NEW"
+    except Refused:
+        raise
+    except Exception as error:  # rosbags raises whatever damaged bytes provoke
+        remedy = REINDEX if path.is_dir() else "a bag that was not closed: rosbag reindex FILE"
         if not log.channels:
-            raise Refused(f"{path}: the bag cannot be read: {error}; {remedy}") from None
-        log.dropped[f"the bag ends early: {error}"] += 1
-    except (OSError, EOFError, ValueError, sqlite3.Error) as error:
-        if not log.channels:
-            raise Refused(f"{path}: the bag cannot be read: {error}; {REINDEX}") from None
-        log.dropped[f"the bag ends early: {error}"] += 1
+            raise Refused(f"{path}: the bag cannot be read: {error or type(error).__name__}; {remedy}") from None
+        log.dropped[f"the bag ends early: {error or type(error).__name__}"] += 1
 
 
 def read_mcap(path, log, bus):

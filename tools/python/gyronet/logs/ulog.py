@@ -37,8 +37,8 @@ def read(path, log, bus):
         log.dropped["the file is damaged; reading went on where pyulog found the next record"] += 1
     for topic in ulog.data_list:
         channel = topic.name if topic.multi_id == 0 else f"{topic.name}.{topic.multi_id}"
-        seconds = 1e-6 * topic.data["timestamp"].astype(float)
         try:
+            seconds = 1e-6 * topic.data["timestamp"].astype(float)
             for name, kind, values, unit in take(topic.name, topic.data, seconds, log):
                 log.channel(channel + name, kind, unit).extend(np.column_stack([seconds, values]))
         except KeyError as error:
