@@ -48,16 +48,11 @@ fn a_reader_that_has_gone_is_no_failure() {
 }
 
 #[test]
-fn a_bench_that_cannot_run_says_what_to_use_or_fetch() {
-    for (arguments, named) in [
-        (&["--policies"][..], "cargo bringup"),
-        (&["--cmsis-nn", "/nowhere"], "git clone --depth 1 https://"),
-    ] {
-        let output = gyronet(&[&["bench-target"], arguments].concat());
-        let err = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{err}");
-        assert!(err.contains(named) && err.trim_end().lines().count() == 1, "{err}");
-    }
+fn a_bench_that_cannot_run_says_what_to_fetch() {
+    let output = gyronet(&["bench-target", "--cmsis-nn", "/nowhere"]);
+    let err = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{err}");
+    assert!(err.contains("git clone --depth 1 https://") && err.trim_end().lines().count() == 1, "{err}");
 }
 
 #[test]
@@ -137,6 +132,8 @@ fn retired_names_say_what_does_their_work() {
         (&["paper", "KAIST", "--out", "OUT"], "make -f tools/paper/Makefile"),
         (&["tables", "SEQUENCES"], "cargo paper tables"),
         (&["warm-up"], "gyronet simulate --trip motorway"),
+        (&["bench-target", "--policies"], "cargo bringup"),
+        (&["demo", "--image"], "--test board"),
         (&["completions", "bash"], "gyronet help"),
         (&["replay", "drive.csv", "--tum", "path.tum"], "gyronet replay --csv"),
         (&["monitor", "can.log", "--csv", "yaw.csv"], "gyronet monitor --json"),

@@ -48,13 +48,6 @@ fn the_page_needs_nothing_else_and_says_what_the_json_says() {
 }
 
 #[test]
-fn the_retired_image_flag_names_its_successor() {
-    let output = Command::new(env!("CARGO_BIN_EXE_gyronet")).args(["demo", "--image"]).output().unwrap();
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert!(!output.status.success() && error.contains("--test board"), "{error}");
-}
-
-#[test]
 fn the_readme_has_the_table_that_the_demo_prints() {
     let (folder, text) = demo("demo-text", &[]);
     let page = std::fs::read_to_string(folder.join("demo.html")).unwrap();

@@ -23,17 +23,9 @@ pub struct Args {
     /// Compare GyroNet with CMSIS-NN, whose sources are in DIR.
     #[arg(long, value_name = "DIR")]
     cmsis_nn: Option<PathBuf>,
-    /// Was: cycles with flash wait states under four cache policies.
-    #[arg(long, hide = true)]
-    policies: bool,
 }
 
 pub fn run(args: &Args, common: Common) -> super::Result {
-    if args.policies {
-        return Err(
-            "--policies is gone with the flash model: `cargo bringup` counts cycles on a board".into()
-        );
-    }
     let workspace = bench::workspace();
     let folder = bench::target_folder();
     if let Some(sources) = &args.cmsis_nn {
@@ -61,13 +53,9 @@ fn print(out: &mut impl Write, counts: &Counts) -> io::Result<()> {
 }
 
 fn json(counts: &Counts) -> serde_json::Value {
-    let region = |count: &Count| {
-        let Count { name, instructions, cycles, stack } = count;
-        serde_json::json!({ "name": name, "instructions": instructions, "cycles": cycles, "stack": stack })
-    };
     let sizes = counts.sizes.iter().map(|(name, bytes)| (name.clone(), (*bytes).into()));
     serde_json::json!({
-        "regions": counts.regions.iter().map(region).collect::<Vec<_>>(),
+        "regions": counts.regions,
         "sizes": sizes.collect::<serde_json::Map<_, _>>(),
     })
 }

@@ -29,19 +29,12 @@ pub struct Args {
     /// Folder for demo.html and can.log [default: target/demo].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    #[arg(long, hide = true)]
-    image: bool,
     #[command(flatten)]
     sent: weights::Sent,
 }
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
-    if args.image {
-        return Err("--image is gone: the image as flashed runs on the virtual board, `cargo test -p gyronet-host-tests \
-                    --test board`; `gyronet size` prints its size and `gyronet bench-target` its instructions"
-            .into());
-    }
     let weights = args.sent.open()?;
     let bundled = bundled::demo_drive()?;
     let drive = match &args.file {

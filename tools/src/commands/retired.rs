@@ -3,12 +3,17 @@
 use clap::error::{ContextKind, ContextValue};
 
 const FAULTS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin faults`";
-const RETIRED: [(&str, &str); 13] = [
+const RETIRED: [(&str, &str); 15] = [
     ("campaign", FAULTS),
     ("soak", FAULTS),
     ("paper", "`make -f tools/paper/Makefile`"),
     ("tables", "`cargo paper tables`"),
     ("warm-up", "`gyronet simulate --trip motorway` with `gyronet evaluate`"),
+    (
+        "--image",
+        "`cargo test -p gyronet-host-tests --test board` (`size` and `bench-target` measure the image)",
+    ),
+    ("--policies", "`cargo bringup`, which counts cycles on a board,"),
     ("completions", "`gyronet help`"),
     ("--tum", "`gyronet replay --csv` (the yaw, beside the drive's wheels)"),
     ("--csv", "`gyronet monitor --json`, or can-utils' candump with tools/gyronet.dbc,"),

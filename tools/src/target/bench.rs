@@ -44,7 +44,7 @@ pub enum BenchError {
 }
 
 /// Holds the counts of one region of the image.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Count {
     /// The image's name for the region.
     pub name: String,
