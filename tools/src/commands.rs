@@ -4,6 +4,7 @@
 pub mod bench_target;
 pub mod bus;
 pub mod calibrate;
+pub mod completions;
 pub mod demo;
 pub mod device;
 #[cfg(feature = "logs")]

@@ -1,5 +1,6 @@
-//! The command line as a whole: help, exit statuses, colours.
+//! The command line as a whole: help, exit statuses, colours, completions.
 
+use std::io::Write as _;
 use std::process::{Command, Output, Stdio};
 
 fn gyronet(arguments: &[&str]) -> Output {
@@ -125,6 +126,34 @@ fn colours_are_for_terminals() {
 }
 
 #[test]
+fn shells_complete_every_subcommand() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let output = gyronet(&["completions", shell]);
+        let script = text(&output.stdout);
+        assert!(output.status.success(), "{shell}");
+        for name in subcommands() {
+            assert!(script.contains(&name), "{shell}: {name}");
+        }
+    }
+}
+
+#[test]
+fn bash_completes() {
+    if Command::new("bash").arg("--version").output().is_err() {
+        // Not `eprintln!`: the test harness would keep it to itself.
+        writeln!(std::io::stderr(), "SKIPPED bash_completes: no bash").unwrap();
+        return;
+    }
+    let script = "source /dev/stdin\nCOMP_WORDS=(gyronet ev); COMP_CWORD=1\n_gyronet gyronet ev gyronet\necho \"${COMPREPLY[@]}\"";
+    let completions = gyronet(&["completions", "bash"]).stdout;
+    let path = format!("{}/completions.bash", env!("CARGO_TARGET_TMPDIR"));
+    std::fs::write(&path, completions).unwrap();
+    let script = script.replace("/dev/stdin", &path);
+    let output = Command::new("bash").args(["--norc", "-c", &script]).output().unwrap();
+    assert_eq!(text(&output.stdout).trim(), "evaluate", "{}", text(&output.stderr));
+}
+
+#[test]
 fn retired_names_say_what_does_their_work() {
     for (retired, successor) in [
         (&["campaign", "--upsets"][..], "--bin faults"),
@@ -134,8 +163,6 @@ fn retired_names_say_what_does_their_work() {
         (&["warm-up"], "gyronet simulate --trip motorway"),
         (&["bench-target", "--policies"], "cargo bringup"),
         (&["demo", "--image"], "--test board"),
-        (&["completions", "bash"], "gyronet help"),
-        (&["replay", "drive.csv", "--tum", "path.tum"], "gyronet replay --csv"),
         (&["monitor", "can.log", "--csv", "yaw.csv"], "gyronet monitor --json"),
         (&["doctor", "drive.csv", "--weights", "mine.blob"], "gyronet evaluate --weights"),
         (&["simulate", "--layout", "kaist", "--out", "OUT"], "cargo paper simulate"),

@@ -35,26 +35,30 @@ fn folder(name: &str, vehicle: &str) -> PathBuf {
 }
 
 /// Reads numbers: one column of a table.
-fn column(path: &Path, at: usize) -> Vec<f64> {
+fn column(path: &Path, separator: char, at: usize) -> Vec<f64> {
     let text = std::fs::read_to_string(path).unwrap();
-    text.lines().filter_map(|line| line.split(',').nth(at)?.parse().ok()).collect()
+    text.lines().filter_map(|line| line.split(separator).nth(at)?.parse().ok()).collect()
 }
 
 #[test]
 fn mounting_and_radius_are_used_and_named() {
     let folder = folder("vehicle_file", "[mounting]\nroll_deg = 180\n[wheels]\nradius_m = 0.578\n");
-    let plain: Vec<&str> = SIMULATED_DRIVE.lines().take(2_501).collect();
-    std::fs::write(folder.join("plain.csv"), plain.join("\n") + "\n").unwrap();
-    let (good, err) = gyronet(&folder, &["replay", "drive.csv", "--csv", "rates.csv"]);
+    std::fs::write(folder.join("plain.csv"), SIMULATED_DRIVE).unwrap();
+    let (good, err) = gyronet(&folder, &["replay", "drive.csv", "--csv", "rates.csv", "--tum", "path.tum"]);
     assert!(good && err.contains("drive.csv: vehicle file drive.toml\n"), "{err}");
-    let (good, err) = gyronet(&folder, &["replay", "plain.csv", "--csv", "plain_rates.csv"]);
+    let (good, err) =
+        gyronet(&folder, &["replay", "plain.csv", "--csv", "plain_rates.csv", "--tum", "plain.tum"]);
     assert!(good && !err.contains("vehicle file"), "{err}");
-    let [turned, plain] = ["rates.csv", "plain_rates.csv"].map(|name| column(&folder.join(name), 2));
+    let [turned, plain] = ["rates.csv", "plain_rates.csv"].map(|name| column(&folder.join(name), ',', 2));
     assert_eq!(turned.len(), 2_200);
     for (turned, plain) in turned.iter().zip(&plain) {
         // The turn by half a circle is rounded, and the network is not linear.
         assert!((turned - plain).abs() < 5e-5, "{turned} {plain}");
     }
+    // Twice the radius is twice the way.
+    let [turned, plain] = ["path.tum", "plain.tum"].map(|name| column(&folder.join(name), ' ', 1));
+    let (turned, plain) = (turned.last().unwrap(), plain[turned.len() - 1]);
+    assert!(plain > 10.0 && (turned / plain - 2.0).abs() < 1e-3, "{turned} {plain}");
 
     for command in ["evaluate", "calibrate", "doctor"] {
         let (_, err) = gyronet(&folder, &[command, "drive.csv"]);
@@ -62,18 +66,8 @@ fn mounting_and_radius_are_used_and_named() {
     }
     let (good, err) = gyronet(&folder, &["demo", "drive.csv", "--out", "demo"]);
     assert!(good && err.contains("drive.csv: vehicle file drive.toml\n"), "{err}");
-    let (good, err) = gyronet(&folder, &["demo", "plain.csv", "--out", "plain"]);
-    assert!(good, "{err}");
-    let page = |folder_of: &str| std::fs::read_to_string(folder.join(folder_of).join("demo.html")).unwrap();
-    let [turned, plain] = ["demo", "plain"].map(page);
-    assert!(turned.contains("(radius 0.578 m)"), "the page says what the path rests on");
-    // Twice the radius is twice the way; the pages round it to metres.
-    let metres = |page: &str| {
-        let (_, way) = page.split_once("Dead reckoning over ").unwrap();
-        way.split(' ').next().unwrap().parse::<f64>().unwrap()
-    };
-    let [turned, plain] = [turned, plain].map(|page| metres(&page));
-    assert!(plain > 10.0 && (turned - 2.0 * plain).abs() <= 1.5, "{turned} {plain}");
+    let page = std::fs::read_to_string(folder.join("demo/demo.html")).unwrap();
+    assert!(page.contains("(radius 0.578 m)"), "the page says what the path rests on");
 }
 
 #[test]
@@ -85,7 +79,7 @@ fn what_import_writes_is_not_turned_again() {
     assert!(!good && err.contains("drive.toml: --out would overwrite it"), "{err}");
     let (good, err) = import("level.csv");
     assert!(good, "{err}");
-    let up = column(&folder.join("level.csv"), 3);
+    let up = column(&folder.join("level.csv"), ',', 3);
     assert!(up.len() == 2_500 && up.iter().all(|up| *up > 5.0));
     let header = std::fs::read_to_string(folder.join("level.csv")).unwrap();
     assert!(
@@ -111,4 +105,17 @@ fn what_import_writes_is_not_turned_again() {
     let (good, err) = gyronet(&folder, &["replay", "level.csv"]);
     assert!(!good && err.contains("level.toml: not a valid vehicle file: "), "{err}");
     assert!(err.contains("unknown field `rol_deg`"), "{err}");
+}
+
+#[test]
+fn a_sequence_of_a_data_set_comes_with_its_radius() {
+    let folder = folder("vehicle_sequence", "");
+    let (good, err) = gyronet(&folder, &["simulate", "--layout", "nclt", "--minutes", "1", "--out", "nclt"]);
+    assert!(good, "{err}");
+    let (good, err) = gyronet(&folder, &["import", "nclt", "nclt", "--out", "robot.csv"]);
+    assert!(good && err.contains("rows; robot.toml beside it"), "{err}");
+    let (good, err) = gyronet(&folder, &["demo", "robot.csv", "--out", "demo"]);
+    assert!(good, "{err}");
+    let page = std::fs::read_to_string(folder.join("demo/demo.html")).unwrap();
+    assert!(page.contains("(radius 0.24 m)"), "its wheels are smaller than the recorded car's");
 }

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 ///
 /// The command runs the drive through the pipeline that is flashed. The log has the format of `candump -L` and the
 /// recording's time stamps; can-utils' canplayer and python-can can play it. It is written to standard output, unless
-/// --out names a file or --mcap or --csv is given. The summary is written to standard error; with --json it is
+/// --out names a file or --mcap, --csv or --tum is given. The summary is written to standard error; with --json it is
 /// written to standard output if the log is not.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
@@ -26,7 +26,7 @@ Examples:
   gyronet replay drive.csv --out can.log
   gyronet replay drive.csv | head
   gyronet replay drive.csv --out can.log --mcap drive.mcap    # and drive.layout.json, for Foxglove
-  gyronet replay drive.csv --out can.log --csv rates.csv")]
+  gyronet replay drive.csv --out can.log --csv rates.csv --tum path.tum")]
 pub struct Args {
     /// Recorded drive.
     #[arg(value_name = "FILE")]
@@ -40,6 +40,9 @@ pub struct Args {
     /// Write the rates, the yaw and its expected error to this table, one line per sample.
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
+    /// Write the path computed from the wheels and the navigation yaw to this file, in the TUM format that evo reads.
+    #[arg(long, value_name = "FILE.tum")]
+    tum: Option<PathBuf>,
     #[command(flatten)]
     sent: Sent,
 }
@@ -64,7 +67,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let drive = read_drive(&args.file, common)?;
     // A drive that cannot be replayed leaves no file behind.
     initialise(&drive)?;
-    let writes_elsewhere = args.mcap.is_some() || args.csv.is_some();
+    let writes_elsewhere = [&args.mcap, &args.csv, &args.tum].into_iter().any(Option::is_some);
     let log: Box<dyn Write> = match &args.out {
         Some(path) => Box::new(BufWriter::new(File::create(path).map_err(WriteError::to(path))?)),
         None if writes_elsewhere => Box::new(io::sink()),
@@ -77,11 +80,19 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
     };
     let mut log = Log::new(log);
-    let mut table = args.csv.as_ref().map(|path| Output::new(path, export::Table::new)).transpose()?;
-    let mut mcap = args
-        .mcap
-        .as_ref()
-        .map(|path| Output::new(path, |file| foxglove::Recorder::new(file).map_err(io::Error::other)))
+    let open = |path: &Option<PathBuf>| path.clone();
+    let mut table = open(&args.csv).map(|path| Output::new(&path, export::Table::new)).transpose()?;
+    let mut tum = match &args.tum {
+        None => None,
+        Some(path) => {
+            let speeds = drive
+                .speeds()
+                .ok_or_else(|| format!("{}: --tum needs wheels, since a path needs a speed", drive.path))?;
+            Some(Output::new(path, |file| Ok(export::Tum::new(speeds, file)))?)
+        }
+    };
+    let mut mcap = open(&args.mcap)
+        .map(|path| Output::new(&path, |file| foxglove::Recorder::new(file).map_err(io::Error::other)))
         .transpose()?;
 
     let mut statuses = BTreeMap::from(STATUSES.map(|status| (status_name(status), 0u64)));
@@ -97,6 +108,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         if let Some(table) = &mut table {
             table.write(|table| table.step(&step))?;
         }
+        if let Some(tum) = &mut tum {
+            tum.write(|tum| tum.step(&step))?;
+        }
         if let Some(mcap) = &mut mcap {
             mcap.write(|mcap| mcap.step(&step).map_err(io::Error::other))?;
         }
@@ -106,6 +120,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let frames = log.finish().map_err(log_error)?;
     if let Some(table) = &mut table {
         table.write(export::Table::finish)?;
+    }
+    if let Some(tum) = &mut tum {
+        tum.write(export::Tum::finish)?;
     }
     if let Some(mut mcap) = mcap {
         mcap.write(|mcap| mcap.finish().map_err(io::Error::other))?;

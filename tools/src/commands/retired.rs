@@ -3,7 +3,7 @@
 use clap::error::{ContextKind, ContextValue};
 
 const FAULTS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin faults`";
-const RETIRED: [(&str, &str); 15] = [
+const RETIRED: [(&str, &str); 13] = [
     ("campaign", FAULTS),
     ("soak", FAULTS),
     ("paper", "`make -f tools/paper/Makefile`"),
@@ -14,8 +14,6 @@ const RETIRED: [(&str, &str); 15] = [
         "`cargo test -p gyronet-host-tests --test board` (`size` and `bench-target` measure the image)",
     ),
     ("--policies", "`cargo bringup`, which counts cycles on a board,"),
-    ("completions", "`gyronet help`"),
-    ("--tum", "`gyronet replay --csv` (the yaw, beside the drive's wheels)"),
     ("--csv", "`gyronet monitor --json`, or can-utils' candump with tools/gyronet.dbc,"),
     ("--weights", "`gyronet evaluate --weights`"),
     ("--layout", "`cargo paper simulate`"),

@@ -1,6 +1,9 @@
-//! The table of a replayed drive's rates for other programs.
+//! Tables and paths of a replayed drive for other programs: its rates, and its path in TUM format.
 
+use super::DT;
+use super::wheel_frames::Speeds;
 use crate::board::Step;
+use gyronet::odometry::Track;
 use gyronet::units::AngularRate;
 use std::io::{self, Write};
 
@@ -45,6 +48,36 @@ impl<W: Write> Table<W> {
     }
 }
 
+/// The poses from dead reckoning with the navigation rate, from the end of static initialisation on: time of the
+/// recording, s, x forward and y left of the first pose, m, and the heading as a quaternion.
+#[derive(Debug)]
+pub struct Tum<W> {
+    out: W,
+    speeds: Speeds,
+    track: Track,
+}
+
+impl<W: Write> Tum<W> {
+    /// Starts at the first pose.
+    pub fn new(speeds: Speeds, out: W) -> Self {
+        Self { out, speeds, track: Track::default() }
+    }
+
+    /// Writes the pose of a step.
+    pub fn step(&mut self, step: &Step) -> io::Result<()> {
+        let way = self.speeds.next(&step.input) * DT;
+        let Some(sent) = step.navigation.filter(|_| step.is_compared) else { return Ok(()) };
+        self.track.step([way; 2], sent.rate.rad_per_sec() * DT);
+        let ([x, y], (sin, cos)) = (self.track.position, (0.5 * self.track.yaw).sin_cos());
+        writeln!(self.out, "{:.4} {x:.4} {y:.4} 0 0 0 {sin:.9} {cos:.9}", seconds(step.time.0))
+    }
+
+    /// Flushes the writer.
+    pub fn finish(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
 fn seconds(micros: u64) -> f64 {
     micros as f64 * 1e-6
 }
@@ -58,21 +91,38 @@ mod tests {
     use crate::drive::stream::Drive;
     use crate::evaluate::ablation::Uncorrected;
     use gyronet::coprocessor::Config;
+    use std::f64::consts::TAU;
 
     #[test]
-    fn a_table_has_a_row_for_each_sample() {
+    fn table_and_path_say_the_same() {
         let recording = bundled::simulated_drive().unwrap();
         let drive = Drive::from(&recording);
         let board = Board::new(Config::DEFAULT, drive.wheels(), Uncorrected);
         let mut table = Table::new(Vec::new()).unwrap();
+        let mut path = Tum::new(drive.speeds().unwrap(), Vec::new());
         for step in Steps::new(&drive, board).unwrap() {
-            table.step(&step.unwrap()).unwrap();
+            let step = step.unwrap();
+            table.step(&step).unwrap();
+            path.step(&step).unwrap();
         }
-        let table = String::from_utf8(table.out).unwrap();
+        let (table, path) = (table.out, path.out);
+        let table = String::from_utf8(table).unwrap();
         let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
         assert_eq!(rows.len(), recording.rows.len() - 300);
         assert!(rows.iter().any(|row| row[6] == "ready"));
         let unknown = rows.iter().filter(|row| row[3].is_empty()).count();
         assert_eq!(unknown, 7, "the last navigation rates are never sent");
+
+        let number = |field: &str| field.parse::<f64>().unwrap();
+        let path = String::from_utf8(path).unwrap();
+        let poses: Vec<Vec<f64>> = path.lines().map(|line| line.split(' ').map(number).collect()).collect();
+        assert_eq!(poses.len(), rows.len() - unknown);
+        let (pose, row) = (poses.last().unwrap(), &rows[poses.len() - 1]);
+        assert!((pose[0] - number(row[0])).abs() < 1e-9);
+        // Both yaws start at the same sample.
+        let off = 2.0 * pose[6].atan2(pose[7]) - number(row[5]);
+        assert!((off - TAU * (off / TAU).round()).abs() < 1e-3, "{off} {row:?}");
+        let reach = poses.iter().map(|pose| pose[1].hypot(pose[2])).fold(0.0, f64::max);
+        assert!((200.0..564.0).contains(&reach), "{reach}");
     }
 }
