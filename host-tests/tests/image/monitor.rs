@@ -9,7 +9,7 @@ use gyronet_host_tests::synthetic;
 use gyronet_tools::client::monitor::line::{NoFrame, Splitter, parse_line};
 use gyronet_tools::client::monitor::source::{Lines, Source, SourceError};
 use gyronet_tools::client::monitor::{Counts, Monitor};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
@@ -135,6 +135,13 @@ fn a_board_is_read_over_tcp_until_it_goes() {
     let address = listener.local_addr().expect("a port").to_string();
     let board = std::thread::spawn(move || {
         let mut line = listener.accept().expect("the monitor").0;
+        // A connection that is closed with unread bytes is reset, and the other end loses what it has not read.
+        let mut commands = Vec::new();
+        while !commands.ends_with(b"O\r") {
+            let mut byte = [0];
+            line.read_exact(&mut byte).expect("the monitor opens");
+            commands.extend(byte);
+        }
         for frame in &frames {
             line.write_all(&slcan::emit(frame).expect("a data frame")).expect("the monitor reads");
         }
