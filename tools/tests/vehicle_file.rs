@@ -106,16 +106,3 @@ fn what_import_writes_is_not_turned_again() {
     assert!(!good && err.contains("level.toml: not a valid vehicle file: "), "{err}");
     assert!(err.contains("unknown field `rol_deg`"), "{err}");
 }
-
-#[test]
-fn a_sequence_of_a_data_set_comes_with_its_radius() {
-    let folder = folder("vehicle_sequence", "");
-    let (good, err) = gyronet(&folder, &["simulate", "--layout", "nclt", "--minutes", "1", "--out", "nclt"]);
-    assert!(good, "{err}");
-    let (good, err) = gyronet(&folder, &["import", "nclt", "nclt", "--out", "robot.csv"]);
-    assert!(good && err.contains("rows; robot.toml beside it"), "{err}");
-    let (good, err) = gyronet(&folder, &["demo", "robot.csv", "--out", "demo"]);
-    assert!(good, "{err}");
-    let page = std::fs::read_to_string(folder.join("demo/demo.html")).unwrap();
-    assert!(page.contains("(radius 0.24 m)"), "its wheels are smaller than the recorded car's");
-}
