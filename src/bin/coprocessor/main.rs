@@ -142,7 +142,7 @@ mod app {
         let (board, handlers) = board::Board::start(cx.device, cx.core.SYST);
         let Some(parts) = start::parts(&board) else { cortex_m::peripheral::SCB::sys_reset() };
         let start::Parts { output, config, weights, device } = parts;
-        let coprocessor = start::init_static(cx.local.coprocessor_place, || Coprocessor::new(config));
+        let coprocessor = start::init_static(cx.local.coprocessor_place, || Coprocessor::new(*config));
         let network = weights.and_then(|blob| GyroNet::with_state(blob, cx.local.network_state).ok());
         let service = board.service;
         let (bits_per_second, bring_up) = (output.bits_per_second, BringUp::new(output.part, board.spi));

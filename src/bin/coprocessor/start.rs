@@ -50,7 +50,7 @@ fn receive(board: &Board, configuration: &Configuration, wheels: &WheelSettings,
 /// The resources of the tasks.
 pub struct Parts {
     pub output: OutputParts,
-    pub config: Config,
+    pub config: &'static Config,
     /// Weights for the network.
     pub weights: Option<Blob<'static>>,
     pub device: Stored,
@@ -72,7 +72,8 @@ pub fn parts(board: &Board) -> Option<Parts> {
     let configuration = device.configuration();
     let weights = blob.map_or(0, |blob| blob.crc);
     let of_other_weights = device.calibration().unit.is_some_and(|unit| unit.weights != weights);
-    let config = Config {
+    // In a static, since the stack is at its deepest where the coprocessor is made of it.
+    let config = &*cortex_m::singleton!(: Config = Config {
         wheels: WheelReceiver::new(*device.wheels()).ok(),
         has_gyronet: blob.is_some(),
         has_fognet: false,
@@ -83,8 +84,8 @@ pub fn parts(board: &Board) -> Option<Parts> {
             configuration_lost: device.configuration_lost(),
         },
         ..configuration.coprocessor(device.calibration(), device.learned(), weights)
-    };
-    receive(board, configuration, device.wheels(), &config);
+    })?;
+    receive(board, configuration, device.wheels(), config);
     let (part, bits_per_second) = (configuration.imu, config.can.settings().bits_per_second);
     Some(Parts {
         output: OutputParts { part, bits_per_second, slcan_inputs: configuration.slcan_inputs },
