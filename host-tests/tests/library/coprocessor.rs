@@ -308,16 +308,3 @@ fn a_fibre_optic_gyro_does_not_use_old_wheels() {
     // The last frame came at 10 ms and is good for 100 ms, though no sample of the other sensor has come since.
     assert!(silent.is_some_and(|at| (110..=135).contains(&at)), "{silent:?}");
 }
-
-/// The wheels are looked at before the sample is worked on, so the report is not a sample late.
-#[test]
-fn lost_wheels_are_reported_with_the_first_sample_after_their_time() {
-    let mut car = Car::new(Config { wheels: wheels(), ..Config::DEFAULT });
-    for _ in 0..40 {
-        car.sample();
-        car.coprocessor.can(&wheel_frame(&STANDS), at(car.tick)).expect("a good frame");
-    }
-    // The frames are old after 100 ms.
-    let missed = (41..60).find(|_| car.sample().vehicle.navigation.faults.contains(Faults::WHEELS));
-    assert_eq!(missed, Some(51));
-}

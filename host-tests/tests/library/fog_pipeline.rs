@@ -187,12 +187,6 @@ fn a_missing_input_is_reported() {
     assert_eq!((late, fog.counters().late), (51, 1));
 }
 
-#[test]
-fn nothing_is_sent_of_a_gyro_that_was_never_heard() {
-    let mut fog = with_fognet(true);
-    assert!(run(&mut fog, 1..101, |_| false).is_empty());
-}
-
 /// An increment that straddles two steps is in both: the one that holds the end of the last equal increment is stuck,
 /// too.
 #[test]

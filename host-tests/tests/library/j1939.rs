@@ -3,7 +3,6 @@
 use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
 use gyronet::can::j1939::{VDC2_PGN, VDC2_PRIORITY, Validity, Vdc2, Vdc2Encoder, Vdc2Length, broadcast_id};
-use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::units::{AngularRate, SpecificForce};
 use proptest::prelude::*;
 
@@ -28,17 +27,6 @@ fn frames_equal_published_vectors() {
     let frame: DataFrame = encode(rate(0.0)).frame(0x80).expect("eight bytes");
     assert!(matches!(frame.id(), Id::Extended(id) if id.as_raw() == 0x18F0_0980));
     assert_eq!(frame.data()[..3], [0xFF; 3], "signals that we have not");
-}
-
-#[test]
-fn a_parameter_group_of_others_is_refused() {
-    // ARI (61482): pitch, roll and yaw rate, 1/128 deg/s from -250; read as any input is.
-    let ari = [0x00, 0x7D, 0x00, 0x7D, 0x00, 0x82, 0xFF, 0xFF];
-    let rates = [0, 16, 32].map(|start| {
-        let field = BitField::new(start, 16, ByteOrder::Intel, false).expect("inside a frame");
-        field.value(&ari).expect("eight bytes") as f64 / 128.0 - 250.0
-    });
-    assert_eq!(rates, [0.0, 0.0, 10.0]);
 }
 
 #[test]

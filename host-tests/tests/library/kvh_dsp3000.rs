@@ -141,11 +141,4 @@ proptest! {
         let reading = Reading { millionths, valid };
         prop_assert_eq!(lines(reading.emit().as_bytes()), [Ok(reading)]);
     }
-
-    #[test]
-    fn any_bytes_are_survived(bytes in prop::collection::vec(any::<u8>(), 0..500)) {
-        lines(&bytes);
-        let mut part = Dsp3000Binary::new(Mode::Rate, 0);
-        prop_assert!(bytes.iter().filter_map(|byte| part.receive(*byte)).count() <= bytes.len() / 4);
-    }
 }

@@ -152,20 +152,6 @@ fn misplaced_samples_are_a_gap_and_change_no_rate() {
 }
 
 #[test]
-fn the_same_sample_again_changes_nothing() {
-    let clean = run(&mut new(), drive(0..600), constant(0.004));
-    let mut pipeline = new();
-    let mut twice = |sample| {
-        let outputs = run(&mut pipeline, [sample], constant(0.004));
-        assert!(pipeline.correct(sample, None, &BoardState::GOOD).is_err());
-        outputs
-    };
-    let outputs: Vec<Output> = drive(0..600).flat_map(&mut twice).collect();
-    assert_eq!(outputs, clean);
-    assert_eq!(pipeline.counters().misplaced, 600);
-}
-
-#[test]
 fn a_misplaced_sample_starts_static_initialisation_again() {
     let standing = |ticks: core::ops::Range<u64>| ticks.map(|tick| turning(tick, rate(0.001)));
     let mut pipeline = new();

@@ -71,19 +71,6 @@ fn a_network_that_dies_leaves_the_gyro_less_its_bias() {
 }
 
 #[test]
-fn an_estimate_for_another_window_is_not_used() {
-    let mut pipeline = new();
-    for sample in drive(0..400) {
-        let output = pipeline.correct(sample, None, &BoardState::GOOD).expect("a place on the grid");
-        if let Some(due) = output.window {
-            pipeline.deliver(due.end.wrapping_sub(5), constant(0.01)(&due).expect("an estimate"));
-            pipeline.deliver(due.end + 1, constant(0.01)(&due).expect("an estimate"));
-        }
-    }
-    assert_eq!((pipeline.counters().windows, pipeline.counters().late), (0, 18));
-}
-
-#[test]
 fn an_implausible_estimate_is_not_believed() {
     let mut pipeline = new();
     let limit = CompensateConfig::DEFAULT.max_mean;

@@ -9,7 +9,6 @@ use gyronet::can::slcan::port::Port;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::sample::PERIOD_US;
 use gyronet::units::Micros;
-use gyronet_host_tests::stream::{constant, drive, new, run};
 use gyronet_host_tests::synthetic;
 use proptest::prelude::*;
 use std::collections::VecDeque;
@@ -108,39 +107,6 @@ fn each_configuration_fits_its_line() {
             println!("{name} at {baud}, {}: {dropped} frames dropped in a minute", hello.escape_ascii());
             assert_eq!(dropped == 0, fits);
         }
-    }
-}
-
-#[test]
-fn a_line_that_stalls_breaks_or_goes_holds_up_nothing() {
-    let clean = run(&mut new(), drive(0..1_000), constant(0.002));
-    for broken in [false, true] {
-        let (mut pipeline, mut encoder) = (new(), CanEncoder::new(Config::DEFAULT));
-        let mut port = Port::<QUEUE>::new(500_000);
-        let (mut line, mut all) = (Line::default(), Vec::new());
-        let mut outputs = Vec::new();
-        for (tick, sample) in drive(0..1_000).enumerate() {
-            outputs.extend(run(&mut pipeline, [sample], constant(0.002)));
-            for frame in encoder.encode(&outputs[tick].vehicle) {
-                all.push(frame);
-                port.enqueue(frame, sample.time);
-            }
-            // In the middle of a line, which must be whole nevertheless.
-            let gone = (400..800).contains(&tick);
-            line.room = if gone { 0 } else { 6 * 22 + usize::from(tick < 400) };
-            line.broken = broken && gone;
-            assert_eq!(port.service(&mut line, |_| ()).is_err(), line.broken);
-        }
-        assert_eq!(outputs, clean, "the pipeline does not know of it");
-        let sent = frames(&line.sent);
-        // The newest come first when the line is back; what was begun is finished.
-        let resumed = 6 * 801 - QUEUE;
-        let due: Vec<DataFrame> = all[..6 * 400].iter().chain(&all[resumed..]).copied().collect();
-        let waiting = due.len() - sent.len();
-        assert_eq!(sent, due[..sent.len()]);
-        assert_eq!(port.dropped() as usize, resumed - 6 * 400);
-        println!("broken {broken}: {} sent, {} dropped, {waiting} wait", sent.len(), port.dropped());
-        assert!(waiting < QUEUE, "a line with no more room than it needs keeps its backlog, no more");
     }
 }
 

@@ -107,27 +107,6 @@ fn layout_is_the_linker_s() {
 }
 
 #[test]
-fn records_come_back() {
-    let flash = Flash::default();
-    let mut store = open(&flash);
-    assert_eq!(store.get::<Configuration>(), Ok(None));
-    let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
-    let calibration =
-        Calibration { level: Some(Level { roll_deg: 1.5, pitch_deg: -2.0 }), ..Default::default() };
-    let learned = Learned { specific_force: Some([SpecificForce(1 << 20); 3]), ..Learned::NOTHING };
-    store.set(&configuration).expect("it is stored");
-    store.set(&learned).expect("it is stored");
-    store.set(&calibration).expect("it is stored");
-    for mut store in [store, open(&flash)] {
-        assert_eq!(store.get::<Configuration>(), Ok(Some(configuration)));
-        assert_eq!(store.get::<Calibration>(), Ok(Some(calibration)));
-        assert_eq!(store.get::<Learned>(), Ok(Some(learned)));
-        assert_eq!(store.get::<Accepted>(), Ok(None));
-        assert!(!store.damaged());
-    }
-}
-
-#[test]
 fn a_value_out_of_its_range_is_refused() {
     let default = Configuration::DEFAULT;
     let tilted = |roll_deg, pitch_deg, yaw_deg| Configuration {
@@ -284,21 +263,6 @@ fn no_flipped_bit_is_believed() {
         }
     }
     println!("{flips} flipped bits, none believed");
-}
-
-#[test]
-fn the_newest_record_counts_whichever_sector_holds_it() {
-    let flash = Flash::default();
-    let mut store = open(&flash);
-    let (mut changes, mut first) = (0, None);
-    for k in 0..500 {
-        let configuration = Configuration { latitude_deg: Some((k % 90) as f32), ..Configuration::DEFAULT };
-        store.set(&configuration).expect("it is stored");
-        let header = flash.borrow().bytes()[layout::STORE.start as usize];
-        changes += usize::from(first.replace(header).is_some_and(|before| before != header));
-        assert_eq!(open(&flash).get::<Configuration>(), Ok(Some(configuration)), "write {k}");
-    }
-    assert!(changes > 0, "the first sector has been used again");
 }
 
 proptest! {

@@ -309,19 +309,4 @@ proptest! {
         let again = BitField::new(field.start(), field.bits(), field.order(), field.is_signed());
         prop_assert_eq!(again, Ok(field));
     }
-
-    #[test]
-    fn any_frame_is_taken_without_panic(
-        data in proptest::collection::vec(any::<u8>(), 0..=8), now in any::<u64>(), kind in 0..4,
-    ) {
-        let checksum = match kind {
-            0 => Checksum::None,
-            1 => Checksum::J1850 { at: 7 },
-            2 => Checksum::Xor { at: 0 },
-            _ => Checksum::Sum { at: 1 },
-        };
-        let mut receiver = WheelReceiver::new(two_wheels(checksum)).expect("checked");
-        let _ = receiver.decode(&frame(OTHER, &data), Micros(now));
-        let _ = receiver.poll(Micros(now.wrapping_mul(3)));
-    }
 }
