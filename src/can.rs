@@ -1,7 +1,6 @@
 //! Encoding, decoding, queueing and transport of the messages on the vehicle's bus.
 
 pub mod bosch;
-mod carry;
 pub mod config;
 pub mod diagnosis;
 #[doc(hidden)]
@@ -17,6 +16,7 @@ pub mod latitude;
 pub mod load;
 #[doc(hidden)]
 pub mod queue;
+mod residual;
 #[doc(hidden)]
 pub mod signal;
 pub mod slcan;

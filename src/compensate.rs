@@ -3,15 +3,15 @@
 //! A sample's best estimate is the mean of the estimates of all windows that cover it ([`Mode`]). It is complete only
 //! some samples later, so two rates are sent for every sample:
 //!
-//! - the **prompt** rate at once, for a receiver that uses it for control. No window covers the sample yet, so only
+//! - the **live** rate at once, for a receiver that uses it for control. No window covers the sample yet, so only
 //!   the steady part of its correction is known ([`SteadyGain`]: the mounting).
-//! - the **navigation** rate [`CompensateConfig::lag`] samples later, for a receiver that integrates it to a heading.
+//! - the **delayed** rate [`CompensateConfig::lag`] samples later, for a receiver that integrates it to a heading.
 //!   Most windows that cover the sample have been evaluated by then.
 //!
 //! A revision by a later window is not lost: it is carried into the rates that follow, so that the sum of the rates
 //! reaches the sum of the best estimates. Each rate carries at most a bounded part of the revision, so that no rate
 //! jumps. With c_k(t) the estimate for sample k as known at sample t, and L the lag:
-//! `rate(t) = gyro(t-L) - c_{t-L}(t) - carried part of sum over k < t-L of (c_k(t) - c_k(t-1))`. The prompt rate
+//! `rate(t) = gyro(t-L) - c_{t-L}(t) - carried part of sum over k < t-L of (c_k(t) - c_k(t-1))`. The live rate
 //! carries an eighth of its outstanding revisions with each sample. A revision mostly concerns the noise of past
 //! samples, which the newest sample does not have; carried at once, the revision would add that noise to the newest
 //! rate.
@@ -21,7 +21,7 @@
 //! gain. Another vehicle's unit is also mounted differently from the one that a model was trained with. If driving
 //! shows that, the mounting's part is subtracted as well, until driving shows otherwise.
 //!
-//! | when | prompt | navigation |
+//! | when | live | delayed |
 //! |---|---|---|
 //! | the first window is not full yet | gyro less bias | no rate during the lag, then gyro less bias |
 //! | after a gap, clipping, a late or implausible estimate | gyro less bias until the next window | the best estimate of each sample, gyro less bias where it has none |
@@ -34,7 +34,7 @@ mod mode;
 mod mounting_check;
 mod slow_mean;
 
-pub use mode::{DELAY, Hop, Lag, Mode, OutOfRange};
+pub use mode::{DELAY, Lag, Mode, OutOfRange, Stride};
 
 use mounting_check::MountingCheck;
 use slow_mean::SlowMean;
@@ -50,7 +50,7 @@ use crate::units::AngularRate;
 pub struct CompensateConfig {
     /// The rule that selects the estimates.
     pub mode: Mode,
-    /// The delay of the navigation rate.
+    /// The delay of the delayed rate.
     pub lag: Lag,
     /// Largest mean correction of a window that is accepted (rad/s code). Vibration makes single corrections large;
     /// their mean is bias-like and small.
@@ -58,28 +58,28 @@ pub struct CompensateConfig {
     /// Largest single correction of a window that is accepted.
     pub max_single: AngularRate,
     /// Largest part of the revisions that one rate carries.
-    pub max_carry: AngularRate,
+    pub max_revision: AngularRate,
 }
 
 impl CompensateConfig {
     /// A window every five samples, with both estimates of a sample averaged; a lag of 70 ms, the shortest that does
     /// not increase the error on the validation drive (`cargo gyronet evaluate --lags`); 3 deg/s for a window's mean,
-    /// 30 deg/s for one correction, 1 deg/s of carry.
+    /// 30 deg/s for one correction, 1 deg/s of revisions in one rate.
     pub const DEFAULT: Self = Self {
-        mode: Mode::Overlap { hop: Hop::HALF },
+        mode: Mode::Overlap { stride: Stride::HALF },
         lag: match Lag::new(7) {
             Some(lag) => lag,
             None => Lag::MAX,
         },
         max_mean: AngularRate::from_deg_per_sec(3.0),
         max_single: AngularRate(10 * AngularRate::from_deg_per_sec(3.0).0),
-        max_carry: AngularRate::from_deg_per_sec(1.0),
+        max_revision: AngularRate::from_deg_per_sec(1.0),
     };
 }
 
-/// With each sample the prompt rate carries its outstanding revisions divided by this: a time constant of 80 ms.
-const PROMPT_CARRY: i64 = 8;
-/// A carry that needs more samples than this is reported: 0.25 deg with the default bound.
+/// With each sample the live rate carries its outstanding revisions divided by this: a time constant of 80 ms.
+const LIVE_DIVISOR: i64 = 8;
+/// Revisions that need more samples than this are reported: 0.25 deg with the default bound.
 const LONG: u64 = 25;
 /// Quarters of a second at standstill whose angle may still be carried: the last second and the current quarter.
 /// Wheels show late that a vehicle pulls away, but no later than this.
@@ -95,7 +95,7 @@ struct Entry {
     /// Gyro less static bias, about x, y and z.
     rates: [AngularRate; 3],
     validity: Validity,
-    /// The navigation rate was sent as zero, whatever the estimate.
+    /// The delayed rate was sent as zero, whatever the estimate.
     held: bool,
     sum: i64,
     count: i32,
@@ -130,7 +130,7 @@ pub struct Compensated {
 /// A sample that no window will change any more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Settled {
+pub struct Complete {
     /// Grid step of the sample.
     pub tick: u32,
     /// Gyro less static bias.
@@ -141,7 +141,7 @@ pub struct Settled {
     pub good: bool,
 }
 
-impl Settled {
+impl Complete {
     /// Returns the rate less the correction; `None` where it is not good.
     #[must_use]
     pub fn left(&self) -> Option<AngularRate> {
@@ -170,9 +170,9 @@ pub struct Compensator {
     mounting_check: MountingCheck,
     /// The slow mean of the corrections.
     slow_mean: SlowMean,
-    /// Revisions not yet in the prompt rate, and in the navigation rate.
-    prompt_carry: i64,
-    navigation_carry: i64,
+    /// Revisions not yet in the live rate, and in the delayed rate.
+    live_revisions: i64,
+    delayed_revisions: i64,
     /// Gyro less estimate and bias of the samples that standstill set to zero, summed over the current quarter of a
     /// second and those before it.
     held: [i64; HELD_QUARTERS],
@@ -190,8 +190,8 @@ impl Compensator {
             steady_gain: SteadyGain::NONE,
             mounting_check: MountingCheck::START,
             slow_mean: SlowMean::NONE,
-            prompt_carry: 0,
-            navigation_carry: 0,
+            live_revisions: 0,
+            delayed_revisions: 0,
             held: [0; HELD_QUARTERS],
             held_until: 0,
         }
@@ -221,7 +221,7 @@ impl Compensator {
             |entry: &Entry, c: &AngularRate| i64::from(c.0) - i64::from(mismatched.correction(entry.rates).0);
         let seen = window.filter_map(|(entry, c)| entry.as_ref().map(|entry| own(entry, c)));
         let used_mean = seen.sum::<i64>().checked_div(used.len() as i64).unwrap_or(0);
-        self.slow_mean.observe(used_mean, mode.hop());
+        self.slow_mean.observe(used_mean, mode.stride());
         let constant = self.slow_mean.get();
         for (place, (entry, correction)) in self.kept.iter_mut().skip(oldest).zip(corrections).enumerate() {
             let (Some(entry), true) = (entry, used.contains(&place)) else { continue };
@@ -230,10 +230,10 @@ impl Compensator {
             let estimate = entry.sum.checked_div(i64::from(entry.count)).unwrap_or(0);
             let revision = estimate - i64::from(entry.estimate);
             entry.estimate = estimate as i32;
-            self.prompt_carry += revision;
+            self.live_revisions += revision;
             let age = KEPT - 1 - (oldest + place);
             match (age >= lag.samples(), entry.held) {
-                (true, false) => self.navigation_carry += revision,
+                (true, false) => self.delayed_revisions += revision,
                 (true, true) => self.held[0] -= revision,
                 (false, _) => {}
             }
@@ -272,18 +272,18 @@ impl Compensator {
     /// Returns the rate of the newest sample, less the estimate and `bias`.
     ///
     /// Revisions are not carried into a clipped rate, because a receiver drops it.
-    pub fn prompt(&mut self, bias: AngularRate) -> Option<Compensated> {
+    pub fn live(&mut self, bias: AngularRate) -> Option<Compensated> {
         let entry = self.kept[KEPT - 1]?;
         let taken = i64::from(entry.estimate) + i64::from(bias.0);
-        let carried = self.prompt_carry / PROMPT_CARRY;
-        Some(emit(&entry, taken, carried, &mut self.prompt_carry, self.config.max_carry))
+        let carried = self.live_revisions / LIVE_DIVISOR;
+        Some(emit(&entry, taken, carried, &mut self.live_revisions, self.config.max_revision))
     }
 
     /// Returns the rate of the sample [`CompensateConfig::lag`] before the newest one; `None` before there is one.
     /// Call it once for each sample.
     ///
     /// `stands` is true when the vehicle has stood since before that sample was taken; its rate is then zero.
-    pub fn navigation(&mut self, bias: AngularRate, stands: bool) -> Option<Compensated> {
+    pub fn delayed(&mut self, bias: AngularRate, stands: bool) -> Option<Compensated> {
         let entry = self.kept.iter_mut().nth_back(self.config.lag.samples())?.as_mut()?;
         entry.held = stands && entry.validity.is_good();
         let mut taken = i64::from(entry.estimate) + i64::from(bias.0);
@@ -296,15 +296,15 @@ impl Compensator {
             self.held[0] += i64::from(entry.rate().0) - taken;
             taken = i64::from(entry.rate().0);
         }
-        let carried = self.navigation_carry;
-        Some(emit(entry, taken, carried, &mut self.navigation_carry, self.config.max_carry))
+        let carried = self.delayed_revisions;
+        Some(emit(entry, taken, carried, &mut self.delayed_revisions, self.config.max_revision))
     }
 
     /// Returns the newest sample that no window changes any more; each sample is returned once.
     #[must_use]
-    pub fn settled(&self) -> Option<Settled> {
-        let entry = self.kept.iter().nth_back(self.config.mode.settled_after())?.as_ref()?;
-        Some(Settled {
+    pub fn complete(&self) -> Option<Complete> {
+        let entry = self.kept.iter().nth_back(self.config.mode.complete_after())?.as_ref()?;
+        Some(Complete {
             tick: entry.tick,
             rate: entry.rate(),
             correction: AngularRate(entry.estimate),
@@ -320,44 +320,50 @@ impl Compensator {
     /// Notes that the vehicle no longer stands. It may have moved before that was detected, so the angle held at zero
     /// in the last second is carried into the next rates; older angles stay zero.
     pub fn end_standstill(&mut self) {
-        self.navigation_carry -= core::mem::take(&mut self.held).iter().sum::<i64>();
+        self.delayed_revisions -= core::mem::take(&mut self.held).iter().sum::<i64>();
         self.held_until = 0;
     }
 
-    /// Returns whether the navigation rates have more to carry than a window revises, because the wheels stood while
+    /// Returns whether the delayed rates have more to carry than a window revises, because the wheels stood while
     /// the vehicle turned. The rates are wrong until all of it is carried.
     #[must_use]
-    pub fn carry_exceeds_limit(&self) -> bool {
-        let much = LONG * u64::from(self.config.max_carry.0.unsigned_abs());
-        self.navigation_carry.unsigned_abs() > much
+    pub fn revisions_exceed_limit(&self) -> bool {
+        let much = LONG * u64::from(self.config.max_revision.0.unsigned_abs());
+        self.delayed_revisions.unsigned_abs() > much
     }
 
-    /// Returns the amount that the sum of the prompt rates still lacks, codes x samples: revisions that are not carried
+    /// Returns the amount that the sum of the live rates still lacks, codes x samples: revisions that are not carried
     /// yet.
     #[must_use]
-    pub fn prompt_owed(&self) -> i64 {
-        -self.prompt_carry
+    pub fn live_pending(&self) -> i64 {
+        -self.live_revisions
     }
 
-    /// Returns the amount that the sum of the navigation rates still lacks: revisions that are not carried yet, and
+    /// Returns the amount that the sum of the delayed rates still lacks: revisions that are not carried yet, and
     /// samples whose rates are not sent yet.
     #[must_use]
-    pub fn navigation_owed(&self, bias: AngularRate) -> i64 {
+    pub fn delayed_pending(&self, bias: AngularRate) -> i64 {
         let waiting = self.kept.iter().rev().take(self.config.lag.samples()).flatten();
         let best = |entry: &Entry| i64::from(entry.rate().0) - i64::from(entry.estimate) - i64::from(bias.0);
-        waiting.map(best).sum::<i64>() - self.navigation_carry
+        waiting.map(best).sum::<i64>() - self.delayed_revisions
     }
 }
 
-/// Subtracts the estimate and, within the bound, `carried` of the carry. A part that does not fit the code stays in
-/// the carry.
-fn emit(entry: &Entry, taken: i64, carried: i64, carry: &mut i64, max_carry: AngularRate) -> Compensated {
+/// Subtracts the estimate and, within the bound, `carried` of the revisions that wait. A part that does not fit the
+/// code goes on waiting.
+fn emit(
+    entry: &Entry,
+    taken: i64,
+    carried: i64,
+    waiting: &mut i64,
+    max_revision: AngularRate,
+) -> Compensated {
     // A negative bound would disable the limit.
-    let bound = if entry.validity.is_good() { i64::from(max_carry.0).max(0) } else { 0 };
+    let bound = if entry.validity.is_good() { i64::from(max_revision.0).max(0) } else { 0 };
     let carried = carried.clamp(-bound, bound);
     let wanted = i64::from(entry.rate().0) - taken - carried;
     let rate = wanted.clamp(i64::from(i32::MIN), i64::from(i32::MAX));
-    *carry += rate - wanted - carried;
+    *waiting += rate - wanted - carried;
     let correction = (i64::from(entry.rate().0) - rate).clamp(i64::from(i32::MIN), i64::from(i32::MAX));
     Compensated {
         tick: entry.tick,

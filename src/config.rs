@@ -2,7 +2,7 @@
 
 pub use crate::align::clock_ratio::ClockRatioConfig;
 pub use crate::bias::{EarthRate, Latitude, QuietConfig, StaticConfig, ZeroRateConfig};
-pub use crate::compensate::{CompensateConfig, Hop, Lag, Mode};
+pub use crate::compensate::{CompensateConfig, Lag, Mode, Stride};
 pub use crate::coprocessor::StorageFaults;
 pub use crate::fog::{FogConfig, FogErrors, FogNetUse, Tilt};
 pub use crate::model::seconds::Padding;

@@ -36,7 +36,7 @@ use crate::can::encoder::CanEncoder;
 use crate::can::fog_encoder::FogEncoder;
 use crate::can::latitude::LatitudeReceiver;
 use crate::can::wheel::WheelReceiver;
-use crate::compensate::Settled;
+use crate::compensate::Complete;
 use crate::estimate::VehicleSample;
 use crate::fog::{FogCounters, FogPipeline};
 use crate::health::{BoardFaults, InputCounters, MonitorCounters, count};
@@ -60,7 +60,7 @@ pub struct Observation {
     /// The newest report of the wheels.
     pub wheels: WheelSample,
     /// The sample whose estimate is final with this one.
-    pub settled: Option<Settled>,
+    pub complete: Option<Complete>,
     /// The reason why static initialisation was refused with this sample.
     pub refused: Option<StaticError>,
 }
@@ -161,9 +161,9 @@ impl Coprocessor {
             let replaced = self.handover.offer(window, now);
             count(&mut self.counters.replaced_windows, u32::from(replaced));
         }
-        let (settled, refused) = (output.settled, output.refused);
+        let (complete, refused) = (output.complete, output.refused);
         let wheels = wheels.unwrap_or_default();
-        Ok(Observation { sample: Some(sample), vehicle: output.vehicle, wheels, settled, refused })
+        Ok(Observation { sample: Some(sample), vehicle: output.vehicle, wheels, complete, refused })
     }
 
     /// Counts an input of the inertial sensor that was not a valid sample.
@@ -238,7 +238,7 @@ impl Coprocessor {
             let vehicle = self.pipeline.silent(steps, &self.board_state());
             self.send(&vehicle, self.monitor.time_at(now), sink);
             let wheels = self.poll_wheels().unwrap_or_default();
-            Observation { sample: None, vehicle, wheels, settled: None, refused: None }
+            Observation { sample: None, vehicle, wheels, complete: None, refused: None }
         });
         self.step_fog(sink);
         Ok(observation)

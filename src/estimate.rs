@@ -36,10 +36,10 @@ pub struct YawEstimate {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VehicleSample {
     /// The rate of this sample, for receivers that use it for control: the Bosch messages and VDC2.
-    pub prompt: YawEstimate,
+    pub live: YawEstimate,
     /// The rate of the sample [`crate::compensate::CompensateConfig::lag`] before it, for receivers that
     /// integrate it to a heading: our own messages.
-    pub navigation: YawEstimate,
+    pub delayed: YawEstimate,
     /// The rate about x (forward) less its bias.
     pub roll_rate: AngularRate,
     /// The rate about y (left) less its bias.

@@ -1,5 +1,5 @@
 //! Corrects the turns of a fibre-optic gyro, frame by frame: it subtracts the Earth's rate and the gyro's
-//! bias (`lane`), and, if the configuration selects FoGNet, its estimate of the remaining error.
+//! bias (`earth_and_bias`), and, if the configuration selects FoGNet, its estimate of the remaining error.
 //!
 //! # FoGNet
 //!
@@ -21,14 +21,14 @@
 //! Using differences between overlapping windows instead would give 60 interleaved sums of
 //! single estimates, each with its own error.
 
+mod earth_and_bias;
 mod fognet_watch;
-mod lane;
 mod part;
 mod pipeline;
 mod rate;
 mod rest;
 
-pub use lane::{Lane, Tilt};
+pub use earth_and_bias::{EarthAndBias, Tilt};
 pub use part::FogErrors;
 pub use pipeline::{FogCounters, FogPipeline, STUCK_AFTER, STUCK_US};
 pub use rate::IncrementRate;

@@ -55,8 +55,8 @@ pub enum Source {
     Raw = 0,
     /// The gyro less its static bias.
     Static = 1,
-    /// Corrected by GyroNet.
-    GyroNet = 2,
+    /// Corrected by the window model.
+    Model = 2,
     /// The fibre-optic gyro, corrected by FoGNet.
     FogNet = 3,
     /// The fibre-optic gyro less the Earth's rate at the latitude and its bias.
@@ -174,7 +174,7 @@ impl BoardFaults {
 pub const fn judge(status: Status) -> (Source, Quality) {
     match status {
         Status::Init => (Source::Raw, Quality::Initialising),
-        Status::Ready => (Source::GyroNet, Quality::Good),
+        Status::Ready => (Source::Model, Quality::Good),
         Status::Degraded => (Source::Static, Quality::Degraded),
         Status::Clipped | Status::Stuck | Status::Silent => (Source::Raw, Quality::Unusable),
     }

@@ -23,7 +23,7 @@ pub use windows::DueWindow;
 use crate::align::clock_ratio::ClockRatio;
 use crate::align::{AlignError, Aligner};
 use crate::bias::{StandstillSource, StaticError, StaticInit, ZeroPoint, ZeroRate, ZeroRateOutcome};
-use crate::compensate::{Compensated, Compensator, Implausible, Settled};
+use crate::compensate::{Compensated, Compensator, Complete, Implausible};
 use crate::estimate::VehicleSample;
 use crate::health::{BoardFaults, Counters, Faults, count};
 use crate::model::Estimate;
@@ -55,7 +55,7 @@ pub struct Output {
     /// Both rates and everything else that is sent, for [`crate::can::encoder::CanEncoder`].
     pub vehicle: VehicleSample,
     /// The sample whose estimate is final with this one.
-    pub settled: Option<Settled>,
+    pub complete: Option<Complete>,
     /// A window that is due: run it through the network and [`Pipeline::deliver`] the estimate before the sample
     /// [`crate::compensate::Mode::delay`] steps later.
     pub window: Option<DueWindow>,
@@ -68,12 +68,12 @@ pub struct Output {
 /// Holds the corrections that [`crate::estimate::YawEstimate::yaw`] does not contain yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Owed {
-    /// Missing from the prompt yaw: revisions that have not been carried over yet.
-    pub prompt: Yaw,
-    /// Missing from the navigation yaw: revisions that have not been carried over yet, and the samples whose rates
+pub struct Pending {
+    /// Missing from the live yaw: revisions that have not been carried over yet.
+    pub live: Yaw,
+    /// Missing from the delayed yaw: revisions that have not been carried over yet, and the samples whose rates
     /// are not sent yet.
-    pub navigation: Yaw,
+    pub delayed: Yaw,
 }
 
 /// Turns the samples of one vehicle's sensor into corrected rates.
@@ -98,8 +98,8 @@ struct State {
     /// Samples for which the vehicle has stood; zero while it moves.
     stood: u32,
     /// The sums of the rates that were sent.
-    prompt_yaw: Yaw,
-    navigation_yaw: Yaw,
+    live_yaw: Yaw,
+    delayed_yaw: Yaw,
     /// Grid step of the newest message set.
     tick: u32,
     /// Samples until the last gap is a whole window in the past.
@@ -116,9 +116,9 @@ struct State {
 /// The rates of one sample before they are reported.
 #[derive(Debug, Clone, Copy, Default)]
 struct Rates {
-    prompt: Option<Compensated>,
-    navigation: Option<Compensated>,
-    settled: Option<Settled>,
+    live: Option<Compensated>,
+    delayed: Option<Compensated>,
+    complete: Option<Complete>,
     /// Sigma of the reading's bias before static initialisation, rad/s, where earlier drives have shown the bias.
     early_sigma: Option<f32>,
 }
@@ -137,8 +137,8 @@ impl Pipeline {
             uncertainty: Uncertainty::new(config.uncertainty),
             wheels_seen: [false; WHEELS],
             stood: 0,
-            prompt_yaw: Yaw(0),
-            navigation_yaw: Yaw(0),
+            live_yaw: Yaw(0),
+            delayed_yaw: Yaw(0),
             tick: 0,
             gap_within: 0,
             yaw_gaps: 0,
@@ -198,10 +198,10 @@ impl Pipeline {
             Some(zero) => (self.estimate_rates(&frame, &zero, standstill, quiet), None),
         };
         let vehicle = self.report(&frame, &rates, wheels, board);
-        let hop = self.config.compensate.mode.hop();
-        let window = self.state.windows.due(frame.tick, hop);
+        let stride = self.config.compensate.mode.stride();
+        let window = self.state.windows.due(frame.tick, stride);
         self.state.gap_within = self.state.gap_within.saturating_sub(1);
-        Ok(Output { vehicle, settled: rates.settled, window, refused, implausible })
+        Ok(Output { vehicle, complete: rates.complete, window, refused, implausible })
     }
 
     /// Notes that the sensor was moved since earlier drives; it is reported with every message set from now on.
@@ -237,10 +237,10 @@ impl Pipeline {
 
     /// Returns the corrections that the summed rates do not contain yet.
     #[must_use]
-    pub fn owed(&self) -> Owed {
-        Owed {
-            prompt: Yaw(self.state.compensator.prompt_owed()),
-            navigation: Yaw(self.state.compensator.navigation_owed(self.bias())),
+    pub fn pending(&self) -> Pending {
+        Pending {
+            live: Yaw(self.state.compensator.live_pending()),
+            delayed: Yaw(self.state.compensator.delayed_pending(self.bias())),
         }
     }
 
@@ -344,7 +344,7 @@ impl Pipeline {
         if good {
             self.state.windows.add(features);
         }
-        let settled = self.state.compensator.settled();
+        let complete = self.state.compensator.complete();
         let source = match standstill {
             Some(Standstill::Still) => StandstillSource::Wheels,
             // Where wheel speeds are available, they decide.
@@ -352,24 +352,24 @@ impl Pipeline {
             None if quiet => StandstillSource::Inertial,
             None => StandstillSource::None,
         };
-        self.update_bias(settled.as_ref(), good.then_some(rate), source);
+        self.update_bias(complete.as_ref(), good.then_some(rate), source);
         let bias = self.bias();
         let stands = self.state.stood as usize > self.config.compensate.lag.samples();
-        let prompt = self.state.compensator.prompt(bias);
-        let navigation = self.state.compensator.navigation(bias, stands);
-        Rates { prompt, navigation, settled, early_sigma: None }
+        let live = self.state.compensator.live(bias);
+        let delayed = self.state.compensator.delayed(bias, stands);
+        Rates { live, delayed, complete, early_sigma: None }
     }
 
     fn update_bias(
         &mut self,
-        settled: Option<&Settled>,
+        complete: Option<&Complete>,
         rate: Option<AngularRate>,
         source: StandstillSource,
     ) {
         let State { initialised, compensator, stood, counters, sensor_bias, .. } = &mut self.state;
         let zero_rate = initialised.as_mut().and_then(|known| known.zero_rate.as_mut());
-        let (Some(zero_rate), Some(settled)) = (zero_rate, settled) else { return };
-        match zero_rate.observe(settled.left(), source, sensor_bias.change_sigma()) {
+        let (Some(zero_rate), Some(complete)) = (zero_rate, complete) else { return };
+        match zero_rate.observe(complete.left(), source, sensor_bias.change_sigma()) {
             Some(ZeroRateOutcome::Used) => {
                 count(&mut counters.zero_rate_updates, 1);
                 sensor_bias.refer();

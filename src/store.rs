@@ -27,7 +27,7 @@ mod wheels;
 
 pub use access::Access;
 pub use calibration::{Calibration, Level, UnitMap};
-pub use configuration::{Configuration, FogLane, FogPart, ImuPart, Mounting};
+pub use configuration::{Configuration, FogGyro, FogPart, ImuPart, Mounting};
 pub use error::{Field, FieldError, FlashFault, StoreError};
 pub use learned::Learned;
 pub use record::{Record, Store};

@@ -43,16 +43,16 @@ pub fn run(
     outputs
 }
 
-/// Returns the runs of equal status of the prompt rate: each with its number of samples.
+/// Returns the runs of equal status of the live rate: each with its number of samples.
 pub fn statuses(outputs: &[Output]) -> Vec<(Status, usize)> {
     outputs
-        .chunk_by(|a, b| a.vehicle.prompt.status == b.vehicle.prompt.status)
-        .map(|run| (run[0].vehicle.prompt.status, run.len()))
+        .chunk_by(|a, b| a.vehicle.live.status == b.vehicle.live.status)
+        .map(|run| (run[0].vehicle.live.status, run.len()))
         .collect()
 }
 
 /// Returns the runs of equal faults: each with its number of samples.
 pub fn faults(outputs: &[Output]) -> Vec<(Faults, usize)> {
-    let faults = |output: &Output| output.vehicle.navigation.faults;
+    let faults = |output: &Output| output.vehicle.delayed.faults;
     outputs.chunk_by(|a, b| faults(a) == faults(b)).map(|run| (faults(&run[0]), run.len())).collect()
 }

@@ -43,14 +43,14 @@ pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {
 }
 
 pub fn estimate(rate: AngularRate, yaw: Yaw) -> YawEstimate {
-    YawEstimate { rate, yaw, source: Source::GyroNet, quality: Quality::Good, ..YawEstimate::default() }
+    YawEstimate { rate, yaw, source: Source::Model, quality: Quality::Good, ..YawEstimate::default() }
 }
 
 /// Returns the output for a vehicle that turns at `rate`, has turned by `yaw`, and has no fault.
 pub fn vehicle(tick: u32, rate: AngularRate, yaw: Yaw) -> VehicleSample {
     VehicleSample {
-        prompt: YawEstimate { rate, quality: Quality::Good, ..YawEstimate::default() },
-        navigation: estimate(rate, yaw),
+        live: YawEstimate { rate, quality: Quality::Good, ..YawEstimate::default() },
+        delayed: estimate(rate, yaw),
         tick,
         ..VehicleSample::default()
     }

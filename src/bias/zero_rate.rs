@@ -1,7 +1,7 @@
 //! Zero-rate updates estimate, while the vehicle stands, the error of the yaw rate that the network has not removed.
 //!
 //! A Kalman filter estimates two states from one-second means of the gyro, less its static bias and its
-//! settled correction:
+//! complete correction:
 //!
 //! - the **bias** b also holds while driving: it is a random walk, and changes with temperature;
 //! - the **offset** s holds for one standstill only: an idling engine shakes the sensor differently from
@@ -139,7 +139,7 @@ impl ZeroRate {
         }
     }
 
-    /// Adds the remaining rate of a settled sample (gyro less static bias less the network's estimate; `None` where
+    /// Adds the remaining rate of a complete sample (gyro less static bias less the network's estimate; `None` where
     /// that is not good). `source` is the evidence that the vehicle stands, and `thermal` the sigma of the change of
     /// the bias with temperature since the last outcome [`ZeroRateOutcome::Used`], rad/s. Returns the outcome of a
     /// second at standstill when one is complete.
@@ -181,11 +181,11 @@ impl ZeroRate {
         Some(self.second(&block))
     }
 
-    /// Checks the newest sample's rate, less static bias, before it is settled. Returns true once when the rate
+    /// Checks the newest sample's rate, less static bias, before it is complete. Returns true once when the rate
     /// contradicts the wheels.
     ///
     /// A vehicle may slide with its wheels locked. The limit on the turn of a second at standstill therefore also
-    /// applies to parts of a second: when a sample exceeds it, that sample's navigation rate, which is zero at
+    /// applies to parts of a second: when a sample exceeds it, that sample's delayed rate, which is zero at
     /// standstill, has not been sent yet.
     pub fn contradicts_wheels(&mut self, rate: AngularRate) -> bool {
         if self.source != StandstillSource::Wheels {

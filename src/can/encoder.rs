@@ -56,13 +56,13 @@ impl CanEncoder {
     /// Encodes the frames of one sample and passes each to `send`.
     #[inline(never)]
     pub fn send(&mut self, sample: &VehicleSample, mut send: impl FnMut(DataFrame)) {
-        let (status, validity) = match sample.prompt.quality {
+        let (status, validity) = match sample.live.quality {
             Quality::Good | Quality::Degraded => (SignalStatus::OK, Validity::Valid),
             Quality::Initialising => (SignalStatus::INITIALISING, Validity::NotAvailable),
             Quality::Unusable => (SignalStatus::FAILURE, Validity::Error),
         };
         // The accelerometer is in the same sensor as the gyro.
-        let unusable = sample.prompt.quality == Quality::Unusable;
+        let unusable = sample.live.quality == Quality::Unusable;
         let force_status = if unusable { SignalStatus::FAILURE } else { SignalStatus::OK };
         let settings = *self.config.settings();
         if let Some(BoschSettings { tx1_only }) = settings.bosch {
@@ -75,10 +75,10 @@ impl CanEncoder {
             }
         }
         if let (Some(feed), Some(yaw)) = (self.yaw.as_mut(), settings.yaw) {
-            feed.frames(&sample.navigation, yaw.ids).for_each(&mut send);
+            feed.frames(&sample.delayed, yaw.ids).for_each(&mut send);
         }
         if let Some(vdc2) = settings.vdc2 {
-            let message = self.vdc2.encode(sample.prompt.rate, validity, &sample.specific_force);
+            let message = self.vdc2.encode(sample.live.rate, validity, &sample.specific_force);
             count(&mut self.out_of_range, u32::from(validity != Validity::Error && message.has_error()));
             message.frame(vdc2.source).into_iter().for_each(send);
         }
@@ -96,7 +96,7 @@ impl CanEncoder {
 /// samples are missing.
 fn motion(sample: &VehicleSample, rate_status: SignalStatus, force_status: SignalStatus) -> Motion {
     Motion {
-        angular_rate: [sample.roll_rate, sample.pitch_rate, sample.prompt.rate],
+        angular_rate: [sample.roll_rate, sample.pitch_rate, sample.live.rate],
         specific_force: sample.specific_force,
         temperature: sample.temperature,
         rate_status,

@@ -12,7 +12,7 @@
 //! deg/h, and zero lies between two codes (32112.64): with plain rounding, a parked car would seem to turn
 //! at 9 deg/h indefinitely. The rounding residual is therefore carried.
 
-use super::carry::{RoundingCarry, Scale};
+use super::residual::{RoundingResidual, Scale};
 use crate::units::{AngularRate, SpecificForce};
 use embedded_can::{ExtendedId, Frame};
 
@@ -115,7 +115,7 @@ pub enum Validity {
 #[derive(Debug, Clone, Copy)]
 #[doc(hidden)]
 pub struct Vdc2Encoder {
-    yaw_rate: RoundingCarry,
+    yaw_rate: RoundingResidual,
 }
 
 impl Default for Vdc2Encoder {
@@ -126,7 +126,7 @@ impl Default for Vdc2Encoder {
 
 impl Vdc2Encoder {
     /// Starts without a rounding residual.
-    pub const START: Self = Self { yaw_rate: RoundingCarry::new(YAW_RATE) };
+    pub const START: Self = Self { yaw_rate: RoundingResidual::new(YAW_RATE) };
 
     /// Encodes one sample; the axes of the specific force are forward, left, up. J1939 has no status next to a value,
     /// so for a rate that is not valid, or a value out of range, a special code is sent instead.

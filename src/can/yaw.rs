@@ -85,7 +85,7 @@ impl RateMessage {
         let source = match judgement & 7 {
             0 => Source::Raw,
             1 => Source::Static,
-            2 => Source::GyroNet,
+            2 => Source::Model,
             3 => Source::FogNet,
             4 => Source::EarthRate,
             unknown => return Err(YawError::Source(unknown)),

@@ -1,8 +1,8 @@
 //! This encoder makes the three protected yaw messages (rate, angle, detail) from estimates.
 
 use super::DataFrame;
-use super::carry::{RoundingCarry, Scale};
 use super::e2e::{Profile, Protector};
+use super::residual::{RoundingResidual, Scale};
 use super::yaw::{
     AngleMessage, DetailMessage, Faults, Quality, RATE_NOT_AVAILABLE, RateMessage, encode_angle,
     encode_latency, encode_sigma,
@@ -109,27 +109,27 @@ impl YawEncoder {
 }
 
 /// The mean of some samples without loss: the remainder of the division stays in the sum, and the rounding residual
-/// in the carry.
+/// in the residual.
 #[derive(Debug, Clone, Copy)]
 struct Mean {
     sum: i64,
-    carry: RoundingCarry,
+    residual: RoundingResidual,
 }
 
 impl Mean {
     const fn new(scale: Scale) -> Self {
-        Self { sum: 0, carry: RoundingCarry::new(scale) }
+        Self { sum: 0, residual: RoundingResidual::new(scale) }
     }
 
     fn take(&mut self, samples: u8) -> i32 {
         let mean = self.sum.checked_div_euclid(samples.into()).unwrap_or(0);
         self.sum -= mean * i64::from(samples);
         // The mean of i32 values fits an i32.
-        self.carry.encode(AngularRate(mean as i32))
+        self.residual.encode(AngularRate(mean as i32))
     }
 
     fn reset(&mut self) {
         self.sum = 0;
-        self.carry.reset();
+        self.residual.reset();
     }
 }

@@ -13,13 +13,13 @@ pub const DELAY: u32 = 2;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Hop(u8);
+pub struct Stride(u8);
 
-impl Hop {
+impl Stride {
     /// Half a window: every sample is covered by two windows.
     pub const HALF: Self = Self(WINDOW as u8 / 2);
 
-    /// Creates a hop; `None` outside the range, where samples would be left without an estimate.
+    /// Creates a stride; `None` outside the range, where samples would be left without an estimate.
     #[must_use]
     pub const fn new(samples: u8) -> Option<Self> {
         if samples >= 1 && samples as usize <= WINDOW { Some(Self(samples)) } else { None }
@@ -32,7 +32,7 @@ impl Hop {
     }
 }
 
-impl TryFrom<u8> for Hop {
+impl TryFrom<u8> for Stride {
     type Error = OutOfRange;
 
     fn try_from(samples: u8) -> Result<Self, OutOfRange> {
@@ -40,8 +40,8 @@ impl TryFrom<u8> for Hop {
     }
 }
 
-impl From<Hop> for u8 {
-    fn from(Hop(samples): Hop) -> Self {
+impl From<Stride> for u8 {
+    fn from(Stride(samples): Stride) -> Self {
         samples
     }
 }
@@ -111,25 +111,25 @@ pub enum Mode {
     /// The mean of all windows that cover a sample.
     Overlap {
         /// Samples between two windows.
-        hop: Hop,
+        stride: Stride,
     },
 }
 
 impl Mode {
     /// Returns the number of samples between two windows.
     #[must_use]
-    pub const fn hop(self) -> u32 {
+    pub const fn stride(self) -> u32 {
         match self {
             Self::Newest => 1,
-            Self::Middle => Hop::HALF.samples(),
-            Self::Overlap { hop } => hop.samples(),
+            Self::Middle => Stride::HALF.samples(),
+            Self::Overlap { stride } => stride.samples(),
         }
     }
 
     /// Returns the number of samples from a window's newest one to the use of its estimate.
     #[must_use]
     pub const fn delay(self) -> u32 {
-        if self.hop() < DELAY { self.hop() } else { DELAY }
+        if self.stride() < DELAY { self.stride() } else { DELAY }
     }
 
     /// Returns the outputs of a window that are used, oldest first.
@@ -148,7 +148,7 @@ impl Mode {
     /// Returns the number of samples after which no window changes an estimate any more.
     #[must_use]
     #[doc(hidden)]
-    pub const fn settled_after(self) -> usize {
+    pub const fn complete_after(self) -> usize {
         WINDOW - 1 - self.used().start + self.delay() as usize
     }
 }
@@ -159,21 +159,21 @@ mod tests {
 
     #[test]
     fn only_what_makes_sense_can_be_said() {
-        assert_eq!((Hop::new(0), Hop::new(11)), (None, None));
-        assert_eq!(Hop::new(5), Some(Hop::HALF));
+        assert_eq!((Stride::new(0), Stride::new(11)), (None, None));
+        assert_eq!(Stride::new(5), Some(Stride::HALF));
         assert_eq!((Lag::new(11), Lag::new(12)), (Some(Lag::MAX), None));
     }
 
     #[test]
     fn every_sample_gets_an_estimate_and_none_is_read_too_late() {
-        let overlap = (1..=10).filter_map(Hop::new).map(|hop| Mode::Overlap { hop });
+        let overlap = (1..=10).filter_map(Stride::new).map(|stride| Mode::Overlap { stride });
         for mode in [Mode::Newest, Mode::Middle].into_iter().chain(overlap) {
-            assert!(mode.used().len() >= mode.hop() as usize, "{mode:?}");
-            assert!(mode.delay() >= 1 && mode.delay() <= mode.hop(), "{mode:?}");
-            assert!(mode.settled_after() <= Lag::MAX.samples(), "{mode:?}");
+            assert!(mode.used().len() >= mode.stride() as usize, "{mode:?}");
+            assert!(mode.delay() >= 1 && mode.delay() <= mode.stride(), "{mode:?}");
+            assert!(mode.complete_after() <= Lag::MAX.samples(), "{mode:?}");
         }
-        assert_eq!(Mode::Newest.settled_after(), 1);
-        assert_eq!(Mode::Middle.settled_after(), 8);
-        assert_eq!(Mode::Overlap { hop: Hop::HALF }.settled_after(), 11);
+        assert_eq!(Mode::Newest.complete_after(), 1);
+        assert_eq!(Mode::Middle.complete_after(), 8);
+        assert_eq!(Mode::Overlap { stride: Stride::HALF }.complete_after(), 11);
     }
 }

@@ -16,9 +16,9 @@ impl SlowMean {
     /// The mean before the first value is zero.
     pub(super) const NONE: Self = Self { mean: 0, count: 0 };
 
-    /// Adds a value, within 2^32; values arrive every `hop` samples.
-    pub(super) fn observe(&mut self, value: i64, hop: u32) {
-        let most = MEMORY.checked_div(hop.into()).unwrap_or(MEMORY);
+    /// Adds a value, within 2^32; values arrive every `stride` samples.
+    pub(super) fn observe(&mut self, value: i64, stride: u32) {
+        let most = MEMORY.checked_div(stride.into()).unwrap_or(MEMORY);
         self.count = (self.count + 1).min(most);
         let beyond = (value << Q) - self.mean;
         self.mean += beyond.checked_div(self.count).unwrap_or(0);

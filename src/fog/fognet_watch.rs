@@ -48,10 +48,10 @@ impl FogNetWatch {
             return false;
         }
         let second = core::mem::replace(&mut self.second, [Second::EMPTY; 2]);
-        let Some([lane, network]) = self.before.replace(second) else { return false };
-        let [next_lane, next_network] = &second;
-        let (lane, network) = (lane.triangle(next_lane), network.triangle(next_network));
-        self.gain += lane * lane - network * network - self.gain / MEMORY;
+        let Some([base, network]) = self.before.replace(second) else { return false };
+        let [next_base, next_network] = &second;
+        let (base, network) = (base.triangle(next_base), network.triangle(next_network));
+        self.gain += base * base - network * network - self.gain / MEMORY;
         self.comparisons = self.comparisons.saturating_add(1);
         self.comparisons >= SOON && self.gain < -CLEAR
     }

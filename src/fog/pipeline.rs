@@ -22,7 +22,7 @@
 //! the grid is split, and its rounding makes sums of equal increments differ.
 
 use super::fognet_watch::FogNetWatch;
-use super::{FogConfig, FogCorrector, FogNetUse, FogOutput, IncrementRate, Lane, RestOutcome};
+use super::{EarthAndBias, FogConfig, FogCorrector, FogNetUse, FogOutput, IncrementRate, RestOutcome};
 use crate::align::clock::ClockError;
 use crate::align::fog_grid::FogGrid;
 use crate::bias::Latitude;
@@ -97,7 +97,7 @@ impl FogCounters {
 #[derive(Debug, Clone)]
 pub struct FogPipeline {
     grid: FogGrid,
-    lane: Lane,
+    earth_and_bias: EarthAndBias,
     /// The latitude on the bus contradicts the one in use.
     latitude_contested: bool,
     shake: [f32; 2],
@@ -127,7 +127,7 @@ impl FogPipeline {
     pub const fn new(config: FogConfig, has_network: bool, expected: bool) -> Self {
         Self {
             grid: FogGrid::new(expected),
-            lane: Lane::new(config.errors, config.tilt, config.latitude),
+            earth_and_bias: EarthAndBias::new(config.errors, config.tilt, config.latitude),
             latitude_contested: false,
             shake: config.shake,
             corrector: FogCorrector::new(config),
@@ -149,7 +149,7 @@ impl FogPipeline {
     /// Sets the latitude. If the vehicle has `moved` there, the gyro's bias is kept; otherwise the latitude before
     /// was wrong, or there was none.
     pub fn set_latitude(&mut self, latitude: Latitude, moved: bool) {
-        self.lane.set_latitude(Some(latitude), moved);
+        self.earth_and_bias.set_latitude(Some(latitude), moved);
     }
 
     /// Notes whether the latitude on the bus contradicts the one in use.
@@ -197,11 +197,11 @@ impl FogPipeline {
         let stuck = turn.is_none() && self.stuck_in_step;
         self.stuck_in_step = self.repeats.are_stuck();
         let standstill = wheels.map_or(Standstill::Unknown, |wheels| wheels.standstill);
-        let (kept, outcome) = self.lane.correct(turn, standstill);
+        let (kept, outcome) = self.earth_and_bias.correct(turn, standstill);
         self.count_rest(outcome);
         let wheels = wheels.and_then(rear);
         let uses_network = self.fognet != FogNetUse::Off;
-        let has_latitude = self.lane.latitude().is_some();
+        let has_latitude = self.earth_and_bias.latitude().is_some();
         let by_network = uses_network.then(|| {
             let output = self.corrector.correct(&FogFrame { turn: kept, inertial, wheels });
             self.note(&output);
@@ -214,7 +214,7 @@ impl FogPipeline {
         }
         count(&mut self.counters.gaps, u32::from(turn.is_none()));
         let latency_us = u32::try_from(now.0.saturating_sub(step.time.0)).ok();
-        let contradicted = self.lane.rest().is_contradicted();
+        let contradicted = self.earth_and_bias.rest().is_contradicted();
         count(&mut self.counters.no_latitude, u32::from(!has_latitude));
         let faults = self
             .estimate_faults
@@ -251,7 +251,7 @@ impl FogPipeline {
             kept.zip(by_network).map_or(0, |(kept, by_network)| kept.0.saturating_sub(by_network.0));
         let changed = changed as f32 * (RATE_HZ as f32 / Angle::PER_RAD);
         let spread = sqrt(shake * shake + changed * changed);
-        let sigma = turn.is_some().then(|| self.lane.sigma(rate, spread));
+        let sigma = turn.is_some().then(|| self.earth_and_bias.sigma(rate, spread));
         Some(YawEstimate { tick, rate, correction, yaw, sigma, status, source, quality, faults, latency_us })
     }
 
@@ -271,9 +271,9 @@ impl FogPipeline {
 
     /// Returns the source of the rate without FoGNet.
     fn source(&self) -> Source {
-        match self.lane.latitude() {
+        match self.earth_and_bias.latitude() {
             Some(_) => Source::EarthRate,
-            None if self.lane.rest().is_measured() => Source::Static,
+            None if self.earth_and_bias.rest().is_measured() => Source::Static,
             None => Source::Raw,
         }
     }

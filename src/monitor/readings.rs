@@ -12,7 +12,7 @@ use crate::units::{AngularRate, SpecificForce};
 ///
 /// With noise of half a bit an axis at rest repeats nearly every second reading. Even then three axes repeat seven
 /// times in a row only once in two days, and once in months where an axis repeats one reading in thirty. No
-/// navigation rate of these samples has been sent yet.
+/// delayed rate of these samples has been sent yet.
 pub const STUCK_AFTER: u8 = 7;
 /// An axis that often repeats a reading counts as stuck after this many equal samples in a row.
 pub const AXIS_STUCK_AFTER: u8 = 30;

@@ -27,26 +27,25 @@ impl Pipeline {
         self.state.tick = frame.tick;
         let faults = self.faults(&frame.sample, wheels, board);
         let accepted = self.state.windows.is_accepted();
-        let prompt = self.estimate(
+        let live = self.estimate(
             frame,
-            rates.prompt,
+            rates.live,
             rates.early_sigma,
             board,
             |_| accepted,
-            |pipeline| &mut pipeline.state.prompt_yaw,
+            |pipeline| &mut pipeline.state.live_yaw,
         );
         let covered = |rate: &Compensated| rate.covered || accepted;
-        let navigation =
-            self.estimate(frame, rates.navigation, rates.early_sigma, board, covered, |pipeline| {
-                &mut pipeline.state.navigation_yaw
-            });
+        let delayed = self.estimate(frame, rates.delayed, rates.early_sigma, board, covered, |pipeline| {
+            &mut pipeline.state.delayed_yaw
+        });
         let zero =
             self.state.initialised.as_ref().map_or([AngularRate::ZERO; 3], |known| known.zero.reading());
         let [roll_rate, pitch_rate, _] = frame.sample.angular_rate;
         let less = |rate: AngularRate, zero: AngularRate| AngularRate(rate.0.saturating_sub(zero.0));
         VehicleSample {
-            prompt: YawEstimate { faults, ..prompt },
-            navigation: YawEstimate { faults, ..navigation },
+            live: YawEstimate { faults, ..live },
+            delayed: YawEstimate { faults, ..delayed },
             roll_rate: less(roll_rate, zero[0]),
             pitch_rate: less(pitch_rate, zero[1]),
             specific_force: frame.sample.specific_force,
@@ -73,8 +72,8 @@ impl Pipeline {
             ..YawEstimate::default()
         };
         VehicleSample {
-            prompt: yaw(self.state.prompt_yaw),
-            navigation: yaw(self.state.navigation_yaw),
+            live: yaw(self.state.live_yaw),
+            delayed: yaw(self.state.delayed_yaw),
             tick: self.state.tick,
             ..VehicleSample::default()
         }
@@ -88,7 +87,9 @@ impl Pipeline {
             .faults()
             .with(Faults::of(sample.validity))
             .with(Faults::GAP.when(self.state.gap_within > 0))
-            .with(Faults::IMPLAUSIBLE.when(self.state.moved || self.state.compensator.carry_exceeds_limit()))
+            .with(
+                Faults::IMPLAUSIBLE.when(self.state.moved || self.state.compensator.revisions_exceed_limit()),
+            )
             .with(Faults::WHEELS.when(contradicted || self.has_lost_wheels(wheels)))
             .with(board.faults.faults())
     }
@@ -160,7 +161,7 @@ impl UncertaintyConfig {
     pub const DEFAULT: Self = Self { per_scale: 0.25, uncorrected: 2.5e-4 };
 }
 
-/// The network's predicted error is averaged over this many windows: about a second at the default hop.
+/// The network's predicted error is averaged over this many windows: about a second at the default stride.
 const WINDOWS: f32 = 20.0;
 
 /// Tracks the expected error of the corrected rate.

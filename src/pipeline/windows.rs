@@ -42,11 +42,11 @@ impl Windows {
         *self = Self::START;
     }
 
-    /// Returns the window that ends with this tick, if it is full, at least `hop` samples after the last one, and no
+    /// Returns the window that ends with this tick, if it is full, at least `stride` samples after the last one, and no
     /// other is handed out.
     #[inline(never)]
-    pub fn due(&mut self, tick: u32, hop: u32) -> Option<DueWindow> {
-        if self.since < hop || self.out.is_some() {
+    pub fn due(&mut self, tick: u32, stride: u32) -> Option<DueWindow> {
+        if self.since < stride || self.out.is_some() {
             return None;
         }
         let features = self.window.snapshot()?;

@@ -61,7 +61,7 @@ impl Mounting {
 /// The settings of the correction of the fibre-optic gyro.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct FogLane {
+pub struct FogGyro {
     /// Angle between the axis of the gyro and the vertical of the level vehicle, 0 to 45 deg.
     pub tilt_deg: f32,
     /// Frame that carries the vehicle's latitude, if any.
@@ -78,7 +78,7 @@ pub struct Configuration {
     /// Messages on the CAN bus: identifiers, periods, protection.
     pub can: Settings,
     /// Latitude, -90 to 90 deg, north positive. With `None` the Earth's rate stays in the bias, and the rate of a
-    /// fibre-optic gyro is degraded until a latitude arrives in [`FogLane::latitude_frame`].
+    /// fibre-optic gyro is degraded until a latitude arrives in [`FogGyro::latitude_frame`].
     pub latitude_deg: Option<f32>,
     /// Mounting of the sensor.
     pub mounting: Mounting,
@@ -89,7 +89,7 @@ pub struct Configuration {
     /// Identifiers (11 bits) of the fibre-optic gyro's messages: rate, angle, detail.
     pub fog_ids: [u16; 3],
     /// Correction of the fibre-optic gyro.
-    pub fog_lane: FogLane,
+    pub fog_gyro: FogGyro,
     /// Whether wheel and latitude frames from a host on SLCAN are used, for a bench without a bus. On a vehicle,
     /// anyone with access to that line could then influence the rate.
     pub slcan_inputs: bool,
@@ -110,7 +110,7 @@ impl Configuration {
         static_init: StaticConfig::DEFAULT,
         compensate: CompensateConfig::DEFAULT,
         fog_ids: FOG_IDS,
-        fog_lane: FogLane { tilt_deg: 0.0, latitude_frame: None },
+        fog_gyro: FogGyro { tilt_deg: 0.0, latitude_frame: None },
         slcan_inputs: false,
         diagnosis: DiagnosisIds::DEFAULT,
         learn: true,
@@ -159,7 +159,7 @@ impl Configuration {
             errors: FogErrors::DSP1760,
             latitude: self.latitude(),
             // A stored configuration has been checked.
-            tilt: Tilt::from_degrees(self.fog_lane.tilt_deg).unwrap_or(Tilt::NONE),
+            tilt: Tilt::from_degrees(self.fog_gyro.tilt_deg).unwrap_or(Tilt::NONE),
             ..FogConfig::DEFAULT
         }
     }
@@ -170,7 +170,7 @@ impl Configuration {
     /// [`LatitudeConfigError`].
     pub fn latitude_receiver(&self) -> Result<Option<LatitudeReceiver>, LatitudeConfigError> {
         let make = |frame| LatitudeReceiver::new(frame, self.latitude_deg);
-        self.fog_lane.latitude_frame.map(make).transpose()
+        self.fog_gyro.latitude_frame.map(make).transpose()
     }
 
     /// Returns the configuration of a coprocessor that runs the weights with this checksum. The board adds the
@@ -208,22 +208,22 @@ impl Record for Configuration {
         if let Some(receiver) = self.latitude_receiver().map_err(FieldError::Latitude)?
             && self.own_identifier([receiver.id()].into_iter()).is_some()
         {
-            let id = self.fog_lane.latitude_frame.map_or(0, |frame| frame.id);
+            let id = self.fog_gyro.latitude_frame.map_or(0, |frame| frame.id);
             return Err(FieldError::Latitude(LatitudeConfigError::Own(id)));
         }
         let ids = self.diagnosis.ids().map_err(FieldError::Diagnosis)?;
-        let latitude_id = self.fog_lane.latitude_frame.map_or(u32::MAX, |frame| frame.id);
+        let latitude_id = self.fog_gyro.latitude_frame.map_or(u32::MAX, |frame| frame.id);
         if self.own_identifier(ids.into_iter()).is_some() || latitude_id == self.diagnosis.request {
             return Err(FieldError::Diagnosis(self.diagnosis.request));
         }
         let Mounting { roll_deg, pitch_deg, yaw_deg } = self.mounting;
         let StaticConfig { gyro_std, accel_std, gyro_drift, accel_drift, gyro_bias } = self.static_init;
         // Modes and lags need no check: all values of their types are valid.
-        let CompensateConfig { mode: _, lag: _, max_mean, max_single, max_carry } = self.compensate;
+        let CompensateConfig { mode: _, lag: _, max_mean, max_single, max_revision } = self.compensate;
         let rate = |rate: AngularRate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC;
         for (field, value) in [
             (Field::LatitudeDeg, self.latitude_deg.unwrap_or(0.0)),
-            (Field::FogTiltDeg, self.fog_lane.tilt_deg),
+            (Field::FogTiltDeg, self.fog_gyro.tilt_deg),
             (Field::MountingRollDeg, roll_deg),
             (Field::MountingPitchDeg, pitch_deg),
             (Field::MountingYawDeg, yaw_deg),
@@ -234,7 +234,7 @@ impl Record for Configuration {
             (Field::StaticGyroBias, gyro_bias),
             (Field::CompensateMaxMean, rate(max_mean)),
             (Field::CompensateMaxSingle, rate(max_single)),
-            (Field::CompensateMaxCarry, rate(max_carry)),
+            (Field::CompensateMaxRevision, rate(max_revision)),
         ] {
             within(field, value)?;
         }

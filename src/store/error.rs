@@ -24,7 +24,7 @@ pub enum Field {
     StaticGyroBias,
     CompensateMaxMean,
     CompensateMaxSingle,
-    CompensateMaxCarry,
+    CompensateMaxRevision,
     CalibrationRollDeg,
     CalibrationPitchDeg,
     CalibrationGyroMap,
@@ -38,7 +38,7 @@ impl Field {
     pub const fn name(self) -> &'static str {
         match self {
             Self::LatitudeDeg => "latitude_deg",
-            Self::FogTiltDeg => "fog_lane.tilt_deg",
+            Self::FogTiltDeg => "fog_gyro.tilt_deg",
             Self::MountingRollDeg => "mounting.roll_deg",
             Self::MountingPitchDeg => "mounting.pitch_deg",
             Self::MountingYawDeg => "mounting.yaw_deg",
@@ -49,7 +49,7 @@ impl Field {
             Self::StaticGyroBias => "static_init.gyro_bias",
             Self::CompensateMaxMean => "compensate.max_mean",
             Self::CompensateMaxSingle => "compensate.max_single",
-            Self::CompensateMaxCarry => "compensate.max_carry",
+            Self::CompensateMaxRevision => "compensate.max_revision",
             Self::CalibrationRollDeg => "level.roll_deg",
             Self::CalibrationPitchDeg => "level.pitch_deg",
             Self::CalibrationGyroMap => "gyro_map",
@@ -69,7 +69,7 @@ impl Field {
             Self::StaticAccelStd => [1e-4, 20.0],
             Self::StaticGyroDrift => [1e-5, 0.1],
             Self::StaticAccelDrift => [1e-4, 2.0],
-            Self::CompensateMaxMean | Self::CompensateMaxCarry => [0.0, 0.5],
+            Self::CompensateMaxMean | Self::CompensateMaxRevision => [0.0, 0.5],
             Self::CompensateMaxSingle => [0.0, 5.0],
             Self::CalibrationRollDeg | Self::CalibrationPitchDeg => [-MAX_TILT_DEG, MAX_TILT_DEG],
             Self::CalibrationGyroMap | Self::BiasCurve | Self::Forward => return None,
@@ -101,7 +101,7 @@ pub enum FieldError {
     #[error("can: {0}")]
     Can(ConfigError),
     /// The configuration of the latitude frame is invalid.
-    #[error("fog_lane.latitude_frame: {0}")]
+    #[error("fog_gyro.latitude_frame: {0}")]
     Latitude(LatitudeConfigError),
     /// The configuration of the wheel frames is invalid.
     #[error("wheels: {0}")]

@@ -1,7 +1,7 @@
 //! The board on the host: the library's coprocessor, driven by the rows of a recorded drive.
 //!
 //! The board runs the code of the firmware, so its frames are those that a board in the vehicle would send. A step is
-//! given out [`HOLD`] rows after its row, when its navigation rate and its settled rate are known; nothing older is
+//! given out [`HOLD`] rows after its row, when its delayed rate and its complete rate are known; nothing older is
 //! kept, so a long drive needs no more memory than a short one.
 
 use crate::drive::recording::Row;
@@ -38,18 +38,18 @@ pub struct Step {
     pub standstill: Standstill,
     /// The estimates that were sent with this row.
     pub vehicle: VehicleSample,
-    /// The navigation rate of this row's sample, which is sent some samples later; `None` during static
+    /// The delayed rate of this row's sample, which is sent some samples later; `None` during static
     /// initialisation and for the last samples of the drive.
-    pub navigation: Option<YawEstimate>,
-    /// The gyro less static bias less the network's settled estimate, which is known some samples later; the prompt
-    /// rate if there is no settled estimate.
-    pub settled: AngularRate,
+    pub delayed: Option<YawEstimate>,
+    /// The gyro less static bias less the network's complete estimate, which is known some samples later; the live
+    /// rate if there is no complete estimate.
+    pub complete: AngularRate,
     /// The frames that were sent with this row, and those sent while the sensor was silent after it.
     pub frames: Vec<TimedFrame>,
     /// Static initialisation has finished.
     pub is_initialised: bool,
     /// The rates of this step are compared with others: after static initialisation, and before the first step without
-    /// a navigation rate.
+    /// a delayed rate.
     pub is_compared: bool,
 }
 
@@ -64,7 +64,7 @@ pub struct Board<N> {
     /// The time from which on the board finds the sensor silent.
     silent_from: Micros,
     held: VecDeque<Step>,
-    /// Whether a step that was given out is initialised, and whether one after that has no navigation rate.
+    /// Whether a step that was given out is initialised, and whether one after that has no delayed rate.
     initialised: bool,
     ended: bool,
 }
@@ -115,21 +115,21 @@ impl<N: WindowNetwork> Board<N> {
             time,
             standstill: observation.wheels.standstill,
             vehicle,
-            navigation: None,
-            settled: vehicle.prompt.rate,
+            delayed: None,
+            complete: vehicle.live.rate,
             frames,
             is_initialised: false,
             is_compared: false,
         });
-        if vehicle.navigation.status != Status::Init
-            && let Some(step) = self.held(vehicle.navigation.tick)
+        if vehicle.delayed.status != Status::Init
+            && let Some(step) = self.held(vehicle.delayed.tick)
         {
-            step.navigation = Some(vehicle.navigation);
+            step.delayed = Some(vehicle.delayed);
         }
-        if let Some(settled) = observation.settled
-            && let Some(step) = self.held(settled.tick)
+        if let Some(complete) = observation.complete
+            && let Some(step) = self.held(complete.tick)
         {
-            step.settled = AngularRate(settled.rate.0.saturating_sub(settled.correction.0));
+            step.complete = AngularRate(complete.rate.0.saturating_sub(complete.correction.0));
         }
         Ok(if self.held.len() > HOLD { self.end() } else { None })
     }
@@ -137,8 +137,8 @@ impl<N: WindowNetwork> Board<N> {
     /// Gives out the next of the steps that are still held; call it until `None` after the last row.
     pub fn end(&mut self) -> Option<Step> {
         let mut step = self.held.pop_front()?;
-        self.initialised |= step.vehicle.prompt.status != Status::Init;
-        self.ended |= self.initialised && step.navigation.is_none();
+        self.initialised |= step.vehicle.live.status != Status::Init;
+        self.ended |= self.initialised && step.delayed.is_none();
         step.is_initialised = self.initialised;
         step.is_compared = self.initialised && !self.ended;
         Some(step)
@@ -156,6 +156,6 @@ impl<N: WindowNetwork> Board<N> {
     }
 
     fn held(&mut self, tick: u32) -> Option<&mut Step> {
-        self.held.iter_mut().rev().find(|step| step.vehicle.prompt.tick == tick)
+        self.held.iter_mut().rev().find(|step| step.vehicle.live.tick == tick)
     }
 }

@@ -20,8 +20,8 @@ fn frames(samples: u32) -> Vec<DataFrame> {
     let mut encoder = CanEncoder::new(Config::DEFAULT);
     let rate = AngularRate::from_rad_per_sec(1_f32.to_radians()).unwrap();
     let sample = |tick: u32| VehicleSample {
-        prompt: YawEstimate { rate, quality: gyronet::health::Quality::Good, ..YawEstimate::default() },
-        navigation: YawEstimate {
+        live: YawEstimate { rate, quality: gyronet::health::Quality::Good, ..YawEstimate::default() },
+        delayed: YawEstimate {
             rate,
             yaw: Yaw(i64::from(rate.0) * i64::from(tick)),
             quality: gyronet::health::Quality::Good,

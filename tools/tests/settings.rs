@@ -34,8 +34,16 @@ fn values_are_set_by_name() {
     for retired in ["fog_lane.fognet=Simulated", "fog_serial=1"] {
         assert!(refused(retired).contains("retired, because FoGNet"), "{}", refused(retired));
     }
+    for (renamed, name) in [
+        ("fog_lane.tilt_deg=3", "fog_gyro"),
+        ("compensate.max_carry=0.01", "compensate.max_revision"),
+        ("compensate.mode.Overlap.hop=5", "compensate.mode.Overlap.stride"),
+    ] {
+        assert!(refused(renamed).ends_with(&format!(": its name is {name} now")), "{}", refused(renamed));
+    }
+    // A configuration that was written before.
     let mut old = value.clone();
-    old["fog_lane"]["fognet"] = "Simulated".into();
+    old["fog_lane"] = serde_json::json!({ "tilt_deg": 0.0, "fognet": "Simulated" });
     assert!(from_value(old).unwrap_err().to_string().starts_with("fog_lane.fognet: retired"));
     // The board's own code for 3 deg/s.
     assert_eq!(refused("compensate.max_mean=7027624"), "compensate.max_mean: 7027624 is not a rate in rad/s");

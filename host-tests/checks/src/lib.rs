@@ -26,8 +26,6 @@ mod bosch_tx1;
 mod can_config;
 #[path = "../../tests/library/can_dbc.rs"]
 mod can_dbc;
-#[path = "../../tests/library/carry.rs"]
-mod carry;
 #[path = "../../tests/library/clock_ratio.rs"]
 mod clock_ratio;
 #[path = "../../tests/library/e2e.rs"]
@@ -48,6 +46,8 @@ mod pipeline;
 mod pipeline_estimates;
 #[path = "../../tests/library/pipeline_wheels.rs"]
 mod pipeline_wheels;
+#[path = "../../tests/library/revisions.rs"]
+mod revisions;
 #[path = "../../tests/library/sensor_monitor.rs"]
 mod sensor_monitor;
 #[path = "../../tests/library/sensor_serial.rs"]

@@ -55,13 +55,13 @@ pub fn run(samples: u64) -> Vec<(String, bool)> {
             monitor.take_line(std::str::from_utf8(&line.bytes).expect("ASCII").trim_end(), 0.0);
         }
         let vehicle = board.newest.expect("a sample in each row");
-        let good = matches!(vehicle.prompt.status, Status::Degraded | Status::Ready);
+        let good = matches!(vehicle.live.status, Status::Degraded | Status::Ready);
         ready += u64::from(good);
         if good {
             let received = monitor.drop_in.unwrap_or(f64::NAN);
-            drop_in_error += (received - vehicle.prompt.rate.rad_per_sec().to_degrees()) / f64::from(RATE_HZ);
+            drop_in_error += (received - vehicle.live.rate.rad_per_sec().to_degrees()) / f64::from(RATE_HZ);
         }
-        let newest = vehicle.navigation.yaw;
+        let newest = vehicle.delayed.yaw;
         yaw = Some((yaw.map_or(newest, |(first, _)| first), newest));
         turned += sample.reference[2].abs() / f64::from(RATE_HZ) / std::f64::consts::TAU;
         if row == samples / 2 {

@@ -66,7 +66,7 @@ fn run(
 
 /// Returns the sigma of the bias, rad/s: no network corrects these drives.
 fn bias_sigma(output: &Output) -> f64 {
-    let sigma = output.vehicle.navigation.sigma.expect("known").rad_per_sec();
+    let sigma = output.vehicle.delayed.sigma.expect("known").rad_per_sec();
     let uncorrected = f64::from(UncertaintyConfig::DEFAULT.uncorrected);
     (sigma * sigma - uncorrected * uncorrected).sqrt()
 }
@@ -74,21 +74,21 @@ fn bias_sigma(output: &Output) -> f64 {
 #[test]
 fn a_vehicle_that_drives_off_at_once_has_a_rate_with_its_sigma() {
     let (_, without) = run(PipelineConfig::DEFAULT, 500, |_| 35.0, 0, 0.1);
-    assert!(without.iter().all(|output| output.vehicle.navigation.status == Status::Init));
+    assert!(without.iter().all(|output| output.vehicle.delayed.status == Status::Init));
     let (_, with) = run(known(), 500, |_| 35.0, 0, 0.1);
     // The first second shows whether the sensor is where it was.
     let (first, with) = with.split_at(100);
-    assert!(first.iter().all(|output| output.vehicle.navigation.status == Status::Init));
+    assert!(first.iter().all(|output| output.vehicle.delayed.status == Status::Init));
     for output in with {
-        let navigation = output.vehicle.navigation;
-        assert_eq!((navigation.status, navigation.quality), (Status::Degraded, Quality::Degraded));
-        let sigma = navigation.sigma.expect("the curve's").rad_per_sec();
+        let delayed = output.vehicle.delayed;
+        assert_eq!((delayed.status, delayed.quality), (Status::Degraded, Quality::Degraded));
+        let sigma = delayed.sigma.expect("the curve's").rad_per_sec();
         assert!((1e-4..1e-3).contains(&sigma), "{sigma}");
     }
-    let mean = with.iter().map(|output| output.vehicle.navigation.rate.rad_per_sec()).sum::<f64>() / 400.0;
+    let mean = with.iter().map(|output| output.vehicle.delayed.rate.rad_per_sec()).sum::<f64>() / 400.0;
     assert!((mean - 0.1).abs() < 2e-4, "{mean}");
     // The yaw goes on from there.
-    let yaw = with.last().expect("samples").vehicle.navigation.yaw.rad();
+    let yaw = with.last().expect("samples").vehicle.delayed.yaw.rad();
     assert!((yaw - 0.4).abs() < 2e-3, "{yaw}");
 }
 
@@ -106,7 +106,7 @@ fn hard_braking_is_no_sensor_that_was_moved() {
             .correct(sample, Some(&wheels), &BoardState::GOOD)
             .expect("a place on the grid")
             .vehicle
-            .navigation
+            .delayed
             .status
     });
     assert!(statuses.skip(100).all(|status| status == Status::Degraded));
@@ -139,8 +139,7 @@ fn a_first_stop_shows_the_bias_at_its_own_temperature() {
 fn warming_up_turns_the_vehicle_no_more_than_the_curve_s_error() {
     // Three seconds at rest at 20 deg C, then ten minutes of driving straight, in which the sensor warms by 30 K.
     let celsius = |tick: u64| 20.0 + 30.0 * (tick as f64 / 60_000.0);
-    let turned =
-        |outputs: &[Output]| outputs.last().expect("samples").vehicle.navigation.yaw.rad().to_degrees();
+    let turned = |outputs: &[Output]| outputs.last().expect("samples").vehicle.delayed.yaw.rad().to_degrees();
     let (_, without) = run(PipelineConfig::DEFAULT, 60_000, celsius, 400, 0.0);
     let (_, with) = run(known(), 60_000, celsius, 400, 0.0);
     let (without_curve, with_curve) = (turned(&without), turned(&with));
@@ -160,7 +159,7 @@ fn a_standstill_takes_the_error_of_a_wrong_curve_out() {
     let wrong = PipelineConfig { bias_curve: filter.curve(), ..known() };
     let (_, outputs) = run(wrong, 2_000, |_| 20.0, 1_000, 0.1);
     let driven = &outputs[1_100..];
-    let mean = driven.iter().map(|output| output.vehicle.navigation.rate.rad_per_sec()).sum::<f64>();
+    let mean = driven.iter().map(|output| output.vehicle.delayed.rate.rad_per_sec()).sum::<f64>();
     assert!((mean / driven.len() as f64 - 0.1).abs() < 2e-4, "{mean}");
 }
 
@@ -170,25 +169,22 @@ fn a_sensor_that_was_moved_is_reported() {
     let moved = PipelineConfig { rest_force: was, ..known() };
     let (pipeline, outputs) = run(moved, 500, |_| 20.0, 400, 0.0);
     assert_eq!(pipeline.counters().moved_mounts, 1);
-    let early = outputs.iter().take(290).map(|output| output.vehicle.navigation.status);
+    let early = outputs.iter().take(290).map(|output| output.vehicle.delayed.status);
     assert!(
         early.into_iter().all(|status| status == Status::Init),
         "no early rate of a sensor that was moved"
     );
-    let last = &outputs.last().expect("samples").vehicle.navigation;
+    let last = &outputs.last().expect("samples").vehicle.delayed;
     assert!(last.faults.contains(Faults::IMPLAUSIBLE));
     let (mut pipeline, outputs) = run(known(), 500, |_| 20.0, 400, 0.0);
     assert_eq!(pipeline.counters().moved_mounts, 0);
     // A drive has shown it.
     (0..2).for_each(|_| pipeline.mount_moved());
     assert_eq!(pipeline.counters().moved_mounts, 1);
-    let next = pipeline
-        .correct(turning(501, rate(0.0)), None, &BoardState::GOOD)
-        .expect("in order")
-        .vehicle
-        .navigation;
+    let next =
+        pipeline.correct(turning(501, rate(0.0)), None, &BoardState::GOOD).expect("in order").vehicle.delayed;
     assert!(next.faults.contains(Faults::IMPLAUSIBLE));
-    assert!(outputs.iter().all(|output| !output.vehicle.navigation.faults.contains(Faults::IMPLAUSIBLE)));
+    assert!(outputs.iter().all(|output| !output.vehicle.delayed.faults.contains(Faults::IMPLAUSIBLE)));
 }
 
 #[test]
@@ -196,8 +192,8 @@ fn a_part_without_a_temperature_is_not_corrected_by_the_curve() {
     let mut pipeline = Pipeline::new(known());
     let output =
         pipeline.correct(turning(0, rate(0.01)), None, &BoardState::GOOD).expect("a place on the grid");
-    assert!((output.vehicle.navigation.rate.rad_per_sec() - 0.01).abs() < 1e-6);
-    assert_eq!(output.vehicle.navigation.status, Status::Init);
+    assert!((output.vehicle.delayed.rate.rad_per_sec() - 0.01).abs() < 1e-6);
+    assert_eq!(output.vehicle.delayed.status, Status::Init);
 }
 
 /// Xsens MTi sends its temperature once in a second, and may begin late.
@@ -217,7 +213,7 @@ fn a_temperature_that_comes_late_makes_no_step() {
             let seen = coprocessor.imu(sample, sample.time, &mut ()).expect("a place on the grid");
             let known = (tick >= first).then_some(CentiCelsius(3_500));
             assert_eq!(seen.sample.and_then(|sample| sample.temperature), known, "sample {tick}");
-            sent.push(seen.vehicle.navigation);
+            sent.push(seen.vehicle.delayed);
         }
         let after = &sent[800..];
         assert!(after.iter().all(|sent| sent.status == Status::Degraded), "from {first}");

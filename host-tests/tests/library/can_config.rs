@@ -134,8 +134,8 @@ fn every_message_reports_that_the_rate_is_not_to_be_used() {
         [(Quality::Initialising, 4, 426_887, 0xFFFF), (Quality::Unusable, 2, i32::MIN, 0xFE00)]
     {
         let mut unusable = sample(0);
-        unusable.navigation.quality = quality;
-        unusable.prompt.quality = quality;
+        unusable.delayed.quality = quality;
+        unusable.live.quality = quality;
         let frames = encoder.encode(&unusable);
         assert_eq!(frames[0].data()[2] >> 4, nibble);
         // What the part has not passed on is no acceleration either.

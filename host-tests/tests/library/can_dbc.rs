@@ -151,7 +151,7 @@ fn value_tables_are_our_enumerations() {
         table.iter().map(|value| (value.id, value.description.to_lowercase())).collect()
     };
     let named = |code: u8, name: &str| (i64::from(code), name.to_owned());
-    let sources = [Source::Raw, Source::Static, Source::GyroNet, Source::FogNet, Source::EarthRate]
+    let sources = [Source::Raw, Source::Static, Source::Model, Source::FogNet, Source::EarthRate]
         .map(|source| named(source as u8, &format!("{source:?}").to_lowercase()));
     assert_eq!(table(0x1A0, "Source"), sources);
     let qualities = [Quality::Good, Quality::Degraded, Quality::Initialising, Quality::Unusable]
@@ -241,7 +241,7 @@ fn any_sample() -> impl Strategy<Value = VehicleSample> {
     let source = prop_oneof![
         Just(Source::Raw),
         Just(Source::Static),
-        Just(Source::GyroNet),
+        Just(Source::Model),
         Just(Source::FogNet),
         Just(Source::EarthRate)
     ];
@@ -254,7 +254,7 @@ fn any_sample() -> impl Strategy<Value = VehicleSample> {
     // A little beyond what the coarse signals hold.
     let rate = || (-500_000_000..500_000_000).prop_map(AngularRate);
     let force = || (-50_000_000..50_000_000).prop_map(SpecificForce);
-    let prompt = (rate(), quality.clone()).prop_map(|(rate, quality)| YawEstimate {
+    let live = (rate(), quality.clone()).prop_map(|(rate, quality)| YawEstimate {
         rate,
         quality,
         ..YawEstimate::default()
@@ -278,10 +278,10 @@ fn any_sample() -> impl Strategy<Value = VehicleSample> {
         });
     let force = [force(), force(), force()];
     let temperature = proptest::option::of(-6000..16_000_i16);
-    (prompt, yaw, [rate(), rate()], force, temperature, any::<u32>()).prop_map(
-        |(prompt, navigation, [roll_rate, pitch_rate], specific_force, temperature, tick)| VehicleSample {
-            prompt,
-            navigation,
+    (live, yaw, [rate(), rate()], force, temperature, any::<u32>()).prop_map(
+        |(live, delayed, [roll_rate, pitch_rate], specific_force, temperature, tick)| VehicleSample {
+            live,
+            delayed,
             roll_rate,
             pitch_rate,
             specific_force,
@@ -330,7 +330,7 @@ proptest! {
             let [forward, left, up] = sample.specific_force;
             let negated = AngularRate(-sample.roll_rate.0);
             let names = ["YawRate", "YawRate_STAT", "AY", "AY_STAT", "MSG_CNT_TX1", "CRC_TX1"];
-            compare_bosch(tx1, names, (sample.prompt.rate, left), sample.tick);
+            compare_bosch(tx1, names, (sample.live.rate, left), sample.tick);
             let names = ["RollRate", "RollRate_STAT", "AX", "AX_STAT", "MSG_CNT_TX2", "CRC_TX2"];
             compare_bosch(tx2, names, (negated, forward), sample.tick);
             let names = ["PitchRate", "PitchRate_STAT", "AZ", "AZ_STAT", "MSG_CNT_TX3", "CRC_TX3"];
@@ -350,11 +350,11 @@ proptest! {
             let decoded = decode(rate);
             let message = RateMessage::parse(rate.data()).expect("a rate message");
             prop_assert_eq!(decoded["Rate"].0, i64::from(message.rate));
-            prop_assert_eq!(decoded["Source"].0, sample.navigation.source as i64);
-            prop_assert_eq!(decoded["Quality"].0, sample.navigation.quality as i64);
+            prop_assert_eq!(decoded["Source"].0, sample.delayed.source as i64);
+            prop_assert_eq!(decoded["Quality"].0, sample.delayed.quality as i64);
             if let Some(sent) = message.deg_per_sec() {
                 close(decoded["Rate"].1, sent, 1e-9);
-                close(sent, sample.navigation.rate.rad_per_sec().to_degrees(), 1.1e-6);
+                close(sent, sample.delayed.rate.rad_per_sec().to_degrees(), 1.1e-6);
             }
 
             let decoded = decode(angle);
@@ -367,15 +367,15 @@ proptest! {
             prop_assert_eq!(decoded["Correction"].0, i64::from(message.correction));
             prop_assert_eq!(decoded["ExpectedError"].0, i64::from(message.sigma));
             prop_assert_eq!(decoded["Latency"].0, i64::from(message.latency));
-            if let Some(sigma) = sample.navigation.sigma && message.sigma < u16::MAX - 1 {
+            if let Some(sigma) = sample.delayed.sigma && message.sigma < u16::MAX - 1 {
                 // Rounded up to the next step of 1e-5 deg/s.
                 let beyond = decoded["ExpectedError"].1 - sigma.rad_per_sec().abs().to_degrees();
                 prop_assert!((-1e-9..1.001e-5).contains(&beyond), "{beyond}");
             }
             if message.correction.abs() < i16::MAX {
-                close(decoded["Correction"].1, sample.navigation.correction.rad_per_sec().to_degrees(), 2.1e-4);
+                close(decoded["Correction"].1, sample.delayed.correction.rad_per_sec().to_degrees(), 2.1e-4);
             }
-            if let Some(us) = sample.navigation.latency_us && us <= 127_000 {
+            if let Some(us) = sample.delayed.latency_us && us <= 127_000 {
                 close(decoded["Latency"].1, f64::from(us) / 1000.0, 0.5);
             }
 
@@ -385,7 +385,7 @@ proptest! {
             prop_assert_eq!(decoded["SteerWhlAngle"].0, 0xFFFF);
             if let Some(sent) = message.yaw_rate_rad_per_sec() {
                 close(decoded["YawRate_VDC2"].1, sent, 1e-12);
-                close(sent, sample.prompt.rate.rad_per_sec(), 1.1 / 8192.0);
+                close(sent, sample.live.rate.rad_per_sec(), 1.1 / 8192.0);
             }
             if message.lateral <= 0xFAFF {
                 close(decoded["LateralAccel"].1, left.metre_per_sec2(), 0.51 / 2048.0);

@@ -231,10 +231,10 @@ fn turned(off: f64, config: Config) -> (f64, Vec<AngularRate>, Coprocessor) {
             sample.angular_rate[2].0 += rate(0.3).0;
         }
         let output = coprocessor.imu(ImuSample { time, ..sample }, arrival, &mut ()).expect("in time");
-        assert!(tick < 400 || output.vehicle.prompt.status == Status::Degraded, "{tick}");
-        rates.push(output.vehicle.navigation.rate);
+        assert!(tick < 400 || output.vehicle.live.status == Status::Degraded, "{tick}");
+        rates.push(output.vehicle.delayed.rate);
         if [6_000, 16_000].contains(&tick) {
-            marks.push(output.vehicle.navigation.yaw.rad());
+            marks.push(output.vehicle.delayed.yaw.rad());
         }
     }
     let period = (1.0 + off) * PERIOD_US as f64 * 1e-6;
@@ -265,7 +265,7 @@ fn a_clock_at_fault_is_on_the_bus() {
     for tick in 0..6_000 {
         let (time, arrival) = sensor.sample();
         let sample = ImuSample { time, ..idling(tick, 0.001, &mut noise) };
-        let faults = coprocessor.imu(sample, arrival, &mut ()).expect("in time").vehicle.navigation.faults;
+        let faults = coprocessor.imu(sample, arrival, &mut ()).expect("in time").vehicle.delayed.faults;
         let reported = faults == faults.with(Faults::IMPLAUSIBLE);
         first = first.or(reported.then_some(tick));
         assert!(first.is_none() || reported, "for as long as it lasts");

@@ -85,7 +85,7 @@ fn a_sample_gives_its_frames_once_and_an_observation() {
     let observation = car.sample();
     assert_eq!(observation.sample.map(|sample| sample.time), Some(Micros(0)));
     assert_eq!(
-        (observation.vehicle.prompt.status, observation.wheels.standstill),
+        (observation.vehicle.live.status, observation.wheels.standstill),
         (Status::Init, Standstill::Unknown)
     );
     assert_eq!(car.sent.frames.len(), SET);
@@ -100,7 +100,7 @@ fn a_window_is_handed_out_once_and_its_estimate_is_used_two_samples_later() {
     assert_eq!(car.coprocessor.window(), None);
     car.coprocessor.deliver(window.end, NOTHING).expect("the window that is due");
     for sample in 1..=DELAY {
-        let status = car.sample().vehicle.prompt.status;
+        let status = car.sample().vehicle.live.status;
         assert_eq!(status == Status::Ready, sample == DELAY, "{sample}");
     }
 }
@@ -139,7 +139,7 @@ fn a_sample_out_of_order_is_an_error_and_the_next_ones_report_a_gap() {
     assert_eq!(error, InputError::Imu(backwards));
     assert_eq!(car.sent.frames, [], "no frame is sent for it");
     assert_eq!(car.coprocessor.pipeline().counters().misplaced, 1);
-    assert!(car.sample().vehicle.navigation.faults.contains(Faults::GAP));
+    assert!(car.sample().vehicle.delayed.faults.contains(Faults::GAP));
     car.coprocessor.fog(fog(10), at(car.tick), &mut ()).expect("the first one");
     let again = car.coprocessor.fog(fog(10), at(car.tick), &mut ());
     assert_eq!(again, Err(InputError::Fog(ClockError::Duplicate { at: Micros(10_000) })));
@@ -239,23 +239,23 @@ fn damage_and_losses_are_reported_with_every_set() {
         let window = lost.until_window();
         lost.coprocessor.deliver(window.end, NOTHING).expect("the window that is due");
         let sent = lost.sample().vehicle;
-        if sent.prompt.status == Status::Ready {
+        if sent.live.status == Status::Ready {
             // No rate is better than degraded with another vehicle's configuration.
-            assert_eq!((sent.prompt.quality, sent.prompt.faults), (Quality::Degraded, Faults::STORED));
+            assert_eq!((sent.live.quality, sent.live.faults), (Quality::Degraded, Faults::STORED));
             break;
         }
     }
     let mut car = Car::new(Config::DEFAULT);
-    assert_eq!(car.sample().vehicle.navigation.faults, Faults::NONE);
+    assert_eq!(car.sample().vehicle.delayed.faults, Faults::NONE);
     car.coprocessor.bus(3, false);
-    assert_eq!(car.sample().vehicle.navigation.faults, Faults::BUS, "lost frames are reported once");
-    assert_eq!(car.sample().vehicle.navigation.faults, Faults::NONE);
+    assert_eq!(car.sample().vehicle.delayed.faults, Faults::BUS, "lost frames are reported once");
+    assert_eq!(car.sample().vehicle.delayed.faults, Faults::NONE);
     car.coprocessor.bus(3, true);
-    assert_eq!(car.sample().vehicle.navigation.faults, Faults::BUS, "the controller is off the bus");
+    assert_eq!(car.sample().vehicle.delayed.faults, Faults::BUS, "the controller is off the bus");
     car.coprocessor.bus(3, false);
     car.coprocessor.weights_damaged();
     for _ in 0..400 {
-        assert!(car.sample().vehicle.navigation.faults.contains(Faults::STORED));
+        assert!(car.sample().vehicle.delayed.faults.contains(Faults::STORED));
         assert_eq!(car.coprocessor.window(), None);
     }
 }

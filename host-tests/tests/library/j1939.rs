@@ -61,7 +61,7 @@ fn what_is_not_valid_is_not_a_value() {
         assert_eq!(vdc2.yaw_rate, code);
         assert_eq!(vdc2.yaw_rate_rad_per_sec(), None);
     }
-    assert_eq!(encoder.encode(rate(0.0), Validity::Valid, &AT_REST).yaw_rate, 32_113, "nothing is owed");
+    assert_eq!(encoder.encode(rate(0.0), Validity::Valid, &AT_REST).yaw_rate, 32_113, "nothing is pending");
 }
 
 #[test]

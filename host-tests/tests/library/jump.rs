@@ -64,16 +64,16 @@ fn without_late(faults: Faults) -> Faults {
 
 /// The sample has no rate, and says why.
 fn assert_refused(output: &Observation, why: &str) {
-    assert_eq!(output.vehicle.prompt.status, Status::Clipped, "{why}");
-    assert_eq!(output.vehicle.prompt.quality, Quality::Unusable, "{why}");
-    let faults = output.vehicle.navigation.faults;
+    assert_eq!(output.vehicle.live.status, Status::Clipped, "{why}");
+    assert_eq!(output.vehicle.live.quality, Quality::Unusable, "{why}");
+    let faults = output.vehicle.delayed.faults;
     assert_eq!(without_late(faults), Faults::IMPLAUSIBLE, "{why}");
 }
 
 fn assert_believed(output: &Observation, why: &str) {
-    assert_eq!(output.vehicle.prompt.status, Status::Degraded, "{why}");
-    assert_eq!(output.vehicle.prompt.quality, Quality::Degraded, "{why}");
-    assert_eq!(without_late(output.vehicle.navigation.faults), Faults::NONE, "{why}");
+    assert_eq!(output.vehicle.live.status, Status::Degraded, "{why}");
+    assert_eq!(output.vehicle.live.quality, Quality::Degraded, "{why}");
+    assert_eq!(without_late(output.vehicle.delayed.faults), Faults::NONE, "{why}");
 }
 
 #[test]
@@ -136,21 +136,21 @@ fn across_a_gap_any_reading_is_believed() {
         let mut drive = Drive::new();
         drive.tick += missing;
         let output = drive.off_by(2, 2 * RATE_LIMIT);
-        assert_eq!(output.vehicle.prompt.status == Status::Clipped, refused, "{missing} samples missing");
+        assert_eq!(output.vehicle.live.status == Status::Clipped, refused, "{missing} samples missing");
         assert_eq!(drive.coprocessor.monitor_counters().wrong, u32::from(refused));
-        assert_eq!(output.vehicle.navigation.faults.with(Faults::GAP), output.vehicle.navigation.faults);
+        assert_eq!(output.vehicle.delayed.faults.with(Faults::GAP), output.vehicle.delayed.faults);
     }
 }
 
-/// A rate that is not believed is not integrated as a rate that looks right: the navigation rate of that
+/// A rate that is not believed is not integrated as a rate that looks right: the delayed rate of that
 /// very sample, which goes out seven samples later, has no quality either.
 #[test]
-fn the_navigation_rate_of_a_refused_reading_is_unusable() {
+fn the_delayed_rate_of_a_refused_reading_is_unusable() {
     let mut drive = Drive::new();
-    let jump = drive.off_by(2, 2 * RATE_LIMIT).vehicle.prompt.tick;
+    let jump = drive.off_by(2, 2 * RATE_LIMIT).vehicle.live.tick;
     let unusable =
-        (0..12).map(|_| drive.idle()).filter(|out| out.vehicle.navigation.quality == Quality::Unusable);
-    assert_eq!(unusable.map(|output| output.vehicle.navigation.tick).collect::<Vec<_>>(), [jump]);
+        (0..12).map(|_| drive.idle()).filter(|out| out.vehicle.delayed.quality == Quality::Unusable);
+    assert_eq!(unusable.map(|output| output.vehicle.delayed.tick).collect::<Vec<_>>(), [jump]);
 }
 
 /// The limits in physical units, by the types' own conversion.

@@ -25,7 +25,7 @@ impl Bench {
         Self { compensator, noise: Noise::new(seed), tick: 0, window: Vec::new(), found: 0 }
     }
 
-    /// Runs some seconds; returns the mean square of the corrections of the settled samples, codes squared.
+    /// Runs some seconds; returns the mean square of the corrections of the complete samples, codes squared.
     fn run(&mut self, seconds: u32, coupling: f64, drives: bool) -> f64 {
         let rate = |rad_per_s: f64| AngularRate::from_rad_per_sec(rad_per_s as f32).expect("a rate");
         let mut squares = Vec::new();
@@ -42,8 +42,8 @@ impl Bench {
                 let estimate = Estimate { corrections, steady_gain: MOUNTING, ..Estimate::NONE };
                 self.compensator.revise(&estimate).expect("plausible");
             }
-            let settled = self.compensator.settled().filter(|settled| settled.good);
-            squares.extend(settled.map(|settled| f64::from(settled.correction.0).powi(2)));
+            let complete = self.compensator.complete().filter(|complete| complete.good);
+            squares.extend(complete.map(|complete| f64::from(complete.correction.0).powi(2)));
             self.tick += 1;
         }
         squares.iter().sum::<f64>() / squares.len() as f64

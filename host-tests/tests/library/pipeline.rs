@@ -25,20 +25,23 @@ fn init_then_degraded_then_ready() {
         [(Init, 300), (Degraded, (COVERED - KNOWN) as usize), (Ready, 400 - COVERED as usize)]
     );
     assert_eq!(pipeline.gyro_bias(), Some([AngularRate(0), AngularRate(0), rate(0.001)]));
-    let at = |tick: u64| outputs[tick as usize].vehicle.prompt;
+    let at = |tick: u64| outputs[tick as usize].vehicle.live;
     assert_eq!((at(0).rate, at(299).yaw.0), (rate(0.001), 0), "raw, and nothing summed yet");
     let less_bias = AngularRate(rate(0.25).0 - rate(0.001).0);
     assert_eq!(at(COVERED - 1).rate, less_bias);
     assert_eq!(at(399).rate, less_bias, "a constant correction is taken out");
     for output in &outputs {
-        let VehicleSample { prompt, navigation, tick, .. } = output.vehicle;
-        assert_eq!((prompt.source, prompt.quality), judge(prompt.status));
-        assert_eq!((navigation.source, navigation.quality), judge(navigation.status));
-        assert_eq!((prompt.faults, navigation.faults, tick), (Faults::NONE, Faults::NONE, prompt.tick));
+        let VehicleSample { live, delayed, tick, .. } = output.vehicle;
+        assert_eq!((live.source, live.quality), judge(live.status));
+        assert_eq!((delayed.source, delayed.quality), judge(delayed.status));
+        assert_eq!((live.faults, delayed.faults, tick), (Faults::NONE, Faults::NONE, live.tick));
     }
     // The first window ends with the tenth sample, the others follow every fifth.
     let ends: Vec<u32> = outputs.iter().filter_map(|output| Some(output.window?.end)).collect();
-    assert_eq!(ends, (309..400).step_by(CompensateConfig::DEFAULT.mode.hop() as usize).collect::<Vec<u32>>());
+    assert_eq!(
+        ends,
+        (309..400).step_by(CompensateConfig::DEFAULT.mode.stride() as usize).collect::<Vec<u32>>()
+    );
     assert_eq!(pipeline.counters().windows, 18, "the one that ended at 399 is still out");
 }
 
@@ -100,7 +103,7 @@ fn clipping_is_a_failure_until_it_is_over() {
         [(Init, 300), (Degraded, 11), (Ready, 89), (Clipped, 3), (Degraded, 11), (Ready, 86)]
     );
     for output in &outputs[400..403] {
-        assert_eq!(output.vehicle.prompt.quality, Quality::Unusable);
+        assert_eq!(output.vehicle.live.quality, Quality::Unusable);
     }
     assert_eq!(faults(&outputs), [(Faults::NONE, 400), (Faults::CLIPPED, 3), (Faults::NONE, 97)]);
     assert_eq!(pipeline.counters().invalid, 3);
@@ -134,13 +137,12 @@ fn misplaced_samples_are_a_gap_and_change_no_rate() {
     let (mut pipeline, mut noise) = (new(), Noise::new(6));
     for (sample, clean) in drive(0..600).zip(&clean) {
         let outputs = run(&mut pipeline, [sample], constant(0.0));
-        let reported = outputs[0].vehicle.navigation.faults == Faults::GAP;
-        assert_eq!(reported, clean.vehicle.prompt.tick > KNOWN as u32);
-        let prompt = |output: &Output| {
-            (output.vehicle.prompt.tick, output.vehicle.prompt.rate, output.vehicle.prompt.yaw)
-        };
-        assert_eq!(prompt(&outputs[0]), prompt(clean));
-        for _ in 0..if u64::from(clean.vehicle.prompt.tick) < KNOWN { 0 } else { noise.int(1, 2) } {
+        let reported = outputs[0].vehicle.delayed.faults == Faults::GAP;
+        assert_eq!(reported, clean.vehicle.live.tick > KNOWN as u32);
+        let live =
+            |output: &Output| (output.vehicle.live.tick, output.vehicle.live.rate, output.vehicle.live.yaw);
+        assert_eq!(live(&outputs[0]), live(clean));
+        for _ in 0..if u64::from(clean.vehicle.live.tick) < KNOWN { 0 } else { noise.int(1, 2) } {
             let mut misplaced = turning(0, rate(3.0));
             misplaced.time.0 =
                 sample.time.0.saturating_sub(noise.int(0, 900_000) as u64) + noise.int(0, 1) as u64 * 5_000;
@@ -180,7 +182,7 @@ fn a_clock_that_jumps_by_a_few_milliseconds_is_a_gap() {
         let counted = counters.missing + counters.misplaced + counters.clock_jumps;
         let within = jump_us.abs() <= 2_000;
         assert_eq!(counted > 0, !within, "{jump_us} us");
-        assert_eq!(outputs[0].vehicle.navigation.faults == Faults::GAP, !within, "{jump_us} us");
+        assert_eq!(outputs[0].vehicle.delayed.faults == Faults::GAP, !within, "{jump_us} us");
     }
 }
 
@@ -194,37 +196,36 @@ fn a_clock_jump_is_counted_and_survived() {
     assert_eq!(statuses(&outputs), [(Degraded, 11), (Ready, 88)]);
     assert_eq!((pipeline.counters().clock_jumps, pipeline.counters().missing), (1, 0));
     assert_eq!(faults(&outputs), [(Faults::GAP, WINDOW), (Faults::NONE, 99 - WINDOW)]);
-    assert_eq!(outputs[0].vehicle.prompt.tick, 400);
+    assert_eq!(outputs[0].vehicle.live.tick, 400);
 }
 
 #[test]
-fn the_navigation_rate_is_late_and_leaves_none_out() {
+fn the_delayed_rate_is_late_and_leaves_none_out() {
     let lag = CompensateConfig::DEFAULT.lag.samples();
     let mut pipeline = new();
     let outputs = run(&mut pipeline, drive((0..400).chain(403..500)), constant(0.002));
     let (init, sent) = outputs.split_at(KNOWN as usize + lag);
     assert!(
-        init.iter()
-            .all(|output| output.vehicle.navigation.status == Init && output.vehicle.navigation.yaw.0 == 0)
+        init.iter().all(|output| output.vehicle.delayed.status == Init && output.vehicle.delayed.yaw.0 == 0)
     );
     // A gap delays what came before it, it swallows none.
     let expected: Vec<u32> = (KNOWN as u32..400).chain(403..500 - lag as u32).collect();
-    assert_eq!(sent.iter().map(|output| output.vehicle.navigation.tick).collect::<Vec<_>>(), expected);
-    let late = |output: &Output| output.vehicle.navigation.latency_us;
+    assert_eq!(sent.iter().map(|output| output.vehicle.delayed.tick).collect::<Vec<_>>(), expected);
+    let late = |output: &Output| output.vehicle.delayed.latency_us;
     let across_the_gap = sent.iter().filter(|output| late(output) != Some(10_000 * lag as u32));
     assert_eq!(across_the_gap.map(late).collect::<Vec<_>>(), vec![Some(10_000 * (lag as u32 + 3)); lag]);
     // The first four after start and gap go out before a window has covered them, and the gap
     // takes the last five before it their window.
     let degraded = sent
         .iter()
-        .filter(|output| output.vehicle.navigation.status == Degraded)
-        .map(|o| o.vehicle.navigation.tick);
+        .filter(|output| output.vehicle.delayed.status == Degraded)
+        .map(|o| o.vehicle.delayed.tick);
     assert_eq!(
         degraded.collect::<Vec<_>>(),
         [300, 301, 302, 303, 395, 396, 397, 398, 399, 403, 404, 405, 406]
     );
     // They are made up for all the same.
     let less = i64::from(rate(0.25).0 - rate(0.001).0);
-    let sum: i64 = sent.iter().map(|output| i64::from(output.vehicle.navigation.rate.0)).sum();
-    assert_eq!(sum + pipeline.owed().navigation.0, less * 197);
+    let sum: i64 = sent.iter().map(|output| i64::from(output.vehicle.delayed.rate.0)).sum();
+    assert_eq!(sum + pipeline.pending().delayed.0, less * 197);
 }

@@ -16,14 +16,14 @@ use gyronet::units::{AngularRate, Yaw};
 use gyronet_host_tests::stream::{constant, drive, faults, new, run, statuses};
 use gyronet_host_tests::synthetic::{rate, turning};
 
-/// Returns the angle that the navigation rate owes where all samples that wait for it are alike, and no revision.
+/// Returns the angle that the delayed rate owes where all samples that wait for it are alike, and no revision.
 fn waiting(last: &YawEstimate) -> Yaw {
     Yaw(CompensateConfig::DEFAULT.lag.samples() as i64 * i64::from(last.rate.0))
 }
 
 #[test]
 fn an_estimate_that_is_late_or_missing_is_counted() {
-    for lateness in [DELAY as usize, CompensateConfig::DEFAULT.mode.hop() as usize, 20, usize::MAX] {
+    for lateness in [DELAY as usize, CompensateConfig::DEFAULT.mode.stride() as usize, 20, usize::MAX] {
         let mut pipeline = new();
         let mut waiting: Vec<(usize, DueWindow)> = Vec::new();
         for (now, sample) in drive(0..400).enumerate() {
@@ -37,10 +37,10 @@ fn an_estimate_that_is_late_or_missing_is_counted() {
             });
             waiting.extend(output.window.map(|due| (now, due)));
             assert!(
-                matches!(output.vehicle.prompt.status, Init | Degraded),
+                matches!(output.vehicle.live.status, Init | Degraded),
                 "{lateness} samples late at {now}"
             );
-            assert_eq!(output.vehicle.prompt.correction, AngularRate(0));
+            assert_eq!(output.vehicle.live.correction, AngularRate(0));
         }
         let counters = pipeline.counters();
         assert_eq!((counters.windows, counters.late), (0, 18), "{lateness} samples late");
@@ -64,8 +64,8 @@ fn a_network_that_dies_leaves_the_gyro_less_its_bias() {
     let mut alive = constant(0.01);
     let outputs = run(&mut pipeline, drive(0..600), |due| if due.end < 450 { alive(due) } else { None });
     assert_eq!(statuses(&outputs)[2].0, Ready);
-    let last = outputs[599].vehicle.prompt;
-    assert_eq!((last.status, pipeline.owed().navigation), (Degraded, waiting(&last)));
+    let last = outputs[599].vehicle.live;
+    assert_eq!((last.status, pipeline.pending().delayed), (Degraded, waiting(&last)));
     assert_eq!(faults(&outputs), [(Faults::NONE, 456), (Faults::LATE, 144)]);
     assert_eq!(last.correction, AngularRate(0), "an old estimate must not be applied for ever");
 }
@@ -87,8 +87,8 @@ fn an_implausible_estimate_is_not_believed() {
     assert_eq!((pipeline.counters().implausible, pipeline.counters().clamped_inputs), (9, 18));
     assert_eq!(outputs.iter().filter(|output| output.implausible.is_some()).count(), 9);
     assert_eq!(faults(&outputs), [(Faults::NONE, 356), (Faults::IMPLAUSIBLE, 44)]);
-    let last = outputs[399].vehicle.prompt;
-    assert_eq!((last.correction, pipeline.owed().navigation), (AngularRate(0), waiting(&last)));
+    let last = outputs[399].vehicle.live;
+    assert_eq!((last.correction, pipeline.pending().delayed), (AngularRate(0), waiting(&last)));
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn a_rate_beyond_the_signal_is_marked() {
     // Neither do the largest codes wrap.
     let samples = (0..400).map(|tick| turning(tick, AngularRate(if tick < 300 { 1_000 } else { i32::MIN })));
     let outputs = run(&mut new(), samples, constant(0.01));
-    assert_eq!(outputs[399].vehicle.prompt.rate, AngularRate(i32::MIN));
+    assert_eq!(outputs[399].vehicle.live.rate, AngularRate(i32::MIN));
     let last = *tx1(&mut CanEncoder::new(Config::DEFAULT), &outputs).last().expect("samples");
     assert_eq!((last.yaw_rate, last.yaw_rate_status), (0, SignalStatus::FAILURE));
 }

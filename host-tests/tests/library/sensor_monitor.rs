@@ -25,7 +25,7 @@ fn fed(samples: u64) -> (Coprocessor, Noise) {
     for tick in 0..samples {
         let observation = sample(&mut coprocessor, idling(tick, 0.001, &mut noise), tick);
         assert_eq!(coprocessor.poll(at(tick), &mut ()), Ok(None));
-        assert!(matches!(observation.vehicle.prompt.status, Status::Init | Status::Degraded));
+        assert!(matches!(observation.vehicle.live.status, Status::Init | Status::Degraded));
     }
     (coprocessor, noise)
 }
@@ -50,23 +50,23 @@ fn silence_has_no_rate_and_ends_with_a_sample() {
     }
     assert_eq!(sets.len(), 10, "one every 10 ms");
     for (set, tick) in sets.iter().map(|set| set.vehicle).zip(402..) {
-        let rate = set.navigation;
+        let rate = set.delayed;
         assert_eq!((set.tick, rate.quality, rate.rate.0), (tick, Quality::Unusable, 0));
         assert_eq!((rate.faults, rate.status, set.temperature), (Faults::GAP, Status::Silent, None));
     }
     assert_eq!(coprocessor.monitor_counters().silences, 1);
     let set = sample(&mut coprocessor, idling(412, 0.001, &mut noise), 412).vehicle;
-    assert_eq!((set.prompt.tick, set.prompt.status), (412, Status::Degraded), "the bias is kept");
+    assert_eq!((set.live.tick, set.live.status), (412, Status::Degraded), "the bias is kept");
     assert_eq!(coprocessor.poll(at(413), &mut ()), Ok(None));
 }
 
 #[test]
 fn silence_keeps_the_yaw() {
     let (mut coprocessor, mut noise) = fed(400);
-    let last = sample(&mut coprocessor, idling(400, 0.001, &mut noise), 400).vehicle.navigation;
+    let last = sample(&mut coprocessor, idling(400, 0.001, &mut noise), 400).vehicle.delayed;
     let set =
         coprocessor.poll(Micros(at(400).0 + TIMEOUT_US), &mut ()).expect("time goes on").expect("a set");
-    let silent = set.vehicle.navigation;
+    let silent = set.vehicle.delayed;
     assert_ne!(silent.yaw.0, 0);
     assert_eq!((silent.yaw, silent.source, set.sample), (last.yaw, Source::Raw, None));
 }
@@ -76,7 +76,7 @@ fn a_part_has_time_to_start() {
     let mut coprocessor = coprocessor();
     assert_eq!(coprocessor.poll(Micros(START_US - 1), &mut ()), Ok(None));
     let set = coprocessor.poll(Micros(START_US), &mut ()).expect("time goes on").expect("a set");
-    assert_eq!(set.vehicle.navigation.quality, Quality::Unusable);
+    assert_eq!(set.vehicle.delayed.quality, Quality::Unusable);
 }
 
 #[test]
@@ -86,15 +86,15 @@ fn stuck_from_the_seventh_equal_sample_to_the_first_that_differs() {
     for tick in 400..440 {
         let set = sample(&mut coprocessor, still, tick).vehicle;
         let stuck = tick >= 400 + u64::from(STUCK_AFTER);
-        assert_eq!(set.prompt.status == Status::Stuck, stuck, "sample {tick}");
-        assert_eq!(set.prompt.quality == Quality::Unusable, stuck);
+        assert_eq!(set.live.status == Status::Stuck, stuck, "sample {tick}");
+        assert_eq!(set.live.quality == Quality::Unusable, stuck);
         // Nobody runs the network here.
-        let late = set.navigation.faults.contains(Faults::LATE);
+        let late = set.delayed.faults.contains(Faults::LATE);
         let stuck = if stuck { Faults::STUCK } else { Faults::NONE };
-        assert_eq!(set.navigation.faults, stuck.with(if late { Faults::LATE } else { Faults::NONE }));
+        assert_eq!(set.delayed.faults, stuck.with(if late { Faults::LATE } else { Faults::NONE }));
     }
     let moved = idling(440, 0.001, &mut noise);
-    assert_eq!(sample(&mut coprocessor, moved, 440).vehicle.prompt.status, Status::Degraded);
+    assert_eq!(sample(&mut coprocessor, moved, 440).vehicle.live.status, Status::Degraded);
     assert_eq!(coprocessor.monitor_counters().stuck, 1);
 }
 
@@ -110,7 +110,7 @@ fn a_gyro_or_one_axis_may_be_stuck_beside_axes_that_move() {
             }
             let set = sample(&mut coprocessor, moving, tick).vehicle;
             let stuck = tick >= 400 + u64::from(after);
-            assert_eq!(set.prompt.status == Status::Stuck, stuck, "axes {axes:?}, sample {tick}");
+            assert_eq!(set.live.status == Status::Stuck, stuck, "axes {axes:?}, sample {tick}");
         }
         assert_eq!(coprocessor.monitor_counters().stuck, 1);
     }
@@ -129,7 +129,7 @@ fn saturation_is_held_for_50_ms() {
             _ => (Validity::Good, Status::Degraded),
         };
         let judged = observation.sample.expect("a sample").validity;
-        assert_eq!((judged, observation.vehicle.prompt.status), (validity, status), "sample {tick}");
+        assert_eq!((judged, observation.vehicle.live.status), (validity, status), "sample {tick}");
     }
     assert_eq!(coprocessor.monitor_counters().held, u32::from(HOLD));
 }

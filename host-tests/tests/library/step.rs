@@ -78,9 +78,9 @@ fn standing() -> DataFrame {
 fn constant_readings_of_a_test_become_good_rates() {
     let (mut car, mut can) = (Car::new(), QueuedCan::<_>::new(Controller::default()));
     let last = (0..400).map(|_| car.sample(&mut can)).last().expect("steps");
-    let prompt = last.observation.expect("a message set").vehicle.prompt;
-    assert_eq!((prompt.status, prompt.faults, last.imu_error), (Status::Ready, Faults::NONE, None));
-    assert!(prompt.rate.rad_per_sec().abs() < 1e-4, "{}", prompt.rate.rad_per_sec());
+    let live = last.observation.expect("a message set").vehicle.live;
+    assert_eq!((live.status, live.faults, last.imu_error), (Status::Ready, Faults::NONE, None));
+    assert!(live.rate.rad_per_sec().abs() < 1e-4, "{}", live.rate.rad_per_sec());
     assert_eq!(can.controller().sent.len(), 400 * SET);
 }
 
@@ -112,11 +112,11 @@ fn a_sensor_that_fails_to_read_is_counted_and_reported_as_silent() {
     assert!(failing.iter().all(|step| step.imu_error == Some(RangeError::NotFinite)));
     assert_eq!(car.coprocessor.input_counters().imu_errors, 5);
     let silent = failing.iter().filter_map(|step| step.observation);
-    let statuses: Vec<Status> = silent.map(|observation| observation.vehicle.prompt.status).collect();
+    let statuses: Vec<Status> = silent.map(|observation| observation.vehicle.live.status).collect();
     // 30 ms after the last sample, then every 10 ms.
     assert_eq!(statuses, [Status::Silent; 3]);
     assert_eq!(can.controller().sent.len(), 403 * SET);
-    let next = car.sample(&mut can).observation.map(|seen| seen.vehicle.prompt.status);
+    let next = car.sample(&mut can).observation.map(|seen| seen.vehicle.live.status);
     assert_eq!(next, Some(Status::Degraded), "until the next window");
 }
 
@@ -125,7 +125,7 @@ fn frames_that_the_bus_does_not_take_are_lost_and_reported() {
     let controller = Controller { is_blocked: true, ..Controller::default() };
     let (mut car, mut can) = (Car::new(), QueuedCan::<_, QUEUE>::new(controller));
     let faults: Vec<Faults> = (0..6)
-        .map(|_| car.sample(&mut can).observation.expect("a message set").vehicle.prompt.faults)
+        .map(|_| car.sample(&mut can).observation.expect("a message set").vehicle.live.faults)
         .collect();
     assert_eq!(can.lost() as usize, 6 * SET - QUEUE);
     // The fifth set pushes out the first, which the sixth reports.

@@ -11,10 +11,9 @@ use gyronet::model::blob::CRC;
 use gyronet::store::layout::{self, RECORD_SECTOR, SECTORS, SLOT_SIZE, sector_at};
 use gyronet::store::slots::{SlotError, file, select};
 use gyronet::store::{
-    Accepted, Calibration, Configuration, Field, FieldError, Learned, Level, Mounting, Record, Slot, Store,
-    StoreError,
+    Accepted, Configuration, Field, FieldError, Learned, Mounting, Record, Slot, Store, StoreError,
 };
-use gyronet::units::{AngularRate, CentiCelsius, Duration, SpecificForce, WheelSpeed};
+use gyronet::units::{AngularRate, CentiCelsius, Duration, WheelSpeed};
 use gyronet_host_tests::flash::{F405, Region};
 use gyronet_host_tests::noise::{Noise, cases};
 use gyronet_host_tests::recordings::workspace;

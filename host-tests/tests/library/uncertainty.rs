@@ -79,8 +79,8 @@ fn the_pipeline_sends_the_expected_error() {
         let output =
             pipeline.correct(idling(tick, 0.001, &mut noise), None, &BoardState::GOOD).expect("in time");
         let known = tick >= u64::from(STATIC_SAMPLES);
-        assert_eq!(output.vehicle.prompt.sigma.is_some(), known, "sample {tick}");
-        if let Some(sigma) = output.vehicle.prompt.sigma {
+        assert_eq!(output.vehicle.live.sigma.is_some(), known, "sample {tick}");
+        if let Some(sigma) = output.vehicle.live.sigma {
             assert_sigma(sigma, 2.5e-4, "not corrected yet");
         }
     }
@@ -91,7 +91,7 @@ fn the_pipeline_sends_the_expected_error() {
 const BANDS: [(f64, f64); 3] = [(0.694, 0.03), (0.948, 0.02), (1.0, 0.008)];
 const TRIALS: [u32; 2] = [9, 11];
 
-/// The rate sent for navigation, default configuration.
+/// The delayed rate, default configuration.
 fn score(path: &Path) -> Score {
     let recording = Drive::open(path).expect("a recording");
     let mut network =

@@ -22,7 +22,7 @@ fn rate(deg_per_sec: f64) -> AngularRate {
 }
 
 fn sample(rate: AngularRate, yaw: Yaw) -> YawEstimate {
-    YawEstimate { rate, yaw, source: Source::GyroNet, quality: Quality::Good, ..YawEstimate::default() }
+    YawEstimate { rate, yaw, source: Source::Model, quality: Quality::Good, ..YawEstimate::default() }
 }
 
 /// CanEncoder rates and keeps the accounts that the pipeline keeps; gives the sum of the decoded
@@ -97,12 +97,12 @@ fn a_rate_that_is_unusable_is_not_sent() {
     assert_eq!(AngleMessage::parse(&angle).expect("an angle message").faults, Faults::CLIPPED);
     assert_eq!(judge(Status::Init), (Source::Raw, Quality::Initialising));
     assert_eq!(judge(Status::Degraded), (Source::Static, Quality::Degraded));
-    assert_eq!(judge(Status::Ready), (Source::GyroNet, Quality::Good));
+    assert_eq!(judge(Status::Ready), (Source::Model, Quality::Good));
 }
 
 #[test]
 fn every_judgement_is_read_as_it_was_sent() {
-    for source in [Source::Raw, Source::Static, Source::GyroNet, Source::FogNet, Source::EarthRate] {
+    for source in [Source::Raw, Source::Static, Source::Model, Source::FogNet, Source::EarthRate] {
         for quality in [Quality::Good, Quality::Degraded, Quality::Initialising, Quality::Unusable] {
             let message = RateMessage { rate: -7, source, quality };
             assert_eq!(RateMessage::parse(&message.emit()), Ok(message));

@@ -76,7 +76,7 @@ fn a_constant_of_the_network_turns_nothing() {
     for moves in [400, 6_000] {
         let [without, with] = [0.0, NETWORK].map(|network| {
             let run = run_with(PipelineConfig::DEFAULT, network, 12_000, |_| 0.0, moves_from(moves));
-            run.1.last().map_or(0.0, |output| output.vehicle.navigation.yaw.rad())
+            run.1.last().map_or(0.0, |output| output.vehicle.delayed.yaw.rad())
         });
         println!("{without:+.5} rad in two minutes without it, {with:+.5} rad with it");
         assert!((with - without).abs() < 0.001 * NETWORK * 120.0);
@@ -84,12 +84,12 @@ fn a_constant_of_the_network_turns_nothing() {
 }
 
 #[test]
-fn proven_standing_is_zero_and_the_prompt_rate_goes_on() {
+fn proven_standstill_is_zero_and_the_live_rate_goes_on() {
     let (_, outputs) = run(3_000, |_| 0.0, |_| Some(Standstill::Still));
     let held = |rate: &YawEstimate| rate.rate == AngularRate::ZERO;
-    assert!(outputs[400..].iter().all(|output| held(&output.vehicle.navigation)));
-    assert!(outputs[400..].iter().all(|output| output.vehicle.navigation.status == Status::Ready));
-    let live = outputs[400..].iter().filter(|output| !held(&output.vehicle.prompt)).count();
+    assert!(outputs[400..].iter().all(|output| held(&output.vehicle.delayed)));
+    assert!(outputs[400..].iter().all(|output| output.vehicle.delayed.status == Status::Ready));
+    let live = outputs[400..].iter().filter(|output| !held(&output.vehicle.live)).count();
     assert!(live > 2_500, "a receiver that watches for stuck sensors sees {live} live samples");
 }
 
@@ -97,7 +97,7 @@ fn proven_standing_is_zero_and_the_prompt_rate_goes_on() {
 fn drift(ticks: u64) -> f64 {
     let alone = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
     let (_, outputs) = run_with(alone, NETWORK, ticks, |_| 0.0, |_| None);
-    outputs.last().map_or(0.0, |output| deg(output.vehicle.navigation.yaw.rad()))
+    outputs.last().map_or(0.0, |output| deg(output.vehicle.delayed.yaw.rad()))
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn a_slow_turn_is_no_bias() {
     for turn in [0.05, 0.1, 0.3, 1.0, -0.1] {
         let rad = f64::to_radians(turn);
         let (pipeline, outputs) = run(9_000, |tick| if tick < 1_000 { 0.0 } else { rad }, |_| None);
-        let turned = deg(outputs[8_999].vehicle.navigation.yaw.rad()) - drift(9_000);
+        let turned = deg(outputs[8_999].vehicle.delayed.yaw.rad()) - drift(9_000);
         let truth = turn * 80.0;
         println!("{turn} deg/s: {turned:.3} of {truth:.3} deg, bias {:+.6}", pipeline.bias().rad_per_sec());
         assert!((turned - truth).abs() < 0.1 * truth.abs(), "{turn} deg/s: {turned} of {truth} deg");
@@ -119,7 +119,7 @@ fn a_turn_that_begins_slowly_is_no_bias_either() {
     let ramp = |tick: u64| f64::to_radians(0.3) * (tick.saturating_sub(1_000) as f64 / 6_000.0).min(1.0);
     let (pipeline, outputs) = run(13_000, ramp, |_| None);
     let truth: f64 = (0..13_000).map(|tick| deg(ramp(tick)) * 0.01).sum();
-    let turned = deg(outputs[12_999].vehicle.navigation.yaw.rad()) - drift(13_000);
+    let turned = deg(outputs[12_999].vehicle.delayed.yaw.rad()) - drift(13_000);
     println!("{turned:.3} of {truth:.3} deg, bias {:+.6} rad/s", pipeline.bias().rad_per_sec());
     assert!((turned - truth).abs() < 0.1 * truth, "{turned} of {truth} deg");
 }
@@ -129,8 +129,7 @@ fn quiet_without_wheels_updates_but_never_holds() {
     let (pipeline, outputs) = run(6_000, |_| 0.0, |_| None);
     assert!(pipeline.counters().zero_rate_updates > 30, "{}", pipeline.counters().zero_rate_updates);
     assert!(
-        outputs[400..].iter().filter(|output| output.vehicle.navigation.rate == AngularRate::ZERO).count()
-            < 10
+        outputs[400..].iter().filter(|output| output.vehicle.delayed.rate == AngularRate::ZERO).count() < 10
     );
     // Where there are wheels they decide, though all is quiet.
     let (pipeline, _) =
@@ -144,7 +143,7 @@ fn wheels_that_see_the_car_pull_away_late_cost_no_angle() {
     let turn = |tick: u64| if (2_950..3_400).contains(&tick) { 0.15 } else { 0.0 };
     let (pipeline, outputs) = run(5_000, turn, moves_from(3_000));
     let truth = 4.5 * 0.15;
-    let turned = outputs[4_999].vehicle.navigation.yaw.rad() + pipeline.owed().navigation.rad();
+    let turned = outputs[4_999].vehicle.delayed.yaw.rad() + pipeline.pending().delayed.rad();
     println!("{turned:.4} of {truth:.4} rad");
     assert!((turned - truth).abs() < 0.01, "{turned} of {truth} rad");
     assert!(pipeline.bias().rad_per_sec().abs() < 5e-4, "nor did it become bias");
@@ -154,7 +153,7 @@ fn wheels_that_see_the_car_pull_away_late_cost_no_angle() {
 fn a_turntable_is_a_turn_whatever_the_wheels_say() {
     let turn = |tick: u64| if tick >= 2_000 { 0.1 } else { 0.0 };
     let (pipeline, outputs) = run(8_000, turn, |_| Some(Standstill::Still));
-    let turned = outputs[7_999].vehicle.navigation.yaw.rad() + pipeline.owed().navigation.rad();
+    let turned = outputs[7_999].vehicle.delayed.yaw.rad() + pipeline.pending().delayed.rad();
     println!("{turned:.3} of 6 rad, {} seconds contradicted", pipeline.counters().contradicted);
     assert!((turned - 6.0).abs() < 0.05, "{turned} of 6 rad");
     assert!(pipeline.counters().contradicted > 50);
@@ -170,8 +169,8 @@ fn locked_wheels_in_a_turn_never_hold_the_rate_at_zero() {
     };
     let (_, outputs) = run(3_400, turn, locked);
     for (tick, output) in outputs.iter().enumerate().skip(2_910) {
-        assert!((output.vehicle.navigation.rate.rad_per_sec() - 0.3).abs() < 0.01, "sample {tick}");
-        let reported = output.vehicle.navigation.faults.0 & Faults::WHEELS.0 != 0;
+        assert!((output.vehicle.delayed.rate.rad_per_sec() - 0.3).abs() < 0.01, "sample {tick}");
+        let reported = output.vehicle.delayed.faults.0 & Faults::WHEELS.0 != 0;
         assert_eq!(reported, (3_001..3_200).contains(&tick), "sample {tick}");
     }
 }

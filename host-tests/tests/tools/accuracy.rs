@@ -64,7 +64,7 @@ fn trials(test: &str) -> Option<&'static [Trial]> {
 /// The README's rows: how each begins, its method, and the place among its numbers of the ratio of both drives to static
 /// initialisation, behind which stand those of each drive.
 const ROWS: [(&str, Method, usize); 2] =
-    [("| gyronet, live rate |", Method::PROMPT, 1), ("| gyronet, delayed rate |", Method::NAVIGATION, 1)];
+    [("| gyronet, live rate |", Method::LIVE, 1), ("| gyronet, delayed rate |", Method::DELAYED, 1)];
 /// The sentence that begins so has the ratio to the best classical method as its first number.
 const OVER_BEST_CLASSICAL: &str = "The delayed rate has";
 

@@ -8,7 +8,7 @@ use gyronet_tools::evaluate::heading_error::Reference;
 
 /// The training drives: none on which the rows are judged.
 const TRIALS: [u32; 5] = [2, 3, 4, 6, 7];
-/// Samples on either side, up to the delay of the rate for navigation.
+/// Samples on either side, up to the delay of the delayed rate.
 const HALVES: std::ops::RangeInclusive<usize> = 1..=7;
 /// Corners, Hz.
 const CORNERS: [f64; 9] = [2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0];

@@ -1,4 +1,4 @@
-//! The default lane of a fibre-optic gyro on simulated sequences that stop now and then, each of a device of its own:
+//! The corrections of a fibre-optic gyro without a network on simulated sequences that stop now and then, each of a device of its own:
 //! what standstills add to the Earth's rate, and whether the expected errors are as large as the true ones.
 
 use gyronet_host_tests::sequence::{path_error, simulate};
@@ -20,7 +20,7 @@ struct Errors {
     by_default: f64,
     /// Less the Earth's rate and the bias that the simulation gave the device.
     by_truth: f64,
-    /// Sum of the squares of what the lane's bias is off at the end, (deg/h)^2.
+    /// Sum of the squares of what the bias is off at the end, (deg/h)^2.
     off: f64,
     drives: usize,
     inside: usize,

@@ -1,4 +1,4 @@
-//! The default lane of a fibre-optic gyro on a real drive: an hour in Kingston with a ring-laser gyro in its place, the
+//! The corrections of a fibre-optic gyro without a network on a real drive: an hour in Kingston with a ring-laser gyro in its place, the
 //! car's own speed, and the heading of a survey-grade system as reference.
 
 use gyronet::bias::Latitude;

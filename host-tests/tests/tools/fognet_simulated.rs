@@ -13,7 +13,7 @@ use gyronet_paper::simulate::{Layout, Spec};
 const SECONDS: u32 = 10 * 60;
 /// Runs of the gyro that FoGNet was trained for; none of them is in a set.
 const RUNS: std::ops::Range<u64> = 501..503;
-/// Largest mean error of the turn in a minute with FoGNet, over that of the default lane.
+/// Largest mean error of the turn in a minute with FoGNet, over that without a network.
 const RATIO: f64 = 0.9;
 
 fn simulated(device: u64, run: u64) -> Sequence {

@@ -1,5 +1,5 @@
 //! The default model's mounting is the training car's: it stays on that car's drives, and goes out on simulated vehicles,
-//! whose units are mounted otherwise. There the navigation rate is then better than static initialisation and zero-rate
+//! whose units are mounted otherwise. There the delayed rate is then better than static initialisation and zero-rate
 //! updates alone.
 
 use gyronet::model::window::{Features, WINDOW};
@@ -25,12 +25,12 @@ impl WindowNetwork for Nothing {
     }
 }
 
-/// Runs a drive; returns how often the mounting went out, and the 1 s error of the navigation rate, rad.
+/// Runs a drive; returns how often the mounting went out, and the 1 s error of the delayed rate, rad.
 fn run(recording: &Recording, network: &mut impl WindowNetwork) -> (u32, f64) {
     let wheels = WheelFrames::new(recording);
     let drive =
         Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network, || {}).expect("it stands first");
-    let rates: Vec<f64> = drive.navigation().map(|rate| rate.rate.rad_per_sec()).collect();
+    let rates: Vec<f64> = drive.delayed().map(|rate| rate.rate.rad_per_sec()).collect();
     let steps = &drive.steps[drive.compared()];
     let reference: Vec<f64> =
         steps.iter().map(|step| recording.rows[step.row].reference.expect("it has one")).collect();

@@ -30,7 +30,7 @@ fn the_reference_reader_finds_every_frame_and_state() {
         let step = step.unwrap();
         file.step(&step).unwrap();
         step.frames.iter().for_each(|sent| log.frame(sent.time, &sent.frame).unwrap());
-        yaw = step.vehicle.navigation.yaw.rad();
+        yaw = step.vehicle.delayed.yaw.rad();
     }
     let messages = file.finish().unwrap();
 
@@ -67,7 +67,7 @@ fn the_layout_plots_fields_that_the_file_has() {
     let paths = panels.values().flat_map(|panel| panel["paths"].as_array().into_iter().flatten());
     let paths: Vec<&str> = paths.map(|path| path["value"].as_str().unwrap()).collect();
     assert!(paths.len() >= 8);
-    let known = ["reference", "prompt", "navigation", "correction", "sigma", "yaw", "status", "standstill"];
+    let known = ["reference", "live", "delayed", "correction", "sigma", "yaw", "status", "standstill"];
     for path in paths {
         let field = path.strip_prefix("/rate.");
         assert!(

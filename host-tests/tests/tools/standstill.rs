@@ -50,7 +50,7 @@ fn stand(text: &str, config: PipelineConfig, wheels: bool) -> (f64, f64, u32) {
                 Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, ..Estimate::NONE };
             pipeline.deliver(due.end, estimate);
         }
-        last = output.vehicle.navigation.yaw.rad().to_degrees();
+        last = output.vehicle.delayed.yaw.rad().to_degrees();
         largest = largest.max(f64::abs(last));
     }
     (largest, last, pipeline.counters().zero_rate_updates)

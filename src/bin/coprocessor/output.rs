@@ -169,7 +169,7 @@ impl Output {
     #[inline(never)]
     fn note(&mut self, observation: &coprocessor::Observation) {
         let coprocessor::Observation { sample, vehicle, wheels, .. } = observation;
-        let (tick, status, faults) = (vehicle.tick, vehicle.prompt.status, vehicle.prompt.faults);
+        let (tick, status, faults) = (vehicle.tick, vehicle.live.status, vehicle.live.faults);
         let note = Observation { sample: *sample, tick, status, faults, wheels: *wheels };
         count(&mut self.lines.overruns, u32::from(!OBSERVATIONS.push(note)));
     }

@@ -163,7 +163,7 @@ impl Sink for Rates {
 
 /// Returns the sequence with the Earth's rate and the bias subtracted from the gyro, as the board computes it and
 /// FoGNet receives it.
-pub fn after_lane(sequence: &Sequence) -> Sequence {
+pub fn after_base(sequence: &Sequence) -> Sequence {
     let (sent, _) = run_board(sequence, default_config(sequence), None);
     let mut corrected = sequence.clone();
     for (step, sent) in corrected.steps.iter_mut().zip(sent) {

@@ -43,7 +43,7 @@ impl Spans {
         let row = &step.input;
         let rates = row.sample.angular_rate.map(AngularRate::rad_per_sec);
         let turns = std::array::from_fn(|axis| (rates[axis] - bias[axis]) * DT);
-        let corrected = step.settled.rad_per_sec();
+        let corrected = step.complete.rad_per_sec();
         self.by_rate.add(corrected, turns, row.reference);
         self.by_course.add(corrected, turns, row.course);
     }

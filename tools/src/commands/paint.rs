@@ -4,7 +4,7 @@ use console::style;
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::report::{COLUMNS, Report};
 
-/// Returns a report with its headings and the navigation rate highlighted.
+/// Returns a report with its headings and the delayed rate highlighted.
 pub fn report(report: &Report) -> String {
     let mut text = String::new();
     for line in report.to_string().lines() {
@@ -12,7 +12,7 @@ pub fn report(report: &Report) -> String {
             style(line).bold()
         } else if line.trim_start().starts_with(COLUMNS[0]) {
             style(line).dim()
-        } else if line.trim_start().starts_with(Method::NAVIGATION.name) {
+        } else if line.trim_start().starts_with(Method::DELAYED.name) {
             style(line).green().bold()
         } else {
             style(line)

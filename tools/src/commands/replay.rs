@@ -40,7 +40,7 @@ pub struct Args {
     /// Write the rates, the yaw and its expected error to this table, one line per sample.
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
-    /// Write the path computed from the wheels and the navigation yaw to this file, in the TUM format that evo reads.
+    /// Write the path computed from the wheels and the delayed yaw to this file, in the TUM format that evo reads.
     #[arg(long, value_name = "FILE.tum")]
     tum: Option<PathBuf>,
     #[command(flatten)]
@@ -114,7 +114,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         if let Some(mcap) = &mut mcap {
             mcap.write(|mcap| mcap.step(&step).map_err(io::Error::other))?;
         }
-        statuses.entry(status_name(step.vehicle.prompt.status)).and_modify(|count| *count += 1);
+        statuses.entry(status_name(step.vehicle.live.status)).and_modify(|count| *count += 1);
     }
     bar.finish_and_clear();
     let frames = log.finish().map_err(log_error)?;

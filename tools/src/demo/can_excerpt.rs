@@ -58,7 +58,7 @@ impl Sent {
             for TimedFrame { frame, time } in &step.frames {
                 log.frame(*time, frame)?;
             }
-            let rate = |step: &Step| step.vehicle.prompt.rate.0.unsigned_abs();
+            let rate = |step: &Step| step.vehicle.live.rate.0.unsigned_abs();
             let fastest = sent.fastest.as_ref().is_none_or(|fastest| rate(&step) >= rate(fastest));
             if step.is_compared && fastest {
                 sent.fastest = Some(step);
@@ -153,7 +153,7 @@ mod tests {
             names,
             ["MM5_10_TX1", "MM5_10_TX2", "MM5_10_TX3", "GyroNet_Rate", "GyroNet_Angle", "GyroNet_Detail"]
         );
-        let fastest = sent.fastest.unwrap().vehicle.prompt.rate;
+        let fastest = sent.fastest.unwrap().vehicle.live.rate;
         let gyro = recording.rows.iter().map(|row| row.sample.angular_rate[2].rad_per_sec().abs());
         assert!((fastest.rad_per_sec().abs() - gyro.fold(0.0, f64::max)).abs() < 0.1, "{fastest:?}");
         let degrees = fastest.rad_per_sec().to_degrees();

@@ -11,7 +11,7 @@ use gyronet::sample::RATE_HZ;
 
 /// The curves of these methods are drawn, from back to front.
 const DRAWN: [Method; 5] =
-    [Method::RAW, Method::STATIC, Method::STATIC_ZERO_RATE, Method::PROMPT, Method::NAVIGATION];
+    [Method::RAW, Method::STATIC, Method::STATIC_ZERO_RATE, Method::LIVE, Method::DELAYED];
 /// The class and the name of the reference.
 const REFERENCE: &str = "reference";
 
@@ -48,7 +48,7 @@ pub fn page(demo: &Demo<'_>) -> String {
 fn facts(demo: &Demo<'_>) -> String {
     let mut facts = Vec::new();
     if let Some(errors) = demo.errors {
-        let sent = errors.methods[Method::NAVIGATION].error;
+        let sent = errors.methods[Method::DELAYED].error;
         if let Some(ours) = errors.over_best_classical {
             facts
                 .push(("error over that of the best classical method", format!("{:.2}", ours.default.ratio)));
@@ -147,7 +147,7 @@ fn methods(demo: &Demo<'_>) -> String {
         "{}{}<p class=\"note\">Heading error over {:.1} s against <code>{}</code>: mean over windows of 1, 10 and 60 s, RMS \
          and value at the end. To static: the error in 1 s (the RMS where the reference is a course) over that of static \
          initialisation. Mean: the mean correction beyond static initialisation and zero-rate updates. The linear \
-         window is a settled estimate after static initialisation. The last two rows are the rates that the board \
+         window is a complete estimate after static initialisation. The last two rows are the rates that the board \
          sends: with the sample (Bosch TX1, VDC2), and in its own messages some samples later.</p>\n",
         ours.unwrap_or_default(),
         table("methods", "", &COLUMNS, rows),

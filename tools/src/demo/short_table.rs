@@ -22,7 +22,7 @@ impl fmt::Display for ShortTable<'_> {
             let note = if is_best(&method) { " (best classical method)" } else { "" };
             self.row(f, method, &format!("{}{note}", method.name))?;
         }
-        for method in [Method::PROMPT, Method::NAVIGATION] {
+        for method in [Method::LIVE, Method::DELAYED] {
             let delay = errors.methods[method].cost.delay_ms;
             self.row(f, method, &format!("gyronet, {} ({delay} ms delay)", method.name))?;
         }

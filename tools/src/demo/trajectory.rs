@@ -9,7 +9,7 @@ use gyronet::odometry::Track;
 use serde::Serialize;
 
 /// The paths of these methods are drawn.
-const METHODS: [Method; 3] = [Method::RAW, Method::STATIC, Method::NAVIGATION];
+const METHODS: [Method; 3] = [Method::RAW, Method::STATIC, Method::DELAYED];
 
 /// Holds the path of a method.
 #[derive(Debug, Clone, PartialEq, Serialize)]

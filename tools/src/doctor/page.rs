@@ -5,7 +5,7 @@ use crate::plot::page::chart::{Chart, Curve};
 use crate::plot::page::{HINT, document, escaped, table};
 
 /// Class of each axis's curve in the style sheet, and the name of the axis.
-const AXES: [(&str, &str); 3] = [("static", "x"), ("prompt", "y"), ("default", "z")];
+const AXES: [(&str, &str); 3] = [("static", "x"), ("live", "y"), ("default", "z")];
 
 pub fn page(doctor: &Doctor) -> String {
     let mut body = format!(

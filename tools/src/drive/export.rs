@@ -7,8 +7,8 @@ use gyronet::odometry::Track;
 use gyronet::units::AngularRate;
 use std::io::{self, Write};
 
-/// A table with a line for each step after static initialisation: time, s; the yaw rate of the gyro, the prompt rate,
-/// the navigation rate and its expected error, rad/s; the yaw of the navigation rate, rad; and the status of the prompt
+/// A table with a line for each step after static initialisation: time, s; the yaw rate of the gyro, the live rate,
+/// the delayed rate and its expected error, rad/s; the yaw of the delayed rate, rad; and the status of the live
 /// rate. An empty field is unknown.
 #[derive(Debug)]
 pub struct Table<W> {
@@ -18,7 +18,7 @@ pub struct Table<W> {
 impl<W: Write> Table<W> {
     /// Writes the header.
     pub fn new(mut out: W) -> io::Result<Self> {
-        writeln!(out, "t_s,gyro,prompt,navigation,sigma,yaw,status")?;
+        writeln!(out, "t_s,gyro,live,delayed,sigma,yaw,status")?;
         Ok(Self { out })
     }
 
@@ -28,17 +28,17 @@ impl<W: Write> Table<W> {
         }
         let [.., gyro] = step.input.sample.angular_rate;
         let known = |value: Option<f64>| value.map(|value| format!("{value:.7}")).unwrap_or_default();
-        let sent = step.navigation;
+        let sent = step.delayed;
         writeln!(
             self.out,
             "{:.4},{:.7},{:.7},{},{},{},{}",
             seconds(step.time.0),
             gyro.rad_per_sec(),
-            step.vehicle.prompt.rate.rad_per_sec(),
+            step.vehicle.live.rate.rad_per_sec(),
             known(sent.map(|sent| sent.rate.rad_per_sec())),
             known(sent.and_then(|sent| sent.sigma).map(AngularRate::rad_per_sec)),
             known(sent.map(|sent| sent.yaw.rad())),
-            format!("{:?}", step.vehicle.prompt.status).to_lowercase(),
+            format!("{:?}", step.vehicle.live.status).to_lowercase(),
         )
     }
 
@@ -48,7 +48,7 @@ impl<W: Write> Table<W> {
     }
 }
 
-/// The poses from dead reckoning with the navigation rate, from the end of static initialisation on: time of the
+/// The poses from dead reckoning with the delayed rate, from the end of static initialisation on: time of the
 /// recording, s, x forward and y left of the first pose, m, and the heading as a quaternion.
 #[derive(Debug)]
 pub struct Tum<W> {
@@ -66,7 +66,7 @@ impl<W: Write> Tum<W> {
     /// Writes the pose of a step.
     pub fn step(&mut self, step: &Step) -> io::Result<()> {
         let way = self.speeds.next(&step.input) * DT;
-        let Some(sent) = step.navigation.filter(|_| step.is_compared) else { return Ok(()) };
+        let Some(sent) = step.delayed.filter(|_| step.is_compared) else { return Ok(()) };
         self.track.step([way; 2], sent.rate.rad_per_sec() * DT);
         let ([x, y], (sin, cos)) = (self.track.position, (0.5 * self.track.yaw).sin_cos());
         writeln!(self.out, "{:.4} {x:.4} {y:.4} 0 0 0 {sin:.9} {cos:.9}", seconds(step.time.0))
@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(rows.len(), recording.rows.len() - 300);
         assert!(rows.iter().any(|row| row[6] == "ready"));
         let unknown = rows.iter().filter(|row| row[3].is_empty()).count();
-        assert_eq!(unknown, 7, "the last navigation rates are never sent");
+        assert_eq!(unknown, 7, "the last delayed rates are never sent");
 
         let number = |field: &str| field.parse::<f64>().unwrap();
         let path = String::from_utf8(path).unwrap();

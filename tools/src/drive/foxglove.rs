@@ -66,7 +66,7 @@ impl<W: Write + Seek> Recorder<W> {
             }),
         )?;
         self.message(self.channels.rate, time, &rate(step, row.reference))?;
-        let half = 0.5 * step.vehicle.navigation.yaw.rad();
+        let half = 0.5 * step.vehicle.delayed.yaw.rad();
         self.message(
             self.channels.pose,
             time,
@@ -79,7 +79,7 @@ impl<W: Write + Seek> Recorder<W> {
                 },
             }),
         )?;
-        let status = step.vehicle.prompt.status;
+        let status = step.vehicle.live.status;
         if self.last != Some(status) {
             let level = if status == Status::Ready { INFO } else { WARNING };
             self.message(
@@ -135,16 +135,16 @@ impl<W: Write + Seek> Recorder<W> {
 }
 
 fn rate(step: &Step, reference: Option<f64>) -> Value {
-    let (prompt, navigation) = (&step.vehicle.prompt, step.navigation);
+    let (live, delayed) = (&step.vehicle.live, step.delayed);
     json!({
         "timestamp": stamp(step.time),
-        "prompt": prompt.rate.rad_per_sec(),
-        "navigation": navigation.map(|navigation| navigation.rate.rad_per_sec()),
-        "settled": step.settled.rad_per_sec(),
-        "correction": prompt.correction.rad_per_sec(),
-        "sigma": prompt.sigma.map(|sigma| sigma.rad_per_sec()),
-        "yaw": step.vehicle.navigation.yaw.rad(),
-        "status": format!("{:?}", prompt.status).to_lowercase(),
+        "live": live.rate.rad_per_sec(),
+        "delayed": delayed.map(|delayed| delayed.rate.rad_per_sec()),
+        "complete": step.complete.rad_per_sec(),
+        "correction": live.correction.rad_per_sec(),
+        "sigma": live.sigma.map(|sigma| sigma.rad_per_sec()),
+        "yaw": step.vehicle.delayed.yaw.rad(),
+        "status": format!("{:?}", live.status).to_lowercase(),
         "standstill": format!("{:?}", step.standstill).to_lowercase(),
         "reference": reference,
     })
@@ -179,9 +179,9 @@ fn channels(writer: &mut Writer<impl Write + Seek>) -> Result<Channels, McapErro
             "gyronet.Rate",
             json!({
                 "timestamp": stamp,
-                "prompt": number,
-                "navigation": perhaps,
-                "settled": number,
+                "live": number,
+                "delayed": perhaps,
+                "complete": number,
                 "correction": number,
                 "sigma": perhaps,
                 "yaw": number,

@@ -100,8 +100,8 @@ pub struct Replay {
     pub start: usize,
     /// The gyro's static bias.
     pub gyro_bias: [AngularRate; 3],
-    /// The carry of the navigation rates at the end: yaw that has not been sent yet.
-    pub owed: Yaw,
+    /// The yaw that the delayed rates have not sent yet at the end.
+    pub pending: Yaw,
     /// The event counters of the pipeline.
     pub counters: Counters,
 }
@@ -134,19 +134,19 @@ impl Replay {
             .gyro_bias()
             .ok_or_else(|| ReplayError::NeverInitialised { path: recording.path.clone() })?;
         let start = start.unwrap_or(steps.len());
-        let (owed, counters) = (pipeline.owed().navigation, *pipeline.counters());
-        Ok(Self { steps, start, gyro_bias, owed, counters })
+        let (pending, counters) = (pipeline.pending().delayed, *pipeline.counters());
+        Ok(Self { steps, start, gyro_bias, pending, counters })
     }
 
-    /// Returns the range of the steps that have a navigation rate: from the end of static initialisation on.
+    /// Returns the range of the steps that have a delayed rate: from the end of static initialisation on.
     pub fn compared(&self) -> Range<usize> {
         let compared = self.steps.iter().filter(|step| step.is_compared).count();
         self.start..self.start + compared
     }
 
-    /// Returns the navigation rates of the compared steps.
-    pub fn navigation(&self) -> impl Iterator<Item = YawEstimate> {
-        self.steps[self.compared()].iter().filter_map(|step| step.navigation)
+    /// Returns the delayed rates of the compared steps.
+    pub fn delayed(&self) -> impl Iterator<Item = YawEstimate> {
+        self.steps[self.compared()].iter().filter_map(|step| step.delayed)
     }
 }
 
@@ -190,11 +190,11 @@ mod tests {
         assert_eq!((drive.steps.len(), drive.start, ticks), (1_000, 300, 1_000));
         assert_eq!(drive.gyro_bias[2], recording.rows[1].sample.angular_rate[2]);
         // The constant part of the corrections is removed.
-        let sent: i64 = drive.navigation().map(|rate| i64::from(rate.rate.0)).sum();
+        let sent: i64 = drive.delayed().map(|rate| i64::from(rate.rate.0)).sum();
         assert_eq!((drive.compared(), sent), (300..993, 0));
         // What remains is the variation of the last seven samples.
-        assert_eq!(drive.owed, Yaw(-(1 << 14)));
-        let count = |status| drive.steps.iter().filter(|step| step.vehicle.prompt.status == status).count();
+        assert_eq!(drive.pending, Yaw(-(1 << 14)));
+        let count = |status| drive.steps.iter().filter(|step| step.vehicle.live.status == status).count();
         assert_eq!((count(Status::Init), count(Status::Clipped)), (300, 0));
         let degraded = count(Status::Degraded);
         assert_eq!(degraded + count(Status::Ready), 700);

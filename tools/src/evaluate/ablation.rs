@@ -1,4 +1,4 @@
-//! What each part of the compensation contributes: the error of the navigation rate
+//! What each part of the compensation contributes: the error of the delayed rate
 //! with different configurations, all of which the board can run.
 
 use crate::board::{Board, Step};
@@ -51,7 +51,7 @@ fn with_mode(mode: Mode) -> PipelineConfig {
     PipelineConfig { compensate, ..PipelineConfig::DEFAULT }
 }
 
-/// Returns a configuration with another lag of the navigation rate.
+/// Returns a configuration with another lag of the delayed rate.
 pub(crate) fn with_lag(config: PipelineConfig, lag: Lag) -> PipelineConfig {
     let compensate = CompensateConfig { lag, ..config.compensate };
     PipelineConfig { compensate, ..config }
@@ -64,10 +64,10 @@ pub fn parts() -> Vec<Variant> {
     vec![
         Variant { network: false, ..Variant::new("static initialisation", alone(PipelineConfig::DEFAULT)) },
         Variant { network: false, ..Variant::new("+ zero-rate updates", PipelineConfig::DEFAULT) },
-        Variant::new("newest, settled", alone(with_lag(with_mode(Mode::Newest), Lag::MAX))),
-        Variant::new("middle, settled", alone(with_lag(with_mode(Mode::Middle), Lag::MAX))),
+        Variant::new("newest, complete", alone(with_lag(with_mode(Mode::Newest), Lag::MAX))),
+        Variant::new("middle, complete", alone(with_lag(with_mode(Mode::Middle), Lag::MAX))),
         Variant::new("overlap, at once", alone(with_lag(with_mode(overlap), Lag::NONE))),
-        Variant::new("overlap, settled", alone(with_lag(with_mode(overlap), Lag::MAX))),
+        Variant::new("overlap, complete", alone(with_lag(with_mode(overlap), Lag::MAX))),
         Variant::new("overlap, default lag", alone(PipelineConfig::DEFAULT)),
         Variant { wheels: false, ..Variant::new("+ updates, no wheels", PipelineConfig::DEFAULT) },
         Variant::new("+ zero-rate updates", PipelineConfig::DEFAULT),
@@ -197,7 +197,7 @@ struct Sums {
 
 impl Sums {
     fn add(&mut self, step: &Step) {
-        let Some(sent) = step.navigation.filter(|_| step.is_compared) else { return };
+        let Some(sent) = step.delayed.filter(|_| step.is_compared) else { return };
         let Some(truth) = step.input.reference else {
             self.has_gap = true;
             return;

@@ -34,16 +34,16 @@ impl Cost {
     pub fn new(method: Method, shapes: &Shapes) -> Option<Self> {
         let CompensateConfig { mode, lag, .. } = CompensateConfig::DEFAULT;
         let low_pass = LowPass::chosen();
-        let windows = |shape| multiplications(shape) as f64 / f64::from(mode.hop());
-        let settled = mode.settled_after();
+        let windows = |shape| multiplications(shape) as f64 / f64::from(mode.stride());
+        let complete = mode.complete_after();
         let (multiplications_per_sample, samples) = match method {
             Method::FIR | Method::FIR_ZERO_RATE => (low_pass.multiplications() as f64, low_pass.delay()),
             Method::VQF => (vqf::MULTIPLICATIONS as f64, 0),
-            Method::LINEAR => (windows(LINEAR), settled),
-            Method::GYRONET_F32 => (windows(shapes.paper?[0]), settled),
-            Method::GYRONET_INT => (windows(shapes.paper?[1]), settled),
-            Method::PROMPT => (windows(shapes.sent), 0),
-            Method::NAVIGATION => (windows(shapes.sent), lag.samples()),
+            Method::LINEAR => (windows(LINEAR), complete),
+            Method::GYRONET_F32 => (windows(shapes.paper?[0]), complete),
+            Method::GYRONET_INT => (windows(shapes.paper?[1]), complete),
+            Method::LIVE => (windows(shapes.sent), 0),
+            Method::DELAYED => (windows(shapes.sent), lag.samples()),
             // The other methods only subtract a bias from the gyro.
             _ => (0.0, 0),
         };

@@ -58,27 +58,27 @@ impl Method {
     /// The same as [`Method::LINEAR`] with the paper's GyroNet in integers.
     pub const GYRONET_INT: Self = mems("gyronet_int", "GyroNet, integer");
     /// The live rate, which the board sends at once: Bosch TX1, VDC2.
-    pub const PROMPT: Self = mems("prompt", "live rate");
+    pub const LIVE: Self = mems("live", "live rate");
     /// The delayed rate, which the board sends in its own yaw messages, some samples later.
-    pub const NAVIGATION: Self = mems("default", "delayed rate");
+    pub const DELAYED: Self = mems("default", "delayed rate");
     /// The orientation filter VQF ([`crate::evaluate::vqf`]). On a drive it starts from static initialisation; in the
     /// paper's tables it replaces the vendor's filter and estimates the bias itself.
     pub const VQF: Self = mems("vqf", "VQF filter");
     /// VQF with wider limits of rest, for a vehicle that vibrates at standstill.
     pub const VQF_VEHICLE: Self = mems("vqf_vehicle", "VQF filter, vehicle's limits of rest");
     pub const VENDOR: Self = mems("vendor", "vendor's filter");
-    /// GyroNet alone, integer, settled estimates.
+    /// GyroNet alone, integer, complete estimates.
     pub const GYRONET: Self = mems("gyronet", "GyroNet");
-    /// GyroNet alone, prompt rate.
+    /// GyroNet alone, live rate.
     pub const GYRONET_ONLINE: Self = mems("gyronet_online", "GyroNet, sent at once");
-    /// GyroNet followed by zero-rate updates, navigation rate.
+    /// GyroNet followed by zero-rate updates, delayed rate.
     pub const GYRONET_LOOP: Self = mems("gyronet_loop", "GyroNet with the bias loop");
     /// The fibre-optic gyro without any correction.
     pub const FOG: Self = fog("fog", "FoG");
     /// The fibre-optic gyro less the Earth's rate at the latitude of the sequence.
     pub const FOG_EARTH: Self = fog("fog_earth", "FoG less Earth rate");
     /// The fibre-optic gyro as the board sends it by default: less the Earth's rate and the bias at standstills.
-    pub const FOG_DEFAULT: Self = fog("fog_default", "FoG, default lane");
+    pub const FOG_DEFAULT: Self = fog("fog_default", "FoG, no network");
     /// FoGNet on the rate of [`Method::GYRONET_LOOP`] instead of a fibre-optic gyro: the paper's future work. FoGNet
     /// was not trained on such rates.
     pub const PSEUDO_FOG: Self = mems("pseudo_fog", "FoGNet on GyroNet's rate");
@@ -102,8 +102,8 @@ impl Method {
         Self::LINEAR,
         Self::GYRONET_F32,
         Self::GYRONET_INT,
-        Self::PROMPT,
-        Self::NAVIGATION,
+        Self::LIVE,
+        Self::DELAYED,
     ];
 
     /// The methods of a sequence, in the order of the paper's tables.

@@ -124,8 +124,8 @@ pub fn run(
         };
         match steps.zip(updated) {
             Some((steps, updated)) => {
-                let paper = [1, 2].map(|after| steps.get(sent + after).map(|step| step.settled));
-                let known = Known { updated: updated.navigation, linear: steps[0].settled, paper };
+                let paper = [1, 2].map(|after| steps.get(sent + after).map(|step| step.complete));
+                let known = Known { updated: updated.delayed, linear: steps[0].complete, paper };
                 let step = steps.into_iter().nth(sent).unwrap_or(updated);
                 side_by_side.step(step, &known).iter().for_each(&mut visit);
             }
@@ -172,10 +172,10 @@ impl SideBySide {
         let sample = &step.input.sample;
         let gyro = sample.angular_rate.map(AngularRate::rad_per_sec);
         let [x, y, still] = [0, 1, 2].map(|axis| gyro[axis] - self.bias[axis]);
-        // The static rate is used before the first navigation rate and after the last one.
+        // The static rate is used before the first delayed rate and after the last one.
         let updated = known.updated.map_or(still, |sent| sent.rate.rad_per_sec());
         let vqf = self.vqf.rate([x, y, still], sample.specific_force.map(SpecificForce::metre_per_sec2));
-        let navigation = step.navigation.map(|sent| sent.rate.rad_per_sec());
+        let delayed = step.delayed.map(|sent| sent.rate.rad_per_sec());
         let [float, integer] = known.paper.map(|rate| rate.map(AngularRate::rad_per_sec));
         // In the order of Method::ON_A_DRIVE; the low passes' rates come later.
         let rates = PerMethod::of([
@@ -188,8 +188,8 @@ impl SideBySide {
             Some(known.linear.rad_per_sec()),
             float,
             integer,
-            Some(step.vehicle.prompt.rate.rad_per_sec()),
-            navigation,
+            Some(step.vehicle.live.rate.rad_per_sec()),
+            delayed,
         ]);
         self.waiting.push_back(Sample { step, rates });
         let filtered = [self.fir[0].next(still), self.fir[1].next(updated)];

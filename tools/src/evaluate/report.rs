@@ -118,10 +118,10 @@ pub struct Comparison {
 /// Comparison of both rates that are sent with the best classical methods.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Comparisons {
-    /// The navigation rate.
+    /// The delayed rate.
     pub default: Comparison,
-    /// The prompt rate.
-    pub prompt: Comparison,
+    /// The live rate.
+    pub live: Comparison,
 }
 
 impl Comparisons {
@@ -135,17 +135,17 @@ impl Comparisons {
             let (best, least) = errors.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
             Some(Comparison { best_classical: best.key, ratio: error.compared()? / least })
         };
-        Some(Self { default: compare(Method::NAVIGATION)?, prompt: compare(Method::PROMPT)? })
+        Some(Self { default: compare(Method::DELAYED)?, live: compare(Method::LIVE)? })
     }
 }
 
 impl fmt::Display for Comparisons {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { default, prompt } = self;
+        let Self { default, live } = self;
         write!(
             f,
             "{:.2} of the best classical method ({}); live rate {:.2} ({})",
-            default.ratio, default.best_classical, prompt.ratio, prompt.best_classical
+            default.ratio, default.best_classical, live.ratio, live.best_classical
         )
     }
 }
@@ -376,7 +376,7 @@ mod tests {
                     Method::RAW => 1.0,
                     Method::FIR_ZERO_RATE => 0.3125,
                     Method::STATIC_ZERO_RATE => 0.375,
-                    Method::NAVIGATION => 0.25,
+                    Method::DELAYED => 0.25,
                     _ => 0.5,
                 };
             let rate = (reference == "ref_gyr_z").then_some(error);
@@ -389,7 +389,7 @@ mod tests {
             };
             let delay_ms = match method {
                 Method::FIR_ZERO_RATE => 50,
-                Method::NAVIGATION => 70,
+                Method::DELAYED => 70,
                 _ => 0,
             };
             Some(Row {
@@ -422,7 +422,7 @@ mod tests {
         let names: Vec<&str> = methods.keys().map(String::as_str).collect();
         let mut due =
             vec!["raw", "static", "static_zero_rate", "fir", "linear", "vqf", "gyronet_f32", "gyronet_int"];
-        due.extend(["prompt", "default", "fir_zero_rate"]);
+        due.extend(["live", "default", "fir_zero_rate"]);
         due.sort_unstable();
         assert_eq!(names, due);
         let row = json["drives"][1]["methods"]["default"].as_object().unwrap();
@@ -442,9 +442,9 @@ mod tests {
     #[test]
     fn ours_is_beside_the_best_that_is_no_later() {
         for drive in report().drives {
-            let Comparisons { default, prompt } = drive.over_best_classical.unwrap();
+            let Comparisons { default, live } = drive.over_best_classical.unwrap();
             assert_eq!((default.best_classical, default.ratio), ("fir_zero_rate", 0.8));
-            assert_eq!((prompt.best_classical, prompt.ratio), ("static_zero_rate", 0.5 / 0.375));
+            assert_eq!((live.best_classical, live.ratio), ("static_zero_rate", 0.5 / 0.375));
         }
     }
 

@@ -64,13 +64,16 @@ const SETTINGS: &[(&str, Takes)] = &[
         Number("m/s^2", Field::StaticAccelDrift, "spread of one-second means at rest"),
     ),
     ("static_init.gyro_bias", Number("rad/s", Field::StaticGyroBias, "largest bias")),
-    ("compensate.mode.Overlap.hop", Other("samples", "1 to 10; `compensate.mode` also `Newest`, `Middle`")),
+    (
+        "compensate.mode.Overlap.stride",
+        Other("samples", "1 to 10; `compensate.mode` also `Newest`, `Middle`"),
+    ),
     ("compensate.lag", Other("samples", "0 to 11, of 10 ms: how late the delayed rate is sent")),
     ("compensate.max_mean", Number("rad/s", Field::CompensateMaxMean, "largest mean correction of a window")),
     ("compensate.max_single", Number("rad/s", Field::CompensateMaxSingle, "largest single correction")),
     (
-        "compensate.max_carry",
-        Number("rad/s", Field::CompensateMaxCarry, "largest part of a revision that is added to one rate"),
+        "compensate.max_revision",
+        Number("rad/s", Field::CompensateMaxRevision, "largest part of a revision that is added to one rate"),
     ),
     (
         "fog_ids",
@@ -80,10 +83,10 @@ const SETTINGS: &[(&str, Takes)] = &[
         ),
     ),
     (
-        "fog_lane.tilt_deg",
+        "fog_gyro.tilt_deg",
         Number("deg", Field::FogTiltDeg, "from the gyro's axis to the vertical of the level vehicle"),
     ),
-    ("fog_lane.latitude_frame", Other("", "`null`, or the frame that carries the latitude")),
+    ("fog_gyro.latitude_frame", Other("", "`null`, or the frame that carries the latitude")),
     (
         "slcan_inputs",
         Other("", "`true` accepts wheel and latitude frames that a host sends over SLCAN: for a bench only"),

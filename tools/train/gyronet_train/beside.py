@@ -22,7 +22,7 @@ import torch
 
 from .augment import turn
 from .export import export
-from .linear import HOP, PARTS, fit, ratio, rows, sums, window_error
+from .linear import STRIDE, PARTS, fit, ratio, rows, sums, window_error
 from .model import GyroNet
 from .recordings import STATIC_SAMPLES, WINDOW, Drive, find_drive, load_drive, mean_1s_error, windows
 from .training import calibrate
@@ -95,8 +95,8 @@ def train(drives: list[Drive], outputs: np.ndarray, units: int, epochs: int, see
 
 @torch.no_grad()
 def estimates(model: GyroNet, drive: Drive) -> tuple[np.ndarray, np.ndarray]:
-    """Returns corrections (W, N) and scales (W,) of the windows HOP apart."""
-    x = torch.from_numpy(np.ascontiguousarray(windows(drive.features)[::HOP]))
+    """Returns corrections (W, N) and scales (W,) of the windows STRIDE apart."""
+    x = torch.from_numpy(np.ascontiguousarray(windows(drive.features)[::STRIDE]))
     correction, scale = zip(*(model(part) for part in x.split(4096)))
     return torch.cat(correction).numpy(), torch.cat(scale).numpy()
 
@@ -106,7 +106,7 @@ def corrected_ratio(model: GyroNet, drive: Drive) -> float:
     corrections, _ = estimates(model, drive)
     total, count = np.zeros(len(drive.gyro_error)), np.zeros(len(drive.gyro_error))
     for k in range(WINDOW):
-        samples = np.arange(len(corrections)) * HOP + k
+        samples = np.arange(len(corrections)) * STRIDE + k
         np.add.at(total, samples, corrections[:, k])
         np.add.at(count, samples, 1)
     error = drive.gyro_error - total / np.maximum(count, 1)
@@ -117,10 +117,10 @@ def log_loss(model: GyroNet | None, outputs: np.ndarray, drive: Drive, unit: flo
     """Returns the mean negative log likelihood of the windows' mean errors, in units of the training drives' mean
     error; without a model, with the same scale for all windows."""
     data = Windows([drive], outputs)
-    error = data.left.mean(1).abs().numpy()[::HOP] / unit
+    error = data.left.mean(1).abs().numpy()[::STRIDE] / unit
     if model is None:
         return float(error.mean())
-    scale = estimates(model, drive)[1][STATIC_SAMPLES // HOP :][: len(error)] / unit
+    scale = estimates(model, drive)[1][STATIC_SAMPLES // STRIDE :][: len(error)] / unit
     return float((error[: len(scale)] / scale + np.log(scale)).mean())
 
 

@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from .model import INPUTS, overlap_mean
 from .recordings import Drive, find_drive, load_drive, mean_1s_error, windows
-from .spans import HOP, Spans
+from .spans import STRIDE, Spans
 
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402 - the backend comes first
@@ -84,9 +84,9 @@ def errors(network: Network, drives: list[Drive]) -> tuple[float, float]:
     network.eval()
     by_sample, in_1s = [], []
     for drive in drives:
-        output = network(torch.from_numpy(np.ascontiguousarray(windows(drive.features)[::HOP])))
-        by_sample.append(float(np.abs(output.numpy() - windows(drive.gyro_error)[::HOP]).mean()))
-        in_1s.append(mean_1s_error(drive.gyro_error - overlap_mean(output, HOP, len(drive.gyro_error)).numpy()))
+        output = network(torch.from_numpy(np.ascontiguousarray(windows(drive.features)[::STRIDE])))
+        by_sample.append(float(np.abs(output.numpy() - windows(drive.gyro_error)[::STRIDE]).mean()))
+        in_1s.append(mean_1s_error(drive.gyro_error - overlap_mean(output, STRIDE, len(drive.gyro_error)).numpy()))
     return float(np.mean(by_sample)), float(np.mean(in_1s))
 
 

@@ -24,7 +24,7 @@ from safetensors.numpy import save_file
 from . import course
 from .recordings import RATE_HZ, STATIC_SAMPLES, WINDOW, Drive, find_drive, load_drive, mean_1s_error, windows
 
-HOP = 5
+STRIDE = 5
 REACH = 5
 FEATURES = 6
 ROLL, PITCH, YAW = 3, 4, 5
@@ -101,22 +101,22 @@ def on_grid(taps: np.ndarray) -> np.ndarray:
 def rows(taps: np.ndarray) -> np.ndarray:
     """Returns the outputs of a window (WINDOW, WINDOW, FEATURES) whose mean over overlapping windows is the filter.
 
-    A sample is estimated at index k of one window and at index k + HOP of the previous window; the mean of both is
+    A sample is estimated at index k of one window and at index k + STRIDE of the previous window; the mean of both is
     the filter's output. A tap that only one of the windows covers has twice its weight there. The taps that both
     windows cover compensate for this, so that the taps of each row have the filter's sum.
     """
     outputs = np.zeros((WINDOW, WINDOW, FEATURES))
-    for k in range(HOP):
+    for k in range(STRIDE):
         ahead, behind = np.zeros_like(taps), np.zeros_like(taps)
-        shared = slice(REACH - k, REACH - k + WINDOW - HOP)
+        shared = slice(REACH - k, REACH - k + WINDOW - STRIDE)
         ahead[shared.stop :] = 2 * taps[shared.stop :]
         behind[: shared.start] = 2 * taps[: shared.start]
         missing = taps.sum(axis=0) - ahead.sum(axis=0) - taps[shared].sum(axis=0)
-        ahead[shared] = taps[shared] + missing / (WINDOW - HOP)
-        behind[shared] = taps[shared] - missing / (WINDOW - HOP)
+        ahead[shared] = taps[shared] + missing / (WINDOW - STRIDE)
+        behind[shared] = taps[shared] - missing / (WINDOW - STRIDE)
         # The window begins k samples before this sample.
         place(outputs[k], ahead, k)
-        place(outputs[k + HOP], behind, k + HOP)
+        place(outputs[k + STRIDE], behind, k + STRIDE)
     return on_grid(outputs)
 
 
@@ -128,8 +128,8 @@ def place(row: np.ndarray, taps: np.ndarray, k: int) -> None:
 
 
 def corrections(outputs: np.ndarray, drive: Drive) -> np.ndarray:
-    """Returns the outputs (W, WINDOW) of the windows HOP apart."""
-    return np.tensordot(windows(drive.features)[::HOP].astype(np.float64), outputs, axes=([1, 2], [1, 2]))
+    """Returns the outputs (W, WINDOW) of the windows STRIDE apart."""
+    return np.tensordot(windows(drive.features)[::STRIDE].astype(np.float64), outputs, axes=([1, 2], [1, 2]))
 
 
 def rate_error(outputs: np.ndarray, drive: Drive) -> np.ndarray:
@@ -137,7 +137,7 @@ def rate_error(outputs: np.ndarray, drive: Drive) -> np.ndarray:
     total, count = np.zeros(len(drive.gyro_error)), np.zeros(len(drive.gyro_error))
     estimates = corrections(outputs, drive)
     for k in range(WINDOW):
-        samples = np.arange(len(estimates)) * HOP + k
+        samples = np.arange(len(estimates)) * STRIDE + k
         total[samples] += estimates[:, k]
         count[samples] += 1
     return drive.gyro_error - total / np.maximum(count, 1)
@@ -157,9 +157,9 @@ def leave_one_out(drives: list[Drive], basis: np.ndarray) -> list[float]:
 
 def window_error(outputs: np.ndarray, drives: list[Drive]) -> float:
     """Returns the mean |error| of a window's mean corrected rate, rad/s, after the static phase."""
-    from_static = slice(STATIC_SAMPLES // HOP, None)
+    from_static = slice(STATIC_SAMPLES // STRIDE, None)
     errors = [
-        (windows(d.gyro_error)[::HOP] - corrections(outputs, d)).mean(axis=1)[from_static] for d in drives
+        (windows(d.gyro_error)[::STRIDE] - corrections(outputs, d)).mean(axis=1)[from_static] for d in drives
     ]
     return float(abs(np.concatenate(errors)).mean())
 

@@ -71,14 +71,14 @@ class GyroNet(nn.Module):
         return outputs["gyro_error"], self.output_scale * outputs["log_scale"].exp()
 
 
-def overlap_mean(outputs: torch.Tensor, hop: int, length: int) -> torch.Tensor:
-    """Returns the mean of each sample's estimates from windows `hop` apart; 0 if no window covers the sample.
+def overlap_mean(outputs: torch.Tensor, stride: int, length: int) -> torch.Tensor:
+    """Returns the mean of each sample's estimates from windows `stride` apart; 0 if no window covers the sample.
 
-    `outputs` is (W, N) for the windows that start at 0, hop, 2 hop, ...; the result is (length,).
+    `outputs` is (W, N) for the windows that start at 0, stride, 2 stride, ...; the result is (length,).
     """
     total = torch.zeros(length)
     count = torch.zeros(length)
-    starts = torch.arange(outputs.shape[0]) * hop
+    starts = torch.arange(outputs.shape[0]) * stride
     for k in range(outputs.shape[1]):
         total.index_add_(0, starts + k, outputs[:, k])
         count.index_add_(0, starts + k, torch.ones(outputs.shape[0]))

@@ -68,7 +68,7 @@ def kaist_files(folder: Path):
 
 def load_grid(path: Path, rates: Path | None = None) -> list[Seconds]:
     """Reads a drive that `gyronet-paper import` wrote: the pieces of whole seconds between its gaps, counted
-    from its first row. If `rates` is given, the navigation rates of `gyronet replay --csv` replace the fibre-optic
+    from its first row. If `rates` is given, the delayed rates of `gyronet replay --csv` replace the fibre-optic
     gyro: the paper's pseudo-FoG. Raises ValueError with the reason."""
     mounting = read_mounting(path)
     digest = hashlib.sha256(path.read_bytes() + mounting.text)
@@ -103,7 +103,7 @@ def turns(path: Path, start: float, row: np.ndarray) -> np.ndarray:
     if not np.isin(at, row).all():
         raise ValueError(f"{path}: has rates at times at which the drive has no rows")
     turn = np.zeros(row[-1] + 1)
-    turn[at] = np.nan_to_num(sent["navigation"]) / RATE_HZ
+    turn[at] = np.nan_to_num(sent["delayed"]) / RATE_HZ
     return turn[row]
 
 

@@ -1,6 +1,6 @@
-"""Spans of drives, each cut into windows HOP samples apart, as the firmware runs them.
+"""Spans of drives, each cut into windows STRIDE samples apart, as the firmware runs them.
 
-A span of k windows has k - 1 stretches of HOP samples that two windows cover. The firmware uses the mean
+A span of k windows has k - 1 stretches of STRIDE samples that two windows cover. The firmware uses the mean
 of both windows there, so the loss is computed from it.
 """
 
@@ -14,7 +14,7 @@ import torch
 from .moments import Moments
 from .recordings import WINDOW, Drive
 
-HOP = 5
+STRIDE = 5
 
 
 class Spans:
@@ -25,7 +25,7 @@ class Spans:
         self.names = {drive.name: drive.sha256 for drive in drives}
         self.moments = Moments.added([Moments.of(drive) for drive in drives])
         self.windows = windows
-        self.length = WINDOW + (windows - 1) * HOP
+        self.length = WINDOW + (windows - 1) * STRIDE
         self.features = torch.from_numpy(np.concatenate([d.features for d in drives]))
         self.gyro_error = torch.from_numpy(np.concatenate([d.gyro_error for d in drives]))
         ends = np.cumsum([len(d.gyro_error) for d in drives])
@@ -38,7 +38,7 @@ class Spans:
     @staticmethod
     def count(samples: int, windows: int) -> int:
         """Returns the number of spans in a drive of `samples` samples."""
-        return max(0, samples - (WINDOW + (windows - 1) * HOP) + 1)
+        return max(0, samples - (WINDOW + (windows - 1) * STRIDE) + 1)
 
     def batches(self, windows: int) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
         """Yields shuffled batches of about `windows` windows: features (S, L, 6), gyro error (S, L).
@@ -60,10 +60,10 @@ class Spans:
 def cut(span: torch.Tensor) -> torch.Tensor:
     """Cuts spans into windows: (S, L, ...) -> (S, k, WINDOW, ...)."""
     return torch.stack(
-        [span[:, at : at + WINDOW] for at in range(0, span.shape[1] - WINDOW + 1, HOP)], dim=1
+        [span[:, at : at + WINDOW] for at in range(0, span.shape[1] - WINDOW + 1, STRIDE)], dim=1
     )
 
 
 def overlapped(windows: torch.Tensor) -> torch.Tensor:
-    """Averages both estimates of the samples that two windows cover: (S, k, WINDOW) -> (S, (k - 1) HOP)."""
-    return ((windows[:, :-1, HOP:] + windows[:, 1:, :HOP]) / 2).flatten(1)
+    """Averages both estimates of the samples that two windows cover: (S, k, WINDOW) -> (S, (k - 1) STRIDE)."""
+    return ((windows[:, :-1, STRIDE:] + windows[:, 1:, :STRIDE]) / 2).flatten(1)

@@ -9,12 +9,12 @@ import torch
 
 from .model import GyroNet, overlap_mean
 from .recordings import RATE_HZ, STATIC_SAMPLES, Drive, mean_1s_error, windows
-from .spans import HOP
+from .spans import STRIDE
 
 
 @dataclass(frozen=True)
 class Validation:
-    """Errors after the static phase, with overlapping windows HOP apart."""
+    """Errors after the static phase, with overlapping windows STRIDE apart."""
 
     mean_1s_rad: float
     """Mean |yaw error| over consecutive 1 s windows: the number that the tools print."""
@@ -36,18 +36,18 @@ def validate_all(model: GyroNet, drives: list[Drive]) -> Validation:
 
 @torch.no_grad()
 def corrections(model: GyroNet, features: np.ndarray) -> tuple[torch.Tensor, torch.Tensor]:
-    """Returns outputs (W, N) and scales (W,) of the windows HOP apart."""
+    """Returns outputs (W, N) and scales (W,) of the windows STRIDE apart."""
     model.eval()
-    return model(torch.from_numpy(np.ascontiguousarray(windows(features)[::HOP])))
+    return model(torch.from_numpy(np.ascontiguousarray(windows(features)[::STRIDE])))
 
 
 def validate(model: GyroNet, drive: Drive) -> Validation:
     """Runs the network on a drive; returns its errors."""
     output, scale = corrections(model, drive.features)
-    rate_error = drive.gyro_error - overlap_mean(output, HOP, len(drive.gyro_error)).numpy()
+    rate_error = drive.gyro_error - overlap_mean(output, STRIDE, len(drive.gyro_error)).numpy()
     yaw_error = np.cumsum(np.append(0.0, rate_error[STATIC_SAMPLES:])) / RATE_HZ
-    moving = slice(STATIC_SAMPLES // HOP, None)
-    label = windows(drive.gyro_error)[::HOP].mean(axis=1)[moving]
+    moving = slice(STATIC_SAMPLES // STRIDE, None)
+    label = windows(drive.gyro_error)[::STRIDE].mean(axis=1)[moving]
     window_error = np.abs(output.numpy().mean(axis=1)[moving] - label)
     scale = scale.numpy()[moving]
     return Validation(

@@ -53,12 +53,12 @@ class Gaps(unittest.TestCase):
         rates = self.path.with_name("rates.csv")
         sent = np.concatenate([np.arange(300, 1010), np.arange(1230, 2400)])
         lines = [f"{k / 100:.4f},{'' if k == 500 else k / 1000},ready" for k in sent]
-        rates.write_text("\n".join(["t_s,navigation,status", *lines]))
+        rates.write_text("\n".join(["t_s,delayed,status", *lines]))
         first, second = load_grid(self.path, rates)
         self.assertEqual(first.features[:3, 8].tolist(), [0.0] * 3)
         np.testing.assert_allclose(first.features[5, 8], np.arange(501, 600).sum() / 1e5)
         np.testing.assert_allclose(second.features[0, 8], np.arange(1300, 1400).sum() / 1e5)
-        rates.write_text("t_s,navigation,status\n11.0,0.1,ready\n11.01,0.1,ready\n")
+        rates.write_text("t_s,delayed,status\n11.0,0.1,ready\n11.01,0.1,ready\n")
         with self.assertRaisesRegex(ValueError, "rates.csv: has rates at times at which the drive has no rows"):
             load_grid(self.path, rates)
 

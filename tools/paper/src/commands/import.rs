@@ -76,7 +76,7 @@ fn write(args: &Args, sequence: &Sequence) -> super::Result {
         }
         let out = BufWriter::new(File::create(path).map_err(named(path))?);
         let rows = if args.training {
-            sequence::write_whole(&fog_replay::after_lane(sequence), out)
+            sequence::write_whole(&fog_replay::after_base(sequence), out)
         } else {
             sequence::write_csv(sequence, out)
         };

@@ -129,18 +129,18 @@ impl Estimates {
                 self.add(Method::STATIC, || constant(bias));
                 self.add(Method::FIR, || LowPass::chosen().filter(&constant(bias)));
                 for (method, run_time, rates) in [
-                    (Method::GYRONET, alone_s, corrected(&drive, &gyro, |step| step.settled)),
+                    (Method::GYRONET, alone_s, corrected(&drive, &gyro, |step| step.complete)),
                     (
                         Method::GYRONET_ONLINE,
                         alone_s,
-                        corrected(&drive, &gyro, |step| step.vehicle.prompt.rate),
+                        corrected(&drive, &gyro, |step| step.vehicle.live.rate),
                     ),
-                    // The navigation rates of the drive's last steps have not been sent yet.
+                    // The delayed rates of the drive's last steps have not been sent yet.
                     (
                         Method::GYRONET_LOOP,
                         looped_s,
                         corrected(&looped, &gyro, |step| {
-                            step.navigation.map_or(step.settled, |sent| sent.rate)
+                            step.delayed.map_or(step.complete, |sent| sent.rate)
                         }),
                     ),
                 ] {

@@ -9,9 +9,17 @@ use serde::Serialize;
 use serde_json::Value;
 
 /// Names inside `compensate` of the rates that a record stores as codes.
-const RATES: [&str; 3] = ["max_mean", "max_single", "max_carry"];
-/// Settings that chose FoGNet, with their paths in a configuration.
-const RETIRED: [(&str, &str); 2] = [("fog_lane.fognet", "/fog_lane/fognet"), ("fog_serial", "/fog_serial")];
+const RATES: [&str; 3] = ["max_mean", "max_single", "max_revision"];
+const NO_FOGNET: &str =
+    "retired, because FoGNet no longer runs on this board (`cargo paper tables` runs it on recordings)";
+/// Settings that have gone, with the reason or the successor. A name stands for those below it too.
+const RETIRED: [(&str, &str); 5] = [
+    ("fog_lane.fognet", NO_FOGNET),
+    ("fog_serial", NO_FOGNET),
+    ("fog_lane", "its name is fog_gyro now"),
+    ("compensate.max_carry", "its name is compensate.max_revision now"),
+    ("compensate.mode.Overlap.hop", "its name is compensate.mode.Overlap.stride now"),
+];
 /// Decimals, in rad/s, that distinguish any two codes.
 const RATE_DECIMALS: usize = 9;
 
@@ -23,10 +31,8 @@ pub enum SettingError {
     NoAssignment(String),
     #[error("{0}: there is no such setting; see `device get`")]
     Name(String),
-    #[error(
-        "{0}: retired, because FoGNet no longer runs on this board (`cargo paper tables` runs it on recordings)"
-    )]
-    Retired(&'static str),
+    #[error("{0}: {1}")]
+    Retired(&'static str, &'static str),
     /// The value is not a rate, or out of range.
     #[error("compensate.{name}: {value} is not a rate in rad/s")]
     Rate {
@@ -55,8 +61,9 @@ pub fn to_value(configuration: &Configuration) -> Result<Value, SettingError> {
 
 /// Converts names and values to a configuration; ranges are not checked.
 pub fn from_value(mut value: Value) -> Result<Configuration, SettingError> {
-    if let Some((name, _)) = RETIRED.iter().find(|(_, path)| value.pointer(path).is_some()) {
-        return Err(SettingError::Retired(name));
+    let path = |name: &str| format!("/{}", name.replace('.', "/"));
+    if let Some((name, instead)) = RETIRED.iter().find(|(name, _)| value.pointer(&path(name)).is_some()) {
+        return Err(SettingError::Retired(name, instead));
     }
     for name in RATES {
         // `serde_json` reports a missing rate below.
@@ -69,8 +76,10 @@ pub fn from_value(mut value: Value) -> Result<Configuration, SettingError> {
 
 pub fn assign(configuration: &mut Value, setting: &str) -> Result<(), SettingError> {
     let (name, text) = setting.split_once('=').ok_or_else(|| SettingError::NoAssignment(setting.into()))?;
-    if let Some((name, _)) = RETIRED.iter().find(|(retired, _)| *retired == name) {
-        return Err(SettingError::Retired(name));
+    let is_below =
+        |above: &str| name.strip_prefix(above).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+    if let Some((name, instead)) = RETIRED.iter().find(|(retired, _)| is_below(retired)) {
+        return Err(SettingError::Retired(name, instead));
     }
     let place = name.split('.').try_fold(configuration, |value, key| match key.parse::<usize>() {
         Ok(index) => value.get_mut(index),

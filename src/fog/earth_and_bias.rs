@@ -1,4 +1,4 @@
-//! The lane corrects a gyro's turns for what is known without a network: the Earth's rate at the latitude, the tilt of
+//! Corrections of a gyro's turns for what is known without a network: the Earth's rate at the latitude, the tilt of
 //! the gyro's axis, and its bias ([`super::rest`]).
 
 use super::part::FogErrors;
@@ -41,7 +41,7 @@ impl Tilt {
 
 /// Corrects a gyro's turns without a network.
 #[derive(Debug, Clone)]
-pub struct Lane {
+pub struct EarthAndBias {
     tilt: Tilt,
     tilt_rest: i128,
     latitude: Option<Latitude>,
@@ -50,8 +50,8 @@ pub struct Lane {
     reading: Option<Angle>,
 }
 
-impl Lane {
-    /// Creates a lane before its first step.
+impl EarthAndBias {
+    /// Creates one before its first step.
     #[must_use]
     pub const fn new(errors: FogErrors, tilt: Tilt, latitude: Option<Latitude>) -> Self {
         let earth = match latitude {
@@ -129,9 +129,9 @@ mod tests {
     #[test]
     fn the_earth_comes_off_to_the_resolution_of_an_increment() {
         for degrees in [90.0, 60.0, 0.0, -34.0, -90.0f32] {
-            let mut lane = Lane::new(FogErrors::DSP1760, Tilt::NONE, None);
-            lane.set_latitude(Latitude::from_degrees(degrees), false);
-            let (turn, _) = lane.correct(Some(Angle::ZERO), Standstill::Moving);
+            let mut fog = EarthAndBias::new(FogErrors::DSP1760, Tilt::NONE, None);
+            fog.set_latitude(Latitude::from_degrees(degrees), false);
+            let (turn, _) = fog.correct(Some(Angle::ZERO), Standstill::Moving);
             let taken = -turn.unwrap().rad() * 100.0;
             let earth = 7.292_115e-5 * f64::from(degrees).to_radians().sin();
             // 1e-5 deg/h.
@@ -142,11 +142,11 @@ mod tests {
     #[test]
     fn a_tilted_gyro_shows_the_whole_turn() {
         let tilt = Tilt::from_degrees(5.0).unwrap();
-        let mut lane = Lane::new(FogErrors::DSP1760, tilt, None);
+        let mut fog = EarthAndBias::new(FogErrors::DSP1760, tilt, None);
         // A full turn in 20 s.
         let turn = core::f64::consts::TAU / 2_000.0 * 5f64.to_radians().cos();
         let code = Angle((turn * f64::from(Angle::PER_RAD)).round() as i64);
-        let turned = (0..2_000).filter_map(|_| lane.correct(Some(code), Standstill::Moving).0);
+        let turned = (0..2_000).filter_map(|_| fog.correct(Some(code), Standstill::Moving).0);
         let turned: f64 = turned.map(Angle::rad).sum();
         assert!((turned - core::f64::consts::TAU).abs() < 1e-8, "{turned}");
         assert_eq!([Tilt::from_degrees(0.0), Tilt::from_degrees(45.1)], [Some(Tilt::NONE), None]);

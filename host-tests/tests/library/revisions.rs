@@ -1,11 +1,11 @@
 //! No angle is lost between the network's revised estimates and the rates on the bus: a ledger
 //! beside the pipeline, exact to the last code.
 
-use gyronet::compensate::{CompensateConfig, Compensator, Hop, Lag, Mode};
+use gyronet::compensate::{CompensateConfig, Compensator, Lag, Mode, Stride};
 use gyronet::health::Status;
 use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SteadyGain};
-use gyronet::pipeline::{BoardState, Owed, Pipeline, PipelineConfig};
+use gyronet::pipeline::{BoardState, Pending, Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::units::{AngularRate, Yaw};
 use gyronet_host_tests::noise::Noise;
@@ -22,8 +22,8 @@ struct Ledger {
     constant: (i64, i64),
     out: Option<(u32, [i64; WINDOW])>,
     /// Sums of the rates that went out.
-    prompt: i64,
-    navigation: i64,
+    live: i64,
+    delayed: i64,
 }
 
 struct Sample {
@@ -78,7 +78,7 @@ impl Ledger {
         let used = &window[mode.used()];
         let sum: i64 = used.iter().map(|(_, estimate)| estimate).sum();
         let (constant, windows) = &mut self.constant;
-        *windows = (*windows + 1).min(1_280 / i64::from(mode.hop()));
+        *windows = (*windows + 1).min(1_280 / i64::from(mode.stride()));
         *constant += ((sum / used.len() as i64 * 65_536) - *constant) / *windows;
         for (sample, estimate) in &mut window[mode.used()] {
             sample.estimates.push(*estimate - (*constant >> 16));
@@ -98,16 +98,16 @@ struct Faults {
     spread: f64,
 }
 
-/// 30 s with the ledger checked about five times a second; returns how often the carry was bounded
-/// and how many samples were settled.
+/// 30 s with the ledger checked about five times a second; returns how often the revisions of a rate were bounded
+/// and how many samples were complete.
 fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) {
-    let CompensateConfig { mode, lag, max_mean, max_carry, .. } = compensate;
+    let CompensateConfig { mode, lag, max_mean, max_revision, .. } = compensate;
     let mut noise = Noise::new(seed);
     let config = PipelineConfig { compensate, zero_rate: None, ..PipelineConfig::DEFAULT };
     let mut pipeline = Pipeline::new(config);
     let mut ledger = Ledger::default();
-    let (mut tick, mut bounded, mut ready, mut settled) = (0u64, 0, 0, 0);
-    let bound = i64::from(max_carry.0);
+    let (mut tick, mut bounded, mut ready, mut complete) = (0u64, 0, 0, 0);
+    let bound = i64::from(max_revision.0);
     while tick < 3_000 {
         let moving = tick > 400;
         tick += if moving && faults.gaps && noise.int(0, 99) == 0 { noise.int(2, 9) as u64 } else { 1 };
@@ -117,43 +117,43 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
         sample.angular_rate[2].0 += if moving { rate(0.4).0 } else { 0 };
         let broken = ledger.samples.last_key_value().map(|(last, _)| *last);
         let output = pipeline.correct(sample, None, &BoardState::GOOD).expect("a place on the grid");
-        let (prompt, navigation) = (output.vehicle.prompt, output.vehicle.navigation);
-        let Some(bias) = pipeline.gyro_bias().filter(|_| prompt.status != Status::Init) else {
+        let (live, delayed) = (output.vehicle.live, output.vehicle.delayed);
+        let Some(bias) = pipeline.gyro_bias().filter(|_| live.status != Status::Init) else {
             continue;
         };
-        if clipped || broken.is_some_and(|last| prompt.tick != last + 1) {
+        if clipped || broken.is_some_and(|last| live.tick != last + 1) {
             ledger.break_window();
         }
-        ledger.take_estimate(prompt.tick, mode, max_mean.0.into());
+        ledger.take_estimate(live.tick, mode, max_mean.0.into());
         let rates: [AngularRate; 3] =
             std::array::from_fn(|k| AngularRate(sample.angular_rate[k].0 - bias[k].0));
         let (gyro, steady) = (i64::from(rates[2].0), ledger.steady(rates));
-        ledger.samples.insert(prompt.tick, Sample { gyro, clipped, steady, estimates: Vec::new() });
-        ledger.prompt += i64::from(prompt.rate.0);
-        if navigation.status != Status::Init {
-            ledger.navigation += i64::from(navigation.rate.0);
+        ledger.samples.insert(live.tick, Sample { gyro, clipped, steady, estimates: Vec::new() });
+        ledger.live += i64::from(live.rate.0);
+        if delayed.status != Status::Init {
+            ledger.delayed += i64::from(delayed.rate.0);
         }
         if noise.int(0, 19) == 0 {
-            let Owed { prompt: Yaw(prompt_owed), navigation: Yaw(navigation_owed) } = pipeline.owed();
-            assert_eq!(ledger.prompt + prompt_owed, ledger.best(), "at tick {}", prompt.tick);
-            assert_eq!(ledger.navigation + navigation_owed, ledger.best(), "at tick {}", prompt.tick);
+            let Pending { live: Yaw(live_pending), delayed: Yaw(delayed_pending) } = pipeline.pending();
+            assert_eq!(ledger.live + live_pending, ledger.best(), "at tick {}", live.tick);
+            assert_eq!(ledger.delayed + delayed_pending, ledger.best(), "at tick {}", live.tick);
         }
-        assert_eq!((prompt.yaw.0, navigation.yaw.0), (ledger.prompt, ledger.navigation));
-        if let Some(settled_now) = output.settled {
-            let sample = &ledger.samples[&settled_now.tick];
-            assert_eq!(i64::from(settled_now.correction.0), sample.estimate());
-            settled += u32::from(settled_now.good);
+        assert_eq!((live.yaw.0, delayed.yaw.0), (ledger.live, ledger.delayed));
+        if let Some(complete_now) = output.complete {
+            let sample = &ledger.samples[&complete_now.tick];
+            assert_eq!(i64::from(complete_now.correction.0), sample.estimate());
+            complete += u32::from(complete_now.good);
         }
-        for rate in [prompt, navigation].iter().filter(|rate| rate.status != Status::Init) {
+        for rate in [live, delayed].iter().filter(|rate| rate.status != Status::Init) {
             let sample = &ledger.samples[&rate.tick];
             let carried = sample.gyro - sample.estimate() - i64::from(rate.rate.0);
             assert!(carried.abs() <= bound, "one rate carries {carried}");
             assert!(!sample.clipped || carried == 0, "a receiver drops the rate of a clipped sample");
             bounded += u32::from(carried.abs() == bound);
         }
-        let late = ledger.samples.range(navigation.tick..).count() - 1;
-        assert_eq!(late, if navigation.status == Status::Init { 0 } else { lag.samples() });
-        ready += u32::from(navigation.status == Status::Ready);
+        let late = ledger.samples.range(delayed.tick..).count() - 1;
+        assert_eq!(late, if delayed.status == Status::Init { 0 } else { lag.samples() });
+        ready += u32::from(delayed.status == Status::Ready);
         if let Some(due) = output.window {
             let mean = faults.spread * noise.normal();
             let corrections = [(); WINDOW].map(|()| rate(mean + faults.spread * noise.normal()));
@@ -162,12 +162,12 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
         }
     }
     assert!(ready > 1_000, "only {ready} samples were corrected");
-    (bounded, settled)
+    (bounded, complete)
 }
 
 /// Returns every mode with every kind of lag.
 fn configs() -> impl Iterator<Item = CompensateConfig> {
-    let overlap = [1, 3, 5, 10].into_iter().filter_map(Hop::new).map(|hop| Mode::Overlap { hop });
+    let overlap = [1, 3, 5, 10].into_iter().filter_map(Stride::new).map(|stride| Mode::Overlap { stride });
     let modes = overlap.chain([Mode::Middle, Mode::Newest]);
     let lags = [0, 2, 7, 11].into_iter().filter_map(Lag::new);
     let with = |mode, lag| CompensateConfig { mode, lag, ..CompensateConfig::DEFAULT };
@@ -179,11 +179,11 @@ const CALM: Faults = Faults { gaps: false, clipping: false, spread: 0.0002 };
 #[test]
 fn the_sum_of_a_clean_stream_is_that_of_the_estimates() {
     for config in configs() {
-        let (bounded, settled) = check(config, CALM, 1);
+        let (bounded, complete) = check(config, CALM, 1);
         assert_eq!(bounded, 0, "nothing here needs the bound");
         // What comes before the first used output has no estimate, and the last are under way.
-        let without = config.mode.used().start + config.mode.settled_after();
-        assert_eq!(settled as usize, 3_000 - 300 - without, "{config:?}");
+        let without = config.mode.used().start + config.mode.complete_after();
+        assert_eq!(complete as usize, 3_000 - 300 - without, "{config:?}");
     }
 }
 
@@ -195,9 +195,9 @@ fn gaps_clipping_and_implausible_windows_lose_no_revision() {
 }
 
 #[test]
-fn a_bounded_carry_is_spread_and_not_lost() {
+fn bounded_revisions_are_spread_and_not_lost() {
     for config in configs() {
-        let tight = CompensateConfig { max_carry: AngularRate(5_000), ..config };
+        let tight = CompensateConfig { max_revision: AngularRate(5_000), ..config };
         assert!(check(tight, CALM, 7).0 > 1_000);
         assert!(check(tight, Faults { gaps: true, clipping: true, spread: 0.02 }, 8).0 > 1_000);
     }
@@ -209,7 +209,7 @@ fn a_bounded_carry_is_spread_and_not_lost() {
 fn a_revision_while_the_vehicle_stands_is_given_back_when_it_moves() {
     const ALL: u32 = 400;
     let (mut compensator, mut noise) = (Compensator::new(CompensateConfig::DEFAULT), Noise::new(9));
-    let (mut sent, mut best, mut settled) = (0, 0, 0);
+    let (mut sent, mut best, mut complete) = (0, 0, 0);
     for tick in 0..ALL {
         match tick {
             // The last estimates are known by then: those of the samples that follow are zero.
@@ -225,14 +225,14 @@ fn a_revision_while_the_vehicle_stands_is_given_back_when_it_moves() {
         if tick == 200 {
             compensator.end_standstill();
         }
-        let navigation = compensator.navigation(AngularRate::ZERO, (100..200).contains(&tick));
-        sent += navigation.map_or(0, |navigation| i64::from(navigation.rate.0));
+        let delayed = compensator.delayed(AngularRate::ZERO, (100..200).contains(&tick));
+        sent += delayed.map_or(0, |delayed| i64::from(delayed.rate.0));
         best += i64::from(gyro.0);
-        if let Some(known) = compensator.settled() {
+        if let Some(known) = compensator.complete() {
             best -= i64::from(known.correction.0);
-            settled += 1;
+            complete += 1;
         }
     }
-    assert!(settled > ALL - 20);
-    assert_eq!(sent + compensator.navigation_owed(AngularRate::ZERO), best);
+    assert!(complete > ALL - 20);
+    assert_eq!(sent + compensator.delayed_pending(AngularRate::ZERO), best);
 }

@@ -26,14 +26,14 @@ impl Scale {
 
 /// Carries the rounding residual of one signal to its next code.
 #[derive(Debug, Clone, Copy)]
-pub struct RoundingCarry {
+pub struct RoundingResidual {
     scale: Scale,
     /// Sum of the exact values minus the sum of the codes sent, in LSB x 2^-32.
     residual: i64,
 }
 
-impl RoundingCarry {
-    /// Creates a carry with residual zero.
+impl RoundingResidual {
+    /// Creates one whose residual is zero.
     #[must_use]
     pub const fn new(scale: Scale) -> Self {
         Self { scale, residual: 0 }

@@ -1,4 +1,4 @@
-//! The default lane of a fibre-optic gyro: Earth's rate, bias by standstills, and what its messages say of both.
+//! The corrections of a fibre-optic gyro without a network: Earth's rate, bias by standstills, and what its messages say of both.
 
 use embedded_can::{ExtendedId, Frame, Id};
 use gyronet::bias::Latitude;
@@ -73,7 +73,7 @@ impl Gyro {
     }
 }
 
-fn lane(latitude_deg: Option<f32>) -> FogPipeline {
+fn at_latitude(latitude_deg: Option<f32>) -> FogPipeline {
     let config = FogConfig { latitude: latitude_deg.and_then(Latitude::from_degrees), ..FogConfig::DEFAULT };
     let fog = FogPipeline::new(config, true, false);
     fog
@@ -90,7 +90,7 @@ fn ten_straight_minutes_anywhere_on_earth() {
         [(0.0f32, 0.4), (60.0, -0.5), (-34.0, 0.25), (36.37, 0.0), (90.0, 0.1)].into_iter().enumerate()
     {
         let mut gyro = Gyro::new(seed as u64 + 1, latitude.into(), bias);
-        let mut fog = lane(Some(latitude));
+        let mut fog = at_latitude(Some(latitude));
         gyro.run(&mut fog, 600);
         gyro.standstill = Standstill::Moving;
         let sent = gyro.run(&mut fog, 600);
@@ -110,7 +110,7 @@ fn ten_straight_minutes_anywhere_on_earth() {
 fn without_a_latitude_the_rate_is_degraded() {
     let mut gyro = Gyro::new(9, -34.0, 0.0);
     gyro.standstill = Standstill::Moving;
-    let mut fog = lane(None);
+    let mut fog = at_latitude(None);
     let sent = gyro.run(&mut fog, 10);
     assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::Raw, Quality::Degraded)));
     // Any latitude may be the right one: 8.7 deg/h beside the shaking of 35.1.
@@ -128,7 +128,7 @@ fn without_a_latitude_the_rate_is_degraded() {
 #[test]
 fn a_turn_on_standing_wheels_is_reported_and_not_learnt() {
     let mut gyro = Gyro::new(4, 60.0, 0.0);
-    let mut fog = lane(Some(60.0));
+    let mut fog = at_latitude(Some(60.0));
     gyro.run(&mut fog, 60);
     gyro.rate += 100.0 * DEG_PER_HOUR;
     let sent = gyro.run(&mut fog, 60);
