@@ -75,8 +75,7 @@ impl Gyro {
 
 fn at_latitude(latitude_deg: Option<f32>) -> FogPipeline {
     let config = FogConfig { latitude: latitude_deg.and_then(Latitude::from_degrees), ..FogConfig::DEFAULT };
-    let fog = FogPipeline::new(config, true, false);
-    fog
+    FogPipeline::new(config, true, false)
 }
 
 fn mean_deg_per_hour(sent: &[YawEstimate]) -> f64 {
@@ -145,8 +144,7 @@ fn constant(deg_per_hour: f64) -> Angle {
 
 fn with_fognet(fognet: FogNetUse) -> FogPipeline {
     let config = FogConfig { latitude: Latitude::from_degrees(36.37), fognet, ..FogConfig::DEFAULT };
-    let fog = FogPipeline::new(config, true, false);
-    fog
+    FogPipeline::new(config, true, false)
 }
 
 #[test]

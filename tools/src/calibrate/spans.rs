@@ -113,9 +113,9 @@ struct ByCourse {
 impl ByCourse {
     fn add(&mut self, corrected: f64, turns: [f64; 3], course: Option<f64>) {
         self.is_known |= course.is_some();
-        for axis in 0..3 {
-            self.turned[axis] += turns[axis];
-            self.sum[axis] += self.turned[axis];
+        for ((sum, turned), turn) in self.sum.iter_mut().zip(&mut self.turned).zip(turns) {
+            *turned += turn;
+            *sum += *turned;
         }
         self.samples += 1;
         let off = self.off.add(corrected, course);

@@ -228,7 +228,8 @@ fn flash_is_written_at_standstill_alone() {
         (Status::Silent, Faults::NONE),
         &WheelSample::without_speeds(Standstill::Moving),
     );
-    let requests: [fn(&mut Board) -> Result<(), Refusal>; 8] = [
+    type Request = fn(&mut Board) -> Result<(), Refusal>;
+    let requests: [Request; 8] = [
         |board| board.set_wheels(&WheelSettings::TOYOTA),
         |board| board.set_unit(None),
         |board| board.weights_begin(64),
