@@ -4,7 +4,7 @@ use crate::bias::{Rest, StaticConfig, StaticError, StaticInit};
 use crate::mounting::{LevelError, Rotation};
 use crate::sample::ImuSample;
 use crate::sqrt::sqrt;
-use crate::store::calibration::MAX_TILT_DEG;
+use crate::store::MAX_TILT_DEG;
 use crate::store::{Level, Mounting};
 use crate::units::SpecificForce;
 use serde::{Deserialize, Serialize};

@@ -6,9 +6,6 @@ use super::record::Record;
 use crate::mounting::{GyroMap, Rotation};
 use serde::{Deserialize, Serialize};
 
-/// Largest tilt that a mounting calibration may find, deg; a larger one means a wrong rotation.
-pub(crate) const MAX_TILT_DEG: f32 = 45.0;
-
 /// The tilt of the configured sensor frame against level ground.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -1,10 +1,12 @@
 //! Defines the errors of the store, in terms that a user can act on.
 
-use super::calibration::MAX_TILT_DEG;
 use crate::can::config::ConfigError;
 use crate::can::latitude::LatitudeConfigError;
 use crate::can::wheel::WheelConfigError;
 use serde::{Deserialize, Serialize};
+
+/// Largest tilt that a mounting calibration may find, deg; a larger one means a wrong rotation.
+pub(crate) const MAX_TILT_DEG: f32 = 45.0;
 
 /// A value of a record that has a range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

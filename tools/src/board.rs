@@ -11,7 +11,8 @@ use gyronet::compensate::Lag;
 use gyronet::coprocessor::{Clock, Config, Coprocessor, TimedFrame};
 use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::health::Status;
-use gyronet::model::WindowNetwork;
+use gyronet::model::window::{Features, WINDOW};
+use gyronet::model::{Estimate, WindowNetwork};
 use gyronet::monitor::TIMEOUT_US;
 use gyronet::sample::Standstill;
 use gyronet::units::{AngularRate, Micros};
@@ -24,6 +25,18 @@ const POLL_US: u64 = 1_000;
 /// Longest part of a gap in which the board's messages about a silent sensor are replayed, microseconds; the rest of
 /// the gap is skipped.
 const SILENCE_US: u64 = 60_000_000;
+
+/// A network whose corrections are zero.
+#[derive(Debug, Clone, Copy)]
+pub struct Uncorrected;
+
+impl WindowNetwork for Uncorrected {
+    fn estimate(&mut self, _window: &[Features; WINDOW]) -> Estimate {
+        let corrections = [AngularRate::ZERO; WINDOW];
+        // A scale of 1e-3 rad/s gives a second the sigma of an uncorrected rate.
+        Estimate { corrections, scale: AngularRate(134_218), ..Estimate::NONE }
+    }
+}
 
 /// The results of one row.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,9 +2,9 @@
 //! that cannot be used.
 
 use gyronet::model::blob::Shape;
+use gyronet_tools::board::Uncorrected;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::stream::Drive;
-use gyronet_tools::evaluate::ablation::Uncorrected;
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::rates::{Network, Networks, Rates, Sample};
 use gyronet_tools::evaluate::report::{DriveErrors, EvaluateError};

@@ -86,10 +86,10 @@ fn seconds(micros: u64) -> f64 {
 mod tests {
     use super::*;
     use crate::board::Board;
+    use crate::board::Uncorrected;
     use crate::bundled;
     use crate::drive::replay::Steps;
     use crate::drive::stream::Drive;
-    use crate::evaluate::ablation::Uncorrected;
     use gyronet::coprocessor::Config;
     use std::f64::consts::TAU;
 

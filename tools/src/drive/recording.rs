@@ -92,13 +92,18 @@ impl Recording {
 
     /// Returns the file's name without folder and extension, for tables.
     pub fn name(&self) -> &str {
-        super::stream::name(&self.path)
+        name(&self.path)
     }
 
     /// Returns the time from the first sample to the end of the last one, s.
     pub fn seconds(&self) -> f64 {
         self.facts().seconds()
     }
+}
+
+/// The name of a file without folder and extension.
+pub(super) fn name(path: &str) -> &str {
+    Path::new(path).file_stem().and_then(|stem| stem.to_str()).unwrap_or(path)
 }
 
 #[cfg(test)]

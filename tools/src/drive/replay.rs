@@ -3,11 +3,11 @@
 pub use crate::board::Step;
 
 use crate::board::Board;
+use crate::board::Uncorrected;
 use crate::drive::error::DataError;
 use crate::drive::recording::Recording;
 use crate::drive::stream::{Drive, Rows};
 use crate::drive::wheel_frames::WheelFrames;
-use crate::evaluate::ablation::Uncorrected;
 use gyronet::bias::StaticError;
 use gyronet::coprocessor::Config;
 use gyronet::estimate::YawEstimate;

@@ -2,7 +2,7 @@
 //! a short one.
 
 use super::error::DataError;
-use super::recording::{Facts, Reader, Recording, Row, Survey};
+use super::recording::{Facts, Reader, Recording, Row, Survey, name};
 use super::vehicle::Vehicle;
 use super::wheel_frames::{Speeds, WheelFrames};
 use gyronet::mounting::GyroMap;
@@ -127,9 +127,4 @@ impl Drive<'_> {
     pub fn speeds(&self) -> Option<Speeds> {
         Speeds::of(self.facts.wheels, self.vehicle.radius_m())
     }
-}
-
-/// The name of a file without folder and extension.
-pub(super) fn name(path: &str) -> &str {
-    Path::new(path).file_stem().and_then(|stem| stem.to_str()).unwrap_or(path)
 }

@@ -1,14 +1,13 @@
 //! What each part of the compensation contributes: the error of the delayed rate
 //! with different configurations, all of which the board can run.
 
-use crate::board::{Board, Step};
+use crate::board::{Board, Step, Uncorrected};
 use crate::drive::replay::{ReplayError, Steps};
 use crate::drive::stream::Drive;
 use crate::evaluate::metrics::{WINDOW, YawError, YawSums};
-use crate::evaluate::rates::silent;
+use crate::evaluate::rates::{silent, with_lag};
 use gyronet::compensate::{CompensateConfig, Lag, Mode};
-use gyronet::model::window::Features;
-use gyronet::model::{Estimate, WindowNetwork};
+use gyronet::model::WindowNetwork;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::Standstill;
 use gyronet::units::AngularRate;
@@ -33,28 +32,10 @@ impl Variant {
     }
 }
 
-/// A network whose corrections are zero.
-#[derive(Debug, Clone, Copy)]
-pub struct Uncorrected;
-
-impl WindowNetwork for Uncorrected {
-    fn estimate(&mut self, _window: &[Features; gyronet::model::window::WINDOW]) -> Estimate {
-        let corrections = [AngularRate::ZERO; gyronet::model::window::WINDOW];
-        // A scale of 1e-3 rad/s gives a second the sigma of an uncorrected rate.
-        Estimate { corrections, scale: AngularRate(134_218), ..Estimate::NONE }
-    }
-}
-
 /// Returns the default configuration with another mode.
 fn with_mode(mode: Mode) -> PipelineConfig {
     let compensate = CompensateConfig { mode, ..CompensateConfig::DEFAULT };
     PipelineConfig { compensate, ..PipelineConfig::DEFAULT }
-}
-
-/// Returns a configuration with another lag of the delayed rate.
-pub(crate) fn with_lag(config: PipelineConfig, lag: Lag) -> PipelineConfig {
-    let compensate = CompensateConfig { lag, ..config.compensate };
-    PipelineConfig { compensate, ..config }
 }
 
 /// Returns the variants that show the parts of the compensation.

@@ -5,17 +5,16 @@
 //! static bias, which the classical methods subtract from the first sample on, and then as a whole. A drive that begins
 //! in motion is read once more before that, for the best constant bias ([`super::rest`]).
 
-use crate::board::{Board, Step};
+use crate::board::{Board, Step, Uncorrected};
 use crate::drive::replay::{ReplayError, initialise};
 use crate::drive::stream::Drive;
 use crate::drive::wheel_frames::Speeds;
-use crate::evaluate::ablation::{Uncorrected, with_lag};
 use crate::evaluate::cost::{Cost, Shapes};
 use crate::evaluate::fir::{Line, LowPass};
 use crate::evaluate::methods::PerMethod;
 use crate::evaluate::{rest, vqf};
 use gyronet::can;
-use gyronet::compensate::Lag;
+use gyronet::compensate::{CompensateConfig, Lag};
 use gyronet::coprocessor::Config;
 use gyronet::estimate::YawEstimate;
 use gyronet::model::blob::Shape;
@@ -76,6 +75,12 @@ pub struct Comparison {
 /// A configuration whose board sends nothing: only its rates are compared.
 pub(super) fn silent(pipeline: PipelineConfig) -> Config {
     Config { pipeline, can: can::config::Config::SILENT, ..Config::DEFAULT }
+}
+
+/// Returns a configuration with another lag of the delayed rate.
+pub(crate) fn with_lag(config: PipelineConfig, lag: Lag) -> PipelineConfig {
+    let compensate = CompensateConfig { lag, ..config.compensate };
+    PipelineConfig { compensate, ..config }
 }
 
 /// Runs every method, and passes each sample to `visit`. All networks run in the same pipeline; the pipeline without a
