@@ -45,7 +45,7 @@ fn a_good_line_has_nothing_to_count() {
     assert!((monitor.state.rate.expect("known") - 50.0).abs() < 1e-5);
     assert!((monitor.drop_in.expect("known") - 50.0).abs() < 0.006);
     let json = monitor.json(9.99);
-    assert_eq!((&json["source"], &json["quality"]), (&"GyroNet".into(), &"good".into()));
+    assert_eq!((&json["source"], &json["quality"]), (&"Model".into(), &"good".into()));
     assert_eq!((&json["faults"], &json["correction_deg_per_s"]), (&"none".into(), &0.0.into()));
     println!("{json}\n{monitor}");
 }
