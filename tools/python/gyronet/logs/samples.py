@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+import weakref
 from array import array
 from collections import Counter
 
@@ -72,7 +73,10 @@ class Channel:
         self.count, self.last = self.count + len(kept), float(kept[-1, 0])
         self.seen |= (kept[:, 1:] != 0).any(axis=0)
         if self.kept:
-            self.file = self.file or tempfile.TemporaryFile()
+            if self.file is None:
+                self.file = tempfile.TemporaryFile()
+                # A log and its channels refer to each other: without this the file is open until some later collection.
+                weakref.finalize(self, self.file.close)
             self.file.write(np.ascontiguousarray(kept).tobytes())
 
     def append(self, other):
