@@ -1,6 +1,6 @@
 //! Simulated sequences in the layouts of KAIST Complex Urban and NCLT, with an exactly known
-//! truth: the car of [`gyronet_tools::simulate`] drives through a [`town`] with a fibre-optic gyro ([`fog`]) and wheels
-//! ([`odometer`]). [`vehicles`] lists every parameter with its source.
+//! truth: the car of [`gyronet_tools::simulate`] drives through a town with a fibre-optic gyro ([`fog`]) and wheels
+//! (`odometer`). [`vehicles`] lists every parameter with its source.
 //!
 //! A sequence is completely determined by its [`Spec`]. The run's seed determines route, road, traffic, tyres, noise
 //! and the biases at power-on. The device's seed determines the scale and misalignment of the sensors, and the

@@ -3,7 +3,7 @@
 //!
 //! The drive is read more than once, and never kept: first for its facts ([`Drive::open`]), then its beginning for the
 //! static bias, which the classical methods subtract from the first sample on, and then as a whole. A drive that begins
-//! in motion is read once more before that, for the best constant bias ([`super::rest`]).
+//! in motion is read once more before that, for the best constant bias (`rest`).
 
 use crate::board::{Board, Step, Uncorrected};
 use crate::drive::replay::{ReplayError, initialise};
