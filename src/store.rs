@@ -28,6 +28,7 @@ mod wheels;
 pub use access::Access;
 pub use calibration::{Calibration, Level, UnitMap};
 pub use configuration::{Configuration, FogGyro, FogPart, ImuPart, Mounting};
+#[cfg(feature = "service")]
 pub(crate) use error::MAX_TILT_DEG;
 pub use error::{Field, FieldError, FlashFault, StoreError};
 pub use learned::Learned;

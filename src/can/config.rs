@@ -130,6 +130,7 @@ impl Config {
     ///
     /// # Errors
     /// [`ConfigError::Overload`].
+    #[cfg(feature = "store")]
     pub(crate) fn check_further_load(&self) -> Result<(), ConfigError> {
         self.check_load(&[Periodic { id: Id::Standard(StandardId::ZERO), period_ms: SAMPLE_MS }; 3])
     }
