@@ -50,7 +50,7 @@ use crate::units::AngularRate;
 pub struct CompensateConfig {
     /// The rule that selects the estimates.
     pub mode: Mode,
-    /// The delay of the delayed rate.
+    /// The delay of the delayed rate, in samples.
     pub lag: Lag,
     /// Largest mean correction of a window that is accepted (rad/s code). Vibration makes single corrections large;
     /// their mean is bias-like and small.

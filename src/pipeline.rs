@@ -35,7 +35,7 @@ use initialised::Initialised;
 use sensor_bias::SensorBias;
 use windows::Windows;
 
-/// What a sample's rates depend on besides the sensors: the faults and the clock of the board.
+/// The faults and the clock of the board, on which a sample's rates depend besides the sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoardState {
     /// The faults other than those of the sensor.

@@ -1,4 +1,4 @@
-//! What a coprocessor has sent, kept for a test.
+//! The frames that a coprocessor has sent, kept for a test.
 
 use gyronet::coprocessor::{Sink, TimedFrame};
 use gyronet::estimate::YawEstimate;

@@ -87,7 +87,7 @@ impl<C: Can, const N: usize> Bus for QueuedCan<C, N> {
     }
 }
 
-/// What a step has done.
+/// The results of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step<E> {
     /// The newest sample's results, or those of a silent sensor; `None` where no message set was due.

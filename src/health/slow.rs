@@ -1,4 +1,4 @@
-//! What changes slowly: whether the vehicle stands, and how well the board knows its sensor.
+//! States that change slowly: whether the vehicle stands, and how well the board knows its sensor.
 
 /// Whether the vehicle stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -12,7 +12,7 @@ pub enum Verdict {
     Moving = 2,
 }
 
-/// What a verdict rests on.
+/// The evidence for a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Evidence {
     /// Nothing.
@@ -43,7 +43,7 @@ pub enum Knowledge {
 pub struct SlowStatus {
     /// Whether the vehicle stands.
     pub verdict: Verdict,
-    /// What the verdict rests on.
+    /// The evidence for the verdict.
     pub evidence: Evidence,
     /// Knowledge of the gyro's bias.
     pub bias: Knowledge,

@@ -1,4 +1,4 @@
-//! What single readings cannot show: that they repeat themselves, or are further apart than a vehicle moves.
+//! Faults that show in successive readings only: they repeat themselves, or are further apart than a vehicle moves.
 //!
 //! A working part has noise, a stuck one has none. A part without a checksum, or with a short one, passes a flipped bit on
 //! as a reading. A limit on the step between samples finds it, because a vehicle moves far less in 10 ms: the largest steps

@@ -1,4 +1,4 @@
-//! What the slow status message says of the pipeline.
+//! The pipeline's part of the slow status message.
 
 use super::Pipeline;
 use crate::bias::{StandstillSource, ZeroRate};

@@ -1,4 +1,4 @@
-//! What each part of the compensation contributes: the error of the delayed rate
+//! The contribution of each part of the compensation: the error of the delayed rate
 //! with different configurations, all of which the board can run.
 
 use crate::board::{Board, Step, Uncorrected};
