@@ -134,7 +134,7 @@ unsafe fn UART5() {
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static COPROCESSOR: ConstStaticCell<Coprocessor> = 
+    static COPROCESSOR: ConstStaticCell<Coprocessor> =
         ConstStaticCell::new(Coprocessor::new(Config::DEFAULT));
     static RECEIVED: ConstStaticCell<[u8; 256]> = ConstStaticCell::new([0; 256]);
 
