@@ -9,12 +9,11 @@
 mod curve;
 pub(crate) mod earth;
 mod quiet;
-mod spread;
 mod static_init;
 mod zero_rate;
 
 pub use curve::{BiasCurve, CurveBias, CurveFilter};
-pub use earth::{EarthRate, Latitude, ZeroPoint};
+pub use earth::{EarthRate, Latitude};
 pub use quiet::{QuietConfig, QuietDetector};
 pub use static_init::{Rest, STATIC_SAMPLES, StaticConfig, StaticError, StaticInit};
 pub use zero_rate::{StandstillSource, ZeroRate, ZeroRateConfig, ZeroRateOutcome};

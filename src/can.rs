@@ -9,14 +9,12 @@ pub mod e2e;
 pub mod encoder;
 #[doc(hidden)]
 pub mod fog_encoder;
-mod frame;
 pub mod j1939;
 pub mod latitude;
 #[doc(hidden)]
 pub mod load;
 #[doc(hidden)]
 pub mod queue;
-mod residual;
 #[doc(hidden)]
 pub mod signal;
 pub mod slcan;
@@ -26,4 +24,4 @@ pub mod yaw;
 #[doc(hidden)]
 pub mod yaw_encoder;
 
-pub use frame::DataFrame;
+pub use queue::DataFrame;

@@ -31,18 +31,15 @@
 //! The lag counts samples, not time: a gap delays earlier samples and drops none.
 
 mod mode;
-mod mounting_check;
-mod slow_mean;
+mod unit;
 
 pub use mode::{DELAY, Lag, Mode, OutOfRange, Stride};
-
-use mounting_check::MountingCheck;
-use slow_mean::SlowMean;
 
 use crate::model::window::WINDOW;
 use crate::model::{Estimate, SteadyGain};
 use crate::sample::{RATE_HZ, Validity};
 use crate::units::AngularRate;
+use unit::{MountingCheck, SlowMean};
 
 /// Configures how estimates of the gyro's error become corrected rates.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -20,7 +20,6 @@
 
 mod clock;
 mod config;
-mod handover;
 mod sink;
 mod step;
 
@@ -44,11 +43,10 @@ use crate::model::Estimate;
 use crate::model::fognet::FogEstimate;
 use crate::model::seconds::SecondsWindow;
 use crate::monitor::SensorMonitor;
-use crate::pipeline::{BoardState, Pipeline};
+use crate::pipeline::{BoardState, Handover, Pipeline};
 use crate::sample::{FogSample, ImuSample, WheelSample};
 use crate::units::{CentiCelsius, Micros};
 use clock::Timeline;
-use handover::Handover;
 
 /// The results of one sample, or of its absence, for a log or diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -19,10 +19,11 @@ mod windows;
 pub use config::PipelineConfig;
 pub use report::{Uncertainty, UncertaintyConfig};
 pub use windows::DueWindow;
+pub(crate) use windows::Handover;
 
 use crate::align::clock_ratio::ClockRatio;
 use crate::align::{AlignError, Aligner};
-use crate::bias::{StandstillSource, StaticError, StaticInit, ZeroPoint, ZeroRate, ZeroRateOutcome};
+use crate::bias::{StandstillSource, StaticError, StaticInit, ZeroRate, ZeroRateOutcome};
 use crate::compensate::{Compensated, Compensator, Complete, Implausible};
 use crate::estimate::VehicleSample;
 use crate::health::{BoardFaults, Counters, Faults, count};
@@ -32,7 +33,7 @@ use crate::sample::{Frame, ImuSample, Standstill, WHEELS, WheelSample};
 use crate::model::window::{self, Features, WINDOW};
 use crate::units::{AngularRate, Yaw};
 use initialised::Initialised;
-use sensor_bias::SensorBias;
+use sensor_bias::{SensorBias, ZeroPoint};
 use windows::Windows;
 
 /// The faults and the clock of the board, on which a sample's rates depend besides the sensors.

@@ -154,3 +154,24 @@ impl WheelSample {
         Self { time: Micros(0), speeds: [None; WHEELS], standstill }
     }
 }
+
+/// The extension of 32-bit stamps (71 minutes of microseconds, 119 hours at 10 kHz) to 64 bits, which never wrap. A
+/// stamp that is up to half the range smaller than the previous one is a step back, not a wrap.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct StampClock {
+    /// Last stamp and its unwrapped time.
+    last: Option<(u32, u64)>,
+}
+
+impl StampClock {
+    pub(crate) const START: Self = Self { last: None };
+
+    pub(crate) fn unwrap(&mut self, stamp: u32) -> u64 {
+        let time = match self.last {
+            None => u64::from(stamp),
+            Some((last, base)) => base.saturating_add_signed(i64::from(stamp.wrapping_sub(last) as i32)),
+        };
+        self.last = Some((stamp, time));
+        time
+    }
+}

@@ -39,7 +39,6 @@ pub mod dsp3000;
 pub mod framer;
 pub mod icm42688;
 pub mod serial;
-mod unwrap;
 pub mod xsens;
 
 use crate::sample::{FogSample, ImuSample};

@@ -2,8 +2,7 @@
 //!
 //! About the vertical it is 15.041 deg/h times the sine of the latitude, 9 deg/h at 37 degrees: negligible for a MEMS
 //! part, nearly all of the error of a fibre-optic gyro. A mean at standstill contains it; a bias from elsewhere (a
-//! store, a data sheet, a filter) does not. [`ZeroPoint`] is made from such a mean and [`EarthRate`], and holds the
-//! bias and the reading at rest separately: the reading contains the Earth's rate exactly once.
+//! store, a data sheet, a filter) does not.
 
 use crate::units::{Angle, AngularRate, RATE_HZ};
 
@@ -60,41 +59,13 @@ pub enum EarthRate {
 }
 
 impl EarthRate {
-    fn vertical(self) -> AngularRate {
+    /// Returns the rate that is not part of the bias, about the upward vertical.
+    #[must_use]
+    pub fn vertical(self) -> AngularRate {
         match self {
             Self::LeftInBias => AngularRate::ZERO,
             Self::Subtracted(latitude) => latitude.vertical_rate(),
         }
-    }
-}
-
-/// The reading at rest of a gyro whose z axis is vertical.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct ZeroPoint {
-    bias: [AngularRate; 3],
-    earth: AngularRate,
-}
-
-impl ZeroPoint {
-    /// Creates the zero point from the mean at rest, which contains the Earth's rate.
-    #[must_use]
-    pub fn at_rest([x, y, z]: [AngularRate; 3], earth: EarthRate) -> Self {
-        let earth = earth.vertical();
-        Self { bias: [x, y, AngularRate(z.0.saturating_sub(earth.0))], earth }
-    }
-
-    /// Returns the gyro's readings at rest about x, y and z, to be subtracted from each of its readings.
-    #[must_use]
-    pub fn reading(&self) -> [AngularRate; 3] {
-        let [x, y, z] = self.bias;
-        [x, y, AngularRate(z.0.saturating_add(self.earth.0))]
-    }
-
-    /// Returns the part's bias; with [`EarthRate::LeftInBias`] it contains the Earth's rate.
-    #[must_use]
-    pub fn bias(&self) -> [AngularRate; 3] {
-        self.bias
     }
 }
 
@@ -114,16 +85,5 @@ mod tests {
         assert_eq!(south.0, -at_37().vertical().0);
         assert_eq!(Latitude::from_degrees(90.1), None);
         assert_eq!(Latitude::from_degrees(f32::NAN), None);
-    }
-
-    #[test]
-    fn a_mean_at_rest_is_the_reading_whatever_is_subtracted() {
-        let mean = [AngularRate(1), AngularRate(-2), AngularRate(50_000)];
-        for earth in [EarthRate::LeftInBias, at_37()] {
-            assert_eq!(ZeroPoint::at_rest(mean, earth).reading(), mean);
-        }
-        let [_, _, z] = ZeroPoint::at_rest(mean, at_37()).bias();
-        assert_eq!(z.0, 50_000 - at_37().vertical().0);
-        assert_eq!(ZeroPoint::at_rest(mean, EarthRate::LeftInBias).bias(), mean);
     }
 }

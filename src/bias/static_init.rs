@@ -6,7 +6,7 @@
 //! speeds up. A steady straight drive can still look like standing; where wheel speeds are
 //! known they decide.
 
-use super::spread::Spread;
+use super::quiet::Spread;
 use crate::mounting::LevelError;
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};

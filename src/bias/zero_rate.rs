@@ -14,7 +14,7 @@
 //! faster than white noise, nor that a low-pass correction makes samples alike. A second counts only if the vehicle
 //! also stands in the next one, because wheel sensors show late that a car pulls away.
 
-use super::spread::Spread;
+use super::quiet::Spread;
 use crate::sample::RATE_HZ;
 use crate::sqrt::sqrt;
 use crate::units::AngularRate;

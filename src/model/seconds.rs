@@ -4,7 +4,7 @@
 //! of the gyro's angle is lost. A gap in the gyro ends the window, because the angle turned in it would be missing from
 //! the sum; so does a second that has inertial samples or wheel speeds in less than half of its frames.
 
-use super::ring::Ring;
+use super::window::Ring;
 use crate::model::window;
 use crate::sample::RATE_HZ;
 use crate::units::{Angle, WheelSpeed};

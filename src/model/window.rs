@@ -1,6 +1,6 @@
 //! A window holds the last ten samples as the networks see them: integer codes, the angular rate less the static bias.
 
-use super::ring::Ring;
+use crate::nn::linear::Linear;
 use crate::sample::ImuSample;
 use crate::units::AngularRate;
 
@@ -26,4 +26,126 @@ pub type Window = Ring<Features, WINDOW>;
 impl Window {
     /// A window without a sample.
     pub const EMPTY: Self = Self::without_elements([0; FEATURES]);
+}
+
+/// Keeps the last `N` elements.
+#[derive(Debug, Clone)]
+pub struct Ring<T, const N: usize> {
+    places: [T; N],
+    /// The place of the next element: in a full ring, that of the oldest one.
+    next: usize,
+    filled: usize,
+}
+
+impl<T: Copy, const N: usize> Ring<T, N> {
+    /// Creates a ring without elements; its unused places hold `filling`.
+    pub(super) const fn without_elements(filling: T) -> Self {
+        Self { places: [filling; N], next: 0, filled: 0 }
+    }
+
+    /// Removes all elements, because a gap ends the series.
+    pub fn clear(&mut self) {
+        (self.next, self.filled) = (0, 0);
+    }
+
+    /// Adds the newest element; a full ring drops its oldest.
+    pub fn add(&mut self, element: T) {
+        if let Some(place) = self.places.get_mut(self.next) {
+            *place = element;
+        }
+        self.next = (self.next + 1) % N;
+        self.filled = (self.filled + 1).min(N);
+    }
+
+    /// Returns the number of elements.
+    pub(super) const fn len(&self) -> usize {
+        self.filled
+    }
+
+    /// Returns an element by its number, 0 for the oldest.
+    pub(super) fn get(&self, number: usize) -> Option<&T> {
+        // A ring that is not full begins at place 0.
+        self.places.get(if self.filled == N { (self.next + number) % N } else { number })
+    }
+
+    /// Returns the elements, oldest first; `None` until the ring is full.
+    #[must_use]
+    pub fn snapshot(&self) -> Option<[T; N]> {
+        (self.filled == N).then(|| core::array::from_fn(|number| self.places[(self.next + number) % N]))
+    }
+}
+
+/// Holds estimates of the yaw gyro's error, one for each sample of a window, oldest first.
+pub type Corrections = [AngularRate; WINDOW];
+
+/// The smallest [`Estimate::scale`]: 2^-20 rad/s (0.2 deg/h), far below what a window can resolve.
+pub const SCALE_MIN: AngularRate = AngularRate(1 << 7);
+/// The largest [`Estimate::scale`]: 1 rad/s, which means that the estimate is useless.
+pub const SCALE_MAX: AngularRate = AngularRate(1 << AngularRate::FRACTION_BITS);
+
+/// Turns a window into corrections; the integer network and the f32 reference implement it.
+pub trait WindowNetwork {
+    /// Runs the network over one window.
+    fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate;
+}
+
+impl<N: WindowNetwork + ?Sized> WindowNetwork for &mut N {
+    fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate {
+        (**self).estimate(window)
+    }
+}
+
+/// Holds the result of a window: the gyro's error in each sample, and the expected error of the estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Estimate {
+    /// The corrections.
+    pub corrections: Corrections,
+    /// The expected absolute error of the mean of the window's corrected rates, as the scale of a Laplace distribution,
+    /// between [`SCALE_MIN`] and [`SCALE_MAX`].
+    pub scale: AngularRate,
+    /// Input values that had to be clamped to the network's range.
+    pub clamped_inputs: u16,
+    /// The part of the corrections that follows from a sample's own rates.
+    pub steady_gain: SteadyGain,
+}
+
+impl Estimate {
+    /// An estimate without a correction, with the largest scale.
+    pub const NONE: Self = Self {
+        corrections: [AngularRate::ZERO; WINDOW],
+        scale: SCALE_MAX,
+        clamped_inputs: 0,
+        steady_gain: SteadyGain::NONE,
+    };
+}
+
+/// The factors that turn a constant angular rate about x, y and z into its correction: a linear part models the
+/// unit's mounting and gain with them. Q24, from rate codes to a rate code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SteadyGain(pub [i32; 3]);
+
+impl SteadyGain {
+    /// The gain of a model without a linear part: zero.
+    pub const NONE: Self = Self([0; 3]);
+
+    /// Returns the factors of the roll and pitch rates, which model the mounting.
+    #[must_use]
+    pub const fn mounting(self) -> Self {
+        let Self([roll, pitch, _]) = self;
+        Self([roll, pitch, 0])
+    }
+
+    /// Returns the gain less `part`.
+    #[must_use]
+    pub fn minus(self, part: Self) -> Self {
+        Self(core::array::from_fn(|axis| self.0[axis].saturating_sub(part.0[axis])))
+    }
+
+    /// Returns the correction of a sample with these rates.
+    #[must_use]
+    pub fn correction(&self, rates: [AngularRate; 3]) -> AngularRate {
+        AngularRate(Linear::output(&self.0, &rates.map(|rate| rate.0)))
+    }
 }

@@ -1,7 +1,8 @@
 //! Static initialisation finds the bias and the tilt; this module holds both once it has succeeded.
 
+use super::sensor_bias::ZeroPoint;
 use super::{Pipeline, PipelineConfig};
-use crate::bias::{QuietDetector, Rest, StaticError, ZeroPoint, ZeroRate};
+use crate::bias::{QuietDetector, Rest, StaticError, ZeroRate};
 use crate::health::count;
 use crate::mounting::{Rotation, is_moved};
 use crate::sample::Frame;

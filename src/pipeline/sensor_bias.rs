@@ -1,8 +1,11 @@
-//! Subtracts from each reading the bias that earlier drives have shown at the sensor's temperature,
-//! before any other stage. So the rate can be used before the vehicle has stood.
+//! The bias of a reading: what earlier drives have shown at the sensor's temperature, and what a mean at rest shows.
+//!
+//! The first is subtracted before any other stage, so that the rate can be used before the vehicle has stood. A mean at
+//! rest contains the Earth's rate: [`ZeroPoint`] holds the bias and the reading at rest separately, and the reading
+//! contains the Earth's rate exactly once.
 
 use super::PipelineConfig;
-use crate::bias::CurveBias;
+use crate::bias::{CurveBias, EarthRate};
 use crate::mounting::{Rotation, is_moved};
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
@@ -146,4 +149,48 @@ fn early_levelling(config: &PipelineConfig) -> Option<(Rotation, [SpecificForce;
     let force = config.rest_force?;
     let levelling = config.levelling.rotation(config.mounting.force(force)).ok()?;
     Some((levelling, force))
+}
+
+/// The reading at rest of a gyro whose z axis is vertical.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct ZeroPoint {
+    bias: [AngularRate; 3],
+    earth: AngularRate,
+}
+
+impl ZeroPoint {
+    /// Creates the zero point from the mean at rest, which contains the Earth's rate.
+    pub(super) fn at_rest([x, y, z]: [AngularRate; 3], earth: EarthRate) -> Self {
+        let earth = earth.vertical();
+        Self { bias: [x, y, AngularRate(z.0.saturating_sub(earth.0))], earth }
+    }
+
+    /// Returns the gyro's readings at rest about x, y and z, to be subtracted from each of its readings.
+    pub(super) fn reading(&self) -> [AngularRate; 3] {
+        let [x, y, z] = self.bias;
+        [x, y, AngularRate(z.0.saturating_add(self.earth.0))]
+    }
+
+    /// Returns the part's bias; with [`EarthRate::LeftInBias`] it contains the Earth's rate.
+    pub(super) fn bias(&self) -> [AngularRate; 3] {
+        self.bias
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bias::Latitude;
+
+    #[test]
+    fn a_mean_at_rest_is_the_reading_whatever_is_subtracted() {
+        let at_37 = EarthRate::Subtracted(Latitude::from_degrees(37.0).unwrap());
+        let mean = [AngularRate(1), AngularRate(-2), AngularRate(50_000)];
+        for earth in [EarthRate::LeftInBias, at_37] {
+            assert_eq!(ZeroPoint::at_rest(mean, earth).reading(), mean);
+        }
+        let [_, _, z] = ZeroPoint::at_rest(mean, at_37).bias();
+        assert_eq!(z.0, 50_000 - at_37.vertical().0);
+        assert_eq!(ZeroPoint::at_rest(mean, EarthRate::LeftInBias).bias(), mean);
+    }
 }

@@ -16,9 +16,8 @@ pub use config::{AngleUnit, Dsp1760Config, OutputRate, Rotation, TemperatureUnit
 pub use framing::Kvh;
 
 use super::framer::Framer;
-use super::unwrap::StampClock;
 use crate::health::count;
-use crate::sample::FogSample;
+use crate::sample::{FogSample, StampClock};
 use crate::units::{Angle, CentiCelsius, Micros};
 use clock::MessageClock;
 use framing::is_self_test;

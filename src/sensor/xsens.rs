@@ -1,25 +1,63 @@
 //! Reads the Xsens MTi: MTData2 messages in Xbus frames (MT Low-Level Communication Protocol, MT0605P).
 //!
-//! `xbus` finds the frames, [`MtData2`] holds the measurements of a frame, and `precision` decodes the four number
-//! formats.
+//! An Xbus frame is `FA FF MID LEN DATA.. CS`; all bytes after FA add up to 0 modulo 256. [`MtData2`] holds the
+//! measurements of a frame.
 
+mod emit;
 mod mtdata2;
-#[doc(hidden)]
-pub mod precision;
-#[doc(hidden)]
-pub mod xbus;
 
+#[doc(hidden)]
+pub use mtdata2::Precision;
 pub use mtdata2::{MID_MT_DATA2, MtData2, XsensError};
-pub use xbus::{MAX_FRAME, Xbus};
 
-use super::framer::Framer;
-use super::unwrap::StampClock;
-use crate::sample::{ImuSample, Validity};
+use super::framer::{Framer, Protocol};
+use crate::sample::{ImuSample, StampClock, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use mtdata2::id;
 
+const PREAMBLE: u8 = 0xFA;
+const BUS_ID: u8 = 0xFF;
+/// Value of LEN that marks an extended length, which no message here needs.
+const EXTENDED_LENGTH: u8 = 0xFF;
+/// Bytes of a frame in addition to its data.
+const OVERHEAD: usize = 5;
+/// Length of the longest frame, bytes.
+pub const MAX_FRAME: usize = 254 + OVERHEAD;
+
 /// Bits of the status word that report clipping of accelerometer x, y, z and gyro x, y, z.
 const STATUS_CLIPPED: u32 = 0x3F << 8;
+
+/// The framing of Xbus messages.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Xbus;
+
+impl Protocol for Xbus {
+    const HEADER: usize = 4;
+
+    fn length(header: &[u8]) -> Option<usize> {
+        match *header {
+            [PREAMBLE, BUS_ID, _, len] if len != EXTENDED_LENGTH => Some(usize::from(len) + OVERHEAD),
+            _ => None,
+        }
+    }
+
+    fn check(frame: &[u8]) -> bool {
+        frame.iter().skip(1).fold(0u8, |sum, byte| sum.wrapping_add(*byte)) == 0
+    }
+}
+
+impl Xbus {
+    /// Returns the message identifier and the data of an intact frame.
+    #[must_use]
+    pub fn parse(frame: &[u8]) -> Option<(u8, &[u8])> {
+        match frame {
+            [PREAMBLE, BUS_ID, mid, len, data @ .., _] if usize::from(*len) == data.len() => {
+                Xbus::check(frame).then_some((*mid, data))
+            }
+            _ => None,
+        }
+    }
+}
 
 /// The parser of an MTi: converts bytes to samples with unwrapped time.
 #[derive(Debug, Clone, Default)]

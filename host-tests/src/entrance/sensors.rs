@@ -10,8 +10,8 @@ use gyronet::sensor::dsp3000::Mode;
 use gyronet::sensor::dsp3000::ascii::{Dsp3000Ascii, Reading};
 use gyronet::sensor::dsp3000::binary::{Dsp3000Binary, LOCK, Word};
 use gyronet::sensor::icm42688::packet::{Packet, Resolution};
-use gyronet::sensor::xsens::precision::Precision;
-use gyronet::sensor::xsens::{MtData2, Mti, xbus};
+use gyronet::sensor::xsens::Precision;
+use gyronet::sensor::xsens::{MtData2, Mti, Xbus};
 use gyronet::units::Micros;
 
 /// Passes bytes as a stream to the MTi's parser, and as the data of a message.
@@ -28,7 +28,7 @@ pub fn xsens(data: &[u8]) {
         // A parsed message must be parsed as the same again after it was emitted; bytes are compared, since NaN is
         // not equal to itself.
         let frame = message.emit_as(Precision::Double);
-        let (_, again) = xbus::parse(&frame).expect("an emitted frame");
+        let (_, again) = Xbus::parse(&frame).expect("an emitted frame");
         let again = MtData2::parse(again).expect("an emitted message");
         assert_eq!(again.emit_as(Precision::Double), frame);
     }
@@ -36,7 +36,7 @@ pub fn xsens(data: &[u8]) {
 
 pub fn xsens_seeds() -> Vec<Seed> {
     let fixed = message(77).emit_as(Precision::Fixed1632);
-    let (_, data) = xbus::parse(&fixed).expect("an emitted frame");
+    let (_, data) = Xbus::parse(&fixed).expect("an emitted frame");
     vec![
         ("stream", [synthetic_frame(), message(200).emit_as(Precision::Single).to_vec()].concat()),
         ("fixed_data", data.to_vec()),

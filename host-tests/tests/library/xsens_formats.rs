@@ -1,8 +1,8 @@
 //! The four precisions of MTData2.
 
 use gyronet::sensor::framer::Protocol;
-use gyronet::sensor::xsens::precision::Precision;
-use gyronet::sensor::xsens::{MtData2, Mti, Xbus, XsensError, xbus};
+use gyronet::sensor::xsens::Precision;
+use gyronet::sensor::xsens::{MtData2, Mti, Xbus, XsensError};
 use proptest::prelude::*;
 
 const ALL: [Precision; 4] =
@@ -38,7 +38,7 @@ fn one_message_is_the_same_in_each_precision() {
     assert_eq!(message.emit_as(Precision::Single)[..], message.emit()[..]);
     let samples = ALL.map(|precision| {
         let frame = message.emit_as(precision);
-        let (_, data) = xbus::parse(&frame).expect("intact");
+        let (_, data) = Xbus::parse(&frame).expect("intact");
         assert_eq!(MtData2::parse(data), Ok(message), "{precision:?}");
         let mut mti = Mti::new();
         frame.iter().for_each(|byte| mti.receive(*byte));
@@ -114,12 +114,12 @@ proptest! {
         let frame = message.emit_as(ALL[precision]);
         prop_assert!(Xbus::check(&frame));
         for length in 0..frame.len() {
-            prop_assert_eq!(xbus::parse(&frame[..length]), None);
+            prop_assert_eq!(Xbus::parse(&frame[..length]), None);
         }
         for bit in 0..frame.len() * 8 {
             let mut damaged = frame.clone();
             damaged[bit / 8] ^= 1 << (bit % 8);
-            prop_assert_eq!(xbus::parse(&damaged), None, "bit {}", bit);
+            prop_assert_eq!(Xbus::parse(&damaged), None, "bit {}", bit);
         }
     }
 }

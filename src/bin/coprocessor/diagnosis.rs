@@ -5,12 +5,13 @@
 //! idle is preempted. Responses are sent after the waiting rates.
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
-use crate::pause;
+use crate::frames;
+use crate::output;
 use crate::regions::{Records, Weights};
 use crate::ring::Ring;
 use crate::serial;
 use crate::stm32f405::{rng, timer};
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use embedded_io::Write;
@@ -79,14 +80,6 @@ fn unpack(packed: u32) -> Option<Id> {
     }
 }
 
-/// True while a tester has stopped the messages of the board.
-static SILENCED: AtomicBool = AtomicBool::new(false);
-
-/// Returns whether a tester has stopped the messages of the board.
-pub fn is_silenced() -> bool {
-    SILENCED.load(Ordering::Relaxed)
-}
-
 /// Serves one tester at a time, on any line.
 pub struct Diagnosis {
     tester: Tester,
@@ -132,7 +125,7 @@ impl Diagnosis {
         }
         let Tester { server, line } = tester;
         server.poll(device, counters, now, rng::bytes);
-        SILENCED.store(server.is_silenced(), Ordering::Relaxed);
+        frames::SILENCED.store(server.is_silenced(), Ordering::Relaxed);
         while match line {
             Line::Service => port.outgoing().is_none(),
             Line::Can | Line::Slcan => !RESPONSES.is_full(),
@@ -148,7 +141,7 @@ impl Diagnosis {
         if server.restart_is_due() && RESPONSES.is_empty() && port.outgoing().is_none() {
             // The flush is bounded: a response that cannot be sent does not delay the restart.
             let _ = service.flush();
-            pause::with_silence_announced(SCB::sys_reset);
+            output::with_silence_announced(SCB::sys_reset);
         }
     }
 }

@@ -44,18 +44,13 @@ mod crash;
 #[cfg(target_os = "none")]
 mod diagnosis;
 #[cfg(target_os = "none")]
+mod frames;
 #[cfg(target_os = "none")]
 mod idle;
 #[cfg(target_os = "none")]
 mod imu;
 #[cfg(target_os = "none")]
-mod outgoing;
-#[cfg(target_os = "none")]
 mod output;
-#[cfg(target_os = "none")]
-mod pause;
-#[cfg(target_os = "none")]
-mod received;
 #[cfg(target_os = "none")]
 mod regions;
 #[cfg(target_os = "none")]
@@ -103,7 +98,7 @@ mod app {
     use crate::output::Output;
     use crate::stm32f405::pac::Interrupt;
     use crate::stm32f405::{can, timer};
-    use crate::{board, crash, received, serial, start};
+    use crate::{board, crash, frames, serial, start};
     use core::mem::MaybeUninit;
     use cortex_m::asm::dsb;
     use gyronet::coprocessor::Coprocessor;
@@ -199,7 +194,7 @@ mod app {
 
     #[task(binds = CAN1_RX0, priority = 3)]
     fn can_received(_: can_received::Context) {
-        received::take();
+        frames::take();
         dsb();
     }
 

@@ -1,16 +1,19 @@
 //! The output task: moves samples and frames between the lines and the coprocessor. Nothing in it waits.
+//!
+//! It also announces that the buses will be silent, because the flash is erased or the board restarts. Idle requests the
+//! announcement and waits for it; from then on the task sends message sets without a rate, until idle's work is done. A
+//! receiver can tell from them that the silence is intended.
 
 use crate::board::SUPERVISOR;
 use crate::boards::BOARD;
 use crate::diagnosis::{self, FROM_SLCAN};
+use crate::frames::{self, FRAMES, Outgoing};
 use crate::idle::{OBSERVATIONS, Observation};
 use crate::imu::{BYTES_PER_STEP, Imu};
-use crate::outgoing::Outgoing;
-use crate::pause;
-use crate::received::{self, FRAMES};
 use crate::serial;
 use crate::stm32f405::can::{Can, State};
 use crate::stm32f405::{timer, watchdog};
+use core::sync::atomic::{AtomicU8, Ordering};
 use embedded_can::Frame as _;
 use gyronet::coprocessor::{self, Coprocessor};
 use gyronet::health::count;
@@ -21,6 +24,21 @@ use gyronet::units::Micros;
 
 /// Half a period of the LED, ms; a power of two.
 const BLINK_MS: u32 = 512;
+
+/// In this state, the output task sends rates.
+const RUNNING: u8 = 0;
+/// In this state, idle waits for the announcement.
+const REQUESTED: u8 = 1;
+/// In this state, a message set without a rate has been queued.
+const ANNOUNCED: u8 = 2;
+/// Limits how long idle waits for the output task's announcement, us.
+const ANNOUNCE_US: u64 = 20_000;
+/// Time for the frames to be sent, us; six frames take 1.7 ms.
+const LEAVE_US: u64 = 5_000;
+/// Limits how often a wait reads the timer, so that it ends even if the timer stands still.
+const POLLS: u32 = 1_000_000;
+
+static STATE: AtomicU8 = AtomicU8::new(RUNNING);
 
 /// The configuration of the output task's lines.
 pub struct OutputParts {
@@ -84,16 +102,12 @@ impl Output {
         let mut polled = core::mem::replace(&mut self.polled_at, tick) != tick;
         if polled {
             self.outgoing.tick(tick);
-            // The LED blinks as long as this task runs.
-            if let Some((led, lit)) = BOARD.led {
-                led.set(lit == (tick & BLINK_MS != 0));
-            }
             self.poll_inputs(coprocessor, now);
         }
-        coprocessor.pause(pause::is_requested(), &mut self.outgoing);
-        if pause::is_requested() {
+        coprocessor.pause(is_requested(), &mut self.outgoing);
+        if is_requested() {
             self.send(coprocessor, now);
-            pause::announce();
+            announce();
         }
         let mut budget = BYTES_PER_STEP;
         while coprocessor.is_ready(now) {
@@ -128,6 +142,10 @@ impl Output {
             fog: *coprocessor.fog_counters(),
             inputs: *coprocessor.input_counters(),
         };
+        // The LED blinks as long as this task runs.
+        if let Some((led, lit)) = BOARD.led {
+            led.set(lit == (tick & BLINK_MS != 0));
+        }
         if SUPERVISOR.complete() {
             watchdog::feed();
         }
@@ -140,10 +158,11 @@ impl Output {
             let _ = coprocessor.can(&frame, now);
         }
         for _ in 0..serial::RECEIVED {
-            let accepted = self.dsp1760.receive_some(self.fog.received());
-            if accepted == 0 {
+            let waiting = self.fog.received();
+            if waiting.is_empty() {
                 break;
             }
+            let accepted = self.dsp1760.receive_some(waiting);
             self.fog.consume(accepted);
             while let Some(sample) = self.dsp1760.next_sample() {
                 match sample {
@@ -160,7 +179,7 @@ impl Output {
     /// Reports lost frames and the state of the bus to the coprocessor.
     fn report_bus(&mut self, coprocessor: &mut Coprocessor) {
         self.lines.unsent = self.outgoing.dropped();
-        self.lines.frames_lost = received::lost().saturating_add(self.unread);
+        self.lines.frames_lost = frames::lost().saturating_add(self.unread);
         let lost = self.lines.unsent.saturating_add(self.lines.frames_lost);
         coprocessor.bus(lost, self.outgoing.state() >= State::Passive);
     }
@@ -188,4 +207,30 @@ impl Output {
         let lost = [self.imu.lost(), self.fog.lost(), self.outgoing.lost()];
         self.lines.line_errors = lost.into_iter().fold(0, u32::saturating_add);
     }
+}
+
+/// Announces that the buses will be silent, then runs `work`, which silences them. Idle calls this.
+pub fn with_silence_announced<T>(work: impl FnOnce() -> T) -> T {
+    STATE.store(REQUESTED, Ordering::Relaxed);
+    wait(ANNOUNCE_US, || STATE.load(Ordering::Relaxed) == ANNOUNCED);
+    wait(LEAVE_US, || false);
+    let result = work();
+    STATE.store(RUNNING, Ordering::Relaxed);
+    result
+}
+
+/// Returns whether rates are withheld now.
+fn is_requested() -> bool {
+    STATE.load(Ordering::Relaxed) != RUNNING
+}
+
+/// Reports to idle that the announcement has been queued.
+fn announce() {
+    let _ = STATE.compare_exchange(REQUESTED, ANNOUNCED, Ordering::Relaxed, Ordering::Relaxed);
+}
+
+/// Waits until `over` returns true, or `us` microseconds have passed.
+fn wait(us: u64, over: impl Fn() -> bool) {
+    let until = timer::micros() + us;
+    let _ = (0..POLLS).any(|_| over() || timer::micros() >= until);
 }

@@ -1,7 +1,7 @@
 //! The regions of the flash that the image writes: records and weight files.
 #![allow(unsafe_code, reason = "memory by address; the block says why it is sound")]
 
-use crate::pause;
+use crate::output;
 use crate::stm32f405::flash::{Flash, FlashError, WORD};
 use crate::stm32f405::watchdog;
 use core::ops::Range;
@@ -25,7 +25,7 @@ fn aligned(range: Range<u32>, unit: usize) -> Result<Range<u32>, FlashError> {
 
 /// Erases a range of whole sectors, after announcing the silence on the buses.
 fn erase(flash: &Flash, range: Range<u32>) -> Result<(), FlashError> {
-    pause::with_silence_announced(|| {
+    output::with_silence_announced(|| {
         let mut at = range.start;
         while at < range.end {
             let sector = sector(at).filter(|sector| sector.end <= range.end).ok_or(FlashError::NotAligned)?;

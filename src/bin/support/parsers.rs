@@ -12,7 +12,7 @@ use gyronet::sensor::dsp3000::Mode;
 use gyronet::sensor::dsp3000::ascii::{Dsp3000Ascii, Reading};
 use gyronet::sensor::dsp3000::binary::{Dsp3000Binary, LOCK, Word};
 use gyronet::sensor::icm42688::packet::{Packet, Resolution};
-use gyronet::sensor::xsens::precision::Precision;
+use gyronet::sensor::xsens::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::units::Micros;
 

@@ -1,16 +1,10 @@
 //! MTData2 (MID 36) consists of packets `ID ID LEN DATA..`, big-endian. The low nibble of an ID gives precision and
 //! coordinate system. The coordinate system affects only orientations; the readings used here are in sensor axes.
 
-use super::precision::Precision;
-use super::xbus;
-use crate::sample::ImuSample;
 use crate::units::RangeError;
-use heapless::Vec;
 
 /// Message identifier of MTData2.
 pub const MID_MT_DATA2: u8 = 0x36;
-/// Length of the longest frame that [`MtData2::emit_as`] returns, bytes.
-pub const MAX_EMITTED: usize = 96;
 
 /// The data identifiers, without precision and coordinate system.
 pub mod id {
@@ -109,69 +103,6 @@ impl MtData2 {
         }
         if data.is_empty() { Ok(message) } else { Err(XsensError::Truncated { id: 0 }) }
     }
-
-    /// The message of a sample, as an MTi sends it.
-    #[must_use]
-    pub fn of(sample: &ImuSample, number: u16) -> Self {
-        Self {
-            packet_counter: Some(number),
-            sample_time_fine: Some((sample.time.0 / 100) as u32),
-            acceleration: Some(sample.specific_force.map(|force| force.metre_per_sec2() as f32)),
-            rate_of_turn: Some(sample.angular_rate.map(|rate| rate.rad_per_sec() as f32)),
-            temperature: sample.temperature.map(|temperature| f32::from(temperature.0) / 100.0),
-            status: Some(3),
-        }
-    }
-
-    /// Encodes the whole frame in single precision; fields that are `None` are omitted.
-    #[must_use]
-    pub fn emit(&self) -> Vec<u8, 72> {
-        // 72 bytes hold all six packets.
-        xbus::emit(MID_MT_DATA2, &self.data(Precision::Single)).unwrap_or_default()
-    }
-
-    /// Encodes the whole frame with its numbers in the given precision.
-    #[must_use]
-    pub fn emit_as(&self, precision: Precision) -> Vec<u8, MAX_EMITTED> {
-        xbus::emit(MID_MT_DATA2, &self.data(precision)).unwrap_or_default()
-    }
-
-    /// Encodes all packets that are present.
-    fn data(&self, precision: Precision) -> Vec<u8, MAX_EMITTED> {
-        let mut data = Vec::new();
-        // MAX_EMITTED bytes hold all six packets in the longest precision, double.
-        let mut packet = |id: u16, bytes: &[u8]| {
-            let _ = data.extend_from_slice(&id.to_be_bytes());
-            let _ = data.push(bytes.len() as u8);
-            let _ = data.extend_from_slice(bytes);
-        };
-        let numbers = |values: &[f32]| {
-            let mut bytes = Vec::<u8, 24>::new();
-            for value in values {
-                let _ = bytes.extend_from_slice(&precision.emit((*value).into()));
-            }
-            bytes
-        };
-        if let Some(counter) = self.packet_counter {
-            packet(id::PACKET_COUNTER, &counter.to_be_bytes());
-        }
-        if let Some(time) = self.sample_time_fine {
-            packet(id::SAMPLE_TIME_FINE, &time.to_be_bytes());
-        }
-        if let Some(values) = &self.acceleration {
-            packet(precision.mark(id::ACCELERATION), &numbers(values));
-        }
-        if let Some(values) = &self.rate_of_turn {
-            packet(precision.mark(id::RATE_OF_TURN), &numbers(values));
-        }
-        if let Some(temperature) = self.temperature {
-            packet(precision.mark(id::TEMPERATURE), &numbers(&[temperature]));
-        }
-        if let Some(status) = self.status {
-            packet(id::STATUS_WORD, &status.to_be_bytes());
-        }
-        data
-    }
 }
 
 fn word(packet: &[u8]) -> Option<u32> {
@@ -184,4 +115,73 @@ fn vector(id: u16, packet: &[u8]) -> Option<[f32; 3]> {
     let mut next = || numbers.next().and_then(|bytes| precision.parse_f32(bytes));
     let values = [next()?, next()?, next()?];
     (packet.len() == 3 * precision.bytes()).then_some(values)
+}
+
+/// The format of a number, selected by bits 0 and 1 of the data identifier; all are big-endian.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Precision {
+    /// f32.
+    Single,
+    /// i32 with 20 bits of fraction.
+    Fixed1220,
+    /// 48 bits with 32 bits of fraction; the 32 fraction bits are sent before the 16 integer bits.
+    Fixed1632,
+    /// f64.
+    Double,
+}
+
+impl Precision {
+    /// Returns the precision that a data identifier selects.
+    #[must_use]
+    pub const fn of(id: u16) -> Self {
+        match id & 3 {
+            0 => Self::Single,
+            1 => Self::Fixed1220,
+            2 => Self::Fixed1632,
+            _ => Self::Double,
+        }
+    }
+
+    /// Returns the length of a number, bytes.
+    #[must_use]
+    pub const fn bytes(self) -> usize {
+        match self {
+            Self::Single | Self::Fixed1220 => 4,
+            Self::Fixed1632 => 6,
+            Self::Double => 8,
+        }
+    }
+
+    /// Decodes a number, exactly; `None` if the length of `bytes` is wrong.
+    #[must_use]
+    pub fn parse(self, bytes: &[u8]) -> Option<f64> {
+        match (self, bytes) {
+            (Self::Single, &[a, b, c, d]) => Some(f32::from_be_bytes([a, b, c, d]).into()),
+            (Self::Fixed1220, &[a, b, c, d]) => {
+                Some(f64::from(i32::from_be_bytes([a, b, c, d])) / f64::from(1 << 20))
+            }
+            (Self::Fixed1632, &[f3, f2, f1, f0, i1, i0]) => {
+                let sign = if i1 & 0x80 == 0 { 0 } else { 0xFF };
+                let code = i64::from_be_bytes([sign, sign, i1, i0, f3, f2, f1, f0]);
+                Some(code as f64 / (1u64 << 32) as f64)
+            }
+            (Self::Double, &[a, b, c, d, e, f, g, h]) => Some(f64::from_be_bytes([a, b, c, d, e, f, g, h])),
+            _ => None,
+        }
+    }
+
+    /// Decodes a number and rounds it once to f32. Where possible no f64 arithmetic is used, because some targets
+    /// compute f64 in software.
+    #[must_use]
+    pub fn parse_f32(self, bytes: &[u8]) -> Option<f32> {
+        match (self, bytes) {
+            (Self::Single, &[a, b, c, d]) => Some(f32::from_be_bytes([a, b, c, d])),
+            // The conversion rounds; the division by a power of two is exact.
+            (Self::Fixed1220, &[a, b, c, d]) => {
+                Some(i32::from_be_bytes([a, b, c, d]) as f32 / (1 << 20) as f32)
+            }
+            _ => self.parse(bytes).map(|value| value as f32),
+        }
+    }
 }

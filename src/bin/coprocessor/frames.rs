@@ -1,8 +1,15 @@
-//! The two lines that carry the board's frames: SLCAN always, CAN if its controller works.
+//! The frames of the two lines that carry them: SLCAN always, CAN if its controller works.
+//!
+//! Frames that CAN receives go from the receive interrupt to the output task, or to idle if they are requests of a
+//! tester.
+#![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
-use crate::diagnosis::{self, Line, RESPONSES};
+use crate::diagnosis::{self, FROM_CAN, Line, RESPONSES};
+use crate::ring::Ring;
 use crate::serial;
-use crate::stm32f405::can::{self, Can, STALE_MS, State};
+use crate::stm32f405::can::{self, Can, Received, STALE_MS, State};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use embedded_can::Frame as _;
 use gyronet::can::DataFrame;
 use gyronet::can::queue::TransmitQueue;
 use gyronet::can::slcan::host::StatusFlags;
@@ -12,6 +19,36 @@ use gyronet::units::Micros;
 
 /// Frames that can wait for each line.
 const QUEUE: usize = 24;
+
+/// Waiting wheel and latitude frames; the output task reads them every millisecond.
+pub static FRAMES: Ring<DataFrame, 8> =
+    // SAFETY: the receive interrupt writes, the output task reads.
+    unsafe { Ring::new() };
+/// Number of frames that found no room, in the controller or here. Only the handler counts.
+static LOST: AtomicU32 = AtomicU32::new(0);
+
+/// Handles the receive interrupt: takes every received frame.
+pub fn take() {
+    while let Some(Received { frame, lost }) = can::receive() {
+        let full = frame.is_some_and(|frame| !push(frame));
+        let lost = LOST.load(Ordering::Relaxed).saturating_add(u32::from(lost) + u32::from(full));
+        LOST.store(lost, Ordering::Relaxed);
+    }
+}
+
+/// Queues a frame for its task. Returns whether there was room.
+fn push(frame: DataFrame) -> bool {
+    if diagnosis::is_request(frame.id()) { FROM_CAN.push(frame) } else { FRAMES.push(frame) }
+}
+
+/// Returns the number of frames lost since the start. The controller does not count how many it loses at once, so
+/// those count as one.
+pub fn lost() -> u32 {
+    LOST.load(Ordering::Relaxed)
+}
+
+/// True while a tester has stopped the messages of the board.
+pub static SILENCED: AtomicBool = AtomicBool::new(false);
 
 /// Both lines and the frames that wait for them; a [`Sink`] of the coprocessor's frames.
 pub struct Outgoing {
@@ -36,6 +73,7 @@ impl Outgoing {
 
     /// Sends as much as the lines accept; passes the frames that a host has sent over SLCAN to `take`.
     pub fn service(&mut self, take: impl FnMut(DataFrame)) {
+        self.refill();
         self.port.set_bus(match self.state() {
             State::Active => StatusFlags::default(),
             State::Warning => StatusFlags::ERROR_WARNING,
@@ -52,7 +90,6 @@ impl Outgoing {
         }
         // Errors need no handling: a line that lost a byte is answered as invalid, or just lacks that byte.
         let _ = self.port.service(&mut self.slcan, take);
-        self.refill();
     }
 
     /// Sets the time, ms, and polls the controller. Called every millisecond.
@@ -103,7 +140,7 @@ impl Sink for Outgoing {
     /// Queues a frame for both lines, unless a tester has silenced the board.
     #[inline(never)]
     fn frame(&mut self, TimedFrame { frame, time }: TimedFrame) {
-        if diagnosis::is_silenced() {
+        if SILENCED.load(Ordering::Relaxed) {
             return;
         }
         self.port.enqueue(frame, time);

@@ -1,4 +1,7 @@
-//! The mounting check determines whether a model's mounting is that of the unit that it runs on.
+//! The two errors of a model that was trained with another unit: a constant, and the mounting.
+//!
+//! The mean of the corrections shows the constant. The mounting check determines whether the mounting is that of
+//! the unit that the model runs on.
 //!
 //! A linear part subtracts some of the roll and pitch rates from the yaw rate: the mounting of the unit that it was
 //! trained with. On another unit that adds an error. While a vehicle drives, its yaw rate changes slowly, and its
@@ -104,5 +107,35 @@ impl MountingCheck {
             self.is_mismatched = false;
         }
         self.is_mismatched && !was_mismatched
+    }
+}
+
+/// The number of samples that the mean covers.
+const MEMORY: i64 = 1_280;
+/// Fraction bits of the mean.
+const Q: u32 = 16;
+
+/// The mean of a value: of all so far, and later of about the last [`MEMORY`] samples.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SlowMean {
+    mean: i64,
+    count: i64,
+}
+
+impl SlowMean {
+    /// The mean before the first value is zero.
+    pub(super) const NONE: Self = Self { mean: 0, count: 0 };
+
+    /// Adds a value, within 2^32; values arrive every `stride` samples.
+    pub(super) fn observe(&mut self, value: i64, stride: u32) {
+        let most = MEMORY.checked_div(stride.into()).unwrap_or(MEMORY);
+        self.count = (self.count + 1).min(most);
+        let beyond = (value << Q) - self.mean;
+        self.mean += beyond.checked_div(self.count).unwrap_or(0);
+    }
+
+    /// Returns the mean.
+    pub(super) fn get(self) -> i64 {
+        self.mean >> Q
     }
 }
