@@ -6,7 +6,6 @@
 
 mod can;
 mod diagnosis;
-mod logs;
 mod recording;
 mod records;
 mod sensors;
@@ -29,7 +28,7 @@ pub struct Entrance {
     pub mutations: u64,
 }
 
-pub const ALL: [Entrance; 17] = [
+pub const ALL: [Entrance; 16] = [
     Entrance { name: "xsens", run: sensors::xsens, seeds: sensors::xsens_seeds, mutations: 20_000 },
     Entrance { name: "dsp1760", run: sensors::dsp1760, seeds: sensors::dsp1760_seeds, mutations: 20_000 },
     Entrance { name: "dsp3000", run: sensors::dsp3000, seeds: sensors::dsp3000_seeds, mutations: 20_000 },
@@ -49,7 +48,6 @@ pub const ALL: [Entrance; 17] = [
     Entrance { name: "gyronet_blob", run: weights::gyronet, seeds: weights::seeds, mutations: 100 },
     Entrance { name: "fognet_blob", run: weights::fognet, seeds: weights::seeds, mutations: 50 },
     Entrance { name: "recording", run: recording::csv, seeds: recording::seeds, mutations: 1_000 },
-    Entrance { name: "logs", run: logs::file, seeds: logs::seeds, mutations: 2_000 },
     Entrance { name: "sequences", run: sequences::folder, seeds: sequences::seeds, mutations: 300 },
     Entrance { name: "trajectory", run: trajectory::tum, seeds: trajectory::seeds, mutations: 20_000 },
 ];

@@ -7,11 +7,9 @@ pub mod calibrate;
 pub mod completions;
 pub mod demo;
 pub mod device;
-#[cfg(feature = "logs")]
 pub mod doctor;
 mod drives;
 pub mod evaluate;
-#[cfg(feature = "logs")]
 pub mod import;
 pub mod keys;
 pub mod monitor;
@@ -19,7 +17,7 @@ mod paint;
 mod progress;
 pub mod quantize;
 pub mod reference;
-#[cfg(feature = "logs")]
+#[cfg(feature = "mcap")]
 pub mod replay;
 pub mod retired;
 pub mod sign;
@@ -27,7 +25,6 @@ pub mod simulate;
 pub mod size;
 pub mod train;
 mod weights;
-#[cfg(feature = "logs")]
 pub mod wheels;
 
 use gyronet_tools::drive::error::DataError;

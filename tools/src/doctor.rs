@@ -4,6 +4,7 @@
 //! The recording is read row by row and not rejected for its defects: a defect for which other commands would reject
 //! the recording is reported as a finding.
 
+mod align;
 mod allan;
 mod finding;
 mod forward;

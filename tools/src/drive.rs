@@ -6,7 +6,7 @@
 pub mod candump;
 pub mod error;
 pub mod export;
-#[cfg(feature = "logs")]
+#[cfg(feature = "mcap")]
 pub mod foxglove;
 pub mod recording;
 pub mod replay;

@@ -6,8 +6,7 @@
 //! ```text
 //! board <- drive <- parts
 //! drive <- calibrate
-//! drive <- import -> wheels
-//! drive <- doctor -> import, plot
+//! drive <- doctor -> plot
 //! drive <- evaluate
 //! train -> evaluate, plot      python
 //! target -> simulate      network      client <- reference      wheels
@@ -19,12 +18,9 @@ pub mod bundled;
 pub mod calibrate;
 pub mod client;
 pub mod demo;
-#[cfg(feature = "logs")]
 pub mod doctor;
 pub mod drive;
 pub mod evaluate;
-#[cfg(feature = "logs")]
-pub mod import;
 pub mod network;
 pub mod parts;
 pub mod plot;

@@ -52,12 +52,10 @@ enum Command {
     Demo(commands::demo::Args),
     Evaluate(commands::evaluate::Args),
     Calibrate(commands::calibrate::Args),
-    #[cfg(feature = "logs")]
+    #[cfg(feature = "mcap")]
     Replay(commands::replay::Args),
     Simulate(commands::simulate::Args),
-    #[cfg(feature = "logs")]
     Import(commands::import::Args),
-    #[cfg(feature = "logs")]
     Doctor(commands::doctor::Args),
     Train(commands::train::Args),
     Quantize(commands::quantize::Args),
@@ -68,7 +66,6 @@ enum Command {
     Keys(commands::keys::Args),
     Sign(commands::sign::Args),
     Reference(commands::reference::Args),
-    #[cfg(feature = "logs")]
     Wheels(commands::wheels::Args),
     Size(commands::size::Args),
     Completions(commands::completions::Args),
@@ -86,15 +83,13 @@ fn main() -> ExitCode {
         Command::Demo(args) => commands::demo::run(args, common),
         Command::Evaluate(args) => commands::evaluate::run(args, common),
         Command::Calibrate(args) => commands::calibrate::run(args, common),
-        #[cfg(feature = "logs")]
+        #[cfg(feature = "mcap")]
         Command::Replay(args) => commands::replay::run(args, common),
         Command::Keys(args) => commands::keys::run(args, common),
         Command::Sign(args) => commands::sign::run(args, common),
         Command::Reference(args) => commands::reference::run(args, common),
         Command::Simulate(args) => commands::simulate::run(args, common),
-        #[cfg(feature = "logs")]
         Command::Import(args) => commands::import::run(args, common),
-        #[cfg(feature = "logs")]
         Command::Doctor(args) => commands::doctor::run(args, common),
         Command::Train(args) => commands::train::run(args, common),
         Command::Quantize(args) => commands::quantize::run(args, common),
@@ -102,7 +97,6 @@ fn main() -> ExitCode {
         Command::Monitor(args) => commands::monitor::run(args, common),
         Command::BenchTarget(args) => commands::bench_target::run(args, common),
         Command::Device(args) => commands::device::run(args, common),
-        #[cfg(feature = "logs")]
         Command::Wheels(args) => commands::wheels::run(args, common),
         Command::Size(args) => commands::size::run(args, common),
         Command::Completions(args) => commands::completions::run(args, Cli::command()),

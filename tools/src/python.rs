@@ -1,5 +1,7 @@
 //! Some steps run Python programs of this repository: [`interpreter`] finds a Python interpreter for them, or creates
-//! a virtual environment.
+//! a virtual environment. [`package`] runs the package that reads logs.
+
+pub mod package;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -32,6 +34,26 @@ pub enum PythonError {
         /// The command that failed.
         step: &'static str,
     },
+    #[error(
+        "logs are read by Python, and python3 cannot be started ({source}): install Python 3.11 or later, or set GYRONET_PYTHON"
+    )]
+    NoPython { source: std::io::Error },
+    #[error(
+        "logs are read by Python 3.11 or later, and python3 is older: set GYRONET_PYTHON to a later one with tools/python/requirements.txt"
+    )]
+    OldPython,
+    /// Neither a checkout nor an installed package.
+    #[error(
+        "logs are read by the Python package gyronet {version}, which python3 does not have: pip install ./tools/python in gyronet's repository"
+    )]
+    NoPackage { version: &'static str },
+    #[error("{}: {source}", folder.display())]
+    Folder { folder: PathBuf, source: std::io::Error },
+    /// The environment of the package could not be made; nothing of it is left.
+    #[error(
+        "the Python packages that read logs could not be installed: {step}: {reason} (without a network: pip install -r tools/python/requirements.txt from a mirror, and GYRONET_PYTHON)"
+    )]
+    Install { step: &'static str, reason: String },
 }
 
 /// Returns an interpreter that can import all `packages`: `given`, or else that of the virtual environment. A missing
@@ -73,8 +95,12 @@ fn imports(python: &Path, packages: &[&str]) -> Result<(), PythonError> {
     if output.status.success() {
         return Ok(());
     }
-    let text = String::from_utf8_lossy(&output.stderr);
-    let reason = text.trim().lines().last().unwrap_or("ended without a message").to_owned();
+    let reason = last_line(&output.stderr);
     let packages = packages.iter().map(|package| (*package).to_owned()).collect();
     Err(PythonError::Packages { python: python.to_owned(), reason, packages })
+}
+
+fn last_line(said: &[u8]) -> String {
+    let text = String::from_utf8_lossy(said);
+    text.trim().lines().last().unwrap_or("ended without a message").to_owned()
 }

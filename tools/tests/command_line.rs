@@ -24,7 +24,7 @@ fn every_help_begins_with_one_line_and_ends_with_examples() {
     let names = subcommands();
     assert!(names.len() >= 13, "{names:?}");
     for name in names.iter().filter(|name| *name != "help") {
-        let output = gyronet(&[name, "--help"]);
+        let output = gyronet(&["help", name]);
         let help = text(&output.stdout);
         assert_eq!(output.status.code(), Some(0), "{name}");
         let first = help.lines().next().unwrap();

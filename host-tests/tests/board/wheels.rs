@@ -1,4 +1,4 @@
-//! Wheel frames of another maker: from a DBC file to the record in the board's flash, and on the bus.
+//! Wheel frames of another maker: from a settings file to the record in the board's flash, and on the bus.
 
 use crate::common::{self, SAMPLE, START, drive, frames};
 use crate::service;
@@ -8,24 +8,31 @@ use gyronet::can::{DataFrame, slcan};
 use gyronet::health::Faults;
 use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
-use gyronet_tools::wheels::{WheelFile, from_dbc};
+use gyronet_tools::wheels::WheelFile;
 
-/// Two axles in two frames with 29 bits of identifier, little-endian, m/s.
-const DBC: &str = r#"VERSION ""
-NS_ :
-BS_:
-BU_: ABS
-BO_ 2566844926 AxleFront: 8 ABS
- SG_ SpeedFrontLeft : 8|13@1+ (0.03125,0) [0|255] "m/s" ABS
- SG_ SpeedFrontRight : 24|13@1+ (0.03125,0) [0|255] "m/s" ABS
-BO_ 2566845182 AxleRear: 8 ABS
- SG_ SpeedRearLeft : 8|13@1+ (0.03125,0) [0|255] "m/s" ABS
- SG_ SpeedRearRight : 24|13@1+ (0.03125,0) [0|255] "m/s" ABS
+/// Two axles in two frames with 29 bits of identifier, little-endian, 1/32 m/s, with a counter in byte 6 and the exclusive
+/// or in byte 7.
+const SETTINGS: &str = r#"
+[[frame]]
+id = 0x18FEF1FE
+extended = true
+checksum = { kind = "xor", byte = 7 }
+counter = { start_bit = 48, bits = 4, order = "intel" }
+signal = [
+    { wheel = "front-left", start_bit = 8, bits = 13, order = "intel", factor_kmh = 0.1125, offset_kmh = 0 },
+    { wheel = "front-right", start_bit = 24, bits = 13, order = "intel", factor_kmh = 0.1125, offset_kmh = 0 },
+]
+[[frame]]
+id = 0x18FEF2FE
+extended = true
+checksum = { kind = "xor", byte = 7 }
+counter = { start_bit = 48, bits = 4, order = "intel" }
+signal = [
+    { wheel = "rear-left", start_bit = 8, bits = 13, order = "intel", factor_kmh = 0.1125, offset_kmh = 0 },
+    { wheel = "rear-right", start_bit = 24, bits = 13, order = "intel", factor_kmh = 0.1125, offset_kmh = 0 },
+]
 "#;
-const FRAMES: [u32; 2] = [2_566_844_926 - (1 << 31), 2_566_845_182 - (1 << 31)];
-/// The DBC file does not tell two things: a counter in byte 6, and the exclusive or in byte 7.
-const PROTECTION: &str = "checksum = { kind = \"xor\", byte = 7 }\n\
-                          counter = { start_bit = 48, bits = 4, order = \"intel\" }\n";
+const FRAMES: [u32; 2] = [0x18FE_F1FE, 0x18FE_F2FE];
 
 /// The frame of an axle whose wheels turn at this many thirty-seconds of a metre per second.
 fn axle(id: u32, code: u16, counter: u8) -> DataFrame {
@@ -37,11 +44,7 @@ fn axle(id: u32, code: u16, counter: u8) -> DataFrame {
 }
 
 fn settings() -> gyronet::can::wheel::WheelSettings {
-    let signals = ["SpeedFrontLeft", "SpeedFrontRight", "SpeedRearLeft", "SpeedRearRight"].map(Some);
-    let file = from_dbc("other.dbc", DBC, signals).expect("four signals");
-    let text = toml::to_string(&file).expect("it is TOML");
-    let edited = text.replace("[[frame]]\n", &format!("[[frame]]\n{PROTECTION}"));
-    WheelFile::parse("wheels.toml", &edited).and_then(|file| file.settings("wheels.toml")).expect("settings")
+    WheelFile::parse("wheels.toml", SETTINGS).and_then(|file| file.settings("wheels.toml")).expect("settings")
 }
 
 /// The angle messages' fault bits.

@@ -12,7 +12,7 @@ from gyronet.refused import Refused
 
 def parser():
     top = argparse.ArgumentParser(
-        prog="gyronet-logs",
+        prog=os.environ.get("GYRONET_COMMAND", "gyronet-logs"),
         description="Make a drive for gyronet of logs of other tools, and wheel settings of a DBC file.",
     )
     commands = top.add_subparsers(dest="command", required=True)
@@ -44,6 +44,7 @@ def parser():
     log.add_argument("--from", dest="start", type=float, default=0.0, metavar="SECONDS", help="skip this much after the first sample")
     log.add_argument("--to", type=float, metavar="SECONDS", help="end this long after the first sample")
     log.add_argument("--json", action="store_true", help="print the report as JSON")
+    log.add_argument("--quiet", "-q", action="store_true", help="no progress")
     wheels = commands.add_parser("wheels", help="wheel settings of a vehicle").add_subparsers(dest="action", required=True)
     dbc = wheels.add_parser(
         "from-dbc",
@@ -57,6 +58,7 @@ def parser():
     for wheel in ("front-left", "front-right", "rear-left", "rear-right"):
         dbc.add_argument(f"--{wheel}", metavar="SIGNAL")
     dbc.add_argument("--out", metavar="FILE.toml", help="write to this file instead of standard output")
+    dbc.add_argument("--quiet", "-q", action="store_true", help="no remarks")
     return top
 
 
@@ -71,6 +73,7 @@ def vehicle_of(args):
     vehicle = Vehicle.read(path) if path else Vehicle()
     # Only a drive's own file says that its rows are turned already; its names are those of the original logs.
     vehicle.mounting["applied"] = vehicle.mounting["applied"] and own is not None
+    vehicle.start = vehicle.start if own else None
     if vehicle.mounting["applied"]:
         vehicle.forget_names()
     if args.out:
@@ -88,8 +91,10 @@ def vehicle_of(args):
 
 
 def run_import(args):
-    from gyronet.logs import Drive, Request
+    from gyronet.logs import Drive, Request, progress
     from gyronet.logs.units import Flags
+
+    progress.QUIET = args.quiet
 
     if not 0 <= args.start < 1e6 or args.to is not None and not args.start < args.to:
         raise Refused("--from and --to are seconds after the first sample, --from below --to")
@@ -118,7 +123,7 @@ def run_import(args):
                           "warnings": drive.warnings, "dropped_by_reason": drive.dropped}))
         return
     print(f"{drive.seconds:.2f} s, {drive.rows} rows, {dropped} records dropped")
-    for line in [next(drive.remarks()), *(f"dropped {count}: {reason}" for reason, count in drive.dropped.items()), *report]:
+    for line in [drive.start_line(), *(f"dropped {count}: {reason}" for reason, count in drive.dropped.items()), *report]:
         print(f"  {line}")
     for warning in drive.warnings:
         print(f"  warning: {warning}")

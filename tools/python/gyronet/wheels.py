@@ -125,7 +125,7 @@ def run(args):
         print("\n".join(listing(args.file)))
         raise Refused("no signal is named, nothing is written: choose with --rear-left SIGNAL --rear-right SIGNAL")
     text, remarks = from_dbc(args.file, signals)
-    for remark in remarks:
+    for remark in [] if args.quiet else remarks:
         print(f"remark: {remark}", file=sys.stderr)
     if not args.out:
         print(text, end="")

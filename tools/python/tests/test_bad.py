@@ -112,7 +112,7 @@ class Bad(unittest.TestCase):
         written = tomllib.loads(text)
         self.assertEqual((written["mounting"]["applied"], written["mounting"]["yaw_deg"], written["wheels"]["radius_m"]), (True, 90.0, 0.31))
         self.assertEqual(written["columns"], {"acc_x": {"name": "acc_x", "unit": "m/s^2"}})
-        self.assertTrue("# start = unknown" in text and "# unit of imu = m/s^2, rad/s" in text)
+        self.assertEqual(written["recording"], {"units": {"imu": "m/s^2, rad/s"}, "dropped": {}})
         self.assertEqual(made.run(self.folder, "import", "o.csv", "--out", "p.csv")[0], 0)
         self.assertEqual((self.folder / "p.csv").read_text(), (self.folder / "o.csv").read_text())
 

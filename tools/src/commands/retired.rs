@@ -3,7 +3,7 @@
 use clap::error::{ContextKind, ContextValue};
 
 const FAULTS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin faults`";
-const RETIRED: [(&str, &str); 13] = [
+const RETIRED: [(&str, &str); 11] = [
     ("campaign", FAULTS),
     ("soak", FAULTS),
     ("paper", "`make -f tools/paper/Makefile`"),
@@ -18,8 +18,6 @@ const RETIRED: [(&str, &str); 13] = [
     ("--weights", "`gyronet evaluate --weights`"),
     ("--layout", "`cargo paper simulate`"),
     ("--set", "`cargo paper simulate`"),
-    ("--training", "`cargo paper import`"),
-    ("--stamps", "`cargo paper import`"),
 ];
 
 /// The line about a retired name, if that is what the arguments are wrong about.

@@ -1,9 +1,10 @@
 //! `gyronet wheels` creates and checks the settings of a vehicle's wheel frames.
 
-use super::{Common, WriteError, print_json};
-use gyronet_tools::wheels::{WheelFile, from_dbc};
+use super::{Common, print_json};
+use gyronet_tools::wheels::WheelFile;
+use std::ffi::OsString;
 use std::io::{Write, stdout};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Create or check the settings of a vehicle's wheel frames.
 ///
@@ -25,30 +26,12 @@ pub struct Args {
 enum Action {
     /// Create a settings file from a DBC file and the names of its signals.
     ///
-    /// Two wheels of one axle are enough. A DBC file does not say how a frame is protected: add checksum and counter
-    /// by hand. tools/README.md lists all settings.
-    #[command(after_help = "\
-Examples:
-  gyronet wheels from-dbc car.dbc --front-left WHL_SPD_FL --front-right WHL_SPD_FR \\
-      --rear-left WHL_SPD_RL --rear-right WHL_SPD_RR --out wheels.toml")]
+    /// The package `gyronet` in Python reads the DBC file, as in `gyronet import`.
+    #[command(disable_help_flag = true)]
     FromDbc {
-        /// DBC file of the vehicle's bus.
-        file: PathBuf,
-        /// Signal of the front left wheel: SIGNAL or MESSAGE.SIGNAL.
-        #[arg(long, value_name = "SIGNAL", requires = "front_right")]
-        front_left: Option<String>,
-        /// Signal of the front right wheel.
-        #[arg(long, value_name = "SIGNAL", requires = "front_left")]
-        front_right: Option<String>,
-        /// Signal of the rear left wheel.
-        #[arg(long, value_name = "SIGNAL", requires = "rear_right")]
-        rear_left: Option<String>,
-        /// Signal of the rear right wheel.
-        #[arg(long, value_name = "SIGNAL", requires = "rear_left")]
-        rear_right: Option<String>,
-        /// Write the settings to this file instead of standard output.
-        #[arg(long, value_name = "FILE.toml")]
-        out: Option<PathBuf>,
+        /// Arguments of the Python package's command.
+        #[arg(value_name = "ARGUMENTS", trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<OsString>,
     },
     /// Check a settings file as the board does.
     Check {
@@ -60,21 +43,11 @@ Examples:
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     match &args.action {
-        Action::FromDbc { file, front_left, front_right, rear_left, rear_right, out } => {
-            let signals = [front_left, front_right, rear_left, rear_right].map(Option::as_deref);
-            let path = file.display().to_string();
-            let settings = from_dbc(&path, &read(file)?, signals)?;
-            settings.settings(&path)?;
-            let text = toml::to_string(&settings)?;
-            match out {
-                Some(out) => std::fs::write(out, text).map_err(WriteError::to(out))?,
-                None if common.json => print_json(&mut stdout().lock(), &settings)?,
-                None => write!(stdout().lock(), "{text}")?,
-            }
-        }
+        Action::FromDbc { arguments } => super::import::python(&["wheels", "from-dbc"], arguments, common)?,
         Action::Check { file } => {
             let path = file.display().to_string();
-            let settings = WheelFile::parse(&path, &read(file)?)?;
+            let text = std::fs::read_to_string(file).map_err(|error| format!("{path}: {error}"))?;
+            let settings = WheelFile::parse(&path, &text)?;
             settings.settings(&path)?;
             if common.json {
                 return print_json(&mut stdout().lock(), &settings);
@@ -84,10 +57,4 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
     }
     Ok(())
-}
-
-fn read(file: &Path) -> Result<String, String> {
-    // DBC files are often in Latin-1; names and numbers are ASCII.
-    let bytes = std::fs::read(file).map_err(|error| format!("{}: {error}", file.display()))?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }

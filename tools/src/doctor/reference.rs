@@ -1,9 +1,9 @@
 //! Examines the reference, a true yaw rate or a course.
 
+use super::align::{self, Offset};
 use super::finding::{Finding, Verdict};
 use super::recording::{Rows, SECOND};
 use crate::drive::DT;
-use crate::import::align::{self, Offset};
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 

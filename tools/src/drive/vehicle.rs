@@ -9,16 +9,13 @@
 //! [wheels]
 //! radius_m = 0.31     # rolling radius
 //! track_m = 1.52      # distance between left and right
-//! front_left = "WHEELS.FL"
-//! [signals]           # needed if several channels fit
-//! imu = "/imu/data"
-//! position = "/gps/fix"
-//! [columns]           # of a text table: our name = name in the table, with a unit
-//! t_s = { name = "timestamp", unit = "ms" }
+//! [recording]         # written by the import
+//! start = 1700000000.25    # time of day of the first row, s since 1970
 //! ```
 
 use super::error::{DataError, DataFault};
 use gyronet::mounting::Rotation;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -26,33 +23,34 @@ use std::path::{Path, PathBuf};
 /// Default rolling radius, m: that of the recorded car. The vehicle file gives another vehicle's.
 pub const RADIUS: f64 = 0.289;
 
-/// The contents of a vehicle file.
+/// The contents of a vehicle file. The tables and names with which a log is imported are for Python only.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Vehicle {
     /// The mounting of the IMU.
     pub mounting: Mounting,
-    /// The wheels and the signals of their speeds.
     pub wheels: Wheels,
-    /// The channels to use if several fit.
-    pub signals: Signals,
-    pub bus: BusFiles,
-    /// The columns of a text table.
-    pub columns: Columns,
+    pub recording: Origin,
+    #[serde(skip_serializing)]
+    signals: IgnoredAny,
+    #[serde(skip_serializing)]
+    bus: IgnoredAny,
+    #[serde(skip_serializing)]
+    columns: IgnoredAny,
     #[serde(skip)]
     pub path: Option<PathBuf>,
 }
 
-/// The columns of a text table, by our name of each column.
-pub type Columns = BTreeMap<String, Column>;
-
-/// A column of a text table.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Column {
-    pub name: String,
-    /// The unit of the column; SI if absent.
-    pub unit: Option<String>,
+/// The import of the drive, as `gyronet import` writes it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Origin {
+    /// Time of day of the first row, s since 1970, if a clock of the logs shows it.
+    pub start: Option<f64>,
+    /// Unit of each channel that was used.
+    pub units: BTreeMap<String, String>,
+    /// Records that could not be used, by reason.
+    pub dropped: BTreeMap<String, u64>,
 }
 
 /// Angles from the sensor's axes to the vehicle's, degrees, as in the board's configuration.
@@ -69,7 +67,7 @@ pub struct Mounting {
     pub applied: bool,
 }
 
-/// The dimensions of the wheels and the channels of their speeds.
+/// The dimensions of the wheels.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Wheels {
@@ -77,35 +75,14 @@ pub struct Wheels {
     pub radius_m: Option<f64>,
     /// Distance between the left and the right wheels, m.
     pub track_m: Option<f64>,
-    /// Channel of the front left wheel's speed.
-    pub front_left: Option<String>,
-    /// Channel of the front right wheel's speed.
-    pub front_right: Option<String>,
-    /// Channel of the rear left wheel's speed.
-    pub rear_left: Option<String>,
-    /// Channel of the rear right wheel's speed.
-    pub rear_right: Option<String>,
-}
-
-/// The channels to use if several fit.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Signals {
-    /// Channel of the gyro and accelerometer.
-    pub imu: Option<String>,
-    /// Channel of the odometry, whose speed replaces the wheels.
-    pub odometry: Option<String>,
-    /// Channel of the GNSS position.
-    pub position: Option<String>,
-    /// Channel of the reference yaw rate, `ref_gyr_z`: that of a better gyro, never of the IMU itself.
-    pub reference_rate: Option<String>,
-}
-
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BusFiles {
-    /// The DBC file; a relative path starts at the vehicle file's folder.
-    pub dbc: Option<PathBuf>,
+    #[serde(skip_serializing)]
+    front_left: IgnoredAny,
+    #[serde(skip_serializing)]
+    front_right: IgnoredAny,
+    #[serde(skip_serializing)]
+    rear_left: IgnoredAny,
+    #[serde(skip_serializing)]
+    rear_right: IgnoredAny,
 }
 
 impl Vehicle {
@@ -114,9 +91,6 @@ impl Vehicle {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|source| DataError::open(&name, source))?;
         let mut vehicle = Self::parse(&name, &text)?;
-        if let (Some(dbc), Some(folder)) = (&mut vehicle.bus.dbc, path.parent()) {
-            *dbc = folder.join(&*dbc);
-        }
         vehicle.path = Some(path.to_owned());
         Ok(vehicle)
     }
@@ -129,13 +103,6 @@ impl Vehicle {
     pub fn of_drive(drive: &Path) -> Result<Self, DataError> {
         let path = Self::beside(drive);
         if path.is_file() { Self::read(&path) } else { Ok(Self::default()) }
-    }
-
-    /// Returns the vehicle without the names of channels, columns and bus files.
-    pub fn without_names(self) -> Self {
-        let Wheels { radius_m, track_m, .. } = self.wheels;
-        let wheels = Wheels { radius_m, track_m, ..Wheels::default() };
-        Self { mounting: self.mounting, wheels, path: self.path, ..Self::default() }
     }
 
     /// Returns the rolling radius of the wheels, m; [`RADIUS`] if the file gives none.
@@ -154,6 +121,9 @@ impl Vehicle {
                 return Err(error(format!("wheels.{name} must be 0.01 to 10 m")));
             }
         }
+        if vehicle.recording.start.is_some_and(|start| !(0.0..1e11).contains(&start)) {
+            return Err(error("recording.start must be a time in seconds since 1970".to_owned()));
+        }
         let Mounting { roll_deg, pitch_deg, yaw_deg, .. } = vehicle.mounting;
         if [roll_deg, pitch_deg, yaw_deg].iter().any(|angle| angle.is_nan() || angle.abs() > 360.0) {
             return Err(error("the angles of mounting must be at most 360 degrees".to_owned()));
@@ -169,38 +139,26 @@ impl Mounting {
         let rotation = Rotation::from_mounting(roll, pitch, yaw)?;
         (!self.applied && rotation != Rotation::IDENTITY).then_some(rotation)
     }
-
-    /// Rotates a vector from the sensor's axes to the vehicle's, unless the rows are already in the vehicle's axes.
-    pub fn turn(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
-        if self.applied {
-            return [x, y, z];
-        }
-        let [(sr, cr), (sp, cp), (sy, cy)] =
-            [self.roll_deg, self.pitch_deg, self.yaw_deg].map(|angle| angle.to_radians().sin_cos());
-        let (y, z) = (cr * y - sr * z, sr * y + cr * z);
-        let (x, z) = (cp * x + sp * z, cp * z - sp * x);
-        [cy * x - sy * y, sy * x + cy * y, z]
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gyronet::units::AngularRate;
 
     #[test]
-    fn angles_mean_what_they_mean_on_the_board() {
-        let (roll, pitch, yaw) = (12.0f32, -34.0f32, 56.0f32);
-        let mounting =
-            Mounting { roll_deg: roll.into(), pitch_deg: pitch.into(), yaw_deg: yaw.into(), applied: false };
-        let board = mounting.rotation().unwrap();
-        assert_eq!(Mounting { applied: true, ..mounting }.rotation(), None);
-        for axis in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
-            let rate = axis.map(|w: f64| AngularRate::from_rad_per_sec(w as f32).unwrap());
-            for (here, there) in mounting.turn(axis).iter().zip(board.rate(rate)) {
-                assert!((here - there.rad_per_sec()).abs() < 1e-5, "{here} {there:?}");
-            }
-        }
+    fn the_tables_of_an_import_are_read_or_left_to_python() {
+        let text = "[mounting]\nyaw_deg = 90\n[wheels]\nrear_left = 'WHEELS.RL'\n[signals]\nimu = '/imu'\n[bus]\n\
+                    dbc = 'car.dbc'\n[columns]\nt_s = { name = 'zeit', unit = 'ms' }\n";
+        let old = Vehicle::parse("car.toml", text).unwrap();
+        assert_eq!((old.mounting.yaw_deg, &old.recording), (90.0, &Origin::default()));
+        let text =
+            format!("{text}[recording]\nstart = 1700000000.25\nunits = {{ '/imu' = 'm/s^2, rad/s' }}\n");
+        let new = Vehicle::parse("car.toml", &text).unwrap();
+        assert_eq!(new.recording.start, Some(1_700_000_000.25));
+        assert_eq!(
+            Vehicle::parse("car.toml", &toml::to_string(&new).unwrap()).unwrap().recording,
+            new.recording
+        );
     }
 
     #[test]

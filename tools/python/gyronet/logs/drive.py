@@ -208,6 +208,8 @@ class Drive:
     def start_of_day(self):
         """The time of day of row 0, s since 1970, by whichever clock has it."""
         self.start_time = self.start if self.start > DAY else None
+        if self.start_time is None and self.vehicle.start is not None:
+            self.start_time = self.vehicle.start + self.start - self.gyro.offset
         for used in self.used():
             epoch = self.logs[used.file].epoch
             if self.start_time is None and epoch is not None:
@@ -215,13 +217,18 @@ class Drive:
             elif self.start_time is None and used.seconds[0] > DAY:
                 self.start_time = self.start - used.offset
 
-    def remarks(self):
-        start = "unknown: no clock of the logs is a time of day"
-        if self.start_time is not None:
-            start = f"{self.start_time:.6f} ({datetime.fromtimestamp(self.start_time, timezone.utc).isoformat(timespec='microseconds')})"
-        yield f"start = {start}"
-        yield from (f"unit of {used.name} = {used.unit}" for used in self.used())
-        yield from (f"dropped {count}: {reason}" for reason, count in self.dropped.items())
+    def recording(self):
+        """What is known of the import, as tables of the vehicle file."""
+        return {
+            "recording": {"start": None if self.start_time is None else round(self.start_time, 6)},
+            "recording.units": {used.name: used.unit for used in self.used()},
+            "recording.dropped": self.dropped,
+        }
+
+    def start_line(self):
+        if self.start_time is None:
+            return "start = unknown: no clock of the logs is a time of day"
+        return f"start = {self.start_time:.6f} ({datetime.fromtimestamp(self.start_time, timezone.utc).isoformat(timespec='microseconds')})"
 
     def write(self, out):
         """Writes the drive and its vehicle file; on an error neither is left behind."""
@@ -231,7 +238,7 @@ class Drive:
         try:
             with open(halves[0][1], "w", encoding="utf-8", newline="\n") as file:
                 self.write_csv(file)
-            halves[1][1].write_text(self.vehicle.text(self.remarks()), encoding="utf-8")
+            halves[1][1].write_text(self.vehicle.text(self.recording()), encoding="utf-8")
             for path, half in halves:
                 os.replace(half, path)
         except OSError as error:

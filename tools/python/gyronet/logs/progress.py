@@ -3,11 +3,13 @@
 import sys
 import time
 
+QUIET = False
+
 
 class Progress:
     def __init__(self, name, total):
         self.name, self.total, self.done, self.said = name, max(total, 1), 0, time.monotonic()
-        self.on = sys.stderr.isatty()
+        self.on = sys.stderr.isatty() and not QUIET
 
     def step(self):
         self.at(self.done + 1)

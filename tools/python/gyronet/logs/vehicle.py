@@ -1,6 +1,7 @@
 """The vehicle file (TOML) beside a log or a drive: mounting, wheels, names of channels, DBC file and columns."""
 
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -20,7 +21,7 @@ WHEELS = ["front_right", "rear_right", "front_left", "rear_left"]  # the order o
 
 class Vehicle:
     def __init__(self):
-        self.path, self.columns = None, {}
+        self.path, self.columns, self.start = None, {}, None
         for table, keys in KEYS.items():
             setattr(self, table, dict(keys))
 
@@ -35,6 +36,9 @@ class Vehicle:
         for table, entries in text.items():
             if table == "columns" and isinstance(entries, dict):
                 vehicle.columns = {name: _column(path, name, entry) for name, entry in entries.items()}
+                continue
+            if table == "recording" and isinstance(entries, dict) and isinstance(entries.get("start", 0.0), (int, float)):
+                vehicle.start = entries.get("start")
                 continue
             if table not in KEYS or not isinstance(entries, dict):
                 raise Refused(f"{path}: unknown table [{table}]; known are {', '.join([*KEYS, 'columns'])}")
@@ -80,17 +84,17 @@ class Vehicle:
         x, z = np.cos(pitch) * x + np.sin(pitch) * z, np.cos(pitch) * z - np.sin(pitch) * x
         return np.column_stack([np.cos(yaw) * x - np.sin(yaw) * y, np.sin(yaw) * x + np.cos(yaw) * y, z])
 
-    def text(self, remarks):
-        """The file of a drive whose rows are in the vehicle's axes; remarks about the import are comments at its head."""
-        lines = [f"# {remark}" for remark in remarks]
-        for table, keys in KEYS.items():
-            entries = {**getattr(self, table), **({"applied": True} if table == "mounting" else {})}
-            lines += ["", f"[{table}]"]
-            lines += [f"{key} = {_value(entries[key])}" for key in keys if entries[key] is not None]
-        lines += ["", "[columns]"]
+    def text(self, recording):
+        """The file of a drive whose rows are in the vehicle's axes; `recording` holds what is known of the import."""
+        tables = {**{table: getattr(self, table) for table in KEYS}, **recording}
+        tables["mounting"] = {**self.mounting, "applied": True}
+        lines = []
+        for table, entries in tables.items():
+            lines += [f"[{table}]", *(f"{_key(key)} = {_value(value)}" for key, value in entries.items() if value is not None), ""]
+        lines += ["[columns]"]
         for name, column in self.columns.items():
             fields = ", ".join(f"{key} = {_value(value)}" for key, value in column.items() if value is not None)
-            lines.append(f"{json.dumps(name, ensure_ascii=False)} = {{ {fields} }}")
+            lines.append(f"{_key(name)} = {{ {fields} }}")
         return "\n".join(lines) + "\n"
 
 
@@ -100,5 +104,9 @@ def _column(path, name, entry):
     return entry
 
 
+def _key(name):
+    return name if re.fullmatch("[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
+
+
 def _value(value):
-    return json.dumps(float(value) if isinstance(value, int) and not isinstance(value, bool) else value, ensure_ascii=False)
+    return json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,76 @@
+"""Logs of other people's tools (GYRONET_DATA/logs), imported or refused for a reason; a drive imported again."""
+
+import os
+import shutil
+import tempfile
+import tomllib
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+from tests import made
+
+DATA = Path(os.environ.get("GYRONET_DATA", "/nonexistent")) / "logs"
+
+
+class Folder(unittest.TestCase):
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def run_import(self, *arguments):
+        return made.run(self.folder, "import", *arguments, "--out", "out.csv")
+
+    def imports(self, *arguments):
+        status, text = self.run_import(*arguments)
+        self.assertEqual(status, 0, text)
+        return made.drive(self.folder), text
+
+    def refuses(self, *arguments):
+        status, text = self.run_import(*arguments)
+        self.assertEqual((status, text.count("\n"), (self.folder / "out.csv").exists()), (1, 1, False), text)
+        return text
+
+
+@unittest.skipUnless(DATA.is_dir(), "no GYRONET_DATA")
+class Logs(Folder):
+    def test_a_robot(self):
+        drive, text = self.imports(DATA / "jackal.bag")
+        self.assertEqual(len(drive["t_s"]), 6_121)
+        self.assertGreater(np.isfinite(drive["wheel2_rate"]).sum(), 6_000)
+        self.assertIn("50.0 Hz to 100 Hz: linear interpolation", text)
+
+    def test_two_imus_and_two_odometries(self):
+        bag = DATA / "xsens_wheels_stereo.bag"
+        self.assertIn("several channels fit as imu", self.refuses(bag))
+        self.assertIn("/imu", self.refuses(bag, "--imu", "/imu"))
+        drive, _ = self.imports(bag, "--imu", "/xsens/imu_data", "--odometry", "/wheel_odometry")
+        self.assertTrue(13_200 < len(drive["t_s"]) < 13_300)
+
+    def test_an_aircraft_that_stands(self):
+        drive, text = self.imports(DATA / "px4_sample_log_small.ulg")
+        self.assertTrue(600 <= len(drive["t_s"]) <= 655)
+        self.assertTrue(9.5 < drive["acc_z"].mean() < 10.1)
+
+    def test_bus_logs_without_an_imu(self):
+        for name in ["logfile.asc", "test_CanMessage.blf", "test_CanMessage_V2_1.trc"]:
+            self.assertIn("no IMU", self.refuses(DATA / name))
+
+
+class Again(Folder):
+    def test_a_part_of_a_drive_keeps_the_time_of_day(self):
+        t = made.times()
+        made.mcap(self.folder / "d.mcap", made.imu_messages(t, made.imu(t)))
+        self.assertEqual(made.run(self.folder, "import", "d.mcap", "--out", "first.csv")[0], 0)
+        self.imports("first.csv", "--from", "2")
+        starts = [tomllib.loads((self.folder / name).read_text())["recording"]["start"] for name in ("first.toml", "out.toml")]
+        np.testing.assert_allclose(starts, [made.START, made.START + 2], atol=2e-6)
+        # Another drive's file says nothing about this one.
+        shutil.copy(self.folder / "first.csv", self.folder / "other.csv")
+        self.imports("other.csv", "--vehicle", "first.toml")
+        self.assertNotIn("start", tomllib.loads((self.folder / "out.toml").read_text())["recording"])
+
+
+if __name__ == "__main__":
+    unittest.main()
