@@ -2,11 +2,10 @@
 //!
 //! [`sequence`] reads the data sets and [`simulate`] writes simulated sequences in their formats, [`trajectory`] reads
 //! the trajectories of other programs, [`fog_replay`] runs FoGNet, and [`tables`] computes the paper's tables and
-//! figures, which [`svg`] draws.
+//! figures.
 
 pub mod fog_replay;
 pub mod sequence;
 pub mod simulate;
-pub mod svg;
 pub mod tables;
 pub mod trajectory;

@@ -3,7 +3,6 @@
 use super::{named, print_json, remark};
 use gyronet_paper::fog_replay;
 use gyronet_paper::sequence::{self, Sequence};
-use gyronet_paper::tables::pictures;
 use gyronet_tools::drive::vehicle::Vehicle;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -18,8 +17,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
-  gyronet-paper import urban14 --out urban14.csv
-  gyronet-paper import 2012-01-08 --stamps stamps.svg")]
+  gyronet-paper import urban14 --out urban14.csv")]
 pub struct Args {
     /// Folder of the sequence.
     #[arg(value_name = "DIR")]
@@ -31,9 +29,6 @@ pub struct Args {
     /// subtracted from the fibre-optic gyro, as FoGNet receives it. A sequence that starts moving is an error.
     #[arg(long, requires = "out")]
     training: bool,
-    /// Plot the time between stamps in each file to this file (the paper's Fig. 11).
-    #[arg(long, value_name = "FILE.svg")]
-    stamps: Option<PathBuf>,
 }
 
 /// Runs the subcommand.
@@ -87,9 +82,6 @@ fn write(args: &Args, sequence: &Sequence) -> super::Result {
         let beside = Vehicle::beside(path);
         super::write(&beside, toml::to_string(&vehicle)?)?;
         remark(format_args!("{}: {rows} rows; {} beside it", path.display(), beside.display()))?;
-    }
-    if let Some(path) = &args.stamps {
-        super::write(path, pictures::stamps(sequence)?)?;
     }
     Ok(())
 }

@@ -39,7 +39,7 @@ pub struct Args {
     /// Folders of sequences, or folders that contain such folders.
     #[arg(required = true, value_name = "DIR")]
     folders: Vec<PathBuf>,
-    /// Write report.html (one page with all tables and pictures) and each picture as SVG to this folder.
+    /// Write report.html, one page with all tables and figures, to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Fit the fibre-optic gyro and the wheels to this sequence, or to the sequences in this folder, and show the fit
@@ -60,7 +60,7 @@ pub struct Args {
     pseudo_fog_weights: Option<PathBuf>,
 }
 
-/// Returns a unique name for a sequence's pictures: folders of different data sets may have the same name.
+/// Returns a unique name for a sequence's figures: folders of different data sets may have the same name.
 fn title(sequence: &Sequence, number: usize) -> String {
     let layout = match sequence.layout {
         Layout::Kaist => "kaist",
@@ -131,7 +131,7 @@ pub fn run(args: &Args, json: bool) -> super::Result {
         let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
         remark(format_args!("{}: {:.0} s of driving", errors.name, errors.seconds))?;
         if args.out.is_some() {
-            drawn.push((title(&sequence, drawn.len()), pictures::draw(&sequence, &errors, &paths)?));
+            drawn.push((title(&sequence, drawn.len()), pictures::draw(&sequence, &errors, &paths)));
         }
         all.push(errors);
     }
@@ -147,10 +147,5 @@ pub fn run(args: &Args, json: bool) -> super::Result {
     let Some(folder) = &args.out else { return Ok(()) };
     fs::create_dir_all(folder).map_err(super::named(folder))?;
     super::write(&folder.join("report.html"), html::page(&tables, &drawn))?;
-    for (sequence, pictures) in &drawn {
-        for picture in pictures {
-            super::write(&folder.join(format!("{sequence}-{}.svg", picture.kind)), &picture.svg)?;
-        }
-    }
     Ok(remark(format_args!("{}", folder.join("report.html").display()))?)
 }

@@ -1,11 +1,10 @@
-//! Writes one self-contained HTML page with all tables and pictures.
+//! Writes one self-contained HTML page with all tables and charts.
 
-use super::pictures::Picture;
 use super::table::{Row, Table};
-use gyronet_tools::plot::page::{self, document, escaped};
+use gyronet_tools::plot::page::{self, HINT, document, escaped};
 use std::fmt::Write;
 
-pub fn page(tables: &[Table], pictures: &[(String, Vec<Picture>)]) -> String {
+pub fn page(tables: &[Table], charts: &[(String, Vec<String>)]) -> String {
     let mut html = String::from("<h1>The paper's tables</h1>\n");
     html += "<p class=\"lead\">X. Zhao et al., <i>Learning to Compensate for the Drift and Error of Gyroscope in \
              Vehicle Localization</i>; written by <code>gyronet-paper tables</code>.</p>\n";
@@ -20,14 +19,13 @@ pub fn page(tables: &[Table], pictures: &[(String, Vec<Picture>)]) -> String {
             let _ = writeln!(html, "<p class=\"note\">{}</p>", escaped(note));
         }
     }
-    for (k, (name, pictures)) in pictures.iter().enumerate() {
+    if !charts.is_empty() {
+        let _ = writeln!(html, "<p class=\"note\">{HINT}</p>");
+    }
+    for (k, (name, charts)) in charts.iter().enumerate() {
         let open = if k == 0 { " open" } else { "" };
-        let _ = writeln!(html, "<details{open}><summary>{}</summary>", escaped(name));
-        for picture in pictures {
-            let caption = escaped(&picture.caption);
-            let _ = writeln!(html, "<figure>{}<figcaption>{caption}</figcaption></figure>", picture.svg);
-        }
-        html += "</details>\n";
+        let charts = charts.concat();
+        let _ = writeln!(html, "<details{open}><summary>{}</summary>\n{charts}</details>", escaped(name));
     }
     document("gyronet: the paper's tables", &html)
 }
