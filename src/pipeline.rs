@@ -334,8 +334,8 @@ impl Pipeline {
         quiet: bool,
     ) -> Rates {
         let sample = &frame.sample;
-        let features = window::features(sample, &zero.reading());
-        let [_, _, _, rates @ ..] = features.map(AngularRate);
+        let rates = zero.less(sample.angular_rate);
+        let features = window::features(sample.specific_force, rates);
         let [.., rate] = rates;
         let good = sample.validity.is_good();
         let drives = standstill == Some(Standstill::Moving);

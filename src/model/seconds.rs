@@ -23,7 +23,7 @@ pub const FRAMES: u32 = RATE_HZ;
 pub struct FogFrame {
     /// Angle turned about z (up) since the frame before; `None` if part of it is unknown.
     pub turn: Option<Angle>,
-    /// Reading of the inertial sensor, its gyro less the static bias ([`window::features`]).
+    /// Reading of the inertial sensor, its gyro less the static bias ([`window::Features`]).
     pub inertial: Option<window::Features>,
     /// Speeds of the left and the right wheel.
     pub wheels: Option<[WheelSpeed; 2]>,

@@ -1,8 +1,7 @@
 //! A window holds the last ten samples as the networks see them: integer codes, the angular rate less the static bias.
 
 use crate::nn::linear::Linear;
-use crate::sample::ImuSample;
-use crate::units::AngularRate;
+use crate::units::{AngularRate, SpecificForce};
 
 /// A GyroNet window has this many samples: 0.1 s at 100 Hz (section III-B of the paper).
 pub const WINDOW: usize = 10;
@@ -12,12 +11,10 @@ pub const FEATURES: usize = 6;
 /// Holds the features of one sample, in the codes of [`crate::units`].
 pub type Features = [i32; FEATURES];
 
-/// Returns the features of a sample, its angular rate less the static bias.
+/// Returns the features of a sample; `rates` is its angular rate less the static bias.
 #[must_use]
-pub fn features(sample: &ImuSample, gyro_bias: &[AngularRate; 3]) -> Features {
-    let [fx, fy, fz] = sample.specific_force;
-    let rate = |axis: usize| sample.angular_rate[axis].0.saturating_sub(gyro_bias[axis].0);
-    [fx.0, fy.0, fz.0, rate(0), rate(1), rate(2)]
+pub fn features([fx, fy, fz]: [SpecificForce; 3], [x, y, z]: [AngularRate; 3]) -> Features {
+    [fx.0, fy.0, fz.0, x.0, y.0, z.0]
 }
 
 /// Keeps the last [`WINDOW`] samples without a gap.

@@ -39,15 +39,14 @@ impl Pipeline {
         let delayed = self.estimate(frame, rates.delayed, rates.early_sigma, board, covered, |pipeline| {
             &mut pipeline.state.delayed_yaw
         });
-        let zero =
-            self.state.initialised.as_ref().map_or([AngularRate::ZERO; 3], |known| known.zero.reading());
-        let [roll_rate, pitch_rate, _] = frame.sample.angular_rate;
-        let less = |rate: AngularRate, zero: AngularRate| AngularRate(rate.0.saturating_sub(zero.0));
+        let raw = frame.sample.angular_rate;
+        let known = self.state.initialised.as_ref();
+        let [roll_rate, pitch_rate, _] = known.map_or(raw, |known| known.zero.less(raw));
         VehicleSample {
             live: YawEstimate { faults, ..live },
             delayed: YawEstimate { faults, ..delayed },
-            roll_rate: less(roll_rate, zero[0]),
-            pitch_rate: less(pitch_rate, zero[1]),
+            roll_rate,
+            pitch_rate,
             specific_force: frame.sample.specific_force,
             temperature: frame.sample.temperature,
             tick: frame.tick,

@@ -165,10 +165,16 @@ impl ZeroPoint {
         Self { bias: [x, y, AngularRate(z.0.saturating_sub(earth.0))], earth }
     }
 
-    /// Returns the gyro's readings at rest about x, y and z, to be subtracted from each of its readings.
-    pub(super) fn reading(&self) -> [AngularRate; 3] {
+    /// Returns the gyro's readings at rest about x, y and z.
+    fn reading(&self) -> [AngularRate; 3] {
         let [x, y, z] = self.bias;
         [x, y, AngularRate(z.0.saturating_add(self.earth.0))]
+    }
+
+    /// Returns readings of the gyro less those at rest.
+    pub(super) fn less(&self, rates: [AngularRate; 3]) -> [AngularRate; 3] {
+        let rest = self.reading();
+        core::array::from_fn(|axis| AngularRate(rates[axis].0.saturating_sub(rest[axis].0)))
     }
 
     /// Returns the part's bias; with [`EarthRate::LeftInBias`] it contains the Earth's rate.
