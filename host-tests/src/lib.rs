@@ -20,6 +20,7 @@ pub mod replay;
 pub mod require;
 pub mod sent;
 pub mod sequence;
+pub mod situations;
 pub mod stored;
 pub mod stream;
 pub mod synthetic;

@@ -1,0 +1,173 @@
+//! The board on the host: bytes of the sensor and wheel frames in, frames out, a millisecond at a time.
+
+use embedded_can::Frame;
+use gyronet::align::clock_ratio::ClockRatioConfig;
+use gyronet::can::DataFrame;
+use gyronet::can::config::{Config as CanConfig, Settings, StatusSettings};
+use gyronet::can::status::STATUS_ID;
+use gyronet::can::wheel::{WheelReceiver, WheelSettings};
+use gyronet::coprocessor::{Bus, Config, Coprocessor, Sink, TimedFrame};
+use gyronet::model::{Blob, GyroNet, weights};
+use gyronet::sample::ImuSample;
+use gyronet::sensor::Source;
+use gyronet::sensor::adis16465::{Adis16465, BURST};
+use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
+use gyronet::sensor::xsens::Mti;
+use gyronet::service::{Device, SupportedHardware};
+use gyronet::store::{Calibration, Configuration, ImuPart, Learned};
+use gyronet::units::Micros;
+use gyronet_tools::parts::icm42688::NoDelay;
+use gyronet_tools::parts::{Part, adis16465, icm42688};
+use std::collections::VecDeque;
+
+use crate::ram_flash::RamFlash;
+
+const HARDWARE: SupportedHardware = SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[] };
+/// The board fetches at most this many packets from a FIFO at once.
+const MAX_FETCHED: usize = 32;
+
+/// The board's end of the sensor's line.
+enum Line {
+    Mti(Box<Mti>),
+    Fifo(Box<Icm42688<icm42688::Bus>>, icm42688::Bus),
+    Bursts(Adis16465<adis16465::Bus>, adis16465::Bus),
+}
+
+/// The samples that wait for the coprocessor; `None` where bytes gave none.
+#[derive(Default)]
+struct Waiting(VecDeque<Option<ImuSample>>);
+
+impl Source for Waiting {
+    type Sample = ImuSample;
+    type Error = std::fmt::Error;
+
+    fn next_sample(&mut self) -> Option<Result<ImuSample, Self::Error>> {
+        self.0.pop_front().map(|sample| sample.ok_or(std::fmt::Error))
+    }
+}
+
+/// The CAN bus.
+#[derive(Default)]
+struct Wire {
+    received: VecDeque<DataFrame>,
+    sent: Vec<DataFrame>,
+}
+
+impl Sink for Wire {
+    fn frame(&mut self, frame: TimedFrame) {
+        self.sent.push(frame.frame);
+    }
+}
+
+impl Bus for Wire {
+    fn receive(&mut self) -> Option<DataFrame> {
+        self.received.pop_front()
+    }
+
+    fn flush(&mut self) {}
+
+    fn lost(&self) -> u32 {
+        0
+    }
+}
+
+pub struct Board {
+    coprocessor: Box<Coprocessor>,
+    device: Box<Device<RamFlash<16384>, RamFlash<16384>>>,
+    network: GyroNet<'static>,
+    line: Line,
+    waiting: Waiting,
+    wire: Wire,
+}
+
+impl Board {
+    /// Starts a board that has learnt this in earlier drives.
+    pub fn new(part: Part, has_wheels: bool, period_ms: u16, learned: &Learned) -> Self {
+        let yaw = Settings::DEFAULT.yaw.map(|yaw| gyronet::can::config::YawSettings { period_ms, ..yaw });
+        let status = Some(StatusSettings { id: STATUS_ID });
+        let can = CanConfig::new(Settings { bosch: None, yaw, status, ..Settings::DEFAULT });
+        let config = Config {
+            can: can.expect("a period of the handbook"),
+            wheels: has_wheels
+                .then(|| WheelReceiver::new(WheelSettings::TOYOTA).expect("the library's settings")),
+            clock_ratio: Some(ClockRatioConfig::DEFAULT),
+            ..Configuration::DEFAULT.coprocessor(&Calibration::NONE, learned, 0)
+        };
+        let blob = Blob::new_checked(&weights::DEFAULT.0).expect("the library's weights");
+        let line = match part {
+            Part::Icm42688 => {
+                let bus = icm42688::Bus::default();
+                let driver = Icm42688::new(bus.clone(), Icm42688Config::default(), &mut NoDelay);
+                Line::Fifo(Box::new(driver.expect("a simulated part that is well")), bus)
+            }
+            Part::Adis16465 => {
+                let bus = adis16465::Bus::default();
+                Line::Bursts(Adis16465::new(bus.clone(), adis16465::MODEL), bus)
+            }
+            Part::Xsens | Part::Dsp1760 => Line::Mti(Box::default()),
+        };
+        Self {
+            coprocessor: Box::new(Coprocessor::new(config)),
+            device: Box::new(Device::new(&HARDWARE)),
+            network: GyroNet::new(blob),
+            line,
+            waiting: Waiting::default(),
+            wire: Wire::default(),
+        }
+    }
+
+    /// What it has learnt.
+    pub fn learned(&self) -> Learned {
+        *self.device.learned()
+    }
+
+    /// Bytes of the sensor's line arrive.
+    pub fn receive(&mut self, bytes: &[u8], now: Micros) {
+        let waiting = &mut self.waiting.0;
+        match &mut self.line {
+            Line::Mti(mti) => {
+                for byte in bytes {
+                    mti.receive(*byte);
+                    waiting.extend(std::iter::from_fn(|| mti.next_sample()).map(Result::ok));
+                }
+            }
+            Line::Fifo(driver, bus) => {
+                bus.fill(bytes.iter().copied());
+                let samples = std::iter::from_fn(|| driver.next_sample().transpose()).take(MAX_FETCHED);
+                waiting.extend(samples.map(Result::ok));
+            }
+            Line::Bursts(driver, bus) => {
+                // Bits that the part does not send read as ones.
+                let mut burst = [0xFF; BURST];
+                burst.iter_mut().zip(bytes).for_each(|(to, byte)| *to = *byte);
+                bus.answer(burst);
+                waiting.push_back(driver.read(now).ok());
+            }
+        }
+    }
+
+    pub fn receive_frame(&mut self, frame: DataFrame) {
+        self.wire.received.push_back(frame);
+    }
+
+    /// Does what is due, and returns the frames that were sent.
+    pub fn step(&mut self, now: Micros) -> Vec<DataFrame> {
+        let Self { coprocessor, device, network, waiting, wire, .. } = self;
+        if let Some(seen) = coprocessor.step(now, waiting, wire, Some(network)).observation {
+            let (live, tick) = (&seen.vehicle.live, seen.vehicle.tick);
+            device.observe(seen.sample.as_ref(), tick, (live.status, live.faults), &seen.wheels);
+            if device.take_mount_moved() {
+                coprocessor.mount_moved();
+            }
+        }
+        std::mem::take(&mut wire.sent)
+    }
+}
+
+/// Returns the identifier of a frame with 11 bits.
+pub fn id(frame: &DataFrame) -> u16 {
+    match frame.id() {
+        embedded_can::Id::Standard(id) => id.as_raw(),
+        embedded_can::Id::Extended(_) => u16::MAX,
+    }
+}

@@ -1,0 +1,205 @@
+//! The judgement of a ride: what the bus said, against the truth.
+//!
+//! | letter | what | promise |
+//! |---|---|---|
+//! | s | a second whose sets are all good | its yaw is off by at most four of the largest expected errors that it sent |
+//! | y | a span between two good sets, with anything between them | its yaw is off by at most four times the sum of the expected errors of its seconds and the growth of the doubt, unless the count of gaps has changed by a second later |
+//! | t | a status that says "stands" | the vehicle's speed over ground is below 0.3 m/s, but for half a second in all |
+//! | g | the time in all | good for the share that the situation allows |
+//! | m | the last seconds | good, or a fault or a contradiction says why not |
+//!
+//! The board steps every millisecond and states a sample's age in half milliseconds, so the time of a sample is known
+//! to 1.5 ms, and the yaw of a span to that time by the change of the rate.
+
+use super::receiver::{Receiver, Set, Slow};
+use super::ride::Travelled;
+
+/// Expected errors by which yaw may be off.
+const SIGMAS: f64 = 4.0;
+/// Uncertainty of a sample's time, s.
+const TIMING: f64 = 1.5e-3;
+/// Lengths of the spans, s.
+const SPANS: [f64; 5] = [2.0, 5.0, 15.0, 45.0, 135.0];
+/// A span begins at every so many sets of 10 ms.
+const EVERY: f64 = 0.25;
+/// Seconds that may be off by chance: one in fifteen thousand.
+const CHANCE: usize = 15_000;
+/// Speed that is no standstill, m/s, and time for which it may count as one, s.
+const MOVES: f64 = 0.3;
+const MAY_STAND: f64 = 0.5;
+/// Seconds at the end in which the state must have a reason.
+const LAST: f64 = 5.0;
+
+/// The worst error of a kind, over what was allowed.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Worst {
+    pub ratio: f64,
+    /// Its time, s; the error, rad.
+    pub at: f64,
+    pub error: f64,
+}
+
+impl Worst {
+    fn add(&mut self, at: f64, error: f64, allowed: f64) {
+        let ratio = error.abs() / allowed;
+        if ratio > self.ratio {
+            *self = Self { ratio, at, error };
+        }
+    }
+}
+
+#[derive(Debug, Clone, Default)]
+pub struct Outcome {
+    /// Seconds in all, and those good throughout.
+    pub seconds: usize,
+    pub good: usize,
+    /// Least share of them that must be good.
+    pub least: f64,
+    /// Good seconds inside one expected error, and those off by more than four.
+    pub inside: usize,
+    pub wrong: usize,
+    pub second: Worst,
+    /// Spans off by more than is allowed.
+    pub wrong_spans: usize,
+    pub span: Worst,
+    /// Time for which a moving vehicle was said to stand, s.
+    pub stood: f64,
+    /// The last seconds are not good, and nothing says why.
+    pub is_mute: bool,
+}
+
+impl Outcome {
+    /// Counts the ride of another seed.
+    pub fn add(&mut self, other: &Self) {
+        self.seconds += other.seconds;
+        self.good += other.good;
+        self.least = other.least;
+        self.inside += other.inside;
+        self.wrong += other.wrong;
+        self.wrong_spans += other.wrong_spans;
+        for (worst, other) in [(&mut self.second, other.second), (&mut self.span, other.span)] {
+            if other.ratio > worst.ratio {
+                *worst = other;
+            }
+        }
+        self.stood = self.stood.max(other.stood);
+        self.is_mute |= other.is_mute;
+    }
+
+    /// The broken promises, each with a letter and in words.
+    pub fn broken(&self) -> Vec<(char, String)> {
+        let mut broken = Vec::new();
+        if self.wrong > self.good / CHANCE {
+            let Worst { ratio, at, error } = self.second;
+            let (sigma, error) = (SIGMAS * ratio, error.to_degrees());
+            let text =
+                format!("{} good seconds off, {sigma:.1} sigma ({error:.2} deg) at {at:.0} s", self.wrong);
+            broken.push(('s', text));
+        }
+        if self.wrong_spans > 0 {
+            let Worst { ratio, at, error } = self.span;
+            let (sigma, error) = (SIGMAS * ratio, error.to_degrees());
+            broken.push(('y', format!("yaw off by {error:.2} deg, {sigma:.1} sigma, from {at:.0} s")));
+        }
+        if self.stood > MAY_STAND {
+            broken.push(('t', format!("stands for {:.0} s of motion", self.stood)));
+        }
+        let share = self.good as f64 / self.seconds as f64;
+        if share < self.least {
+            broken.push(('g', format!("good for {:.0} % of the time", 100.0 * share)));
+        }
+        if self.is_mute {
+            broken.push(('m', "not good at the end, without a reason".to_owned()));
+        }
+        broken
+    }
+}
+
+/// Judges what a receiver has collected from a start of the board to this time.
+pub fn judge(received: &Receiver, truth: &Travelled, end: f64) -> Outcome {
+    let sets = &received.sets;
+    let mut outcome = Outcome::default();
+    let (errors, sums) = integrate(sets, truth);
+    let last_good = runs(sets);
+    let mut next = f64::NEG_INFINITY;
+    for (from, set) in sets.iter().enumerate().filter(|(_, set)| set.is_good()) {
+        if set.sampled < next {
+            continue;
+        }
+        next = set.sampled + EVERY;
+        let to = sets.partition_point(|later| later.sampled < set.sampled + 1.0 - 1e-6);
+        if to < sets.len() && last_good[from] >= to {
+            let sigma = sets[from..=to].iter().filter_map(|set| set.sigma).fold(0.0, f64::max);
+            let off = errors[to] - errors[from];
+            let slack = timing(truth, set, &sets[to]);
+            outcome.second.add(set.sampled, off, SIGMAS * sigma + slack);
+            outcome.good += 1;
+            outcome.inside += usize::from(off.abs() <= sigma);
+            outcome.wrong += usize::from(off.abs() > SIGMAS * sigma + slack);
+        }
+        for length in SPANS {
+            let to = sets.partition_point(|later| later.sampled < set.sampled + length);
+            let Some(end) = sets.get(to).filter(|end| end.is_good()) else { continue };
+            let (Some(before), Some(after)) =
+                (newest(&received.slow, set.sampled), newest(&received.slow, end.sampled + 1.5))
+            else {
+                continue;
+            };
+            if before.gaps != after.gaps {
+                continue;
+            }
+            let doubt = (after.doubt.unwrap_or(0.0) - before.doubt.unwrap_or(0.0)).max(0.0);
+            let allowed = SIGMAS * (sums[to] - sums[from] + doubt) + timing(truth, set, end);
+            let off = errors[to] - errors[from];
+            outcome.span.add(set.sampled, off, allowed);
+            outcome.wrong_spans += usize::from(off.abs() > allowed);
+        }
+    }
+    // Four looks a second.
+    outcome.good /= 4;
+    outcome.inside /= 4;
+    outcome.wrong = outcome.wrong.div_ceil(4);
+    for pair in received.slow.windows(2).filter(|pair| pair[0].stands && pair[1].stands) {
+        let moving = truth.speed(pair[0].at).abs().min(truth.speed(pair[1].at).abs()) > MOVES;
+        outcome.stood += if moving { pair[1].at - pair[0].at } else { 0.0 };
+    }
+    let end = end - LAST;
+    let last: Vec<&Set> = sets.iter().filter(|set| set.sampled > end).collect();
+    let explained = last.iter().any(|set| set.is_good() || set.faults != 0);
+    outcome.is_mute = !explained && !received.slow.iter().any(|slow| slow.at > end && slow.contradicted);
+    outcome
+}
+
+/// The yaw's error at each set, and the sum of the expected errors up to it, rad.
+fn integrate(sets: &[Set], truth: &Travelled) -> (Vec<f64>, Vec<f64>) {
+    let errors = sets.iter().map(|set| set.yaw - truth.heading(set.sampled)).collect();
+    let (mut sum, mut last) = (0.0, None::<&Set>);
+    let mut sums = Vec::with_capacity(sets.len());
+    for set in sets {
+        let length = last.map_or(0.0, |last| set.sampled - last.sampled);
+        // Where no expected error is sent, nothing is allowed.
+        sum += set.sigma.unwrap_or(0.0) * length.min(1.0);
+        sums.push(sum);
+        last = Some(set);
+    }
+    (errors, sums)
+}
+
+/// The last set of the good ones in a row from each set on.
+fn runs(sets: &[Set]) -> Vec<usize> {
+    let mut last = vec![0; sets.len()];
+    for (at, set) in sets.iter().enumerate().rev() {
+        let goes_on =
+            sets.get(at + 1).is_some_and(|next| next.is_good() && next.sampled - set.sampled < 0.25);
+        last[at] = if goes_on { last[at + 1] } else { at };
+    }
+    last
+}
+
+fn timing(truth: &Travelled, from: &Set, to: &Set) -> f64 {
+    TIMING * (truth.rate(to.sampled) - truth.rate(from.sampled)).abs()
+}
+
+fn newest(slow: &[Slow], before: f64) -> Option<&Slow> {
+    slow[..slow.partition_point(|slow| slow.at <= before)].last()
+}

@@ -1,0 +1,160 @@
+//! What the sensor, its line, its clock and the wheels do.
+
+use super::super::damage::Damage;
+use super::super::scene::Scene;
+use super::super::sensor::Fault;
+use super::super::vehicle::{CAR, HATCH, TRUCK, UTV};
+use super::super::wheels::WheelFault;
+use super::{ALL, Situation, WHEELED};
+
+pub static SITUATIONS: &[Situation] = &[
+    Situation::new("sensor of 50 Hz", &[CAR, TRUCK], |scene| of_rate(scene, 50.0)),
+    Situation::new("sensor of 83 Hz", &[CAR, TRUCK], |scene| of_rate(scene, 83.3)),
+    Situation::new("sensor of 104 Hz", &[CAR, TRUCK], |scene| of_rate(scene, 104.0)),
+    Situation::new("sensor of 120 Hz", &[CAR, TRUCK], |scene| of_rate(scene, 120.0)),
+    Situation::new("sensor of 200 Hz", &[CAR, TRUCK], |scene| of_rate(scene, 200.0)),
+    Situation::new("sensor of 400 Hz", &[CAR, TRUCK], |scene| of_rate(scene, 400.0)),
+    Situation::new("sensor that samples at uneven times", &[CAR, UTV], |scene| {
+        scene.sensor.jitter = 1e-3;
+        of_rate(scene, 100.0);
+    }),
+    Situation::new("sensor whose clock is 1.5 % fast", &[CAR, HATCH], |scene| {
+        scene.sensor.clock = 0.015;
+        of_rate(scene, 100.0);
+    }),
+    Situation::new("sensor whose clock jumps", &[CAR, HATCH], |scene| {
+        scene.ride.hold(8.0);
+        scene.town(1);
+        scene.ride.reach(10.0, 5.0).turn(40.0, 4.0);
+        scene.sensor_fault(1e3, Fault::ClockJump(0.35));
+        scene.ride.turn(40.0, 4.0).stop(5.0, 5.0);
+        scene.town(1);
+    }),
+    Situation::new("every clock and counter wraps", &[CAR, HATCH, TRUCK], |scene| {
+        // 32 bits of the part's 100 us and of the board's microseconds.
+        scene.sensor.epoch = 429_496.7296 - 60.0;
+        scene.epoch = 4_294.967_296 - 60.0;
+        of_rate(scene, 100.0);
+    }),
+    Situation::new("gain of 1.008", ALL, |scene| {
+        scene.sensor.gain[2] = 1.008;
+        of_rate(scene, 100.0);
+    }),
+    Situation::new("mounted 5 deg askew", ALL, |scene| {
+        scene.sensor.tilt = [0.087, -0.06, 0.0];
+        of_rate(scene, 100.0);
+    }),
+    Situation::new("gyro stuck in a turn", ALL, |scene| in_a_turn(scene, 5.0, Fault::Stuck(&[0, 1, 2]))),
+    Situation::new("one gyro axis stuck in a turn", ALL, |scene| in_a_turn(scene, 5.0, Fault::Stuck(&[2]))),
+    Situation::new("sensor silent in a turn", ALL, |scene| in_a_turn(scene, 1.5, Fault::Silent)),
+    Situation::new("no number for an axis in a turn", ALL, |scene| in_a_turn(scene, 1.0, Fault::NoNumber(2))),
+    Situation::new("one implausible reading", ALL, |scene| in_a_turn(scene, 0.011, Fault::Shift(2, 7.0))),
+    Situation::new("one small implausible reading", ALL, |scene| {
+        in_a_turn(scene, 0.011, Fault::Shift(2, 0.8))
+    }),
+    Situation::new("implausible readings for a second", ALL, |scene| {
+        in_a_turn(scene, 1.0, Fault::Shift(2, -3.0))
+    }),
+    Situation::new("gyro beyond its range", ALL, |scene| in_a_turn(scene, 0.5, Fault::Gain(2, 60.0))),
+    Situation::new("bias steps after a knock", ALL, |scene| {
+        scene.ride.hold(8.0);
+        scene.town(2);
+        scene.ride.hold(1.0);
+        scene.sensor_fault(1e3, Fault::Shift(2, 0.01));
+        scene.ride.hold(4.0);
+        scene.town(2);
+    }),
+    Situation::new("sensor moved between two drives", ALL, |scene| {
+        after_a_restart(scene, Fault::Moved([0.1, -0.35, 0.0]));
+    }),
+    Situation::new("sensor swapped", ALL, |scene| after_a_restart(scene, Fault::Shift(2, 0.02))),
+    Situation::new("messages every 50 ms", ALL, |scene| {
+        scene.period_ms = 50;
+        in_a_turn(scene, 0.13, Fault::Silent);
+    }),
+    Situation::new("messages every 100 ms", ALL, |scene| {
+        scene.period_ms = 100;
+        in_a_turn(scene, 0.09, Fault::NoNumber(2));
+    }),
+    Situation::new("bits flip on the line", &[CAR, TRUCK, UTV, HATCH], |scene| {
+        on_the_line(scene, Damage::BitFlip(0.05))
+    }),
+    Situation::new("noise on the line", ALL, |scene| on_the_line(scene, Damage::Burst(0.05, 40))),
+    Situation::new("messages are lost", ALL, |scene| on_the_line(scene, Damage::Drop(0.05))),
+    Situation::new("messages come twice", ALL, |scene| on_the_line(scene, Damage::Twice(0.1))),
+    Situation::new("messages are cut off", ALL, |scene| on_the_line(scene, Damage::Truncation(0.05))),
+    Situation::new("messages overtake each other", &[CAR, UTV], |scene| {
+        on_the_line(scene, Damage::Late(0.02))
+    }),
+    Situation::new("line stalls in a turn", &[CAR, UTV], |scene| {
+        scene.ride.hold(8.0);
+        scene.town(1);
+        scene.ride.reach(10.0, 5.0).turn(30.0, 3.0);
+        scene.line_fault(0.7, Damage::Stall);
+        scene.ride.turn(60.0, 5.0).stop(5.0, 5.0);
+        scene.town(1);
+    }),
+    Situation::new("wheel marked as faulty", WHEELED, |scene| wheels(scene, WheelFault::Marked(1))),
+    Situation::new("one wheel dead", WHEELED, |scene| wheels(scene, WheelFault::One(2, 0.0))),
+    Situation::new("one tyre flat", WHEELED, |scene| wheels(scene, WheelFault::One(3, 1.04))),
+    Situation::new("wheels of another size", WHEELED, |scene| wheels(scene, WheelFault::All(1.06))),
+    Situation::new("wheel frames end", WHEELED, |scene| {
+        wheels(scene, WheelFault::Silent);
+        scene.least = 0.1;
+    }),
+    Situation::new("wheel frames frozen in motion", WHEELED, |scene| {
+        scene.ride.hold(8.0);
+        scene.ride.reach(10.0, 5.0).hold(2.0);
+        scene.wheel_fault(1e3, WheelFault::Frozen);
+        scene.ride.turn(90.0, 6.0).stop(5.0, 10.0);
+        scene.town(2);
+    }),
+    Situation::new("wheel frames frozen at zero on a motorway", WHEELED, |scene| {
+        scene.ride.hold(8.0);
+        scene.town(1);
+        scene.wheel_fault(1e3, WheelFault::All(0.0));
+        scene.ride.now.road = 0.1;
+        scene.ride.reach(30.0, 20.0).hold(10.0).turn(5.0, 40.0).turn(-4.0, 30.0).hold(10.0);
+        scene.least = 0.1;
+    }),
+];
+
+fn of_rate(scene: &mut Scene, hz: f64) {
+    scene.sensor.hz = hz;
+    scene.ride.hold(8.0);
+    scene.town(3);
+}
+
+fn in_a_turn(scene: &mut Scene, seconds: f64, what: Fault) {
+    scene.ride.hold(8.0);
+    scene.town(1);
+    scene.ride.reach(10.0, 6.0).turn(30.0, 3.0);
+    scene.sensor_fault(seconds, what);
+    scene.ride.turn(60.0, 5.0).hold(5.0).stop(5.0, 3.0);
+    scene.town(1);
+}
+
+fn after_a_restart(scene: &mut Scene, what: Fault) {
+    scene.ride.hold(8.0);
+    scene.town(2);
+    scene.ride.hold(5.0);
+    scene.restart();
+    scene.sensor_fault(1e3, what);
+    scene.ride.hold(8.0);
+    scene.town(2);
+}
+
+fn on_the_line(scene: &mut Scene, what: Damage) {
+    scene.ride.hold(8.0);
+    scene.town(1);
+    scene.line_fault(25.0, what);
+    scene.town(2);
+    scene.least = 0.2;
+}
+
+fn wheels(scene: &mut Scene, what: WheelFault) {
+    scene.ride.hold(8.0);
+    scene.town(1);
+    scene.wheel_fault(1e3, what);
+    scene.town(2);
+}
