@@ -1,38 +1,65 @@
 //! The unit tests of the Python packages. The trainer's, as far as they want no PyTorch: readers of drives and sequences,
-//! vehicle files, filters of the rivals, errors of trajectories. Those of the import of logs.
+//! vehicle files, filters of the rivals, errors of trajectories. Those of the package `gyronet`: import, and the board.
 
+use gyronet::coprocessor::Config;
+use gyronet::model::{Blob, GyroNet, weights};
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require;
+use gyronet_tools::board::Board;
+use gyronet_tools::bundled;
+use gyronet_tools::drive::candump::Log;
+use gyronet_tools::drive::export::Table;
+use gyronet_tools::drive::replay::Steps;
+use gyronet_tools::drive::stream::Drive;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
 use std::process::Command;
 
 #[test]
 fn the_trainers_unit_tests_pass() {
-    pass("the_trainers_unit_tests_pass", "tools/train", &["numpy", "scipy"], 52);
+    let test = "the_trainers_unit_tests_pass";
+    let Some(python) = require::python(test, &["numpy", "scipy"]) else { return };
+    pass(test, Command::new(python).arg("-B").current_dir(workspace().join("tools/train")), "tests", 52);
 }
 
+/// `GYRONET_WHEEL` is set where the wheel is installed in `GYRONET_PYTHON`: then it is tested, not the sources.
 #[test]
-fn the_unit_tests_of_the_import_in_python_pass() {
-    let packages = ["asammdf", "can", "cantools", "mcap", "numpy", "pyulog", "rosbags"];
-    pass("the_unit_tests_of_the_import_in_python_pass", "tools/python", &packages, 41);
+fn the_unit_tests_of_the_python_package_pass() {
+    let (test, folder) = ("the_unit_tests_of_the_python_package_pass", workspace().join("tools/python"));
+    let mut packages = vec!["asammdf", "can", "cantools", "mcap", "numpy", "pyulog", "rosbags"];
+    let wheel = std::env::var_os("GYRONET_WHEEL").is_some();
+    packages.extend(wheel.then_some("gyronet._core"));
+    let Some(python) = require::python(test, &packages) else { return };
+    let (mut command, replay) = (Command::new(python), tempfile::tempdir().unwrap());
+    replayed(replay.path());
+    command.arg("-B").current_dir(folder.join("tests")).env("GYRONET_REPLAY", replay.path());
+    if !wheel {
+        command.env("PYTHONPATH", &folder);
+    }
+    pass(test, &mut command, ".", if wheel { 46 } else { 41 });
 }
 
-/// Runs the unit tests of a folder, of which `least` must not be skipped.
-fn pass(test: &str, folder: &str, packages: &[&str], least: usize) {
-    let Some(python) = require::python(test, packages) else { return };
-    let output = Command::new(python)
-        .args([
-            "-B",
-            "-m",
-            "unittest",
-            "discover",
-            "--start-directory",
-            "tests",
-            "--top-level-directory",
-            ".",
-        ])
-        .current_dir(workspace().join(folder))
-        .output()
-        .unwrap();
+/// Writes the log and the table of `gyronet replay` for the simulated drive.
+fn replayed(folder: &Path) {
+    let recording = bundled::simulated_drive().unwrap();
+    let drive = Drive::from(&recording);
+    let network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).unwrap());
+    let file = |name| BufWriter::new(File::create(folder.join(name)).unwrap());
+    let (mut log, mut table) = (Log::new(file("can.log")), Table::new(file("rates.csv")).unwrap());
+    for step in Steps::new(&drive, Board::new(Config::DEFAULT, drive.wheels(), network)).unwrap() {
+        let step = step.unwrap();
+        step.frames.iter().for_each(|sent| log.frame(sent.time, &sent.frame).unwrap());
+        table.step(&step).unwrap();
+    }
+    log.finish().unwrap();
+    table.finish().unwrap();
+}
+
+/// Runs the unit tests in a folder of the command's, of which `least` must not be skipped.
+fn pass(test: &str, python: &mut Command, tests: &str, least: usize) {
+    let discover = ["-m", "unittest", "discover", "--start-directory", tests, "--top-level-directory", "."];
+    let output = python.args(discover).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
     let ran = said.lines().find_map(|line| line.strip_prefix("Ran ")).expect("a count of tests");
@@ -42,7 +69,7 @@ fn pass(test: &str, folder: &str, packages: &[&str], least: usize) {
         .split_once("skipped=")
         .map_or(0, |(_, count)| count.trim_end().trim_end_matches(')').parse().unwrap());
     if skipped > 0 {
-        require::skipped(test, &format!("{skipped} of {folder} want what is not here"));
+        require::skipped(test, &format!("{skipped} unit tests want what is not here"));
     }
     assert!(ran - skipped >= least, "{said}");
 }

@@ -10,7 +10,7 @@ import tomllib
 import unittest
 from pathlib import Path
 
-from tests import made
+import made
 
 TEXTS = {
     "pointer.bag": (b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n", "git lfs pull"),
@@ -128,7 +128,7 @@ class Bad(unittest.TestCase):
             code = ("import sys; from gyronet.__main__ import main; status = main(['import', sys.argv[1], '--out', 'out.csv']); "
                     "print('VmHWM', open('/proc/self/status').read().split('VmHWM:')[1].split()[0]); sys.exit(status)")
             done = subprocess.run([sys.executable, "-c", code, name], cwd=self.folder, capture_output=True, text=True, check=True,
-                                  env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])})
+                                  env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
             peak.append(int(done.stdout.split("VmHWM ")[1]) // 1024)
         self.assertLess(peak[1] - peak[0], 100, peak)
 

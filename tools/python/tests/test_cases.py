@@ -10,8 +10,8 @@ from pathlib import Path
 import can
 import numpy as np
 
-from tests import made
-from tests.made import START, VEHICLE, bus, dbc, frames, imu, run, table, times
+import made
+from made import START, VEHICLE, bus, dbc, frames, imu, run, table, times
 
 SAME = ["--same-clock", "--vehicle", "v.toml", "--out", "out.csv"]
 

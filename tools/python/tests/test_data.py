@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests import made
+import made
 
 DATA = Path(os.environ.get("GYRONET_DATA", "/nonexistent")) / "logs"
 

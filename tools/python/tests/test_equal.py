@@ -17,7 +17,7 @@ from rosbags.highlevel import AnyReader
 from gyronet.logs import opened
 from gyronet.logs.can import Bus
 from gyronet.logs.drive import Request
-from tests import made
+import made
 
 DATA = Path(os.environ.get("GYRONET_DATA", "/nonexistent")) / "logs"
 

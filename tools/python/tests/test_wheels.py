@@ -6,7 +6,7 @@ import tomllib
 import unittest
 from pathlib import Path
 
-from tests import made
+import made
 
 REAR = ["--rear-left", "RL", "--rear-right", "RR"]
 REFUSED = [

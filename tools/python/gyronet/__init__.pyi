@@ -1,0 +1,1 @@
+from gyronet._core import Coprocessor as Coprocessor
