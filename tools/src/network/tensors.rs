@@ -26,6 +26,14 @@ pub enum CheckpointError {
         /// The reader's error.
         source: safetensors::SafeTensorError,
     },
+    #[error(
+        "{name}: a checkpoint of PyTorch; write its weights as safetensors: python3 -c \"import torch, safetensors.torch as s; \
+        s.save_file({{k: t.contiguous() for k, t in torch.load('{name}', 'cpu').items()}}, 'net.safetensors')\""
+    )]
+    PyTorch { name: String },
+    /// The file has tensors that are not part of the network.
+    #[error("{name}: the network has no {}: quantising would leave them out", tensors.join(", "))]
+    Unused { name: String, tensors: Vec<String> },
     #[error("{name}: tensor {tensor} is missing")]
     Missing {
         /// The file.
@@ -88,6 +96,20 @@ pub(crate) fn dense(name: &str, inputs: usize, outputs: usize) -> [Shape; 2] {
     [tensor(&format!("{name}.weight"), &[outputs, inputs]), tensor(&format!("{name}.bias"), &[outputs])]
 }
 
+/// A tensor's name in the network, without what torch.compile and DistributedDataParallel put before it.
+fn own(name: &str) -> &str {
+    let compiled = name.strip_prefix("_orig_mod.").or_else(|| name.strip_prefix("module."));
+    compiled.map_or(name, own)
+}
+
+fn unread(name: &str, bytes: &[u8], source: safetensors::SafeTensorError) -> CheckpointError {
+    // torch.save writes a ZIP archive, or a pickle.
+    if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"\x80\x02") {
+        return CheckpointError::PyTorch { name: name.to_owned() };
+    }
+    CheckpointError::Format { name: name.to_owned(), source }
+}
+
 #[derive(Debug, Clone)]
 pub struct Tensors {
     tensors: BTreeMap<String, Vec<f32>>,
@@ -101,9 +123,9 @@ impl Tensors {
     pub(crate) fn names(path: &Path) -> Result<Vec<String>, CheckpointError> {
         let bytes =
             std::fs::read(path).map_err(|source| CheckpointError::Io { path: path.to_owned(), source })?;
-        let format = |source| CheckpointError::Format { name: path.display().to_string(), source };
+        let format = |source| unread(&path.display().to_string(), &bytes, source);
         let file = SafeTensors::deserialize(&bytes).map_err(format)?;
-        Ok(file.names().into_iter().map(ToString::to_string).collect())
+        Ok(file.names().into_iter().map(|name| own(name).to_owned()).collect())
     }
 
     pub(crate) fn read(path: &Path, shapes: fn(Found<'_>) -> Vec<Shape>) -> Result<Self, CheckpointError> {
@@ -117,17 +139,24 @@ impl Tensors {
         bytes: &[u8],
         shapes: fn(Found<'_>) -> Vec<Shape>,
     ) -> Result<Self, CheckpointError> {
-        let format = |source| CheckpointError::Format { name: name.to_owned(), source };
+        let format = |source| unread(name, bytes, source);
         let (_, header) = SafeTensors::read_metadata(bytes).map_err(format)?;
         let file = SafeTensors::deserialize(bytes).map_err(format)?;
         let provenance =
             header.metadata().as_ref().and_then(|map| map.get("provenance")).cloned().unwrap_or_default();
+        let mut views = BTreeMap::new();
+        let mut unused: Vec<String> = Vec::new();
+        for (tensor, view) in file.iter() {
+            if views.insert(own(tensor), view).is_some() {
+                unused.push(tensor.to_owned());
+            }
+        }
         let mut tensors = BTreeMap::new();
-        for (tensor, shape) in shapes(&|tensor| file.tensor(tensor).ok().map(|view| view.shape().to_vec())) {
+        for (tensor, shape) in shapes(&|tensor| views.get(tensor).map(|view| view.shape().to_vec())) {
             let name = || name.to_owned();
-            let view = file
-                .tensor(&tensor)
-                .map_err(|_| CheckpointError::Missing { name: name(), tensor: tensor.clone() })?;
+            let view = views
+                .remove(tensor.as_str())
+                .ok_or_else(|| CheckpointError::Missing { name: name(), tensor: tensor.clone() })?;
             if view.dtype() != Dtype::F32 || view.shape() != shape {
                 let found = format!("{:?} {:?}", view.dtype(), view.shape());
                 return Err(CheckpointError::Shape { name: name(), tensor, found, expected: shape });
@@ -138,6 +167,10 @@ impl Tensors {
                 return Err(CheckpointError::NotFinite { name: name(), tensor, at });
             }
             tensors.insert(tensor, values);
+        }
+        unused.extend(views.into_keys().map(str::to_owned));
+        if !unused.is_empty() {
+            return Err(CheckpointError::Unused { name: name.to_owned(), tensors: unused });
         }
         let sha256 = format!("{:x}", Sha256::digest(bytes));
         Ok(Self { tensors, provenance, sha256 })
@@ -166,5 +199,35 @@ impl Tensors {
             bias_ih: tensor("bias_ih"),
             bias_hh: tensor("bias_hh"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use safetensors::tensor::TensorView;
+
+    /// A file of tensors with two numbers each.
+    fn file(names: &[&str]) -> Vec<u8> {
+        let data = [0u8; 8];
+        let view = |name: &&str| ((*name).to_owned(), TensorView::new(Dtype::F32, vec![2], &data).unwrap());
+        safetensors::serialize(names.iter().map(view), None).unwrap()
+    }
+
+    fn error(bytes: &[u8]) -> String {
+        Tensors::parse("net", bytes, |_| vec![tensor("a", &[2])]).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn every_tensor_of_a_file_is_used_or_named() {
+        let read = |names: &[&str]| Tensors::parse("net", &file(names), |_| vec![tensor("a", &[2])]);
+        for name in ["a", "_orig_mod.a", "module._orig_mod.a"] {
+            assert!(read(&[name]).unwrap().has("a"), "{name}");
+        }
+        let unused = error(&file(&["a", "lstm1.weight_ih_l1", "lstm1.weight_hh_l1"]));
+        assert!(unused.contains("no lstm1.weight_hh_l1, lstm1.weight_ih_l1:"), "{unused}");
+        assert!(error(&file(&["a", "_orig_mod.a"])).contains("the network has no "));
+        assert_eq!(error(&file(&["b"])), "net: tensor a is missing");
+        assert!(error(b"PK\x03\x04...............").contains("a checkpoint of PyTorch; write its weights"));
     }
 }
