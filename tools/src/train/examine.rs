@@ -86,7 +86,15 @@ pub struct Examined {
 
 /// Examines a drive.
 pub fn examine(path: &Path) -> Result<Examined, Refusal> {
-    let recording = Recording::read(path)?;
+    let mut recording = Recording::read(path)?;
+    // At its ends a reference from another source may be missing; the trainer leaves these rows out, too.
+    let known = |row: &Row| row.reference.is_some();
+    if let (Some(first), Some(last)) =
+        (recording.rows.iter().position(known), recording.rows.iter().rposition(known))
+    {
+        recording.rows.truncate(last + 1);
+        recording.rows.drain(..first);
+    }
     let named = || recording.path.clone();
     if let Some(row) = recording.rows.iter().find(|row| row.reference.is_none()) {
         let course = recording.rows.iter().any(|row| row.course.is_some());
@@ -157,12 +165,22 @@ mod tests {
     }
 
     #[test]
+    fn the_ends_without_a_reference_are_left_out() {
+        let at = |time: f64| {
+            if (1.0..61.0).contains(&time) { turn(time - 1.0).to_string() } else { String::new() }
+        };
+        let drive = examined("ends", 63, |time| (turn(time - 1.0) + 0.002, at(time))).expect("good");
+        assert!((drive.seconds - 57.0).abs() < 0.02, "{drive:?}");
+    }
+
+    #[test]
     fn a_drive_that_carries_none_is_refused_with_the_reason() {
         let same = |rate: f64| (rate, rate.to_string());
-        let without = |time| (0.0, if time < 20.0 { "0".to_owned() } else { String::new() });
+        let without = |time| (0.0, if (20.0..40.0).contains(&time) { String::new() } else { "0".to_owned() });
+        let never = |_| (0.0, String::new());
         for (name, seconds, reason, rates) in [
             ("blind", 63, "line 2002: no ref_gyr_z", &without as &dyn Fn(f64) -> (f64, String)),
-            ("course", 63, "its ref_yaw trains the linear part", &without),
+            ("course", 63, "its ref_yaw trains the linear part", &never),
             ("short", 20, "17 s after the 3 s at rest; training needs 30 s", &|time| same(turn(time))),
             ("moving", 63, "starts moving: line ", &|time: f64| same((2.0 * time).sin())),
             ("mirrored", 63, "wrong unit or sign", &|time: f64| {

@@ -69,16 +69,20 @@ def load_pieces(path: Path) -> list[Drive]:
 
 
 def read_table(path: Path, columns: tuple[str, ...]) -> tuple[np.ndarray, Mounting, str]:
-    """Reads the rows of one CSV, its mounting, and the hash of both. Raises ValueError if one of the columns does not
-    have a number in every row."""
+    """Reads the rows of one CSV, its mounting, and the hash of both. Rows at the ends without a reference rate, if that is
+    one of the columns, are left out. Raises ValueError if one of the columns does not have a number in every row."""
     mounting = read_mounting(path)
     table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
     missing = [name for name in columns if name not in (table.dtype.names or ())]
     if missing:
         raise ValueError(f"{path}: missing columns {', '.join(missing)}")
+    first = 0
+    if "ref_gyr_z" in columns and (known := np.flatnonzero(np.isfinite(table["ref_gyr_z"]))).size:
+        first = known[0]
+        table = table[first : known[-1] + 1]
     unknown = ~np.isfinite(np.stack([table[name] for name in columns], axis=1)).all(axis=1)
     if unknown.any():
-        raise ValueError(f"{path}: line {np.argmax(unknown) + 2}: a value is empty or not a number")
+        raise ValueError(f"{path}: line {first + np.argmax(unknown) + 2}: a value is empty or not a number")
     return table, mounting, hashlib.sha256(path.read_bytes() + mounting.text).hexdigest()
 
 

@@ -30,6 +30,17 @@ class Gaps(unittest.TestCase):
         np.testing.assert_array_equal(piece.features, load_drive(self.path).features)
         self.assertEqual((len(piece.features), len(load_grid(self.path)[0].turn)), (2400, 24))
 
+    def test_ends_without_a_reference_are_left_out(self):
+        self.rows[[*range(7), *range(2390, 2400)], REFERENCE] = np.nan
+        self.write(np.arange(2400))
+        drive = load_drive(self.path)
+        self.assertEqual(len(drive.gyro_error), 2383)
+        np.testing.assert_allclose(drive.reference_rate[0], self.rows[7, REFERENCE], rtol=1e-6)
+        self.rows[100, REFERENCE] = np.nan
+        self.write(np.arange(2400))
+        with self.assertRaisesRegex(ValueError, "line 102: a value is empty"):
+            load_drive(self.path)
+
     def test_pieces_share_the_static_initialisation_of_the_first(self):
         kept = np.concatenate([np.arange(1010), np.arange(1230, 1300), np.arange(1400, 2400)])
         self.write(kept)
