@@ -6,6 +6,7 @@
 pub mod candump;
 pub mod error;
 pub mod export;
+pub(crate) mod foreign;
 #[cfg(feature = "mcap")]
 pub mod foxglove;
 pub mod recording;

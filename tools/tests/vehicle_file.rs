@@ -65,6 +65,12 @@ fn mounting_and_radius_are_used_and_named() {
         let (_, err) = gyronet(&folder, &[command, "drive.csv"]);
         assert!(err.contains("drive.csv: vehicle file drive.toml\n"), "{command}: {err}");
     }
+    std::fs::write(folder.join("drive.mcap"), b"\x89MCAP0\r\n").unwrap();
+    for command in ["evaluate", "calibrate", "doctor", "replay"] {
+        let (good, err) = gyronet(&folder, &[command, "drive.mcap"]);
+        let command = "gyronet import drive.mcap --out drive.csv\n";
+        assert!(!good && err.ends_with(command) && err.lines().count() == 1, "{err}");
+    }
     let (good, err) = gyronet(&folder, &["demo", "drive.csv", "--out", "demo"]);
     assert!(good && err.contains("drive.csv: vehicle file drive.toml\n"), "{err}");
     let page = std::fs::read_to_string(folder.join("demo/demo.html")).unwrap();
@@ -118,6 +124,28 @@ fn what_import_writes_is_not_turned_again() {
         let (level, later) = (values(level), values(later));
         assert!(level.iter().zip(&later).all(|(a, b)| (a - b).abs() < 1e-6), "{level:?} {later:?}");
     }
+
+    let day = std::fs::read_to_string(folder.join("level.toml")).unwrap();
+    std::fs::write(
+        folder.join("level.toml"),
+        day.replace("[recording]\n", "[recording]\nstart = 1700000000.25\n"),
+    )
+    .unwrap();
+    let outputs = ["--csv", "day.csv", "--tum", "day.tum", "--out", "day.log", "--mcap", "day.mcap"];
+    let (good, err) = gyronet(&folder, &[&["replay", "level.csv"][..], &outputs].concat());
+    assert!(good, "{err}");
+    let times = |name: &str, separator: char| column(&folder.join(name), separator, 0);
+    let (plain, day, path) = (times("rates.csv", ','), times("day.csv", ','), times("day.tum", ' '));
+    assert_eq!(plain.len(), day.len());
+    assert!(plain.iter().zip(&day).all(|(plain, day)| (day - plain - 1_700_000_000.25).abs() < 1e-3));
+    assert!((path[0] - day[0]).abs() < 1e-3, "{path:?}");
+    let log = std::fs::read_to_string(folder.join("day.log")).unwrap();
+    assert!(log.starts_with("(170000000"), "{}", &log[..40]);
+    let mcap = std::fs::read(folder.join("day.mcap")).unwrap();
+    assert!(
+        mcap.windows(8).any(|bytes| bytes == 1_700_000_000_250_000_000u64.to_le_bytes()),
+        "log_time of the first row"
+    );
 
     std::fs::write(folder.join("level.toml"), "[mounting]\nrol_deg = 180\n").unwrap();
     let (good, err) = gyronet(&folder, &["replay", "level.csv"]);

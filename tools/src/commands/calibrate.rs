@@ -43,7 +43,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let drives = args.files.iter().map(|file| cut(&read_drive(file, common)?, blob, common));
     let drives = drives.collect::<Result<Vec<Cut>, Box<dyn Error>>>()?;
     let unit = calibrate(&drives, blob.crc)?;
-    if let Some(path) = &args.out {
+    let found = unit.shares.iter().any(|share| share.refused.is_none());
+    if let Some(path) = args.out.as_ref().filter(|_| found) {
         let text = serde_json::to_string_pretty(&unit.json())? + "\n";
         std::fs::write(path, text).map_err(WriteError::to(path))?;
     }
@@ -65,7 +66,12 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             drive.name, drive.deviation_rad
         )?;
     }
-    Ok(())
+    match &args.out {
+        Some(path) if !found => {
+            Err(format!("{}: not written: nothing could be calibrated", path.display()).into())
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Runs a drive on the board with these weights, with a progress bar.

@@ -1,10 +1,8 @@
 //! `gyronet evaluate` computes the heading errors of each method on recorded drives.
 
-use super::{Common, drives, paint, print_json, progress, read_drive, weights};
+use super::{Common, drives, paint, print_json, progress, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
-use gyronet_tools::calibrate::unit_file;
-use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::ablation::{self, Floor, Score, Variant};
 use gyronet_tools::evaluate::report::Report;
 use gyronet_tools::network::checkpoint::Checkpoint;
@@ -46,10 +44,6 @@ pub struct Args {
     /// Print the error of the delayed rate at every lag from 0 to 110 ms (the board's default is 70).
     #[arg(long)]
     lags: bool,
-    /// Calibration file from `gyronet calibrate`, applied to the gyro of every method. It corrects only the gain and
-    /// mounting errors that remain after the weights' correction, for the classical methods too.
-    #[arg(long, value_name = "FILE.json")]
-    calibration: Option<PathBuf>,
     /// Add rows for the paper's GyroNet, in f32 and in integers; they take twenty times as long as all others together.
     #[arg(long, conflicts_with_all = ["ablation", "lags"])]
     all: bool,
@@ -57,18 +51,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", requires = "all")]
     checkpoint: Option<PathBuf>,
     #[command(flatten)]
-    sent: weights::Sent,
-}
-
-impl Args {
-    /// Opens a drive, and applies the calibration if one is given.
-    fn drive(&self, file: &Path, common: Common) -> Result<Drive<'static>, Box<dyn Error + Send + Sync>> {
-        let mut drive = read_drive(file, common)?;
-        if let Some(path) = &self.calibration {
-            drive.gyro_map = Some(unit_file::read_for(path, self.sent.open()?.blob()?.crc)?);
-        }
-        Ok(drive)
-    }
+    unit: weights::Unit,
 }
 
 /// Runs the subcommand.
@@ -83,9 +66,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         args.all.then(|| args.checkpoint.as_deref().map_or_else(bundled::checkpoint, Checkpoint::read));
     let checkpoint = checkpoint.transpose()?;
     let judge = |file: &Path, bar: &ProgressBar| {
-        let drive = args.drive(file, common)?;
+        let drive = args.unit.drive(file, common)?;
         bar.set_length(drive.facts.rows as u64);
-        args.sent.errors(&drive, checkpoint.as_ref(), |_| bar.inc(1))
+        args.unit.sent.errors(&drive, checkpoint.as_ref(), |_| bar.inc(1))
     };
     let report = Report::new(drives::errors(&args.files, common, judge)?);
     let mut out = std::io::stdout().lock();
@@ -105,11 +88,11 @@ struct Scored {
 }
 
 fn compare(args: &Args, common: Common, variants: &[Variant]) -> super::Result {
-    let weights = args.sent.open()?;
+    let weights = args.unit.sent.open()?;
     let mut network = GyroNet::new(weights.blob()?);
     let mut drives = Vec::new();
     for file in &args.files {
-        let drive = args.drive(file, common).map_err(|error| -> Box<dyn Error> { error })?;
+        let drive = args.unit.drive(file, common).map_err(|error| -> Box<dyn Error> { error })?;
         let bar = progress::bar(common, variants.len() * drive.facts.rows, drive.name());
         let scores = ablation::run(&drive, &mut network, variants, || bar.inc(1));
         bar.finish_and_clear();

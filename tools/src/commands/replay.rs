@@ -1,7 +1,7 @@
 //! `gyronet replay` runs a drive through the board's code and writes its CAN log.
 
-use super::weights::Sent;
-use super::{Common, WriteError, print_json, progress, read_drive};
+use super::weights::Unit;
+use super::{Common, WriteError, print_json, progress};
 use gyronet::coprocessor::{Config, TimedFrame};
 use gyronet::health::{Counters, Status};
 use gyronet::model::GyroNet;
@@ -16,8 +16,9 @@ use std::path::{Path, PathBuf};
 
 /// Write the CAN messages that a board would send on a recorded drive.
 ///
-/// The command runs the drive through the pipeline that is flashed. The log has the format of `candump -L` and the
-/// recording's time stamps; can-utils' canplayer and python-can can play it. It is written to standard output, unless
+/// The command runs the drive through the pipeline that is flashed. The log has the format of `candump -L`;
+/// can-utils' canplayer and python-can can play it. All files are in time of day if the vehicle file has the start of
+/// the recording (`gyronet import` writes it), else in the recording's time. It is written to standard output, unless
 /// --out names a file or --mcap, --csv or --tum is given. The summary is written to standard error; with --json it is
 /// written to standard output if the log is not.
 #[derive(Debug, Clone, clap::Args)]
@@ -44,7 +45,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.tum")]
     tum: Option<PathBuf>,
     #[command(flatten)]
-    sent: Sent,
+    unit: Unit,
 }
 
 /// A file that is written while the drive is read.
@@ -63,8 +64,9 @@ impl<W> Output<W> {
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let weights = args.sent.open()?;
-    let drive = read_drive(&args.file, common)?;
+    let weights = args.unit.sent.open()?;
+    let drive =
+        args.unit.drive(&args.file, common).map_err(|error| -> Box<dyn std::error::Error> { error })?;
     // A drive that cannot be replayed leaves no file behind.
     initialise(&drive)?;
     let writes_elsewhere = [&args.mcap, &args.csv, &args.tum].into_iter().any(Option::is_some);
@@ -95,12 +97,15 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         .map(|path| Output::new(&path, |file| foxglove::Recorder::new(file).map_err(io::Error::other)))
         .transpose()?;
 
+    let start_us = drive.vehicle.recording.start.map_or(0, |start| (1e6 * start).round() as u64);
     let mut statuses = BTreeMap::from(STATUSES.map(|status| (status_name(status), 0u64)));
     let board = Board::new(Config::DEFAULT, drive.wheels(), GyroNet::new(weights.blob()?));
     let mut steps = Steps::new(&drive, board)?;
     let bar = progress::bar(common, drive.facts.rows, drive.name());
     for step in &mut steps {
-        let step: Step = step?;
+        let mut step: Step = step?;
+        step.time.0 += start_us;
+        step.frames.iter_mut().for_each(|sent| sent.time.0 += start_us);
         bar.inc(1);
         for TimedFrame { frame, time } in &step.frames {
             log.frame(*time, frame).map_err(log_error)?;

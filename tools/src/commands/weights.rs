@@ -1,6 +1,8 @@
 //! Chooses the weights, bundled or from a file, and runs every method with them.
 
+use super::{Common, read_drive};
 use gyronet::model::{self, Blob, weights};
+use gyronet_tools::calibrate::unit_file;
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::rates::{Network, Networks, Sample};
 use gyronet_tools::evaluate::report::DriveErrors;
@@ -35,6 +37,28 @@ pub struct Sent {
     /// Weight file for the rates that the board sends [default: the library's default model].
     #[arg(long, value_name = "BLOB")]
     pub weights: Option<PathBuf>,
+}
+
+/// The rates that the board of a unit sends.
+#[derive(Debug, Clone, clap::Args)]
+pub struct Unit {
+    /// Calibration file from `gyronet calibrate`, applied to the gyro (of every method). It corrects only the gain and
+    /// mounting errors that remain after the weights' correction.
+    #[arg(long, value_name = "FILE.json")]
+    calibration: Option<PathBuf>,
+    #[command(flatten)]
+    pub sent: Sent,
+}
+
+impl Unit {
+    /// Opens a drive, and applies the calibration if one is given.
+    pub fn drive(&self, file: &Path, common: Common) -> Result<Drive<'static>, Box<dyn Error + Send + Sync>> {
+        let mut drive = read_drive(file, common)?;
+        if let Some(path) = &self.calibration {
+            drive.gyro_map = Some(unit_file::read_for(path, self.sent.open()?.blob()?.crc)?);
+        }
+        Ok(drive)
+    }
 }
 
 impl Sent {

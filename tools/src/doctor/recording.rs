@@ -1,9 +1,9 @@
 //! Reads the rows of a recording unchecked; rows that cannot be read are counted.
 
 use crate::drive::error::DataError;
+use crate::drive::foreign;
 use crate::drive::recording::{Reader, Row, WHEELS};
 use crate::drive::vehicle::Vehicle;
-use std::fs::File;
 use std::ops::Range;
 use std::path::Path;
 
@@ -37,7 +37,7 @@ impl Rows {
     /// Reads a file.
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let shown = path.display().to_string();
-        let file = File::open(path).map_err(|source| DataError::open(&shown, source))?;
+        let file = foreign::open(path)?;
         let name = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or(&shown).to_owned();
         let vehicle = Vehicle::of_drive(path)?;
         let reader = Reader::new(&shown, std::io::BufReader::new(file))?.mounted(&vehicle);

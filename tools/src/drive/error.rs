@@ -74,7 +74,7 @@ pub enum DataFault {
     #[error("holds no samples")]
     Empty,
     /// The header lacks a column.
-    #[error("column {0} is missing")]
+    #[error("column {0} is missing (a table of another tool becomes a drive by `gyronet import`)")]
     MissingColumn(&'static str),
     /// A row has more or fewer fields than the header.
     #[error("{found} fields, the header has {expected}")]
@@ -98,6 +98,9 @@ pub enum DataFault {
     /// The vehicle file cannot be used.
     #[error("not a valid vehicle file: {reason}")]
     Vehicle { reason: String },
+    /// A log of another tool.
+    #[error("{format}, not a drive; import it first: {command}")]
+    Foreign { format: &'static str, command: String },
     /// A fault of a data set, described by its reader.
     #[error(transparent)]
     Other(Box<dyn std::error::Error + Send + Sync>),

@@ -22,9 +22,9 @@ pub use reader::Reader;
 pub use survey::{Facts, Survey};
 
 use crate::drive::error::DataError;
+use crate::drive::foreign;
 use crate::drive::vehicle::Vehicle;
 use gyronet::sample::ImuSample;
-use std::fs::File;
 use std::path::Path;
 
 /// Number of wheel columns of a recording.
@@ -65,8 +65,7 @@ impl Recording {
     /// Reads a file, and the vehicle file beside it.
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
-        let file = File::open(path).map_err(|source| DataError::of(&name, source.into()))?;
-        Self::of(&name, file, Vehicle::of_drive(path)?)
+        Self::of(&name, foreign::open(path)?, Vehicle::of_drive(path)?)
     }
 
     /// Parses a recording from any reader; `path` is its name in errors.

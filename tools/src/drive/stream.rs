@@ -2,6 +2,7 @@
 //! a short one.
 
 use super::error::DataError;
+use super::foreign;
 use super::recording::{Facts, Reader, Recording, Row, Survey, name};
 use super::vehicle::Vehicle;
 use super::wheel_frames::{Speeds, WheelFrames};
@@ -42,7 +43,7 @@ impl Drive<'static> {
     /// memory.
     pub fn open(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
-        let file = File::open(path).map_err(|source| DataError::of(&name, source.into()))?;
+        let file = foreign::open(path)?;
         let vehicle = Vehicle::of_drive(path)?;
         let again = file.metadata().is_ok_and(|metadata| metadata.is_file());
         let (mut survey, mut kept) = (Survey::default(), Vec::new());
