@@ -22,7 +22,7 @@ pub struct Drive<'a> {
     pub path: String,
     /// Contents of the vehicle file beside the drive; the rows are in the vehicle's axes.
     pub vehicle: Cow<'a, Vehicle>,
-    /// What the first reading has found.
+    /// Found by the first reading.
     pub facts: Facts,
     /// A map that is applied to the gyro of each row.
     pub gyro_map: Option<GyroMap>,

@@ -8,7 +8,7 @@ use gyronet::sample::{PERIOD_US, RATE_HZ};
 use gyronet::units::Micros;
 use std::collections::BTreeMap;
 
-/// What a drive has.
+/// The content of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Facts {
     /// Number of rows.
@@ -19,12 +19,12 @@ pub struct Facts {
     pub last: Micros,
     /// Number of rows that are missing in gaps.
     pub missing: u64,
-    /// Whether each wheel is recorded in any row.
+    /// True if each wheel is recorded in any row.
     pub wheels: [bool; WHEELS],
 }
 
 impl Facts {
-    /// What these rows have, whether they can be replayed or not.
+    /// The content of these rows, whether they can be replayed or not.
     pub fn of(rows: &[Row]) -> Self {
         let mut survey = Survey::default();
         rows.iter().for_each(|row| survey.row(row));
@@ -36,7 +36,7 @@ impl Facts {
         (self.last.0 - self.first.0 + PERIOD_US) as f64 * 1e-6
     }
 
-    /// Whether any wheel is recorded.
+    /// True if any wheel is recorded.
     pub fn has_wheels(&self) -> bool {
         self.wheels.contains(&true)
     }
