@@ -120,6 +120,10 @@ pub struct Compensated {
     pub correction: AngularRate,
     /// A window has covered this sample.
     pub covered: bool,
+    /// The gyro's rates about x and y, less static bias.
+    pub roll_and_pitch: [AngularRate; 2],
+    /// What is left of the gyro's yaw rate where standstill has set it to zero.
+    pub withheld: Option<AngularRate>,
     /// The validity of the sample's reading.
     pub validity: Validity,
 }
@@ -261,6 +265,12 @@ impl Compensator {
         self.mounting_check.observe(yaw_rate, mounting.correction(rates))
     }
 
+    /// Marks this many of the newest samples as [`Validity::Stuck`], because a later one has shown it.
+    pub fn distrust(&mut self, samples: usize) {
+        let newest = self.kept.iter_mut().rev().flatten().take(samples);
+        newest.filter(|entry| entry.validity.is_good()).for_each(|entry| entry.validity = Validity::Stuck);
+    }
+
     /// Returns the mounting's part of the newest estimate's model if it is another unit's.
     fn mismatched_mounting(&self) -> SteadyGain {
         if self.mounting_check.is_mismatched() { self.steady_gain.mounting() } else { SteadyGain::NONE }
@@ -284,17 +294,21 @@ impl Compensator {
         let entry = self.kept.iter_mut().nth_back(self.config.lag.samples())?.as_mut()?;
         entry.held = stands && entry.validity.is_good();
         let mut taken = i64::from(entry.estimate) + i64::from(bias.0);
+        let mut withheld = None;
         if entry.held {
             if self.held_until == 0 {
                 self.held.rotate_right(1);
                 (self.held[0], self.held_until) = (0, RATE_HZ / 4);
             }
             self.held_until -= 1;
-            self.held[0] += i64::from(entry.rate().0) - taken;
+            let left = i64::from(entry.rate().0) - taken;
+            self.held[0] += left;
+            withheld = Some(code(left));
             taken = i64::from(entry.rate().0);
         }
         let carried = self.delayed_revisions;
-        Some(emit(entry, taken, carried, &mut self.delayed_revisions, self.config.max_revision))
+        let sent = emit(entry, taken, carried, &mut self.delayed_revisions, self.config.max_revision);
+        Some(Compensated { withheld, ..sent })
     }
 
     /// Returns the newest sample that no window changes any more; each sample is returned once.
@@ -341,6 +355,7 @@ impl Compensator {
     #[must_use]
     pub fn delayed_pending(&self, bias: AngularRate) -> i64 {
         let waiting = self.kept.iter().rev().take(self.config.lag.samples()).flatten();
+        let waiting = waiting.filter(|entry| entry.validity.is_good());
         let best = |entry: &Entry| i64::from(entry.rate().0) - i64::from(entry.estimate) - i64::from(bias.0);
         waiting.map(best).sum::<i64>() - self.delayed_revisions
     }
@@ -359,16 +374,23 @@ fn emit(
     let bound = if entry.validity.is_good() { i64::from(max_revision.0).max(0) } else { 0 };
     let carried = carried.clamp(-bound, bound);
     let wanted = i64::from(entry.rate().0) - taken - carried;
-    let rate = wanted.clamp(i64::from(i32::MIN), i64::from(i32::MAX));
-    *waiting += rate - wanted - carried;
-    let correction = (i64::from(entry.rate().0) - rate).clamp(i64::from(i32::MIN), i64::from(i32::MAX));
+    let rate = code(wanted);
+    *waiting += i64::from(rate.0) - wanted - carried;
+    let [roll, pitch, _] = entry.rates;
     Compensated {
         tick: entry.tick,
-        rate: AngularRate(rate as i32),
-        correction: AngularRate(correction as i32),
+        rate,
+        correction: code(i64::from(entry.rate().0) - i64::from(rate.0)),
         covered: entry.count > 0,
+        roll_and_pitch: [roll, pitch],
+        withheld: None,
         validity: entry.validity,
     }
+}
+
+/// Saturates at the ends of the code.
+fn code(rate: i64) -> AngularRate {
+    AngularRate(rate.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
 }
 
 /// Returns the mean correction, rounded towards zero.

@@ -1,5 +1,9 @@
 //! An estimate is the corrected yaw rate with its quality; every CAN frame is made from these values alone.
 
+mod accumulated;
+
+pub(crate) use accumulated::AccumulatedYaw;
+
 use crate::health::{Faults, Quality, Source, Status};
 use crate::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
 
@@ -14,7 +18,7 @@ pub struct YawEstimate {
     /// The amount subtracted from the gyro beyond its static bias: the network's estimate, the bias found by zero-rate
     /// updates, revisions of earlier samples.
     pub correction: AngularRate,
-    /// The sum of all these rates since the bias became known, each over a step of the sensor's clock
+    /// The sum of all these rates that may be used since the bias became known, each over a step of the sensor's clock
     /// ([`crate::align::clock_ratio`]).
     pub yaw: Yaw,
     /// The expected error of the mean rate over one second, 1 sigma, once the bias is known.
@@ -29,6 +33,18 @@ pub struct YawEstimate {
     pub faults: Faults,
     /// The time from the sample to the message in microseconds, where it is known.
     pub latency_us: Option<u32>,
+}
+
+impl YawEstimate {
+    /// Takes over, for a mean of both, what it must not lose of an earlier estimate: the worst quality with its status
+    /// and source, the largest sigma, and every fault. An unknown sigma is larger than any.
+    #[must_use]
+    pub fn with_earlier(self, earlier: &Self) -> Self {
+        let worst = if earlier.quality as u8 > self.quality as u8 { *earlier } else { self };
+        let Self { status, source, quality, .. } = worst;
+        let sigma = self.sigma.zip(earlier.sigma).map(|(one, other)| one.max(other));
+        Self { status, source, quality, sigma, faults: self.faults.with(earlier.faults), ..self }
+    }
 }
 
 /// Holds everything that is sent for one sample of the inertial sensor.

@@ -14,21 +14,23 @@ mod initialised;
 mod report;
 mod sensor_bias;
 mod status;
+mod uncertainty;
 mod windows;
 
 pub use config::PipelineConfig;
-pub use report::{Uncertainty, UncertaintyConfig};
+pub use uncertainty::{GyroErrors, Origin, Turning, Uncertainty, UncertaintyConfig};
 pub use windows::DueWindow;
 pub(crate) use windows::Handover;
 
 use crate::align::clock_ratio::ClockRatio;
-use crate::align::{AlignError, Aligner};
+use crate::align::{AlignError, Aligner, MAX_GAP};
 use crate::bias::{StandstillSource, StaticError, StaticInit, ZeroRate, ZeroRateOutcome};
 use crate::compensate::{Compensated, Compensator, Complete, Implausible};
-use crate::estimate::VehicleSample;
+use crate::estimate::{AccumulatedYaw, VehicleSample};
 use crate::health::{BoardFaults, Counters, Faults, count};
 use crate::model::Estimate;
-use crate::sample::{Frame, ImuSample, Standstill, WHEELS, WheelSample};
+use crate::monitor::{AXIS_STUCK_AFTER, STUCK_AFTER};
+use crate::sample::{Frame, ImuSample, Standstill, Validity, WHEELS, WheelSample};
 
 use crate::model::window::{self, Features, WINDOW};
 use crate::units::{AngularRate, Yaw};
@@ -99,18 +101,19 @@ struct State {
     /// Samples for which the vehicle has stood; zero while it moves.
     stood: u32,
     /// The sums of the rates that were sent.
-    live_yaw: Yaw,
-    delayed_yaw: Yaw,
-    /// Grid step of the newest message set.
+    live_yaw: AccumulatedYaw,
+    delayed_yaw: AccumulatedYaw,
+    /// Grid step of the newest message set, and the sets without a sample since the newest one.
     tick: u32,
+    silent: u32,
     /// Samples until the last gap is a whole window in the past.
     gap_within: u32,
-    /// Gaps since the yaw began to accumulate.
-    yaw_gaps: u32,
     /// The newest sample as the networks see it.
     inertial: Option<Features>,
     /// The sensor is mounted differently than in earlier drives.
     moved: bool,
+    /// The newest reading was a repeated one.
+    stuck: bool,
     counters: Counters,
 }
 
@@ -138,13 +141,14 @@ impl Pipeline {
             uncertainty: Uncertainty::new(config.uncertainty),
             wheels_seen: [false; WHEELS],
             stood: 0,
-            live_yaw: Yaw(0),
-            delayed_yaw: Yaw(0),
+            live_yaw: AccumulatedYaw::START,
+            delayed_yaw: AccumulatedYaw::START,
             tick: 0,
+            silent: 0,
             gap_within: 0,
-            yaw_gaps: 0,
             inertial: None,
             moved: false,
+            stuck: false,
             counters: Counters::NONE,
         };
         Self { config, state }
@@ -184,6 +188,13 @@ impl Pipeline {
             count(&mut self.state.counters.invalid, 1);
             self.break_window();
         }
+        let stuck = sample.validity == Validity::Stuck;
+        if stuck && !core::mem::replace(&mut self.state.stuck, stuck) {
+            // The readings before this one were no better.
+            self.state.compensator.distrust(usize::from(STUCK_AFTER) - 1);
+            self.lose(frame.tick, AXIS_STUCK_AFTER.into());
+        }
+        self.state.stuck = stuck;
         let implausible = self.use_estimate(frame.tick);
         let initialised = self.state.initialised.as_mut();
         let quiet = initialised.is_some_and(|known| known.quiet.observe(&frame.sample));
@@ -272,6 +283,8 @@ impl Pipeline {
         if let AlignError::Jump { .. } = error {
             count(&mut self.state.counters.clock_jumps, 1);
             self.state.static_init.restart();
+            let State { tick, silent, .. } = self.state;
+            self.lose(tick.wrapping_sub(silent), MAX_GAP.max(silent));
         } else {
             count(&mut self.state.counters.misplaced, 1);
         }
@@ -281,11 +294,16 @@ impl Pipeline {
         }
     }
 
+    /// Notes that the gap in the yaw that ends after a tick is longer than the grid shows.
+    fn lose(&mut self, after: u32, steps: u32) {
+        self.state.live_yaw.lose(after, steps);
+        self.state.delayed_yaw.lose(after, steps);
+    }
+
     fn gap(&mut self) {
         self.state.gap_within = WINDOW as u32;
         self.break_window();
         if let Some(known) = &mut self.state.initialised {
-            count(&mut self.state.yaw_gaps, 1);
             known.quiet.restart();
             known.zero_rate.as_mut().map(ZeroRate::restart);
         }

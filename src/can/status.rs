@@ -12,9 +12,9 @@
 //! | 10 to 12 | [`Knowledge`] of the sensor's mounting | 7 |
 //! | 13 to 15 | doubts of a second source of the yaw rate | 7 |
 //! | 16 to 23 | gaps in the accumulated yaw since it began; 254 also above | 255 |
-//! | 24 to 39 | doubt of the accumulated yaw, 0.01 deg | 65535 |
+//! | 24 to 39 | expected error of the angle turned in the last minute, 0.01 deg; 65534 also above | 65535 |
 //!
-//! Nothing on the board finds the doubts yet: they are sent as not available.
+//! Nothing on the board finds the doubts of a second source yet: they are sent as not available.
 
 pub use crate::health::slow::{Evidence, Knowledge, SlowStatus, Verdict};
 
@@ -30,9 +30,10 @@ pub const PERIOD_MS: u16 = 1_000;
 const SAMPLES: u8 = 100;
 /// Code of an unknown number of gaps.
 const NO_GAPS: u8 = u8::MAX;
-/// Codes of the doubts, which nothing finds yet.
+/// Code of the doubts of a second source, which nothing finds yet.
 const NO_SOURCE: u64 = 7;
-const NO_DOUBT: u64 = 0xFFFF;
+/// Code of an unknown doubt of the yaw.
+const NO_DOUBT: u16 = u16::MAX;
 
 /// Encodes the message as eight bytes with an empty header.
 #[must_use]
@@ -42,6 +43,11 @@ pub const fn emit(status: &SlowStatus) -> [u8; 8] {
         Some(_) => NO_GAPS - 1,
         None => NO_GAPS,
     };
+    let doubt = match status.doubt {
+        Some(doubt) if doubt < NO_DOUBT as u32 => doubt as u16,
+        Some(_) => NO_DOUBT - 1,
+        None => NO_DOUBT,
+    };
     let bits = status.verdict as u64
         | (status.evidence as u64) << 2
         | (status.bias as u64) << 4
@@ -49,7 +55,7 @@ pub const fn emit(status: &SlowStatus) -> [u8; 8] {
         | (status.mounting as u64) << 10
         | NO_SOURCE << 13
         | (gaps as u64) << 16
-        | NO_DOUBT << 24;
+        | (doubt as u64) << 24;
     (bits << 24).to_le_bytes()
 }
 

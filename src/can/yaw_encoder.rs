@@ -8,8 +8,8 @@
 use super::DataFrame;
 use super::e2e::{Profile, Protector};
 use super::yaw::{
-    AngleMessage, DetailMessage, Faults, Quality, RATE_NOT_AVAILABLE, RateMessage, encode_angle,
-    encode_latency, encode_sigma,
+    AngleMessage, DetailMessage, Quality, RATE_NOT_AVAILABLE, RateMessage, encode_angle, encode_latency,
+    encode_sigma,
 };
 use crate::estimate::YawEstimate;
 use crate::units::AngularRate;
@@ -18,7 +18,8 @@ use embedded_can::{Frame, StandardId};
 /// The encoder of the three yaw messages; it emits one set per `every` samples.
 ///
 /// The rate and the correction are means over those samples: a receiver that multiplies the rate by
-/// the period gets the full angle, whatever the period.
+/// the period gets the full angle, whatever the period. A mean has the worst quality and the largest expected error of
+/// its samples ([`YawEstimate::with_earlier`]).
 #[derive(Debug, Clone, Copy)]
 pub struct YawEncoder {
     protectors: [Protector; 3],
@@ -27,7 +28,8 @@ pub struct YawEncoder {
     samples: u8,
     rate: Mean,
     correction: Mean,
-    faults: Faults,
+    /// What the samples since the last set are worth together.
+    together: Option<YawEstimate>,
 }
 
 impl YawEncoder {
@@ -42,7 +44,7 @@ impl YawEncoder {
             samples: 0,
             rate: Mean::new(Scale::MICRO_DEG_PER_SEC),
             correction: Mean::new(Scale::FIFTH_MILLI_DEG_PER_SEC),
-            faults: Faults::NONE,
+            together: None,
         }
     }
 
@@ -57,14 +59,16 @@ impl YawEncoder {
     pub fn encode(&mut self, sample: &YawEstimate) -> Option<[[u8; 8]; 3]> {
         self.rate.sum += i64::from(sample.rate.0);
         self.correction.sum += i64::from(sample.correction.0);
-        // A fault that lasts one sample must be reported even if no message is due with it.
-        self.faults = self.faults.with(sample.faults);
+        let sample = match &self.together {
+            Some(earlier) => sample.with_earlier(earlier),
+            None => *sample,
+        };
         self.samples += 1;
         if self.samples < self.every {
+            self.together = Some(sample);
             return None;
         }
-        self.samples = 0;
-        let faults = core::mem::take(&mut self.faults);
+        (self.samples, self.together) = (0, None);
         let rate = self.rate.take(self.every);
         let correction = self.correction.take(self.every);
         let rate = match sample.quality {
@@ -82,7 +86,7 @@ impl YawEncoder {
         let correction = self.limit(correction);
         let messages = [
             RateMessage { rate, source: sample.source, quality: sample.quality }.emit(),
-            AngleMessage { yaw: encode_angle(sample.yaw), faults }.emit(),
+            AngleMessage { yaw: encode_angle(sample.yaw), faults: sample.faults }.emit(),
             DetailMessage {
                 correction,
                 sigma: encode_sigma(sample.sigma),

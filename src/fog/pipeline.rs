@@ -26,7 +26,7 @@ use super::{EarthAndBias, FogConfig, FogCorrector, FogNetUse, FogOutput, Increme
 use crate::align::clock::ClockError;
 use crate::align::fog_grid::FogGrid;
 use crate::bias::Latitude;
-use crate::estimate::YawEstimate;
+use crate::estimate::{AccumulatedYaw, YawEstimate};
 use crate::health::{Faults, Quality, Source, Status, count};
 use crate::model::fognet::FogEstimate;
 use crate::model::seconds::{FogFrame, SecondsWindow};
@@ -108,7 +108,7 @@ pub struct FogPipeline {
     has_network: bool,
     rate: IncrementRate,
     correction: IncrementRate,
-    yaw: Yaw,
+    yaw: AccumulatedYaw,
     repeats: Repeats,
     /// An increment of the next step was stuck.
     stuck_in_step: bool,
@@ -136,7 +136,7 @@ impl FogPipeline {
             has_network,
             rate: IncrementRate::START,
             correction: IncrementRate::START,
-            yaw: Yaw(0),
+            yaw: AccumulatedYaw::START,
             repeats: Repeats::NONE,
             stuck_in_step: false,
             due: None,
@@ -242,8 +242,7 @@ impl FogPipeline {
             }
             _ => (AngularRate::ZERO, AngularRate::ZERO),
         };
-        self.yaw.0 = self.yaw.0.wrapping_add(i64::from(rate.0));
-        let (tick, yaw) = ((step.time.0 / PERIOD_US) as u32, self.yaw);
+        let tick = (step.time.0 / PERIOD_US) as u32;
         let [standing, moving] = self.shake;
         let shake = if standstill == Standstill::Still { standing } else { moving };
         // FoGNet reports no uncertainty, so everything that it changes counts as a possible error.
@@ -252,7 +251,11 @@ impl FogPipeline {
         let changed = changed as f32 * (RATE_HZ as f32 / Angle::PER_RAD);
         let spread = sqrt(shake * shake + changed * changed);
         let sigma = turn.is_some().then(|| self.earth_and_bias.sigma(rate, spread));
-        Some(YawEstimate { tick, rate, correction, yaw, sigma, status, source, quality, faults, latency_us })
+        let yaw = Yaw(0);
+        let mut estimate =
+            YawEstimate { tick, rate, correction, yaw, sigma, status, source, quality, faults, latency_us };
+        self.yaw.add(&mut estimate, i64::from(rate.0));
+        Some(estimate)
     }
 
     /// Notes that FoGNet's weights are unavailable: later rates are computed without FoGNet and report that.

@@ -53,4 +53,7 @@ pub struct SlowStatus {
     pub mounting: Knowledge,
     /// Gaps in the accumulated yaw; `None` before it begins.
     pub gaps: Option<u32>,
+    /// Expected error (1 sigma) of the angle that the accumulated yaw has turned in the last minute, 0.01 deg, gaps
+    /// included; `None` before it begins.
+    pub doubt: Option<u32>,
 }

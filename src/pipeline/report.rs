@@ -1,17 +1,11 @@
 //! The estimates that are sent, built from compensated rates: yaw, expected error, status, faults, the other axes.
-//!
-//! The number sent with each rate is the expected error of the mean rate over one second, 1 sigma: over a single sample
-//! vibration outweighs every other error, and no car changes its heading much in 10 ms. Its two parts are taken as
-//! independent: the network's, from the error that it predicts for its windows ([`crate::model::Estimate::scale`]), and
-//! the bias's, from the zero-rate updates.
 
-use super::{BoardState, Pipeline, Rates};
+use super::{BoardState, Origin, Pipeline, Rates, Turning};
 use crate::bias::ZeroRate;
 use crate::compensate::Compensated;
 use crate::estimate::{VehicleSample, YawEstimate};
 use crate::health::{Faults, Status, judge};
-use crate::sample::{Frame, ImuSample, PERIOD_US, Validity, WheelSample};
-use crate::sqrt::sqrt;
+use crate::sample::{Frame, PERIOD_US, Validity, WheelSample};
 use crate::units::{AngularRate, Yaw};
 
 impl Pipeline {
@@ -24,27 +18,33 @@ impl Pipeline {
         wheels: Option<&WheelSample>,
         board: &BoardState,
     ) -> VehicleSample {
-        self.state.tick = frame.tick;
-        let faults = self.faults(&frame.sample, wheels, board);
+        (self.state.tick, self.state.silent) = (frame.tick, 0);
+        let faults = self.faults(wheels, board);
         let accepted = self.state.windows.is_accepted();
-        let live = self.estimate(
-            frame,
-            rates.live,
-            rates.early_sigma,
-            board,
-            |_| accepted,
-            |pipeline| &mut pipeline.state.live_yaw,
-        );
+        let early = rates.early_sigma;
+        let mut live = self.estimate(frame, rates.live, early, board, |_| accepted);
+        let is_calibrated = self.is_calibrated();
+        self.state.uncertainty.calibrated(is_calibrated);
         let covered = |rate: &Compensated| rate.covered || accepted;
-        let delayed = self.estimate(frame, rates.delayed, rates.early_sigma, board, covered, |pipeline| {
-            &mut pipeline.state.delayed_yaw
-        });
+        let mut delayed = self.estimate(frame, rates.delayed, early, board, covered);
+        for estimate in [&mut live, &mut delayed] {
+            estimate.faults = estimate.faults.with(faults);
+        }
+        let [live_turn, delayed_turn] =
+            [&live, &delayed].map(|estimate| board.clock_ratio.turned(estimate.rate));
+        self.state.live_yaw.add(&mut live, live_turn);
+        let missed = self.state.delayed_yaw.add(&mut delayed, delayed_turn);
+        self.state.uncertainty.miss(missed);
+        if delayed.sigma.is_some() {
+            let turning = self.turning(frame, rates, delayed.status);
+            self.state.uncertainty.add(&turning);
+        }
         let raw = frame.sample.angular_rate;
         let known = self.state.initialised.as_ref();
         let [roll_rate, pitch_rate, _] = known.map_or(raw, |known| known.zero.less(raw));
         VehicleSample {
-            live: YawEstimate { faults, ..live },
-            delayed: YawEstimate { faults, ..delayed },
+            live,
+            delayed,
             roll_rate,
             pitch_rate,
             specific_force: frame.sample.specific_force,
@@ -58,6 +58,7 @@ impl Pipeline {
     #[must_use]
     pub fn silent(&mut self, steps: u32, board: &BoardState) -> VehicleSample {
         self.state.tick = self.state.tick.wrapping_add(steps);
+        self.state.silent = self.state.silent.saturating_add(steps);
         let status = Status::Silent;
         let (source, quality) = judge(status);
         let faults = board.faults.faults().with(Faults::GAP);
@@ -71,20 +72,19 @@ impl Pipeline {
             ..YawEstimate::default()
         };
         VehicleSample {
-            live: yaw(self.state.live_yaw),
-            delayed: yaw(self.state.delayed_yaw),
+            live: yaw(self.state.live_yaw.yaw()),
+            delayed: yaw(self.state.delayed_yaw.yaw()),
             tick: self.state.tick,
             ..VehicleSample::default()
         }
     }
 
-    /// Returns the faults that hold for this sample.
-    fn faults(&self, sample: &ImuSample, wheels: Option<&WheelSample>, board: &BoardState) -> Faults {
+    /// Returns the faults that hold now, whichever sample a message is of.
+    fn faults(&self, wheels: Option<&WheelSample>, board: &BoardState) -> Faults {
         let contradicted = self.zero_rate().is_some_and(ZeroRate::contradicted);
         self.state
             .windows
             .faults()
-            .with(Faults::of(sample.validity))
             .with(Faults::GAP.when(self.state.gap_within > 0))
             .with(
                 Faults::IMPLAUSIBLE.when(self.state.moved || self.state.compensator.revisions_exceed_limit()),
@@ -100,16 +100,32 @@ impl Pipeline {
         speeds.iter().all(Option::is_none) || speeds.iter().zip(self.state.wheels_seen).any(lost)
     }
 
-    /// Builds the estimate of one rate. Until a rate exists the estimate carries the gyro's own reading, with the
-    /// sigma of the bias curve where there is one.
+    /// Returns the sigma of the bias, rad/s: `early` before static initialisation.
+    fn bias_sigma(&self, early: Option<f32>) -> f32 {
+        early.unwrap_or_else(|| self.zero_rate().map_or(0.0, ZeroRate::sigma))
+    }
+
+    /// Returns what a delayed rate contributes to the expected error; before there is one, the reading itself.
+    fn turning(&self, frame: &Frame, rates: &Rates, status: Status) -> Turning {
+        let (rate, bias) = (rates.delayed.as_ref(), self.bias_sigma(rates.early_sigma));
+        let origin = origin(status, rate);
+        let Some(Compensated { rate, roll_and_pitch: [roll, pitch], withheld, .. }) = rate else {
+            let (rates, withheld) = (frame.sample.angular_rate, AngularRate::ZERO);
+            return Turning { rates, withheld, origin, bias };
+        };
+        let withheld = withheld.unwrap_or(AngularRate::ZERO);
+        Turning { rates: [*roll, *pitch, *rate], withheld, origin, bias }
+    }
+
+    /// Builds the estimate of one rate, without its yaw and with the fault of its own sample alone. Until a rate exists
+    /// the estimate carries the gyro's own reading, with the sigma of the bias curve where there is one.
     fn estimate(
-        &mut self,
+        &self,
         frame: &Frame,
         rate: Option<Compensated>,
         early_sigma: Option<f32>,
         board: &BoardState,
         estimated: impl Fn(&Compensated) -> bool,
-        yaw: impl Fn(&mut Self) -> &mut Yaw,
     ) -> YawEstimate {
         let estimated = rate.as_ref().is_some_and(estimated);
         let validity = rate.map_or(frame.sample.validity, |rate| rate.validity);
@@ -120,83 +136,32 @@ impl Pipeline {
             Validity::Good if estimated => Status::Ready,
             Validity::Good => Status::Degraded,
         };
-        let [.., raw] = frame.sample.angular_rate;
-        let used = rate.map(|rate| rate.rate).or_else(|| early_sigma.map(|_| raw));
-        let bias = early_sigma.unwrap_or_else(|| self.zero_rate().map_or(0.0, ZeroRate::sigma));
-        let sigma = used.map(|_| self.state.uncertainty.sigma(estimated, bias));
-        let turned = used.map_or(0, |rate| board.clock_ratio.turned(rate));
-        let yaw = yaw(self);
-        yaw.0 = yaw.0.wrapping_add(turned);
-        let yaw = *yaw;
-        let tick = rate.map_or(frame.tick, |rate| rate.tick);
         let (source, quality) = judge(status);
+        let [.., raw] = frame.sample.angular_rate;
+        let tick = rate.map_or(frame.tick, |rate| rate.tick);
+        let bias = self.bias_sigma(early_sigma);
+        let has_sigma = matches!(status, Status::Ready | Status::Degraded);
         YawEstimate {
             tick,
-            rate: used.unwrap_or(raw),
+            rate: rate.map_or(raw, |rate| rate.rate),
             correction: rate.map_or(AngularRate::ZERO, |rate| rate.correction),
-            yaw,
-            sigma,
+            yaw: Yaw(0),
+            sigma: has_sigma.then(|| self.state.uncertainty.sigma(origin(status, rate.as_ref()), bias)),
             status,
             source,
             quality: board.faults.cap_quality(quality),
-            faults: Faults::NONE,
+            faults: Faults::of(validity),
             // From sample to sample: the pipeline has no clock to measure its own time.
             latency_us: Some(frame.tick.wrapping_sub(tick).saturating_mul(PERIOD_US as u32)),
         }
     }
 }
 
-/// Holds the factors that turn the network's predicted error into the error over a second.
-#[derive(Debug, Clone, Copy)]
-pub struct UncertaintyConfig {
-    /// Sigma of a second's error over the RMS of the scales of its windows.
-    pub per_scale: f32,
-    /// Sigma of a second that the network has not corrected, rad/s.
-    pub uncorrected: f32,
-}
-
-impl UncertaintyConfig {
-    /// These factors were calibrated on the validation drive alone (`cargo gyronet evaluate --ablation`).
-    pub const DEFAULT: Self = Self { per_scale: 0.25, uncorrected: 2.5e-4 };
-}
-
-/// The network's predicted error is averaged over this many windows: about a second at the default stride.
-const WINDOWS: f32 = 20.0;
-
-/// Tracks the expected error of the corrected rate.
-#[derive(Debug, Clone)]
-pub struct Uncertainty {
-    config: UncertaintyConfig,
-    /// Running mean square of the windows' scales, (rad/s)^2.
-    scale_square: Option<f32>,
-}
-
-impl Uncertainty {
-    /// Creates the state before the first window.
-    #[must_use]
-    pub const fn new(config: UncertaintyConfig) -> Self {
-        Self { config, scale_square: None }
-    }
-
-    /// Adds the error that the network predicts for a window.
-    pub fn window(&mut self, scale: AngularRate) {
-        let scale = scale.0 as f32 / AngularRate::PER_RAD_PER_SEC;
-        let square = scale * scale;
-        let before = self.scale_square.unwrap_or(square);
-        self.scale_square = Some(before + (square - before) / WINDOWS);
-    }
-
-    /// Returns the sigma of a rate, rounded up, from the `bias` sigma in rad/s; a rate not `corrected` by the network
-    /// has a fixed sigma in place of the network's.
-    #[must_use]
-    pub fn sigma(&self, corrected: bool, bias: f32) -> AngularRate {
-        let UncertaintyConfig { per_scale, uncorrected } = self.config;
-        let own = match self.scale_square {
-            Some(scale_square) if corrected => per_scale * per_scale * scale_square,
-            _ => uncorrected * uncorrected,
-        };
-        let sigma = sqrt(own + bias * bias);
-        // Beyond the code's range the cast saturates.
-        AngularRate(libm::ceilf(sigma * AngularRate::PER_RAD_PER_SEC) as i32)
+/// Returns how a usable rate was found.
+fn origin(status: Status, rate: Option<&Compensated>) -> Origin {
+    match (rate.and_then(|rate| rate.withheld), status) {
+        (Some(_), _) => Origin::Standstill,
+        (None, Status::Ready) => Origin::Network,
+        (None, _) => Origin::Gyro,
     }
 }

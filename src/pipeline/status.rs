@@ -17,11 +17,24 @@ impl Pipeline {
             (false, true) => Knowledge::Coarse,
             (false, false) => Knowledge::Unknown,
         };
-        let is_mapped = self.config.gyro_map != GyroMap::IDENTITY;
-        let gain = if is_mapped { Knowledge::Fine } else { Knowledge::Unknown };
+        let gain = if self.is_calibrated() { Knowledge::Fine } else { Knowledge::Unknown };
         let mounting = if self.state.moved { Knowledge::Refused } else { self.config.forward };
-        let gaps = known.then_some(self.state.yaw_gaps);
-        SlowStatus { verdict, evidence, bias, gain, mounting, gaps }
+        let gaps = self.state.delayed_yaw.gaps();
+        let doubt = gaps.map(|_| self.yaw_doubt());
+        SlowStatus { verdict, evidence, bias, gain, mounting, gaps, doubt }
+    }
+
+    /// Whether this unit's gain and misalignment are known.
+    pub(super) fn is_calibrated(&self) -> bool {
+        self.config.gyro_map != GyroMap::IDENTITY
+    }
+
+    /// The expected error of the angle turned in the last minute, 0.01 deg, rounded up.
+    fn yaw_doubt(&self) -> u32 {
+        let lag = self.config.compensate.lag.samples() as u32;
+        let missing = self.state.delayed_yaw.missing(self.state.tick.wrapping_sub(lag));
+        // Beyond the code's range the cast saturates.
+        libm::ceilf(self.state.uncertainty.minute(missing).to_degrees() * 100.0) as u32
     }
 
     fn standstill(&self, wheels: Option<Standstill>) -> (Verdict, Evidence) {

@@ -131,7 +131,8 @@ fn a_first_stop_shows_the_bias_at_its_own_temperature() {
         last = Some(pipeline.correct(sample, Some(&wheels), &BoardState::GOOD).expect("a place on the grid"));
     }
     assert!(pipeline.gyro_bias().is_some(), "it has stood");
-    let sigma = bias_sigma(&last.expect("samples"));
+    // Nothing but the bias is uncertain at standstill.
+    let sigma = last.expect("samples").vehicle.delayed.sigma.expect("known").rad_per_sec();
     assert!(sigma < 3e-4, "{sigma}: none of the 30 K is left in it");
 }
 

@@ -222,18 +222,24 @@ fn the_slow_status_means_what_the_file_says() {
         named("GainKnowledge", &status.gain);
         named("MountingKnowledge", &status.mounting);
         assert_eq!(decoded["YawGaps"].0, gaps);
+        let doubt = status.doubt.map_or(0xFFFF, |doubt| i64::from(doubt.min(0xFFFE)));
+        assert_eq!(decoded["YawDoubt"].0, doubt);
+        close(decoded["YawDoubt"].1, doubt as f64 * 0.01, 1e-9);
         // What nothing finds yet is not available.
-        assert_eq!((decoded["SecondSourceDoubt"].0, decoded["YawDoubt"].0), (7, 0xFFFF));
-        close(decoded["YawDoubt"].1, 655.35, 1e-9);
+        assert_eq!(decoded["SecondSourceDoubt"].0, 7);
     };
     for (gaps, code) in [(None, 255), (Some(0), 0), (Some(253), 253), (Some(254), 254), (Some(u32::MAX), 254)]
     {
-        check(SlowStatus { gaps, ..SlowStatus::default() }, code);
+        let doubt = gaps.map(|gaps: u32| gaps.saturating_mul(257));
+        check(SlowStatus { gaps, doubt, ..SlowStatus::default() }, code);
     }
     for k in 0..12 {
         let [bias, gain, mounting] = [k, k / 2, k / 3].map(|k| knowledge[k % 4]);
         let (verdict, evidence) = (verdicts[k % 3], evidence[k / 4]);
-        check(SlowStatus { verdict, evidence, bias, gain, mounting, gaps: Some(k as u32) }, k as i64);
+        check(
+            SlowStatus { verdict, evidence, bias, gain, mounting, gaps: Some(k as u32), doubt: Some(1) },
+            k as i64,
+        );
     }
 }
 

@@ -50,6 +50,7 @@ mod store_power_cut;
 mod supervisor;
 mod transmit_queue;
 mod uncertainty;
+mod validity;
 mod wheel_input;
 mod window_model;
 mod xsens;

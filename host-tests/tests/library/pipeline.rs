@@ -105,7 +105,8 @@ fn clipping_is_a_failure_until_it_is_over() {
     for output in &outputs[400..403] {
         assert_eq!(output.vehicle.live.quality, Quality::Unusable);
     }
-    assert_eq!(faults(&outputs), [(Faults::NONE, 400), (Faults::CLIPPED, 3), (Faults::NONE, 97)]);
+    // With the delayed rates of these samples.
+    assert_eq!(faults(&outputs), [(Faults::NONE, 407), (Faults::CLIPPED, 3), (Faults::NONE, 90)]);
     assert_eq!(pipeline.counters().invalid, 3);
 }
 

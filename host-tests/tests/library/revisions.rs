@@ -48,7 +48,8 @@ impl Sample {
 impl Ledger {
     /// The best rates of all samples as known now, summed.
     fn best(&self) -> i64 {
-        self.samples.values().map(|sample| sample.gyro - sample.estimate()).sum()
+        let usable = self.samples.values().filter(|sample| !sample.clipped);
+        usable.map(|sample| sample.gyro - sample.estimate()).sum()
     }
 
     /// The part of a sample's correction that is known with it.
@@ -129,10 +130,9 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
             std::array::from_fn(|k| AngularRate(sample.angular_rate[k].0 - bias[k].0));
         let (gyro, steady) = (i64::from(rates[2].0), ledger.steady(rates));
         ledger.samples.insert(live.tick, Sample { gyro, clipped, steady, estimates: Vec::new() });
-        ledger.live += i64::from(live.rate.0);
-        if delayed.status != Status::Init {
-            ledger.delayed += i64::from(delayed.rate.0);
-        }
+        let usable = |status| status != Status::Init && status != Status::Clipped;
+        ledger.live += if usable(live.status) { i64::from(live.rate.0) } else { 0 };
+        ledger.delayed += if usable(delayed.status) { i64::from(delayed.rate.0) } else { 0 };
         if noise.int(0, 19) == 0 {
             let Pending { live: Yaw(live_pending), delayed: Yaw(delayed_pending) } = pipeline.pending();
             assert_eq!(ledger.live + live_pending, ledger.best(), "at tick {}", live.tick);

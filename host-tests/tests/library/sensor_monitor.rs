@@ -89,9 +89,9 @@ fn stuck_from_the_seventh_equal_sample_to_the_first_that_differs() {
         assert_eq!(set.live.status == Status::Stuck, stuck, "sample {tick}");
         assert_eq!(set.live.quality == Quality::Unusable, stuck);
         // Nobody runs the network here.
-        let late = set.delayed.faults.contains(Faults::LATE);
+        let late = set.live.faults.contains(Faults::LATE);
         let stuck = if stuck { Faults::STUCK } else { Faults::NONE };
-        assert_eq!(set.delayed.faults, stuck.with(if late { Faults::LATE } else { Faults::NONE }));
+        assert_eq!(set.live.faults, stuck.with(if late { Faults::LATE } else { Faults::NONE }));
     }
     let moved = idling(440, 0.001, &mut noise);
     assert_eq!(sample(&mut coprocessor, moved, 440).vehicle.live.status, Status::Degraded);

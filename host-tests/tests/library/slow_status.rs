@@ -46,8 +46,18 @@ fn run(
     found
 }
 
+/// The frame says this; the doubt of the yaw, which it alone says, is known when the yaw has begun.
 fn assert_says(frame: &DataFrame, status: SlowStatus) {
+    let doubt = Some(doubt(frame)).filter(|doubt| *doubt != u32::from(u16::MAX));
+    assert_eq!(doubt.is_some(), status.gaps.is_some());
+    let status = SlowStatus { doubt, ..status };
     assert_eq!(frame.data()[3..], emit(&status)[3..], "not {status:?}");
+}
+
+/// The expected error of the angle turned in the last minute, 0.01 deg.
+fn doubt(frame: &DataFrame) -> u32 {
+    let [.., low, high] = *frame.data() else { panic!("eight bytes") };
+    u16::from_le_bytes([low, high]).into()
 }
 
 #[test]
@@ -82,6 +92,34 @@ fn it_says_what_the_board_knows() {
     let frames = run(&mut board, 925..1_900, None);
     let moved = SlowStatus { gaps: Some(2), mounting: Knowledge::Refused, ..still };
     assert_says(frames.last().expect("the newest"), moved);
+}
+
+#[test]
+fn a_silence_is_a_doubt_while_it_lasts_and_for_a_minute() {
+    let mut board = coprocessor(Some(StatusSettings { id: STATUS_ID }), false);
+    let before = doubt(run(&mut board, 0..1_000, None).last().expect("the newest"));
+    assert!(before < 100, "{before}: 1 deg");
+    let mut found = Vec::new();
+    for millisecond in 0..4_000 {
+        let mut sink = |sent: TimedFrame| {
+            if matches!(sent.frame.id(), Id::Standard(id) if id.as_raw() == STATUS_ID) {
+                found.push(doubt(&sent.frame));
+            }
+        };
+        board.poll(Micros(10_010_000 + millisecond * 1_000), &mut sink).expect("time goes on");
+    }
+    // In 4 s a vehicle's rate walks by 0.2 x 4^1.5 / 3^0.5 rad: 53 deg.
+    assert!(
+        found.is_sorted() && (2_500..5_500).contains(found.last().expect("in four seconds")),
+        "{found:?}"
+    );
+    // The grid begins again with the first sample.
+    let sample = idling(1_400, 0.001, &mut Noise::new(8));
+    assert!(board.imu(sample, Micros(14_010_000), &mut ()).is_err());
+    let frames = run(&mut board, 1_401..1_500, None);
+    assert!(doubt(frames.last().expect("the newest")) >= *found.last().expect("not empty"));
+    let frames = run(&mut board, 1_500..8_100, None);
+    assert!(doubt(frames.last().expect("the newest")) < 300, "over");
 }
 
 #[test]

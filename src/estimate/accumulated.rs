@@ -1,0 +1,83 @@
+//! The accumulated yaw: the sum of the rates that may be used, the gaps in it, and how much may be missing.
+//!
+//! A rate that may not be used is not added: the yaw keeps its value, as across steps without a sample. What the
+//! vehicle has turned meanwhile is missing from the yaw for good. With the rates w before and after a gap of T seconds,
+//! taken as a random walk between them, the missing angle has a variance of (max |w| T)^2 + q^2 T^3 / 3.
+
+use super::YawEstimate;
+use crate::health::Quality;
+use crate::sample::RATE_HZ;
+use crate::units::{AngularRate, Yaw};
+
+/// Random walk q of a vehicle's yaw rate, rad/s per square root of a second.
+const WALK: f32 = 0.2;
+
+/// A rate's accumulated yaw.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct AccumulatedYaw {
+    yaw: Yaw,
+    gaps: u32,
+    /// Tick and rate of the newest step in the yaw.
+    newest: Option<(u32, AngularRate)>,
+    /// The tick after which the next gap ends, and the steps by which it is longer than the ticks show.
+    hidden: Option<(u32, u32)>,
+}
+
+impl AccumulatedYaw {
+    /// The yaw before the first usable rate.
+    pub(crate) const START: Self = Self { yaw: Yaw(0), gaps: 0, newest: None, hidden: None };
+
+    /// Adds the angle `turned` in a step, a code of [`Yaw`], unless its estimate may not be used; sets the estimate's
+    /// yaw. Returns the variance of the angle that a gap before this step has left out, rad^2.
+    pub(crate) fn add(&mut self, estimate: &mut YawEstimate, turned: i64) -> f32 {
+        let mut missed = 0.0;
+        if matches!(estimate.quality, Quality::Good | Quality::Degraded) {
+            self.yaw.0 = self.yaw.0.wrapping_add(turned);
+            let YawEstimate { tick, rate, .. } = *estimate;
+            if let Some((last, before)) = self.newest.replace((tick, rate)) {
+                let hidden = self.hidden.take_if(|(after, _)| is_later(tick, *after));
+                let between = tick.wrapping_sub(last).saturating_sub(1);
+                let steps = between.saturating_add(hidden.map_or(0, |(_, steps)| steps));
+                self.gaps = self.gaps.saturating_add(u32::from(steps > 0));
+                missed = variance(steps, before.0.unsigned_abs().max(rate.0.unsigned_abs()));
+            }
+        }
+        estimate.yaw = self.yaw;
+        missed
+    }
+
+    /// Lengthens the gap that ends with the first usable rate after a tick, by steps of which the ticks know nothing.
+    pub(crate) fn lose(&mut self, after: u32, steps: u32) {
+        let before = self.hidden.map_or(0, |(_, steps)| steps);
+        self.hidden = Some((after, before.saturating_add(steps)));
+    }
+
+    /// The yaw now.
+    pub(crate) fn yaw(&self) -> Yaw {
+        self.yaw
+    }
+
+    /// The number of gaps; `None` before the yaw begins.
+    pub(crate) fn gaps(&self) -> Option<u32> {
+        self.newest.map(|_| self.gaps)
+    }
+
+    /// The variance of the angle that is missing in a gap that has lasted until `tick`, rad^2.
+    pub(crate) fn missing(&self, tick: u32) -> f32 {
+        let Some((last, before)) = self.newest else { return 0.0 };
+        let steps = if is_later(tick, last) { tick.wrapping_sub(last) } else { 0 };
+        let hidden = self.hidden.map_or(0, |(_, steps)| steps);
+        variance(steps.saturating_add(hidden), before.0.unsigned_abs())
+    }
+}
+
+fn is_later(tick: u32, than: u32) -> bool {
+    tick.wrapping_sub(than) as i32 > 0
+}
+
+/// The variance of the angle turned in `steps` that no rate covers, rad^2; `rate` is the larger of those around them.
+fn variance(steps: u32, rate: u32) -> f32 {
+    let seconds = steps as f32 / RATE_HZ as f32;
+    let turned = rate as f32 / AngularRate::PER_RAD_PER_SEC * seconds;
+    turned * turned + WALK * WALK / 3.0 * seconds * seconds * seconds
+}
