@@ -44,7 +44,7 @@ use crate::model::fognet::FogEstimate;
 use crate::model::seconds::SecondsWindow;
 use crate::monitor::SensorMonitor;
 use crate::pipeline::{BoardState, Handover, Pipeline};
-use crate::sample::{FogSample, ImuSample, WheelSample};
+use crate::sample::{FogSample, Frame, ImuSample, NO_STAMP, WheelSample};
 use crate::units::{CentiCelsius, Micros};
 use clock::Timeline;
 
@@ -121,39 +121,65 @@ impl Coprocessor {
         }
     }
 
-    /// Processes a sample of the inertial sensor that arrived at `now`; its frames go to `sink`.
+    /// Processes a sample of the inertial sensor that arrived at `now`, and returns the newest step of 10 ms that it
+    /// completes: at more than 100 samples a second most complete none, at fewer some complete several, of which those that
+    /// wait for an estimate follow with [`Coprocessor::poll`]. Frames and observations of all of them go to `sink`.
     ///
     /// # Errors
-    /// [`InputError::Imu`] when its time stamp has no place on the grid, [`InputError::ClockWentBack`]. The sample is
-    /// counted and not used, and no frame is sent for it; the samples that follow report a gap.
+    /// [`InputError::Imu`] when its time stamp or the sensor's rate cannot be used, [`InputError::ClockWentBack`]. The
+    /// sample is counted and not used, and no frame is sent for it; the samples that follow report a gap.
     pub fn imu(
         &mut self,
         sample: ImuSample,
         now: Micros,
         sink: &mut impl Sink,
-    ) -> Result<Observation, InputError> {
-        let observation = self.correct(sample, now, sink);
+    ) -> Result<Option<Observation>, InputError> {
+        let observation = self.add(sample, now, sink);
         self.step_fog(sink);
         observation
     }
 
-    // Not inlined, so that its large frame is gone before the step of the fibre-optic gyro.
-    #[inline(never)]
-    fn correct(
+    fn add(
         &mut self,
         sample: ImuSample,
         now: Micros,
         sink: &mut impl Sink,
-    ) -> Result<Observation, InputError> {
+    ) -> Result<Option<Observation>, InputError> {
         let now = self.advance(now)?;
+        let sample = ImuSample { time: if sample.time == NO_STAMP { now } else { sample.time }, ..sample };
         self.timeline.sample = sample.time;
-        let wheels = self.poll_wheels();
         self.temperature = sample.temperature.or(self.temperature);
-        let validity = self.monitor.judge(&sample);
-        let sample = ImuSample { validity, temperature: self.temperature, ..sample };
-        let board = self.board_state();
-        let output = self.pipeline.correct(sample, wheels.as_ref(), &board).map_err(InputError::Imu)?;
+        while let Some(frame) = self.pipeline.next_frame() {
+            self.correct(frame, now, sink);
+        }
+        self.pipeline.add(sample).map_err(InputError::Imu)?;
+        // The caller has seen that the first one is ready.
+        let first = self.pipeline.next_frame().map(|frame| self.correct(frame, now, sink));
+        let newest = self.correct_ready(now, sink).or(first);
         self.monitor.heard(sample.time, now);
+        Ok(newest)
+    }
+
+    /// Corrects the steps that need no estimate that is still being computed.
+    fn correct_ready(&mut self, now: Micros, sink: &mut impl Sink) -> Option<Observation> {
+        let mut newest = None;
+        while !self.handover.must_wait(self.pipeline.tick(), now)
+            && let Some(frame) = self.pipeline.next_frame()
+        {
+            newest = Some(self.correct(frame, now, sink));
+        }
+        newest
+    }
+
+    // Not inlined, so that its large frame is gone before the step of the fibre-optic gyro.
+    #[inline(never)]
+    fn correct(&mut self, mut frame: Frame, now: Micros, sink: &mut impl Sink) -> Observation {
+        let wheels = self.poll_wheels();
+        frame.sample.validity = self.monitor.judge(&frame.sample);
+        frame.sample.temperature = self.temperature;
+        let sample = frame.sample;
+        let board = self.board_state();
+        let output = self.pipeline.step(frame, wheels.as_ref(), &board);
         self.send(&output.vehicle, sample.time, sink);
         if let Some(window) = &output.window {
             let replaced = self.handover.offer(window, now);
@@ -161,7 +187,10 @@ impl Coprocessor {
         }
         let (complete, refused) = (output.complete, output.refused);
         let wheels = wheels.unwrap_or_default();
-        Ok(Observation { sample: Some(sample), vehicle: output.vehicle, wheels, complete, refused })
+        let observation =
+            Observation { sample: Some(sample), vehicle: output.vehicle, wheels, complete, refused };
+        sink.observed(&observation);
+        observation
     }
 
     /// Counts an input of the inertial sensor that was not a valid sample.
@@ -226,27 +255,31 @@ impl Coprocessor {
         }
     }
 
-    /// Does the work that is due at `now` without an input: it sends the messages of silent sensors to `sink`.
+    /// Does the work that is due at `now` without an input: it sends the messages of silent sensors, and of steps that
+    /// have waited for an estimate, to `sink`.
     ///
     /// # Errors
     /// [`InputError::ClockWentBack`]; the error is counted.
     pub fn poll(&mut self, now: Micros, sink: &mut impl Sink) -> Result<Option<Observation>, InputError> {
         let now = self.advance(now)?;
+        let waited = self.correct_ready(now, sink);
         let observation = self.monitor.poll(now).map(|steps| {
             let vehicle = self.pipeline.silent(steps, &self.board_state());
             self.send(&vehicle, self.monitor.time_at(now), sink);
             let wheels = self.poll_wheels().unwrap_or_default();
-            Observation { sample: None, vehicle, wheels, complete: None, refused: None }
+            let observation = Observation { sample: None, vehicle, wheels, complete: None, refused: None };
+            sink.observed(&observation);
+            observation
         });
         self.step_fog(sink);
-        Ok(observation)
+        Ok(observation.or(waited))
     }
 
     /// Returns whether the next sample of the inertial sensor can be processed at `now`. If not, the sample needs an
     /// estimate that is still being computed: leave it in its buffer. The sensor does not count as silent meanwhile.
     pub fn is_ready(&mut self, now: Micros) -> bool {
         let now = self.timeline.at(now);
-        let waits = self.handover.must_wait(self.pipeline.tick(), now);
+        let waits = self.pipeline.is_step_due() && self.handover.must_wait(self.pipeline.tick(), now);
         if waits {
             self.monitor.hold(now);
         }
@@ -372,7 +405,7 @@ impl Coprocessor {
         let stored = self.storage.damaged || !self.handover.has_network();
         let configuration_lost = self.storage.configuration_lost;
         let bus = self.bus.is_off || self.bus.lost != self.bus.reported;
-        let clock = self.monitor.is_clock_off();
+        let clock = self.monitor.is_clock_off() || self.pipeline.is_rate_refused();
         let faults = BoardFaults { bus, clock, stored, configuration_lost };
         BoardState { faults, clock_ratio: self.monitor.clock_ratio() }
     }

@@ -141,7 +141,7 @@ impl Faults {
 pub struct BoardFaults {
     /// Frames were lost on the bus, or the controller is off it.
     pub bus: bool,
-    /// The clock of the inertial sensor is too far off the board's.
+    /// The clock of the inertial sensor is too far off the board's, or it sends too few or too many samples a second.
     pub clock: bool,
     /// Weights, configuration or calibration are damaged.
     pub stored: bool,
@@ -162,10 +162,14 @@ impl BoardFaults {
             .with(Faults::IMPLAUSIBLE.when(self.clock))
     }
 
-    /// Caps a quality at degraded where the configuration is lost.
+    /// Caps a quality at degraded where the configuration is lost, or the sensor's clock is off.
     #[must_use]
     pub const fn cap_quality(self, quality: Quality) -> Quality {
-        if self.configuration_lost && matches!(quality, Quality::Good) { Quality::Degraded } else { quality }
+        if (self.configuration_lost || self.clock) && matches!(quality, Quality::Good) {
+            Quality::Degraded
+        } else {
+            quality
+        }
     }
 }
 
@@ -189,7 +193,7 @@ pub struct Counters {
     pub samples: u32,
     /// Grid steps that no sample filled.
     pub missing: u32,
-    /// Samples refused: duplicate, backwards or off the grid.
+    /// Samples refused: duplicate, backwards, or of a rate that is not used.
     pub misplaced: u32,
     /// Clock jumps of more than a second.
     pub clock_jumps: u32,

@@ -1,4 +1,4 @@
-//! The pipeline computes the corrected yaw rates of one sample of the inertial sensor.
+//! The pipeline computes the corrected yaw rates of each 10 ms of the inertial sensor.
 //!
 //! This file owns the order of the stages (grid, mounting, initialisation, window, compensation, zero-rate
 //! updates, report) and nothing else. The stages do not import each other; they share the types of samples,
@@ -114,6 +114,8 @@ struct State {
     moved: bool,
     /// The newest reading was a repeated one.
     stuck: bool,
+    /// The newest sample was refused for its rate.
+    rate_refused: bool,
     counters: Counters,
 }
 
@@ -149,30 +151,65 @@ impl Pipeline {
             inertial: None,
             moved: false,
             stuck: false,
+            rate_refused: false,
             counters: Counters::NONE,
         };
         Self { config, state }
     }
 
-    /// Corrects one sample of the inertial sensor; its validity must have been set ([`crate::monitor`]). `wheels` is the
-    /// newest report of [`crate::can::wheel::WheelReceiver`], `None` before its first frame.
+    /// Adds a sample of the inertial sensor; [`Pipeline::next_frame`] gives the steps of the grid that it completes.
     ///
     /// # Errors
-    /// [`AlignError`] when its time stamp has no place on the grid; the sample is counted and not used. Unless it was
-    /// a duplicate, the samples that follow report [`Faults::GAP`] for as long as after a missing one.
+    /// [`AlignError`]; the sample is counted and not used. Unless it was a duplicate, the steps that follow report
+    /// [`Faults::GAP`] for as long as after a missing one.
+    pub fn add(&mut self, sample: ImuSample) -> Result<(), AlignError> {
+        let added = self.state.aligner.add(sample);
+        self.state.rate_refused = matches!(added, Err(AlignError::Rate { .. }));
+        added.inspect_err(|error| self.refuse(*error))
+    }
+
+    /// Returns the next step of the grid that the samples have completed; call it until `None` after each sample.
+    pub fn next_frame(&mut self) -> Option<Frame> {
+        self.state.aligner.next_frame()
+    }
+
+    /// Returns whether the sensor sends too few or too many samples a second to be used.
+    #[must_use]
+    pub fn is_rate_refused(&self) -> bool {
+        self.state.rate_refused
+    }
+
+    /// Returns whether the next sample completes a step of the grid.
+    #[must_use]
+    pub fn is_step_due(&self) -> bool {
+        self.state.aligner.is_nearly_complete()
+    }
+
+    /// Adds a sample of a sensor with 100 samples a second, and corrects the step that it completes; its validity must
+    /// have been set.
+    ///
+    /// # Errors
+    /// As [`Pipeline::add`], and [`AlignError::Open`] where it completes none.
     pub fn correct(
         &mut self,
         sample: ImuSample,
         wheels: Option<&WheelSample>,
         board: &BoardState,
     ) -> Result<Output, AlignError> {
+        self.add(sample)?;
+        let frame = self.next_frame().ok_or(AlignError::Open { at: sample.time })?;
+        Ok(self.step(frame, wheels, board))
+    }
+
+    /// Corrects a step of the grid; its sample's validity must have been set ([`crate::monitor`]). `wheels` is the newest
+    /// report of [`crate::can::wheel::WheelReceiver`], `None` before its first frame.
+    pub fn step(&mut self, mut frame: Frame, wheels: Option<&WheelSample>, board: &BoardState) -> Output {
         if let Some(WheelSample { speeds, .. }) = wheels {
             let seen = self.state.wheels_seen.iter_mut().zip(speeds);
             seen.for_each(|(seen, speed)| *seen |= speed.is_some());
         }
         let standstill = wheels.map(|wheels| wheels.standstill);
-        let mut frame = self.state.aligner.align(sample).inspect_err(|error| self.refuse(*error))?;
-        let mut sample = sample;
+        let mut sample = frame.sample;
         let initialised = self.state.initialised.is_some();
         if self.state.sensor_bias.subtract(&mut sample, &self.config, initialised) {
             self.state.static_init.restart();
@@ -213,7 +250,7 @@ impl Pipeline {
         let stride = self.config.compensate.mode.stride();
         let window = self.state.windows.due(frame.tick, stride);
         self.state.gap_within = self.state.gap_within.saturating_sub(1);
-        Ok(Output { vehicle, complete: rates.complete, window, refused, implausible })
+        Output { vehicle, complete: rates.complete, window, refused, implausible }
     }
 
     /// Notes that the sensor was moved since earlier drives; it is reported with every message set from now on.

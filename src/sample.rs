@@ -6,11 +6,14 @@ use crate::units::{Angle, AngularRate, CentiCelsius, Micros, SpecificForce, Whee
 /// The grid's step is 10 ms, in microseconds.
 pub const PERIOD_US: u64 = 1_000_000 / RATE_HZ as u64;
 
+/// The time of a reading from a part that sends none: the time of its arrival is used.
+pub const NO_STAMP: Micros = Micros(u64::MAX);
+
 /// Holds one reading of an inertial measurement unit: x forward, y left, z up (FLU).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ImuSample {
-    /// Time of the reading by the part's own clock, unwrapped.
+    /// Time of the reading by the part's own clock, unwrapped, or [`NO_STAMP`].
     pub time: Micros,
     /// Specific force x, y, z.
     pub specific_force: [SpecificForce; 3],

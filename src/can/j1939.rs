@@ -99,7 +99,7 @@ impl Vdc2 {
     }
 }
 
-/// The validity of the rate.
+/// Whether the rate is valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Validity {

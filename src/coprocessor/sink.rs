@@ -1,5 +1,6 @@
 //! Where a coprocessor's frames go: each one straight from its encoder to the caller's queue.
 
+use super::Observation;
 use crate::can::DataFrame;
 use crate::can::queue::TransmitQueue;
 use crate::estimate::YawEstimate;
@@ -25,6 +26,9 @@ pub trait Sink {
     /// Takes a frame. It must not wait: what the bus does not accept is dropped and counted by the sink, and passed to
     /// [`super::Coprocessor::bus`].
     fn frame(&mut self, frame: TimedFrame);
+
+    /// Takes what was observed in 10 ms of the inertial sensor, or in its silence, after its frames.
+    fn observed(&mut self, _observation: &Observation) {}
 
     /// Takes a rate of the fibre-optic gyro, before its frames.
     fn fog_rate(&mut self, _rate: &YawEstimate) {}

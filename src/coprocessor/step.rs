@@ -123,9 +123,8 @@ impl Coprocessor {
             }
             match imu.next_sample() {
                 Some(Ok(sample)) => {
-                    if let Ok(observation) = self.imu(sample, now, bus) {
-                        step.observation = Some(observation);
-                    }
+                    // A refused sample is counted.
+                    step.observation = self.imu(sample, now, bus).ok().flatten().or(step.observation);
                 }
                 Some(Err(error)) => {
                     self.imu_error();

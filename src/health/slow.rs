@@ -1,6 +1,6 @@
 //! States that change slowly: whether the vehicle stands, and how well the board knows its sensor.
 
-/// The verdict about standstill.
+/// Whether the vehicle stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Verdict {
     /// Neither is shown, or the gyro contradicts the wheels.
@@ -41,7 +41,7 @@ pub enum Knowledge {
 /// All of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SlowStatus {
-    /// The verdict about standstill.
+    /// Whether the vehicle stands.
     pub verdict: Verdict,
     /// The evidence for the verdict.
     pub evidence: Evidence,

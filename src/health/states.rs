@@ -44,7 +44,7 @@ const fn remark(
 /// and VDC2 "error".
 ///
 /// From a fault the state returns to init where no bias is known, otherwise to degraded.
-pub const STATES: [State; 10] = [
+pub const STATES: [State; 11] = [
     state(
         Status::Init,
         "init",
@@ -121,8 +121,15 @@ pub const STATES: [State; 10] = [
         "clock off",
         "the sensor's clock differs from the board's crystal by more than 4 %; the yaw is then accumulated by the \
          sensor's clock",
-        "as in the present state; IMPLAUSIBLE",
+        "as in the present state, at best degraded; IMPLAUSIBLE",
         "the clocks agree again",
         "`clock_off`",
+    ),
+    remark(
+        "rate not used",
+        "the sensor sends fewer than 50 or more than 1000 samples a second",
+        "none, as silent; IMPLAUSIBLE",
+        "a rate between",
+        "`misplaced`",
     ),
 ];

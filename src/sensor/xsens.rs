@@ -11,7 +11,7 @@ pub use mtdata2::Precision;
 pub use mtdata2::{MID_MT_DATA2, MtData2, XsensError};
 
 use super::framer::{Framer, Protocol};
-use crate::sample::{ImuSample, StampClock, Validity};
+use crate::sample::{ImuSample, NO_STAMP, StampClock, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use mtdata2::id;
 
@@ -113,7 +113,6 @@ impl Mti {
 
     fn sample(&mut self, message: &MtData2) -> Result<ImuSample, XsensError> {
         let missing = |id| XsensError::Missing { id };
-        let ticks = message.sample_time_fine.ok_or(missing(id::SAMPLE_TIME_FINE))?;
         let force = message.acceleration.ok_or(missing(id::ACCELERATION))?;
         let rate = message.rate_of_turn.ok_or(missing(id::RATE_OF_TURN))?;
         let reading = |id| move |error| XsensError::Reading { id, error };
@@ -125,7 +124,7 @@ impl Mti {
             angular_rate: [wx.map_err(r)?, wy.map_err(r)?, wz.map_err(r)?],
             temperature: message.temperature.and_then(centi_celsius),
             validity: Validity::reported(message.status.is_some_and(|status| status & STATUS_CLIPPED != 0)),
-            time: Micros(self.stamps.unwrap(ticks) * 100),
+            time: message.sample_time_fine.map_or(NO_STAMP, |ticks| Micros(self.stamps.unwrap(ticks) * 100)),
         })
     }
 }

@@ -2,7 +2,7 @@
 //! up at standstills, forward while the vehicle drives.
 //!
 //! Without wheels, a long straight can look like a standstill, so only static calibrations add to the bias curve.
-//! Learnt values are stored after the first, second, fourth, ... period of three seconds at rest, about ten times
+//! What was learnt is stored after the first, second, fourth, ... period of three seconds at rest, about ten times
 //! per start. It is also stored each time the sigma of the forward direction has decreased by 30 %, about six times
 //! in total.
 
@@ -27,12 +27,12 @@ pub struct Learner {
     /// `None` until the first period at rest.
     filter: Option<CurveFilter>,
     rests: u32,
-    /// True if the specific force of this standstill has been used.
+    /// Whether the specific force of this standstill has been used.
     has_stood: bool,
     forward: ForwardEstimator,
-    /// True if the mounting has changed since earlier drives; nothing is learnt then.
+    /// Whether the mounting has changed since earlier drives; nothing is learnt then.
     is_moved: bool,
-    /// True if there is something new to store.
+    /// Whether there is something new to store.
     pub is_changed: bool,
 }
 

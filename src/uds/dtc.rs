@@ -35,7 +35,7 @@ pub struct Trouble {
     pub code: u32,
     /// A short name.
     pub name: &'static str,
-    /// The check for a workshop.
+    /// What a workshop checks.
     pub check: &'static str,
     cause: Cause,
 }
@@ -98,8 +98,8 @@ pub static TROUBLES: [Trouble; 14] = [
     trouble(
         0x5A01,
         0x62,
-        "inertial sensor: implausible, or its clock is off",
-        "the mounting, settings `mounting`",
+        "inertial sensor: implausible, or its clock or rate is off",
+        "its output rate (50 to 1000 Hz), the mounting, settings `mounting`",
         Cause::Fault(Faults::IMPLAUSIBLE),
     ),
     trouble(
@@ -184,9 +184,9 @@ impl From<&Conditions> for Snapshot {
 #[derive(Debug)]
 pub struct Memory {
     entries: [Entry; TROUBLES.len()],
-    /// True if troubles are recorded; a tester may stop the recording.
+    /// Whether troubles are recorded; a tester may stop the recording.
     pub is_enabled: bool,
-    /// True if the confirmed troubles differ from the stored ones.
+    /// Whether the confirmed troubles differ from the stored ones.
     pub is_changed: bool,
 }
 

@@ -17,7 +17,7 @@ use embedded_storage::nor_flash::NorFlash;
 pub struct Server {
     transport: Transport,
     services: Services,
-    /// True if "response pending" has been sent for the request.
+    /// Whether "response pending" has been sent for the request.
     is_pending: bool,
 }
 

@@ -32,14 +32,14 @@ pub(super) struct Services {
     session: Session,
     /// Time of the tester's last frame, or of the last response, ms.
     pub last_activity: u32,
-    /// True if the request was addressed to all servers.
+    /// Whether the request was addressed to all servers.
     pub is_functional: bool,
     pub(super) memory: Memory,
-    /// True if the memory has been restored from flash.
+    /// Whether the memory has been restored from flash.
     is_restored: bool,
-    /// True if the messages of the board are stopped.
+    /// Whether the messages of the board are stopped.
     pub is_silenced: bool,
-    /// True if a tester has requested a restart.
+    /// Whether a tester has requested a restart.
     pub is_restarting: bool,
     pub(super) download: Option<Download>,
     pub(super) security: Security,
@@ -49,7 +49,7 @@ pub(super) struct Services {
 pub(super) struct Surroundings<'a, E> {
     pub counters: &'a AllCounters,
     pub errors: TransportErrors,
-    /// True if "response pending" has been sent.
+    /// Whether "response pending" has been sent.
     pub is_pending: bool,
     /// The time, ms.
     pub now: u32,

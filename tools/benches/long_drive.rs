@@ -67,7 +67,7 @@ fn write_drive(path: &Path, seconds: u64) -> Result<(), Box<dyn Error>> {
     Ok(file.flush()?)
 }
 
-/// The time and memory that a command took.
+/// What a command took.
 struct Cost {
     wall: Duration,
     processor: f64,

@@ -47,7 +47,7 @@ pub struct Step {
     pub input: Row,
     /// The sample's time stamp.
     pub time: Micros,
-    /// The standstill by the wheels.
+    /// Whether the vehicle stands, by its wheels.
     pub standstill: Standstill,
     /// The estimates that were sent with this row.
     pub vehicle: VehicleSample,
@@ -77,7 +77,7 @@ pub struct Board<N> {
     /// The time from which on the board finds the sensor silent.
     silent_from: Micros,
     held: VecDeque<Step>,
-    /// True once a step that was given out is initialised, and once one after that has no delayed rate.
+    /// Whether a step that was given out is initialised, and whether one after that has no delayed rate.
     initialised: bool,
     ended: bool,
 }
@@ -112,7 +112,7 @@ impl<N: WindowNetwork> Board<N> {
         }
         let mut frames = Vec::new();
         let sent = self.coprocessor.imu(row.sample, self.now, &mut |frame: TimedFrame| frames.push(frame));
-        let Ok(observation) = sent else { return Ok(None) };
+        let Ok(Some(observation)) = sent else { return Ok(None) };
         if let Some(refused) = observation.refused {
             return Err(refused);
         }

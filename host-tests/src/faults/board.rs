@@ -93,7 +93,7 @@ impl Board {
             let mut sending = Sending { port: &mut self.port, out, now: now.0, row: self.row, fog_row: None };
             match delivered {
                 Delivered::Imu(Some(sample)) => {
-                    if let Ok(observed) = self.coprocessor.imu(sample, now, &mut sending) {
+                    if let Ok(Some(observed)) = self.coprocessor.imu(sample, now, &mut sending) {
                         self.newest = Some(observed.vehicle);
                     }
                 }

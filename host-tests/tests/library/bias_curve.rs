@@ -211,7 +211,7 @@ fn a_temperature_that_comes_late_makes_no_step() {
                 sample.angular_rate[axis] = rate(bias(35.0) + 0.001 * noise.normal());
                 sample.specific_force[axis].0 += force(0.02 * noise.normal()).0;
             }
-            let seen = coprocessor.imu(sample, sample.time, &mut ()).expect("a place on the grid");
+            let seen = coprocessor.imu(sample, sample.time, &mut ()).expect("in order").expect("a step");
             let known = (tick >= first).then_some(CentiCelsius(3_500));
             assert_eq!(seen.sample.and_then(|sample| sample.temperature), known, "sample {tick}");
             sent.push(seen.vehicle.delayed);

@@ -230,7 +230,10 @@ fn turned(off: f64, config: Config) -> (f64, Vec<AngularRate>, Coprocessor) {
         if sensor.now > 8.0 {
             sample.angular_rate[2].0 += rate(0.3).0;
         }
-        let output = coprocessor.imu(ImuSample { time, ..sample }, arrival, &mut ()).expect("in time");
+        let output = coprocessor
+            .imu(ImuSample { time, ..sample }, arrival, &mut ())
+            .expect("in time")
+            .expect("a step");
         assert!(tick < 400 || output.vehicle.live.status == Status::Degraded, "{tick}");
         rates.push(output.vehicle.delayed.rate);
         if [6_000, 16_000].contains(&tick) {
@@ -265,7 +268,8 @@ fn a_clock_at_fault_is_on_the_bus() {
     for tick in 0..6_000 {
         let (time, arrival) = sensor.sample();
         let sample = ImuSample { time, ..idling(tick, 0.001, &mut noise) };
-        let faults = coprocessor.imu(sample, arrival, &mut ()).expect("in time").vehicle.delayed.faults;
+        let step = coprocessor.imu(sample, arrival, &mut ()).expect("in time").expect("a step");
+        let faults = step.vehicle.delayed.faults;
         let reported = faults == faults.with(Faults::IMPLAUSIBLE);
         first = first.or(reported.then_some(tick));
         assert!(first.is_none() || reported, "for as long as it lasts");

@@ -45,7 +45,7 @@ impl Drive {
     fn send(&mut self, sample: ImuSample) -> Observation {
         self.tick += 1;
         let time = Micros(self.tick * PERIOD_US);
-        self.coprocessor.imu(ImuSample { time, ..sample }, time, &mut ()).expect("in time")
+        self.coprocessor.imu(ImuSample { time, ..sample }, time, &mut ()).expect("in time").expect("a step")
     }
 }
 

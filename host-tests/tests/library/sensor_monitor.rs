@@ -36,7 +36,7 @@ fn at(tick: u64) -> Micros {
 
 fn sample(coprocessor: &mut Coprocessor, sample: ImuSample, tick: u64) -> Observation {
     let sample = ImuSample { time: Micros(tick * PERIOD_US), ..sample };
-    coprocessor.imu(sample, at(tick), &mut ()).expect("in time")
+    coprocessor.imu(sample, at(tick), &mut ()).expect("in time").expect("a step")
 }
 
 #[test]

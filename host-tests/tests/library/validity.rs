@@ -103,7 +103,7 @@ impl Board {
         change(&mut sample);
         let now = Micros(self.tick * PERIOD_US);
         self.tick += 1;
-        self.coprocessor.imu(sample, now, &mut ()).expect("in time").vehicle.delayed
+        self.coprocessor.imu(sample, now, &mut ()).expect("in time").expect("a step").vehicle.delayed
     }
 
     fn doubt(&self) -> f64 {

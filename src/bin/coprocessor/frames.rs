@@ -5,6 +5,7 @@
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
 use crate::diagnosis::{self, FROM_CAN, Line, RESPONSES};
+use crate::idle::{OBSERVATIONS, Observation};
 use crate::ring::Ring;
 use crate::serial;
 use crate::stm32f405::can::{self, Can, Received, STALE_MS, State};
@@ -14,7 +15,8 @@ use gyronet::can::DataFrame;
 use gyronet::can::queue::TransmitQueue;
 use gyronet::can::slcan::host::StatusFlags;
 use gyronet::can::slcan::port::Port;
-use gyronet::coprocessor::{Sink, TimedFrame};
+use gyronet::coprocessor::{self, Sink, TimedFrame};
+use gyronet::health::count;
 use gyronet::units::Micros;
 
 /// Frames that can wait for each line.
@@ -59,11 +61,14 @@ pub struct Outgoing {
     queue: TransmitQueue<(DataFrame, u32), QUEUE>,
     /// Board time, ms.
     now: u32,
+    /// Observations that idle missed for lack of time.
+    overruns: u32,
 }
 
 impl Outgoing {
     pub fn new(slcan: serial::Port, bits_per_second: u32, can: Option<Can>) -> Self {
-        Self { slcan, port: Port::new(bits_per_second), can, queue: TransmitQueue::new(), now: 0 }
+        let (port, queue) = (Port::new(bits_per_second), TransmitQueue::new());
+        Self { slcan, port, can, queue, now: 0, overruns: 0 }
     }
 
     /// Joins the CAN bus.
@@ -125,6 +130,11 @@ impl Outgoing {
         self.port.dropped().saturating_add(self.queue.dropped()).saturating_add(can::aborted())
     }
 
+    /// Returns the number of observations that idle missed.
+    pub const fn overruns(&self) -> u32 {
+        self.overruns
+    }
+
     /// Returns the CAN controller's error state, or [`State::Active`] without a controller.
     pub fn state(&self) -> State {
         self.can.as_ref().map_or(State::Active, Can::state)
@@ -137,6 +147,15 @@ impl Outgoing {
 }
 
 impl Sink for Outgoing {
+    /// Hands an observation to idle.
+    #[inline(never)]
+    fn observed(&mut self, observation: &coprocessor::Observation) {
+        let coprocessor::Observation { sample, vehicle, wheels, .. } = observation;
+        let (tick, status, faults) = (vehicle.tick, vehicle.live.status, vehicle.live.faults);
+        let note = Observation { sample: *sample, tick, status, faults, wheels: *wheels };
+        count(&mut self.overruns, u32::from(!OBSERVATIONS.push(note)));
+    }
+
     /// Queues a frame for both lines, unless a tester has silenced the board.
     #[inline(never)]
     fn frame(&mut self, TimedFrame { frame, time }: TimedFrame) {

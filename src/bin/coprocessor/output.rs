@@ -8,14 +8,13 @@ use crate::board::SUPERVISOR;
 use crate::boards::BOARD;
 use crate::diagnosis::{self, FROM_SLCAN};
 use crate::frames::{self, FRAMES, Outgoing};
-use crate::idle::{OBSERVATIONS, Observation};
 use crate::imu::{BYTES_PER_STEP, Imu};
 use crate::serial;
 use crate::stm32f405::can::{Can, State};
 use crate::stm32f405::{timer, watchdog};
 use core::sync::atomic::{AtomicU8, Ordering};
 use embedded_can::Frame as _;
-use gyronet::coprocessor::{self, Coprocessor};
+use gyronet::coprocessor::Coprocessor;
 use gyronet::health::count;
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::service::message::{AllCounters, LineCounters};
@@ -117,9 +116,7 @@ impl Output {
                         self.poll_inputs(coprocessor, now);
                     }
                     self.report_bus(coprocessor);
-                    if let Ok(observation) = &coprocessor.imu(sample, now, &mut self.outgoing) {
-                        self.note(observation);
-                    }
+                    let _ = coprocessor.imu(sample, now, &mut self.outgoing);
                     self.send(coprocessor, now);
                 }
                 Some(Err(())) => coprocessor.imu_error(),
@@ -131,9 +128,7 @@ impl Output {
             return;
         }
         self.report_bus(coprocessor);
-        if let Ok(Some(observation)) = &coprocessor.poll(now, &mut self.outgoing) {
-            self.note(observation);
-        }
+        let _ = coprocessor.poll(now, &mut self.outgoing);
         self.send(coprocessor, now);
         *counters = AllCounters {
             pipeline: *coprocessor.pipeline().counters(),
@@ -184,15 +179,6 @@ impl Output {
         coprocessor.bus(lost, self.outgoing.state() >= State::Passive);
     }
 
-    /// Hands an observation to idle.
-    #[inline(never)]
-    fn note(&mut self, observation: &coprocessor::Observation) {
-        let coprocessor::Observation { sample, vehicle, wheels, .. } = observation;
-        let (tick, status, faults) = (vehicle.tick, vehicle.live.status, vehicle.live.faults);
-        let note = Observation { sample: *sample, tick, status, faults, wheels: *wheels };
-        count(&mut self.lines.overruns, u32::from(!OBSERVATIONS.push(note)));
-    }
-
     /// Sends the queued frames, and takes the frames that a host has sent over SLCAN.
     #[inline(never)]
     fn send(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
@@ -205,6 +191,7 @@ impl Output {
             }
         });
         let lost = [self.imu.lost(), self.fog.lost(), self.outgoing.lost()];
+        self.lines.overruns = self.outgoing.overruns();
         self.lines.line_errors = lost.into_iter().fold(0, u32::saturating_add);
     }
 }

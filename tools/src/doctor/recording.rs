@@ -2,13 +2,17 @@
 
 use crate::drive::error::DataError;
 use crate::drive::foreign;
-use crate::drive::recording::{Reader, Row, WHEELS};
+use crate::drive::recording::{Reader, Row, WHEELS, resampled};
 use crate::drive::vehicle::Vehicle;
+use gyronet::align::PERIODS_US;
+use gyronet::sample::PERIOD_US;
 use std::ops::Range;
 use std::path::Path;
 
 /// Rows per second.
 pub const SECOND: usize = 100;
+/// Rows by which the rate is judged.
+const FIRST: usize = 1_000;
 /// Most rows that are kept: a day at 100 Hz.
 const MOST: usize = 8_640_000;
 
@@ -16,6 +20,8 @@ const MOST: usize = 8_640_000;
 #[derive(Debug)]
 pub struct Rows {
     pub name: String,
+    /// Median of the first periods, s; if it is not that of 100 Hz and is used, the rows are brought to 100 Hz.
+    pub period: Option<f64>,
     /// Seconds since the first row.
     pub seconds: Vec<f64>,
     /// Specific force, m/s^2, and angular rate, rad/s.
@@ -46,10 +52,21 @@ impl Rows {
 
     pub fn parse(
         name: &str,
-        reader: impl Iterator<Item = Result<Row, DataError>>,
+        mut reader: impl Iterator<Item = Result<Row, DataError>>,
     ) -> Result<Self, DataError> {
+        let first: Vec<_> = reader.by_ref().take(FIRST).collect();
+        let times: Vec<u64> = first.iter().flatten().map(|row| row.sample.time.0).collect();
+        let periods = sorted(times.windows(2).map(|pair| (pair[1] - pair[0]) as f64));
+        let period = periods.get(periods.len() / 2).copied();
+        let is_off = period.is_some_and(|us| us != PERIOD_US as f64 && PERIODS_US.contains(&(us as u64)));
+        let reader: Box<dyn Iterator<Item = Result<Row, DataError>> + '_> = if is_off {
+            Box::new(resampled(name, first.into_iter().chain(reader)))
+        } else {
+            Box::new(first.into_iter().chain(reader))
+        };
         let mut rows = Self {
             name: name.to_owned(),
+            period: period.map(|us| 1e-6 * us),
             seconds: Vec::new(),
             force: Vec::new(),
             rate: Vec::new(),

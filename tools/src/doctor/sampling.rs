@@ -3,26 +3,26 @@
 use super::finding::{Finding, Verdict};
 use super::recording::{Rows, sorted};
 use crate::drive::DT;
+use gyronet::align::PERIODS_US;
 
 /// A longer period than this is a gap, s.
 const GAP: f64 = 0.015;
-/// Difference from 100 Hz beyond which other commands reject the rate, Hz.
-const OFF: f64 = 20.0;
 
 pub fn findings(rows: &Rows) -> Vec<Finding> {
     let mut findings = Vec::new();
     let periods = sorted(rows.seconds.windows(2).map(|pair| pair[1] - pair[0]));
-    match periods.get(periods.len() / 2) {
+    match rows.period {
         None => findings.push(Finding::bad("rate", "Fewer than two rows can be read.")),
         Some(median) => {
-            let hz = 1.0 / median;
-            if (hz - 100.0).abs() > OFF {
-                findings.push(Finding::bad(
-                    "rate",
-                    format!("{hz:.2} Hz by the median period: other commands reject this rate; `gyronet import` resamples to 100 Hz."),
-                ));
+            let is_used = PERIODS_US.contains(&((1e6 * median).round() as u64));
+            let text = format!("{:.2} Hz by the median period", 1.0 / median);
+            if !is_used {
+                let cure = "the board and the other commands use 50 to 1000 Hz; `gyronet import` resamples to 100 Hz.";
+                findings.push(Finding::bad("rate", format!("{text}: {cure}")));
             } else {
-                findings.push(Finding::good("rate", format!("{hz:.2} Hz by the median period.")));
+                let brought =
+                    if (median - DT).abs() < 1e-6 { "" } else { ", brought to 100 Hz as on the board" };
+                findings.push(Finding::good("rate", format!("{text}{brought}.")));
                 findings.push(gaps(&periods, rows.len()));
             }
         }

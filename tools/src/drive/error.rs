@@ -89,8 +89,8 @@ pub enum DataFault {
     /// The recording is too short for static initialisation.
     #[error("is {seconds:.2} s long, static initialisation alone needs {needed} s")]
     TooShort { seconds: f64, needed: f64 },
-    /// The median period is not that of 100 Hz.
-    #[error("is sampled at {hz:.1} Hz, should be 100 Hz")]
+    /// The usual period is not used by the board.
+    #[error("is sampled at {hz:.1} Hz, should be 50 to 1000 Hz")]
     Rate { hz: f64 },
     /// A wheel, 1 to 4, turns during static initialisation; its mean rate over a second is in rad/s.
     #[error("starts moving: line {line}, wheel {wheel} turns at {rate:.2} rad/s in the first 3 s")]

@@ -1,4 +1,5 @@
-//! A recorded drive is a CSV file with a header and one row for each 10 ms.
+//! A recorded drive is a CSV file with a header and one row for each sample, best of 100 Hz. Other rates from 50 to 1000 Hz
+//! are brought to 100 Hz as on the board ([`gyronet::align`]).
 //!
 //! Columns are found by name, in any order; unknown columns are skipped.
 //!
@@ -16,9 +17,11 @@
 //! sends them. So a recording read here and the same recording parsed from MTData2 bytes are bit-identical samples.
 
 mod reader;
+mod resampled;
 mod survey;
 
 pub use reader::Reader;
+pub use resampled::resampled;
 pub use survey::{Facts, Survey};
 
 use crate::drive::error::DataError;
@@ -31,8 +34,6 @@ use std::path::Path;
 pub const WHEELS: usize = 4;
 /// Largest mean rate of a standing wheel over a second, rad/s. A rate sensor on a standing wheel reads up to 0.04.
 pub const WHEEL_STANDS: f64 = 0.3;
-/// Largest difference of the median sample period from 10 ms, microseconds.
-const PERIOD_TOLERANCE_US: u64 = 2_000;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
@@ -80,11 +81,15 @@ impl Recording {
             survey.row(&row);
             rows.push(row);
         }
-        let missing = survey.finish(path)?.missing;
-        Ok(Self { path: path.to_owned(), rows, missing, vehicle })
+        let mut facts = survey.finish(path)?;
+        if facts.is_off_grid {
+            rows = resampled(path, rows.into_iter().map(Ok)).collect::<Result<_, _>>()?;
+            facts = Survey::of(&rows).finish(path)?;
+        }
+        Ok(Self { path: path.to_owned(), rows, missing: facts.missing, vehicle })
     }
 
-    /// The content of the rows.
+    /// What the rows have.
     pub fn facts(&self) -> Facts {
         Facts::of(&self.rows)
     }

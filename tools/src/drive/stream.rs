@@ -3,7 +3,7 @@
 
 use super::error::DataError;
 use super::foreign;
-use super::recording::{Facts, Reader, Recording, Row, Survey, name};
+use super::recording::{Facts, Reader, Recording, Row, Survey, name, resampled};
 use super::vehicle::Vehicle;
 use super::wheel_frames::{Speeds, WheelFrames};
 use gyronet::mounting::GyroMap;
@@ -22,8 +22,10 @@ pub struct Drive<'a> {
     pub path: String,
     /// Contents of the vehicle file beside the drive; the rows are in the vehicle's axes.
     pub vehicle: Cow<'a, Vehicle>,
-    /// Found by the first reading.
+    /// What the first reading has found.
     pub facts: Facts,
+    /// Whether the rows of the source are brought to 100 Hz.
+    is_off_grid: bool,
     /// A map that is applied to the gyro of each row.
     pub gyro_map: Option<GyroMap>,
     /// Rows before those of the file.
@@ -56,14 +58,17 @@ impl Drive<'static> {
         }
         let facts = survey.finish(&name)?;
         let source = if again { Source::File(path.to_owned()) } else { Source::Memory(Cow::Owned(kept)) };
-        Ok(Self {
-            path: name,
-            vehicle: Cow::Owned(vehicle),
-            facts,
-            gyro_map: None,
-            before: Vec::new(),
-            source,
-        })
+        let (vehicle, before) = (Cow::Owned(vehicle), Vec::new());
+        let is_off_grid = facts.is_off_grid;
+        let mut drive = Self { path: name, vehicle, facts, is_off_grid, gyro_map: None, before, source };
+        if is_off_grid {
+            let mut survey = Survey::default();
+            for row in drive.rows()? {
+                survey.row(&row?);
+            }
+            drive.facts = survey.finish(&drive.path)?;
+        }
+        Ok(drive)
     }
 }
 
@@ -74,6 +79,7 @@ impl<'a> From<&'a Recording> for Drive<'a> {
             path: recording.path.clone(),
             vehicle: Cow::Borrowed(&recording.vehicle),
             facts: recording.facts(),
+            is_off_grid: false,
             gyro_map: None,
             before: Vec::new(),
             source: Source::Memory(Cow::Borrowed(&recording.rows)),
@@ -98,6 +104,7 @@ impl Drive<'_> {
                 Box::new(Reader::new(&self.path, file)?.mounted(&self.vehicle))
             }
         };
+        let rows: Rows<'_> = if self.is_off_grid { Box::new(resampled(&self.path, rows)) } else { rows };
         if self.gyro_map.is_none() && self.before.is_empty() {
             return Ok(rows);
         }

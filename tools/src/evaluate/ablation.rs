@@ -20,9 +20,9 @@ pub struct Variant {
     pub name: String,
     /// The configuration.
     pub config: PipelineConfig,
-    /// True if the network runs; otherwise the corrections are zero.
+    /// Whether the network runs; otherwise the corrections are zero.
     pub network: bool,
-    /// True if the vehicle's bus has wheel speeds.
+    /// Whether the vehicle's bus has wheel speeds.
     pub wheels: bool,
 }
 

@@ -163,9 +163,9 @@ pub struct DriveErrors {
     pub missing: u32,
     /// The column of the reference.
     pub reference: &'static str,
-    /// True if the recording has wheel rates.
+    /// Whether the recording has wheel rates.
     pub wheels: bool,
-    /// True if the standstill at the start is simulated.
+    /// Whether the standstill at the start is simulated.
     pub simulated_rest: bool,
     /// Our rates compared with the best classical method.
     pub over_best_classical: Option<Comparisons>,

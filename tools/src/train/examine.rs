@@ -33,7 +33,7 @@ pub enum Refusal {
         path: String,
         /// The first line without a true yaw rate.
         line: u64,
-        /// True if the drive has a course instead.
+        /// Whether the drive has a course instead.
         course: bool,
     },
     /// Rows are missing.

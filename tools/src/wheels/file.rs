@@ -39,7 +39,7 @@ pub enum WheelFileError {
         path: String,
         /// The identifier.
         id: u32,
-        /// True if the file declares an identifier of 29 bits.
+        /// Whether the file declares an identifier of 29 bits.
         extended: bool,
     },
     /// A wheel has two signals.
@@ -106,7 +106,7 @@ const fn still_for_ms() -> u32 {
 pub struct Frame {
     /// CAN identifier.
     pub id: u32,
-    /// True if the identifier has 29 bits.
+    /// Whether the identifier has 29 bits.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub extended: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -174,7 +174,7 @@ pub struct Place {
     pub bits: u8,
     /// Order of the bytes.
     pub order: Order,
-    /// True if the value is signed.
+    /// Whether the value is signed.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub signed: bool,
 }

@@ -1,14 +1,15 @@
 //! The first reading of a drive: it checks the drive as a whole, and notes what a replay must know before its first
 //! row.
 
-use super::{PERIOD_TOLERANCE_US, Row, WHEEL_STANDS, WHEELS};
+use super::{Row, WHEEL_STANDS, WHEELS};
 use crate::drive::error::{DataError, DataFault};
+use gyronet::align::{PERIODS_US, SNAP_US};
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::{PERIOD_US, RATE_HZ};
 use gyronet::units::Micros;
 use std::collections::BTreeMap;
 
-/// The content of a drive.
+/// What a drive has.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Facts {
     /// Number of rows.
@@ -19,16 +20,16 @@ pub struct Facts {
     pub last: Micros,
     /// Number of rows that are missing in gaps.
     pub missing: u64,
-    /// True if each wheel is recorded in any row.
+    /// Whether the rows are not 10 ms apart.
+    pub is_off_grid: bool,
+    /// Whether each wheel is recorded in any row.
     pub wheels: [bool; WHEELS],
 }
 
 impl Facts {
-    /// The content of these rows, whether they can be replayed or not.
+    /// What these rows have, whether they can be replayed or not.
     pub fn of(rows: &[Row]) -> Self {
-        let mut survey = Survey::default();
-        rows.iter().for_each(|row| survey.row(row));
-        survey.facts
+        Survey::of(rows).facts
     }
 
     /// Time from the first sample to the end of the last one, s.
@@ -36,7 +37,7 @@ impl Facts {
         (self.last.0 - self.first.0 + PERIOD_US) as f64 * 1e-6
     }
 
-    /// True if any wheel is recorded.
+    /// Whether any wheel is recorded.
     pub fn has_wheels(&self) -> bool {
         self.wheels.contains(&true)
     }
@@ -54,6 +55,13 @@ pub struct Survey {
 }
 
 impl Survey {
+    /// The survey of these rows.
+    pub fn of(rows: &[Row]) -> Self {
+        let mut survey = Self::default();
+        rows.iter().for_each(|row| survey.row(row));
+        survey
+    }
+
     /// Adds the next row.
     pub fn row(&mut self, row: &Row) {
         let (facts, time) = (&mut self.facts, row.sample.time);
@@ -62,6 +70,8 @@ impl Survey {
         } else {
             let period = time.0 - facts.last.0;
             *self.periods.entry(period).or_default() += 1;
+            let beyond = (time.0 - facts.first.0) % PERIOD_US;
+            facts.is_off_grid |= beyond.min(PERIOD_US - beyond) > SNAP_US;
             facts.missing += ((period + PERIOD_US / 2) / PERIOD_US).saturating_sub(1);
         }
         facts.last = time;
@@ -74,8 +84,8 @@ impl Survey {
         }
     }
 
-    /// Checks that the drive can be replayed: at least 3 s long, at 100 Hz, with any wheels at rest in the first 3 s.
-    pub fn finish(self, path: &str) -> Result<Facts, DataError> {
+    /// Checks that the drive can be replayed: at least 3 s long, at 50 to 1000 Hz, with any wheels at rest in the first 3 s.
+    pub fn finish(mut self, path: &str) -> Result<Facts, DataError> {
         if self.facts.rows == 0 {
             return Err(DataError::of(path, DataFault::Empty));
         }
@@ -84,9 +94,10 @@ impl Survey {
             return Err(DataError::of(path, DataFault::TooShort { seconds, needed }));
         }
         let median = self.median_period().unwrap_or(PERIOD_US);
-        if median.abs_diff(PERIOD_US) > PERIOD_TOLERANCE_US {
+        if !PERIODS_US.contains(&median) {
             return Err(DataError::of(path, DataFault::Rate { hz: 1e6 / median as f64 }));
         }
+        self.facts.is_off_grid |= median.abs_diff(PERIOD_US) > SNAP_US;
         self.check_wheels(path)?;
         Ok(self.facts)
     }

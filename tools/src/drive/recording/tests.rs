@@ -134,15 +134,27 @@ fn nothing_at_all() {
 }
 
 #[test]
-fn another_rate_is_refused() {
-    let mut text = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\n");
-    for k in 0..200 {
-        writeln!(text, "{:.2},0,0,9.8,0,0,0", 0.02 * f64::from(k)).unwrap();
+fn another_rate_is_brought_to_100_hz_or_refused() {
+    let drive = |hz: u32| {
+        let mut text = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z\n");
+        for k in 0..=4 * hz {
+            let (time, rate) = (f64::from(k) / f64::from(hz), if k < 2 * hz { 0.0 } else { 1.0 });
+            writeln!(text, "{time:.4},0,0,9.8,0,0,{rate},{rate}").unwrap();
+        }
+        parse(&text)
+    };
+    for hz in [50, 83, 95, 104, 120, 400, 1000] {
+        let rows = drive(hz).unwrap().rows;
+        assert!((395..=401).contains(&rows.len()), "{hz} Hz: {} rows", rows.len());
+        assert!(rows.windows(2).all(|pair| pair[1].sample.time.0 - pair[0].sample.time.0 <= 20_000));
+        let turned: f64 = rows.iter().map(|row| row.sample.angular_rate[2].rad_per_sec() * 0.01).sum();
+        assert!((turned - 2.0).abs() < 0.021, "{hz} Hz: {turned} rad");
+        let off = |row: &Row| (row.reference.unwrap() - row.sample.angular_rate[2].rad_per_sec()).abs();
+        assert!(rows.iter().all(|row| off(row) < 1e-6));
     }
-    assert_eq!(
-        parse(&text).unwrap_err().to_string(),
-        "drives/a.csv: is sampled at 50.0 Hz, should be 100 Hz"
-    );
+    let error = |hz| drive(hz).unwrap_err().to_string();
+    assert_eq!(error(40), "drives/a.csv: is sampled at 40.0 Hz, should be 50 to 1000 Hz");
+    assert_eq!(error(2_000), "drives/a.csv: is sampled at 2000.0 Hz, should be 50 to 1000 Hz");
 }
 
 #[test]
