@@ -2,7 +2,7 @@
 //! observations.
 //!
 //! [`Coprocessor`] defines the order in which the parts of the product run, and does no input or output itself. The
-//! firmware image, a replay of a recorded drive, the fault harness and your own board are adapters around it, so all
+//! firmware image, a replay of a recorded drive, the simulated situations and your own board are adapters around it, so all
 //! of them run the same code. It owns the monitor of the inertial sensor, the pipeline, the wheels, the pipeline of
 //! the fibre-optic gyro, the message encoders, and the rule for late windows.
 //!

@@ -4,7 +4,6 @@
 pub mod board;
 pub mod browser;
 pub mod entrance;
-pub mod faults;
 pub mod flash;
 pub mod golden;
 pub mod image;

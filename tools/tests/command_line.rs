@@ -156,8 +156,8 @@ fn bash_completes() {
 #[test]
 fn retired_names_say_what_does_their_work() {
     for (retired, successor) in [
-        (&["campaign", "--upsets"][..], "--bin faults"),
-        (&["--json", "soak"], "--bin faults"),
+        (&["campaign", "--upsets"][..], "--bin situations"),
+        (&["--json", "soak"], "--bin situations"),
         (&["paper", "KAIST", "--out", "OUT"], "make -f tools/paper/Makefile"),
         (&["tables", "SEQUENCES"], "cargo paper tables"),
         (&["warm-up"], "gyronet simulate --trip motorway"),

@@ -1,5 +1,7 @@
 //! The board on the host: bytes of the sensor and wheel frames in, frames out, a millisecond at a time.
 
+use super::sensor::LATITUDE;
+use crate::ram_flash::RamFlash;
 use embedded_can::Frame;
 use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::can::DataFrame;
@@ -11,16 +13,15 @@ use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::sample::ImuSample;
 use gyronet::sensor::Source;
 use gyronet::sensor::adis16465::{Adis16465, BURST};
+use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
 use gyronet::sensor::xsens::Mti;
 use gyronet::service::{Device, SupportedHardware};
-use gyronet::store::{Calibration, Configuration, ImuPart, Learned};
+use gyronet::store::{Calibration, Configuration, FogPart, ImuPart, Learned};
 use gyronet::units::Micros;
 use gyronet_tools::parts::icm42688::NoDelay;
 use gyronet_tools::parts::{Part, adis16465, icm42688};
 use std::collections::VecDeque;
-
-use crate::ram_flash::RamFlash;
 
 const HARDWARE: SupportedHardware = SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[] };
 /// The board fetches at most this many packets from a FIFO at once.
@@ -76,6 +77,7 @@ pub struct Board {
     device: Box<Device<RamFlash<16384>, RamFlash<16384>>>,
     network: GyroNet<'static>,
     line: Line,
+    fibre_optic: Dsp1760,
     waiting: Waiting,
     wire: Wire,
 }
@@ -86,12 +88,14 @@ impl Board {
         let yaw = Settings::DEFAULT.yaw.map(|yaw| gyronet::can::config::YawSettings { period_ms, ..yaw });
         let status = Some(StatusSettings { id: STATUS_ID });
         let can = CanConfig::new(Settings { bosch: None, yaw, status, ..Settings::DEFAULT });
+        let fog = (part == Part::Dsp1760).then_some(FogPart::Dsp1760);
+        let configuration = Configuration { fog, latitude_deg: Some(LATITUDE), ..Configuration::DEFAULT };
         let config = Config {
             can: can.expect("a period of the handbook"),
             wheels: has_wheels
                 .then(|| WheelReceiver::new(WheelSettings::TOYOTA).expect("the library's settings")),
             clock_ratio: Some(ClockRatioConfig::DEFAULT),
-            ..Configuration::DEFAULT.coprocessor(&Calibration::NONE, learned, 0)
+            ..configuration.coprocessor(&Calibration::NONE, learned, 0)
         };
         let blob = Blob::new_checked(&weights::DEFAULT.0).expect("the library's weights");
         let line = match part {
@@ -111,6 +115,7 @@ impl Board {
             device: Box::new(Device::new(&HARDWARE)),
             network: GyroNet::new(blob),
             line,
+            fibre_optic: Dsp1760::new(Dsp1760Config::DEFAULT),
             waiting: Waiting::default(),
             wire: Wire::default(),
         }
@@ -142,6 +147,20 @@ impl Board {
                 burst.iter_mut().zip(bytes).for_each(|(to, byte)| *to = *byte);
                 bus.answer(burst);
                 waiting.push_back(driver.read(now).ok());
+            }
+        }
+    }
+
+    /// Bytes of the fibre-optic gyro arrive.
+    pub fn receive_fibre_optic(&mut self, bytes: &[u8], now: Micros) {
+        for byte in bytes {
+            self.fibre_optic.receive(*byte);
+            while let Some(sample) = self.fibre_optic.next_sample() {
+                match sample {
+                    // What is refused is counted.
+                    Ok(sample) => drop(self.coprocessor.fog(sample, now, &mut self.wire)),
+                    Err(_) => self.coprocessor.fog_error(),
+                }
             }
         }
     }

@@ -73,7 +73,7 @@ impl Outcome {
     pub fn add(&mut self, other: &Self) {
         self.seconds += other.seconds;
         self.good += other.good;
-        self.least = other.least;
+        self.least = self.least.max(other.least);
         self.inside += other.inside;
         self.wrong += other.wrong;
         self.wrong_spans += other.wrong_spans;

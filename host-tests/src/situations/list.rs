@@ -6,7 +6,7 @@ mod roads;
 
 use super::judge::Outcome;
 use super::scene::Scene;
-use super::vehicle::{BARE, CAR, HATCH, TRUCK, UTV, Vehicle};
+use super::vehicle::{BARE, CAR, HATCH, TRUCK, UTV, VAN, Vehicle};
 
 pub struct Situation {
     pub name: &'static str,
@@ -15,8 +15,8 @@ pub struct Situation {
     pub set: fn(&mut Scene),
 }
 
-const ALL: &[Vehicle] = &[CAR, HATCH, TRUCK, UTV, BARE];
-const WHEELED: &[Vehicle] = &[CAR, HATCH, TRUCK];
+const ALL: &[Vehicle] = &[CAR, HATCH, TRUCK, UTV, BARE, VAN];
+const WHEELED: &[Vehicle] = &[CAR, HATCH, TRUCK, VAN];
 const WITHOUT: &[Vehicle] = &[BARE, UTV];
 
 impl Situation {

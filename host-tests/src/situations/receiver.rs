@@ -5,9 +5,9 @@ use super::board::id;
 use embedded_can::Frame;
 use gyronet::can::DataFrame;
 
-const RATE: u16 = 0x1A0;
-const ANGLE: u16 = 0x1A1;
-const DETAIL: u16 = 0x1A2;
+/// The first of the messages rate, angle, detail: of the inertial sensor, of a fibre-optic gyro.
+pub const INERTIAL: u16 = 0x1A0;
+pub const FIBRE_OPTIC: u16 = 0x1A4;
 const STATUS: u16 = 0x1A3;
 const GOOD: u8 = 0;
 
@@ -43,8 +43,9 @@ pub struct Slow {
     pub doubt: Option<f64>,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Receiver {
+    first: u16,
     rate: Option<(u8, u8)>,
     angle: Option<(u8, i32, u8)>,
     newest: Option<(i32, f64)>,
@@ -53,15 +54,23 @@ pub struct Receiver {
 }
 
 impl Receiver {
+    /// A receiver of the messages from this identifier on.
+    pub const fn new(first: u16) -> Self {
+        Self { first, rate: None, angle: None, newest: None, sets: Vec::new(), slow: Vec::new() }
+    }
+
     /// Takes a frame that arrived at this time, s.
     pub fn take(&mut self, frame: &DataFrame, at: f64) {
         let Ok(data) = <[u8; 8]>::try_from(frame.data()) else { return };
         let counter = data[2];
         let word = i32::from_le_bytes([data[3], data[4], data[5], data[6]]);
-        match id(frame) {
-            RATE => self.rate = Some((counter, data[7] >> 3 & 3)),
-            ANGLE => self.angle = Some((counter, word, data[7])),
-            DETAIL => {
+        if id(frame) == STATUS {
+            return self.status(u64::from_le_bytes(data) >> 24, at);
+        }
+        match id(frame).wrapping_sub(self.first) {
+            0 => self.rate = Some((counter, data[7] >> 3 & 3)),
+            1 => self.angle = Some((counter, word, data[7])),
+            2 => {
                 let (Some((one, quality)), Some((two, code, faults))) = (self.rate, self.angle) else {
                     return;
                 };
@@ -78,18 +87,18 @@ impl Receiver {
                 let latency = if data[7] == u8::MAX { 0.0 } else { f64::from(data[7]) * 0.5e-3 };
                 self.sets.push(Set { sampled: at - latency, yaw, quality, faults, sigma });
             }
-            STATUS => {
-                let bits = u64::from_le_bytes(data) >> 24;
-                let doubt = bits >> 24 & 0xFFFF;
-                self.slow.push(Slow {
-                    at,
-                    stands: bits & 3 == 1,
-                    contradicted: !matches!(bits >> 13 & 7, 0 | 7),
-                    gaps: (bits >> 16) as u8,
-                    doubt: (doubt != 0xFFFF).then(|| (doubt as f64 * 0.01).to_radians()),
-                });
-            }
             _ => {}
         }
+    }
+
+    fn status(&mut self, bits: u64, at: f64) {
+        let doubt = bits >> 24 & 0xFFFF;
+        self.slow.push(Slow {
+            at,
+            stands: bits & 3 == 1,
+            contradicted: !matches!(bits >> 13 & 7, 0 | 7),
+            gaps: (bits >> 16) as u8,
+            doubt: (doubt != 0xFFFF).then(|| (doubt as f64 * 0.01).to_radians()),
+        });
     }
 }

@@ -39,6 +39,8 @@ pub struct Leg {
     pub road: f64,
     /// Speed of the wheels over that over ground: 0 where it is carried, towed on a trailer, or slides.
     pub rolling: f64,
+    /// Share of a turn that its path follows: 0 in a spin.
+    pub grip: f64,
 }
 
 /// A ride in the making: [`Ride::now`] is what the next leg continues with.
@@ -61,6 +63,7 @@ impl Default for Ride {
             engine: 1.0,
             road: 1.0,
             rolling: 1.0,
+            grip: 1.0,
         };
         Self { now, legs: Vec::new() }
     }
@@ -91,10 +94,11 @@ impl Ride {
     /// Blocks of a town: each with an acceleration, two turns, and a stop.
     pub fn town(&mut self, blocks: usize, random: &mut Random) -> &mut Self {
         for _ in 0..blocks {
-            let speed = random.between(7.0, 13.0);
-            self.reach(speed, speed / 2.0).hold(random.between(1.0, 4.0));
-            self.turn(random.sign() * random.between(70.0, 100.0), random.between(4.0, 6.0)).hold(2.0);
-            self.turn(random.sign() * random.between(10.0, 60.0), random.between(3.0, 5.0));
+            let speed = random.between(8.0, 13.0);
+            let slow = random.between(4.0, 7.0);
+            self.reach(speed, speed / 2.0).hold(random.between(1.0, 3.0)).reach(slow, 3.0);
+            self.turn(random.sign() * random.between(70.0, 100.0), random.between(4.0, 6.0));
+            self.reach(speed, 3.0).turn(random.sign() * random.between(5.0, 30.0), 4.0);
             self.stop(speed / 2.0, random.between(4.0, 8.0));
         }
         self
@@ -165,7 +169,7 @@ impl Body {
     fn step(&mut self, leg: &Leg, [middle, end]: [Leg; 2], at: f64, random: &mut Random) {
         self.time += STEP;
         let yaw_rate = leg.turn / leg.seconds * steered(at) + middle.carried;
-        let acceleration = [(end.speed - self.speed) / STEP, middle.speed * yaw_rate];
+        let acceleration = [(end.speed - self.speed) / STEP, leg.grip * middle.speed * yaw_rate];
         self.speed = end.speed;
         let [frequency, damping, roll, pitch] = SPRINGS;
         for ([angle, rate], pull) in

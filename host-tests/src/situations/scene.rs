@@ -3,13 +3,14 @@
 use super::board::Board;
 use super::damage::{Damage, damaged};
 use super::judge::{Outcome, judge};
-use super::receiver::Receiver;
+use super::receiver::{FIBRE_OPTIC, INERTIAL, Receiver};
 use super::ride::{Ride, STEP};
-use super::sensor::{During, Fault, Sensor};
+use super::sensor::{During, Fault, Message, Sensor};
 use super::vehicle::Vehicle;
 use super::wheels::{WheelFault, frames};
 use gyronet::store::Learned;
 use gyronet::units::Micros;
+use gyronet_tools::parts::Part;
 use gyronet_tools::random::Random;
 
 /// Time that a board needs to start, s.
@@ -20,6 +21,8 @@ pub struct Scene {
     pub vehicle: Vehicle,
     pub ride: Ride,
     pub sensor: Sensor,
+    /// A gyro beside the sensor, which then has the sensor's faults instead.
+    pub fibre_optic: Option<Sensor>,
     pub wheels: Vec<During<WheelFault>>,
     /// Period of the yaw messages.
     pub period_ms: u16,
@@ -42,6 +45,8 @@ impl Scene {
             vehicle: *vehicle,
             ride: Ride::default(),
             sensor: Sensor::new(vehicle, &mut Random::new(seed, 1)),
+            fibre_optic: (vehicle.part == Part::Dsp1760)
+                .then(|| Sensor::fibre_optic(&mut Random::new(seed, 6))),
             wheels: Vec::new(),
             period_ms: 10,
             restarts: Vec::new(),
@@ -58,10 +63,15 @@ impl Scene {
         self.ride.town(blocks, &mut self.random);
     }
 
+    /// The sensor that the situation is about: a fibre-optic gyro if there is one.
+    pub fn measures(&mut self) -> &mut Sensor {
+        self.fibre_optic.as_mut().unwrap_or(&mut self.sensor)
+    }
+
     /// The sensor has a fault from the ride's end so far, for this time.
     pub fn sensor_fault(&mut self, seconds: f64, what: Fault) {
         let from = self.ride.end();
-        self.sensor.faults.push(During { from, to: from + seconds, what });
+        self.measures().faults.push(During { from, to: from + seconds, what });
     }
 
     /// The wheels' frames have a fault from the ride's end so far, for this time.
@@ -85,39 +95,60 @@ impl Scene {
     pub fn run(&self) -> Outcome {
         let random = |stream| Random::new(self.seed, stream);
         let travelled = self.ride.travel(&self.vehicle, &mut random(2));
-        let messages = self.sensor.messages(&travelled, &mut random(3));
-        let mut messages = damaged(messages, &self.damage, &mut random(5)).into_iter().peekable();
+        let inertial = self.sensor.messages(&travelled, &mut random(3));
+        let fibre_optic = self.fibre_optic.iter().flat_map(|gyro| gyro.messages(&travelled, &mut random(7)));
+        let fibre_optic: Vec<Message> = fibre_optic.collect();
+        let damage = |messages, is_meant: bool| {
+            let damage = if is_meant { &self.damage[..] } else { &[] };
+            damaged(messages, damage, &mut random(5)).into_iter().peekable()
+        };
+        let mut inertial = damage(inertial, self.fibre_optic.is_none());
+        let mut fibre_optic = damage(fibre_optic, true);
         let shown = self.vehicle.wheels;
         let frames = shown.map(|shown| frames(&travelled, shown, &self.wheels, &mut random(4)));
         let mut frames = frames.unwrap_or_default().into_iter().peekable();
         let start =
             |learned: &Learned| Board::new(self.vehicle.part, shown.is_some(), self.period_ms, learned);
-        let (mut board, mut received, mut began) =
-            (start(&Learned::NOTHING), Receiver::default(), -self.epoch);
+        let receivers = || {
+            let firsts = if self.fibre_optic.is_some() { &[INERTIAL, FIBRE_OPTIC][..] } else { &[INERTIAL] };
+            firsts.iter().map(|first| Receiver::new(*first)).collect::<Vec<_>>()
+        };
+        let (mut board, mut received, mut began) = (start(&Learned::NOTHING), receivers(), -self.epoch);
         let mut restarts = self.restarts.iter().peekable();
-        let mut outcome = Outcome::default();
+        let mut outcome = Outcome { least: self.least, ..Outcome::default() };
+        let finish = |outcome: &mut Outcome, received: &[Receiver], now: f64| {
+            received.iter().for_each(|received| outcome.add(&judge(received, &travelled, now)));
+        };
         for step in 1..=(travelled.seconds() / STEP) as usize {
             let now = step as f64 * STEP;
             if restarts.next_if(|at| **at <= now).is_some() {
-                outcome.add(&judge(&received, &travelled, now));
-                (board, received, began) = (start(&board.learned()), Receiver::default(), now + BOOT);
+                finish(&mut outcome, &received, now);
+                (board, received, began) = (start(&board.learned()), receivers(), now + BOOT);
             }
-            let clock = Micros(((now - began).max(0.0) * 1e6) as u64);
-            while let Some(message) = messages.next_if(|message| message.at <= now + 1e-7) {
-                if now >= began {
+            let runs = now >= began;
+            let clock = Micros(((now - began).max(0.0) * 1e6).round() as u64);
+            let arrives = |message: &Message| message.at <= now + 1e-7;
+            while let Some(message) = inertial.next_if(arrives) {
+                if runs {
                     board.receive(&message.bytes, clock);
+                }
+            }
+            while let Some(message) = fibre_optic.next_if(arrives) {
+                if runs {
+                    board.receive_fibre_optic(&message.bytes, clock);
                 }
             }
             while let Some((_, frame)) = frames.next_if(|(at, _)| *at <= now) {
                 board.receive_frame(frame);
             }
-            if now >= began {
-                board.step(clock).iter().for_each(|frame| received.take(frame, now));
+            if runs {
+                for frame in board.step(clock) {
+                    received.iter_mut().for_each(|receiver| receiver.take(&frame, now));
+                }
             }
         }
-        outcome.add(&judge(&received, &travelled, travelled.seconds()));
-        outcome.seconds = travelled.seconds() as usize;
-        outcome.least = self.least;
+        finish(&mut outcome, &received, travelled.seconds());
+        outcome.seconds = received.len() * travelled.seconds() as usize;
         outcome
     }
 }

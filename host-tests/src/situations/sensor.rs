@@ -4,6 +4,7 @@ use super::ride::Travelled;
 use super::vehicle::Vehicle;
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::sensor::adis16465::DiagStat;
+use gyronet::sensor::dsp1760::message::{self as dsp1760, Extra};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use gyronet_tools::parts::{Part, adis16465, icm42688};
 use gyronet_tools::random::Random;
@@ -13,6 +14,10 @@ const MTI_RANGE: [f64; 2] = [7.85, 98.0];
 const MTI_CLIPPED: u32 = 0x3F << 8;
 /// Self-test passed, filter valid.
 const MTI_GOOD: u32 = 3;
+
+/// Earth's rate, rad/s, and the latitude of all rides, deg.
+const EARTH_RATE: f64 = 7.292_115e-5;
+pub const LATITUDE: f32 = 48.0;
 
 /// Something that lasts from one time to another, s.
 #[derive(Debug, Clone, Copy)]
@@ -77,10 +82,11 @@ pub struct Message {
 }
 
 impl Sensor {
+    /// The inertial sensor of a vehicle.
     pub fn new(vehicle: &Vehicle, random: &mut Random) -> Self {
         let mut draw = |sigma: f64| random.normals().map(|normal| sigma * normal);
         Self {
-            part: vehicle.part,
+            part: if vehicle.part == Part::Dsp1760 { Part::Xsens } else { vehicle.part },
             hz: 100.0,
             clock: 0.0,
             epoch: 0.0,
@@ -90,6 +96,25 @@ impl Sensor {
             gain: draw(vehicle.gain).map(|error| 1.0 + error),
             tilt: draw(vehicle.tilt),
             noise: vehicle.noise,
+            warming: [25.0, 0.0, 1.0],
+            faults: Vec::new(),
+        }
+    }
+
+    /// A DSP-1760 with the errors of its data sheet: 0.05 deg/h, 0.012 deg/sqrt(h), 50 ppm, and its mount's 0.3 deg.
+    pub fn fibre_optic(random: &mut Random) -> Self {
+        let mut draw = |sigma: f64| random.normals().map(|normal| sigma * normal);
+        Self {
+            part: Part::Dsp1760,
+            hz: 1_000.0,
+            clock: 0.0,
+            epoch: 0.0,
+            jitter: 0.0,
+            bias: draw(2.5e-7),
+            per_kelvin: [0.0; 3],
+            gain: draw(5e-5).map(|error| 1.0 + error),
+            tilt: draw(5e-3),
+            noise: [3.5e-6, 0.0],
             warming: [25.0, 0.0, 1.0],
             faults: Vec::new(),
         }
@@ -137,6 +162,8 @@ impl Sensor {
     }
 
     fn readings(&self, motion: [f64; 6], time: f64, seconds: f64, random: &mut Random) -> [f64; 6] {
+        let mut motion = motion;
+        motion[2] += EARTH_RATE * f64::from(LATITUDE).to_radians().sin();
         let mut readings = turned(motion, self.tilt);
         let warmer = self.celsius(time) - 25.0;
         for axis in 0..3 {
@@ -156,6 +183,9 @@ impl Sensor {
         celsius: f64,
         without: Option<usize>,
     ) -> Vec<u8> {
+        if self.part == Part::Dsp1760 {
+            return increment(number, stamp, readings.map(|rate| rate / self.hz), without);
+        }
         if self.part == Part::Xsens {
             return mti(number as u16, (stamp / 100) as u32, readings, celsius, without);
         }
@@ -199,6 +229,19 @@ fn turned(readings: [f64; 6], by: [f64; 3]) -> [f64; 6] {
         }
     }
     out
+}
+
+/// A message of a DSP-1760 with this increment, rad; the axis without a number is marked as not valid.
+fn increment(number: u64, stamp: u64, turns: [f64; 6], without: Option<usize>) -> Vec<u8> {
+    let [x, y, z, ..] = turns;
+    let message = dsp1760::Message {
+        rotation: [x, y, z].map(|turn| turn as f32),
+        acceleration: [0.0; 3],
+        extra: Extra::Timed { time: stamp as u32, temperature: 25 },
+        validity: dsp1760::Validity(dsp1760::Validity::GYRO.0 & !without.map_or(0, |axis| 1 << axis)),
+        sequence: (number % 128) as u8,
+    };
+    message.emit().to_vec()
 }
 
 /// An MTData2 message in single precision, from the manual of the MTi 600 series (MT Low Level Communication).

@@ -84,7 +84,8 @@ pub const UTV: Vehicle = Vehicle {
 /// The car without wheel frames.
 pub const BARE: Vehicle = Vehicle { name: "bare", wheels: None, ..CAR };
 
-pub const ALL: [Vehicle; 5] = [CAR, HATCH, TRUCK, UTV, BARE];
+/// The car with a fibre-optic gyro beside its MTi; what happens to the sensor happens to that gyro.
+pub const VAN: Vehicle = Vehicle { name: "van", part: Part::Dsp1760, ..CAR };
 
 /// A narrow band of noise: a phasor that turns, decays and is driven by white noise; both parts have variance 1.
 #[derive(Debug, Clone, Copy, Default)]

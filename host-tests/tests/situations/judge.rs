@@ -1,7 +1,7 @@
 //! The simulation's truth and the judge themselves: a perfect sensor is right, and each promise can be broken.
 
 use gyronet_host_tests::situations::judge::{Outcome, judge};
-use gyronet_host_tests::situations::receiver::{Receiver, Set, Slow};
+use gyronet_host_tests::situations::receiver::{INERTIAL, Receiver, Set, Slow};
 use gyronet_host_tests::situations::ride::{Ride, Travelled};
 use gyronet_host_tests::situations::scene::Scene;
 use gyronet_host_tests::situations::sensor::Sensor;
@@ -74,7 +74,7 @@ fn the_same_seed_gives_the_same_outcome_and_another_seed_another_one() {
 /// The letters of the promises that are broken by right messages after a change.
 fn broken(change: impl Fn(&mut Receiver)) -> String {
     let (_, travelled) = ride();
-    let mut received = Receiver::default();
+    let mut received = Receiver::new(INERTIAL);
     for step in 1..3_000 {
         let sampled = 0.01 * f64::from(step);
         let yaw = travelled.heading(sampled);

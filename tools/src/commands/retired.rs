@@ -2,10 +2,10 @@
 
 use clap::error::{ContextKind, ContextValue};
 
-const FAULTS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin faults`";
+const SITUATIONS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin situations`";
 const RETIRED: [(&str, &str); 11] = [
-    ("campaign", FAULTS),
-    ("soak", FAULTS),
+    ("campaign", SITUATIONS),
+    ("soak", SITUATIONS),
     ("paper", "`make -f tools/paper/Makefile`"),
     ("tables", "`cargo paper tables`"),
     ("warm-up", "`gyronet simulate --trip motorway` with `gyronet evaluate`"),

@@ -3,7 +3,7 @@
 use super::super::damage::Damage;
 use super::super::scene::Scene;
 use super::super::sensor::Fault;
-use super::super::vehicle::{CAR, HATCH, TRUCK, UTV};
+use super::super::vehicle::{CAR, HATCH, TRUCK, UTV, VAN};
 use super::super::wheels::WheelFault;
 use super::{ALL, Situation, WHEELED};
 
@@ -36,12 +36,38 @@ pub static SITUATIONS: &[Situation] = &[
         scene.epoch = 4_294.967_296 - 60.0;
         of_rate(scene, 100.0);
     }),
+    Situation::new("fibre-optic gyro", &[VAN], |scene| of_rate(scene, 100.0)),
+    Situation::new("fibre-optic gyro whose clock is 4 % fast", &[VAN], |scene| {
+        scene.measures().clock = 0.04;
+        of_rate(scene, 100.0);
+    }),
+    Situation::new("fibre-optic gyro set to degrees", &[VAN], |scene| {
+        scene.sensor_fault(1e3, Fault::Gain(2, 180.0 / std::f64::consts::PI));
+        of_rate(scene, 100.0);
+        scene.least = 0.4;
+    }),
+    Situation::new("fibre-optic gyro stuck", &[VAN], |scene| in_a_turn(scene, 5.0, Fault::Stuck(&[0, 1, 2]))),
+    Situation::new("fibre-optic gyro silent", &[VAN], |scene| in_a_turn(scene, 1.5, Fault::Silent)),
+    Situation::new("fibre-optic gyro marks its axis", &[VAN], |scene| {
+        in_a_turn(scene, 1.0, Fault::NoNumber(2))
+    }),
+    Situation::new("bits flip on the fibre-optic gyro's line", &[VAN], |scene| {
+        on_the_line(scene, Damage::BitFlip(0.01));
+    }),
+    Situation::new("fibre-optic gyro's line stalls", &[VAN], stall),
+    Situation::new("ferry that turns a fibre-optic gyro", &[VAN], |scene| {
+        scene.ride.now.carried = 0.01;
+        scene.ride.hold(20.0);
+        scene.ride.now.carried = 0.0;
+        scene.ride.hold(10.0);
+        scene.town(2);
+    }),
     Situation::new("gain of 1.008", ALL, |scene| {
-        scene.sensor.gain[2] = 1.008;
+        scene.measures().gain[2] = 1.008;
         of_rate(scene, 100.0);
     }),
     Situation::new("mounted 5 deg askew", ALL, |scene| {
-        scene.sensor.tilt = [0.087, -0.06, 0.0];
+        scene.measures().tilt = [0.087, -0.06, 0.0];
         of_rate(scene, 100.0);
     }),
     Situation::new("gyro stuck in a turn", ALL, |scene| in_a_turn(scene, 5.0, Fault::Stuck(&[0, 1, 2]))),
@@ -86,13 +112,17 @@ pub static SITUATIONS: &[Situation] = &[
     Situation::new("messages overtake each other", &[CAR, UTV], |scene| {
         on_the_line(scene, Damage::Late(0.02))
     }),
-    Situation::new("line stalls in a turn", &[CAR, UTV], |scene| {
+    Situation::new("line stalls in a turn", &[CAR, UTV], stall),
+    Situation::new("two faults, drawn", ALL, |scene| {
         scene.ride.hold(8.0);
         scene.town(1);
-        scene.ride.reach(10.0, 5.0).turn(30.0, 3.0);
-        scene.line_fault(0.7, Damage::Stall);
-        scene.ride.turn(60.0, 5.0).stop(5.0, 5.0);
+        scene.ride.reach(9.0, 5.0);
+        drawn(scene);
+        scene.ride.turn(70.0, 6.0);
+        drawn(scene);
+        scene.ride.turn(-50.0, 6.0).stop(5.0, 6.0);
         scene.town(1);
+        scene.least = 0.3;
     }),
     Situation::new("wheel marked as faulty", WHEELED, |scene| wheels(scene, WheelFault::Marked(1))),
     Situation::new("one wheel dead", WHEELED, |scene| wheels(scene, WheelFault::One(2, 0.0))),
@@ -157,4 +187,39 @@ fn wheels(scene: &mut Scene, what: WheelFault) {
     scene.town(1);
     scene.wheel_fault(1e3, what);
     scene.town(2);
+}
+
+fn stall(scene: &mut Scene) {
+    scene.ride.hold(8.0);
+    scene.town(1);
+    scene.ride.reach(10.0, 5.0).turn(30.0, 3.0);
+    scene.line_fault(0.7, Damage::Stall);
+    scene.ride.turn(60.0, 5.0).stop(5.0, 5.0);
+    scene.town(1);
+}
+
+/// A fault of any kind, from now on for up to five seconds.
+fn drawn(scene: &mut Scene) {
+    let seconds = scene.random.log_between(0.01, 5.0);
+    let axis = scene.random.below(6);
+    let share = scene.random.log_between(0.02, 1.0);
+    let size = scene.random.sign() * scene.random.log_between(0.02, 30.0);
+    match scene.random.below(16) {
+        0 => scene.sensor_fault(seconds, Fault::Stuck(&[0, 1, 2])),
+        1 => scene.sensor_fault(seconds, Fault::Stuck(&[3, 4, 5])),
+        2 => scene.sensor_fault(seconds, Fault::Stuck(&[2])),
+        3 => scene.sensor_fault(0.01, Fault::Shift(axis, size)),
+        4 => scene.sensor_fault(seconds, Fault::NoNumber(axis)),
+        5 => scene.sensor_fault(seconds, Fault::Silent),
+        6 => scene.sensor_fault(1e3, Fault::ClockJump(size)),
+        7 => scene.line_fault(seconds, Damage::Drop(share)),
+        8 => scene.line_fault(seconds, Damage::Twice(share)),
+        9 => scene.line_fault(seconds, Damage::BitFlip(share)),
+        10 => scene.line_fault(seconds, Damage::Burst(share, 64)),
+        11 => scene.line_fault(seconds, Damage::Truncation(share)),
+        12 => scene.line_fault(seconds, Damage::Late(share)),
+        13 => scene.line_fault(seconds, Damage::Stall),
+        14 => scene.wheel_fault(seconds, WheelFault::All(share)),
+        _ => scene.wheel_fault(seconds, WheelFault::Silent),
+    }
 }

@@ -103,9 +103,9 @@ pub static SITUATIONS: &[Situation] = &[
         scene.town(1);
         scene.ride.reach(14.0, 8.0).hold(5.0);
         scene.wheel_fault(4.0, WheelFault::All(0.0));
-        (scene.ride.now.road, scene.ride.now.speed) = (0.2, 4.0);
+        (scene.ride.now.road, scene.ride.now.speed, scene.ride.now.grip) = (0.2, 4.0, 0.0);
         scene.ride.turn(12.0, 4.0);
-        scene.ride.now.road = 1.0;
+        (scene.ride.now.road, scene.ride.now.grip) = (1.0, 1.0);
         scene.ride.reach(10.0, 5.0).turn(-60.0, 5.0).stop(5.0, 5.0);
     }),
     Situation::new("slow slide with locked wheels", WHEELED, |scene| {
@@ -120,7 +120,10 @@ pub static SITUATIONS: &[Situation] = &[
     Situation::new("spin on ice", ALL, |scene| {
         scene.ride.hold(8.0);
         scene.town(1);
-        scene.ride.reach(14.0, 8.0).turn(540.0, 4.0).stop(3.0, 6.0);
+        scene.ride.reach(14.0, 8.0);
+        (scene.ride.now.grip, scene.ride.now.speed) = (0.0, 3.0);
+        scene.ride.turn(540.0, 4.0).stop(3.0, 6.0);
+        scene.ride.now.grip = 1.0;
         scene.town(1);
     }),
     Situation::new("wheels spin at a standstill", WHEELED, |scene| {
