@@ -71,11 +71,11 @@ def vehicle_of(args):
     own = own if not args.vehicle and own.is_file() else None
     path = own or args.vehicle or (shared if shared.is_file() else None)
     vehicle = Vehicle.read(path) if path else Vehicle()
-    # Only a drive's own file says that its rows are turned already; its names are those of the original logs.
-    vehicle.mounting["applied"] = vehicle.mounting["applied"] and own is not None
-    vehicle.start = vehicle.start if own else None
-    if vehicle.mounting["applied"]:
+    # A drive's own file: its rows are turned already, and its names are those of the original logs.
+    if own and vehicle.turned:
         vehicle.forget_names()
+    else:
+        vehicle.of_log()
     if args.out:
         written = [Path(args.out).resolve(), Path(args.out).with_suffix(".toml").resolve()]
         for read in [*args.files, *([vehicle.path] if vehicle.path else [])]:

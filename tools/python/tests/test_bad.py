@@ -110,9 +110,9 @@ class Bad(unittest.TestCase):
         self.assertEqual(made.run(self.folder, "import", "d.csv", "--unit", "acc_x=m/s^2", "--out", "o.csv")[0], 0)
         text = (self.folder / "o.toml").read_text()
         written = tomllib.loads(text)
-        self.assertEqual((written["mounting"]["applied"], written["mounting"]["yaw_deg"], written["wheels"]["radius_m"]), (True, 90.0, 0.31))
+        self.assertEqual((written["mounting"]["yaw_deg"], written["recording"]["mounting"]["yaw_deg"], written["wheels"]["radius_m"]), (0.0, 90.0, 0.31))
         self.assertEqual(written["columns"], {"acc_x": {"name": "acc_x", "unit": "m/s^2"}})
-        self.assertEqual(written["recording"], {"units": {"imu": "m/s^2, rad/s"}, "dropped": {}})
+        self.assertEqual((written["recording"]["units"], written["recording"]["dropped"]), ({"imu": "m/s^2, rad/s"}, {}))
         self.assertEqual(made.run(self.folder, "import", "o.csv", "--out", "p.csv")[0], 0)
         self.assertEqual((self.folder / "p.csv").read_text(), (self.folder / "o.csv").read_text())
 

@@ -68,8 +68,27 @@ class Again(Folder):
         np.testing.assert_allclose(starts, [made.START, made.START + 2], atol=2e-6)
         # Another drive's file says nothing about this one.
         shutil.copy(self.folder / "first.csv", self.folder / "other.csv")
-        self.imports("other.csv", "--vehicle", "first.toml")
+        self.imports("other.csv", "--vehicle", "first.toml", "--imu", "imu")
         self.assertNotIn("start", tomllib.loads((self.folder / "out.toml").read_text())["recording"])
+
+    def test_a_mounting_that_is_edited_counts(self):
+        t = made.times()
+        made.mcap(self.folder / "d.mcap", made.imu_messages(t, made.imu(t)))
+        (self.folder / "d.toml").write_text("[mounting]\nroll_deg = 10.0\nyaw_deg = 90.0\n")
+        first, _ = self.imports("d.mcap")
+        beside = self.folder / "out.toml"
+        text = beside.read_text()
+        self.assertEqual(tomllib.loads(text)["mounting"]["yaw_deg"], 0.0)
+        beside.write_text(text.replace("yaw_deg = 0.0", "yaw_deg = -90.0", 1))
+        self.assertEqual(made.run(self.folder, "import", "out.csv", "--out", "again.csv")[0], 0)
+        again = made.drive(self.folder, "again.csv")
+        np.testing.assert_allclose(again["acc_x"], first["acc_y"], atol=2e-7)
+        whole = tomllib.loads((self.folder / "again.toml").read_text())["recording"]["mounting"]
+        # For another log of the vehicle, both turns in one; so also from the files of older imports.
+        (self.folder / "old.toml").write_text("[mounting]\napplied = true\n" + "".join(f"{key} = {value}\n" for key, value in whole.items()))
+        for vehicle in ("again.toml", "old.toml"):
+            self.assertEqual(made.run(self.folder, "import", "d.mcap", "--vehicle", vehicle, "--imu", "/imu", "--out", "both.csv")[0], 0)
+            np.testing.assert_allclose(made.drive(self.folder, "both.csv")["acc_x"], again["acc_x"], atol=3e-7)
 
 
 if __name__ == "__main__":

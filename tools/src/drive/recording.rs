@@ -47,6 +47,8 @@ pub struct Row {
     pub course: Option<f64>,
     /// Rates of the wheels, rad/s.
     pub wheels: [Option<f64>; WHEELS],
+    /// Speed over ground by GNSS, m/s.
+    pub speed: Option<f64>,
 }
 
 /// A complete drive in memory; [`super::stream::Drive`] is for drives of any length.

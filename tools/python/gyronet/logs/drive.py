@@ -90,6 +90,11 @@ class Drive:
         self.place_courses()
         self.count_rows()
         self.start_of_day()
+        # The names that were used, for what the doctor says.
+        halves = [self.gyro.name] + [self.accel.name] * (self.accel is not self.gyro)
+        used = {"imu": "+".join(halves), "odometry": self.odometry, "position": self.position, "reference_rate": self.reference}
+        for role, channel in used.items():
+            self.vehicle.signals[role] = getattr(channel, "name", channel)
 
     def choose(self, files):
         signals, request = self.vehicle.signals, self.request

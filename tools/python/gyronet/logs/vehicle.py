@@ -10,8 +10,9 @@ import numpy as np
 from gyronet.refused import Refused
 
 RADIUS = 0.289  # m; that of the recorded car
+ZERO = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0}
 KEYS = {
-    "mounting": {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "applied": False},
+    "mounting": {**ZERO, "applied": False},
     "wheels": dict.fromkeys(["radius_m", "track_m", "front_left", "front_right", "rear_left", "rear_right"]),
     "signals": dict.fromkeys(["imu", "odometry", "position", "reference_rate"]),
     "bus": {"dbc": None},
@@ -21,7 +22,7 @@ WHEELS = ["front_right", "rear_right", "front_left", "rear_left"]  # the order o
 
 class Vehicle:
     def __init__(self):
-        self.path, self.columns, self.start = None, {}, None
+        self.path, self.columns, self.start, self.turned = None, {}, None, None
         for table, keys in KEYS.items():
             setattr(self, table, dict(keys))
 
@@ -33,12 +34,16 @@ class Vehicle:
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise Refused(f"{path}: not a vehicle file: {error}") from None
         vehicle.path = path
+        if text.get("mounting", {}).get("applied") is True:
+            # As imports wrote it before they wrote what the rows have been turned by.
+            turned = {**text.pop("mounting")}
+            text.setdefault("recording", {})["mounting"] = {key: turned[key] for key in turned if key in ZERO}
         for table, entries in text.items():
             if table == "columns" and isinstance(entries, dict):
                 vehicle.columns = {name: _column(path, name, entry) for name, entry in entries.items()}
                 continue
-            if table == "recording" and isinstance(entries, dict) and isinstance(entries.get("start", 0.0), (int, float)):
-                vehicle.start = entries.get("start")
+            if table == "recording" and isinstance(entries, dict):
+                vehicle.start, vehicle.turned = entries.get("start"), {**ZERO, **entries.get("mounting", {})}
                 continue
             if table not in KEYS or not isinstance(entries, dict):
                 raise Refused(f"{path}: unknown table [{table}]; known are {', '.join([*KEYS, 'columns'])}")
@@ -59,6 +64,19 @@ class Vehicle:
             vehicle.bus["dbc"] = str(path.parent / vehicle.bus["dbc"])
         return vehicle
 
+    def of_log(self):
+        """The vehicle as a log needs it: what a drive's rows have been turned by comes first."""
+        if self.turned:
+            self.mounting, self.turned, self.start = self.whole(), None, None
+
+    def whole(self):
+        """The mounting of the sensor: what the rows have been turned by, then what they still need."""
+        m = _matrix(self.mounting) @ _matrix(self.turned or ZERO)
+        level = np.hypot(m[2, 1], m[2, 2])
+        roll, yaw = (np.arctan2(m[2, 1], m[2, 2]), np.arctan2(m[1, 0], m[0, 0])) if level > 1e-6 else (0.0, np.arctan2(-m[0, 1], m[1, 1]))
+        angles = np.round(np.degrees([roll, np.arctan2(-m[2, 0], level), yaw]), 6) + 0.0
+        return dict(zip(ZERO, angles.tolist()))
+
     def forget_names(self):
         """Keeps mounting and dimensions only: the channel names are those of the original logs."""
         for table in ("signals", "bus"):
@@ -75,19 +93,12 @@ class Vehicle:
         return next((column.get("unit") for column in self.columns.values() if column["name"] == name), None)
 
     def turn(self, vectors):
-        """Rows of x, y, z from the sensor's axes to the vehicle's, unless they are there already."""
-        if self.mounting["applied"]:
-            return vectors
-        roll, pitch, yaw = (np.radians(self.mounting[f"{name}_deg"]) for name in ("roll", "pitch", "yaw"))
-        x, y, z = vectors.T
-        y, z = np.cos(roll) * y - np.sin(roll) * z, np.sin(roll) * y + np.cos(roll) * z
-        x, z = np.cos(pitch) * x + np.sin(pitch) * z, np.cos(pitch) * z - np.sin(pitch) * x
-        return np.column_stack([np.cos(yaw) * x - np.sin(yaw) * y, np.sin(yaw) * x + np.cos(yaw) * y, z])
+        """Rows of x, y, z from the sensor's axes to the vehicle's."""
+        return vectors @ _matrix(self.mounting).T if any(self.mounting[name] for name in ZERO) else vectors
 
     def text(self, recording):
         """The file of a drive whose rows are in the vehicle's axes; `recording` holds what is known of the import."""
-        tables = {**{table: getattr(self, table) for table in KEYS}, **recording}
-        tables["mounting"] = {**self.mounting, "applied": True}
+        tables = {**{table: getattr(self, table) for table in KEYS}, **recording, "mounting": ZERO, "recording.mounting": self.whole()}
         lines = []
         for table, entries in tables.items():
             lines += [f"[{table}]", *(f"{_key(key)} = {_value(value)}" for key, value in entries.items() if value is not None), ""]
@@ -102,6 +113,12 @@ def _column(path, name, entry):
     if not isinstance(entry, dict) or "name" not in entry or set(entry) - {"name", "unit"}:
         raise Refused(f'{path}: columns.{name}: write {{ name = "...", unit = "..." }}')
     return entry
+
+
+def _matrix(mounting):
+    (sr, sp, sy), (cr, cp, cy) = ([turn(np.radians(mounting[name])) for name in ZERO] for turn in (np.sin, np.cos))
+    return np.array([[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+                     [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr], [-sp, cp * sr, cp * cr]])
 
 
 def _key(name):

@@ -14,6 +14,7 @@ const FORCE: [&str; 3] = ["acc_x", "acc_y", "acc_z"];
 const RATE: [&str; 3] = ["gyr_x", "gyr_y", "gyr_z"];
 const REFERENCE: &str = "ref_gyr_z";
 const COURSE: &str = "ref_yaw";
+const SPEED: &str = "gnss_speed";
 const TEMPERATURE: &str = "temp_c";
 const WHEEL: [&str; WHEELS] = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"];
 
@@ -36,6 +37,7 @@ struct Columns {
     course: Option<Column>,
     temperature: Option<Column>,
     wheels: [Option<Column>; WHEELS],
+    speed: Option<Column>,
 }
 
 impl Columns {
@@ -59,6 +61,7 @@ impl Columns {
             course: optional(COURSE),
             temperature: optional(TEMPERATURE),
             wheels: WHEEL.map(optional),
+            speed: optional(SPEED),
         })
     }
 }
@@ -104,7 +107,7 @@ impl<R: std::io::Read> Reader<R> {
 
     fn row(&mut self) -> Result<Row, DataError> {
         let line = self.record.position().map_or(0, csv::Position::line);
-        let Columns { time, force, rate, reference, course, temperature, wheels } = self.columns;
+        let Columns { time, force, rate, reference, course, temperature, wheels, speed } = self.columns;
         let fields = Fields { path: &self.path, line, record: &self.record };
         let time = fields.time(time)?;
         if let Some(last) = self.last
@@ -126,10 +129,10 @@ impl<R: std::io::Read> Reader<R> {
             validity: Validity::Good,
         };
         let sample = self.rotation.map_or(sample, |rotation| rotation.sample(&sample));
-        let (reference, course) = (optional(reference)?, optional(course)?);
+        let (reference, course, speed) = (optional(reference)?, optional(course)?, optional(speed)?);
         let wheels = [w1?, w2?, w3?, w4?];
         self.last = Some(time);
-        Ok(Row { line, sample, reference, course, wheels })
+        Ok(Row { line, sample, reference, course, wheels, speed })
     }
 }
 
