@@ -8,13 +8,16 @@ mod align;
 mod allan;
 mod finding;
 mod forward;
+mod line;
 mod mounting;
 mod page;
 mod range;
 mod recording;
 mod reference;
+mod remedy;
 mod sampling;
 mod scope;
+mod speed;
 mod standstill;
 mod wheels;
 
@@ -24,15 +27,20 @@ pub use mounting::Mounting;
 pub use page::page;
 
 use crate::drive::error::DataError;
+use crate::drive::foreign;
+use crate::drive::recording::{Reader, Recording};
 use crate::drive::replay::initialise;
 use crate::drive::stream::Drive;
+use crate::drive::vehicle::Vehicle;
 use recording::Rows;
 use std::path::Path;
+
+/// Shortest standstill in which a drive can start, s.
+const LEAST_REST_S: f64 = 4.0;
 
 /// The results of examining a recording.
 #[derive(Debug)]
 pub struct Doctor {
-    /// The name of the recording.
     pub name: String,
     /// The time from the first row to the last, s.
     pub seconds: f64,
@@ -52,33 +60,36 @@ pub struct Doctor {
 impl Doctor {
     /// Examines a recording.
     pub fn examine(path: &Path) -> Result<Self, DataError> {
-        let mut doctor = Self::of(&Rows::read(path)?);
-        doctor.findings.insert(0, start(path));
+        let rows = Rows::read(path)?;
+        let mut doctor = Self::of(&rows);
+        doctor.findings.insert(0, start(path, &doctor, &rows)?);
         Ok(doctor)
     }
 
     fn of(rows: &Rows) -> Self {
-        let standstills = standstill::find(rows);
+        let (standstills, driven) = standstill::find(rows);
         let longest = standstills.iter().max_by_key(|span| span.len());
         let allan = allan::at_rest(rows, longest);
         let noise = allan.as_ref().map(|allan| [0, 1, 2].map(|axis: usize| allan[axis].noise()));
         let mounting = longest.and_then(|span| Mounting::at_rest(&rows.force[span.clone()]));
 
+        let forward = forward::find(rows, mounting.as_ref());
         let mut findings = sampling::findings(rows);
         findings.extend(range::findings(rows));
         findings.extend([
-            standstill::finding(rows, &standstills),
+            standstill::finding(rows, (&standstills, driven)),
             allan::finding(noise.as_ref(), longest),
             Finding::note(
                 "temperature",
                 "Not examined: a bias that follows temperature cannot be told from one that drifts.",
             ),
-            mounting::finding(mounting.as_ref()),
-            forward::finding(rows, mounting.as_ref()),
+            mounting::finding(rows, mounting.as_ref(), forward::wrong(forward)),
+            forward::finding(rows, mounting.as_ref(), forward),
             wheels::finding(rows),
             reference::finding(rows, longest),
             scope::finding(rows, &standstills),
         ]);
+        findings.extend(speed::finding(rows));
         let seconds = |row: usize| rows.seconds[row.min(rows.len() - 1)];
         Self {
             name: rows.name.clone(),
@@ -98,21 +109,53 @@ impl Doctor {
     }
 }
 
-/// Runs the beginning of the drive through the pipeline and reports whether static initialisation succeeds.
-fn start(path: &Path) -> Finding {
+/// Runs the beginning of the drive through the pipeline and reports whether static initialisation succeeds, or else
+/// from when on it does.
+fn start(path: &Path, doctor: &Doctor, rows: &Rows) -> Result<Finding, DataError> {
     let run = || -> Result<(), Box<dyn std::error::Error>> {
         initialise(&Drive::open(path)?)?;
         Ok(())
     };
-    match run() {
-        Ok(()) => Finding::good("start", "Static initialisation succeeds."),
-        Err(reason) => {
-            let reason = reason.to_string();
-            // The page may be sent to others, so it shows the recording's name instead of a path.
-            let reason = reason.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&reason);
-            Finding::bad("start", format!("{reason}; `gyronet import --from` skips the beginning."))
+    let Err(reason) = run() else { return Ok(Finding::good("start", "Static initialisation succeeds.")) };
+    let reason = reason.to_string();
+    // The page may be sent to others, so it shows the recording's name instead of a path.
+    let reason = reason.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&reason);
+    let mut from = None;
+    for (begin, end) in doctor.standstills.iter().filter(|(begin, end)| end - begin >= LEAST_REST_S) {
+        if starts(path, *begin, *end)? {
+            from = Some(begin.ceil());
+            break;
         }
     }
+    let name = &rows.name;
+    let remedy = match from {
+        Some(from) => format!(
+            "it can start at {from} s: `gyronet import {name}.csv --from {from} --out {name}_from_{from}.csv`"
+        ),
+        None => {
+            "it succeeds in no standstill: record it again, and let it stand for the first 3 s".to_owned()
+        }
+    };
+    Ok(Finding::bad("start", format!("{reason}; {remedy}.")))
+}
+
+/// Returns whether static initialisation succeeds between two times, s since the first row.
+fn starts(path: &Path, begin: f64, end: f64) -> Result<bool, DataError> {
+    let vehicle = Vehicle::of_drive(path)?;
+    let name = path.display().to_string();
+    let (mut first, mut rows) = (None, Vec::new());
+    for row in Reader::new(&name, foreign::open(path)?)?.mounted(&vehicle) {
+        let Ok(row) = row else { continue };
+        let time = 1e-6 * (row.sample.time.0 - *first.get_or_insert(row.sample.time.0)) as f64;
+        if time > end {
+            break;
+        }
+        if time >= begin.ceil() {
+            rows.push(row);
+        }
+    }
+    let part = Recording { path: name, rows, missing: 0, vehicle };
+    Ok(initialise(&Drive::from(&part)).is_ok())
 }
 
 #[cfg(test)]

@@ -76,11 +76,12 @@ fn a_sensor_at_rest_has_the_noise_of_its_data_sheet() {
     assert!((rate.to_degrees() * 0.664 - 0.0082).abs() < 2e-4 && (30.0..55.0).contains(&tau), "{rate} {tau}");
 }
 
-/// Returns the angle and the sigma that the finding on the forward direction names.
+/// The angle from x to forward, to the left, and its sigma, as the finding names them.
 fn forward(doctor: &Doctor) -> [f64; 2] {
     let text = &doctor.finding("forward").unwrap().text;
     let mut numbers = text.split(' ').filter_map(|word| word.parse().ok());
-    [(); 2].map(|()| numbers.next().unwrap_or_else(|| panic!("{text}")))
+    let [angle, sigma] = [(); 2].map(|()| numbers.next().unwrap_or_else(|| panic!("{text}")));
+    [if text.contains("to the right of forward") { angle } else { -angle }, sigma]
 }
 
 #[test]

@@ -24,7 +24,6 @@ impl Verdict {
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
-    /// The subject.
     pub what: &'static str,
     /// The verdict on the subject.
     pub verdict: Verdict,

@@ -3,6 +3,7 @@
 use super::Mounting;
 use super::finding::Finding;
 use super::recording::Rows;
+use super::remedy;
 use gyronet::mounting::{Forward, ForwardEstimator, Rotation};
 use gyronet::sample::{ImuSample, Standstill, Validity, WheelSample};
 use gyronet::units::{AngularRate, Micros, SpecificForce, WheelSpeed};
@@ -11,29 +12,34 @@ use gyronet::units::{AngularRate, Micros, SpecificForce, WheelSpeed};
 const WRONG: f32 = 25.0;
 const VAGUE: f32 = 10.0;
 
-/// Returns the finding; `mounting` gives the vertical.
-pub fn finding(rows: &Rows, mounting: Option<&Mounting>) -> Finding {
+/// The angle from x to forward, to the left, after levelling, and its sigma, degrees; `None` if they are not known.
+pub fn find(rows: &Rows, mounting: Option<&Mounting>) -> Option<[f32; 2]> {
+    let Mounting { roll_deg, pitch_deg, rest, .. } = mounting?;
+    let (rest, level) = (force(*rest)?, Rotation::from_mounting(*roll_deg as f32, *pitch_deg as f32, 0.0)?);
+    let forward = estimate(rows, &rest)?;
+    Some([forward.yaw(&level, rest), forward.sigma].map(f32::to_degrees)).filter(|[_, sigma]| *sigma <= VAGUE)
+}
+
+/// The angle by which x must be turned, degrees; 0 if it is near forward or forward is not known.
+pub fn wrong(found: Option<[f32; 2]>) -> f64 {
+    found.filter(|[yaw, _]| yaw.abs() > WRONG).map_or(0.0, |[yaw, _]| yaw.into())
+}
+
+pub fn finding(rows: &Rows, mounting: Option<&Mounting>, found: Option<[f32; 2]>) -> Finding {
     let what = "forward";
-    let found = mounting.and_then(|mounting| {
-        let rest = force(mounting.rest)?;
-        let forward = estimate(rows, &rest)?;
-        Some([forward.yaw(&Rotation::IDENTITY, rest), forward.sigma].map(f32::to_degrees))
-    });
-    let Some([yaw, sigma]) = found.filter(|[_, sigma]| *sigma <= VAGUE) else {
+    let Some((mounting, [yaw, sigma])) = mounting.zip(found) else {
         return Finding::note(what, "Wheels and accelerometer do not show the forward direction.");
     };
-    let text = format!("{yaw:+.0} +- {sigma:.0} deg to the left of x, by wheels and accelerometer");
+    let side = if yaw > 0.0 { "right" } else { "left" };
+    let text = format!(
+        "x points {:.0} +- {sigma:.0} deg to the {side} of forward, by wheels and accelerometer",
+        yaw.abs()
+    );
     if yaw.abs() <= WRONG {
         Finding::good(what, format!("{text}."))
     } else {
-        let named = rows.vehicle.mounting.yaw_deg - f64::from(yaw);
-        let named = (named + 180.0).rem_euclid(360.0) - 180.0;
-        Finding::note(
-            what,
-            format!(
-                "{text}: x is not forward. Train and drive with the same mounting, or set yaw_deg = {named:.0} in the vehicle file."
-            ),
-        )
+        let remedy = remedy::mounting(rows, mounting, yaw.into());
+        Finding::note(what, format!("{text}: train and drive with the same mounting, or {remedy}."))
     }
 }
 

@@ -1,6 +1,8 @@
 //! Computes the roll and pitch of the sensor's mounting from gravity at rest.
 
 use super::finding::Finding;
+use super::recording::Rows;
+use super::remedy;
 
 /// Standard gravity, m/s^2.
 const GRAVITY: f64 = 9.806_65;
@@ -35,9 +37,9 @@ impl Mounting {
     }
 }
 
-pub fn finding(mounting: Option<&Mounting>) -> Finding {
+pub fn finding(rows: &Rows, mounting: Option<&Mounting>, left_deg: f64) -> Finding {
     let what = "mounting";
-    let Some(Mounting { roll_deg, pitch_deg, force, .. }) = mounting else {
+    let Some(level @ Mounting { roll_deg, pitch_deg, force, .. }) = mounting else {
         return Finding::note(what, "No standstill in which to measure gravity.");
     };
     let excess = force / GRAVITY - 1.0;
@@ -49,13 +51,14 @@ pub fn finding(mounting: Option<&Mounting>) -> Finding {
     if excess.abs() > 0.1 {
         Finding::bad(what, format!("{angles}: the unit of the accelerometer is not m/s^2."))
     } else if tilt > TILT.1 {
-        Finding::bad(what, format!("{angles}: z is not up; set the mounting in the vehicle file."))
+        Finding::bad(what, format!("{angles}: z is not up; {}.", remedy::mounting(rows, level, left_deg)))
     } else if tilt > TILT.0 {
         Finding::note(
             what,
             format!(
-                "{angles}: the board levels a tilt beyond {} deg by itself, but it is better to set it in the vehicle file.",
-                TILT.0
+                "{angles}: the board levels a tilt beyond {} deg by itself, but better {}.",
+                TILT.0,
+                remedy::mounting(rows, level, left_deg)
             ),
         )
     } else {

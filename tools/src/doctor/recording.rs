@@ -30,6 +30,8 @@ pub struct Rows {
     /// True yaw rate, rad/s, and course, rad.
     pub reference: Vec<Option<f64>>,
     pub course: Vec<Option<f64>>,
+    /// Speed by GNSS, m/s.
+    pub speed: Vec<Option<f64>>,
     /// Rate of each wheel, rad/s.
     pub wheels: [Vec<Option<f64>>; WHEELS],
     /// Number of rows that were not used, and why the first one could not be read.
@@ -40,7 +42,6 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Reads a file.
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let shown = path.display().to_string();
         let file = foreign::open(path)?;
@@ -72,6 +73,7 @@ impl Rows {
             rate: Vec::new(),
             reference: Vec::new(),
             course: Vec::new(),
+            speed: Vec::new(),
             wheels: Default::default(),
             bad: 0,
             first_bad: None,
@@ -97,6 +99,7 @@ impl Rows {
             rows.rate.push(row.sample.angular_rate.map(|rate| rate.rad_per_sec()));
             rows.reference.push(row.reference);
             rows.course.push(row.course);
+            rows.speed.push(row.speed);
             for (wheel, rate) in rows.wheels.iter_mut().zip(row.wheels) {
                 wheel.push(rate);
             }

@@ -2,7 +2,9 @@
 
 use super::align::{self, Offset};
 use super::finding::{Finding, Verdict};
+use super::line::{DEGREES, Line, confused, seconds, turned};
 use super::recording::{Rows, SECOND};
+use super::remedy;
 use crate::drive::DT;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -14,31 +16,98 @@ const LATE: (f64, f64) = (0.015, 0.5);
 const LEAST_AT_REST: usize = 5;
 /// Two courses this far apart or further give no yaw rate, s.
 const COURSE_GAP: f64 = 2.0;
+/// Seconds by which GPS time is ahead of UTC.
+const GPS_AHEAD: f64 = 18.0;
+/// Gain error that is worth a word, and gains beyond which a unit is wrong.
+const GAIN: f64 = 0.003;
+/// A reference that never turns faster has nothing to compare, rad/s.
+const STILL: f64 = 0.01;
+const FAR: Range<f64> = 0.8..1.25;
 
 pub fn finding(rows: &Rows, standstill: Option<&Range<usize>>) -> Finding {
-    let gyro = rows.series(|k| Some(rows.rate[k][2]));
-    let rate = rows.series(|k| rows.reference[k]);
-    let course = rows.series(|k| rows.course[k]);
-    if !rate.is_empty() {
+    let known = rows.reference.iter().flatten().count();
+    let courses = rows.course.iter().flatten().count();
+    if known > 0 {
+        let percent = 100.0 * known as f64 / rows.len() as f64;
         let noise = standstill.map(|span| scatter(&rows.reference[span.clone()])).unwrap_or_default();
-        of_rate(&gyro, &rate, 100.0 * rate.len() as f64 / rows.len() as f64, &noise)
-    } else if !course.is_empty() {
-        of_course(&gyro, &course)
+        of_rate(rows, &format!("A yaw rate in {percent:.0} % of the rows"), &noise)
+    } else if courses > 0 {
+        of_course(rows, &format!("A course, {courses} values"))
     } else {
         Finding::note(WHAT, "None: the recording can neither judge a method nor train a network.")
     }
 }
 
-fn of_rate(gyro: &align::Rate, rate: &align::Rate, percent: f64, noise: &str) -> Finding {
-    let rows = format!("A yaw rate in {percent:.0} % of the rows");
-    match align::offset(gyro, rate) {
-        Ok(Offset { seconds, coefficient }) => Finding {
-            what: WHAT,
-            verdict: if seconds.abs() < LATE.0 { Verdict::Good } else { Verdict::Bad },
-            text: format!("{rows}, correlation with the gyro {coefficient:.4}, {}{noise}.", delay(seconds)),
-        },
-        Err(reason) => Finding::bad(WHAT, format!("{rows} that does not fit the gyro: {reason}{noise}.")),
+/// The clock of a reference against the gyro's; its sign may be the other one.
+fn aligned(gyro: &align::Rate, other: &[(f64, f64)]) -> Result<Offset, (String, bool)> {
+    let negative: Vec<(f64, f64)> = other.iter().map(|(time, rate)| (*time, -rate)).collect();
+    align::offset(gyro, other).map_err(|reason| (reason, align::offset(gyro, &negative).is_ok()))
+}
+
+/// The largest mean rate of a second, without the sign, rad/s.
+fn turns(rate: &align::Rate) -> f64 {
+    let mean = |second: &[(f64, f64)]| second.iter().map(|(_, rate)| rate).sum::<f64>() / second.len() as f64;
+    rate.chunks(SECOND).map(|second| mean(second).abs()).fold(0.0, f64::max)
+}
+
+/// The words on a wrong sign, or on another reason for which a reference does not fit.
+fn unfit(values: &str, (reason, mirrored): (String, bool)) -> Finding {
+    let reason =
+        if mirrored { "the opposite sign (turns to the left are positive, with z up)" } else { &reason };
+    Finding::bad(WHAT, format!("{values} that does not fit the gyro: {reason}."))
+}
+
+/// A confusion of units, by how much more the gyro turns than the reference.
+fn units(rows: &Rows, gain: f64, column: &str) -> Option<String> {
+    let channel = if confused(gain, DEGREES) {
+        remedy::channel(rows, "imu", "imu")
+    } else if confused(gain, 1.0 / DEGREES) {
+        remedy::channel(rows, "reference_rate", column)
+    } else {
+        return None;
+    };
+    let import = remedy::import(rows, &format!("--unit {channel}=deg/s"));
+    Some(format!("the gyro turns {gain:.3} times as much: {channel} is in deg/s; {import}"))
+}
+
+fn of_rate(rows: &Rows, values: &str, noise: &str) -> Finding {
+    let (gyro, rate) = (rows.series(|k| Some(rows.rate[k][2])), rows.series(|k| rows.reference[k]));
+    let Offset { seconds: late, coefficient } = match aligned(&gyro, &rate) {
+        Ok(offset) => offset,
+        Err(_) if turns(&rate) < STILL => {
+            return Finding::note(WHAT, format!("{values}{noise}; it shows no turn."));
+        }
+        Err(reason) => return unfit(values, reason),
+    };
+    let shift = (late / DT).round() as isize;
+    let pair = |k: usize| Some((rows.rate.get(k.checked_add_signed(shift)?)?[2], rows.reference[k]?));
+    let line = Line::of(&seconds(rows, pair));
+    let gain = line.map_or(1.0, |line| 1.0 / line.slope);
+    let text = format!("{values}, correlation with the gyro {coefficient:.4}, {}{noise}", delay(late));
+    if let Some(units) = units(rows, gain, "ref_gyr_z") {
+        return Finding::bad(WHAT, format!("{text}; {units}."));
     }
+    if !FAR.contains(&gain) {
+        return Finding::bad(
+            WHAT,
+            format!("{text}; the gyro turns {gain:.3} times as much: one unit is wrong."),
+        );
+    }
+    if late.abs() >= LATE.0 {
+        let name = remedy::channel(rows, "reference_rate", "ref_gyr_z");
+        let import = remedy::import(rows, &format!("--offset {name}={late:.3}"));
+        return Finding::bad(WHAT, format!("{text}; {import}."));
+    }
+    let sigma = line.map_or(0.0, |line| line.sigma);
+    let gain =
+        if (gain - 1.0).abs() < GAIN.max(3.0 * sigma) { String::new() } else { percent("gain", gain, sigma) };
+    Finding::good(WHAT, format!("{text}{gain}."))
+}
+
+/// "; the gyro's gain is 0.7 +- 0.1 % too high"
+fn percent(what: &str, ratio: f64, sigma: f64) -> String {
+    let word = if ratio > 1.0 { "high" } else { "low" };
+    format!("; the gyro's {what} is {:.1} +- {:.1} % too {word}", 100.0 * (ratio - 1.0).abs(), 100.0 * sigma)
 }
 
 /// Returns the text for a clock offset: by how much the reference is early or late.
@@ -62,23 +131,55 @@ fn scatter(reference: &[Option<f64>]) -> String {
     )
 }
 
-fn of_course(gyro: &align::Rate, course: &align::Rate) -> Finding {
-    let change = |pair: &[(f64, f64)]| {
-        let seconds = pair[1].0 - pair[0].0;
-        let turn = (pair[1].1 - pair[0].1 + PI).rem_euclid(TAU) - PI;
-        (seconds < COURSE_GAP).then(|| (0.5 * (pair[0].0 + pair[1].0), turn / seconds))
+fn of_course(rows: &Rows, values: &str) -> Finding {
+    let known: Vec<(usize, f64)> = (0..rows.len()).filter_map(|row| Some((row, rows.course[row]?))).collect();
+    // Two courses: their rows, and the turn between them, rad.
+    let turns = known.windows(2).filter_map(|pair| {
+        let ((from, before), (to, after)) = (pair[0], pair[1]);
+        let turn = (after - before + PI).rem_euclid(TAU) - PI;
+        (rows.seconds[to] - rows.seconds[from] < COURSE_GAP).then_some((from, to, turn))
+    });
+    let turns: Vec<(usize, usize, f64)> = turns.collect();
+    let change = |(from, to, turn): &(usize, usize, f64)| {
+        let (begin, end) = (rows.seconds[*from], rows.seconds[*to]);
+        (0.5 * (begin + end), turn / (end - begin))
     };
-    let change: Vec<(f64, f64)> = course.windows(2).filter_map(change).collect();
-    let values = format!("A course, {} values", course.len());
-    match align::offset(gyro, &change) {
-        Ok(Offset { seconds, coefficient }) => Finding {
-            what: WHAT,
-            verdict: if seconds.abs() < LATE.1 { Verdict::Good } else { Verdict::Note },
-            text: format!(
-                "{values}; its change agrees with the gyro (correlation {coefficient:.3}), {}.",
-                delay(seconds)
-            ),
-        },
-        Err(reason) => Finding::note(WHAT, format!("{values}; cannot be aligned with the gyro: {reason}.")),
+    let gyro = rows.series(|k| Some(rows.rate[k][2]));
+    let Offset { seconds: late, coefficient } =
+        match aligned(&gyro, &turns.iter().map(change).collect::<Vec<_>>()) {
+            Ok(offset) => offset,
+            Err((_, true)) => return unfit(values, (String::new(), true)),
+            Err((reason, false)) => {
+                return Finding::note(WHAT, format!("{values}; cannot be aligned with the gyro: {reason}."));
+            }
+        };
+    let (angle, shift) = (turned(rows), (late / DT).round() as isize);
+    let pair = |(from, to, turn): &(usize, usize, f64)| {
+        let at = |row: usize| angle.get(row.checked_add_signed(shift)?);
+        Some((at(*to)? - at(*from)?, *turn))
+    };
+    let line = Line::of(&turns.iter().filter_map(pair).collect::<Vec<_>>());
+    let gain = line.map_or(1.0, |line| 1.0 / line.slope);
+    let text =
+        format!("{values}; its change agrees with the gyro (correlation {coefficient:.3}), {}", delay(late));
+    if let Some(units) = units(rows, gain, "ref_yaw") {
+        return Finding::bad(WHAT, format!("{text}; {units}."));
+    }
+    if late.abs() >= LATE.1 {
+        let gps = if (late.abs() - GPS_AHEAD).abs() < 1.0 { " (GPS time against UTC)" } else { "" };
+        let name = remedy::channel(rows, "position", "position");
+        let import = remedy::import(rows, &format!("--offset {name}={late:.1}"));
+        return Finding::bad(WHAT, format!("{text}{gps}; {import}."));
+    }
+    // A course slips in bends, so it says less of a gain than a rate does.
+    let gain = if (0.9..1.1).contains(&gain) {
+        String::new()
+    } else {
+        percent("scale", gain, line.map_or(0.0, |line| line.sigma))
+    };
+    Finding {
+        what: WHAT,
+        verdict: if gain.is_empty() { Verdict::Good } else { Verdict::Note },
+        text: format!("{text}{gain}."),
     }
 }

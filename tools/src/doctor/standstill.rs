@@ -12,12 +12,15 @@ use std::ops::Range;
 const QUIET: (f64, f64) = (2.5, 0.0866);
 /// The mean yaw rate of a second at rest may differ by this much from the median of all quiet seconds, rad/s.
 const RESTING_RATE: f64 = 0.01;
+/// Speed by GNSS of a vehicle that does not stand, m/s.
+const DRIVES: f64 = 1.0;
 
-pub fn find(rows: &Rows) -> Vec<Range<usize>> {
+/// Returns the standstills, and the number of seconds that are as quiet but in which the vehicle drove by its GNSS.
+pub fn find(rows: &Rows) -> (Vec<Range<usize>>, usize) {
     let seconds = || (0..rows.len() / SECOND).map(|k| k * SECOND..(k + 1) * SECOND);
     let spreads: Vec<f64> = seconds().map(|second| spread(&rows.rate[second])).collect();
     let ranked = sorted(spreads.iter().copied());
-    let Some(quietest) = ranked.get(ranked.len() / 100) else { return Vec::new() };
+    let Some(quietest) = ranked.get(ranked.len() / 100) else { return (Vec::new(), 0) };
     let limit = (QUIET.0 * quietest).min(QUIET.1);
     let quiet =
         seconds().zip(&spreads).filter(|(second, spread)| **spread <= limit && wheels_rest(rows, second));
@@ -26,6 +29,7 @@ pub fn find(rows: &Rows) -> Vec<Range<usize>> {
     // A slow turn is as quiet as a standstill, but its mean rate differs from the median of the quiet seconds.
     let means = sorted(quiet.iter().map(|(_, mean)| *mean));
     let bias = means.get(means.len() / 2).copied().unwrap_or_default();
+    let (quiet, driven): (Vec<_>, Vec<_>) = quiet.into_iter().partition(|(second, _)| !drives(rows, second));
     let mut standstills: Vec<Range<usize>> = Vec::new();
     for (second, _) in quiet.into_iter().filter(|(_, mean)| (mean - bias).abs() < RESTING_RATE) {
         match standstills.last_mut() {
@@ -33,7 +37,7 @@ pub fn find(rows: &Rows) -> Vec<Range<usize>> {
             _ => standstills.push(second),
         }
     }
-    standstills
+    (standstills, driven.len())
 }
 
 /// Returns the root of the sum of the three axes' variances.
@@ -52,13 +56,24 @@ fn wheels_rest(rows: &Rows, second: &Range<usize>) -> bool {
     })
 }
 
-pub fn finding(rows: &Rows, standstills: &[Range<usize>]) -> Finding {
+fn drives(rows: &Rows, second: &Range<usize>) -> bool {
+    let speeds = sorted(rows.speed[second.clone()].iter().copied().flatten());
+    speeds.get(speeds.len() / 2).is_some_and(|speed| *speed > DRIVES)
+}
+
+pub fn finding(rows: &Rows, (standstills, driven): (&[Range<usize>], usize)) -> Finding {
     let lengths = || standstills.iter().map(Range::len);
     let [total, longest] =
         [lengths().sum(), lengths().max().unwrap_or_default()].map(|rows: usize| rows as f64 * DT);
     let by =
         if rows.wheels.iter().flatten().any(Option::is_some) { "gyro and wheels" } else { "the gyro alone" };
-    let text = format!("{} by {by}, {total:.0} s in total, the longest {longest:.0} s.", standstills.len());
+    let mut text =
+        format!("{} by {by}, {total:.0} s in total, the longest {longest:.0} s.", standstills.len());
+    if driven > 0 {
+        text += &format!(
+            " {driven} s are as quiet, but driven by the GNSS speed: the gyro alone cannot tell stops."
+        );
+    }
     if standstills.is_empty() {
         Finding::note("standstills", text)
     } else {

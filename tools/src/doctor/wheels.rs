@@ -1,22 +1,14 @@
 //! Compares wheels and gyro: the speed difference of right and left, over the track, is the yaw rate.
 
 use super::finding::Finding;
-use super::recording::{Rows, SECOND};
+use super::line::{DEGREES, KMH, Line, confused, seconds};
+use super::recording::Rows;
+use super::remedy;
 
 /// Fewest seconds of turning for a comparison.
 const LEAST_TURNING_S: usize = 5;
 /// Mean yaw rate above which a second counts as turning, rad/s.
 const TURNS: f64 = 0.05;
-
-/// The fitted line of a wheel pair's rate difference over the yaw rate.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Pair {
-    /// Rate difference, rad/s, per rad/s of yaw rate: the track over the radius.
-    slope: f64,
-    correlation: f64,
-    /// Rate difference without a turn, rad/s.
-    offset: f64,
-}
 
 pub fn finding(rows: &Rows) -> Finding {
     let what = "wheels";
@@ -24,7 +16,7 @@ pub fn finding(rows: &Rows) -> Finding {
     if known == 0 {
         return Finding::note(what, "None: no standstill by the wheels, and no speed.");
     }
-    let Some(Pair { slope, correlation, offset }) = compare(rows) else {
+    let Some(Line { slope, correlation, offset, .. }) = compare(rows) else {
         return Finding::note(
             what,
             format!(
@@ -39,7 +31,9 @@ pub fn finding(rows: &Rows) -> Finding {
         "{known} recorded; left and right against the gyro: correlation {correlation:.3}, track {track:.2} m at a radius of {radius} m{}, {offset:+.3} rad/s apart when driving straight",
         named.unwrap_or_default()
     );
-    if correlation > 0.9 && (0.2..4.0).contains(&track) {
+    if let Some(wrong) = units(rows, track, correlation) {
+        Finding::bad(what, format!("{text}: {wrong}."))
+    } else if correlation > 0.9 && (0.2..4.0).contains(&track) {
         Finding::good(what, format!("{text}."))
     } else if correlation < -0.9 {
         Finding::bad(what, format!("{text}: left and right are swapped, or z is down."))
@@ -48,35 +42,51 @@ pub fn finding(rows: &Rows) -> Finding {
     }
 }
 
-/// Compares means over seconds. Wheels 1 and 2 are right, 3 and 4 left, 1 and 3 at the front. Returns `None` if no
-/// axle has both wheels or the drive hardly turns.
-fn compare(rows: &Rows) -> Option<Pair> {
+/// A confusion of units, by the track that the wheels and the gyro have together.
+fn units(rows: &Rows, track: f64, correlation: f64) -> Option<String> {
+    let named = rows.vehicle.wheels.track_m;
+    // Without a named track, that of a car or a truck.
+    let fits = |ratio: f64| match named {
+        Some(named) => confused(track / named, ratio),
+        None => !(0.5..3.0).contains(&track) && (1.0..2.6).contains(&(track / ratio)),
+    };
+    if correlation < 0.9 {
+        None
+    } else if fits(1.0 / DEGREES) {
+        let channel = remedy::channel(rows, "imu", "imu");
+        let import = remedy::import(rows, &format!("--unit {channel}=deg/s"));
+        Some(format!("{channel} is in deg/s; {import}"))
+    } else if fits(KMH) {
+        Some(format!("the wheels are in km/h; {}", in_kmh(rows)))
+    } else {
+        None
+    }
+}
+
+/// The import with the unit of each wheel.
+pub fn in_kmh(rows: &Rows) -> String {
+    let wheels = &rows.vehicle.wheels;
+    let names = [&wheels.front_left, &wheels.front_right, &wheels.rear_left, &wheels.rear_right];
+    let mut flags: Vec<String> =
+        names.into_iter().flatten().map(|name| format!("--unit {name}=km/h")).collect();
+    if flags.is_empty() {
+        let number =
+            (1..=rows.wheels.len()).filter(|wheel| rows.wheels[wheel - 1].iter().any(Option::is_some));
+        flags = number.map(|wheel| format!("--unit wheel{wheel}_rate=km/h")).collect();
+    }
+    remedy::import(rows, &flags.join(" "))
+}
+
+/// Compares means over seconds. Wheels 1 and 2 are right, 3 and 4 left, 1 and 3 at the front. Returns the rate
+/// difference, rad/s, over the yaw rate: its slope is the track over the radius. `None` if no axle has both wheels or
+/// the drive hardly turns.
+fn compare(rows: &Rows) -> Option<Line> {
     for (right, left) in [(1, 3), (0, 2)] {
         let (right, left) = (&rows.wheels[right], &rows.wheels[left]);
-        let seconds = (0..rows.len()).step_by(SECOND).filter_map(|from| {
-            let span = from..(from + SECOND).min(rows.len());
-            let mean = |wheel: &[Option<f64>]| {
-                let known = || wheel.iter().flatten();
-                (known().count() >= 5).then(|| known().sum::<f64>() / known().count() as f64)
-            };
-            let (right, left) = (mean(&right[span.clone()])?, mean(&left[span.clone()])?);
-            Some((rows.mean_yaw_rate(span), right - left))
-        });
-        let seconds: Vec<(f64, f64)> = seconds.collect();
+        let seconds = seconds(rows, |k| Some((rows.rate[k][2], right[k]? - left[k]?)));
         if seconds.iter().filter(|(rate, _)| rate.abs() > TURNS).count() >= LEAST_TURNING_S {
-            return line(&seconds);
+            return Line::of(&seconds);
         }
     }
     None
-}
-
-fn line(points: &[(f64, f64)]) -> Option<Pair> {
-    let count = points.len() as f64;
-    let (mx, my) =
-        (points.iter().map(|p| p.0).sum::<f64>() / count, points.iter().map(|p| p.1).sum::<f64>() / count);
-    let sum = |of: &dyn Fn(f64, f64) -> f64| points.iter().map(|p| of(p.0 - mx, p.1 - my)).sum::<f64>();
-    let (xx, xy, yy) = (sum(&|x, _| x * x), sum(&|x, y| x * y), sum(&|_, y| y * y));
-    let slope = xy / xx;
-    let known = xx > 0.0 && yy > 0.0;
-    known.then(|| Pair { slope, correlation: xy / (xx * yy).sqrt(), offset: my - slope * mx })
 }

@@ -76,11 +76,9 @@ fn write(args: &Args, sequence: &Sequence) -> super::Result {
             sequence::write_csv(sequence, out)
         };
         let rows = rows.map_err(named(path))?;
-        let mut vehicle = Vehicle::default();
-        vehicle.wheels.radius_m = Some(sequence.layout.vehicle().world.car.wheel_radius);
-        vehicle.mounting.applied = true;
+        let radius = sequence.layout.vehicle().world.car.wheel_radius;
         let beside = Vehicle::beside(path);
-        super::write(&beside, toml::to_string(&vehicle)?)?;
+        super::write(&beside, format!("[wheels]\nradius_m = {radius:?}\n"))?;
         remark(format_args!("{}: {rows} rows; {} beside it", path.display(), beside.display()))?;
     }
     Ok(())

@@ -1,0 +1,45 @@
+//! What mends a finding: an edit of the vehicle file, or a flag of the import.
+
+use super::Mounting;
+use super::recording::Rows;
+use crate::drive::vehicle::{self, Vehicle};
+use std::path::Path;
+
+/// The vehicle file whose edit works, with the mounting that turns x forward and z up; `left_deg` is the direction of
+/// forward from x after levelling.
+pub fn mounting(rows: &Rows, level: &Mounting, left_deg: f64) -> String {
+    let Vehicle { mounting, recording, path, .. } = &rows.vehicle;
+    let level = turn(level.roll_deg, level.pitch_deg, 0.0);
+    let vehicle::Mounting { roll_deg, pitch_deg, yaw_deg, .. } =
+        mounting.then(&level).then(&turn(0.0, 0.0, -left_deg));
+    let default = Path::new(&rows.name).with_extension("toml");
+    let file = path.as_deref().unwrap_or(&default).file_name().unwrap_or_default().display();
+    let applied = if mounting.applied { ", applied = false" } else { "" };
+    let mut text = format!(
+        "in {file}, under [mounting], set roll_deg = {roll_deg:.1}, pitch_deg = {pitch_deg:.1}, yaw_deg = {yaw_deg:.1}{applied}"
+    );
+    let vehicle::Mounting { roll_deg, pitch_deg, yaw_deg, .. } =
+        recording.mounting.then(&turn(roll_deg, pitch_deg, yaw_deg));
+    if recording.mounting != vehicle::Mounting::default() {
+        text += &format!(" (on the board {roll_deg:.1}, {pitch_deg:.1}, {yaw_deg:.1})");
+    }
+    text
+}
+
+fn turn(roll_deg: f64, pitch_deg: f64, yaw_deg: f64) -> vehicle::Mounting {
+    vehicle::Mounting { roll_deg, pitch_deg, yaw_deg, applied: false }
+}
+
+/// The channel of a role, as the import names it in this drive or in its log.
+pub fn channel<'r>(rows: &'r Rows, role: &str, column: &'r str) -> &'r str {
+    rows.vehicle.signals.get(role).map_or(column, String::as_str)
+}
+
+/// The import with these flags.
+pub fn import(rows: &Rows, flags: &str) -> String {
+    if rows.vehicle.recording.units.is_empty() {
+        format!("`gyronet import {0}.csv {flags} --out {0}_fixed.csv`", rows.name)
+    } else {
+        format!("import the log again with `{flags}`")
+    }
+}
