@@ -40,7 +40,6 @@ pub enum CalibrateError {
     /// The drive has no heading reference.
     #[error("{path}: no {columns}: a calibration needs one of these columns")]
     NoReference {
-        /// The recording.
         path: String,
         /// The columns that are missing.
         columns: &'static str,
@@ -48,7 +47,6 @@ pub enum CalibrateError {
     /// The reference of the drive is too short.
     #[error("{path}: only {seconds:.0} s with a reference; a calibration needs {SHORTEST_S:.0} s")]
     TooShort {
-        /// The recording.
         path: String,
         /// The time with a reference, s.
         seconds: f64,
@@ -56,7 +54,6 @@ pub enum CalibrateError {
     /// No calibration makes the gyro agree with the reference.
     #[error("{path}: reference and gyro differ by {rad:.3} rad from span to span: not the same drive")]
     Contradiction {
-        /// The recording.
         path: String,
         /// The robust deviation of the spans from the fit, rad.
         rad: f64,

@@ -56,7 +56,6 @@ pub enum ViaError {
     /// The bytes of a row gave no sample.
     #[error("{path}: line {line}: the {part} delivers no sample: {why}")]
     NoSample {
-        /// The recording.
         path: String,
         /// The row's line.
         line: u64,

@@ -9,17 +9,11 @@ use std::process::{Command, Stdio};
 /// The reason why no Python interpreter can run a step.
 #[derive(Debug, thiserror::Error)]
 pub enum PythonError {
-    /// A program cannot be started.
     #[error("{}: {source}", program.display())]
-    Start {
-        program: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    Start { program: PathBuf, source: std::io::Error },
     /// The interpreter lacks a package.
     #[error("{}: {reason} (needed: {})", python.display(), packages.join(", "))]
     Packages {
-        /// Path of the interpreter.
         python: PathBuf,
         /// The last line of the interpreter's error output.
         reason: String,
@@ -28,12 +22,7 @@ pub enum PythonError {
     },
     /// A command that creates the environment failed; the command has printed its own error message.
     #[error("{}: could not be created: {step} failed (without a network, pass --python with a Python that has all packages)", environment.display())]
-    Environment {
-        /// The folder of the environment.
-        environment: PathBuf,
-        /// The command that failed.
-        step: &'static str,
-    },
+    Environment { environment: PathBuf, step: &'static str },
     #[error(
         "logs are read by Python, and python3 cannot be started ({source}): install Python 3.11 or later, or set GYRONET_PYTHON"
     )]

@@ -19,16 +19,10 @@ const PUBLIC: &str = "gyronet public key 1";
 pub enum KeyError {
     /// The file cannot be read or written.
     #[error("{}: {source}", path.display())]
-    File {
-        /// Path of the file.
-        path: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    File { path: PathBuf, source: std::io::Error },
     /// The file is not a key file of the expected kind.
     #[error("{}: not a {what}", path.display())]
     Content {
-        /// Path of the file.
         path: PathBuf,
         /// The expected kind of key.
         what: &'static str,

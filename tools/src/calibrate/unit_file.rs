@@ -20,7 +20,6 @@ pub struct UnitFile {
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DriveFit {
-    /// The name of the recording.
     pub name: String,
     /// The gyro's bias about x, y and z at the start of the drive, rad/s.
     pub gyro_bias_rad_per_s: [f64; 3],
@@ -34,20 +33,11 @@ pub struct DriveFit {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum UnitFileError {
-    /// The file cannot be read.
     #[error("{path}: {source}")]
-    Read {
-        path: String,
-        /// The reason.
-        source: std::io::Error,
-    },
+    Read { path: String, source: std::io::Error },
     /// The file is not a calibration file.
     #[error("{path}: {source}")]
-    Json {
-        path: String,
-        /// The reason.
-        source: serde_json::Error,
-    },
+    Json { path: String, source: serde_json::Error },
     /// The map is too far from the identity for a real unit.
     #[error("{path}: gyro_map: an element is too far from the identity")]
     Implausible { path: String },

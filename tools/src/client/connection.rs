@@ -13,24 +13,15 @@ const CONNECT: Duration = Duration::from_secs(5);
 pub enum ConnectError {
     /// The name is neither host:port nor a serial port that can be opened.
     #[error("{name}: not host:port, and not a serial port that can be opened: {source}")]
-    Serial {
-        name: String,
-        /// The system's error.
-        source: serialport::Error,
-    },
+    Serial { name: String, source: serialport::Error },
     /// The host does not accept the connection.
     #[error("{name}: cannot connect: {source}")]
-    Tcp {
-        name: String,
-        /// The system's error.
-        source: io::Error,
-    },
+    Tcp { name: String, source: io::Error },
     /// The CAN interface cannot be opened.
     #[error("can:{name}: {source}")]
     Interface {
         /// The name of the interface.
         name: String,
-        /// The system's error.
         source: io::Error,
     },
     /// This system has no CAN interfaces.

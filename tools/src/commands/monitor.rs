@@ -62,7 +62,6 @@ enum MonitorError {
     NoLog(String),
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let config = Config::DEFAULT;
     let mut source = Source::open(&args.source, args.baud, config.settings().bits_per_second)?;

@@ -62,7 +62,6 @@ impl<W> Output<W> {
     }
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let weights = args.unit.sent.open()?;
     let drive =

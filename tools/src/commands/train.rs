@@ -66,7 +66,6 @@ pub struct Args {
     python: Option<PathBuf>,
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let roles = Roles::choose(&args.folder, args.shards.is_some(), args.validate.as_deref(), &args.hold_out)?;
     for refusal in &roles.refused {

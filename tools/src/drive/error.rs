@@ -61,7 +61,6 @@ impl fmt::Display for DataError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DataFault {
-    /// The file cannot be read.
     #[error(transparent)]
     Io(#[from] std::io::Error),
     /// The file is not a CSV in UTF-8.

@@ -42,7 +42,6 @@ impl<W: Write> Table<W> {
         )
     }
 
-    /// Flushes the writer.
     pub fn finish(&mut self) -> io::Result<()> {
         self.out.flush()
     }
@@ -72,7 +71,6 @@ impl<W: Write> Tum<W> {
         writeln!(self.out, "{:.4} {x:.4} {y:.4} 0 0 0 {sin:.9} {cos:.9}", seconds(step.time.0))
     }
 
-    /// Flushes the writer.
     pub fn finish(&mut self) -> io::Result<()> {
         self.out.flush()
     }

@@ -27,7 +27,6 @@ pub enum ReplayError {
     /// The vehicle does not stand still during static initialisation.
     #[error("{path}: starts moving: line {line}: {source}")]
     StartsMoving {
-        /// The recording.
         path: String,
         /// The line at which the three seconds ended.
         line: u64,
@@ -36,10 +35,7 @@ pub enum ReplayError {
     },
     /// The recording has no three seconds without a gap.
     #[error("{path}: never holds 3 s without a gap, so static initialisation cannot finish")]
-    NeverInitialised {
-        /// The recording.
-        path: String,
-    },
+    NeverInitialised { path: String },
 }
 
 pub struct Steps<'d, N> {

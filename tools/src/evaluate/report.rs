@@ -23,7 +23,6 @@ pub enum EvaluateError {
         course (ref_yaw)"
     )]
     NoReference {
-        /// The recording.
         path: String,
         /// The first line without a reference.
         line: u64,
@@ -33,7 +32,6 @@ pub enum EvaluateError {
         yaw rate or 20 s of course is needed"
     )]
     TooShort {
-        /// The recording.
         path: String,
         /// The reference's column.
         column: &'static str,
@@ -45,7 +43,6 @@ pub enum EvaluateError {
         or another drive"
     )]
     Disagrees {
-        /// The recording.
         path: String,
         /// The reference's column.
         column: &'static str,

@@ -76,7 +76,6 @@ pub struct Checkpoint<N> {
 }
 
 impl<N: Network> Checkpoint<N> {
-    /// Reads a file.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
         Ok(Self { tensors: Tensors::read(path, N::shapes)?, network: PhantomData })
     }

@@ -10,22 +10,11 @@ use std::path::{Path, PathBuf};
 /// The reason why a checkpoint cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// The file cannot be read.
     #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    Io { path: PathBuf, source: std::io::Error },
     /// The file is not a safetensors file.
     #[error("{name}: not a safetensors file: {source}")]
-    Format {
-        /// The file.
-        name: String,
-        /// The reader's error.
-        source: safetensors::SafeTensorError,
-    },
+    Format { name: String, source: safetensors::SafeTensorError },
     #[error(
         "{name}: a checkpoint of PyTorch; write its weights as safetensors: python3 -c \"import torch, safetensors.torch as s; \
         s.save_file({{k: t.contiguous() for k, t in torch.load('{name}', 'cpu').items()}}, 'net.safetensors')\""
@@ -35,15 +24,10 @@ pub enum CheckpointError {
     #[error("{name}: the network has no {}: quantising would leave them out", tensors.join(", "))]
     Unused { name: String, tensors: Vec<String> },
     #[error("{name}: tensor {tensor} is missing")]
-    Missing {
-        /// The file.
-        name: String,
-        tensor: String,
-    },
+    Missing { name: String, tensor: String },
     /// A tensor does not have the shape and element type that the network needs.
     #[error("{name}: tensor {tensor} is {found}, should be F32 {expected:?}")]
     Shape {
-        /// The file.
         name: String,
         tensor: String,
         /// Type and shape as found.
@@ -54,7 +38,6 @@ pub enum CheckpointError {
     /// A tensor holds NaN or an infinity.
     #[error("{name}: tensor {tensor} holds a value that is not finite, at {at}")]
     NotFinite {
-        /// The file.
         name: String,
         tensor: String,
         /// Index of the element.

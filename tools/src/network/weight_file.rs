@@ -7,20 +7,11 @@ use std::path::Path;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WeightFileError {
-    /// The file cannot be read.
     #[error("{path}: {source}")]
-    Io {
-        path: String,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    Io { path: String, source: std::io::Error },
     /// The library rejects the file.
     #[error("{path}: {source}")]
-    Blob {
-        path: String,
-        /// The reason.
-        source: BlobError,
-    },
+    Blob { path: String, source: BlobError },
 }
 
 /// A weight file that has passed all of the library's checks.

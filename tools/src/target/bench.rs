@@ -27,11 +27,7 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 pub enum BenchError {
     /// A program could not be started.
     #[error("{program} cannot be started: {source}")]
-    Start {
-        program: String,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    Start { program: String, source: std::io::Error },
     /// A program ended with an error.
     #[error("{program} failed:\n{output}")]
     Failed { program: String, output: String },

@@ -22,22 +22,11 @@ pub struct ImageSize {
 /// The reason why an image cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum SizeError {
-    /// The file cannot be read.
     #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: String,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    Io { path: String, source: std::io::Error },
     /// The file is not an object file.
     #[error("{path}: {source}")]
-    Format {
-        /// The file.
-        path: String,
-        /// The reader's error.
-        source: object::Error,
-    },
+    Format { path: String, source: object::Error },
 }
 
 impl ImageSize {

@@ -29,7 +29,6 @@ pub enum Refusal {
     /// The drive has no true yaw rate.
     #[error("{path}: line {line}: no ref_gyr_z (true yaw rate), which training needs in every row{}", advice(*course))]
     NoReference {
-        /// The recording.
         path: String,
         /// The first line without a true yaw rate.
         line: u64,
@@ -39,7 +38,6 @@ pub enum Refusal {
     /// Rows are missing.
     #[error("{path}: line {line}: {ms:.1} ms after the previous row; training needs a row every 10 ms")]
     Gap {
-        /// The recording.
         path: String,
         /// The line after the first gap.
         line: u64,
@@ -48,7 +46,6 @@ pub enum Refusal {
     },
     #[error("{path}: {seconds:.0} s after the 3 s at rest; training needs {SHORTEST_S:.0} s")]
     TooShort {
-        /// The recording.
         path: String,
         /// Length of the drive after static initialisation, s.
         seconds: f64,
@@ -59,7 +56,6 @@ pub enum Refusal {
         or another drive"
     )]
     Disagrees {
-        /// The recording.
         path: String,
         /// The typical difference in 10 s, rad.
         rad: f64,
@@ -74,7 +70,6 @@ fn advice(course: bool) -> &'static str {
 /// A drive that can be trained on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Examined {
-    /// The file.
     pub path: PathBuf,
     /// The file's name without `.csv`.
     pub name: String,

@@ -15,11 +15,7 @@ const LEAST_TURNED_RAD: f64 = std::f64::consts::TAU;
 pub enum RolesError {
     /// The folder cannot be listed.
     #[error("{folder}: {source}")]
-    Folder {
-        folder: String,
-        /// The reason.
-        source: std::io::Error,
-    },
+    Folder { folder: String, source: std::io::Error },
     /// Too few drives can be used.
     #[error("{folder}: {usable} drives can be used, but {needed} are needed{}", listed(refused))]
     TooFew {
@@ -28,7 +24,6 @@ pub enum RolesError {
         usable: usize,
         /// The number that is needed.
         needed: usize,
-        /// The drives left out.
         refused: Vec<Refusal>,
     },
     /// The training drives are too short.
@@ -40,7 +35,6 @@ pub enum RolesError {
         folder: String,
         /// Length of the training drives together, s.
         seconds: f64,
-        /// The drives left out.
         refused: Vec<Refusal>,
     },
     #[error(
@@ -60,7 +54,6 @@ pub enum RolesError {
         name: String,
         /// The number of drives that match the name.
         found: usize,
-        /// The drives left out.
         refused: Vec<Refusal>,
     },
 }

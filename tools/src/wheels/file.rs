@@ -28,16 +28,11 @@ pub enum WheelFileError {
     },
     /// The file has too many frames.
     #[error("{path}: {found} frames, at most {MAX_FRAMES} are allowed")]
-    Frames {
-        path: String,
-        /// The number of frames.
-        found: usize,
-    },
+    Frames { path: String, found: usize },
     /// The identifier of a frame is too large.
     #[error("{path}: frame {id:#x}: not an identifier of {} bits", if *.extended { 29 } else { 11 })]
     Identifier {
         path: String,
-        /// The identifier.
         id: u32,
         /// Whether the file declares an identifier of 29 bits.
         extended: bool,
@@ -47,13 +42,7 @@ pub enum WheelFileError {
     Twice { path: String, wheel: Wheel },
     /// A value is outside a frame of eight bytes.
     #[error("{path}: frame {id:#x}: {source}")]
-    Place {
-        path: String,
-        /// The frame.
-        id: u32,
-        /// The reason.
-        source: OutsideFrame,
-    },
+    Place { path: String, id: u32, source: OutsideFrame },
     /// A number is out of the range of the board's codes.
     #[error("{path}: {key} = {value}: must be {range}")]
     Range {
@@ -65,11 +54,7 @@ pub enum WheelFileError {
     },
     /// The library rejects the settings.
     #[error("{path}: {source}")]
-    Settings {
-        path: String,
-        /// The reason.
-        source: WheelConfigError,
-    },
+    Settings { path: String, source: WheelConfigError },
 }
 
 /// The settings of a vehicle's wheel frames.

@@ -8,26 +8,17 @@ use std::fmt;
 /// The error of a request that did not get the expected response.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
-    /// The line cannot be opened.
     #[error(transparent)]
     Connect(#[from] ConnectError),
     /// The line cannot be used.
     #[error("{name}: {source}")]
-    Line {
-        /// Name of the line.
-        name: String,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    Line { name: String, source: std::io::Error },
     /// An identifier has too many bits, or is given twice.
     #[error("identifier {0:#x}: has too many bits, or is given twice")]
     Identifier(u32),
     /// No response arrived.
     #[error("{name}: no response to three requests; is this the board's line, and is the board running?")]
-    Silence {
-        /// Name of the line.
-        name: String,
-    },
+    Silence { name: String },
     /// The board refused the request, for this reason.
     #[error("the board refuses: {0}")]
     Refused(Refusal),

@@ -18,23 +18,14 @@ pub const WAIT: Duration = Duration::from_millis(100);
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SourceError {
-    /// The line cannot be opened.
     #[error(transparent)]
     Connect(#[from] ConnectError),
     /// The file cannot be opened.
     #[error("{name}: {source}")]
-    Open {
-        name: String,
-        /// The system's error.
-        source: io::Error,
-    },
+    Open { name: String, source: io::Error },
     /// Reading from or writing to the source failed.
     #[error("{name}: {source}")]
-    Read {
-        name: String,
-        /// The system's error.
-        source: io::Error,
-    },
+    Read { name: String, source: io::Error },
 }
 
 /// The result of a read.
