@@ -1,4 +1,5 @@
-"""gyronet in Python: the board (`Coprocessor`), import of logs (`gyronet.logs`), wheel settings of DBC files (`gyronet.wheels`)."""
+"""gyronet in Python: the board (`Coprocessor`), import of logs (`gyronet.logs`), corrected bags
+(`gyronet.correct`), wheel settings of DBC files (`gyronet.wheels`)."""
 
 
 def __getattr__(name):
@@ -7,5 +8,5 @@ def __getattr__(name):
     try:
         from gyronet._core import Coprocessor
     except ImportError:
-        raise ImportError("the board is not in this installation: install Rust (https://rustup.rs), then the package again") from None
+        raise ImportError("this Python has gyronet without the board: install Rust (https://rustup.rs), then pip install ./tools/python again") from None
     return Coprocessor

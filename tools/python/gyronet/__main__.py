@@ -1,4 +1,4 @@
-"""The command `gyronet-logs`: import, and wheels from-dbc. Exit status 1: refused, with the reason on standard error."""
+"""The command `gyronet-logs`: import, correct, and wheels from-dbc. Exit status 1: refused, with the reason on standard error."""
 
 import argparse
 import json
@@ -25,8 +25,41 @@ def parser():
             " file holds what a log does not contain; a copy is written beside the drive."
         ),
     )
-    log.add_argument("files", nargs="+", metavar="FILE", help="logs of one drive, or bag folders")
     log.add_argument("--out", metavar="FILE.csv", help="write the drive to this file")
+    add_log_arguments(log)
+    bag = commands.add_parser(
+        "correct",
+        help="copy a bag with the yaw rate that the board computes",
+        description=(
+            "Copy a ROS 1 or 2 bag or an MCAP file. In the gyro's topic the angular velocity and its covariance are those"
+            " of the board; stamps, frame_id and all other messages stay as they are. The board's quality is added as"
+            " diagnostic_msgs in /gyronet/quality. Messages without a corrected rate (initialising, gaps) stay as they are."
+            " Further logs give wheels and references."
+        ),
+    )
+    bag.add_argument("--out", metavar="LOG2", required=True, help="write the corrected bag to this file or folder")
+    bag.add_argument("--weights", metavar="FILE.blob", help="weight file [default: the library's model]")
+    bag.add_argument("--calibration", metavar="FILE.json", help="calibration file of `gyronet calibrate`")
+    add_log_arguments(bag)
+    wheels = commands.add_parser("wheels", help="wheel settings of a vehicle").add_subparsers(dest="action", required=True)
+    dbc = wheels.add_parser(
+        "from-dbc",
+        help="create wheel settings from a DBC file",
+        description=(
+            "Create the settings of wheel frames from a DBC file and the names of its signals, SIGNAL or"
+            " MESSAGE.SIGNAL. Without names it lists the signals that could be wheel speeds and writes nothing."
+        ),
+    )
+    dbc.add_argument("file", metavar="FILE.dbc")
+    for wheel in ("front-left", "front-right", "rear-left", "rear-right"):
+        dbc.add_argument(f"--{wheel}", metavar="SIGNAL")
+    dbc.add_argument("--out", metavar="FILE.toml", help="write to this file instead of standard output")
+    dbc.add_argument("--quiet", "-q", action="store_true", help="no remarks")
+    return top
+
+
+def add_log_arguments(log):
+    log.add_argument("files", nargs="+", metavar="FILE", help="logs of one drive, or bag folders")
     log.add_argument(
         "--vehicle",
         metavar="FILE.toml",
@@ -45,21 +78,6 @@ def parser():
     log.add_argument("--to", type=float, metavar="SECONDS", help="end this long after the first sample")
     log.add_argument("--json", action="store_true", help="print the report as JSON")
     log.add_argument("--quiet", "-q", action="store_true", help="no progress")
-    wheels = commands.add_parser("wheels", help="wheel settings of a vehicle").add_subparsers(dest="action", required=True)
-    dbc = wheels.add_parser(
-        "from-dbc",
-        help="create wheel settings from a DBC file",
-        description=(
-            "Create the settings of wheel frames from a DBC file and the names of its signals, SIGNAL or"
-            " MESSAGE.SIGNAL. Without names it lists the signals that could be wheel speeds and writes nothing."
-        ),
-    )
-    dbc.add_argument("file", metavar="FILE.dbc")
-    for wheel in ("front-left", "front-right", "rear-left", "rear-right"):
-        dbc.add_argument(f"--{wheel}", metavar="SIGNAL")
-    dbc.add_argument("--out", metavar="FILE.toml", help="write to this file instead of standard output")
-    dbc.add_argument("--quiet", "-q", action="store_true", help="no remarks")
-    return top
 
 
 def vehicle_of(args):
@@ -76,7 +94,7 @@ def vehicle_of(args):
         vehicle.forget_names()
     else:
         vehicle.of_log()
-    if args.out:
+    if args.command == "import" and args.out:
         written = [Path(args.out).resolve(), Path(args.out).with_suffix(".toml").resolve()]
         for read in [*args.files, *([vehicle.path] if vehicle.path else [])]:
             if Path(read).resolve() in written:
@@ -90,7 +108,7 @@ def vehicle_of(args):
     return vehicle
 
 
-def run_import(args):
+def drive_of(args):
     from gyronet.logs import Drive, Request, progress
     from gyronet.logs.units import Flags
 
@@ -113,11 +131,24 @@ def run_import(args):
     flags = Flags(args.unit)
     for name in [name for name in flags if isinstance(name, str)]:
         vehicle.columns.setdefault(name, {"name": name, "unit": flags[name]})
-    drive = Drive(Request(args.files, vehicle, args.same_clock, args.stamps == "recorded", args.start, args.to, flags, offsets, args.rate))
+    return Drive(Request(args.files, vehicle, args.same_clock, args.stamps == "recorded", args.start, args.to, flags, offsets, args.rate))
+
+
+def run_logs(args):
+    if args.command == "correct":
+        try:
+            from gyronet import bags, correct
+        except ImportError as error:
+            raise Refused(str(error)) from None
+        bags.copier_of(Path(args.files[0]), Path(args.out))
+    drive = drive_of(args)
     report, start, dropped = drive.report, drive.start_time, sum(drive.dropped.values())
     if args.out:
-        beside = drive.write(args.out)
-        report.append(f"{args.out}: {drive.rows} rows; {beside} beside it")
+        if args.command == "correct":
+            report.append(correct.correct(drive, args.files[0], args.out, args.weights, args.calibration))
+        else:
+            beside = drive.write(args.out)
+            report.append(f"{args.out}: {drive.rows} rows; {beside} beside it")
     if args.json:
         print(json.dumps({"seconds": round(drive.seconds, 2), "rows": drive.rows, "dropped": dropped, "start": start, "report": report,
                           "warnings": drive.warnings, "dropped_by_reason": drive.dropped}))
@@ -134,11 +165,11 @@ def main(arguments=None):
     logging.disable(logging.CRITICAL)  # the libraries' own remarks; ours are in the report
     sys.unraisablehook = lambda _: None  # a reader that could not be opened complains again when it is thrown away
     try:
-        if args.command == "import":
-            run_import(args)
-        else:
+        if args.command == "wheels":
             from gyronet.wheels import run
             run(args)
+        else:
+            run_logs(args)
     except Refused as error:
         print("error:", " ".join(str(error).split()), file=sys.stderr)
         return 1
