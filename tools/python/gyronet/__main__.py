@@ -53,6 +53,7 @@ def parser():
     dbc.add_argument("file", metavar="FILE.dbc")
     for wheel in ("front-left", "front-right", "rear-left", "rear-right"):
         dbc.add_argument(f"--{wheel}", metavar="SIGNAL")
+    dbc.add_argument("--unit", action="append", default=[], metavar="SIGNAL=UNIT", help="unit of a signal, such as RL=km/h")
     dbc.add_argument("--out", metavar="FILE.toml", help="write to this file instead of standard output")
     dbc.add_argument("--quiet", "-q", action="store_true", help="no remarks")
     return top

@@ -4,7 +4,7 @@ import re
 
 import cantools
 
-from gyronet.refused import Refused
+from gyronet.refused import Refused, listed
 
 # Descriptions of raw values that are no measurement, as DBC files of several makers write them.
 NO_VALUE = re.compile(
@@ -16,21 +16,49 @@ NO_VALUE = re.compile(
 )
 
 
+MENDED = 200  # statements that are left out at most
+
+
 def load(path, notes=None):
-    """The database of a DBC file."""
+    """The database of a DBC file, without the statements that cantools cannot read; `notes` gets what was mended."""
     try:
         with open(path, encoding="cp1252", errors="replace") as file:
             text = file.read()
-        text, mended = _with_bit_31(text)
-        database = cantools.database.load_string(text, "dbc", strict=False)
     except OSError as error:
         raise Refused(f"{path}: {error.strerror}") from None
-    except Exception as error:  # cantools gives its parser's and its own errors
-        reason = " ".join(str(error).split())
-        raise Refused(f"{path}: not a valid DBC file: {reason}") from None
-    if mended and notes is not None:
-        notes.append(f"{path}: taken as 29-bit identifiers, although bit 31 is not set: {', '.join(hex(m) for m in mended[:8])}")
+    text, wide = _with_bit_31(text)
+    left_out, database = [], None
+    while database is None:
+        try:
+            database = cantools.database.load_string(text, "dbc", strict=False)
+        except Exception as error:  # cantools gives its parser's and its own errors
+            text, statements = _without(text, str(error))
+            left_out += statements
+            if not statements or len(left_out) > MENDED or not re.search(r"^\s*BO_\s", text, re.MULTILINE):
+                raise Refused(f"{path}: not a valid DBC file: {' '.join(str(error).split())}") from None
+    if wide and notes is not None:
+        notes.append(f"{path}: taken as 29-bit identifiers, although bit 31 is not set: {', '.join(map(hex, wide[:8]))}")
+    if left_out and notes is not None:
+        notes.append(f"{path}: left out, since cantools cannot read them{listed(left_out, ': ', 4)}")
     return database
+
+
+def _without(text, error):
+    """Empties the statement at which cantools stopped, a message with its signals; values of signals that are not there."""
+    lines = text.split("\n")
+    if found := re.search(r"line (\d+), column", error):
+        first = behind = int(found[1]) - 1
+        behind += 1
+        while lines[first].lstrip().startswith("BO_ ") and behind < len(lines) and lines[behind].lstrip().startswith("SG_"):
+            behind += 1
+        places = range(first, behind)
+    else:
+        unused = re.findall(r"VAL_ (\d+) (\w+)", error)
+        places = [k for k, line in enumerate(lines) if tuple(line.split()[:3]) in [("VAL_", *names) for names in unused]]
+    statements = [f"line {k + 1}: {lines[k].strip()[:40]}" for k in places if lines[k].strip()]
+    for k in places:
+        lines[k] = ""
+    return "\n".join(lines), statements
 
 
 def _with_bit_31(text):

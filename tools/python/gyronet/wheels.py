@@ -14,8 +14,9 @@ SAYS_VALID = re.compile(r"valid|qf|qual|stat|fault|fail|err|inv|gult|gült", re.
 SAYS_DIRECTION = re.compile(r"dir|richt|revers|backw|forw", re.IGNORECASE)
 
 
-def from_dbc(path, signals):
-    """The settings file's text and remarks; `signals` is a name, SIGNAL or MESSAGE.SIGNAL, by wheel."""
+def from_dbc(path, signals, flags=()):
+    """The settings file's text and remarks; `signals` is a name, SIGNAL or MESSAGE.SIGNAL, by wheel; `flags` give units."""
+    flags = units.Flags(flags)
     for left, right in (WHEELS[:2], WHEELS[2:]):
         if (left in signals) != (right in signals):
             raise Refused(f"--{left} and --{right}: both wheels of an axle are needed")
@@ -23,9 +24,9 @@ def from_dbc(path, signals):
     database = dbc.load(path, remarks)
     for wheel in WHEELS:
         if wheel in signals:
-            message, signal = find(path, database, signals[wheel])
+            message, signal = find(path, database, signals[wheel], remarks)
             frames.setdefault((message.frame_id, message.is_extended_frame), (message, []))[1].append(
-                entry(path, wheel, message, signal, remarks)
+                entry(path, wheel, message, signal, flags, remarks)
             )
     lines = ["timeout_ms = 100", "still_speed_kmh = 0.1", "still_for_ms = 500"]
     for (identifier, extended), (message, entries) in frames.items():
@@ -33,10 +34,11 @@ def from_dbc(path, signals):
         for one in entries:
             lines += ["", "[[frame.signal]]", *(f"{key} = {value}" for key, value in one.items())]
         remarks += about(database, message)
+    flags.check()
     return "\n".join(lines) + "\n", list(dict.fromkeys(remarks))
 
 
-def find(path, database, name):
+def find(path, database, name, remarks):
     message_name, _, signal_name = name.rpartition(".")
     found = [(message, signal) for message in database.messages for signal in message.signals
              if signal.name == signal_name and message_name in ("", message.name)]
@@ -46,10 +48,10 @@ def find(path, database, name):
         raise Refused(f"{path}: {name} is in {', '.join(message.name for message, _ in found)}: name one as MESSAGE.SIGNAL")
     near = [f"{message.name}.{signal.name}" for message in database.messages for signal in message.signals
             if WHEEL_NAME.search(signal.name) or signal_name.lower() in signal.name.lower()]
-    raise Refused(f"{path}: no signal {name}" + listed(near, "; there are ", 8))
+    raise Refused(f"{path}: no signal {name}" + listed(near, "; there are ", 8) + listed(remarks, "; "))
 
 
-def entry(path, wheel, message, signal, remarks):
+def entry(path, wheel, message, signal, flags, remarks):
     """One wheel's signal in the settings."""
     name = f"{message.name}.{signal.name}"
 
@@ -62,9 +64,9 @@ def entry(path, wheel, message, signal, remarks):
         refuse("is multiplexed; the board reads frames with one layout")
     if signal.is_float:
         refuse("is a floating-point number; the board reads integers")
-    unit = units.find(signal.unit)
+    unit = units.find(flags.get(name) or flags.get(signal.name) or signal.unit)
     if not unit or unit[0] != "speed":
-        refuse(f'the unit "{signal.unit or ""}" is not km/h, m/s or mph: correct it in a copy of the DBC file')
+        refuse(f'the unit "{signal.unit or ""}" is not km/h, m/s or mph; give it: --unit {signal.name}=km/h')
     place = signal.start if signal.byte_order == "little_endian" else 8 * (signal.start // 8) + 7 - signal.start % 8
     if signal.length > 32 or place + signal.length > 64:
         refuse(f"{signal.length} bits from bit {signal.start} on: the board reads up to 32 bits in 8 bytes")
@@ -124,7 +126,7 @@ def run(args):
     if not signals:
         print("\n".join(listing(args.file)))
         raise Refused("no signal is named, nothing is written: choose with --rear-left SIGNAL --rear-right SIGNAL")
-    text, remarks = from_dbc(args.file, signals)
+    text, remarks = from_dbc(args.file, signals, args.unit)
     for remark in [] if args.quiet else remarks:
         print(f"remark: {remark}", file=sys.stderr)
     if not args.out:

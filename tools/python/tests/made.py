@@ -9,6 +9,7 @@ from pathlib import Path
 import can
 import cantools
 import numpy as np
+from mcap.writer import CompressionType, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from gyronet.__main__ import main
@@ -152,8 +153,7 @@ def fix_messages(t, start=START):
                build(STORE, "sensor_msgs/msg/NavSatFix", seconds + start, latitude=50 + y[k] / 111_320, longitude=east))
 
 
-def mcap(path, messages, compression=None, close=True):
-    from mcap.writer import CompressionType, Writer
+def mcap(path, messages, compression=None, close=True, little_endian=True):
     with open(path, "wb") as file:
         writer = Writer(file, compression=compression or CompressionType.ZSTD, chunk_size=20_000)
         writer.start("ros2")
@@ -163,7 +163,7 @@ def mcap(path, messages, compression=None, close=True):
                 text, _ = STORE.generate_msgdef(kind, ros_version=2)
                 channels[topic] = writer.register_channel(topic, "cdr", writer.register_schema(kind, "ros2msg", text.encode()))
             nanos = int(recorded * 1e9)
-            writer.add_message(channels[topic], nanos, bytes(STORE.serialize_cdr(message, kind)), nanos)
+            writer.add_message(channels[topic], nanos, bytes(STORE.serialize_cdr(message, kind, little_endian=little_endian)), nanos)
         if close:
             writer.finish()
 

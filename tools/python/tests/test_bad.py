@@ -96,6 +96,16 @@ class Bad(unittest.TestCase):
         made.mcap(self.folder / "d.log", made.imu_messages(made.times(), made.imu(made.times())))
         self.assertEqual(made.run(self.folder, "import", "d.log")[0], 0)
 
+    def test_either_byte_order_but_not_a_wrong_one(self):
+        t, path = made.times(), self.folder / "d.mcap"
+        made.mcap(path, made.imu_messages(t, made.imu(t)), made.CompressionType.NONE, little_endian=False)
+        self.assertEqual(made.run(self.folder, "import", "d.mcap", "--out", "out.csv")[0], 0)
+        drive = made.drive(self.folder)
+        self.assertLess(abs(drive["gyr_z"] - made.turn(drive["t_s"])).max(), 0.03)
+        stamp = int(made.START).to_bytes(4)[:3]
+        path.write_bytes(path.read_bytes().replace(bytes(4) + stamp, b"\x00\x01\x00\x00" + stamp))
+        self.refused(["d.mcap", "--out", "wrong.csv"], "no IMU in the files")
+
     def test_a_cut_mcap_gives_what_is_there(self):
         t = made.times()
         path = self.folder / "d.mcap"

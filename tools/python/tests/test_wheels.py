@@ -50,6 +50,23 @@ class FromDbc(unittest.TestCase):
         status, text, file = self.run_(*REAR, "--out", "w.toml", identifier=0x10630040)
         self.assertEqual((status, file["frame"][0]["id"], file["frame"][0]["extended"]), (0, 0x10630040, True), text)
 
+    def test_units_of_real_files_and_by_flag(self):
+        for unit, factor in (("Unit_KiloMeterPerHour", 0.01), ("Unit_KilometerPerHour", 0.01), ("km^h", 0.01), ("Unit_MeterPerSecond", 0.036)):
+            status, text, file = self.run_(*REAR, "--out", "w.toml", unit=unit)
+            self.assertEqual((status, file["frame"][0]["signal"][0]["factor_kmh"]), (0, factor), text)
+        status, text, file = self.run_(*REAR, "--unit", "RL=m/s", "--unit", "WHEELS.RR=m/s", "--out", "w.toml", unit="")
+        self.assertEqual((status, file["frame"][0]["signal"][1]["factor_kmh"]), (0, 0.036), text)
+        self.assertIn("no channel or column of that name", self.run_(*REAR, "--unit", "XY=m/s")[1])
+
+    def test_statements_that_cantools_cannot_read_are_left_out(self):
+        extra = ('BO_ 1275 2017_5: 8 XXX\n SG_ A : 0|8@1+ (1,0) [0|1] "" X\nBO_ 1276 X1: 8 XXX\n SG_ 0_COUNTER : 0|8@1+ (1,0) [0|1] "" X\n'
+                 'CM_ SG_ 304 "Seems to be platform";\nVAL_ 501 CRUISE_STATE 1 "a" ;\nVAL_ 1200 GONE 1 "a" ;\nVAL_ 1200 RL 65535 "SNA" ;\n')
+        status, text, file = self.run_(*REAR, "--out", "w.toml", extra=extra)
+        self.assertEqual((status, file["frame"][0]["signal"][0]["invalid"]), (0, 0xFFFF), text)
+        for words in ("line 10: BO_ 1275 2017_5: 8 XXX", "SG_ 0_COUNTER", "more"):
+            self.assertIn(words, text)
+        self.assertIn("left out, since cantools cannot read them: line 10", self.run_("--rear-left", "A", "--rear-right", "B", extra=extra)[1])
+
     def test_what_the_board_cannot_read_is_refused(self):
         for more, words in REFUSED:
             status, text, file = self.run_(*REAR, "--out", "w.toml", **more)
