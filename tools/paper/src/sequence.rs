@@ -166,7 +166,8 @@ impl Sequence {
         }
         let (wheel_base, has_gyro, start_s) = (files.wheel_base, files.has_gyro, files.epoch_s + begin);
         let Files { imu, fog, wheels, truth, .. } = files;
-        let files = [imu.finish()?, fog.finish()?, wheels.finish()?, truth.finish()?];
+        let mut files = [imu.finish()?, fog.finish()?, wheels.finish()?, truth.finish()?];
+        summary::compare_ends(&mut files);
         let name = folder.canonicalize().ok().and_then(|path| Some(path.file_name()?.to_str()?.to_owned()));
         let name = name.unwrap_or_else(|| folder.display().to_string());
         let path = folder.to_owned();

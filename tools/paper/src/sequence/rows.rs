@@ -5,6 +5,7 @@ use crate::sequence::SequenceFault;
 use csv::ByteRecord;
 use gyronet_tools::drive::error::{DataError, ValueError};
 use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// A value beyond this is refused: UTM coordinates are about 4e6 m, and no sensor reads as much.
@@ -38,12 +39,15 @@ pub(super) struct Rows<const N: usize> {
     csv: csv::Reader<File>,
     record: ByteRecord,
     last: Option<i64>,
+    /// Length of a file whose last line has no end.
+    cut_at: Option<u64>,
     pub summary: StreamSummary,
 }
 
 impl<const N: usize> Rows<N> {
     pub fn open(path: &Path, format: Format<N>) -> Result<Self, DataError> {
         let name = path.display().to_string();
+        let cut_at = File::open(path).and_then(cut).map_err(|source| DataError::open(&name, source))?;
         let file = File::open(path).map_err(|source| DataError::open(&name, source))?;
         let csv = csv::ReaderBuilder::new()
             .has_headers(false)
@@ -53,7 +57,7 @@ impl<const N: usize> Rows<N> {
             .from_reader(file);
         let summary = StreamSummary::new(path, format.stamps_per_second, format.nominal_hz);
         let record = ByteRecord::new();
-        Ok(Self { path: name, format, csv, record, last: None, summary })
+        Ok(Self { path: name, format, csv, record, last: None, cut_at, summary })
     }
 
     pub fn path(&self) -> &str {
@@ -72,6 +76,10 @@ impl<const N: usize> Rows<N> {
                 return Ok(None);
             }
             let line = self.record.position().map_or(0, csv::Position::line);
+            if self.cut_at == Some(self.csv.position().byte()) {
+                self.summary.cut.count(line);
+                continue;
+            }
             let found = self.record.len();
             if found != self.format.columns {
                 let fault = SequenceFault::Columns { found, expected: self.format.columns }.into();
@@ -130,4 +138,16 @@ impl<const N: usize> Rows<N> {
         let text = String::from_utf8_lossy(self.bytes(column));
         DataError::value(&self.path, line, column + 1, &text, error)
     }
+}
+
+/// Returns the length of a file whose last byte is not the end of a line.
+fn cut(mut file: File) -> io::Result<Option<u64>> {
+    let length = file.metadata()?.len();
+    if length == 0 {
+        return Ok(None);
+    }
+    let mut last = [0];
+    file.seek(SeekFrom::Start(length - 1))?;
+    file.read_exact(&mut last)?;
+    Ok((last != *b"\n").then_some(length))
 }

@@ -6,6 +6,8 @@ use std::path::Path;
 
 /// A gap is longer than this many nominal periods.
 const GAP_PERIODS: f64 = 2.5;
+/// A file that ends earlier than this is remarked, s.
+pub(super) const EARLY_S: f64 = 1.0;
 
 /// Holds a count, and the line of its first occurrence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -49,8 +51,12 @@ pub struct StreamSummary {
     pub duplicates: Seen,
     /// Rows skipped because a field is NaN or infinite.
     pub not_finite: Seen,
+    /// The last line if it lacks its end: half a number cannot be told from a whole one.
+    pub cut: Seen,
     /// Encoder resets; the wheels were assumed to keep their speed.
     pub resets: Seen,
+    /// Time from its end to that of the file that ends last, s.
+    pub ends_early_s: f64,
     /// Spread of the time between stamps, for each second of the file.
     #[serde(skip)]
     pub spreads: Vec<Spread>,
@@ -77,7 +83,9 @@ impl StreamSummary {
             longest_gap_s: 0.0,
             duplicates: Seen::default(),
             not_finite: Seen::default(),
+            cut: Seen::default(),
             resets: Seen::default(),
+            ends_early_s: 0.0,
             spreads: Vec::new(),
             clock: Clock { per_second, nominal_hz, first: None, last: 0 },
         }
@@ -108,6 +116,15 @@ impl StreamSummary {
     }
 }
 
+/// Compares the ends of files whose stamps are of one clock.
+pub(super) fn compare_ends(files: &mut [StreamSummary; 4]) {
+    let end = |file: &StreamSummary| file.clock.last as f64 / file.clock.per_second;
+    let last = files.iter().map(end).fold(0.0, f64::max);
+    for file in files {
+        file.ends_early_s = last - end(file);
+    }
+}
+
 impl fmt::Display for StreamSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:<24}{:>9} rows {:>8.2} Hz", self.file, self.rows, self.rate_hz)?;
@@ -115,11 +132,15 @@ impl fmt::Display for StreamSummary {
         for (seen, what) in [
             (self.duplicates, "duplicate stamps skipped"),
             (self.not_finite, "rows with NaN skipped"),
+            (self.cut, "last line skipped, which is cut"),
             (self.resets, "encoder resets bridged"),
         ] {
             if let Some(line) = seen.first_line {
                 write!(f, ", {} {what} (first: line {line})", seen.count)?;
             }
+        }
+        if self.ends_early_s > EARLY_S {
+            write!(f, ", ends {:.1} s before the others: is it whole?", self.ends_early_s)?;
         }
         Ok(())
     }

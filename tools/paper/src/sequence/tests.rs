@@ -1,3 +1,4 @@
+use super::summary::EARLY_S;
 use super::*;
 use crate::simulate;
 use tempfile::{TempDir, tempdir};
@@ -235,6 +236,27 @@ fn nan_and_duplicates_are_counted_and_bridged() {
     // The NaN of the gyro loses no angle: the neighbouring rows contain it.
     scratch.edit(FOG, |lines| set(&mut lines[0], 3, "NaN"));
     assert_eq!(scratch.read().unwrap().files[1].not_finite.count, 1);
+}
+
+#[test]
+fn a_file_whose_download_stopped_is_remarked() {
+    let scratch = Scratch::new("cut", Layout::Nclt, 20);
+    let whole = scratch.read().unwrap();
+    assert!(whole.files.iter().all(|file| file.ends_early_s < EARLY_S && file.cut.count == 0));
+    let path = scratch.0.path().join("kvh.csv");
+    let text = fs::read_to_string(&path).unwrap();
+    let lines = text[..text.len() / 2].lines().count() as u64;
+    fs::write(&path, &text[..text.len() / 2]).unwrap();
+    let sequence = scratch.read().unwrap();
+    let [_, fog, ..] = &sequence.files;
+    assert_eq!((fog.rows, fog.cut.first_line), (lines - 1, Some(lines)));
+    let text = fog.to_string();
+    let missing = whole.seconds() - sequence.seconds();
+    assert!(missing > 9.0 && (fog.ends_early_s - missing).abs() < 0.2, "{} {missing}", fog.ends_early_s);
+    assert!(
+        text.contains("last line skipped, which is cut") && text.contains("s before the others"),
+        "{text}"
+    );
 }
 
 #[test]
