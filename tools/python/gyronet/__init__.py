@@ -1,6 +1,11 @@
 """gyronet in Python: the board (`Coprocessor`), import of logs (`gyronet.logs`), corrected bags
 (`gyronet.correct`), wheel settings of DBC files (`gyronet.wheels`)."""
 
+from pkgutil import extend_path
+
+# The sources, run as they are, find the extension of an installed package.
+__path__ = extend_path(__path__, __name__)
+
 
 def __getattr__(name):
     if name != "Coprocessor":

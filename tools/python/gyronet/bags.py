@@ -30,7 +30,7 @@ def copy(path, out, change):
         copier(path, half / out.name, change)
         os.rename(half / out.name, out)
     except OSError as error:
-        raise Refused(f"{error.filename or out}: {error.strerror or error}") from None
+        raise Refused(f"{out}: {error.strerror or error}") from None
     except Refused:
         raise
     except Exception as error:  # the libraries raise whatever damaged bytes provoke

@@ -247,7 +247,7 @@ class Drive:
             for path, half in halves:
                 os.replace(half, path)
         except OSError as error:
-            raise Refused(f"{error.filename or out}: {error.strerror}") from None
+            raise Refused(f"{out}: {error.strerror}") from None
         finally:
             for _, half in halves:
                 with suppress(OSError):
