@@ -105,8 +105,10 @@ fn a_python_with_the_package_is_used_as_it_is() {
     assert_eq!(calls.len(), 2, "{calls:?}");
     let given = machine.folder.join("given");
     std::fs::copy(machine.folder.join("bin/python3"), &given).unwrap();
-    let (output, calls) = machine.run(&["import", "a.bag"], &[("GYRONET_PYTHON", given.to_str().unwrap())]);
+    let correct = ["correct", "a.bag", "--out", "b.bag"];
+    let (output, calls) = machine.run(&correct, &[("GYRONET_PYTHON", given.to_str().unwrap())]);
     assert!(text(&output.stdout).starts_with(given.to_str().unwrap()), "{output:?}");
+    assert!(text(&output.stdout).ends_with("-m gyronet correct a.bag --out b.bag\n"), "{output:?}");
     assert_eq!(calls.len(), 1, "{calls:?}");
     // An older one is not.
     let (_, calls) = machine.run(&["import", "a.bag"], &[("INSTALLED", "0.0.1")]);

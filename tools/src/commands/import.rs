@@ -24,6 +24,23 @@ pub struct Args {
     arguments: Vec<OsString>,
 }
 
+/// Copy a ROS bag or MCAP file with the yaw rate that the board computes.
+///
+/// The package `gyronet` in Python writes it; the Python must have the package with the board: `pip install
+/// ./tools/python`, and `GYRONET_PYTHON`. `gyronet correct --help` has the options.
+#[derive(Debug, Clone, clap::Args)]
+#[command(disable_help_flag = true, after_help = "Example: gyronet correct drive.mcap --out corrected.mcap")]
+pub struct Correct {
+    /// Arguments of the Python package's command.
+    #[arg(value_name = "ARGUMENTS", trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<OsString>,
+}
+
+/// Runs the subcommand `correct`.
+pub fn correct(args: &Correct, common: Common) -> super::Result {
+    python(&["correct"], &args.arguments, common)
+}
+
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let sequence = match &args.arguments[..] {
