@@ -232,6 +232,8 @@ class Board:
             device.reset()
         self.dwt.trace = bool(self.debug.demcr)
         for peripheral in self.peripherals.values():
+            peripheral.catch_up()
+        for peripheral in self.peripherals.values():
             peripheral.reset(cause)
         self.clocks_changed()
         vectors = self.memory.read(0, 8)

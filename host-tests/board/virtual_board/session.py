@@ -210,7 +210,9 @@ def _condition(board, wanted):
         wanted = {"event": wanted}
     if "usart" in wanted:
         name = wanted["usart"] if isinstance(wanted["usart"], str) else f"USART{wanted['usart']}"
-        return lambda entry: len(board.peripherals[name].sent) >= wanted["bytes"]
+        usart = board.peripherals[name]
+        usart.watch()
+        return lambda entry: len(usart.sent) >= wanted["bytes"]
     if "can" in wanted:
         return _FrameCount(board.peripherals["CAN1"].bus, wanted["can"])
     fields = {key: value for key, value in wanted.items() if key != "event"}

@@ -130,6 +130,19 @@ class Dma(Peripheral):
                 stream.flags |= TCIF
                 stream.left = stream.total
 
+    def give(self, name, count):
+        """Reads bytes from memory for a stream that feeds silently, as if they had been requested one by one."""
+        number = self.by_request[name]
+        stream = self.streams[number]
+        data = self.board.memory_read(stream.m0ar + stream.total - stream.left, count)
+        half = stream.total // 2
+        stream.flags |= HTIF if stream.left > half >= stream.left - count else 0
+        stream.left -= count
+        if not stream.left:
+            stream.flags |= TCIF
+            self._disable(number)
+        return data
+
     def serves_silently(self, name):
         """Returns whether a stream writes bytes to memory in circular mode without an interrupt."""
         number = self.by_request.get(name)
@@ -138,6 +151,15 @@ class Dma(Peripheral):
         stream = self.streams[number]
         mode = stream.cr & (CIRC | MINC | PINC | DBM | 3 << 11 | 3 << 6 | TEIE | HTIE | TCIE)
         return mode == CIRC | MINC and stream.m0ar not in CCM
+
+    def feeds_silently(self, name):
+        """Returns the number of bytes that a stream will still read from memory, if it raises no interrupt; else 0."""
+        number = self.by_request.get(name)
+        if number is None:
+            return 0
+        stream = self.streams[number]
+        mode = stream.cr & (CIRC | MINC | PINC | DBM | 3 << 11 | 3 << 6 | TEIE | HTIE | TCIE)
+        return stream.left if mode == MINC | TO_PERIPHERAL << 6 and stream.m0ar not in CCM else 0
 
     def _catch_up(self):
         for source in list(self.sources):

@@ -21,8 +21,8 @@ PS = 1_000_000_000_000
 PE, FE, NF, ORE, IDLE, RXNE, TC, TXE = (1 << bit for bit in range(8))
 ERRORS = PE | FE | NF | ORE | IDLE
 CLEARED_BY_ZERO = RXNE | TC
-SBK, RWU, RE, TE, IDLEIE, RXNEIE, PEIE, PS_ODD, PCE, M, UE, OVER8 = (
-    1 << bit for bit in (0, 1, 2, 3, 4, 5, 8, 9, 10, 12, 13, 15))
+SBK, RWU, RE, TE, IDLEIE, RXNEIE, TCIE, TXEIE, PEIE, PS_ODD, PCE, M, UE, OVER8 = (
+    1 << bit for bit in (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 13, 15))
 EIE, DMAR, DMAT = 1 << 0, 1 << 6, 1 << 7
 TOLERANCE = 0.035
 STOP_HALVES = (2, 1, 4, 3)
@@ -47,6 +47,10 @@ class Usart(Peripheral):
         self.arrival = self.departure = self.idle_event = None
         #: Whether several bytes are received at a time.
         self.at_once = False
+        #: Whether DMA feeds the bytes of the scheduled departure unnoticed, and whether a test waits for single bytes.
+        self.batch = self.watched = False
+        #: Whether due bytes are being sent now: DMA then writes the data register.
+        self.sending = False
         self.lost = 0
         self.noted = {}
         self.irq_level = False
@@ -54,7 +58,7 @@ class Usart(Peripheral):
 
     def _registers(self):
         self.sr, self.cr1, self.cr2, self.cr3, self.brr, self.gtpr = TC | TXE, 0, 0, 0, 0, 0
-        self.rdr, self.tdr, self.shift = 0, None, None
+        self.rdr, self.tdr, self.shift, self.shift_end = 0, None, None, 0
         self.seen, self.seen_tc = 0, False
         self.preamble_until = 0
         self.listening_since = None
@@ -63,6 +67,8 @@ class Usart(Peripheral):
         self._compare()
 
     def reset(self, cause):
+        self._send_due()
+        self.batch = False
         for handle in (self.departure, self.idle_event):
             if handle:
                 handle.cancel()
@@ -77,12 +83,16 @@ class Usart(Peripheral):
 
     def power_off(self):
         """Drops the scheduled events, which are lost with the power; bytes that arrive meanwhile are lost."""
+        self._send_due()
+        self.shift, self.batch = None, False
         self.arrival = self.departure = self.idle_event = None
 
     # -- timing ------------------------------------------------------------------------------------------------------
 
     def clocks_changed(self):
         """Computes bit and frame times from BRR and the bus clock (section 30.3.4)."""
+        if self.batch:
+            self._send_due()
         if self.cr1 & OVER8:
             divider = (self.brr >> 4) * 8 + (self.brr & 7)
         else:
@@ -91,6 +101,8 @@ class Usart(Peripheral):
         self.bit_ps = divider * PS // hz if divider and hz else 0
         halves = 2 * (1 + (9 if self.cr1 & M else 8)) + STOP_HALVES[self.cr2 >> 12 & 3]
         self.frame_ps = halves * self.bit_ps // 2
+        if self.batch and self.shift is not None:
+            self._send()
         self._compare()
 
     def _compare(self):
@@ -108,25 +120,67 @@ class Usart(Peripheral):
 
     # -- transmitter -------------------------------------------------------------------------------------------------
 
-    def _load(self):
+    def _load(self, now):
         """Moves the data register's byte into the shift register, which sets TXE (section 30.3.2)."""
         self.shift, self.tdr = self.tdr, None
         self.sr |= TXE
-        start = max(self.board.now, self.preamble_until)
-        self.departure = self.board.schedule(start + self.frame_ps - self.board.now, self._departed)
+        self.shift_end = max(now, self.preamble_until) + self.frame_ps
+
+    def _send(self):
+        """Schedules the end of the shift register's byte, or of all that DMA feeds unnoticed within `AT_ONCE`."""
+        if self.departure:
+            self.departure.cancel()
+        left = self._fed_silently()
+        self.batch = left > 0
+        end = self.shift_end + min(left, AT_ONCE // self.frame_ps) * self.frame_ps if left else self.shift_end
+        self.departure = self.board.schedule(end - self.board.now, self._departed)
+
+    def _fed_silently(self):
+        """Returns the number of bytes that DMA will feed without an interrupt, and without a test that waits for a byte."""
+        if self.watched or not self.cr3 & DMAT or self.cr1 & (TXEIE | TCIE):
+            return 0
+        return self.board.peripherals[self.dma].feeds_silently(self.name + "_TX")
 
     def _departed(self):
         self.departure = None
-        value = self.shift
+        self._send_due()
+        if self.shift is not None:
+            self._send()
+
+    def _send_due(self):
+        """Sends the bytes whose stop bits have ended by now."""
+        if self.sending:
+            return
+        self.sending = True
+        if self.batch and self.tdr is not None and abs(self.mismatch) <= TOLERANCE:
+            self._send_many()
+        while self.shift is not None and self.shift_end <= self.board.now:
+            self._depart()
+        self.sending = False
+
+    def _send_many(self):
+        """Sends the due bytes for which DMA still has as many to feed, all at once."""
+        count = min((self.board.now - self.shift_end) // self.frame_ps + 1, self._fed_silently())
+        if count <= 0:
+            return
+        line = [self.shift, self.tdr, *self.board.peripherals[self.dma].give(self.name + "_TX", count)]
+        if connected(self.board, self.tx_pins, self.function):
+            start, frame = self.shift_end, self.frame_ps
+            self.sent += [(start + number * frame, value & 0xFF) for number, value in enumerate(line[:count])]
+        self.shift, self.tdr = line[count:]
+        self.shift_end += count * self.frame_ps
+
+    def _depart(self):
+        now, value = self.shift_end, self.shift
         self.shift = None
         mismatch = self.mismatch
         if connected(self.board, self.tx_pins, self.function):
             if abs(mismatch) > TOLERANCE:
                 self._note_mismatch("tx", mismatch)
                 value = _sampled(value & 0xFF, PS / self.baud, self.bit_ps)[0]
-            self.sent.append((self.board.now, value & 0xFF))
+            self.sent.append((now, value & 0xFF))
         if self.tdr is not None:
-            self._load()
+            self._load(now)
         else:
             self.sr |= TC
         self._interrupt()
@@ -135,8 +189,21 @@ class Usart(Peripheral):
 
     def take_sent(self):
         """Returns the bytes that left the TX pin since the last call: (end of the stop bit in picoseconds, byte)."""
+        self._send_due()
         sent, self.sent = self.sent, []
         return sent
+
+    def watch(self):
+        """Sends each byte at its time from now on, because a test waits for one."""
+        self.watched = True
+        self._check_batch()
+
+    def _check_batch(self):
+        """Sends what is due, and one byte at a time from now on if DMA no longer feeds the bytes unnoticed."""
+        if self.batch and not self.sending:
+            self._send_due()
+            if self.shift is not None and not self._fed_silently():
+                self._send()
 
     # -- receiver ----------------------------------------------------------------------------------------------------
 
@@ -176,6 +243,7 @@ class Usart(Peripheral):
 
     def catch_up(self):
         """Receives what has arrived while only DMA notices, and schedules the next reception again if that has changed."""
+        self._check_batch()
         if self.at_once:
             self._take_due()
             if self.arrival and not self._only_dma_notices():
@@ -279,7 +347,7 @@ class Usart(Peripheral):
             pass
 
     def read(self, offset, size):
-        if self.at_once:
+        if self.at_once or self.batch:
             self.catch_up()
         # Section 30.6 requires half-words or words; the bus bridge converts all reads to words, as it does for DMA.
         if size == 1 and offset != 0x04:
@@ -307,10 +375,10 @@ class Usart(Peripheral):
         raise registers.unmodelled(self, offset, "read")
 
     def write(self, offset, value, size):
-        if self.at_once:
+        if self.at_once or self.batch:
             self.catch_up()
         self._write(offset, value, size)
-        if self.at_once:
+        if self.at_once or self.batch:
             self.catch_up()
 
     def _write(self, offset, value, size):
@@ -353,14 +421,16 @@ class Usart(Peripheral):
         self.sr &= ~TXE
         if self.shift is None:
             if self.board.now >= self.preamble_until:
-                self._load()
+                self._load(self.board.now)
+                self._send()
             else:
                 self.board.schedule(self.preamble_until - self.board.now, self._preamble_over)
         self._interrupt()
 
     def _preamble_over(self):
         if self.tdr is not None and self.shift is None and self.board.now >= self.preamble_until:
-            self._load()
+            self._load(self.board.now)
+            self._send()
             self._interrupt()
 
     def _write_cr1(self, value):
