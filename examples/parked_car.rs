@@ -7,7 +7,7 @@ use embedded_can::{Frame, StandardId};
 use embedded_io::{ErrorType, Read, ReadReady};
 use gyronet::Micros;
 use gyronet::can::DataFrame;
-use gyronet::can::bosch::{SignalStatus, TX1_ID, Tx1};
+use gyronet::can::bosch::{Message, SignalStatus, TX1_ID};
 use gyronet::health::InputCounters;
 use gyronet::sample::TestSignal;
 use gyronet::sensor::xsens::MtData2;
@@ -63,7 +63,7 @@ impl Read for Port {
 #[derive(Default)]
 pub struct Controller {
     frames: u32,
-    last: Option<Tx1>,
+    last: Option<Message>,
     received: bool,
 }
 
@@ -74,7 +74,7 @@ impl embedded_can::nb::Can for Controller {
     fn transmit(&mut self, frame: &DataFrame) -> nb::Result<Option<DataFrame>, Infallible> {
         self.frames += 1;
         if frame.id() == TX1_ID.into() {
-            self.last = Tx1::parse(frame.data()).ok();
+            self.last = Message::parse(frame.data()).ok();
         }
         Ok(None)
     }
@@ -93,9 +93,9 @@ pub fn exit_at_the_end(now: Micros, can: &Controller, inputs: &InputCounters) {
         return;
     }
     let complete = can.frames == 6 * SAMPLES && *inputs == InputCounters::NONE;
-    let good = can.last.as_ref().filter(|tx1| complete && tx1.yaw_rate_status == SignalStatus::OK);
+    let good = can.last.as_ref().filter(|tx1| complete && tx1.rate_status == SignalStatus::OK);
     if let Some(tx1) = good {
-        let milli_deg = (1e3 * tx1.yaw_rate_deg_per_sec()) as i32;
+        let milli_deg = (1e3 * tx1.rate_deg_per_sec()) as i32;
         hprintln!("{} frames; corrected yaw rate {}e-3 deg/s", can.frames, milli_deg);
     }
     debug::exit(if good.is_some() { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });

@@ -68,9 +68,9 @@
 //! # }
 //! # let frames = &can.controller().0;
 //! # assert_eq!((frames.len(), coprocessor.input_counters().imu_errors), (6 * 400, 0));
-//! # let last = gyronet::can::bosch::Tx1::parse(frames[6 * 399].data())?;
-//! # assert_eq!(last.yaw_rate_status, gyronet::can::bosch::SignalStatus::OK);
-//! # assert!(last.yaw_rate_deg_per_sec().abs() < 0.05, "the bias is off: {}", last.yaw_rate_deg_per_sec());
+//! # let last = gyronet::can::bosch::Message::parse(frames[6 * 399].data())?;
+//! # assert_eq!(last.rate_status, gyronet::can::bosch::SignalStatus::OK);
+//! # assert!(last.rate_deg_per_sec().abs() < 0.05, "the bias is off: {}", last.rate_deg_per_sec());
 //! # for _ in 0..4 { coprocessor.step(timer(), &mut imu, &mut can, Some(&mut network)); }
 //! # assert_eq!(can.controller().0.len(), 6 * 402, "silence is reported");
 //! # Ok(())

@@ -26,7 +26,7 @@ mod set;
 pub use set::{LAYOUTS, Layout, Message, Motion, SetEncoder};
 
 use crate::units::{AngularRate, CentiCelsius, SpecificForce};
-use embedded_can::{Frame, StandardId};
+use embedded_can::StandardId;
 
 /// Identifier of the message that carries yaw rate and lateral acceleration (TX1).
 pub const TX1_ID: StandardId = StandardId::new(0x174).unwrap();
@@ -58,76 +58,22 @@ impl SignalStatus {
     pub const INITIALISING: Self = Self(4);
 }
 
-/// TX1, the yaw message, as codes: 0.005 deg/s and 0.127465e-3 g each, zero at 0x8000.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Tx1 {
-    /// Code of the yaw rate.
-    pub yaw_rate: u16,
-    /// Status of the yaw rate.
-    pub yaw_rate_status: SignalStatus,
-    /// Code of the temperature.
-    pub temperature: u8,
-    /// Code of the lateral acceleration.
-    pub lateral_acceleration: u16,
-    /// Status of the lateral acceleration.
-    pub lateral_acceleration_status: SignalStatus,
-    /// Message counter, 0 to 15.
-    pub counter: u8,
-}
-
-/// The reason why a frame is not a valid TX1 message.
+/// The reason why a frame is not a valid message of the set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub enum Tx1Error {
+pub enum MessageError {
     /// The frame does not have eight bytes.
-    #[error("TX1 has {0} bytes instead of 8")]
+    #[error("a Bosch message has {0} bytes instead of 8")]
     Length(usize),
     /// The checksum is wrong.
-    #[error("TX1 checksum is {received:02x}, should be {computed:02x}")]
+    #[error("the checksum of a Bosch message is {received:02x}, should be {computed:02x}")]
     Crc {
         /// The checksum of bytes 0 to 6.
         computed: u8,
         /// Byte 7.
         received: u8,
     },
-}
-
-impl Tx1 {
-    /// Encodes the message as eight bytes.
-    #[must_use]
-    pub fn emit(&self) -> [u8; 8] {
-        Message::from(*self).emit()
-    }
-
-    /// Returns the frame in a driver's own type; `None` only if that type cannot hold it.
-    #[must_use]
-    pub fn frame<F: Frame>(&self) -> Option<F> {
-        F::new(TX1_ID, &self.emit())
-    }
-
-    /// Decodes eight bytes after checking length and CRC.
-    ///
-    /// # Errors
-    /// [`Tx1Error`] for a wrong length or checksum.
-    pub fn parse(bytes: &[u8]) -> Result<Self, Tx1Error> {
-        let message = Message::parse(bytes)?;
-        Ok(Self {
-            yaw_rate: message.rate,
-            yaw_rate_status: message.rate_status,
-            temperature: message.temperature,
-            lateral_acceleration: message.acceleration,
-            lateral_acceleration_status: message.acceleration_status,
-            counter: message.counter,
-        })
-    }
-
-    /// Returns the yaw rate in deg/s.
-    #[must_use]
-    pub fn yaw_rate_deg_per_sec(&self) -> f64 {
-        f64::from(i32::from(self.yaw_rate) - ZERO) * 0.005
-    }
 }
 
 /// Carries the yaw rate's rounding residual from message to message.

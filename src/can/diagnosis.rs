@@ -7,7 +7,7 @@ use embedded_can::{ExtendedId, Id, StandardId};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DiagnosisIds {
-    /// Whether all three identifiers have 29 bits instead of 11.
+    /// True if all three identifiers have 29 bits instead of 11.
     pub extended: bool,
     /// Identifier of requests to this board.
     pub request: u32,

@@ -99,7 +99,7 @@ impl Vdc2 {
     }
 }
 
-/// Whether the rate is valid.
+/// The validity of the rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Validity {

@@ -25,7 +25,7 @@ const LONGEST_DEG: f32 = 1.0;
 pub struct LatitudeSettings {
     /// Identifier of the frame.
     pub id: u32,
-    /// Whether the identifier has 29 bits.
+    /// True if the identifier has 29 bits.
     pub extended: bool,
     /// Start bit, as in a DBC file.
     pub start: u8,
@@ -33,7 +33,7 @@ pub struct LatitudeSettings {
     pub bits: u8,
     /// Order of the bytes.
     pub order: ByteOrder,
-    /// Whether the value is signed.
+    /// True if the value is signed.
     pub signed: bool,
     /// Degrees per LSB, north positive.
     pub degrees_per_bit: f32,
@@ -112,7 +112,7 @@ pub enum LatitudeError {
 pub struct ReceivedLatitude {
     /// Degrees, north positive.
     pub degrees: f32,
-    /// Whether it agrees with the latitude in use; otherwise it is the first one, or replaces a wrong one.
+    /// True if it agrees with the latitude in use; otherwise it is the first one, or replaces a wrong one.
     pub moved: bool,
 }
 

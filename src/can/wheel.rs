@@ -25,7 +25,7 @@ pub struct WheelReceiver {
     settings: WheelSettings,
     sequences: [Sequence; MAX_FRAMES],
     wheels: Wheels,
-    /// Whether a good frame has been received.
+    /// True if a good frame has been received.
     has_received: bool,
     lost: u32,
 }

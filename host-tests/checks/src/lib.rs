@@ -18,10 +18,8 @@ pub mod wire;
 mod adis16465;
 #[path = "../../tests/library/align_faults.rs"]
 mod align_faults;
-#[path = "../../tests/library/bosch_set.rs"]
-mod bosch_set;
-#[path = "../../tests/library/bosch_tx1.rs"]
-mod bosch_tx1;
+#[path = "../../tests/library/bosch.rs"]
+mod bosch;
 #[path = "../../tests/library/can_config.rs"]
 mod can_config;
 #[path = "../../tests/library/can_dbc.rs"]

@@ -3,7 +3,7 @@
 
 use crate::common::{self, IMU, SAMPLE, SERVICE, START};
 use embedded_can::{Frame, Id};
-use gyronet::can::bosch::{SignalStatus, TX1_ID, Tx1};
+use gyronet::can::bosch::{Message, SignalStatus, TX1_ID};
 use gyronet::can::yaw::{AngleMessage, FOG_IDS, Quality, RateMessage};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::health::Faults;
@@ -88,7 +88,7 @@ fn faults_of_the_inertial_sensor_give_the_hosts_frames() {
     let silent = host.followed as usize;
     assert!((45..=50).contains(&silent), "{silent} sets for 0.5 s without a message");
     let tx1 = frames(&host.lines, Id::Standard(TX1_ID));
-    let status = |frame: &DataFrame| Tx1::parse(frame.data()).expect("a good checksum").yaw_rate_status;
+    let status = |frame: &DataFrame| Message::parse(frame.data()).expect("a good checksum").rate_status;
     let failed = tx1.iter().filter(|frame| status(frame) == SignalStatus::FAILURE).count();
     println!("{TEST}: {} frames, {silent} sets in silence, {failed} without a rate", host.lines.len());
     assert!(failed > silent + CLIPS.len() + STUCK.len() - 10, "{failed}");

@@ -2,7 +2,7 @@
 //! back to the gyro less its bias, or says that there is no good rate.
 
 use embedded_can::Frame;
-use gyronet::can::bosch::{SignalStatus, Tx1};
+use gyronet::can::bosch::{Message, SignalStatus};
 use gyronet::can::config::Config;
 use gyronet::can::encoder::CanEncoder;
 use gyronet::compensate::{CompensateConfig, DELAY};
@@ -98,7 +98,7 @@ fn a_rate_beyond_the_signal_is_marked() {
     let outputs = run(&mut pipeline, samples, constant(0.0));
     let mut encoder = CanEncoder::new(Config::DEFAULT);
     for (number, tx1) in tx1(&mut encoder, &outputs).iter().enumerate() {
-        let failed = (tx1.yaw_rate, tx1.yaw_rate_status) == (0xFFFF, SignalStatus::FAILURE);
+        let failed = (tx1.rate, tx1.rate_status) == (0xFFFF, SignalStatus::FAILURE);
         assert_eq!(failed, number >= 310, "{number}");
     }
     assert_eq!(encoder.out_of_range(), 10);
@@ -107,11 +107,11 @@ fn a_rate_beyond_the_signal_is_marked() {
     let outputs = run(&mut new(), samples, constant(0.01));
     assert_eq!(outputs[399].vehicle.live.rate, AngularRate(i32::MIN));
     let last = *tx1(&mut CanEncoder::new(Config::DEFAULT), &outputs).last().expect("samples");
-    assert_eq!((last.yaw_rate, last.yaw_rate_status), (0, SignalStatus::FAILURE));
+    assert_eq!((last.rate, last.rate_status), (0, SignalStatus::FAILURE));
 }
 
 /// TX1 of each sample.
-fn tx1(encoder: &mut CanEncoder, outputs: &[Output]) -> Vec<Tx1> {
+fn tx1(encoder: &mut CanEncoder, outputs: &[Output]) -> Vec<Message> {
     let mut first = |output: &Output| encoder.encode(&output.vehicle)[0];
-    outputs.iter().map(|output| Tx1::parse(first(output).data()).expect("a good checksum")).collect()
+    outputs.iter().map(|output| Message::parse(first(output).data()).expect("a good checksum")).collect()
 }

@@ -11,7 +11,7 @@
 //! again), so a drop-in replacement must do the same.
 
 use super::{
-    CRC, SignalStatus, TX1_ID, Tx1, Tx1Error, YawRateSignal, ZERO, encode_acceleration, encode_temperature,
+    CRC, MessageError, SignalStatus, TX1_ID, YawRateSignal, ZERO, encode_acceleration, encode_temperature,
 };
 use crate::units::{AngularRate, CentiCelsius, SpecificForce};
 use embedded_can::{Frame, StandardId};
@@ -23,11 +23,11 @@ pub struct Layout {
     pub id: StandardId,
     /// Axis of the rate: 0 roll, 1 pitch, 2 yaw.
     pub rate_axis: usize,
-    /// Whether the rate is sent with the opposite sign.
+    /// True if the rate is sent with the opposite sign.
     pub rate_negated: bool,
     /// Axis of the acceleration: 0 forward, 1 left, 2 up.
     pub force_axis: usize,
-    /// Whether byte 3 is the temperature; otherwise 0.
+    /// True if byte 3 is the temperature; otherwise 0.
     pub temperature: bool,
 }
 
@@ -70,20 +70,6 @@ pub struct Message {
     pub counter: u8,
 }
 
-impl From<Tx1> for Message {
-    fn from(tx1: Tx1) -> Self {
-        Self {
-            rate: tx1.yaw_rate,
-            rate_status: tx1.yaw_rate_status,
-            nibble: 0,
-            temperature: tx1.temperature,
-            acceleration: tx1.lateral_acceleration,
-            acceleration_status: tx1.lateral_acceleration_status,
-            counter: tx1.counter,
-        }
-    }
-}
-
 impl Message {
     /// Encodes the message as eight bytes.
     #[must_use]
@@ -100,14 +86,14 @@ impl Message {
     /// Decodes eight bytes after checking length and CRC.
     ///
     /// # Errors
-    /// [`Tx1Error`] for a wrong length or checksum.
-    pub fn parse(bytes: &[u8]) -> Result<Self, Tx1Error> {
+    /// [`MessageError`] for a wrong length or checksum.
+    pub fn parse(bytes: &[u8]) -> Result<Self, MessageError> {
         let &[rate0, rate1, status, temperature, force0, force1, counter, received] = bytes else {
-            return Err(Tx1Error::Length(bytes.len()));
+            return Err(MessageError::Length(bytes.len()));
         };
         let computed = CRC.checksum(&bytes[..7]);
         if computed != received {
-            return Err(Tx1Error::Crc { computed, received });
+            return Err(MessageError::Crc { computed, received });
         }
         Ok(Self {
             rate: u16::from_le_bytes([rate0, rate1]),

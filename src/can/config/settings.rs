@@ -55,7 +55,7 @@ impl E2e {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoschSettings {
-    /// Whether only TX1 is sent, for receivers that use only the yaw rate.
+    /// True if only TX1 is sent, for receivers that use only the yaw rate.
     pub tx1_only: bool,
 }
 

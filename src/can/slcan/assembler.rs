@@ -16,7 +16,7 @@ pub struct TooLong;
 pub struct LineAssembler {
     line: Vec<u8, MAX_HOST_LINE>,
     too_long: bool,
-    /// Whether the line was returned; the next character begins a new one.
+    /// True if the line was returned; the next character begins a new one.
     done: bool,
 }
 
