@@ -13,7 +13,6 @@ mod foreign_mounting;
 mod gyronet_golden;
 mod mounting;
 mod pages;
-mod parts;
 mod python_seconds;
 mod python_units;
 mod recordings_bad_input;

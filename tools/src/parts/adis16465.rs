@@ -1,42 +1,18 @@
-//! Sends bursts of an ADIS16465-2 through the driver and a simulated SPI bus.
+//! Bursts of an ADIS16465-2, and a simulated SPI bus for the driver.
 //!
 //! The part sends 16 bits of each reading and no time: the driver stamps a sample with the time of its read.
 
-use super::{Part, Sent, ViaError};
-use crate::drive::recording::Recording;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use gyronet::sample::ImuSample;
-use gyronet::sensor::adis16465::{Adis16465, BURST, Burst, DiagStat, Model};
+use gyronet::sensor::adis16465::{BURST, Burst, DiagStat, Model};
 use gyronet::units::STANDARD_GRAVITY;
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The simulated model has a range of 500 deg/s.
 pub const MODEL: Model = Model::Adis16465_2;
-/// Bytes of a read on the bus: the command and the burst.
-const READ_BYTES: u64 = 2 + BURST as u64;
 /// The reported temperature, counts of 0.1 deg C: room temperature.
 const TEMPERATURE: i16 = 250;
-
-pub(super) fn send(recording: &Recording) -> Result<Sent, ViaError> {
-    let bus = Bus::default();
-    let mut part = Adis16465::new(bus.clone(), MODEL);
-    let mut samples = Vec::with_capacity(recording.rows.len());
-    for (number, row) in recording.rows.iter().enumerate() {
-        bus.answer(burst(number, &row.sample).emit());
-        let sample = part.read(row.sample.time);
-        let no_sample = |error| Part::Adis16465.no_sample(recording, row, error);
-        samples.push(ImuSample { validity: row.sample.validity, ..sample.map_err(no_sample)? });
-    }
-    let bytes = READ_BYTES * samples.len() as u64;
-    Ok((samples, bytes))
-}
-
-/// Returns the steps of a rate in rad/s and of an acceleration in m/s^2.
-pub(super) fn steps() -> [f64; 2] {
-    let [per_rad, per_force] = counts();
-    [1.0 / per_rad, 1.0 / per_force]
-}
 
 /// Returns the counts in one rad/s and in one m/s^2.
 fn counts() -> [f64; 2] {

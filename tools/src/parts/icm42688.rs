@@ -1,23 +1,20 @@
-//! Sends 20-bit FIFO packets through the driver and a simulated SPI bus: reset, identity, settings,
-//! packets, and the register that is checked with each packet.
+//! 20-bit FIFO packets, and a simulated SPI bus for the driver: reset, identity, settings, packets, and the register
+//! that is checked with each packet.
 
-use super::{Part, Sent, ViaError};
-use crate::drive::recording::Recording;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use gyronet::sample::ImuSample;
 use gyronet::sensor::icm42688::packet::{Packet, Resolution};
 use gyronet::sensor::icm42688::registers as reg;
-use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
 use gyronet::units::{Micros, STANDARD_GRAVITY};
 use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Step of a rate, 1/131 deg/s: the part uses 19 of the 20 bits.
-pub const RATE_STEP: f64 = std::f64::consts::PI / 180.0 / 131.0;
+const RATE_STEP: f64 = std::f64::consts::PI / 180.0 / 131.0;
 /// Step of an acceleration, 1/8192 g: the part uses 18 of the 20 bits.
-pub const FORCE_STEP: f64 = STANDARD_GRAVITY as f64 / 8192.0;
+const FORCE_STEP: f64 = STANDARD_GRAVITY as f64 / 8192.0;
 /// Counts of a 20-bit reading per step.
 const RATE_COUNTS: f64 = 2.0;
 const FORCE_COUNTS: f64 = 4.0;
@@ -28,34 +25,9 @@ const WRAP: u64 = 1 << 16;
 /// Time after which the counter wraps, microseconds; a count is 32/30 us.
 pub const WRAP_US: f64 = WRAP as f64 * 32.0 / 30.0;
 
-pub(super) fn send(recording: &Recording) -> Result<Sent, ViaError> {
-    let bus = Bus::default();
-    let no_start = |why: String| ViaError::NoStart { part: Part::Icm42688, why };
-    let mut part = Icm42688::new(bus.clone(), Icm42688Config::default(), &mut NoDelay)
-        .map_err(|error| no_start(error.to_string()))?;
-    let mut samples = Vec::with_capacity(recording.rows.len());
-    for row in &recording.rows {
-        let error = |why: String| Part::Icm42688.no_sample(recording, row, why);
-        bus.fill(packet(&row.sample).emit());
-        let sample = part.next_sample().map_err(|e| error(e.to_string()))?;
-        let sample = sample.ok_or_else(|| error("its FIFO seems empty".to_owned()))?;
-        // The part's clock starts at any count; only the row's time shows how often it has wrapped in a gap.
-        let (sent, read) = (counts(row.sample.time), counts(sample.time));
-        let turns = sent.saturating_sub(read) / WRAP;
-        samples.push(ImuSample { time: micros(read + turns * WRAP), ..sample });
-    }
-    let bytes = bus.part().bytes;
-    Ok((samples, bytes))
-}
-
 /// Returns the nearest count of the part's counter at a time, without wrapping.
 const fn counts(time: Micros) -> u64 {
     (time.0 * 30 + 16) / 32
-}
-
-/// Returns the time of a count, rounded to the nearest microsecond.
-const fn micros(counts: u64) -> Micros {
-    Micros((counts * 32 + 15) / 30)
 }
 
 /// Encodes a sample as a packet, with the readings rounded to the part's steps and clipped at the ends of the range.
@@ -80,7 +52,6 @@ struct Simulated {
     registers: std::collections::HashMap<(u8, u8), u8>,
     bank: u8,
     fifo: VecDeque<u8>,
-    bytes: u64,
 }
 
 impl Simulated {
@@ -130,18 +101,12 @@ impl SpiDevice for Bus {
         let mut selected = 0;
         for operation in operations {
             match operation {
-                Operation::Write(bytes) => {
-                    part.bytes += bytes.len() as u64;
-                    match **bytes {
-                        [address] => selected = address & !reg::READ,
-                        [address, value] => part.write(address, value),
-                        _ => {}
-                    }
-                }
-                Operation::Read(to) => {
-                    part.bytes += to.len() as u64;
-                    part.read(selected, to);
-                }
+                Operation::Write(bytes) => match **bytes {
+                    [address] => selected = address & !reg::READ,
+                    [address, value] => part.write(address, value),
+                    _ => {}
+                },
+                Operation::Read(to) => part.read(selected, to),
                 // The driver does not use these operations.
                 Operation::Transfer(..) | Operation::TransferInPlace(_) | Operation::DelayNs(_) => {}
             }
