@@ -2,7 +2,6 @@
 //! SLCAN lines come out. Like the image, it does the input and output around the library's [`Coprocessor`].
 
 use crate::recordings::Row;
-use gyronet::can::config::Config;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::coprocessor::{self, Clock, Coprocessor, TimedFrame};
@@ -13,9 +12,6 @@ use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::store::{Calibration, Configuration, Learned};
 use gyronet::units::Micros;
-
-/// The image sends these messages.
-pub const CONFIG: Config = Config::DEFAULT;
 
 /// Returns the message that an MTi would send for a row.
 pub fn message(number: usize, row: &Row) -> MtData2 {

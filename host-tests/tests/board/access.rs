@@ -3,13 +3,10 @@
 use crate::common::{self, START};
 use crate::service::{self, on_bus};
 use embedded_can::{Frame, Id, StandardId};
-use gyronet::service::message::Refusal;
 use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
-use gyronet_host_tests::stored::other_weights;
 use gyronet_tools::client::device::Authority;
 use gyronet_tools::client::device::error::DeviceError;
-use gyronet_tools::client::device::upload::upload;
 use gyronet_tools::signing::PrivateKey;
 use std::time::Duration;
 
@@ -24,35 +21,6 @@ fn locked(test: &str) -> Option<(Board, PrivateKey)> {
 
 fn again(key: &PrivateKey) -> Authority {
     Authority::Key(key.clone())
-}
-
-#[test]
-fn signed_weights_run_after_a_restart_and_unsigned_ones_do_not() {
-    const TEST: &str = "signed_weights_run_after_a_restart_and_unsigned_ones_do_not";
-    let Some((mut board, key)) = locked(TEST) else { return };
-    let file = other_weights(1);
-    let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
-    match upload(&mut on_bus(&mut board), &file, |_| {}) {
-        Err(DeviceError::Refused(Refusal::Unsigned)) => {}
-        other => panic!("{other:?}"),
-    }
-    let begin = board.counts().time;
-    let mut device = on_bus(&mut board);
-    device.authorise(again(&key));
-    upload(&mut device, &file, |_| {}).expect("it is signed");
-    device.restart().expect("access is proven");
-    board.run(START);
-    let took = board.counts().time - begin;
-    println!("{TEST}: {} bytes, signed, running after {:.1} s of board time", file.len(), took.as_secs_f64());
-    assert!(took < Duration::from_secs(60), "{took:?}");
-    assert_eq!(service::info(&mut board).weights_crc, Some(crc));
-    let access = on_bus(&mut board).access().expect("a response");
-    assert_eq!((access.state, access.counter), ("locked", 1));
-    assert_eq!(access.serial, "31002A000F4759524F4E4554", "the model's unique number");
-    match on_bus(&mut board).set_configuration(&Configuration::DEFAULT) {
-        Err(DeviceError::Refused(Refusal::Unsigned | Refusal::Signature | Refusal::Counter { .. })) => {}
-        other => panic!("{other:?}"),
-    }
 }
 
 /// A response to a challenge: the generator's numbers differ from board start to board start.

@@ -1,32 +1,15 @@
 //! The model of the STM32F405 itself: its own tests, and the image as it is flashed running on it.
 
+use crate::common::{self, IMU, SERVICE, SLCAN, START, boot};
 use crate::service::{self, info};
 use gyronet::service::event::ResetCause;
 use gyronet::service::message::{FlashState, Identity, Info, Origin};
-use gyronet_host_tests::board::{self, At, Board, PACKAGES};
-use gyronet_host_tests::recordings::{self, workspace};
+use gyronet_host_tests::board::{At, Board, PACKAGES};
+use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::{replay, require};
 use gyronet_tools::target::stack::priorities;
 use std::process::Command;
 use std::time::Duration;
-
-const IMU: usize = 1;
-const SLCAN: usize = 2;
-const SERVICE: usize = 6;
-/// The state of the SLCAN line.
-const BAUD: u32 = 921_600;
-const SAMPLE: Duration = Duration::from_millis(10);
-/// The time from power-on until the image listens to all lines.
-const START: Duration = Duration::from_millis(200);
-/// One second of a drive.
-const SAMPLES: usize = 100;
-
-fn boot(test: &str) -> Option<Board> {
-    let elf = board::firmware("netduino-plus-2", test, env!("CARGO_TARGET_TMPDIR"), "coprocessor")?;
-    let mut board = Board::boot(test, &elf)?;
-    board.configure(&format!("USART{SLCAN}.baud"), BAUD);
-    Some(board)
-}
 
 #[test]
 fn model_passes_its_own_tests() {
@@ -41,35 +24,11 @@ fn model_passes_its_own_tests() {
     println!("{}", words.lines().rev().take(3).collect::<Vec<_>>().join(" "));
 }
 
-#[test]
-fn image_sends_over_slcan_what_the_host_sends() {
-    let Some(mut board) = boot("image_sends_over_slcan_what_the_host_sends") else { return };
-    let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
-    let messages: Vec<_> =
-        rows.iter().take(SAMPLES).enumerate().map(|(k, row)| replay::message(k, row).emit()).collect();
-    for (number, message) in messages.iter().enumerate() {
-        board.send_at(IMU, message, START + SAMPLE * number as u32);
-    }
-    board.run(START + SAMPLE * (SAMPLES as u32 + 2));
-    let sent = board.sent(SLCAN);
-    let lines: Vec<_> =
-        sent.split(|byte| *byte == b'\r').filter(|line| !line.is_empty()).map(<[u8]>::to_vec).collect();
-    let mut host = replay::Board::new().follow_lines(lines.clone());
-    host.push(&messages.concat());
-    let text =
-        |lines: &[Vec<u8>]| lines.iter().map(|line| line.escape_ascii().to_string()).collect::<Vec<_>>();
-    assert!(host.lines.len() > 5 * SAMPLES, "{} lines", host.lines.len());
-    assert_eq!(text(&lines[..host.lines.len()]), text(&host.lines));
-}
-
 /// The image's own list of priorities, which the bound of the stack rests on, is what its code sets.
 #[test]
 fn priorities_are_those_that_the_stack_bound_rests_on() {
     const TEST: &str = "priorities_are_those_that_the_stack_bound_rests_on";
-    let Some(elf) = board::firmware("netduino-plus-2", TEST, env!("CARGO_TARGET_TMPDIR"), "coprocessor")
-    else {
-        return;
-    };
+    let Some(elf) = common::elf(TEST) else { return };
     let Some(mut board) = Board::boot(TEST, &elf) else { return };
     board.run(START);
     let set = board.priorities();

@@ -1,17 +1,9 @@
-//! The SLCAN line of the board: a host's commands, and udsoncan over can-isotp and python-can beside the rates.
+//! The SLCAN line of the board: a host's commands.
 
 use crate::common::{self, SAMPLE, SET, SLCAN, START};
 use gyronet::can::{DataFrame, slcan};
 use gyronet_host_tests::board::Board;
-use gyronet_host_tests::recordings::workspace;
-use gyronet_host_tests::{replay, require};
-use std::io::{ErrorKind, Read, Write};
-use std::net::{TcpListener, TcpStream};
-use std::process::Command;
-use std::time::Duration;
-
-/// Board time that passes between two looks at the socket.
-const TURN: Duration = Duration::from_millis(2);
+use gyronet_host_tests::replay;
 
 fn standing(board: &mut Board, samples: std::ops::Range<usize>) {
     let now = board.counts().time;
@@ -48,51 +40,4 @@ fn board_answers_the_commands_of_a_host() {
     for stamp in [120, 130, 140] {
         assert!(stamps.iter().filter(|at| **at == stamp).count() >= SET, "{stamps:?}");
     }
-}
-
-/// Serves the SLCAN line to a client until it goes; board time passes as long as it is there.
-fn serve(board: &mut Board, mut client: TcpStream) -> std::io::Result<()> {
-    client.set_read_timeout(Some(Duration::from_micros(100)))?;
-    loop {
-        let mut bytes = [0; 256];
-        match client.read(&mut bytes) {
-            Ok(0) => return Ok(()),
-            Ok(count) => board.send(SLCAN, &bytes[..count]),
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
-            Err(error) if error.kind() == ErrorKind::ConnectionReset => return Ok(()),
-            Err(error) => return Err(error),
-        }
-        board.run(TURN);
-        match client.write_all(&board.sent(SLCAN)) {
-            Err(error) if matches!(error.kind(), ErrorKind::ConnectionReset | ErrorKind::BrokenPipe) => {
-                return Ok(());
-            }
-            written => written?,
-        }
-    }
-}
-
-#[test]
-fn udsoncan_reads_the_board_over_slcan() {
-    const TEST: &str = "udsoncan_reads_the_board_over_slcan";
-    let Some(python) = require::python(TEST, &["can", "isotp", "serial", "udsoncan", "yaml"]) else { return };
-    let Some(mut board) = common::boot(TEST) else { return };
-    board.run(START);
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let address = listener.local_addr().expect("a port");
-    let client = std::thread::spawn(move || {
-        Command::new(python)
-            .arg(workspace().join("host-tests/tests/clients/uds_client.py"))
-            .args(["slcan", &format!("socket://{address}")])
-            .output()
-            .expect("Python")
-    });
-    // The sensor speaks meanwhile: its rates share the line.
-    standing(&mut board, 0..6_000);
-    serve(&mut board, listener.accept().expect("the client").0).expect("the line holds");
-    let client = client.join().expect("it ends");
-    let said = String::from_utf8_lossy(&client.stdout).into_owned();
-    println!("{said}");
-    assert!(client.status.success(), "{}", String::from_utf8_lossy(&client.stderr));
-    assert_eq!(said.lines().last(), Some("done"));
 }

@@ -1,19 +1,19 @@
-//! The board stores records over used sectors and weight files, through diagnosis and the flash
+//! The board stores records over used sectors and signed weight files, through diagnosis and the flash
 //! controller, and works on while it erases as far as the part lets it.
 
 use crate::common::{self, IMU, START};
-use crate::service::{self, ask, on_bus, storing};
+use crate::service::{self, on_bus};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::model::{Blob, weights};
-use gyronet::service::message::{FlashState, Origin, Refusal};
-use gyronet::store::layout::{FLASH_BASE, STORE};
+use gyronet::service::message::{FlashState, Origin};
 use gyronet::store::slots::WeightSource;
-use gyronet::store::{Configuration, Field, FieldError, Slot, StoreError};
+use gyronet::store::{Configuration, Slot};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::replay;
 use gyronet_host_tests::stored::other_weights;
-use gyronet_tools::client::device::error::DeviceError;
+use gyronet_tools::client::device::Authority;
 use gyronet_tools::client::device::upload::{Uploaded, upload};
+use gyronet_tools::signing::PrivateKey;
 use std::time::Duration;
 
 const MS: Duration = Duration::from_millis(1);
@@ -91,30 +91,6 @@ fn configuration_survives_restarts_while_sectors_fill_and_are_used_again() {
     assert_eq!(erased[..4], [1, 2, 1, 2]);
     assert_eq!(resets[0], "por");
     assert!(resets[1..].iter().all(|cause| cause == "software"), "{resets:?}");
-}
-
-#[test]
-fn invalid_configuration_is_refused_and_changes_nothing() {
-    let Some(mut board) = common::boot("invalid_configuration_is_refused_and_changes_nothing") else {
-        return;
-    };
-    board.run(START);
-    on_bus(&mut board).set_configuration(&latitude(7)).expect("it is stored");
-    let records = |board: &mut Board| board.read(At::Address(FLASH_BASE + STORE.start), STORE.len());
-    let before = records(&mut board);
-    let wild = Configuration { latitude_deg: Some(91.0), ..latitude(8) };
-    let range = FieldError::Range { field: Field::LatitudeDeg, value: 91.0, low: -90.0, high: 90.0 };
-    let refusal = Refusal::Store(StoreError::Field(range));
-    match on_bus(&mut board).set_configuration(&wild) {
-        Err(DeviceError::Refused(found)) => assert_eq!(found, refusal),
-        other => panic!("{other:?}"),
-    }
-    let mut other = storing(&latitude(8));
-    other[3] = 1;
-    assert_eq!(ask(&mut board, &other), [0x7F, 0x2E, 0x31], "another layout");
-    assert!(records(&mut board) == before, "the flash is as it was");
-    restart(&mut board);
-    assert_eq!(service::configuration(&mut board), latitude(7));
 }
 
 #[test]
@@ -197,17 +173,27 @@ fn uploaded_weights_run_from_their_slot() {
     board.run(START);
     let file = other_weights(1);
     let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
-    let (done, took) = timed(&mut board, |board| upload(&mut on_bus(board), &file, |_| {}));
-    assert_eq!(done.expect("it is taken"), Uploaded { slot: Slot::A, crc });
-    println!("{TEST}: {} bytes in {took:?}", file.len());
-    assert_eq!(service::info(&mut board).weights, WeightSource::BuiltIn);
-    restart(&mut board);
+    let key = PrivateKey::generate().expect("random numbers");
+    on_bus(&mut board).set_key(&key.public()).expect("there was none");
+    let (done, took) = timed(&mut board, |board| {
+        let mut device = on_bus(board);
+        device.authorise(Authority::Key(key));
+        let done = upload(&mut device, &file, |_| {});
+        device.restart().expect("access is proven");
+        board.run(START);
+        done
+    });
+    assert_eq!(done.expect("it is signed"), Uploaded { slot: Slot::A, crc });
+    println!("{TEST}: {} bytes, signed, running after {took:?}", file.len());
+    assert!(took < Duration::from_secs(60), "{took:?}");
+    assert_eq!(common::counters(&mut board).lines.frames_lost, 0);
     let info = service::info(&mut board);
     assert_eq!(
         (info.weights, info.weights_crc, info.flash),
         (WeightSource::Slot(Slot::A), Some(crc), FlashState::Ready)
     );
-    assert_eq!(erased_and_reset(&mut board), (vec![10, 1], vec!["por".to_owned(), "software".to_owned()]));
+    // The key takes the first sector of the records.
+    assert_eq!(erased_and_reset(&mut board), (vec![1, 10], vec!["por".to_owned(), "software".to_owned()]));
     let samples = common::drive(SAMPLES);
     let begin = board.counts().time;
     let _ = board.can_frames();

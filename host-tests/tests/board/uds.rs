@@ -5,7 +5,6 @@ use crate::common::{self, START, drive};
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::diagnosis::DiagnosisIds;
-use gyronet::model::weights;
 use gyronet::store::{Configuration, Record};
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::recordings::workspace;
@@ -42,43 +41,6 @@ fn exchange(board: &mut Board, frames: &[[u8; 8]]) -> Vec<[u8; 8]> {
 
 fn ask(board: &mut Board, request: &[u8]) -> Option<Vec<u8>> {
     Tester::default().ask(request, 8_000, |frames| exchange(board, frames))
-}
-
-/// A weight file of the size of the built-in one is up and running in under a minute, the restart included.
-#[test]
-fn a_weight_file_comes_over_can_and_is_used() {
-    const TEST: &str = "a_weight_file_comes_over_can_and_is_used";
-    let Some(mut board) = common::boot(TEST) else { return };
-    board.run(START);
-    let file = other_weights(1);
-    let crc = |file: &[u8]| u32::from_le_bytes(*file.last_chunk().expect("a checksum")).to_be_bytes();
-    let running = |source: u8, file: &[u8]| Some([&[0x62, 1, 3, source][..], &crc(file)].concat());
-    assert_eq!(ask(&mut board, &[0x22, 1, 3]), running(1, &weights::DEFAULT.0));
-    let from = board.counts().time;
-    assert_eq!(ask(&mut board, &[0x10, 2]), Some(vec![0x50, 2, 0, 50, 0x01, 0xF4]));
-    let [a, b, c, d] = (file.len() as u32).to_be_bytes();
-    let mut tester = Tester::default();
-    let begin = [0x34, 0, 0x44, 0, 0, 0, 0, a, b, c, d];
-    let begun = tester.ask(&begin, 8_000, |frames| exchange(&mut board, frames));
-    assert_eq!(
-        (begun, tester.pending),
-        (Some(vec![0x74, 0x20, 1, 2]), 1),
-        "pending goes out before the erase"
-    );
-    for (number, bytes) in (1..=255u8).chain(0..=255).cycle().zip(file.chunks(256)) {
-        assert_eq!(ask(&mut board, &[&[0x36, number], bytes].concat()), Some(vec![0x76, number]));
-    }
-    let finished = [&[0x77, 0][..], &crc(&file)].concat();
-    assert_eq!(ask(&mut board, &[0x37]), Some(finished), "slot A, and the checksum");
-    assert_eq!(ask(&mut board, &[0x31, 1, 0xFF, 1]), Some(vec![0x71, 1, 0xFF, 1]));
-    assert_eq!(ask(&mut board, &[0x11, 1]), Some(vec![0x51, 1]));
-    board.run(START);
-    assert_eq!(ask(&mut board, &[0x22, 1, 3]), running(2, &file));
-    let took = board.counts().time - from;
-    println!("{} bytes, modelled: {:.1} s", file.len(), took.as_secs_f64());
-    assert!(took < Duration::from_secs(60), "{took:?}");
-    let counters = common::counters(&mut board);
-    assert_eq!(counters.lines.frames_lost, 0);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 """Diagnoses the board with udsoncan over can-isotp, as they are published.
 
-`uds_client.py slcan URL` reads over a serial line, `uds_client.py socketcan vcan0` over an interface of Linux. `uds_client.py pipes WEIGHTS` reads and writes over a bus that is two
+`uds_client.py socketcan vcan0` reads over an interface of Linux. `uds_client.py pipes WEIGHTS` reads and writes over a bus that is two
 pipes, with the key and signatures in WEIGHTS.json: each line "turn ID#DATA ..." that goes out carries the frames of a millisecond, and the line that
 comes back the server's frames. Time is counted in turns, so that a slow model of the board breaks no timeout.
 """
@@ -102,7 +102,7 @@ DESCRIPTION = yaml.safe_load((Path(__file__).parents[3] / "tools/gyronet_uds.yam
 DIDS = DESCRIPTION["data"]
 CODECS = {did: Bytes if data["format"] == "bytes" else data["format"]
           for did, data in (DIDS | DESCRIPTION["write_only"]).items()}
-# An emulated or modelled board does not keep real time, so its own time-outs do not count.
+# A modelled board does not keep real time, so its own time-outs do not count.
 CONFIG = dict(udsoncan.configs.default_client_config, data_identifiers=CODECS, request_timeout=None,
               p2_timeout=20, p2_star_timeout=60, use_server_timing=False)
 
@@ -175,10 +175,7 @@ def main():
         address = isotp.Address(isotp.AddressingMode.Normal_11bits, txid=SERVER, rxid=RESPONSE)
         stack = isotp.NotifierBasedCanStack(bus=bus, notifier=notifier, address=address, params={"tx_padding": 0xAA})
         with Client(PythonIsoTpConnection(stack), config=CONFIG) as client:
-            configuration = examine(client)
-            if line == "slcan":
-                # The emulator has no flash controller.
-                refused(0x22, client.write_data_by_identifier, 0x0100, configuration)
+            examine(client)
         notifier.stop()
         bus.shutdown()
     print("done")
