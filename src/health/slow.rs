@@ -1,6 +1,6 @@
 //! States that change slowly: whether the vehicle stands, and how well the board knows its sensor.
 
-/// Whether the vehicle stands.
+/// The verdict about standstill.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Verdict {
     /// Neither is shown, or the gyro contradicts the wheels.
@@ -41,7 +41,7 @@ pub enum Knowledge {
 /// All of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SlowStatus {
-    /// Whether the vehicle stands.
+    /// The verdict about standstill.
     pub verdict: Verdict,
     /// The evidence for the verdict.
     pub evidence: Evidence,

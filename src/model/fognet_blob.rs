@@ -91,7 +91,7 @@ impl core::fmt::Display for Training {
 pub struct FogBlob<'w> {
     /// The provenance of the weights: JSON.
     pub provenance: &'w str,
-    /// What the network was trained on.
+    /// The data that the network was trained on.
     pub training: Training,
     /// The scaling of each feature.
     pub normalisation: [Normalisation; INPUTS],

@@ -36,7 +36,7 @@ pub(super) struct SensorBias {
     early: Option<(Rotation, [SpecificForce; 3])>,
     /// Specific force of this second, codes, and its good samples.
     force: ([i64; 3], i64),
-    /// Whether the last seconds show that the sensor was not moved since, and the seconds in a row that show that it
+    /// True if the last seconds show that the sensor was not moved since; and the seconds in a row that show that it
     /// was.
     in_place: bool,
     elsewhere: u32,

@@ -47,7 +47,7 @@ pub struct Device<R: NorFlash, W> {
     identity: Identity,
     flash: FlashState,
     writable: bool,
-    /// Whether stored data were refused.
+    /// True if stored data were refused.
     refused: bool,
     configuration: Configuration,
     configuration_origin: Origin,
@@ -59,7 +59,7 @@ pub struct Device<R: NorFlash, W> {
     calibration_origin: Origin,
     learned: Learned,
     learner: Learner,
-    /// Whether the sensor was found to have moved; cleared by [`Self::take_mount_moved`].
+    /// True if the sensor was found to have moved; cleared by [`Self::take_mount_moved`].
     mount_moved: bool,
     calibrator: Option<Calibrator>,
     calibration_state: State,

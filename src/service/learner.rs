@@ -2,7 +2,7 @@
 //! up at standstills, forward while the vehicle drives.
 //!
 //! Without wheels, a long straight can look like a standstill, so only static calibrations add to the bias curve.
-//! What was learnt is stored after the first, second, fourth, ... period of three seconds at rest, about ten times
+//! Learnt values are stored after the first, second, fourth, ... period of three seconds at rest, about ten times
 //! per start. It is also stored each time the sigma of the forward direction has decreased by 30 %, about six times
 //! in total.
 
@@ -27,12 +27,12 @@ pub struct Learner {
     /// `None` until the first period at rest.
     filter: Option<CurveFilter>,
     rests: u32,
-    /// Whether the specific force of this standstill has been used.
+    /// True if the specific force of this standstill has been used.
     has_stood: bool,
     forward: ForwardEstimator,
-    /// Whether the mounting has changed since earlier drives; nothing is learnt then.
+    /// True if the mounting has changed since earlier drives; nothing is learnt then.
     is_moved: bool,
-    /// Whether there is something new to store.
+    /// True if there is something new to store.
     pub is_changed: bool,
 }
 

@@ -164,7 +164,7 @@ pub struct Info {
     pub record_versions: [u8; 2],
     /// State of the record store.
     pub flash: FlashState,
-    /// Whether data can be stored: the board has a flash, and its controller is in order.
+    /// True if data can be stored: the board has a flash, and its controller is in order.
     pub writable: bool,
     /// Origin of the configuration.
     pub configuration: Origin,

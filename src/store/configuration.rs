@@ -90,12 +90,12 @@ pub struct Configuration {
     pub fog_ids: [u16; 3],
     /// Correction of the fibre-optic gyro.
     pub fog_gyro: FogGyro,
-    /// Whether wheel and latitude frames from a host on SLCAN are used, for a bench without a bus. On a vehicle,
+    /// True if wheel and latitude frames from a host on SLCAN are used, for a bench without a bus. On a vehicle,
     /// anyone with access to that line could then influence the rate.
     pub slcan_inputs: bool,
     /// Identifiers of diagnosis.
     pub diagnosis: DiagnosisIds,
-    /// Whether the board learns the sensor's bias over temperature and the forward direction, and uses them.
+    /// True if the board learns the sensor's bias over temperature and the forward direction, and uses them.
     pub learn: bool,
 }
 

@@ -141,9 +141,9 @@ pub struct Store<F> {
     /// Offset of the next record, if one can be appended.
     free: Option<u32>,
     damaged: bool,
-    /// Whether a damaged record may have been the configuration.
+    /// True if a damaged record may have been the configuration.
     configuration_damaged: bool,
-    /// Whether a header is neither valid nor blank; the newest sector may then be lost.
+    /// True if a header is neither valid nor blank; the newest sector may then be lost.
     header_damaged: bool,
 }
 

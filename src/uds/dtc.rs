@@ -35,7 +35,7 @@ pub struct Trouble {
     pub code: u32,
     /// A short name.
     pub name: &'static str,
-    /// What a workshop checks.
+    /// The check for a workshop.
     pub check: &'static str,
     cause: Cause,
 }
@@ -184,9 +184,9 @@ impl From<&Conditions> for Snapshot {
 #[derive(Debug)]
 pub struct Memory {
     entries: [Entry; TROUBLES.len()],
-    /// Whether troubles are recorded; a tester may stop the recording.
+    /// True if troubles are recorded; a tester may stop the recording.
     pub is_enabled: bool,
-    /// Whether the confirmed troubles differ from the stored ones.
+    /// True if the confirmed troubles differ from the stored ones.
     pub is_changed: bool,
 }
 

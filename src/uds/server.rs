@@ -17,7 +17,7 @@ use embedded_storage::nor_flash::NorFlash;
 pub struct Server {
     transport: Transport,
     services: Services,
-    /// Whether "response pending" has been sent for the request.
+    /// True if "response pending" has been sent for the request.
     is_pending: bool,
 }
 

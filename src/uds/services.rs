@@ -32,14 +32,14 @@ pub(super) struct Services {
     session: Session,
     /// Time of the tester's last frame, or of the last response, ms.
     pub last_activity: u32,
-    /// Whether the request was addressed to all servers.
+    /// True if the request was addressed to all servers.
     pub is_functional: bool,
     pub(super) memory: Memory,
-    /// Whether the memory has been restored from flash.
+    /// True if the memory has been restored from flash.
     is_restored: bool,
-    /// Whether the messages of the board are stopped.
+    /// True if the messages of the board are stopped.
     pub is_silenced: bool,
-    /// Whether a tester has requested a restart.
+    /// True if a tester has requested a restart.
     pub is_restarting: bool,
     pub(super) download: Option<Download>,
     pub(super) security: Security,
@@ -49,7 +49,7 @@ pub(super) struct Services {
 pub(super) struct Surroundings<'a, E> {
     pub counters: &'a AllCounters,
     pub errors: TransportErrors,
-    /// Whether "response pending" has been sent.
+    /// True if "response pending" has been sent.
     pub is_pending: bool,
     /// The time, ms.
     pub now: u32,

@@ -67,7 +67,7 @@ fn write_drive(path: &Path, seconds: u64) -> Result<(), Box<dyn Error>> {
     Ok(file.flush()?)
 }
 
-/// What a command took.
+/// The time and memory that a command took.
 struct Cost {
     wall: Duration,
     processor: f64,

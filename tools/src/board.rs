@@ -47,7 +47,7 @@ pub struct Step {
     pub input: Row,
     /// The sample's time stamp.
     pub time: Micros,
-    /// Whether the vehicle stands, by its wheels.
+    /// The standstill by the wheels.
     pub standstill: Standstill,
     /// The estimates that were sent with this row.
     pub vehicle: VehicleSample,
@@ -77,7 +77,7 @@ pub struct Board<N> {
     /// The time from which on the board finds the sensor silent.
     silent_from: Micros,
     held: VecDeque<Step>,
-    /// Whether a step that was given out is initialised, and whether one after that has no delayed rate.
+    /// True once a step that was given out is initialised, and once one after that has no delayed rate.
     initialised: bool,
     ended: bool,
 }

@@ -1,7 +1,7 @@
 //! The configuration of a DSP-1760 holds the settings that its messages do not contain, but that are needed to
 //! compute rotation and time.
 
-/// Whether a rotation is an increment or a rate.
+/// The kind of a rotation: an increment or a rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Rotation {

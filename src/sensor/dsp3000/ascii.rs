@@ -22,7 +22,7 @@ const MILLIONTHS: u32 = 1_000_000;
 pub struct Reading {
     /// Value in millionths of the unit, exact.
     pub millionths: i32,
-    /// Whether the gyro marks the reading as valid.
+    /// True if the gyro marks the reading as valid.
     pub valid: bool,
 }
 
@@ -100,7 +100,7 @@ fn decimal(digits: &[u8]) -> Result<u32, LineError> {
 #[derive(Debug, Clone, Default)]
 pub struct Dsp3000Ascii {
     line: Vec<u8, MAX_LINE>,
-    /// Whether the current line is too long; it is ignored until it ends.
+    /// True if the current line is too long; it is ignored until it ends.
     too_long: bool,
 }
 

@@ -37,7 +37,7 @@ const VALUE_MASK: u32 = PARITY - 1;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Word {
-    /// Whether the gyro marks the value as valid.
+    /// True if the gyro marks the value as valid.
     pub valid: bool,
     /// Sync bits, 0 to 3.
     pub sync: u8,

@@ -30,7 +30,7 @@ pub struct Message {
     pub says: String,
 }
 
-/// What the board sends on a drive.
+/// The frames that the board sends on a drive.
 #[derive(Debug, Default)]
 pub struct Sent {
     /// The step with the fastest turn after static initialisation.

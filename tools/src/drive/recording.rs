@@ -91,7 +91,7 @@ impl Recording {
         Ok(Self { path: path.to_owned(), rows, missing: facts.missing, vehicle })
     }
 
-    /// What the rows have.
+    /// The content of the rows.
     pub fn facts(&self) -> Facts {
         Facts::of(&self.rows)
     }

@@ -22,7 +22,7 @@ pub struct Drive<'a> {
     pub path: String,
     /// Contents of the vehicle file beside the drive; the rows are in the vehicle's axes.
     pub vehicle: Cow<'a, Vehicle>,
-    /// What the first reading has found.
+    /// Found by the first reading.
     pub facts: Facts,
     /// Whether the rows of the source are brought to 100 Hz.
     is_off_grid: bool,

@@ -20,9 +20,9 @@ pub struct Variant {
     pub name: String,
     /// The configuration.
     pub config: PipelineConfig,
-    /// Whether the network runs; otherwise the corrections are zero.
+    /// True if the network runs; otherwise the corrections are zero.
     pub network: bool,
-    /// Whether the vehicle's bus has wheel speeds.
+    /// True if the vehicle's bus has wheel speeds.
     pub wheels: bool,
 }
 

@@ -62,11 +62,11 @@ pub struct Sample {
     pub rates: PerMethod<f64>,
 }
 
-/// What holds for the whole drive.
+/// The facts of the whole drive.
 #[derive(Debug, Clone)]
 pub struct Comparison {
     pub costs: PerMethod<Cost>,
-    /// Whether the drive begins in motion, so that a simulated standstill was inserted before it.
+    /// True if the drive begins in motion, so that a simulated standstill was inserted before it.
     pub simulated_rest: bool,
     /// Number of grid steps without a sample.
     pub missing: u32,

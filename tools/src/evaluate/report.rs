@@ -160,9 +160,9 @@ pub struct DriveErrors {
     pub missing: u32,
     /// The column of the reference.
     pub reference: &'static str,
-    /// Whether the recording has wheel rates.
+    /// True if the recording has wheel rates.
     pub wheels: bool,
-    /// Whether the standstill at the start is simulated.
+    /// True if the standstill at the start is simulated.
     pub simulated_rest: bool,
     /// Our rates compared with the best classical method.
     pub over_best_classical: Option<Comparisons>,

@@ -5,7 +5,7 @@ use crate::client::device::settings::{flat, to_value};
 use gyronet::store::{Configuration, Field};
 use std::collections::BTreeMap;
 
-/// What a setting takes: a number in the range of its check, or what the text says.
+/// The value that a setting takes: a number in the range of its check, or what the text says.
 enum Takes {
     Number(&'static str, Field, &'static str),
     Other(&'static str, &'static str),

@@ -32,7 +32,7 @@ pub enum Refusal {
         path: String,
         /// The first line without a true yaw rate.
         line: u64,
-        /// Whether the drive has a course instead.
+        /// True if the drive has a course instead.
         course: bool,
     },
     /// Rows are missing.

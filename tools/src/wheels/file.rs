@@ -34,7 +34,7 @@ pub enum WheelFileError {
     Identifier {
         path: String,
         id: u32,
-        /// Whether the file declares an identifier of 29 bits.
+        /// True if the file declares an identifier of 29 bits.
         extended: bool,
     },
     /// A wheel has two signals.
@@ -91,7 +91,7 @@ const fn still_for_ms() -> u32 {
 pub struct Frame {
     /// CAN identifier.
     pub id: u32,
-    /// Whether the identifier has 29 bits.
+    /// True if the identifier has 29 bits.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub extended: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -159,7 +159,7 @@ pub struct Place {
     pub bits: u8,
     /// Order of the bytes.
     pub order: Order,
-    /// Whether the value is signed.
+    /// True if the value is signed.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub signed: bool,
 }

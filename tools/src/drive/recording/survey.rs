@@ -9,7 +9,7 @@ use gyronet::sample::{PERIOD_US, RATE_HZ};
 use gyronet::units::Micros;
 use std::collections::BTreeMap;
 
-/// What a drive has.
+/// The content of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Facts {
     /// Number of rows.
@@ -20,14 +20,14 @@ pub struct Facts {
     pub last: Micros,
     /// Number of rows that are missing in gaps.
     pub missing: u64,
-    /// Whether the rows are not 10 ms apart.
+    /// True if the rows are not 10 ms apart.
     pub is_off_grid: bool,
-    /// Whether each wheel is recorded in any row.
+    /// True if each wheel is recorded in any row.
     pub wheels: [bool; WHEELS],
 }
 
 impl Facts {
-    /// What these rows have, whether they can be replayed or not.
+    /// The content of these rows, whether they can be replayed or not.
     pub fn of(rows: &[Row]) -> Self {
         Survey::of(rows).facts
     }
@@ -37,7 +37,7 @@ impl Facts {
         (self.last.0 - self.first.0 + PERIOD_US) as f64 * 1e-6
     }
 
-    /// Whether any wheel is recorded.
+    /// True if any wheel is recorded.
     pub fn has_wheels(&self) -> bool {
         self.wheels.contains(&true)
     }

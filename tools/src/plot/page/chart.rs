@@ -24,7 +24,7 @@ pub struct Curve {
     pub note: String,
     /// The points in the units of the axes.
     pub points: Vec<(f64, f64)>,
-    /// Whether the axes must cover the whole curve; otherwise the curve may leave the chart.
+    /// True if the axes must cover the whole curve; otherwise the curve may leave the chart.
     pub in_scale: bool,
 }
 
@@ -34,7 +34,7 @@ pub struct Chart<'a> {
     pub title: &'a str,
     /// The text after the title: the quantities and units of the axes.
     pub axes: &'a str,
-    /// Whether both axes have the same scale; otherwise the horizontal axis is the time.
+    /// True if both axes have the same scale; otherwise the horizontal axis is the time.
     pub same_scale: bool,
     /// The curves from back to front.
     pub curves: Vec<Curve>,
