@@ -1,8 +1,6 @@
 """Peripherals of the STM32F405, one file each, written from RM0090 and the data sheets."""
 
-from .backup import BackupSram, Rtc
 from .bxcan import BxCan
-from .crc_unit import CrcUnit
 from .dbgmcu import Dbgmcu
 from .dma import Dma
 from .exti import Exti
@@ -17,7 +15,6 @@ from .spi import spis
 from .syscfg import Syscfg
 from .timer import timers
 from .usart import usarts
-from .wwdg import Wwdg
 
 
 def create(board):
@@ -30,5 +27,4 @@ def create(board):
     serial[0].attach(Icm42688(board), ports[0], 4)
     return [Rcc(board), Pwr(board), Flash(board), Exti(board), Syscfg(board), *ports, Dbgmcu(board),
             Iwdg(board), *usarts(board), *timers(board), BxCan(board), *serial,
-            Dma(board, "DMA1", 0x4002_6000), Dma(board, "DMA2", 0x4002_6400), Rtc(board), BackupSram(board), Wwdg(board),
-            CrcUnit(board), Rng(board)]
+            Dma(board, "DMA1", 0x4002_6000), Dma(board, "DMA2", 0x4002_6400), Rng(board)]
