@@ -6,10 +6,6 @@ pub mod states;
 
 use crate::sample::Validity;
 
-#[cfg(target_has_atomic = "8")]
-#[doc(hidden)]
-pub mod supervisor;
-
 /// The state of the corrected yaw rate, as one state machine. No state needs a restart to leave it, except that with
 /// damaged weights the state is `Degraded` at best.
 /// [`states::STATES`] says when each state is entered and left.

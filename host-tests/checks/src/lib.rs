@@ -56,8 +56,6 @@ mod slcan;
 mod slcan_command;
 #[path = "../../tests/library/slcan_port.rs"]
 mod slcan_port;
-#[path = "../../tests/library/supervisor.rs"]
-mod supervisor;
 #[path = "../../tests/library/transmit_queue.rs"]
 mod transmit_queue;
 #[path = "../../tests/library/wheel_input.rs"]

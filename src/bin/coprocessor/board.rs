@@ -14,12 +14,8 @@ use crate::stm32f405::usart::Usart;
 use crate::stm32f405::{Chip, pac, serial_number, supply, timer};
 use crate::{crash, serial};
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
-use gyronet::health::supervisor::Supervisor;
 use gyronet::service::event::CanFault;
 use gyronet::service::message::Identity;
-
-/// Records which tasks have run, for the watchdog.
-pub static SUPERVISOR: Supervisor = Supervisor::new();
 
 // SAFETY: each element belongs to one line, which `Board::start` starts.
 static MEMORY: [serial::Memory; 4] = [const { unsafe { serial::Memory::new() } }; 4];

@@ -7,10 +7,9 @@
 use crate::ring::Ring;
 use crate::stm32f405::spi::Spi;
 use crate::stm32f405::timer;
-use crate::{board, serial};
+use crate::{output, serial};
 use core::sync::atomic::{AtomicBool, Ordering};
 use embedded_hal::delay::DelayNs;
-use gyronet::health::supervisor::Task;
 use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::sensor::icm42688::packet::Resolution;
 use gyronet::sensor::icm42688::{Bandwidth, Icm42688, Icm42688Config, Icm42688Error, OutputRate};
@@ -25,9 +24,6 @@ pub const BYTES_PER_STEP: usize = serial::RECEIVED;
 const BYTES_PER_POLL: usize = BYTES_PER_STEP / 4;
 /// Interval between attempts to bring up the part, ms.
 const RETRY_MS: u32 = 1_000;
-/// Timer reads per millisecond before a delay gives up, in case the timer stands still; a millisecond normally has
-/// about ten thousand.
-const POLLS_PER_MS: u32 = 1_000_000;
 
 const ICM: Icm42688Config = Icm42688Config {
     rate: OutputRate::Hz100,
@@ -186,11 +182,9 @@ struct Delay;
 
 impl DelayNs for Delay {
     fn delay_ns(&mut self, ns: u32) {
-        let until = timer::micros() + u64::from(ns.div_ceil(1_000)) + 1;
-        let over = |_| {
-            board::SUPERVISOR.report(Task::Idle);
-            timer::micros() >= until
-        };
-        let _ = (0..(ns / 1_000_000 + 1).saturating_mul(POLLS_PER_MS)).any(over);
+        output::wait(u64::from(ns.div_ceil(1_000)) + 1, || {
+            output::report(output::Task::Idle);
+            false
+        });
     }
 }

@@ -95,14 +95,13 @@ mod app {
     use crate::diagnosis::Diagnosis;
     use crate::idle::Idle;
     use crate::imu::BringUp;
-    use crate::output::Output;
+    use crate::output::{Output, Task, report};
     use crate::stm32f405::pac::Interrupt;
     use crate::stm32f405::{can, timer};
     use crate::{board, crash, frames, serial, start};
     use core::mem::MaybeUninit;
     use cortex_m::asm::dsb;
     use gyronet::coprocessor::Coprocessor;
-    use gyronet::health::supervisor::Task;
     use gyronet::model::blob::HIDDEN;
     use gyronet::model::gyronet::GyroNetState;
     use gyronet::model::{GyroNet, WindowNetwork};
@@ -173,7 +172,7 @@ mod app {
     fn tick(cx: tick::Context) {
         let now = timer::tick();
         cx.local.receptions.iter_mut().flatten().for_each(|reception| reception.count(now));
-        board::SUPERVISOR.report(Task::Tick);
+        report(Task::Tick);
         rtic::pend(Interrupt::UART4);
         dsb();
     }
@@ -227,7 +226,7 @@ mod app {
             let _ = cx.shared.coprocessor.lock(|coprocessor| coprocessor.deliver(due.end, estimate));
             rtic::pend(Interrupt::UART4);
         }
-        board::SUPERVISOR.report(Task::Window);
+        report(Task::Window);
     }
 
     #[idle(local = [rest], shared = [coprocessor, counters])]
@@ -238,7 +237,7 @@ mod app {
             if found.any() {
                 cx.shared.coprocessor.lock(|coprocessor| found.report(coprocessor));
             }
-            board::SUPERVISOR.report(Task::Idle);
+            report(Task::Idle);
             // Every interrupt ends the sleep, the next tick at the latest.
             cortex_m::asm::wfi();
         }

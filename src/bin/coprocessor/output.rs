@@ -4,7 +4,6 @@
 //! announcement and waits for it; from then on the task sends message sets without a rate, until idle's work is done. A
 //! receiver can tell from them that the silence is intended.
 
-use crate::board::SUPERVISOR;
 use crate::boards::BOARD;
 use crate::diagnosis::{self, FROM_SLCAN};
 use crate::frames::{self, FRAMES, Outgoing};
@@ -34,10 +33,28 @@ const ANNOUNCED: u8 = 2;
 const ANNOUNCE_US: u64 = 20_000;
 /// Time for the frames to be sent, us; six frames take 1.7 ms.
 const LEAVE_US: u64 = 5_000;
-/// Limits how often a wait reads the timer, so that it ends even if the timer stands still.
-const POLLS: u32 = 1_000_000;
+/// More interrupts than come in a millisecond, so that a wait ends even if the timer stands still.
+const WAKES_PER_MS: u64 = 1_000;
 
 static STATE: AtomicU8 = AtomicU8::new(RUNNING);
+
+/// A task that has to report: the watchdog is fed only when all of them have run.
+#[derive(Clone, Copy)]
+#[repr(u8)]
+pub enum Task {
+    Tick = 1,
+    /// The network's task, which also reports when it has nothing to do.
+    Window = 1 << 1,
+    Idle = 1 << 2,
+}
+
+const ALL_TASKS: u8 = Task::Tick as u8 | Task::Window as u8 | Task::Idle as u8;
+static REPORTS: AtomicU8 = AtomicU8::new(0);
+
+/// Notes that a task has completed a cycle.
+pub fn report(task: Task) {
+    REPORTS.fetch_or(task as u8, Ordering::Relaxed);
+}
 
 /// The configuration of the output task's lines.
 pub struct OutputParts {
@@ -141,7 +158,8 @@ impl Output {
         if let Some((led, lit)) = BOARD.led {
             led.set(lit == (tick & BLINK_MS != 0));
         }
-        if SUPERVISOR.complete() {
+        // A new cycle begins once every task has reported.
+        if REPORTS.compare_exchange(ALL_TASKS, 0, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
             watchdog::feed();
         }
     }
@@ -216,8 +234,14 @@ fn announce() {
     let _ = STATE.compare_exchange(REQUESTED, ANNOUNCED, Ordering::Relaxed, Ordering::Relaxed);
 }
 
-/// Waits until `over` returns true, or `us` microseconds have passed.
-fn wait(us: u64, over: impl Fn() -> bool) {
+/// Waits, asleep between interrupts, until `over` returns true or `us` microseconds have passed. Idle calls this.
+pub fn wait(us: u64, over: impl Fn() -> bool) {
     let until = timer::micros() + us;
-    let _ = (0..POLLS).any(|_| over() || timer::micros() >= until);
+    let _ = (0..(us / 1_000 + 1) * WAKES_PER_MS).any(|_| {
+        let over = over() || timer::micros() >= until;
+        if !over {
+            cortex_m::asm::wfi();
+        }
+        over
+    });
 }
