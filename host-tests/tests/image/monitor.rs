@@ -1,17 +1,13 @@
 //! The monitor counts what is lost, repeated and damaged, and loses no angle over it.
 
 use embedded_can::{Frame, StandardId};
+use gyronet::can::DataFrame;
 use gyronet::can::config::{Config, Settings};
 use gyronet::can::encoder::CanEncoder;
-use gyronet::can::{DataFrame, slcan};
-use gyronet::units::{AngularRate, Micros, Yaw};
+use gyronet::units::{AngularRate, Yaw};
 use gyronet_host_tests::synthetic;
 use gyronet_tools::client::monitor::line::{NoFrame, Splitter, parse_line};
-use gyronet_tools::client::monitor::source::{Lines, Source, SourceError};
 use gyronet_tools::client::monitor::{Counts, Monitor};
-use std::io::{Read, Write};
-use std::net::TcpListener;
-use std::time::{Duration, Instant};
 
 /// Frames of a car that turns at 50 deg/s, and how far it has turned, deg.
 fn drive(config: Config, samples: u32) -> (Vec<DataFrame>, f64) {
@@ -23,31 +19,6 @@ fn drive(config: Config, samples: u32) -> (Vec<DataFrame>, f64) {
         frames.extend(encoder.encode(&sample));
     }
     (frames, rate.rad_per_sec().to_degrees() * f64::from(samples - 1) / 100.0)
-}
-
-#[test]
-fn a_good_line_has_nothing_to_count() {
-    let config = Config::new(Settings::DEFAULT).expect("checked");
-    let (frames, turned) = drive(config, 1000);
-    let mut monitor = Monitor::new(&config);
-    for (k, frame) in frames.iter().enumerate() {
-        let line = slcan::emit(frame).expect("a data frame");
-        let stamped = slcan::emit_stamped(frame, Micros(k as u64 * 1000)).expect("a data frame");
-        let text = |line: &[u8]| String::from_utf8_lossy(line).into_owned();
-        assert_eq!(parse_line(&text(&line)), Ok((None, *frame)));
-        assert_eq!(parse_line(&text(&stamped)), Ok((Some(k as f64 / 1000.0), *frame)));
-        assert_eq!(monitor.take(frame, k as f64 / 600.0), k % 6 == 5, "a set is whole with its detail");
-    }
-    assert_eq!(monitor.counts, Counts { frames: 6000, ..Counts::default() });
-    let yaw = monitor.state.yaw.expect("known");
-    assert!((yaw - turned).abs() < 1e-6, "{yaw} {turned}");
-    assert!((monitor.frames_per_second().expect("ten seconds") - 600.0).abs() < 1.0);
-    assert!((monitor.state.rate.expect("known") - 50.0).abs() < 1e-5);
-    assert!((monitor.drop_in.expect("known") - 50.0).abs() < 0.006);
-    let json = monitor.json(9.99);
-    assert_eq!((&json["source"], &json["quality"]), (&"Model".into(), &"good".into()));
-    assert_eq!((&json["faults"], &json["correction_deg_per_s"]), (&"none".into(), &0.0.into()));
-    println!("{json}\n{monitor}");
 }
 
 #[test]
@@ -124,43 +95,4 @@ fn bytes_become_lines() {
     let lines: Vec<String> = bytes.iter().filter_map(|byte| splitter.feed(*byte)).collect();
     let long = "x".repeat(128);
     assert_eq!(lines, ["V0101", "t1230", &long, "N", "\u{FFFD}"]);
-}
-
-#[test]
-fn a_board_is_read_over_tcp_until_it_goes() {
-    const LIMIT: Duration = Duration::from_secs(60);
-    let config = Config::DEFAULT;
-    let (frames, _) = drive(config, 500);
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let address = listener.local_addr().expect("a port").to_string();
-    let board = std::thread::spawn(move || {
-        let mut line = listener.accept().expect("the monitor").0;
-        // A connection that is closed with unread bytes is reset, and the other end loses what it has not read.
-        let mut commands = Vec::new();
-        while !commands.ends_with(b"O\r") {
-            let mut byte = [0];
-            line.read_exact(&mut byte).expect("the monitor opens");
-            commands.extend(byte);
-        }
-        for frame in &frames {
-            line.write_all(&slcan::emit(frame).expect("a data frame")).expect("the monitor reads");
-        }
-    });
-    let mut source = Source::open(&address, 0, config.settings().bits_per_second).expect("it listens");
-    let (mut monitor, start) = (Monitor::new(&config), Instant::now());
-    // The board goes: that is an end, not a wait.
-    let end = loop {
-        assert!(start.elapsed() < LIMIT, "{:?}", monitor.counts);
-        match source.read() {
-            Ok(Lines::Some(lines)) => {
-                for line in &lines {
-                    let _ = monitor.take_line(line, 0.0);
-                }
-            }
-            end => break end,
-        }
-    };
-    board.join().expect("every line was taken");
-    assert_eq!(monitor.counts, Counts { frames: 3_000, ..Counts::default() });
-    assert!(matches!(end, Ok(Lines::End) | Err(SourceError::Read { .. })), "{end:?}");
 }
