@@ -1,9 +1,8 @@
 //! The inputs of a board with everything connected: an MTi, a fibre-optic gyro that is simulated from the reference,
 //! and wheel frames.
 
-use crate::recordings::Row;
-use crate::replay;
 use gyronet::can::DataFrame;
+use gyronet::sample::ImuSample;
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::xsens::MtData2;
 use gyronet_tools::drive::wheel_frames;
@@ -28,21 +27,22 @@ pub struct Step {
 }
 
 impl Step {
-    pub fn from_row(number: usize, row: &Row) -> Self {
+    /// Returns the inputs that end with a sample, in which the vehicle turns at `reference`, rad/s.
+    pub fn new(number: usize, sample: &ImuSample, reference: f64) -> Self {
         let speed = if number < STANDING_SAMPLES { 0.0 } else { 20.0 };
         Self {
             wheels: number.is_multiple_of(WHEEL_INTERVAL).then(|| wheels(speed)),
-            imu: replay::message(number, row),
-            fog: fog_bytes(number, fog_reading(number, row)),
+            imu: MtData2::of(sample, number as u16),
+            fog: fog_bytes(number, fog_reading(number, reference)),
         }
     }
 }
 
-/// Returns each of the gyro's readings in the 10 ms that end with a row, rad: a tenth of the turn.
-pub fn fog_reading(number: usize, row: &Row) -> f32 {
+/// Returns each of the gyro's readings in 10 ms at this rate, rad/s: a tenth of the turn, rad.
+pub fn fog_reading(number: usize, reference: f64) -> f32 {
     // A gyro that repeats itself counts as stuck, so no reading equals the one before.
     let noise = if number.is_multiple_of(2) { FOG_STEP / 4.0 } else { -FOG_STEP / 4.0 };
-    ((row.reference * 0.01 / MESSAGES_PER_ROW as f64 / FOG_STEP).round() * FOG_STEP + noise) as f32
+    ((reference * 0.01 / MESSAGES_PER_ROW as f64 / FOG_STEP).round() * FOG_STEP + noise) as f32
 }
 
 /// Returns the bytes that the gyro sends in the 10 ms that end with a row. For the first row it sends only the last

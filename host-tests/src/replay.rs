@@ -1,29 +1,17 @@
 //! The image's output task on the host: bytes of an Xsens MTi and a DSP-1760 and wheel frames go in,
 //! SLCAN lines come out. Like the image, it does the input and output around the library's [`Coprocessor`].
 
-use crate::recordings::Row;
+use crate::synthetic;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::coprocessor::{self, Clock, Coprocessor, TimedFrame};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::monitor::{START_US, TIMEOUT_US};
-use gyronet::sample::PERIOD_US;
+use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::store::{Calibration, Configuration, Learned};
 use gyronet::units::Micros;
-
-/// Returns the message that an MTi would send for a row.
-pub fn message(number: usize, row: &Row) -> MtData2 {
-    MtData2 {
-        packet_counter: Some(number as u16),
-        sample_time_fine: Some((row.time * 10_000.0).round() as u32),
-        acceleration: Some(row.acceleration),
-        rate_of_turn: Some(row.rate_of_turn),
-        temperature: None,
-        status: Some(3),
-    }
-}
 
 /// Compares what a board has sent with what it must send, line by line.
 pub fn assert_same(lines: &[Vec<u8>], expected: &[Vec<u8>]) {
@@ -36,17 +24,18 @@ pub fn assert_same(lines: &[Vec<u8>], expected: &[Vec<u8>]) {
 
 /// Returns the bytes of message `number` of an MTi, one every 10 ms, when the vehicle is level and turns at
 /// `yaw_rate`, rad/s.
-pub fn turning(number: usize, yaw_rate: f32) -> Vec<u8> {
+pub fn turning(number: usize, yaw_rate: f64) -> Vec<u8> {
+    let mut sample = synthetic::turning(number as u64, synthetic::rate(yaw_rate));
     // The lowest bits of a real part always change.
-    let sign = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
-    let (force, rate) = (2e-6 * sign, 8e-9 * sign);
-    let row = Row {
-        time: number as f64 * 0.01,
-        acceleration: [force, force, 9.81 + force],
-        rate_of_turn: [rate, rate, yaw_rate + rate],
-        reference: 0.0,
-    };
-    message(number, &row).emit().to_vec()
+    let sign = if number.is_multiple_of(2) { 1 } else { -1 };
+    sample.specific_force.iter_mut().for_each(|force| force.0 += 2 * sign);
+    sample.angular_rate.iter_mut().for_each(|rate| rate.0 += sign);
+    message(number, &sample)
+}
+
+/// Returns the bytes of message `number` of an MTi.
+pub fn message(number: usize, sample: &ImuSample) -> Vec<u8> {
+    MtData2::of(sample, number as u16).emit().to_vec()
 }
 
 /// Returns the lines that the board must send for these bytes, without the CR.

@@ -13,6 +13,7 @@ use gyronet_host_tests::board::Board;
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::stored::Stored;
 use gyronet_host_tests::{inputs, replay, require};
+use gyronet_tools::drive::recording::Recording;
 use std::io::Write;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -88,8 +89,8 @@ fn frames_are_those_of_the_host_byte_for_byte() {
 fn frames_of_a_real_drive_are_those_of_the_host() {
     const TEST: &str = "frames_of_a_real_drive_are_those_of_the_host";
     let Some(path) = recordings::trial(TEST, 11) else { return };
-    let rows = recordings::rows(&path).into_iter().take(3_000).enumerate();
-    let samples: Vec<Vec<u8>> = rows.map(|(k, row)| replay::message(k, &row).emit().to_vec()).collect();
+    let rows = Recording::read(&path).expect("a recording").rows.into_iter().take(3_000).enumerate();
+    let samples: Vec<Vec<u8>> = rows.map(|(k, row)| replay::message(k, &row.sample)).collect();
     compare(TEST, &samples);
 }
 

@@ -4,8 +4,8 @@ use crate::service;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::service::message::{AllCounters, Info};
 use gyronet_host_tests::board::{self, Board};
-use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::replay;
+use gyronet_tools::bundled;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -42,8 +42,8 @@ pub fn boot(test: &str) -> Option<Board> {
 
 /// Samples of the simulated drive, as the sensor sends them.
 pub fn drive(samples: usize) -> Vec<Vec<u8>> {
-    let rows = recordings::rows(&workspace().join("tools/data/simulated_drive.csv"));
-    rows.iter().take(samples).enumerate().map(|(k, row)| replay::message(k, row).emit().to_vec()).collect()
+    let rows = bundled::simulated_drive().expect("it comes with the tools").rows.into_iter();
+    rows.take(samples).enumerate().map(|(k, row)| replay::message(k, &row.sample)).collect()
 }
 
 /// Sends samples, one every 10 ms, from a time on.

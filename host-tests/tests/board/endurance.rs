@@ -14,13 +14,14 @@ use gyronet::can::fog_encoder::FogEncoder;
 use gyronet::can::yaw::FOG_IDS;
 use gyronet::can::{DataFrame, config::Config, slcan};
 use gyronet::health::InputCounters;
+use gyronet::sample::ImuSample;
 use gyronet::service::message::{AllCounters, LineCounters};
 use gyronet::uds::isotp::Transport;
+use gyronet::units::AngularRate;
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::inputs::Step;
-use gyronet_host_tests::recordings::Row;
-use gyronet_host_tests::replay;
 use gyronet_host_tests::tester::segment;
+use gyronet_host_tests::{replay, synthetic};
 use gyronet_tools::client::device::requests;
 use gyronet_tools::client::monitor::{Counts, Monitor};
 use gyronet_tools::simulate::{self, Simulation};
@@ -80,13 +81,12 @@ impl Outside {
         let number = self.number;
         self.number += 1;
         let sample = self.drive.next().expect("it is without end");
-        let row = Row {
-            time: number as f64 * 0.01,
-            acceleration: sample.specific_force.map(|force| force as f32),
-            rate_of_turn: sample.angular_rate.map(|rate| rate as f32),
-            reference: sample.reference[2],
+        let measured = ImuSample {
+            specific_force: sample.specific_force.map(synthetic::force),
+            angular_rate: sample.angular_rate.map(synthetic::rate),
+            ..synthetic::turning(number as u64, AngularRate::ZERO)
         };
-        let Step { wheels, imu, fog } = Step::from_row(number, &row);
+        let Step { wheels, imu, fog } = Step::new(number, &measured, sample.reference[2]);
         let begin = START + SAMPLE * number as u32;
         let message = imu.emit();
         board.send_at(IMU, &message, begin);

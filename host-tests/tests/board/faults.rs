@@ -8,13 +8,16 @@ use gyronet::can::yaw::{AngleMessage, FOG_IDS, Quality, RateMessage};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::health::Faults;
 use gyronet::model::{Blob, weights};
+use gyronet::sample::ImuSample;
+use gyronet::sensor::xsens::MtData2;
 use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::inputs::{self, Step};
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::recordings::{self, Row, workspace};
 use gyronet_host_tests::replay;
 use gyronet_host_tests::stored::Stored;
+use gyronet_tools::bundled;
+use gyronet_tools::drive::recording::Row;
 use std::ops::Range;
 use std::time::Duration;
 
@@ -26,7 +29,7 @@ const CLIPPED: u32 = 1 << 11;
 const FOG_MESSAGE: usize = 36;
 
 fn rows() -> Vec<Row> {
-    recordings::rows(&workspace().join("tools/data/simulated_drive.csv"))
+    bundled::simulated_drive().expect("it comes with the tools").rows
 }
 
 /// The frames that the board has sent on CAN, as lines.
@@ -62,12 +65,9 @@ fn faults_of_the_inertial_sensor_give_the_hosts_frames() {
     for number in 0..END {
         let garbage = noise.int(-20, 40).max(0);
         let mut bytes: Vec<u8> = (0..garbage).map(|_| noise.byte()).collect();
-        let row = if STUCK.contains(&number) {
-            Row { time: rows[number].time, ..rows[STUCK.start - 1] }
-        } else {
-            rows[number]
-        };
-        let mut message = replay::message(number, &row);
+        let of = if STUCK.contains(&number) { STUCK.start - 1 } else { number };
+        let sample = ImuSample { time: rows[number].sample.time, ..rows[of].sample };
+        let mut message = MtData2::of(&sample, number as u16);
         if CLIPS.contains(&number) {
             message.status = Some(CLIPPED);
         }
@@ -116,11 +116,12 @@ fn faults_of_the_fibre_optic_gyro_are_reported_as_long_as_they_last() {
     let mut host = replay::Board::configured(&configuration, weights);
     let (rows, mut noise) = (rows(), Noise::new(7));
     for number in 0..END {
-        let mut step = Step::from_row(number, &rows[number]);
+        let reference = |number: usize| rows[number].reference.expect("a reference");
+        let mut step = Step::new(number, &rows[number].sample, reference(number));
         match number {
             _ if GARBAGE.contains(&number) => step.fog.iter_mut().for_each(|byte| *byte = noise.byte()),
             _ if STUCK.contains(&number) => {
-                let held = inputs::fog_reading(STUCK.start - 1, &rows[STUCK.start - 1]);
+                let held = inputs::fog_reading(STUCK.start - 1, reference(STUCK.start - 1));
                 step.fog = inputs::fog_bytes(number, held);
             }
             _ if NO_WHEELS.contains(&number) => step.wheels = None,

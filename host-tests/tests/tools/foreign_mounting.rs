@@ -28,8 +28,7 @@ impl WindowNetwork for Nothing {
 /// Runs a drive; returns how often the mounting went out, and the 1 s error of the delayed rate, rad.
 fn run(recording: &Recording, network: &mut impl WindowNetwork) -> (u32, f64) {
     let wheels = WheelFrames::new(recording);
-    let drive =
-        Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network, || {}).expect("it stands first");
+    let drive = Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network).expect("it stands first");
     let rates: Vec<f64> = drive.delayed().map(|rate| rate.rate.rad_per_sec()).collect();
     let steps = &drive.steps[drive.compared()];
     let reference: Vec<f64> =

@@ -43,7 +43,7 @@ fn yaw_rates(recording: &Recording, mounting: Rotation, levelling: Levelling) ->
     let config = PipelineConfig { mounting, levelling, ..PipelineConfig::DEFAULT };
     let mut network =
         GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("they come with the library"));
-    let drive = Replay::run(recording, &config, WheelFrames::new(recording), &mut network, || {});
+    let drive = Replay::run(recording, &config, WheelFrames::new(recording), &mut network);
     drive.expect("it stands still first").delayed().map(|rate| rate.rate.rad_per_sec()).collect()
 }
 

@@ -21,7 +21,7 @@ fn cut(text: &str, skip: usize) -> String {
 
 fn run(recording: &Recording) -> Result<Replay, ReplayError> {
     let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
-    Replay::run(recording, &PipelineConfig::DEFAULT, None, &mut GyroNet::new(blob), || {})
+    Replay::run(recording, &PipelineConfig::DEFAULT, None, &mut GyroNet::new(blob))
 }
 
 #[test]
