@@ -103,33 +103,22 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Replays a recording; the estimate of each window is delivered without delay. `tick` is called for each row.
-    /// `wheels` replaces the vehicle's bus.
+    /// Replays a recording; the estimate of each window is delivered without delay. `wheels` replaces the vehicle's bus.
     pub fn run(
         recording: &Recording,
         config: &PipelineConfig,
         wheels: Option<WheelFrames>,
         network: &mut impl WindowNetwork,
-        mut tick: impl FnMut(),
     ) -> Result<Self, ReplayError> {
         let config = Config { pipeline: *config, ..Config::DEFAULT };
-        let mut board = Board::new(config, wheels, network);
-        let mut steps: Vec<Step> = Vec::with_capacity(recording.rows.len());
-        for row in &recording.rows {
-            tick();
-            let step = board.row(row).map_err(|source| {
-                let path = recording.path.clone();
-                ReplayError::StartsMoving { path, line: row.line, source }
-            })?;
-            steps.extend(step);
-        }
-        steps.extend(std::iter::from_fn(|| board.end()));
-        let start = steps.iter().position(|step| step.is_initialised);
-        let pipeline = board.coprocessor().pipeline();
+        let drive = Drive::from(recording);
+        let mut replayed = Steps::new(&drive, Board::new(config, wheels, network))?;
+        let steps = replayed.by_ref().collect::<Result<Vec<Step>, _>>()?;
+        let pipeline = replayed.board.coprocessor().pipeline();
         let gyro_bias = pipeline
             .gyro_bias()
             .ok_or_else(|| ReplayError::NeverInitialised { path: recording.path.clone() })?;
-        let start = start.unwrap_or(steps.len());
+        let start = steps.iter().position(|step| step.is_initialised).unwrap_or(steps.len());
         let (pending, counters) = (pipeline.pending().delayed, *pipeline.counters());
         Ok(Self { steps, start, gyro_bias, pending, counters })
     }
@@ -179,11 +168,10 @@ mod tests {
     #[test]
     fn the_first_three_seconds_initialise() {
         let recording = recording(1_000, |_| 0.01, usize::MAX);
-        let mut ticks = 0;
         // The vehicle never moves, so zero-rate updates would undo the correction.
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
-        let drive = Replay::run(&recording, &config, None, &mut Constant, || ticks += 1).unwrap();
-        assert_eq!((drive.steps.len(), drive.start, ticks), (1_000, 300, 1_000));
+        let drive = Replay::run(&recording, &config, None, &mut Constant).unwrap();
+        assert_eq!((drive.steps.len(), drive.start), (1_000, 300));
         assert_eq!(drive.gyro_bias[2], recording.rows[1].sample.angular_rate[2]);
         // The constant part of the corrections is removed.
         let sent: i64 = drive.delayed().map(|rate| i64::from(rate.rate.0)).sum();
@@ -200,7 +188,7 @@ mod tests {
     #[test]
     fn a_gap_is_no_error() {
         let recording = recording(1_000, |_| 0.01, 700);
-        let drive = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap();
+        let drive = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant).unwrap();
         assert_eq!((drive.counters.missing, recording.missing), (1, 1));
     }
 
@@ -212,7 +200,7 @@ mod tests {
         for row in &mut recording.rows[700..] {
             row.sample.time.0 += 90_000;
         }
-        let drive = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap();
+        let drive = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant).unwrap();
         let frames = |row: usize| drive.steps[row].frames.len();
         let set = frames(600);
         let sets = frames(699) / set;
@@ -223,8 +211,7 @@ mod tests {
     #[test]
     fn starting_in_a_turn_is_refused() {
         let recording = recording(1_000, |k| 0.001 * k as f64, usize::MAX);
-        let error =
-            Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap_err();
+        let error = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant).unwrap_err();
         assert!(matches!(error, ReplayError::StartsMoving { line: 301, .. }), "{error:?}");
         assert!(error.to_string().starts_with("a.csv: starts moving: line 301: "), "{error}");
     }
@@ -232,8 +219,7 @@ mod tests {
     #[test]
     fn never_three_seconds_whole() {
         let recording = recording(400, |_| 0.01, 200);
-        let error =
-            Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant, || {}).unwrap_err();
+        let error = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant).unwrap_err();
         assert!(matches!(error, ReplayError::NeverInitialised { .. }), "{error:?}");
     }
 }

@@ -117,10 +117,9 @@ impl Estimates {
         let constant = |rate: f64| gyro.iter().map(|z| z - rate).collect::<Vec<f64>>();
         // This is the paper's network alone, without zero-rate updates.
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
-        let (drive, alone_s) = timed(|| Replay::run(recording, &config, None, network, || {}));
+        let (drive, alone_s) = timed(|| Replay::run(recording, &config, None, network));
         let wheels = WheelFrames::new(recording);
-        let (looped, looped_s) =
-            timed(|| Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network, || {}));
+        let (looped, looped_s) = timed(|| Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network));
         self.add(Method::RAW, || constant(0.0));
         match drive.and_then(|drive| Ok((drive, looped?))) {
             Ok((drive, looped)) => {
