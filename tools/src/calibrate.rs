@@ -52,7 +52,9 @@ pub enum CalibrateError {
         seconds: f64,
     },
     /// No calibration makes the gyro agree with the reference.
-    #[error("{path}: reference and gyro differ by {rad:.3} rad from span to span: not the same drive")]
+    #[error(
+        "{path}: reference and gyro differ by {rad:.3} rad from span to span: a wrong unit or clock, or another drive; `gyronet doctor` says which"
+    )]
     Contradiction {
         path: String,
         /// The robust deviation of the spans from the fit, rad.

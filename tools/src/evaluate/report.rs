@@ -39,8 +39,8 @@ pub enum EvaluateError {
         seconds: f64,
     },
     #[error(
-        "{path}: {column} disagrees with the gyro by {rad:.2} rad in 10 s: wrong unit or sign (rad, positive to the left), \
-        or another drive"
+        "{path}: {column} disagrees with the gyro by {rad:.2} rad in 10 s: a wrong unit, sign or clock, or another drive; \
+        `gyronet doctor` says which"
     )]
     Disagrees {
         path: String,

@@ -52,8 +52,8 @@ pub enum Refusal {
     },
     /// The gyro and the reference disagree.
     #[error(
-        "{path}: ref_gyr_z disagrees with gyr_z by {rad:.2} rad in 10 s: wrong unit or sign (rad/s, positive to the left), \
-        or another drive"
+        "{path}: ref_gyr_z disagrees with gyr_z by {rad:.2} rad in 10 s: a wrong unit, sign or clock, or another drive; \
+        `gyronet doctor` says which"
     )]
     Disagrees {
         path: String,
@@ -178,7 +178,7 @@ mod tests {
             ("course", 63, "its ref_yaw trains the linear part", &never),
             ("short", 20, "17 s after the 3 s at rest; training needs 30 s", &|time| same(turn(time))),
             ("moving", 63, "starts moving: line ", &|time: f64| same((2.0 * time).sin())),
-            ("mirrored", 63, "wrong unit or sign", &|time: f64| {
+            ("mirrored", 63, "a wrong unit, sign or clock", &|time: f64| {
                 (30.0 * turn(time), (-30.0 * turn(time)).to_string())
             }),
         ] {
