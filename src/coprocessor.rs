@@ -406,7 +406,8 @@ impl Coprocessor {
         let configuration_lost = self.storage.configuration_lost;
         let bus = self.bus.is_off || self.bus.lost != self.bus.reported;
         let clock = self.monitor.is_clock_off() || self.pipeline.is_rate_refused();
-        let faults = BoardFaults { bus, clock, stored, configuration_lost };
+        let wheels = self.wheels.as_ref().is_some_and(WheelReceiver::is_invalid);
+        let faults = BoardFaults { bus, wheels, clock, stored, configuration_lost };
         BoardState { faults, clock_ratio: self.monitor.clock_ratio() }
     }
 

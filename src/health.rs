@@ -137,6 +137,8 @@ impl Faults {
 pub struct BoardFaults {
     /// Frames were lost on the bus, or the controller is off it.
     pub bus: bool,
+    /// A wheel says of its speed that it is not valid.
+    pub wheels: bool,
     /// The clock of the inertial sensor is too far off the board's, or it sends too few or too many samples a second.
     pub clock: bool,
     /// Weights, configuration or calibration are damaged.
@@ -147,13 +149,15 @@ pub struct BoardFaults {
 
 impl BoardFaults {
     /// No fault is present.
-    pub const NONE: Self = Self { bus: false, clock: false, stored: false, configuration_lost: false };
+    pub const NONE: Self =
+        Self { bus: false, wheels: false, clock: false, stored: false, configuration_lost: false };
 
     /// Returns the bits that are sent.
     #[must_use]
     pub const fn faults(self) -> Faults {
         Faults::BUS
             .when(self.bus)
+            .with(Faults::WHEELS.when(self.wheels))
             .with(Faults::STORED.when(self.stored))
             .with(Faults::IMPLAUSIBLE.when(self.clock))
     }

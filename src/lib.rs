@@ -106,6 +106,7 @@ pub mod can;
 pub mod config;
 pub mod coprocessor;
 pub mod estimate;
+pub mod heading;
 pub mod health;
 pub mod model;
 pub mod odometry;

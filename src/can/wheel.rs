@@ -9,8 +9,8 @@
 mod layout;
 mod settings;
 
-pub use layout::{Checksum, WheelError, WheelFrame, WheelSignal};
-#[cfg(feature = "service")]
+use layout::Pulses;
+pub use layout::{ByteSum, Checksum, Code, MAX_SPEED, Parts, WheelError, WheelFrame, WheelSignal};
 pub(crate) use settings::raw_id;
 pub use settings::{MAX_FRAMES, WheelConfigError, WheelSettings};
 
@@ -25,7 +25,10 @@ pub struct WheelReceiver {
     settings: WheelSettings,
     sequences: [Sequence; MAX_FRAMES],
     wheels: Wheels,
-    /// True if a good frame has been received.
+    pulses: [Option<Pulses>; WHEELS],
+    /// Wheels that the newest frame marked as not valid.
+    invalid: [bool; WHEELS],
+    /// True if a frame has been received whose protection was right.
     has_received: bool,
     lost: u32,
 }
@@ -44,7 +47,8 @@ impl WheelReceiver {
             // A lost frame is counted and the new one still accepted: its speed is good.
             Sequence::new(counters, u8::MAX)
         });
-        Ok(Self { settings, sequences, wheels, has_received: false, lost: 0 })
+        let (pulses, invalid) = ([None; WHEELS], [false; WHEELS]);
+        Ok(Self { settings, sequences, wheels, pulses, invalid, has_received: false, lost: 0 })
     }
 
     /// Processes a frame received at `now`; `None` if it is not a wheel frame.
@@ -60,11 +64,17 @@ impl WheelReceiver {
         self.wheels.expire(now);
         let result = self.take(index, &layout, frame.data(), now);
         self.wheels.judge(now);
-        self.has_received |= result.is_ok();
+        self.has_received |= matches!(result, Ok(()) | Err(WheelError::Invalid { .. }));
         Some(result.map(|()| self.wheels.sample(now)))
     }
 
-    /// Returns the newest speeds without a new frame; `None` before the first good frame, because a vehicle without
+    /// Returns whether the newest frames marked a wheel's speed as not valid, or carried an impossible one.
+    #[must_use]
+    pub fn is_invalid(&self) -> bool {
+        self.invalid.contains(&true)
+    }
+
+    /// Returns the newest speeds without a new frame; `None` before the first intact frame, because a vehicle without
     /// wheel frames is not a fault.
     pub fn poll(&mut self, now: Micros) -> Option<WheelSample> {
         self.wheels.expire(now);
@@ -96,8 +106,15 @@ impl WheelReceiver {
         let mut result = Ok(());
         for (wheel, signal) in self.settings.signals.iter().enumerate() {
             let Some(signal) = signal.filter(|signal| usize::from(signal.frame) == index) else { continue };
-            let speed = signal.speed(wheel, data);
-            self.wheels.set(wheel, speed.ok(), now);
+            let (Some(pulses), Some(invalid)) = (self.pulses.get_mut(wheel), self.invalid.get_mut(wheel))
+            else {
+                continue;
+            };
+            let speed = signal.speed(wheel, data, now, pulses);
+            *invalid = speed.is_err();
+            if speed != Ok(None) {
+                self.wheels.set(wheel, speed.ok().flatten(), now);
+            }
             result = result.and(speed.map(drop));
         }
         result

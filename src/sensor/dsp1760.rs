@@ -55,8 +55,8 @@ pub struct Dsp1760Counters {
     pub implausible: u32,
 }
 
-/// Largest plausible rate, rad/s; the gyro's own range ends at 490 deg/s.
-const MAX_RATE: f32 = 16.0;
+/// The gyro's range ends at 490 deg/s. In degrees taken for radians that is 8.6 deg/s.
+const MAX_RATE: f32 = 490.0 * core::f32::consts::PI / 180.0;
 
 /// The parser of a DSP-1760: converts bytes to increments with unwrapped time.
 #[derive(Debug, Clone)]

@@ -27,6 +27,9 @@ pub const MAX_FRAME: usize = 254 + OVERHEAD;
 /// Bits of the status word that report clipping of accelerometer x, y, z and gyro x, y, z.
 const STATUS_CLIPPED: u32 = 0x3F << 8;
 
+/// Bit of the status word that says that the self-test has passed.
+const STATUS_SELF_TEST: u32 = 1;
+
 /// The framing of Xbus messages.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Xbus;
@@ -36,13 +39,16 @@ impl Protocol for Xbus {
 
     fn length(header: &[u8]) -> Option<usize> {
         match *header {
+            // Data that are too long for us, of which the header alone is reported.
+            [PREAMBLE, BUS_ID, MID_MT_DATA2, EXTENDED_LENGTH] => Some(Self::HEADER),
             [PREAMBLE, BUS_ID, _, len] if len != EXTENDED_LENGTH => Some(usize::from(len) + OVERHEAD),
             _ => None,
         }
     }
 
     fn check(frame: &[u8]) -> bool {
-        frame.iter().skip(1).fold(0u8, |sum, byte| sum.wrapping_add(*byte)) == 0
+        frame.len() == Self::HEADER
+            || frame.iter().skip(1).fold(0u8, |sum, byte| sum.wrapping_add(*byte)) == 0
     }
 }
 
@@ -87,7 +93,7 @@ impl Mti {
         self.framer.receive_some(bytes)
     }
 
-    /// Returns the next sample, or the reason why an intact data message gives none. Other messages are skipped.
+    /// Returns the next sample, or the reason why an intact message gives none.
     #[inline]
     pub fn next_sample(&mut self) -> Option<Result<ImuSample, XsensError>> {
         // Only one byte in 54 ends a message, so most calls return early.
@@ -96,13 +102,12 @@ impl Mti {
 
     #[inline(never)]
     fn next_message(&mut self) -> Option<Result<ImuSample, XsensError>> {
-        loop {
-            let frame = self.framer.next_frame()?;
-            if frame.get(2) == Some(&MID_MT_DATA2) {
-                let message = frame.get(4..frame.len() - 1).map_or(Ok(MtData2::default()), MtData2::parse);
-                return Some(message.and_then(|message| self.sample(&message)));
-            }
-        }
+        let message = match *self.framer.next_frame()? {
+            [_, _, MID_MT_DATA2, len, ref data @ .., _] if len != EXTENDED_LENGTH => MtData2::parse(data),
+            [_, _, mid, ..] => Err(XsensError::Foreign { mid }),
+            _ => return None,
+        };
+        Some(message.and_then(|message| self.sample(&message)))
     }
 
     /// Returns the number of frame candidates with a wrong checksum.
@@ -112,6 +117,9 @@ impl Mti {
     }
 
     fn sample(&mut self, message: &MtData2) -> Result<ImuSample, XsensError> {
+        if message.status.is_some_and(|status| status & STATUS_SELF_TEST == 0) {
+            return Err(XsensError::SelfTest);
+        }
         let missing = |id| XsensError::Missing { id };
         let force = message.acceleration.ok_or(missing(id::ACCELERATION))?;
         let rate = message.rate_of_turn.ok_or(missing(id::RATE_OF_TURN))?;

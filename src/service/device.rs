@@ -17,7 +17,7 @@ use super::standstill::StandstillGate;
 use crate::can::wheel::WheelSettings;
 use crate::health::slow::Knowledge;
 use crate::health::{Faults, Status};
-use crate::sample::{ImuSample, WheelSample};
+use crate::sample::{ImuSample, Standstill, WheelSample};
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{
     Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Learned, Record, Slot, Store, Troubles,
@@ -55,6 +55,8 @@ pub struct Device<R: NorFlash, W> {
     next_configuration: Configuration,
     wheels: WheelSettings,
     wheels_origin: Origin,
+    /// The newest report of the wheels.
+    wheels_seen: WheelSample,
     calibration: Calibration,
     calibration_origin: Origin,
     learned: Learned,
@@ -100,6 +102,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             next_configuration: Configuration::DEFAULT,
             wheels: WheelSettings::TOYOTA,
             wheels_origin: Origin::BuiltIn,
+            wheels_seen: WheelSample::without_speeds(Standstill::Unknown),
             calibration: Calibration::NONE,
             calibration_origin: Origin::BuiltIn,
             learned: Learned::NOTHING,
@@ -197,6 +200,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.faults = faults;
         let limits = &self.configuration.static_init;
         self.standstill.observe(sample, wheels.standstill, limits);
+        self.wheels_seen = *wheels;
         if self.configuration.learn && self.learner.observe(sample, wheels, limits, &mut self.learned) {
             self.mount_moved = true;
             self.note(EventKind::MountMoved);
@@ -301,6 +305,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     pub fn uploaded(&self) -> Option<(Slot, u32)> {
         let Uploading { upload, checked } = self.uploading?;
         Some((upload.slot(), checked?))
+    }
+
+    /// Returns the newest report of the wheels, and whether the vehicle is proven to stand.
+    #[must_use]
+    pub fn standing(&self) -> (&WheelSample, bool) {
+        (&self.wheels_seen, self.standstill.is_open())
     }
 
     /// Returns whether the output may be interrupted, because the vehicle is proven to stand.

@@ -34,7 +34,7 @@ pub enum ResetCause {
     LowPower,
 }
 
-/// The reason why a sensor on SPI could not be set up.
+/// The reason why a sensor could not be set up or read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -43,6 +43,10 @@ pub enum SensorFault {
     Bus,
     /// The sensor did not complete its reset.
     Reset,
+    /// The sensor says that its self-test has failed.
+    SelfTest,
+    /// The sensor sends messages with this identifier, and none that can be read.
+    Foreign(u8),
     /// The identity that was read is not that of the sensor; 0 or 255: nothing answers.
     Identity(u8),
     /// A register does not hold the value that was written.

@@ -45,6 +45,10 @@ impl Display for SensorFault {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         match self {
             Self::Bus => f.write_str("the SPI controller did not answer"),
+            Self::SelfTest => f.write_str("its self-test has failed"),
+            Self::Foreign(mid) => {
+                write!(f, "it sends messages {mid:02x} alone, no MTData2 (36) of up to 254 bytes")
+            }
             Self::Reset => f.write_str("the sensor did not restart after its reset"),
             Self::Identity(identity @ (0 | 0xFF)) => {
                 write!(f, "no sensor answers (identity {identity:#04x})")

@@ -6,7 +6,7 @@ use crate::can::wheel::{WheelReceiver, WheelSettings};
 
 impl Record for WheelSettings {
     const KEY: u8 = 4;
-    const VERSION: u8 = 1;
+    const VERSION: u8 = 2;
 
     fn check(&self) -> Result<(), FieldError> {
         WheelReceiver::new(*self).map(drop).map_err(FieldError::Wheels)

@@ -58,7 +58,7 @@ const fn write_only(id: u16, name: &'static str, bytes: &'static str, content: &
 }
 
 /// All data identifiers.
-pub const IDENTIFIERS: [Identifier; 24] = [
+pub const IDENTIFIERS: [Identifier; 25] = [
     read_only(0xF186, "session", "1", "session: 1 default, 2 programming, 3 extended"),
     read_only(0xF189, "firmware_version", "1, 1, 1", "version of the firmware"),
     read_only(0xF18C, "serial_number", "text", "serial number of the chip, 24 hexadecimal digits"),
@@ -117,6 +117,12 @@ pub const IDENTIFIERS: [Identifier; 24] = [
         "forward",
         "1, 2, 2",
         "forward direction: 0 unknown, 1 within 10 deg, 2 within 3 deg; its angle to the left of the configured x axis, its sigma, both 1/100 deg",
+    ),
+    read_only(
+        0x0117,
+        "wheel_speeds",
+        "2, 2, 2, 2, 1, 1",
+        "speed of each wheel, 0.01 m/s, 7FFF for none; the wheels: 0 unknown, 1 moving, 2 standing; 1 if the vehicle is proven to stand",
     ),
 ];
 
@@ -224,6 +230,14 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             put(out, &[device.forward_knowledge() as u8])?;
             put(out, &yaw.to_be_bytes())?;
             put(out, &sigma.to_be_bytes())
+        }
+        0x0117 => {
+            let (wheels, stands) = device.standing();
+            for speed in wheels.speeds {
+                let code = speed.map_or(i16::MAX, |speed| (i64::from(speed.0) * 100 >> 16) as i16);
+                put(out, &code.to_be_bytes())?;
+            }
+            put(out, &[wheels.standstill as u8, u8::from(stands)])
         }
         _ => Err(Nrc::RequestOutOfRange),
     }

@@ -105,8 +105,8 @@ pub static TROUBLES: [Trouble; 14] = [
     trouble(
         0x5A01,
         0x49,
-        "inertial sensor: could not be set up",
-        "wires of SPI; `device info` has the register",
+        "inertial sensor: could not be set up or read, or its self-test has failed",
+        "`device info` has the reason: wires of SPI, the sensor's output messages",
         Cause::SensorRefused,
     ),
     trouble(

@@ -7,7 +7,7 @@ use gyronet::can::bosch::Message;
 use gyronet::can::e2e::{Checker, DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
 use gyronet::can::j1939::Vdc2;
 use gyronet::can::signal::{BitField, ByteOrder};
-use gyronet::can::wheel::{Checksum, WheelFrame, WheelReceiver, WheelSettings, WheelSignal};
+use gyronet::can::wheel::{ByteSum, Checksum, WheelFrame, WheelReceiver, WheelSettings, WheelSignal};
 use gyronet::can::yaw::{AngleMessage, DetailMessage, RateMessage};
 use gyronet::sample::Standstill;
 use gyronet::units::{Duration, Micros, WheelSpeed};
@@ -27,17 +27,13 @@ fn two_wheels(checksum: Checksum) -> WheelSettings {
         BitField::new(start, len, ByteOrder::Intel, signed).expect("a field inside the frame")
     };
     let signal = |start| {
-        let (factor_q16, offset) = (WheelSignal::per_bit_kmh(0.036), WheelSpeed(0));
-        Some(WheelSignal {
-            frame: 0,
-            field: field(start, 16, true),
-            factor_q16,
-            offset,
-            invalid: Some(0x8000),
-        })
+        let invalid = [Some(0x8000), None, None];
+        let signal = WheelSignal::new(0, field(start, 16, true), WheelSignal::per_bit_kmh(0.036));
+        Some(WheelSignal { invalid, pulses: start == 40, ..signal })
     };
+    let counter = Some(field(60, 4, false).into());
     WheelSettings {
-        frames: [Some(WheelFrame { id: ID, counter: Some(field(60, 4, false)), checksum }), None, None, None],
+        frames: [Some(WheelFrame { id: ID, counter, checksum }), None, None, None],
         signals: [None, None, signal(24), signal(40)],
         timeout: Duration(50_000),
         still_speed: WheelSpeed(655),
@@ -50,10 +46,11 @@ fn two_wheels(checksum: Checksum) -> WheelSettings {
 /// its limit or contradict the speeds.
 pub fn wheels(mut data: &[u8]) {
     let choice = byte(&mut data);
+    let sum = |start| ByteSum::new(BitField::new(start, 8, ByteOrder::Intel, false).expect("a byte").into());
     let checksum = match choice % 8 {
         0 => Checksum::J1850 { at: 0 },
-        1 => Checksum::Xor { at: 1 },
-        2 => Checksum::Sum { at: 2 },
+        1 => Checksum::Sum(ByteSum { xor: true, ..sum(8) }),
+        2 => Checksum::Sum(ByteSum { with_id: true, nibbles: true, ..sum(16) }),
         3..=6 => Checksum::E2e(PROFILES[usize::from(choice % 8 - 3)]),
         _ => Checksum::None,
     };

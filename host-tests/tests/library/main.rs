@@ -22,6 +22,7 @@ mod fog_pipeline;
 mod fognet_blob;
 mod framer;
 mod gyronet_scale;
+mod heading;
 mod icm42688;
 mod j1939;
 mod jump;

@@ -20,7 +20,7 @@ fn receiver() -> WheelReceiver {
     let signal = |wheel: u8| {
         let field = BitField::new(16 * wheel, 16, ByteOrder::Intel, false).expect("inside the frame");
         let factor_q16 = WheelSignal::per_bit_kmh(0.01);
-        Some(WheelSignal { frame: 0, field, factor_q16, offset: WheelSpeed(0), invalid: None })
+        Some(WheelSignal::new(0, field, factor_q16))
     };
     let frame = WheelFrame { id: ID.into(), counter: None, checksum: Checksum::None };
     WheelReceiver::new(WheelSettings {

@@ -37,17 +37,16 @@ fn largest_wheels() -> WheelSettings {
     let frame = |number: u8| {
         Some(WheelFrame {
             id: ExtendedId::new(0x1FFF_FFF0 + u32::from(number)).expect("29 bits").into(),
-            counter: Some(BitField::new(24, 8, ByteOrder::Intel, false).expect("inside a frame")),
+            counter: Some(BitField::new(24, 8, ByteOrder::Intel, false).expect("inside a frame").into()),
             checksum: Checksum::E2e(Profile::P02(P02 { data_ids: [0xFF; 16] })),
         })
     };
     let signal = |frame: u8| {
+        let field = BitField::new(39, 32, ByteOrder::Motorola, true).expect("inside a frame");
         Some(WheelSignal {
-            frame,
-            field: BitField::new(39, 32, ByteOrder::Motorola, true).expect("inside a frame"),
-            factor_q16: i32::MIN,
             offset: WheelSpeed(i32::MIN),
-            invalid: Some(u32::MAX),
+            invalid: [Some(u32::MAX), None, None],
+            ..WheelSignal::new(frame, field, i32::MIN)
         })
     };
     let (longest, still_speed) = (Duration(10_000_000), WheelSpeed(i32::MAX));

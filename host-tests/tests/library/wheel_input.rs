@@ -5,7 +5,8 @@ use gyronet::can::DataFrame;
 use gyronet::can::e2e::{DataIdMode, Fault, P01, Profile};
 use gyronet::can::signal::{BitField, ByteOrder, OutsideFrame};
 use gyronet::can::wheel::{
-    Checksum, WheelConfigError, WheelError, WheelFrame, WheelReceiver, WheelSettings, WheelSignal,
+    ByteSum, Checksum, Code, Parts, WheelConfigError, WheelError, WheelFrame, WheelReceiver, WheelSettings,
+    WheelSignal,
 };
 use gyronet::sample::Standstill;
 use gyronet::units::{Duration, Micros, WheelSpeed};
@@ -26,15 +27,10 @@ fn car() -> WheelFrame {
 /// Two wheels, little-endian, signed, a counter in byte 6, byte 7 left for a checksum.
 fn two_wheels(checksum: Checksum) -> WheelSettings {
     let signal = |start| {
-        Some(WheelSignal {
-            frame: 0,
-            field: BitField::new(start, 16, ByteOrder::Intel, true).expect("inside a frame"),
-            factor_q16: WheelSignal::per_bit_kmh(0.036),
-            offset: WheelSpeed(0),
-            invalid: None,
-        })
+        let field = BitField::new(start, 16, ByteOrder::Intel, true).expect("inside a frame");
+        Some(WheelSignal::new(0, field, WheelSignal::per_bit_kmh(0.036)))
     };
-    let frame = WheelFrame { id: OTHER, counter: Some(intel(48, 4)), checksum };
+    let frame = WheelFrame { id: OTHER, counter: Some(intel(48, 4).into()), checksum };
     WheelSettings { signals: [None, None, signal(16), signal(32)], ..settings(frame) }
 }
 
@@ -160,8 +156,8 @@ fn wrong_checksums_and_counters_are_refused() {
     let sum = |data: &[u8]| data[..7].iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
     let kinds = [
         (Checksum::J1850 { at: 7 }, j1850 as fn(&[u8]) -> u8),
-        (Checksum::Xor { at: 7 }, xor),
-        (Checksum::Sum { at: 7 }, sum),
+        (Checksum::Sum(ByteSum { xor: true, ..ByteSum::new(intel(56, 8).into()) }), xor),
+        (Checksum::Sum(ByteSum::new(intel(56, 8).into())), sum),
     ];
     for (checksum, compute) in kinds {
         let mut receiver = WheelReceiver::new(two_wheels(checksum)).expect("checked");
@@ -184,6 +180,127 @@ fn wrong_checksums_and_counters_are_refused() {
         let short = receiver.decode(&frame(OTHER, &[0; 3]), Micros(0)).expect("a wheel frame");
         assert_eq!(short, Err(WheelError::Short(3)));
     }
+}
+
+/// Frames with the checksums that opendbc's code computes for them.
+#[test]
+fn sums_of_other_makers_are_checked() {
+    let nibble = ByteSum {
+        nibbles: true,
+        with_id: true,
+        negated: true,
+        start: 8,
+        ..ByteSum::new(intel(56, 4).into())
+    };
+    let parts = |low, high| Parts { low: intel(low, 2), high: Some(intel(high, 2)) };
+    let split = ByteSum { without_counter: true, last: 9, ..ByteSum::new(parts(46, 62)) };
+    let with_id = |start| ByteSum { with_id: true, ..ByteSum::new(intel(start, 8).into()) };
+    let cases = [
+        ("Honda", 0x1D0, nibble, Some(intel(60, 2).into()), 0x1234_5678_9ABC_DE2F_u64, 2),
+        ("Subaru", 0x13A, with_id(0), None, 0x9134_5678_9ABC_DE20, 0),
+        ("Toyota", 0xAA, ByteSum { with_length: true, ..with_id(56) }, None, 0x1234_5678_9ABC_DEFA, 0),
+        ("Hyundai", 0x386, split, Some(parts(14, 30)), 0x12B4_5678_9A7C_DE20, 6),
+    ];
+    for (maker, id, sum, counter, data, count) in cases {
+        let id = Id::Standard(StandardId::new(id).expect("11 bits"));
+        let frame = WheelFrame { id, counter, checksum: Checksum::Sum(sum) };
+        assert_eq!(frame.check(&data.to_be_bytes()), Ok(counter.map(|_| count)), "{maker}");
+        // Four bits of a sum of bytes see the lower half of each.
+        for bit in (0..64).filter(|bit| !sum.without_counter || bit % 8 < 4) {
+            let damaged = (data ^ 1 << bit).to_be_bytes();
+            assert_eq!(frame.check(&damaged), Err(WheelError::Checksum), "{maker}, bit {bit}");
+        }
+    }
+}
+
+/// A frame in which a wheel says that it is at fault, before any that is good.
+#[test]
+fn a_wheel_that_says_it_is_at_fault_has_no_speed() {
+    let mut receiver = WheelReceiver::new(WheelSettings::TOYOTA).expect("checked");
+    let faulty = frame(ID, &[0x1A, 0x6F, 0x9A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]);
+    for k in 0..100 {
+        let error = receiver.decode(&faulty, Micros(k * 12 * MS)).expect("a wheel frame");
+        assert_eq!(error, Err(WheelError::Invalid { wheel: 0 }));
+    }
+    assert!(receiver.is_invalid());
+    let sample = receiver.poll(Micros(1_200 * MS)).expect("intact frames have come");
+    assert_eq!(
+        sample.speeds.map(|speed| speed.map(|speed| speed.0.abs() < 10)),
+        [None, Some(true), Some(true), Some(true)]
+    );
+    assert_eq!(sample.standstill, Standstill::Unknown);
+    let good = frame(ID, &[0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]);
+    assert!(receiver.decode(&good, Micros(1_212 * MS)).expect("a wheel frame").is_ok());
+    assert!(!receiver.is_invalid());
+}
+
+#[test]
+fn codes_ranges_and_directions_are_what_the_settings_say() {
+    let code = |start, value| Some(Code { field: intel(start, 2), value });
+    let signal = |start| {
+        let kmh = |kmh: f64| WheelSpeed((kmh / 3.6 * 65_536.0) as i32);
+        Some(WheelSignal {
+            invalid: [Some(0xFFFF), Some(0xFFFE), None],
+            range: Some([kmh(-20.0), kmh(300.0)]),
+            valid_when: code(56, 1),
+            reverse_when: code(58, 2),
+            ..WheelSignal::new(0, intel(start, 16), WheelSignal::per_bit_kmh(0.01))
+        })
+    };
+    let plain = WheelFrame { id: ID, counter: None, checksum: Checksum::None };
+    let signals = [None, None, signal(0), signal(16)];
+    let mut receiver = WheelReceiver::new(WheelSettings { signals, ..settings(plain) }).expect("checked");
+    let mut read = |raw: u16, says: u8| {
+        let [lo, hi] = raw.to_le_bytes();
+        let sample =
+            receiver.decode(&frame(ID, &[lo, hi, lo, hi, 0, 0, 0, says]), Micros(0)).expect("a wheel frame");
+        sample.ok().map(|sample| (sample.speeds[2].expect("known").metre_per_sec() * 360.0).round() as i32)
+    };
+    for (raw, says, expected) in [
+        (1_000, 0b0001, Some(1_000)),
+        (1_000, 0b1001, Some(-1_000)),
+        (1_000, 0b0101, Some(1_000)),
+        (1_000, 0b0000, None),
+        (1_000, 0b0010, None),
+        (30_000, 0b0001, Some(30_000)),
+        (30_001, 0b0001, None),
+        (2_001, 0b1001, None),
+        (0xFFFF, 0b0001, None),
+        (0xFFFE, 0b0001, None),
+    ] {
+        assert_eq!(read(raw, says), expected, "{raw} {says:04b}");
+    }
+}
+
+/// Pulses of 20 mm that wrap after 256, in frames of 10 ms.
+#[test]
+fn pulses_become_speeds_and_standstill() {
+    let metre = 4_294_967_296.0;
+    let signal = |start| {
+        Some(WheelSignal { pulses: true, ..WheelSignal::new(0, intel(start, 8), (0.02 * metre) as i32) })
+    };
+    let plain = WheelFrame { id: ID, counter: None, checksum: Checksum::None };
+    let settings = WheelSettings { signals: [None, None, signal(0), signal(8)], ..settings(plain) };
+    let mut receiver = WheelReceiver::new(settings).expect("checked");
+    let mut way = 250.0 * 0.02;
+    let mut drive = |speed: f64, from: u64| {
+        (from..from + 200)
+            .map(|k| {
+                way += speed * 0.01;
+                let raw = (way / 0.02) as u64 as u8;
+                receiver
+                    .decode(&frame(ID, &[raw, raw]), Micros(k * 10 * MS))
+                    .expect("a wheel frame")
+                    .expect("valid")
+            })
+            .last()
+            .expect("frames")
+    };
+    assert!((drive(20.0, 0).speeds[2].expect("known").metre_per_sec() - 20.0).abs() < 0.25);
+    assert_eq!(drive(0.0, 200).standstill, Standstill::Still);
+    assert_eq!(drive(0.3, 400).standstill, Standstill::Moving);
+    // A counter that starts again is no speed: 200 pulses in 100 ms are 40 m/s, 255 in 10 ms never happen.
+    assert!(drive(-0.0, 600).speeds[2].expect("known").metre_per_sec().abs() < 0.25);
 }
 
 #[test]
@@ -226,16 +343,21 @@ fn settings_that_cannot_be_are_refused() {
         let elsewhere = second.map(|signal| WheelSignal { frame, ..signal });
         assert_eq!(with([first, elsewhere, None, None]), WheelConfigError::Wheel(1));
     }
-    let counter = Some(intel(0, 9));
+    let counter = Some(intel(0, 9).into());
     assert_eq!(refused(WheelFrame { counter, ..car() }), WheelConfigError::Counter(9));
-    let checksum = Checksum::Sum { at: 8 };
+    let checksum = Checksum::Sum(ByteSum::new(intel(0, 9).into()));
+    assert_eq!(refused(WheelFrame { checksum, ..car() }), WheelConfigError::Counter(9));
+    let range = Some([WheelSpeed(1), WheelSpeed(0)]);
+    let empty = first.map(|signal| WheelSignal { range, ..signal });
+    assert_eq!(with([empty, second, None, None]), WheelConfigError::Range(0));
+    let checksum = Checksum::J1850 { at: 8 };
     assert_eq!(refused(WheelFrame { checksum, ..car() }), WheelConfigError::Checksum(8));
     let twice = WheelSettings { frames: [Some(car()), Some(car()), None, None], ..settings(car()) };
     assert_eq!(WheelReceiver::new(twice).err(), Some(WheelConfigError::DuplicateIdentifier(0xAA)));
     // The counter and the protection lie over a speed.
-    let counter = Some(intel(8, 4));
+    let counter = Some(intel(8, 4).into());
     assert_eq!(refused(WheelFrame { counter, ..car() }), WheelConfigError::Overlap(0xAA));
-    let checksum = Checksum::Xor { at: 7 };
+    let checksum = Checksum::Sum(ByteSum::new(intel(56, 8).into()));
     assert_eq!(refused(WheelFrame { checksum, ..car() }), WheelConfigError::Overlap(0xAA));
     let checksum = Checksum::E2e(Profile::P01(P01 { data_id: 1, mode: DataIdMode::Both }));
     assert_eq!(refused(WheelFrame { checksum, ..car() }), WheelConfigError::Overlap(0xAA));

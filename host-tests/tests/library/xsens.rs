@@ -124,13 +124,31 @@ fn packets_of_a_wrong_length_are_refused() {
     assert_eq!(MtData2::parse(&[]), Ok(MtData2::default()));
 }
 
+/// The old protocol's data, an error message, and a message of extended length between two good ones.
+#[test]
+fn other_messages_are_named() {
+    let framed = |mid: u8, data: &[u8]| {
+        let frame = [&[0xFF, mid, data.len() as u8], data].concat();
+        let sum = frame.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
+        [&[0xFA], &frame[..], &[sum.wrapping_neg()]].concat()
+    };
+    let extended = [&[0xFA, 0xFF, 0x36, 0xFF, 0x01, 0x2C][..], &[0x55; 301]].concat();
+    let good = || message(1).emit().to_vec();
+    let bytes = [good(), framed(0x32, &[0; 38]), framed(0x42, &[3]), extended, good()].concat();
+    let seen: Vec<_> = feed_new(bytes).into_iter().map(|result| result.err()).collect();
+    let foreign = |mid| Some(XsensError::Foreign { mid });
+    assert_eq!(seen, [None, foreign(0x32), foreign(0x42), foreign(0x36), None]);
+}
+
 #[test]
 fn status_and_temperature_are_read() {
     for bit in 0..32 {
-        let made = MtData2 { status: Some(1 << bit), ..message(1) };
+        let made = MtData2 { status: Some(1 | 1 << bit), ..message(1) };
         let saturated = feed_new(made.emit())[0].unwrap().validity == Validity::Saturated;
         assert_eq!(saturated, (8..14).contains(&bit), "bit {bit}");
     }
+    let failed = MtData2 { status: Some(0x0180_0006), ..message(1) };
+    assert_eq!(feed_new(failed.emit()), [Err(XsensError::SelfTest)]);
     for (degrees, code) in [
         (25.344, Some(CentiCelsius(2_534))),
         (-40.0, Some(CentiCelsius(-4_000))),

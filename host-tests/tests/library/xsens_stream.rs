@@ -1,6 +1,6 @@
 //! MTData2 frames out of a byte stream: damage of every kind, and time that wraps.
 
-use gyronet::sensor::xsens::{MtData2, Mti};
+use gyronet::sensor::xsens::{MtData2, Mti, XsensError};
 use gyronet::units::{Micros, SpecificForce};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::wire::{bytes, feed, feed_new, message, real_frame, synthetic_frame};
@@ -19,7 +19,8 @@ fn the_parser_resynchronises() {
         bytes("fa ff 30 00 d1 fa ff 3f 00 c2 fa ff 42 01 04 ba"),
     ] {
         // A false header may announce 254 bytes more than are there: fill up.
-        let samples = feed_new(before.iter().chain(&second).copied().chain([0; 260]));
+        let mut samples = feed_new(before.iter().chain(&second).copied().chain([0; 260]));
+        samples.retain(|result| !matches!(result, Err(XsensError::Foreign { .. })));
         assert_eq!(samples, expected, "after {before:02x?}");
     }
 }

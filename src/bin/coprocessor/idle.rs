@@ -2,7 +2,7 @@
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
 use crate::diagnosis::Diagnosis;
-use crate::imu::BringUp;
+use crate::imu::{self, BringUp};
 use crate::regions::{Records, Weights};
 use crate::ring::Ring;
 use crate::stm32f405::{clocks, timer};
@@ -11,7 +11,7 @@ use gyronet::health::{Faults, Status};
 use gyronet::model::background::BackgroundCheck;
 use gyronet::sample::{ImuSample, WheelSample};
 use gyronet::service::Device;
-use gyronet::service::event::ClockFault;
+use gyronet::service::event::{ClockFault, SensorFault};
 use gyronet::service::message::AllCounters;
 
 /// Interval between checks of a failed clock, ms.
@@ -64,6 +64,8 @@ pub struct Idle {
     weights: Option<BackgroundCheck<'static>>,
     diagnosis: Diagnosis,
     bring_up: Option<BringUp>,
+    /// Why the MTi gives no samples.
+    refusal: Option<SensorFault>,
     /// The reason why the internal oscillator runs, and the time of the last check whether that reason is over, ms.
     clock_fault: Option<ClockFault>,
     retried: u32,
@@ -81,7 +83,7 @@ impl Idle {
         bring_up: Option<BringUp>,
         clock_fault: Option<ClockFault>,
     ) -> Self {
-        Self { device, weights, diagnosis, bring_up, clock_fault, retried: 0, milliseconds: 0 }
+        Self { device, weights, diagnosis, bring_up, refusal: None, clock_fault, retried: 0, milliseconds: 0 }
     }
 
     /// Does a bounded piece of work, and returns the faults that were found.
@@ -90,6 +92,10 @@ impl Idle {
         self.observe();
         if let Some(result) = self.bring_up.as_mut().and_then(BringUp::step) {
             self.device.sensor(result);
+        }
+        let refusal = imu::refusal();
+        if core::mem::replace(&mut self.refusal, refusal) != refusal {
+            self.device.sensor(refusal.map_or(Ok(()), Err));
         }
         counters.lines.service_errors = self.diagnosis.refused();
         self.diagnosis.step(self.device, counters);

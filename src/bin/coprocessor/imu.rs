@@ -8,12 +8,12 @@ use crate::ring::Ring;
 use crate::stm32f405::spi::Spi;
 use crate::stm32f405::timer;
 use crate::{output, serial};
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU16, Ordering};
 use embedded_hal::delay::DelayNs;
 use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::sensor::icm42688::packet::Resolution;
 use gyronet::sensor::icm42688::{Bandwidth, Icm42688, Icm42688Config, Icm42688Error, OutputRate};
-use gyronet::sensor::xsens::Mti;
+use gyronet::sensor::xsens::{Mti, XsensError};
 use gyronet::service::event::SensorFault;
 use gyronet::store::ImuPart;
 use gyronet::units::Micros;
@@ -36,12 +36,18 @@ type Part = Icm42688<Spi>;
 static READY: Ring<Part, 1> =
     // SAFETY: idle writes, the output task reads.
     unsafe { Ring::new() };
+/// Messages without a sample before the reason is reported: an MTi acknowledges commands in single ones.
+const REFUSED: u8 = 20;
+/// Why the MTi gives no samples: 0, one of these, or the second with the message's identifier.
+static REASON: AtomicU16 = AtomicU16::new(0);
+const SELF_TEST: u16 = 1;
+const FOREIGN: u16 = 0x100;
 static WANTED: AtomicBool = AtomicBool::new(true);
 
 /// The output task's end of the sensor.
 #[allow(clippy::large_enum_variant, reason = "no heap to put the large one on; there is one of them")]
 pub enum Imu {
-    Line(serial::Port, Mti),
+    Line(serial::Port, Mti, u8),
     Spi(SpiPart),
 }
 
@@ -50,15 +56,20 @@ impl Imu {
     /// supports.
     #[inline]
     pub fn new(part: ImuPart, line: serial::Port) -> Self {
-        if part == ImuPart::Icm42688 { Self::Spi(SpiPart::default()) } else { Self::Line(line, Mti::new()) }
+        if part == ImuPart::Icm42688 {
+            Self::Spi(SpiPart::default())
+        } else {
+            Self::Line(line, Mti::new(), 0)
+        }
     }
 
     /// Returns the next sample, or an error for a damaged one; `None` if nothing is waiting or this step has used up
     /// its `budget` of bytes.
     pub fn next_sample(&mut self, budget: &mut usize) -> Option<Result<ImuSample, ()>> {
         match self {
-            Self::Line(port, mti) => loop {
+            Self::Line(port, mti, refused) => loop {
                 if let Some(sample) = mti.next_sample() {
+                    note(refused, sample.as_ref().err());
                     return Some(sample.map_err(drop));
                 }
                 let accepted = mti.receive_some(port.received());
@@ -78,9 +89,31 @@ impl Imu {
     /// Returns the number of bytes that were damaged or lost.
     pub fn lost(&self) -> u32 {
         match self {
-            Self::Line(port, _) => port.lost(),
+            Self::Line(port, ..) => port.lost(),
             Self::Spi(_) => 0,
         }
+    }
+}
+
+/// Counts messages in a row that gave no sample, and reports the newest reason from [`REFUSED`] of them on.
+fn note(refused: &mut u8, error: Option<&XsensError>) {
+    *refused = if error.is_some() { refused.saturating_add(1) } else { 0 };
+    let reason = match error {
+        Some(XsensError::SelfTest) => SELF_TEST,
+        Some(XsensError::Foreign { mid }) => FOREIGN | u16::from(*mid),
+        _ => 0,
+    };
+    if *refused == 0 || *refused >= REFUSED {
+        REASON.store(reason, Ordering::Relaxed);
+    }
+}
+
+/// Returns why the MTi gives no samples, by its own messages.
+pub fn refusal() -> Option<SensorFault> {
+    match REASON.load(Ordering::Relaxed) {
+        SELF_TEST => Some(SensorFault::SelfTest),
+        reason if reason & FOREIGN != 0 => Some(SensorFault::Foreign(reason as u8)),
+        _ => None,
     }
 }
 

@@ -1,6 +1,6 @@
 //! The settings describe the frames that carry the wheel speeds, and when the vehicle counts as standing.
 
-use super::layout::{Checksum, WheelFrame, WheelSignal};
+use super::layout::{Checksum, Code, WheelFrame, WheelSignal};
 use crate::can::signal::{BitField, ByteOrder};
 use crate::sample::WHEELS;
 use crate::units::{Duration, WheelSpeed};
@@ -43,8 +43,8 @@ pub enum WheelConfigError {
     /// Two frames have the same identifier.
     #[error("wheel frame {0:x} is configured twice")]
     DuplicateIdentifier(u32),
-    /// A counter has more than 8 bits.
-    #[error("wheel counter has {0} bits, more than 8")]
+    /// A counter or a checksum has more than 8 bits.
+    #[error("wheel counter or checksum has {0} bits, more than 8")]
     Counter(u8),
     /// A checksum is beyond byte 7.
     #[error("wheel checksum is in byte {0}, beyond byte 7")]
@@ -58,15 +58,17 @@ pub enum WheelConfigError {
     /// The factor of a wheel is zero.
     #[error("wheel {0}: the factor is zero")]
     Factor(usize),
+    /// The smallest speed of a wheel is above the largest.
+    #[error("wheel {0}: the smallest speed is above the largest")]
+    Range(usize),
     /// The timeout or `still_for` is zero, or above 10 s.
     #[error("wheel times: {0} us is not above 0 and at most 10 s")]
     Time(u64),
 }
 
 impl WheelSettings {
-    /// The wheel-speed frame of many Toyota cars: identifier 0xAA, four big-endian
-    /// values of 0.01 km/h from -67.67, front right, front left, rear right, rear left (opendbc,
-    /// `WHEEL_SPEEDS`). The vehicle stands after 0.5 s below 0.1 km/h; a speed is stale after 0.1 s.
+    /// The wheel-speed frame of many Toyota cars: identifier 0xAA, four big-endian values of 15 bits, 0.01 km/h from
+    /// -67.67, each below its fault bit: front right, front left, rear right, rear left (opendbc, `WHEEL_SPEEDS`). The vehicle stands after 0.5 s below 0.1 km/h; a speed is stale after 0.1 s.
     pub const TOYOTA: Self = Self {
         frames: [Some(TOYOTA), None, None, None],
         signals: [toyota(23), toyota(7), toyota(55), toyota(39)],
@@ -92,10 +94,12 @@ impl WheelSettings {
             {
                 return Err(WheelConfigError::Counter(counter.bits()));
             }
-            if let Checksum::J1850 { at } | Checksum::Xor { at } | Checksum::Sum { at } = frame.checksum
-                && at > 7
-            {
-                return Err(WheelConfigError::Checksum(at));
+            match frame.checksum {
+                Checksum::J1850 { at } if at > 7 => return Err(WheelConfigError::Checksum(at)),
+                Checksum::Sum(sum) if sum.field.bits() > 8 => {
+                    return Err(WheelConfigError::Counter(sum.field.bits()));
+                }
+                _ => {}
             }
         }
         let mut taken = self.frames.map(|frame| frame.map_or(0, |frame| frame.protected_mask()));
@@ -112,6 +116,9 @@ impl WheelSettings {
             take(taken, signal.field.mask(), *frame)?;
             if signal.factor_q16 == 0 {
                 return Err(WheelConfigError::Factor(wheel));
+            }
+            if signal.range.is_some_and(|[least, most]| least > most) {
+                return Err(WheelConfigError::Range(wheel));
             }
         }
         match self.signals.iter().flatten().count() {
@@ -135,16 +142,15 @@ const TOYOTA: WheelFrame =
     WheelFrame { id: Id::Standard(StandardId::new(0xAA).unwrap()), counter: None, checksum: Checksum::None };
 
 const fn toyota(start: u8) -> Option<WheelSignal> {
-    match BitField::new(start, 16, ByteOrder::Motorola, false) {
-        Ok(field) => Some(WheelSignal {
-            frame: 0,
-            field,
-            factor_q16: WheelSignal::per_bit_kmh(0.01),
-            offset: WheelSpeed((-67.67 / 3.6 * 65_536.0) as i32),
-            invalid: Some(0xFFFF),
-        }),
-        Err(_) => None,
-    }
+    let speed = BitField::new(start - 1, 15, ByteOrder::Motorola, false);
+    let (Ok(field), Ok(fault)) = (speed, BitField::new(start, 1, ByteOrder::Motorola, false)) else {
+        return None;
+    };
+    Some(WheelSignal {
+        offset: WheelSpeed((-67.67 / 3.6 * 65_536.0) as i32),
+        valid_when: Some(Code { field: fault, value: 0 }),
+        ..WheelSignal::new(0, field, WheelSignal::per_bit_kmh(0.01))
+    })
 }
 
 /// Returns an identifier as a number.

@@ -29,6 +29,15 @@ pub mod id {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum XsensError {
+    /// The message is no MTData2, such as one of the old protocol (MID 32) or an error (42), or longer than 254 bytes.
+    #[error("MTi: message {mid:02x} is no MTData2 of up to 254 bytes")]
+    Foreign {
+        /// Identifier of the message.
+        mid: u8,
+    },
+    /// The status word says that the self-test has not passed.
+    #[error("MTi: the self-test has failed")]
+    SelfTest,
     /// A packet is longer than the rest of the message.
     #[error("MTData2: packet {id:04x} is cut off")]
     Truncated {

@@ -4,7 +4,8 @@ use embedded_can::{ExtendedId, Id, StandardId};
 use gyronet::can::e2e::{DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
 use gyronet::can::signal::{BitField, ByteOrder, OutsideFrame};
 use gyronet::can::wheel::{
-    Checksum, MAX_FRAMES, WheelConfigError, WheelFrame, WheelReceiver, WheelSettings, WheelSignal,
+    ByteSum, Checksum, Code, MAX_FRAMES, Parts, WheelConfigError, WheelFrame, WheelReceiver, WheelSettings,
+    WheelSignal,
 };
 use gyronet::sample::WHEELS;
 use gyronet::units::{Duration, WheelSpeed};
@@ -14,6 +15,8 @@ use serde::{Deserialize, Serialize};
 const CODES_PER_KMH: f64 = 65_536.0 / 3.6;
 /// [`WheelSignal::factor_q16`] of a factor of 1 km/h.
 const FACTORS_PER_KMH: f64 = CODES_PER_KMH * 65_536.0;
+/// The same of a pulse of 1 m.
+const FACTORS_PER_METRE: f64 = 65_536.0 * 65_536.0;
 
 /// The reason why a wheel settings file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -40,6 +43,9 @@ pub enum WheelFileError {
     /// A wheel has two signals.
     #[error("{path}: {wheel:?} has two signals")]
     Twice { path: String, wheel: Wheel },
+    /// A signal has neither a factor nor a way per pulse, or both.
+    #[error("{path}: {wheel:?} needs either factor_kmh or metres_per_pulse")]
+    Scale { path: String, wheel: Wheel },
     /// A value is outside a frame of eight bytes.
     #[error("{path}: frame {id:#x}: {source}")]
     Place { path: String, id: u32, source: OutsideFrame },
@@ -98,7 +104,7 @@ pub struct Frame {
     pub checksum: Option<Protection>,
     /// The position of the message counter; absent if there is none, or if it is part of an AUTOSAR profile.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub counter: Option<Place>,
+    pub counter: Option<Counter>,
     pub signal: Vec<Signal>,
 }
 
@@ -112,15 +118,9 @@ pub enum Protection {
         byte: usize,
     },
     /// Exclusive or of all other bytes.
-    Xor {
-        /// Byte of the checksum, from 0.
-        byte: usize,
-    },
-    /// Sum of all other bytes, modulo 256.
-    Sum {
-        /// Byte of the checksum, from 0.
-        byte: usize,
-    },
+    Xor(Sum),
+    /// Sum of all other bytes.
+    Sum(Sum),
     /// AUTOSAR E2E profile 1.
     #[serde(rename = "e2e-p01")]
     P01 {
@@ -151,6 +151,71 @@ pub enum Protection {
     },
 }
 
+/// What a sum has beyond the bytes: see [`ByteSum`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sum {
+    /// Byte of the checksum, from 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub byte: Option<u8>,
+    /// Its bits, where it is no whole byte, and the high ones, where they are elsewhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub low: Option<Place>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub high: Option<Place>,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub nibbles: bool,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub with_id: bool,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub with_length: bool,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub without_counter: bool,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub negated: bool,
+    pub start: u8,
+    pub last_xor: u8,
+}
+
+/// The message counter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counter {
+    #[serde(flatten)]
+    pub low: Place,
+    /// Its high bits, where they are elsewhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub high: Option<Place>,
+}
+
+/// A field, by default one bit, and the value of it that says something, by default 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Says {
+    pub start_bit: u8,
+    #[serde(default = "one_bit")]
+    pub bits: u8,
+    #[serde(default)]
+    pub order: Order,
+    #[serde(default = "one")]
+    pub value: u32,
+}
+
+const fn one_bit() -> u8 {
+    1
+}
+
+const fn one() -> u32 {
+    1
+}
+
+/// One raw value, or a list.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Raw {
+    One(u32),
+    List(Vec<u32>),
+}
+
 /// The position of a value in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Place {
@@ -165,10 +230,11 @@ pub struct Place {
 }
 
 /// The byte order of a value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
     /// Little endian (DBC `@1`).
+    #[default]
     Intel,
     /// Big endian (DBC `@0`).
     Motorola,
@@ -192,13 +258,26 @@ pub struct Signal {
     #[serde(flatten)]
     pub place: Place,
     /// Speed per raw count, km/h.
-    pub factor_kmh: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub factor_kmh: Option<f64>,
+    /// In its place, for a signal that counts the wheel's pulses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub metres_per_pulse: Option<f64>,
     /// Speed at raw value 0, km/h.
     #[serde(default)]
     pub offset_kmh: f64,
-    /// The raw value that means "not valid".
+    /// Raw values that mean "not valid", at most three.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub invalid: Option<u32>,
+    pub invalid: Option<Raw>,
+    /// Smallest and largest valid speed, km/h.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_kmh: Option<[f64; 2]>,
+    /// The field that says that the speed is valid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub valid_when: Option<Says>,
+    /// The field that says that the wheel turns backwards.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reverse_when: Option<Says>,
 }
 
 impl WheelFile {
@@ -265,7 +344,10 @@ impl Frame {
             id,
             extended,
             checksum: Protection::of(frame.checksum),
-            counter: frame.counter.as_ref().map(Place::of),
+            counter: frame.counter.map(|Parts { low, high }| Counter {
+                low: Place::of(&low),
+                high: high.as_ref().map(Place::of),
+            }),
             signal: own.map(|(wheel, signal)| Signal::of(wheel, &signal)).collect(),
         }
     }
@@ -284,8 +366,15 @@ impl Frame {
                 id,
                 extended,
             })?,
-            counter: self.counter.map(|counter| counter.field()).transpose().map_err(place)?,
-            checksum: self.checksum.as_ref().map_or(Checksum::None, Protection::checksum),
+            counter: self
+                .counter
+                .map(|counter| parts(counter.low, counter.high))
+                .transpose()
+                .map_err(place)?,
+            checksum: match &self.checksum {
+                None => Checksum::None,
+                Some(protection) => protection.checksum().map_err(place)?,
+            },
         })
     }
 }
@@ -293,12 +382,32 @@ impl Frame {
 impl Signal {
     fn settings(&self, path: &str, id: u32, frame: u8) -> Result<WheelSignal, WheelFileError> {
         let place = |source| WheelFileError::Place { path: path.to_owned(), id, source };
+        let (pulses, factor_q16) = match (self.factor_kmh, self.metres_per_pulse) {
+            (Some(kmh), None) => (false, factor(path, kmh)?),
+            (None, Some(metres)) => (true, pulse(path, metres)?),
+            _ => return Err(WheelFileError::Scale { path: path.to_owned(), wheel: self.wheel }),
+        };
+        let codes = match &self.invalid {
+            None => &[][..],
+            Some(Raw::One(code)) => std::slice::from_ref(code),
+            Some(Raw::List(codes)) => codes,
+        };
+        let mut invalid = [None; 3];
+        if codes.len() > invalid.len() {
+            let (path, value) = (path.to_owned(), codes.len() as f64);
+            return Err(WheelFileError::Range { path, key: "invalid", value, range: "at most three codes" });
+        }
+        invalid.iter_mut().zip(codes).for_each(|(to, code)| *to = Some(*code));
+        let limit = |kmh| speed(path, "range_kmh", kmh);
+        let range = self.range_kmh.map(|[least, most]| Ok([limit(least)?, limit(most)?]));
         Ok(WheelSignal {
-            frame,
-            field: self.place.field().map_err(place)?,
-            factor_q16: factor(path, self.factor_kmh)?,
+            pulses,
             offset: speed(path, "offset_kmh", self.offset_kmh)?,
-            invalid: self.invalid,
+            invalid,
+            range: range.transpose()?,
+            valid_when: self.valid_when.map(Says::code).transpose().map_err(place)?,
+            reverse_when: self.reverse_when.map(Says::code).transpose().map_err(place)?,
+            ..WheelSignal::new(frame, self.place.field().map_err(place)?, factor_q16)
         })
     }
 
@@ -306,9 +415,17 @@ impl Signal {
         Self {
             wheel,
             place: Place::of(&signal.field),
-            factor_kmh: f64::from(signal.factor_q16) / FACTORS_PER_KMH,
+            factor_kmh: (!signal.pulses).then(|| f64::from(signal.factor_q16) / FACTORS_PER_KMH),
+            metres_per_pulse: signal.pulses.then(|| f64::from(signal.factor_q16) / FACTORS_PER_METRE),
             offset_kmh: kmh(signal.offset),
-            invalid: signal.invalid,
+            invalid: match signal.invalid.into_iter().flatten().collect::<Vec<_>>()[..] {
+                [] => None,
+                [code] => Some(Raw::One(code)),
+                ref codes => Some(Raw::List(codes.to_vec())),
+            },
+            range_kmh: signal.range.map(|range| range.map(kmh)),
+            valid_when: signal.valid_when.map(Says::of),
+            reverse_when: signal.reverse_when.map(Says::of),
         }
     }
 }
@@ -331,13 +448,68 @@ impl Place {
     }
 }
 
+impl Says {
+    fn code(self) -> Result<Code, OutsideFrame> {
+        let place = Place { start_bit: self.start_bit, bits: self.bits, order: self.order, signed: false };
+        Ok(Code { field: place.field()?, value: self.value })
+    }
+
+    fn of(Code { field, value }: Code) -> Self {
+        let Place { start_bit, bits, order, .. } = Place::of(&field);
+        Self { start_bit, bits, order, value }
+    }
+}
+
+impl Sum {
+    fn sum(self, xor: bool) -> Result<ByteSum, OutsideFrame> {
+        let start_bit = self.byte.unwrap_or(u8::MAX).saturating_mul(8);
+        let byte = Place { start_bit, bits: 8, order: Order::Intel, signed: false };
+        let Self { nibbles, with_id, with_length, without_counter, negated, start, last_xor, .. } = self;
+        Ok(ByteSum {
+            xor,
+            nibbles,
+            with_id,
+            with_length,
+            without_counter,
+            negated,
+            start,
+            last: last_xor,
+            ..ByteSum::new(parts(self.low.unwrap_or(byte), self.high)?)
+        })
+    }
+
+    fn of(sum: ByteSum) -> Self {
+        let ByteSum { field, nibbles, with_id, with_length, without_counter, negated, start, last, .. } = sum;
+        let low = Place::of(&field.low);
+        let is_byte = low.bits == 8 && low.start_bit % 8 == 0 && low.order == Order::Intel;
+        let byte = is_byte.then_some(low.start_bit / 8);
+        let (low, high) = ((!is_byte).then_some(low), field.high.as_ref().map(Place::of));
+        Self {
+            byte,
+            low,
+            high,
+            nibbles,
+            with_id,
+            with_length,
+            without_counter,
+            negated,
+            start,
+            last_xor: last,
+        }
+    }
+}
+
+fn parts(low: Place, high: Option<Place>) -> Result<Parts, OutsideFrame> {
+    Ok(Parts { low: low.field()?, high: high.map(|high| high.field()).transpose()? })
+}
+
 impl Protection {
     fn of(checksum: Checksum) -> Option<Self> {
         Some(match checksum {
             Checksum::None => return None,
             Checksum::J1850 { at } => Self::J1850 { byte: at },
-            Checksum::Xor { at } => Self::Xor { byte: at },
-            Checksum::Sum { at } => Self::Sum { byte: at },
+            Checksum::Sum(sum) if sum.xor => Self::Xor(Sum::of(sum)),
+            Checksum::Sum(sum) => Self::Sum(Sum::of(sum)),
             Checksum::E2e(Profile::P01(P01 { data_id, mode })) => Self::P01 { data_id, mode },
             Checksum::E2e(Profile::P02(P02 { data_ids })) => Self::P02 { data_ids },
             Checksum::E2e(Profile::P05(P05 { data_id })) => Self::P05 { data_id },
@@ -345,16 +517,16 @@ impl Protection {
         })
     }
 
-    fn checksum(&self) -> Checksum {
-        match *self {
+    fn checksum(&self) -> Result<Checksum, OutsideFrame> {
+        Ok(match *self {
             Self::J1850 { byte } => Checksum::J1850 { at: byte },
-            Self::Xor { byte } => Checksum::Xor { at: byte },
-            Self::Sum { byte } => Checksum::Sum { at: byte },
+            Self::Xor(sum) => Checksum::Sum(sum.sum(true)?),
+            Self::Sum(sum) => Checksum::Sum(sum.sum(false)?),
             Self::P01 { data_id, mode } => Checksum::E2e(Profile::P01(P01 { data_id, mode })),
             Self::P02 { data_ids } => Checksum::E2e(Profile::P02(P02 { data_ids })),
             Self::P05 { data_id } => Checksum::E2e(Profile::P05(P05 { data_id })),
             Self::P11 { data_id, mode } => Checksum::E2e(Profile::P11(P11 { data_id, mode })),
-        }
+        })
     }
 }
 
@@ -366,6 +538,16 @@ fn factor(path: &str, kmh: f64) -> Result<i32, WheelFileError> {
     }
     let range = "below 100 and not 0";
     Err(WheelFileError::Range { path: path.to_owned(), key: "factor_kmh", value: kmh, range })
+}
+
+/// Converts the way of a pulse to the library's code.
+fn pulse(path: &str, metres: f64) -> Result<i32, WheelFileError> {
+    let code = (metres * FACTORS_PER_METRE).round() as i32;
+    if metres.abs() < 0.5 && code != 0 {
+        return Ok(code);
+    }
+    let (path, range) = (path.to_owned(), "below 0.5 and not 0");
+    Err(WheelFileError::Range { path, key: "metres_per_pulse", value: metres, range })
 }
 
 fn kmh(speed: WheelSpeed) -> f64 {
@@ -387,10 +569,10 @@ mod tests {
 [[frame]]
 id = 0xAA
 signal = [
-    { wheel = "front-right", start_bit = 7, bits = 16, order = "motorola", factor_kmh = 0.01, offset_kmh = -67.67, invalid = 0xFFFF },
-    { wheel = "front-left", start_bit = 23, bits = 16, order = "motorola", factor_kmh = 0.01, offset_kmh = -67.67, invalid = 0xFFFF },
-    { wheel = "rear-right", start_bit = 39, bits = 16, order = "motorola", factor_kmh = 0.01, offset_kmh = -67.67, invalid = 0xFFFF },
-    { wheel = "rear-left", start_bit = 55, bits = 16, order = "motorola", factor_kmh = 0.01, offset_kmh = -67.67, invalid = 0xFFFF },
+    { wheel = "front-right", start_bit = 7, bits = 16, order = "motorola", factor_kmh = 0.01, offset_kmh = -67.67, invalid = [0xFFFF, 0xFFFE] },
+    { wheel = "front-left", start_bit = 23, bits = 16, order = "motorola", factor_kmh = 0.01, offset_kmh = -67.67, invalid = [0xFFFF, 0xFFFE] },
+    { wheel = "rear-right", start_bit = 39, bits = 16, order = "motorola", factor_kmh = 0.01, offset_kmh = -67.67, invalid = [0xFFFF, 0xFFFE] },
+    { wheel = "rear-left", start_bit = 55, bits = 16, order = "motorola", factor_kmh = 0.01, offset_kmh = -67.67, invalid = [0xFFFF, 0xFFFE] },
 ]
 "#;
 
@@ -405,16 +587,33 @@ signal = [
         let offset = |settings: &WheelSettings| settings.signals[0].unwrap().offset.0;
         // The file's offset is rounded and the constant truncated: they differ by 0.00006 km/h.
         assert_eq!(offset(&settings), offset(&WheelSettings::TOYOTA) - 1);
+        assert_eq!(settings.signals[0].unwrap().invalid, [Some(0xFFFF), Some(0xFFFE), None]);
         assert_eq!(settings.still_speed, WheelSpeed(1_820));
         assert_eq!((settings.timeout, settings.still_for), (Duration(100_000), Duration(500_000)));
     }
 
     #[test]
     fn settings_survive_the_way_over_the_file() {
-        let file = WheelFile::of(&WheelSettings::TOYOTA);
-        let text = toml::to_string(&file).unwrap();
-        let again = WheelFile::parse("car.toml", &text).unwrap().settings("car.toml").unwrap();
-        assert_eq!(again, WheelSettings::TOYOTA);
+        let all = r#"
+[[frame]]
+id = 0x386
+checksum = { kind = "sum", low = { start_bit = 46, bits = 2, order = "intel" }, high = { start_bit = 62, bits = 2, order = "intel" }, nibbles = true, with_id = true, with_length = true, without_counter = true, negated = true, start = 8, last_xor = 9 }
+counter = { start_bit = 14, bits = 2, order = "intel", high = { start_bit = 30, bits = 2, order = "intel" } }
+signal = [
+    { wheel = "front-left", start_bit = 0, bits = 14, order = "intel", factor_kmh = 0.03125, range_kmh = [0, 300], valid_when = { start_bit = 16, bits = 2, value = 0 } },
+    { wheel = "front-right", start_bit = 32, bits = 14, order = "intel", metres_per_pulse = 0.02, reverse_when = { start_bit = 18 } },
+]
+"#;
+        let settings = |text: &str| WheelFile::parse("car.toml", text).unwrap().settings("car.toml").unwrap();
+        for first in [WheelSettings::TOYOTA, settings(all)] {
+            let text = toml::to_string(&WheelFile::of(&first)).unwrap();
+            assert_eq!(settings(&text), first);
+        }
+        let [Some(left), Some(right), ..] = settings(all).signals else { panic!() };
+        assert_eq!((right.pulses, right.factor_q16), (true, (0.02_f64 * 4_294_967_296.0).round() as i32));
+        let reverse = right.reverse_when.unwrap();
+        assert_eq!((reverse.field.start(), reverse.field.bits(), reverse.value), (18, 1, 1));
+        assert_eq!(left.valid_when.unwrap().value, 0);
     }
 
     #[test]
@@ -428,6 +627,10 @@ signal = [
 
     #[test]
     fn files_that_cannot_be_are_refused_with_the_reason() {
+        let unscaled = TOYOTA.replacen("factor_kmh = 0.01, ", "", 1);
+        assert!(error(&unscaled).ends_with("FrontRight needs either factor_kmh or metres_per_pulse"));
+        let codes = TOYOTA.replacen("0xFFFE", "1, 2, 3", 1);
+        assert!(error(&codes).ends_with("invalid = 4: must be at most three codes"));
         assert!(error("frame = 1").starts_with("car.toml: TOML parse error at line 1"));
         assert!(error(&TOYOTA.replace("start_bit = 23", "start_bit = 15")).ends_with("two values overlap"));
         assert!(

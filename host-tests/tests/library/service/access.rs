@@ -447,12 +447,11 @@ fn the_longest_wheel_settings_fit_with_their_trailer() {
         counter: None,
         checksum: Checksum::E2e(Profile::P02(P02 { data_ids: [0xFF; 16] })),
     };
+    let field = BitField::new(32, 32, ByteOrder::Intel, true).expect("it fits");
     let signal = |frame| WheelSignal {
-        frame,
-        field: BitField::new(32, 32, ByteOrder::Intel, true).expect("it fits"),
-        factor_q16: i32::MIN,
         offset: WheelSpeed(i32::MIN),
-        invalid: Some(u32::MAX),
+        invalid: [Some(u32::MAX), None, None],
+        ..WheelSignal::new(frame, field, i32::MIN)
     };
     let wheels = WheelSettings {
         frames: [0, 1, 2, 3].map(|k| Some(frame(k))),

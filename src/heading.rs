@@ -1,0 +1,108 @@
+//! A heading reference of the vehicle: course and speed over ground with their accuracies, from CAN.
+//!
+//! [`nmea2000`] has the messages of GNSS receivers on boats and machines, [`j1939`] that of trucks, and [`described`]
+//! reads any other frame by its description. These are types and codecs alone; nothing on the board uses them yet.
+
+pub mod described;
+pub mod j1939;
+pub mod nmea2000;
+
+use embedded_can::{ExtendedId, Frame, Id};
+
+/// Course and speed over ground.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Heading {
+    /// Direction of motion, rad from true north, clockwise from above, 0 to 2 pi.
+    pub course: Option<f32>,
+    /// Accuracy of the course, 1 sigma, rad.
+    pub course_sigma: Option<f32>,
+    /// Speed over ground, m/s.
+    pub speed: Option<f32>,
+    /// Accuracy of the speed, 1 sigma, m/s.
+    pub speed_sigma: Option<f32>,
+}
+
+/// Position on the Earth, degrees, north and east positive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Position {
+    /// Latitude, -90 to 90 deg.
+    pub latitude_deg: f64,
+    /// Longitude, -180 to 180 deg.
+    pub longitude_deg: f64,
+}
+
+/// The reason why a frame gives no heading.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum HeadingError {
+    /// The frame has too few bytes.
+    #[error("heading frame of {0} bytes is too short")]
+    Short(usize),
+    /// The course is not from true north.
+    #[error("the course is not from true north: reference {0}")]
+    Reference(u8),
+    /// A value is larger than it can be.
+    #[error("heading: {what} = {value} is out of range")]
+    Range {
+        /// The quantity.
+        what: &'static str,
+        /// Its value.
+        value: f32,
+    },
+}
+
+impl Heading {
+    /// Checks that each value can be that of a vehicle.
+    ///
+    /// # Errors
+    /// [`HeadingError::Range`].
+    pub fn checked(self) -> Result<Self, HeadingError> {
+        // A code of a full turn is rounded up, and a vehicle is never faster than 150 m/s.
+        let limits = [
+            ("course", self.course, core::f32::consts::TAU + 1e-3),
+            ("course accuracy", self.course_sigma, core::f32::consts::TAU),
+            ("speed", self.speed, 150.0),
+            ("speed accuracy", self.speed_sigma, 150.0),
+        ];
+        for (what, value, most) in limits {
+            if let Some(value) = value
+                && !(0.0..=most).contains(&value)
+            {
+                return Err(HeadingError::Range { what, value });
+            }
+        }
+        Ok(self)
+    }
+}
+
+/// Returns the parameter group of a frame that is sent to all (SAE J1939-21, 5.2.5), with its eight bytes.
+///
+/// # Errors
+/// [`HeadingError::Short`] for a frame of this group with fewer bytes.
+fn group(frame: &impl Frame, group: u32) -> Option<Result<[u8; 8], HeadingError>> {
+    let Id::Extended(id) = frame.id() else { return None };
+    let found = id.as_raw() >> 8 & 0x3_FFFF;
+    let data = frame.data();
+    (found == group).then(|| data.try_into().map_err(|_| HeadingError::Short(data.len())))
+}
+
+/// Makes the identifier of a parameter group sent to all, with priority 0 to 7.
+const fn group_id(group: u32, priority: u8, source: u8) -> Option<ExtendedId> {
+    crate::can::j1939::broadcast_id(group, priority, source)
+}
+
+/// Returns a 16-bit number unless it is one of the codes from `from` on, which stand for errors and for no value.
+fn word(bytes: [u8; 2], from: u16) -> Option<f32> {
+    let code = u16::from_le_bytes(bytes);
+    (code < from).then(|| f32::from(code))
+}
+
+/// Returns the code of a value, rounded to nearest; `none` without a value, or where it has no code.
+fn code(value: Option<f32>, per_unit: f32, none: u16) -> [u8; 2] {
+    let code = value.map(|value| libm::roundf(value * per_unit));
+    let code = code.filter(|code| (0.0..f32::from(none)).contains(code)).map_or(none, |code| code as u16);
+    code.to_le_bytes()
+}

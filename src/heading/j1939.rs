@@ -1,0 +1,34 @@
+//! Vehicle Direction/Speed of SAE J1939-71 (VDS, PGN 65256): SPN 165 compass bearing, SPN 517 navigation-based speed.
+
+use super::{Heading, HeadingError, code, group, group_id, word};
+use embedded_can::Frame;
+
+/// Parameter group of direction and speed.
+pub const DIRECTION_SPEED: u32 = 65_256;
+const PRIORITY: u8 = 6;
+/// From here on a 16-bit code stands for a parameter's state, an error or no value (J1939-71, 5.1.4).
+const STATES: u16 = 0xFB00;
+/// Codes per radian: 1/128 deg.
+const PER_RAD: f32 = 128.0 * 180.0 / core::f32::consts::PI;
+/// Codes per m/s: 1/256 km/h.
+const PER_SPEED: f32 = 256.0 * 3.6;
+
+/// Reads bearing and speed; `None` for a frame of another group.
+///
+/// # Errors
+/// [`HeadingError`].
+pub fn direction_speed(frame: &impl Frame) -> Option<Result<Heading, HeadingError>> {
+    Some(group(frame, DIRECTION_SPEED)?.and_then(|[c0, c1, s0, s1, ..]| {
+        let course = word([c0, c1], STATES).map(|code| code / PER_RAD);
+        let speed = word([s0, s1], STATES).map(|code| code / PER_SPEED);
+        Heading { course, speed, ..Heading::default() }.checked()
+    }))
+}
+
+/// Makes a frame with bearing and speed; pitch and altitude are not available.
+#[must_use]
+pub fn direction_speed_frame<F: Frame>(heading: &Heading, source: u8) -> Option<F> {
+    let [c0, c1] = code(heading.course, PER_RAD, u16::MAX);
+    let [s0, s1] = code(heading.speed, PER_SPEED, u16::MAX);
+    F::new(group_id(DIRECTION_SPEED, PRIORITY, source)?, &[c0, c1, s0, s1, 0xFF, 0xFF, 0xFF, 0xFF])
+}
