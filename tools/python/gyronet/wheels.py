@@ -11,6 +11,10 @@ from gyronet.refused import Refused, listed
 WHEELS = ["front-left", "front-right", "rear-left", "rear-right"]
 WHEEL_NAME = re.compile(r"wh(ee)?l|rad|speed|spd|geschw|[fr][lr]$|[vh][lr]$", re.IGNORECASE)
 SAYS_VALID = re.compile(r"valid|qf|qual|stat|fault|fail|err|inv|gult|gült", re.IGNORECASE)
+SAYS_FAULT = re.compile(r"fault|fail|err|inv|fehl|ung(ue|ü)lt|not", re.IGNORECASE)
+SAYS_GOOD = re.compile(r"valid$|vld$|g(ue|ü)ltig|\bok\b|\bgood\b|normal", re.IGNORECASE)
+SAYS_BACK = re.compile(r"back|revers|r(ue|ü)ckw", re.IGNORECASE)
+MOST_CODES = 3
 SAYS_DIRECTION = re.compile(r"dir|richt|revers|backw|forw", re.IGNORECASE)
 
 
@@ -20,20 +24,20 @@ def from_dbc(path, signals, flags=()):
     for left, right in (WHEELS[:2], WHEELS[2:]):
         if (left in signals) != (right in signals):
             raise Refused(f"--{left} and --{right}: both wheels of an axle are needed")
-    remarks, frames = [], {}
+    remarks, frames, used = [], {}, set()
     database = dbc.load(path, remarks)
     for wheel in WHEELS:
         if wheel in signals:
             message, signal = find(path, database, signals[wheel], remarks)
             frames.setdefault((message.frame_id, message.is_extended_frame), (message, []))[1].append(
-                entry(path, wheel, message, signal, flags, remarks)
+                entry(path, wheel, message, signal, flags, remarks, used)
             )
     lines = ["timeout_ms = 100", "still_speed_kmh = 0.1", "still_for_ms = 500"]
     for (identifier, extended), (message, entries) in frames.items():
         lines += ["", f"[[frame]] # {message.name}", f"id = {identifier:#x}", *(["extended = true"] if extended else [])]
         for one in entries:
             lines += ["", "[[frame.signal]]", *(f"{key} = {value}" for key, value in one.items())]
-        remarks += about(database, message)
+        remarks += about(database, message, used)
     flags.check()
     return "\n".join(lines) + "\n", list(dict.fromkeys(remarks))
 
@@ -51,7 +55,7 @@ def find(path, database, name, remarks):
     raise Refused(f"{path}: no signal {name}" + listed(near, "; there are ", 8) + listed(remarks, "; "))
 
 
-def entry(path, wheel, message, signal, flags, remarks):
+def entry(path, wheel, message, signal, flags, remarks, used):
     """One wheel's signal in the settings."""
     name = f"{message.name}.{signal.name}"
 
@@ -84,26 +88,51 @@ def entry(path, wheel, message, signal, flags, remarks):
         "offset_kmh": float(offset),
     }
     codes = {raw & (1 << signal.length) - 1: text for raw, text in sorted(dbc.codes(signal).items())}
-    if codes:
-        result["invalid"] = hex(max(codes))
-        for raw in sorted(codes)[:-1]:
-            value = raw - (1 << signal.length) if signal.is_signed and raw >> signal.length - 1 else raw
-            remarks.append(f"{name}: {raw:#x} ({codes[raw]}) is no speed either, but the settings hold one code: the board reads "
-                           f"{value * factor + offset:.1f} km/h")
+    kept = sorted(codes, reverse=True)[:MOST_CODES]
+    if kept:
+        result["invalid"] = hex(kept[0]) if len(kept) == 1 else f"[{', '.join(map(hex, kept))}]"
+    for raw in sorted(set(codes) - set(kept)):
+        value = raw - (1 << signal.length) if signal.is_signed and raw >> signal.length - 1 else raw
+        remarks.append(f"{name}: {raw:#x} ({codes[raw]}) is no speed either, but the settings hold {MOST_CODES} codes: the board reads "
+                       f"{value * factor + offset:.1f} km/h")
+    for key, value_of in (("valid_when", valid_value), ("reverse_when", reverse_value)):
+        beside = [(other, value_of(other)) for other in message.signals if other.name.startswith(signal.name) and other.name != signal.name]
+        beside = [(other, value) for other, value in beside if value is not None]
+        if len(beside) == 1:
+            other, value = beside[0]
+            order = result["order"] if other.byte_order == signal.byte_order else '"intel"' if signal.byte_order == "big_endian" else '"motorola"'
+            result[key] = f"{{ start_bit = {other.start}, bits = {other.length}, order = {order}, value = {value} }}"
+            used.add(other.name)
     return result
 
 
-def about(database, message):
-    """What the DBC file says of a message beyond its speeds, and the settings cannot."""
+def valid_value(signal):
+    """The value of a field that says "valid"; None where the DBC file does not tell."""
+    if signal.length > 4 or not SAYS_VALID.search(signal.name):
+        return None
+    good = [int(raw) for raw, text in (signal.choices or {}).items() if SAYS_GOOD.search(str(text)) and not SAYS_FAULT.search(str(text))]
+    if signal.choices:
+        return good[0] if len(good) == 1 else None
+    return 0 if SAYS_FAULT.search(signal.name) else 1 if SAYS_GOOD.search(signal.name) and signal.length == 1 else None
+
+
+def reverse_value(signal):
+    """The value of a field that says "backwards"."""
+    back = [int(raw) for raw, text in (signal.choices or {}).items() if SAYS_BACK.search(str(text))]
+    return back[0] if len(back) == 1 and signal.length <= 4 else None
+
+
+def about(database, message, used):
+    """What the DBC file says of a message beyond its speeds, and the settings do not."""
     if dbc.is_j1939(database, message) and message.frame_id & 0xFF == 0xFE:
         yield (
             f"{message.name}: address FE stands for any sender, but the board compares the whole identifier: set the"
             " sender's address in id"
         )
     for signal in message.signals:
-        if signal.length <= 4 and (SAYS_VALID.search(signal.name) or SAYS_DIRECTION.search(signal.name)):
+        if signal.name not in used and signal.length <= 4 and (SAYS_VALID.search(signal.name) or SAYS_DIRECTION.search(signal.name)):
             what = "a direction" if SAYS_DIRECTION.search(signal.name) else "validity"
-            yield f"{message.name}.{signal.name} (bit {signal.start}, {signal.length} bits) seems to be {what}: the settings do not read it"
+            yield f"{message.name}.{signal.name} (bit {signal.start}, {signal.length} bits) seems to be {what}: not read, since the DBC file does not say which value means what: add it by hand"
     if any(re.search(r"crc|checks|chks|counter|alive|\bcnt", signal.name, re.IGNORECASE) for signal in message.signals):
         yield f"{message.name} has a checksum or a counter: add it by hand, since a DBC file does not say how it is computed"
 

@@ -32,19 +32,33 @@ class FromDbc(unittest.TestCase):
 
     def test_signs_orders_units_and_codes(self):
         signals = [' SG_ RL : 7|15@0- (0.01,-100) [0|9] "m/s" E', ' SG_ RR : 23|15@0- (0.01,-100) [0|9] "m/s" E', ' SG_ RL_Valid : 40|1@1+ (1,0) [0|1] "" E',
-                   ' SG_ RR_Direction : 41|2@1+ (1,0) [0|3] "" E', ' SG_ Crc : 56|8@1+ (1,0) [0|1] "" E']
+                   ' SG_ RR_Direction : 41|2@1+ (1,0) [0|3] "" E', ' SG_ RR_Quality : 48|2@1+ (1,0) [0|3] "" E', ' SG_ Crc : 56|8@1+ (1,0) [0|1] "" E']
         extra = 'VAL_ 2566844926 RL 16382 "Init" 16383 "Fehler" 0 "stands" ;\nVAL_ 2566844926 RR -16384 "SNA" ;\n'
+        extra += 'VAL_ 2566844926 RR_Direction 1 "forward" 2 "backward" ;\n'
         status, text, file = self.run_(*REAR, "--out", "w.toml", identifier=2566844926, signals=signals, extra=extra)
         self.assertEqual(status, 0, text)
         frame = file["frame"][0]
         self.assertEqual((len(file["frame"]), frame["id"], frame["extended"]), (1, 0x18FEF1FE, True))
         left, right = frame["signal"]
         self.assertEqual(left, {"wheel": "rear-left", "start_bit": 7, "bits": 15, "order": "motorola", "signed": True, "factor_kmh": 0.036,
-                                "offset_kmh": -360.0, "invalid": 16383})
+                                "offset_kmh": -360.0, "invalid": [16383, 16382],
+                                "valid_when": {"start_bit": 40, "bits": 1, "order": "intel", "value": 1}})
+        self.assertEqual(right["reverse_when"], {"start_bit": 41, "bits": 2, "order": "intel", "value": 2})
         self.assertEqual(right["invalid"], 0x4000)
-        for words in ("0x3ffe (Init) is no speed either", "RL_Valid (bit 40, 1 bits) seems to be validity", "RR_Direction (bit 41, 2 bits) seems to be a direction",
-                      "a checksum or a counter", "address FE stands for any sender"):
+        for words in ("RR_Quality (bit 48, 2 bits) seems to be validity", "a checksum or a counter", "address FE stands for any sender"):
             self.assertIn(words, text)
+
+    def test_what_a_frame_says_of_its_speeds(self):
+        signals = [' SG_ RL : 6|15@0+ (0.01,-67.67) [0|250] "km/h" E', ' SG_ RR : 22|15@0+ (0.01,-67.67) [0|250] "km/h" E',
+                   ' SG_ RL_FAULT : 7|1@0+ (1,0) [0|1] "" E', ' SG_ RRValidity : 23|1@0+ (1,0) [0|1] "" E']
+        codes = " ".join(f'{raw} "Error{raw - 32760}"' for raw in range(32763, 32768))
+        extra = f'VAL_ 1200 RRValidity 0 "Valid" 1 "Invalid" ;\nVAL_ 1200 RL {codes} ;\n'
+        status, text, file = self.run_(*REAR, "--out", "w.toml", signals=signals, extra=extra)
+        self.assertEqual(status, 0, text)
+        left, right = file["frame"][0]["signal"]
+        self.assertEqual((left["invalid"], left["valid_when"]["start_bit"], left["valid_when"]["value"]), ([32767, 32766, 32765], 7, 0))
+        self.assertEqual((right["valid_when"]["start_bit"], right["valid_when"]["value"]), (23, 0))
+        self.assertIn("0x7ffb (Error3) is no speed either, but the settings hold 3 codes", text)
 
     def test_bit_31_that_is_missing(self):
         status, text, file = self.run_(*REAR, "--out", "w.toml", identifier=0x10630040)
