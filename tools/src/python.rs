@@ -33,7 +33,7 @@ pub enum PythonError {
     OldPython,
     /// Neither a checkout nor an installed package.
     #[error(
-        "logs are read by the Python package gyronet {version}, which python3 does not have: pip install ./tools/python in gyronet's repository"
+        "this needs the Python package gyronet {version}, which python3 does not have: pip install ./tools/python in gyronet's repository"
     )]
     NoPackage { version: &'static str },
     #[error("{}: {source}", folder.display())]

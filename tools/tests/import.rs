@@ -11,7 +11,7 @@ const PYTHON: &str = r#"#!/bin/sh
 echo "$*" >> "$CALLS"
 case "$1 $2" in
     "-c "*) exit "${TOO_OLD:-0}" ;;
-    "-I -c") echo "$INSTALLED" ;;
+    "-EP -c") echo "$INSTALLED" ;;
     "-m venv") mkdir -p "$3/bin" && cp "$0" "$3/bin/python" ;;
     "-m pip") [ -z "$OFFLINE" ] || { printf 'trying\nERROR: no route\n' >&2; exit 1; } ;;
     "-m gyronet") echo "$0|$PYTHONPATH|$*"; echo 'said by Python' >&2; exit 3 ;;
@@ -109,7 +109,17 @@ fn a_python_with_the_package_is_used_as_it_is() {
     let (output, calls) = machine.run(&correct, &[("GYRONET_PYTHON", given.to_str().unwrap())]);
     assert!(text(&output.stdout).starts_with(given.to_str().unwrap()), "{output:?}");
     assert!(text(&output.stdout).ends_with("-m gyronet correct a.bag --out b.bag\n"), "{output:?}");
-    assert_eq!(calls.len(), 1, "{calls:?}");
+    assert_eq!(calls.len(), 2, "{calls:?}");
+    let (output, _) = machine.run(&["import", "a.bag"], &[("GYRONET_PYTHON", "/nowhere/python")]);
+    assert!(refused(&output).contains("/nowhere/python: No such file"));
+    // The board is in the installed package alone.
+    let (output, _) = machine.run(&correct, &installed);
+    assert!(
+        text(&output.stdout).ends_with("bin/python3||-m gyronet correct a.bag --out b.bag\n"),
+        "{output:?}"
+    );
+    let (output, _) = machine.run(&correct, &[]);
+    assert!(refused(&output).contains("pip install ./tools/python"));
     // An older one is not.
     let (_, calls) = machine.run(&["import", "a.bag"], &[("INSTALLED", "0.0.1")]);
     assert!(calls.iter().any(|call| call.starts_with("-m venv")), "{calls:?}");

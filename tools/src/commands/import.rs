@@ -1,6 +1,7 @@
 //! `gyronet import` converts logs of other tools to one drive, in Python.
 
 use super::{Common, remark};
+use gyronet_tools::python::PythonError;
 use gyronet_tools::python::package::package;
 use gyronet_tools::target::bench::workspace;
 use std::ffi::{OsStr, OsString};
@@ -26,10 +27,13 @@ pub struct Args {
 
 /// Copy a ROS bag or MCAP file with the yaw rate that the board computes.
 ///
-/// The package `gyronet` in Python writes it; the Python must have the package with the board: `pip install
-/// ./tools/python`, and `GYRONET_PYTHON`. `gyronet correct --help` has the options.
+/// The package `gyronet` in Python writes it, as `pip install ./tools/python` installs it for `python3`, or for the
+/// Python that `GYRONET_PYTHON` names. `gyronet correct --help` has the options.
 #[derive(Debug, Clone, clap::Args)]
-#[command(disable_help_flag = true, after_help = "Example: gyronet correct drive.mcap --out corrected.mcap")]
+#[command(
+    disable_help_flag = true,
+    after_help = "Examples:\n  gyronet correct drive.mcap --out corrected.mcap"
+)]
 pub struct Correct {
     /// Arguments of the Python package's command.
     #[arg(value_name = "ARGUMENTS", trailing_var_arg = true, allow_hyphen_values = true)]
@@ -57,7 +61,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 
 /// Runs a command of the Python package, whose exit status becomes ours.
 pub fn python(command: &[&str], arguments: &[OsString], common: Common) -> super::Result {
-    let mut python = package(&workspace().join("tools/python"), |environment| {
+    let board = command == ["correct"];
+    let mut python = package(&workspace().join("tools/python"), board, |environment| {
         let _ = remark(
             common,
             format_args!("makes the Python environment that reads logs, once: {}", environment.display()),
@@ -66,7 +71,9 @@ pub fn python(command: &[&str], arguments: &[OsString], common: Common) -> super
     python.args(command).args(arguments);
     let options = [("--json", common.json), ("--quiet", common.quiet)];
     python.args(options.into_iter().filter(|(_, given)| *given).map(|(option, _)| OsStr::new(option)));
-    let status = python.env("GYRONET_COMMAND", "gyronet").status()?;
+    let started = python.env("GYRONET_COMMAND", "gyronet").status();
+    let status =
+        started.map_err(|source| PythonError::Start { program: python.get_program().into(), source })?;
     if status.success() {
         return Ok(());
     }

@@ -1,8 +1,8 @@
 //! The Python package `gyronet` (tools/python), which reads logs: where it is, and the light environment that runs it.
 //!
 //! In order: the Python that `GYRONET_PYTHON` names; the environment in the user's cache folder; the package as `pip`
-//! installed it for `python3`. In a checkout, whose sources are run as they are, a missing or outdated environment is
-//! made.
+//! installed it for `python3`. In a checkout, whose sources are run where the package is not installed, a missing or
+//! outdated environment is made. The board needs the package as `pip` installs it, which compiles it.
 
 use super::{PythonError, last_line};
 use std::ffi::OsString;
@@ -15,19 +15,22 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// The file of an environment that holds its requirements; written last.
 const STAMP: &str = "made-of.txt";
 
-/// Returns `python -m gyronet` without arguments. `sources` is the package's folder in a checkout. `remark` gets a line
-/// before an environment is made.
-pub fn package(sources: &Path, remark: impl FnOnce(&Path)) -> Result<Command, PythonError> {
+/// Returns `python -m gyronet` without arguments, with the `board` or for logs alone. `sources` is the package's folder
+/// in a checkout. `remark` gets a line before an environment is made.
+pub fn package(sources: &Path, board: bool, remark: impl FnOnce(&Path)) -> Result<Command, PythonError> {
     let sources = Some(sources).filter(|folder| folder.join("gyronet").is_dir());
-    let environment = cache().map(|cache| cache.join("python"));
+    let named = std::env::var_os("GYRONET_PYTHON").map(PathBuf::from);
+    let python = named.clone().unwrap_or_else(|| "python3".into());
+    let light = named.is_none() && !board && sources.is_some();
+    let environment = cache().map(|cache| cache.join("python")).filter(|_| light);
     let made = environment.as_ref().filter(|environment| is_current(environment));
-    let (python, sources) = if let Some(given) = std::env::var_os("GYRONET_PYTHON") {
-        (given.into(), sources)
-    } else if let (Some(environment), Some(_)) = (made, sources) {
+    let (python, sources) = if let Some(environment) = made {
         (interpreter(environment), sources)
-    } else if is_installed() {
-        ("python3".into(), None)
-    } else if let (Some(environment), Some(_)) = (&environment, sources) {
+    } else if is_installed(&python) {
+        (python, None)
+    } else if named.is_some() && sources.is_some() {
+        (python, sources)
+    } else if let Some(environment) = &environment {
         remark(environment);
         (make(environment)?, sources)
     } else {
@@ -61,10 +64,10 @@ fn is_current(environment: &Path) -> bool {
         && interpreter(environment).exists()
 }
 
-/// Checks for the package of this version among those of `python3`.
-fn is_installed() -> bool {
+/// Checks for the package of this version among those of a Python.
+fn is_installed(python: &Path) -> bool {
     let program = "import importlib.metadata as m; print(m.version('gyronet'))";
-    let output = Command::new("python3").args(["-I", "-c", program]).output();
+    let output = Command::new(python).args(["-EP", "-c", program]).output();
     output.is_ok_and(|output| output.status.success() && output.stdout.trim_ascii() == VERSION.as_bytes())
 }
 
