@@ -10,6 +10,7 @@ pub mod judge;
 pub mod known;
 pub mod list;
 pub mod receiver;
+pub mod recordings;
 pub mod report;
 pub mod ride;
 pub mod scene;

@@ -4,7 +4,9 @@ use clap::Parser;
 use gyronet_host_tests::parallel;
 use gyronet_host_tests::situations::judge::Outcome;
 use gyronet_host_tests::situations::list;
+use gyronet_host_tests::situations::recordings;
 use gyronet_host_tests::situations::report::{HEADING, line};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Drive vehicles through the situations, and hold what the bus says against the truth.
@@ -21,6 +23,9 @@ struct Args {
     /// Seeds of each vehicle in each situation.
     #[arg(long, default_value_t = 10)]
     seeds: u64,
+    /// Judge the recordings of this folder instead, by their references.
+    #[arg(long, value_name = "FOLDER")]
+    recordings: Option<PathBuf>,
     /// The first seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -31,7 +36,14 @@ fn main() -> ExitCode {
     let threads: Vec<u64> = (0..std::thread::available_parallelism().map_or(1, usize::from) as u64).collect();
     let mut is_broken = false;
     println!("{HEADING}");
-    for situation in list::all().filter(|situation| situation.name.contains(&args.name)) {
+    for (name, outcome) in args.recordings.iter().flat_map(|folder| recordings::judged(folder, &args.name)) {
+        print!("{}", line(&name, "", &outcome));
+        is_broken |= !outcome.broken().is_empty();
+    }
+    let is_simulated = args.recordings.is_none();
+    for situation in
+        list::all().filter(|_| is_simulated).filter(|situation| situation.name.contains(&args.name))
+    {
         for vehicle in situation.vehicles {
             if args.vehicle.as_ref().is_some_and(|name| name != vehicle.name) {
                 continue;
@@ -45,7 +57,7 @@ fn main() -> ExitCode {
             });
             let mut outcome = Outcome::default();
             outcomes.iter().filter(|one| one.seconds > 0).for_each(|one| outcome.add(one));
-            print!("{}", line(situation, vehicle.name, &outcome));
+            print!("{}", line(situation.name, vehicle.name, &outcome));
             is_broken |= !outcome.broken().is_empty();
         }
     }

@@ -3,21 +3,25 @@
 //! | letter | what | promise |
 //! |---|---|---|
 //! | s | a second whose sets are all good | its yaw is off by at most four of the largest expected errors that it sent |
-//! | y | a span between two good sets, with anything between them | its yaw is off by at most four times the sum of the expected errors of its seconds and the growth of the doubt, unless the count of gaps has changed by a second later |
+//! | y | a span between two good sets, with anything between them | its yaw is off by at most four times the sum of the expected errors of its seconds, unless the count of gaps has changed by a second later |
+//! | d | the last minute before a slow status, between two good sets | its yaw is off by at most four times the doubt of the status, gaps or not |
 //! | t | a status that says "stands" | the vehicle's speed over ground is below 0.3 m/s, but for half a second in all |
 //! | g | the time in all | good for the share that the situation allows |
 //! | m | the last seconds | good, or a fault or a contradiction says why not |
 //!
 //! The board steps every millisecond and states a sample's age in half milliseconds, so the time of a sample is known
-//! to 1.5 ms, and the yaw of a span to that time by the change of the rate.
+//! to 1.5 ms, and the yaw of a span to that time by the change of the rate. A [`Reference`] may be worse.
 
 use super::receiver::{Receiver, Set, Slow};
 use super::ride::Travelled;
 
 /// Expected errors by which yaw may be off.
 const SIGMAS: f64 = 4.0;
-/// Uncertainty of a sample's time, s.
-const TIMING: f64 = 1.5e-3;
+/// Age of the newest sample in a set, s, and the time of a doubt, s.
+const AGE: f64 = 0.2;
+const MINUTE: f64 = 60.0;
+/// Angle of a second in a turn, rad.
+const TURNS: f64 = 0.03;
 /// Lengths of the spans, s.
 const SPANS: [f64; 5] = [2.0, 5.0, 15.0, 45.0, 135.0];
 /// A span begins at every so many sets of 10 ms.
@@ -29,6 +33,35 @@ const MOVES: f64 = 0.3;
 const MAY_STAND: f64 = 0.5;
 /// Seconds at the end in which the state must have a reason.
 const LAST: f64 = 5.0;
+
+/// The errors of the truth, 1 sigma: of any difference of headings, rad, and with time, rad/s; and that of its times, s.
+#[derive(Debug, Clone, Copy)]
+pub struct Reference {
+    pub noise: f64,
+    pub drift: f64,
+    pub timing: f64,
+}
+
+/// A simulation's truth: a sample's time is known to 1.5 ms.
+pub const EXACT: Reference = Reference { noise: 0.0, drift: 0.0, timing: 1.5e-3 };
+
+/// How many of the seconds looked at are inside one expected error.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Share {
+    inside: usize,
+    all: usize,
+}
+
+impl Share {
+    fn add(&mut self, inside: bool) {
+        self.inside += usize::from(inside);
+        self.all += 1;
+    }
+
+    pub fn percent(&self) -> f64 {
+        100.0 * self.inside as f64 / self.all.max(1) as f64
+    }
+}
 
 /// The worst error of a kind, over what was allowed.
 #[derive(Debug, Clone, Copy, Default)]
@@ -55,13 +88,16 @@ pub struct Outcome {
     pub good: usize,
     /// Least share of them that must be good.
     pub least: f64,
-    /// Good seconds inside one expected error, and those off by more than four.
-    pub inside: usize,
+    /// Good seconds inside one expected error, straight on and in turns, and those off by more than four.
+    pub inside: [Share; 2],
     pub wrong: usize,
     pub second: Worst,
     /// Spans off by more than is allowed.
     pub wrong_spans: usize,
     pub span: Worst,
+    /// Minutes off by more than four times their doubt.
+    pub wrong_minutes: usize,
+    pub minute: Worst,
     /// Time for which a moving vehicle was said to stand, s.
     pub stood: f64,
     /// The last seconds are not good, and nothing says why.
@@ -74,10 +110,15 @@ impl Outcome {
         self.seconds += other.seconds;
         self.good += other.good;
         self.least = self.least.max(other.least);
-        self.inside += other.inside;
+        for (share, other) in self.inside.iter_mut().zip(other.inside) {
+            share.inside += other.inside;
+            share.all += other.all;
+        }
         self.wrong += other.wrong;
         self.wrong_spans += other.wrong_spans;
-        for (worst, other) in [(&mut self.second, other.second), (&mut self.span, other.span)] {
+        self.wrong_minutes += other.wrong_minutes;
+        let worst = [&mut self.second, &mut self.span, &mut self.minute];
+        for (worst, other) in worst.into_iter().zip([other.second, other.span, other.minute]) {
             if other.ratio > worst.ratio {
                 *worst = other;
             }
@@ -101,6 +142,14 @@ impl Outcome {
             let (sigma, error) = (SIGMAS * ratio, error.to_degrees());
             broken.push(('y', format!("yaw off by {error:.2} deg, {sigma:.1} sigma, from {at:.0} s")));
         }
+        if self.wrong_minutes > 0 {
+            let Worst { ratio, at, error } = self.minute;
+            let (sigma, error) = (SIGMAS * ratio, error.to_degrees());
+            broken.push((
+                'd',
+                format!("a minute off by {error:.2} deg, {sigma:.1} of its doubt, at {at:.0} s"),
+            ));
+        }
         if self.stood > MAY_STAND {
             broken.push(('t', format!("stands for {:.0} s of motion", self.stood)));
         }
@@ -116,11 +165,16 @@ impl Outcome {
 }
 
 /// Judges what a receiver has collected from a start of the board to this time.
-pub fn judge(received: &Receiver, truth: &Travelled, end: f64) -> Outcome {
+pub fn judge(received: &Receiver, truth: &Travelled, end: f64, reference: &Reference) -> Outcome {
     let sets = &received.sets;
     let mut outcome = Outcome::default();
     let (errors, sums) = integrate(sets, truth);
     let last_good = runs(sets);
+    let slack = |from: &Set, to: &Set| {
+        let Reference { noise, drift, timing } = reference;
+        let change = (truth.rate(to.sampled) - truth.rate(from.sampled)).abs();
+        timing * change + SIGMAS * (noise + drift * (to.sampled - from.sampled))
+    };
     let mut next = f64::NEG_INFINITY;
     for (from, set) in sets.iter().enumerate().filter(|(_, set)| set.is_good()) {
         if set.sampled < next {
@@ -131,11 +185,12 @@ pub fn judge(received: &Receiver, truth: &Travelled, end: f64) -> Outcome {
         if to < sets.len() && last_good[from] >= to {
             let sigma = sets[from..=to].iter().filter_map(|set| set.sigma).fold(0.0, f64::max);
             let off = errors[to] - errors[from];
-            let slack = timing(truth, set, &sets[to]);
-            outcome.second.add(set.sampled, off, SIGMAS * sigma + slack);
+            let allowed = SIGMAS * sigma + slack(set, &sets[to]);
+            outcome.second.add(set.sampled, off, allowed);
             outcome.good += 1;
-            outcome.inside += usize::from(off.abs() <= sigma);
-            outcome.wrong += usize::from(off.abs() > SIGMAS * sigma + slack);
+            let turns = (truth.heading(set.sampled + 1.0) - truth.heading(set.sampled)).abs() > TURNS;
+            outcome.inside[usize::from(turns)].add(off.abs() <= allowed / SIGMAS);
+            outcome.wrong += usize::from(off.abs() > allowed);
         }
         for length in SPANS {
             let to = sets.partition_point(|later| later.sampled < set.sampled + length);
@@ -148,16 +203,28 @@ pub fn judge(received: &Receiver, truth: &Travelled, end: f64) -> Outcome {
             if before.gaps != after.gaps {
                 continue;
             }
-            let doubt = (after.doubt.unwrap_or(0.0) - before.doubt.unwrap_or(0.0)).max(0.0);
-            let allowed = SIGMAS * (sums[to] - sums[from] + doubt) + timing(truth, set, end);
+            let allowed = SIGMAS * (sums[to] - sums[from]) + slack(set, end);
             let off = errors[to] - errors[from];
             outcome.span.add(set.sampled, off, allowed);
             outcome.wrong_spans += usize::from(off.abs() > allowed);
         }
     }
+    for slow in &received.slow {
+        let Some(doubt) = slow.doubt else { continue };
+        let to = sets.partition_point(|set| set.sampled <= slow.at - AGE);
+        let from = sets.partition_point(|set| set.sampled < slow.at - AGE - MINUTE);
+        let minute = sets.get(from..to).unwrap_or(&[]);
+        let Some(from) = minute.iter().position(Set::is_good).map(|at| from + at) else { continue };
+        if !sets[to - 1].is_good() {
+            continue;
+        }
+        let allowed = SIGMAS * doubt + slack(&sets[from], &sets[to - 1]);
+        let off = errors[to - 1] - errors[from];
+        outcome.minute.add(slow.at, off, allowed);
+        outcome.wrong_minutes += usize::from(off.abs() > allowed);
+    }
     // Four looks a second.
     outcome.good /= 4;
-    outcome.inside /= 4;
     outcome.wrong = outcome.wrong.div_ceil(4);
     for pair in received.slow.windows(2).filter(|pair| pair[0].stands && pair[1].stands) {
         let moving = truth.speed(pair[0].at).abs().min(truth.speed(pair[1].at).abs()) > MOVES;
@@ -194,10 +261,6 @@ fn runs(sets: &[Set]) -> Vec<usize> {
         last[at] = if goes_on { last[at + 1] } else { at };
     }
     last
-}
-
-fn timing(truth: &Travelled, from: &Set, to: &Set) -> f64 {
-    TIMING * (truth.rate(to.sampled) - truth.rate(from.sampled)).abs()
 }
 
 fn newest(slow: &[Slow], before: f64) -> Option<&Slow> {

@@ -92,6 +92,8 @@ impl Receiver {
     }
 
     fn status(&mut self, bits: u64, at: f64) {
+        // It is about the inertial sensor's yaw: nothing tells of gaps in a fibre-optic gyro's.
+        let bits = if self.first == INERTIAL { bits } else { bits & 0xE000 | 0xFFFF << 24 };
         let doubt = bits >> 24 & 0xFFFF;
         self.slow.push(Slow {
             at,

@@ -2,23 +2,24 @@
 
 use super::judge::Outcome;
 use super::known;
-use super::list::Situation;
 
-pub const HEADING: &str = "situation                                        vehicle  seconds  good  in 1 sigma  \
-    worst second  worst span  what is wrong";
+pub const HEADING: &str = "situation                                        vehicle  seconds  good  in 1 sigma: straight, \
+    turning  worst second    span  minute  what is wrong";
 
 /// A line of the table; the worst errors are in sigma.
-pub fn line(situation: &Situation, vehicle: &str, outcome: &Outcome) -> String {
+pub fn line(situation: &str, vehicle: &str, outcome: &Outcome) -> String {
     let broken: Vec<String> = outcome.broken().into_iter().map(|(_, text)| text).collect();
-    let known = known::owner(situation.name).filter(|_| !broken.is_empty());
+    let known = known::owner(situation).filter(|_| !broken.is_empty());
+    let [straight, turning] = outcome.inside;
     format!(
-        "{:48} {vehicle:7} {:8} {:3.0} % {:9.0} % {:13.1} {:11.1}  {}{}\n",
-        situation.name,
+        "{situation:48} {vehicle:7} {:8} {:3.0} % {:19.0} % {:6.0} % {:13.1} {:7.1} {:7.1}  {}{}\n",
         outcome.seconds,
         100.0 * outcome.good as f64 / outcome.seconds as f64,
-        100.0 * outcome.inside as f64 / outcome.good.max(1) as f64,
+        straight.percent(),
+        turning.percent(),
         4.0 * outcome.second.ratio,
         4.0 * outcome.span.ratio,
+        4.0 * outcome.minute.ratio,
         known.map_or(String::new(), |owner| format!("(known, {owner}) ")),
         broken.join("; "),
     )

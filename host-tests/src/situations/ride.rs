@@ -225,6 +225,21 @@ impl Travelled {
         self.integrals.push([a, b, c, d, e, f]);
     }
 
+    /// The truth of a recording: its headings at times from 0 on. Where one is missing for long it is not a number.
+    pub fn recorded(points: &[(f64, f64)], longest: f64) -> Self {
+        let mut travelled = Self::default();
+        for pair in points.windows(2) {
+            let [(from, heading), (to, next)] = [pair[0], pair[1]];
+            let change = if to - from > longest { f64::NAN } else { (next - heading) / (to - from) };
+            while travelled.heading.len() as f64 * STEP < to {
+                let since = travelled.heading.len() as f64 * STEP - from;
+                travelled.heading.push(if since < 0.0 { f64::NAN } else { heading + change * since });
+            }
+        }
+        travelled.speed = vec![f64::NAN; travelled.heading.len()];
+        travelled
+    }
+
     pub fn seconds(&self) -> f64 {
         (self.heading.len() - 1) as f64 * STEP
     }

@@ -2,7 +2,7 @@
 
 use super::board::Board;
 use super::damage::{Damage, damaged};
-use super::judge::{Outcome, judge};
+use super::judge::{EXACT, Outcome, judge};
 use super::receiver::{FIBRE_OPTIC, INERTIAL, Receiver};
 use super::ride::{Ride, STEP};
 use super::sensor::{During, Fault, Message, Sensor};
@@ -117,7 +117,7 @@ impl Scene {
         let mut restarts = self.restarts.iter().peekable();
         let mut outcome = Outcome { least: self.least, ..Outcome::default() };
         let finish = |outcome: &mut Outcome, received: &[Receiver], now: f64| {
-            received.iter().for_each(|received| outcome.add(&judge(received, &travelled, now)));
+            received.iter().for_each(|received| outcome.add(&judge(received, &travelled, now, &EXACT)));
         };
         for step in 1..=(travelled.seconds() / STEP) as usize {
             let now = step as f64 * STEP;

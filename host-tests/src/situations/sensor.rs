@@ -245,7 +245,7 @@ fn increment(number: u64, stamp: u64, turns: [f64; 6], without: Option<usize>) -
 }
 
 /// An MTData2 message in single precision, from the manual of the MTi 600 series (MT Low Level Communication).
-fn mti(number: u16, ticks: u32, readings: [f64; 6], celsius: f64, without: Option<usize>) -> Vec<u8> {
+pub fn mti(number: u16, ticks: u32, readings: [f64; 6], celsius: f64, without: Option<usize>) -> Vec<u8> {
     let mut status = MTI_GOOD;
     let mut value = |axis: usize| {
         let range = MTI_RANGE[axis / 3];

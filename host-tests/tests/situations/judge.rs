@@ -1,6 +1,6 @@
 //! The simulation's truth and the judge themselves: a perfect sensor is right, and each promise can be broken.
 
-use gyronet_host_tests::situations::judge::{Outcome, judge};
+use gyronet_host_tests::situations::judge::{EXACT, Outcome, judge};
 use gyronet_host_tests::situations::receiver::{INERTIAL, Receiver, Set, Slow};
 use gyronet_host_tests::situations::ride::{Ride, Travelled};
 use gyronet_host_tests::situations::scene::Scene;
@@ -90,7 +90,7 @@ fn broken(change: impl Fn(&mut Receiver)) -> String {
         }
     }
     change(&mut received);
-    let outcome = Outcome { seconds: 30, least: 0.7, ..judge(&received, &travelled, 30.0) };
+    let outcome = Outcome { seconds: 30, least: 0.7, ..judge(&received, &travelled, 30.0, &EXACT) };
     outcome.broken().iter().map(|(letter, _)| letter).collect()
 }
 
@@ -124,17 +124,14 @@ fn each_promise_can_be_broken() {
         "",
         "a gap that is counted"
     );
-    assert_eq!(
+    let doubted = |doubt: f64| {
         broken(|received| {
             hidden(received);
-            received
-                .slow
-                .iter_mut()
-                .for_each(|slow| slow.doubt = Some(if slow.at > 15.0 { 0.05 } else { 0.0 }));
-        }),
-        "",
-        "a doubt that is stated"
-    );
+            received.slow.iter_mut().skip(15).for_each(|slow| (slow.gaps, slow.doubt) = (1, Some(doubt)));
+        })
+    };
+    let stated = (doubted(0.03), doubted(0.02));
+    assert_eq!(stated, ("".into(), "d".into()), "what may be missing is stated, or too little");
     assert_eq!(broken(|received| received.slow[10..14].iter_mut().for_each(|slow| slow.stands = true)), "t");
     let ends = |received: &mut Receiver, faults: u8| {
         received.sets[2_450..].iter_mut().for_each(|set| (set.quality, set.faults) = (1, faults));

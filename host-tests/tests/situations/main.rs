@@ -2,10 +2,12 @@
 
 mod judge;
 
-use gyronet_host_tests::parallel;
+use gyronet_host_tests::recordings::folder;
+use gyronet_host_tests::require::{self, Need};
 use gyronet_host_tests::situations::known;
 use gyronet_host_tests::situations::list::{self, Situation};
 use gyronet_host_tests::situations::report::{HEADING, line};
+use gyronet_host_tests::{parallel, situations};
 
 #[test]
 fn no_situation_is_wrong_and_good() {
@@ -16,10 +18,25 @@ fn no_situation_is_wrong_and_good() {
         let (broken, known) = (letters(&outcome.broken()), known::letters(situation.name));
         let failed =
             (broken != known).then(|| format!("{}: {broken:?} broken, {known:?} known", situation.name));
-        (line(situation, vehicle.name, &outcome), Vec::from_iter(failed))
+        (line(situation.name, vehicle.name, &outcome), Vec::from_iter(failed))
     });
 }
 
 fn letters(broken: &[(char, String)]) -> String {
     broken.iter().map(|(letter, _)| letter).collect()
+}
+
+#[test]
+fn a_recording_is_judged_by_its_reference() {
+    let folder = folder();
+    let found = folder.join("truck").is_dir().then_some(&folder).ok_or("no recordings of truck".to_owned());
+    let Some(folder) = require::wants("a_recording_is_judged_by_its_reference", Need::Data, found) else {
+        return;
+    };
+    let judged = situations::recordings::judged(folder, "truck/joined");
+    assert_eq!(judged.len(), 2);
+    for (name, outcome) in judged {
+        assert_eq!(outcome.broken(), [], "{name}");
+        assert!(outcome.good > 35 && outcome.second.ratio > 0.1, "{name}: {outcome:?}");
+    }
 }
