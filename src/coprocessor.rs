@@ -20,6 +20,7 @@
 
 mod clock;
 mod config;
+mod second_source;
 mod sink;
 mod step;
 
@@ -36,17 +37,19 @@ use crate::can::fog_encoder::FogEncoder;
 use crate::can::latitude::LatitudeReceiver;
 use crate::can::wheel::WheelReceiver;
 use crate::compensate::Complete;
-use crate::estimate::VehicleSample;
+use crate::estimate::{VehicleSample, YawEstimate};
 use crate::fog::{FogCounters, FogPipeline};
-use crate::health::{BoardFaults, InputCounters, MonitorCounters, count};
+use crate::health::slow::SlowStatus;
+use crate::health::{BoardFaults, Faults, InputCounters, MonitorCounters, Quality, Source, count};
 use crate::model::Estimate;
 use crate::model::fognet::FogEstimate;
 use crate::model::seconds::SecondsWindow;
 use crate::monitor::SensorMonitor;
 use crate::pipeline::{BoardState, Handover, Pipeline};
 use crate::sample::{FogSample, Frame, ImuSample, NO_STAMP, WheelSample};
-use crate::units::{CentiCelsius, Micros};
+use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use clock::Timeline;
+use second_source::{Doubts, SecondSource, Shown};
 
 /// The results of one sample, or of its absence, for a log or diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,6 +87,9 @@ pub struct Coprocessor {
     wheels: Option<WheelReceiver>,
     fog: FogPipeline,
     latitude: Option<LatitudeReceiver>,
+    second: SecondSource,
+    /// The newest usable rate of the fibre-optic gyro, rad/s.
+    fog_rate: Option<f32>,
     encoder: CanEncoder,
     fog_encoder: FogEncoder,
     /// The newest temperature: some parts send it with one sample in a hundred.
@@ -113,6 +119,8 @@ impl Coprocessor {
             wheels: config.wheels,
             fog: FogPipeline::new(config.fog, config.has_fognet, config.fog_expected),
             latitude: config.latitude,
+            second: SecondSource::START,
+            fog_rate: None,
             encoder: CanEncoder::new(config.can),
             fog_encoder: FogEncoder::new(config.fog_ids),
             temperature: None,
@@ -185,6 +193,14 @@ impl Coprocessor {
             let replaced = self.handover.offer(window, now);
             count(&mut self.counters.replaced_windows, u32::from(replaced));
         }
+        let rate = Some(output.vehicle.live).filter(|live| live.source != Source::Raw).map(rad_per_sec);
+        let [_, lateral, _] = output.vehicle.specific_force;
+        self.second.add(&Shown {
+            inertial: rate,
+            fog: self.fog_rate,
+            lateral: lateral.0 as f32 / SpecificForce::PER_METRE_PER_SEC2,
+            wheels: wheels.as_ref().and_then(second_source::axle),
+        });
         let (complete, refused) = (output.complete, output.refused);
         let wheels = wheels.unwrap_or_default();
         let observation =
@@ -392,7 +408,12 @@ impl Coprocessor {
             let wheels = self.poll_wheels();
             let fresh = self.timeline.is_sensors() || !self.monitor.is_stale(self.timeline.now());
             let inertial = self.pipeline.inertial().filter(|_| fresh);
-            let Some(estimate) = self.fog.next_step(time, inertial, wheels.as_ref()) else { return };
+            let Some(mut estimate) = self.fog.next_step(time, inertial, wheels.as_ref()) else { return };
+            self.fog_rate = (estimate.quality != Quality::Unusable).then(|| rad_per_sec(estimate));
+            if self.second.doubts().is_some_and(|doubts| doubts.fog) && self.fog_rate.is_some() {
+                estimate.quality = Quality::Degraded;
+                estimate.faults = estimate.faults.with(Faults::IMPLAUSIBLE);
+            }
             sink.fog_rate(&estimate);
             let time = self.timeline.sample;
             if SINK::TAKES_FRAMES {
@@ -406,8 +427,10 @@ impl Coprocessor {
         let configuration_lost = self.storage.configuration_lost;
         let bus = self.bus.is_off || self.bus.lost != self.bus.reported;
         let clock = self.monitor.is_clock_off() || self.pipeline.is_rate_refused();
-        let wheels = self.wheels.as_ref().is_some_and(WheelReceiver::is_invalid);
-        let faults = BoardFaults { bus, wheels, clock, stored, configuration_lost };
+        let doubts = self.second.doubts().unwrap_or_default();
+        let wheels = doubts.wheels || self.wheels.as_ref().is_some_and(WheelReceiver::is_invalid);
+        let contradicted = doubts.inertial;
+        let faults = BoardFaults { bus, wheels, clock, contradicted, stored, configuration_lost };
         BoardState { faults, clock_ratio: self.monitor.clock_ratio() }
     }
 
@@ -430,9 +453,10 @@ impl Coprocessor {
     fn encode<SINK: Sink>(&mut self, vehicle: &VehicleSample, time: Micros, sink: &mut SINK) {
         if SINK::TAKES_FRAMES {
             self.encoder.send(vehicle, |frame| sink.frame(TimedFrame { frame, time }));
+            let doubts = self.second.doubts().map(Doubts::bits);
             let Self { encoder, pipeline, wheels, timeline, .. } = self;
             let mut standstill = || Some(wheels.as_mut()?.poll(timeline.time())?.standstill);
-            if let Some(frame) = encoder.status(|| pipeline.status(standstill())) {
+            if let Some(frame) = encoder.status(|| SlowStatus { doubts, ..pipeline.status(standstill()) }) {
                 sink.frame(TimedFrame { frame, time });
             }
             self.counters.out_of_range = self.encoder.out_of_range();
@@ -443,4 +467,8 @@ impl Coprocessor {
         count(&mut self.counters.unclaimed_estimates, u32::from(!wanted));
         if wanted { Ok(()) } else { Err(InputError::NoWindow { end }) }
     }
+}
+
+fn rad_per_sec(estimate: YawEstimate) -> f32 {
+    estimate.rate.0 as f32 / AngularRate::PER_RAD_PER_SEC
 }

@@ -141,6 +141,8 @@ pub struct BoardFaults {
     pub wheels: bool,
     /// The clock of the inertial sensor is too far off the board's, or it sends too few or too many samples a second.
     pub clock: bool,
+    /// Other sources of the yaw rate contradict the inertial sensor.
+    pub contradicted: bool,
     /// Weights, configuration or calibration are damaged.
     pub stored: bool,
     /// The configuration of this vehicle is lost: the built-in one is used, so no rate is better than degraded.
@@ -149,8 +151,14 @@ pub struct BoardFaults {
 
 impl BoardFaults {
     /// No fault is present.
-    pub const NONE: Self =
-        Self { bus: false, wheels: false, clock: false, stored: false, configuration_lost: false };
+    pub const NONE: Self = Self {
+        bus: false,
+        wheels: false,
+        clock: false,
+        contradicted: false,
+        stored: false,
+        configuration_lost: false,
+    };
 
     /// Returns the bits that are sent.
     #[must_use]
@@ -159,13 +167,14 @@ impl BoardFaults {
             .when(self.bus)
             .with(Faults::WHEELS.when(self.wheels))
             .with(Faults::STORED.when(self.stored))
-            .with(Faults::IMPLAUSIBLE.when(self.clock))
+            .with(Faults::IMPLAUSIBLE.when(self.clock || self.contradicted))
     }
 
-    /// Caps a quality at degraded where the configuration is lost, or the sensor's clock is off.
+    /// Caps a quality at degraded where the configuration is lost, the sensor's clock is off, or other
+    /// sources contradict it.
     #[must_use]
     pub const fn cap_quality(self, quality: Quality) -> Quality {
-        if (self.configuration_lost || self.clock) && matches!(quality, Quality::Good) {
+        if (self.configuration_lost || self.clock || self.contradicted) && matches!(quality, Quality::Good) {
             Quality::Degraded
         } else {
             quality

@@ -10,11 +10,9 @@
 //! | 4 to 6 | [`Knowledge`] of the gyro's bias | 7 |
 //! | 7 to 9 | [`Knowledge`] of its gain and misalignment | 7 |
 //! | 10 to 12 | [`Knowledge`] of the sensor's mounting | 7 |
-//! | 13 to 15 | doubts of a second source of the yaw rate | 7 |
+//! | 13 to 15 | sources of the yaw rate that others contradict: 1 inertial gyro, 2 fibre-optic gyro, 4 wheels, or their sum | 7 |
 //! | 16 to 23 | gaps in the accumulated yaw since it began; 254 also above | 255 |
 //! | 24 to 39 | expected error of the angle turned in the last minute, 0.01 deg; 65534 also above | 65535 |
-//!
-//! Nothing on the board finds the doubts of a second source yet: they are sent as not available.
 
 pub use crate::health::slow::{Evidence, Knowledge, SlowStatus, Verdict};
 
@@ -30,8 +28,8 @@ pub const PERIOD_MS: u16 = 1_000;
 const SAMPLES: u8 = 100;
 /// Code of an unknown number of gaps.
 const NO_GAPS: u8 = u8::MAX;
-/// Code of the doubts of a second source, which nothing finds yet.
-const NO_SOURCE: u64 = 7;
+/// Code of unknown doubts of a second source.
+const NO_SOURCE: u8 = 7;
 /// Code of an unknown doubt of the yaw.
 const NO_DOUBT: u16 = u16::MAX;
 
@@ -43,6 +41,10 @@ pub const fn emit(status: &SlowStatus) -> [u8; 8] {
         Some(_) => NO_GAPS - 1,
         None => NO_GAPS,
     };
+    let doubts = match status.doubts {
+        Some(doubts) => doubts,
+        None => NO_SOURCE,
+    };
     let doubt = match status.doubt {
         Some(doubt) if doubt < NO_DOUBT as u32 => doubt as u16,
         Some(_) => NO_DOUBT - 1,
@@ -53,7 +55,7 @@ pub const fn emit(status: &SlowStatus) -> [u8; 8] {
         | (status.bias as u64) << 4
         | (status.gain as u64) << 7
         | (status.mounting as u64) << 10
-        | NO_SOURCE << 13
+        | (doubts as u64) << 13
         | (gaps as u64) << 16
         | (doubt as u64) << 24;
     (bits << 24).to_le_bytes()

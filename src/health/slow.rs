@@ -51,6 +51,9 @@ pub struct SlowStatus {
     pub gain: Knowledge,
     /// Knowledge of the sensor's mounting.
     pub mounting: Knowledge,
+    /// Sources of the yaw rate that others contradict: inertial gyro 1, fibre-optic gyro 2, wheels 4; `None` before two
+    /// have been compared.
+    pub doubts: Option<u8>,
     /// Gaps in the accumulated yaw; `None` before it begins.
     pub gaps: Option<u32>,
     /// Expected error (1 sigma) of the angle that the accumulated yaw has turned in the last minute, 0.01 deg, gaps

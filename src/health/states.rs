@@ -44,7 +44,7 @@ const fn remark(
 /// and VDC2 "error".
 ///
 /// From a fault the state returns to init where no bias is known, otherwise to degraded.
-pub const STATES: [State; 11] = [
+pub const STATES: [State; 12] = [
     state(
         Status::Init,
         "init",
@@ -131,5 +131,12 @@ pub const STATES: [State; 11] = [
         "none, as silent; IMPLAUSIBLE",
         "a rate between",
         "`misplaced`",
+    ),
+    remark(
+        "contradicted",
+        "two seconds in which other sources (fibre-optic gyro, wheels, accelerometer) contradict the gyro; 0x1A3 names it",
+        "as in the present state, at best degraded; IMPLAUSIBLE",
+        "two seconds of a turn in which they agree",
+        "",
     ),
 ];

@@ -21,7 +21,7 @@ impl Pipeline {
         let mounting = if self.state.moved { Knowledge::Refused } else { self.config.forward };
         let gaps = self.state.delayed_yaw.gaps();
         let doubt = gaps.map(|_| self.yaw_doubt());
-        SlowStatus { verdict, evidence, bias, gain, mounting, gaps, doubt }
+        SlowStatus { verdict, evidence, bias, gain, mounting, doubts: None, gaps, doubt }
     }
 
     /// Whether this unit's gain and misalignment are known.

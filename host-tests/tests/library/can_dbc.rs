@@ -225,8 +225,7 @@ fn the_slow_status_means_what_the_file_says() {
         let doubt = status.doubt.map_or(0xFFFF, |doubt| i64::from(doubt.min(0xFFFE)));
         assert_eq!(decoded["YawDoubt"].0, doubt);
         close(decoded["YawDoubt"].1, doubt as f64 * 0.01, 1e-9);
-        // What nothing finds yet is not available.
-        assert_eq!(decoded["SecondSourceDoubt"].0, 7);
+        assert_eq!(decoded["SecondSourceDoubt"].0, status.doubts.map_or(7, i64::from));
     };
     for (gaps, code) in [(None, 255), (Some(0), 0), (Some(253), 253), (Some(254), 254), (Some(u32::MAX), 254)]
     {
@@ -237,7 +236,16 @@ fn the_slow_status_means_what_the_file_says() {
         let [bias, gain, mounting] = [k, k / 2, k / 3].map(|k| knowledge[k % 4]);
         let (verdict, evidence) = (verdicts[k % 3], evidence[k / 4]);
         check(
-            SlowStatus { verdict, evidence, bias, gain, mounting, gaps: Some(k as u32), doubt: Some(1) },
+            SlowStatus {
+                verdict,
+                evidence,
+                bias,
+                gain,
+                mounting,
+                doubts: Some(k as u8 % 7),
+                gaps: Some(k as u32),
+                doubt: Some(1),
+            },
             k as i64,
         );
     }

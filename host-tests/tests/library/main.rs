@@ -37,6 +37,7 @@ mod pipeline;
 mod pipeline_estimates;
 mod pipeline_wheels;
 mod revisions;
+mod second_source;
 mod sensor_monitor;
 mod sensor_rates;
 mod sensor_serial;

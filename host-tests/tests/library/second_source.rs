@@ -1,0 +1,133 @@
+//! Sources of the yaw rate that contradict each other: the one that is alone is doubted, and no other.
+
+use embedded_can::{Frame, StandardId};
+use gyronet::bias::Latitude;
+use gyronet::can::DataFrame;
+use gyronet::can::wheel::{WheelReceiver, WheelSettings};
+use gyronet::coprocessor::{Observation, Sink, TimedFrame};
+use gyronet::estimate::YawEstimate;
+use gyronet::fog::FogConfig;
+use gyronet::health::{Faults, Quality};
+use gyronet::sample::{FogSample, PERIOD_US};
+use gyronet::units::{Angle, Micros};
+use gyronet::{Config, Coprocessor};
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::synthetic::{force, rate, turning};
+
+/// Factors on what each source reads of a turn of 5 deg/s at 15 m/s: inertial gyro, fibre-optic gyro (0: none), and
+/// left and right wheel.
+struct Read {
+    inertial: f64,
+    fog: f64,
+    wheels: [f64; 2],
+}
+
+const TRUE: Read = Read { inertial: 1.0, fog: 1.0, wheels: [1.0; 2] };
+
+#[derive(Default)]
+struct Seen {
+    inertial: Vec<YawEstimate>,
+    fog: Vec<YawEstimate>,
+}
+
+impl Sink for Seen {
+    fn frame(&mut self, _frame: TimedFrame) {}
+
+    fn observed(&mut self, observation: &Observation) {
+        self.inertial.push(observation.vehicle.live);
+    }
+
+    fn fog_rate(&mut self, rate: &YawEstimate) {
+        self.fog.push(*rate);
+    }
+}
+
+/// The last rates of both gyros after 8 s of turn.
+fn turned(read: &Read) -> (YawEstimate, Option<YawEstimate>) {
+    let wheels = WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings");
+    let fog = FogConfig { latitude: Latitude::from_degrees(48.0), ..FogConfig::DEFAULT };
+    let config = Config { wheels: Some(wheels), fog, fog_expected: read.fog != 0.0, ..Config::DEFAULT };
+    let (mut coprocessor, mut noise, mut seen) = (Coprocessor::new(config), Noise::new(3), Seen::default());
+    for tick in 1..=1_300 {
+        let now = Micros(tick * PERIOD_US);
+        let (speed, yaw) = if tick > 500 { (15.0, 5_f64.to_radians()) } else { (0.0, 0.0) };
+        let axle = [-0.75, 0.75].map(|side| speed + side * yaw);
+        let [left, right] = [0, 1].map(|wheel| axle[wheel] * read.wheels[wheel]);
+        let raw = |speed: f64| ((speed * 3.6 + 67.67) * 100.0).round() as u16;
+        let bytes: Vec<u8> =
+            [right, left, right, left].iter().flat_map(|speed| raw(*speed).to_be_bytes()).collect();
+        let frame = DataFrame::new(StandardId::new(0xAA).expect("11 bits"), &bytes).expect("eight bytes");
+        coprocessor.can(&frame, now).expect("a good frame");
+        let mut sample = turning(tick, rate(0.001 + yaw * read.inertial));
+        sample.specific_force[1] = force(speed * yaw);
+        for axis in 0..3 {
+            sample.angular_rate[axis].0 += rate(2e-4 * noise.normal()).0;
+            sample.specific_force[axis].0 += force(2e-3 * noise.normal()).0;
+        }
+        coprocessor.imu(sample, now, &mut seen).expect("in time");
+        if read.fog != 0.0 {
+            let angle =
+                Angle::from_rad((yaw * read.fog * 0.01 + 1e-7 * noise.normal()) as f32).expect("in range");
+            let increment = [None, None, Some(angle)];
+            let sample = FogSample { time: now, span: 10_000, lost: 0, increment, temperature: None };
+            coprocessor.fog(sample, now, &mut seen).expect("in order");
+        }
+    }
+    (*seen.inertial.last().expect("a step"), seen.fog.last().copied())
+}
+
+const DOUBTED: (bool, bool) = (true, true);
+const GOOD: (bool, bool) = (false, false);
+
+/// Implausible, and not good, by any fault but the late window of a board without a network.
+fn doubted(estimate: &YawEstimate) -> (bool, bool) {
+    (estimate.faults.contains(Faults::IMPLAUSIBLE), estimate.quality != Quality::Good)
+}
+
+#[test]
+fn sources_that_agree_are_not_doubted() {
+    for wheels in [[1.0; 2], [1.01, 0.99]] {
+        let (inertial, fog) = turned(&Read { wheels, ..TRUE });
+        assert!(!inertial.faults.contains(Faults::IMPLAUSIBLE), "{inertial:?}");
+        assert!(!inertial.faults.contains(Faults::WHEELS), "{inertial:?}");
+        assert_eq!(doubted(&fog.expect("a rate")), GOOD);
+    }
+}
+
+/// The gyro is set to degrees, to the other direction, or has lost its scale.
+#[test]
+fn a_fibre_optic_gyro_that_is_alone_is_doubted() {
+    for factor in [57.295_78, -1.0, 0.5, 1.5] {
+        let (inertial, fog) = turned(&Read { fog: factor, ..TRUE });
+        assert_eq!(doubted(&fog.expect("a rate")), DOUBTED, "{factor}");
+        assert_eq!(
+            inertial.faults.contains(Faults::IMPLAUSIBLE),
+            factor.abs() < 2.0 && factor > 0.0,
+            "{factor}"
+        );
+    }
+}
+
+#[test]
+fn an_inertial_gyro_that_is_alone_is_doubted() {
+    for factor in [-1.0, 20.0] {
+        let (inertial, fog) = turned(&Read { inertial: factor, ..TRUE });
+        assert!(inertial.faults.contains(Faults::IMPLAUSIBLE), "{factor}");
+        assert_eq!(doubted(&fog.expect("a rate")), GOOD, "{factor}");
+    }
+    // Without a fibre-optic gyro wheels and accelerometer contradict it.
+    let (inertial, _) = turned(&Read { inertial: 20.0, fog: 0.0, ..TRUE });
+    assert!(inertial.faults.contains(Faults::IMPLAUSIBLE));
+}
+
+#[test]
+fn wheels_that_are_alone_are_doubted() {
+    for wheels in [[1.0, 0.0], [1.0, 1.3], [1.3, 1.0]] {
+        for fog in [0.0, 1.0] {
+            let (inertial, fog) = turned(&Read { wheels, fog, ..TRUE });
+            assert!(inertial.faults.contains(Faults::WHEELS), "{wheels:?}");
+            assert!(!inertial.faults.contains(Faults::IMPLAUSIBLE), "{wheels:?}");
+            assert!(fog.is_none_or(|fog| !fog.faults.contains(Faults::IMPLAUSIBLE)), "{wheels:?}");
+        }
+    }
+}

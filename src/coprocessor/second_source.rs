@@ -1,0 +1,162 @@
+//! Sources of the yaw rate held against each other, second by second.
+//!
+//! | sources | they agree while |
+//! |---|---|
+//! | fibre-optic gyro, inertial gyro | their mean rates differ by at most 1 deg/s and 5 % of the larger one |
+//! | wheels, gyro | the wheels of an axle differ by 0.4 to 4 m (any track) times the rate, +- 0.1 m/s and 1.5 % of the speed |
+//! | accelerometer, gyro | the lateral force is speed times rate, +- 2 m/s^2 and 30 % |
+//!
+//! In a second with contradiction the source that is alone is doubted: the gyro that the other two (gyro, wheels,
+//! accelerometer) contradict, or the wheels that both others contradict. Where two contradict each other and no third
+//! one judges, both are doubted. A doubt begins with the second such second in a row (a tyre that slips, a lag in a
+//! swerve), and ends with the second one in which its source agrees with another in a turn.
+
+use crate::sample::{RATE_HZ, WheelSample};
+
+/// Sources in doubt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Doubts {
+    pub inertial: bool,
+    pub fog: bool,
+    pub wheels: bool,
+}
+
+impl Doubts {
+    /// The code of the slow status message.
+    pub fn bits(self) -> u8 {
+        u8::from(self.inertial) | u8::from(self.fog) << 1 | u8::from(self.wheels) << 2
+    }
+}
+
+/// What the sources show in one step of 10 ms.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Shown {
+    /// Yaw rates of the gyros less their bias, rad/s.
+    pub inertial: Option<f32>,
+    pub fog: Option<f32>,
+    /// Lateral specific force, m/s^2, to the left.
+    pub lateral: f32,
+    /// Speed, and how much faster the right wheel of the rear axle is than the left one, m/s.
+    pub wheels: Option<[f32; 2]>,
+}
+
+/// Smallest rate of a turn in which sources show that they agree, rad/s.
+const TURN: f32 = 0.035;
+/// Wheels and accelerometer are asked above this speed, m/s: below it wheels turn on the spot and slip.
+const FAST: f32 = 3.0;
+/// A doubt begins and ends with this many seconds in a row.
+const SECONDS: u8 = 2;
+
+/// A second in progress, and the doubts so far.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SecondSource {
+    steps: u32,
+    /// Sums of inertial rate, fibre-optic rate, lateral force, speed, difference of the wheels, and their numbers.
+    sums: [(f32, u32); 5],
+    /// Seconds in a row in which each source (inertial, fibre-optic, wheels) was alone, and in which it agreed.
+    alone: [u8; 3],
+    agreed: [u8; 3],
+    doubts: [bool; 3],
+    judged: bool,
+}
+
+impl SecondSource {
+    pub const START: Self = Self {
+        steps: 0,
+        sums: [(0.0, 0); 5],
+        alone: [0; 3],
+        agreed: [0; 3],
+        doubts: [false; 3],
+        judged: false,
+    };
+
+    /// Adds a step of 10 ms.
+    pub fn add(&mut self, shown: &Shown) {
+        let Shown { inertial, fog, lateral, wheels } = *shown;
+        let [speed, difference] = wheels.map_or([None; 2], |values| values.map(Some));
+        for (sum, value) in self.sums.iter_mut().zip([inertial, fog, Some(lateral), speed, difference]) {
+            if let Some(value) = value {
+                *sum = (sum.0 + value, sum.1 + 1);
+            }
+        }
+        self.steps += 1;
+        if self.steps >= RATE_HZ {
+            let [inertial, fog, lateral, speed, difference] =
+                self.sums.map(|(sum, number)| (number == RATE_HZ).then(|| sum / RATE_HZ as f32));
+            self.judge([inertial, fog], lateral, speed.zip(difference));
+            (self.steps, self.sums) = (0, Self::START.sums);
+        }
+    }
+
+    /// The doubts; `None` before two sources have shown anything at the same time.
+    pub fn doubts(&self) -> Option<Doubts> {
+        let [inertial, fog, wheels] = self.doubts;
+        self.judged.then_some(Doubts { inertial, fog, wheels })
+    }
+
+    fn judge(&mut self, gyros: [Option<f32>; 2], lateral: Option<f32>, wheels: Option<(f32, f32)>) {
+        let wheels = wheels.filter(|(speed, _)| *speed > FAST);
+        let by_wheels = gyros.map(|rate| Some(wheels_agree(rate?, wheels?)));
+        let by_force = gyros.map(|rate| Some(force_agrees(rate?, lateral?, wheels?.0)));
+        let [inertial, fog] = gyros;
+        let gyros_agree = inertial
+            .zip(fog)
+            .map(|(one, other)| (one - other).abs() <= 0.0175 + 0.05 * one.abs().max(other.abs()));
+        if gyros_agree.is_none() && by_wheels == [None; 2] {
+            return;
+        }
+        self.judged = true;
+        let turns = gyros.map(|rate| rate.is_some_and(|rate| rate.abs() > TURN));
+        // How many of the others speak for each gyro, and against it.
+        let voices = |gyro: usize| {
+            let voices = [gyros_agree, by_wheels[gyro], by_force[gyro]];
+            [true, false].map(|what| voices.iter().filter(|voice| **voice == Some(what)).count())
+        };
+        let [[for_inertial, against_inertial], [for_fog, against_fog]] = [voices(0), voices(1)];
+        let alone = match gyros_agree {
+            Some(false) => [against_inertial >= against_fog, against_fog >= against_inertial, false],
+            _ => {
+                let wheels = by_wheels.contains(&Some(false));
+                let gyro = against_inertial > 1 && for_inertial == 0;
+                [gyro || wheels && against_inertial > for_inertial, against_fog > for_fog, wheels && !gyro]
+            }
+        };
+        let agreed = [
+            turns[0] && for_inertial > against_inertial,
+            turns[1] && for_fog > against_fog,
+            turns.contains(&true) && by_wheels.contains(&Some(true)) && !by_wheels.contains(&Some(false)),
+        ];
+        for source in 0..3 {
+            let counted = |count: u8, now: bool| if now { count.saturating_add(1) } else { 0 };
+            self.alone[source] = counted(self.alone[source], alone[source]);
+            // Seconds that show nothing do not end a row of agreement.
+            let doubtful = alone[source] || !agreed[source] && self.alone[source] > 0;
+            self.agreed[source] = if doubtful { 0 } else { self.agreed[source] + u8::from(agreed[source]) };
+            self.doubts[source] |= self.alone[source] >= SECONDS;
+            if self.agreed[source] >= SECONDS {
+                (self.doubts[source], self.agreed[source]) = (false, 0);
+            }
+        }
+    }
+}
+
+/// Whether the wheels' difference can be that of an axle in a turn at this rate.
+fn wheels_agree(rate: f32, (speed, difference): (f32, f32)) -> bool {
+    let slack = 0.1 + 0.015 * speed;
+    let [narrow, wide] = [0.4 * rate, 4.0 * rate];
+    difference >= narrow.min(wide) - slack && difference <= narrow.max(wide) + slack
+}
+
+/// Whether the lateral force can be that of a turn at this rate and speed, on a street with a bank.
+fn force_agrees(rate: f32, lateral: f32, speed: f32) -> bool {
+    let expected = rate * speed;
+    (lateral - expected).abs() <= 2.0 + 0.3 * expected.abs()
+}
+
+/// The mean speed of an axle, m/s, and how much faster its right wheel is.
+pub(super) fn axle(wheels: &WheelSample) -> Option<[f32; 2]> {
+    let [front_left, front_right, rear_left, rear_right] = wheels.speeds;
+    let [left, right] = [rear_left.or(front_left)?, rear_right.or(front_right)?]
+        .map(|speed| speed.0 as f32 / (1 << crate::units::WheelSpeed::FRACTION_BITS) as f32);
+    Some([(left + right) / 2.0, right - left])
+}
