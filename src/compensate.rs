@@ -122,6 +122,8 @@ pub struct Compensated {
     pub covered: bool,
     /// The gyro's rates about x and y, less static bias.
     pub roll_and_pitch: [AngularRate; 2],
+    /// The network's part of the correction.
+    pub estimate: AngularRate,
     /// What is left of the gyro's yaw rate where standstill has set it to zero.
     pub withheld: Option<AngularRate>,
     /// The validity of the sample's reading.
@@ -383,6 +385,7 @@ fn emit(
         correction: code(i64::from(entry.rate().0) - i64::from(rate.0)),
         covered: entry.count > 0,
         roll_and_pitch: [roll, pitch],
+        estimate: AngularRate(entry.estimate),
         withheld: None,
         validity: entry.validity,
     }

@@ -9,7 +9,7 @@
 //! | saturated | the part reports it | [`Status::Clipped`], no window, no initialisation | [`HOLD`] samples later |
 //! | stuck | [`STUCK_AFTER`] samples equal to the one before in gyro, accelerometer or one axis; [`AXIS_STUCK_AFTER`] where an axis often repeats itself | [`Status::Stuck`], no window, no initialisation | a sample that differs |
 //! | clock off | the sensor's clock departs from the outside one by more than [`ClockRatioConfig::limit_ppm`] | fault bit `IMPLAUSIBLE`; the yaw is summed by the sensor's clock | the departure is within the limit again |
-//! | implausible | a reading is further from the last one than a vehicle moves in 10 ms ([`JUMP_RATE`], [`JUMP_FORCE`]) | as saturated, fault bit `IMPLAUSIBLE` | a reading near the last good one, or [`JUMP_PATIENCE`] samples later |
+//! | implausible | a reading is further from the last one than this axis moves in 10 ms ([`JUMP_RATE`], [`JUMP_FORCE`], [`USUAL`]) | as saturated, fault bit `IMPLAUSIBLE` | a reading near the last good one, or [`JUMP_PATIENCE`] samples later |
 //!
 //! [`Status::Silent`]: crate::health::Status::Silent
 //! [`Status::Clipped`]: crate::health::Status::Clipped
@@ -17,7 +17,7 @@
 
 mod readings;
 
-pub use readings::{AXIS_STUCK_AFTER, JUMP_FORCE, JUMP_PATIENCE, JUMP_RATE, STUCK_AFTER};
+pub use readings::{AXIS_STUCK_AFTER, JUMP_FORCE, JUMP_PATIENCE, JUMP_RATE, STUCK_AFTER, USUAL};
 
 use crate::align::clock_ratio::{ClockRatio, ClockRatioConfig, RatioEstimator};
 use crate::health::{MonitorCounters, count};

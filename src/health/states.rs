@@ -105,7 +105,8 @@ pub const STATES: [State; 12] = [
     state(
         Status::Clipped,
         "fault: wrong",
-        "a reading changes by more in 10 ms than a vehicle can (1 rad/s, 30 m/s^2)",
+        "a reading changes in 10 ms by more than 12 times what this axis is used to (RMS of 0.6 s), and by more than \
+         0.3 rad/s in yaw, 1 rad/s in roll and pitch, 30 m/s^2",
         "none; IMPLAUSIBLE",
         "a reading near the last good one, or the fourth such reading in a row",
         "`wrong`",

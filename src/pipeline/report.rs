@@ -109,12 +109,15 @@ impl Pipeline {
     fn turning(&self, frame: &Frame, rates: &Rates, status: Status) -> Turning {
         let (rate, bias) = (rates.delayed.as_ref(), self.bias_sigma(rates.early_sigma));
         let origin = origin(status, rate);
-        let Some(Compensated { rate, roll_and_pitch: [roll, pitch], withheld, .. }) = rate else {
-            let (rates, withheld) = (frame.sample.angular_rate, AngularRate::ZERO);
-            return Turning { rates, withheld, origin, bias };
+        let Some(Compensated { rate, roll_and_pitch: [roll, pitch], estimate, withheld, .. }) = rate else {
+            let (rates, none) = (frame.sample.angular_rate, AngularRate::ZERO);
+            return Turning { rates, estimate: none, withheld: none, origin, bias };
         };
-        let withheld = withheld.unwrap_or(AngularRate::ZERO);
-        Turning { rates: [*roll, *pitch, *rate], withheld, origin, bias }
+        let rates = [*roll, *pitch, *rate];
+        match *withheld {
+            Some(withheld) => Turning { rates, estimate: AngularRate::ZERO, withheld, origin, bias },
+            None => Turning { rates, estimate: *estimate, withheld: AngularRate::ZERO, origin, bias },
+        }
     }
 
     /// Builds the estimate of one rate, without its yaw and with the fault of its own sample alone. Until a rate exists

@@ -11,6 +11,7 @@
 //! | rate that standstill has set to zero | its mean | adds linearly |
 //! | gain | a share of the yaw rate | of the net turn |
 //! | mounting | a share of the roll and pitch rates | of their net turns |
+//! | unit that the network was not trained with | a share of its mean correction | of its net correction |
 //! | gap in the accumulated yaw | | the angle that may be missing ([`crate::estimate`]) |
 
 use crate::sample::RATE_HZ;
@@ -37,6 +38,8 @@ pub struct GyroErrors {
     pub gain: f32,
     /// Share of the roll and pitch rates, rad.
     pub mounting: f32,
+    /// Share of the network's mean correction: what it learnt of its own unit is wrong on another.
+    pub model: f32,
 }
 
 impl UncertaintyConfig {
@@ -46,8 +49,8 @@ impl UncertaintyConfig {
     pub const DEFAULT: Self = Self {
         per_scale: 0.25,
         uncorrected: 2.5e-4,
-        unknown: GyroErrors { gain: 0.003, mounting: 0.03 },
-        known: GyroErrors { gain: 0.0015, mounting: 0.01 },
+        unknown: GyroErrors { gain: 0.003, mounting: 0.03, model: 0.5 },
+        known: GyroErrors { gain: 0.0015, mounting: 0.01, model: 0.0 },
     };
 }
 
@@ -78,6 +81,8 @@ pub enum Origin {
 pub struct Turning {
     /// The rates about x, y and z.
     pub rates: [AngularRate; 3],
+    /// The network's correction of the rate about z.
+    pub estimate: AngularRate,
     /// The rate that standstill has set to zero.
     pub withheld: AngularRate,
     /// How the rate about z was found.
@@ -86,8 +91,10 @@ pub struct Turning {
     pub bias: f32,
 }
 
-/// Sums over some time: the turns about x, y and z and the turn that standstill has set to zero, rad.
-type Turns = [f32; 4];
+/// Sums over some time, rad: the turns about x, y and z, the network's correction, and the turn that standstill has set
+/// to zero.
+type Turns = [f32; TURNS];
+const TURNS: usize = 5;
 
 /// A part of the minute.
 #[derive(Debug, Clone, Copy)]
@@ -99,7 +106,7 @@ struct Part {
 }
 
 impl Part {
-    const EMPTY: Self = Self { turns: [0.0; 4], linear: 0.0, square: 0.0 };
+    const EMPTY: Self = Self { turns: [0.0; TURNS], linear: 0.0, square: 0.0 };
 }
 
 /// Tracks the expected error of the corrected rate.
@@ -127,9 +134,9 @@ impl Uncertainty {
             config,
             errors: config.unknown,
             scale_square: None,
-            blocks: [[0.0; 4]; BLOCKS],
+            blocks: [[0.0; TURNS]; BLOCKS],
             samples: 0,
-            rates: [0.0; 4],
+            rates: [0.0; TURNS],
             parts: [Part::EMPTY; PARTS + 1],
             in_part: 0,
         }
@@ -152,7 +159,7 @@ impl Uncertainty {
     pub fn add(&mut self, turning: &Turning) {
         const STEP: f32 = 1.0 / RATE_HZ as f32;
         let [x, y, z] = turning.rates;
-        let turns = [x, y, z, turning.withheld].map(|rate| rad_per_sec(rate) * STEP);
+        let turns = [x, y, z, turning.estimate, turning.withheld].map(|rate| rad_per_sec(rate) * STEP);
         let sum = |to: &mut Turns| to.iter_mut().zip(turns).for_each(|(to, turn)| *to += turn);
         sum(&mut self.blocks[0]);
         self.samples += 1;
@@ -160,7 +167,7 @@ impl Uncertainty {
             self.end_block();
         }
         let (own, bias) = (self.own(turning.origin), turning.bias);
-        let [_, _, _, withheld] = self.rates;
+        let [.., withheld] = self.rates;
         let [part, ..] = &mut self.parts;
         sum(&mut part.turns);
         part.linear += sqrt(bias * bias + withheld * withheld) * STEP;
@@ -184,11 +191,10 @@ impl Uncertainty {
         };
         let [second, end] = [BLOCKS, QUICK]
             .map(|blocks| over(&self.blocks[..blocks], blocks as f32 * BLOCK as f32 / RATE_HZ as f32));
-        let [x, y, z, withheld] = second;
-        let [_, _, z_at_end, _] = end;
-        self.rates = [x, y, libm::fabsf(z).max(libm::fabsf(z_at_end)), withheld];
+        self.rates = second;
+        self.rates[2] = libm::fabsf(second[2]).max(libm::fabsf(end[2]));
         self.blocks.rotate_right(1);
-        (self.blocks[0], self.samples) = ([0.0; 4], 0);
+        (self.blocks[0], self.samples) = ([0.0; TURNS], 0);
     }
 
     /// The variance of a second's own error, (rad/s)^2.
@@ -201,17 +207,17 @@ impl Uncertainty {
         }
     }
 
-    /// The variance of what grows with turns about x, y and z, rad or rad/s.
-    fn growing(&self, [x, y, z]: [f32; 3]) -> f32 {
-        let GyroErrors { gain, mounting } = self.errors;
-        gain * gain * z * z + mounting * mounting * (x * x + y * y)
+    /// The variance of what grows with these turns, rad^2, or rates.
+    fn growing(&self, [x, y, z, estimate, _]: Turns) -> f32 {
+        let GyroErrors { gain, mounting, model } = self.errors;
+        gain * gain * z * z + mounting * mounting * (x * x + y * y) + model * model * estimate * estimate
     }
 
     /// Returns the sigma of a rate, rounded up, from the `bias` sigma in rad/s.
     #[must_use]
     pub fn sigma(&self, origin: Origin, bias: f32) -> AngularRate {
-        let [x, y, z, withheld] = self.rates;
-        let sigma = sqrt(self.own(origin) + bias * bias + withheld * withheld + self.growing([x, y, z]));
+        let [.., withheld] = self.rates;
+        let sigma = sqrt(self.own(origin) + bias * bias + withheld * withheld + self.growing(self.rates));
         // Beyond the code's range the cast saturates.
         AngularRate(libm::ceilf(sigma * AngularRate::PER_RAD_PER_SEC) as i32)
     }
@@ -220,7 +226,7 @@ impl Uncertainty {
     /// may hide, rad^2.
     #[must_use]
     pub fn minute(&self, missing: f32) -> f32 {
-        let (mut turns, mut linear, mut square) = ([0.0; 3], 0.0, missing);
+        let (mut turns, mut linear, mut square) = ([0.0; TURNS], 0.0, missing);
         for part in &self.parts {
             turns.iter_mut().zip(part.turns).for_each(|(sum, turn)| *sum += turn);
             linear += part.linear;

@@ -4,6 +4,7 @@
 
 pub mod ablation;
 pub mod cost;
+pub mod expected_error;
 pub mod fir;
 pub mod heading_error;
 pub mod methods;

@@ -3,19 +3,25 @@
 
 use gyronet::coprocessor::{Config, Coprocessor, Observation};
 use gyronet::health::{Faults, Quality, Status};
+use gyronet::monitor::SensorMonitor;
 use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::units::{AngularRate, Micros, SpecificForce};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::synthetic::idling;
+use gyronet_host_tests::{parallel, recordings};
+use gyronet_tools::drive::recording::Reader;
+use std::fs::File;
 
-/// 1 rad/s in codes of 2^-27 rad/s.
-const RATE_LIMIT: i32 = 134_217_728;
+/// 1 and 0.3 rad/s in codes of 2^-27 rad/s: about x and y, and about z.
+const TILT_LIMIT: i32 = 134_217_728;
+const RATE_LIMIT: i32 = 40_265_318;
 /// 30 m/s^2 in codes of 2^-20 m/s^2.
 const FORCE_LIMIT: i32 = 31_457_280;
 
 /// A vehicle that stands with its engine running, past static initialisation.
 struct Drive {
     coprocessor: Coprocessor,
+    noise: Noise,
     tick: u64,
     last: ImuSample,
 }
@@ -29,7 +35,7 @@ impl Drive {
             coprocessor.imu(last, Micros(last.time.0), &mut ()).expect("in time");
         }
         assert_eq!(coprocessor.monitor_counters().wrong, 0, "no reading of an idling engine is doubted");
-        Self { coprocessor, tick: 399, last }
+        Self { coprocessor, noise, tick: 399, last }
     }
 
     /// The next sample: the last one that was believed, with one axis off by some codes.
@@ -40,6 +46,12 @@ impl Drive {
             _ => sample.specific_force[axis - 3].0 += codes,
         }
         self.send(sample)
+    }
+
+    /// The next sample of the idling engine, with one axis off by some codes.
+    fn shaken(&mut self, axis: usize, codes: i32) -> Observation {
+        self.last = idling(self.tick + 1, 0.001, &mut self.noise);
+        self.off_by(axis, codes)
     }
 
     fn send(&mut self, sample: ImuSample) -> Observation {
@@ -68,16 +80,18 @@ fn assert_believed(output: &Observation, why: &str) {
 }
 
 #[test]
-fn a_step_of_the_limit_is_believed_and_one_code_more_is_not() {
-    for axis in 0..6 {
-        let limit = if axis < 3 { RATE_LIMIT } else { FORCE_LIMIT };
+fn a_step_of_the_limit_is_believed_and_a_thousandth_more_is_not() {
+    for (axis, limit) in
+        [TILT_LIMIT, TILT_LIMIT, RATE_LIMIT, FORCE_LIMIT, FORCE_LIMIT, FORCE_LIMIT].into_iter().enumerate()
+    {
+        let limit = limit - limit / 2_000;
         for sign in [1, -1] {
             let why = format!("axis {axis}, sign {sign}");
             let mut drive = Drive::new();
             assert_believed(&drive.off_by(axis, sign * limit), &why);
             assert_eq!(drive.coprocessor.monitor_counters().wrong, 0, "{why}");
             let mut drive = Drive::new();
-            assert_refused(&drive.off_by(axis, sign * (limit + 1)), &why);
+            assert_refused(&drive.off_by(axis, sign * (limit + limit / 1_000)), &why);
             assert_eq!(drive.coprocessor.monitor_counters().wrong, 1, "{why}");
         }
     }
@@ -89,13 +103,13 @@ fn the_fourth_reading_in_a_row_is_believed_wherever_it_is() {
         let limit = if axis < 3 { RATE_LIMIT } else { FORCE_LIMIT };
         let mut drive = Drive::new();
         for number in 1..=3 {
-            assert_refused(&drive.off_by(axis, limit + 100 * number), &format!("reading {number}"));
+            assert_refused(&drive.off_by(axis, limit + 100_000 * number), &format!("reading {number}"));
         }
-        assert_believed(&drive.off_by(axis, limit + 400), "reading 4");
+        assert_believed(&drive.off_by(axis, limit + 400_000), "reading 4");
         assert_eq!(drive.coprocessor.monitor_counters().wrong, 3);
-        // Others are held against this one from there on.
-        assert_refused(&drive.off_by(axis, 399), "a limit and a code away");
-        assert_believed(&drive.off_by(axis, 400), "a limit away");
+        // Others are held against this one from there on, with a limit half as high again by this step.
+        assert_refused(&drive.off_by(axis, -limit), "two limits away");
+        assert_believed(&drive.off_by(axis, 0), "a limit away");
         assert_eq!(drive.coprocessor.monitor_counters().wrong, 4);
     }
 }
@@ -115,9 +129,9 @@ fn a_reading_near_the_last_good_one_ends_it() {
 fn a_refused_reading_is_not_what_the_next_one_is_held_against() {
     let mut drive = Drive::new();
     assert_refused(&drive.off_by(2, 2 * RATE_LIMIT), "two limits off");
-    // One limit from the refused one, two from the last that was believed.
-    assert_refused(&drive.off_by(2, 2 * RATE_LIMIT + 1), "two limits and a code off");
-    assert_believed(&drive.off_by(2, RATE_LIMIT), "one limit off");
+    // One limit from the refused one, three from the last that was believed.
+    assert_refused(&drive.off_by(2, 3 * RATE_LIMIT), "three limits off");
+    assert_believed(&drive.off_by(2, RATE_LIMIT - 100), "one limit off");
 }
 
 /// The last reading says nothing of the next one after 50 ms without a sample.
@@ -135,7 +149,57 @@ fn across_a_gap_any_reading_is_believed() {
 
 /// The limits in physical units, by the types' own conversion.
 #[test]
-fn the_limits_are_1_rad_per_s_and_30_m_per_s2() {
-    assert_eq!(AngularRate::from_rad_per_sec(1.0), Ok(AngularRate(RATE_LIMIT)));
+fn the_limits_are_1_and_0_3_rad_per_s_and_30_m_per_s2() {
+    assert_eq!(AngularRate::from_rad_per_sec(1.0), Ok(AngularRate(TILT_LIMIT)));
+    assert!((AngularRate(RATE_LIMIT).rad_per_sec() - 0.3).abs() < 1e-8);
     assert_eq!(SpecificForce::from_metre_per_sec2(30.0), Ok(SpecificForce(FORCE_LIMIT)));
+}
+
+/// A sensor that shakes ever harder, with steps of up to 3 rad/s and 90 m/s^2, is believed; an axis beside it keeps
+/// its limit, and the shaken one has its own back when it is calm again.
+#[test]
+fn a_limit_follows_the_steps_of_its_axis() {
+    for (axis, limit) in [(1, TILT_LIMIT), (2, RATE_LIMIT), (5, FORCE_LIMIT)] {
+        let mut drive = Drive::new();
+        for k in 0..200 {
+            let size = 3 * (limit / 200 * k) / 2;
+            drive.shaken(axis, if k % 2 == 0 { size } else { -size });
+        }
+        assert_eq!(drive.coprocessor.monitor_counters().wrong, 0, "axis {axis}");
+        let (beside, far) = if axis == 2 { (5, 2 * FORCE_LIMIT) } else { (2, 2 * RATE_LIMIT) };
+        let mut jump = |axis: usize, by: i32| {
+            drive.shaken(axis, 0);
+            drive.shaken(axis, by).vehicle.live.status == Status::Clipped
+        };
+        assert!(!jump(axis, 3 * limit), "axis {axis} shakes");
+        assert!(jump(beside, far), "axis {beside} does not");
+        for _ in 0..600 {
+            drive.shaken(axis, 0);
+        }
+        assert_refused(&drive.shaken(axis, 2 * limit), "calm again");
+    }
+}
+
+/// No reading of any recording is doubted.
+#[test]
+fn nothing_that_was_recorded_is_implausible() {
+    let Some(_) = recordings::trial("nothing_that_was_recorded_is_implausible", 9) else { return };
+    let folders = ["wid_car", "car_mti710", "rc_car", "real_car", "truck", "utv"]
+        .map(|set| recordings::folder().join(set));
+    let files = folders.iter().flat_map(|folder| std::fs::read_dir(folder).expect("a set"));
+    let files = files
+        .map(|file| file.expect("a file").path())
+        .filter(|path| path.extension().is_some_and(|e| e == "csv"));
+    let files: Vec<_> = files.collect();
+    assert!(files.len() > 40, "{}", files.len());
+    let doubted = parallel::map(&files, |path| {
+        let (reader, mut monitor) =
+            (Reader::new("", File::open(path).expect("it is there")), SensorMonitor::new(None));
+        for row in reader.expect("a drive") {
+            monitor.judge(&row.expect("a row").sample);
+        }
+        monitor.counters().wrong
+    });
+    let doubted: Vec<_> = files.iter().zip(doubted).filter(|(_, wrong)| *wrong > 0).collect();
+    assert!(doubted.is_empty(), "{doubted:?}");
 }

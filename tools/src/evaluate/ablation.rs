@@ -10,7 +10,6 @@ use gyronet::compensate::{CompensateConfig, Lag, Mode};
 use gyronet::model::WindowNetwork;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::Standstill;
-use gyronet::units::AngularRate;
 use serde::Serialize;
 
 /// A configuration to compare.
@@ -75,10 +74,6 @@ pub struct Score {
     pub error: YawError,
     /// RMS error of a sample, rad/s.
     pub rms_rad_per_s: f64,
-    /// Shares of the 1 s errors within one, two and three sigma.
-    pub inside_sigma: [f64; 3],
-    /// Mean sigma of a second, rad.
-    pub sigma_rad: f64,
 }
 
 /// The error of the reference itself in whole seconds in which the wheels stand. Smaller errors cannot be measured.
@@ -126,8 +121,6 @@ pub fn mean(drives: &[Vec<Score>]) -> Option<Vec<Score>> {
             name: first[k].name.clone(),
             error: YawError::mean(&scores.iter().map(|score| score.error).collect::<Vec<_>>())?,
             rms_rad_per_s: mean(&|score| score.rms_rad_per_s),
-            inside_sigma: std::array::from_fn(|n| mean(&|score| score.inside_sigma[n])),
-            sigma_rad: mean(&|score| score.sigma_rad),
         })
     };
     (0..first.len()).map(of).collect()
@@ -168,12 +161,6 @@ struct Sums {
     yaw: YawSums,
     squares: f64,
     samples: usize,
-    /// The error and the sigma of the second in progress.
-    error: f64,
-    sigma: f64,
-    inside: [f64; 3],
-    sigmas: f64,
-    seconds: f64,
 }
 
 impl Sums {
@@ -186,18 +173,7 @@ impl Sums {
         let rate = sent.rate.rad_per_sec();
         self.yaw.add(rate, truth);
         self.squares += (rate - truth) * (rate - truth);
-        self.error += rate - truth;
-        self.sigma += sent.sigma.map_or(0.0, AngularRate::rad_per_sec);
         self.samples += 1;
-        if self.samples.is_multiple_of(WINDOW) {
-            let [error, sigma] =
-                [&mut self.error, &mut self.sigma].map(|sum| std::mem::take(sum) / WINDOW as f64);
-            for (n, inside) in (1..).zip(&mut self.inside) {
-                *inside += f64::from(u8::from(error.abs() <= f64::from(n) * sigma));
-            }
-            self.sigmas += sigma;
-            self.seconds += 1.0;
-        }
     }
 
     fn score(&self, name: &str) -> Option<Score> {
@@ -206,8 +182,6 @@ impl Sums {
             name: name.to_owned(),
             error,
             rms_rad_per_s: (self.squares / self.samples as f64).sqrt(),
-            inside_sigma: self.inside.map(|count| count / self.seconds),
-            sigma_rad: self.sigmas / self.seconds,
         })
     }
 }

@@ -4,6 +4,7 @@ use crate::drive::DT;
 use crate::drive::replay::ReplayError;
 use crate::drive::stream::Drive;
 use crate::evaluate::cost::Cost;
+use crate::evaluate::expected_error::ExpectedError;
 use crate::evaluate::heading_error::{AgainstCourse, AgainstRate, Errors, HeadingError, PLAUSIBLE_10S_RAD};
 use crate::evaluate::methods::{Method, PerMethod};
 use crate::evaluate::rates::{self, Networks, Sample};
@@ -166,6 +167,8 @@ pub struct DriveErrors {
     pub simulated_rest: bool,
     /// Our rates compared with the best classical method.
     pub over_best_classical: Option<Comparisons>,
+    /// Seconds inside one expected error; `None` against a course.
+    pub expected_error: Option<ExpectedError>,
     pub methods: PerMethod<Row>,
 }
 
@@ -182,7 +185,7 @@ impl DriveErrors {
             visit(sample);
         })?;
         let path = || drive.path.clone();
-        let Judges { samples, without_rate, has_course, methods } = judges;
+        let Judges { samples, without_rate, has_course, methods, expected_error } = judges;
         let seconds = samples as f64 * DT;
         let (reference, judged): (_, [Option<Errors>; _]) = match without_rate {
             None => ("ref_gyr_z", methods.each_ref().map(|method| method.rate.errors())),
@@ -217,6 +220,7 @@ impl DriveErrors {
             wheels: drive.facts.has_wheels(),
             simulated_rest: comparison.simulated_rest,
             over_best_classical: Comparisons::new(&methods),
+            expected_error: (reference == "ref_gyr_z").then_some(expected_error),
             methods,
         })
     }
@@ -231,6 +235,7 @@ struct Judges {
     without_rate: Option<u64>,
     has_course: bool,
     methods: [Judge; Method::ON_A_DRIVE.len()],
+    expected_error: ExpectedError,
 }
 
 /// The errors of one method in progress, against either reference.
@@ -253,6 +258,9 @@ impl Judges {
             self.without_rate = self.without_rate.or(Some(row.line));
         }
         self.has_course |= row.course.is_some();
+        if let Some((sent, truth)) = sample.step.delayed.zip(row.reference) {
+            self.expected_error.add(&sent, truth);
+        }
         for (judge, rate) in self.methods.iter_mut().zip(sample.rates.values()) {
             let Some(rate) = *rate else { continue };
             judge.yaw += rate * DT;
@@ -333,6 +341,9 @@ impl fmt::Display for Report {
                 write!(f, "; starts in motion: 3 s at rest are simulated, with the best constant bias")?;
             }
             writeln!(f)?;
+            if let Some(expected_error) = drive.expected_error {
+                writeln!(f, "  {expected_error}")?;
+            }
             table(f, drive.over_best_classical, &drive.methods)?;
         }
         for Mean { set, drives, over_best_classical, methods } in &self.sets {
@@ -404,6 +415,7 @@ mod tests {
             wheels: false,
             simulated_rest: reference == "ref_yaw",
             over_best_classical: Comparisons::new(&methods),
+            expected_error: None,
             methods,
         }
     }
