@@ -2,18 +2,61 @@
 //!
 //! `static_init` takes the mean of the first three seconds. `zero_rate` continues whenever the vehicle stands: it
 //! estimates the rate that remains after the network, so that the loop is closed around gyro and network together.
-//! The wheels show that the vehicle stands. Without wheel speeds, `quiet` checks the inertial sensors, within limits
-//! that are tighter than those of the start. `curve` stores the bias by temperature that standstills have shown.
-//! `earth` keeps the rotation of the Earth from being subtracted twice.
+//! [`crate::standstill`] judges whether the vehicle stands. `curve` stores the bias by temperature that standstills
+//! have shown. `earth` keeps the rotation of the Earth from being subtracted twice.
 
 mod curve;
 pub(crate) mod earth;
-mod quiet;
 mod static_init;
 mod zero_rate;
 
 pub use curve::{BiasCurve, CurveBias, CurveFilter};
 pub use earth::{EarthRate, Latitude};
-pub use quiet::{QuietConfig, QuietDetector};
 pub use static_init::{Rest, STATIC_SAMPLES, StaticConfig, StaticError, StaticInit};
-pub use zero_rate::{StandstillSource, ZeroRate, ZeroRateConfig, ZeroRateOutcome};
+pub use zero_rate::{ZeroRate, ZeroRateConfig, ZeroRateOutcome};
+
+use crate::sqrt::sqrt;
+
+/// The exact sum and the squared deviations of readings (Welford's method: B. P. Welford, Technometrics 4, 1962).
+#[derive(Debug, Clone, Copy, Default)]
+struct Spread {
+    count: u32,
+    sum: i64,
+    mean: f32,
+    squares: f32,
+}
+
+impl Spread {
+    /// The state without a reading.
+    pub const EMPTY: Self = Self { count: 0, sum: 0, mean: 0.0, squares: 0.0 };
+
+    /// Adds a reading, as code and as value.
+    pub fn add(&mut self, code: i32, value: f32) {
+        self.count += 1;
+        self.sum += i64::from(code);
+        let delta = value - self.mean;
+        self.mean += delta / self.count as f32;
+        self.squares += delta * (value - self.mean);
+    }
+
+    /// Returns the number of readings.
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// Returns the mean of the codes, rounded to nearest; zero without readings.
+    pub fn mean_code(&self) -> i32 {
+        let count = i64::from(self.count.max(1));
+        (self.sum + count / 2).div_euclid(count) as i32
+    }
+
+    /// Returns the variance of the values.
+    pub fn variance(&self) -> f32 {
+        self.squares / self.count.max(1) as f32
+    }
+
+    /// Returns the standard deviation of the values.
+    pub fn std(&self) -> f32 {
+        sqrt(self.variance())
+    }
+}

@@ -1,10 +1,11 @@
 //! The parts of a [`Config`](crate::Config), in one place: each stage owns the type that configures it.
 
 pub use crate::align::clock_ratio::ClockRatioConfig;
-pub use crate::bias::{EarthRate, Latitude, QuietConfig, StaticConfig, ZeroRateConfig};
+pub use crate::bias::{EarthRate, Latitude, StaticConfig, ZeroRateConfig};
 pub use crate::compensate::{CompensateConfig, Lag, Mode, Stride};
 pub use crate::coprocessor::StorageFaults;
 pub use crate::fog::{FogConfig, FogErrors, FogNetUse, Tilt};
 pub use crate::model::seconds::Padding;
 pub use crate::mounting::{Levelling, Rotation};
 pub use crate::pipeline::{PipelineConfig, UncertaintyConfig};
+pub use crate::standstill::StandstillConfig;

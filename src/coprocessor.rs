@@ -47,6 +47,7 @@ use crate::model::seconds::SecondsWindow;
 use crate::monitor::SensorMonitor;
 use crate::pipeline::{BoardState, Handover, Pipeline};
 use crate::sample::{FogSample, Frame, ImuSample, NO_STAMP, WheelSample};
+use crate::standstill::Standing;
 use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use clock::Timeline;
 use second_source::{Doubts, SecondSource, Shown};
@@ -60,6 +61,8 @@ pub struct Observation {
     pub vehicle: VehicleSample,
     /// The newest report of the wheels.
     pub wheels: WheelSample,
+    /// Whether the vehicle stands.
+    pub standing: Standing,
     /// The sample whose estimate is final with this one.
     pub complete: Option<Complete>,
     /// The reason why static initialisation was refused with this sample.
@@ -201,10 +204,16 @@ impl Coprocessor {
             lateral: lateral.0 as f32 / SpecificForce::PER_METRE_PER_SEC2,
             wheels: wheels.as_ref().and_then(second_source::axle),
         });
-        let (complete, refused) = (output.complete, output.refused);
+        let (standing, complete, refused) = (output.standing, output.complete, output.refused);
         let wheels = wheels.unwrap_or_default();
-        let observation =
-            Observation { sample: Some(sample), vehicle: output.vehicle, wheels, complete, refused };
+        let observation = Observation {
+            sample: Some(sample),
+            vehicle: output.vehicle,
+            wheels,
+            standing,
+            complete,
+            refused,
+        };
         sink.observed(&observation);
         observation
     }
@@ -283,7 +292,9 @@ impl Coprocessor {
             let vehicle = self.pipeline.silent(steps, &self.board_state());
             self.send(&vehicle, self.monitor.time_at(now), sink);
             let wheels = self.poll_wheels().unwrap_or_default();
-            let observation = Observation { sample: None, vehicle, wheels, complete: None, refused: None };
+            let standing = Standing::UNKNOWN;
+            let observation =
+                Observation { sample: None, vehicle, wheels, standing, complete: None, refused: None };
             sink.observed(&observation);
             observation
         });

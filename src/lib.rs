@@ -139,6 +139,8 @@ pub mod nn;
 #[doc(hidden)]
 pub mod pipeline;
 mod sqrt;
+#[doc(hidden)]
+pub mod standstill;
 mod vector;
 
 pub use can::{DataFrame, queue::TransmitQueue};

@@ -24,13 +24,14 @@ pub(crate) use windows::Handover;
 
 use crate::align::clock_ratio::ClockRatio;
 use crate::align::{AlignError, Aligner, MAX_GAP};
-use crate::bias::{StandstillSource, StaticError, StaticInit, ZeroRate, ZeroRateOutcome};
+use crate::bias::{StaticError, StaticInit, ZeroRate, ZeroRateOutcome};
 use crate::compensate::{Compensated, Compensator, Complete, Implausible};
 use crate::estimate::{AccumulatedYaw, VehicleSample};
 use crate::health::{BoardFaults, Counters, Faults, count};
 use crate::model::Estimate;
 use crate::monitor::{AXIS_STUCK_AFTER, STUCK_AFTER};
 use crate::sample::{Frame, ImuSample, Standstill, Validity, WHEELS, WheelSample};
+use crate::standstill::{Judge, Standing};
 
 use crate::model::window::{self, Features, WINDOW};
 use crate::units::{AngularRate, Yaw};
@@ -62,6 +63,8 @@ pub struct Output {
     /// A window that is due: run it through the network and [`Pipeline::deliver`] the estimate before the sample
     /// [`crate::compensate::Mode::delay`] steps later.
     pub window: Option<DueWindow>,
+    /// Whether the vehicle stands; not likely where the gyro contradicts it.
+    pub standing: Standing,
     /// The reason why static initialisation failed with this sample and started again.
     pub refused: Option<StaticError>,
     /// The reason why the estimate due with this sample was rejected.
@@ -91,6 +94,8 @@ pub struct Pipeline {
 struct State {
     aligner: Aligner,
     sensor_bias: SensorBias,
+    standstill: Judge,
+    standing: Standing,
     static_init: StaticInit,
     initialised: Option<Initialised>,
     windows: Windows,
@@ -136,6 +141,8 @@ impl Pipeline {
         let state = State {
             aligner: Aligner::START,
             sensor_bias: SensorBias::START,
+            standstill: Judge::new(config.standstill),
+            standing: Standing::UNKNOWN,
             static_init: StaticInit::new(config.static_init),
             initialised: None,
             windows: Windows::START,
@@ -208,7 +215,6 @@ impl Pipeline {
             let seen = self.state.wheels_seen.iter_mut().zip(speeds);
             seen.for_each(|(seen, speed)| *seen |= speed.is_some());
         }
-        let standstill = wheels.map(|wheels| wheels.standstill);
         let mut sample = frame.sample;
         let initialised = self.state.initialised.is_some();
         if self.state.sensor_bias.subtract(&mut sample, &self.config, initialised) {
@@ -233,24 +239,26 @@ impl Pipeline {
         }
         self.state.stuck = stuck;
         let implausible = self.use_estimate(frame.tick);
-        let initialised = self.state.initialised.as_mut();
-        let quiet = initialised.is_some_and(|known| known.quiet.observe(&frame.sample));
+        let standing = self.state.standstill.observe(&frame.sample, wheels);
+        let moves = wheels.is_some_and(|wheels| wheels.standstill == Standstill::Moving);
         let (rates, refused) = match self.level(&mut frame.sample) {
             None => {
-                let refused = self.initialise(&frame, standstill == Some(Standstill::Moving));
+                let refused = self.initialise(&frame, standing, moves);
                 let early = self.state.sensor_bias.early(&sample);
                 if let Some((levelling, _)) = early {
                     frame.sample = levelling.sample(&frame.sample);
                 }
                 (Rates { early_sigma: early.map(|(_, sigma)| sigma), ..Rates::default() }, refused)
             }
-            Some(zero) => (self.estimate_rates(&frame, &zero, standstill, quiet), None),
+            Some(zero) => (self.estimate_rates(&frame, &zero, standing, moves), None),
         };
+        self.state.standing = self.judged(standing);
         let vehicle = self.report(&frame, &rates, wheels, board);
         let stride = self.config.compensate.mode.stride();
         let window = self.state.windows.due(frame.tick, stride);
         self.state.gap_within = self.state.gap_within.saturating_sub(1);
-        Output { vehicle, complete: rates.complete, window, refused, implausible }
+        let standing = self.state.standing;
+        Output { vehicle, complete: rates.complete, window, standing, refused, implausible }
     }
 
     /// Notes that the sensor was moved since earlier drives; it is reported with every message set from now on.
@@ -305,6 +313,15 @@ impl Pipeline {
         self.zero_rate().map_or(AngularRate::ZERO, ZeroRate::bias)
     }
 
+    /// The judgement of a standstill, with what the gyro says about it.
+    fn judged(&self, standing: Standing) -> Standing {
+        match self.zero_rate() {
+            Some(known) if known.contradicted() => Standing { is_contradicted: true, ..Standing::UNKNOWN },
+            Some(known) if known.is_refused() => Standing::UNKNOWN,
+            _ => standing,
+        }
+    }
+
     fn zero_rate(&self) -> Option<&ZeroRate> {
         self.state.initialised.as_ref()?.zero_rate.as_ref()
     }
@@ -341,7 +358,7 @@ impl Pipeline {
         self.state.gap_within = WINDOW as u32;
         self.break_window();
         if let Some(known) = &mut self.state.initialised {
-            known.quiet.restart();
+            self.state.standstill.restart();
             known.zero_rate.as_mut().map(ZeroRate::restart);
         }
     }
@@ -381,19 +398,12 @@ impl Pipeline {
     }
 
     #[inline(never)]
-    fn estimate_rates(
-        &mut self,
-        frame: &Frame,
-        zero: &ZeroPoint,
-        standstill: Option<Standstill>,
-        quiet: bool,
-    ) -> Rates {
+    fn estimate_rates(&mut self, frame: &Frame, zero: &ZeroPoint, standing: Standing, drives: bool) -> Rates {
         let sample = &frame.sample;
         let rates = zero.less(sample.angular_rate);
         let features = window::features(sample.specific_force, rates);
         let [.., rate] = rates;
         let good = sample.validity.is_good();
-        let drives = standstill == Some(Standstill::Moving);
         let mounting_mismatch = self.state.compensator.add(frame.tick, rates, sample.validity, drives);
         count(&mut self.state.counters.foreign_mountings, u32::from(mounting_mismatch));
         self.state.inertial = good.then_some(features);
@@ -401,14 +411,7 @@ impl Pipeline {
             self.state.windows.add(features);
         }
         let complete = self.state.compensator.complete();
-        let source = match standstill {
-            Some(Standstill::Still) => StandstillSource::Wheels,
-            // Where wheel speeds are available, they decide.
-            Some(_) => StandstillSource::None,
-            None if quiet => StandstillSource::Inertial,
-            None => StandstillSource::None,
-        };
-        self.update_bias(complete.as_ref(), good.then_some(rate), source);
+        self.update_bias(complete.as_ref(), good.then_some(rate), standing);
         let bias = self.bias();
         let stands = self.state.stood as usize > self.config.compensate.lag.samples();
         let live = self.state.compensator.live(bias);
@@ -416,16 +419,11 @@ impl Pipeline {
         Rates { live, delayed, complete, early_sigma: None }
     }
 
-    fn update_bias(
-        &mut self,
-        complete: Option<&Complete>,
-        rate: Option<AngularRate>,
-        source: StandstillSource,
-    ) {
+    fn update_bias(&mut self, complete: Option<&Complete>, rate: Option<AngularRate>, standing: Standing) {
         let State { initialised, compensator, stood, counters, sensor_bias, .. } = &mut self.state;
         let zero_rate = initialised.as_mut().and_then(|known| known.zero_rate.as_mut());
         let (Some(zero_rate), Some(complete)) = (zero_rate, complete) else { return };
-        match zero_rate.observe(complete.left(), source, sensor_bias.change_sigma()) {
+        match zero_rate.observe(complete.left(), standing, sensor_bias.change_sigma()) {
             Some(ZeroRateOutcome::Used) => {
                 count(&mut counters.zero_rate_updates, 1);
                 sensor_bias.refer();

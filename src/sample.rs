@@ -151,6 +151,12 @@ pub struct WheelSample {
 }
 
 impl WheelSample {
+    /// Returns whether a wheel has a speed.
+    #[must_use]
+    pub fn has_speed(&self) -> bool {
+        self.speeds.iter().any(Option::is_some)
+    }
+
     /// Creates a report without speeds.
     #[must_use]
     pub const fn without_speeds(standstill: Standstill) -> Self {

@@ -15,7 +15,6 @@ pub mod hardware;
 mod learner;
 pub mod message;
 #[doc(hidden)]
-pub mod standstill;
 mod text;
 
 pub use conditions::Conditions;

@@ -3,7 +3,8 @@
 use crate::noise::Noise;
 use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::health::{Quality, Source};
-use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ, Validity};
+use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ, Standstill, Validity};
+use gyronet::standstill::Standing;
 use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
 
 /// Returns a rate, rad/s, in fixed point.
@@ -40,6 +41,11 @@ pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {
         sample.specific_force[axis].0 += force(0.8 * shake(axis)).0;
     }
     sample
+}
+
+/// The judgement of a standstill by wheels that nothing contradicts.
+pub fn judged(wheels: Standstill) -> Standing {
+    if wheels == Standstill::Still { Standing::WHEELS } else { Standing::UNKNOWN }
 }
 
 pub fn estimate(rate: AngularRate, yaw: Yaw) -> YawEstimate {

@@ -3,16 +3,20 @@
 //! A vehicle with its engine running shakes but goes nowhere, so stillness is judged twice:
 //! the spread inside the three seconds must stay below what an engine does, and the means of
 //! its three single seconds must agree, which they do not when the vehicle turns, rolls or
-//! speeds up. A steady straight drive can still look like standing; where wheel speeds are
-//! known they decide.
+//! speeds up. Wheels that stand allow twice as much, for a vehicle that rocks when its engine starts. A steady straight
+//! drive or a slow turn (a ferry, a turntable) can still look like standing: later standstills heal that
+//! ([`super::zero_rate`]).
 
-use super::quiet::Spread;
+use super::Spread;
 use crate::mounting::LevelError;
 use crate::sample::{ImuSample, RATE_HZ};
+use crate::sqrt::sqrt;
 use crate::units::{AngularRate, SpecificForce};
 
 /// The number of samples of static initialisation: 3 s.
 pub const STATIC_SAMPLES: u32 = 3 * RATE_HZ;
+/// Samples in a mean of the yaw rate.
+const BATCH: u32 = 10;
 const SECONDS: usize = (STATIC_SAMPLES / RATE_HZ) as usize;
 
 /// Limits of stillness. The test `still_stretches` holds the defaults against eight real drives:
@@ -135,10 +139,8 @@ pub struct Rest {
     pub angular_rate: [AngularRate; 3],
     /// Mean specific force, which shows the vertical.
     pub specific_force: [SpecificForce; 3],
-    /// Standard deviation of each gyro axis, rad/s.
-    pub gyro_std: [f32; 3],
-    /// Standard deviation of each accelerometer axis, m/s^2.
-    pub accel_std: [f32; 3],
+    /// Sigma of the mean yaw rate, by the spread of means over 100 ms, rad/s: an engine averages out in them.
+    pub yaw_sigma: f32,
 }
 
 /// Collects the samples of a static initialisation.
@@ -147,6 +149,9 @@ pub struct StaticInit {
     config: StaticConfig,
     gyro: [Axis; 3],
     accel: [Axis; 3],
+    /// Means of the yaw rate over [`BATCH`] samples, and the sum of the current ones.
+    yaw: Spread,
+    yaw_sum: i64,
     /// Turning wheels have been refused, and no sample has been taken since.
     wheels_refused: bool,
 }
@@ -155,12 +160,20 @@ impl StaticInit {
     /// Creates a collection without samples.
     #[must_use]
     pub const fn new(config: StaticConfig) -> Self {
-        Self { config, gyro: [Axis::EMPTY; 3], accel: [Axis::EMPTY; 3], wheels_refused: false }
+        Self {
+            config,
+            gyro: [Axis::EMPTY; 3],
+            accel: [Axis::EMPTY; 3],
+            yaw: Spread::EMPTY,
+            yaw_sum: 0,
+            wheels_refused: false,
+        }
     }
 
-    /// Adds a sample. After [`STATIC_SAMPLES`] of them it returns the readings at rest, or the reason for refusing
+    /// Adds a sample; `by_wheels` is true where the wheels show that the vehicle stands. The last sample decides, because
+    /// they show it late. After [`STATIC_SAMPLES`] of them it returns the readings at rest, or the reason for refusing
     /// them, and restarts.
-    pub fn add(&mut self, sample: &ImuSample) -> Option<Result<Rest, StaticError>> {
+    pub fn add(&mut self, sample: &ImuSample, by_wheels: bool) -> Option<Result<Rest, StaticError>> {
         self.wheels_refused = false;
         for axis in 0..3 {
             let rate = sample.angular_rate[axis].0;
@@ -169,10 +182,15 @@ impl StaticInit {
             self.accel[axis].add(force, force as f32 / SpecificForce::PER_METRE_PER_SEC2);
         }
         let [first, ..] = &self.gyro;
+        self.yaw_sum += i64::from(sample.angular_rate[2].0);
+        if first.all.count().is_multiple_of(BATCH) {
+            let mean = core::mem::take(&mut self.yaw_sum) as f32 / BATCH as f32;
+            self.yaw.add(0, mean / AngularRate::PER_RAD_PER_SEC);
+        }
         if first.all.count() < STATIC_SAMPLES {
             return None;
         }
-        let result = self.judge();
+        let result = self.judge(by_wheels);
         self.restart();
         Some(result)
     }
@@ -191,10 +209,12 @@ impl StaticInit {
         for axis in self.gyro.iter_mut().chain(&mut self.accel) {
             *axis = Axis::default();
         }
+        (self.yaw, self.yaw_sum) = (Spread::EMPTY, 0);
         self.wheels_refused = false;
     }
 
-    fn judge(&self) -> Result<Rest, StaticError> {
+    fn judge(&self, by_wheels: bool) -> Result<Rest, StaticError> {
+        let tolerance = if by_wheels { 2.0 } else { 1.0 };
         for axis in 0..3u8 {
             let (gyro, accel) = (&self.gyro[usize::from(axis)], &self.accel[usize::from(axis)]);
             let std = gyro.all.std();
@@ -206,11 +226,11 @@ impl StaticInit {
                 return Err(StaticError::AccelNoise { axis, std });
             }
             let spread = gyro.drift(AngularRate::PER_RAD_PER_SEC);
-            if spread > self.config.gyro_drift {
+            if spread > tolerance * self.config.gyro_drift {
                 return Err(StaticError::GyroDrift { axis, spread });
             }
             let spread = accel.drift(SpecificForce::PER_METRE_PER_SEC2);
-            if spread > self.config.accel_drift {
+            if spread > tolerance * self.config.accel_drift {
                 return Err(StaticError::AccelDrift { axis, spread });
             }
             let mean = gyro.all.mean_code() as f32 / AngularRate::PER_RAD_PER_SEC;
@@ -221,8 +241,7 @@ impl StaticInit {
         Ok(Rest {
             angular_rate: self.gyro.each_ref().map(|axis| AngularRate(axis.all.mean_code())),
             specific_force: self.accel.each_ref().map(|axis| SpecificForce(axis.all.mean_code())),
-            gyro_std: self.gyro.each_ref().map(|axis| axis.all.std()),
-            accel_std: self.accel.each_ref().map(|axis| axis.all.std()),
+            yaw_sigma: sqrt(self.yaw.variance() / (self.yaw.count() - 1).max(1) as f32),
         })
     }
 }

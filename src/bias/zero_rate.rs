@@ -7,16 +7,23 @@
 //! - the **offset** s holds for one standstill only: an idling engine shakes the sensor differently from
 //!   a road, which shifts the mean of gyro and network. The shift differs from stop to stop and does not
 //!   average out during a stop: without this state, a minute at a traffic light would make the filter
-//!   too certain of a bias that does not hold on the road.
+//!   too certain of a bias that does not hold on the road. It is the wider the less probable the standstill is:
+//!   what is taken for one may be a smooth bend, so a doubtful standstill teaches little.
 //!
 //! The mean of a second is modelled as z = b + s + noise, with the noise taken from the spread of the ten means of
 //! [`BATCH`] samples in it: the spread of single samples would not show that an engine's vibration averages out
 //! faster than white noise, nor that a low-pass correction makes samples alike. A second counts only if the vehicle
 //! also stands in the next one, because wheel sensors show late that a car pulls away.
+//!
+//! A second is refused whose mean is off by more than four sigma of the filter: then either the vehicle turns (a ferry,
+//! a turntable, wheels that are locked or creep below their threshold) or the bias is wrong (initialised during such a
+//! turn). Until that is decided the difference is part of sigma. A stop that agrees with the bias withdraws the doubt;
+//! [`AGREEING_STOPS`] that contradict it and agree with each other replace the bias.
 
-use super::quiet::Spread;
+use super::Spread;
 use crate::sample::RATE_HZ;
 use crate::sqrt::sqrt;
+use crate::standstill::{Standing, StandstillSource};
 use crate::units::AngularRate;
 
 /// Describes the noise of part and vehicle. All values are 1 sigma.
@@ -30,9 +37,9 @@ pub struct ZeroRateConfig {
     pub standstill: f32,
     /// Least noise of a one-second mean, rad/s: a smaller spread is raised to it.
     pub noise: f32,
-    /// A second whose mean is off by more than this, and by more than ten sigma of the bias, is not a standstill,
-    /// whatever the wheels report, rad/s.
-    pub max_step: f32,
+    /// Yaw rate of a vehicle that is taken for a standing one, rad/s: a bend of 6 km at 110 km/h. The smoothest driven
+    /// seconds of the training drives turn by up to twice as much, RMS by half as much.
+    pub mistaken: f32,
     /// Largest bias, and largest uncertainty of it, rad/s.
     pub max_bias: f32,
 }
@@ -42,9 +49,9 @@ impl ZeroRateConfig {
     /// `config/kaist`); the noise is less than half of that part's 1.7e-4 rad/s/sqrt(Hz) over a second, so that a
     /// better part benefits. The offset is measured: between standing and driving the mean error of the corrected
     /// rate changes by 1.3e-4 rad/s RMS over the five training drives and the validation drive, 0.9e-4 on the latter
-    /// alone.
+    /// alone. Static initialisation may be off by 5 deg/s, so the bias may change by as much.
     pub const DEFAULT: Self =
-        Self { initial: 1e-4, walk: 1e-5, standstill: 1.4e-4, noise: 5e-5, max_step: 5e-3, max_bias: 0.02 };
+        Self { initial: 1e-4, walk: 1e-5, standstill: 1.4e-4, noise: 5e-5, mistaken: 5e-3, max_bias: 0.1 };
 }
 
 /// Samples in each of the means whose spread is taken.
@@ -53,18 +60,16 @@ const BATCH: u32 = 10;
 /// Low-order bits that are dropped when the turn at standstill is summed.
 const TURNED_SHIFT: u32 = AngularRate::FRACTION_BITS - 20;
 
-/// The evidence that the vehicle stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum StandstillSource {
-    /// There is no evidence.
-    #[default]
-    None,
-    /// All wheels stand. That is enough by itself: a gate on the gyro would exclude a true bias.
-    Wheels,
-    /// The inertial sensors are quiet. The mean must also be plausible for the bias.
-    Inertial,
-}
+/// Innovation of a second, over its sigma, above which the second is refused.
+const GATE: f32 = 4.0;
+/// Seconds over which the noise is averaged.
+const NOISE_SECONDS: f32 = 8.0;
+/// Turn of a vehicle that somebody boards in a part of a second, rad.
+const BOARDING: f32 = 1e-3;
+/// Refused seconds that make a stop contradict the bias.
+const REFUSED_SECONDS: u8 = 3;
+/// Stops that contradict the bias and agree with each other before they replace it.
+const AGREEING_STOPS: u8 = 3;
 
 /// Says how a whole second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,6 +90,15 @@ struct Measurement {
     variance: f32,
 }
 
+/// Seconds that contradict the bias: their mean in this stop, and that of earlier stops that agree with each other.
+#[derive(Debug, Clone, Copy, Default)]
+struct Doubt {
+    mean: f32,
+    seconds: u8,
+    earlier: f32,
+    stops: u8,
+}
+
 /// Covariance of bias and offset.
 #[derive(Debug, Clone, Copy)]
 struct Covariance {
@@ -100,12 +114,15 @@ pub struct ZeroRate {
     bias: f32,
     offset: f32,
     covariance: Covariance,
-    source: StandstillSource,
+    standing: Standing,
     /// The means of a second so far, and the sum and number of the samples of the next one.
     block: Spread,
     batch: (i64, u32),
     waiting: Option<Measurement>,
+    /// Mean variance of the seconds so far: that of a single one is small or large by chance.
+    noise: Option<f32>,
     refused: bool,
+    doubt: Doubt,
     /// Turn at standstill by the newest samples, 2^-20 rad/s x samples: in the current quarter of a second and in the
     /// four before it. Then the samples left in the current quarter.
     turned: [i32; 5],
@@ -127,11 +144,13 @@ impl ZeroRate {
             bias: 0.0,
             offset: 0.0,
             covariance,
-            source: StandstillSource::None,
+            standing: Standing::UNKNOWN,
             block: Spread::EMPTY,
             batch: (0, 0),
             waiting: None,
+            noise: None,
             refused: false,
+            doubt: Doubt::default(),
             turned: [0; 5],
             turning_for: 0,
             since_walk: 0,
@@ -140,13 +159,13 @@ impl ZeroRate {
     }
 
     /// Adds the remaining rate of a complete sample (gyro less static bias less the network's estimate; `None` where
-    /// that is not good). `source` is the evidence that the vehicle stands, and `thermal` the sigma of the change of
-    /// the bias with temperature since the last outcome [`ZeroRateOutcome::Used`], rad/s. Returns the outcome of a
-    /// second at standstill when one is complete.
+    /// that is not good). `standing` is the judgement of the standstill, and `thermal` the sigma of the change of the
+    /// bias with temperature since the last outcome [`ZeroRateOutcome::Used`], rad/s. Returns the outcome of a second
+    /// at standstill when one is complete.
     pub fn observe(
         &mut self,
         left: Option<AngularRate>,
-        source: StandstillSource,
+        standing: Standing,
         thermal: f32,
     ) -> Option<ZeroRateOutcome> {
         self.thermal = thermal;
@@ -155,10 +174,12 @@ impl ZeroRate {
             self.since_walk = 0;
             self.walk();
         }
-        if source != self.source {
-            self.stop_begins(source);
+        let is_other =
+            |before: Standing| before.source != standing.source || before.is_likely() != standing.is_likely();
+        if is_other(self.standing) {
+            self.stop_begins(standing);
         }
-        if source == StandstillSource::None {
+        if standing.source == StandstillSource::None {
             return None;
         }
         let Some(AngularRate(left)) = left else {
@@ -184,11 +205,11 @@ impl ZeroRate {
     /// Checks the newest sample's rate, less static bias, before it is complete. Returns true once when the rate
     /// contradicts the wheels.
     ///
-    /// A vehicle may slide with its wheels locked. The limit on the turn of a second at standstill therefore also
-    /// applies to parts of a second: when a sample exceeds it, that sample's delayed rate, which is zero at
-    /// standstill, has not been sent yet.
+    /// A vehicle may slide with its wheels locked. The limit on the mean of a second at standstill therefore also
+    /// applies to the turn in parts of a second: when a sample exceeds it, that sample's delayed rate, which is zero
+    /// at standstill, has not been sent yet.
     pub fn contradicts_wheels(&mut self, rate: AngularRate) -> bool {
-        if self.source != StandstillSource::Wheels {
+        if !self.standing.is_by_wheels() {
             self.turned = [0; 5];
             return false;
         }
@@ -202,7 +223,7 @@ impl ZeroRate {
         self.turning_for -= 1;
         let per_rad = (AngularRate::PER_RAD_PER_SEC / (1 << TURNED_SHIFT) as f32) * RATE_HZ as f32;
         let turned = self.turned.iter().sum::<i32>() as f32 / per_rad;
-        if libm::fabsf(turned) <= self.wheels_gate() {
+        if libm::fabsf(turned) <= self.turn_gate() {
             return false;
         }
         self.turned = [0; 5];
@@ -217,18 +238,25 @@ impl ZeroRate {
     /// Returns whether the wheels stand while the gyro shows a turn.
     #[must_use]
     pub fn contradicted(&self) -> bool {
-        self.source == StandstillSource::Wheels && self.refused
+        self.standing.is_by_wheels() && self.refused
     }
 
-    /// The evidence that the vehicle stands; none where the gyro contradicts it.
+    /// Returns whether the gyro contradicts that the vehicle stands.
     #[must_use]
-    pub fn evidence(&self) -> StandstillSource {
-        if self.refused { StandstillSource::None } else { self.source }
+    pub fn is_refused(&self) -> bool {
+        self.refused
     }
 
-    /// Returns the largest turn of a second at standstill, rad.
-    fn wheels_gate(&self) -> f32 {
-        self.config.max_step.max(10.0 * self.sigma())
+    /// Returns the largest turn of a part of a second at standstill, rad: as for a second, with the shake of a vehicle
+    /// that somebody boards.
+    fn turn_gate(&self) -> f32 {
+        GATE * sqrt(self.innovation_variance(BOARDING * BOARDING))
+    }
+
+    /// Returns the variance of the difference between the mean of a second, which has this variance, and the filter.
+    fn innovation_variance(&self, measured: f32) -> f32 {
+        let Covariance { both, offset, .. } = self.covariance;
+        (self.bias_variance() + 2.0 * both + offset + measured).max(measured)
     }
 
     /// Drops the current second, which a gap has cut short.
@@ -238,19 +266,27 @@ impl ZeroRate {
         self.waiting = None;
     }
 
-    /// Returns the bias to subtract; while the vehicle stands, it contains the offset of this standstill.
+    /// Returns the bias to subtract; while the wheels stand, it contains the offset of this standstill.
     #[must_use]
     pub fn bias(&self) -> AngularRate {
-        let stands = self.source != StandstillSource::None && !self.refused;
-        let bias = if stands { self.bias + self.offset } else { self.bias };
+        let bias = if self.stands() { self.bias + self.offset } else { self.bias };
         let bias = within(bias, 2.0 * self.config.max_bias);
         AngularRate(libm::roundf(bias * AngularRate::PER_RAD_PER_SEC) as i32)
     }
 
-    /// Returns the uncertainty of the bias when driving, 1 sigma, rad/s.
+    /// Returns the uncertainty of the bias when driving, 1 sigma, rad/s; with it the contradiction that is not decided.
     #[must_use]
     pub fn sigma(&self) -> f32 {
-        sqrt(self.bias_variance())
+        let Doubt { mean, seconds, earlier, stops } = self.doubt;
+        let off = |mean: f32, is_doubt: bool| if is_doubt { libm::fabsf(mean - self.bias) } else { 0.0 };
+        let off = off(mean, seconds >= REFUSED_SECONDS).max(off(earlier, stops > 0));
+        sqrt(self.bias_variance() + off * off).min(self.config.max_bias)
+    }
+
+    /// Returns whether standstills contradict the bias.
+    #[must_use]
+    pub fn is_doubted(&self) -> bool {
+        self.doubt.seconds >= REFUSED_SECONDS || self.doubt.stops > 0
     }
 
     /// Returns the variance of the bias when driving: that of the filter, and that of the change with temperature since
@@ -263,16 +299,39 @@ impl ZeroRate {
     /// Returns whether the wheels stand and the gyro does not contradict them.
     #[must_use]
     pub fn stands(&self) -> bool {
-        self.source == StandstillSource::Wheels && !self.refused
+        self.standing.is_by_wheels() && !self.refused
     }
 
-    fn stop_begins(&mut self, source: StandstillSource) {
-        self.source = source;
+    fn stop_begins(&mut self, standing: Standing) {
+        self.end_doubt();
+        self.standing = standing;
         self.refused = false;
         self.restart();
         self.offset = 0.0;
-        let offset = self.config.standstill * self.config.standstill;
+        let ZeroRateConfig { standstill, mistaken, .. } = self.config;
+        let offset = standstill * standstill + (1.0 - standing.probability) * mistaken * mistaken;
         self.covariance = Covariance { both: 0.0, offset, ..self.covariance };
+    }
+
+    /// Compares a stop that contradicted the bias with earlier ones, and replaces the bias once enough agree.
+    fn end_doubt(&mut self) {
+        let Doubt { mean, seconds, earlier, stops } = self.doubt;
+        self.doubt.seconds = 0;
+        if seconds < REFUSED_SECONDS {
+            return;
+        }
+        let ZeroRateConfig { standstill, noise, .. } = self.config;
+        // Each has an offset of its own.
+        let variance = standstill * standstill + noise * noise;
+        let agrees = stops > 0 && libm::fabsf(mean - earlier) <= GATE * sqrt(2.0 * variance);
+        let (stops, before) = if agrees { (stops + 1, earlier) } else { (1, mean) };
+        let mean = before + (mean - before) / f32::from(stops);
+        self.doubt = Doubt { earlier: mean, stops, ..Doubt::default() };
+        if stops >= AGREEING_STOPS {
+            self.bias = within(mean, self.config.max_bias);
+            self.covariance = Covariance { bias: variance, both: 0.0, offset: 0.0 };
+            self.doubt = Doubt::default();
+        }
     }
 
     /// Adds a second of the bias' random walk to its variance.
@@ -282,34 +341,49 @@ impl ZeroRate {
     }
 
     fn second(&mut self, block: &Spread) -> ZeroRateOutcome {
-        let noise = self.config.noise;
-        let measured = Measurement {
-            mean: block.mean_code() as f32 / AngularRate::PER_RAD_PER_SEC,
-            variance: (block.variance() / (block.count() - 1) as f32).max(noise * noise),
-        };
-        let step = measured.mean - self.bias - self.offset;
-        let Covariance { both, offset, .. } = self.covariance;
-        let bias = self.bias_variance();
-        let gate = match self.source {
-            StandstillSource::Wheels => self.wheels_gate(),
-            StandstillSource::Inertial => 3.0 * sqrt(bias + 2.0 * both + offset + measured.variance),
-            StandstillSource::None => 0.0,
-        };
-        if libm::fabsf(step) > gate {
-            self.waiting = None;
-            self.refused = true;
-            return ZeroRateOutcome::Refused;
+        let own = block.variance() / (block.count() - 1) as f32;
+        let before = self.noise.unwrap_or(own);
+        let usual = before + (own - before) / NOISE_SECONDS;
+        self.noise = Some(usual);
+        let least = self.config.noise * self.config.noise;
+        let mean = block.mean_code() as f32 / AngularRate::PER_RAD_PER_SEC;
+        let measured = Measurement { mean, variance: usual.max(least) };
+        self.refused = self.is_off(&measured);
+        let before = self.waiting.replace(measured);
+        match before {
+            Some(before) if !self.is_off(&before) => self.update(before),
+            Some(before) => self.contradict(before),
+            None => {}
         }
-        self.refused = false;
-        let Some(before) = self.waiting.replace(measured) else { return ZeroRateOutcome::Waits };
-        self.update(before);
-        ZeroRateOutcome::Used
+        match before {
+            _ if self.refused => ZeroRateOutcome::Refused,
+            Some(_) => ZeroRateOutcome::Used,
+            None => ZeroRateOutcome::Waits,
+        }
+    }
+
+    /// Returns whether a second is off by more than the filter's own sigma explains.
+    fn is_off(&self, measured: &Measurement) -> bool {
+        let step = measured.mean - self.bias - self.offset;
+        libm::fabsf(step) > GATE * sqrt(self.innovation_variance(measured.variance))
+    }
+
+    /// Notes a second at a probable standstill that contradicts the bias.
+    fn contradict(&mut self, measured: Measurement) {
+        if self.standing.is_likely() {
+            let Doubt { mean, seconds, .. } = &mut self.doubt;
+            *seconds = seconds.saturating_add(1);
+            *mean += (measured.mean - *mean) / f32::from(*seconds);
+        }
     }
 
     /// Applies the Kalman filter's measurement update.
     fn update(&mut self, measured: Measurement) {
         self.covariance.bias = self.bias_variance();
         self.thermal = 0.0;
+        if self.standing.is_likely() {
+            self.doubt = Doubt::default();
+        }
         let Covariance { bias, both, offset } = self.covariance;
         let (with_bias, with_offset) = (bias + both, both + offset);
         let innovation = measured.mean - self.bias - self.offset;

@@ -3,7 +3,7 @@
 /// The verdict about standstill.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Verdict {
-    /// Neither is shown, or the gyro contradicts the wheels.
+    /// Neither is shown, or the inertial sensor contradicts standing wheels.
     #[default]
     Unknown = 0,
     /// The vehicle stands.
@@ -20,7 +20,7 @@ pub enum Evidence {
     None = 0,
     /// The wheel speeds.
     Wheels = 1,
-    /// A quiet inertial sensor.
+    /// A quiet inertial sensor, since the start or after braking.
     Inertial = 2,
 }
 

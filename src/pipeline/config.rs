@@ -1,10 +1,11 @@
 //! The pipeline's configuration is a plain value, separate from the pipeline's state.
 
-use crate::bias::{BiasCurve, EarthRate, QuietConfig, StaticConfig, ZeroRateConfig};
+use crate::bias::{BiasCurve, EarthRate, StaticConfig, ZeroRateConfig};
 use crate::compensate::CompensateConfig;
 use crate::health::slow::Knowledge;
 use crate::mounting::{GyroMap, Levelling, Rotation};
 use crate::pipeline::UncertaintyConfig;
+use crate::standstill::StandstillConfig;
 use crate::units::SpecificForce;
 
 /// Holds all settings of the pipeline.
@@ -28,8 +29,8 @@ pub struct PipelineConfig {
     pub earth_rate: EarthRate,
     /// Zero-rate updates; `None` leaves the bias as static initialisation found it.
     pub zero_rate: Option<ZeroRateConfig>,
-    /// Limits by which standstill is recognised without wheels.
-    pub quiet: QuietConfig,
+    /// Limits by which the inertial sensor shows a standstill.
+    pub standstill: StandstillConfig,
     /// Settings of the compensation, which applies the estimates to the rates.
     pub compensate: CompensateConfig,
     /// The model of a rate's expected error.
@@ -48,7 +49,7 @@ impl PipelineConfig {
         static_init: StaticConfig::DEFAULT,
         earth_rate: EarthRate::LeftInBias,
         zero_rate: Some(ZeroRateConfig::DEFAULT),
-        quiet: QuietConfig::DEFAULT,
+        standstill: StandstillConfig::DEFAULT,
         compensate: CompensateConfig::DEFAULT,
         uncertainty: UncertaintyConfig::DEFAULT,
     };

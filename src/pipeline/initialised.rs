@@ -2,30 +2,35 @@
 
 use super::sensor_bias::ZeroPoint;
 use super::{Pipeline, PipelineConfig};
-use crate::bias::{QuietDetector, Rest, StaticError, ZeroRate};
+use crate::bias::{Rest, StaticError, ZeroRate, ZeroRateConfig};
 use crate::health::count;
 use crate::mounting::{Rotation, is_moved};
 use crate::sample::Frame;
+use crate::standstill::Standing;
 
-/// Holds the results of static initialisation, and the detectors that start from them.
+/// Holds the results of static initialisation, and the filter that starts from them.
 #[derive(Debug, Clone)]
 pub(super) struct Initialised {
     /// The rotation beyond the configured mounting.
     pub(super) levelling: Rotation,
     pub(super) zero: ZeroPoint,
-    pub(super) quiet: QuietDetector,
     pub(super) zero_rate: Option<ZeroRate>,
 }
 
 impl Pipeline {
-    /// Adds a sample to static initialisation, of a vehicle that the wheels show to move or not. Returns the reason if
-    /// this sample makes it fail.
+    /// Adds a sample to static initialisation, of a vehicle whose wheels may turn (`moves`). Returns the reason if this
+    /// sample makes it fail.
     #[inline(never)]
-    pub(super) fn initialise(&mut self, frame: &Frame, moves: bool) -> Option<StaticError> {
+    pub(super) fn initialise(
+        &mut self,
+        frame: &Frame,
+        standing: Standing,
+        moves: bool,
+    ) -> Option<StaticError> {
         let judged = if moves {
             self.state.static_init.refuse_wheels().map(Err)
         } else if frame.sample.validity.is_good() {
-            self.state.static_init.add(&frame.sample)
+            self.state.static_init.add(&frame.sample, standing.is_by_wheels())
         } else {
             // The reading says nothing about the bias; the gap it leaves has restarted the initialisation.
             None
@@ -37,7 +42,7 @@ impl Pipeline {
 
     #[inline(never)]
     fn accept(&mut self, rest: &Rest) -> Result<(), StaticError> {
-        let PipelineConfig { levelling, static_init, earth_rate, zero_rate, quiet, .. } = self.config;
+        let PipelineConfig { levelling, earth_rate, zero_rate, .. } = self.config;
         let levelling = levelling.rotation(rest.specific_force).map_err(StaticError::Level)?;
         let before = self.config.rest_force.map(|force| self.config.mounting.force(force));
         if before.is_some_and(|before| is_moved(&before, &rest.specific_force)) {
@@ -47,8 +52,10 @@ impl Pipeline {
         self.state.initialised = Some(Initialised {
             levelling,
             zero: ZeroPoint::at_rest(levelling.rate(rest.angular_rate), earth_rate),
-            quiet: QuietDetector::new(quiet, &static_init, rest),
-            zero_rate: zero_rate.map(ZeroRate::new),
+            zero_rate: zero_rate.map(|config| {
+                let initial = config.initial.max(rest.yaw_sigma);
+                ZeroRate::new(ZeroRateConfig { initial, ..config })
+            }),
         });
         Ok(())
     }

@@ -6,6 +6,7 @@ use crate::compensate::Compensated;
 use crate::estimate::{VehicleSample, YawEstimate};
 use crate::health::{Faults, Status, judge};
 use crate::sample::{Frame, PERIOD_US, Validity, WheelSample};
+use crate::standstill::Standing;
 use crate::units::{AngularRate, Yaw};
 
 impl Pipeline {
@@ -59,6 +60,7 @@ impl Pipeline {
     pub fn silent(&mut self, steps: u32, board: &BoardState) -> VehicleSample {
         self.state.tick = self.state.tick.wrapping_add(steps);
         self.state.silent = self.state.silent.saturating_add(steps);
+        self.state.standing = Standing::UNKNOWN;
         let status = Status::Silent;
         let (source, quality) = judge(status);
         let faults = board.faults.faults().with(Faults::GAP);
@@ -81,7 +83,6 @@ impl Pipeline {
 
     /// Returns the faults that hold now, whichever sample a message is of.
     fn faults(&self, wheels: Option<&WheelSample>, board: &BoardState) -> Faults {
-        let contradicted = self.zero_rate().is_some_and(ZeroRate::contradicted);
         self.state
             .windows
             .faults()
@@ -89,7 +90,7 @@ impl Pipeline {
             .with(
                 Faults::IMPLAUSIBLE.when(self.state.moved || self.state.compensator.revisions_exceed_limit()),
             )
-            .with(Faults::WHEELS.when(contradicted || self.has_lost_wheels(wheels)))
+            .with(Faults::WHEELS.when(self.state.standing.is_contradicted || self.has_lost_wheels(wheels)))
             .with(board.faults.faults())
     }
 

@@ -1,10 +1,11 @@
 //! The pipeline's part of the slow status message.
 
 use super::Pipeline;
-use crate::bias::{StandstillSource, ZeroRate};
+use crate::bias::ZeroRate;
 use crate::health::slow::{Evidence, Knowledge, SlowStatus, Verdict};
 use crate::mounting::GyroMap;
 use crate::sample::Standstill;
+use crate::standstill::StandstillSource;
 
 impl Pipeline {
     /// The content of the slow status message now, with what the wheels show; `None` before their first report.
@@ -13,6 +14,7 @@ impl Pipeline {
         let (verdict, evidence) = self.standstill(wheels);
         let known = self.state.initialised.is_some();
         let bias = match (known, self.state.sensor_bias.is_known()) {
+            _ if self.zero_rate().is_some_and(ZeroRate::is_doubted) => Knowledge::Refused,
             (true, _) => Knowledge::Fine,
             (false, true) => Knowledge::Coarse,
             (false, false) => Knowledge::Unknown,
@@ -38,17 +40,13 @@ impl Pipeline {
     }
 
     fn standstill(&self, wheels: Option<Standstill>) -> (Verdict, Evidence) {
-        let contradicted = self.zero_rate().is_some_and(ZeroRate::contradicted);
-        match wheels {
-            Some(Standstill::Still) if contradicted => (Verdict::Unknown, Evidence::Wheels),
-            Some(Standstill::Still) => (Verdict::Standing, Evidence::Wheels),
-            Some(Standstill::Moving) => (Verdict::Moving, Evidence::Wheels),
-            // Where wheel speeds are available, they decide.
-            Some(Standstill::Unknown) => (Verdict::Unknown, Evidence::None),
-            None => match self.zero_rate().map(ZeroRate::evidence) {
-                Some(StandstillSource::Inertial) => (Verdict::Standing, Evidence::Inertial),
-                _ => (Verdict::Unknown, Evidence::None),
-            },
+        let standing = self.state.standing;
+        match standing.source {
+            _ if standing.is_contradicted => (Verdict::Unknown, Evidence::Wheels),
+            StandstillSource::Wheels => (Verdict::Standing, Evidence::Wheels),
+            StandstillSource::Inertial if standing.is_likely() => (Verdict::Standing, Evidence::Inertial),
+            _ if wheels == Some(Standstill::Moving) => (Verdict::Moving, Evidence::Wheels),
+            _ => (Verdict::Unknown, Evidence::None),
         }
     }
 }

@@ -1,12 +1,15 @@
 //! A calibration at rest finds the gyro's bias, or the tilt of the sensor on level ground.
+//!
+//! What it finds is in use only once it is stored.
 
 use crate::bias::{Rest, StaticConfig, StaticError, StaticInit};
 use crate::mounting::{LevelError, Rotation};
-use crate::sample::ImuSample;
+use crate::sample::{ImuSample, Standstill};
 use crate::sqrt::sqrt;
+use crate::standstill::Standing;
 use crate::store::MAX_TILT_DEG;
 use crate::store::{Level, Mounting};
-use crate::units::SpecificForce;
+use crate::units::{CentiCelsius, SpecificForce};
 use serde::{Deserialize, Serialize};
 
 /// The kind of calibration.
@@ -49,6 +52,15 @@ pub enum State {
     Failed(Task, CalibrationFault),
 }
 
+/// What a calibration has found.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Finding {
+    /// The readings at rest, and the temperature.
+    Static(Rest, Option<CentiCelsius>),
+    /// The tilt.
+    Mounting(Level),
+}
+
 /// A calibration in progress.
 #[derive(Debug, Clone)]
 pub(crate) struct Calibrator {
@@ -69,12 +81,20 @@ impl Calibrator {
         self.task
     }
 
-    /// Adds a sample; with the last one, returns the mean readings at rest.
-    pub fn add(&mut self, sample: &ImuSample) -> Option<Result<Rest, CalibrationFault>> {
+    /// Adds a sample and what shows that the vehicle stands; with the last one, returns the mean readings at rest.
+    pub fn add(
+        &mut self,
+        sample: &ImuSample,
+        standing: &Standing,
+        wheels: Standstill,
+    ) -> Option<Result<Rest, CalibrationFault>> {
+        if wheels == Standstill::Moving || standing.is_contradicted {
+            return Some(Err(fault(StaticError::Wheels)));
+        }
         if !sample.validity.is_good() {
             return Some(Err(CalibrationFault::Clipped));
         }
-        let judged = self.still.add(sample)?;
+        let judged = self.still.add(sample, standing.is_by_wheels())?;
         Some(judged.map_err(fault))
     }
 }

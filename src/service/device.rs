@@ -8,16 +8,16 @@ mod weights;
 
 pub use weights::MappedSlots;
 
-use super::calibrate::{Calibrator, State, Task, level};
+use super::calibrate::{Calibrator, Finding, State, Task, level};
 use super::conditions::Conditions;
 use super::event::{EventKind, EventLog, LogPage, SensorFault};
 use super::learner::Learner;
 use super::message::{AccessCounters, FlashState, Identity, Info, Origin, PROTOCOL, Refusal};
-use super::standstill::StandstillGate;
 use crate::can::wheel::WheelSettings;
 use crate::health::slow::Knowledge;
 use crate::health::{Faults, Status};
 use crate::sample::{ImuSample, Standstill, WheelSample};
+use crate::standstill::Standing;
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{
     Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Learned, Record, Slot, Store, Troubles,
@@ -64,6 +64,8 @@ pub struct Device<R: NorFlash, W> {
     /// True if the sensor was found to have moved; cleared by [`Self::take_mount_moved`].
     mount_moved: bool,
     calibrator: Option<Calibrator>,
+    /// The result of the calibration, until it is stored.
+    found: Option<Finding>,
     calibration_state: State,
     accepted: Accepted,
     troubles: Troubles,
@@ -74,7 +76,8 @@ pub struct Device<R: NorFlash, W> {
     weights_crc: Option<u32>,
     refused_slots: [Option<SlotError>; 2],
     uploading: Option<Uploading>,
-    standstill: StandstillGate,
+    /// The output may be interrupted: no rate is valid, or the vehicle stands.
+    may_interrupt: bool,
     sensor: Option<SensorFault>,
     status: Status,
     faults: Faults,
@@ -109,6 +112,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             learner: Learner::new(),
             mount_moved: false,
             calibrator: None,
+            found: None,
             calibration_state: State::Idle,
             accepted: Accepted::NONE,
             troubles: Troubles::NONE,
@@ -118,7 +122,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             weights_crc: None,
             refused_slots: [None; 2],
             uploading: None,
-            standstill: StandstillGate::new(),
+            may_interrupt: true,
             sensor: None,
             status: Status::Init,
             faults: Faults::NONE,
@@ -188,20 +192,24 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Processes each sample of the sensor (`None` while the sensor is silent), the status and faults of the yaw
-    /// rate, and the wheels.
+    /// rate, the wheels, and whether the vehicle stands. A flash erase stalls the processor for up to 2 s, so flash is
+    /// written only at standstill, or while the sensor is silent, when no rate is sent.
     pub fn observe(
         &mut self,
         sample: Option<&ImuSample>,
         tick: u32,
         (status, faults): (Status, Faults),
         wheels: &WheelSample,
+        standing: &Standing,
     ) {
         self.tick = tick;
         self.faults = faults;
         let limits = &self.configuration.static_init;
-        self.standstill.observe(sample, wheels.standstill, limits);
         self.wheels_seen = *wheels;
-        if self.configuration.learn && self.learner.observe(sample, wheels, limits, &mut self.learned) {
+        self.may_interrupt = sample.is_none() || standing.is_lasting();
+        if self.configuration.learn
+            && self.learner.observe(sample, wheels, standing, limits, &mut self.learned)
+        {
             self.mount_moved = true;
             self.note(EventKind::MountMoved);
         }
@@ -210,32 +218,25 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             self.note(EventKind::Status(status));
         }
         if let Some(sample) = sample {
-            self.add_to_calibration(sample);
+            self.add_to_calibration(sample, wheels, standing);
         }
     }
 
-    fn add_to_calibration(&mut self, sample: &ImuSample) {
+    fn add_to_calibration(&mut self, sample: &ImuSample, wheels: &WheelSample, standing: &Standing) {
         let Some(calibrator) = self.calibrator.as_mut() else { return };
         let task = calibrator.task();
-        let Some(rest) = calibrator.add(sample) else { return };
-        let result = rest.and_then(|rest| {
-            match task {
-                Task::Static => {
-                    // The result is also valid for a sensor that has moved.
-                    self.learner.calibrated(&rest, sample.temperature, &mut self.learned);
-                }
-                Task::Mounting => {
-                    self.calibration.level = Some(level(rest.specific_force, &self.configuration.mounting)?);
-                }
-            }
-            Ok(())
+        let Some(rest) = calibrator.add(sample, standing, wheels.standstill) else { return };
+        let found = rest.and_then(|rest| match task {
+            Task::Static => Ok(Finding::Static(rest, sample.temperature)),
+            Task::Mounting => level(rest.specific_force, &self.configuration.mounting).map(Finding::Mounting),
         });
         self.calibrator = None;
-        self.calibration_state = match result {
-            Ok(()) => State::Found(task),
+        self.calibration_state = match found {
+            Ok(_) => State::Found(task),
             Err(fault) => State::Failed(task, fault),
         };
-        self.note(EventKind::Calibrated(result.err()));
+        self.note(EventKind::Calibrated(found.err()));
+        self.found = found.ok();
     }
 
     /// Carries out a request, unless it interrupts the output of a vehicle that is not proven to stand, and keeps the
@@ -310,12 +311,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// Returns the newest report of the wheels, and whether the vehicle is proven to stand.
     #[must_use]
     pub fn standing(&self) -> (&WheelSample, bool) {
-        (&self.wheels_seen, self.standstill.is_open())
+        (&self.wheels_seen, self.may_interrupt)
     }
 
     /// Returns whether the output may be interrupted, because the vehicle is proven to stand.
     pub(crate) fn may_interrupt(&self) -> bool {
-        self.standstill.is_open()
+        self.may_interrupt
     }
 
     fn refuse(&mut self, kind: EventKind) {
@@ -372,6 +373,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     #[inline(never)]
     pub fn start_calibration(&mut self, task: Task) {
         self.forget_refusal();
+        self.found = None;
         self.calibrator = Some(Calibrator::new(task, self.configuration.static_init));
         self.calibration_state = State::Running(task);
     }
@@ -379,7 +381,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// Stops the calibration without a result.
     pub fn cancel_calibration(&mut self) {
         self.forget_refusal();
-        self.calibrator = None;
+        (self.calibrator, self.found) = (None, None);
         self.calibration_state = State::Idle;
     }
 
@@ -389,11 +391,14 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// [`Refusal::NothingFound`], [`Refusal::Store`], [`Refusal::Moving`].
     pub fn store_result(&mut self) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
-            match device.calibration_state {
-                State::Found(Task::Static) => device.store_learned()?,
-                State::Found(Task::Mounting) => device.store_calibration()?,
-                _ => return Err(Refusal::NothingFound),
+            match device.found.ok_or(Refusal::NothingFound)? {
+                Finding::Static(rest, temperature) => device.store_rest(&rest, temperature)?,
+                Finding::Mounting(level) => {
+                    let calibration = Calibration { level: Some(level), ..device.calibration };
+                    device.store_calibration(calibration)?;
+                }
             }
+            device.found = None;
             device.calibration_state = State::Idle;
             Ok(())
         })
@@ -405,8 +410,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// [`Refusal::Store`], [`Refusal::Moving`].
     pub fn forget_learned(&mut self) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
-            let before = core::mem::replace(&mut device.learned, Learned::NOTHING);
-            device.store_learned().inspect_err(|_| device.learned = before)?;
+            device.store_learned(Learned::NOTHING)?;
             device.learner = Learner::new();
             Ok(())
         })

@@ -8,7 +8,8 @@
 
 use crate::bias::{CurveFilter, Rest, StaticConfig, StaticInit};
 use crate::mounting::{Forward, ForwardEstimator};
-use crate::sample::{ImuSample, Standstill, WheelSample};
+use crate::sample::{ImuSample, WheelSample};
+use crate::standstill::Standing;
 use crate::store::Learned;
 use crate::units::CentiCelsius;
 
@@ -52,12 +53,13 @@ impl Learner {
         }
     }
 
-    /// Processes a sample (`None` while the sensor is silent) and the wheels; `limits` are those of a period at rest.
+    /// Processes a sample (`None` while the sensor is silent), the wheels and the judgement of standstill; `limits` are those of a period at rest.
     /// Returns `true` when it detects that the sensor has moved since earlier drives.
     pub fn observe(
         &mut self,
         sample: Option<&ImuSample>,
         wheels: &WheelSample,
+        standing: &Standing,
         limits: &StaticConfig,
         learned: &mut Learned,
     ) -> bool {
@@ -68,10 +70,10 @@ impl Learner {
         {
             self.learn_forward(forward, learned);
         }
-        let still = wheels.standstill == Standstill::Still;
+        let still = standing.is_by_wheels();
         if let Some(sample) = sample.filter(|sample| still && sample.validity.is_good()) {
             let rest = self.rest.get_or_insert_with(|| StaticInit::new(*limits));
-            if let Some(Ok(rest)) = rest.add(sample) {
+            if let Some(Ok(rest)) = rest.add(sample, still) {
                 self.learn_rest(&rest, sample.temperature, learned);
             }
         } else {
@@ -82,12 +84,10 @@ impl Learner {
     }
 
     /// Learns from the three seconds at rest of a static calibration, which are also valid for a sensor that has
-    /// moved.
+    /// moved; the learner is a new one.
     pub fn calibrated(&mut self, rest: &Rest, temperature: Option<CentiCelsius>, learned: &mut Learned) {
         (learned.specific_force, learned.forward) = (None, None);
-        (self.forward, self.has_stood, self.is_moved) = (ForwardEstimator::START, false, false);
         self.learn_rest(rest, temperature, learned);
-        self.is_changed = true;
     }
 
     fn learn_rest(&mut self, rest: &Rest, temperature: Option<CentiCelsius>, learned: &mut Learned) {

@@ -5,6 +5,7 @@ use super::{Seed, byte, take};
 use crate::noise::Noise;
 use crate::ram_flash::RamFlash;
 use crate::synthetic::idling;
+use crate::synthetic::judged;
 use crate::tester::segment;
 use gyronet::health::{Faults, Status};
 use gyronet::sample::{Standstill, WheelSample};
@@ -50,6 +51,7 @@ pub fn frames(mut data: &[u8]) {
             0,
             (Status::Ready, Faults::NONE),
             &WheelSample::without_speeds(Standstill::Still),
+            &judged(Standstill::Still),
         );
     }
     let mut bench = Bench { server: Server::new(), board, now: u32::MAX - 1_000 };

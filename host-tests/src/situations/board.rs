@@ -174,7 +174,13 @@ impl Board {
         let Self { coprocessor, device, network, waiting, wire, .. } = self;
         if let Some(seen) = coprocessor.step(now, waiting, wire, Some(network)).observation {
             let (live, tick) = (&seen.vehicle.live, seen.vehicle.tick);
-            device.observe(seen.sample.as_ref(), tick, (live.status, live.faults), &seen.wheels);
+            device.observe(
+                seen.sample.as_ref(),
+                tick,
+                (live.status, live.faults),
+                &seen.wheels,
+                &seen.standing,
+            );
             if device.take_mount_moved() {
                 coprocessor.mount_moved();
             }

@@ -46,6 +46,7 @@ mod slcan;
 mod slcan_command;
 mod slcan_port;
 mod slow_status;
+mod standstill;
 mod step;
 mod store;
 mod store_power_cut;

@@ -54,8 +54,8 @@ fn run(ticks: u64, mut wheels: impl FnMut(u64) -> Option<u16>) -> Vec<Output> {
 
 #[test]
 fn static_initialisation_waits_for_the_wheels() {
-    // A steady straight drive looks like standing to the gyro.
-    let outputs = run(1_000, |tick| Some(if tick < 500 { 5_000 } else { 0 }));
+    // A steady straight drive looks like standing to the gyro; then it brakes at 11 m/s^2.
+    let outputs = run(1_000, |tick| Some(5_000.min(40 * 500u64.saturating_sub(tick)) as u16));
     assert_eq!(statuses(&outputs), [(Init, 800), (Degraded, 200)]);
     let refused: Vec<usize> = (0..1_000).filter(|&k| outputs[k].refused.is_some()).collect();
     assert_eq!(refused, [0], "said once");

@@ -7,11 +7,11 @@ use gyronet::can::e2e::{Checker, DataIdMode, P01, Profile, Verdict as Received};
 use gyronet::can::status::{Evidence, Knowledge, STATUS_ID, SlowStatus, Verdict, emit};
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::coprocessor::TimedFrame;
-use gyronet::sample::PERIOD_US;
+use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::units::Micros;
 use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::synthetic::idling;
+use gyronet_host_tests::synthetic::{force, rate, turning};
 
 /// Wheels of the built-in settings at 0 and at 3.6 km/h.
 const STANDS: [u8; 8] = [0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F];
@@ -21,6 +21,16 @@ fn coprocessor(status: Option<StatusSettings>, wheels: bool) -> Coprocessor {
     let can = config::Config::new(Settings { status, ..Settings::DEFAULT }).expect("checked");
     let wheels = wheels.then(|| WheelReceiver::new(WheelSettings::TOYOTA).expect("checked"));
     Coprocessor::new(Config { can, wheels, ..Config::DEFAULT })
+}
+
+/// A sample of a car at rest, with noise on every axis.
+fn parked(tick: u64, noise: &mut Noise) -> ImuSample {
+    let mut sample = turning(tick, rate(0.0));
+    for axis in 0..3 {
+        sample.angular_rate[axis] = rate(0.001 + 0.001 * noise.normal());
+        sample.specific_force[axis].0 += force(0.02 * noise.normal()).0;
+    }
+    sample
 }
 
 /// Feeds samples of a car at rest, with a wheel frame before each where one is given; returns the status frames.
@@ -41,7 +51,7 @@ fn run(
                 found.push(sent.frame);
             }
         };
-        coprocessor.imu(idling(tick, 0.001, &mut noise), now, &mut sink).expect("in time");
+        coprocessor.imu(parked(tick, &mut noise), now, &mut sink).expect("in time");
     }
     found
 }
@@ -114,7 +124,7 @@ fn a_silence_is_a_doubt_while_it_lasts_and_for_a_minute() {
         "{found:?}"
     );
     // The grid begins again with the first sample.
-    let sample = idling(1_400, 0.001, &mut Noise::new(8));
+    let sample = parked(1_400, &mut Noise::new(8));
     assert!(board.imu(sample, Micros(14_010_000), &mut ()).is_err());
     let frames = run(&mut board, 1_401..1_500, None);
     assert!(doubt(frames.last().expect("the newest")) >= *found.last().expect("not empty"));
@@ -136,8 +146,8 @@ fn wheels_decide_where_they_are_known() {
     assert_says(frames.last().expect("the newest"), stands);
     let frames = run(&mut board, 501..701, Some(DRIVES));
     assert_says(frames.last().expect("the newest"), SlowStatus { verdict: Verdict::Moving, ..stands });
-    // Silent wheels: the sensor's quiet is not believed instead.
+    // Wheels are silent, as in a parked car whose brakes sleep: the sensor's quiet shows it.
     let frames = run(&mut board, 701..1201, None);
-    let silent = SlowStatus { verdict: Verdict::Unknown, evidence: Evidence::None, ..stands };
+    let silent = SlowStatus { evidence: Evidence::Inertial, ..stands };
     assert_says(frames.last().expect("the newest"), silent);
 }

@@ -6,6 +6,7 @@ use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::Learner;
 use gyronet::store::{Calibration, Configuration, Learned};
+use gyronet_host_tests::synthetic::judged;
 use gyronet_tools::drive::recording::{Recording, WHEEL_STANDS};
 use gyronet_tools::evaluate::ablation::{self, Variant};
 use gyronet_tools::simulate::warming::{self, Trip};
@@ -38,7 +39,13 @@ fn learn(trip: &Recording, learned: &mut Learned) {
         slow = if is_slow { slow + 1 } else { 0 };
         let standstill = if slow > STANDS { Standstill::Still } else { Standstill::Moving };
         let wheels = WheelSample::without_speeds(standstill);
-        learner.observe(Some(&row.sample), &wheels, &Configuration::DEFAULT.static_init, learned);
+        learner.observe(
+            Some(&row.sample),
+            &wheels,
+            &judged(standstill),
+            &Configuration::DEFAULT.static_init,
+            learned,
+        );
     }
 }
 

@@ -150,9 +150,10 @@ impl Sink for Outgoing {
     /// Hands an observation to idle.
     #[inline(never)]
     fn observed(&mut self, observation: &coprocessor::Observation) {
-        let coprocessor::Observation { sample, vehicle, wheels, .. } = observation;
+        let coprocessor::Observation { sample, vehicle, wheels, standing, .. } = observation;
         let (tick, status, faults) = (vehicle.tick, vehicle.live.status, vehicle.live.faults);
-        let note = Observation { sample: *sample, tick, status, faults, wheels: *wheels };
+        let note =
+            Observation { sample: *sample, tick, status, faults, wheels: *wheels, standing: *standing };
         count(&mut self.overruns, u32::from(!OBSERVATIONS.push(note)));
     }
 

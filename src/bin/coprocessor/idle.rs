@@ -13,6 +13,7 @@ use gyronet::sample::{ImuSample, WheelSample};
 use gyronet::service::Device;
 use gyronet::service::event::{ClockFault, SensorFault};
 use gyronet::service::message::AllCounters;
+use gyronet::standstill::Standing;
 
 /// Interval between checks of a failed clock, ms.
 const RETRY_MS: u32 = 1_000;
@@ -27,6 +28,7 @@ pub struct Observation {
     pub status: Status,
     pub faults: Faults,
     pub wheels: WheelSample,
+    pub standing: Standing,
 }
 
 /// Observations that idle has not processed yet.
@@ -106,8 +108,8 @@ impl Idle {
 
     #[inline(never)]
     fn observe(&mut self) {
-        while let Some(Observation { sample, tick, status, faults, wheels }) = OBSERVATIONS.pop() {
-            self.device.observe(sample.as_ref(), tick, (status, faults), &wheels);
+        while let Some(Observation { sample, tick, status, faults, wheels, standing }) = OBSERVATIONS.pop() {
+            self.device.observe(sample.as_ref(), tick, (status, faults), &wheels, &standing);
         }
     }
 

@@ -1,13 +1,16 @@
 //! Reads the stored records at the start, and stores them on request.
 
 use super::{Device, INTERRUPTS, MappedSlots, SupportedHardware};
+use crate::bias::Rest;
 use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};
 use crate::service::event::EventKind;
+use crate::service::learner::Learner;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
 use crate::store::{
     Accepted, Access, Calibration, Configuration, FieldError, FlashFault, Learned, Record, Store, StoreError,
     Troubles, UnitMap,
 };
+use crate::units::CentiCelsius;
 use embedded_storage::nor_flash::NorFlash;
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
@@ -175,22 +178,38 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             }
             let calibration = Calibration { unit, ..device.calibration };
             calibration.check().map_err(StoreError::from)?;
-            device.calibration = calibration;
-            device.store_calibration()
+            device.store_calibration(calibration)
         })
     }
 
-    pub(super) fn store_learned(&mut self) -> Result<(), Refusal> {
+    /// Stores the readings at rest of a calibration, which are valid even for a sensor that has moved.
+    pub(super) fn store_rest(
+        &mut self,
+        rest: &Rest,
+        temperature: Option<CentiCelsius>,
+    ) -> Result<(), Refusal> {
+        let (mut learner, mut learned) = (Learner::new(), self.learned);
+        learner.calibrated(rest, temperature, &mut learned);
+        self.store_learned(learned)?;
+        self.learner = learner;
+        Ok(())
+    }
+
+    /// Stores what was learnt, and then uses it.
+    pub(super) fn store_learned(&mut self, learned: Learned) -> Result<(), Refusal> {
         let store = self.store.as_mut().ok_or(StoreError::NoFlash)?;
-        store.set(&self.learned)?;
+        store.set(&learned)?;
+        self.learned = learned;
         self.learner.is_changed = false;
         self.note(EventKind::LearnedStored);
         Ok(())
     }
 
-    pub(super) fn store_calibration(&mut self) -> Result<(), Refusal> {
+    /// Stores a calibration, and then uses it.
+    pub(super) fn store_calibration(&mut self, calibration: Calibration) -> Result<(), Refusal> {
         let store = self.store.as_mut().ok_or(StoreError::NoFlash)?;
-        store.set(&self.calibration)?;
+        store.set(&calibration)?;
+        self.calibration = calibration;
         self.calibration_origin = Origin::Stored;
         self.note(EventKind::CalibrationStored);
         Ok(())
@@ -216,10 +235,10 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     #[inline(never)]
     pub(crate) fn store_learned_if_due(&mut self) {
         let has_room = self.store.as_ref().is_some_and(Store::has_room);
-        if self.learner.is_changed && has_room && self.standstill.is_open() {
+        if self.learner.is_changed && has_room && self.may_interrupt {
             // If the flash refuses the record, do not try again each time.
             self.learner.is_changed = false;
-            if let Err(Refusal::Store(error)) = self.store_learned() {
+            if let Err(Refusal::Store(error)) = self.store_learned(self.learned) {
                 self.note(EventKind::LearnedRefused(error));
             }
         }
@@ -229,7 +248,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// caller must try again.
     #[inline(never)]
     pub(crate) fn store_troubles(&mut self, troubles: &Troubles, may_erase: bool) -> bool {
-        let may_erase = may_erase && self.standstill.is_open();
+        let may_erase = may_erase && self.may_interrupt;
         let Some(store) = self.store.as_mut() else { return true };
         if !store.has_room() && !may_erase {
             return false;

@@ -7,16 +7,27 @@ use gyronet::mounting::{Forward, GyroMap};
 use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::calibrate::{CalibrationFault, State, Task};
 use gyronet::service::message::Refusal;
+use gyronet::standstill::Standing;
 use gyronet::store::{Configuration, Learned, Mounting, UnitMap};
 use gyronet::uds::isotp::MAX_MESSAGE;
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
 use gyronet_host_tests::flash::F405;
 use gyronet_host_tests::stored::open;
+use gyronet_host_tests::synthetic::judged;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// Runs a calibration to its end.
+/// Runs a calibration to its end, while the wheels stand.
 fn calibrate(board: &mut Board, task: Task, force: [f32; 3], wobble: f32) -> State {
+    calibrate_by(board, task, (force, wobble), Standstill::Still)
+}
+
+fn calibrate_by(
+    board: &mut Board,
+    task: Task,
+    (force, wobble): ([f32; 3], f32),
+    wheels: Standstill,
+) -> State {
     board.start_calibration(task);
     for k in 0..301u64 {
         let rate = 0.01 + if k % 2 == 0 { wobble } else { -wobble };
@@ -24,7 +35,8 @@ fn calibrate(board: &mut Board, task: Task, force: [f32; 3], wobble: f32) -> Sta
             Some(&sample(k, force, rate)),
             k as u32,
             (Status::Ready, Faults::NONE),
-            &WheelSample::without_speeds(Standstill::Still),
+            &WheelSample::without_speeds(wheels),
+            &judged(wheels),
         );
     }
     board.calibration_state()
@@ -42,6 +54,16 @@ fn calibration_is_found_and_kept() {
     );
     assert_eq!(board.store_result(), Err(Refusal::NothingFound));
     let mut board = start(&flash);
+    let before = (*board.learned(), board.calibration().level);
+    for task in [Task::Static, Task::Mounting] {
+        // Without wheels, so that nothing else learns.
+        let found = calibrate_by(&mut board, task, ([0.3, 0.0, 9.81], 0.001), Standstill::Unknown);
+        assert_eq!(found, State::Found(task));
+        assert_eq!((*board.learned(), board.calibration().level), before, "not in use before it is stored");
+        board.cancel_calibration();
+        board.observe(None, 0, (Status::Silent, Faults::NONE), &WheelSample::default(), &Standing::UNKNOWN);
+        assert_eq!(board.store_result(), Err(Refusal::NothingFound), "cancelled");
+    }
     assert_eq!(calibrate(&mut board, Task::Static, level, 0.001), State::Found(Task::Static));
     assert_eq!(board.store_result(), Ok(()));
     // Rolled by 30 deg: gravity shows on y.
@@ -80,6 +102,19 @@ fn the_map_of_a_unit_is_kept_for_the_weights_it_was_found_with() {
 }
 
 #[test]
+fn calibration_looks_at_the_wheels() {
+    let contradicted = Standing { is_contradicted: true, ..Standing::UNKNOWN };
+    for (wheels, standing) in [(Standstill::Moving, Standing::UNKNOWN), (Standstill::Still, contradicted)] {
+        let mut board = start(&Rc::new(RefCell::new(F405::default())));
+        board.start_calibration(Task::Static);
+        let (smooth, wheels) = (sample(0, [0.0, 0.0, 9.81], 0.01), WheelSample::without_speeds(wheels));
+        board.observe(Some(&smooth), 0, (Status::Ready, Faults::NONE), &wheels, &standing);
+        let failed = State::Failed(Task::Static, CalibrationFault::Moving(6));
+        assert_eq!(board.calibration_state(), failed);
+    }
+}
+
+#[test]
 fn configured_rotation_comes_first() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mounting = Mounting { roll_deg: 180.0, pitch_deg: 0.0, yaw_deg: 90.0 };
@@ -92,6 +127,7 @@ fn configured_rotation_comes_first() {
     // the vehicle's -y.
     let state = calibrate(&mut board, Task::Mounting, [-0.5, 0.0, -9.8], 0.001);
     assert_eq!(state, State::Found(Task::Mounting));
+    assert_eq!(board.store_result(), Ok(()));
     let level = board.calibration().level.expect("it was found");
     assert!((level.roll_deg + 2.9206).abs() < 1e-3 && level.pitch_deg.abs() < 1e-3, "{level:?}");
 }

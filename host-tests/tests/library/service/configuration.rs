@@ -9,12 +9,12 @@ use gyronet::health::{Faults, Status};
 use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::event::EventKind;
 use gyronet::service::message::{FlashState, Origin, Refusal};
+use gyronet::standstill::{Standing, StandstillSource};
 use gyronet::store::layout;
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, Field, FieldError, FlashFault, FogPart, ImuPart, Mounting, StoreError};
 use gyronet_host_tests::flash::{F405, MappedRegion, Region};
 use std::cell::RefCell;
-use std::ops::Range;
 use std::rc::Rc;
 
 #[test]
@@ -146,7 +146,8 @@ fn nothing_is_written_with_an_unlocked_controller_and_the_standstill_gate_holds(
     assert_eq!(board.set_configuration(&Configuration::DEFAULT), no_flash);
     let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
     assert_eq!(board.weights_begin(64), no_slot);
-    assert!(!storable(&mut board, 0..1, 0.0, Standstill::Moving));
+    see(&mut board, Standing::UNKNOWN);
+    assert!(!storable(&mut board));
     assert_eq!(board.restart(), Err(Refusal::Moving));
     assert_eq!(flash.borrow().operations(), before);
 }
@@ -187,17 +188,15 @@ fn identifiers_of_diagnosis_are_three_that_nobody_else_uses() {
     }
 }
 
-/// Returns whether a configuration can be stored after so many samples.
-fn storable(board: &mut Board, samples: Range<u64>, wobble: f32, wheels: Standstill) -> bool {
-    for k in samples {
-        let rate = 0.01 + if k % 2 == 0 { wobble } else { -wobble };
-        board.observe(
-            Some(&sample(k, [0.0, 0.0, 9.81], rate)),
-            k as u32,
-            (Status::Ready, Faults::NONE),
-            &WheelSample::without_speeds(wheels),
-        );
-    }
+/// Lets the board see a sample of a vehicle that stands or not.
+fn see(board: &mut Board, standing: Standing) {
+    let at_rest = sample(0, [0.0, 0.0, 9.81], 0.01);
+    let wheels = WheelSample::without_speeds(Standstill::Unknown);
+    board.observe(Some(&at_rest), 0, (Status::Ready, Faults::NONE), &wheels, &standing);
+}
+
+/// Returns whether a configuration can be stored.
+fn storable(board: &mut Board) -> bool {
     match board.set_configuration(&Configuration::DEFAULT) {
         Ok(()) => true,
         Err(Refusal::Moving) => false,
@@ -209,25 +208,26 @@ fn storable(board: &mut Board, samples: Range<u64>, wobble: f32, wheels: Standst
 fn flash_is_written_at_standstill_alone() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
-    assert!(storable(&mut board, 0..0, 0.0, Standstill::Unknown), "no rate is valid yet");
-    assert!(!storable(&mut board, 0..1, 0.0, Standstill::Moving));
-    assert!(storable(&mut board, 1..2, 0.5, Standstill::Still), "the wheels prove it");
-    assert!(!storable(&mut board, 2..202, 0.001, Standstill::Unknown), "quiet for two seconds");
-    assert!(storable(&mut board, 202..402, 0.001, Standstill::Unknown), "quiet for more than three");
-    assert!(!storable(&mut board, 402..602, 0.3, Standstill::Unknown), "a gyro that moves");
-    board.observe(
-        None,
-        700,
-        (Status::Silent, Faults::NONE),
-        &WheelSample::without_speeds(Standstill::Unknown),
-    );
-    assert!(storable(&mut board, 0..0, 0.0, Standstill::Unknown), "a bench without a sensor");
-    board.observe(
-        None,
-        701,
-        (Status::Silent, Faults::NONE),
-        &WheelSample::without_speeds(Standstill::Moving),
-    );
+    assert!(storable(&mut board), "no rate is valid yet");
+    let quiet =
+        |probability| Standing { source: StandstillSource::Inertial, probability, ..Standing::UNKNOWN };
+    let contradicted = Standing { is_contradicted: true, ..Standing::UNKNOWN };
+    for (standing, may) in [
+        (Standing::UNKNOWN, false),
+        (Standing::WHEELS, true),
+        (contradicted, false),
+        (quiet(0.0), false),
+        (quiet(0.5), true),
+        (quiet(0.98), true),
+    ] {
+        see(&mut board, standing);
+        assert_eq!(storable(&mut board), may, "{standing:?}");
+    }
+    see(&mut board, Standing::UNKNOWN);
+    let wheels = WheelSample::without_speeds(Standstill::Unknown);
+    board.observe(None, 700, (Status::Silent, Faults::NONE), &wheels, &Standing::UNKNOWN);
+    assert!(storable(&mut board), "a bench without a sensor");
+    see(&mut board, Standing::UNKNOWN);
     type Request = fn(&mut Board) -> Result<(), Refusal>;
     let requests: [Request; 8] = [
         |board| board.set_wheels(&WheelSettings::TOYOTA),

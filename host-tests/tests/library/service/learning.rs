@@ -11,10 +11,12 @@ use gyronet::sample::{ImuSample, Standstill, WheelSample};
 use gyronet::service::Learner;
 use gyronet::service::calibrate::Task;
 use gyronet::service::event::EventKind;
+use gyronet::standstill::Standing;
 use gyronet::store::{Calibration, Configuration, Learned};
 use gyronet::units::{CentiCelsius, WheelSpeed};
 use gyronet_host_tests::flash::F405;
 use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::synthetic::judged;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -31,8 +33,8 @@ fn observe(
     for tick in 0..100 * seconds {
         let temperature = Some(CentiCelsius(celsius * 100));
         let sample = ImuSample { temperature, ..sample(tick, force, bias) };
-        let wheels = WheelSample::without_speeds(wheels);
-        board.observe(Some(&sample), tick as u32, (Status::Ready, Faults::NONE), &wheels);
+        let (wheels, standing) = (WheelSample::without_speeds(wheels), judged(wheels));
+        board.observe(Some(&sample), tick as u32, (Status::Ready, Faults::NONE), &wheels, &standing);
     }
 }
 
@@ -123,7 +125,7 @@ fn driven(seconds: u64, yaw_deg: f64) -> impl Iterator<Item = (ImuSample, WheelS
 /// Lets the board see it.
 fn drive(board: &mut Board, seconds: u64, yaw_deg: f64) {
     for (sample, wheels) in driven(seconds, yaw_deg) {
-        board.observe(Some(&sample), 0, (Status::Ready, Faults::NONE), &wheels);
+        board.observe(Some(&sample), 0, (Status::Ready, Faults::NONE), &wheels, &judged(wheels.standstill));
     }
 }
 
@@ -182,8 +184,10 @@ fn how_far_a_sensor_must_be_moved_depends_on_how_well_forward_was_known() {
         let known = Forward { direction: [1.0, 0.0, 0.0], sigma: f32::to_radians(sigma_deg) };
         learned.forward = Some(known);
         let (mut learner, limits) = (Learner::new(), StaticConfig::DEFAULT);
-        let reports = driven(180, turned)
-            .filter(|(sample, wheels)| learner.observe(Some(sample), wheels, &limits, &mut learned));
+        let reports = driven(180, turned).filter(|(sample, wheels)| {
+            let standing = judged(wheels.standstill);
+            learner.observe(Some(sample), wheels, &standing, &limits, &mut learned)
+        });
         assert_eq!(reports.count(), usize::from(moved), "{turned} deg, known within {sigma_deg} deg");
         assert!(!moved || learned.forward == Some(known), "what was known stays");
     }
@@ -199,7 +203,7 @@ fn a_minute_on_a_ramp_is_one_standstill() {
         observe(&mut board, 4, (0.01, 20), ramp, Standstill::Still);
         // A sample is missing.
         let still = WheelSample::without_speeds(Standstill::Still);
-        board.observe(None, 0, (Status::Ready, Faults::GAP), &still);
+        board.observe(None, 0, (Status::Ready, Faults::GAP), &still, &Standing::WHEELS);
     }
     let [ahead, ..] = board.learned().specific_force.expect("two standstills");
     assert!((ahead.metre_per_sec2() - 2.2 / 8.0).abs() < 0.01, "{ahead:?}");

@@ -4,6 +4,7 @@ use super::{IDENTITY, bare, info, sample};
 use gyronet::health::{Faults, Status};
 use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::event::{EventKind, ResetCause, SensorFault};
+use gyronet_host_tests::synthetic::judged;
 
 #[test]
 fn sensor_that_does_not_answer_is_noted_once() {
@@ -33,6 +34,7 @@ fn the_log_is_bounded_and_reports_what_is_lost() {
             k as u32,
             (status, Faults::NONE),
             &WheelSample::without_speeds(Standstill::Still),
+            &judged(Standstill::Still),
         );
     }
     let (mut after, mut events, mut lost) = (2, 0, 0);

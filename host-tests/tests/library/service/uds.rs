@@ -14,6 +14,7 @@ use gyronet::uds::dtc::{TROUBLES, bit};
 use gyronet_host_tests::flash::F405;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::stored::other_weights;
+use gyronet_host_tests::synthetic::judged;
 use gyronet_host_tests::tester::{Tester, frame};
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -64,12 +65,19 @@ impl Bench {
                 k as u32,
                 good,
                 &WheelSample::without_speeds(Standstill::Still),
+                &judged(Standstill::Still),
             );
         }
     }
 
     fn fail(&mut self, status: Status, faults: Faults) {
-        self.board.observe(None, 0, (status, faults), &WheelSample::without_speeds(Standstill::Unknown));
+        self.board.observe(
+            None,
+            0,
+            (status, faults),
+            &WheelSample::without_speeds(Standstill::Unknown),
+            &judged(Standstill::Unknown),
+        );
         self.server.poll(&mut self.board, &AllCounters::default(), self.now, || None);
     }
 }
@@ -219,6 +227,7 @@ fn a_trouble_survives_a_restart_with_the_state_in_which_it_came() {
         1_234,
         (Status::Silent, Faults::GAP),
         &WheelSample::without_speeds(Standstill::Unknown),
+        &judged(Standstill::Unknown),
     );
     let operations = flash.borrow().operations();
     bench.server.poll(&mut bench.board, &AllCounters::default(), 0, || None);
@@ -281,6 +290,7 @@ fn messages_are_stopped_at_standstill_and_for_the_length_of_a_session() {
         0,
         (Status::Ready, Faults::NONE),
         &WheelSample::without_speeds(Standstill::Moving),
+        &judged(Standstill::Moving),
     );
     bench.expect(&[0x28, 1, 1], &[0x7F, 0x28, 0x22]);
     assert!(!bench.server.is_silenced());
@@ -311,6 +321,7 @@ fn a_configuration_is_read_changed_and_written_at_standstill() {
         0,
         (Status::Ready, Faults::NONE),
         &WheelSample::without_speeds(Standstill::Moving),
+        &judged(Standstill::Moving),
     );
     bench.expect(&write, &[0x7F, 0x2E, 0x22]);
     bench.stand();

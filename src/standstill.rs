@@ -1,0 +1,220 @@
+//! The judge of standstill: whether the vehicle stands, by wheels and inertial sensor, and how probably.
+//!
+//! Bias, static initialisation, learning, calibration and the writing of the flash rest on this judge alone.
+//!
+//! - **Wheels** that stand prove a standstill, unless the inertial sensor contradicts them: the vehicle shakes for
+//!   seconds as only a driven one does, or the wheels came to rest faster than a vehicle can brake (locked, or frames
+//!   frozen at zero). They are believed again once they have turned, or once the inertial sensor is quiet.
+//! - **A quiet inertial sensor** ([`inertial`]) shows a standstill where no wheel tells, or all are silent. A smooth
+//!   road can be as quiet, so it counts as a stop only since the start, or after the vehicle has slowed down; without
+//!   that the probability is zero, and a half once the quiet has lasted for ten seconds. Wheels that turn during a
+//!   quiet second, or stand, change the probability for this vehicle.
+
+mod inertial;
+
+pub use inertial::{Inertial, Motion};
+
+use crate::sample::{ImuSample, Standstill, WheelSample};
+use crate::units::WheelSpeed;
+
+/// Limits of a quiet inertial sensor. The test `standstills_of_every_recording_with_a_speed` prints what they find and
+/// miss.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StandstillConfig {
+    /// Largest shake of a vehicle at rest, rad/s ([`Motion::shake`]): an idling engine stays below, any road above. For
+    /// gyros with less noise than 0.02 deg/s/sqrt(Hz).
+    pub shake: f32,
+    /// Largest change of speed within two seconds at rest, m/s.
+    pub speed_change: f32,
+    /// Least speed that the vehicle loses before a stop, m/s.
+    pub braking: f32,
+}
+
+impl StandstillConfig {
+    /// Limits for road vehicles, chosen on training drives.
+    pub const DEFAULT: Self = Self { shake: 2e-3, speed_change: 0.15, braking: 0.6 };
+}
+
+/// Shake that contradicts standing wheels when it lasts for [`SHAKEN`], rad/s. Loading shakes a truck by 0.013.
+const DRIVEN_SHAKE: f32 = 6e-3;
+/// The number of judgements in a row, 100 ms each.
+const SHAKEN: u8 = 50;
+/// A speed of a wheel that shows motion: 0.3 m/s.
+const TURNS: u32 = 19_661;
+/// Largest loss of speed in 10 ms by braking, 12 m/s^2, and the speed at which passive wheel sensors go silent, 2 m/s;
+/// codes.
+const BRAKING: u32 = 7_864;
+const DEAD_BAND: u32 = 131_072;
+/// Probability that standing wheels are a standing vehicle.
+const BY_WHEELS: f32 = 0.9999;
+/// Tenths of a second of quiet after which a road is excluded, and the probability from then on.
+const LASTING: (u8, f32) = (100, 0.5);
+/// Quiet seconds of this vehicle at rest and in motion, before its wheels have shown any; counted in tenths.
+const BEFORE: [f32; 2] = [490.0, 10.0];
+
+/// The evidence that the vehicle stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum StandstillSource {
+    /// There is no evidence.
+    #[default]
+    None,
+    /// All wheels stand.
+    Wheels,
+    /// The inertial sensor is quiet.
+    Inertial,
+}
+
+/// The judgement of a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Standing {
+    /// The evidence.
+    pub source: StandstillSource,
+    /// Probability that the vehicle stands, 0 to 1; 0 without evidence.
+    pub probability: f32,
+    /// The wheels stand, and another source contradicts them.
+    pub is_contradicted: bool,
+}
+
+impl Standing {
+    /// Nothing shows a standstill.
+    pub const UNKNOWN: Self =
+        Self { source: StandstillSource::None, probability: 0.0, is_contradicted: false };
+    /// The wheels stand.
+    pub const WHEELS: Self =
+        Self { source: StandstillSource::Wheels, probability: BY_WHEELS, is_contradicted: false };
+    const CONTRADICTED: Self = Self { is_contradicted: true, ..Self::UNKNOWN };
+
+    /// Returns whether the vehicle probably stands: more than nine times in ten.
+    #[must_use]
+    pub fn is_likely(&self) -> bool {
+        self.probability > 0.9
+    }
+
+    /// Returns whether a road is excluded, so that the output may be interrupted.
+    #[must_use]
+    pub fn is_lasting(&self) -> bool {
+        self.probability >= LASTING.1
+    }
+
+    /// Returns whether the wheels prove it.
+    #[must_use]
+    pub fn is_by_wheels(&self) -> bool {
+        self.source == StandstillSource::Wheels
+    }
+}
+
+/// Judges each sample.
+#[derive(Debug, Clone)]
+pub struct Judge {
+    config: StandstillConfig,
+    inertial: Inertial,
+    /// Judgements in a row that are quiet.
+    quiet_for: u8,
+    /// The quiet belongs to a stop, and whether the speed has changed since the last quiet.
+    is_stop: bool,
+    has_moved: bool,
+    /// Judgements in a row that contradict standing wheels by their shake.
+    shaken: u8,
+    are_wheels_doubted: bool,
+    /// The least speed that the vehicle still has, however hard it brakes, codes.
+    speed: u32,
+    /// Quiet tenths of a second at rest and in motion, by the wheels.
+    quiet: [f32; 2],
+}
+
+impl Judge {
+    /// Creates a judge before the first sample.
+    #[must_use]
+    pub const fn new(config: StandstillConfig) -> Self {
+        Self {
+            config,
+            inertial: Inertial::START,
+            quiet_for: 0,
+            is_stop: true,
+            has_moved: false,
+            shaken: 0,
+            are_wheels_doubted: false,
+            speed: 0,
+            quiet: BEFORE,
+        }
+    }
+
+    /// Starts the inertial evidence again after a gap.
+    pub fn restart(&mut self) {
+        (self.inertial, self.quiet_for) = (Inertial::START, 0);
+    }
+
+    /// Judges a sample of the 100 Hz grid; `wheels` is `None` where there are none.
+    pub fn observe(&mut self, sample: &ImuSample, wheels: Option<&WheelSample>) -> Standing {
+        let standstill = wheels.map_or(Standstill::Unknown, |wheels| self.wheels(wheels));
+        if !sample.validity.is_good() {
+            self.restart();
+        } else if let Some(motion) = self.inertial.add(sample) {
+            self.inertial_evidence(&motion, standstill);
+        }
+        match standstill {
+            Standstill::Still if self.are_wheels_doubted => Standing::CONTRADICTED,
+            Standstill::Still => Standing::WHEELS,
+            Standstill::Moving => Standing::UNKNOWN,
+            // A wheel that still tells has not decided yet.
+            Standstill::Unknown if wheels.is_some_and(WheelSample::has_speed) => Standing::UNKNOWN,
+            Standstill::Unknown if self.quiet_for > 0 => {
+                let source = StandstillSource::Inertial;
+                Standing { source, probability: self.probability(), is_contradicted: false }
+            }
+            Standstill::Unknown => Standing::UNKNOWN,
+        }
+    }
+
+    /// Returns the probability that a quiet vehicle stands.
+    fn probability(&self) -> f32 {
+        let [rest, motion] = self.quiet;
+        match self.quiet_for {
+            _ if self.is_stop => rest / (rest + motion),
+            lasting if lasting >= LASTING.0 => LASTING.1,
+            _ => 0.0,
+        }
+    }
+
+    /// Returns what the wheels show; a single wheel that turns shows motion. Doubts wheels that stopped too fast.
+    fn wheels(&mut self, wheels: &WheelSample) -> Standstill {
+        let speeds = wheels.speeds.iter().flatten();
+        let fastest = speeds.map(|WheelSpeed(speed)| speed.unsigned_abs()).max().unwrap_or(0);
+        let standstill = if fastest > TURNS { Standstill::Moving } else { wheels.standstill };
+        self.speed = fastest.max(self.speed.saturating_sub(BRAKING));
+        match standstill {
+            Standstill::Still => self.are_wheels_doubted |= self.speed > DEAD_BAND,
+            Standstill::Moving => self.are_wheels_doubted = false,
+            Standstill::Unknown => {}
+        }
+        standstill
+    }
+
+    fn inertial_evidence(&mut self, motion: &Motion, wheels: Standstill) {
+        let StandstillConfig { shake, speed_change, braking } = self.config;
+        if motion.speed_change >= speed_change {
+            (self.is_stop, self.has_moved) = (false, true);
+        }
+        let is_quiet = motion.shake < shake && motion.speed_change < speed_change;
+        self.quiet_for = if is_quiet { self.quiet_for.saturating_add(1) } else { 0 };
+        if is_quiet && core::mem::take(&mut self.has_moved) {
+            self.is_stop |= motion.speed_lost.is_some_and(|lost| lost >= braking);
+        }
+        self.shaken = if wheels == Standstill::Still && motion.shake > DRIVEN_SHAKE {
+            self.shaken.saturating_add(1)
+        } else {
+            0
+        };
+        self.are_wheels_doubted = (self.are_wheels_doubted || self.shaken >= SHAKEN) && !is_quiet;
+        if is_quiet && self.is_stop {
+            let [rest, moving] = &mut self.quiet;
+            match wheels {
+                Standstill::Still => *rest += 1.0,
+                Standstill::Moving => *moving += 1.0,
+                Standstill::Unknown => {}
+            }
+        }
+    }
+}
