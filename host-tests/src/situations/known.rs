@@ -33,6 +33,7 @@ static KNOWN: &[(&str, u8, &str)] = &[
     ("bits flip on the line", 1, "d"),
     ("messages are lost", 1, "d"),
     ("messages are cut off", 1, "d"),
+    ("gyro beyond its range", 1, "d"),
     ("line stalls in a turn", 1, "sy"),
     ("wheel frames frozen at zero on a motorway", 3, "t"),
 ];
