@@ -29,6 +29,7 @@ static KNOWN: &[(&str, u8, &str)] = &[
     ("fibre-optic gyro's line stalls", 1, "y"),
     ("ferry that turns a fibre-optic gyro", 3, "syd"),
     ("implausible readings for a second", 1, "d"),
+    ("gyro beyond its range", 1, "d"),
     ("bias steps after a knock", 3, "syd"),
     ("bits flip on the line", 1, "d"),
     ("messages are lost", 1, "d"),
