@@ -127,8 +127,7 @@ impl SecondSource {
             turns.contains(&true) && by_wheels.contains(&Some(true)) && !by_wheels.contains(&Some(false)),
         ];
         for source in 0..3 {
-            let counted = |count: u8, now: bool| if now { count.saturating_add(1) } else { 0 };
-            self.alone[source] = counted(self.alone[source], alone[source]);
+            self.alone[source] = if alone[source] { self.alone[source].saturating_add(1) } else { 0 };
             // Seconds that show nothing do not end a row of agreement.
             let doubtful = alone[source] || !agreed[source] && self.alone[source] > 0;
             self.agreed[source] = if doubtful { 0 } else { self.agreed[source] + u8::from(agreed[source]) };

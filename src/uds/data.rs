@@ -234,7 +234,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
         0x0117 => {
             let (wheels, stands) = device.standing();
             for speed in wheels.speeds {
-                let code = speed.map_or(i16::MAX, |speed| (i64::from(speed.0) * 100 >> 16) as i16);
+                let code = speed.map_or(i16::MAX, |speed| ((i64::from(speed.0) * 100) >> 16) as i16);
                 put(out, &code.to_be_bytes())?;
             }
             put(out, &[wheels.standstill as u8, u8::from(stands)])

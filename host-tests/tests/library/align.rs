@@ -60,7 +60,7 @@ fn compare(times: &[u64], hz: u64) {
         sums[1] += exact(end);
         assert_eq!((frame.missing, frame.sample.validity), (0, Validity::Good), "{hz} Hz");
         // Near 100 Hz stamps move to the grid, and random readings make a random walk of that.
-        let moved = if (91..=111).contains(&hz) { 20 * i128::from(SNAP_US) << 31 } else { 0 };
+        let moved = if (91..=111).contains(&hz) { (20 * i128::from(SNAP_US)) << 31 } else { 0 };
         let off = (sums[0] - sums[1]).abs();
         assert!(off <= moved / i128::from(STEP) + frames.len() as i128, "{hz} Hz, {frame:?}: {off}");
     }

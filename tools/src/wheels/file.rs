@@ -481,7 +481,7 @@ impl Sum {
     fn of(sum: ByteSum) -> Self {
         let ByteSum { field, nibbles, with_id, with_length, without_counter, negated, start, last, .. } = sum;
         let low = Place::of(&field.low);
-        let is_byte = low.bits == 8 && low.start_bit % 8 == 0 && low.order == Order::Intel;
+        let is_byte = low.bits == 8 && low.start_bit.is_multiple_of(8) && low.order == Order::Intel;
         let byte = is_byte.then_some(low.start_bit / 8);
         let (low, high) = ((!is_byte).then_some(low), field.high.as_ref().map(Place::of));
         Self {

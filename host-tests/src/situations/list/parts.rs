@@ -32,7 +32,7 @@ pub static SITUATIONS: &[Situation] = &[
     }),
     Situation::new("every clock and counter wraps", &[CAR, HATCH, TRUCK], |scene| {
         // 32 bits of the part's 100 us and of the board's microseconds.
-        scene.sensor.epoch = 429_496.7296 - 60.0;
+        scene.sensor.epoch = 429_496.729_6 - 60.0;
         scene.epoch = 4_294.967_296 - 60.0;
         of_rate(scene, 100.0);
     }),
