@@ -5,7 +5,7 @@
 //! - **Wheels** that stand prove a standstill, unless the inertial sensor contradicts them: the vehicle shakes for
 //!   seconds as only a driven one does, or the wheels came to rest faster than a vehicle can brake (locked, or frames
 //!   frozen at zero). They are believed again once they have turned, or once the inertial sensor is quiet.
-//! - **A quiet inertial sensor** ([`inertial`]) shows a standstill where no wheel tells, or all are silent. A smooth
+//! - **A quiet inertial sensor** (`inertial`) shows a standstill where no wheel tells, or all are silent. A smooth
 //!   road can be as quiet, so it counts as a stop only since the start, or after the vehicle has slowed down; without
 //!   that the probability is zero, and a half once the quiet has lasted for ten seconds. Wheels that turn during a
 //!   quiet second, or stand, change the probability for this vehicle.

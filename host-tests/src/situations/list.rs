@@ -1,4 +1,4 @@
-//! The situations: [`places`] where a vehicle is, [`roads`] and how it is driven, [`parts`] and what fails.
+//! The situations: `places` where a vehicle is, `roads` and how it is driven, `parts` and what fails.
 
 mod parts;
 mod places;

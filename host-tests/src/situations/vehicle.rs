@@ -16,7 +16,7 @@ pub struct Vehicle {
     pub part: Part,
     /// Vibration at idle: frequency in Hz, then sigma of each axis in rad/s and m/s^2.
     pub engine: [f64; 3],
-    /// Vibrations of the road at [`ROAD_SPEED`].
+    /// Vibrations of the road at `ROAD_SPEED`.
     pub road: [[f64; 3]; 2],
     /// White noise of the gyro, rad/s/sqrt(Hz); of the accelerometer, m/s^2/sqrt(Hz).
     pub noise: [f64; 2],
