@@ -10,13 +10,10 @@
 use super::Spread;
 use crate::mounting::LevelError;
 use crate::sample::{ImuSample, RATE_HZ};
-use crate::sqrt::sqrt;
 use crate::units::{AngularRate, SpecificForce};
 
 /// The number of samples of static initialisation: 3 s.
 pub const STATIC_SAMPLES: u32 = 3 * RATE_HZ;
-/// Samples in a mean of the yaw rate.
-const BATCH: u32 = 10;
 const SECONDS: usize = (STATIC_SAMPLES / RATE_HZ) as usize;
 
 /// Limits of stillness. The test `still_stretches` holds the defaults against eight real drives:
@@ -139,8 +136,6 @@ pub struct Rest {
     pub angular_rate: [AngularRate; 3],
     /// Mean specific force, which shows the vertical.
     pub specific_force: [SpecificForce; 3],
-    /// Sigma of the mean yaw rate, by the spread of means over 100 ms, rad/s: an engine averages out in them.
-    pub yaw_sigma: f32,
 }
 
 /// Collects the samples of a static initialisation.
@@ -149,9 +144,6 @@ pub struct StaticInit {
     config: StaticConfig,
     gyro: [Axis; 3],
     accel: [Axis; 3],
-    /// Means of the yaw rate over [`BATCH`] samples, and the sum of the current ones.
-    yaw: Spread,
-    yaw_sum: i64,
     /// Turning wheels have been refused, and no sample has been taken since.
     wheels_refused: bool,
 }
@@ -160,14 +152,7 @@ impl StaticInit {
     /// Creates a collection without samples.
     #[must_use]
     pub const fn new(config: StaticConfig) -> Self {
-        Self {
-            config,
-            gyro: [Axis::EMPTY; 3],
-            accel: [Axis::EMPTY; 3],
-            yaw: Spread::EMPTY,
-            yaw_sum: 0,
-            wheels_refused: false,
-        }
+        Self { config, gyro: [Axis::EMPTY; 3], accel: [Axis::EMPTY; 3], wheels_refused: false }
     }
 
     /// Adds a sample; `by_wheels` is true where the wheels show that the vehicle stands. The last sample decides, because
@@ -182,11 +167,6 @@ impl StaticInit {
             self.accel[axis].add(force, force as f32 / SpecificForce::PER_METRE_PER_SEC2);
         }
         let [first, ..] = &self.gyro;
-        self.yaw_sum += i64::from(sample.angular_rate[2].0);
-        if first.all.count().is_multiple_of(BATCH) {
-            let mean = core::mem::take(&mut self.yaw_sum) as f32 / BATCH as f32;
-            self.yaw.add(0, mean / AngularRate::PER_RAD_PER_SEC);
-        }
         if first.all.count() < STATIC_SAMPLES {
             return None;
         }
@@ -209,7 +189,6 @@ impl StaticInit {
         for axis in self.gyro.iter_mut().chain(&mut self.accel) {
             *axis = Axis::default();
         }
-        (self.yaw, self.yaw_sum) = (Spread::EMPTY, 0);
         self.wheels_refused = false;
     }
 
@@ -241,7 +220,6 @@ impl StaticInit {
         Ok(Rest {
             angular_rate: self.gyro.each_ref().map(|axis| AngularRate(axis.all.mean_code())),
             specific_force: self.accel.each_ref().map(|axis| SpecificForce(axis.all.mean_code())),
-            yaw_sigma: sqrt(self.yaw.variance() / (self.yaw.count() - 1).max(1) as f32),
         })
     }
 }

@@ -83,11 +83,13 @@ pub enum ZeroRateOutcome {
     Refused,
 }
 
-/// Holds the mean of a second and the variance of that mean.
+/// Holds the mean of a second and the variance of that mean: its own, by which it is weighed, and that of the seconds
+/// around it, by which it is refused, since its own is small or large by chance.
 #[derive(Debug, Clone, Copy)]
 struct Measurement {
     mean: f32,
     variance: f32,
+    usual: f32,
 }
 
 /// Seconds that contradict the bias: their mean in this stop, and that of earlier stops that agree with each other.
@@ -119,7 +121,7 @@ pub struct ZeroRate {
     block: Spread,
     batch: (i64, u32),
     waiting: Option<Measurement>,
-    /// Mean variance of the seconds so far: that of a single one is small or large by chance.
+    /// Mean variance of the seconds so far.
     noise: Option<f32>,
     refused: bool,
     doubt: Doubt,
@@ -347,7 +349,7 @@ impl ZeroRate {
         self.noise = Some(usual);
         let least = self.config.noise * self.config.noise;
         let mean = block.mean_code() as f32 / AngularRate::PER_RAD_PER_SEC;
-        let measured = Measurement { mean, variance: usual.max(least) };
+        let measured = Measurement { mean, variance: own.max(least), usual: usual.max(own).max(least) };
         self.refused = self.is_off(&measured);
         let before = self.waiting.replace(measured);
         match before {
@@ -365,7 +367,7 @@ impl ZeroRate {
     /// Returns whether a second is off by more than the filter's own sigma explains.
     fn is_off(&self, measured: &Measurement) -> bool {
         let step = measured.mean - self.bias - self.offset;
-        libm::fabsf(step) > GATE * sqrt(self.innovation_variance(measured.variance))
+        libm::fabsf(step) > GATE * sqrt(self.innovation_variance(measured.usual))
     }
 
     /// Notes a second at a probable standstill that contradicts the bias.

@@ -108,11 +108,12 @@ impl SecondSource {
         self.judged = true;
         let turns = gyros.map(|rate| rate.is_some_and(|rate| rate.abs() > TURN));
         // How many of the others speak for each gyro, and against it.
-        let voices = |gyro: usize| {
-            let voices = [gyros_agree, by_wheels[gyro], by_force[gyro]];
+        let voices = |by_wheels: Option<bool>, by_force: Option<bool>| {
+            let voices = [gyros_agree, by_wheels, by_force];
             [true, false].map(|what| voices.iter().filter(|voice| **voice == Some(what)).count())
         };
-        let [[for_inertial, against_inertial], [for_fog, against_fog]] = [voices(0), voices(1)];
+        let [for_inertial, against_inertial] = voices(by_wheels[0], by_force[0]);
+        let [for_fog, against_fog] = voices(by_wheels[1], by_force[1]);
         let alone = match gyros_agree {
             Some(false) => [against_inertial >= against_fog, against_fog >= against_inertial, false],
             _ => {

@@ -2,7 +2,7 @@
 
 use super::sensor_bias::ZeroPoint;
 use super::{Pipeline, PipelineConfig};
-use crate::bias::{Rest, StaticError, ZeroRate, ZeroRateConfig};
+use crate::bias::{Rest, StaticError, ZeroRate};
 use crate::health::count;
 use crate::mounting::{Rotation, is_moved};
 use crate::sample::Frame;
@@ -52,10 +52,7 @@ impl Pipeline {
         self.state.initialised = Some(Initialised {
             levelling,
             zero: ZeroPoint::at_rest(levelling.rate(rest.angular_rate), earth_rate),
-            zero_rate: zero_rate.map(|config| {
-                let initial = config.initial.max(rest.yaw_sigma);
-                ZeroRate::new(ZeroRateConfig { initial, ..config })
-            }),
+            zero_rate: zero_rate.map(ZeroRate::new),
         });
         Ok(())
     }

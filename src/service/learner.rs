@@ -53,8 +53,8 @@ impl Learner {
         }
     }
 
-    /// Processes a sample (`None` while the sensor is silent), the wheels and the judgement of standstill; `limits` are those of a period at rest.
-    /// Returns `true` when it detects that the sensor has moved since earlier drives.
+    /// Processes a sample (`None` while the sensor is silent), the wheels and the judgement of standstill; `limits` are
+    /// those of a period at rest. Returns `true` when it detects that the sensor has moved since earlier drives.
     pub fn observe(
         &mut self,
         sample: Option<&ImuSample>,
@@ -73,7 +73,8 @@ impl Learner {
         let still = standing.is_by_wheels();
         if let Some(sample) = sample.filter(|sample| still && sample.validity.is_good()) {
             let rest = self.rest.get_or_insert_with(|| StaticInit::new(*limits));
-            if let Some(Ok(rest)) = rest.add(sample, still) {
+            // What is kept over starts can wait for a rest that does not rock.
+            if let Some(Ok(rest)) = rest.add(sample, false) {
                 self.learn_rest(&rest, sample.temperature, learned);
             }
         } else {

@@ -59,7 +59,7 @@ impl Inertial {
     /// Adds a sample; returns the motion each 100 ms once the window is full.
     pub fn add(&mut self, sample: &ImuSample) -> Option<Motion> {
         let [gyro, force] = &mut self.sums;
-        let weight = WEIGHTS[self.count];
+        let weight = WEIGHTS.get(self.count).copied().unwrap_or_default();
         gyro.iter_mut().zip(sample.angular_rate).for_each(|(sum, axis)| *sum += weight * i64::from(axis.0));
         force
             .iter_mut()
@@ -94,9 +94,9 @@ impl Inertial {
     fn motion(&self) -> Motion {
         let (mut variance, mut change) = (0.0, 0.0);
         let mut lost = self.before.map(|_| 0.0);
+        let (rates, forces) = (mean_of(&self.gyro), mean_of(&self.force));
         for axis in 0..3 {
-            let rate = mean_of(&self.gyro, axis);
-            let force = mean_of(&self.force, axis);
+            let (rate, force) = (rates[axis], forces[axis]);
             let (mut speed, mut least, mut largest) = (0.0f32, 0.0f32, 0.0f32);
             for (gyro, newest) in self.gyro.iter().zip(&self.force) {
                 let off = gyro[axis] - rate;
@@ -114,6 +114,10 @@ impl Inertial {
     }
 }
 
-fn mean_of(window: &[Axes; WINDOW], axis: usize) -> f32 {
-    window.iter().map(|values| values[axis]).sum::<f32>() / WINDOW as f32
+fn mean_of(window: &[Axes; WINDOW]) -> Axes {
+    let mut sums = [0.0; 3];
+    for values in window {
+        sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+    }
+    sums.map(|sum| sum / WINDOW as f32)
 }
