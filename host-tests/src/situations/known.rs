@@ -5,18 +5,15 @@
 
 /// Situation, deliverable, letters.
 static KNOWN: &[(&str, u8, &str)] = &[
-    ("ferry that turns while the board starts", 3, "sy"),
-    ("ferry that turns on the way", 3, "syd"),
-    ("turntable of 0.2 deg/s", 3, "syd"),
+    ("ferry that turns while the board starts", 3, "syd"),
     ("turntable of a showroom while the board starts", 3, "syd"),
-    ("ship that swings at anchor", 3, "sy"),
+    ("ship that swings at anchor", 3, "syd"),
     ("car carrier in a town", 3, "t"),
-    ("shuttle train", 3, "syt"),
+    ("shuttle train", 3, "yt"),
     ("banked test track", 4, "sy"),
-    ("people board, the wind rocks", 3, "g"),
     ("creeping from the start", 3, "syd"),
     ("smooth motorway", 3, "t"),
-    ("warm-up with slow bends", 3, "sydt"),
+    ("warm-up with slow bends", 3, "syt"),
     ("vibrating utility vehicle", 3, "gm"),
     ("slow slide with locked wheels", 3, "t"),
     ("spin on ice", 4, "y"),
@@ -34,7 +31,6 @@ static KNOWN: &[(&str, u8, &str)] = &[
     ("bits flip on the line", 1, "d"),
     ("messages are lost", 1, "d"),
     ("messages are cut off", 1, "d"),
-    ("gyro beyond its range", 1, "d"),
     ("line stalls in a turn", 1, "sy"),
     ("wheel frames frozen at zero on a motorway", 3, "t"),
 ];

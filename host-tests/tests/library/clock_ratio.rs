@@ -218,7 +218,7 @@ fn an_oscillator_that_warms_up_is_followed() {
     }
 }
 
-/// A car that stands for five seconds and then turns at 0.3 rad/s, by a sensor that is off by a share,
+/// A car that stands for five seconds and then turns at 0.25 rad/s, by a sensor that is off by a share,
 /// through a coprocessor with and without another clock. The yaw from 60 s to 160 s over that of the same rates
 /// in true time, less one; all rates, and the coprocessor.
 fn turned(off: f64, config: Config) -> (f64, Vec<AngularRate>, Coprocessor) {
@@ -228,7 +228,7 @@ fn turned(off: f64, config: Config) -> (f64, Vec<AngularRate>, Coprocessor) {
         let (time, arrival) = sensor.sample();
         let mut sample = idling(tick, 0.001, &mut noise);
         if sensor.now > 8.0 {
-            sample.angular_rate[2].0 += rate(0.3).0;
+            sample.angular_rate[2].0 += rate(0.25).0;
         }
         let output = coprocessor
             .imu(ImuSample { time, ..sample }, arrival, &mut ())
