@@ -186,11 +186,13 @@ impl Uncertainty {
     }
 
     fn end_block(&mut self) {
-        let over = |blocks: &[Turns], seconds: f32| -> Turns {
-            core::array::from_fn(|axis| blocks.iter().map(|block| block[axis]).sum::<f32>() / seconds)
+        let over = |count: usize| -> Turns {
+            let seconds = count as f32 * BLOCK as f32 / RATE_HZ as f32;
+            core::array::from_fn(|axis| {
+                self.blocks.iter().take(count).map(|block| block[axis]).sum::<f32>() / seconds
+            })
         };
-        let [second, end] = [BLOCKS, QUICK]
-            .map(|blocks| over(&self.blocks[..blocks], blocks as f32 * BLOCK as f32 / RATE_HZ as f32));
+        let [second, end] = [BLOCKS, QUICK].map(over);
         self.rates = second;
         self.rates[2] = libm::fabsf(second[2]).max(libm::fabsf(end[2]));
         self.blocks.rotate_right(1);
