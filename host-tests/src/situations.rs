@@ -9,6 +9,7 @@ mod damage;
 pub mod judge;
 pub mod known;
 pub mod list;
+pub mod parts;
 pub mod receiver;
 pub mod recordings;
 pub mod report;

@@ -22,7 +22,6 @@ pub mod doctor;
 pub mod drive;
 pub mod evaluate;
 pub mod network;
-pub mod parts;
 pub mod plot;
 pub mod python;
 pub mod random;

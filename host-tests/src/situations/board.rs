@@ -1,5 +1,7 @@
 //! The board on the host: bytes of the sensor and wheel frames in, frames out, a millisecond at a time.
 
+use super::parts::icm42688::NoDelay;
+use super::parts::{Part, adis16465, icm42688};
 use super::sensor::LATITUDE;
 use crate::ram_flash::RamFlash;
 use embedded_can::Frame;
@@ -19,8 +21,6 @@ use gyronet::sensor::xsens::Mti;
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::{Calibration, Configuration, FogPart, ImuPart, Learned};
 use gyronet::units::Micros;
-use gyronet_tools::parts::icm42688::NoDelay;
-use gyronet_tools::parts::{Part, adis16465, icm42688};
 use std::collections::VecDeque;
 
 const HARDWARE: SupportedHardware = SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[] };

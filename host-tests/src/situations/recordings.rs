@@ -2,6 +2,7 @@
 
 use super::board::Board;
 use super::judge::{Outcome, Reference, judge};
+use super::parts::Part;
 use super::receiver::{INERTIAL, Receiver};
 use super::ride::{STEP, Travelled};
 use super::sensor::mti;
@@ -9,7 +10,6 @@ use gyronet::store::Learned;
 use gyronet::units::Micros;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::wheel_frames::WheelFrames;
-use gyronet_tools::parts::Part;
 use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
 

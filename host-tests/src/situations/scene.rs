@@ -3,6 +3,7 @@
 use super::board::Board;
 use super::damage::{Damage, damaged};
 use super::judge::{EXACT, Outcome, judge};
+use super::parts::Part;
 use super::receiver::{FIBRE_OPTIC, INERTIAL, Receiver};
 use super::ride::{Ride, STEP};
 use super::sensor::{During, Fault, Message, Sensor};
@@ -10,7 +11,6 @@ use super::vehicle::Vehicle;
 use super::wheels::{WheelFault, frames};
 use gyronet::store::Learned;
 use gyronet::units::Micros;
-use gyronet_tools::parts::Part;
 use gyronet_tools::random::Random;
 
 /// Time that a board needs to start, s.

@@ -1,12 +1,12 @@
 //! An inertial sensor on the vehicle: its errors, its clock, its faults, and the bytes that it sends.
 
+use super::parts::{Part, adis16465, icm42688};
 use super::ride::Travelled;
 use super::vehicle::Vehicle;
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::sensor::adis16465::DiagStat;
 use gyronet::sensor::dsp1760::message::{self as dsp1760, Extra};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
-use gyronet_tools::parts::{Part, adis16465, icm42688};
 use gyronet_tools::random::Random;
 
 /// Range of an MTi, rad/s and m/s^2, and the clipping bits of its status word.

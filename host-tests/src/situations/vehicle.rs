@@ -1,7 +1,7 @@
 //! Vehicles and their sensors: how they shake, what the part's errors are, what the wheels report.
 
+use super::parts::Part;
 use super::ride::STEP;
-use gyronet_tools::parts::Part;
 use gyronet_tools::random::Random;
 use std::f64::consts::{PI, TAU};
 
