@@ -124,7 +124,7 @@ pub struct Compensated {
     pub roll_and_pitch: [AngularRate; 2],
     /// The network's part of the correction.
     pub estimate: AngularRate,
-    /// What is left of the gyro's yaw rate where standstill has set it to zero.
+    /// The gyro's yaw rate less the bias, where standstill has set the sent rate to zero.
     pub withheld: Option<AngularRate>,
     /// The validity of the sample's reading.
     pub validity: Validity,

@@ -61,7 +61,7 @@ pub struct Observation {
     pub vehicle: VehicleSample,
     /// The newest report of the wheels.
     pub wheels: WheelSample,
-    /// Whether the vehicle stands.
+    /// The judgement of standstill.
     pub standing: Standing,
     /// The sample whose estimate is final with this one.
     pub complete: Option<Complete>,

@@ -63,7 +63,7 @@ pub struct Output {
     /// A window that is due: run it through the network and [`Pipeline::deliver`] the estimate before the sample
     /// [`crate::compensate::Mode::delay`] steps later.
     pub window: Option<DueWindow>,
-    /// Whether the vehicle stands; not likely where the gyro contradicts it.
+    /// The judgement of standstill; not likely where the gyro contradicts it.
     pub standing: Standing,
     /// The reason why static initialisation failed with this sample and started again.
     pub refused: Option<StaticError>,

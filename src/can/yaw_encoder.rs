@@ -28,7 +28,7 @@ pub struct YawEncoder {
     samples: u8,
     rate: Mean,
     correction: Mean,
-    /// What the samples since the last set are worth together.
+    /// The samples since the last set, joined.
     together: Option<YawEstimate>,
 }
 

@@ -28,7 +28,7 @@ impl Doubts {
     }
 }
 
-/// What the sources show in one step of 10 ms.
+/// The readings of the sources in one step of 10 ms.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Shown {
     /// Yaw rates of the gyros less their bias, rad/s.
@@ -140,14 +140,14 @@ impl SecondSource {
     }
 }
 
-/// Whether the wheels' difference can be that of an axle in a turn at this rate.
+/// Returns true if an axle's wheels may differ so in a turn at this rate.
 fn wheels_agree(rate: f32, (speed, difference): (f32, f32)) -> bool {
     let slack = 0.1 + 0.015 * speed;
     let [narrow, wide] = [0.4 * rate, 4.0 * rate];
     difference >= narrow.min(wide) - slack && difference <= narrow.max(wide) + slack
 }
 
-/// Whether the lateral force can be that of a turn at this rate and speed, on a street with a bank.
+/// Returns true if a turn at this rate and speed may have this lateral force, on a street with a bank.
 fn force_agrees(rate: f32, lateral: f32, speed: f32) -> bool {
     let expected = rate * speed;
     (lateral - expected).abs() <= 2.0 + 0.3 * expected.abs()

@@ -26,7 +26,7 @@ impl Pipeline {
         SlowStatus { verdict, evidence, bias, gain, mounting, doubts: None, gaps, doubt }
     }
 
-    /// Whether this unit's gain and misalignment are known.
+    /// True if this unit's gain and misalignment are calibrated.
     pub(super) fn is_calibrated(&self) -> bool {
         self.config.gyro_map != GyroMap::IDENTITY
     }

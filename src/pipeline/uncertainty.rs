@@ -76,7 +76,7 @@ pub enum Origin {
     Standstill,
 }
 
-/// What a sample contributes.
+/// The rates of a sample, and how they were found.
 #[derive(Debug, Clone, Copy)]
 pub struct Turning {
     /// The rates about x, y and z.

@@ -1,6 +1,6 @@
 //! A calibration at rest finds the gyro's bias, or the tilt of the sensor on level ground.
 //!
-//! What it finds is in use only once it is stored.
+//! Its result is in use only once it is stored.
 
 use crate::bias::{Rest, StaticConfig, StaticError, StaticInit};
 use crate::mounting::{LevelError, Rotation};
@@ -52,7 +52,7 @@ pub enum State {
     Failed(Task, CalibrationFault),
 }
 
-/// What a calibration has found.
+/// The result of a calibration.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Finding {
     /// The readings at rest, and the temperature.

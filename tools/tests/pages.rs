@@ -21,7 +21,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// What the command prints in the root, or `None` if it needs recordings that are not here.
+/// The command's output in the root, or `None` if it needs recordings that are not here.
 fn printed(arguments: &str) -> Option<String> {
     let recordings =
         std::env::var_os("GYRONET_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);

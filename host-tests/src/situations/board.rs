@@ -121,7 +121,7 @@ impl Board {
         }
     }
 
-    /// What it has learnt.
+    /// The learnt values.
     pub fn learned(&self) -> Learned {
         *self.device.learned()
     }

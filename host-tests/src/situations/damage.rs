@@ -3,7 +3,7 @@
 use super::sensor::{During, Message};
 use gyronet_tools::random::Random;
 
-/// What happens to a message while it lasts.
+/// The fate of each message while the damage lasts.
 #[derive(Debug, Clone, Copy)]
 pub enum Damage {
     /// This share of the messages is lost.

@@ -31,7 +31,7 @@ impl Set {
     }
 }
 
-/// What the slow status says, and when, s.
+/// The newest slow status, and its time, s.
 #[derive(Debug, Clone, Copy)]
 pub struct Slow {
     pub at: f64,

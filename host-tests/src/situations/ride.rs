@@ -128,7 +128,7 @@ impl Ride {
     }
 }
 
-/// What changes smoothly, at a place in a leg.
+/// The values that change smoothly, at a place in a leg.
 fn between(from: &Leg, to: &Leg, at: f64) -> Leg {
     let smooth = at * at * (3.0 - 2.0 * at);
     let mix = |from: f64, to: f64| from + (to - from) * smooth;

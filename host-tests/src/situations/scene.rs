@@ -16,7 +16,7 @@ use gyronet_tools::random::Random;
 /// Time that a board needs to start, s.
 const BOOT: f64 = 0.3;
 
-/// What a situation sets up; it starts as an ordinary vehicle that has not moved yet.
+/// The setting of a situation; it starts as an ordinary vehicle that has not moved yet.
 pub struct Scene {
     pub vehicle: Vehicle,
     pub ride: Ride,
@@ -28,7 +28,7 @@ pub struct Scene {
     pub period_ms: u16,
     /// Times at which the board starts again, with what it has learnt.
     pub restarts: Vec<f64>,
-    /// What the board's clock shows at the start, s.
+    /// The reading of the board's clock at the start, s.
     pub epoch: f64,
     /// Damage to the messages of the sensor's line.
     pub damage: Vec<During<Damage>>,

@@ -58,7 +58,7 @@ pub struct Sensor {
     pub hz: f64,
     /// Share by which its clock is fast.
     pub clock: f64,
-    /// What its clock shows at the start, s.
+    /// The reading of its clock at the start, s.
     pub epoch: f64,
     /// Sigma of the sampling times, s.
     pub jitter: f64,

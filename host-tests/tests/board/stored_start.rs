@@ -1,4 +1,4 @@
-//! What the board finds in its flash at the start, in order or damaged: it runs on, and the bus, the log and the
+//! Flash contents at the start, in order or damaged: the board runs on, and the bus, the log and the
 //! service line report it from the first frame on.
 
 use crate::common::{self, IMU, SAMPLE, START, frames};

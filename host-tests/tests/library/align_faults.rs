@@ -85,7 +85,7 @@ fn expected() -> i32 {
     AngularRate::from_rad_per_sec(RATE as f32).unwrap().0
 }
 
-/// Whether all steps are whole and right.
+/// True if all steps are whole and right.
 fn all_good(steps: &[Step]) -> bool {
     steps.iter().all(|step| step.turn.rate(2).is_some_and(|rate| rate.0.abs_diff(expected()) <= 8))
 }

@@ -93,7 +93,7 @@ const LATE: usize = 100;
 const CLAIMED_S: f64 = 0.5;
 const FOUND: [f64; 2] = [0.95, 0.6];
 
-/// What a recording says of itself: whether the vehicle moves or stands at each row, where that is known.
+/// The truth in a recording: whether the vehicle moves or stands at each row, where that is known.
 struct Truth {
     moves: Vec<bool>,
     stands: Vec<bool>,

@@ -70,7 +70,7 @@ enum Action {
     Wheels,
     /// Calibrate the sensor while the vehicle stands still (3 s), and print the result.
     Calibrate {
-        /// What to calibrate, or another action; `show` only prints the calibration.
+        /// The calibration, or another action; `show` only prints the calibration.
         #[arg(value_enum)]
         task: calibration::What,
         /// Calibration file from `gyronet calibrate`, for `unit`.

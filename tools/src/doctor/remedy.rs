@@ -1,4 +1,4 @@
-//! What mends a finding: an edit of the vehicle file, or a flag of the import.
+//! Remedies of findings: edits of the vehicle file, or flags of the import.
 
 use super::Mounting;
 use super::recording::Rows;

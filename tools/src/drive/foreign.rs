@@ -1,4 +1,4 @@
-//! Logs of other tools, told from drives by their first bytes.
+//! Logs of other tools, recognised by their first bytes.
 
 use super::error::{DataError, DataFault};
 use std::fs::File;

@@ -24,7 +24,7 @@ pub struct Drive<'a> {
     pub vehicle: Cow<'a, Vehicle>,
     /// Found by the first reading.
     pub facts: Facts,
-    /// Whether the rows of the source are brought to 100 Hz.
+    /// True if the rows are brought to 100 Hz.
     is_off_grid: bool,
     /// A map that is applied to the gyro of each row.
     pub gyro_map: Option<GyroMap>,

@@ -1,22 +1,15 @@
 //! Reads and writes wheel settings (TOML), with speeds in km/h and start bits as in DBC files.
 
-use embedded_can::{ExtendedId, Id, StandardId};
-use gyronet::can::e2e::{DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
-use gyronet::can::signal::{BitField, ByteOrder, OutsideFrame};
-use gyronet::can::wheel::{
-    ByteSum, Checksum, Code, MAX_FRAMES, Parts, WheelConfigError, WheelFrame, WheelReceiver, WheelSettings,
-    WheelSignal,
-};
-use gyronet::sample::WHEELS;
-use gyronet::units::{Duration, WheelSpeed};
-use serde::{Deserialize, Serialize};
+mod frame;
+mod protection;
 
-/// Speed codes per km/h.
-const CODES_PER_KMH: f64 = 65_536.0 / 3.6;
-/// [`WheelSignal::factor_q16`] of a factor of 1 km/h.
-const FACTORS_PER_KMH: f64 = CODES_PER_KMH * 65_536.0;
-/// The same of a pulse of 1 m.
-const FACTORS_PER_METRE: f64 = 65_536.0 * 65_536.0;
+use frame::{kmh, speed};
+use gyronet::can::e2e::{DataIdMode, P11Mode};
+use gyronet::can::signal::OutsideFrame;
+use gyronet::can::wheel::{MAX_FRAMES, WheelConfigError, WheelReceiver, WheelSettings};
+use gyronet::sample::WHEELS;
+use gyronet::units::Duration;
+use serde::{Deserialize, Serialize};
 
 /// The reason why a wheel settings file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -151,7 +144,7 @@ pub enum Protection {
     },
 }
 
-/// What a sum has beyond the bytes: see [`ByteSum`].
+/// The options of a sum of bytes: see [`ByteSum`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sum {
@@ -330,237 +323,6 @@ impl WheelFile {
     }
 }
 
-impl Frame {
-    fn of(settings: &WheelSettings, number: u8, frame: &WheelFrame) -> Self {
-        let wheels = [Wheel::FrontLeft, Wheel::FrontRight, Wheel::RearLeft, Wheel::RearRight];
-        let signals = wheels.into_iter().zip(settings.signals);
-        let own = signals.filter_map(|(wheel, signal)| Some((wheel, signal?)));
-        let own = own.filter(|(_, signal)| signal.frame == number);
-        let (id, extended) = match frame.id {
-            Id::Standard(id) => (id.as_raw().into(), false),
-            Id::Extended(id) => (id.as_raw(), true),
-        };
-        Self {
-            id,
-            extended,
-            checksum: Protection::of(frame.checksum),
-            counter: frame.counter.map(|Parts { low, high }| Counter {
-                low: Place::of(&low),
-                high: high.as_ref().map(Place::of),
-            }),
-            signal: own.map(|(wheel, signal)| Signal::of(wheel, &signal)).collect(),
-        }
-    }
-
-    fn settings(&self, path: &str) -> Result<WheelFrame, WheelFileError> {
-        let Self { id, extended, .. } = *self;
-        let identifier = if extended {
-            ExtendedId::new(id).map(Id::Extended)
-        } else {
-            u16::try_from(id).ok().and_then(StandardId::new).map(Id::Standard)
-        };
-        let place = |source| WheelFileError::Place { path: path.to_owned(), id, source };
-        Ok(WheelFrame {
-            id: identifier.ok_or_else(|| WheelFileError::Identifier {
-                path: path.to_owned(),
-                id,
-                extended,
-            })?,
-            counter: self
-                .counter
-                .map(|counter| parts(counter.low, counter.high))
-                .transpose()
-                .map_err(place)?,
-            checksum: match &self.checksum {
-                None => Checksum::None,
-                Some(protection) => protection.checksum().map_err(place)?,
-            },
-        })
-    }
-}
-
-impl Signal {
-    fn settings(&self, path: &str, id: u32, frame: u8) -> Result<WheelSignal, WheelFileError> {
-        let place = |source| WheelFileError::Place { path: path.to_owned(), id, source };
-        let (pulses, factor_q16) = match (self.factor_kmh, self.metres_per_pulse) {
-            (Some(kmh), None) => (false, factor(path, kmh)?),
-            (None, Some(metres)) => (true, pulse(path, metres)?),
-            _ => return Err(WheelFileError::Scale { path: path.to_owned(), wheel: self.wheel }),
-        };
-        let codes = match &self.invalid {
-            None => &[][..],
-            Some(Raw::One(code)) => std::slice::from_ref(code),
-            Some(Raw::List(codes)) => codes,
-        };
-        let mut invalid = [None; 3];
-        if codes.len() > invalid.len() {
-            let (path, value) = (path.to_owned(), codes.len() as f64);
-            return Err(WheelFileError::Range { path, key: "invalid", value, range: "at most three codes" });
-        }
-        invalid.iter_mut().zip(codes).for_each(|(to, code)| *to = Some(*code));
-        let limit = |kmh| speed(path, "range_kmh", kmh);
-        let range = self.range_kmh.map(|[least, most]| Ok([limit(least)?, limit(most)?]));
-        Ok(WheelSignal {
-            pulses,
-            offset: speed(path, "offset_kmh", self.offset_kmh)?,
-            invalid,
-            range: range.transpose()?,
-            valid_when: self.valid_when.map(Says::code).transpose().map_err(place)?,
-            reverse_when: self.reverse_when.map(Says::code).transpose().map_err(place)?,
-            ..WheelSignal::new(frame, self.place.field().map_err(place)?, factor_q16)
-        })
-    }
-
-    fn of(wheel: Wheel, signal: &WheelSignal) -> Self {
-        Self {
-            wheel,
-            place: Place::of(&signal.field),
-            factor_kmh: (!signal.pulses).then(|| f64::from(signal.factor_q16) / FACTORS_PER_KMH),
-            metres_per_pulse: signal.pulses.then(|| f64::from(signal.factor_q16) / FACTORS_PER_METRE),
-            offset_kmh: kmh(signal.offset),
-            invalid: match signal.invalid.into_iter().flatten().collect::<Vec<_>>()[..] {
-                [] => None,
-                [code] => Some(Raw::One(code)),
-                ref codes => Some(Raw::List(codes.to_vec())),
-            },
-            range_kmh: signal.range.map(|range| range.map(kmh)),
-            valid_when: signal.valid_when.map(Says::of),
-            reverse_when: signal.reverse_when.map(Says::of),
-        }
-    }
-}
-
-impl Place {
-    fn of(field: &BitField) -> Self {
-        let order = match field.order() {
-            ByteOrder::Intel => Order::Intel,
-            ByteOrder::Motorola => Order::Motorola,
-        };
-        Self { start_bit: field.start(), bits: field.bits(), order, signed: field.is_signed() }
-    }
-
-    fn field(&self) -> Result<BitField, OutsideFrame> {
-        let order = match self.order {
-            Order::Intel => ByteOrder::Intel,
-            Order::Motorola => ByteOrder::Motorola,
-        };
-        BitField::new(self.start_bit, self.bits, order, self.signed)
-    }
-}
-
-impl Says {
-    fn code(self) -> Result<Code, OutsideFrame> {
-        let place = Place { start_bit: self.start_bit, bits: self.bits, order: self.order, signed: false };
-        Ok(Code { field: place.field()?, value: self.value })
-    }
-
-    fn of(Code { field, value }: Code) -> Self {
-        let Place { start_bit, bits, order, .. } = Place::of(&field);
-        Self { start_bit, bits, order, value }
-    }
-}
-
-impl Sum {
-    fn sum(self, xor: bool) -> Result<ByteSum, OutsideFrame> {
-        let start_bit = self.byte.unwrap_or(u8::MAX).saturating_mul(8);
-        let byte = Place { start_bit, bits: 8, order: Order::Intel, signed: false };
-        let Self { nibbles, with_id, with_length, without_counter, negated, start, last_xor, .. } = self;
-        Ok(ByteSum {
-            xor,
-            nibbles,
-            with_id,
-            with_length,
-            without_counter,
-            negated,
-            start,
-            last: last_xor,
-            ..ByteSum::new(parts(self.low.unwrap_or(byte), self.high)?)
-        })
-    }
-
-    fn of(sum: ByteSum) -> Self {
-        let ByteSum { field, nibbles, with_id, with_length, without_counter, negated, start, last, .. } = sum;
-        let low = Place::of(&field.low);
-        let is_byte = low.bits == 8 && low.start_bit.is_multiple_of(8) && low.order == Order::Intel;
-        let byte = is_byte.then_some(low.start_bit / 8);
-        let (low, high) = ((!is_byte).then_some(low), field.high.as_ref().map(Place::of));
-        Self {
-            byte,
-            low,
-            high,
-            nibbles,
-            with_id,
-            with_length,
-            without_counter,
-            negated,
-            start,
-            last_xor: last,
-        }
-    }
-}
-
-fn parts(low: Place, high: Option<Place>) -> Result<Parts, OutsideFrame> {
-    Ok(Parts { low: low.field()?, high: high.map(|high| high.field()).transpose()? })
-}
-
-impl Protection {
-    fn of(checksum: Checksum) -> Option<Self> {
-        Some(match checksum {
-            Checksum::None => return None,
-            Checksum::J1850 { at } => Self::J1850 { byte: at },
-            Checksum::Sum(sum) if sum.xor => Self::Xor(Sum::of(sum)),
-            Checksum::Sum(sum) => Self::Sum(Sum::of(sum)),
-            Checksum::E2e(Profile::P01(P01 { data_id, mode })) => Self::P01 { data_id, mode },
-            Checksum::E2e(Profile::P02(P02 { data_ids })) => Self::P02 { data_ids },
-            Checksum::E2e(Profile::P05(P05 { data_id })) => Self::P05 { data_id },
-            Checksum::E2e(Profile::P11(P11 { data_id, mode })) => Self::P11 { data_id, mode },
-        })
-    }
-
-    fn checksum(&self) -> Result<Checksum, OutsideFrame> {
-        Ok(match *self {
-            Self::J1850 { byte } => Checksum::J1850 { at: byte },
-            Self::Xor(sum) => Checksum::Sum(sum.sum(true)?),
-            Self::Sum(sum) => Checksum::Sum(sum.sum(false)?),
-            Self::P01 { data_id, mode } => Checksum::E2e(Profile::P01(P01 { data_id, mode })),
-            Self::P02 { data_ids } => Checksum::E2e(Profile::P02(P02 { data_ids })),
-            Self::P05 { data_id } => Checksum::E2e(Profile::P05(P05 { data_id })),
-            Self::P11 { data_id, mode } => Checksum::E2e(Profile::P11(P11 { data_id, mode })),
-        })
-    }
-}
-
-/// Converts a factor to the library's code. It must be below 100 km/h, and its code must not be zero.
-fn factor(path: &str, kmh: f64) -> Result<i32, WheelFileError> {
-    let code = (kmh * FACTORS_PER_KMH).round() as i32;
-    if kmh.abs() < 100.0 && code != 0 {
-        return Ok(code);
-    }
-    let range = "below 100 and not 0";
-    Err(WheelFileError::Range { path: path.to_owned(), key: "factor_kmh", value: kmh, range })
-}
-
-/// Converts the way of a pulse to the library's code.
-fn pulse(path: &str, metres: f64) -> Result<i32, WheelFileError> {
-    let code = (metres * FACTORS_PER_METRE).round() as i32;
-    if metres.abs() < 0.5 && code != 0 {
-        return Ok(code);
-    }
-    let (path, range) = (path.to_owned(), "below 0.5 and not 0");
-    Err(WheelFileError::Range { path, key: "metres_per_pulse", value: metres, range })
-}
-
-fn kmh(speed: WheelSpeed) -> f64 {
-    f64::from(speed.0) / CODES_PER_KMH
-}
-
-fn speed(path: &str, key: &'static str, kmh: f64) -> Result<WheelSpeed, WheelFileError> {
-    if kmh.abs() < 1e4 {
-        return Ok(WheelSpeed((kmh * CODES_PER_KMH).round() as i32));
-    }
-    Err(WheelFileError::Range { path: path.to_owned(), key, value: kmh, range: "within 10000" })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -588,7 +350,7 @@ signal = [
         // The file's offset is rounded and the constant truncated: they differ by 0.00006 km/h.
         assert_eq!(offset(&settings), offset(&WheelSettings::TOYOTA) - 1);
         assert_eq!(settings.signals[0].unwrap().invalid, [Some(0xFFFF), Some(0xFFFE), None]);
-        assert_eq!(settings.still_speed, WheelSpeed(1_820));
+        assert_eq!(settings.still_speed.0, 1_820);
         assert_eq!((settings.timeout, settings.still_for), (Duration(100_000), Duration(500_000)));
     }
 

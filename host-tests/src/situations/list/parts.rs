@@ -1,4 +1,4 @@
-//! What the sensor, its line, its clock and the wheels do.
+//! Situations of the sensor, its line, its clock and the wheels.
 
 use super::super::damage::Damage;
 use super::super::scene::Scene;

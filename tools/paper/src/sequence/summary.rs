@@ -51,7 +51,7 @@ pub struct StreamSummary {
     pub duplicates: Seen,
     /// Rows skipped because a field is NaN or infinite.
     pub not_finite: Seen,
-    /// The last line if it lacks its end: half a number cannot be told from a whole one.
+    /// The last line if it lacks its end: half a number looks like a whole one.
     pub cut: Seen,
     /// Encoder resets; the wheels were assumed to keep their speed.
     pub resets: Seen,

@@ -1,0 +1,145 @@
+//! Frames and signals of the file as those of the board, and back.
+
+use super::protection::parts;
+use super::{Counter, Frame, Place, Protection, Raw, Says, Signal, Wheel, WheelFileError};
+use embedded_can::{ExtendedId, Id, StandardId};
+use gyronet::can::wheel::{Checksum, Parts, WheelFrame, WheelSettings, WheelSignal};
+use gyronet::units::WheelSpeed;
+
+/// Speed codes per km/h.
+const CODES_PER_KMH: f64 = 65_536.0 / 3.6;
+/// [`WheelSignal::factor_q16`] of a factor of 1 km/h.
+const FACTORS_PER_KMH: f64 = CODES_PER_KMH * 65_536.0;
+/// The same of a pulse of 1 m.
+const FACTORS_PER_METRE: f64 = 65_536.0 * 65_536.0;
+
+impl Frame {
+    pub(super) fn of(settings: &WheelSettings, number: u8, frame: &WheelFrame) -> Self {
+        let wheels = [Wheel::FrontLeft, Wheel::FrontRight, Wheel::RearLeft, Wheel::RearRight];
+        let signals = wheels.into_iter().zip(settings.signals);
+        let own = signals.filter_map(|(wheel, signal)| Some((wheel, signal?)));
+        let own = own.filter(|(_, signal)| signal.frame == number);
+        let (id, extended) = match frame.id {
+            Id::Standard(id) => (id.as_raw().into(), false),
+            Id::Extended(id) => (id.as_raw(), true),
+        };
+        Self {
+            id,
+            extended,
+            checksum: Protection::of(frame.checksum),
+            counter: frame.counter.map(|Parts { low, high }| Counter {
+                low: Place::of(&low),
+                high: high.as_ref().map(Place::of),
+            }),
+            signal: own.map(|(wheel, signal)| Signal::of(wheel, &signal)).collect(),
+        }
+    }
+
+    pub(super) fn settings(&self, path: &str) -> Result<WheelFrame, WheelFileError> {
+        let Self { id, extended, .. } = *self;
+        let identifier = if extended {
+            ExtendedId::new(id).map(Id::Extended)
+        } else {
+            u16::try_from(id).ok().and_then(StandardId::new).map(Id::Standard)
+        };
+        let place = |source| WheelFileError::Place { path: path.to_owned(), id, source };
+        Ok(WheelFrame {
+            id: identifier.ok_or_else(|| WheelFileError::Identifier {
+                path: path.to_owned(),
+                id,
+                extended,
+            })?,
+            counter: self
+                .counter
+                .map(|counter| parts(counter.low, counter.high))
+                .transpose()
+                .map_err(place)?,
+            checksum: match &self.checksum {
+                None => Checksum::None,
+                Some(protection) => protection.checksum().map_err(place)?,
+            },
+        })
+    }
+}
+
+impl Signal {
+    pub(super) fn settings(&self, path: &str, id: u32, frame: u8) -> Result<WheelSignal, WheelFileError> {
+        let place = |source| WheelFileError::Place { path: path.to_owned(), id, source };
+        let (pulses, factor_q16) = match (self.factor_kmh, self.metres_per_pulse) {
+            (Some(kmh), None) => (false, factor(path, kmh)?),
+            (None, Some(metres)) => (true, pulse(path, metres)?),
+            _ => return Err(WheelFileError::Scale { path: path.to_owned(), wheel: self.wheel }),
+        };
+        let codes = match &self.invalid {
+            None => &[][..],
+            Some(Raw::One(code)) => std::slice::from_ref(code),
+            Some(Raw::List(codes)) => codes,
+        };
+        let mut invalid = [None; 3];
+        if codes.len() > invalid.len() {
+            let (path, value) = (path.to_owned(), codes.len() as f64);
+            return Err(WheelFileError::Range { path, key: "invalid", value, range: "at most three codes" });
+        }
+        invalid.iter_mut().zip(codes).for_each(|(to, code)| *to = Some(*code));
+        let limit = |kmh| speed(path, "range_kmh", kmh);
+        let range = self.range_kmh.map(|[least, most]| Ok([limit(least)?, limit(most)?]));
+        Ok(WheelSignal {
+            pulses,
+            offset: speed(path, "offset_kmh", self.offset_kmh)?,
+            invalid,
+            range: range.transpose()?,
+            valid_when: self.valid_when.map(Says::code).transpose().map_err(place)?,
+            reverse_when: self.reverse_when.map(Says::code).transpose().map_err(place)?,
+            ..WheelSignal::new(frame, self.place.field().map_err(place)?, factor_q16)
+        })
+    }
+
+    pub(super) fn of(wheel: Wheel, signal: &WheelSignal) -> Self {
+        Self {
+            wheel,
+            place: Place::of(&signal.field),
+            factor_kmh: (!signal.pulses).then(|| f64::from(signal.factor_q16) / FACTORS_PER_KMH),
+            metres_per_pulse: signal.pulses.then(|| f64::from(signal.factor_q16) / FACTORS_PER_METRE),
+            offset_kmh: kmh(signal.offset),
+            invalid: match signal.invalid.into_iter().flatten().collect::<Vec<_>>()[..] {
+                [] => None,
+                [code] => Some(Raw::One(code)),
+                ref codes => Some(Raw::List(codes.to_vec())),
+            },
+            range_kmh: signal.range.map(|range| range.map(kmh)),
+            valid_when: signal.valid_when.map(Says::of),
+            reverse_when: signal.reverse_when.map(Says::of),
+        }
+    }
+}
+
+/// Converts a factor to the library's code. It must be below 100 km/h, and its code must not be zero.
+pub(super) fn factor(path: &str, kmh: f64) -> Result<i32, WheelFileError> {
+    let code = (kmh * FACTORS_PER_KMH).round() as i32;
+    if kmh.abs() < 100.0 && code != 0 {
+        return Ok(code);
+    }
+    let range = "below 100 and not 0";
+    Err(WheelFileError::Range { path: path.to_owned(), key: "factor_kmh", value: kmh, range })
+}
+
+/// Converts the way of a pulse to the library's code.
+pub(super) fn pulse(path: &str, metres: f64) -> Result<i32, WheelFileError> {
+    let code = (metres * FACTORS_PER_METRE).round() as i32;
+    if metres.abs() < 0.5 && code != 0 {
+        return Ok(code);
+    }
+    let (path, range) = (path.to_owned(), "below 0.5 and not 0");
+    Err(WheelFileError::Range { path, key: "metres_per_pulse", value: metres, range })
+}
+
+pub(super) fn kmh(speed: WheelSpeed) -> f64 {
+    f64::from(speed.0) / CODES_PER_KMH
+}
+
+pub(super) fn speed(path: &str, key: &'static str, kmh: f64) -> Result<WheelSpeed, WheelFileError> {
+    if kmh.abs() < 1e4 {
+        return Ok(WheelSpeed((kmh * CODES_PER_KMH).round() as i32));
+    }
+    Err(WheelFileError::Range { path: path.to_owned(), key, value: kmh, range: "within 10000" })
+}
