@@ -2,8 +2,8 @@
 //!
 //! An engine shakes a standing vehicle at tens of hertz, a road shakes a driven one at less than five. So means over
 //! 100 ms, with triangular weights, keep the road and lose the engine. The published detectors (moving variance, angular
-//! rate energy, SHOE: Skog, Handel, Nilsson and Rantakokko, IEEE Trans. Biomed. Eng. 57, 2010) find fewer stops on raw
-//! samples.
+//! rate energy, SHOE: Skog, Handel, Nilsson and Rantakokko, IEEE Trans. Biomed. Eng. 57, 2010) take more motion for
+//! standing on raw samples (the test `standstill_detectors` prints how much).
 
 use crate::sample::ImuSample;
 use crate::sqrt::sqrt;

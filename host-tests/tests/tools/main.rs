@@ -19,6 +19,8 @@ mod python_units;
 mod recordings_bad_input;
 mod replay_mcap;
 mod standstill;
+mod standstill_detectors;
+mod standstill_truth;
 mod still_stretches;
 mod tables_methods;
 mod trajectory_evo;

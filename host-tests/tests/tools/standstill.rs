@@ -1,5 +1,6 @@
 //! Standing still on recordings: half an hour of it, and what looks like it on the road.
 
+use crate::standstill_truth::{self, Truth, read};
 use gyronet::coprocessor::{Clock, Config, Coprocessor};
 use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SCALE_MIN};
@@ -10,11 +11,9 @@ use gyronet_host_tests::recordings;
 use gyronet_host_tests::require::{self, Need};
 use gyronet_host_tests::synthetic::{force, rate};
 use gyronet_tools::board::Uncorrected;
-use gyronet_tools::drive::recording::{Reader, Recording, Row};
-use gyronet_tools::drive::vehicle::Vehicle;
+use gyronet_tools::drive::recording::{Recording, Row};
 use gyronet_tools::drive::wheel_frames::{self, WheelFrames};
 use std::ops::RangeInclusive;
-use std::path::Path;
 
 /// The largest yaw in half an hour at rest while the wheels are known to stand, deg.
 const LARGEST_YAW: f64 = 0.2;
@@ -83,82 +82,10 @@ fn half_an_hour_at_rest_turns_by_no_more_than_the_bias_allows() {
     assert!(stands <= LARGEST_YAW, "{stands} deg");
 }
 
-/// Above this speed the vehicle moves, and below that it stands, m/s.
-const MOVES: f64 = 0.3;
-const STANDS: f64 = 0.15;
-/// Rows by which the wheels of `utv` are late.
-const LATE: usize = 100;
 /// Seconds of motion that may be claimed as standstill on a recording, and the least shares of the stops of three
 /// seconds or more that are found: with wheels, and without.
 const CLAIMED_S: f64 = 0.5;
 const FOUND: [f64; 2] = [0.95, 0.6];
-
-/// The truth in a recording: whether the vehicle moves or stands at each row, where that is known.
-struct Truth {
-    moves: Vec<bool>,
-    stands: Vec<bool>,
-}
-
-impl Truth {
-    /// By the recorded speed; by the wheels where there is none, or it is frozen until the first fix.
-    fn read(path: &Path, recording: &Recording) -> Option<Self> {
-        let text = std::fs::read_to_string(path).ok()?;
-        let mut lines = text.lines();
-        let header: Vec<&str> = lines.next()?.split(',').collect();
-        let column = header.iter().position(|name| *name == "speed");
-        let field = |line: &str| column.and_then(|column| line.split(',').nth(column)?.parse::<f64>().ok());
-        let mut speeds: Vec<Option<f64>> = lines.map(field).collect();
-        let frozen = speeds.iter().take(100).all(|speed| *speed == speeds[0]) && speeds[0] > Some(MOVES);
-        let late = header.contains(&"can_speed");
-        let by_wheels = column.is_none() || frozen;
-        if by_wheels {
-            let radius = recording.vehicle.radius_m();
-            let fastest =
-                |row: &Row| row.wheels.iter().flatten().map(|rate| rate.abs() * radius).reduce(f64::max);
-            speeds = recording.rows.iter().map(fastest).collect();
-        }
-        let mut last = None;
-        speeds.iter_mut().for_each(|speed| last = std::mem::replace(speed, speed.or(last)).or(last));
-        let is = |check: &dyn Fn(f64) -> bool| speeds.iter().map(|speed| speed.is_some_and(check)).collect();
-        let (moves, stands): (Vec<bool>, Vec<bool>) =
-            (is(&|speed| speed > MOVES), is(&|speed| speed < STANDS));
-        let near = |flags: &[bool], row: usize| {
-            let span = row.saturating_sub(LATE)..(row + LATE).min(flags.len());
-            late && flags[span].contains(&true)
-        };
-        let clear = |flags: &[bool], other: &[bool]| {
-            (0..flags.len()).map(|row| flags[row] && !near(other, row)).collect::<Vec<_>>()
-        };
-        let known = moves.contains(&true) || stands.contains(&true);
-        known.then(|| Self { moves: clear(&moves, &stands), stands: clear(&stands, &moves) })
-    }
-
-    /// The stops of at least three seconds.
-    fn stops(&self) -> Vec<std::ops::Range<usize>> {
-        let (mut stops, mut begin) = (Vec::new(), None);
-        for (row, stands) in self.stands.iter().chain([&false]).enumerate() {
-            match (begin, stands) {
-                (None, true) => begin = Some(row),
-                (Some(first), false) => {
-                    stops.extend((row - first >= 300).then_some(first..row));
-                    begin = None;
-                }
-                _ => {}
-            }
-        }
-        stops
-    }
-}
-
-/// Reads a recording, also one that begins in motion.
-fn read(path: &Path) -> Recording {
-    let vehicle = Vehicle::of_drive(path).expect("a vehicle file or none");
-    let file = std::fs::File::open(path).expect("a recording");
-    let name = path.display().to_string();
-    let rows = Reader::new(&name, file).expect("a header").mounted(&vehicle);
-    let rows = rows.collect::<Result<_, _>>().expect("rows");
-    Recording { path: name, rows, missing: 0, vehicle }
-}
 
 /// Returns at which rows the board says that the vehicle stands.
 fn claims(recording: &Recording, with_wheels: bool) -> Option<Vec<bool>> {
@@ -183,13 +110,8 @@ fn claims(recording: &Recording, with_wheels: bool) -> Option<Vec<bool>> {
 
 #[test]
 fn standstills_of_every_recording_with_a_speed() {
-    let folder = recordings::folder();
-    let sets = ["wid_car", "real_car", "rc_car", "utv", "truck", "car_mti710"].map(|set| folder.join(set));
-    let files = sets.iter().filter_map(|set| std::fs::read_dir(set).ok()).flatten().flatten();
-    let mut paths: Vec<_> =
-        files.map(|file| file.path()).filter(|path| path.extension().is_some_and(|e| e == "csv")).collect();
-    paths.sort();
-    let found = if paths.is_empty() { Err(format!("no recording in {}", folder.display())) } else { Ok(()) };
+    let paths = standstill_truth::recordings();
+    let found = if paths.is_empty() { Err("no recording with a speed".to_owned()) } else { Ok(()) };
     if require::wants("standstills_of_every_recording_with_a_speed", Need::Data, found).is_none() {
         return;
     }
