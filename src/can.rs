@@ -15,6 +15,7 @@ pub mod latitude;
 pub mod load;
 #[doc(hidden)]
 pub mod queue;
+mod residual;
 #[doc(hidden)]
 pub mod signal;
 pub mod slcan;

@@ -12,7 +12,7 @@
 //! deg/h, and zero lies between two codes (32112.64): with plain rounding, a parked car would seem to turn
 //! at 9 deg/h indefinitely. The rounding residual is therefore carried.
 
-use super::yaw_encoder::{RoundingResidual, Scale};
+use super::residual::{RoundingResidual, Scale};
 use crate::units::{AngularRate, SpecificForce};
 use embedded_can::{ExtendedId, Frame};
 
