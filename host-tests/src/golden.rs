@@ -1,4 +1,4 @@
-//! Reads the outputs of PyTorch for some windows, layer by layer, as `tools/train` exports them.
+//! Reads the outputs of PyTorch for some windows, layer by layer, as `gyronet_train` exports them.
 
 use crate::recordings::workspace;
 use safetensors::{Dtype, SafeTensors};

@@ -76,7 +76,7 @@ fn python_and_the_library_make_the_same_windows_and_losses() {
     let ends = ENDS.map(|end| end.to_string()).join(",");
     let settings = [CORRECTION, SCALE, ALPHA].map(|value| value.to_string());
     let output = Command::new(python)
-        .env("PYTHONPATH", workspace().join("tools/train"))
+        .env("PYTHONPATH", workspace().join("tools/python"))
         .args([&script, &csv])
         .arg(ends)
         .args(settings)

@@ -18,7 +18,7 @@ use std::path::PathBuf;
 
 /// Convert an f32 checkpoint to an int8 weight file for the board.
 ///
-/// The input is a checkpoint of GyroNet (safetensors, from tools/train). The weight file has int8 rows,
+/// The input is a checkpoint of GyroNet (safetensors, from gyronet_train). The weight file has int8 rows,
 /// packed in the order in which the kernels read them, with its provenance and a CRC-32.
 ///
 /// The command also prints the error that quantisation adds: the RMS of the difference between integer and f32

@@ -30,8 +30,7 @@ use std::process::{Command, Stdio};
 Examples:
   gyronet train drives
   gyronet train drives --hold-out monday friday --validate sunday --out mine
-  gyronet train drives --seeds 1 2 3 --python /usr/bin/python3
-  gyronet train drives --shards fleet --processes 4    # shards: python -m gyronet_train.shards")]
+  gyronet train drives --seeds 1 2 3 --python /usr/bin/python3")]
 pub struct Args {
     /// Folder of drives.
     #[arg(value_name = "FOLDER")]
@@ -54,20 +53,14 @@ pub struct Args {
     /// Seeds to train with; the best on the validation drive is kept.
     #[arg(long, num_args = 1.., default_values_t = [1], value_name = "N")]
     seeds: Vec<u64>,
-    /// Train on the Parquet shards of this folder; the drives of FOLDER only validate or are held out.
-    #[arg(long, value_name = "DIR")]
-    shards: Option<PathBuf>,
-    /// Number of processes that train together on this machine.
-    #[arg(long, default_value_t = 1, value_name = "N")]
-    processes: u32,
-    /// Python with the packages of tools/train/requirements.txt [default: .venv of the workspace, created if
+    /// Python with the packages of tools/python/gyronet_train/requirements.txt [default: .venv of the workspace, created if
     /// missing].
     #[arg(long, value_name = "FILE")]
     python: Option<PathBuf>,
 }
 
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let roles = Roles::choose(&args.folder, args.shards.is_some(), args.validate.as_deref(), &args.hold_out)?;
+    let roles = Roles::choose(&args.folder, args.validate.as_deref(), &args.hold_out)?;
     for refusal in &roles.refused {
         remark(common, format_args!("left out: {refusal}"))?;
     }
@@ -76,9 +69,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         common,
         format_args!(
             "trains: {}; chooses: {}; held out: {}",
-            args.shards
-                .as_ref()
-                .map_or_else(|| names(&roles.train).join(" "), |path| path.display().to_string()),
+            names(&roles.train).join(" "),
             roles.validate.name,
             names(&roles.held_out).join(" ")
         ),
@@ -117,23 +108,15 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 
 /// Trains in Python, whose progress bar and lines are shown on standard error.
 fn python_training(args: &Args, common: Common, roles: &Roles, out: &Path) -> super::Result {
-    let (environment, source) = (bench::workspace().join(".venv"), bench::workspace().join("tools/train"));
-    let mut packages = vec!["torch", "numpy", "safetensors", "tqdm"];
-    packages.extend(args.shards.as_ref().map(|_| "pyarrow"));
-    let requirements = source.join("requirements.txt");
+    let (environment, source) = (bench::workspace().join(".venv"), bench::workspace().join("tools/python"));
+    let requirements = source.join("gyronet_train/requirements.txt");
+    let packages = ["torch", "numpy", "safetensors", "tqdm"];
     let python = python::interpreter(args.python.as_deref(), &environment, &requirements, &packages)?;
     let mut command = Command::new(&python);
     command.env("PYTHONPATH", source);
-    if args.processes > 1 {
-        let processes = args.processes.to_string();
-        command.args(["-m", "torch.distributed.run", "--standalone", "--nproc_per_node", &processes]);
-    }
     command.args(["-m", "gyronet_train"]).arg(&args.folder).arg("--out").arg(out);
     command.args(["--validate", &roles.validate.name]);
-    match &args.shards {
-        Some(folder) => command.arg("--shards").arg(folder),
-        None => command.arg("--train").args(roles.train.iter().map(|drive| &drive.name)),
-    };
+    command.arg("--train").args(roles.train.iter().map(|drive| &drive.name));
     for (option, value) in [("--epochs", args.epochs), ("--patience", args.patience)] {
         command.args([option, &value.to_string()]);
     }

@@ -1,4 +1,4 @@
-//! Reads the f32 checkpoints of GyroNet and FoGNet that `tools/train` exports.
+//! Reads the f32 checkpoints of GyroNet and FoGNet that `gyronet_train` exports.
 
 pub use super::tensors::CheckpointError;
 

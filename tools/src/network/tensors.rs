@@ -96,7 +96,7 @@ fn unread(name: &str, bytes: &[u8], source: safetensors::SafeTensorError) -> Che
 #[derive(Debug, Clone)]
 pub struct Tensors {
     tensors: BTreeMap<String, Vec<f32>>,
-    /// The provenance that `tools/train` wrote: JSON, or empty.
+    /// The provenance that `gyronet_train` wrote: JSON, or empty.
     pub provenance: String,
     /// SHA-256 of the file.
     pub sha256: String,

@@ -64,7 +64,7 @@ pub enum Refusal {
 
 /// Returns advice for a drive whose only reference is a course.
 fn advice(course: bool) -> &'static str {
-    if course { "; its ref_yaw trains the linear part: python -m gyronet_train.linear --course" } else { "" }
+    if course { "; its ref_yaw is enough for `gyronet calibrate`" } else { "" }
 }
 
 /// A drive that can be trained on.
@@ -175,7 +175,7 @@ mod tests {
         let never = |_| (0.0, String::new());
         for (name, seconds, reason, rates) in [
             ("blind", 63, "line 2002: no ref_gyr_z", &without as &dyn Fn(f64) -> (f64, String)),
-            ("course", 63, "its ref_yaw trains the linear part", &never),
+            ("course", 63, "its ref_yaw is enough for `gyronet calibrate`", &never),
             ("short", 20, "17 s after the 3 s at rest; training needs 30 s", &|time| same(turn(time))),
             ("moving", 63, "starts moving: line ", &|time: f64| same((2.0 * time).sin())),
             ("mirrored", 63, "a wrong unit, sign or clock", &|time: f64| {

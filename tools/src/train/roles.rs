@@ -66,7 +66,6 @@ fn listed(refused: &[Refusal]) -> String {
 /// The drives of a folder, by role.
 #[derive(Debug)]
 pub struct Roles {
-    /// Training drives; empty if shards are used.
     pub train: Vec<Examined>,
     /// The validation drive, which chooses the epoch and the seed.
     pub validate: Examined,
@@ -78,13 +77,8 @@ pub struct Roles {
 
 impl Roles {
     /// Examines the drives of a folder and chooses their roles. By default the last quarter by name is held out, the
-    /// drive before it validates, and the others train. With `shards` no drive of the folder trains.
-    pub fn choose(
-        folder: &Path,
-        shards: bool,
-        validate: Option<&str>,
-        held_out: &[String],
-    ) -> Result<Self, RolesError> {
+    /// drive before it validates, and the others train.
+    pub fn choose(folder: &Path, validate: Option<&str>, held_out: &[String]) -> Result<Self, RolesError> {
         let named = || folder.display().to_string();
         let (mut usable, mut refused) = (Vec::new(), Vec::new());
         for path in csv_files(folder).map_err(|source| RolesError::Folder { folder: named(), source })? {
@@ -93,9 +87,9 @@ impl Roles {
                 Err(refusal) => refused.push(refusal),
             }
         }
-        let needed = if shards { 2 } else { FEWEST };
-        if usable.len() < needed {
-            return Err(RolesError::TooFew { folder: named(), usable: usable.len(), needed, refused });
+        if usable.len() < FEWEST {
+            let (usable, needed) = (usable.len(), FEWEST);
+            return Err(RolesError::TooFew { folder: named(), usable, needed, refused });
         }
         let quarter = (usable.len() / 4).max(1);
         let mut take = |name: &str| match find(&usable, name) {
@@ -111,10 +105,11 @@ impl Roles {
         if held_out.is_empty() {
             held_out = usable.split_off(usable.len().saturating_sub(quarter));
         }
-        let (Some(validate), least) = (validate.or_else(|| usable.pop()), if shards { 0 } else { 2 }) else {
-            return Err(RolesError::TooFew { folder: named(), usable: held_out.len(), needed, refused });
+        let Some(validate) = validate.or_else(|| usable.pop()) else {
+            let (usable, needed) = (held_out.len(), FEWEST);
+            return Err(RolesError::TooFew { folder: named(), usable, needed, refused });
         };
-        if held_out.is_empty() || usable.len() < least {
+        if held_out.is_empty() || usable.len() < 2 {
             let usable = usable.len() + held_out.len() + 1;
             return Err(RolesError::TooFew {
                 folder: named(),
@@ -123,16 +118,15 @@ impl Roles {
                 refused,
             });
         }
-        let train = if shards { Vec::new() } else { usable };
-        let seconds = train.iter().map(|drive| drive.seconds).sum::<f64>();
-        let turned_rad = train.iter().map(|drive| drive.turned_rad).sum::<f64>();
-        if !shards && seconds < LEAST_S {
+        let seconds = usable.iter().map(|drive| drive.seconds).sum::<f64>();
+        let turned_rad = usable.iter().map(|drive| drive.turned_rad).sum::<f64>();
+        if seconds < LEAST_S {
             return Err(RolesError::TooShort { folder: named(), seconds, refused });
         }
-        if !shards && turned_rad < LEAST_TURNED_RAD {
+        if turned_rad < LEAST_TURNED_RAD {
             return Err(RolesError::NoTurns { folder: named(), turned_rad });
         }
-        Ok(Self { train, validate, held_out, refused })
+        Ok(Self { train: usable, validate, held_out, refused })
     }
 }
 

@@ -22,7 +22,7 @@ use std::path::PathBuf;
 Example:
   gyronet-paper quantize fognet.safetensors --out fognet.blob --drives sequences/train08")]
 pub struct Args {
-    /// Checkpoint (safetensors, from tools/train).
+    /// Checkpoint (safetensors, from gyronet_train).
     checkpoint: PathBuf,
     /// Weight file to write.
     #[arg(long, short, value_name = "BLOB")]

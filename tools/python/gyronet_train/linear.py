@@ -21,7 +21,6 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import save_file
 
-from . import course
 from .recordings import RATE_HZ, STATIC_SAMPLES, WINDOW, Drive, find_drive, load_drive, mean_1s_error, windows
 
 STRIDE = 5
@@ -170,13 +169,11 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors file")
     parser.add_argument("--stem", default="linear_window", help="name of the file")
     parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07", "08"], metavar="NN")
-    parser.add_argument("--course", action="store_true", help="train on ref_yaw: mounting and gain only (course.py)")
-    parser.add_argument("--noise-deg", type=float, metavar="DEG", help="simulate the course from ref_gyr_z, at 1 Hz")
     return parser.parse_args()
 
 
-def train_on_rate(paths: list[Path]) -> tuple[list[Drive], np.ndarray, float, dict]:
-    """Trains on `ref_gyr_z`; returns drives, outputs of a window, expected error in rad/s and report."""
+def trained(paths: list[Path]) -> tuple[list[Drive], np.ndarray, float, dict]:
+    """Fits the filter; returns drives, outputs of a window, expected error in rad/s and report."""
     drives = [load_drive(path) for path in paths]
     print("1 s error over static initialisation's, each drive with the filter of the others: mean, standard deviation")
     report = {}
@@ -192,28 +189,6 @@ def train_on_rate(paths: list[Path]) -> tuple[list[Drive], np.ndarray, float, di
     return drives, outputs, window_error(outputs, drives), report
 
 
-def train_on_course(paths: list[Path], noise_deg: float | None) -> tuple[list[course.CourseDrive], np.ndarray, float, dict]:
-    """Trains mounting and gain on `ref_yaw`; returns the same as `train_on_rate`."""
-    drives = []
-    for path in paths:
-        try:
-            drives.append(course.load_course_drive(path, noise_deg))
-        except ValueError as error:
-            print(f"left out: {error}")
-    if len(drives) < 2:
-        raise SystemExit(f"{len(drives)} drives can be used, but 2 are needed")
-    for drive in drives:
-        print(f"{drive.name}: ref_yaw, {len(drive.errors)} spans of 10 s, {drive.left_out} spans with jumps left out")
-    print("10 s error over static initialisation's, each drive with the shares of the others: mean, standard deviation")
-    report = {"mounting + gain": tell("mounting + gain, 3 numbers", course.leave_one_out(drives))}
-    shares, sigmas = course.fit(drives)
-    for name, share, sigma, limit in zip(("roll rate", "pitch rate", "yaw rate"), shares, sigmas, course.SHOWN):
-        shown = "" if sigma < limit else ": not observable in these drives"
-        print(f"share of the {name} {share:+.5f}, sigma {sigma:.5f}{shown}")
-    taps = np.tensordot(shares, np.concatenate([PARTS["mounting"], PARTS["gain"]]), axes=1)
-    return drives, rows(taps), course.window_error(shares, drives), report
-
-
 def tell(what: str, ratios: list[float]) -> list[float]:
     """Prints the ratios of all drives; returns their mean and standard deviation."""
     found = [round(float(np.mean(ratios)), 4), round(float(np.std(ratios, ddof=1)), 4)]
@@ -223,11 +198,7 @@ def tell(what: str, ratios: list[float]) -> list[float]:
 
 def main() -> None:
     args = arguments()
-    paths = [find_drive(args.data, n) for n in args.train]
-    if args.course:
-        drives, outputs, scale, report = train_on_course(paths, args.noise_deg)
-    else:
-        drives, outputs, scale, report = train_on_rate(paths)
+    drives, outputs, scale, report = trained([find_drive(args.data, n) for n in args.train])
     features = np.concatenate([drive.features for drive in drives])
     tensors = {
         "input_mean": features.mean(axis=0),
@@ -238,7 +209,7 @@ def main() -> None:
     provenance = {
         "network": "gyronet",
         "parts": "linear",
-        "reference": ("ref_yaw" if args.noise_deg is None else "simulated course") if args.course else "ref_gyr_z",
+        "reference": "ref_gyr_z",
         "train": [drive.name for drive in drives],
         "sha256": {drive.name: drive.sha256 for drive in drives},
         "leave_one_out_to_static": report,

@@ -1,4 +1,4 @@
-"""Training of one network with one seed, in one process or several.
+"""Training of one network with one seed.
 
 As in the paper, training uses Adam with an initial rate of 0.0015 and mean absolute error over shuffled
 windows of 0.1 s. Unlike in the paper, turns are added (augment.py), the rate follows one cycle, the
@@ -7,8 +7,8 @@ that overlap as in the firmware, and can be changed to those of other units of t
 neither is done, since it improved neither the 1 s error nor the windows' mean error on the validation
 drive.
 
-Random numbers are seeded in each epoch from seed, epoch and process, so that a resumed training gives the same result
-as one that was not interrupted.
+Random numbers are seeded in each epoch from seed and epoch, so that a resumed training gives the same result as one that
+was not interrupted.
 """
 
 from __future__ import annotations
@@ -20,12 +20,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import torch
 from tqdm import tqdm
 
-from . import processes
 from .augment import other_unit, turn
 from .loss import span_loss
 from .model import GyroNet
@@ -33,9 +31,6 @@ from .recordings import Drive
 from .spans import Spans, cut
 from .state import load_state, save_state
 from .validation import Validation, validate_all
-
-if TYPE_CHECKING:
-    from .shards import Stream
 
 
 @dataclass(frozen=True)
@@ -45,7 +40,7 @@ class Settings:
     epochs: int
     """Number of passes, each with as many windows as the training drives have samples."""
     batch: int
-    """Approximate number of windows of a batch, of all processes together."""
+    """Approximate number of windows of a batch."""
     lr: float
     """Largest learning rate."""
     turns: bool
@@ -85,7 +80,7 @@ class Trained:
 
 
 def train(
-    data: Spans | Stream,
+    data: Spans,
     validation: list[Drive],
     settings: Settings,
     seed: int,
@@ -96,15 +91,12 @@ def train(
     of = {"settings": dataclasses.asdict(settings), "seed": seed, "drives": data.names}
     of["validation drives"] = [drive.sha256 for drive in validation]
     torch.manual_seed(seed)
-    deviations = data.moments.deviations()
-    unit = deviations[-1].item()
-    model = GyroNet(data.moments.mean(), deviations[:-1], unit)
+    unit = data.deviations[-1].item()
+    model = GyroNet(data.mean, data.deviations[:-1], unit)
     mean, best = copy.deepcopy(model), copy.deepcopy(model)
-    rank, ranks = processes.part()
-    batch = settings.batch // ranks
     optimiser = torch.optim.Adam(model.parameters(), lr=settings.lr)
     schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimiser, settings.lr, total_steps=data.epoch(batch) * settings.epochs
+        optimiser, settings.lr, total_steps=data.epoch(settings.batch) * settings.epochs
     )
     parts = {"model": model, "mean": mean, "best": best, "optimiser": optimiser, "schedule": schedule}
     epochs: list[Epoch] = []
@@ -115,20 +107,19 @@ def train(
             part.load_state_dict(saved[name])
         epochs = [Epoch(e["epoch"], e["loss"], Validation(**e["validation"])) for e in saved["epochs"]]
         seconds = saved["seconds"]
-    parallel = processes.together(model)
     started = time.monotonic() - seconds
     while not finished(epochs, settings):
         epoch = len(epochs) + 1
-        torch.manual_seed((seed << 32) + (epoch << 16) + rank)
+        torch.manual_seed((seed << 32) + (epoch << 16))
         model.train()
         batches = tqdm(
-            data.batches(batch), f"epoch {epoch}/{settings.epochs}", data.epoch(batch), disable=True if rank else None
+            data.batches(settings.batch), f"epoch {epoch}/{settings.epochs}", data.epoch(settings.batch), disable=None
         )
         total = 0.0
         for x, gyro_error in batches:
             x = turn(x) if settings.turns else x
             x = other_unit(x) if settings.units else x
-            correction, scale = parallel(cut(x).flatten(0, 1))
+            correction, scale = model(cut(x).flatten(0, 1))
             shape = (len(x), settings.windows)
             loss = span_loss(correction.unflatten(0, shape), scale.view(shape), gyro_error, unit)
             optimiser.zero_grad()
@@ -137,13 +128,12 @@ def train(
             schedule.step()
             total += loss.item()
             update_mean(mean, model, min(settings.memory, schedule.last_epoch / (schedule.last_epoch + 10)))
-        errors = processes.of_first(validate_all(mean, validation))
-        epochs.append(Epoch(epoch, processes.mean(total / data.epoch(batch)), errors))
+        epochs.append(Epoch(epoch, total / data.epoch(settings.batch), validate_all(mean, validation)))
         if best_of(epochs).epoch == epoch:
             best.load_state_dict(mean.state_dict())
         on_epoch(epochs[-1])
         seconds = time.monotonic() - started
-        if state and rank == 0:
+        if state:
             told = {"epochs": [dataclasses.asdict(e) for e in epochs], "seconds": seconds}
             save_state(state, of, {name: part.state_dict() for name, part in parts.items()} | told)
     chosen = best_of(epochs)

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 import numpy as np
 import torch
 
-from .moments import Moments
 from .recordings import WINDOW, Drive
 
 STRIDE = 5
@@ -20,25 +19,19 @@ STRIDE = 5
 class Spans:
     """All spans of `windows` windows in some drives, one from each sample."""
 
-    def __init__(self, drives: list[Drive], windows: int, part: tuple[int, int] = (0, 1)):
-        """`part` (k, n) means process k of n, which gets every n-th span."""
+    def __init__(self, drives: list[Drive], windows: int):
         self.names = {drive.name: drive.sha256 for drive in drives}
-        self.moments = Moments.added([Moments.of(drive) for drive in drives])
         self.windows = windows
         self.length = WINDOW + (windows - 1) * STRIDE
-        self.features = torch.from_numpy(np.concatenate([d.features for d in drives]))
-        self.gyro_error = torch.from_numpy(np.concatenate([d.gyro_error for d in drives]))
+        features, gyro_error = (np.concatenate([getattr(d, name) for d in drives]) for name in ("features", "gyro_error"))
+        self.mean = torch.from_numpy(features.mean(axis=0, dtype=float)).float()
+        # Standard deviations of the features, followed by that of the gyro error.
+        deviations = [values.std(axis=0, dtype=float, ddof=1) for values in (features, gyro_error)]
+        self.deviations = torch.from_numpy(np.append(*deviations)).float()
+        self.features, self.gyro_error = torch.from_numpy(features), torch.from_numpy(gyro_error)
         ends = np.cumsum([len(d.gyro_error) for d in drives])
         starts = [np.arange(end - len(d.gyro_error), end - self.length + 1) for d, end in zip(drives, ends)]
-        every = torch.from_numpy(np.concatenate(starts))
-        rank, ranks = part
-        # Every process gets the same number of spans.
-        self.starts = every[rank::ranks][: len(every) // ranks]
-
-    @staticmethod
-    def count(samples: int, windows: int) -> int:
-        """Returns the number of spans in a drive of `samples` samples."""
-        return max(0, samples - (WINDOW + (windows - 1) * STRIDE) + 1)
+        self.starts = torch.from_numpy(np.concatenate(starts))
 
     def batches(self, windows: int) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
         """Yields shuffled batches of about `windows` windows: features (S, L, 6), gyro error (S, L).

@@ -3,8 +3,7 @@
 Trains once for each seed, prints each seed's errors on the validation drives with mean and spread, and
 keeps the best network. Test drives are never read. training.py describes the training and where it
 differs from the paper. A training that was killed resumes from the files STEM.seedN.state in --out;
-STEM.history.json has every epoch. Training drives can be Parquet shards (shards.py), and several
-processes train together under torchrun. With --scale-of CHECKPOINT, only the scale of that network's
+STEM.history.json has every epoch. With --scale-of CHECKPOINT, only the scale of that network's
 expected error is fitted (scale.py).
 """
 
@@ -21,7 +20,6 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
-from . import processes
 from .export import export, load_gyronet
 from .model import GyroNet
 from .recordings import Drive, find_drive, load_pieces, mean_1s_error
@@ -37,7 +35,6 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors files")
     parser.add_argument("--stem", default="gyronet", help="name of the files")
     parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07"], metavar="NAME")
-    parser.add_argument("--shards", type=Path, metavar="FOLDER", help="train on these shards instead (pyarrow)")
     parser.add_argument("--validate", nargs="+", default=["08"], metavar="NAME")
     parser.add_argument("--epochs", type=int, default=20)
     parser.add_argument("--patience", type=int, default=6, help="stop after this many epochs without improvement")
@@ -65,37 +62,26 @@ def line(what: str, validation: Validation) -> str:
 def main() -> None:
     args = arguments()
     torch.set_num_threads(args.threads)
-    processes.join()
     try:
         run(args)
     except ValueError as error:
         raise SystemExit(str(error)) from error
     except KeyboardInterrupt:
         raise SystemExit("stopped; the same command resumes after the last complete epoch") from None
-    finally:
-        processes.leave()
 
 
 def run(args: argparse.Namespace) -> None:
-    """Trains and writes the files; only the first process writes and prints."""
-    first = processes.part()[0] == 0
-    say = print if first else lambda *_, **__: None
+    """Trains and writes the files."""
     args.out.mkdir(parents=True, exist_ok=True)
     validation = pieces(args.data, args.validate)
     if args.scale_of:
-        model, provenance = with_scale(args, csv_drives(args), validation)
+        model, provenance = with_scale(args, pieces(args.data, args.train), validation)
     else:
-        model, provenance = best_of_seeds(args, validation, say)
+        model, provenance = best_of_seeds(args, validation)
     if args.note:
         provenance["note"] = args.note
-    if first:
-        for path in export(model, provenance, args.out, args.stem):
-            print(path)
-
-
-def csv_drives(args: argparse.Namespace) -> list[Drive]:
-    """Returns the training drives."""
-    return pieces(args.data, args.train)
+    for path in export(model, provenance, args.out, args.stem):
+        print(path)
 
 
 def pieces(folder: Path, names: list[str]) -> list[Drive]:
@@ -103,57 +89,45 @@ def pieces(folder: Path, names: list[str]) -> list[Drive]:
     return [piece for name in tqdm(names, "reading", disable=None) for piece in load_pieces(find_drive(folder, name))]
 
 
-def data(args: argparse.Namespace):
-    """Returns the training data: drives in memory, or shards as a stream."""
-    if args.shards is None:
-        return Spans(csv_drives(args), args.windows, processes.part())
-    try:
-        from .shards import Stream
-    except ImportError as error:
-        raise ValueError(f"--shards needs pyarrow: {error}") from error
-    return Stream(args.shards, args.windows, processes.part())
-
-
-def best_of_seeds(args: argparse.Namespace, validation: list[Drive], say) -> tuple[GyroNet, dict]:
+def best_of_seeds(args: argparse.Namespace, validation: list[Drive]) -> tuple[GyroNet, dict]:
     """Trains with each seed; returns the best network on the validation drives, and its provenance."""
     weights = [len(drive.gyro_error) for drive in validation]
     static = float(np.average([mean_1s_error(drive.gyro_error) for drive in validation], weights=weights))
-    say(f"static initialisation: 1 s error {static:.6f} rad")
+    print(f"static initialisation: 1 s error {static:.6f} rad")
     settings = Settings(args.epochs, args.batch, args.lr, args.turns, args.units, args.windows, args.patience)
-    spans = data(args)
+    spans = Spans(pieces(args.data, args.train), args.windows)
     networks: dict[int, Trained] = {}
     for seed in args.seeds:
 
         def on_epoch(epoch: Epoch) -> None:
-            say(line(f"seed {seed} epoch {epoch.epoch}, loss {epoch.loss:.4f}", epoch.validation), flush=True)
+            print(line(f"seed {seed} epoch {epoch.epoch}, loss {epoch.loss:.4f}", epoch.validation), flush=True)
 
         state = args.out / f"{args.stem}.seed{seed}.state"
         networks[seed] = train(spans, validation, settings, seed, on_epoch, state)
-        say(line(f"seed {seed}, {networks[seed].seconds:.0f} s", networks[seed].validation))
+        print(line(f"seed {seed}, {networks[seed].seconds:.0f} s", networks[seed].validation))
     errors = [network.validation.mean_1s_rad for network in networks.values()]
     seconds = sum(network.seconds for network in networks.values())
     if len(errors) > 1:
-        say(
+        print(
             f"{len(errors)} seeds in {seconds:.0f} s: 1 s error {statistics.mean(errors):.6f} rad, "
             f"standard deviation {statistics.stdev(errors):.6f}"
         )
     seed = min(networks, key=lambda seed: networks[seed].validation.any_1s_rad)
     chosen = networks[seed]
-    if processes.part()[0] == 0:
-        history = {
-            "static_1s_rad": static,
-            "seed": seed,
-            "seeds": {
-                s: {
-                    "best": n.epoch,
-                    "seconds": n.seconds,
-                    "loss": [e.loss for e in n.epochs],
-                    "mean_1s_rad": [e.validation.mean_1s_rad for e in n.epochs],
-                }
-                for s, n in networks.items()
-            },
-        }
-        (args.out / f"{args.stem}.history.json").write_text(json.dumps(history))
+    history = {
+        "static_1s_rad": static,
+        "seed": seed,
+        "seeds": {
+            s: {
+                "best": n.epoch,
+                "seconds": n.seconds,
+                "loss": [e.loss for e in n.epochs],
+                "mean_1s_rad": [e.validation.mean_1s_rad for e in n.epochs],
+            }
+            for s, n in networks.items()
+        },
+    }
+    (args.out / f"{args.stem}.history.json").write_text(json.dumps(history))
     provenance = {
         "network": "gyronet",
         "train": list(spans.names),
@@ -165,7 +139,6 @@ def best_of_seeds(args: argparse.Namespace, validation: list[Drive], say) -> tup
         "epoch": chosen.epoch,
         "seed": seed,
         "seconds": round(seconds),
-        "processes": processes.part()[1],
         **dataclasses.asdict(settings),
         "torch": torch.__version__.split("+")[0],
         "date": datetime.date.today().isoformat(),
