@@ -55,6 +55,7 @@ def parser():
         dbc.add_argument(f"--{wheel}", metavar="SIGNAL")
     dbc.add_argument("--unit", action="append", default=[], metavar="SIGNAL=UNIT", help="unit of a signal, such as RL=km/h")
     dbc.add_argument("--out", metavar="FILE.toml", help="write to this file instead of standard output")
+    dbc.add_argument("--json", action="store_true", help="print settings and remarks as JSON")
     dbc.add_argument("--quiet", "-q", action="store_true", help="no remarks")
     return top
 
@@ -83,7 +84,7 @@ def add_log_arguments(log):
 
 def vehicle_of(args):
     """The vehicle file's content, in which arguments replace what the file gives."""
-    from gyronet.logs.vehicle import Vehicle
+    from gyronet.vehicle import Vehicle
 
     first = Path(args.files[0]).resolve()
     own, shared = first.with_suffix(".toml"), first.with_name("vehicle.toml")
@@ -110,11 +111,11 @@ def vehicle_of(args):
 
 
 def drive_of(args):
-    from gyronet.logs import Drive, Request, progress
-    from gyronet.logs.units import Flags
+    from gyronet import progress
+    from gyronet.logs import Drive, Request
+    from gyronet.units import Flags
 
     progress.QUIET = args.quiet
-
     if not 0 <= args.start < 1e6 or args.to is not None and not args.start < args.to:
         raise Refused("--from and --to are seconds after the first sample, --from below --to")
     if args.rate is not None and not 0 < args.rate < 1e5:

@@ -5,7 +5,7 @@ import struct
 import numpy as np
 
 from gyronet import Coprocessor, bags
-from gyronet.logs import progress
+from gyronet.progress import bar
 from gyronet.refused import Refused
 
 # A rate is corrected only where the rows of the board are this close, s.
@@ -65,12 +65,12 @@ class Change:
     def __init__(self, drive, corrections):
         self.topic, self.recorded, self.corrections = drive.gyro.name, drive.request.recorded, corrections
         self.corrected, self.left, self.said = 0, 0, (None, 0)
-        self.progress = progress.Progress(f"correct {self.topic}", len(corrections.stamps))
+        self.progress = bar(None, f"correct {self.topic}", len(corrections.stamps))
 
     def __call__(self, topic, kind, recorded, data, is_ros1):
         if topic != self.topic or kind != "sensor_msgs/msg/Imu":
             return data, None
-        self.progress.step()
+        self.progress.update()
         order, place, stamp, header = layout(data, is_ros1)
         values = np.array(struct.unpack_from(order + "12d", data, place))
         seconds = stamp if stamp > 0 and not self.recorded else 1e-9 * recorded
@@ -140,6 +140,6 @@ def correct(drive, path, out, weights=None, calibration=None):
         raise Refused(f"{path}: {error}; --from SECONDS starts at a later rest") from None
     change = Change(drive, corrections)
     bags.copy(path, out, change)
-    change.progress.end()
+    change.progress.close()
     return (f"{out}: {change.corrected} messages of {channel.name} corrected, {change.left} left as they are (initialising, gaps, not usable); "
             f"quality in {bags.TOPIC}")

@@ -1,11 +1,13 @@
 """`wheels from-dbc`: settings of wheel frames from a DBC file. What the board's settings cannot say is a remark or a refusal."""
 
+import json
 import re
 import sys
+import tomllib
 from pathlib import Path
 
 from gyronet import dbc
-from gyronet.logs import units
+from gyronet import units
 from gyronet.refused import Refused, listed
 
 WHEELS = ["front-left", "front-right", "rear-left", "rear-right"]
@@ -15,6 +17,7 @@ SAYS_FAULT = re.compile(r"fault|fail|err|inv|fehl|ung(ue|ü)lt|not", re.IGNORECA
 SAYS_GOOD = re.compile(r"valid$|vld$|g(ue|ü)ltig|\bok\b|\bgood\b|normal", re.IGNORECASE)
 SAYS_BACK = re.compile(r"back|revers|r(ue|ü)ckw", re.IGNORECASE)
 MOST_CODES = 3
+SLOWEST_RANGE = 150.0  # km/h: a signal whose range ends below says nothing of a car's speeds
 SAYS_DIRECTION = re.compile(r"dir|richt|revers|backw|forw", re.IGNORECASE)
 
 
@@ -95,6 +98,12 @@ def entry(path, wheel, message, signal, flags, remarks, used):
         value = raw - (1 << signal.length) if signal.is_signed and raw >> signal.length - 1 else raw
         remarks.append(f"{name}: {raw:#x} ({codes[raw]}) is no speed either, but the settings hold {MOST_CODES} codes: the board reads "
                        f"{value * factor + offset:.1f} km/h")
+    # Half a count beyond, since the board rounds factor and offset.
+    low, high = ((limit or 0.0) * kmh + side * 0.5 * abs(factor) for limit, side in ((signal.minimum, -1), (signal.maximum, 1)))
+    if high >= SLOWEST_RANGE and low <= 0.0:
+        result["range_kmh"] = [round(low, 6), round(min(high, 1_000.0), 6)]
+    elif signal.maximum:
+        remarks.append(f"{name}: its range, {signal.minimum or 0:g} to {signal.maximum:g}, is not used, since a car leaves it")
     for key, value_of in (("valid_when", valid_value), ("reverse_when", reverse_value)):
         beside = [(other, value_of(other)) for other in message.signals if other.name.startswith(signal.name) and other.name != signal.name]
         beside = [(other, value) for other, value in beside if value is not None]
@@ -156,6 +165,9 @@ def run(args):
         print("\n".join(listing(args.file)))
         raise Refused("no signal is named, nothing is written: choose with --rear-left SIGNAL --rear-right SIGNAL")
     text, remarks = from_dbc(args.file, signals, args.unit)
+    if args.json and not args.out:
+        print(json.dumps({**tomllib.loads(text), "remarks": remarks}))
+        return
     for remark in [] if args.quiet else remarks:
         print(f"remark: {remark}", file=sys.stderr)
     if not args.out:

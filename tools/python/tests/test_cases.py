@@ -137,7 +137,7 @@ class OnTheBus(Case):
         lines = {
             "bus.log": [f" (2023-11-14 22:13:{20 + t:09.6f})  can0  4B0   [8]  {hex_(m)}" for m, t in zip(frames(), times(hz=25.0))],
             "bus.asc": ["date Thu Sep 2 09:37:49 am 2021", "base hex timestamps absolute", "internal events logged"]
-                       + [f"   {m.timestamp:.6f} 1  WHEELS          Rx   d 8 {hex_(m)}" for m in frames()],
+                       + [f"   {m.timestamp:.6f} 1  4B0          Rx   d 8 {hex_(m)}" for m in frames()],
             "bus.trc": [";####", ";   CAN activities imported from drive.blf", ";   Start time: 18.12.2021 14:28:07.062", ";   PCAN-Net: N/A",
                         ";    |       +time offset of message (ms)", ";----+-   ---+---  ----+---  +  -+ -- -- ..."]
                        + [f"{k + 1:6}) {1000 * t:9.0f}      04B0  8  {hex_(m)} " for k, (m, t) in enumerate(zip(frames(), times(hz=25.0)))]}
@@ -146,11 +146,10 @@ class OnTheBus(Case):
             t = times()
             table(self.path("imu.csv"), t if name.endswith("trc") else START + t, imu(t))
             self.has_wheels(self.imports("imu.csv", name, *SAME))
-            packed = self.path(name + ".gz")
-            packed.write_bytes(gzip.compress(self.path(name).read_bytes()))
-            self.has_wheels(self.imports("imu.csv", packed.name, *SAME))
-        packed.write_bytes(packed.read_bytes()[:200])
-        self.refuses("imu.csv", packed.name, *SAME, says=["cannot be unpacked"])
+            self.path("packed.gz").write_bytes(gzip.compress(self.path(name).read_bytes()))
+            self.refuses("imu.csv", "packed.gz", *SAME, says=["compressed by gzip; unpack it first: gunzip FILE"])
+        self.path("bus.asc").write_text(self.path("bus.asc").read_text().replace(" 4B0 ", " WHEELS "))
+        self.refuses("imu.csv", "bus.asc", *SAME, says=["no frame of this asc log", "names of messages in place of identifiers", "export them as numbers"])
 
     def test_the_formats_of_python_can(self):
         table(self.path("imu.csv"), START + times(), imu(times()))
@@ -218,6 +217,10 @@ class InBags(Case):
         self.assertLess(np.abs(drive["gyr_z"] - made.turn(drive["t_s"])).max(), 0.03)
         made.mcap(self.path("g.mcap"), made.imu_messages(t, imu(t, force=1 / 9.80665)))
         self.refuses("g.mcap", says=["the specific force is 1.00", "--unit /imu=g"])
+        self.refuses("g.mcap", "--unit", "/imu=g", "--unit", "/imu=km/h", says=["--unit /imu=km/h: no channel", "with such a unit"])
+        made.mcap(self.path("kmh.mcap"), [*made.imu_messages(t, imu(t)), *made.odometry_messages(times(80.0, 10.0))])
+        wheels = [self.imports("kmh.mcap", *flags, "--out", "out.csv")["wheel2_rate"] for flags in ([], ["--unit", "/odom=km/h"])]
+        np.testing.assert_allclose(3.6 * wheels[1], wheels[0], atol=3e-6)
 
     def test_31_33_halves_of_an_imu(self):
         t, rows = times(), imu(times())
@@ -237,18 +240,18 @@ class InBags(Case):
         made.mcap(self.path("b.mcap"), made.imu_messages(burst, imu(t)))
         drive = self.imports("b.mcap", "--out", "out.csv", says=["bursts of 10 every 0.100 s from 0.00 s on"])
         self.assertLess(np.abs(drive["gyr_z"] - made.turn(drive["t_s"])).max(), 0.03)
-        text = self.imports("b.mcap")
-        self.assertIn("100.0 Hz to 100 Hz", text)
+        self.assertIn("100.0 Hz, 0.00 to 11.99 s", self.imports("b.mcap"))
 
     def test_37_joints_without_velocity(self):
         angle = np.cumsum(made.speed(times()) / 0.3) / 50
-        joints = [("/joints", "sensor_msgs/msg/JointState", START + s, made.build(made.STORE, "sensor_msgs/msg/JointState", START + s,
-                   name=["rl", "rr"], position=np.array([a, a]))) for s, a in zip(times(), angle)]
-        made.mcap(self.path("j.mcap"), [*made.imu_messages(times(), imu(times())), *joints])
         self.path("v.toml").write_text("[wheels]\nradius_m = 0.3\nrear_left = '/joints/rl'\nrear_right = '/joints/rr'\n")
-        drive = self.imports("j.mcap", "--vehicle", "v.toml", "--out", "out.csv", says=["no velocity"])
-        truth = made.speed(drive["t_s"]) / 0.3
-        self.assertLess(np.nanmax(np.abs(drive["wheel4_rate"] - truth)), 0.2)
+        for field, values in (("velocity", made.speed(times()) / 0.3), ("position", angle)):
+            joints = [("/joints", "sensor_msgs/msg/JointState", START + s, made.build(made.STORE, "sensor_msgs/msg/JointState", START + s,
+                       name=["rl", "rr"], **{field: np.array([v, v])})) for s, v in zip(times(), values)]
+            made.mcap(self.path(f"{field}.mcap"), [*made.imu_messages(times(), imu(times())), *joints])
+        drive = self.imports("velocity.mcap", "--vehicle", "v.toml", "--out", "out.csv")
+        self.assertLess(np.nanmax(np.abs(drive["wheel4_rate"] - made.speed(drive["t_s"]) / 0.3)), 0.2)
+        self.refuses("position.mcap", "--vehicle", "v.toml", says=["no channel /joints/rr", "positions only (record velocities"])
 
     def test_the_bags_of_rosbags(self):
         for name, write in (("one.bag", made.bag1), ("lite", made.bag2), ("cap", lambda p, m: made.bag2(p, m, "mcap")),
@@ -305,12 +308,24 @@ class InTables(Case):
         comma = self.path("comma.csv")
         table(comma, t, rows, "t_s;acc_x;acc_y;acc_z;gyr_x;gyr_y;gyr_z", ";")
         comma.write_text(comma.read_text().replace(".", ","))
-        self.path("d.gcsv").write_text("GYROFLOW IMU LOG\nversion,1.3\nid,logger\norientation,YxZ\ntscale,0.001\ngscale,0.001\nascale,0.001\nt,gx,gy,gz,ax,ay,az\n"
-                                       + "".join(f"{1000 * s:.0f}," + ",".join(f"{v:.0f}" for v in [*row[3:] * 1e3, *row[:3] / 9.80665e-3]) + "\n" for s, row in zip(t, rows)))
-        for arguments, says in ((["data.csv", "--vehicle", "v.toml"], "start = 1403636579.758"), (["comma.csv"], "decimal commas"), (["d.gcsv"], "orientation YxZ")):
+        self.path("d.gcsv").write_text("GYROFLOW IMU LOG\nversion,1.3\ntscale,0.001\ngscale,0.001\nascale,0.001\nt,gx,gy,gz,ax,ay,az\n0,0,0,0,0,0,1000\n")
+        self.refuses("d.gcsv", says=["a Gyroflow log", "write a table in SI, headed t_s,acc_x"])
+        for arguments, says in ((["data.csv", "--vehicle", "v.toml"], "start = 1403636579.758"), (["comma.csv"], "decimal commas")):
             drive = self.imports(*arguments, "--out", "out.csv", says=[says])
             self.assertLess(np.abs(drive["gyr_z"] - made.turn(drive["t_s"])).max(), 0.03)
             self.assertLess(np.abs(drive["acc_z"] - 9.81).max(), 0.05)
+
+    def test_rows_that_do_not_fit(self):
+        t = times()
+        table(self.path("d.csv"), t, imu(t))
+        lines = self.path("d.csv").read_text().splitlines()
+        for at, row in ((100, lines[100] + ",7,8"), (200, lines[200] + ","), (300, lines[300] + ",9"), (400, lines[400].rsplit(",", 2)[0]),
+                        (500, "nan" + lines[500][8:]), (510, ""), (520, "dear reader,hello")):
+            lines[at] = row
+        self.path("d.csv").write_text("\n".join(lines) + "\n")
+        drive = self.imports("d.csv", "--out", "out.csv", says=["dropped 2: d.csv: rows without a time", "dropped 2: d.csv: rows that are longer than the header",
+                                                              "dropped 1: d.csv: imu: not a finite number"])
+        self.assertLess(np.abs(drive["gyr_z"] - made.turn(drive["t_s"])).max(), 0.03)
 
     def test_45_54_tables_that_are_refused(self):
         t = times()

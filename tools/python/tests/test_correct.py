@@ -12,7 +12,7 @@ import made
 
 try:
     from gyronet import Coprocessor, bags
-    from gyronet.logs.vehicle import Vehicle
+    from gyronet.vehicle import Vehicle
 except ImportError:
     raise unittest.SkipTest("the board's extension is not built: pip install ./tools/python with Rust") from None
 

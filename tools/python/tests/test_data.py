@@ -39,7 +39,7 @@ class Logs(Folder):
         drive, text = self.imports(DATA / "jackal.bag")
         self.assertEqual(len(drive["t_s"]), 6_121)
         self.assertGreater(np.isfinite(drive["wheel2_rate"]).sum(), 6_000)
-        self.assertIn("50.0 Hz to 100 Hz: linear interpolation", text)
+        self.assertIn("imu: /imu/data, m/s^2, rad/s, 50.0 Hz, 0.00 to 61.20 s", text)
 
     def test_two_imus_and_two_odometries(self):
         bag = DATA / "xsens_wheels_stereo.bag"

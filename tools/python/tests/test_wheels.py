@@ -1,5 +1,6 @@
 """Wheel settings from DBC files."""
 
+import json
 import shutil
 import tempfile
 import tomllib
@@ -45,7 +46,7 @@ class FromDbc(unittest.TestCase):
                                 "valid_when": {"start_bit": 40, "bits": 1, "order": "intel", "value": 1}})
         self.assertEqual(right["reverse_when"], {"start_bit": 41, "bits": 2, "order": "intel", "value": 2})
         self.assertEqual(right["invalid"], 0x4000)
-        for words in ("RR_Quality (bit 48, 2 bits) seems to be validity", "a checksum or a counter", "address FE stands for any sender"):
+        for words in ("RR_Quality (bit 48, 2 bits) seems to be validity", "a checksum or a counter", "address FE stands for any sender", "its range, 0 to 9, is not used"):
             self.assertIn(words, text)
 
     def test_what_a_frame_says_of_its_speeds(self):
@@ -58,6 +59,7 @@ class FromDbc(unittest.TestCase):
         left, right = file["frame"][0]["signal"]
         self.assertEqual((left["invalid"], left["valid_when"]["start_bit"], left["valid_when"]["value"]), ([32767, 32766, 32765], 7, 0))
         self.assertEqual((right["valid_when"]["start_bit"], right["valid_when"]["value"]), (23, 0))
+        self.assertEqual((left["range_kmh"], right["range_kmh"]), ([-0.005, 250.005], [-0.005, 250.005]))
         self.assertIn("0x7ffb (Error3) is no speed either, but the settings hold 3 codes", text)
 
     def test_bit_31_that_is_missing(self):
@@ -87,6 +89,11 @@ class FromDbc(unittest.TestCase):
             self.assertEqual((status, file), (1, None), text)
             self.assertIn(words, text)
         self.assertIn("both wheels of an axle", self.run_("--rear-left", "RL", "--out", "w.toml")[1])
+
+    def test_as_json(self):
+        status, text, _ = self.run_(*REAR, "--json", unit="Unit_KiloMeterPerHour")
+        file = json.loads(text)
+        self.assertEqual((status, file["frame"][0]["id"], file["frame"][0]["signal"][0]["range_kmh"], file["remarks"]), (0, 0x4B0, [-0.005, 655.005], []))
 
     def test_without_signals_they_are_listed_and_nothing_is_written(self):
         status, text, file = self.run_("--out", "w.toml", extra='VAL_ 1200 FL 65535 "SNA" ;\n')

@@ -8,12 +8,10 @@ from pathlib import Path
 import can
 
 from gyronet import dbc
-from gyronet.logs.progress import Progress
+from gyronet.progress import bar
 from gyronet.refused import Refused, listed
 
 SCREEN = re.compile(r"\s*\(([^)]+)\)\s+(\S+)\s+(?:[RT]X\s+\S+\s+\S+\s+|[RT]X\s+)?([0-9A-Fa-f]{3,8})\s+\[(\d+)\]\s*(.*)")
-
-
 FIRST_IS_0 = {"asc": 1, "blf": 1}  # python-can counts the channels of these from 0
 
 
@@ -53,14 +51,14 @@ class Bus:
         try:
             raw = message.decode(data, decode_choices=False, scaling=False, allow_truncated=True)
         except Exception:  # a multiplexer value without signals, a container that is cut
-            log.dropped[f"{message.name}: cannot be decoded"] += 1
+            log.drop(f"{message.name}: cannot be decoded")
             return
         for signal, name, codes in taken:
             value = raw.get(signal.name)
             if value is None:
                 log.passed[f"frame of {message.name} without {signal.name} (another multiplexer value, or too short)"] += 1
             elif value in codes:
-                log.dropped[f"{name}: marked as no value ({codes[value]})"] += 1
+                log.drop(f"{name}: marked as no value ({codes[value]})")
             else:
                 physical = float(signal.conversion.raw_to_scaled(value, decode_choices=False))
                 log.add(f"{name}@{bus}" if bus else name, "number", seconds, (physical,), signal.unit or "")
@@ -84,76 +82,46 @@ class Bus:
         return f"; no frame {message.frame_id:X} of {message.name} gave it" + listed(passed, "; passed over: ", 8)
 
 
-class Asc(can.ASCReader):
-    """Vector ASC whose lines may hold the names of messages in place of identifiers."""
-
-    names = {}
-
-    def _extract_can_id(self, text, fields):
-        message = self.names.get(text)
-        if message is None:
-            return super()._extract_can_id(text, fields)
-        fields.update(arbitration_id=message.frame_id, is_extended_id=message.is_extended_frame)
-
-
-def screen(file):
+def screen(path):
     """What candump prints on a screen: `(stamp) can0 123 [2] 01 02`; the stamp may be a date (-tA), taken as UTC."""
-    for line in file:
-        found = SCREEN.match(line)
-        if not found or "remote" in found[5]:
-            yield None
-            continue
-        stamp = found[1].strip()
-        if "-" in stamp[1:]:
-            seconds = datetime.fromisoformat(stamp).replace(tzinfo=timezone.utc).timestamp()
-        else:
-            seconds = float(stamp)
-        data = bytes.fromhex("".join(found[5].split()[: int(found[4])]))
-        yield can.Message(seconds, int(found[3], 16), len(found[3]) > 3, data=data, channel=found[2], is_fd=len(data) > 8, check=False)
+    with open(path, encoding="utf-8", errors="replace") as file:
+        for line in file:
+            found = SCREEN.match(line)
+            if not found or "remote" in found[5]:
+                yield None
+                continue
+            stamp = found[1].strip()
+            date = "-" in stamp[1:] and datetime.fromisoformat(stamp).replace(tzinfo=timezone.utc)
+            data = bytes.fromhex("".join(found[5].split()[: int(found[4])]))
+            yield can.Message(date.timestamp() if date else float(stamp), int(found[3], 16), len(found[3]) > 3, data=data, channel=found[2],
+                              is_fd=len(data) > 8, check=False)
 
 
 def read(path, kind, log, bus):
     """A log of the kind candump, screen, asc, blf, trc or mf4."""
-    named = bus.names if bus.path else {}
-    readers = {"candump": can.CanutilsLogReader, "asc": type("Asc", (Asc,), {"names": named}), "blf": can.BLFReader,
-               "trc": can.TRCReader, "mf4": can.MF4Reader}
-    first, before = None, len(log.passed)
-    progress = Progress(Path(path).name, Path(path).stat().st_size)
-    frames = 0
+    readers = {"candump": can.CanutilsLogReader, "screen": screen, "asc": can.ASCReader, "blf": can.BLFReader, "trc": can.TRCReader,
+               "mf4": can.MF4Reader}
+    first, frames, before = None, 0, len(log.passed)
     try:
-        if kind == "screen":
-            reader = screen(open(path, encoding="utf-8", errors="replace"))
-        else:
-            reader = readers[kind](str(path))
-        for message in reader:
+        for message in bar(readers[kind](str(path)), Path(path).name):
             frames += 1
-            if frames % 1000 == 0 and getattr(reader, "file", None):
-                progress.at(reader.file.buffer.tell() if hasattr(reader.file, "buffer") else reader.file.tell())
             if message is None:
-                log.dropped["lines that are not a frame"] += 1
+                log.drop("lines that are not a frame")
             elif message.is_error_frame or message.is_remote_frame:
                 log.passed["CAN error frame" if message.is_error_frame else "CAN remote frame"] += 1
             else:
-                channel = message.channel
-                if isinstance(channel, int):
-                    channel += FIRST_IS_0.get(kind, 0)
-                    name = str(channel) if channel > 1 else ""
-                else:
-                    first = first or channel
-                    name = "" if channel in (None, first) else str(channel)
-                bus.add(log, message.timestamp, name, message.arbitration_id, message.is_extended_id, bytes(message.data))
+                first = message.channel if first is None else first
+                channel = message.channel + FIRST_IS_0.get(kind, 0) if isinstance(message.channel, int) else message.channel
+                own = channel is None or (channel <= 1 if isinstance(channel, int) else channel == first)
+                bus.add(log, message.timestamp, "" if own else str(channel), message.arbitration_id, message.is_extended_id, bytes(message.data))
     except Refused:
         raise
     except Exception as error:  # the libraries raise whatever a damaged line provokes
-        place = f"after {frames} frames"
         hint = ""
         if kind == "asc" and isinstance(error, ValueError) and "invalid literal" in str(error):
-            hint = "; the lines may hold names of messages in place of identifiers: pass the DBC file that has them with --dbc"
+            hint = "; lines with names of messages in place of identifiers are not read: export them as numbers"
         if not frames:
             raise Refused(f"{path}: no frame of this {kind} log can be read: {error}{hint}") from None
-        log.dropped[f"damaged {place}, the rest is not read: {error}{hint}"] += 1
-    progress.end()
+        log.drop(f"damaged after {frames} frames, the rest is not read: {error}{hint}")
     if not frames and len(log.passed) == before:
         raise Refused(f"{path}: no frame in this {kind} log; its lines are not of the form that its beginning says")
-    if kind == "screen" and "-" in open(path, encoding="utf-8", errors="replace").read(40)[2:20]:
-        log.notes.append("the stamps are dates without a zone: taken as UTC")

@@ -13,14 +13,9 @@ SLOWEST, WORST, LONGEST, LEAST_SCATTER, METRES = 1.0, 0.15, 4.0, 0.01, 111_320.0
 
 def courses(rows):
     """Rows of time, course (rad to the left, unwrapped), its standard deviation and speed."""
-    found = by_velocity(rows) if np.isfinite(rows[:, 4]).any() else by_positions(rows)
+    found = by_velocity(rows) if np.isfinite(rows[:, 4]).any() else by_positions(rows) if len(rows) > 3 else []
     found = np.array(found, float).reshape(-1, 4)
-    last = None
-    for row in found:
-        if last is not None:
-            turns = (row[1] - last) / math.tau
-            row[1] -= math.tau * math.copysign(math.floor(abs(turns) + 0.5), turns)
-        last = row[1]
+    found[:, 1] = np.unwrap(found[:, 1])
     return found
 
 
@@ -31,8 +26,6 @@ def by_velocity(rows):
 
 
 def by_positions(rows):
-    if not len(rows):
-        return []
     east = METRES * math.cos(math.radians(rows[0, 1]))
     x, y, times = east * (rows[:, 2] - rows[0, 2]), METRES * (rows[:, 1] - rows[0, 1]), rows[:, 0]
     noise, found = scatter(x, y), []
@@ -55,4 +48,4 @@ def scatter(x, y):
     """Standard deviation of neighbouring fixes in one direction, m, by the median third difference."""
     sizes = np.sort(np.abs(np.concatenate([np.diff(x, 3), np.diff(y, 3)])))
     # 1 + 9 + 9 + 1 variances; a median of absolute values is 0.6745 standard deviations.
-    return max(sizes[len(sizes) // 2] / (0.6745 * math.sqrt(20)), LEAST_SCATTER) if len(sizes) else math.inf
+    return max(sizes[len(sizes) // 2] / (0.6745 * math.sqrt(20)), LEAST_SCATTER)

@@ -10,15 +10,16 @@ import numpy as np
 
 from gyronet.logs import clocks, course, grid, opened, select
 from gyronet.logs.can import Bus
-from gyronet.logs.units import Flags
+from gyronet.units import Flags
 from gyronet.logs.used import Used
-from gyronet.logs.vehicle import RADIUS, WHEELS, Vehicle
+from gyronet.vehicle import RADIUS, WHEELS, Vehicle
 from gyronet.refused import Refused
 
 SHORTEST, LONGEST = 3.0, 86_400.0
 RATES = (24.5, 1_020.0)
 CHUNK = 50_000  # rows in memory
 DAY = 1e9  # s: later stamps are times of day
+NAMES = ["t_s", *select.IMU_COLUMNS, "ref_gyr_z", "ref_yaw", "ref_yaw_sigma", "gnss_speed", *select.COLUMNS]
 ROLES = [f"wheel {name.replace('_', ' ')}" for name in WHEELS]
 
 
@@ -41,19 +42,15 @@ class Request:
 
 def merged(logs):
     """Joins the parts of a split recording: the same channels, one after the other."""
-    logs = sorted(logs, key=lambda log: min([channel.first for channel in log.channels.values()], default=0.0))
     whole = []
-    for log in logs:
+    for log in sorted(logs, key=lambda log: min([channel.first for channel in log.channels.values()], default=0.0)):
         before = next((other for other in whole if _goes_on(other, log)), None)
         if before is None:
             whole.append(log)
             continue
         before.notes.append(f"{log.path} goes on where {before.path} ends")
         for name, channel in log.channels.items():
-            if name in before.channels:
-                before.channels[name].append(channel)
-            else:
-                before.channels[name] = channel
+            before.channels.setdefault(name, channel).append(channel)
         before.dropped.update(log.dropped)
         before.passed.update(log.passed)
     return whole
@@ -78,12 +75,8 @@ class Drive:
         self.choose(files)
         for log in logs:
             self.report += [f"{log.path}: {note}" for note in log.notes]
-            passed = {kind: count for kind, count in log.passed.items() if count}
-            if passed:
-                self.report.append(
-                    f"{log.path}: {sum(passed.values())} records that this drive does not need: "
-                    + ", ".join(list(passed)[:6])
-                )
+            if passed := +log.passed:
+                self.report.append(f"{log.path}: {passed.total()} records that this drive does not need: {', '.join(list(passed)[:6])}")
         self.report += bus.notes + files.notes
         self.span()
         clocks.settle(self, logs, request)
@@ -98,27 +91,26 @@ class Drive:
 
     def choose(self, files):
         signals, request = self.vehicle.signals, self.request
+
+        def used(role, entry):
+            return Used(role, entry, request) if entry else None
+
         gyro, accel = files.imu(signals["imu"])
         if gyro is accel:
-            self.gyro = self.accel = Used("imu", gyro, request)
+            self.gyro = self.accel = used("imu", gyro)
         else:
-            self.gyro, self.accel = Used("gyro", gyro, request), Used("accelerometer", accel, request)
+            self.gyro, self.accel = used("gyro", gyro), used("accelerometer", accel)
         self.accel.check_gravity()
         wheels = files.wheels(self.vehicle)
-        self.wheels = [Used(role, entry, request) if entry else None for role, entry in zip(ROLES, wheels)]
+        self.wheels = list(map(used, ROLES, wheels))
         name = signals["reference_rate"] or ("ref_gyr_z" if any(c.name == "ref_gyr_z" for _, c in files.all) else None)
-        entry = files.named("the reference rate", name, ("number", "imu", "gyro", "odometry")) if name else None
-        self.reference = Used("reference rate", entry, request) if entry else None
+        self.reference = used("reference rate", name and files.named("the reference rate", name, ("number", "imu", "gyro", "odometry")))
         # If wheels are found, no odometry is needed.
-        entry = None if any(wheels) and not signals["odometry"] else files.one("odometry", "odometry", ("odometry",), signals["odometry"])
-        self.odometry = Used("odometry", entry, request) if entry else None
-        entry = files.one("position", "position", ("position",), signals["position"])
-        self.position = Used("position", entry, request) if entry else None
+        self.odometry = used("odometry", files.one("odometry", signals["odometry"] or any(wheels) and "none"))
+        self.position = used("position", files.one("position", signals["position"]))
         self.courses = course.courses(self.position.channel.rows()) if self.position else np.empty((0, 4))
-        names = {channel.name for _, channel in files.all}
-        for name in request.offsets:
-            if name not in names:
-                raise Refused(f"--offset {name}: no such channel" + files.listed(files.all))
+        if unknown := set(request.offsets) - {channel.name for _, channel in files.all}:
+            raise Refused(f"--offset {min(unknown)}: no such channel" + files.listed(files.all))
         request.units.check()
 
     def used(self):
@@ -159,25 +151,25 @@ class Drive:
         for first in range(0, self.count, CHUNK):
             index = np.arange(first, min(first + CHUNK, self.count))
             times = self.start + grid.DT * index
-            table = np.full((len(index), 15), np.nan)
-            table[:, 0] = grid.DT * index
+            rows = np.full((len(index), 15), np.nan)
+            rows[:, 0] = grid.DT * index
             gyro = self.gyro.at(times)
             force = gyro[:, :3] if self.accel is self.gyro else self.accel.at(times)
-            table[:, 1:4], table[:, 4:7] = self.vehicle.turn(force), self.vehicle.turn(gyro[:, -3:])
+            rows[:, 1:4], rows[:, 4:7] = self.vehicle.turn(force), self.vehicle.turn(gyro[:, -3:])
             if self.reference:
-                table[:, 7] = self.reference.at(times)[:, 0]
+                rows[:, 7] = self.reference.at(times)[:, 0]
             here = (self.course_rows >= first) & (self.course_rows <= index[-1])
-            table[self.course_rows[here] - first, 8:11] = self.course_values[here]
+            rows[self.course_rows[here] - first, 8:11] = self.course_values[here]
             for k, wheel in enumerate(self.wheels):
                 if wheel:
-                    table[:, 11 + k] = wheel.at(times)[:, 0] * (1.0 if wheel.dimension == "rate" else 1.0 / self.vehicle.radius)
+                    rows[:, 11 + k] = wheel.at(times)[:, 0] * (1.0 if wheel.dimension == "rate" else 1.0 / self.vehicle.radius)
             if self.odometry:
                 speed, turn = self.odometry.at(times).T
                 half, known = 0.5 * (self.vehicle.wheels["track_m"] or 0.0), np.isfinite(speed)
-                table[known, 11], table[known, 13] = np.nan, np.nan
-                table[known, 12] = (speed + half * turn)[known] / self.vehicle.radius
-                table[known, 14] = (speed - half * turn)[known] / self.vehicle.radius
-            yield table[np.isfinite(table[:, 1:7]).all(axis=1)]
+                rows[known, 11], rows[known, 13] = np.nan, np.nan
+                rows[known, 12] = (speed + half * turn)[known] / self.vehicle.radius
+                rows[known, 14] = (speed - half * turn)[known] / self.vehicle.radius
+            yield rows[np.isfinite(rows[:, 1:7]).all(axis=1)]
 
     def count_rows(self):
         filled, self.rows, self.seconds = np.zeros(15, int), 0, 0.0
@@ -204,7 +196,6 @@ class Drive:
                 used.remarks.append("no course: it stands, is too slow or too noisy")
         for used in self.used():
             self.report.append(used.line(self.start, self.rows))
-        self.report.append(f"imu: {self.gyro.hz:.1f} Hz to 100 Hz: {grid.method(self.gyro.hz)}")
         if (self.odometry or any(wheel and wheel.dimension == "speed" for wheel in self.wheels)) and not self.vehicle.wheels["radius_m"]:
             self.report.append(f"wheels: radius {RADIUS} m is assumed; set wheels.radius_m")
         if self.count > self.rows:
@@ -212,15 +203,14 @@ class Drive:
 
     def start_of_day(self):
         """The time of day of row 0, s since 1970, by whichever clock has it."""
-        self.start_time = self.start if self.start > DAY else None
-        if self.start_time is None and self.vehicle.start is not None:
-            self.start_time = self.vehicle.start + self.start - self.gyro.offset
+        known = [self.start] if self.start > DAY else []
+        if self.vehicle.start is not None:
+            known.append(self.vehicle.start + self.start - self.gyro.offset)
         for used in self.used():
             epoch = self.logs[used.file].epoch
-            if self.start_time is None and epoch is not None:
-                self.start_time = self.start - used.offset + epoch
-            elif self.start_time is None and used.seconds[0] > DAY:
-                self.start_time = self.start - used.offset
+            if epoch is not None or used.seconds[0] > DAY:
+                known.append(self.start - used.offset + (epoch or 0.0))
+        self.start_time = known[0] if known else None
 
     def recording(self):
         """What is known of the import, as tables of the vehicle file."""
@@ -255,12 +245,8 @@ class Drive:
         return beside
 
     def write_csv(self, file):
-        names = (
-            "t_s acc_x acc_y acc_z gyr_x gyr_y gyr_z ref_gyr_z ref_yaw ref_yaw_sigma gnss_speed wheel1_rate wheel2_rate"
-            " wheel3_rate wheel4_rate"
-        )
         columns = [k for k in range(15) if k < 7 or self.seen[k]]
-        file.write(",".join(names.split()[k] for k in columns) + "\n")
+        file.write(",".join(NAMES[k] for k in columns) + "\n")
         form = ",".join(["%.2f"] + ["%.7f"] * 6 + ["%.6f"] * (len(columns) - 7)) + "\n"
         for table in self.chunks():
             for row in table[:, columns].tolist():

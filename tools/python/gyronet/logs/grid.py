@@ -17,12 +17,6 @@ def rate(seconds):
     return float(1 / np.partition(periods, middle)[middle])
 
 
-def method(hz):
-    if hz >= AVERAGED_HZ:
-        return "mean of the samples within 5 ms of each row"
-    return "interpolated to the row's time, no filter" if abs(hz - 100) < 0.5 else "linear interpolation, no filter"
-
-
 def resample(stamps, read, hz, times, offset=0.0):
     """Values at rising times, of samples with these stamps plus the offset; `read` gives the values of a range of samples."""
     low, high = np.searchsorted(stamps, [times[0] - offset - 2.0, times[-1] - offset + 2.0])

@@ -5,8 +5,9 @@ import re
 import numpy as np
 from asammdf import MDF
 
-from gyronet.logs import can, units
-from gyronet.logs.table import IMU_COLUMNS
+from gyronet import units
+from gyronet.logs import can
+from gyronet.logs.select import IMU_COLUMNS
 from gyronet.refused import Refused, listed
 
 

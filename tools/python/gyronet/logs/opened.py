@@ -1,20 +1,22 @@
 """A file or folder by its first bytes, whatever its suffix says; what cannot be a log is refused in one line."""
 
-import gzip
-import shutil
-import tempfile
+import re
 from pathlib import Path
 
+from gyronet.logs import can, ros
 from gyronet.logs.samples import Log
 from gyronet.refused import Refused
 
-SUFFIXES = {".bag", ".mcap", ".db3", ".ulg", ".log", ".asc", ".blf", ".trc", ".mf4", ".mdf", ".csv", ".txt", ".gcsv"}
-ZSTD, GZIP, SQLITE, MCAP = b"\x28\xb5\x2f\xfd", b"\x1f\x8b", b"SQLite format 3\0", b"\x89MCAP0\r\n"
+SUFFIXES = {".bag", ".mcap", ".db3", ".ulg", ".log", ".asc", ".blf", ".trc", ".mf4", ".mdf", ".csv", ".txt"}
+ROSBAG, SQLITE, MCAP = b"#ROSBAG V2.0", b"SQLite format 3\0", b"\x89MCAP0\r\n"
 REFUSED = [
+    (b"\x1f\x8b", "compressed by gzip; unpack it first: gunzip FILE"),
+    (b"\x28\xb5\x2f\xfd", "compressed by zstd; unpack it first: unzstd FILE (a compressed ROS 2 bag: import its folder)"),
     (b"version https://git-lfs", "a Git LFS pointer, not the file itself; run: git lfs pull"),
     (b"PK\x03\x04", "a ZIP archive; unpack it first"),
     (b"#ROSBAG V1", "a bag of version 1; convert it: rosbag fix OLD.bag NEW.bag"),
     (b"\x7fELF", "a program, not a log"),
+    (b"GYROFLOW", "a Gyroflow log, whose numbers are scaled by its head: write a table in SI, headed t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z"),
 ]
 
 
@@ -37,80 +39,46 @@ def expand(paths):
 
 
 def read(path, request, bus, several):
-    """The channels of one file."""
-    log = Log(str(path), request.wanted(), request.recorded)
-    if path.is_dir():
-        from gyronet.logs import ros
-        ros.read_bag(path, log, bus)
-        return log.close()
-    try:
-        with open(path, "rb") as file:
-            head = file.read(4096)
-    except OSError as error:
-        raise Refused(f"{path}: {error.strerror}") from None
-    if head.startswith((GZIP, ZSTD)):
-        with tempfile.TemporaryDirectory() as folder:
-            inner = Path(folder) / (path.stem if path.suffix in (".gz", ".zst") else path.name)
-            unpack(path, head, inner)
-            with open(inner, "rb") as file:
-                dispatch(inner, file.read(4096), log, request, bus, several)
-            return log.close()
-    dispatch(path, head, log, request, bus, several)
-    return log.close()
-
-
-def unpack(path, head, inner):
-    try:
-        if head.startswith(GZIP):
-            with gzip.open(path) as packed, open(inner, "wb") as file:
-                shutil.copyfileobj(packed, file)
-        else:
-            import zstandard
-            with open(path, "rb") as packed, open(inner, "wb") as file:
-                zstandard.ZstdDecompressor().copy_stream(packed, file)
-    except Exception as error:  # a truncated or damaged archive
-        raise Refused(f"{path}: cannot be unpacked: {error}") from None
-
-
-def dispatch(path, head, log, request, bus, several):
-    if not head:
-        raise Refused(f"{path}: is empty")
+    """The channels of one file or bag folder."""
+    log, head = Log(str(path), request.wanted(), request.recorded), b""
+    if not path.is_dir():
+        try:
+            with open(path, "rb") as file:
+                head = file.read(4096)
+        except OSError as error:
+            raise Refused(f"{path}: {error.strerror}") from None
+        if not head:
+            raise Refused(f"{path}: is empty")
     for magic, reason in REFUSED:
         if head.startswith(magic):
             raise Refused(f"{path}: {reason}")
     text = head.decode("utf-8", "replace").lstrip("\ufeff").lstrip()
     if text[:200].lower().startswith(("<!doctype", "<html", "<?xml")):
         raise Refused(f"{path}: a web page, not a log: the download went wrong")
-    if head.startswith((MCAP, SQLITE, b"#ROSBAG V2.0")):
-        from gyronet.logs import ros
-        (ros.read_mcap if head.startswith(MCAP) else ros.read_sqlite if head.startswith(SQLITE) else ros.read_bag)(path, log, bus)
+    if head.startswith(MCAP):
+        ros.read_mcap(path, log, bus)
+    elif not head or head.startswith((SQLITE, ROSBAG)):
+        ros.read_bag(path, log, bus, ".bag" if head.startswith(ROSBAG) else ".db3")
     elif head.startswith(b"ULog\x01\x12\x35"):
         from gyronet.logs import ulog
         ulog.read(path, log, bus)
     elif head.startswith((b"MDF     ", b"UnFinMF ")):
         from gyronet.logs import mdf
         mdf.read(path, log, bus, request.vehicle, request.units)
-    elif (kind := can_kind(head, text)):
-        from gyronet.logs import can
+    elif kind := can_kind(head, text):
         can.read(path, kind, log, bus)
     else:
         from gyronet.logs import table
         table.read(path, log, request.vehicle, request.units, request.rate, several)
+    return log.close()
 
 
 def can_kind(head, text):
-    lines = [line.strip() for line in text.lower().splitlines() if line.strip()]
-    first = lines[0] if lines else ""
+    """The format of a CAN log by its first line, of TRC by its remarks; None for another."""
     if head.startswith(b"LOGG"):
         return "blf"
-    if first.startswith("(") and "#" in first:
-        return "candump"
-    if first.startswith("(") and "[" in first:
-        return "screen"
-    if first.startswith(("date ", "base ")):
-        return "asc"
-    is_trc = any(
-        ";$fileversion" in line or "message number" in line or "pcan" in line or "time offset of message" in line
-        for line in lines
-    )
-    return "trc" if first.startswith(";") and is_trc else None
+    is_trc = re.search(r";\$fileversion|message number|pcan|time offset of message", text, re.IGNORECASE)
+    for kind, form in (("candump", r"\(.*#"), ("screen", r"\(.*\["), ("asc", "(date|base) "), ("trc", ";")):
+        if re.match(form, text, re.IGNORECASE) and (kind != "trc" or is_trc):
+            return kind
+    return None

@@ -45,34 +45,27 @@ class Channel:
         good &= np.isfinite(values).all(axis=1)
         if self.kind == "position":
             good &= (np.abs(block[:, 1]) <= 90) & (np.abs(block[:, 2]) <= 360)
-        self.drop("not a finite number", len(block) - np.count_nonzero(good))
+        self.log.drop(f"{self.name}: not a finite number", len(block) - np.count_nonzero(good))
         block = block[good]
         if not len(block):
             return
         seconds = block[:, 0]
-        before = np.maximum.accumulate(np.concatenate([[self.last], seconds[:-1]]))
-        rises = seconds > before
         self.first = seconds[0] if self.first is None else self.first
-        if not rises.all():
-            falls = ~rises
-            for reason, which in (("stand still", seconds == before), ("step back", seconds < before)):
-                if which.any():
-                    self.falls.setdefault(reason, [0, before[which][0] - self.first])[0] += np.count_nonzero(which)
-            far = before - seconds > STEP
-            if far.any():
-                size, place = (before - seconds)[far].max(), (before - self.first)[far][0]
-                old = self.back or (0.0, place, 0)
-                self.back = (max(size, old[0]), old[1], old[2] + np.count_nonzero(far))
-        kept, before = block[rises], before[rises]
-        if not len(kept):
-            return
-        pauses = np.where(np.isfinite(before), kept[:, 0] - before, 0.0)
-        at = int(np.argmax(pauses))
-        if pauses[at] > self.gap[0]:
-            self.gap = (float(pauses[at]), float(before[at] - self.first))
-        self.count, self.last = self.count + len(kept), float(kept[-1, 0])
+        before = np.maximum.accumulate(np.concatenate([[self.last], seconds[:-1]]))
+        step = seconds - before
+        for reason, which in (("stand still", step == 0), ("step back", step < 0)):
+            if which.any():
+                self.falls.setdefault(reason, [0, before[which][0] - self.first])[0] += np.count_nonzero(which)
+        if (far := step < -STEP).any():
+            size, place, lost = self.back or (0.0, before[far][0] - self.first, 0)
+            self.back = (max(size, -step[far].min()), place, lost + np.count_nonzero(far))
+        longest = int(np.argmax(np.where(np.isfinite(step), step, 0.0)))
+        if self.gap[0] < step[longest] < np.inf:
+            self.gap = (float(step[longest]), float(before[longest] - self.first))
+        kept = block[step > 0]
+        self.count, self.last = self.count + len(kept), float(max(seconds.max(), self.last))
         self.seen |= (kept[:, 1:] != 0).any(axis=0)
-        if self.kept:
+        if self.kept and len(kept):
             if self.file is None:
                 self.file = tempfile.TemporaryFile()
                 # A log and its channels refer to each other: without this the file is open until some later collection.
@@ -81,14 +74,10 @@ class Channel:
 
     def append(self, other):
         """Adds the samples of the same channel in the next part of a recording."""
-        if other.count and other.file:
+        if other is not self and other.count and other.file:
             for first in range(0, other.count, BLOCK):
                 self.extend(other.rows(first, first + BLOCK))
         self.close()
-
-    def drop(self, reason, count):
-        if count:
-            self.log.dropped[f"{self.name}: {reason}"] += int(count)
 
     def close(self):
         """Ends the writing; an IMU one of whose halves is zero throughout is a gyro or an accelerometer."""
@@ -96,7 +85,7 @@ class Channel:
         if self.file:
             self.file.flush()
         for reason, (count, place) in self.falls.items():
-            self.drop(f"stamps that {reason}, first at {place:.2f} s", count)
+            self.log.drop(f"{self.name}: stamps that {reason}, first at {place:.2f} s", count)
         self.falls = {}
         if self.kind == "imu" and self.count:
             force, rate = self.seen[:3].any(), self.seen[3:].any()
@@ -144,6 +133,10 @@ class Log:
             self.dropped[f"{name}: another type under the same name"] += 1
         else:
             channel.add(seconds, values)
+
+    def drop(self, reason, count=1):
+        if count:
+            self.dropped[reason] += int(count)
 
     def close(self):
         for channel in self.channels.values():

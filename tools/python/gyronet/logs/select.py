@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
-from gyronet.logs.vehicle import WHEELS
+from gyronet.vehicle import WHEELS
 from gyronet.refused import Refused, listed
 
+IMU_COLUMNS = ["acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z"]
 COLUMNS = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"]
 # Of these two only the first is a drive's: every PX4 log since 1.13 has both.
 PREFERRED = ("vehicle_gps_position", "sensor_gps")
@@ -45,19 +46,17 @@ class Files:
         seen = sorted(set(self.bus.candidates())) if kinds != ("imu",) and self.bus.path else []
         raise Refused(f"no channel {name} for {role}{why}" + (self.listed(others) or listed(seen)) + ("" if why else self.passed()))
 
-    def one(self, role, flag, kinds, name):
+    def one(self, kind, name):
         """The only channel of a kind, or the one of a name."""
-        if name == "none":
-            return None
         if name:
-            return self.named(role, name, kinds)
-        found = self.of(*kinds)
+            return None if name == "none" else self.named(kind, name, (kind,))
+        found = self.of(kind)
         names = [channel.name for _, channel in found]
         if len(found) == 2 and sorted(names) == sorted(PREFERRED):
-            self.notes.append(f"{role}: {PREFERRED[0]} is taken, not {PREFERRED[1]} (--{flag} {PREFERRED[1]} takes the other)")
+            self.notes.append(f"{kind}: {PREFERRED[0]} is taken, not {PREFERRED[1]} (--{kind} {PREFERRED[1]} takes the other)")
             found = [entry for entry in found if entry[1].name == PREFERRED[0]]
         if len(found) > 1:
-            raise Refused(f"several channels fit as {role}: name one in the vehicle file or with --{flag}" + self.listed(found))
+            raise Refused(f"several channels fit as {kind}: name one in the vehicle file or with --{kind}" + self.listed(found))
         return found[0] if found else None
 
     def imu(self, name):
@@ -72,7 +71,7 @@ class Files:
                 raise Refused(f"{name} has no {'accelerometer' if other == 'accel' else 'gyro'} (it is zero or absent throughout): "
                               f"--imu GYRO+ACCEL joins two channels" + self.listed(self.of(other, "imu")))
             return found, found
-        found = self.one("imu", "imu", ("imu",), None)
+        found = self.one("imu", None)
         if found:
             return found, found
         gyros, accels = self.of("gyro"), self.of("accel")

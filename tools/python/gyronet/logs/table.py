@@ -1,73 +1,82 @@
-"""Text tables by the csv module: any CSV by a column map, exports of Xsens MT Manager, EuRoC, and Gyroflow's .gcsv."""
+"""Text tables by pandas: any CSV by a column map, exports of Xsens MT Manager, and EuRoC."""
 
 import csv
 import itertools
-import math
 import re
+import warnings
 from pathlib import Path
 
-from gyronet.logs import units
+import numpy as np
+import pandas
+
+from gyronet import units
+from gyronet.logs.select import COLUMNS, IMU_COLUMNS
 from gyronet.refused import Refused, listed
 
-IMU_COLUMNS = ["acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z"]
-OWN_RATES = ["ref_gyr_z", "wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"]
+POSITION = ["latitude", "longitude", "position_sigma", "ground_speed", "course", "course_sigma"]
 # Names that common exports use for the same column in the same unit.
-KNOWN = {
-    "t_s": ["time_s", "timestamp_s", "timestamps"], "latitude": ["Latitude", "gnss_lat"], "longitude": ["Longitude", "gnss_lon"],
-    "position_sigma": [], "ground_speed": [], "course": [], "course_sigma": [],
-    **{name: [name.title()] for name in IMU_COLUMNS},
-}
-DIMENSION = {"t_s": "time", "latitude": "angle", "longitude": "angle", "position_sigma": "length", "ground_speed": "speed",
-             "course": "angle", "course_sigma": "angle", **dict(zip(IMU_COLUMNS, 3 * ["acceleration"] + 3 * ["rate"]))}
+KNOWN = {"t_s": ["time_s", "timestamp_s", "timestamps"], **{name: [name.title()] for name in IMU_COLUMNS},
+         **{name: [] for name in POSITION}, "latitude": ["Latitude", "gnss_lat"], "longitude": ["Longitude", "gnss_lon"]}
+DIMENSION = {"t_s": "time", **dict(zip(POSITION, ["angle", "angle", "length", "speed", "angle", "angle"])),
+             **dict(zip(IMU_COLUMNS, 3 * ["acceleration"] + 3 * ["rate"]))}
 REMARKS = 1_000  # lines before the header
+ROWS = 50_000  # in memory
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*([eE][+-]?\d+)?|\.\d+([eE][+-]?\d+)?|nan|inf)$", re.IGNORECASE)
 COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?$")
-GCSV = {"t": ("t_s", "tscale"), "gx": ("gyr_x", "gscale"), "gy": ("gyr_y", "gscale"), "gz": ("gyr_z", "gscale"),
-        "ax": ("acc_x", "ascale"), "ay": ("acc_y", "ascale"), "az": ("acc_z", "ascale")}
 
 
 class Header:
     """The columns of a table and how its rows are split: the last line of words before rows of numbers is the header."""
 
-    def __init__(self, path, file):
-        self.rate, self.settings, before = None, {}, []
-        for line in itertools.islice(file, REMARKS):
-            line = line.strip("\r\n")
-            if "DeviceTag" in line:
-                raise Refused(f"{path}: an Xsens DOT export, whose units differ by version; name its columns in the vehicle file")
-            if found := re.search(r"Update Rate:\s*([\d.]+)", line):
-                self.rate = float(found[1]) or None
-            if not line.strip():
-                continue
-            self.separator = next((mark for mark in (";", "\t", ",") if mark in line), None)
-            fields = self.split(line)
-            self.commas = self.separator != "," and any(map(COMMA.match, fields))
-            numbers = sum(bool(NUMBER.match(field.replace(",", ".") if self.commas else field)) for field in fields)
-            if numbers >= 2 and numbers + fields.count("") > len(fields) / 2:
-                break
-            if len(fields) == 2:
-                self.settings[fields[0]] = fields[1]
-            before.append(line)
-        else:
-            if any("\0" in line or "\ufffd" in line for line in before) or not any(len(self.split(line)) > 1 for line in before):
-                raise Refused(f"{path}: unknown format: neither a bag, MCAP, ULog, MDF or CAN log, nor a table with a header")
-            raise Refused(f"{path}: a table without a row of numbers in its first {len(before)} lines")
-        self.first = line
-        words = self.split(before[-1].lstrip("#/ ")) if before else []
-        if len(words) not in (len(fields), len(fields) - 1) or all(map(NUMBER.match, words)):
-            raise Refused(f"{path}: no header: line {len(before) + 1} has numbers, and the line before it does not name its "
+    def __init__(self, path):
+        self.rate, before = None, []
+        with open(path, encoding="utf-8-sig", errors="replace") as file:
+            for self.lines, line in enumerate(itertools.islice(file, REMARKS)):
+                line = line.strip("\r\n")
+                if "DeviceTag" in line:
+                    raise Refused(f"{path}: an Xsens DOT export, whose units differ by version; name its columns in the vehicle file")
+                if found := re.search(r"Update Rate:\s*([\d.]+)", line):
+                    self.rate = float(found[1]) or None
+                if not line.strip():
+                    continue
+                self.separator = next((mark for mark in (";", "\t", ",") if mark in line), None)
+                fields = self.split(line)
+                self.commas = self.separator != "," and any(map(COMMA.match, fields))
+                numbers = sum(bool(NUMBER.match(field.replace(",", ".") if self.commas else field)) for field in fields)
+                if numbers >= 2 and numbers + fields.count("") > len(fields) / 2:
+                    break
+                before.append(line)
+            else:
+                if any("\0" in line or "\ufffd" in line for line in before) or not any(len(self.split(line)) > 1 for line in before):
+                    raise Refused(f"{path}: unknown format: neither a bag, MCAP, ULog, MDF or CAN log, nor a table with a header")
+                raise Refused(f"{path}: a table without a row of numbers in its first {len(before)} lines")
+        self.names = self.split(before[-1].lstrip("#/ ")) if before else []
+        if len(self.names) not in (len(fields), len(fields) - 1) or all(map(NUMBER.match, self.names)):
+            raise Refused(f"{path}: no header: line {self.lines + 1} has numbers, and the line before it does not name its "
                           f"{len(fields)} columns; write such a line, for example t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z")
         # A unit may stand in brackets behind the name, as EuRoC writes it.
-        self.names, self.units = words, {}
-        for name in words:
-            if found := re.match(r"(.*\S)\s*[\[(]([^\])]+)[\])]$", name):
-                self.units[name] = found[2]
-        self.gcsv = bool(before) and before[0].startswith("GYROFLOW IMU LOG")
+        found = {name: re.match(r"(.*\S)\s*[\[(]([^\])]+)[\])]$", name) for name in self.names}
+        self.units = {name: match[2] for name, match in found.items() if match}
 
     def split(self, line):
         if self.separator is None:
             return line.split()
         return [field.strip() for field in next(csv.reader([line], delimiter=self.separator), [])]
+
+
+class Columns:
+    """Where our columns are in a table, and their scales."""
+
+    def __init__(self, path, header, vehicle, flags, several):
+        self.path, self.names, self.units, self.flags, self.vehicle = path, header.names, header.units, flags, vehicle
+        self.places, self.scales = {}, {}
+        for ours, others in KNOWN.items():
+            if ours in vehicle.columns:
+                place = self.mapped(ours, several)
+            else:
+                place = next((at for at in map(self.column, [ours, *others]) if at is not None), None)
+            if place is not None:
+                self.places[ours], self.scales[ours] = place, self.scale(ours, place)
 
     def column(self, name):
         """The index of a column; a leading # belongs to the header, and the unit in brackets may be left out."""
@@ -76,146 +85,98 @@ class Header:
                 return at
         return None
 
-
-class Columns:
-    """Where our columns are in a table, and their scales."""
-
-    def __init__(self, path, header, vehicle, flags, several):
-        self.path, self.header, self.flags, self.vehicle = path, header, flags, vehicle
-        self.file = Path(path).name
-        self.places = {}
-        for ours, others in KNOWN.items():
-            place = self.mapped(ours, several) if ours in vehicle.columns else None
-            if place is None and ours not in vehicle.columns:
-                place = next((at for at in map(header.column, [ours, *others]) if at is not None), None)
-            if place is not None:
-                self.places[ours] = (place, self.scale(ours, place))
-        if header.gcsv:
-            for at, name in enumerate(header.names):
-                if name in GCSV:
-                    ours, factor = GCSV[name]
-                    unit = 9.80665 if factor == "ascale" else 1.0
-                    self.places.setdefault(ours, (at, unit * float(header.settings.get(factor, 1.0))))
-
     def mapped(self, ours, several):
         """The index of a column that the vehicle file names, as NAME or FILE:NAME."""
-        name = self.vehicle.columns[ours]["name"]
-        if name.startswith(self.file + ":"):
-            name = name[len(self.file) + 1:]
-        at = self.header.column(name)
+        name = self.vehicle.columns[ours]["name"].removeprefix(Path(self.path).name + ":")
+        at = self.column(name)
         if at is None and not several:
-            raise Refused(f"{self.path}: no column {name}" + listed(self.header.names, "; the columns are "))
+            raise Refused(f"{self.path}: no column {name}" + listed(self.names, "; the columns are "))
         return at
 
     def scale(self, ours, place):
-        name = self.header.names[place]
-        unit = self.flags.get(ours) or self.flags.get(name) or self.vehicle.columns.get(ours, {}).get("unit") or self.header.units.get(name)
+        name, dimension = self.names[place], DIMENSION[ours]
+        unit = self.flags.get(ours) or self.flags.get(name) or self.vehicle.columns.get(ours, {}).get("unit") or self.units.get(name)
         if not unit:
             return 1.0
-        if DIMENSION[ours] == "rate" and (units.find(unit) or [""])[0] == "angle" and name not in self.header.units:
+        if dimension == "rate" and (units.find(unit) or [""])[0] == "angle" and name not in self.units:
             raise Refused(f"{self.path}: {name}: {unit} is an angle, not a rate; write {unit}/s")
-        scale = units.scale(name, unit, [DIMENSION[ours]], f"{DIMENSION[ours]} column")[0]
+        scale = units.scale(name, unit, [dimension], f"{dimension} column")[0]
         return scale / units.DEG if ours in ("latitude", "longitude") else scale
 
-    def others(self):
-        """Columns that stay plain numbers: index, name and unit."""
-        used = {place for place, _ in self.places.values()}
-        for at, name in enumerate(self.header.names):
-            if at not in used:
-                unit = self.flags.get(name) or self.vehicle.unit_of(name) or self.header.units.get(name)
-                yield at, name, unit or ("rad/s" if name in OWN_RATES else "")
+    def add(self, log, seconds, rows):
+        """Gives the columns of some rows to the log's channels."""
+        def scaled(names):
+            known = [name in self.places for name in names]
+            columns = [rows[:, self.places[name]] * self.scales[name] if has else seconds * np.nan for name, has in zip(names, known)]
+            return np.column_stack(columns), known
+
+        (force, has_force), (rate, has_rate) = scaled(IMU_COLUMNS[:3]), scaled(IMU_COLUMNS[3:])
+        halves = [half for half, has in ((force, has_force), (rate, has_rate)) if all(has)]
+        if halves:
+            kind = "imu" if len(halves) == 2 else "accel" if all(has_force) else "gyro"
+            log.channel(kind, kind).extend(np.column_stack([seconds, *halves]))
+        fix, has_fix = scaled(POSITION)
+        if has_fix[0] and has_fix[1]:
+            known = np.isfinite(fix[:, :2]).all(axis=1)
+            if (wrong := known & ((np.abs(fix[:, 0]) > 90) | (np.abs(fix[:, 1]) > 360))).any():
+                latitude, longitude = fix[wrong][0, :2]
+                raise Refused(f"{self.path}: latitude {latitude:g}, longitude {longitude:g} are outside 90 and 360 degrees: another unit? "
+                              "--unit latitude=1e-7deg --unit longitude=1e-7deg")
+            log.channel("position", "position").extend(np.column_stack([seconds, fix])[known])
+        for at, name in enumerate(self.names):
+            if at not in self.places.values():
+                unit = self.flags.get(name) or self.vehicle.unit_of(name) or self.units.get(name) or ("rad/s" if name in ("ref_gyr_z", *COLUMNS) else "")
+                known = np.isfinite(rows[:, at])
+                log.channel(name, "number", unit).extend(np.column_stack([seconds, rows[:, at]])[known])
 
 
-class Counter:
-    """A counter that wraps, in counts per second."""
+class Clock:
+    """The rows' times: a column, or a counter of an Xsens sensor, which wraps."""
 
-    def __init__(self, at, period, second):
-        self.at, self.period, self.second, self.last, self.turns = at, period, second, None, 0.0
+    def __init__(self, path, columns, header, first, rate):
+        self.period, self.last, self.turns = None, -np.inf, 0.0
+        if "t_s" in columns.places:
+            self.at, self.scale = columns.places["t_s"], columns.scales["t_s"]
+            if header.names[self.at] == "PacketCounter":
+                raise Refused(f"{path}: PacketCounter counts samples and is no time: take it out of [columns] and give --rate HZ")
+            return
+        for name, self.period, second in (("SampleTimeFine", 2.0**32, 1e4), ("PacketCounter", 65_536.0, rate or header.rate)):
+            self.at = columns.column(name)
+            if self.at is not None and np.isfinite(first[self.at]):
+                if second is None:
+                    raise Refused(f"{path}: {name} counts samples, and no update rate is written: give it with --rate HZ")
+                self.scale = 1 / second
+                return
+        raise Refused(f'{path}: no time column; name it in the vehicle file: [columns] t_s = {{ name = "...", unit = "ms" }}'
+                      + listed(header.names, "; the columns are "))
 
-    def seconds(self, row):
-        count = row[self.at]
-        # A wrap steps back by more than half of the counter's range; a smaller step is a jump of the clock.
-        if self.last is not None and count < self.last - 0.5 * self.period:
-            self.turns += self.period
-        if not math.isnan(count):
-            self.last = count
-        return (self.turns + count) / self.second
-
-
-def clock(path, columns, first, rate):
-    """How a row's time is read: a column, or a counter of an Xsens sensor."""
-    header = columns.header
-    if "t_s" in columns.places:
-        at, scale = columns.places["t_s"]
-        if header.names[at] == "PacketCounter":
-            raise Refused(f"{path}: PacketCounter counts samples and is no time: take it out of [columns] and give --rate HZ")
-        return lambda row: scale * row[at]
-    for name, period, second in (("SampleTimeFine", 2.0**32, 1e4), ("PacketCounter", 65_536.0, rate or header.rate)):
-        at = header.column(name)
-        if at is not None and not math.isnan(first[at]):
-            if second is None:
-                raise Refused(f"{path}: {name} counts samples, and no update rate is written: give it with --rate HZ")
-            return Counter(at, period, second).seconds
-    raise Refused(f'{path}: no time column; name it in the vehicle file: [columns] t_s = {{ name = "...", unit = "ms" }}'
-                  + listed(header.names, "; the columns are "))
-
-
-def number(field, commas):
-    try:
-        return float(field.replace(",", ".") if commas else field)
-    except ValueError:
-        return math.nan
+    def seconds(self, counts):
+        if self.period:
+            # A wrap steps back by more than half of the counter's range; a smaller step is a jump of the clock.
+            turns = self.turns + self.period * np.cumsum(np.diff(counts, prepend=self.last) < -0.5 * self.period)
+            self.last, self.turns = counts[-1], turns[-1]
+            counts = counts + turns
+        return self.scale * counts
 
 
 def read(path, log, vehicle, flags, rate, several):
-    with open(path, encoding="utf-8-sig", errors="replace", newline="") as file:
-        header = Header(path, file)
-        columns = Columns(path, header, vehicle, flags, several)
-        rows = file if header.separator is None else csv.reader(file, delimiter=header.separator)
-        rows = itertools.chain([header.split(header.first)], map(str.split, file) if header.separator is None else rows)
-        if header.commas:
-            log.notes.append("numbers with decimal commas")
-        if header.gcsv and header.settings.get("orientation", "XYZ") != "XYZ":
-            log.notes.append(f"orientation {header.settings['orientation']} is not applied: give the mounting in the vehicle file")
-        try:
-            take(path, log, header, columns, rows, rate)
-        except csv.Error as error:
-            raise Refused(f"{path}: line {getattr(rows, 'line_num', '?')}: not a table: {error}") from None
-
-
-def take(path, log, header, columns, rows, rate):
-    places, count, others, time = columns.places, len(header.names), list(columns.others()), None
-    halves = [kind for kind, names in (("accel", IMU_COLUMNS[:3]), ("gyro", IMU_COLUMNS[3:])) if all(name in places for name in names)]
-    kind = "imu" if len(halves) == 2 else halves[0] if halves else None
-    wanted = {"imu": IMU_COLUMNS, "accel": IMU_COLUMNS[:3], "gyro": IMU_COLUMNS[3:], None: []}[kind]
-    inertial = [places[name] for name in wanted]
-    position = [places.get(name) for name in ("latitude", "longitude", "position_sigma", "ground_speed", "course", "course_sigma")]
-    for row in rows:
-        if len(row) == count + 1 and not row[-1].strip():
-            row = row[:-1]
-        if len(row) != count:
-            if any(map(str.strip, row)):
-                log.dropped["rows whose length differs from the header"] += 1
-            continue
-        row = [number(field, header.commas) for field in row]
-        time = time or clock(path, columns, row, rate)
-        seconds = time(row)
-        if not math.isfinite(seconds):
-            log.dropped["rows without a time"] += 1
-            continue
-        if kind:
-            values = [scale * row[at] for at, scale in inertial]
-            if all(map(math.isfinite, values)):
-                log.add(kind, kind, seconds, values)
-            else:
-                log.dropped["rows without all numbers of the IMU"] += 1
-        if position[0] and position[1]:
-            fix = [scale * row[at] if place else math.nan for place in position for at, scale in [place or (0, 0.0)]]
-            if math.isfinite(fix[0]) and math.isfinite(fix[1]):
-                if abs(fix[0]) > 90 or abs(fix[1]) > 360:
-                    raise Refused(f"{path}: latitude {fix[0]:g}, longitude {fix[1]:g} are outside 90 and 360 degrees: another unit? "
-                                  "--unit latitude=1e-7deg --unit longitude=1e-7deg")
-                log.add("position", "position", seconds, fix)
-        for at, name, unit in others:
-            if math.isfinite(row[at]):
-                log.add(name, "number", seconds, (row[at],), unit)
+    header = Header(path)
+    columns = Columns(path, header, vehicle, flags, several)
+    if header.commas:
+        log.notes.append("numbers with decimal commas")
+    count, clock = len(header.names), None
+    with open(path, encoding="utf-8-sig", errors="replace") as file, warnings.catch_warnings(record=True) as longer:
+        warnings.simplefilter("always", pandas.errors.ParserWarning)
+        list(itertools.islice(file, header.lines))
+        # One more column takes what a separator at the end of a line makes.
+        for frame in pandas.read_csv(file, sep=header.separator or r"\s+", header=None, names=range(count + 1), index_col=False, chunksize=ROWS,
+                                     decimal="," if header.commas else ".", on_bad_lines="warn", skipinitialspace=True):
+            rows = frame.apply(pandas.to_numeric, errors="coerce").to_numpy(float)
+            clock = clock or Clock(path, columns, header, rows[0], rate)
+            timed, whole = np.isfinite(rows[:, clock.at]), frame[count].isna().to_numpy()
+            log.drop("rows without a time", np.count_nonzero(~timed & whole))
+            log.drop("rows that are longer than the header", np.count_nonzero(~whole))
+            rows = rows[timed & whole]
+            if len(rows):
+                columns.add(log, clock.seconds(rows[:, clock.at]), rows)
+    log.drop("rows that are longer than the header", sum(str(warning.message).count("Skipping line") for warning in longer))

@@ -2,12 +2,14 @@
 
 import numpy as np
 
-from gyronet.logs import grid, units
+from gyronet import units
+from gyronet.logs import grid
 from gyronet.logs.samples import BLOCK
 from gyronet.refused import Refused
 
 GRAVITY = 9.80665
 IMU = {"imu": [("acceleration", "m/s^2"), ("rate", "rad/s")], "gyro": [("rate", "rad/s")], "accelerometer": [("acceleration", "m/s^2")]}
+HALVES = {**IMU, "odometry": [("speed", "m/s"), ("rate", "rad/s")]}  # dimensions and units of a message's parts
 
 
 class Used:
@@ -30,15 +32,13 @@ class Used:
     def pick(self, request):
         """Columns of the samples, their scales, the unit's name and its dimension."""
         kind, name, width = self.channel.kind, self.name, self.channel.width
-        if self.role in IMU:
-            given = [request.units.get((name, dimension)) for dimension, _ in IMU[self.role]]
+        if self.role in HALVES:
+            given = [request.units.get((name, dimension)) for dimension, _ in HALVES[self.role]]
             scales = [units.find(unit)[1] if unit else 1.0 for unit in given]
-            said = ", ".join(unit or own for unit, (_, own) in zip(given, IMU[self.role]))
+            said = ", ".join(unit or own for unit, (_, own) in zip(given, HALVES[self.role]))
             # A channel of the kind imu holds both halves also where one of them is zero throughout.
-            first = 3 if self.role == "gyro" and width == 7 else 0
-            return slice(first, first + 3 * len(given)), np.repeat(scales, 3), said, None
-        if self.role == "odometry":
-            return slice(0, 2), 1.0, "m/s, rad/s", None
+            first, axes = 3 if self.role == "gyro" and width == 7 else 0, 3 if self.role in IMU else 1
+            return slice(first, first + axes * len(given)), np.repeat(scales, axes), said, None
         if self.role == "position":
             return slice(0, 6), 1.0, "deg", None
         if kind != "number":
@@ -88,7 +88,5 @@ class Used:
         size = float(np.median(np.linalg.norm(self.values(0, 10_000)[:, :3], axis=1)))
         if 0.8 < size < 1.25 or 800 < size < 1250:
             unit = "g" if size < 2 else "mg"
-            raise Refused(
-                f"{self.name}: the specific force is {size:.2f}, where gravity is {GRAVITY:.2f} m/s^2: {unit}? --unit"
-                f" {self.name}={unit}"
-            )
+            raise Refused(f"{self.name}: the specific force is {size:.2f}, where gravity is {GRAVITY:.2f} m/s^2: {unit}?"
+                          f" --unit {self.name}={unit}")

@@ -65,10 +65,10 @@ class Flags(dict):
             self[name] = self[name, find(unit)[0]] = unit
 
     def get(self, key, default=None):
-        self.asked.add(key[0] if isinstance(key, tuple) else key)
+        self.asked.add(key)
         return super().get(key, default)
 
     def check(self):
-        for name in self:
-            if isinstance(name, str) and name not in self.asked:
-                raise Refused(f"--unit {name}={self[name]}: no channel or column of that name is used")
+        for name, dimension in (key for key in self if isinstance(key, tuple)):
+            if not self.asked & {name, (name, dimension)}:
+                raise Refused(f"--unit {name}={self[name, dimension]}: no channel or column of that name is used with such a unit")
