@@ -43,7 +43,6 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], metavar="N")
     parser.add_argument("--threads", type=int, default=torch.get_num_threads(), help="CPU threads")
     parser.add_argument("--no-turns", dest="turns", action="store_false", help="do not add turns")
-    parser.add_argument("--units", action="store_true", help="add other units of the part")
     parser.add_argument("--windows", type=int, default=1, help="windows per span")
     parser.add_argument("--scale-of", type=Path, metavar="CHECKPOINT", help="fit only this network's scale")
     parser.add_argument("--note", help="a sentence for the provenance")
@@ -94,7 +93,7 @@ def best_of_seeds(args: argparse.Namespace, validation: list[Drive]) -> tuple[Gy
     weights = [len(drive.gyro_error) for drive in validation]
     static = float(np.average([mean_1s_error(drive.gyro_error) for drive in validation], weights=weights))
     print(f"static initialisation: 1 s error {static:.6f} rad")
-    settings = Settings(args.epochs, args.batch, args.lr, args.turns, args.units, args.windows, args.patience)
+    settings = Settings(args.epochs, args.batch, args.lr, args.turns, args.windows, args.patience)
     spans = Spans(pieces(args.data, args.train), args.windows)
     networks: dict[int, Trained] = {}
     for seed in args.seeds:

@@ -3,9 +3,8 @@
 As in the paper, training uses Adam with an initial rate of 0.0015 and mean absolute error over shuffled
 windows of 0.1 s. Unlike in the paper, turns are added (augment.py), the rate follows one cycle, the
 running mean of the weights is kept, and a scale is trained (loss.py). Windows can be grouped in spans
-that overlap as in the firmware, and can be changed to those of other units of the part. By default
-neither is done, since it improved neither the 1 s error nor the windows' mean error on the validation
-drive.
+that overlap as in the firmware; by default they are not, since it improved neither the 1 s error nor the
+windows' mean error on the validation drive.
 
 Random numbers are seeded in each epoch from seed and epoch, so that a resumed training gives the same result as one that
 was not interrupted.
@@ -24,7 +23,7 @@ from pathlib import Path
 import torch
 from tqdm import tqdm
 
-from .augment import other_unit, turn
+from .augment import turn
 from .loss import span_loss
 from .model import GyroNet
 from .recordings import Drive
@@ -45,8 +44,6 @@ class Settings:
     """Largest learning rate."""
     turns: bool
     """Whether to add turns."""
-    units: bool
-    """Whether to add other units of the part."""
     windows: int
     """Windows of a span; with one window, the loss ignores the overlap."""
     patience: int
@@ -118,7 +115,6 @@ def train(
         total = 0.0
         for x, gyro_error in batches:
             x = turn(x) if settings.turns else x
-            x = other_unit(x) if settings.units else x
             correction, scale = model(cut(x).flatten(0, 1))
             shape = (len(x), settings.windows)
             loss = span_loss(correction.unflatten(0, shape), scale.view(shape), gyro_error, unit)

@@ -12,7 +12,7 @@ from gyronet_train.training import Settings, train
 
 from .made_csv import write_drive
 
-SETTINGS = Settings(epochs=3, batch=256, lr=0.0015, turns=True, units=False, windows=1, patience=9)
+SETTINGS = Settings(epochs=3, batch=256, lr=0.0015, turns=True, windows=1, patience=9)
 
 
 torch.set_num_threads(1)  # Several wait for each other on a busy machine.
@@ -55,14 +55,14 @@ class Training(unittest.TestCase):
     def test_the_state_of_another_training_is_refused(self):
         self.train(state=self.state)
         with self.assertRaisesRegex(ValueError, r"a\.state: is of a training with other settings"):
-            self.train(Settings(4, 256, 0.0015, True, False, 1, 9), state=self.state)
+            self.train(Settings(4, 256, 0.0015, True, 1, 9), state=self.state)
         self.spans.names = {"d": "0"}
         with self.assertRaisesRegex(ValueError, "other drives"):
             self.train(state=self.state)
 
     def test_it_stops_early_and_keeps_the_best(self):
         # Steps so large that nothing is learnt.
-        trained = self.train(Settings(9, 256, 100.0, False, False, 1, 2))
+        trained = self.train(Settings(9, 256, 100.0, False, 1, 2))
         self.assertEqual(len(trained.epochs), trained.epoch + 2)
         self.assertLess(len(trained.epochs), 9)
 
