@@ -3,8 +3,7 @@
 Trains once for each seed, prints each seed's errors on the validation drives with mean and spread, and
 keeps the best network. Test drives are never read. training.py describes the training and where it
 differs from the paper. A training that was killed resumes from the files STEM.seedN.state in --out;
-STEM.history.json has every epoch. With --scale-of CHECKPOINT, only the scale of that network's
-expected error is fitted (scale.py).
+STEM.history.json has every epoch.
 """
 
 from __future__ import annotations
@@ -20,13 +19,12 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
-from .export import export, load_gyronet
+from .export import export
 from .model import GyroNet
 from .recordings import Drive, find_drive, load_pieces, mean_1s_error
-from .scale import fit_scale
 from .spans import Spans
-from .training import Epoch, Settings, Trained, calibrate, train
-from .validation import Validation, validate_all
+from .training import Epoch, Settings, Trained, train
+from .validation import Validation
 
 
 def arguments() -> argparse.Namespace:
@@ -44,7 +42,6 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--threads", type=int, default=torch.get_num_threads(), help="CPU threads")
     parser.add_argument("--no-turns", dest="turns", action="store_false", help="do not add turns")
     parser.add_argument("--windows", type=int, default=1, help="windows per span")
-    parser.add_argument("--scale-of", type=Path, metavar="CHECKPOINT", help="fit only this network's scale")
     parser.add_argument("--note", help="a sentence for the provenance")
     return parser.parse_args()
 
@@ -73,10 +70,7 @@ def run(args: argparse.Namespace) -> None:
     """Trains and writes the files."""
     args.out.mkdir(parents=True, exist_ok=True)
     validation = pieces(args.data, args.validate)
-    if args.scale_of:
-        model, provenance = with_scale(args, pieces(args.data, args.train), validation)
-    else:
-        model, provenance = best_of_seeds(args, validation)
+    model, provenance = best_of_seeds(args, validation)
     if args.note:
         provenance["note"] = args.note
     for path in export(model, provenance, args.out, args.stem):
@@ -148,21 +142,6 @@ def best_of_seeds(args: argparse.Namespace, validation: list[Drive]) -> tuple[Gy
 def names(drives: list[Drive]) -> list[str]:
     """Returns the names of drives, each once even if the drive has several pieces."""
     return list(dict.fromkeys(drive.name for drive in drives))
-
-
-def with_scale(
-    args: argparse.Namespace, drives: list[Drive], validation: list[Drive]
-) -> tuple[GyroNet, dict]:
-    """Returns the checkpoint's network, with its scale fitted again to the drives that it was trained on."""
-    model, provenance = load_gyronet(args.scale_of)
-    if provenance["sha256"] != {d.name: d.sha256 for d in [*drives, *validation]}:
-        raise ValueError(f"{args.scale_of}: was trained or validated on other drives")
-    print(line("before", validate_all(model, validation)))
-    fit_scale(model, drives)
-    calibrate(model, validate_all(model, validation).scale_ratio)
-    print(line("after", validate_all(model, validation)))
-    provenance["scale"] = f"fitted alone on {datetime.date.today()}"
-    return model, provenance
 
 
 if __name__ == "__main__":

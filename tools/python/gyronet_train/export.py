@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import torch
-from safetensors import safe_open
 from safetensors.torch import save_file
 
 from .fognet_model import FoGNet
@@ -24,25 +23,6 @@ def export(model: GyroNet | FoGNet, provenance: dict, folder: Path, stem: str) -
     golden = folder / f"{stem}.golden.safetensors"
     save_file(golden_tensors(model), golden, metadata={"made_by": f"torch {torch.__version__}"})
     return [checkpoint, golden]
-
-
-def load_gyronet(path: Path) -> tuple[GyroNet, dict]:
-    """Reads a checkpoint that `export` wrote, and its provenance. Raises ValueError for another network."""
-    with safe_open(path, "pt") as file:
-        provenance = json.loads(file.metadata()["provenance"])
-        tensors = {name: file.get_tensor(name) for name in file.keys()}
-    if provenance["network"] != "gyronet":
-        raise ValueError(f"{path}: is a checkpoint of {provenance['network']}, not gyronet")
-    recurrent = tensors.get("lstm1.weight_hh_l0")
-    model = GyroNet(
-        tensors["input_mean"],
-        tensors["input_std"],
-        tensors["output_scale"].item(),
-        units=0 if recurrent is None else recurrent.shape[1],
-        linear=tensors.get("linear.weight"),
-    )
-    model.load_state_dict(tensors)
-    return model, provenance
 
 
 @torch.no_grad()

@@ -1,27 +1,16 @@
-"""python -m gyronet_train.linear DATA --out FOLDER: fit the linear part of a window model to a folder of drives.
+"""The linear part of a window model: a filter of eleven taps around a sample, fitted to drives.
 
-The linear part is a filter of eleven taps around a sample. It removes from the yaw gyro the unit's mounting
-(roll and pitch rate), its gain, and noise (differences of neighbouring gyro and accelerometer samples). A
-difference of neighbours is zero for a constant input, so the accelerometer's level and a constant error do
-not contribute (`PARTS`).
-
-The fit minimises the absolute error of the yaw change over any second, the number that the tools print. For
-the report, each drive is predicted by the filter of the other drives: mean and standard deviation of the
-error over static initialisation's, as the parts are added. The written filter is fitted to all drives. Only
-numpy and safetensors are needed.
+It removes from the yaw gyro the unit's mounting (roll and pitch rate), its gain, and noise (differences of neighbouring
+gyro and accelerometer samples). A difference of neighbours is zero for a constant input, so the accelerometer's level and
+a constant error do not contribute (`PARTS`). The fit minimises the absolute error of the yaw change over any second, the
+number that the tools print.
 """
 
 from __future__ import annotations
 
-import argparse
-import datetime
-import json
-from pathlib import Path
-
 import numpy as np
-from safetensors.numpy import save_file
 
-from .recordings import RATE_HZ, STATIC_SAMPLES, WINDOW, Drive, find_drive, load_drive, mean_1s_error, windows
+from .recordings import RATE_HZ, STATIC_SAMPLES, WINDOW, Drive, mean_1s_error, windows
 
 STRIDE = 5
 REACH = 5
@@ -147,13 +136,6 @@ def ratio(outputs: np.ndarray, drive: Drive) -> float:
     return mean_1s_error(rate_error(outputs, drive)) / mean_1s_error(drive.gyro_error)
 
 
-def leave_one_out(drives: list[Drive], basis: np.ndarray) -> list[float]:
-    """Returns the ratio of each drive with the filter of the others."""
-    made = [sums(drive, basis) for drive in drives]
-    others = (made[:k] + made[k + 1 :] for k in range(len(drives)))
-    return [ratio(rows(fit(rest, basis)), drive) for rest, drive in zip(others, drives)]
-
-
 def window_error(outputs: np.ndarray, drives: list[Drive]) -> float:
     """Returns the mean |error| of a window's mean corrected rate, rad/s, after the static phase."""
     from_static = slice(STATIC_SAMPLES // STRIDE, None)
@@ -161,66 +143,3 @@ def window_error(outputs: np.ndarray, drives: list[Drive]) -> float:
         (windows(d.gyro_error)[::STRIDE] - corrections(outputs, d)).mean(axis=1)[from_static] for d in drives
     ]
     return float(abs(np.concatenate(errors)).mean())
-
-
-def arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="gyronet_train.linear", description=__doc__)
-    parser.add_argument("data", type=Path, help="folder of drives")
-    parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors file")
-    parser.add_argument("--stem", default="linear_window", help="name of the file")
-    parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07", "08"], metavar="NN")
-    return parser.parse_args()
-
-
-def trained(paths: list[Path]) -> tuple[list[Drive], np.ndarray, float, dict]:
-    """Fits the filter; returns drives, outputs of a window, expected error in rad/s and report."""
-    drives = [load_drive(path) for path in paths]
-    print("1 s error over static initialisation's, each drive with the filter of the others: mean, standard deviation")
-    report = {}
-    for count in range(1, len(PARTS) + 1):
-        names = " + ".join(list(PARTS)[:count])
-        basis = np.concatenate(list(PARTS.values())[:count])
-        report[names] = tell(f"{names}, {len(basis)} numbers", leave_one_out(drives, basis))
-    basis = np.concatenate(list(PARTS.values()))
-    taps = fit([sums(drive, basis) for drive in drives], basis)
-    outputs = rows(taps)
-    roll, pitch, gain = taps.sum(axis=0)[[ROLL, PITCH, YAW]]
-    print(f"mounting {roll:+.5f} of roll rate, {pitch:+.5f} of pitch rate; gain {gain:+.5f}")
-    return drives, outputs, window_error(outputs, drives), report
-
-
-def tell(what: str, ratios: list[float]) -> list[float]:
-    """Prints the ratios of all drives; returns their mean and standard deviation."""
-    found = [round(float(np.mean(ratios)), 4), round(float(np.std(ratios, ddof=1)), 4)]
-    print(f"  {what}: {found[0]:.3f} {found[1]:.3f} ({' '.join(f'{ratio:.3f}' for ratio in ratios)})")
-    return found
-
-
-def main() -> None:
-    args = arguments()
-    drives, outputs, scale, report = trained([find_drive(args.data, n) for n in args.train])
-    features = np.concatenate([drive.features for drive in drives])
-    tensors = {
-        "input_mean": features.mean(axis=0),
-        "input_std": features.std(axis=0),
-        "output_scale": np.array([scale]),
-        "linear.weight": outputs.reshape(WINDOW, WINDOW * FEATURES),
-    }
-    provenance = {
-        "network": "gyronet",
-        "parts": "linear",
-        "reference": "ref_gyr_z",
-        "train": [drive.name for drive in drives],
-        "sha256": {drive.name: drive.sha256 for drive in drives},
-        "leave_one_out_to_static": report,
-        "date": datetime.date.today().isoformat(),
-    }
-    args.out.mkdir(parents=True, exist_ok=True)
-    path = args.out / f"{args.stem}.safetensors"
-    metadata = {"provenance": json.dumps(provenance, sort_keys=True)}
-    save_file({name: np.ascontiguousarray(t, np.float32) for name, t in tensors.items()}, path, metadata)
-    print(path)
-
-
-if __name__ == "__main__":
-    main()
