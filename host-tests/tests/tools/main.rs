@@ -16,6 +16,7 @@ mod mounting;
 mod pages;
 mod python_seconds;
 mod python_units;
+mod python_wheels;
 mod recordings_bad_input;
 mod replay_mcap;
 mod standstill;

@@ -1,12 +1,11 @@
 //! These tests create recordings with one defect each.
 
+mod course;
+mod mounting;
+
 use super::line::{DEGREES, KMH};
 use super::*;
-use crate::bundled;
 use crate::drive::recording::Reader;
-use crate::drive::vehicle::Vehicle;
-use gyronet::mounting::Rotation;
-use gyronet::units::SpecificForce;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, Normal};
@@ -94,76 +93,6 @@ fn a_gain_is_said_in_per_cent() {
     assert!((numbers[0] - 0.7).abs() < 3.0 * numbers[1] && numbers[1] < 0.3, "{reference}");
 }
 
-/// A car that rests for 10 s and then drives with turns of both sides, in a drive with a course and a speed by GNSS.
-/// The gyro and the wheels are multiplied by `gyro` and `wheels`, and the course comes `late` seconds late.
-fn with_course(gyro: f64, wheels: f64, late: usize, toml: &str) -> Doctor {
-    let mut text =
-        String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,wheel2_rate,wheel4_rate,ref_yaw,gnss_speed\n");
-    let (mut random, normal) = (ChaCha8Rng::seed_from_u64(2), Normal::new(0.0, 0.002).unwrap());
-    let mut courses = Vec::new();
-    let mut angle = 0.0;
-    for k in 0..9_000 {
-        let time = 0.01 * f64::from(k);
-        let speed = (1.5 * (time - 10.0)).clamp(0.0, 12.0);
-        let turn = if time < 10.0 {
-            0.0
-        } else {
-            0.3 * (0.21 * time).sin() * (0.05 * time + 0.4 + 1e-4 * time * time).cos()
-        };
-        angle += 0.01 * turn;
-        courses.push((speed > 1.0).then_some((angle, speed)));
-        let mut noise = || normal.sample(&mut random);
-        let (rate, wheel) = (gyro * (turn + noise()), wheels * speed / 0.289);
-        let side = speed * turn + noise();
-        write!(
-            text,
-            "{time:.2},{},{side},{},{},{},{rate},{wheel},{wheel},",
-            noise(),
-            9.81 + noise(),
-            gyro * noise(),
-            gyro * noise()
-        )
-        .unwrap();
-        match (k % 20, k as usize >= late) {
-            (0, true) => match courses[k as usize - late] {
-                Some((course, speed)) => writeln!(text, "{course:.6},{speed:.6}").unwrap(),
-                None => text.push_str(",\n"),
-            },
-            _ => text.push_str(",\n"),
-        }
-    }
-    let vehicle = Vehicle::parse("made.toml", toml).unwrap();
-    let reader = Reader::new("made.csv", text.as_bytes()).unwrap();
-    Doctor::of(&Rows { vehicle, ..Rows::parse("made", reader).unwrap() })
-}
-
-#[test]
-fn speed_and_course_show_units_and_clocks() {
-    let named = "[signals]\nimu = '/imu'\nposition = '/fix'\n[wheels]\nrear_left = 'W.RL'\nrear_right = 'W.RR'\n\
-                 [recording.units]\n'/imu' = 'm/s^2, rad/s'\n";
-    let good = with_course(1.0, 1.0, 0, named);
-    assert!(good.findings.iter().all(|finding| finding.verdict != Verdict::Bad), "{:?}", good.findings);
-    assert_eq!(found(&good, "speed").1, "Wheels turn 1.000 times as fast as the speed by GNSS.");
-    for (what, doctor, remedy) in [
-        ("reference", with_course(DEGREES, 1.0, 0, named), "import the log again with `--unit /imu=deg/s`"),
-        (
-            "reference",
-            with_course(1.0, 1.0, 1_800, named),
-            "(GPS time against UTC); import the log again with `--offset /fix=-18.0`",
-        ),
-        (
-            "speed",
-            with_course(1.0, KMH, 0, named),
-            "in km/h; import the log again with `--unit W.RL=km/h --unit W.RR=km/h`",
-        ),
-    ] {
-        let (verdict, text) = found(&doctor, what);
-        assert!(verdict == Verdict::Bad && text.contains(remedy), "{text}");
-    }
-    let smaller = with_course(1.0, 1.05, 0, named);
-    assert!(found(&smaller, "speed").1.contains("radius_m = 0.275 in the vehicle file fits"));
-}
-
 #[test]
 fn each_defect_is_found() {
     let bad = |what: &str, text: &str, edit: &dyn Fn(usize, &mut [f64; 10]) -> bool| {
@@ -223,68 +152,6 @@ fn each_defect_is_found() {
         row[9] = (0.3 * row[0] + 1e-4 * k as f64 * row[0]).sin();
         true
     });
-}
-
-/// The simulated drive as a sensor with this mounting records it.
-fn mounted(path: &Path, mounting: Rotation) {
-    let inverse = |v: [f64; 3]| {
-        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        axes.map(|axis| {
-            let turned = mounting.force(axis.map(|value| SpecificForce::from_metre_per_sec2(value).unwrap()));
-            turned.iter().zip(v).map(|(one, other)| one.metre_per_sec2() * other).sum::<f64>()
-        })
-    };
-    let mut lines = bundled::SIMULATED_DRIVE.lines();
-    let mut text = lines.next().unwrap().to_owned() + "\n";
-    for line in lines {
-        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
-        for first in [1, 4] {
-            let vector = [0, 1, 2].map(|k| fields[first + k].parse().unwrap());
-            for (k, value) in inverse(vector).into_iter().enumerate() {
-                fields[first + k] = value.to_string();
-            }
-        }
-        text += &(fields.join(",") + "\n");
-    }
-    std::fs::write(path, text).unwrap();
-}
-
-#[test]
-fn obeying_the_doctor_converges_in_one_step() {
-    let folder = tempfile::tempdir().unwrap();
-    let csv = folder.path().join("car.csv");
-    for angles in
-        [[0.0, 0.0, 90.0], [180.0, 0.0, 0.0], [90.0, 0.0, -60.0], [25.0, -10.0, 120.0], [-5.0, 70.0, -150.0]]
-    {
-        let [roll, pitch, yaw] = angles;
-        mounted(&csv, Rotation::from_mounting(roll, pitch, yaw).unwrap());
-        // No file; one of an older import, whose angles do not count; one with a mounting that is wrong.
-        for toml in
-            ["", "[mounting]\nyaw_deg = 35\napplied = true\n", "[mounting]\nroll_deg = 40\nyaw_deg = 10\n"]
-        {
-            let file = csv.with_extension("toml");
-            std::fs::write(&file, toml).unwrap();
-            let remedies = |doctor: &Doctor| -> Vec<String> {
-                let all = doctor
-                    .findings
-                    .iter()
-                    .filter_map(|finding| finding.text.split_once("under [mounting], set "));
-                all.map(|(_, settings)| settings.trim_end_matches('.').to_owned()).collect()
-            };
-            let first = remedies(&Doctor::examine(&csv).unwrap());
-            assert!(
-                !first.is_empty() && first.iter().all(|remedy| *remedy == first[0]),
-                "{angles:?} {first:?}"
-            );
-            std::fs::write(&file, format!("[mounting]\n{}\n", first[0].replace(", ", "\n"))).unwrap();
-            let doctor = Doctor::examine(&csv).unwrap();
-            assert_eq!(remedies(&doctor), Vec::<String>::new(), "{angles:?} {toml:?} {first:?}");
-            let bad = doctor.findings.iter().filter(|finding| finding.verdict == Verdict::Bad);
-            assert_eq!(bad.count(), 0, "{angles:?} {:?}", doctor.findings);
-            let (_, forward) = found(&doctor, "forward");
-            assert!(forward.starts_with("x points "), "{forward}");
-        }
-    }
 }
 
 #[test]
