@@ -17,7 +17,7 @@ SAYS_FAULT = re.compile(r"fault|fail|err|inv|fehl|ung(ue|ü)lt|not", re.IGNORECA
 SAYS_GOOD = re.compile(r"valid$|vld$|g(ue|ü)ltig|\bok\b|\bgood\b|normal", re.IGNORECASE)
 SAYS_BACK = re.compile(r"back|revers|r(ue|ü)ckw", re.IGNORECASE)
 MOST_CODES = 3
-SLOWEST_RANGE = 150.0  # km/h: a signal whose range ends below says nothing of a car's speeds
+SLOWEST_RANGE, LARGEST = 150.0, 400.0  # km/h: a range that ends below says nothing of a car's speeds; the board's own
 SAYS_DIRECTION = re.compile(r"dir|richt|revers|backw|forw", re.IGNORECASE)
 
 
@@ -101,7 +101,8 @@ def entry(path, wheel, message, signal, flags, remarks, used):
     # Half a count beyond, since the board rounds factor and offset.
     low, high = ((limit or 0.0) * kmh + side * 0.5 * abs(factor) for limit, side in ((signal.minimum, -1), (signal.maximum, 1)))
     if high >= SLOWEST_RANGE and low <= 0.0:
-        result["range_kmh"] = [round(low, 6), round(min(high, 1_000.0), 6)]
+        limits = [round(max(low, -LARGEST), 6), round(min(high, LARGEST), 6)]
+        result.update({"range_kmh": limits} if limits != [-LARGEST, LARGEST] else {})
     elif signal.maximum:
         remarks.append(f"{name}: its range, {signal.minimum or 0:g} to {signal.maximum:g}, is not used, since a car leaves it")
     for key, value_of in (("valid_when", valid_value), ("reverse_when", reverse_value)):

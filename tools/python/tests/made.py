@@ -7,7 +7,6 @@ import warnings
 from pathlib import Path
 
 import can
-import cantools
 import numpy as np
 from mcap.writer import CompressionType, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -208,7 +207,3 @@ def ulog(path, topics, version=1, rubbish_at=None, rubbish=bytes(37)):
     for k, (_, _, bytes_) in enumerate(sorted(data)):
         out += record("D", bytes_) + (sync if k % 50 == 49 else b"") + (rubbish + sync if k == rubbish_at else b"")
     Path(path).write_bytes(out)
-
-
-def load_dbc(path):
-    return cantools.database.load_file(path, strict=False)

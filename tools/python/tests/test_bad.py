@@ -16,7 +16,9 @@ TEXTS = {
     "pointer.bag": (b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n", "git lfs pull"),
     "page.mcap": (b"<!DOCTYPE html><html>not found</html>", "a web page, not a log"),
     "empty.log": (b"", "is empty"),
-    "zip.ulg": (b"PK\x03\x04" + bytes(50), "unpack it first"),
+    "zip.ulg": (b"PK\x03\x04" + bytes(50), "unpack it, or save the sheet as CSV"),
+    "packed.bag": (b"\x1f\x8b" + bytes(50), "gunzip FILE"),
+    "wide.csv": ("t_s,acc_x\n1,2\n".encode("utf-16"), "UTF-16 text; save it as UTF-8"),
     "old.bag": (b"#ROSBAG V1.2\n" + bytes(99), "rosbag fix"),
     "cut.bag": (b"#ROSBAG V2.0\n" + bytes(50), "the bag cannot be read"),
     "noise.bin": (bytes(range(256)) * 20, "unknown format"),
@@ -43,7 +45,7 @@ ARGUMENTS = [
     (["d.csv", "--vehicle", "bad.toml"], "unknown key wheels.radius"),
     (["d.csv", "--vehicle", "long.toml"], "0.01 to 10 m"),
     (["d.csv", "--dbc", "d.csv"], "not a valid DBC file"),
-    (["slow.csv"], "10.0 Hz"),
+    (["slow.csv"], "10 Hz by the median period"),
 ]
 
 

@@ -5,6 +5,7 @@ import math
 import shutil
 import tempfile
 import unittest
+from datetime import datetime, timezone
 from pathlib import Path
 
 import can
@@ -314,6 +315,16 @@ class InTables(Case):
             drive = self.imports(*arguments, "--out", "out.csv", says=[says])
             self.assertLess(np.abs(drive["gyr_z"] - made.turn(drive["t_s"])).max(), 0.03)
             self.assertLess(np.abs(drive["acc_z"] - 9.81).max(), 0.05)
+
+    def test_stamps_that_are_dates(self):
+        t = times()
+        table(self.path("d.csv"), t, imu(t))
+        lines = self.path("d.csv").read_text().splitlines()
+        for zone, first in (("Z", START), ("+02:00", START - 7200), ("", START)):
+            dates = [datetime.fromtimestamp(START + s, timezone.utc).replace(tzinfo=None).isoformat() + zone for s in t]
+            self.path("d.csv").write_text("\n".join([lines[0], *(f"{date},{line.partition(',')[2]}" for date, line in zip(dates, lines[1:]))]) + "\n")
+            drive = self.imports("d.csv", "--out", "out.csv", says=[f"start = {first:.6f}"])
+            self.assertLess(np.abs(drive["gyr_z"] - made.turn(drive["t_s"])).max(), 0.03)
 
     def test_rows_that_do_not_fit(self):
         t = times()

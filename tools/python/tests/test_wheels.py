@@ -93,7 +93,7 @@ class FromDbc(unittest.TestCase):
     def test_as_json(self):
         status, text, _ = self.run_(*REAR, "--json", unit="Unit_KiloMeterPerHour")
         file = json.loads(text)
-        self.assertEqual((status, file["frame"][0]["id"], file["frame"][0]["signal"][0]["range_kmh"], file["remarks"]), (0, 0x4B0, [-0.005, 655.005], []))
+        self.assertEqual((status, file["frame"][0]["id"], file["frame"][0]["signal"][0]["range_kmh"], file["remarks"]), (0, 0x4B0, [-0.005, 400.0], []))
 
     def test_without_signals_they_are_listed_and_nothing_is_written(self):
         status, text, file = self.run_("--out", "w.toml", extra='VAL_ 1200 FL 65535 "SNA" ;\n')

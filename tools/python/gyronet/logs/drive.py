@@ -126,13 +126,13 @@ class Drive:
                 raise Refused(self.apart(self.accel) + "; one clock is needed")
         self.start = first + request.start
         last = min(last, first + request.to) if request.to is not None else last
+        for used in (self.gyro, self.accel):
+            if not RATES[0] <= used.hz <= RATES[1]:
+                raise Refused(f"{used.name}: {used.hz:.3g} Hz by the median period, {used.channel.rate:.3g} Hz by count and span, "
+                              "but an IMU needs 25 to 1000 Hz; is the time's unit right? --unit t_s=ms")
         seconds = last - self.start
         if not SHORTEST <= seconds < LONGEST:
             raise Refused(f"{self.gyro.name}: {seconds:.2f} s, but a drive is 3 s to a day long; --from and --to choose a part")
-        for used in (self.gyro, self.accel):
-            if not RATES[0] <= used.hz <= RATES[1]:
-                raise Refused(f"{used.name}: {used.hz:.1f} Hz by the median period, {used.channel.rate:.1f} Hz by count and span, "
-                              "but an IMU needs 25 to 1000 Hz; is the time's unit right? --unit t_s=ms")
         self.count = int(seconds / grid.DT) + 1
 
     def apart(self, used):

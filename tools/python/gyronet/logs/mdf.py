@@ -13,42 +13,55 @@ from gyronet.refused import Refused, listed
 
 def read(path, log, bus, vehicle, flags):
     try:
-        mdf = MDF(str(path))
+        with MDF(str(path)) as mdf:
+            if any("CAN_DataFrame" in name for name in mdf.channels_db):
+                can.read(path, "mf4", log, bus)
+            else:
+                Signals(path, mdf, vehicle, flags).give(log)
+    except Refused:
+        raise
     except Exception as error:  # asammdf raises whatever damaged blocks provoke
         reason = re.sub(r"'?<mmap[^']*'?", "it", " ".join(str(error).split()))
         raise Refused(f"{path}: asammdf cannot read this MDF file: {reason}; finalise it with the logger's or asammdf's tools") from None
-    with mdf:
-        if any("CAN_DataFrame" in name for name in mdf.channels_db):
-            can.read(path, "mf4", log, bus)
-            return
-        start = mdf.start_time.timestamp() if mdf.start_time else 0.0
-        names = {ours: vehicle.columns.get(ours, {}).get("name", ours) for ours in IMU_COLUMNS}
+
+
+class Signals:
+    def __init__(self, path, mdf, vehicle, flags):
+        self.path, self.mdf, self.vehicle, self.flags = path, mdf, vehicle, flags
+        self.start = mdf.start_time.timestamp() if mdf.start_time else 0.0
+
+    def get(self, name):
+        """Times, values and unit of the only signal of that name; numbers where a description gives them a text."""
+        places = self.mdf.channels_db[name]
+        if len(places) > 1:
+            raise Refused(f"{self.path}: {len(places)} signals are named {name}")
+        signal = self.mdf.get(name, *places[0], raw=True, ignore_invalidation_bits=False).physical(ignore_value2text_conversions=True)
+        if signal.samples.dtype.kind not in "biuf":
+            raise Refused(f"{self.path}: {name}: texts, not numbers")
+        master = self.mdf.groups[places[0][0]].channels[self.mdf.masters_db[places[0][0]]]
+        unit = self.flags.get("t_s") or self.vehicle.columns.get("t_s", {}).get("unit") or master.unit or "s"
+        scale = units.scale(f"the time of {name}", unit, ["time"], "time")[0]
+        return scale * signal.timestamps + self.start, signal.samples.astype(float), signal.unit
+
+    def give(self, log):
+        mapped = self.vehicle.columns
+        names = {ours: mapped.get(ours, {}).get("name", ours) for ours in IMU_COLUMNS}
         for half, kind in ((IMU_COLUMNS[:3], "accel"), (IMU_COLUMNS[3:], "gyro")):
-            if all(names[ours] in mdf for ours in half):
-                dimension = "acceleration" if kind == "accel" else "rate"
-                axes = [_signal(mdf, path, names[ours]) for ours in half]
-                if any(len(axis) != len(axes[0]) or (axis.timestamps != axes[0].timestamps).any() for axis in axes):
-                    raise Refused(f"{path}: {', '.join(names[ours] for ours in half)} have different time stamps")
-                scaled = []
-                for ours, axis in zip(half, axes):
-                    unit = flags.get(ours) or flags.get(axis.name) or vehicle.columns.get(ours, {}).get("unit") or axis.unit
-                    scaled.append(axis.samples.astype(float) * units.scale(axis.name, unit, [dimension], f"{kind} column")[0])
-                log.channel(kind, kind).extend(np.column_stack([axes[0].timestamps + start, *scaled]))
+            if all(names[ours] in self.mdf for ours in half):
+                axes, columns = [self.get(names[ours]) for ours in half], []
+                if any(len(axis[0]) != len(axes[0][0]) or (axis[0] != axes[0][0]).any() for axis in axes):
+                    raise Refused(f"{self.path}: {', '.join(names[ours] for ours in half)} have different time stamps")
+                for ours, (_, values, unit) in zip(half, axes):
+                    unit = self.flags.get(ours) or self.flags.get(names[ours]) or mapped.get(ours, {}).get("unit") or unit
+                    columns.append(values * units.scale(names[ours], unit, ["acceleration" if kind == "accel" else "rate"], f"{kind} column")[0])
+                log.channel(kind, kind).extend(np.column_stack([axes[0][0], *columns]))
         for name in log.wanted or ():
             name = name.rpartition(":")[2]
-            if name in mdf and name not in log.channels:
-                signal = _signal(mdf, path, name)
-                log.channel(name, "number", signal.unit).extend(
-                    np.column_stack([signal.timestamps + start, signal.samples.astype(float)]))
-        others = [name for name in mdf.channels_db if name not in log.channels and name not in names.values() and name not in ("t", "time")]
-        log.passed.update({f"MDF signal {name}": 1 for name in others[:64]})
+            if name in self.mdf and name not in log.channels:
+                seconds, values, unit = self.get(name)
+                log.channel(name, "number", unit).extend(np.column_stack([seconds, values]))
+        others = set(self.mdf.channels_db) - {*log.channels, *names.values(), "t", "time"}
+        log.passed.update({f"MDF signal {name}": 1 for name in sorted(others)[:64]})
         if not log.channels:
-            raise Refused(f"{path}: none of the signals is named in the vehicle file ([columns] gyr_x = {{ name = ... }})"
+            raise Refused(f"{self.path}: none of the signals is named in the vehicle file ([columns] gyr_x = {{ name = ... }})"
                           + listed(sorted(others), "; there are "))
-
-
-def _signal(mdf, path, name):
-    places = mdf.channels_db[name]
-    if len(places) > 1:
-        raise Refused(f"{path}: {len(places)} signals are named {name}")
-    return mdf.get(name, *places[0], ignore_invalidation_bits=False)

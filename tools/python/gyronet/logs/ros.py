@@ -45,7 +45,7 @@ def read_bag(path, log, bus, suffix=""):
             raise
         except Exception as error:  # rosbags raises whatever damaged bytes provoke
             remedy = "a bag that was not closed: rosbag reindex FILE" if suffix == ".bag" else REINDEX
-            reason = str(error).replace(str(named), "it") or type(error).__name__
+            reason = str(error).replace(str(named), str(path)) or type(error).__name__
             if not log.channels:
                 raise Refused(f"{path}: the bag cannot be read: {reason}; {remedy}") from None
             log.drop(f"the bag ends early: {reason}")

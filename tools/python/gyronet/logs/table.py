@@ -171,8 +171,11 @@ def read(path, log, vehicle, flags, rate, several):
         # One more column takes what a separator at the end of a line makes.
         for frame in pandas.read_csv(file, sep=header.separator or r"\s+", header=None, names=range(count + 1), index_col=False, chunksize=ROWS,
                                      decimal="," if header.commas else ".", on_bad_lines="warn", skipinitialspace=True):
-            rows = frame.apply(pandas.to_numeric, errors="coerce").to_numpy(float)
+            rows = frame.apply(pandas.to_numeric, errors="coerce").to_numpy(float, copy=True)
             clock = clock or Clock(path, columns, header, rows[0], rate)
+            if np.isnan(rows[:, clock.at]).all():  # dates, in UTC where they do not say
+                dates = pandas.to_datetime(frame[clock.at], format="ISO8601", utc=True, errors="coerce")
+                rows[:, clock.at] = (dates - pandas.Timestamp(0, tz="UTC")).dt.total_seconds() / clock.scale
             timed, whole = np.isfinite(rows[:, clock.at]), frame[count].isna().to_numpy()
             log.drop("rows without a time", np.count_nonzero(~timed & whole))
             log.drop("rows that are longer than the header", np.count_nonzero(~whole))
