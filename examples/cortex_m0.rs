@@ -52,7 +52,7 @@ mod firmware {
         }
         let Some(rate) = last.map(|last| last.vehicle.live) else { return false };
         let deg_per_sec = rate.rate.rad_per_sec().to_degrees();
-        hprintln!("corrected yaw rate {}e-3 deg/s", (1e3 * deg_per_sec) as i32);
+        hprintln!("corrected yaw rate {} millidegrees a second", (1e3 * deg_per_sec) as i32);
         let good = rate.status == Status::Ready && rate.source == Source::Model;
         good && (deg_per_sec - 6.0).abs() < 0.06
     }

@@ -96,7 +96,7 @@ pub fn exit_at_the_end(now: Micros, can: &Controller, inputs: &InputCounters) {
     let good = can.last.as_ref().filter(|tx1| complete && tx1.rate_status == SignalStatus::OK);
     if let Some(tx1) = good {
         let milli_deg = (1e3 * tx1.rate_deg_per_sec()) as i32;
-        hprintln!("{} frames; corrected yaw rate {}e-3 deg/s", can.frames, milli_deg);
+        hprintln!("{} frames; corrected yaw rate {} millidegrees a second", can.frames, milli_deg);
     }
     debug::exit(if good.is_some() { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
 }

@@ -11,7 +11,7 @@
 //! 1. Pass in the inputs that have arrived: [`Coprocessor::imu`], [`Coprocessor::fog`], [`Coprocessor::can`]. Call
 //!    [`Coprocessor::poll`] about every millisecond, because it detects a silent sensor. The frames go to the
 //!    [`Sink`] that each call gets.
-//! 2. Run the windows of [`Coprocessor::window`] and [`Coprocessor::fog_window`] through the networks, at once or in
+//! 2. Run the windows of [`Coprocessor::window`] and [`Coprocessor::fog_second`] through the networks, at once or in
 //!    a task of lower priority, and pass the estimates to [`Coprocessor::deliver`] and [`Coprocessor::deliver_fog`].
 //!
 //! A window's estimate is used [`crate::compensate::Mode::delay`] samples after the window, however early it arrives,
@@ -43,7 +43,7 @@ use crate::health::slow::SlowStatus;
 use crate::health::{BoardFaults, Faults, InputCounters, MonitorCounters, Quality, Source, count};
 use crate::model::Estimate;
 use crate::model::fognet::FogEstimate;
-use crate::model::seconds::SecondsWindow;
+use crate::model::seconds::NewSecond;
 use crate::monitor::SensorMonitor;
 use crate::pipeline::{BoardState, Handover, Pipeline};
 use crate::sample::{FogSample, Frame, ImuSample, NO_STAMP, WheelSample};
@@ -328,9 +328,10 @@ impl Coprocessor {
         self.claim(wanted, end)
     }
 
-    /// Returns the window that is due for FoGNet and its number, once.
-    pub fn fog_window(&mut self) -> Option<(u32, SecondsWindow<'_>)> {
-        self.fog.window()
+    /// Returns the second that ends the window that is due for FoGNet, once: add it to a
+    /// [`Minute`](crate::model::seconds::Minute).
+    pub fn fog_second(&mut self) -> Option<NewSecond> {
+        self.fog.second()
     }
 
     /// Accepts FoGNet's estimate of a window.

@@ -37,9 +37,7 @@ pub use rest::{RestOutcome, RestReading};
 use crate::bias::Latitude;
 use crate::model::fognet::{FogEstimate, GAIN_FRACTION_BITS};
 use crate::model::fognet_blob::{Gyro, Training};
-use crate::model::seconds::{
-    FRAMES, FogFrame, Incomplete, Minute, Padding, STEPS, SecondSums, SecondsWindow,
-};
+use crate::model::seconds::{FRAMES, FogFrame, Incomplete, NewSecond, STEPS, SecondSums};
 use crate::units::Angle;
 
 /// A window's correction is spread over this many frames.
@@ -113,8 +111,6 @@ pub struct FogConfig {
     pub shake: [f32; 2],
     /// Says whether FoGNet is used.
     pub fognet: FogNetUse,
-    /// The filling of a window before a minute is over.
-    pub padding: Padding,
     /// Largest correction of a window that is accepted.
     pub max_correction: Angle,
 }
@@ -129,7 +125,6 @@ impl FogConfig {
         tilt: Tilt::NONE,
         shake: [6e-5, 1.7e-4],
         fognet: FogNetUse::Off,
-        padding: Padding::Repeat,
         max_correction: Angle((0.02 * Angle::PER_RAD as f64) as i64),
     };
 }
@@ -152,9 +147,9 @@ pub struct FogOutput {
     pub correction: Angle,
     /// Says whether an estimate was in use for this frame.
     pub corrected: bool,
-    /// A window is due: run [`FogCorrector::window`] through the network and
-    /// [`FogCorrector::deliver`] the estimate under this number within a second.
-    pub due: Option<u32>,
+    /// A second is over: add it to a [`Minute`](crate::model::seconds::Minute), run the window that it ends through the
+    /// network and [`FogCorrector::deliver`] the estimate under its number within a second.
+    pub due: Option<NewSecond>,
     /// The window ended here; a new one has begun.
     pub broken: Option<Incomplete>,
     /// The reason why the estimate due with this frame was rejected.
@@ -163,15 +158,17 @@ pub struct FogOutput {
     pub late: bool,
 }
 
-/// Applies FoGNet's corrections to a gyro's turns, and collects its windows.
+/// Applies FoGNet's corrections to a gyro's turns, and collects the seconds of its windows. Who runs the network keeps
+/// the window.
 #[derive(Debug, Clone)]
 pub struct FogCorrector {
     config: FogConfig,
     sums: SecondSums,
-    minute: Minute,
-    /// Number of the next window.
+    /// Number of the next second.
     next: u32,
-    /// The window that is handed out, and its estimate once delivered.
+    /// The next second begins a new window.
+    is_first: bool,
+    /// The window that is due, and its estimate once delivered.
     out: Option<(u32, Option<FogEstimate>)>,
     estimate: Option<FogEstimate>,
     /// The remainders of the divisions: of the linear part, of the spread part.
@@ -186,8 +183,8 @@ impl FogCorrector {
         Self {
             config,
             sums: SecondSums::ZERO,
-            minute: Minute::EMPTY,
             next: 0,
+            is_first: true,
             out: None,
             estimate: None,
             linear_rest: 0,
@@ -211,13 +208,11 @@ impl FogCorrector {
         match self.sums.add(frame) {
             Ok(None) => {}
             Ok(Some(second)) => {
-                self.minute.add(second);
                 (output.implausible, output.late) = self.use_estimate();
-                if self.window().is_some() {
-                    output.due = Some(self.next);
-                    self.out = Some((self.next, None));
-                    self.next = self.next.wrapping_add(1);
-                }
+                output.due = Some(NewSecond { number: self.next, is_first: self.is_first, second });
+                self.out = Some((self.next, None));
+                self.next = self.next.wrapping_add(1);
+                self.is_first = false;
             }
             Err(incomplete) => {
                 output.broken = Some(incomplete);
@@ -225,12 +220,6 @@ impl FogCorrector {
             }
         }
         output
-    }
-
-    /// Returns the window that is due, until the next second is over.
-    #[must_use]
-    pub fn window(&self) -> Option<SecondsWindow<'_>> {
-        self.minute.window(self.config.padding)
     }
 
     /// Accepts the estimate of a window that [`FogOutput::due`] announced, to use it when the next second is over.
@@ -248,7 +237,7 @@ impl FogCorrector {
     /// Drops the window and its estimate: neither may span a gap.
     pub fn break_window(&mut self) {
         self.sums = SecondSums::ZERO;
-        self.minute.clear();
+        self.is_first = true;
         self.out = None;
         self.estimate = None;
     }

@@ -25,7 +25,7 @@ mod firmware {
     use cortex_m_semihosting::{debug, hprintln};
     use gyronet::fog::FogCorrector;
     use gyronet::model::fognet::{FogNetState, MinuteNetwork};
-    use gyronet::model::seconds::{Minute, Padding, STEPS, Second};
+    use gyronet::model::seconds::{Minute, STEPS, Second};
     use gyronet::model::{FogBlob, FogNet, weights};
     use gyronet::units::Angle;
     use panic_semihosting as _;
@@ -70,12 +70,12 @@ mod firmware {
                 }
                 minute.add(second);
             }
-            let Some(window) = minute.window(Padding::None) else { return };
+            let Some(window) = minute.window() else { return };
             meter.run(name, || {
                 black_box(network.estimate(black_box(&window)));
             });
         }
-        let Some(window) = minute.window(Padding::None) else { return };
+        let Some(window) = minute.window() else { return };
         meter.run("fognet/start", || network.start(&window));
         // Skip both directions of layer 1, and the first piece of layer 2: the pieces that follow are the longest.
         for _ in 0..=STEPS {

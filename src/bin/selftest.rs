@@ -22,7 +22,7 @@ mod firmware {
     use gyronet::model::blob::HIDDEN;
     use gyronet::model::fognet::{FogNetState, MinuteNetwork};
     use gyronet::model::gyronet::GyroNetState;
-    use gyronet::model::seconds::{Minute, Padding, STEPS, Second};
+    use gyronet::model::seconds::{Minute, STEPS, Second};
     use gyronet::model::window::{FEATURES, Features, WINDOW};
     use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
     use gyronet::nn::lstm::{self, DirectionWeights, Scratch};
@@ -166,7 +166,7 @@ mod firmware {
                 let turn = Angle(i64::from(numbers.within(1 << 29)) << 14);
                 minute.add(Second { features, turn });
             }
-            let estimate = network.estimate(&minute.window(Padding::None)?);
+            let estimate = network.estimate(&minute.window()?);
             for angle in [estimate.correction, estimate.linear] {
                 digest.update(&angle.0.to_le_bytes());
             }

@@ -29,7 +29,7 @@ use crate::bias::Latitude;
 use crate::estimate::{AccumulatedYaw, YawEstimate};
 use crate::health::{Faults, Quality, Source, Status, count};
 use crate::model::fognet::FogEstimate;
-use crate::model::seconds::{FogFrame, SecondsWindow};
+use crate::model::seconds::{FogFrame, NewSecond};
 use crate::model::window::Features;
 use crate::sample::{FogSample, PERIOD_US, RATE_HZ, Standstill, WheelSample};
 use crate::sqrt::sqrt;
@@ -112,7 +112,7 @@ pub struct FogPipeline {
     repeats: Repeats,
     /// An increment of the next step was stuck.
     stuck_in_step: bool,
-    due: Option<u32>,
+    due: Option<NewSecond>,
     /// An estimate is due at the end of the second.
     awaited: bool,
     /// The fault of the newest estimate.
@@ -286,10 +286,9 @@ impl FogPipeline {
         count(&mut self.counters.contradicted, u32::from(outcome == Some(RestOutcome::Refused)));
     }
 
-    /// Returns the window that is due and its number, once.
-    pub fn window(&mut self) -> Option<(u32, SecondsWindow<'_>)> {
-        let number = self.due.take()?;
-        Some((number, self.corrector.window()?))
+    /// Returns the second that ends the window that is due, once.
+    pub fn second(&mut self) -> Option<NewSecond> {
+        self.due.take()
     }
 
     /// Accepts the estimate of a window. Returns whether it will be used: not if no window waits for it, or if it is
@@ -306,10 +305,10 @@ impl FogPipeline {
 
     fn note(&mut self, output: &FogOutput) {
         let FogOutput { corrected, due, broken, implausible, late, .. } = output;
-        if let Some(number) = due.filter(|_| self.has_network) {
+        if let Some(second) = due.filter(|_| self.has_network) {
             let used = self.awaited && !*late && implausible.is_none();
             count(&mut self.counters.windows, u32::from(used));
-            self.due = Some(number);
+            self.due = Some(second);
             self.awaited = true;
         }
         count(&mut self.counters.broken, u32::from(broken.is_some()));

@@ -44,6 +44,11 @@ pub struct FogEstimate {
     pub clamped_inputs: u16,
 }
 
+impl FogEstimate {
+    /// An estimate without a correction.
+    pub const NONE: Self = Self { correction: Angle::ZERO, linear: Angle::ZERO, gain: 0, clamped_inputs: 0 };
+}
+
 /// Turns a minute into a correction; the integer network and the f32 reference implement it.
 pub trait MinuteNetwork {
     /// Runs the network over one window.

@@ -112,83 +112,79 @@ impl SecondSums {
     }
 }
 
-/// Says how a window is filled before there are [`STEPS`] seconds; Fig. 8 of the paper shows that it is padded, but not
-/// with what.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// A second for the window, with its number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Padding {
-    /// The window repeats the seconds so far, in their order.
-    #[default]
-    Repeat,
-    /// The window repeats the oldest second.
-    Edge,
-    /// The window is not padded: no window exists before the first minute is over.
-    None,
+pub struct NewSecond {
+    /// Number of the second, and of the window that it ends.
+    pub number: u32,
+    /// Says whether it begins a new window: the first one, or the first one after a gap.
+    pub is_first: bool,
+    /// Its features.
+    pub second: Second,
 }
 
 /// Keeps the last [`STEPS`] seconds without a gap.
-pub type Minute = Ring<Second, STEPS>;
+#[derive(Debug, Clone)]
+pub struct Minute {
+    seconds: Ring<Second, STEPS>,
+    /// Number of the newest second.
+    newest: u32,
+}
 
 impl Minute {
     /// A minute without a second.
-    pub const EMPTY: Self = Self::without_elements(Second { features: [0; FEATURES], turn: Angle::ZERO });
+    pub const EMPTY: Self = Self {
+        seconds: Ring::without_elements(Second { features: [0; FEATURES], turn: Angle::ZERO }),
+        newest: 0,
+    };
 
-    /// Returns the window, oldest second first, padded to [`STEPS`]; `None` where the padding cannot fill it.
-    #[must_use]
-    pub fn window(&self, padding: Padding) -> Option<SecondsWindow<'_>> {
-        let enough = self.len() == STEPS || self.len() > 0 && padding != Padding::None;
-        enough.then_some(SecondsWindow { minute: self, padding })
-    }
-}
-
-/// Gives access to the [`STEPS`] seconds of a window, in place.
-#[derive(Debug, Clone, Copy)]
-pub struct SecondsWindow<'m> {
-    minute: &'m Minute,
-    padding: Padding,
-}
-
-/// Holds a copy of a window, for a reader that must not block the writer for longer than a copy takes.
-#[derive(Debug, Clone)]
-pub struct WindowCopy {
-    minute: Minute,
-    padding: Padding,
-}
-
-impl WindowCopy {
-    /// A copy without a window.
-    pub const EMPTY: Self = Self { minute: Minute::EMPTY, padding: Padding::Repeat };
-
-    /// Copies a window.
-    pub fn take(&mut self, window: &SecondsWindow<'_>) {
-        self.minute.clone_from(window.minute);
-        self.padding = window.padding;
+    /// Adds the next second of the corrector and returns the window that it ends. A second whose number does not follow
+    /// the one before begins a new window, because one between was missed.
+    pub fn follow(&mut self, new: NewSecond) -> SecondsWindow<'_> {
+        if new.is_first || new.number != self.newest.wrapping_add(1) {
+            self.seconds.clear();
+        }
+        self.newest = new.number;
+        self.add(new.second);
+        SecondsWindow { seconds: &self.seconds }
     }
 
-    /// Returns the window; `None` before one was copied.
+    /// Adds a second that follows the one before.
+    pub fn add(&mut self, second: Second) {
+        self.seconds.add(second);
+    }
+
+    /// Returns the window that ends with the newest second; `None` without a second.
     #[must_use]
     pub fn window(&self) -> Option<SecondsWindow<'_>> {
-        self.minute.window(self.padding)
+        (self.seconds.len() > 0).then_some(SecondsWindow { seconds: &self.seconds })
     }
+}
+
+/// Gives access to the [`STEPS`] seconds of a window, in place. Before there are as many, the seconds so far are
+/// repeated in their order; Fig. 8 of the paper shows that a window is padded, but not with what.
+#[derive(Debug, Clone, Copy)]
+pub struct SecondsWindow<'m> {
+    seconds: &'m Ring<Second, STEPS>,
 }
 
 impl<'m> SecondsWindow<'m> {
+    /// Returns whether the window has a whole minute, and repeats no second.
+    #[must_use]
+    pub const fn is_whole(&self) -> bool {
+        self.seconds.len() == STEPS
+    }
+
     /// Returns the seconds, oldest first: [`STEPS`] of them.
     pub fn iter(&self) -> impl Iterator<Item = &'m Second> + use<'m> {
-        let Self { minute, padding } = *self;
-        let filled = minute.len();
+        let seconds = self.seconds;
+        let filled = seconds.len();
         let missing = STEPS - filled;
         (0..STEPS).filter_map(move |step| {
-            let number = match (step.checked_sub(missing), padding) {
-                (Some(row), _) => row,
-                (None, Padding::Repeat) => {
-                    // Counted from the newest end, so that the repetition ends where the data begin.
-                    let seconds = filled.max(1);
-                    (filled - missing % seconds + step) % seconds
-                }
-                (None, Padding::Edge | Padding::None) => 0,
-            };
-            minute.get(number)
+            // Counted from the newest end, so that the repetition ends where the data begin.
+            let repeated = (filled.max(1) - missing % filled.max(1) + step) % filled.max(1);
+            seconds.get(step.checked_sub(missing).unwrap_or(repeated))
         })
     }
 }

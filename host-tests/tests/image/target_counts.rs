@@ -2,7 +2,7 @@
 //! the emulator (instructions, and modelled cycles at zero wait states), and they are right there.
 
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
-use gyronet::model::seconds::{Minute, Padding, STEPS, Second};
+use gyronet::model::seconds::{Minute, STEPS, Second};
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
 use gyronet::units::Angle;
@@ -129,7 +129,7 @@ fn fognet_hash() -> u32 {
             let turn = Angle(i64::from(numbers.within(1 << 29)) << 14);
             minute.add(Second { features, turn });
         }
-        let window = minute.window(Padding::None).expect("it is full");
+        let window = minute.window().expect("it is full");
         let estimate = network.estimate(&window);
         for angle in [estimate.correction, estimate.linear] {
             digest.update(&angle.0.to_le_bytes());

@@ -11,7 +11,6 @@ use gyronet::coprocessor::{Clock, InputError, Observation, StorageFaults};
 use gyronet::fog::{FogConfig, FogNetUse};
 use gyronet::health::{Faults, InputCounters, Quality, Status};
 use gyronet::model::fognet::FogEstimate;
-use gyronet::model::seconds::STEPS;
 use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::DueWindow;
@@ -277,12 +276,12 @@ fn a_fibre_optic_gyro_sends_its_own_messages_and_hands_out_its_own_windows() {
             FOG_IDS.iter().any(|id| frame.id() == Id::Standard(StandardId::new(*id).expect("11 bits")))
         };
         sent += car.sent.frames.drain(..).filter(|sent| own(&sent.frame)).count();
-        if let Some((number, window)) = car.coprocessor.fog_window() {
-            assert_eq!(window.iter().count(), STEPS);
+        if let Some(second) = car.coprocessor.fog_second() {
+            assert_eq!((second.number, second.is_first), (windows, windows == 0));
             windows += 1;
             let correction = Angle(600_000_000);
             let estimate = FogEstimate { correction, linear: Angle::ZERO, gain: 0, clamped_inputs: 0 };
-            car.coprocessor.deliver_fog(number, estimate).expect("the window that is due");
+            car.coprocessor.deliver_fog(second.number, estimate).expect("the window that is due");
         }
     }
     assert_eq!(sent, 3 * 599, "a set of three messages every 10 ms");

@@ -1,8 +1,10 @@
-//! FoGNet's corrections on the way out: seconds, padding, the rule and its exact sum.
+//! FoGNet's corrections on the way out: seconds, windows, the rule and its exact sum.
 
 use gyronet::fog::{FogConfig, FogCorrector, FogOutput, IncrementRate};
 use gyronet::model::fognet::FogEstimate;
-use gyronet::model::seconds::{FogFrame, Incomplete, Minute, Padding, STEPS, Second, SecondSums};
+use gyronet::model::seconds::{
+    FogFrame, Incomplete, Minute, NewSecond, STEPS, Second, SecondSums, SecondsWindow,
+};
 use gyronet::units::{Angle, AngularRate, WheelSpeed};
 use gyronet_host_tests::noise::Noise;
 
@@ -32,8 +34,8 @@ fn run(corrector: &mut FogCorrector, turns: &[i64], given: FogEstimate, after: u
         .enumerate()
         .map(|(n, turn)| {
             let output = corrector.correct(&frame(*turn));
-            if let Some(number) = output.due {
-                due = Some((n + after, number));
+            if let Some(second) = output.due {
+                due = Some((n + after, second.number));
             }
             if let Some((at, number)) = due
                 && n >= at
@@ -100,28 +102,35 @@ fn a_second_needs_the_gyro_and_half_of_the_rest() {
     }
 }
 
+fn turns(window: &SecondsWindow<'_>) -> Vec<i64> {
+    window.iter().map(|second| second.turn.0).collect()
+}
+
 #[test]
-fn a_window_is_padded_as_configured() {
+fn a_window_repeats_its_seconds_until_a_minute_is_over() {
     let mut minute = Minute::EMPTY;
-    let rows = |minute: &Minute, padding| {
-        minute.window(padding).map(|window| window.iter().map(|second| second.turn.0).collect::<Vec<i64>>())
-    };
-    for padding in [Padding::Repeat, Padding::Edge, Padding::None] {
-        assert_eq!(rows(&minute, padding), None, "{padding:?}");
-    }
+    assert!(minute.window().is_none());
     for n in 0..130i64 {
         minute.add(Second { features: [0; 8], turn: Angle(n) });
         let have = n + 1;
         let newest = (have - STEPS as i64)..have;
-        let repeat: Vec<i64> =
-            newest.clone().map(|row| if have < 60 { row.rem_euclid(have) } else { row }).collect();
-        let edge: Vec<i64> = newest.clone().map(|row| row.max(0)).collect();
-        assert_eq!(rows(&minute, Padding::Repeat), Some(repeat), "{have} s");
-        assert_eq!(rows(&minute, Padding::Edge), Some(edge), "{have} s");
-        assert_eq!(rows(&minute, Padding::None), (have >= 60).then(|| newest.collect()), "{have} s");
+        let expected: Vec<i64> =
+            newest.map(|row| if have < 60 { row.rem_euclid(have) } else { row }).collect();
+        assert_eq!(minute.window().as_ref().map(turns), Some(expected), "{have} s");
     }
-    minute.clear();
-    assert_eq!(rows(&minute, Padding::Repeat), None);
+}
+
+#[test]
+fn a_second_that_was_missed_and_a_gap_begin_a_new_window() {
+    let mut minute = Minute::EMPTY;
+    let mut follow = |number: u32, is_first| {
+        let second = Second { features: [0; 8], turn: Angle(number.into()) };
+        turns(&minute.follow(NewSecond { number, is_first, second }))[..3].to_vec()
+    };
+    assert_eq!(follow(5, false), [5, 5, 5]);
+    assert_eq!(follow(6, false), [5, 6, 5]);
+    assert_eq!(follow(8, false), [8, 8, 8], "7 was missed");
+    assert_eq!(follow(9, true), [9, 9, 9], "a gap");
 }
 
 #[test]
@@ -178,21 +187,18 @@ fn the_speed_of_the_network_changes_no_turn() {
 
 #[test]
 fn a_gap_ends_the_window_and_the_estimate() {
-    let mut corrector = FogCorrector::new(FogConfig { padding: Padding::Repeat, ..FogConfig::DEFAULT });
+    let mut corrector = FogCorrector::new(FogConfig::DEFAULT);
     let given = estimate(MILLIRADIAN, 0, 0.0);
     assert!(run(&mut corrector, &[0; 450], given, 0)[449].corrected);
     let output = corrector.correct(&FogFrame { turn: None, ..frame(0) });
     assert_eq!((output.turn, output.broken, output.corrected), (None, Some(Incomplete::Gyro), false));
-    assert!(corrector.window().is_none());
     // The estimate of a window from before the gap is refused.
     corrector.deliver(3, given);
     let after = run(&mut corrector, &[0; 450], given, 0);
     assert_eq!(after.iter().position(|output| output.corrected), Some(200));
     assert!(after.iter().all(|output| !output.late));
-    // Without padding a whole minute goes by.
-    let mut corrector = FogCorrector::new(FogConfig { padding: Padding::None, ..FogConfig::DEFAULT });
-    let outputs = run(&mut corrector, &[0; 7_000], given, 0);
-    assert_eq!(outputs.iter().position(|output| output.corrected), Some(6_100));
+    let first: Vec<_> = after.iter().filter_map(|output| output.due).map(|second| second.is_first).collect();
+    assert_eq!(first, [true, false, false, false]);
 }
 
 #[test]

@@ -61,10 +61,10 @@ impl Gyro {
             let speeds = [Some(WheelSpeed(0)); 4];
             let wheels = WheelSample { time: sample.time, speeds, standstill: self.standstill };
             sent.extend(std::iter::from_fn(|| fog.next_step(sample.time, Some([0; 6]), Some(&wheels))));
-            if let Some((number, _)) = fog.window() {
+            if let Some(second) = fog.second() {
                 let correction = self.correction;
                 fog.deliver(
-                    number,
+                    second.number,
                     FogEstimate { correction, linear: Angle::ZERO, gain: 0, clamped_inputs: 0 },
                 );
             }
@@ -162,7 +162,7 @@ fn fognet_is_dropped_where_a_standstill_shows_harm() {
     gyro.standstill = Standstill::Moving;
     let sent = gyro.run(&mut fog, 60);
     assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::EarthRate, Quality::Good)));
-    assert!(mean_deg_per_hour(&sent).abs() < 1.0 && fog.window().is_none());
+    assert!(mean_deg_per_hour(&sent).abs() < 1.0 && fog.second().is_none());
 }
 
 #[test]

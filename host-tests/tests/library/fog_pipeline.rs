@@ -50,8 +50,8 @@ fn run(fog: &mut FogPipeline, steps: core::ops::Range<u64>, with: impl Fn(u64) -
         while let Some(yaw) = fog.next_step(now, Some([0; 6]), Some(&wheels())) {
             sent.push(yaw);
         }
-        if let Some((number, _)) = fog.window() {
-            fog.deliver(number, NOTHING);
+        if let Some(second) = fog.second() {
+            fog.deliver(second.number, NOTHING);
         }
     }
     sent
@@ -83,7 +83,7 @@ fn a_network_whose_weights_are_gone_is_left_out_at_once_and_reported() {
     let sent = run(&mut fog, 301..701, |_| true);
     let without = (Source::EarthRate, Quality::Degraded, Faults::STORED);
     assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality, yaw.faults) == without), "{:?}", sent[0]);
-    assert!(fog.window().is_none() && fog.counters().late == late);
+    assert!(fog.second().is_none() && fog.counters().late == late);
 }
 
 #[test]
@@ -171,7 +171,7 @@ fn a_missing_input_is_reported() {
     let mut fog = with_fognet(false);
     let sent = run(&mut fog, 1..301, |_| true);
     assert!(sent.iter().all(|yaw| yaw.source == Source::EarthRate && yaw.faults == Faults::STORED));
-    assert!(fog.window().is_none());
+    assert!(fog.second().is_none());
     let mut fog = with_fognet(true);
     fog.add(Micros(PERIOD_US), sample(1)).expect("the first one");
     let yaw = fog.next_step(Micros(PERIOD_US), Some([0; 6]), None).expect("a step");

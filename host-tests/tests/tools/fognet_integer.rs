@@ -4,7 +4,7 @@
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
 use gyronet::model::fognet_blob::INPUTS;
 use gyronet::model::fognet_f32::FogNetF32;
-use gyronet::model::seconds::{Minute, Padding, STEPS, Second};
+use gyronet::model::seconds::{Minute, STEPS, Second};
 use gyronet::model::{FogBlob, FogNet, weights};
 use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 use gyronet_host_tests::golden::{Golden, WINDOWS};
@@ -40,7 +40,7 @@ fn minute(window: &Window) -> Minute {
 /// Returns the part of a correction that is not linear, by both networks, rad.
 fn bent(integer: &mut FogNet<'_, '_>, float: &mut FogNetF32<'_>, window: &Window) -> [f64; 2] {
     let minute = minute(window);
-    let window = minute.window(Padding::None).expect("a minute");
+    let window = minute.window().expect("a minute");
     [integer.estimate(&window), float.estimate(&window)]
         .map(|estimate| estimate.correction.rad() - estimate.linear.rad())
 }

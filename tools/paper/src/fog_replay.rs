@@ -11,7 +11,7 @@ use gyronet::fog::{
 };
 use gyronet::model::fognet::MinuteNetwork;
 use gyronet::model::fognet_blob::{Gyro, Training};
-use gyronet::model::seconds::FogFrame;
+use gyronet::model::seconds::{FogFrame, Minute};
 use gyronet::model::window::Features;
 use gyronet::sample::{FogSample, ImuSample, PERIOD_US, RATE_HZ, Validity};
 use gyronet::units::{Angle, AngularRate, Micros, SpecificForce, WheelSpeed};
@@ -41,6 +41,7 @@ pub struct FogReplay {
 pub fn run(sequence: &Sequence, network: &mut impl MinuteNetwork, config: FogConfig) -> FogReplay {
     let inertial = features(sequence);
     let mut corrector = FogCorrector::new(config);
+    let mut minute = Minute::EMPTY;
     let mut drive = FogReplay::default();
     for (step, inertial) in sequence.steps.iter().zip(inertial) {
         let wheels = step.wheels.map(|way| {
@@ -54,11 +55,11 @@ pub fn run(sequence: &Sequence, network: &mut impl MinuteNetwork, config: FogCon
             wheels: Some(wheels),
         };
         let output = corrector.correct(&frame);
-        if let (Some(number), Some(window)) = (output.due, corrector.window()) {
-            let estimate = network.estimate(&window);
+        if let Some(second) = output.due {
+            let estimate = network.estimate(&minute.follow(second));
             drive.windows += 1;
             drive.clamped_inputs += u64::from(estimate.clamped_inputs);
-            corrector.deliver(number, estimate);
+            corrector.deliver(second.number, estimate);
         }
         drive.turns.push(output.turn.map_or(0.0, Angle::rad));
         drive.corrected += u64::from(output.corrected);
@@ -108,6 +109,7 @@ pub fn run_board(
         clock: Clock::Sensor,
         ..Config::DEFAULT
     });
+    let mut minute = Minute::EMPTY;
     let mut way = [0.0; 2];
     let mut sent = Rates(vec![YawEstimate::default(); sequence.steps.len()]);
     for (number, step) in sequence.steps.iter().enumerate() {
@@ -137,10 +139,10 @@ pub fn run_board(
         let increment = [None, None, Some(angle(step.fog))];
         let sample = FogSample { time, span: PERIOD_US as u32, lost: 0, increment, temperature: None };
         let _ = coprocessor.fog(sample, time, &mut sent);
-        if let (Some(network), Some((number, window))) = (&mut fognet, coprocessor.fog_window()) {
-            let estimate = network.estimate(&window);
+        if let (Some(network), Some(second)) = (&mut fognet, coprocessor.fog_second()) {
+            let estimate = network.estimate(&minute.follow(second));
             // The estimate is in time, so it is not refused.
-            let _ = coprocessor.deliver_fog(number, estimate);
+            let _ = coprocessor.deliver_fog(second.number, estimate);
         }
     }
     (sent.0, *coprocessor.fog_counters())

@@ -16,9 +16,9 @@ use crate::simulate::world::EARTH_RATE;
 use gyronet::bias::{STATIC_SAMPLES, StaticConfig};
 use gyronet::fog::FogConfig;
 use gyronet::model::WindowNetwork;
-use gyronet::model::fognet::MinuteNetwork;
+use gyronet::model::fognet::{FogEstimate, MinuteNetwork};
 use gyronet::model::fognet_blob::Training;
-use gyronet::model::seconds::Padding;
+use gyronet::model::seconds::SecondsWindow;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
 use gyronet::units::AngularRate;
@@ -85,11 +85,12 @@ impl Estimates {
             let before = self.refused.take().map(|before| before + "; ").unwrap_or_default();
             self.refused = Some(format!("{before}FoGNet's weights were not run: {error}"));
         }
-        for (method, padding) in
-            [(Method::FOGNET, FogConfig::DEFAULT.padding), (Method::FOGNET_NOPAD, Padding::None)]
-        {
-            let config = FogConfig { padding, ..fog_replay::default_config(sequence) };
-            let network: Option<&mut dyn MinuteNetwork> = if fits.is_ok() { Some(network) } else { None };
+        let config = fog_replay::default_config(sequence);
+        let mut whole = WholeMinutes(network);
+        for method in [Method::FOGNET, Method::FOGNET_NOPAD] {
+            let network: &mut dyn MinuteNetwork =
+                if method == Method::FOGNET { &mut *whole.0 } else { &mut whole };
+            let network = fits.is_ok().then_some(network);
             self.add(method, || {
                 let (sent, _) = fog_replay::run_board(sequence, config, network);
                 sent.iter().map(|sent| sent.rate.rad_per_sec()).collect()
@@ -222,4 +223,13 @@ fn corrected(drive: &Replay, gyro: &[f64], which: impl Fn(&Step) -> AngularRate)
 fn rates(headings: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut last = None;
     headings.map(|yaw| (yaw - last.replace(yaw).unwrap_or(yaw)) / DT).collect()
+}
+
+/// Corrects nothing before a window is a whole minute.
+struct WholeMinutes<'n, N>(&'n mut N);
+
+impl<N: MinuteNetwork> MinuteNetwork for WholeMinutes<'_, N> {
+    fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {
+        if window.is_whole() { self.0.estimate(window) } else { FogEstimate::NONE }
+    }
 }
