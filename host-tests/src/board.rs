@@ -221,6 +221,16 @@ impl Board {
         Counts::new(&self.ask("counts", json!({})))
     }
 
+    /// Takes the longest path of each task since the last call, instructions, by the name of its function.
+    pub fn paths(&mut self) -> Vec<(String, u64)> {
+        let answer = self.ask("paths_take", json!({}));
+        let path = |entry: &Value| {
+            let name = entry["name"].as_str().unwrap_or_default().to_owned();
+            (name, entry["instructions"].as_u64().expect("the model counts"))
+        };
+        list(&answer["paths"]).iter().map(path).collect()
+    }
+
     /// Saves the state of the whole board under a name.
     pub fn snapshot(&mut self, name: &str) {
         self.ask("snapshot", json!({ "name": name }));

@@ -19,6 +19,7 @@ pub mod replay;
 pub mod require;
 pub mod sent;
 pub mod sequence;
+pub mod settings;
 pub mod situations;
 pub mod stored;
 pub mod stream;

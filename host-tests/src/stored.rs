@@ -27,7 +27,7 @@ pub fn upload(flash: &Rc<RefCell<F405>>, slot: Slot, file: &[u8]) -> Result<(), 
     for (block, offset) in file.chunks(256).zip((0..).step_by(256)) {
         upload.block(&mut region, offset, block).map_err(|e| text(&e))?;
     }
-    let crc = upload.verify(slots(&flash.borrow())).map_err(|e| text(&e))?;
+    let crc = upload.verify(slots(&flash.borrow())).map_err(|e| text(&e))?.crc;
     let mut store = open(flash).map_err(|e| text(&e))?;
     let accepted = store.get::<Accepted>().map_err(|e| text(&e))?.unwrap_or(Accepted::NONE);
     store.set(&accepted.with(slot, crc)).map_err(|e| text(&e))

@@ -1,12 +1,16 @@
 //! Defines which outputs of a window are used, the samples between windows, and the lag of the rate.
 
 use crate::model::window::WINDOW;
+use crate::sample::RATE_HZ;
 use core::ops::Range;
 
 /// An estimate is used this many samples after its window's newest one, however long the network took, so that the
 /// board's frames do not depend on its speed. With a window every sample, the estimate has to be ready with the next
 /// sample.
 pub const DELAY: u32 = 2;
+
+/// Cycles of the other tasks between two samples: health, compensation, frames.
+const OUTPUT_CYCLES: u32 = 30_000;
 
 /// Samples between two windows: 1 to [`WINDOW`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,6 +134,17 @@ impl Mode {
     #[must_use]
     pub const fn delay(self) -> u32 {
         if self.stride() < DELAY { self.stride() } else { DELAY }
+    }
+
+    /// Returns the cycles that a window may take, so that its estimate is ready in time and three tenths of the processor
+    /// are left to the tasks of lower priority; `u32::MAX` where the clock is not known.
+    #[must_use]
+    pub const fn window_cycles(self, clock_hz: u32) -> u32 {
+        if clock_hz == 0 {
+            return u32::MAX;
+        }
+        let sample = (clock_hz / RATE_HZ).saturating_sub(OUTPUT_CYCLES);
+        self.delay() * (sample / 10 * 7)
     }
 
     /// Returns the outputs of a window that are used, oldest first.

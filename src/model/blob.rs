@@ -48,6 +48,15 @@ impl Shape {
         [GYRONET, WINDOW as u16, FEATURES as u16, self.units, 2, outputs]
     }
 
+    /// Returns the largest cost of a window on a Cortex-M4 at zero wait states, modelled cycles (`cargo bench-target`
+    /// prints those of some shapes).
+    #[must_use]
+    pub const fn window_cycles(self) -> u32 {
+        let units = self.units as u32;
+        let layers = if units > 0 { 20_000 + 4_400 * units + 355 * units * units } else { 0 };
+        layers + if self.linear { 5_000 } else { 0 }
+    }
+
     /// Returns the number of bytes of a file with `provenance` bytes of padded text.
     #[must_use]
     pub const fn file_len(self, provenance: usize) -> usize {

@@ -12,7 +12,7 @@ use super::calibrate::{Calibrator, Finding, State, Task, level};
 use super::conditions::Conditions;
 use super::event::{EventKind, EventLog, LogPage, SensorFault};
 use super::learner::Learner;
-use super::message::{AccessCounters, FlashState, Identity, Info, Origin, PROTOCOL, Refusal};
+use super::message::{AccessCounters, FAILED_STARTS, FlashState, Identity, Info, Origin, PROTOCOL, Refusal};
 use crate::can::wheel::WheelSettings;
 use crate::health::slow::Knowledge;
 use crate::health::{Faults, Status};
@@ -35,6 +35,8 @@ pub struct SupportedHardware {
     pub imus: &'static [ImuPart],
     /// Supported fibre-optic gyros.
     pub fogs: &'static [FogPart],
+    /// Clock frequency of the processor on its crystal, Hz.
+    pub clock_hz: u32,
 }
 
 /// The state of the board apart from the pipeline: stored data, weights, calibration and event log.
@@ -55,6 +57,8 @@ pub struct Device<R: NorFlash, W> {
     next_configuration: Configuration,
     wheels: WheelSettings,
     wheels_origin: Origin,
+    /// Wheel settings that the next start will use.
+    next_wheels: WheelSettings,
     /// The newest report of the wheels.
     wheels_seen: WheelSample,
     calibration: Calibration,
@@ -74,6 +78,8 @@ pub struct Device<R: NorFlash, W> {
     access_counters: AccessCounters,
     weights: WeightSource,
     weights_crc: Option<u32>,
+    /// Cost of a window of the weights that a start on the crystal will use, cycles.
+    next_window: u32,
     refused_slots: [Option<SlotError>; 2],
     uploading: Option<Uploading>,
     /// The output may be interrupted: no rate is valid, or the vehicle stands.
@@ -105,6 +111,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             next_configuration: Configuration::DEFAULT,
             wheels: WheelSettings::TOYOTA,
             wheels_origin: Origin::BuiltIn,
+            next_wheels: WheelSettings::TOYOTA,
             wheels_seen: WheelSample::without_speeds(Standstill::Unknown),
             calibration: Calibration::NONE,
             calibration_origin: Origin::BuiltIn,
@@ -120,6 +127,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             access_counters: AccessCounters::NONE,
             weights: WeightSource::None,
             weights_crc: None,
+            next_window: 0,
             refused_slots: [None; 2],
             uploading: None,
             may_interrupt: true,
@@ -305,7 +313,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     #[must_use]
     pub fn uploaded(&self) -> Option<(Slot, u32)> {
         let Uploading { upload, checked } = self.uploading?;
-        Some((upload.slot(), checked?))
+        Some((upload.slot(), checked?.crc))
     }
 
     /// Returns the newest report of the wheels, and whether the vehicle is proven to stand.
@@ -317,6 +325,19 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// Returns whether the output may be interrupted, because the vehicle is proven to stand.
     pub(crate) fn may_interrupt(&self) -> bool {
         self.may_interrupt
+    }
+
+    /// Returns whether the starts before this one have failed, so that what is stored is not used.
+    fn has_failed(&self) -> bool {
+        self.identity.failed_starts >= FAILED_STARTS
+    }
+
+    /// Runs work that takes long, as [`MappedSlots::check`] does.
+    pub(crate) fn long<T>(&self, work: impl FnOnce() -> T) -> T {
+        match &self.slots {
+            Some(slots) => slots.check(work),
+            None => work(),
+        }
     }
 
     fn refuse(&mut self, kind: EventKind) {
@@ -358,7 +379,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             clock_fault: self.identity.clock_fault.is_some(),
             tick: self.tick,
             can_fault: self.identity.can_fault.is_some(),
-            crashed: self.identity.crash.is_some(),
+            crashed: self.identity.crash.is_some() || self.has_failed(),
             access_refused: self.refusal.is_some_and(|refusal| refusal.is_access_denied()),
         }
     }

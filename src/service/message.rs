@@ -8,7 +8,7 @@ use crate::store::slots::{SlotError, WeightSource};
 use serde::{Deserialize, Serialize};
 
 /// Version of the encoding of these types; every change of a type increments it.
-pub const PROTOCOL: u8 = 17;
+pub const PROTOCOL: u8 = 18;
 /// Size of a full block of a weight file, bytes.
 pub const BLOCK: usize = 256;
 
@@ -105,6 +105,9 @@ pub enum Origin {
     Refused(StoreError),
 }
 
+/// Failed starts after which the built-in configuration and weights are used.
+pub const FAILED_STARTS: u8 = 3;
+
 /// The board's identity, and what is known about its start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
@@ -124,6 +127,8 @@ pub struct Identity {
     pub reset: ResetCause,
     /// Last crash since power-on.
     pub crash: Option<Crash>,
+    /// Starts in a row that have ended in a crash or a reset by the watchdog within a minute.
+    pub failed_starts: u8,
 }
 
 impl Identity {
@@ -137,6 +142,7 @@ impl Identity {
         can_fault: None,
         reset: ResetCause::Unknown,
         crash: None,
+        failed_starts: 0,
     };
 }
 

@@ -8,6 +8,7 @@ use crate::bias::{EarthRate, Latitude, StaticConfig};
 use crate::can::config::{Config, Settings};
 use crate::can::diagnosis::DiagnosisIds;
 use crate::can::latitude::{LatitudeConfigError, LatitudeReceiver, LatitudeSettings};
+use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};
 use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
 use crate::coprocessor;
@@ -143,6 +144,13 @@ impl Configuration {
 }
 
 impl Configuration {
+    /// Returns the default with this one's identifiers and messages, which other nodes know; it learns nothing.
+    #[cfg(feature = "service")]
+    pub(crate) fn bus_alone(&self) -> Self {
+        let Self { can, fog_ids, diagnosis, .. } = *self;
+        Self { can, fog_ids, diagnosis, learn: false, ..Self::DEFAULT }
+    }
+
     fn latitude(&self) -> Option<Latitude> {
         self.latitude_deg.and_then(Latitude::from_degrees)
     }
@@ -152,6 +160,17 @@ impl Configuration {
         let can = Config::new(self.can).ok()?;
         let fog = self.fog_ids.map(|id| StandardId::new(id).map(Id::Standard));
         ids.find(|id| can.sends(*id) || fog.contains(&Some(*id)))
+    }
+
+    /// Checks that the identifier of no wheel frame is that of a message that the board sends, or of diagnosis.
+    ///
+    /// # Errors
+    /// [`FieldError::Wheels`].
+    pub fn check_wheels(&self, wheels: &WheelSettings) -> Result<(), FieldError> {
+        let ids = || wheels.frames.iter().flatten().map(|frame| frame.id);
+        let diagnosis = self.diagnosis.ids().map_err(FieldError::Diagnosis)?;
+        let taken = ids().find(|id| diagnosis.contains(id)).or_else(|| self.own_identifier(ids()));
+        taken.map_or(Ok(()), |id| Err(FieldError::Wheels(WheelConfigError::Own(raw_id(id)))))
     }
 
     fn fog(&self) -> FogConfig {
@@ -205,20 +224,18 @@ impl Record for Configuration {
         if self.fog.is_some() {
             config.check_further_load().map_err(FieldError::Can)?;
         }
-        if let Some(receiver) = self.latitude_receiver().map_err(FieldError::Latitude)?
-            && self.own_identifier([receiver.id()].into_iter()).is_some()
-        {
-            let id = self.fog_gyro.latitude_frame.map_or(0, |frame| frame.id);
-            return Err(FieldError::Latitude(LatitudeConfigError::Own(id)));
-        }
         let ids = self.diagnosis.ids().map_err(FieldError::Diagnosis)?;
-        let latitude_id = self.fog_gyro.latitude_frame.map_or(u32::MAX, |frame| frame.id);
-        if self.own_identifier(ids.into_iter()).is_some() || latitude_id == self.diagnosis.request {
+        if let Some(receiver) = self.latitude_receiver().map_err(FieldError::Latitude)?
+            && (ids.contains(&receiver.id()) || self.own_identifier([receiver.id()].into_iter()).is_some())
+        {
+            return Err(FieldError::Latitude(LatitudeConfigError::Own(raw_id(receiver.id()))));
+        }
+        if self.own_identifier(ids.into_iter()).is_some() {
             return Err(FieldError::Diagnosis(self.diagnosis.request));
         }
         let Mounting { roll_deg, pitch_deg, yaw_deg } = self.mounting;
         let StaticConfig { gyro_std, accel_std, gyro_drift, accel_drift, gyro_bias } = self.static_init;
-        // Modes and lags need no check: all values of their types are valid.
+        // All lags are valid, and all modes that leave a window of the weights enough time: see the device.
         let CompensateConfig { mode: _, lag: _, max_mean, max_single, max_revision } = self.compensate;
         let rate = |rate: AngularRate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC;
         for (field, value) in [

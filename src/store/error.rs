@@ -67,12 +67,14 @@ impl Field {
             Self::LatitudeDeg | Self::MountingPitchDeg => [-90.0, 90.0],
             Self::FogTiltDeg => [0.0, 45.0],
             Self::MountingRollDeg | Self::MountingYawDeg => [-180.0, 180.0],
-            Self::StaticGyroStd | Self::StaticGyroBias => [1e-5, 1.0],
-            Self::StaticAccelStd => [1e-4, 20.0],
-            Self::StaticGyroDrift => [1e-5, 0.1],
-            Self::StaticAccelDrift => [1e-4, 2.0],
-            Self::CompensateMaxMean | Self::CompensateMaxRevision => [0.0, 0.5],
-            Self::CompensateMaxSingle => [0.0, 5.0],
+            // Below the noise of a quiet part, static initialisation would never end.
+            Self::StaticGyroStd | Self::StaticGyroBias => [5e-4, 1.0],
+            Self::StaticAccelStd => [5e-3, 20.0],
+            Self::StaticGyroDrift => [2e-4, 0.1],
+            Self::StaticAccelDrift => [1e-3, 2.0],
+            // With none at all, no estimate is ever accepted, and no revision ever carried.
+            Self::CompensateMaxMean | Self::CompensateMaxRevision => [1e-3, 0.5],
+            Self::CompensateMaxSingle => [1e-3, 5.0],
             Self::CalibrationRollDeg | Self::CalibrationPitchDeg => [-MAX_TILT_DEG, MAX_TILT_DEG],
             Self::CalibrationGyroMap | Self::BiasCurve | Self::Forward => return None,
         })
@@ -111,6 +113,14 @@ pub enum FieldError {
     /// This firmware image does not support the sensor.
     #[error("sensor: this firmware image does not drive the part")]
     PartNotInImage,
+    /// The weights are too large for the mode.
+    #[error("compensate.mode: a window of the weights takes {cycles} cycles, and it leaves {available}")]
+    Window {
+        /// Largest cost of a window.
+        cycles: u32,
+        /// Cycles that it may take.
+        available: u32,
+    },
     /// An identifier of diagnosis has too many bits, or is used twice.
     #[error("diagnosis: identifier {0:#x} has too many bits, or is used twice")]
     Diagnosis(u32),
@@ -170,6 +180,9 @@ pub enum StoreError {
     /// A value is out of its range.
     #[error(transparent)]
     Field(FieldError),
+    /// The board was reset three times within a minute of its start.
+    #[error("the board was reset three times within a minute of its start")]
+    Resets,
     /// The record was damaged, and none has been stored since.
     #[error("the record was damaged, and none has been stored since")]
     Lost,

@@ -9,14 +9,19 @@
 //! | n / 4, rounded up | postcard's encoding, then FF | 1 | CRC-32 of the generation |
 //! | 1 | CRC-32 of all words before it | | |
 //!
-//! All values are little-endian. Records are appended until the sector in use is full, or ends with a record that a
-//! power cut has torn. Then the *other* sector is erased, and the newest record of each key is copied there, together
-//! with the new one. The header is written last, with the next generation; only then does the other sector become the
-//! one in use. The sector in use is thus never erased or rewritten, and an erase that is interrupted does no harm. If
-//! the configuration was damaged, a record of layout 0 marks that in the new sector.
+//! All values are little-endian. Records are appended until the sector in use is full, or holds one that a power cut
+//! has torn. Then the *other* sector is erased, and the newest record of each key is copied there, together with the new
+//! one. The header is written last, with the next generation; only then does the other sector become the one in use. The
+//! sector in use is thus never erased, and an erase that is interrupted does no harm. If the configuration was damaged,
+//! a record of layout 0 marks that in the new sector. A record of the generation stands for a damaged header, and behind
+//! damage the next intact record is searched for.
+//!
+//! **Access** must not fall back to a key that was replaced, nor to none. Its record is written twice, then a mark that
+//! there is one, and superseded ones are overwritten with zeros, which a programmed word takes (RM0090 3.6.4). A
+//! damaged record is restored from the other; with both damaged, the mark makes access read as [`StoreError::Lost`].
 
-use super::Configuration;
 use super::error::{FieldError, FlashFault, StoreError};
+use super::{Access, Configuration};
 use crate::model::blob::CRC;
 use core::ops::Range;
 use embedded_storage::nor_flash::{NorFlash, NorFlashError, NorFlashErrorKind};
@@ -34,8 +39,13 @@ const BUFFER: usize = MAX_LEN + 2 * WORD;
 const FEW: u32 = 8;
 /// Layout version that marks a lost record; real layout versions begin at 1.
 const LOST: u8 = 0;
-/// Highest key of a record.
+/// Number of records of access.
+const ACCESS_COPIES: u32 = 2;
+/// Highest key of a [`Record`].
 const MAX_KEY: u8 = 7;
+/// Key of the mark that there is a record of access, and of the sector's generation.
+const HAS_ACCESS: u8 = 8;
+const GENERATION: u8 = 9;
 /// Constant in the header's checksum that distinguishes our sectors from other uses of the flash.
 const FORMAT: u32 = u32::from_le_bytes(*b"GYR1");
 
@@ -81,12 +91,15 @@ impl Raw {
         Some(())
     }
 
-    /// Writes the mark of a lost record.
-    fn mark_lost(&mut self, key: u8) {
-        (self.words, self.len) = ([0xFF; BUFFER], 0);
-        self.words[..WORD].copy_from_slice(&[key, LOST, 0, 0]);
-        let crc = CRC.checksum(&self.words[..WORD]).to_le_bytes();
-        self.words[WORD..2 * WORD].copy_from_slice(&crc);
+    /// Writes a record that has no type: the mark of a lost one (layout 0), or one of the store's own.
+    fn mark(&mut self, key: u8, version: u8, content: &[u8]) {
+        (self.words, self.len) = ([0xFF; BUFFER], content.len());
+        let head = [key, version, content.len() as u8, 0];
+        let bytes = head.iter().chain(content);
+        self.words.iter_mut().zip(bytes).for_each(|(place, byte)| *place = *byte);
+        let end = Self::size(self.len) - WORD;
+        let crc = CRC.checksum(self.words.get(..end).unwrap_or_default()).to_le_bytes();
+        self.words.iter_mut().skip(end).zip(crc).for_each(|(place, byte)| *place = byte);
     }
 
     fn bytes(&self) -> &[u8] {
@@ -95,6 +108,10 @@ impl Raw {
 
     const fn key(&self) -> u8 {
         self.words[0]
+    }
+
+    const fn is_lost(&self) -> bool {
+        self.words[1] == LOST
     }
 
     fn is_intact(&self) -> bool {
@@ -106,7 +123,7 @@ impl Raw {
 
     fn decode<R: Record>(&self) -> Result<R, StoreError> {
         let [_, found, ..] = self.words;
-        if found == LOST {
+        if self.is_lost() {
             return Err(StoreError::Lost);
         }
         if found != R::VERSION {
@@ -122,14 +139,14 @@ impl Raw {
     }
 }
 
-/// The content found at an offset in a sector.
-enum Place {
-    /// A record, which may be torn.
-    Record,
-    /// Erased flash.
-    Blank,
-    /// No record: the bytes are not those of a record, or the sector ends here.
-    End,
+/// What a walk through a sector has seen.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    damaged: bool,
+    /// True if a damaged record may have been the configuration.
+    configuration_damaged: bool,
+    /// Offset of the first erased word behind the records.
+    free: Option<u32>,
 }
 
 /// The store of the newest record of each kind, in two flash sectors that are used alternately.
@@ -140,9 +157,7 @@ pub struct Store<F> {
     current: Option<(u32, u32)>,
     /// Offset of the next record, if one can be appended.
     free: Option<u32>,
-    damaged: bool,
-    /// True if a damaged record may have been the configuration.
-    configuration_damaged: bool,
+    seen: Seen,
     /// True if a header is neither valid nor blank; the newest sector may then be lost.
     header_damaged: bool,
 }
@@ -155,22 +170,20 @@ impl<F: NorFlash> Store<F> {
     /// [`StoreError::Flash`].
     pub fn open(flash: F, start: u32) -> Result<Self, StoreError> {
         const { assert!(F::READ_SIZE <= WORD && WORD.is_multiple_of(F::WRITE_SIZE)) };
-        let mut store = Self {
-            flash,
-            start,
-            current: None,
-            free: None,
-            damaged: false,
-            configuration_damaged: false,
-            header_damaged: false,
-        };
+        let mut store =
+            Self { flash, start, current: None, free: None, seen: Seen::default(), header_damaged: false };
+        let mut is_current_damaged = false;
         for sector in [0, 1] {
-            let generation = store.generation(sector)?;
+            let (generation, is_damaged) = store.generation(sector)?;
             let newest = store.current.map(|(_, generation)| generation);
             if generation > newest {
                 store.current = generation.map(|generation| (sector, generation));
+                is_current_damaged = is_damaged;
             }
+            // The copy in a sector that is not used any more shows that it is not the newest.
+            store.header_damaged |= is_damaged && generation.is_none();
         }
+        store.header_damaged |= is_current_damaged;
         if store.current.is_some() {
             // No record has key 0, so the search reads all records.
             let mut nothing = Raw::EMPTY;
@@ -183,7 +196,7 @@ impl<F: NorFlash> Store<F> {
     /// previous record is then used.
     #[must_use]
     pub fn damaged(&self) -> bool {
-        self.damaged || self.header_damaged
+        self.seen.damaged || self.header_damaged
     }
 
     /// Returns the newest intact record; `None` if there is none.
@@ -193,7 +206,7 @@ impl<F: NorFlash> Store<F> {
     /// value out of range.
     pub fn get<R: Record>(&mut self) -> Result<Option<R>, StoreError> {
         let mut raw = Raw::EMPTY;
-        if self.find(R::KEY, &mut raw)? { raw.decode().map(Some) } else { Ok(None) }
+        if self.find_any(R::KEY, &mut raw)? { raw.decode().map(Some) } else { Ok(None) }
     }
 
     /// Stores a record and reads it back. Until the new record is complete, the previous one remains valid.
@@ -221,20 +234,28 @@ impl<F: NorFlash> Store<F> {
         self.free.zip(end).map_or(0, |(at, end)| end.saturating_sub(at))
     }
 
-    /// If little room is left, erases the other sector and moves the newest records there. Call it at the start, when
-    /// an erase disturbs nothing: records stored while the vehicle drives must fit without an erase.
+    /// If little room is left, or something is damaged, erases the other sector and moves the newest records there;
+    /// completes what a power cut has left undone of a record of access. Call it at the start, when an erase disturbs
+    /// nothing: records stored while the vehicle drives must fit without an erase.
     ///
     /// # Errors
     /// [`StoreError::Flash`].
     pub fn make_room(&mut self) -> Result<(), StoreError> {
         let mut raw = Raw::EMPTY;
-        if self.current.is_none() || self.room() >= FEW * BUFFER as u32 {
+        let Some((sector, _)) = self.current else { return Ok(()) };
+        if self.room() < FEW * BUFFER as u32 {
+            for key in 1..=MAX_KEY {
+                if self.find_any(key, &mut raw)? {
+                    return self.change_sector(&raw);
+                }
+            }
             return Ok(());
         }
-        for key in 1..=MAX_KEY {
-            if self.find(key, &mut raw)? {
-                return self.change_sector(&raw);
+        if self.find(Access::KEY, &mut raw)? {
+            if self.count(sector, &raw)? < ACCESS_COPIES {
+                self.write(&raw)?;
             }
+            self.supersede(sector, &raw)?;
         }
         Ok(())
     }
@@ -244,11 +265,13 @@ impl<F: NorFlash> Store<F> {
     #[inline(never)]
     fn write(&mut self, raw: &Raw) -> Result<(), StoreError> {
         let appended = match (self.current, self.free) {
-            (Some((sector, _)), Some(at)) => self.append(sector, at, raw)?,
+            (Some((sector, _)), Some(at)) => self.append_all(sector, at, raw)?.map(|_| sector),
             _ => None,
         };
-        if appended.is_none() {
-            self.change_sector(raw)?;
+        match appended {
+            None => self.change_sector(raw)?,
+            Some(sector) if raw.key() == Access::KEY => self.supersede(sector, raw)?,
+            Some(_) => {}
         }
         let mut stored = Raw::EMPTY;
         if self.find(raw.key(), &mut stored)? && stored.bytes() == raw.bytes() {
@@ -269,74 +292,145 @@ impl<F: NorFlash> Store<F> {
         Ok(bytes)
     }
 
-    fn generation(&mut self, sector: u32) -> Result<Option<u32>, StoreError> {
+    /// Returns the generation of a sector, and whether its header is damaged.
+    fn generation(&mut self, sector: u32) -> Result<(Option<u32>, bool), StoreError> {
         let at = self.range(sector).start;
         let generation = u32::from_le_bytes(self.read(at)?);
         let crc = u32::from_le_bytes(self.read(at + WORD_U32)?);
-        let intact = crc == header_crc(generation);
-        let blank = generation == u32::MAX && crc == u32::MAX;
-        self.header_damaged |= !intact && !blank;
-        Ok(intact.then_some(generation))
+        if crc == header_crc(generation) {
+            return Ok((Some(generation), false));
+        }
+        if generation == u32::MAX && crc == u32::MAX {
+            return Ok((None, false));
+        }
+        let mut raw = Raw::EMPTY;
+        let copy = self.walk(sector, GENERATION, &mut raw, &mut Seen::default())?;
+        let content = raw.words.get(WORD..).and_then(|words| words.first_chunk());
+        Ok((content.filter(|_| copy).map(|content| u32::from_le_bytes(*content)), true))
     }
 
-    /// Reads the record at offset `at` into `raw`, if there is one.
-    fn place(&mut self, sector: u32, at: u32, raw: &mut Raw) -> Result<Place, StoreError> {
+    /// Reads the next intact record of a sector from offset `at` on, and returns its own offset; `at` is then behind it.
+    /// Each turn advances by a word at least.
+    fn next(
+        &mut self,
+        sector: u32,
+        at: &mut u32,
+        raw: &mut Raw,
+        seen: &mut Seen,
+    ) -> Result<Option<u32>, StoreError> {
         let end = self.range(sector).end;
-        if at + WORD_U32 > end {
-            return Ok(Place::End);
+        let mut in_damage = false;
+        while *at + WORD_U32 <= end {
+            let here = *at;
+            let first = self.read::<WORD>(here)?;
+            let is_blank = first == [0xFF; WORD];
+            if is_blank && !in_damage {
+                seen.free = Some(here);
+                return Ok(None);
+            }
+            // A word of zeros belongs to a superseded record.
+            if !is_blank && first != [0; WORD] {
+                let [key, _, low, high] = first;
+                let len = usize::from(u16::from_le_bytes([low, high]));
+                let fits = len <= MAX_LEN && here + Raw::size(len) as u32 <= end;
+                if fits && let Some(words) = raw.words.get_mut(..Raw::size(len)) {
+                    raw.len = len;
+                    self.flash.read(here, words).map_err(fault)?;
+                    if raw.is_intact() {
+                        *at += Raw::size(len) as u32;
+                        return Ok(Some(here));
+                    }
+                }
+                // A power cut leaves the first word intact, which holds the key; flipped bits may not. Before zeros,
+                // it may be what is left of a superseded record.
+                let is_other =
+                    fits && ((2..=GENERATION).contains(&key) || self.read(here + WORD_U32)? == [0; WORD]);
+                seen.configuration_damaged |= !in_damage && !is_other;
+                (in_damage, seen.damaged) = (true, true);
+            }
+            *at += WORD_U32;
         }
-        let first = self.read::<WORD>(at)?;
-        if first == [0xFF; WORD] {
-            return Ok(Place::Blank);
+        Ok(None)
+    }
+
+    /// Copies the newest intact record of a key in a sector into `newest`, and returns whether there is one.
+    #[inline(never)]
+    fn walk(&mut self, sector: u32, key: u8, newest: &mut Raw, seen: &mut Seen) -> Result<bool, StoreError> {
+        let mut at = self.range(sector).start + HEADER;
+        let (mut raw, mut found) = (Raw::EMPTY, false);
+        while self.next(sector, &mut at, &mut raw, seen)?.is_some() {
+            if raw.key() == key {
+                *newest = raw;
+                found = true;
+            }
         }
-        let [_, _, low, high] = first;
-        let len = usize::from(u16::from_le_bytes([low, high]));
-        let fits = len <= MAX_LEN && at + Raw::size(len) as u32 <= end;
-        raw.len = len;
-        match raw.words.get_mut(..Raw::size(len)) {
-            Some(words) if fits => self.flash.read(at, words).map_err(fault)?,
-            _ => return Ok(Place::End),
-        }
-        Ok(Place::Record)
+        Ok(found)
     }
 
     /// Copies the newest intact record of a key into `newest`, and returns whether there is one. Also updates `free`
-    /// and the damage flags.
-    #[inline(never)]
+    /// and what was seen of damage.
     fn find(&mut self, key: u8, newest: &mut Raw) -> Result<bool, StoreError> {
         let Some((sector, _)) = self.current else { return Ok(false) };
-        let mut at = self.range(sector).start + HEADER;
-        let mut raw = Raw::EMPTY;
-        let mut found = false;
-        (self.damaged, self.configuration_damaged) = (false, false);
-        loop {
-            // Each iteration advances by the length of a record, at least two words.
-            match self.place(sector, at, &mut raw)? {
-                Place::Record => {
-                    at += Raw::size(raw.len) as u32;
-                    if !raw.is_intact() {
-                        self.damaged = true;
-                        // A power cut leaves the first word intact, which holds the key; flipped bits may not.
-                        self.configuration_damaged |= !(2..=MAX_KEY).contains(&raw.key());
-                    } else if raw.key() == key {
-                        *newest = raw;
-                        found = true;
+        let mut seen = Seen::default();
+        let found = self.walk(sector, key, newest, &mut seen)?;
+        self.seen = seen;
+        // No record is appended after one that may be torn.
+        self.free = seen.free.filter(|_| !self.damaged());
+        Ok(found)
+    }
+
+    /// As [`Self::find`]; access that was there and is not is the mark of a lost record.
+    fn find_any(&mut self, key: u8, newest: &mut Raw) -> Result<bool, StoreError> {
+        let is_found = self.find(key, newest)?;
+        if is_found || key != Access::KEY {
+            return Ok(is_found);
+        }
+        let mut is_lost = self.find(HAS_ACCESS, newest)?;
+        if self.header_damaged {
+            let (mut others, used) = (0, self.current.map(|(sector, _)| sector));
+            for sector in [0, 1].into_iter().filter(|sector| used != Some(*sector)) {
+                is_lost |= self.walk(sector, HAS_ACCESS, newest, &mut Seen::default())?;
+                others += u32::from(!self.is_blank(sector)?);
+            }
+            // Both headers are gone, and no power cut does that.
+            is_lost |= others > 1;
+        }
+        if is_lost {
+            newest.mark(key, LOST, &[]);
+        }
+        Ok(is_lost)
+    }
+
+    /// Returns whether a sector has no header.
+    fn is_blank(&mut self, sector: u32) -> Result<bool, StoreError> {
+        let at = self.range(sector).start;
+        Ok(self.read(at)? == [0xFF; 2 * WORD])
+    }
+
+    /// Returns how often a sector holds this record.
+    fn count(&mut self, sector: u32, record: &Raw) -> Result<u32, StoreError> {
+        let (mut at, mut raw, mut count) = (self.range(sector).start + HEADER, Raw::EMPTY, 0);
+        while self.next(sector, &mut at, &mut raw, &mut Seen::default())?.is_some() {
+            count += u32::from(raw.bytes() == record.bytes());
+        }
+        Ok(count)
+    }
+
+    /// Overwrites all records of access with zeros, but `newest`: in this sector, and in the other one.
+    #[inline(never)]
+    fn supersede(&mut self, sector: u32, newest: &Raw) -> Result<(), StoreError> {
+        for (sector, is_current) in [(sector, true), (1 - sector, false)] {
+            let (mut at, mut raw) = (self.range(sector).start + HEADER, Raw::EMPTY);
+            while let Some(here) = self.next(sector, &mut at, &mut raw, &mut Seen::default())? {
+                if raw.key() == Access::KEY && !(is_current && raw.bytes() == newest.bytes()) {
+                    // The first word last: a power cut leaves a record that is damaged, and whose key is known.
+                    for word in (here..at).step_by(WORD).rev() {
+                        self.flash.write(word, &[0; WORD]).map_err(fault)?;
                     }
-                }
-                // No record is appended after one that may be torn.
-                Place::Blank => {
-                    self.free = (!self.damaged()).then_some(at);
-                    return Ok(found);
-                }
-                Place::End => {
-                    let is_damage = at + WORD_U32 <= self.range(sector).end;
-                    self.damaged |= is_damage;
-                    self.configuration_damaged |= is_damage;
-                    self.free = None;
-                    return Ok(found);
                 }
             }
         }
+        Ok(())
     }
 
     /// Writes a record at offset `at` and returns the offset of the next one; `None` if the record does not fit.
@@ -353,6 +447,20 @@ impl<F: NorFlash> Store<F> {
         written.map(|()| Some(end))
     }
 
+    /// Writes a record as [`Self::append`]; one of access twice, then the mark that there is one.
+    fn append_all(&mut self, sector: u32, at: u32, raw: &Raw) -> Result<Option<u32>, StoreError> {
+        let mut at = self.append(sector, at, raw)?;
+        if raw.key() == Access::KEY {
+            let mut mark = Raw::EMPTY;
+            mark.mark(HAS_ACCESS, 1, &[]);
+            for raw in [raw, &mark] {
+                let Some(behind) = at else { break };
+                at = self.append(sector, behind, raw)?;
+            }
+        }
+        Ok(at)
+    }
+
     /// Fills the other sector with the newest record of each key, including the given one, and switches to it. A mark
     /// replaces a damaged configuration, which then reads as [`StoreError::Lost`] until a new one is stored: the
     /// sensor's axes are unknown meanwhile.
@@ -363,26 +471,30 @@ impl<F: NorFlash> Store<F> {
             None => (0, 1),
         };
         let Range { start, end } = self.range(sector);
-        self.flash.erase(start, end).map_err(fault)?;
         let mut at = start + HEADER;
         let mut raw = Raw::EMPTY;
+        // The sector that is erased may hold the only mark of it.
+        let is_access_lost = self.find_any(Access::KEY, &mut raw)? && raw.is_lost();
+        self.flash.erase(start, end).map_err(fault)?;
         for key in (1..=MAX_KEY).filter(|key| *key != newest.key()) {
-            let is_lost =
-                !self.find(key, &mut raw)? && key == Configuration::KEY && self.configuration_damaged;
-            if is_lost {
-                raw.mark_lost(key);
-            } else if raw.key() != key {
-                continue;
+            if !self.find(key, &mut raw)? {
+                match key {
+                    Access::KEY if is_access_lost => raw.mark(key, LOST, &[]),
+                    Configuration::KEY if self.seen.configuration_damaged => raw.mark(key, LOST, &[]),
+                    _ => continue,
+                }
             }
-            at = self.append(sector, at, &raw)?.ok_or(StoreError::Full)?;
+            at = self.append_all(sector, at, &raw)?.ok_or(StoreError::Full)?;
         }
-        let free = self.append(sector, at, newest)?.ok_or(StoreError::Full)?;
+        at = self.append_all(sector, at, newest)?.ok_or(StoreError::Full)?;
+        raw.mark(GENERATION, 1, &generation.to_le_bytes());
+        let free = self.append(sector, at, &raw)?.ok_or(StoreError::Full)?;
         self.flash.write(start, &generation.to_le_bytes()).map_err(fault)?;
         self.flash.write(start + WORD_U32, &header_crc(generation).to_le_bytes()).map_err(fault)?;
         // The header of the previous sector was good, if there was one.
         self.header_damaged &= self.current.is_none();
         (self.current, self.free) = (Some((sector, generation)), Some(free));
-        Ok(())
+        if self.find(Access::KEY, &mut raw)? { self.supersede(sector, &raw) } else { Ok(()) }
     }
 }
 

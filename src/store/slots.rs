@@ -3,7 +3,7 @@
 //! A file is uploaded to the unused slot, checked in flash, and then accepted: the record stores its slot and
 //! checksum. At the next start, [`select`] tries in this order and uses the first file that passes all checks: the
 //! active slot, the other slot if its file was accepted, the built-in weights. An interrupted upload thus never harms
-//! the file in use.
+//! the file in use. A file whose windows the processor cannot run in time is refused like a damaged one.
 
 use super::error::{FieldError, FlashFault};
 use super::record::Record;
@@ -92,6 +92,14 @@ pub enum SlotError {
     /// The file's checksum is not that of the accepted file; the file has this checksum.
     #[error("file {0:08x} is not the one that was accepted")]
     NotAccepted(u32),
+    /// The file is too large for this clock and the mode.
+    #[error("a window takes {cycles} cycles, and clock and `compensate.mode` leave {available}")]
+    Slow {
+        /// Largest cost of a window.
+        cycles: u32,
+        /// Cycles that it may take.
+        available: u32,
+    },
     /// The content of the file is invalid.
     #[error(transparent)]
     Blob(BlobError),
@@ -158,24 +166,40 @@ pub struct Selection<'w> {
     pub refused: [Option<SlotError>; 2],
 }
 
-/// Selects the first weights that pass all checks.
+/// Selects the first weights that pass all checks, and of which a window takes no more than the `available` cycles.
 #[must_use]
-pub fn select<'w>(accepted: &Accepted, slots: [&'w [u8]; 2], built_in: &'w [u8]) -> Selection<'w> {
+pub fn select<'w>(
+    accepted: &Accepted,
+    slots: [&'w [u8]; 2],
+    built_in: &'w [u8],
+    available: u32,
+) -> Selection<'w> {
+    let slow = |blob: &Blob<'_>| {
+        let cycles = blob.shape.window_cycles();
+        (!fits(cycles, available)).then_some(SlotError::Slow { cycles, available })
+    };
     let mut refused = [None; 2];
     let order = accepted.active.map(|active| [active, active.other()]);
     for slot in order.into_iter().flatten() {
         let Some(accepted) = slot.of(accepted.files) else { continue };
         match file(slot.of(slots)) {
-            Ok(blob) if blob.crc == accepted => {
-                return Selection { weights: Some(blob), source: WeightSource::Slot(slot), refused };
-            }
-            Ok(blob) => refuse(&mut refused, slot, SlotError::NotAccepted(blob.crc)),
+            Ok(blob) if blob.crc != accepted => refuse(&mut refused, slot, SlotError::NotAccepted(blob.crc)),
+            Ok(blob) => match slow(&blob) {
+                None => return Selection { weights: Some(blob), source: WeightSource::Slot(slot), refused },
+                Some(error) => refuse(&mut refused, slot, error),
+            },
             Err(error) => refuse(&mut refused, slot, error),
         }
     }
-    let weights = Blob::new_checked(built_in).ok();
+    let weights = Blob::new_checked(built_in).ok().filter(|blob| slow(blob).is_none());
     let source = if weights.is_some() { WeightSource::BuiltIn } else { WeightSource::None };
     Selection { weights, source, refused }
+}
+
+/// Returns whether a window fits. Not inlined, so that a test can force one that does not upon the image.
+#[inline(never)]
+fn fits(cycles: u32, available: u32) -> bool {
+    cycles <= available
 }
 
 fn refuse(refused: &mut [Option<SlotError>; 2], slot: Slot, error: SlotError) {

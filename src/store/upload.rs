@@ -3,6 +3,7 @@
 use super::error::FlashFault;
 use super::slot::Slot;
 use super::slots::{SlotError, file};
+use crate::model::Blob;
 use embedded_storage::nor_flash::{NorFlash, NorFlashError};
 
 /// The state of an upload.
@@ -57,15 +58,15 @@ impl Upload {
         Ok(())
     }
 
-    /// Checks the whole file in flash and returns its checksum.
+    /// Checks the whole file in flash.
     ///
     /// # Errors
     /// [`SlotError::Incomplete`], and the errors of [`file()`].
-    pub fn verify(&self, slots: [&[u8]; 2]) -> Result<u32, SlotError> {
+    pub fn verify<'s>(&self, slots: [&'s [u8]; 2]) -> Result<Blob<'s>, SlotError> {
         if self.written != self.length {
             return Err(SlotError::Incomplete { written: self.written });
         }
-        file(self.slot.of(slots)).map(|blob| blob.crc)
+        file(self.slot.of(slots))
     }
 
     /// Returns the slot of the file.

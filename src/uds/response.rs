@@ -50,8 +50,13 @@ pub(super) fn nrc(refusal: Refusal) -> Nrc {
             Nrc::RequestOutOfRange
         }
         Refusal::Store(
-            StoreError::Field(_) | StoreError::Version { .. } | StoreError::Encoding | StoreError::Lost,
-        ) => Nrc::RequestOutOfRange,
+            StoreError::Field(_)
+            | StoreError::Version { .. }
+            | StoreError::Encoding
+            | StoreError::Lost
+            | StoreError::Resets,
+        )
+        | Refusal::Slot(SlotError::Slow { .. }) => Nrc::RequestOutOfRange,
         Refusal::Locked => Nrc::SecurityAccessDenied,
         Refusal::Unsigned => Nrc::IncorrectMessageLengthOrInvalidFormat,
         Refusal::Answer | Refusal::Signature => Nrc::InvalidKey,

@@ -1,10 +1,11 @@
 //! Controls access: challenge and response (service 0x27), and signatures of written data.
 //!
 //! Without a key everyone may write. With a key, written data must be signed. A tester that proves once per session
-//! that it has the private key may also restart, silence and calibrate the board, and clear its troubles. The number
-//! of wrong answers is stored before the response is sent, so a restart does not help an attacker to guess. From the
-//! third wrong answer in a row on, a delay follows each one and doubles each time; it also runs after a restart.
-//! Refusals are counted (data 0113) and reported as a trouble.
+//! that it has the private key may also restart, silence and calibrate the board, and clear its troubles. A challenge
+//! is answered once, and by the key that it was made for. The number of wrong answers is stored before the response is
+//! sent, so a restart does not help an attacker to guess. From the third wrong answer in a row on, a delay follows each
+//! one and doubles each time; it also runs after a restart. Signed data are not delayed, and end the delay: answers of
+//! others do not keep the owner out. Refusals are counted (data 0113) and reported as a trouble.
 //!
 //! | refusal | code |
 //! |---|---|
@@ -101,7 +102,7 @@ impl Security {
                 }
                 let (seed, key) = self.seed.take().zip(access.key).ok_or(Nrc::RequestSequenceError)?;
                 let message = signature::challenge(device.serial(), &seed);
-                let is_right = signature::is_valid(&key, &message, &answer);
+                let is_right = device.long(|| signature::is_valid(&key, &message, &answer));
                 let wrong = if is_right { 0 } else { access.wrong.saturating_add(1) };
                 if wrong != access.wrong {
                     device.store_access(Access { wrong, ..access }).map_err(nrc)?;
@@ -131,13 +132,14 @@ impl Security {
         }
         let access = device.access().ok_or(Nrc::SecurityAccessDenied)?;
         let key = Some(key).filter(|key| *key != [0; 32]);
-        if key.as_ref().is_some_and(|key| !signature::is_key(key)) {
+        if key.as_ref().is_some_and(|key| !device.long(|| signature::is_key(key))) {
             return Err(Nrc::RequestOutOfRange);
         }
         device.store_access(Access { key, ..access }).map_err(nrc)?;
-        // The session that stores the first key stays unlocked. A signature does not prove that its sender has the
-        // private key.
-        self.is_unlocked = key.is_some() && (self.is_unlocked || access.key.is_none());
+        // The session that stores the first key has access. One that replaces a key has not: a signature does not prove
+        // that its sender has a private key, and an answer proves the key before.
+        self.end();
+        self.is_unlocked = key.is_some() && access.key.is_none();
         Ok(())
     }
 }
@@ -158,7 +160,8 @@ pub(super) fn signed<'b, R: NorFlash, W: MappedSlots>(
     Ok(content)
 }
 
-/// Checks a trailer, and stores its counter, so that the same signature is never accepted again.
+/// Checks a trailer, and stores its counter, so that the same signature is never accepted again. Wrong answers before
+/// it are forgotten.
 #[inline(never)]
 pub(super) fn accept<R: NorFlash, W: MappedSlots>(
     target: u16,
@@ -183,10 +186,10 @@ pub(super) fn accept<R: NorFlash, W: MappedSlots>(
         return Err(nrc(device.refuse_request(refusal)));
     }
     let message = signature::message(&Statement { target, serial, counter }, digest);
-    if !signature::is_valid(&key, &message, signature) {
+    if !device.long(|| signature::is_valid(&key, &message, signature)) {
         return Err(nrc(device.refuse_request(Refusal::Signature)));
     }
-    device.store_access(Access { counter, ..access }).map_err(nrc)
+    device.store_access(Access { counter, wrong: 0, ..access }).map_err(nrc)
 }
 
 /// Appends the access state: 0 open, 1 locked, 2 unlocked; the newest counter; the number of successive wrong

@@ -16,6 +16,7 @@ from .exceptions import (
 )  # fmt: skip
 from .memory import Memory
 from .nvic import NMI, Nvic
+from .paths import Paths
 from .processor import COUNT, FAULT, SLEEP, STATE, UNDEFINED, Processor
 from .scb import FpuControl, Scb
 from .systick import SysTick
@@ -63,6 +64,7 @@ class Board:
         self.nvic, self.scb, self.systick = Nvic(self), Scb(self), SysTick(self)
         self.dwt, self.debug = Dwt(self), CoreDebug(self)
         self.exceptions = Exceptions(self)
+        self.paths = Paths(self)
         for device in (Fixed(), self.systick, self.nvic, self.scb, self.debug, self.dwt, FpuControl(self)):
             self.bus.attach_private(device)
         self.bus.private[0xE000EF00 >> 2] = self.nvic
@@ -238,6 +240,7 @@ class Board:
         self.clocks_changed()
         vectors = self.memory.read(0, 8)
         self.processor.reset(int.from_bytes(vectors[:4], "little"), int.from_bytes(vectors[4:], "little"))
+        self.paths.begin()
         self.record("reset", cause=cause)
 
     # The run.
@@ -339,6 +342,7 @@ class Board:
             if self.scb.scr & SLEEPDEEP:
                 self.violate(Violation("WFI with SLEEPDEEP: Stop and Standby mode are not modelled"))
             self.sleeping = True
+            self.paths.sleep()
         elif why == FAULT:
             self._memory_fault()
         elif why == UNDEFINED:

@@ -130,6 +130,7 @@ class Exceptions:
         nvic.active |= bit
         nvic.pending &= ~bit
         self.current = number
+        board.paths.enter()
         entered = xpsr & 0xF80F_0000 | (target & 1) << 24 | number
         self.enter_batch.write(frame, control & ~(SPSEL | FPCA | SFPA), entered, entered & 0xF000_0000, excret, target)
         board.processor.start_at = target & ~1
@@ -191,6 +192,7 @@ class Exceptions:
         sp = frame + length | (xpsr >> 9 & 1) << 2
         control = control & 1 | (SPSEL if excret & 4 else 0) | (FPCA | SFPA if extended else 0)
         self.current = number
+        board.paths.leave(leaving)
         xpsr &= 0xFF0F_FDFF
         target = pc & ~1 | xpsr >> 24 & 1
         self.leave.write(xpsr, control, r0, r1, r2, r3, r12, lr, sp, xpsr & 0xF000_0000, target)

@@ -195,6 +195,14 @@ class Session:
             "can_filtered": board.peripherals["CAN1"].filtered,
         }
 
+    def paths_take(self) -> dict:
+        """Returns the longest path of each exception since the last call, 0 for the program, in instructions, and its name."""
+        board, longest = self.board, self.board.paths.longest
+        board.paths.longest = {}
+        vectors = {number: board.memory.word(board.scb.vtor + 4 * number) for number in longest if number}
+        name = lambda number: board.symbol_at(vectors[number]) if number else "idle"
+        return {"paths": [{"name": name(number), "instructions": count} for number, count in sorted(longest.items())]}
+
     def snapshot(self, name: str) -> None:
         """Saves the state of the board under a name."""
         self.snapshots[name] = Snapshot(self.board)

@@ -49,6 +49,7 @@ class Snapshot:
         board.processor.uc.context_restore(self.context)
         board.processor.fpu_ahead = False
         board.processor.start_at = None
+        board.paths.begin()
 
 
 def _put_back(board, region, saved: bytes) -> None:

@@ -16,7 +16,7 @@ use gyronet::store::{FlashFault, FogPart, ImuPart, Record as _};
 use gyronet::uds::Server;
 
 const SUPPORTED_HARDWARE: SupportedHardware =
-    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760] };
+    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760], clock_hz: 168_000_000 };
 
 type Board = Device<RamFlash<SECTOR>, RamFlash<RECORD_SECTOR>>;
 

@@ -229,9 +229,9 @@ fn yaw_is_right_though_the_parts_oscillator_is_one_percent_off() {
     /// Seconds after the start at which the turn begins: the ratio of the clocks is known after ten.
     const BEGINS: f64 = 12.0;
     // Without corrections by the network: what is integrated is the part's rate less its static bias.
-    let none = AngularRate(0);
+    let least = AngularRate::from_rad_per_sec(1.1e-3).expect("a gyro's range");
     let mut configuration = Configuration::DEFAULT;
-    (configuration.compensate.max_mean, configuration.compensate.max_single) = (none, none);
+    (configuration.compensate.max_mean, configuration.compensate.max_single) = (least, least);
     let Some(mut board) = equipped(TEST, configuration) else { return };
     let row = |seconds: f64, rate: f64| json!([seconds * 1e6, [0.0, 0.0, rate], LEVEL]);
     let turn = [

@@ -2,6 +2,7 @@
 
 mod access;
 mod bringup;
+mod budget;
 mod can;
 mod clock;
 mod common;

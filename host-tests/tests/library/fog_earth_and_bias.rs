@@ -222,6 +222,10 @@ fn a_latitude_over_can_is_used_when_it_is_confirmed() {
         now += 100_000;
         receiver.decode(&position(degrees), Micros(now))
     };
+    // Frames that do not agree never confirm each other.
+    for k in 0..4 * CONFIRM {
+        assert_eq!(take(&mut receiver, if k % 2 == 0 { 48.1 } else { 47.9 }), None);
+    }
     for _ in 1..CONFIRM {
         assert_eq!(take(&mut receiver, 48.1), None);
     }

@@ -205,3 +205,18 @@ fn every_step_that_holds_an_equal_increment_is_reported_as_stuck() {
     assert!(unusable.iter().all(|faults| faults.contains(Faults::STUCK)), "{unusable:?}");
     assert!(unusable.iter().all(|faults| !faults.contains(Faults::GAP)), "{unusable:?}");
 }
+
+/// A gyro whose messages cover half of each 10 ms.
+#[test]
+fn a_step_that_is_partly_covered_has_no_rate() {
+    let mut fog = with_fognet(false);
+    run(&mut fog, 1..101, |_| true);
+    for step in 101..201 {
+        let now = Micros(step * PERIOD_US);
+        let half = FogSample { span: PERIOD_US as u32 / 2, lost: 1, ..sample(step) };
+        fog.add(now, half).expect("in order");
+        let yaw = fog.next_step(now, Some([0; 6]), Some(&wheels())).expect("a step");
+        assert_eq!((yaw.rate.0, yaw.quality), (0, Quality::Unusable), "step {step}");
+        assert!(yaw.faults.0 & Faults::GAP.0 != 0, "step {step}");
+    }
+}

@@ -4,10 +4,12 @@ mod access;
 mod calibration;
 mod configuration;
 mod isotp;
+mod keys;
 mod learning;
 mod log;
 #[cfg(target_os = "linux")]
 mod socketcan;
+mod together;
 mod uds;
 mod weights;
 
@@ -25,12 +27,13 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 type Board = Device<Region<RECORD_SECTOR>, MappedRegion>;
-const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[] };
+const SUPPORTED_HARDWARE: SupportedHardware =
+    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[], clock_hz: 168_000_000 };
 const IDENTITY: Identity = Identity {
     firmware: [0, 1, 0],
     device_id: Some(0x413),
     serial: *b"a test board",
-    clock_hz: 16_000_000,
+    clock_hz: 168_000_000,
     clock_fault: None,
     can_fault: None,
     reset: ResetCause::Software,
@@ -43,6 +46,7 @@ const IDENTITY: Identity = Identity {
         file: [0; FILE],
         count: 1,
     }),
+    failed_starts: 0,
 };
 
 fn start(flash: &Rc<RefCell<F405>>) -> Board {

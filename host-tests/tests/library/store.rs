@@ -302,9 +302,9 @@ fn slots_are_checked() {
     let bytes = &held.bytes()[start..];
     let slots = [&bytes[..SLOT_SIZE], &bytes[SLOT_SIZE..]];
     let crc = file(slots[0]).expect("a whole file").crc;
-    let selection = select(&Accepted::NONE, slots, built_in);
+    let selection = select(&Accepted::NONE, slots, built_in, u32::MAX);
     assert_eq!(selection.source, gyronet::store::slots::WeightSource::BuiltIn);
-    let selection = select(&Accepted::NONE.with(Slot::A, crc ^ 1), slots, built_in);
+    let selection = select(&Accepted::NONE.with(Slot::A, crc ^ 1), slots, built_in, u32::MAX);
     assert_eq!(selection.source, gyronet::store::slots::WeightSource::BuiltIn);
     assert_eq!(selection.refused, [Some(SlotError::NotAccepted(crc)), None]);
 }

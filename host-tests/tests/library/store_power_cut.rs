@@ -1,10 +1,10 @@
-//! Power cuts at every operation of a configuration write, a write of the bias curve and a weight
+//! Power cuts at every operation of a configuration write, a write of the bias curve, a change of the key and a weight
 //! upload, on a flash with the F405's rules: the old or the new is always there, whole.
 
 use gyronet::model::weights;
 use gyronet::store::layout::{self, SLOT_SIZE};
 use gyronet::store::slots::{Selection, WeightSource, select};
-use gyronet::store::{Accepted, Configuration, Learned, Record, Slot};
+use gyronet::store::{Accepted, Access, Configuration, Learned, Record, Slot};
 use gyronet::units::SpecificForce;
 use gyronet_host_tests::flash::{Cut, F405};
 use gyronet_host_tests::stored::{open, other_weights, slots, upload};
@@ -13,6 +13,10 @@ use std::rc::Rc;
 
 fn configuration(k: usize) -> Configuration {
     Configuration { latitude_deg: Some((k % 90) as f32), ..Configuration::DEFAULT }
+}
+
+fn access(k: usize) -> Access {
+    Access { key: Some([k as u8; 32]), counter: k as u32, wrong: 0 }
 }
 
 fn learned(k: usize) -> Learned {
@@ -29,6 +33,7 @@ fn starts<R: Record>(make: fn(usize) -> R) -> Vec<(F405, usize, u64)> {
     store.set(&Accepted::NONE.with(Slot::B, 7)).expect("it is stored");
     store.set(&learned(1)).expect("it is stored");
     store.set(&configuration(1)).expect("it is stored");
+    store.set(&access(1)).expect("it is stored");
     store.set(&make(1)).expect("it is stored");
     let (mut starts, mut plain, mut changes) = (Vec::new(), 0, 0);
     for k in 2..5_000 {
@@ -67,6 +72,9 @@ fn whole<R: Record + PartialEq + std::fmt::Debug>(
     } else {
         assert_eq!(store.get::<Configuration>(), Ok(Some(configuration(1))), "{at}");
     }
+    if R::KEY != Access::KEY {
+        assert_eq!(store.get::<Access>(), Ok(Some(access(1))), "{at}");
+    }
 }
 
 /// Tries every cut of every write, and after it every cut of the next attempt.
@@ -84,12 +92,17 @@ fn every_cut<R: Record + PartialEq + std::fmt::Debug>(name: &str, make: fn(usize
                 cuts += 1;
                 let torn = flash.borrow().clone();
                 whole(&flash, make, k, &at);
+                let started = Rc::new(RefCell::new(torn.clone()));
+                open(&started).and_then(|mut store| store.make_room()).expect("the flash answers");
+                whole(&started, make, k, &at);
+                assert!(open(&started).is_ok_and(|store| !store.damaged()), "{at}: a start mends it");
                 // The next attempt works, and may be cut itself.
                 let retry = |flash: &Rc<RefCell<F405>>| open(flash).and_then(|mut store| store.set(&make(k)));
                 retry(&flash).unwrap_or_else(|error| panic!("{at}: {error}"));
                 assert_eq!(open(&flash).and_then(|mut store| store.get::<R>()), Ok(Some(make(k))), "{at}");
                 let retried = flash.borrow().operations() - torn.operations();
-                for again in 0..retried {
+                // In turns: every fourth of them.
+                for again in (after % 4..retried).step_by(4) {
                     let flash = Rc::new(RefCell::new(torn.clone()));
                     flash.borrow_mut().cut_after(again, cut);
                     assert!(retry(&flash).is_err(), "{at}");
@@ -114,12 +127,17 @@ fn a_cut_while_a_calibration_is_written_leaves_the_old_or_the_new_one() {
     every_cut("calibration", learned);
 }
 
+#[test]
+fn a_cut_while_a_key_is_replaced_leaves_the_old_or_the_new_one() {
+    every_cut("key", access);
+}
+
 /// Returns the weights that the board would run on after a restart.
 fn running(flash: &Rc<RefCell<F405>>) -> (WeightSource, u32) {
     let accepted = open(flash).and_then(|mut store| store.get::<Accepted>());
     let accepted = accepted.expect("records are whole").unwrap_or(Accepted::NONE);
     let flash = flash.borrow();
-    let Selection { weights, source, .. } = select(&accepted, slots(&flash), &weights::DEFAULT.0);
+    let Selection { weights, source, .. } = select(&accepted, slots(&flash), &weights::DEFAULT.0, u32::MAX);
     (source, weights.expect("there always are some").crc)
 }
 

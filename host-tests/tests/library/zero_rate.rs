@@ -322,3 +322,59 @@ fn a_stop_begins_without_the_offset_of_the_one_before() {
     zero_rate.observe(Some(rate(0.0006)), Standing::WHEELS, 0.0);
     assert_eq!(zero_rate.bias(), driving);
 }
+
+/// Runs a parked car with a gap of some samples at a tick, and with wheels that stand, if there are any.
+fn parked_with_gap(ticks: u64, gap: std::ops::Range<u64>, wheels_stand: bool) -> (Pipeline, Vec<Output>) {
+    let (mut noise, mut pipeline, mut network) =
+        (Noise::new(3), Pipeline::new(PipelineConfig::DEFAULT), constant(0.0));
+    let mut outputs = Vec::new();
+    for tick in (0..ticks).filter(|tick| !gap.contains(tick)) {
+        let sample = parked(tick, &mut noise);
+        let report = wheels_stand.then(|| wheels(&sample, Standstill::Still));
+        let output =
+            pipeline.correct(sample, report.as_ref(), &BoardState::GOOD).expect("a place on the grid");
+        if let Some(due) = &output.window {
+            pipeline.deliver(due.end, network(due).expect("an estimate"));
+        }
+        outputs.push(output);
+    }
+    (pipeline, outputs)
+}
+
+/// The second in which the gap lies is not used.
+#[test]
+fn no_second_at_standstill_spans_a_gap() {
+    let updates = |gap| parked_with_gap(1_500, gap, true).0.counters().zero_rate_updates;
+    let (whole, broken) = (updates(0..0), updates(860..863));
+    assert!(whole >= 9 && broken < whole, "{broken} updates of {whole}");
+}
+
+#[test]
+fn no_quiet_spans_a_gap() {
+    let (_, outputs) = parked_with_gap(1_500, 860..863, false);
+    let source = |tick: usize| outputs[tick].standing.source;
+    assert_eq!(source(859), StandstillSource::Inertial);
+    // Two seconds are wanted again.
+    for tick in (860..1_050).step_by(10) {
+        assert_eq!(source(tick), StandstillSource::None, "tick {tick}");
+    }
+    assert_eq!(source(1_100), StandstillSource::Inertial);
+}
+
+/// A vehicle that pulls away before its wheels show it: what was held back is carried, and reported while it is.
+#[test]
+fn too_much_to_carry_is_reported_until_it_is_carried() {
+    let mut config = PipelineConfig::DEFAULT;
+    config.compensate.max_revision = AngularRate::from_deg_per_sec(0.1);
+    let implausible = |turn: f64| {
+        let turning = move |tick: u64| if (940..1_000).contains(&tick) { turn } else { 0.0 };
+        let (_, outputs) = run_with(config, 0.0, 1_300, turning, moves_from(1_000));
+        let is = |output: &&Output| output.vehicle.live.faults.0 & Faults::IMPLAUSIBLE.0 != 0;
+        assert!(!outputs[1_250..].iter().any(|output| is(&output)), "it has been carried");
+        outputs.iter().filter(is).count()
+    };
+    assert_eq!(implausible(0.0), 0);
+    let reported = implausible(0.003);
+    // 0.1 deg at 0.001 deg a sample, less the last quarter of the limit of 25 of them.
+    assert!((40..=110).contains(&reported), "{reported}");
+}

@@ -49,6 +49,7 @@ impl Board {
         let Chip { clocks, device_id, reset } = Chip::start(&p, BOARD.crystal_hz);
         assign_pins();
         let can = if clocks.exact() { Can::start(p.CAN1, Mode::Normal) } else { Err(CanFault::Clock) };
+        let (crash, failed_starts) = crash::take(reset);
         let identity = Identity {
             firmware: version(),
             device_id: Some(device_id),
@@ -57,7 +58,8 @@ impl Board {
             clock_fault: clocks.fault,
             can_fault: can.as_ref().err().copied(),
             reset,
-            crash: crash::take(),
+            crash,
+            failed_starts,
         };
         let now = timer::micros() as u32;
         let [imu, slcan, fog, service] =

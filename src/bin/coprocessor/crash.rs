@@ -12,12 +12,15 @@ use core::ptr::{addr_of_mut, read_volatile, write_volatile};
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
 use gyronet::service::crash::{Crash, CrashKind, FILE};
+use gyronet::service::event::ResetCause;
+use gyronet::service::message::FAILED_STARTS;
 
 /// Marks a valid record: after power-on the RAM holds arbitrary bits.
 const MAGIC: u32 = 0x4752_4E44;
 /// Words of a record: magic, count of crashes, kind (0: none since the last start), place, link, status, address,
-/// file, check word.
-const WORDS: usize = 7 + FILE / 4 + 1;
+/// file, failed starts in a row, check word.
+const WORDS: usize = FAILED + 2;
+const FAILED: usize = 7 + FILE / 4;
 /// Addresses that a stack pointer can hold, and the size of an exception frame in bytes.
 const RAM: core::ops::Range<u32> = 0x2000_0000..0x2002_0000;
 const FRAME: u32 = 32;
@@ -33,8 +36,8 @@ fn check(words: &Words) -> u32 {
 }
 
 fn read() -> Option<Words> {
-    // SAFETY: any bits are words. Nothing else runs: this is before the first interrupt, or in a
-    // handler that ends in a reset.
+    // SAFETY: any bits are words. Nothing else uses them: this is before the first interrupt, in idle, or in a handler
+    // that ends in a reset.
     let words = unsafe { read_volatile(addr_of_mut!(RECORD).cast::<Words>()) };
     (words[0] == MAGIC && words[WORDS - 1] == check(&words)).then_some(words)
 }
@@ -46,13 +49,30 @@ fn write(mut words: Words) {
     unsafe { write_volatile(addr_of_mut!(RECORD).cast::<Words>(), words) };
 }
 
-/// Returns the crash that caused this start, if any, and clears it.
-pub fn take() -> Option<Crash> {
-    let words = read()?;
-    let [_, count, kind, place, link, status, address, ..] = words;
+/// Returns the crash that caused this start, if any, and clears it; and the number of starts in a row that have ended in
+/// a crash or a reset by the watchdog before [`settled`].
+pub fn take(reset: ResetCause) -> (Option<Crash>, u8) {
+    let words = read().unwrap_or([0; WORDS]);
+    let crash = recorded(&words);
+    let has_failed = reset == ResetCause::Watchdog
+        || crash.is_some_and(|crash| !matches!(crash.kind, CrashKind::CrystalStopped | CrashKind::SupplyLow));
     let mut rest = [0; WORDS];
-    rest[1] = count;
+    rest[1] = words[1];
+    rest[FAILED] = if has_failed { words[FAILED].saturating_add(1) } else { 0 };
     write(rest);
+    (crash, rest[FAILED].min(u8::MAX.into()) as u8)
+}
+
+/// Notes that the start has not failed. One with the built-in configuration goes on until a tester restarts the board.
+pub fn settled() {
+    if let Some(mut words) = read().filter(|words| words[FAILED] < u32::from(FAILED_STARTS)) {
+        words[FAILED] = 0;
+        write(words);
+    }
+}
+
+fn recorded(words: &Words) -> Option<Crash> {
+    let [_, count, kind, place, link, status, address, ..] = *words;
     let kind = match kind {
         0 => return None,
         1 => CrashKind::Panic,
@@ -71,7 +91,9 @@ pub fn take() -> Option<Crash> {
 /// Records a crash and resets the chip.
 fn crash(kind: u32, [place, link, status, address]: [u32; 4], path: &str) -> ! {
     let mut words = [0; WORDS];
-    words[1] = read().map_or(0, |words| words[1]).saturating_add(1);
+    let before = read().unwrap_or(words);
+    words[1] = before[1].saturating_add(1);
+    words[FAILED] = before[FAILED];
     words[2] = kind;
     words[3] = place;
     words[4] = link;

@@ -1,6 +1,7 @@
 //! The idle task runs diagnosis and checks the weights against their checksum.
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
+use crate::crash;
 use crate::diagnosis::Diagnosis;
 use crate::imu::{self, BringUp};
 use crate::regions::{Records, Weights};
@@ -17,6 +18,8 @@ use gyronet::standstill::Standing;
 
 /// Interval between checks of a failed clock, ms.
 const RETRY_MS: u32 = 1_000;
+/// Time after which a start has not failed, ms.
+const SETTLED_MS: u32 = 60_000;
 /// Duration of one pass over the weights, ms.
 const CHECK_MS: usize = 10_000;
 
@@ -131,7 +134,10 @@ impl Idle {
         if now == self.milliseconds {
             return false;
         }
-        self.milliseconds = now;
+        let before = core::mem::replace(&mut self.milliseconds, now);
+        if before < SETTLED_MS && now >= SETTLED_MS {
+            crash::settled();
+        }
         let pass = self.weights.as_mut().and_then(|check| check.advance(check.len() / CHECK_MS + 1));
         let damaged = pass.is_some_and(|pass| pass.is_err());
         if damaged {

@@ -18,7 +18,7 @@
 //! | 4, 3 | `imu_line`, `fog_line`, `slcan_line`; `service_line` | a damaged byte | counts it |
 //! | 3 | `can_received`, `can_sent` | a frame | into and out of their queues |
 //! | 2 | `output` | pended by `tick`, `can_sent`, `window` | samples, frames, watchdog |
-//! | 1 | `window` | pended by `output` | GyroNet |
+//! | 1 | `window` | pended by `output` and itself | a piece of a GyroNet window |
 //! | 0 | `idle` | the remaining time | diagnosis, checksums of the weights; otherwise sleep |
 //!
 //! `output`, `window` and `idle` share the library's `Coprocessor`; everything else is passed on in queues of fixed
@@ -102,9 +102,9 @@ mod app {
     use core::mem::MaybeUninit;
     use cortex_m::asm::dsb;
     use gyronet::coprocessor::Coprocessor;
+    use gyronet::model::GyroNet;
     use gyronet::model::blob::HIDDEN;
     use gyronet::model::gyronet::GyroNetState;
-    use gyronet::model::{GyroNet, WindowNetwork};
     use gyronet::service::message::AllCounters;
 
     #[shared]
@@ -217,14 +217,26 @@ mod app {
         rtic::pend(Interrupt::UART5);
     }
 
-    #[task(binds = UART5, priority = 1, local = [network], shared = [coprocessor])]
+    /// Runs a piece of a window each time, so that the watchdog sees a large model advance at any clock.
+    #[task(binds = UART5, priority = 1, local = [network, end: Option<u32> = None], shared = [coprocessor])]
     fn window(mut cx: window::Context) {
-        let due = cx.shared.coprocessor.lock(|coprocessor| coprocessor.window());
-        if let (Some(due), Some(network)) = (due, cx.local.network) {
-            let estimate = network.estimate(&due.features);
-            // A late estimate is counted.
-            let _ = cx.shared.coprocessor.lock(|coprocessor| coprocessor.deliver(due.end, estimate));
-            rtic::pend(Interrupt::UART4);
+        let window::LocalResources { network, end, .. } = cx.local;
+        if let (Some(network), Some(under_way)) = (network.as_mut(), *end) {
+            if let Some(estimate) = network.advance() {
+                *end = None;
+                // A late estimate is counted.
+                let _ = cx.shared.coprocessor.lock(|coprocessor| coprocessor.deliver(under_way, estimate));
+                rtic::pend(Interrupt::UART4);
+            }
+        } else {
+            let due = cx.shared.coprocessor.lock(|coprocessor| coprocessor.window());
+            if let (Some(network), Some(due)) = (network, due) {
+                network.start(&due.features);
+                *end = Some(due.end);
+            }
+        }
+        if end.is_some() {
+            rtic::pend(Interrupt::UART5);
         }
         report(Task::Window);
     }

@@ -7,7 +7,7 @@ use crate::diagnosis;
 use crate::idle::Stored;
 use crate::output::OutputParts;
 use crate::regions::{self, Records, Weights};
-use crate::stm32f405::{flash::Flash, pac};
+use crate::stm32f405::{clocks::FULL_HZ, flash::Flash, pac};
 use core::mem::MaybeUninit;
 use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
@@ -27,6 +27,7 @@ const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
         (false, false) => &[],
     },
     fogs: if BOARD.fog.is_some() { &[FogPart::Dsp1760] } else { &[] },
+    clock_hz: FULL_HZ,
 };
 
 /// Weights that are used if no slot has valid ones.

@@ -9,7 +9,8 @@ use super::crystal::{self, INTERNAL_HZ};
 use super::{pac, supply, wait_until};
 use gyronet::service::event::ClockFault;
 
-const FULL_HZ: u32 = 168_000_000;
+/// Frequency of the processor on the crystal, Hz.
+pub const FULL_HZ: u32 = 168_000_000;
 const MHZ: u32 = 1_000_000;
 /// Polls before a step times out: above 25 ms at 16 MHz. A crystal takes 2 ms (DS8626 table 37).
 const POLLS: u32 = 80_000;

@@ -41,6 +41,7 @@ impl Chip {
         let device_id = p.DBGMCU.idcode().read().bits();
         let reset = reset::cause(&p.RCC);
         let clocks = Clocks::start(&p.RCC, &p.FLASH, &p.PWR, crystal_hz);
+        watchdog::follow(clocks.exact());
         timer::start(&p.RCC, &p.TIM5, &clocks);
         enable_peripherals(&p.RCC);
         Self { clocks, device_id, reset }

@@ -11,24 +11,27 @@ use core::sync::atomic::{AtomicBool, Ordering};
 /// Polls before the change of a register times out: above 300 us at 168 MHz, which 17 kHz needs.
 const POLLS: u32 = 10_000;
 
-/// Times until the reset, at 47, 32 and 17 kHz.
+/// Times until the reset, at 47, 32 and 17 kHz; without the crystal the processor is 10.5 times slower.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Limit {
-    /// 2.7, 4 and 7.5 s: the start, and an erase of a sector, which stalls the processor for up to 2 s
-    /// (DS8626 table 48).
+    /// 2.7, 4 and 7.5 s, without the crystal twice as long: the start, the check of a file or a signature, and an erase
+    /// of a sector, which stalls the processor for up to 2 s (DS8626 table 48).
     Long,
-    /// 68, 100 and 188 ms: all tasks run.
+    /// 68, 100 and 188 ms, without the crystal 0.7, 1.05 and 2 s: all tasks run.
     Short,
 }
 
 impl Limit {
     /// Prescaler code and reload value.
-    const fn settings(self) -> (u8, u16) {
-        match self {
+    const fn settings(self, slow: bool) -> (u8, u16) {
+        match (self, slow) {
             // 32 kHz / 256 = 125 Hz.
-            Self::Long => (6, 500),
+            (Self::Long, false) => (6, 500),
+            (Self::Long, true) => (6, 1_000),
             // 32 kHz / 4 = 8 kHz.
-            Self::Short => (0, 800),
+            (Self::Short, false) => (0, 800),
+            // 32 kHz / 64 = 500 Hz.
+            (Self::Short, true) => (4, 525),
         }
     }
 }
@@ -48,8 +51,16 @@ pub fn start(dbgmcu: &pac::DBGMCU) {
 
 /// True while the long limit is set.
 static LONG: AtomicBool = AtomicBool::new(true);
+/// True if the processor does not run from the crystal.
+static SLOW: AtomicBool = AtomicBool::new(false);
 
-/// Runs `work`, which takes up to 2 s, with the long limit, and then restores the previous limit.
+/// Makes the limits follow the processor's clock.
+pub fn follow(is_exact: bool) {
+    SLOW.store(!is_exact, Ordering::Relaxed);
+    set(Limit::Long);
+}
+
+/// Runs `work`, which takes up to 2 s (5 s without the crystal), with the long limit, and then restores the previous limit.
 pub fn with_long_limit<T>(work: impl FnOnce() -> T) -> T {
     let long = LONG.load(Ordering::Relaxed);
     set(Limit::Long);
@@ -61,7 +72,7 @@ pub fn with_long_limit<T>(work: impl FnOnce() -> T) -> T {
 /// Changes the limit and begins a new period.
 pub fn set(limit: Limit) {
     LONG.store(limit == Limit::Long, Ordering::Relaxed);
-    let (prescaler, reload) = limit.settings();
+    let (prescaler, reload) = limit.settings(SLOW.load(Ordering::Relaxed));
     wait_until_applied();
     // A reload by the output task in between would lock both registers again.
     // SAFETY: the key that unlocks both registers, and values within them (RM0090 21.4).

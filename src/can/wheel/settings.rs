@@ -52,8 +52,8 @@ pub enum WheelConfigError {
     /// Two fields of a frame (speeds, counter, protection) overlap.
     #[error("wheel frame {0:x}: two values overlap")]
     Overlap(u32),
-    /// One of the board's own messages has the identifier.
-    #[error("wheel frame {0:x} is one of our own messages")]
+    /// One of the board's own messages has the identifier, or diagnosis.
+    #[error("wheel frame {0:x} is one of our own messages, or of diagnosis")]
     Own(u32),
     /// The factor of a wheel is zero.
     #[error("wheel {0}: the factor is zero")]
@@ -76,6 +76,11 @@ impl WheelSettings {
         still_speed: WheelSpeed(1_820),
         still_for: Duration::from_millis(500),
     };
+
+    /// No wheel speeds.
+    #[cfg(feature = "service")]
+    pub(crate) const NONE: Self =
+        Self { frames: [None; MAX_FRAMES], signals: [None; WHEELS], ..Self::TOYOTA };
 
     /// Checks the settings, and returns which wheels have a signal.
     pub(super) fn wheels(&self) -> Result<[bool; WHEELS], WheelConfigError> {

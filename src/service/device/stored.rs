@@ -2,7 +2,7 @@
 
 use super::{Device, INTERRUPTS, MappedSlots, SupportedHardware};
 use crate::bias::Rest;
-use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};
+use crate::can::wheel::WheelSettings;
 use crate::service::event::EventKind;
 use crate::service::learner::Learner;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
@@ -76,6 +76,16 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.next_configuration = self.configuration;
         let (wheels, origin) = self.take(store.get(), EventKind::WheelsRefused);
         (self.wheels, self.wheels_origin) = (wheels.unwrap_or(WheelSettings::TOYOTA), origin);
+        self.next_wheels = self.wheels;
+        if let Err(error) = self.configuration.check_wheels(&self.wheels) {
+            let (_, origin) = self.take::<()>(Err(error.into()), EventKind::WheelsRefused);
+            (self.wheels, self.wheels_origin) = (WheelSettings::NONE, origin);
+        }
+        if self.has_failed() {
+            let (_, origin) = self.take::<()>(Err(StoreError::Resets), EventKind::ConfigurationRefused);
+            (self.configuration, self.configuration_origin) = (self.configuration.bus_alone(), origin);
+            self.wheels = WheelSettings::NONE;
+        }
         let (calibration, origin) = self.take(store.get(), EventKind::CalibrationRefused);
         (self.calibration, self.calibration_origin) = (calibration.unwrap_or(Calibration::NONE), origin);
         let (learned, _) = self.take(store.get(), EventKind::LearnedRefused);
@@ -116,7 +126,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     fn check_supported(&self, configuration: &Configuration) -> Result<(), StoreError> {
-        let SupportedHardware { imus, fogs } = self.supported;
+        let SupportedHardware { imus, fogs, .. } = self.supported;
         if !imus.contains(&configuration.imu) || configuration.fog.is_some_and(|fog| !fogs.contains(&fog)) {
             return Err(StoreError::Field(FieldError::PartNotInImage));
         }
@@ -137,6 +147,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             // Check the values first, so that a bad value is reported even if nothing can be stored.
             configuration.check().map_err(StoreError::from)?;
             device.check_supported(configuration)?;
+            configuration.check_wheels(&device.next_wheels).map_err(StoreError::from)?;
+            let available = configuration.compensate.mode.window_cycles(device.supported.clock_hz);
+            let cycles = device.next_window;
+            if cycles > available {
+                return Err(StoreError::Field(FieldError::Window { cycles, available }).into());
+            }
             device.store()?.set(configuration)?;
             device.next_configuration = *configuration;
             device.note(EventKind::ConfigurationStored);
@@ -152,12 +168,9 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     pub fn set_wheels(&mut self, wheels: &WheelSettings) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
             wheels.check().map_err(StoreError::from)?;
-            let ids = wheels.frames.iter().flatten().map(|frame| frame.id);
-            if let Some(id) = device.configuration.own_identifier(ids) {
-                let error = WheelConfigError::Own(raw_id(id));
-                return Err(StoreError::Field(FieldError::Wheels(error)).into());
-            }
+            device.next_configuration.check_wheels(wheels).map_err(StoreError::from)?;
             device.store()?.set(wheels)?;
+            device.next_wheels = *wheels;
             device.note(EventKind::WheelsStored);
             Ok(())
         })

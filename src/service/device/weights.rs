@@ -5,7 +5,7 @@ use crate::model::Blob;
 use crate::service::event::EventKind;
 use crate::service::message::{BLOCK, Refusal};
 use crate::store::slots::{Selection, SlotError, WeightSource, select};
-use crate::store::{Slot, Upload};
+use crate::store::{Accepted, Slot, Upload};
 use embedded_storage::nor_flash::NorFlash;
 
 /// The flash of the weight files, which is also memory-mapped for reading. Offsets are from the start of the whole
@@ -14,27 +14,42 @@ pub trait MappedSlots: NorFlash {
     /// Returns both slots, aligned to words.
     fn slots(&self) -> [&[u8]; 2];
 
-    /// Runs the check of a file, which takes a tenth of a second. A board may override this to extend its watchdog
-    /// timeout.
+    /// Runs the check of a file or of a signature, which takes a tenth of a second at 168 MHz. A board may override this
+    /// to extend its watchdog timeout.
     fn check<T>(&self, work: impl FnOnce() -> T) -> T {
         work()
     }
 }
 
-/// An upload in progress, and the checksum of its file once checked.
+/// An upload in progress, and its file once checked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Uploading {
     pub(super) upload: Upload,
-    pub(super) checked: Option<u32>,
+    pub(super) checked: Option<Checked>,
+}
+
+/// What is known of a file that has been checked.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Checked {
+    pub(super) crc: u32,
+    /// Largest cost of a window, cycles.
+    window: u32,
 }
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// Selects the weights to run from `slots`, as the processor reads them, else from the image itself.
     pub fn weights<'w>(&mut self, slots: Option<[&'w [u8]; 2]>, built_in: &'w [u8]) -> Option<Blob<'w>> {
+        let available = self.configuration.compensate.mode.window_cycles(self.identity.clock_hz);
+        let accepted = if self.has_failed() { &Accepted::NONE } else { &self.accepted };
         let Selection { weights, source, refused } =
-            select(&self.accepted, slots.unwrap_or_default(), built_in);
+            select(accepted, slots.unwrap_or_default(), built_in, available);
         self.weights = source;
         self.weights_crc = weights.map(|blob| blob.crc);
+        let slow = refused.into_iter().flatten().find_map(|error| match error {
+            SlotError::Slow { cycles, .. } => Some(cycles),
+            _ => None,
+        });
+        self.next_window = slow.or(weights.map(|blob| blob.shape.window_cycles())).unwrap_or(0);
         self.refused_slots = refused;
         for (slot, error) in Slot::ALL.into_iter().zip(refused) {
             if let Some(error) = error {
@@ -123,7 +138,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             let flash = device.slots.as_ref().ok_or(SlotError::NoFlash)?;
             let uploading = device.uploading.as_mut().ok_or(SlotError::NotBegun)?;
             let upload = &uploading.upload;
-            uploading.checked = Some(flash.check(|| upload.verify(flash.slots()))?);
+            let Blob { crc, shape, .. } = flash.check(|| upload.verify(flash.slots()))?;
+            uploading.checked = Some(Checked { crc, window: shape.window_cycles() });
             Ok(())
         })
     }
@@ -136,10 +152,16 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     pub fn weights_activate(&mut self) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
             let Uploading { upload, checked } = device.uploading.ok_or(SlotError::NotBegun)?;
-            let file = checked.ok_or(SlotError::Incomplete { written: upload.written() })?;
-            let accepted = device.accepted.with(upload.slot(), file);
+            let Checked { crc, window: cycles } =
+                checked.ok_or(SlotError::Incomplete { written: upload.written() })?;
+            let mode = device.next_configuration.compensate.mode;
+            let available = mode.window_cycles(device.supported.clock_hz);
+            if cycles > available {
+                return Err(SlotError::Slow { cycles, available }.into());
+            }
+            let accepted = device.accepted.with(upload.slot(), crc);
             device.store()?.set(&accepted)?;
-            device.accepted = accepted;
+            (device.accepted, device.next_window) = (accepted, cycles);
             device.uploading = None;
             device.note(EventKind::WeightsAccepted(upload.slot()));
             Ok(())

@@ -215,6 +215,9 @@ fn print_info(info: &Info, access: &str) -> io::Result<()> {
     if let Some(crash) = identity.crash {
         writeln!(out, "crashed       {crash}")?;
     }
+    if identity.failed_starts > 0 {
+        writeln!(out, "failed starts {} in a row", identity.failed_starts)?;
+    }
     writeln!(out, "status        {}", info.status)?;
     if let Some(fault) = info.sensor {
         writeln!(out, "sensor        {fault}")?;

@@ -6,8 +6,7 @@ use super::{Board, sample, start};
 use gyronet::bias::StaticConfig;
 use gyronet::health::{Faults, Status};
 use gyronet::mounting::Forward;
-use gyronet::sample::{ImuSample, Standstill, WheelSample};
-
+use gyronet::sample::{ImuSample, Standstill, Validity, WheelSample};
 use gyronet::service::Learner;
 use gyronet::service::calibrate::Task;
 use gyronet::service::event::EventKind;
@@ -16,6 +15,7 @@ use gyronet::store::{Calibration, Configuration, Learned};
 use gyronet::units::{CentiCelsius, WheelSpeed};
 use gyronet_host_tests::flash::F405;
 use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::stored::open;
 use gyronet_host_tests::synthetic::judged;
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -218,4 +218,75 @@ fn a_board_that_must_not_learn_does_not_look_for_forward() {
     observe(&mut board, 4, (0.01, 20), LEVEL, Standstill::Still);
     drive(&mut board, 120, 20.0);
     assert_eq!(board.forward_deg(), None);
+}
+
+#[test]
+fn readings_that_are_not_good_teach_nothing() {
+    let mut board = start(&Rc::new(RefCell::new(F405::default())));
+    let before = *board.learned();
+    for validity in [Validity::Saturated, Validity::Recovering, Validity::Implausible, Validity::Stuck] {
+        for tick in 0..400 {
+            let sample = ImuSample { validity, ..sample(tick, LEVEL, 0.05) };
+            let wheels = WheelSample::without_speeds(Standstill::Still);
+            board.observe(Some(&sample), 0, (Status::Clipped, Faults::NONE), &wheels, &Standing::WHEELS);
+        }
+        assert_eq!(*board.learned(), before, "{validity:?}");
+    }
+}
+
+/// A platform that turns while the wheels stand: the pipeline contradicts it.
+#[test]
+fn a_contradicted_standstill_teaches_nothing() {
+    let contradicted = Standing { is_contradicted: true, ..Standing::UNKNOWN };
+    let mut board = start(&Rc::new(RefCell::new(F405::default())));
+    let before = *board.learned();
+    for tick in 0..1_000 {
+        let wheels = WheelSample::without_speeds(Standstill::Still);
+        let turning = sample(tick, LEVEL, 0.009);
+        board.observe(Some(&turning), 0, (Status::Ready, Faults::WHEELS), &wheels, &contradicted);
+    }
+    assert_eq!(*board.learned(), before);
+}
+
+/// Drives past, with this fault.
+fn moves(bench: &mut Bench, faults: Faults) {
+    let (wheels, moving) = (WheelSample::without_speeds(Standstill::Moving), sample(0, LEVEL, 0.01));
+    bench.board.observe(Some(&moving), 0, (Status::Ready, faults), &wheels, &Standing::UNKNOWN);
+}
+
+#[test]
+fn what_was_learnt_waits_for_the_next_stop() {
+    let (flash, mut bench) = bench();
+    assert_eq!(bench.board.set_configuration(&Configuration::DEFAULT), Ok(()));
+    // The troubles of this start are stored first.
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    observe(&mut bench.board, 4, (0.01, 20), LEVEL, Standstill::Still);
+    moves(&mut bench, Faults::NONE);
+    let before = flash.borrow().operations();
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    assert_eq!(flash.borrow().operations(), before, "in motion nothing is written");
+    observe(&mut bench.board, 1, (0.01, 20), LEVEL, Standstill::Still);
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    assert!(flash.borrow().operations() > before && is_near(learned(&start(&flash), 20.0), 0.01));
+}
+
+/// Troubles may be appended at any time; where that needs an erase, a workshop waits for the vehicle to stand.
+#[test]
+fn troubles_erase_nothing_in_motion() {
+    let (flash, mut bench) = bench();
+    for k in 0..10_000 {
+        let latitude = Configuration { latitude_deg: Some((k % 90) as f32), ..Configuration::DEFAULT };
+        assert_eq!(bench.board.set_configuration(&latitude), Ok(()));
+        if !open(&flash).expect("the flash answers").has_room() {
+            break;
+        }
+    }
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    moves(&mut bench, Faults::GAP);
+    let before = flash.borrow().operations();
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    assert_eq!(flash.borrow().operations(), before);
+    observe(&mut bench.board, 1, (0.01, 20), LEVEL, Standstill::Still);
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    assert!(flash.borrow().operations() > before);
 }

@@ -1,0 +1,151 @@
+//! Random settings, each value of which is valid by itself: whether they are valid together is for the board to say.
+
+use crate::noise::Noise;
+use embedded_can::{ExtendedId, Id, StandardId};
+use gyronet::can::config::{
+    BIT_RATES, BoschSettings, DataIdMode, E2e, Settings, StatusSettings, Vdc2Settings, YawSettings,
+};
+use gyronet::can::diagnosis::DiagnosisIds;
+use gyronet::can::latitude::LatitudeSettings;
+use gyronet::can::signal::ByteOrder;
+use gyronet::can::wheel::{WheelFrame, WheelSettings};
+use gyronet::compensate::{CompensateConfig, Lag, Mode, Stride};
+use gyronet::store::{Configuration, Field, FogGyro, FogPart, Mounting};
+use gyronet::units::AngularRate;
+
+/// Identifiers of all kinds of frames, few enough that they meet.
+const IDS: [u16; 24] = [
+    0x0A0, 0x0A1, 0x0AA, 0x0AB, 0x0B0, 0x130, 0x174, 0x178, 0x17C, 0x1A0, 0x1A1, 0x1A2, 0x1A3, 0x1A4, 0x1A5,
+    0x1A6, 0x200, 0x201, 0x202, 0x300, 0x301, 0x6F0, 0x700, 0x708,
+];
+/// The frame VDC2 of some addresses, and other frames of 29 bits.
+const LONG_IDS: [u32; 6] = [0x0CFD_C5_0B, 0x0CFD_C5_2A, 0x18FE_F31C, 0x18DA_10F1, 0x18DB_33F1, 0x18DA_F110];
+
+/// A value between the bounds of a field, its bounds among them.
+fn within(noise: &mut Noise, field: Field) -> f32 {
+    let [low, high] = field.range().expect("it has a range");
+    match noise.int(0, 9) {
+        0 => low,
+        1 => high,
+        _ => (low + (high - low) * noise.int(0, 1_000) as f32 / 1_000.0).clamp(low, high),
+    }
+}
+
+fn rate(noise: &mut Noise, field: Field) -> AngularRate {
+    let [low, high] = field.range().expect("it has a range");
+    let code = |value: f32| (f64::from(value) * f64::from(AngularRate::PER_RAD_PER_SEC)) as i64;
+    // Rounded inwards.
+    AngularRate((code(within(noise, field))).clamp(code(low) + 1, code(high) - 1) as i32)
+}
+
+fn one<T: Copy>(noise: &mut Noise, of: &[T]) -> T {
+    of[noise.int(0, of.len() as i64 - 1) as usize]
+}
+
+fn maybe<T>(noise: &mut Noise, some: impl FnOnce(&mut Noise) -> T) -> Option<T> {
+    (noise.int(0, 2) > 0).then(|| some(noise))
+}
+
+fn three(noise: &mut Noise, usual: [u16; 3]) -> [u16; 3] {
+    if noise.int(0, 1) == 0 { usual } else { [(); 3].map(|()| one(noise, &IDS)) }
+}
+
+/// Any mode.
+fn mode(noise: &mut Noise) -> Mode {
+    match noise.int(0, 11) {
+        0 => Mode::Newest,
+        1 => Mode::Middle,
+        samples => Mode::Overlap { stride: Stride::new(samples as u8 - 1).expect("1 to 10") },
+    }
+}
+
+/// Returns a configuration.
+pub fn configuration(noise: &mut Noise) -> Configuration {
+    let default = Configuration::DEFAULT;
+    let yaw = default.can.yaw.expect("it is sent");
+    let can = Settings {
+        bits_per_second: one(noise, &BIT_RATES),
+        bosch: maybe(noise, |noise| BoschSettings { tx1_only: noise.int(0, 1) == 0 }),
+        yaw: maybe(noise, |noise| YawSettings {
+            ids: three(noise, yaw.ids),
+            period_ms: 10 * noise.int(1, 100) as u16,
+            e2e: E2e::P01 { mode: DataIdMode::Both, data_ids: [1, 2, 3] },
+        }),
+        vdc2: maybe(noise, |noise| Vdc2Settings { source: one(noise, &[0x0B, 0x2A, 253]) }),
+        status: maybe(noise, |noise| StatusSettings { id: one(noise, &IDS) }),
+    };
+    let latitude_frame = maybe(noise, |noise| {
+        let extended = noise.int(0, 1) == 0;
+        let id = if extended { one(noise, &LONG_IDS) } else { one(noise, &IDS).into() };
+        LatitudeSettings {
+            id,
+            extended,
+            start: 0,
+            bits: 32,
+            order: ByteOrder::Intel,
+            signed: false,
+            degrees_per_bit: 1e-7,
+            offset_deg: -210.0,
+            invalid: Some(u32::MAX),
+        }
+    });
+    let diagnosis = match noise.int(0, 3) {
+        0 => DiagnosisIds {
+            extended: true,
+            request: LONG_IDS[3],
+            functional: LONG_IDS[4],
+            response: LONG_IDS[5],
+        },
+        1 => DiagnosisIds {
+            request: one(noise, &IDS).into(),
+            response: one(noise, &IDS).into(),
+            ..DiagnosisIds::DEFAULT
+        },
+        _ => DiagnosisIds::DEFAULT,
+    };
+    let mut static_init = default.static_init;
+    for (place, field) in [
+        (&mut static_init.gyro_std, Field::StaticGyroStd),
+        (&mut static_init.accel_std, Field::StaticAccelStd),
+        (&mut static_init.gyro_drift, Field::StaticGyroDrift),
+        (&mut static_init.accel_drift, Field::StaticAccelDrift),
+        (&mut static_init.gyro_bias, Field::StaticGyroBias),
+    ] {
+        *place = within(noise, field);
+    }
+    Configuration {
+        fog: maybe(noise, |_| FogPart::Dsp1760),
+        can,
+        latitude_deg: maybe(noise, |noise| within(noise, Field::LatitudeDeg)),
+        mounting: Mounting {
+            roll_deg: within(noise, Field::MountingRollDeg),
+            pitch_deg: within(noise, Field::MountingPitchDeg),
+            yaw_deg: within(noise, Field::MountingYawDeg),
+        },
+        static_init,
+        compensate: CompensateConfig {
+            mode: mode(noise),
+            lag: Lag::new(noise.int(0, 11) as u8).expect("up to 11"),
+            max_mean: rate(noise, Field::CompensateMaxMean),
+            max_single: rate(noise, Field::CompensateMaxSingle),
+            max_revision: rate(noise, Field::CompensateMaxRevision),
+        },
+        fog_ids: three(noise, default.fog_ids),
+        fog_gyro: FogGyro { tilt_deg: within(noise, Field::FogTiltDeg), latitude_frame },
+        slcan_inputs: noise.int(0, 1) == 0,
+        diagnosis,
+        learn: noise.int(0, 1) == 0,
+        ..default
+    }
+}
+
+/// Returns settings of the wheel frame.
+pub fn wheels(noise: &mut Noise) -> WheelSettings {
+    let id = match noise.int(0, 3) {
+        0 => Id::Extended(ExtendedId::new(one(noise, &LONG_IDS)).expect("29 bits")),
+        1 => Id::Standard(StandardId::new(one(noise, &[0x7DF, 0x7E0, 0x7E8])).expect("11 bits")),
+        _ => Id::Standard(StandardId::new(one(noise, &IDS)).expect("11 bits")),
+    };
+    let frame = WheelSettings::TOYOTA.frames[0].map(|frame| WheelFrame { id, ..frame });
+    WheelSettings { frames: [frame, None, None, None], ..WheelSettings::TOYOTA }
+}

@@ -1,0 +1,257 @@
+//! Settings that are valid one by one and together: what is accepted can run, in whatever order it is stored.
+
+use super::IDENTITY;
+use embedded_can::{Id, StandardId};
+use gyronet::can::config::Config;
+use gyronet::can::wheel::{WheelConfigError, WheelSettings};
+use gyronet::compensate::{Mode, Stride};
+use gyronet::model::blob::Shape;
+use gyronet::model::weights;
+use gyronet::service::message::{FAILED_STARTS, Identity, Origin, Refusal};
+use gyronet::service::{Device, SupportedHardware};
+use gyronet::store::layout::STORE;
+use gyronet::store::slots::{SlotError, WeightSource};
+use gyronet::store::{Configuration, FieldError, FogPart, ImuPart, Slot, StoreError};
+use gyronet_host_tests::flash::{F405, MappedRegion, Region};
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::ram_flash::RamFlash;
+use gyronet_host_tests::recordings::workspace;
+use gyronet_host_tests::settings;
+use gyronet_host_tests::stored::{open, other_weights, upload};
+use std::cell::RefCell;
+use std::collections::{BTreeMap, HashSet};
+use std::rc::Rc;
+
+const HZ: u32 = 168_000_000;
+const HARDWARE: SupportedHardware =
+    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760], clock_hz: HZ };
+
+const NO_WHEELS: WheelSettings =
+    WheelSettings { frames: [None; 4], signals: [None; 4], ..WheelSettings::TOYOTA };
+
+type Board = Device<RamFlash<16384>, RamFlash<16384>>;
+
+fn board(built_in: &[u8]) -> Board {
+    let mut board = Board::new(&HARDWARE);
+    board.begin(Some(RamFlash::new(&[])), None, Ok(()), IDENTITY);
+    assert!(board.weights(None, built_in).is_some());
+    board
+}
+
+/// The kind of a refusal.
+fn reason(result: Result<(), Refusal>) -> String {
+    let Err(Refusal::Store(StoreError::Field(error))) = result else { panic!("{result:?}") };
+    format!("{error:?}").chars().take_while(|letter| letter.is_alphabetic() || *letter == '(').collect()
+}
+
+/// Every identifier that the board sends or takes must be one of its own; inputs may share a frame.
+fn identifiers(configuration: &Configuration, wheels: &WheelSettings) -> Option<usize> {
+    let can = Config::new(configuration.can).ok()?;
+    let mut seen = HashSet::new();
+    let mut all: Vec<Id> = can.messages().iter().map(|message| message.id).collect();
+    all.extend(configuration.fog_ids.map(|id| Id::Standard(StandardId::new(id).expect("11 bits"))));
+    all.extend(configuration.diagnosis.ids().ok()?);
+    let inputs: HashSet<Id> = wheels
+        .frames
+        .iter()
+        .flatten()
+        .map(|frame| frame.id)
+        .chain(configuration.fog_gyro.latitude_frame.map(|frame| frame.id().expect("an identifier")))
+        .collect();
+    all.extend(inputs);
+    let count = all.len();
+    all.into_iter().all(|id| seen.insert(id)).then_some(count)
+}
+
+/// The measured cost of a window (`cargo bench-target`), cycles, by the number of units.
+fn measured() -> BTreeMap<u16, u32> {
+    let page =
+        std::fs::read_to_string(workspace().join("tools/MEASUREMENTS.md")).expect("it is in the repository");
+    let (_, table) = page.split_once("| linear part and units a direction |").expect("the table");
+    let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+    rows.map(|row| {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        let units: String = cells[1].chars().take_while(char::is_ascii_digit).collect();
+        (units.parse().expect("units"), cells[3].replace(',', "").parse().expect("cycles"))
+    })
+    .collect()
+}
+
+#[test]
+fn the_cost_of_a_window_is_never_more_than_stated() {
+    let measured = measured();
+    assert!(measured.len() >= 6, "{measured:?}");
+    for (units, cycles) in measured {
+        let stated = Shape { units, linear: units < 60 }.window_cycles();
+        println!("{units} units: {cycles} cycles measured, {stated} stated");
+        assert!(cycles <= stated && stated < cycles + cycles / 4 + 1_000);
+    }
+}
+
+/// 10,000 configurations of values that are valid one by one, with wheels and either model, stored in both orders.
+#[test]
+fn what_is_accepted_together_can_run() {
+    let mut models = [(board(&weights::DEFAULT.0), 4), (board(&weights::GYRONET.0), 60)];
+    let measured = measured();
+    let (mut accepted, mut reasons) = (0, BTreeMap::<String, usize>::new());
+    for seed in 0..10_000 {
+        let mut noise = Noise::new(seed);
+        let (configuration, wheels) = (settings::configuration(&mut noise), settings::wheels(&mut noise));
+        let (board, units) = &mut models[seed as usize % 2];
+        let mut store = |wheels_first: bool| {
+            board.set_wheels(&NO_WHEELS)?;
+            board.set_configuration(&Configuration::DEFAULT)?;
+            if wheels_first {
+                board.set_wheels(&wheels)?;
+                board.set_configuration(&configuration)
+            } else {
+                board.set_configuration(&configuration)?;
+                board.set_wheels(&wheels)
+            }
+        };
+        let (stored, wheels_first) = (store(false), store(true));
+        let runs = |configuration: &Configuration| {
+            let compensate = &configuration.compensate;
+            let time = f64::from(compensate.mode.delay()) * 0.01;
+            let fits = f64::from(measured[units]) / f64::from(HZ) < 0.75 * time;
+            let limits = [compensate.max_mean, compensate.max_single, compensate.max_revision];
+            fits && limits.iter().all(|limit| limit.0 > 0) && identifiers(configuration, &wheels).is_some()
+        };
+        if stored.is_ok() {
+            assert!(runs(&configuration), "{seed}: {configuration:?} {wheels:?}");
+            accepted += 1;
+        } else {
+            assert!(wheels_first.is_err(), "{seed}: the order decides");
+            *reasons.entry(reason(stored)).or_default() += 1;
+        }
+    }
+    println!("{accepted} of 10000 accepted; refused: {reasons:?}");
+    assert!(accepted > 500 && reasons.len() >= 4, "{accepted}, {reasons:?}");
+}
+
+#[test]
+fn neither_order_makes_the_board_send_what_it_receives() {
+    let id = |raw: u16| Id::Standard(StandardId::new(raw).expect("11 bits"));
+    let wheels = |raw: u16| {
+        let mut wheels = WheelSettings::TOYOTA;
+        wheels.frames[0].as_mut().expect("a frame").id = id(raw);
+        wheels
+    };
+    let own =
+        |raw: u32| Err(Refusal::Store(StoreError::Field(FieldError::Wheels(WheelConfigError::Own(raw)))));
+    let mut configuration = Configuration { fog_ids: [0xAA, 0x1A5, 0x1A6], ..Configuration::DEFAULT };
+    let mut board = board(&weights::DEFAULT.0);
+    assert_eq!(board.set_configuration(&configuration), own(0xAA), "the built-in wheel frame");
+    assert_eq!(board.set_wheels(&wheels(0xB0)), Ok(()));
+    assert_eq!(board.set_configuration(&configuration), Ok(()));
+    assert_eq!(board.set_wheels(&WheelSettings::TOYOTA), own(0xAA), "of the next configuration");
+    for raw in [0x7E0, 0x7DF, 0x7E8] {
+        assert_eq!(board.set_wheels(&wheels(raw)), own(raw.into()), "diagnosis");
+    }
+    configuration.diagnosis.request = 0xB0;
+    assert_eq!(board.set_configuration(&configuration), own(0xB0), "of the next wheels");
+}
+
+/// Records that do not fit each other, as a tool may have put them into the flash.
+#[test]
+fn a_start_uses_what_fits_and_reports_the_rest() {
+    let newest = |mode| {
+        let mut configuration = Configuration { fog_ids: [0xAA, 0x1A5, 0x1A6], ..Configuration::DEFAULT };
+        configuration.compensate.mode = mode;
+        configuration
+    };
+    let hop = Mode::Overlap { stride: Stride::new(1).expect("a sample") };
+    for mode in [Mode::Newest, hop] {
+        let flash = Rc::new(RefCell::new(F405::default()));
+        upload(&flash, Slot::A, &other_weights(1)).expect("it is stored");
+        open(&flash).and_then(|mut store| store.set(&newest(mode))).expect("it is stored");
+        let mut board = super::start(&flash);
+        let info = board.info();
+        assert_eq!((info.configuration, info.weights), (Origin::Stored, WeightSource::BuiltIn));
+        let slow = |error| matches!(error, Some(SlotError::Slow { cycles, available }) if cycles > available);
+        assert!(slow(info.refused_slots[0]) && board.stored_damaged(), "{info:?}");
+        assert!(matches!(info.wheels, Origin::Refused(StoreError::Field(FieldError::Wheels(_)))));
+        assert_eq!(board.wheels().frames, [None; 4], "no frame of its own is taken for the wheels");
+        // And nothing heavier may be stored beside it.
+        assert!(matches!(
+            board.set_configuration(&newest(mode)),
+            Err(Refusal::Store(StoreError::Field(FieldError::Wheels(_))))
+        ));
+        assert_eq!(board.set_wheels(&NO_WHEELS), Ok(()));
+        let window = board.set_configuration(&newest(mode));
+        assert!(
+            matches!(window, Err(Refusal::Store(StoreError::Field(FieldError::Window { .. })))),
+            "{window:?}"
+        );
+    }
+}
+
+#[test]
+fn weights_that_are_too_slow_for_the_mode_are_not_activated() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let mut board = super::start(&flash);
+    let mut configuration = Configuration::DEFAULT;
+    configuration.compensate.mode = Mode::Newest;
+    assert_eq!(board.set_configuration(&configuration), Ok(()), "with the built-in weights");
+    let file = other_weights(1);
+    let send = |board: &mut super::Board| {
+        board.weights_begin(file.len() as u32)?;
+        for (block, offset) in file.chunks(256).zip((0..).step_by(256)) {
+            board.weights_block(offset, block)?;
+        }
+        board.weights_verify()?;
+        board.weights_activate()
+    };
+    assert!(matches!(send(&mut board), Err(Refusal::Slot(SlotError::Slow { .. }))));
+    assert_eq!(board.set_configuration(&Configuration::DEFAULT), Ok(()));
+    assert_eq!(board.weights_activate(), Ok(()));
+    let window = board.set_configuration(&configuration);
+    assert!(
+        matches!(window, Err(Refusal::Store(StoreError::Field(FieldError::Window { .. })))),
+        "{window:?}"
+    );
+}
+
+/// A board with this flash and identity.
+fn started(flash: &Rc<RefCell<F405>>, identity: Identity) -> super::Board {
+    let mut board = super::Board::new(&super::SUPPORTED_HARDWARE);
+    board.begin(Some(Region::new(flash, STORE)), None, Ok(()), identity);
+    let slots = MappedRegion::new(flash);
+    assert!(board.weights(Some(slots.current()), &weights::DEFAULT.0).is_some());
+    board
+}
+
+#[test]
+fn a_model_is_refused_by_name_at_a_clock_that_is_too_slow() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    upload(&flash, Slot::A, &other_weights(1)).expect("it is stored");
+    let start = |clock_hz| started(&flash, Identity { clock_hz, ..IDENTITY }).info();
+    assert_eq!(start(HZ).weights, WeightSource::Slot(Slot::A));
+    let slow = start(16_000_000);
+    assert_eq!(slow.weights, WeightSource::BuiltIn);
+    assert!(matches!(slow.refused_slots, [Some(SlotError::Slow { .. }), None]), "{slow:?}");
+}
+
+#[test]
+fn three_failed_starts_leave_the_bus_as_it_is_and_the_rest_built_in() {
+    let flash = Rc::new(RefCell::new(F405::default()));
+    let mut stored = Configuration { latitude_deg: Some(48.0), ..Configuration::DEFAULT };
+    stored.diagnosis.request = 0x700;
+    stored.can.bits_per_second = 250_000;
+    open(&flash).and_then(|mut store| store.set(&stored)).expect("it is stored");
+    upload(&flash, Slot::A, &other_weights(1)).expect("it is stored");
+    let start = |failed_starts| started(&flash, Identity { failed_starts, ..IDENTITY });
+    let board = start(FAILED_STARTS - 1);
+    assert_eq!((*board.configuration(), board.info().weights), (stored, WeightSource::Slot(Slot::A)));
+    let mut board = start(FAILED_STARTS);
+    let info = board.info();
+    assert_eq!(info.configuration, Origin::Refused(StoreError::Resets));
+    assert_eq!(info.weights, WeightSource::BuiltIn);
+    assert!(board.stored_damaged() && board.configuration_lost());
+    let Configuration { can, diagnosis, latitude_deg, learn, .. } = *board.configuration();
+    assert_eq!((can, diagnosis, latitude_deg, learn), (stored.can, stored.diagnosis, None, false));
+    // What is stored stays, until the owner stores another one.
+    assert_eq!(*board.next_configuration(), stored);
+    assert_eq!(board.set_configuration(&Configuration::DEFAULT), Ok(()));
+    assert_eq!(*start(0).configuration(), Configuration::DEFAULT);
+}
