@@ -22,7 +22,7 @@ TEXTS = {
     "old.bag": (b"#ROSBAG V1.2\n" + bytes(99), "rosbag fix"),
     "cut.bag": (b"#ROSBAG V2.0\n" + bytes(50), "the bag cannot be read"),
     "noise.bin": (bytes(range(256)) * 20, "unknown format"),
-    "prose.txt": (b"dear reader,\nthis is a letter, not a log,\nyours\n", "without a row of numbers"),
+    "prose.txt": (b"dear reader,\nthis is a letter, not a log,\nyours\n", "none of its first 3 lines is a row of numbers"),
     "cut.mcap": (b"\x89MCAP0\r\n\x01\xff\xff", "mcap recover"),
     "cut.ulg": (b"ULog\x01\x12\x35\x01" + bytes(3), "not a readable ULog"),
     "cut.blf": (b"LOGG" + bytes(20), "no frame of this blf log can be read"),
@@ -33,6 +33,7 @@ TEXTS = {
 ARGUMENTS = [
     (["d.csv", "--out", "d.csv"], "--out would overwrite it"),
     (["d.csv", "--out", "none/o.csv"], "none/"),
+    (["d.csv", "--out", "d.csv/o.csv"], "Not a directory"),
     (["absent.csv"], "no such file"),
     (["d.csv", "d.csv"], "given twice"),
     (["others"], "neither metadata.yaml"),

@@ -311,7 +311,7 @@ class InTables(Case):
         comma.write_text(comma.read_text().replace(".", ","))
         self.path("d.gcsv").write_text("GYROFLOW IMU LOG\nversion,1.3\ntscale,0.001\ngscale,0.001\nascale,0.001\nt,gx,gy,gz,ax,ay,az\n0,0,0,0,0,0,1000\n")
         self.refuses("d.gcsv", says=["a Gyroflow log", "write a table in SI, headed t_s,acc_x"])
-        for arguments, says in ((["data.csv", "--vehicle", "v.toml"], "start = 1403636579.758"), (["comma.csv"], "decimal commas")):
+        for arguments, says in ((["data.csv", "--vehicle", "v.toml"], "start = 1403636579.758"), (["comma.csv"], "imu: imu")):
             drive = self.imports(*arguments, "--out", "out.csv", says=[says])
             self.assertLess(np.abs(drive["gyr_z"] - made.turn(drive["t_s"])).max(), 0.03)
             self.assertLess(np.abs(drive["acc_z"] - 9.81).max(), 0.05)

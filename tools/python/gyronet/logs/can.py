@@ -114,8 +114,6 @@ def read(path, kind, log, bus):
                 channel = message.channel + FIRST_IS_0.get(kind, 0) if isinstance(message.channel, int) else message.channel
                 own = channel is None or (channel <= 1 if isinstance(channel, int) else channel == first)
                 bus.add(log, message.timestamp, "" if own else str(channel), message.arbitration_id, message.is_extended_id, bytes(message.data))
-    except Refused:
-        raise
     except Exception as error:  # the libraries raise whatever a damaged line provokes
         hint = ""
         if kind == "asc" and isinstance(error, ValueError) and "invalid literal" in str(error):

@@ -10,11 +10,7 @@ RATED = 100_000  # periods, from the beginning, of which the median is taken
 
 def rate(seconds):
     """The sample rate by the median period, Hz."""
-    periods = np.diff(seconds[: RATED + 1])
-    if not len(periods):
-        return 0.0
-    middle = len(periods) // 2
-    return float(1 / np.partition(periods, middle)[middle])
+    return float(1 / np.median(np.diff(seconds[: RATED + 1]))) if len(seconds) > 1 else 0.0
 
 
 def resample(stamps, read, hz, times, offset=0.0):

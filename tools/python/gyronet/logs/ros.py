@@ -5,6 +5,7 @@ import re
 import tempfile
 from pathlib import Path
 
+from mcap.reader import NonSeekingReader
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
@@ -41,8 +42,6 @@ def read_bag(path, log, bus, suffix=""):
                 messages = reader.messages(connections) if connections else ()
                 for connection, recorded, data in bar(messages, Path(path).name, sum(c.msgcount for c in connections)):
                     taken.add(connection.topic, connection.msgtype, lambda c=connection, d=data: reader.deserialize(d, c.msgtype), recorded)
-        except Refused:
-            raise
         except Exception as error:  # rosbags raises whatever damaged bytes provoke
             remedy = "a bag that was not closed: rosbag reindex FILE" if suffix == ".bag" else REINDEX
             reason = str(error).replace(str(named), str(path)) or type(error).__name__
@@ -52,39 +51,35 @@ def read_bag(path, log, bus, suffix=""):
 
 
 def read_mcap(path, log, bus):
-    from mcap.reader import NonSeekingReader
-
-    taken, stores, last = Messages(log, bus), {}, None
+    taken, readers, last = Messages(log, bus), {}, None
     with open(path, "rb") as file:
         try:
             for schema, channel, message in bar(NonSeekingReader(file).iter_messages(log_time_order=False), Path(path).name):
                 last = message.log_time
-                kind = re.sub(r"^(\w+)/(?!msg/)", r"\1/msg/", schema.name) if schema else "no schema"
-                if channel.message_encoding not in ("cdr", "ros1"):
-                    kind = f"{kind} in {channel.message_encoding or 'no encoding'}"
-                if kind not in WANTED:
+                if channel.id not in readers:
+                    readers[channel.id] = _reader(schema, channel.message_encoding)
+                kind, read = readers[channel.id]
+                if read:
+                    taken.add(channel.topic, kind, lambda: read(message.data, kind), message.log_time)
+                else:
                     log.passed[kind] += 1
-                    continue
-                store = stores.get(schema.id)
-                if store is None:
-                    store = stores[schema.id] = _store(schema, kind)
-                read = store.deserialize_cdr if channel.message_encoding == "cdr" else store.deserialize_ros1
-                taken.add(channel.topic, kind, lambda: read(message.data, kind), message.log_time)
-        except Refused:
-            raise
         except Exception as error:  # mcap raises whatever damaged bytes provoke
             if last is None:
                 raise Refused(f"{path}: the MCAP file cannot be read: {error or type(error).__name__}; mcap recover FILE") from None
             log.drop(f"the file ends within a record ({type(error).__name__}); mcap recover FILE")
 
 
-def _store(schema, kind):
-    if not schema.data:
-        return defaults()
-    store = get_typestore(Stores.EMPTY)
-    text = schema.data.decode("utf-8", "replace")
-    store.register(get_types_from_idl(text) if schema.encoding == "ros2idl" else get_types_from_msg(text, kind))
-    return store
+def _reader(schema, encoding):
+    """The type of a channel's messages, and what reads them: None for those that no drive needs."""
+    kind = re.sub(r"^(\w+)/(?!msg/)", r"\1/msg/", schema.name) if schema else "no schema"
+    if encoding not in ("cdr", "ros1"):
+        return f"{kind} in {encoding or 'no encoding'}", None
+    if kind not in WANTED:
+        return kind, None
+    store, text = defaults() if not schema.data else get_typestore(Stores.EMPTY), schema.data.decode("utf-8", "replace")
+    if text:
+        store.register(get_types_from_idl(text) if schema.encoding == "ros2idl" else get_types_from_msg(text, kind))
+    return kind, store.deserialize_cdr if encoding == "cdr" else store.deserialize_ros1
 
 
 class Messages:
@@ -100,8 +95,6 @@ class Messages:
             stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
             seconds = stamp if stamp > 0 and not self.log.recorded else 1e-9 * recorded
             self.takers[kind](topic, seconds, message)
-        except Refused:
-            raise
         except Exception as error:  # whatever the bytes of one message provoke, the others are read
             self.log.drop(f"{topic}: invalid or truncated {kind} ({type(error).__name__})")
 

@@ -47,9 +47,8 @@ class Header:
                     break
                 before.append(line)
             else:
-                if any("\0" in line or "\ufffd" in line for line in before) or not any(len(self.split(line)) > 1 for line in before):
-                    raise Refused(f"{path}: unknown format: neither a bag, MCAP, ULog, MDF or CAN log, nor a table with a header")
-                raise Refused(f"{path}: a table without a row of numbers in its first {len(before)} lines")
+                raise Refused(f"{path}: unknown format: neither a bag, MCAP, ULog, MDF or CAN log, nor a table: none of its first"
+                              f" {len(before)} lines is a row of numbers")
         self.names = self.split(before[-1].lstrip("#/ ")) if before else []
         if len(self.names) not in (len(fields), len(fields) - 1) or all(map(NUMBER.match, self.names)):
             raise Refused(f"{path}: no header: line {self.lines + 1} has numbers, and the line before it does not name its "
@@ -162,8 +161,6 @@ class Clock:
 def read(path, log, vehicle, flags, rate, several):
     header = Header(path)
     columns = Columns(path, header, vehicle, flags, several)
-    if header.commas:
-        log.notes.append("numbers with decimal commas")
     count, clock = len(header.names), None
     with open(path, encoding="utf-8-sig", errors="replace") as file, warnings.catch_warnings(record=True) as longer:
         warnings.simplefilter("always", pandas.errors.ParserWarning)
