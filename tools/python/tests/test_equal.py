@@ -89,8 +89,9 @@ class Equal(unittest.TestCase):
     def test_bags_as_rosbags(self):
         t = made.times()
         made.bag2(self.folder / "lite", made.imu_messages(t, made.imu(t)))
+        made.bag2(self.folder / "cap", made.imu_messages(t, made.imu(t)), "mcap")
         made.bag1(self.folder / "one.bag", made.imu_messages(t, made.imu(t), made.STORE1))
-        for path in [self.folder / "lite", self.folder / "one.bag", *sorted(DATA.glob("*.bag"))]:
+        for path in [*(self.folder / name for name in ("lite", "lite/lite.db3", "cap", "cap/cap.mcap", "one.bag")), *sorted(DATA.glob("*.bag"))]:
             expected = {}
             with AnyReader([path], default_typestore=made.STORE) as reader:
                 for connection, _, data in reader.messages([c for c in reader.connections if c.msgtype == "sensor_msgs/msg/Imu"]):

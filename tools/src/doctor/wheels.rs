@@ -63,13 +63,15 @@ fn units(rows: &Rows, track: f64, correlation: f64) -> Option<String> {
     }
 }
 
-/// The import with the unit of each wheel.
+/// The import with the unit of each wheel, or of the odometry that stands for them.
 pub fn in_kmh(rows: &Rows) -> String {
     let wheels = &rows.vehicle.wheels;
     let names = [&wheels.front_left, &wheels.front_right, &wheels.rear_left, &wheels.rear_right];
     let mut flags: Vec<String> =
         names.into_iter().flatten().map(|name| format!("--unit {name}=km/h")).collect();
-    if flags.is_empty() {
+    if let (true, Some(odometry)) = (flags.is_empty(), rows.vehicle.signals.get("odometry")) {
+        flags.push(format!("--unit {odometry}=km/h"));
+    } else if flags.is_empty() {
         let number =
             (1..=rows.wheels.len()).filter(|wheel| rows.wheels[wheel - 1].iter().any(Option::is_some));
         flags = number.map(|wheel| format!("--unit wheel{wheel}_rate=km/h")).collect();

@@ -128,7 +128,7 @@ class Drive:
         last = min(last, first + request.to) if request.to is not None else last
         for used in (self.gyro, self.accel):
             if not RATES[0] <= used.hz <= RATES[1]:
-                raise Refused(f"{used.name}: {used.hz:.3g} Hz by the median period, {used.channel.rate:.3g} Hz by count and span, "
+                raise Refused(f"{used.name}: {used.hz:.4g} Hz by the median period, {used.channel.rate:.4g} Hz by count and span, "
                               "but an IMU needs 25 to 1000 Hz; is the time's unit right? --unit t_s=ms")
         seconds = last - self.start
         if not SHORTEST <= seconds < LONGEST:

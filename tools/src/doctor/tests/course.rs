@@ -77,6 +77,9 @@ fn speed_and_course_show_units_and_clocks() {
         let (verdict, text) = found(&doctor, what);
         assert!(verdict == Verdict::Bad && text.contains(remedy), "{text}");
     }
+    let odometry = "[signals]\nodometry = '/odom'\n[recording.units]\n'/imu' = 'm/s^2, rad/s'\n";
+    let doctor = with_course(1.0, KMH, 0, odometry);
+    assert!(found(&doctor, "speed").1.ends_with("import the log again with `--unit /odom=km/h`."));
     let smaller = with_course(1.0, 1.05, 0, named);
     assert!(found(&smaller, "speed").1.contains("radius_m = 0.275 in the vehicle file fits"));
 }
