@@ -9,7 +9,7 @@ use gyronet::can::config::{BIT_RATES, Settings};
 use gyronet::can::yaw::{AngleMessage, RateMessage};
 use gyronet::health::{Faults, Quality};
 use gyronet::store::Configuration;
-use gyronet_host_tests::board::Board;
+use gyronet_host_tests::board::{Board, Event};
 use gyronet_host_tests::recordings::{self, workspace};
 use gyronet_host_tests::stored::Stored;
 use gyronet_host_tests::{inputs, replay, require};
@@ -248,7 +248,7 @@ fn slcan_reports_warning_passive_and_bus_off() {
     board.run(200 * MS);
     assert_eq!(status(&mut board), "00");
     board.configure("CAN1.short", "recessive");
-    board.run(20 * MS);
+    board.run_until("bus_off", 20 * MS).expect("the errors add up");
     assert_eq!(status(&mut board), "80", "off the bus");
 }
 
@@ -269,26 +269,59 @@ fn no_acknowledgement_for_a_while() {
     assert!(dropped.abs_diff(missing) <= SET, "{dropped} counted, {missing} missing");
 }
 
+/// Times of the events of a kind.
+fn times(kind: &str, events: &[Event]) -> Vec<Duration> {
+    events.iter().filter(|event| event.kind == kind).map(|event| event.time).collect()
+}
+
+/// The time from bus-off to the return: the wait, and 128 x 11 recessive bits at 500 kbit/s.
+fn returns_after(wait: Duration) -> Duration {
+    wait + Duration::from_micros(128 * 11 * 2)
+}
+
+/// Case bus/03: the bus is in order again as soon as the controller is off it.
 #[test]
-fn bus_off_and_back() {
+fn bus_off_lasts_10_20_and_40_ms_and_the_standard_s_wait() {
+    const TEST: &str = "bus_off_lasts_10_20_and_40_ms_and_the_standard_s_wait";
+    let Some(mut board) = boot(TEST) else { return };
+    common::send(&mut board, &drive(500), START);
+    board.run(START + Duration::from_millis(500));
+    for (wait, pause) in [(10, 703), (20, 703), (40, 1_400), (10, 103)] {
+        let _ = board.events();
+        board.configure("CAN1.short", "recessive");
+        board.run_until("bus_off", 50 * MS).expect("the errors add up");
+        board.configure("CAN1.short", serde_json::Value::Null);
+        let _ = board.can_frames();
+        board.run(pause * MS);
+        let events = board.events();
+        let ([off], [back]) = (&times("bus_off", &events)[..], &times("bus_off_ended", &events)[..]) else {
+            panic!("{wait} ms: {events:?}")
+        };
+        let first = board.can_frames()[0].0;
+        println!("{TEST}: {wait} ms: back after {:?}, first frame {:?} later", *back - *off, first - *back);
+        let promised = returns_after(wait * MS);
+        assert!((*back - *off).abs_diff(promised) < MS, "{:?} for {promised:?}", *back - *off);
+        assert!(first - *back < SAMPLE + 2 * MS, "the next sample's frames are sent");
+    }
+}
+
+#[test]
+fn bus_off_again_and_again() {
     let lasts = Duration::from_millis(400);
     let set = ("CAN1.short", "recessive".into());
-    let Some(run) = disturbed("bus_off_and_back", lasts, set, serde_json::Value::Null) else { return };
+    let Some(run) = disturbed("bus_off_again_and_again", lasts, set, serde_json::Value::Null) else { return };
     let mut board = run.board;
-    let times = |kind: &str, events: &[gyronet_host_tests::board::Event]| -> Vec<Duration> {
-        events.iter().filter(|event| event.kind == kind).map(|event| event.time).collect()
-    };
-    let off = times("bus_off", &board.events());
-    println!("bus-off at {off:?}");
-    assert!(off.len() >= 3, "{off:?}");
-    // Each restart waits twice as long as the one before.
-    let waits: Vec<Duration> = off.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    assert!(waits.windows(2).all(|pair| pair[1] > pair[0]), "{waits:?}");
+    let events = board.events();
+    let (off, back) = (times("bus_off", &events), times("bus_off_ended", &events));
+    println!("bus-off at {off:?}, back at {back:?}");
+    // 10 + 20 + 40 + 80 + 160 ms and what it takes to fail again are less than 400 ms; 320 ms end after the fault.
+    assert_eq!((off.len(), back.len()), (6, 6));
+    for (k, (off, back)) in off.iter().zip(&back).enumerate() {
+        assert!((*back - *off).abs_diff(returns_after(10 * MS * (1 << k))) < MS, "{:?}", *back - *off);
+    }
     assert_eq!(stale(&run.after, &run.made), []);
-    assert!(!run.after.is_empty() && has(flags(&frames(&run.after))[0], Faults::BUS));
-    // Sent again as soon as the controller's wait is over.
-    let back = START + Duration::from_secs(1) + lasts;
-    assert!(run.after[0].0 - back < Duration::from_millis(700), "{:?}", run.after[0].0 - back);
+    assert!(has(flags(&frames(&run.after))[0], Faults::BUS));
+    assert!(run.after[0].0 - back[5] < SAMPLE + 2 * MS, "{:?}", run.after[0].0 - back[5]);
 }
 
 #[test]

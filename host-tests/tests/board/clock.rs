@@ -41,6 +41,23 @@ fn no_crystal_and_then_one() {
     assert_eq!((identity.clock_hz, identity.clock_fault, identity.can_fault), (168_000_000, None, None));
 }
 
+/// PRFTEN in FLASH_ACR, by the revision in DBGMCU_IDCODE: A has the device number of the STM32F2.
+#[test]
+fn revision_a_runs_without_prefetch() {
+    for (idcode, prefetch) in [(0x100F_6413_u32, 1), (0x1001_6413, 1), (0x1000_6411, 0), (0x1000_6413, 0)] {
+        let Some(mut board) = unpowered("revision_a_runs_without_prefetch") else { return };
+        board.configure("DBGMCU.idcode", idcode);
+        board.trace("FLASH", true);
+        board.power_on();
+        board.run(START);
+        let events = board.events();
+        let accesses = events.iter().filter(|event| event.number("address") == Some(f64::from(0x4002_3C00)));
+        let last = accesses.filter(|event| event.text("access") == "write").last().expect("a latency is set");
+        let value = last.number("value").expect("a word") as u32;
+        assert_eq!((value & 7, value >> 8 & 1), (5, prefetch), "{idcode:x}: {value:x}");
+    }
+}
+
 #[test]
 fn crystal_of_another_frequency() {
     for (hz, khz) in [(16_000_000, 16_000), (8_000_000, 8_000), (20_000_000, 20_000)] {

@@ -17,6 +17,7 @@
 //! | 4 | `tick` | 1 ms | board time; counts the bytes that DMA has received |
 //! | 4, 3 | `imu_line`, `fog_line`, `slcan_line`; `service_line` | a damaged byte | counts it |
 //! | 3 | `can_received`, `can_sent` | a frame | into and out of their queues |
+//! | 3 | `can_went_off` | bus-off | notes the time |
 //! | 2 | `output` | pended by `tick`, `can_sent`, `window` | samples, frames, watchdog |
 //! | 1 | `window` | pended by `output` and itself | a piece of a GyroNet window |
 //! | 0 | `idle` | the remaining time | diagnosis, checksums of the weights; otherwise sleep |
@@ -69,7 +70,7 @@ mod stm32f405;
 #[allow(unsafe_code, reason = "a section that is not loaded")]
 #[used]
 #[unsafe(link_section = ".priorities")]
-static PRIORITIES: [[u8; 2]; 10] = {
+static PRIORITIES: [[u8; 2]; 11] = {
     use crate::stm32f405::pac::Interrupt;
     const SYSTICK: u8 = 15;
     const FIRST: u8 = 16;
@@ -82,6 +83,7 @@ static PRIORITIES: [[u8; 2]; 10] = {
         [FIRST + Interrupt::USART6 as u8, 3],
         [FIRST + Interrupt::CAN1_RX0 as u8, 3],
         [FIRST + Interrupt::CAN1_TX as u8, 3],
+        [FIRST + Interrupt::CAN1_SCE as u8, 3],
         [FIRST + Interrupt::UART4 as u8, 2],
         [FIRST + Interrupt::UART5 as u8, 1],
     ]
@@ -201,6 +203,12 @@ mod app {
     fn can_sent(_: can_sent::Context) {
         can::transmitted();
         rtic::pend(Interrupt::UART4);
+        dsb();
+    }
+
+    #[task(binds = CAN1_SCE, priority = 3)]
+    fn can_went_off(_: can_went_off::Context) {
+        can::went_off();
         dsb();
     }
 

@@ -2,10 +2,11 @@
 //!
 //! Nothing here waits except for the start of initialisation mode, with a limit. A frame that a mailbox could not
 //! send within [`STALE_MS`] is aborted, so no stale values are sent when the bus recovers. After bus-off the
-//! controller is restarted at growing intervals, so that a broken node does not disturb the bus all the time.
+//! controller is restarted at growing intervals, so that a broken node does not disturb the bus all the time. From the
+//! restart to the return BOFF stays set, for 128 x 11 recessive bits: that is neither bus-off anew nor being on the bus.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
-use super::{pac, wait_until};
+use super::{pac, timer, wait_until};
 use core::sync::atomic::{AtomicU32, Ordering};
 use embedded_can::{ExtendedId, Frame as _, Id, StandardId};
 use gyronet::can::DataFrame;
@@ -44,9 +45,13 @@ const EMPTY: u32 = 1 << 26;
 /// controller has stayed on the bus for as long as the longest.
 const FIRST_RESTART_MS: u32 = 10;
 const LAST_RESTART_MS: u32 = 1_280;
+/// Half the time between two polls, us: a restart is at most this far from its time.
+const HALF_POLL_US: u32 = 500;
 
 /// Number of frames that left a mailbox unsent. Only the transmit interrupt counts.
 static ABORTED: AtomicU32 = AtomicU32::new(0);
+/// The time of a bus-off that the sending half has not seen yet, us; 0 without one.
+static OFF_AT: AtomicU32 = AtomicU32::new(0);
 
 /// The mode in which the controller runs on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,15 +75,15 @@ pub enum State {
     Off,
 }
 
-/// The state of the recovery from bus-off.
+/// The state of the recovery from bus-off (RM0090 32.7.6).
 #[derive(Debug, Clone, Copy)]
 enum Recovery {
     /// The controller has been on the bus since a time, ms.
     On { since: u32 },
-    /// The controller is restarted at a time, ms.
+    /// The controller is in initialisation mode until a time, us.
     Waits { until: u32 },
-    /// Initialisation mode is requested; leaving it starts the recovery (RM0090 32.7.6).
-    Restarts,
+    /// The controller counts 128 x 11 recessive bits.
+    Counts,
 }
 
 /// Sends frames through the controller.
@@ -119,7 +124,7 @@ impl Can {
                 .bits(0);
             w.lbkm().bit(loopback).silm().bit(loopback)
         });
-        can.ier().write(|w| w.fmpie0().set_bit().tmeie().set_bit());
+        can.ier().write(|w| w.fmpie0().set_bit().tmeie().set_bit().bofie().set_bit().errie().set_bit());
         // Frames leave in the order of their requests.
         can.mcr().modify(|_, w| w.txfp().set_bit());
         let recovery = Recovery::On { since: 0 };
@@ -161,31 +166,36 @@ impl Can {
     /// Aborts frames that have become stale, and restarts the controller after bus-off. Called every
     /// millisecond, with the time in milliseconds.
     pub fn poll(&mut self, now: u32) {
-        let off = self.registers.esr().read().boff().bit_is_set();
-        self.recovery = match self.recovery {
-            Recovery::On { .. } if off => {
+        let micros = timer::micros() as u32;
+        let is_off = self.registers.esr().read().boff().bit_is_set();
+        let off_at = Some(OFF_AT.swap(0, Ordering::Relaxed)).filter(|at| *at != 0);
+        self.recovery = match (self.recovery, off_at) {
+            (Recovery::On { .. } | Recovery::Counts, Some(at)) => {
                 self.abort(|_| true);
-                let until = now.wrapping_add(self.interval_ms);
+                // The controller does nothing in this mode; leaving it starts the recovery.
+                self.registers.mcr().modify(|_, w| w.inrq().set_bit());
+                let until = at.wrapping_add(1_000 * self.interval_ms);
                 self.interval_ms = (2 * self.interval_ms).min(LAST_RESTART_MS);
                 Recovery::Waits { until }
             }
-            Recovery::On { since } => {
+            (Recovery::On { since }, None) => {
                 if now.wrapping_sub(since) > LAST_RESTART_MS {
                     self.interval_ms = FIRST_RESTART_MS;
                 }
                 self.abort(|requested| now.wrapping_sub(requested) > STALE_MS);
                 self.recovery
             }
-            Recovery::Waits { until } if (now.wrapping_sub(until) as i32) < 0 => self.recovery,
-            Recovery::Waits { .. } => {
-                self.registers.mcr().modify(|_, w| w.inrq().set_bit());
-                Recovery::Restarts
+            (Recovery::Waits { until }, _) => {
+                let is_due = micros.wrapping_add(HALF_POLL_US).wrapping_sub(until) as i32 >= 0;
+                if is_due && self.registers.msr().read().inak().bit_is_set() {
+                    self.join();
+                    Recovery::Counts
+                } else {
+                    self.recovery
+                }
             }
-            Recovery::Restarts if self.registers.msr().read().inak().bit_is_set() => {
-                self.join();
-                Recovery::On { since: now }
-            }
-            Recovery::Restarts => Recovery::Restarts,
+            (Recovery::Counts, None) if is_off => self.recovery,
+            (Recovery::Counts, None) => Recovery::On { since: now },
         };
     }
 
@@ -269,6 +279,14 @@ pub fn aborted() -> u32 {
     ABORTED.load(Ordering::Relaxed)
 }
 
+/// Returns whether all mailboxes are empty.
+#[inline]
+pub fn all_sent() -> bool {
+    // SAFETY: the register is only read.
+    let status = unsafe { &*pac::CAN1::ptr() }.tsr().read().bits();
+    (0..MAILBOXES).all(|k| status & EMPTY << k != 0)
+}
+
 /// Handles the transmit interrupt: clears it and counts frames that were aborted.
 pub fn transmitted() {
     // SAFETY: the completion flags belong to this handler.
@@ -286,6 +304,16 @@ pub fn transmitted() {
     // SAFETY: a one in RQCP clears the flags of its mailbox and the interrupt.
     // reset value: 0x1C00_0000, read-only bits
     can.tsr().write(|w| unsafe { w.bits(completed) });
+}
+
+/// Handles the interrupt of a bus-off: notes its time.
+pub fn went_off() {
+    OFF_AT.store(timer::micros() as u32 | 1, Ordering::Relaxed);
+    // SAFETY: the flag belongs to this handler.
+    let can = unsafe { &*pac::CAN1::ptr() };
+    // A one clears the flag, zeros change nothing.
+    // reset value: 0x0000_0C02, read-only bits
+    can.msr().write(|w| w.erri().set_bit());
 }
 
 /// Holds a frame from the receive FIFO.

@@ -96,7 +96,7 @@ fn full(rcc: &pac::RCC, flash: &pac::FLASH, crystal_hz: u32) -> Result<u32, Cloc
         return Err(ClockFault::Pll);
     }
     // Five wait states at 150 to 168 MHz and 2.7 to 3.6 V (RM0090 table 10), before the clock rises.
-    flash.acr().modify(|_, w| w.latency().ws5().prften().enabled().icen().enabled().dcen().enabled());
+    flash.acr().modify(|_, w| w.latency().ws5().icen().enabled().dcen().enabled());
     if !wait_until(POLLS, || flash.acr().read().latency().is_ws5()) {
         return Err(ClockFault::Pll);
     }
@@ -108,6 +108,13 @@ fn full(rcc: &pac::RCC, flash: &pac::FLASH, crystal_hz: u32) -> Result<u32, Cloc
     // A crystal that stops raises the NMI, which records the reason and resets the chip.
     rcc.cr().modify(|_, w| w.csson().on());
     Ok(measured_hz)
+}
+
+/// Enables the flash's prefetch where the chip has one that works: not in revision A, whose DBGMCU_IDCODE holds the
+/// STM32F2's device (0x411) or revision 0x1000.
+pub fn enable_prefetch(flash: &pac::FLASH, idcode: u32) {
+    let (device, revision) = (idcode & 0xFFF, idcode >> 16);
+    flash.acr().modify(|_, w| w.prften().bit(device == 0x413 && revision > 0x1000));
 }
 
 /// Retries what failed at the start; returns whether it would succeed after a reset. Called once a second.

@@ -42,6 +42,9 @@ impl Chip {
         let reset = reset::cause(&p.RCC);
         let clocks = Clocks::start(&p.RCC, &p.FLASH, &p.PWR, crystal_hz);
         watchdog::follow(clocks.exact());
+        if clocks.exact() {
+            clocks::enable_prefetch(&p.FLASH, device_id);
+        }
         timer::start(&p.RCC, &p.TIM5, &clocks);
         enable_peripherals(&p.RCC);
         Self { clocks, device_id, reset }
