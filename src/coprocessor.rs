@@ -50,6 +50,7 @@ use crate::sample::{FogSample, Frame, ImuSample, NO_STAMP, WheelSample};
 use crate::standstill::Standing;
 use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use clock::Timeline;
+use embedded_can::Frame as _;
 use second_source::{Doubts, SecondSource, Shown};
 
 /// The results of one sample, or of its absence, for a log or diagnosis.
@@ -241,14 +242,14 @@ impl Coprocessor {
         count(&mut self.counters.fog_errors, 1);
     }
 
-    /// Processes a frame received from the bus at `now`. Frames with neither a wheel speed nor a latitude are
-    /// ignored.
+    /// Processes a frame received from the bus at `now`. Returns whether it is used: it carries wheel speeds or the
+    /// latitude.
     ///
     /// # Errors
     /// [`InputError::Wheels`] when a wheel frame is corrupt or marks a speed as invalid, [`InputError::Latitude`],
     /// [`InputError::ClockWentBack`]; the error is counted. Without a valid frame the wheels become silent after a
     /// while, which is reported; the latitude in use is kept.
-    pub fn can(&mut self, frame: &DataFrame, now: Micros) -> Result<(), InputError> {
+    pub fn can(&mut self, frame: &DataFrame, now: Micros) -> Result<bool, InputError> {
         self.advance(now)?;
         let time = self.timeline.time();
         match self.wheels.as_mut().and_then(|wheels| wheels.decode(frame, time)) {
@@ -256,13 +257,14 @@ impl Coprocessor {
                 count(&mut self.counters.wheel_errors, 1);
                 Err(InputError::Wheels(error))
             }
-            Some(Ok(_)) | None => self.take_latitude(frame, time),
+            wheels => Ok(self.take_latitude(frame, time)? || wheels.is_some()),
         }
     }
 
-    fn take_latitude(&mut self, frame: &DataFrame, time: Micros) -> Result<(), InputError> {
-        let Some(receiver) = &mut self.latitude else { return Ok(()) };
+    fn take_latitude(&mut self, frame: &DataFrame, time: Micros) -> Result<bool, InputError> {
+        let Some(receiver) = &mut self.latitude else { return Ok(false) };
         let received = receiver.decode(frame, time);
+        let is_meant = frame.id() == receiver.id();
         self.fog.contest_latitude(receiver.is_contested());
         match received.transpose() {
             Ok(received) => {
@@ -271,7 +273,7 @@ impl Coprocessor {
                 {
                     self.fog.set_latitude(latitude, received.moved);
                 }
-                Ok(())
+                Ok(is_meant)
             }
             Err(error) => {
                 count(&mut self.counters.latitude_errors, 1);

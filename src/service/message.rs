@@ -247,7 +247,7 @@ pub struct LineCounters {
     pub line_errors: u32,
     /// Observations that a task of lower priority missed for lack of time.
     pub overruns: u32,
-    /// Text lines on the service line that were refused.
+    /// Text lines of hosts, on SLCAN and on the service line, that were refused.
     pub service_errors: u32,
     /// CAN frames that passed the filters but were lost because the queue was full.
     pub frames_lost: u32,

@@ -200,13 +200,13 @@ fn the_next_sample_waits_for_the_estimate_until_it_is_late() {
 #[test]
 fn wheel_frames_that_are_damaged_are_errors_and_others_are_passed_over() {
     let mut coprocessor = Coprocessor::new(Config { wheels: wheels(), ..Config::DEFAULT });
-    assert_eq!(coprocessor.can(&wheel_frame(&STANDS), at(1)), Ok(()));
+    assert_eq!(coprocessor.can(&wheel_frame(&STANDS), at(1)), Ok(true));
     assert_eq!(
         coprocessor.can(&wheel_frame(&STANDS[..3]), at(1)),
         Err(InputError::Wheels(WheelError::Short(3)))
     );
     let other = DataFrame::new(StandardId::new(0x123).expect("11 bits"), &[0; 8]).expect("eight bytes");
-    assert_eq!(coprocessor.can(&other, at(1)), Ok(()));
+    assert_eq!(coprocessor.can(&other, at(1)), Ok(false));
     assert_eq!(coprocessor.input_counters().wheel_errors, 1);
 }
 

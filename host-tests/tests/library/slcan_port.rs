@@ -90,7 +90,7 @@ fn minute(config: Config, baud: u32, hello: &[u8]) -> u32 {
         }
         // A UART holds nothing over for later.
         line.room = (baud / BITS / 100) as usize;
-        port.service(&mut line, |_| ()).expect("the line holds");
+        port.service(&mut line, |_| true).expect("the line holds");
     }
     port.dropped()
 }
@@ -116,17 +116,32 @@ fn commands_are_answered_between_frames() {
     let mut line = Line { room: 10, ..Line::default() };
     port.enqueue(frame(1), Micros(0));
     port.enqueue(frame(2), Micros(1_234_000));
-    port.service(&mut line, |_| ()).expect("the line holds");
+    port.service(&mut line, |_| true).expect("the line holds");
     line.received.extend(b"V\rZ1\rt0AA21A6F\r");
     line.room = 1_000;
     let mut taken = Vec::new();
-    port.service(&mut line, |frame| taken.push(frame)).expect("the line holds");
+    port.service(&mut line, |frame| {
+        taken.push(frame);
+        true
+    })
+    .expect("the line holds");
     assert_eq!(
         line.sent.escape_ascii().to_string(),
         "t17480100000000000000\\rV0101\\r\\r\\rt1748020000000000000004D2\\r"
     );
     assert_eq!(taken.len(), 1);
     assert_eq!(taken[0].data(), [0x1A, 0x6F]);
+}
+
+/// Case bus/11.
+#[test]
+fn a_frame_that_is_not_used_is_refused_and_counted() {
+    let mut port = Port::<QUEUE>::new(500_000);
+    let mut line = Line { room: 1_000, ..Line::default() };
+    line.received.extend(b"t1232AABB\rT000001232AABB\rt0AA21A6F\r");
+    port.service(&mut line, |frame| frame.data() == [0x1A, 0x6F]).expect("the line holds");
+    assert_eq!(line.sent, b"\x07\x07\r");
+    assert_eq!(port.refused(), 2);
 }
 
 #[test]
@@ -136,13 +151,13 @@ fn the_bus_state_is_reported_beside_drops() {
     port.set_bus(StatusFlags::BUS_ERROR);
     (0..2).for_each(|number| port.enqueue(frame(number), Micros(0)));
     line.received.extend(b"F\rF\r");
-    port.service(&mut line, |_| ()).expect("the line holds");
+    port.service(&mut line, |_| true).expect("the line holds");
     // The drop once, the bus as long as it is off.
     assert!(line.sent.starts_with(b"F82\rF80\r"), "{}", line.sent.escape_ascii());
     port.set_bus(StatusFlags::default());
     line.sent.clear();
     line.received.extend(b"F\r");
-    port.service(&mut line, |_| ()).expect("the line holds");
+    port.service(&mut line, |_| true).expect("the line holds");
     assert_eq!(line.sent, b"F00\r");
 }
 
@@ -155,18 +170,18 @@ fn drops_are_reported_once() {
     }
     line.received.extend(b"F\rF\r");
     line.room = 1_000;
-    port.service(&mut line, |_| ()).expect("the line holds");
+    port.service(&mut line, |_| true).expect("the line holds");
     assert!(line.sent.starts_with(b"F02\rF00\r"), "{}", line.sent.escape_ascii());
     assert_eq!(frames(&line.sent), [frame(3), frame(4)]);
     // A host that asks and never reads: no torn answer, no growth, and it is counted.
     line.room = 0;
     line.received.extend(b"V\r".repeat(1_000));
     while !line.received.is_empty() {
-        port.service(&mut line, |_| ()).expect("the line holds");
+        port.service(&mut line, |_| true).expect("the line holds");
     }
     line.room = usize::MAX;
     line.sent.clear();
-    port.service(&mut line, |_| ()).expect("the line holds");
+    port.service(&mut line, |_| true).expect("the line holds");
     let answers = line.sent.len() / 6;
     assert_eq!(line.sent, b"V0101\r".repeat(answers));
     assert_eq!(port.refused() as usize, 1_000 - answers);
@@ -190,11 +205,11 @@ proptest! {
             line.received.extend(said.bytes());
             (line.room, line.broken) = (room, broken);
             let before = line.sent.len();
-            let _ = port.service(&mut line, |_| ());
+            let _ = port.service(&mut line, |_| true);
             prop_assert!(line.sent.len() - before <= room);
         }
         (line.room, line.broken) = (usize::MAX, false);
-        port.service(&mut line, |_| ()).expect("the line holds");
+        port.service(&mut line, |_| true).expect("the line holds");
         let sent = frames(&line.sent);
         let number_of = |frame: &DataFrame| u64::from_le_bytes(frame.data().try_into().expect("eight bytes"));
         prop_assert_eq!(sent.len() as u64 + u64::from(port.dropped()), number);

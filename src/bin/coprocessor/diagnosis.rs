@@ -114,9 +114,11 @@ impl Diagnosis {
         service.advance();
         // Errors need no handling: a line that lost a byte is answered as invalid, or just lacks that byte.
         let _ = port.service(service, |frame| {
-            if is_request(frame.id()) {
+            let is_request = is_request(frame.id());
+            if is_request {
                 tester.receive(Line::Service, &frame, now);
             }
+            is_request
         });
         for (line, frames) in [(Line::Can, &FROM_CAN), (Line::Slcan, &FROM_SLCAN)] {
             while let Some(frame) = frames.pop() {

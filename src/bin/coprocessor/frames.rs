@@ -63,12 +63,14 @@ pub struct Outgoing {
     now: u32,
     /// Observations that idle missed for lack of time.
     overruns: u32,
+    /// True while the oldest response is on its way on SLCAN.
+    responds: bool,
 }
 
 impl Outgoing {
     pub fn new(slcan: serial::Port, bits_per_second: u32, can: Option<Can>) -> Self {
         let (port, queue) = (Port::new(bits_per_second), TransmitQueue::new());
-        Self { slcan, port, can, queue, now: 0, overruns: 0 }
+        Self { slcan, port, can, queue, now: 0, overruns: 0, responds: false }
     }
 
     /// Joins the CAN bus.
@@ -76,8 +78,9 @@ impl Outgoing {
         self.can.iter().for_each(Can::join);
     }
 
-    /// Sends as much as the lines accept; passes the frames that a host has sent over SLCAN to `take`.
-    pub fn service(&mut self, take: impl FnMut(DataFrame)) {
+    /// Sends as much as the lines accept; passes the frames that a host has sent over SLCAN to `take`, which returns
+    /// whether a frame is used.
+    pub fn service(&mut self, take: impl FnMut(DataFrame) -> bool) {
         self.refill();
         self.port.set_bus(match self.state() {
             State::Active => StatusFlags::default(),
@@ -86,12 +89,17 @@ impl Outgoing {
             State::Off => StatusFlags::BUS_ERROR,
         });
         self.slcan.advance();
-        // One response at a time, after the rates have been sent.
+        // One response at a time, after the rates have been sent. It stays in the ring until it has left.
+        if self.responds && self.port.outgoing().is_none() && self.slcan.is_sent() {
+            self.responds = false;
+            RESPONSES.drop_oldest(1);
+        }
         if let Some((Line::Slcan, frame)) = RESPONSES.oldest().first()
+            && !self.responds
             && self.port.outgoing().is_none()
         {
-            self.port.enqueue(*frame, Micros(1_000 * u64::from(self.now)));
-            RESPONSES.drop_oldest(1);
+            self.responds = true;
+            self.port.enqueue(*frame, self.stamp());
         }
         // Errors need no handling: a line that lost a byte is answered as invalid, or just lacks that byte.
         let _ = self.port.service(&mut self.slcan, take);
@@ -123,6 +131,16 @@ impl Outgoing {
             }
             RESPONSES.drop_oldest(1);
         }
+    }
+
+    /// Returns the time stamp of what is sent now, whoever sends it: board time.
+    fn stamp(&self) -> Micros {
+        Micros(1_000 * u64::from(self.now))
+    }
+
+    /// Returns the number of text lines of a host that were refused.
+    pub fn refused(&self) -> u32 {
+        self.port.refused()
     }
 
     /// Returns the number of frames that a line did not accept in time.
@@ -159,11 +177,11 @@ impl Sink for Outgoing {
 
     /// Queues a frame for both lines, unless a tester has silenced the board.
     #[inline(never)]
-    fn frame(&mut self, TimedFrame { frame, time }: TimedFrame) {
+    fn frame(&mut self, TimedFrame { frame, .. }: TimedFrame) {
         if SILENCED.load(Ordering::Relaxed) {
             return;
         }
-        self.port.enqueue(frame, time);
+        self.port.enqueue(frame, self.stamp());
         if self.can.is_some() {
             self.queue.enqueue((frame, self.now));
         }

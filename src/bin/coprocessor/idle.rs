@@ -8,7 +8,7 @@ use crate::regions::{Records, Weights};
 use crate::ring::Ring;
 use crate::stm32f405::{clocks, timer};
 use gyronet::coprocessor::Coprocessor;
-use gyronet::health::{Faults, Status};
+use gyronet::health::{Faults, Status, count};
 use gyronet::model::background::BackgroundCheck;
 use gyronet::sample::{ImuSample, WheelSample};
 use gyronet::service::Device;
@@ -102,7 +102,7 @@ impl Idle {
         if core::mem::replace(&mut self.refusal, refusal) != refusal {
             self.device.sensor(refusal.map_or(Ok(()), Err));
         }
-        counters.lines.service_errors = self.diagnosis.refused();
+        count(&mut counters.lines.service_errors, self.diagnosis.refused());
         self.diagnosis.step(self.device, counters);
         self.retry_clock();
         let weights_damaged = self.check();

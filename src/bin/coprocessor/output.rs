@@ -203,11 +203,14 @@ impl Output {
         let (unread, takes_inputs) = (&mut self.unread, self.slcan_inputs);
         self.outgoing.service(|frame| {
             if diagnosis::is_request(frame.id()) {
-                count(unread, u32::from(!FROM_SLCAN.push(frame)));
-            } else if takes_inputs {
-                let _ = coprocessor.can(&frame, now);
+                let has_room = FROM_SLCAN.push(frame);
+                count(unread, u32::from(!has_room));
+                has_room
+            } else {
+                takes_inputs && coprocessor.can(&frame, now) == Ok(true)
             }
         });
+        self.lines.service_errors = self.outgoing.refused();
         let lost = [self.imu.lost(), self.fog.lost(), self.outgoing.lost()];
         self.lines.overruns = self.outgoing.overruns();
         self.lines.line_errors = lost.into_iter().fold(0, u32::saturating_add);

@@ -156,6 +156,12 @@ impl Port {
         self.memory.damaged.load(Ordering::Relaxed).saturating_add(self.overwritten)
     }
 
+    /// Returns whether the last bit of the last byte is on the line.
+    pub fn is_sent(&mut self) -> bool {
+        self.advance();
+        self.memory.sending.is_empty() && (!self.fitted || self.usart.status().sent())
+    }
+
     /// Starts to send the waiting bytes, if DMA has sent the previous ones. A task that sends calls this in every step.
     pub fn advance(&mut self) {
         let sending = &self.memory.sending;
@@ -212,10 +218,6 @@ impl Write for Port {
     }
 
     fn flush(&mut self) -> Result<(), ErrorKind> {
-        let sent = |_| {
-            self.advance();
-            self.memory.sending.is_empty() && (!self.fitted || self.usart.status().sent())
-        };
-        if (0..FLUSH_POLLS).any(sent) { Ok(()) } else { Err(ErrorKind::TimedOut) }
+        if (0..FLUSH_POLLS).any(|_| self.is_sent()) { Ok(()) } else { Err(ErrorKind::TimedOut) }
     }
 }

@@ -48,7 +48,7 @@ impl StatusFlags {
 pub struct Reaction {
     /// The answer to send before the next frame.
     pub answer: Answer,
-    /// A frame from the host, which the caller may use (wheel speeds on a bench).
+    /// A frame from the host. If the caller does not use it, [`Session::refuse`] has the answer instead.
     pub frame: Option<DataFrame>,
 }
 
@@ -124,7 +124,7 @@ impl Session {
         }
     }
 
-    /// Returns the error answer, for a line that could not be received.
+    /// Returns the error answer, for a line that could not be received or a frame that is not used.
     pub fn refuse(&mut self) -> Reaction {
         self.refused = self.refused.saturating_add(1);
         Reaction::answer(ERROR)

@@ -69,10 +69,12 @@ impl<const N: usize> Port<N> {
         self.queue.enqueue((frame, time));
     }
 
-    /// Processes a byte from the host, and returns the frame that it completes.
-    pub fn receive(&mut self, byte: u8) -> Option<DataFrame> {
+    /// Processes a byte from the host; a frame that it completes goes to `take`, which returns whether the frame is
+    /// used. One that is not is refused as a wrong line is.
+    pub fn receive(&mut self, byte: u8, take: impl FnOnce(DataFrame) -> bool) {
         let dropped = self.queue.dropped();
-        let reaction = match self.assembler.receive(byte)? {
+        let Some(line) = self.assembler.receive(byte) else { return };
+        let mut reaction = match line {
             Ok(line) => {
                 let reported =
                     if line == b"F" { core::mem::replace(&mut self.reported, dropped) } else { dropped };
@@ -81,10 +83,12 @@ impl<const N: usize> Port<N> {
             }
             Err(TooLong) => self.session.refuse(),
         };
+        if reaction.frame.is_some_and(|frame| !take(frame)) {
+            reaction = self.session.refuse();
+        }
         // A host that keeps sending commands without reading gets no answer rather than a partial one.
         let fits = self.answers.extend_from_slice(&reaction.answer).is_ok();
         count(&mut self.unanswered, u32::from(!fits));
-        reaction.frame
     }
 
     /// Returns the bytes to send next: the rest of the current line, else answers, else the oldest frame.
@@ -106,11 +110,16 @@ impl<const N: usize> Port<N> {
         self.taken = self.taken.saturating_add(bytes).min(self.line.len());
     }
 
-    /// Reads and writes as many bytes as the line allows without blocking; `frame` is called with the host's frames.
+    /// Reads and writes as many bytes as the line allows without blocking; `take` is called with the host's frames, and
+    /// returns whether a frame is used.
     ///
     /// # Errors
     /// The error of the serial line. No buffered byte is lost.
-    pub fn service<L>(&mut self, line: &mut L, mut frame: impl FnMut(DataFrame)) -> Result<(), L::Error>
+    pub fn service<L>(
+        &mut self,
+        line: &mut L,
+        mut take: impl FnMut(DataFrame) -> bool,
+    ) -> Result<(), L::Error>
     where
         L: Read + ReadReady + Write + WriteReady,
     {
@@ -120,7 +129,7 @@ impl<const N: usize> Port<N> {
                 break;
             }
             let [byte] = byte;
-            self.receive(byte).into_iter().for_each(&mut frame);
+            self.receive(byte, &mut take);
         }
         while line.write_ready()? {
             let Some(outgoing) = self.outgoing() else { break };
