@@ -39,6 +39,16 @@ pub enum At<'a> {
     Symbol(&'a str),
 }
 
+/// A frame as an observer of the bus sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen {
+    pub start: Duration,
+    pub end: Duration,
+    /// True if the board has sent it.
+    pub own: bool,
+    pub frame: DataFrame,
+}
+
 /// A board in the model.
 #[derive(Debug)]
 pub struct Board {
@@ -155,10 +165,20 @@ impl Board {
 
     /// Takes the frames that the board has sent completely, with the time of their end.
     pub fn can_frames(&mut self) -> Vec<(Duration, DataFrame)> {
+        self.bus_log().into_iter().filter(|seen| seen.own).map(|seen| (seen.end, seen.frame)).collect()
+    }
+
+    /// Takes all complete frames that were on the bus.
+    pub fn bus_log(&mut self) -> Vec<Seen> {
         let answer = self.ask("can_take", json!({}));
-        let own = |entry: &&Value| entry["source"] == "board" && entry["error"].is_null();
-        let frames = list(&answer["frames"]).iter().filter(own);
-        frames.map(|entry| (duration(&entry["time_us"]), frame(entry))).collect()
+        let complete = list(&answer["frames"]).iter().filter(|entry| entry["error"].is_null());
+        let seen = complete.map(|entry| Seen {
+            start: duration(&entry["start_us"]),
+            end: duration(&entry["time_us"]),
+            own: entry["source"] == "board",
+            frame: frame(entry),
+        });
+        seen.collect()
     }
 
     /// Sets a fault or a condition of the environment, such as `"RCC.crystal_hz"` to `null`.

@@ -28,6 +28,8 @@ pub struct StoredTrouble {
     pub occurrences: u8,
     /// State of the board when the fault first appeared.
     pub snapshot: Snapshot,
+    /// True if the fault was present in the last operation cycle that tested it.
+    pub pending: bool,
 }
 
 /// The confirmed troubles.
@@ -44,7 +46,7 @@ impl Troubles {
 
 impl Record for Troubles {
     const KEY: u8 = 5;
-    const VERSION: u8 = 1;
+    const VERSION: u8 = 2;
 
     /// Any value is valid.
     fn check(&self) -> Result<(), FieldError> {

@@ -243,6 +243,11 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
     }
 }
 
+/// Returns whether an identifier can be written, or could be by earlier versions.
+pub(super) fn is_writable(id: u16) -> bool {
+    matches!(id, 0x0100 | 0x0101 | 0x010D | 0x0110 | RETIRED_FIRST..=RETIRED_LAST)
+}
+
 /// Writes the value of an identifier. Each record has its own function, so that only one record is on the stack.
 pub(super) fn write<R: NorFlash, W: MappedSlots>(
     id: u16,

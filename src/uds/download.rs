@@ -60,11 +60,11 @@ impl Download {
     /// Writes a block. A repeated block is answered again, because its response may have been lost.
     pub fn block<R: NorFlash, W: MappedSlots>(
         &mut self,
-        parameters: &[u8],
+        number: u8,
+        bytes: &[u8],
         device: &mut Device<R, W>,
         out: &mut Response,
     ) -> Result<(), Nrc> {
-        let (&number, bytes) = parameters.split_first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
         put(out, &[number])?;
         if number == self.next.wrapping_sub(1) && self.offset > 0 {
             return Ok(());

@@ -1,7 +1,8 @@
 //! The trouble memory holds the faults that the board has had, for a workshop to read (ISO 14229-1 D.2).
 //!
 //! A fault is confirmed at once, because the pipeline has already debounced it. The fault stays in the memory until a
-//! tester clears it, even after a restart, so that intermittent faults are found, too.
+//! tester clears it, even after a restart, so that intermittent faults are found, too. An operation cycle begins at the
+//! start. A fault stays pending through the next cycle; one without the fault for [`PASSED_TICKS`] ends that.
 //! [`TROUBLES`] lists them; `gyronet reference troubles` prints the list.
 
 use crate::health::{Faults, Status};
@@ -14,7 +15,7 @@ pub mod bit {
     pub const FAILED: u8 = 1;
     /// The fault has been present since the start.
     pub const FAILED_THIS_CYCLE: u8 = 1 << 1;
-    /// The fault has been present in this operation cycle, which begins at the start.
+    /// The fault has been present in this operation cycle, which begins at the start, or in the one before.
     pub const PENDING: u8 = 1 << 2;
     /// The fault is in the memory.
     pub const CONFIRMED: u8 = 1 << 3;
@@ -27,6 +28,9 @@ pub mod bit {
     /// Mask of the bits that this server supports.
     pub const AVAILABLE: u8 = 0x7F;
 }
+
+/// Length of an operation cycle without a fault that counts as passed, 10 ms: the flash is not written at each start.
+pub const PASSED_TICKS: u32 = 6_000;
 
 /// A trouble that the board can report.
 #[derive(Debug)]
@@ -64,6 +68,15 @@ enum Cause {
 }
 
 impl Cause {
+    /// Returns whether a stall of the processor, as by an erase, causes this, too: what would have arrived is lost.
+    fn follows_stall(self) -> bool {
+        match self {
+            Self::Status(status) => status == Status::Silent,
+            Self::Fault(fault) => Faults::GAP.with(Faults::BUS).with(Faults::WHEELS).contains(fault),
+            _ => false,
+        }
+    }
+
     fn is_present(self, now: &Conditions) -> bool {
         match self {
             Self::Status(status) => now.status == status,
@@ -166,11 +179,14 @@ pub struct Entry {
     pub occurrences: u8,
     /// State of the board when the fault first appeared.
     pub snapshot: Snapshot,
+    /// True if the stored trouble is to be pending at the next start.
+    pending_next: bool,
 }
 
 const UNTESTED: Entry = Entry {
     status: bit::UNTESTED_SINCE_CLEAR | bit::UNTESTED_THIS_CYCLE,
     occurrences: 0,
+    pending_next: false,
     snapshot: Snapshot { tick: 0, status: 0, faults: 0 },
 };
 
@@ -197,12 +213,14 @@ impl Memory {
         Self { entries: [UNTESTED; TROUBLES.len()], is_enabled: true, is_changed: false }
     }
 
-    /// Records the faults that are present now.
-    pub fn observe(&mut self, now: &Conditions) {
+    /// Records the faults that are present now, but for those that a stall of the processor causes where there was one.
+    pub fn observe(&mut self, now: &Conditions, has_stalled: bool) {
         if !self.is_enabled {
             return;
         }
-        for (trouble, entry) in TROUBLES.iter().zip(&mut self.entries) {
+        let entries = TROUBLES.iter().zip(&mut self.entries);
+        for (trouble, entry) in entries.filter(|(trouble, _)| !has_stalled || !trouble.cause.follows_stall())
+        {
             entry.status &= !(bit::UNTESTED_SINCE_CLEAR | bit::UNTESTED_THIS_CYCLE);
             let was_present = entry.status & bit::FAILED != 0;
             let is_present = trouble.cause.is_present(now);
@@ -210,8 +228,8 @@ impl Memory {
                 entry.occurrences = entry.occurrences.saturating_add(1);
                 if entry.status & bit::CONFIRMED == 0 {
                     entry.snapshot = now.into();
-                    self.is_changed = true;
                 }
+                self.is_changed |= !core::mem::replace(&mut entry.pending_next, true);
                 entry.status |= bit::FAILED
                     | bit::FAILED_THIS_CYCLE
                     | bit::PENDING
@@ -219,6 +237,11 @@ impl Memory {
                     | bit::FAILED_SINCE_CLEAR;
             } else if !is_present {
                 entry.status &= !bit::FAILED;
+                let has_passed = entry.status & bit::FAILED_THIS_CYCLE == 0 && now.tick >= PASSED_TICKS;
+                if has_passed && entry.pending_next {
+                    entry.pending_next = false;
+                    self.is_changed = true;
+                }
             }
         }
     }
@@ -240,9 +263,10 @@ impl Memory {
     pub fn restore(&mut self, stored: &Troubles) {
         for (trouble, entry) in TROUBLES.iter().zip(&mut self.entries) {
             let found = stored.confirmed.iter().find(|stored| stored.code == trouble.code);
-            if let Some(StoredTrouble { occurrences, snapshot, .. }) = found {
+            if let Some(StoredTrouble { occurrences, snapshot, pending, .. }) = found {
                 entry.status = bit::CONFIRMED | bit::FAILED_SINCE_CLEAR | bit::UNTESTED_THIS_CYCLE;
-                (entry.occurrences, entry.snapshot) = (*occurrences, *snapshot);
+                entry.status |= if *pending { bit::PENDING } else { 0 };
+                (entry.occurrences, entry.snapshot, entry.pending_next) = (*occurrences, *snapshot, *pending);
             }
         }
     }
@@ -252,9 +276,10 @@ impl Memory {
     pub fn confirmed(&self) -> Troubles {
         let mut troubles = Troubles::NONE;
         for (trouble, entry) in self.entries().filter(|(_, entry)| entry.status & bit::CONFIRMED != 0) {
-            let Entry { occurrences, snapshot, .. } = *entry;
+            let Entry { occurrences, snapshot, pending_next: pending, .. } = *entry;
             // Cannot fail: the record has room for all troubles.
-            let _ = troubles.confirmed.push(StoredTrouble { code: trouble.code, occurrences, snapshot });
+            let _ =
+                troubles.confirmed.push(StoredTrouble { code: trouble.code, occurrences, snapshot, pending });
         }
         troubles
     }

@@ -4,7 +4,8 @@
 //! [`Transport`] handles one exchange at a time: it assembles a request, receives the response from the caller, and
 //! splits it into frames at the pace that the tester requests. It does no I/O and has no clock; frames and the time
 //! are arguments. As receiver it grants [`BLOCK`] frames at a time, so that a queue of that length in front of it
-//! never overflows. A frame out of sequence ends the message and is counted; the next message can then begin.
+//! never overflows. A frame out of sequence ends the message and is counted; the next message can then begin. As sender
+//! it counts the tester's separation time from the end of a frame on the bus, which the caller reports.
 
 use super::signature::TRAILER;
 use crate::health::count;
@@ -63,14 +64,21 @@ enum State {
         waits: u8,
     },
     /// Consecutive frames are being sent, the next one not before `due`; `left` frames remain before the next flow
-    /// control, 0 means all.
+    /// control, 0 means all. While the newest frame has not left, its separation time has not begun, and `due` is when
+    /// it must have left (N_As).
     Sending {
         sent: usize,
         sequence: u8,
         left: u8,
         gap_ms: u32,
         due: u32,
+        has_left: bool,
     },
+}
+
+impl State {
+    /// The first frame of a message is due.
+    const SENDING: Self = Self::Sending { sent: 0, sequence: 0, left: 0, gap_ms: 0, due: 0, has_left: true };
 }
 
 /// The transport layer of one exchange with a tester.
@@ -212,7 +220,10 @@ impl Transport {
             return count(&mut self.errors.unexpected, 1);
         };
         self.state = match status {
-            CONTINUE => State::Sending { sent, sequence, left: block, gap_ms: gap_ms(gap), due: now },
+            CONTINUE => {
+                let gap_ms = gap_ms(gap);
+                State::Sending { sent, sequence, left: block, gap_ms, due: now, has_left: true }
+            }
             WAIT if waits < MAX_WAITS => {
                 State::Waiting { sent, sequence, until: now.wrapping_add(TIMEOUT_MS), waits: waits + 1 }
             }
@@ -233,7 +244,9 @@ impl Transport {
 
     /// Ends an exchange whose timeout has expired.
     pub fn expire(&mut self, now: u32) {
-        if let State::Receiving { until, .. } | State::Waiting { until, .. } = self.state
+        if let State::Receiving { until, .. }
+        | State::Waiting { until, .. }
+        | State::Sending { due: until, has_left: false, .. } = self.state
             && now.wrapping_sub(until) as i32 >= 0
         {
             count(&mut self.errors.timeout, 1);
@@ -252,7 +265,7 @@ impl Transport {
         self.response.clear();
         let fits = self.response.extend_from_slice(message).is_ok();
         if fits {
-            self.state = State::Sending { sent: 0, sequence: 0, left: 0, gap_ms: 0, due: 0 };
+            self.state = State::SENDING;
         }
         fits
     }
@@ -267,17 +280,27 @@ impl Transport {
         answer(&self.request, &mut self.response);
         self.state = match self.response.is_empty() {
             true => State::Idle,
-            false => State::Sending { sent: 0, sequence: 0, left: 0, gap_ms: 0, due: 0 },
+            false => State::SENDING,
         };
         true
     }
 
-    /// Returns the next frame to send, if one is due.
+    /// Records that all frames of [`Self::next_frame`] have left by `now`: the separation time begins. One millisecond
+    /// is added, because `now` may be the beginning of the millisecond.
+    pub fn frames_left(&mut self, now: u32) {
+        if let State::Sending { gap_ms, due, has_left, .. } = &mut self.state
+            && !core::mem::replace(has_left, true)
+        {
+            *due = now.wrapping_add(*gap_ms + 1);
+        }
+    }
+
+    /// Returns the next frame to send, if one is due. [`Self::frames_left`] must be called once it has left.
     pub fn next_frame(&mut self, now: u32) -> Option<Bytes> {
         if let Some(urgent) = self.urgent.take() {
             return Some(urgent);
         }
-        let State::Sending { sent, sequence, left, gap_ms, due } = self.state else { return None };
+        let State::Sending { sent, sequence, left, gap_ms, due, has_left } = self.state else { return None };
         let length = self.response.len();
         if sent == 0 {
             let (head, taken) = match length {
@@ -291,7 +314,7 @@ impl Transport {
             };
             return Some(frame(&head.unwrap_or_default(), self.response.get(..taken).unwrap_or_default()));
         }
-        if (now.wrapping_sub(due) as i32) < 0 {
+        if !has_left || (now.wrapping_sub(due) as i32) < 0 {
             return None;
         }
         let end = length.min(sent + 7);
@@ -300,8 +323,9 @@ impl Transport {
             _ if end == length => State::Idle,
             1 => State::Waiting { sent: end, sequence: next, until: now.wrapping_add(TIMEOUT_MS), waits: 0 },
             _ => {
-                let left = left.saturating_sub(1);
-                State::Sending { sent: end, sequence: next, left, gap_ms, due: now.wrapping_add(gap_ms) }
+                let (left, has_left) = (left.saturating_sub(1), gap_ms == 0);
+                let due = if has_left { now } else { now.wrapping_add(TIMEOUT_MS) };
+                State::Sending { sent: end, sequence: next, left, gap_ms, due, has_left }
             }
         };
         Some(frame(&[0x20 | sequence], self.response.get(sent..end).unwrap_or_default()))

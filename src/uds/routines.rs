@@ -18,8 +18,12 @@ const SELF_TEST: u16 = 0x0204;
 const FORGET: u16 = 0x0205;
 /// Routine that reads the log.
 const LOG: u16 = 0x0203;
+/// Routine that stores the result of a calibration.
+const STORE: u16 = 0x0202;
 /// Routine that activates a download.
 const USE_DOWNLOAD: u16 = 0xFF01;
+
+const REQUEST_RESULT: RoutineControlType = RoutineControlType::RequestRoutineResult;
 
 /// Returns a bit for each component that fails: 0 the processor's clock, 1 the CAN controller, 2 the inertial
 /// sensor's set-up, 3 stored data, 4 the weights, 5 the flash controller, 6 the random number generator.
@@ -50,36 +54,33 @@ impl Services {
         let (id, option) = rest.split_first_chunk().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
         put(out, id)?;
         let id = u16::from_be_bytes(*id);
-        let control = RoutineControlType::from_repr(sub).ok_or(Nrc::SubFunctionNotSupported)?;
-        if id == LOG && control == RoutineControlType::StartRoutine {
-            return put_record(out, &device.events(u32::from_be_bytes(exactly(option)?)));
-        }
-        if id == SELF_TEST && control == RoutineControlType::StartRoutine {
-            let [] = exactly(option)?;
-            return put(out, &[self_test(device, entropy().is_some())]);
-        }
         let task = match id {
             0x0200 => Some(Task::Static),
             0x0201 => Some(Task::Mounting),
-            _ => None,
+            STORE | LOG | SELF_TEST | FORGET => None,
+            USE_DOWNLOAD if self.require_session(Session::Programming).is_ok() => None,
+            _ => return Err(Nrc::RequestOutOfRange),
         };
-        if id == USE_DOWNLOAD && control == RoutineControlType::StartRoutine {
-            self.require_session(Session::Programming)?;
-            self.accept_download(option, device)?;
-            return device.weights_activate().map_err(nrc);
-        }
-        let [] = exactly(option)?;
-        if control != RoutineControlType::RequestRoutineResult {
+        let control = RoutineControlType::from_repr(sub);
+        // The other routines only read, or check a signature of their own.
+        if matches!(id, STORE | FORGET) || task.is_some() && control != Some(REQUEST_RESULT) {
             self.security.check(device)?;
         }
-        match (id, task, control) {
-            (_, Some(task), RoutineControlType::StartRoutine) => {
-                device.start_calibration(task);
+        let control =
+            control.filter(|control| task.is_some() || *control == RoutineControlType::StartRoutine);
+        let control = control.ok_or(Nrc::SubFunctionNotSupported)?;
+        match id {
+            LOG => return put_record(out, &device.events(u32::from_be_bytes(exactly(option)?))),
+            USE_DOWNLOAD => {
+                self.accept_download(option, device)?;
+                return device.weights_activate().map_err(nrc);
             }
-            (_, Some(_), RoutineControlType::StopRoutine) => {
-                device.cancel_calibration();
-            }
-            (_, Some(task), RoutineControlType::RequestRoutineResult) => {
+            _ => exactly(option).map(|[]: [u8; 0]| ())?,
+        }
+        match (task, control) {
+            (Some(task), RoutineControlType::StartRoutine) => device.start_calibration(task),
+            (Some(_), RoutineControlType::StopRoutine) => device.cancel_calibration(),
+            (Some(task), REQUEST_RESULT) => {
                 let state = match device.calibration_state() {
                     State::Running(of) if of == task => 1,
                     State::Found(of) if of == task => 2,
@@ -88,16 +89,9 @@ impl Services {
                 };
                 put(out, &[state])?;
             }
-            (0x0202, None, RoutineControlType::StartRoutine) => {
-                device.store_result().map_err(nrc)?;
-            }
-            (FORGET, None, RoutineControlType::StartRoutine) => {
-                device.forget_learned().map_err(nrc)?;
-            }
-            (0x0202 | FORGET | SELF_TEST | USE_DOWNLOAD, None, _) => {
-                return Err(Nrc::SubFunctionNotSupported);
-            }
-            _ => return Err(Nrc::RequestOutOfRange),
+            (None, _) if id == SELF_TEST => put(out, &[self_test(device, entropy().is_some())])?,
+            (None, _) if id == STORE => device.store_result().map_err(nrc)?,
+            (None, _) => device.forget_learned().map_err(nrc)?,
         }
         Ok(())
     }

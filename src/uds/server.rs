@@ -1,7 +1,9 @@
 //! The server passes requests from the transport to the services, and responses back.
 //!
 //! Before the server executes a request that may erase flash, it sends "response pending", because an erase stalls
-//! the processor for longer than a tester waits.
+//! the processor for longer than a tester waits. Troubles that must be stored with an erase wait for such a request:
+//! a request that came in the middle of an erase could not be answered in time. The faults that the erase causes on
+//! the board itself are no troubles.
 
 use super::isotp::{Bytes, Transport};
 use super::response::Nrc;
@@ -19,6 +21,8 @@ pub struct Server {
     services: Services,
     /// True if "response pending" has been sent for the request.
     is_pending: bool,
+    /// True if the last request may have stalled the board: time has passed since the last poll.
+    has_stalled: bool,
 }
 
 impl Default for Server {
@@ -32,7 +36,7 @@ impl Server {
     #[must_use]
     pub const fn new() -> Self {
         let services = Services::new();
-        Self { transport: Transport::new(), services, is_pending: false }
+        Self { transport: Transport::new(), services, is_pending: false, has_stalled: false }
     }
 
     /// Processes the data of a frame received on this server's own identifier.
@@ -58,7 +62,13 @@ impl Server {
         }
     }
 
-    /// Returns the next frame to send, if one is due.
+    /// Records that all frames of [`Self::next_frame`] have left the board by `now`. The separation time that a tester
+    /// wants between frames begins here.
+    pub fn frames_left(&mut self, now: u32) {
+        self.transport.frames_left(now);
+    }
+
+    /// Returns the next frame to send, if one is due. Call [`Self::frames_left`] once it has left.
     pub fn next_frame(&mut self, now: u32) -> Option<Bytes> {
         self.transport.next_frame(now)
     }
@@ -92,11 +102,14 @@ impl Server {
     ) {
         self.transport.expire(now);
         let services = &mut self.services;
-        services.update_troubles(device);
+        if core::mem::take(&mut self.has_stalled) {
+            services.stalled(now);
+        }
+        services.update_troubles(device, now, self.is_pending);
         services.expire(now);
         if let Some(request) = self.transport.request()
             && !self.is_pending
-            && services.takes_long(request)
+            && services.takes_long(request, device)
         {
             let service = request.first().copied().unwrap_or(0);
             self.is_pending = true;
@@ -110,7 +123,7 @@ impl Server {
             services.answer(request, device, surroundings, out);
         });
         if answered {
-            self.is_pending = false;
+            self.has_stalled = core::mem::take(&mut self.is_pending);
             services.is_functional = false;
             services.last_activity = now;
         }

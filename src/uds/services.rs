@@ -1,5 +1,8 @@
 //! Dispatches the services (ISO 14229-1) and holds the state between requests.
 //!
+//! A request is checked in the order of ISO 14229-1: service, session, least length, sub-function, access, length,
+//! values, conditions. The first check that fails gives the code.
+//!
 //! Services translate UDS requests to requests of the device, so that the same rules apply on all lines. A request
 //! that writes data or silences the output needs a non-default session, and a vehicle that is proven to stand.
 
@@ -10,6 +13,7 @@ use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, exactly, put};
 use super::security::{self, Security, Seed};
 use super::session::{self, Session};
+use super::signature::SIGNATURE;
 use super::troubles;
 use crate::service::message::AllCounters;
 use crate::service::{Device, MappedSlots};
@@ -18,6 +22,8 @@ use embedded_storage::nor_flash::NorFlash;
 
 /// Session timeout: longest silence of a tester in a non-default session, ms (S3).
 const SESSION_MS: u32 = 5_000;
+/// Time after a stall of the board in which the faults that it causes end, ms.
+const SETTLE_MS: u32 = 1_000;
 /// Bit of a sub-function that suppresses the positive response.
 const SUPPRESS: u8 = 0x80;
 
@@ -37,6 +43,8 @@ pub(super) struct Services {
     pub(super) memory: Memory,
     /// True if the memory has been restored from flash.
     is_restored: bool,
+    /// Time until which faults may come from the board's own stall, ms.
+    settles_at: Option<u32>,
     /// True if the messages of the board are stopped.
     pub is_silenced: bool,
     /// True if a tester has requested a restart.
@@ -66,6 +74,7 @@ impl Services {
             is_functional: false,
             memory: Memory::new(),
             is_restored: false,
+            settles_at: None,
             is_silenced: false,
             is_restarting: false,
             download: None,
@@ -86,17 +95,30 @@ impl Services {
         self.last_activity = now;
     }
 
-    /// Records present faults, and stores new ones.
+    /// Records that the board has stalled until now, for a request: the tester could not be heard meanwhile.
+    pub fn stalled(&mut self, now: u32) {
+        self.last_activity = now;
+        self.settles_at = Some(now.wrapping_add(SETTLE_MS));
+    }
+
+    /// Records present faults, and stores new ones; with an erase only if `may_erase`. Lets the messages of the board
+    /// resume once the vehicle may move.
     #[inline(never)]
-    pub fn update_troubles<R: NorFlash, W: MappedSlots>(&mut self, device: &mut Device<R, W>) {
+    pub fn update_troubles<R: NorFlash, W: MappedSlots>(
+        &mut self,
+        device: &mut Device<R, W>,
+        now: u32,
+        may_erase: bool,
+    ) {
         if !core::mem::replace(&mut self.is_restored, true) {
             self.memory.restore(device.troubles());
         }
+        self.is_silenced &= device.may_interrupt();
         device.store_learned_if_due();
-        self.memory.observe(&device.conditions());
+        self.settles_at = self.settles_at.filter(|until| (now.wrapping_sub(*until) as i32) < 0);
+        self.memory.observe(&device.conditions(), self.settles_at.is_some() || may_erase);
         if self.memory.is_changed {
-            let in_workshop = self.session != Session::Default;
-            self.memory.is_changed = !device.store_troubles(&self.memory.confirmed(), in_workshop);
+            self.memory.is_changed = !device.store_troubles(&self.memory.confirmed(), may_erase);
         }
     }
 
@@ -110,16 +132,21 @@ impl Services {
         }
     }
 
-    /// Returns whether a request takes long, because it may erase flash or checks a whole file.
-    pub fn takes_long(&self, request: &[u8]) -> bool {
+    /// Returns whether a request takes long, because it may erase flash or checks a whole file, or because troubles wait
+    /// to be stored with an erase. These do not delay "tester present", to which a tester may not listen.
+    pub fn takes_long<R: NorFlash, W: MappedSlots>(&self, request: &[u8], device: &Device<R, W>) -> bool {
+        let erases = || {
+            let is_heard = !self.is_functional && !matches!(request, [0x3E, ..]);
+            self.memory.is_changed && is_heard && device.troubles_want_erase()
+        };
         self.session != Session::Default
-            && matches!(
+            && (matches!(
                 request,
                 [0x2E | 0x34 | 0x37, ..]
                     | [0x27, 2 | 0x82, ..]
                     | [0x31, 1, 0x02, 0x02 | 0x05]
                     | [0x31, 1, 0xFF, 0x01, ..]
-            )
+            ) || erases())
     }
 
     /// Writes the response to a request; leaves `out` empty if no response is wanted.
@@ -186,7 +213,17 @@ impl Services {
             UdsCommand::CommunicationControl => self.communication_control(sub, rest, device),
             UdsCommand::ControlDTCSetting => self.dtc_setting(sub, device),
             UdsCommand::ReadDTCInformation => troubles::read(&self.memory, sub, rest, out),
-            UdsCommand::SecurityAccess => self.security.access(sub, rest, device, (now, entropy), out),
+            UdsCommand::SecurityAccess => {
+                let length = match sub {
+                    1 => 0,
+                    2 => SIGNATURE,
+                    _ => return Err(Nrc::SubFunctionNotSupported),
+                };
+                if rest.len() != length {
+                    return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
+                }
+                self.security.access(sub, rest, device, (now, entropy), out)
+            }
             _ => self.routine(sub, rest, device, entropy, out),
         }?;
         Ok(is_wanted)
@@ -212,17 +249,24 @@ impl Services {
                 let security = &self.security;
                 let sources = Sources { device: &*device, counters, session, security, errors };
                 for id in rest.chunks_exact(2) {
+                    let before = out.len();
                     put(out, id)?;
                     let id = id.try_into().map_or(0, u16::from_be_bytes);
-                    data::read(id, &sources, out)?;
+                    match data::read(id, &sources, out) {
+                        // An unknown identifier is left out, unless all are unknown.
+                        Err(Nrc::RequestOutOfRange) => out.truncate(before),
+                        read => read?,
+                    }
                 }
-                Ok(())
+                if out.len() > 1 { Ok(()) } else { Err(Nrc::RequestOutOfRange) }
             }
             UdsCommand::WriteDataByIdentifier => {
-                let [high, low, bytes @ ..] = rest else {
-                    return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
-                };
+                let id = rest.split_first_chunk().filter(|(_, bytes)| !bytes.is_empty());
+                let ([high, low], bytes) = id.ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
                 let id = u16::from_be_bytes([*high, *low]);
+                if !data::is_writable(id) {
+                    return Err(Nrc::RequestOutOfRange);
+                }
                 let content = security::signed(id, bytes, device)?;
                 match id {
                     0x0110 => self.security.write_key(content, device)?,
@@ -235,7 +279,11 @@ impl Services {
                 self.download = Some(Download::begin(rest, device, out)?);
                 Ok(())
             }
-            UdsCommand::TransferData => self.under_way()?.block(rest, device, out),
+            UdsCommand::TransferData => {
+                let (&number, bytes) =
+                    rest.split_first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+                self.under_way()?.block(number, bytes, device, out)
+            }
             UdsCommand::RequestTransferExit => {
                 let [] = exactly(rest)?;
                 self.under_way()?.finish(device, out)

@@ -19,5 +19,6 @@ mod slcan;
 mod stored;
 mod stored_start;
 mod supply;
+mod timing;
 mod uds;
 mod wheels;

@@ -153,8 +153,9 @@ fn longest_erase_fits_the_watchdogs_limit_and_the_short_limit_returns() {
     assert_eq!(response, Some(vec![0x74, 0x20, 1, 2]));
     println!("{TEST}: a slot is erased in {took:?}");
     assert!(took >= Duration::from_secs(2));
-    board.run(Duration::from_millis(500));
-    // The sensor's silence is stored behind it.
+    // The sensor's silence outlasts that of the erase, and is stored with the next request.
+    board.run(Duration::from_millis(1_500));
+    assert_eq!(service::ask(&mut board, &[0x22, 0xF1, 0x86]), [0x62, 0xF1, 0x86, 2]);
     assert_eq!(erased_and_reset(&mut board), (vec![10, 1], Vec::new()));
     // Idle hangs.
     board.patch(At::Symbol("idle::Idle::step"), &[0xFE, 0xE7]);

@@ -10,7 +10,7 @@ use gyronet_host_tests::board::Board;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require;
 use gyronet_host_tests::stored::other_weights;
-use gyronet_host_tests::tester::Tester;
+use gyronet_host_tests::tester::{Tester, bytes};
 use gyronet_tools::signing::{PrivateKey, hex};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
@@ -171,11 +171,7 @@ fn udsoncan_reads_writes_and_downloads() {
         };
         for text in frames.split_whitespace() {
             let (id, data) = text.split_once('#').expect("identifier#data");
-            let bytes: Vec<u8> = (0..data.len())
-                .step_by(2)
-                .map(|k| u8::from_str_radix(&data[k..k + 2], 16).expect("hexadecimal"))
-                .collect();
-            board.can_send(&frame(u16::from_str_radix(id, 16).expect("hexadecimal"), &bytes));
+            board.can_send(&frame(u16::from_str_radix(id, 16).expect("hexadecimal"), &bytes(data)));
         }
         board.run(TURN);
         let sent = common::frames(&board.can_frames());

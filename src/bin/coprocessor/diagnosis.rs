@@ -10,7 +10,8 @@ use crate::output;
 use crate::regions::{Records, Weights};
 use crate::ring::Ring;
 use crate::serial;
-use crate::stm32f405::{rng, timer};
+use crate::stm32f405::pac::Interrupt;
+use crate::stm32f405::{can, rng, timer};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
@@ -126,6 +127,14 @@ impl Diagnosis {
             }
         }
         let Tester { server, line } = tester;
+        let have_left = match line {
+            Line::Service => port.outgoing().is_none() && service.is_sent(),
+            Line::Can => RESPONSES.is_empty() && can::all_sent(),
+            Line::Slcan => RESPONSES.is_empty(),
+        };
+        if have_left {
+            server.frames_left(now);
+        }
         server.poll(device, counters, now, rng::bytes);
         frames::SILENCED.store(server.is_silenced(), Ordering::Relaxed);
         while match line {
@@ -137,7 +146,11 @@ impl Diagnosis {
             let Some(frame) = unpack(response).and_then(|id| DataFrame::new(id, &data)) else { continue };
             match line {
                 Line::Service => port.enqueue(frame, Micros(1_000 * u64::from(now))),
-                Line::Can | Line::Slcan => _ = RESPONSES.push((*line, frame)),
+                Line::Can | Line::Slcan => {
+                    let _ = RESPONSES.push((*line, frame));
+                    // The output task sends it now, not with the next tick.
+                    rtic::pend(Interrupt::UART4);
+                }
             }
         }
         if server.restart_is_due() && RESPONSES.is_empty() && port.outgoing().is_none() {

@@ -257,6 +257,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
+    /// Returns whether troubles cannot be stored without an erase, and the vehicle stands.
+    pub(crate) fn troubles_want_erase(&self) -> bool {
+        self.may_interrupt && self.store.as_ref().is_some_and(|store| !store.has_room())
+    }
+
     /// Stores the troubles. If an erase is needed, it waits for `may_erase` and standstill. Returns `false` if the
     /// caller must try again.
     #[inline(never)]

@@ -113,6 +113,7 @@ impl<B: Bus> Device<B> {
             while let Some(data) = transport.next_frame(milliseconds) {
                 let frame = DataFrame::new(self.request, &data).ok_or(DeviceError::TooLong)?;
                 self.bus.send(&frame).map_err(|source| self.broken(source))?;
+                transport.frames_left(milliseconds);
                 until = until.max(now + RESPONSE);
             }
             if response.is_some() || now > until {

@@ -22,7 +22,7 @@ const SERIAL: [u8; 12] = *b"a test board";
 const CONFIGURATION: u16 = 0x0100;
 
 /// A board with a key, in an extended session at standstill.
-fn locked() -> (Rc<RefCell<F405>>, Bench, PrivateKey) {
+pub fn locked() -> (Rc<RefCell<F405>>, Bench, PrivateKey) {
     let (flash, mut bench) = bench();
     let key = PrivateKey::generate().expect("random numbers");
     bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);

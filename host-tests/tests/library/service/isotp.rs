@@ -50,6 +50,10 @@ fn a_response_keeps_to_the_block_and_the_gap_that_the_tester_names() {
     while got.len() < response.len() {
         transport.receive(&frame(&[0x30, 2, 5], &[]), now);
         for _ in 0..20 {
+            // A frame is on the bus for two milliseconds.
+            if times.last().is_some_and(|begun| now == begun + 2) {
+                transport.frames_left(now);
+            }
             if let Some(data) = transport.next_frame(now) {
                 sent += 1;
                 assert_eq!(data[0], 0x20 | sent);
@@ -61,7 +65,8 @@ fn a_response_keeps_to_the_block_and_the_gap_that_the_tester_names() {
     }
     got.truncate(response.len());
     assert_eq!(got, response);
-    assert_eq!(times, [0, 5, 20, 25, 40]);
+    // Case bus/04: 5 ms from the end of a frame, which was within the millisecond before the report.
+    assert_eq!(times, [0, 8, 20, 28, 40]);
     assert!(transport.is_idle());
 }
 
@@ -123,6 +128,14 @@ fn a_tester_that_falls_silent_is_given_up_after_a_second() {
     }
     assert!(transport.is_idle(), "ten waits are the most");
     assert_eq!(transport.errors().timeout, 2);
+    // And a frame that never leaves.
+    give(&mut transport, &[0x22, 1, 2]);
+    transport.answer(|_, out| out.extend_from_slice(&long(20)).expect("it fits"));
+    let _ = transport.next_frame(0);
+    transport.receive(&frame(&[0x30, 0, 1], &[]), 0);
+    assert!(transport.next_frame(0).is_some() && transport.next_frame(500).is_none());
+    transport.expire(TIMEOUT_MS);
+    assert!(transport.is_idle() && transport.errors().timeout == 3);
 }
 
 #[test]

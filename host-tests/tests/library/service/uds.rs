@@ -1,6 +1,7 @@
 //! The diagnostic server as a tester sees it: sessions, data, troubles, routines and downloads, with the responses of
 //! ISO 14229-1 word for word.
 
+use super::access::locked;
 use super::{Board, sample, start};
 use gyronet::health::{Faults, Status};
 use gyronet::model::weights;
@@ -10,12 +11,12 @@ use gyronet::service::message::{AllCounters, Refusal};
 use gyronet::store::{Configuration, Field, FieldError, Record, StoreError};
 use gyronet::uds::Server;
 use gyronet::uds::data::{Access, IDENTIFIERS, Identifier};
-use gyronet::uds::dtc::{TROUBLES, bit};
+use gyronet::uds::dtc::{PASSED_TICKS, TROUBLES, bit};
 use gyronet_host_tests::flash::F405;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::stored::other_weights;
 use gyronet_host_tests::synthetic::judged;
-use gyronet_host_tests::tester::{Tester, frame};
+use gyronet_host_tests::tester::{Tester, bytes, frame};
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -51,6 +52,30 @@ impl Bench {
         })
     }
 
+    /// Asks all servers: a single frame. "Response pending" is counted.
+    fn ask_all(&mut self, request: &[u8]) -> Option<Vec<u8>> {
+        self.server.receive_functional(&frame(&[request.len() as u8], request), self.now);
+        (0..2).find_map(|_| {
+            self.server.poll(&mut self.board, &AllCounters::default(), self.now, || None);
+            let answer = self.server.next_frame(self.now)?;
+            let is_pending = matches!(answer, [3, 0x7F, _, 0x78, ..]);
+            self.tester.pending += usize::from(is_pending);
+            (!is_pending).then(|| answer[1..=usize::from(answer[0])].to_vec())
+        })
+    }
+
+    /// Lets the vehicle turn.
+    fn turn(&mut self) {
+        let turning = sample(0, [0.0, 0.0, 9.81], 0.3);
+        self.board.observe(
+            Some(&turning),
+            0,
+            (Status::Ready, Faults::NONE),
+            &WheelSample::without_speeds(Standstill::Moving),
+            &judged(Standstill::Moving),
+        );
+    }
+
     pub fn expect(&mut self, request: &[u8], response: &[u8]) {
         assert_eq!(self.ask(request).as_deref(), Some(response), "{request:02x?}");
     }
@@ -71,9 +96,13 @@ impl Bench {
     }
 
     fn fail(&mut self, status: Status, faults: Faults) {
+        self.fail_at(0, status, faults);
+    }
+
+    fn fail_at(&mut self, tick: u32, status: Status, faults: Faults) {
         self.board.observe(
             None,
-            0,
+            tick,
             (status, faults),
             &WheelSample::without_speeds(Standstill::Unknown),
             &judged(Standstill::Unknown),
@@ -106,71 +135,91 @@ fn a_session_ends_after_five_seconds_of_silence() {
     bench.expect(&[0x22, 0xF1, 0x86], &[0x62, 0xF1, 0x86, 1]);
 }
 
+/// The checks of ISO 14229-1 that each service makes, in the standard's order: a request that fails the check, and its
+/// code. Wherever it can, the request also fails a later check. The vehicle moves; `locked` is the extended session of a
+/// board with a key.
+const CHECKS: &str = "
+    default     BA=11 2301=11                                           services that the board does not have
+    default     10=13 100900=12 100300=13                               DiagnosticSessionControl
+    locked      110200=12 110100=33                                     ECUReset
+    default     11=13 110100=13 1101=22
+    locked      1401=33                                                 ClearDiagnosticInformation
+    default     140102=13 14010203=31
+    default     19=13 1942010203=12 1902=13 1906010203=13 190601020301=31  ReadDTCInformation
+    default     22=13 221234F1=13 221234FFFF=31                         ReadDataByIdentifier
+    default     27=7F                                                   SecurityAccess
+    extended    27=13 270300=12 270100=13 270200=13
+    locked      2701=22
+    default     28=7F                                                   CommunicationControl
+    locked      2809=12 2801=33
+    extended    28=13 2801=13 280302=31 280301=22
+    default     2E=7F                                                   WriteDataByIdentifier
+    locked      2E0100=13 2EF18601=31 2E010000=13
+    extended    2E01006300=31
+    default     31=7F 31010200=7F                                       RoutineControl
+    locked      31090909=31 3109020200=33
+    extended    310902=13 3109FF01=31 3109020000=12 3102020200=12 31030204=12
+    extended    3103020000=13 3101020200=13 31030200=24 31010202=22
+    extended    34=7F                                                   RequestDownload
+    programming 3410=13 341011=31 3400550004=31 34001100=13 3400110204=31 3400110004=22
+    extended    36=7F 37=7F                                             TransferData, RequestTransferExit
+    programming 36=13 3601=24 3700=13 37=24
+    default     3E=13 3E0100=12 3E0000=13                               TesterPresent
+    default     85=7F                                                   ControlDTCSetting
+    extended    85=13
+    locked      8509=12 8502=33
+";
+
 #[test]
-fn what_is_wrong_with_a_request_has_the_standard_s_code() {
-    let (_, mut bench) = bench();
-    for (request, code) in [
-        (&[0x10, 9][..], 0x12),
-        (&[0x10], 0x13),
-        (&[0x10, 3, 0], 0x13),
-        (&[0x11, 2], 0x12),
-        (&[0x14, 1, 2, 3], 0x31),
-        (&[0x19, 0x42], 0x12),
-        (&[0x19, 2], 0x13),
-        (&[0x19, 6, 1, 2, 3, 1], 0x31),
-        (&[0x22, 0xF1], 0x13),
-        (&[0x22, 0x12, 0x34], 0x31),
-        (&[0x23, 1], 0x11),
-        (&[0x28, 1, 1], 0x7F),
-        (&[0x2E, 1, 0, 0], 0x7F),
-        (&[0x31, 1, 2, 0], 0x7F),
-        (&[0x34, 0, 0x11, 0, 4], 0x7F),
-        (&[0x36, 1, 0], 0x7F),
-        (&[0x37], 0x7F),
-        (&[0x3E, 1], 0x12),
-        (&[0x85, 2], 0x7F),
-        (&[0xBA], 0x11),
-    ] {
-        bench.expect(request, &[0x7F, request[0], code]);
+fn each_service_makes_its_checks_in_the_order_of_the_standard() {
+    let mut served = [false; 256];
+    for line in CHECKS.trim().lines() {
+        let mut words = line.split_whitespace();
+        let state = words.next().expect("a state");
+        let mut bench = if state == "locked" { locked().1 } else { bench().1 };
+        match state {
+            "default" => {}
+            "programming" => bench.expect(&[0x10, 2], &[0x50, 2, 0, 50, 0x01, 0xF4]),
+            _ => bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]),
+        }
+        bench.turn();
+        for (request, code) in words.filter_map(|word| word.split_once('=')) {
+            let (request, code) = (bytes(request), bytes(code)[0]);
+            let answer = [0x7F, request[0], code];
+            bench.expect(&request, &answer);
+            served[usize::from(request[0])] |= code != 0x11;
+            // To all servers, what a server does not have or do is refused in silence, unless it asked to wait.
+            let pending = bench.tester.pending;
+            let to_all = bench.ask_all(&request);
+            let is_aloud =
+                !matches!(code, 0x11 | 0x12 | 0x31 | 0x7E | 0x7F) || bench.tester.pending > pending;
+            assert_eq!(to_all.as_deref(), is_aloud.then_some(&answer[..]), "{line}");
+        }
     }
-    bench.expect(&[0x10, 2], &[0x50, 2, 0, 50, 0x01, 0xF4]);
-    for (request, code) in [
-        (&[0x28, 2, 1][..], 0x12),
-        (&[0x28, 1, 2], 0x31),
-        (&[0x28, 1], 0x13),
-        (&[0x2E, 0xF1, 0x86, 1], 0x31),
-        (&[0x2E, 1, 0], 0x13),
-        (&[0x2E, 1, 0, 99, 0], 0x31),
-        (&[0x31, 1, 9, 9], 0x31),
-        (&[0x31, 3, 2, 0], 0x24),
-        (&[0x31, 2, 2, 2], 0x12),
-        (&[0x34, 0x10, 0x11, 0, 4], 0x31),
-        (&[0x34, 0, 0x55, 0, 4], 0x31),
-        (&[0x34, 0, 0x11, 0], 0x13),
-        (&[0x34, 0, 0x11, 2, 4], 0x31),
-        (&[0x36, 1, 0], 0x24),
-        (&[0x37], 0x24),
-    ] {
-        bench.expect(request, &[0x7F, request[0], code]);
+    // No service is left out.
+    let (_, mut bench) = bench();
+    for service in 0..=u8::MAX {
+        let is_served = bench.ask(&[service]) != Some(vec![0x7F, service, 0x11]);
+        assert_eq!(is_served, served[usize::from(service)], "{service:02x}");
+    }
+}
+
+/// Case bus/06.
+#[test]
+fn a_list_with_unknown_identifiers_gives_the_known_ones() {
+    let (_, mut bench) = bench();
+    for list in [[0xF1, 0x86, 0xFF, 0xFF], [0xFF, 0xFF, 0xF1, 0x86]] {
+        bench.expect(&[&[0x22][..], &list].concat(), &[0x62, 0xF1, 0x86, 1]);
     }
 }
 
 #[test]
-fn requests_to_all_servers_are_refused_in_silence() {
+fn requests_to_all_servers_are_counted_where_they_come_between() {
     let (_, mut bench) = bench();
-    let mut functional = |request: &[u8]| {
-        let Bench { server, board, now, .. } = &mut bench;
-        server.receive_functional(&frame(&[request.len() as u8], request), *now);
-        server.poll(board, &AllCounters::default(), *now, || None);
-        server.next_frame(*now).map(|data| data[1..=usize::from(data[0])].to_vec())
-    };
-    assert_eq!(functional(&[0x3E, 0]), Some(vec![0x7E, 0]));
-    assert_eq!(functional(&[0xBA]), None);
-    assert_eq!(functional(&[0x22, 0x12, 0x34]), None);
-    assert_eq!(functional(&[0x3E, 0x80]), None);
-    assert_eq!(functional(&[0x10]), Some(vec![0x7F, 0x10, 0x13]), "a length is refused aloud");
+    assert_eq!(bench.ask_all(&[0x3E, 0]), Some(vec![0x7E, 0]));
+    assert_eq!(bench.ask_all(&[0x3E, 0x80]), None);
     // One that is no request changes nothing for the next, and all but "tester present" is counted.
-    assert_eq!(functional(&[]), None);
+    assert_eq!(bench.ask_all(&[]), None);
     bench.expect(&[0xBA], &[0x7F, 0xBA, 0x11]);
     bench.server.receive(&[0x10, 20, 0x22, 1, 0, 1, 1, 1], bench.now);
     bench.server.receive_functional(&[2, 0x3E, 0x80], bench.now);
@@ -241,13 +290,63 @@ fn a_trouble_survives_a_restart_with_the_state_in_which_it_came() {
     assert_eq!(flash.borrow().operations(), operations);
     let mut after = Bench::new(&flash);
     let snapshot = [1, 2, 1, 4, Status::Silent as u8, Faults::GAP.0, 1, 8, 0, 0, 0x04, 0xD2];
-    let response = [&[0x59, 4, 0x5A, 0x01, 0x31, 0x28][..], &snapshot].concat();
+    let response = [&[0x59, 4, 0x5A, 0x01, 0x31, 0x2C][..], &snapshot].concat();
     after.fail(Status::Ready, Faults::NONE);
     after.expect(&[0x19, 4, 0x5A, 0x01, 0x31, 1], &response);
     after.expect(&[0x14, 0xFF, 0xFF, 0xFF], &[0x54]);
     after.fail(Status::Ready, Faults::NONE);
     let mut cleared = Bench::new(&flash);
     cleared.expect(&[0x19, 4, 0x5A, 0x01, 0x31, 1], &[0x59, 4, 0x5A, 0x01, 0x31, 0]);
+}
+
+/// ISO 14229-1 D.2: pending from the cycle with the fault to the end of the next one without.
+#[test]
+fn a_trouble_is_pending_for_two_cycles_and_confirmed_until_it_is_cleared() {
+    const SILENCE: [u8; 6] = [0x19, 6, 0x5A, 0x01, 0x31, 1];
+    let status = |bench: &mut Bench| bench.ask(&SILENCE).expect("the trouble")[5];
+    let (flash, mut bench) = bench();
+    assert_eq!(bench.board.set_configuration(&Configuration::DEFAULT), Ok(()));
+    bench.fail(Status::Silent, Faults::NONE);
+    assert_eq!(status(&mut bench), 0x2F);
+    bench.fail(Status::Ready, Faults::NONE);
+    assert_eq!(status(&mut bench), 0x2E, "over, but of this cycle");
+    // A cycle that ends early is none that has passed.
+    for ticks in [PASSED_TICKS - 1, PASSED_TICKS] {
+        let mut next = Bench::new(&flash);
+        next.fail_at(0, Status::Init, Faults::NONE);
+        assert_eq!(status(&mut next), 0x2C);
+        next.fail_at(ticks, Status::Ready, Faults::NONE);
+        assert_eq!(status(&mut next), 0x2C, "until the end of the cycle");
+    }
+    let mut third = Bench::new(&flash);
+    third.fail_at(0, Status::Init, Faults::NONE);
+    assert_eq!(status(&mut third), 0x28, "confirmed stays");
+    third.fail(Status::Silent, Faults::NONE);
+    assert_eq!(status(&mut third), 0x2F);
+    assert_eq!(status(&mut Bench::new(&flash)), 0x2C, "pending again");
+}
+
+/// Case bus/20: what an erase of the board's own makes its lines miss is no trouble; what lasts longer is.
+#[test]
+fn a_stall_for_a_request_leaves_no_troubles() {
+    let (_, mut bench) = bench();
+    bench.expect(&[0x14, 0xFF, 0xFF, 0xFF], &[0x54]);
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.stand();
+    let before = bench.ask(&[0x19, 2, 8]).expect("the crash of these tests");
+    let record = postcard::to_stdvec(&Configuration::DEFAULT).expect("it fits");
+    bench.expect(&[&[0x2E, 1, 0, Configuration::VERSION][..], &record].concat(), &[0x6E, 1, 0]);
+    let stall = Faults::GAP.with(Faults::BUS).with(Faults::WHEELS);
+    bench.fail(Status::Silent, stall);
+    bench.now += 990;
+    bench.fail(Status::Silent, stall);
+    assert_eq!(bench.ask(&[0x19, 2, 8]).as_deref(), Some(&before[..]));
+    // Another fault is recorded at once, and one that stays after a second.
+    bench.fail(Status::Stuck, stall);
+    assert_eq!(bench.ask(&[0x19, 2, 8]).map(|all| all.len()), Some(before.len() + 4));
+    bench.now += 20;
+    bench.fail(Status::Silent, stall);
+    assert_eq!(bench.ask(&[0x19, 2, 8]).map(|all| all.len()), Some(before.len() + 4 + 4 * 4));
 }
 
 #[test]
@@ -258,9 +357,16 @@ fn a_trouble_erases_nothing_before_a_tester_s_session_at_standstill() {
     bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
     bench.stand();
     bench.fail(Status::Silent, Faults::NONE);
+    // Case bus/05: a request in the middle of an erase would be answered late, so the erase waits for one.
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    assert_eq!((flash.borrow().operations(), bench.tester.pending), (0, 0));
+    bench.expect(&[0x22, 0xF1, 0x86], &[0x62, 0xF1, 0x86, 3]);
     assert!(flash.borrow().operations() > 0);
+    assert_eq!(bench.tester.pending, 1, "the tester was told to wait");
+    bench.expect(&[0x22, 0xF1, 0x86], &[0x62, 0xF1, 0x86, 3]);
+    assert_eq!(bench.tester.pending, 1);
     let mut after = Bench::new(&flash);
-    after.expect(&[0x19, 6, 0x5A, 0x01, 0x31, 1], &[0x59, 6, 0x5A, 0x01, 0x31, 0x28, 1, 1]);
+    after.expect(&[0x19, 6, 0x5A, 0x01, 0x31, 1], &[0x59, 6, 0x5A, 0x01, 0x31, 0x2C, 1, 1]);
 }
 
 #[test]
@@ -284,21 +390,21 @@ fn each_trouble_has_a_code_of_its_own_and_one_condition() {
 fn messages_are_stopped_at_standstill_and_for_the_length_of_a_session() {
     let (_, mut bench) = bench();
     bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    let turning = sample(0, [0.0, 0.0, 9.81], 0.3);
-    bench.board.observe(
-        Some(&turning),
-        0,
-        (Status::Ready, Faults::NONE),
-        &WheelSample::without_speeds(Standstill::Moving),
-        &judged(Standstill::Moving),
-    );
+    bench.turn();
     bench.expect(&[0x28, 1, 1], &[0x7F, 0x28, 0x22]);
     assert!(!bench.server.is_silenced());
     bench.stand();
-    bench.expect(&[0x28, 1, 1], &[0x68, 1]);
+    // Case bus/14: with 03 and 02 a tester also names what a server receives, which goes on.
+    for (sub, is_silenced) in [(1, true), (0, false), (3, true), (2, false)] {
+        bench.expect(&[0x28, sub, 1], &[0x68, sub]);
+        assert_eq!(bench.server.is_silenced(), is_silenced, "{sub}");
+    }
+    assert_eq!(bench.ask_all(&[0x28, 0x83, 1]), None);
     assert!(bench.server.is_silenced());
-    bench.expect(&[0x28, 0, 1], &[0x68, 0]);
-    assert!(!bench.server.is_silenced());
+    bench.turn();
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    assert!(!bench.server.is_silenced(), "a vehicle that moves has its messages");
+    bench.stand();
     bench.expect(&[0x28, 1, 3], &[0x68, 1]);
     bench.now += 5_001;
     bench.fail(Status::Ready, Faults::NONE);
@@ -315,14 +421,7 @@ fn a_configuration_is_read_changed_and_written_at_standstill() {
     let mut write = vec![0x2E, 1, 0, Configuration::VERSION];
     write.extend(postcard::to_stdvec(&changed).expect("it fits"));
     bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    let turning = sample(0, [0.0, 0.0, 9.81], 0.3);
-    bench.board.observe(
-        Some(&turning),
-        0,
-        (Status::Ready, Faults::NONE),
-        &WheelSample::without_speeds(Standstill::Moving),
-        &judged(Standstill::Moving),
-    );
+    bench.turn();
     bench.expect(&write, &[0x7F, 0x2E, 0x22]);
     bench.stand();
     bench.expect(&write, &[0x6E, 1, 0]);
