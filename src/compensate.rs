@@ -106,6 +106,22 @@ impl Entry {
         let [.., rate] = self.rates;
         rate
     }
+
+    /// Returns what is subtracted from the yaw rate: the estimate, the bias, and the gain's share of the rest.
+    fn taken(&self, Remaining { bias, gain }: Remaining) -> i64 {
+        let taken = i64::from(self.estimate) + i64::from(bias.0);
+        let rest = i64::from(self.rate().0) - taken;
+        if gain == 0.0 { taken } else { taken + (gain * rest as f32) as i64 }
+    }
+}
+
+/// What the gyro reads wrong beyond its static bias and the network's estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Remaining {
+    /// At any rate.
+    pub bias: AngularRate,
+    /// Share of the rate that is read too much.
+    pub gain: f32,
 }
 
 /// A compensated rate and the correction that was subtracted.
@@ -142,13 +158,21 @@ pub struct Complete {
     pub correction: AngularRate,
     /// The sample is good: a window has covered it, and the part was not saturated.
     pub good: bool,
+    /// The part was not saturated.
+    pub valid: bool,
 }
 
 impl Complete {
     /// Returns the rate less the correction; `None` where it is not good.
     #[must_use]
     pub fn left(&self) -> Option<AngularRate> {
-        self.good.then_some(AngularRate(self.rate.0.saturating_sub(self.correction.0)))
+        self.valid_left().filter(|_| self.good)
+    }
+
+    /// Returns the rate less the correction, also where no window has covered the sample.
+    #[must_use]
+    pub fn valid_left(&self) -> Option<AngularRate> {
+        self.valid.then_some(AngularRate(self.rate.0.saturating_sub(self.correction.0)))
     }
 }
 
@@ -278,12 +302,12 @@ impl Compensator {
         if self.mounting_check.is_mismatched() { self.steady_gain.mounting() } else { SteadyGain::NONE }
     }
 
-    /// Returns the rate of the newest sample, less the estimate and `bias`.
+    /// Returns the rate of the newest sample, less the estimate and what remains.
     ///
     /// Revisions are not carried into a clipped rate, because a receiver drops it.
-    pub fn live(&mut self, bias: AngularRate) -> Option<Compensated> {
+    pub fn live(&mut self, remaining: Remaining) -> Option<Compensated> {
         let entry = self.kept[KEPT - 1]?;
-        let taken = i64::from(entry.estimate) + i64::from(bias.0);
+        let taken = entry.taken(remaining);
         let carried = self.live_revisions / LIVE_DIVISOR;
         Some(emit(&entry, taken, carried, &mut self.live_revisions, self.config.max_revision))
     }
@@ -292,10 +316,10 @@ impl Compensator {
     /// Call it once for each sample.
     ///
     /// `stands` is true when the vehicle has stood since before that sample was taken; its rate is then zero.
-    pub fn delayed(&mut self, bias: AngularRate, stands: bool) -> Option<Compensated> {
+    pub fn delayed(&mut self, remaining: Remaining, stands: bool) -> Option<Compensated> {
         let entry = self.kept.iter_mut().nth_back(self.config.lag.samples())?.as_mut()?;
         entry.held = stands && entry.validity.is_good();
-        let mut taken = i64::from(entry.estimate) + i64::from(bias.0);
+        let mut taken = entry.taken(remaining);
         let mut withheld = None;
         if entry.held {
             if self.held_until == 0 {
@@ -322,6 +346,7 @@ impl Compensator {
             rate: entry.rate(),
             correction: AngularRate(entry.estimate),
             good: entry.count > 0 && entry.validity.is_good(),
+            valid: entry.validity.is_good(),
         })
     }
 
@@ -355,10 +380,10 @@ impl Compensator {
     /// Returns the amount that the sum of the delayed rates still lacks: revisions that are not carried yet, and
     /// samples whose rates are not sent yet.
     #[must_use]
-    pub fn delayed_pending(&self, bias: AngularRate) -> i64 {
+    pub fn delayed_pending(&self, remaining: Remaining) -> i64 {
         let waiting = self.kept.iter().rev().take(self.config.lag.samples()).flatten();
         let waiting = waiting.filter(|entry| entry.validity.is_good());
-        let best = |entry: &Entry| i64::from(entry.rate().0) - i64::from(entry.estimate) - i64::from(bias.0);
+        let best = |entry: &Entry| i64::from(entry.rate().0) - entry.taken(remaining);
         waiting.map(best).sum::<i64>() - self.delayed_revisions
     }
 }

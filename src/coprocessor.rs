@@ -39,6 +39,7 @@ use crate::can::wheel::WheelReceiver;
 use crate::compensate::Complete;
 use crate::estimate::{VehicleSample, YawEstimate};
 use crate::fog::{FogCounters, FogPipeline};
+use crate::heading::Heading;
 use crate::health::slow::SlowStatus;
 use crate::health::{BoardFaults, Faults, InputCounters, MonitorCounters, Quality, Source, count};
 use crate::model::Estimate;
@@ -259,6 +260,21 @@ impl Coprocessor {
             }
             wheels => Ok(self.take_latitude(frame, time)? || wheels.is_some()),
         }
+    }
+
+    /// Processes a course over ground that arrived at `now`. It may be up to two seconds older than its arrival.
+    ///
+    /// # Errors
+    /// [`InputError::Heading`] when a value can be no vehicle's, [`InputError::ClockWentBack`]; it is counted and not
+    /// used.
+    pub fn heading(&mut self, heading: &Heading, now: Micros) -> Result<(), InputError> {
+        self.advance(now)?;
+        let checked = heading.checked().map_err(|error| {
+            count(&mut self.counters.heading_errors, 1);
+            InputError::Heading(error)
+        })?;
+        self.pipeline.course(&checked);
+        Ok(())
     }
 
     fn take_latitude(&mut self, frame: &DataFrame, time: Micros) -> Result<bool, InputError> {

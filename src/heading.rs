@@ -1,11 +1,17 @@
 //! A heading reference of the vehicle: course and speed over ground with their accuracies, from CAN.
 //!
 //! [`nmea2000`] has the messages of GNSS receivers on boats and machines, [`j1939`] that of trucks, and [`described`]
-//! reads any other frame by its description. These are types and codecs alone; nothing on the board uses them yet.
+//! reads any other frame by its description. [`Estimator`] learns from them.
 
 pub mod described;
+mod estimator;
+pub(crate) mod filter;
 pub mod j1939;
 pub mod nmea2000;
+mod turns;
+
+pub use estimator::{CourseConfig, CourseCounters, Estimator, Refusal};
+pub(crate) use estimator::{FINE_BIAS, gain_knowledge};
 
 use embedded_can::{ExtendedId, Frame, Id};
 

@@ -283,6 +283,8 @@ pub struct InputCounters {
     pub wheel_errors: u32,
     /// Frames whose latitude was marked invalid, was impossible, or was too far from the one in use.
     pub latitude_errors: u32,
+    /// Courses or speeds over ground that no vehicle has.
+    pub heading_errors: u32,
     /// Inputs with a time before the newest one.
     pub clock_back: u32,
     /// Estimates that no window waited for.
@@ -300,6 +302,7 @@ impl InputCounters {
         fog_errors: 0,
         wheel_errors: 0,
         latitude_errors: 0,
+        heading_errors: 0,
         clock_back: 0,
         unclaimed_estimates: 0,
         replaced_windows: 0,

@@ -10,6 +10,7 @@
 //! frames.
 
 mod config;
+mod course;
 mod initialised;
 mod report;
 mod sensor_bias;
@@ -27,6 +28,7 @@ use crate::align::{AlignError, Aligner, MAX_GAP};
 use crate::bias::{StaticError, StaticInit, ZeroRate, ZeroRateOutcome};
 use crate::compensate::{Compensated, Compensator, Complete, Implausible};
 use crate::estimate::{AccumulatedYaw, VehicleSample};
+use crate::heading::Estimator;
 use crate::health::{BoardFaults, Counters, Faults, count};
 use crate::model::Estimate;
 use crate::monitor::{AXIS_STUCK_AFTER, STUCK_AFTER};
@@ -35,6 +37,7 @@ use crate::standstill::{Judge, Standing};
 
 use crate::model::window::{self, Features, WINDOW};
 use crate::units::{AngularRate, Yaw};
+use course::Start;
 use initialised::Initialised;
 use sensor_bias::{SensorBias, ZeroPoint};
 use windows::Windows;
@@ -98,6 +101,8 @@ struct State {
     standing: Standing,
     static_init: StaticInit,
     initialised: Option<Initialised>,
+    course: Estimator,
+    start: Start,
     windows: Windows,
     compensator: Compensator,
     uncertainty: Uncertainty,
@@ -145,6 +150,8 @@ impl Pipeline {
             standing: Standing::UNKNOWN,
             static_init: StaticInit::new(config.static_init),
             initialised: None,
+            course: Estimator::new(config.course),
+            start: Start::EMPTY,
             windows: Windows::START,
             compensator: Compensator::new(config.compensate),
             uncertainty: Uncertainty::new(config.uncertainty),
@@ -248,10 +255,12 @@ impl Pipeline {
                 if let Some((levelling, _)) = early {
                     frame.sample = levelling.sample(&frame.sample);
                 }
+                self.start_in_motion(&frame, early, standing);
                 (Rates { early_sigma: early.map(|(_, sigma)| sigma), ..Rates::default() }, refused)
             }
             Some(zero) => (self.estimate_rates(&frame, &zero, standing, moves), None),
         };
+        self.judge_start();
         self.state.standing = self.judged(standing);
         let vehicle = self.report(&frame, &rates, wheels, board);
         let stride = self.config.compensate.mode.stride();
@@ -297,7 +306,7 @@ impl Pipeline {
     pub fn pending(&self) -> Pending {
         Pending {
             live: Yaw(self.state.compensator.live_pending()),
-            delayed: Yaw(self.state.compensator.delayed_pending(self.bias())),
+            delayed: Yaw(self.state.compensator.delayed_pending(self.remaining())),
         }
     }
 
@@ -412,17 +421,18 @@ impl Pipeline {
         }
         let complete = self.state.compensator.complete();
         self.update_bias(complete.as_ref(), good.then_some(rate), standing);
-        let bias = self.bias();
+        let remaining = self.remaining();
         let stands = self.state.stood as usize > self.config.compensate.lag.samples();
-        let live = self.state.compensator.live(bias);
-        let delayed = self.state.compensator.delayed(bias, stands);
+        let live = self.state.compensator.live(remaining);
+        let delayed = self.state.compensator.delayed(remaining, stands);
         Rates { live, delayed, complete, early_sigma: None }
     }
 
     fn update_bias(&mut self, complete: Option<&Complete>, rate: Option<AngularRate>, standing: Standing) {
-        let State { initialised, compensator, stood, counters, sensor_bias, .. } = &mut self.state;
+        let State { initialised, compensator, stood, counters, sensor_bias, course, .. } = &mut self.state;
         let zero_rate = initialised.as_mut().and_then(|known| known.zero_rate.as_mut());
         let (Some(zero_rate), Some(complete)) = (zero_rate, complete) else { return };
+        course.add(zero_rate.filter(), complete.tick, complete.valid_left(), standing.is_likely());
         match zero_rate.observe(complete.left(), standing, sensor_bias.change_sigma()) {
             Some(ZeroRateOutcome::Used) => {
                 count(&mut counters.zero_rate_updates, 1);

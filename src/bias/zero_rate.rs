@@ -21,6 +21,7 @@
 //! [`AGREEING_STOPS`] that contradict it and agree with each other replace the bias.
 
 use super::Spread;
+use crate::heading::filter::{BIAS, Filter, GAIN, STOP};
 use crate::sample::RATE_HZ;
 use crate::sqrt::sqrt;
 use crate::standstill::{Standing, StandstillSource};
@@ -101,21 +102,11 @@ struct Doubt {
     stops: u8,
 }
 
-/// Covariance of bias and offset.
-#[derive(Debug, Clone, Copy)]
-struct Covariance {
-    bias: f32,
-    both: f32,
-    offset: f32,
-}
-
 /// Estimates the bias that remains after static initialisation and network.
 #[derive(Debug, Clone)]
 pub struct ZeroRate {
     config: ZeroRateConfig,
-    bias: f32,
-    offset: f32,
-    covariance: Covariance,
+    filter: Filter,
     standing: Standing,
     /// The means of a second so far, and the sum and number of the samples of the next one.
     block: Spread,
@@ -139,13 +130,14 @@ impl ZeroRate {
     #[must_use]
     pub fn new(config: ZeroRateConfig) -> Self {
         let square = |sigma: f32| sigma * sigma;
-        let covariance =
-            Covariance { bias: square(config.initial), both: 0.0, offset: square(config.standstill) };
+        Self::with(config, Filter::new(square(config.initial), square(config.standstill)))
+    }
+
+    /// Creates it with a filter that has learnt already.
+    pub(crate) fn with(config: ZeroRateConfig, filter: Filter) -> Self {
         Self {
             config,
-            bias: 0.0,
-            offset: 0.0,
-            covariance,
+            filter,
             standing: Standing::UNKNOWN,
             block: Spread::EMPTY,
             batch: (0, 0),
@@ -158,6 +150,17 @@ impl ZeroRate {
             since_walk: 0,
             thermal: 0.0,
         }
+    }
+
+    /// Returns the filter, for what is learnt in motion.
+    pub(crate) fn filter(&mut self) -> &mut Filter {
+        &mut self.filter
+    }
+
+    /// Returns the learnt gain, and its sigma once it is estimated.
+    pub(crate) fn gain(&self) -> (f32, Option<f32>) {
+        let variance = self.filter.variance::<GAIN>();
+        (self.filter.get::<GAIN>(), (variance > 0.0).then(|| sqrt(variance)))
     }
 
     /// Adds the remaining rate of a complete sample (gyro less static bias less the network's estimate; `None` where
@@ -257,7 +260,7 @@ impl ZeroRate {
 
     /// Returns the variance of the difference between the mean of a second, which has this variance, and the filter.
     fn innovation_variance(&self, measured: f32) -> f32 {
-        let Covariance { both, offset, .. } = self.covariance;
+        let (both, offset) = (self.filter.bias_and_stop(), self.filter.variance::<STOP>());
         (self.bias_variance() + 2.0 * both + offset + measured).max(measured)
     }
 
@@ -271,7 +274,8 @@ impl ZeroRate {
     /// Returns the bias to subtract; while the wheels stand, it contains the offset of this standstill.
     #[must_use]
     pub fn bias(&self) -> AngularRate {
-        let bias = if self.stands() { self.bias + self.offset } else { self.bias };
+        let own = self.filter.get::<BIAS>();
+        let bias = if self.stands() { own + self.filter.get::<STOP>() } else { own };
         let bias = within(bias, 2.0 * self.config.max_bias);
         AngularRate(libm::roundf(bias * AngularRate::PER_RAD_PER_SEC) as i32)
     }
@@ -280,7 +284,8 @@ impl ZeroRate {
     #[must_use]
     pub fn sigma(&self) -> f32 {
         let Doubt { mean, seconds, earlier, stops } = self.doubt;
-        let off = |mean: f32, is_doubt: bool| if is_doubt { libm::fabsf(mean - self.bias) } else { 0.0 };
+        let bias = self.filter.get::<BIAS>();
+        let off = |mean: f32, is_doubt: bool| if is_doubt { libm::fabsf(mean - bias) } else { 0.0 };
         let off = off(mean, seconds >= REFUSED_SECONDS).max(off(earlier, stops > 0));
         sqrt(self.bias_variance() + off * off).min(self.config.max_bias)
     }
@@ -295,7 +300,7 @@ impl ZeroRate {
     /// the last update, (rad/s)^2.
     fn bias_variance(&self) -> f32 {
         let largest = self.config.max_bias;
-        (self.covariance.bias + self.thermal * self.thermal).min(largest * largest)
+        (self.filter.variance::<BIAS>() + self.thermal * self.thermal).min(largest * largest)
     }
 
     /// Returns whether the wheels stand and the gyro does not contradict them.
@@ -309,10 +314,9 @@ impl ZeroRate {
         self.standing = standing;
         self.refused = false;
         self.restart();
-        self.offset = 0.0;
         let ZeroRateConfig { standstill, mistaken, .. } = self.config;
         let offset = standstill * standstill + (1.0 - standing.probability) * mistaken * mistaken;
-        self.covariance = Covariance { both: 0.0, offset, ..self.covariance };
+        self.filter.restart::<STOP>(0.0, offset);
     }
 
     /// Compares a stop that contradicted the bias with earlier ones, and replaces the bias once enough agree.
@@ -330,8 +334,8 @@ impl ZeroRate {
         let mean = before + (mean - before) / f32::from(stops);
         self.doubt = Doubt { earlier: mean, stops, ..Doubt::default() };
         if stops >= AGREEING_STOPS {
-            self.bias = within(mean, self.config.max_bias);
-            self.covariance = Covariance { bias: variance, both: 0.0, offset: 0.0 };
+            self.filter.restart::<BIAS>(within(mean, self.config.max_bias), variance);
+            self.filter.restart::<STOP>(self.filter.get::<STOP>(), 0.0);
             self.doubt = Doubt::default();
         }
     }
@@ -339,7 +343,8 @@ impl ZeroRate {
     /// Adds a second of the bias' random walk to its variance.
     fn walk(&mut self) {
         let ZeroRateConfig { walk, max_bias, .. } = self.config;
-        self.covariance.bias = (self.covariance.bias + walk * walk).min(max_bias * max_bias);
+        let variance = self.filter.variance::<BIAS>() + walk * walk;
+        self.filter.put_variance::<BIAS>(variance.min(max_bias * max_bias));
     }
 
     fn second(&mut self, block: &Spread) -> ZeroRateOutcome {
@@ -366,7 +371,7 @@ impl ZeroRate {
 
     /// Returns whether a second is off by more than the filter's own sigma explains.
     fn is_off(&self, measured: &Measurement) -> bool {
-        let step = measured.mean - self.bias - self.offset;
+        let step = measured.mean - self.filter.get::<BIAS>() - self.filter.get::<STOP>();
         libm::fabsf(step) > GATE * sqrt(self.innovation_variance(measured.usual))
     }
 
@@ -381,24 +386,24 @@ impl ZeroRate {
 
     /// Applies the Kalman filter's measurement update.
     fn update(&mut self, measured: Measurement) {
-        self.covariance.bias = self.bias_variance();
-        self.thermal = 0.0;
+        self.take_thermal();
         if self.standing.is_likely() {
             self.doubt = Doubt::default();
         }
-        let Covariance { bias, both, offset } = self.covariance;
-        let (with_bias, with_offset) = (bias + both, both + offset);
-        let innovation = measured.mean - self.bias - self.offset;
-        let per_variance = 1.0 / (with_bias + with_offset + measured.variance);
-        let (bias_gain, offset_gain) = (with_bias * per_variance, with_offset * per_variance);
+        self.filter.standstill(measured.mean, measured.variance);
+        self.bound();
+    }
+
+    /// Adds the change with temperature to the variance of the bias.
+    fn take_thermal(&mut self) {
+        self.filter.put_variance::<BIAS>(self.bias_variance());
+        self.thermal = 0.0;
+    }
+
+    fn bound(&mut self) {
         let largest = self.config.max_bias;
-        self.bias = within(self.bias + bias_gain * innovation, largest);
-        self.offset = within(self.offset + offset_gain * innovation, largest);
-        self.covariance = Covariance {
-            bias: (bias - bias_gain * with_bias).max(0.0),
-            both: both - bias_gain * with_offset,
-            offset: (offset - offset_gain * with_offset).max(0.0),
-        };
+        self.filter.put::<BIAS>(within(self.filter.get::<BIAS>(), largest));
+        self.filter.put::<STOP>(within(self.filter.get::<STOP>(), largest));
     }
 }
 

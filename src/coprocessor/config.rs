@@ -9,6 +9,7 @@ use crate::can::latitude::{LatitudeError, LatitudeReceiver};
 use crate::can::wheel::{WheelError, WheelReceiver};
 use crate::can::yaw::FOG_IDS;
 use crate::fog::FogConfig;
+use crate::heading::HeadingError;
 use crate::pipeline::PipelineConfig;
 use crate::units::Duration;
 
@@ -101,6 +102,9 @@ pub enum InputError {
     /// A latitude is marked invalid, is impossible, or is too far from the one in use.
     #[error("{0}")]
     Latitude(#[source] LatitudeError),
+    /// A course or speed over ground is no vehicle's.
+    #[error("{0}")]
+    Heading(#[source] HeadingError),
     /// No window waits for this estimate.
     #[error("no window waits for estimate {end}")]
     NoWindow {

@@ -2,6 +2,7 @@
 
 use crate::bias::{BiasCurve, EarthRate, StaticConfig, ZeroRateConfig};
 use crate::compensate::CompensateConfig;
+use crate::heading::CourseConfig;
 use crate::health::slow::Knowledge;
 use crate::mounting::{GyroMap, Levelling, Rotation};
 use crate::pipeline::UncertaintyConfig;
@@ -29,6 +30,8 @@ pub struct PipelineConfig {
     pub earth_rate: EarthRate,
     /// Zero-rate updates; `None` leaves the bias as static initialisation found it.
     pub zero_rate: Option<ZeroRateConfig>,
+    /// Learning from courses, with the filter of the zero-rate updates.
+    pub course: CourseConfig,
     /// Limits by which the inertial sensor shows a standstill.
     pub standstill: StandstillConfig,
     /// Settings of the compensation, which applies the estimates to the rates.
@@ -49,6 +52,7 @@ impl PipelineConfig {
         static_init: StaticConfig::DEFAULT,
         earth_rate: EarthRate::LeftInBias,
         zero_rate: Some(ZeroRateConfig::DEFAULT),
+        course: CourseConfig::DEFAULT,
         standstill: StandstillConfig::DEFAULT,
         compensate: CompensateConfig::DEFAULT,
         uncertainty: UncertaintyConfig::DEFAULT,

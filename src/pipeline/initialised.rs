@@ -1,4 +1,5 @@
-//! Static initialisation finds the bias and the tilt; this module holds both once it has succeeded.
+//! Static initialisation finds the bias and the tilt, or a course the bias of a vehicle that moves; this module holds both
+//! once one has succeeded.
 
 use super::sensor_bias::ZeroPoint;
 use super::{Pipeline, PipelineConfig};
@@ -15,6 +16,8 @@ pub(super) struct Initialised {
     pub(super) levelling: Rotation,
     pub(super) zero: ZeroPoint,
     pub(super) zero_rate: Option<ZeroRate>,
+    /// The bias was found in motion, and is not known well yet.
+    pub(super) is_coarse: bool,
 }
 
 impl Pipeline {
@@ -53,7 +56,9 @@ impl Pipeline {
             levelling,
             zero: ZeroPoint::at_rest(levelling.rate(rest.angular_rate), earth_rate),
             zero_rate: zero_rate.map(ZeroRate::new),
+            is_coarse: false,
         });
+        self.state.course.restart();
         Ok(())
     }
 }

@@ -4,7 +4,7 @@ use super::{BoardState, Origin, Pipeline, Rates, Turning};
 use crate::bias::ZeroRate;
 use crate::compensate::Compensated;
 use crate::estimate::{VehicleSample, YawEstimate};
-use crate::health::{Faults, Status, judge};
+use crate::health::{Faults, Quality, Status, judge};
 use crate::sample::{Frame, PERIOD_US, Validity, WheelSample};
 use crate::standstill::Standing;
 use crate::units::{AngularRate, Yaw};
@@ -26,6 +26,9 @@ impl Pipeline {
         let mut live = self.estimate(frame, rates.live, early, board, |_| accepted);
         let is_calibrated = self.is_calibrated();
         self.state.uncertainty.calibrated(is_calibrated);
+        if let Some((_, sigma)) = self.gain_by_course() {
+            self.state.uncertainty.gain(sigma);
+        }
         let covered = |rate: &Compensated| rate.covered || accepted;
         let mut delayed = self.estimate(frame, rates.delayed, early, board, covered);
         for estimate in [&mut live, &mut delayed] {
@@ -141,6 +144,8 @@ impl Pipeline {
             Validity::Good => Status::Degraded,
         };
         let (source, quality) = judge(status);
+        let quality =
+            if self.is_bias_coarse() && quality == Quality::Good { Quality::Degraded } else { quality };
         let [.., raw] = frame.sample.angular_rate;
         let tick = rate.map_or(frame.tick, |rate| rate.tick);
         let bias = self.bias_sigma(early_sigma);

@@ -15,11 +15,15 @@ impl Pipeline {
         let known = self.state.initialised.is_some();
         let bias = match (known, self.state.sensor_bias.is_known()) {
             _ if self.zero_rate().is_some_and(ZeroRate::is_doubted) => Knowledge::Refused,
+            (true, _) if self.is_bias_coarse() => Knowledge::Coarse,
             (true, _) => Knowledge::Fine,
             (false, true) => Knowledge::Coarse,
             (false, false) => Knowledge::Unknown,
         };
-        let gain = if self.is_calibrated() { Knowledge::Fine } else { Knowledge::Unknown };
+        let gain = match self.gain_by_course() {
+            _ if self.is_calibrated() => Knowledge::Fine,
+            known => known.map_or(Knowledge::Unknown, |(knowledge, _)| knowledge),
+        };
         let mounting = if self.state.moved { Knowledge::Refused } else { self.config.forward };
         let gaps = self.state.delayed_yaw.gaps();
         let doubt = gaps.map(|_| self.yaw_doubt());

@@ -155,6 +155,11 @@ impl Uncertainty {
         self.errors = if calibrated { self.config.known } else { self.config.unknown };
     }
 
+    /// Notes that courses have shown the gain with this sigma.
+    pub fn gain(&mut self, sigma: f32) {
+        self.errors.gain = self.errors.gain.min(sigma);
+    }
+
     /// Adds a usable sample.
     pub fn add(&mut self, turning: &Turning) {
         const STEP: f32 = 1.0 / RATE_HZ as f32;

@@ -191,7 +191,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             let monitor =
                 words!(counters.watch => MonitorCounters { silences, stuck, held, wrong, clock_off });
             let inputs = words!(counters.inputs => InputCounters {
-                imu_errors, fog_errors, wheel_errors, latitude_errors, clock_back, unclaimed_estimates,
+                imu_errors, fog_errors, wheel_errors, latitude_errors, heading_errors, clock_back, unclaimed_estimates,
                 replaced_windows, out_of_range
             });
             let lines = words!(counters.lines => LineCounters {

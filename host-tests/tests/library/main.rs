@@ -12,6 +12,7 @@ mod can_config;
 mod can_dbc;
 mod clock_ratio;
 mod coprocessor;
+mod course;
 mod default_model;
 mod e2e;
 mod entrances;

@@ -1,7 +1,7 @@
 //! No angle is lost between the network's revised estimates and the rates on the bus: a ledger
 //! beside the pipeline, exact to the last code.
 
-use gyronet::compensate::{CompensateConfig, Compensator, Lag, Mode, Stride};
+use gyronet::compensate::{CompensateConfig, Compensator, Lag, Mode, Remaining, Stride};
 use gyronet::health::Status;
 use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SteadyGain};
@@ -225,7 +225,7 @@ fn a_revision_while_the_vehicle_stands_is_given_back_when_it_moves() {
         if tick == 200 {
             compensator.end_standstill();
         }
-        let delayed = compensator.delayed(AngularRate::ZERO, (100..200).contains(&tick));
+        let delayed = compensator.delayed(Remaining::default(), (100..200).contains(&tick));
         sent += delayed.map_or(0, |delayed| i64::from(delayed.rate.0));
         best += i64::from(gyro.0);
         if let Some(known) = compensator.complete() {
@@ -234,5 +234,5 @@ fn a_revision_while_the_vehicle_stands_is_given_back_when_it_moves() {
         }
     }
     assert!(complete > ALL - 20);
-    assert_eq!(sent + compensator.delayed_pending(AngularRate::ZERO), best);
+    assert_eq!(sent + compensator.delayed_pending(Remaining::default()), best);
 }

@@ -270,15 +270,15 @@ mod tests {
             &PIPELINE_COUNTERS.to_be_bytes()[..],
             &words(0, 14),
             &INPUT_COUNTERS.to_be_bytes(),
-            &words(100, 18),
+            &words(100, 19),
             &FOG_COUNTERS.to_be_bytes(),
             &words(200, 12),
         ]
         .concat();
         let all = counters(&response).expect("whole");
         assert_eq!((all.pipeline.samples, all.pipeline.moved_mounts), (0, 13));
-        assert_eq!((all.watch.silences, all.inputs.imu_errors, all.lines.unsent), (100, 105, 113));
-        assert_eq!((all.lines.frames_lost, all.fog.samples, all.fog.dropped), (117, 200, 211));
+        assert_eq!((all.watch.silences, all.inputs.imu_errors, all.lines.unsent), (100, 105, 114));
+        assert_eq!((all.lines.frames_lost, all.fog.samples, all.fog.dropped), (118, 200, 211));
         for length in 0..response.len() {
             assert!(counters(&response[..length]).is_err(), "{length}");
         }

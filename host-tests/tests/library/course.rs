@@ -1,0 +1,183 @@
+//! Courses: what the board learns from them while it drives, and what false ones must not teach it.
+
+use gyronet::heading::Heading;
+use gyronet::health::slow::Knowledge;
+use gyronet::health::{Quality, Status};
+use gyronet::pipeline::{BoardState, Output, Pipeline, PipelineConfig};
+use gyronet::sample::{RATE_HZ, Standstill, WHEELS, WheelSample};
+use gyronet::units::{AngularRate, WheelSpeed};
+use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::stream::constant;
+use gyronet_host_tests::synthetic::{force, rate, turning};
+use std::f64::consts::{PI, TAU};
+
+const BIAS: f64 = 0.004;
+const GAIN: f64 = 0.008;
+/// Sigma of a course, rad.
+const NOISE: f64 = 0.01;
+const SECOND: usize = RATE_HZ as usize;
+
+/// A winding road with turns both ways, rad/s.
+fn road(second: f64) -> f64 {
+    0.15 * (TAU * second / 23.0).sin() + 0.1 * (TAU * second / 61.0).sin()
+}
+
+/// A drive: how long it stands first, s, its yaw rate, and the course that arrives at a second, from the headings so far.
+struct Drive<'a> {
+    stands: usize,
+    /// Yaw rate while the wheels stand, rad/s.
+    creeps: f64,
+    turn: &'a dyn Fn(f64) -> f64,
+    course: &'a dyn Fn(usize, &[f64]) -> Option<f64>,
+}
+
+/// The pipeline after a drive of `seconds`, its outputs, and the true headings of every sample.
+fn drive(seconds: usize, drive: &Drive<'_>) -> (Pipeline, Vec<Output>, Vec<f64>) {
+    let mut noise = Noise::new(7);
+    let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
+    let mut network = constant(0.0);
+    let (mut outputs, mut headings) = (Vec::new(), Vec::new());
+    let mut heading = 1.0;
+    for tick in 0..seconds * SECOND {
+        let moves = tick >= drive.stands * SECOND;
+        let yaw_rate = if moves { (drive.turn)(tick as f64 * 0.01) } else { drive.creeps };
+        heading += yaw_rate * 0.01;
+        headings.push(heading);
+        let mut sample = turning(tick as u64, rate((1.0 + GAIN) * yaw_rate + BIAS + 0.002 * noise.normal()));
+        for axis in 0..3 {
+            sample.specific_force[axis].0 += force(0.3 * noise.normal()).0;
+        }
+        for axis in 0..2 {
+            sample.angular_rate[axis] = rate(0.01 * noise.normal());
+        }
+        if moves
+            && tick % SECOND == 0
+            && let Some(course) = (drive.course)(tick / SECOND, &headings)
+        {
+            let course = (-(course + NOISE * noise.normal())).rem_euclid(TAU) as f32;
+            pipeline.course(&Heading { course: Some(course), speed: Some(15.0), ..Heading::default() });
+        }
+        let (speed, standstill) = if moves {
+            (15 << WheelSpeed::FRACTION_BITS, Standstill::Moving)
+        } else {
+            (0, Standstill::Still)
+        };
+        let wheels = WheelSample { time: sample.time, speeds: [Some(WheelSpeed(speed)); WHEELS], standstill };
+        let output = pipeline.correct(sample, Some(&wheels), &BoardState::GOOD).expect("a place on the grid");
+        if let Some(due) = &output.window {
+            pipeline.deliver(due.end, network(due).expect("an estimate"));
+        }
+        outputs.push(output);
+    }
+    (pipeline, outputs, headings)
+}
+
+/// The heading some seconds ago.
+fn ago(headings: &[f64], seconds: f64) -> Option<f64> {
+    headings.len().checked_sub(1 + (seconds * 100.0) as usize).map(|at| headings[at])
+}
+
+/// The error of the yaw over the last `seconds`, rad.
+fn error(outputs: &[Output], headings: &[f64], seconds: usize) -> f64 {
+    let [from, to] = [outputs.len() - seconds * SECOND, outputs.len() - 1];
+    let tick = |at: usize| outputs[at].vehicle.delayed.tick as usize;
+    let turned = outputs[to].vehicle.delayed.yaw.rad() - outputs[from].vehicle.delayed.yaw.rad();
+    turned - (headings[tick(to)] - headings[tick(from)])
+}
+
+fn true_course(second: usize, headings: &[f64]) -> Option<f64> {
+    ago(headings, 0.4).filter(|_| second >= 1)
+}
+
+#[test]
+fn a_vehicle_that_never_stands_is_usable_in_20_s_and_good_in_60() {
+    let course = |second, headings: &[f64]| true_course(second, headings).filter(|_| second < 90);
+    let (pipeline, outputs, headings) =
+        drive(150, &Drive { stands: 0, creeps: 0.0, turn: &road, course: &course });
+    let first = |wanted: &dyn Fn(&Output) -> bool| outputs.iter().position(wanted).map(|at| at as f64 * 0.01);
+    let usable = first(&|output| output.vehicle.delayed.status != Status::Init).expect("a rate");
+    let good = first(&|output| output.vehicle.delayed.quality == Quality::Good).expect("a good rate");
+    println!("usable after {usable} s, good after {good} s, {:?}", pipeline.courses());
+    assert!(usable <= 20.0 && good <= 60.0);
+    let held = error(&outputs, &headings, 58).to_degrees();
+    println!("heading held for a minute: {held:.3} deg");
+    assert!(held.abs() < 0.6, "{held} deg");
+    assert_eq!(pipeline.status(None).bias, Knowledge::Fine);
+    // Without courses it never starts.
+    let (_, outputs, _) = drive(60, &Drive { stands: 0, creeps: 0.0, turn: &road, course: &|_, _| None });
+    assert!(outputs.iter().all(|output| output.vehicle.delayed.status == Status::Init));
+}
+
+#[test]
+fn the_gain_is_learnt_where_the_vehicle_turns_both_ways() {
+    let (pipeline, ..) = drive(1_200, &Drive { stands: 5, creeps: 0.0, turn: &road, course: &true_course });
+    let (gain, sigma) = pipeline.gain();
+    println!("gain {gain:.5}, sigma {sigma:?}");
+    assert!((f64::from(gain) - GAIN).abs() < 0.002, "{gain}");
+    assert!(pipeline.status(None).gain != Knowledge::Unknown);
+}
+
+#[test]
+fn a_steady_circle_teaches_no_gain() {
+    // The slip grows as the driver goes faster, and looks like a gain.
+    let slipping = |second: usize, headings: &[f64]| Some(headings.last()? + 0.001 * second as f64);
+    let (pipeline, outputs, headings) =
+        drive(120, &Drive { stands: 10, creeps: 0.0, turn: &|_| 0.3, course: &slipping });
+    assert_eq!(pipeline.gain().0, 0.0);
+    let (_, without, _) =
+        drive(120, &Drive { stands: 10, creeps: 0.0, turn: &|_| 0.3, course: &|_, _| None });
+    let [with, without] =
+        [&outputs, &without].map(|outputs| error(outputs, &headings, 60).abs().to_degrees());
+    println!("error in 60 s: {with:.3} deg with these courses, {without:.3} without");
+    assert!(with < without + 0.1);
+}
+
+#[test]
+fn false_courses_teach_nothing_and_are_counted() {
+    type Course = dyn Fn(usize, &[f64]) -> Option<f64>;
+    let bad: [(&str, &Course, bool); 7] = [
+        ("lags by 2 s", &|_, headings| ago(headings, 2.0), false),
+        ("lag changes", &|second, headings| ago(headings, 1.0 + (second as f64 / 20.0).sin()), false),
+        ("stands", &|_, _| Some(1.0), true),
+        ("is 18 s old", &|_, headings| ago(headings, 18.0), true),
+        (
+            "jumps by pi",
+            &|second, headings| Some(headings.last()? + if second % 40 < 20 { PI } else { 0.0 }),
+            true,
+        ),
+        (
+            "is another vehicle's",
+            &|second, _| Some(0.3 * (second as f64 / 7.0).sin() + 0.02 * second as f64),
+            true,
+        ),
+        ("is noise", &|second, _| Some((second * second) as f64), true),
+    ];
+    let known = Drive { stands: 30, creeps: 0.0, turn: &road, course: &|_, _| None };
+    let (without, alone, headings) = drive(300, &known);
+    for (name, course, is_refused) in bad {
+        let (pipeline, outputs, _) = drive(300, &Drive { stands: 30, creeps: 0.0, turn: &road, course });
+        let [own, due] = [&outputs, &alone].map(|outputs| error(outputs, &headings, 120).to_degrees());
+        let moved = (pipeline.bias().rad_per_sec() - without.bias().rad_per_sec()).to_degrees() * 60.0;
+        println!(
+            "{name}: bias moved by {moved:+.3} deg/min, 120 s error {own:+.2} deg for {due:+.2}, {:?}, gain {:?}",
+            pipeline.courses(),
+            pipeline.gain()
+        );
+        assert!(pipeline.courses().refused > 20 || !is_refused, "{name}: {:?}", pipeline.courses());
+        assert!(own.abs() < due.abs() + 0.1, "{name}: {own} deg");
+        assert!(
+            !is_refused || moved.abs() < 0.1 && pipeline.gain().0 == 0.0,
+            "{name}: bias moved by {moved} deg/min"
+        );
+    }
+}
+
+#[test]
+fn a_wrong_start_heals_by_courses() {
+    // Initialised on a ferry that turns.
+    let creeps = AngularRate::from_deg_per_sec(0.5).rad_per_sec();
+    let (_, outputs, headings) = drive(420, &Drive { stands: 5, creeps, turn: &road, course: &true_course });
+    let held = error(&outputs, &headings, 60).to_degrees();
+    println!("{held:.2} deg in the last minute");
+    assert!(held.abs() < 1.0);
+}

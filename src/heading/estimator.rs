@@ -1,0 +1,373 @@
+//! Learns bias and gain of the yaw gyro from a course while the vehicle drives, and holds the heading without one.
+//!
+//! Courses measure the states of `filter`, which the zero-rate updates share, so that a bias has one value and one
+//! variance, whatever has shown it. A course is the direction of travel, some time ago, with errors that last for
+//! seconds. So
+//!
+//! - it is weighed by its accuracy, its speed and the rate: what compares straight with straight counts, and a turn
+//!   shows the lag rather than the bias;
+//! - courses that follow each other within [`CORRELATION`] count as one;
+//! - the gain is learnt only where the vehicle turns both ways: in a steady circle a growing slip looks like a gain;
+//! - a course far from the expected heading is refused, and one at some distance has bounded influence. After
+//!   [`PATIENCE`] without a match the heading starts again from the course; bias and gain stay what they were. Where two
+//!   such times show the same drift, the bias is wrong, and becomes uncertain by it. Courses that keep failing teach only
+//!   a heading until they have matched for [`TRUST`];
+//! - after a halt a course may have jumped by half a turn, because the vehicle goes backwards.
+
+use super::Heading;
+use super::filter::{BIAS, Filter, GAIN, HEADING, LAG, Measured, wrap};
+use super::turns::{BLOCK, BLOCK_SECONDS, Turns};
+use crate::health::count;
+use crate::health::slow::Knowledge;
+use crate::sample::RATE_HZ;
+use crate::sqrt::sqrt;
+use crate::units::AngularRate;
+use core::f32::consts::PI;
+
+/// Settings of the learning.
+#[derive(Debug, Clone, Copy)]
+pub struct CourseConfig {
+    /// Slowest speed with a course, m/s.
+    pub slowest: f32,
+    /// Accuracy of a course, 1 sigma, besides what the receiver says: slip, wind and the crown of the road, rad.
+    pub accuracy: f32,
+    /// Accuracy of the speed across the direction of travel, where the receiver says nothing, m/s.
+    pub across: f32,
+    /// Error of a course in a turn, rad per rad/s, besides the lag's.
+    pub turning: f32,
+    /// Random walks of the course against the heading (rad) and of the lag (s), per square root of a second.
+    pub walks: [f32; 2],
+    /// How much the bias at rest and the bias on the road may differ, because the road shakes the sensor, rad/s.
+    pub driving: f32,
+    /// Gain of a part before anything is learnt, 1 sigma.
+    pub gain: f32,
+}
+
+impl CourseConfig {
+    /// A road vehicle with a GNSS receiver.
+    pub const DEFAULT: Self = Self {
+        slowest: 3.0,
+        accuracy: 0.02,
+        across: 0.1,
+        turning: 0.1,
+        walks: [2e-3, 0.02],
+        driving: 3e-4,
+        gain: 0.005,
+    };
+}
+
+/// Errors of a course last so long, s.
+const CORRELATION: f32 = 1.0;
+/// Innovation over its sigma from which a course has no more influence, and from which it is refused.
+const BOUNDED: f32 = 2.0;
+const REFUSED: f32 = 4.0;
+/// Time without a course that matches before the heading starts again, samples.
+const PATIENCE: u32 = 10 * RATE_HZ;
+/// Time with courses that match after which failures are forgotten, samples; and so many failures are too many.
+const TRUST: u32 = 60 * RATE_HZ;
+const FAILURES: u8 = 3;
+/// Matching courses in a row that teach again after a failure.
+const MATCHES: u8 = 10;
+/// Drift of the heading that a wrong bias explains, rad/s, the distance at which a drift is noticed, rad, and how alike two
+/// such drifts are: a share, and rad/s.
+const DRIFT: core::ops::Range<f32> = 2e-3..0.03;
+const NOTICED: f32 = 0.3;
+const ALIKE: [f32; 2] = [0.25, 2e-3];
+/// Time without a course after which it may have turned by half a turn, samples.
+const HALT: u32 = 3 * RATE_HZ / 2;
+const ROUND: f32 = 2.6;
+/// Lag before it is estimated, its sigma, and its bounds, s.
+const FIRST_LAG: [f32; 2] = [0.3, 0.3];
+const LAGS: [f32; 2] = [-0.5, 2.0];
+/// Largest gain.
+const MAX_GAIN: f32 = 0.05;
+/// The turn over which left and right are remembered, the least of each, and the least share of either, rad.
+const REMEMBERED: f32 = 12.0;
+const BOTH_WAYS: [f32; 2] = [1.0, 0.2];
+/// Turn during which a course that does not change has failed, rad.
+const STANDS: f32 = 0.05;
+/// A course this inaccurate teaches nothing, rad.
+const INACCURATE: f32 = 0.2;
+/// Fewest courses with which a vehicle starts in motion.
+const FEW: u32 = 5;
+/// Sigma of the bias with which a rate can be used, and with which it is as good as after a standstill, rad/s.
+const COARSE_BIAS: f32 = 2e-3;
+pub(crate) const FINE_BIAS: f32 = 5e-4;
+/// The same of the gain.
+const COARSE_GAIN: f32 = 0.003;
+const FINE_GAIN: f32 = 0.0015;
+
+/// The reason why a course teaches nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Refusal {
+    /// It is far from the heading that the gyro shows.
+    Jump,
+    /// It does not change in a turn.
+    Stands,
+    /// The vehicle stands.
+    Standstill,
+}
+
+/// A course that has arrived: its tick, direction to the left, variance and weight.
+#[derive(Debug, Clone, Copy)]
+struct Arrived {
+    tick: u32,
+    course: f32,
+    speed: f32,
+    sigma: Option<f32>,
+}
+
+/// Courses that do not match the heading.
+#[derive(Debug, Clone, Copy)]
+struct Failing {
+    /// Tick and distance of the first one after one that matched.
+    since: Option<(u32, f32)>,
+    /// Drift of the heading when it last started again, rad/s.
+    drift: Option<f32>,
+    /// Times in a row that the heading started again, and the tick of the newest one.
+    times: u8,
+    trusted: u32,
+    /// Courses in a row that match.
+    matches: u8,
+}
+
+impl Failing {
+    /// Notes that the heading starts again after a course at this distance; returns the drift that two such times agree
+    /// about, rad/s.
+    fn start(&mut self, tick: u32, off: f32) -> Option<f32> {
+        let (since, first) = self.since.take()?;
+        let drift = wrap(off - first) * RATE_HZ as f32 / tick.wrapping_sub(since).max(1) as f32;
+        (self.times, self.trusted) = (self.times.saturating_add(1), tick);
+        let before = core::mem::replace(&mut self.drift, (libm::fabsf(first) < NOTICED).then_some(drift))?;
+        let drift = self.drift?;
+        let [share, least] = ALIKE;
+        let is_alike = libm::fabsf(drift - before) < share * libm::fabsf(drift) + least;
+        (is_alike && DRIFT.contains(&libm::fabsf(drift))).then_some(drift)
+    }
+}
+
+/// Counters of courses since the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CourseCounters {
+    /// Courses that were used.
+    pub used: u32,
+    /// Courses that were refused.
+    pub refused: u32,
+    /// Times that the heading started again.
+    pub restarts: u32,
+}
+
+/// Learns from courses.
+#[derive(Debug, Clone)]
+pub struct Estimator {
+    config: CourseConfig,
+    turns: Turns,
+    /// Tick of the newest sample in the turns.
+    tick: u32,
+    waiting: Option<Arrived>,
+    /// The newest course, and the turn since it changed, rad.
+    newest: Option<f32>,
+    unchanged: f32,
+    /// Ticks of the newest course, and of the newest one that was used, once the heading is known.
+    last: Option<u32>,
+    used: Option<u32>,
+    /// Turns to the left and to the right, rad.
+    ways: [f32; 2],
+    learns_gain: bool,
+    is_backwards: bool,
+    failing: Failing,
+    refusal: Option<Refusal>,
+    counters: CourseCounters,
+}
+
+impl Estimator {
+    /// Creates it before the first course.
+    #[must_use]
+    pub const fn new(config: CourseConfig) -> Self {
+        Self {
+            config,
+            turns: Turns::EMPTY,
+            tick: 0,
+            waiting: None,
+            newest: None,
+            unchanged: 0.0,
+            last: None,
+            used: None,
+            ways: [0.0; 2],
+            learns_gain: false,
+            is_backwards: false,
+            failing: Failing { since: None, drift: None, times: 0, trusted: 0, matches: 0 },
+            refusal: None,
+            counters: CourseCounters { used: 0, refused: 0, restarts: 0 },
+        }
+    }
+
+    /// Takes a course that arrives after the sample of a tick. It is used once that sample's rate is final; one that
+    /// arrives meanwhile is left out, and so is one without direction or speed, too slow or too inaccurate.
+    pub fn arrived(&mut self, heading: &Heading, tick: u32) {
+        let Heading { course: Some(course), speed: Some(speed), course_sigma: sigma, .. } = *heading else {
+            return;
+        };
+        if speed >= self.config.slowest
+            && sigma.is_none_or(|sigma| sigma < INACCURATE)
+            && self.waiting.is_none()
+        {
+            // Counted clockwise by receivers.
+            self.waiting = Some(Arrived { tick, course: wrap(-course), speed, sigma });
+        }
+    }
+
+    /// Adds a sample: its rate less what is known of the bias; `None` where it cannot be used. `stands` is true at a
+    /// standstill.
+    pub(crate) fn add(&mut self, filter: &mut Filter, tick: u32, rate: Option<AngularRate>, stands: bool) {
+        let follows = tick.wrapping_sub(self.tick) == 1;
+        self.tick = tick;
+        let Some(rate) = rate else { return self.restart() };
+        if !follows {
+            self.restart();
+        }
+        let Some(turned) = self.turns.add(rate) else { return };
+        if self.used.is_some() {
+            self.walk(filter, turned, stands);
+        }
+        if let Some(arrived) = self.waiting.take_if(|arrived| tick.wrapping_sub(arrived.tick) < u32::MAX / 2)
+        {
+            match self.take(filter, &arrived, stands) {
+                Ok(()) => {
+                    self.refusal = None;
+                    count(&mut self.counters.used, 1);
+                }
+                Err(refusal) => {
+                    self.refusal = Some(refusal);
+                    count(&mut self.counters.refused, 1);
+                }
+            }
+        }
+    }
+
+    /// Starts the heading again, because a turn may have been missed.
+    pub(crate) fn restart(&mut self) {
+        (self.turns, self.used, self.waiting) = (Turns::EMPTY, None, None);
+    }
+
+    /// Advances the states by a block.
+    fn walk(&mut self, filter: &mut Filter, turned: f32, stands: bool) {
+        let [heading, lag] = self.config.walks.map(|walk| walk * walk * BLOCK_SECONDS);
+        filter.turn(turned, BLOCK_SECONDS, stands);
+        filter.put_variance::<LAG>((filter.variance::<LAG>() + lag).min(1.0));
+        filter.put_variance::<HEADING>(filter.variance::<HEADING>() + heading);
+        let driven = turned - filter.get::<BIAS>() * BLOCK_SECONDS;
+        let kept = 1.0 - (libm::fabsf(driven) / REMEMBERED).min(1.0);
+        let [left, right] = &mut self.ways;
+        *left = (*left + driven.max(0.0)) * kept;
+        *right = (*right - driven.min(0.0)) * kept;
+        let (less, both) = (left.min(*right), *left + *right);
+        let [least, share] = BOTH_WAYS;
+        self.learns_gain = less >= least && less >= share * both;
+        self.unchanged += driven;
+    }
+
+    /// Uses a course, or says why not.
+    fn take(&mut self, filter: &mut Filter, arrived: &Arrived, stands: bool) -> Result<(), Refusal> {
+        if core::mem::replace(&mut self.newest, Some(arrived.course)) != Some(arrived.course) {
+            self.unchanged = 0.0;
+        }
+        if stands {
+            return Err(Refusal::Standstill);
+        }
+        if libm::fabsf(self.unchanged) > STANDS {
+            return Err(Refusal::Stands);
+        }
+        if filter.variance::<GAIN>() == 0.0 {
+            let [lag, sigma] = FIRST_LAG;
+            filter.restart::<LAG>(lag, sigma * sigma);
+            filter.restart::<GAIN>(0.0, self.config.gain * self.config.gain);
+            let driving = self.config.driving;
+            filter.put_variance::<BIAS>(filter.variance::<BIAS>() + driving * driving);
+        }
+        let paused = self.last.map_or(u32::MAX, |last| arrived.tick.wrapping_sub(last));
+        self.last = Some(arrived.tick);
+        let age = self.tick.wrapping_sub(arrived.tick) as f32 / BLOCK as f32;
+        let back = age + filter.get::<LAG>() / BLOCK_SECONDS;
+        // The first seconds are too short for a lag.
+        let Some((since, rate)) = self.turns.since(back) else { return Ok(()) };
+        let CourseConfig { accuracy, across, turning, .. } = self.config;
+        let sigma = arrived.sigma.unwrap_or(across / arrived.speed);
+        let own = accuracy * accuracy + sigma * sigma + turning * turning * rate * rate;
+        let interval = (paused as f32 / RATE_HZ as f32).max(BLOCK_SECONDS);
+        let variance = own * (CORRELATION / interval).max(1.0);
+        let half = if self.is_backwards { PI } else { 0.0 };
+        let off = wrap(arrived.course + since + half - filter.get::<HEADING>());
+        let start = |filter: &mut Filter| {
+            filter.restart::<HEADING>(
+                wrap(arrived.course + since),
+                variance + rate * rate * filter.variance::<LAG>(),
+            );
+        };
+        if self.used.is_none() {
+            start(filter);
+            (self.used, self.is_backwards) = (Some(arrived.tick), false);
+            return Ok(());
+        }
+        let turns_round = paused > HALT && libm::fabsf(off) > ROUND;
+        self.is_backwards ^= turns_round;
+        let off = if turns_round { wrap(off + PI) } else { off };
+        let mut measured = Measured { off, rate, variance };
+        let innovation = filter.innovation(&measured);
+        let ratio = libm::fabsf(off) / sqrt(innovation);
+        if !(ratio <= REFUSED) {
+            self.failing.matches = 0;
+            let (since, _) = *self.failing.since.get_or_insert((arrived.tick, off));
+            if arrived.tick.wrapping_sub(since) > PATIENCE {
+                if let Some(drift) = self.failing.start(arrived.tick, off) {
+                    filter.put_variance::<BIAS>(filter.variance::<BIAS>() + drift * drift);
+                    self.failing = Failing { times: 0, drift: None, ..self.failing };
+                }
+                start(filter);
+                (self.used, self.is_backwards) = (Some(arrived.tick), false);
+                count(&mut self.counters.restarts, 1);
+            }
+            return Err(Refusal::Jump);
+        }
+        measured.variance += innovation * (ratio / BOUNDED - 1.0).max(0.0);
+        if arrived.tick.wrapping_sub(self.failing.trusted) > TRUST {
+            self.failing = Failing { times: 0, drift: None, ..self.failing };
+        }
+        self.failing.since = None;
+        self.failing.matches = self.failing.matches.saturating_add(1);
+        let Failing { times, matches, .. } = self.failing;
+        let is_doubted = times >= FAILURES || times > 0 && matches < MATCHES;
+        filter.course(&measured, [is_doubted, is_doubted || !self.learns_gain]);
+        let [least, most] = LAGS;
+        filter.put::<LAG>(filter.get::<LAG>().max(least).min(most));
+        filter.put::<GAIN>(filter.get::<GAIN>().max(-MAX_GAIN).min(MAX_GAIN));
+        self.used = Some(arrived.tick);
+        Ok(())
+    }
+
+    /// Returns whether the heading is known.
+    pub(crate) fn has_begun(&self) -> bool {
+        self.used.is_some()
+    }
+
+    /// Returns whether the bias is known well enough to use the rate.
+    pub(crate) fn is_usable(&self, filter: &Filter) -> bool {
+        self.has_begun() && self.counters.used >= FEW && sqrt(filter.variance::<BIAS>()) <= COARSE_BIAS
+    }
+
+    /// Returns the counters.
+    #[must_use]
+    pub fn counters(&self) -> &CourseCounters {
+        &self.counters
+    }
+}
+
+/// Returns what a sigma of the gain means.
+pub(crate) fn gain_knowledge(sigma: f32) -> Knowledge {
+    match sigma {
+        fine if fine <= FINE_GAIN => Knowledge::Fine,
+        coarse if coarse <= COARSE_GAIN => Knowledge::Coarse,
+        _ => Knowledge::Unknown,
+    }
+}

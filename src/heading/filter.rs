@@ -1,0 +1,166 @@
+//! The Kalman filter of what a yaw gyro reads wrong, for standstills and courses alike.
+//!
+//! | state | unit | between measurements |
+//! |---|---|---|
+//! | [`BIAS`] | rad/s | random walk |
+//! | [`STOP`]: offset of a standstill | rad/s | each stop has its own |
+//! | [`GAIN`]: share of the rate that is read too much | | constant |
+//! | [`HEADING`] of the vehicle | rad, to the left | the gyro's turn less bias and gain |
+//! | [`LAG`] of the course behind the heading | s | random walk |
+//!
+//! A second at standstill measures the sum of the first two. A course measures the heading some lag ago. The lag is the
+//! receiver's latency and, because its effect is as proportional to the rate, the slip of the vehicle in a turn.
+//!
+//! Without a course the last three are independent of the first two, and nothing is computed with them.
+
+/// Index of each state.
+pub(crate) const BIAS: usize = 0;
+pub(crate) const STOP: usize = 1;
+pub(crate) const GAIN: usize = 2;
+pub(crate) const HEADING: usize = 3;
+pub(crate) const LAG: usize = 4;
+const STATES: usize = 5;
+
+type Vector = [f32; STATES];
+
+/// A measured course.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Measured {
+    /// Course less the heading that the filter expects a lag ago, rad.
+    pub off: f32,
+    /// The yaw rate a lag ago, rad/s.
+    pub rate: f32,
+    /// Variance of the course, rad^2.
+    pub variance: f32,
+}
+
+/// Estimates the states.
+#[derive(Debug, Clone)]
+pub(crate) struct Filter {
+    state: Vector,
+    covariance: [Vector; STATES],
+}
+
+impl Filter {
+    /// Creates a filter with these variances of the bias and the offset of a standstill.
+    pub const fn new(bias: f32, stop: f32) -> Self {
+        let mut covariance = [[0.0; STATES]; STATES];
+        covariance[BIAS][BIAS] = bias;
+        covariance[STOP][STOP] = stop;
+        Self { state: [0.0; STATES], covariance }
+    }
+
+    /// Returns a state.
+    pub const fn get<const STATE: usize>(&self) -> f32 {
+        self.state[STATE]
+    }
+
+    /// Sets a state and keeps its covariance.
+    pub const fn put<const STATE: usize>(&mut self, value: f32) {
+        self.state[STATE] = value;
+    }
+
+    /// Returns the variance of a state.
+    pub const fn variance<const STATE: usize>(&self) -> f32 {
+        self.covariance[STATE][STATE]
+    }
+
+    /// Sets the variance of a state and keeps its covariance with others.
+    pub const fn put_variance<const STATE: usize>(&mut self, variance: f32) {
+        self.covariance[STATE][STATE] = variance;
+    }
+
+    /// Returns the covariance of bias and offset.
+    pub const fn bias_and_stop(&self) -> f32 {
+        self.covariance[BIAS][STOP]
+    }
+
+    /// Starts a state again, independent of all others.
+    pub fn restart<const STATE: usize>(&mut self, value: f32, variance: f32) {
+        for row in &mut self.covariance {
+            row[STATE] = 0.0;
+        }
+        self.covariance[STATE] = [0.0; STATES];
+        self.covariance[STATE][STATE] = variance;
+        self.state[STATE] = value;
+    }
+
+    /// Adds the mean of a second at standstill, rad/s, with its variance.
+    pub fn standstill(&mut self, mean: f32, variance: f32) {
+        let [bias, stop, ..] = self.covariance;
+        let with: Vector = core::array::from_fn(|state| bias[state] + stop[state]);
+        let innovation = mean - self.state[BIAS] - self.state[STOP];
+        let per_variance = 1.0 / (with[BIAS] + with[STOP] + variance);
+        let gains = with.map(|with| with * per_variance);
+        self.apply(&gains, innovation, &with);
+    }
+
+    /// Turns the heading by what the gyro shows in some time, rad and s; `stands` is true at a standstill.
+    pub fn turn(&mut self, turned: f32, seconds: f32, stands: bool) {
+        let at_stop = if stands { seconds } else { 0.0 };
+        let driven = turned - self.state[BIAS] * seconds;
+        self.state[HEADING] =
+            wrap(self.state[HEADING] + driven - self.state[GAIN] * driven - self.state[STOP] * at_stop);
+        // The heading's row of the transition; all others are those of the identity.
+        let by: [(usize, f32); 3] = [(BIAS, -seconds), (STOP, -at_stop), (GAIN, -driven)];
+        let add: Vector = core::array::from_fn(|column| {
+            by.iter().map(|(state, part)| part * self.covariance[*state % STATES][column]).sum()
+        });
+        let own = by.iter().map(|(state, part)| part * add[*state % STATES]).sum::<f32>();
+        for (state, add) in add.iter().enumerate() {
+            self.covariance[HEADING][state] += add;
+            self.covariance[state][HEADING] += add;
+        }
+        self.covariance[HEADING][HEADING] += own;
+    }
+
+    /// Returns the variance of the difference between a course and the heading that is expected.
+    pub fn innovation(&self, measured: &Measured) -> f32 {
+        let with = self.with_course(measured.rate);
+        with[HEADING] - measured.rate * with[LAG] + measured.variance
+    }
+
+    fn with_course(&self, rate: f32) -> Vector {
+        let [.., heading, lag] = self.covariance;
+        core::array::from_fn(|state| heading[state] - rate * lag[state])
+    }
+
+    /// Adds a course. What is `held` (bias, gain) keeps its value and its variance, and counts as a known source of error
+    /// (the filter of Schmidt and Kalman).
+    pub fn course(&mut self, measured: &Measured, held: [bool; 2]) {
+        let with = self.with_course(measured.rate);
+        let variance = with[HEADING] - measured.rate * with[LAG] + measured.variance;
+        let mut gains = with.map(|with| with / variance);
+        for (state, held) in [BIAS, GAIN].into_iter().zip(held) {
+            if held {
+                gains[state] = 0.0;
+            }
+        }
+        self.apply(&gains, measured.off, &with);
+        self.state[HEADING] = wrap(self.state[HEADING]);
+        // What the gains leave out, in Joseph's form: zero where they are the best ones.
+        for row in 0..STATES {
+            let rest = with[row] - gains[row] * variance;
+            for column in 0..STATES {
+                self.covariance[row][column] -= rest * gains[column];
+            }
+        }
+    }
+
+    /// Corrects the states by the innovation, and the covariance by the gains.
+    fn apply(&mut self, gains: &Vector, innovation: f32, with: &Vector) {
+        for row in 0..STATES {
+            self.state[row] += gains[row] * innovation;
+            for column in 0..STATES {
+                self.covariance[row][column] -= gains[row] * with[column];
+            }
+            self.covariance[row][row] = self.covariance[row][row].max(0.0);
+        }
+    }
+}
+
+/// Wraps an angle of a few turns to -pi to pi.
+pub(crate) fn wrap(angle: f32) -> f32 {
+    use core::f32::consts::TAU;
+    angle - TAU * libm::roundf(angle / TAU)
+}

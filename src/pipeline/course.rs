@@ -1,0 +1,117 @@
+//! Courses in the pipeline: a start in motion, and what is learnt after it.
+//!
+//! A vehicle that never stands has no static initialisation. There the bias about z is what the courses show, that of the
+//! other axes their mean since the first course: no vehicle rolls or pitches for long. The tilt is that of earlier drives.
+
+use super::initialised::Initialised;
+use super::sensor_bias::ZeroPoint;
+use super::{Pipeline, State};
+use crate::bias::ZeroRate;
+use crate::compensate::Remaining;
+use crate::heading::filter::{BIAS, Filter};
+use crate::heading::{CourseCounters, FINE_BIAS, Heading, gain_knowledge};
+use crate::health::slow::Knowledge;
+use crate::mounting::Rotation;
+use crate::sample::Frame;
+use crate::standstill::Standing;
+use crate::units::AngularRate;
+
+/// The search for a bias in motion.
+#[derive(Debug, Clone)]
+pub(super) struct Start {
+    filter: Filter,
+    /// Sums of the rates about x and y since the first course, codes, and their number.
+    sums: [i64; 2],
+    count: i64,
+}
+
+impl Start {
+    pub(super) const EMPTY: Self = Self { filter: Filter::new(0.0, 0.0), sums: [0; 2], count: 0 };
+
+    fn mean(&self) -> [AngularRate; 2] {
+        self.sums.map(|sum| AngularRate((sum / self.count.max(1)) as i32))
+    }
+}
+
+impl Pipeline {
+    /// Takes a course that arrives now: the vehicle's direction of travel up to two seconds ago.
+    pub fn course(&mut self, heading: &Heading) {
+        self.state.course.arrived(heading, self.state.tick);
+    }
+
+    /// Returns the counters of courses.
+    #[must_use]
+    pub fn courses(&self) -> &CourseCounters {
+        self.state.course.counters()
+    }
+
+    /// Returns the gain that courses have shown, a share, and its sigma once it is estimated.
+    #[must_use]
+    pub fn gain(&self) -> (f32, Option<f32>) {
+        self.zero_rate().map_or((0.0, None), ZeroRate::gain)
+    }
+
+    /// Adds a sample before initialisation, already levelled; `early` is what earlier drives have shown: levelling and
+    /// sigma of the bias. Initialises once the courses have shown the bias.
+    #[inline(never)]
+    pub(super) fn start_in_motion(
+        &mut self,
+        frame: &Frame,
+        early: Option<(Rotation, f32)>,
+        standing: Standing,
+    ) {
+        let Some(zero_rate) = self.config.zero_rate.filter(|_| self.state.initialised.is_none()) else {
+            return;
+        };
+        let State { course, start, .. } = &mut self.state;
+        if !course.has_begun() {
+            let sigma = early.map_or(zero_rate.max_bias, |(_, sigma)| sigma);
+            *start = Start { filter: Filter::new(sigma * sigma, 0.0), ..Start::EMPTY };
+        }
+        let [x, y, z] = frame.sample.angular_rate;
+        let is_good = frame.sample.validity.is_good();
+        if is_good {
+            start.sums.iter_mut().zip([x, y]).for_each(|(sum, rate)| *sum += i64::from(rate.0));
+            start.count += 1;
+        }
+        course.add(&mut start.filter, frame.tick, is_good.then_some(z), standing.is_likely());
+        if !course.is_usable(&start.filter) {
+            return;
+        }
+        let mut filter = start.filter.clone();
+        let [x, y] = start.mean();
+        let z = AngularRate(libm::roundf(filter.get::<BIAS>() * AngularRate::PER_RAD_PER_SEC) as i32);
+        filter.put::<BIAS>(0.0);
+        self.state.sensor_bias.refer();
+        self.state.initialised = Some(Initialised {
+            levelling: early.map_or(Rotation::IDENTITY, |(levelling, _)| levelling),
+            zero: ZeroPoint::at_rest([x, y, z], self.config.earth_rate),
+            zero_rate: Some(ZeroRate::with(zero_rate, filter)),
+            is_coarse: true,
+        });
+    }
+
+    /// Notes once a bias that was found in motion is as good as one after a standstill.
+    pub(super) fn judge_start(&mut self) {
+        if let Some(Initialised { zero_rate: Some(zero_rate), is_coarse, .. }) = &mut self.state.initialised {
+            *is_coarse &= zero_rate.sigma() > FINE_BIAS;
+        }
+    }
+
+    /// Returns whether a bias that was found in motion is not known well yet.
+    pub(super) fn is_bias_coarse(&self) -> bool {
+        self.state.initialised.as_ref().is_some_and(|known| known.is_coarse)
+    }
+
+    /// Returns how well the gain is known by courses, with its sigma.
+    pub(super) fn gain_by_course(&self) -> Option<(Knowledge, f32)> {
+        let (_, sigma) = self.zero_rate()?.gain();
+        sigma.map(|sigma| (gain_knowledge(sigma), sigma))
+    }
+
+    /// Returns what the gyro reads wrong beyond its static bias and the network's estimate.
+    pub(super) fn remaining(&self) -> Remaining {
+        let gain = self.zero_rate().map_or(0.0, |known| known.gain().0);
+        Remaining { bias: self.bias(), gain }
+    }
+}
