@@ -80,6 +80,9 @@ pub struct Board<N> {
     /// True once a step that was given out is initialised, and once one after that has no delayed rate.
     initialised: bool,
     ended: bool,
+    /// The vehicle may move at the start, and the board takes the courses of the rows.
+    may_move: bool,
+    takes_course: bool,
 }
 
 impl<N: WindowNetwork> Board<N> {
@@ -90,8 +93,26 @@ impl<N: WindowNetwork> Board<N> {
         let coprocessor = Coprocessor::new(Config { wheels: receiver, clock: Clock::Sensor, ..config });
         let held = VecDeque::with_capacity(HOLD + 1);
         let [now, silent_from] = [Micros(0); 2];
-        let [initialised, ended] = [false; 2];
-        Self { coprocessor, wheels, network, rows: 0, now, silent_from, held, initialised, ended }
+        let [initialised, ended, may_move, takes_course] = [false; 4];
+        Self {
+            coprocessor,
+            wheels,
+            network,
+            rows: 0,
+            now,
+            silent_from,
+            held,
+            initialised,
+            ended,
+            may_move,
+            takes_course,
+        }
+    }
+
+    /// The board of a vehicle that may move at the start, with or without the courses of the rows.
+    #[must_use]
+    pub fn moving(self, takes_course: bool) -> Self {
+        Self { may_move: true, takes_course, ..self }
     }
 
     /// The coprocessor, to read its state.
@@ -110,10 +131,14 @@ impl<N: WindowNetwork> Board<N> {
             // A speed that does not fit the frame is counted as not valid.
             let _ = self.coprocessor.can(&frame, self.now);
         }
+        if let Some(heading) = row.heading.filter(|_| self.takes_course) {
+            // A course that is no vehicle's is counted.
+            let _ = self.coprocessor.heading(&heading, self.now);
+        }
         let mut frames = Vec::new();
         let sent = self.coprocessor.imu(row.sample, self.now, &mut |frame: TimedFrame| frames.push(frame));
         let Ok(Some(observation)) = sent else { return Ok(None) };
-        if let Some(refused) = observation.refused {
+        if let Some(refused) = observation.refused.filter(|_| !self.may_move) {
             return Err(refused);
         }
         self.silent_from = Micros(self.now.0 + TIMEOUT_US);

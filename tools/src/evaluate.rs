@@ -4,11 +4,14 @@
 
 pub mod ablation;
 pub mod cost;
+pub mod ekf;
 pub mod expected_error;
 pub mod fir;
 pub mod heading_error;
 pub mod methods;
 pub mod metrics;
+pub mod outage;
+pub mod outage_table;
 pub mod rates;
 pub mod report;
 mod rest;

@@ -3,7 +3,10 @@
 use super::{Common, drives, paint, print_json, progress, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
+use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::ablation::{self, Floor, Score, Variant};
+use gyronet_tools::evaluate::outage::{self, Outage};
+use gyronet_tools::evaluate::outage_table::Outages;
 use gyronet_tools::evaluate::report::Report;
 use gyronet_tools::network::checkpoint::Checkpoint;
 use indicatif::ProgressBar;
@@ -34,6 +37,7 @@ Examples:
   gyronet evaluate trial09.csv trial11.csv
   gyronet evaluate */*.csv --json               # all drives, and the mean of each folder
   gyronet evaluate drive.csv --weights mine.blob --json
+  gyronet evaluate drive.csv --outage 30,60,120 # the heading after a loss of GNSS
   gyronet evaluate drive.csv --ablation         # what each part contributes")]
 pub struct Args {
     /// Recorded drives with ref_gyr_z or ref_yaw.
@@ -46,6 +50,12 @@ pub struct Args {
     /// Print the error of the delayed rate at every lag from 0 to 110 ms (the board's default is 70).
     #[arg(long)]
     lags: bool,
+    /// Print the heading error after a loss of GNSS for so many seconds, from every second on after 60 s with a course,
+    /// and after 20 s. The drives have `course` and `gnss_speed`, or `gnss_lat` and `gnss_lon`, besides a reference; they
+    /// may begin in motion.
+    #[arg(long, value_name = "SECONDS", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=3600))]
+    #[arg(conflicts_with_all = ["ablation", "lags", "all"])]
+    outage: Vec<u16>,
     /// Add rows for the paper's GyroNet, in f32 and in integers; they take twenty times as long as all others together.
     #[arg(long, conflicts_with_all = ["ablation", "lags"])]
     all: bool,
@@ -64,6 +74,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if args.lags {
         return compare(args, common, &ablation::lags());
     }
+    if !args.outage.is_empty() {
+        return outages(args, common);
+    }
     let checkpoint =
         args.all.then(|| args.checkpoint.as_deref().map_or_else(bundled::checkpoint, Checkpoint::read));
     let checkpoint = checkpoint.transpose()?;
@@ -78,6 +91,45 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         return print_json(&mut out, &report);
     }
     Ok(write!(out, "{}", paint::report(&report))?)
+}
+
+/// Hides the courses of each drive from every start on.
+fn outages(args: &Args, common: Common) -> super::Result {
+    let weights = args.unit.sent.open()?;
+    let lengths: Vec<usize> = args.outage.iter().copied().map(usize::from).collect();
+    let mut sets: Vec<(String, Vec<Vec<Outage>>)> = Vec::new();
+    for file in &args.files {
+        let drive = Drive::open_moving(file)?;
+        let mut network = GyroNet::new(weights.blob()?);
+        let bar = progress::bar(common, drive.facts.rows, drive.name());
+        let found = outage::run(&drive, &mut network, &lengths, || bar.inc(1));
+        bar.finish_and_clear();
+        let found = found?;
+        if found.is_empty() {
+            let remark = format_args!("{}: no start: too little course or reference", drive.path);
+            super::remark(common, remark)?;
+        }
+        let set = file.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned();
+        match sets.iter_mut().find(|(own, _)| *own == set) {
+            Some((_, drives)) => drives.push(found),
+            None => sets.push((set, vec![found])),
+        }
+    }
+    let mut out = std::io::stdout().lock();
+    let each: Vec<Outages> =
+        sets.iter().map(|(set, drives)| Outages::new(set, drives.len(), drives.iter().flatten())).collect();
+    let drives = sets.iter().flat_map(|(_, drives)| drives);
+    let all = Outages::new("all", args.files.len(), drives.flatten());
+    if common.json {
+        let Outages { outage, outage_after_20_s, .. } = all;
+        let json =
+            serde_json::json!({ "outage": outage, "outage_after_20_s": outage_after_20_s, "sets": each });
+        return print_json(&mut out, &json);
+    }
+    for set in each.iter().chain((each.len() > 1).then_some(&all)) {
+        write!(out, "{set}")?;
+    }
+    Ok(())
 }
 
 /// The scores of one drive, as in the JSON.

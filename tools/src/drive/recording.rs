@@ -11,11 +11,15 @@
 //! | `ref_gyr_z` | rad/s | optional: the true yaw rate; empty if unknown |
 //! | `ref_yaw` | rad | optional: the true course, to the left; empty if unknown |
 //! | `temp_c` | deg C | optional: temperature of the sensor; empty if not recorded |
+//! | `course`, `course_sigma` | rad | optional: course over ground by GNSS, clockwise from north, and its accuracy |
+//! | `gnss_speed` | m/s | optional: speed over ground by GNSS |
+//! | `gnss_lat`, `gnss_lon` | deg | optional: position by GNSS; without `course` it gives course and speed |
 //! | `wheel1_rate` .. `wheel4_rate` | rad/s | optional: rate of a wheel; empty if not recorded |
 //!
 //! Values are converted to the codes of [`gyronet::units`] through f32, and times through 10 kHz ticks, as the sensor
 //! sends them. So a recording read here and the same recording parsed from MTData2 bytes are bit-identical samples.
 
+mod position;
 mod reader;
 mod resampled;
 mod survey;
@@ -27,6 +31,7 @@ pub use survey::{Facts, Survey};
 use crate::drive::error::DataError;
 use crate::drive::foreign;
 use crate::drive::vehicle::Vehicle;
+use gyronet::heading::Heading;
 use gyronet::sample::ImuSample;
 use std::path::Path;
 
@@ -49,6 +54,8 @@ pub struct Row {
     pub wheels: [Option<f64>; WHEELS],
     /// Speed over ground by GNSS, m/s.
     pub speed: Option<f64>,
+    /// Course over ground by GNSS that arrives with the sample.
+    pub heading: Option<Heading>,
 }
 
 /// A complete drive in memory; [`super::stream::Drive`] is for drives of any length.

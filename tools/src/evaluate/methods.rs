@@ -61,6 +61,10 @@ impl Method {
     pub const LIVE: Self = mems("live", "live rate");
     /// The delayed rate, which the board sends in its own yaw messages, some samples later.
     pub const DELAYED: Self = mems("default", "delayed rate");
+    /// A filter of heading, bias and gain by courses, as a user of a GNSS receiver would write it.
+    pub const EKF: Self = mems("ekf", "EKF with the course");
+    /// The delayed rate without a network, learnt from courses.
+    pub const NO_MODEL: Self = mems("no_model", "delayed rate, no model");
     /// The orientation filter VQF ([`crate::evaluate::vqf`]). On a drive it starts from static initialisation; in the
     /// paper's tables it replaces the vendor's filter and estimates the bias itself.
     pub const VQF: Self = mems("vqf", "VQF filter");

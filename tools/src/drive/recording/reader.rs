@@ -1,12 +1,15 @@
 //! The rows of a recording, one at a time.
 
+use super::position::Track;
 use super::{Row, WHEELS};
 use crate::drive::error::{DataError, DataFault, ValueError};
 use crate::drive::vehicle::Vehicle;
 use csv::StringRecord;
+use gyronet::heading::Heading;
 use gyronet::mounting::Rotation;
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
+use std::f64::consts::TAU;
 use std::str::FromStr;
 
 const TIME: &str = "t_s";
@@ -15,6 +18,8 @@ const RATE: [&str; 3] = ["gyr_x", "gyr_y", "gyr_z"];
 const REFERENCE: &str = "ref_gyr_z";
 const COURSE: &str = "ref_yaw";
 const SPEED: &str = "gnss_speed";
+const DIRECTION: [&str; 2] = ["course", "course_sigma"];
+const POSITION: [&str; 2] = ["gnss_lat", "gnss_lon"];
 const TEMPERATURE: &str = "temp_c";
 const WHEEL: [&str; WHEELS] = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"];
 
@@ -38,6 +43,8 @@ struct Columns {
     temperature: Option<Column>,
     wheels: [Option<Column>; WHEELS],
     speed: Option<Column>,
+    direction: [Option<Column>; 2],
+    position: [Option<Column>; 2],
 }
 
 impl Columns {
@@ -62,6 +69,8 @@ impl Columns {
             temperature: optional(TEMPERATURE),
             wheels: WHEEL.map(optional),
             speed: optional(SPEED),
+            direction: DIRECTION.map(optional),
+            position: POSITION.map(optional),
         })
     }
 }
@@ -76,6 +85,7 @@ pub struct Reader<R> {
     fields: usize,
     last: Option<Micros>,
     rotation: Option<Rotation>,
+    track: Track,
 }
 
 impl<R: std::io::Read> Reader<R> {
@@ -97,6 +107,7 @@ impl<R: std::io::Read> Reader<R> {
             fields,
             last: None,
             rotation: None,
+            track: Track::default(),
         })
     }
 
@@ -107,7 +118,8 @@ impl<R: std::io::Read> Reader<R> {
 
     fn row(&mut self) -> Result<Row, DataError> {
         let line = self.record.position().map_or(0, csv::Position::line);
-        let Columns { time, force, rate, reference, course, temperature, wheels, speed } = self.columns;
+        let Columns { time, force, rate, reference, course, temperature, wheels, speed, direction, position } =
+            self.columns;
         let fields = Fields { path: &self.path, line, record: &self.record };
         let time = fields.time(time)?;
         if let Some(last) = self.last
@@ -131,8 +143,19 @@ impl<R: std::io::Read> Reader<R> {
         let sample = self.rotation.map_or(sample, |rotation| rotation.sample(&sample));
         let (reference, course, speed) = (optional(reference)?, optional(course)?, optional(speed)?);
         let wheels = [w1?, w2?, w3?, w4?];
+        let ([direction, sigma], [latitude, longitude]) = (direction.map(optional), position.map(optional));
+        let (direction, sigma, position) = (direction?, sigma?, latitude?.zip(longitude?));
+        let heading = match (self.columns.direction, direction) {
+            ([None, _], _) => position.and_then(|position| self.track.add(time, position)),
+            (_, direction) => direction.map(|course| Heading {
+                course: Some(course.rem_euclid(TAU) as f32),
+                course_sigma: sigma.map(|sigma| sigma as f32),
+                speed: speed.map(|speed| speed as f32),
+                speed_sigma: None,
+            }),
+        };
         self.last = Some(time);
-        Ok(Row { line, sample, reference, course, wheels, speed })
+        Ok(Row { line, sample, reference, course, wheels, speed, heading })
     }
 }
 

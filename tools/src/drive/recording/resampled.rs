@@ -8,18 +8,24 @@ use gyronet::units::AngularRate;
 
 pub type Result = std::result::Result<Row, DataError>;
 
-/// Brings rows to 100 Hz. A reference rate is averaged as the sensor is; course and wheels are those of the newest row.
+/// Brings rows to 100 Hz. A reference rate is averaged as the sensor is; course and wheels are those of the newest row,
+/// and a heading reference belongs to the first step after it.
 pub fn resampled(path: &str, rows: impl Iterator<Item = Result>) -> impl Iterator<Item = Result> {
-    let (mut sensor, mut reference) = (Aligner::START, Aligner::START);
-    rows.flat_map(move |row| match row.map(|row| steps(&row, &mut sensor, &mut reference)) {
-        Ok(Ok(rows)) => rows.into_iter().map(Ok).collect(),
-        // The grid restarts, as on the board.
-        Ok(Err(AlignError::Jump { .. })) => Vec::new(),
-        Ok(Err(AlignError::Rate { period_us })) => {
-            vec![Err(DataError::of(path, DataFault::Rate { hz: 1e6 / period_us as f64 }))]
+    let (mut sensor, mut reference, mut heading) = (Aligner::START, Aligner::START, None);
+    rows.flat_map(move |row| {
+        match row.map(|row| {
+            heading = row.heading.or(heading);
+            steps(&row, &mut sensor, &mut reference)
+        }) {
+            Ok(Ok(rows)) => rows.into_iter().map(|row| Ok(Row { heading: heading.take(), ..row })).collect(),
+            // The grid restarts, as on the board.
+            Ok(Err(AlignError::Jump { .. })) => Vec::new(),
+            Ok(Err(AlignError::Rate { period_us })) => {
+                vec![Err(DataError::of(path, DataFault::Rate { hz: 1e6 / period_us as f64 }))]
+            }
+            Ok(Err(error)) => vec![Err(DataError::of(path, DataFault::Other(Box::new(error))))],
+            Err(error) => vec![Err(error)],
         }
-        Ok(Err(error)) => vec![Err(DataError::of(path, DataFault::Other(Box::new(error))))],
-        Err(error) => vec![Err(error)],
     })
 }
 

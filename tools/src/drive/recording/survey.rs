@@ -86,6 +86,14 @@ impl Survey {
 
     /// Checks that the drive can be replayed: at least 3 s long, at 50 to 1000 Hz, with any wheels at rest in the first 3 s.
     pub fn finish(mut self, path: &str) -> Result<Facts, DataError> {
+        let beginning = std::mem::take(&mut self.beginning);
+        let facts = self.finish_moving(path)?;
+        check_wheels(&beginning, path)?;
+        Ok(facts)
+    }
+
+    /// As [`Survey::finish`], with wheels that may turn.
+    pub fn finish_moving(mut self, path: &str) -> Result<Facts, DataError> {
         if self.facts.rows == 0 {
             return Err(DataError::of(path, DataFault::Empty));
         }
@@ -98,7 +106,6 @@ impl Survey {
             return Err(DataError::of(path, DataFault::Rate { hz: 1e6 / median as f64 }));
         }
         self.facts.is_off_grid |= median.abs_diff(PERIOD_US) > SNAP_US;
-        self.check_wheels(path)?;
         Ok(self.facts)
     }
 
@@ -111,24 +118,24 @@ impl Survey {
         });
         found.map(|(period, _)| *period)
     }
+}
 
-    /// Checks that the wheels stand in each of the first three seconds. Each second is checked on its own, so that a
-    /// car that pulls away in the last one is found.
-    fn check_wheels(&self, path: &str) -> Result<(), DataError> {
-        for second in self.beginning.chunks(RATE_HZ as usize) {
-            for wheel in 0..WHEELS {
-                let rates = || second.iter().filter_map(|row| row.wheels[wheel]);
-                let mean = rates().sum::<f64>() / rates().count().max(1) as f64;
-                if mean.abs() <= WHEEL_STANDS {
-                    continue;
-                }
-                let turns = |row: &&Row| row.wheels[wheel].is_some_and(|rate| rate.abs() > WHEEL_STANDS);
-                // At least one rate is above the limit, since the mean is.
-                let line = second.iter().find(turns).map_or(0, |row| row.line);
-                let fault = DataFault::Moving { line, wheel: wheel + 1, rate: mean };
-                return Err(DataError::of(path, fault));
+/// Checks that the wheels stand in each of the first three seconds. Each second is checked on its own, so that a
+/// car that pulls away in the last one is found.
+fn check_wheels(beginning: &[Row], path: &str) -> Result<(), DataError> {
+    for second in beginning.chunks(RATE_HZ as usize) {
+        for wheel in 0..WHEELS {
+            let rates = || second.iter().filter_map(|row| row.wheels[wheel]);
+            let mean = rates().sum::<f64>() / rates().count().max(1) as f64;
+            if mean.abs() <= WHEEL_STANDS {
+                continue;
             }
+            let turns = |row: &&Row| row.wheels[wheel].is_some_and(|rate| rate.abs() > WHEEL_STANDS);
+            // At least one rate is above the limit, since the mean is.
+            let line = second.iter().find(turns).map_or(0, |row| row.line);
+            let fault = DataFault::Moving { line, wheel: wheel + 1, rate: mean };
+            return Err(DataError::of(path, fault));
         }
-        Ok(())
     }
+    Ok(())
 }

@@ -1,0 +1,326 @@
+//! The heading error after a loss of GNSS: the courses are hidden from a start on, for every start of a drive.
+//!
+//! A start comes every [`EVERY_S`] seconds, once the vehicle has driven with a course for long enough. The boards at work
+//! are copied there, and the copies go on without a course. The error of a method is the change of its heading since the
+//! start less that of the reference, which is taken as the median of the last three seconds, at both ends. Every method
+//! has the same samples, wheels and courses.
+
+use crate::board::{Board, Step, Uncorrected};
+use crate::drive::DT;
+use crate::drive::error::DataError;
+use crate::drive::recording::Row;
+use crate::drive::stream::Drive;
+use crate::drive::wheel_frames::Speeds;
+use crate::evaluate::heading_error::OffCourse;
+use crate::evaluate::methods::Method;
+use crate::evaluate::metrics::wrap;
+use crate::evaluate::rates::silent;
+use crate::evaluate::{ekf, vqf};
+use gyronet::model::window::{Features, WINDOW};
+use gyronet::model::{Estimate, WindowNetwork};
+use gyronet::pipeline::PipelineConfig;
+use gyronet::sample::{RATE_HZ, Standstill};
+use gyronet::units::{AngularRate, SpecificForce};
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+/// Time from one start to the next, s.
+pub const EVERY_S: usize = 2;
+/// Seconds of course before a start, one set of rows each.
+pub const AFTER_S: [usize; 2] = [60, 20];
+/// Slowest speed that counts as driven with a course, m/s, and the longest time from one course to the next, s.
+const SLOWEST: f32 = 3.0;
+const APART_S: f64 = 2.1;
+/// Samples over whose median the reference is taken.
+const MEDIAN: usize = 3 * SECOND;
+const SECOND: usize = RATE_HZ as usize;
+
+/// The compared methods, in the order of the table.
+pub const METHODS: [Method; 6] =
+    [Method::STATIC, Method::STATIC_ZERO_RATE, Method::VQF, Method::EKF, Method::NO_MODEL, Method::DELAYED];
+type ByMethod<T> = [T; METHODS.len()];
+
+/// The error of every method in one outage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outage {
+    /// Time driven with a course before it, s.
+    pub driven_s: f64,
+    /// Its length, s.
+    pub seconds: usize,
+    /// Its start, s from the start of the drive.
+    pub start_s: f64,
+    /// Errors of the heading, rad.
+    pub heading: ByMethod<f64>,
+    /// Distance by the wheels, m, and what the errors of the heading move its end by, m.
+    pub position: Option<(f64, ByMethod<f64>)>,
+}
+
+/// A network that several boards share.
+#[derive(Clone)]
+struct Shared<'a>(Rc<RefCell<&'a mut dyn WindowNetwork>>);
+
+impl WindowNetwork for Shared<'_> {
+    fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate {
+        self.0.borrow_mut().estimate(window)
+    }
+}
+
+/// Runs every method through the outages of a drive, which may begin in motion.
+pub fn run(
+    drive: &Drive<'_>,
+    network: &mut dyn WindowNetwork,
+    lengths_s: &[usize],
+    mut progress: impl FnMut(),
+) -> Result<Vec<Outage>, DataError> {
+    let mut race = Race::new(drive, Shared(Rc::new(RefCell::new(network))), lengths_s);
+    for (at, row) in drive.rows()?.enumerate() {
+        race.row(at, &row?);
+        progress();
+    }
+    race.end();
+    Ok(race.found)
+}
+
+/// The boards with the course: without the model, and with it.
+#[derive(Clone)]
+struct Boards<'a> {
+    no_model: Board<Uncorrected>,
+    model: Board<Shared<'a>>,
+}
+
+impl Boards<'_> {
+    /// Adds a row, and returns the steps that it completes.
+    fn row(&mut self, row: &Row) -> Option<[Step; 2]> {
+        // A start that is refused in motion is no error here.
+        let (no_model, model) = (self.no_model.row(row).ok().flatten(), self.model.row(row).ok().flatten());
+        no_model.zip(model).map(|(no_model, model)| [no_model, model])
+    }
+
+    fn end(&mut self) -> Option<[Step; 2]> {
+        self.no_model.end().zip(self.model.end()).map(|(no_model, model)| [no_model, model])
+    }
+}
+
+/// The boards and filters of one drive, and the outages in progress.
+struct Race<'a> {
+    lengths: Vec<usize>,
+    boards: Boards<'a>,
+    zero_rate: Board<Uncorrected>,
+    ekf: ekf::Filter,
+    vqf: vqf::Heading,
+    speeds: Option<Speeds>,
+    /// Time of the newest course, us, and the time driven with one, s.
+    newest: Option<u64>,
+    driven_s: f64,
+    /// Readings of the last two seconds, and the updates at standstill so far.
+    gyro: VecDeque<f64>,
+    updates: u32,
+    reference: Reference,
+    running: Vec<Running<'a>>,
+    found: Vec<Outage>,
+}
+
+/// An outage in progress.
+struct Running<'a> {
+    start: usize,
+    driven_s: f64,
+    /// Copies that get no course any more.
+    boards: Boards<'a>,
+    /// Known once the boards give out the step of the start.
+    begun: Option<Begun>,
+    path: Path,
+}
+
+/// The copy of the filter, and the gyro's sum less the true heading at the start: the median and the newest.
+struct Begun {
+    ekf: ekf::Filter,
+    median: f64,
+    off: f64,
+}
+
+/// The gyro's sum less the true heading.
+#[derive(Default)]
+struct Reference {
+    by_course: OffCourse,
+    by_rate: f64,
+    recent: VecDeque<Option<f64>>,
+}
+
+impl Reference {
+    fn add(&mut self, gyro: f64, row: &Row) {
+        self.recent.push_back(match row.reference {
+            Some(rate) => {
+                self.by_rate += (gyro - rate) * DT;
+                Some(self.by_rate)
+            }
+            None => self.by_course.add(gyro, row.course),
+        });
+        if self.recent.len() > MEDIAN {
+            self.recent.pop_front();
+        }
+    }
+
+    fn median(&self) -> Option<f64> {
+        let mut known: Vec<f64> = self.recent.iter().flatten().copied().collect();
+        known.sort_unstable_by(f64::total_cmp);
+        known.get(known.len() / 2).copied()
+    }
+
+    fn newest(&self) -> Option<f64> {
+        self.recent.iter().rev().flatten().next().copied()
+    }
+}
+
+impl<'a> Race<'a> {
+    fn new(drive: &Drive<'_>, network: Shared<'a>, lengths_s: &[usize]) -> Self {
+        let config = || silent(PipelineConfig::DEFAULT);
+        let no_model = Board::new(config(), drive.wheels(), Uncorrected).moving(true);
+        Self {
+            lengths: lengths_s.to_vec(),
+            boards: Boards { no_model, model: Board::new(config(), drive.wheels(), network).moving(true) },
+            zero_rate: Board::new(config(), drive.wheels(), Uncorrected).moving(false),
+            ekf: ekf::Filter::default(),
+            vqf: vqf::Heading::new(vqf::on_a_vehicle()),
+            speeds: drive.speeds(),
+            newest: None,
+            driven_s: 0.0,
+            gyro: VecDeque::new(),
+            updates: 0,
+            reference: Reference::default(),
+            running: Vec::new(),
+            found: Vec::new(),
+        }
+    }
+
+    fn row(&mut self, at: usize, row: &Row) {
+        let hidden = Row { heading: None, ..*row };
+        let copies = self.running.iter_mut().map(|outage| outage.boards.row(&hidden)).collect();
+        let zero_rate = self.zero_rate.row(row).ok().flatten();
+        if let Some((steps, zero_rate)) = self.boards.row(row).zip(zero_rate) {
+            self.step(&steps, &zero_rate, copies);
+        }
+        self.listen(row);
+        if at.is_multiple_of(EVERY_S * SECOND) && AFTER_S.iter().any(|after| self.driven_s >= *after as f64) {
+            let (boards, driven_s) = (self.boards.clone(), self.driven_s);
+            self.running.push(Running { start: at, driven_s, boards, begun: None, path: Path::default() });
+        }
+    }
+
+    fn end(&mut self) {
+        while let Some((steps, zero_rate)) = self.boards.end().zip(self.zero_rate.end()) {
+            let copies = self.running.iter_mut().map(|outage| outage.boards.end()).collect();
+            self.step(&steps, &zero_rate, copies);
+        }
+    }
+
+    /// Adds up the time with a course.
+    fn listen(&mut self, row: &Row) {
+        if row.heading.is_some_and(|heading| heading.speed.is_some_and(|speed| speed >= SLOWEST)) {
+            let now = row.sample.time.0;
+            let since = self.newest.replace(now).map_or(0.0, |last| (now - last) as f64 * 1e-6);
+            self.driven_s += if since < APART_S { since } else { 0.0 };
+        }
+    }
+
+    /// Adds a step of the boards and of their copies to every method.
+    fn step(&mut self, [_, model]: &[Step; 2], zero_rate: &Step, copies: Vec<Option<[Step; 2]>>) {
+        let row = &model.input;
+        let [x, y, gyro] = row.sample.angular_rate.map(AngularRate::rad_per_sec);
+        self.reference.add(gyro, row);
+        let pipeline = self.zero_rate.coprocessor().pipeline();
+        let [bx, by, bias] = pipeline.gyro_bias().unwrap_or_default().map(AngularRate::rad_per_sec);
+        let updates = pipeline.counters().zero_rate_updates;
+        let force = row.sample.specific_force.map(SpecificForce::metre_per_sec2);
+        let vqf = self.vqf.rate([x - bx, y - by, gyro - bias], force);
+        // The update is of the second before the newest one.
+        self.gyro.push_back(gyro);
+        let ended = self.gyro.len() > 2 * SECOND && self.gyro.pop_front().is_some() && updates > self.updates;
+        let mean = ended.then(|| self.gyro.iter().take(SECOND).sum::<f64>() / SECOND as f64);
+        self.updates = updates;
+        let stands = model.standstill == Standstill::Still;
+        let filtered = |ekf: &mut ekf::Filter| {
+            mean.into_iter().for_each(|mean| ekf.standstill(mean));
+            ekf.sample(gyro, stands)
+        };
+        filtered(&mut self.ekf);
+        if let Some(heading) = &row.heading {
+            self.ekf.course(heading);
+        }
+        let speed = self.speeds.as_mut().map(|speeds| speeds.next(row));
+        let (now, found) = (self.reference.median(), &mut self.found);
+        let (newest, lengths) = (self.reference.newest(), &self.lengths);
+        let mut copies = copies.into_iter();
+        self.running.retain_mut(|outage| {
+            let Some(Some([own_no_model, own])) = copies.next() else { return false };
+            if own.row <= outage.start {
+                if own.row == outage.start {
+                    outage.begun =
+                        now.zip(newest).map(|(median, off)| Begun { ekf: self.ekf.clone(), median, off });
+                }
+                return own.row < outage.start || outage.begun.is_some();
+            }
+            let Some(begun) = &mut outage.begun else { return false };
+            let rate = |step: &Step| step.delayed.map_or(gyro, |sent| sent.rate.rad_per_sec());
+            let rates = [
+                gyro - bias,
+                rate(zero_rate),
+                vqf,
+                filtered(&mut begun.ekf),
+                rate(&own_no_model),
+                rate(&own),
+            ];
+            outage.path.add(rates, gyro, newest.map_or(0.0, |off| off - begun.off), speed);
+            let steps = own.row - outage.start;
+            if let Some(seconds) = lengths.iter().copied().find(|seconds| seconds * SECOND == steps)
+                && let Some(now) = now
+            {
+                let Path { angles, gyro, .. } = outage.path;
+                let truth = gyro - (now - begun.median);
+                found.push(Outage {
+                    driven_s: outage.driven_s,
+                    seconds,
+                    start_s: outage.start as f64 * DT,
+                    heading: angles.map(|angle| wrap(angle - truth).abs()),
+                    position: speed.map(|_| outage.path.position()),
+                });
+            }
+            lengths.iter().any(|seconds| seconds * SECOND > steps)
+        });
+    }
+}
+
+/// The paths since a start.
+#[derive(Debug, Clone, Copy, Default)]
+struct Path {
+    /// Angles by each method, and by the gyro alone, rad.
+    angles: ByMethod<f64>,
+    gyro: f64,
+    /// Ends by each method, and by the reference, m; the distance, m.
+    ends: ByMethod<[f64; 2]>,
+    reference: [f64; 2],
+    distance: f64,
+}
+
+impl Path {
+    /// Adds a sample: the rates, the gyro's own, by how much its sum is ahead of the truth, rad, and the speed, m/s.
+    fn add(&mut self, rates: ByMethod<f64>, gyro: f64, off: f64, speed: Option<f64>) {
+        self.gyro += gyro * DT;
+        let by = speed.unwrap_or(0.0) * DT;
+        self.distance += by.abs();
+        let go = |place: &mut [f64; 2], angle: f64| {
+            place[0] += by * angle.cos();
+            place[1] += by * angle.sin();
+        };
+        for ((angle, rate), end) in self.angles.iter_mut().zip(rates).zip(&mut self.ends) {
+            *angle += rate * DT;
+            go(end, *angle);
+        }
+        go(&mut self.reference, self.gyro - off);
+    }
+
+    fn position(&self) -> (f64, ByMethod<f64>) {
+        let [x, y] = self.reference;
+        (self.distance, self.ends.map(|end| (end[0] - x).hypot(end[1] - y)))
+    }
+}

@@ -1,0 +1,148 @@
+//! The errors of many outages, as a table and as JSON: median, 90 % and worst of each method.
+
+use super::outage::{AFTER_S, METHODS, Outage};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Median, 90 % and worst of some values.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    pub median: f64,
+    pub p90: f64,
+    pub worst: f64,
+}
+
+impl Spread {
+    /// `None` without values.
+    pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+        let mut values: Vec<f64> = values.collect();
+        values.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| values.get((share * (values.len() as f64 - 1.0)).round() as usize).copied();
+        Some(Self { median: at(0.5)?, p90: at(0.9)?, worst: at(1.0)? })
+    }
+}
+
+/// The errors of one method over all outages of one length.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Figures {
+    pub starts: usize,
+    pub heading_deg: Spread,
+    /// What the heading moves the end of the path by wheels, m and % of the distance; absent without wheels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_m: Option<Spread>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_percent: Option<Spread>,
+}
+
+/// By length of the outage, s, and by method.
+pub type ByLength = BTreeMap<usize, BTreeMap<&'static str, Figures>>;
+
+/// The outages of the drives of one folder, or of all.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Outages {
+    /// The folder, or "all".
+    pub set: String,
+    pub drives: usize,
+    /// After 60 s with a course.
+    pub outage: ByLength,
+    /// After 20 s with a course.
+    pub outage_after_20_s: ByLength,
+}
+
+impl Outages {
+    /// Sums up the outages of some drives.
+    pub fn new<'a>(set: &str, drives: usize, outages: impl Iterator<Item = &'a Outage> + Clone) -> Self {
+        let [outage, outage_after_20_s] = AFTER_S.map(|after| {
+            let mut lengths = ByLength::new();
+            for length in outages.clone().map(|outage| outage.seconds) {
+                lengths.entry(length).or_default();
+            }
+            for (length, methods) in &mut lengths {
+                let chosen =
+                    outages.clone().filter(|one| one.seconds == *length && one.driven_s >= after as f64);
+                for (k, method) in METHODS.iter().enumerate() {
+                    let moved = || chosen.clone().filter_map(|one| one.position);
+                    let heading_deg = Spread::of(chosen.clone().map(|one| one.heading[k].to_degrees()));
+                    methods.extend(heading_deg.map(|heading_deg| {
+                        let figures = Figures {
+                            starts: chosen.clone().count(),
+                            heading_deg,
+                            position_m: Spread::of(moved().map(|(_, ends)| ends[k])),
+                            position_percent: Spread::of(
+                                moved()
+                                    .filter(|(distance, _)| *distance > 50.0)
+                                    .map(|(distance, ends)| 100.0 * ends[k] / distance),
+                            ),
+                        };
+                        (method.key, figures)
+                    }));
+                }
+            }
+            lengths
+        });
+        Self { set: set.to_owned(), drives, outage, outage_after_20_s }
+    }
+}
+
+impl fmt::Display for Outages {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (after, lengths) in AFTER_S.iter().zip([&self.outage, &self.outage_after_20_s]) {
+            for (length, methods) in lengths.iter().filter(|(_, methods)| !methods.is_empty()) {
+                let starts = methods.values().map(|figures| figures.starts).max().unwrap_or(0);
+                writeln!(
+                    f,
+                    "{}, {} drives: {length} s without GNSS after {after} s with it, {starts} starts",
+                    self.set, self.drives
+                )?;
+                writeln!(
+                    f,
+                    "  {:<26}{:>27}{:>27}{:>24}",
+                    "median, 90 %, worst", "heading, deg", "position, m", "position, %"
+                )?;
+                for method in METHODS {
+                    let Some(figures) = methods.get(method.key) else { continue };
+                    let three = |spread: Option<Spread>, width: usize| {
+                        spread.map_or_else(String::new, |Spread { median, p90, worst }| {
+                            format!("{median:>width$.2}{p90:>width$.2}{worst:>width$.2}")
+                        })
+                    };
+                    writeln!(
+                        f,
+                        "  {:<26}{}{:>27}{:>24}",
+                        method.name,
+                        three(Some(figures.heading_deg), 9),
+                        three(figures.position_m, 9),
+                        three(figures.position_percent, 8)
+                    )?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_length_has_its_starts() {
+        let outage = |driven_s: f64, seconds, error: f64| Outage {
+            driven_s,
+            seconds,
+            start_s: 0.0,
+            heading: std::array::from_fn(|k| error * (k + 1) as f64),
+            position: None,
+        };
+        let all =
+            [outage(30.0, 60, 0.3), outage(70.0, 60, 0.1), outage(90.0, 60, 0.2), outage(90.0, 30, 0.4)];
+        let table = Outages::new("x", 1, all.iter());
+        let of = |lengths: &ByLength, length: usize| lengths[&length]["static"];
+        assert_eq!((of(&table.outage, 60).starts, of(&table.outage, 30).starts), (2, 1));
+        assert_eq!(of(&table.outage_after_20_s, 60).starts, 3);
+        let heading = of(&table.outage_after_20_s, 60).heading_deg;
+        assert!((heading.median - 0.2f64.to_degrees()).abs() < 1e-9, "{heading:?}");
+        assert!((heading.worst - 0.3f64.to_degrees()).abs() < 1e-9, "{heading:?}");
+    }
+}
