@@ -273,6 +273,8 @@ fn what_was_learnt_waits_for_the_next_stop() {
 /// Troubles may be appended at any time; where that needs an erase, a workshop waits for the vehicle to stand.
 #[test]
 fn troubles_erase_nothing_in_motion() {
+    // A request that may be told to wait for an erase.
+    const READ: [u8; 3] = [0x22, 0xF1, 0x86];
     let (flash, mut bench) = bench();
     for k in 0..10_000 {
         let latitude = Configuration { latitude_deg: Some((k % 90) as f32), ..Configuration::DEFAULT };
@@ -284,9 +286,9 @@ fn troubles_erase_nothing_in_motion() {
     bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
     moves(&mut bench, Faults::GAP);
     let before = flash.borrow().operations();
-    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    bench.expect(&READ, &[0x62, 0xF1, 0x86, 3]);
     assert_eq!(flash.borrow().operations(), before);
     observe(&mut bench.board, 1, (0.01, 20), LEVEL, Standstill::Still);
-    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    bench.expect(&READ, &[0x62, 0xF1, 0x86, 3]);
     assert!(flash.borrow().operations() > before);
 }
