@@ -19,13 +19,20 @@ pub enum Need {
     Data,
     /// A Python with the packages that a test names.
     Python,
+    /// The C compiler arm-none-eabi-gcc.
+    Gcc,
     /// Chromium.
     Browser,
 }
 
 impl Need {
-    const ALL: [(&'static str, Self); 4] =
-        [("qemu", Self::Qemu), ("data", Self::Data), ("python", Self::Python), ("browser", Self::Browser)];
+    const ALL: [(&'static str, Self); 5] = [
+        ("qemu", Self::Qemu),
+        ("data", Self::Data),
+        ("python", Self::Python),
+        ("gcc", Self::Gcc),
+        ("browser", Self::Browser),
+    ];
 }
 
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

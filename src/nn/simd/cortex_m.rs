@@ -146,7 +146,7 @@ pub(in crate::nn) fn project<const U: usize>(
     let copies = projection.len() > 1 && record_bytes > CACHED_BYTES;
     let copy = if copies { record.as_mut_ptr().cast() } else { core::ptr::null_mut() };
     let first = projection.as_mut_ptr().cast::<Accumulators>();
-    let skipped = entry(inputs / 2, PROJECT_UNROLL);
+    let skipped = entry::<PROJECT_UNROLL>(inputs / 2);
     let call = ProjectCall {
         x: x.as_ptr().wrapping_sub(1),
         x_end: x.as_ptr_range().end.wrapping_sub(1),
@@ -176,7 +176,7 @@ pub(in crate::nn) fn step<const U: usize, const W: usize>(
     let hidden = hidden.as_mut_ptr().cast::<u16>();
     let columns = DirectionWeights::padded(weights.units());
     let quads = columns / 4;
-    let skipped = entry(quads, STEP_UNROLL);
+    let skipped = entry::<STEP_UNROLL>(quads);
     let (start, entry, to_weights) = match previous {
         Some(previous) => (previous.as_ptr(), skipped * STEP_BYTES, -((16 * skipped) as isize)),
         None => (core::ptr::null(), NO_PREVIOUS, (4 * columns) as isize),
@@ -243,9 +243,9 @@ unsafe extern "C" fn copy_kernel(
     )
 }
 
-/// Returns where to enter a loop unrolled `unroll` times, so that `count` items end with a full iteration.
-fn entry(count: usize, unroll: usize) -> usize {
-    (unroll - count % unroll) % unroll
+/// Returns where to enter a loop unrolled `UNROLL` times, so that `count` items end with a full iteration.
+const fn entry<const UNROLL: usize>(count: usize) -> usize {
+    (UNROLL - count % UNROLL) % UNROLL
 }
 
 /// Computes for each unit and each pair of steps: both steps' accumulators := bias + rows . columns.
