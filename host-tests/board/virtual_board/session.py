@@ -200,7 +200,7 @@ class Session:
         board, longest = self.board, self.board.paths.longest
         board.paths.longest = {}
         vectors = {number: board.memory.word(board.scb.vtor + 4 * number) for number in longest if number}
-        name = lambda number: board.symbol_at(vectors[number]) if number else "idle"
+        name = lambda number: board.symbol_at(vectors[number]).partition("+")[0] if number else "idle"
         return {"paths": [{"name": name(number), "instructions": count} for number, count in sorted(longest.items())]}
 
     def snapshot(self, name: str) -> None:

@@ -77,16 +77,19 @@ fn longest_paths_at_both_clocks() {
             assert_eq!(info.weights, WeightSource::Slot(Slot::B));
         }
         board.paths();
-        let [key, other] = [(); 2].map(|()| PrivateKey::generate().expect("random numbers"));
+        let key = PrivateKey::generate().expect("random numbers");
         on_line(&mut board).set_key(&key.public()).expect("there was none");
-        let mut stored = |key: PrivateKey, latitude: f32| {
+        let mut stored = |authority, latitude: f32| {
             let mut device = on_line(&mut board);
-            device.authorise(Authority::Key(key));
+            device.authorise(authority);
             device
                 .set_configuration(&Configuration { latitude_deg: Some(latitude), ..Configuration::DEFAULT })
         };
-        stored(key.clone(), 1.0).expect("it is signed");
-        let wrong = stored(other, 2.0);
+        stored(Authority::Key(key.clone()), 1.0).expect("it is signed");
+        // Of the last counter but without a signature.
+        let mut trailer = [0; 69];
+        trailer[1..5].fill(0xFF);
+        let wrong = stored(Authority::Signature(trailer), 2.0);
         assert!(matches!(wrong, Err(DeviceError::Refused(Refusal::Signature))), "{wrong:?}");
         let mut device = on_line(&mut board);
         device.authorise(Authority::Key(key));

@@ -11,7 +11,7 @@ use gyronet::model::blob::CRC;
 use gyronet::store::layout::{self, RECORD_SECTOR, SECTORS, SLOT_SIZE, sector_at};
 use gyronet::store::slots::{SlotError, file, select};
 use gyronet::store::{
-    Accepted, Configuration, Field, FieldError, Learned, Mounting, Record, Slot, Store, StoreError,
+    Accepted, Access, Configuration, Field, FieldError, Learned, Mounting, Record, Slot, Store, StoreError,
 };
 use gyronet::units::{AngularRate, CentiCelsius, Duration, WheelSpeed};
 use gyronet_host_tests::flash::{F405, Region};
@@ -341,5 +341,23 @@ fn sectors_of_zeros_are_damaged() {
     for offset in layout::STORE {
         flash.borrow_mut().damage(offset as usize, 0xFF);
     }
-    assert!(open(&flash).damaged(), "a raw image of the flash has overwritten the records");
+    let mut store = open(&flash);
+    assert!(store.damaged(), "a raw image of the flash has overwritten the records");
+    // A record mends one of the two, the next start the other; whether there was a key is not known.
+    store.set(&Configuration::DEFAULT).expect("it is stored");
+    assert!(store.damaged());
+    let mut store = open(&flash);
+    assert!(store.make_room().is_ok() && !store.damaged() && !open(&flash).damaged());
+    assert_eq!(store.get::<Access>(), Err(StoreError::Lost));
+}
+
+#[test]
+fn a_damaged_header_heals_with_the_next_record() {
+    let flash = Flash::default();
+    open(&flash).set(&Configuration::DEFAULT).expect("it is stored");
+    flash.borrow_mut().damage(layout::STORE.start as usize + 1, 4);
+    let mut store = open(&flash);
+    assert!(store.damaged() && store.get() == Ok(Some(Configuration::DEFAULT)), "a copy stands for it");
+    store.set(&Configuration::DEFAULT).expect("it is stored");
+    assert!(!store.damaged() && store.has_room() && !open(&flash).damaged());
 }

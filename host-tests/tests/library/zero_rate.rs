@@ -341,7 +341,6 @@ fn parked_with_gap(ticks: u64, gap: std::ops::Range<u64>, wheels_stand: bool) ->
     (pipeline, outputs)
 }
 
-/// The second in which the gap lies is not used.
 #[test]
 fn no_second_at_standstill_spans_a_gap() {
     let updates = |gap| parked_with_gap(1_500, gap, true).0.counters().zero_rate_updates;
@@ -375,6 +374,5 @@ fn too_much_to_carry_is_reported_until_it_is_carried() {
     };
     assert_eq!(implausible(0.0), 0);
     let reported = implausible(0.003);
-    // 0.1 deg at 0.001 deg a sample, less the last quarter of the limit of 25 of them.
     assert!((40..=110).contains(&reported), "{reported}");
 }

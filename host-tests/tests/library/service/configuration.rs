@@ -4,7 +4,7 @@ use super::{Board, IDENTITY, SUPPORTED_HARDWARE, bare, info, sample, start};
 use embedded_can::{Id, StandardId};
 use gyronet::can::config::{ConfigError, Settings};
 use gyronet::can::diagnosis::DiagnosisIds;
-use gyronet::can::wheel::{WheelConfigError, WheelFrame, WheelSettings};
+use gyronet::can::wheel::{WheelFrame, WheelSettings};
 use gyronet::health::{Faults, Status};
 use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::event::EventKind;
@@ -60,7 +60,7 @@ fn configuration_is_kept_whole() {
 }
 
 #[test]
-fn wheel_frames_are_kept_and_none_may_be_the_board_s_own() {
+fn wheel_frames_are_kept() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
     let known = |board: &mut Board| (info(board).wheels, *board.wheels());
@@ -72,11 +72,6 @@ fn wheel_frames_are_kept_and_none_may_be_the_board_s_own() {
         WheelSettings { frames: [frame, None, None, None], ..WheelSettings::TOYOTA }
     };
     assert_eq!(board.set_wheels(&with_id(0xAB)), Ok(()));
-    for own in [0x1A0, Configuration::DEFAULT.fog_ids[1]] {
-        let error = FieldError::Wheels(WheelConfigError::Own(own.into()));
-        let refused = Err(Refusal::Store(StoreError::Field(error)));
-        assert_eq!(board.set_wheels(&with_id(own)), refused);
-    }
     assert_eq!(known(&mut board), built_in, "from the next start on");
     let mut board = start(&flash);
     assert_eq!(known(&mut board), (Origin::Stored, with_id(0xAB)));

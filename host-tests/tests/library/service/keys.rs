@@ -133,11 +133,17 @@ fn wrong_answers_of_others_do_not_keep_the_owner_out() {
 #[test]
 fn nothing_is_written_in_motion_whoever_asks() {
     let [key, other] = keys();
+    let (open, mut without_key) = bench();
+    enter(&mut without_key);
     let (flash, mut bench) = locked(&key);
     let seed = challenge(&mut bench, 1);
     let (wheels, moving) = (WheelSample::without_speeds(Standstill::Moving), judged(Standstill::Moving));
     let moved = sample(500, [0.0, 0.0, 9.81], 0.0);
-    bench.board.observe(Some(&moved), 500, (Status::Ready, Faults::NONE), &wheels, &moving);
+    for bench in [&mut bench, &mut without_key] {
+        bench.board.observe(Some(&moved), 500, (Status::Ready, Faults::NONE), &wheels, &moving);
+    }
+    without_key.expect(&write_key(key.public(), &[]), &[0x7F, 0x2E, 0x22]);
+    assert_eq!(super::start(&open).access(), Some(Access::OPEN));
     let before = flash.borrow().operations();
     let record = postcard::to_stdvec(&Configuration::DEFAULT).expect("there is room");
     let content = [&[Configuration::VERSION][..], &record].concat();
