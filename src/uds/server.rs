@@ -45,6 +45,18 @@ impl Server {
         self.transport.receive(data, now);
     }
 
+    /// Returns whether a tester has a session other than the default one.
+    #[must_use]
+    pub fn has_session(&self) -> bool {
+        self.services.has_session()
+    }
+
+    /// Sets whether the next frames are of another tester than the session's: it may read, and neither use the session
+    /// and its access, nor prolong or end it.
+    pub fn set_guest(&mut self, is_guest: bool) {
+        self.services.is_guest = is_guest;
+    }
+
     /// Counts a frame of a tester that is refused because another tester is being served.
     pub fn refuse(&mut self) {
         self.transport.refuse();
@@ -125,7 +137,7 @@ impl Server {
         if answered {
             self.has_stalled = core::mem::take(&mut self.is_pending);
             services.is_functional = false;
-            services.last_activity = now;
+            services.frame_received(now);
         }
     }
 }

@@ -40,6 +40,8 @@ pub(super) struct Services {
     pub last_activity: u32,
     /// True if the request was addressed to all servers.
     pub is_functional: bool,
+    /// True if the session is another tester's: this one is served as in the default session, and cannot end it.
+    pub is_guest: bool,
     pub(super) memory: Memory,
     /// True if the memory has been restored from flash.
     is_restored: bool,
@@ -72,6 +74,7 @@ impl Services {
             session: Session::Default,
             last_activity: 0,
             is_functional: false,
+            is_guest: false,
             memory: Memory::new(),
             is_restored: false,
             settles_at: None,
@@ -92,7 +95,19 @@ impl Services {
     /// Records that a frame of the tester was received.
     pub fn frame_received(&mut self, now: u32) {
         self.expire(now);
-        self.last_activity = now;
+        if !self.is_guest {
+            self.last_activity = now;
+        }
+    }
+
+    /// Returns whether a tester has a session other than the default one.
+    pub fn has_session(&self) -> bool {
+        self.session != Session::Default
+    }
+
+    /// Returns the session of the tester that is being served.
+    pub fn session(&self) -> Session {
+        if self.is_guest { Session::Default } else { self.session }
     }
 
     /// Records that the board has stalled until now, for a request: the tester could not be heard meanwhile.
@@ -139,7 +154,7 @@ impl Services {
             let is_heard = !self.is_functional && !matches!(request, [0x3E, ..]);
             self.memory.is_changed && is_heard && device.troubles_want_erase()
         };
-        self.session != Session::Default
+        self.session() != Session::Default
             && (matches!(
                 request,
                 [0x2E | 0x34 | 0x37, ..]
@@ -199,6 +214,16 @@ impl Services {
             device.forget_refusal();
         }
         self.require_session(session::needed(command, rest))?;
+        if self.is_guest
+            && matches!(
+                command,
+                UdsCommand::DiagnosticSessionControl
+                    | UdsCommand::ECUReset
+                    | UdsCommand::ClearDiagnosticInformation
+            )
+        {
+            return Err(Nrc::ConditionsNotCorrect);
+        }
         if !session::has_sub_function(command) {
             return self.serve_data(command, rest, device, surroundings, out).map(|()| true);
         }
@@ -245,7 +270,7 @@ impl Services {
                     return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
                 }
                 let Surroundings { counters, errors, .. } = surroundings;
-                let session = self.session as u8;
+                let session = self.session() as u8;
                 let security = &self.security;
                 let sources = Sources { device: &*device, counters, session, security, errors };
                 for id in rest.chunks_exact(2) {
@@ -299,9 +324,10 @@ impl Services {
 
     /// Refuses a request that needs another session.
     pub(super) fn require_session(&self, session: Session) -> Result<(), Nrc> {
+        let own = self.session();
         let has = session == Session::Default
-            || self.session == session
-            || (self.session, session) == (Session::Programming, Session::Extended);
+            || own == session
+            || (own, session) == (Session::Programming, Session::Extended);
         if has { Ok(()) } else { Err(Nrc::ServiceNotSupportedInActiveSession) }
     }
 }

@@ -94,11 +94,13 @@ struct Tester {
     server: Server,
     /// Line of the current conversation, or of the last one.
     line: Line,
+    /// Line of the session, which no tester on another line may use.
+    owner: Line,
 }
 
 impl Diagnosis {
     pub fn new(service: serial::Port, bits_per_second: u32) -> Self {
-        let tester = Tester { server: Server::new(), line: Line::Can };
+        let tester = Tester { server: Server::new(), line: Line::Can, owner: Line::Can };
         Self { tester, service, port: Port::new(bits_per_second) }
     }
 
@@ -126,7 +128,7 @@ impl Diagnosis {
                 tester.receive(line, &frame, now);
             }
         }
-        let Tester { server, line } = tester;
+        let Tester { server, line, .. } = tester;
         let have_left = match line {
             Line::Service => port.outgoing().is_none() && service.is_sent(),
             Line::Can => RESPONSES.is_empty() && can::all_sent(),
@@ -170,6 +172,10 @@ impl Tester {
         if self.line != line {
             return self.server.refuse();
         }
+        if !self.server.has_session() {
+            self.owner = line;
+        }
+        self.server.set_guest(self.owner != line);
         let [_, functional, _] = ids();
         if pack(frame.id()) == functional {
             self.server.receive_functional(frame.data(), now);

@@ -204,6 +204,31 @@ fn each_service_makes_its_checks_in_the_order_of_the_standard() {
     }
 }
 
+/// A tester on another line has no part in the session, nor in the access that was proven in it.
+#[test]
+fn a_second_tester_neither_uses_nor_ends_the_session_of_the_first() {
+    let (_, mut bench) = bench();
+    bench.stand();
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.server.set_guest(true);
+    bench.expect(&[0x22, 0xF1, 0x86], &[0x62, 0xF1, 0x86, 1]);
+    for (request, code) in
+        [("2E010000", 0x7F), ("2701", 0x7F), ("1003", 0x22), ("1101", 0x22), ("14FFFFFF", 0x22)]
+    {
+        let request = bytes(request);
+        bench.expect(&request, &[0x7F, request[0], code]);
+    }
+    bench.server.set_guest(false);
+    bench.expect(&[0x22, 0xF1, 0x86], &[0x62, 0xF1, 0x86, 3]);
+    bench.fail(Status::Ready, Faults::NONE);
+    bench.now += 4_900;
+    bench.server.set_guest(true);
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    bench.now += 200;
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    assert!(!bench.server.has_session(), "nor keeps it");
+}
+
 /// Case bus/06.
 #[test]
 fn a_list_with_unknown_identifiers_gives_the_known_ones() {
