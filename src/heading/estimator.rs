@@ -356,6 +356,12 @@ impl Estimator {
         self.has_begun() && self.counters.used >= FEW && sqrt(filter.variance::<BIAS>()) <= COARSE_BIAS
     }
 
+    /// Returns why the newest course taught nothing; `None` where it was used.
+    #[must_use]
+    pub fn refusal(&self) -> Option<Refusal> {
+        self.refusal
+    }
+
     /// Returns the counters.
     #[must_use]
     pub fn counters(&self) -> &CourseCounters {

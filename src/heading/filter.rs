@@ -88,7 +88,7 @@ impl Filter {
     /// Adds the mean of a second at standstill, rad/s, with its variance.
     pub fn standstill(&mut self, mean: f32, variance: f32) {
         let [bias, stop, ..] = self.covariance;
-        let with: Vector = core::array::from_fn(|state| bias[state] + stop[state]);
+        let with = combined(&bias, 1.0, &stop);
         let innovation = mean - self.state[BIAS] - self.state[STOP];
         let per_variance = 1.0 / (with[BIAS] + with[STOP] + variance);
         let gains = with.map(|with| with * per_variance);
@@ -102,14 +102,15 @@ impl Filter {
         self.state[HEADING] =
             wrap(self.state[HEADING] + driven - self.state[GAIN] * driven - self.state[STOP] * at_stop);
         // The heading's row of the transition; all others are those of the identity.
-        let by: [(usize, f32); 3] = [(BIAS, -seconds), (STOP, -at_stop), (GAIN, -driven)];
-        let add: Vector = core::array::from_fn(|column| {
-            by.iter().map(|(state, part)| part * self.covariance[*state % STATES][column]).sum()
-        });
-        let own = by.iter().map(|(state, part)| part * add[*state % STATES]).sum::<f32>();
-        for (state, add) in add.iter().enumerate() {
-            self.covariance[HEADING][state] += add;
-            self.covariance[state][HEADING] += add;
+        let [bias, stop, gain, ..] = self.covariance;
+        let add = combined(&combined(&bias, at_stop / seconds, &stop), driven / seconds, &gain)
+            .map(|sum| -seconds * sum);
+        let own = -seconds * add[BIAS] - at_stop * add[STOP] - driven * add[GAIN];
+        for (row, add) in self.covariance.iter_mut().zip(add) {
+            row[HEADING] += add;
+        }
+        for (own, add) in self.covariance[HEADING].iter_mut().zip(add) {
+            *own += add;
         }
         self.covariance[HEADING][HEADING] += own;
     }
@@ -122,7 +123,7 @@ impl Filter {
 
     fn with_course(&self, rate: f32) -> Vector {
         let [.., heading, lag] = self.covariance;
-        core::array::from_fn(|state| heading[state] - rate * lag[state])
+        combined(&heading, -rate, &lag)
     }
 
     /// Adds a course. What is `held` (bias, gain) keeps its value and its variance, and counts as a known source of error
@@ -131,32 +132,40 @@ impl Filter {
         let with = self.with_course(measured.rate);
         let variance = with[HEADING] - measured.rate * with[LAG] + measured.variance;
         let mut gains = with.map(|with| with / variance);
-        for (state, held) in [BIAS, GAIN].into_iter().zip(held) {
-            if held {
-                gains[state] = 0.0;
-            }
+        let [is_bias_held, is_gain_held] = held;
+        if is_bias_held {
+            gains[BIAS] = 0.0;
+        }
+        if is_gain_held {
+            gains[GAIN] = 0.0;
         }
         self.apply(&gains, measured.off, &with);
         self.state[HEADING] = wrap(self.state[HEADING]);
         // What the gains leave out, in Joseph's form: zero where they are the best ones.
-        for row in 0..STATES {
-            let rest = with[row] - gains[row] * variance;
-            for column in 0..STATES {
-                self.covariance[row][column] -= rest * gains[column];
-            }
+        for ((row, with), gain) in self.covariance.iter_mut().zip(with).zip(gains) {
+            let rest = with - gain * variance;
+            row.iter_mut().zip(gains).for_each(|(own, gain)| *own -= rest * gain);
         }
     }
 
     /// Corrects the states by the innovation, and the covariance by the gains.
     fn apply(&mut self, gains: &Vector, innovation: f32, with: &Vector) {
-        for row in 0..STATES {
-            self.state[row] += gains[row] * innovation;
-            for column in 0..STATES {
-                self.covariance[row][column] -= gains[row] * with[column];
-            }
-            self.covariance[row][row] = self.covariance[row][row].max(0.0);
+        for ((state, row), gain) in self.state.iter_mut().zip(&mut self.covariance).zip(gains) {
+            *state += gain * innovation;
+            row.iter_mut().zip(with).for_each(|(own, with)| *own -= gain * with);
+        }
+        let [[bias, ..], [_, stop, ..], [_, _, gain, ..], [.., heading, _], [.., lag]] = &mut self.covariance;
+        for variance in [bias, stop, gain, heading, lag] {
+            *variance = variance.max(0.0);
         }
     }
+}
+
+/// Returns one vector plus `part` times another.
+fn combined(one: &Vector, part: f32, other: &Vector) -> Vector {
+    let mut sum = *one;
+    sum.iter_mut().zip(other).for_each(|(sum, other)| *sum += part * other);
+    sum
 }
 
 /// Wraps an angle of a few turns to -pi to pi.

@@ -9,7 +9,7 @@ use super::{Pipeline, State};
 use crate::bias::ZeroRate;
 use crate::compensate::Remaining;
 use crate::heading::filter::{BIAS, Filter};
-use crate::heading::{CourseCounters, FINE_BIAS, Heading, gain_knowledge};
+use crate::heading::{CourseCounters, FINE_BIAS, Heading, Refusal, gain_knowledge};
 use crate::health::slow::Knowledge;
 use crate::mounting::Rotation;
 use crate::sample::Frame;
@@ -43,6 +43,12 @@ impl Pipeline {
     #[must_use]
     pub fn courses(&self) -> &CourseCounters {
         self.state.course.counters()
+    }
+
+    /// Returns why the newest course taught nothing; `None` where it was used.
+    #[must_use]
+    pub fn course_refusal(&self) -> Option<Refusal> {
+        self.state.course.refusal()
     }
 
     /// Returns the gain that courses have shown, a share, and its sigma once it is estimated.
