@@ -370,6 +370,14 @@ impl Compensator {
         self.delayed_revisions.unsigned_abs() > much
     }
 
+    /// Returns how much of the revisions the delayed rates carry in the next second, rad.
+    #[must_use]
+    pub fn carried_in_a_second(&self) -> f32 {
+        let most = i64::from(RATE_HZ) * i64::from(self.config.max_revision.0).max(0);
+        let carried = self.delayed_revisions.unsigned_abs().min(most.unsigned_abs());
+        carried as f32 / (AngularRate::PER_RAD_PER_SEC * RATE_HZ as f32)
+    }
+
     /// Returns the amount that the sum of the live rates still lacks, codes x samples: revisions that are not carried
     /// yet.
     #[must_use]

@@ -38,14 +38,14 @@ use crate::can::latitude::LatitudeReceiver;
 use crate::can::wheel::WheelReceiver;
 use crate::compensate::Complete;
 use crate::estimate::{VehicleSample, YawEstimate};
-use crate::fog::{FogCounters, FogPipeline};
+use crate::fog::{Beside, FogConfig, FogCounters, FogPipeline};
 use crate::heading::Heading;
 use crate::health::slow::SlowStatus;
 use crate::health::{BoardFaults, Faults, InputCounters, MonitorCounters, Quality, Source, count};
 use crate::model::Estimate;
 use crate::model::fognet::FogEstimate;
 use crate::model::seconds::NewSecond;
-use crate::monitor::SensorMonitor;
+use crate::monitor::{SensorMonitor, TIMEOUT_US};
 use crate::pipeline::{BoardState, Handover, Pipeline};
 use crate::sample::{FogSample, Frame, ImuSample, NO_STAMP, WheelSample};
 use crate::standstill::Standing;
@@ -93,7 +93,8 @@ pub struct Coprocessor {
     fog: FogPipeline,
     latitude: Option<LatitudeReceiver>,
     second: SecondSource,
-    /// The newest usable rate of the fibre-optic gyro, rad/s.
+    /// The newest usable rates of the inertial and the fibre-optic gyro, rad/s.
+    inertial_rate: Option<f32>,
     fog_rate: Option<f32>,
     encoder: CanEncoder,
     fog_encoder: FogEncoder,
@@ -122,9 +123,14 @@ impl Coprocessor {
             handover: Handover::new(config.has_gyronet, config.pipeline.compensate.mode.delay()),
             pipeline: Pipeline::new(config.pipeline),
             wheels: config.wheels,
-            fog: FogPipeline::new(config.fog, config.has_fognet, config.fog_expected),
+            fog: FogPipeline::new(
+                FogConfig { clock_ratio, ..config.fog },
+                config.has_fognet,
+                config.fog_expected,
+            ),
             latitude: config.latitude,
             second: SecondSource::START,
+            inertial_rate: None,
             fog_rate: None,
             encoder: CanEncoder::new(config.can),
             fog_encoder: FogEncoder::new(config.fog_ids),
@@ -161,6 +167,12 @@ impl Coprocessor {
         let now = self.advance(now)?;
         let sample = ImuSample { time: if sample.time == NO_STAMP { now } else { sample.time }, ..sample };
         self.timeline.sample = sample.time;
+        if !self.timeline.is_sensors() {
+            let lost = self.monitor.arrives(sample.time, now);
+            if lost > 0 {
+                self.pipeline.lose_time(lost);
+            }
+        }
         self.temperature = sample.temperature.or(self.temperature);
         while let Some(frame) = self.pipeline.next_frame() {
             self.correct(frame, now, sink);
@@ -192,7 +204,16 @@ impl Coprocessor {
         frame.sample.temperature = self.temperature;
         let sample = frame.sample;
         let board = self.board_state();
-        let output = self.pipeline.step(frame, wheels.as_ref(), &board);
+        let mut output = self.pipeline.step(frame, wheels.as_ref(), &board);
+        if output.standing.is_likely() {
+            self.monitor.settle();
+        }
+        let late = self.monitor.late();
+        // At fewer than 100 samples a second a step waits for the sample that completes it, at more for the next but one.
+        let waited = self.timeline.sample.0.saturating_sub(sample.time.0).min(u64::from(u32::MAX)) as u32;
+        if late > 0 || waited > 0 {
+            output.vehicle.come_late(late.saturating_add(waited), u64::from(late) > TIMEOUT_US);
+        }
         self.send(&output.vehicle, sample.time, sink);
         if let Some(window) = &output.window {
             let replaced = self.handover.offer(window, now);
@@ -200,12 +221,17 @@ impl Coprocessor {
         }
         let rate = Some(output.vehicle.live).filter(|live| live.source != Source::Raw).map(rad_per_sec);
         let [_, lateral, _] = output.vehicle.specific_force;
+        self.inertial_rate = rate;
         self.second.add(&Shown {
             inertial: rate,
             fog: self.fog_rate,
+            is_fog_confirmed: self.fog.is_confirmed(),
             lateral: lateral.0 as f32 / SpecificForce::PER_METRE_PER_SEC2,
             wheels: wheels.as_ref().and_then(second_source::axle),
         });
+        if self.second.confirms_fog() {
+            self.fog.confirm();
+        }
         let (standing, complete, refused) = (output.standing, output.complete, output.refused);
         let wheels = wheels.unwrap_or_default();
         let observation = Observation {
@@ -438,8 +464,12 @@ impl Coprocessor {
             let wheels = self.poll_wheels();
             let fresh = self.timeline.is_sensors() || !self.monitor.is_stale(self.timeline.now());
             let inertial = self.pipeline.inertial().filter(|_| fresh);
+            let doubted = self.second.doubts().is_some_and(|doubts| doubts.inertial);
+            let rate = self.inertial_rate.filter(|_| fresh && !doubted);
+            let (tilted, scale) = (self.pipeline.tilted(), self.second.scale());
+            self.fog.beside(Beside { rate, tilted, scale });
             let Some(mut estimate) = self.fog.next_step(time, inertial, wheels.as_ref()) else { return };
-            self.fog_rate = (estimate.quality != Quality::Unusable).then(|| rad_per_sec(estimate));
+            self.fog_rate = self.fog.shown();
             if self.second.doubts().is_some_and(|doubts| doubts.fog) && self.fog_rate.is_some() {
                 estimate.quality = Quality::Degraded;
                 estimate.faults = estimate.faults.with(Faults::IMPLAUSIBLE);
@@ -459,9 +489,9 @@ impl Coprocessor {
         let clock = self.monitor.is_clock_off() || self.pipeline.is_rate_refused();
         let doubts = self.second.doubts().unwrap_or_default();
         let wheels = doubts.wheels || self.wheels.as_ref().is_some_and(WheelReceiver::is_invalid);
-        let contradicted = doubts.inertial;
+        let contradicted = doubts.inertial || self.monitor.shift() > 0.0;
         let faults = BoardFaults { bus, wheels, clock, contradicted, stored, configuration_lost };
-        BoardState { faults, clock_ratio: self.monitor.clock_ratio() }
+        BoardState { faults, clock_ratio: self.monitor.clock_ratio(), shift: self.monitor.shift() }
     }
 
     fn send<SINK: Sink>(&mut self, vehicle: &VehicleSample, time: Micros, sink: &mut SINK) {
@@ -484,9 +514,17 @@ impl Coprocessor {
         if SINK::TAKES_FRAMES {
             self.encoder.send(vehicle, |frame| sink.frame(TimedFrame { frame, time }));
             let doubts = self.second.doubts().map(Doubts::bits);
-            let Self { encoder, pipeline, wheels, timeline, .. } = self;
+            let Self { encoder, pipeline, wheels, timeline, fog, .. } = self;
+            // One number for both yaws: a receiver sees that it changes.
+            let gaps = |own: Option<u32>| match (own, fog.gaps()) {
+                (Some(own), Some(fog)) => Some(own.wrapping_add(fog)),
+                (own, fog) => own.or(fog),
+            };
             let mut standstill = || Some(wheels.as_mut()?.poll(timeline.time())?.standstill);
-            if let Some(frame) = encoder.status(|| SlowStatus { doubts, ..pipeline.status(standstill()) }) {
+            if let Some(frame) = encoder.status(|| {
+                let status = pipeline.status(standstill());
+                SlowStatus { doubts, gaps: gaps(status.gaps), ..status }
+            }) {
                 sink.frame(TimedFrame { frame, time });
             }
             self.counters.out_of_range = self.encoder.out_of_range();

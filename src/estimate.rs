@@ -3,6 +3,7 @@
 mod accumulated;
 
 pub(crate) use accumulated::AccumulatedYaw;
+pub use accumulated::Missed;
 
 use crate::health::{Faults, Quality, Source, Status};
 use crate::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
@@ -44,6 +45,23 @@ impl YawEstimate {
         let Self { status, source, quality, .. } = worst;
         let sigma = self.sigma.zip(earlier.sigma).map(|(one, other)| one.max(other));
         Self { status, source, quality, sigma, faults: self.faults.with(earlier.faults), ..self }
+    }
+}
+
+impl VehicleSample {
+    /// Notes that the sample arrived so many microseconds late: its rates are right for its own time, and if it `is_stale`
+    /// too old to be the present ones.
+    pub(crate) fn come_late(&mut self, late_us: u32, is_stale: bool) {
+        for estimate in [&mut self.live, &mut self.delayed] {
+            estimate.latency_us = estimate.latency_us.map(|latency| latency.saturating_add(late_us));
+            if !is_stale {
+                continue;
+            }
+            estimate.faults = estimate.faults.with(Faults::GAP);
+            if estimate.quality == Quality::Good {
+                estimate.quality = Quality::Degraded;
+            }
+        }
     }
 }
 

@@ -30,10 +30,11 @@ mod rest;
 
 pub use earth_and_bias::{EarthAndBias, Tilt};
 pub use part::FogErrors;
-pub use pipeline::{FogCounters, FogPipeline, STUCK_AFTER, STUCK_US};
+pub use pipeline::{Beside, FogCounters, FogPipeline, STUCK_AFTER, STUCK_US};
 pub use rate::IncrementRate;
 pub use rest::{RestOutcome, RestReading};
 
+use crate::align::clock_ratio::ClockRatioConfig;
 use crate::bias::Latitude;
 use crate::model::fognet::{FogEstimate, GAIN_FRACTION_BITS};
 use crate::model::fognet_blob::{Gyro, Training};
@@ -109,6 +110,8 @@ pub struct FogConfig {
     /// Vibration that remains in a mean rate over a second, 1 sigma, rad/s: of the standing and of the moving
     /// vehicle. It is not a turn of the vehicle, and sums to zero.
     pub shake: [f32; 2],
+    /// The limit on the departure of the gyro's clock from the caller's; `None` where the caller's is no better.
+    pub clock_ratio: Option<ClockRatioConfig>,
     /// Says whether FoGNet is used.
     pub fognet: FogNetUse,
     /// Largest correction of a window that is accepted.
@@ -124,6 +127,7 @@ impl FogConfig {
         latitude: None,
         tilt: Tilt::NONE,
         shake: [6e-5, 1.7e-4],
+        clock_ratio: None,
         fognet: FogNetUse::Off,
         max_correction: Angle((0.02 * Angle::PER_RAD as f64) as i64),
     };

@@ -9,7 +9,8 @@
 //! | saturated | the part reports it | [`Status::Clipped`], no window, no initialisation | [`HOLD`] samples later |
 //! | stuck | [`STUCK_AFTER`] samples equal to the one before in gyro, accelerometer or one axis; [`AXIS_STUCK_AFTER`] where an axis often repeats itself | [`Status::Stuck`], no window, no initialisation | a sample that differs |
 //! | clock off | the sensor's clock departs from the outside one by more than [`ClockRatioConfig::limit_ppm`] | fault bit `IMPLAUSIBLE`; the yaw is summed by the sensor's clock | the departure is within the limit again |
-//! | implausible | a reading is further from the last one than this axis moves in 10 ms ([`JUMP_RATE`], [`JUMP_FORCE`], [`USUAL`]) | as saturated, fault bit `IMPLAUSIBLE` | a reading near the last good one, or [`JUMP_PATIENCE`] samples later |
+//! | late | samples arrive more than [`TIMEOUT_US`] later than their stamps and the least late ones let expect (a line that stalled) | at best degraded, fault bit `GAP`, the latency contains it | samples that arrive in time, or a second later |
+//! | implausible | a reading is further from the last one than this axis moves in 10 ms ([`JUMP_RATE`], [`JUMP_FORCE`], [`USUAL`]) | as saturated, fault bit `IMPLAUSIBLE` | a reading near the last good one, or [`JUMP_PATIENCE`] samples later: then at best degraded, and the jump of the yaw rate is part of its expected error, until it jumps back or the vehicle stands |
 //!
 //! [`Status::Silent`]: crate::health::Status::Silent
 //! [`Status::Clipped`]: crate::health::Status::Clipped
@@ -34,6 +35,40 @@ pub const START_US: u64 = 2_000_000;
 /// Samples after saturation that are not used: 50 ms, in which the part's filter recovers.
 pub const HOLD: u8 = 5;
 
+/// Rate at which arrivals may become later without being late, parts of 16: a sensor's clock that is 6 % slow.
+const CREEP: u64 = 16;
+/// Arrivals that vary by less are in time, microseconds.
+const IN_TIME_US: u64 = 5_000;
+/// Late arrivals are a new normal after this time, microseconds.
+const PATIENCE_US: u64 = 1_000_000;
+
+/// Judges how late samples arrive.
+#[derive(Debug, Clone, Copy, Default)]
+struct Arrivals {
+    /// Time stamp of the newest sample, and the least time from stamp to arrival, which creeps up.
+    newest: Option<(u64, i64)>,
+    late_since: Option<u64>,
+}
+
+impl Arrivals {
+    /// Returns by how many microseconds a sample arrives later than the least late ones, and what the sensor's clock has lost
+    /// if they all do for a second: a counter that has wrapped unseen.
+    fn late(&mut self, time: Micros, now: Micros) -> (u64, u64) {
+        let measured = (now.0 as i64).wrapping_sub(time.0 as i64);
+        let (last, before) = self.newest.unwrap_or((time.0, measured));
+        let expected = before.saturating_add((time.0.saturating_sub(last) / CREEP) as i64);
+        let late = measured.saturating_sub(expected).max(0) as u64;
+        let since = if late > TIMEOUT_US { Some(*self.late_since.get_or_insert(now.0)) } else { None };
+        self.late_since = since;
+        if since.is_some_and(|since| now.0.saturating_sub(since) > PATIENCE_US) {
+            (self.newest, self.late_since) = (Some((time.0, measured)), None);
+            return (0, late);
+        }
+        self.newest = Some((time.0, expected.min(measured)));
+        (late, 0)
+    }
+}
+
 /// Judges each reading of the sensor, and reports silence and clock faults.
 #[derive(Debug, Clone)]
 pub struct SensorMonitor {
@@ -44,6 +79,9 @@ pub struct SensorMonitor {
     recovering: u8,
     /// Time stamp and arrival of the newest sample that was used.
     newest: Option<(Micros, Micros)>,
+    arrivals: Arrivals,
+    /// The time by which the newest sample came late, microseconds; 0 where it came in time.
+    late: u32,
     /// The time from which silence is counted: of that arrival, or of a later look at samples that wait.
     heard: Option<Micros>,
     /// The time at which the next message set without a sample is due.
@@ -63,6 +101,8 @@ impl SensorMonitor {
             stuck: false,
             recovering: 0,
             newest: None,
+            arrivals: Arrivals { newest: None, late_since: None },
+            late: 0,
             heard: None,
             due: None,
             clock: match clock {
@@ -98,6 +138,31 @@ impl SensorMonitor {
             (.., true) => Validity::Implausible,
             _ => Validity::Good,
         }
+    }
+
+    /// Notes that a sample with time stamp `time` arrives at `now` by an outside clock. Returns the time that the sensor's
+    /// clock has lost, microseconds.
+    pub fn arrives(&mut self, time: Micros, now: Micros) -> u64 {
+        let (late, lost) = self.arrivals.late(time, now);
+        self.late = if late > IN_TIME_US { late.min(u64::from(u32::MAX)) as u32 } else { 0 };
+        lost
+    }
+
+    /// Returns the time by which the newest sample came late, microseconds; 0 where it came in time.
+    #[must_use]
+    pub fn late(&self) -> u32 {
+        self.late
+    }
+
+    /// Returns the yaw rate by which the readings may be off since a jump, rad/s.
+    #[must_use]
+    pub fn shift(&self) -> f32 {
+        self.jump.shift()
+    }
+
+    /// Notes that the readings are those of a vehicle that stands: whatever has jumped is right.
+    pub fn settle(&mut self) {
+        self.jump.settle();
     }
 
     /// Notes that a sample with time stamp `time` arrived at `now` and was used.

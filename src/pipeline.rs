@@ -32,7 +32,7 @@ use crate::heading::Estimator;
 use crate::health::{BoardFaults, Counters, Faults, count};
 use crate::model::Estimate;
 use crate::monitor::{AXIS_STUCK_AFTER, STUCK_AFTER};
-use crate::sample::{Frame, ImuSample, Standstill, Validity, WHEELS, WheelSample};
+use crate::sample::{Frame, ImuSample, PERIOD_US, Standstill, Validity, WHEELS, WheelSample};
 use crate::standstill::{Judge, Standing};
 
 use crate::model::window::{self, Features, WINDOW};
@@ -49,11 +49,13 @@ pub struct BoardState {
     pub faults: BoardFaults,
     /// The true length of the steps of the sensor's clock, by which the rates are summed.
     pub clock_ratio: ClockRatio,
+    /// The yaw rate by which the readings may be off since they have jumped, rad/s.
+    pub shift: f32,
 }
 
 impl BoardState {
     /// No fault, and a sensor whose clock is right.
-    pub const GOOD: Self = Self { faults: BoardFaults::NONE, clock_ratio: ClockRatio::ONE };
+    pub const GOOD: Self = Self { faults: BoardFaults::NONE, clock_ratio: ClockRatio::ONE, shift: 0.0 };
 }
 
 /// Holds the results of one sample.
@@ -261,6 +263,9 @@ impl Pipeline {
             Some(zero) => (self.estimate_rates(&frame, &zero, standing, moves), None),
         };
         self.judge_start();
+        if self.state.standstill.has_driven_off() {
+            self.zero_rate_mut().map(ZeroRate::moves);
+        }
         self.state.standing = self.judged(standing);
         let vehicle = self.report(&frame, &rates, wheels, board);
         let stride = self.config.compensate.mode.stride();
@@ -293,6 +298,13 @@ impl Pipeline {
     #[must_use]
     pub fn tick(&self) -> u32 {
         self.state.tick
+    }
+
+    /// Returns the share of its rate by which a gyro about the vehicle's vertical axis misses the present turn, because it is
+    /// on a slope or banked.
+    #[must_use]
+    pub fn tilted(&self) -> f32 {
+        self.state.uncertainty.tilted().max(self.state.uncertainty.tilted_now())
     }
 
     /// Returns the event counters since the start.
@@ -335,6 +347,10 @@ impl Pipeline {
         self.state.initialised.as_ref()?.zero_rate.as_ref()
     }
 
+    fn zero_rate_mut(&mut self) -> Option<&mut ZeroRate> {
+        self.state.initialised.as_mut()?.zero_rate.as_mut()
+    }
+
     /// Levels a sample and returns the gyro's reading at rest; does nothing and returns `None` before initialisation.
     fn level(&mut self, sample: &mut ImuSample) -> Option<ZeroPoint> {
         let known = self.state.initialised.as_ref()?;
@@ -355,6 +371,13 @@ impl Pipeline {
         if !matches!(error, AlignError::Duplicate { .. }) {
             self.gap();
         }
+    }
+
+    /// Notes that the sensor's clock has lost this time, microseconds: the next step ends a gap.
+    pub(crate) fn lose_time(&mut self, lost: u64) {
+        let steps = (lost / PERIOD_US).min(u64::from(u16::MAX)) as u32;
+        self.lose(self.state.tick, steps);
+        self.gap();
     }
 
     /// Notes that the gap in the yaw that ends after a tick is longer than the grid shows.
@@ -421,6 +444,7 @@ impl Pipeline {
         }
         let complete = self.state.compensator.complete();
         self.update_bias(complete.as_ref(), good.then_some(rate), standing);
+        self.claim_again(sample, rates, standing, drives);
         let remaining = self.remaining();
         let stands = self.state.stood as usize > self.config.compensate.lag.samples();
         let live = self.state.compensator.live(remaining);

@@ -4,17 +4,20 @@
 //!
 //! - **Wheels** that stand prove a standstill, unless the inertial sensor contradicts them: the vehicle shakes for
 //!   seconds as only a driven one does, or the wheels came to rest faster than a vehicle can brake (locked, or frames
-//!   frozen at zero). They are believed again once they have turned, or once the inertial sensor is quiet.
+//!   frozen at zero). They are believed again once they have turned, or once the inertial sensor is quiet. Wheels that
+//!   stand while the vehicle speeds up (carried, or frozen at zero) are believed again only once they have turned.
 //! - **A quiet inertial sensor** (`inertial`) shows a standstill where no wheel tells, or all are silent. A smooth
-//!   road can be as quiet, so it counts as a stop only since the start, or after the vehicle has slowed down; without
+//!   road can be as quiet, so it counts as a stop only since the start, or after the vehicle has slowed down: by a
+//!   force against the one by which it pulled away, that has ended at the level of that standstill. Without
 //!   that the probability is zero, and a half once the quiet has lasted for ten seconds. Wheels that turn during a
 //!   quiet second, or stand, change the probability for this vehicle.
 
 mod inertial;
 
-pub use inertial::{Inertial, Motion};
+pub use inertial::{Axes, Inertial, Motion};
 
 use crate::sample::{ImuSample, Standstill, WheelSample};
+use crate::sqrt::sqrt;
 use crate::units::WheelSpeed;
 
 /// Limits of a quiet inertial sensor. The test `standstills_of_every_recording_with_a_speed` prints what they find and
@@ -39,6 +42,20 @@ impl StandstillConfig {
 const DRIVEN_SHAKE: f32 = 6e-3;
 /// The number of judgements in a row, 100 ms each.
 const SHAKEN: u8 = 50;
+/// Change of the force since the vehicle stands that only speeding up explains (or a tilt by 3 deg), and change of speed
+/// within two seconds, m/s^2 and m/s; and the tenths of a second for which a vehicle rocks after it has stopped.
+const CARRIED: (f32, f32) = (0.5, 0.5);
+const ROCKS: u8 = 15;
+/// Part of a loss of speed that must be against the pull, and force along it by which a stop may differ from the
+/// standstill before, m/s^2: a slope.
+const AGAINST: f32 = 0.5;
+const SLOPE: f32 = 0.6;
+/// Speed of a wheel of a vehicle that drives, and does not creep at the wheels' threshold: 1 m/s.
+const DRIVES: u32 = 65_536;
+/// Shake of a vehicle that an engine shakes as much as any, rad/s.
+const CALM: f32 = 1.2e-2;
+/// Least force that shows where a vehicle pulls away to, m/s^2.
+const PULL: f32 = 0.3;
 /// A speed of a wheel that shows motion: 0.3 m/s.
 const TURNS: u32 = 19_661;
 /// Largest loss of speed in 10 ms by braking, 12 m/s^2, and the speed at which passive wheel sensors go silent, 2 m/s;
@@ -118,6 +135,17 @@ pub struct Judge {
     /// Judgements in a row that contradict standing wheels by their shake.
     shaken: u8,
     are_wheels_doubted: bool,
+    /// The vehicle has sped up while the wheels stood.
+    is_carried: bool,
+    /// The newest motion: the wheels turn fast, the speed changes, or nothing but an engine shakes the vehicle.
+    drives: bool,
+    speeds_up: bool,
+    is_calm: bool,
+    /// Judgements since the wheels stand.
+    still_for: u8,
+    /// Force at the last standstill, and the one by which the vehicle left it, m/s^2.
+    rest: Option<Axes>,
+    pull: Option<Axes>,
     /// The least speed that the vehicle still has, however hard it brakes, codes.
     speed: u32,
     /// Quiet tenths of a second at rest and in motion, by the wheels.
@@ -136,6 +164,13 @@ impl Judge {
             has_moved: false,
             shaken: 0,
             are_wheels_doubted: false,
+            is_carried: false,
+            drives: false,
+            speeds_up: false,
+            is_calm: false,
+            still_for: 0,
+            rest: None,
+            pull: None,
             speed: 0,
             quiet: BEFORE,
         }
@@ -144,6 +179,19 @@ impl Judge {
     /// Starts the inertial evidence again after a gap.
     pub fn restart(&mut self) {
         (self.inertial, self.quiet_for) = (Inertial::START, 0);
+    }
+
+    /// Returns whether the vehicle drives: its wheels turn faster than they creep, or the last two seconds show a change of
+    /// speed, or a force, that no standing vehicle has.
+    #[must_use]
+    pub fn has_driven_off(&self) -> bool {
+        self.drives || self.speeds_up
+    }
+
+    /// Returns whether nothing but an engine shakes the vehicle.
+    #[must_use]
+    pub fn is_calm(&self) -> bool {
+        self.is_calm
     }
 
     /// Judges a sample of the 100 Hz grid; `wheels` is `None` where there are none.
@@ -155,7 +203,7 @@ impl Judge {
             self.inertial_evidence(&motion, standstill);
         }
         match standstill {
-            Standstill::Still if self.are_wheels_doubted => Standing::CONTRADICTED,
+            Standstill::Still if self.are_wheels_doubted || self.is_carried => Standing::CONTRADICTED,
             Standstill::Still => Standing::WHEELS,
             Standstill::Moving => Standing::UNKNOWN,
             // A wheel that still tells has not decided yet.
@@ -183,24 +231,59 @@ impl Judge {
         let speeds = wheels.speeds.iter().flatten();
         let fastest = speeds.map(|WheelSpeed(speed)| speed.unsigned_abs()).max().unwrap_or(0);
         let standstill = if fastest > TURNS { Standstill::Moving } else { wheels.standstill };
+        // Some frames say that the vehicle moves, and not how fast.
+        self.drives = standstill == Standstill::Moving && !(TURNS..DRIVES).contains(&fastest);
         self.speed = fastest.max(self.speed.saturating_sub(BRAKING));
         match standstill {
             Standstill::Still => self.are_wheels_doubted |= self.speed > DEAD_BAND,
-            Standstill::Moving => self.are_wheels_doubted = false,
+            Standstill::Moving => (self.are_wheels_doubted, self.is_carried) = (false, false),
             Standstill::Unknown => {}
+        }
+        if standstill != Standstill::Still {
+            self.still_for = 0;
         }
         standstill
     }
 
+    /// Returns whether a change of speed before quiet is a braking that has ended.
+    fn is_against_the_pull(&self, lost: Axes, force: Axes) -> bool {
+        let (Some(pull), Some(rest)) = (self.pull, self.rest) else { return true };
+        let size = norm(pull);
+        dot(lost, pull) <= -AGAINST * norm(lost) * size && dot(minus(force, rest), pull) <= SLOPE * size
+    }
+
     fn inertial_evidence(&mut self, motion: &Motion, wheels: Standstill) {
         let StandstillConfig { shake, speed_change, braking } = self.config;
-        if motion.speed_change >= speed_change {
+        let left = self.rest.map(|rest| minus(motion.newest, rest));
+        let carried = left.is_some_and(|left| norm(left) >= CARRIED.0);
+        let speeds_up = motion.speed_change >= CARRIED.1;
+        self.speeds_up = speeds_up || carried;
+        self.is_calm = !speeds_up && motion.shake < CALM;
+        if motion.speed_change >= speed_change || carried && self.is_stop {
             (self.is_stop, self.has_moved) = (false, true);
         }
         let is_quiet = motion.shake < shake && motion.speed_change < speed_change;
         self.quiet_for = if is_quiet { self.quiet_for.saturating_add(1) } else { 0 };
         if is_quiet && core::mem::take(&mut self.has_moved) {
-            self.is_stop |= motion.speed_lost.is_some_and(|lost| lost >= braking);
+            self.is_stop |= motion
+                .speed_lost
+                .is_some_and(|lost| norm(lost) >= braking && self.is_against_the_pull(lost, motion.force));
+        }
+        if wheels == Standstill::Still {
+            self.still_for = self.still_for.saturating_add(1);
+            let sped_up = self.still_for > 2 * ROCKS && speeds_up;
+            self.is_carried |= self.still_for > ROCKS && carried || sped_up;
+        }
+        let stands = match wheels {
+            Standstill::Still => !self.is_carried && (self.still_for == ROCKS || self.rest.is_none()),
+            Standstill::Moving => false,
+            Standstill::Unknown => is_quiet && self.is_stop,
+        };
+        if stands {
+            (self.rest, self.pull) = (Some(motion.force), None);
+        } else if let (None, Some(rest)) = (self.pull, self.rest) {
+            let pull = minus(motion.force, rest);
+            self.pull = (norm(pull) >= PULL).then_some(pull);
         }
         self.shaken = if wheels == Standstill::Still && motion.shake > DRIVEN_SHAKE {
             self.shaken.saturating_add(1)
@@ -217,4 +300,16 @@ impl Judge {
             }
         }
     }
+}
+
+fn minus(one: Axes, other: Axes) -> Axes {
+    core::array::from_fn(|axis| one[axis] - other[axis])
+}
+
+fn dot([a, b, c]: Axes, [x, y, z]: Axes) -> f32 {
+    a * x + b * y + c * z
+}
+
+fn norm(axes: Axes) -> f32 {
+    sqrt(dot(axes, axes))
 }

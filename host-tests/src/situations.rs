@@ -7,7 +7,6 @@
 pub mod board;
 mod damage;
 pub mod judge;
-pub mod known;
 pub mod list;
 pub mod parts;
 pub mod receiver;

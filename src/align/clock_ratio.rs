@@ -29,7 +29,7 @@
 //! Where the sensor's own time is the only one (a recording, whose bytes arrive at the host's pace)
 //! there is no estimator, and [`ClockRatio::ONE`] is used.
 
-use crate::units::{AngularRate, Micros};
+use crate::units::{Angle, AngularRate, Micros};
 use heapless::Deque;
 
 /// One sample is taken from each block of this length, by the sensor's clock.
@@ -71,6 +71,17 @@ impl ClockRatio {
     #[must_use]
     pub fn departure_ppm(self) -> u32 {
         self.0.abs_diff(Self::ONE.0) / Self::PPM
+    }
+
+    /// Returns an angle that was summed over the sensor's time, over true time. It has at most 46 bits, the departure 26.
+    #[must_use]
+    pub fn angle(self, Angle(angle): Angle) -> Angle {
+        let departure = i64::from(self.0) - i64::from(Self::ONE.0);
+        let (high, low) = (angle >> 16, angle & 0xFFFF);
+        Angle(
+            angle
+                .saturating_add((high * departure + ((low * departure) >> 16)) >> (Self::FRACTION_BITS - 16)),
+        )
     }
 
     /// Returns the angle that a vehicle turns at `rate` in a grid step of the sensor's clock, to the
@@ -128,6 +139,7 @@ pub struct RatioEstimator {
     /// The slope of the points, which compares arrivals with each other even where it is not accepted as the ratio.
     slope: ClockRatio,
     ratio: ClockRatio,
+    is_known: bool,
     fault: bool,
 }
 
@@ -141,6 +153,7 @@ impl RatioEstimator {
             points: Deque::new(),
             slope: ClockRatio::ONE,
             ratio: ClockRatio::ONE,
+            is_known: false,
             fault: false,
         }
     }
@@ -178,6 +191,12 @@ impl RatioEstimator {
         self.ratio
     }
 
+    /// Returns whether enough points show the ratio.
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        self.is_known
+    }
+
     /// Returns whether the clocks depart from each other by more than [`ClockRatioConfig::limit_ppm`].
     #[must_use]
     pub fn fault(&self) -> bool {
@@ -207,6 +226,7 @@ impl RatioEstimator {
             let _ = self.points.push_back(newest);
             return;
         }
+        self.is_known = true;
         self.fault = slope.departure_ppm() > self.config.limit_ppm;
         let alike = board.abs_diff(sensor) <= JITTER_US;
         self.ratio = if self.fault || alike { ClockRatio::ONE } else { slope };

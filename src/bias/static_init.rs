@@ -3,7 +3,8 @@
 //! A vehicle with its engine running shakes but goes nowhere, so stillness is judged twice:
 //! the spread inside the three seconds must stay below what an engine does, and the means of
 //! its three single seconds must agree, which they do not when the vehicle turns, rolls or
-//! speeds up. Wheels that stand allow twice as much, for a vehicle that rocks when its engine starts. A steady straight
+//! speeds up. Where the judge of standstill agrees the change may be twice as large, for a vehicle that rocks when its engine
+//! starts. Where its means, which leave an engine's vibration out, are calm, the spread may be four times as large. A steady straight
 //! drive or a slow turn (a ferry, a turntable) can still look like standing: later standstills heal that
 //! ([`super::zero_rate`]).
 
@@ -136,6 +137,8 @@ pub struct Rest {
     pub angular_rate: [AngularRate; 3],
     /// Mean specific force, which shows the vertical.
     pub specific_force: [SpecificForce; 3],
+    /// Spread of the one-second means about z, rad/s.
+    pub drift: f32,
 }
 
 /// Collects the samples of a static initialisation.
@@ -155,10 +158,10 @@ impl StaticInit {
         Self { config, gyro: [Axis::EMPTY; 3], accel: [Axis::EMPTY; 3], wheels_refused: false }
     }
 
-    /// Adds a sample; `by_wheels` is true where the wheels show that the vehicle stands. The last sample decides, because
-    /// they show it late. After [`STATIC_SAMPLES`] of them it returns the readings at rest, or the reason for refusing
+    /// Adds a sample; the judge says whether the vehicle probably `stands`, and is `calm` but for an engine's vibration. The
+    /// last sample decides, because wheels show it late. After [`STATIC_SAMPLES`] of them it returns the readings at rest, or the reason for refusing
     /// them, and restarts.
-    pub fn add(&mut self, sample: &ImuSample, by_wheels: bool) -> Option<Result<Rest, StaticError>> {
+    pub fn add(&mut self, sample: &ImuSample, stands: bool, calm: bool) -> Option<Result<Rest, StaticError>> {
         self.wheels_refused = false;
         for axis in 0..3 {
             let rate = sample.angular_rate[axis].0;
@@ -170,7 +173,7 @@ impl StaticInit {
         if first.all.count() < STATIC_SAMPLES {
             return None;
         }
-        let result = self.judge(by_wheels);
+        let result = self.judge(stands, calm);
         self.restart();
         Some(result)
     }
@@ -192,24 +195,25 @@ impl StaticInit {
         self.wheels_refused = false;
     }
 
-    fn judge(&self, by_wheels: bool) -> Result<Rest, StaticError> {
-        let tolerance = if by_wheels { 2.0 } else { 1.0 };
+    fn judge(&self, stands: bool, calm: bool) -> Result<Rest, StaticError> {
+        let wide = |allowed: bool, factor: f32| if allowed { factor } else { 1.0 };
+        let (turning, speeding, vibration) = (wide(stands, 2.0), wide(stands || calm, 2.0), wide(calm, 4.0));
         for axis in 0..3u8 {
             let (gyro, accel) = (&self.gyro[usize::from(axis)], &self.accel[usize::from(axis)]);
             let std = gyro.all.std();
-            if std > self.config.gyro_std {
+            if std > vibration * self.config.gyro_std {
                 return Err(StaticError::GyroNoise { axis, std });
             }
             let std = accel.all.std();
-            if std > self.config.accel_std {
+            if std > vibration * self.config.accel_std {
                 return Err(StaticError::AccelNoise { axis, std });
             }
             let spread = gyro.drift(AngularRate::PER_RAD_PER_SEC);
-            if spread > tolerance * self.config.gyro_drift {
+            if spread > turning * self.config.gyro_drift {
                 return Err(StaticError::GyroDrift { axis, spread });
             }
             let spread = accel.drift(SpecificForce::PER_METRE_PER_SEC2);
-            if spread > tolerance * self.config.accel_drift {
+            if spread > speeding * self.config.accel_drift {
                 return Err(StaticError::AccelDrift { axis, spread });
             }
             let mean = gyro.all.mean_code() as f32 / AngularRate::PER_RAD_PER_SEC;
@@ -217,9 +221,11 @@ impl StaticInit {
                 return Err(StaticError::GyroBias { axis, mean });
             }
         }
+        let [.., yaw] = &self.gyro;
         Ok(Rest {
             angular_rate: self.gyro.each_ref().map(|axis| AngularRate(axis.all.mean_code())),
             specific_force: self.accel.each_ref().map(|axis| SpecificForce(axis.all.mean_code())),
+            drift: yaw.drift(AngularRate::PER_RAD_PER_SEC),
         })
     }
 }

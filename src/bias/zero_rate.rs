@@ -17,8 +17,12 @@
 //!
 //! A second is refused whose mean is off by more than four sigma of the filter: then either the vehicle turns (a ferry,
 //! a turntable, wheels that are locked or creep below their threshold) or the bias is wrong (initialised during such a
-//! turn). Until that is decided the difference is part of sigma. A stop that agrees with the bias withdraws the doubt;
-//! [`AGREEING_STOPS`] that contradict it and agree with each other replace the bias.
+//! turn). From its first part on and until that is decided the difference is part of sigma. A stop that agrees with the
+//! bias withdraws the doubt; [`AGREEING_STOPS`] that contradict it and agree with each other replace the bias.
+//!
+//! Static initialisation only **claims** a bias: on a deck that turns, the turn is in it. A vehicle drives off from ground
+//! that stands. So the reading decides that static initialisation would accept last, within [`CONFIRMING`] samples before
+//! the vehicle begins to move; or the next stop. Until then all that the deck may turn by is part of sigma.
 
 use super::Spread;
 use crate::heading::filter::{BIAS, Filter, GAIN, STOP};
@@ -55,6 +59,13 @@ impl ZeroRateConfig {
         Self { initial: 1e-4, walk: 1e-5, standstill: 1.4e-4, noise: 5e-5, mistaken: 5e-3, max_bias: 0.1 };
 }
 
+impl ZeroRateConfig {
+    /// Returns the sigma of the bias by three seconds whose means spread so much: more than noise is a change that goes on.
+    fn initial_of(&self, drift: f32) -> f32 {
+        self.initial.max(drift - 5.0 * self.initial)
+    }
+}
+
 /// Samples in each of the means whose spread is taken.
 const BATCH: u32 = 10;
 
@@ -68,9 +79,13 @@ const NOISE_SECONDS: f32 = 8.0;
 /// Turn of a vehicle that somebody boards in a part of a second, rad.
 const BOARDING: f32 = 1e-3;
 /// Refused seconds that make a stop contradict the bias.
-const REFUSED_SECONDS: u8 = 3;
+const REFUSED_SECONDS: u8 = 2;
 /// Stops that contradict the bias and agree with each other before they replace it.
 const AGREEING_STOPS: u8 = 3;
+/// Samples for which a standstill that the gyro has contradicted is not believed: a slide may turn now and then.
+const DISTRUSTED: u32 = 10 * RATE_HZ;
+/// Samples after three seconds at rest within which the vehicle begins to move from there.
+const CONFIRMING: u32 = 10 * RATE_HZ;
 
 /// Says how a whole second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,6 +117,21 @@ struct Doubt {
     stops: u8,
 }
 
+/// A bias that nothing but one standstill has shown.
+#[derive(Debug, Clone, Copy)]
+struct Claim {
+    /// What the deck may turn by: the reading at rest, and the sigma of what earlier drives or the part's kind let
+    /// expect of it, rad/s.
+    reading: f32,
+    expected: f32,
+    /// The newest three seconds that static initialisation would accept: their mean and the spread of its seconds, rad/s, and
+    /// the samples for which they are evidence.
+    newest: (f32, f32),
+    counts_for: u32,
+    /// The vehicle has moved since.
+    has_moved: bool,
+}
+
 /// Estimates the bias that remains after static initialisation and network.
 #[derive(Debug, Clone)]
 pub struct ZeroRate {
@@ -115,7 +145,13 @@ pub struct ZeroRate {
     /// Mean variance of the seconds so far.
     noise: Option<f32>,
     refused: bool,
+    /// The rate by which a refused standstill contradicts the bias so far, rad/s.
+    against: f32,
+    /// Samples for which this standstill is not believed after it was refused.
+    distrusted_for: u32,
     doubt: Doubt,
+    /// `None` once the bias is confirmed.
+    claim: Option<Claim>,
     /// Turn at standstill by the newest samples, 2^-20 rad/s x samples: in the current quarter of a second and in the
     /// four before it. Then the samples left in the current quarter.
     turned: [i32; 5],
@@ -126,7 +162,18 @@ pub struct ZeroRate {
 }
 
 impl ZeroRate {
-    /// Creates a filter after static initialisation.
+    /// Creates a filter after a static initialisation that showed this reading beyond the bias that is subtracted
+    /// already, rad/s, where the sigma of that bias is known; `drift` is the spread of its seconds.
+    #[must_use]
+    pub fn claimed(config: ZeroRateConfig, reading: f32, sigma: Option<f32>, drift: f32) -> Self {
+        let expected = sigma.unwrap_or(config.mistaken);
+        let claim =
+            Claim { reading, expected, newest: (0.0, drift), counts_for: CONFIRMING, has_moved: false };
+        let initial = config.initial_of(drift);
+        Self { claim: Some(claim), ..Self::new(ZeroRateConfig { initial, ..config }) }
+    }
+
+    /// Creates a filter after a static initialisation whose bias is beyond doubt.
     #[must_use]
     pub fn new(config: ZeroRateConfig) -> Self {
         let square = |sigma: f32| sigma * sigma;
@@ -144,7 +191,10 @@ impl ZeroRate {
             waiting: None,
             noise: None,
             refused: false,
+            against: 0.0,
+            distrusted_for: 0,
             doubt: Doubt::default(),
+            claim: None,
             turned: [0; 5],
             turning_for: 0,
             since_walk: 0,
@@ -174,6 +224,10 @@ impl ZeroRate {
         thermal: f32,
     ) -> Option<ZeroRateOutcome> {
         self.thermal = thermal;
+        if let Some(claim) = &mut self.claim {
+            claim.counts_for = claim.counts_for.saturating_sub(1);
+        }
+        self.distrusted_for = if self.refused { DISTRUSTED } else { self.distrusted_for.saturating_sub(1) };
         self.since_walk += 1;
         if self.since_walk == RATE_HZ {
             self.since_walk = 0;
@@ -232,6 +286,8 @@ impl ZeroRate {
             return false;
         }
         self.turned = [0; 5];
+        let now = rate.0.saturating_sub(self.bias().0) as f32 / AngularRate::PER_RAD_PER_SEC;
+        self.against = self.against.max(libm::fabsf(turned)).max(libm::fabsf(now));
         if core::mem::replace(&mut self.refused, true) {
             return false;
         }
@@ -243,13 +299,13 @@ impl ZeroRate {
     /// Returns whether the wheels stand while the gyro shows a turn.
     #[must_use]
     pub fn contradicted(&self) -> bool {
-        self.standing.is_by_wheels() && self.refused
+        self.standing.is_by_wheels() && self.is_refused()
     }
 
-    /// Returns whether the gyro contradicts that the vehicle stands.
+    /// Returns whether the gyro contradicts that the vehicle stands, or has just done so.
     #[must_use]
     pub fn is_refused(&self) -> bool {
-        self.refused
+        self.refused || self.distrusted_for > 0
     }
 
     /// Returns the largest turn of a part of a second at standstill, rad: as for a second, with the shake of a vehicle
@@ -262,6 +318,41 @@ impl ZeroRate {
     fn innovation_variance(&self, measured: f32) -> f32 {
         let (both, offset) = (self.filter.bias_and_stop(), self.filter.variance::<STOP>());
         (self.bias_variance() + 2.0 * both + offset + measured).max(measured)
+    }
+
+    /// Takes the mean of three more seconds that static initialisation accepts, and the spread of its seconds, rad/s.
+    pub fn rest(&mut self, mean: f32, drift: f32) {
+        if let Some(claim) = self.claim.as_mut().filter(|claim| !claim.has_moved) {
+            (claim.newest, claim.counts_for) = ((mean, drift), CONFIRMING);
+        }
+    }
+
+    /// Notes that the vehicle moves: what it has just stood on did not turn, so its newest reading there is the bias.
+    pub fn moves(&mut self) {
+        let Some(claim) = &mut self.claim else { return };
+        claim.has_moved = true;
+        if claim.counts_for == 0 {
+            return;
+        }
+        let (mean, drift) = claim.newest;
+        self.claim = None;
+        let ZeroRateConfig { standstill, noise, max_bias, .. } = self.config;
+        let initial = self.config.initial_of(drift);
+        // Each of the two means has an offset and a noise of its own.
+        let variance = self.filter.variance::<BIAS>()
+            + initial * initial
+            + 2.0 * (standstill * standstill + noise * noise);
+        if libm::fabsf(mean - self.filter.get::<BIAS>()) > GATE * sqrt(variance) {
+            self.filter.restart::<BIAS>(within(mean, max_bias), initial * initial);
+            self.filter.restart::<STOP>(0.0, 0.0);
+            self.doubt = Doubt::default();
+        }
+    }
+
+    /// Returns whether a second source has confirmed the bias: the vehicle has driven off, or a later standstill agrees.
+    #[must_use]
+    pub fn is_confirmed(&self) -> bool {
+        self.claim.is_none()
     }
 
     /// Drops the current second, which a gap has cut short.
@@ -287,7 +378,10 @@ impl ZeroRate {
         let bias = self.filter.get::<BIAS>();
         let off = |mean: f32, is_doubt: bool| if is_doubt { libm::fabsf(mean - bias) } else { 0.0 };
         let off = off(mean, seconds >= REFUSED_SECONDS).max(off(earlier, stops > 0));
-        sqrt(self.bias_variance() + off * off).min(self.config.max_bias)
+        let off = if self.refused && self.standing.is_likely() { off.max(self.against) } else { off };
+        let hidden =
+            self.claim.map_or(0.0, |claim| claim.reading * claim.reading + claim.expected * claim.expected);
+        sqrt(self.bias_variance() + off * off + hidden).min(self.config.max_bias)
     }
 
     /// Returns whether standstills contradict the bias.
@@ -306,13 +400,13 @@ impl ZeroRate {
     /// Returns whether the wheels stand and the gyro does not contradict them.
     #[must_use]
     pub fn stands(&self) -> bool {
-        self.standing.is_by_wheels() && !self.refused
+        self.standing.is_by_wheels() && !self.is_refused()
     }
 
     fn stop_begins(&mut self, standing: Standing) {
         self.end_doubt();
         self.standing = standing;
-        self.refused = false;
+        (self.refused, self.against, self.distrusted_for) = (false, 0.0, 0);
         self.restart();
         let ZeroRateConfig { standstill, mistaken, .. } = self.config;
         let offset = standstill * standstill + (1.0 - standing.probability) * mistaken * mistaken;
@@ -333,7 +427,10 @@ impl ZeroRate {
         let (stops, before) = if agrees { (stops + 1, earlier) } else { (1, mean) };
         let mean = before + (mean - before) / f32::from(stops);
         self.doubt = Doubt { earlier: mean, stops, ..Doubt::default() };
-        if stops >= AGREEING_STOPS {
+        // Ground on which the vehicle stops says more than what it started on.
+        let enough = if self.claim.is_some_and(|claim| claim.has_moved) { 1 } else { AGREEING_STOPS };
+        if stops >= enough {
+            self.claim = None;
             self.filter.restart::<BIAS>(within(mean, self.config.max_bias), variance);
             self.filter.restart::<STOP>(self.filter.get::<STOP>(), 0.0);
             self.doubt = Doubt::default();
@@ -356,6 +453,11 @@ impl ZeroRate {
         let mean = block.mean_code() as f32 / AngularRate::PER_RAD_PER_SEC;
         let measured = Measurement { mean, variance: own.max(least), usual: usual.max(own).max(least) };
         self.refused = self.is_off(&measured);
+        self.against = if self.refused {
+            libm::fabsf(mean - self.filter.get::<BIAS>() - self.filter.get::<STOP>())
+        } else {
+            0.0
+        };
         let before = self.waiting.replace(measured);
         match before {
             Some(before) if !self.is_off(&before) => self.update(before),
@@ -377,18 +479,25 @@ impl ZeroRate {
 
     /// Notes a second at a probable standstill that contradicts the bias.
     fn contradict(&mut self, measured: Measurement) {
-        if self.standing.is_likely() {
-            let Doubt { mean, seconds, .. } = &mut self.doubt;
-            *seconds = seconds.saturating_add(1);
-            *mean += (measured.mean - *mean) / f32::from(*seconds);
+        if !self.standing.is_likely() {
+            return;
         }
+        let Doubt { mean, seconds, .. } = &mut self.doubt;
+        *seconds = seconds.saturating_add(1);
+        *mean += (measured.mean - *mean) / f32::from(*seconds);
+    }
+
+    /// Notes a second at a probable standstill that agrees with the bias.
+    fn agree(&mut self) {
+        self.doubt = Doubt::default();
+        self.claim = self.claim.filter(|claim| !claim.has_moved);
     }
 
     /// Applies the Kalman filter's measurement update.
     fn update(&mut self, measured: Measurement) {
         self.take_thermal();
         if self.standing.is_likely() {
-            self.doubt = Doubt::default();
+            self.agree();
         }
         self.filter.standstill(measured.mean, measured.variance);
         self.bound();

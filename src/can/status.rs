@@ -11,7 +11,7 @@
 //! | 7 to 9 | [`Knowledge`] of its gain and misalignment | 7 |
 //! | 10 to 12 | [`Knowledge`] of the sensor's mounting | 7 |
 //! | 13 to 15 | sources of the yaw rate that others contradict: 1 inertial gyro, 2 fibre-optic gyro, 4 wheels, or their sum | 7 |
-//! | 16 to 23 | gaps in the accumulated yaw since it began; 254 also above | 255 |
+//! | 16 to 23 | gaps in the accumulated yaws (inertial, fibre-optic) since they began, modulo 255 | 255 |
 //! | 24 to 39 | expected error of the angle turned in the last minute, 0.01 deg; 65534 also above | 65535 |
 
 pub use crate::health::slow::{Evidence, Knowledge, SlowStatus, Verdict};
@@ -37,8 +37,7 @@ const NO_DOUBT: u16 = u16::MAX;
 #[must_use]
 pub const fn emit(status: &SlowStatus) -> [u8; 8] {
     let gaps = match status.gaps {
-        Some(gaps) if gaps < NO_GAPS as u32 => gaps as u8,
-        Some(_) => NO_GAPS - 1,
+        Some(gaps) => (gaps % NO_GAPS as u32) as u8,
         None => NO_GAPS,
     };
     let doubts = match status.doubts {

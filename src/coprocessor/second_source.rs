@@ -9,7 +9,8 @@
 //! In a second with contradiction the source that is alone is doubted: the gyro that the other two (gyro, wheels,
 //! accelerometer) contradict, or the wheels that both others contradict. Where two contradict each other and no third
 //! one judges, both are doubted. A doubt begins with the second such second in a row (a tyre that slips, a lag in a
-//! swerve), and ends with the second one in which its source agrees with another in a turn.
+//! swerve), and ends with the second one in which its source agrees with another in a turn. A fibre-optic gyro that
+//! nothing has confirmed yet contradicts no other, and is doubted at once.
 
 use crate::sample::{RATE_HZ, WheelSample};
 
@@ -34,12 +35,19 @@ pub(super) struct Shown {
     /// Yaw rates of the gyros less their bias, rad/s.
     pub inertial: Option<f32>,
     pub fog: Option<f32>,
+    /// A standstill or a turn has shown unit and sign of the fibre-optic gyro's output.
+    pub is_fog_confirmed: bool,
     /// Lateral specific force, m/s^2, to the left.
     pub lateral: f32,
     /// Speed, and how much faster the right wheel of the rear axle is than the left one, m/s.
     pub wheels: Option<[f32; 2]>,
 }
 
+/// Rate of a turn in which gyros that agree have the same unit and sign, rad/s.
+const CONFIRMING: f32 = 0.1;
+/// Sum of squared rates from which on gains are compared, (rad/s)^2 x s, and the seconds of turning that it remembers.
+const COMPARED: f32 = 0.1;
+const TURNS: f32 = 100.0;
 /// Smallest rate of a turn in which sources show that they agree, rad/s.
 const TURN: f32 = 0.035;
 /// Wheels and accelerometer are asked above this speed, m/s: below it wheels turn on the spot and slip.
@@ -58,6 +66,9 @@ pub(super) struct SecondSource {
     agreed: [u8; 3],
     doubts: [bool; 3],
     judged: bool,
+    is_fog_confirmed: bool,
+    /// Sums over turns of the product of both gyros' rates, and of the inertial one's square.
+    products: [f32; 2],
 }
 
 impl SecondSource {
@@ -68,11 +79,14 @@ impl SecondSource {
         agreed: [0; 3],
         doubts: [false; 3],
         judged: false,
+        is_fog_confirmed: false,
+        products: [0.0; 2],
     };
 
     /// Adds a step of 10 ms.
     pub fn add(&mut self, shown: &Shown) {
-        let Shown { inertial, fog, lateral, wheels } = *shown;
+        let Shown { inertial, fog, is_fog_confirmed, lateral, wheels } = *shown;
+        self.is_fog_confirmed |= is_fog_confirmed;
         let [speed, difference] = wheels.map_or([None; 2], |values| values.map(Some));
         for (sum, value) in self.sums.iter_mut().zip([inertial, fog, Some(lateral), speed, difference]) {
             if let Some(value) = value {
@@ -94,6 +108,17 @@ impl SecondSource {
         self.judged.then_some(Doubts { inertial, fog, wheels })
     }
 
+    /// Returns whether the gyros have agreed in a turn, or a standstill has shown the fibre-optic one's unit.
+    pub fn confirms_fog(&self) -> bool {
+        self.is_fog_confirmed
+    }
+
+    /// Returns how much the gains of both gyros differ, once they have been compared in turns.
+    pub fn scale(&self) -> Option<f32> {
+        let [product, square] = self.products;
+        (square > COMPARED).then(|| (product / square - 1.0).abs())
+    }
+
     fn judge(&mut self, gyros: [Option<f32>; 2], lateral: Option<f32>, wheels: Option<(f32, f32)>) {
         let wheels = wheels.filter(|(speed, _)| *speed > FAST);
         let by_wheels = gyros.map(|rate| Some(wheels_agree(rate?, wheels?)));
@@ -106,6 +131,15 @@ impl SecondSource {
             return;
         }
         self.judged = true;
+        if let (Some(inertial), Some(fog)) = (inertial, fog)
+            && inertial.abs() > CONFIRMING
+        {
+            let [product, square] = &mut self.products;
+            *product += inertial * fog - *product / TURNS;
+            *square += inertial * inertial - *square / TURNS;
+        }
+        let both_turn = gyros.iter().all(|rate| rate.is_some_and(|rate| rate.abs() > CONFIRMING));
+        self.is_fog_confirmed |= gyros_agree == Some(true) && both_turn;
         let turns = gyros.map(|rate| rate.is_some_and(|rate| rate.abs() > TURN));
         // How many of the others speak for each gyro, and against it.
         let voices = |by_wheels: Option<bool>, by_force: Option<bool>| {
@@ -115,6 +149,10 @@ impl SecondSource {
         let [for_inertial, against_inertial] = voices(by_wheels[0], by_force[0]);
         let [for_fog, against_fog] = voices(by_wheels[1], by_force[1]);
         let alone = match gyros_agree {
+            Some(false) if !self.is_fog_confirmed => {
+                self.doubts[1] = true;
+                [false, true, false]
+            }
             Some(false) => [against_inertial >= against_fog, against_fog >= against_inertial, false],
             _ => {
                 let wheels = by_wheels.contains(&Some(false));

@@ -1,8 +1,9 @@
 //! The accumulated yaw: the sum of the rates that may be used, the gaps in it, and how much may be missing.
 //!
 //! A rate that may not be used is not added: the yaw keeps its value, as across steps without a sample. What the
-//! vehicle has turned meanwhile is missing from the yaw for good. With the rates w before and after a gap of T seconds,
-//! taken as a random walk between them, the missing angle has a variance of (max |w| T)^2 + q^2 T^3 / 3.
+//! vehicle has turned meanwhile is missing from the yaw for good. With the rates v and w before and after a gap of T
+//! seconds, taken as a random walk between them, it is likely (v + w) T / 2, with a variance of ((v - w) T / 2)^2 +
+//! q^2 T^3 / 3. The likely angles of many gaps in one turn add up; their rest does not.
 
 use super::YawEstimate;
 use crate::health::Quality;
@@ -28,9 +29,9 @@ impl AccumulatedYaw {
     pub(crate) const START: Self = Self { yaw: Yaw(0), gaps: 0, newest: None, hidden: None };
 
     /// Adds the angle `turned` in a step, a code of [`Yaw`], unless its estimate may not be used; sets the estimate's
-    /// yaw. Returns the variance of the angle that a gap before this step has left out, rad^2.
-    pub(crate) fn add(&mut self, estimate: &mut YawEstimate, turned: i64) -> f32 {
-        let mut missed = 0.0;
+    /// yaw. Returns the angle that a gap before this step has left out.
+    pub(crate) fn add(&mut self, estimate: &mut YawEstimate, turned: i64) -> Missed {
+        let mut missed = Missed::NOTHING;
         if matches!(estimate.quality, Quality::Good | Quality::Degraded) {
             self.yaw.0 = self.yaw.0.wrapping_add(turned);
             let YawEstimate { tick, rate, .. } = *estimate;
@@ -39,7 +40,7 @@ impl AccumulatedYaw {
                 let between = tick.wrapping_sub(last).saturating_sub(1);
                 let steps = between.saturating_add(hidden.map_or(0, |(_, steps)| steps));
                 self.gaps = self.gaps.saturating_add(u32::from(steps > 0));
-                missed = variance(steps, before.0.unsigned_abs().max(rate.0.unsigned_abs()));
+                missed = Missed::between(steps, before, rate);
             }
         }
         estimate.yaw = self.yaw;
@@ -62,12 +63,12 @@ impl AccumulatedYaw {
         self.newest.map(|_| self.gaps)
     }
 
-    /// The variance of the angle that is missing in a gap that has lasted until `tick`, rad^2.
-    pub(crate) fn missing(&self, tick: u32) -> f32 {
-        let Some((last, before)) = self.newest else { return 0.0 };
+    /// The angle that is missing in a gap that has lasted until `tick`.
+    pub(crate) fn missing(&self, tick: u32) -> Missed {
+        let Some((last, before)) = self.newest else { return Missed::NOTHING };
         let steps = if is_later(tick, last) { tick.wrapping_sub(last) } else { 0 };
         let hidden = self.hidden.map_or(0, |(_, steps)| steps);
-        variance(steps.saturating_add(hidden), before.0.unsigned_abs())
+        Missed::between(steps.saturating_add(hidden), before, before)
     }
 }
 
@@ -75,9 +76,26 @@ fn is_later(tick: u32, than: u32) -> bool {
     tick.wrapping_sub(than) as i32 > 0
 }
 
-/// The variance of the angle turned in `steps` that no rate covers, rad^2; `rate` is the larger of those around them.
-fn variance(steps: u32, rate: u32) -> f32 {
-    let seconds = steps as f32 / RATE_HZ as f32;
-    let turned = rate as f32 / AngularRate::PER_RAD_PER_SEC * seconds;
-    turned * turned + WALK * WALK / 3.0 * seconds * seconds * seconds
+/// An angle that a gap has left out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Missed {
+    /// The likely angle, rad.
+    pub angle: f32,
+    /// Its variance, rad^2.
+    pub variance: f32,
+}
+
+impl Missed {
+    /// No gap.
+    pub const NOTHING: Self = Self { angle: 0.0, variance: 0.0 };
+
+    /// The angle turned in `steps` between two rates.
+    fn between(steps: u32, before: AngularRate, after: AngularRate) -> Self {
+        let seconds = steps as f32 / RATE_HZ as f32;
+        let [before, after] =
+            [before, after].map(|rate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC * seconds);
+        let half = (after - before) / 2.0;
+        let walked = WALK * WALK / 3.0 * seconds * seconds * seconds;
+        Self { angle: (before + after) / 2.0, variance: half * half + walked }
+    }
 }

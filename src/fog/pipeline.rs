@@ -7,7 +7,9 @@
 //!
 //! | state | rate | source | quality | faults |
 //! |---|---|---|---|---|
-//! | latitude and wheels are known | less Earth's rate and bias | Earth rate | good | |
+//! | latitude and wheels are known, and a standstill or another gyro has shown unit and sign of the output | less Earth's rate and bias | Earth rate | good | |
+//! | nothing has shown them yet | the same | Earth rate | degraded | IMPLAUSIBLE where a standstill contradicts them |
+//! | the gyro's clock departs from the board's by more than the limit | the same | Earth rate | degraded | IMPLAUSIBLE |
 //! | wheels are silent, or stand while the gyro turns | the same | Earth rate | degraded | WHEELS |
 //! | the latitude on the bus contradicts the one in use | the same | Earth rate | degraded | IMPLAUSIBLE |
 //! | no latitude is known, the vehicle has stood still | less the reading at standstill | static | degraded | |
@@ -15,6 +17,7 @@
 //! | FoGNet is configured, the latitude is known, and an estimate is in use | also less the correction | FoGNet | as without; degraded with weights from simulated drives | |
 //! | standstills show that FoGNet makes the rate worse: it is dropped until the next start | as without FoGNet | | | |
 //! | FoGNet's estimate is late, rejected, or there are no weights for this gyro | as without FoGNet | | degraded | LATE, IMPLAUSIBLE, STORED |
+//! | a step differs from the inertial gyro as no vehicle turns in 10 ms; after two seconds of that it is degraded | not available | raw | unusable | IMPLAUSIBLE |
 //! | increments are missing in the step, or none have come yet from a gyro that is expected | not available | raw | unusable | GAP |
 //! | increments repeat themselves ([`STUCK_AFTER`], [`STUCK_US`]), until one differs | not available | raw | unusable | STUCK |
 //!
@@ -24,6 +27,7 @@
 use super::fognet_watch::FogNetWatch;
 use super::{EarthAndBias, FogConfig, FogCorrector, FogNetUse, FogOutput, IncrementRate, RestOutcome};
 use crate::align::clock::ClockError;
+use crate::align::clock_ratio::{ClockRatio, RatioEstimator};
 use crate::align::fog_grid::FogGrid;
 use crate::bias::Latitude;
 use crate::estimate::{AccumulatedYaw, YawEstimate};
@@ -42,6 +46,49 @@ pub const STUCK_AFTER: u8 = 4;
 /// Duration of these increments, microseconds: ten increments of a DSP-1760, whose noise in 1 ms is hundreds of
 /// thousands of its units and never repeats.
 pub const STUCK_US: u32 = 10_000;
+
+/// Share by which a clock may be off before it has been measured: a quarter of what is accepted.
+const CLOCK: f32 = 0.01;
+
+/// Difference of a step's rate from the inertial gyro's that no vehicle has, rad/s and as a share of it, and the steps for
+/// which it is rejected.
+const DIFFERS: (f32, f32) = (0.3, 0.1);
+const DOUBTED: u32 = 2 * RATE_HZ;
+/// Share of the rate, 1 sigma, that the slope of a street, the mounting and a unit's gain hide from any gyro, and with
+/// an inertial gyro until both have been compared in turns.
+const SHARE: f32 = 0.0025;
+const UNKNOWN_SHARE: f32 = 0.03;
+
+/// What the inertial sensor shows besides.
+#[derive(Debug, Clone, Copy)]
+pub struct Beside {
+    /// The yaw rate, rad/s.
+    pub rate: Option<f32>,
+    /// The share of a turn that a gyro misses on the present slope.
+    pub tilted: f32,
+    /// How much the gains of both gyros differ; `None` before they have turned.
+    pub scale: Option<f32>,
+}
+
+impl Beside {
+    /// There is no inertial sensor.
+    pub const NOTHING: Self = Self { rate: None, tilted: 0.0, scale: None };
+
+    fn differs(&self, turn: Angle) -> bool {
+        let own = turn.0 as f32 * (RATE_HZ as f32 / Angle::PER_RAD);
+        self.rate.is_some_and(|rate| (own - rate).abs() > DIFFERS.0 + DIFFERS.1 * rate.abs())
+    }
+
+    /// Returns the share of the rate by which it may be off, 1 sigma.
+    fn share(&self) -> f32 {
+        let scale = match (self.scale, self.rate) {
+            (Some(scale), _) => scale,
+            (None, Some(_)) => UNKNOWN_SHARE,
+            (None, None) => 0.0,
+        };
+        sqrt(SHARE * SHARE + scale * scale + self.tilted * self.tilted)
+    }
+}
 
 /// Event counters since the start. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -98,6 +145,15 @@ impl FogCounters {
 pub struct FogPipeline {
     grid: FogGrid,
     earth_and_bias: EarthAndBias,
+    /// Compares the gyro's clock with the board's, where that is better.
+    clock: Option<RatioEstimator>,
+    /// Unit and sign of the gyro's output have been shown; a standstill has contradicted them.
+    is_confirmed: bool,
+    was_refused: bool,
+    beside: Beside,
+    /// Steps in a row that differed from the inertial gyro, and the newest one's rate, rad/s.
+    rejected: u32,
+    shown: Option<f32>,
     /// The latitude on the bus contradicts the one in use.
     latitude_contested: bool,
     shake: [f32; 2],
@@ -128,6 +184,15 @@ impl FogPipeline {
         Self {
             grid: FogGrid::new(expected),
             earth_and_bias: EarthAndBias::new(config.errors, config.tilt, config.latitude),
+            clock: match config.clock_ratio {
+                Some(config) => Some(RatioEstimator::new(config)),
+                None => None,
+            },
+            is_confirmed: false,
+            was_refused: false,
+            beside: Beside::NOTHING,
+            rejected: 0,
+            shown: None,
             latitude_contested: false,
             shake: config.shake,
             corrector: FogCorrector::new(config),
@@ -157,6 +222,35 @@ impl FogPipeline {
         self.latitude_contested = contested;
     }
 
+    /// Notes that another gyro agrees in a turn: unit and sign of the output are those of the configuration, unless a
+    /// standstill contradicts them.
+    pub fn confirm(&mut self) {
+        self.is_confirmed |= !self.was_refused;
+    }
+
+    /// Returns whether unit and sign of the output are known.
+    #[must_use]
+    pub fn is_confirmed(&self) -> bool {
+        self.is_confirmed
+    }
+
+    /// Sets what the inertial sensor shows besides.
+    pub fn beside(&mut self, beside: Beside) {
+        self.beside = beside;
+    }
+
+    /// Returns the rate of the newest step, whether the inertial gyro agrees or not, rad/s.
+    #[must_use]
+    pub fn shown(&self) -> Option<f32> {
+        self.shown
+    }
+
+    /// Returns the number of gaps in the accumulated yaw; `None` before it begins.
+    #[must_use]
+    pub fn gaps(&self) -> Option<u32> {
+        self.yaw.gaps()
+    }
+
     /// Adds a sample that arrived at `now`. Call [`FogPipeline::next_step`] until `None` after it.
     ///
     /// # Errors
@@ -167,6 +261,12 @@ impl FogPipeline {
         if stuck {
             let [.., up] = &mut sample.increment;
             *up = None;
+        }
+        if let Some(clock) = &mut self.clock {
+            clock.observe(sample.time, now);
+            let ratio = clock.ratio();
+            let turns = sample.increment.iter_mut().flatten().filter(|_| ratio != ClockRatio::ONE);
+            turns.for_each(|turn| *turn = ratio.angle(*turn));
         }
         self.grid.add(now, sample).inspect_err(|_| count(&mut self.counters.misplaced, 1))?;
         count(&mut self.counters.samples, 1);
@@ -194,11 +294,21 @@ impl FogPipeline {
         let step = self.grid.next_step(now)?;
         let [.., turn] = step.turn.angle;
         let turn = turn.filter(|_| u64::from(step.turn.covered) == PERIOD_US);
+        let reading = self.earth_and_bias.rest().reading();
+        self.shown = turn.map(|turn| turn.0 as f32 * (RATE_HZ as f32 / Angle::PER_RAD) - reading);
+        let differs = turn.is_some_and(|turn| self.beside.differs(turn));
+        self.rejected = if differs { self.rejected.saturating_add(1) } else { 0 };
+        let wrong = differs && self.rejected <= DOUBTED;
+        let turn = turn.filter(|_| !wrong);
         let stuck = turn.is_none() && self.stuck_in_step;
         self.stuck_in_step = self.repeats.are_stuck();
         let standstill = wheels.map_or(Standstill::Unknown, |wheels| wheels.standstill);
         let (kept, outcome) = self.earth_and_bias.correct(turn, standstill);
         self.count_rest(outcome);
+        self.was_refused |= outcome == Some(RestOutcome::Refused);
+        self.is_confirmed |= outcome == Some(RestOutcome::Used) && self.earth_and_bias.rest().shows_unit();
+        let is_clock_off = self.clock.as_ref().is_some_and(RatioEstimator::fault);
+        let contradicts_unit = self.was_refused && !self.is_confirmed;
         let wheels = wheels.and_then(rear);
         let uses_network = self.fognet != FogNetUse::Off;
         let has_latitude = self.earth_and_bias.latitude().is_some();
@@ -219,20 +329,22 @@ impl FogPipeline {
         let faults = self
             .estimate_faults
             .with(Faults::STUCK.when(stuck))
-            .with(Faults::GAP.when(turn.is_none() && !stuck))
+            .with(Faults::GAP.when(turn.is_none() && !stuck && !wrong))
             .with(Faults::WHEELS.when(wheels.is_none() || contradicted))
-            .with(Faults::IMPLAUSIBLE.when(self.latitude_contested))
+            .with(
+                Faults::IMPLAUSIBLE
+                    .when(self.latitude_contested || is_clock_off || contradicts_unit || differs),
+            )
             .with(Faults::STORED.when(uses_network && !self.has_network));
+        let is_good = faults == Faults::NONE && self.is_confirmed;
         let (status, source, quality) = match (turn, by_network) {
             (None, _) if stuck => (Status::Stuck, Source::Raw, Quality::Unusable),
             (None, _) => (Status::Silent, Source::Raw, Quality::Unusable),
-            (Some(_), Some(_)) if self.fognet == FogNetUse::Recorded && faults == Faults::NONE => {
+            (Some(_), Some(_)) if self.fognet == FogNetUse::Recorded && is_good => {
                 (Status::Ready, Source::FogNet, Quality::Good)
             }
             (Some(_), Some(_)) => (Status::Degraded, Source::FogNet, Quality::Degraded),
-            (Some(_), None) if has_latitude && faults == Faults::NONE => {
-                (Status::Ready, Source::EarthRate, Quality::Good)
-            }
+            (Some(_), None) if has_latitude && is_good => (Status::Ready, Source::EarthRate, Quality::Good),
             (Some(_), None) => (Status::Degraded, self.source(), Quality::Degraded),
         };
         let (rate, correction) = match (turn, by_network.or(kept)) {
@@ -249,7 +361,10 @@ impl FogPipeline {
         let changed =
             kept.zip(by_network).map_or(0, |(kept, by_network)| kept.0.saturating_sub(by_network.0));
         let changed = changed as f32 * (RATE_HZ as f32 / Angle::PER_RAD);
-        let spread = sqrt(shake * shake + changed * changed);
+        let unknown = self.clock.as_ref().is_some_and(|clock| !clock.is_known());
+        let share = self.beside.share() + if unknown { CLOCK } else { 0.0 };
+        let grows = share * rate.0 as f32 / AngularRate::PER_RAD_PER_SEC;
+        let spread = sqrt(shake * shake + changed * changed + grows * grows);
         let sigma = turn.is_some().then(|| self.earth_and_bias.sigma(rate, spread));
         let yaw = Yaw(0);
         let mut estimate =

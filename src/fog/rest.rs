@@ -14,6 +14,9 @@
 //!
 //! A mean counts only if the vehicle also stands in the next second, because wheel sensors show late that a car pulls
 //! away. A mean that is off by more than ten sigma was not a standstill, whatever the wheels report.
+//!
+//! A reading at rest also shows that unit and sign of the gyro's output are those of the configuration: it is the Earth's
+//! rate to a half, or its noise is that of the part.
 
 use super::part::FogErrors;
 use crate::bias::earth::EARTH_RATE;
@@ -23,6 +26,8 @@ use crate::units::Angle;
 
 /// A second has this many steps.
 const STEPS: i64 = RATE_HZ as i64;
+/// Steps of a quarter of a second.
+const QUARTER: u32 = RATE_HZ / 4;
 /// Largest code of a step, 2,900 deg/s: a second's sums stay within 58 bits.
 const LARGEST_CODE: i64 = 1 << 43;
 /// Uncertainty of the gyro's reading before it has stood still, rad/s: more than any latitude and bias.
@@ -33,6 +38,8 @@ const GATE: f32 = 10.0;
 const MEMORY: u8 = 64;
 /// The square of a difference is limited to this many variances, because a beginning turn is not noise.
 const LARGEST: f32 = 9.0;
+/// Noise of a gyro in its own unit over that of the data sheet; degrees taken for radians are 57.
+const NOISY: f32 = 8.0;
 
 /// Says how a second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,6 +111,11 @@ pub struct RestReading {
     noise: f32,
     differences: u8,
     refused: bool,
+    /// The rate by which the newest standstill contradicts the reading, rad/s; 0 once one agrees.
+    doubt: f32,
+    /// Turn of the standing vehicle in the newest quarters of a second, codes, and the steps for which it stands.
+    turned: [i64; 5],
+    stood: u32,
     since_walk: u32,
 }
 
@@ -123,6 +135,9 @@ impl RestReading {
             noise: errors.angle_walk * errors.angle_walk,
             differences: 1,
             refused: false,
+            doubt: 0.0,
+            turned: [0; 5],
+            stood: 0,
             since_walk: 0,
         }
     }
@@ -150,14 +165,34 @@ impl RestReading {
             self.refused = false;
         }
         let (Some(turn), Standstill::Still) = (turn, standstill) else {
+            (self.turned, self.stood) = ([0; 5], 0);
             self.second = Second::EMPTY;
             self.before = None;
             self.waiting = None;
             self.last = None;
             return None;
         };
+        self.turn(turn);
         self.second.add(turn);
         (i64::from(self.second.steps) == STEPS).then(|| self.end_second())
+    }
+
+    fn turn(&mut self, turn: Angle) {
+        if self.stood % QUARTER == 0 {
+            self.turned.rotate_right(1);
+            self.turned[0] = 0;
+        }
+        self.turned[0] += turn.0.clamp(-LARGEST_CODE, LARGEST_CODE);
+        self.stood = self.stood.saturating_add(1);
+    }
+
+    /// Returns what a standing vehicle has turned in the last second beyond the reading at rest, rad, or the doubt of the
+    /// newest standstill, rad/s, if that is larger: the vehicle turns, or the gyro's bias has changed.
+    fn against(&self) -> f32 {
+        let steps = self.stood.min(RATE_HZ + self.stood % QUARTER);
+        let turned = self.turned.iter().sum::<i64>() as f32 / Angle::PER_RAD;
+        let expected = self.combined().mean * steps as f32 / RATE_HZ as f32;
+        self.doubt.max(if self.stood > 0 { (turned - expected).abs() } else { 0.0 })
     }
 
     /// Returns the reading at rest that is subtracted, rad/s.
@@ -171,8 +206,9 @@ impl RestReading {
     #[must_use]
     pub fn sigma(&self, rate: f32, shake: f32) -> f32 {
         let FogErrors { angle_walk, scale, .. } = self.errors;
-        let scaled = scale * rate;
-        sqrt(self.combined().variance + angle_walk * angle_walk + scaled * scaled + shake * shake)
+        let (scaled, against) = (scale * rate, self.against());
+        let own = self.combined().variance + angle_walk * angle_walk;
+        sqrt(own + scaled * scaled + shake * shake + against * against)
     }
 
     /// Returns whether a standstill has been used.
@@ -185,6 +221,16 @@ impl RestReading {
     #[must_use]
     pub fn is_contradicted(&self) -> bool {
         self.refused
+    }
+
+    /// Returns whether the reading at rest proves unit and sign of the gyro's output.
+    #[must_use]
+    pub fn shows_unit(&self) -> bool {
+        let (earth, Estimate { mean, variance }) = (self.earth.unwrap_or(0.0), self.measured);
+        let by_earth = 4.0 * sqrt(variance) + (mean - earth).abs() < 0.5 * earth.abs();
+        let usual = NOISY * self.errors.angle_walk;
+        let by_noise = self.differences > 2 && self.noise <= usual * usual;
+        self.is_measured() && (by_earth || by_noise)
     }
 
     /// Returns the weighted mean of both sources.
@@ -208,17 +254,22 @@ impl RestReading {
         if let Some(last) = self.last.replace(mean) {
             let square = ((mean - last) * (mean - last)).min(LARGEST * self.noise);
             self.differences = (self.differences + 1).min(MEMORY);
-            self.noise += (square - self.noise) / f32::from(self.differences);
+            let noise = self.noise + (square - self.noise) / f32::from(self.differences);
+            // A deck that begins to turn, or ends to, is not noise either.
+            let largest = NOISY * self.errors.angle_walk;
+            self.noise = if self.refused { noise.min(self.noise.max(largest * largest)) } else { noise };
         }
         let by_part = self.errors.angle_walk * self.errors.angle_walk;
         let seen = Estimate { mean, variance: self.noise.max(by_part) };
         let expected = self.combined();
         self.refused = (mean - expected.mean).abs() > GATE * sqrt(expected.variance + seen.variance);
         if self.refused {
+            self.doubt = (mean - expected.mean).abs();
             self.waiting = None;
             return RestOutcome::Refused;
         }
         let Some(before) = self.waiting.replace(seen) else { return RestOutcome::Waits };
+        self.doubt = 0.0;
         let Estimate { mean, variance } = self.measured;
         let gain = variance / (variance + before.variance);
         self.measured =

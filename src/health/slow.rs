@@ -54,7 +54,7 @@ pub struct SlowStatus {
     /// Sources of the yaw rate that others contradict: inertial gyro 1, fibre-optic gyro 2, wheels 4; `None` before two
     /// have been compared.
     pub doubts: Option<u8>,
-    /// Gaps in the accumulated yaw; `None` before it begins.
+    /// Gaps in the accumulated yaws of both gyros; `None` before one begins.
     pub gaps: Option<u32>,
     /// Expected error (1 sigma) of the angle that the accumulated yaw has turned in the last minute, 0.01 deg, gaps
     /// included; `None` before it begins.

@@ -44,7 +44,7 @@ const fn remark(
 /// and VDC2 "error".
 ///
 /// From a fault the state returns to init where no bias is known, otherwise to degraded.
-pub const STATES: [State; 12] = [
+pub const STATES: [State; 15] = [
     state(
         Status::Init,
         "init",
@@ -109,6 +109,27 @@ pub const STATES: [State; 12] = [
          0.3 rad/s in yaw, 1 rad/s in roll and pitch, 30 m/s^2",
         "none; IMPLAUSIBLE",
         "a reading near the last good one, or the fourth such reading in a row",
+        "`wrong`",
+    ),
+    remark(
+        "not confirmed",
+        "the bias rests on the one standstill of the start, in which a ferry or a turntable may have turned; 0x1A3 says coarse",
+        "as in the present state, at best degraded",
+        "the vehicle drives off within 10 s of a reading at rest, which decides, or stops later and agrees",
+        "",
+    ),
+    remark(
+        "late",
+        "samples arrive more than 29 ms later than their time stamps let expect: the line has stalled",
+        "as in the present state, at best degraded, with its latency; GAP",
+        "samples that arrive in time",
+        "",
+    ),
+    remark(
+        "jumped",
+        "the yaw rate has jumped as no vehicle turns, and stays there",
+        "as in the present state, at best degraded, the jump in the expected error; IMPLAUSIBLE",
+        "it jumps back, or the vehicle stands",
         "`wrong`",
     ),
     remark(

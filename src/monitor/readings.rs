@@ -77,6 +77,8 @@ pub const USUAL: f32 = 12.0;
 const STEPS: f32 = 64.0;
 /// At most this many readings in a row are rejected; the next one is accepted whatever its value.
 pub const JUMP_PATIENCE: u8 = 3;
+/// Samples for which a shift is told on: those that have not been sent yet.
+const TOLD: u8 = 12;
 /// Readings are not compared with a last good reading older than this, microseconds.
 const OLD_US: u32 = 50_000;
 
@@ -92,12 +94,24 @@ pub(super) struct Jump {
     squares: [f32; AXES],
     /// Readings in a row that were rejected.
     rejected: u8,
+    /// The yaw rate by which the readings are off if the jumps that were accepted are faults, rad/s, and the samples for
+    /// which that is told on after it has ended.
+    shift: f32,
+    told_for: u8,
 }
 
 impl Jump {
     /// Creates the state before the first reading.
     pub const fn new() -> Self {
-        Self { last: [0.0; AXES], at: 0, known: false, squares: [0.0; AXES], rejected: 0 }
+        Self {
+            last: [0.0; AXES],
+            at: 0,
+            known: false,
+            squares: [0.0; AXES],
+            rejected: 0,
+            shift: 0.0,
+            told_for: 0,
+        }
     }
 
     /// Checks a reading and returns whether it is too far from the last accepted one; otherwise it is accepted.
@@ -108,12 +122,21 @@ impl Jump {
             sample.specific_force.map(|force| force.0 as f32 / SpecificForce::PER_METRE_PER_SEC2),
         );
         let reading = [wx, wy, wz, fx, fy, fz];
+        if self.told_for == 1 {
+            self.shift = 0.0;
+        }
+        self.told_for = self.told_for.saturating_sub(1);
         let age = (at.wrapping_sub(self.at) as i32).unsigned_abs();
         if self.known && age <= OLD_US {
             let steps: [f32; AXES] = core::array::from_fn(|axis| reading[axis] - self.last[axis]);
-            if self.rejected < JUMP_PATIENCE && self.is_far(&steps) {
+            let is_far = self.is_far(&steps);
+            if self.rejected < JUMP_PATIENCE && is_far {
                 self.rejected += 1;
                 return true;
+            }
+            let [_, _, yaw, ..] = steps;
+            if is_far || self.shift != 0.0 && libm::fabsf(yaw + self.shift) < JUMP_RATE[2] {
+                self.accept_jump(yaw);
             }
             for (square, step) in self.squares.iter_mut().zip(steps) {
                 *square += (step * step - *square) / STEPS;
@@ -121,6 +144,29 @@ impl Jump {
         }
         (self.last, self.at, self.known, self.rejected) = (reading, at, true, 0);
         false
+    }
+
+    /// Notes a jump of the yaw rate that lasts. One back to what was before ends the doubt.
+    fn accept_jump(&mut self, step: f32) {
+        let [.., smallest] = JUMP_RATE;
+        let shift = self.shift + step;
+        if libm::fabsf(shift) > smallest {
+            self.shift = shift;
+        } else {
+            self.settle();
+        }
+    }
+
+    /// Notes that the present level of the readings is right.
+    pub fn settle(&mut self) {
+        if self.shift != 0.0 && self.told_for == 0 {
+            self.told_for = TOLD;
+        }
+    }
+
+    /// Returns the yaw rate by which the readings are off if the jumps that were accepted are faults, rad/s.
+    pub fn shift(&self) -> f32 {
+        libm::fabsf(self.shift)
     }
 
     fn is_far(&self, steps: &[f32; AXES]) -> bool {

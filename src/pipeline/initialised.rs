@@ -2,12 +2,13 @@
 //! once one has succeeded.
 
 use super::sensor_bias::ZeroPoint;
-use super::{Pipeline, PipelineConfig};
+use super::{Pipeline, PipelineConfig, State};
 use crate::bias::{Rest, StaticError, ZeroRate};
 use crate::health::count;
 use crate::mounting::{Rotation, is_moved};
-use crate::sample::Frame;
+use crate::sample::{Frame, ImuSample};
 use crate::standstill::Standing;
+use crate::units::{AngularRate, SpecificForce};
 
 /// Holds the results of static initialisation, and the filter that starts from them.
 #[derive(Debug, Clone)]
@@ -33,7 +34,7 @@ impl Pipeline {
         let judged = if moves {
             self.state.static_init.refuse_wheels().map(Err)
         } else if frame.sample.validity.is_good() {
-            self.state.static_init.add(&frame.sample, standing.is_by_wheels())
+            self.state.static_init.add(&frame.sample, standing.is_likely(), self.state.standstill.is_calm())
         } else {
             // The reading says nothing about the bias; the gap it leaves has restarted the initialisation.
             None
@@ -41,6 +42,34 @@ impl Pipeline {
         let refused = judged.and_then(|rest| rest.and_then(|rest| self.accept(&rest)).err());
         count(&mut self.state.counters.moving, u32::from(refused.is_some()));
         refused
+    }
+
+    /// Goes on with static initialisation until the bias that it has found is confirmed; `rates` are those less that bias.
+    #[inline(never)]
+    pub(super) fn claim_again(
+        &mut self,
+        sample: &ImuSample,
+        rates: [AngularRate; 3],
+        standing: Standing,
+        moves: bool,
+    ) {
+        let State { initialised, static_init, standstill, .. } = &mut self.state;
+        let Some(zero_rate) = initialised.as_mut().and_then(|known| known.zero_rate.as_mut()) else { return };
+        if zero_rate.is_confirmed() {
+            return;
+        }
+        if !sample.validity.is_good() || moves {
+            return static_init.restart();
+        }
+        // Whoever boards a vehicle rocks it, and does not turn it.
+        let [.., yaw] = rates;
+        let specific_force = [SpecificForce(0), SpecificForce(0), SpecificForce::STANDARD_GRAVITY];
+        let angular_rate = [AngularRate::ZERO, AngularRate::ZERO, yaw];
+        let sample = ImuSample { angular_rate, specific_force, ..*sample };
+        if let Some(Ok(rest)) = static_init.add(&sample, standing.is_likely(), standstill.is_calm()) {
+            let [.., mean] = rest.angular_rate;
+            zero_rate.rest(mean.0 as f32 / AngularRate::PER_RAD_PER_SEC, rest.drift);
+        }
     }
 
     #[inline(never)]
@@ -52,12 +81,12 @@ impl Pipeline {
             self.mount_moved();
         }
         self.state.sensor_bias.refer();
-        self.state.initialised = Some(Initialised {
-            levelling,
-            zero: ZeroPoint::at_rest(levelling.rate(rest.angular_rate), earth_rate),
-            zero_rate: zero_rate.map(ZeroRate::new),
-            is_coarse: false,
-        });
+        let rates = levelling.rate(rest.angular_rate);
+        let [.., reading] = rates.map(|rate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC);
+        let sigma = self.state.sensor_bias.sigma();
+        let zero_rate = zero_rate.map(|config| ZeroRate::claimed(config, reading, sigma, rest.drift));
+        let zero = ZeroPoint::at_rest(rates, earth_rate);
+        self.state.initialised = Some(Initialised { levelling, zero, zero_rate, is_coarse: false });
         self.state.course.restart();
         Ok(())
     }

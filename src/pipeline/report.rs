@@ -6,6 +6,7 @@ use crate::compensate::Compensated;
 use crate::estimate::{VehicleSample, YawEstimate};
 use crate::health::{Faults, Quality, Status, judge};
 use crate::sample::{Frame, PERIOD_US, Validity, WheelSample};
+use crate::sqrt::sqrt;
 use crate::standstill::Standing;
 use crate::units::{AngularRate, Yaw};
 
@@ -33,6 +34,9 @@ impl Pipeline {
         let mut delayed = self.estimate(frame, rates.delayed, early, board, covered);
         for estimate in [&mut live, &mut delayed] {
             estimate.faults = estimate.faults.with(faults);
+            if estimate.quality == Quality::Good && !self.is_bias_confirmed() {
+                estimate.quality = Quality::Degraded;
+            }
         }
         let [live_turn, delayed_turn] =
             [&live, &delayed].map(|estimate| board.clock_ratio.turned(estimate.rate));
@@ -40,7 +44,7 @@ impl Pipeline {
         let missed = self.state.delayed_yaw.add(&mut delayed, delayed_turn);
         self.state.uncertainty.miss(missed);
         if delayed.sigma.is_some() {
-            let turning = self.turning(frame, rates, delayed.status);
+            let turning = self.turning(frame, rates, delayed.status, board.shift);
             self.state.uncertainty.add(&turning);
         }
         let raw = frame.sample.angular_rate;
@@ -104,14 +108,22 @@ impl Pipeline {
         speeds.iter().all(Option::is_none) || speeds.iter().zip(self.state.wheels_seen).any(lost)
     }
 
-    /// Returns the sigma of the bias, rad/s: `early` before static initialisation.
-    fn bias_sigma(&self, early: Option<f32>) -> f32 {
-        early.unwrap_or_else(|| self.zero_rate().map_or(0.0, ZeroRate::sigma))
+    /// Returns false while the bias rests on one standstill alone, and what the vehicle stood on may have turned.
+    pub(super) fn is_bias_confirmed(&self) -> bool {
+        self.zero_rate().is_none_or(ZeroRate::is_confirmed)
+    }
+
+    /// Returns the sigma of what adds linearly, rad/s: of the bias (`early` before static initialisation), `shift` since a
+    /// jump, and revisions that are carried.
+    fn bias_sigma(&self, early: Option<f32>, shift: f32) -> f32 {
+        let sigma = early.unwrap_or_else(|| self.zero_rate().map_or(0.0, ZeroRate::sigma));
+        let carried = self.state.compensator.carried_in_a_second();
+        sqrt(sigma * sigma + shift * shift + carried * carried)
     }
 
     /// Returns what a delayed rate contributes to the expected error; before there is one, the reading itself.
-    fn turning(&self, frame: &Frame, rates: &Rates, status: Status) -> Turning {
-        let (rate, bias) = (rates.delayed.as_ref(), self.bias_sigma(rates.early_sigma));
+    fn turning(&self, frame: &Frame, rates: &Rates, status: Status, shift: f32) -> Turning {
+        let (rate, bias) = (rates.delayed.as_ref(), self.bias_sigma(rates.early_sigma, shift));
         let origin = origin(status, rate);
         let Some(Compensated { rate, roll_and_pitch: [roll, pitch], estimate, withheld, .. }) = rate else {
             let (rates, none) = (frame.sample.angular_rate, AngularRate::ZERO);
@@ -148,7 +160,7 @@ impl Pipeline {
             if self.is_bias_coarse() && quality == Quality::Good { Quality::Degraded } else { quality };
         let [.., raw] = frame.sample.angular_rate;
         let tick = rate.map_or(frame.tick, |rate| rate.tick);
-        let bias = self.bias_sigma(early_sigma);
+        let bias = self.bias_sigma(early_sigma, board.shift);
         let has_sigma = matches!(status, Status::Ready | Status::Degraded);
         YawEstimate {
             tick,

@@ -93,6 +93,11 @@ impl SensorBias {
         self.newest.is_some()
     }
 
+    /// Returns the sigma of that bias, rad/s.
+    pub(super) fn sigma(&self) -> Option<f32> {
+        self.newest.map(|newest| newest.sigma)
+    }
+
     /// Compares a second's mean specific force with that of earlier drives: a single sample also shows bumps and
     /// braking.
     fn end_second(&mut self) {

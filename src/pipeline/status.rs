@@ -15,7 +15,7 @@ impl Pipeline {
         let known = self.state.initialised.is_some();
         let bias = match (known, self.state.sensor_bias.is_known()) {
             _ if self.zero_rate().is_some_and(ZeroRate::is_doubted) => Knowledge::Refused,
-            (true, _) if self.is_bias_coarse() => Knowledge::Coarse,
+            (true, _) if self.is_bias_coarse() || !self.is_bias_confirmed() => Knowledge::Coarse,
             (true, _) => Knowledge::Fine,
             (false, true) => Knowledge::Coarse,
             (false, false) => Knowledge::Unknown,

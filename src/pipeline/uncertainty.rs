@@ -9,14 +9,17 @@
 //! | network, or noise where it has not corrected; none at standstill | from the error that it predicts for its windows ([`crate::model::Estimate::scale`]) | adds in squares |
 //! | bias | from the bias curve and the zero-rate updates | adds linearly |
 //! | rate that standstill has set to zero | its mean | adds linearly |
+//! | revision that is not carried yet | what a second carries of it | adds linearly |
 //! | gain | a share of the yaw rate | of the net turn |
 //! | mounting | a share of the roll and pitch rates | of their net turns |
+//! | slope or bank in a turn | the share 1 - cos of the yaw rate, by the roll and pitch that the turn itself shows, or the tilt at rest | adds linearly |
 //! | unit that the network was not trained with | a share of its mean correction | of its net correction |
-//! | gap in the accumulated yaw | | the angle that may be missing ([`crate::estimate`]) |
+//! | gap in the accumulated yaw | | the angle that the rates around it have turned, and what it may hide ([`crate::estimate`]) |
 
+use crate::estimate::Missed;
 use crate::sample::RATE_HZ;
 use crate::sqrt::sqrt;
-use crate::units::AngularRate;
+use crate::units::{AngularRate, SpecificForce};
 
 /// The sizes of the errors that are not estimated while driving.
 #[derive(Debug, Clone, Copy)]
@@ -61,6 +64,11 @@ const BLOCK: u32 = 10;
 const BLOCKS: usize = (RATE_HZ / BLOCK) as usize;
 /// A turn counts from this many blocks on, because the mean over a second shows its begin late.
 const QUICK: usize = 2;
+/// Net turn that shows how far its axis is from the sensor's, rad, and the largest share of it that is missed, of 30 deg.
+const TURN: f32 = 0.2;
+const TILTED: f32 = 0.13;
+/// Largest share by the tilt at rest: of 6 deg.
+const ASKEW: f32 = 0.0055;
 /// Samples of a part of the minute, and its parts besides the current one.
 const PART: u32 = 5 * RATE_HZ;
 const PARTS: usize = (60 * RATE_HZ / PART) as usize;
@@ -103,10 +111,12 @@ struct Part {
     /// Sums of the errors that add linearly, rad, and in squares, rad^2.
     linear: f32,
     square: f32,
+    /// The turn that gaps have left out, by the rates around them, rad.
+    missed: f32,
 }
 
 impl Part {
-    const EMPTY: Self = Self { turns: [0.0; TURNS], linear: 0.0, square: 0.0 };
+    const EMPTY: Self = Self { turns: [0.0; TURNS], linear: 0.0, square: 0.0, missed: 0.0 };
 }
 
 /// Tracks the expected error of the corrected rate.
@@ -114,6 +124,8 @@ impl Part {
 pub struct Uncertainty {
     config: UncertaintyConfig,
     errors: GyroErrors,
+    /// Share of the yaw rate that the tilt at rest hides: a mounting that is askew, or a street.
+    askew: f32,
     /// Running mean square of the windows' scales, (rad/s)^2.
     scale_square: Option<f32>,
     /// The last second, the newest block first, and the samples in that block.
@@ -133,6 +145,7 @@ impl Uncertainty {
         Self {
             config,
             errors: config.unknown,
+            askew: 0.0,
             scale_square: None,
             blocks: [[0.0; TURNS]; BLOCKS],
             samples: 0,
@@ -152,12 +165,21 @@ impl Uncertainty {
 
     /// Notes whether this unit is calibrated.
     pub fn calibrated(&mut self, calibrated: bool) {
-        self.errors = if calibrated { self.config.known } else { self.config.unknown };
+        let UncertaintyConfig { known, unknown, .. } = self.config;
+        // What gravity shows at rest is a mounting that nothing has corrected, or a street.
+        let mounting = unknown.mounting.max(sqrt(2.0 * self.askew));
+        self.errors = if calibrated { known } else { GyroErrors { mounting, ..unknown } };
     }
 
     /// Notes that courses have shown the gain with this sigma.
     pub fn gain(&mut self, sigma: f32) {
         self.errors.gain = self.errors.gain.min(sigma);
+    }
+
+    /// Notes the specific force at rest after levelling.
+    pub fn askew(&mut self, rest: [SpecificForce; 3]) {
+        self.askew =
+            share(rest.map(|axis| axis.0 as f32 / SpecificForce::PER_METRE_PER_SEC2), 1.0).min(ASKEW);
     }
 
     /// Adds a usable sample.
@@ -172,10 +194,11 @@ impl Uncertainty {
             self.end_block();
         }
         let (own, bias) = (self.own(turning.origin), turning.bias);
+        let tilted = self.tilted() * rad_per_sec(turning.rates[2]);
         let [.., withheld] = self.rates;
         let [part, ..] = &mut self.parts;
         sum(&mut part.turns);
-        part.linear += sqrt(bias * bias + withheld * withheld) * STEP;
+        part.linear += sqrt(bias * bias + withheld * withheld + tilted * tilted) * STEP;
         // The errors of a second are alike, those of different seconds are not.
         part.square += own * STEP;
         self.in_part += 1;
@@ -185,9 +208,26 @@ impl Uncertainty {
         }
     }
 
-    /// Adds the variance of an angle that the accumulated yaw lacks, rad^2.
-    pub fn miss(&mut self, variance: f32) {
-        self.parts[0].square += variance;
+    /// Adds what the accumulated yaw lacks: the likely angle, rad, and its variance, rad^2.
+    pub fn miss(&mut self, Missed { angle, variance }: Missed) {
+        let [part, ..] = &mut self.parts;
+        part.missed += angle;
+        part.square += variance;
+    }
+
+    /// Returns the share of the yaw rate that is missed because the turn's axis is not the sensor's: on a slope a turn also
+    /// rolls and pitches the vehicle, for as long as it lasts.
+    #[must_use]
+    pub fn tilted(&self) -> f32 {
+        let [[x, y, z, ..], [a, b, c, ..]] = [self.parts[0].turns, self.parts[1].turns];
+        share([x + a, y + b, z + c], TURN).max(self.askew)
+    }
+
+    /// The same by the last second alone, in which a body that leans into the turn looks like a slope.
+    #[must_use]
+    pub fn tilted_now(&self) -> f32 {
+        let [x, y, z, ..] = self.rates;
+        share([x, y, z], TURN / 4.0)
     }
 
     fn end_block(&mut self) {
@@ -224,23 +264,31 @@ impl Uncertainty {
     #[must_use]
     pub fn sigma(&self, origin: Origin, bias: f32) -> AngularRate {
         let [.., withheld] = self.rates;
-        let sigma = sqrt(self.own(origin) + bias * bias + withheld * withheld + self.growing(self.rates));
+        let tilted = self.tilted() * self.rates[2];
+        let linear = bias * bias + withheld * withheld + tilted * tilted;
+        let sigma = sqrt(self.own(origin) + linear + self.growing(self.rates));
         // Beyond the code's range the cast saturates.
         AngularRate(libm::ceilf(sigma * AngularRate::PER_RAD_PER_SEC) as i32)
     }
 
-    /// Returns the sigma of the angle turned in the last minute, rad. `missing` is the variance of what an open gap
-    /// may hide, rad^2.
+    /// Returns the sigma of the angle turned in the last minute, rad; `missing` is what an open gap may hide.
     #[must_use]
-    pub fn minute(&self, missing: f32) -> f32 {
-        let (mut turns, mut linear, mut square) = ([0.0; TURNS], 0.0, missing);
+    pub fn minute(&self, missing: Missed) -> f32 {
+        let (mut turns, mut linear, mut square) = ([0.0; TURNS], 0.0, missing.variance);
+        let mut missed = missing.angle;
         for part in &self.parts {
             turns.iter_mut().zip(part.turns).for_each(|(sum, turn)| *sum += turn);
             linear += part.linear;
             square += part.square;
+            missed += part.missed;
         }
-        sqrt(square + linear * linear + self.growing(turns))
+        sqrt(square + linear * linear + missed * missed + self.growing(turns))
     }
+}
+
+/// The share 1 - cos of a turn about this axis that a gyro about z misses, for turns about z above `least`.
+fn share([x, y, z]: [f32; 3], least: f32) -> f32 {
+    if libm::fabsf(z) < least { 0.0 } else { (0.5 * (x * x + y * y) / (z * z)).min(TILTED) }
 }
 
 fn rad_per_sec(rate: AngularRate) -> f32 {

@@ -94,7 +94,7 @@ impl Calibrator {
         if !sample.validity.is_good() {
             return Some(Err(CalibrationFault::Clipped));
         }
-        let judged = self.still.add(sample, standing.is_by_wheels())?;
+        let judged = self.still.add(sample, standing.is_by_wheels(), false)?;
         Some(judged.map_err(fault))
     }
 }

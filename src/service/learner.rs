@@ -74,7 +74,7 @@ impl Learner {
         if let Some(sample) = sample.filter(|sample| still && sample.validity.is_good()) {
             let rest = self.rest.get_or_insert_with(|| StaticInit::new(*limits));
             // What is kept over starts can wait for a rest that does not rock.
-            if let Some(Ok(rest)) = rest.add(sample, false) {
+            if let Some(Ok(rest)) = rest.add(sample, false, false) {
                 self.learn_rest(&rest, sample.temperature, learned);
             }
         } else {

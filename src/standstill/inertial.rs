@@ -18,7 +18,8 @@ const BATCH_SECONDS: f32 = 0.1;
 /// Time over which the force before the window is averaged, s.
 const BEFORE: f32 = 3.0;
 
-type Axes = [f32; 3];
+/// Values about or along x, y and z.
+pub type Axes = [f32; 3];
 
 /// The motion of the newest window.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,9 +28,12 @@ pub struct Motion {
     pub shake: f32,
     /// Largest change of the speed within the window against a steady change, all axes, m/s.
     pub speed_change: f32,
-    /// Speed lost or gained by the mean force of the 3 s before the window against that in it, m/s; `None` before
-    /// there were any.
-    pub speed_lost: Option<f32>,
+    /// Change of speed by the mean force of the 3 s before the window against that in it, m/s; `None` before there were
+    /// any.
+    pub speed_lost: Option<Axes>,
+    /// Mean force of the window, and of its last half second, m/s^2.
+    pub force: Axes,
+    pub newest: Axes,
 }
 
 /// Collects the samples of the window.
@@ -93,7 +97,7 @@ impl Inertial {
 
     fn motion(&self) -> Motion {
         let (mut variance, mut change) = (0.0, 0.0);
-        let mut lost = self.before.map(|_| 0.0);
+        let mut lost = self.before;
         let (rates, forces) = (mean_of(&self.gyro), mean_of(&self.force));
         for axis in 0..3 {
             let (rate, force) = (rates[axis], forces[axis]);
@@ -106,18 +110,19 @@ impl Inertial {
             }
             change += (largest - least) * (largest - least);
             if let (Some(lost), Some(before)) = (&mut lost, self.before) {
-                let off = BEFORE * (before[axis] - force);
-                *lost += off * off;
+                lost[axis] = BEFORE * (before[axis] - force);
             }
         }
-        Motion { shake: sqrt(variance), speed_change: sqrt(change), speed_lost: lost.map(sqrt) }
+        let newest = mean_of(self.force.rchunks(WINDOW / 4).next().unwrap_or(&[]));
+        let (shake, speed_change) = (sqrt(variance), sqrt(change));
+        Motion { shake, speed_change, speed_lost: lost, force: forces, newest }
     }
 }
 
-fn mean_of(window: &[Axes; WINDOW]) -> Axes {
+fn mean_of(window: &[Axes]) -> Axes {
     let mut sums = [0.0; 3];
     for values in window {
         sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
     }
-    sums.map(|sum| sum / WINDOW as f32)
+    sums.map(|sum| sum / window.len().max(1) as f32)
 }

@@ -11,7 +11,7 @@ use std::process::ExitCode;
 
 /// Drive vehicles through the situations, and hold what the bus says against the truth.
 ///
-/// The exit status is 1 if a promise is broken in any of them, known or not.
+/// The exit status is 1 if a promise is broken in any of them.
 #[derive(Parser)]
 struct Args {
     /// Situations whose names contain this; all without it.

@@ -7,7 +7,7 @@
 //! | d | the last minute before a slow status, between two good sets | its yaw is off by at most four times the doubt of the status, gaps or not |
 //! | t | a status that says "stands" | the vehicle's speed over ground is below 0.3 m/s, but for half a second in all |
 //! | g | the time in all | good for the share that the situation allows |
-//! | m | the last seconds | good, or a fault or a contradiction says why not |
+//! | m | the last seconds | good, or a fault, a contradiction or the state of the bias says why not |
 //!
 //! The board steps every millisecond and states a sample's age in half milliseconds, so the time of a sample is known
 //! to 1.5 ms, and the yaw of a span to that time by the change of the rate. A [`Reference`] may be worse.
@@ -233,7 +233,8 @@ pub fn judge(received: &Receiver, truth: &Travelled, end: f64, reference: &Refer
     let end = end - LAST;
     let last: Vec<&Set> = sets.iter().filter(|set| set.sampled > end).collect();
     let explained = last.iter().any(|set| set.is_good() || set.faults != 0);
-    outcome.is_mute = !explained && !received.slow.iter().any(|slow| slow.at > end && slow.contradicted);
+    outcome.is_mute = !explained
+        && !received.slow.iter().any(|slow| slow.at > end && (slow.contradicted || slow.doubted_bias));
     outcome
 }
 

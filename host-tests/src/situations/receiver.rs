@@ -38,6 +38,8 @@ pub struct Slow {
     pub stands: bool,
     /// A second source contradicts.
     pub contradicted: bool,
+    /// The bias is not confirmed yet, or contradicted.
+    pub doubted_bias: bool,
     pub gaps: u8,
     /// Doubt of the accumulated yaw, rad.
     pub doubt: Option<f64>,
@@ -92,13 +94,14 @@ impl Receiver {
     }
 
     fn status(&mut self, bits: u64, at: f64) {
-        // It is about the inertial sensor's yaw: nothing tells of gaps in a fibre-optic gyro's.
-        let bits = if self.first == INERTIAL { bits } else { bits & 0xE000 | 0xFFFF << 24 };
+        // The gaps are those of both yaws, the rest but for the second source is about the inertial sensor alone.
+        let bits = if self.first == INERTIAL { bits } else { bits & 0xFF_E000 | 0xFFFF << 24 };
         let doubt = bits >> 24 & 0xFFFF;
         self.slow.push(Slow {
             at,
             stands: bits & 3 == 1,
             contradicted: !matches!(bits >> 13 & 7, 0 | 7),
+            doubted_bias: matches!(bits >> 4 & 7, 1 | 3),
             gaps: (bits >> 16) as u8,
             doubt: (doubt != 0xFFFF).then(|| (doubt as f64 * 0.01).to_radians()),
         });

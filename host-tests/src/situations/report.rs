@@ -1,7 +1,6 @@
 //! The table of the situations.
 
 use super::judge::Outcome;
-use super::known;
 
 pub const HEADING: &str = "situation                                        vehicle  seconds  good  in 1 sigma: straight, \
     turning  worst second    span  minute  what is wrong";
@@ -9,10 +8,9 @@ pub const HEADING: &str = "situation                                        vehi
 /// A line of the table; the worst errors are in sigma.
 pub fn line(situation: &str, vehicle: &str, outcome: &Outcome) -> String {
     let broken: Vec<String> = outcome.broken().into_iter().map(|(_, text)| text).collect();
-    let known = known::owner(situation).filter(|_| !broken.is_empty());
     let [straight, turning] = outcome.inside;
     format!(
-        "{situation:48} {vehicle:7} {:8} {:3.0} % {:19.0} % {:6.0} % {:13.1} {:7.1} {:7.1}  {}{}\n",
+        "{situation:48} {vehicle:7} {:8} {:3.0} % {:19.0} % {:6.0} % {:13.1} {:7.1} {:7.1}  {}\n",
         outcome.seconds,
         100.0 * outcome.good as f64 / outcome.seconds as f64,
         straight.percent(),
@@ -20,7 +18,6 @@ pub fn line(situation: &str, vehicle: &str, outcome: &Outcome) -> String {
         4.0 * outcome.second.ratio,
         4.0 * outcome.span.ratio,
         4.0 * outcome.minute.ratio,
-        known.map_or(String::new(), |owner| format!("(known, {owner}) ")),
         broken.join("; "),
     )
 }

@@ -11,7 +11,8 @@ type Verdict = Result<[AngularRate; 3], StaticError>;
 
 /// CanEncoder exactly the samples of one initialisation; only the last may bring a verdict.
 fn judge(init: &mut StaticInit, sample: impl FnMut(u64) -> ImuSample) -> Verdict {
-    let mut verdicts = (0..u64::from(STATIC_SAMPLES)).map(sample).map(|sample| init.add(&sample, false));
+    let mut verdicts =
+        (0..u64::from(STATIC_SAMPLES)).map(sample).map(|sample| init.add(&sample, false, false));
     let last = verdicts.by_ref().enumerate().find_map(|(k, verdict)| Some((k, verdict?)));
     let (at, verdict) = last.expect("a verdict");
     assert_eq!(at as u32 + 1, STATIC_SAMPLES);
@@ -101,7 +102,7 @@ fn initialisation_starts_again_after_a_verdict_and_on_restart() {
     assert!(judge(&mut init, |tick| turning(tick, rate(0.2))).is_err());
     assert_eq!(judge(&mut init, still), Ok([AngularRate(0), AngularRate(0), rate(0.01)]));
     for tick in 0..u64::from(STATIC_SAMPLES) - 1 {
-        assert_eq!(init.add(&turning(tick, rate(0.2)), false), None);
+        assert_eq!(init.add(&turning(tick, rate(0.2)), false, false), None);
     }
     init.restart();
     assert_eq!(judge(&mut init, still), Ok([AngularRate(0), AngularRate(0), rate(0.01)]));

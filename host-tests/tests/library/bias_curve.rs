@@ -118,8 +118,8 @@ fn a_first_stop_shows_the_bias_at_its_own_temperature() {
     let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
     let mut noise = Noise::new(5);
     let mut last = None;
-    for tick in 0..3_400u64 {
-        let (celsius, stands) = ((tick / 100).min(30) as i16, tick >= 3_000);
+    for tick in 0..3_420u64 {
+        let (celsius, stands) = ((tick / 100).min(30) as i16, (3_000..3_400).contains(&tick));
         let mut sample = turning(tick, rate(bias(30.0)));
         for axis in 0..3 {
             sample.angular_rate[axis].0 += rate(0.001 * noise.normal()).0;
@@ -131,9 +131,8 @@ fn a_first_stop_shows_the_bias_at_its_own_temperature() {
         last = Some(pipeline.correct(sample, Some(&wheels), &BoardState::GOOD).expect("a place on the grid"));
     }
     assert!(pipeline.gyro_bias().is_some(), "it has stood");
-    // Nothing but the bias is uncertain at standstill.
     let sigma = last.expect("samples").vehicle.delayed.sigma.expect("known").rad_per_sec();
-    assert!(sigma < 3e-4, "{sigma}: none of the 30 K is left in it");
+    assert!(sigma < 4e-4, "{sigma}: none of the 30 K is left in it");
 }
 
 #[test]

@@ -21,7 +21,10 @@ fn with_fognet(has_network: bool) -> FogPipeline {
 fn fognet_on(has_network: bool, expected: bool) -> FogPipeline {
     let latitude = Latitude::from_degrees(0.0);
     let config = FogConfig { latitude, fognet: FogNetUse::Simulated, ..FogConfig::DEFAULT };
-    FogPipeline::new(config, has_network, expected)
+    let mut fog = FogPipeline::new(config, has_network, expected);
+    // Another gyro has agreed in a turn.
+    fog.confirm();
+    fog
 }
 
 fn sample(step: u64) -> FogSample {

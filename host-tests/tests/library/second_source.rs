@@ -22,6 +22,9 @@ struct Read {
     wheels: [f64; 2],
 }
 
+/// The Earth's rate at 48 deg north, rad/s.
+const EARTH: f64 = 5.419e-5;
+
 const TRUE: Read = Read { inertial: 1.0, fog: 1.0, wheels: [1.0; 2] };
 
 #[derive(Default)]
@@ -66,8 +69,8 @@ fn turned(read: &Read) -> (YawEstimate, Option<YawEstimate>) {
         }
         coprocessor.imu(sample, now, &mut seen).expect("in time");
         if read.fog != 0.0 {
-            let angle =
-                Angle::from_rad((yaw * read.fog * 0.01 + 1e-7 * noise.normal()) as f32).expect("in range");
+            let angle = Angle::from_rad(((yaw + EARTH) * read.fog * 0.01 + 1e-7 * noise.normal()) as f32)
+                .expect("in range");
             let increment = [None, None, Some(angle)];
             let sample = FogSample { time: now, span: 10_000, lost: 0, increment, temperature: None };
             coprocessor.fog(sample, now, &mut seen).expect("in order");

@@ -83,7 +83,7 @@ fn one_wheel_that_turns_is_motion() {
 fn wheels_frozen_at_zero_prove_nothing_on_the_road() {
     let (mut car, frozen) = (Vehicle::new(), wheels(0.0, Standstill::Still));
     assert_eq!(car.go(1.0, 0.0, 0.0, Some(&frozen)), Standing::WHEELS);
-    let standing = car.go(20.0, 0.02, 0.0, Some(&frozen));
+    let standing = car.go(20.0, 0.008, 0.0, Some(&frozen));
     assert!(standing.is_contradicted && standing.source == StandstillSource::None, "{standing:?}");
     // Whoever loads a van shakes it for a while.
     assert_eq!(car.go(5.0, 0.0, 0.0, Some(&frozen)), Standing::WHEELS);
@@ -110,4 +110,26 @@ fn wheels_show_whether_quiet_can_be_trusted_on_this_vehicle() {
         let standing = car.go(3.0, 0.0, 0.0, Some(&silent));
         assert_eq!(standing.is_likely(), trusted, "quiet in motion for {seconds} s: {standing:?}");
     }
+}
+
+/// A car on a carrier, or frames frozen at zero: smooth, but for the force.
+#[test]
+fn wheels_that_stand_while_the_vehicle_speeds_up_prove_nothing_until_they_turn() {
+    let (mut car, stands) = (Vehicle::new(), wheels(0.0, Standstill::Still));
+    assert_eq!(car.go(8.0, 0.0, 0.0, Some(&stands)), Standing::WHEELS);
+    assert!(car.go(2.0, 0.0, 0.8, Some(&stands)).is_contradicted);
+    assert!(car.go(20.0, 0.0, 0.0, Some(&stands)).is_contradicted, "quiet is not enough");
+    car.go(5.0, 0.02, 0.0, Some(&wheels(5.0, Standstill::Moving)));
+    assert_eq!(car.go(5.0, 0.0, 0.0, Some(&stands)), Standing::WHEELS);
+}
+
+/// It pulls away and goes on smoothly, then brakes and stands: only the second quiet is a stop.
+#[test]
+fn quiet_after_speeding_up_is_no_stop() {
+    let mut car = Vehicle::new();
+    assert!(car.go(8.0, 0.0, 0.0, None).is_likely());
+    car.go(6.0, 0.0, 1.5, None);
+    assert!(!car.go(6.0, 0.0, 0.0, None).is_likely(), "it drives on");
+    car.go(4.0, 0.0, -2.0, None);
+    assert!(car.go(5.0, 0.0, 0.0, None).is_likely(), "it stands");
 }

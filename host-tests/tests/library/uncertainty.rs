@@ -2,6 +2,7 @@
 //! tools (`expected_error`).
 
 use gyronet::bias::STATIC_SAMPLES;
+use gyronet::estimate::Missed;
 use gyronet::pipeline::{BoardState, Pipeline, PipelineConfig};
 use gyronet::pipeline::{GyroErrors, Origin, Turning, Uncertainty, UncertaintyConfig};
 use gyronet::units::AngularRate;
@@ -84,11 +85,11 @@ fn a_turn_is_as_uncertain_as_gain_and_mounting_until_they_are_known() {
     for (known, [gain, mounting]) in [(false, [0.01, 0.02]), (true, [0.001, 0.002])] {
         let mut uncertainty = Uncertainty::new(ERRORS);
         uncertainty.calibrated(known);
-        turn(&mut uncertainty, 2.0, [0.3, -0.4, -0.25, 0.0]);
-        let due = root(&[3e-4, gain * 0.25, mounting * 0.5]);
+        turn(&mut uncertainty, 2.0, [0.3, -0.4, -0.05, 0.0]);
+        let due = root(&[3e-4, gain * 0.05, mounting * 0.5]);
         assert_sigma(uncertainty.sigma(Origin::Gyro, 0.0), due, "turning");
-        let minute = root(&[3e-4 * 2f64.sqrt(), 2e-4, gain * 0.5, mounting * 1.0]);
-        let found = f64::from(uncertainty.minute(0.0));
+        let minute = root(&[3e-4 * 2f64.sqrt(), 2e-4, gain * 0.1, mounting * 1.0]);
+        let found = f64::from(uncertainty.minute(Missed::NOTHING));
         assert!((found / minute - 1.0).abs() < 1e-4, "{found} is not {minute}");
     }
 }
@@ -104,7 +105,7 @@ fn a_lasting_correction_may_be_another_unit_s() {
         (0..200).for_each(|_| uncertainty.add(&turning));
         assert_sigma(uncertainty.sigma(Origin::Gyro, 0.0), root(&[3e-4, share * 2e-3]), "a second");
         let due = root(&[3e-4 * 2f64.sqrt(), share * 4e-3]);
-        let found = f64::from(uncertainty.minute(0.0));
+        let found = f64::from(uncertainty.minute(Missed::NOTHING));
         assert!((found / due - 1.0).abs() < 1e-4, "{found} is not {due}");
     }
 }
@@ -132,26 +133,49 @@ fn a_rate_that_standstill_hides_may_be_an_error_as_a_whole() {
     // Zero has no noise of its own.
     assert_sigma(uncertainty.sigma(Origin::Standstill, 3e-3), 5e-3, "hidden");
     turn(&mut uncertainty, 9.0, [0.0, 0.0, 0.0, 4e-3]);
-    let found = f64::from(uncertainty.minute(0.0));
+    let found = f64::from(uncertainty.minute(Missed::NOTHING));
     // The mean of the first second begins at zero.
     assert!((found / (9.5 * root(&[4e-3, 1e-4])) - 1.0).abs() < 0.02, "{found}");
+}
+
+/// A banked turn pitches the vehicle for as long as it lasts: a gyro about z misses 1 - cos of it.
+#[test]
+fn a_turn_on_a_bank_is_as_uncertain_as_what_its_axis_misses() {
+    let mut uncertainty = Uncertainty::new(ERRORS);
+    turn(&mut uncertainty, 2.0, [0.0, 0.1, 0.5, 0.0]);
+    let due = root(&[3e-4, 0.01 * 0.5, 0.02 * 0.1, 0.02 * 0.5]);
+    let found = uncertainty.sigma(Origin::Gyro, 0.0).rad_per_sec();
+    assert!((found / due - 1.0).abs() < 1e-5, "{found} is not {due}");
+}
+
+/// The angles that many gaps leave out of one turn add up.
+#[test]
+fn gaps_in_one_turn_add_linearly_and_those_in_opposite_turns_cancel() {
+    let mut uncertainty = Uncertainty::new(ERRORS);
+    let gap = |angle: f32| Missed { angle, variance: 0.0 };
+    (0..20).for_each(|_| uncertainty.miss(gap(0.01)));
+    assert!((uncertainty.minute(Missed::NOTHING) - 0.2).abs() < 1e-5);
+    (0..20).for_each(|_| uncertainty.miss(gap(-0.01)));
+    assert!(uncertainty.minute(Missed::NOTHING) < 1e-5);
 }
 
 /// Opposite turns cancel their gain error; the errors of bias add, those of seconds average out.
 #[test]
 fn a_minute_adds_each_error_by_its_rule_and_forgets_older_ones() {
     let mut uncertainty = Uncertainty::new(ERRORS);
-    let minute = |uncertainty: &Uncertainty, missing: f32| f64::from(uncertainty.minute(missing));
+    let minute = |uncertainty: &Uncertainty, variance: f32| {
+        f64::from(uncertainty.minute(Missed { angle: 0.0, variance }))
+    };
     let close =
         |found: f64, due: f64, why: &str| assert!((found / due - 1.0).abs() < 1e-3, "{why}: {found}, {due}");
-    assert_eq!(uncertainty.minute(0.0), 0.0);
+    assert_eq!(uncertainty.minute(Missed::NOTHING), 0.0);
     close(minute(&uncertainty, 0.25), 0.5, "an open gap");
     turn(&mut uncertainty, 10.0, [0.0, 0.0, 0.2, 0.0]);
     let noise = |seconds: f64| [3e-4 * seconds.sqrt(), 1e-4 * seconds];
     close(minute(&uncertainty, 0.0), root(&[root(&noise(10.0)), 0.01 * 2.0]), "a turn");
     turn(&mut uncertainty, 10.0, [0.0, 0.0, -0.2, 0.0]);
     close(minute(&uncertainty, 0.0), root(&noise(20.0)), "there and back");
-    uncertainty.miss(0.01);
+    uncertainty.miss(Missed { angle: 0.0, variance: 0.01 });
     turn(&mut uncertainty, 59.0, [0.0; 4]);
     assert!(minute(&uncertainty, 0.0) > 0.1, "a gap within the minute");
     turn(&mut uncertainty, 6.0, [0.0; 4]);

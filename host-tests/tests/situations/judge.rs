@@ -84,6 +84,7 @@ fn broken(change: impl Fn(&mut Receiver)) -> String {
                 at: sampled,
                 stands: false,
                 contradicted: false,
+                doubted_bias: false,
                 gaps: 0,
                 doubt: None,
             });

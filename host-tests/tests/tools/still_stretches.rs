@@ -23,8 +23,11 @@ fn wheels(row: &Row) -> f64 {
 
 fn accepted(rows: &[Row]) -> bool {
     let mut init = StaticInit::new(StaticConfig::DEFAULT);
-    let results: Vec<bool> =
-        rows.iter().filter_map(|row| init.add(&row.sample, false)).map(|result| result.is_ok()).collect();
+    let results: Vec<bool> = rows
+        .iter()
+        .filter_map(|row| init.add(&row.sample, false, false))
+        .map(|result| result.is_ok())
+        .collect();
     assert_eq!(results.len(), 1);
     results[0]
 }

@@ -50,6 +50,8 @@ pub static SITUATIONS: &[Situation] = &[
     Situation::new("long idle", ALL, |scene| {
         scene.ride.hold(100.0);
         scene.town(1);
+        // Nothing confirms the bias before it drives off.
+        scene.least = 0.2;
     }),
     Situation::new("engine off at each stop", WHEELED, |scene| {
         scene.ride.hold(8.0);
@@ -69,6 +71,8 @@ pub static SITUATIONS: &[Situation] = &[
         scene.ride.now.engine = 2.0;
         scene.ride.hold(20.0);
         scene.town(2);
+        // For a quarter of the time it has not driven off yet.
+        scene.least = 0.6;
     }),
     Situation::new("restart in motion", ALL, |scene| {
         scene.ride.hold(8.0);
@@ -88,6 +92,8 @@ pub static SITUATIONS: &[Situation] = &[
         scene.ride.now.speed = 7.0;
         scene.ride.turn(360.0, 18.0).hold(6.0).stop(4.0, 8.0);
         scene.town(2);
+        // Until it drives off from its first stop.
+        scene.least = 0.6;
     }),
     Situation::new("towed with the front axle lifted", WHEELED, |scene| {
         scene.ride.hold(8.0);
