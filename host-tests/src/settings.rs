@@ -19,7 +19,7 @@ const IDS: [u16; 24] = [
     0x1A6, 0x200, 0x201, 0x202, 0x300, 0x301, 0x6F0, 0x700, 0x708,
 ];
 /// The frame VDC2 of some addresses, and other frames of 29 bits.
-const LONG_IDS: [u32; 6] = [0x0CFD_C5_0B, 0x0CFD_C5_2A, 0x18FE_F31C, 0x18DA_10F1, 0x18DB_33F1, 0x18DA_F110];
+const LONG_IDS: [u32; 6] = [0x0CFD_C50B, 0x0CFD_C52A, 0x18FE_F31C, 0x18DA_10F1, 0x18DB_33F1, 0x18DA_F110];
 
 /// A value between the bounds of a field, its bounds among them.
 fn within(noise: &mut Noise, field: Field) -> f32 {

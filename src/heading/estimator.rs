@@ -270,7 +270,7 @@ impl Estimator {
 
     /// Uses a course, or says why not.
     fn take(&mut self, filter: &mut Filter, arrived: &Arrived, stands: bool) -> Result<(), Refusal> {
-        if core::mem::replace(&mut self.newest, Some(arrived.course)) != Some(arrived.course) {
+        if self.newest.replace(arrived.course) != Some(arrived.course) {
             self.unchanged = 0.0;
         }
         if stands {
@@ -316,7 +316,7 @@ impl Estimator {
         let mut measured = Measured { off, rate, variance };
         let innovation = filter.innovation(&measured);
         let ratio = libm::fabsf(off) / sqrt(innovation);
-        if !(ratio <= REFUSED) {
+        if ratio.is_nan() || ratio > REFUSED {
             self.failing.matches = 0;
             let (since, _) = *self.failing.since.get_or_insert((arrived.tick, off));
             if arrived.tick.wrapping_sub(since) > PATIENCE {
@@ -341,7 +341,7 @@ impl Estimator {
         filter.course(&measured, [is_doubted, is_doubted || !self.learns_gain]);
         let [least, most] = LAGS;
         filter.put::<LAG>(filter.get::<LAG>().max(least).min(most));
-        filter.put::<GAIN>(filter.get::<GAIN>().max(-MAX_GAIN).min(MAX_GAIN));
+        filter.put::<GAIN>(filter.get::<GAIN>().clamp(-MAX_GAIN, MAX_GAIN));
         self.used = Some(arrived.tick);
         Ok(())
     }

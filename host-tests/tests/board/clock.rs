@@ -51,8 +51,9 @@ fn revision_a_runs_without_prefetch() {
         board.power_on();
         board.run(START);
         let events = board.events();
-        let accesses = events.iter().filter(|event| event.number("address") == Some(f64::from(0x4002_3C00)));
-        let last = accesses.filter(|event| event.text("access") == "write").last().expect("a latency is set");
+        let mut accesses =
+            events.iter().filter(|event| event.number("address") == Some(f64::from(0x4002_3C00)));
+        let last = accesses.rfind(|event| event.text("access") == "write").expect("a latency is set");
         let value = last.number("value").expect("a word") as u32;
         assert_eq!((value & 7, value >> 8 & 1), (5, prefetch), "{idcode:x}: {value:x}");
     }

@@ -107,8 +107,8 @@ impl Filter {
         for row in 0..3 {
             let gain = with[row] * per_variance;
             self.state[row] += gain * innovation;
-            for column in 0..3 {
-                self.covariance[row][column] -= gain * with[column];
+            for (cell, with) in self.covariance[row].iter_mut().zip(with) {
+                *cell -= gain * with;
             }
         }
     }
