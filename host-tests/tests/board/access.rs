@@ -76,6 +76,8 @@ fn a_signature_is_checked_while_the_rates_go_out() {
     let mut device = on_bus(&mut board);
     device.authorise(again(&key));
     device.set_configuration(&configuration).expect("the records' sector is erased here");
+    // The next tester is on another line.
+    service::enter(&mut board, 1);
     board.run(Duration::from_millis(500));
     let begin = board.counts().time;
     let _ = board.can_frames();

@@ -62,7 +62,7 @@ fn a_sensor_that_falls_silent_is_a_trouble_and_the_rates_keep_their_place() {
             let ours = sent.iter().filter(|frame| raw(frame) == 0x7E8);
             ours.map(|frame| frame.data().try_into().expect("eight bytes")).collect()
         });
-        assert_eq!(read.map(|bytes| bytes.len()), Some(3 + 4 * 18));
+        assert_eq!(read.map(|bytes| bytes.len()), Some(3 + 4 * 19));
         reads += 1;
     }
     println!("{reads} reads of 75 bytes and {rates} frames of rates in a second");
