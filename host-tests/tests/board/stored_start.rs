@@ -21,6 +21,8 @@ use std::time::Duration;
 
 const SAMPLES: usize = 20;
 const RATE: u16 = 0x1A0;
+/// Time from power-on until the image listens, where its start has mended a sector of the records.
+const MENDED: Duration = START.saturating_add(Duration::from_millis(300));
 
 /// A board that has run for [`SAMPLES`] with this flash.
 struct Started {
@@ -36,8 +38,8 @@ impl Started {
         stored.write_to(&mut board);
         prepare(&mut board);
         board.power_on();
-        common::send(&mut board, &common::drive(SAMPLES), START);
-        board.run(START + SAMPLE * SAMPLES as u32);
+        common::send(&mut board, &common::drive(SAMPLES), MENDED);
+        board.run(MENDED + SAMPLE * SAMPLES as u32);
         let frames = frames(&board.can_frames());
         let info = service::info(&mut board);
         let page = on_line(&mut board).log(0).expect("a response");
@@ -82,25 +84,17 @@ fn a_stored_configuration_takes_effect() {
 #[test]
 fn a_configuration_that_cannot_be_used_is_reported() {
     let good = || Stored::default().record(&Configuration::DEFAULT);
-    for (test, stored, flash, event) in [
-        (
-            "corrupt content",
-            good().damaged(STORE.start + 20, 4),
-            FlashState::Damaged,
-            EventKind::RecordsDamaged,
-        ),
-        (
-            "corrupt header",
-            good().damaged(STORE.start + 1, 0x80),
-            FlashState::Damaged,
-            EventKind::RecordsDamaged,
-        ),
+    // A copy stands for the header.
+    for (test, stored, is_used) in [
+        ("corrupt content", good().damaged(STORE.start + 20, 4), false),
+        ("corrupt header", good().damaged(STORE.start + 1, 0x80), true),
     ] {
         let Some(started) = Started::with(test, &stored, |_| ()) else { return };
         assert!(started.flagged(), "{test}");
-        assert_eq!(started.info.flash, flash, "{test}");
-        assert!(started.info.configuration != Origin::Stored, "{test}: {:?}", started.info.configuration);
-        assert!(started.events.contains(&event), "{test}: {:?}", started.events);
+        assert_eq!(started.info.flash, FlashState::Damaged, "{test}");
+        let configuration = started.info.configuration;
+        assert_eq!(configuration == Origin::Stored, is_used, "{test}: {configuration:?}");
+        assert!(started.events.contains(&EventKind::RecordsDamaged), "{test}: {:?}", started.events);
     }
 }
 

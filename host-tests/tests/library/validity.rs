@@ -220,18 +220,24 @@ fn a_mean_has_the_worst_quality_and_the_largest_sigma_in_any_order() {
     assert_eq!(unknown.2.sigma, SIGMA_UNKNOWN);
 }
 
-/// Neither the sum nor its rounding residual outlives a mean that may not be used.
+/// Neither the sum nor its rounding residual outlives a mean that may not be used, nor that of a limited correction: a
+/// code is 0.43 LSB of the rate, two of them round to one.
 #[test]
 fn a_mean_that_may_not_be_used_leaves_nothing_to_the_next() {
-    for status in [Status::Init, Status::Clipped] {
-        let mut encoder = encoder(3);
-        let mut send =
-            |sample: &YawEstimate| encoder.encode(sample).map(|[rate, ..]| RateMessage::parse(&rate));
-        let odd = YawEstimate { rate: AngularRate(1_000_001), ..good(0.0) };
-        for sample in [odd, odd, with(status, None)] {
-            send(&sample);
-        }
-        let next = [good(0.0); 3].iter().filter_map(&mut send).last().expect("a set").expect("a rate");
-        assert_eq!(next.rate, 0, "{status:?}");
+    for (status, due) in [(Status::Ready, 1), (Status::Init, 0), (Status::Clipped, 0)] {
+        let mut encoder = encoder(1);
+        let mut send = |sample| encoder.encode(&sample).map(|[rate, ..]| RateMessage::parse(&rate));
+        let code = AngularRate(1);
+        send(YawEstimate { rate: code, ..with(status, None) });
+        let next = send(YawEstimate { rate: code, ..good(0.0) }).expect("a set").expect("a rate");
+        assert_eq!(next.rate, due, "{status:?}");
+    }
+    // LSB of 0.2 mdeg/s, and what is left of them.
+    for (first, due) in [(100.4, 1), (40_000.4, 0)] {
+        let mut encoder = encoder(1);
+        let correction = |lsb: f64| YawEstimate { correction: rate((lsb * 2e-4).to_radians()), ..good(0.0) };
+        encoder.encode(&correction(first));
+        let [.., detail] = encoder.encode(&correction(0.2)).expect("a set");
+        assert_eq!(DetailMessage::parse(&detail).expect("details").correction, due, "{first}");
     }
 }

@@ -283,9 +283,12 @@ fn troubles_erase_nothing_in_motion() {
             break;
         }
     }
+    // What was learnt waits, too, although the vehicle stands.
+    observe(&mut bench.board, 4, (0.01, 20), LEVEL, Standstill::Still);
+    let before = flash.borrow().operations();
+    bench.expect(&READ, &[0x62, 0xF1, 0x86, 1]);
     bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
     moves(&mut bench, Faults::GAP);
-    let before = flash.borrow().operations();
     bench.expect(&READ, &[0x62, 0xF1, 0x86, 3]);
     assert_eq!(flash.borrow().operations(), before);
     observe(&mut bench.board, 1, (0.01, 20), LEVEL, Standstill::Still);

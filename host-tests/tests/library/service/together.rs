@@ -3,6 +3,8 @@
 use super::IDENTITY;
 use embedded_can::{Id, StandardId};
 use gyronet::can::config::Config;
+use gyronet::can::latitude::{LatitudeConfigError, LatitudeSettings};
+use gyronet::can::signal::ByteOrder;
 use gyronet::can::wheel::{WheelConfigError, WheelSettings};
 use gyronet::compensate::{Mode, Stride};
 use gyronet::model::blob::Shape;
@@ -148,6 +150,26 @@ fn neither_order_makes_the_board_send_what_it_receives() {
     }
     configuration.diagnosis.request = 0xB0;
     assert_eq!(board.set_configuration(&configuration), own(0xB0), "of the next wheels");
+    for id in [0x7E0, 0x7DF, 0x7E8] {
+        let order = ByteOrder::Intel;
+        let (degrees_per_bit, offset_deg, invalid) = (1e-7, -210.0, None);
+        let (extended, start, bits, signed) = (false, 0, 32, false);
+        let frame = LatitudeSettings {
+            id,
+            extended,
+            start,
+            bits,
+            order,
+            signed,
+            degrees_per_bit,
+            offset_deg,
+            invalid,
+        };
+        let mut configuration = Configuration::DEFAULT;
+        configuration.fog_gyro.latitude_frame = Some(frame);
+        let error = FieldError::Latitude(LatitudeConfigError::Own(id));
+        assert_eq!(board.set_configuration(&configuration), Err(Refusal::Store(StoreError::Field(error))));
+    }
 }
 
 /// Records that do not fit each other, as a tool may have put them into the flash.
