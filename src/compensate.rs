@@ -195,6 +195,9 @@ pub struct Compensator {
     /// The steady gain of the newest estimate's model; zero without an estimate.
     steady_gain: SteadyGain,
     mounting_check: MountingCheck,
+    /// The newest model's mounting; and whether levelling has replaced it.
+    mounting: SteadyGain,
+    is_levelled: bool,
     /// The slow mean of the corrections.
     slow_mean: SlowMean,
     /// Revisions not yet in the live rate, and in the delayed rate.
@@ -216,6 +219,8 @@ impl Compensator {
             kept: [None; KEPT],
             steady_gain: SteadyGain::NONE,
             mounting_check: MountingCheck::START,
+            mounting: SteadyGain::NONE,
+            is_levelled: false,
             slow_mean: SlowMean::NONE,
             live_revisions: 0,
             delayed_revisions: 0,
@@ -240,6 +245,7 @@ impl Compensator {
             return Err(Implausible { mean: AngularRate(average), largest });
         }
         self.steady_gain = estimate.steady_gain;
+        self.mounting = estimate.steady_gain.mounting();
         let used = mode.used();
         let oldest = KEPT - (mode.delay() as usize - 1) - WINDOW;
         let window = self.kept.iter().skip(oldest).zip(corrections).take(used.end).skip(used.start);
@@ -268,9 +274,8 @@ impl Compensator {
         Ok(())
     }
 
-    /// Adds a sample: its gyro rates less static bias. `drives` is true when the vehicle is known to move. Returns
-    /// whether the model's mounting has just been found to be another unit's.
-    pub fn add(&mut self, tick: u32, rates: [AngularRate; 3], validity: Validity, drives: bool) -> bool {
+    /// Adds a sample: its gyro rates less static bias.
+    pub fn add(&mut self, tick: u32, rates: [AngularRate; 3], validity: Validity) {
         self.kept.rotate_left(1);
         let steady = match self.steady_gain {
             SteadyGain::NONE => 0,
@@ -282,6 +287,11 @@ impl Compensator {
         };
         self.kept[KEPT - 1] =
             Some(Entry { tick, rates, validity, held: false, sum: 0, count: 0, estimate: steady });
+    }
+
+    /// Compares a sample's rates, less static bias and not levelled, with the model's mounting. `drives` is true when
+    /// the vehicle is known to move. Returns whether the mounting has just been found to be another unit's.
+    pub fn check_mounting(&mut self, rates: [AngularRate; 3], validity: Validity, drives: bool) -> bool {
         let mounting = self.steady_gain.mounting();
         if !drives || !validity.is_good() || mounting == SteadyGain::NONE {
             self.mounting_check.interrupt();
@@ -297,9 +307,31 @@ impl Compensator {
         newest.filter(|entry| entry.validity.is_good()).for_each(|entry| entry.validity = Validity::Stuck);
     }
 
-    /// Returns the mounting's part of the newest estimate's model if it is another unit's.
+    /// Returns the mounting's part of the newest estimate's model if it is another unit's, or levelled already.
     fn mismatched_mounting(&self) -> SteadyGain {
-        if self.mounting_check.is_mismatched() { self.steady_gain.mounting() } else { SteadyGain::NONE }
+        let is_out = self.is_levelled || self.mounting_check.is_own() == Some(false);
+        if is_out { self.steady_gain.mounting() } else { SteadyGain::NONE }
+    }
+
+    /// Notes whether levelling has taken the tilt off that a model's mounting corrects.
+    pub fn level(&mut self, is_levelled: bool) {
+        self.is_levelled = is_levelled;
+    }
+
+    /// Returns whether driving has shown that the model's mounting is this unit's.
+    #[must_use]
+    pub fn is_own_mounting(&self) -> bool {
+        self.mounting_check.is_own() == Some(true)
+    }
+
+    /// Returns how far up deviates from z, along x and y, on the unit that the model was trained with, or by nothing if
+    /// driving has shown that this is another one; `None` without a model that has a mounting.
+    #[must_use]
+    pub fn learnt_up(&self) -> Option<[f32; 2]> {
+        let SteadyGain([x, y, _]) = self.mounting;
+        let is_other = self.mounting_check.is_own() == Some(false);
+        let own = [x, y].map(|gain| if is_other { 0.0 } else { -gain as f32 / (1u32 << 24) as f32 });
+        (self.mounting != SteadyGain::NONE).then_some(own)
     }
 
     /// Returns the rate of the newest sample, less the estimate and what remains.

@@ -5,6 +5,6 @@ pub use crate::bias::{EarthRate, Latitude, StaticConfig, ZeroRateConfig};
 pub use crate::compensate::{CompensateConfig, Lag, Mode, Stride};
 pub use crate::coprocessor::StorageFaults;
 pub use crate::fog::{FogConfig, FogErrors, FogNetUse, Tilt};
-pub use crate::mounting::{Levelling, Rotation};
+pub use crate::mounting::{Rotation, Vertical};
 pub use crate::pipeline::{PipelineConfig, UncertaintyConfig};
 pub use crate::standstill::StandstillConfig;

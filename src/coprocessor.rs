@@ -46,7 +46,8 @@ use crate::model::Estimate;
 use crate::model::fognet::FogEstimate;
 use crate::model::seconds::NewSecond;
 use crate::monitor::{SensorMonitor, TIMEOUT_US};
-use crate::pipeline::{BoardState, Handover, Pipeline};
+use crate::mounting::Vertical;
+use crate::pipeline::{self, BoardState, Handover, Pipeline};
 use crate::sample::{FogSample, Frame, ImuSample, NO_STAMP, WheelSample};
 use crate::standstill::Standing;
 use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
@@ -69,6 +70,8 @@ pub struct Observation {
     pub complete: Option<Complete>,
     /// The reason why static initialisation was refused with this sample.
     pub refused: Option<StaticError>,
+    /// What standstills and turns have shown of the vertical, in the sensor's axes, where this sample has changed it.
+    pub vertical: Option<Vertical>,
 }
 
 /// The state of the bus, as the caller reports it.
@@ -232,7 +235,7 @@ impl Coprocessor {
         if self.second.confirms_fog() {
             self.fog.confirm();
         }
-        let (standing, complete, refused) = (output.standing, output.complete, output.refused);
+        let pipeline::Output { standing, complete, refused, vertical, .. } = output;
         let wheels = wheels.unwrap_or_default();
         let observation = Observation {
             sample: Some(sample),
@@ -241,6 +244,7 @@ impl Coprocessor {
             standing,
             complete,
             refused,
+            vertical,
         };
         sink.observed(&observation);
         observation
@@ -337,8 +341,15 @@ impl Coprocessor {
             self.send(&vehicle, self.monitor.time_at(now), sink);
             let wheels = self.poll_wheels().unwrap_or_default();
             let standing = Standing::UNKNOWN;
-            let observation =
-                Observation { sample: None, vehicle, wheels, standing, complete: None, refused: None };
+            let observation = Observation {
+                sample: None,
+                vehicle,
+                wheels,
+                standing,
+                complete: None,
+                refused: None,
+                vertical: None,
+            };
             sink.observed(&observation);
             observation
         });

@@ -4,14 +4,13 @@
 //!
 //! Both are 3 x 3 matrices of Q30 numbers, applied in integers, so that every machine computes the same bits.
 //!
-//! Levelling finds the vertical from the accelerometer. It cannot tell a tilted board from a tilted street: on the
-//! recordings, taking the parking slopes of 2 to 8 degrees for mounting more than doubles the 1 s error of a drive
-//! (0.00021 to 0.00049 rad on trial 04 of the training drives). Hence [`Levelling::Beyond`]: a tilt steeper than any
-//! street counts as mounting, a smaller one as the street.
+//! Levelling turns up what standstills and turns have shown to be the vertical ([`VerticalEstimator`]).
 
 mod forward;
+mod vertical;
 
 pub use forward::{Forward, ForwardEstimator};
+pub use vertical::{Judgement, Vertical, VerticalEstimator};
 
 use crate::sample::ImuSample;
 use crate::sqrt::sqrt;
@@ -25,37 +24,6 @@ const ONE: f32 = (1u32 << Q) as f32;
 const GRAVITY_TOLERANCE: f32 = 1.0;
 /// Cosine of 150 degrees: beyond that tilt the direction in which to turn the board upright is too uncertain.
 const UPSIDE_DOWN: f32 = -0.866;
-
-/// The condition under which the accelerometer's tilt counts as the board's.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Levelling {
-    /// The tilt never counts: the mounting is known.
-    Off,
-    /// The tilt always counts: the vehicle starts on level ground.
-    Always,
-    /// The tilt counts when it is larger than this, degrees.
-    Beyond(f32),
-}
-
-impl Levelling {
-    /// The tilt counts beyond 15 degrees (27 %), since no street is that steep.
-    pub const DEFAULT: Self = Self::Beyond(15.0);
-
-    /// Returns the rotation that levels a sensor with this mean specific force at rest.
-    ///
-    /// # Errors
-    /// [`LevelError`], unless levelling is off.
-    pub fn rotation(self, rest: [SpecificForce; 3]) -> Result<Rotation, LevelError> {
-        let least = match self {
-            Self::Off => return Ok(Rotation::IDENTITY),
-            Self::Always => 0.0,
-            Self::Beyond(degrees) => degrees,
-        };
-        let (rotation, tilt) = Rotation::levelling(rest)?;
-        Ok(if tilt > least { rotation } else { Rotation::IDENTITY })
-    }
-}
 
 /// Cosine of the angle beyond which a sensor counts as moved: 25 degrees. Streets are no steeper than 15 degrees, and
 /// the mean of several is less.
@@ -117,24 +85,40 @@ impl Rotation {
     /// [`LevelError`].
     #[doc(hidden)]
     pub fn levelling(rest: [SpecificForce; 3]) -> Result<(Self, f32), LevelError> {
-        let [x, y, z] = metre_per_sec2(&rest);
-        let norm = sqrt(x * x + y * y + z * z);
+        let force = metre_per_sec2(&rest);
+        let norm = sqrt(dot(&force, &force));
         if libm::fabsf(norm - STANDARD_GRAVITY) > GRAVITY_TOLERANCE {
             return Err(LevelError::NotGravity(norm));
         }
-        let [x, y, cos] = [x / norm, y / norm, z / norm];
+        let up = force.map(|axis| axis / norm);
+        let [x, y, cos] = up;
         let tilt = libm::atan2f(sqrt(x * x + y * y), cos).to_degrees();
         if cos < UPSIDE_DOWN {
             return Err(LevelError::UpsideDown(tilt));
         }
+        Ok((Self::upright(&up), tilt))
+    }
+
+    /// Returns the smallest rotation that turns a direction upright: a unit vector that does not point down.
+    pub(crate) fn upright(&[x, y, cos]: &[f32; 3]) -> Self {
         // Rodrigues' formula for the axis (y, -x, 0): I + [v] + [v]^2 / (1 + cos).
-        let share = 1.0 / (1.0 + cos);
-        let rotation = Self::from_elements([
+        let share = 1.0 / (1.0 + cos.max(UPSIDE_DOWN));
+        Self::from_elements([
             [1.0 - x * x * share, -x * y * share, -x],
             [-x * y * share, 1.0 - y * y * share, -y],
             [x, y, cos],
-        ]);
-        Ok((rotation, tilt))
+        ])
+    }
+
+    /// Returns the rotation back.
+    #[must_use]
+    pub(crate) fn inverse(&self) -> Self {
+        Self(core::array::from_fn(|row| core::array::from_fn(|column| self.0[column][row])))
+    }
+
+    /// Returns a vector of any length in the vehicle's axes.
+    pub(crate) fn vector(&self, vector: &[f32; 3]) -> [f32; 3] {
+        self.0.map(|row| dot(&row.map(|element| element as f32 / ONE), vector))
     }
 
     /// Returns the rotation that turns first by `self`, then by `next`.

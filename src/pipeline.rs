@@ -12,6 +12,7 @@
 mod config;
 mod course;
 mod initialised;
+mod level;
 mod report;
 mod sensor_bias;
 mod status;
@@ -36,6 +37,7 @@ use crate::sample::{Frame, ImuSample, PERIOD_US, Standstill, Validity, WHEELS, W
 use crate::standstill::{Judge, Standing};
 
 use crate::model::window::{self, Features, WINDOW};
+use crate::mounting::Vertical;
 use crate::units::{AngularRate, Yaw};
 use course::Start;
 use initialised::Initialised;
@@ -74,6 +76,8 @@ pub struct Output {
     pub refused: Option<StaticError>,
     /// The reason why the estimate due with this sample was rejected.
     pub implausible: Option<Implausible>,
+    /// What standstills and turns have shown of the vertical, in the sensor's axes, where this sample has changed it.
+    pub vertical: Option<Vertical>,
 }
 
 /// Holds the corrections that [`crate::estimate::YawEstimate::yaw`] does not contain yet.
@@ -250,7 +254,7 @@ impl Pipeline {
         let implausible = self.use_estimate(frame.tick);
         let standing = self.state.standstill.observe(&frame.sample, wheels);
         let moves = wheels.is_some_and(|wheels| wheels.standstill == Standstill::Moving);
-        let (rates, refused) = match self.level(&mut frame.sample) {
+        let (rates, refused) = match self.level(&mut frame.sample, standing, moves) {
             None => {
                 let refused = self.initialise(&frame, standing, moves);
                 let early = self.state.sensor_bias.early(&sample);
@@ -272,7 +276,8 @@ impl Pipeline {
         let window = self.state.windows.due(frame.tick, stride);
         self.state.gap_within = self.state.gap_within.saturating_sub(1);
         let standing = self.state.standing;
-        Output { vehicle, complete: rates.complete, window, standing, refused, implausible }
+        let vertical = self.new_vertical();
+        Output { vehicle, complete: rates.complete, window, standing, refused, implausible, vertical }
     }
 
     /// Notes that the sensor was moved since earlier drives; it is reported with every message set from now on.
@@ -352,9 +357,17 @@ impl Pipeline {
     }
 
     /// Levels a sample and returns the gyro's reading at rest; does nothing and returns `None` before initialisation.
-    fn level(&mut self, sample: &mut ImuSample) -> Option<ZeroPoint> {
-        let known = self.state.initialised.as_ref()?;
-        *sample = known.levelling.sample(sample);
+    fn level(&mut self, sample: &mut ImuSample, standing: Standing, moves: bool) -> Option<ZeroPoint> {
+        let stands = self.judged(standing).is_likely();
+        let State { initialised, compensator, counters, .. } = &mut self.state;
+        let known = initialised.as_mut()?;
+        if known.level.add(sample, stands, compensator) {
+            known.zero = known.level.zero(self.config.earth_rate);
+        }
+        // A model's mounting is that of a sensor as it is mounted.
+        let is_foreign = compensator.check_mounting(known.level.rates(sample), sample.validity, moves);
+        count(&mut counters.foreign_mountings, u32::from(is_foreign));
+        *sample = known.level.rotation().sample(sample);
         Some(known.zero)
     }
 
@@ -392,6 +405,7 @@ impl Pipeline {
         if let Some(known) = &mut self.state.initialised {
             self.state.standstill.restart();
             known.zero_rate.as_mut().map(ZeroRate::restart);
+            known.level.restart();
         }
     }
 
@@ -436,8 +450,7 @@ impl Pipeline {
         let features = window::features(sample.specific_force, rates);
         let [.., rate] = rates;
         let good = sample.validity.is_good();
-        let mounting_mismatch = self.state.compensator.add(frame.tick, rates, sample.validity, drives);
-        count(&mut self.state.counters.foreign_mountings, u32::from(mounting_mismatch));
+        self.state.compensator.add(frame.tick, rates, sample.validity);
         self.state.inertial = good.then_some(features);
         if good {
             self.state.windows.add(features);

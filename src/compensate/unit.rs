@@ -43,23 +43,18 @@ pub(super) struct MountingCheck {
     /// Number of changes, and the sums of their products: correction squared, with the yaw rate, yaw rate squared.
     count: f32,
     products: [f32; 3],
-    is_mismatched: bool,
+    /// `None` before driving has shown it.
+    is_own: Option<bool>,
 }
 
 impl MountingCheck {
     /// The mounting counts as the unit's own until it is shown not to be.
-    pub(super) const START: Self = Self {
-        sums: [0; 2],
-        samples: 0,
-        before: [None; 2],
-        count: 0.0,
-        products: [0.0; 3],
-        is_mismatched: false,
-    };
+    pub(super) const START: Self =
+        Self { sums: [0; 2], samples: 0, before: [None; 2], count: 0.0, products: [0.0; 3], is_own: None };
 
-    /// Returns whether the mounting is another unit's.
-    pub(super) fn is_mismatched(&self) -> bool {
-        self.is_mismatched
+    /// Returns whether the mounting is the unit's own; `None` before driving has shown it.
+    pub(super) fn is_own(&self) -> Option<bool> {
+        self.is_own
     }
 
     /// Adds a sample's yaw rate and the correction of the mounting. Returns whether the mounting has just been found
@@ -100,13 +95,13 @@ impl MountingCheck {
         let factor = with_yaw / squared;
         let unexplained = (yaw_squared - factor * with_yaw).max(0.0);
         let sigma = sqrt(unexplained / squared / (INDEPENDENT * self.count));
-        let was_mismatched = self.is_mismatched;
+        let before = self.is_own;
         if factor + SIGMAS * sigma < HALF {
-            self.is_mismatched = true;
+            self.is_own = Some(false);
         } else if factor - SIGMAS * sigma > HALF {
-            self.is_mismatched = false;
+            self.is_own = Some(true);
         }
-        self.is_mismatched && !was_mismatched
+        self.is_own == Some(false) && before != Some(false)
     }
 }
 

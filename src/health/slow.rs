@@ -30,9 +30,9 @@ pub enum Knowledge {
     /// Not at all: the configured or built-in value is in use.
     #[default]
     Unknown = 0,
-    /// From earlier drives, and not confirmed yet; a mounting within 10 deg.
+    /// From earlier drives, and not confirmed yet; a mounting of which up or forward is known, within 10 deg.
     Coarse = 1,
-    /// Measured; a mounting within 3 deg.
+    /// Measured; a mounting of which up and forward are known within 3 deg.
     Fine = 2,
     /// Measurements contradict what was known.
     Refused = 3,

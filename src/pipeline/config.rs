@@ -4,7 +4,7 @@ use crate::bias::{BiasCurve, EarthRate, StaticConfig, ZeroRateConfig};
 use crate::compensate::CompensateConfig;
 use crate::heading::CourseConfig;
 use crate::health::slow::Knowledge;
-use crate::mounting::{GyroMap, Levelling, Rotation};
+use crate::mounting::{GyroMap, Rotation, Vertical};
 use crate::pipeline::UncertaintyConfig;
 use crate::standstill::StandstillConfig;
 use crate::units::SpecificForce;
@@ -22,8 +22,10 @@ pub struct PipelineConfig {
     pub forward: Knowledge,
     /// The correction of the gain and of the remaining mounting error of this unit's gyro.
     pub gyro_map: GyroMap,
-    /// The condition under which the accelerometer corrects the mounting.
-    pub levelling: Levelling,
+    /// What standstills and turns of earlier drives have shown of the vertical, in the sensor's axes.
+    pub vertical: Vertical,
+    /// True if a tilt beyond the mounting is found and taken off.
+    pub levelling: bool,
     /// Limits of static initialisation.
     pub static_init: StaticConfig,
     /// The treatment of the Earth's rotation.
@@ -48,7 +50,8 @@ impl PipelineConfig {
         rest_force: None,
         forward: Knowledge::Unknown,
         gyro_map: GyroMap::IDENTITY,
-        levelling: Levelling::DEFAULT,
+        vertical: Vertical::UNKNOWN,
+        levelling: true,
         static_init: StaticConfig::DEFAULT,
         earth_rate: EarthRate::LeftInBias,
         zero_rate: Some(ZeroRateConfig::DEFAULT),

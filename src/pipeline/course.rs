@@ -4,14 +4,14 @@
 //! other axes their mean since the first course: no vehicle rolls or pitches for long. The tilt is that of earlier drives.
 
 use super::initialised::Initialised;
-use super::sensor_bias::ZeroPoint;
+use super::level::Level;
 use super::{Pipeline, State};
 use crate::bias::ZeroRate;
 use crate::compensate::Remaining;
 use crate::heading::filter::{BIAS, Filter};
 use crate::heading::{CourseCounters, FINE_BIAS, Heading, Refusal, gain_knowledge};
 use crate::health::slow::Knowledge;
-use crate::mounting::Rotation;
+use crate::mounting::{Rotation, Vertical};
 use crate::sample::Frame;
 use crate::standstill::Standing;
 use crate::units::AngularRate;
@@ -89,9 +89,14 @@ impl Pipeline {
         let z = AngularRate(libm::roundf(filter.get::<BIAS>() * AngularRate::PER_RAD_PER_SEC) as i32);
         filter.put::<BIAS>(0.0);
         self.state.sensor_bias.refer();
+        let mounted = self.config.vertical.turned(&self.config.mounting);
+        let (known, levelling) =
+            early.map_or((Vertical::UNKNOWN, Rotation::IDENTITY), |(levelling, _)| (mounted, levelling));
+        let rates = levelling.inverse().rate([x, y, z]);
+        let level = Level::new(rates, None, self.config.levelling.then_some(known));
         self.state.initialised = Some(Initialised {
-            levelling: early.map_or(Rotation::IDENTITY, |(levelling, _)| levelling),
-            zero: ZeroPoint::at_rest([x, y, z], self.config.earth_rate),
+            zero: level.zero(self.config.earth_rate),
+            level,
             zero_rate: Some(ZeroRate::with(zero_rate, filter)),
             is_coarse: true,
         });

@@ -1,11 +1,12 @@
 //! Static initialisation finds the bias and the tilt, or a course the bias of a vehicle that moves; this module holds both
 //! once one has succeeded.
 
+use super::level::Level;
 use super::sensor_bias::ZeroPoint;
 use super::{Pipeline, PipelineConfig, State};
 use crate::bias::{Rest, StaticError, ZeroRate};
 use crate::health::count;
-use crate::mounting::{Rotation, is_moved};
+use crate::mounting::{Rotation, Vertical, is_moved};
 use crate::sample::{Frame, ImuSample};
 use crate::standstill::Standing;
 use crate::units::{AngularRate, SpecificForce};
@@ -14,7 +15,8 @@ use crate::units::{AngularRate, SpecificForce};
 #[derive(Debug, Clone)]
 pub(super) struct Initialised {
     /// The rotation beyond the configured mounting.
-    pub(super) levelling: Rotation,
+    pub(super) level: Level,
+    /// The reading at rest with that rotation.
     pub(super) zero: ZeroPoint,
     pub(super) zero_rate: Option<ZeroRate>,
     /// The bias was found in motion, and is not known well yet.
@@ -74,19 +76,23 @@ impl Pipeline {
 
     #[inline(never)]
     fn accept(&mut self, rest: &Rest) -> Result<(), StaticError> {
-        let PipelineConfig { levelling, earth_rate, zero_rate, .. } = self.config;
-        let levelling = levelling.rotation(rest.specific_force).map_err(StaticError::Level)?;
-        let before = self.config.rest_force.map(|force| self.config.mounting.force(force));
-        if before.is_some_and(|before| is_moved(&before, &rest.specific_force)) {
+        let PipelineConfig { mounting, vertical, levelling, earth_rate, zero_rate, .. } = self.config;
+        if levelling {
+            Rotation::levelling(rest.specific_force).map_err(StaticError::Level)?;
+        }
+        let before = self.config.rest_force.map(|force| mounting.force(force));
+        let is_moved = before.is_some_and(|before| is_moved(&before, &rest.specific_force));
+        if is_moved {
             self.mount_moved();
         }
+        let known = if is_moved { Vertical::UNKNOWN } else { vertical.turned(&mounting) };
+        let level = Level::new(rest.angular_rate, Some(&rest.specific_force), levelling.then_some(known));
         self.state.sensor_bias.refer();
-        let rates = levelling.rate(rest.angular_rate);
-        let [.., reading] = rates.map(|rate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC);
+        let [.., reading] = level.rates_at_rest().map(|rate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC);
         let sigma = self.state.sensor_bias.sigma();
         let zero_rate = zero_rate.map(|config| ZeroRate::claimed(config, reading, sigma, rest.drift));
-        let zero = ZeroPoint::at_rest(rates, earth_rate);
-        self.state.initialised = Some(Initialised { levelling, zero, zero_rate, is_coarse: false });
+        let zero = level.zero(earth_rate);
+        self.state.initialised = Some(Initialised { level, zero, zero_rate, is_coarse: false });
         self.state.course.restart();
         Ok(())
     }

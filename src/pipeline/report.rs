@@ -30,6 +30,8 @@ impl Pipeline {
         if let Some((_, sigma)) = self.gain_by_course() {
             self.state.uncertainty.gain(sigma);
         }
+        let (variance, is_levelled) = self.tilt_variance();
+        self.state.uncertainty.tilt(variance, is_levelled);
         let covered = |rate: &Compensated| rate.covered || accepted;
         let mut delayed = self.estimate(frame, rates.delayed, early, board, covered);
         for estimate in [&mut live, &mut delayed] {

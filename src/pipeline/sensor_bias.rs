@@ -5,6 +5,7 @@
 //! contains the Earth's rate exactly once.
 
 use super::PipelineConfig;
+use super::level;
 use crate::bias::{CurveBias, EarthRate};
 use crate::mounting::{Rotation, is_moved};
 use crate::sample::{ImuSample, RATE_HZ};
@@ -122,7 +123,7 @@ impl SensorBias {
         let reference = *self.reference.get_or_insert(now);
         self.change_sigma = config.bias_curve.change_sigma(reference, now);
         if self.early.is_none() {
-            self.early = early_levelling(config);
+            self.early = config.rest_force.map(|force| (level::early(config), force));
         }
     }
 
@@ -146,14 +147,6 @@ impl SensorBias {
         let sigma = self.newest?.sigma;
         (self.in_place && sample.validity.is_good()).then_some((levelling, sigma))
     }
-}
-
-/// Returns the levelling that static initialisation would find for the specific force at rest of earlier drives, and that
-/// force.
-fn early_levelling(config: &PipelineConfig) -> Option<(Rotation, [SpecificForce; 3])> {
-    let force = config.rest_force?;
-    let levelling = config.levelling.rotation(config.mounting.force(force)).ok()?;
-    Some((levelling, force))
 }
 
 /// The reading at rest of a gyro whose z axis is vertical.

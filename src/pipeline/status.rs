@@ -1,6 +1,7 @@
 //! The pipeline's part of the slow status message.
 
 use super::Pipeline;
+use super::level::Level;
 use crate::bias::ZeroRate;
 use crate::health::slow::{Evidence, Knowledge, SlowStatus, Verdict};
 use crate::mounting::GyroMap;
@@ -24,10 +25,24 @@ impl Pipeline {
             _ if self.is_calibrated() => Knowledge::Fine,
             known => known.map_or(Knowledge::Unknown, |(knowledge, _)| knowledge),
         };
-        let mounting = if self.state.moved { Knowledge::Refused } else { self.config.forward };
+        let mounting = match (self.level_knowledge(), self.config.forward) {
+            _ if self.state.moved => Knowledge::Refused,
+            (level, forward) if level == forward => level,
+            _ => Knowledge::Coarse,
+        };
         let gaps = self.state.delayed_yaw.gaps();
         let doubt = gaps.map(|_| self.yaw_doubt());
         SlowStatus { verdict, evidence, bias, gain, mounting, doubts: None, gaps, doubt }
+    }
+
+    /// How well standstills and turns have shown the vertical; a calibration has measured it well.
+    fn level_knowledge(&self) -> Knowledge {
+        let level = self.state.initialised.as_ref().map(|known| &known.level);
+        match level.map(Level::vertical) {
+            _ if !self.config.levelling => Knowledge::Fine,
+            Some(Some(now)) => now.knowledge(),
+            _ => self.config.vertical.knowledge(),
+        }
     }
 
     /// True if this unit's gain and misalignment are calibrated.

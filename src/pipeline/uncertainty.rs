@@ -11,7 +11,7 @@
 //! | rate that standstill has set to zero | its mean | adds linearly |
 //! | revision that is not carried yet | what a second carries of it | adds linearly |
 //! | gain | a share of the yaw rate | of the net turn |
-//! | mounting | a share of the roll and pitch rates | of their net turns |
+//! | mounting, and a tilt that may be the street's | a share of the roll and pitch rates | of their net turns |
 //! | slope or bank in a turn | the share 1 - cos of the yaw rate, by the roll and pitch that the turn itself shows, or the tilt at rest | adds linearly |
 //! | unit that the network was not trained with | a share of its mean correction | of its net correction |
 //! | gap in the accumulated yaw | | the angle that the rates around it have turned, and what it may hide ([`crate::estimate`]) |
@@ -180,6 +180,18 @@ impl Uncertainty {
     pub fn askew(&mut self, rest: [SpecificForce; 3]) {
         self.askew =
             share(rest.map(|axis| axis.0 as f32 / SpecificForce::PER_METRE_PER_SEC2), 1.0).min(ASKEW);
+    }
+
+    /// Notes the variance of the direction of the axis in use, rad^2, and whether a tilt beyond the mounting is taken
+    /// off: its sigma then takes the place of that of a mounting by eye. A tilt takes half its square off a turn's rate.
+    pub fn tilt(&mut self, variance: f32, is_levelled: bool) {
+        let GyroErrors { gain, mounting, .. } = self.errors;
+        self.errors.gain = sqrt(gain * gain + 0.25 * variance * variance);
+        self.errors.mounting = if is_levelled {
+            sqrt(variance).max(self.config.known.mounting)
+        } else {
+            sqrt(mounting * mounting + variance)
+        };
     }
 
     /// Adds a usable sample.

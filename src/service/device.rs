@@ -16,6 +16,7 @@ use super::message::{AccessCounters, FAILED_STARTS, FlashState, Identity, Info, 
 use crate::can::wheel::WheelSettings;
 use crate::health::slow::Knowledge;
 use crate::health::{Faults, Status};
+use crate::mounting::{Rotation, Vertical};
 use crate::sample::{ImuSample, Standstill, WheelSample};
 use crate::standstill::Standing;
 use crate::store::slots::{SlotError, WeightSource};
@@ -228,6 +229,22 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         if let Some(sample) = sample {
             self.add_to_calibration(sample, wheels, standing);
         }
+    }
+
+    /// Learns what standstills and turns have shown of the vertical.
+    pub fn learn_vertical(&mut self, vertical: Vertical) {
+        if self.configuration.learn {
+            self.learner.learn_vertical(vertical, &mut self.learned);
+        }
+    }
+
+    /// Returns how well the vertical is known; roll and pitch of the sensor in the configured axes, and their sigma,
+    /// deg.
+    #[must_use]
+    pub fn level_deg(&self) -> (Knowledge, [f32; 3]) {
+        let mounting = self.configuration.mounting.rotation().unwrap_or(Rotation::IDENTITY);
+        let vertical = self.learned.vertical.turned(&mounting);
+        (vertical.knowledge(), vertical.tilt_deg())
     }
 
     fn add_to_calibration(&mut self, sample: &ImuSample, wheels: &WheelSample, standing: &Standing) {

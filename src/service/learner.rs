@@ -1,5 +1,5 @@
 //! The learner estimates the sensor's bias over temperature at standstills that the wheels prove, and its mounting:
-//! up at standstills, forward while the vehicle drives.
+//! up at standstills and in turns ([`crate::mounting::VerticalEstimator`]), forward while the vehicle drives.
 //!
 //! Without wheels, a long straight can look like a standstill, so only static calibrations add to the bias curve.
 //! Learnt values are stored after the first, second, fourth, ... period of three seconds at rest, about ten times
@@ -7,7 +7,7 @@
 //! in total.
 
 use crate::bias::{CurveFilter, Rest, StaticConfig, StaticInit};
-use crate::mounting::{Forward, ForwardEstimator};
+use crate::mounting::{Forward, ForwardEstimator, Vertical};
 use crate::sample::{ImuSample, WheelSample};
 use crate::standstill::Standing;
 use crate::store::Learned;
@@ -31,6 +31,8 @@ pub struct Learner {
     /// True if the specific force of this standstill has been used.
     has_stood: bool,
     forward: ForwardEstimator,
+    /// The vertical that was stored last.
+    vertical: Option<Vertical>,
     /// True if the mounting has changed since earlier drives; nothing is learnt then.
     is_moved: bool,
     /// True if there is something new to store.
@@ -48,6 +50,7 @@ impl Learner {
             rests: 0,
             has_stood: false,
             forward,
+            vertical: None,
             is_moved: false,
             is_changed: false,
         }
@@ -81,6 +84,10 @@ impl Learner {
             self.rest = None;
             self.has_stood &= still;
         }
+        if self.is_moved && learned.vertical != Vertical::UNKNOWN {
+            // It is not that of this mounting any more.
+            (learned.vertical, self.is_changed) = (Vertical::UNKNOWN, true);
+        }
         self.is_moved && !was_moved
     }
 
@@ -88,7 +95,22 @@ impl Learner {
     /// moved; the learner is a new one.
     pub fn calibrated(&mut self, rest: &Rest, temperature: Option<CentiCelsius>, learned: &mut Learned) {
         (learned.specific_force, learned.forward) = (None, None);
+        learned.vertical = Vertical::UNKNOWN;
         self.learn_rest(rest, temperature, learned);
+    }
+
+    /// Learns what standstills and turns have shown of the vertical. It is stored when
+    /// it differs notably.
+    pub fn learn_vertical(&mut self, vertical: Vertical, learned: &mut Learned) {
+        if self.is_moved {
+            return;
+        }
+        let before = self.vertical.get_or_insert(learned.vertical);
+        if vertical.differs(before) {
+            *before = vertical;
+            self.is_changed = true;
+        }
+        learned.vertical = vertical;
     }
 
     fn learn_rest(&mut self, rest: &Rest, temperature: Option<CentiCelsius>, learned: &mut Learned) {

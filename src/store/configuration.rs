@@ -13,7 +13,7 @@ use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
 use crate::coprocessor;
 use crate::fog::{FogConfig, FogErrors, Tilt};
-use crate::mounting::{GyroMap, Levelling, Rotation};
+use crate::mounting::{GyroMap, Rotation};
 use crate::pipeline::PipelineConfig;
 use crate::units::AngularRate;
 use embedded_can::{Id, StandardId};
@@ -131,10 +131,11 @@ impl Configuration {
         PipelineConfig {
             bias_curve: learned.bias_curve,
             rest_force: learned.specific_force,
+            vertical: learned.vertical,
             mounting: level.map_or(mounting, |level| mounting.then(&level)),
             forward: learned.forward_knowledge(&mounting),
             gyro_map: calibration.gyro_map(weights).unwrap_or(GyroMap::IDENTITY),
-            levelling: if level.is_some() { Levelling::Off } else { Levelling::DEFAULT },
+            levelling: level.is_none(),
             static_init: self.static_init,
             earth_rate: self.latitude().map_or(EarthRate::LeftInBias, EarthRate::Subtracted),
             compensate: self.compensate,

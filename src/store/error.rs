@@ -32,6 +32,7 @@ pub enum Field {
     CalibrationGyroMap,
     BiasCurve,
     Forward,
+    Vertical,
 }
 
 impl Field {
@@ -57,6 +58,7 @@ impl Field {
             Self::CalibrationGyroMap => "gyro_map",
             Self::BiasCurve => "bias_curve",
             Self::Forward => "forward",
+            Self::Vertical => "vertical",
         }
     }
 
@@ -76,7 +78,7 @@ impl Field {
             Self::CompensateMaxMean | Self::CompensateMaxRevision => [1e-3, 0.5],
             Self::CompensateMaxSingle => [1e-3, 5.0],
             Self::CalibrationRollDeg | Self::CalibrationPitchDeg => [-MAX_TILT_DEG, MAX_TILT_DEG],
-            Self::CalibrationGyroMap | Self::BiasCurve | Self::Forward => return None,
+            Self::CalibrationGyroMap | Self::BiasCurve | Self::Forward | Self::Vertical => return None,
         })
     }
 }

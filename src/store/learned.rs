@@ -5,7 +5,7 @@ use super::error::{Field, FieldError};
 use super::record::Record;
 use crate::bias::BiasCurve;
 use crate::health::slow::Knowledge;
-use crate::mounting::{Forward, Rotation, is_moved};
+use crate::mounting::{Forward, Rotation, Vertical, is_moved};
 use crate::units::SpecificForce;
 use serde::{Deserialize, Serialize};
 
@@ -22,13 +22,20 @@ pub struct Learned {
     pub bias_curve: BiasCurve,
     /// Mean specific force at standstill; `None` before the first standstill.
     pub specific_force: Option<[SpecificForce; 3]>,
+    /// What standstills and turns have shown of the vertical.
+    pub vertical: Vertical,
     /// Forward direction of the vehicle; `None` until it is known within 10 degrees.
     pub forward: Option<Forward>,
 }
 
 impl Learned {
     /// Record before anything was learnt.
-    pub const NOTHING: Self = Self { bias_curve: BiasCurve::UNKNOWN, specific_force: None, forward: None };
+    pub const NOTHING: Self = Self {
+        bias_curve: BiasCurve::UNKNOWN,
+        specific_force: None,
+        vertical: Vertical::UNKNOWN,
+        forward: None,
+    };
 
     /// Returns whether a specific force at rest shows that the sensor has moved.
     #[must_use]
@@ -67,11 +74,14 @@ impl Learned {
 
 impl Record for Learned {
     const KEY: u8 = 7;
-    const VERSION: u8 = 1;
+    const VERSION: u8 = 2;
 
     fn check(&self) -> Result<(), FieldError> {
         if !self.bias_curve.is_plausible() {
             return Err(FieldError::Implausible(Field::BiasCurve));
+        }
+        if !self.vertical.is_plausible() {
+            return Err(FieldError::Implausible(Field::Vertical));
         }
         if !self.forward.is_none_or(|forward| forward.is_plausible()) {
             return Err(FieldError::Implausible(Field::Forward));

@@ -58,7 +58,7 @@ const fn write_only(id: u16, name: &'static str, bytes: &'static str, content: &
 }
 
 /// All data identifiers.
-pub const IDENTIFIERS: [Identifier; 25] = [
+pub const IDENTIFIERS: [Identifier; 26] = [
     read_only(0xF186, "session", "1", "session: 1 default, 2 programming, 3 extended"),
     read_only(0xF189, "firmware_version", "1, 1, 1", "version of the firmware"),
     read_only(0xF18C, "serial_number", "text", "serial number of the chip, 24 hexadecimal digits"),
@@ -123,6 +123,12 @@ pub const IDENTIFIERS: [Identifier; 25] = [
         "wheel_speeds",
         "2, 2, 2, 2, 1, 1",
         "speed of each wheel, 0.01 m/s, 7FFF for none; the wheels: 0 unknown, 1 moving, 2 standing; 1 if the vehicle is proven to stand",
+    ),
+    read_only(
+        0x0118,
+        "level",
+        "1, 2, 2, 2",
+        "tilt of the sensor beyond the configured mounting, by standstills and turns: 0 unknown, 1 coarse, 2 within 3 deg; roll, pitch, their sigma, all three 1/100 deg",
     ),
 ];
 
@@ -230,6 +236,13 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             put(out, &[device.forward_knowledge() as u8])?;
             put(out, &yaw.to_be_bytes())?;
             put(out, &sigma.to_be_bytes())
+        }
+        0x0118 => {
+            let (knowledge, angles) = device.level_deg();
+            put(out, &[knowledge as u8])?;
+            angles
+                .into_iter()
+                .try_for_each(|angle| put(out, &(libm::roundf(100.0 * angle) as i16).to_be_bytes()))
         }
         0x0117 => {
             let (wheels, stands) = device.standing();

@@ -1,10 +1,10 @@
 //! Simulates a drive: a car stands, pulls away, follows bends, turns and stops, and a MEMS sensor with
-//! known errors measures the motion. The true yaw rate is known exactly.
+//! known errors measures the motion. The truth is known exactly: the rate of the heading, about the vertical, and the roll
+//! and pitch rates of the car's body.
 //!
 //! [`route`] generates the route, [`car`] moves on a plane with grade, bank and suspension, [`vibration`] shakes the
-//! sensor, [`mems`] adds the sensor's own errors, and [`csv`] writes the recording. The truth is the
-//! reading of a perfect sensor at the same position without vibration: vibration does not change the car's heading,
-//! and counts as an error.
+//! sensor, [`mems`] adds the sensor's own errors and its tilt, and [`csv`] writes the recording. Vibration does not change
+//! the car's heading, and counts as an error; so do a tilted sensor and a sloping street.
 //!
 //! The simulation does not model a particular sensor or car. It shows that everything works, and how well static
 //! initialisation performs; only recordings of a real car show whether a network helps.
@@ -64,7 +64,7 @@ pub struct Sample {
     pub specific_force: [f64; 3],
     /// The measured angular rate, rad/s.
     pub angular_rate: [f64; 3],
-    /// True angular rate, rad/s.
+    /// True roll and pitch rates of the body, and the rate of the heading, about the vertical, rad/s.
     pub reference: [f64; 3],
     /// Rates of the wheels front right, rear right, front left, rear left, rad/s.
     pub wheels: [f64; 4],
@@ -113,10 +113,11 @@ impl Iterator for Simulation {
         self.tick += 1;
         let motion = self.car.step();
         let shake = self.vibration.step(motion.speed);
-        // The truth is tilted too, because it is that of a perfect part with the same mounting.
-        let reference = self.mems.tilt(motion.angular_rate);
-        let force = add(self.mems.tilt(motion.specific_force), shake.specific_force);
-        let (specific_force, mut angular_rate) = self.mems.measure(force, add(reference, shake.angular_rate));
+        let [roll, pitch, _] = motion.angular_rate;
+        // The car shakes, whatever the tilt of the part.
+        let force = self.mems.tilt(add(motion.specific_force, shake.specific_force));
+        let rate = self.mems.tilt(add(motion.angular_rate, shake.angular_rate));
+        let (specific_force, mut angular_rate) = self.mems.measure(force, rate);
         let warm = self.warming.as_mut().map(|warming| warming.step(seconds, motion.speed));
         if let Some((_, bias)) = warm {
             angular_rate = add(angular_rate, bias);
@@ -125,7 +126,7 @@ impl Iterator for Simulation {
             seconds,
             specific_force,
             angular_rate,
-            reference,
+            reference: [roll, pitch, motion.heading_rate],
             wheels: self.car.wheels(&motion),
             speed: motion.speed,
             celsius: warm.map(|(celsius, _)| celsius),

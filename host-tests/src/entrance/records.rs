@@ -8,7 +8,7 @@ use embedded_storage::nor_flash::ReadNorFlash;
 use gyronet::Coprocessor;
 use gyronet::bias::{BiasCurve, CurveFilter};
 use gyronet::model::blob::CRC;
-use gyronet::mounting::Forward;
+use gyronet::mounting::{Forward, Vertical};
 use gyronet::sample::ImuSample;
 use gyronet::store::{Accepted, Calibration, Configuration, Learned, Level, Record, Store};
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
@@ -74,6 +74,7 @@ pub fn seeds() -> Vec<Seed> {
     let learned = Learned {
         bias_curve: filter.curve(),
         specific_force: Some([SpecificForce(1 << 20); 3]),
+        vertical: Vertical::UNKNOWN,
         forward: Some(Forward { direction: [0.6, 0.8, 0.0], sigma: 0.05 }),
     };
     // The first sector, as it is in flash.

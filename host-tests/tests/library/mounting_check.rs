@@ -34,7 +34,8 @@ impl Bench {
             let pitch = 0.03 * self.noise.normal();
             let rates =
                 [rate(0.0), rate(pitch), rate(turn + coupling * pitch + 0.0003 * self.noise.normal())];
-            self.found += u32::from(self.compensator.add(self.tick, rates, Validity::Good, drives));
+            self.compensator.add(self.tick, rates, Validity::Good);
+            self.found += u32::from(self.compensator.check_mounting(rates, Validity::Good, drives));
             self.window.push(rates);
             if self.tick % 5 == 1 && self.window.len() > WINDOW {
                 let end = self.window.len() - 1;

@@ -221,7 +221,7 @@ fn a_revision_while_the_vehicle_stands_is_given_back_when_it_moves() {
             _ => {}
         }
         let gyro = rate(0.002 + 0.001 * noise.normal());
-        compensator.add(tick, [AngularRate::ZERO, AngularRate::ZERO, gyro], Validity::Good, false);
+        compensator.add(tick, [AngularRate::ZERO, AngularRate::ZERO, gyro], Validity::Good);
         if tick == 200 {
             compensator.end_standstill();
         }

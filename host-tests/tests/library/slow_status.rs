@@ -93,7 +93,7 @@ fn it_says_what_the_board_knows() {
     let frames = run(&mut board, 0..901, None);
     assert_says(&frames[0], nothing);
     // After static initialisation, without wheels: the quiet sensor shows that the car stands.
-    let known = SlowStatus { bias: Knowledge::Coarse, gaps: Some(0), ..nothing };
+    let known = SlowStatus { bias: Knowledge::Coarse, mounting: Knowledge::Coarse, gaps: Some(0), ..nothing };
     let still = SlowStatus { verdict: Verdict::Standing, evidence: Evidence::Inertial, ..known };
     assert_says(frames.last().expect("the newest"), still);
     // Samples are missing twice; the sensor is found moved.
@@ -141,6 +141,7 @@ fn wheels_decide_where_they_are_known() {
         verdict: Verdict::Standing,
         evidence: Evidence::Wheels,
         bias: Knowledge::Coarse,
+        mounting: Knowledge::Coarse,
         gaps: Some(0),
         ..SlowStatus::default()
     };

@@ -141,7 +141,7 @@ fn a_value_out_of_its_range_is_refused() {
     assert_eq!(refused, Err(StoreError::Field(FieldError::Can(ConfigError::Period(15)))));
     let mut filter = CurveFilter::new(&BiasCurve::UNKNOWN);
     (0..100).for_each(|_| filter.add(CentiCelsius(11_000), [AngularRate(i32::MAX); 3]));
-    let wild = Learned { bias_curve: filter.curve(), specific_force: None, forward: None };
+    let wild = Learned { bias_curve: filter.curve(), ..Learned::NOTHING };
     let refused = Err(StoreError::Field(FieldError::Implausible(Field::BiasCurve)));
     assert_eq!(store.set(&wild), refused);
     assert_eq!(flash.borrow().operations(), 0, "nothing was written");

@@ -24,6 +24,7 @@ mod standstill_detectors;
 mod standstill_truth;
 mod still_stretches;
 mod tables_methods;
+mod tilt;
 mod trajectory_evo;
 mod turns;
 mod warm_up;

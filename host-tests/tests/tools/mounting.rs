@@ -2,7 +2,7 @@
 
 use gyronet::bias::StaticError;
 use gyronet::model::{Blob, GyroNet, weights};
-use gyronet::mounting::{LevelError, Levelling, Rotation};
+use gyronet::mounting::{LevelError, Rotation};
 use gyronet::pipeline::PipelineConfig;
 use gyronet::units::SpecificForce;
 use gyronet_host_tests::noise::cases;
@@ -39,7 +39,7 @@ fn turned(recording: &Recording) -> Recording {
     recording
 }
 
-fn yaw_rates(recording: &Recording, mounting: Rotation, levelling: Levelling) -> Vec<f64> {
+fn yaw_rates(recording: &Recording, mounting: Rotation, levelling: bool) -> Vec<f64> {
     let config = PipelineConfig { mounting, levelling, ..PipelineConfig::DEFAULT };
     let mut network =
         GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("they come with the library"));
@@ -64,18 +64,17 @@ fn apart(a: &[f64], b: &[f64]) -> (f64, f64) {
 /// place may cost, for levelling takes it for mounting.
 fn check(recording: &Recording, noise: f64, street: f64) {
     let tilted = turned(recording);
-    let level = yaw_rates(recording, Rotation::IDENTITY, Levelling::DEFAULT);
+    let level = yaw_rates(recording, Rotation::IDENTITY, true);
     let mounting = Rotation::from_mounting(TURNED, TURNED, 0.0).expect("finite");
-    for (what, mounting, levelling, angle) in [
-        ("configured", mounting, Levelling::DEFAULT, 2e-4),
-        ("levelled", Rotation::IDENTITY, Levelling::DEFAULT, street),
-    ] {
+    for (what, mounting, levelling, angle) in
+        [("configured", mounting, true, 2e-4), ("levelled", Rotation::IDENTITY, true, street)]
+    {
         let (rms, largest) = apart(&yaw_rates(&tilted, mounting, levelling), &level);
         println!("{}: {what}: {rms:.6} rad/s RMS apart, angle {largest:.5} rad", recording.name());
         assert!(rms <= noise, "{}: {what}: {rms} rad/s", recording.name());
         assert!(largest <= angle, "{}: {what}: {largest} rad", recording.name());
     }
-    let (rms, largest) = apart(&yaw_rates(&tilted, Rotation::IDENTITY, Levelling::Off), &level);
+    let (rms, largest) = apart(&yaw_rates(&tilted, Rotation::IDENTITY, false), &level);
     println!("{}: as it is: {rms:.6} rad/s RMS apart, angle {largest:.5} rad", recording.name());
     assert!(rms > noise, "the test can tell");
 }
@@ -96,7 +95,7 @@ fn a_sensor_turned_by_30_degrees_gives_the_same_yaw_on_a_real_drive() {
 
 #[test]
 fn what_shows_no_vertical_is_refused() {
-    let config = PipelineConfig { levelling: Levelling::Always, ..PipelineConfig::DEFAULT };
+    let config = PipelineConfig::DEFAULT;
     for (up, upside_down) in [(5.0, false), (-9.81, true)] {
         let mut pipeline = gyronet::pipeline::Pipeline::new(config);
         let samples = (0..300).map(|tick| {

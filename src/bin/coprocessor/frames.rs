@@ -168,10 +168,10 @@ impl Sink for Outgoing {
     /// Hands an observation to idle.
     #[inline(never)]
     fn observed(&mut self, observation: &coprocessor::Observation) {
-        let coprocessor::Observation { sample, vehicle, wheels, standing, .. } = observation;
+        let coprocessor::Observation { sample, vehicle, wheels, standing, vertical, .. } = observation;
         let (tick, status, faults) = (vehicle.tick, vehicle.live.status, vehicle.live.faults);
-        let note =
-            Observation { sample: *sample, tick, status, faults, wheels: *wheels, standing: *standing };
+        let (sample, wheels, standing, vertical) = (*sample, *wheels, *standing, *vertical);
+        let note = Observation { sample, tick, status, faults, wheels, standing, vertical };
         count(&mut self.overruns, u32::from(!OBSERVATIONS.push(note)));
     }
 

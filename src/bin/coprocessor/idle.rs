@@ -10,6 +10,7 @@ use crate::stm32f405::{clocks, timer};
 use gyronet::coprocessor::Coprocessor;
 use gyronet::health::{Faults, Status, count};
 use gyronet::model::background::BackgroundCheck;
+use gyronet::mounting::Vertical;
 use gyronet::sample::{ImuSample, WheelSample};
 use gyronet::service::Device;
 use gyronet::service::event::{ClockFault, SensorFault};
@@ -32,6 +33,7 @@ pub struct Observation {
     pub faults: Faults,
     pub wheels: WheelSample,
     pub standing: Standing,
+    pub vertical: Option<Vertical>,
 }
 
 /// Observations that idle has not processed yet.
@@ -111,7 +113,9 @@ impl Idle {
 
     #[inline(never)]
     fn observe(&mut self) {
-        while let Some(Observation { sample, tick, status, faults, wheels, standing }) = OBSERVATIONS.pop() {
+        while let Some(seen) = OBSERVATIONS.pop() {
+            let Observation { sample, tick, status, faults, wheels, standing, vertical } = seen;
+            vertical.into_iter().for_each(|vertical| self.device.learn_vertical(vertical));
             self.device.observe(sample.as_ref(), tick, (status, faults), &wheels, &standing);
         }
     }

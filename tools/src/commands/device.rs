@@ -145,7 +145,12 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     match &args.action {
         Action::Info => {
             let info = device.info()?;
-            if json { print_json(&info)? } else { print_info(&info, device.access()?.state)? }
+            if json {
+                print_json(&info)?;
+            } else {
+                print_info(&info, device.access()?.state)?;
+                print_tilt(device.level_deg()?)?;
+            }
         }
         Action::Get => settings::print(&device.configuration()?, json)?,
         Action::Set { settings, file } => settings::set(&mut device, settings, file.as_deref(), json)?,
@@ -237,6 +242,20 @@ fn print_info(info: &Info, access: &str) -> io::Result<()> {
         }
     }
     Ok(())
+}
+
+/// Prints the tilt of the sensor beyond its configured mounting.
+fn print_tilt(tilt: Option<[f32; 3]>) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match tilt {
+        Some([roll, pitch, sigma]) => {
+            writeln!(
+                out,
+                "tilt          roll {roll:+.1} deg, pitch {pitch:+.1} deg, +- {sigma:.1} deg, by standstills and turns"
+            )
+        }
+        None => writeln!(out, "tilt          unknown: the vehicle has not stood yet"),
+    }
 }
 
 fn log(device: &mut Board, json: bool) -> super::Result {

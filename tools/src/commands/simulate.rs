@@ -11,8 +11,8 @@ use std::path::PathBuf;
 ///
 /// A car stands, pulls away, follows bends, turns and stops; a MEMS sensor with known errors measures its motion.
 ///
-/// The CSV file has the columns that the other commands read, and the true rates in ref_gyr_*. The same seed gives the
-/// same file on every machine.
+/// The CSV file has the columns that the other commands read, and the truth in ref_gyr_*: roll and pitch rates of the car,
+/// and in ref_gyr_z the rate of its heading, about the vertical. The same seed gives the same file on every machine.
 ///
 /// With --trip the sensor warms up, its bias follows its temperature (temp_c), and each device has a bias of its own.
 /// Half an hour on a motorway without a stop shows how far the heading drifts meanwhile.
@@ -21,6 +21,7 @@ use std::path::PathBuf;
 Examples:
   gyronet simulate --out drive.csv
   gyronet simulate --seconds 600 --seed 7 --out drive.csv
+  gyronet simulate --seconds 1200 --tilt 7,0 --out tilted.csv
   gyronet simulate --trip motorway --device 3 --seconds 2160 --out motorway.csv")]
 pub struct Args {
     /// Write the drive to this file.
@@ -32,6 +33,9 @@ pub struct Args {
     /// Seed of the route, the road, the noise and the bias at power-on.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Tilt the sensor: roll and pitch of its mounting, deg.
+    #[arg(long, value_name = "ROLL,PITCH", value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
+    tilt: Vec<f64>,
     /// Let the sensor warm up on this trip.
     #[arg(long)]
     trip: Option<Trip>,
@@ -43,7 +47,12 @@ pub struct Args {
 /// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let warming = args.trip.map(|trip| warming::Config { trip, device: args.device });
-    let config = Config { warming, seconds: args.seconds, seed: args.seed, ..Config::DEFAULT };
+    let mut config = Config { warming, seconds: args.seconds, seed: args.seed, ..Config::DEFAULT };
+    config.mems.mount = match *args.tilt {
+        [] => [0.0; 2],
+        [roll, pitch] => [pitch, roll].map(f64::to_radians),
+        _ => return Err("--tilt takes two angles, ROLL,PITCH".into()),
+    };
     let error = WriteError::to(&args.out);
     let file = File::create(&args.out).map_err(&error)?;
     let samples = csv::write(&config, BufWriter::new(file)).map_err(&error)?;

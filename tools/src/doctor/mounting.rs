@@ -56,8 +56,7 @@ pub fn finding(rows: &Rows, mounting: Option<&Mounting>, left_deg: f64) -> Findi
         Finding::note(
             what,
             format!(
-                "{angles}: the board levels a tilt beyond {} deg by itself, but better {}.",
-                TILT.0,
+                "{angles}: the board finds and takes off such a tilt by itself, but better {}.",
                 remedy::mounting(rows, level, left_deg)
             ),
         )

@@ -31,8 +31,7 @@ pub struct Config {
     pub misalignment: f64,
     /// Sensitivity of a gyro axis to specific force, sigma for each pair of axes, rad/s per m/s^2.
     pub gyro_per_force: f64,
-    /// Pitch and roll of the part's mounting, rad: the recordings' part is tilted so that y reads about -0.8 m/s^2 at
-    /// rest.
+    /// Pitch and roll of the part's mounting, rad.
     pub mount: [f64; 2],
 }
 
@@ -48,7 +47,7 @@ impl Config {
         scale: 0.001,
         misalignment: 0.000_87,
         gyro_per_force: 0.0,
-        mount: [0.015, -0.085],
+        mount: [0.0; 2],
     };
 }
 

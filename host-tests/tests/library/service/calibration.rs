@@ -3,7 +3,7 @@
 use super::{Board, sample, start};
 use gyronet::bias::{BiasCurve, CurveFilter};
 use gyronet::health::{Faults, Status};
-use gyronet::mounting::{Forward, GyroMap};
+use gyronet::mounting::{Forward, GyroMap, Vertical};
 use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::calibrate::{CalibrationFault, State, Task};
 use gyronet::service::message::Refusal;
@@ -139,6 +139,7 @@ fn what_was_learnt_fits_a_response_and_a_record() {
     let learned = Learned {
         bias_curve: filter.curve(),
         specific_force: Some([SpecificForce(-10_000_000); 3]),
+        vertical: Vertical::UNKNOWN,
         forward: Some(Forward { direction: [-0.577; 3], sigma: 0.171 }),
     };
     let record = postcard::to_stdvec(&learned).expect("there is room");

@@ -4,8 +4,9 @@
 use super::uds::{Bench, bench};
 use super::{Board, sample, start};
 use gyronet::bias::StaticConfig;
+use gyronet::health::slow::Knowledge;
 use gyronet::health::{Faults, Status};
-use gyronet::mounting::Forward;
+use gyronet::mounting::{Forward, Vertical, VerticalEstimator};
 use gyronet::sample::{ImuSample, Standstill, Validity, WheelSample};
 use gyronet::service::Learner;
 use gyronet::service::calibrate::Task;
@@ -294,4 +295,42 @@ fn troubles_erase_nothing_in_motion() {
     observe(&mut bench.board, 1, (0.01, 20), LEVEL, Standstill::Still);
     bench.expect(&READ, &[0x62, 0xF1, 0x86, 3]);
     assert!(flash.borrow().operations() > before);
+}
+
+#[test]
+fn a_tilt_is_kept_and_dropped_when_the_sensor_was_moved() {
+    let (flash, mut bench) = bench();
+    assert_eq!(bench.board.set_configuration(&Configuration::DEFAULT), Ok(()));
+    bench.expect(&[0x22, 0x01, 0x18], &[0x62, 0x01, 0x18, 0, 0, 0, 0, 0, 0x03, 0x22]);
+    // Two stops on a street that slopes by 1 deg; the sensor rolls by 12 deg.
+    let mut estimator = VerticalEstimator::new(Vertical::UNKNOWN);
+    for roll in [11.0, 13.0] {
+        let (sin, cos) = f64::to_radians(roll).sin_cos();
+        estimator.rest(&sample(0, [0.0, (9.81 * sin) as f32, (9.81 * cos) as f32], 0.0).specific_force);
+    }
+    bench.board.learn_vertical(*estimator.known());
+    let (knowledge, [roll, pitch, sigma]) = bench.board.level_deg();
+    assert!(knowledge == Knowledge::Fine && (roll - 12.0).abs() < 0.5 && pitch.abs() < 0.1, "{roll} {pitch}");
+    assert!((2.0..3.0).contains(&sigma), "{sigma}");
+    let hundredths = |angle: f32| ((100.0 * angle).round() as i16).to_be_bytes();
+    let response = [hundredths(roll), hundredths(pitch), hundredths(sigma)].concat();
+    bench.expect(&[0x22, 0x01, 0x18], &[&[0x62, 0x01, 0x18, 2][..], &response].concat());
+    let tilted = [0.0, 2.04, 9.6];
+    observe(&mut bench.board, 4, (0.01, 20), tilted, Standstill::Still);
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+
+    let mut kept = Bench::new(&flash);
+    assert_eq!(kept.board.learned().vertical, *estimator.known());
+    let used = Configuration::DEFAULT.pipeline(&Calibration::NONE, kept.board.learned(), 0);
+    assert!(used.levelling && used.vertical == *estimator.known());
+    let off = Configuration { learn: false, ..Configuration::DEFAULT };
+    assert_eq!(off.pipeline(&Calibration::NONE, kept.board.learned(), 0).vertical, Vertical::UNKNOWN);
+    // The sensor hangs on its side now.
+    observe(&mut kept.board, 4, (0.01, 20), [0.0, 9.81, 0.0], Standstill::Still);
+    assert!(kept.board.take_mount_moved());
+    assert_eq!(kept.board.learned().vertical, Vertical::UNKNOWN);
+    kept.board.learn_vertical(*estimator.known());
+    assert_eq!(kept.board.learned().vertical, Vertical::UNKNOWN, "nothing is learnt");
+    kept.expect(&[0x3E, 0], &[0x7E, 0]);
+    assert_eq!(start(&flash).learned().vertical, Vertical::UNKNOWN);
 }

@@ -35,6 +35,7 @@ pub const ACCESS: u16 = 0x0111;
 const ACCESS_COUNTERS: u16 = 0x0113;
 const LEARNED: u16 = 0x0115;
 const FORWARD: u16 = 0x0116;
+const LEVEL: u16 = 0x0118;
 pub const COUNTERS: [u8; 7] = {
     let [a, b] = PIPELINE_COUNTERS.to_be_bytes();
     let [c, d] = INPUT_COUNTERS.to_be_bytes();
@@ -106,6 +107,19 @@ impl<B: Bus> Device<B> {
             [0, ..] => Ok(None),
             [_, a, b, c, d] => {
                 let angles = [[a, b], [c, d]].map(i16::from_be_bytes);
+                Ok(Some(angles.map(|angle| f32::from(angle) / 100.0)))
+            }
+            _ => Err(DeviceError::Mismatch),
+        }
+    }
+
+    /// Returns roll and pitch of the sensor beyond the configured mounting and their sigma, deg; `None` before the first
+    /// standstill.
+    pub fn level_deg(&mut self) -> Result<Option<[f32; 3]>> {
+        match *self.read(LEVEL)?.as_slice() {
+            [0, ..] => Ok(None),
+            [_, a, b, c, d, e, f] => {
+                let angles = [[a, b], [c, d], [e, f]].map(i16::from_be_bytes);
                 Ok(Some(angles.map(|angle| f32::from(angle) / 100.0)))
             }
             _ => Err(DeviceError::Mismatch),

@@ -20,7 +20,7 @@ pub enum What {
     NoUnit,
     /// Erase what the board has learnt, after another sensor was fitted or the sensor was moved.
     Forget,
-    /// Print the calibration, and what the board has learnt: the bias curve and the forward direction.
+    /// Print the calibration, and what the board has learnt: the bias curve, the tilt and the forward direction.
     Show,
     /// Cancel the running calibration without a result.
     Cancel,
@@ -79,9 +79,9 @@ pub fn run(
                 if store {
                     device.store_calibration()?;
                 }
-                let (calibration, learned, forward) =
-                    (device.calibration()?, device.learned()?, device.forward_deg()?);
-                return print_value(&to_value(&calibration, &learned, forward)?, json);
+                let (forward, tilt) = (device.forward_deg()?, device.level_deg()?);
+                let learned = to_value(&device.calibration()?, &device.learned()?, forward, tilt)?;
+                return print_value(&learned, json);
             }
         }
     }

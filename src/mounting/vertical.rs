@@ -1,0 +1,400 @@
+//! The vertical in the sensor's axes, by gravity at standstills and by the axis of turns.
+//!
+//! At rest the specific force points up, but a street slopes. In a turn the angular rate points up, and the slope adds
+//! only its change from the turn's begin to its end. So each is off by a street's slope, and their mean is the vertical
+//! of the vehicle on a level street.
+//!
+//! A single tilt may be the street's or the sensor's. Two explanations compete: the sensor is mounted as configured
+//! (and as a model has learnt), or it is tilted by an unknown angle. Slopes are normal with the same sigma in both, so
+//! the ratio of their probabilities has a closed form. The first explanation starts with the better odds: only a tilt
+//! steeper than streets, or one that turns confirm, is taken off.
+
+use super::{Rotation, metre_per_sec2};
+use crate::health::slow::Knowledge;
+use crate::sample::RATE_HZ;
+use crate::sqrt::sqrt;
+use crate::units::{AngularRate, SpecificForce};
+use crate::vector::dot;
+
+/// Sigma of a street's slope, rad: 3.5 deg, that of the standstills of the five training drives.
+const SLOPE: f32 = 0.061;
+/// Sigma of the tilt of a sensor that is not mounted as configured, rad: 8 deg.
+const TILT: f32 = 0.14;
+/// Logarithm of the odds that a sensor is mounted as configured: four to one. A model's mounting is that of a single unit:
+/// even odds, and twenty to one after driving has shown it.
+const CONFIGURED: f32 = 1.386;
+const MODEL_S: f32 = 0.0;
+const PROVEN: f32 = 3.0;
+/// Logarithm of the odds at which a tilt is no longer taken off.
+const AGAIN: f32 = 1.0;
+/// Least sigma of a turn's axis, rad: 2.5 deg. The body leans outwards, and a ramp is as steep all the way up.
+const LEAN: f32 = 0.0436;
+/// Information of a vertical that is known to 1 deg, rad^-2: that of a dozen standstills. Older ones fade beyond it.
+const MOST: f32 = 3_283.0;
+/// Least rate of a turn, rad/s, as the mean of a second, and its least angle, rad.
+const TURNING: f32 = 0.05;
+const LEAST_TURN: f32 = 0.5;
+/// Samples of a standstill that are averaged: 3 s; and those after which the next one is on another street: 10 s.
+const REST: u32 = 3 * RATE_HZ;
+const APART: u32 = 10 * RATE_HZ;
+/// Sigma of a vertical that is known well, deg.
+const FINE_DEG: f32 = 3.0;
+
+/// The mean of directions that pointed up, each weighted with the inverse of its variance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Vertical {
+    sum: [f32; 3],
+    /// Sum of the weights, rad^-2.
+    information: f32,
+}
+
+impl Vertical {
+    /// The state before the first standstill.
+    pub const UNKNOWN: Self = Self { sum: [0.0; 3], information: 0.0 };
+
+    /// Adds a direction, a unit vector, with its variance in rad^2.
+    #[must_use]
+    fn with(&self, direction: &[f32; 3], variance: f32) -> Self {
+        let weight = 1.0 / variance;
+        let information = self.information + weight;
+        let fade = if information > MOST { MOST / information } else { 1.0 };
+        let sum = core::array::from_fn(|axis| fade * (self.sum[axis] + weight * direction[axis]));
+        Self { sum, information: fade * information }
+    }
+
+    /// Returns the weighted sum of the deviations from `z`, and the variance of the tilt that explains them.
+    fn deviation(&self) -> ([f32; 3], f32) {
+        let [x, y, z] = self.sum;
+        let sum = [x, y, z - self.information];
+        let mean_square = dot(&sum, &sum) / (self.information * self.information).max(1.0);
+        (sum, mean_square.max(TILT * TILT))
+    }
+
+    /// Returns the direction that points up if the sensor is tilted.
+    #[must_use]
+    pub fn up(&self) -> [f32; 3] {
+        let (sum, tilt) = self.deviation();
+        let [x, y, z] = sum.map(|axis| axis / (self.information + 1.0 / tilt));
+        let up = [x, y, 1.0 + z];
+        let length = sqrt(dot(&up, &up)).max(f32::MIN_POSITIVE);
+        up.map(|axis| axis / length)
+    }
+
+    /// Returns the sigma of that direction in each axis, rad.
+    #[must_use]
+    pub fn sigma(&self) -> f32 {
+        let (_, tilt) = self.deviation();
+        sqrt(1.0 / (self.information + 1.0 / tilt))
+    }
+
+    /// Returns whether it differs notably from an earlier one: it is twice as certain, or 1 degree off.
+    #[must_use]
+    pub fn differs(&self, before: &Self) -> bool {
+        self.information > 2.0 * before.information || dot(&self.up(), &before.up()) < 0.999_85
+    }
+
+    /// Returns the logarithm of the odds that the sensor is mounted as configured: up then deviates by `configured`
+    /// from z, along x and y.
+    fn odds(&self, [x, y]: [f32; 2]) -> f32 {
+        let (sum, tilt) = self.deviation();
+        let information = self.information;
+        let as_configured = dot(&sum, &[x, y, 0.0]) - 0.5 * information * (x * x + y * y);
+        let tilted =
+            0.5 * dot(&sum, &sum) / (information + 1.0 / tilt) - libm::logf(1.0 + information * tilt);
+        as_configured - tilted
+    }
+
+    /// Returns the same vertical in other axes.
+    #[must_use]
+    pub fn turned(&self, rotation: &Rotation) -> Self {
+        Self { sum: rotation.vector(&self.sum), ..*self }
+    }
+
+    /// How well it is known.
+    #[must_use]
+    pub fn knowledge(&self) -> Knowledge {
+        match self.information {
+            0.0 => Knowledge::Unknown,
+            _ if self.sigma().to_degrees() <= FINE_DEG => Knowledge::Fine,
+            _ => Knowledge::Coarse,
+        }
+    }
+
+    /// Returns roll and pitch of the mounting that turns this direction up, and their sigma, deg.
+    #[must_use]
+    pub fn tilt_deg(&self) -> [f32; 3] {
+        let [x, y, z] = self.up();
+        let pitch = libm::atan2f(-x, sqrt(y * y + z * z));
+        [libm::atan2f(y, z), pitch, self.sigma()].map(f32::to_degrees)
+    }
+
+    /// Returns whether it is a mean of unit vectors.
+    #[must_use]
+    pub fn is_plausible(&self) -> bool {
+        (0.0..=1.01 * MOST).contains(&self.information)
+            && dot(&self.sum, &self.sum) <= 1.01 * self.information * self.information
+    }
+}
+
+/// What is taken for the mounting.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Judgement {
+    /// The direction that points up; `None` where the sensor is mounted as configured.
+    pub up: Option<[f32; 3]>,
+    /// Variance of the direction of the axis in use, rad^2; 0 where nothing speaks against the configuration.
+    pub variance: f32,
+}
+
+/// Collects standstills and turns, in the configured axes.
+#[derive(Debug, Clone)]
+pub struct VerticalEstimator {
+    known: Vertical,
+    is_tilted: bool,
+    /// Sums of the current standstill, its samples, and the samples since the one before.
+    force: [i64; 3],
+    stood: u32,
+    away: u32,
+    /// Sums of the current second, codes, and its samples.
+    rate: [i64; 3],
+    samples: u32,
+    /// The angle of the current turn, rad.
+    turn: [f32; 3],
+}
+
+impl VerticalEstimator {
+    /// Starts with what is known.
+    #[must_use]
+    pub const fn new(known: Vertical) -> Self {
+        Self {
+            known,
+            is_tilted: false,
+            force: [0; 3],
+            stood: 0,
+            away: APART,
+            rate: [0; 3],
+            samples: 0,
+            turn: [0.0; 3],
+        }
+    }
+
+    /// Adds the mean specific force of a standstill that goes on.
+    pub fn rest(&mut self, force: &[SpecificForce; 3]) {
+        let force = metre_per_sec2(force);
+        let length = sqrt(dot(&force, &force));
+        if length > 1.0 {
+            self.known = self.known.with(&force.map(|axis| axis / length), SLOPE * SLOPE);
+        }
+        (self.stood, self.away) = (REST, 0);
+    }
+
+    /// Adds a good sample: its specific force, its angular rate less the bias, and whether the vehicle stands. Returns
+    /// true when a second is over.
+    pub fn add(&mut self, force: &[SpecificForce; 3], rate: &[AngularRate; 3], stands: bool) -> bool {
+        if stands {
+            self.stood = self.stood.saturating_add(1);
+            self.force.iter_mut().zip(force).for_each(|(sum, axis)| *sum += i64::from(axis.0));
+            if self.stood == REST {
+                if self.away >= APART {
+                    self.rest(&self.force.map(|sum| SpecificForce((sum / i64::from(REST)) as i32)));
+                }
+                self.away = 0;
+            }
+        } else {
+            (self.stood, self.force) = (0, [0; 3]);
+            self.away = self.away.saturating_add(1);
+        }
+        self.rate.iter_mut().zip(rate).for_each(|(sum, axis)| *sum += i64::from(axis.0));
+        self.samples += 1;
+        if self.samples < RATE_HZ {
+            return false;
+        }
+        self.end_second();
+        true
+    }
+
+    /// Drops the current second and turn, because samples are missing.
+    pub fn restart(&mut self) {
+        (self.rate, self.samples, self.turn) = ([0; 3], 0, [0.0; 3]);
+    }
+
+    fn end_second(&mut self) {
+        self.samples = 0;
+        let per_code = 1.0 / (RATE_HZ as f32 * AngularRate::PER_RAD_PER_SEC);
+        let angle = core::mem::take(&mut self.rate).map(|sum| sum as f32 * per_code);
+        let up = self.known.up();
+        let (yaw, before) = (dot(&angle, &up), dot(&self.turn, &up));
+        let turns = libm::fabsf(yaw) > TURNING;
+        if !turns || yaw * before < 0.0 {
+            self.known = self.now();
+            self.turn = [0.0; 3];
+        }
+        if turns {
+            self.turn.iter_mut().zip(angle).for_each(|(sum, axis)| *sum += axis);
+        }
+    }
+
+    /// Returns the vertical with the turn that goes on.
+    #[must_use]
+    pub fn now(&self) -> Vertical {
+        let yaw = dot(&self.turn, &self.known.up());
+        if libm::fabsf(yaw) < LEAST_TURN {
+            return self.known;
+        }
+        let length = sqrt(dot(&self.turn, &self.turn));
+        let direction = self.turn.map(|axis| axis / libm::copysignf(length, yaw));
+        self.known.with(&direction, (2.0 * SLOPE * SLOPE / (yaw * yaw)).max(LEAN * LEAN))
+    }
+
+    /// Returns the standstills and turns that are complete.
+    #[must_use]
+    pub fn known(&self) -> &Vertical {
+        &self.known
+    }
+
+    /// Judges what the tilt is. `learnt` is the deviation of up that a model corrects, `None` without a model, and
+    /// `is_proven` whether driving has shown that it is this sensor's.
+    pub fn judge(&mut self, learnt: Option<[f32; 2]>, is_proven: bool) -> Judgement {
+        let (now, configured) = (self.now(), learnt.unwrap_or_default());
+        let before = match learnt {
+            None => CONFIGURED,
+            Some(_) if is_proven => PROVEN,
+            Some(_) => MODEL_S,
+        };
+        let odds = before + now.odds(configured);
+        self.is_tilted = odds < if self.is_tilted { AGAIN } else { 0.0 };
+        let up = now.up();
+        if self.is_tilted {
+            return Judgement { up: Some(up), variance: now.sigma() * now.sigma() };
+        }
+        let [x, y, _] = up;
+        let off = [x - configured[0], y - configured[1]];
+        Judgement { up: None, variance: dot(&off, &off) / (1.0 + libm::expf(odds)) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NONE: [f32; 2] = [0.0; 2];
+    const MODEL: Option<[f32; 2]> = Some([0.03, 0.06]);
+
+    /// Readings of a sensor whose up is tilted by these angles about y and x, small: at rest, and turning.
+    fn readings([x, y]: [f32; 2], yaw: f32) -> ([SpecificForce; 3], [AngularRate; 3]) {
+        let up = [libm::sinf(x.to_radians()), libm::sinf(y.to_radians()), 1.0];
+        let length = sqrt(dot(&up, &up));
+        let up = up.map(|axis| axis / length);
+        (
+            up.map(|axis| SpecificForce::from_metre_per_sec2(9.81 * axis).unwrap()),
+            up.map(|axis| AngularRate::from_rad_per_sec(yaw * axis).unwrap()),
+        )
+    }
+
+    /// Lets it see seconds of a sensor with this tilt.
+    fn run(estimator: &mut VerticalEstimator, seconds: u32, tilt: [f32; 2], yaw: f32, stands: bool) {
+        let (force, rate) = readings(tilt, yaw);
+        (0..100 * seconds).for_each(|_| drop(estimator.add(&force, &rate, stands)));
+    }
+
+    /// Stands on streets with these slopes, half a minute apart.
+    fn stood(slopes: &[[f32; 2]]) -> VerticalEstimator {
+        let mut estimator = VerticalEstimator::new(Vertical::UNKNOWN);
+        for slope in slopes {
+            run(&mut estimator, 20, *slope, 0.0, true);
+            run(&mut estimator, 30, NONE, 0.0, false);
+        }
+        estimator
+    }
+
+    fn roll(estimator: &mut VerticalEstimator) -> Option<f32> {
+        estimator.judge(None, false).up.map(|[_, y, _]| y.asin().to_degrees())
+    }
+
+    #[test]
+    fn a_street_is_told_from_a_mounting_by_its_slope_and_by_turns() {
+        assert_eq!(roll(&mut stood(&[[0.0, 7.0]])), None, "it may be a street");
+        assert!(roll(&mut stood(&[[0.0, 12.0]])).is_some_and(|roll| roll > 10.0), "no street is as steep");
+        for (turned, seconds) in [(0.4, 20), (-0.4, 20)] {
+            // The turn confirms the tilt, before it ends.
+            let mut estimator = stood(&[[0.0, 7.0]]);
+            run(&mut estimator, seconds, [0.0, 7.0], turned, false);
+            let found = roll(&mut estimator).expect("a tilt");
+            assert!((found - 7.0).abs() < 0.5, "{found}");
+            // Or shows that it was the street's.
+            let mut estimator = stood(&[[0.0, 7.0]]);
+            run(&mut estimator, seconds, NONE, turned, false);
+            assert_eq!(roll(&mut estimator), None);
+        }
+        // A bend of 0.3 rad shows nothing.
+        let mut estimator = stood(&[[0.0, 7.0]]);
+        run(&mut estimator, 3, [0.0, 7.0], 0.1, false);
+        run(&mut estimator, 3, NONE, 0.0, false);
+        assert_eq!(roll(&mut estimator), None);
+    }
+
+    #[test]
+    fn slopes_average_out_and_the_sigma_says_how_well() {
+        let slopes = [[3.0, 10.0], [-3.0, 4.0], [0.0, 7.0], [2.0, 5.0], [-2.0, 9.0]];
+        let mut estimator = stood(&slopes);
+        let found = roll(&mut estimator).expect("five stops agree");
+        assert!((found - 7.0).abs() < 0.4, "{found}");
+        let known = *estimator.known();
+        let [roll, pitch, sigma] = known.tilt_deg();
+        assert!((roll - 7.0).abs() < 0.4 && pitch.abs() < 0.2, "{roll} {pitch}");
+        assert!((1.4..1.6).contains(&sigma), "3.5 deg over the root of five: {sigma}");
+        assert_eq!(known.knowledge(), Knowledge::Fine);
+        assert_eq!(stood(&slopes[..1]).known().knowledge(), Knowledge::Coarse);
+        assert_eq!(Vertical::UNKNOWN.knowledge(), Knowledge::Unknown);
+        // Many more do not make it certain, so that another mounting is found again.
+        let mut estimator = stood(&[[0.0, 7.0]; 100]);
+        let before = estimator.known().sigma();
+        assert!((0.9..1.1).contains(&before.to_degrees()) && estimator.known().is_plausible(), "{before}");
+        for _ in 0..40 {
+            run(&mut estimator, 20, [0.0, -7.0], 0.0, true);
+            run(&mut estimator, 20, NONE, 0.0, false);
+        }
+        assert!(estimator.known().up()[1].asin().to_degrees() < -5.0);
+    }
+
+    #[test]
+    fn one_stop_counts_once_and_a_gap_ends_a_turn() {
+        let mut estimator = stood(&[[0.0, 7.0]]);
+        let before = *estimator.known();
+        // It creeps on in a queue.
+        run(&mut estimator, 4, [0.0, 7.0], 0.0, true);
+        let queued = *estimator.known();
+        for _ in 0..5 {
+            run(&mut estimator, 5, NONE, 0.0, false);
+            run(&mut estimator, 10, [0.0, 7.0], 0.0, true);
+        }
+        assert!(queued != before && *estimator.known() == queued);
+        for _ in 0..5 {
+            run(&mut estimator, 2, [0.0, 7.0], 0.2, false);
+            estimator.restart();
+        }
+        run(&mut estimator, 2, NONE, 0.0, false);
+        assert_eq!(*estimator.known(), queued);
+    }
+
+    #[test]
+    fn a_model_s_own_mounting_is_left_to_it() {
+        let learnt = Some([0.0, libm::sinf(5f32.to_radians())]);
+        let mut estimator = stood(&[[0.0, 7.0], [0.0, 6.0], [1.0, 5.0]]);
+        assert_eq!(estimator.judge(learnt, false).up, None);
+        assert!(estimator.judge(Some([0.0, -0.1]), false).up.is_some(), "another unit's");
+        let mut estimator = stood(&[[0.0, 12.5], [0.0, 12.5]]);
+        assert!(estimator.clone().judge(MODEL, false).up.is_some());
+        assert_eq!(estimator.judge(MODEL, true).up, None, "driving has shown it");
+    }
+
+    #[test]
+    fn what_was_known_has_the_same_vertical_in_other_axes() {
+        let known = *stood(&[[5.0, -9.0], [4.0, -8.0]]).known();
+        let mounting = Rotation::from_mounting(90.0, 0.0, 30.0).unwrap();
+        let there = known.turned(&mounting.inverse()).turned(&mounting);
+        assert!(known.up().iter().zip(there.up()).all(|(a, b)| (a - b).abs() < 1e-5));
+        assert!(!there.differs(&known) && known.differs(&Vertical::UNKNOWN));
+    }
+}

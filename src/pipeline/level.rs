@@ -1,0 +1,158 @@
+//! The rotation beyond the configured mounting, which follows the vertical that standstills and turns have shown.
+//!
+//! It follows slowly, so that neither a rate nor a window of the network jumps.
+
+use super::sensor_bias::ZeroPoint;
+use super::{Pipeline, PipelineConfig};
+use crate::bias::EarthRate;
+use crate::compensate::Compensator;
+use crate::mounting::{Judgement, Rotation, Vertical, VerticalEstimator};
+use crate::sample::ImuSample;
+use crate::sqrt::sqrt;
+use crate::units::{AngularRate, SpecificForce};
+use crate::vector::dot;
+
+/// Samples between two steps, and the largest step: 3 degrees in a second.
+const STEP_SAMPLES: u32 = 5;
+const STEP: f32 = 2.6e-3;
+/// Where a configured sensor's z axis points.
+const Z: [f32; 3] = [0.0, 0.0, 1.0];
+
+/// The mounting beyond the configured one.
+#[derive(Debug, Clone)]
+pub(super) struct Level {
+    /// `None` where a calibration has measured the tilt.
+    estimator: Option<VerticalEstimator>,
+    /// Up, as the sensor is mounted: where it should be, and where it is taken to be.
+    goal: [f32; 3],
+    up: [f32; 3],
+    rotation: Rotation,
+    /// Mean rates at rest, not levelled.
+    rest: [AngularRate; 3],
+    samples: u32,
+    /// Variance of the direction of the axis in use, rad^2.
+    variance: f32,
+    /// The vertical that was reported last.
+    reported: Vertical,
+}
+
+impl Level {
+    /// Starts with the rates at rest, the specific force at rest unless the vehicle moves, and what earlier drives have
+    /// shown.
+    pub(super) fn new(
+        rest: [AngularRate; 3],
+        force: Option<&[SpecificForce; 3]>,
+        known: Option<Vertical>,
+    ) -> Self {
+        let mut level = Self {
+            estimator: known.map(VerticalEstimator::new),
+            goal: Z,
+            up: Z,
+            rotation: Rotation::IDENTITY,
+            rest,
+            samples: 0,
+            variance: 0.0,
+            reported: Vertical::UNKNOWN,
+        };
+        if let Some(estimator) = &mut level.estimator {
+            force.into_iter().for_each(|force| estimator.rest(force));
+            // A model's mounting is known only with its first window.
+            let judgement = estimator.judge(None, false);
+            level.take(judgement);
+            level.up = level.goal;
+            level.rotation = Rotation::upright(&level.up);
+        }
+        level
+    }
+
+    /// Returns the gyro's reading at rest, levelled.
+    pub(super) fn rates_at_rest(&self) -> [AngularRate; 3] {
+        self.rotation.rate(self.rest)
+    }
+
+    /// Returns the same, of which the Earth's rate is a part.
+    pub(super) fn zero(&self, earth: EarthRate) -> ZeroPoint {
+        ZeroPoint::at_rest(self.rates_at_rest(), earth)
+    }
+
+    pub(super) fn rotation(&self) -> &Rotation {
+        &self.rotation
+    }
+
+    /// Returns the rates less those at rest, not levelled.
+    pub(super) fn rates(&self, sample: &ImuSample) -> [AngularRate; 3] {
+        core::array::from_fn(|axis| {
+            AngularRate(sample.angular_rate[axis].0.saturating_sub(self.rest[axis].0))
+        })
+    }
+
+    /// Adds a sample that is not levelled yet. Returns true where the rotation has changed.
+    pub(super) fn add(&mut self, sample: &ImuSample, stands: bool, compensator: &mut Compensator) -> bool {
+        let rates = self.rates(sample);
+        let Some(estimator) = &mut self.estimator else { return false };
+        if !sample.validity.is_good() {
+            estimator.restart();
+        } else if estimator.add(&sample.specific_force, &rates, stands) {
+            let judgement = estimator.judge(compensator.learnt_up(), compensator.is_own_mounting());
+            compensator.level(judgement.up.is_some());
+            self.take(judgement);
+        }
+        self.samples = (self.samples + 1) % STEP_SAMPLES;
+        self.samples == 0 && self.follow()
+    }
+
+    fn take(&mut self, judgement: Judgement) {
+        self.goal = judgement.up.unwrap_or(Z);
+        self.variance = judgement.variance;
+    }
+
+    /// Moves up by a step towards its goal.
+    fn follow(&mut self) -> bool {
+        let way: [f32; 3] = core::array::from_fn(|axis| self.goal[axis] - self.up[axis]);
+        let length = sqrt(dot(&way, &way));
+        if length <= 1e-6 {
+            return false;
+        }
+        let part = (STEP / length).min(1.0);
+        let up: [f32; 3] = core::array::from_fn(|axis| self.up[axis] + part * way[axis]);
+        let norm = sqrt(dot(&up, &up)).max(0.1);
+        self.up = if part < 1.0 { up.map(|axis| axis / norm) } else { self.goal };
+        self.rotation = Rotation::upright(&self.up);
+        true
+    }
+
+    /// Starts the current turn again after a gap.
+    pub(super) fn restart(&mut self) {
+        if let Some(estimator) = &mut self.estimator {
+            estimator.restart();
+        }
+    }
+
+    pub(super) fn vertical(&self) -> Option<&Vertical> {
+        self.estimator.as_ref().map(VerticalEstimator::known)
+    }
+}
+
+impl Pipeline {
+    /// Returns what standstills and turns have shown, in the sensor's axes, where it has changed.
+    pub(super) fn new_vertical(&mut self) -> Option<Vertical> {
+        let PipelineConfig { mounting, .. } = &self.config;
+        let level = &mut self.state.initialised.as_mut()?.level;
+        let known = *level.vertical()?;
+        let is_new = core::mem::replace(&mut level.reported, known) != known;
+        is_new.then(|| known.turned(&mounting.inverse()))
+    }
+
+    /// Returns the variance of the direction of the axis in use, rad^2, and whether a tilt is taken off.
+    pub(super) fn tilt_variance(&self) -> (f32, bool) {
+        let known = self.state.initialised.as_ref();
+        known.map_or((0.0, false), |known| (known.level.variance, known.level.goal != Z))
+    }
+}
+
+/// Returns the rotation that earlier drives have shown.
+pub(super) fn early(config: &PipelineConfig) -> Rotation {
+    let known = config.vertical.turned(&config.mounting);
+    let judged = VerticalEstimator::new(known).judge(None, false);
+    judged.up.filter(|_| config.levelling).map_or(Rotation::IDENTITY, |up| Rotation::upright(&up))
+}
