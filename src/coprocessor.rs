@@ -97,7 +97,7 @@ pub struct Coprocessor {
     latitude: Option<LatitudeReceiver>,
     second: SecondSource,
     /// The newest usable rates of the inertial and the fibre-optic gyro, rad/s.
-    inertial_rate: Option<f32>,
+    inertial_rate: Option<(Micros, f32)>,
     fog_rate: Option<f32>,
     encoder: CanEncoder,
     fog_encoder: FogEncoder,
@@ -224,7 +224,7 @@ impl Coprocessor {
         }
         let rate = Some(output.vehicle.live).filter(|live| live.source != Source::Raw).map(rad_per_sec);
         let [_, lateral, _] = output.vehicle.specific_force;
-        self.inertial_rate = rate;
+        self.inertial_rate = rate.map(|rate| (self.timeline.time(), rate));
         self.second.add(&Shown {
             inertial: rate,
             fog: self.fog_rate,

@@ -52,18 +52,20 @@ const CLOCK: f32 = 0.01;
 
 /// Difference of a step's rate from the inertial gyro's that no vehicle has, rad/s and as a share of it, and the steps for
 /// which it is rejected.
-const DIFFERS: (f32, f32) = (0.3, 0.1);
+const DIFFERS: (f32, f32) = (3.0, 0.5);
 const DOUBTED: u32 = 2 * RATE_HZ;
 /// Share of the rate, 1 sigma, that the slope of a street, the mounting and a unit's gain hide from any gyro, and with
 /// an inertial gyro until both have been compared in turns.
-const SHARE: f32 = 0.0025;
-const UNKNOWN_SHARE: f32 = 0.03;
+const SHARE: f32 = 0.0005;
+const UNKNOWN_SHARE: f32 = 0.01;
+/// Difference of both gains that is the inertial gyro's, whose data sheet allows it.
+const INERTIAL_GAIN: f32 = 0.01;
 
 /// What the inertial sensor shows besides.
 #[derive(Debug, Clone, Copy)]
 pub struct Beside {
-    /// The yaw rate, rad/s.
-    pub rate: Option<f32>,
+    /// The newest yaw rate, rad/s, and its time.
+    pub rate: Option<(Micros, f32)>,
     /// The share of a turn that a gyro misses on the present slope.
     pub tilted: f32,
     /// How much the gains of both gyros differ; `None` before they have turned.
@@ -74,15 +76,19 @@ impl Beside {
     /// There is no inertial sensor.
     pub const NOTHING: Self = Self { rate: None, tilted: 0.0, scale: None };
 
-    fn differs(&self, turn: Angle) -> bool {
+    /// Returns whether the turn of a step differs from the rate at that time.
+    fn differs(&self, turn: Angle, time: Micros) -> bool {
         let own = turn.0 as f32 * (RATE_HZ as f32 / Angle::PER_RAD);
-        self.rate.is_some_and(|rate| (own - rate).abs() > DIFFERS.0 + DIFFERS.1 * rate.abs())
+        let at_once = |at: &Micros| at.0.abs_diff(time.0) <= 2 * PERIOD_US;
+        self.rate
+            .filter(|(at, _)| at_once(at))
+            .is_some_and(|(_, rate)| (own - rate).abs() > DIFFERS.0 + DIFFERS.1 * rate.abs())
     }
 
     /// Returns the share of the rate by which it may be off, 1 sigma.
     fn share(&self) -> f32 {
         let scale = match (self.scale, self.rate) {
-            (Some(scale), _) => scale,
+            (Some(scale), _) => (scale - INERTIAL_GAIN).max(0.0),
             (None, Some(_)) => UNKNOWN_SHARE,
             (None, None) => 0.0,
         };
@@ -296,7 +302,7 @@ impl FogPipeline {
         let turn = turn.filter(|_| u64::from(step.turn.covered) == PERIOD_US);
         let reading = self.earth_and_bias.rest().reading();
         self.shown = turn.map(|turn| turn.0 as f32 * (RATE_HZ as f32 / Angle::PER_RAD) - reading);
-        let differs = turn.is_some_and(|turn| self.beside.differs(turn));
+        let differs = turn.is_some_and(|turn| self.beside.differs(turn, step.time));
         self.rejected = if differs { self.rejected.saturating_add(1) } else { 0 };
         let wrong = differs && self.rejected <= DOUBTED;
         let turn = turn.filter(|_| !wrong);

@@ -186,13 +186,14 @@ impl RestReading {
         self.stood = self.stood.saturating_add(1);
     }
 
-    /// Returns what a standing vehicle has turned in the last second beyond the reading at rest, rad, or the doubt of the
-    /// newest standstill, rad/s, if that is larger: the vehicle turns, or the gyro's bias has changed.
+    /// Returns what a standing vehicle has turned in the last second beyond the reading at rest and its noise, rad, or the
+    /// doubt of the newest standstill, rad/s, if that is larger: the vehicle turns, or the gyro's bias has changed.
     fn against(&self) -> f32 {
         let steps = self.stood.min(RATE_HZ + self.stood % QUARTER);
         let turned = self.turned.iter().sum::<i64>() as f32 / Angle::PER_RAD;
         let expected = self.combined().mean * steps as f32 / RATE_HZ as f32;
-        self.doubt.max(if self.stood > 0 { (turned - expected).abs() } else { 0.0 })
+        let beyond = (turned - expected).abs() - 3.0 * sqrt(self.noise);
+        self.doubt.max(if self.stood > 0 { beyond } else { 0.0 })
     }
 
     /// Returns the reading at rest that is subtracted, rad/s.

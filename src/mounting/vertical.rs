@@ -295,7 +295,7 @@ mod tests {
     /// Lets it see seconds of a sensor with this tilt.
     fn run(estimator: &mut VerticalEstimator, seconds: u32, tilt: [f32; 2], yaw: f32, stands: bool) {
         let (force, rate) = readings(tilt, yaw);
-        (0..100 * seconds).for_each(|_| drop(estimator.add(&force, &rate, stands)));
+        (0..100 * seconds).for_each(|_| _ = estimator.add(&force, &rate, stands));
     }
 
     /// Stands on streets with these slopes, half a minute apart.
