@@ -178,7 +178,7 @@ impl RestReading {
     }
 
     fn turn(&mut self, turn: Angle) {
-        if self.stood % QUARTER == 0 {
+        if self.stood.is_multiple_of(QUARTER) {
             self.turned.rotate_right(1);
             self.turned[0] = 0;
         }
