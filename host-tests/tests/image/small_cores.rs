@@ -22,7 +22,7 @@ const BOARDS: [Board; 2] = [
         name: "microbit",
         target: "thumbv6m-none-eabi",
         hertz: 16_000_000,
-        models: &[(0, 36_000), (8, 390_000), (16, 1_000_000)],
+        models: &[(0, 36_000), (8, 390_000), (16, 1_010_000)],
     },
     Board {
         name: "lm3s6965evb",
