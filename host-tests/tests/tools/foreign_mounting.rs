@@ -1,6 +1,6 @@
 //! The default model's mounting is the training car's: it stays on that car's drives, and goes out on simulated vehicles,
-//! whose units are mounted otherwise. There the delayed rate is then better than static initialisation and zero-rate
-//! updates alone.
+//! whose units are mounted otherwise. There the delayed rate is then better, on average, than static initialisation
+//! and zero-rate updates alone.
 
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Blob, Estimate, GyroNet, WindowNetwork, weights};
@@ -14,9 +14,8 @@ use gyronet_tools::simulate::{Config, csv};
 
 /// All drives of the training car that have wheel speeds.
 const TRIALS: [u32; 8] = [2, 3, 4, 6, 7, 8, 9, 11];
-const SEEDS: [u64; 4] = [1, 2, 3, 4];
-/// The vehicle that does not gain yet, since a bias that one standstill has shown is a claim: 1.16 of the error.
-const KNOWN_WORSE: u64 = 4;
+/// Simulated vehicles: their mean decides, since the bias of one standstill is a drive's own luck.
+const SEEDS: std::ops::Range<u64> = 101..149;
 
 /// Corrects nothing.
 struct Nothing;
@@ -55,21 +54,25 @@ fn the_training_car_keeps_its_mounting() {
 }
 
 #[test]
-fn a_simulated_vehicle_loses_it_and_gains() {
-    let ran = parallel::map(&SEEDS, |seed| {
+fn simulated_vehicles_lose_it_and_gain_on_average() {
+    let seeds: Vec<u64> = SEEDS.collect();
+    let ran = parallel::map(&seeds, |seed| {
         let mut bytes = Vec::new();
         csv::write(&Config { seed: *seed, ..Config::DEFAULT }, &mut bytes).expect("memory");
         let recording = Recording::parse("simulated.csv", &bytes[..]).expect("a drive");
         (run(&recording, &mut default_model()), run(&recording, &mut Nothing))
     });
-    for (seed, ((found, default), (_, without))) in SEEDS.iter().zip(ran) {
-        println!("seed {seed}: 1 s error {:.3} of that without a correction", default / without);
+    let (mut default, mut without, mut worse) = (0.0, 0.0, 0);
+    for (seed, ((found, with), (_, alone))) in SEEDS.zip(ran) {
         assert_eq!(found, 1, "seed {seed}");
-        let gains = *seed != KNOWN_WORSE;
-        assert_eq!(
-            default < without,
-            gains,
-            "seed {seed}: {default} rad, {without} rad without a correction"
-        );
+        default += with;
+        without += alone;
+        worse += u32::from(with > alone);
     }
+    println!(
+        "1 s error {:.3} of that without a correction, {worse} of {} worse",
+        default / without,
+        seeds.len()
+    );
+    assert!(default < without, "{default} rad, {without} rad without a correction");
 }
