@@ -49,7 +49,6 @@ pub struct Seen {
     pub frame: DataFrame,
 }
 
-/// A board in the model.
 #[derive(Debug)]
 pub struct Board {
     link: Link,
@@ -85,7 +84,6 @@ impl Board {
         self.ask("power_off", json!({}));
     }
 
-    /// Removes power for a time.
     pub fn power_cycle(&mut self, off: Duration) {
         self.power_off();
         self.run(off);
@@ -186,7 +184,6 @@ impl Board {
         self.ask("set", json!({ "values": { name: value.into() } }));
     }
 
-    /// Takes the event log.
     pub fn events(&mut self) -> Vec<Event> {
         let answer = self.ask("events_take", json!({}));
         list(&answer["events"]).iter().map(Event::new).collect()
@@ -251,12 +248,10 @@ impl Board {
         list(&answer["paths"]).iter().map(path).collect()
     }
 
-    /// Saves the state of the whole board under a name.
     pub fn snapshot(&mut self, name: &str) {
         self.ask("snapshot", json!({ "name": name }));
     }
 
-    /// Restores a saved state.
     pub fn restore(&mut self, name: &str) {
         self.ask("restore", json!({ "name": name }));
     }

@@ -31,7 +31,6 @@ impl Noise {
         self.bits().to_le_bytes()[7]
     }
 
-    /// Returns one of `from..=to`.
     pub fn int(&mut self, from: i64, to: i64) -> i64 {
         let span = to.abs_diff(from) as u128 + 1;
         // The high half of a 64 x 64 bit product: uniform to one part in 2^64 / span.

@@ -12,7 +12,6 @@ pub struct Row {
     pub bias: i32,
     /// The multiplier: gate input = accumulator * multiplier / 2^16.
     pub multiplier: i16,
-    /// The weights of the inputs.
     pub input: Vec<i8>,
     /// The weights of the hidden state.
     pub recurrent: Vec<i8>,

@@ -59,7 +59,6 @@ pub struct Board {
     silent: u64,
     /// The number of message sets without a rate that were followed.
     pub followed: u64,
-    /// The lines that it has sent.
     pub lines: Vec<Vec<u8>>,
 }
 
@@ -134,7 +133,6 @@ impl Board {
         Micros(self.now.0 + if self.silent == 0 { first } else { PERIOD_US })
     }
 
-    /// Receives bytes of the inertial sensor.
     pub fn push(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.mti.receive(*byte);
@@ -156,7 +154,6 @@ impl Board {
         let _ = self.coprocessor.can(frame, self.now);
     }
 
-    /// Receives bytes of the fibre-optic gyro.
     pub fn push_fog(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.dsp1760.receive(*byte);
@@ -175,7 +172,6 @@ impl Board {
         }
     }
 
-    /// Runs the windows that are due.
     fn estimate(&mut self) {
         if let Some(due) = self.coprocessor.window() {
             let estimate = self.network.estimate(&due.features);

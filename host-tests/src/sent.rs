@@ -3,12 +3,9 @@
 use gyronet::coprocessor::{Sink, TimedFrame};
 use gyronet::estimate::YawEstimate;
 
-/// Everything that was sent.
 #[derive(Debug, Clone, Default)]
 pub struct Sent {
-    /// Frames, in the order of sending.
     pub frames: Vec<TimedFrame>,
-    /// Rates of the fibre-optic gyro.
     pub fog: Vec<YawEstimate>,
 }
 

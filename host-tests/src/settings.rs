@@ -50,7 +50,6 @@ fn three(noise: &mut Noise, usual: [u16; 3]) -> [u16; 3] {
     if noise.int(0, 1) == 0 { usual } else { [(); 3].map(|()| one(noise, &IDS)) }
 }
 
-/// Any mode.
 fn mode(noise: &mut Noise) -> Mode {
     match noise.int(0, 11) {
         0 => Mode::Newest,
@@ -59,7 +58,6 @@ fn mode(noise: &mut Noise) -> Mode {
     }
 }
 
-/// Returns a configuration.
 pub fn configuration(noise: &mut Noise) -> Configuration {
     let default = Configuration::DEFAULT;
     let yaw = default.can.yaw.expect("it is sent");
@@ -139,7 +137,6 @@ pub fn configuration(noise: &mut Noise) -> Configuration {
     }
 }
 
-/// Returns settings of the wheel frame.
 pub fn wheels(noise: &mut Noise) -> WheelSettings {
     let id = match noise.int(0, 3) {
         0 => Id::Extended(ExtendedId::new(one(noise, &LONG_IDS)).expect("29 bits")),

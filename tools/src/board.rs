@@ -38,16 +38,11 @@ impl WindowNetwork for Uncorrected {
     }
 }
 
-/// The results of one row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
-    /// Index of the row in the recording.
     pub row: usize,
-    /// The row itself.
     pub input: Row,
-    /// The sample's time stamp.
     pub time: Micros,
-    /// The standstill by the wheels.
     pub standstill: Standstill,
     /// The estimates that were sent with this row.
     pub vehicle: VehicleSample,
@@ -59,7 +54,6 @@ pub struct Step {
     pub complete: AngularRate,
     /// The frames that were sent with this row, and those sent while the sensor was silent after it.
     pub frames: Vec<TimedFrame>,
-    /// Static initialisation has finished.
     pub is_initialised: bool,
     /// The rates of this step are compared with others: after static initialisation, and before the first step without
     /// a delayed rate.
@@ -115,7 +109,6 @@ impl<N: WindowNetwork> Board<N> {
         Self { may_move: true, takes_course, ..self }
     }
 
-    /// The coprocessor, to read its state.
     pub fn coprocessor(&self) -> &Coprocessor {
         &self.coprocessor
     }

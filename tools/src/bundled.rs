@@ -25,7 +25,6 @@ pub fn demo_drive() -> Result<Recording, DataError> {
     Recording::parse("simulated_drive.csv", &bytes[..])
 }
 
-/// Returns the f32 checkpoint of GyroNet.
 pub fn checkpoint() -> Result<Checkpoint<GyroNet>, CheckpointError> {
     Checkpoint::parse("gyronet.safetensors", CHECKPOINT)
 }

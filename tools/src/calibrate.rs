@@ -34,40 +34,22 @@ const MAX_RESIDUAL_RAD: f64 = 0.05;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrateError {
-    /// The drive cannot be replayed.
     #[error(transparent)]
     Replay(#[from] ReplayError),
-    /// The drive has no heading reference.
     #[error("{path}: no {columns}: a calibration needs one of these columns")]
-    NoReference {
-        path: String,
-        /// The columns that are missing.
-        columns: &'static str,
-    },
-    /// The reference of the drive is too short.
+    NoReference { path: String, columns: &'static str },
     #[error("{path}: only {seconds:.0} s with a reference; a calibration needs {SHORTEST_S:.0} s")]
     TooShort {
         path: String,
         /// The time with a reference, s.
         seconds: f64,
     },
-    /// No calibration makes the gyro agree with the reference.
     #[error(
         "{path}: reference and gyro differ by {rad:.3} rad from span to span: a wrong unit or clock, or another drive; `gyronet doctor` says which"
     )]
-    Contradiction {
-        path: String,
-        /// The robust deviation of the spans from the fit, rad.
-        rad: f64,
-    },
-    /// A share is larger than a real unit's can be.
+    Contradiction { path: String, rad: f64 },
     #[error("{what} {value:+.4} is too large for any unit; configure how the sensor is mounted")]
-    Implausible {
-        /// The name of the share.
-        what: &'static str,
-        /// The value of the share.
-        value: f64,
-    },
+    Implausible { what: &'static str, value: f64 },
 }
 
 /// A share that the fit has found, with its sigma.

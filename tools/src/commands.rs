@@ -68,7 +68,6 @@ pub struct Common {
     pub json: bool,
 }
 
-/// The error of a file that could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: {source}")]
 struct WriteError {

@@ -18,26 +18,20 @@ pub use costs::Cost;
 pub use short_table::ShortTable;
 pub use trajectory::{Path, Trajectories};
 
-/// Holds the results of one drive.
 #[derive(Debug)]
 pub struct Demo<'a> {
     pub drive: &'a Drive<'a>,
-    /// Says whether the drive is simulated.
     pub simulated: bool,
-    /// Its yaw rates.
     pub rates: &'a Rates,
     pub errors: Option<&'a DriveErrors>,
     /// The path of the vehicle by each method, where the drive has wheels.
     pub trajectories: Option<Trajectories>,
-    /// The messages of one sample.
     pub excerpt: Vec<Message>,
-    /// The figures of time and memory.
     pub costs: Vec<Cost>,
     /// Messages of the whole drive.
     pub frames: u64,
 }
 
-/// Holds the results for JSON.
 #[derive(Debug, Serialize)]
 pub struct Summary<'a> {
     name: &'a str,
@@ -77,7 +71,6 @@ impl<'a> Demo<'a> {
         }
     }
 
-    /// Returns the results for JSON.
     pub fn summary(&self) -> Summary<'_> {
         Summary {
             name: self.drive.name(),
@@ -94,7 +87,6 @@ impl<'a> Demo<'a> {
         }
     }
 
-    /// Returns the page as HTML.
     pub fn page(&self) -> String {
         page::page(self)
     }

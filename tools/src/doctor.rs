@@ -38,7 +38,6 @@ use std::path::Path;
 /// Shortest standstill in which a drive can start, s.
 const LEAST_REST_S: f64 = 4.0;
 
-/// The results of examining a recording.
 #[derive(Debug)]
 pub struct Doctor {
     pub name: String,
@@ -58,7 +57,6 @@ pub struct Doctor {
 }
 
 impl Doctor {
-    /// Examines a recording.
     pub fn examine(path: &Path) -> Result<Self, DataError> {
         let rows = Rows::read(path)?;
         let mut doctor = Self::of(&rows);
@@ -103,7 +101,6 @@ impl Doctor {
         }
     }
 
-    /// Returns the finding about a subject.
     pub fn finding(&self, what: &str) -> Option<&Finding> {
         self.findings.iter().find(|finding| finding.what == what)
     }

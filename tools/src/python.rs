@@ -11,7 +11,6 @@ use std::process::{Command, Stdio};
 pub enum PythonError {
     #[error("{}: {source}", program.display())]
     Start { program: PathBuf, source: std::io::Error },
-    /// The interpreter lacks a package.
     #[error("{}: {reason} (needed: {})", python.display(), packages.join(", "))]
     Packages {
         python: PathBuf,
@@ -20,7 +19,6 @@ pub enum PythonError {
         /// All packages that the step needs.
         packages: Vec<String>,
     },
-    /// A command that creates the environment failed; the command has printed its own error message.
     #[error("{}: could not be created: {step} failed (without a network, pass --python with a Python that has all packages)", environment.display())]
     Environment { environment: PathBuf, step: &'static str },
     #[error(
@@ -31,14 +29,12 @@ pub enum PythonError {
         "logs are read by Python 3.11 or later, and python3 is older: set GYRONET_PYTHON to a later one with tools/python/requirements.txt"
     )]
     OldPython,
-    /// Neither a checkout nor an installed package.
     #[error(
         "this needs the Python package gyronet {version}, which python3 does not have: pip install ./tools/python in gyronet's repository"
     )]
     NoPackage { version: &'static str },
     #[error("{}: {source}", folder.display())]
     Folder { folder: PathBuf, source: std::io::Error },
-    /// The environment of the package could not be made; nothing of it is left.
     #[error(
         "the Python packages that read logs could not be installed: {step}: {reason} (without a network: pip install -r tools/python/requirements.txt from a mirror, and GYRONET_PYTHON)"
     )]

@@ -5,7 +5,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
-/// A stream of random numbers.
 #[derive(Debug, Clone)]
 pub struct Random(ChaCha8Rng);
 
@@ -16,7 +15,6 @@ impl Random {
         Self(rng)
     }
 
-    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         StandardUniform.sample(&mut self.0)
     }

@@ -10,7 +10,6 @@ use gyronet::health::states::STATES;
 use gyronet::uds::data::{Access, IDENTIFIERS};
 use gyronet::uds::dtc::TROUBLES;
 
-/// Data identifiers of diagnosis.
 pub fn identifiers() -> Table {
     let mut table = Table::new(&["identifier", "name", "bytes", "content", "services"]);
     for of in &IDENTIFIERS {
@@ -24,7 +23,6 @@ pub fn identifiers() -> Table {
     table
 }
 
-/// Trouble codes (DTCs).
 pub fn troubles() -> Table {
     let mut table = Table::new(&["code", "bytes", "trouble", "check"]);
     for trouble in &TROUBLES {
@@ -34,7 +32,6 @@ pub fn troubles() -> Table {
     table
 }
 
-/// States of the yaw rate.
 pub fn states() -> Table {
     let mut table =
         Table::new(&["state", "status in data 0104", "when", "yaw rate on CAN", "until", "counter"]);

@@ -17,17 +17,10 @@ const PUBLIC: &str = "gyronet public key 1";
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum KeyError {
-    /// The file cannot be read or written.
     #[error("{}: {source}", path.display())]
     File { path: PathBuf, source: std::io::Error },
-    /// The file is not a key file of the expected kind.
     #[error("{}: not a {what}", path.display())]
-    Content {
-        path: PathBuf,
-        /// The expected kind of key.
-        what: &'static str,
-    },
-    /// The system has no random numbers.
+    Content { path: PathBuf, what: &'static str },
     #[error("the system gives no random numbers: {0}")]
     Random(getrandom::Error),
 }
@@ -43,7 +36,6 @@ impl PrivateKey {
         Ok(Self(SigningKey::from_bytes(&secret)))
     }
 
-    /// Reads `NAME.key`.
     pub fn read(path: &Path) -> Result<Self, KeyError> {
         Ok(Self(SigningKey::from_bytes(&read(path, PRIVATE)?)))
     }
@@ -93,12 +85,10 @@ impl PrivateKey {
     }
 }
 
-/// Reads `NAME.pub`.
 pub fn read_public(path: &Path) -> Result<[u8; 32], KeyError> {
     read(path, PUBLIC)
 }
 
-/// Returns bytes as hexadecimal digits.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut text, byte| {
         let _ = write!(text, "{byte:02X}");

@@ -28,16 +28,13 @@ use route::Route;
 use vibration::Vibration;
 use warming::{Trip, Warming};
 
-/// Holds the parameters of a simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
-    /// Length, s.
     pub seconds: u32,
     /// Seed of the route, the road and the part.
     pub seed: u64,
     pub car: car::Config,
     pub vibration: vibration::Config,
-    /// The part.
     pub mems: mems::Config,
     /// A trip on which the part warms up; it replaces the part's bias.
     pub warming: Option<warming::Config>,
@@ -85,7 +82,6 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Starts at rest.
     pub fn new(config: &Config) -> Self {
         let (seed, warming) = (config.seed, config.warming);
         let route = match warming.map(|warming| warming.trip) {
@@ -134,7 +130,6 @@ impl Iterator for Simulation {
     }
 }
 
-/// The sum of two vectors.
 pub fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| a[axis] + b[axis])
 }

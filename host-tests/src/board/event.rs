@@ -3,7 +3,6 @@
 use serde_json::Value;
 use std::time::Duration;
 
-/// An entry of the event log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
     pub time: Duration,
@@ -39,7 +38,6 @@ impl Event {
 /// The counts of a board since its first power-on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Counts {
-    /// Instructions that ran.
     pub instructions: u64,
     pub time: Duration,
     /// Board time during which the core slept.

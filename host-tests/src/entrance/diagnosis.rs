@@ -20,7 +20,6 @@ const SUPPORTED_HARDWARE: SupportedHardware =
 
 type Board = Device<RamFlash<SECTOR>, RamFlash<RECORD_SECTOR>>;
 
-/// A server on its board, and the time in milliseconds.
 struct Bench {
     server: Server,
     board: Board,

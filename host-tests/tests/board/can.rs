@@ -269,7 +269,6 @@ fn no_acknowledgement_for_a_while() {
     assert!(dropped.abs_diff(missing) <= SET, "{dropped} counted, {missing} missing");
 }
 
-/// Times of the events of a kind.
 fn times(kind: &str, events: &[Event]) -> Vec<Duration> {
     events.iter().filter(|event| event.kind == kind).map(|event| event.time).collect()
 }

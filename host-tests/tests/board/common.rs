@@ -58,12 +58,10 @@ pub fn host(samples: &[Vec<u8>]) -> Vec<DataFrame> {
     lines.iter().map(|line| slcan::parse(line).expect("a frame")).collect()
 }
 
-/// The frames alone.
 pub fn frames(timed: &[(Duration, DataFrame)]) -> Vec<DataFrame> {
     timed.iter().map(|(_, frame)| *frame).collect()
 }
 
-/// The state that the board reports.
 pub fn info(board: &mut Board) -> Info {
     service::info(board)
 }
@@ -72,7 +70,6 @@ pub fn counters(board: &mut Board) -> AllCounters {
     service::on_line(board).counters().expect("a response")
 }
 
-/// Times and causes of resets.
 pub fn resets(board: &mut Board) -> Vec<(Duration, String)> {
     let events = board.events();
     let resets = events.iter().filter(|event| event.kind == "reset");

@@ -13,7 +13,6 @@ fn sample(time: u64, rate: i32) -> ImuSample {
     ImuSample { time: Micros(time), ..turning(0, AngularRate(rate)) }
 }
 
-/// The steps that a sample completes.
 fn steps(aligner: &mut Aligner, sample: ImuSample) -> Result<Vec<Frame>, AlignError> {
     aligner.add(sample)?;
     Ok(std::iter::from_fn(|| aligner.next_frame()).collect())

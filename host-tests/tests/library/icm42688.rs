@@ -138,7 +138,6 @@ impl Bus {
         self.read(0x75, &[identity]);
     }
 
-    /// A good start.
     fn start(&mut self, registers: &[(u8, u8, u8, u8); 17]) {
         self.reset(0x47);
         for &(bank, address, after_reset, value) in registers {

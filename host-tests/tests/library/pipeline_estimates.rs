@@ -110,7 +110,6 @@ fn a_rate_beyond_the_signal_is_marked() {
     assert_eq!((last.rate, last.rate_status), (0, SignalStatus::FAILURE));
 }
 
-/// TX1 of each sample.
 fn tx1(encoder: &mut CanEncoder, outputs: &[Output]) -> Vec<Message> {
     let mut first = |output: &Output| encoder.encode(&output.vehicle)[0];
     outputs.iter().map(|output| Message::parse(first(output).data()).expect("a good checksum")).collect()

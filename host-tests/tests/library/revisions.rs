@@ -90,7 +90,6 @@ impl Ledger {
 /// The steady gain of every estimate here: 3 and 2 % of roll and pitch rate, 0.1 % of the yaw rate.
 const STEADY_GAIN: SteadyGain = SteadyGain([503_316, -335_544, 16_777]);
 
-/// The faults of a stream.
 #[derive(Clone, Copy)]
 struct Faults {
     gaps: bool,

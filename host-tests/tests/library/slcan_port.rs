@@ -18,7 +18,6 @@ const QUEUE: usize = 32;
 /// Bits for a byte: start, eight, stop.
 const BITS: u32 = 10;
 
-/// A serial line.
 #[derive(Debug, Default)]
 struct Line {
     received: VecDeque<u8>,

@@ -177,7 +177,6 @@ fn with(status: Status, sigma: Option<AngularRate>) -> YawEstimate {
     YawEstimate { sigma, status, source, quality, ..good(0.5) }
 }
 
-/// Encodes samples as one set.
 fn set(samples: &[YawEstimate]) -> (RateMessage, AngleMessage, DetailMessage) {
     let mut encoder = encoder(samples.len() as u8);
     let sets: Vec<_> = samples.iter().filter_map(|sample| encoder.encode(sample)).collect();

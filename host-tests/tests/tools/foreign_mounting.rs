@@ -17,7 +17,6 @@ const TRIALS: [u32; 8] = [2, 3, 4, 6, 7, 8, 9, 11];
 /// Simulated vehicles: their mean decides, since the bias of one standstill is a drive's own luck.
 const SEEDS: std::ops::Range<u64> = 101..149;
 
-/// Corrects nothing.
 struct Nothing;
 
 impl WindowNetwork for Nothing {

@@ -17,7 +17,6 @@ const HYUNDAI: &str = "BO_ 160 W: 8 E\n SG_ RL : 0|14@1+ (0.03125,0) [0|511.9] \
 /// An identifier of 29 bits without bit 31, and a range beyond the board's own.
 const WIDE: &str = "BO_ 274726976 W: 8 E\n SG_ RL : 0|16@1- (0.01,0) [-327|327] \"m/s\" E\n SG_ RR : 16|16@1- (0.01,0) [-327|327] \"m/s\" E\n";
 
-/// The settings of the rear left wheel.
 fn rear_left(python: &str, dbc: &str) -> WheelSignal {
     let folder = tempfile::tempdir().unwrap();
     let text = format!("VERSION \"\"\nNS_ :\nBS_:\nBU_: E\n{dbc}");

@@ -4,7 +4,6 @@
 use super::{Board, Line};
 use crate::stm32f405::pins::Pin;
 
-/// Description of the board.
 pub const BOARD: Board = Board {
     imu: Some(Line { tx: Pin::new('A', 9), rx: Pin::new('A', 10), baud: 115_200, fallback_baud: 115_200 }),
     ..Board::new("minimal board", 8_000_000, SERVICE, [Pin::new('B', 8), Pin::new('B', 9)])

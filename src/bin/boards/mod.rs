@@ -53,13 +53,9 @@ impl Board {
     }
 }
 
-/// Pins and bit rate of a serial line.
 pub struct Line {
-    /// Transmit.
     pub tx: Pin,
-    /// Receive.
     pub rx: Pin,
-    /// Bit rate, baud.
     pub baud: u32,
     /// Bit rate while the board runs on its internal oscillator at 16 MHz.
     pub fallback_baud: u32,

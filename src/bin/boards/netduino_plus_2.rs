@@ -3,7 +3,6 @@
 use super::{Board, Line};
 use crate::stm32f405::pins::Pin;
 
-/// Description of the Netduino Plus 2.
 pub const BOARD: Board = Board {
     led: Some((Pin::new('A', 10), true)),
     // The LED is on PA10, so USART1 is on the shield's SCL and SDA pins.

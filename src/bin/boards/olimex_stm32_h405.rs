@@ -3,7 +3,6 @@
 use super::{Board, Line};
 use crate::stm32f405::pins::Pin;
 
-/// Description of the Olimex STM32-H405.
 pub const BOARD: Board = Board {
     // The LED is connected between the supply and the pin, so a low level lights it.
     led: Some((Pin::new('C', 12), false)),

@@ -18,7 +18,6 @@ const ICM_42688: u8 = 0x47;
 /// Time limit for the frames in loopback, us. A frame at 500 kbit/s takes 0.25 ms.
 const FRAME_US: u64 = 5_000;
 
-/// Blinks the LED.
 pub fn led(report: &mut Report, clocks: &Clocks) {
     let Some((led, lit)) = BOARD.led else {
         return report.manual_check("LED", format_args!("the board has none"));
@@ -104,7 +103,6 @@ pub fn can(report: &mut Report, chip: &Chip, registers: pac::CAN1) {
     }
 }
 
-/// Reads the identity of a sensor on SPI1.
 pub fn sensor(report: &mut Report, registers: &pac::SPI1) {
     const NAME: &str = "SPI1";
     let Some(pins) = BOARD.spi else {

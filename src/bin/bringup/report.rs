@@ -41,7 +41,6 @@ impl Report {
         Self { usart: Usart::six(), failed: 0 }
     }
 
-    /// Prints a line.
     pub fn print(&mut self, text: fmt::Arguments<'_>) {
         watchdog::feed();
         rtt_target::rprintln!("{}", text);
@@ -50,12 +49,10 @@ impl Report {
         let _ = self.write_str("\r\n");
     }
 
-    /// Reports a check that has passed.
     pub fn pass(&mut self, what: &str, text: fmt::Arguments<'_>) {
         self.print(format_args!("{what:<12} PASS  {text}"));
     }
 
-    /// Reports a check that has failed.
     pub fn fail(&mut self, what: &str, text: fmt::Arguments<'_>) {
         self.failed += 1;
         self.print(format_args!("{what:<12} FAIL  {text}"));
@@ -66,7 +63,6 @@ impl Report {
         self.print(format_args!("{what:<12} ----  {text}"));
     }
 
-    /// Returns the number of checks that have failed.
     pub fn failed(&self) -> u32 {
         self.failed
     }

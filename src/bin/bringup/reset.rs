@@ -46,7 +46,6 @@ pub fn report_result(report: &mut Report, elapsed: u32) {
     report.print(format_args!("{failed} checks failed"));
 }
 
-/// Waits for the watchdog to reset the chip.
 pub fn wait_for_watchdog(report: &mut Report) -> ! {
     report.print(format_args!("watchdog     ...   the chip resets now"));
     // The watchdog has an oscillator of its own: its limit is checked whatever clock the processor has.

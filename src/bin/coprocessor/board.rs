@@ -125,7 +125,6 @@ fn assign_pins() {
     }
 }
 
-/// Returns the version of the package.
 fn version() -> [u8; 3] {
     let number = |text: &str| text.bytes().fold(0, |number: u8, digit| number * 10 + (digit - b'0'));
     [

@@ -30,7 +30,6 @@ type Words = [u32; WORDS];
 #[unsafe(link_section = ".uninit.crash")]
 static mut RECORD: MaybeUninit<Words> = MaybeUninit::uninit();
 
-/// Returns the check word of a record.
 fn check(words: &Words) -> u32 {
     words.iter().take(WORDS - 1).fold(MAGIC, |check, word| check.rotate_left(5) ^ word)
 }

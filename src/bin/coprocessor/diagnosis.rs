@@ -31,15 +31,12 @@ pub enum Line {
     Service,
 }
 
-/// Requests on CAN.
 pub static FROM_CAN: Ring<DataFrame, 16> =
     // SAFETY: the receive interrupt writes, idle reads.
     unsafe { Ring::new() };
-/// Requests on SLCAN.
 pub static FROM_SLCAN: Ring<DataFrame, 16> =
     // SAFETY: the output task writes, idle reads.
     unsafe { Ring::new() };
-/// Responses.
 pub static RESPONSES: Ring<(Line, DataFrame), 16> =
     // SAFETY: idle writes, the output task reads.
     unsafe { Ring::new() };
@@ -48,12 +45,10 @@ pub static RESPONSES: Ring<(Line, DataFrame), 16> =
 /// encodes them. Set before any task runs.
 static IDS: [AtomicU32; 3] = [const { AtomicU32::new(u32::MAX) }; 3];
 
-/// Sets the identifiers.
 pub fn set_ids(ids: [Id; 3]) {
     IDS.iter().zip(ids).for_each(|(place, id)| place.store(pack(id), Ordering::Relaxed));
 }
 
-/// Returns whether a frame is a request.
 pub fn is_request(id: Id) -> bool {
     let [request, functional, _] = ids();
     [request, functional].contains(&pack(id))

@@ -73,7 +73,6 @@ impl Outgoing {
         Self { slcan, port, can, queue, now: 0, overruns: 0, responds: false }
     }
 
-    /// Joins the CAN bus.
     pub fn join(&self) {
         self.can.iter().for_each(Can::join);
     }

@@ -48,12 +48,10 @@ pub struct Found {
 }
 
 impl Found {
-    /// Returns whether there is anything to report.
     pub fn any(&self) -> bool {
         self.weights_damaged || self.mount_moved
     }
 
-    /// Reports the faults.
     pub fn report(&self, coprocessor: &mut Coprocessor) {
         if self.weights_damaged {
             coprocessor.weights_damaged();
@@ -64,10 +62,8 @@ impl Found {
     }
 }
 
-/// Holds the state of the idle task.
 pub struct Idle {
     device: &'static mut Device<Records, Weights>,
-    /// Background check of the weights in use.
     weights: Option<BackgroundCheck<'static>>,
     diagnosis: Diagnosis,
     bring_up: Option<BringUp>,
@@ -79,7 +75,6 @@ pub struct Idle {
     milliseconds: u32,
 }
 
-/// The device with its stored data, and the check of the weights.
 pub type Stored = (&'static mut Device<Records, Weights>, Option<BackgroundCheck<'static>>);
 
 impl Idle {

@@ -135,7 +135,6 @@ pub struct SpiPart {
 }
 
 impl SpiPart {
-    /// Polls the part for a sample.
     #[inline(never)]
     fn poll(&mut self) -> Option<Result<ImuSample, ()>> {
         if self.part.is_none() {

@@ -64,7 +64,6 @@ pub struct OutputParts {
     pub slcan_inputs: bool,
 }
 
-/// Holds the state of the output task.
 pub struct Output {
     imu: Imu,
     fog: serial::Port,

@@ -48,7 +48,6 @@ impl<T, const N: usize> Ring<T, N> {
         self.places.get(count & Self::MASK).map_or(core::ptr::null_mut(), |place| place.get().cast())
     }
 
-    /// Returns the number of waiting values.
     #[inline(always)]
     pub fn len(&self) -> usize {
         let len = self.written.load(Ordering::Relaxed).wrapping_sub(self.read.load(Ordering::Relaxed));
@@ -120,13 +119,11 @@ impl<T, const N: usize> Ring<T, N> {
         self.read.store(read.wrapping_add(count), Ordering::Relaxed);
     }
 
-    /// Returns whether nothing waits.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Returns whether there is no room.
     #[inline(always)]
     pub fn is_full(&self) -> bool {
         self.len() >= N

@@ -52,7 +52,6 @@ fn receive(board: &Board, configuration: &Configuration, wheels: &WheelSettings,
 pub struct Parts {
     pub output: OutputParts,
     pub config: &'static Config,
-    /// Weights for the network.
     pub weights: Option<Blob<'static>>,
     pub device: Stored,
 }

@@ -86,7 +86,6 @@ enum Recovery {
     Counts,
 }
 
-/// Sends frames through the controller.
 pub struct Can {
     registers: pac::CAN1,
     /// The time at which each mailbox got its frame, ms.
@@ -149,7 +148,6 @@ impl Can {
         self.registers.mcr().modify(|_, w| w.inrq().clear_bit());
     }
 
-    /// Returns the state of error confinement.
     pub fn state(&self) -> State {
         let errors = self.registers.esr().read();
         if errors.boff().bit_is_set() || !matches!(self.recovery, Recovery::On { .. }) {

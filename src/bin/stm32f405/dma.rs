@@ -95,7 +95,6 @@ impl Stream {
         left.into()
     }
 
-    /// Returns whether the stream is still running.
     #[inline(always)]
     pub fn is_running(&self) -> bool {
         self.stream().cr().read().en().is_enabled()

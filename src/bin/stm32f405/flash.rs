@@ -160,7 +160,6 @@ impl Flash {
     }
 }
 
-/// Reads a word of the flash.
 fn word(offset: u32) -> u32 {
     // SAFETY: inside the flash, on a word boundary.
     unsafe { ((FLASH_BASE + offset) as *const u32).read_volatile() }

@@ -69,7 +69,6 @@ impl Pin {
         old & !(mask << shift) | (value & mask) << shift
     }
 
-    /// Assigns the pin to a peripheral.
     pub fn alternate(self, function: u8, speed: Speed) {
         let port = self.registers();
         // SAFETY: each field takes any value of its width.

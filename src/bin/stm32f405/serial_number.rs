@@ -4,7 +4,6 @@
 /// Address of the first word of the identifier.
 const ADDRESS: *const [u32; 3] = 0x1FFF_7A10 as *const [u32; 3];
 
-/// Reads the identifier, in memory order.
 pub fn read() -> [u8; 12] {
     // SAFETY: read-only memory of every STM32F405, on a word boundary.
     bytemuck::cast(unsafe { ADDRESS.read_volatile() })

@@ -134,7 +134,6 @@ impl Usart {
         core::ptr::from_ref(self.registers().dr()).cast()
     }
 
-    /// Returns the stream that receives.
     pub fn receiver(&self) -> Stream {
         self.streams[0]
     }
@@ -145,7 +144,6 @@ impl Usart {
         Status(self.registers().sr().read().bits())
     }
 
-    /// Reads the received byte.
     #[inline]
     pub fn read(&self) -> u8 {
         self.registers().dr().read().bits() as u8

@@ -80,7 +80,6 @@ pub const fn input_words(units: usize, inputs: usize) -> usize {
     DirectionWeights::input_words(units, inputs)
 }
 
-/// Returns the same as [`input_words`] for the recurrent records.
 pub const fn recurrent_words(units: usize) -> usize {
     DirectionWeights::recurrent_words(units)
 }

@@ -10,7 +10,6 @@ impl Numbers {
         Self(seed)
     }
 
-    /// Returns the next number.
     pub const fn next(&mut self) -> u32 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 17;
@@ -18,7 +17,6 @@ impl Numbers {
         self.0
     }
 
-    /// Returns a uniform number in -`limit`..=`limit`.
     pub const fn within(&mut self, limit: i32) -> i32 {
         (self.next() >> 1) as i32 % (2 * limit + 1) - limit
     }

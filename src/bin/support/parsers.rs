@@ -16,7 +16,6 @@ use gyronet::sensor::xsens::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::units::Micros;
 
-/// Measures every parser.
 pub fn run(meter: &mut Meter) {
     dsp1760(meter);
     mtdata2(meter);

@@ -11,7 +11,6 @@ const CLAMP: i32 = 8_192;
 /// Limit of an int8 weight.
 const WEIGHT: i32 = 40;
 
-/// A weight file while it is being written.
 struct Writer<const LEN: usize> {
     bytes: [u8; LEN],
     at: usize,

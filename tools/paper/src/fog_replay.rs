@@ -21,23 +21,19 @@ use gyronet_tools::drive::wheel_frames;
 /// Number of steps of static initialisation: 3 s.
 const STATIC_STEPS: usize = 300;
 
-/// Holds the results of FoGNet on a sequence.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FogReplay {
     /// Corrected turn of each step, rad.
     pub turns: Vec<f64>,
     /// Steps with a correction.
     pub corrected: u64,
-    /// Number of windows that FoGNet estimated.
     pub windows: u64,
     pub clamped_inputs: u64,
     /// Estimates that were rejected as implausible.
     pub implausible: u64,
-    /// Windows broken by a gap.
     pub broken: u64,
 }
 
-/// Runs a sequence through FoGNet alone.
 pub fn run(sequence: &Sequence, network: &mut impl MinuteNetwork, config: FogConfig) -> FogReplay {
     let inertial = features(sequence);
     let mut corrector = FogCorrector::new(config);
@@ -148,7 +144,6 @@ pub fn run_board(
     (sent.0, *coprocessor.fog_counters())
 }
 
-/// The rate that is sent for each step.
 struct Rates(Vec<YawEstimate>);
 
 impl Sink for Rates {

@@ -66,11 +66,8 @@ pub struct Step {
 /// Holds a drive on the 100 Hz grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sequence {
-    /// Name of the sequence's folder.
     pub name: String,
-    /// Path of the sequence's folder.
     pub path: PathBuf,
-    /// The data set whose layout the files have.
     pub layout: Layout,
     /// The specification of a simulated sequence; `None` for a recorded one.
     pub simulated: Option<Spec>,
@@ -94,7 +91,6 @@ pub struct Sequence {
     pub files: [StreamSummary; 4],
 }
 
-/// Holds the open files of either layout.
 struct Files {
     /// Time zero of the streams, s since 1970.
     epoch_s: f64,
@@ -188,7 +184,6 @@ impl Sequence {
         })
     }
 
-    /// Returns the length of the sequence, s.
     pub fn seconds(&self) -> f64 {
         self.steps.len() as f64 * DT
     }
@@ -249,7 +244,6 @@ impl Sequence {
         Ok(Recording { path, rows: rows.collect(), missing: 0, vehicle: Vehicle::default() })
     }
 
-    /// Checks that the vehicle stands during static initialisation.
     pub fn needs_standstill(&self) -> Result<(), DataError> {
         let steps = self.steps.iter().take(STATIC_SAMPLES as usize);
         let metres = steps.map(|step| (step.wheels[0] + step.wheels[1]) / 2.0).sum::<f64>().abs();
@@ -257,7 +251,6 @@ impl Sequence {
         if metres > STANDING { Err(DataError::of(self.path.display(), fault)) } else { Ok(()) }
     }
 
-    /// Checks that the sequence has an inertial sensor.
     pub fn needs_gyro(&self) -> Result<(), DataError> {
         self.has_gyro
             .then_some(())
@@ -265,7 +258,6 @@ impl Sequence {
     }
 }
 
-/// Holds the values of all files at one time.
 #[derive(Debug, Clone, Copy)]
 struct Values {
     imu: [f64; 7],

@@ -33,7 +33,6 @@ use std::path::Path;
 /// Name of the file that marks a sequence's folder as simulated.
 pub const MARKER: &str = "simulated.json";
 
-/// The layout of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Layout {
@@ -44,7 +43,6 @@ pub enum Layout {
 }
 
 impl Layout {
-    /// Returns the data set's vehicle.
     pub fn vehicle(self) -> Vehicle {
         match self {
             Self::Kaist => vehicles::KAIST,
@@ -56,7 +54,6 @@ impl Layout {
 /// The specification of a sequence, which is written to [`MARKER`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Spec {
-    /// The layout of the files.
     pub layout: Layout,
     /// Name of the sequence and of its folder.
     pub name: String,
@@ -68,7 +65,6 @@ pub struct Spec {
     pub run: u64,
 }
 
-/// A set of sequences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Set {
     /// Eight sequences, as the paper's urban06 to 13.
@@ -136,7 +132,6 @@ impl Drive {
     }
 }
 
-/// Creates a folder and writes a sequence into it.
 pub fn write(spec: &Spec, folder: &Path) -> io::Result<()> {
     std::fs::create_dir_all(folder)?;
     std::fs::write(folder.join(MARKER), serde_json::to_string_pretty(spec)? + "\n")?;

@@ -10,17 +10,14 @@ use gyronet_tools::evaluate::trajectory_error::Point;
 use std::fs;
 use std::path::Path;
 
-/// The columns of a row.
 const COLUMNS: [&str; 8] = ["time", "x", "y", "z", "qx", "qy", "qz", "qw"];
 /// A value beyond this is refused: UTM coordinates are about 4e6 m, times since 1970 about 2e9 s.
 const MAX_VALUE: f64 = 1e12;
 /// Tolerance of a quaternion's norm, which differs from 1 by the rounding of the printed digits.
 const NORM_TOLERANCE: f64 = 0.01;
 
-/// Holds a pose in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    /// Line number in the file.
     pub line: u64,
     /// The time, s since 1970.
     pub time: f64,
@@ -33,20 +30,17 @@ pub struct Pose {
 /// Holds the trajectory of a file: at least one pose, times ascending.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
-    /// Path of the file.
     pub path: String,
     pub poses: Vec<Pose>,
 }
 
 impl Trajectory {
-    /// Reads a file.
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
         let text = fs::read_to_string(path).map_err(|source| DataError::open(&name, source))?;
         Self::parse(name, &text)
     }
 
-    /// Reads the text of a file.
     pub fn parse(path: String, text: &str) -> Result<Self, DataError> {
         let mut poses: Vec<Pose> = Vec::new();
         for (line, row) in (1..).zip(text.lines()) {

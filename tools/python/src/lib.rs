@@ -239,7 +239,6 @@ fn known(value: Option<f64>) -> f64 {
     value.unwrap_or(f64::NAN)
 }
 
-/// Returns the first values.
 fn array<const N: usize>(values: &[f64]) -> [f64; N] {
     std::array::from_fn(|k| values[k])
 }

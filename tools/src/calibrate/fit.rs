@@ -17,14 +17,12 @@ const BLOCKS: usize = 10;
 /// Least robust deviation, rad; anything smaller is rounding.
 const FLOOR_RAD: f64 = 1e-9;
 
-/// The result of a fit.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// Shares of the roll, pitch and yaw rate; 0 for one that is not fitted.
     pub shares: [f64; 3],
     /// Standard deviations of the shares.
     pub sigmas: [f64; 3],
-    /// The constant of each drive, rad/s.
     pub biases: Vec<f64>,
     /// The robust deviation of each drive's spans from the fit, rad.
     pub deviations: Vec<f64>,

@@ -23,7 +23,6 @@ pub struct Span {
     pub error: f64,
     /// The turns about x, y and z by the gyro, rad.
     pub turns: [f64; 3],
-    /// Length of the span, s.
     pub seconds: f64,
 }
 

@@ -6,7 +6,6 @@ use gyronet::store::UnitMap;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// The calibration of a unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnitFile {
     /// The map that the board applies to the gyro.
@@ -29,19 +28,15 @@ pub struct DriveFit {
     pub deviation_rad: f64,
 }
 
-/// The reason why a calibration file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum UnitFileError {
     #[error("{path}: {source}")]
     Read { path: String, source: std::io::Error },
-    /// The file is not a calibration file.
     #[error("{path}: {source}")]
     Json { path: String, source: serde_json::Error },
-    /// The map is too far from the identity for a real unit.
     #[error("{path}: gyro_map: an element is too far from the identity")]
     Implausible { path: String },
-    /// The calibration was computed with other weights.
     #[error("{path}: computed with the weights {found:08x}, but {runs:08x} are in use")]
     OtherWeights {
         path: String,
@@ -52,7 +47,6 @@ pub enum UnitFileError {
     },
 }
 
-/// The JSON of the file.
 #[derive(Serialize, Deserialize)]
 struct Content {
     gyro_map: [[f32; 3]; 3],
@@ -64,7 +58,6 @@ struct Content {
 }
 
 impl UnitFile {
-    /// Returns the content as JSON.
     pub fn json(&self) -> serde_json::Value {
         let shares = self.shares.map(|Share { name, value, sigma, refused }| {
             (String::from(name), serde_json::json!({ "value": value, "sigma": sigma, "refused": refused }))

@@ -16,7 +16,6 @@ pub const WAIT: Duration = Duration::from_millis(20);
 /// Prefix of the name of a Linux CAN interface.
 const INTERFACE: &str = "can:";
 
-/// A connection that carries CAN frames.
 pub trait Bus {
     fn send(&mut self, frame: &DataFrame) -> Result<()>;
 

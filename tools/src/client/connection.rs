@@ -7,24 +7,15 @@ use std::time::Duration;
 /// Timeout of connecting and of writing.
 const CONNECT: Duration = Duration::from_secs(5);
 
-/// The error of a connection that cannot be opened.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConnectError {
-    /// The name is neither host:port nor a serial port that can be opened.
     #[error("{name}: not host:port, and not a serial port that can be opened: {source}")]
     Serial { name: String, source: serialport::Error },
-    /// The host does not accept the connection.
     #[error("{name}: cannot connect: {source}")]
     Tcp { name: String, source: io::Error },
-    /// The CAN interface cannot be opened.
     #[error("can:{name}: {source}")]
-    Interface {
-        /// The name of the interface.
-        name: String,
-        source: io::Error,
-    },
-    /// This system has no CAN interfaces.
+    Interface { name: String, source: io::Error },
     #[error("can:{name}: CAN interfaces work only on Linux")]
     NoInterfaces { name: String },
 }
@@ -32,7 +23,6 @@ pub enum ConnectError {
 /// An open line. Its reads time out after the time that it was opened with.
 pub enum Connection {
     Serial(Box<dyn serialport::SerialPort>),
-    /// A TCP socket.
     Tcp(TcpStream),
 }
 

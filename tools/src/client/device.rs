@@ -34,7 +34,6 @@ const POSITIVE: u8 = 0x40;
 /// Data identifier of the reason why the last request was refused.
 const REFUSAL: [u8; 2] = [0x01, 0x0B];
 
-/// A board on a bus.
 pub struct Device<B> {
     bus: B,
     name: String,
@@ -62,7 +61,6 @@ impl<B: Bus> Device<B> {
         Ok(Self { bus, name: name.to_owned(), request, response, authority: Authority::None })
     }
 
-    /// Sets the proof of access for all later writes.
     pub fn authorise(&mut self, authority: Authority) {
         self.authority = authority;
     }

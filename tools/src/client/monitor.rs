@@ -54,7 +54,6 @@ pub struct Monitor {
     pace: Option<(f64, u32)>,
     frames_per_second: Option<f64>,
     stamp: Option<f64>,
-    /// Counts of messages.
     pub counts: Counts,
     /// Newest values of the inertial sensor's set of messages.
     pub state: State,

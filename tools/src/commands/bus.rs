@@ -42,7 +42,6 @@ impl Traffic {
     }
 }
 
-/// Runs the subcommand.
 pub fn run(_: &Args, common: Common) -> super::Result {
     let vdc2 = Some(Vdc2Settings { source: 0x80 });
     let all = Config::new(Settings { vdc2, ..Settings::DEFAULT })?;

@@ -36,7 +36,6 @@ pub struct Args {
     sent: Sent,
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let weights = args.sent.open()?;
     let blob = weights.blob()?;

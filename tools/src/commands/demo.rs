@@ -33,7 +33,6 @@ pub struct Args {
     sent: weights::Sent,
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let weights = args.sent.open()?;
     let bundled = bundled::demo_drive()?;

@@ -102,7 +102,6 @@ enum Action {
 
 type Board = Device<Box<dyn Bus>>;
 
-/// The output of `access`.
 #[derive(Serialize)]
 struct Access {
     #[serde(flatten)]

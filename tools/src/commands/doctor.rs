@@ -28,7 +28,6 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let doctor = Doctor::examine(&args.file)?;
     if let Some(vehicle) = Vehicle::of_drive(&args.file)?.path {

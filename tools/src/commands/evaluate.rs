@@ -66,7 +66,6 @@ pub struct Args {
     unit: weights::Unit,
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     if args.ablation {
         return compare(args, common, &ablation::parts());

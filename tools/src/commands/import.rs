@@ -45,7 +45,6 @@ pub fn correct(args: &Correct, common: Common) -> super::Result {
     python(&["correct"], &args.arguments, common)
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let sequence = match &args.arguments[..] {
         [layout, folder, ..] if layout == "kaist" || layout == "nclt" => Some(folder),

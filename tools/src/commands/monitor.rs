@@ -53,7 +53,6 @@ fn seconds(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
 }
 
-/// The error of a source without messages.
 #[derive(Debug, thiserror::Error)]
 enum MonitorError {
     #[error("{0}: no complete set of messages (rate, angle, detail)")]

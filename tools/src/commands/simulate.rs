@@ -44,7 +44,6 @@ pub struct Args {
     device: u64,
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     let warming = args.trip.map(|trip| warming::Config { trip, device: args.device });
     let mut config = Config { warming, seconds: args.seconds, seed: args.seed, ..Config::DEFAULT };

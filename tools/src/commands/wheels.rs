@@ -40,7 +40,6 @@ enum Action {
     },
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args, common: Common) -> super::Result {
     match &args.action {
         Action::FromDbc { arguments } => super::import::python(&["wheels", "from-dbc"], arguments, common)?,

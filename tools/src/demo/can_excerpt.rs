@@ -15,16 +15,12 @@ use gyronet::units::Micros;
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
-/// Describes a message in words.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Message {
     /// The time of its sample since the recording's first, s.
     pub time: String,
-    /// The name in `gyronet.dbc`.
     pub name: String,
-    /// Identifier, hexadecimal.
     pub id: String,
-    /// Data, hexadecimal.
     pub data: String,
     /// The content in words.
     pub says: String,
@@ -35,7 +31,6 @@ pub struct Message {
 pub struct Sent {
     /// The step with the fastest turn after static initialisation.
     pub fastest: Option<Step>,
-    /// Number of frames.
     pub frames: u64,
     /// The time that this machine took for the board alone.
     pub run_time: Duration,

@@ -11,18 +11,14 @@ use gyronet::sample::PERIOD_US;
 use serde::Serialize;
 use std::time::Duration;
 
-/// Holds a figure of time or memory.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Cost {
-    /// The quantity.
     pub what: &'static str,
-    /// The figure with its unit.
     pub figure: String,
     /// The source of the figure.
     pub how: String,
 }
 
-/// Returns the figures of a drive.
 pub fn all(samples: usize, run_time: Duration, config: &Config) -> Vec<Cost> {
     let micros = run_time.as_secs_f64() * 1e6 / samples.max(1) as f64;
     let lag = PipelineConfig::DEFAULT.compensate.lag.samples() as u64 * PERIOD_US / 1_000;

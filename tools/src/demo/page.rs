@@ -12,7 +12,6 @@ use gyronet::sample::RATE_HZ;
 /// The curves of these methods are drawn, from back to front.
 const DRAWN: [Method; 5] =
     [Method::RAW, Method::STATIC, Method::STATIC_ZERO_RATE, Method::LIVE, Method::DELAYED];
-/// The class and the name of the reference.
 const REFERENCE: &str = "reference";
 
 pub fn page(demo: &Demo<'_>) -> String {

@@ -11,7 +11,6 @@ use serde::Serialize;
 /// The paths of these methods are drawn.
 const METHODS: [Method; 3] = [Method::RAW, Method::STATIC, Method::DELAYED];
 
-/// Holds the path of a method.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Path {
     /// The method, or `None` for the reference.
@@ -30,14 +29,12 @@ fn key<S: serde::Serializer>(method: &Option<Method>, serializer: S) -> Result<S
     serializer.serialize_str(method.map_or("reference", |method| method.key))
 }
 
-/// Holds the paths of a drive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectories {
     /// The paths, the reference's first if there is one.
     pub paths: Vec<Path>,
     /// The number of wheels that the speed is the mean of.
     pub wheels: usize,
-    /// The way, m.
     pub metres: f64,
 }
 

@@ -18,7 +18,6 @@ const RIVAL: (f64, f64) = (3.0, 0.05);
 /// Time of each rate that is compared, from its beginning, s: all lags of a longer time would take minutes.
 pub const LONGEST: f64 = 8_192.0;
 
-/// The offset between two clocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Offset {
     /// Time to add to the times of the second clock, s.

@@ -25,7 +25,6 @@ pub struct Allan {
     pub points: Vec<(f64, f64)>,
 }
 
-/// The noise figures of a gyro.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     /// Angular random walk, rad/s/sqrt(Hz) or, the same number, rad/sqrt(s).

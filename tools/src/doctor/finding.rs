@@ -1,6 +1,5 @@
 //! A finding is one sentence about one subject of a recording, with a verdict.
 
-/// The verdict on a subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// The subject is as it should be.
@@ -25,7 +24,6 @@ impl Verdict {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     pub what: &'static str,
-    /// The verdict on the subject.
     pub verdict: Verdict,
     /// One sentence with its numbers.
     pub text: String,

@@ -9,7 +9,6 @@ const NEAR: f64 = 0.15;
 const LEAST: usize = 5;
 /// Kilometres per hour in a metre per second.
 pub const KMH: f64 = 3.6;
-/// Degrees in a radian.
 pub const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 /// The line of y over x.

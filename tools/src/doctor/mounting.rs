@@ -12,9 +12,7 @@ const TILT: (f64, f64) = (15.0, 60.0);
 /// The mounting, by gravity at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mounting {
-    /// Roll, degrees.
     pub roll_deg: f64,
-    /// Pitch, degrees.
     pub pitch_deg: f64,
     /// Magnitude of the specific force, m/s^2.
     pub force: f64,

@@ -16,7 +16,6 @@ const FIRST: usize = 1_000;
 /// Most rows that are kept: a day at 100 Hz.
 const MOST: usize = 8_640_000;
 
-/// The columns of a recording.
 #[derive(Debug)]
 pub struct Rows {
     pub name: String,
@@ -123,7 +122,6 @@ impl Rows {
     }
 }
 
-/// Returns the values in ascending order.
 pub fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_unstable_by(f64::total_cmp);

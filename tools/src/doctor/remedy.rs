@@ -35,7 +35,6 @@ pub fn channel<'r>(rows: &'r Rows, role: &str, column: &'r str) -> &'r str {
     rows.vehicle.signals.get(role).map_or(column, String::as_str)
 }
 
-/// The import with these flags.
 pub fn import(rows: &Rows, flags: &str) -> String {
     if rows.vehicle.recording.units.is_empty() {
         format!("`gyronet import {0}.csv {flags} --out {0}_fixed.csv`", rows.name)

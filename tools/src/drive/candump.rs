@@ -16,12 +16,10 @@ pub struct Log<W> {
 }
 
 impl<W: Write> Log<W> {
-    /// Starts an empty log.
     pub fn new(out: W) -> Self {
         Self { out, frames: 0 }
     }
 
-    /// Writes one data frame with its time stamp.
     pub fn frame(&mut self, time: Micros, frame: &impl Frame) -> io::Result<()> {
         let Micros(us) = time;
         write!(self.out, "({}.{:06}) {INTERFACE} ", us / 1_000_000, us % 1_000_000)?;

@@ -16,7 +16,6 @@ pub struct Table<W> {
 }
 
 impl<W: Write> Table<W> {
-    /// Writes the header.
     pub fn new(mut out: W) -> io::Result<Self> {
         writeln!(out, "t_s,gyro,live,delayed,sigma,yaw,status")?;
         Ok(Self { out })
@@ -57,12 +56,10 @@ pub struct Tum<W> {
 }
 
 impl<W: Write> Tum<W> {
-    /// Starts at the first pose.
     pub fn new(speeds: Speeds, out: W) -> Self {
         Self { out, speeds, track: Track::default() }
     }
 
-    /// Writes the pose of a step.
     pub fn step(&mut self, step: &Step) -> io::Result<()> {
         let way = self.speeds.next(&step.input) * DT;
         let Some(sent) = step.delayed.filter(|_| step.is_compared) else { return Ok(()) };

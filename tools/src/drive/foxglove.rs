@@ -32,7 +32,6 @@ struct Channels {
     can: u16,
 }
 
-/// A file in progress.
 pub struct Recorder<W: Write + Seek> {
     writer: Writer<W>,
     channels: Channels,
@@ -41,7 +40,6 @@ pub struct Recorder<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> Recorder<W> {
-    /// Starts a file.
     pub fn new(out: W) -> Result<Self, McapError> {
         let options = WriteOptions::new()
             .compression(Some(Compression::Lz4))

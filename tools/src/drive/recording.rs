@@ -44,7 +44,6 @@ pub const WHEEL_STANDS: f64 = 0.3;
 pub struct Row {
     /// Line number in the file; the header is line 1.
     pub line: u64,
-    /// The sample of the sensor.
     pub sample: ImuSample,
     /// The true yaw rate, rad/s.
     pub reference: Option<f64>,
@@ -63,7 +62,6 @@ pub struct Row {
 pub struct Recording {
     /// The path of the file, for messages.
     pub path: String,
-    /// The rows in order of time.
     pub rows: Vec<Row>,
     /// Number of rows that are missing in gaps.
     pub missing: u64,
@@ -98,7 +96,6 @@ impl Recording {
         Ok(Self { path: path.to_owned(), rows, missing: facts.missing, vehicle })
     }
 
-    /// The content of the rows.
     pub fn facts(&self) -> Facts {
         Facts::of(&self.rows)
     }
@@ -108,7 +105,6 @@ impl Recording {
         name(&self.path)
     }
 
-    /// Returns the time from the first sample to the end of the last one, s.
     pub fn seconds(&self) -> f64 {
         self.facts().seconds()
     }

@@ -21,19 +21,15 @@ use std::ops::Range;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReplayError {
-    /// The drive cannot be read.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// The vehicle does not stand still during static initialisation.
     #[error("{path}: starts moving: line {line}: {source}")]
     StartsMoving {
         path: String,
         /// The line at which the three seconds ended.
         line: u64,
-        /// The check that failed.
         source: StaticError,
     },
-    /// The recording has no three seconds without a gap.
     #[error("{path}: never holds 3 s without a gap, so static initialisation cannot finish")]
     NeverInitialised { path: String },
 }
@@ -49,7 +45,6 @@ impl<'d, N: WindowNetwork> Steps<'d, N> {
         Ok(Self { path: &drive.path, rows: drive.rows()?.fuse(), board })
     }
 
-    /// The board, with its counters.
     pub fn board(&self) -> &Board<N> {
         &self.board
     }
@@ -98,7 +93,6 @@ pub struct Replay {
     pub gyro_bias: [AngularRate; 3],
     /// The yaw that the delayed rates have not sent yet at the end.
     pub pending: Yaw,
-    /// The event counters of the pipeline.
     pub counters: Counters,
 }
 

@@ -85,7 +85,6 @@ impl Drive<'static> {
 }
 
 impl<'a> From<&'a Recording> for Drive<'a> {
-    /// A drive that is in memory.
     fn from(recording: &'a Recording) -> Self {
         Self {
             path: recording.path.clone(),
@@ -107,7 +106,6 @@ impl<'a> Drive<'a> {
 }
 
 impl Drive<'_> {
-    /// The rows from the first one on.
     pub fn rows(&self) -> Result<Rows<'_>, DataError> {
         let rows: Rows<'_> = match &self.source {
             Source::Memory(rows) => Box::new(rows.iter().copied().map(Ok)),

@@ -26,7 +26,6 @@ pub const RADIUS: f64 = 0.289;
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Vehicle {
-    /// The mounting of the IMU.
     pub mounting: Mounting,
     pub wheels: Wheels,
     pub recording: Origin,
@@ -81,7 +80,6 @@ pub struct Wheels {
 }
 
 impl Vehicle {
-    /// Reads a vehicle file.
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|source| DataError::open(&name, source))?;

@@ -12,12 +12,9 @@ use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::Standstill;
 use serde::Serialize;
 
-/// A configuration to compare.
 #[derive(Debug, Clone)]
 pub struct Variant {
-    /// The name in tables.
     pub name: String,
-    /// The configuration.
     pub config: PipelineConfig,
     /// True if the network runs; otherwise the corrections are zero.
     pub network: bool,
@@ -68,7 +65,6 @@ pub fn lags() -> Vec<Variant> {
 /// The score of one variant, on one drive or as a mean over drives.
 #[derive(Debug, Clone, Serialize)]
 pub struct Score {
-    /// The variant's name.
     pub name: String,
     #[serde(flatten)]
     pub error: YawError,
@@ -79,7 +75,6 @@ pub struct Score {
 /// The error of the reference itself in whole seconds in which the wheels stand. Smaller errors cannot be measured.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Floor {
-    /// Number of whole seconds.
     pub seconds: usize,
     /// Mean absolute yaw change in one second, rad.
     pub mean_1s_rad: f64,
@@ -154,7 +149,6 @@ pub fn floor(drive: &Drive<'_>) -> Result<Option<Floor>, ReplayError> {
     }))
 }
 
-/// A score in progress.
 #[derive(Default)]
 struct Sums {
     has_gap: bool,

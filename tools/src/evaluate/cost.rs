@@ -13,11 +13,9 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cost {
     pub multiplications_per_sample: f64,
-    /// Delay from the sample to its rate, ms.
     pub delay_ms: u64,
 }
 
-/// The shapes of the networks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shapes {
     /// The model of the rates that are sent.

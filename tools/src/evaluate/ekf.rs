@@ -76,7 +76,6 @@ impl Filter {
         self.update(0, mean - self.state[0], STANDSTILL * STANDSTILL);
     }
 
-    /// Adds a course.
     pub fn course(&mut self, heading: &Heading) {
         let (Some(course), Some(speed)) = (heading.course, heading.speed.map(f64::from)) else { return };
         if speed < SLOWEST || self.time - self.last < APART {
@@ -100,7 +99,6 @@ impl Filter {
         self.matched = Some(self.time);
     }
 
-    /// Measures one state.
     fn update(&mut self, measured: usize, innovation: f64, variance: f64) {
         let with = self.covariance[measured];
         let per_variance = 1.0 / (with[measured] + variance);

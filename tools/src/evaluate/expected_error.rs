@@ -13,7 +13,6 @@ use std::fmt;
 /// Mean yaw rate from which a second counts as turning, rad/s.
 const TURNS: f64 = 0.03;
 
-/// The good seconds of a kind.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Seconds {
     pub seconds: usize,
@@ -48,7 +47,6 @@ pub struct ExpectedError {
     second: Second,
 }
 
-/// The second in progress.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Second {
     samples: u32,

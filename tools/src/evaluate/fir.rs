@@ -71,13 +71,11 @@ pub struct Line {
 }
 
 impl Line {
-    /// Starts before the first input.
     pub fn new(filter: LowPass) -> Self {
         let inputs = VecDeque::with_capacity(filter.taps.len() + 1);
         Self { filter, inputs, due: 0 }
     }
 
-    /// Adds an input; returns the value that comes out.
     pub fn next(&mut self, input: f64) -> Option<f64> {
         self.due += 1;
         if self.inputs.is_empty() {

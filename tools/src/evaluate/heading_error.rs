@@ -27,7 +27,6 @@ pub const PLAUSIBLE_10S_RAD: f64 = 0.5;
 /// Lengths of the windows over which the heading change is judged, s.
 const WINDOWS_S: [usize; 3] = [1, 10, 60];
 
-/// The reference of a drive.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reference {
     /// The true yaw rate of each sample, rad/s (`ref_gyr_z`).
@@ -64,7 +63,6 @@ impl Reference {
     }
 }
 
-/// The heading error of one yaw rate on one drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
     pub figures: HeadingError,
@@ -107,7 +105,6 @@ impl HeadingError {
     }
 }
 
-/// A mean in progress.
 #[derive(Debug, Clone, Copy, Default)]
 struct Mean {
     count: f64,
@@ -238,7 +235,6 @@ impl Default for AgainstRate {
 }
 
 impl AgainstRate {
-    /// Starts before the first sample.
     pub fn new() -> Self {
         let mut changes = Changes::new(1, 1);
         changes.add(Some(0.0));
@@ -323,7 +319,6 @@ impl Default for AgainstCourse {
 }
 
 impl AgainstCourse {
-    /// Starts before the first sample.
     pub fn new() -> Self {
         Self {
             off: OffCourse::default(),
@@ -402,7 +397,6 @@ pub struct BiasByCourse {
 }
 
 impl BiasByCourse {
-    /// Adds a sample.
     pub fn add(&mut self, gyro: f64, course: Option<f64>) {
         let time = self.samples as f64 * DT;
         self.samples += 1;

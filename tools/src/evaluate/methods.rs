@@ -15,12 +15,9 @@ pub enum Gyro {
     Given,
 }
 
-/// A method of computing a yaw rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Method {
-    /// The name in JSON.
     pub key: &'static str,
-    /// The name in tables.
     pub name: &'static str,
     pub gyro: Gyro,
 }

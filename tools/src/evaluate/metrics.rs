@@ -42,7 +42,6 @@ impl YawError {
     }
 }
 
-/// A [`YawError`] in progress.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct YawSums {
     samples: usize,

@@ -46,7 +46,6 @@ type ByMethod<T> = [T; METHODS.len()];
 pub struct Outage {
     /// Time driven with a course before it, s.
     pub driven_s: f64,
-    /// Its length, s.
     pub seconds: usize,
     /// Its start, s from the start of the drive.
     pub start_s: f64,
@@ -121,7 +120,6 @@ struct Race<'a> {
     found: Vec<Outage>,
 }
 
-/// An outage in progress.
 struct Running<'a> {
     start: usize,
     driven_s: f64,

@@ -41,12 +41,10 @@ pub type ByLength = BTreeMap<usize, BTreeMap<&'static str, Figures>>;
 /// The outages of the drives of one folder, or of all.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outages {
-    /// The folder, or "all".
     pub set: String,
     pub drives: usize,
     /// After 60 s with a course.
     pub outage: ByLength,
-    /// After 20 s with a course.
     pub outage_after_20_s: ByLength,
 }
 

@@ -43,7 +43,6 @@ impl WindowNetwork for Network<'_> {
     }
 }
 
-/// The networks that the methods run.
 pub struct Networks<'a> {
     /// The model of the default weights, whose linear part corrects the rate.
     pub default: Network<'a>,
@@ -53,7 +52,6 @@ pub struct Networks<'a> {
     pub paper: Option<[Network<'a>; 2]>,
 }
 
-/// One sample of a comparison.
 #[derive(Debug, Clone)]
 pub struct Sample {
     /// The step of the board whose rates are sent.
@@ -232,7 +230,6 @@ pub struct Rates {
 }
 
 impl Rates {
-    /// Starts before the first sample of a drive.
     pub fn of(drive: &Drive<'_>) -> Self {
         let wheels = drive.speeds();
         Self {

@@ -12,11 +12,9 @@ use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 
-/// The reason why a drive cannot be evaluated.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvaluateError {
-    /// The drive cannot be read or replayed.
     #[error(transparent)]
     Replay(#[from] ReplayError),
     #[error(
@@ -52,14 +50,12 @@ pub enum EvaluateError {
     },
 }
 
-/// The errors and the cost of a method.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Row {
     #[serde(flatten)]
     pub error: HeadingError,
     /// The mean of the corrections beyond static initialisation and zero-rate updates, deg/h.
     pub mean_correction_deg_h: f64,
-    /// The cost of the method.
     #[serde(flatten)]
     pub cost: Cost,
 }
@@ -116,9 +112,7 @@ pub struct Comparison {
 /// Comparison of both rates that are sent with the best classical methods.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Comparisons {
-    /// The delayed rate.
     pub default: Comparison,
-    /// The live rate.
     pub live: Comparison,
 }
 
@@ -148,24 +142,18 @@ impl fmt::Display for Comparisons {
     }
 }
 
-/// The results of all methods on one drive.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DriveErrors {
-    /// The recording's name.
     pub name: String,
-    /// The folder of the recording.
     pub set: String,
     /// The length of the comparison, s.
     pub seconds: f64,
     /// Number of grid steps without a sample; they are left out of every method's errors.
     pub missing: u32,
-    /// The column of the reference.
     pub reference: &'static str,
-    /// True if the recording has wheel rates.
     pub wheels: bool,
     /// True if the standstill at the start is simulated.
     pub simulated_rest: bool,
-    /// Our rates compared with the best classical method.
     pub over_best_classical: Option<Comparisons>,
     /// Seconds inside one expected error; `None` against a course.
     pub expected_error: Option<ExpectedError>,
@@ -226,10 +214,8 @@ impl DriveErrors {
     }
 }
 
-/// The errors of all methods in progress.
 #[derive(Default)]
 struct Judges {
-    /// Number of compared samples.
     samples: usize,
     /// The first line without a true yaw rate.
     without_rate: Option<u64>,
@@ -275,13 +261,9 @@ impl Judges {
 /// The mean over some drives with equal weights. Each figure is the mean over the drives that have it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mean {
-    /// The folder of the drives, or "all".
     pub set: String,
-    /// The number of drives.
     pub drives: usize,
-    /// Our rates compared with the best classical method.
     pub over_best_classical: Option<Comparisons>,
-    /// The errors and the cost of each method.
     pub methods: PerMethod<Row>,
 }
 
@@ -303,7 +285,6 @@ impl Mean {
 /// The results of the methods on several drives, and their means.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// The results of each drive.
     pub drives: Vec<DriveErrors>,
     /// The mean of each folder's drives.
     pub sets: Vec<Mean>,
@@ -313,7 +294,6 @@ pub struct Report {
 }
 
 impl Report {
-    /// Creates a report of the drives and computes the means.
     pub fn new(drives: Vec<DriveErrors>) -> Self {
         let mut names: Vec<&String> = Vec::new();
         for drive in &drives {

@@ -11,12 +11,10 @@ use serde::Serialize;
 /// A point in the plane, m.
 pub type Point = [f64; 2];
 
-/// The error of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TrajectoryError {
     /// Root of the mean squared distance, m.
     pub rmse_m: f64,
-    /// Mean distance, m.
     pub mean_m: f64,
 }
 

@@ -33,7 +33,6 @@ pub struct Heading {
 }
 
 impl Heading {
-    /// Starts a filter.
     pub fn new(filter: VQF) -> Self {
         Self { filter, yaw: None }
     }

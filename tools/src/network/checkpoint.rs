@@ -68,7 +68,6 @@ impl Network for FogNet {
     }
 }
 
-/// A checkpoint in memory.
 #[derive(Debug, Clone)]
 pub struct Checkpoint<N> {
     tensors: Tensors,

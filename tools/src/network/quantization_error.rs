@@ -17,7 +17,6 @@ pub struct Both<'n, I, F> {
 /// The differences of two networks, summed over all outputs of all windows.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct QuantizationError {
-    /// Number of windows that were compared.
     pub windows: u64,
     pub clamped_inputs: u64,
     squared_difference: f64,
@@ -42,12 +41,10 @@ impl QuantizationError {
 }
 
 impl<'n, I, F> Both<'n, I, F> {
-    /// Creates a pair that has compared no window yet.
     pub fn new(integer: &'n mut I, reference: &'n mut F) -> Self {
         Self { integer, reference, error: QuantizationError::default() }
     }
 
-    /// Returns the error so far.
     pub fn error(&self) -> QuantizationError {
         self.error
     }

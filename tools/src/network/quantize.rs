@@ -34,7 +34,6 @@ pub enum QuantizeError {
         /// The largest weight of the row.
         weight: f64,
     },
-    /// A normalisation constant does not fit its fixed-point field.
     #[error("{what} {value} does not fit its fixed-point field")]
     Constant {
         /// The name of the constant.
@@ -45,7 +44,6 @@ pub enum QuantizeError {
         "the checkpoint does not name its gyro: train with --gyro, and with --serial if the weights are for one gyro only"
     )]
     Gyro,
-    /// The result does not pass the library's own checks.
     #[error(transparent)]
     Blob(#[from] blob::BlobError),
 }
@@ -57,9 +55,7 @@ pub struct Report {
     pub rows: usize,
     /// Number of rows whose scale was raised to keep their sum within the limit.
     pub raised: usize,
-    /// Largest factor by which a scale was raised.
     pub largest_raise: f64,
-    /// Length of the file, bytes.
     pub bytes: usize,
 }
 

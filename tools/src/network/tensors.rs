@@ -12,7 +12,6 @@ use std::path::{Path, PathBuf};
 pub enum CheckpointError {
     #[error("{path}: {source}")]
     Io { path: PathBuf, source: std::io::Error },
-    /// The file is not a safetensors file.
     #[error("{name}: not a safetensors file: {source}")]
     Format { name: String, source: safetensors::SafeTensorError },
     #[error(
@@ -20,12 +19,10 @@ pub enum CheckpointError {
         s.save_file({{k: t.contiguous() for k, t in torch.load('{name}', 'cpu').items()}}, 'net.safetensors')\""
     )]
     PyTorch { name: String },
-    /// The file has tensors that are not part of the network.
     #[error("{name}: the network has no {}: quantising would leave them out", tensors.join(", "))]
     Unused { name: String, tensors: Vec<String> },
     #[error("{name}: tensor {tensor} is missing")]
     Missing { name: String, tensor: String },
-    /// A tensor does not have the shape and element type that the network needs.
     #[error("{name}: tensor {tensor} is {found}, should be F32 {expected:?}")]
     Shape {
         name: String,
@@ -35,7 +32,6 @@ pub enum CheckpointError {
         /// Shape as needed.
         expected: Vec<usize>,
     },
-    /// A tensor holds NaN or an infinity.
     #[error("{name}: tensor {tensor} holds a value that is not finite, at {at}")]
     NotFinite {
         name: String,
@@ -98,7 +94,6 @@ pub struct Tensors {
     tensors: BTreeMap<String, Vec<f32>>,
     /// The provenance that `gyronet_train` wrote: JSON, or empty.
     pub provenance: String,
-    /// SHA-256 of the file.
     pub sha256: String,
 }
 
@@ -159,7 +154,6 @@ impl Tensors {
         Ok(Self { tensors, provenance, sha256 })
     }
 
-    /// Returns whether there is a tensor of this name.
     pub(crate) fn has(&self, name: &str) -> bool {
         self.tensors.contains_key(name)
     }

@@ -9,7 +9,6 @@ use std::path::Path;
 pub enum WeightFileError {
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },
-    /// The library rejects the file.
     #[error("{path}: {source}")]
     Blob { path: String, source: BlobError },
 }
@@ -48,12 +47,10 @@ impl WeightFile {
         Ok(file)
     }
 
-    /// Returns GyroNet's weights.
     pub fn blob(&self) -> Result<Blob<'_>, WeightFileError> {
         Blob::new_checked(self.bytes()).map_err(|source| self.refused(source))
     }
 
-    /// Returns FoGNet's weights.
     pub fn fog_blob(&self) -> Result<FogBlob<'_>, WeightFileError> {
         FogBlob::new_checked(self.bytes()).map_err(|source| self.refused(source))
     }

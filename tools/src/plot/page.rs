@@ -9,7 +9,6 @@ const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/zoom.js");
 pub const HINT: &str = "Drag over a chart, or press + and - on it, to zoom; tap a name to hide its curve.";
 
-/// Returns a complete page around its body.
 pub fn document(title: &str, body: &str) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\">\

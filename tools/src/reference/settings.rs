@@ -104,7 +104,6 @@ const SETTINGS: &[(&str, Takes)] = &[
     ),
 ];
 
-/// The settings that `gyronet device get` prints.
 pub fn settings() -> Table {
     let mut table = Table::new(&["setting", "unit", "range", "default"]);
     let defaults = defaults();

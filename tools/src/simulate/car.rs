@@ -14,7 +14,6 @@ use std::f64::consts::TAU;
 /// Standard gravity, m/s^2.
 pub const GRAVITY: f64 = 9.80665;
 
-/// Holds the parameters of a car and its driver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// Wheel radius, m: that of the recordings' car.

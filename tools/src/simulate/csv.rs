@@ -4,7 +4,6 @@ use super::{Config, Sample, Simulation};
 use gyronet::sample::RATE_HZ;
 use std::io::{self, Write};
 
-/// Header of the file.
 pub const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_x,ref_gyr_y,ref_gyr_z,\
                           wheel1_rate,wheel2_rate,wheel3_rate,wheel4_rate";
 

@@ -3,14 +3,10 @@
 /// A piece of a route.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Leg {
-    /// The vehicle waits.
     Stand {
-        /// Duration, s.
         seconds: f64,
     },
-    /// The vehicle drives.
     Road {
-        /// Length, m.
         metres: f64,
         /// The speed, m/s.
         speed: f64,
@@ -20,7 +16,6 @@ pub enum Leg {
 }
 
 impl Leg {
-    /// Returns the highest speed in the leg, m/s.
     pub fn speed(&self) -> f64 {
         match *self {
             Self::Stand { .. } => 0.0,

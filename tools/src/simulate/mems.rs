@@ -106,7 +106,6 @@ pub struct Mems {
 }
 
 impl Mems {
-    /// Creates the part of a seed.
     pub fn new(config: &Config, seed: u64) -> Self {
         let mut random = Purpose::Mems.stream(seed);
         let mut triad = |noise, walk, bias| {

@@ -70,7 +70,6 @@ impl Config {
     };
 }
 
-/// Holds the vibration at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Shake {
     /// Specific force of the vibration, m/s^2.
@@ -103,7 +102,6 @@ impl Band {
     }
 }
 
-/// Simulates a source.
 #[derive(Debug, Clone, Copy)]
 struct Shaker {
     source: Source,

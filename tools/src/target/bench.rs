@@ -22,29 +22,21 @@ pub const MACHINE: &str = "netduinoplus2";
 /// The Rust target of the image.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// The reason why a bench cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
-    /// A program could not be started.
     #[error("{program} cannot be started: {source}")]
     Start { program: String, source: std::io::Error },
-    /// A program ended with an error.
     #[error("{program} failed:\n{output}")]
     Failed { program: String, output: String },
-    /// A program did not end.
     #[error("{program} did not end within {LIMIT:?}")]
     TooLong { program: String },
-    /// The image printed an unexpected line.
     #[error("the bench image printed an unexpected line: {0}")]
     Line(String),
 }
 
-/// Holds the counts of one region of the image.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Count {
-    /// The image's name for the region.
     pub name: String,
-    /// Number of executed instructions.
     pub instructions: u64,
     /// Modelled Cortex-M4 cycles at zero wait states.
     pub cycles: u64,
@@ -52,7 +44,6 @@ pub struct Count {
     pub stack: u64,
 }
 
-/// Holds all counts of one run, and the sizes that the image prints.
 #[derive(Debug, Clone, Default)]
 pub struct Counts {
     /// The regions in the order in which they ran.
@@ -62,13 +53,11 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Appends the counts of another image.
     pub fn extend(&mut self, other: Self) {
         self.regions.extend(other.regions);
         self.sizes.extend(other.sizes);
     }
 
-    /// Returns the first region of a name.
     pub fn get(&self, name: &str) -> Option<&Count> {
         self.regions.iter().find(|count| count.name == name)
     }
@@ -82,7 +71,6 @@ impl Counts {
         })
     }
 
-    /// Returns all regions whose name begins with `prefix`.
     pub fn starting_with(&self, prefix: &str) -> impl Iterator<Item = &Count> {
         self.regions.iter().filter(move |count| count.name.starts_with(prefix))
     }
@@ -212,7 +200,6 @@ pub fn emulate(machine: &str, image: &Path, arguments: &[&str]) -> Result<(Strin
     run(qemu.args(arguments).arg("-kernel").arg(image))
 }
 
-/// Returns the number after `key` in a line.
 fn field(line: &str, key: &str) -> Option<u64> {
     let (_, rest) = line.split_once(key)?;
     rest.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()

@@ -35,19 +35,14 @@ const SOURCES: [&str; 18] = [
     "FullyConnectedFunctions/arm_fully_connected_s16.c",
 ];
 
-/// The reason why CMSIS-NN cannot be counted.
 #[derive(Debug, thiserror::Error)]
 pub enum CmsisError {
-    /// A source file that is missing.
     #[error("{0} is not there: the folder does not hold CMSIS-NN (fetch it with `{FETCH}`)")]
     Missing(String),
-    /// The compiler is missing.
     #[error("{COMPILER} is not installed (Debian and Ubuntu: apt install gcc-arm-none-eabi)")]
     NoCompiler,
-    /// The image could not be built or run.
     #[error(transparent)]
     Bench(#[from] BenchError),
-    /// The image printed something else than its regions.
     #[error("CMSIS-NN's image printed {0:?}")]
     Output(String),
 }
@@ -56,7 +51,6 @@ pub enum CmsisError {
 pub struct Region {
     /// Activations and extent, such as `cmsis-nn/s8/window`.
     pub name: String,
-    /// Executed instructions.
     pub instructions: u64,
     /// Modelled Cortex-M4 cycles at zero wait states.
     pub cycles: u64,

@@ -15,22 +15,18 @@ pub struct ImageSize {
     pub kernels: u64,
     /// Statics in SRAM, and the code that runs from SRAM.
     pub static_ram: u64,
-    /// Statics in CCM.
     pub ccm: u64,
 }
 
-/// The reason why an image cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum SizeError {
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },
-    /// The file is not an object file.
     #[error("{path}: {source}")]
     Format { path: String, source: object::Error },
 }
 
 impl ImageSize {
-    /// Measures an image.
     pub fn read(path: &Path) -> Result<Self, SizeError> {
         let name = || path.display().to_string();
         let bytes = std::fs::read(path).map_err(|source| SizeError::Io { path: name(), source })?;

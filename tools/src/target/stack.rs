@@ -30,26 +30,14 @@ const MASKED: &str = "__rtic_init_resources";
 /// The reason why no bound of an image's stack can be computed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StackError {
-    /// The file is not a firmware image.
     #[error("not a firmware image: {0}")]
     Format(String),
-    /// A function calls itself, directly or through others.
     #[error("recursion: {}", .0.join(" -> "))]
     Recursion(Vec<String>),
-    /// The stack pointer is moved by a register.
     #[error("{function} moves the stack pointer by a register at {address:#010x}")]
-    Dynamic {
-        function: String,
-        /// The address of the instruction.
-        address: u32,
-    },
-    /// A call goes to an address where no function begins.
+    Dynamic { function: String, address: u32 },
     #[error("{function} calls {target:#010x}, where no function begins")]
-    Target {
-        function: String,
-        /// The called address.
-        target: u32,
-    },
+    Target { function: String, target: u32 },
 }
 
 /// The functions of the deepest call chain, outermost first, each with its own stack use in bytes.
@@ -62,11 +50,9 @@ pub struct Handler {
     pub priority: Option<u8>,
     /// Stack of the handler in bytes, the processor's frame included.
     pub bytes: u32,
-    /// The handler's deepest call chain.
     pub deepest: Way,
 }
 
-/// The worst-case stack of an image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageStack {
     /// Bytes of the main program while interrupts are on.

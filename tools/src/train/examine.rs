@@ -20,13 +20,10 @@ const TURNING_RAD: f64 = 0.02;
 /// The reason why a drive cannot be trained on.
 #[derive(Debug, thiserror::Error)]
 pub enum Refusal {
-    /// The file is not a drive.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// The vehicle does not stand still in the first 3 s.
     #[error(transparent)]
     Start(#[from] ReplayError),
-    /// The drive has no true yaw rate.
     #[error("{path}: line {line}: no ref_gyr_z (true yaw rate), which training needs in every row{}", advice(*course))]
     NoReference {
         path: String,
@@ -35,7 +32,6 @@ pub enum Refusal {
         /// True if the drive has a course instead.
         course: bool,
     },
-    /// Rows are missing.
     #[error("{path}: line {line}: {ms:.1} ms after the previous row; training needs a row every 10 ms")]
     Gap {
         path: String,
@@ -50,7 +46,6 @@ pub enum Refusal {
         /// Length of the drive after static initialisation, s.
         seconds: f64,
     },
-    /// The gyro and the reference disagree.
     #[error(
         "{path}: ref_gyr_z disagrees with gyr_z by {rad:.2} rad in 10 s: a wrong unit, sign or clock, or another drive; \
         `gyronet doctor` says which"
@@ -67,7 +62,6 @@ fn advice(course: bool) -> &'static str {
     if course { "; its ref_yaw is enough for `gyronet calibrate`" } else { "" }
 }
 
-/// A drive that can be trained on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Examined {
     pub path: PathBuf,
@@ -79,7 +73,6 @@ pub struct Examined {
     pub turned_rad: f64,
 }
 
-/// Examines a drive.
 pub fn examine(path: &Path) -> Result<Examined, Refusal> {
     let mut recording = Recording::read(path)?;
     // At its ends a reference from another source may be missing; the trainer leaves these rows out, too.

@@ -10,52 +10,25 @@ const LEAST_S: f64 = 300.0;
 /// Least turn of all training drives together, rad: a full circle.
 const LEAST_TURNED_RAD: f64 = std::f64::consts::TAU;
 
-/// The reason why a folder cannot be trained on.
 #[derive(Debug, thiserror::Error)]
 pub enum RolesError {
-    /// The folder cannot be listed.
     #[error("{folder}: {source}")]
     Folder { folder: String, source: std::io::Error },
-    /// Too few drives can be used.
     #[error("{folder}: {usable} drives can be used, but {needed} are needed{}", listed(refused))]
-    TooFew {
-        folder: String,
-        /// The number of drives that can be used.
-        usable: usize,
-        /// The number that is needed.
-        needed: usize,
-        refused: Vec<Refusal>,
-    },
-    /// The training drives are too short.
+    TooFew { folder: String, usable: usize, needed: usize, refused: Vec<Refusal> },
     #[error(
         "{folder}: the training drives have {seconds:.0} s together, but {LEAST_S:.0} s are needed{}",
         listed(refused)
     )]
-    TooShort {
-        folder: String,
-        /// Length of the training drives together, s.
-        seconds: f64,
-        refused: Vec<Refusal>,
-    },
+    TooShort { folder: String, seconds: f64, refused: Vec<Refusal> },
     #[error(
     "{folder}: too few turns: the training drives turn by {:.0} degrees together, but {:.0} are needed",
         turned_rad.to_degrees(),
         LEAST_TURNED_RAD.to_degrees()
     )]
-    NoTurns {
-        folder: String,
-        /// Turns of the training drives together, rad.
-        turned_rad: f64,
-    },
-    /// A name on the command line matches no drive, or several.
+    NoTurns { folder: String, turned_rad: f64 },
     #[error("{folder}: {found} drives match the name {name:?}{}", listed(refused))]
-    Name {
-        folder: String,
-        name: String,
-        /// The number of drives that match the name.
-        found: usize,
-        refused: Vec<Refusal>,
-    },
+    Name { folder: String, name: String, found: usize, refused: Vec<Refusal> },
 }
 
 /// Formats refusals, one line each.
@@ -71,7 +44,6 @@ pub struct Roles {
     pub validate: Examined,
     /// Held-out drives, on which the result is evaluated.
     pub held_out: Vec<Examined>,
-    /// Reasons why the other drives cannot be used.
     pub refused: Vec<Refusal>,
 }
 

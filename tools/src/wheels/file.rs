@@ -15,17 +15,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WheelFileError {
-    /// The file is not TOML, or a key or value is unknown.
     #[error("{path}: {source}")]
     Toml {
         path: String,
         /// The place and the reason.
         source: Box<toml::de::Error>,
     },
-    /// The file has too many frames.
     #[error("{path}: {found} frames, at most {MAX_FRAMES} are allowed")]
     Frames { path: String, found: usize },
-    /// The identifier of a frame is too large.
     #[error("{path}: frame {id:#x}: not an identifier of {} bits", if *.extended { 29 } else { 11 })]
     Identifier {
         path: String,
@@ -33,25 +30,14 @@ pub enum WheelFileError {
         /// True if the file declares an identifier of 29 bits.
         extended: bool,
     },
-    /// A wheel has two signals.
     #[error("{path}: {wheel:?} has two signals")]
     Twice { path: String, wheel: Wheel },
-    /// A signal has neither a factor nor a way per pulse, or both.
     #[error("{path}: {wheel:?} needs either factor_kmh or metres_per_pulse")]
     Scale { path: String, wheel: Wheel },
-    /// A value is outside a frame of eight bytes.
     #[error("{path}: frame {id:#x}: {source}")]
     Place { path: String, id: u32, source: OutsideFrame },
-    /// A number is out of the range of the board's codes.
     #[error("{path}: {key} = {value}: must be {range}")]
-    Range {
-        path: String,
-        key: &'static str,
-        value: f64,
-        /// The allowed values.
-        range: &'static str,
-    },
-    /// The library rejects the settings.
+    Range { path: String, key: &'static str, value: f64, range: &'static str },
     #[error("{path}: {source}")]
     Settings { path: String, source: WheelConfigError },
 }
@@ -88,7 +74,6 @@ const fn still_for_ms() -> u32 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Frame {
-    /// CAN identifier.
     pub id: u32,
     /// True if the identifier has 29 bits.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -101,7 +86,6 @@ pub struct Frame {
     pub signal: Vec<Signal>,
 }
 
-/// The protection of a frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Protection {
@@ -117,7 +101,6 @@ pub enum Protection {
     /// AUTOSAR E2E profile 1.
     #[serde(rename = "e2e-p01")]
     P01 {
-        /// Identifier of the data.
         data_id: u16,
         /// The bytes of the identifier that enter the checksum.
         mode: DataIdMode,
@@ -130,14 +113,10 @@ pub enum Protection {
     },
     /// AUTOSAR E2E profile 5.
     #[serde(rename = "e2e-p05")]
-    P05 {
-        /// Identifier of the data.
-        data_id: u16,
-    },
+    P05 { data_id: u16 },
     /// AUTOSAR E2E profile 11.
     #[serde(rename = "e2e-p11")]
     P11 {
-        /// Identifier of the data.
         data_id: u16,
         /// The bytes of the identifier that enter the checksum.
         mode: P11Mode,
@@ -170,7 +149,6 @@ pub struct Sum {
     pub last_xor: u8,
 }
 
-/// The message counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counter {
     #[serde(flatten)]
@@ -209,20 +187,16 @@ pub enum Raw {
     List(Vec<u32>),
 }
 
-/// The position of a value in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Place {
     pub start_bit: u8,
     /// Number of bits, 1 to 32.
     pub bits: u8,
-    /// Order of the bytes.
     pub order: Order,
-    /// True if the value is signed.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub signed: bool,
 }
 
-/// The byte order of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
@@ -233,7 +207,6 @@ pub enum Order {
     Motorola,
 }
 
-/// The wheel of a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Wheel {
@@ -243,11 +216,9 @@ pub enum Wheel {
     RearRight,
 }
 
-/// The speed of a wheel in a frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Signal {
     pub wheel: Wheel,
-    /// The position of the speed in the frame.
     #[serde(flatten)]
     pub place: Place,
     /// Speed per raw count, km/h.
@@ -279,7 +250,6 @@ impl WheelFile {
             .map_err(|source| WheelFileError::Toml { path: path.to_owned(), source: Box::new(source) })
     }
 
-    /// Creates the file contents from a board's settings.
     pub fn of(settings: &WheelSettings) -> Self {
         let frames = (0..).zip(&settings.frames);
         let frames = frames.filter_map(|(k, frame)| Some(Frame::of(settings, k, frame.as_ref()?)));

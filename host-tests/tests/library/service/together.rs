@@ -40,7 +40,6 @@ fn board(built_in: &[u8]) -> Board {
     board
 }
 
-/// The kind of a refusal.
 fn reason(result: Result<(), Refusal>) -> String {
     let Err(Refusal::Store(StoreError::Field(error))) = result else { panic!("{result:?}") };
     format!("{error:?}").chars().take_while(|letter| letter.is_alphabetic() || *letter == '(').collect()
@@ -232,7 +231,6 @@ fn weights_that_are_too_slow_for_the_mode_are_not_activated() {
     );
 }
 
-/// A board with this flash and identity.
 fn started(flash: &Rc<RefCell<F405>>, identity: Identity) -> super::Board {
     let mut board = super::Board::new(&super::SUPPORTED_HARDWARE);
     board.begin(Some(Region::new(flash, STORE)), None, Ok(()), identity);

@@ -31,7 +31,6 @@ pub struct Args {
     training: bool,
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args, json: bool) -> super::Result {
     let sequence = Sequence::read(&args.folder)?;
     if json {

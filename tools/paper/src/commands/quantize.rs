@@ -32,7 +32,6 @@ pub struct Args {
     drives: Vec<PathBuf>,
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args, json: bool) -> super::Result {
     let checkpoint = Checkpoint::<checkpoint::FogNet>::read(&args.checkpoint)?;
     let (bytes, Report { rows, raised, largest_raise, .. }) = fognet::quantize(&checkpoint)?;

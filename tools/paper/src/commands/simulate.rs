@@ -35,7 +35,6 @@ pub struct Args {
     device: u64,
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args) -> super::Result {
     if let Some(set) = args.set {
         return set.specs(args.layout).iter().try_for_each(|spec| write(spec, &args.out.join(&spec.name)));

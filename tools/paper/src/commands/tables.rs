@@ -88,7 +88,6 @@ fn fit(folders: &[PathBuf]) -> super::Result<Vec<(Layout, Joint)>> {
     solved.ok_or_else(|| "--train: these sequences turn or move too little for a fit".into())
 }
 
-/// Runs the subcommand.
 pub fn run(args: &Args, json: bool) -> super::Result {
     for (k, given) in args.methods.iter().enumerate() {
         if args.methods[..k].iter().any(|other| other.method == given.method) {

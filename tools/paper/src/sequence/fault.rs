@@ -8,47 +8,35 @@ pub enum SequenceFault {
         "neither a KAIST Urban sequence (a folder with sensor_data in it) nor an NCLT one (with kvh.csv or ms25.csv)"
     )]
     UnknownLayout,
-    /// A row has more or fewer columns than the data set defines.
     #[error("{found} columns, expected {expected}")]
     Columns { found: usize, expected: usize },
-    /// A time stamp is earlier than the previous one.
     #[error("time goes backwards from {last} to {at}")]
     Backwards { last: i64, at: i64 },
     /// The gap before a row is so long that the rows after it belong to another drive.
     #[error("silent for {seconds:.0} s before this row; a gap of a drive is at most {most} s long")]
     Silent { seconds: f64, most: f64 },
-    /// The files of a sequence have too little time in common.
     #[error("its files have {seconds:.2} s in common, needed are {needed} s")]
     TooLittleInCommon { seconds: f64, needed: f64 },
-    /// The wheels of a sequence turn during static initialisation.
     #[error(
         "starts moving: its wheels roll {metres:.2} m in the first 3 s; at most {most} m count as standing"
     )]
     Rolling { metres: f64, most: f64 },
-    /// The calibration lacks a parameter, or the parameter is not a positive number.
     #[error("no usable parameter {0:?}")]
     Parameter(&'static str),
-    /// The four numbers of an attitude are not a unit quaternion.
     #[error("a quaternion of norm {norm:.3}, which is no attitude")]
     Quaternion { norm: f64 },
-    /// Two poses of a trajectory are too far apart to interpolate between them.
     #[error("{seconds:.2} s after the previous pose; at most {most} s can be interpolated")]
     FarApart { seconds: f64, most: f64 },
-    /// A trajectory does not cover the time that is compared.
     #[error(
         "has poses from {from_s:.2} to {to_s:.2} s, but {begin_s:.2} to {end_s:.2} s are needed: wrong length or clock"
     )]
     Span { from_s: f64, to_s: f64, begin_s: f64, end_s: f64 },
-    /// A trajectory does not start from the true pose.
     #[error("{metres:.2} m and {degrees:.1} deg from the truth at the start: the frames differ")]
     Frame { metres: f64, degrees: f64 },
-    /// A trajectory is further from the truth than the vehicle can have driven.
     #[error("{metres:.0} m from the truth, where at most {most:.0} m are possible: it has diverged")]
     Diverged { metres: f64, most: f64 },
-    /// An inertial sensor is needed, but the sequence has none.
     #[error("xsens_imu.csv has 8 columns: no gyro and no accelerometer")]
     NoGyro,
-    /// The marker of a simulated sequence cannot be parsed.
     #[error(transparent)]
     Marker(#[from] serde_json::Error),
 }

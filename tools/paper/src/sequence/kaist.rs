@@ -38,7 +38,6 @@ const POSE: Format<4> =
 const IMPOSSIBLE_SPEED: f64 = 100.0;
 
 pub(super) const CALIBRATION: &str = "calibration/EncoderParameter.txt";
-/// Paths of the other files.
 pub(super) const PATHS: [&str; 4] =
     ["sensor_data/xsens_imu.csv", "sensor_data/fog.csv", "sensor_data/encoder.csv", "global_pose.csv"];
 
@@ -115,7 +114,6 @@ fn orientation(path: &Path) -> Result<Imu, DataError> {
     Ok((Box::new(track), epoch))
 }
 
-/// Returns the heading of a quaternion.
 pub(crate) fn yaw([x, y, z, w]: [f64; 4]) -> f64 {
     libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 }
@@ -131,7 +129,6 @@ fn columns(path: &Path) -> Result<usize, DataError> {
     Ok(line.split(',').count())
 }
 
-/// Holds the parameters of the calibration file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct EncoderParameters {
     /// Counts per revolution.

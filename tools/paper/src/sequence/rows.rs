@@ -13,7 +13,6 @@ const MAX_VALUE: f64 = 1e12;
 /// A file with a longer gap is not a single drive, s.
 const MAX_SILENCE: f64 = 600.0;
 
-/// Describes the format of a file.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Format<const N: usize> {
     /// Number of columns, including that of the stamp.
@@ -21,7 +20,6 @@ pub(super) struct Format<const N: usize> {
     /// Indices of the used columns; the stamp is column 0.
     pub used: [usize; N],
     pub stamps_per_second: f64,
-    /// The nominal number of samples per second.
     pub nominal_hz: f64,
 }
 

@@ -9,12 +9,9 @@ const GAP_PERIODS: f64 = 2.5;
 /// A file that ends earlier than this is remarked, s.
 pub(super) const EARLY_S: f64 = 1.0;
 
-/// Holds a count, and the line of its first occurrence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Seen {
-    /// Number of occurrences.
     pub count: u64,
-    /// Line number of the first occurrence.
     pub first_line: Option<u64>,
 }
 
@@ -28,24 +25,17 @@ impl Seen {
 /// Holds the smallest and largest time between two stamps in one second of a file, ms.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
-    /// Smallest time.
     pub least_ms: f64,
-    /// Largest time.
     pub most_ms: f64,
 }
 
-/// Holds the summary of one file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StreamSummary {
-    /// Name of the file.
     pub file: String,
-    /// Number of used rows.
     pub rows: u64,
-    /// Mean rate, Hz.
     pub rate_hz: f64,
     /// Number of times that two stamps are more than 2.5 nominal periods apart.
     pub gaps: u64,
-    /// The longest time between two stamps, s.
     pub longest_gap_s: f64,
     /// Rows skipped because they repeat the stamp of the previous row.
     pub duplicates: Seen,

@@ -3,7 +3,6 @@ use super::*;
 use crate::simulate;
 use tempfile::{TempDir, tempdir};
 
-/// A sequence in its own folder.
 struct Scratch(TempDir);
 
 impl Scratch {
@@ -34,7 +33,6 @@ const FOG: &str = "sensor_data/fog.csv";
 const IMU: &str = "sensor_data/xsens_imu.csv";
 const ENCODER: &str = "sensor_data/encoder.csv";
 
-/// Replaces a field of a line.
 fn set(line: &mut String, column: usize, to: &str) {
     let mut fields: Vec<&str> = line.split(',').collect();
     fields[column] = to;

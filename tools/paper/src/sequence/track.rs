@@ -24,7 +24,6 @@ pub(super) trait Stream<const M: usize> {
     fn finish(self: Box<Self>) -> Result<StreamSummary, DataError>;
 }
 
-/// Holds an interpolated value.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Value<const M: usize> {
     pub values: [f64; M],

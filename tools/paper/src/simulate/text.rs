@@ -4,7 +4,6 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// A writer of a file of comma-separated rows.
 pub(super) struct Rows {
     file: BufWriter<File>,
     line: Vec<u8>,

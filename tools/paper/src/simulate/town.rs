@@ -41,7 +41,6 @@ pub struct Town {
 }
 
 impl Town {
-    /// Creates the route of a seed.
     pub fn new(config: &Config, seed: u64) -> Self {
         let mut random = Purpose::Route.stream(seed);
         let [from, to] = config.before;

@@ -44,7 +44,6 @@ const DEG: f64 = std::f64::consts::PI / 180.0;
 /// sqrt(1 h) in sqrt(s).
 const ROOT_HOUR: f64 = 60.0;
 
-/// The delays of messages by the logger.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delays {
     /// The mean delay, s.
@@ -55,18 +54,13 @@ pub struct Delays {
     pub longest: f64,
 }
 
-/// The parameters of a vehicle and its sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vehicle {
-    /// The vehicle's motion and environment.
     pub world: world::Config,
     pub town: town::Config,
-    /// The inertial sensor.
     pub mems: mems::Config,
-    /// The fibre-optic gyro.
     pub fog: fog::Config,
     pub wheels: odometer::Config,
-    /// The logger's delays.
     pub delays: Delays,
 }
 

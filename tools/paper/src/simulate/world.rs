@@ -15,32 +15,25 @@ use gyronet_tools::simulate::vibration::{self, Shake, Vibration};
 /// Rotation rate of the Earth, rad/s (WGS 84).
 pub const EARTH_RATE: f64 = 7.292_115e-5;
 
-/// Holds the parameters of the drive's world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
-    /// The vehicle.
     pub car: car::Config,
     pub vibration: vibration::Config,
     /// Normalised cornering stiffness of the rear axle: lateral acceleration over g for 1 rad.
     pub cornering_stiffness: f64,
-    /// Latitude, deg.
     pub latitude_deg: f64,
 }
 
-/// Holds the truth at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
-    /// Time since the start, s.
     pub seconds: f64,
     /// Position relative to the start, m.
     pub position: [f64; 3],
     /// Heading, not wrapped, rad.
     pub yaw: f64,
-    /// The motion of the vehicle.
     pub motion: Motion,
     /// Angular rate relative to inertial space, in vehicle axes and without vibration, rad/s.
     pub inertial_rate: [f64; 3],
-    /// The vibration of the sensor.
     pub shake: Shake,
 }
 

@@ -3,7 +3,6 @@
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::trajectory_error::Point;
 
-/// The estimate of a method on a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     pub method: Method,

@@ -31,7 +31,6 @@ use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::vqf;
 use std::time::Instant;
 
-/// Holds the estimates of all methods on a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimates {
     /// Index of the first compared step, after static initialisation.
@@ -46,7 +45,6 @@ pub struct Estimates {
     pub refused: Option<String>,
 }
 
-/// Runs every method.
 pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork) -> Estimates {
     let start = (STATIC_SAMPLES as usize).min(sequence.steps.len());
     let mut estimates =
@@ -182,7 +180,6 @@ impl Estimates {
         self.methods.push(Estimate { method, turns, places: Places::RECKONED, run_time: Some(run_time) });
     }
 
-    /// Adds the fit of wheels and fibre-optic gyro.
     pub fn add_joint(&mut self, sequence: &Sequence, joint: &Joint) {
         self.methods.push(joint.estimate(sequence, self.start));
         self.fitted = Some(joint.to_string());

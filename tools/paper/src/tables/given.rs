@@ -34,17 +34,14 @@ pub const DIVERGED: f64 = 100.0;
 pub struct Given {
     /// The method's name in tables and in JSON.
     pub method: Method,
-    /// Folder of the trajectories.
     pub folder: PathBuf,
 }
 
 /// The error of a `NAME=FOLDER` that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NameError {
-    /// The name or the folder is missing.
     #[error("expected NAME=FOLDER")]
     Form,
-    /// The name is that of one of our own methods.
     #[error("{0:?} is a method of our own")]
     Taken(String),
 }

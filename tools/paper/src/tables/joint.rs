@@ -53,7 +53,6 @@ impl Fit {
     }
 }
 
-/// Holds the fitted numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
     /// Share of the gyro's turn.

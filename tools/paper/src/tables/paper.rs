@@ -72,7 +72,6 @@ pub const RUN_TIME: [Line; 3] =
 pub const NCLT: [Line; 2] =
     [line("FoG + odometry", &[41.98, 18.15]), line("FoGNet + odometry", &[38.64, 16.66])];
 
-/// Returns the average of lines, column by column.
 pub fn average(lines: &[Line]) -> Vec<f64> {
     let columns = lines.first().map_or(0, |line| line.figures.len());
     let mean = |k: usize| lines.iter().map(|line| line.figures[k]).sum::<f64>() / lines.len() as f64;

@@ -52,7 +52,6 @@ pub struct SequenceErrors {
     pub name: String,
     /// The data set whose layout it has.
     pub layout: Layout,
-    /// Says whether the sequence is simulated.
     pub simulated: bool,
     pub group: Group,
     /// Length of the compared part, s.
@@ -175,12 +174,10 @@ pub fn mean<'a>(sequences: impl Iterator<Item = &'a SequenceErrors>) -> ByMethod
     all.into_iter().filter(|(_, e)| e.len() == count).map(|(key, e)| (key, Errors::mean(&e))).collect()
 }
 
-/// Holds all results, as in the JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Results {
     /// Says whether at least one sequence is simulated.
     pub simulated: bool,
-    /// One entry for each sequence.
     pub sequences: Vec<SequenceErrors>,
     /// The means over all sequences, for the methods that were run on all of them.
     pub mean: ByMethod,
@@ -194,7 +191,6 @@ pub struct Results {
 }
 
 impl Results {
-    /// Computes the means of the sequences' errors.
     pub fn new(sequences: Vec<SequenceErrors>) -> Self {
         let mean_all = mean(sequences.iter());
         let of = |layout| sequences.iter().filter(move |sequence| sequence.layout == layout);

@@ -20,18 +20,14 @@ pub struct Row {
 pub struct Table {
     /// Number of the table in the paper, and its subject.
     pub title: String,
-    /// Says whether it contains results of simulated drives.
     pub simulated: bool,
     /// Names of the columns of our rows.
     pub columns: Vec<String>,
-    /// Number of decimals.
     pub decimals: usize,
-    /// Our rows.
     pub rows: Vec<Row>,
     /// Names of the columns of the paper's rows.
     pub paper_columns: Vec<String>,
     pub paper_rows: Vec<Row>,
-    /// Remarks below the table.
     pub notes: Vec<String>,
 }
 

@@ -13,7 +13,6 @@ use gyronet::units::AngularRate;
 use gyronet_tools::evaluate::methods::Method;
 use std::path::PathBuf;
 
-/// A network that never corrects anything.
 struct Nothing;
 
 impl WindowNetwork for Nothing {

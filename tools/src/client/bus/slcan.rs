@@ -25,7 +25,6 @@ impl Line for Connection {
     }
 }
 
-/// An SLCAN line to a board or an adapter.
 pub struct SlcanBus<L> {
     line: L,
     text: Vec<u8>,

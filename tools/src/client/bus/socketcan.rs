@@ -8,7 +8,6 @@ use socketcan::{CanFrame, CanSocket, Socket, SocketOptions};
 use std::io::{ErrorKind, Result};
 use std::time::{Duration, Instant};
 
-/// An open CAN interface.
 pub struct Interface {
     socket: CanSocket,
     opened: Instant,

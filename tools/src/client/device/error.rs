@@ -10,30 +10,22 @@ use std::fmt;
 pub enum DeviceError {
     #[error(transparent)]
     Connect(#[from] ConnectError),
-    /// The line cannot be used.
     #[error("{name}: {source}")]
     Line { name: String, source: std::io::Error },
-    /// An identifier has too many bits, or is given twice.
     #[error("identifier {0:#x}: has too many bits, or is given twice")]
     Identifier(u32),
-    /// No response arrived.
     #[error("{name}: no response to three requests; is this the board's line, and is the board running?")]
     Silence { name: String },
-    /// The board refused the request, for this reason.
     #[error("the board refuses: {0}")]
     Refused(Refusal),
-    /// The board refused the request, and gave only a code.
     #[error("the board refuses service {service:#04x}: {code}")]
     Negative {
-        /// Identifier of the service.
         service: u8,
         /// The negative response code (ISO 14229-1 A.1).
         code: Code,
     },
-    /// The response does not have the layout that this program expects.
     #[error("the response does not fit this version ({} of gyronet); does the board have another firmware version?", env!("CARGO_PKG_VERSION"))]
     Mismatch,
-    /// The request is longer than the board accepts.
     #[error("the request is too long for the board")]
     TooLong,
 }

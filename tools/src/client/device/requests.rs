@@ -171,13 +171,11 @@ impl<B: Bus> Device<B> {
         words.fields()
     }
 
-    /// Restarts the board.
     pub fn restart(&mut self) -> Result<()> {
         self.enter(Session::Extended)?;
         self.ask(&[0x11, 1]).map(drop)
     }
 
-    /// Returns the value of a data identifier.
     pub fn read(&mut self, id: u16) -> Result<Vec<u8>> {
         let id = id.to_be_bytes();
         let response = self.ask(&[0x22, id[0], id[1]])?;

@@ -23,25 +23,16 @@ const RETIRED: [(&str, &str); 5] = [
 /// Decimals, in rad/s, that distinguish any two codes.
 const RATE_DECIMALS: usize = 9;
 
-/// The error of a setting or of a configuration that cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum SettingError {
-    /// The text is not `NAME=VALUE`.
     #[error("{0}: not NAME=VALUE")]
     NoAssignment(String),
     #[error("{0}: there is no such setting; see `device get`")]
     Name(String),
     #[error("{0}: {1}")]
     Retired(&'static str, &'static str),
-    /// The value is not a rate, or out of range.
     #[error("compensate.{name}: {value} is not a rate in rad/s")]
-    Rate {
-        /// Name of the rate inside `compensate`.
-        name: &'static str,
-        /// The refused value.
-        value: Value,
-    },
-    /// A part of the configuration is missing or has the wrong type.
+    Rate { name: &'static str, value: Value },
     #[error("no configuration: {0}")]
     Json(#[from] serde_json::Error),
 }

@@ -7,10 +7,8 @@ use gyronet::service::message::BLOCK;
 use gyronet::store::Slot;
 use gyronet::uds::Session;
 
-/// A file that the board has accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Uploaded {
-    /// The slot that holds the file.
     pub slot: Slot,
     /// The checksum that the board computed.
     pub crc: u32,

@@ -20,10 +20,8 @@ pub const WAIT: Duration = Duration::from_millis(100);
 pub enum SourceError {
     #[error(transparent)]
     Connect(#[from] ConnectError),
-    /// The file cannot be opened.
     #[error("{name}: {source}")]
     Open { name: String, source: io::Error },
-    /// Reading from or writing to the source failed.
     #[error("{name}: {source}")]
     Read { name: String, source: io::Error },
 }
@@ -42,7 +40,6 @@ enum Kind {
     Log(File),
 }
 
-/// An open source.
 pub struct Source {
     name: String,
     kind: Kind,

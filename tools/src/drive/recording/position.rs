@@ -18,7 +18,6 @@ const ACROSS_M: f64 = 0.07;
 /// Length of a degree of latitude, m.
 const DEGREE_M: f64 = 111_132.0;
 
-/// The newest positions.
 #[derive(Debug, Default)]
 pub(super) struct Track {
     newest: Option<(f64, f64)>,

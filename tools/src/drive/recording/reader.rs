@@ -178,7 +178,6 @@ impl<R: std::io::Read> Iterator for Reader<R> {
     }
 }
 
-/// The fields of one row.
 struct Fields<'a> {
     path: &'a str,
     line: u64,

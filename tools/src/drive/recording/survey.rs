@@ -12,11 +12,8 @@ use std::collections::BTreeMap;
 /// The content of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Facts {
-    /// Number of rows.
     pub rows: usize,
-    /// Time of the first row.
     pub first: Micros,
-    /// Time of the last row.
     pub last: Micros,
     /// Number of rows that are missing in gaps.
     pub missing: u64,
@@ -37,13 +34,11 @@ impl Facts {
         (self.last.0 - self.first.0 + PERIOD_US) as f64 * 1e-6
     }
 
-    /// True if any wheel is recorded.
     pub fn has_wheels(&self) -> bool {
         self.wheels.contains(&true)
     }
 }
 
-/// A survey in progress.
 #[derive(Debug, Default)]
 pub struct Survey {
     facts: Facts,
@@ -55,14 +50,12 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// The survey of these rows.
     pub fn of(rows: &[Row]) -> Self {
         let mut survey = Self::default();
         rows.iter().for_each(|row| survey.row(row));
         survey
     }
 
-    /// Adds the next row.
     pub fn row(&mut self, row: &Row) {
         let (facts, time) = (&mut self.facts, row.sample.time);
         if facts.rows == 0 {

@@ -18,7 +18,6 @@ pub struct Function {
 
 #[derive(Debug, Default)]
 pub struct Code {
-    /// The functions by address.
     pub functions: BTreeMap<u32, Function>,
     /// Functions whose address is taken somewhere.
     taken: BTreeSet<u32>,
@@ -87,7 +86,6 @@ impl Code {
         Ok(code)
     }
 
-    /// Reads the instructions of one function.
     fn function(
         &mut self,
         name: &str,

@@ -23,7 +23,6 @@ pub struct Vectors {
 pub type Group = (Option<u8>, BTreeSet<u32>);
 
 impl Vectors {
-    /// Reads the priorities of an image.
     pub fn prioritise(&mut self, section: &[u8]) -> Result<(), StackError> {
         let refused = || StackError::Format(format!("{SECTION} is no list of vectors and priorities"));
         let (entries, []) = section.as_chunks::<2>() else { return Err(refused()) };

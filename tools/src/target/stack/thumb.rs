@@ -3,7 +3,6 @@
 //! Only instructions that affect one of them are decoded (ARMv7-M Architecture Reference Manual, A7.7); all others
 //! are [`Effect::None`].
 
-/// The effect of an instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
     /// The instruction affects neither the stack pointer nor the control flow.
