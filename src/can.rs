@@ -10,7 +10,6 @@ pub mod encoder;
 #[doc(hidden)]
 pub mod fog_encoder;
 pub mod j1939;
-pub mod latitude;
 #[doc(hidden)]
 pub mod load;
 #[doc(hidden)]

@@ -34,12 +34,11 @@ use crate::bias::{Latitude, StaticError};
 use crate::can::DataFrame;
 use crate::can::encoder::CanEncoder;
 use crate::can::fog_encoder::FogEncoder;
-use crate::can::latitude::LatitudeReceiver;
 use crate::can::wheel::WheelReceiver;
 use crate::compensate::Complete;
 use crate::estimate::{VehicleSample, YawEstimate};
 use crate::fog::{Beside, FogConfig, FogCounters, FogPipeline};
-use crate::heading::Heading;
+use crate::heading::{Heading, HeadingError, HeadingReceiver, Received};
 use crate::health::slow::SlowStatus;
 use crate::health::{BoardFaults, Faults, InputCounters, MonitorCounters, Quality, Source, count};
 use crate::model::Estimate;
@@ -52,7 +51,6 @@ use crate::sample::{FogSample, Frame, ImuSample, NO_STAMP, WheelSample};
 use crate::standstill::Standing;
 use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use clock::Timeline;
-use embedded_can::Frame as _;
 use second_source::{Doubts, SecondSource, Shown};
 
 /// The results of one sample, or of its absence, for a log or diagnosis.
@@ -94,7 +92,7 @@ pub struct Coprocessor {
     handover: Handover,
     wheels: Option<WheelReceiver>,
     fog: FogPipeline,
-    latitude: Option<LatitudeReceiver>,
+    heading: Option<HeadingReceiver>,
     second: SecondSource,
     /// The newest usable rates of the inertial and the fibre-optic gyro, rad/s.
     inertial_rate: Option<(Micros, f32)>,
@@ -131,7 +129,7 @@ impl Coprocessor {
                 config.has_fognet,
                 config.fog_expected,
             ),
-            latitude: config.latitude,
+            heading: config.heading,
             second: SecondSource::START,
             inertial_rate: None,
             fog_rate: None,
@@ -273,11 +271,11 @@ impl Coprocessor {
         count(&mut self.counters.fog_errors, 1);
     }
 
-    /// Processes a frame received from the bus at `now`. Returns whether it is used: it carries wheel speeds or the
-    /// latitude.
+    /// Processes a frame received from the bus at `now`. Returns whether it is used: it carries wheel speeds, a
+    /// course or the latitude.
     ///
     /// # Errors
-    /// [`InputError::Wheels`] when a wheel frame is corrupt or marks a speed as invalid, [`InputError::Latitude`],
+    /// [`InputError::Wheels`] when a wheel frame is corrupt or marks a speed as invalid, [`InputError::Heading`],
     /// [`InputError::ClockWentBack`]; the error is counted. Without a valid frame the wheels become silent after a
     /// while, which is reported; the latitude in use is kept.
     pub fn can(&mut self, frame: &DataFrame, now: Micros) -> Result<bool, InputError> {
@@ -288,7 +286,7 @@ impl Coprocessor {
                 count(&mut self.counters.wheel_errors, 1);
                 Err(InputError::Wheels(error))
             }
-            wheels => Ok(self.take_latitude(frame, time)? || wheels.is_some()),
+            wheels => Ok(self.take_heading(frame, time)? || wheels.is_some()),
         }
     }
 
@@ -299,33 +297,34 @@ impl Coprocessor {
     /// used.
     pub fn heading(&mut self, heading: &Heading, now: Micros) -> Result<(), InputError> {
         self.advance(now)?;
-        let checked = heading.checked().map_err(|error| {
-            count(&mut self.counters.heading_errors, 1);
-            InputError::Heading(error)
-        })?;
+        let checked = heading.checked().map_err(|error| self.refuse_heading(error))?;
         self.pipeline.course(&checked);
         Ok(())
     }
 
-    fn take_latitude(&mut self, frame: &DataFrame, time: Micros) -> Result<bool, InputError> {
-        let Some(receiver) = &mut self.latitude else { return Ok(false) };
+    fn refuse_heading(&mut self, error: HeadingError) -> InputError {
+        let InputCounters { latitude_errors, heading_errors, .. } = &mut self.counters;
+        let is_jump = matches!(error, HeadingError::Jump { .. });
+        count(if is_jump { latitude_errors } else { heading_errors }, 1);
+        InputError::Heading(error)
+    }
+
+    #[inline(never)]
+    fn take_heading(&mut self, frame: &DataFrame, time: Micros) -> Result<bool, InputError> {
+        let Some(receiver) = &mut self.heading else { return Ok(false) };
         let received = receiver.decode(frame, time);
-        let is_meant = frame.id() == receiver.id();
         self.fog.contest_latitude(receiver.is_contested());
-        match received.transpose() {
-            Ok(received) => {
-                if let Some((received, latitude)) =
-                    received.and_then(|received| Some((received, Latitude::from_degrees(received.degrees)?)))
-                {
-                    self.fog.set_latitude(latitude, received.moved);
-                }
-                Ok(is_meant)
-            }
-            Err(error) => {
-                count(&mut self.counters.latitude_errors, 1);
-                Err(InputError::Latitude(error))
-            }
+        let received = received.transpose().map_err(|error| self.refuse_heading(error))?;
+        let Some(Received { heading, latitude }) = received else { return Ok(false) };
+        if let Some(heading) = &heading {
+            self.pipeline.course(heading);
         }
+        if let Some((latitude, is_near)) =
+            latitude.and_then(|found| Some((Latitude::from_degrees(found.degrees)?, found.moved)))
+        {
+            self.fog.set_latitude(latitude, is_near);
+        }
+        Ok(true)
     }
 
     /// Does the work that is due at `now` without an input: it sends the messages of silent sensors, and of steps that

@@ -1,17 +1,21 @@
 //! A heading reference of the vehicle: course and speed over ground with their accuracies, from CAN.
 //!
-//! [`nmea2000`] has the messages of GNSS receivers on boats and machines, [`j1939`] that of trucks, and [`described`]
-//! reads any other frame by its description. [`Estimator`] learns from them.
+//! [`nmea2000`] has the messages of GNSS receivers on boats and machines, [`j1939`] those of trucks; any other frame is
+//! read by its description. [`HeadingReceiver`] takes those that the configuration names, and [`Estimator`] learns.
 
-pub mod described;
+mod described;
 mod estimator;
 pub(crate) mod filter;
 pub mod j1939;
+pub mod latitude;
 pub mod nmea2000;
+mod receiver;
 mod turns;
 
+pub use described::HeadingSignal;
 pub use estimator::{CourseConfig, CourseCounters, Estimator, Refusal};
 pub(crate) use estimator::{FINE_BIAS, gain_knowledge};
+pub use receiver::{HeadingConfigError, HeadingReceiver, HeadingSettings, Received};
 
 use embedded_can::{ExtendedId, Frame, Id};
 
@@ -57,6 +61,14 @@ pub enum HeadingError {
         what: &'static str,
         /// Its value.
         value: f32,
+    },
+    /// The latitude is further from the one in use than the vehicle can have driven.
+    #[error("latitude jumps from {from} to {to}")]
+    Jump {
+        /// The latitude in use.
+        from: f32,
+        /// The latitude that was received.
+        to: f32,
     },
 }
 

@@ -281,9 +281,9 @@ pub struct InputCounters {
     pub fog_errors: u32,
     /// Wheel frames that were corrupt or marked a speed as invalid.
     pub wheel_errors: u32,
-    /// Frames whose latitude was marked invalid, was impossible, or was too far from the one in use.
+    /// Frames whose latitude was too far from the one in use.
     pub latitude_errors: u32,
-    /// Courses or speeds over ground that no vehicle has.
+    /// Courses, speeds over ground or latitudes that no vehicle has, and frames of them that are too short.
     pub heading_errors: u32,
     /// Inputs with a time before the newest one.
     pub clock_back: u32,

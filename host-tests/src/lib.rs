@@ -25,4 +25,5 @@ pub mod stored;
 pub mod stream;
 pub mod synthetic;
 pub mod tester;
+pub mod winding;
 pub mod wire;

@@ -6,10 +6,10 @@ use gyronet::can::config::{
     BIT_RATES, BoschSettings, DataIdMode, E2e, Settings, StatusSettings, Vdc2Settings, YawSettings,
 };
 use gyronet::can::diagnosis::DiagnosisIds;
-use gyronet::can::latitude::LatitudeSettings;
-use gyronet::can::signal::ByteOrder;
+use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{WheelFrame, WheelSettings};
 use gyronet::compensate::{CompensateConfig, Lag, Mode, Stride};
+use gyronet::heading::{HeadingSettings, HeadingSignal};
 use gyronet::store::{Configuration, Field, FogGyro, FogPart, Mounting};
 use gyronet::units::AngularRate;
 
@@ -72,21 +72,25 @@ pub fn configuration(noise: &mut Noise) -> Configuration {
         vdc2: maybe(noise, |noise| Vdc2Settings { source: one(noise, &[0x0B, 0x2A, 253]) }),
         status: maybe(noise, |noise| StatusSettings { id: one(noise, &IDS) }),
     };
-    let latitude_frame = maybe(noise, |noise| {
-        let extended = noise.int(0, 1) == 0;
-        let id = if extended { one(noise, &LONG_IDS) } else { one(noise, &IDS).into() };
-        LatitudeSettings {
-            id,
-            extended,
-            start: 0,
-            bits: 32,
-            order: ByteOrder::Intel,
-            signed: false,
-            degrees_per_bit: 1e-7,
-            offset_deg: -210.0,
-            invalid: Some(u32::MAX),
-        }
-    });
+    let place = |noise: &mut Noise| HeadingSignal {
+        id: if noise.int(0, 1) == 0 {
+            Id::Extended(ExtendedId::new(one(noise, &LONG_IDS)).expect("29 bits"))
+        } else {
+            Id::Standard(StandardId::new(one(noise, &IDS)).expect("11 bits"))
+        },
+        field: BitField::new(0, 32, ByteOrder::Intel, false).expect("inside the frame"),
+        factor: 1e-7,
+        offset: -210.0,
+        invalid: Some(u32::MAX),
+    };
+    let heading = HeadingSettings {
+        nmea2000: noise.int(0, 1) == 0,
+        j1939: noise.int(0, 3) == 0,
+        speed: maybe(noise, place),
+        course: maybe(noise, place),
+        latitude: maybe(noise, place),
+        ..HeadingSettings::NONE
+    };
     let diagnosis = match noise.int(0, 3) {
         0 => DiagnosisIds {
             extended: true,
@@ -129,7 +133,8 @@ pub fn configuration(noise: &mut Noise) -> Configuration {
             max_revision: rate(noise, Field::CompensateMaxRevision),
         },
         fog_ids: three(noise, default.fog_ids),
-        fog_gyro: FogGyro { tilt_deg: within(noise, Field::FogTiltDeg), latitude_frame },
+        fog_gyro: FogGyro { tilt_deg: within(noise, Field::FogTiltDeg) },
+        heading,
         slcan_inputs: noise.int(0, 1) == 0,
         diagnosis,
         learn: noise.int(0, 1) == 0,

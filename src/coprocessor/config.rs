@@ -5,11 +5,10 @@ use crate::align::AlignError;
 use crate::align::clock::ClockError;
 use crate::align::clock_ratio::ClockRatioConfig;
 use crate::can;
-use crate::can::latitude::{LatitudeError, LatitudeReceiver};
 use crate::can::wheel::{WheelError, WheelReceiver};
 use crate::can::yaw::FOG_IDS;
 use crate::fog::FogConfig;
-use crate::heading::HeadingError;
+use crate::heading::{HeadingError, HeadingReceiver};
 use crate::pipeline::PipelineConfig;
 use crate::units::Duration;
 
@@ -34,8 +33,8 @@ pub struct Config {
     pub wheels: Option<WheelReceiver>,
     /// Settings of the pipeline that turns the fibre-optic gyro's samples into rates.
     pub fog: FogConfig,
-    /// The receiver of the vehicle's latitude, for the Earth's rate; `None` where none is sent.
-    pub latitude: Option<LatitudeReceiver>,
+    /// The receiver of the vehicle's course, speed over ground and latitude; `None` where none is sent.
+    pub heading: Option<HeadingReceiver>,
     /// Identifiers (11 bits) of the fibre-optic gyro's messages: rate, angle, detail.
     pub fog_ids: [u16; 3],
     /// A fibre-optic gyro is fitted: its messages are then sent from the start, and its silence is reported.
@@ -62,7 +61,7 @@ impl Config {
         can: can::config::Config::DEFAULT,
         wheels: None,
         fog: FogConfig::DEFAULT,
-        latitude: None,
+        heading: None,
         fog_ids: FOG_IDS,
         fog_expected: false,
         has_gyronet: true,
@@ -99,10 +98,7 @@ pub enum InputError {
     /// A wheel frame is corrupt or marks a speed as invalid.
     #[error("wheel speeds: {0}")]
     Wheels(#[source] WheelError),
-    /// A latitude is marked invalid, is impossible, or is too far from the one in use.
-    #[error("{0}")]
-    Latitude(#[source] LatitudeError),
-    /// A course or speed over ground is no vehicle's.
+    /// A course, speed over ground or latitude is no vehicle's, or the latitude is too far from the one in use.
     #[error("{0}")]
     Heading(#[source] HeadingError),
     /// No window waits for this estimate.

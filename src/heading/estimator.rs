@@ -206,9 +206,10 @@ impl Estimator {
     /// Takes a course that arrives after the sample of a tick. It is used once that sample's rate is final; one that
     /// arrives meanwhile is left out, and so is one without direction or speed, too slow or too inaccurate.
     pub fn arrived(&mut self, heading: &Heading, tick: u32) {
-        let Heading { course: Some(course), speed: Some(speed), course_sigma: sigma, .. } = *heading else {
+        let Heading { course: Some(course), speed: Some(speed), course_sigma, speed_sigma } = *heading else {
             return;
         };
+        let sigma = course_sigma.or(speed_sigma.map(|across| across / speed));
         if speed >= self.config.slowest
             && sigma.is_none_or(|sigma| sigma < INACCURATE)
             && self.waiting.is_none()

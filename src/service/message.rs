@@ -8,7 +8,7 @@ use crate::store::slots::{SlotError, WeightSource};
 use serde::{Deserialize, Serialize};
 
 /// Version of the encoding of these types; every change of a type increments it.
-pub const PROTOCOL: u8 = 18;
+pub const PROTOCOL: u8 = 19;
 /// Size of a full block of a weight file, bytes.
 pub const BLOCK: usize = 256;
 

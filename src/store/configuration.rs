@@ -7,12 +7,12 @@ use super::{Calibration, Learned, Level};
 use crate::bias::{EarthRate, Latitude, StaticConfig};
 use crate::can::config::{Config, Settings};
 use crate::can::diagnosis::DiagnosisIds;
-use crate::can::latitude::{LatitudeConfigError, LatitudeReceiver, LatitudeSettings};
 use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};
 use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
 use crate::coprocessor;
 use crate::fog::{FogConfig, FogErrors, Tilt};
+use crate::heading::{HeadingReceiver, HeadingSettings};
 use crate::mounting::{GyroMap, Rotation};
 use crate::pipeline::PipelineConfig;
 use crate::units::AngularRate;
@@ -65,8 +65,6 @@ impl Mounting {
 pub struct FogGyro {
     /// Angle between the axis of the gyro and the vertical of the level vehicle, 0 to 45 deg.
     pub tilt_deg: f32,
-    /// Frame that carries the vehicle's latitude, if any.
-    pub latitude_frame: Option<LatitudeSettings>,
 }
 
 /// The complete configuration; a change takes effect at the next start.
@@ -79,7 +77,7 @@ pub struct Configuration {
     /// Messages on the CAN bus: identifiers, periods, protection.
     pub can: Settings,
     /// Latitude, -90 to 90 deg, north positive. With `None` the Earth's rate stays in the bias, and the rate of a
-    /// fibre-optic gyro is degraded until a latitude arrives in [`FogGyro::latitude_frame`].
+    /// fibre-optic gyro is degraded until a latitude arrives as [`Configuration::heading`] says.
     pub latitude_deg: Option<f32>,
     /// Mounting of the sensor.
     pub mounting: Mounting,
@@ -91,7 +89,9 @@ pub struct Configuration {
     pub fog_ids: [u16; 3],
     /// Correction of the fibre-optic gyro.
     pub fog_gyro: FogGyro,
-    /// True if wheel and latitude frames from a host on SLCAN are used, for a bench without a bus. On a vehicle,
+    /// Frames with the vehicle's course, speed over ground and latitude, from which bias and gain are learnt in motion.
+    pub heading: HeadingSettings,
+    /// True if wheel, course and latitude frames from a host on SLCAN are used, for a bench without a bus. On a vehicle,
     /// anyone with access to that line could then influence the rate.
     pub slcan_inputs: bool,
     /// Identifiers of diagnosis.
@@ -111,7 +111,8 @@ impl Configuration {
         static_init: StaticConfig::DEFAULT,
         compensate: CompensateConfig::DEFAULT,
         fog_ids: FOG_IDS,
-        fog_gyro: FogGyro { tilt_deg: 0.0, latitude_frame: None },
+        fog_gyro: FogGyro { tilt_deg: 0.0 },
+        heading: HeadingSettings::NONE,
         slcan_inputs: false,
         diagnosis: DiagnosisIds::DEFAULT,
         learn: true,
@@ -184,15 +185,6 @@ impl Configuration {
         }
     }
 
-    /// Creates the receiver of the vehicle's latitude; `None` if no frame is configured.
-    ///
-    /// # Errors
-    /// [`LatitudeConfigError`].
-    pub fn latitude_receiver(&self) -> Result<Option<LatitudeReceiver>, LatitudeConfigError> {
-        let make = |frame| LatitudeReceiver::new(frame, self.latitude_deg);
-        self.fog_gyro.latitude_frame.map(make).transpose()
-    }
-
     /// Returns the configuration of a coprocessor that runs the weights with this checksum. The board adds the
     /// wheels, the clock, the networks, and whether damage was found at the start.
     #[must_use]
@@ -209,7 +201,8 @@ impl Configuration {
             fog_ids: self.fog_ids,
             fog_expected: self.fog.is_some(),
             fog: self.fog(),
-            latitude: self.latitude_receiver().unwrap_or(None),
+            heading: (self.heading != HeadingSettings::NONE)
+                .then(|| HeadingReceiver::new(self.heading, self.latitude_deg)),
             ..coprocessor::Config::DEFAULT
         }
     }
@@ -217,7 +210,7 @@ impl Configuration {
 
 impl Record for Configuration {
     const KEY: u8 = 1;
-    const VERSION: u8 = 8;
+    const VERSION: u8 = 9;
 
     fn check(&self) -> Result<(), FieldError> {
         let config = Config::new(self.can).map_err(FieldError::Can)?;
@@ -226,11 +219,9 @@ impl Record for Configuration {
             config.check_further_load().map_err(FieldError::Can)?;
         }
         let ids = self.diagnosis.ids().map_err(FieldError::Diagnosis)?;
-        if let Some(receiver) = self.latitude_receiver().map_err(FieldError::Latitude)?
-            && (ids.contains(&receiver.id()) || self.own_identifier([receiver.id()].into_iter()).is_some())
-        {
-            return Err(FieldError::Latitude(LatitudeConfigError::Own(raw_id(receiver.id()))));
-        }
+        let fog_ids = self.fog_ids.into_iter().filter_map(StandardId::new).map(Id::Standard);
+        let own = config.messages().into_iter().map(|message| message.id);
+        self.heading.check(own.chain(fog_ids).chain(ids)).map_err(FieldError::Heading)?;
         if self.own_identifier(ids.into_iter()).is_some() {
             return Err(FieldError::Diagnosis(self.diagnosis.request));
         }

@@ -1,8 +1,8 @@
 //! Defines the errors of the store, in terms that a user can act on.
 
 use crate::can::config::ConfigError;
-use crate::can::latitude::LatitudeConfigError;
 use crate::can::wheel::WheelConfigError;
+use crate::heading::HeadingConfigError;
 use serde::{Deserialize, Serialize};
 
 /// Largest tilt that a mounting calibration may find, deg; a larger one means a wrong rotation.
@@ -106,9 +106,9 @@ pub enum FieldError {
     /// The configuration of the bus messages is invalid.
     #[error("can: {0}")]
     Can(ConfigError),
-    /// The configuration of the latitude frame is invalid.
-    #[error("fog_gyro.latitude_frame: {0}")]
-    Latitude(LatitudeConfigError),
+    /// The configuration of the frames with course and latitude is invalid.
+    #[error("heading: {0}")]
+    Heading(HeadingConfigError),
     /// The configuration of the wheel frames is invalid.
     #[error("wheels: {0}")]
     Wheels(WheelConfigError),

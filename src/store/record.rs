@@ -32,7 +32,7 @@ const WORD_U32: u32 = WORD as u32;
 /// Length of the sector header, bytes.
 const HEADER: u32 = 2 * WORD_U32;
 /// Length of the longest encoded record, bytes.
-pub(crate) const MAX_LEN: usize = 260;
+pub(crate) const MAX_LEN: usize = 288;
 /// Length of the longest record with its first and last word, bytes.
 const BUFFER: usize = MAX_LEN + 2 * WORD;
 /// Number of records of maximum length that must fit without an erase after a start.

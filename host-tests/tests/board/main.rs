@@ -6,6 +6,7 @@ mod budget;
 mod can;
 mod clock;
 mod common;
+mod course;
 mod crash;
 mod embassy;
 mod endurance;

@@ -9,18 +9,12 @@ use gyronet::units::{AngularRate, WheelSpeed};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::stream::constant;
 use gyronet_host_tests::synthetic::{force, rate, turning};
+use gyronet_host_tests::winding::{BIAS, GAIN, road};
 use std::f64::consts::{PI, TAU};
 
-const BIAS: f64 = 0.004;
-const GAIN: f64 = 0.008;
 /// Sigma of a course, rad.
 const NOISE: f64 = 0.01;
 const SECOND: usize = RATE_HZ as usize;
-
-/// A winding road with turns both ways, rad/s.
-fn road(second: f64) -> f64 {
-    0.15 * (TAU * second / 23.0).sin() + 0.1 * (TAU * second / 61.0).sin()
-}
 
 /// A drive: how long it stands first, s, its yaw rate, and the course that arrives at a second, from the headings so far.
 struct Drive<'a> {

@@ -1,15 +1,13 @@
 //! The corrections of a fibre-optic gyro without a network: Earth's rate, bias by standstills, and what its messages say of both.
 
-use embedded_can::{ExtendedId, Frame, Id};
+use embedded_can::{ExtendedId, Frame};
 use gyronet::bias::Latitude;
 use gyronet::can::DataFrame;
-use gyronet::can::latitude::{
-    CONFIRM, LatitudeConfigError, LatitudeError, LatitudeReceiver, LatitudeSettings,
-};
-use gyronet::can::signal::ByteOrder;
 use gyronet::coprocessor::{Config, Coprocessor, InputError};
 use gyronet::estimate::YawEstimate;
 use gyronet::fog::{FogConfig, FogErrors, FogNetUse, FogPipeline};
+use gyronet::heading::latitude::CONFIRM;
+use gyronet::heading::{HeadingError, HeadingReceiver, HeadingSettings, Received};
 use gyronet::health::{Faults, Quality, Source};
 use gyronet::model::fognet::FogEstimate;
 use gyronet::sample::{FogSample, PERIOD_US, Standstill, WheelSample};
@@ -192,18 +190,9 @@ fn without_a_latitude_fognet_changes_nothing() {
     assert!((mean_deg_per_hour(&sent) - 8.9).abs() < 1.0, "{}", mean_deg_per_hour(&sent));
 }
 
-fn settings() -> LatitudeSettings {
-    LatitudeSettings {
-        id: 0x18FE_F31C,
-        extended: true,
-        start: 0,
-        bits: 32,
-        order: ByteOrder::Intel,
-        signed: false,
-        degrees_per_bit: 1e-7,
-        offset_deg: -210.0,
-        invalid: Some(u32::MAX),
-    }
+/// Reads J1939's position.
+fn receiver() -> HeadingReceiver {
+    HeadingReceiver::new(HeadingSettings { j1939: true, ..HeadingSettings::NONE }, None)
 }
 
 /// J1939's vehicle position: 1e-7 deg from -210.
@@ -215,12 +204,12 @@ fn position(degrees: f64) -> DataFrame {
 
 #[test]
 fn a_latitude_over_can_is_used_when_it_is_confirmed() {
-    let mut receiver = LatitudeReceiver::new(settings(), None).expect("checked settings");
-    assert_eq!(receiver.id(), Id::Extended(ExtendedId::new(0x18FE_F31C).expect("29 bits")));
+    let mut receiver = receiver();
     let mut now = 0;
-    let mut take = |receiver: &mut LatitudeReceiver, degrees: f64| {
+    let mut take = |receiver: &mut HeadingReceiver, degrees: f64| {
         now += 100_000;
-        receiver.decode(&position(degrees), Micros(now))
+        let received = receiver.decode(&position(degrees), Micros(now)).expect("its frame");
+        received.map(|received| received.latitude).transpose()
     };
     // Frames that do not agree never confirm each other.
     for k in 0..4 * CONFIRM {
@@ -235,39 +224,23 @@ fn a_latitude_over_can_is_used_when_it_is_confirmed() {
     assert!(next.moved && !receiver.is_contested());
     // A jump is refused, and the one in use is contested until a frame agrees with it.
     let jump = take(&mut receiver, -48.1);
-    assert!(matches!(jump, Some(Err(LatitudeError::Jump { .. }))) && receiver.is_contested(), "{jump:?}");
+    assert!(matches!(jump, Some(Err(HeadingError::Jump { .. }))) && receiver.is_contested(), "{jump:?}");
     assert!(take(&mut receiver, 48.1).expect("known").is_ok() && !receiver.is_contested());
     // One that stays has to be believed.
     let jumps: Vec<_> = (0..CONFIRM).map(|_| take(&mut receiver, 52.0).expect("judged")).collect();
     let (last, refused) = jumps.split_last().expect("some");
     assert!(refused.iter().all(Result::is_err) && last.is_ok_and(|last| !last.moved));
     // What no latitude can be.
-    assert!(matches!(take(&mut receiver, 95.0), Some(Err(LatitudeError::Range(_)))));
+    assert!(matches!(take(&mut receiver, 95.0), Some(Err(HeadingError::Range { what: "latitude", .. }))));
     let marked = DataFrame::new(position(0.0).id(), &[0xFF; 8]).expect("eight bytes");
-    assert_eq!(receiver.decode(&marked, Micros(now)), Some(Err(LatitudeError::Invalid)));
+    assert_eq!(receiver.decode(&marked, Micros(now)), Some(Ok(Received::default())));
     let short = DataFrame::new(position(0.0).id(), &[0; 3]).expect("three bytes");
-    assert_eq!(receiver.decode(&short, Micros(now)), Some(Err(LatitudeError::Short(3))));
-}
-
-#[test]
-fn latitude_settings_that_make_none_are_refused() {
-    let refused = |settings| LatitudeReceiver::new(settings, None).expect_err("refused");
-    let outside = LatitudeSettings { start: 40, ..settings() };
-    assert_eq!(refused(outside), LatitudeConfigError::Outside { start: 40, bits: 32 });
-    let id = LatitudeSettings { extended: false, ..settings() };
-    assert_eq!(refused(id), LatitudeConfigError::Identifier(0x18FE_F31C));
-    for degrees_per_bit in [0.0, f32::NAN, 1e9] {
-        assert!(matches!(
-            refused(LatitudeSettings { degrees_per_bit, ..settings() }),
-            LatitudeConfigError::Scale(_)
-        ));
-    }
+    assert_eq!(receiver.decode(&short, Micros(now)), Some(Err(HeadingError::Short(3))));
 }
 
 #[test]
 fn the_coprocessor_takes_the_latitude_from_the_bus() {
-    let receiver = LatitudeReceiver::new(settings(), None).expect("checked settings");
-    let mut coprocessor = Coprocessor::new(Config { latitude: Some(receiver), ..Config::DEFAULT });
+    let mut coprocessor = Coprocessor::new(Config { heading: Some(receiver()), ..Config::DEFAULT });
     let mut gyro = Gyro::new(7, -34.0, 0.0);
     let (mut rates, mut sources) = (Sent::default(), Vec::new());
     for step in 0..400 {
@@ -281,7 +254,7 @@ fn the_coprocessor_takes_the_latitude_from_the_bus() {
     assert_eq!((sources.first(), sources.last()), (Some(&Source::Raw), Some(&Source::EarthRate)));
     let now = Micros(400 * PERIOD_US);
     let jump = coprocessor.can(&position(34.0), now);
-    assert!(matches!(jump, Err(InputError::Latitude(LatitudeError::Jump { .. }))), "{jump:?}");
+    assert!(matches!(jump, Err(InputError::Heading(HeadingError::Jump { .. }))), "{jump:?}");
     assert_eq!(coprocessor.input_counters().latitude_errors, 1);
     let sample = gyro.sample();
     coprocessor.fog(sample, sample.time, &mut rates).expect("in order");

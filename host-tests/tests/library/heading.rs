@@ -3,8 +3,16 @@
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::signal::{BitField, ByteOrder};
-use gyronet::heading::described::{HeadingFrame, Quantity};
-use gyronet::heading::{Heading, HeadingError, Position, j1939, nmea2000};
+use gyronet::coprocessor::{Config, Coprocessor};
+use gyronet::heading::{
+    Heading, HeadingError, HeadingReceiver, HeadingSettings, HeadingSignal, Position, Received, j1939,
+    nmea2000,
+};
+use gyronet::health::slow::Knowledge;
+use gyronet::units::Micros;
+use gyronet_host_tests::sent::Sent;
+use gyronet_host_tests::stream::constant;
+use gyronet_host_tests::winding::Winding;
 use proptest::prelude::*;
 
 fn frame(id: u32, data: &[u8]) -> DataFrame {
@@ -61,30 +69,88 @@ fn j1939_direction_and_speed_by_its_bytes() {
 }
 
 #[test]
-fn a_described_frame_has_what_its_description_says() {
-    let id = Id::Standard(StandardId::new(0x321).expect("11 bits"));
-    let quantity = |start, bits, factor| {
+fn described_values_may_be_in_frames_of_their_own() {
+    let id = |raw| Id::Standard(StandardId::new(raw).expect("11 bits"));
+    let signal = |raw, start, bits, factor| {
         let field = BitField::new(start, bits, ByteOrder::Intel, bits == 16).expect("inside the frame");
-        let invalid = Some((1_u64 << bits) as u32 - 1);
-        Some(Quantity { field, factor, offset: 0.0, invalid })
+        Some(HeadingSignal { id: id(raw), field, factor, offset: 0.0, invalid: Some((1 << bits) - 1) })
     };
-    let described = HeadingFrame {
-        id,
-        course: quantity(0, 16, 1e-4),
-        course_sigma: quantity(16, 8, 1e-3),
-        speed: quantity(24, 12, 0.05),
-        speed_sigma: None,
+    let settings = HeadingSettings {
+        course: signal(0x321, 0, 16, 1e-4),
+        course_sigma: signal(0x321, 16, 8, 1e-3),
+        speed: signal(0x322, 24, 12, 0.05),
+        latitude: signal(0x322, 0, 16, 0.01),
+        ..HeadingSettings::NONE
     };
-    let read = |bytes: &[u8]| described.heading(&DataFrame::new(id, bytes).expect("eight bytes"));
-    // -1.0000 rad, 20 mrad, 400 codes.
-    let heading = read(&[0xF0, 0xD8, 20, 0x90, 0x01]).expect("its frame").expect("in range");
-    assert!((heading.course.expect("known") - (std::f32::consts::TAU - 1.0)).abs() < 1e-5);
-    assert!((heading.course_sigma.expect("known") - 0.02).abs() < 1e-6);
-    assert!((heading.speed.expect("known") - 20.0).abs() < 1e-5);
-    assert_eq!(heading.speed_sigma, None);
-    assert_eq!(read(&[0xFF, 0xFF, 0xFF, 0xFF, 0xFF]).expect("its frame"), Ok(Heading::default()));
-    assert_eq!(read(&[0; 4]), Some(Err(HeadingError::Short(4))));
-    assert_eq!(described.heading(&frame(0x321, &[0; 8])), None);
+    let mut receiver = HeadingReceiver::new(settings, None);
+    let mut read = |raw, bytes: &[u8], ms: u64| {
+        receiver.decode(&DataFrame::new(id(raw), bytes).expect("eight bytes"), Micros(1_000 * ms))
+    };
+    // 400 codes; a latitude that is not confirmed.
+    assert_eq!(read(0x322, &[0, 0, 0, 0x90, 0x01], 0), Some(Ok(Received::default())));
+    // -1.0000 rad, 20 mrad.
+    let heading =
+        |read: Option<Result<Received, HeadingError>>| read.expect("its frame").map(|read| read.heading);
+    let fresh = heading(read(0x321, &[0xF0, 0xD8, 20], 1_000)).expect("in range").expect("a course");
+    assert!((fresh.course.expect("known") - (std::f32::consts::TAU - 1.0)).abs() < 1e-5);
+    assert!((fresh.course_sigma.expect("known") - 0.02).abs() < 1e-6);
+    assert!((fresh.speed.expect("known") - 20.0).abs() < 1e-5);
+    assert_eq!(fresh.speed_sigma, None);
+    let stale = heading(read(0x321, &[0xF0, 0xD8, 20], 2_000)).expect("in range").expect("a course");
+    assert_eq!(stale.speed, None);
+    assert_eq!(heading(read(0x321, &[0xFF, 0xFF, 20], 2_100)), Ok(None));
+    assert_eq!(heading(read(0x321, &[0; 2], 2_200)), Err(HeadingError::Short(2)));
+    assert_eq!(read(0x323, &[0; 8], 2_300), None);
+}
+
+#[test]
+fn courses_of_one_sender_are_used_until_it_is_silent() {
+    let settings = HeadingSettings { nmea2000: true, j1939: true, ..HeadingSettings::NONE };
+    let mut receiver = HeadingReceiver::new(settings, None);
+    let mut is_used = |id, ms: u64| {
+        let frame = frame(id, &[0, 0xFC, 0x20, 0x4E, 0xE8, 0x03, 0xFF, 0xFF]);
+        let read = receiver.decode(&frame, Micros(1_000 * ms)).expect("its group").expect("in range");
+        read.heading.is_some()
+    };
+    assert!(is_used(0x09F8_0223, 0) && !is_used(0x09F8_0224, 100) && !is_used(0x18FE_E824, 4_000));
+    assert!(is_used(0x18FE_E824, 5_100) && !is_used(0x09F8_0223, 5_200) && is_used(0x09F8_0224, 5_300));
+}
+
+/// A drive of two minutes with two courses a second for 90 s: its frames, its yaw error in the last 28 s, deg, and how well
+/// the bias is known.
+fn drive(heading: Option<HeadingReceiver>, has_courses: bool) -> (Vec<DataFrame>, f64, Knowledge) {
+    let (mut vehicle, mut sent) = (Winding::new(7), Sent::default());
+    let mut coprocessor = Coprocessor::new(Config { heading, ..Config::DEFAULT });
+    let mut yaws = Vec::new();
+    for tick in 0..12_000 {
+        let sample = vehicle.sample();
+        if has_courses && tick < 9_000 && tick % 50 == 0 {
+            assert_eq!(coprocessor.can(&vehicle.course(), sample.time), Ok(heading.is_some()));
+        }
+        if let Some(seen) = coprocessor.imu(sample, sample.time, &mut sent).expect("in order") {
+            yaws.push((seen.vehicle.live.tick as usize, seen.vehicle.live.yaw.rad()));
+        }
+        while let Some(due) = coprocessor.window() {
+            coprocessor
+                .deliver(due.end, constant(0.0)(&due).expect("an estimate"))
+                .expect("the window that is due");
+        }
+    }
+    let [(from, before), (to, after)] = [yaws[9_100], yaws[11_900]];
+    let off = (after - before) - (vehicle.headings[to] - vehicle.headings[from]);
+    let frames = sent.frames.iter().map(|sent| sent.frame).collect();
+    (frames, off.to_degrees(), coprocessor.pipeline().status(None).bias)
+}
+
+#[test]
+fn courses_on_the_bus_are_used_where_they_are_configured() {
+    let settings = HeadingSettings { nmea2000: true, ..HeadingSettings::NONE };
+    let (_, held, bias) = drive(Some(HeadingReceiver::new(settings, None)), true);
+    println!("28 s after the last course: {held:.3} deg");
+    assert!(held.abs() < 0.5 && bias == Knowledge::Fine, "{held} deg, {bias:?}");
+    let ((with, ..), (without, lost, unknown)) = (drive(None, true), drive(None, false));
+    assert!(with == without, "frames that are not configured change nothing");
+    assert!(lost.abs() > 5.0 && unknown == Knowledge::Unknown, "{lost} deg, {unknown:?}");
 }
 
 proptest! {

@@ -74,7 +74,7 @@ pub fn can(report: &mut Report, chip: &Chip, registers: pac::CAN1) {
         Ok(can) => can,
         Err(fault) => return report.fail(NAME, format_args!("{fault}")),
     };
-    can.receive_only([Id::Standard(wanted)].into_iter());
+    can.receive_only([(Id::Standard(wanted), u32::MAX)].into_iter());
     can.join();
     let sent = [(other, 0), (wanted, 1), (wanted, 2)].map(|(id, number)| DataFrame::new(id, &[number; 8]));
     for frame in sent.iter().flatten() {

@@ -22,7 +22,7 @@ use gyronet::units::Micros;
 /// Frames that can wait for each line.
 const QUEUE: usize = 24;
 
-/// Waiting wheel and latitude frames; the output task reads them every millisecond.
+/// Waiting wheel, course and latitude frames; the output task reads them every millisecond.
 pub static FRAMES: Ring<DataFrame, 8> =
     // SAFETY: the receive interrupt writes, the output task reads.
     unsafe { Ring::new() };

@@ -60,7 +60,7 @@ pub fn report(task: Task) {
 pub struct OutputParts {
     pub part: ImuPart,
     pub bits_per_second: u32,
-    /// True if wheel and latitude frames of a host on SLCAN are used.
+    /// True if wheel, course and latitude frames of a host on SLCAN are used.
     pub slcan_inputs: bool,
 }
 
@@ -74,7 +74,7 @@ pub struct Output {
     /// True once CAN takes part in the bus.
     joined: bool,
     lines: LineCounters,
-    /// True if wheel and latitude frames of a host on SLCAN are used.
+    /// True if wheel, course and latitude frames of a host on SLCAN are used.
     slcan_inputs: bool,
     /// Number of tester frames on SLCAN that found no room.
     unread: u32,

@@ -35,16 +35,16 @@ const BUILT_IN: &[u8] = &weights::DEFAULT.0;
 
 /// Sets the bit rate of CAN and the identifiers of diagnosis, and makes CAN receive only the frames that the
 /// configuration names.
-fn receive(board: &Board, configuration: &Configuration, wheels: &WheelSettings, config: &Config) {
-    let wheels = wheels.frames.into_iter().flatten().map(|frame| frame.id);
-    let latitude = config.latitude.map(|latitude| latitude.id());
+fn receive(board: &Board, configuration: &Configuration, wheels: &WheelSettings) {
+    let exactly = |id| (id, u32::MAX);
+    let wheels = wheels.frames.into_iter().flatten().map(|frame| exactly(frame.id));
     // A stored configuration has been checked.
     let ids = configuration.diagnosis.ids().ok();
     ids.into_iter().for_each(diagnosis::set_ids);
-    let requests = ids.into_iter().flat_map(|[request, functional, _]| [request, functional]);
+    let requests = ids.into_iter().flat_map(|[request, functional, _]| [request, functional].map(exactly));
     if let Some(can) = &board.can {
         can.set_bit_rate(configuration.can.bits_per_second);
-        can.receive_only(requests.into_iter().chain(wheels).chain(latitude));
+        can.receive_only(requests.into_iter().chain(wheels).chain(configuration.heading.filters()));
     }
 }
 
@@ -85,7 +85,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
         },
         ..configuration.coprocessor(device.calibration(), device.learned(), weights)
     })?;
-    receive(board, configuration, device.wheels(), config);
+    receive(board, configuration, device.wheels());
     let (part, bits_per_second) = (configuration.imu, config.can.settings().bits_per_second);
     Some(Parts {
         output: OutputParts { part, bits_per_second, slcan_inputs: configuration.slcan_inputs },

@@ -137,9 +137,9 @@ impl Can {
         self.registers.btr().modify(|_, w| unsafe { w.brp().bits(prescaler(bits_per_second) - 1) });
     }
 
-    /// Receives the frames of up to 14 identifiers, and nothing else.
-    pub fn receive_only(&self, ids: impl Iterator<Item = Id>) {
-        receive_only(&self.registers, ids);
+    /// Receives the frames that agree with one of up to 14 identifiers in the bits of its mask, and nothing else.
+    pub fn receive_only(&self, filters: impl Iterator<Item = (Id, u32)>) {
+        receive_only(&self.registers, filters);
     }
 
     /// Joins the bus. The controller waits for 11 recessive bits by itself. Called once received frames can be taken:
@@ -244,19 +244,19 @@ const fn prescaler(bits_per_second: u32) -> u16 {
     }
 }
 
-/// Sets one filter bank for each identifier, as a list that names it twice; other frames are not received.
-fn receive_only(can: &pac::CAN1, ids: impl Iterator<Item = Id>) {
+/// Sets one filter bank for each identifier, with its mask; other frames are not received, nor remote ones.
+fn receive_only(can: &pac::CAN1, filters: impl Iterator<Item = (Id, u32)>) {
     can.fmr().modify(|_, w| w.finit().set_bit());
     // SAFETY: one bit for each bank that CAN1 has; `take` keeps to them.
     unsafe {
         can.fa1r().write(|w| w.bits(0));
         let mut banks = 0;
-        for (k, (bank, id)) in can.fb_iter().zip(ids).take(14).enumerate() {
+        for (k, (bank, (id, mask))) in can.fb_iter().zip(filters).take(14).enumerate() {
             bank.fr1().write(|w| w.bits(word(id)));
-            bank.fr2().write(|w| w.bits(word(id)));
+            bank.fr2().write(|w| w.bits(compared(id, mask)));
             banks |= 1 << k;
         }
-        can.fm1r().write(|w| w.bits(banks));
+        can.fm1r().write(|w| w.bits(0));
         can.fs1r().write(|w| w.bits(banks));
         can.ffa1r().write(|w| w.bits(0));
         can.fa1r().write(|w| w.bits(banks));
@@ -270,6 +270,15 @@ fn word(id: Id) -> u32 {
         Id::Standard(id) => u32::from(id.as_raw()) << 21,
         Id::Extended(id) => id.as_raw() << 3 | 1 << 2,
     }
+}
+
+/// Returns the mask of a filter: these bits of the identifier, its length, and that it is no remote frame.
+fn compared(id: Id, mask: u32) -> u32 {
+    let bits = match id {
+        Id::Standard(_) => mask << 21,
+        Id::Extended(_) => mask << 3,
+    };
+    bits | 1 << 2 | 1 << 1
 }
 
 /// Returns the number of frames that left a mailbox unsent since the start.

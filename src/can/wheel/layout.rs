@@ -246,7 +246,7 @@ pub struct WheelFrame {
 
 /// These functions store an identifier as a number; bit 31 marks an identifier of 29 bits.
 #[cfg(feature = "serde")]
-mod stored_id {
+pub(crate) mod stored_id {
     use embedded_can::{ExtendedId, Id, StandardId};
     use serde::{Deserialize, Deserializer, Serializer, de::Error};
 

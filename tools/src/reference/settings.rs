@@ -86,10 +86,19 @@ const SETTINGS: &[(&str, Takes)] = &[
         "fog_gyro.tilt_deg",
         Number("deg", Field::FogTiltDeg, "from the gyro's axis to the vertical of the level vehicle"),
     ),
-    ("fog_gyro.latitude_frame", Other("", "`null`, or the frame that carries the latitude")),
+    ("heading.nmea2000", Other("", "`true`: course and latitude from PGN 129026 and 129025")),
+    ("heading.j1939", Other("", "`true`: from PGN 65256 and 65267")),
+    ("heading.course", Other("", "`null`, or where a frame has it, rad clockwise from north")),
+    ("heading.course_sigma", Other("", "the same, rad")),
+    ("heading.speed", Other("", "the same, m/s over ground")),
+    ("heading.speed_sigma", Other("", "the same, m/s")),
+    ("heading.latitude", Other("", "the same, deg")),
     (
         "slcan_inputs",
-        Other("", "`true` accepts wheel and latitude frames that a host sends over SLCAN: for a bench only"),
+        Other(
+            "",
+            "`true` accepts wheel, course and latitude frames that a host sends over SLCAN: for a bench only",
+        ),
     ),
     ("diagnosis.extended", Other("", "`true`: the three identifiers have 29 bits")),
     (

@@ -3,10 +3,10 @@
 use super::IDENTITY;
 use embedded_can::{Id, StandardId};
 use gyronet::can::config::Config;
-use gyronet::can::latitude::{LatitudeConfigError, LatitudeSettings};
-use gyronet::can::signal::ByteOrder;
+use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{WheelConfigError, WheelSettings};
 use gyronet::compensate::{Mode, Stride};
+use gyronet::heading::{HeadingConfigError, HeadingSettings, HeadingSignal};
 use gyronet::model::blob::Shape;
 use gyronet::model::weights;
 use gyronet::service::message::{FAILED_STARTS, Identity, Origin, Refusal};
@@ -57,7 +57,7 @@ fn are_distinct(configuration: &Configuration, wheels: &WheelSettings) -> bool {
         .iter()
         .flatten()
         .map(|frame| frame.id)
-        .chain(configuration.fog_gyro.latitude_frame.map(|frame| frame.id().expect("an identifier")))
+        .chain(configuration.heading.filters().map(|(id, _)| id))
         .collect();
     all.extend(inputs);
     all.into_iter().all(|id| seen.insert(id))
@@ -149,25 +149,34 @@ fn neither_order_makes_the_board_send_what_it_receives() {
     }
     configuration.diagnosis.request = 0xB0;
     assert_eq!(board.set_configuration(&configuration), own(0xB0), "of the next wheels");
-    for id in [0x7E0, 0x7DF, 0x7E8] {
-        let order = ByteOrder::Intel;
-        let (degrees_per_bit, offset_deg, invalid) = (1e-7, -210.0, None);
-        let (extended, start, bits, signed) = (false, 0, 32, false);
-        let frame = LatitudeSettings {
-            id,
-            extended,
-            start,
-            bits,
-            order,
-            signed,
-            degrees_per_bit,
-            offset_deg,
-            invalid,
+    let refused =
+        |configuration: &Configuration, board: &mut Board| match board.set_configuration(configuration) {
+            Err(Refusal::Store(StoreError::Field(FieldError::Heading(error)))) => error,
+            other => panic!("{other:?}"),
         };
-        let mut configuration = Configuration::DEFAULT;
-        configuration.fog_gyro.latitude_frame = Some(frame);
-        let error = FieldError::Latitude(LatitudeConfigError::Own(id));
-        assert_eq!(board.set_configuration(&configuration), Err(Refusal::Store(StoreError::Field(error))));
+    let field = BitField::new(0, 16, ByteOrder::Intel, false).expect("inside the frame");
+    let signal = |raw| HeadingSignal { id: id(raw), field, factor: 1e-4, offset: 0.0, invalid: None };
+    for raw in [0x7E0, 0x7DF, 0x7E8, 0x1A0, 0x1A5] {
+        let heading = HeadingSettings { speed: Some(signal(raw)), ..HeadingSettings::NONE };
+        let configuration = Configuration { heading, ..Configuration::DEFAULT };
+        assert_eq!(refused(&configuration, &mut board), HeadingConfigError::Own(raw.into()));
+    }
+    // A parameter group is one of many identifiers.
+    let mut configuration = Configuration::DEFAULT;
+    configuration.heading.j1939 = true;
+    configuration.diagnosis.extended = true;
+    configuration.diagnosis.request = 0x18FE_E855;
+    assert_eq!(refused(&configuration, &mut board), HeadingConfigError::Own(0x18FE_E855));
+    configuration.diagnosis.request = 0x18DA_10F1;
+    assert_eq!(board.set_configuration(&configuration), Ok(()));
+    let heading = HeadingSettings { course: Some(signal(0x300)), ..HeadingSettings::NONE };
+    let configuration = Configuration { heading, ..Configuration::DEFAULT };
+    assert_eq!(refused(&configuration, &mut board), HeadingConfigError::NoSpeed);
+    for factor in [0.0, f32::NAN, 1e9] {
+        let speed = Some(HeadingSignal { factor, ..signal(0x300) });
+        let heading = HeadingSettings { speed, ..HeadingSettings::NONE };
+        let configuration = Configuration { heading, ..Configuration::DEFAULT };
+        assert_eq!(refused(&configuration, &mut board), HeadingConfigError::Scale(0x300));
     }
 }
 

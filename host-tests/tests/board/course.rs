@@ -1,0 +1,82 @@
+//! Courses on the bus of the flashed image: what it learns from them, and what is left of it after them.
+
+use crate::common::{self, SAMPLE, START};
+use crate::service;
+use embedded_can::{Frame, Id};
+use gyronet::can::config::{Settings, StatusSettings};
+use gyronet::can::status::{Knowledge, STATUS_ID};
+use gyronet::can::yaw::AngleMessage;
+use gyronet::can::{DataFrame, config};
+use gyronet::store::Configuration;
+use gyronet_host_tests::board::Board;
+use gyronet_host_tests::replay;
+use gyronet_host_tests::winding::{BIAS, Winding};
+use std::time::Duration;
+
+const ANGLE: u16 = 0x1A1;
+
+/// The message set of a car without Bosch's, with the slow status, and courses by NMEA 2000.
+fn configuration() -> Configuration {
+    let status = Some(StatusSettings { id: STATUS_ID });
+    let mut configuration =
+        Configuration { can: Settings { status, ..Settings::DEFAULT }, ..Configuration::DEFAULT };
+    assert!(config::Config::new(configuration.can).is_ok());
+    configuration.heading.nmea2000 = true;
+    configuration
+}
+
+fn content(frame: &DataFrame, id: u16) -> Option<&[u8]> {
+    matches!(frame.id(), Id::Standard(own) if own.as_raw() == id).then(|| frame.data())
+}
+
+/// Drives for some seconds, with two courses in each if there are any, and returns the frames.
+fn drive(board: &mut Board, vehicle: &mut Winding, seconds: usize, has_courses: bool) -> Vec<DataFrame> {
+    let mut sent = Vec::new();
+    for _ in 0..2 * seconds {
+        let now = board.counts().time;
+        let samples: Vec<Vec<u8>> =
+            (0..50).map(|_| replay::message(vehicle.headings.len(), &vehicle.sample())).collect();
+        common::send(board, &samples, now);
+        if has_courses {
+            board.can_send_at(&vehicle.course(), now + 50 * SAMPLE - Duration::from_millis(3));
+        }
+        board.run(50 * SAMPLE);
+        sent.extend(common::frames(&board.can_frames()));
+    }
+    sent
+}
+
+#[test]
+fn courses_on_the_bus_teach_the_bias_and_hold_the_heading() {
+    const TEST: &str = "courses_on_the_bus_teach_the_bias_and_hold_the_heading";
+    let Some(mut board) = common::boot(TEST) else { return };
+    board.run(START);
+    service::on_line(&mut board).set_configuration(&configuration()).expect("it is stored");
+    service::on_line(&mut board).restart().expect("a response");
+    board.run(START);
+    board.can_frames();
+    let mut vehicle = Winding::new(7);
+    let learning = drive(&mut board, &mut vehicle, 55, true);
+    let statuses: Vec<&[u8]> = learning.iter().filter_map(|frame| content(frame, STATUS_ID)).collect();
+    let bias = |status: &[u8]| status[3] >> 4 & 7;
+    println!(
+        "{TEST}: bias by the second {:?}",
+        statuses.iter().map(|status| bias(status)).collect::<Vec<_>>()
+    );
+    assert_eq!(bias(statuses[1]), Knowledge::Unknown as u8);
+    assert_eq!(bias(statuses[statuses.len() - 1]), Knowledge::Fine as u8);
+
+    let from = vehicle.headings.len();
+    let held = drive(&mut board, &mut vehicle, 15, false);
+    let yaws = held.iter().filter_map(|frame| content(frame, ANGLE));
+    let yaws: Vec<f64> = yaws.map(|data| AngleMessage::parse(data).expect("eight bytes").deg()).collect();
+    let turned = (vehicle.headings[vehicle.headings.len() - 1] - vehicle.headings[from]).to_degrees();
+    let off = (yaws[yaws.len() - 1] - yaws[0] - turned + 180.0).rem_euclid(360.0) - 180.0;
+    println!(
+        "{TEST}: {off:.2} deg in 15 s without courses, {:.2} by the bias alone",
+        BIAS.to_degrees() * 15.0
+    );
+    assert!(yaws.len() > 1_490 && off.abs() < 0.5, "{} sets, {off} deg", yaws.len());
+    let counters = common::counters(&mut board);
+    assert_eq!((counters.lines.frames_lost, counters.inputs.heading_errors), (0, 0));
+}
