@@ -94,8 +94,8 @@ pub struct Coprocessor {
     fog: FogPipeline,
     heading: Option<HeadingReceiver>,
     second: SecondSource,
-    /// The newest usable rates of the inertial and the fibre-optic gyro, rad/s.
-    inertial_rate: Option<(Micros, f32)>,
+    /// The newest usable rates of the inertial gyro, with its expected error, and of the fibre-optic one, rad/s.
+    inertial_rate: Option<(Micros, [f32; 2])>,
     fog_rate: Option<f32>,
     encoder: CanEncoder,
     fog_encoder: FogEncoder,
@@ -222,7 +222,9 @@ impl Coprocessor {
         }
         let rate = Some(output.vehicle.live).filter(|live| live.source != Source::Raw).map(rad_per_sec);
         let [_, lateral, _] = output.vehicle.specific_force;
-        self.inertial_rate = rate.map(|rate| (self.timeline.time(), rate));
+        let sigma =
+            output.vehicle.live.sigma.map_or(0.0, |sigma| sigma.0 as f32 / AngularRate::PER_RAD_PER_SEC);
+        self.inertial_rate = rate.map(|rate| (self.timeline.time(), [rate, sigma]));
         self.second.add(&Shown {
             inertial: rate,
             fog: self.fog_rate,
@@ -475,9 +477,11 @@ impl Coprocessor {
             let fresh = self.timeline.is_sensors() || !self.monitor.is_stale(self.timeline.now());
             let inertial = self.pipeline.inertial().filter(|_| fresh);
             let doubted = self.second.doubts().is_some_and(|doubts| doubts.inertial);
-            let rate = self.inertial_rate.filter(|_| fresh && !doubted);
-            let (tilted, scale) = (self.pipeline.tilted(), self.second.scale());
-            self.fog.beside(Beside { rate, tilted, scale });
+            let inertial_rate = self.inertial_rate.filter(|_| fresh && !doubted);
+            let rate = inertial_rate.map(|(at, [rate, _])| (at, rate));
+            let sigma = inertial_rate.map_or(0.0, |(_, [_, sigma])| sigma);
+            let (tilted, leaning) = (self.pipeline.tilted(), self.pipeline.leaning());
+            self.fog.beside(Beside { rate, sigma, tilted, leaning, scale: self.second.scale() });
             let Some(mut estimate) = self.fog.next_step(time, inertial, wheels.as_ref()) else { return };
             self.fog_rate = self.fog.shown();
             if self.second.doubts().is_some_and(|doubts| doubts.fog) && self.fog_rate.is_some() {

@@ -21,6 +21,7 @@
 //! Using differences between overlapping windows instead would give 60 interleaved sums of
 //! single estimates, each with its own error.
 
+mod beside;
 mod earth_and_bias;
 mod fognet_watch;
 mod part;
@@ -28,9 +29,10 @@ mod pipeline;
 mod rate;
 mod rest;
 
+pub use beside::Beside;
 pub use earth_and_bias::{EarthAndBias, Tilt};
 pub use part::FogErrors;
-pub use pipeline::{Beside, FogCounters, FogPipeline, STUCK_AFTER, STUCK_US};
+pub use pipeline::{FogCounters, FogPipeline, STUCK_AFTER, STUCK_US};
 pub use rate::IncrementRate;
 pub use rest::{RestOutcome, RestReading};
 

@@ -312,6 +312,12 @@ impl Pipeline {
         self.state.uncertainty.tilted().max(self.state.uncertainty.tilted_now())
     }
 
+    /// Returns the mean roll and pitch rate of the last second, both together, rad/s.
+    #[must_use]
+    pub fn leaning(&self) -> f32 {
+        self.state.uncertainty.leaning()
+    }
+
     /// Returns the event counters since the start.
     #[must_use]
     pub fn counters(&self) -> &Counters {

@@ -9,8 +9,9 @@
 //! In a second with contradiction the source that is alone is doubted: the gyro that the other two (gyro, wheels,
 //! accelerometer) contradict, or the wheels that both others contradict. Where two contradict each other and no third
 //! one judges, both are doubted. A doubt begins with the second such second in a row (a tyre that slips, a lag in a
-//! swerve), and ends with the second one in which its source agrees with another in a turn. A fibre-optic gyro that
-//! nothing has confirmed yet contradicts no other, and is doubted at once.
+//! swerve), and ends with the second one in which its source agrees with another in a turn, or straight on if it began
+//! while a gyro showed no turn: then a bias was wrong, no gain. A fibre-optic gyro that nothing has confirmed yet
+//! contradicts no other, and is doubted at once.
 
 use crate::sample::{RATE_HZ, WheelSample};
 
@@ -65,6 +66,8 @@ pub(super) struct SecondSource {
     alone: [u8; 3],
     agreed: [u8; 3],
     doubts: [bool; 3],
+    /// The gyros' doubts have begun, or gone on, while one of them showed no turn.
+    is_bias: bool,
     judged: bool,
     is_fog_confirmed: bool,
     /// Sums over turns of the product of both gyros' rates, and of the inertial one's square.
@@ -78,6 +81,7 @@ impl SecondSource {
         alone: [0; 3],
         agreed: [0; 3],
         doubts: [false; 3],
+        is_bias: false,
         judged: false,
         is_fog_confirmed: false,
         products: [0.0; 2],
@@ -160,9 +164,13 @@ impl SecondSource {
                 [gyro || wheels && against_inertial > for_inertial, against_fog > for_fog, wheels && !gyro]
             }
         };
+        if gyros_agree == Some(false) {
+            self.is_bias = turns.contains(&false);
+        }
+        let shows = |turns: bool| turns || self.is_bias && gyros_agree == Some(true);
         let agreed = [
-            turns[0] && for_inertial > against_inertial,
-            turns[1] && for_fog > against_fog,
+            shows(turns[0]) && for_inertial > against_inertial,
+            shows(turns[1]) && for_fog > against_fog,
             turns.contains(&true) && by_wheels.contains(&Some(true)) && !by_wheels.contains(&Some(false)),
         ];
         for source in 0..3 {
@@ -197,4 +205,28 @@ pub(super) fn axle(wheels: &WheelSample) -> Option<[f32; 2]> {
     let [left, right] = [rear_left.or(front_left)?, rear_right.or(front_right)?]
         .map(|speed| speed.0 as f32 / (1 << crate::units::WheelSpeed::FRACTION_BITS) as f32);
     Some([(left + right) / 2.0, right - left])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Seconds with these rates of both gyros; returns whether the inertial one is doubted.
+    fn run(source: &mut SecondSource, seconds: u32, [inertial, fog]: [f32; 2]) -> bool {
+        let [inertial, fog] = [Some(inertial), Some(fog)];
+        let shown = Shown { inertial, fog, is_fog_confirmed: true, ..Shown::default() };
+        (0..seconds * RATE_HZ).for_each(|_| source.add(&shown));
+        source.doubts().expect("two sources").inertial
+    }
+
+    #[test]
+    fn a_bias_that_is_mended_is_believed_straight_on_and_a_gain_in_a_turn() {
+        // A bias found on a turntable, then at rest.
+        let mut source = SecondSource::START;
+        assert!(run(&mut source, 3, [-0.087, 0.0]) && !run(&mut source, 2, [0.0, 0.0]));
+        // The straight after a turn says nothing of a gain; the next turn does.
+        let mut source = SecondSource::START;
+        assert!(run(&mut source, 3, [0.3, 0.4]) && run(&mut source, 5, [0.0, 0.0]));
+        assert!(!run(&mut source, 2, [0.4, 0.4]));
+    }
 }

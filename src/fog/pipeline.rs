@@ -24,6 +24,7 @@
 //! Increments are compared as the gyro sends them, not as they are summed. An increment that straddles two steps of
 //! the grid is split, and its rounding makes sums of equal increments differ.
 
+use super::beside::{Beside, Comparison};
 use super::fognet_watch::FogNetWatch;
 use super::{EarthAndBias, FogConfig, FogCorrector, FogNetUse, FogOutput, IncrementRate, RestOutcome};
 use crate::align::clock::ClockError;
@@ -49,52 +50,6 @@ pub const STUCK_US: u32 = 10_000;
 
 /// Share by which a clock may be off before it has been measured: a quarter of what is accepted.
 const CLOCK: f32 = 0.01;
-
-/// Difference of a step's rate from the inertial gyro's that no vehicle has, rad/s and as a share of it, and the steps for
-/// which it is rejected.
-const DIFFERS: (f32, f32) = (3.0, 0.5);
-const DOUBTED: u32 = 2 * RATE_HZ;
-/// Share of the rate, 1 sigma, that the slope of a street, the mounting and a unit's gain hide from any gyro, and with
-/// an inertial gyro until both have been compared in turns.
-const SHARE: f32 = 0.0005;
-const UNKNOWN_SHARE: f32 = 0.01;
-/// Difference of both gains that is the inertial gyro's, whose data sheet allows it.
-const INERTIAL_GAIN: f32 = 0.01;
-
-/// What the inertial sensor shows besides.
-#[derive(Debug, Clone, Copy)]
-pub struct Beside {
-    /// The newest yaw rate, rad/s, and its time.
-    pub rate: Option<(Micros, f32)>,
-    /// The share of a turn that a gyro misses on the present slope.
-    pub tilted: f32,
-    /// How much the gains of both gyros differ; `None` before they have turned.
-    pub scale: Option<f32>,
-}
-
-impl Beside {
-    /// There is no inertial sensor.
-    pub const NOTHING: Self = Self { rate: None, tilted: 0.0, scale: None };
-
-    /// Returns whether the turn of a step differs from the rate at that time.
-    fn differs(&self, turn: Angle, time: Micros) -> bool {
-        let own = turn.0 as f32 * (RATE_HZ as f32 / Angle::PER_RAD);
-        let at_once = |at: &Micros| at.0.abs_diff(time.0) <= 2 * PERIOD_US;
-        self.rate
-            .filter(|(at, _)| at_once(at))
-            .is_some_and(|(_, rate)| (own - rate).abs() > DIFFERS.0 + DIFFERS.1 * rate.abs())
-    }
-
-    /// Returns the share of the rate by which it may be off, 1 sigma.
-    fn share(&self) -> f32 {
-        let scale = match (self.scale, self.rate) {
-            (Some(scale), _) => (scale - INERTIAL_GAIN).max(0.0),
-            (None, Some(_)) => UNKNOWN_SHARE,
-            (None, None) => 0.0,
-        };
-        sqrt(SHARE * SHARE + scale * scale + self.tilted * self.tilted)
-    }
-}
 
 /// Event counters since the start. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -156,9 +111,8 @@ pub struct FogPipeline {
     /// Unit and sign of the gyro's output have been shown; a standstill has contradicted them.
     is_confirmed: bool,
     was_refused: bool,
-    beside: Beside,
-    /// Steps in a row that differed from the inertial gyro, and the newest one's rate, rad/s.
-    rejected: u32,
+    beside: Comparison,
+    /// The newest step's rate, rad/s.
     shown: Option<f32>,
     /// The latitude on the bus contradicts the one in use.
     latitude_contested: bool,
@@ -196,8 +150,7 @@ impl FogPipeline {
             },
             is_confirmed: false,
             was_refused: false,
-            beside: Beside::NOTHING,
-            rejected: 0,
+            beside: Comparison::START,
             shown: None,
             latitude_contested: false,
             shake: config.shake,
@@ -228,10 +181,9 @@ impl FogPipeline {
         self.latitude_contested = contested;
     }
 
-    /// Notes that another gyro agrees in a turn: unit and sign of the output are those of the configuration, unless a
-    /// standstill contradicts them.
+    /// Notes that another gyro agrees in a turn: unit and sign of the output are those of the configuration.
     pub fn confirm(&mut self) {
-        self.is_confirmed |= !self.was_refused;
+        self.is_confirmed = true;
     }
 
     /// Returns whether unit and sign of the output are known.
@@ -242,7 +194,7 @@ impl FogPipeline {
 
     /// Sets what the inertial sensor shows besides.
     pub fn beside(&mut self, beside: Beside) {
-        self.beside = beside;
+        self.beside.take(beside);
     }
 
     /// Returns the rate of the newest step, whether the inertial gyro agrees or not, rad/s.
@@ -302,9 +254,8 @@ impl FogPipeline {
         let turn = turn.filter(|_| u64::from(step.turn.covered) == PERIOD_US);
         let reading = self.earth_and_bias.rest().reading();
         self.shown = turn.map(|turn| turn.0 as f32 * (RATE_HZ as f32 / Angle::PER_RAD) - reading);
-        let differs = turn.is_some_and(|turn| self.beside.differs(turn, step.time));
-        self.rejected = if differs { self.rejected.saturating_add(1) } else { 0 };
-        let wrong = differs && self.rejected <= DOUBTED;
+        let differs = self.shown.is_some_and(|rate| self.beside.differs(rate, step.time));
+        let wrong = differs && self.beside.rejects();
         let turn = turn.filter(|_| !wrong);
         let stuck = turn.is_none() && self.stuck_in_step;
         self.stuck_in_step = self.repeats.are_stuck();
@@ -368,9 +319,9 @@ impl FogPipeline {
             kept.zip(by_network).map_or(0, |(kept, by_network)| kept.0.saturating_sub(by_network.0));
         let changed = changed as f32 * (RATE_HZ as f32 / Angle::PER_RAD);
         let unknown = self.clock.as_ref().is_some_and(|clock| !clock.is_known());
-        let share = self.beside.share() + if unknown { CLOCK } else { 0.0 };
-        let grows = share * rate.0 as f32 / AngularRate::PER_RAD_PER_SEC;
-        let spread = sqrt(shake * shake + changed * changed + grows * grows);
+        let clock = if unknown { CLOCK } else { 0.0 };
+        let beside = self.beside.sigma(rate.0 as f32 / AngularRate::PER_RAD_PER_SEC, clock);
+        let spread = sqrt(shake * shake + changed * changed + beside * beside);
         let sigma = turn.is_some().then(|| self.earth_and_bias.sigma(rate, spread));
         let yaw = Yaw(0);
         let mut estimate =

@@ -38,8 +38,10 @@ const GATE: f32 = 10.0;
 const MEMORY: u8 = 64;
 /// The square of a difference is limited to this many variances, because a beginning turn is not noise.
 const LARGEST: f32 = 9.0;
-/// Noise of a gyro in its own unit over that of the data sheet; degrees taken for radians are 57.
+/// Noise of a gyro in its own unit over that of the data sheet, on a shaken vehicle that may turn, and at rest; degrees
+/// taken for radians are 57.
 const NOISY: f32 = 8.0;
+const OWN_UNIT: f32 = 16.0;
 
 /// Says how a second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -186,14 +188,19 @@ impl RestReading {
         self.stood = self.stood.saturating_add(1);
     }
 
-    /// Returns what a standing vehicle has turned in the last second beyond the reading at rest and its noise, rad, or the
-    /// doubt of the newest standstill, rad/s, if that is larger: the vehicle turns, or the gyro's bias has changed.
+    /// Returns the rate at which a standing vehicle has turned in the last second, or in its last quarters, beyond the
+    /// reading at rest and its noise, or the doubt of the newest standstill if that is larger, rad/s: the vehicle turns, or
+    /// the gyro's bias has changed.
     fn against(&self) -> f32 {
-        let steps = self.stood.min(RATE_HZ + self.stood % QUARTER);
-        let turned = self.turned.iter().sum::<i64>() as f32 / Angle::PER_RAD;
-        let expected = self.combined().mean * steps as f32 / RATE_HZ as f32;
-        let beyond = (turned - expected).abs() - 3.0 * sqrt(self.noise);
-        self.doubt.max(if self.stood > 0 { beyond } else { 0.0 })
+        let beyond = |quarters: usize| {
+            let current = self.stood.saturating_sub(1) % QUARTER + 1;
+            let steps = self.stood.min(QUARTER * (quarters as u32 - 1) + current);
+            let seconds = steps as f32 / RATE_HZ as f32;
+            let turned = self.turned.iter().take(quarters).sum::<i64>() as f32 / Angle::PER_RAD;
+            let beyond = (turned - self.combined().mean * seconds).abs() - 3.0 * sqrt(self.noise);
+            beyond / seconds.max(0.25)
+        };
+        self.doubt.max(beyond(2)).max(beyond(5))
     }
 
     /// Returns the reading at rest that is subtracted, rad/s.
@@ -229,7 +236,7 @@ impl RestReading {
     pub fn shows_unit(&self) -> bool {
         let (earth, Estimate { mean, variance }) = (self.earth.unwrap_or(0.0), self.measured);
         let by_earth = 4.0 * sqrt(variance) + (mean - earth).abs() < 0.5 * earth.abs();
-        let usual = NOISY * self.errors.angle_walk;
+        let usual = OWN_UNIT * self.errors.angle_walk;
         let by_noise = self.differences > 2 && self.noise <= usual * usual;
         self.is_measured() && (by_earth || by_noise)
     }
@@ -252,18 +259,22 @@ impl RestReading {
         let second = core::mem::replace(&mut self.second, Second::EMPTY);
         let Some(before) = self.before.replace(second) else { return RestOutcome::Waits };
         let mean = before.triangle(&second);
-        if let Some(last) = self.last.replace(mean) {
+        let by_part = self.errors.angle_walk * self.errors.angle_walk;
+        let expected = self.combined();
+        let is_off =
+            |noise: f32| (mean - expected.mean).abs() > GATE * sqrt(expected.variance + noise.max(by_part));
+        // A deck that begins to turn, or ends to, is not noise.
+        let changes = is_off(self.noise) != self.refused;
+        if let Some(last) = self.last.replace(mean).filter(|_| !changes) {
             let square = ((mean - last) * (mean - last)).min(LARGEST * self.noise);
             self.differences = (self.differences + 1).min(MEMORY);
             let noise = self.noise + (square - self.noise) / f32::from(self.differences);
-            // A deck that begins to turn, or ends to, is not noise either.
+            // That of one that turns is a swell.
             let largest = NOISY * self.errors.angle_walk;
             self.noise = if self.refused { noise.min(self.noise.max(largest * largest)) } else { noise };
         }
-        let by_part = self.errors.angle_walk * self.errors.angle_walk;
         let seen = Estimate { mean, variance: self.noise.max(by_part) };
-        let expected = self.combined();
-        self.refused = (mean - expected.mean).abs() > GATE * sqrt(expected.variance + seen.variance);
+        self.refused = is_off(self.noise);
         if self.refused {
             self.doubt = (mean - expected.mean).abs();
             self.waiting = None;

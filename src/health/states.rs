@@ -158,7 +158,7 @@ pub const STATES: [State; 15] = [
         "contradicted",
         "two seconds in which other sources (fibre-optic gyro, wheels, accelerometer) contradict the gyro; 0x1A3 names it",
         "as in the present state, at best degraded; IMPLAUSIBLE",
-        "two seconds of a turn in which they agree",
+        "two seconds of a turn in which they agree, or straight on where a bias was wrong",
         "",
     ),
 ];

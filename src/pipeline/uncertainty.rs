@@ -12,14 +12,14 @@
 //! | revision that is not carried yet | what a second carries of it | adds linearly |
 //! | gain | a share of the yaw rate | of the net turn |
 //! | mounting, and a tilt that may be the street's | a share of the roll and pitch rates | of their net turns |
-//! | slope or bank in a turn | the share 1 - cos of the yaw rate, by the roll and pitch that the turn itself shows, or the tilt at rest | adds linearly |
+//! | slope or bank in a turn | the share 1 - cos of the yaw rate, by the roll and pitch that the turn itself shows | adds linearly |
 //! | unit that the network was not trained with | a share of its mean correction | of its net correction |
 //! | gap in the accumulated yaw | | the angle that the rates around it have turned, and what it may hide ([`crate::estimate`]) |
 
 use crate::estimate::Missed;
 use crate::sample::RATE_HZ;
 use crate::sqrt::sqrt;
-use crate::units::{AngularRate, SpecificForce};
+use crate::units::AngularRate;
 
 /// The sizes of the errors that are not estimated while driving.
 #[derive(Debug, Clone, Copy)]
@@ -67,8 +67,6 @@ const QUICK: usize = 2;
 /// Net turn that shows how far its axis is from the sensor's, rad, and the largest share of it that is missed, of 30 deg.
 const TURN: f32 = 0.2;
 const TILTED: f32 = 0.13;
-/// Largest share by the tilt at rest: of 6 deg.
-const ASKEW: f32 = 0.0055;
 /// Samples of a part of the minute, and its parts besides the current one.
 const PART: u32 = 5 * RATE_HZ;
 const PARTS: usize = (60 * RATE_HZ / PART) as usize;
@@ -124,8 +122,6 @@ impl Part {
 pub struct Uncertainty {
     config: UncertaintyConfig,
     errors: GyroErrors,
-    /// Share of the yaw rate that the tilt at rest hides: a mounting that is askew, or a street.
-    askew: f32,
     /// Running mean square of the windows' scales, (rad/s)^2.
     scale_square: Option<f32>,
     /// The last second, the newest block first, and the samples in that block.
@@ -145,7 +141,6 @@ impl Uncertainty {
         Self {
             config,
             errors: config.unknown,
-            askew: 0.0,
             scale_square: None,
             blocks: [[0.0; TURNS]; BLOCKS],
             samples: 0,
@@ -166,20 +161,12 @@ impl Uncertainty {
     /// Notes whether this unit is calibrated.
     pub fn calibrated(&mut self, calibrated: bool) {
         let UncertaintyConfig { known, unknown, .. } = self.config;
-        // What gravity shows at rest is a mounting that nothing has corrected, or a street.
-        let mounting = unknown.mounting.max(sqrt(2.0 * self.askew));
-        self.errors = if calibrated { known } else { GyroErrors { mounting, ..unknown } };
+        self.errors = if calibrated { known } else { unknown };
     }
 
     /// Notes that courses have shown the gain with this sigma.
     pub fn gain(&mut self, sigma: f32) {
         self.errors.gain = self.errors.gain.min(sigma);
-    }
-
-    /// Notes the specific force at rest after levelling.
-    pub fn askew(&mut self, rest: [SpecificForce; 3]) {
-        self.askew =
-            share(rest.map(|axis| axis.0 as f32 / SpecificForce::PER_METRE_PER_SEC2), 1.0).min(ASKEW);
     }
 
     /// Notes the variance of the direction of the axis in use, rad^2, and whether a tilt beyond the mounting is taken
@@ -232,7 +219,7 @@ impl Uncertainty {
     #[must_use]
     pub fn tilted(&self) -> f32 {
         let [[x, y, z, ..], [a, b, c, ..]] = [self.parts[0].turns, self.parts[1].turns];
-        share([x + a, y + b, z + c], TURN).max(self.askew)
+        share([x + a, y + b, z + c], TURN)
     }
 
     /// The same by the last second alone, in which a body that leans into the turn looks like a slope.
@@ -240,6 +227,13 @@ impl Uncertainty {
     pub fn tilted_now(&self) -> f32 {
         let [x, y, z, ..] = self.rates;
         share([x, y, z], TURN / 4.0)
+    }
+
+    /// Returns the mean roll and pitch rate of the last second, both together, rad/s.
+    #[must_use]
+    pub fn leaning(&self) -> f32 {
+        let [x, y, ..] = self.rates;
+        sqrt(x * x + y * y)
     }
 
     fn end_block(&mut self) {

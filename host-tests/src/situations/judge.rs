@@ -3,7 +3,7 @@
 //! | letter | what | promise |
 //! |---|---|---|
 //! | s | a second whose sets are all good | its yaw is off by at most four of the largest expected errors that it sent |
-//! | y | a span between two good sets, with anything between them | its yaw is off by at most four times the sum of the expected errors of its seconds, unless the count of gaps has changed by a second later |
+//! | y | a span between two good sets, with anything between them | its yaw is off by at most four times the sum of the expected errors of its seconds, unless the count of gaps changes by a second later |
 //! | d | the last minute before a slow status, between two good sets | its yaw is off by at most four times the doubt of the status, gaps or not |
 //! | t | a status that says "stands" | the vehicle's speed over ground is below 0.3 m/s, but for half a second in all |
 //! | g | the time in all | good for the share that the situation allows |
@@ -195,12 +195,8 @@ pub fn judge(received: &Receiver, truth: &Travelled, end: f64, reference: &Refer
         for length in SPANS {
             let to = sets.partition_point(|later| later.sampled < set.sampled + length);
             let Some(end) = sets.get(to).filter(|end| end.is_good()) else { continue };
-            let (Some(before), Some(after)) =
-                (newest(&received.slow, set.sampled), newest(&received.slow, end.sampled + 1.5))
-            else {
-                continue;
-            };
-            if before.gaps != after.gaps {
+            let Some(seen) = between(&received.slow, set.sampled, end.sampled + 1.5) else { continue };
+            if seen.windows(2).any(|pair| pair[0].gaps != pair[1].gaps) {
                 continue;
             }
             let allowed = SIGMAS * (sums[to] - sums[from]) + slack(set, end);
@@ -264,6 +260,8 @@ fn runs(sets: &[Set]) -> Vec<usize> {
     last
 }
 
-fn newest(slow: &[Slow], before: f64) -> Option<&Slow> {
-    slow[..slow.partition_point(|slow| slow.at <= before)].last()
+/// The statuses from the last one before a time to another time; `None` where there is none before.
+fn between(slow: &[Slow], from: f64, to: f64) -> Option<&[Slow]> {
+    let at = |time: f64| slow.partition_point(|slow| slow.at <= time);
+    slow.get(at(from).checked_sub(1)?..at(to))
 }
