@@ -47,7 +47,7 @@ impl Scratch {
             refused: None,
         };
         estimates.add_given(sequence, &self.given());
-        SequenceErrors::new(sequence, &estimates).0
+        SequenceErrors::new(sequence, &estimates)
     }
 
     fn compared(&self, sequence: &Sequence) -> Errors {

@@ -17,7 +17,7 @@ mod utm;
 
 pub use export::{HEADER, write_csv, write_whole};
 pub(super) use kaist::yaw;
-pub use summary::{Seen, Spread, StreamSummary};
+pub use summary::{Seen, StreamSummary};
 
 use crate::simulate::{Layout, MARKER, Spec};
 pub use fault::SequenceFault;

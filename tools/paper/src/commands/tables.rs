@@ -1,4 +1,4 @@
-//! `gyronet-paper tables` computes the paper's tables and figures on given sequences.
+//! `gyronet-paper tables` computes the paper's tables on given sequences.
 
 use super::{print_json, remark};
 use gyronet::model::fognet::FogNetState;
@@ -9,19 +9,18 @@ use gyronet_paper::simulate::Layout;
 use gyronet_paper::tables::given::Given;
 use gyronet_paper::tables::joint::{Fit, Joint};
 use gyronet_paper::tables::results::{Results, SequenceErrors};
-use gyronet_paper::tables::{estimates, html, pictures, table};
+use gyronet_paper::tables::{estimates, table};
 use gyronet_tools::drive::error::DataError;
 use gyronet_tools::network::weight_file::WeightFile;
 use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Compute the paper's tables and figures on sequences of KAIST Urban or NCLT.
+/// Compute the paper's tables on sequences of KAIST Urban or NCLT.
 ///
 /// The input is sequences: folders in the layout of KAIST Complex Urban or NCLT, recorded or written by
 /// `gyronet-paper simulate`. The command prints Tables I to VII beside the paper's own results, except tables that these
-/// sequences have no results for. With --out it also draws Figs. 6, 7, 9, 10 and 11. Results of simulated sequences
-/// are marked. If the vehicle does not stand still for the first 3 s, methods that need static initialisation are
+/// sequences have no results for. Results of simulated sequences are marked. If the vehicle does not stand still for the first 3 s, methods that need static initialisation are
 /// left out, and the reason is printed.
 ///
 /// --method adds another program's method: a folder of trajectories in the format of TUM's RGB-D benchmark (rows of
@@ -32,16 +31,13 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
-  gyronet-paper simulate --layout kaist --set test --out sequences && gyronet-paper tables sequences --out report
+  gyronet-paper simulate --layout kaist --set test --out sequences && gyronet-paper tables sequences
   gyronet-paper tables urban14 urban15 --json
   gyronet-paper tables sequences --method lwoi=OUT/model --method mine=trajectories")]
 pub struct Args {
     /// Folders of sequences, or folders that contain such folders.
     #[arg(required = true, value_name = "DIR")]
     folders: Vec<PathBuf>,
-    /// Write report.html, one page with all tables and figures, to this folder.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
     /// Fit the fibre-optic gyro and the wheels to this sequence, or to the sequences in this folder, and show the fit
     /// as a method. May be repeated.
     #[arg(long, value_name = "DIR")]
@@ -58,15 +54,6 @@ pub struct Args {
     /// Weight file of a FoGNet that was trained on GyroNet's rate, for pseudo_fog [default: that of --fog-weights].
     #[arg(long, value_name = "BLOB")]
     pseudo_fog_weights: Option<PathBuf>,
-}
-
-/// Returns a unique name for a sequence's figures: folders of different data sets may have the same name.
-fn title(sequence: &Sequence, number: usize) -> String {
-    let layout = match sequence.layout {
-        Layout::Kaist => "kaist",
-        Layout::Nclt => "nclt",
-    };
-    format!("{:02}-{layout}-{}", number + 1, sequence.name)
 }
 
 /// Fits the fibre-optic gyro and the wheels to the sequences of each data set's layout.
@@ -117,7 +104,7 @@ pub fn run(args: &Args, json: bool) -> super::Result {
         folders.extend(sequence::find(folder)?);
     }
     let joint = fit(&args.train)?;
-    let (mut all, mut drawn) = (Vec::new(), Vec::new());
+    let mut all = Vec::new();
     for folder in &folders {
         let sequence = Sequence::read(folder)?;
         let mut estimates = estimates::run(&sequence, &mut network);
@@ -127,24 +114,16 @@ pub fn run(args: &Args, json: bool) -> super::Result {
             estimates.add_joint(&sequence, joint);
         }
         args.methods.iter().for_each(|given| estimates.add_given(&sequence, given));
-        let (errors, paths) = SequenceErrors::new(&sequence, &estimates);
+        let errors = SequenceErrors::new(&sequence, &estimates);
         remark(format_args!("{}: {:.0} s of driving", errors.name, errors.seconds))?;
-        if args.out.is_some() {
-            drawn.push((title(&sequence, drawn.len()), pictures::draw(&sequence, &errors, &paths)));
-        }
         all.push(errors);
     }
     let results = Results::new(all);
     let files = [args.weights.as_deref(), args.fog_weights.as_deref()];
     let tables: Vec<_> = table::tables(&results).into_iter().map(|table| table.with_weights(files)).collect();
     if json {
-        print_json(&results)?;
-    } else {
-        let mut out = std::io::stdout().lock();
-        tables.iter().try_for_each(|table| writeln!(out, "{table}"))?;
+        return print_json(&results);
     }
-    let Some(folder) = &args.out else { return Ok(()) };
-    fs::create_dir_all(folder).map_err(super::named(folder))?;
-    super::write(&folder.join("report.html"), html::page(&tables, &drawn))?;
-    Ok(remark(format_args!("{}", folder.join("report.html").display()))?)
+    let mut out = std::io::stdout().lock();
+    Ok(tables.iter().try_for_each(|table| writeln!(out, "{table}"))?)
 }

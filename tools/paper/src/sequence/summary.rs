@@ -22,13 +22,6 @@ impl Seen {
     }
 }
 
-/// Holds the smallest and largest time between two stamps in one second of a file, ms.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Spread {
-    pub least_ms: f64,
-    pub most_ms: f64,
-}
-
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StreamSummary {
     pub file: String,
@@ -47,9 +40,6 @@ pub struct StreamSummary {
     pub resets: Seen,
     /// Time from its end to that of the file that ends last, s.
     pub ends_early_s: f64,
-    /// Spread of the time between stamps, for each second of the file.
-    #[serde(skip)]
-    pub spreads: Vec<Spread>,
     #[serde(skip)]
     clock: Clock,
 }
@@ -76,7 +66,6 @@ impl StreamSummary {
             cut: Seen::default(),
             resets: Seen::default(),
             ends_early_s: 0.0,
-            spreads: Vec::new(),
             clock: Clock { per_second, nominal_hz, first: None, last: 0 },
         }
     }
@@ -90,19 +79,9 @@ impl StreamSummary {
         };
         let seconds = (stamp - clock.last) as f64 / clock.per_second;
         clock.last = stamp;
-        let since = (stamp - first) as f64 / clock.per_second;
-        self.rate_hz = (self.rows - 1) as f64 / since;
+        self.rate_hz = (self.rows - 1) as f64 * clock.per_second / (stamp - first) as f64;
         self.gaps += u64::from(seconds * clock.nominal_hz > GAP_PERIODS);
         self.longest_gap_s = self.longest_gap_s.max(seconds);
-        let ms = seconds * 1e3;
-        // Limits the number of seconds to that of rows, in case of a stamp far ahead.
-        let second = (since as usize).min(self.rows as usize);
-        if self.spreads.len() <= second {
-            self.spreads.resize(second + 1, Spread { least_ms: ms, most_ms: ms });
-        }
-        let spread = &mut self.spreads[second];
-        spread.least_ms = spread.least_ms.min(ms);
-        spread.most_ms = spread.most_ms.max(ms);
     }
 }
 

@@ -36,17 +36,6 @@ pub struct Errors {
 
 pub type ByMethod = BTreeMap<&'static str, Errors>;
 
-/// Holds the path of a method, or the true path.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Path {
-    /// The method; `None` for the true path.
-    pub method: Option<Method>,
-    /// Heading at each step, not wrapped, rad.
-    pub yaw: Vec<f64>,
-    /// The points of the path, m.
-    pub points: Vec<Point>,
-}
-
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SequenceErrors {
     pub name: String,
@@ -73,8 +62,8 @@ pub struct SequenceErrors {
 }
 
 impl SequenceErrors {
-    /// Compares the estimates with the truth; also returns the paths for pictures, the truth's first.
-    pub fn new(sequence: &Sequence, estimates: &Estimates) -> (Self, Vec<Path>) {
+    /// Compares the estimates with the truth.
+    pub fn new(sequence: &Sequence, estimates: &Estimates) -> Self {
         let steps = &sequence.steps[estimates.start..];
         let turns = &sequence.turns()[estimates.start..];
         let truth: Vec<Point> = steps.iter().map(|step| step.position).collect();
@@ -82,29 +71,23 @@ impl SequenceErrors {
         let heading = steps.first().map_or(0.0, |step| step.yaw) - turns.first().copied().unwrap_or(0.0);
         let begin = estimates.start.checked_sub(1).map_or([0.0; 2], |k| sequence.steps[k].position);
         let (mut methods, mut order) = (ByMethod::new(), Vec::new());
-        let mut paths =
-            vec![Path { method: None, yaw: steps.iter().map(|step| step.yaw).collect(), points: truth }];
         for estimate in &estimates.methods {
             let scale = if let Places::Reckoned { scale } = estimate.places { scale } else { 1.0 };
             let mut track = Track { position: begin, yaw: heading };
-            let (yaw, mut points): (Vec<f64>, Vec<Point>) = steps
-                .iter()
-                .zip(&estimate.turns)
-                .map(|(step, turned)| {
-                    track.step(step.wheels.map(|way| scale * way), *turned);
-                    (track.yaw, track.position)
-                })
-                .unzip();
-            if let Places::Given(places) = &estimate.places {
-                points.clone_from(places);
-            }
-            if let Some(errors) = Errors::new(turns, estimate, &points, &paths[0].points) {
+            let reckoned = steps.iter().zip(&estimate.turns).map(|(step, turned)| {
+                track.step(step.wheels.map(|way| scale * way), *turned);
+                track.position
+            });
+            let points: Vec<Point> = match &estimate.places {
+                Places::Given(places) => places.clone(),
+                Places::Reckoned { .. } => reckoned.collect(),
+            };
+            if let Some(errors) = Errors::new(turns, estimate, &points, &truth) {
                 methods.insert(estimate.method.key, errors);
                 order.push(estimate.method);
             }
-            paths.push(Path { method: Some(estimate.method), yaw, points });
         }
-        let errors = Self {
+        Self {
             name: sequence.name.clone(),
             layout: sequence.layout,
             simulated: sequence.simulated.is_some(),
@@ -116,8 +99,7 @@ impl SequenceErrors {
             fitted: estimates.fitted.clone(),
             methods,
             order,
-        };
-        (errors, paths)
+        }
     }
 }
 
