@@ -9,12 +9,11 @@
 //! |---|---|
 //! | [`Coprocessor`] | takes samples, CAN frames and time; returns frames, windows and observations ([`coprocessor`]) |
 //! | [`Config`] | configures it ([`config`]) |
-//! | [`sensor`] | decodes bytes into samples: Xsens MTi, KVH DSP-1760 and DSP-3000, ICM-42688, ADIS16465 |
+//! | [`sensor`] | decodes bytes into samples: Xsens MTi, KVH DSP-1760, ICM-42688, ADIS16465 |
 //! | [`sample`], [`units`] | hold samples in fixed point: 2^-27 rad/s, 2^-20 m/s^2, microseconds |
 //! | [`model`] | runs the networks: ten samples in, the gyro's error out |
 //! | [`can`] | encodes Bosch MM5.10, our own messages, J1939, E2E, SLCAN; decodes wheel speeds |
 //! | [`estimate`], [`health`] | describe a corrected rate, its state and the counters |
-//! | [`odometry`] | computes the vehicle's path from wheel speeds and yaw rate |
 //! | [`store`], [`service`] | keep configuration and weights in flash, and change them on request |
 //!
 //! # On a board of your own
@@ -109,7 +108,6 @@ pub mod estimate;
 pub mod heading;
 pub mod health;
 pub mod model;
-pub mod odometry;
 pub mod sample;
 pub mod sensor;
 #[cfg(feature = "service")]

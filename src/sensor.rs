@@ -8,7 +8,6 @@
 //! |---|---|---|---|
 //! | Xsens MTi | UART | [`xsens::Mti`] | [`ImuSample`] |
 //! | KVH DSP-1760, 17xx | RS-422 | [`dsp1760::Dsp1760`] | [`FogSample`] |
-//! | KVH DSP-3000 | RS-232 | [`dsp3000`] | [`FogSample`], timed by arrival |
 //! | TDK ICM-42688-P | SPI | [`icm42688::Icm42688`] | [`ImuSample`] |
 //! | ADI ADIS16465, 16470 | SPI | [`adis16465::Adis16465`] | [`ImuSample`], timed by data ready |
 //!
@@ -22,11 +21,9 @@
 //! | MTData2 | sum of bytes, 8 bits | refused | one in 256 other errors |
 //! | DSP-1760 | CRC of 32 bits | refused | one in 4 x 10^9 |
 //! | ADIS164xx burst | sum of bytes, 16 bits | refused | swapped bytes |
-//! | DSP-3000 word | one parity bit | refused | half of the errors of more bits |
-//! | DSP-3000 line | none, except its format | a digit may become another one | that digit |
 //! | ICM-42688 packet | none, except its header | a reading may be another one | that reading |
 //!
-//! The last two have no check on the wire: keep their lines short, and rely on the pipeline's own limits.
+//! The last one has no check on the wire: keep its line short, and rely on the pipeline's own limits.
 //!
 //! `src/bin/PORTING.md` lists the six steps to add a part.
 
@@ -34,7 +31,6 @@ pub mod adis16465;
 #[doc(hidden)]
 pub mod crc;
 pub mod dsp1760;
-pub mod dsp3000;
 #[doc(hidden)]
 pub mod framer;
 pub mod icm42688;

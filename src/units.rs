@@ -141,24 +141,6 @@ impl Yaw {
     }
 }
 
-/// Holds a length, signed 64 bit, LSB 2^-32 m (0.23 nm), range +-2,147,483 km.
-///
-/// This is so fine that a hundred roundings a second, always in the same direction, add up to 42 um an hour.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Length(pub i64);
-
-impl Length {
-    /// Fraction bits of the code.
-    pub const FRACTION_BITS: u32 = 32;
-
-    /// Returns the length in m, for display and evaluation.
-    #[must_use]
-    pub fn metre(self) -> f64 {
-        self.0 as f64 / (1u64 << Self::FRACTION_BITS) as f64
-    }
-}
-
 /// Holds the speed of a wheel over ground, signed 32 bit, LSB 2^-16 m/s, range +-32768 m/s.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -31,7 +31,6 @@ pub struct Entrance {
 pub const ALL: [Entrance; 16] = [
     Entrance { name: "xsens", run: sensors::xsens, seeds: sensors::xsens_seeds, mutations: 20_000 },
     Entrance { name: "dsp1760", run: sensors::dsp1760, seeds: sensors::dsp1760_seeds, mutations: 20_000 },
-    Entrance { name: "dsp3000", run: sensors::dsp3000, seeds: sensors::dsp3000_seeds, mutations: 20_000 },
     Entrance { name: "icm42688", run: sensors::icm42688, seeds: sensors::icm42688_seeds, mutations: 20_000 },
     Entrance {
         name: "adis16465",

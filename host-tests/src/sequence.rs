@@ -1,8 +1,8 @@
 //! Simulates sequences, and does dead reckoning of them with turns from any source.
 
-use gyronet::odometry::Track;
 use gyronet_paper::sequence::Sequence;
 use gyronet_paper::simulate::{self, Spec};
+use gyronet_tools::drive::track::Track;
 use gyronet_tools::evaluate::trajectory_error::TrajectoryError;
 use tempfile::tempdir;
 

@@ -1,6 +1,6 @@
 //! Recorded drives. [`stream`] reads a drive row by row, [`recording`] keeps one in memory, [`vehicle`] reads the
 //! vehicle file beside it, and [`wheel_frames`] turns wheel speeds into CAN frames. [`replay`] runs the drive through
-//! the board. [`candump`] writes the frames that were sent, [`foxglove`] everything for Foxglove, and [`export`]
+//! the board. [`track`] is its path. [`candump`] writes the frames that were sent, [`foxglove`] all for Foxglove, [`export`]
 //! tables and paths.
 
 pub mod candump;
@@ -12,6 +12,7 @@ pub mod foxglove;
 pub mod recording;
 pub mod replay;
 pub mod stream;
+pub mod track;
 pub mod vehicle;
 pub mod wheel_frames;
 

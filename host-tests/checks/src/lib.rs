@@ -36,8 +36,6 @@ mod icm42688;
 mod j1939;
 #[path = "../../tests/library/kvh_dsp1760.rs"]
 mod kvh_dsp1760;
-#[path = "../../tests/library/kvh_dsp3000.rs"]
-mod kvh_dsp3000;
 #[path = "../../tests/library/pipeline.rs"]
 mod pipeline;
 #[path = "../../tests/library/pipeline_estimates.rs"]

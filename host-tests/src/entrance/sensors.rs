@@ -1,4 +1,4 @@
-//! Passes bytes to the parsers of the five sensors.
+//! Passes bytes to the parsers of the sensors.
 
 use super::Seed;
 use crate::wire::{bytes, feed, message, synthetic_frame};
@@ -6,9 +6,6 @@ use gyronet::sensor::adis16465::{BURST, Burst, Model};
 use gyronet::sensor::crc::CRC_32_MPEG_2;
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
-use gyronet::sensor::dsp3000::Mode;
-use gyronet::sensor::dsp3000::ascii::{Dsp3000Ascii, Reading};
-use gyronet::sensor::dsp3000::binary::{Dsp3000Binary, LOCK, Word};
 use gyronet::sensor::icm42688::packet::{Packet, Resolution};
 use gyronet::sensor::xsens::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti, Xbus};
@@ -75,31 +72,6 @@ pub fn dsp1760_seeds() -> Vec<Seed> {
         [bytes("fe 81 00 aa 7f 7f 7f 7f 7f 7f 55"), message(4, Extra::Temperature(25))].concat(),
     ];
     vec![("stream", extras.concat()), ("self_test", self_test)]
-}
-
-/// Parses bytes as lines and as words.
-pub fn dsp3000(data: &[u8]) {
-    let mut lines = Dsp3000Ascii::new();
-    let mut words = Dsp3000Binary::new(Mode::Rate, 0);
-    for byte in data {
-        if let Some(Ok(reading)) = lines.receive(*byte) {
-            let line = reading.emit();
-            assert_eq!(Reading::parse(line.trim_end().as_bytes()), Ok(reading));
-        }
-        if let Some(word) = words.receive(*byte) {
-            assert_eq!(Word::parse(word.emit()), Ok(word));
-        }
-    }
-}
-
-pub fn dsp3000_seeds() -> Vec<Seed> {
-    let line = |millionths, valid| Reading { millionths, valid }.emit().into_bytes().to_vec();
-    let word = |value| Word { valid: true, sync: 0, mode: Mode::Rate, value }.emit();
-    let values = -100_000..i32::from(LOCK) - 100_000 + 2;
-    vec![
-        ("lines", [line(10_000_000, true), line(-123, false)].concat()),
-        ("words", values.flat_map(word).collect()),
-    ]
 }
 
 /// Parses bytes as packets of either kind.

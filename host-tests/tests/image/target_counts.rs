@@ -11,11 +11,9 @@ use gyronet_tools::target::bench::{self, Counts};
 use gyronet_tools::target::size::ImageSize;
 
 /// The largest frame of each parser, and what it may hold beside it: clock, counters, settings.
-const PARSERS: [(&str, u64, u64); 6] = [
+const PARSERS: [(&str, u64, u64); 4] = [
     ("sensor/dsp1760_parser", 40, 100),
     ("sensor/mtdata2_parser", 259, 61),
-    ("sensor/dsp3000_line_parser", 32, 16),
-    ("sensor/dsp3000_word_parser", 4, 16),
     ("sensor/icm42688_packet_parser", 20, 40),
     ("sensor/adis16465_burst_parser", 20, 0),
 ];

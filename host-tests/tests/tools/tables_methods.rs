@@ -1,7 +1,6 @@
 //! `gyronet-paper tables --method`: another program's trajectories in the tables, on simulated sequences. The truth has no
 //! error, a known error is found, evo finds the same, and what cannot be compared is named and never a number.
 
-use gyronet::odometry::Track;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require::python;
 use gyronet_host_tests::sequence::simulate;
@@ -11,6 +10,7 @@ use gyronet_paper::tables::estimates::Estimates;
 use gyronet_paper::tables::given::Given;
 use gyronet_paper::tables::results::{Errors, Results, SequenceErrors};
 use gyronet_paper::tables::table;
+use gyronet_tools::drive::track::Track;
 use gyronet_tools::evaluate::trajectory_error::Point;
 use std::fmt::Write;
 use std::fs;

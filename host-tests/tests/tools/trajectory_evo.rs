@@ -1,8 +1,8 @@
 //! The trajectory error against evo itself, the program that the paper used: its results for three pairs of paths stand
 //! here as numbers, so that no machine needs it.
 
-use gyronet::odometry::Track;
 use gyronet_host_tests::noise::Noise;
+use gyronet_tools::drive::track::Track;
 use gyronet_tools::evaluate::trajectory_error::{Point, TrajectoryError};
 
 /// Rmse, mean, and both after alignment without scale, m: evo 1.38.1 (`APE`, translation part; `align`) for the paths

@@ -8,9 +8,6 @@ use gyronet::sensor::ByteSource;
 use gyronet::sensor::adis16465::{Burst, DiagStat, Model};
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
-use gyronet::sensor::dsp3000::Mode;
-use gyronet::sensor::dsp3000::ascii::{Dsp3000Ascii, Reading};
-use gyronet::sensor::dsp3000::binary::{Dsp3000Binary, LOCK, Word};
 use gyronet::sensor::icm42688::packet::{Packet, Resolution};
 use gyronet::sensor::xsens::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti};
@@ -19,12 +16,9 @@ use gyronet::units::Micros;
 pub fn run(meter: &mut Meter) {
     dsp1760(meter);
     mtdata2(meter);
-    dsp3000(meter);
     bursts(meter);
     hprintln!("sensor/dsp1760_parser bytes={}", size_of::<Dsp1760>());
     hprintln!("sensor/mtdata2_parser bytes={}", size_of::<Mti>());
-    hprintln!("sensor/dsp3000_line_parser bytes={}", size_of::<Dsp3000Ascii>());
-    hprintln!("sensor/dsp3000_word_parser bytes={}", size_of::<Dsp3000Binary>());
     hprintln!("sensor/icm42688_packet_parser bytes={}", size_of::<Packet>());
     hprintln!("sensor/adis16465_burst_parser bytes={}", size_of::<Burst>());
 }
@@ -78,31 +72,6 @@ fn mtdata2(meter: &mut Meter) {
     let double = [1, 2].map(|n| message(n).emit_as(Precision::Double));
     stream(meter, "sensor/mtdata2_frame", &mut Mti::new(), single.each_ref().map(|frame| &frame[..]));
     stream(meter, "sensor/mtdata2_f64_frame", &mut Mti::new(), double.each_ref().map(|frame| &frame[..]));
-}
-
-fn dsp3000(meter: &mut Meter) {
-    let line = Reading { millionths: -12_345_678, valid: true }.emit();
-    let mut lines = Dsp3000Ascii::new();
-    meter.run("sensor/dsp3000_line", || {
-        for byte in black_box(line.as_bytes()) {
-            if let Some(Ok(reading)) = lines.receive(*byte) {
-                black_box(reading.sample(Mode::Rate, Micros(5), 10_000));
-            }
-        }
-    });
-    hprintln!("sensor/dsp3000_line bytes={}", line.len());
-    let word = Word { valid: true, sync: 0, mode: Mode::Incremental, value: 166_667 }.emit();
-    let mut words = Dsp3000Binary::new(Mode::Incremental, 0);
-    let mut feed = || {
-        for byte in black_box(&word) {
-            if let Some(word) = words.receive(*byte) {
-                black_box(word.sample(Micros(5), 1_000));
-            }
-        }
-    };
-    (0..LOCK).for_each(|_| feed());
-    meter.run("sensor/dsp3000_word", feed);
-    hprintln!("sensor/dsp3000_word bytes={}", word.len());
 }
 
 /// Measures the parsers of the bytes of an SPI transfer.

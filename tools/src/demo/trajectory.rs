@@ -2,10 +2,10 @@
 
 use crate::drive::DT;
 use crate::drive::stream::Drive;
+use crate::drive::track::Track;
 use crate::evaluate::methods::Method;
 use crate::evaluate::rates::Rates;
 use crate::evaluate::trajectory_error::{Point, TrajectoryError};
-use gyronet::odometry::Track;
 use serde::Serialize;
 
 /// The paths of these methods are drawn.

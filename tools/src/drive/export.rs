@@ -3,7 +3,7 @@
 use super::DT;
 use super::wheel_frames::Speeds;
 use crate::board::Step;
-use gyronet::odometry::Track;
+use crate::drive::track::Track;
 use gyronet::units::AngularRate;
 use std::io::{self, Write};
 

@@ -5,7 +5,7 @@ use super::estimates::Estimates;
 use super::group::Group;
 use crate::sequence::Sequence;
 use crate::simulate::Layout;
-use gyronet::odometry::Track;
+use gyronet_tools::drive::track::Track;
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::metrics::YawError;
 use gyronet_tools::evaluate::trajectory_error::{Point, TrajectoryError};

@@ -8,8 +8,8 @@ use crate::sequence::{Sequence, Step, StreamSummary};
 use crate::simulate::{self, Layout, Spec};
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Estimate as WindowEstimate, WindowNetwork};
-use gyronet::odometry::Track;
 use gyronet::units::AngularRate;
+use gyronet_tools::drive::track::Track;
 use gyronet_tools::evaluate::methods::Method;
 use std::path::PathBuf;
 
