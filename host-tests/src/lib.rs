@@ -2,7 +2,6 @@
 //! skipped, the virtual board and its image, and every generator of bytes, samples, streams and weights.
 
 pub mod board;
-pub mod browser;
 pub mod entrance;
 pub mod flash;
 pub mod golden;

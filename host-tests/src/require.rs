@@ -21,18 +21,11 @@ pub enum Need {
     Python,
     /// The C compiler arm-none-eabi-gcc.
     Gcc,
-    /// Chromium.
-    Browser,
 }
 
 impl Need {
-    const ALL: [(&'static str, Self); 5] = [
-        ("qemu", Self::Qemu),
-        ("data", Self::Data),
-        ("python", Self::Python),
-        ("gcc", Self::Gcc),
-        ("browser", Self::Browser),
-    ];
+    const ALL: [(&'static str, Self); 4] =
+        [("qemu", Self::Qemu), ("data", Self::Data), ("python", Self::Python), ("gcc", Self::Gcc)];
 }
 
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -13,7 +13,6 @@ mod fognet_simulated;
 mod foreign_mounting;
 mod gyronet_golden;
 mod mounting;
-mod pages;
 mod python_seconds;
 mod python_units;
 mod python_wheels;
