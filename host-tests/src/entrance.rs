@@ -28,7 +28,7 @@ pub struct Entrance {
     pub mutations: u64,
 }
 
-pub const ALL: [Entrance; 16] = [
+pub const ALL: [Entrance; 15] = [
     Entrance { name: "xsens", run: sensors::xsens, seeds: sensors::xsens_seeds, mutations: 20_000 },
     Entrance { name: "dsp1760", run: sensors::dsp1760, seeds: sensors::dsp1760_seeds, mutations: 20_000 },
     Entrance { name: "icm42688", run: sensors::icm42688, seeds: sensors::icm42688_seeds, mutations: 20_000 },

@@ -23,7 +23,6 @@ pub mod retired;
 pub mod sign;
 pub mod simulate;
 pub mod size;
-pub mod train;
 mod weights;
 pub mod wheels;
 

@@ -8,8 +8,7 @@
 //! drive <- calibrate
 //! drive <- doctor -> plot
 //! drive <- evaluate
-//! train -> evaluate, plot      python
-//! target -> simulate      network      client <- reference      wheels
+//! target -> simulate      network      client <- reference      wheels      python
 //! demo -> everything above
 //! ```
 
@@ -29,5 +28,4 @@ pub mod reference;
 pub mod signing;
 pub mod simulate;
 pub mod target;
-pub mod train;
 pub mod wheels;

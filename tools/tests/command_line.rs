@@ -160,6 +160,7 @@ fn retired_names_say_what_does_their_work() {
         (&["--json", "soak"], "--bin situations"),
         (&["paper", "KAIST", "--out", "OUT"], "make -f tools/paper/Makefile"),
         (&["tables", "SEQUENCES"], "cargo paper tables"),
+        (&["train", "DRIVES"], "python -m gyronet_train.beside"),
         (&["warm-up"], "gyronet simulate --trip motorway"),
         (&["bench-target", "--policies"], "cargo bringup"),
         (&["demo", "--image"], "--test board"),

@@ -3,11 +3,12 @@
 use clap::error::{ContextKind, ContextValue};
 
 const SITUATIONS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin situations`";
-const RETIRED: [(&str, &str); 11] = [
+const RETIRED: [(&str, &str); 12] = [
     ("campaign", SITUATIONS),
     ("soak", SITUATIONS),
     ("paper", "`make -f tools/paper/Makefile`"),
     ("tables", "`cargo paper tables`"),
+    ("train", "`python -m gyronet_train.beside` (tools/python/gyronet_train/README.md)"),
     ("warm-up", "`gyronet simulate --trip motorway` with `gyronet evaluate`"),
     (
         "--image",
