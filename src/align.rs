@@ -118,7 +118,6 @@ pub struct Aligner {
     tick: u32,
     missing: u32,
     sums: Sums,
-    /// Remainders of the means.
     rest: [i64; 6],
     /// The newest periods, microseconds, the place of the oldest one, and the usual one: their mean, or where samples
     /// are missing their median.
@@ -188,7 +187,6 @@ impl Aligner {
     }
 
     /// Returns whether the next sample completes a step, unless it comes early.
-    #[must_use]
     pub fn is_nearly_complete(&self) -> bool {
         self.last.is_none_or(|(_, end)| self.end - end < 2 * i64::from(self.usual))
     }

@@ -101,7 +101,6 @@ struct Entry {
 }
 
 impl Entry {
-    /// Returns the yaw rate.
     fn rate(&self) -> AngularRate {
         let [.., rate] = self.rates;
         rate
@@ -164,13 +163,11 @@ pub struct Complete {
 
 impl Complete {
     /// Returns the rate less the correction; `None` where it is not good.
-    #[must_use]
     pub fn left(&self) -> Option<AngularRate> {
         self.valid_left().filter(|_| self.good)
     }
 
     /// Returns the rate less the correction, also where no window has covered the sample.
-    #[must_use]
     pub fn valid_left(&self) -> Option<AngularRate> {
         self.valid.then_some(AngularRate(self.rate.0.saturating_sub(self.correction.0)))
     }
@@ -212,7 +209,6 @@ pub struct Compensator {
 
 impl Compensator {
     /// Creates a compensator without an estimate.
-    #[must_use]
     pub const fn new(config: CompensateConfig) -> Self {
         Self {
             config,
@@ -319,14 +315,12 @@ impl Compensator {
     }
 
     /// Returns whether driving has shown that the model's mounting is this unit's.
-    #[must_use]
     pub fn is_own_mounting(&self) -> bool {
         self.mounting_check.is_own() == Some(true)
     }
 
     /// Returns how far up deviates from z, along x and y, on the unit that the model was trained with, or by nothing if
     /// driving has shown that this is another one; `None` without a model that has a mounting.
-    #[must_use]
     pub fn learnt_up(&self) -> Option<[f32; 2]> {
         let SteadyGain([x, y, _]) = self.mounting;
         let is_other = self.mounting_check.is_own() == Some(false);
@@ -370,7 +364,6 @@ impl Compensator {
     }
 
     /// Returns the newest sample that no window changes any more; each sample is returned once.
-    #[must_use]
     pub fn complete(&self) -> Option<Complete> {
         let entry = self.kept.iter().nth_back(self.config.mode.complete_after())?.as_ref()?;
         Some(Complete {
@@ -396,14 +389,12 @@ impl Compensator {
 
     /// Returns whether the delayed rates have more to carry than a window revises, because the wheels stood while
     /// the vehicle turned. The rates are wrong until all of it is carried.
-    #[must_use]
     pub fn revisions_exceed_limit(&self) -> bool {
         let much = LONG * u64::from(self.config.max_revision.0.unsigned_abs());
         self.delayed_revisions.unsigned_abs() > much
     }
 
     /// Returns how much of the revisions the delayed rates carry in the next second, rad.
-    #[must_use]
     pub fn carried_in_a_second(&self) -> f32 {
         let most = i64::from(RATE_HZ) * i64::from(self.config.max_revision.0).max(0);
         let carried = self.delayed_revisions.unsigned_abs().min(most.unsigned_abs());
@@ -412,14 +403,12 @@ impl Compensator {
 
     /// Returns the amount that the sum of the live rates still lacks, codes x samples: revisions that are not carried
     /// yet.
-    #[must_use]
     pub fn live_pending(&self) -> i64 {
         -self.live_revisions
     }
 
     /// Returns the amount that the sum of the delayed rates still lacks: revisions that are not carried yet, and
     /// samples whose rates are not sent yet.
-    #[must_use]
     pub fn delayed_pending(&self, remaining: Remaining) -> i64 {
         let waiting = self.kept.iter().rev().take(self.config.lag.samples()).flatten();
         let waiting = waiting.filter(|entry| entry.validity.is_good());

@@ -109,7 +109,6 @@ pub struct Coprocessor {
 impl Coprocessor {
     /// Creates a coprocessor before its first input, at time 0. It is about 10 KB: on a board with a small stack make it
     /// in a static.
-    #[must_use]
     #[inline]
     pub const fn new(config: Config) -> Self {
         let clock_ratio = match config.clock {
@@ -422,19 +421,16 @@ impl Coprocessor {
     }
 
     /// Returns the pipeline, to read its state.
-    #[must_use]
     pub fn pipeline(&self) -> &Pipeline {
         &self.pipeline
     }
 
     /// Returns the fault counters of the sensor monitor.
-    #[must_use]
     pub fn monitor_counters(&self) -> &MonitorCounters {
         self.monitor.counters()
     }
 
     /// Returns the event counters of the fibre-optic gyro.
-    #[must_use]
     pub fn fog_counters(&self) -> &FogCounters {
         self.fog.counters()
     }
@@ -451,7 +447,6 @@ impl Coprocessor {
     }
 
     /// Returns the counters of inputs that were refused or replaced.
-    #[must_use]
     pub fn input_counters(&self) -> &InputCounters {
         &self.counters
     }

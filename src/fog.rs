@@ -82,9 +82,6 @@ pub enum GyroMismatch {
 
 /// Checks that weights are for a gyro: trained for its part and for its serial number or any, and on simulated drives
 /// only where `wanted` allows it.
-///
-/// # Errors
-/// [`GyroMismatch`].
 pub fn check_training(
     trained: Training,
     part: Gyro,
@@ -184,7 +181,6 @@ pub struct FogCorrector {
 
 impl FogCorrector {
     /// Creates a corrector before its first frame.
-    #[must_use]
     pub const fn new(config: FogConfig) -> Self {
         Self {
             config,

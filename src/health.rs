@@ -102,7 +102,6 @@ impl Faults {
     pub const BUS: Self = Self(1 << 7);
 
     /// Returns the fault that a reading of this validity stands for.
-    #[must_use]
     pub(crate) const fn of(validity: Validity) -> Self {
         match validity {
             Validity::Good => Self::NONE,
@@ -183,7 +182,6 @@ impl BoardFaults {
 }
 
 /// Returns the source and the quality that a status stands for.
-#[must_use]
 pub const fn judge(status: Status) -> (Source, Quality) {
     match status {
         Status::Init => (Source::Raw, Quality::Initialising),

@@ -93,7 +93,6 @@ pub struct SensorMonitor {
 
 impl SensorMonitor {
     /// Creates a monitor before its first sample. With `clock`, the sensor's clock is compared with the outside one.
-    #[must_use]
     pub const fn new(clock: Option<ClockRatioConfig>) -> Self {
         Self {
             repeats: Repeats::new(),
@@ -114,7 +113,6 @@ impl SensorMonitor {
     }
 
     /// Returns the fault counters.
-    #[must_use]
     pub fn counters(&self) -> &MonitorCounters {
         &self.counters
     }
@@ -149,13 +147,11 @@ impl SensorMonitor {
     }
 
     /// Returns the time by which the newest sample came late, microseconds; 0 where it came in time.
-    #[must_use]
     pub fn late(&self) -> u32 {
         self.late
     }
 
     /// Returns the yaw rate by which the readings may be off since a jump, rad/s.
-    #[must_use]
     pub fn shift(&self) -> f32 {
         self.jump.shift()
     }
@@ -178,26 +174,22 @@ impl SensorMonitor {
     }
 
     /// Returns the true length of a step of the sensor's clock, as the samples so far show it.
-    #[must_use]
     pub fn clock_ratio(&self) -> ClockRatio {
         self.clock.as_ref().map_or(ClockRatio::ONE, RatioEstimator::ratio)
     }
 
     /// Returns whether the sensor's clock is at fault, as the samples so far show it.
-    #[must_use]
     pub fn is_clock_off(&self) -> bool {
         self.clock.as_ref().is_some_and(RatioEstimator::fault)
     }
 
     /// Returns whether the newest sample is so old that its reading says nothing about `now`.
-    #[must_use]
     pub fn is_stale(&self, now: Micros) -> bool {
         let arrival = self.newest.map_or(0, |(_, arrival)| arrival.0);
         now.0.saturating_sub(arrival) >= TIMEOUT_US
     }
 
     /// Returns the sensor's time at `now`, as if its clock had gone on since the newest sample.
-    #[must_use]
     pub fn time_at(&self, now: Micros) -> Micros {
         let (time, arrival) = self.newest.unwrap_or_default();
         Micros(time.0.saturating_add(now.0.saturating_sub(arrival.0)))

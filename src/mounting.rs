@@ -30,7 +30,6 @@ const UPSIDE_DOWN: f32 = -0.866;
 const MOVED: f32 = 0.906;
 
 /// Returns whether two mean specific forces at standstill are so far apart that the sensor was moved between them.
-#[must_use]
 pub(crate) fn is_moved(before: &[SpecificForce; 3], now: &[SpecificForce; 3]) -> bool {
     let (before, now) = (metre_per_sec2(before), metre_per_sec2(now));
     dot(&before, &now) < MOVED * sqrt(dot(&before, &before) * dot(&now, &now))
@@ -65,7 +64,6 @@ impl Rotation {
 
     /// Creates the rotation of a board that is turned from the vehicle's axes by `yaw` about z, then by `pitch` about
     /// its own y, then by `roll` about its own x, degrees. `None` when one is not finite.
-    #[must_use]
     pub fn from_mounting(roll: f32, pitch: f32, yaw: f32) -> Option<Self> {
         if ![roll, pitch, yaw].iter().all(|angle| angle.is_finite()) {
             return None;
@@ -80,9 +78,6 @@ impl Rotation {
     }
 
     /// Returns the smallest rotation that turns a mean specific force at rest upright, and its angle in degrees.
-    ///
-    /// # Errors
-    /// [`LevelError`].
     #[doc(hidden)]
     pub fn levelling(rest: [SpecificForce; 3]) -> Result<(Self, f32), LevelError> {
         let force = metre_per_sec2(&rest);
@@ -110,8 +105,6 @@ impl Rotation {
         ])
     }
 
-    /// Returns the rotation back.
-    #[must_use]
     pub(crate) fn inverse(&self) -> Self {
         Self(core::array::from_fn(|row| core::array::from_fn(|column| self.0[column][row])))
     }
@@ -122,7 +115,6 @@ impl Rotation {
     }
 
     /// Returns the rotation that turns first by `self`, then by `next`.
-    #[must_use]
     #[doc(hidden)]
     pub fn then(&self, next: &Self) -> Self {
         let Self(first) = self;
@@ -132,21 +124,18 @@ impl Rotation {
     }
 
     /// Returns an angular rate in the vehicle's axes.
-    #[must_use]
     #[doc(hidden)]
     pub fn rate(&self, rate: [AngularRate; 3]) -> [AngularRate; 3] {
         self.turn(rate.map(|axis| axis.0)).map(AngularRate)
     }
 
     /// Returns a specific force in the vehicle's axes.
-    #[must_use]
     #[doc(hidden)]
     pub fn force(&self, force: [SpecificForce; 3]) -> [SpecificForce; 3] {
         self.turn(force.map(|axis| axis.0)).map(SpecificForce)
     }
 
     /// Returns a sample in the vehicle's axes: x forward, y left, z up.
-    #[must_use]
     #[doc(hidden)]
     pub fn sample(&self, sample: &ImuSample) -> ImuSample {
         ImuSample {
@@ -193,7 +182,6 @@ impl GyroMap {
     pub const MAX_CROSS: f32 = 0.15;
 
     /// Creates a map from a matrix, row by row; `None` if an element is not finite or too far from the identity.
-    #[must_use]
     pub fn from_elements(elements: [[f32; 3]; 3]) -> Option<Self> {
         let map = Self(elements.map(|row| row.map(|element| libm::roundf(element * ONE) as i32)));
         let finite = elements.as_flattened().iter().all(|element| element.is_finite());
@@ -201,13 +189,11 @@ impl GyroMap {
     }
 
     /// Returns the matrix, row by row.
-    #[must_use]
     pub fn elements(&self) -> [[f32; 3]; 3] {
         self.0.map(|row| row.map(|element| element as f32 / ONE))
     }
 
     /// Returns whether every element is near enough to the identity for a real unit.
-    #[must_use]
     pub fn is_plausible(&self) -> bool {
         let [gain, cross] = [Self::MAX_GAIN, Self::MAX_CROSS].map(|limit| (limit * ONE) as u32);
         self.0.iter().zip(Self::IDENTITY.0).enumerate().all(|(row, (elements, identity))| {
@@ -218,7 +204,6 @@ impl GyroMap {
     }
 
     /// Returns the true rates for the gyro's readings.
-    #[must_use]
     #[doc(hidden)]
     pub fn rate(&self, rate: [AngularRate; 3]) -> [AngularRate; 3] {
         product(&self.0, rate.map(|axis| axis.0)).map(AngularRate)

@@ -52,14 +52,12 @@ pub struct Aligned<T>(pub T);
 
 /// Packs two consecutive columns into one word, as the kernels load them: the first in the lower half.
 #[inline]
-#[must_use]
 pub const fn pack(first: i16, second: i16) -> u32 {
     first as u16 as u32 | (second as u16 as u32) << 16
 }
 
 /// Returns the two columns of a word.
 #[inline]
-#[must_use]
 pub const fn unpack(word: u32) -> (i32, i32) {
     (word as i16 as i32, word as i32 >> 16)
 }

@@ -45,7 +45,6 @@ pub enum Validity {
 
 impl Validity {
     /// Returns the validity that a part reports for its own reading.
-    #[must_use]
     pub const fn reported(saturated: bool) -> Self {
         if saturated { Self::Saturated } else { Self::Good }
     }
@@ -71,7 +70,6 @@ pub struct TestSignal {
 
 impl TestSignal {
     /// A level sensor that turns about the vertical at `deg_per_sec`.
-    #[must_use]
     pub const fn turning(deg_per_sec: f64) -> Self {
         Self {
             specific_force: [SpecificForce(0), SpecificForce(0), SpecificForce::STANDARD_GRAVITY],
@@ -80,7 +78,6 @@ impl TestSignal {
     }
 
     /// Returns the sample with this number, 100 a second.
-    #[must_use]
     pub fn sample(&self, number: u32) -> ImuSample {
         let noise = (number % 2) as i32;
         ImuSample {
@@ -152,13 +149,11 @@ pub struct WheelSample {
 
 impl WheelSample {
     /// Returns whether a wheel has a speed.
-    #[must_use]
     pub fn has_speed(&self) -> bool {
         self.speeds.iter().any(Option::is_some)
     }
 
     /// Creates a report without speeds.
-    #[must_use]
     pub const fn without_speeds(standstill: Standstill) -> Self {
         Self { time: Micros(0), speeds: [None; WHEELS], standstill }
     }

@@ -104,19 +104,16 @@ impl Standing {
     const CONTRADICTED: Self = Self { is_contradicted: true, ..Self::UNKNOWN };
 
     /// Returns whether the vehicle probably stands: more than nine times in ten.
-    #[must_use]
     pub fn is_likely(&self) -> bool {
         self.probability > 0.9
     }
 
     /// Returns whether a road is excluded, so that the output may be interrupted.
-    #[must_use]
     pub fn is_lasting(&self) -> bool {
         self.probability >= LASTING.1
     }
 
     /// Returns whether the wheels prove it.
-    #[must_use]
     pub fn is_by_wheels(&self) -> bool {
         self.source == StandstillSource::Wheels
     }
@@ -154,7 +151,6 @@ pub struct Judge {
 
 impl Judge {
     /// Creates a judge before the first sample.
-    #[must_use]
     pub const fn new(config: StandstillConfig) -> Self {
         Self {
             config,
@@ -183,13 +179,11 @@ impl Judge {
 
     /// Returns whether the vehicle drives: its wheels turn faster than they creep, or the last two seconds show a change of
     /// speed, or a force, that no standing vehicle has.
-    #[must_use]
     pub fn has_driven_off(&self) -> bool {
         self.drives || self.speeds_up
     }
 
     /// Returns whether nothing but an engine shakes the vehicle.
-    #[must_use]
     pub fn is_calm(&self) -> bool {
         self.is_calm
     }

@@ -38,7 +38,6 @@ impl AngularRate {
     pub const ZERO: Self = Self(0);
 
     /// Returns the nearest code to a rate in deg/s, for constants; beyond +-916 deg/s the code saturates.
-    #[must_use]
     pub const fn from_deg_per_sec(value: f64) -> Self {
         let code = value * (core::f64::consts::PI / 180.0) * (1u32 << Self::FRACTION_BITS) as f64;
         Self((code + if code < 0.0 { -0.5 } else { 0.5 }) as i32)
@@ -191,7 +190,6 @@ pub struct Duration(pub u64);
 
 impl Duration {
     /// Creates a duration of milliseconds.
-    #[must_use]
     pub const fn from_millis(millis: u32) -> Self {
         Self(millis as u64 * 1_000)
     }

@@ -1,6 +1,5 @@
 //! Computes with vectors of f32.
 
-/// Returns the dot product.
 pub(crate) fn dot<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -130,7 +130,6 @@ impl PartClock {
     }
 
     /// Returns the event counters since the start.
-    #[must_use]
     pub fn counters(&self) -> &ClockCounters {
         &self.counters
     }

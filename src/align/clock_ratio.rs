@@ -145,7 +145,6 @@ pub struct RatioEstimator {
 
 impl RatioEstimator {
     /// Creates an estimator before its first sample.
-    #[must_use]
     pub const fn new(config: ClockRatioConfig) -> Self {
         Self {
             config,
@@ -186,19 +185,16 @@ impl RatioEstimator {
     }
 
     /// Returns the ratio in use: one before it is known, and while the clocks contradict each other.
-    #[must_use]
     pub fn ratio(&self) -> ClockRatio {
         self.ratio
     }
 
     /// Returns whether enough points show the ratio.
-    #[must_use]
     pub fn is_known(&self) -> bool {
         self.is_known
     }
 
     /// Returns whether the clocks depart from each other by more than [`ClockRatioConfig::limit_ppm`].
-    #[must_use]
     pub fn fault(&self) -> bool {
         self.fault
     }

@@ -35,7 +35,6 @@ pub struct FogGrid {
 
 impl FogGrid {
     /// The state before the first sample. Where one is `expected`, steps are due from time 0 on, and empty until it comes.
-    #[must_use]
     pub const fn new(expected: bool) -> Self {
         let next = if expected { Some(0) } else { None };
         Self { clock: PartClock::START, increments: Increments::EMPTY, next }
@@ -56,7 +55,6 @@ impl FogGrid {
     }
 
     /// Returns whether the next step is complete or due, or so old that the grid restarts.
-    #[must_use]
     pub fn is_due(&self, now: Micros) -> bool {
         self.next.is_some_and(|next| {
             self.increments.has_reached(Micros(next)) || now.0.saturating_sub(next) >= MAX_DELAY_US
@@ -84,13 +82,11 @@ impl FogGrid {
     }
 
     /// Returns the events of the gyro's clock since the start.
-    #[must_use]
     pub fn clock(&self) -> &ClockCounters {
         self.clock.counters()
     }
 
     /// Returns the events of the increments since the start.
-    #[must_use]
     pub fn increments(&self) -> &IncrementCounters {
         self.increments.counters()
     }

@@ -33,7 +33,6 @@ pub struct Turn {
 impl Turn {
     /// Returns the mean rate about an axis over the step, rounded to nearest; `None` where the axis was not good
     /// throughout, or a part of the step is not covered.
-    #[must_use]
     pub fn rate(&self, axis: usize) -> Option<AngularRate> {
         let Angle(angle) = self.angle.get(axis).copied().flatten()?;
         if u64::from(self.covered) != PERIOD_US {
@@ -127,7 +126,6 @@ impl Increments {
     }
 
     /// Returns whether the increments reach `time`, so that [`Increments::take`] need not wait.
-    #[must_use]
     pub fn has_reached(&self, time: Micros) -> bool {
         self.last_end.is_some_and(|end| end >= time.0)
     }
@@ -172,7 +170,6 @@ impl Increments {
     }
 
     /// Returns the event counters since the start.
-    #[must_use]
     pub fn counters(&self) -> &IncrementCounters {
         &self.counters
     }

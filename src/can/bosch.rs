@@ -117,7 +117,6 @@ impl YawRateSignal {
 }
 
 /// Returns the nearest code of a lateral acceleration, and whether it fits (+-4.18 g).
-#[must_use]
 #[doc(hidden)]
 pub fn encode_acceleration(force: SpecificForce) -> (u16, SignalStatus) {
     let code = (i64::from(force.0) * AY_PER_CODE_Q32 + (1 << 31)) >> 32;
@@ -129,7 +128,6 @@ pub fn encode_acceleration(force: SpecificForce) -> (u16, SignalStatus) {
 }
 
 /// Returns the code of a temperature: whole degrees from -50, 0xC9 above 150, 0xFF if unknown.
-#[must_use]
 #[doc(hidden)]
 pub fn encode_temperature(temperature: Option<CentiCelsius>) -> u8 {
     match temperature {

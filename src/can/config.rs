@@ -49,9 +49,6 @@ impl Config {
         Self { settings: Settings { bosch: None, yaw: None, vdc2: None, ..Settings::DEFAULT } };
 
     /// Checks settings.
-    ///
-    /// # Errors
-    /// [`ConfigError`].
     pub fn new(settings: Settings) -> Result<Self, ConfigError> {
         if !BIT_RATES.contains(&settings.bits_per_second) {
             return Err(ConfigError::BitRate(settings.bits_per_second));
@@ -89,13 +86,11 @@ impl Config {
     }
 
     /// Returns the checked settings.
-    #[must_use]
     pub const fn settings(&self) -> &Settings {
         &self.settings
     }
 
     /// Returns every message that is sent, in the order of sending.
-    #[must_use]
     pub fn messages(&self) -> Vec<Periodic, MAX_MESSAGES> {
         let Settings { bosch, yaw, vdc2, status, .. } = self.settings;
         let bosch = bosch_ids(bosch).map(|id| Periodic { id: Id::Standard(id), period_ms: SAMPLE_MS });
@@ -136,25 +131,16 @@ impl Config {
     }
 
     /// Returns whether one of our messages has this identifier; no input may use such an identifier.
-    #[must_use]
     pub fn sends(&self, id: Id) -> bool {
         self.messages().iter().any(|message| message.id == id)
     }
 
     /// Returns the bus load of the messages in 1/1000, with the largest possible number of stuff bits.
-    #[must_use]
     pub fn bus_load_per_mille(&self) -> u32 {
         per_mille(&self.messages(), Periodic::worst_case_bits, self.settings.bits_per_second)
     }
 
-    /// Returns the load of the messages as SLCAN on a serial line, in 1/1000; above 1000 they do not fit.
-    #[must_use]
-    pub fn line_load_per_mille(&self, line_bits_per_second: u32, stamped: bool) -> u32 {
-        per_mille(&self.messages(), |message| message.slcan_bits(stamped), line_bits_per_second)
-    }
-
     /// Returns the number of samples for each set of our own messages.
-    #[must_use]
     pub(crate) const fn samples_per_yaw(&self) -> u8 {
         match &self.settings.yaw {
             // At most 1000 / 10.

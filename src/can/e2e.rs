@@ -72,7 +72,6 @@ pub enum Profile {
 
 impl Profile {
     /// Returns the number of bytes at the start of the data that belong to the profile.
-    #[must_use]
     pub const fn header_len(&self) -> usize {
         match self {
             Self::P01(_) | Self::P02(_) | Self::P11(_) => 2,
@@ -81,7 +80,6 @@ impl Profile {
     }
 
     /// Returns a mask of the header's bits; bit `8 * byte + bit` of the frame is the same bit of the mask.
-    #[must_use]
     pub const fn header_mask(&self) -> u64 {
         match self {
             Self::P01(P01 { mode: DataIdMode::Nibble, .. })
@@ -92,7 +90,6 @@ impl Profile {
     }
 
     /// Returns the number of counter values; 0 follows the last one.
-    #[must_use]
     pub const fn counters(&self) -> u16 {
         match self {
             Self::P01(_) | Self::P11(_) => p01::COUNTERS,
@@ -115,9 +112,6 @@ impl Profile {
     }
 
     /// Checks everything except the sequence, and returns the counter.
-    ///
-    /// # Errors
-    /// [`Fault`].
     pub fn check(&self, data: &[u8]) -> Result<u8, Fault> {
         match self {
             Self::P01(profile) => profile.check(data),
@@ -137,7 +131,6 @@ pub struct Protector {
 
 impl Protector {
     /// Creates a protector whose counter starts at 0.
-    #[must_use]
     pub const fn new(profile: Profile) -> Self {
         Self { profile, counter: 0 }
     }
@@ -163,16 +156,12 @@ pub struct Checker {
 impl Checker {
     /// Creates a checker. `max_delta` is the largest counter step that still counts as loss
     /// (1: no message may be lost).
-    #[must_use]
     pub const fn new(profile: Profile, max_delta: u8) -> Self {
         Self { profile, sequence: Sequence::new(profile.counters(), max_delta) }
     }
 
     /// Checks one message. A corrupt message does not affect the sequence, so it counts as lost when
     /// the next good message arrives.
-    ///
-    /// # Errors
-    /// [`Fault`].
     pub fn check(&mut self, data: &[u8]) -> Result<Verdict, Fault> {
         let counter = self.profile.check(data)?;
         Ok(self.sequence.check(counter))

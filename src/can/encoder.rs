@@ -24,7 +24,6 @@ pub struct CanEncoder {
 
 impl CanEncoder {
     /// Creates an encoder whose counters and residuals start at zero.
-    #[must_use]
     pub const fn new(config: Config) -> Self {
         let yaw = match config.settings().yaw {
             Some(yaw) => Some(YawEncoder::new(yaw.e2e.profiles(), config.samples_per_yaw())),
@@ -38,7 +37,6 @@ impl CanEncoder {
     }
 
     /// Returns the number of messages marked "failed" because a value was outside its signal's range.
-    #[must_use]
     pub fn out_of_range(&self) -> u32 {
         self.out_of_range
     }

@@ -21,13 +21,11 @@ pub struct FogEncoder {
 impl FogEncoder {
     /// Creates an encoder. `ids` are the identifiers (11 bits) of rate, angle and detail, by default
     /// [`super::yaw::FOG_IDS`].
-    #[must_use]
     pub const fn new(ids: [u16; 3]) -> Self {
         Self { encoder: YawEncoder::new(Self::profiles(ids), 1), ids }
     }
 
     /// Returns the E2E profile of each message.
-    #[must_use]
     pub const fn profiles([rate, angle, detail]: [u16; 3]) -> [Profile; 3] {
         const fn profile(data_id: u16) -> Profile {
             Profile::P01(P01 { data_id, mode: DataIdMode::Both })
@@ -36,7 +34,6 @@ impl FogEncoder {
     }
 
     /// Returns every message of the gyro, without those whose identifier has more than 11 bits.
-    #[must_use]
     pub fn messages(ids: [u16; 3]) -> Vec<Periodic, 3> {
         let message = |id| Periodic { id: Id::Standard(id), period_ms: SAMPLE_MS };
         ids.into_iter().filter_map(StandardId::new).map(message).collect()

@@ -33,7 +33,6 @@ const LATERAL_ZERO_Q9: i64 = 16_449_012;
 
 /// Returns the 29-bit identifier of a broadcast parameter group, for a priority of 0 to 7 and the sender's
 /// address.
-#[must_use]
 pub const fn broadcast_id(pgn: u32, priority: u8, source: u8) -> Option<ExtendedId> {
     if priority > 7 || pgn > 0x3_FFFF {
         return None;
@@ -61,7 +60,6 @@ pub struct Vdc2Length(pub usize);
 
 impl Vdc2 {
     /// Encodes the message as eight bytes.
-    #[must_use]
     pub const fn emit(&self) -> [u8; 8] {
         let [yaw0, yaw1] = self.yaw_rate.to_le_bytes();
         let [lateral0, lateral1] = self.lateral.to_le_bytes();
@@ -69,9 +67,6 @@ impl Vdc2 {
     }
 
     /// Decodes eight bytes.
-    ///
-    /// # Errors
-    /// [`Vdc2Length`].
     pub const fn parse(bytes: &[u8]) -> Result<Self, Vdc2Length> {
         let &[_, _, _, yaw0, yaw1, lateral0, lateral1, longitudinal] = bytes else {
             return Err(Vdc2Length(bytes.len()));
@@ -81,19 +76,16 @@ impl Vdc2 {
     }
 
     /// Returns the frame in a driver's own type; `None` only if that type cannot hold it.
-    #[must_use]
     pub fn frame<F: Frame>(&self, source: u8) -> Option<F> {
         F::new(broadcast_id(VDC2_PGN, VDC2_PRIORITY, source)?, &self.emit())
     }
 
     /// Returns whether a signal reports an error.
-    #[must_use]
     pub const fn has_error(&self) -> bool {
         self.yaw_rate == ERROR || self.lateral == ERROR || self.longitudinal == LONGITUDINAL_ERROR
     }
 
     /// Returns the yaw rate in rad/s; `None` if the code is not a value.
-    #[must_use]
     pub fn yaw_rate_rad_per_sec(&self) -> Option<f64> {
         (i64::from(self.yaw_rate) <= MAX_CODE).then(|| f64::from(self.yaw_rate) / 8192.0 - 3.92)
     }

@@ -1,4 +1,4 @@
-//! These functions compute the load of periodic messages on a CAN bus (worst case) and on a serial line.
+//! The load of periodic messages on a CAN bus (worst case) and on a serial line.
 
 use embedded_can::Id;
 
@@ -22,7 +22,6 @@ impl Periodic {
     /// 13 bits are never stuffed (CRC delimiter, acknowledgement, end of frame, space); in the
     /// others, of which 34 or 54 are not data, there is at most one stuff bit for every four
     /// bits after the first (Davis et al., 2007).
-    #[must_use]
     pub const fn worst_case_bits(&self) -> u32 {
         let stuffed = DATA_BITS
             + match self.id {
@@ -33,7 +32,6 @@ impl Periodic {
     }
 
     /// Returns the line bits of the same frame as an SLCAN line, with or without a time stamp.
-    #[must_use]
     pub const fn slcan_bits(&self, stamped: bool) -> u32 {
         let identifier = match self.id {
             Id::Standard(_) => 3,
@@ -46,7 +44,6 @@ impl Periodic {
 }
 
 /// Returns the load of the messages on a bus or line, in 1/1000, rounded up.
-#[must_use]
 pub fn per_mille(messages: &[Periodic], bits: impl Fn(&Periodic) -> u32, bits_per_second: u32) -> u32 {
     // Bits in 1000 s, exact for every period that divides 1,000,000 ms, rounded up for others.
     let bits: u64 = messages

@@ -26,7 +26,6 @@ impl<F, const N: usize> Default for TransmitQueue<F, N> {
 
 impl<F, const N: usize> TransmitQueue<F, N> {
     /// Creates an empty queue.
-    #[must_use]
     pub const fn new() -> Self {
         const { assert!(N > 0, "a queue holds at least one frame") };
         Self { frames: Deque::new(), dropped: 0, errors: 0 }
@@ -48,7 +47,6 @@ impl<F, const N: usize> TransmitQueue<F, N> {
     }
 
     /// Returns the oldest frame.
-    #[must_use]
     pub fn front(&self) -> Option<&F> {
         self.frames.front()
     }
@@ -96,25 +94,21 @@ impl<F, const N: usize> TransmitQueue<F, N> {
     }
 
     /// Returns the number of waiting frames.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.frames.len()
     }
 
     /// Returns whether the queue is empty.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.frames.is_empty()
     }
 
     /// Returns the number of dropped frames.
-    #[must_use]
     pub fn dropped(&self) -> u32 {
         self.dropped
     }
 
     /// Returns the number of calls of [`Self::service`] that ended with an error of the controller.
-    #[must_use]
     pub fn errors(&self) -> u32 {
         self.errors
     }
@@ -130,7 +124,6 @@ pub struct DataFrame {
 
 impl DataFrame {
     /// Converts the frame to a driver's own type; `None` if that type cannot hold the frame.
-    #[must_use]
     pub fn convert<F: Frame>(&self) -> Option<F> {
         F::new(self.id(), self.data())
     }

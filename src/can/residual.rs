@@ -33,7 +33,6 @@ pub(super) struct RoundingResidual {
 }
 
 impl RoundingResidual {
-    /// Creates one whose residual is zero.
     pub(super) const fn new(scale: Scale) -> Self {
         Self { scale, residual: 0 }
     }

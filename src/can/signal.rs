@@ -39,9 +39,6 @@ pub struct BitField {
 
 impl BitField {
     /// Creates a field from start bit and length, as in a DBC file.
-    ///
-    /// # Errors
-    /// [`OutsideFrame`].
     pub const fn new(start: u8, len: u8, order: ByteOrder, signed: bool) -> Result<Self, OutsideFrame> {
         let outside = Err(OutsideFrame { start, len });
         if start > 63 || len == 0 || len > 32 {
@@ -64,7 +61,6 @@ impl BitField {
     }
 
     /// Returns the start bit, as in a DBC file.
-    #[must_use]
     pub const fn start(&self) -> u8 {
         match self.order {
             ByteOrder::Intel => self.shift,
@@ -76,19 +72,16 @@ impl BitField {
     }
 
     /// Returns the byte order of the value.
-    #[must_use]
     pub const fn order(&self) -> ByteOrder {
         self.order
     }
 
     /// Returns whether the value is signed.
-    #[must_use]
     pub const fn is_signed(&self) -> bool {
         self.signed
     }
 
     /// Returns a mask of the value's bits; bit `8 * byte + bit` of the frame is the same bit of the mask.
-    #[must_use]
     pub const fn mask(&self) -> u64 {
         let mask = ((1 << self.len) - 1) << self.shift;
         match self.order {
@@ -98,13 +91,11 @@ impl BitField {
     }
 
     /// Returns the number of bits of the value, 1 to 32.
-    #[must_use]
     pub const fn bits(&self) -> u8 {
         self.len
     }
 
     /// Returns the raw bits, without sign extension; `None` if the frame is too short.
-    #[must_use]
     pub fn raw(&self, data: &[u8]) -> Option<u32> {
         if data.len() < usize::from(self.bytes) {
             return None;
@@ -121,7 +112,6 @@ impl BitField {
     }
 
     /// Returns the value, sign-extended if the field is signed; `None` if the frame is too short.
-    #[must_use]
     pub fn value(&self, data: &[u8]) -> Option<i64> {
         let raw = i64::from(self.raw(data)?);
         let negative = self.signed && raw >> (self.len - 1) & 1 == 1;

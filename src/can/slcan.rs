@@ -28,7 +28,6 @@ const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
 /// end.
 ///
 /// Returns `None` for a frame that is not a classic data frame (remote, or more than eight bytes).
-#[must_use]
 pub fn emit(frame: &impl Frame) -> Option<Line> {
     if frame.is_remote_frame() || frame.data().len() > 8 {
         return None;
@@ -52,7 +51,6 @@ pub fn emit(frame: &impl Frame) -> Option<Line> {
 
 /// Encodes a frame as [`emit`] does, followed by a time stamp of four hexadecimal digits: milliseconds modulo one
 /// minute. A host enables time stamps with `Z1`.
-#[must_use]
 pub fn emit_stamped(frame: &impl Frame, time: Micros) -> Option<StampedLine> {
     let line = emit(frame)?;
     let (_, frame) = line.split_last()?;

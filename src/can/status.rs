@@ -34,7 +34,6 @@ const NO_SOURCE: u8 = 7;
 const NO_DOUBT: u16 = u16::MAX;
 
 /// Encodes the message as eight bytes with an empty header.
-#[must_use]
 pub const fn emit(status: &SlowStatus) -> [u8; 8] {
     let gaps = match status.gaps {
         Some(gaps) => (gaps % NO_GAPS as u32) as u8,
@@ -71,7 +70,6 @@ pub struct StatusEncoder {
 
 impl StatusEncoder {
     /// Creates an encoder; `None` if the identifier has more than 11 bits.
-    #[must_use]
     pub const fn new(id: u16) -> Option<Self> {
         let profile = Profile::P01(P01 { data_id: id, mode: DataIdMode::Both });
         match StandardId::new(id) {

@@ -37,9 +37,6 @@ pub struct WheelReceiver {
 
 impl WheelReceiver {
     /// Checks the settings and creates a receiver.
-    ///
-    /// # Errors
-    /// [`WheelConfigError`].
     pub fn new(settings: WheelSettings) -> Result<Self, WheelConfigError> {
         let WheelSettings { timeout, still_speed, still_for, .. } = settings;
         let rule = StandstillRule { timeout, still_speed, still_for };
@@ -71,7 +68,6 @@ impl WheelReceiver {
     }
 
     /// Returns whether the newest frames marked a wheel's speed as not valid, or carried an impossible one.
-    #[must_use]
     pub fn is_invalid(&self) -> bool {
         self.invalid.contains(&true)
     }
@@ -84,7 +80,6 @@ impl WheelReceiver {
     }
 
     /// Returns the number of lost frames, from the message counters.
-    #[must_use]
     pub fn lost(&self) -> u32 {
         self.lost
     }
@@ -147,7 +142,6 @@ pub struct Wheels {
 
 impl Wheels {
     /// Creates the state before the first speed.
-    #[must_use]
     pub const fn new(rule: StandstillRule, expected: [bool; WHEELS]) -> Self {
         Self { rule, expected, speeds: [None; WHEELS], still_since: None }
     }
@@ -185,7 +179,6 @@ impl Wheels {
     }
 
     /// Returns the newest speeds, and whether the vehicle stands.
-    #[must_use]
     pub fn sample(&self, now: Micros) -> WheelSample {
         let standstill = match self.still_since {
             Some(since) if now.since(since) >= self.rule.still_for => Standstill::Still,

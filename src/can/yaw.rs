@@ -68,16 +68,12 @@ pub struct RateMessage {
 
 impl RateMessage {
     /// Encodes the message as eight bytes with an empty header.
-    #[must_use]
     pub const fn emit(&self) -> [u8; 8] {
         let [a, b, c, d] = self.rate.to_le_bytes();
         [0, 0, 0, a, b, c, d, self.source as u8 | (self.quality as u8) << 3]
     }
 
     /// Decodes the content after the header.
-    ///
-    /// # Errors
-    /// [`YawError`].
     pub const fn parse(bytes: &[u8]) -> Result<Self, YawError> {
         let &[_, _, _, a, b, c, d, judgement] = bytes else {
             return Err(YawError::Length(bytes.len()));
@@ -100,7 +96,6 @@ impl RateMessage {
     }
 
     /// Returns the rate in deg/s; `None` when it is not available.
-    #[must_use]
     pub fn deg_per_sec(&self) -> Option<f64> {
         (self.rate != RATE_NOT_AVAILABLE).then(|| f64::from(self.rate) * 1e-6)
     }
@@ -118,7 +113,6 @@ pub struct AngleMessage {
 
 impl AngleMessage {
     /// Encodes the message as eight bytes with an empty header.
-    #[must_use]
     pub const fn emit(&self) -> [u8; 8] {
         let [a, b, c, d] = self.yaw.to_le_bytes();
         [0, 0, 0, a, b, c, d, self.faults.0]
@@ -136,7 +130,6 @@ impl AngleMessage {
     }
 
     /// Returns the angle in deg, -180 to below 180.
-    #[must_use]
     pub fn deg(&self) -> f64 {
         f64::from(self.yaw) * (360.0 / 4_294_967_296.0)
     }
@@ -156,7 +149,6 @@ pub struct DetailMessage {
 
 impl DetailMessage {
     /// Encodes the message as eight bytes with an empty header.
-    #[must_use]
     pub const fn emit(&self) -> [u8; 8] {
         let [a, b] = self.correction.to_le_bytes();
         let [c, d] = self.sigma.to_le_bytes();
@@ -175,21 +167,18 @@ impl DetailMessage {
     }
 
     /// Returns the latency in ms; `None` if it is unknown.
-    #[must_use]
     pub fn latency_ms(&self) -> Option<f64> {
         (self.latency != LATENCY_UNKNOWN).then(|| f64::from(self.latency) * 0.5)
     }
 }
 
 /// Returns the nearest code of an accumulated yaw; whole turns are dropped.
-#[must_use]
 #[doc(hidden)]
 pub const fn encode_angle(yaw: Yaw) -> i32 {
     ((yaw.0 as i128 * ANGLE_PER_YAW_Q56 + (1 << 55)) >> 56) as i32
 }
 
 /// Returns the code of an expected error, rounded up, so that the error is never understated below saturation.
-#[must_use]
 #[doc(hidden)]
 pub const fn encode_sigma(sigma: Option<AngularRate>) -> u16 {
     let Some(AngularRate(sigma)) = sigma else { return SIGMA_UNKNOWN };
@@ -198,7 +187,6 @@ pub const fn encode_sigma(sigma: Option<AngularRate>) -> u16 {
 }
 
 /// Returns the code of a latency in microseconds, rounded up.
-#[must_use]
 #[doc(hidden)]
 pub const fn encode_latency(latency_us: Option<u32>) -> u8 {
     let Some(latency_us) = latency_us else { return LATENCY_UNKNOWN };

@@ -31,7 +31,6 @@ pub struct YawEncoder {
 impl YawEncoder {
     /// Creates an encoder. The profiles are those of rate, angle and detail; `every` is the number of
     /// samples per set, at least one.
-    #[must_use]
     pub const fn new([rate, angle, detail]: [Profile; 3], every: u8) -> Self {
         Self {
             protectors: [Protector::new(rate), Protector::new(angle), Protector::new(detail)],

@@ -24,7 +24,6 @@ impl Stride {
     pub const HALF: Self = Self(WINDOW as u8 / 2);
 
     /// Creates a stride; `None` outside the range, where samples would be left without an estimate.
-    #[must_use]
     pub const fn new(samples: u8) -> Option<Self> {
         if samples >= 1 && samples as usize <= WINDOW { Some(Self(samples)) } else { None }
     }
@@ -64,7 +63,6 @@ impl Lag {
     pub const MAX: Self = Self((WINDOW + DELAY as usize - 1) as u8);
 
     /// Creates a lag; `None` beyond [`Lag::MAX`], where waiting longer gains nothing.
-    #[must_use]
     pub const fn new(samples: u8) -> Option<Self> {
         if samples <= Self::MAX.0 { Some(Self(samples)) } else { None }
     }

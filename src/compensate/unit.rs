@@ -129,7 +129,6 @@ impl SlowMean {
         self.mean += beyond.checked_div(self.count).unwrap_or(0);
     }
 
-    /// Returns the mean.
     pub(super) fn get(self) -> i64 {
         self.mean >> Q
     }

@@ -44,7 +44,6 @@ pub struct QueuedCan<C: Can, const N: usize = 24> {
 
 impl<C: Can, const N: usize> QueuedCan<C, N> {
     /// Creates a bus with an empty queue.
-    #[must_use]
     pub const fn new(can: C) -> Self {
         Self { can, queue: TransmitQueue::new(), missed: 0 }
     }

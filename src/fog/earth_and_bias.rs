@@ -7,7 +7,6 @@ use crate::bias::Latitude;
 use crate::sample::{RATE_HZ, Standstill};
 use crate::units::{Angle, AngularRate};
 
-/// Fraction bits of [`Tilt`].
 const TILT_FRACTION_BITS: u32 = 30;
 
 /// Holds the angle between the gyro's axis and the vertical of the level vehicle. A tilted gyro measures a turn times
@@ -25,7 +24,6 @@ impl Tilt {
     pub const NONE: Self = Self { secant_minus_one: 0 };
 
     /// Creates a tilt of 0 to 45 degrees; `None` for anything else.
-    #[must_use]
     pub fn from_degrees(degrees: f32) -> Option<Self> {
         if !(0.0..=45.0).contains(&degrees) {
             return None;
@@ -52,7 +50,6 @@ pub struct EarthAndBias {
 
 impl EarthAndBias {
     /// Creates one before its first step.
-    #[must_use]
     pub const fn new(errors: FogErrors, tilt: Tilt, latitude: Option<Latitude>) -> Self {
         let earth = match latitude {
             Some(latitude) => Some(earth_rate(latitude)),
@@ -69,7 +66,6 @@ impl EarthAndBias {
     }
 
     /// Returns the latitude in use.
-    #[must_use]
     pub fn latitude(&self) -> Option<Latitude> {
         self.latitude
     }
@@ -92,14 +88,12 @@ impl EarthAndBias {
 
     /// Returns the expected error of the mean rate over a second, 1 sigma, while the vehicle turns at `rate` and shakes
     /// by `shake`, rad/s.
-    #[must_use]
     pub fn sigma(&self, rate: AngularRate, shake: f32) -> AngularRate {
         let sigma = self.rest.sigma(rate.0 as f32 / AngularRate::PER_RAD_PER_SEC, shake);
         AngularRate(libm::ceilf(sigma * AngularRate::PER_RAD_PER_SEC) as i32)
     }
 
     /// Returns the filter of the bias.
-    #[must_use]
     pub fn rest(&self) -> &RestReading {
         &self.rest
     }

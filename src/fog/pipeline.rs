@@ -139,7 +139,6 @@ pub struct FogPipeline {
 impl FogPipeline {
     /// Creates a pipeline before its first sample. Without a network no window is due, and the messages report that.
     /// Where a gyro is `expected`, rates are sent from time 0 on, and its silence is reported.
-    #[must_use]
     pub const fn new(config: FogConfig, has_network: bool, expected: bool) -> Self {
         Self {
             grid: FogGrid::new(expected),
@@ -187,7 +186,6 @@ impl FogPipeline {
     }
 
     /// Returns whether unit and sign of the output are known.
-    #[must_use]
     pub fn is_confirmed(&self) -> bool {
         self.is_confirmed
     }
@@ -198,13 +196,11 @@ impl FogPipeline {
     }
 
     /// Returns the rate of the newest step, whether the inertial gyro agrees or not, rad/s.
-    #[must_use]
     pub fn shown(&self) -> Option<f32> {
         self.shown
     }
 
     /// Returns the number of gaps in the accumulated yaw; `None` before it begins.
-    #[must_use]
     pub fn gaps(&self) -> Option<u32> {
         self.yaw.gaps()
     }
@@ -235,7 +231,6 @@ impl FogPipeline {
     }
 
     /// Returns whether the next 10 ms are complete, or due at `now`.
-    #[must_use]
     pub fn is_due(&self, now: Micros) -> bool {
         self.grid.is_due(now)
     }
@@ -370,7 +365,6 @@ impl FogPipeline {
     }
 
     /// Returns the event counters since the start.
-    #[must_use]
     pub fn counters(&self) -> &FogCounters {
         &self.counters
     }

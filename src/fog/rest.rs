@@ -55,7 +55,6 @@ pub enum RestOutcome {
     Refused,
 }
 
-/// A mean and its variance.
 #[derive(Debug, Clone, Copy)]
 struct Estimate {
     mean: f32,
@@ -123,7 +122,6 @@ pub struct RestReading {
 
 impl RestReading {
     /// Creates a filter before its first step, with the Earth's rate about the vertical, rad/s, where it is known.
-    #[must_use]
     pub const fn new(errors: FogErrors, earth: Option<f32>) -> Self {
         Self {
             errors,
@@ -204,14 +202,12 @@ impl RestReading {
     }
 
     /// Returns the reading at rest that is subtracted, rad/s.
-    #[must_use]
     pub fn reading(&self) -> f32 {
         self.combined().mean
     }
 
     /// Returns the expected error (1 sigma) of the mean rate over a second, rad/s, while the vehicle turns at `rate` and
     /// shakes by `shake`.
-    #[must_use]
     pub fn sigma(&self, rate: f32, shake: f32) -> f32 {
         let FogErrors { angle_walk, scale, .. } = self.errors;
         let (scaled, against) = (scale * rate, self.against());
@@ -220,19 +216,16 @@ impl RestReading {
     }
 
     /// Returns whether a standstill has been used.
-    #[must_use]
     pub fn is_measured(&self) -> bool {
         self.measured.variance < UNKNOWN * UNKNOWN / 2.0
     }
 
     /// Returns whether the wheels stand while the gyro shows a turn.
-    #[must_use]
     pub fn is_contradicted(&self) -> bool {
         self.refused
     }
 
     /// Returns whether the reading at rest proves unit and sign of the gyro's output.
-    #[must_use]
     pub fn shows_unit(&self) -> bool {
         let (earth, Estimate { mean, variance }) = (self.earth.unwrap_or(0.0), self.measured);
         let by_earth = 4.0 * sqrt(variance) + (mean - earth).abs() < 0.5 * earth.abs();

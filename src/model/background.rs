@@ -15,19 +15,16 @@ pub struct BackgroundCheck<'w> {
 impl<'w> BackgroundCheck<'w> {
     /// Creates a check that starts at the first byte of a file's content; `crc` is its checksum when the file was
     /// loaded.
-    #[must_use]
     pub fn new(content: &'w [u8], crc: u32) -> Self {
         Self { content, stored: crc, digest: CRC.digest(), at: 0 }
     }
 
     /// Returns the number of bytes that one round checks.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.content.len()
     }
 
     /// Returns whether there is nothing to check; weights are never empty.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.content.is_empty()
     }

@@ -105,9 +105,6 @@ pub struct Blob<'w> {
 
 impl<'w> Blob<'w> {
     /// Checks everything about a weight file, then gives access to it in place.
-    ///
-    /// # Errors
-    /// [`BlobError`] of the first check that fails.
     pub fn new_checked(bytes: &'w [u8]) -> Result<Self, BlobError> {
         let smallest = Shape { units: 4, linear: false };
         let mut reader = Reader::new(bytes, smallest.file_len(0));

@@ -105,14 +105,12 @@ pub struct FogNet<'w, 's> {
 
 impl<'w, 's> FogNet<'w, 's> {
     /// Creates a network over checked weights. A window in progress in that state is dropped.
-    #[must_use]
     pub fn new(blob: FogBlob<'w>, state: &'s mut FogNetState) -> Self {
         state.stage = Stage::Idle;
         Self { blob, state }
     }
 
     /// Returns the network's weights.
-    #[must_use]
     pub fn blob(&self) -> &FogBlob<'w> {
         &self.blob
     }

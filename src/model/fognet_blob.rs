@@ -115,7 +115,6 @@ pub struct FogBlob<'w> {
 }
 
 /// Returns the number of bytes of a FoGNet file with `provenance` bytes of padded text.
-#[must_use]
 pub const fn file_len(provenance: usize) -> usize {
     HEADER_LEN
         + provenance
@@ -128,9 +127,6 @@ pub const fn file_len(provenance: usize) -> usize {
 
 impl<'w> FogBlob<'w> {
     /// Checks everything about a weight file, then gives access to it in place.
-    ///
-    /// # Errors
-    /// [`BlobError`] of the first check that fails.
     pub fn new_checked(bytes: &'w [u8]) -> Result<Self, BlobError> {
         let mut reader = Reader::new(bytes, file_len(0));
         let shape = |found| (found == TOPOLOGY).then_some(());
@@ -172,14 +168,12 @@ impl<'w> FogBlob<'w> {
     }
 
     /// Returns the correction for a complete sum of [`FogBlob::fc2`], without the linear part.
-    #[must_use]
     pub fn spread(&self, sum: i32) -> Angle {
         let product = i64::from(sum) * i64::from(self.fc2.multiplier) + (1 << (CORRECTION_SHIFT - 1));
         Angle(self.offset.0.saturating_add(product >> CORRECTION_SHIFT))
     }
 
     /// Returns the mean of [`FogBlob::gains`].
-    #[must_use]
     pub fn mean_gain(&self) -> i32 {
         let sum: i64 = self.gains.iter().map(|gain| i64::from(*gain)).sum();
         // A mean of int32s fits an int32.

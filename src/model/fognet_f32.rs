@@ -67,7 +67,6 @@ fn two_layers<const I: usize, const H: usize, const W: usize>(
 
 impl FogNetF32<'_> {
     /// Runs the network over features in m/s^2, rad/s, m and rad.
-    #[must_use]
     pub fn layers(&self, window: &[[f32; INPUTS]; STEPS]) -> FogLayerOutputs {
         let normalised = window
             .map(|features| core::array::from_fn(|k| (features[k] - self.input_mean[k]) / self.input_std[k]));

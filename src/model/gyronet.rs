@@ -37,7 +37,6 @@ pub trait Memory {
     /// The arrays of this size.
     type Arrays: WindowRun;
 
-    /// Returns the arrays.
     fn arrays(&mut self) -> &mut Self::Arrays;
 }
 
@@ -228,7 +227,6 @@ pub struct GyroNet<'w, S = GyroNetState<HIDDEN>> {
 
 impl<'w> GyroNet<'w> {
     /// Creates a network over checked weights, with a state for the largest network: 27 KB.
-    #[must_use]
     pub fn new(blob: Blob<'w>) -> Self {
         Self { blob, steady_gain: steady_gain(&blob), state: GyroNetState::ZERO }
     }
@@ -260,7 +258,6 @@ impl<'w, S: Memory> GyroNet<'w, S> {
     }
 
     /// Returns the network's weights.
-    #[must_use]
     pub fn blob(&self) -> &Blob<'w> {
         &self.blob
     }

@@ -54,7 +54,6 @@ pub struct LayerOutputs {
 
 impl GyroNetF32<'_> {
     /// Runs the network over features in m/s^2 and rad/s.
-    #[must_use]
     pub fn layers(&self, window: &[[f32; FEATURES]; WINDOW]) -> LayerOutputs {
         let normalised = window
             .map(|features| core::array::from_fn(|k| (features[k] - self.input_mean[k]) / self.input_std[k]));

@@ -156,7 +156,6 @@ impl Minute {
     }
 
     /// Returns the window that ends with the newest second; `None` without a second.
-    #[must_use]
     pub fn window(&self) -> Option<SecondsWindow<'_>> {
         (self.seconds.len() > 0).then_some(SecondsWindow { seconds: &self.seconds })
     }
@@ -171,7 +170,6 @@ pub struct SecondsWindow<'m> {
 
 impl<'m> SecondsWindow<'m> {
     /// Returns whether the window has a whole minute, and repeats no second.
-    #[must_use]
     pub const fn is_whole(&self) -> bool {
         self.seconds.len() == STEPS
     }

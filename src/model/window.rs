@@ -12,7 +12,6 @@ pub const FEATURES: usize = 6;
 pub type Features = [i32; FEATURES];
 
 /// Returns the features of a sample; `rates` is its angular rate less the static bias.
-#[must_use]
 pub fn features([fx, fy, fz]: [SpecificForce; 3], [x, y, z]: [AngularRate; 3]) -> Features {
     [fx.0, fy.0, fz.0, x.0, y.0, z.0]
 }
@@ -54,7 +53,6 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         self.filled = (self.filled + 1).min(N);
     }
 
-    /// Returns the number of elements.
     pub(super) const fn len(&self) -> usize {
         self.filled
     }
@@ -66,7 +64,6 @@ impl<T: Copy, const N: usize> Ring<T, N> {
     }
 
     /// Returns the elements, oldest first; `None` until the ring is full.
-    #[must_use]
     pub fn snapshot(&self) -> Option<[T; N]> {
         (self.filled == N).then(|| core::array::from_fn(|number| self.places[(self.next + number) % N]))
     }
@@ -141,7 +138,6 @@ impl SteadyGain {
     }
 
     /// Returns the correction of a sample with these rates.
-    #[must_use]
     pub fn correction(&self, rates: [AngularRate; 3]) -> AngularRate {
         AngularRate(Linear::output(&self.0, &rates.map(|rate| rate.0)))
     }

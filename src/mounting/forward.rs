@@ -38,7 +38,6 @@ pub struct Forward {
 impl Forward {
     /// Returns the angle from the x axis of a mounting to this direction, to the left, rad: 0 where the mounting is
     /// right. `rest` is the specific force at rest, in the sensor's axes.
-    #[must_use]
     pub fn yaw(&self, mounting: &Rotation, rest: [SpecificForce; 3]) -> f32 {
         let level = Rotation::levelling(mounting.force(rest)).map_or(Rotation::IDENTITY, |(level, _)| level);
         // A unit vector is within the range of the code.
@@ -48,7 +47,6 @@ impl Forward {
     }
 
     /// Returns the angle to another direction, rad, and its sigma.
-    #[must_use]
     pub fn angle_to(&self, other: &Self) -> [f32; 2] {
         let sine = cross(&self.direction, &other.direction);
         let angle = libm::atan2f(sqrt(dot(&sine, &sine)), dot(&self.direction, &other.direction));
@@ -56,7 +54,6 @@ impl Forward {
     }
 
     /// Returns whether the direction is a unit vector and the sigma is not negative.
-    #[must_use]
     pub fn is_plausible(&self) -> bool {
         libm::fabsf(dot(&self.direction, &self.direction) - 1.0) < 0.01 && self.sigma >= 0.0
     }
@@ -150,7 +147,6 @@ impl ForwardEstimator {
 
     /// Returns the direction; `None` before the vehicle has driven for long enough, and where the accelerations of
     /// sensor and wheels do not match.
-    #[must_use]
     pub fn forward(&self) -> Option<Forward> {
         let length = sqrt(dot(&self.turned, &self.turned));
         let gain = length / self.motion;

@@ -55,7 +55,6 @@ impl Vertical {
     pub const UNKNOWN: Self = Self { sum: [0.0; 3], information: 0.0 };
 
     /// Adds a direction, a unit vector, with its variance in rad^2.
-    #[must_use]
     fn with(&self, direction: &[f32; 3], variance: f32) -> Self {
         let weight = 1.0 / variance;
         let information = self.information + weight;
@@ -73,7 +72,6 @@ impl Vertical {
     }
 
     /// Returns the direction that points up if the sensor is tilted.
-    #[must_use]
     pub fn up(&self) -> [f32; 3] {
         let (sum, tilt) = self.deviation();
         let [x, y, z] = sum.map(|axis| axis / (self.information + 1.0 / tilt));
@@ -83,14 +81,12 @@ impl Vertical {
     }
 
     /// Returns the sigma of that direction in each axis, rad.
-    #[must_use]
     pub fn sigma(&self) -> f32 {
         let (_, tilt) = self.deviation();
         sqrt(1.0 / (self.information + 1.0 / tilt))
     }
 
     /// Returns whether it differs notably from an earlier one: it is twice as certain, or 1 degree off.
-    #[must_use]
     pub fn differs(&self, before: &Self) -> bool {
         self.information > 2.0 * before.information || dot(&self.up(), &before.up()) < 0.999_85
     }
@@ -107,13 +103,11 @@ impl Vertical {
     }
 
     /// Returns the same vertical in other axes.
-    #[must_use]
     pub fn turned(&self, rotation: &Rotation) -> Self {
         Self { sum: rotation.vector(&self.sum), ..*self }
     }
 
     /// How well it is known.
-    #[must_use]
     pub fn knowledge(&self) -> Knowledge {
         match self.information {
             0.0 => Knowledge::Unknown,
@@ -123,7 +117,6 @@ impl Vertical {
     }
 
     /// Returns roll and pitch of the mounting that turns this direction up, and their sigma, deg.
-    #[must_use]
     pub fn tilt_deg(&self) -> [f32; 3] {
         let [x, y, z] = self.up();
         let pitch = libm::atan2f(-x, sqrt(y * y + z * z));
@@ -131,7 +124,6 @@ impl Vertical {
     }
 
     /// Returns whether it is a mean of unit vectors.
-    #[must_use]
     pub fn is_plausible(&self) -> bool {
         (0.0..=1.01 * MOST).contains(&self.information)
             && dot(&self.sum, &self.sum) <= 1.01 * self.information * self.information
@@ -165,7 +157,6 @@ pub struct VerticalEstimator {
 
 impl VerticalEstimator {
     /// Starts with what is known.
-    #[must_use]
     pub const fn new(known: Vertical) -> Self {
         Self {
             known,
@@ -236,7 +227,6 @@ impl VerticalEstimator {
     }
 
     /// Returns the vertical with the turn that goes on.
-    #[must_use]
     pub fn now(&self) -> Vertical {
         let yaw = dot(&self.turn, &self.known.up());
         if libm::fabsf(yaw) < LEAST_TURN {
@@ -248,7 +238,6 @@ impl VerticalEstimator {
     }
 
     /// Returns the standstills and turns that are complete.
-    #[must_use]
     pub fn known(&self) -> &Vertical {
         &self.known
     }

@@ -37,14 +37,12 @@ pub static TANH: [i32; TANH_LEN] = table(true, TANH_SHIFT, TANH_FRACTION_SCALE);
 
 /// Clamps a gate input to the tables' range, +-8 in Q14.
 #[inline]
-#[must_use]
 pub fn saturate(x: i32) -> i32 {
     x.clamp(INPUT_MIN, INPUT_MAX)
 }
 
 /// Returns the sigmoid of a saturated Q14 input. The upper half of the result is Q15.
 #[inline]
-#[must_use]
 pub fn sigmoid(x: i32) -> i32 {
     let entry = SIGMOID[((x >> SIGMOID_SHIFT) + SIGMOID_LEN as i32 / 2) as usize & (SIGMOID_LEN - 1)];
     let fraction = x & ((1 << SIGMOID_SHIFT) - 1);
@@ -53,7 +51,6 @@ pub fn sigmoid(x: i32) -> i32 {
 
 /// Returns the hyperbolic tangent of a saturated Q14 input. The upper half of the result is Q15.
 #[inline]
-#[must_use]
 pub fn tanh(x: i32) -> i32 {
     let entry = TANH[((x >> TANH_SHIFT) + TANH_LEN as i32 / 2) as usize & (TANH_LEN - 1)];
     let fraction = (x & ((1 << TANH_SHIFT) - 1)) << TANH_FRACTION_SCALE;

@@ -36,7 +36,6 @@ pub struct Pass {
 
 impl Pass {
     /// Creates the state before the first step.
-    #[must_use]
     pub const fn new(direction: Direction) -> Self {
         Self { direction, done: 0 }
     }
@@ -128,7 +127,6 @@ impl Pass {
 
 /// Returns the index of word `column / 2` of `step` in a sequence of `columns` values a step.
 #[inline]
-#[must_use]
 pub const fn word_index(step: usize, column: usize, columns: usize) -> usize {
     (step / 2) * columns + (column / 2) * 2 + step % 2
 }
@@ -158,7 +156,6 @@ pub struct Run {
 
 impl Run {
     /// Creates the state before the first step.
-    #[must_use]
     pub const fn new() -> Self {
         Self { stage: 0, pass: Pass::new(Direction::Forward) }
     }

@@ -21,7 +21,6 @@ impl Dense<'_> {
     ///
     /// `hidden` holds two units a word. The sum stays inside 32 bits: [`crate::model::Blob`] proves it for the
     /// weights in use.
-    #[must_use]
     pub fn partial(weights: &[i16], hidden: &[u32]) -> i32 {
         // Halfwords, as the processor's multiply-accumulate reads them: no unpacking.
         let hidden: &[i16] = bytemuck::must_cast_slice(hidden);
@@ -29,7 +28,6 @@ impl Dense<'_> {
     }
 
     /// Returns the scaled output of a complete sum (bias included), rounded to nearest, saturated.
-    #[must_use]
     pub fn scale(&self, sum: i32) -> i32 {
         let product = i64::from(sum) * i64::from(self.multiplier) + (1 << (Self::SHIFT - 1));
         (product >> Self::SHIFT).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32

@@ -9,7 +9,6 @@ pub const FRACTION_BITS: u32 = 16;
 const CUBIC: [u32; 3] = [45_575, 14_831, 5_130];
 
 /// Returns `unit * 2^exponent` for an exponent in Q16, rounded down, saturated to 2^31 - 1.
-#[must_use]
 pub fn times_exp2(unit: u32, exponent: i32) -> i32 {
     let fraction = exponent as u32 & ((1 << FRACTION_BITS) - 1);
     // Every partial sum is at most 1.0: 17 bits, times 16.

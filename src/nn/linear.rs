@@ -33,7 +33,6 @@ impl<'w> Linear<'w> {
     }
 
     /// Returns a row's output, rounded to nearest and saturated.
-    #[must_use]
     pub fn output(row: &[i32], inputs: &[i32]) -> i32 {
         let start = 1 << (Self::FRACTION_BITS - 1);
         // The magnitude is at most (2^32 - 1) 2^31 plus one half, which is below 2^63.

@@ -34,26 +34,22 @@ pub struct DirectionWeights<'w> {
 
 impl<'w> DirectionWeights<'w> {
     /// Returns the number of words of the input records.
-    #[must_use]
     pub const fn input_words(units: usize, inputs: usize) -> usize {
         units * (BIAS_WORDS + inputs)
     }
 
     /// Returns the number of words of the recurrent records.
-    #[must_use]
     pub const fn recurrent_words(units: usize) -> usize {
         units * (Self::padded(units) + MULTIPLIER_WORDS)
     }
 
     /// Returns the number of columns of a recurrent record: the units, rounded up to a multiple of four.
-    #[must_use]
     pub const fn padded(units: usize) -> usize {
         units.next_multiple_of(4)
     }
 
     /// Creates a direction over records in the layout of a weight file; `None` unless `units` and `inputs` are even
     /// and not zero, `inputs` at most [`MAX_INPUTS`], and the lengths fit them.
-    #[must_use]
     pub const fn new(units: usize, inputs: usize, input: &'w [u32], recurrent: &'w [u32]) -> Option<Self> {
         let even = units.is_multiple_of(2) && inputs.is_multiple_of(2) && units > 0 && inputs > 0;
         if even
@@ -68,32 +64,27 @@ impl<'w> DirectionWeights<'w> {
     }
 
     /// Returns the number of hidden units.
-    #[must_use]
     pub const fn units(&self) -> usize {
         self.units
     }
 
     /// Returns whether arrays for `room` units fit the direction: it has `room` units, or fewer in whole groups of
     /// four, because the hidden state is read in such groups.
-    #[must_use]
     pub const fn fits(&self, room: usize) -> bool {
         self.units == room || self.units < room && self.units.is_multiple_of(4)
     }
 
     /// Returns the number of input columns.
-    #[must_use]
     pub const fn inputs(&self) -> usize {
         self.inputs
     }
 
     /// Returns all input records.
-    #[must_use]
     pub const fn input(&self) -> &'w [u32] {
         self.input
     }
 
     /// Returns all recurrent records.
-    #[must_use]
     pub const fn recurrent(&self) -> &'w [u32] {
         self.recurrent
     }
@@ -102,7 +93,6 @@ impl<'w> DirectionWeights<'w> {
     /// earlier call must have done so. Records that do not fit are read in place.
     ///
     /// A step reads every record once. In memory without wait states the copy pays for itself in two or three steps.
-    #[must_use]
     pub fn through<'a>(&self, room: &'a mut [u32], load: bool) -> DirectionWeights<'a>
     where
         'w: 'a,
@@ -275,7 +265,6 @@ fn scale(value: i32, factor: i32) -> i32 {
     ((i64::from(value) * i64::from(factor)) >> 16) as i32
 }
 
-/// Returns the upper half of a word.
 #[inline]
 fn upper(word: i32) -> i32 {
     word >> 16
@@ -283,7 +272,6 @@ fn upper(word: i32) -> i32 {
 
 /// Returns the largest magnitude that the accumulators of one unit can reach, for inputs up to `input_max` and any
 /// hidden state: rows i, f, g, o.
-#[must_use]
 pub fn row_bound(weights: &DirectionWeights<'_>, unit: usize, input_max: i32) -> [i64; GATES] {
     let mut bound = [0i64; GATES];
     let records = weights.input_records().nth(unit).zip(weights.recurrent_records().nth(unit));

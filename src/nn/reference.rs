@@ -20,7 +20,6 @@ pub struct LstmWeights<'w> {
 
 impl LstmWeights<'_> {
     /// Returns the number of hidden units.
-    #[must_use]
     pub const fn units(&self) -> usize {
         self.bias_ih.len() / GATES
     }
@@ -70,13 +69,11 @@ fn step(weights: &LstmWeights<'_>, x: &[f32], h: &[f32], s: &mut [f32], next: &m
 }
 
 /// Computes a fully-connected layer of one output: `weight` (I) and `bias` over `x` (I).
-#[must_use]
 pub fn dense(weight: &[f32], bias: f32, x: &[f32]) -> f32 {
     weight.iter().zip(x).fold(bias, |sum, (w, x)| sum + w * x)
 }
 
 /// Returns the logistic function, 1 / (1 + e^-x).
-#[must_use]
 pub fn sigmoid(x: f32) -> f32 {
     1.0 / (1.0 + libm::expf(-x))
 }

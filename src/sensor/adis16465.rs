@@ -11,7 +11,6 @@ use crate::sample::ImuSample;
 use crate::units::Micros;
 use embedded_hal::spi::{Operation, SpiDevice};
 
-/// Command that requests a burst.
 const BURST_COMMAND: [u8; 2] = [0x68, 0x00];
 
 /// The error of a read.
@@ -39,7 +38,6 @@ pub struct Adis16465<SPI> {
 
 impl<SPI: SpiDevice> Adis16465<SPI> {
     /// Creates a driver for the sensor with its factory settings. Wait 300 ms after power-up before the first read.
-    #[must_use]
     pub const fn new(spi: SPI, model: Model) -> Self {
         Self { spi, model, last_counter: None, lost: 0 }
     }
@@ -50,9 +48,6 @@ impl<SPI: SpiDevice> Adis16465<SPI> {
     }
 
     /// Reads the newest values. The burst carries no time stamp: `now` is the time of the data-ready signal.
-    ///
-    /// # Errors
-    /// [`AdisError`].
     pub fn read(&mut self, now: Micros) -> Result<ImuSample, AdisError<SPI::Error>> {
         let mut bytes = [0; BURST];
         let mut burst = [Operation::Write(&BURST_COMMAND), Operation::Read(&mut bytes)];
@@ -69,7 +64,6 @@ impl<SPI: SpiDevice> Adis16465<SPI> {
 
     /// Returns the number of readings that were not fetched. At 2000 readings and 100 reads a second, it grows by 19
     /// per read.
-    #[must_use]
     pub fn lost(&self) -> u32 {
         self.lost
     }

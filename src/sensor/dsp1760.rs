@@ -73,7 +73,6 @@ pub struct Dsp1760 {
 
 impl Dsp1760 {
     /// Creates a parser that has received nothing.
-    #[must_use]
     pub const fn new(config: Dsp1760Config) -> Self {
         Self {
             config,
@@ -122,13 +121,11 @@ impl Dsp1760 {
     }
 
     /// Returns the number of frame candidates with a wrong checksum.
-    #[must_use]
     pub fn bad_checksums(&self) -> u32 {
         self.framer.bad_checksums()
     }
 
     /// Returns the event counters since the start.
-    #[must_use]
     pub fn counters(&self) -> &Dsp1760Counters {
         &self.counters
     }

@@ -35,7 +35,6 @@ pub struct Framer<P, const N: usize> {
 
 impl<P: Protocol, const N: usize> Framer<P, N> {
     /// Creates a framer that has received nothing.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             buffer: Vec::new(),
@@ -88,19 +87,16 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
     /// Returns whether [`Framer::next_frame`] has nothing to return until more bytes arrive. A caller that checks
     /// this first spends only a few instructions on most bytes.
     #[inline]
-    #[must_use]
     pub fn is_waiting(&self) -> bool {
         self.buffer.len() < self.needed
     }
 
     /// Returns the number of candidates with a wrong checksum.
-    #[must_use]
     pub fn bad_checksums(&self) -> u32 {
         self.bad_checksums
     }
 
     /// Returns the number of skipped bytes, which belonged to no intact frame.
-    #[must_use]
     pub fn skipped(&self) -> u32 {
         self.skipped
     }

@@ -33,7 +33,6 @@ pub struct Serial<PORT, PART> {
 
 impl<PORT, PART> Serial<PORT, PART> {
     /// Creates a source from a port and the parser of a configured sensor.
-    #[must_use]
     pub const fn new(port: PORT, part: PART) -> Self {
         Self { port, part }
     }

@@ -54,7 +54,6 @@ impl Protocol for Xbus {
 
 impl Xbus {
     /// Returns the message identifier and the data of an intact frame.
-    #[must_use]
     pub fn parse(frame: &[u8]) -> Option<(u8, &[u8])> {
         match frame {
             [PREAMBLE, BUS_ID, mid, len, data @ .., _] if usize::from(*len) == data.len() => {
@@ -75,7 +74,6 @@ pub struct Mti {
 
 impl Mti {
     /// Creates a parser that has received nothing.
-    #[must_use]
     pub const fn new() -> Self {
         Self { framer: Framer::new(), stamps: StampClock::START }
     }
@@ -111,7 +109,6 @@ impl Mti {
     }
 
     /// Returns the number of frame candidates with a wrong checksum.
-    #[must_use]
     pub fn bad_checksums(&self) -> u32 {
         self.framer.bad_checksums()
     }

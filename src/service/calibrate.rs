@@ -70,13 +70,11 @@ pub(crate) struct Calibrator {
 
 impl Calibrator {
     /// Starts a calibration.
-    #[must_use]
     pub fn new(task: Task, limits: StaticConfig) -> Self {
         Self { task, still: StaticInit::new(limits) }
     }
 
     /// Returns the kind of calibration.
-    #[must_use]
     pub const fn task(&self) -> Task {
         self.task
     }

@@ -45,7 +45,6 @@ pub struct Crash {
 
 impl Crash {
     /// Returns the end of the source file's path.
-    #[must_use]
     pub fn file(&self) -> &str {
         let text = core::str::from_utf8(&self.file).unwrap_or_default();
         text.trim_end_matches('\0')

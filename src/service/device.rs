@@ -97,7 +97,6 @@ pub struct Device<R: NorFlash, W> {
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// Creates a device with built-in values, for use before [`Device::begin`]. The function is `const`, so that a
     /// `static` can hold the device.
-    #[must_use]
     pub const fn new(supported: &'static SupportedHardware) -> Self {
         Self {
             store: None,
@@ -142,31 +141,26 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Returns the configuration in use.
-    #[must_use]
     pub fn configuration(&self) -> &Configuration {
         &self.configuration
     }
 
     /// Returns the configuration that the next start will use.
-    #[must_use]
     pub fn next_configuration(&self) -> &Configuration {
         &self.next_configuration
     }
 
     /// Returns the settings of the wheel frames in use.
-    #[must_use]
     pub fn wheels(&self) -> &WheelSettings {
         &self.wheels
     }
 
     /// Returns the calibration.
-    #[must_use]
     pub fn calibration(&self) -> &Calibration {
         &self.calibration
     }
 
     /// Returns what the board has learnt about its sensor.
-    #[must_use]
     pub fn learned(&self) -> &Learned {
         &self.learned
     }
@@ -179,13 +173,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     /// Returns the forward direction in the configured axes, as an angle to the left of x, and its sigma, deg. The
     /// angle is 0 if the configured mounting is correct.
-    #[must_use]
     pub fn forward_deg(&self) -> Option<[f32; 2]> {
         self.learned.yaw_deg(&self.configuration.mounting.rotation()?)
     }
 
     /// How well drives have shown the forward direction.
-    #[must_use]
     pub fn forward_knowledge(&self) -> Knowledge {
         let mounting = self.configuration.mounting.rotation();
         mounting.map_or(Knowledge::Unknown, |mounting| self.learned.forward_knowledge(&mounting))
@@ -240,7 +232,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     /// Returns how well the vertical is known; roll and pitch of the sensor in the configured axes, and their sigma,
     /// deg.
-    #[must_use]
     pub fn level_deg(&self) -> (Knowledge, [f32; 3]) {
         let mounting = self.configuration.mounting.rotation().unwrap_or(Rotation::IDENTITY);
         let vertical = self.learned.vertical.turned(&mounting);
@@ -285,7 +276,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Returns the reason why the last request was refused; `None` if it was executed.
-    #[must_use]
     pub fn refusal(&self) -> Option<Refusal> {
         self.refusal
     }
@@ -298,19 +288,16 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Returns the serial number of the board.
-    #[must_use]
     pub fn serial(&self) -> &[u8; 12] {
         &self.identity.serial
     }
 
     /// Returns the access record: the key, and the counters stored with it; `None` if it could not be read.
-    #[must_use]
     pub fn access(&self) -> Option<Access> {
         self.access
     }
 
     /// Returns the counters of requests that were refused for lack of access.
-    #[must_use]
     pub fn access_counters(&self) -> AccessCounters {
         self.access_counters
     }
@@ -321,20 +308,17 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Returns a page of the events after number `after`; 0 for all.
-    #[must_use]
     pub fn events(&self, after: u32) -> LogPage {
         self.log.page(after)
     }
 
     /// Returns the slot and the checksum of the uploaded file, once the file has been checked.
-    #[must_use]
     pub fn uploaded(&self) -> Option<(Slot, u32)> {
         let Uploading { upload, checked } = self.uploading?;
         Some((upload.slot(), checked?.crc))
     }
 
     /// Returns the newest report of the wheels, and whether the vehicle is proven to stand.
-    #[must_use]
     pub fn standing(&self) -> (&WheelSample, bool) {
         (&self.wheels_seen, self.may_interrupt)
     }
@@ -367,7 +351,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Returns the board's identity and state.
-    #[must_use]
     pub fn info(&self) -> Info {
         Info {
             protocol: PROTOCOL,
@@ -402,7 +385,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Returns the progress of the calibration.
-    #[must_use]
     pub fn calibration_state(&self) -> State {
         self.calibration_state
     }

@@ -151,7 +151,6 @@ pub(crate) struct EventLog {
 
 impl EventLog {
     /// Creates an empty log.
-    #[must_use]
     pub const fn new() -> Self {
         Self { events: Deque::new(), total: 0 }
     }
@@ -170,7 +169,6 @@ impl EventLog {
     }
 
     /// Returns a page of the events after number `after`.
-    #[must_use]
     pub fn page(&self, after: u32) -> LogPage {
         let oldest = self.events.front().map_or(1, |event| event.number);
         let mut events = Vec::new();

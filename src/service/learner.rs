@@ -41,7 +41,6 @@ pub struct Learner {
 
 impl Learner {
     /// Creates a learner without observations.
-    #[must_use]
     pub const fn new() -> Self {
         let forward = ForwardEstimator::START;
         Self {

@@ -76,7 +76,6 @@ pub enum Refusal {
 
 impl Refusal {
     /// Returns whether the request was refused for lack of access: no valid proof or signature.
-    #[must_use]
     pub const fn is_access_denied(&self) -> bool {
         matches!(self, Self::Locked | Self::Unsigned | Self::Answer | Self::Signature | Self::Counter { .. })
     }

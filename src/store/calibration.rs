@@ -18,7 +18,6 @@ pub struct Level {
 
 impl Level {
     /// Returns the rotation from the configured frame to the vehicle's; `None` if an angle is not finite.
-    #[must_use]
     pub fn rotation(&self) -> Option<Rotation> {
         Rotation::from_mounting(self.roll_deg, self.pitch_deg, 0.0)
     }
@@ -50,7 +49,6 @@ impl Calibration {
 
     /// Returns the map for a board that runs these weights; `None` if no map is stored, or only one for other
     /// weights.
-    #[must_use]
     pub fn gyro_map(&self, weights: u32) -> Option<GyroMap> {
         self.unit.filter(|unit| unit.weights == weights).map(|unit| unit.gyro_map)
     }

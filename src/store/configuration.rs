@@ -53,7 +53,6 @@ pub struct Mounting {
 
 impl Mounting {
     /// Returns the rotation from the sensor's axes to the vehicle's; `None` if an angle is not finite.
-    #[must_use]
     pub fn rotation(&self) -> Option<Rotation> {
         Rotation::from_mounting(self.roll_deg, self.pitch_deg, self.yaw_deg)
     }
@@ -123,7 +122,6 @@ impl Configuration {
     /// Returns the pipeline's configuration, from this one, a calibration and what the board has learnt. If the
     /// calibration has a level, it is applied after the mounting, and no other levelling is done. The map of the gyro
     /// is used only with the weights it was determined with.
-    #[must_use]
     pub fn pipeline(&self, calibration: &Calibration, learned: &Learned, weights: u32) -> PipelineConfig {
         // The angles are finite: they have been checked.
         let mounting = self.mounting.rotation().unwrap_or(Rotation::IDENTITY);
@@ -187,7 +185,6 @@ impl Configuration {
 
     /// Returns the configuration of a coprocessor that runs the weights with this checksum. The board adds the
     /// wheels, the clock, the networks, and whether damage was found at the start.
-    #[must_use]
     pub fn coprocessor(
         &self,
         calibration: &Calibration,

@@ -44,7 +44,6 @@ pub const SLOT_SIZE: usize = 128 << 10;
 pub const SLOTS: Range<u32> = FIRMWARE_A.end..0x10_0000;
 
 /// Returns the number of the sector that begins at `offset`; `None` if none does.
-#[must_use]
 pub fn sector_at(offset: u32) -> Option<u8> {
     let mut start = 0;
     for (number, size) in (0u8..).zip(SECTORS) {
@@ -57,7 +56,6 @@ pub fn sector_at(offset: u32) -> Option<u8> {
 }
 
 /// Returns the range of the sector that begins at `offset`; `None` if none does.
-#[must_use]
 pub fn sector(offset: u32) -> Option<Range<u32>> {
     let size = SECTORS.get(usize::from(sector_at(offset)?))?;
     Some(offset..offset + size)

@@ -41,7 +41,6 @@ const FEW: u32 = 8;
 const LOST: u8 = 0;
 /// Number of records of access.
 const ACCESS_COPIES: u32 = 2;
-/// Highest key of a [`Record`].
 const MAX_KEY: u8 = 7;
 /// Key of the mark that there is a record of access, and of the sector's generation.
 const HAS_ACCESS: u8 = 8;
@@ -194,7 +193,6 @@ impl<F: NorFlash> Store<F> {
 
     /// Returns whether a damaged record or sector header was found, because of a power cut or flipped bits. The
     /// previous record is then used.
-    #[must_use]
     pub fn damaged(&self) -> bool {
         self.seen.damaged || self.header_damaged
     }
@@ -223,7 +221,6 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Returns whether the next record of any length fits without an erase.
-    #[must_use]
     pub fn has_room(&self) -> bool {
         self.room() >= BUFFER as u32
     }

@@ -167,7 +167,6 @@ pub struct Selection<'w> {
 }
 
 /// Selects the first weights that pass all checks, and of which a window takes no more than the `available` cycles.
-#[must_use]
 pub fn select<'w>(
     accepted: &Accepted,
     slots: [&'w [u8]; 2],

@@ -70,13 +70,11 @@ impl Upload {
     }
 
     /// Returns the slot of the file.
-    #[must_use]
     pub const fn slot(&self) -> Slot {
         self.slot
     }
 
     /// Returns the number of bytes written.
-    #[must_use]
     pub const fn written(&self) -> u32 {
         self.written
     }

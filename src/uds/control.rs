@@ -93,7 +93,6 @@ impl Services {
         Ok(())
     }
 
-    /// Clears one trouble, or all.
     pub(super) fn clear_troubles<R: NorFlash, W: MappedSlots>(
         &mut self,
         rest: &[u8],

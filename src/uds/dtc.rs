@@ -46,7 +46,6 @@ pub struct Trouble {
 
 impl Trouble {
     /// Returns the code as a workshop reads it (SAE J2012-DA), such as `C1A01-31`.
-    #[must_use]
     pub fn display(&self) -> impl core::fmt::Display {
         let system = ['P', 'C', 'B', 'U'][(self.code >> 22 & 3) as usize];
         let (code, failure) = (self.code >> 8 & 0x3FFF, self.code as u8);
@@ -208,7 +207,6 @@ pub struct Memory {
 
 impl Memory {
     /// Creates an empty memory.
-    #[must_use]
     pub const fn new() -> Self {
         Self { entries: [UNTESTED; TROUBLES.len()], is_enabled: true, is_changed: false }
     }
@@ -272,7 +270,6 @@ impl Memory {
     }
 
     /// Returns the confirmed troubles, which must be stored.
-    #[must_use]
     pub fn confirmed(&self) -> Troubles {
         let mut troubles = Troubles::NONE;
         for (trouble, entry) in self.entries().filter(|(_, entry)| entry.status & bit::CONFIRMED != 0) {

@@ -105,26 +105,22 @@ const OVERFLOW: u8 = 0x32;
 
 impl Transport {
     /// Creates an idle transport.
-    #[must_use]
     pub const fn new() -> Self {
         let errors = TransportErrors { unexpected: 0, sequence: 0, overflow: 0, timeout: 0 };
         Self { state: State::Idle, request: Vec::new(), response: Vec::new(), urgent: None, errors }
     }
 
     /// Returns the counters of failed transfers.
-    #[must_use]
     pub fn errors(&self) -> TransportErrors {
         self.errors
     }
 
     /// Returns the request once it is complete, until it is answered.
-    #[must_use]
     pub fn request(&self) -> Option<&[u8]> {
         (self.state == State::Received).then_some(&*self.request)
     }
 
     /// Returns whether no exchange is in progress.
-    #[must_use]
     pub fn is_idle(&self) -> bool {
         self.state == State::Idle && self.urgent.is_none()
     }

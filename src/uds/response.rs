@@ -10,10 +10,8 @@ use heapless::Vec;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// A response that is being written.
 pub(super) type Response = Vec<u8, MAX_MESSAGE>;
 
-/// Appends bytes to a response.
 pub(super) fn put(out: &mut Response, bytes: &[u8]) -> Result<(), Nrc> {
     out.extend_from_slice(bytes).map_err(|_| Nrc::ResponseTooLong)
 }

@@ -33,7 +33,6 @@ impl Default for Server {
 
 impl Server {
     /// Creates a server in the default session.
-    #[must_use]
     pub const fn new() -> Self {
         let services = Services::new();
         Self { transport: Transport::new(), services, is_pending: false, has_stalled: false }
@@ -46,7 +45,6 @@ impl Server {
     }
 
     /// Returns whether a tester has a session other than the default one.
-    #[must_use]
     pub fn has_session(&self) -> bool {
         self.services.has_session()
     }
@@ -86,19 +84,16 @@ impl Server {
     }
 
     /// Returns whether nothing is being received, answered or sent.
-    #[must_use]
     pub fn is_idle(&self) -> bool {
         self.transport.is_idle()
     }
 
     /// Returns whether a tester has stopped the messages of the board.
-    #[must_use]
     pub fn is_silenced(&self) -> bool {
         self.services.is_silenced
     }
 
     /// Returns whether a tester has requested a restart and its response has been sent.
-    #[must_use]
     pub fn restart_is_due(&self) -> bool {
         self.services.is_restarting && self.is_idle()
     }

@@ -53,7 +53,6 @@ impl core::fmt::Debug for Hasher {
 
 impl Hasher {
     /// Creates the hash of an empty content.
-    #[must_use]
     pub fn new() -> Self {
         Self { hash: Sha512::new(), length: 0 }
     }
@@ -74,7 +73,6 @@ impl Hasher {
 }
 
 /// Returns the digest of a content.
-#[must_use]
 #[inline(never)]
 pub fn digest(content: &[u8]) -> Digest {
     let mut hasher = Hasher::new();
@@ -94,7 +92,6 @@ pub struct Statement {
 }
 
 /// Returns the bytes that are signed for a content.
-#[must_use]
 pub fn message(statement: &Statement, digest: &Digest) -> [u8; CONTENT_MESSAGE] {
     joined([
         &CONTENT,
@@ -107,7 +104,6 @@ pub fn message(statement: &Statement, digest: &Digest) -> [u8; CONTENT_MESSAGE] 
 }
 
 /// Returns the bytes that are signed to answer a challenge of a board.
-#[must_use]
 pub fn challenge(serial: &[u8; SERIAL], seed: &[u8; SEED]) -> [u8; ACCESS_MESSAGE] {
     joined([&ACCESS, serial, seed])
 }
@@ -121,7 +117,6 @@ fn joined<const N: usize, const PARTS: usize>(parts: [&[u8]; PARTS]) -> [u8; N] 
 /// Returns whether a signature of a message is valid for a public key (RFC 8032 5.1.7, without the cofactor). S must
 /// be below the group's order, so that a signature is not malleable. All inputs are public, so the function need not
 /// run in constant time.
-#[must_use]
 #[inline(never)]
 pub fn is_valid(key: &[u8; KEY], message: &[u8], signature: &[u8; SIGNATURE]) -> bool {
     let Some((r, s)) = signature.split_first_chunk::<32>() else { return false };
@@ -160,7 +155,6 @@ fn sum_of_products(s: &[u8; 32], k: &[u8; 32], point: &EdwardsPoint) -> [u8; 32]
 
 /// Returns whether bytes are a public key: a point of the curve that is not one of the eight of low order, for which
 /// anyone can sign.
-#[must_use]
 #[inline(never)]
 pub fn is_key(key: &[u8; KEY]) -> bool {
     let Ok(mut point) = CompressedY(*key).decompressed() else { return false };

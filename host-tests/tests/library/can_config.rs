@@ -6,6 +6,7 @@ use gyronet::can::config::{
 };
 use gyronet::can::e2e::{DataIdMode, P11Mode};
 use gyronet::can::encoder::CanEncoder;
+use gyronet::can::load::per_mille;
 use gyronet::can::status::STATUS_ID;
 use gyronet::can::yaw::Quality;
 use gyronet::estimate::VehicleSample;
@@ -33,8 +34,8 @@ fn bus_loads_equal_those_by_hand() {
     assert_eq!(config.bus_load_per_mille(), 6 * 135 * 100 / 500);
     assert_eq!(Config::new(ALL).expect("checked").bus_load_per_mille(), (6 * 135 + 160) * 100 / 500);
     // 22 characters of ten bits.
-    assert_eq!(config.line_load_per_mille(1_320_000, false), 100);
-    assert_eq!(config.line_load_per_mille(1_560_000, true), 100);
+    let line = |stamped, bits| per_mille(&config.messages(), |message| message.slcan_bits(stamped), bits);
+    assert_eq!((line(false, 1_320_000), line(true, 1_560_000)), (100, 100));
 }
 
 #[test]

@@ -72,7 +72,6 @@ pub struct Message {
 
 impl Message {
     /// Encodes the message as eight bytes.
-    #[must_use]
     pub fn emit(&self) -> [u8; 8] {
         let [rate0, rate1] = self.rate.to_le_bytes();
         let [force0, force1] = self.acceleration.to_le_bytes();
@@ -107,20 +106,17 @@ impl Message {
     }
 
     /// Returns the rate in deg/s.
-    #[must_use]
     pub fn rate_deg_per_sec(&self) -> f64 {
         f64::from(i32::from(self.rate) - ZERO) * 0.005
     }
 
     /// Returns the acceleration in g (0.127465e-3 g a code).
-    #[must_use]
     pub fn acceleration_g(&self) -> f64 {
         f64::from(i32::from(self.acceleration) - ZERO) * 0.000_127_465
     }
 
     /// Returns the frame with a layout's identifier, in a driver's own type; `None` only if that type cannot hold
     /// the frame.
-    #[must_use]
     pub fn frame<F: Frame>(&self, layout: &Layout) -> Option<F> {
         F::new(layout.id, &self.emit())
     }

@@ -35,7 +35,6 @@ pub enum E2e {
 
 impl E2e {
     /// Returns the profile of each message.
-    #[must_use]
     pub const fn profiles(&self) -> [Profile; 3] {
         [self.profile(0), self.profile(1), self.profile(2)]
     }

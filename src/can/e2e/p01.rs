@@ -61,9 +61,6 @@ impl P01 {
     }
 
     /// Checks CRC, identifier and range of the counter, and returns the counter.
-    ///
-    /// # Errors
-    /// [`Fault`].
     pub fn check(&self, data: &[u8]) -> Result<u8, Fault> {
         let (counter, nibble) = HEADER.check(data, |counter, behind| self.crc(counter, behind))?;
         if self.mode == DataIdMode::Nibble && nibble != self.nibble() {

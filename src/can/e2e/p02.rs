@@ -30,9 +30,6 @@ impl P02 {
     }
 
     /// Checks the CRC and returns the counter.
-    ///
-    /// # Errors
-    /// [`Fault`].
     pub fn check(&self, data: &[u8]) -> Result<u8, Fault> {
         HEADER.check(data, |counter, behind| self.crc(counter, behind)).map(|(counter, _)| counter)
     }

@@ -35,9 +35,6 @@ impl P05 {
     }
 
     /// Checks the CRC and returns the counter.
-    ///
-    /// # Errors
-    /// [`Fault`].
     pub fn check(&self, data: &[u8]) -> Result<u8, Fault> {
         let &[low, high, counter, ref rest @ ..] = data else {
             return Err(Fault::Length(data.len()));

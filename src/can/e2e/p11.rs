@@ -43,9 +43,6 @@ impl P11 {
     }
 
     /// Checks CRC, identifier and range of the counter, and returns the counter.
-    ///
-    /// # Errors
-    /// [`Fault`].
     pub fn check(&self, data: &[u8]) -> Result<u8, Fault> {
         self.as_p01().check(data)
     }

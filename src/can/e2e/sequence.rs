@@ -37,7 +37,6 @@ pub struct Sequence {
 
 impl Sequence {
     /// Creates a check for `counters` values. Steps up to `max_delta` count as loss, larger ones as a wrong sequence.
-    #[must_use]
     pub const fn new(counters: u16, max_delta: u8) -> Self {
         Self { counters, max_delta, last: None }
     }

@@ -22,7 +22,6 @@ pub struct LineAssembler {
 
 impl LineAssembler {
     /// Creates an assembler with an empty line.
-    #[must_use]
     pub const fn new() -> Self {
         Self { line: Vec::new(), too_long: false, done: false }
     }

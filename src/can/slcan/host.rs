@@ -60,7 +60,6 @@ impl Reaction {
 }
 
 /// Returns the digit of the command `S` for a bit rate; `None` if the command has none for it.
-#[must_use]
 pub const fn bit_rate_digit(bits_per_second: u32) -> Option<u8> {
     Some(match bits_per_second {
         10_000 => b'0',
@@ -86,19 +85,16 @@ pub struct Session {
 
 impl Session {
     /// Creates a session without time stamps, the state that hosts expect at first.
-    #[must_use]
     pub const fn new(bits_per_second: u32) -> Self {
         Self { bit_rate: bit_rate_digit(bits_per_second), stamped: false, refused: 0 }
     }
 
     /// Returns whether the host has enabled time stamps.
-    #[must_use]
     pub const fn stamped(&self) -> bool {
         self.stamped
     }
 
     /// Returns the number of lines that were answered with an error.
-    #[must_use]
     pub const fn refused(&self) -> u32 {
         self.refused
     }

@@ -43,7 +43,6 @@ pub struct Port<const N: usize> {
 
 impl<const N: usize> Port<N> {
     /// Creates a port for a bus of this bit rate, with empty buffers.
-    #[must_use]
     pub const fn new(bits_per_second: u32) -> Self {
         Self {
             session: Session::new(bits_per_second),
@@ -143,13 +142,11 @@ impl<const N: usize> Port<N> {
     }
 
     /// Returns the number of dropped frames.
-    #[must_use]
     pub fn dropped(&self) -> u32 {
         self.queue.dropped()
     }
 
     /// Returns the number of refused lines from the host plus the number of answers for which there was no room.
-    #[must_use]
     pub fn refused(&self) -> u32 {
         self.session.refused().saturating_add(self.unanswered)
     }

@@ -47,7 +47,6 @@ pub const MAX_SPEED: WheelSpeed = WheelSpeed((400.0 / 3.6 * 65_536.0) as i32);
 
 impl WheelSignal {
     /// Creates a signal of a speed that is always valid.
-    #[must_use]
     pub const fn new(frame: u8, field: BitField, factor_q16: i32) -> Self {
         let (pulses, invalid, range) = (false, [None; 3], None);
         let [valid_when, reverse_when] = [None; 2];
@@ -56,7 +55,6 @@ impl WheelSignal {
     }
 
     /// Converts a DBC factor in km/h per LSB, below 1000, to [`WheelSignal::factor_q16`].
-    #[must_use]
     pub const fn per_bit_kmh(factor: f64) -> i32 {
         (factor / 3.6 * 4_294_967_296.0) as i32
     }
@@ -145,7 +143,6 @@ impl From<BitField> for Parts {
 
 impl Parts {
     /// Returns the number of bits.
-    #[must_use]
     pub fn bits(&self) -> u8 {
         self.low.bits() + self.high.map_or(0, |high| high.bits())
     }
@@ -190,14 +187,12 @@ pub struct ByteSum {
 
 impl ByteSum {
     /// Creates a plain sum of all other bytes.
-    #[must_use]
     pub const fn new(field: Parts) -> Self {
         let [xor, nibbles, with_id, with_length, without_counter, negated] = [false; 6];
         let (start, last) = (0, 0);
         Self { field, xor, nibbles, with_id, with_length, without_counter, negated, start, last }
     }
 
-    /// Returns the checksum of a frame.
     fn of(&self, frame: &WheelFrame, data: &[u8]) -> u8 {
         let counter = frame.counter.filter(|_| self.without_counter).map_or(0, |counter| counter.mask());
         let cleared = (self.field.mask() | counter).to_le_bytes();
@@ -317,9 +312,6 @@ impl WheelFrame {
     }
 
     /// Checks the protection of a frame, and returns its counter if it has one.
-    ///
-    /// # Errors
-    /// [`WheelError`].
     pub fn check(&self, data: &[u8]) -> Result<Option<u8>, WheelError> {
         let short = WheelError::Short(data.len());
         let matches = match self.checksum {

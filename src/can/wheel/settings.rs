@@ -77,7 +77,6 @@ impl WheelSettings {
         still_for: Duration::from_millis(500),
     };
 
-    /// No wheel speeds.
     #[cfg(feature = "service")]
     pub(crate) const NONE: Self =
         Self { frames: [None; MAX_FRAMES], signals: [None; WHEELS], ..Self::TOYOTA };
@@ -158,8 +157,6 @@ const fn toyota(start: u8) -> Option<WheelSignal> {
     })
 }
 
-/// Returns an identifier as a number.
-#[must_use]
 pub(crate) fn raw_id(id: Id) -> u32 {
     match id {
         Id::Standard(id) => id.as_raw().into(),

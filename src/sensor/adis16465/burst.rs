@@ -157,7 +157,6 @@ impl Burst {
     }
 
     /// Encodes the burst.
-    #[must_use]
     pub fn emit(&self) -> [u8; BURST] {
         let ([gx, gy, gz], [ax, ay, az]) = (self.rate, self.acceleration);
         let words = [gx, gy, gz, ax, ay, az, self.temperature].map(|reading| reading as u16);

@@ -47,7 +47,6 @@ impl OutputRate {
     pub const HZ_1000: Self = Self(1000);
 
     /// Creates a rate; `None` if the gyro does not offer it.
-    #[must_use]
     pub fn new(hertz: u16) -> Option<Self> {
         Self::OFFERED.contains(&hertz).then_some(Self(hertz))
     }

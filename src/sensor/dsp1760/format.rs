@@ -17,7 +17,6 @@ pub enum Format {
 
 impl Format {
     /// Returns the format that the first four bytes select.
-    #[must_use]
     pub const fn of(header: [u8; 4]) -> Option<Self> {
         match header {
             [0xFE, 0x81, 0xFF, 0x55] => Some(Self::A),

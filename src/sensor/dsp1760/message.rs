@@ -75,7 +75,6 @@ pub struct Message {
 
 impl Message {
     /// Returns the format of the message.
-    #[must_use]
     pub const fn format(&self) -> Format {
         match self.extra {
             Extra::Temperature(_) => Format::A,
@@ -85,9 +84,6 @@ impl Message {
     }
 
     /// Parses a whole message. The valid bit of a reading that is not finite is cleared.
-    ///
-    /// # Errors
-    /// [`MessageError`].
     pub fn parse(frame: &[u8]) -> Result<Self, MessageError> {
         let format = frame.first_chunk().copied().and_then(Format::of).ok_or(MessageError::Header)?;
         let length = MessageError::Length { got: frame.len(), expected: format.length() };
@@ -133,7 +129,6 @@ impl Message {
     }
 
     /// Encodes the message, CRC included.
-    #[must_use]
     pub fn emit(&self) -> Vec<u8, MAX_MESSAGE> {
         let mut frame = Vec::new();
         // MAX_MESSAGE bytes hold every format.

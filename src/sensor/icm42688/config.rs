@@ -87,7 +87,6 @@ pub struct Icm42688Config {
 impl Icm42688Config {
     /// Returns the register values in the order in which they are written: filters and ranges
     /// before gyro and accelerometer are switched on.
-    #[must_use]
     pub const fn settings(&self) -> [Setting; SETTINGS] {
         const fn set(register: Register, mask: u8, value: u8) -> Setting {
             Setting { register, mask, value }

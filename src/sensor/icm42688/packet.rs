@@ -87,9 +87,6 @@ pub struct Packet {
 
 impl Packet {
     /// Parses a packet.
-    ///
-    /// # Errors
-    /// [`PacketError`].
     pub fn parse(resolution: Resolution, bytes: &[u8]) -> Result<Self, PacketError> {
         let length = PacketError::Length { got: bytes.len(), expected: resolution.bytes() };
         let (&[header, ax1, ax0, ay1, ay0, az1, az0, gx1, gx0, gy1, gy0, gz1, gz0], rest) =
@@ -129,7 +126,6 @@ impl Packet {
     }
 
     /// Encodes the packet; each reading is truncated to the bits of its field.
-    #[must_use]
     pub fn emit(&self) -> Vec<u8, MAX_PACKET> {
         let mut bytes = Vec::new();
         // MAX_PACKET bytes hold either packet.

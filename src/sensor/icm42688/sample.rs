@@ -38,7 +38,6 @@ impl Resolution {
 
 impl Packet {
     /// Converts the readings, taken at `time`, to the pipeline's units; `None` where an axis has no reading.
-    #[must_use]
     pub fn sample(&self, time: Micros) -> Option<ImuSample> {
         let (per_dps, per_g) = (self.resolution.counts_per_dps(), self.resolution.counts_per_g());
         let rate = |reading: Option<i32>| {

@@ -10,7 +10,6 @@ const MAX_EMITTED: usize = 96;
 
 impl MtData2 {
     /// The message of a sample, as an MTi sends it.
-    #[must_use]
     pub fn of(sample: &ImuSample, number: u16) -> Self {
         Self {
             packet_counter: Some(number),
@@ -23,14 +22,12 @@ impl MtData2 {
     }
 
     /// Encodes the whole frame in single precision; fields that are `None` are omitted.
-    #[must_use]
     pub fn emit(&self) -> Vec<u8, 72> {
         // 72 bytes hold all six packets.
         frame(MID_MT_DATA2, &self.data(Precision::Single)).unwrap_or_default()
     }
 
     /// Encodes the whole frame with its numbers in the given precision.
-    #[must_use]
     pub fn emit_as(&self, precision: Precision) -> Vec<u8, MAX_EMITTED> {
         frame(MID_MT_DATA2, &self.data(precision)).unwrap_or_default()
     }
@@ -109,7 +106,6 @@ impl Precision {
 }
 
 /// Encodes the frame of a message; `None` if it is longer than `N` bytes or than an Xbus frame.
-#[must_use]
 fn frame<const N: usize>(mid: u8, data: &[u8]) -> Option<Vec<u8, N>> {
     let len = u8::try_from(data.len()).ok().filter(|len| *len != EXTENDED_LENGTH)?;
     let mut frame = Vec::new();

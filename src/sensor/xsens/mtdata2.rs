@@ -142,7 +142,6 @@ pub enum Precision {
 
 impl Precision {
     /// Returns the precision that a data identifier selects.
-    #[must_use]
     pub const fn of(id: u16) -> Self {
         match id & 3 {
             0 => Self::Single,

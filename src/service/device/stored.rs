@@ -51,13 +51,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Returns whether any stored data are damaged or refused: [`crate::health::Faults::STORED`].
-    #[must_use]
     pub fn stored_damaged(&self) -> bool {
         self.refused || self.records_damaged()
     }
 
     /// Returns whether a stored configuration could not be used; the sensor's axes are then unknown.
-    #[must_use]
     pub fn configuration_lost(&self) -> bool {
         match self.configuration_origin {
             Origin::BuiltIn => self.records_damaged(),
