@@ -33,21 +33,17 @@ impl Step {
         Self {
             wheels: number.is_multiple_of(WHEEL_INTERVAL).then(|| wheels(speed)),
             imu: MtData2::of(sample, number as u16),
-            fog: fog_bytes(number, fog_reading(number, reference)),
+            fog: fog_bytes(number, reference),
         }
     }
 }
 
-/// Returns each of the gyro's readings in 10 ms at this rate, rad/s: a tenth of the turn, rad.
-pub fn fog_reading(number: usize, reference: f64) -> f32 {
+/// Returns the bytes that the gyro sends in the 10 ms that end with a row, at this rate, rad/s. For the first row it
+/// sends only the last message, so that a message set always follows the last message of a row.
+fn fog_bytes(number: usize, reference: f64) -> Vec<u8> {
     // A gyro that repeats itself counts as stuck, so no reading equals the one before.
     let noise = if number.is_multiple_of(2) { FOG_STEP / 4.0 } else { -FOG_STEP / 4.0 };
-    ((reference * 0.01 / MESSAGES_PER_ROW as f64 / FOG_STEP).round() * FOG_STEP + noise) as f32
-}
-
-/// Returns the bytes that the gyro sends in the 10 ms that end with a row. For the first row it sends only the last
-/// message, so that a message set always follows the last message of a row.
-pub fn fog_bytes(number: usize, reading: f32) -> Vec<u8> {
+    let reading = ((reference * 0.01 / MESSAGES_PER_ROW as f64 / FOG_STEP).round() * FOG_STEP + noise) as f32;
     let message = |part: usize| Message {
         rotation: [0.0, 0.0, reading],
         acceleration: [0.0; 3],

@@ -185,7 +185,7 @@ impl Received {
             self.transport.answer(|message, _| {
                 *answers += 1;
                 match message {
-                    [0x62, rest @ ..] if rest.len() > 100 => {
+                    [0x62, rest @ ..] if rest.starts_with(&requests::COUNTERS[1..3]) => {
                         *counters = Some(requests::counters(rest).expect("counters"));
                     }
                     [0x59 | 0x62, ..] => {}

@@ -10,7 +10,6 @@ mod course;
 mod crash;
 mod embassy;
 mod endurance;
-mod faults;
 mod icm42688;
 mod minimal;
 mod model;

@@ -81,46 +81,24 @@ fn a_stored_configuration_takes_effect() {
     assert!(missed.len() >= SAMPLES - 2 && missed.iter().all(|is| *is == Quality::Unusable), "{missed:?}");
 }
 
+/// What a start makes of each damage is in `library::service::configuration` and `weights`; here the image reports it.
 #[test]
-fn a_configuration_that_cannot_be_used_is_reported() {
-    let good = || Stored::default().record(&Configuration::DEFAULT);
-    // A copy stands for the header.
-    for (test, stored, is_used) in [
-        ("corrupt content", good().damaged(STORE.start + 20, 4), false),
-        ("corrupt header", good().damaged(STORE.start + 1, 0x80), true),
-    ] {
-        let Some(started) = Started::with(test, &stored, |_| ()) else { return };
-        assert!(started.flagged(), "{test}");
-        assert_eq!(started.info.flash, FlashState::Damaged, "{test}");
-        let configuration = started.info.configuration;
-        assert_eq!(configuration == Origin::Stored, is_used, "{test}: {configuration:?}");
-        assert!(started.events.contains(&EventKind::RecordsDamaged), "{test}: {:?}", started.events);
-    }
-}
-
-#[test]
-fn a_damaged_slot_gives_way_to_the_other_and_to_the_built_in_weights() {
+fn a_damaged_configuration_and_a_damaged_slot_give_way_and_are_reported() {
     let [a, b] = [other_weights(0x10), other_weights(0x20)];
-    let stored = || Stored::default().weights(Slot::A, &a).weights(Slot::B, &b);
-    let inside = |slot: Slot| slot.offset() + SLOT_SIZE as u32 / 2;
-    for (test, stored, source, damaged) in [
-        ("both whole", stored(), WeightSource::Slot(Slot::B), 0),
-        ("B damaged", stored().damaged(inside(Slot::B), 0x10), WeightSource::Slot(Slot::A), 1),
-        (
-            "both damaged",
-            stored().damaged(inside(Slot::A), 1).damaged(inside(Slot::B), 0x80),
-            WeightSource::BuiltIn,
-            2,
-        ),
-    ] {
-        let Some(started) = Started::with(test, &stored, |_| ()) else { return };
-        assert_eq!(started.info.weights, source, "{test}");
-        assert_eq!(started.flagged(), damaged > 0, "{test}");
-        let slots = started.info.refused_slots.into_iter().flatten();
-        assert_eq!(slots.filter(|error| matches!(error, SlotError::Blob(_))).count(), damaged, "{test}");
-        let refused = started.events.iter().filter(|event| matches!(event, EventKind::SlotRefused(..)));
-        assert_eq!(refused.count(), damaged, "{test}");
-    }
+    let stored = Stored::default().record(&Configuration::DEFAULT).weights(Slot::A, &a).weights(Slot::B, &b);
+    let inside = Slot::B.offset() + SLOT_SIZE as u32 / 2;
+    let stored = stored.damaged(STORE.start + 20, 4).damaged(inside, 0x10);
+    let test = "a_damaged_configuration_and_a_damaged_slot_give_way_and_are_reported";
+    let Some(Started { info, events, .. }) = Started::with(test, &stored, |_| ()).inspect(|started| {
+        assert!(started.flagged());
+    }) else {
+        return;
+    };
+    assert_eq!((info.flash, info.weights), (FlashState::Damaged, WeightSource::Slot(Slot::A)));
+    assert_ne!(info.configuration, Origin::Stored);
+    assert!(matches!(info.refused_slots, [None, Some(SlotError::Blob(_))]), "{:?}", info.refused_slots);
+    assert!(events.contains(&EventKind::RecordsDamaged), "{events:?}");
+    assert!(events.iter().any(|event| matches!(event, EventKind::SlotRefused(Slot::B, _))), "{events:?}");
 }
 
 /// A controller that a reset does not lock is a fault: what is stored is read, nothing is written, and the gate of the

@@ -1,18 +1,13 @@
 //! The command `gyronet demo`: its page, its JSON, its log.
 
+use super::{gyronet, scratch, text};
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 fn demo(name: &str, arguments: &[&str]) -> (PathBuf, String) {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let output = Command::new(env!("CARGO_BIN_EXE_gyronet"))
-        .args(["demo", "--out"])
-        .arg(&folder)
-        .args(arguments)
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    (folder, String::from_utf8(output.stdout).unwrap())
+    let folder = scratch(name);
+    let output = gyronet(&[&["demo", "--out", folder.to_str().unwrap()], arguments].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    (folder, text(&output.stdout))
 }
 
 #[test]

@@ -1,21 +1,14 @@
 //! The vehicle file beside a drive: `drive.toml` beside `drive.csv`, read by every command.
 
+use super::{column, gyronet_in, scratch};
 use gyronet_tools::bundled::SIMULATED_DRIVE;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
-
-/// Runs a command in a folder, and returns whether it succeeded, and its standard error.
-fn gyronet(folder: &Path, arguments: &[&str]) -> (bool, String) {
-    let output =
-        Command::new(env!("CARGO_BIN_EXE_gyronet")).current_dir(folder).args(arguments).output().unwrap();
-    (output.status.success(), String::from_utf8(output.stderr).unwrap())
-}
 
 /// Makes a folder with 25 s of the simulated drive as a sensor that hangs upside down records it, and its vehicle file.
 fn folder(name: &str, vehicle: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    std::fs::create_dir_all(&folder).unwrap();
+    let folder = scratch(name);
     let mut lines = SIMULATED_DRIVE.lines().take(2_501);
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
     let turned = ["acc_y", "acc_z", "gyr_y", "gyr_z"];
@@ -35,20 +28,15 @@ fn folder(name: &str, vehicle: &str) -> PathBuf {
     folder
 }
 
-/// Reads numbers: one column of a table.
-fn column(path: &Path, separator: char, at: usize) -> Vec<f64> {
-    let text = std::fs::read_to_string(path).unwrap();
-    text.lines().filter_map(|line| line.split(separator).nth(at)?.parse().ok()).collect()
-}
-
 #[test]
 fn mounting_and_radius_are_used_and_named() {
     let folder = folder("vehicle_file", "[mounting]\nroll_deg = 180\n[wheels]\nradius_m = 0.578\n");
     std::fs::write(folder.join("plain.csv"), SIMULATED_DRIVE).unwrap();
-    let (good, err) = gyronet(&folder, &["replay", "drive.csv", "--csv", "rates.csv", "--tum", "path.tum"]);
+    let (good, err) =
+        gyronet_in(&folder, &["replay", "drive.csv", "--csv", "rates.csv", "--tum", "path.tum"]);
     assert!(good && err.contains("drive.csv: vehicle file drive.toml\n"), "{err}");
     let (good, err) =
-        gyronet(&folder, &["replay", "plain.csv", "--csv", "plain_rates.csv", "--tum", "plain.tum"]);
+        gyronet_in(&folder, &["replay", "plain.csv", "--csv", "plain_rates.csv", "--tum", "plain.tum"]);
     assert!(good && !err.contains("vehicle file"), "{err}");
     let [turned, plain] = ["rates.csv", "plain_rates.csv"].map(|name| column(&folder.join(name), ',', 2));
     assert_eq!(turned.len(), 2_200);
@@ -62,16 +50,16 @@ fn mounting_and_radius_are_used_and_named() {
     assert!(plain > 10.0 && (turned / plain - 2.0).abs() < 1e-3, "{turned} {plain}");
 
     for command in ["evaluate", "calibrate", "doctor"] {
-        let (_, err) = gyronet(&folder, &[command, "drive.csv"]);
+        let (_, err) = gyronet_in(&folder, &[command, "drive.csv"]);
         assert!(err.contains("drive.csv: vehicle file drive.toml\n"), "{command}: {err}");
     }
     std::fs::write(folder.join("drive.mcap"), b"\x89MCAP0\r\n").unwrap();
     for command in ["evaluate", "calibrate", "doctor", "replay"] {
-        let (good, err) = gyronet(&folder, &[command, "drive.mcap"]);
+        let (good, err) = gyronet_in(&folder, &[command, "drive.mcap"]);
         let command = "gyronet import drive.mcap --out drive.csv\n";
         assert!(!good && err.ends_with(command) && err.lines().count() == 1, "{err}");
     }
-    let (good, err) = gyronet(&folder, &["demo", "drive.csv", "--out", "demo"]);
+    let (good, err) = gyronet_in(&folder, &["demo", "drive.csv", "--out", "demo"]);
     assert!(good && err.contains("drive.csv: vehicle file drive.toml\n"), "{err}");
     let page = std::fs::read_to_string(folder.join("demo/demo.html")).unwrap();
     assert!(page.contains("(radius 0.578 m)"), "the page says what the path rests on");
@@ -98,7 +86,7 @@ fn what_import_writes_is_not_turned_again() {
     }
     let folder = folder("vehicle_import", "[mounting]\nroll_deg = 180\n");
     let import =
-        |out: &str| gyronet(&folder, &["import", "drive.csv", "--vehicle", "drive.toml", "--out", out]);
+        |out: &str| gyronet_in(&folder, &["import", "drive.csv", "--vehicle", "drive.toml", "--out", out]);
     let (good, err) = import("drive.csv");
     assert!(!good && err.contains("drive.csv: --out would overwrite it"), "{err}");
     let (good, err) = import("level.csv");
@@ -110,11 +98,11 @@ fn what_import_writes_is_not_turned_again() {
         header.starts_with("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,wheel1_rate,wheel2_rate"),
         "{header}"
     );
-    let (good, err) = gyronet(&folder, &["replay", "level.csv", "--csv", "rates.csv"]);
+    let (good, err) = gyronet_in(&folder, &["replay", "level.csv", "--csv", "rates.csv"]);
     assert!(good && err.contains("level.csv: vehicle file level.toml\n"), "{err}");
 
     // Neither turned nor stripped of wheels and reference by another import.
-    let (good, err) = gyronet(&folder, &["import", "level.csv", "--from", "1", "--out", "later.csv"]);
+    let (good, err) = gyronet_in(&folder, &["import", "level.csv", "--from", "1", "--out", "later.csv"]);
     assert!(good, "{err}");
     let [level, later] =
         ["level.csv", "later.csv"].map(|name| std::fs::read_to_string(folder.join(name)).unwrap());
@@ -132,7 +120,7 @@ fn what_import_writes_is_not_turned_again() {
     )
     .unwrap();
     let outputs = ["--csv", "day.csv", "--tum", "day.tum", "--out", "day.log", "--mcap", "day.mcap"];
-    let (good, err) = gyronet(&folder, &[&["replay", "level.csv"][..], &outputs].concat());
+    let (good, err) = gyronet_in(&folder, &[&["replay", "level.csv"][..], &outputs].concat());
     assert!(good, "{err}");
     let times = |name: &str, separator: char| column(&folder.join(name), separator, 0);
     let (plain, day, path) = (times("rates.csv", ','), times("day.csv", ','), times("day.tum", ' '));
@@ -148,7 +136,7 @@ fn what_import_writes_is_not_turned_again() {
     );
 
     std::fs::write(folder.join("level.toml"), "[mounting]\nrol_deg = 180\n").unwrap();
-    let (good, err) = gyronet(&folder, &["replay", "level.csv"]);
+    let (good, err) = gyronet_in(&folder, &["replay", "level.csv"]);
     assert!(!good && err.contains("level.toml: not a valid vehicle file: "), "{err}");
     assert!(err.contains("unknown field `rol_deg`"), "{err}");
 }

@@ -1,15 +1,8 @@
 //! The command line as a whole: help, exit statuses, colours, completions.
 
+use super::{command, gyronet, text};
 use std::io::Write as _;
-use std::process::{Command, Output, Stdio};
-
-fn gyronet(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gyronet")).args(arguments).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
+use std::process::{Command, Stdio};
 
 /// Names of the subcommands, from the help itself.
 fn subcommands() -> Vec<String> {
@@ -37,12 +30,7 @@ fn every_help_begins_with_one_line_and_ends_with_examples() {
 
 #[test]
 fn a_reader_that_has_gone_is_no_failure() {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_gyronet"))
-        .arg("bus")
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = command(&["bus"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), text(&output.stderr).as_str()), (Some(0), ""));
@@ -116,9 +104,8 @@ fn json_is_json_and_quiet_is_quiet() {
 #[test]
 fn colours_are_for_terminals() {
     let colored = |variable: &str| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_gyronet"));
-        command.args(["size", "--elf", "/nowhere/image"]).env_remove("NO_COLOR");
-        let output = command.env(variable, "1").output().unwrap();
+        let mut command = command(&["size", "--elf", "/nowhere/image"]);
+        let output = command.env_remove("NO_COLOR").env(variable, "1").output().unwrap();
         output.stderr.contains(&0x1b)
     };
     assert!(colored("CLICOLOR_FORCE"));

@@ -1,5 +1,4 @@
 //! `gyronet evaluate` and `gyronet replay` need no more memory for a long drive than for a short one.
-#![cfg(target_os = "linux")]
 
 use std::fmt::Write as _;
 use std::io::{BufWriter, Write as _};

@@ -1,11 +1,11 @@
 //! The commands that Python does: `gyronet import` and `gyronet wheels from-dbc` find it, or make an environment for it.
 //!
 //! A shell script stands for Python; it makes environments that hold itself, and prints how it was called.
-#![cfg(unix)]
 
+use super::{command, scratch, text};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 const PYTHON: &str = r#"#!/bin/sh
 echo "$*" >> "$CALLS"
@@ -24,9 +24,8 @@ struct Machine {
 
 impl Machine {
     fn new(name: &str) -> Self {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("import").join(name);
-        let _ = std::fs::remove_dir_all(&folder);
-        std::fs::create_dir_all(folder.join("bin")).unwrap();
+        let folder = scratch(&format!("import-{name}"));
+        std::fs::create_dir(folder.join("bin")).unwrap();
         let python = folder.join("bin/python3");
         std::fs::write(&python, PYTHON).unwrap();
         std::fs::set_permissions(&python, PermissionsExt::from_mode(0o755)).unwrap();
@@ -37,8 +36,7 @@ impl Machine {
     fn run(&self, arguments: &[&str], variables: &[(&str, &str)]) -> (Output, Vec<String>) {
         let calls = self.folder.join("calls");
         let _ = std::fs::remove_file(&calls);
-        let output = Command::new(env!("CARGO_BIN_EXE_gyronet"))
-            .args(arguments)
+        let output = command(arguments)
             .env_remove("GYRONET_PYTHON")
             .env_remove("PYTHONPATH")
             .env("XDG_CACHE_HOME", self.folder.join("cache"))
@@ -54,10 +52,6 @@ impl Machine {
     fn environment(&self) -> PathBuf {
         self.folder.join("cache/gyronet/python")
     }
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
 }
 
 /// One line on standard error, and status 1.

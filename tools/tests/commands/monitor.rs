@@ -1,5 +1,6 @@
 //! The command `gyronet monitor`: logs, sockets, tables, ends.
 
+use super::{gyronet, text};
 use gyronet::can::DataFrame;
 use gyronet::can::config::Config;
 use gyronet::can::encoder::CanEncoder;
@@ -12,7 +13,7 @@ use gyronet_tools::drive::candump::Log;
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::process::Output;
 use std::time::Instant;
 
 /// Frames of so many samples at 1 deg/s.
@@ -42,6 +43,12 @@ fn file(name: &str, content: &[u8]) -> PathBuf {
     path
 }
 
+fn monitor(arguments: &[&str]) -> (Output, String, String) {
+    let output = gyronet(&[&["monitor"], arguments].concat());
+    let (out, err) = (text(&output.stdout), text(&output.stderr));
+    (output, out, err)
+}
+
 fn log(name: &str, frames: &[DataFrame]) -> PathBuf {
     let mut log = Vec::new();
     let mut out = Log::new(&mut log);
@@ -50,13 +57,6 @@ fn log(name: &str, frames: &[DataFrame]) -> PathBuf {
     }
     out.finish().unwrap();
     file(name, &log)
-}
-
-fn monitor(arguments: &[&str]) -> (Output, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_gyronet")).arg("monitor").args(arguments).output().unwrap();
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    let (out, err) = (text(&output.stdout), text(&output.stderr));
-    (output, out, err)
 }
 
 #[test]
