@@ -6,6 +6,7 @@
 mod described;
 mod estimator;
 pub(crate) mod filter;
+mod gain;
 pub mod j1939;
 pub mod latitude;
 pub mod nmea2000;
@@ -13,8 +14,9 @@ mod receiver;
 mod turns;
 
 pub use described::HeadingSignal;
-pub use estimator::{CourseConfig, CourseCounters, Estimator, Refusal};
+pub use estimator::{CourseConfig, CourseCounters, CourseState, Estimator, Refusal};
 pub(crate) use estimator::{FINE_BIAS, gain_knowledge};
+pub use gain::Gain;
 pub use receiver::{HeadingConfigError, HeadingReceiver, HeadingSettings, Received};
 
 use embedded_can::{ExtendedId, Frame, Id};

@@ -282,8 +282,10 @@ impl Pipeline {
 
     /// Notes that the sensor was moved since earlier drives; it is reported with every message set from now on.
     pub fn mount_moved(&mut self) {
-        count(&mut self.state.counters.moved_mounts, u32::from(!self.state.moved));
-        self.state.moved = true;
+        if !core::mem::replace(&mut self.state.moved, true) {
+            count(&mut self.state.counters.moved_mounts, 1);
+            self.forget_gain();
+        }
     }
 
     /// Accepts the estimate of a window that [`Output::window`] announced. Returns whether it will be used: not if no

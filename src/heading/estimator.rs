@@ -14,9 +14,10 @@
 //!   a heading until they have matched for [`TRUST`];
 //! - after a halt a course may have jumped by half a turn, because the vehicle goes backwards.
 
-use super::Heading;
 use super::filter::{BIAS, Filter, GAIN, HEADING, LAG, Measured, wrap};
+use super::gain::MAX_GAIN;
 use super::turns::{BLOCK, BLOCK_SECONDS, Turns};
+use super::{Gain, Heading};
 use crate::health::count;
 use crate::health::slow::Knowledge;
 use crate::sample::RATE_HZ;
@@ -79,8 +80,6 @@ const ROUND: f32 = 2.6;
 /// Lag before it is estimated, its sigma, and its bounds, s.
 const FIRST_LAG: [f32; 2] = [0.3, 0.3];
 const LAGS: [f32; 2] = [-0.5, 2.0];
-/// Largest gain.
-const MAX_GAIN: f32 = 0.05;
 /// The turn over which left and right are remembered, the least of each, and the least share of either, rad.
 const REMEMBERED: f32 = 12.0;
 const BOTH_WAYS: [f32; 2] = [1.0, 0.2];
@@ -149,6 +148,7 @@ impl Failing {
 
 /// Counters of courses since the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CourseCounters {
     /// Courses that were used.
     pub used: u32,
@@ -156,6 +156,26 @@ pub struct CourseCounters {
     pub refused: u32,
     /// Times that the heading started again.
     pub restarts: u32,
+}
+
+/// What courses have shown since the start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CourseState {
+    /// Counters.
+    pub counters: CourseCounters,
+    /// True while courses contradict the gyro: for 10 s none has matched, and since then they have not for a minute.
+    pub is_contradicted: bool,
+    /// The gain, once it is estimated.
+    pub gain: Option<Gain>,
+}
+
+impl CourseState {
+    /// Before the first course.
+    pub const START: Self = Self {
+        counters: CourseCounters { used: 0, refused: 0, restarts: 0 },
+        is_contradicted: false,
+        gain: None,
+    };
 }
 
 /// Learns from courses.
@@ -199,7 +219,7 @@ impl Estimator {
             is_backwards: false,
             failing: Failing { since: None, drift: None, times: 0, trusted: 0, matches: 0 },
             refusal: None,
-            counters: CourseCounters { used: 0, refused: 0, restarts: 0 },
+            counters: CourseState::START.counters,
         }
     }
 
@@ -280,10 +300,13 @@ impl Estimator {
         if libm::fabsf(self.unchanged) > STANDS {
             return Err(Refusal::Stands);
         }
-        if filter.variance::<GAIN>() == 0.0 {
+        if filter.variance::<LAG>() == 0.0 {
             let [lag, sigma] = FIRST_LAG;
             filter.restart::<LAG>(lag, sigma * sigma);
-            filter.restart::<GAIN>(0.0, self.config.gain * self.config.gain);
+            // Earlier drives may have shown it.
+            if filter.variance::<GAIN>() == 0.0 {
+                filter.restart::<GAIN>(0.0, self.config.gain * self.config.gain);
+            }
             let driving = self.config.driving;
             filter.put_variance::<BIAS>(filter.variance::<BIAS>() + driving * driving);
         }
@@ -361,6 +384,12 @@ impl Estimator {
     #[must_use]
     pub fn refusal(&self) -> Option<Refusal> {
         self.refusal
+    }
+
+    /// Returns whether courses contradict the gyro.
+    #[must_use]
+    pub fn is_contradicted(&self) -> bool {
+        self.failing.times > 0
     }
 
     /// Returns the counters.

@@ -2,7 +2,7 @@
 
 use crate::bias::{BiasCurve, EarthRate, StaticConfig, ZeroRateConfig};
 use crate::compensate::CompensateConfig;
-use crate::heading::CourseConfig;
+use crate::heading::{CourseConfig, Gain};
 use crate::health::slow::Knowledge;
 use crate::mounting::{GyroMap, Rotation, Vertical};
 use crate::pipeline::UncertaintyConfig;
@@ -34,6 +34,10 @@ pub struct PipelineConfig {
     pub zero_rate: Option<ZeroRateConfig>,
     /// Learning from courses, with the filter of the zero-rate updates.
     pub course: CourseConfig,
+    /// The gain of the yaw gyro that earlier drives have shown.
+    pub gain: Option<Gain>,
+    /// The model and map that a gain is found with ([`Gain::of`]).
+    pub gain_of: u32,
     /// Limits by which the inertial sensor shows a standstill.
     pub standstill: StandstillConfig,
     /// Settings of the compensation, which applies the estimates to the rates.
@@ -56,6 +60,8 @@ impl PipelineConfig {
         earth_rate: EarthRate::LeftInBias,
         zero_rate: Some(ZeroRateConfig::DEFAULT),
         course: CourseConfig::DEFAULT,
+        gain: None,
+        gain_of: 0,
         standstill: StandstillConfig::DEFAULT,
         compensate: CompensateConfig::DEFAULT,
         uncertainty: UncertaintyConfig::DEFAULT,

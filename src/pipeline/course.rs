@@ -8,8 +8,8 @@ use super::level::Level;
 use super::{Pipeline, State};
 use crate::bias::ZeroRate;
 use crate::compensate::Remaining;
-use crate::heading::filter::{BIAS, Filter};
-use crate::heading::{CourseCounters, FINE_BIAS, Heading, Refusal, gain_knowledge};
+use crate::heading::filter::{BIAS, Filter, GAIN};
+use crate::heading::{CourseCounters, CourseState, FINE_BIAS, Gain, Heading, Refusal, gain_knowledge};
 use crate::health::slow::Knowledge;
 use crate::mounting::{Rotation, Vertical};
 use crate::sample::Frame;
@@ -73,6 +73,7 @@ impl Pipeline {
         if !course.has_begun() {
             let sigma = early.map_or(zero_rate.max_bias, |(_, sigma)| sigma);
             *start = Start { filter: Filter::new(sigma * sigma, 0.0), ..Start::EMPTY };
+            give_back(&mut start.filter, self.config.gain);
         }
         let [x, y, z] = frame.sample.angular_rate;
         let is_good = frame.sample.validity.is_good();
@@ -102,6 +103,26 @@ impl Pipeline {
         });
     }
 
+    /// Returns what courses have shown since the start.
+    #[must_use]
+    pub fn course_state(&self) -> CourseState {
+        let (share, sigma) = self.gain();
+        let gain = sigma.map(|sigma| Gain { share, sigma, of: self.config.gain_of });
+        let course = &self.state.course;
+        CourseState { counters: *course.counters(), is_contradicted: course.is_contradicted(), gain }
+    }
+
+    /// Forgets the gain: the sensor is mounted differently.
+    pub(super) fn forget_gain(&mut self) {
+        self.config.gain = None;
+        let prior = self.config.course.gain;
+        if let Some(zero_rate) = self.zero_rate_mut()
+            && zero_rate.gain().1.is_some()
+        {
+            zero_rate.filter().restart::<GAIN>(0.0, prior * prior);
+        }
+    }
+
     /// Notes once a bias that was found in motion is as good as one after a standstill.
     pub(super) fn judge_start(&mut self) {
         if let Some(Initialised { zero_rate: Some(zero_rate), is_coarse, .. }) = &mut self.state.initialised {
@@ -124,5 +145,12 @@ impl Pipeline {
     pub(super) fn remaining(&self) -> Remaining {
         let gain = self.zero_rate().map_or(0.0, |known| known.gain().0);
         Remaining { bias: self.bias(), gain }
+    }
+}
+
+/// Puts the gain of earlier drives into a filter.
+pub(super) fn give_back(filter: &mut Filter, gain: Option<Gain>) {
+    if let Some(Gain { share, sigma, .. }) = gain {
+        filter.restart::<GAIN>(share, sigma * sigma);
     }
 }

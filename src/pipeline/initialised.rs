@@ -1,6 +1,7 @@
 //! Static initialisation finds the bias and the tilt, or a course the bias of a vehicle that moves; this module holds both
 //! once one has succeeded.
 
+use super::course::give_back;
 use super::level::Level;
 use super::sensor_bias::ZeroPoint;
 use super::{Pipeline, PipelineConfig, State};
@@ -90,7 +91,12 @@ impl Pipeline {
         self.state.sensor_bias.refer();
         let [.., reading] = level.rates_at_rest().map(|rate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC);
         let sigma = self.state.sensor_bias.sigma();
-        let zero_rate = zero_rate.map(|config| ZeroRate::claimed(config, reading, sigma, rest.drift));
+        let gain = self.config.gain;
+        let zero_rate = zero_rate.map(|config| {
+            let mut zero_rate = ZeroRate::claimed(config, reading, sigma, rest.drift);
+            give_back(zero_rate.filter(), gain);
+            zero_rate
+        });
         let zero = level.zero(earth_rate);
         self.state.initialised = Some(Initialised { level, zero, zero_rate, is_coarse: false });
         self.state.course.restart();

@@ -21,6 +21,8 @@ pub struct Conditions {
     pub can_fault: bool,
     /// The last start followed a crash.
     pub crashed: bool,
+    /// Courses contradict the gyro.
+    pub course_contradicts: bool,
     /// The last request was refused for lack of access.
     pub access_refused: bool,
 }

@@ -14,6 +14,7 @@ use super::event::{EventKind, EventLog, LogPage, SensorFault};
 use super::learner::Learner;
 use super::message::{AccessCounters, FAILED_STARTS, FlashState, Identity, Info, Origin, PROTOCOL, Refusal};
 use crate::can::wheel::WheelSettings;
+use crate::heading::{CourseState, gain_knowledge};
 use crate::health::slow::Knowledge;
 use crate::health::{Faults, Status};
 use crate::mounting::{Rotation, Vertical};
@@ -66,6 +67,8 @@ pub struct Device<R: NorFlash, W> {
     calibration_origin: Origin,
     learned: Learned,
     learner: Learner,
+    /// The newest state of the courses.
+    course: CourseState,
     /// True if the sensor was found to have moved; cleared by [`Self::take_mount_moved`].
     mount_moved: bool,
     calibrator: Option<Calibrator>,
@@ -117,6 +120,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             calibration_origin: Origin::BuiltIn,
             learned: Learned::NOTHING,
             learner: Learner::new(),
+            course: CourseState::START,
             mount_moved: false,
             calibrator: None,
             found: None,
@@ -228,6 +232,23 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         if self.configuration.learn {
             self.learner.learn_vertical(vertical, &mut self.learned);
         }
+    }
+
+    /// Takes what courses have shown since the start.
+    pub fn learn_course(&mut self, course: &CourseState) {
+        self.course = *course;
+        if self.configuration.learn
+            && let Some(gain) = &course.gain
+        {
+            self.learner.learn_gain(gain, &mut self.learned);
+        }
+    }
+
+    /// Returns what courses have shown since the start, and how well the gain is known.
+    #[must_use]
+    pub fn course(&self) -> (&CourseState, Knowledge) {
+        let gain = self.course.gain.map_or(Knowledge::Unknown, |gain| gain_knowledge(gain.sigma));
+        (&self.course, if self.course.is_contradicted { Knowledge::Refused } else { gain })
     }
 
     /// Returns how well the vertical is known; roll and pitch of the sensor in the configured axes, and their sigma,
@@ -380,6 +401,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             tick: self.tick,
             can_fault: self.identity.can_fault.is_some(),
             crashed: self.identity.crash.is_some() || self.has_failed(),
+            course_contradicts: self.course.is_contradicted,
             access_refused: self.refusal.is_some_and(|refusal| refusal.is_access_denied()),
         }
     }
@@ -432,6 +454,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.request(INTERRUPTS, |device| {
             device.store_learned(Learned::NOTHING)?;
             device.learner = Learner::new();
+            device.learner.keeps_gain = false;
             Ok(())
         })
     }

@@ -1,5 +1,6 @@
 //! The learner estimates the sensor's bias over temperature at standstills that the wheels prove, and its mounting:
-//! up at standstills and in turns ([`crate::mounting::VerticalEstimator`]), forward while the vehicle drives.
+//! up at standstills and in turns ([`crate::mounting::VerticalEstimator`]), forward while the vehicle drives. The gain comes
+//! from the pipeline, which learns it from courses.
 //!
 //! Without wheels, a long straight can look like a standstill, so only static calibrations add to the bias curve.
 //! Learnt values are stored after the first, second, fourth, ... period of three seconds at rest, about ten times
@@ -7,6 +8,7 @@
 //! in total.
 
 use crate::bias::{CurveFilter, Rest, StaticConfig, StaticInit};
+use crate::heading::Gain;
 use crate::mounting::{Forward, ForwardEstimator, Vertical};
 use crate::sample::{ImuSample, WheelSample};
 use crate::standstill::Standing;
@@ -37,6 +39,8 @@ pub struct Learner {
     is_moved: bool,
     /// True if there is something new to store.
     pub is_changed: bool,
+    /// False once the gain was forgotten, which the pipeline still has: it is learnt from the next start on.
+    pub keeps_gain: bool,
 }
 
 impl Learner {
@@ -52,6 +56,7 @@ impl Learner {
             vertical: None,
             is_moved: false,
             is_changed: false,
+            keeps_gain: true,
         }
     }
 
@@ -83,9 +88,9 @@ impl Learner {
             self.rest = None;
             self.has_stood &= still;
         }
-        if self.is_moved && learned.vertical != Vertical::UNKNOWN {
-            // It is not that of this mounting any more.
-            (learned.vertical, self.is_changed) = (Vertical::UNKNOWN, true);
+        if self.is_moved && (learned.vertical != Vertical::UNKNOWN || learned.gain.is_some()) {
+            // They are not those of this mounting any more.
+            (learned.vertical, learned.gain, self.is_changed) = (Vertical::UNKNOWN, None, true);
         }
         self.is_moved && !was_moved
     }
@@ -110,6 +115,13 @@ impl Learner {
             self.is_changed = true;
         }
         learned.vertical = vertical;
+    }
+
+    /// Learns the gain that courses have shown. It is stored when it differs notably.
+    pub fn learn_gain(&mut self, gain: &Gain, learned: &mut Learned) {
+        if self.keeps_gain && !self.is_moved && gain.replaces(learned.gain.as_ref()) {
+            (learned.gain, self.is_changed) = (Some(*gain), true);
+        }
     }
 
     fn learn_rest(&mut self, rest: &Rest, temperature: Option<CentiCelsius>, learned: &mut Learned) {

@@ -12,7 +12,7 @@ use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
 use crate::coprocessor;
 use crate::fog::{FogConfig, FogErrors, Tilt};
-use crate::heading::{HeadingReceiver, HeadingSettings};
+use crate::heading::{Gain, HeadingReceiver, HeadingSettings};
 use crate::mounting::{GyroMap, Rotation};
 use crate::pipeline::PipelineConfig;
 use crate::units::AngularRate;
@@ -127,13 +127,20 @@ impl Configuration {
         let mounting = self.mounting.rotation().unwrap_or(Rotation::IDENTITY);
         let level = calibration.level.as_ref().and_then(Level::rotation);
         let learned = if self.learn { learned } else { &Learned::NOTHING };
+        let gyro_map = calibration.gyro_map(weights).unwrap_or(GyroMap::IDENTITY);
+        let elements = gyro_map.elements();
+        let fold = |of: u32, element: &f32| of.rotate_left(5) ^ element.to_bits();
+        let gain_of = elements.as_flattened().iter().fold(weights, fold);
+        let gain = learned.gain.filter(|gain| gain.of == gain_of && self.heading != HeadingSettings::NONE);
         PipelineConfig {
             bias_curve: learned.bias_curve,
             rest_force: learned.specific_force,
             vertical: learned.vertical,
             mounting: level.map_or(mounting, |level| mounting.then(&level)),
             forward: learned.forward_knowledge(&mounting),
-            gyro_map: calibration.gyro_map(weights).unwrap_or(GyroMap::IDENTITY),
+            gyro_map,
+            gain: gain.map(Gain::aged),
+            gain_of,
             levelling: level.is_none(),
             static_init: self.static_init,
             earth_rate: self.latitude().map_or(EarthRate::LeftInBias, EarthRate::Subtracted),

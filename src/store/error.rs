@@ -33,6 +33,7 @@ pub enum Field {
     BiasCurve,
     Forward,
     Vertical,
+    Gain,
 }
 
 impl Field {
@@ -59,6 +60,7 @@ impl Field {
             Self::BiasCurve => "bias_curve",
             Self::Forward => "forward",
             Self::Vertical => "vertical",
+            Self::Gain => "gain",
         }
     }
 
@@ -78,7 +80,9 @@ impl Field {
             Self::CompensateMaxMean | Self::CompensateMaxRevision => [1e-3, 0.5],
             Self::CompensateMaxSingle => [1e-3, 5.0],
             Self::CalibrationRollDeg | Self::CalibrationPitchDeg => [-MAX_TILT_DEG, MAX_TILT_DEG],
-            Self::CalibrationGyroMap | Self::BiasCurve | Self::Forward | Self::Vertical => return None,
+            Self::CalibrationGyroMap | Self::BiasCurve | Self::Forward | Self::Vertical | Self::Gain => {
+                return None;
+            }
         })
     }
 }

@@ -1,9 +1,10 @@
-//! This record holds what the board has learnt about its sensor: the bias over temperature, and the up and forward
-//! directions.
+//! This record holds what the board has learnt about its sensor: the bias over temperature, the up and forward
+//! directions, and the gain.
 
 use super::error::{Field, FieldError};
 use super::record::Record;
 use crate::bias::BiasCurve;
+use crate::heading::Gain;
 use crate::health::slow::Knowledge;
 use crate::mounting::{Forward, Rotation, Vertical, is_moved};
 use crate::units::SpecificForce;
@@ -26,6 +27,8 @@ pub struct Learned {
     pub vertical: Vertical,
     /// Forward direction of the vehicle; `None` until it is known within 10 degrees.
     pub forward: Option<Forward>,
+    /// Gain of the yaw gyro, by courses; `None` until they have shown it.
+    pub gain: Option<Gain>,
 }
 
 impl Learned {
@@ -35,6 +38,7 @@ impl Learned {
         specific_force: None,
         vertical: Vertical::UNKNOWN,
         forward: None,
+        gain: None,
     };
 
     /// Returns whether a specific force at rest shows that the sensor has moved.
@@ -74,7 +78,7 @@ impl Learned {
 
 impl Record for Learned {
     const KEY: u8 = 7;
-    const VERSION: u8 = 2;
+    const VERSION: u8 = 3;
 
     fn check(&self) -> Result<(), FieldError> {
         if !self.bias_curve.is_plausible() {
@@ -85,6 +89,9 @@ impl Record for Learned {
         }
         if !self.forward.is_none_or(|forward| forward.is_plausible()) {
             return Err(FieldError::Implausible(Field::Forward));
+        }
+        if !self.gain.is_none_or(|gain| gain.is_plausible()) {
+            return Err(FieldError::Implausible(Field::Gain));
         }
         Ok(())
     }

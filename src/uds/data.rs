@@ -8,6 +8,7 @@ use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, decode, nrc, put, put_record};
 use super::security::{self, Security};
 use crate::fog::FogCounters;
+use crate::heading::CourseCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters};
 use crate::service::message::{AccessCounters, AllCounters, LineCounters, Refusal};
 use crate::service::{Device, MappedSlots};
@@ -58,7 +59,7 @@ const fn write_only(id: u16, name: &'static str, bytes: &'static str, content: &
 }
 
 /// All data identifiers.
-pub const IDENTIFIERS: [Identifier; 26] = [
+pub const IDENTIFIERS: [Identifier; 27] = [
     read_only(0xF186, "session", "1", "session: 1 default, 2 programming, 3 extended"),
     read_only(0xF189, "firmware_version", "1, 1, 1", "version of the firmware"),
     read_only(0xF18C, "serial_number", "text", "serial number of the chip, 24 hexadecimal digits"),
@@ -129,6 +130,12 @@ pub const IDENTIFIERS: [Identifier; 26] = [
         "level",
         "1, 2, 2, 2",
         "tilt of the sensor beyond the configured mounting, by standstills and turns: 0 unknown, 1 coarse, 2 within 3 deg; roll, pitch, their sigma, all three 1/100 deg",
+    ),
+    read_only(
+        0x0119,
+        "course",
+        "1, 2, 2, 4, 4, 4",
+        "gain of the yaw gyro by courses: 0 unknown, 1 coarse, 2 fine, 3 they contradict the gyro; gain and sigma, 1e-5; courses used, refused, and starts of the heading after contradictions",
     ),
 ];
 
@@ -243,6 +250,13 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             angles
                 .into_iter()
                 .try_for_each(|angle| put(out, &(libm::roundf(100.0 * angle) as i16).to_be_bytes()))
+        }
+        0x0119 => {
+            let (course, knowledge) = device.course();
+            let codes = course.gain.map_or([0.0, 0.0], |gain| [gain.share, gain.sigma]);
+            put(out, &[knowledge as u8])?;
+            codes.iter().try_for_each(|share| put(out, &(libm::roundf(1e5 * share) as i16).to_be_bytes()))?;
+            put_words(out, &words!(course.counters => CourseCounters { used, refused, restarts }))
         }
         0x0117 => {
             let (wheels, stands) = device.standing();

@@ -63,6 +63,7 @@ enum Cause {
     Crash,
     Clock,
     Can,
+    Course,
     AccessRefused,
 }
 
@@ -85,13 +86,14 @@ impl Cause {
             Self::Crash => now.crashed,
             Self::Clock => now.clock_fault,
             Self::Can => now.can_fault,
+            Self::Course => now.course_contradicts,
             Self::AccessRefused => now.access_refused,
         }
     }
 }
 
 /// All troubles.
-pub static TROUBLES: [Trouble; 14] = [
+pub static TROUBLES: [Trouble; 15] = [
     trouble(
         0x5A01,
         0x31,
@@ -152,6 +154,13 @@ pub static TROUBLES: [Trouble; 14] = [
         "wheels: silent, or they contradict the gyro",
         "wheel frames, radius, slip",
         Cause::Fault(Faults::WHEELS),
+    ),
+    trouble(
+        0xDA04,
+        0x62,
+        "course: contradicts the gyro",
+        "the GNSS receiver, its antenna; who else sends courses",
+        Cause::Course,
     ),
     trouble(
         0xDA03,

@@ -7,6 +7,7 @@ use crate::synthetic::turning;
 use embedded_storage::nor_flash::ReadNorFlash;
 use gyronet::Coprocessor;
 use gyronet::bias::{BiasCurve, CurveFilter};
+use gyronet::heading::Gain;
 use gyronet::model::blob::CRC;
 use gyronet::mounting::{Forward, Vertical};
 use gyronet::sample::ImuSample;
@@ -76,6 +77,7 @@ pub fn seeds() -> Vec<Seed> {
         specific_force: Some([SpecificForce(1 << 20); 3]),
         vertical: Vertical::UNKNOWN,
         forward: Some(Forward { direction: [0.6, 0.8, 0.0], sigma: 0.05 }),
+        gain: Some(Gain { share: 0.008, sigma: 0.001, of: 0 }),
     };
     // The first sector, as it is in flash.
     let mut raw = vec![0; 1 + SECTOR];

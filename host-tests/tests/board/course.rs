@@ -10,7 +10,7 @@ use gyronet::can::{DataFrame, config};
 use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::replay;
-use gyronet_host_tests::winding::{BIAS, Winding};
+use gyronet_host_tests::winding::{BIAS, GAIN, Winding};
 use std::time::Duration;
 
 const ANGLE: u16 = 0x1A1;
@@ -72,11 +72,36 @@ fn courses_on_the_bus_teach_the_bias_and_hold_the_heading() {
     let yaws: Vec<f64> = yaws.map(|data| AngleMessage::parse(data).expect("eight bytes").deg()).collect();
     let turned = (vehicle.headings[vehicle.headings.len() - 1] - vehicle.headings[from]).to_degrees();
     let off = (yaws[yaws.len() - 1] - yaws[0] - turned + 180.0).rem_euclid(360.0) - 180.0;
+    // The gain takes twenty minutes to learn.
+    let by_gain = GAIN * turned;
     println!(
-        "{TEST}: {off:.2} deg in 15 s without courses, {:.2} by the bias alone",
+        "{TEST}: {off:.2} deg in 15 s without courses, {by_gain:.2} of it by the gain; {:.2} by the bias alone",
         BIAS.to_degrees() * 15.0
     );
-    assert!(yaws.len() > 1_490 && off.abs() < 0.5, "{} sets, {off} deg", yaws.len());
+    assert!(yaws.len() > 1_490 && (off - by_gain).abs() < 0.3, "{} sets, {off} deg, {by_gain}", yaws.len());
+
+    // Another vehicle's courses teach nothing; the gain's state and a trouble say that they contradict the gyro.
+    let gain = |frames: &[DataFrame]| {
+        let last = frames.iter().filter_map(|frame| content(frame, STATUS_ID)).last().expect("one a second");
+        u16::from_le_bytes([last[3], last[4]]) >> 7 & 7
+    };
+    assert_ne!(gain(&held), Knowledge::Refused as u16);
+    let mut other = Winding::new(8);
+    for _ in 0..500 {
+        other.sample();
+    }
+    let mut contradicted = Vec::new();
+    for second in 0..17 {
+        other.headings.push(other.headings[other.headings.len() - 1] + 1.5 + f64::from(second));
+        board.can_send(&other.course());
+        contradicted = drive(&mut board, &mut vehicle, 1, false);
+    }
+    let (state, _, courses) = service::on_line(&mut board).course().expect("a response");
+    println!("{TEST}: {courses:?}");
+    assert_eq!((gain(&contradicted), state), (Knowledge::Refused as u16, 3));
+    assert!(courses.refused >= 10 && courses.restarts >= 1, "{courses:?}");
+    let trouble = service::on_line(&mut board).ask(&[0x19, 6, 0xDA, 0x04, 0x62, 1]).expect("a response");
+    assert_eq!(trouble[..5], [6, 0xDA, 0x04, 0x62, 0x2F], "present, pending and confirmed");
     let counters = common::counters(&mut board);
     assert_eq!((counters.lines.frames_lost, counters.inputs.heading_errors), (0, 0));
 }

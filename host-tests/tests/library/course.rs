@@ -1,6 +1,6 @@
 //! Courses: what the board learns from them while it drives, and what false ones must not teach it.
 
-use gyronet::heading::Heading;
+use gyronet::heading::{Gain, Heading};
 use gyronet::health::slow::Knowledge;
 use gyronet::health::{Quality, Status};
 use gyronet::pipeline::{BoardState, Output, Pipeline, PipelineConfig};
@@ -27,8 +27,16 @@ struct Drive<'a> {
 
 /// The pipeline after a drive of `seconds`, its outputs, and the true headings of every sample.
 fn drive(seconds: usize, drive: &Drive<'_>) -> (Pipeline, Vec<Output>, Vec<f64>) {
+    drive_with(PipelineConfig::DEFAULT, seconds, drive)
+}
+
+fn drive_with(
+    config: PipelineConfig,
+    seconds: usize,
+    drive: &Drive<'_>,
+) -> (Pipeline, Vec<Output>, Vec<f64>) {
     let mut noise = Noise::new(7);
-    let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
+    let mut pipeline = Pipeline::new(config);
     let mut network = constant(0.0);
     let (mut outputs, mut headings) = (Vec::new(), Vec::new());
     let mut heading = 1.0;
@@ -109,6 +117,25 @@ fn the_gain_is_learnt_where_the_vehicle_turns_both_ways() {
     println!("gain {gain:.5}, sigma {sigma:?}");
     assert!((f64::from(gain) - GAIN).abs() < 0.002, "{gain}");
     assert!(pipeline.status(None).gain != Knowledge::Unknown);
+
+    // At the next start it holds from the first sample on, without a course.
+    let known = pipeline.course_state().gain.map(Gain::aged);
+    assert!(known.is_some_and(|known| known.sigma < 0.002), "{known:?}");
+    let config = PipelineConfig { gain: known, ..PipelineConfig::DEFAULT };
+    let without = Drive { stands: 5, creeps: 0.0, turn: &|_| 0.3, course: &|_, _| None };
+    let (pipeline, outputs, headings) = drive_with(config, 60, &without);
+    assert_eq!(pipeline.status(None).gain, Knowledge::Coarse);
+    let (_, alone, _) = drive(60, &without);
+    let [with, alone] = [&outputs, &alone].map(|outputs| error(outputs, &headings, 50).abs().to_degrees());
+    println!(
+        "a circle of 50 s without courses: {with:.2} deg with the gain of the drive before, {alone:.2} without"
+    );
+    assert!(with < 0.35 * alone);
+    // A sensor that hangs differently has another gain.
+    let mut moved = pipeline;
+    moved.mount_moved();
+    let (share, sigma) = moved.gain();
+    assert!(share == 0.0 && sigma.is_some_and(|sigma| sigma > 0.004_9), "{share} {sigma:?}");
 }
 
 #[test]

@@ -8,6 +8,7 @@ use crate::regions::{Records, Weights};
 use crate::ring::Ring;
 use crate::stm32f405::{clocks, timer};
 use gyronet::coprocessor::Coprocessor;
+use gyronet::heading::CourseState;
 use gyronet::health::{Faults, Status, count};
 use gyronet::model::background::BackgroundCheck;
 use gyronet::mounting::Vertical;
@@ -90,8 +91,9 @@ impl Idle {
 
     /// Does a bounded piece of work, and returns the faults that were found.
     #[inline(never)]
-    pub fn step(&mut self, counters: &mut AllCounters) -> Found {
+    pub fn step(&mut self, counters: &mut AllCounters, course: &CourseState) -> Found {
         self.observe();
+        self.device.learn_course(course);
         if let Some(result) = self.bring_up.as_mut().and_then(BringUp::step) {
             self.device.sensor(result);
         }

@@ -6,6 +6,7 @@ mod settings;
 use super::Common;
 use clap::Subcommand;
 use gyronet::can::diagnosis::DiagnosisIds;
+use gyronet::heading::CourseCounters;
 use gyronet::model::Blob;
 use gyronet::model::fognet_blob::FOGNET;
 use gyronet::service::message::{AccessCounters, Info};
@@ -149,6 +150,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             } else {
                 print_info(&info, device.access()?.state)?;
                 print_tilt(device.level_deg()?)?;
+                print_course(device.course()?)?;
             }
         }
         Action::Get => settings::print(&device.configuration()?, json)?,
@@ -255,6 +257,20 @@ fn print_tilt(tilt: Option<[f32; 3]>) -> io::Result<()> {
         }
         None => writeln!(out, "tilt          unknown: the vehicle has not stood yet"),
     }
+}
+
+fn print_course((state, [gain, sigma], counters): (u8, [f32; 2], CourseCounters)) -> io::Result<()> {
+    let CourseCounters { used, refused, restarts } = counters;
+    let text = match state {
+        _ if counters == CourseCounters::default() && sigma == 0.0 => "no courses yet".to_owned(),
+        3 => format!("contradicts the gyro: {refused} courses refused, {used} used, {restarts} starts again"),
+        _ => format!(
+            "{used} courses used, {refused} refused; gain of the gyro {:+.2} % +- {:.2} %",
+            100.0 * gain,
+            100.0 * sigma
+        ),
+    };
+    writeln!(io::stdout().lock(), "course        {text}")
 }
 
 fn log(device: &mut Board, json: bool) -> super::Result {

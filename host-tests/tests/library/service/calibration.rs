@@ -2,6 +2,7 @@
 
 use super::{Board, sample, start};
 use gyronet::bias::{BiasCurve, CurveFilter};
+use gyronet::heading::Gain;
 use gyronet::health::{Faults, Status};
 use gyronet::mounting::{Forward, GyroMap, Vertical};
 use gyronet::sample::{Standstill, WheelSample};
@@ -141,6 +142,7 @@ fn what_was_learnt_fits_a_response_and_a_record() {
         specific_force: Some([SpecificForce(-10_000_000); 3]),
         vertical: Vertical::UNKNOWN,
         forward: Some(Forward { direction: [-0.577; 3], sigma: 0.171 }),
+        gain: Some(Gain { share: -0.05, sigma: 0.002, of: u32::MAX }),
     };
     let record = postcard::to_stdvec(&learned).expect("there is room");
     assert!(record.len() + 4 <= MAX_MESSAGE, "{} bytes", record.len());

@@ -4,6 +4,7 @@
 use super::uds::{Bench, bench};
 use super::{Board, sample, start};
 use gyronet::bias::StaticConfig;
+use gyronet::heading::{CourseCounters, CourseState, Gain};
 use gyronet::health::slow::Knowledge;
 use gyronet::health::{Faults, Status};
 use gyronet::mounting::{Forward, Vertical, VerticalEstimator};
@@ -333,4 +334,78 @@ fn a_tilt_is_kept_and_dropped_when_the_sensor_was_moved() {
     assert_eq!(kept.board.learned().vertical, Vertical::UNKNOWN, "nothing is learnt");
     kept.expect(&[0x3E, 0], &[0x7E, 0]);
     assert_eq!(start(&flash).learned().vertical, Vertical::UNKNOWN);
+}
+
+#[test]
+fn a_gain_by_courses_is_kept_less_certain_and_dropped_when_the_sensor_was_moved() {
+    let (flash, mut bench) = bench();
+    let mut configuration = Configuration::DEFAULT;
+    configuration.heading.nmea2000 = true;
+    assert_eq!(bench.board.set_configuration(&configuration), Ok(()));
+    let read = [0x22, 0x01, 0x19];
+    let response = |state: u8, counters: [u32; 3], gain: [i16; 2]| {
+        let words = counters.map(u32::to_be_bytes).concat();
+        [&[0x62, 0x01, 0x19, state][..], &gain.map(i16::to_be_bytes).concat(), &words].concat()
+    };
+    bench.expect(&read, &response(0, [0; 3], [0; 2]));
+    let of = configuration.pipeline(&Calibration::NONE, &Learned::NOTHING, 7).gain_of;
+    let gain = |sigma| Gain { share: -0.008, sigma, of };
+    let counters = CourseCounters { used: 900, refused: 2, restarts: 0 };
+    let seen = |sigma| CourseState { counters, gain: Some(gain(sigma)), ..CourseState::START };
+    bench.board.learn_course(&seen(0.003));
+    assert_eq!(bench.board.learned().gain, None, "too uncertain to be kept");
+    for sigma in [0.002, 0.0015, 0.001] {
+        bench.board.learn_course(&seen(sigma));
+    }
+    bench.expect(&read, &response(2, [900, 2, 0], [-800, 100]));
+    observe(&mut bench.board, 4, (0.01, 20), LEVEL, Standstill::Still);
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+
+    let mut kept = Bench::new(&flash);
+    assert_eq!(kept.board.learned().gain, Some(gain(0.001)));
+    let used = |configuration: &Configuration, weights: u32| {
+        configuration.pipeline(&Calibration::NONE, kept.board.learned(), weights).gain
+    };
+    let given = used(&configuration, 7).expect("it is used");
+    assert!(given.share == -0.008 && (given.sigma - 0.001_887).abs() < 1e-6, "{given:?}");
+    assert_eq!(used(&configuration, 8), None, "another model");
+    assert_eq!(used(&Configuration::DEFAULT, 7), None, "no courses are configured");
+    assert_eq!(used(&Configuration { learn: false, ..configuration }, 7), None);
+    // The sensor hangs on its side now.
+    observe(&mut kept.board, 4, (0.01, 20), [0.0, 9.81, 0.0], Standstill::Still);
+    assert!(kept.board.take_mount_moved());
+    kept.board.learn_course(&seen(0.001));
+    assert_eq!(kept.board.learned().gain, None);
+    kept.expect(&[0x3E, 0], &[0x7E, 0]);
+    assert_eq!(start(&flash).learned().gain, None);
+    // What was forgotten is learnt from the next start on.
+    let mut board = start(&flash);
+    board.learn_course(&seen(0.001));
+    observe(&mut board, 1, (0.01, 20), LEVEL, Standstill::Still);
+    assert_eq!(board.forget_learned(), Ok(()));
+    board.learn_course(&seen(0.001));
+    assert_eq!(board.learned().gain, None);
+}
+
+#[test]
+fn courses_that_contradict_the_gyro_are_a_trouble() {
+    let (_flash, mut bench) = bench();
+    let status = |bench: &mut Bench, status: u8| {
+        bench.expect(
+            &[0x19, 6, 0xDA, 0x04, 0x62, 1],
+            &[0x59, 6, 0xDA, 0x04, 0x62, status, 1, u8::from(status & 8 != 0)],
+        );
+    };
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    status(&mut bench, 0);
+    let counters = CourseCounters { used: 10, refused: 11, restarts: 1 };
+    bench.board.learn_course(&CourseState { counters, is_contradicted: true, gain: None });
+    bench.expect(
+        &[0x22, 0x01, 0x19],
+        &[0x62, 0x01, 0x19, 3, 0, 0, 0, 0, 0, 0, 0, 10, 0, 0, 0, 11, 0, 0, 0, 1],
+    );
+    status(&mut bench, 0x2F);
+    bench.board.learn_course(&CourseState::START);
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    status(&mut bench, 0x2E);
 }

@@ -5,6 +5,7 @@ use crate::client::bus::Bus;
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::wheel::WheelSettings;
 use gyronet::fog::FogCounters;
+use gyronet::heading::CourseCounters;
 use gyronet::health::{Counters, InputCounters, MonitorCounters};
 use gyronet::service::calibrate::{State, Task};
 use gyronet::service::event::LogPage;
@@ -36,6 +37,7 @@ const ACCESS_COUNTERS: u16 = 0x0113;
 const LEARNED: u16 = 0x0115;
 const FORWARD: u16 = 0x0116;
 const LEVEL: u16 = 0x0118;
+const COURSE: u16 = 0x0119;
 pub const COUNTERS: [u8; 7] = {
     let [a, b] = PIPELINE_COUNTERS.to_be_bytes();
     let [c, d] = INPUT_COUNTERS.to_be_bytes();
@@ -124,6 +126,14 @@ impl<B: Bus> Device<B> {
             }
             _ => Err(DeviceError::Mismatch),
         }
+    }
+
+    /// Returns how well the gain is known by courses, its code, the gain and its sigma, and the counters of courses.
+    pub fn course(&mut self) -> Result<(u8, [f32; 2], CourseCounters)> {
+        let content = self.read(COURSE)?;
+        let [state, a, b, c, d, words @ ..] = content.as_slice() else { return Err(DeviceError::Mismatch) };
+        let gain = [[*a, *b], [*c, *d]].map(|code| f32::from(i16::from_be_bytes(code)) * 1e-5);
+        Ok((*state, gain, Words(words).fields()?))
     }
 
     /// Makes the board forget what it has learnt about its sensor.
