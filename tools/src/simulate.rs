@@ -14,6 +14,7 @@
 
 pub mod car;
 pub mod csv;
+pub mod gnss;
 pub mod leg;
 pub mod mems;
 pub mod purpose;
@@ -23,6 +24,7 @@ pub mod warming;
 
 use crate::drive::DT;
 use car::Car;
+use gnss::Gnss;
 use mems::Mems;
 use route::Route;
 use vibration::Vibration;
@@ -38,6 +40,8 @@ pub struct Config {
     pub mems: mems::Config,
     /// A trip on which the part warms up; it replaces the part's bias.
     pub warming: Option<warming::Config>,
+    /// A GNSS receiver.
+    pub gnss: Option<gnss::Config>,
 }
 
 impl Config {
@@ -49,6 +53,7 @@ impl Config {
         vibration: vibration::Config::DEFAULT,
         mems: mems::Config::DEFAULT,
         warming: None,
+        gnss: None,
     };
 }
 
@@ -69,6 +74,8 @@ pub struct Sample {
     pub speed: f64,
     /// Temperature of a part that warms up, deg C.
     pub celsius: Option<f64>,
+    /// A course that arrives with the sample.
+    pub course: Option<gnss::Course>,
 }
 
 /// An endless iterator over the samples of a drive.
@@ -78,6 +85,7 @@ pub struct Simulation {
     vibration: Vibration,
     mems: Mems,
     warming: Option<Warming>,
+    gnss: Option<Gnss>,
     tick: u32,
 }
 
@@ -96,6 +104,7 @@ impl Simulation {
                 None => Mems::new(&config.mems, seed),
             },
             warming: warming.map(|warming| Warming::new(&warming, seed)),
+            gnss: config.gnss.map(|gnss| Gnss::new(&gnss, seed)),
             tick: 0,
         }
     }
@@ -126,6 +135,7 @@ impl Iterator for Simulation {
             wheels: self.car.wheels(&motion),
             speed: motion.speed,
             celsius: warm.map(|(celsius, _)| celsius),
+            course: self.gnss.as_mut().and_then(|gnss| gnss.step(motion.heading_rate, motion.speed)),
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Common, WriteError, print_json, remark};
 use gyronet_tools::simulate::warming::{self, Trip};
-use gyronet_tools::simulate::{Config, csv};
+use gyronet_tools::simulate::{Config, csv, gnss};
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::PathBuf;
@@ -22,6 +22,7 @@ Examples:
   gyronet simulate --out drive.csv
   gyronet simulate --seconds 600 --seed 7 --out drive.csv
   gyronet simulate --seconds 1200 --tilt 7,0 --out tilted.csv
+  gyronet simulate --seconds 1800 --gnss 0.5 --out gnss.csv
   gyronet simulate --trip motorway --device 3 --seconds 2160 --out motorway.csv")]
 pub struct Args {
     /// Write the drive to this file.
@@ -42,11 +43,23 @@ pub struct Args {
     /// Seed of the errors that all trips of a sensor share.
     #[arg(long, default_value_t = 1, requires = "trip")]
     device: u64,
+    /// Add the courses of a GNSS receiver with this latency, s (0 to 2).
+    #[arg(long, value_name = "LATENCY", value_parser = latency)]
+    gnss: Option<f64>,
+    /// Let somebody turn the course slowly from this time on, s.
+    #[arg(long, value_name = "SECONDS", requires = "gnss")]
+    spoofed_from: Option<f64>,
+}
+
+fn latency(text: &str) -> Result<f64, String> {
+    let latency = text.parse().ok().filter(|latency| (0.0..=2.0).contains(latency));
+    latency.ok_or_else(|| "not 0 to 2 s".to_owned())
 }
 
 pub fn run(args: &Args, common: Common) -> super::Result {
     let warming = args.trip.map(|trip| warming::Config { trip, device: args.device });
-    let mut config = Config { warming, seconds: args.seconds, seed: args.seed, ..Config::DEFAULT };
+    let gnss = args.gnss.map(|latency_s| gnss::Config { latency_s, spoofed_from_s: args.spoofed_from });
+    let mut config = Config { warming, gnss, seconds: args.seconds, seed: args.seed, ..Config::DEFAULT };
     config.mems.mount = match *args.tilt {
         [] => [0.0; 2],
         [roll, pitch] => [pitch, roll].map(f64::to_radians),

@@ -1,5 +1,6 @@
 //! Writes a simulated drive in the layout of [`crate::drive::recording`].
 
+use super::gnss::Course;
 use super::{Config, Sample, Simulation};
 use gyronet::sample::RATE_HZ;
 use std::io::{self, Write};
@@ -10,10 +11,17 @@ pub const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_x,ref_
 /// Writes a complete drive; returns the number of samples.
 pub fn write(config: &Config, mut out: impl Write) -> io::Result<u32> {
     let temperature = if config.warming.is_some() { ",temp_c" } else { "" };
-    writeln!(out, "{HEADER}{temperature}")?;
+    let gnss = if config.gnss.is_some() { ",course,course_sigma,gnss_speed" } else { "" };
+    writeln!(out, "{HEADER}{temperature}{gnss}")?;
     let samples = config.seconds * RATE_HZ;
     for sample in Simulation::new(config).take(samples as usize) {
         row(&sample, &mut out)?;
+        match sample.course {
+            Some(Course { course, sigma, speed }) => write!(out, ",{course:.5},{sigma:.5},{speed:.3}")?,
+            None if config.gnss.is_some() => write!(out, ",,,")?,
+            None => {}
+        }
+        writeln!(out)?;
     }
     out.flush()?;
     Ok(samples)
@@ -29,15 +37,18 @@ fn row(sample: &Sample, out: &mut impl Write) -> io::Result<()> {
     if let Some(celsius) = sample.celsius {
         write!(out, ",{celsius:.2}")?;
     }
-    writeln!(out)
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::drive::recording::Recording;
+    use crate::simulate::gnss;
     use crate::simulate::warming::{self, Trip};
+    use gyronet::heading::Heading;
     use gyronet::units::CentiCelsius;
+    use std::f64::consts::{PI, TAU};
 
     #[test]
     fn what_is_written_can_be_read() {
@@ -52,6 +63,30 @@ mod tests {
         assert!((row.reference.unwrap() - sample.reference[2]).abs() < 1e-6);
         assert!((row.wheels[3].unwrap() - sample.wheels[3]).abs() < 1e-6);
         assert_eq!((row.sample.temperature, sample.celsius), (None, None));
+    }
+
+    #[test]
+    fn courses_come_late_and_not_in_outages() {
+        let mut bytes = Vec::new();
+        let gnss = Some(gnss::Config { latency_s: 1.5, spoofed_from_s: None });
+        let config = Config { seconds: 600, gnss, ..Config::DEFAULT };
+        write(&config, &mut bytes).unwrap();
+        let recording = Recording::parse("a.csv", &bytes[..]).unwrap();
+        let (mut heading, mut headings, mut used) = (0.0, Vec::new(), 0);
+        for row in &recording.rows {
+            heading += 0.01 * row.reference.unwrap();
+            headings.push(heading);
+            let Some(Heading { course: Some(course), course_sigma: Some(sigma), .. }) = row.heading else {
+                continue;
+            };
+            let due = headings[headings.len() - 151];
+            let off = (f64::from(course) + due + PI).rem_euclid(TAU) - PI;
+            assert!(off.abs() < 5.0 * f64::from(sigma) + 1e-3, "{off} {sigma}");
+            let seconds = headings.len() / 100;
+            assert!(seconds >= 30 && seconds % 300 < 240);
+            used += 1;
+        }
+        assert!(used > 300, "{used}");
     }
 
     #[test]

@@ -18,6 +18,7 @@ pub enum Purpose {
     Magnetometer,
     DeviceWarming,
     Warming,
+    Gnss,
 }
 
 impl Purpose {
