@@ -19,7 +19,7 @@ pub(crate) use estimator::{FINE_BIAS, gain_knowledge};
 pub use gain::Gain;
 pub use receiver::{HeadingConfigError, HeadingReceiver, HeadingSettings, Received};
 
-use embedded_can::{ExtendedId, Frame, Id};
+use embedded_can::{Frame, Id};
 
 /// Course and speed over ground.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -33,16 +33,6 @@ pub struct Heading {
     pub speed: Option<f32>,
     /// Accuracy of the speed, 1 sigma, m/s.
     pub speed_sigma: Option<f32>,
-}
-
-/// Position on the Earth, degrees, north and east positive.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Position {
-    /// Latitude, -90 to 90 deg.
-    pub latitude_deg: f64,
-    /// Longitude, -180 to 180 deg.
-    pub longitude_deg: f64,
 }
 
 /// The reason why a frame gives no heading.
@@ -107,11 +97,6 @@ fn group(frame: &impl Frame, group: u32) -> Option<Result<[u8; 8], HeadingError>
     let found = id.as_raw() >> 8 & 0x3_FFFF;
     let data = frame.data();
     (found == group).then(|| data.try_into().map_err(|_| HeadingError::Short(data.len())))
-}
-
-/// Makes the identifier of a parameter group sent to all, with priority 0 to 7.
-const fn group_id(group: u32, priority: u8, source: u8) -> Option<ExtendedId> {
-    crate::can::j1939::broadcast_id(group, priority, source)
 }
 
 /// Returns a 16-bit number unless it is one of the codes from `from` on, which stand for errors and for no value.

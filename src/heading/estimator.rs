@@ -9,7 +9,8 @@
 //! - courses that follow each other within [`CORRELATION`] count as one;
 //! - the gain is learnt only where the vehicle turns both ways: in a steady circle a growing slip looks like a gain;
 //! - a course far from the expected heading is refused, and one at some distance has bounded influence. After
-//!   [`PATIENCE`] without a match the heading starts again from the course; bias and gain stay what they were. Where two
+//!   [`PATIENCE`] without a match the heading starts again from the course; bias and gain are again what they were with the
+//!   newest of [`MATCHES`] courses that matched well, unless the vehicle has stood since. Where two
 //!   such times show the same drift, the bias is wrong, and becomes uncertain by it. Courses that keep failing teach only
 //!   a heading until they have matched for [`TRUST`];
 //! - after a halt a course may have jumped by half a turn, because the vehicle goes backwards.
@@ -62,6 +63,8 @@ const CORRELATION: f32 = 1.0;
 /// Innovation over its sigma from which a course has no more influence, and from which it is refused.
 const BOUNDED: f32 = 2.0;
 const REFUSED: f32 = 4.0;
+/// The same of one that matches well.
+const WELL: f32 = 1.0;
 /// Time without a course that matches before the heading starts again, samples.
 const PATIENCE: u32 = 10 * RATE_HZ;
 /// Time with courses that match after which failures are forgotten, samples; and so many failures are too many.
@@ -129,6 +132,8 @@ struct Failing {
     trusted: u32,
     /// Courses in a row that match.
     matches: u8,
+    /// Bias and gain with their variances, before the courses that may be false.
+    before: Option<[f32; 4]>,
 }
 
 impl Failing {
@@ -217,7 +222,7 @@ impl Estimator {
             ways: [0.0; 2],
             learns_gain: false,
             is_backwards: false,
-            failing: Failing { since: None, drift: None, times: 0, trusted: 0, matches: 0 },
+            failing: Failing { since: None, drift: None, times: 0, trusted: 0, matches: 0, before: None },
             refusal: None,
             counters: CourseState::START.counters,
         }
@@ -276,6 +281,7 @@ impl Estimator {
     fn walk(&mut self, filter: &mut Filter, turned: f32, stands: bool) {
         let [heading, lag] = self.config.walks.map(|walk| walk * walk * BLOCK_SECONDS);
         filter.turn(turned, BLOCK_SECONDS, stands);
+        self.failing.before.take_if(|_| stands);
         filter.put_variance::<LAG>((filter.variance::<LAG>() + lag).min(1.0));
         filter.put_variance::<HEADING>(filter.variance::<HEADING>() + heading);
         let driven = turned - filter.get::<BIAS>() * BLOCK_SECONDS;
@@ -309,6 +315,7 @@ impl Estimator {
             }
             let driving = self.config.driving;
             filter.put_variance::<BIAS>(filter.variance::<BIAS>() + driving * driving);
+            self.failing.before = Some(learnt(filter));
         }
         let paused = self.last.map_or(u32::MAX, |last| arrived.tick.wrapping_sub(last));
         self.last = Some(arrived.tick);
@@ -344,6 +351,10 @@ impl Estimator {
             self.failing.matches = 0;
             let (since, _) = *self.failing.since.get_or_insert((arrived.tick, off));
             if arrived.tick.wrapping_sub(since) > PATIENCE {
+                if let Some([bias, bias_variance, gain, gain_variance]) = self.failing.before.take() {
+                    filter.restart::<BIAS>(bias, bias_variance);
+                    filter.restart::<GAIN>(gain, gain_variance);
+                }
                 if let Some(drift) = self.failing.start(arrived.tick, off) {
                     filter.put_variance::<BIAS>(filter.variance::<BIAS>() + drift * drift);
                     self.failing = Failing { times: 0, drift: None, ..self.failing };
@@ -367,6 +378,9 @@ impl Estimator {
         filter.put::<LAG>(filter.get::<LAG>().max(least).min(most));
         filter.put::<GAIN>(filter.get::<GAIN>().clamp(-MAX_GAIN, MAX_GAIN));
         self.used = Some(arrived.tick);
+        if ratio < WELL && matches >= MATCHES {
+            self.failing.before = Some(learnt(filter));
+        }
         Ok(())
     }
 
@@ -397,6 +411,11 @@ impl Estimator {
     pub fn counters(&self) -> &CourseCounters {
         &self.counters
     }
+}
+
+/// Returns bias and gain, each with its variance.
+fn learnt(filter: &Filter) -> [f32; 4] {
+    [filter.get::<BIAS>(), filter.variance::<BIAS>(), filter.get::<GAIN>(), filter.variance::<GAIN>()]
 }
 
 /// Returns what a sigma of the gain means.

@@ -1,14 +1,13 @@
 //! Vehicle Direction/Speed of SAE J1939-71 (VDS, PGN 65256): SPN 165 compass bearing, SPN 517 navigation-based speed;
 //! Vehicle Position (VP, PGN 65267): SPN 584 latitude.
 
-use super::{Heading, HeadingError, code, group, group_id, word};
+use super::{Heading, HeadingError, group, word};
 use embedded_can::Frame;
 
 /// Parameter group of direction and speed.
 pub const DIRECTION_SPEED: u32 = 65_256;
 /// Parameter group of the position.
 pub const POSITION: u32 = 65_267;
-const PRIORITY: u8 = 6;
 /// From here on a 16-bit code stands for a parameter's state, an error or no value (J1939-71, 5.1.4).
 const STATES: u16 = 0xFB00;
 /// The same of 32 bits.
@@ -40,12 +39,4 @@ pub fn latitude(frame: &impl Frame) -> Option<Result<Option<f32>, HeadingError>>
         // 1e-7 deg per code, from -210 deg.
         (code < LONG_STATES).then(|| (f64::from(code) * 1e-7 - 210.0) as f32)
     }))
-}
-
-/// Makes a frame with bearing and speed; pitch and altitude are not available.
-#[must_use]
-pub fn direction_speed_frame<F: Frame>(heading: &Heading, source: u8) -> Option<F> {
-    let [c0, c1] = code(heading.course, PER_RAD, u16::MAX);
-    let [s0, s1] = code(heading.speed, PER_SPEED, u16::MAX);
-    F::new(group_id(DIRECTION_SPEED, PRIORITY, source)?, &[c0, c1, s0, s1, 0xFF, 0xFF, 0xFF, 0xFF])
 }

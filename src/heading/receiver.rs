@@ -150,10 +150,9 @@ impl HeadingReceiver {
         let HeadingSettings { nmea2000, j1939, .. } = self.settings;
         let mut read = None;
         if nmea2000 {
-            read = nmea2000::course_speed(frame).map(of_heading).or_else(|| {
-                let position = nmea2000::position(frame)?;
-                Some(position.map(|at| (None, at.map(|at| at.latitude_deg as f32))))
-            });
+            read = nmea2000::course_speed(frame)
+                .map(of_heading)
+                .or_else(|| Some(nmea2000::latitude(frame)?.map(|latitude| (None, latitude))));
         }
         if j1939 && read.is_none() {
             read = j1939::direction_speed(frame)
