@@ -104,11 +104,11 @@ const FINE_GAIN: f32 = 0.0015;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refusal {
     /// It is far from the heading that the gyro shows.
-    Jump,
+    Jump = 1,
     /// It does not change in a turn.
-    Stands,
+    Stands = 2,
     /// The vehicle stands.
-    Standstill,
+    Standstill = 3,
 }
 
 /// A course that has arrived: its tick, direction to the left, variance and weight.
@@ -170,6 +170,8 @@ pub struct CourseState {
     pub counters: CourseCounters,
     /// True while courses contradict the gyro: for 10 s none has matched, and since then they have not for a minute.
     pub is_contradicted: bool,
+    /// Why the newest course taught nothing; `None` where it was used.
+    pub refusal: Option<Refusal>,
     /// The gain, once it is estimated.
     pub gain: Option<Gain>,
 }
@@ -179,6 +181,7 @@ impl CourseState {
     pub const START: Self = Self {
         counters: CourseCounters { used: 0, refused: 0, restarts: 0 },
         is_contradicted: false,
+        refusal: None,
         gain: None,
     };
 }
@@ -394,22 +397,11 @@ impl Estimator {
         self.has_begun() && self.counters.used >= FEW && sqrt(filter.variance::<BIAS>()) <= COARSE_BIAS
     }
 
-    /// Returns why the newest course taught nothing; `None` where it was used.
+    /// Returns what courses have shown, without the gain.
     #[must_use]
-    pub fn refusal(&self) -> Option<Refusal> {
-        self.refusal
-    }
-
-    /// Returns whether courses contradict the gyro.
-    #[must_use]
-    pub fn is_contradicted(&self) -> bool {
-        self.failing.times > 0
-    }
-
-    /// Returns the counters.
-    #[must_use]
-    pub fn counters(&self) -> &CourseCounters {
-        &self.counters
+    pub fn state(&self) -> CourseState {
+        let Self { counters, refusal, failing, .. } = *self;
+        CourseState { counters, refusal, is_contradicted: failing.times > 0, gain: None }
     }
 }
 

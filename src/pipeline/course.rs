@@ -9,7 +9,7 @@ use super::{Pipeline, State};
 use crate::bias::ZeroRate;
 use crate::compensate::Remaining;
 use crate::heading::filter::{BIAS, Filter, GAIN};
-use crate::heading::{CourseCounters, CourseState, FINE_BIAS, Gain, Heading, Refusal, gain_knowledge};
+use crate::heading::{CourseState, FINE_BIAS, Gain, Heading, gain_knowledge};
 use crate::health::slow::Knowledge;
 use crate::mounting::{Rotation, Vertical};
 use crate::sample::Frame;
@@ -37,18 +37,6 @@ impl Pipeline {
     /// Takes a course that arrives now: the vehicle's direction of travel up to two seconds ago.
     pub fn course(&mut self, heading: &Heading) {
         self.state.course.arrived(heading, self.state.tick);
-    }
-
-    /// Returns the counters of courses.
-    #[must_use]
-    pub fn courses(&self) -> &CourseCounters {
-        self.state.course.counters()
-    }
-
-    /// Returns why the newest course taught nothing; `None` where it was used.
-    #[must_use]
-    pub fn course_refusal(&self) -> Option<Refusal> {
-        self.state.course.refusal()
     }
 
     /// Returns the gain that courses have shown, a share, and its sigma once it is estimated.
@@ -108,8 +96,7 @@ impl Pipeline {
     pub fn course_state(&self) -> CourseState {
         let (share, sigma) = self.gain();
         let gain = sigma.map(|sigma| Gain { share, sigma, of: self.config.gain_of });
-        let course = &self.state.course;
-        CourseState { counters: *course.counters(), is_contradicted: course.is_contradicted(), gain }
+        CourseState { gain, ..self.state.course.state() }
     }
 
     /// Forgets the gain: the sensor is mounted differently.

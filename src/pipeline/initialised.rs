@@ -91,14 +91,13 @@ impl Pipeline {
         self.state.sensor_bias.refer();
         let [.., reading] = level.rates_at_rest().map(|rate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC);
         let sigma = self.state.sensor_bias.sigma();
-        let gain = self.config.gain;
-        let zero_rate = zero_rate.map(|config| {
-            let mut zero_rate = ZeroRate::claimed(config, reading, sigma, rest.drift);
-            give_back(zero_rate.filter(), gain);
-            zero_rate
-        });
+        let zero_rate = zero_rate.map(|config| ZeroRate::claimed(config, reading, sigma, rest.drift));
         let zero = level.zero(earth_rate);
         self.state.initialised = Some(Initialised { level, zero, zero_rate, is_coarse: false });
+        let gain = self.config.gain;
+        if let Some(zero_rate) = self.zero_rate_mut() {
+            give_back(zero_rate.filter(), gain);
+        }
         self.state.course.restart();
         Ok(())
     }

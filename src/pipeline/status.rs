@@ -22,7 +22,7 @@ impl Pipeline {
             (false, false) => Knowledge::Unknown,
         };
         let gain = match self.gain_by_course() {
-            _ if self.state.course.is_contradicted() => Knowledge::Refused,
+            _ if self.state.course.state().is_contradicted => Knowledge::Refused,
             _ if self.is_calibrated() => Knowledge::Fine,
             known => known.map_or(Knowledge::Unknown, |(knowledge, _)| knowledge),
         };

@@ -134,8 +134,8 @@ pub const IDENTIFIERS: [Identifier; 27] = [
     read_only(
         0x0119,
         "course",
-        "1, 2, 2, 4, 4, 4",
-        "gain of the yaw gyro by courses: 0 unknown, 1 coarse, 2 fine, 3 they contradict the gyro; gain and sigma, 1e-5; courses used, refused, and starts of the heading after contradictions",
+        "1, 2, 2, 4, 4, 4, 1",
+        "gain of the yaw gyro by courses: 0 unknown, 1 coarse, 2 fine, 3 they contradict the gyro; gain and sigma, 1e-5; courses used, refused, and starts of the heading after contradictions; the newest course: 0 used, 1 far from the gyro's heading, 2 the same in a turn, 3 the vehicle stands",
     ),
 ];
 
@@ -256,7 +256,8 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             let codes = course.gain.map_or([0.0, 0.0], |gain| [gain.share, gain.sigma]);
             put(out, &[knowledge as u8])?;
             codes.iter().try_for_each(|share| put(out, &(libm::roundf(1e5 * share) as i16).to_be_bytes()))?;
-            put_words(out, &words!(course.counters => CourseCounters { used, refused, restarts }))
+            put_words(out, &words!(course.counters => CourseCounters { used, refused, restarts }))?;
+            put(out, &[course.refusal.map_or(0, |refusal| refusal as u8)])
         }
         0x0117 => {
             let (wheels, stands) = device.standing();

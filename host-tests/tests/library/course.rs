@@ -113,7 +113,7 @@ fn a_vehicle_that_never_stands_is_usable_in_20_s_and_good_in_60() {
     let first = |wanted: &dyn Fn(&Output) -> bool| outputs.iter().position(wanted).map(|at| at as f64 * 0.01);
     let usable = first(&|output| output.vehicle.delayed.status != Status::Init).expect("a rate");
     let good = first(&|output| output.vehicle.delayed.quality == Quality::Good).expect("a good rate");
-    println!("usable after {usable} s, good after {good} s, {:?}", pipeline.courses());
+    println!("usable after {usable} s, good after {good} s, {:?}", pipeline.course_state().counters);
     assert!(usable <= 20.0 && good <= 60.0);
     let held = error(&outputs, &headings, 58).to_degrees();
     println!("heading held for a minute: {held:.3} deg");
@@ -168,8 +168,12 @@ fn false_courses_teach_nothing_and_are_counted() {
     for (name, course) in bad {
         let (pipeline, ..) = drive(300, &Drive { course, ..known });
         let moved = (pipeline.bias().rad_per_sec() - without.bias().rad_per_sec()).to_degrees() * 60.0;
-        println!("{name}: bias moved by {moved:+.3} deg/min, {:?}", pipeline.courses());
-        assert!(pipeline.courses().refused > 20, "{name}: {:?}", pipeline.courses());
+        println!("{name}: bias moved by {moved:+.3} deg/min, {:?}", pipeline.course_state().counters);
+        assert!(
+            pipeline.course_state().counters.refused > 20,
+            "{name}: {:?}",
+            pipeline.course_state().counters
+        );
         assert!(moved.abs() < 0.01 && pipeline.gain().0 == 0.0, "{name}: bias moved by {moved} deg/min");
     }
 }

@@ -4,7 +4,7 @@
 use super::uds::{Bench, bench};
 use super::{Board, sample, start};
 use gyronet::bias::StaticConfig;
-use gyronet::heading::{CourseCounters, CourseState, Gain};
+use gyronet::heading::{CourseCounters, CourseState, Gain, Refusal};
 use gyronet::health::slow::Knowledge;
 use gyronet::health::{Faults, Status};
 use gyronet::mounting::{Forward, Vertical, VerticalEstimator};
@@ -345,7 +345,7 @@ fn a_gain_by_courses_is_kept_less_certain_and_dropped_when_the_sensor_was_moved(
     let read = [0x22, 0x01, 0x19];
     let response = |state: u8, counters: [u32; 3], gain: [i16; 2]| {
         let words = counters.map(u32::to_be_bytes).concat();
-        [&[0x62, 0x01, 0x19, state][..], &gain.map(i16::to_be_bytes).concat(), &words].concat()
+        [&[0x62, 0x01, 0x19, state][..], &gain.map(i16::to_be_bytes).concat(), &words, &[0]].concat()
     };
     bench.expect(&read, &response(0, [0; 3], [0; 2]));
     let of = configuration.pipeline(&Calibration::NONE, &Learned::NOTHING, 7).gain_of;
@@ -399,10 +399,11 @@ fn courses_that_contradict_the_gyro_are_a_trouble() {
     bench.expect(&[0x3E, 0], &[0x7E, 0]);
     status(&mut bench, 0);
     let counters = CourseCounters { used: 10, refused: 11, restarts: 1 };
-    bench.board.learn_course(&CourseState { counters, is_contradicted: true, gain: None });
+    let refusal = Some(Refusal::Jump);
+    bench.board.learn_course(&CourseState { counters, is_contradicted: true, refusal, gain: None });
     bench.expect(
         &[0x22, 0x01, 0x19],
-        &[0x62, 0x01, 0x19, 3, 0, 0, 0, 0, 0, 0, 0, 10, 0, 0, 0, 11, 0, 0, 0, 1],
+        &[0x62, 0x01, 0x19, 3, 0, 0, 0, 0, 0, 0, 0, 10, 0, 0, 0, 11, 0, 0, 0, 1, 1],
     );
     status(&mut bench, 0x2F);
     bench.board.learn_course(&CourseState::START);
