@@ -61,7 +61,6 @@ pub enum AlignError {
     /// The time stamp is before the last one.
     #[error("time goes backwards, from {} to {} us", .last.0, .at.0)]
     Backwards {
-        /// The last time stamp.
         last: Micros,
         /// The time stamp of the refused sample.
         at: Micros,
@@ -81,7 +80,6 @@ pub enum AlignError {
     /// The time stamp is more than [`MAX_GAP`] steps from the last one, either way.
     #[error("time jumps from {} to {} us, more than 1 s", .last.0, .at.0)]
     Jump {
-        /// The last time stamp.
         last: Micros,
         /// The time stamp of the refused sample.
         at: Micros,

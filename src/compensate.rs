@@ -114,7 +114,7 @@ impl Entry {
     }
 }
 
-/// What the gyro reads wrong beyond its static bias and the network's estimate.
+/// The gyro's error beyond its static bias and the network's estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Remaining {
     /// At any rate.

@@ -68,7 +68,7 @@ pub struct Observation {
     pub complete: Option<Complete>,
     /// The reason why static initialisation was refused with this sample.
     pub refused: Option<StaticError>,
-    /// What standstills and turns have shown of the vertical, in the sensor's axes, where this sample has changed it.
+    /// The vertical by standstills and turns, in the sensor's axes, where this sample has changed it.
     pub vertical: Option<Vertical>,
 }
 

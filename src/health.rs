@@ -101,7 +101,6 @@ impl Faults {
     /// Frames were dropped because the bus did not accept them, or because a receive queue was full.
     pub const BUS: Self = Self(1 << 7);
 
-    /// Returns the fault that a reading of this validity stands for.
     pub(crate) const fn of(validity: Validity) -> Self {
         match validity {
             Validity::Good => Self::NONE,

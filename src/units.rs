@@ -1,4 +1,4 @@
-//! These types are the fixed-point physical quantities of the integer pipeline.
+//! The fixed-point physical quantities of the integer pipeline.
 //!
 //! Everything between the sensor parser and the CAN payload is integer arithmetic, so that a host and a
 //! microcontroller agree to the last bit. Each quantity is a separate type around its integer code; conversions from

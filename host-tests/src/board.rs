@@ -21,7 +21,6 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Packages that the model needs.
 pub const PACKAGES: &[&str] = &["unicorn"];
 
 /// Returns the ELF file of an image for a board, named by its feature. The test is reported as skipped if the model
@@ -127,7 +126,6 @@ impl Board {
         self.ask("usart_send", json!({ "usart": usart, "hex": hex(bytes), "at_us": micros(time) }));
     }
 
-    /// Takes the bytes that the board has sent.
     pub fn sent(&mut self, usart: usize) -> Vec<u8> {
         self.sent_chunks(usart).into_iter().flat_map(|(_, bytes)| bytes).collect()
     }
@@ -194,7 +192,6 @@ impl Board {
         self.ask("trace", json!({ "peripheral": peripheral, "on": on }));
     }
 
-    /// Reads flash or RAM.
     pub fn read(&mut self, at: At, length: usize) -> Vec<u8> {
         let answer = self.ask("memory_read", place(at, json!({ "length": length })));
         unhex(&answer["hex"])
@@ -223,7 +220,6 @@ impl Board {
         list(&answer["priorities"]).iter().filter_map(Value::as_i64).collect()
     }
 
-    /// Changes a register of the processor.
     pub fn set_register(&mut self, name: &str, value: u32) {
         self.ask("registers", json!({ "set": { name: value } }));
     }

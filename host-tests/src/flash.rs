@@ -44,7 +44,6 @@ impl Cut {
 /// Says why an operation was not done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MockError {
-    /// There is no power.
     PowerCut,
     /// The range is not a word or a sector.
     Alignment,

@@ -13,7 +13,6 @@ const MESSAGES_PER_ROW: usize = 10;
 const FOG_STEP: f64 = 4e-8;
 /// Wheel frames are this many samples apart.
 const WHEEL_INTERVAL: usize = 2;
-/// The vehicle stands for this many samples.
 const STANDING_SAMPLES: usize = 600;
 
 /// Holds the inputs of 10 ms, in order.

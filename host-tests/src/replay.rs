@@ -21,7 +21,6 @@ pub fn turning(number: usize, yaw_rate: f64) -> Vec<u8> {
     message(number, &sample)
 }
 
-/// Returns the bytes of message `number` of an MTi.
 pub fn message(number: usize, sample: &ImuSample) -> Vec<u8> {
     MtData2::of(sample, number as u16).emit().to_vec()
 }
@@ -57,7 +56,6 @@ impl Board {
         Self::configured(&Configuration::DEFAULT, blob)
     }
 
-    /// Returns a board with this configuration and these weights.
     pub fn configured(configuration: &Configuration, blob: Blob<'static>) -> Self {
         let wheels = WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings");
         let config = coprocessor::Config {

@@ -13,7 +13,6 @@ pub fn open(flash: &Rc<RefCell<F405>>) -> Result<Store<Region<RECORD_SECTOR>>, S
     Store::open(Region::new(flash, layout::STORE), 0)
 }
 
-/// Returns both weight slots of a flash.
 pub fn slots(flash: &F405) -> [&[u8]; 2] {
     let bytes = &flash.bytes()[layout::SLOTS.start as usize..layout::SLOTS.end as usize];
     bytes.split_at(SLOT_SIZE).into()

@@ -20,7 +20,6 @@ pub fn road(second: f64) -> f64 {
     0.15 * (TAU * second / 23.0).sin() + 0.1 * (TAU * second / 61.0).sin()
 }
 
-/// The vehicle.
 #[derive(Debug)]
 pub struct Winding {
     noise: Noise,
@@ -46,7 +45,6 @@ impl Winding {
         sample
     }
 
-    /// Returns the course that arrives now.
     pub fn course(&mut self) -> DataFrame {
         let heading = self.headings[self.headings.len().saturating_sub(1 + LATENCY)];
         let course = (-(heading + NOISE * self.receiver.normal())).rem_euclid(TAU) as f32;

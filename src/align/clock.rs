@@ -43,7 +43,6 @@ pub enum ClockError {
     /// The time stamp is before the last one.
     #[error("a sample of {} us arrived after one of {} us", .at.0, .last.0)]
     OutOfOrder {
-        /// The last time stamp.
         last: Micros,
         /// The refused time stamp.
         at: Micros,

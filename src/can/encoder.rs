@@ -1,4 +1,4 @@
-//! This encoder makes the configured frames of one sample of the inertial sensor.
+//! Makes the configured frames of one sample of the inertial sensor.
 
 use super::DataFrame;
 use super::bosch::{LAYOUTS, Motion, SetEncoder, SignalStatus};

@@ -1,4 +1,4 @@
-//! This encoder makes the yaw messages of a fibre-optic gyro (FOG). They are sent from the FOG's first sample on, or
+//! Makes the yaw messages of a fibre-optic gyro (FOG). They are sent from the FOG's first sample on, or
 //! from power-up if a FOG is configured.
 
 use super::DataFrame;

@@ -1,4 +1,4 @@
-//! This encoder makes the three protected yaw messages (rate, angle, detail) from estimates.
+//! Makes the three protected yaw messages (rate, angle, detail) from estimates.
 
 use super::DataFrame;
 use super::e2e::{Profile, Protector};

@@ -13,7 +13,6 @@ use crate::units::{AngularRate, Yaw};
 /// Random walk q of a vehicle's yaw rate, rad/s per square root of a second.
 const WALK: f32 = 0.2;
 
-/// A rate's accumulated yaw.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct AccumulatedYaw {
     yaw: Yaw,
@@ -53,7 +52,6 @@ impl AccumulatedYaw {
         self.hidden = Some((after, before.saturating_add(steps)));
     }
 
-    /// The yaw now.
     pub(crate) fn yaw(&self) -> Yaw {
         self.yaw
     }

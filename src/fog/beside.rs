@@ -61,7 +61,6 @@ impl Beside {
     }
 }
 
-/// The comparison so far.
 #[derive(Debug, Clone)]
 pub(super) struct Comparison {
     beside: Beside,

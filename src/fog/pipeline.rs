@@ -131,7 +131,6 @@ pub struct FogPipeline {
     due: Option<NewSecond>,
     /// An estimate is due at the end of the second.
     awaited: bool,
-    /// The fault of the newest estimate.
     estimate_faults: Faults,
     counters: FogCounters,
 }
@@ -408,7 +407,6 @@ impl Repeats {
     /// The state before the first increment.
     const NONE: Self = Self { newest: None, equal: 0, equal_us: 0 };
 
-    /// Returns the state after a further sample.
     fn after(self, sample: &FogSample) -> Self {
         let [.., newest] = sample.increment;
         if newest.is_none() || newest != self.newest {

@@ -1,4 +1,4 @@
-//! This filter finds the bias of a fibre-optic gyro from its readings while the wheels stand.
+//! Finds the bias of a fibre-optic gyro from its readings while the wheels stand.
 //!
 //! Two sources give the gyro's reading at rest:
 //!

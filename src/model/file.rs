@@ -133,7 +133,6 @@ pub enum BlobError {
     },
 }
 
-/// Returns the name of the network that a topology belongs to.
 fn network_name([network, ..]: &Topology) -> &'static str {
     if *network == FOGNET { "FoGNet" } else { "GyroNet" }
 }
@@ -157,7 +156,6 @@ pub(super) const fn header_len(inputs: usize) -> usize {
     32 + 8 * inputs
 }
 
-/// Returns the number of bytes of one direction.
 pub(super) const fn direction_len(units: usize, inputs: usize) -> usize {
     4 * (DirectionWeights::input_words(units, inputs) + DirectionWeights::recurrent_words(units))
 }

@@ -1,4 +1,4 @@
-//! These functions normalise codes to the input of a first layer, for both networks.
+//! Normalises codes to the input of a first layer, for both networks.
 
 use super::file::Normalisation;
 use crate::nn::{bilstm, pack};

@@ -128,7 +128,6 @@ pub struct NewSecond {
 #[derive(Debug, Clone)]
 pub struct Minute {
     seconds: Ring<Second, STEPS>,
-    /// Number of the newest second.
     newest: u32,
 }
 

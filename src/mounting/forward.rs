@@ -72,7 +72,6 @@ pub struct ForwardEstimator {
     count: f32,
 }
 
-/// Holds the sums of the current second.
 #[derive(Debug, Clone, Copy)]
 struct Second {
     samples: u32,

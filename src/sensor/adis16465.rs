@@ -1,4 +1,4 @@
-//! This driver reads Analog Devices ADIS16465 and ADIS16470 over SPI (mode 3).
+//! Reads Analog Devices ADIS16465 and ADIS16470 over SPI (mode 3).
 //!
 //! One burst read returns all values: the command 68 00, then the twenty bytes of a [`Burst`], at 1 MHz at most. This
 //! file does the SPI transfer; `burst` parses the bytes without I/O.

@@ -1,25 +1,21 @@
 //! Reads the KVH DSP-1760 fibre-optic gyro (and the 1725, 1750, 1775 units, which use the same
-//! messages): RS-422, 921600 baud 8N1 at 1000 messages a second.
+//! messages): RS-422, 921600 baud 8N1.
 //!
-//! A message does not say whether rotations are increments or rates, radians or degrees: [`Dsp1760Config`] does.
-//! Formats A and C carry no time stamp, only a sequence number; their time is the number of messages, lost ones
+//! A message says neither what it measures nor how often it comes. The gyro must be set to what it leaves the factory
+//! with, at 1000 messages a second: increments of the angle, in radians, and whole deg C. Formats A and C carry no time stamp, only a sequence number; their time is the number of messages, lost ones
 //! included, times the period. The sequence number wraps at 128, so it does not reveal a loss of 128 messages or
 //! more. The time stamps of format B reveal it, or the arrival times do ([`crate::align`]).
 
-mod clock;
-mod config;
 mod format;
 mod framing;
 pub mod message;
 
-pub use config::{AngleUnit, Dsp1760Config, OutputRate, Rotation, TemperatureUnit};
 pub use framing::Kvh;
 
 use super::framer::Framer;
 use crate::health::count;
 use crate::sample::{FogSample, StampClock};
 use crate::units::{Angle, CentiCelsius, Micros};
-use clock::MessageClock;
 use framing::is_self_test;
 use message::{Extra, MAX_MESSAGE, MAX_SEQUENCE, Message, MessageError, Validity};
 
@@ -55,17 +51,18 @@ pub struct Dsp1760Counters {
     pub implausible: u32,
 }
 
-/// The gyro's range ends at 490 deg/s. In degrees taken for radians that is 8.6 deg/s.
-const MAX_RATE: f32 = 490.0 * core::f32::consts::PI / 180.0;
+/// The time from one message to the next, microseconds.
+const PERIOD_US: u32 = 1_000;
+/// The gyro's range ends at 490 deg/s, rad in a period. In degrees taken for radians that is 8.6 deg/s.
+const MAX_INCREMENT: f32 = 490.0 * core::f32::consts::PI / 180.0 * 1e-6 * PERIOD_US as f32;
 
 /// The parser of a DSP-1760: converts bytes to increments with unwrapped time.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Dsp1760 {
-    config: Dsp1760Config,
     framer: Framer<Kvh, MAX_MESSAGE>,
     last_sequence: Option<u8>,
-    /// Counts all messages, lost ones included.
-    messages: MessageClock,
+    /// All messages, lost ones included, times the period, microseconds.
+    time: u64,
     /// Unwraps the time stamps of format B.
     stamps: StampClock,
     counters: Dsp1760Counters,
@@ -73,12 +70,11 @@ pub struct Dsp1760 {
 
 impl Dsp1760 {
     /// Creates a parser that has received nothing.
-    pub const fn new(config: Dsp1760Config) -> Self {
+    pub const fn new() -> Self {
         Self {
-            config,
             framer: Framer::new(),
             last_sequence: None,
-            messages: MessageClock::START,
+            time: 0,
             stamps: StampClock::START,
             counters: Dsp1760Counters { gaps: 0, lost: 0, repeated: 0, self_tests: 0, implausible: 0 },
         }
@@ -141,46 +137,27 @@ impl Dsp1760 {
         let lost = u32::from(steps) - 1;
         count(&mut self.counters.gaps, u32::from(lost > 0));
         count(&mut self.counters.lost, lost);
-        let begin = self.messages.advance(self.config.rate, lost);
-        let end = self.messages.advance(self.config.rate, 1);
+        self.time += u64::from(u32::from(steps) * PERIOD_US);
         let (time, temperature) = match message.extra {
-            Extra::Temperature(temperature) => (end, Some(temperature)),
+            Extra::Temperature(temperature) => (self.time, Some(temperature)),
             Extra::Timed { time, temperature } => (self.stamps.unwrap(time), Some(temperature)),
-            Extra::Slow(_) => (end, None),
+            Extra::Slow(_) => (self.time, None),
         };
-        let span = (end - begin) as u32;
-        let increment = self.increments(&message.rotation, message.validity, span);
-        let temperature = temperature.and_then(|code| self.centi_celsius(code));
-        Ok(FogSample { time: Micros(time), span, lost, increment, temperature })
+        let increment = self.increments(&message.rotation, message.validity);
+        let temperature = temperature.and_then(|celsius| celsius.checked_mul(100)).map(CentiCelsius);
+        Ok(FogSample { time: Micros(time), span: PERIOD_US, lost, increment, temperature })
     }
 
     #[inline]
-    fn increments(&mut self, rotation: &[f32; 3], validity: Validity, span: u32) -> [Option<Angle>; 3] {
-        let seconds = span as f32 * 1e-6;
-        let per_unit = match self.config.angle {
-            AngleUnit::Radians => 1.0,
-            AngleUnit::Degrees => core::f32::consts::PI / 180.0,
-        };
-        let scale = match self.config.rotation {
-            Rotation::Delta => per_unit,
-            Rotation::Rate => per_unit * seconds,
-        };
-        let limit = MAX_RATE * seconds;
+    fn increments(&mut self, rotation: &[f32; 3], validity: Validity) -> [Option<Angle>; 3] {
         core::array::from_fn(|axis| {
             if !validity.gyro(axis) {
                 return None;
             }
-            let angle = rotation[axis] * scale;
-            let believed = angle >= -limit && angle <= limit;
+            let angle = rotation[axis];
+            let believed = (-MAX_INCREMENT..=MAX_INCREMENT).contains(&angle);
             count(&mut self.counters.implausible, u32::from(!believed));
             if believed { Angle::from_rad(angle).ok() } else { None }
         })
-    }
-
-    fn centi_celsius(&self, code: i16) -> Option<CentiCelsius> {
-        match self.config.temperature {
-            TemperatureUnit::Hundredths => Some(CentiCelsius(code)),
-            TemperatureUnit::Whole => code.checked_mul(100).map(CentiCelsius),
-        }
     }
 }

@@ -128,7 +128,6 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         self.buffer.get(..self.used)
     }
 
-    /// Drops the frame that was returned.
     fn release(&mut self) {
         self.drop_front(self.used);
         self.used = 0;

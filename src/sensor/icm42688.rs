@@ -1,4 +1,4 @@
-//! This driver reads the TDK ICM-42688-P over SPI (mode 0 or 3, at most 24 MHz).
+//! Reads the TDK ICM-42688-P over SPI (mode 0 or 3, at most 24 MHz).
 //!
 //! [`packet`] parses the entries of its FIFO without I/O, [`registers`] lists its registers, and this file does the
 //! SPI transfers. Every wait is a bounded number of [`DelayNs`] delays. Each call for a sample also reads back one
@@ -19,7 +19,7 @@ use crate::sample::ImuSample;
 use clock::Clock;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{Operation, SpiDevice};
-use packet::{MAX_PACKET, Packet, PacketError};
+use packet::{PACKET, Packet, PacketError};
 use registers::{self as reg, Register, Setting};
 
 /// Largest number of polls of the reset bit, 1 ms apart.
@@ -67,7 +67,6 @@ pub enum Icm42688Error<E> {
 pub struct Icm42688<SPI> {
     spi: SPI,
     config: Icm42688Config,
-    /// Index of the setting to check next.
     next_check: usize,
     clock: Clock,
 }
@@ -118,15 +117,13 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
         let mut waiting = [0; 2];
         let address = [reg::FIFO_COUNTH.address | reg::READ];
         self.transaction(&mut [Operation::Write(&address), Operation::Read(&mut waiting)])?;
-        let bytes = self.config.resolution.bytes();
-        if usize::from(u16::from_be_bytes(waiting)) < bytes {
+        if usize::from(u16::from_be_bytes(waiting)) < PACKET {
             return Ok(None);
         }
-        let mut buffer = [0; MAX_PACKET];
-        let packet = buffer.get_mut(..bytes).unwrap_or_default();
+        let mut packet = [0; PACKET];
         let address = [reg::FIFO_DATA.address | reg::READ];
-        self.transaction(&mut [Operation::Write(&address), Operation::Read(packet)])?;
-        match Packet::parse(self.config.resolution, packet) {
+        self.transaction(&mut [Operation::Write(&address), Operation::Read(&mut packet)])?;
+        match Packet::parse(&packet) {
             Ok(packet) => {
                 let time = self.clock.unwrap(packet.time);
                 packet.sample(time).map(Some).ok_or(Icm42688Error::NoReading)

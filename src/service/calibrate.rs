@@ -52,16 +52,13 @@ pub enum State {
     Failed(Task, CalibrationFault),
 }
 
-/// The result of a calibration.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Finding {
     /// The readings at rest, and the temperature.
     Static(Rest, Option<CentiCelsius>),
-    /// The tilt.
     Mounting(Level),
 }
 
-/// A calibration in progress.
 #[derive(Debug, Clone)]
 pub(crate) struct Calibrator {
     task: Task,

@@ -61,7 +61,6 @@ pub struct Device<R: NorFlash, W> {
     wheels_origin: Origin,
     /// Wheel settings that the next start will use.
     next_wheels: WheelSettings,
-    /// The newest report of the wheels.
     wheels_seen: WheelSample,
     calibration: Calibration,
     calibration_origin: Origin,
@@ -301,7 +300,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.refusal
     }
 
-    /// Records and counts a refusal, and returns it.
     pub(crate) fn refuse_request(&mut self, refusal: Refusal) -> Refusal {
         self.access_counters.count(&refusal);
         self.refusal = Some(refusal);

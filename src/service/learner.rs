@@ -33,7 +33,6 @@ pub struct Learner {
     /// True if the specific force of this standstill has been used.
     has_stood: bool,
     forward: ForwardEstimator,
-    /// The vertical that was stored last.
     vertical: Option<Vertical>,
     /// True if the mounting has changed since earlier drives; nothing is learnt then.
     is_moved: bool,

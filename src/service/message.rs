@@ -223,7 +223,6 @@ impl AccessCounters {
     /// All counters zero.
     pub const NONE: Self = Self { locked: 0, unsigned: 0, answers: 0, signatures: 0, replayed: 0 };
 
-    /// Counts a refusal, if it was for lack of access.
     pub(crate) fn count(&mut self, refusal: &Refusal) {
         let counter = match refusal {
             Refusal::Locked => &mut self.locked,

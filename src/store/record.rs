@@ -39,7 +39,6 @@ const BUFFER: usize = MAX_LEN + 2 * WORD;
 const FEW: u32 = 8;
 /// Layout version that marks a lost record; real layout versions begin at 1.
 const LOST: u8 = 0;
-/// Number of records of access.
 const ACCESS_COPIES: u32 = 2;
 const MAX_KEY: u8 = 7;
 /// Key of the mark that there is a record of access, and of the sector's generation.
@@ -62,7 +61,6 @@ pub trait Record: Serialize + DeserializeOwned {
     fn check(&self) -> Result<(), FieldError>;
 }
 
-/// A record as stored in flash.
 #[derive(Clone, Copy)]
 struct Raw {
     words: [u8; BUFFER],
@@ -404,7 +402,6 @@ impl<F: NorFlash> Store<F> {
         Ok(self.read(at)? == [0xFF; 2 * WORD])
     }
 
-    /// Returns how often a sector holds this record.
     fn count(&mut self, sector: u32, record: &Raw) -> Result<u32, StoreError> {
         let (mut at, mut raw, mut count) = (self.range(sector).start + HEADER, Raw::EMPTY, 0);
         while self.next(sector, &mut at, &mut raw, &mut Seen::default())?.is_some() {

@@ -1,4 +1,4 @@
-//! This record holds the troubles that a workshop has not cleared yet, so that they survive a restart.
+//! The record of the troubles that a workshop has not cleared yet, so that they survive a restart.
 
 use super::error::FieldError;
 use super::record::Record;

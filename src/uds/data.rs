@@ -147,7 +147,6 @@ macro_rules! words {
     }};
 }
 
-/// The sources of the values that are read.
 pub(super) struct Sources<'a, R: NorFlash, W> {
     pub device: &'a Device<R, W>,
     pub counters: &'a AllCounters,

@@ -13,7 +13,6 @@ use embedded_storage::nor_flash::NorFlash;
 /// Address that took FoGNet's file, which this board no longer runs.
 const FOGNET: u32 = 1;
 
-/// A download in progress.
 #[derive(Debug)]
 pub(super) struct Download {
     length: u32,

@@ -53,7 +53,6 @@ impl Trouble {
     }
 }
 
-/// The condition that causes a trouble.
 #[derive(Debug, Clone, Copy)]
 enum Cause {
     Status(Status),

@@ -1,4 +1,4 @@
-//! These functions read values from requests, write values to responses, and map refusals to negative response codes
+//! Reads values from requests, writes values to responses, and maps refusals to negative response codes
 //! (ISO 14229-1 A.1).
 
 use super::isotp::MAX_MESSAGE;
@@ -40,7 +40,6 @@ pub(super) fn put_record(out: &mut Response, record: &impl Serialize) -> Result<
     written.map(|_| ()).map_err(|_| Nrc::ResponseTooLong)
 }
 
-/// Returns the negative response code for a refusal.
 pub(super) fn nrc(refusal: Refusal) -> Nrc {
     match refusal {
         Refusal::Moving | Refusal::NothingFound => Nrc::ConditionsNotCorrect,

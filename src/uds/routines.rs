@@ -12,15 +12,11 @@ use crate::service::{Device, MappedSlots};
 use automotive_diag::uds::RoutineControlType;
 use embedded_storage::nor_flash::NorFlash;
 
-/// Routine that tests the components of the board.
 const SELF_TEST: u16 = 0x0204;
 /// Routine that erases what the board has learnt about its sensor.
 const FORGET: u16 = 0x0205;
-/// Routine that reads the log.
 const LOG: u16 = 0x0203;
-/// Routine that stores the result of a calibration.
 const STORE: u16 = 0x0202;
-/// Routine that activates a download.
 const USE_DOWNLOAD: u16 = 0xFF01;
 
 const REQUEST_RESULT: RoutineControlType = RoutineControlType::RequestRoutineResult;

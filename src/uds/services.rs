@@ -317,7 +317,6 @@ impl Services {
         }
     }
 
-    /// Returns the download in progress.
     fn under_way(&mut self) -> Result<&mut Download, Nrc> {
         self.download.as_mut().ok_or(Nrc::RequestSequenceError)
     }

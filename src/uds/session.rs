@@ -1,4 +1,4 @@
-//! These functions define which session a service needs, and which services have sub-functions (ISO 14229-1).
+//! The session that each service needs, and the services with sub-functions (ISO 14229-1).
 
 use automotive_diag::uds::UdsCommand;
 
@@ -17,7 +17,6 @@ pub enum Session {
     Extended = 3,
 }
 
-/// Returns the session that a service needs.
 pub(super) fn needed(command: UdsCommand, rest: &[u8]) -> Session {
     match command {
         // The log can be read in any session.

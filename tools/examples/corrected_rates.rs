@@ -1,4 +1,4 @@
-//! This example prints the corrected yaw rates of a recorded drive as CSV.
+//! Prints the corrected yaw rates of a recorded drive as CSV.
 //!
 //! `cargo run --release -p gyronet-tools --example corrected_rates -- tools/data/simulated_drive.csv`
 //!

@@ -100,7 +100,6 @@ const SHARES: [(&str, f64, &str); 3] = [
     ("gain", MAX_GAIN_SIGMA, "too few turns, or all alike: the drives cannot tell it from a bias"),
 ];
 
-/// Fits the map of a unit to its drives.
 pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, CalibrateError> {
     let spans: Vec<&[Span]> = drives.iter().map(|drive| drive.spans.as_slice()).collect();
     // A share that the drives hardly show makes the others uncertain, so the least certain one is removed first.

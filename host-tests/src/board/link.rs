@@ -30,7 +30,6 @@ impl Link {
         Self { child, input, output }
     }
 
-    /// Runs one command and returns the answer.
     pub fn ask(&mut self, command: &str, mut arguments: Value) -> Result<Value, String> {
         arguments["command"] = command.into();
         let gone = |error| format!("the model has ended: {error}");
@@ -53,7 +52,6 @@ impl Drop for Link {
     }
 }
 
-/// Returns bytes as hexadecimal digits.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -4,9 +4,9 @@ use super::Seed;
 use crate::wire::{bytes, feed, message, synthetic_frame};
 use gyronet::sensor::adis16465::{BURST, Burst, Model};
 use gyronet::sensor::crc::CRC_32_MPEG_2;
+use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
-use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
-use gyronet::sensor::icm42688::packet::{Packet, Resolution};
+use gyronet::sensor::icm42688::packet::{PACKET, Packet};
 use gyronet::sensor::xsens::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti, Xbus};
 use gyronet::units::Micros;
@@ -42,8 +42,8 @@ pub fn xsens_seeds() -> Vec<Seed> {
 
 /// Passes bytes as a stream to the parser, as a message, and as a message with a valid checksum.
 pub fn dsp1760(data: &[u8]) {
-    let samples = feed(&mut Dsp1760::new(Dsp1760Config::DEFAULT), data);
-    let (mut rest, mut part, mut again) = (data, Dsp1760::new(Dsp1760Config::DEFAULT), Vec::new());
+    let samples = feed(&mut Dsp1760::new(), data);
+    let (mut rest, mut part, mut again) = (data, Dsp1760::new(), Vec::new());
     while !rest.is_empty() {
         rest = &rest[part.receive_some(rest)..];
         again.extend(core::iter::from_fn(|| part.next_sample()));
@@ -74,23 +74,18 @@ pub fn dsp1760_seeds() -> Vec<Seed> {
     vec![("stream", extras.concat()), ("self_test", self_test)]
 }
 
-/// Parses bytes as packets of either kind.
+/// Parses bytes as packets.
 pub fn icm42688(data: &[u8]) {
-    for resolution in [Resolution::Bits16, Resolution::Bits20] {
-        for bytes in data.chunks(resolution.bytes()) {
-            if let Ok(packet) = Packet::parse(resolution, bytes) {
-                assert_eq!(Packet::parse(resolution, &packet.emit()), Ok(packet));
-            }
-        }
+    let (packets, _) = data.as_chunks::<PACKET>();
+    for packet in packets.iter().filter_map(|bytes| Packet::parse(bytes).ok()) {
+        assert_eq!(Packet::parse(&packet.emit()), Ok(packet));
     }
 }
 
 pub fn icm42688_seeds() -> Vec<Seed> {
-    let packet = |resolution| {
-        let (acceleration, rate) = ([Some(0), Some(-1), Some(2048)], [Some(5), None, Some(-164)]);
-        Packet { resolution, acceleration, rate, temperature: Some(3), time: 1_000 }.emit().to_vec()
-    };
-    vec![("packet_3", packet(Resolution::Bits16)), ("packet_4", packet(Resolution::Bits20))]
+    let (acceleration, rate) = ([Some(0), Some(-1), Some(2048)], [Some(5), None, Some(-164)]);
+    let packet = Packet { acceleration, rate, temperature: Some(3), time: 1_000 };
+    vec![("packet_4", packet.emit().to_vec())]
 }
 
 /// Parses bytes as bursts, unchanged and with a valid sum.

@@ -15,7 +15,7 @@ use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::sample::ImuSample;
 use gyronet::sensor::Source;
 use gyronet::sensor::adis16465::{Adis16465, BURST};
-use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
+use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
 use gyronet::sensor::xsens::Mti;
 use gyronet::service::{Device, SupportedHardware};
@@ -115,7 +115,7 @@ impl Board {
             device: Box::new(Device::new(&HARDWARE)),
             network: GyroNet::new(blob),
             line,
-            fibre_optic: Dsp1760::new(Dsp1760Config::DEFAULT),
+            fibre_optic: Dsp1760::new(),
             waiting: Waiting::default(),
             wire: Wire::default(),
         }

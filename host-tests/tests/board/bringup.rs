@@ -35,7 +35,6 @@ fn lines_of(feature: &str, test: &str, prepare: impl FnOnce(&mut Board)) -> Opti
     Some((board, lines))
 }
 
-/// The verdict and the text on a check.
 fn check<'l>(lines: &'l [String], name: &str) -> (&'l str, &'l str) {
     let line =
         lines.iter().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("no line on {name}"));

@@ -28,7 +28,6 @@ fn latitude(k: usize) -> Configuration {
     Configuration { latitude_deg: Some(k as f32 * 0.125), ..Configuration::DEFAULT }
 }
 
-/// Board time that something takes.
 fn timed<T>(board: &mut Board, work: impl FnOnce(&mut Board) -> T) -> (T, Duration) {
     let begin = board.counts().time;
     let result = work(board);

@@ -79,7 +79,6 @@ fn frame_bytes(id: u32, data: &[u8]) -> [u8; 16] {
     bytes
 }
 
-/// Returns the frames that this host sends.
 fn host() -> Vec<[u8; 16]> {
     let mut settings = WheelSettings::TOYOTA;
     settings.signals.iter_mut().flatten().for_each(|signal| signal.valid_when = None);

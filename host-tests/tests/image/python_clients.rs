@@ -97,7 +97,6 @@ fn python_sums_the_whole_angle_of_a_minute() {
     assert!((sums.plain_error() - 3.6).abs() < 0.001);
 }
 
-/// The sums that Python has read, deg.
 struct Sums {
     frames: u32,
     good: u32,

@@ -34,7 +34,6 @@ struct Run {
 }
 
 impl Cable {
-    /// The part without a fault.
     fn new() -> Self {
         let arrival = |n: u64| {
             let taken = (n + 1) * 1_000;

@@ -61,7 +61,6 @@ fn number(ratio: ClockRatio) -> f64 {
     f64::from(ratio.0) / f64::from(ClockRatio::ONE.0)
 }
 
-/// Returns the distance of the ratio from the true one.
 fn error(estimator: &RatioEstimator, off: f64) -> f64 {
     (number(estimator.ratio()) / (1.0 + off) - 1.0).abs()
 }

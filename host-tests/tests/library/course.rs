@@ -88,7 +88,6 @@ fn drive_with(
     (pipeline, outputs, headings)
 }
 
-/// The heading some seconds ago.
 fn ago(headings: &[f64], seconds: f64) -> Option<f64> {
     headings.len().checked_sub(1 + (seconds * 100.0) as usize).map(|at| headings[at])
 }

@@ -4,31 +4,18 @@ use embedded_hal_mock::eh1::delay::NoopDelay;
 use embedded_hal_mock::eh1::spi::{Mock, Transaction};
 use gyronet::sample::Validity;
 use gyronet::sensor::Source;
-use gyronet::sensor::icm42688::packet::{Packet, PacketError, Resolution};
+use gyronet::sensor::icm42688::packet::{Packet, PacketError};
 use gyronet::sensor::icm42688::registers::{self as reg, Register};
 use gyronet::sensor::icm42688::{Bandwidth, Icm42688, Icm42688Config, Icm42688Error, OutputRate};
 use gyronet::units::{CentiCelsius, Micros};
 use proptest::prelude::*;
 
-/// az 1 g, gz 10 deg/s at 2000 deg/s, 25 deg C, time 1000.
-const PACKET_3: [u8; 16] = [0x68, 0, 0, 0, 0, 8, 0, 0, 0, 0, 0, 0, 0xa4, 0, 3, 0xe8];
 /// az 1 g, gz 10 deg/s, ay -4 and gy -2 counts, 30 deg C, time 1000.
 const PACKET_4: [u8; 20] =
     [0x78, 0, 0, 0xff, 0xff, 8, 0, 0, 0, 0xff, 0xff, 0, 0xa3, 2, 0x96, 3, 0xe8, 0, 0xce, 0x0c];
 
-fn packet_3() -> Packet {
-    Packet {
-        resolution: Resolution::Bits16,
-        acceleration: [0, 0, 2048].map(Some),
-        rate: [0, 0, 164].map(Some),
-        temperature: Some(0),
-        time: 1000,
-    }
-}
-
 fn packet_4() -> Packet {
     Packet {
-        resolution: Resolution::Bits20,
         acceleration: [0, -4, 32_768].map(Some),
         rate: [0, -2, 2620].map(Some),
         temperature: Some(662),
@@ -37,33 +24,25 @@ fn packet_4() -> Packet {
 }
 
 #[test]
-fn packets_are_read_as_the_data_sheet_says() {
-    assert_eq!(Packet::parse(Resolution::Bits16, &PACKET_3), Ok(packet_3()));
-    assert_eq!(Packet::parse(Resolution::Bits20, &PACKET_4), Ok(packet_4()));
-    assert_eq!(packet_3().emit()[..], PACKET_3);
-    assert_eq!(packet_4().emit()[..], PACKET_4);
+fn a_packet_is_read_as_the_data_sheet_says() {
+    assert_eq!(Packet::parse(&PACKET_4), Ok(packet_4()));
+    assert_eq!(packet_4().emit(), PACKET_4);
 }
 
 #[test]
 fn invalid_marks_are_no_readings() {
     let mut bytes = PACKET_4;
     bytes[0] |= 0x80;
-    assert_eq!(Packet::parse(Resolution::Bits20, &bytes), Err(PacketError::Empty));
-    assert_eq!(Packet::parse(Resolution::Bits16, &PACKET_4[..16]), Err(PacketError::Header { got: 0x78 }));
-    for length in (0..16).chain(17..20) {
-        let got = Packet::parse(Resolution::Bits16, &PACKET_4[..length]);
-        assert_eq!(got, Err(PacketError::Length { got: length, expected: 16 }));
-    }
+    assert_eq!(Packet::parse(&bytes), Err(PacketError::Empty));
     for axis in 0..3 {
-        let mut missing = packet_3();
+        let mut missing = packet_4();
         missing.acceleration[axis] = None;
         missing.temperature = None;
         assert_eq!(missing.emit()[1 + 2 * axis..3 + 2 * axis], [0x80, 0]);
-        assert_eq!(Packet::parse(Resolution::Bits16, &missing.emit()), Ok(missing));
+        assert_eq!(Packet::parse(&missing.emit()), Ok(missing));
         let mut missing = packet_4();
         missing.rate[axis] = None;
-        missing.temperature = None;
-        assert_eq!(Packet::parse(Resolution::Bits20, &missing.emit()), Ok(missing));
+        assert_eq!(Packet::parse(&missing.emit()), Ok(missing));
     }
 }
 
@@ -73,18 +52,6 @@ fn invalid_marks_are_no_readings() {
 fn either_end_of_the_range_is_saturation() {
     let clipped =
         |packet: Packet| packet.sample(Micros(0)).expect("a reading").validity == Validity::Saturated;
-    for (end, inside) in [(-32_766, -32_765), (32_767, 32_766)] {
-        for axis in 0..3 {
-            for (reading, saturated) in [(end, true), (inside, false)] {
-                let mut packet = packet_3();
-                packet.rate[axis] = Some(reading);
-                assert_eq!(clipped(packet), saturated, "rate {reading}");
-                let mut packet = packet_3();
-                packet.acceleration[axis] = Some(reading);
-                assert_eq!(clipped(packet), saturated, "acceleration {reading}");
-            }
-        }
-    }
     for (end, inside) in [(-524_256, -524_252), (524_284, 524_280)] {
         for axis in 0..3 {
             for (reading, saturated) in [(end, true), (inside, false)] {
@@ -227,33 +194,22 @@ fn the_driver_configures_and_reads() {
 }
 
 #[test]
-fn a_part_at_1_khz_with_16_bits_is_read() {
+fn a_part_at_1_khz_is_read() {
     let mut registers = REGISTERS;
     registers[2].3 = 0x66;
     registers[3].3 = 0x06;
     registers[5].3 = 0x66;
-    registers[14].3 = 0x07;
     let mut bus = Bus::default();
     bus.start(&registers);
     bus.read(0x4C, &[0x30]);
-    bus.read(0x2E, &[0, 16]);
-    // 1310 counts are 10 deg/s at 250 deg/s.
-    bus.read(0x30, &Packet { rate: [Some(0), Some(0), Some(1310)], ..packet_3() }.emit());
-    bus.read(0x4D, &[0x51]);
-    bus.read(0x2E, &[0, 16]);
-    bus.read(0x30, &Packet { rate: [Some(0), Some(0), Some(32_767)], ..packet_3() }.emit());
+    bus.read(0x2E, &[0, 20]);
+    bus.read(0x30, &PACKET_4);
     let mut spi = Mock::new(&bus.seen);
-    let config = Icm42688Config {
-        rate: OutputRate::Hz1000,
-        bandwidth: Bandwidth::Twentieth,
-        resolution: Resolution::Bits16,
-    };
+    let config = Icm42688Config { rate: OutputRate::Hz1000, bandwidth: Bandwidth::Twentieth };
     let mut part = Icm42688::new(spi.clone(), config, &mut NoopDelay::new()).expect("a good part");
     // As every part is asked, whatever its line.
     let sample = Source::next_sample(&mut part).expect("one waits").expect("good");
     assert!((sample.angular_rate[2].rad_per_sec() - 10f64.to_radians()).abs() < 2e-8);
-    assert_eq!(sample.temperature, Some(CentiCelsius(2500)));
-    assert_eq!(part.next_sample().expect("good").expect("one waits").validity, Validity::Saturated);
     drop(part);
     spi.done();
 }
@@ -300,27 +256,15 @@ fn another_part_or_none_is_named() {
     assert_eq!(reg::IDENTITY, 0x47);
 }
 
-fn reading(bits: u32) -> impl Strategy<Value = Option<i32>> {
-    let end = 1i32 << (bits - 1);
-    prop::option::of(1 - end..end)
-}
-
 fn any_packet() -> impl Strategy<Value = Packet> {
-    let of = |bits, resolution, temperature: BoxedStrategy<Option<i16>>| {
-        let axes = || prop::array::uniform3(reading(bits));
-        (axes(), axes(), temperature, any::<u16>()).prop_map(
-            move |(acceleration, rate, temperature, time)| Packet {
-                resolution,
-                acceleration,
-                rate,
-                temperature,
-                time,
-            },
-        )
-    };
-    let narrow = prop::option::of(-127..=127i16).boxed();
-    let wide = prop::option::of(-32_767..=32_767i16).boxed();
-    prop_oneof![of(16, Resolution::Bits16, narrow), of(20, Resolution::Bits20, wide)]
+    let axes = || prop::array::uniform3(prop::option::of(-524_287..524_288i32));
+    let temperature = prop::option::of(-32_767..=32_767i16);
+    (axes(), axes(), temperature, any::<u16>()).prop_map(|(acceleration, rate, temperature, time)| Packet {
+        acceleration,
+        rate,
+        temperature,
+        time,
+    })
 }
 
 proptest! {
@@ -328,6 +272,6 @@ proptest! {
 
     #[test]
     fn round_trip(packet in any_packet()) {
-        prop_assert_eq!(Packet::parse(packet.resolution, &packet.emit()), Ok(packet));
+        prop_assert_eq!(Packet::parse(&packet.emit()), Ok(packet));
     }
 }

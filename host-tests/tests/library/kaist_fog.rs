@@ -6,8 +6,8 @@ use gyronet::can::config::{BoschSettings, Config, E2e, Settings};
 use gyronet::can::encoder::CanEncoder;
 use gyronet::can::yaw::AngleMessage;
 use gyronet::can::{DataFrame, yaw};
+use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
-use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
 use gyronet::units::{Angle, AngularRate, Micros, Yaw};
 use gyronet_host_tests::recordings;
 use gyronet_host_tests::require::{self, Need};
@@ -41,7 +41,7 @@ fn bytes(increments: &[f64]) -> impl Iterator<Item = (Micros, Vec<u8>)> {
 
 /// Returns the angle of each step of the grid, as the board finds it.
 fn turns(increments: &[f64]) -> Vec<Angle> {
-    let mut part = Dsp1760::new(Dsp1760Config::DEFAULT);
+    let mut part = Dsp1760::new();
     let mut grid = FogGrid::new(false);
     let mut turns = Vec::new();
     for (now, message) in bytes(increments) {

@@ -4,9 +4,7 @@ use gyronet::sample::FogSample;
 use gyronet::sensor::ByteSource;
 use gyronet::sensor::crc::CRC_32_MPEG_2;
 use gyronet::sensor::dsp1760::message::{Extra, Format, Message, MessageError, Validity};
-use gyronet::sensor::dsp1760::{
-    AngleUnit, Dsp1760, Dsp1760Config, Dsp1760Error, OutputRate, Rotation, TemperatureUnit,
-};
+use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Error};
 use gyronet::units::{Angle, CentiCelsius, Micros};
 use gyronet_host_tests::wire::{bytes, feed};
 use proptest::prelude::*;
@@ -21,7 +19,7 @@ const HUNDREDTHS_Z_BAD: &str =
 const TIMED: &str = "fe81ff56 0000000000000000 379268A8 0000000000000000 3f800000 075bcd15 77010019 5d9c71b2";
 
 fn feed_new(bytes: &[u8]) -> Vec<Result<FogSample, Dsp1760Error>> {
-    feed(&mut Dsp1760::new(Dsp1760Config::DEFAULT), bytes)
+    feed(&mut Dsp1760::new(), bytes)
 }
 
 fn message(sequence: u8, z: f32) -> Message {
@@ -83,12 +81,14 @@ fn samples_carry_angle_time_and_temperature() {
     };
     assert_eq!(feed_new(&bytes(PLUS_10_DPS)), [Ok(first)]);
     // The number before 0 is 127: two frames in that order are one step apart.
-    let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
+    let part = &mut Dsp1760::new();
     let samples = feed(part, [bytes(MINUS_10_DPS), bytes(PLUS_10_DPS)].concat());
     let invalid = samples[0].expect("a sample");
     assert_eq!((invalid.increment[2], invalid.temperature), (None, Some(CentiCelsius(-500))));
     assert_eq!(samples[1..], [Ok(FogSample { time: Micros(2_000), ..first })]);
     assert_eq!((part.counters().gaps, part.counters().lost, part.bad_checksums()), (0, 0, 0));
+    // Of a gyro that is set to hundredths.
+    assert_eq!(feed_new(&bytes(HUNDREDTHS))[0].map(|sample| sample.temperature), Ok(None));
     assert_eq!(feed_new(&bytes(TIMED))[0].map(|sample| sample.time), Ok(Micros(123_456_789)));
 }
 
@@ -110,7 +110,7 @@ fn the_parser_resynchronises() {
     // A damaged frame is a candidate whose checksum does not fit.
     let mut damaged = other.clone();
     damaged[20] ^= 1;
-    let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
+    let part = &mut Dsp1760::new();
     assert_eq!(feed(part, [&damaged[..], &damaged, &recorded].concat()).len(), 1);
     assert_eq!((part.bad_checksums(), ByteSource::bad_checksums(part)), (2, 2));
     // A header inside the payload: an acceleration whose bits are FE 81 FF 55.
@@ -122,7 +122,7 @@ fn the_parser_resynchronises() {
 fn self_tests_are_passed_over() {
     let short = bytes("FE8100AA 7F7F7F7F7F7F 55");
     let long = bytes("FE8100AB 7F7F7F7F7F7F7F7F 55");
-    let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
+    let part = &mut Dsp1760::new();
     let stream = [&short[..], &bytes(RECORDED), &long, &bytes(PLUS_10_DPS), &short].concat();
     assert_eq!(feed(part, &stream).len(), 2);
     assert_eq!(part.counters().self_tests, 3);
@@ -135,7 +135,7 @@ fn self_tests_are_passed_over() {
 
 #[test]
 fn lost_and_repeated_messages_are_counted() {
-    let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
+    let part = &mut Dsp1760::new();
     let mut take = |sequence| feed(part, message(sequence, 1e-6).emit())[0].map(|s| (s.time.0, s.lost));
     assert_eq!(take(126), Ok((1_000, 0)));
     assert_eq!(take(127), Ok((2_000, 0)));
@@ -156,46 +156,20 @@ fn a_number_that_is_none_is_not_valid() {
         assert_eq!(Message::parse(&made.emit()).expect("intact").validity, Validity(0x37));
     }
     // Faster than anything turns: 1 rad in a millisecond.
-    let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
+    let part = &mut Dsp1760::new();
     assert_eq!(feed(part, message(0, 1.0).emit())[0].expect("a sample").increment[2], None);
     assert_eq!(part.counters().implausible, 1);
 }
 
 #[test]
-fn units_are_those_of_the_manual() {
-    let expected = 10f64.to_radians() * 1e-3;
-    for (rotation, angle, value) in [
-        (Rotation::Delta, AngleUnit::Radians, expected),
-        (Rotation::Delta, AngleUnit::Degrees, 0.01),
-        (Rotation::Rate, AngleUnit::Radians, 10f64.to_radians()),
-        (Rotation::Rate, AngleUnit::Degrees, 10.0),
-    ] {
-        let temperature = TemperatureUnit::Hundredths;
-        let config = Dsp1760Config { rotation, angle, temperature, ..Dsp1760Config::DEFAULT };
-        let made = Message { extra: Extra::Temperature(2534), ..message(0, value as f32) };
-        let sample = feed(&mut Dsp1760::new(config), made.emit())[0].expect("a sample");
-        assert_eq!(sample.temperature, Some(CentiCelsius(2534)));
-        let got = sample.increment[2].expect("valid").rad();
-        // A few roundings of f32.
-        assert!((got / expected - 1.0).abs() < 3.0 * f64::from(f32::EPSILON), "{rotation:?} {angle:?} {got}");
-    }
-}
-
-#[test]
-fn time_stamps_wrap_and_750_messages_fill_a_second() {
+fn time_stamps_wrap() {
     let timed = |sequence, time| {
         Message { extra: Extra::Timed { time, temperature: 0 }, ..message(sequence, 0.0) }.emit()
     };
-    let part = &mut Dsp1760::new(Dsp1760Config::DEFAULT);
+    let part = &mut Dsp1760::new();
     feed(part, timed(0, u32::MAX - 499));
     let after = feed(part, timed(1, 500))[0].expect("a sample");
     assert_eq!(after.time, Micros(u64::from(u32::MAX) + 501));
-    let rate = OutputRate::new(750).expect("offered");
-    let part = &mut Dsp1760::new(Dsp1760Config { rate, ..Dsp1760Config::DEFAULT });
-    let stream: Vec<u8> = (0..750u16).flat_map(|n| message((n % 128) as u8, 0.0).emit()).collect();
-    let samples = feed(part, &stream);
-    assert_eq!(samples.last().expect("750 samples").expect("a sample").time, Micros(1_000_000));
-    assert_eq!(samples.iter().map(|s| s.expect("a sample").span).sum::<u32>(), 1_000_000);
 }
 
 #[test]

@@ -30,7 +30,6 @@ struct Sample {
     /// Gyro less bias.
     gyro: i64,
     clipped: bool,
-    /// The steady part of its correction.
     steady: i64,
     estimates: Vec<i64>,
 }

@@ -59,7 +59,6 @@ fn start(flash: &Rc<RefCell<F405>>) -> Board {
     board
 }
 
-/// A board without flash.
 fn bare() -> Board {
     let mut board = Board::new(&SUPPORTED_HARDWARE);
     board.begin(None, None, Ok(()), IDENTITY);

@@ -18,7 +18,6 @@ fn parse(line: &[u8]) -> Result<DataFrame, SlcanError> {
     slcan::parse(line)
 }
 
-/// Frames and their lines.
 fn examples() -> [(DataFrame, &'static [u8]); 5] {
     let tx1 = [0xD0, 0x87, 0x00, 0x4B, 0x11, 0x83, 0x01, 0x00];
     [

@@ -147,7 +147,6 @@ fn a_value_out_of_its_range_is_refused() {
     assert_eq!(flash.borrow().operations(), 0, "nothing was written");
 }
 
-/// A later layout of the configuration.
 #[derive(Debug, Serialize, Deserialize)]
 struct Later {
     value: u32,
@@ -208,7 +207,6 @@ fn an_older_layout_is_refused_by_its_number() {
     }
 }
 
-/// A flash with a configuration of this layout and content.
 fn written(version: u8, content: &[u8]) -> Flash {
     let flash = Flash::default();
     let mut record = vec![Configuration::KEY, version, content.len() as u8, 0];

@@ -12,7 +12,6 @@ const DEVICES: u64 = 16;
 /// 1 rad/s in deg/h.
 const DEG_PER_HOUR: f64 = 206_264.8;
 
-/// The errors of some drives.
 #[derive(Default)]
 struct Errors {
     /// Sums of the path errors, m.

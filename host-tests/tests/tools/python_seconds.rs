@@ -34,7 +34,6 @@ struct FromPython {
     window: Vec<[f64; 6]>,
 }
 
-/// Keeps every window.
 #[derive(Default)]
 struct Windows(Vec<Vec<[f64; FEATURES]>>);
 

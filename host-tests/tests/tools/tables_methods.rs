@@ -1,8 +1,6 @@
 //! `gyronet-paper tables --method`: another program's trajectories in the tables, on simulated sequences. The truth has no
-//! error, a known error is found, evo finds the same, and what cannot be compared is named and never a number.
+//! error, a known error is found, and what cannot be compared is named and never a number.
 
-use gyronet_host_tests::recordings::workspace;
-use gyronet_host_tests::require::python;
 use gyronet_host_tests::sequence::simulate;
 use gyronet_paper::sequence::Sequence;
 use gyronet_paper::simulate::{Layout, Spec};
@@ -10,12 +8,10 @@ use gyronet_paper::tables::estimates::Estimates;
 use gyronet_paper::tables::given::Given;
 use gyronet_paper::tables::results::{Errors, Results, SequenceErrors};
 use gyronet_paper::tables::table;
-use gyronet_tools::drive::track::Track;
 use gyronet_tools::evaluate::trajectory_error::Point;
 use std::fmt::Write;
 use std::fs;
 use std::path::PathBuf;
-use std::process::Command;
 use tempfile::{TempDir, tempdir};
 
 /// The methods are compared from here on.
@@ -127,44 +123,6 @@ fn ten_poses_a_second_are_enough() {
     scratch.write(&sequence, &slow);
     let errors = scratch.compared(&sequence);
     assert!(errors.ate_m < 0.005, "{errors:?}");
-}
-
-#[test]
-fn evo_finds_the_same_error() {
-    let test = "evo_finds_the_same_error";
-    let Some(python) = python(test, &["evo"]) else { return };
-    let scratch = Scratch::new();
-    let sequence = sequence(Layout::Kaist, "k");
-    let mut track = Track { position: [0.0; 2], yaw: sequence.steps[0].yaw };
-    let path: Vec<Track> = sequence
-        .steps
-        .iter()
-        .map(|step| {
-            track.step(step.wheels, step.fog + 5e-6);
-            track
-        })
-        .collect();
-    scratch.write(&sequence, &rows(&sequence, |k| (path[k].position, path[k].yaw)));
-    let errors = scratch.compared(&sequence);
-    let truth_file = scratch.0.path().join("truth.tum");
-    fs::write(&truth_file, truth(&sequence)[START..].join("\n")).unwrap();
-    let script = workspace().join("host-tests/tests/clients/evo_ate.py");
-    let output =
-        Command::new(python).arg(script).arg(truth_file).arg(scratch.0.path().join("k.txt")).output();
-    let output = output.unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let evo: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(evo["poses"], sequence.steps.len() - START);
-    assert!(errors.ate_m > 2.0 * errors.aligned_ate_m && errors.aligned_ate_m > 0.1, "{errors:?}");
-    for (name, ours) in [
-        ("ate_m", errors.ate_m),
-        ("ate_mean_m", errors.ate_mean_m),
-        ("aligned_ate_m", errors.aligned_ate_m),
-        ("aligned_ate_mean_m", errors.aligned_ate_mean_m),
-    ] {
-        // Stamps are printed to a microsecond, and our places are on the line between two rows.
-        assert!((ours - evo[name].as_f64().unwrap()).abs() < 1e-5, "{name}: {ours} {evo}");
-    }
 }
 
 #[test]

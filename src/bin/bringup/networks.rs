@@ -8,7 +8,6 @@ use gyronet::model::gyronet::GyroNetState;
 use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 
-/// Measures one window.
 pub fn count(report: &mut Report, mut dcb: DCB, mut dwt: DWT) {
     dcb.enable_trace();
     dwt.enable_cycle_counter();

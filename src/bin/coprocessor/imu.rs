@@ -11,7 +11,6 @@ use crate::{output, serial};
 use core::sync::atomic::{AtomicBool, AtomicU16, Ordering};
 use embedded_hal::delay::DelayNs;
 use gyronet::sample::{ImuSample, PERIOD_US};
-use gyronet::sensor::icm42688::packet::Resolution;
 use gyronet::sensor::icm42688::{Bandwidth, Icm42688, Icm42688Config, Icm42688Error, OutputRate};
 use gyronet::sensor::xsens::{Mti, XsensError};
 use gyronet::service::event::SensorFault;
@@ -25,11 +24,7 @@ const BYTES_PER_POLL: usize = BYTES_PER_STEP / 4;
 /// Interval between attempts to bring up the part, ms.
 const RETRY_MS: u32 = 1_000;
 
-const ICM: Icm42688Config = Icm42688Config {
-    rate: OutputRate::Hz100,
-    bandwidth: Bandwidth::Sixteenth,
-    resolution: Resolution::Bits20,
-};
+const ICM: Icm42688Config = Icm42688Config { rate: OutputRate::Hz100, bandwidth: Bandwidth::Sixteenth };
 
 type Part = Icm42688<Spi>;
 

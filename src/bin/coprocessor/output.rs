@@ -15,7 +15,7 @@ use core::sync::atomic::{AtomicU8, Ordering};
 use embedded_can::Frame as _;
 use gyronet::coprocessor::Coprocessor;
 use gyronet::health::count;
-use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
+use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::service::message::{AllCounters, LineCounters};
 use gyronet::store::ImuPart;
 use gyronet::units::Micros;
@@ -88,7 +88,7 @@ impl OutputParts {
         Output {
             imu: Imu::new(self.part, imu),
             fog,
-            dsp1760: Dsp1760::new(Dsp1760Config::DEFAULT),
+            dsp1760: Dsp1760::new(),
             outgoing: Outgoing::new(slcan, self.bits_per_second, can),
             polled_at: 0,
             joined: false,
@@ -101,7 +101,6 @@ impl OutputParts {
 
 // The coprocessor counts the inputs that it refuses, so the task ignores its errors.
 impl Output {
-    /// Runs one step of the output task.
     #[inline(never)]
     pub fn step(&mut self, coprocessor: &mut Coprocessor, counters: &mut AllCounters) {
         // A step also follows each sent CAN frame and each estimate. Inputs other than the inertial sensor are read

@@ -48,7 +48,6 @@ fn receive(board: &Board, configuration: &Configuration, wheels: &WheelSettings)
     }
 }
 
-/// The resources of the tasks.
 pub struct Parts {
     pub output: OutputParts,
     pub config: &'static Config,

@@ -31,7 +31,6 @@ pub enum FlashError {
     OutOfBounds,
     /// The range does not begin and end at the boundary of a sector or a word.
     NotAligned,
-    /// An operation is running.
     Busy,
     /// The controller did not accept its keys; it refuses them until the next reset.
     Locked,
@@ -89,7 +88,6 @@ impl Flash {
         unsafe { core::slice::from_raw_parts((FLASH_BASE + offset) as *const u8, len) }
     }
 
-    /// Erases the sector that begins at an offset.
     pub fn erase(&self, offset: u32) -> Result<(), FlashError> {
         let sector = sector_at(offset).ok_or(FlashError::NotAligned)?;
         let len = SECTORS.get(usize::from(sector)).copied().unwrap_or_default();

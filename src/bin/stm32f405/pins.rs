@@ -96,7 +96,6 @@ impl Pin {
         self.registers().moder().modify(|r, w| unsafe { w.bits(self.field(r.bits(), 2, 0b01)) });
     }
 
-    /// Sets the level of an output.
     pub fn set(self, high: bool) {
         let bit = 1 << self.number;
         // SAFETY: ones set or reset their pin, zeros change nothing (RM0090 8.4.7).

@@ -13,7 +13,6 @@ const HZ: u32 = 1_000_000;
 /// Half-wraps of the counter since the start.
 static HALVES: AtomicU32 = AtomicU32::new(0);
 
-/// Starts the counter at zero.
 pub fn start(rcc: &pac::RCC, timer: &pac::TIM5, clocks: &Clocks) {
     rcc.apb1enr().modify(|_, w| w.tim5en().enabled());
     clock_delay();

@@ -94,7 +94,6 @@ fn wait_until_applied() {
     });
 }
 
-/// Begins a new period.
 pub fn feed() {
     registers().kr().write(|w| w.key().feed());
 }

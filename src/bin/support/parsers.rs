@@ -6,9 +6,9 @@ use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use gyronet::sensor::ByteSource;
 use gyronet::sensor::adis16465::{Burst, DiagStat, Model};
+use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
-use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Config};
-use gyronet::sensor::icm42688::packet::{Packet, Resolution};
+use gyronet::sensor::icm42688::packet::Packet;
 use gyronet::sensor::xsens::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::units::Micros;
@@ -54,9 +54,13 @@ fn dsp1760(meter: &mut Meter) {
     let untimed = [0, 1].map(|n| message(n, Extra::Temperature(25)).emit());
     let timed =
         [0, 1].map(|n| message(n, Extra::Timed { time: 1_000 * u32::from(n) + 7, temperature: 25 }).emit());
-    let part = || Dsp1760::new(Dsp1760Config::DEFAULT);
-    stream(meter, "sensor/dsp1760_frame", &mut part(), untimed.each_ref().map(|frame| &frame[..]));
-    stream(meter, "sensor/dsp1760_timed_frame", &mut part(), timed.each_ref().map(|frame| &frame[..]));
+    stream(meter, "sensor/dsp1760_frame", &mut Dsp1760::new(), untimed.each_ref().map(|frame| &frame[..]));
+    stream(
+        meter,
+        "sensor/dsp1760_timed_frame",
+        &mut Dsp1760::new(),
+        timed.each_ref().map(|frame| &frame[..]),
+    );
 }
 
 fn mtdata2(meter: &mut Meter) {
@@ -77,7 +81,6 @@ fn mtdata2(meter: &mut Meter) {
 /// Measures the parsers of the bytes of an SPI transfer.
 fn bursts(meter: &mut Meter) {
     let packet = Packet {
-        resolution: Resolution::Bits20,
         acceleration: [12, -4, 32_768].map(Some),
         rate: [6, -2, 2_620].map(Some),
         temperature: Some(662),
@@ -85,7 +88,7 @@ fn bursts(meter: &mut Meter) {
     };
     let bytes = packet.emit();
     meter.run("sensor/icm42688_packet", || {
-        let packet = Packet::parse(Resolution::Bits20, black_box(&bytes));
+        let packet = Packet::parse(black_box(&bytes));
         black_box(packet.ok().and_then(|packet| packet.sample(Micros(1_000))));
     });
     hprintln!("sensor/icm42688_packet bytes={}", bytes.len());

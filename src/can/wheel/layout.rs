@@ -239,7 +239,7 @@ pub struct WheelFrame {
     pub checksum: Checksum,
 }
 
-/// These functions store an identifier as a number; bit 31 marks an identifier of 29 bits.
+/// An identifier as a number; bit 31 marks an identifier of 29 bits.
 #[cfg(feature = "serde")]
 pub(crate) mod stored_id {
     use embedded_can::{ExtendedId, Id, StandardId};

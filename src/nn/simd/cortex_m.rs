@@ -1,4 +1,4 @@
-//! This is the kernel for Cortex-M with the DSP extension (M4, M7, M33 and up), in assembly.
+//! The kernel for Cortex-M with the DSP extension (M4, M7, M33 and up), in assembly.
 //!
 //! # Where the work is
 //! A GyroNet window is 1.12 million multiply-accumulates (1.18 by its shape, but the first step has no recurrent

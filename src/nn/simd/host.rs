@@ -1,4 +1,4 @@
-//! This kernel is for hosts and uses the `wide` crate's vectors (SSE2, AVX2 or NEON, as compiled).
+//! The kernel for hosts, with the `wide` crate's vectors (SSE2, AVX2 or NEON, as compiled).
 //!
 //! Four words of a record are two column pairs of all four gates: (i,f) (g,o) (i,f) (g,o). With
 //! the matching columns copied beside each other, one multiply-add of halfword pairs does all
@@ -26,7 +26,6 @@ impl Sums {
         self.low += low.dot(x);
     }
 
-    /// Returns the sums added to the accumulators' start values.
     #[inline]
     fn finish(self, start: Accumulators) -> Accumulators {
         let [packed, low] = [self.packed.to_array(), self.low.to_array()];

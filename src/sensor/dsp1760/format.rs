@@ -73,13 +73,13 @@ impl Validity {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Extra {
-    /// Temperature of format A, in the configured unit.
+    /// Temperature of format A, deg C.
     Temperature(i16),
     /// Time stamp and temperature of format B.
     Timed {
         /// Time, microseconds; it wraps.
         time: u32,
-        /// Temperature, in the configured unit.
+        /// Temperature, deg C.
         temperature: i16,
     },
     /// Slow reading of format C: temperature or magnetic field x, y, z, by sequence number modulo 4.

@@ -1,4 +1,4 @@
-//! This protocol finds DSP-1760 messages in a byte stream, by header and CRC.
+//! Finds DSP-1760 messages in a byte stream, by header and CRC.
 
 use super::message::Format;
 use crate::sensor::crc::CRC_32_MPEG_2;

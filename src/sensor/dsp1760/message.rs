@@ -61,7 +61,7 @@ pub enum MessageError {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Message {
-    /// Increment or rate about x, y, z, in the configured unit.
+    /// Increment about x, y, z, rad.
     pub rotation: [f32; 3],
     /// Specific force x, y, z in g; only the 17xx units measure it, not the DSP-1760.
     pub acceleration: [f32; 3],

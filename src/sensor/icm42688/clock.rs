@@ -44,7 +44,6 @@ mod tests {
         counts.into_iter().map(|counts| clock.unwrap(counts as u16).0).collect()
     }
 
-    /// Returns the differences of successive times.
     fn periods(times: &[u64]) -> Vec<u64> {
         times.windows(2).map(|pair| pair[1] - pair[0]).collect()
     }

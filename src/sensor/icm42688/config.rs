@@ -20,7 +20,6 @@
 //! A mean of ten samples at 1 kHz would have a delay of only 4.5 ms and zeros at the frequencies that are aliased,
 //! but would need ten times the SPI traffic and a decimator in the driver. At 100 Hz our filter leaves only 1.4 %.
 
-use super::packet::Resolution;
 use super::registers::{self as reg, Register, Setting, aaf_258_hz};
 
 /// The output rate of the sensor.
@@ -80,8 +79,6 @@ pub struct Icm42688Config {
     pub rate: OutputRate,
     /// Bandwidth of the last filter.
     pub bandwidth: Bandwidth,
-    /// Resolution of the FIFO packets.
-    pub resolution: Resolution,
 }
 
 impl Icm42688Config {
@@ -93,10 +90,6 @@ impl Icm42688Config {
         }
         let [square_high, square_low] = aaf_258_hz::DELTSQR.to_be_bytes();
         let shift = aaf_258_hz::BITSHIFT << 4 | square_high;
-        let content = match self.resolution {
-            Resolution::Bits16 => reg::FIFO_16_BIT,
-            Resolution::Bits20 => reg::FIFO_20_BIT,
-        };
         [
             set(reg::INTF_CONFIG0, 0x70, reg::BIG_ENDIAN),
             set(reg::INTF_CONFIG1, 0xC0, reg::AFSR_OFF),
@@ -112,7 +105,7 @@ impl Icm42688Config {
             set(reg::ACCEL_CONFIG_STATIC2, 0x7F, aaf_258_hz::DELT << 1),
             set(reg::ACCEL_CONFIG_STATIC3, 0xFF, square_low),
             set(reg::ACCEL_CONFIG_STATIC4, 0xFF, shift),
-            set(reg::FIFO_CONFIG1, 0x17, content),
+            set(reg::FIFO_CONFIG1, 0x17, reg::FIFO_20_BIT),
             set(reg::FIFO_CONFIG, 0xC0, reg::FIFO_STREAM),
             set(reg::PWR_MGMT0, 0x2F, reg::LOW_NOISE),
         ]

@@ -100,9 +100,7 @@ pub const ACCEL_16_G: u8 = 0 << 5;
 pub const GYRO_THIRD_ORDER: u8 = 2 << 2;
 /// Written to [`ACCEL_CONFIG1`], sets the third order (ACCEL_UI_FILT_ORD, bits 4-3).
 pub const ACCEL_THIRD_ORDER: u8 = 2 << 3;
-/// Written to [`FIFO_CONFIG1`], puts temperature, gyro and accelerometer into the FIFO.
-pub const FIFO_16_BIT: u8 = 0x07;
-/// Written to [`FIFO_CONFIG1`], puts the same values into the FIFO with readings of 20 bits.
+/// Written to [`FIFO_CONFIG1`], puts temperature, gyro and accelerometer into the FIFO, with readings of 20 bits.
 pub const FIFO_20_BIT: u8 = 0x17;
 
 /// Settings of the anti-alias filter for 258 Hz, from the data sheet's table of bandwidths.

@@ -216,7 +216,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         Ok(())
     }
 
-    /// Stores a calibration, and then uses it.
     pub(super) fn store_calibration(&mut self, calibration: Calibration) -> Result<(), Refusal> {
         let store = self.store.as_mut().ok_or(StoreError::NoFlash)?;
         store.set(&calibration)?;

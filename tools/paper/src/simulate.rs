@@ -92,7 +92,6 @@ impl Set {
     }
 }
 
-/// Simulates all sensors of a vehicle on a drive.
 struct Drive {
     world: World,
     mems: Mems,

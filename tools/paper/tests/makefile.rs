@@ -46,7 +46,6 @@ impl Run {
         self.folder.path().join(name).display().to_string()
     }
 
-    /// Runs make; returns its output and the commands that it ran.
     fn make(&self, set: &str, failing: &str) -> Option<(Output, Vec<String>)> {
         let (ran, program) = (self.path("ran"), self.path("program"));
         fs::write(&ran, "").unwrap();

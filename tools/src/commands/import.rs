@@ -40,7 +40,6 @@ pub struct Correct {
     arguments: Vec<OsString>,
 }
 
-/// Runs the subcommand `correct`.
 pub fn correct(args: &Correct, common: Common) -> super::Result {
     python(&["correct"], &args.arguments, common)
 }

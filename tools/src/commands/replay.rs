@@ -159,14 +159,12 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     Ok(())
 }
 
-/// The states that are counted.
 const STATUSES: [Status; 4] = [Status::Init, Status::Degraded, Status::Ready, Status::Clipped];
 
 fn status_name(status: Status) -> String {
     format!("{status:?}").to_lowercase()
 }
 
-/// Returns all counters that are not zero.
 fn events(c: &Counters, out_of_range: u32) -> Vec<(&'static str, u32)> {
     let all = [
         ("samples", c.samples),

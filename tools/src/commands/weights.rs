@@ -21,7 +21,6 @@ impl Weights {
         Ok(Self { file: path.map(WeightFile::read).transpose()? })
     }
 
-    /// Checks the weights and returns them.
     pub fn blob(&self) -> Result<Blob<'_>, WeightFileError> {
         match &self.file {
             Some(file) => file.blob(),

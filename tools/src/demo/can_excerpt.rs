@@ -37,7 +37,6 @@ pub struct Sent {
 }
 
 impl Sent {
-    /// Runs the board on a drive and writes its frames.
     pub fn run(
         drive: &Drive<'_>,
         network: impl WindowNetwork,

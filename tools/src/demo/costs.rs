@@ -15,7 +15,6 @@ use std::time::Duration;
 pub struct Cost {
     pub what: &'static str,
     pub figure: String,
-    /// The source of the figure.
     pub how: String,
 }
 

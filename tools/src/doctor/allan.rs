@@ -11,7 +11,6 @@ use std::ops::Range;
 
 /// Fewest pairs of spans for a point; a point from fewer scatters by more than a third.
 const LEAST_PAIRS: usize = 9;
-/// Points of the curve in each decade.
 const PER_DECADE: f64 = 8.0;
 /// The flat part of the curve of 1/f noise, in units of the noise coefficient.
 const FLAT: f64 = 0.664;

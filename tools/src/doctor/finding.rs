@@ -2,7 +2,6 @@
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// The subject is as it should be.
     Good,
     /// The finding is information; it may limit the use of the recording.
     Note,

@@ -9,7 +9,6 @@ const GRAVITY: f64 = 9.806_65;
 /// Tilt beyond which the mounting should be configured, and beyond which it must be, degrees.
 const TILT: (f64, f64) = (15.0, 60.0);
 
-/// The mounting, by gravity at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mounting {
     pub roll_deg: f64,

@@ -9,7 +9,6 @@ use gyronet::sample::PERIOD_US;
 use std::ops::Range;
 use std::path::Path;
 
-/// Rows per second.
 pub const SECOND: usize = 100;
 /// Rows by which the rate is judged.
 const FIRST: usize = 1_000;

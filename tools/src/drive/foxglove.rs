@@ -20,7 +20,6 @@ use std::io::{Seek, Write};
 const INFO: u8 = 2;
 const WARNING: u8 = 3;
 
-/// The Foxglove layout that goes with the file.
 pub const LAYOUT: &str = include_str!("foxglove/layout.json");
 
 /// Identifiers of a file's channels.

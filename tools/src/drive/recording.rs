@@ -35,7 +35,6 @@ use gyronet::heading::Heading;
 use gyronet::sample::ImuSample;
 use std::path::Path;
 
-/// Number of wheel columns of a recording.
 pub const WHEELS: usize = 4;
 /// Largest mean rate of a standing wheel over a second, rad/s. A rate sensor on a standing wheel reads up to 0.04.
 pub const WHEEL_STANDS: f64 = 0.3;
@@ -76,7 +75,6 @@ impl Recording {
         Self::of(&name, foreign::open(path)?, Vehicle::of_drive(path)?)
     }
 
-    /// Parses a recording from any reader; `path` is its name in errors.
     pub fn parse(path: &str, input: impl std::io::Read) -> Result<Self, DataError> {
         Self::of(path, input, Vehicle::default())
     }

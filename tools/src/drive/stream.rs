@@ -18,7 +18,6 @@ pub type Rows<'a> = Box<dyn Iterator<Item = Result<Row, DataError>> + 'a>;
 /// A complete drive, which can be read again and again.
 #[derive(Debug, Clone)]
 pub struct Drive<'a> {
-    /// The path of the file, for messages.
     pub path: String,
     /// Contents of the vehicle file beside the drive; the rows are in the vehicle's axes.
     pub vehicle: Cow<'a, Vehicle>,

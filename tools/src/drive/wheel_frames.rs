@@ -101,7 +101,6 @@ impl Speeds {
         Some(Self { wheels, last: [0.0; WHEELS], radius })
     }
 
-    /// The number of wheels that are averaged.
     pub fn wheels(&self) -> usize {
         self.wheels.len()
     }

@@ -34,7 +34,6 @@ fn with_mode(mode: Mode) -> PipelineConfig {
     PipelineConfig { compensate, ..PipelineConfig::DEFAULT }
 }
 
-/// Returns the variants that show the parts of the compensation.
 pub fn parts() -> Vec<Variant> {
     let alone = |config| PipelineConfig { zero_rate: None, ..config };
     let overlap = CompensateConfig::DEFAULT.mode;

@@ -24,7 +24,6 @@ pub struct Shapes {
     pub paper: Option<[Shape; 2]>,
 }
 
-/// The linear part alone.
 const LINEAR: Shape = Shape { units: 0, linear: true };
 
 impl Cost {

@@ -14,7 +14,6 @@ use gyronet::sample::RATE_HZ;
 use serde::Serialize;
 use std::collections::VecDeque;
 
-/// Samples per second.
 const SECOND: usize = RATE_HZ as usize;
 /// Seconds over which the median of the error against a course is taken.
 pub const BLOCK_S: usize = 10;

@@ -140,7 +140,6 @@ impl<T> PerMethod<T> {
         Self(values)
     }
 
-    /// Computes a value for each method.
     pub fn new(of: impl FnMut(Method) -> Option<T>) -> Self {
         Self(Method::ON_A_DRIVE.map(of))
     }

@@ -8,7 +8,6 @@ use std::f64::consts::{PI, TAU};
 /// Samples of a window of [`YawError::mean_1s_rad`].
 pub const WINDOW: usize = RATE_HZ as usize;
 
-/// The yaw error of one method on one drive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct YawError {
     /// Mean absolute error of the yaw change over consecutive, non-overlapping 1 s windows. An incomplete window does

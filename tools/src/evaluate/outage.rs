@@ -89,7 +89,6 @@ struct Boards<'a> {
 }
 
 impl Boards<'_> {
-    /// Adds a row, and returns the steps that it completes.
     fn row(&mut self, row: &Row) -> Option<[Step; 2]> {
         // A start that is refused in motion is no error here.
         let (no_model, model) = (self.no_model.row(row).ok().flatten(), self.model.row(row).ok().flatten());
@@ -288,7 +287,6 @@ impl<'a> Race<'a> {
     }
 }
 
-/// The paths since a start.
 #[derive(Debug, Clone, Copy, Default)]
 struct Path {
     /// Angles by each method, and by the gyro alone, rad.

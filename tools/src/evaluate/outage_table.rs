@@ -38,7 +38,6 @@ pub struct Figures {
 /// By length of the outage, s, and by method.
 pub type ByLength = BTreeMap<usize, BTreeMap<&'static str, Figures>>;
 
-/// The outages of the drives of one folder, or of all.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outages {
     pub set: String,

@@ -25,7 +25,6 @@ use gyronet::units::{AngularRate, Micros, SpecificForce};
 use std::borrow::Cow;
 use std::collections::VecDeque;
 
-/// A network of any kind and its shape.
 pub struct Network<'a> {
     run: &'a mut (dyn WindowNetwork + Send),
     shape: Shape,

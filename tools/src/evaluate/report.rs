@@ -32,7 +32,6 @@ pub enum EvaluateError {
     )]
     TooShort {
         path: String,
-        /// The reference's column.
         column: &'static str,
         /// Length of the drive after static initialisation, s.
         seconds: f64,
@@ -43,7 +42,6 @@ pub enum EvaluateError {
     )]
     Disagrees {
         path: String,
-        /// The reference's column.
         column: &'static str,
         /// The typical difference in 10 s, rad.
         rad: f64,
@@ -103,7 +101,6 @@ pub fn columns(rows: &PerMethod<Row>) -> impl Iterator<Item = (Method, [String; 
 /// Comparison of one of our rates with the best classical method that has the same inputs and no more delay.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Comparison {
-    /// The key of the best classical method.
     pub best_classical: &'static str,
     /// Our error over that method's: the 1 s error, or the RMS over the drive if the reference gives no 1 s error.
     pub ratio: f64,

@@ -13,7 +13,6 @@ use gyronet::nn::reference::LstmWeights;
 use std::marker::PhantomData;
 use std::path::Path;
 
-/// A kind of network that a checkpoint can hold.
 pub trait Network {
     /// Returns the names and shapes of the network's tensors; `found` gives the shapes in the file, from which
     /// variable sizes are taken.
@@ -102,12 +101,10 @@ impl Checkpoint<GyroNet> {
         blob::Shape { units: units as u16, linear: self.linear().is_some() }
     }
 
-    /// Returns the weights of the linear part.
     pub fn linear(&self) -> Option<&[f32]> {
         self.tensors.has(LINEAR).then(|| self.tensors.tensor(LINEAR))
     }
 
-    /// Returns the Bi-LSTMs.
     fn bilstms(&self) -> Option<NetworkF32<'_>> {
         self.tensors.has("fc.weight").then(|| NetworkF32 {
             lstm1: [self.direction(1, false), self.direction(1, true)],

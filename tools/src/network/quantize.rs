@@ -31,15 +31,10 @@ pub enum QuantizeError {
         layer: usize,
         /// Row in PyTorch's order: gate x units + unit.
         row: usize,
-        /// The largest weight of the row.
         weight: f64,
     },
     #[error("{what} {value} does not fit its fixed-point field")]
-    Constant {
-        /// The name of the constant.
-        what: String,
-        value: f64,
-    },
+    Constant { what: String, value: f64 },
     #[error(
         "the checkpoint does not name its gyro: train with --gyro, and with --serial if the weights are for one gyro only"
     )]
@@ -48,10 +43,8 @@ pub enum QuantizeError {
     Blob(#[from] blob::BlobError),
 }
 
-/// The figures of a quantisation.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
-    /// Number of gate rows.
     pub rows: usize,
     /// Number of rows whose scale was raised to keep their sum within the limit.
     pub raised: usize,

@@ -24,21 +24,9 @@ pub enum CheckpointError {
     #[error("{name}: tensor {tensor} is missing")]
     Missing { name: String, tensor: String },
     #[error("{name}: tensor {tensor} is {found}, should be F32 {expected:?}")]
-    Shape {
-        name: String,
-        tensor: String,
-        /// Type and shape as found.
-        found: String,
-        /// Shape as needed.
-        expected: Vec<usize>,
-    },
+    Shape { name: String, tensor: String, found: String, expected: Vec<usize> },
     #[error("{name}: tensor {tensor} holds a value that is not finite, at {at}")]
-    NotFinite {
-        name: String,
-        tensor: String,
-        /// Index of the element.
-        at: usize,
-    },
+    NotFinite { name: String, tensor: String, at: usize },
 }
 
 /// Name and shape of a tensor, as in PyTorch.

@@ -46,7 +46,6 @@ pub struct Config {
 }
 
 impl Config {
-    /// The default is a passenger car in a town.
     pub const DEFAULT: Self = Self {
         wheel_radius: 0.289,
         track: 1.5,

@@ -1,6 +1,5 @@
 //! A leg is a straight or curved piece of a route, or a wait.
 
-/// A piece of a route.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Leg {
     Stand {

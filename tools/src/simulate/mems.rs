@@ -36,7 +36,6 @@ pub struct Config {
 }
 
 impl Config {
-    /// The default is a good MEMS part.
     pub const DEFAULT: Self = Self {
         gyro_noise: 1.7453e-4,
         gyro_walk: 1e-5,

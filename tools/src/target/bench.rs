@@ -17,9 +17,7 @@ const POLL: Duration = Duration::from_millis(5);
 pub const IMAGES: [&str; 2] = ["bench", "bench_fognet"];
 /// The images that are built to be flashed, optimised for size.
 const FLASHED: [&str; 2] = ["coprocessor", "bringup"];
-/// The emulated board.
 pub const MACHINE: &str = "netduinoplus2";
-/// The Rust target of the image.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
 #[derive(Debug, thiserror::Error)]
@@ -173,7 +171,6 @@ pub(super) fn regions(
     Ok((stdout, counts.collect::<Vec<_>>().into_iter()))
 }
 
-/// Compiles the plugin that counts instructions.
 fn plugin(workspace: &Path) -> Result<PathBuf, BenchError> {
     let library = scratch(workspace)?.join("m4count.so");
     let source = workspace.join("tools/bench/m4count.c");

@@ -8,7 +8,6 @@ use super::bench::{self, BenchError};
 use std::path::Path;
 use std::process::Command;
 
-/// The command that fetches the sources.
 pub const FETCH: &str = "git clone --depth 1 https://github.com/ARM-software/CMSIS-NN";
 const COMPILER: &str = "arm-none-eabi-gcc";
 const MACHINE: &str = "mps2-an386";

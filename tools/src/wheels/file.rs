@@ -16,11 +16,7 @@ use serde::{Deserialize, Serialize};
 #[non_exhaustive]
 pub enum WheelFileError {
     #[error("{path}: {source}")]
-    Toml {
-        path: String,
-        /// The place and the reason.
-        source: Box<toml::de::Error>,
-    },
+    Toml { path: String, source: Box<toml::de::Error> },
     #[error("{path}: {found} frames, at most {MAX_FRAMES} are allowed")]
     Frames { path: String, found: usize },
     #[error("{path}: frame {id:#x}: not an identifier of {} bits", if *.extended { 29 } else { 11 })]

@@ -35,7 +35,6 @@ fn gyronet_in(folder: &Path, arguments: &[&str]) -> (bool, String) {
     (output.status.success(), text(&output.stderr))
 }
 
-/// An empty folder.
 fn scratch(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = std::fs::remove_dir_all(&folder);
@@ -43,7 +42,6 @@ fn scratch(name: &str) -> PathBuf {
     folder
 }
 
-/// The numbers in one column of a table.
 fn column(path: &Path, separator: char, at: usize) -> Vec<f64> {
     let text = std::fs::read_to_string(path).unwrap();
     text.lines().filter_map(|line| line.split(separator).nth(at)?.parse().ok()).collect()

@@ -4,7 +4,7 @@
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use gyronet::sample::ImuSample;
-use gyronet::sensor::icm42688::packet::{Packet, Resolution};
+use gyronet::sensor::icm42688::packet::Packet;
 use gyronet::sensor::icm42688::registers as reg;
 use gyronet::units::{Micros, STANDARD_GRAVITY};
 use std::collections::VecDeque;
@@ -36,7 +36,6 @@ pub fn packet(sample: &ImuSample) -> Packet {
         Some((libm::round(value / step) * counts).clamp(ENDS[0], ENDS[1]) as i32)
     };
     Packet {
-        resolution: Resolution::Bits20,
         acceleration: sample
             .specific_force
             .map(|force| reading(force.metre_per_sec2(), FORCE_STEP, FORCE_COUNTS)),

@@ -124,7 +124,6 @@ fn driven(seconds: u64, yaw_deg: f64) -> impl Iterator<Item = (ImuSample, WheelS
     })
 }
 
-/// Lets the board see it.
 fn drive(board: &mut Board, seconds: u64, yaw_deg: f64) {
     for (sample, wheels) in driven(seconds, yaw_deg) {
         board.observe(Some(&sample), 0, (Status::Ready, Faults::NONE), &wheels, &judged(wheels.standstill));
@@ -250,7 +249,6 @@ fn a_contradicted_standstill_teaches_nothing() {
     assert_eq!(*board.learned(), before);
 }
 
-/// Drives past, with this fault.
 fn moves(bench: &mut Bench, faults: Faults) {
     let (wheels, moving) = (WheelSample::without_speeds(Standstill::Moving), sample(0, LEVEL, 0.01));
     bench.board.observe(Some(&moving), 0, (Status::Ready, faults), &wheels, &Standing::UNKNOWN);

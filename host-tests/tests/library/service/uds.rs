@@ -64,7 +64,6 @@ impl Bench {
         })
     }
 
-    /// Lets the vehicle turn.
     fn turn(&mut self) {
         let turning = sample(0, [0.0, 0.0, 9.81], 0.3);
         self.board.observe(

@@ -20,7 +20,6 @@ pub(super) trait Stream<const M: usize> {
     fn at(&mut self, time: f64) -> Result<Option<Value<M>>, DataError>;
     /// Returns the time of the newest row that was read.
     fn reached(&self) -> f64;
-    /// Reads the rest of the file and returns its summary.
     fn finish(self: Box<Self>) -> Result<StreamSummary, DataError>;
 }
 

@@ -9,7 +9,6 @@ use gyronet_tools::simulate::purpose::Purpose;
 use std::collections::VecDeque;
 use std::f64::consts::FRAC_PI_2;
 
-/// Holds the parameters of the town and its traffic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// Speed limits, m/s, each with the share of the streets that have it.

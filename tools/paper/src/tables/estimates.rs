@@ -35,7 +35,6 @@ use std::time::Instant;
 pub struct Estimates {
     /// Index of the first compared step, after static initialisation.
     pub start: usize,
-    /// The estimates of the methods that could be run.
     pub methods: Vec<Estimate>,
     /// The methods whose given trajectory cannot be compared, with the reason.
     pub left_out: Vec<(Method, String)>,

@@ -4,7 +4,6 @@
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
     pub name: &'static str,
-    /// Numbers of the line, one for each column.
     pub figures: &'static [f64],
 }
 

@@ -62,7 +62,6 @@ pub struct SequenceErrors {
 }
 
 impl SequenceErrors {
-    /// Compares the estimates with the truth.
     pub fn new(sequence: &Sequence, estimates: &Estimates) -> Self {
         let steps = &sequence.steps[estimates.start..];
         let turns = &sequence.turns()[estimates.start..];

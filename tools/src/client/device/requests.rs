@@ -44,7 +44,6 @@ pub const COUNTERS: [u8; 7] = {
     let [e, f] = FOG_COUNTERS.to_be_bytes();
     [0x22, a, b, c, d, e, f]
 };
-/// The routine that puts a download into use.
 pub const USE_DOWNLOAD: u16 = 0xFF01;
 /// The other routines.
 const STATIC: u16 = 0x0200;
@@ -73,7 +72,6 @@ impl<B: Bus> Device<B> {
         decode(&record)
     }
 
-    /// Returns the configuration that the board was started with.
     pub fn configuration(&mut self) -> Result<Configuration> {
         versioned::<Configuration>(&self.read(CONFIGURATION)?)
     }
@@ -150,7 +148,6 @@ impl<B: Bus> Device<B> {
         self.routine(START, routine(task))
     }
 
-    /// Stops a calibration without a result.
     pub fn cancel_calibration(&mut self) -> Result<()> {
         self.routine(STOP, STATIC)
     }

@@ -87,7 +87,6 @@ pub fn value(of: &impl Serialize) -> serde_json::Result<Value> {
     serde_json::from_str(&serde_json::to_string(of)?)
 }
 
-/// Returns every value with its name.
 pub fn flat(value: &Value) -> Vec<(String, String)> {
     let mut lines = Vec::new();
     walk("", value, &mut lines);

@@ -6,7 +6,6 @@ use gyronet::can::{DataFrame, slcan};
 /// Longest line that is read; a log's line with eight data bytes has about 50 characters.
 const MAX_LINE: usize = 128;
 
-/// The error of a line without a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("neither an SLCAN line nor a line of a candump log")]
 pub struct NoFrame;

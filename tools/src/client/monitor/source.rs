@@ -11,7 +11,6 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 use std::time::Duration;
 
-/// Timeout of a read.
 pub const WAIT: Duration = Duration::from_millis(100);
 
 /// The error of a source that cannot be opened or read.
@@ -26,7 +25,6 @@ pub enum SourceError {
     Read { name: String, source: io::Error },
 }
 
-/// The result of a read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Lines {
     /// The received lines; empty if none arrived within [`WAIT`].

@@ -24,7 +24,6 @@ pub struct State {
     pub latency: Option<f64>,
 }
 
-/// Names a message of the set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     Rate,

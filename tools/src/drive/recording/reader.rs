@@ -30,7 +30,6 @@ const MICROS_PER_TICK: u64 = 100;
 /// Bytes that are read from a file at once.
 const BUFFER: usize = 1 << 16;
 
-/// Name and index of a column.
 type Column = (&'static str, usize);
 
 #[derive(Debug, Clone, Copy)]
@@ -89,7 +88,6 @@ pub struct Reader<R> {
 }
 
 impl<R: std::io::Read> Reader<R> {
-    /// Reads the header; `path` is for messages.
     pub fn new(path: &str, input: R) -> Result<Self, DataError> {
         let mut csv =
             csv::ReaderBuilder::new().trim(csv::Trim::Headers).buffer_capacity(BUFFER).from_reader(input);

@@ -9,7 +9,6 @@ use gyronet::sample::{PERIOD_US, RATE_HZ};
 use gyronet::units::Micros;
 use std::collections::BTreeMap;
 
-/// The content of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Facts {
     pub rows: usize,

@@ -5,7 +5,6 @@ use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT};
 use gyronet::nn::reference::LstmWeights;
 use gyronet::nn::{GATES, HIDDEN_FRACTION_BITS, HIDDEN_MAX, pack};
 
-/// A quantised gate row.
 #[derive(Debug, Clone)]
 struct Row {
     bias: i32,

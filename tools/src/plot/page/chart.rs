@@ -18,7 +18,6 @@ const ASPECTS: (f64, f64) = (1.5, 2.6);
 pub struct Curve {
     /// The class in the style sheet, which gives the colour.
     pub class: &'static str,
-    /// The name in the legend.
     pub label: String,
     /// The text after the name in the legend.
     pub note: String,
@@ -28,7 +27,6 @@ pub struct Curve {
     pub in_scale: bool,
 }
 
-/// A chart of curves with common axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart<'a> {
     pub title: &'a str,

@@ -12,21 +12,32 @@ pub enum Effect {
     /// The stack grows by a register's value.
     Dynamic,
     /// A register is rounded down by less than this many bytes; it may become the stack pointer.
-    Align { register: u8, bytes: u32 },
+    Align {
+        register: u8,
+        bytes: u32,
+    },
     /// A register becomes the stack pointer.
-    MoveSp { register: u8 },
-    /// A call of a function at an address.
+    MoveSp {
+        register: u8,
+    },
     Call(u32),
-    /// A jump to an address.
     Branch(u32),
     /// A call or jump to a register's value.
-    Indirect { register: u8 },
+    Indirect {
+        register: u8,
+    },
     /// A jump to an address that is loaded from memory.
     Loaded,
     /// The lower half of a register is set.
-    MoveLow { register: u8, value: u32 },
+    MoveLow {
+        register: u8,
+        value: u32,
+    },
     /// The upper half of a register is set; the lower half is unchanged.
-    MoveHigh { register: u8, value: u32 },
+    MoveHigh {
+        register: u8,
+        value: u32,
+    },
 }
 
 const SP: u16 = 13;
