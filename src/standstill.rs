@@ -14,6 +14,7 @@
 
 mod inertial;
 
+use inertial::WINDOW;
 pub use inertial::{Axes, Inertial, Motion};
 
 use crate::sample::{ImuSample, Standstill, WheelSample};
@@ -124,8 +125,9 @@ impl Standing {
 pub struct Judge {
     config: StandstillConfig,
     inertial: Inertial,
-    /// Judgements in a row that are quiet.
+    /// Judgements in a row that are quiet, and those since then in which nothing but the gyro's mean has changed.
     quiet_for: u8,
+    lingers: u8,
     /// The quiet belongs to a stop, and whether the speed has changed since the last quiet.
     is_stop: bool,
     has_moved: bool,
@@ -156,6 +158,7 @@ impl Judge {
             config,
             inertial: Inertial::START,
             quiet_for: 0,
+            lingers: 0,
             is_stop: true,
             has_moved: false,
             shaken: 0,
@@ -257,7 +260,10 @@ impl Judge {
             (self.is_stop, self.has_moved) = (false, true);
         }
         let is_quiet = motion.shake < shake && motion.speed_change < speed_change;
-        self.quiet_for = if is_quiet { self.quiet_for.saturating_add(1) } else { 0 };
+        // A gyro that jumps, or a deck that begins to turn, speeds nothing up.
+        let is_turned = self.is_stop && self.quiet_for > 0 && self.is_calm && self.lingers < WINDOW as u8;
+        self.lingers = if is_turned && !is_quiet { self.lingers + 1 } else { 0 };
+        self.quiet_for = if is_quiet || is_turned { self.quiet_for.saturating_add(1) } else { 0 };
         if is_quiet && core::mem::take(&mut self.has_moved) {
             self.is_stop |= motion
                 .speed_lost

@@ -8,7 +8,7 @@
 //!   a road, which shifts the mean of gyro and network. The shift differs from stop to stop and does not
 //!   average out during a stop: without this state, a minute at a traffic light would make the filter
 //!   too certain of a bias that does not hold on the road. It is the wider the less probable the standstill is:
-//!   what is taken for one may be a smooth bend, so a doubtful standstill teaches little.
+//!   what is taken for one may be a smooth bend, which begins and ends, so a doubtful standstill teaches little.
 //!
 //! The mean of a second is modelled as z = b + s + noise, with the noise taken from the spread of the ten means of
 //! [`BATCH`] samples in it: the spread of single samples would not show that an engine's vibration averages out
@@ -17,12 +17,17 @@
 //!
 //! A second is refused whose mean is off by more than four sigma of the filter: then either the vehicle turns (a ferry,
 //! a turntable, wheels that are locked or creep below their threshold) or the bias is wrong (initialised during such a
-//! turn). From its first part on and until that is decided the difference is part of sigma. A stop that agrees with the
-//! bias withdraws the doubt; [`AGREEING_STOPS`] that contradict it and agree with each other replace the bias.
+//! turn, or changed by a knock). From its first part on and until that is decided the difference is part of sigma
+//! (`doubt`).
 //!
-//! Static initialisation only **claims** a bias: on a deck that turns, the turn is in it. A vehicle drives off from ground
-//! that stands. So the reading decides that static initialisation would accept last, within [`CONFIRMING`] samples before
-//! the vehicle begins to move; or the next stop. Until then all that the deck may turn by is part of sigma.
+//! Static initialisation only **claims** a bias: on a deck that turns, the turn is in it (`claim`).
+
+mod claim;
+mod config;
+mod doubt;
+mod turned;
+
+pub use config::ZeroRateConfig;
 
 use super::Spread;
 use crate::heading::filter::{BIAS, Filter, GAIN, STOP};
@@ -30,63 +35,25 @@ use crate::sample::RATE_HZ;
 use crate::sqrt::sqrt;
 use crate::standstill::{Standing, StandstillSource};
 use crate::units::AngularRate;
-
-/// Describes the noise of part and vehicle. All values are 1 sigma.
-#[derive(Debug, Clone, Copy)]
-pub struct ZeroRateConfig {
-    /// Bias left by static initialisation, rad/s.
-    pub initial: f32,
-    /// Random walk of the bias, rad/s per square root of a second.
-    pub walk: f32,
-    /// Offset of a standstill, rad/s.
-    pub standstill: f32,
-    /// Least noise of a one-second mean, rad/s: a smaller spread is raised to it.
-    pub noise: f32,
-    /// Yaw rate of a vehicle that is taken for a standing one, rad/s: a bend of 6 km at 110 km/h. The smoothest driven
-    /// seconds of the training drives turn by up to twice as much, RMS by half as much.
-    pub mistaken: f32,
-    /// Largest bias, and largest uncertainty of it, rad/s.
-    pub max_bias: f32,
-}
-
-impl ZeroRateConfig {
-    /// The noise of a MEMS part on a car. The walk is the one published for an Xsens MTi-100 (OpenVINS,
-    /// `config/kaist`); the noise is less than half of that part's 1.7e-4 rad/s/sqrt(Hz) over a second, so that a
-    /// better part benefits. The offset is measured: between standing and driving the mean error of the corrected
-    /// rate changes by 1.3e-4 rad/s RMS over the five training drives and the validation drive, 0.9e-4 on the latter
-    /// alone. Static initialisation may be off by 5 deg/s, so the bias may change by as much.
-    pub const DEFAULT: Self =
-        Self { initial: 1e-4, walk: 1e-5, standstill: 1.4e-4, noise: 5e-5, mistaken: 5e-3, max_bias: 0.1 };
-}
-
-impl ZeroRateConfig {
-    /// Returns the sigma of the bias by three seconds whose means spread so much: more than noise is a change that goes on.
-    fn initial_of(&self, drift: f32) -> f32 {
-        self.initial.max(drift - 5.0 * self.initial)
-    }
-}
+use claim::Claim;
+use doubt::Doubt;
+use turned::Turned;
 
 /// Samples in each of the means whose spread is taken.
 const BATCH: u32 = 10;
-
-/// Low-order bits that are dropped when the turn at standstill is summed.
-const TURNED_SHIFT: u32 = AngularRate::FRACTION_BITS - 20;
 
 /// Innovation of a second, over its sigma, above which the second is refused.
 const GATE: f32 = 4.0;
 /// Seconds over which the noise is averaged.
 const NOISE_SECONDS: f32 = 8.0;
+/// Seconds in which a bend begins or ends that is taken for a standstill.
+const BEND_SECONDS: f32 = 10.0;
+/// Variance of a refused second's mean, over that of those before, up to which it is steady.
+const STEADY: f32 = 9.0;
 /// Turn of a vehicle that somebody boards in a part of a second, rad.
 const BOARDING: f32 = 1e-3;
-/// Refused seconds that make a stop contradict the bias.
-const REFUSED_SECONDS: u8 = 2;
-/// Stops that contradict the bias and agree with each other before they replace it.
-const AGREEING_STOPS: u8 = 3;
 /// Samples for which a standstill that the gyro has contradicted is not believed: a slide may turn now and then.
 const DISTRUSTED: u32 = 10 * RATE_HZ;
-/// Samples after three seconds at rest within which the vehicle begins to move from there.
-const CONFIRMING: u32 = 10 * RATE_HZ;
-
 /// Says how a whole second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -106,30 +73,6 @@ struct Measurement {
     mean: f32,
     variance: f32,
     usual: f32,
-}
-
-/// Seconds that contradict the bias: their mean in this stop, and that of earlier stops that agree with each other.
-#[derive(Debug, Clone, Copy, Default)]
-struct Doubt {
-    mean: f32,
-    seconds: u8,
-    earlier: f32,
-    stops: u8,
-}
-
-/// A bias that nothing but one standstill has shown.
-#[derive(Debug, Clone, Copy)]
-struct Claim {
-    /// What the deck may turn by: the reading at rest, and the sigma of what earlier drives or the part's kind let
-    /// expect of it, rad/s.
-    reading: f32,
-    expected: f32,
-    /// The newest three seconds that static initialisation would accept: their mean and the spread of its seconds, rad/s, and
-    /// the samples for which they are evidence.
-    newest: (f32, f32),
-    counts_for: u32,
-    /// The vehicle has moved since.
-    has_moved: bool,
 }
 
 /// Estimates the bias that remains after static initialisation and network.
@@ -152,10 +95,7 @@ pub struct ZeroRate {
     doubt: Doubt,
     /// `None` once the bias is confirmed.
     claim: Option<Claim>,
-    /// Turn at standstill by the newest samples, 2^-20 rad/s x samples: in the current quarter of a second and in the
-    /// four before it. Then the samples left in the current quarter.
-    turned: [i32; 5],
-    turning_for: u8,
+    turned: Turned,
     since_walk: u32,
     /// Sigma of the change of the bias with temperature since the last update, rad/s.
     thermal: f32,
@@ -166,10 +106,8 @@ impl ZeroRate {
     /// already, rad/s, where the sigma of that bias is known; `drift` is the spread of its seconds.
     #[must_use]
     pub fn claimed(config: ZeroRateConfig, reading: f32, sigma: Option<f32>, drift: f32) -> Self {
-        let expected = sigma.unwrap_or(config.mistaken);
-        let claim =
-            Claim { reading, expected, newest: (0.0, drift), counts_for: CONFIRMING, has_moved: false };
-        let initial = config.initial_of(drift);
+        let initial = config.after_rest(drift);
+        let claim = Claim::new(reading, sigma.unwrap_or(config.mistaken), initial);
         Self { claim: Some(claim), ..Self::new(ZeroRateConfig { initial, ..config }) }
     }
 
@@ -193,10 +131,9 @@ impl ZeroRate {
             refused: false,
             against: 0.0,
             distrusted_for: 0,
-            doubt: Doubt::default(),
+            doubt: Doubt::NONE,
             claim: None,
-            turned: [0; 5],
-            turning_for: 0,
+            turned: Turned::NONE,
             since_walk: 0,
             thermal: 0.0,
         }
@@ -225,7 +162,7 @@ impl ZeroRate {
     ) -> Option<ZeroRateOutcome> {
         self.thermal = thermal;
         if let Some(claim) = &mut self.claim {
-            claim.counts_for = claim.counts_for.saturating_sub(1);
+            claim.pass_on();
         }
         self.distrusted_for = if self.refused { DISTRUSTED } else { self.distrusted_for.saturating_sub(1) };
         self.since_walk += 1;
@@ -266,26 +203,18 @@ impl ZeroRate {
     ///
     /// A vehicle may slide with its wheels locked. The limit on the mean of a second at standstill therefore also
     /// applies to the turn in parts of a second: when a sample exceeds it, that sample's delayed rate, which is zero
-    /// at standstill, has not been sent yet.
+    /// at standstill, has not been sent yet. Without wheels such a turn is part of sigma.
     pub fn contradicts_wheels(&mut self, rate: AngularRate) -> bool {
-        if !self.standing.is_by_wheels() {
-            self.turned = [0; 5];
+        if !self.standing.is_likely() {
+            self.turned = Turned::NONE;
             return false;
         }
-        if self.turning_for == 0 {
-            // Any second that ends now lies within the five quarters.
-            self.turned.rotate_right(1);
-            (self.turned[0], self.turning_for) = (0, RATE_HZ as u8 / 4);
-        }
-        // A sum of 125 of them fits.
-        self.turned[0] += rate.0.saturating_sub(self.bias().0) >> TURNED_SHIFT;
-        self.turning_for -= 1;
-        let per_rad = (AngularRate::PER_RAD_PER_SEC / (1 << TURNED_SHIFT) as f32) * RATE_HZ as f32;
-        let turned = self.turned.iter().sum::<i32>() as f32 / per_rad;
-        if libm::fabsf(turned) <= self.turn_gate() {
+        self.turned.add(rate.0.saturating_sub(self.bias().0));
+        let turned = self.turned.angle();
+        if !self.standing.is_by_wheels() || libm::fabsf(turned) <= self.turn_gate() {
             return false;
         }
-        self.turned = [0; 5];
+        self.turned = Turned::NONE;
         let now = rate.0.saturating_sub(self.bias().0) as f32 / AngularRate::PER_RAD_PER_SEC;
         self.against = self.against.max(libm::fabsf(turned)).max(libm::fabsf(now));
         if core::mem::replace(&mut self.refused, true) {
@@ -294,6 +223,15 @@ impl ZeroRate {
         // The next whole second shows whether the turn goes on.
         self.restart();
         true
+    }
+
+    /// Returns the rate by which the newest quarters of a second contradict the bias at a standstill that no wheel shows,
+    /// beyond their noise, rad/s.
+    fn turns(&self) -> f32 {
+        let is_inertial = self.standing.source == StandstillSource::Inertial && self.standing.is_likely();
+        let Some(noise) = self.noise.filter(|_| is_inertial) else { return 0.0 };
+        let least = self.config.noise * self.config.noise;
+        self.turned.newest_rate(GATE * sqrt(noise.max(least)))
     }
 
     /// Returns whether the wheels stand while the gyro shows a turn.
@@ -322,22 +260,16 @@ impl ZeroRate {
 
     /// Takes the mean of three more seconds that static initialisation accepts, and the spread of its seconds, rad/s.
     pub fn rest(&mut self, mean: f32, drift: f32) {
-        if let Some(claim) = self.claim.as_mut().filter(|claim| !claim.has_moved) {
-            (claim.newest, claim.counts_for) = ((mean, drift), CONFIRMING);
+        if let Some(claim) = &mut self.claim {
+            claim.rest(mean, self.config.after_rest(drift));
         }
     }
 
     /// Notes that the vehicle moves: what it has just stood on did not turn, so its newest reading there is the bias.
     pub fn moves(&mut self) {
-        let Some(claim) = &mut self.claim else { return };
-        claim.has_moved = true;
-        if claim.counts_for == 0 {
-            return;
-        }
-        let (mean, drift) = claim.newest;
+        let Some((mean, initial)) = self.claim.as_mut().and_then(Claim::moves) else { return };
         self.claim = None;
         let ZeroRateConfig { standstill, noise, max_bias, .. } = self.config;
-        let initial = self.config.initial_of(drift);
         // Each of the two means has an offset and a noise of its own.
         let variance = self.filter.variance::<BIAS>()
             + initial * initial
@@ -345,7 +277,7 @@ impl ZeroRate {
         if libm::fabsf(mean - self.filter.get::<BIAS>()) > GATE * sqrt(variance) {
             self.filter.restart::<BIAS>(within(mean, max_bias), initial * initial);
             self.filter.restart::<STOP>(0.0, 0.0);
-            self.doubt = Doubt::default();
+            self.doubt = Doubt::NONE;
         }
     }
 
@@ -374,20 +306,17 @@ impl ZeroRate {
     /// Returns the uncertainty of the bias when driving, 1 sigma, rad/s; with it the contradiction that is not decided.
     #[must_use]
     pub fn sigma(&self) -> f32 {
-        let Doubt { mean, seconds, earlier, stops } = self.doubt;
-        let bias = self.filter.get::<BIAS>();
-        let off = |mean: f32, is_doubt: bool| if is_doubt { libm::fabsf(mean - bias) } else { 0.0 };
-        let off = off(mean, seconds >= REFUSED_SECONDS).max(off(earlier, stops > 0));
+        let off = self.doubt.off(self.filter.get::<BIAS>());
         let off = if self.refused && self.standing.is_likely() { off.max(self.against) } else { off };
-        let hidden =
-            self.claim.map_or(0.0, |claim| claim.reading * claim.reading + claim.expected * claim.expected);
+        let off = off.max(self.turns());
+        let hidden = self.claim.as_ref().map_or(0.0, Claim::variance);
         sqrt(self.bias_variance() + off * off + hidden).min(self.config.max_bias)
     }
 
     /// Returns whether standstills contradict the bias.
     #[must_use]
     pub fn is_doubted(&self) -> bool {
-        self.doubt.seconds >= REFUSED_SECONDS || self.doubt.stops > 0
+        self.doubt.is_some()
     }
 
     /// Returns the variance of the bias when driving: that of the filter, and that of the change with temperature since
@@ -408,32 +337,21 @@ impl ZeroRate {
         self.standing = standing;
         (self.refused, self.against, self.distrusted_for) = (false, 0.0, 0);
         self.restart();
-        let ZeroRateConfig { standstill, mistaken, .. } = self.config;
-        let offset = standstill * standstill + (1.0 - standing.probability) * mistaken * mistaken;
+        let offset = self.config.standstill * self.config.standstill + self.mistaken();
         self.filter.restart::<STOP>(0.0, offset);
     }
 
     /// Compares a stop that contradicted the bias with earlier ones, and replaces the bias once enough agree.
     fn end_doubt(&mut self) {
-        let Doubt { mean, seconds, earlier, stops } = self.doubt;
-        self.doubt.seconds = 0;
-        if seconds < REFUSED_SECONDS {
-            return;
-        }
-        let ZeroRateConfig { standstill, noise, .. } = self.config;
-        // Each has an offset of its own.
+        let ZeroRateConfig { standstill, noise, max_bias, .. } = self.config;
+        // Each stop has an offset of its own.
         let variance = standstill * standstill + noise * noise;
-        let agrees = stops > 0 && libm::fabsf(mean - earlier) <= GATE * sqrt(2.0 * variance);
-        let (stops, before) = if agrees { (stops + 1, earlier) } else { (1, mean) };
-        let mean = before + (mean - before) / f32::from(stops);
-        self.doubt = Doubt { earlier: mean, stops, ..Doubt::default() };
         // Ground on which the vehicle stops says more than what it started on.
-        let enough = if self.claim.is_some_and(|claim| claim.has_moved) { 1 } else { AGREEING_STOPS };
-        if stops >= enough {
+        let is_claim = self.claim.as_ref().is_some_and(Claim::has_moved);
+        if let Some(mean) = self.doubt.end_stop(GATE * sqrt(2.0 * variance), is_claim) {
             self.claim = None;
-            self.filter.restart::<BIAS>(within(mean, self.config.max_bias), variance);
+            self.filter.restart::<BIAS>(within(mean, max_bias), variance);
             self.filter.restart::<STOP>(self.filter.get::<STOP>(), 0.0);
-            self.doubt = Doubt::default();
         }
     }
 
@@ -442,6 +360,15 @@ impl ZeroRate {
         let ZeroRateConfig { walk, max_bias, .. } = self.config;
         let variance = self.filter.variance::<BIAS>() + walk * walk;
         self.filter.put_variance::<BIAS>(variance.min(max_bias * max_bias));
+        if self.standing.source != StandstillSource::None && !self.standing.is_likely() {
+            let bends = self.filter.variance::<STOP>() + self.mistaken() / BEND_SECONDS;
+            self.filter.put_variance::<STOP>(bends.min(max_bias * max_bias));
+        }
+    }
+
+    /// Returns the variance of the yaw rate of what is taken for a standstill, (rad/s)^2.
+    fn mistaken(&self) -> f32 {
+        (1.0 - self.standing.probability) * self.config.mistaken * self.config.mistaken
     }
 
     fn second(&mut self, block: &Spread) -> ZeroRateOutcome {
@@ -458,11 +385,17 @@ impl ZeroRate {
         } else {
             0.0
         };
+        // No vehicle that pulls away turns as steadily as one at rest.
+        let is_steady = self.refused && own <= STEADY * before.max(least);
         let before = self.waiting.replace(measured);
         match before {
             Some(before) if !self.is_off(&before) => self.update(before),
-            Some(before) => self.contradict(before),
+            Some(before) => self.contradict(before, false),
             None => {}
+        }
+        if is_steady {
+            self.contradict(measured, true);
+            self.waiting = None;
         }
         match before {
             _ if self.refused => ZeroRateOutcome::Refused,
@@ -478,26 +411,27 @@ impl ZeroRate {
     }
 
     /// Notes a second at a probable standstill that contradicts the bias.
-    fn contradict(&mut self, measured: Measurement) {
-        if !self.standing.is_likely() {
-            return;
+    fn contradict(&mut self, measured: Measurement, is_steady: bool) {
+        if self.standing.is_likely() {
+            self.doubt.add(measured.mean, is_steady);
         }
-        let Doubt { mean, seconds, .. } = &mut self.doubt;
-        *seconds = seconds.saturating_add(1);
-        *mean += (measured.mean - *mean) / f32::from(*seconds);
     }
 
-    /// Notes a second at a probable standstill that agrees with the bias.
-    fn agree(&mut self) {
-        self.doubt = Doubt::default();
-        self.claim = self.claim.filter(|claim| !claim.has_moved);
+    /// Notes the mean of a second at a probable standstill that agrees with the bias, and not more with what contradicts it.
+    fn agree(&mut self, mean: f32) {
+        let own = self.filter.get::<BIAS>() + self.filter.get::<STOP>();
+        if self.doubt.is_nearer(mean, libm::fabsf(mean - own)) {
+            return;
+        }
+        self.doubt = Doubt::NONE;
+        self.claim = self.claim.take().filter(|claim| !claim.has_moved());
     }
 
     /// Applies the Kalman filter's measurement update.
     fn update(&mut self, measured: Measurement) {
         self.take_thermal();
         if self.standing.is_likely() {
-            self.agree();
+            self.agree(measured.mean);
         }
         self.filter.standstill(measured.mean, measured.variance);
         self.bound();

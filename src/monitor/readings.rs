@@ -77,8 +77,14 @@ pub const USUAL: f32 = 12.0;
 const STEPS: f32 = 64.0;
 /// At most this many readings in a row are rejected; the next one is accepted whatever its value.
 pub const JUMP_PATIENCE: u8 = 3;
-/// Samples for which a shift is told on: those that have not been sent yet.
+/// Samples for which a shift is told on: those that have not been sent yet; and samples in a row near the rate before the
+/// jumps that end it.
 const TOLD: u8 = 12;
+const BACK: u8 = 20;
+/// Samples after a rejected one for which an axis is not used to its steps, and those after which it is nevertheless: a
+/// fault shakes a reading too, and a vehicle may begin to.
+const ODD: u16 = 100;
+const USED_TO: u16 = 300;
 /// Readings are not compared with a last good reading older than this, microseconds.
 const OLD_US: u32 = 50_000;
 
@@ -94,10 +100,22 @@ pub(super) struct Jump {
     squares: [f32; AXES],
     /// Readings in a row that were rejected.
     rejected: u8,
-    /// The yaw rate by which the readings are off if the jumps that were accepted are faults, rad/s, and the samples for
-    /// which that is told on after it has ended.
-    shift: f32,
-    told_for: u8,
+    /// Samples since the first one that was rejected, and since the last one.
+    odd_for: u16,
+    odd_ago: u16,
+    shift: Option<Shift>,
+}
+
+/// Jumps of the yaw rate that were accepted.
+#[derive(Debug, Clone, Copy)]
+struct Shift {
+    /// Their sum, and the rate before the first of them, rad/s.
+    sum: f32,
+    before: f32,
+    /// Readings in a row near that rate.
+    near: u8,
+    /// Samples for which it is told on after it has ended.
+    told_for: Option<u8>,
 }
 
 impl Jump {
@@ -109,8 +127,9 @@ impl Jump {
             known: false,
             squares: [0.0; AXES],
             rejected: 0,
-            shift: 0.0,
-            told_for: 0,
+            odd_for: 0,
+            odd_ago: 0,
+            shift: None,
         }
     }
 
@@ -122,51 +141,76 @@ impl Jump {
             sample.specific_force.map(|force| force.0 as f32 / SpecificForce::PER_METRE_PER_SEC2),
         );
         let reading = [wx, wy, wz, fx, fy, fz];
-        if self.told_for == 1 {
-            self.shift = 0.0;
-        }
-        self.told_for = self.told_for.saturating_sub(1);
+        self.pass_on();
         let age = (at.wrapping_sub(self.at) as i32).unsigned_abs();
         if self.known && age <= OLD_US {
             let steps: [f32; AXES] = core::array::from_fn(|axis| reading[axis] - self.last[axis]);
             let is_far = self.is_far(&steps);
+            if is_far {
+                (self.odd_for, self.odd_ago) = (self.odd_for.max(1), 0);
+            }
             if self.rejected < JUMP_PATIENCE && is_far {
                 self.rejected += 1;
                 return true;
             }
             let [_, _, yaw, ..] = steps;
-            if is_far || self.shift != 0.0 && libm::fabsf(yaw + self.shift) < JUMP_RATE[2] {
-                self.accept_jump(yaw);
-            }
-            for (square, step) in self.squares.iter_mut().zip(steps) {
-                *square += (step * step - *square) / STEPS;
+            self.accept(yaw, is_far);
+            if self.odd_for == 0 || self.odd_for > USED_TO {
+                for (square, step) in self.squares.iter_mut().zip(steps) {
+                    *square += (step * step - *square) / STEPS;
+                }
             }
         }
         (self.last, self.at, self.known, self.rejected) = (reading, at, true, 0);
         false
     }
 
-    /// Notes a jump of the yaw rate that lasts. One back to what was before ends the doubt.
-    fn accept_jump(&mut self, step: f32) {
+    /// Counts a sample for what lasts some samples.
+    fn pass_on(&mut self) {
+        self.odd_ago = self.odd_ago.saturating_add(1);
+        let is_odd = self.odd_for > 0 && (self.odd_ago < ODD || self.shift.is_some());
+        self.odd_for = if is_odd { self.odd_for.saturating_add(1) } else { 0 };
+        let told_for = self.shift.as_mut().and_then(|shift| shift.told_for.as_mut());
+        if told_for.is_some_and(|left| {
+            *left = left.saturating_sub(1);
+            *left == 0
+        }) {
+            self.shift = None;
+        }
+    }
+
+    /// Notes a step of the yaw rate that is accepted. A jump that lasts begins a shift, and others add to it. It ends where
+    /// they have added up to nothing and the rate is what it was before: a gain that is wrong changes it where nothing jumps.
+    fn accept(&mut self, step: f32, is_far: bool) {
         let [.., smallest] = JUMP_RATE;
-        let shift = self.shift + step;
-        if libm::fabsf(shift) > smallest {
-            self.shift = shift;
-        } else {
-            self.settle();
+        let [_, _, yaw, ..] = self.last;
+        let Some(shift) = &mut self.shift else {
+            if is_far && libm::fabsf(step) > smallest {
+                self.shift = Some(Shift { sum: step, before: yaw, near: 0, told_for: None });
+            }
+            return;
+        };
+        if is_far || libm::fabsf(step + shift.sum) < smallest && libm::fabsf(shift.sum) > smallest {
+            shift.sum += step;
+        }
+        let is_near = libm::fabsf(yaw + step - shift.before) < smallest && libm::fabsf(shift.sum) < smallest;
+        shift.near = if is_near { shift.near + 1 } else { 0 };
+        if shift.near >= BACK {
+            self.shift = None;
         }
     }
 
     /// Notes that the present level of the readings is right.
     pub fn settle(&mut self) {
-        if self.shift != 0.0 && self.told_for == 0 {
-            self.told_for = TOLD;
+        if let Some(shift) = &mut self.shift {
+            shift.told_for.get_or_insert(TOLD);
         }
     }
 
-    /// Returns the yaw rate by which the readings are off if the jumps that were accepted are faults, rad/s.
+    /// Returns the yaw rate by which the newest reading is off if the jumps that were accepted are faults, rad/s.
     pub fn shift(&self) -> f32 {
-        libm::fabsf(self.shift)
+        let [_, _, yaw, ..] = self.last;
+        self.shift.map_or(0.0, |shift| libm::fabsf(shift.sum).max(libm::fabsf(yaw - shift.before)))
     }
 
     fn is_far(&self, steps: &[f32; AXES]) -> bool {
@@ -177,5 +221,51 @@ impl Jump {
             .zip(always)
             .zip(self.squares)
             .any(|((step, always), square)| step * step > (always * always).max(USUAL * USUAL * square))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample::{PERIOD_US, Validity};
+    use crate::units::Micros;
+
+    /// Checks a second of a yaw rate; returns the sums of the rates that pass, less the true ones, and of the shifts, rad.
+    fn second(jump: &mut Jump, from: u64, read: impl Fn(f32) -> f32) -> (f32, f32) {
+        let (mut wrong, mut told) = (0.0f32, 0.0);
+        for step in from..from + 100 {
+            let rate = 0.02 + 0.03 * libm::sinf(step as f32 * 0.9);
+            let mut angular_rate = [AngularRate(0); 3];
+            angular_rate[2] = AngularRate::from_rad_per_sec(read(rate)).unwrap();
+            let specific_force = [SpecificForce(0); 3];
+            let (time, validity) = (Micros(step * PERIOD_US), Validity::Good);
+            let sample = ImuSample { time, angular_rate, specific_force, temperature: None, validity };
+            if !jump.check(&sample) {
+                wrong += 0.01 * (read(rate) - rate);
+                told += 0.01 * jump.shift();
+            }
+        }
+        (libm::fabsf(wrong), told)
+    }
+
+    #[test]
+    fn a_gain_of_sixty_is_told_though_every_reading_jumps_back_and_forth() {
+        let mut jump = Jump::new();
+        assert_eq!(second(&mut jump, 0, |rate| rate), (0.0, 0.0));
+        let (wrong, told) = second(&mut jump, 100, |rate| 60.0 * rate);
+        assert!(wrong > 0.1 && told > 0.5 * wrong, "{wrong} rad, {told} told");
+        // It is not used to such steps, so what is right again is believed soon.
+        second(&mut jump, 200, |rate| rate);
+        assert_eq!(second(&mut jump, 300, |rate| rate).0, 0.0);
+    }
+
+    #[test]
+    fn a_vehicle_that_begins_to_shake_is_believed_after_three_seconds() {
+        let mut jump = Jump::new();
+        for second_from in [0, 100, 200, 300, 400, 500] {
+            second(&mut jump, second_from, |rate| rate + 20.0 * (rate - 0.02));
+        }
+        assert_eq!(jump.rejected, 0);
+        assert!(jump.squares[2] > 0.02, "{}", jump.squares[2]);
     }
 }

@@ -8,6 +8,10 @@
 //! (and as a model has learnt), or it is tilted by an unknown angle. Slopes are normal with the same sigma in both, so
 //! the ratio of their probabilities has a closed form. The first explanation starts with the better odds: only a tilt
 //! steeper than streets, or one that turns confirm, is taken off.
+//!
+//! What earlier drives have shown is a claim: a standstill that no street explains drops it, because the sensor was moved.
+//! Which of both is right the next turn or street shows; until then their angle is part of the variance, and so is a scatter
+//! that streets do not explain.
 
 use super::{Rotation, metre_per_sec2};
 use crate::health::slow::Knowledge;
@@ -29,6 +33,8 @@ const PROVEN: f32 = 3.0;
 const AGAIN: f32 = 1.0;
 /// Least sigma of a turn's axis, rad: 2.5 deg. The body leans outwards, and a ramp is as steep all the way up.
 const LEAN: f32 = 0.0436;
+/// Sigmas of slope and known vertical, together, beyond which no street explains a standstill.
+const GATE: f32 = 4.0;
 /// Information of a vertical that is known to 1 deg, rad^-2: that of a dozen standstills. Older ones fade beyond it.
 const MOST: f32 = 3_283.0;
 /// Least rate of a turn, rad/s, as the mean of a second, and its least angle, rad.
@@ -80,10 +86,14 @@ impl Vertical {
         up.map(|axis| axis / length)
     }
 
-    /// Returns the sigma of that direction in each axis, rad.
+    /// Returns the sigma of that direction in each axis, rad: by the slope of streets, or by how far the directions scatter
+    /// where that is more.
     pub fn sigma(&self) -> f32 {
         let (_, tilt) = self.deviation();
-        sqrt(1.0 / (self.information + 1.0 / tilt))
+        // Each direction has two axes, and a weight of at most that of a standstill but for turns.
+        let scatter = 2.0 * (self.information - sqrt(dot(&self.sum, &self.sum)));
+        let expected = (2.0 * self.information * SLOPE * SLOPE).max(2.0);
+        sqrt((scatter / expected).max(1.0) / (self.information + 1.0 / tilt))
     }
 
     /// Returns whether it differs notably from an earlier one: it is twice as certain, or 1 degree off.
@@ -144,6 +154,8 @@ pub struct Judgement {
 pub struct VerticalEstimator {
     known: Vertical,
     is_tilted: bool,
+    /// Square of the angle to what was known before a standstill has dropped it, rad^2, until another source decides.
+    disputed: f32,
     /// Sums of the current standstill, its samples, and the samples since the one before.
     force: [i64; 3],
     stood: u32,
@@ -161,6 +173,7 @@ impl VerticalEstimator {
         Self {
             known,
             is_tilted: false,
+            disputed: 0.0,
             force: [0; 3],
             stood: 0,
             away: APART,
@@ -175,7 +188,14 @@ impl VerticalEstimator {
         let force = metre_per_sec2(force);
         let length = sqrt(dot(&force, &force));
         if length > 1.0 {
-            self.known = self.known.with(&force.map(|axis| axis / length), SLOPE * SLOPE);
+            let up = force.map(|axis| axis / length);
+            let before = self.known.up();
+            let off: [f32; 3] = core::array::from_fn(|axis| up[axis] - before[axis]);
+            let (square, sigma) = (dot(&off, &off), self.known.sigma());
+            let is_moved =
+                self.known.information > 0.0 && square > GATE * GATE * (SLOPE * SLOPE + sigma * sigma);
+            self.disputed = if is_moved { square } else { 0.0 };
+            self.known = if is_moved { Vertical::UNKNOWN } else { self.known }.with(&up, SLOPE * SLOPE);
         }
         (self.stood, self.away) = (REST, 0);
     }
@@ -218,7 +238,9 @@ impl VerticalEstimator {
         let (yaw, before) = (dot(&angle, &up), dot(&self.turn, &up));
         let turns = libm::fabsf(yaw) > TURNING;
         if !turns || yaw * before < 0.0 {
-            self.known = self.now();
+            let now = self.now();
+            self.disputed = if now == self.known { self.disputed } else { 0.0 };
+            self.known = now;
             self.turn = [0.0; 3];
         }
         if turns {
@@ -254,12 +276,13 @@ impl VerticalEstimator {
         let odds = before + now.odds(configured);
         self.is_tilted = odds < if self.is_tilted { AGAIN } else { 0.0 };
         let up = now.up();
+        let disputed = if now == self.known { self.disputed } else { 0.0 };
         if self.is_tilted {
-            return Judgement { up: Some(up), variance: now.sigma() * now.sigma() };
+            return Judgement { up: Some(up), variance: now.sigma() * now.sigma() + disputed };
         }
         let [x, y, _] = up;
         let off = [x - configured[0], y - configured[1]];
-        Judgement { up: None, variance: dot(&off, &off) / (1.0 + libm::expf(odds)) }
+        Judgement { up: None, variance: dot(&off, &off) / (1.0 + libm::expf(odds)) + disputed }
     }
 }
 
@@ -385,5 +408,34 @@ mod tests {
         let there = known.turned(&mounting.inverse()).turned(&mounting);
         assert!(known.up().iter().zip(there.up()).all(|(a, b)| (a - b).abs() < 1e-5));
         assert!(!there.differs(&known) && known.differs(&Vertical::UNKNOWN));
+    }
+
+    #[test]
+    fn a_rest_that_no_street_explains_drops_what_was_known_until_a_turn_decides() {
+        let drive = |moved: [f32; 2], turns: [f32; 2]| {
+            let mut estimator = VerticalEstimator::new(*stood(&[NONE; 4]).known());
+            let before = estimator.known().sigma();
+            run(&mut estimator, 4, moved, 0.0, true);
+            let at_rest = estimator.judge(None, false);
+            run(&mut estimator, 4, turns, 0.4, false);
+            (before, at_rest, estimator.judge(None, false))
+        };
+        let (before, at_rest, turned) = drive([0.0, 20.0], [0.0, 20.0]);
+        let up = at_rest.up.expect("no street is as steep")[1].asin().to_degrees();
+        assert!(
+            up > 15.0 && at_rest.variance > 0.1,
+            "{up} {at_rest:?}: it may be a ramp, and the sensor where it was"
+        );
+        assert!(turned.variance < 1.1 * SLOPE * SLOPE, "the turn decides: {turned:?}");
+        // A street is one more.
+        let (_, street, _) = drive([0.0, 8.0], NONE);
+        assert!(street.up.is_none() && street.variance < before * before, "{street:?}");
+    }
+
+    #[test]
+    fn directions_that_scatter_are_known_worse() {
+        let calm = stood(&[[0.0, 3.0], [0.0, -3.0], [3.0, 0.0], [-3.0, 0.0]]).known().sigma();
+        let scattered = stood(&[[0.0, 11.0], [0.0, -11.0], [11.0, 0.0], [-11.0, 0.0]]).known().sigma();
+        assert!(scattered > 1.8 * calm, "{scattered} {calm}");
     }
 }

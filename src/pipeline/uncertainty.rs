@@ -6,7 +6,7 @@
 //!
 //! | part | sigma of a second's mean rate | over a minute |
 //! |---|---|---|
-//! | network, or noise where it has not corrected; none at standstill | from the error that it predicts for its windows ([`crate::model::Estimate::scale`]) | adds in squares |
+//! | network, or noise where it has not corrected; at standstill the angle by which an engine shakes the vehicle | from the error that it predicts for its windows ([`crate::model::Estimate::scale`]) | adds in squares |
 //! | bias | from the bias curve and the zero-rate updates | adds linearly |
 //! | rate that standstill has set to zero | its mean | adds linearly |
 //! | revision that is not carried yet | what a second carries of it | adds linearly |
@@ -16,10 +16,13 @@
 //! | unit that the network was not trained with | a share of its mean correction | of its net correction |
 //! | gap in the accumulated yaw | | the angle that the rates around it have turned, and what it may hide ([`crate::estimate`]) |
 
+mod swing;
+
 use crate::estimate::Missed;
 use crate::sample::RATE_HZ;
 use crate::sqrt::sqrt;
 use crate::units::AngularRate;
+use swing::Swing;
 
 /// The sizes of the errors that are not estimated while driving.
 #[derive(Debug, Clone, Copy)]
@@ -127,6 +130,8 @@ pub struct Uncertainty {
     /// The last second, the newest block first, and the samples in that block.
     blocks: [Turns; BLOCKS],
     samples: u32,
+    /// What standstill hides besides its mean.
+    swing: Swing,
     /// The mean rates of the last second, about z those of its end where they are larger, rad/s.
     rates: Turns,
     /// The last minute, the newest part first, and the samples in that part.
@@ -144,6 +149,7 @@ impl Uncertainty {
             scale_square: None,
             blocks: [[0.0; TURNS]; BLOCKS],
             samples: 0,
+            swing: Swing::NONE,
             rates: [0.0; TURNS],
             parts: [Part::EMPTY; PARTS + 1],
             in_part: 0,
@@ -186,6 +192,10 @@ impl Uncertainty {
         const STEP: f32 = 1.0 / RATE_HZ as f32;
         let [x, y, z] = turning.rates;
         let turns = [x, y, z, turning.estimate, turning.withheld].map(|rate| rad_per_sec(rate) * STEP);
+        if turning.origin == Origin::Standstill {
+            let [.., withheld] = turns;
+            self.swing.add(withheld);
+        }
         let sum = |to: &mut Turns| to.iter_mut().zip(turns).for_each(|(to, turn)| *to += turn);
         sum(&mut self.blocks[0]);
         self.samples += 1;
@@ -254,7 +264,8 @@ impl Uncertainty {
     fn own(&self, origin: Origin) -> f32 {
         let UncertaintyConfig { per_scale, uncorrected, .. } = self.config;
         match (origin, self.scale_square) {
-            (Origin::Standstill, _) => 0.0,
+            // From one end of the second to the other.
+            (Origin::Standstill, _) => 2.0 * self.swing.variance,
             (Origin::Network, Some(scale_square)) => per_scale * per_scale * scale_square,
             _ => uncorrected * uncorrected,
         }

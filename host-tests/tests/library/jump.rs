@@ -115,9 +115,9 @@ fn the_fourth_reading_in_a_row_is_believed_wherever_it_is() {
         }
         assert_believed(&fourth, "reading 4");
         assert_eq!(drive.coprocessor.monitor_counters().wrong, 3);
-        // Others are held against this one from there on, with a limit half as high again by this step.
-        assert_refused(&drive.off_by(axis, -limit), "two limits away");
-        assert_believed(&drive.off_by(axis, 0), "a limit away");
+        // Others are held against this one from there on, with the same limit: a fault is not what an axis is used to.
+        assert_refused(&drive.off_by(axis, 0), "more than a limit away");
+        assert_believed(&drive.off_by(axis, 500_000), "less than a limit away");
         assert_eq!(drive.coprocessor.monitor_counters().wrong, 4);
     }
 }

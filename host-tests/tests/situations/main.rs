@@ -1,4 +1,4 @@
-//! Each situation once: no promise is broken but those that are known.
+//! Each situation once: no promise is broken.
 
 mod judge;
 
@@ -8,22 +8,14 @@ use gyronet_host_tests::situations::list::{self, Situation};
 use gyronet_host_tests::situations::report::{HEADING, line};
 use gyronet_host_tests::{parallel, situations};
 
-/// Situations that are wrong and good still. One that keeps its promises must leave the list.
-const KNOWN: [&str; 1] = ["sensor moved between two drives"];
-
 #[test]
 fn no_situation_is_wrong_and_good() {
     let situations: Vec<&Situation> = list::all().collect();
     parallel::table(HEADING, &situations, |situation| {
         let vehicle = &situation.vehicles[0];
         let outcome = situation.run(vehicle, 1);
-        let mut failed: Vec<String> =
-            outcome.broken().into_iter().map(|(_, text)| format!("{}: {text}", situation.name)).collect();
-        if KNOWN.contains(&situation.name) {
-            let kept = failed.is_empty().then(|| format!("{}: keeps its promises now", situation.name));
-            failed = kept.into_iter().collect();
-        }
-        (line(situation.name, vehicle.name, &outcome), failed)
+        let failed = outcome.broken().into_iter().map(|(_, text)| format!("{}: {text}", situation.name));
+        (line(situation.name, vehicle.name, &outcome), failed.collect())
     });
 }
 
