@@ -155,7 +155,10 @@ fn accepted_settings_run_and_refused_ones_do_not() {
     let mut all: Vec<(f64, Configuration, Shape)> = (0..4_000)
         .filter_map(|seed| {
             let mut noise = Noise::new(seed);
-            let configuration = settings::configuration(&mut noise);
+            // Windows run only behind a static initialisation.
+            let Configuration { static_init, mounting, .. } = Configuration::DEFAULT;
+            let configuration =
+                Configuration { static_init, mounting, ..settings::configuration(&mut noise) };
             let shape = shapes[seed as usize % 2];
             configuration
                 .check()
