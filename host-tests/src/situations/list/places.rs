@@ -35,7 +35,7 @@ pub static SITUATIONS: &[Situation] = &[
         scene.ride.hold(8.0);
         scene.town(2);
         // Half of the time it has not driven off yet.
-        scene.least = 0.45;
+        scene.least = 0.48;
     }),
     Situation::new("car carrier in a town", WHEELED, |scene| {
         scene.ride.hold(8.0);

@@ -45,13 +45,13 @@ pub static SITUATIONS: &[Situation] = &[
         scene.ride.hold(1.0);
         scene.ride.now.engine = 1.0;
         scene.town(2);
-        scene.least = 0.3;
+        scene.least = 0.65;
     }),
     Situation::new("long idle", ALL, |scene| {
         scene.ride.hold(100.0);
         scene.town(1);
         // Nothing confirms the bias before it drives off.
-        scene.least = 0.2;
+        scene.least = 0.23;
     }),
     Situation::new("engine off at each stop", WHEELED, |scene| {
         scene.ride.hold(8.0);
@@ -72,7 +72,7 @@ pub static SITUATIONS: &[Situation] = &[
         scene.ride.hold(20.0);
         scene.town(2);
         // For a quarter of the time it has not driven off yet.
-        scene.least = 0.6;
+        scene.least = 0.65;
     }),
     Situation::new("restart in motion", ALL, |scene| {
         scene.ride.hold(8.0);
@@ -81,7 +81,7 @@ pub static SITUATIONS: &[Situation] = &[
         scene.restart();
         scene.ride.hold(5.0).turn(80.0, 6.0).hold(8.0).stop(6.0, 8.0);
         scene.town(1);
-        scene.least = 0.5;
+        scene.least = 0.65;
     }),
     Situation::new("reversing", ALL, |scene| {
         scene.ride.hold(8.0).reach(-2.0, 2.0).turn(60.0, 8.0).hold(2.0).stop(2.0, 4.0);
