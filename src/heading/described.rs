@@ -37,7 +37,7 @@ impl HeadingSignal {
             let short = HeadingError::Short(frame.data().len());
             let (raw, value) =
                 self.field.raw(frame.data()).zip(self.field.value(frame.data())).ok_or(short)?;
-            Ok((self.invalid != Some(raw)).then(|| value as f32 * self.factor + self.offset))
+            Ok((self.invalid != Some(raw)).then_some(value as f32 * self.factor + self.offset))
         })
     }
 }

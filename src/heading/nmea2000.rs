@@ -51,6 +51,6 @@ pub fn course_speed_frame<F: Frame>(heading: &Heading, sequence: u8, source: u8)
 pub fn latitude(frame: &impl Frame) -> Option<Result<Option<f32>, HeadingError>> {
     Some(group(frame, POSITION)?.map(|[a, b, c, d, ..]| {
         let code = i32::from_le_bytes([a, b, c, d]);
-        (code < LONG_RESERVED).then(|| code as f32 * 1e-7)
+        (code < LONG_RESERVED).then_some(code as f32 * 1e-7)
     }))
 }

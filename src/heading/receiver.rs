@@ -94,7 +94,7 @@ impl HeadingSettings {
     /// # Errors
     /// [`HeadingConfigError`].
     pub fn check(&self, taken: impl Iterator<Item = Id>) -> Result<(), HeadingConfigError> {
-        for signal in self.signals().iter().flatten().filter(|signal| !signal.is_plausible()) {
+        if let Some(signal) = self.signals().iter().flatten().find(|signal| !signal.is_plausible()) {
             return Err(HeadingConfigError::Scale(raw_id(signal.id)));
         }
         if self.course.is_some() && self.speed.is_none() {
