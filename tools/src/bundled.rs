@@ -3,7 +3,7 @@
 use crate::drive::error::DataError;
 use crate::drive::recording::Recording;
 use crate::network::checkpoint::{Checkpoint, CheckpointError, GyroNet};
-use crate::simulate::{Config, csv};
+use crate::simulate::{Config, csv, gnss};
 
 /// The drive that `gyronet simulate --seconds 90 --seed 1` writes.
 pub const SIMULATED_DRIVE: &str = include_str!("../data/simulated_drive.csv");
@@ -17,9 +17,11 @@ pub fn simulated_drive() -> Result<Recording, DataError> {
 /// Length of the drive of `gyronet demo`, s.
 pub const DEMO_SECONDS: u32 = 600;
 
-/// Returns the drive of `gyronet demo`: ten minutes of the same vehicle (`gyronet simulate --seconds 600 --seed 1`).
-pub fn demo_drive() -> Result<Recording, DataError> {
-    let config = Config { seconds: DEMO_SECONDS, seed: 1, ..Config::DEFAULT };
+/// Returns the drive of `gyronet demo`: ten minutes of the same vehicle (`gyronet simulate --seconds 600 --seed 1`),
+/// with or without courses that arrive after half a second (`--gnss 0.5`).
+pub fn demo_drive(with_gnss: bool) -> Result<Recording, DataError> {
+    let gnss = with_gnss.then_some(gnss::Config { latency_s: 0.5, spoofed_from_s: None });
+    let config = Config { seconds: DEMO_SECONDS, seed: 1, gnss, ..Config::DEFAULT };
     let mut bytes = Vec::new();
     csv::write(&config, &mut bytes).expect("a vector takes all bytes");
     Recording::parse("simulated_drive.csv", &bytes[..])

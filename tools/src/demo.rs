@@ -5,9 +5,11 @@ mod costs;
 mod page;
 mod short_table;
 mod trajectory;
+mod tunnel;
 
 use crate::drive::stream::Drive;
 use crate::evaluate::methods::PerMethod;
+use crate::evaluate::outage_table::ByLength;
 use crate::evaluate::rates::Rates;
 use crate::evaluate::report::{Comparisons, DriveErrors, Row};
 use gyronet::can::config::Config;
@@ -17,6 +19,7 @@ pub use can_excerpt::{Message, Sent};
 pub use costs::Cost;
 pub use short_table::ShortTable;
 pub use trajectory::{Path, Trajectories};
+pub use tunnel::Tunnel;
 
 #[derive(Debug)]
 pub struct Demo<'a> {
@@ -26,6 +29,8 @@ pub struct Demo<'a> {
     pub errors: Option<&'a DriveErrors>,
     /// The path of the vehicle by each method, where the drive has wheels.
     pub trajectories: Option<Trajectories>,
+    /// The tunnels, where the drive has courses.
+    pub tunnel: Option<&'a Tunnel>,
     pub excerpt: Vec<Message>,
     pub costs: Vec<Cost>,
     /// Messages of the whole drive.
@@ -45,9 +50,17 @@ pub struct Summary<'a> {
     methods: Option<&'a PerMethod<Row>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     paths: Option<&'a [Path]>,
+    #[serde(flatten)]
+    tunnel: Option<Outage<'a>>,
     frames: u64,
     excerpt: &'a [Message],
     costs: &'a [Cost],
+}
+
+/// The tunnels, as `gyronet evaluate --outage` has them.
+#[derive(Debug, Serialize)]
+struct Outage<'a> {
+    outage: &'a ByLength,
 }
 
 impl<'a> Demo<'a> {
@@ -57,6 +70,7 @@ impl<'a> Demo<'a> {
         simulated: bool,
         rates: &'a Rates,
         errors: Option<&'a DriveErrors>,
+        tunnel: Option<&'a Tunnel>,
         sent: &Sent,
     ) -> Self {
         Self {
@@ -65,6 +79,7 @@ impl<'a> Demo<'a> {
             rates,
             errors,
             trajectories: Trajectories::new(drive, rates),
+            tunnel,
             excerpt: can_excerpt::in_words(sent.fastest.as_ref(), drive.facts.first, Config::DEFAULT),
             costs: costs::all(drive.facts.rows, sent.run_time, &Config::DEFAULT),
             frames: sent.frames,
@@ -80,6 +95,7 @@ impl<'a> Demo<'a> {
             missing: self.drive.facts.missing,
             over_best_classical: self.errors.and_then(|errors| errors.over_best_classical),
             methods: self.errors.map(|errors| &errors.methods),
+            tunnel: self.tunnel.map(|tunnel| Outage { outage: &tunnel.outages.outage }),
             paths: self.trajectories.as_ref().map(|trajectories| trajectories.paths.as_slice()),
             frames: self.frames,
             excerpt: &self.excerpt,

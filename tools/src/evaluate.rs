@@ -11,6 +11,8 @@ pub mod heading_error;
 pub mod methods;
 pub mod metrics;
 pub mod outage;
+pub mod outage_chart;
+pub mod outage_path;
 pub mod outage_table;
 pub mod rates;
 pub mod report;

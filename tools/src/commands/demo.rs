@@ -1,9 +1,9 @@
 //! `gyronet demo`: all results of one drive.
 
-use super::{Common, WriteError, print_json, progress, read_drive, weights};
+use super::{Common, WriteError, paint, print_json, progress, read_drive, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
-use gyronet_tools::demo::{Demo, Sent, ShortTable};
+use gyronet_tools::demo::{Demo, Sent, ShortTable, Tunnel};
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::rates::Rates;
 use gyronet_tools::evaluate::report::EvaluateError;
@@ -35,7 +35,8 @@ pub struct Args {
 
 pub fn run(args: &Args, common: Common) -> super::Result {
     let weights = args.sent.open()?;
-    let bundled = bundled::demo_drive()?;
+    let [bundled, with_gnss] = [false, true].map(bundled::demo_drive);
+    let (bundled, with_gnss) = (bundled?, with_gnss?);
     let drive = match &args.file {
         Some(path) => read_drive(path, common)?,
         None => Drive::from(&bundled),
@@ -60,7 +61,13 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let file = File::create(&log).map_err(WriteError::to(&log))?;
     let sent = Sent::run(&drive, GyroNet::new(weights.blob()?), BufWriter::new(file))?;
     let simulated = args.file.is_none();
-    let demo = Demo::new(&drive, simulated, &rates, errors.as_ref(), &sent);
+    let mut network = GyroNet::new(weights.blob()?);
+    // The table above has no courses: a course is an input of ours, and the classical methods have none.
+    let tunnel = match &args.file {
+        Some(path) => Tunnel::new(&Drive::open_moving(path)?, &mut network)?,
+        None => Tunnel::new(&Drive::from(&with_gnss), &mut network)?,
+    };
+    let demo = Demo::new(&drive, simulated, &rates, errors.as_ref(), tunnel.as_ref(), &sent);
     std::fs::write(&page, demo.page()).map_err(WriteError::to(&page))?;
 
     let mut out = std::io::stdout().lock();
@@ -84,6 +91,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     match &errors {
         Some(errors) => writeln!(out, "{}", ShortTable(errors))?,
         None => writeln!(out, "No reference (ref_gyr_z or ref_yaw), so no errors.\n")?,
+    }
+    if let Some(tunnel) = &tunnel {
+        writeln!(out, "{}", paint::tunnel(tunnel))?;
     }
     writeln!(out, "every result, as a page   {}", page.display())?;
     writeln!(

@@ -6,6 +6,7 @@ use gyronet_tools::bundled;
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::ablation::{self, Floor, Score, Variant};
 use gyronet_tools::evaluate::outage::{self, Outage};
+use gyronet_tools::evaluate::outage_chart;
 use gyronet_tools::evaluate::outage_table::Outages;
 use gyronet_tools::evaluate::report::Report;
 use gyronet_tools::network::checkpoint::Checkpoint;
@@ -38,6 +39,7 @@ Examples:
   gyronet evaluate */*.csv --json               # all drives, and the mean of each folder
   gyronet evaluate drive.csv --weights mine.blob --json
   gyronet evaluate drive.csv --outage 30,60,120 # the heading after a loss of GNSS
+  gyronet evaluate */*.csv --outage 60 --pictures tunnel
   gyronet evaluate drive.csv --ablation         # what each part contributes")]
 pub struct Args {
     /// Recorded drives with ref_gyr_z or ref_yaw.
@@ -56,6 +58,9 @@ pub struct Args {
     #[arg(long, value_name = "SECONDS", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=3600))]
     #[arg(conflicts_with_all = ["ablation", "lags", "all"])]
     outage: Vec<u16>,
+    /// With --outage, write pictures of the median and of the worst outage into this folder: median.svg, worst.svg.
+    #[arg(long, value_name = "FOLDER", requires = "outage")]
+    pictures: Option<PathBuf>,
     /// Add rows for the paper's GyroNet, in f32 and in integers; they take twenty times as long as all others together.
     #[arg(long, conflicts_with_all = ["ablation", "lags"])]
     all: bool,
@@ -96,12 +101,12 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 fn outages(args: &Args, common: Common) -> super::Result {
     let weights = args.unit.sent.open()?;
     let lengths: Vec<usize> = args.outage.iter().copied().map(usize::from).collect();
-    let mut sets: Vec<(String, Vec<Vec<Outage>>)> = Vec::new();
+    let mut sets: Vec<(String, Vec<(&Path, Vec<Outage>)>)> = Vec::new();
     for file in &args.files {
         let drive = Drive::open_moving(file)?;
         let mut network = GyroNet::new(weights.blob()?);
         let bar = progress::bar(common, drive.facts.rows, drive.name());
-        let found = outage::run(&drive, &mut network, &lengths, || bar.inc(1));
+        let found = outage::run(&drive, &mut network, &lengths, outage::EVERY_S, || bar.inc(1));
         bar.finish_and_clear();
         let found = found?;
         if found.is_empty() {
@@ -110,15 +115,20 @@ fn outages(args: &Args, common: Common) -> super::Result {
         }
         let set = file.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned();
         match sets.iter_mut().find(|(own, _)| *own == set) {
-            Some((_, drives)) => drives.push(found),
-            None => sets.push((set, vec![found])),
+            Some((_, drives)) => drives.push((file, found)),
+            None => sets.push((set, vec![(file, found)])),
         }
     }
-    let mut out = std::io::stdout().lock();
-    let each: Vec<Outages> =
-        sets.iter().map(|(set, drives)| Outages::new(set, drives.len(), drives.iter().flatten())).collect();
     let drives = sets.iter().flat_map(|(_, drives)| drives);
-    let all = Outages::new("all", args.files.len(), drives.flatten());
+    if let Some(folder) = &args.pictures {
+        pictures(folder, drives.clone(), &mut GyroNet::new(weights.blob()?))?;
+    }
+    let mut out = std::io::stdout().lock();
+    let each: Vec<Outages> = sets
+        .iter()
+        .map(|(set, drives)| Outages::new(set, drives.len(), drives.iter().flat_map(|(_, found)| found)))
+        .collect();
+    let all = Outages::new("all", args.files.len(), drives.flat_map(|(_, found)| found));
     if common.json {
         let Outages { outage, outage_after_20_s, .. } = all;
         let json =
@@ -127,6 +137,27 @@ fn outages(args: &Args, common: Common) -> super::Result {
     }
     for set in each.iter().chain((each.len() > 1).then_some(&all)) {
         write!(out, "{set}")?;
+    }
+    Ok(())
+}
+
+/// Writes the pictures of the median and of the worst outage.
+fn pictures<'a>(
+    folder: &Path,
+    drives: impl Iterator<Item = &'a (&'a Path, Vec<Outage>)> + Clone,
+    network: &mut GyroNet<'_>,
+) -> super::Result {
+    let all = drives.clone().flat_map(|(_, found)| found);
+    let chosen = outage_chart::typical(all).ok_or("no outage to draw: too little course or reference")?;
+    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    for (outage, name) in chosen.into_iter().zip(["median.svg", "worst.svg"]) {
+        let is_of = |(_, found): &&(&Path, Vec<Outage>)| found.iter().any(|own| std::ptr::eq(own, outage));
+        let Some((file, _)) = drives.clone().find(is_of) else { continue };
+        let drive = Drive::open_moving(file)?;
+        let points = outage::trace(&drive, network, outage)?;
+        let file = folder.join(name);
+        std::fs::write(&file, outage_chart::svg(drive.name(), outage, &points))
+            .map_err(|error| format!("{}: {error}", file.display()))?;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Writes the page of a drive.
 
 use super::trajectory::Trajectories;
-use super::{Cost, Demo, Message};
+use super::{Cost, Demo, Message, Tunnel};
 use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
 use crate::evaluate::report::{COLUMNS, columns};
@@ -28,6 +28,11 @@ pub fn page(demo: &Demo<'_>) -> String {
                  weights were trained on another vehicle. Your own drive: <code>gyronet demo DRIVE.csv</code>.</p>\n";
     }
     body += &facts(demo);
+    if let Some(Tunnel { picture, .. }) = demo.tunnel {
+        body += "<h2>A tunnel</h2>\n<p class=\"note\">The median of the drive's tunnels. Every method had the same courses before \
+                 it.</p>\n";
+        body += &format!("<div class=\"tunnel\">\n{picture}</div>\n");
+    }
     body += "<h2>Yaw</h2>\n";
     body += &yaw(demo);
     if let Some(trajectories) = &demo.trajectories {

@@ -1,6 +1,6 @@
 //! The heading error after a loss of GNSS: the courses are hidden from a start on, for every start of a drive.
 //!
-//! A start comes every [`EVERY_S`] seconds, once the vehicle has driven with a course for long enough. The boards at work
+//! A start comes every few seconds ([`EVERY_S`] in the table), once the vehicle has driven with a course for long enough. The boards at work
 //! are copied there, and the copies go on without a course. The error of a method is the change of its heading since the
 //! start less that of the reference, which is taken as the median of the last three seconds, at both ends. Every method
 //! has the same samples, wheels and courses.
@@ -14,6 +14,7 @@ use crate::drive::wheel_frames::Speeds;
 use crate::evaluate::heading_error::OffCourse;
 use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::wrap;
+use crate::evaluate::outage_path::{Path, Point};
 use crate::evaluate::rates::silent;
 use crate::evaluate::{ekf, vqf};
 use gyronet::model::window::{Features, WINDOW};
@@ -25,7 +26,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-/// Time from one start to the next, s.
+/// Time from one start to the next in the table, s.
 pub const EVERY_S: usize = 2;
 /// Seconds of course before a start, one set of rows each.
 pub const AFTER_S: [usize; 2] = [60, 20];
@@ -39,7 +40,7 @@ const SECOND: usize = RATE_HZ as usize;
 /// The compared methods, in the order of the table.
 pub const METHODS: [Method; 6] =
     [Method::STATIC, Method::STATIC_ZERO_RATE, Method::VQF, Method::EKF, Method::NO_MODEL, Method::DELAYED];
-type ByMethod<T> = [T; METHODS.len()];
+pub type ByMethod<T> = [T; METHODS.len()];
 
 /// The error of every method in one outage.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,15 +71,20 @@ pub fn run(
     drive: &Drive<'_>,
     network: &mut dyn WindowNetwork,
     lengths_s: &[usize],
-    mut progress: impl FnMut(),
+    every_s: usize,
+    progress: impl FnMut(),
 ) -> Result<Vec<Outage>, DataError> {
-    let mut race = Race::new(drive, Shared(Rc::new(RefCell::new(network))), lengths_s);
-    for (at, row) in drive.rows()?.enumerate() {
-        race.row(at, &row?);
-        progress();
-    }
-    race.end();
-    Ok(race.found)
+    Ok(Race::run(drive, network, lengths_s, Starts::Every(every_s * SECOND), progress)?.found)
+}
+
+/// Runs one outage again, and returns the way through it at every half second.
+pub fn trace(
+    drive: &Drive<'_>,
+    network: &mut dyn WindowNetwork,
+    outage: &Outage,
+) -> Result<Vec<Point>, DataError> {
+    let start = (outage.start_s / DT).round() as usize;
+    Ok(Race::run(drive, network, &[outage.seconds], Starts::At(start), || {})?.trace)
 }
 
 /// The boards with the course: without the model, and with it.
@@ -117,6 +123,16 @@ struct Race<'a> {
     reference: Reference,
     running: Vec<Running<'a>>,
     found: Vec<Outage>,
+    starts: Starts,
+    /// The way from the only start on.
+    trace: Vec<Point>,
+}
+
+/// The rows at which GNSS is lost: every so many, or one whose way is kept.
+#[derive(Clone, Copy)]
+enum Starts {
+    Every(usize),
+    At(usize),
 }
 
 struct Running<'a> {
@@ -170,7 +186,23 @@ impl Reference {
 }
 
 impl<'a> Race<'a> {
-    fn new(drive: &Drive<'_>, network: Shared<'a>, lengths_s: &[usize]) -> Self {
+    fn run(
+        drive: &Drive<'_>,
+        network: &'a mut dyn WindowNetwork,
+        lengths_s: &[usize],
+        starts: Starts,
+        mut progress: impl FnMut(),
+    ) -> Result<Self, DataError> {
+        let mut race = Self::new(drive, Shared(Rc::new(RefCell::new(network))), lengths_s, starts);
+        for (at, row) in drive.rows()?.enumerate() {
+            race.row(at, &row?);
+            progress();
+        }
+        race.end();
+        Ok(race)
+    }
+
+    fn new(drive: &Drive<'_>, network: Shared<'a>, lengths_s: &[usize], starts: Starts) -> Self {
         let config = || silent(PipelineConfig::DEFAULT);
         let no_model = Board::new(config(), drive.wheels(), Uncorrected).moving(true);
         Self {
@@ -187,6 +219,8 @@ impl<'a> Race<'a> {
             reference: Reference::default(),
             running: Vec::new(),
             found: Vec::new(),
+            starts,
+            trace: Vec::new(),
         }
     }
 
@@ -198,7 +232,13 @@ impl<'a> Race<'a> {
             self.step(&steps, &zero_rate, copies);
         }
         self.listen(row);
-        if at.is_multiple_of(EVERY_S * SECOND) && AFTER_S.iter().any(|after| self.driven_s >= *after as f64) {
+        let starts = match self.starts {
+            Starts::Every(rows) => {
+                at.is_multiple_of(rows) && AFTER_S.iter().any(|after| self.driven_s >= *after as f64)
+            }
+            Starts::At(row) => at == row,
+        };
+        if starts {
             let (boards, driven_s) = (self.boards.clone(), self.driven_s);
             self.running.push(Running { start: at, driven_s, boards, begun: None, path: Path::default() });
         }
@@ -247,6 +287,7 @@ impl<'a> Race<'a> {
         let speed = self.speeds.as_mut().map(|speeds| speeds.next(row));
         let (now, found) = (self.reference.median(), &mut self.found);
         let (newest, lengths) = (self.reference.newest(), &self.lengths);
+        let mut trace = matches!(self.starts, Starts::At(_)).then_some(&mut self.trace);
         let mut copies = copies.into_iter();
         self.running.retain_mut(|outage| {
             let Some(Some([own_no_model, own])) = copies.next() else { return false };
@@ -269,11 +310,16 @@ impl<'a> Race<'a> {
             ];
             outage.path.add(rates, gyro, newest.map_or(0.0, |off| off - begun.off), speed);
             let steps = own.row - outage.start;
+            if let Some(trace) = &mut trace
+                && steps.is_multiple_of(SECOND / 2)
+            {
+                trace.push(outage.path.point(speed.is_some()));
+            }
             if let Some(seconds) = lengths.iter().copied().find(|seconds| seconds * SECOND == steps)
                 && let Some(now) = now
             {
-                let Path { angles, gyro, .. } = outage.path;
-                let truth = gyro - (now - begun.median);
+                let truth = outage.path.gyro() - (now - begun.median);
+                let angles = outage.path.angles();
                 found.push(Outage {
                     driven_s: outage.driven_s,
                     seconds,
@@ -284,39 +330,5 @@ impl<'a> Race<'a> {
             }
             lengths.iter().any(|seconds| seconds * SECOND > steps)
         });
-    }
-}
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Path {
-    /// Angles by each method, and by the gyro alone, rad.
-    angles: ByMethod<f64>,
-    gyro: f64,
-    /// Ends by each method, and by the reference, m; the distance, m.
-    ends: ByMethod<[f64; 2]>,
-    reference: [f64; 2],
-    distance: f64,
-}
-
-impl Path {
-    /// Adds a sample: the rates, the gyro's own, by how much its sum is ahead of the truth, rad, and the speed, m/s.
-    fn add(&mut self, rates: ByMethod<f64>, gyro: f64, off: f64, speed: Option<f64>) {
-        self.gyro += gyro * DT;
-        let by = speed.unwrap_or(0.0) * DT;
-        self.distance += by.abs();
-        let go = |place: &mut [f64; 2], angle: f64| {
-            place[0] += by * angle.cos();
-            place[1] += by * angle.sin();
-        };
-        for ((angle, rate), end) in self.angles.iter_mut().zip(rates).zip(&mut self.ends) {
-            *angle += rate * DT;
-            go(end, *angle);
-        }
-        go(&mut self.reference, self.gyro - off);
-    }
-
-    fn position(&self) -> (f64, ByMethod<f64>) {
-        let [x, y] = self.reference;
-        (self.distance, self.ends.map(|end| (end[0] - x).hypot(end[1] - y)))
     }
 }

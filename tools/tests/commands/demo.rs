@@ -43,13 +43,16 @@ fn the_page_needs_nothing_else_and_says_what_the_json_says() {
 }
 
 #[test]
-fn the_readme_has_the_table_that_the_demo_prints() {
+fn the_readme_has_the_tables_that_the_demo_prints() {
     let (folder, text) = demo("demo-text", &[]);
     let page = std::fs::read_to_string(folder.join("demo.html")).unwrap();
     assert!(text.starts_with("A SIMULATED drive") && page.contains("Simulated drive."));
-    let table = text.split("\n\n").find(|part| part.starts_with("heading error")).expect("a table");
     let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md")).unwrap();
-    assert!(readme.contains(table), "{table}");
+    for title in ["heading error", "60 s without GNSS"] {
+        let table = text.split("\n\n").find(|part| part.starts_with(title)).expect("a table");
+        assert!(readme.contains(table), "{table}");
+    }
+    assert!(page.contains("<h2>A tunnel</h2>") && page.contains("60 s without GNSS</text>"));
 }
 
 #[test]

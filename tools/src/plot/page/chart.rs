@@ -112,12 +112,12 @@ impl Chart<'_> {
 }
 
 /// Returns the position of a value on its axis, 0 to 1.
-fn part(value: f64, (from, to): (f64, f64)) -> f64 {
+pub fn part(value: f64, (from, to): (f64, f64)) -> f64 {
     (value - from) / (to - from)
 }
 
 /// Widens both ranges to the same scale, and returns them with the ratio of width to height.
-fn same_scale(x: (f64, f64), y: (f64, f64)) -> ((f64, f64), (f64, f64), f64) {
+pub fn same_scale(x: (f64, f64), y: (f64, f64)) -> ((f64, f64), (f64, f64), f64) {
     let aspect = ((x.1 - x.0) / (y.1 - y.0)).clamp(ASPECTS.0, ASPECTS.1);
     let metres = 1.1 * (y.1 - y.0).max((x.1 - x.0) / aspect);
     let around = |(low, high): (f64, f64), half: f64| ((low + high) / 2.0 - half, (low + high) / 2.0 + half);
@@ -125,13 +125,13 @@ fn same_scale(x: (f64, f64), y: (f64, f64)) -> ((f64, f64), (f64, f64), f64) {
 }
 
 /// A labelled position on an axis.
-struct Tick {
-    at: f64,
-    label: String,
+pub struct Tick {
+    pub at: f64,
+    pub label: String,
 }
 
 /// Returns about `most` round numbers. The script has the same rule.
-fn ticks((from, to): (f64, f64), most: u32, is_log: bool) -> Vec<Tick> {
+pub fn ticks((from, to): (f64, f64), most: u32, is_log: bool) -> Vec<Tick> {
     let rough = (to - from) / f64::from(most);
     let power = 10f64.powf(rough.log10().floor());
     let step =

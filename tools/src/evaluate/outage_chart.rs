@@ -1,0 +1,247 @@
+//! A picture of one outage, as an SVG that a page shows in a column of 390 px or more, light or dark: the path in
+//! metres, and the error of the heading by time.
+
+use crate::evaluate::methods::Method;
+use crate::evaluate::outage::{AFTER_S, METHODS, Outage};
+use crate::evaluate::outage_path::Point;
+use crate::plot::curve::range;
+use crate::plot::page::chart::{part, same_scale, ticks};
+use crate::plot::page::escaped;
+use std::fmt::Write;
+
+const WIDTH: f64 = 480.0;
+/// Left and right margins of a panel, and the place of its axis' numbers and title.
+const MARGINS: [f64; 2] = [44.0, 12.0];
+const GAP: f64 = 44.0;
+const HEADING_HEIGHT: f64 = 130.0;
+/// The methods that are drawn, from back to front, with their colours on light and on dark ground.
+const DRAWN: [(Method, &str, &str); 4] = [
+    (Method::STATIC, "#7d858d", "#9aa3ab"),
+    (Method::STATIC_ZERO_RATE, "#b5569a", "#e08cc6"),
+    (Method::EKF, "#0068a8", "#5cb3ef"),
+    (Method::DELAYED, "#c8400a", "#ff8152"),
+];
+/// These lie in the picture as a whole; others may leave it.
+const IN_SCALE: [Method; 2] = [Method::EKF, Method::DELAYED];
+const SECONDS_OF_A_POINT: f64 = 0.5;
+
+fn column(method: Method) -> usize {
+    METHODS.iter().position(|own| *own == method).unwrap_or_default()
+}
+
+/// Returns the picture of an outage of a drive.
+pub fn svg(drive: &str, outage: &Outage, points: &[Point]) -> String {
+    let title = format!(
+        "{drive}: {} s without GNSS, {:.0} s after the start, after {:.0} s with it",
+        outage.seconds, outage.start_s, outage.driven_s
+    );
+    let mut body = legend(outage);
+    let mut top = 56.0 + 17.0 * (DRAWN.len() + 1) as f64;
+    if points.iter().any(|point| point.places.is_some()) {
+        top = path(&mut body, top, points) + GAP;
+    }
+    let height = heading(&mut body, top, points) + GAP - 8.0;
+    format!(
+        "<svg id=\"tunnel\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height:.0}\" \
+         font-family=\"system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif\" font-size=\"13\" role=\"img\" \
+         aria-label=\"{}\">\n<style>\n{}</style>\n\
+         <rect class=\"ground\" width=\"{WIDTH}\" height=\"{height:.0}\" rx=\"8\"/>\n<text x=\"12\" y=\"22\" font-weight=\"600\">\
+         {} s without GNSS</text><text class=\"note\" x=\"12\" y=\"40\">{}</text>\n{body}</svg>\n",
+        escaped(&title),
+        style(),
+        outage.seconds,
+        escaped(&format!("{drive}, {:.0} s after its start", outage.start_s)),
+    )
+}
+
+/// Returns the style sheet. Every rule holds in this picture alone, since a page may have the picture in its text.
+fn style() -> String {
+    let grounds = [
+        ["#fff", "#f5f6f8", "#dfe3e7", "#1d2126", "#5d6670", "#1d2126"],
+        ["#14171a", "#1c2126", "#333a41", "#e6e9ec", "#98a2ac", "#f2f4f6"],
+    ];
+    let rules = grounds.into_iter().enumerate().map(|(is_dark, [ground, panel, grid, ink, soft, truth])| {
+        let mut rules = format!(
+            "#tunnel .ground{{fill:{ground}}}#tunnel .panel{{fill:{panel}}}#tunnel .grid{{stroke:{grid}}}#tunnel text{{fill:{ink}}}\
+             #tunnel .note{{fill:{soft}}}#tunnel .truth{{stroke:{truth}}}"
+        );
+        for (k, (_, on_light, on_dark)) in DRAWN.iter().enumerate() {
+            // Writing to a string does not fail.
+            let _ = write!(rules, "#tunnel .m{k}{{stroke:{}}}", [on_light, on_dark][is_dark]);
+        }
+        rules
+    });
+    let [light, dark] = [0, 1].map(|at| rules.clone().nth(at).unwrap_or_default());
+    format!(
+        "#tunnel .note{{font-size:11.5px}}#tunnel .curve{{fill:none;stroke-width:2;stroke-linejoin:round}}\n{light}\n\
+         #tunnel .truth{{stroke-width:2.5}}\n@media (prefers-color-scheme:dark){{{dark}}}\n"
+    )
+}
+
+/// Returns the median and the worst of the longest outages by the error of the delayed rate's heading; those whose
+/// path is known first.
+pub fn typical<'a>(outages: impl Iterator<Item = &'a Outage> + Clone) -> Option<[&'a Outage; 2]> {
+    let after = f64::from(AFTER_S[0] as u32);
+    let longest = outages.clone().map(|outage| outage.seconds).max()?;
+    let rank =
+        |outage: &Outage| (outage.seconds == longest, outage.position.is_some(), outage.driven_s >= after);
+    let best = outages.clone().map(rank).max()?;
+    let mut chosen: Vec<&Outage> = outages.filter(|outage| rank(outage) == best).collect();
+    let error = |outage: &Outage| outage.heading[column(Method::DELAYED)];
+    chosen.sort_by(|a, b| error(a).total_cmp(&error(b)));
+    Some([chosen.get(chosen.len() / 2)?, chosen.last()?])
+}
+
+/// The names of the curves, with the errors at the end.
+fn legend(outage: &Outage) -> String {
+    let mut text = String::new();
+    let mut line = |y: f64, class: &str, name: &str, note: &str| {
+        let _ = writeln!(
+            text,
+            "<line class=\"curve {class}\" x1=\"12\" x2=\"34\" y1=\"{0:.0}\" y2=\"{0:.0}\"/><text x=\"42\" y=\"{y:.0}\">{name}</text>\
+             <text class=\"note\" x=\"250\" y=\"{y:.0}\">{note}</text>",
+            y - 4.0
+        );
+    };
+    let distance = outage.position.map(|(distance, _)| format!("{distance:.0} m"));
+    line(60.0, "truth", "reference", &distance.unwrap_or_default());
+    for (k, (method, ..)) in DRAWN.iter().enumerate() {
+        let at = column(*method);
+        let end = outage.position.map(|(_, ends)| format!(", {:.1} m", ends[at]));
+        let note =
+            format!("{:.1}° off at the end{}", outage.heading[at].to_degrees(), end.unwrap_or_default());
+        let name = if *method == Method::DELAYED { "gyronet" } else { method.name };
+        line(77.0 + 17.0 * k as f64, &format!("m{k}"), name, &note);
+    }
+    text
+}
+
+/// Draws the paths, and returns the lower end.
+fn path(body: &mut String, top: f64, points: &[Point]) -> f64 {
+    let places = || points.iter().filter_map(|point| point.places);
+    let start = std::iter::once([0.0; 2]);
+    let truth: Vec<[f64; 2]> = start.clone().chain(places().map(|(reference, _)| reference)).collect();
+    let by = |method: Method| -> Vec<[f64; 2]> {
+        start.clone().chain(places().map(|(_, ends)| ends[column(method)])).collect()
+    };
+    let scaled: Vec<[f64; 2]> = IN_SCALE.into_iter().flat_map(by).chain(truth.iter().copied()).collect();
+    let axis = |k: usize| range(scaled.iter().map(|place| place[k]), 0.03);
+    let (x, y, aspect) = same_scale(axis(0), axis(1));
+    let height = (WIDTH - MARGINS[0] - MARGINS[1]) / aspect;
+    let curves = DRAWN.iter().enumerate().map(|(k, (method, ..))| (format!("m{k}"), by(*method)));
+    panel(body, top, height, x, y, "m", std::iter::once(("truth".to_owned(), truth)).chain(curves))
+}
+
+/// Draws the errors of the heading by time, and returns the lower end.
+fn heading(body: &mut String, top: f64, points: &[Point]) -> f64 {
+    let by = |method: Method| -> Vec<[f64; 2]> {
+        let error = |(k, point): (usize, &Point)| {
+            [(k + 1) as f64 * SECONDS_OF_A_POINT, point.heading[column(method)].to_degrees()]
+        };
+        std::iter::once([0.0; 2]).chain(points.iter().enumerate().map(error)).collect()
+    };
+    let scaled: Vec<[f64; 2]> = IN_SCALE.into_iter().flat_map(by).collect();
+    let (_, last) = range(scaled.iter().map(|point| point[0]), 0.0);
+    let y = range(scaled.iter().map(|point| point[1]), 0.15);
+    let curves = DRAWN.iter().enumerate().map(|(k, (method, ..))| (format!("m{k}"), by(*method)));
+    panel(body, top, HEADING_HEIGHT, (0.0, last), y, "error of the heading, degrees, by seconds", curves)
+}
+
+/// Draws curves with axes, and returns the lower end.
+fn panel(
+    body: &mut String,
+    top: f64,
+    height: f64,
+    x: (f64, f64),
+    y: (f64, f64),
+    axes: &str,
+    curves: impl Iterator<Item = (String, Vec<[f64; 2]>)>,
+) -> f64 {
+    let [left, right] = [MARGINS[0], WIDTH - MARGINS[1]];
+    let width = right - left;
+    let bottom = top + height;
+    let (across, up) = (|at: f64| left + width * part(at, x), |at: f64| bottom - height * part(at, y));
+    let _ = writeln!(
+        body,
+        "<svg x=\"{left}\" y=\"{top:.0}\" width=\"{width}\" height=\"{height:.0}\" viewBox=\"{left} {top:.0} {width} {height:.0}\">\
+         <rect class=\"panel\" x=\"{left}\" y=\"{top:.0}\" width=\"{width}\" height=\"{height:.0}\"/>"
+    );
+    let mut numbers = String::new();
+    for tick in ticks(x, 6, false) {
+        let at = across(tick.at);
+        let _ = writeln!(
+            body,
+            "<line class=\"grid\" x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{top:.0}\" y2=\"{bottom:.0}\"/>"
+        );
+        let _ = write!(
+            numbers,
+            "<text class=\"note\" text-anchor=\"middle\" x=\"{at:.1}\" y=\"{:.0}\">{}</text>",
+            bottom + 15.0,
+            tick.label
+        );
+    }
+    for tick in ticks(y, 5, false) {
+        let at = up(tick.at);
+        let _ = writeln!(
+            body,
+            "<line class=\"grid\" x1=\"{left}\" x2=\"{right}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/>"
+        );
+        let _ = write!(
+            numbers,
+            "<text class=\"note\" text-anchor=\"end\" x=\"{:.0}\" y=\"{:.1}\">{}</text>",
+            left - 6.0,
+            at + 4.0,
+            tick.label
+        );
+    }
+    for (class, points) in curves {
+        let _ = write!(body, "<polyline class=\"curve {class}\" points=\"");
+        for [at, value] in points {
+            // A curve that has left the picture stays near it.
+            let near = |value: f64| value.clamp(-2_000.0, 2_000.0);
+            let _ = write!(body, "{:.1},{:.1} ", near(across(at)), near(up(value)));
+        }
+        body.push_str("\"/>\n");
+    }
+    let _ = writeln!(
+        body,
+        "</svg>\n{numbers}<text class=\"note\" x=\"{left}\" y=\"{:.0}\">{axes}</text>",
+        bottom + 32.0
+    );
+    bottom
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outage(seconds: usize, error: f64) -> Outage {
+        let heading = std::array::from_fn(|_| error);
+        let position = Some((500.0, std::array::from_fn(|_| 3.0)));
+        Outage { driven_s: 70.0, seconds, start_s: 80.0, heading, position }
+    }
+
+    #[test]
+    fn the_median_and_the_worst_of_the_longest_are_typical() {
+        let all = [outage(30, 9.0), outage(60, 0.3), outage(60, 0.1), outage(60, 0.2)];
+        assert_eq!(typical(all.iter()), Some([&all[3], &all[1]]));
+        assert_eq!(typical([].iter()), None);
+    }
+
+    #[test]
+    fn a_picture_has_all_curves_and_the_errors_at_the_end() {
+        let points: Vec<_> = (1..=120)
+            .map(|k| Point {
+                heading: std::array::from_fn(|m| 0.001 * f64::from(k) * m as f64),
+                places: Some(([f64::from(k), 0.0], std::array::from_fn(|m| [f64::from(k), m as f64]))),
+            })
+            .collect();
+        let svg = svg("<b>", &outage(60, 0.1), &points);
+        assert!(
+            svg.contains("60 s without GNSS") && svg.contains("&lt;b&gt;, 80 s after its start"),
+            "{svg}"
+        );
+        assert!(svg.contains("5.7° off at the end, 3.0 m"), "{svg}");
+        assert_eq!(svg.matches("<polyline").count(), 5 + 4, "the paths, and the errors of the methods");
+    }
+}

@@ -1,0 +1,71 @@
+//! The path of every method since the start of an outage, from its rates and the speed of the wheels.
+
+use crate::drive::DT;
+use crate::evaluate::outage::ByMethod;
+
+/// Where the methods are at one time of an outage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// Errors of the heading, rad.
+    pub heading: ByMethod<f64>,
+    /// Places by the reference and by each method, m forward and to the left of the start; absent without wheels.
+    pub places: Option<([f64; 2], ByMethod<[f64; 2]>)>,
+}
+
+/// The paths since a start.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Path {
+    /// Angles by each method, and by the gyro alone, rad.
+    angles: ByMethod<f64>,
+    gyro: f64,
+    /// Ends by each method, and by the reference, m; the distance, m.
+    ends: ByMethod<[f64; 2]>,
+    reference: [f64; 2],
+    distance: f64,
+    /// By how much the gyro's sum is ahead of the truth, rad.
+    off: f64,
+}
+
+impl Path {
+    /// Adds a sample: the rates, the gyro's own, by how much its sum is ahead of the truth, rad, and the speed, m/s.
+    pub fn add(&mut self, rates: ByMethod<f64>, gyro: f64, off: f64, speed: Option<f64>) {
+        self.gyro += gyro * DT;
+        let by = speed.unwrap_or(0.0) * DT;
+        self.distance += by.abs();
+        let go = |place: &mut [f64; 2], angle: f64| {
+            place[0] += by * angle.cos();
+            place[1] += by * angle.sin();
+        };
+        for ((angle, rate), end) in self.angles.iter_mut().zip(rates).zip(&mut self.ends) {
+            *angle += rate * DT;
+            go(end, *angle);
+        }
+        go(&mut self.reference, self.gyro - off);
+        self.off = off;
+    }
+
+    /// Returns the angle by the gyro alone, rad.
+    pub fn gyro(&self) -> f64 {
+        self.gyro
+    }
+
+    /// Returns the angles by each method, rad.
+    pub fn angles(&self) -> ByMethod<f64> {
+        self.angles
+    }
+
+    /// Returns the newest point.
+    pub fn point(&self, has_speed: bool) -> Point {
+        let truth = self.gyro - self.off;
+        Point {
+            heading: self.angles.map(|angle| angle - truth),
+            places: has_speed.then_some((self.reference, self.ends)),
+        }
+    }
+
+    /// Returns the distance, and what each heading moves the end by, m.
+    pub fn position(&self) -> (f64, ByMethod<f64>) {
+        let [x, y] = self.reference;
+        (self.distance, self.ends.map(|end| (end[0] - x).hypot(end[1] - y)))
+    }
+}
