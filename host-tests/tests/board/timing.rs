@@ -50,12 +50,14 @@ struct Timed {
 
 fn timed(board: &mut Board, request: &[u8]) -> Timed {
     let _ = board.bus_log();
+    let until = board.counts().time + 2 * P2_STAR;
     service::send(board, request);
     let (mut asked, mut first, mut pending) = (Duration::ZERO, None, 0);
     let mut newest = Duration::ZERO;
     let (mut message, mut length) = (Vec::new(), 0);
     loop {
         board.run(MS);
+        assert!(board.counts().time < until, "{request:02x?}: no whole response");
         assert!(first.is_none() || board.counts().time - newest < P2_STAR, "{request:02x?}");
         for seen in board.bus_log() {
             let data = seen.frame.data();
