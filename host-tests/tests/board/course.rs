@@ -81,7 +81,8 @@ fn courses_on_the_bus_teach_the_bias_and_hold_the_heading() {
 
     // Another vehicle's courses teach nothing; the gain's state and a trouble say that they contradict the gyro.
     let gain = |frames: &[DataFrame]| {
-        let last = frames.iter().filter_map(|frame| content(frame, STATUS_ID)).last().expect("one a second");
+        let last =
+            frames.iter().filter_map(|frame| content(frame, STATUS_ID)).next_back().expect("one a second");
         u16::from_le_bytes([last[3], last[4]]) >> 7 & 7
     };
     assert_ne!(gain(&held), Knowledge::Refused as u16);
