@@ -53,6 +53,8 @@ const AGAINST: f32 = 0.5;
 const SLOPE: f32 = 0.6;
 /// Speed of a wheel of a vehicle that drives, and does not creep at the wheels' threshold: 1 m/s.
 const DRIVES: u32 = 65_536;
+/// Share of the largest change of speed at rest up to which a gyro that changes its mean ends no standstill.
+const STILL: f32 = 0.15;
 /// Shake of a vehicle that an engine shakes as much as any, rad/s.
 const CALM: f32 = 1.2e-2;
 /// Least force that shows where a vehicle pulls away to, m/s^2.
@@ -261,7 +263,8 @@ impl Judge {
         }
         let is_quiet = motion.shake < shake && motion.speed_change < speed_change;
         // A gyro that jumps, or a deck that begins to turn, speeds nothing up.
-        let is_turned = self.is_stop && self.quiet_for > 0 && self.is_calm && self.lingers < WINDOW as u8;
+        let is_still = self.is_stop && self.quiet_for > 0 && motion.speed_change < STILL * speed_change;
+        let is_turned = is_still && self.is_calm && self.lingers < WINDOW as u8;
         self.lingers = if is_turned && !is_quiet { self.lingers + 1 } else { 0 };
         self.quiet_for = if is_quiet || is_turned { self.quiet_for.saturating_add(1) } else { 0 };
         if is_quiet && core::mem::take(&mut self.has_moved) {

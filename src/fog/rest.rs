@@ -190,15 +190,15 @@ impl RestReading {
     /// reading at rest and its noise, or the doubt of the newest standstill if that is larger, rad/s: the vehicle turns, or
     /// the gyro's bias has changed.
     fn against(&self) -> f32 {
-        let beyond = |quarters: usize| {
+        let beyond = |quarters: usize, sigmas: f32| {
             let current = self.stood.saturating_sub(1) % QUARTER + 1;
             let steps = self.stood.min(QUARTER * (quarters as u32 - 1) + current);
             let seconds = steps as f32 / RATE_HZ as f32;
             let turned = self.turned.iter().take(quarters).sum::<i64>() as f32 / Angle::PER_RAD;
-            let beyond = (turned - self.combined().mean * seconds).abs() - 3.0 * sqrt(self.noise);
+            let beyond = (turned - self.combined().mean * seconds).abs() - sigmas * sqrt(self.noise);
             beyond / seconds.max(0.25)
         };
-        self.doubt.max(beyond(2)).max(beyond(5))
+        self.doubt.max(beyond(2, GATE)).max(beyond(5, 3.0))
     }
 
     /// Returns the reading at rest that is subtracted, rad/s.
@@ -252,22 +252,18 @@ impl RestReading {
         let second = core::mem::replace(&mut self.second, Second::EMPTY);
         let Some(before) = self.before.replace(second) else { return RestOutcome::Waits };
         let mean = before.triangle(&second);
-        let by_part = self.errors.angle_walk * self.errors.angle_walk;
-        let expected = self.combined();
-        let is_off =
-            |noise: f32| (mean - expected.mean).abs() > GATE * sqrt(expected.variance + noise.max(by_part));
-        // A deck that begins to turn, or ends to, is not noise.
-        let changes = is_off(self.noise) != self.refused;
-        if let Some(last) = self.last.replace(mean).filter(|_| !changes) {
+        if let Some(last) = self.last.replace(mean) {
             let square = ((mean - last) * (mean - last)).min(LARGEST * self.noise);
             self.differences = (self.differences + 1).min(MEMORY);
             let noise = self.noise + (square - self.noise) / f32::from(self.differences);
-            // That of one that turns is a swell.
+            // A deck that begins to turn, or ends to, is not noise either.
             let largest = NOISY * self.errors.angle_walk;
             self.noise = if self.refused { noise.min(self.noise.max(largest * largest)) } else { noise };
         }
+        let by_part = self.errors.angle_walk * self.errors.angle_walk;
         let seen = Estimate { mean, variance: self.noise.max(by_part) };
-        self.refused = is_off(self.noise);
+        let expected = self.combined();
+        self.refused = (mean - expected.mean).abs() > GATE * sqrt(expected.variance + seen.variance);
         if self.refused {
             self.doubt = (mean - expected.mean).abs();
             self.waiting = None;
