@@ -153,9 +153,21 @@ impl Coprocessor {
         now: Micros,
         sink: &mut impl Sink,
     ) -> Result<Option<Observation>, InputError> {
-        let observation = self.add(sample, now, sink);
+        let mut newest = None;
+        self.take(sample, now, sink, &mut newest).map(|()| newest)
+    }
+
+    /// Does the same with the observation in place: a copy of it is a large part of a small stack.
+    fn take(
+        &mut self,
+        sample: ImuSample,
+        now: Micros,
+        sink: &mut impl Sink,
+        newest: &mut Option<Observation>,
+    ) -> Result<(), InputError> {
+        let added = self.add(sample, now, sink, newest);
         self.step_fog(sink);
-        observation
+        added
     }
 
     fn add(
@@ -163,7 +175,8 @@ impl Coprocessor {
         sample: ImuSample,
         now: Micros,
         sink: &mut impl Sink,
-    ) -> Result<Option<Observation>, InputError> {
+        newest: &mut Option<Observation>,
+    ) -> Result<(), InputError> {
         let now = self.advance(now)?;
         let sample = ImuSample { time: if sample.time == NO_STAMP { now } else { sample.time }, ..sample };
         self.timeline.sample = sample.time;
@@ -175,30 +188,36 @@ impl Coprocessor {
         }
         self.temperature = sample.temperature.or(self.temperature);
         while let Some(frame) = self.pipeline.next_frame() {
-            self.correct(frame, now, sink);
+            self.correct(frame, now, sink, newest);
         }
         self.pipeline.add(sample).map_err(InputError::Imu)?;
         // The caller has seen that the first one is ready.
-        let first = self.pipeline.next_frame().map(|frame| self.correct(frame, now, sink));
-        let newest = self.correct_ready(now, sink).or(first);
+        if let Some(first) = self.pipeline.next_frame() {
+            self.correct(first, now, sink, newest);
+        }
+        self.correct_ready(now, sink, newest);
         self.monitor.heard(sample.time, now);
-        Ok(newest)
+        Ok(())
     }
 
     /// Corrects the steps that need no estimate that is still being computed.
-    fn correct_ready(&mut self, now: Micros, sink: &mut impl Sink) -> Option<Observation> {
-        let mut newest = None;
+    fn correct_ready(&mut self, now: Micros, sink: &mut impl Sink, newest: &mut Option<Observation>) {
         while !self.handover.must_wait(self.pipeline.tick(), now)
             && let Some(frame) = self.pipeline.next_frame()
         {
-            newest = Some(self.correct(frame, now, sink));
+            self.correct(frame, now, sink, newest);
         }
-        newest
     }
 
     // Not inlined, so that its large frame is gone before the step of the fibre-optic gyro.
     #[inline(never)]
-    fn correct(&mut self, mut frame: Frame, now: Micros, sink: &mut impl Sink) -> Observation {
+    fn correct(
+        &mut self,
+        mut frame: Frame,
+        now: Micros,
+        sink: &mut impl Sink,
+        newest: &mut Option<Observation>,
+    ) {
         let wheels = self.poll_wheels();
         frame.sample.validity = self.monitor.judge(&frame.sample);
         frame.sample.temperature = self.temperature;
@@ -236,7 +255,7 @@ impl Coprocessor {
         }
         let pipeline::Output { standing, complete, refused, vertical, .. } = output;
         let wheels = wheels.unwrap_or_default();
-        let observation = Observation {
+        sink.observed(newest.insert(Observation {
             sample: Some(sample),
             vehicle: output.vehicle,
             wheels,
@@ -244,9 +263,7 @@ impl Coprocessor {
             complete,
             refused,
             vertical,
-        };
-        sink.observed(&observation);
-        observation
+        }));
     }
 
     /// Counts an input of the inertial sensor that was not a valid sample.
@@ -334,14 +351,25 @@ impl Coprocessor {
     /// # Errors
     /// [`InputError::ClockWentBack`]; the error is counted.
     pub fn poll(&mut self, now: Micros, sink: &mut impl Sink) -> Result<Option<Observation>, InputError> {
+        let mut newest = None;
+        self.poll_into(now, sink, &mut newest).map(|()| newest)
+    }
+
+    /// Does the same with the observation in place.
+    fn poll_into(
+        &mut self,
+        now: Micros,
+        sink: &mut impl Sink,
+        newest: &mut Option<Observation>,
+    ) -> Result<(), InputError> {
         let now = self.advance(now)?;
-        let waited = self.correct_ready(now, sink);
-        let observation = self.monitor.poll(now).map(|steps| {
+        self.correct_ready(now, sink, newest);
+        if let Some(steps) = self.monitor.poll(now) {
             let vehicle = self.pipeline.silent(steps, &self.board_state());
             self.send(&vehicle, self.monitor.time_at(now), sink);
             let wheels = self.poll_wheels().unwrap_or_default();
             let standing = Standing::UNKNOWN;
-            let observation = Observation {
+            sink.observed(newest.insert(Observation {
                 sample: None,
                 vehicle,
                 wheels,
@@ -349,12 +377,10 @@ impl Coprocessor {
                 complete: None,
                 refused: None,
                 vertical: None,
-            };
-            sink.observed(&observation);
-            observation
-        });
+            }));
+        }
         self.step_fog(sink);
-        Ok(observation.or(waited))
+        Ok(())
     }
 
     /// Returns whether the next sample of the inertial sensor can be processed at `now`. If not, the sample needs an

@@ -123,7 +123,7 @@ impl Coprocessor {
             match imu.next_sample() {
                 Some(Ok(sample)) => {
                     // A refused sample is counted.
-                    step.observation = self.imu(sample, now, bus).ok().flatten().or(step.observation);
+                    let _ = self.take(sample, now, bus, &mut step.observation);
                 }
                 Some(Err(error)) => {
                     self.imu_error();
@@ -135,14 +135,15 @@ impl Coprocessor {
                 self.estimate(network);
             }
         }
-        if let Ok(Some(silent)) = self.poll(now, bus) {
-            step.observation = Some(silent);
-        }
+        // A clock that went back is counted.
+        let _ = self.poll_into(now, bus, &mut step.observation);
         bus.flush();
         step
     }
 
     /// Runs GyroNet on the window that is due, if there is one.
+    // Not inlined: the network's stack is not that of the steps before and after it.
+    #[inline(never)]
     pub fn estimate(&mut self, network: &mut dyn WindowNetwork) {
         if let Some(due) = self.window() {
             // A late estimate is counted.
