@@ -97,11 +97,14 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     Ok(write!(out, "{}", paint::report(&report))?)
 }
 
+/// The outages of a drive, with its file.
+type Found<'a> = (&'a Path, Vec<Outage>);
+
 /// Hides the courses of each drive from every start on.
 fn outages(args: &Args, common: Common) -> super::Result {
     let weights = args.unit.sent.open()?;
     let lengths: Vec<usize> = args.outage.iter().copied().map(usize::from).collect();
-    let mut sets: Vec<(String, Vec<(&Path, Vec<Outage>)>)> = Vec::new();
+    let mut sets: Vec<(String, Vec<Found<'_>>)> = Vec::new();
     for file in &args.files {
         let drive = Drive::open_moving(file)?;
         let mut network = GyroNet::new(weights.blob()?);
@@ -144,14 +147,14 @@ fn outages(args: &Args, common: Common) -> super::Result {
 /// Writes the pictures of the median and of the worst outage.
 fn pictures<'a>(
     folder: &Path,
-    drives: impl Iterator<Item = &'a (&'a Path, Vec<Outage>)> + Clone,
+    drives: impl Iterator<Item = &'a Found<'a>> + Clone,
     network: &mut GyroNet<'_>,
 ) -> super::Result {
     let all = drives.clone().flat_map(|(_, found)| found);
     let chosen = outage_chart::typical(all).ok_or("no outage to draw: too little course or reference")?;
     std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     for (outage, name) in chosen.into_iter().zip(["median.svg", "worst.svg"]) {
-        let is_of = |(_, found): &&(&Path, Vec<Outage>)| found.iter().any(|own| std::ptr::eq(own, outage));
+        let is_of = |(_, found): &&Found<'_>| found.iter().any(|own| std::ptr::eq(own, outage));
         let Some((file, _)) = drives.clone().find(is_of) else { continue };
         let drive = Drive::open_moving(file)?;
         let points = outage::trace(&drive, network, outage)?;
