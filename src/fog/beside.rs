@@ -2,32 +2,30 @@
 //!
 //! | what they differ by | is |
 //! |---|---|
-//! | a step, as no vehicle turns in 10 ms ([`LIMIT`], or [`USUAL`] times the RMS of such differences) | a step that is not used; after two seconds of them it is used and degraded |
-//! | the mean of the last second, by more than [`GATE`] of the inertial one's expected errors | part of sigma |
+//! | a step, as no vehicle turns in 10 ms ([`LIMIT`]: increments that come late add up in one) | a step that is not used; after two seconds of them it is used and degraded |
+//! | the mean of the last second, by more than [`GATE`] of the inertial one's expected errors | part of sigma; beyond what sigma can say it is degraded |
 //! | the gain in turns, beyond what the inertial one's may be off | a share of the rate, and of the roll and pitch rates: an axis that is askew reads too little |
 
 use crate::sample::{PERIOD_US, RATE_HZ};
 use crate::sqrt::sqrt;
 use crate::units::Micros;
 
-/// Difference of a step's rate that is always plausible, rad/s, and the share of the inertial rate that is added: a gain
-/// is judged over a second.
-const LIMIT: (f32, f32) = (0.3, 0.5);
-/// Beyond it, a difference is plausible up to so many times the RMS of the last ones: vibration between both times.
-const USUAL: f32 = 12.0;
-/// Steps of that RMS, and steps for which a difference is rejected.
-const STEPS: f32 = 64.0;
+/// Difference of a step's rate that no vehicle has, rad/s and as a share of the inertial one, and the steps for which it is
+/// rejected.
+const LIMIT: (f32, f32) = (3.0, 0.5);
 const DOUBTED: u32 = 2 * RATE_HZ;
 /// Expected errors of the inertial gyro beyond which the difference of a second is the fibre-optic one's.
 const GATE: f32 = 3.0;
+/// Largest expected error on the bus, rad/s: 0.655 deg/s.
+const TOLD: f32 = 0.0114;
 /// Share of the rate, 1 sigma, that the slope of a street, the mounting and a unit's gain hide from any gyro, and with
 /// an inertial gyro until both have been compared in turns.
 const SHARE: f32 = 0.0005;
 const UNKNOWN_SHARE: f32 = 0.01;
 /// Gain of an inertial gyro, 1 sigma: the difference that says nothing about the other one.
 const INERTIAL_GAIN: f32 = 0.003;
-/// Share of the roll and pitch rates, rad: a mount of 0.3 deg.
-const MOUNT: f32 = 0.005;
+/// Share of the roll and pitch rates, rad: a mount of 0.2 deg.
+const MOUNT: f32 = 0.003;
 /// Steps of a block, and blocks of a second.
 const BLOCK: u32 = 10;
 const BLOCKS: usize = (RATE_HZ / BLOCK) as usize;
@@ -64,9 +62,8 @@ impl Beside {
 #[derive(Debug, Clone)]
 pub(super) struct Comparison {
     beside: Beside,
-    /// Steps in a row that differed, and the mean square of the differences of the others, (rad/s)^2.
+    /// Steps in a row that differed.
     rejected: u32,
-    square: f32,
     /// Sums of the differences, rad/s, and their numbers: the newest block first.
     blocks: [(f32, u32); BLOCKS],
     steps: u32,
@@ -75,7 +72,7 @@ pub(super) struct Comparison {
 impl Comparison {
     /// The state before the first step.
     pub const START: Self =
-        Self { beside: Beside::NOTHING, rejected: 0, square: 0.0, blocks: [(0.0, 0); BLOCKS], steps: 0 };
+        Self { beside: Beside::NOTHING, rejected: 0, blocks: [(0.0, 0); BLOCKS], steps: 0 };
 
     pub fn take(&mut self, beside: Beside) {
         self.beside = beside;
@@ -97,17 +94,19 @@ impl Comparison {
         let [(sum, number), ..] = &mut self.blocks;
         (*sum, *number) = (*sum + off, *number + 1);
         let (always, share) = LIMIT;
-        let differs = libm::fabsf(off) > (always + share * libm::fabsf(rate)).max(USUAL * sqrt(self.square));
+        let differs = libm::fabsf(off) > always + share * libm::fabsf(rate);
         self.rejected = if differs { self.rejected.saturating_add(1) } else { 0 };
-        if !differs {
-            self.square += (off * off - self.square) / STEPS;
-        }
         differs
     }
 
     /// Returns whether a step that differs is not used.
     pub fn rejects(&self) -> bool {
         self.rejected <= DOUBTED
+    }
+
+    /// Returns whether the last second differs by more than an expected error can say.
+    pub fn contradicts(&self) -> bool {
+        self.off() > TOLD
     }
 
     /// Returns by how much the mean rate of a second may be off, 1 sigma, at this rate, rad/s; `clock` is the share of the
@@ -152,12 +151,9 @@ mod tests {
     fn a_step_that_no_vehicle_turns_is_rejected_for_two_seconds() {
         let mut comparison = Comparison::START;
         assert!(!second(&mut comparison, 0.5, 0.55));
-        assert!(second(&mut comparison, 0.0, 0.8) && comparison.rejects());
-        assert!(second(&mut comparison, 0.0, 0.8) && comparison.rejects());
-        assert!(second(&mut comparison, 0.0, 0.8) && !comparison.rejects(), "it is used, and degraded");
-        // A vehicle that shakes both at different times is used to more.
-        comparison.square = 0.01;
-        assert!(!second(&mut comparison, 0.0, 0.8));
+        assert!(second(&mut comparison, 0.0, 3.1) && comparison.rejects());
+        assert!(second(&mut comparison, 0.0, 3.1) && comparison.rejects());
+        assert!(second(&mut comparison, 0.0, 3.1) && !comparison.rejects(), "it is used, and degraded");
     }
 
     #[test]

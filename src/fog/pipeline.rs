@@ -250,6 +250,7 @@ impl FogPipeline {
         self.shown = turn.map(|turn| turn.0 as f32 * (RATE_HZ as f32 / Angle::PER_RAD) - reading);
         let differs = self.shown.is_some_and(|rate| self.beside.differs(rate, step.time));
         let wrong = differs && self.beside.rejects();
+        let contradicts_other = differs || self.beside.contradicts();
         let turn = turn.filter(|_| !wrong);
         let stuck = turn.is_none() && self.stuck_in_step;
         self.stuck_in_step = self.repeats.are_stuck();
@@ -284,7 +285,7 @@ impl FogPipeline {
             .with(Faults::WHEELS.when(wheels.is_none() || contradicted))
             .with(
                 Faults::IMPLAUSIBLE
-                    .when(self.latitude_contested || is_clock_off || contradicts_unit || differs),
+                    .when(self.latitude_contested || is_clock_off || contradicts_unit || contradicts_other),
             )
             .with(Faults::STORED.when(uses_network && !self.has_network));
         let is_good = faults == Faults::NONE && self.is_confirmed;

@@ -186,19 +186,14 @@ impl RestReading {
         self.stood = self.stood.saturating_add(1);
     }
 
-    /// Returns the rate at which a standing vehicle has turned in the last second, or in its last quarters, beyond the
-    /// reading at rest and its noise, or the doubt of the newest standstill if that is larger, rad/s: the vehicle turns, or
-    /// the gyro's bias has changed.
+    /// Returns what a standing vehicle has turned in the last second beyond the reading at rest and its noise, rad, or the
+    /// doubt of the newest standstill, rad/s, if that is larger: the vehicle turns, or the gyro's bias has changed.
     fn against(&self) -> f32 {
-        let beyond = |quarters: usize, sigmas: f32| {
-            let current = self.stood.saturating_sub(1) % QUARTER + 1;
-            let steps = self.stood.min(QUARTER * (quarters as u32 - 1) + current);
-            let seconds = steps as f32 / RATE_HZ as f32;
-            let turned = self.turned.iter().take(quarters).sum::<i64>() as f32 / Angle::PER_RAD;
-            let beyond = (turned - self.combined().mean * seconds).abs() - sigmas * sqrt(self.noise);
-            beyond / seconds.max(0.25)
-        };
-        self.doubt.max(beyond(2, GATE)).max(beyond(5, 3.0))
+        let current = self.stood.saturating_sub(1) % QUARTER + 1;
+        let steps = self.stood.min(RATE_HZ + current);
+        let turned = self.turned.iter().sum::<i64>() as f32 / Angle::PER_RAD;
+        let expected = self.combined().mean * steps as f32 / RATE_HZ as f32;
+        self.doubt.max((turned - expected).abs() - 3.0 * sqrt(self.noise))
     }
 
     /// Returns the reading at rest that is subtracted, rad/s.

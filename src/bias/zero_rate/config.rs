@@ -1,7 +1,5 @@
 //! The configuration of the zero-rate updates is a plain value, separate from their state.
 
-use crate::sqrt::sqrt;
-
 /// Describes the noise of part and vehicle. All values are 1 sigma.
 #[derive(Debug, Clone, Copy)]
 pub struct ZeroRateConfig {
@@ -29,10 +27,9 @@ impl ZeroRateConfig {
     pub const DEFAULT: Self =
         Self { initial: 1e-4, walk: 1e-5, standstill: 1.4e-4, noise: 5e-5, mistaken: 5e-3, max_bias: 0.1 };
 
-    /// Returns the sigma of the mean of three seconds whose means spread so much: a range of three is 1.7 of their sigmas,
-    /// and their mean has 0.6 of one.
+    /// Returns the sigma of the mean of three seconds whose means spread so much: what exceeds five sigma is a change that
+    /// goes on.
     pub(super) fn after_rest(&self, drift: f32) -> f32 {
-        let mean = drift / 3.0;
-        sqrt(self.initial * self.initial + mean * mean)
+        self.initial.max(drift - 5.0 * self.initial)
     }
 }
