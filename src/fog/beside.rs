@@ -18,9 +18,10 @@ const DOUBTED: u32 = 2 * RATE_HZ;
 const GATE: f32 = 3.0;
 /// Largest expected error on the bus, rad/s: 0.655 deg/s.
 const TOLD: f32 = 0.0114;
-/// Share of the rate, 1 sigma, that the slope of a street, the mounting and a unit's gain hide from any gyro, and with
-/// an inertial gyro until both have been compared in turns.
-const SHARE: f32 = 0.0005;
+/// Shares of the rate, 1 sigma: of a unit's gain (200 ppm, DSP-1760) with the mounting; of the slope of a street where
+/// no inertial sensor shows it; and beside an inertial gyro until both have been compared in turns.
+const UNIT_SHARE: f32 = 0.0002;
+const STREET_SHARE: f32 = 0.00046;
 const UNKNOWN_SHARE: f32 = 0.01;
 /// Gain of an inertial gyro, 1 sigma: the difference that says nothing about the other one.
 const INERTIAL_GAIN: f32 = 0.003;
@@ -116,7 +117,8 @@ impl Comparison {
         let gain = self.beside.gain();
         // An axis that is askew by an angle reads the cosine of a turn, and the sine of a roll.
         let askew = if self.beside.scale.is_some() { sqrt(2.0 * gain) } else { 0.0 };
-        let share = sqrt(SHARE * SHARE + gain * gain + tilted * tilted) + clock;
+        let street = if self.beside.rate.is_some() { tilted } else { STREET_SHARE };
+        let share = sqrt(UNIT_SHARE * UNIT_SHARE + gain * gain + street * street) + clock;
         let (grows, leans, off) = (share * rate, (MOUNT + askew) * leaning, self.off());
         sqrt(grows * grows + leans * leans + off * off)
     }
@@ -174,7 +176,8 @@ mod tests {
             Comparison { beside, ..Comparison::START }.sigma(if leaning > 0.0 { 0.0 } else { 0.5 }, 0.0)
         };
         let usual = with(INERTIAL_GAIN, 0.0);
-        assert!(usual < 1.01 * SHARE * 0.5, "the inertial one's own: {usual}");
+        let own = sqrt(UNIT_SHARE * UNIT_SHARE + STREET_SHARE * STREET_SHARE);
+        assert!(usual < 1.01 * own * 0.5, "the inertial one's own: {usual}");
         assert!((with(0.008, 0.0) / (0.5 * 0.0074) - 1.0).abs() < 0.02);
         let [upright, askew] = [INERTIAL_GAIN, 0.0055].map(|scale| with(scale, 0.1));
         assert!((upright - 0.1 * MOUNT).abs() < 1e-6 && (8e-3..12e-3).contains(&askew), "{upright} {askew}");
