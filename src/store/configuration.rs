@@ -224,7 +224,8 @@ impl Record for Configuration {
         }
         let ids = self.diagnosis.ids().map_err(FieldError::Diagnosis)?;
         let fog_ids = self.fog_ids.into_iter().filter_map(StandardId::new).map(Id::Standard);
-        let own = config.messages().into_iter().map(|message| message.id);
+        let messages = config.messages();
+        let own = messages.iter().map(|message| message.id);
         self.heading.check(own.chain(fog_ids).chain(ids)).map_err(FieldError::Heading)?;
         if self.own_identifier(ids.into_iter()).is_some() {
             return Err(FieldError::Diagnosis(self.diagnosis.request));
