@@ -1,5 +1,4 @@
-//! Builds the paper's tables with our results, as rows of text and numbers that [`super::text`] and
-//! [`super::html`] print.
+//! Builds the paper's tables with our results, as rows of text and numbers that [`super::text`] prints.
 
 use super::group::Group;
 use super::notes;
