@@ -157,7 +157,7 @@ impl Coprocessor {
         self.take(sample, now, sink, &mut newest).map(|()| newest)
     }
 
-    /// Does the same with the observation in place: a copy of it is a large part of a small stack.
+    /// [`Self::imu`] that writes the observation in place: a copy of it is a large part of a small stack.
     fn take(
         &mut self,
         sample: ImuSample,
@@ -240,9 +240,9 @@ impl Coprocessor {
         }
         let rate = Some(output.vehicle.live).filter(|live| live.source != Source::Raw).map(rad_per_sec);
         let [_, lateral, _] = output.vehicle.specific_force;
-        let sigma =
-            output.vehicle.live.sigma.map_or(0.0, |sigma| sigma.0 as f32 / AngularRate::PER_RAD_PER_SEC);
-        self.inertial_rate = rate.map(|rate| (self.timeline.time(), [rate, sigma]));
+        // A rate without an expected error contradicts nothing.
+        let sigma = output.vehicle.live.sigma.map(|sigma| sigma.0 as f32 / AngularRate::PER_RAD_PER_SEC);
+        self.inertial_rate = rate.zip(sigma).map(|(rate, sigma)| (self.timeline.time(), [rate, sigma]));
         self.second.add(&Shown {
             inertial: rate,
             fog: self.fog_rate,
@@ -355,7 +355,7 @@ impl Coprocessor {
         self.poll_into(now, sink, &mut newest).map(|()| newest)
     }
 
-    /// Does the same with the observation in place.
+    /// [`Self::poll`] that writes the observation in place.
     fn poll_into(
         &mut self,
         now: Micros,

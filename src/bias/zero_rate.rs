@@ -8,7 +8,7 @@
 //!   a road, which shifts the mean of gyro and network. The shift differs from stop to stop and does not
 //!   average out during a stop: without this state, a minute at a traffic light would make the filter
 //!   too certain of a bias that does not hold on the road. It is the wider the less probable the standstill is:
-//!   what is taken for one may be a smooth bend, which begins and ends, so a doubtful standstill teaches little.
+//!   it may be a smooth bend, which begins and ends, so a doubtful standstill teaches little.
 //!
 //! The mean of a second is modelled as z = b + s + noise, with the noise taken from the spread of the ten means of
 //! [`BATCH`] samples in it: the spread of single samples would not show that an engine's vibration averages out

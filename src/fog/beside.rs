@@ -17,7 +17,7 @@ const DOUBTED: u32 = 2 * RATE_HZ;
 /// Expected errors of the inertial gyro beyond which the difference of a second is the fibre-optic one's.
 const GATE: f32 = 3.0;
 /// Largest expected error on the bus, rad/s: 0.655 deg/s.
-const TOLD: f32 = 0.0114;
+const LARGEST_SIGMA: f32 = 0.0114;
 /// Shares of the rate, 1 sigma: of a unit's gain (200 ppm, DSP-1760) with the mounting; of the slope of a street where
 /// no inertial sensor shows it; and beside an inertial gyro until both have been compared in turns.
 const UNIT_SHARE: f32 = 0.0002;
@@ -107,7 +107,7 @@ impl Comparison {
 
     /// Returns whether the last second differs by more than an expected error can say.
     pub fn contradicts(&self) -> bool {
-        self.off() > TOLD
+        self.off() > LARGEST_SIGMA
     }
 
     /// Returns by how much the mean rate of a second may be off, 1 sigma, at this rate, rad/s; `clock` is the share of the

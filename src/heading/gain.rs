@@ -1,8 +1,7 @@
 //! The gain of the yaw gyro that courses have shown, kept over starts.
 //!
-//! A gain belongs to the model and the map of the unit that the rate has run through, so it names them and counts only
-//! with the same. At the next start it is given back less certain, by what a part may change meanwhile; the courses of
-//! that start confirm it.
+//! A gain is that of the rate behind the model and the unit's map, so it is stored with their checksum and used with the
+//! same ones only. Its sigma grows at the next start by what a part's gain may change in between; new courses reduce it.
 
 /// What a gain may change by from one start to the next, 1 sigma.
 const AGED: f32 = 0.0016;
@@ -10,10 +9,10 @@ const AGED: f32 = 0.0016;
 const KEPT: f32 = 0.002;
 /// Largest gain.
 pub(super) const MAX_GAIN: f32 = 0.05;
-/// Ratio of sigmas, and change over the sigma, from which a gain is stored anew.
+/// Ratio of sigmas, and change over the sigma, from which a gain replaces the stored one.
 const BETTER: f32 = 0.7;
 
-/// A gain.
+/// A gain of the yaw gyro.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -27,7 +26,7 @@ pub struct Gain {
 }
 
 impl Gain {
-    /// Returns it as it counts at the start after the one that has found it.
+    /// Returns the gain with the sigma that it has at the next start.
     #[must_use]
     pub fn aged(self) -> Self {
         Self { sigma: crate::sqrt::sqrt(self.sigma * self.sigma + AGED * AGED), ..self }

@@ -77,14 +77,14 @@ pub const USUAL: f32 = 12.0;
 const STEPS: f32 = 64.0;
 /// At most this many readings in a row are rejected; the next one is accepted whatever its value.
 pub const JUMP_PATIENCE: u8 = 3;
-/// Samples for which a shift is told on: those that have not been sent yet; and samples in a row near the rate before the
-/// jumps that end it.
-const TOLD: u8 = 12;
+/// Samples for which a shift that has ended is still reported: their rates have not been sent yet.
+const REPORTED: u8 = 12;
+/// Readings in a row near the rate before the jumps that end a shift.
 const BACK: u8 = 20;
-/// Samples after a rejected one for which an axis is not used to its steps, and those after which it is nevertheless: a
-/// fault shakes a reading too, and a vehicle may begin to.
+/// Samples after a rejected one in which an axis's steps do not count for its usual steps, because a fault makes large steps,
+/// too; and the samples of rejected steps after which they count, because the vehicle itself may have begun to shake.
 const ODD: u16 = 100;
-const USED_TO: u16 = 300;
+const USUAL_AFTER: u16 = 300;
 /// Readings are not compared with a last good reading older than this, microseconds.
 const OLD_US: u32 = 50_000;
 
@@ -114,8 +114,8 @@ struct Shift {
     before: f32,
     /// Readings in a row near that rate.
     near: u8,
-    /// Samples for which it is told on after it has ended.
-    told_for: Option<u8>,
+    /// Samples for which it is still reported; `None` while it lasts.
+    reported_for: Option<u8>,
 }
 
 impl Jump {
@@ -155,7 +155,7 @@ impl Jump {
             }
             let [_, _, yaw, ..] = steps;
             self.accept(yaw, is_far);
-            if self.odd_for == 0 || self.odd_for > USED_TO {
+            if self.odd_for == 0 || self.odd_for > USUAL_AFTER {
                 for (square, step) in self.squares.iter_mut().zip(steps) {
                     *square += (step * step - *square) / STEPS;
                 }
@@ -165,13 +165,13 @@ impl Jump {
         false
     }
 
-    /// Counts a sample for what lasts some samples.
+    /// Counts a sample for the limits that are in samples.
     fn pass_on(&mut self) {
         self.odd_ago = self.odd_ago.saturating_add(1);
         let is_odd = self.odd_for > 0 && (self.odd_ago < ODD || self.shift.is_some());
         self.odd_for = if is_odd { self.odd_for.saturating_add(1) } else { 0 };
-        let told_for = self.shift.as_mut().and_then(|shift| shift.told_for.as_mut());
-        if told_for.is_some_and(|left| {
+        let reported_for = self.shift.as_mut().and_then(|shift| shift.reported_for.as_mut());
+        if reported_for.is_some_and(|left| {
             *left = left.saturating_sub(1);
             *left == 0
         }) {
@@ -179,14 +179,15 @@ impl Jump {
         }
     }
 
-    /// Notes a step of the yaw rate that is accepted. A jump that lasts begins a shift, and others add to it. It ends where
-    /// they have added up to nothing and the rate is what it was before: a gain that is wrong changes it where nothing jumps.
+    /// Adds an accepted step of the yaw rate. A jump that lasts begins a shift, and further jumps add to it. The shift ends
+    /// once the jumps add up to less than a jump and the rate is near the one before it. The sum alone does not end it: with a
+    /// wrong gain the rate also changes in steps that are no jumps.
     fn accept(&mut self, step: f32, is_far: bool) {
         let [.., smallest] = JUMP_RATE;
         let [_, _, yaw, ..] = self.last;
         let Some(shift) = &mut self.shift else {
             if is_far && libm::fabsf(step) > smallest {
-                self.shift = Some(Shift { sum: step, before: yaw, near: 0, told_for: None });
+                self.shift = Some(Shift { sum: step, before: yaw, near: 0, reported_for: None });
             }
             return;
         };
@@ -203,7 +204,7 @@ impl Jump {
     /// Notes that the present level of the readings is right.
     pub fn settle(&mut self) {
         if let Some(shift) = &mut self.shift {
-            shift.told_for.get_or_insert(TOLD);
+            shift.reported_for.get_or_insert(REPORTED);
         }
     }
 
@@ -232,7 +233,7 @@ mod tests {
 
     /// Checks a second of a yaw rate; returns the sums of the rates that pass, less the true ones, and of the shifts, rad.
     fn second(jump: &mut Jump, from: u64, read: impl Fn(f32) -> f32) -> (f32, f32) {
-        let (mut wrong, mut told) = (0.0f32, 0.0);
+        let (mut wrong, mut reported) = (0.0f32, 0.0);
         for step in from..from + 100 {
             let rate = 0.02 + 0.03 * libm::sinf(step as f32 * 0.9);
             let mut angular_rate = [AngularRate(0); 3];
@@ -242,18 +243,18 @@ mod tests {
             let sample = ImuSample { time, angular_rate, specific_force, temperature: None, validity };
             if !jump.check(&sample) {
                 wrong += 0.01 * (read(rate) - rate);
-                told += 0.01 * jump.shift();
+                reported += 0.01 * jump.shift();
             }
         }
-        (libm::fabsf(wrong), told)
+        (libm::fabsf(wrong), reported)
     }
 
     #[test]
-    fn a_gain_of_sixty_is_told_though_every_reading_jumps_back_and_forth() {
+    fn a_gain_of_sixty_is_reported_though_every_reading_jumps_back_and_forth() {
         let mut jump = Jump::new();
         assert_eq!(second(&mut jump, 0, |rate| rate), (0.0, 0.0));
-        let (wrong, told) = second(&mut jump, 100, |rate| 60.0 * rate);
-        assert!(wrong > 0.1 && told > 0.5 * wrong, "{wrong} rad, {told} told");
+        let (wrong, reported) = second(&mut jump, 100, |rate| 60.0 * rate);
+        assert!(wrong > 0.1 && reported > 0.5 * wrong, "{wrong} rad, {reported} reported");
         // It is not used to such steps, so what is right again is believed soon.
         second(&mut jump, 200, |rate| rate);
         assert_eq!(second(&mut jump, 300, |rate| rate).0, 0.0);

@@ -1,9 +1,9 @@
 //! Reads the KVH DSP-1760 fibre-optic gyro (and the 1725, 1750, 1775 units, which use the same
 //! messages): RS-422, 921600 baud 8N1.
 //!
-//! A message says neither what it measures nor how often it comes. The gyro must be set to what it leaves the factory
-//! with, at 1000 messages a second: increments of the angle, in radians, and whole deg C. Formats A and C carry no time stamp, only a sequence number; their time is the number of messages, lost ones
-//! included, times the period. The sequence number wraps at 128, so it does not reveal a loss of 128 messages or
+//! A message contains neither its unit nor its period. The gyro must have its factory settings (increments of the angle in
+//! radians, whole deg C) and send 1000 messages a second. Formats A and C carry no time stamp, only a sequence number; their
+//! time is the number of messages, lost ones included, times the period. The sequence number wraps at 128, so it does not reveal a loss of 128 messages or
 //! more. The time stamps of format B reveal it, or the arrival times do ([`crate::align`]).
 
 mod format;

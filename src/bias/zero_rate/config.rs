@@ -27,8 +27,8 @@ impl ZeroRateConfig {
     pub const DEFAULT: Self =
         Self { initial: 1e-4, walk: 1e-5, standstill: 1.4e-4, noise: 5e-5, mistaken: 5e-3, max_bias: 0.1 };
 
-    /// Returns the sigma of the mean of three seconds whose means spread so much: what exceeds five sigma is a change that
-    /// goes on.
+    /// Returns the sigma of the bias by three seconds at rest, whose means differ by `drift`, rad/s: a difference beyond five
+    /// sigma is a change that goes on, and is added.
     pub(super) fn after_rest(&self, drift: f32) -> f32 {
         self.initial.max(drift - 5.0 * self.initial)
     }

@@ -37,7 +37,7 @@ impl Doubt {
         self.is_by_this_stop() || self.stops > 0
     }
 
-    /// Returns whether a second is nearer to what contradicts the bias than this, rad/s.
+    /// Returns whether the mean of a second is nearer than `than` to the stops that contradict the bias, rad/s.
     pub fn is_nearer(&self, mean: f32, than: f32) -> bool {
         let is_nearer = |own: f32, is_doubt: bool| is_doubt && libm::fabsf(mean - own) < than;
         is_nearer(self.mean, self.is_by_this_stop()) || is_nearer(self.earlier, self.stops > 0)

@@ -20,6 +20,8 @@ use gyronet::standstill::Standing;
 
 /// Interval between checks of a failed clock, ms.
 const RETRY_MS: u32 = 1_000;
+/// Time from one reading of the state of the courses to the next; a course comes once a second.
+const COURSE_MS: u32 = 100;
 /// Time after which a start has not failed, ms.
 const SETTLED_MS: u32 = 60_000;
 /// Duration of one pass over the weights, ms.
@@ -73,6 +75,8 @@ pub struct Idle {
     /// The reason why the internal oscillator runs, and the time of the last check whether that reason is over, ms.
     clock_fault: Option<ClockFault>,
     retried: u32,
+    /// Time at which the state of the courses was read last, ms.
+    course_at: u32,
     milliseconds: u32,
 }
 
@@ -86,14 +90,28 @@ impl Idle {
         bring_up: Option<BringUp>,
         clock_fault: Option<ClockFault>,
     ) -> Self {
-        Self { device, weights, diagnosis, bring_up, refusal: None, clock_fault, retried: 0, milliseconds: 0 }
+        Self {
+            device,
+            weights,
+            diagnosis,
+            bring_up,
+            refusal: None,
+            clock_fault,
+            retried: 0,
+            course_at: 0,
+            milliseconds: 0,
+        }
     }
 
     /// Does a bounded piece of work, and returns the faults that were found.
     #[inline(never)]
-    pub fn step(&mut self, counters: &mut AllCounters, course: &CourseState) -> Found {
+    pub fn step(&mut self, counters: &mut AllCounters, course: impl FnOnce() -> CourseState) -> Found {
         self.observe();
-        self.device.learn_course(course);
+        let now = timer::milliseconds();
+        if now.wrapping_sub(self.course_at) >= COURSE_MS {
+            self.course_at = now;
+            self.device.learn_course(&course());
+        }
         if let Some(result) = self.bring_up.as_mut().and_then(BringUp::step) {
             self.device.sensor(result);
         }

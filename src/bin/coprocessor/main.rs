@@ -253,8 +253,9 @@ mod app {
     fn idle(mut cx: idle::Context) -> ! {
         loop {
             let mut counters = cx.shared.counters.lock(|counters| *counters);
-            let course = cx.shared.coprocessor.lock(|coprocessor| coprocessor.pipeline().course_state());
-            let found = cx.local.rest.step(&mut counters, &course);
+            let coprocessor = &mut cx.shared.coprocessor;
+            let course = || coprocessor.lock(|coprocessor| coprocessor.pipeline().course_state());
+            let found = cx.local.rest.step(&mut counters, course);
             if found.any() {
                 cx.shared.coprocessor.lock(|coprocessor| found.report(coprocessor));
             }
