@@ -50,17 +50,12 @@ pub struct Summary<'a> {
     methods: Option<&'a PerMethod<Row>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     paths: Option<&'a [Path]>,
-    #[serde(flatten)]
-    tunnel: Option<Outage<'a>>,
+    /// As `gyronet evaluate --outage` has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    outage: Option<&'a ByLength>,
     frames: u64,
     excerpt: &'a [Message],
     costs: &'a [Cost],
-}
-
-/// The tunnels, as `gyronet evaluate --outage` has them.
-#[derive(Debug, Serialize)]
-struct Outage<'a> {
-    outage: &'a ByLength,
 }
 
 impl<'a> Demo<'a> {
@@ -95,7 +90,7 @@ impl<'a> Demo<'a> {
             missing: self.drive.facts.missing,
             over_best_classical: self.errors.and_then(|errors| errors.over_best_classical),
             methods: self.errors.map(|errors| &errors.methods),
-            tunnel: self.tunnel.map(|tunnel| Outage { outage: &tunnel.outages.outage }),
+            outage: self.tunnel.map(|tunnel| &tunnel.outages.outage),
             paths: self.trajectories.as_ref().map(|trajectories| trajectories.paths.as_slice()),
             frames: self.frames,
             excerpt: &self.excerpt,

@@ -25,6 +25,9 @@ pub struct Tunnel {
 impl Tunnel {
     /// Runs the tunnels; `None` if the drive has too little course or reference for one.
     pub fn new(drive: &Drive<'_>, network: &mut dyn WindowNetwork) -> Result<Option<Self>, DataError> {
+        if !drive.rows()?.any(|row| row.is_ok_and(|row| row.heading.is_some())) {
+            return Ok(None);
+        }
         let found = outage::run(drive, network, &[SECONDS], EVERY_S, || {})?;
         let outages = Outages::new(drive.name(), 1, found.iter());
         let Some([median, _]) = outage_chart::typical(found.iter()).filter(|_| !outages.outage.is_empty())

@@ -26,7 +26,7 @@ const IN_SCALE: [Method; 2] = [Method::EKF, Method::DELAYED];
 const SECONDS_OF_A_POINT: f64 = 0.5;
 
 fn column(method: Method) -> usize {
-    METHODS.iter().position(|own| *own == method).unwrap_or_default()
+    METHODS.iter().position(|own| *own == method).expect("the drawn methods are compared ones")
 }
 
 /// Returns the picture of an outage of a drive.
@@ -167,32 +167,23 @@ fn panel(
          <rect class=\"panel\" x=\"{left}\" y=\"{top:.0}\" width=\"{width}\" height=\"{height:.0}\"/>"
     );
     let mut numbers = String::new();
-    for tick in ticks(x, 6, false) {
-        let at = across(tick.at);
+    let mut mark = |[x1, x2, y1, y2]: [f64; 4], anchor: &str, [x, y]: [f64; 2], label: &str| {
         let _ = writeln!(
             body,
-            "<line class=\"grid\" x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{top:.0}\" y2=\"{bottom:.0}\"/>"
+            "<line class=\"grid\" x1=\"{x1:.1}\" x2=\"{x2:.1}\" y1=\"{y1:.1}\" y2=\"{y2:.1}\"/>"
         );
         let _ = write!(
             numbers,
-            "<text class=\"note\" text-anchor=\"middle\" x=\"{at:.1}\" y=\"{:.0}\">{}</text>",
-            bottom + 15.0,
-            tick.label
+            "<text class=\"note\" text-anchor=\"{anchor}\" x=\"{x:.1}\" y=\"{y:.1}\">{label}</text>"
         );
+    };
+    for tick in ticks(x, 6, false) {
+        let at = across(tick.at);
+        mark([at, at, top, bottom], "middle", [at, bottom + 15.0], &tick.label);
     }
     for tick in ticks(y, 5, false) {
         let at = up(tick.at);
-        let _ = writeln!(
-            body,
-            "<line class=\"grid\" x1=\"{left}\" x2=\"{right}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/>"
-        );
-        let _ = write!(
-            numbers,
-            "<text class=\"note\" text-anchor=\"end\" x=\"{:.0}\" y=\"{:.1}\">{}</text>",
-            left - 6.0,
-            at + 4.0,
-            tick.label
-        );
+        mark([left, right, at, at], "end", [left - 6.0, at + 4.0], &tick.label);
     }
     for (class, points) in curves {
         let _ = write!(body, "<polyline class=\"curve {class}\" points=\"");
