@@ -61,38 +61,38 @@ fn trials(test: &str) -> Option<&'static [Trial]> {
     Some(RUN.get_or_init(|| parallel::map(&drives, |(trial, path)| Trial::new(*trial, path))))
 }
 
-/// The README's rows: how each begins, its method, and the place among its numbers of the ratio of both drives to static
+/// The rows of the page of measurements: how each begins, its method, and the place among its numbers of the ratio of both drives to static
 /// initialisation, behind which stand those of each drive.
 const ROWS: [(&str, Method, usize); 2] =
     [("| gyronet, live rate |", Method::LIVE, 1), ("| gyronet, delayed rate |", Method::DELAYED, 1)];
-/// The sentence that begins so has the ratio to the best classical method as its first number.
+/// The README's sentence that begins so has the ratio to the best classical method as its first number.
 const OVER_BEST_CLASSICAL: &str = "The delayed rate has";
 
-/// Returns the numbers in the README's row that begins so: `(0.78 (0.95 and 0.72)` gives all three.
-fn readme_numbers(row: &str) -> Vec<f64> {
-    let readme = std::fs::read_to_string(recordings::workspace().join("README.md")).expect("the README");
-    let line = readme.lines().find_map(|line| line.strip_prefix(row));
-    let line = line.unwrap_or_else(|| panic!("the README has no row {row}"));
+/// Returns the numbers in a page's row that begins so: `(0.78 (0.95 and 0.72)` gives all three.
+fn numbers(page: &str, row: &str) -> Vec<f64> {
+    let text = std::fs::read_to_string(recordings::workspace().join(page)).expect("a page");
+    let line = text.lines().find_map(|line| line.strip_prefix(row));
+    let line = line.unwrap_or_else(|| panic!("{page} has no row {row}"));
     let numbers = line.split(|c: char| !c.is_ascii_digit() && c != '.').filter_map(|word| word.parse().ok());
     numbers.filter(|number: &f64| number.fract() != 0.0).collect()
 }
 
-/// Fails where a ratio is worse than the README's.
+/// Fails where a ratio is not the page's.
 fn hold(what: &str, ratio: f64, readme: f64) {
-    println!("{what}: {ratio:.3}; the README says {readme}");
-    assert!(ratio <= readme * (1.0 + WORSE), "{what}: {ratio:.3}, the README says {readme}");
-    assert!(ratio >= readme * (1.0 - WORSE), "{what}: {ratio:.3} is better: the README says {readme}");
+    println!("{what}: {ratio:.3}; the page says {readme}");
+    assert!(ratio <= readme * (1.0 + WORSE), "{what}: {ratio:.3}, the page says {readme}");
+    assert!(ratio >= readme * (1.0 - WORSE), "{what}: {ratio:.3} is better: the page says {readme}");
 }
 
 #[test]
-fn rates_are_as_good_as_the_readme_says() {
-    let Some(trials) = trials("rates_are_as_good_as_the_readme_says") else { return };
+fn rates_are_as_good_as_the_pages_say() {
+    let Some(trials) = trials("rates_are_as_good_as_the_pages_say") else { return };
     let report = Report::new(trials.iter().map(|trial| trial.drive.clone()).collect());
     let rows = report.mean.expect("two drives");
     let error = |rows: &PerMethod<Row>, method| rows[method].error.mean_1s_rad.expect("whole seconds");
     let to_static = |rows: &PerMethod<Row>, method| error(rows, method) / error(rows, Method::STATIC);
     for (row, method, place) in ROWS {
-        let readme = readme_numbers(row);
+        let readme = numbers("tools/MEASUREMENTS.md", row);
         hold(row, to_static(&rows, method), readme[place]);
         for (trial, readme) in trials.iter().zip(&readme[place + 1..]) {
             let what = format!("trial {:02}, {method:?} to static", trial.number);
@@ -100,7 +100,7 @@ fn rates_are_as_good_as_the_readme_says() {
         }
     }
     let ours = report.sets[0].over_best_classical.expect("two drives").default;
-    hold(ours.best_classical, ours.ratio, readme_numbers(OVER_BEST_CLASSICAL)[0]);
+    hold(ours.best_classical, ours.ratio, numbers("README.md", OVER_BEST_CLASSICAL)[0]);
 }
 
 #[test]
