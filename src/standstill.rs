@@ -53,7 +53,7 @@ const AGAINST: f32 = 0.5;
 const SLOPE: f32 = 0.6;
 /// Speed of a wheel of a vehicle that drives, and does not creep at the wheels' threshold: 1 m/s.
 const DRIVES: u32 = 65_536;
-/// Share of the largest change of speed at rest up to which a gyro that changes its mean ends no standstill.
+/// A change of the gyro's mean does not end a standstill while the speed changes by less than this share of the limit.
 const STILL: f32 = 0.15;
 /// Shake of a vehicle that an engine shakes as much as any, rad/s.
 const CALM: f32 = 1.2e-2;
@@ -127,7 +127,7 @@ impl Standing {
 pub struct Judge {
     config: StandstillConfig,
     inertial: Inertial,
-    /// Judgements in a row that are quiet, and those since then in which nothing but the gyro's mean has changed.
+    /// Judgements in a row that are quiet, and those after them in which only the gyro's mean has changed.
     quiet_for: u8,
     lingers: u8,
     /// The quiet belongs to a stop, and whether the speed has changed since the last quiet.
@@ -262,7 +262,7 @@ impl Judge {
             (self.is_stop, self.has_moved) = (false, true);
         }
         let is_quiet = motion.shake < shake && motion.speed_change < speed_change;
-        // A gyro that jumps, or a deck that begins to turn, speeds nothing up.
+        // A gyro that jumps, and a deck that begins to turn, change no speed.
         let is_still = self.is_stop && self.quiet_for > 0 && motion.speed_change < STILL * speed_change;
         let is_turned = is_still && self.is_calm && self.lingers < WINDOW as u8;
         self.lingers = if is_turned && !is_quiet { self.lingers + 1 } else { 0 };

@@ -1,4 +1,5 @@
-//! The image's output task on the host: bytes of an Xsens MTi and wheel frames go in, SLCAN lines come out. Like the image, it does the input and output around the library's [`Coprocessor`].
+//! The image's output task on the host: bytes of an Xsens MTi and wheel frames go in, SLCAN lines come out. Like the
+//! image, it does the input and output around the library's [`Coprocessor`].
 
 use crate::synthetic;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};

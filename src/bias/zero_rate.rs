@@ -225,8 +225,7 @@ impl ZeroRate {
         true
     }
 
-    /// Returns the rate by which the newest quarters of a second contradict the bias at a standstill that no wheel shows,
-    /// beyond their noise, rad/s.
+    /// Returns the rate of the newest two quarters of a second beyond their noise, at a standstill without wheels, rad/s.
     fn turns(&self) -> f32 {
         let is_inertial = self.standing.source == StandstillSource::Inertial && self.standing.is_likely();
         let Some(noise) = self.noise.filter(|_| is_inertial) else { return 0.0 };
@@ -417,7 +416,8 @@ impl ZeroRate {
         }
     }
 
-    /// Notes the mean of a second at a probable standstill that agrees with the bias, and not more with what contradicts it.
+    /// Takes the mean of a second at a probable standstill that agrees with the bias: it withdraws the doubt, unless it is
+    /// nearer to the stops that contradict the bias.
     fn agree(&mut self, mean: f32) {
         let own = self.filter.get::<BIAS>() + self.filter.get::<STOP>();
         if self.doubt.is_nearer(mean, libm::fabsf(mean - own)) {

@@ -9,8 +9,8 @@
 //! In a second with contradiction the source that is alone is doubted: the gyro that the other two (gyro, wheels,
 //! accelerometer) contradict, or the wheels that both others contradict. Where two contradict each other and no third
 //! one judges, both are doubted. A doubt begins with the second such second in a row (a tyre that slips, a lag in a
-//! swerve), and ends with the second one in which its source agrees with another in a turn, or straight on if it began
-//! while a gyro showed no turn: then a bias was wrong, no gain. A fibre-optic gyro that nothing has confirmed yet
+//! swerve), and ends with the second one in which its source agrees with another in a turn, or straight on if the
+//! doubt began while a gyro showed no turn: then a bias was wrong and not a gain. A fibre-optic gyro that nothing has confirmed yet
 //! contradicts no other, and is doubted at once.
 
 use crate::sample::{RATE_HZ, WheelSample};

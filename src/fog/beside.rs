@@ -1,10 +1,10 @@
-//! A fibre-optic gyro held against the inertial one beside it, step by step and over the last second.
+//! The comparison of a fibre-optic gyro with the inertial one beside it, by steps and over the last second.
 //!
-//! | what they differ by | is |
+//! | difference | effect |
 //! |---|---|
-//! | a step, as no vehicle turns in 10 ms ([`LIMIT`]: increments that come late add up in one) | a step that is not used; after two seconds of them it is used and degraded |
-//! | the mean of the last second, by more than [`GATE`] of the inertial one's expected errors | part of sigma; beyond what sigma can say it is degraded |
-//! | the gain in turns, beyond what the inertial one's may be off | a share of the rate, and of the roll and pitch rates: an axis that is askew reads too little |
+//! | the rate of a step, by more than [`LIMIT`] (late increments add up in one step) | the step is not used; after two seconds of such steps they are used and degraded |
+//! | the mean rate of the last second, by more than [`GATE`] of the inertial gyro's expected errors | the difference is part of sigma; if it exceeds the largest sigma of the bus, the rate is degraded |
+//! | the gain in turns, by more than the inertial gyro's own gain error | the difference is a share of the rate in sigma, and of the roll and pitch rates, because a misaligned axis reads too little |
 
 use crate::sample::{PERIOD_US, RATE_HZ};
 use crate::sqrt::sqrt;
@@ -31,7 +31,7 @@ const MOUNT: f32 = 0.003;
 const BLOCK: u32 = 10;
 const BLOCKS: usize = (RATE_HZ / BLOCK) as usize;
 
-/// What the inertial sensor shows besides.
+/// The rates and errors of the inertial sensor, with which the fibre-optic gyro is compared.
 #[derive(Debug, Clone, Copy)]
 pub struct Beside {
     /// The newest yaw rate, rad/s, and its time.

@@ -9,9 +9,9 @@
 //! the ratio of their probabilities has a closed form. The first explanation starts with the better odds: only a tilt
 //! steeper than streets, or one that turns confirm, is taken off.
 //!
-//! What earlier drives have shown is a claim: a standstill that no street explains drops it, because the sensor was moved.
-//! Which of both is right the next turn or street shows; until then their angle is part of the variance, and so is a scatter
-//! that streets do not explain.
+//! The vertical of earlier drives is a claim. A standstill whose vertical differs from it by more than a street can slope
+//! drops the claim, because the sensor was moved. Until a turn or another standstill agrees with one of the two, the angle
+//! between them is part of the variance. So is the scatter of the standstills where it exceeds that of streets.
 
 use super::{Rotation, metre_per_sec2};
 use crate::health::slow::Knowledge;
@@ -86,8 +86,8 @@ impl Vertical {
         up.map(|axis| axis / length)
     }
 
-    /// Returns the sigma of that direction in each axis, rad: by the slope of streets, or by how far the directions scatter
-    /// where that is more.
+    /// Returns the sigma of that direction in each axis, rad: by the slope of streets, or by the scatter of the directions
+    /// where the scatter is larger.
     pub fn sigma(&self) -> f32 {
         let (_, tilt) = self.deviation();
         // Each direction has two axes, and a weight of at most that of a standstill but for turns.
@@ -154,7 +154,8 @@ pub struct Judgement {
 pub struct VerticalEstimator {
     known: Vertical,
     is_tilted: bool,
-    /// Square of the angle to what was known before a standstill has dropped it, rad^2, until another source decides.
+    /// Square of the angle between the vertical that a standstill has dropped and its own, rad^2; 0 once a turn or another
+    /// standstill has changed the known vertical.
     disputed: f32,
     /// Sums of the current standstill, its samples, and the samples since the one before.
     force: [i64; 3],
