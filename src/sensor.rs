@@ -9,7 +9,6 @@
 //! | Xsens MTi | UART | [`xsens::Mti`] | [`ImuSample`] |
 //! | KVH DSP-1760, 17xx | RS-422 | [`dsp1760::Dsp1760`] | [`FogSample`] |
 //! | TDK ICM-42688-P | SPI | [`icm42688::Icm42688`] | [`ImuSample`] |
-//! | ADI ADIS16465, 16470 | SPI | [`adis16465::Adis16465`] | [`ImuSample`], timed by data ready |
 //!
 //! UART parts are read through [`serial::Serial`] over any port with the traits of `embedded-io`; the maker's tool sets
 //! them up once. SPI parts take an `embedded_hal::spi::SpiDevice`. Either way it is a [`Source`].
@@ -20,14 +19,12 @@
 //! |---|---|---|---|
 //! | MTData2 | sum of bytes, 8 bits | refused | one in 256 other errors |
 //! | DSP-1760 | CRC of 32 bits | refused | one in 4 x 10^9 |
-//! | ADIS164xx burst | sum of bytes, 16 bits | refused | swapped bytes |
 //! | ICM-42688 packet | none, except its header | a reading may be another one | that reading |
 //!
 //! The last one has no check on the wire: keep its line short, and rely on the pipeline's own limits.
 //!
 //! `src/bin/PORTING.md` lists the six steps to add a part.
 
-pub mod adis16465;
 #[doc(hidden)]
 pub mod crc;
 pub mod dsp1760;

@@ -14,8 +14,6 @@ pub mod synthetic;
 #[path = "../../src/wire.rs"]
 pub mod wire;
 
-#[path = "../../tests/library/adis16465.rs"]
-mod adis16465;
 #[path = "../../tests/library/align_faults.rs"]
 mod align_faults;
 #[path = "../../tests/library/bosch.rs"]

@@ -2,14 +2,12 @@
 
 use super::Seed;
 use crate::wire::{bytes, feed, message, synthetic_frame};
-use gyronet::sensor::adis16465::{BURST, Burst, Model};
 use gyronet::sensor::crc::CRC_32_MPEG_2;
 use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::icm42688::packet::{PACKET, Packet};
 use gyronet::sensor::xsens::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti, Xbus};
-use gyronet::units::Micros;
 
 /// Passes bytes as a stream to the MTi's parser, and as the data of a message.
 pub fn xsens(data: &[u8]) {
@@ -86,27 +84,4 @@ pub fn icm42688_seeds() -> Vec<Seed> {
     let (acceleration, rate) = ([Some(0), Some(-1), Some(2048)], [Some(5), None, Some(-164)]);
     let packet = Packet { acceleration, rate, temperature: Some(3), time: 1_000 };
     vec![("packet_4", packet.emit().to_vec())]
-}
-
-/// Parses bytes as bursts, unchanged and with a valid sum.
-pub fn adis16465(data: &[u8]) {
-    let (bursts, _) = data.as_chunks::<BURST>();
-    for bytes in bursts {
-        let mut fitting = *bytes;
-        let sum: u16 = fitting.iter().take(18).map(|byte| u16::from(*byte)).sum();
-        fitting[18..].copy_from_slice(&sum.to_be_bytes());
-        for bytes in [*bytes, fitting] {
-            if let Ok(burst) = Burst::parse(&bytes) {
-                assert_eq!(burst.emit(), bytes);
-                for model in [Model::Adis16465_1, Model::Adis16465_2, Model::Adis16465_3, Model::Adis16470] {
-                    let _ = burst.sample(model, Micros(0));
-                }
-            }
-        }
-    }
-}
-
-pub fn adis16465_seeds() -> Vec<Seed> {
-    // No flag, rate -3, 400, 12; force -40, 4000, 0.0; 25.3 deg C; counter.
-    vec![("burst", bytes("00 00 00 00 ff fd 01 90 00 0c ff d8 0f a0 00 fd 12 34 06 62"))]
 }

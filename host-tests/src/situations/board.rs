@@ -1,7 +1,7 @@
 //! The board on the host: bytes of the sensor and wheel frames in, frames out, a millisecond at a time.
 
 use super::parts::icm42688::NoDelay;
-use super::parts::{Part, adis16465, icm42688};
+use super::parts::{Part, icm42688};
 use super::sensor::LATITUDE;
 use crate::ram_flash::RamFlash;
 use embedded_can::Frame;
@@ -14,7 +14,6 @@ use gyronet::coprocessor::{Bus, Config, Coprocessor, Sink, TimedFrame};
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::sample::ImuSample;
 use gyronet::sensor::Source;
-use gyronet::sensor::adis16465::{Adis16465, BURST};
 use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
 use gyronet::sensor::xsens::Mti;
@@ -31,7 +30,6 @@ const MAX_FETCHED: usize = 32;
 enum Line {
     Mti(Box<Mti>),
     Fifo(Box<Icm42688<icm42688::Bus>>, icm42688::Bus),
-    Bursts(Adis16465<adis16465::Bus>, adis16465::Bus),
 }
 
 /// The samples that wait for the coprocessor; `None` where bytes gave none.
@@ -104,10 +102,6 @@ impl Board {
                 let driver = Icm42688::new(bus.clone(), Icm42688Config::default(), &mut NoDelay);
                 Line::Fifo(Box::new(driver.expect("a simulated part that is well")), bus)
             }
-            Part::Adis16465 => {
-                let bus = adis16465::Bus::default();
-                Line::Bursts(Adis16465::new(bus.clone(), adis16465::MODEL), bus)
-            }
             Part::Xsens | Part::Dsp1760 => Line::Mti(Box::default()),
         };
         Self {
@@ -127,7 +121,7 @@ impl Board {
     }
 
     /// Bytes of the sensor's line arrive.
-    pub fn receive(&mut self, bytes: &[u8], now: Micros) {
+    pub fn receive(&mut self, bytes: &[u8]) {
         let waiting = &mut self.waiting.0;
         match &mut self.line {
             Line::Mti(mti) => {
@@ -140,13 +134,6 @@ impl Board {
                 bus.fill(bytes.iter().copied());
                 let samples = std::iter::from_fn(|| driver.next_sample().transpose()).take(MAX_FETCHED);
                 waiting.extend(samples.map(Result::ok));
-            }
-            Line::Bursts(driver, bus) => {
-                // Bits that the part does not send read as ones.
-                let mut burst = [0xFF; BURST];
-                burst.iter_mut().zip(bytes).for_each(|(to, byte)| *to = *byte);
-                bus.answer(burst);
-                waiting.push_back(driver.read(now).ok());
             }
         }
     }

@@ -58,7 +58,7 @@ fn run(recording: &Recording, reference: &Reference) -> Option<Outcome> {
             let [a, b, c] = row.sample.angular_rate.map(|rate| rate.rad_per_sec());
             let [d, e, f] = row.sample.specific_force.map(|force| force.metre_per_sec2());
             let ticks = ((row.sample.time.0 - first) / 100) as u32;
-            board.receive(&mti(number, ticks, [a, b, c, d, e, f], 25.0, None), clock);
+            board.receive(&mti(number, ticks, [a, b, c, d, e, f], 25.0, None));
             if let Some(frame) = frames.as_mut().and_then(|frames| frames.next(row)) {
                 board.receive_frame(frame);
             }

@@ -130,7 +130,7 @@ impl Scene {
             let arrives = |message: &Message| message.at <= now + 1e-7;
             while let Some(message) = inertial.next_if(arrives) {
                 if runs {
-                    board.receive(&message.bytes, clock);
+                    board.receive(&message.bytes);
                 }
             }
             while let Some(message) = fibre_optic.next_if(arrives) {

@@ -1,10 +1,9 @@
 //! An inertial sensor on the vehicle: its errors, its clock, its faults, and the bytes that it sends.
 
-use super::parts::{Part, adis16465, icm42688};
+use super::parts::{Part, icm42688};
 use super::ride::Travelled;
 use super::vehicle::Vehicle;
 use gyronet::sample::{ImuSample, Validity};
-use gyronet::sensor::adis16465::DiagStat;
 use gyronet::sensor::dsp1760::message::{self as dsp1760, Extra};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use gyronet_tools::random::Random;
@@ -200,14 +199,6 @@ impl Sensor {
             temperature: Some(CentiCelsius((celsius * 100.0) as i16)),
             validity: Validity::Good,
         };
-        if self.part == Part::Adis16465 {
-            let mut burst = adis16465::burst(number as usize, &sample);
-            burst.temperature = (celsius * 10.0) as i16;
-            if without.is_some() {
-                burst.diagnosis = DiagStat::SELF_TEST;
-            }
-            return burst.emit().to_vec();
-        }
         let mut packet = icm42688::packet(&sample);
         match without {
             Some(axis @ 0..3) => packet.rate[axis] = None,

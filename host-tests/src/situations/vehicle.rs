@@ -58,10 +58,10 @@ pub const HATCH: Vehicle = Vehicle {
     ..CAR
 };
 
-/// A truck with an ADIS16465 whose diesel shakes the cab at idle, as on the recordings of truck.
+/// A truck with an ICM-42688-P whose diesel shakes the cab at idle, as on the recordings of truck.
 pub const TRUCK: Vehicle = Vehicle {
     name: "truck",
-    part: Part::Adis16465,
+    part: Part::Icm42688,
     engine: [9.0, 0.012, 0.35],
     road: [[1.2, 0.02, 0.3], [11.0, 0.02, 0.6]],
     noise: [4e-5, 4e-4],

@@ -11,11 +11,10 @@ use gyronet_tools::target::bench::{self, Counts};
 use gyronet_tools::target::size::ImageSize;
 
 /// The largest frame of each parser, and what it may hold beside it: clock, counters, settings.
-const PARSERS: [(&str, u64, u64); 4] = [
+const PARSERS: [(&str, u64, u64); 3] = [
     ("sensor/dsp1760_parser", 40, 100),
     ("sensor/mtdata2_parser", 259, 61),
     ("sensor/icm42688_packet_parser", 20, 40),
-    ("sensor/adis16465_burst_parser", 20, 0),
 ];
 
 struct Bar {

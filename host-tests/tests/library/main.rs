@@ -1,7 +1,6 @@
 //! Tests of the library alone: no file, no emulator and no tool is needed.
 
 mod activation;
-mod adis16465;
 mod align;
 mod align_faults;
 mod bias;

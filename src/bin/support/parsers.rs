@@ -5,7 +5,6 @@ use crate::meter::Meter;
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use gyronet::sensor::ByteSource;
-use gyronet::sensor::adis16465::{Burst, DiagStat, Model};
 use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::icm42688::packet::Packet;
@@ -16,11 +15,10 @@ use gyronet::units::Micros;
 pub fn run(meter: &mut Meter) {
     dsp1760(meter);
     mtdata2(meter);
-    bursts(meter);
+    packet(meter);
     hprintln!("sensor/dsp1760_parser bytes={}", size_of::<Dsp1760>());
     hprintln!("sensor/mtdata2_parser bytes={}", size_of::<Mti>());
     hprintln!("sensor/icm42688_packet_parser bytes={}", size_of::<Packet>());
-    hprintln!("sensor/adis16465_burst_parser bytes={}", size_of::<Burst>());
 }
 
 /// Measures the second of two frames through a parser.
@@ -78,8 +76,8 @@ fn mtdata2(meter: &mut Meter) {
     stream(meter, "sensor/mtdata2_f64_frame", &mut Mti::new(), double.each_ref().map(|frame| &frame[..]));
 }
 
-/// Measures the parsers of the bytes of an SPI transfer.
-fn bursts(meter: &mut Meter) {
+/// Measures the parser of the bytes of an SPI transfer.
+fn packet(meter: &mut Meter) {
     let packet = Packet {
         acceleration: [12, -4, 32_768].map(Some),
         rate: [6, -2, 2_620].map(Some),
@@ -92,17 +90,4 @@ fn bursts(meter: &mut Meter) {
         black_box(packet.ok().and_then(|packet| packet.sample(Micros(1_000))));
     });
     hprintln!("sensor/icm42688_packet bytes={}", bytes.len());
-    let burst = Burst {
-        diagnosis: DiagStat(0),
-        rate: [0, -3, 400],
-        acceleration: [12, -40, 4_000],
-        temperature: 253,
-        counter: 0x1234,
-    };
-    let bytes = burst.emit();
-    meter.run("sensor/adis16465_burst", || {
-        let burst = Burst::parse(black_box(&bytes));
-        black_box(burst.and_then(|burst| burst.sample(Model::Adis16465_2, Micros(5)))).ok();
-    });
-    hprintln!("sensor/adis16465_burst bytes={}", bytes.len());
 }
