@@ -17,7 +17,6 @@ mod paint;
 mod progress;
 pub mod quantize;
 pub mod reference;
-#[cfg(feature = "mcap")]
 pub mod replay;
 pub mod retired;
 pub mod sign;

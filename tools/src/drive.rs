@@ -1,14 +1,12 @@
 //! Recorded drives. [`stream`] reads a drive row by row, [`recording`] keeps one in memory, [`vehicle`] reads the
 //! vehicle file beside it, and [`wheel_frames`] turns wheel speeds into CAN frames. [`replay`] runs the drive through
-//! the board. [`track`] is its path. [`candump`] writes the frames that were sent, [`foxglove`] all for Foxglove, [`export`]
-//! tables and paths.
+//! the board. [`track`] is its path. [`candump`] writes the frames that were sent, [`export`] tables and
+//! paths.
 
 pub mod candump;
 pub mod error;
 pub mod export;
 pub(crate) mod foreign;
-#[cfg(feature = "mcap")]
-pub mod foxglove;
 pub mod recording;
 pub mod replay;
 pub mod stream;

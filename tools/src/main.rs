@@ -52,7 +52,6 @@ enum Command {
     Demo(commands::demo::Args),
     Evaluate(commands::evaluate::Args),
     Calibrate(commands::calibrate::Args),
-    #[cfg(feature = "mcap")]
     Replay(commands::replay::Args),
     Simulate(commands::simulate::Args),
     Import(commands::import::Args),
@@ -83,7 +82,6 @@ fn main() -> ExitCode {
         Command::Demo(args) => commands::demo::run(args, common),
         Command::Evaluate(args) => commands::evaluate::run(args, common),
         Command::Calibrate(args) => commands::calibrate::run(args, common),
-        #[cfg(feature = "mcap")]
         Command::Replay(args) => commands::replay::run(args, common),
         Command::Keys(args) => commands::keys::run(args, common),
         Command::Sign(args) => commands::sign::run(args, common),

@@ -17,7 +17,6 @@ mod python_seconds;
 mod python_units;
 mod python_wheels;
 mod recordings_bad_input;
-mod replay_mcap;
 mod standstill;
 mod standstill_detectors;
 mod standstill_truth;

@@ -7,8 +7,8 @@ use gyronet::health::{Counters, Status};
 use gyronet::model::GyroNet;
 use gyronet_tools::board::{Board, Step};
 use gyronet_tools::drive::candump::Log;
+use gyronet_tools::drive::export;
 use gyronet_tools::drive::replay::{Steps, initialise};
-use gyronet_tools::drive::{export, foxglove};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -19,14 +19,13 @@ use std::path::{Path, PathBuf};
 /// The command runs the drive through the pipeline that is flashed. The log has the format of `candump -L`;
 /// can-utils' canplayer and python-can can play it. All files are in time of day if the vehicle file has the start of
 /// the recording (`gyronet import` writes it), else in the recording's time. It is written to standard output, unless
-/// --out names a file or --mcap, --csv or --tum is given. The summary is written to standard error; with --json it is
+/// --out names a file or --csv or --tum is given. The summary is written to standard error; with --json it is
 /// written to standard output if the log is not.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet replay drive.csv --out can.log
   gyronet replay drive.csv | head
-  gyronet replay drive.csv --out can.log --mcap drive.mcap    # and drive.layout.json, for Foxglove
   gyronet replay drive.csv --out can.log --csv rates.csv --tum path.tum")]
 pub struct Args {
     /// Recorded drive.
@@ -35,9 +34,6 @@ pub struct Args {
     /// Write the log to this file [default: standard output].
     #[arg(long, value_name = "FILE.log")]
     out: Option<PathBuf>,
-    /// Write inputs, rates, heading, states and frames to this file for Foxglove, and a layout beside it.
-    #[arg(long, value_name = "FILE.mcap")]
-    mcap: Option<PathBuf>,
     /// Write the rates, the yaw and its expected error to this table, one line per sample.
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
@@ -68,7 +64,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         args.unit.drive(&args.file, common).map_err(|error| -> Box<dyn std::error::Error> { error })?;
     // A drive that cannot be replayed leaves no file behind.
     initialise(&drive)?;
-    let writes_elsewhere = [&args.mcap, &args.csv, &args.tum].into_iter().any(Option::is_some);
+    let writes_elsewhere = [&args.csv, &args.tum].into_iter().any(Option::is_some);
     let log: Box<dyn Write> = match &args.out {
         Some(path) => Box::new(BufWriter::new(File::create(path).map_err(WriteError::to(path))?)),
         None if writes_elsewhere => Box::new(io::sink()),
@@ -81,8 +77,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
     };
     let mut log = Log::new(log);
-    let open = |path: &Option<PathBuf>| path.clone();
-    let mut table = open(&args.csv).map(|path| Output::new(&path, export::Table::new)).transpose()?;
+    let mut table = args.csv.as_deref().map(|path| Output::new(path, export::Table::new)).transpose()?;
     let mut tum = match &args.tum {
         None => None,
         Some(path) => {
@@ -92,9 +87,6 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             Some(Output::new(path, |file| Ok(export::Tum::new(speeds, file)))?)
         }
     };
-    let mut mcap = open(&args.mcap)
-        .map(|path| Output::new(&path, |file| foxglove::Recorder::new(file).map_err(io::Error::other)))
-        .transpose()?;
 
     let start_us = drive.vehicle.recording.start.map_or(0, |start| (1e6 * start).round() as u64);
     let mut statuses = BTreeMap::from(STATUSES.map(|status| (status_name(status), 0u64)));
@@ -115,9 +107,6 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         if let Some(tum) = &mut tum {
             tum.write(|tum| tum.step(&step))?;
         }
-        if let Some(mcap) = &mut mcap {
-            mcap.write(|mcap| mcap.step(&step).map_err(io::Error::other))?;
-        }
         statuses.entry(status_name(step.vehicle.live.status)).and_modify(|count| *count += 1);
     }
     bar.finish_and_clear();
@@ -127,11 +116,6 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     if let Some(tum) = &mut tum {
         tum.write(export::Tum::finish)?;
-    }
-    if let Some(mut mcap) = mcap {
-        mcap.write(|mcap| mcap.finish().map_err(io::Error::other))?;
-        let layout = mcap.1.with_extension("layout.json");
-        std::fs::write(&layout, foxglove::LAYOUT).map_err(WriteError::to(&layout))?;
     }
     let coprocessor = steps.board().coprocessor();
     let events = events(coprocessor.pipeline().counters(), coprocessor.input_counters().out_of_range);
