@@ -101,7 +101,6 @@ pub struct OutOfRange {
 /// The rule that chooses the estimate of a sample from the windows that cover it.
 ///
 /// The newest output of a window depends only on the past and is the worst; those in the middle depend on both sides.
-/// `cargo gyronet evaluate --ablation` compares the modes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

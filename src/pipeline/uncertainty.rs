@@ -49,7 +49,7 @@ pub struct GyroErrors {
 }
 
 impl UncertaintyConfig {
-    /// The first two factors were calibrated on the validation drive alone (`cargo gyronet evaluate --ablation`). Gain and
+    /// The first two factors were calibrated on the validation drive alone (`cargo gyronet evaluate`: seconds inside one sigma). Gain and
     /// mounting are those of parts for which a data sheet states 0.5 % at most, mounted by eye; a calibration refuses
     /// what it does not know to 0.5 % and 0.02.
     pub const DEFAULT: Self = Self {

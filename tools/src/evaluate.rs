@@ -1,8 +1,7 @@
 //! These modules compare methods of computing a yaw rate. [`rates`] runs each of the [`methods`] on a drive with a
 //! reference, [`heading_error`] and [`trajectory_error`] compute the errors, [`cost`] the multiplications and the
-//! delay, and [`report`] writes the tables. [`ablation`] switches off parts of the compensation.
+//! delay, and [`report`] writes the tables. [`variant`] compares configurations of the board.
 
-pub mod ablation;
 pub mod cost;
 pub mod ekf;
 pub mod expected_error;
@@ -18,4 +17,5 @@ pub mod rates;
 pub mod report;
 mod rest;
 pub mod trajectory_error;
+pub mod variant;
 pub mod vqf;

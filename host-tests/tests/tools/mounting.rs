@@ -59,9 +59,8 @@ fn apart(a: &[f64], b: &[f64]) -> (f64, f64) {
     ((squares / a.len() as f64).sqrt(), largest)
 }
 
-/// `noise`: RMS error of the level drive's rate (0.0014 rad/s against the reference on trial 08:
-/// `cargo gyronet evaluate --ablation`); `street`: angle that the slope of the parking
-/// place may cost, for levelling takes it for mounting.
+/// `noise`: RMS error of the level drive's rate (0.0014 rad/s against the reference on trial 08); `street`: angle that
+/// the slope of the parking place may cost, for levelling takes it for mounting.
 fn check(recording: &Recording, noise: f64, street: f64) {
     let tilted = turned(recording);
     let level = yaw_rates(recording, Rotation::IDENTITY, true);

@@ -9,7 +9,7 @@ use gyronet::store::{Calibration, Configuration, Learned};
 use gyronet_host_tests::parallel;
 use gyronet_host_tests::synthetic::judged;
 use gyronet_tools::drive::recording::{Recording, WHEEL_STANDS};
-use gyronet_tools::evaluate::ablation::{self, Variant};
+use gyronet_tools::evaluate::variant::{self, Variant};
 use gyronet_tools::simulate::warming::{self, Trip};
 use gyronet_tools::simulate::{Config, csv};
 
@@ -58,13 +58,13 @@ fn errors(device: u64) -> [f64; 2] {
     for day in 0..DAYS {
         learn(&simulate(device, Trip::Town, day, TOWN_S), &mut learned);
     }
-    let variant = |config, network| Variant { name: String::new(), config, network, wheels: true };
+    let with = |config, network| Variant { name: String::new(), config, network };
     let variants = [
-        variant(PipelineConfig::DEFAULT, false),
-        variant(Configuration::DEFAULT.pipeline(&Calibration::NONE, &learned, 0), true),
+        with(PipelineConfig::DEFAULT, false),
+        with(Configuration::DEFAULT.pipeline(&Calibration::NONE, &learned, 0), true),
     ];
     let motorway = simulate(device, Trip::Motorway, DAYS, MOTORWAY_S);
-    let scores = ablation::run(&(&motorway).into(), &mut network, &variants, || {}).expect("a start at rest");
+    let scores = variant::run(&(&motorway).into(), &mut network, &variants, || {}).expect("a start at rest");
     [0, 1].map(|k: usize| scores[k].error.final_rad.to_degrees())
 }
 

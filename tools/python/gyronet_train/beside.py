@@ -33,7 +33,7 @@ BATCH = 512
 LR = 0.004
 LIKELIHOOD_WEIGHT = 0.1
 # Factor on the trained scale. With it 0.71 of the seconds of the training drives are within one sigma as the board
-# sends it, without it 0.78 (`gyronet evaluate --ablation`).
+# sends it, without it 0.78 (`gyronet evaluate`).
 STATED = 0.8
 
 

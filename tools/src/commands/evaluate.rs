@@ -4,11 +4,11 @@ use super::{Common, drives, paint, print_json, progress, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::stream::Drive;
-use gyronet_tools::evaluate::ablation::{self, Floor, Score, Variant};
 use gyronet_tools::evaluate::outage::{self, Outage};
 use gyronet_tools::evaluate::outage_chart;
 use gyronet_tools::evaluate::outage_table::Outages;
 use gyronet_tools::evaluate::report::Report;
+use gyronet_tools::evaluate::variant::{self, Score};
 use gyronet_tools::network::checkpoint::Checkpoint;
 use indicatif::ProgressBar;
 use std::error::Error;
@@ -39,16 +39,11 @@ Examples:
   gyronet evaluate */*.csv --json               # all drives, and the mean of each folder
   gyronet evaluate drive.csv --weights mine.blob --json
   gyronet evaluate drive.csv --outage 30,60,120 # the heading after a loss of GNSS
-  gyronet evaluate */*.csv --outage 60 --pictures tunnel
-  gyronet evaluate drive.csv --ablation         # what each part contributes")]
+  gyronet evaluate */*.csv --outage 60 --pictures tunnel")]
 pub struct Args {
     /// Recorded drives with ref_gyr_z or ref_yaw.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Compare configurations: print the error without each part of the compensation, and the reference's own error at
-    /// standstill.
-    #[arg(long, conflicts_with = "lags")]
-    ablation: bool,
     /// Print the error of the delayed rate at every lag from 0 to 110 ms (the board's default is 70).
     #[arg(long)]
     lags: bool,
@@ -56,13 +51,13 @@ pub struct Args {
     /// and after 20 s. The drives have `course` and `gnss_speed`, or `gnss_lat` and `gnss_lon`, besides a reference; they
     /// may begin in motion.
     #[arg(long, value_name = "SECONDS", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=3600))]
-    #[arg(conflicts_with_all = ["ablation", "lags", "all"])]
+    #[arg(conflicts_with_all = ["lags", "all"])]
     outage: Vec<u16>,
     /// With --outage, write pictures of the median and of the worst outage into this folder: median.svg, worst.svg.
     #[arg(long, value_name = "FOLDER", requires = "outage")]
     pictures: Option<PathBuf>,
     /// Add rows for the paper's GyroNet, in f32 and in integers; they take twenty times as long as all others together.
-    #[arg(long, conflicts_with_all = ["ablation", "lags"])]
+    #[arg(long, conflicts_with = "lags")]
     all: bool,
     /// Checkpoint of the f32 network (safetensors) [default: the one that comes with the tools].
     #[arg(long, value_name = "FILE", requires = "all")]
@@ -72,11 +67,8 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, common: Common) -> super::Result {
-    if args.ablation {
-        return compare(args, common, &ablation::parts());
-    }
     if args.lags {
-        return compare(args, common, &ablation::lags());
+        return lags(args, common);
     }
     if !args.outage.is_empty() {
         return outages(args, common);
@@ -170,41 +162,33 @@ fn pictures<'a>(
 struct Scored {
     name: String,
     scores: Vec<Score>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    reference_at_standstill: Option<Floor>,
 }
 
-fn compare(args: &Args, common: Common, variants: &[Variant]) -> super::Result {
+fn lags(args: &Args, common: Common) -> super::Result {
+    let variants = variant::lags();
     let weights = args.unit.sent.open()?;
     let mut network = GyroNet::new(weights.blob()?);
     let mut drives = Vec::new();
     for file in &args.files {
         let drive = args.unit.drive(file, common).map_err(|error| -> Box<dyn Error> { error })?;
         let bar = progress::bar(common, variants.len() * drive.facts.rows, drive.name());
-        let scores = ablation::run(&drive, &mut network, variants, || bar.inc(1));
+        let scores = variant::run(&drive, &mut network, &variants, || bar.inc(1));
         bar.finish_and_clear();
         let scores = scores?;
         if scores.is_empty() {
             return Err(format!("{}: no reference yaw rate, which evaluation needs", drive.path).into());
         }
-        let (name, reference_at_standstill) = (drive.name().to_owned(), ablation::floor(&drive)?);
-        drives.push(Scored { name, scores, reference_at_standstill });
+        drives.push(Scored { name: drive.name().to_owned(), scores });
     }
     let scores: Vec<Vec<Score>> = drives.iter().map(|drive| drive.scores.clone()).collect();
-    let mean = ablation::mean(&scores).filter(|_| drives.len() > 1);
+    let mean = variant::mean(&scores).filter(|_| drives.len() > 1);
     let mut out = std::io::stdout().lock();
     if common.json {
         return print_json(&mut out, &serde_json::json!({ "drives": drives, "mean": mean }));
     }
-    for Scored { name, scores, reference_at_standstill } in &drives {
+    for Scored { name, scores } in &drives {
         writeln!(out, "{name}")?;
         print(&mut out, scores)?;
-        if let Some(Floor { seconds, mean_1s_rad, bias_rad_per_s }) = reference_at_standstill {
-            writeln!(
-                out,
-                "  reference at standstill: {mean_1s_rad:.6} rad in 1 s over {seconds} s, mean {bias_rad_per_s:+.6} rad/s"
-            )?;
-        }
         writeln!(out)?;
     }
     if let Some(mean) = mean {

@@ -3,7 +3,7 @@
 use clap::error::{ContextKind, ContextValue};
 
 const SITUATIONS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin situations`";
-const RETIRED: [(&str, &str); 13] = [
+const RETIRED: [(&str, &str); 14] = [
     ("campaign", SITUATIONS),
     ("soak", SITUATIONS),
     ("paper", "`make -f tools/paper/Makefile`"),
@@ -17,6 +17,7 @@ const RETIRED: [(&str, &str); 13] = [
     ("--policies", "`cargo bringup`, which counts cycles on a board,"),
     ("--csv", "`gyronet monitor --json`, or can-utils' candump with tools/gyronet.dbc,"),
     ("--weights", "`gyronet evaluate --weights`"),
+    ("--ablation", "`gyronet evaluate` (its rows), with `gyronet doctor` (the reference's own error),"),
     ("--mcap", "`gyronet correct`, or `gyronet replay --csv` for a plot,"),
     ("--layout", "`cargo paper simulate`"),
     ("--set", "`cargo paper simulate`"),

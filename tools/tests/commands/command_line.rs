@@ -52,7 +52,7 @@ fn wrong_arguments_are_status_2_and_failures_1() {
         &["replay", "a.csv", "--via", "icm42688"],
         &["simulate", "--out", "a.csv", "--seconds", "1"],
         &["device", "info"],
-        &["evaluate", "a.csv", "--lags", "--ablation"],
+        &["evaluate", "a.csv", "--lags", "--all"],
     ] {
         let output = gyronet(wrong);
         assert_eq!(output.status.code(), Some(2), "{wrong:?}: {}", text(&output.stderr));
@@ -155,6 +155,7 @@ fn retired_names_say_what_does_their_work() {
         (&["doctor", "drive.csv", "--weights", "mine.blob"], "gyronet evaluate --weights"),
         (&["simulate", "--layout", "kaist", "--out", "OUT"], "cargo paper simulate"),
         (&["import", "urban06", "--training", "--out", "a.csv"], "cargo paper import"),
+        (&["evaluate", "drive.csv", "--ablation"], "gyronet evaluate"),
         (&["replay", "drive.csv", "--mcap", "drive.mcap"], "gyronet correct"),
         (&["import", "kaist", "urban06"], "cargo paper import urban06"),
     ] {
