@@ -51,39 +51,21 @@ const PERIODS: usize = 8;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum AlignError {
-    /// The time stamp is the last one's.
     #[error("duplicate sample at {} us", .at.0)]
-    Duplicate {
-        /// The time stamp, microseconds.
-        at: Micros,
-    },
-    /// The time stamp is before the last one.
+    Duplicate { at: Micros },
     #[error("time goes backwards, from {} to {} us", .last.0, .at.0)]
-    Backwards {
-        last: Micros,
-        /// The time stamp of the refused sample.
-        at: Micros,
-    },
+    Backwards { last: Micros, at: Micros },
     /// The sample completes no step ([`crate::pipeline::Pipeline::correct`] alone).
     #[error("the sample at {} us completes no step of 10 ms", .at.0)]
-    Open {
-        /// The time stamp.
-        at: Micros,
-    },
+    Open { at: Micros },
     /// The sensor's usual period is outside [`PERIODS_US`].
     #[error("a sample every {period_us} us: 50 to 1000 a second are used")]
-    Rate {
-        /// The usual period, microseconds.
-        period_us: u64,
-    },
+    Rate { period_us: u64 },
     /// The time stamp is more than [`MAX_GAP`] steps from the last one, either way.
     #[error("time jumps from {} to {} us, more than 1 s", .last.0, .at.0)]
-    Jump {
-        last: Micros,
-        /// The time stamp of the refused sample.
-        at: Micros,
-    },
+    Jump { last: Micros, at: Micros },
 }
 
 /// The part of a sample's time that no step has taken yet.

@@ -64,18 +64,15 @@ pub enum FogNetUse {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum GyroMismatch {
-    /// The weights were trained for another gyro.
     #[error("trained for a {trained}, the configuration has a {part} number {serial}")]
     Other {
-        /// The gyro and the drives that the weights were trained on.
         trained: Training,
-        /// The part that is configured.
         part: Gyro,
         /// Serial number of the configured gyro, 0 where none is configured.
         serial: u32,
     },
-    /// The weights were trained on simulated drives, which the configuration does not allow.
     #[error("trained on a {0}, which runs only where the configuration says Simulated")]
     Simulated(Training),
 }

@@ -39,29 +39,16 @@ pub struct Heading {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum HeadingError {
-    /// The frame has too few bytes.
     #[error("heading frame of {0} bytes is too short")]
     Short(usize),
-    /// The course is not from true north.
     #[error("the course is not from true north: reference {0}")]
     Reference(u8),
-    /// A value is larger than it can be.
     #[error("heading: {what} = {value} is out of range")]
-    Range {
-        /// The quantity.
-        what: &'static str,
-        /// Its value.
-        value: f32,
-    },
-    /// The latitude is further from the one in use than the vehicle can have driven.
+    Range { what: &'static str, value: f32 },
     #[error("latitude jumps from {from} to {to}")]
-    Jump {
-        /// The latitude in use.
-        from: f32,
-        /// The latitude that was received.
-        to: f32,
-    },
+    Jump { from: f32, to: f32 },
 }
 
 impl Heading {

@@ -33,20 +33,12 @@ pub const JITTER_US: u64 = 2_000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum ClockError {
-    /// The time stamp equals the last one.
     #[error("two samples carry the time stamp {} us", .at.0)]
-    Duplicate {
-        /// The time stamp.
-        at: Micros,
-    },
-    /// The time stamp is before the last one.
+    Duplicate { at: Micros },
     #[error("a sample of {} us arrived after one of {} us", .at.0, .last.0)]
-    OutOfOrder {
-        last: Micros,
-        /// The refused time stamp.
-        at: Micros,
-    },
+    OutOfOrder { last: Micros, at: Micros },
 }
 
 /// Event counters. They saturate.

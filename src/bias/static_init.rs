@@ -45,54 +45,25 @@ impl StaticConfig {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum StaticError {
-    /// The spread of a gyro axis is too large, rad/s.
     #[error("the vehicle moves during static initialisation: gyro {} has a spread of {std:.4} rad/s", name(*.axis))]
-    GyroNoise {
-        /// The axis.
-        axis: u8,
-        /// Standard deviation of the axis.
-        std: f32,
-    },
-    /// The spread of an accelerometer axis is too large, m/s^2.
+    GyroNoise { axis: u8, std: f32 },
     #[error(
         "the vehicle moves during static initialisation: accelerometer {} has a spread of {std:.3} m/s^2",
         name(*.axis)
     )]
-    AccelNoise {
-        /// The axis.
-        axis: u8,
-        /// Standard deviation of the axis.
-        std: f32,
-    },
-    /// The gyro's mean changed from one second to another, rad/s.
+    AccelNoise { axis: u8, std: f32 },
     #[error("the vehicle moves during static initialisation: gyro {} changes its mean by {spread:.4} rad/s", name(*.axis))]
-    GyroDrift {
-        /// The axis.
-        axis: u8,
-        /// Largest less smallest one-second mean.
-        spread: f32,
-    },
-    /// The accelerometer's mean changed from one second to another, m/s^2.
+    GyroDrift { axis: u8, spread: f32 },
     #[error(
         "the vehicle moves during static initialisation: accelerometer {} changes its mean by {spread:.3} m/s^2",
         name(*.axis)
     )]
-    AccelDrift {
-        /// The axis.
-        axis: u8,
-        /// Largest less smallest one-second mean.
-        spread: f32,
-    },
+    AccelDrift { axis: u8, spread: f32 },
     /// The mean is larger than any bias: a steady turn, rad/s.
     #[error("the vehicle moves during static initialisation: gyro {} shows a steady {mean:.4} rad/s", name(*.axis))]
-    GyroBias {
-        /// The axis.
-        axis: u8,
-        /// Mean of the axis.
-        mean: f32,
-    },
-    /// The wheels turn.
+    GyroBias { axis: u8, mean: f32 },
     #[error("the vehicle moves during static initialisation: the wheels turn")]
     Wheels,
     /// The accelerometer shows no vertical.

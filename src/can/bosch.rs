@@ -62,16 +62,14 @@ impl SignalStatus {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum MessageError {
-    /// The frame does not have eight bytes.
     #[error("a Bosch message has {0} bytes instead of 8")]
     Length(usize),
-    /// The checksum is wrong.
     #[error("the checksum of a Bosch message is {received:02x}, should be {computed:02x}")]
     Crc {
         /// The checksum of bytes 0 to 6.
         computed: u8,
-        /// Byte 7.
         received: u8,
     },
 }

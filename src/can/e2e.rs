@@ -32,25 +32,15 @@ pub use sequence::{Sequence, Verdict};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum Fault {
-    /// The data are shorter than the header, or longer than the profile allows.
     #[error("E2E: {0} bytes do not fit the profile")]
     Length(usize),
     /// The CRC is wrong: the data are corrupt, or belong to another identifier.
     #[error("E2E: CRC is {received:x}, should be {computed:x}")]
-    Crc {
-        /// The CRC of the received data.
-        computed: u16,
-        /// The value as received.
-        received: u16,
-    },
-    /// The transmitted part of the identifier belongs to another message.
+    Crc { computed: u16, received: u16 },
     #[error("E2E: identifier nibble {received:x} belongs to another message")]
-    DataId {
-        /// The value as received.
-        received: u8,
-    },
-    /// The counter value is outside the profile's range.
+    DataId { received: u8 },
     #[error("E2E: counter {0} is out of range")]
     Counter(u8),
 }

@@ -72,20 +72,14 @@ fn hex(byte: u8) -> [u8; 2] {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum SlcanError {
-    /// The first letter is not `t` or `T`.
     #[error("not a data frame line")]
     Kind,
-    /// A character is not a hexadecimal digit.
     #[error("not a hexadecimal digit at column {at}")]
-    Digit {
-        /// Index of the character in the line.
-        at: usize,
-    },
-    /// The line is shorter or longer than its length digit says.
+    Digit { at: usize },
     #[error("line length does not match the frame")]
     Length,
-    /// The identifier is too large for its kind.
     #[error("identifier out of range")]
     Identifier,
 }

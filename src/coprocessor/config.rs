@@ -82,26 +82,19 @@ impl Default for Config {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum InputError {
     /// `now` is before the newest time; later times continue from the newest time.
     #[error("the clock went back by {} us", .by.0)]
-    ClockWentBack {
-        /// The time by which the clock went back.
-        by: Duration,
-    },
-    /// The time stamp of an inertial sample has no place on the grid.
+    ClockWentBack { by: Duration },
     #[error("inertial sensor: {0}")]
     Imu(#[source] AlignError),
-    /// The time stamp of a fibre-optic gyro's sample is a duplicate or out of order.
     #[error("fibre-optic gyro: {0}")]
     Fog(#[source] ClockError),
-    /// A wheel frame is corrupt or marks a speed as invalid.
     #[error("wheel speeds: {0}")]
     Wheels(#[source] WheelError),
-    /// A course, speed over ground or latitude is no vehicle's, or the latitude is too far from the one in use.
     #[error("{0}")]
     Heading(#[source] HeadingError),
-    /// No window waits for this estimate.
     #[error("no window waits for estimate {end}")]
     NoWindow {
         /// The sample that the window ended with, or the number of FoGNet's window.

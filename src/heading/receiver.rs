@@ -46,14 +46,12 @@ pub struct HeadingSettings {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum HeadingConfigError {
-    /// One of the board's own messages has the identifier, or diagnosis.
     #[error("frame {0:x} is one of our own messages, or of diagnosis")]
     Own(u32),
-    /// Factor or offset cannot be those of the value.
     #[error("frame {0:x}: factor or offset is not plausible")]
     Scale(u32),
-    /// A course without a speed.
     #[error("a course needs a speed")]
     NoSpeed,
 }

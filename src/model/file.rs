@@ -54,19 +54,13 @@ pub type Topology = [u16; 6];
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum BlobError {
     /// The file does not begin with [`MAGIC`].
     #[error("weight file: it begins with {0:02x?}, should be {MAGIC:02x?}")]
     Magic([u8; 4]),
-    /// The file has a format version that this code does not read.
     #[error("weight file: format version {found}, should be {expected}")]
-    Version {
-        /// The version in the file.
-        found: u16,
-        /// The version that this code reads of that network.
-        expected: u16,
-    },
-    /// The file holds another network, or one of another shape.
+    Version { found: u16, expected: u16 },
     #[error(
         "weight file: network {} with window {}, {} inputs, {} units, {} layers, {} linear outputs is not \
          {} ({}: {}, {}, {}, {}, {}{})",
@@ -74,63 +68,34 @@ pub enum BlobError {
         .expected[0], .expected[1], .expected[2], .expected[3], .expected[4], .expected[5], smaller(.expected)
     )]
     Topology {
-        /// The shape in the file.
         found: Topology,
         /// The expected shape; for GyroNet, the largest one.
         expected: Topology,
     },
-    /// The file is shorter or longer than its header and shape say.
     #[error("weight file: {found} bytes, should be {expected}")]
-    Length {
-        /// Expected length, bytes.
-        expected: usize,
-        /// Actual length, bytes.
-        found: usize,
-    },
-    /// The bytes do not begin on a 4-byte boundary.
+    Length { expected: usize, found: usize },
     #[error("weight file: not on a 4-byte boundary")]
     Misaligned,
-    /// The checksum does not match the content.
     #[error("weight file: checksum is {computed:08x}, the file has {stored:08x}")]
-    Crc {
-        /// The checksum computed over the content.
-        computed: u32,
-        /// The checksum stored at the end.
-        stored: u32,
-    },
-    /// The provenance is not UTF-8.
+    Crc { computed: u32, stored: u32 },
     #[error("weight file: provenance is not UTF-8")]
     Provenance,
-    /// The input clamp is not within 1 to 32767, or an output could overflow.
     #[error("weight file: input clamp or output scale out of range")]
     Scale,
-    /// A gate row could overflow its accumulator.
     #[error("weight file: layer {layer}, direction {direction}, unit {unit} could overflow its accumulator")]
     RowBound {
         /// Layer, 0 or 1; FoGNet's LSTM2 has layers 2 and 3.
         layer: u8,
         /// Direction, 0 forward, 1 backward.
         direction: u8,
-        /// Index of the unit.
         unit: u16,
     },
-    /// The gyro that the network was trained for has an unknown number.
     #[error("weight file: trained for gyro {0}, which is not supported")]
     Gyro(u16),
-    /// A row of the linear part could overflow its accumulator.
     #[error("weight file: output {output} of the linear part could overflow its accumulator")]
-    LinearBound {
-        /// Index of the output.
-        output: u16,
-    },
-    /// The network is larger than the memory that the caller provides.
+    LinearBound { output: u16 },
     #[error("weight file: {found} units a direction, memory holds {largest}")]
-    Units {
-        /// Units in the file.
-        found: u16,
-        /// The most units that there is memory for.
-        largest: u16,
-    },
+    Units { found: u16, largest: u16 },
 }
 
 fn network_name([network, ..]: &Topology) -> &'static str {

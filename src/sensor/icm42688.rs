@@ -31,30 +31,17 @@ const START_MS: u32 = 45;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum Icm42688Error<E> {
-    /// The bus failed.
     #[error("ICM-42688: the bus failed: {0:?}")]
     Bus(E),
-    /// The sensor did not complete its reset.
     #[error("ICM-42688: no answer after the reset")]
     Reset,
-    /// Another device answers, or none.
     #[error("ICM-42688: identity is {got:02x}, should be {:02x}", reg::IDENTITY)]
-    Identity {
-        /// Identity that was read.
-        got: u8,
-    },
+    Identity { got: u8 },
     /// A register does not hold the value that was written: configure the sensor again.
     #[error("ICM-42688: register {:02x} of bank {} holds {got:02x}, not {expected:02x}", .register.address, .register.bank)]
-    Setting {
-        /// Register that was read.
-        register: Register,
-        /// Bits that the register holds.
-        got: u8,
-        /// Bits that were written.
-        expected: u8,
-    },
-    /// An axis of the packet has no reading.
+    Setting { register: Register, got: u8, expected: u8 },
     #[error("ICM-42688: an axis of the packet has no reading")]
     NoReading,
     /// The bytes from the FIFO are not a packet; the FIFO was emptied.

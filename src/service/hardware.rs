@@ -25,14 +25,12 @@ pub enum ClockFault {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum CanFault {
-    /// The clock is not accurate enough.
     #[error("the clock is not exact enough")]
     Clock,
-    /// The controller did not leave its sleep mode.
     #[error("the controller does not wake up")]
     Sleeping,
-    /// The controller did not enter initialisation mode.
     #[error("the controller does not enter initialisation mode")]
     NotInitialising,
 }

@@ -15,58 +15,35 @@ pub const BLOCK: usize = 256;
 /// The reason why a request is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum Refusal {
-    /// The layout version of the configuration is not that of this firmware.
     #[error("configuration layout {found}, but the board has {expected}")]
-    Version {
-        /// Version in the request.
-        found: u8,
-        /// Version of this firmware.
-        expected: u8,
-    },
+    Version { found: u8, expected: u8 },
     /// The store has failed, or a value is out of range.
     #[error(transparent)]
     Store(StoreError),
     /// The weight file or its place was refused.
     #[error(transparent)]
     Slot(SlotError),
-    /// There is no calibration result to store.
     #[error("there is no calibration result to store")]
     NothingFound,
-    /// The gain and misalignment were determined with weights other than those that the board runs.
     #[error("calibrated with weights {found:08x}, but the board runs {runs:08x}")]
-    OtherWeights {
-        /// Checksum of the weights in the request.
-        found: u32,
-        /// Checksum of the board's weights.
-        runs: u32,
-    },
-    /// The board has a key, and this session has not proven that it has the private key.
+    OtherWeights { found: u32, runs: u32 },
     #[error("the board has a key, and this session has no access: give its private part with --key")]
     Locked,
-    /// The data have no signature, and the board has a key.
     #[error("the board has a key, and the data are not signed: give --key or --signature")]
     Unsigned,
-    /// The answer to a challenge does not match the board's key.
     #[error("the answer to the challenge does not match the board's key: this is the key of another board")]
     Answer,
-    /// The signature does not match the board's key, or is for another identifier, content or board.
     #[error("the signature does not match the board's key, or this content, identifier and board")]
     Signature,
-    /// The signature, or a newer one, has already been used.
     #[error("the signature's counter is {found}, but {newest} was already accepted: sign with a greater one")]
-    Counter {
-        /// Counter of the signature.
-        found: u32,
-        /// Newest counter that was accepted.
-        newest: u32,
-    },
+    Counter { found: u32, newest: u32 },
     /// A single setting was written; only the whole configuration can be.
     #[error(
         "single settings (data 0201 to 021E) were retired: write the configuration, data 0100, as `gyronet device set` does"
     )]
     SingleSetting,
-    /// A file of FoGNet was offered, which this board does not run.
     #[error("FoGNet no longer runs on this board: address 0 takes GyroNet's weights")]
     FogNet,
     /// The vehicle is not proven to stand: writing the flash would interrupt the output.

@@ -91,43 +91,22 @@ impl Field {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum FieldError {
-    /// A value is not a number or outside its range.
     #[error("{}: {value} is not within {low} to {high}", .field.name())]
-    Range {
-        /// Field that is out of range.
-        field: Field,
-        /// Value of the field.
-        value: f32,
-        /// Smallest valid value.
-        low: f32,
-        /// Largest valid value.
-        high: f32,
-    },
-    /// The values are not plausible for any sensor.
+    Range { field: Field, value: f32, low: f32, high: f32 },
     #[error("{}: not plausible for any sensor", .0.name())]
     Implausible(Field),
-    /// The configuration of the bus messages is invalid.
     #[error("can: {0}")]
     Can(ConfigError),
-    /// The configuration of the frames with course and latitude is invalid.
     #[error("heading: {0}")]
     Heading(HeadingConfigError),
-    /// The configuration of the wheel frames is invalid.
     #[error("wheels: {0}")]
     Wheels(WheelConfigError),
-    /// This firmware image does not support the sensor.
     #[error("sensor: this firmware image does not drive the part")]
     PartNotInImage,
-    /// The weights are too large for the mode.
     #[error("compensate.mode: a window of the weights takes {cycles} cycles, and it leaves {available}")]
-    Window {
-        /// Largest cost of a window.
-        cycles: u32,
-        /// Cycles that it may take.
-        available: u32,
-    },
-    /// An identifier of diagnosis has too many bits, or is used twice.
+    Window { cycles: u32, available: u32 },
     #[error("diagnosis: identifier {0:#x} has too many bits, or is used twice")]
     Diagnosis(u32),
 }
@@ -143,17 +122,14 @@ pub(super) fn within(field: Field, value: f32) -> Result<(), FieldError> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum FlashFault {
-    /// The address is not the start of a word or sector.
     #[error("not the start of a word or sector")]
     NotAligned,
-    /// The address is beyond the end of the flash.
     #[error("beyond its end")]
     OutOfBounds,
-    /// The flash refused the operation, or did not finish it in time.
     #[error("did not take or finish the operation")]
     Refused,
-    /// The controller is unlocked although no operation runs.
     #[error("its controller is unlocked although no operation runs")]
     Unlocked,
 }
@@ -162,34 +138,23 @@ pub enum FlashFault {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum StoreError {
-    /// The board has no flash that it may write.
     #[error("the board has no flash that it may write: nothing can be stored")]
     NoFlash,
-    /// The flash reports an error.
     #[error("flash: {0}")]
     Flash(FlashFault),
-    /// No room is left for the record.
     #[error("no room is left for the record")]
     Full,
-    /// The record has a layout that this firmware does not read.
     #[error("the record has layout {found}, this firmware reads {expected}")]
-    Version {
-        /// Version in the record.
-        found: u8,
-        /// Version that this firmware reads.
-        expected: u8,
-    },
-    /// The record does not decode as its layout version requires.
+    Version { found: u8, expected: u8 },
     #[error("the record does not decode as its layout version requires")]
     Encoding,
     /// A value is out of its range.
     #[error(transparent)]
     Field(FieldError),
-    /// The board was reset three times within a minute of its start.
     #[error("the board was reset three times within a minute of its start")]
     Resets,
-    /// The record was damaged, and none has been stored since.
     #[error("the record was damaged, and none has been stored since")]
     Lost,
 }

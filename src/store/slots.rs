@@ -61,45 +61,30 @@ impl Record for Accepted {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum SlotError {
-    /// The board has no flash that it may write.
     #[error("the board has no flash that it may write: nothing can be stored")]
     NoFlash,
-    /// The flash reports an error.
     #[error("flash: {0}")]
     Flash(FlashFault),
-    /// The slot is erased and holds no file.
     #[error("the slot is empty")]
     Empty,
-    /// The length exceeds the slot, or is not a whole number of words.
     #[error("{0} bytes are too many, or not a whole number of words")]
     Length(u32),
-    /// The block does not continue the upload.
     #[error("the next block must begin at {expected}")]
     Offset {
         /// Offset at which the next block must begin; all bytes before it are written.
         expected: u32,
     },
-    /// No upload is in progress.
     #[error("no upload is in progress")]
     NotBegun,
-    /// The upload is not complete.
     #[error("only {written} bytes have been received")]
-    Incomplete {
-        /// Number of bytes written.
-        written: u32,
-    },
+    Incomplete { written: u32 },
     /// The file's checksum is not that of the accepted file; the file has this checksum.
     #[error("file {0:08x} is not the one that was accepted")]
     NotAccepted(u32),
-    /// The file is too large for this clock and the mode.
     #[error("a window takes {cycles} cycles, and clock and `compensate.mode` leave {available}")]
-    Slow {
-        /// Largest cost of a window.
-        cycles: u32,
-        /// Cycles that it may take.
-        available: u32,
-    },
+    Slow { cycles: u32, available: u32 },
     /// The content of the file is invalid.
     #[error(transparent)]
     Blob(BlobError),

@@ -269,25 +269,19 @@ pub(crate) mod stored_id {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum WheelError {
-    /// The frame has too few bytes.
     #[error("wheel frame of {0} bytes is too short")]
     Short(usize),
-    /// The checksum is wrong.
     #[error("wheel frame has a wrong checksum")]
     Checksum,
-    /// The E2E check failed.
     #[error("wheel frame: {0}")]
     E2e(Fault),
     /// The counter equals the previous one: an old frame.
     #[error("wheel frame is repeated")]
     Repeated,
-    /// A wheel's speed is marked as not valid, or is out of range.
     #[error("wheel {wheel}: speed is not valid")]
-    Invalid {
-        /// Index of the wheel.
-        wheel: usize,
-    },
+    Invalid { wheel: usize },
 }
 
 impl WheelFrame {

@@ -33,35 +33,26 @@ pub struct WheelSettings {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum WheelConfigError {
-    /// The number of wheels is neither two nor four, and there are frames.
     #[error("{0} wheels instead of two or four")]
     Wheels(usize),
-    /// The signal of a wheel refers to a frame that is not configured.
     #[error("wheel {0} refers to a frame that is not configured")]
     Wheel(usize),
-    /// Two frames have the same identifier.
     #[error("wheel frame {0:x} is configured twice")]
     DuplicateIdentifier(u32),
-    /// A counter or a checksum has more than 8 bits.
     #[error("wheel counter or checksum has {0} bits, more than 8")]
     Counter(u8),
-    /// A checksum is beyond byte 7.
     #[error("wheel checksum is in byte {0}, beyond byte 7")]
     Checksum(usize),
-    /// Two fields of a frame (speeds, counter, protection) overlap.
     #[error("wheel frame {0:x}: two values overlap")]
     Overlap(u32),
-    /// One of the board's own messages has the identifier, or diagnosis.
     #[error("wheel frame {0:x} is one of our own messages, or of diagnosis")]
     Own(u32),
-    /// The factor of a wheel is zero.
     #[error("wheel {0}: the factor is zero")]
     Factor(usize),
-    /// The smallest speed of a wheel is above the largest.
     #[error("wheel {0}: the smallest speed is above the largest")]
     Range(usize),
-    /// The timeout or `still_for` is zero, or above 10 s.
     #[error("wheel times: {0} us is not above 0 and at most 10 s")]
     Time(u64),
 }

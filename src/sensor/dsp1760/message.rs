@@ -29,32 +29,17 @@ pub const MAX_SEQUENCE: u8 = 127;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum MessageError {
-    /// The bytes do not begin with the header of a data message.
     #[error("DSP-1760: not the header of a data message")]
     Header,
-    /// The length of the message is not that of its format.
     #[error("DSP-1760: {got} bytes where the header announces {expected}")]
-    Length {
-        /// Number of bytes given.
-        got: usize,
-        /// Number of bytes in the format.
-        expected: usize,
-    },
-    /// The CRC is wrong.
+    Length { got: usize, expected: usize },
     #[error("DSP-1760: CRC {computed:08x}, but the message carries {stored:08x}")]
-    Crc {
-        /// CRC computed over the bytes.
-        computed: u32,
-        /// CRC in the message.
-        stored: u32,
-    },
+    Crc { computed: u32, stored: u32 },
     /// The sequence number is above [`MAX_SEQUENCE`].
     #[error("DSP-1760: sequence number {got}, above {MAX_SEQUENCE}")]
-    Sequence {
-        /// Sequence number in the message.
-        got: u8,
-    },
+    Sequence { got: u8 },
 }
 
 /// A data message, in the units of the wire format.

@@ -28,40 +28,35 @@ pub mod id {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
 pub enum XsensError {
-    /// The message is no MTData2, such as one of the old protocol (MID 32) or an error (42), or longer than 254 bytes.
+    /// For example one of the old protocol (MID 32), or an error (42).
     #[error("MTi: message {mid:02x} is no MTData2 of up to 254 bytes")]
     Foreign {
         /// Identifier of the message.
         mid: u8,
     },
-    /// The status word says that the self-test has not passed.
     #[error("MTi: the self-test has failed")]
     SelfTest,
-    /// A packet is longer than the rest of the message.
     #[error("MTData2: packet {id:04x} is cut off")]
     Truncated {
         /// Identifier of the packet.
         id: u16,
     },
-    /// A packet that is used does not have the length of its format.
     #[error("MTData2: packet {id:04x} does not have the length of its precision")]
     Format {
         /// Identifier of the packet.
         id: u16,
     },
-    /// The message lacks a packet that is needed.
     #[error("MTData2: packet {id:04x} is missing")]
     Missing {
         /// Identifier of the packet.
         id: u16,
     },
-    /// A reading is out of range.
     #[error("MTData2: packet {id:04x}: {error}")]
     Reading {
         /// Identifier of the packet.
         id: u16,
-        /// Error of the reading.
         error: RangeError,
     },
 }
