@@ -10,7 +10,6 @@ mod finding;
 mod forward;
 mod line;
 mod mounting;
-mod page;
 mod range;
 mod recording;
 mod reference;
@@ -21,10 +20,9 @@ mod speed;
 mod standstill;
 mod wheels;
 
-pub use allan::{Allan, Noise};
+pub use allan::Noise;
 pub use finding::{Finding, Verdict};
 pub use mounting::Mounting;
-pub use page::page;
 
 use crate::drive::error::DataError;
 use crate::drive::foreign;
@@ -46,14 +44,10 @@ pub struct Doctor {
     pub findings: Vec<Finding>,
     /// Begin and end of each standstill, s.
     pub standstills: Vec<(f64, f64)>,
-    /// Allan deviations of the gyro about x, y and z in the longest standstill.
-    pub allan: Option<[Allan; 3]>,
-    /// Noise figures of the gyro about x, y and z.
+    /// Noise figures of the gyro about x, y and z, in the longest standstill.
     pub noise: Option<[Option<Noise>; 3]>,
     /// The mounting, by gravity at rest.
     pub mounting: Option<Mounting>,
-    /// Yaw rate of the gyro and of the reference over time, rad/s, for the chart.
-    pub curves: [Vec<(f64, f64)>; 2],
 }
 
 impl Doctor {
@@ -68,7 +62,7 @@ impl Doctor {
         let (standstills, driven) = standstill::find(rows);
         let longest = standstills.iter().max_by_key(|span| span.len());
         let allan = allan::at_rest(rows, longest);
-        let noise = allan.as_ref().map(|allan| [0, 1, 2].map(|axis: usize| allan[axis].noise()));
+        let noise = allan.map(|allan| [0, 1, 2].map(|axis: usize| allan[axis].noise()));
         let mounting = longest.and_then(|span| Mounting::at_rest(&rows.force[span.clone()]));
 
         let forward = forward::find(rows, mounting.as_ref());
@@ -93,10 +87,8 @@ impl Doctor {
             name: rows.name.clone(),
             seconds: rows.seconds.last().copied().unwrap_or_default(),
             standstills: standstills.iter().map(|span| (seconds(span.start), seconds(span.end))).collect(),
-            allan,
             noise,
             mounting,
-            curves: [rows.series(|k| Some(rows.rate[k][2])), rows.series(|k| rows.reference[k])],
             findings,
         }
     }
@@ -115,7 +107,7 @@ fn start(path: &Path, doctor: &Doctor, rows: &Rows) -> Result<Finding, DataError
     };
     let Err(reason) = run() else { return Ok(Finding::good("start", "Static initialisation succeeds.")) };
     let reason = reason.to_string();
-    // The page may be sent to others, so it shows the recording's name instead of a path.
+    // A finding may be sent to others, so it shows the recording's name instead of a path.
     let reason = reason.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&reason);
     let mut from = None;
     for (begin, end) in doctor.standstills.iter().filter(|(begin, end)| end - begin >= LEAST_REST_S) {

@@ -1,31 +1,27 @@
-//! `gyronet doctor` checks a recording and writes a page about it.
+//! `gyronet doctor` checks a recording.
 
-use super::{Common, WriteError, print_json, remark};
-use gyronet_tools::doctor::{Doctor, Finding, Verdict, page};
+use super::{Common, print_json, remark};
+use gyronet_tools::doctor::{Doctor, Finding, Verdict};
 use gyronet_tools::drive::vehicle::Vehicle;
 use std::io::Write;
 use std::path::PathBuf;
 
 /// Check whether a recording is good enough to evaluate, calibrate and train on.
 ///
-/// The input is a drive. The command prints its findings and writes them to an HTML page with plots: sample rate and
-/// gaps, saturation, noise (random walk and bias instability), standstills, mounting by gravity, forward direction by
-/// wheels and accelerometer, wheels against gyro, and the reference. It also says what can and cannot be judged on
-/// the recording.
+/// The input is a drive. The command prints its findings: sample rate and gaps, saturation, noise (random walk and bias
+/// instability), standstills, mounting by gravity, forward direction by wheels and accelerometer, wheels against gyro,
+/// and the reference. It also says what can and cannot be judged on the recording.
 ///
 /// The exit status is 1 if a finding must be fixed before the recording is used.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   gyronet doctor drive.csv
-  gyronet doctor drive.csv --out report.html --json")]
+  gyronet doctor drive.csv --json")]
 pub struct Args {
     /// Recorded drive.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Write the page to this file [default: the recording's name with .doctor.html].
-    #[arg(long, value_name = "FILE.html")]
-    out: Option<PathBuf>,
 }
 
 pub fn run(args: &Args, common: Common) -> super::Result {
@@ -33,8 +29,6 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if let Some(vehicle) = Vehicle::of_drive(&args.file)?.path {
         remark(common, format_args!("{}: vehicle file {}", args.file.display(), vehicle.display()))?;
     }
-    let path = args.out.clone().unwrap_or_else(|| args.file.with_extension("doctor.html"));
-    std::fs::write(&path, page(&doctor)).map_err(WriteError::to(&path))?;
     let mut out = std::io::stdout().lock();
     if common.json {
         let findings = doctor.findings.iter().map(|Finding { what, verdict, text }| {
@@ -44,7 +38,6 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             "name": doctor.name,
             "seconds": doctor.seconds,
             "findings": findings.collect::<Vec<_>>(),
-            "page": path,
         });
         print_json(&mut out, &json)?;
     } else {
@@ -52,7 +45,6 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         for Finding { what, verdict, text } in &doctor.findings {
             writeln!(out, "{:<4} {what}: {text}", verdict.word())?;
         }
-        writeln!(out, "page: {}", path.display())?;
     }
     let bad = doctor.findings.iter().filter(|finding| finding.verdict == Verdict::Bad).count();
     if bad > 0 { Err(format!("{bad} findings must be fixed first").into()) } else { Ok(()) }

@@ -3,7 +3,7 @@
 use clap::error::{ContextKind, ContextValue};
 
 const SITUATIONS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin situations`";
-const RETIRED: [(&str, &str); 14] = [
+const RETIRED: [(&str, &str); 15] = [
     ("campaign", SITUATIONS),
     ("soak", SITUATIONS),
     ("paper", "`make -f tools/paper/Makefile`"),
@@ -19,6 +19,7 @@ const RETIRED: [(&str, &str); 14] = [
     ("--weights", "`gyronet evaluate --weights`"),
     ("--ablation", "`gyronet evaluate` (its rows), with `gyronet doctor` (the reference's own error),"),
     ("--mcap", "`gyronet correct`, or `gyronet replay --csv` for a plot,"),
+    ("doctor --out", "`gyronet doctor --json`"),
     ("--layout", "`cargo paper simulate`"),
     ("--set", "`cargo paper simulate`"),
 ];
@@ -27,6 +28,10 @@ const RETIRED: [(&str, &str); 14] = [
 pub fn line(error: &clap::Error) -> Option<String> {
     let kinds = [ContextKind::InvalidSubcommand, ContextKind::InvalidArg];
     let ContextValue::String(word) = kinds.into_iter().find_map(|kind| error.get(kind))? else { return None };
-    let (name, successor) = RETIRED.iter().find(|(name, _)| name == word)?;
+    let is_it = |name: &str| {
+        let (command, option) = name.rsplit_once(' ').unwrap_or(("", name));
+        option == word && (command.is_empty() || std::env::args().any(|argument| argument == command))
+    };
+    let (name, successor) = RETIRED.iter().find(|(name, _)| is_it(name))?;
     Some(format!("{name} has gone; {successor} does its work"))
 }

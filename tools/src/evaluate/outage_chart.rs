@@ -177,11 +177,11 @@ fn panel(
             "<text class=\"note\" text-anchor=\"{anchor}\" x=\"{x:.1}\" y=\"{y:.1}\">{label}</text>"
         );
     };
-    for tick in ticks(x, 6, false) {
+    for tick in ticks(x, 6) {
         let at = across(tick.at);
         mark([at, at, top, bottom], "middle", [at, bottom + 15.0], &tick.label);
     }
-    for tick in ticks(y, 5, false) {
+    for tick in ticks(y, 5) {
         let at = up(tick.at);
         mark([left, right, at, at], "end", [left - 6.0, at + 4.0], &tick.label);
     }

@@ -155,6 +155,7 @@ fn retired_names_say_what_does_their_work() {
         (&["doctor", "drive.csv", "--weights", "mine.blob"], "gyronet evaluate --weights"),
         (&["simulate", "--layout", "kaist", "--out", "OUT"], "cargo paper simulate"),
         (&["import", "urban06", "--training", "--out", "a.csv"], "cargo paper import"),
+        (&["doctor", "drive.csv", "--out", "page.html"], "gyronet doctor --json"),
         (&["evaluate", "drive.csv", "--ablation"], "gyronet evaluate"),
         (&["replay", "drive.csv", "--mcap", "drive.mcap"], "gyronet correct"),
         (&["import", "kaist", "urban06"], "cargo paper import urban06"),

@@ -40,16 +40,7 @@ pub struct Chart<'a> {
 
 impl Chart<'_> {
     pub fn html(&self) -> String {
-        self.draw(if self.same_scale { "map" } else { "time" })
-    }
-
-    /// Returns a chart whose points are decimal logarithms; the axes show the numbers themselves.
-    pub fn log_html(&self) -> String {
-        self.draw("map log")
-    }
-
-    fn draw(&self, kind: &str) -> String {
-        let is_log = kind.ends_with("log");
+        let kind = if self.same_scale { "map" } else { "time" };
         let scaling = || self.curves.iter().filter(|curve| curve.in_scale);
         let mut x = range(scaling().flat_map(|curve| curve.points.iter().map(|point| point.0)), 0.0);
         let mut y = range(scaling().flat_map(|curve| curve.points.iter().map(|point| point.1)), 0.06);
@@ -77,12 +68,12 @@ impl Chart<'_> {
             );
         }
         html += "</div>\n<div class=\"plot\"><div class=\"x\">";
-        for tick in ticks(x, 9, is_log) {
+        for tick in ticks(x, 9) {
             let _ =
                 write!(html, "<i style=\"left:{:.3}%\"><b>{}</b></i>", 100.0 * part(tick.at, x), tick.label);
         }
         html += "</div><div class=\"y\">";
-        for tick in ticks(y, 6, is_log) {
+        for tick in ticks(y, 6) {
             let _ = write!(
                 html,
                 "<i style=\"bottom:{:.3}%\"><b>{}</b></i>",
@@ -131,7 +122,7 @@ pub struct Tick {
 }
 
 /// Returns about `most` round numbers. The script has the same rule.
-pub fn ticks((from, to): (f64, f64), most: u32, is_log: bool) -> Vec<Tick> {
+pub fn ticks((from, to): (f64, f64), most: u32) -> Vec<Tick> {
     let rough = (to - from) / f64::from(most);
     let power = 10f64.powf(rough.log10().floor());
     let step =
@@ -139,14 +130,7 @@ pub fn ticks((from, to): (f64, f64), most: u32, is_log: bool) -> Vec<Tick> {
     let decimals = (-(step * 1.001).log10().floor()).max(0.0) as usize;
     let (first, last) = ((from / step).ceil() as i64, (to / step).floor() as i64);
     let at = (first..=last).map(|k| k as f64 * step);
-    let label =
-        |at: f64| if is_log { two_digits(10f64.powf(at)) } else { format!("{:.decimals$}", at + 0.0) };
-    at.map(|at| Tick { at, label: label(at) }).collect()
-}
-
-/// Formats a number with two significant digits: 0.032, 1, 320.
-fn two_digits(value: f64) -> String {
-    format!("{value:.1e}").parse::<f64>().unwrap_or(value).to_string()
+    at.map(|at| Tick { at, label: format!("{:.decimals$}", at + 0.0) }).collect()
 }
 
 #[cfg(test)]
@@ -155,14 +139,10 @@ mod tests {
 
     #[test]
     fn ticks_are_round() {
-        let labels =
-            |range, most| ticks(range, most, false).into_iter().map(|tick| tick.label).collect::<Vec<_>>();
+        let labels = |range, most| ticks(range, most).into_iter().map(|tick| tick.label).collect::<Vec<_>>();
         assert_eq!(labels((0.0, 10.0), 5), ["0", "2", "4", "6", "8", "10"]);
         assert_eq!(labels((-0.3, 0.31), 6), ["-0.2", "0.0", "0.2"]);
         assert_eq!(labels((3.0, 90.0), 9), ["10", "20", "30", "40", "50", "60", "70", "80", "90"]);
-        let powers: Vec<_> = ticks((-2.1, 2.6), 9, true).into_iter().map(|tick| tick.label).collect();
-        assert_eq!(powers, ["0.01", "0.1", "1", "10", "100"]);
-        assert_eq!([-1.5, 2.5].map(|at| two_digits(10f64.powf(at))), ["0.032", "320"]);
     }
 
     #[test]

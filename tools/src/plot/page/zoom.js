@@ -17,7 +17,7 @@
       points: line.getAttribute('points').split(' ').map(pair => pair.split(',').map(Number)),
     }));
     return { figure, svg, plot, curves, x0, x1, y0, y1, view: [0, SIDE, 0, SIDE],
-      isMap: figure.classList.contains('map'), isLog: figure.classList.contains('log') };
+      isMap: figure.classList.contains('map') };
   });
 
   const ticks = (from, to, most) => {
@@ -30,10 +30,10 @@
     }
     return all;
   };
-  const axis = (box, side, from, to, most, isLog) => box.replaceChildren(...ticks(from, to, most).map(([at, text]) => {
+  const axis = (box, side, from, to, most) => box.replaceChildren(...ticks(from, to, most).map(([at, text]) => {
     const line = document.createElement('i'), label = document.createElement('b');
     line.style[side] = 100 * (at - from) / (to - from) + '%';
-    label.textContent = isLog ? Number((10 ** at).toPrecision(2)) : text;
+    label.textContent = text;
     line.append(label);
     return line;
   }));
@@ -54,11 +54,11 @@
   };
   const draw = chart => {
     const [left, right, top, bottom] = chart.view;
-    const { svg, plot, isLog, x0, x1, y0, y1 } = chart;
+    const { svg, plot, x0, x1, y0, y1 } = chart;
     svg.setAttribute('viewBox', `${left} ${top} ${right - left} ${bottom - top}`);
     const x = at => x0 + at / SIDE * (x1 - x0), y = at => y1 - at / SIDE * (y1 - y0);
-    axis(plot.querySelector('.x'), 'left', x(left), x(right), 9, isLog);
-    axis(plot.querySelector('.y'), 'bottom', y(bottom), y(top), 6, isLog);
+    axis(plot.querySelector('.x'), 'left', x(left), x(right), 9);
+    axis(plot.querySelector('.y'), 'bottom', y(bottom), y(top), 6);
     chart.whole.classList.toggle('hidden', left <= 0 && right >= SIDE);
   };
   const show = (chart, view) => {
