@@ -195,7 +195,6 @@ pub struct Compensator {
     /// The newest model's mounting; and whether levelling has replaced it.
     mounting: SteadyGain,
     is_levelled: bool,
-    /// The slow mean of the corrections.
     slow_mean: SlowMean,
     /// Revisions not yet in the live rate, and in the delayed rate.
     live_revisions: i64,

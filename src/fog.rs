@@ -164,7 +164,6 @@ pub struct FogOutput {
 pub struct FogCorrector {
     config: FogConfig,
     sums: SecondSums,
-    /// Number of the next second.
     next: u32,
     /// The next second begins a new window.
     is_first: bool,

@@ -30,7 +30,6 @@ pub fn firmware(board: &str, test: &str, scratch: &str, name: &str) -> Option<Pa
     image::firmware_for((board, bench::TARGET), test, scratch, name)
 }
 
-/// A place in memory.
 #[derive(Debug, Clone, Copy)]
 pub enum At<'a> {
     Address(u32),

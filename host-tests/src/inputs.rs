@@ -19,7 +19,6 @@ const STANDING_SAMPLES: usize = 600;
 #[derive(Debug, Clone)]
 pub struct Step {
     pub wheels: Option<DataFrame>,
-    /// The message of the MTi.
     pub imu: MtData2,
     /// The bytes of the fibre-optic gyro.
     pub fog: Vec<u8>,

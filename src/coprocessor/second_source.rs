@@ -15,7 +15,6 @@
 
 use crate::sample::{RATE_HZ, WheelSample};
 
-/// Sources in doubt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Doubts {
     pub inertial: bool,

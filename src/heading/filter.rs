@@ -23,7 +23,6 @@ const STATES: usize = 5;
 
 type Vector = [f32; STATES];
 
-/// A measured course.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Measured {
     /// Course less the heading that the filter expects a lag ago, rad.
@@ -34,7 +33,6 @@ pub(crate) struct Measured {
     pub variance: f32,
 }
 
-/// Estimates the states.
 #[derive(Debug, Clone)]
 pub(crate) struct Filter {
     state: Vector,

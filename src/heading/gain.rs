@@ -7,7 +7,6 @@
 const AGED: f32 = 0.0016;
 /// Largest sigma of a gain that is kept: given back, it is still better than what is known of a part.
 const KEPT: f32 = 0.002;
-/// Largest gain.
 pub(super) const MAX_GAIN: f32 = 0.05;
 /// Ratio of sigmas, and change over the sigma, from which a gain replaces the stored one.
 const BETTER: f32 = 0.7;

@@ -32,7 +32,6 @@ pub(super) struct Level {
     samples: u32,
     /// Variance of the direction of the axis in use, rad^2.
     variance: f32,
-    /// The vertical that was reported last.
     reported: Vertical,
 }
 

@@ -105,7 +105,6 @@ pub struct Turning {
 type Turns = [f32; TURNS];
 const TURNS: usize = 5;
 
-/// A part of the minute.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     turns: Turns,

@@ -66,7 +66,6 @@ pub struct Device<R: NorFlash, W> {
     calibration_origin: Origin,
     learned: Learned,
     learner: Learner,
-    /// The newest state of the courses.
     course: CourseState,
     /// True if the sensor was found to have moved; cleared by [`Self::take_mount_moved`].
     mount_moved: bool,

@@ -60,7 +60,6 @@ pub struct Step {
     pub is_compared: bool,
 }
 
-/// A board with its network and the wheels of its vehicle.
 #[derive(Debug, Clone)]
 pub struct Board<N> {
     coprocessor: Coprocessor,

@@ -40,7 +40,6 @@ impl Random {
         libm::exp(self.between(libm::log(low), libm::log(high)))
     }
 
-    /// Returns an exponentially distributed number with this mean.
     pub fn exponential(&mut self, mean: f64) -> f64 {
         -mean * libm::log(1.0 - self.between(0.0, 1.0))
     }

@@ -40,7 +40,6 @@ pub struct Config {
     pub mems: mems::Config,
     /// A trip on which the part warms up; it replaces the part's bias.
     pub warming: Option<warming::Config>,
-    /// A GNSS receiver.
     pub gnss: Option<gnss::Config>,
 }
 

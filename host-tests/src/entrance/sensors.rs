@@ -72,7 +72,6 @@ pub fn dsp1760_seeds() -> Vec<Seed> {
     vec![("stream", extras.concat()), ("self_test", self_test)]
 }
 
-/// Parses bytes as packets.
 pub fn icm42688(data: &[u8]) {
     let (packets, _) = data.as_chunks::<PACKET>();
     for packet in packets.iter().filter_map(|bytes| Packet::parse(bytes).ok()) {

@@ -45,7 +45,6 @@ impl Source for Waiting {
     }
 }
 
-/// The CAN bus.
 #[derive(Default)]
 struct Wire {
     received: VecDeque<DataFrame>,
@@ -115,7 +114,6 @@ impl Board {
         }
     }
 
-    /// The learnt values.
     pub fn learned(&self) -> Learned {
         *self.device.learned()
     }
@@ -138,7 +136,6 @@ impl Board {
         }
     }
 
-    /// Bytes of the fibre-optic gyro arrive.
     pub fn receive_fibre_optic(&mut self, bytes: &[u8], now: Micros) {
         for byte in bytes {
             self.fibre_optic.receive(*byte);

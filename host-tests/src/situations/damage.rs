@@ -10,7 +10,6 @@ pub enum Damage {
     Drop(f64),
     /// They come twice.
     Twice(f64),
-    /// One bit is wrong.
     BitFlip(f64),
     /// Up to this many bytes are noise.
     Burst(f64, usize),
@@ -22,7 +21,6 @@ pub enum Damage {
     Stall,
 }
 
-/// The messages as they arrive.
 pub fn damaged(messages: Vec<Message>, damage: &[During<Damage>], random: &mut Random) -> Vec<Message> {
     let mut out = Vec::with_capacity(messages.len());
     for mut message in messages {

@@ -70,7 +70,6 @@ impl Default for Ride {
 }
 
 impl Ride {
-    /// Goes on for this time.
     pub fn hold(&mut self, seconds: f64) -> &mut Self {
         self.turn(0.0, seconds)
     }
@@ -81,7 +80,6 @@ impl Ride {
         self
     }
 
-    /// Reaches a speed.
     pub fn reach(&mut self, speed: f64, seconds: f64) -> &mut Self {
         self.now.speed = speed;
         self.hold(seconds)
@@ -109,7 +107,6 @@ impl Ride {
         self.legs.iter().map(|leg| leg.seconds).sum()
     }
 
-    /// Moves the vehicle along the ride.
     pub fn travel(&self, vehicle: &Vehicle, random: &mut Random) -> Travelled {
         let mut body = Body { shaking: Shaking::new(vehicle, random), ..Body::default() };
         let mut travelled = Travelled::default();

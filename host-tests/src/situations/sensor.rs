@@ -81,7 +81,6 @@ pub struct Message {
 }
 
 impl Sensor {
-    /// The inertial sensor of a vehicle.
     pub fn new(vehicle: &Vehicle, random: &mut Random) -> Self {
         let mut draw = |sigma: f64| random.normals().map(|normal| sigma * normal);
         Self {
@@ -124,7 +123,6 @@ impl Sensor {
         start + rise * (1.0 - (-time / constant).exp())
     }
 
-    /// All messages of a ride.
     pub fn messages(&self, travelled: &Travelled, random: &mut Random) -> Vec<Message> {
         let period = 1.0 / (self.hz * (1.0 + self.clock));
         let mut messages = Vec::new();

@@ -81,7 +81,6 @@ pub const UTV: Vehicle = Vehicle {
     ..CAR
 };
 
-/// The car without wheel frames.
 pub const BARE: Vehicle = Vehicle { name: "bare", wheels: None, ..CAR };
 
 /// The car with a fibre-optic gyro beside its MTi; what happens to the sensor happens to that gyro.

@@ -12,7 +12,6 @@ const TRACK: f64 = 1.5;
 /// Sigma of a turning wheel's speed: the pulses' length, as a share.
 const RIPPLE: f64 = 2e-3;
 
-/// A fault of the wheels' frames.
 #[derive(Debug, Clone, Copy)]
 pub enum WheelFault {
     /// All speeds are multiplied: 0 where the wheels are locked or the frames frozen at zero.

@@ -13,7 +13,6 @@ use std::time::Duration;
 pub const IMU: usize = 1;
 pub const SLCAN: usize = 2;
 pub const SERVICE: usize = 6;
-/// Time from one sample of the sensor to the next.
 pub const SAMPLE: Duration = Duration::from_millis(10);
 /// Time from power-on until the image listens to all lines.
 pub const START: Duration = Duration::from_millis(200);

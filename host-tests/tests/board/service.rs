@@ -28,7 +28,6 @@ pub fn on_bus(board: &mut Board) -> Device<CanBus<'_>> {
     Device::new(board.bus(), "the virtual board")
 }
 
-/// The state that the board reports on the service line.
 pub fn info(board: &mut Board) -> Info {
     on_line(board).info().expect("a response")
 }

@@ -47,7 +47,6 @@ fn settings() -> gyronet::can::wheel::WheelSettings {
     WheelFile::parse("wheels.toml", SETTINGS).and_then(|file| file.settings("wheels.toml")).expect("settings")
 }
 
-/// The angle messages' fault bits.
 fn faults(board: &mut Board) -> Vec<Faults> {
     let sent = frames(&board.can_frames());
     let angles = sent.iter().filter_map(|frame| {

@@ -26,7 +26,6 @@ struct Drive<'a> {
     course: &'a dyn Fn(usize, &[f64]) -> Option<f64>,
 }
 
-/// Noise and errors of a part.
 struct Part {
     noise: Noise,
     gain: f64,

@@ -19,7 +19,6 @@ use gyronet::coprocessor::{self, Sink, TimedFrame};
 use gyronet::health::count;
 use gyronet::units::Micros;
 
-/// Frames that can wait for each line.
 const QUEUE: usize = 24;
 
 /// Waiting wheel, course and latitude frames; the output task reads them every millisecond.

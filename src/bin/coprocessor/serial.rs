@@ -151,7 +151,6 @@ impl Port {
         self.memory.received.drop_oldest(count);
     }
 
-    /// Returns the number of bytes that were damaged or lost.
     pub fn lost(&self) -> u32 {
         self.memory.damaged.load(Ordering::Relaxed).saturating_add(self.overwritten)
     }

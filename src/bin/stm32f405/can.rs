@@ -53,7 +53,6 @@ static ABORTED: AtomicU32 = AtomicU32::new(0);
 /// The time of a bus-off that the sending half has not seen yet, us; 0 without one.
 static OFF_AT: AtomicU32 = AtomicU32::new(0);
 
-/// The mode in which the controller runs on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
     /// The controller sends and acknowledges as a node.
@@ -286,7 +285,6 @@ pub fn aborted() -> u32 {
     ABORTED.load(Ordering::Relaxed)
 }
 
-/// Returns whether all mailboxes are empty.
 #[inline]
 pub fn all_sent() -> bool {
     // SAFETY: the register is only read.

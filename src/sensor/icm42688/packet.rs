@@ -31,10 +31,7 @@ pub enum PacketError {
     Empty,
     /// The header is not that of the configured packet: reading is out of step, or a setting is lost.
     #[error("ICM-42688: header {got:02x} is not that of the configured packet")]
-    Header {
-        /// The header.
-        got: u8,
-    },
+    Header { got: u8 },
 }
 
 /// The readings of a packet in raw counts; `None` is a missing reading.

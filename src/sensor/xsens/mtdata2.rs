@@ -32,33 +32,17 @@ pub mod id {
 pub enum XsensError {
     /// For example one of the old protocol (MID 32), or an error (42).
     #[error("MTi: message {mid:02x} is no MTData2 of up to 254 bytes")]
-    Foreign {
-        /// Identifier of the message.
-        mid: u8,
-    },
+    Foreign { mid: u8 },
     #[error("MTi: the self-test has failed")]
     SelfTest,
     #[error("MTData2: packet {id:04x} is cut off")]
-    Truncated {
-        /// Identifier of the packet.
-        id: u16,
-    },
+    Truncated { id: u16 },
     #[error("MTData2: packet {id:04x} does not have the length of its precision")]
-    Format {
-        /// Identifier of the packet.
-        id: u16,
-    },
+    Format { id: u16 },
     #[error("MTData2: packet {id:04x} is missing")]
-    Missing {
-        /// Identifier of the packet.
-        id: u16,
-    },
+    Missing { id: u16 },
     #[error("MTData2: packet {id:04x}: {error}")]
-    Reading {
-        /// Identifier of the packet.
-        id: u16,
-        error: RangeError,
-    },
+    Reading { id: u16, error: RangeError },
 }
 
 /// The content of an MTData2 message, as far as it is used.

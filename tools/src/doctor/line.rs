@@ -11,7 +11,6 @@ const LEAST: usize = 5;
 pub const KMH: f64 = 3.6;
 pub const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-/// The line of y over x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
     pub slope: f64,

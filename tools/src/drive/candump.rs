@@ -34,7 +34,6 @@ impl<W: Write> Log<W> {
         writeln!(self.out)
     }
 
-    /// Flushes the writer and returns the number of frames.
     pub fn finish(mut self) -> io::Result<u64> {
         self.out.flush()?;
         Ok(self.frames)

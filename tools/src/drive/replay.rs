@@ -89,7 +89,6 @@ pub struct Replay {
     pub steps: Vec<Step>,
     /// The first step after static initialisation.
     pub start: usize,
-    /// The gyro's static bias.
     pub gyro_bias: [AngularRate; 3],
     /// The yaw that the delayed rates have not sent yet at the end.
     pub pending: Yaw,
@@ -123,7 +122,6 @@ impl Replay {
         self.start..self.start + compared
     }
 
-    /// Returns the delayed rates of the compared steps.
     pub fn delayed(&self) -> impl Iterator<Item = YawEstimate> {
         self.steps[self.compared()].iter().filter_map(|step| step.delayed)
     }

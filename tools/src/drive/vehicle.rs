@@ -55,11 +55,8 @@ pub struct Origin {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mounting {
-    /// Angle about x.
     pub roll_deg: f64,
-    /// Angle about y.
     pub pitch_deg: f64,
-    /// Angle about z.
     pub yaw_deg: f64,
     /// The rows of the drive are already in the vehicle's axes: so wrote older imports, instead of zero angles.
     pub applied: bool,

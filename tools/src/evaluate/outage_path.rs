@@ -54,7 +54,6 @@ impl Path {
         self.angles
     }
 
-    /// Returns the newest point.
     pub fn point(&self, has_speed: bool) -> Point {
         let truth = self.gyro - self.off;
         Point {

@@ -59,7 +59,6 @@ pub struct Sample {
     pub rates: PerMethod<f64>,
 }
 
-/// The facts of the whole drive.
 #[derive(Debug, Clone)]
 pub struct Comparison {
     pub costs: PerMethod<Cost>,

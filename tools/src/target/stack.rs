@@ -22,7 +22,6 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Bytes that the processor pushes at an exception: registers, floating-point registers, alignment (ARMv7-M, B1.5.6).
 const EXCEPTION_FRAME: u32 = 32 + 72 + 4;
-/// Name of the function that starts the image.
 const RESET: &str = "Reset";
 /// End of the name of the function that RTIC runs with interrupts off; its last step switches them on.
 const MASKED: &str = "__rtic_init_resources";
@@ -74,7 +73,6 @@ impl ImageStack {
         self.start.max(self.main + self.handlers())
     }
 
-    /// Returns the bytes of all nested handlers together.
     pub fn handlers(&self) -> u32 {
         self.handlers.iter().map(|handler| handler.bytes).sum()
     }

@@ -90,9 +90,7 @@ pub enum Protection {
         /// Byte of the checksum, from 0.
         byte: usize,
     },
-    /// Exclusive or of all other bytes.
     Xor(Sum),
-    /// Sum of all other bytes.
     Sum(Sum),
     /// AUTOSAR E2E profile 1.
     #[serde(rename = "e2e-p01")]
@@ -109,7 +107,9 @@ pub enum Protection {
     },
     /// AUTOSAR E2E profile 5.
     #[serde(rename = "e2e-p05")]
-    P05 { data_id: u16 },
+    P05 {
+        data_id: u16,
+    },
     /// AUTOSAR E2E profile 11.
     #[serde(rename = "e2e-p11")]
     P11 {

@@ -80,7 +80,6 @@ impl Simulated {
 pub struct Bus(Arc<Mutex<Simulated>>);
 
 impl Bus {
-    /// Appends bytes to the part's FIFO.
     pub fn fill(&self, bytes: impl IntoIterator<Item = u8>) {
         self.part().fifo.extend(bytes);
     }

@@ -39,7 +39,6 @@ fn configuration(k: u8) -> Configuration {
     Configuration { latitude_deg: Some(f32::from(k)), ..Configuration::DEFAULT }
 }
 
-/// The content of a request that writes a configuration.
 fn content(k: u8) -> Vec<u8> {
     [&[Configuration::VERSION][..], &postcard::to_stdvec(&configuration(k)).expect("there is room")].concat()
 }

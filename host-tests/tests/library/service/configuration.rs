@@ -183,14 +183,12 @@ fn identifiers_of_diagnosis_are_three_that_nobody_else_uses() {
     }
 }
 
-/// Lets the board see a sample of a vehicle that stands or not.
 fn see(board: &mut Board, standing: Standing) {
     let at_rest = sample(0, [0.0, 0.0, 9.81], 0.01);
     let wheels = WheelSample::without_speeds(Standstill::Unknown);
     board.observe(Some(&at_rest), 0, (Status::Ready, Faults::NONE), &wheels, &standing);
 }
 
-/// Returns whether a configuration can be stored.
 fn storable(board: &mut Board) -> bool {
     match board.set_configuration(&Configuration::DEFAULT) {
         Ok(()) => true,

@@ -4,7 +4,6 @@ use crate::sequence::Sequence;
 use crate::simulate::Layout;
 use serde::Serialize;
 
-/// Names the group that a sequence is averaged with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Group {

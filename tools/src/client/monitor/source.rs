@@ -13,7 +13,6 @@ use std::time::Duration;
 
 pub const WAIT: Duration = Duration::from_millis(100);
 
-/// The error of a source that cannot be opened or read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SourceError {

@@ -15,7 +15,6 @@ pub const SECTION: &str = ".priorities";
 pub struct Vectors {
     /// Address of the handler of each exception number, if the vector points to a function.
     pub handlers: Vec<Option<u32>>,
-    /// Priority of each listed exception number.
     pub priorities: BTreeMap<usize, u8>,
 }
 
