@@ -4,6 +4,7 @@
 //! |---|---|---|---|
 //! | [`Configuration`], [`WheelSettings`](crate::can::wheel::WheelSettings), [`Calibration`], [`Learned`], [`Troubles`], which slot is used | two 16 KiB sectors, a [`Store`] | a new record behind the old one | the old record |
 //! | weight files | two 128 KiB sectors, [`slots`] | the slot that is not in use | the slot in use |
+//! | firmware | two slots of 256 KiB, [`firmware`] | the slot that does not run | the image that runs |
 //!
 //! New data never overwrites the data in use, so an interrupted write leaves the old record or slot intact. Records
 //! are found by key and protected by CRC-32; each carries the version of its layout, and every value is checked
@@ -14,6 +15,8 @@ pub mod access;
 pub mod calibration;
 pub mod configuration;
 mod error;
+#[doc(hidden)]
+pub mod firmware;
 #[doc(hidden)]
 pub mod layout;
 mod learned;

@@ -14,6 +14,10 @@ pub use bus::CanBus;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 pub use event::{Counts, Event};
 use gyronet::can::DataFrame;
+use gyronet::model::blob::CRC;
+use gyronet::store::Slot;
+use gyronet::store::firmware::{MAX_IMAGE, Trailer};
+use gyronet::store::layout::FLASH_BASE;
 use gyronet_tools::target::bench;
 pub use line::Line;
 use link::{Link, hex, unhex};
@@ -196,9 +200,18 @@ impl Board {
         unhex(&answer["hex"])
     }
 
-    /// Changes flash or RAM: a stored record, or an instruction (`FEE7` is a branch to itself).
+    /// Changes flash or RAM: a stored record, or an instruction (`FEE7` is a branch to itself). An image that is changed at
+    /// a symbol gets the checksum of what it is now, so that the boot loader starts it.
     pub fn patch(&mut self, at: At, bytes: &[u8]) {
         self.ask("memory_write", place(at, json!({ "hex": hex(bytes) })));
+        let start = FLASH_BASE + Slot::A.firmware().start;
+        let end = At::Address(start + MAX_IMAGE);
+        let length = self.read(end, 4).first_chunk().map_or(0, |word| u32::from_le_bytes(*word));
+        if matches!(at, At::Symbol(_)) && length <= MAX_IMAGE {
+            let crc = CRC.checksum(&self.read(At::Address(start), length as usize));
+            let trailer = Trailer { is_confirmed: true, ..Trailer::new(length, crc, 0, 1) };
+            self.ask("memory_write", place(end, json!({ "hex": hex(&trailer.bytes()) })));
+        }
     }
 
     /// Returns the address of a symbol and its size in bytes.

@@ -1,8 +1,10 @@
-//! Builds the firmware images as `cargo fw` does, so that the tests run the same code as a board.
+//! Builds the firmware images as `cargo fw` does, so that the tests run the same code as a board: the product with its
+//! boot loader.
 
 use crate::recordings::workspace;
 use crate::require::{self, Need};
 use gyronet_tools::target::bench;
+use gyronet_tools::target::firmware::Linked;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -34,10 +36,16 @@ pub fn firmware_for(
     // All boards share one folder, and with it everything that does not depend on the board; the next board's image
     // overwrites this one's there.
     let scratch = Path::new(scratch);
-    let fresh = bench::build_for((board, target), workspace(), image, &scratch.join("images"));
-    let fresh = fresh.unwrap_or_else(|error| panic!("{error}"));
     let elf = scratch.join(format!("{image}-{board}"));
-    std::fs::copy(fresh, &elf).expect("there is room");
+    if image == "coprocessor" {
+        let linked =
+            Linked::build(board, 1, &scratch.join("images")).unwrap_or_else(|error| panic!("{error}"));
+        let whole = linked.for_programmer().expect("it was linked for this");
+        std::fs::write(&elf, whole).expect("there is room");
+    } else {
+        let fresh = bench::build_for((board, target), workspace(), image, &scratch.join("images"));
+        std::fs::copy(fresh.unwrap_or_else(|error| panic!("{error}")), &elf).expect("there is room");
+    }
     built.insert(name, elf.clone());
     Some(elf)
 }

@@ -11,13 +11,16 @@ const SMALL: [(&str, &str); 2] = [
     ("CARGO_FEATURE_MICROBIT", "small_core/microbit.x"),
     ("CARGO_FEATURE_LM3S6965EVB", "small_core/lm3s6965evb.x"),
 ];
-/// Linker script with the flash limits of the `coprocessor` image.
-const SLOTS: &str = "stm32f405/slots.x";
-/// Start address of the code of `coprocessor` and `bringup` (`store::layout::FIRMWARE_A`).
-const CODE: &str = "0x08080000";
+/// Linker scripts with the conditions of an image.
+const SCRIPTS: [(&str, &str); 2] = [("coprocessor", "stm32f405/slots.x"), ("boot", "stm32f405/boot.x")];
+/// Start of the slots for firmware (`store::layout`), of which feature `slot-b` selects the second.
+const FIRMWARE: [u32; 2] = [0x0808_0000, 0x0804_0000];
+/// Place of an image's code behind vectors and label, and of the boot loader's behind its vectors.
+const BEHIND_LABEL: u32 = 0x220;
+const BEHIND_VECTORS: u32 = 0x0800_0200;
 
 fn main() {
-    for input in ["build.rs", MEMORY, REGIONS, SLOTS] {
+    for input in ["build.rs", MEMORY, REGIONS] {
         println!("cargo:rerun-if-changed={input}");
     }
     SMALL.iter().for_each(|(_, map)| println!("cargo:rerun-if-changed={map}"));
@@ -36,9 +39,15 @@ fn main() {
     }
     copy(REGIONS, "regions.x");
     let folder = env::var("CARGO_MANIFEST_DIR").expect("cargo sets it");
-    println!("cargo:rustc-link-arg-bin=coprocessor=-T{}", Path::new(&folder).join(SLOTS).display());
-    for flashed in ["coprocessor", "bringup"] {
-        println!("cargo:rustc-link-arg-bin={flashed}=--defsym=_flashed_code={CODE}");
+    for (image, script) in SCRIPTS {
+        println!("cargo:rerun-if-changed={script}");
+        println!("cargo:rustc-link-arg-bin={image}=-T{}", Path::new(&folder).join(script).display());
+    }
+    let [a, b] = FIRMWARE;
+    let slot = if has("CARGO_FEATURE_SLOT_B") { b } else { a };
+    println!("cargo:rustc-link-arg-bin=coprocessor=--defsym=_slot={slot:#010x}");
+    for (image, code) in [("coprocessor", slot + BEHIND_LABEL), ("bringup", a), ("boot", BEHIND_VECTORS)] {
+        println!("cargo:rustc-link-arg-bin={image}=--defsym=_flashed_code={code:#010x}");
     }
     if has("CARGO_FEATURE_RTT") {
         println!("cargo:rustc-link-arg-bin=coprocessor=-Tdefmt.x");

@@ -2,16 +2,15 @@
 //!
 //! | sectors | size | content |
 //! |---|---|---|
-//! | 0 | 16 KiB | vector table |
+//! | 0 | 16 KiB | boot loader |
 //! | 1, 2 | 2 x 16 KiB | records ([`STORE`]): configuration, keys, calibration, what was learnt, troubles |
 //! | 3 to 5 | 16 + 64 + 128 KiB | not used |
-//! | 6, 7 | 2 x 128 KiB | reserved for a second firmware image ([`FIRMWARE_B`]) |
-//! | 8, 9 | 2 x 128 KiB | firmware: code and constants, GyroNet's built-in weights among them ([`FIRMWARE_A`]) |
+//! | 6, 7 | 2 x 128 KiB | firmware, slot B ([`FIRMWARE_B`]) |
+//! | 8, 9 | 2 x 128 KiB | firmware, slot A ([`FIRMWARE_A`]): vectors, code, constants, the built-in weights |
 //! | 10, 11 | 2 x 128 KiB | GyroNet's weight slots ([`SLOTS`]) |
 //!
-//! Records need small sectors of equal size, and the processor needs its vectors in sector 0. Both firmware slots have
-//! whole sectors of one size, so that an image fits into either. The image's `regions.x` and `slots.x` give the linker
-//! the same layout, and a test compares them.
+//! Records need small sectors of equal size, and the processor begins in sector 0. `regions.x` and `slots.x` give the
+//! linker the same layout, and a test compares them.
 
 use core::ops::Range;
 
@@ -28,15 +27,19 @@ pub const SECTORS: [u32; 12] = {
     sizes[4] = 64 << 10;
     sizes
 };
+/// Version of this layout. An image that expects another one is not accepted as an update.
+pub const LAYOUT: u8 = 1;
+/// Largest size of the boot loader, bytes.
+pub const BOOT_SIZE: u32 = 16 << 10;
 /// Size of a sector of records, bytes.
 pub const RECORD_SECTOR: usize = 16 << 10;
 /// Flash offsets of the records.
 pub const STORE: Range<u32> = 0x4000..0xC000;
-/// Largest size of a firmware image without its vector table, bytes.
+/// Size of a slot for firmware, bytes.
 pub const FIRMWARE_SIZE: u32 = 256 << 10;
-/// Flash offsets that are reserved for a second firmware image. Nothing writes there yet.
+/// Flash offsets of firmware in slot B.
 pub const FIRMWARE_B: Range<u32> = 0x4_0000..0x4_0000 + FIRMWARE_SIZE;
-/// Flash offsets of the firmware.
+/// Flash offsets of firmware in slot A, which `cargo flash-board` writes.
 pub const FIRMWARE_A: Range<u32> = FIRMWARE_B.end..FIRMWARE_B.end + FIRMWARE_SIZE;
 /// Size of a weight slot, one sector, bytes.
 pub const SLOT_SIZE: usize = 128 << 10;

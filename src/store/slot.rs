@@ -1,16 +1,16 @@
-//! The two places for weight files in the flash.
+//! The two places for weight files, and for firmware, in the flash.
 
 use super::layout::{SLOT_SIZE, SLOTS};
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
-/// One of the two slots for GyroNet's weights.
+/// One of two slots: for GyroNet's weights, or for firmware ([`Slot::firmware`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Slot {
-    /// Sector 10.
+    /// Sector 10; firmware in sectors 8 and 9.
     A,
-    /// Sector 11.
+    /// Sector 11; firmware in sectors 6 and 7.
     B,
 }
 

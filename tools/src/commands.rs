@@ -10,6 +10,7 @@ pub mod device;
 pub mod doctor;
 mod drives;
 pub mod evaluate;
+pub mod firmware;
 pub mod import;
 pub mod keys;
 pub mod monitor;

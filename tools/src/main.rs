@@ -67,6 +67,7 @@ enum Command {
     Reference(commands::reference::Args),
     Wheels(commands::wheels::Args),
     Size(commands::size::Args),
+    Firmware(commands::firmware::Args),
     Completions(commands::completions::Args),
 }
 
@@ -97,6 +98,7 @@ fn main() -> ExitCode {
         Command::Device(args) => commands::device::run(args, common),
         Command::Wheels(args) => commands::wheels::run(args, common),
         Command::Size(args) => commands::size::run(args, common),
+        Command::Firmware(args) => commands::firmware::run(args, common),
         Command::Completions(args) => commands::completions::run(args, Cli::command()),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };

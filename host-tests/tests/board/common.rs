@@ -14,8 +14,8 @@ pub const IMU: usize = 1;
 pub const SLCAN: usize = 2;
 pub const SERVICE: usize = 6;
 pub const SAMPLE: Duration = Duration::from_millis(10);
-/// Time from power-on until the image listens to all lines.
-pub const START: Duration = Duration::from_millis(200);
+/// Time from power-on until the image listens to all lines: the boot loader checks the image for 170 ms.
+pub const START: Duration = Duration::from_millis(300);
 /// Frames of a sample.
 pub const SET: usize = 6;
 

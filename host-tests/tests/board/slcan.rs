@@ -43,8 +43,8 @@ fn board_answers_the_commands_of_a_host() {
     let stamps: Vec<_> = stamped.map(|(frame, at)| (frame.id(), Duration::from_millis(at.into()))).collect();
     let response = Id::from(StandardId::new(0x7E8).expect("11 bits"));
     assert!(stamps.iter().any(|(id, _)| *id == response) && stamps.len() > 3 * SET, "{stamps:?}");
-    // Stamps count from the chip's start, which follows the supply's.
-    let past = begun - Duration::from_millis(20)..begun + SAMPLE * 4;
+    // Stamps count from the image's start, which follows the boot loader.
+    let past = begun - START..begun + SAMPLE * 4;
     assert!(stamps.iter().all(|(_, at)| past.contains(at)), "{stamps:?} from {begun:?} on");
     assert!(stamps.is_sorted_by_key(|(_, at)| *at), "{stamps:?}");
 }

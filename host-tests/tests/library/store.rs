@@ -8,6 +8,7 @@ use gyronet::can::e2e::{P02, Profile};
 use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{Checksum, WheelConfigError, WheelFrame, WheelSettings, WheelSignal};
 use gyronet::model::blob::CRC;
+use gyronet::store::firmware;
 use gyronet::store::layout::{self, RECORD_SECTOR, SECTORS, SLOT_SIZE, sector_at};
 use gyronet::store::slots::{SlotError, file, select};
 use gyronet::store::{
@@ -78,15 +79,26 @@ fn wheel_settings_are_kept() {
 fn layout_is_the_linker_s() {
     let text = std::fs::read_to_string(workspace().join("src/bin/stm32f405/regions.x"))
         .expect("it is in the repository");
-    assert!(text.contains(&format!("FLASH : ORIGIN = {:#010x}, LENGTH = 1024K", layout::FLASH_BASE)));
-    let code = format!("const CODE: &str = \"{:#010x}\";", layout::FLASH_BASE + layout::FIRMWARE_A.start);
-    let build = std::fs::read_to_string(workspace().join("src/bin/build.rs")).expect("it is too");
-    assert!(build.contains(&code), "{code}");
-    let limit = std::fs::read_to_string(workspace().join("src/bin/stm32f405/slots.x")).expect("it is too");
-    assert!(limit.contains(&format!("ORIGIN(FLASH) + {}K,", layout::FIRMWARE_A.end >> 10)));
-    assert!(limit.contains(&format!("_stext == ORIGIN(FLASH) + {}K,", layout::FIRMWARE_A.start >> 10)));
+    let (base, room) = (layout::FLASH_BASE, firmware::TRAILER);
+    assert!(text.contains(&format!("_slot : {base:#010x}, LENGTH = DEFINED(_slot) ? 256K - {room} : 1024K")));
+    let read = |path: &str| std::fs::read_to_string(workspace().join(path)).expect("it is too");
+    let build = read("src/bin/build.rs").replace('_', "");
+    let [a, b] = Slot::ALL.map(|slot| base + slot.firmware().start);
+    assert!(build.contains(&format!("const FIRMWARE: [u32; 2] = [{a:#010x}, {b:#010x}];")), "{a:x} {b:x}");
+    let limits = read("src/bin/stm32f405/slots.x");
+    let code = (firmware::LABEL + firmware::LABEL_SIZE).next_multiple_of(32);
+    let [a, b] = Slot::ALL.map(|slot| base + slot.firmware().start + firmware::MAX_IMAGE);
+    for text in [
+        format!("_stext == ORIGIN(FLASH) + {code:#x},"),
+        format!(".label ORIGIN(FLASH) + {:#x} :", firmware::LABEL),
+        format!("BOOT      : ORIGIN = {base:#010X}, LENGTH = {}K", layout::BOOT_SIZE >> 10),
+        format!("TRAILER_A : ORIGIN = {a:#010X}, LENGTH = {room}"),
+        format!("TRAILER_B : ORIGIN = {b:#010X}, LENGTH = {room}"),
+    ] {
+        assert!(limits.contains(&text), "{text}");
+    }
     assert_eq!(SECTORS.iter().sum::<u32>(), 1 << 20);
-    // Vectors, records, three sectors without use, firmware B, firmware A, weights.
+    // Boot loader, records, three sectors without use, firmware B, firmware A, weights.
     let begins = [layout::STORE, layout::FIRMWARE_B, layout::FIRMWARE_A, layout::SLOTS]
         .map(|range| (sector_at(range.start), sector_at(range.end)));
     assert_eq!(begins, [(Some(1), Some(3)), (Some(6), Some(8)), (Some(8), Some(10)), (Some(10), None)]);

@@ -25,8 +25,7 @@ use crate::stm32f405::pins::Pin;
 
 /// Describes a board. What a board does not have is left out of its file.
 pub struct Board {
-    /// Name of the board, as `bringup` prints it.
-    #[allow(dead_code, reason = "coprocessor does not print it")]
+    /// Name of the board, as `bringup` prints it; its first 16 bytes label an image.
     pub name: &'static str,
     /// Frequency of the crystal at OSC_IN, Hz: 4 to 26 MHz, a whole number of MHz.
     pub crystal_hz: u32,

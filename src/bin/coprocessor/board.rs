@@ -16,6 +16,7 @@ use crate::{crash, serial};
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use gyronet::service::event::CanFault;
 use gyronet::service::message::Identity;
+use gyronet::store::firmware::{LABEL_SIZE, Label};
 
 // SAFETY: each element belongs to one line, which `Board::start` starts.
 static MEMORY: [serial::Memory; 4] = [const { unsafe { serial::Memory::new() } }; 4];
@@ -51,7 +52,7 @@ impl Board {
         let can = if clocks.exact() { Can::start(p.CAN1, Mode::Normal) } else { Err(CanFault::Clock) };
         let (crash, failed_starts) = crash::take(reset);
         let identity = Identity {
-            firmware: version(),
+            firmware: VERSION,
             device_id: Some(device_id),
             serial: serial_number::read(),
             clock_hz: clocks.core_hz,
@@ -125,11 +126,21 @@ fn assign_pins() {
     }
 }
 
-fn version() -> [u8; 3] {
-    let number = |text: &str| text.bytes().fold(0, |number: u8, digit| number * 10 + (digit - b'0'));
-    [
-        number(env!("CARGO_PKG_VERSION_MAJOR")),
-        number(env!("CARGO_PKG_VERSION_MINOR")),
-        number(env!("CARGO_PKG_VERSION_PATCH")),
-    ]
+const VERSION: [u8; 3] = {
+    let [major, minor, patch] =
+        [env!("CARGO_PKG_VERSION_MAJOR"), env!("CARGO_PKG_VERSION_MINOR"), env!("CARGO_PKG_VERSION_PATCH")];
+    [number(major), number(minor), number(patch)]
+};
+
+const fn number(text: &str) -> u8 {
+    let (mut number, mut digits) = (0, text.as_bytes());
+    while let [digit, rest @ ..] = digits {
+        (number, digits) = (10 * number + (*digit - b'0'), rest);
+    }
+    number
 }
+
+/// Says of an update what it is, and for which board.
+#[used]
+#[unsafe(link_section = ".label")]
+static LABEL: [u8; LABEL_SIZE] = Label::new(VERSION, BOARD.name).bytes();

@@ -16,7 +16,7 @@ const POLL: Duration = Duration::from_millis(5);
 /// The images that are measured, in order.
 pub const IMAGES: [&str; 2] = ["bench", "bench_fognet"];
 /// The images that are built to be flashed, optimised for size.
-const FLASHED: [&str; 2] = ["coprocessor", "bringup"];
+const FLASHED: [&str; 3] = ["boot", "coprocessor", "bringup"];
 pub const MACHINE: &str = "netduinoplus2";
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 

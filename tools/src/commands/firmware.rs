@@ -1,0 +1,47 @@
+//! `gyronet firmware` builds the firmware of a board.
+
+use super::{Common, WriteError};
+use gyronet_tools::target::bench;
+use gyronet_tools::target::firmware::Linked;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::process::Command;
+
+/// Build the firmware of a board, boot loader and image, for a debug probe.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Board, as a feature of the images.
+    #[arg(long, default_value = "netduino-plus-2")]
+    board: String,
+    /// Another feature of the images, such as `rtt`.
+    #[arg(long)]
+    features: Option<String>,
+    /// Folder of the build and of its results [default: cargo's target folder].
+    #[arg(long, value_name = "DIR")]
+    target_dir: Option<PathBuf>,
+    /// Flash the board through a debug probe (probe-rs), and show its log until Ctrl-C.
+    #[arg(long)]
+    flash: bool,
+}
+
+pub fn run(args: &Args, common: Common) -> super::Result {
+    let folder = args.target_dir.clone().unwrap_or_else(bench::target_folder);
+    let folder = std::path::absolute(folder)?;
+    let features = args.features.iter().fold(args.board.clone(), |all, one| format!("{all},{one}"));
+    let linked = Linked::build(&features, 1, &folder)?;
+    let elf = folder.join(format!("{}.elf", args.board));
+    std::fs::write(&elf, linked.for_programmer()?).map_err(WriteError::to(&elf))?;
+    if args.flash {
+        let status = Command::new("probe-rs")
+            .args(["run", "--chip", "STM32F405RGTx"])
+            .arg(&elf)
+            .status()
+            .map_err(|error| format!("probe-rs: {error}"))?;
+        return if status.success() { Ok(()) } else { Err(format!("probe-rs: {status}").into()) };
+    }
+    let out = &mut io::stdout().lock();
+    if common.json {
+        return super::print_json(out, &serde_json::json!({ "elf": elf }));
+    }
+    Ok(writeln!(out, "{}: for a debug probe", elf.display())?)
+}

@@ -1,0 +1,94 @@
+//! Makes of the linked images what a board gets: an ELF file with the boot loader for a programmer, and an update for
+//! diagnosis.
+//!
+//! An update holds the image for either slot, since an image runs only where it was linked for. It begins with the list
+//! that is signed ([`gyronet::uds::manifest`]).
+
+use super::bench::{self, BenchError, TARGET};
+use gyronet::model::blob::CRC;
+use gyronet::store::Slot;
+use gyronet::store::firmware::{LABEL, LABEL_SIZE, Label, MAX_IMAGE, Trailer};
+use gyronet::store::layout::{BOOT_SIZE, FLASH_BASE};
+use object::{Object, ObjectSection, ObjectSegment};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, thiserror::Error)]
+pub enum FirmwareFileError {
+    #[error(transparent)]
+    Build(#[from] BenchError),
+    #[error("{}: {source}", path.display())]
+    Io { path: PathBuf, source: std::io::Error },
+    #[error("not a linked image: {0}")]
+    Format(#[from] object::Error),
+    #[error("the image has no {0}")]
+    Lacks(&'static str),
+}
+
+/// The linked images of a board.
+pub struct Linked {
+    /// The boot loader.
+    pub boot: Vec<u8>,
+    /// The image for slots A and B, if it was linked for both, as ELF files.
+    pub images: Vec<Vec<u8>>,
+}
+
+impl Linked {
+    /// Builds the boot loader, and the image for the first `slots` slots, for a board, named by its features.
+    pub fn build(board: &str, slots: usize, folder: &Path) -> Result<Self, FirmwareFileError> {
+        let build = |features: &str, image: &str| {
+            let path = bench::build_for((features, TARGET), &bench::workspace(), image, folder)?;
+            std::fs::read(&path).map_err(|source| FirmwareFileError::Io { path, source })
+        };
+        let boot = build(board, "boot")?;
+        let features = [board.to_owned(), format!("{board},slot-b")];
+        let images = features.iter().take(slots).map(|features| build(features, "coprocessor"));
+        Ok(Self { boot, images: images.collect::<Result<_, _>>()? })
+    }
+
+    /// Returns the ELF file for a programmer: boot loader and confirmed image in slot A, none in slot B.
+    pub fn for_programmer(&self) -> Result<Vec<u8>, FirmwareFileError> {
+        let mut elf = self.images.first().ok_or(FirmwareFileError::Lacks("slot A"))?.clone();
+        let image = image(&elf, Slot::A)?;
+        let trailer =
+            Trailer { is_confirmed: true, ..Trailer::new(image.len() as u32, CRC.checksum(&image), 0, 1) };
+        let boot = flat(&self.boot, FLASH_BASE..FLASH_BASE + BOOT_SIZE)?;
+        for (name, bytes) in [(".boot", &boot[..]), (".trailer_a", &trailer.bytes())] {
+            let place =
+                object::File::parse(&*elf)?.section_by_name(name).and_then(|section| section.file_range());
+            let (start, _) = place.ok_or(FirmwareFileError::Lacks("room for the boot loader"))?;
+            elf[start as usize..][..bytes.len()].copy_from_slice(bytes);
+        }
+        Ok(elf)
+    }
+}
+
+/// Returns the bytes of an image that was linked for a slot, whole words; what is not linked is erased.
+pub fn image(elf: &[u8], slot: Slot) -> Result<Vec<u8>, FirmwareFileError> {
+    let start = FLASH_BASE + slot.firmware().start;
+    let image = flat(elf, start..start + MAX_IMAGE)?;
+    label(&image).map(|_| image)
+}
+
+/// Returns the label of an image.
+pub fn label(image: &[u8]) -> Result<Label, FirmwareFileError> {
+    let bytes = image.get(LABEL..).and_then(|rest| rest.first_chunk::<LABEL_SIZE>());
+    bytes.and_then(Label::parse).ok_or(FirmwareFileError::Lacks("label"))
+}
+
+/// Returns what an ELF file puts into a range of addresses, up to its last byte, whole words.
+fn flat(elf: &[u8], range: Range<u32>) -> Result<Vec<u8>, FirmwareFileError> {
+    let mut bytes = Vec::new();
+    // An image's sections are in the segments at their load addresses.
+    let file = object::read::elf::ElfFile32::<object::Endianness>::parse(elf)?;
+    for segment in file.segments() {
+        let at = segment.elf_program_header().p_paddr.get(object::Endianness::Little);
+        let data = segment.data()?;
+        if range.contains(&at) && !data.is_empty() {
+            let (start, len) = ((at - range.start) as usize, data.len());
+            bytes.resize(bytes.len().max((start + len).next_multiple_of(4)), 0xFF);
+            bytes[start..start + len].copy_from_slice(data);
+        }
+    }
+    Ok(bytes)
+}
