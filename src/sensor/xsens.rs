@@ -6,8 +6,6 @@
 mod emit;
 mod mtdata2;
 
-#[doc(hidden)]
-pub use mtdata2::Precision;
 pub use mtdata2::{MID_MT_DATA2, MtData2, XsensError};
 
 use super::framer::{Framer, Protocol};

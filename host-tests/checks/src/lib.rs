@@ -14,8 +14,6 @@ pub mod synthetic;
 #[path = "../../src/wire.rs"]
 pub mod wire;
 
-#[path = "../../tests/library/align_faults.rs"]
-mod align_faults;
 #[path = "../../tests/library/bosch.rs"]
 mod bosch;
 #[path = "../../tests/library/can_config.rs"]
@@ -58,8 +56,6 @@ mod transmit_queue;
 mod wheel_input;
 #[path = "../../tests/library/xsens.rs"]
 mod xsens;
-#[path = "../../tests/library/xsens_formats.rs"]
-mod xsens_formats;
 #[path = "../../tests/library/xsens_stream.rs"]
 mod xsens_stream;
 #[path = "../../tests/library/yaw_encoder.rs"]

@@ -6,7 +6,6 @@ use gyronet::sensor::crc::CRC_32_MPEG_2;
 use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::icm42688::packet::{PACKET, Packet};
-use gyronet::sensor::xsens::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti, Xbus};
 
 /// Passes bytes as a stream to the MTi's parser, and as the data of a message.
@@ -22,20 +21,17 @@ pub fn xsens(data: &[u8]) {
     if let Ok(message) = MtData2::parse(data) {
         // A parsed message must be parsed as the same again after it was emitted; bytes are compared, since NaN is
         // not equal to itself.
-        let frame = message.emit_as(Precision::Double);
+        let frame = message.emit();
         let (_, again) = Xbus::parse(&frame).expect("an emitted frame");
         let again = MtData2::parse(again).expect("an emitted message");
-        assert_eq!(again.emit_as(Precision::Double), frame);
+        assert_eq!(again.emit(), frame);
     }
 }
 
 pub fn xsens_seeds() -> Vec<Seed> {
-    let fixed = message(77).emit_as(Precision::Fixed1632);
-    let (_, data) = Xbus::parse(&fixed).expect("an emitted frame");
-    vec![
-        ("stream", [synthetic_frame(), message(200).emit_as(Precision::Single).to_vec()].concat()),
-        ("fixed_data", data.to_vec()),
-    ]
+    let frame = message(77).emit();
+    let (_, data) = Xbus::parse(&frame).expect("an emitted frame");
+    vec![("stream", [synthetic_frame(), message(200).emit().to_vec()].concat()), ("data", data.to_vec())]
 }
 
 /// Passes bytes as a stream to the parser, as a message, and as a message with a valid checksum.

@@ -2,7 +2,6 @@
 
 mod activation;
 mod align;
-mod align_faults;
 mod bias;
 mod bias_curve;
 mod blob;
@@ -54,7 +53,6 @@ mod validity;
 mod wheel_input;
 mod window_model;
 mod xsens;
-mod xsens_formats;
 mod xsens_stream;
 mod yaw_encoder;
 mod zero_rate;

@@ -2,7 +2,7 @@
 //! another kind.
 
 use gyronet::sample::{ImuSample, Validity};
-use gyronet::sensor::xsens::{MID_MT_DATA2, MtData2, XsensError};
+use gyronet::sensor::xsens::{MID_MT_DATA2, MtData2, Xbus, XsensError};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, RangeError, SpecificForce};
 use gyronet_host_tests::noise::cases;
 use gyronet_host_tests::wire::{feed_new, message, real_frame, synthetic_frame};
@@ -119,6 +119,10 @@ fn packets_of_a_wrong_length_are_refused() {
             );
         }
     }
+    // FP12.20, FP16.32 and double.
+    for (id, len) in [(0x4021, 12), (0x4022, 18), (0x8023, 24), (0x0811, 4)] {
+        assert_eq!(feed_new(frame(&[(id, &vec![0; len])])), [Err(XsensError::Format { id })]);
+    }
     assert_eq!(MtData2::parse(&[0x40, 0x20, 12, 0]), Err(XsensError::Truncated { id: 0x4020 }));
     assert_eq!(MtData2::parse(&[0x40]), Err(XsensError::Truncated { id: 0 }));
     assert_eq!(MtData2::parse(&[]), Ok(MtData2::default()));
@@ -169,7 +173,7 @@ proptest! {
     #![proptest_config(cases(256))]
 
     #[test]
-    fn emit_then_parse(
+    fn a_message_is_read_as_it_was_sent_or_not_at_all(
         packet_counter: Option<u16>,
         sample_time_fine: Option<u32>,
         acceleration in prop::option::of(prop::array::uniform3(float())),
@@ -181,5 +185,14 @@ proptest! {
         let frame = made.emit();
         prop_assert_eq!(frame[1..].iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte)), 0);
         prop_assert_eq!(MtData2::parse(&frame[4..frame.len() - 1]), Ok(made));
+        // No truncated frame and no flipped bit is believed.
+        for length in 0..frame.len() {
+            prop_assert_eq!(Xbus::parse(&frame[..length]), None);
+        }
+        for bit in 0..frame.len() * 8 {
+            let mut damaged = frame.clone();
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            prop_assert_eq!(Xbus::parse(&damaged), None, "bit {}", bit);
+        }
     }
 }

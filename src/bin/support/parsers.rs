@@ -8,7 +8,6 @@ use gyronet::sensor::ByteSource;
 use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::icm42688::packet::Packet;
-use gyronet::sensor::xsens::Precision;
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::units::Micros;
 
@@ -70,10 +69,8 @@ fn mtdata2(meter: &mut Meter) {
         temperature: None,
         status: Some(3),
     };
-    let single = [1, 2].map(|n| message(n).emit());
-    let double = [1, 2].map(|n| message(n).emit_as(Precision::Double));
-    stream(meter, "sensor/mtdata2_frame", &mut Mti::new(), single.each_ref().map(|frame| &frame[..]));
-    stream(meter, "sensor/mtdata2_f64_frame", &mut Mti::new(), double.each_ref().map(|frame| &frame[..]));
+    let frames = [1, 2].map(|n| message(n).emit());
+    stream(meter, "sensor/mtdata2_frame", &mut Mti::new(), frames.each_ref().map(|frame| &frame[..]));
 }
 
 /// Measures the parser of the bytes of an SPI transfer.

@@ -10,6 +10,8 @@ pub const MID_MT_DATA2: u8 = 0x36;
 pub mod id {
     /// Mask that removes precision and coordinate system.
     pub const MASK: u16 = 0xFFF0;
+    /// Mask of the precision: zero is f32.
+    pub const PRECISION: u16 = 3;
     /// Message counter: u16, wraps.
     pub const PACKET_COUNTER: u16 = 0x1020;
     /// Time of the sensor: u32, 10 kHz ticks, wraps.
@@ -37,7 +39,7 @@ pub enum XsensError {
     SelfTest,
     #[error("MTData2: packet {id:04x} is cut off")]
     Truncated { id: u16 },
-    #[error("MTData2: packet {id:04x} does not have the length of its precision")]
+    #[error("MTData2: packet {id:04x} does not have its length in float: set the MTi's precision to float")]
     Format { id: u16 },
     #[error("MTData2: packet {id:04x} is missing")]
     Missing { id: u16 },
@@ -82,10 +84,11 @@ impl MtData2 {
                 id::SAMPLE_TIME_FINE => message.sample_time_fine = Some(word(packet).ok_or(format)?),
                 id::STATUS_WORD => message.status = Some(word(packet).ok_or(format)?),
                 id::TEMPERATURE => {
-                    message.temperature = Some(Precision::of(full_id).parse_f32(packet).ok_or(format)?);
+                    let [degrees] = numbers(full_id, packet).ok_or(format)?;
+                    message.temperature = Some(degrees);
                 }
-                id::ACCELERATION => message.acceleration = Some(vector(full_id, packet).ok_or(format)?),
-                id::RATE_OF_TURN => message.rate_of_turn = Some(vector(full_id, packet).ok_or(format)?),
+                id::ACCELERATION => message.acceleration = Some(numbers(full_id, packet).ok_or(format)?),
+                id::RATE_OF_TURN => message.rate_of_turn = Some(numbers(full_id, packet).ok_or(format)?),
                 _ => {}
             }
         }
@@ -97,78 +100,9 @@ fn word(packet: &[u8]) -> Option<u32> {
     packet.try_into().ok().map(u32::from_be_bytes)
 }
 
-fn vector(id: u16, packet: &[u8]) -> Option<[f32; 3]> {
-    let precision = Precision::of(id);
-    let mut numbers = packet.chunks_exact(precision.bytes());
-    let mut next = || numbers.next().and_then(|bytes| precision.parse_f32(bytes));
-    let values = [next()?, next()?, next()?];
-    (packet.len() == 3 * precision.bytes()).then_some(values)
-}
-
-/// The format of a number, selected by bits 0 and 1 of the data identifier; all are big-endian.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Precision {
-    /// f32.
-    Single,
-    /// i32 with 20 bits of fraction.
-    Fixed1220,
-    /// 48 bits with 32 bits of fraction; the 32 fraction bits are sent before the 16 integer bits.
-    Fixed1632,
-    /// f64.
-    Double,
-}
-
-impl Precision {
-    /// Returns the precision that a data identifier selects.
-    pub const fn of(id: u16) -> Self {
-        match id & 3 {
-            0 => Self::Single,
-            1 => Self::Fixed1220,
-            2 => Self::Fixed1632,
-            _ => Self::Double,
-        }
-    }
-
-    /// Returns the length of a number, bytes.
-    #[must_use]
-    pub const fn bytes(self) -> usize {
-        match self {
-            Self::Single | Self::Fixed1220 => 4,
-            Self::Fixed1632 => 6,
-            Self::Double => 8,
-        }
-    }
-
-    /// Decodes a number, exactly; `None` if the length of `bytes` is wrong.
-    #[must_use]
-    pub fn parse(self, bytes: &[u8]) -> Option<f64> {
-        match (self, bytes) {
-            (Self::Single, &[a, b, c, d]) => Some(f32::from_be_bytes([a, b, c, d]).into()),
-            (Self::Fixed1220, &[a, b, c, d]) => {
-                Some(f64::from(i32::from_be_bytes([a, b, c, d])) / f64::from(1 << 20))
-            }
-            (Self::Fixed1632, &[f3, f2, f1, f0, i1, i0]) => {
-                let sign = if i1 & 0x80 == 0 { 0 } else { 0xFF };
-                let code = i64::from_be_bytes([sign, sign, i1, i0, f3, f2, f1, f0]);
-                Some(code as f64 / (1u64 << 32) as f64)
-            }
-            (Self::Double, &[a, b, c, d, e, f, g, h]) => Some(f64::from_be_bytes([a, b, c, d, e, f, g, h])),
-            _ => None,
-        }
-    }
-
-    /// Decodes a number and rounds it once to f32. Where possible no f64 arithmetic is used, because some targets
-    /// compute f64 in software.
-    #[must_use]
-    pub fn parse_f32(self, bytes: &[u8]) -> Option<f32> {
-        match (self, bytes) {
-            (Self::Single, &[a, b, c, d]) => Some(f32::from_be_bytes([a, b, c, d])),
-            // The conversion rounds; the division by a power of two is exact.
-            (Self::Fixed1220, &[a, b, c, d]) => {
-                Some(i32::from_be_bytes([a, b, c, d]) as f32 / (1 << 20) as f32)
-            }
-            _ => self.parse(bytes).map(|value| value as f32),
-        }
-    }
+/// Decodes numbers of f32, the MTi's default precision; `None` for another one, or another length.
+fn numbers<const N: usize>(id: u16, packet: &[u8]) -> Option<[f32; N]> {
+    let (words, rest) = packet.as_chunks::<4>();
+    let words: [[u8; 4]; N] = words.try_into().ok()?;
+    (id & id::PRECISION == 0 && rest.is_empty()).then(|| words.map(f32::from_be_bytes))
 }
