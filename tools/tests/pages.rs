@@ -79,5 +79,5 @@ fn tables_are_what_their_commands_print() {
             assert!(now == page, "{} is stale: run this test with GYRONET_WRITE_PAGES=1", path.display());
         }
     }
-    assert!(commands >= 3, "{commands} tables found in all pages: are they read at all?");
+    assert!(commands >= 2, "{commands} tables found in all pages: are they read at all?");
 }
