@@ -429,12 +429,6 @@ impl Coprocessor {
         self.handover.stop();
     }
 
-    /// Notes that FoGNet's weights have been erased or no longer match their checksum. Later rates of the gyro are
-    /// computed without FoGNet and report that.
-    pub fn fognet_unavailable(&mut self) {
-        self.fog.fognet_unavailable();
-    }
-
     /// Notes that the sensor was moved since earlier drives. The next messages report it.
     pub fn mount_moved(&mut self) {
         self.pipeline.mount_moved();

@@ -9,9 +9,7 @@ mod diagnosis;
 mod recording;
 mod records;
 mod sensors;
-mod sequences;
 mod slcan;
-mod trajectory;
 mod weights;
 
 pub type Seed = (&'static str, Vec<u8>);
@@ -28,7 +26,7 @@ pub struct Entrance {
     pub mutations: u64,
 }
 
-pub const ALL: [Entrance; 14] = [
+pub const ALL: [Entrance; 12] = [
     Entrance { name: "xsens", run: sensors::xsens, seeds: sensors::xsens_seeds, mutations: 20_000 },
     Entrance { name: "dsp1760", run: sensors::dsp1760, seeds: sensors::dsp1760_seeds, mutations: 20_000 },
     Entrance { name: "icm42688", run: sensors::icm42688, seeds: sensors::icm42688_seeds, mutations: 20_000 },
@@ -41,8 +39,6 @@ pub const ALL: [Entrance; 14] = [
     Entrance { name: "gyronet_blob", run: weights::gyronet, seeds: weights::seeds, mutations: 100 },
     Entrance { name: "fognet_blob", run: weights::fognet, seeds: weights::seeds, mutations: 50 },
     Entrance { name: "recording", run: recording::csv, seeds: recording::seeds, mutations: 1_000 },
-    Entrance { name: "sequences", run: sequences::folder, seeds: sequences::seeds, mutations: 300 },
-    Entrance { name: "trajectory", run: trajectory::tum, seeds: trajectory::seeds, mutations: 20_000 },
 ];
 
 pub fn run(name: &str, data: &[u8]) {

@@ -325,12 +325,6 @@ impl FogPipeline {
         Some(estimate)
     }
 
-    /// Notes that FoGNet's weights are unavailable: later rates are computed without FoGNet and report that.
-    pub fn fognet_unavailable(&mut self) {
-        (self.has_network, self.due, self.awaited) = (false, None, false);
-        self.estimate_faults = Faults::NONE;
-    }
-
     /// Stops FoGNet until the next start. This step's rate still contains its estimate.
     fn drop_fognet(&mut self) {
         count(&mut self.counters.dropped, 1);

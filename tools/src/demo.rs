@@ -1,7 +1,6 @@
 //! The results of one drive, for the summary that `gyronet demo` prints and for its page.
 
 mod can_excerpt;
-mod costs;
 mod page;
 mod short_table;
 mod trajectory;
@@ -16,7 +15,6 @@ use gyronet::can::config::Config;
 use serde::Serialize;
 
 pub use can_excerpt::{Message, Sent};
-pub use costs::Cost;
 pub use short_table::ShortTable;
 pub use trajectory::{Path, Trajectories};
 pub use tunnel::Tunnel;
@@ -32,7 +30,6 @@ pub struct Demo<'a> {
     /// The tunnels, where the drive has courses.
     pub tunnel: Option<&'a Tunnel>,
     pub excerpt: Vec<Message>,
-    pub costs: Vec<Cost>,
     /// Messages of the whole drive.
     pub frames: u64,
 }
@@ -55,7 +52,6 @@ pub struct Summary<'a> {
     outage: Option<&'a ByLength>,
     frames: u64,
     excerpt: &'a [Message],
-    costs: &'a [Cost],
 }
 
 impl<'a> Demo<'a> {
@@ -76,7 +72,6 @@ impl<'a> Demo<'a> {
             trajectories: Trajectories::new(drive, rates),
             tunnel,
             excerpt: can_excerpt::in_words(sent.fastest.as_ref(), drive.facts.first, Config::DEFAULT),
-            costs: costs::all(drive.facts.rows, sent.run_time, &Config::DEFAULT),
             frames: sent.frames,
         }
     }
@@ -94,7 +89,6 @@ impl<'a> Demo<'a> {
             paths: self.trajectories.as_ref().map(|trajectories| trajectories.paths.as_slice()),
             frames: self.frames,
             excerpt: &self.excerpt,
-            costs: &self.costs,
         }
     }
 

@@ -77,19 +77,6 @@ fn corrected_when_an_estimate_is_in_use() {
 }
 
 #[test]
-fn a_network_whose_weights_are_gone_is_left_out_at_once_and_reported() {
-    let mut fog = with_fognet(true);
-    let sent = run(&mut fog, 1..301, |_| true);
-    assert_eq!(sent.last().map(|yaw| yaw.source), Some(Source::FogNet));
-    fog.fognet_unavailable();
-    let late = fog.counters().late;
-    let sent = run(&mut fog, 301..701, |_| true);
-    let without = (Source::EarthRate, Quality::Degraded, Faults::STORED);
-    assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality, yaw.faults) == without), "{:?}", sent[0]);
-    assert!(fog.second().is_none() && fog.counters().late == late);
-}
-
-#[test]
 fn a_gap_is_no_rate_and_ends_the_window() {
     let mut fog = with_fognet(true);
     let sent = run(&mut fog, 1..501, |step| !(301..306).contains(&step));

@@ -4,7 +4,7 @@ use gyronet::bias::STATIC_SAMPLES;
 use gyronet_host_tests::recordings;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::evaluate::fir::LowPass;
-use gyronet_tools::evaluate::heading_error::Reference;
+use gyronet_tools::evaluate::heading_error::AgainstRate;
 
 /// The training drives: none on which the rows are judged.
 const TRIALS: [u32; 5] = [2, 3, 4, 6, 7];
@@ -31,9 +31,10 @@ impl Drive {
 
     /// 1 s error of such rates behind static initialisation.
     fn error(&self, rates: &[f64]) -> f64 {
-        let behind = |rates: &[f64]| rates[STATIC_SAMPLES as usize..].to_vec();
-        let errors = Reference::Rate(behind(&self.reference)).errors(&behind(rates)).expect("whole seconds");
-        errors.figures.mean_1s_rad.expect("whole seconds")
+        let mut against = AgainstRate::new();
+        let behind = self.reference.iter().zip(rates).skip(STATIC_SAMPLES as usize);
+        behind.for_each(|(truth, rate)| against.add(*rate, *truth));
+        against.errors().and_then(|errors| errors.figures.mean_1s_rad).expect("whole seconds")
     }
 }
 

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// Show all results of one drive: a table of errors, a page, a CAN log.
 ///
 /// The page (demo.html) needs only a browser. It has charts of yaw, errors and path that can be zoomed, the table
-/// of methods, decoded CAN messages, time and memory. Without FILE the command takes the simulated drive that
+/// of methods and decoded CAN messages. Without FILE the command takes the simulated drive that
 /// comes with it.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\

@@ -13,7 +13,6 @@ use gyronet::coprocessor::{self, TimedFrame};
 use gyronet::model::WindowNetwork;
 use gyronet::units::Micros;
 use serde::Serialize;
-use std::time::{Duration, Instant};
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Message {
@@ -32,8 +31,6 @@ pub struct Sent {
     /// The step with the fastest turn after static initialisation.
     pub fastest: Option<Step>,
     pub frames: u64,
-    /// The time that this machine took for the board alone.
-    pub run_time: Duration,
 }
 
 impl Sent {
@@ -43,12 +40,8 @@ impl Sent {
         out: impl std::io::Write,
     ) -> Result<Self, Box<dyn std::error::Error>> {
         let (mut sent, mut log) = (Self::default(), Log::new(out));
-        let mut steps = Steps::new(drive, Board::new(coprocessor::Config::DEFAULT, drive.wheels(), network))?;
-        loop {
-            let began = Instant::now();
-            let step = steps.next();
-            sent.run_time += began.elapsed();
-            let Some(step) = step.transpose()? else { break };
+        for step in Steps::new(drive, Board::new(coprocessor::Config::DEFAULT, drive.wheels(), network))? {
+            let step = step?;
             for TimedFrame { frame, time } in &step.frames {
                 log.frame(*time, frame)?;
             }

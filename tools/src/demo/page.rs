@@ -1,7 +1,7 @@
 //! Writes the page of a drive.
 
 use super::trajectory::Trajectories;
-use super::{Cost, Demo, Message, Tunnel};
+use super::{Demo, Message, Tunnel};
 use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
 use crate::evaluate::report::{COLUMNS, columns};
@@ -43,8 +43,6 @@ pub fn page(demo: &Demo<'_>) -> String {
     body += &methods(demo);
     body += "<h2>On the bus</h2>\n";
     body += &excerpt(demo);
-    body += "<h2>Time and memory</h2>\n";
-    body += &costs(&demo.costs);
     document(&format!("gyronet demo: {name}"), &body)
 }
 
@@ -175,9 +173,4 @@ fn excerpt(demo: &Demo<'_>) -> String {
         );
     }
     html + "</tbody></table></div>\n"
-}
-
-fn costs(costs: &[Cost]) -> String {
-    let rows = costs.iter().map(|cost| vec![cost.what.to_owned(), cost.figure.clone(), cost.how.clone()]);
-    table("costs", "", &["what", "figure", "from where"], rows)
 }

@@ -26,42 +26,6 @@ pub const PLAUSIBLE_10S_RAD: f64 = 0.5;
 /// Lengths of the windows over which the heading change is judged, s.
 const WINDOWS_S: [usize; 3] = [1, 10, 60];
 
-#[derive(Debug, Clone, PartialEq)]
-pub enum Reference {
-    /// The true yaw rate of each sample, rad/s (`ref_gyr_z`).
-    Rate(Vec<f64>),
-    /// The course of some samples, rad to the left (`ref_yaw`).
-    Course(Vec<Option<f64>>),
-}
-
-impl Reference {
-    /// The yaw rates; `None` for a course.
-    pub fn rate(&self) -> Option<&[f64]> {
-        match self {
-            Self::Rate(rate) => Some(rate),
-            Self::Course(_) => None,
-        }
-    }
-
-    /// The heading error of an estimated yaw rate; `None` for less than a second of yaw rate or less than 20 s of
-    /// course, or another number of samples.
-    pub fn errors(&self, estimate: &[f64]) -> Option<Errors> {
-        match self {
-            Self::Rate(reference) if reference.len() == estimate.len() => {
-                let mut against = AgainstRate::new();
-                reference.iter().zip(estimate).for_each(|(truth, rate)| against.add(*rate, *truth));
-                against.errors()
-            }
-            Self::Course(course) if course.len() == estimate.len() => {
-                let mut against = AgainstCourse::new();
-                course.iter().zip(estimate).for_each(|(course, rate)| against.add(*rate, *course));
-                against.errors()
-            }
-            _ => None,
-        }
-    }
-}
-
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
     pub figures: HeadingError,
@@ -421,6 +385,20 @@ impl BiasByCourse {
 mod tests {
     use super::*;
 
+    /// The errors of a rate against a rate.
+    fn by_rate(reference: &[f64], estimate: &[f64]) -> Option<Errors> {
+        let mut against = AgainstRate::new();
+        reference.iter().zip(estimate).for_each(|(truth, rate)| against.add(*rate, *truth));
+        against.errors()
+    }
+
+    /// The errors of a constant rate against a course.
+    fn by_course(course: &[Option<f64>], rate: f64) -> Option<Errors> {
+        let mut against = AgainstCourse::new();
+        course.iter().for_each(|course| against.add(rate, *course));
+        against.errors()
+    }
+
     fn close(figure: Option<f64>, due: f64) {
         let figure = figure.expect("a figure");
         assert!((figure - due).abs() < 1e-9, "{figure} is not {due}");
@@ -434,8 +412,7 @@ mod tests {
 
     #[test]
     fn a_constant_bias_grows_with_the_window() {
-        let error =
-            Reference::Rate(vec![0.3; 12_050]).errors(&vec![0.301; 12_050]).expect("whole seconds").figures;
+        let error = by_rate(&[0.3; 12_050], &[0.301; 12_050]).expect("whole seconds").figures;
         close(error.mean_1s_rad, 0.001);
         close(error.mean_10s_rad, 0.01);
         close(error.mean_60s_rad, 0.06);
@@ -446,10 +423,9 @@ mod tests {
 
     #[test]
     fn a_short_drive_has_no_long_window() {
-        let error = Reference::Rate(vec![0.0; 500]).errors(&vec![0.0; 500]).expect("five seconds").figures;
+        let error = by_rate(&[0.0; 500], &[0.0; 500]).expect("five seconds").figures;
         assert_eq!((error.mean_1s_rad, error.mean_10s_rad, error.mean_60s_rad), (Some(0.0), None, None));
-        assert_eq!(Reference::Rate(vec![0.0; 99]).errors(&[0.0; 99]), None);
-        assert_eq!(Reference::Rate(vec![0.0; 200]).errors(&[0.0; 199]), None);
+        assert_eq!(by_rate(&[0.0; 99], &[0.0; 99]), None);
     }
 
     /// The vehicle drives in circles for two minutes. The course of each second is wrapped, has an arbitrary zero, a
@@ -464,8 +440,7 @@ mod tests {
                 known.then(|| wrap(2.0 + turn * f64::from(k) * DT + outlier))
             })
             .collect();
-        let error =
-            Reference::Course(course).errors(&vec![turn + bias; 12_000]).expect("enough course").figures;
+        let error = by_course(&course, turn + bias).expect("enough course").figures;
         assert_eq!((error.mean_1s_rad, error.mean_10s_rad), (None, None));
         let near = |figure: Option<f64>, due: f64| {
             let figure = figure.expect("a figure");
@@ -483,9 +458,9 @@ mod tests {
     fn too_little_course_gives_nothing() {
         let course =
             |seconds: usize| (0..6_000).map(|k| (k < 100 * seconds).then_some(0.0)).collect::<Vec<_>>();
-        assert_eq!(Reference::Course(course(10)).errors(&[0.0; 6_000]), None);
-        assert!(Reference::Course(course(20)).errors(&[0.0; 6_000]).is_some());
-        assert_eq!(Reference::Course(vec![None; 6_000]).errors(&[0.0; 6_000]), None);
+        assert_eq!(by_course(&course(10), 0.0), None);
+        assert!(by_course(&course(20), 0.0).is_some());
+        assert_eq!(by_course(&[None; 6_000], 0.0), None);
         assert_eq!(bias(0.1, &course(15)), None);
     }
 
@@ -501,10 +476,9 @@ mod tests {
     fn a_reference_of_the_other_sign_is_noticed() {
         let rate: Vec<f64> = (0..6_000).map(|k| 0.4 * (f64::from(k) * 0.002).sin()).collect();
         let other: Vec<f64> = rate.iter().map(|rate| -rate).collect();
-        let typical =
-            |reference: Vec<f64>| Reference::Rate(reference).errors(&rate).and_then(|e| e.typical_10s);
-        assert!(typical(other).is_some_and(|off| off > PLAUSIBLE_10S_RAD));
-        assert_eq!(typical(rate.clone()), Some(0.0));
+        let typical = |reference: &[f64]| by_rate(reference, &rate).and_then(|errors| errors.typical_10s);
+        assert!(typical(&other).is_some_and(|off| off > PLAUSIBLE_10S_RAD));
+        assert_eq!(typical(&rate), Some(0.0));
     }
 
     #[test]

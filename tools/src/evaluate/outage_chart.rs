@@ -29,7 +29,6 @@ fn column(method: Method) -> usize {
     METHODS.iter().position(|own| *own == method).expect("the drawn methods are compared ones")
 }
 
-/// Returns the picture of an outage of a drive.
 pub fn svg(drive: &str, outage: &Outage, points: &[Point]) -> String {
     let title = format!(
         "{drive}: {} s without GNSS, {:.0} s after the start, after {:.0} s with it",

@@ -12,7 +12,6 @@ pub struct Point {
     pub places: Option<([f64; 2], ByMethod<[f64; 2]>)>,
 }
 
-/// The paths since a start.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Path {
     /// Angles by each method, and by the gyro alone, rad.
@@ -44,7 +43,6 @@ impl Path {
         self.off = off;
     }
 
-    /// Returns the angle by the gyro alone, rad.
     pub fn gyro(&self) -> f64 {
         self.gyro
     }

@@ -19,7 +19,7 @@ fn the_page_needs_nothing_else_and_says_what_the_json_says() {
     for outside in ["http://", "https://", "src=", "href=", "@import", "url("] {
         assert!(!page.contains(outside), "{outside}");
     }
-    for section in ["Yaw", "Path", "Methods", "On the bus", "Time and memory"] {
+    for section in ["Yaw", "Path", "Methods", "On the bus"] {
         assert!(page.contains(&format!("<h2>{section}</h2>")), "{section}");
     }
     assert!(!page.contains("Simulated drive."), "it is a file like any other");

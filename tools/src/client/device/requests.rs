@@ -29,8 +29,6 @@ const CALIBRATION_STATE: u16 = 0x010C;
 pub const UNIT: u16 = 0x010D;
 /// Data identifier of the public key that controls who may write.
 pub const KEY: u16 = 0x0110;
-/// Data identifier of the number of received messages of the fibre-optic gyro.
-pub const FOG_MESSAGES: u16 = 0x0112;
 /// Data identifier of the state of the access control.
 pub const ACCESS: u16 = 0x0111;
 const ACCESS_COUNTERS: u16 = 0x0113;
