@@ -56,6 +56,9 @@ pub struct CompensateConfig {
     pub max_single: AngularRate,
     /// Largest part of the revisions that one rate carries.
     pub max_revision: AngularRate,
+    /// True if the model's corrections are subtracted. Without them the rate is that of the gyro less bias, level and
+    /// gain; the windows still state its expected error.
+    pub model: bool,
 }
 
 impl CompensateConfig {
@@ -71,6 +74,7 @@ impl CompensateConfig {
         max_mean: AngularRate::from_deg_per_sec(3.0),
         max_single: AngularRate(10 * AngularRate::from_deg_per_sec(3.0).0),
         max_revision: AngularRate::from_deg_per_sec(1.0),
+        model: true,
     };
 }
 
@@ -229,8 +233,12 @@ impl Compensator {
     /// # Errors
     /// [`Implausible`]: nothing was revised, and the next samples have no steady part.
     pub fn revise(&mut self, estimate: &Estimate) -> Result<(), Implausible> {
-        let CompensateConfig { mode, lag, max_mean, max_single, .. } = self.config;
-        let corrections = &estimate.corrections;
+        let CompensateConfig { mode, lag, max_mean, max_single, model, .. } = self.config;
+        let (corrections, steady_gain) = if model {
+            (&estimate.corrections, estimate.steady_gain)
+        } else {
+            (&[AngularRate::ZERO; WINDOW], SteadyGain::NONE)
+        };
         let average = mean(corrections);
         let largest = corrections.iter().max_by_key(|c| c.0.unsigned_abs()).copied().unwrap_or_default();
         if average.unsigned_abs() > max_mean.0.unsigned_abs()
@@ -239,8 +247,8 @@ impl Compensator {
             self.forget();
             return Err(Implausible { mean: AngularRate(average), largest });
         }
-        self.steady_gain = estimate.steady_gain;
-        self.mounting = estimate.steady_gain.mounting();
+        self.steady_gain = steady_gain;
+        self.mounting = steady_gain.mounting();
         let used = mode.used();
         let oldest = KEPT - (mode.delay() as usize - 1) - WINDOW;
         let window = self.kept.iter().skip(oldest).zip(corrections).take(used.end).skip(used.start);

@@ -131,6 +131,7 @@ pub fn configuration(noise: &mut Noise) -> Configuration {
             max_mean: rate(noise, Field::CompensateMaxMean),
             max_single: rate(noise, Field::CompensateMaxSingle),
             max_revision: rate(noise, Field::CompensateMaxRevision),
+            model: noise.int(0, 1) == 0,
         },
         fog_ids: three(noise, default.fog_ids),
         fog_gyro: FogGyro { tilt_deg: within(noise, Field::FogTiltDeg) },

@@ -4,7 +4,7 @@ use super::{BoardState, Origin, Pipeline, Rates, Turning};
 use crate::bias::ZeroRate;
 use crate::compensate::Compensated;
 use crate::estimate::{VehicleSample, YawEstimate};
-use crate::health::{Faults, Quality, Status, judge};
+use crate::health::{Faults, Quality, Source, Status, judge};
 use crate::sample::{Frame, PERIOD_US, Validity, WheelSample};
 use crate::sqrt::sqrt;
 use crate::standstill::Standing;
@@ -158,6 +158,8 @@ impl Pipeline {
             Validity::Good => Status::Degraded,
         };
         let (source, quality) = judge(status);
+        let has_model = self.config.compensate.model;
+        let source = if source == Source::Model && !has_model { Source::Static } else { source };
         let quality =
             if self.is_bias_coarse() && quality == Quality::Good { Quality::Degraded } else { quality };
         let [.., raw] = frame.sample.angular_rate;

@@ -7,11 +7,11 @@ use gyronet::can::config::Config;
 use gyronet::can::encoder::CanEncoder;
 use gyronet::compensate::{CompensateConfig, DELAY};
 use gyronet::estimate::YawEstimate;
-use gyronet::health::Faults;
 use gyronet::health::Status::{Degraded, Init, Ready};
+use gyronet::health::{Faults, Source};
 use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SCALE_MIN};
-use gyronet::pipeline::{BoardState, DueWindow, Output};
+use gyronet::pipeline::{BoardState, DueWindow, Output, Pipeline, PipelineConfig};
 use gyronet::units::{AngularRate, Yaw};
 use gyronet_host_tests::stream::{constant, drive, faults, new, run, statuses};
 use gyronet_host_tests::synthetic::{rate, turning};
@@ -113,4 +113,24 @@ fn a_rate_beyond_the_signal_is_marked() {
 fn tx1(encoder: &mut CanEncoder, outputs: &[Output]) -> Vec<Message> {
     let mut first = |output: &Output| encoder.encode(&output.vehicle)[0];
     outputs.iter().map(|output| Message::parse(first(output).data()).expect("a good checksum")).collect()
+}
+
+#[test]
+fn a_model_that_is_switched_off_corrects_nothing_and_the_rate_is_good() {
+    let mut config = PipelineConfig::DEFAULT;
+    config.compensate.model = false;
+    let outputs = |config, network: &mut dyn FnMut(&DueWindow) -> Option<Estimate>| {
+        run(&mut Pipeline::new(config), drive(0..600), network)
+    };
+    // A correction of any size is neither used nor refused.
+    let off = outputs(config, &mut constant(9.0));
+    let on = outputs(PipelineConfig::DEFAULT, &mut constant(0.0));
+    for (off, on) in off.iter().zip(&on) {
+        for (off, on) in [(off.vehicle.live, on.vehicle.live), (off.vehicle.delayed, on.vehicle.delayed)] {
+            let source = if on.source == Source::Model { Source::Static } else { on.source };
+            assert_eq!(off, YawEstimate { source, ..on });
+        }
+    }
+    let last = off.last().expect("samples").vehicle.delayed;
+    assert_eq!((last.source, last.status), (Source::Static, Ready));
 }

@@ -76,6 +76,10 @@ const SETTINGS: &[(&str, Takes)] = &[
         Number("rad/s", Field::CompensateMaxRevision, "largest part of a revision that is added to one rate"),
     ),
     (
+        "compensate.model",
+        Other("", "`false`: the model's corrections are not subtracted, only bias, level and gain"),
+    ),
+    (
         "fog_ids",
         Other(
             "",
