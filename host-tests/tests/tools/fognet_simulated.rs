@@ -8,7 +8,7 @@ use gyronet::model::{FogBlob, FogNet, weights};
 use gyronet_host_tests::sequence::simulate;
 use gyronet_paper::fog_replay::{check_weights, default_config, run_board};
 use gyronet_paper::sequence::Sequence;
-use gyronet_paper::simulate::{Layout, Spec};
+use gyronet_paper::simulate::Spec;
 
 const SECONDS: u32 = 10 * 60;
 /// Runs of the gyro that FoGNet was trained for; none of them is in a set.
@@ -17,7 +17,7 @@ const RUNS: std::ops::Range<u64> = 501..503;
 const RATIO: f64 = 0.9;
 
 fn simulated(device: u64, run: u64) -> Sequence {
-    simulate(&Spec { layout: Layout::Kaist, name: "made".into(), seconds: SECONDS, device, run })
+    simulate(&Spec { name: "made".into(), seconds: SECONDS, device, run })
 }
 
 /// The sum over a drive's minutes of the error of each one's turn, rad.

@@ -9,7 +9,7 @@ use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require;
 use gyronet_paper::fog_replay;
 use gyronet_paper::sequence::{self, Sequence};
-use gyronet_paper::simulate::{self, Layout, Spec};
+use gyronet_paper::simulate::{self, Spec};
 use gyronet_tools::drive::recording::Recording;
 use serde::Deserialize;
 use std::fs::File;
@@ -63,7 +63,7 @@ fn python_and_the_library_make_the_same_windows_and_losses() {
     let Some(python) = require::python(test, &["numpy"]) else { return };
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
-    let spec = Spec { layout: Layout::Kaist, name: "made".into(), seconds: 90, device: 1, run: 4 };
+    let spec = Spec { name: "made".into(), seconds: 90, device: 1, run: 4 };
     simulate::write(&spec, folder).unwrap();
     let sequence = Sequence::read(folder).unwrap();
     let csv = folder.join("made.csv");

@@ -3,7 +3,7 @@
 
 use gyronet_host_tests::sequence::simulate;
 use gyronet_paper::sequence::Sequence;
-use gyronet_paper::simulate::{Layout, Spec};
+use gyronet_paper::simulate::Spec;
 use gyronet_paper::tables::estimates::Estimates;
 use gyronet_paper::tables::given::Given;
 use gyronet_paper::tables::results::{Errors, Results, SequenceErrors};
@@ -54,8 +54,8 @@ impl Scratch {
 }
 
 /// Simulates a sequence of two minutes.
-fn sequence(layout: Layout, name: &str) -> Sequence {
-    simulate(&Spec { layout, name: name.into(), seconds: 120, device: 1, run: 5 })
+fn sequence(name: &str) -> Sequence {
+    simulate(&Spec { name: name.into(), seconds: 120, device: 1, run: 5 })
 }
 
 /// Returns a row of the format for each step; places are from the sequence's first.
@@ -76,25 +76,23 @@ fn truth(sequence: &Sequence) -> Vec<String> {
 }
 
 #[test]
-fn the_truth_has_no_error_in_either_layout() {
+fn the_truth_has_no_error() {
     let scratch = Scratch::new();
-    for (layout, name) in [(Layout::Kaist, "k"), (Layout::Nclt, "n")] {
-        let sequence = sequence(layout, name);
-        // As lwoi writes: whole seconds, so a little less than the sequence.
-        let mut rows = truth(&sequence);
-        rows.truncate(rows.len() - 95);
-        scratch.write(&sequence, &rows);
-        let errors = scratch.compared(&sequence);
-        assert!(errors.ate_m < 1e-4 && errors.aligned_ate_m < 1e-4, "{name}: {errors:?}");
-        assert!(errors.mean_1s_rad < 1e-7 && errors.final_unwrapped_rad < 1e-6, "{name}: {errors:?}");
-        assert_eq!(errors.run_time_s, None);
-    }
+    let sequence = sequence("k");
+    // As lwoi writes: whole seconds, so a little less than the sequence.
+    let mut rows = truth(&sequence);
+    rows.truncate(rows.len() - 95);
+    scratch.write(&sequence, &rows);
+    let errors = scratch.compared(&sequence);
+    assert!(errors.ate_m < 1e-4 && errors.aligned_ate_m < 1e-4, "{errors:?}");
+    assert!(errors.mean_1s_rad < 1e-7 && errors.final_unwrapped_rad < 1e-6, "{errors:?}");
+    assert_eq!(errors.run_time_s, None);
 }
 
 #[test]
 fn a_known_error_is_found() {
     let scratch = Scratch::new();
-    let sequence = sequence(Layout::Kaist, "k");
+    let sequence = sequence("k");
     let steps = &sequence.steps;
     let shifted = rows(&sequence, |k| {
         let ([x, y], turned) = (steps[k].position, if k > 5_000 { 0.02 } else { 0.0 });
@@ -118,7 +116,7 @@ fn a_known_error_is_found() {
 #[test]
 fn ten_poses_a_second_are_enough() {
     let scratch = Scratch::new();
-    let sequence = sequence(Layout::Kaist, "k");
+    let sequence = sequence("k");
     let slow: Vec<String> = truth(&sequence).into_iter().step_by(10).collect();
     scratch.write(&sequence, &slow);
     let errors = scratch.compared(&sequence);
@@ -128,7 +126,7 @@ fn ten_poses_a_second_are_enough() {
 #[test]
 fn what_cannot_be_compared_is_left_out_and_named() {
     let scratch = Scratch::new();
-    let sequence = sequence(Layout::Kaist, "k");
+    let sequence = sequence("k");
     let good = truth(&sequence);
     let steps = &sequence.steps;
     let shifted = |seconds: f64| {
@@ -181,7 +179,7 @@ fn what_cannot_be_compared_is_left_out_and_named() {
 #[test]
 fn the_tables_count_what_was_left_out() {
     let scratch = Scratch::new();
-    let sequences = ["a", "b"].map(|name| sequence(Layout::Kaist, name));
+    let sequences = ["a", "b"].map(|name| sequence(name));
     scratch.write(&sequences[0], &truth(&sequences[0]));
     let both = sequences.each_ref().map(|sequence| scratch.errors(sequence));
     let tables = table::tables(&Results::new(both.to_vec()));

@@ -1,8 +1,8 @@
 //! Runs a sequence through the coprocessor, to get the rates that the board sends with or without FoGNet,
 //! and through FoGNet alone, to correct the turns of the sequence.
 
+use crate::sequence::Layout;
 use crate::sequence::{Sequence, Step};
-use crate::simulate::Layout;
 use gyronet::bias::Latitude;
 use gyronet::coprocessor::{Clock, Config, Coprocessor, Sink, TimedFrame};
 use gyronet::estimate::YawEstimate;
@@ -201,7 +201,7 @@ fn angle(rad: f64) -> Angle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::{self, Layout, Spec};
+    use crate::simulate::{self, Spec};
     use gyronet::model::fognet::FogEstimate;
     use gyronet::model::seconds::SecondsWindow;
 
@@ -218,8 +218,7 @@ mod tests {
     #[test]
     fn a_constant_bias_comes_off_every_corrected_step() {
         let folder = tempfile::tempdir().unwrap();
-        let spec =
-            Spec { layout: Layout::Kaist, name: String::from("short"), seconds: 40, device: 1, run: 1 };
+        let spec = Spec { name: String::from("short"), seconds: 40, device: 1, run: 1 };
         simulate::write(&spec, folder.path()).unwrap();
         let sequence = Sequence::read(folder.path()).unwrap();
         let fog = run(&sequence, &mut Bias, FogConfig::DEFAULT);

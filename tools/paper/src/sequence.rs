@@ -19,7 +19,7 @@ pub use export::{HEADER, write_csv, write_whole};
 pub(super) use kaist::yaw;
 pub use summary::{Seen, StreamSummary};
 
-use crate::simulate::{Layout, MARKER, Spec};
+use crate::simulate::{MARKER, Spec, vehicles::KAIST};
 pub use fault::SequenceFault;
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::{ImuSample, PERIOD_US, Validity};
@@ -28,6 +28,7 @@ use gyronet_tools::drive::DT;
 use gyronet_tools::drive::error::{DataError, DataFault};
 use gyronet_tools::drive::recording::{Recording, Row as RecordingRow};
 use gyronet_tools::drive::vehicle::Vehicle;
+use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
 use track::Stream;
@@ -38,6 +39,33 @@ pub const MAX_GAP: f64 = 0.1;
 const STANDING: f64 = 0.01;
 /// Minimum length of a sequence, s: static initialisation and one second.
 const NEEDED: f64 = 4.0;
+
+/// The data set whose folders and formats a sequence has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Layout {
+    /// KAIST Complex Urban: a car, Xsens MTi-300, KVH DSP-1760, wheel encoders.
+    Kaist,
+    /// NCLT: a Segway, MicroStrain 3DM-GX3-45, KVH DSP-3000, wheel speeds.
+    Nclt,
+}
+
+impl Layout {
+    pub fn wheel_radius_m(self) -> f64 {
+        match self {
+            Self::Kaist => KAIST.world.car.wheel_radius,
+            Self::Nclt => 0.24,
+        }
+    }
+
+    /// The latitude of the place where the data set was recorded: Daejeon, Ann Arbor.
+    fn latitude_deg(self) -> f64 {
+        match self {
+            Self::Kaist => KAIST.world.latitude_deg,
+            Self::Nclt => 42.29,
+        }
+    }
+}
 
 /// A step of the grid. Axes are x forward, y left, z up; heading is counter-clockwise from east.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -191,7 +219,7 @@ impl Sequence {
     /// Returns the latitude for the Earth's rate: that of the simulation, or of the place where the data set was
     /// recorded.
     pub fn latitude_deg(&self) -> f64 {
-        let made = self.layout.vehicle().world.latitude_deg;
+        let made = self.layout.latitude_deg();
         // A simulated world rotates as at the latitude of its settings, whatever the position of its map.
         self.latitude.filter(|_| self.simulated.is_none()).unwrap_or(made)
     }
@@ -206,7 +234,7 @@ impl Sequence {
     /// Returns the rates of the left and the right wheel in a step, rad/s, by the wheel radius of the data set's
     /// vehicle.
     pub fn wheel_rates(&self, step: &Step) -> [f64; 2] {
-        let radius = self.layout.vehicle().world.car.wheel_radius;
+        let radius = self.layout.wheel_radius_m();
         step.wheels.map(|way| way / DT / radius)
     }
 

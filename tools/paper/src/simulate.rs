@@ -1,4 +1,4 @@
-//! Simulated sequences in the layouts of KAIST Complex Urban and NCLT, with an exactly known
+//! Simulated sequences in the layout of KAIST Complex Urban, with an exactly known
 //! truth: the car of [`gyronet_tools::simulate`] drives through a town with a fibre-optic gyro ([`fog`]) and wheels
 //! (`odometer`). [`vehicles`] lists every parameter with its source.
 //!
@@ -10,7 +10,6 @@
 mod delay;
 pub mod fog;
 mod kaist;
-mod nclt;
 mod odometer;
 mod text;
 mod town;
@@ -20,7 +19,6 @@ pub mod world;
 use self::fog::Fog;
 use self::odometer::Odometer;
 use self::town::Town;
-use self::vehicles::Vehicle;
 use self::world::{Truth, World};
 use gyronet::sample::RATE_HZ;
 use gyronet_tools::random::Random;
@@ -33,28 +31,9 @@ use std::path::Path;
 /// Name of the file that marks a sequence's folder as simulated.
 pub const MARKER: &str = "simulated.json";
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum Layout {
-    /// KAIST Complex Urban: a car, Xsens MTi-300, KVH DSP-1760, wheel encoders.
-    Kaist,
-    /// NCLT: a Segway, MicroStrain 3DM-GX3-45, KVH DSP-3000, wheel speeds.
-    Nclt,
-}
-
-impl Layout {
-    pub fn vehicle(self) -> Vehicle {
-        match self {
-            Self::Kaist => vehicles::KAIST,
-            Self::Nclt => vehicles::NCLT,
-        }
-    }
-}
-
 /// The specification of a sequence, which is written to [`MARKER`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Spec {
-    pub layout: Layout,
     /// Name of the sequence and of its folder.
     pub name: String,
     /// Length, s.
@@ -80,14 +59,14 @@ pub const SECONDS: u32 = 20 * 60;
 
 impl Set {
     /// Returns the specifications of the set's sequences. No run is in two sets.
-    pub fn specs(self, layout: Layout) -> Vec<Spec> {
+    pub fn specs(self) -> Vec<Spec> {
         let (word, count, device, first) = match self {
             Self::Train => ("train", 8u64, 1, 101),
             Self::Test => ("test", 4, 1, 201),
             Self::Transfer => ("transfer", 4, 2, 301),
         };
         let name = |k| format!("{word}{:02}", k + 1);
-        let spec = |k| Spec { layout, name: name(k), seconds: SECONDS, device, run: first + k };
+        let spec = |k| Spec { name: name(k), seconds: SECONDS, device, run: first + k };
         (0..count).map(spec).collect()
     }
 }
@@ -103,7 +82,7 @@ struct Drive {
 
 impl Drive {
     fn new(spec: &Spec) -> Self {
-        let vehicle = spec.layout.vehicle();
+        let vehicle = &vehicles::KAIST;
         let way = Town::new(&vehicle.town, spec.run);
         let heading = Purpose::Stamps.stream(spec.run).between(0.0, std::f64::consts::TAU);
         Self {
@@ -134,11 +113,7 @@ impl Drive {
 pub fn write(spec: &Spec, folder: &Path) -> io::Result<()> {
     std::fs::create_dir_all(folder)?;
     std::fs::write(folder.join(MARKER), serde_json::to_string_pretty(spec)? + "\n")?;
-    let drive = Drive::new(spec);
-    match spec.layout {
-        Layout::Kaist => kaist::write(spec, drive, folder),
-        Layout::Nclt => nclt::write(spec, drive, folder),
-    }
+    kaist::write(spec, Drive::new(spec), folder)
 }
 
 #[cfg(test)]

@@ -12,13 +12,14 @@ fn text(bytes: &[u8]) -> String {
 
 #[test]
 fn wrong_arguments_are_status_2_and_failures_1() {
-    for wrong in [&["nonsense"][..], &["tables", "urban14", "--method", "mine"], &["simulate", "--out", "a"]]
+    for wrong in
+        [&["nonsense"][..], &["tables", "urban14", "--method", "mine"], &["simulate", "--layout", "nclt"]]
     {
         let output = paper(wrong);
         assert_eq!(output.status.code(), Some(2), "{wrong:?}: {}", text(&output.stderr));
     }
     for missing in [
-        &["simulate", "--layout", "kaist", "--minutes", "1", "--out", "/dev/null/one"][..],
+        &["simulate", "--minutes", "1", "--out", "/dev/null/one"][..],
         &["import", "/nowhere"],
         &["tables", "/nowhere"],
         &["tables", "urban14", "--method", "mine=/nowhere"],
@@ -38,7 +39,7 @@ fn tables_fit_to_training_sequences_and_take_other_methods() {
     let folder = tempfile::tempdir().unwrap();
     let [sequence, methods] = ["one", "methods"].map(|name| folder.path().join(name).display().to_string());
     std::fs::create_dir_all(&methods).unwrap();
-    let made = paper(&["simulate", "--layout", "kaist", "--minutes", "1", "--out", &sequence]);
+    let made = paper(&["simulate", "--minutes", "1", "--out", &sequence]);
     assert_eq!(made.status.code(), Some(0), "{}", text(&made.stderr));
     let mine = format!("mine={methods}");
     let output = paper(&["tables", &sequence, "--train", &sequence, "--method", &mine]);
@@ -55,14 +56,13 @@ fn tables_fit_to_training_sequences_and_take_other_methods() {
 #[test]
 fn an_imported_sequence_comes_with_its_radius() {
     let folder = tempfile::tempdir().unwrap();
-    let [sequence, drive] = ["nclt", "robot.csv"].map(|name| folder.path().join(name).display().to_string());
-    for arguments in [
-        &["simulate", "--layout", "nclt", "--minutes", "1", "--out", &sequence][..],
-        &["import", &sequence, "--out", &drive],
-    ] {
+    let [sequence, drive] = ["one", "car.csv"].map(|name| folder.path().join(name).display().to_string());
+    for arguments in
+        [&["simulate", "--minutes", "1", "--out", &sequence][..], &["import", &sequence, "--out", &drive]]
+    {
         let output = paper(arguments);
         assert!(output.status.success(), "{}", text(&output.stderr));
     }
-    let vehicle = std::fs::read_to_string(folder.path().join("robot.toml")).unwrap();
-    assert!(vehicle.contains("radius_m = 0.24"), "its wheels are smaller than the recorded car's: {vehicle}");
+    let vehicle = std::fs::read_to_string(folder.path().join("car.toml")).unwrap();
+    assert!(vehicle.contains("radius_m = 0.311"), "its wheels are larger than the recorded car's: {vehicle}");
 }

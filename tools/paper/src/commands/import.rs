@@ -75,7 +75,7 @@ fn write(args: &Args, sequence: &Sequence) -> super::Result {
             sequence::write_csv(sequence, out)
         };
         let rows = rows.map_err(named(path))?;
-        let radius = sequence.layout.vehicle().world.car.wheel_radius;
+        let radius = sequence.layout.wheel_radius_m();
         let beside = Vehicle::beside(path);
         super::write(&beside, format!("[wheels]\nradius_m = {radius:?}\n"))?;
         remark(format_args!("{}: {rows} rows; {} beside it", path.display(), beside.display()))?;

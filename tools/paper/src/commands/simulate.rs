@@ -1,25 +1,22 @@
 //! `gyronet-paper simulate` writes simulated sequences.
 
 use super::{named, remark};
-use gyronet_paper::simulate::{self, Layout, Set, Spec};
+use gyronet_paper::simulate::{self, Set, Spec};
 use std::path::{Path, PathBuf};
 
 /// Write simulated sequences of a drive through a town, with a fibre-optic gyro and wheels.
 ///
-/// The folders and formats are those of KAIST Complex Urban or NCLT; a file simulated.json marks a sequence as
+/// The folders and formats are those of KAIST Complex Urban; a file simulated.json marks a sequence as
 /// simulated. The same seed gives the same files on every machine.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
-  gyronet-paper simulate --layout kaist --set test --out sequences      # four sequences of 20 min
-  gyronet-paper simulate --layout nclt --minutes 5 --seed 7 --out one")]
+  gyronet-paper simulate --set test --out sequences      # four sequences of 20 min
+  gyronet-paper simulate --minutes 5 --seed 7 --out one")]
 pub struct Args {
     /// Folder of the sequence, or with --set of the sequences.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The data set whose layout is written.
-    #[arg(long)]
-    layout: Layout,
     /// Write all sequences of this set, each into its own folder. train and test share their devices; transfer has
     /// others.
     #[arg(long, conflicts_with_all = ["seed", "minutes", "device"])]
@@ -37,11 +34,11 @@ pub struct Args {
 
 pub fn run(args: &Args) -> super::Result {
     if let Some(set) = args.set {
-        return set.specs(args.layout).iter().try_for_each(|spec| write(spec, &args.out.join(&spec.name)));
+        return set.specs().iter().try_for_each(|spec| write(spec, &args.out.join(&spec.name)));
     }
     let name = args.out.file_name().and_then(|name| name.to_str()).unwrap_or("simulated").to_owned();
     let (seconds, device, run) = (60 * args.minutes, args.device, args.seed);
-    write(&Spec { layout: args.layout, name, seconds, device, run }, &args.out)
+    write(&Spec { name, seconds, device, run }, &args.out)
 }
 
 fn write(spec: &Spec, folder: &Path) -> super::Result {

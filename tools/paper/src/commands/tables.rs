@@ -4,8 +4,8 @@ use super::{print_json, remark};
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::weights::{FOGNET, GYRONET};
 use gyronet::model::{FogNet, GyroNet};
+use gyronet_paper::sequence::Layout;
 use gyronet_paper::sequence::{self, Sequence};
-use gyronet_paper::simulate::Layout;
 use gyronet_paper::tables::given::Given;
 use gyronet_paper::tables::joint::{Fit, Joint};
 use gyronet_paper::tables::results::{Results, SequenceErrors};
@@ -31,7 +31,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
-  gyronet-paper simulate --layout kaist --set test --out sequences && gyronet-paper tables sequences
+  gyronet-paper simulate --set test --out sequences && gyronet-paper tables sequences
   gyronet-paper tables urban14 urban15 --json
   gyronet-paper tables sequences --method lwoi=OUT/model --method mine=trajectories")]
 pub struct Args {

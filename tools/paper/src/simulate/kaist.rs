@@ -2,6 +2,7 @@
 
 use super::delay::Delay;
 use super::text::Rows;
+use super::vehicles::KAIST;
 use super::{Drive, Spec};
 use crate::simulate::odometer;
 use gyronet_tools::drive::DT;
@@ -21,16 +22,15 @@ const ORIGIN: [f64; 3] = [355_000.0, 4_025_000.0, 60.0];
 const FIELD: ([f64; 3], f64) = ([0.0, 0.6, -0.8], 0.003);
 
 pub(super) fn write(spec: &Spec, mut drive: Drive, folder: &Path) -> io::Result<()> {
-    let vehicle = spec.layout.vehicle();
     let data = folder.join("sensor_data");
     fs::create_dir_all(&data)?;
-    calibration(&vehicle.wheels, &folder.join("calibration"))?;
+    calibration(&KAIST.wheels, &folder.join("calibration"))?;
     let mut imu_rows = Rows::create(&data.join("xsens_imu.csv"))?;
     let mut fog_rows = Rows::create(&data.join("fog.csv"))?;
     let mut encoder_rows = Rows::create(&data.join("encoder.csv"))?;
     let mut pose_rows = Rows::create(&folder.join("global_pose.csv"))?;
     let [mut imu_delay, mut fog_delay, mut encoder_delay] =
-        [1, 2, 3].map(|stream| Delay::new(vehicle.delays, spec.run, stream));
+        [1, 2, 3].map(|stream| Delay::new(KAIST.stamp_delay, spec.run, stream));
     let stamp = |seconds: f64| START_NS + (seconds * 1e9).round() as i64;
     let mut heading = None;
     for _ in 0..drive.ticks {

@@ -55,11 +55,6 @@ impl Odometer {
     pub fn turns(&self) -> [f64; 2] {
         self.turns
     }
-
-    /// Returns the distance since the start, left and right, computed from the revolutions with the calibration, m.
-    pub fn metres(&self) -> [f64; 2] {
-        std::array::from_fn(|wheel| self.turns[wheel] * PI * self.config.diameter[wheel])
-    }
 }
 
 #[cfg(test)]
@@ -74,11 +69,15 @@ mod tests {
         slip_stiffness: 20.0,
     };
 
+    fn metres(odometer: &Odometer) -> [f64; 2] {
+        [0, 1].map(|wheel| odometer.turns()[wheel] * PI * EXACT.diameter[wheel])
+    }
+
     #[test]
     fn exact_wheels_measure_the_way_and_the_turn() {
         let mut odometer = Odometer::new(&EXACT, 1);
         (0..1_000).for_each(|_| odometer.step(10.0, 0.0, 0.1, 0.01));
-        let [left, right] = odometer.metres();
+        let [left, right] = metres(&odometer);
         assert!(((left + right) / 2.0 - 100.0).abs() < 1e-9);
         assert!(((right - left) / 1.5 - 1.0).abs() < 1e-9);
     }
@@ -88,7 +87,7 @@ mod tests {
         let way = |acceleration| {
             let mut odometer = Odometer::new(&EXACT, 1);
             odometer.step(10.0, acceleration, 0.0, 1.0);
-            odometer.metres()[0]
+            metres(&odometer)[0]
         };
         assert!(way(2.0) > 10.0 && way(0.0) == 10.0 && way(-2.0) < 10.0);
         assert!((way(GRAVITY * 0.2) - 10.1).abs() < 1e-9, "a fifth of g: 1 %");

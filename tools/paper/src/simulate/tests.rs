@@ -2,8 +2,8 @@ use super::*;
 use std::fs;
 use tempfile::tempdir;
 
-fn spec(layout: Layout, seconds: u32) -> Spec {
-    Spec { layout, name: "one".into(), seconds, device: 1, run: 7 }
+fn spec(seconds: u32) -> Spec {
+    Spec { name: "one".into(), seconds, device: 1, run: 7 }
 }
 
 /// Returns all rows of a file, each with its stamp separated.
@@ -19,7 +19,7 @@ fn rows(path: &Path) -> Vec<(i64, Vec<f64>)> {
 #[test]
 fn kaist_has_its_columns_and_rates() {
     let folder = tempdir().unwrap();
-    write(&spec(Layout::Kaist, 120), folder.path()).unwrap();
+    write(&spec(120), folder.path()).unwrap();
     for (file, count, columns) in [
         ("sensor_data/xsens_imu.csv", 12_000, 16),
         ("sensor_data/fog.csv", 120_000, 3),
@@ -46,7 +46,7 @@ fn kaist_has_its_columns_and_rates() {
 #[test]
 fn kaist_sensors_agree_with_the_pose() {
     let folder = tempdir().unwrap();
-    write(&spec(Layout::Kaist, 600), folder.path()).unwrap();
+    write(&spec(600), folder.path()).unwrap();
     let fog: f64 = rows(&folder.path().join("sensor_data/fog.csv")).iter().map(|row| row.1[2]).sum();
     let poses = rows(&folder.path().join("global_pose.csv"));
     let mut yaw = 0.0;
@@ -68,37 +68,8 @@ fn kaist_sensors_agree_with_the_pose() {
 }
 
 #[test]
-fn nclt_points_down_and_jitters() {
-    let folder = tempdir().unwrap();
-    write(&spec(Layout::Nclt, 300), folder.path()).unwrap();
-    let imu = rows(&folder.path().join("ms25.csv"));
-    let hz = (imu.len() - 1) as f64 / ((imu[imu.len() - 1].0 - imu[0].0) as f64 * 1e-6);
-    assert!((hz - 47.1).abs() < 0.1, "{hz}");
-    assert!(imu.iter().all(|(_, fields)| fields.len() == 9));
-    let down = imu.iter().map(|row| row.1[5]).sum::<f64>() / imu.len() as f64;
-    assert!((down + 9.8).abs() < 0.1, "specific force points up: {down}");
-    let poses = rows(&folder.path().join("groundtruth_one.csv"));
-    let headings = rows(&folder.path().join("kvh.csv"));
-    let change = |rows: &[(i64, Vec<f64>)], column: usize| {
-        let step = |pair: &[(i64, Vec<f64>)]| {
-            let step = pair[1].1[column] - pair[0].1[column];
-            libm::atan2(libm::sin(step), libm::cos(step))
-        };
-        rows.windows(2).map(step).sum::<f64>()
-    };
-    let (gyro, truth) = (change(&headings, 0), change(&poses, 5));
-    assert!((gyro - truth).abs() < 0.05, "both clockwise: {gyro} {truth}");
-    assert!(headings.iter().all(|row| (0.0..std::f64::consts::TAU + 1e-9).contains(&row.1[0])));
-    let wheels = rows(&folder.path().join("wheels.csv"));
-    let gaps: Vec<i64> = wheels.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
-    assert!(gaps.iter().all(|gap| *gap > 0));
-    assert!(gaps.iter().max().unwrap() > &50_000, "blocked now and then");
-}
-
-#[test]
 fn sets_share_devices_and_no_run() {
-    let all: Vec<Spec> =
-        [Set::Train, Set::Test, Set::Transfer].iter().flat_map(|set| set.specs(Layout::Kaist)).collect();
+    let all: Vec<Spec> = [Set::Train, Set::Test, Set::Transfer].iter().flat_map(|set| set.specs()).collect();
     assert_eq!(all.len(), 16);
     let mut runs: Vec<u64> = all.iter().map(|spec| spec.run).collect();
     runs.sort_unstable();

@@ -1,4 +1,4 @@
-//! Defines the vehicles and sensors of the two data sets, with the source of every parameter.
+//! Defines the simulated vehicle and its sensors, with the source of every parameter.
 //!
 //! No parameter was tuned to a result. (M) marks values recalled from a data sheet that was not available; (A) marks
 //! assumptions where nothing is published.
@@ -25,14 +25,6 @@
 //! | vibration | [`gyronet_tools::simulate::vibration::Config::DEFAULT`] | measured on a car (WID recordings) |
 //! | KAIST latitude | 36.37 deg N | Daejeon |
 //! | KAIST delay of a stamp | 0.1 ms, exponential | (A): it is small in the paper's Fig. 11 |
-//! | NCLT IMU: gyro noise; bias stability; initial bias | 0.03 deg/s/sqrt(Hz); 18 deg/h in an hour; 0.25 deg/s, taken as 2 sigma | MicroStrain 3DM-GX3-45 data sheet (M) |
-//! | NCLT IMU: accelerometer noise, bias; scale; misalignment | 80 ug/sqrt(Hz), 0.002 g; 0.0005; 0.05 deg | the same (M) |
-//! | NCLT FoG: noise; bias stability; offset | 4 deg/h/sqrt(Hz); 1 deg/h; 20 deg/h, taken as 2 sigma | KVH DSP-3000 manual 54-0215 (M) |
-//! | NCLT FoG: scale | 1000 ppm | the same, table 2, linearity |
-//! | NCLT wheels: errors of diameters | 0.01 both, 0.003 each | the order of UMBmark, Borenstein and Feng 1996 (M); the paper calls these wheels inaccurate |
-//! | NCLT speeds | 1.0, 1.3, 1.6 m/s | a Segway among people: 5.5 km in 73 min on average (M) |
-//! | NCLT rates and gaps | 47.1 Hz, gaps to 72 ms; 41.2 Hz, to 201 ms | measured on 2013-01-10 |
-//! | NCLT latitude | 42.29 deg N | Ann Arbor |
 
 use super::{fog, odometer, town, world};
 use gyronet_tools::simulate::{car, mems, vibration};
@@ -45,23 +37,14 @@ const DEG: f64 = std::f64::consts::PI / 180.0;
 const ROOT_HOUR: f64 = 60.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Delays {
-    /// The mean delay, s.
-    pub mean: f64,
-    /// Mean time between two blockages, s, and their mean length, s; an infinite time means no blockages.
-    pub blockage: [f64; 2],
-    /// The longest blockage, s.
-    pub longest: f64,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vehicle {
     pub world: world::Config,
     pub town: town::Config,
     pub mems: mems::Config,
     pub fog: fog::Config,
     pub wheels: odometer::Config,
-    pub delays: Delays,
+    /// Mean delay of a message's stamp, s.
+    pub stamp_delay: f64,
 }
 
 /// The car of KAIST Complex Urban.
@@ -114,67 +97,5 @@ pub const KAIST: Vehicle = Vehicle {
         wheel_error: 0.000_03,
         slip_stiffness: 30.0,
     },
-    delays: Delays { mean: 1e-4, blockage: [f64::INFINITY, 0.0], longest: 0.0 },
-};
-
-/// The Segway of NCLT. Its vibration is that of the car, because no better data are available.
-pub const NCLT: Vehicle = Vehicle {
-    world: world::Config {
-        car: car::Config {
-            wheel_radius: 0.24,
-            track: 0.6,
-            acceleration: 0.5,
-            braking: 0.5,
-            // A Segway pitches in the direction of acceleration, much more than a car.
-            pitch_gradient: 0.05,
-            suspension_hz: 0.8,
-            road_grade: 0.03,
-            road_bank: 0.015,
-            bank_waves: [223.0, 71.0],
-            ..car::Config::DEFAULT
-        },
-        vibration: vibration::Config { road_speed: 2.0, ..vibration::Config::DEFAULT },
-        cornering_stiffness: 20.0,
-        latitude_deg: 42.29,
-    },
-    town: town::Config {
-        limits: [(1.0, 0.2), (1.3, 0.6), (1.6, 0.2)],
-        block: [15.0, 60.0],
-        bends: 0.6,
-        stops: 0.15,
-        wait: [2.0, 20.0],
-        turns: [0.3, 0.3],
-        corner: [[2.0, 4.0], [2.0, 4.0]],
-        lateral: 0.6,
-        before: [8.0, 15.0],
-    },
-    mems: mems::Config {
-        gyro_noise: 0.03 * DEG,
-        gyro_walk: 18.0 * DEG_PER_HOUR / ROOT_HOUR,
-        accel_noise: 80e-6 * 9.806_65,
-        accel_walk: 1e-4,
-        gyro_bias: 0.125 * DEG,
-        accel_bias: 0.002 * 9.806_65,
-        scale: 0.0005,
-        misalignment: 0.05 * DEG,
-        gyro_per_force: 0.0,
-        mount: [0.0, 0.0],
-    },
-    fog: fog::Config {
-        // Two-sided noise density, over 1 Hz.
-        angle_walk: 4.0 * DEG_PER_HOUR,
-        device_bias: 10.0 * DEG_PER_HOUR,
-        run_bias: 1.0 * DEG_PER_HOUR,
-        bias_walk: 1.0 * DEG_PER_HOUR / ROOT_HOUR,
-        scale: 1000e-6,
-        misalignment: 5e-3,
-    },
-    wheels: odometer::Config {
-        diameter: [0.48, 0.48],
-        base: 0.6,
-        common_error: 0.01,
-        wheel_error: 0.003,
-        slip_stiffness: 30.0,
-    },
-    delays: Delays { mean: 1e-3, blockage: [5.0, 0.02], longest: 0.05 },
+    stamp_delay: 1e-4,
 };

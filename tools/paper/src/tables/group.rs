@@ -1,7 +1,7 @@
 //! Groups the sequences that are averaged together.
 
+use crate::sequence::Layout;
 use crate::sequence::Sequence;
-use crate::simulate::Layout;
 use serde::Serialize;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -3,8 +3,8 @@
 use super::estimate::{Estimate, Places};
 use super::estimates::Estimates;
 use super::group::Group;
+use crate::sequence::Layout;
 use crate::sequence::Sequence;
-use crate::simulate::Layout;
 use gyronet_tools::drive::track::Track;
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::metrics::YawError;

@@ -4,7 +4,7 @@ use super::group::Group;
 use super::notes;
 use super::paper::{self, Line};
 use super::results::{ByMethod, Errors, Results, SequenceErrors, mean};
-use crate::simulate::Layout;
+use crate::sequence::Layout;
 use gyronet_tools::evaluate::methods::{Gyro, Method};
 use std::path::Path;
 

@@ -4,8 +4,8 @@ use super::group::Group;
 use super::joint::Fit;
 use super::results::{Results, SequenceErrors};
 use super::{estimates, table};
-use crate::sequence::{Sequence, Step, StreamSummary};
-use crate::simulate::{self, Layout, Spec};
+use crate::sequence::{Layout, Sequence, Step, StreamSummary};
+use crate::simulate::{self, Spec};
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Estimate as WindowEstimate, WindowNetwork};
 use gyronet::units::AngularRate;
@@ -23,9 +23,9 @@ impl WindowNetwork for Nothing {
 }
 
 /// Returns a sequence that is simulated and read back.
-fn sequence(name: &str, layout: Layout, seconds: u32) -> Sequence {
+fn sequence(name: &str, seconds: u32) -> Sequence {
     let folder = tempfile::tempdir().unwrap();
-    let spec = Spec { layout, name: name.into(), seconds, device: 1, run: 3 };
+    let spec = Spec { name: name.into(), seconds, device: 1, run: 3 };
     simulate::write(&spec, folder.path()).unwrap();
     Sequence::read(folder.path()).unwrap()
 }
@@ -206,7 +206,7 @@ fn sequences_of_the_paper_get_the_tables_that_it_has_for_them() {
 #[test]
 fn json_and_tables_of_simulated_sequences() {
     let of = |name: &str, layout| {
-        let sequence = sequence(name, layout, 60);
+        let sequence = Sequence { layout, ..sequence(name, 60) };
         SequenceErrors::new(&sequence, &estimates::run(&sequence, &mut Nothing))
     };
     let results = Results::new(vec![of("k", Layout::Kaist), of("n", Layout::Nclt)]);
