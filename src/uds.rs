@@ -16,7 +16,7 @@
 //! | 0x31 | any | 0203 reads the log: events after a number (4 bytes) |
 //! | 0x31 | 2, 3 | 0204 tests the board: a bit for each part that fails, see the YAML |
 //! | 0x31 | 2, 3 | 0200 static, 0201 mounting calibration; 0202 stores it; FF01 (session 2) uses the download |
-//! | 0x34, 0x36, 0x37 | 2 | download of a weight file to address 0 |
+//! | 0x34, 0x36, 0x37 | 2 | download of a weight file to address 0, of [firmware](update) to address 2 |
 //! | 0x3E | any | tester present |
 //! | 0x85 | 2, 3 | stop and continue the recording of troubles |
 
@@ -33,6 +33,7 @@ mod services;
 mod session;
 pub mod signature;
 mod troubles;
+pub mod update;
 
 pub use response::Nrc;
 pub use server::Server;

@@ -8,6 +8,7 @@
 use crate::noise::Noise;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use gyronet::service::MappedSlots;
+use gyronet::store::Slot;
 use gyronet::store::layout::{RECORD_SECTOR, SLOT_SIZE, SLOTS, sector};
 use std::cell::RefCell;
 use std::ops::Range;
@@ -238,11 +239,19 @@ impl<const SECTOR: usize> NorFlash for Region<SECTOR> {
 pub struct MappedRegion {
     region: Region<RECORD_SECTOR>,
     copy: Vec<u32>,
+    /// Slot of the firmware that runs.
+    running: Option<Slot>,
 }
 
 impl MappedRegion {
     pub fn new(flash: &Rc<RefCell<F405>>) -> Self {
-        Self { region: Region::new(flash, 0..BYTES as u32), copy: flash.borrow().words.clone() }
+        let copy = flash.borrow().words.clone();
+        Self { region: Region::new(flash, 0..BYTES as u32), copy, running: None }
+    }
+
+    /// Gives access to the flash of a board whose boot loader has started a slot.
+    pub fn of_running(flash: &Rc<RefCell<F405>>, running: Option<Slot>) -> Self {
+        Self { running, ..Self::new(flash) }
     }
 
     pub fn current(&self) -> [&[u8]; 2] {
@@ -262,6 +271,14 @@ impl MappedRegion {
 impl MappedSlots for MappedRegion {
     fn slots(&self) -> [&[u8]; 2] {
         self.current()
+    }
+
+    fn running(&self) -> Option<Slot> {
+        self.running
+    }
+
+    fn firmware(&self, slot: Slot) -> &[u8] {
+        self.bytes(slot.firmware())
     }
 }
 

@@ -3,11 +3,12 @@
 
 use crate::recordings::workspace;
 use crate::require::{self, Need};
+use gyronet_tools::client::device::update::Update;
 use gyronet_tools::target::bench;
 use gyronet_tools::target::firmware::Linked;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// Returns the ELF file of an image (`coprocessor`, `bringup`, `selftest`, `bench`) for the Netduino Plus 2; the test is
 /// reported as skipped where the target's standard library is not installed.
@@ -16,6 +17,17 @@ use std::sync::{Mutex, PoisonError};
 /// build folder of `cargo test` itself may be locked.
 pub fn firmware(test: &str, scratch: &str, image: &str) -> Option<PathBuf> {
     firmware_for(("netduino-plus-2", bench::TARGET), test, scratch, image)
+}
+
+/// Returns an update of the Netduino Plus 2 to what is in this checkout.
+pub fn update(test: &str, scratch: &str) -> Option<Update> {
+    require::wants(test, Need::Qemu, bench::target_installed(bench::TARGET))?;
+    static BUILT: OnceLock<Update> = OnceLock::new();
+    let build = || {
+        let linked = Linked::build("netduino-plus-2", 2, &Path::new(scratch).join("images"));
+        linked.and_then(|linked| linked.update()).unwrap_or_else(|error| panic!("{error}"))
+    };
+    Some(BUILT.get_or_init(build).clone())
 }
 
 /// Returns the ELF file of an image for another board, named by its feature, and its target.

@@ -2,8 +2,11 @@
 //! content is copied into the virtual board's.
 
 use crate::flash::{F405, Region};
+use crate::noise::Noise;
+use embedded_storage::nor_flash::NorFlash;
 use gyronet::model::blob::CRC;
 use gyronet::model::weights;
+use gyronet::store::firmware::{LABEL, LABEL_SIZE, Label, MAX_IMAGE, Trailer};
 use gyronet::store::layout::{self, FLASH_BASE, RECORD_SECTOR, SLOT_SIZE};
 use gyronet::store::{Accepted, Record, Slot, Store, StoreError, Upload};
 use std::cell::RefCell;
@@ -26,7 +29,7 @@ pub fn upload(flash: &Rc<RefCell<F405>>, slot: Slot, file: &[u8]) -> Result<(), 
     for (block, offset) in file.chunks(256).zip((0..).step_by(256)) {
         upload.block(&mut region, offset, block).map_err(|e| text(&e))?;
     }
-    let crc = upload.verify(slots(&flash.borrow())).map_err(|e| text(&e))?.crc;
+    let crc = upload.verify(slots(&flash.borrow())).map_err(|e| text(&e))?.1.crc;
     let mut store = open(flash).map_err(|e| text(&e))?;
     let accepted = store.get::<Accepted>().map_err(|e| text(&e))?.unwrap_or(Accepted::NONE);
     store.set(&accepted.with(slot, crc)).map_err(|e| text(&e))
@@ -43,6 +46,24 @@ pub fn other_weights(bits: u8) -> Vec<u8> {
     let crc = CRC.checksum(&file[..end]);
     file[end..].copy_from_slice(&crc.to_le_bytes());
     file
+}
+
+/// Returns an image of firmware: a label among noise.
+pub fn image(label: &Label, seed: u64) -> Vec<u8> {
+    let mut noise = Noise::new(seed);
+    let mut image: Vec<u8> = (0..2_048).map(|_| noise.byte()).collect();
+    image[LABEL..LABEL + LABEL_SIZE].copy_from_slice(&label.bytes());
+    image
+}
+
+/// Writes an image to an erased slot as a programmer does.
+pub fn flash_image(flash: &Rc<RefCell<F405>>, slot: Slot, image: &[u8]) {
+    let trailer =
+        Trailer { is_confirmed: true, ..Trailer::new(image.len() as u32, CRC.checksum(image), 0, 1) };
+    let mut region = Region::<RECORD_SECTOR>::new(flash, 0..1 << 20);
+    let start = slot.firmware().start;
+    let written = region.write(start, image).and(region.write(start + MAX_IMAGE, &trailer.bytes()));
+    written.expect("it was erased");
 }
 
 /// Holds a board's flash before it starts.

@@ -3,9 +3,11 @@
 //! Some functions are marked `inline(never)`, so that their large stack frames, with requests and records, exist only
 //! while they run.
 
+mod firmware;
 mod stored;
 mod weights;
 
+pub use firmware::{Firmware, FirmwareState};
 pub use weights::MappedSlots;
 
 use super::calibrate::{Calibrator, Finding, State, Task, level};
@@ -84,6 +86,11 @@ pub struct Device<R: NorFlash, W> {
     next_window: u32,
     refused_slots: [Option<SlotError>; 2],
     uploading: Option<Uploading>,
+    firmware: Firmware,
+    /// What the firmware has reached since the start.
+    reached: u32,
+    /// True once a sample of the sensor has come.
+    has_sample: bool,
     /// The output may be interrupted: no rate is valid, or the vehicle stands.
     may_interrupt: bool,
     sensor: Option<SensorFault>,
@@ -132,6 +139,9 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             next_window: 0,
             refused_slots: [None; 2],
             uploading: None,
+            firmware: Firmware::ALONE,
+            reached: 0,
+            has_sample: false,
             may_interrupt: true,
             sensor: None,
             status: Status::Init,
@@ -209,6 +219,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.faults = faults;
         let limits = &self.configuration.static_init;
         self.wheels_seen = *wheels;
+        self.has_sample |= sample.is_some();
         self.may_interrupt = sample.is_none() || standing.is_lasting();
         if self.configuration.learn
             && self.learner.observe(sample, wheels, standing, limits, &mut self.learned)
@@ -276,13 +287,13 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     /// Carries out a request, unless it interrupts the output of a vehicle that is not proven to stand, and keeps the
     /// reason of a refusal for testers.
-    fn request(
+    fn request<T>(
         &mut self,
         interrupts: bool,
-        work: impl FnOnce(&mut Self) -> Result<(), Refusal>,
-    ) -> Result<(), Refusal> {
+        work: impl FnOnce(&mut Self) -> Result<T, Refusal>,
+    ) -> Result<T, Refusal> {
         let result = if interrupts && !self.may_interrupt() { Err(Refusal::Moving) } else { work(self) };
-        self.refusal = result.err();
+        self.refusal = result.as_ref().err().copied();
         result
     }
 
@@ -383,6 +394,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             weights_crc: self.weights_crc,
             sensor: self.sensor,
             refused_slots: self.refused_slots,
+            firmware: self.firmware,
             status: self.status,
         }
     }
@@ -399,6 +411,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             can_fault: self.identity.can_fault.is_some(),
             crashed: self.identity.crash.is_some() || self.has_failed(),
             course_contradicts: self.course.is_contradicted,
+            firmware_refused: self.firmware.is_refused(),
             access_refused: self.refusal.is_some_and(|refusal| refusal.is_access_denied()),
         }
     }

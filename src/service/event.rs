@@ -93,6 +93,12 @@ pub enum EventKind {
     Calibrated(Option<CalibrationFault>),
     /// The weight file in this slot was accepted.
     WeightsAccepted(Slot),
+    /// Firmware in this slot starts on trial at the next start.
+    FirmwareStored(Slot),
+    /// The firmware has shown that it works, and is confirmed.
+    FirmwareConfirmed(Slot),
+    /// A newer firmware, in the other slot, does not run: its trial has failed, or it is damaged.
+    FirmwareRefused(Slot),
     /// The weights in use no longer match their checksum: the network is off.
     WeightsDamaged,
     /// Stored records are damaged: older or built-in ones are used.

@@ -1,15 +1,17 @@
 //! Refusals of requests, and reports of the board's state.
 
+use super::device::Firmware;
 use super::event::{CanFault, ClockFault, Crash, ResetCause, SensorFault};
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters, Status};
 use crate::store::StoreError;
+use crate::store::firmware::FirmwareError;
 use crate::store::slots::{SlotError, WeightSource};
 use serde::{Deserialize, Serialize};
 
 /// Version of the encoding of these types; every change of a type increments it.
-pub const PROTOCOL: u8 = 19;
-/// Size of a full block of a weight file, bytes.
+pub const PROTOCOL: u8 = 20;
+/// Size of a full block of a download, bytes.
 pub const BLOCK: usize = 256;
 
 /// The reason why a request is refused.
@@ -25,6 +27,9 @@ pub enum Refusal {
     /// The weight file or its place was refused.
     #[error(transparent)]
     Slot(SlotError),
+    /// The firmware was refused.
+    #[error(transparent)]
+    Firmware(FirmwareError),
     #[error("there is no calibration result to store")]
     NothingFound,
     #[error("calibrated with weights {found:08x}, but the board runs {runs:08x}")]
@@ -67,6 +72,12 @@ impl From<StoreError> for Refusal {
 impl From<SlotError> for Refusal {
     fn from(error: SlotError) -> Self {
         Self::Slot(error)
+    }
+}
+
+impl From<FirmwareError> for Refusal {
+    fn from(error: FirmwareError) -> Self {
+        Self::Firmware(error)
     }
 }
 
@@ -162,6 +173,8 @@ pub struct Info {
     pub sensor: Option<SensorFault>,
     /// Reasons why slots A and B were refused, if they were tried.
     pub refused_slots: [Option<SlotError>; 2],
+    /// The firmware that runs, and what became of its update.
+    pub firmware: Firmware,
     /// Status of the corrected yaw rate.
     pub status: Status,
 }

@@ -1,6 +1,7 @@
 //! Formats the board's reports as text, for the host tools; the image does not use it.
 
 use super::calibrate::CalibrationFault;
+use super::device::{Firmware, FirmwareState};
 use super::event::{EventKind, ResetCause, SensorFault};
 use super::message::{FlashState, Origin};
 use core::fmt::{Display, Formatter, Result};
@@ -82,6 +83,21 @@ impl Display for FlashState {
     }
 }
 
+impl Display for Firmware {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        if let Some(slot) = self.slot {
+            write!(f, "slot {slot}, ")?;
+        }
+        f.write_str(match self.state {
+            FirmwareState::Alone => "flashed without the boot loader: no update over diagnosis",
+            FirmwareState::Confirmed => "confirmed",
+            FirmwareState::OnTrial => "on trial",
+            FirmwareState::RolledBack => "the update has failed its trial and was rolled back",
+            FirmwareState::NewerDamaged => "the newer firmware is damaged",
+        })
+    }
+}
+
 impl Display for EventKind {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         match self {
@@ -104,6 +120,13 @@ impl Display for EventKind {
             Self::Calibrated(None) => f.write_str("calibration done"),
             Self::Calibrated(Some(fault)) => write!(f, "calibration failed: {fault}"),
             Self::WeightsAccepted(slot) => write!(f, "weights in slot {slot} accepted"),
+            Self::FirmwareStored(slot) => {
+                write!(f, "firmware in slot {slot} starts on trial at the next start")
+            }
+            Self::FirmwareConfirmed(slot) => write!(f, "firmware in slot {slot} confirmed"),
+            Self::FirmwareRefused(slot) => {
+                write!(f, "newer firmware in slot {slot} not used: its trial failed, or it is damaged")
+            }
             Self::WeightsDamaged => f.write_str("weights in use damaged: the network is off"),
             Self::RecordsDamaged => f.write_str("stored records damaged: older or built-in ones are used"),
             Self::Sensor(None) => f.write_str("sensor set up"),

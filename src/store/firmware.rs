@@ -88,13 +88,13 @@ pub enum FirmwareError {
     Layout { found: u8, expected: u8 },
     #[error("the firmware is older than the board's: give --downgrade if you want it")]
     Older,
-    #[error("the firmware has {0} bytes: too many, or not as many as its list says")]
+    #[error("the firmware has {0} bytes: too many, or not as many as the head of the update says")]
     Length(u32),
     #[error("the running firmware is on trial: wait until it is confirmed")]
     OnTrial,
-    #[error("the list of the images, data 011A, has to be written first")]
-    NoList,
-    #[error("the image that was received is not that of its list")]
+    #[error("the head of the update, data 011A, has to be written first")]
+    NoHead,
+    #[error("the image that was received is not the one that was signed")]
     Content,
 }
 

@@ -1,6 +1,7 @@
-//! Upload of a weight file, block by block, to a slot in the flash.
+//! Upload of a weight file or of firmware, block by block, to a slot in the flash.
 
 use super::error::FlashFault;
+use super::firmware;
 use super::slot::Slot;
 use super::slots::{SlotError, file};
 use crate::model::Blob;
@@ -10,6 +11,8 @@ use embedded_storage::nor_flash::{NorFlash, NorFlashError};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Upload {
     slot: Slot,
+    /// Flash offset of the first byte.
+    start: u32,
     length: u32,
     written: u32,
 }
@@ -35,7 +38,25 @@ impl Upload {
         flash
             .erase(sector.start, sector.end)
             .map_err(|error| SlotError::Flash(FlashFault::from(error.kind())))?;
-        Ok(Self { slot, length, written: 0 })
+        Ok(Self { slot, start: sector.start, length, written: 0 })
+    }
+
+    /// Begins an upload of firmware, whose length has been checked, and erases its slot: two sectors.
+    ///
+    /// # Errors
+    /// [`SlotError::Flash`].
+    pub fn firmware<F: NorFlash>(flash: &mut F, slot: Slot, length: u32) -> Result<Self, SlotError> {
+        firmware::erase(flash, slot).map_err(|error| SlotError::Flash(FlashFault::from(error.kind())))?;
+        Ok(Self { slot, start: slot.firmware().start, length, written: 0 })
+    }
+
+    /// Returns slot, length and number of bytes written of firmware; `None` for weights.
+    pub const fn image(&self) -> Option<(Slot, u32, u32)> {
+        if self.start == self.slot.firmware().start {
+            Some((self.slot, self.length, self.written))
+        } else {
+            None
+        }
     }
 
     /// Writes the next block, a whole number of words.
@@ -52,21 +73,22 @@ impl Upload {
         if !len.is_multiple_of(4) || len > self.length - self.written {
             return Err(SlotError::Length(len));
         }
-        let at = self.slot.offset() + self.written;
+        let at = self.start + self.written;
         flash.write(at, bytes).map_err(|error| SlotError::Flash(FlashFault::from(error.kind())))?;
         self.written += len;
         Ok(())
     }
 
-    /// Checks the whole file in flash.
+    /// Checks the whole weight file in flash, and returns its bytes too.
     ///
     /// # Errors
     /// [`SlotError::Incomplete`], and the errors of [`file()`].
-    pub fn verify<'s>(&self, slots: [&'s [u8]; 2]) -> Result<Blob<'s>, SlotError> {
+    pub fn verify<'s>(&self, slots: [&'s [u8]; 2]) -> Result<(&'s [u8], Blob<'s>), SlotError> {
         if self.written != self.length {
             return Err(SlotError::Incomplete { written: self.written });
         }
-        file(self.slot.of(slots))
+        let slot = self.slot.of(slots);
+        Ok((slot.get(..self.length as usize).unwrap_or_default(), file(slot)?))
     }
 
     /// Returns the slot of the file.

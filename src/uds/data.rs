@@ -7,9 +7,11 @@
 use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, decode, nrc, put, put_record};
 use super::security::{self, Security};
+use super::services::UPDATE;
 use crate::fog::FogCounters;
 use crate::heading::CourseCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters};
+use crate::service::device::Firmware;
 use crate::service::message::{AccessCounters, AllCounters, LineCounters, Refusal};
 use crate::service::{Device, MappedSlots};
 use crate::store::slots::WeightSource;
@@ -59,7 +61,7 @@ const fn write_only(id: u16, name: &'static str, bytes: &'static str, content: &
 }
 
 /// All data identifiers.
-pub const IDENTIFIERS: [Identifier; 27] = [
+pub const IDENTIFIERS: [Identifier; 28] = [
     read_only(0xF186, "session", "1", "session: 1 default, 2 programming, 3 extended"),
     read_only(0xF189, "firmware_version", "1, 1, 1", "version of the firmware"),
     read_only(0xF18C, "serial_number", "text", "serial number of the chip, 24 hexadecimal digits"),
@@ -136,6 +138,12 @@ pub const IDENTIFIERS: [Identifier; 27] = [
         "course",
         "1, 2, 2, 4, 4, 4, 1",
         "gain of the yaw gyro by courses: 0 unknown, 1 coarse, 2 fine, 3 they contradict the gyro; gain and sigma, 1e-5; courses used, refused, and starts of the heading after contradictions; the newest course: 0 used, 1 far from the gyro's heading, 2 the same in a turn, 3 the vehicle stands",
+    ),
+    writable(
+        0x011A,
+        "firmware",
+        "1, 1",
+        "slot of the firmware that runs: 0 A, 1 B, FF none; 0 not updatable, 1 confirmed, 2 on trial, 3 the update was rolled back, 4 it is damaged. Written: the head of an update",
     ),
 ];
 
@@ -258,6 +266,10 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             put_words(out, &words!(course.counters => CourseCounters { used, refused, restarts }))?;
             put(out, &[course.refusal.map_or(0, |refusal| refusal as u8)])
         }
+        0x011A => {
+            let Firmware { slot, state } = device.firmware();
+            put(out, &[slot.map_or(0xFF, |slot| slot as u8), state as u8])
+        }
         0x0117 => {
             let (wheels, stands) = device.standing();
             for speed in wheels.speeds {
@@ -272,7 +284,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
 
 /// Returns whether an identifier can be written, or could be by earlier versions.
 pub(super) fn is_writable(id: u16) -> bool {
-    matches!(id, 0x0100 | 0x0101 | 0x010D | 0x0110 | RETIRED_FIRST..=RETIRED_LAST)
+    matches!(id, 0x0100 | 0x0101 | 0x010D | 0x0110 | UPDATE | RETIRED_FIRST..=RETIRED_LAST)
 }
 
 /// Writes the value of an identifier. Each record has its own function, so that only one record is on the stack.

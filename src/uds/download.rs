@@ -1,26 +1,31 @@
-//! Download of GyroNet's weight file (services 0x34, 0x36, 0x37) to address 0, which is the unused slot.
+//! Download (services 0x34, 0x36, 0x37) of GyroNet's weight file to address 0, which is the unused slot, and of firmware
+//! to address 2, which is the slot that does not run.
 //!
-//! The file is used from the next start on, and only after routine FF01. If a download is interrupted before that,
-//! GyroNet keeps its old file.
+//! Either is used from the next start on, and only after routine FF01. If a download is interrupted before that, the old
+//! one stays. Firmware is accepted only as the head of its update says ([`super::update`]).
 
 use super::response::{Nrc, Response, nrc, put};
-use super::signature::{Digest, Hasher};
+use super::signature::{self, Digest};
+use super::update::Head;
 use crate::service::message::{BLOCK, Refusal};
 use crate::service::{Device, MappedSlots};
 use crate::store::Slot;
+use crate::store::firmware::{FirmwareError, Label};
 use embedded_storage::nor_flash::NorFlash;
 
+const WEIGHTS: u32 = 0;
 /// Address that took FoGNet's file, which this board no longer runs.
 const FOGNET: u32 = 1;
+const FIRMWARE: u32 = 2;
 
 #[derive(Debug)]
 pub(super) struct Download {
+    /// Label, length and hash of the image, if this is firmware.
+    image: Option<(Label, Digest)>,
     length: u32,
     offset: u32,
     /// Number of the next block; it starts at 1 and wraps from 255 to 0.
     next: u8,
-    /// Hash of the file so far, for the signature check.
-    hasher: Hasher,
     /// Digest of the whole file, once the file has been checked.
     digest: Option<Digest>,
 }
@@ -29,6 +34,7 @@ impl Download {
     /// Begins a download with the parameters of 0x34: no compression, the address, the length of the file.
     pub fn begin<R: NorFlash, W: MappedSlots>(
         parameters: &[u8],
+        head: Option<&Head>,
         device: &mut Device<R, W>,
         out: &mut Response,
     ) -> Result<Self, Nrc> {
@@ -44,16 +50,30 @@ impl Download {
         }
         let (address, length) = rest.split_at(address_bytes);
         let number = |bytes: &[u8]| bytes.iter().fold(0u32, |sum, byte| sum << 8 | u32::from(*byte));
-        match number(address) {
-            0 => {}
+        let (address, length) = (number(address), number(length));
+        let image = match address {
+            WEIGHTS => {
+                device.weights_begin(length).map_err(nrc)?;
+                None
+            }
             FOGNET => return Err(nrc(device.refuse_request(Refusal::FogNet))),
+            FIRMWARE => {
+                let refused =
+                    |device: &mut Device<R, W>, error| nrc(device.refuse_request(Refusal::Firmware(error)));
+                let Some(head) = head else { return Err(refused(device, FirmwareError::NoHead)) };
+                let slot = device.firmware_check(&head.label, head.downgrade).map_err(nrc)?;
+                let image = head.image(slot);
+                if image.length != length {
+                    return Err(refused(device, FirmwareError::Length(length)));
+                }
+                device.firmware_begin(slot, length).map_err(nrc)?;
+                Some((head.label, image))
+            }
             _ => return Err(Nrc::RequestOutOfRange),
-        }
-        let length = number(length);
-        device.weights_begin(length).map_err(nrc)?;
+        };
         let [high, low] = (BLOCK as u16 + 2).to_be_bytes();
         put(out, &[0x20, high, low])?;
-        Ok(Self { length, offset: 0, next: 1, hasher: Hasher::new(), digest: None })
+        Ok(Self { image, length, offset: 0, next: 1, digest: None })
     }
 
     /// Writes a block. A repeated block is answered again, because its response may have been lost.
@@ -80,7 +100,6 @@ impl Download {
             return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
         }
         device.weights_block(self.offset, bytes).map_err(nrc)?;
-        self.hasher.update(bytes);
         self.offset += expected as u32;
         self.next = self.next.wrapping_add(1);
         Ok(())
@@ -95,7 +114,13 @@ impl Download {
         if self.offset < self.length {
             return Err(Nrc::RequestSequenceError);
         }
-        device.weights_verify().map_err(nrc)?;
+        let digest = match &self.image {
+            Some((label, expected)) => device.firmware_verify(label, |image| {
+                Some(signature::digest(image)).filter(|digest| digest == expected)
+            }),
+            None => device.weights_verify(signature::digest),
+        };
+        let digest = digest.map_err(nrc)?;
         let (slot, crc) = device.uploaded().ok_or(Nrc::GeneralProgrammingFailure)?;
         put(
             out,
@@ -105,13 +130,12 @@ impl Download {
             }],
         )?;
         put(out, &crc.to_be_bytes())?;
-        let hasher = &mut self.hasher;
-        self.digest.get_or_insert_with(|| hasher.finish());
+        self.digest = Some(digest);
         Ok(())
     }
 
-    /// Returns the digest of the file, once the file has been checked.
-    pub fn digest(&self) -> Option<&Digest> {
-        self.digest.as_ref()
+    /// Returns the digest of the file, once the file has been checked, and whether it is firmware.
+    pub fn checked(&self) -> Option<(&Digest, bool)> {
+        Some((self.digest.as_ref()?, self.image.is_some()))
     }
 }

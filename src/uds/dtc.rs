@@ -64,6 +64,7 @@ enum Cause {
     Can,
     Course,
     AccessRefused,
+    Firmware,
 }
 
 impl Cause {
@@ -87,12 +88,13 @@ impl Cause {
             Self::Can => now.can_fault,
             Self::Course => now.course_contradicts,
             Self::AccessRefused => now.access_refused,
+            Self::Firmware => now.firmware_refused,
         }
     }
 }
 
 /// All troubles.
-pub static TROUBLES: [Trouble; 15] = [
+pub static TROUBLES: [Trouble; 16] = [
     trouble(
         0x5A01,
         0x31,
@@ -138,6 +140,13 @@ pub static TROUBLES: [Trouble; 15] = [
     ),
     trouble(0x5A02, 0x46, "no weights that can be used", "`device info`; upload weights", Cause::NoWeights),
     trouble(0x5A03, 0x47, "the software crashed", "`device info` has the reason", Cause::Crash),
+    trouble(
+        0x5A03,
+        0x52,
+        "the firmware update was rolled back, or is damaged",
+        "what `device info` says of the firmware; update again",
+        Cause::Firmware,
+    ),
     trouble(0x5A03, 0x38, "the processor's clock is not the crystal's", "the crystal", Cause::Clock),
     trouble(
         0xDA01,

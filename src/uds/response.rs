@@ -4,6 +4,7 @@
 use super::isotp::MAX_MESSAGE;
 use crate::service::message::Refusal;
 use crate::store::StoreError;
+use crate::store::firmware::FirmwareError;
 use crate::store::slots::SlotError;
 pub use automotive_diag::uds::UdsError as Nrc;
 use heapless::Vec;
@@ -42,7 +43,14 @@ pub(super) fn put_record(out: &mut Response, record: &impl Serialize) -> Result<
 
 pub(super) fn nrc(refusal: Refusal) -> Nrc {
     match refusal {
-        Refusal::Moving | Refusal::NothingFound => Nrc::ConditionsNotCorrect,
+        Refusal::Moving
+        | Refusal::NothingFound
+        | Refusal::Firmware(FirmwareError::NoBootLoader | FirmwareError::OnTrial) => {
+            Nrc::ConditionsNotCorrect
+        }
+        Refusal::Firmware(FirmwareError::NoHead) => Nrc::RequestSequenceError,
+        Refusal::Firmware(FirmwareError::Content) => Nrc::GeneralProgrammingFailure,
+        Refusal::Firmware(_) => Nrc::RequestOutOfRange,
         Refusal::Version { .. } | Refusal::OtherWeights { .. } | Refusal::SingleSetting | Refusal::FogNet => {
             Nrc::RequestOutOfRange
         }

@@ -67,10 +67,7 @@ impl Services {
         let control = control.ok_or(Nrc::SubFunctionNotSupported)?;
         match id {
             LOG => return put_record(out, &device.events(u32::from_be_bytes(exactly(option)?))),
-            USE_DOWNLOAD => {
-                self.accept_download(option, device)?;
-                return device.weights_activate().map_err(nrc);
-            }
+            USE_DOWNLOAD => return self.use_download(option, device),
             _ => exactly(option).map(|[]: [u8; 0]| ())?,
         }
         match (task, control) {
@@ -92,19 +89,30 @@ impl Services {
         Ok(())
     }
 
-    /// Checks the signature of a download, if the board has a key.
-    fn accept_download<R: NorFlash, W: MappedSlots>(
-        &self,
+    /// Checks the signature of a download, if the board has a key, and has it used from the next start on. Firmware was
+    /// signed by the head of its update.
+    fn use_download<R: NorFlash, W: MappedSlots>(
+        &mut self,
         trailer: &[u8],
         device: &mut Device<R, W>,
     ) -> Result<(), Nrc> {
-        if device.access().is_some_and(|access| access.key.is_none()) {
-            return exactly(trailer).map(|[]: [u8; 0]| ());
+        let checked = self.download.as_ref().and_then(Download::checked);
+        if let Some((_, true)) = checked {
+            let [] = exactly(trailer)?;
+            let (_, counter) = self.update.take().ok_or(Nrc::RequestSequenceError)?;
+            security::use_up(counter, device)?;
+            return device.firmware_activate().map_err(nrc);
         }
-        let Ok(trailer) = trailer.try_into() else {
-            return Err(nrc(device.refuse_request(Refusal::Unsigned)));
-        };
-        let digest = self.download.as_ref().and_then(Download::digest).ok_or(Nrc::RequestSequenceError)?;
-        security::accept(USE_DOWNLOAD, digest, trailer, device)
+        if device.access().is_some_and(|access| access.key.is_none()) {
+            let [] = exactly(trailer)?;
+        } else {
+            let Ok(trailer) = trailer.try_into() else {
+                return Err(nrc(device.refuse_request(Refusal::Unsigned)));
+            };
+            let (digest, _) = checked.ok_or(Nrc::RequestSequenceError)?;
+            let counter = security::check(USE_DOWNLOAD, digest, trailer, device)?;
+            security::use_up(counter, device)?;
+        }
+        device.weights_activate().map_err(nrc)
     }
 }

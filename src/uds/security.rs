@@ -144,33 +144,32 @@ impl Security {
     }
 }
 
-/// Checks the trailer of written data, and returns the data without it. Without a key there is no trailer.
+/// Checks the trailer of written data, and returns the data without it, and the counter to [`use_up`]. Without a key
+/// there is no trailer.
 pub(super) fn signed<'b, R: NorFlash, W: MappedSlots>(
     target: u16,
     bytes: &'b [u8],
     device: &mut Device<R, W>,
-) -> Result<&'b [u8], Nrc> {
+) -> Result<(&'b [u8], Option<u32>), Nrc> {
     if let Some(Access { key: None, .. }) = device.access() {
-        return Ok(bytes);
+        return Ok((bytes, None));
     }
     let Some((content, trailer)) = bytes.split_last_chunk::<TRAILER>() else {
         return Err(nrc(device.refuse_request(Refusal::Unsigned)));
     };
-    accept(target, &signature::digest(content), trailer, device)?;
-    Ok(content)
+    Ok((content, check(target, &signature::digest(content), trailer, device)?))
 }
 
-/// Checks a trailer, and stores its counter, so that the same signature is never accepted again. Wrong answers before
-/// it are forgotten.
+/// Checks a trailer, and returns its counter.
 #[inline(never)]
-pub(super) fn accept<R: NorFlash, W: MappedSlots>(
+pub(super) fn check<R: NorFlash, W: MappedSlots>(
     target: u16,
     digest: &Digest,
     trailer: &[u8; TRAILER],
     device: &mut Device<R, W>,
-) -> Result<(), Nrc> {
+) -> Result<Option<u32>, Nrc> {
     let Some(access) = device.access() else { return Err(Nrc::SecurityAccessDenied) };
-    let Some(key) = access.key else { return Ok(()) };
+    let Some(key) = access.key else { return Ok(None) };
     let [scope, a, b, c, d, signature @ ..] = trailer;
     let counter = u32::from_be_bytes([*a, *b, *c, *d]);
     let serial = match scope {
@@ -181,14 +180,34 @@ pub(super) fn accept<R: NorFlash, W: MappedSlots>(
     if !device.may_interrupt() {
         return Err(nrc(device.refuse_request(Refusal::Moving)));
     }
-    if counter <= access.counter {
-        let refusal = Refusal::Counter { found: counter, newest: access.counter };
-        return Err(nrc(device.refuse_request(refusal)));
-    }
+    check_counter(counter, access, device)?;
     let message = signature::message(&Statement { target, serial, counter }, digest);
     if !device.long(|| signature::is_valid(&key, &message, signature)) {
         return Err(nrc(device.refuse_request(Refusal::Signature)));
     }
+    Ok(Some(counter))
+}
+
+fn check_counter<R: NorFlash, W: MappedSlots>(
+    counter: u32,
+    access: Access,
+    device: &mut Device<R, W>,
+) -> Result<(), Nrc> {
+    if counter <= access.counter {
+        let refusal = Refusal::Counter { found: counter, newest: access.counter };
+        return Err(nrc(device.refuse_request(refusal)));
+    }
+    Ok(())
+}
+
+/// Stores the counter of a signature that was checked, so that the same signature is never accepted again. Wrong answers
+/// before it are forgotten.
+pub(super) fn use_up<R: NorFlash, W: MappedSlots>(
+    counter: Option<u32>,
+    device: &mut Device<R, W>,
+) -> Result<(), Nrc> {
+    let Some((counter, access)) = counter.zip(device.access()) else { return Ok(()) };
+    check_counter(counter, access, device)?;
     device.store_access(Access { counter, wrong: 0, ..access }).map_err(nrc)
 }
 

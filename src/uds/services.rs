@@ -10,13 +10,15 @@ use super::data::{self, Sources};
 use super::download::Download;
 use super::dtc::Memory;
 use super::isotp::TransportErrors;
-use super::response::{Nrc, Response, exactly, put};
+use super::response::{Nrc, Response, exactly, nrc, put};
 use super::security::{self, Security, Seed};
 use super::session::{self, Session};
-use super::signature::SIGNATURE;
+use super::signature::{Digest, SIGNATURE};
 use super::troubles;
+use super::update::Head;
 use crate::service::message::AllCounters;
 use crate::service::{Device, MappedSlots};
+use crate::store::firmware::{FirmwareError, MAX_IMAGE};
 use automotive_diag::uds::UdsCommand;
 use embedded_storage::nor_flash::NorFlash;
 
@@ -24,6 +26,8 @@ use embedded_storage::nor_flash::NorFlash;
 const SESSION_MS: u32 = 5_000;
 /// Time after a stall of the board in which the faults that it causes end, ms.
 const SETTLE_MS: u32 = 1_000;
+/// Data identifier of the firmware: its state, and the head of an update.
+pub(super) const UPDATE: u16 = 0x011A;
 /// Bit of a sub-function that suppresses the positive response.
 const SUPPRESS: u8 = 0x80;
 
@@ -52,6 +56,8 @@ pub(super) struct Services {
     /// True if a tester has requested a restart.
     pub is_restarting: bool,
     pub(super) download: Option<Download>,
+    /// Head of a firmware update, and the counter of its signature.
+    pub(super) update: Option<(Head, Option<u32>)>,
     pub(super) security: Security,
 }
 
@@ -81,6 +87,7 @@ impl Services {
             is_silenced: false,
             is_restarting: false,
             download: None,
+            update: None,
             security: Security::new(),
         }
     }
@@ -139,7 +146,7 @@ impl Services {
 
     pub(super) fn enter(&mut self, session: Session) {
         self.session = session;
-        self.download = None;
+        (self.download, self.update) = (None, None);
         self.security.end();
         if session == Session::Default {
             self.memory.is_enabled = true;
@@ -292,16 +299,25 @@ impl Services {
                 if !data::is_writable(id) {
                     return Err(Nrc::RequestOutOfRange);
                 }
-                let content = security::signed(id, bytes, device)?;
+                let (content, counter) = security::signed(id, bytes, device)?;
                 match id {
-                    0x0110 => self.security.write_key(content, device)?,
-                    _ => data::write(id, content, device)?,
+                    UPDATE => self.begin_update(content, counter, device)?,
+                    0x0110 => {
+                        self.update = None;
+                        security::use_up(counter, device)?;
+                        self.security.write_key(content, device)?;
+                    }
+                    _ => {
+                        security::use_up(counter, device)?;
+                        data::write(id, content, device)?;
+                    }
                 }
                 put(out, &[*high, *low])
             }
             UdsCommand::RequestDownload => {
                 self.download = None;
-                self.download = Some(Download::begin(rest, device, out)?);
+                let head = self.update.as_ref().map(|(head, _)| head);
+                self.download = Some(Download::begin(rest, head, device, out)?);
                 Ok(())
             }
             UdsCommand::TransferData => {
@@ -315,6 +331,27 @@ impl Services {
             }
             _ => Err(Nrc::ServiceNotSupported),
         }
+    }
+
+    /// Checks the head of a firmware update, and keeps it for the download.
+    #[inline(never)]
+    fn begin_update<R: NorFlash, W: MappedSlots>(
+        &mut self,
+        head: &[u8],
+        counter: Option<u32>,
+        device: &mut Device<R, W>,
+    ) -> Result<(), Nrc> {
+        (self.download, self.update) = (None, None);
+        let Some(head) = head.try_into().ok().and_then(Head::parse) else {
+            return Err(nrc(device.refuse_request(FirmwareError::NotAnUpdate.into())));
+        };
+        let slot = device.firmware_check(&head.label, head.downgrade).map_err(nrc)?;
+        let Digest { length, .. } = head.image(slot);
+        if length > MAX_IMAGE {
+            return Err(nrc(device.refuse_request(FirmwareError::Length(length).into())));
+        }
+        self.update = Some((head, counter));
+        Ok(())
     }
 
     fn under_way(&mut self) -> Result<&mut Download, Nrc> {

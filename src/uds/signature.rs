@@ -18,7 +18,7 @@ pub const TRAILER: usize = 1 + 4 + SIGNATURE;
 /// Length of a challenge, bytes.
 pub const SEED: usize = 32;
 /// Length of a SHA-512 hash, bytes.
-const DIGEST: usize = 64;
+pub const DIGEST: usize = 64;
 
 const CONTENT: [u8; 17] = *b"gyronet content 1";
 const ACCESS: [u8; 16] = *b"gyronet access 1";
@@ -26,58 +26,19 @@ const ACCESS: [u8; 16] = *b"gyronet access 1";
 const CONTENT_MESSAGE: usize = CONTENT.len() + 2 + SERIAL + 4 + 4 + DIGEST;
 const ACCESS_MESSAGE: usize = ACCESS.len() + SERIAL + SEED;
 
-/// The hash of a content that arrives in parts.
-pub struct Hasher {
-    hash: Sha512,
-    length: u32,
-}
-
 /// The length of a content and its SHA-512.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Digest {
-    length: u32,
-    hash: [u8; DIGEST],
-}
-
-impl Default for Hasher {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl core::fmt::Debug for Hasher {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("Hasher").field("length", &self.length).finish_non_exhaustive()
-    }
-}
-
-impl Hasher {
-    /// Creates the hash of an empty content.
-    pub fn new() -> Self {
-        Self { hash: Sha512::new(), length: 0 }
-    }
-
-    /// Adds the next bytes of the content.
-    #[inline(never)]
-    pub fn update(&mut self, bytes: &[u8]) {
-        self.hash.update(bytes);
-        self.length = self.length.wrapping_add(bytes.len() as u32);
-    }
-
-    /// Returns the digest of all bytes, and resets the hash.
-    #[inline(never)]
-    pub fn finish(&mut self) -> Digest {
-        let Self { hash, length } = core::mem::take(self);
-        Digest { length, hash: hash.finalize().into() }
-    }
+    /// Length of the content, bytes.
+    pub length: u32,
+    /// SHA-512 of the content.
+    pub hash: [u8; DIGEST],
 }
 
 /// Returns the digest of a content.
 #[inline(never)]
 pub fn digest(content: &[u8]) -> Digest {
-    let mut hasher = Hasher::new();
-    hasher.update(content);
-    hasher.finish()
+    Digest { length: content.len() as u32, hash: Sha512::digest(content).into() }
 }
 
 /// The scope of a signature: identifier, board and counter.
@@ -108,7 +69,7 @@ pub fn challenge(serial: &[u8; SERIAL], seed: &[u8; SEED]) -> [u8; ACCESS_MESSAG
     joined([&ACCESS, serial, seed])
 }
 
-fn joined<const N: usize, const PARTS: usize>(parts: [&[u8]; PARTS]) -> [u8; N] {
+pub(super) fn joined<const N: usize, const PARTS: usize>(parts: [&[u8]; PARTS]) -> [u8; N] {
     let mut message = [0; N];
     message.iter_mut().zip(parts.into_iter().flatten()).for_each(|(place, byte)| *place = *byte);
     message

@@ -1,6 +1,6 @@
 //! The virtual board's CAN bus, for a tester: receiving lets board time pass.
 
-use super::Board;
+use super::{Board, Seen};
 use gyronet::can::DataFrame;
 use gyronet_tools::client::bus::Bus;
 use std::io::Result;
@@ -12,6 +12,14 @@ const TURN: Duration = Duration::from_millis(1);
 /// The CAN bus of a board. Receiving takes the frames that the board has sent.
 #[derive(Debug)]
 pub struct CanBus<'a>(pub(super) &'a mut Board);
+
+impl CanBus<'_> {
+    /// Lets a turn pass, and returns all frames that were on the bus.
+    pub fn observe(&mut self) -> Vec<Seen> {
+        self.0.run(TURN);
+        self.0.bus_log()
+    }
+}
 
 impl Bus for CanBus<'_> {
     fn send(&mut self, frame: &DataFrame) -> Result<()> {

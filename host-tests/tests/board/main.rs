@@ -21,4 +21,5 @@ mod stored_start;
 mod supply;
 mod timing;
 mod uds;
+mod update;
 mod wheels;

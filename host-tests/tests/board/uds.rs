@@ -8,9 +8,11 @@ use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::store::{Configuration, Record};
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::recordings::workspace;
-use gyronet_host_tests::require;
 use gyronet_host_tests::stored::other_weights;
 use gyronet_host_tests::tester::{Tester, bytes};
+use gyronet_host_tests::{image, require};
+use gyronet_tools::client::device::requests::FIRMWARE;
+use gyronet_tools::client::device::update::Update;
 use gyronet_tools::signing::{PrivateKey, hex};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
@@ -134,18 +136,27 @@ fn diagnosis_with_29_bits_is_configured_over_itself() {
 
 /// Relays frames between the client's pipes and the board, a millisecond of the board's time for each turn.
 #[test]
-fn udsoncan_reads_writes_and_downloads() {
-    const TEST: &str = "udsoncan_reads_writes_and_downloads";
+fn udsoncan_reads_writes_downloads_and_updates() {
+    const TEST: &str = "udsoncan_reads_writes_downloads_and_updates";
     let Some(python) = require::python(TEST, &["can", "isotp", "udsoncan", "yaml"]) else { return };
-    let Some(mut board) = common::boot(TEST) else { return };
+    let (Some(whole), Some(mut board)) =
+        (image::update(TEST, env!("CARGO_TARGET_TMPDIR")), common::boot(TEST))
+    else {
+        return;
+    };
     board.run(START);
     let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("uds_weights.bin");
     let weights = other_weights(2);
     std::fs::write(&file, &weights).expect("there is room");
     let key = PrivateKey::generate().expect("random numbers");
     let signed = |content: &[u8]| hex(&key.trailer(0xFF01, None, 7, content));
+    // The first KiB of an image.
+    let [a, b] = whole.images;
+    let update = Update::new(whole.head.label, [a, b[..1_024].to_vec()]);
+    std::fs::write(file.with_extension("bin.update"), update.bytes()).expect("there is room");
     let keys = serde_json::json!({
         "public": hex(&key.public()), "good": signed(&weights), "foreign": signed(&other_weights(1)),
+        "update": hex(&key.trailer(FIRMWARE, None, 8, &update.head.bytes())),
     });
     std::fs::write(file.with_extension("bin.json"), keys.to_string()).expect("there is room");
     let mut client = Command::new(python)

@@ -1,7 +1,8 @@
 """Diagnoses the board with udsoncan over can-isotp, as they are published.
 
 `uds_client.py socketcan vcan0` reads over an interface of Linux. `uds_client.py pipes WEIGHTS` reads and writes over a bus that is two
-pipes, with the key and signatures in WEIGHTS.json: each line "turn ID#DATA ..." that goes out carries the frames of a millisecond, and the line that
+pipes, with the key and signatures in WEIGHTS.json and
+an update in WEIGHTS.update: each line "turn ID#DATA ..." that goes out carries the frames of a millisecond, and the line that
 comes back the server's frames. Both packages run with their default settings, and their clock counts these turns.
 """
 
@@ -150,14 +151,7 @@ def write(client, pipes, weights, signed):
     client.write_data_by_identifier(0x0110, bytes.fromhex(signed["public"]))
     client.change_session(DiagnosticSessionControl.Session.programmingSession)
     refused(0x33, client.ecu_reset, ECUReset.ResetType.hardReset)
-    place = udsoncan.MemoryLocation(0, len(weights), 32, 32)
-    length = client.request_download(place).service_data.max_length - 2
-    for number, start in enumerate(range(0, len(weights), length), 1):
-        client.transfer_data(number & 0xFF, weights[start:start + length])
-        if number == 1:
-            # A file that is cut.
-            refused(0x24, client.request_transfer_exit)
-    client.request_transfer_exit()
+    download(client, 0, weights)
     refused(0x13, client.start_routine, 0xFF01)
     refused(0x35, client.start_routine, 0xFF01, bytes.fromhex(signed["foreign"]))
     client.start_routine(0xFF01, bytes.fromhex(signed["good"]))
@@ -173,12 +167,43 @@ def write(client, pipes, weights, signed):
     assert not pipes.errors, pipes.errors
 
 
+def download(client, address, content):
+    """Sends a file in blocks, and has it checked."""
+    place = udsoncan.MemoryLocation(address, len(content), 32, 32)
+    length = client.request_download(place).service_data.max_length - 2
+    for number, start in enumerate(range(0, len(content), length), 1):
+        client.transfer_data(number & 0xFF, content[start:start + length])
+        if number == 1 and len(content) > length:
+            # A file that is cut.
+            refused(0x24, client.request_transfer_exit)
+    client.request_transfer_exit()
+
+
+def update(client, pipes, file, signature):
+    """Updates the firmware to an image that does not start, which is rolled back."""
+    head, images = file[:161], file[161:]
+    slot, state = client.read_data_by_identifier(0x011A).service_data.values[0x011A]
+    assert (slot, state) == (0, 1), (slot, state)
+    client.change_session(DiagnosticSessionControl.Session.programmingSession)
+    client.write_data_by_identifier(0x011A, head + signature)
+    download(client, 2, images[struct.unpack(">I", head[25:29])[0]:])
+    client.start_routine(0xFF01)
+    print("reset", flush=True)
+    for _ in range(6000):
+        pipes.turn()
+    slot, state = client.read_data_by_identifier(0x011A).service_data.values[0x011A]
+    assert (slot, state) == (0, 3), (slot, state)
+    print("the update was rolled back")
+
+
 def main():
     line, name = sys.argv[1:]
     if line == "pipes":
         pipes = Pipes()
         with Client(pipes, config=CONFIG) as client:
-            write(client, pipes, Path(name).read_bytes(), json.loads(Path(name + ".json").read_text()))
+            signed = json.loads(Path(name + ".json").read_text())
+            write(client, pipes, Path(name).read_bytes(), signed)
+            update(client, pipes, Path(name + ".update").read_bytes(), bytes.fromhex(signed["update"]))
     else:
         bus = can.Bus(interface=line, channel=name, bitrate=500_000)
         notifier = can.Notifier(bus, [])

@@ -14,6 +14,7 @@ mod course;
 mod default_model;
 mod e2e;
 mod entrances;
+mod firmware_power_cut;
 mod fog;
 mod fog_earth_and_bias;
 mod fog_grid;

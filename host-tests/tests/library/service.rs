@@ -3,6 +3,7 @@
 mod access;
 mod calibration;
 mod configuration;
+mod firmware;
 mod isotp;
 mod keys;
 mod learning;
@@ -19,8 +20,8 @@ use gyronet::service::crash::FILE;
 use gyronet::service::event::{Crash, CrashKind, ResetCause};
 use gyronet::service::message::{Identity, Info};
 use gyronet::service::{Device, SupportedHardware};
-use gyronet::store::ImuPart;
 use gyronet::store::layout::{self, RECORD_SECTOR};
+use gyronet::store::{ImuPart, Slot};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use gyronet_host_tests::flash::{F405, MappedRegion, Region};
 use std::cell::RefCell;
@@ -50,9 +51,14 @@ const IDENTITY: Identity = Identity {
 };
 
 fn start(flash: &Rc<RefCell<F405>>) -> Board {
+    start_from(flash, None)
+}
+
+/// A board whose boot loader has started a slot.
+fn start_from(flash: &Rc<RefCell<F405>>, running: Option<Slot>) -> Board {
     let records = Region::new(flash, layout::STORE);
     let mut board = Board::new(&SUPPORTED_HARDWARE);
-    board.begin(Some(records), Some(MappedRegion::new(flash)), Ok(()), IDENTITY);
+    board.begin(Some(records), Some(MappedRegion::of_running(flash, running)), Ok(()), IDENTITY);
     let slots = MappedRegion::new(flash);
     let blob = board.weights(Some(slots.current()), &DEFAULT.0);
     assert!(blob.is_some());

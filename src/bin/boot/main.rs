@@ -35,8 +35,9 @@ mod firmware {
     use gyronet::store::firmware::{TRAILER, select};
     use gyronet::store::layout::{FLASH_BASE, SECTORS};
 
-    /// An eighth of a second at 16 MHz, and the eighths in which the LED is lit.
-    const EIGHTH: u32 = 2_000_000;
+    /// An eighth of a second at 16 MHz, of which a step of the delay takes two clocks, and the eighths in which the LED is
+    /// lit.
+    const EIGHTH: u32 = 1_000_000;
     const PATTERN: u32 = 0b0101;
 
     #[cortex_m_rt::entry]

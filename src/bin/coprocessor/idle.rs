@@ -4,9 +4,11 @@
 use crate::crash;
 use crate::diagnosis::Diagnosis;
 use crate::imu::{self, BringUp};
+use crate::output;
 use crate::regions::{Records, Weights};
 use crate::ring::Ring;
-use crate::stm32f405::{clocks, timer};
+use crate::stm32f405::{can, clocks, timer};
+use cortex_m::peripheral::SCB;
 use gyronet::coprocessor::Coprocessor;
 use gyronet::heading::CourseState;
 use gyronet::health::{Faults, Status, count};
@@ -122,6 +124,9 @@ impl Idle {
         count(&mut counters.lines.service_errors, self.diagnosis.refused());
         self.diagnosis.step(self.device, counters);
         self.retry_clock();
+        if self.device.firmware_trial(can::is_acknowledged(), counters.pipeline.windows, now) {
+            output::with_silence_announced(SCB::sys_reset);
+        }
         let weights_damaged = self.check();
         Found { weights_damaged, mount_moved: self.device.take_mount_moved() }
     }
@@ -143,7 +148,7 @@ impl Idle {
         };
         self.retried = now;
         if clocks::recovered(fault) {
-            cortex_m::peripheral::SCB::sys_reset();
+            SCB::sys_reset();
         }
     }
 

@@ -1,13 +1,17 @@
-//! The regions of the flash that the image writes: records and weight files.
+//! The regions of the flash that the image writes: records, weight files, and firmware in the slot that does not run.
 #![allow(unsafe_code, reason = "memory by address; the block says why it is sound")]
 
 use crate::output;
 use crate::stm32f405::flash::{Flash, FlashError, WORD};
 use crate::stm32f405::watchdog;
 use core::ops::Range;
+use cortex_m::peripheral::SCB;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use gyronet::service::MappedSlots;
-use gyronet::store::layout::{RECORD_SECTOR, SLOT_SIZE, SLOTS, STORE, sector};
+use gyronet::store::Slot;
+use gyronet::store::layout::{
+    FIRMWARE_A, FIRMWARE_B, FLASH_BASE, RECORD_SECTOR, SLOT_SIZE, SLOTS, STORE, sector,
+};
 
 /// Returns the range of `len` bytes from an offset into the flash, if it lies in one of the regions.
 fn inside(regions: &[Range<u32>], offset: u32, len: usize) -> Result<Range<u32>, FlashError> {
@@ -25,6 +29,10 @@ fn aligned(range: Range<u32>, unit: usize) -> Result<Range<u32>, FlashError> {
 
 /// Erases a range of whole sectors, after announcing the silence on the buses.
 fn erase(flash: &Flash, range: Range<u32>) -> Result<(), FlashError> {
+    let runs = |slot: Slot| slot.firmware().contains(&range.start);
+    if running().is_some_and(runs) {
+        return Err(FlashError::OutOfBounds);
+    }
     output::with_silence_announced(|| {
         let mut at = range.start;
         while at < range.end {
@@ -88,16 +96,39 @@ region!(
     RECORD_SECTOR,
     "The sectors of the records; offsets count from their start."
 );
-region!(Weights, 0, [SLOTS], SLOT_SIZE, "The weight slots, by offset into the flash.");
+region!(
+    Weights,
+    0,
+    [SLOTS, FIRMWARE_A, FIRMWARE_B],
+    SLOT_SIZE,
+    "The slots for weights and firmware, by offset into the flash."
+);
 
 impl MappedSlots for Weights {
     fn slots(&self) -> [&[u8]; 2] {
         slots_at_start()
     }
 
+    fn running(&self) -> Option<Slot> {
+        running()
+    }
+
+    fn firmware(&self, slot: Slot) -> &[u8] {
+        let range = slot.firmware();
+        // SAFETY: inside the flash; it is written only while no slice of it is used.
+        unsafe { Flash::mapped(range.start, range.len()) }
+    }
+
     fn check<T>(&self, work: impl FnOnce() -> T) -> T {
         watchdog::with_long_limit(work)
     }
+}
+
+/// Returns the slot that the boot loader has started.
+fn running() -> Option<Slot> {
+    // SAFETY: the register is only read.
+    let vectors = unsafe { &*SCB::PTR }.vtor.read();
+    Slot::ALL.into_iter().find(|slot| vectors == FLASH_BASE + slot.firmware().start)
 }
 
 /// Returns both slots. The slot that the network runs on is not written meanwhile.

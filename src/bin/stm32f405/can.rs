@@ -7,7 +7,7 @@
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
 
 use super::{pac, timer, wait_until};
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embedded_can::{ExtendedId, Frame as _, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::service::event::CanFault;
@@ -50,6 +50,8 @@ const HALF_POLL_US: u32 = 500;
 
 /// Number of frames that left a mailbox unsent. Only the transmit interrupt counts.
 static ABORTED: AtomicU32 = AtomicU32::new(0);
+/// True once another node has acknowledged a frame.
+static ACKNOWLEDGED: AtomicBool = AtomicBool::new(false);
 /// The time of a bus-off that the sending half has not seen yet, us; 0 without one.
 static OFF_AT: AtomicU32 = AtomicU32::new(0);
 
@@ -285,6 +287,12 @@ pub fn aborted() -> u32 {
     ABORTED.load(Ordering::Relaxed)
 }
 
+/// Returns whether another node has acknowledged a frame since the start.
+#[allow(dead_code, reason = "bringup has no bus")]
+pub fn is_acknowledged() -> bool {
+    ACKNOWLEDGED.load(Ordering::Relaxed)
+}
+
 #[inline]
 pub fn all_sent() -> bool {
     // SAFETY: the register is only read.
@@ -303,6 +311,8 @@ pub fn transmitted() {
             completed |= REQUEST_COMPLETED << (8 * k);
             if status & TRANSMITTED << (8 * k) == 0 {
                 ABORTED.store(ABORTED.load(Ordering::Relaxed).saturating_add(1), Ordering::Relaxed);
+            } else {
+                ACKNOWLEDGED.store(true, Ordering::Relaxed);
             }
         }
     }

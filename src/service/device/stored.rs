@@ -1,6 +1,6 @@
 //! Reads the stored records at the start, and stores them on request.
 
-use super::{Device, INTERRUPTS, MappedSlots, SupportedHardware};
+use super::{Device, Firmware, INTERRUPTS, MappedSlots, SupportedHardware};
 use crate::bias::Rest;
 use crate::can::wheel::WheelSettings;
 use crate::service::event::EventKind;
@@ -29,6 +29,10 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         // After a fault, records are read only here, and nothing is kept for writing.
         self.slots = slots.filter(|_| controller.is_ok());
         self.note(EventKind::Started(identity.reset));
+        self.firmware = self.slots.as_mut().map_or(Firmware::ALONE, Firmware::of);
+        if let Some(slot) = self.firmware.slot.filter(|_| self.firmware.is_refused()) {
+            self.note(EventKind::FirmwareRefused(slot.other()));
+        }
         if let Err(fault) = controller {
             self.refuse(EventKind::FlashRefused(fault));
         }

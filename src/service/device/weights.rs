@@ -14,6 +14,16 @@ pub trait MappedSlots: NorFlash {
     /// Returns both slots, aligned to words.
     fn slots(&self) -> [&[u8]; 2];
 
+    /// Returns the slot of the firmware that runs; `None` if it can have no other.
+    fn running(&self) -> Option<Slot> {
+        None
+    }
+
+    /// Returns the content of a slot for firmware.
+    fn firmware(&self, _: Slot) -> &[u8] {
+        &[]
+    }
+
     /// Runs the check of a file or of a signature, which takes a tenth of a second at 168 MHz. A board may override this
     /// to extend its watchdog timeout.
     fn check<T>(&self, work: impl FnOnce() -> T) -> T {
@@ -32,8 +42,8 @@ pub(super) struct Uploading {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Checked {
     pub(super) crc: u32,
-    /// Largest cost of a window, cycles.
-    window: u32,
+    /// Largest cost of a window of weights, cycles.
+    pub(super) window: u32,
 }
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
@@ -128,19 +138,20 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         })
     }
 
-    /// Checks the complete file.
+    /// Checks the complete file, and returns what `of` makes of its bytes.
     ///
     /// # Errors
     /// [`Refusal::Slot`].
     #[inline(never)]
-    pub fn weights_verify(&mut self) -> Result<(), Refusal> {
+    pub fn weights_verify<T>(&mut self, of: impl FnOnce(&[u8]) -> T) -> Result<T, Refusal> {
         self.request(false, |device| {
             let flash = device.slots.as_ref().ok_or(SlotError::NoFlash)?;
             let uploading = device.uploading.as_mut().ok_or(SlotError::NotBegun)?;
             let upload = &uploading.upload;
-            let Blob { crc, shape, .. } = flash.check(|| upload.verify(flash.slots()))?;
+            let of_file = || upload.verify(flash.slots()).map(|(bytes, blob)| (of(bytes), blob));
+            let (result, Blob { crc, shape, .. }) = flash.check(of_file)?;
             uploading.checked = Some(Checked { crc, window: shape.window_cycles() });
-            Ok(())
+            Ok(result)
         })
     }
 

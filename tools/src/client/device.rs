@@ -5,6 +5,7 @@ pub mod calibration;
 pub mod error;
 pub mod requests;
 pub mod settings;
+pub mod update;
 pub mod upload;
 
 pub use access::AccessState;
@@ -25,6 +26,9 @@ use std::time::Duration;
 const RESPONSE: Duration = Duration::from_millis(TIMEOUT_MS as u64);
 /// Timeout after "response pending": erasing a slot takes up to 4 s by the datasheet.
 const PENDING: Duration = Duration::from_secs(8);
+/// The longest time that the proof of a standstill takes after an erase, and the time between two tries.
+const PROOF: Duration = Duration::from_secs(15);
+const RETRY: Duration = Duration::from_millis(500);
 /// Number of times that a request is sent before it fails.
 const ATTEMPTS: u32 = 3;
 /// First byte of a negative response.
@@ -74,6 +78,23 @@ impl<B: Bus> Device<B> {
                 Some(refusal) => DeviceError::Refused(refusal),
                 None => DeviceError::Negative { service, code: Code(code) },
             }),
+        }
+    }
+
+    /// Sends a request as [`Self::ask`] does, and again while the vehicle is not proven to stand. After an erase, in which the
+    /// board has missed its sensor, the proof takes seconds.
+    pub(crate) fn ask_at_rest(&mut self, request: &[u8]) -> Result<Vec<u8>, DeviceError> {
+        let until = self.bus.now() + PROOF;
+        loop {
+            match self.ask(request) {
+                Err(DeviceError::Refused(Refusal::Moving)) if self.bus.now() < until => {
+                    let next = self.bus.now() + RETRY;
+                    while self.bus.now() < next {
+                        self.bus.receive().map_err(|source| self.broken(source))?;
+                    }
+                }
+                other => return other,
+            }
         }
     }
 

@@ -12,6 +12,7 @@ use gyronet::model::fognet_blob::FOGNET;
 use gyronet::service::message::{AccessCounters, Info};
 use gyronet_tools::client::bus::{self, Bus};
 use gyronet_tools::client::device::settings::{flat, value as value_of};
+use gyronet_tools::client::device::update::{Update, update};
 use gyronet_tools::client::device::upload::upload;
 use gyronet_tools::client::device::{AccessState, Authority, Device};
 use gyronet_tools::signing::{self, PrivateKey};
@@ -90,6 +91,14 @@ enum Action {
         /// Weight file, as `gyronet quantize` writes it.
         file: PathBuf,
     },
+    /// Update the firmware; the board checks it, and starts it on trial after a restart.
+    Update {
+        /// Update, as `gyronet firmware` builds it.
+        file: PathBuf,
+        /// Accept firmware that is older than the board's.
+        #[arg(long)]
+        downgrade: bool,
+    },
     /// Print who may write: whether a key is stored, the newest signature counter, and the serial number.
     Access,
     /// Store the public key that controls who may write; `none` removes it.
@@ -165,6 +174,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             print_value(&counters, json)?;
         }
         Action::Weights { file } => weights(&mut device, file, json, common)?,
+        Action::Update { file, downgrade } => update_firmware(&mut device, file, *downgrade, json, common)?,
         Action::Access => {
             let access = Access { access: device.access()?, refused: device.access_counters()? };
             print_value(&access, json)?;
@@ -206,7 +216,7 @@ fn print_info(info: &Info, access: &str) -> io::Result<()> {
     let out = &mut io::stdout().lock();
     let identity = &info.identity;
     let [major, minor, patch] = identity.firmware;
-    writeln!(out, "firmware      {major}.{minor}.{patch}, protocol {}", info.protocol)?;
+    writeln!(out, "firmware      {major}.{minor}.{patch}, {}, protocol {}", info.firmware, info.protocol)?;
     match identity.device_id {
         Some(id) => writeln!(out, "part          {:#05x} revision {:#06x}", id & 0xFFF, id >> 16)?,
         None => writeln!(out, "part          unknown")?,
@@ -318,4 +328,29 @@ fn weights(device: &mut Board, path: &std::path::Path, json: bool, common: Commo
         let (slot, crc) = (uploaded.slot, uploaded.crc);
         Ok(writeln!(io::stdout(), "slot {slot} holds file {crc:08x}; the board uses it after a restart")?)
     }
+}
+
+fn update_firmware(
+    device: &mut Board,
+    path: &std::path::Path,
+    downgrade: bool,
+    json: bool,
+    common: Common,
+) -> super::Result {
+    let file = std::fs::read(path).map_err(super::WriteError::to(path))?;
+    let mut file = Update::parse(&file).map_err(|error| format!("{}: {error}", path.display()))?;
+    file.head.downgrade = downgrade;
+    let bar = super::progress::bar(common, 0, "update");
+    let slot = update(device, &file, |sent, size| {
+        bar.set_length(size as u64);
+        bar.set_position(sent as u64);
+    })?;
+    bar.finish_and_clear();
+    let [major, minor, patch] = file.head.label.version;
+    if json {
+        return print_json(&serde_json::json!({ "slot": slot, "version": file.head.label.version }));
+    }
+    let text =
+        format!("slot {slot} holds firmware {major}.{minor}.{patch}; it starts on trial after a restart");
+    Ok(writeln!(io::stdout(), "{text}")?)
 }

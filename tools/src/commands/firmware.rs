@@ -7,7 +7,7 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::Command;
 
-/// Build the firmware of a board, boot loader and image, for a debug probe.
+/// Build the firmware of a board: boot loader and image for a debug probe, and an update for `device update`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Board, as a feature of the images.
@@ -28,8 +28,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let folder = args.target_dir.clone().unwrap_or_else(bench::target_folder);
     let folder = std::path::absolute(folder)?;
     let features = args.features.iter().fold(args.board.clone(), |all, one| format!("{all},{one}"));
-    let linked = Linked::build(&features, 1, &folder)?;
-    let elf = folder.join(format!("{}.elf", args.board));
+    let linked = Linked::build(&features, if args.flash { 1 } else { 2 }, &folder)?;
+    let [elf, update] = ["elf", "update"].map(|end| folder.join(format!("{}.{end}", args.board)));
     std::fs::write(&elf, linked.for_programmer()?).map_err(WriteError::to(&elf))?;
     if args.flash {
         let status = Command::new("probe-rs")
@@ -39,9 +39,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             .map_err(|error| format!("probe-rs: {error}"))?;
         return if status.success() { Ok(()) } else { Err(format!("probe-rs: {status}").into()) };
     }
+    std::fs::write(&update, linked.update()?.bytes()).map_err(WriteError::to(&update))?;
     let out = &mut io::stdout().lock();
     if common.json {
-        return super::print_json(out, &serde_json::json!({ "elf": elf }));
+        return super::print_json(out, &serde_json::json!({ "elf": elf, "update": update }));
     }
-    Ok(writeln!(out, "{}: for a debug probe", elf.display())?)
+    writeln!(out, "{}: for a debug probe", elf.display())?;
+    Ok(writeln!(out, "{}: for `device update`", update.display())?)
 }

@@ -3,8 +3,11 @@
 use super::Common;
 use clap::ValueEnum;
 use gyronet_tools::calibrate::unit_file;
-use gyronet_tools::client::device::requests::{self, CONFIGURATION, KEY, UNIT, USE_DOWNLOAD, WHEELS};
+use gyronet_tools::client::device::requests::{
+    self, CONFIGURATION, FIRMWARE, KEY, UNIT, USE_DOWNLOAD, WHEELS,
+};
 use gyronet_tools::client::device::settings::from_value;
+use gyronet_tools::client::device::update::Update;
 use gyronet_tools::signing::{PrivateKey, read_public, unhex};
 use gyronet_tools::wheels::WheelFile;
 use std::io::{self, Write};
@@ -19,7 +22,7 @@ use std::path::PathBuf;
 Examples:
   gyronet sign new.blob --target weights --key fleet.key --counter 7 --out new.sig")]
 pub struct Args {
-    /// Weight file, complete configuration (`device get --json`), wheel frames (.toml), unit file, or public key.
+    /// Weight file, firmware update, complete configuration (`device get --json`), wheel frames (.toml), unit file, or public key.
     file: PathBuf,
     /// Kind of the file.
     #[arg(long, value_enum)]
@@ -33,6 +36,9 @@ pub struct Args {
     /// Serial number of the only board that may accept the file (`device access`) [default: any with the key].
     #[arg(long, value_name = "HEX")]
     serial: Option<String>,
+    /// Have firmware accepted even if it is older than the board's.
+    #[arg(long)]
+    downgrade: bool,
     /// Write the signature to this file.
     #[arg(long, value_name = "FILE.sig")]
     out: PathBuf,
@@ -41,6 +47,7 @@ pub struct Args {
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Target {
     Weights,
+    Firmware,
     Configuration,
     Wheels,
     Unit,
@@ -53,6 +60,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let text = || std::fs::read_to_string(&args.file).map_err(|error| format!("{name}: {error}"));
     let (target, content) = match args.target {
         Target::Weights => (USE_DOWNLOAD, read()?),
+        Target::Firmware => {
+            let Update { mut head, .. } = Update::parse(&read()?)?;
+            head.downgrade = args.downgrade;
+            (FIRMWARE, head.bytes().to_vec())
+        }
         Target::Configuration => {
             let value = serde_json::from_str(&text()?).map_err(|error| format!("{name}: {error}"))?;
             (CONFIGURATION, requests::configuration_content(&from_value(value)?)?)

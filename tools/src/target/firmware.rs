@@ -1,10 +1,11 @@
 //! Makes of the linked images what a board gets: an ELF file with the boot loader for a programmer, and an update for
 //! diagnosis.
 //!
-//! An update holds the image for either slot, since an image runs only where it was linked for. It begins with the list
-//! that is signed ([`gyronet::uds::manifest`]).
+//! An update holds the image for either slot, since an image runs only where it was linked for. It begins with the head
+//! that is signed ([`gyronet::uds::update`]).
 
 use super::bench::{self, BenchError, TARGET};
+use crate::client::device::update::Update;
 use gyronet::model::blob::CRC;
 use gyronet::store::Slot;
 use gyronet::store::firmware::{LABEL, LABEL_SIZE, Label, MAX_IMAGE, Trailer};
@@ -44,6 +45,13 @@ impl Linked {
         let features = [board.to_owned(), format!("{board},slot-b")];
         let images = features.iter().take(slots).map(|features| build(features, "coprocessor"));
         Ok(Self { boot, images: images.collect::<Result<_, _>>()? })
+    }
+
+    /// Returns the update for diagnosis, of the image for both slots.
+    pub fn update(&self) -> Result<Update, FirmwareFileError> {
+        let [a, b] = &self.images[..] else { return Err(FirmwareFileError::Lacks("slot B")) };
+        let images = [image(a, Slot::A)?, image(b, Slot::B)?];
+        Ok(Update::new(label(&images[0])?, images))
     }
 
     /// Returns the ELF file for a programmer: boot loader and confirmed image in slot A, none in slot B.

@@ -157,7 +157,7 @@ fn nothing_is_stored_without_flash() {
     assert_eq!(board.set_configuration(&Configuration::DEFAULT), no_flash);
     let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
     assert_eq!(board.weights_begin(64), no_slot);
-    assert_eq!(board.weights_verify(), no_slot);
+    assert_eq!(board.weights_verify(|_| ()), no_slot);
     assert_eq!(board.weights_activate(), Err(Refusal::Slot(SlotError::NotBegun)));
 }
 

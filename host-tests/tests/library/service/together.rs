@@ -227,7 +227,7 @@ fn weights_that_are_too_slow_for_the_mode_are_not_activated() {
         for (block, offset) in file.chunks(256).zip((0..).step_by(256)) {
             board.weights_block(offset, block)?;
         }
-        board.weights_verify()?;
+        board.weights_verify(|_| ())?;
         board.weights_activate()
     };
     assert!(matches!(send(&mut board), Err(Refusal::Slot(SlotError::Slow { .. }))));

@@ -32,13 +32,11 @@ pub struct Bench {
 
 impl Bench {
     pub fn new(flash: &Rc<RefCell<F405>>) -> Self {
-        Self {
-            server: Server::new(),
-            board: start(flash),
-            now: 0,
-            tester: Tester::default(),
-            seeds: Vec::new(),
-        }
+        Self::of(start(flash))
+    }
+
+    pub fn of(board: Board) -> Self {
+        Self { server: Server::new(), board, now: 0, tester: Tester::default(), seeds: Vec::new() }
     }
 
     /// Asks over frames, a millisecond each turn.
@@ -154,13 +152,13 @@ const CHECKS: &str = "
     extended    28=13 2801=13 280302=31 280301=22
     default     2E=7F                                                   WriteDataByIdentifier
     locked      2E0100=13 2EF18601=31 2E010000=13
-    extended    2E01006300=31
+    extended    2E01006300=31 2E011A00=31
     default     31=7F 31010200=7F                                       RoutineControl
     locked      31090909=31 3109020200=33
     extended    310902=13 3109FF01=31 3109020000=12 3102020200=12 31030204=12
     extended    3103020000=13 3101020200=13 31030200=24 31010202=22
     extended    34=7F                                                   RequestDownload
-    programming 3410=13 341011=31 3400550004=31 34001100=13 3400110204=31 3400110004=22
+    programming 3410=13 341011=31 3400550004=31 34001100=13 3400110304=31 3400110204=24 3400110004=22
     extended    36=7F 37=7F                                             TransferData, RequestTransferExit
     programming 36=13 3601=24 3700=13 37=24
     default     3E=13 3E0100=12 3E0000=13                               TesterPresent

@@ -27,12 +27,12 @@ fn weights_are_replaced() {
                 let expected = Err(Refusal::Slot(SlotError::Offset { expected: written }));
                 assert_eq!(board.weights_block(4096, &[]), expected);
                 let early = Err(Refusal::Slot(SlotError::Incomplete { written }));
-                assert_eq!(board.weights_verify(), early);
+                assert_eq!(board.weights_verify(|_| ()), early);
                 assert_eq!(board.weights_activate(), early);
             }
         }
         assert_eq!(board.uploaded(), None);
-        assert_eq!(board.weights_verify(), Ok(()));
+        assert_eq!(board.weights_verify(|_| ()), Ok(()));
         assert_eq!(board.uploaded(), Some((slot, crc)));
         assert_eq!(board.weights_activate(), Ok(()));
         let about = info(&mut start(&flash));
@@ -42,7 +42,7 @@ fn weights_are_replaced() {
     let mut board = start(&flash);
     assert_eq!(board.weights_begin(256), Ok(()));
     assert_eq!(board.weights_block(0, &[0x55; 256]), Ok(()));
-    assert!(matches!(board.weights_verify(), Err(Refusal::Slot(_))));
+    assert!(matches!(board.weights_verify(|_| ()), Err(Refusal::Slot(_))));
     assert!(matches!(board.weights_activate(), Err(Refusal::Slot(_))));
     assert_eq!(info(&mut start(&flash)).weights, WeightSource::Slot(Slot::A));
     // The slot in use damaged, and nothing accepted in the other: the built-in weights, and it is named.
@@ -58,7 +58,7 @@ fn upload(board: &mut Board, file: &[u8]) {
     for (block, offset) in file.chunks(256).zip((0u32..).step_by(256)) {
         assert_eq!(board.weights_block(offset, block), Ok(()));
     }
-    assert_eq!(board.weights_verify(), Ok(()));
+    assert_eq!(board.weights_verify(|_| ()), Ok(()));
 }
 
 /// The upload itself touches the unused slot alone (`store_power_cut`); here the board changes over to it.
@@ -133,7 +133,7 @@ fn a_file_of_fognet_is_refused() {
     for (bytes, offset) in file.chunks(256).zip((0u32..).step_by(256)) {
         assert_eq!(board.weights_block(offset, bytes), Ok(()));
     }
-    let refused = board.weights_verify();
+    let refused = board.weights_verify(|_| ());
     assert!(matches!(refused, Err(Refusal::Slot(SlotError::Blob(_) | SlotError::Length(_)))), "{refused:?}");
     let (_, mut bench) = super::uds::bench();
     bench.expect(&[0x10, 2], &[0x50, 2, 0, 50, 0x01, 0xF4]);

@@ -36,6 +36,8 @@ const LEARNED: u16 = 0x0115;
 const FORWARD: u16 = 0x0116;
 const LEVEL: u16 = 0x0118;
 const COURSE: u16 = 0x0119;
+/// Data identifier of the firmware and of the head of its update.
+pub const FIRMWARE: u16 = 0x011A;
 pub const COUNTERS: [u8; 7] = {
     let [a, b] = PIPELINE_COUNTERS.to_be_bytes();
     let [c, d] = INPUT_COUNTERS.to_be_bytes();

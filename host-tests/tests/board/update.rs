@@ -1,0 +1,337 @@
+//! Firmware updates with the images as they are flashed: boot loader, download over CAN, trial, confirmation, and the way
+//! back from images that are bad.
+
+use crate::common::{self, IMU, SAMPLE, START, resets};
+use crate::service::{self, on_bus, on_line};
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::can::yaw::{Quality, RateMessage};
+use gyronet::model::blob::CRC;
+use gyronet::service::device::{Firmware, FirmwareState};
+use gyronet::store::firmware::{MAX_IMAGE, Trailer};
+use gyronet::store::layout::FLASH_BASE;
+use gyronet::store::{Configuration, Slot};
+use gyronet_host_tests::board::{At, Board, CanBus, Seen};
+use gyronet_host_tests::{image, inputs, replay};
+use gyronet_tools::client::bus::Bus;
+use gyronet_tools::client::device::update::{Update, update};
+use gyronet_tools::client::device::{Authority, Device};
+use gyronet_tools::signing::PrivateKey;
+use std::time::Duration;
+
+const MS: Duration = Duration::from_millis(1);
+const S: Duration = Duration::from_secs(1);
+const RATE: u16 = 0x1A0;
+/// What an image has reached: samples, a frame that was acknowledged.
+const SENSOR: u32 = 1;
+const CAN: u32 = 2;
+/// Time on trial at the end of which an image gives up, and the most until the boot loader has started the one before.
+const TRIAL: Duration = Duration::from_secs(60);
+const BACK: Duration = Duration::from_secs(1);
+
+fn built(test: &str) -> Option<Update> {
+    image::update(test, env!("CARGO_TARGET_TMPDIR"))
+}
+
+fn firmware(board: &mut Board) -> (Option<Slot>, FirmwareState) {
+    let Firmware { slot, state } = service::info(board).firmware;
+    (slot, state)
+}
+
+fn address(slot: Slot) -> u32 {
+    FLASH_BASE + slot.firmware().start
+}
+
+/// A vehicle that stands, with its wheels, from now on.
+fn stand(board: &mut Board, seconds: u32) {
+    let now = board.counts().time;
+    for k in 0..seconds * 100 {
+        board.send_at(IMU, &replay::turning(k as usize, 0.001), now + SAMPLE * k);
+        board.can_send_at(&inputs::wheels(0.0), now + SAMPLE * k);
+    }
+}
+
+/// A tester on CAN that also keeps what it sees.
+struct Recorder<'a>(CanBus<'a>, &'a mut Vec<(Duration, DataFrame)>);
+
+impl Bus for Recorder<'_> {
+    fn send(&mut self, frame: &DataFrame) -> std::io::Result<()> {
+        self.0.send(frame)
+    }
+
+    fn receive(&mut self) -> std::io::Result<Vec<DataFrame>> {
+        let seen: Vec<Seen> = self.0.observe();
+        let own = seen.into_iter().filter(|seen| seen.own).map(|seen| (seen.end, seen.frame));
+        let from = self.1.len();
+        self.1.extend(own);
+        Ok(self.1[from..].iter().map(|(_, frame)| *frame).collect())
+    }
+
+    fn now(&mut self) -> Duration {
+        self.0.now()
+    }
+}
+
+#[test]
+fn the_whole_image_is_updated_over_can_while_rates_are_sent() {
+    const TEST: &str = "the_whole_image_is_updated_over_can_while_rates_are_sent";
+    let (Some(update_file), Some(mut board)) = (built(TEST), common::boot(TEST)) else { return };
+    board.run(START);
+    let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
+    on_bus(&mut board).set_configuration(&configuration).expect("it stands");
+    let key = PrivateKey::generate().expect("random numbers");
+    on_bus(&mut board).set_key(&key.public()).expect("there was none");
+    on_bus(&mut board).authorise(Authority::None);
+    assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::Confirmed));
+    stand(&mut board, 60);
+    board.run(6 * S);
+    let _ = (board.events(), board.can_frames());
+    let (begin, mut log, mut at) = (board.counts().time, Vec::new(), 0);
+    let mut device = Device::new(Recorder(board.bus(), &mut log), "the virtual board");
+    device.authorise(Authority::Key(key.clone()));
+    let slot = update(&mut device, &update_file, |sent, _| at = sent)
+        .unwrap_or_else(|error| panic!("after {at} bytes: {error}"));
+    drop(device);
+    let took = board.counts().time - begin;
+    assert_eq!(slot, Slot::B);
+    let size = update_file.images[1].len();
+    // No rate is missing but where the board erases, which it announces.
+    let rate = Id::from(StandardId::new(RATE).expect("11 bits"));
+    let rates: Vec<_> = log.iter().filter(|(_, frame)| frame.id() == rate).collect();
+    let gaps: Vec<_> = rates.windows(2).filter(|pair| pair[1].0 - pair[0].0 > 15 * MS).collect();
+    println!(
+        "{TEST}: {size} bytes in {took:.2?}, {} rates, silences {:.0?}",
+        rates.len(),
+        gaps.iter().map(|pair| pair[1].0 - pair[0].0).collect::<Vec<_>>()
+    );
+    assert!(took < 60 * S, "{took:?}");
+    for pair in &gaps {
+        let before = RateMessage::parse(pair[0].1.data()).expect("a rate").quality;
+        assert_eq!(before, Quality::Unusable, "announced");
+    }
+    let erased: Vec<u64> = board
+        .events()
+        .iter()
+        .filter(|event| event.kind == "flash_erase")
+        .flat_map(|event| event.numbers("sectors"))
+        .collect();
+    assert_eq!((gaps.len(), &erased[..]), (2, &[6, 7][..]));
+    let silent: Duration = gaps.iter().map(|pair| pair[1].0 - pair[0].0).sum();
+    assert!(rates.len() as u32 + 2 >= (took - silent).as_millis() as u32 / 10, "{}", rates.len());
+    // The controller's three places run over in each.
+    assert_eq!(common::counters(&mut board).lines.frames_lost, 2);
+    // The first frame of the new image, and its confirmation.
+    let mut device = on_bus(&mut board);
+    device.authorise(Authority::Key(key));
+    device.restart().expect("access is proven");
+    let _ = (board.run(100 * MS), board.can_frames());
+    board.run(START);
+    assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::OnTrial));
+    let first = board.can_frames().into_iter().find(|(_, frame)| frame.id() == rate).expect("rates").0;
+    let reset = resets(&mut board).pop().expect("a restart");
+    println!("{TEST}: first rate {:.0?} after the reset", first - reset.0);
+    assert!(first - reset.0 < 300 * MS);
+    board.run(6 * S);
+    assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
+    board.power_cycle(10 * MS);
+    board.run(START);
+    assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
+    assert_eq!(service::configuration(&mut board), configuration, "it outlives the update");
+    assert_eq!(on_bus(&mut board).access().expect("a response").state, "locked", "and so does the key");
+}
+
+/// Writes an image to slot B, to start on trial.
+fn install(board: &mut Board, image: &[u8], expected: u32) {
+    let trailer = Trailer::new(image.len() as u32, CRC.checksum(image), expected, 2);
+    board.patch(At::Address(address(Slot::B)), image);
+    board.patch(At::Address(address(Slot::B) + MAX_IMAGE), &trailer.bytes());
+}
+
+/// Starts the board with the image in slot A, and restarts it with another one on trial in slot B.
+fn try_on(test: &str, expected: u32, spoil: impl FnOnce(&mut Board, &mut Vec<u8>)) -> Option<Board> {
+    let (Update { images: [_, mut image], .. }, mut board) = (built(test)?, common::boot(test)?);
+    board.run(START);
+    assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::Confirmed));
+    spoil(&mut board, &mut image);
+    install(&mut board, &image, expected);
+    on_bus(&mut board).restart().expect("it stands");
+    board.run(START);
+    let _ = board.events();
+    Some(board)
+}
+
+/// Puts instructions at the beginning of a function of the image for slot B, which is that for slot A elsewhere.
+fn replace(board: &mut Board, image: &mut [u8], function: &str, code: &[u8]) {
+    let place = (board.symbol(function).0 - address(Slot::A)) as usize;
+    image[place..place + code.len()].copy_from_slice(code);
+}
+
+/// Checks that the image before runs again, and says why.
+fn rolled_back(board: &mut Board) {
+    board.run(START);
+    assert_eq!(firmware(board), (Some(Slot::A), FirmwareState::RolledBack));
+    let troubles = on_bus(board).ask(&[0x19, 2, 0x09]).expect("a list");
+    assert!(troubles[2..].chunks(4).any(|trouble| trouble[..3] == [0x5A, 0x03, 0x52]), "{troubles:02x?}");
+    board.power_cycle(10 * MS);
+    board.run(START);
+    assert_eq!(firmware(board), (Some(Slot::A), FirmwareState::RolledBack), "for good");
+}
+
+#[test]
+fn an_image_that_hangs_is_rolled_back_by_the_first_reset_of_the_watchdog() {
+    const TEST: &str = "an_image_that_hangs_is_rolled_back_by_the_first_reset_of_the_watchdog";
+    // Its idle task, its output task, and its first instruction, before it has started the watchdog.
+    for function in ["idle::Idle::step", "output::Output::step", "Reset"] {
+        let spoil = |board: &mut Board, image: &mut Vec<u8>| replace(board, image, function, &[0xFE, 0xE7]);
+        let Some(mut board) = try_on(TEST, 0, spoil) else { return };
+        board.run(5 * S);
+        let causes: Vec<String> = resets(&mut board).into_iter().map(|(_, cause)| cause).collect();
+        assert!(causes.len() <= 1 && causes.iter().all(|cause| cause == "iwdg"), "{function}: {causes:?}");
+        rolled_back(&mut board);
+    }
+}
+
+#[test]
+fn an_image_that_crashes_is_rolled_back() {
+    const TEST: &str = "an_image_that_crashes_is_rolled_back";
+    // UDF
+    let spoil =
+        |board: &mut Board, image: &mut Vec<u8>| replace(board, image, "idle::Idle::step", &[0, 0xDE]);
+    let Some(mut board) = try_on(TEST, 0, spoil) else { return };
+    rolled_back(&mut board);
+}
+
+#[test]
+fn an_image_without_can_is_rolled_back_after_its_trial() {
+    const TEST: &str = "an_image_without_can_is_rolled_back_after_its_trial";
+    // It says of each frame that no mailbox was free: movs r0, #0; bx lr
+    let spoil = |board: &mut Board, image: &mut Vec<u8>| {
+        replace(board, image, "stm32f405::can::Can::transmit", &[0, 0x20, 0x70, 0x47]);
+    };
+    let Some(mut board) = try_on(TEST, CAN, spoil) else { return };
+    assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::OnTrial));
+    board.run(TRIAL - BACK);
+    assert_eq!(resets(&mut board), []);
+    board.run(2 * BACK);
+    assert_eq!(resets(&mut board).len(), 1);
+    rolled_back(&mut board);
+}
+
+#[test]
+fn an_image_that_lacks_the_sensor_is_rolled_back_after_its_trial() {
+    const TEST: &str = "an_image_that_lacks_the_sensor_is_rolled_back_after_its_trial";
+    // It waits for another preamble: cmp r_, #FA becomes cmp r_, #FB.
+    let spoil = |board: &mut Board, image: &mut Vec<u8>| {
+        let (start, size) = board.symbol("sensor::xsens::Mti::next_message");
+        let start = (start - address(Slot::A)) as usize;
+        let function = &mut image[start..start + size as usize];
+        let compares = |code: &&mut [u8]| code[0] == 0xFA && (0x28..0x30).contains(&code[1]);
+        let places: Vec<_> = function.chunks_mut(2).filter(compares).collect();
+        assert_eq!(places.len(), 1, "where the preamble is compared");
+        places.into_iter().for_each(|code| code[0] = 0xFB);
+    };
+    let Some(mut board) = try_on(TEST, SENSOR | CAN, spoil) else { return };
+    stand(&mut board, 62);
+    board.run(TRIAL - BACK);
+    assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::OnTrial));
+    board.run(2 * BACK);
+    assert_eq!(resets(&mut board).len(), 1);
+    rolled_back(&mut board);
+}
+
+#[test]
+fn an_image_that_is_damaged_after_its_confirmation_gives_way_and_without_any_the_led_says_so() {
+    const TEST: &str =
+        "an_image_that_is_damaged_after_its_confirmation_gives_way_and_without_any_the_led_says_so";
+    let Some(mut board) = try_on(TEST, 0, |_, _| {}) else { return };
+    board.run(5 * S);
+    assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
+    let damage = |board: &mut Board, slot| {
+        let place = At::Address(address(slot) + 100_000);
+        let byte = board.read(place, 1)[0];
+        board.patch(place, &[byte ^ 0x10]);
+    };
+    damage(&mut board, Slot::B);
+    board.power_cycle(10 * MS);
+    board.run(2 * START);
+    assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::NewerDamaged));
+    damage(&mut board, Slot::A);
+    board.configure("GPIOA.watch", vec![10]);
+    board.power_cycle(10 * MS);
+    let _ = (board.run(2 * START), board.events(), board.bus_log());
+    board.run(3 * S);
+    let edges = board.events().iter().filter(|event| event.kind == "pin").count();
+    assert!((8..=12).contains(&edges), "two flashes a second: {edges} edges");
+    assert_eq!(board.bus_log().len(), 0);
+    // A probe flashes it.
+    damage(&mut board, Slot::A);
+    board.power_cycle(10 * MS);
+    board.run(2 * START);
+    assert_eq!(firmware(&mut board).0, Some(Slot::A));
+}
+
+/// The power is cut at accesses to the flash while an image is downloaded, activated, tried, rolled back and confirmed. The
+/// one that is rolled back is the first KiB of an image.
+#[test]
+fn an_image_starts_after_a_cut_at_an_access_of_the_update() {
+    const TEST: &str = "an_image_starts_after_a_cut_at_an_access_of_the_update";
+    const MANY: usize = 1 << 30;
+    const TINY: usize = 1_024;
+    let (Some(file), Some(mut board)) = (built(TEST), common::boot(TEST)) else { return };
+    board.run(3 * S);
+    service::enter(&mut board, 2);
+    let [a, b] = &file.images;
+    let tiny = Update::new(file.head.label, [a.clone(), b[..TINY].to_vec()]);
+    let mut cuts = 0;
+    let mut cut = |board: &mut Board, name: &str, every: usize, act: &dyn Fn(&mut Board), limit: Duration| {
+        board.snapshot("before");
+        board.cut_after(MANY, Duration::ZERO);
+        act(board);
+        board.run(limit);
+        let count = MANY - board.counts().accesses_left;
+        assert!(count > 0, "{name}");
+        let _ = board.can_frames();
+        board.snapshot("after");
+        for access in (1..=count).step_by(every) {
+            for delay in [Duration::ZERO, Duration::from_micros(8), 300 * MS] {
+                board.restore("before");
+                board.cut_after(access, delay);
+                act(board);
+                let _ = board.run_until("power_off", limit + 300 * MS);
+                board.power_cycle(MS);
+                cuts += 1;
+                // The boot loader may try the new one first, until its watchdog ends that.
+                let starts = |board: &mut Board| {
+                    board.run(2 * START);
+                    on_line(board).info().is_ok_and(|info| info.firmware.slot.is_some())
+                };
+                assert!((0..3).any(|_| starts(board)), "{name}: {access} of {count}, {delay:?}");
+            }
+        }
+        println!("{TEST}: {name}: {count} accesses, one in {every}");
+        board.restore("after");
+    };
+    let head = [&[0x2E, 1, 0x1A][..], &tiny.head.bytes()].concat();
+    assert_eq!(service::ask(&mut board, &head), [0x6E, 1, 0x1A]);
+    let begin = [&[0x34, 0, 0x44, 0, 0, 0, 2][..], &(TINY as u32).to_be_bytes()].concat();
+    cut(&mut board, "erase", 5, &|board| service::send(board, &begin), 3 * S);
+    for (number, block) in (1u8..).zip(tiny.images[1].chunks(256)) {
+        let block = [&[0x36, number][..], block].concat();
+        match number {
+            2 => cut(&mut board, "block", 59, &|board| service::send(board, &block), 100 * MS),
+            _ => assert_eq!(service::ask(&mut board, &block), [0x76, number]),
+        }
+    }
+    assert_eq!(service::ask(&mut board, &[0x37])[..2], [0x77, 1]);
+    cut(&mut board, "activation", 3, &|board| service::send(board, &[0x31, 1, 0xFF, 1]), 100 * MS);
+    cut(&mut board, "start on trial", 3, &|board| board.reset_pin(), START);
+    cut(&mut board, "rollback", 5, &|_| (), 5 * S);
+    board.run(START);
+    assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::RolledBack));
+    install(&mut board, b, 0);
+    board.reset_pin();
+    board.run(START + 4_700 * MS);
+    cut(&mut board, "confirmation", 3, &|_| (), S);
+    assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
+    println!("{TEST}: {cuts} cuts");
+}

@@ -1,0 +1,198 @@
+//! Firmware updates: the image goes to the slot that does not run, starts on trial, and confirms itself.
+//!
+//! The image that runs notes what it has reached within its first half minute: samples of the sensor, a frame that
+//! another node has acknowledged, a window of the network. The image on trial has a minute to reach the same; idle, which
+//! serves diagnosis, asks for it. If it does not, or if it crashes or hangs, the boot loader starts the one before.
+
+use super::weights::{Checked, Uploading};
+use super::{Device, INTERRUPTS, MappedSlots};
+use crate::model::blob::CRC;
+use crate::service::event::EventKind;
+use crate::service::message::Refusal;
+use crate::store::firmware::{self, FirmwareError, Label, MAX_IMAGE, Trailer};
+use crate::store::slots::SlotError;
+use crate::store::{FlashFault, Slot, Upload};
+use embedded_storage::nor_flash::{NorFlash, NorFlashError as _};
+use serde::{Deserialize, Serialize};
+
+/// Time in which an image counts what it reaches, the least time on trial, and the longest, ms.
+const COUNTED_MS: u32 = 30_000;
+const LEAST_MS: u32 = 5_000;
+const LONGEST_MS: u32 = 60_000;
+/// Bits of what an image has reached.
+const SENSOR: u32 = 1;
+const CAN: u32 = 1 << 1;
+const WINDOW: u32 = 1 << 2;
+
+/// How the running firmware stands to its last update.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
+pub enum FirmwareState {
+    /// It was not started by the boot loader, and cannot be updated over diagnosis.
+    Alone = 0,
+    /// It is confirmed.
+    Confirmed = 1,
+    /// It is on trial.
+    OnTrial = 2,
+    /// The update after it did not reach on trial what this one had, and was rolled back.
+    RolledBack = 3,
+    /// The newer image is damaged, so this one runs.
+    NewerDamaged = 4,
+}
+
+/// The running firmware.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Firmware {
+    /// Slot of the image that runs.
+    pub slot: Option<Slot>,
+    /// How it stands to its last update.
+    pub state: FirmwareState,
+}
+
+impl Firmware {
+    pub(super) const ALONE: Self = Self { slot: None, state: FirmwareState::Alone };
+
+    pub(super) fn of<W: MappedSlots>(flash: &mut W) -> Self {
+        let slot = flash.running();
+        let Some((slot, own)) = slot.and_then(|slot| Some((slot, Trailer::read(flash, slot)?))) else {
+            return Self::ALONE;
+        };
+        let newer = Trailer::read(flash, slot.other()).filter(|other| other.number > own.number);
+        let state = match newer {
+            _ if !own.is_confirmed => FirmwareState::OnTrial,
+            Some(Trailer { is_confirmed: false, trials: 1.., .. }) => FirmwareState::RolledBack,
+            Some(_) => FirmwareState::NewerDamaged,
+            None => FirmwareState::Confirmed,
+        };
+        Self { slot: Some(slot), state }
+    }
+
+    /// Returns whether the newest update does not run.
+    pub const fn is_refused(&self) -> bool {
+        matches!(self.state, FirmwareState::RolledBack | FirmwareState::NewerDamaged)
+    }
+}
+
+impl<R: NorFlash, W: MappedSlots> Device<R, W> {
+    /// Returns the running firmware.
+    pub fn firmware(&self) -> Firmware {
+        self.firmware
+    }
+
+    /// Checks what an update is, and returns the slot that it goes to, which does not run.
+    ///
+    /// # Errors
+    /// [`Refusal::Firmware`].
+    pub fn firmware_check(&mut self, label: &Label, downgrade: bool) -> Result<Slot, Refusal> {
+        let spare = self.spare(label, downgrade);
+        self.refusal = spare.err().map(Refusal::Firmware);
+        Ok(spare?)
+    }
+
+    fn spare(&mut self, label: &Label, downgrade: bool) -> Result<Slot, FirmwareError> {
+        let (slot, flash) = self.firmware.slot.zip(self.slots.as_mut()).ok_or(FirmwareError::NoBootLoader)?;
+        let own = firmware::label(flash, slot).ok_or(FirmwareError::NoBootLoader)?;
+        if label.board != own.board {
+            return Err(FirmwareError::Board);
+        }
+        if label.layout != own.layout {
+            return Err(FirmwareError::Layout { found: label.layout, expected: own.layout });
+        }
+        if label.version < own.version && !downgrade {
+            return Err(FirmwareError::Older);
+        }
+        if self.firmware.state == FirmwareState::OnTrial {
+            return Err(FirmwareError::OnTrial);
+        }
+        Ok(slot.other())
+    }
+
+    /// Begins the upload of an image to a slot that does not run, and erases it.
+    ///
+    /// # Errors
+    /// [`Refusal::Firmware`], [`Refusal::Slot`], [`Refusal::Moving`].
+    #[inline(never)]
+    pub fn firmware_begin(&mut self, slot: Slot, length: u32) -> Result<(), Refusal> {
+        self.request(INTERRUPTS, |device| {
+            if length == 0 || length > MAX_IMAGE || !length.is_multiple_of(4) {
+                return Err(FirmwareError::Length(length).into());
+            }
+            if device.firmware.slot != Some(slot.other()) {
+                return Err(FirmwareError::NoBootLoader.into());
+            }
+            device.uploading = None;
+            let flash = device.slots.as_mut().ok_or(SlotError::NoFlash)?;
+            let upload = Upload::firmware(flash, slot, length)?;
+            device.uploading = Some(Uploading { upload, checked: None });
+            Ok(())
+        })
+    }
+
+    /// Checks the complete image: its label, and by `of`, which makes of its bytes what is returned if they are right.
+    ///
+    /// # Errors
+    /// [`Refusal::Firmware`], [`Refusal::Slot`].
+    #[inline(never)]
+    pub fn firmware_verify<T>(
+        &mut self,
+        expected: &Label,
+        of: impl FnOnce(&[u8]) -> Option<T>,
+    ) -> Result<T, Refusal> {
+        self.request(false, |device| {
+            let flash = device.slots.as_mut().ok_or(SlotError::NoFlash)?;
+            let uploading = device.uploading.as_mut().ok_or(SlotError::NotBegun)?;
+            let (slot, length, written) = uploading.upload.image().ok_or(SlotError::NotBegun)?;
+            if written != length {
+                return Err(SlotError::Incomplete { written }.into());
+            }
+            let image = flash.firmware(slot).get(..length as usize).unwrap_or_default();
+            let found = flash.check(|| Some((of(image)?, CRC.checksum(image))));
+            let is_named = firmware::label(flash, slot) == Some(*expected);
+            let (result, crc) = found.filter(|_| is_named).ok_or(FirmwareError::Content)?;
+            uploading.checked = Some(Checked { crc, window: 0 });
+            Ok(result)
+        })
+    }
+
+    /// Lets the checked image start on trial at the next start. It has to reach what this one has reached.
+    ///
+    /// # Errors
+    /// [`Refusal::Slot`], [`Refusal::Moving`].
+    #[inline(never)]
+    pub fn firmware_activate(&mut self) -> Result<(), Refusal> {
+        self.request(INTERRUPTS, |device| {
+            let Uploading { upload, checked } = device.uploading.ok_or(SlotError::NotBegun)?;
+            let (slot, length, written) = upload.image().ok_or(SlotError::NotBegun)?;
+            let Checked { crc, .. } = checked.ok_or(SlotError::Incomplete { written })?;
+            let flash = device.slots.as_mut().ok_or(SlotError::NoFlash)?;
+            let number = Trailer::read(flash, slot.other()).map_or(0, |own| own.number).wrapping_add(1);
+            let trailer = Trailer::new(length, crc, device.reached, number);
+            firmware::activate(flash, slot, &trailer)
+                .map_err(|error| SlotError::Flash(FlashFault::from(error.kind())))?;
+            device.uploading = None;
+            device.note(EventKind::FirmwareStored(slot));
+            Ok(())
+        })
+    }
+
+    /// Notes what has been reached, and confirms an image on trial that has reached enough. Returns whether the board
+    /// must restart, because it has not: the boot loader then starts the image before. `milliseconds` is the time since
+    /// the start; idle calls this.
+    pub fn firmware_trial(&mut self, is_acknowledged: bool, windows: u32, milliseconds: u32) -> bool {
+        let on_trial = self.firmware.state == FirmwareState::OnTrial;
+        if on_trial || milliseconds < COUNTED_MS {
+            self.reached |= if is_acknowledged { CAN } else { 0 } | if windows > 0 { WINDOW } else { 0 };
+            self.reached |= if self.has_sample { SENSOR } else { 0 };
+        }
+        let Some((slot, flash)) = self.firmware.slot.filter(|_| on_trial).zip(self.slots.as_mut()) else {
+            return false;
+        };
+        let expected = Trailer::read(flash, slot).map_or(u32::MAX, |trailer| trailer.expected);
+        if milliseconds >= LEAST_MS && expected & !self.reached == 0 && firmware::confirm(flash, slot) {
+            self.firmware.state = FirmwareState::Confirmed;
+            self.note(EventKind::FirmwareConfirmed(slot));
+            return false;
+        }
+        milliseconds >= LONGEST_MS
+    }
+}
