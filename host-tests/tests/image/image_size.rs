@@ -2,7 +2,7 @@
 
 use gyronet_host_tests::{image, qemu};
 use gyronet_tools::target::size::{BUDGETS, ImageSize};
-use gyronet_tools::target::stack::{ImageStack, functions, handlers_without_barrier};
+use gyronet_tools::target::stack::{ImageStack, functions};
 
 fn elf(test: &str, name: &str) -> Option<Vec<u8>> {
     let path = image::firmware(test, env!("CARGO_TARGET_TMPDIR"), name)?;
@@ -28,18 +28,6 @@ fn no_panic_in_the_image() {
     }
     let Some(bench) = elf(NAME, "bench") else { return };
     assert!(!panics(&bench).is_empty(), "the bench image has no panic handler: is the symbol table read?");
-}
-
-/// Arm erratum 838869 of the Cortex-M4 needs a barrier behind the last store of a short handler.
-#[test]
-fn short_handlers_end_with_a_barrier() {
-    // Exception numbers of SysTick, CAN1_TX, CAN1_RX0, USART1, USART2, USART3 and USART6 (RM0090 table 62).
-    const SHORT: [usize; 7] = [15, 16 + 19, 16 + 20, 16 + 37, 16 + 38, 16 + 39, 16 + 71];
-    // UART4, the output task: long, and without one.
-    const LONG: usize = 16 + 52;
-    let Some(image) = elf("short_handlers_end_with_a_barrier", "coprocessor") else { return };
-    assert_eq!(handlers_without_barrier(&image, &SHORT).expect("handlers"), [""; 0]);
-    assert_eq!(handlers_without_barrier(&image, &[LONG]).expect("a handler").len(), 1, "it would be seen");
 }
 
 #[test]

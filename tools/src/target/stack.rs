@@ -10,12 +10,9 @@
 //! The result is an upper bound. The analysis relies on the symbol table: code without a symbol, or addresses
 //! computed at run time, would be missed; the images have neither.
 
-mod barrier;
 mod code;
 mod priority;
 mod thumb;
-
-pub use barrier::handlers_without_barrier;
 
 use code::Code;
 use std::collections::{BTreeMap, HashMap};

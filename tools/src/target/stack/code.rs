@@ -1,7 +1,7 @@
 //! Reads the functions of an image, with the stack use and the calls of each.
 
 use super::priority::{self, Vectors};
-use super::thumb::{self, Effect, Instruction};
+use super::thumb::{self, Effect};
 use super::{MASKED, StackError};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -12,8 +12,6 @@ pub struct Function {
     own: u32,
     calls: BTreeSet<u32>,
     pub indirect: usize,
-    pub size: u32,
-    pub instructions: Vec<Instruction>,
 }
 
 #[derive(Debug, Default)]
@@ -94,20 +92,13 @@ impl Code {
         is_data: impl Fn(u32) -> bool,
         begins: impl Fn(u32) -> Option<u32>,
     ) -> Result<Function, StackError> {
-        let mut function = Function {
-            name: name.to_owned(),
-            own: 0,
-            calls: BTreeSet::new(),
-            indirect: 0,
-            size: body.len() as u32,
-            instructions: thumb::instructions(body, address, is_data),
-        };
-        let end = address + function.size;
+        let mut function = Function { name: name.to_owned(), own: 0, calls: BTreeSet::new(), indirect: 0 };
+        let end = address + body.len() as u32;
         let (mut low, mut aligned) = ([0u32; 16], [0u32; 16]);
         // Register and function address that the previous instruction has completed. The linker's veneers from flash
         // to RAM jump to it immediately, which is a call. Any other use takes the address.
         let mut made: Option<(u8, u32)> = None;
-        for (at, first, second) in function.instructions.iter().copied() {
+        for (at, first, second) in thumb::instructions(body, address, is_data) {
             let effect = thumb::effect(first, second, at);
             match (made.take(), effect) {
                 (Some((register, target)), Effect::Indirect { register: to }) if register == to => {
