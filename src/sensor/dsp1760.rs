@@ -2,7 +2,7 @@
 //! messages): RS-422, 921600 baud 8N1.
 //!
 //! A message contains neither its unit nor its period. The gyro must have its factory settings (increments of the angle in
-//! radians, whole deg C) and send 1000 messages a second. Formats A and C carry no time stamp, only a sequence number; their
+//! radians, whole deg C) and send 1000 messages a second. Format A carries no time stamp, only a sequence number; its
 //! time is the number of messages, lost ones included, times the period. The sequence number wraps at 128, so it does not reveal a loss of 128 messages or
 //! more. The time stamps of format B reveal it, or the arrival times do ([`crate::align`]).
 
@@ -139,12 +139,11 @@ impl Dsp1760 {
         count(&mut self.counters.lost, lost);
         self.time += u64::from(u32::from(steps) * PERIOD_US);
         let (time, temperature) = match message.extra {
-            Extra::Temperature(temperature) => (self.time, Some(temperature)),
-            Extra::Timed { time, temperature } => (self.stamps.unwrap(time), Some(temperature)),
-            Extra::Slow(_) => (self.time, None),
+            Extra::Temperature(temperature) => (self.time, temperature),
+            Extra::Timed { time, temperature } => (self.stamps.unwrap(time), temperature),
         };
         let increment = self.increments(&message.rotation, message.validity);
-        let temperature = temperature.and_then(|celsius| celsius.checked_mul(100)).map(CentiCelsius);
+        let temperature = temperature.checked_mul(100).map(CentiCelsius);
         Ok(FogSample { time: Micros(time), span: PERIOD_US, lost, increment, temperature })
     }
 

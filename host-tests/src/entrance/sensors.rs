@@ -62,7 +62,6 @@ pub fn dsp1760_seeds() -> Vec<Seed> {
     let [extras @ .., self_test] = [
         message(1, Extra::Temperature(25)),
         message(2, Extra::Timed { time: 123_456_789, temperature: 25 }),
-        message(3, Extra::Slow(25.0)),
         [bytes("fe 81 00 aa 7f 7f 7f 7f 7f 7f 55"), message(4, Extra::Temperature(25))].concat(),
     ];
     vec![("stream", extras.concat()), ("self_test", self_test)]

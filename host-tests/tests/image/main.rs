@@ -3,6 +3,5 @@
 mod c_interface;
 mod image_size;
 mod monitor;
-mod python_clients;
 mod small_cores;
 mod target_counts;

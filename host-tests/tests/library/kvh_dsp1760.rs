@@ -194,7 +194,6 @@ fn any_message() -> impl Strategy<Value = Message> {
     let extra = prop_oneof![
         any::<i16>().prop_map(Extra::Temperature),
         (any::<u32>(), any::<i16>()).prop_map(|(time, temperature)| Extra::Timed { time, temperature }),
-        reading().prop_map(Extra::Slow),
     ];
     (prop::array::uniform3(reading()), prop::array::uniform3(reading()), extra, any::<u8>(), 0..128u8)
         .prop_map(|(rotation, acceleration, extra, validity, sequence)| Message {

@@ -1,4 +1,5 @@
-//! A data message has one of three formats, selected by its fourth byte; some fields exist only in some formats.
+//! A data message has one of two formats, selected by its fourth byte. The gyro's third one (57, with slow readings) is not
+//! read.
 
 /// First bytes of every data message; the format byte follows.
 pub(super) const PREFIX: [u8; 3] = [0xFE, 0x81, 0xFF];
@@ -11,8 +12,6 @@ pub enum Format {
     A,
     /// Message with a time stamp.
     B,
-    /// Message with one of four slow readings, which alternate.
-    C,
 }
 
 impl Format {
@@ -21,7 +20,6 @@ impl Format {
         match header {
             [0xFE, 0x81, 0xFF, 0x55] => Some(Self::A),
             [0xFE, 0x81, 0xFF, 0x56] => Some(Self::B),
-            [0xFE, 0x81, 0xFF, 0x57] => Some(Self::C),
             _ => None,
         }
     }
@@ -32,7 +30,6 @@ impl Format {
         match self {
             Self::A => 36,
             Self::B => 40,
-            Self::C => 38,
         }
     }
 
@@ -40,7 +37,6 @@ impl Format {
         match self {
             Self::A => 0x55,
             Self::B => 0x56,
-            Self::C => 0x57,
         }
     }
 }
@@ -69,7 +65,7 @@ impl Validity {
     }
 }
 
-/// The fields that only some formats have.
+/// The fields in which the formats differ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Extra {
@@ -82,6 +78,4 @@ pub enum Extra {
         /// Temperature, deg C.
         temperature: i16,
     },
-    /// Slow reading of format C: temperature or magnetic field x, y, z, by sequence number modulo 4.
-    Slow(f32),
 }

@@ -1,18 +1,16 @@
 //! Parses and encodes the data messages of the DSP-1760, field by field.
 //!
-//! | offset | format A, 36 bytes | format B, 40 bytes | format C, 38 bytes |
-//! |---|---|---|---|
-//! | 0 | FE 81 FF 55 | FE 81 FF 56 | FE 81 FF 57 |
-//! | 4 | f32 rotation x, y, z | same | same |
-//! | 16 | f32 acceleration x, y, z | same | same |
-//! | 28 | status, sequence | u32 time, microseconds | f32 temperature or field |
-//! | 30 | i16 temperature | (time) | (f32) |
-//! | 32 | CRC | status, sequence, i16 temperature | status, sequence |
-//! | end | | CRC at 36 | CRC at 34 |
+//! | offset | format A, 36 bytes | format B, 40 bytes |
+//! |---|---|---|
+//! | 0 | FE 81 FF 55 | FE 81 FF 56 |
+//! | 4 | f32 rotation x, y, z | same |
+//! | 16 | f32 acceleration x, y, z | same |
+//! | 28 | status, sequence | u32 time, microseconds |
+//! | 30 | i16 temperature | (time) |
+//! | 32 | CRC | status, sequence, i16 temperature |
+//! | 36 | | CRC |
 //!
-//! All values are big-endian. The length of format C is inferred: no recorded frame was available, its fields add up
-//! to 38 bytes, and a test script for these gyros uses the same length. If it is wrong, no frame of format C passes
-//! its CRC, so no wrong reading results.
+//! All values are big-endian.
 
 pub use super::format::{Extra, Format, Validity};
 
@@ -64,7 +62,6 @@ impl Message {
         match self.extra {
             Extra::Temperature(_) => Format::A,
             Extra::Timed { .. } => Format::B,
-            Extra::Slow(_) => Format::C,
         }
     }
 
@@ -101,9 +98,6 @@ impl Message {
                 let time = u32::from_be_bytes([u3, u2, u1, u0]);
                 (Extra::Timed { time, temperature: i16::from_be_bytes([t1, t0]) }, status, sequence)
             }
-            [f3, f2, f1, f0, status, sequence] => {
-                (Extra::Slow(f32::from_be_bytes([f3, f2, f1, f0])), status, sequence)
-            }
             _ => return Err(length),
         };
         if sequence > MAX_SEQUENCE {
@@ -131,10 +125,6 @@ impl Message {
                 put(&time.to_be_bytes());
                 put(&counted);
                 put(&temperature.to_be_bytes());
-            }
-            Extra::Slow(reading) => {
-                put(&reading.to_be_bytes());
-                put(&counted);
             }
         }
         let crc = CRC_32_MPEG_2.checksum(&frame);
