@@ -16,6 +16,7 @@ mod model;
 mod power_cut;
 mod service;
 mod slcan;
+mod sockets;
 mod stored;
 mod stored_start;
 mod supply;

@@ -1,0 +1,191 @@
+//! The product on the virtual board, in a vehicle that drives: its lines are sockets, so that the commands of a real
+//! board can be tried without one.
+//!
+//! An MTi sends the samples of a drive on USART1, and the vehicle's bus has its wheel speeds and courses. The drive begins
+//! again at its end.
+
+use clap::Parser;
+use gyronet::can::DataFrame;
+use gyronet::heading::nmea2000;
+use gyronet_host_tests::board::{self, Board};
+use gyronet_host_tests::replay;
+use gyronet_tools::bundled;
+use gyronet_tools::drive::DT;
+use gyronet_tools::drive::recording::{Recording, Row};
+use gyronet_tools::drive::wheel_frames::WheelFrames;
+use std::error::Error;
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+const NAME: &str = "cargo board";
+const STEP: Duration = Duration::from_millis(10);
+const IMU: usize = 1;
+const SLCAN: usize = 2;
+const SERVICE: usize = 6;
+/// Source address of the GNSS receiver on the bus.
+const RECEIVER: u8 = 0x23;
+/// Board time from one report of the speed to the next.
+const REPORT: Duration = Duration::from_secs(30);
+
+/// Run the firmware on a model of the board (modelled, not silicon), with its lines as sockets.
+#[derive(Parser)]
+#[command(after_help = "\
+Examples, in another terminal:
+  gyronet device --port localhost:4006 info
+  gyronet monitor localhost:4002")]
+struct Args {
+    /// Drive that the vehicle drives; without it one is simulated, with a GNSS receiver.
+    #[arg(value_name = "DRIVE.csv")]
+    drive: Option<PathBuf>,
+    /// Port of the service line (USART6).
+    #[arg(long, default_value_t = 4006)]
+    service: u16,
+    /// Port of the SLCAN line (USART2).
+    #[arg(long, default_value_t = 4002)]
+    slcan: u16,
+    /// Image to run, as `cargo fw` writes it; without it, it is built.
+    #[arg(long, value_name = "FILE.elf")]
+    elf: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    match run(&Args::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{NAME}: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+    let drive = match &args.drive {
+        Some(path) => Recording::read(path)?,
+        None => bundled::demo_drive(true)?,
+    };
+    let mut lines = [
+        Line::open("service line (USART6)", SERVICE, args.service)?,
+        Line::open("SLCAN (USART2)", SLCAN, args.slcan)?,
+    ];
+    let elf = match &args.elf {
+        Some(elf) => elf.clone(),
+        None => {
+            let folder = std::env::current_exe()?.with_file_name("board-image");
+            std::fs::create_dir_all(&folder)?;
+            let elf = board::firmware("netduino-plus-2", NAME, &folder.display().to_string(), "coprocessor");
+            elf.ok_or("the firmware cannot be built: see above")?
+        }
+    };
+    let mut board = Board::unpowered(NAME, &elf).ok_or("the model of the board cannot run: see above")?;
+    board.configure("USART2.baud", 921_600);
+    board.power_on();
+    let (mut vehicle, began, mut report) = (Vehicle::new(drive), Instant::now(), REPORT);
+    loop {
+        let sent = vehicle.next();
+        board.send(IMU, &sent.sample);
+        sent.frames.iter().for_each(|frame| board.can_send(frame));
+        for line in &mut lines {
+            board.send(line.usart, &line.read()?);
+            let bytes = board.sent(line.usart);
+            line.write(&bytes);
+        }
+        // Nobody else takes what the model keeps.
+        (board.can_frames(), board.events());
+        let now = board.run(STEP);
+        std::thread::sleep(now.saturating_sub(began.elapsed()));
+        if now >= report {
+            let share = now.as_secs_f64() / began.elapsed().as_secs_f64();
+            eprintln!("{} s on the board, {share:.2} of real time", now.as_secs());
+            report += REPORT;
+        }
+    }
+}
+
+/// What the vehicle sends in 10 ms.
+struct Sent {
+    /// The bytes of the MTi.
+    sample: Vec<u8>,
+    frames: Vec<DataFrame>,
+}
+
+/// Drives a drive again and again.
+struct Vehicle {
+    drive: Recording,
+    wheels: Option<WheelFrames>,
+    row: usize,
+    courses: u8,
+}
+
+impl Vehicle {
+    fn new(drive: Recording) -> Self {
+        let wheels = WheelFrames::new(&drive);
+        Self { drive, wheels, row: 0, courses: 0 }
+    }
+
+    fn next(&mut self) -> Sent {
+        let rows = &self.drive.rows;
+        let Row { mut sample, heading, .. } = rows[self.row % rows.len()];
+        sample.time.0 = (self.row as f64 * DT * 1e6).round() as u64;
+        let wheels = self.wheels.as_mut().and_then(|wheels| wheels.next(&rows[self.row % rows.len()]));
+        let course = heading.and_then(|heading| {
+            self.courses = self.courses.wrapping_add(1);
+            nmea2000::course_speed_frame(&heading, self.courses, RECEIVER)
+        });
+        let sample = replay::message(self.row, &sample);
+        self.row += 1;
+        Sent { sample, frames: wheels.into_iter().chain(course).collect() }
+    }
+}
+
+/// A line of the board as a socket, for one client at a time.
+struct Line {
+    name: &'static str,
+    usart: usize,
+    listener: TcpListener,
+    client: Option<TcpStream>,
+}
+
+impl Line {
+    fn open(name: &'static str, usart: usize, port: u16) -> io::Result<Self> {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
+        listener.set_nonblocking(true)?;
+        println!("{name}: localhost:{}", listener.local_addr()?.port());
+        Ok(Self { name, usart, listener, client: None })
+    }
+
+    /// Returns what the client has sent since the last call.
+    fn read(&mut self) -> io::Result<Vec<u8>> {
+        if self.client.is_none() {
+            match self.listener.accept() {
+                Ok((client, _)) => {
+                    client.set_nonblocking(true)?;
+                    self.client = Some(client);
+                }
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+                Err(error) => return Err(error),
+            }
+        }
+        let Some(client) = &mut self.client else { return Ok(Vec::new()) };
+        let mut bytes = [0; 512];
+        match client.read(&mut bytes) {
+            Ok(0) => self.client = None,
+            Ok(length) => return Ok(bytes[..length].to_vec()),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+            Err(_) => self.client = None,
+        }
+        Ok(Vec::new())
+    }
+
+    /// Sends to the client, if there is one; a client that does not read is disconnected.
+    fn write(&mut self, bytes: &[u8]) {
+        if let Some(client) = &mut self.client
+            && let Err(error) = client.write_all(bytes)
+        {
+            eprintln!("{}: {error}; disconnected", self.name);
+            self.client = None;
+        }
+    }
+}
