@@ -2,22 +2,36 @@
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use gyronet::service::MappedSlots;
+use gyronet::store::Slot;
+use gyronet::store::firmware::{LABEL, LABEL_SIZE, Label, MAX_IMAGE, TRAILER, Trailer};
 use gyronet::store::layout::{SLOT_SIZE, SLOTS};
+use std::ops::Range;
+
+/// What the firmware of a flash is.
+pub const FIRMWARE: Label = Label::new([1, 0, 0], "a board");
 
 /// Simulates a flash; its smallest sectors are `SECTOR` bytes long.
 #[derive(Debug, Clone)]
 pub struct RamFlash<const SECTOR: usize> {
     words: Vec<u32>,
+    /// Slot of the firmware that runs.
+    running: Option<Slot>,
 }
 
 impl<const SECTOR: usize> RamFlash<SECTOR> {
+    /// Creates a flash with firmware in slot A, which runs.
     pub fn for_weights() -> Self {
-        Self { words: vec![u32::MAX; SLOTS.end as usize / 4] }
+        let mut flash = Self { words: vec![u32::MAX; SLOTS.end as usize / 4], running: Some(Slot::A) };
+        let start = Slot::A.firmware().start as usize;
+        let trailer = Trailer { is_confirmed: true, ..Trailer::new(4, 0, 0, 1) };
+        flash.bytes_mut()[start + LABEL..][..LABEL_SIZE].copy_from_slice(&FIRMWARE.bytes());
+        flash.bytes_mut()[start + MAX_IMAGE as usize..][..TRAILER].copy_from_slice(&trailer.bytes());
+        flash
     }
 
     /// Creates a flash of two sectors that begins with these bytes and is erased after them.
     pub fn new(content: &[u8]) -> Self {
-        let mut flash = Self { words: vec![u32::MAX; 2 * SECTOR / 4] };
+        let mut flash = Self { words: vec![u32::MAX; 2 * SECTOR / 4], running: None };
         let len = content.len().min(2 * SECTOR);
         flash.bytes_mut()[..len].copy_from_slice(&content[..len]);
         flash
@@ -81,5 +95,14 @@ impl<const SECTOR: usize> NorFlash for RamFlash<SECTOR> {
 impl<const SECTOR: usize> MappedSlots for RamFlash<SECTOR> {
     fn slots(&self) -> [&[u8]; 2] {
         self.bytes()[SLOTS.start as usize..SLOTS.end as usize].split_at(SLOT_SIZE).into()
+    }
+
+    fn running(&self) -> Option<Slot> {
+        self.running
+    }
+
+    fn firmware(&self, slot: Slot) -> &[u8] {
+        let Range { start, end } = slot.firmware();
+        &self.bytes()[start as usize..end as usize]
     }
 }

@@ -3,7 +3,7 @@
 use super::records::SECTOR;
 use super::{Seed, byte, take};
 use crate::noise::Noise;
-use crate::ram_flash::RamFlash;
+use crate::ram_flash::{self, RamFlash};
 use crate::synthetic::idling;
 use crate::synthetic::judged;
 use crate::tester::segment;
@@ -13,7 +13,8 @@ use gyronet::service::message::{AllCounters, Identity};
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::layout::RECORD_SECTOR;
 use gyronet::store::{FlashFault, FogPart, ImuPart, Record as _};
-use gyronet::uds::Server;
+use gyronet::uds::update::Head;
+use gyronet::uds::{Server, signature};
 
 const SUPPORTED_HARDWARE: SupportedHardware =
     SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760], clock_hz: 168_000_000 };
@@ -101,6 +102,9 @@ pub fn seeds() -> Vec<Seed> {
         std::iter::once(choice).chain(messages).collect::<Vec<u8>>()
     };
     let block = [&[0x36, 1][..], &[0; 16]].concat();
+    let images = [signature::digest(&[0; 16]); 2];
+    let head = Head { label: ram_flash::FIRMWARE, downgrade: false, images }.bytes();
+    let head = [&[0x2E, 1, 0x1A][..], &head].concat();
     vec![
         (
             "reads",
@@ -117,6 +121,10 @@ pub fn seeds() -> Vec<Seed> {
         ),
         ("sessions", script(0, &[&[0x10, 3], &[0x3E, 0], &[0x85, 2], &[0x11, 1]])),
         ("download", script(7, &[&[0x10, 2], &[0x34, 0, 0x11, 0, 16], &block, &[0x37], &[0x31, 1, 0xFF, 1]])),
+        (
+            "update",
+            script(7, &[&[0x10, 2], &head, &[0x34, 0, 0x11, 2, 16], &block, &[0x37], &[0x31, 1, 0xFF, 1]]),
+        ),
         ("routine", script(7, &[&[0x10, 3], &[0x31, 1, 2, 0], &[0x31, 3, 2, 0], &[0x31, 1, 2, 2]])),
         (
             "key",

@@ -270,14 +270,12 @@ fn an_image_that_is_damaged_after_its_confirmation_gives_way_and_without_any_the
     assert_eq!(firmware(&mut board).0, Some(Slot::A));
 }
 
-/// The power is cut at accesses to the flash while an image is downloaded, activated, tried, rolled back and confirmed. The
-/// one that is rolled back is the first KiB of an image.
-#[test]
-fn an_image_starts_after_a_cut_at_an_access_of_the_update() {
-    const TEST: &str = "an_image_starts_after_a_cut_at_an_access_of_the_update";
+/// Cuts the power at accesses to the flash while an image is downloaded, activated, tried, rolled back and confirmed, at all
+/// of them or at some, and at `delays` after each. The image that is rolled back is the first KiB of one.
+fn cut_power(test: &str, all: bool, delays: &[Duration]) {
     const MANY: usize = 1 << 30;
     const TINY: usize = 1_024;
-    let (Some(file), Some(mut board)) = (built(TEST), common::boot(TEST)) else { return };
+    let (Some(file), Some(mut board)) = (built(test), common::boot(test)) else { return };
     board.run(3 * S);
     service::enter(&mut board, 2);
     let [a, b] = &file.images;
@@ -292,8 +290,8 @@ fn an_image_starts_after_a_cut_at_an_access_of_the_update() {
         assert!(count > 0, "{name}");
         let _ = board.can_frames();
         board.snapshot("after");
-        for access in (1..=count).step_by(every) {
-            for delay in [Duration::ZERO, Duration::from_micros(8), 300 * MS] {
+        for access in (1..=count).step_by(if all { 1 } else { every }) {
+            for &delay in delays {
                 board.restore("before");
                 board.cut_after(access, delay);
                 act(board);
@@ -308,7 +306,7 @@ fn an_image_starts_after_a_cut_at_an_access_of_the_update() {
                 assert!((0..3).any(|_| starts(board)), "{name}: {access} of {count}, {delay:?}");
             }
         }
-        println!("{TEST}: {name}: {count} accesses, one in {every}");
+        println!("{test}: {name}: {count} accesses, {cuts} cuts so far");
         board.restore("after");
     };
     let head = [&[0x2E, 1, 0x1A][..], &tiny.head.bytes()].concat();
@@ -333,5 +331,23 @@ fn an_image_starts_after_a_cut_at_an_access_of_the_update() {
     board.run(START + 4_700 * MS);
     cut(&mut board, "confirmation", 3, &|_| (), S);
     assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
-    println!("{TEST}: {cuts} cuts");
+    println!("{test}: {cuts} cuts");
+}
+
+#[test]
+fn an_image_starts_after_a_cut_at_an_access_of_the_update() {
+    const TEST: &str = "an_image_starts_after_a_cut_at_an_access_of_the_update";
+    cut_power(TEST, false, &[Duration::ZERO, Duration::from_micros(8), 300 * MS]);
+}
+
+/// `cargo test -p gyronet-host-tests --test board cut_at_each_access_of_the_update -- --ignored --nocapture`
+#[test]
+#[ignore = "2,000 cuts take half an hour"]
+fn an_image_starts_after_a_cut_at_each_access_of_the_update() {
+    const TEST: &str = "an_image_starts_after_a_cut_at_each_access_of_the_update";
+    cut_power(
+        TEST,
+        true,
+        &[Duration::ZERO, Duration::from_micros(4), Duration::from_micros(12), 300 * MS, 900 * MS],
+    );
 }

@@ -146,7 +146,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     pub fn weights_verify<T>(&mut self, of: impl FnOnce(&[u8]) -> T) -> Result<T, Refusal> {
         self.request(false, |device| {
             let flash = device.slots.as_ref().ok_or(SlotError::NoFlash)?;
-            let uploading = device.uploading.as_mut().ok_or(SlotError::NotBegun)?;
+            let uploading = device.uploading.as_mut().filter(|uploading| uploading.upload.image().is_none());
+            let uploading = uploading.ok_or(SlotError::NotBegun)?;
             let upload = &uploading.upload;
             let of_file = || upload.verify(flash.slots()).map(|(bytes, blob)| (of(bytes), blob));
             let (result, Blob { crc, shape, .. }) = flash.check(of_file)?;
@@ -162,7 +163,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     #[inline(never)]
     pub fn weights_activate(&mut self) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
-            let Uploading { upload, checked } = device.uploading.ok_or(SlotError::NotBegun)?;
+            let uploading = device.uploading.filter(|uploading| uploading.upload.image().is_none());
+            let Uploading { upload, checked } = uploading.ok_or(SlotError::NotBegun)?;
             let Checked { crc, window: cycles } =
                 checked.ok_or(SlotError::Incomplete { written: upload.written() })?;
             let mode = device.next_configuration.compensate.mode;

@@ -9,6 +9,7 @@ use gyronet::service::message::{BLOCK, Refusal};
 use gyronet::store::Slot;
 use gyronet::store::firmware::{FirmwareError, LABEL, Label, MAX_IMAGE, Trailer, select};
 use gyronet::store::layout::RECORD_SECTOR;
+use gyronet::store::slots::SlotError;
 use gyronet_host_tests::flash::{F405, Region};
 use gyronet_host_tests::stored::{flash_image, image};
 use gyronet_host_tests::synthetic::judged;
@@ -240,6 +241,19 @@ fn an_interrupted_update_is_repeated_with_the_same_signature_once() {
     assert_eq!(refusal(&on_trial), Some(Refusal::Counter { found: 7, newest: 7 }));
     let mut region = Region::<RECORD_SECTOR>::new(&flash, 0..1 << 20);
     assert!(Trailer::read(&mut region, Slot::B).is_some_and(|trailer| trailer.number == 2));
+}
+
+#[test]
+fn firmware_that_waits_for_its_activation_is_not_taken_for_weights() {
+    let (flash, mut bench) = board();
+    let update = update(OWN);
+    bench.expect(&write_head(&update.head.bytes(), &[]), &[0x6E, 1, 0x1A]);
+    assert_eq!(send(&mut bench, &update.images[1])[0], 0x77);
+    bench.expect(&[0x10, 2], &[0x50, 2, 0, 50, 0x01, 0xF4]);
+    bench.expect(&[0x31, 1, 0xFF, 1], &[0x7F, 0x31, 0x24]);
+    assert_eq!(bench.board.weights_verify(|_| ()), Err(SlotError::NotBegun.into()));
+    assert_eq!(boot(&flash, true), Some(Slot::A));
+    assert_eq!(bench.board.firmware_activate(), Ok(()), "which the device still knows");
 }
 
 #[test]
