@@ -86,7 +86,6 @@ fn the_truth_has_no_error() {
     let errors = scratch.compared(&sequence);
     assert!(errors.ate_m < 1e-4 && errors.aligned_ate_m < 1e-4, "{errors:?}");
     assert!(errors.mean_1s_rad < 1e-7 && errors.final_unwrapped_rad < 1e-6, "{errors:?}");
-    assert_eq!(errors.run_time_s, None);
 }
 
 #[test]
@@ -184,7 +183,7 @@ fn the_tables_count_what_was_left_out() {
     let both = sequences.each_ref().map(|sequence| scratch.errors(sequence));
     let tables = table::tables(&Results::new(both.to_vec()));
     let titles: Vec<&str> = tables.iter().map(|table| table.title.split(':').next().unwrap()).collect();
-    assert_eq!(titles, ["Table I", "Table II", "Table IV", "Table VI"]);
+    assert_eq!(titles, ["Table I", "Table II", "Table IV"]);
     for table in &tables[..3] {
         let note = table.notes.iter().position(|note| note == "other program: 1 of 2 sequences left out");
         let note = note.unwrap_or_else(|| panic!("{}: {:?}", table.title, table.notes));

@@ -10,8 +10,6 @@ pub struct Estimate {
     pub turns: Vec<f64>,
     /// Source of the positions after these turns.
     pub places: Places,
-    /// Run time on this machine, s, if it was measured.
-    pub run_time: Option<f64>,
 }
 
 /// The source of an estimate's positions.

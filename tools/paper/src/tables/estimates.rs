@@ -29,7 +29,6 @@ use gyronet_tools::drive::wheel_frames::WheelFrames;
 use gyronet_tools::evaluate::fir::LowPass;
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::vqf;
-use std::time::Instant;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimates {
@@ -53,20 +52,18 @@ pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork) -> Estimates {
         Err(error) => estimates.refused = Some(error.to_string()),
     }
     if sequence.has_vendor {
-        estimates.add(Method::VENDOR, || rates(sequence.steps.iter().map(|step| step.vendor_yaw)));
+        estimates.add(Method::VENDOR, rates(sequence.steps.iter().map(|step| step.vendor_yaw)));
     }
     if let Some(base) = sequence.wheel_base {
         let turn = |step: &sequence::Step| (step.wheels[1] - step.wheels[0]) / base;
-        estimates.add(Method::WHEELS, || sequence.steps.iter().map(|step| turn(step) / DT).collect());
+        estimates.add(Method::WHEELS, sequence.steps.iter().map(|step| turn(step) / DT).collect());
     }
     let fog: Vec<f64> = sequence.steps.iter().map(|step| step.fog / DT).collect();
-    estimates.add(Method::FOG, || fog.clone());
+    estimates.add(Method::FOG, fog.clone());
     let earth = EARTH_RATE * libm::sin(sequence.latitude_deg().to_radians());
-    estimates.add(Method::FOG_EARTH, || fog.iter().map(|rate| rate - earth).collect());
-    estimates.add(Method::FOG_DEFAULT, || {
-        let (sent, _) = fog_replay::run_board(sequence, fog_replay::default_config(sequence), None);
-        sent.iter().map(|sent| sent.rate.rad_per_sec()).collect()
-    });
+    estimates.add(Method::FOG_EARTH, fog.iter().map(|rate| rate - earth).collect());
+    let (sent, _) = fog_replay::run_board(sequence, fog_replay::default_config(sequence), None);
+    estimates.add(Method::FOG_DEFAULT, sent.iter().map(|sent| sent.rate.rad_per_sec()).collect());
     estimates
 }
 
@@ -88,25 +85,21 @@ impl Estimates {
             let network: &mut dyn MinuteNetwork =
                 if method == Method::FOGNET { &mut *whole.0 } else { &mut whole };
             let network = fits.is_ok().then_some(network);
-            self.add(method, || {
-                let (sent, _) = fog_replay::run_board(sequence, config, network);
-                sent.iter().map(|sent| sent.rate.rad_per_sec()).collect()
-            });
+            let (sent, _) = fog_replay::run_board(sequence, config, network);
+            self.add(method, sent.iter().map(|sent| sent.rate.rad_per_sec()).collect());
         }
     }
 
     /// Adds FoGNet on GyroNet's rate, if GyroNet was run.
     pub fn add_pseudo_fog(&mut self, sequence: &Sequence, network: &mut impl MinuteNetwork) {
         let looped = self.methods.iter().find(|estimate| estimate.method == Method::GYRONET_LOOP);
-        let Some((looped, looped_s)) = looped.and_then(|looped| Some((looped, looped.run_time?))) else {
-            return;
-        };
+        let Some(looped) = looped else { return };
         let mut sequence = sequence.clone();
         for (step, turn) in sequence.steps.iter_mut().skip(self.start).zip(&looped.turns) {
             step.fog = *turn;
         }
-        let (drive, run_time) = timed(|| fog_replay::run(&sequence, network, FogConfig::DEFAULT));
-        self.push(Method::PSEUDO_FOG, drive.turns[self.start..].to_vec(), looped_s + run_time);
+        let drive = fog_replay::run(&sequence, network, FogConfig::DEFAULT);
+        self.push(Method::PSEUDO_FOG, drive.turns[self.start..].to_vec());
     }
 
     /// Runs the methods that start from the inertial sensor.
@@ -115,34 +108,21 @@ impl Estimates {
         let constant = |rate: f64| gyro.iter().map(|z| z - rate).collect::<Vec<f64>>();
         // This is the paper's network alone, without zero-rate updates.
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
-        let (drive, alone_s) = timed(|| Replay::run(recording, &config, None, network));
+        let drive = Replay::run(recording, &config, None, network);
         let wheels = WheelFrames::new(recording);
-        let (looped, looped_s) = timed(|| Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network));
-        self.add(Method::RAW, || constant(0.0));
+        let looped = Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network);
+        self.add(Method::RAW, constant(0.0));
         match drive.and_then(|drive| Ok((drive, looped?))) {
             Ok((drive, looped)) => {
                 let still = &gyro[..self.start];
                 let bias = still.iter().sum::<f64>() / still.len().max(1) as f64;
-                self.add(Method::STATIC, || constant(bias));
-                self.add(Method::FIR, || LowPass::chosen().filter(&constant(bias)));
-                for (method, run_time, rates) in [
-                    (Method::GYRONET, alone_s, corrected(&drive, &gyro, |step| step.complete)),
-                    (
-                        Method::GYRONET_ONLINE,
-                        alone_s,
-                        corrected(&drive, &gyro, |step| step.vehicle.live.rate),
-                    ),
-                    // The delayed rates of the drive's last steps have not been sent yet.
-                    (
-                        Method::GYRONET_LOOP,
-                        looped_s,
-                        corrected(&looped, &gyro, |step| {
-                            step.delayed.map_or(step.complete, |sent| sent.rate)
-                        }),
-                    ),
-                ] {
-                    self.push(method, self.turns(&rates), run_time);
-                }
+                self.add(Method::STATIC, constant(bias));
+                self.add(Method::FIR, LowPass::chosen().filter(&constant(bias)));
+                self.add(Method::GYRONET, corrected(&drive, &gyro, |step| step.complete));
+                self.add(Method::GYRONET_ONLINE, corrected(&drive, &gyro, |step| step.vehicle.live.rate));
+                // The delayed rates of the drive's last steps have not been sent yet.
+                let delayed = |step: &Step| step.delayed.map_or(step.complete, |sent| sent.rate);
+                self.add(Method::GYRONET_LOOP, corrected(&looped, &gyro, delayed));
             }
             Err(error) => self.refused = Some(error.to_string()),
         }
@@ -152,31 +132,22 @@ impl Estimates {
                 .iter()
                 .map(|step| (step.angular_rate.map(f64::from), step.specific_force.map(f64::from)))
         };
-        self.add(Method::VQF, || vqf::rates(vqf::published(), samples()));
-        self.add(Method::VQF_VEHICLE, || {
-            let mut filter = vqf::published();
-            // The thresholds are three times the spread that static initialisation allows, because VQF checks each
-            // sample.
-            let StaticConfig { gyro_std, accel_std, .. } = StaticConfig::DEFAULT;
-            let (gyro, accel) = (f64::from(gyro_std).to_degrees(), f64::from(accel_std));
-            filter.set_rest_detection_thresholds(3.0 * gyro, 3.0 * accel);
-            vqf::rates(filter, samples())
-        });
+        self.add(Method::VQF, vqf::rates(vqf::published(), samples()));
+        let mut filter = vqf::published();
+        // The thresholds are three times the spread that static initialisation allows, because VQF checks each sample.
+        let StaticConfig { gyro_std, accel_std, .. } = StaticConfig::DEFAULT;
+        let (gyro, accel) = (f64::from(gyro_std).to_degrees(), f64::from(accel_std));
+        filter.set_rest_detection_thresholds(3.0 * gyro, 3.0 * accel);
+        self.add(Method::VQF_VEHICLE, vqf::rates(filter, samples()));
     }
 
     /// Adds a method from the rates of all steps, rad/s.
-    fn add(&mut self, method: Method, rates: impl FnOnce() -> Vec<f64>) {
-        let (rates, run_time) = timed(rates);
-        self.push(method, self.turns(&rates), run_time);
+    fn add(&mut self, method: Method, rates: Vec<f64>) {
+        self.push(method, rates[self.start..].iter().map(|rate| rate * DT).collect());
     }
 
-    /// Returns the turns of the compared steps, from the rates of all steps.
-    fn turns(&self, rates: &[f64]) -> Vec<f64> {
-        rates[self.start..].iter().map(|rate| rate * DT).collect()
-    }
-
-    fn push(&mut self, method: Method, turns: Vec<f64>, run_time: f64) {
-        self.methods.push(Estimate { method, turns, places: Places::RECKONED, run_time: Some(run_time) });
+    fn push(&mut self, method: Method, turns: Vec<f64>) {
+        self.methods.push(Estimate { method, turns, places: Places::RECKONED });
     }
 
     pub fn add_joint(&mut self, sequence: &Sequence, joint: &Joint) {
@@ -191,13 +162,6 @@ impl Estimates {
             Err(error) => self.left_out.push((given.method, error.to_string())),
         }
     }
-}
-
-/// Returns the result of some work and its run time, s.
-fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
-    let started = Instant::now();
-    let result = work();
-    (result, started.elapsed().as_secs_f64())
 }
 
 /// Returns one of the rates of each step. For a step without a sample this is the interpolated gyro minus the last

@@ -72,7 +72,7 @@ impl Joint {
         let shares = Vector3::new(self.gyro, self.difference, self.constant);
         let turns = sequence.steps[start..].iter().map(|step| shares.dot(&inputs(step))).collect();
         let places = Places::Reckoned { scale: self.way };
-        Estimate { method: Method::FOG_WHEELS, turns, places, run_time: None }
+        Estimate { method: Method::FOG_WHEELS, turns, places }
     }
 }
 

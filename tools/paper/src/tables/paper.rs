@@ -63,10 +63,6 @@ pub const NEW_SEQUENCES: [Line; 3] = [
     line("FoGNet + odometry", &[14.60, 4.31]),
 ];
 
-/// Table VI: time for urban06 to 17, s.
-pub const RUN_TIME: [Line; 3] =
-    [line("lwoi", &[1986.0]), line("FoGNet, CPU", &[1430.0]), line("FoGNet, GPU", &[220.0])];
-
 /// Table VII: ATE and aligned ATE, m, average on NCLT.
 pub const NCLT: [Line; 2] =
     [line("FoG + odometry", &[41.98, 18.15]), line("FoGNet + odometry", &[38.64, 16.66])];

@@ -29,9 +29,6 @@ pub struct Errors {
     pub aligned_ate_m: f64,
     /// Mean distance from the true path after alignment, m.
     pub aligned_ate_mean_m: f64,
-    /// Run time on this machine, s; `None` for a given trajectory.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub run_time_s: Option<f64>,
 }
 
 pub type ByMethod = BTreeMap<&'static str, Errors>;
@@ -119,7 +116,6 @@ impl Errors {
             ate_mean_m: ate.mean_m,
             aligned_ate_m: aligned.rmse_m,
             aligned_ate_mean_m: aligned.mean_m,
-            run_time_s: estimate.run_time,
         })
     }
 
@@ -133,11 +129,6 @@ impl Errors {
             ate_mean_m: mean(|e| e.ate_mean_m),
             aligned_ate_m: mean(|e| e.aligned_ate_m),
             aligned_ate_mean_m: mean(|e| e.aligned_ate_mean_m),
-            run_time_s: errors
-                .iter()
-                .map(|e| e.run_time_s)
-                .sum::<Option<f64>>()
-                .map(|sum| sum / errors.len() as f64),
         }
     }
 }

@@ -70,7 +70,6 @@ pub fn tables(results: &Results) -> Vec<Table> {
         let title = format!("Table V: average ATE on {what}");
         tables.extend(some(&of(group), |set| average(set, &title, &paper::NEW_SEQUENCES)));
     }
-    tables.extend(some(&kaist, run_time));
     tables.extend(some(&nclt, |set| average(set, "Table VII: average ATE on NCLT", &paper::NCLT)));
     tables
 }
@@ -236,28 +235,5 @@ fn average(set: &[&SequenceErrors], title: &str, paper: &[Line]) -> Table {
         paper_columns: names(&["ATE", "aligned"]),
         paper_rows: lines(paper),
         notes: notes::with_fognet(set, &[]),
-    }
-}
-
-/// Builds Table VI.
-fn run_time(set: &[&SequenceErrors]) -> Table {
-    let hours = set.iter().map(|sequence| sequence.seconds).sum::<f64>() / 3600.0;
-    let timed = |method: &Method| method.gyro != Gyro::Given && *method != Method::FOG_WHEELS;
-    let rows = methods_of(set, timed).into_iter().map(|method| Row {
-        name: method.name.to_owned(),
-        figures: vec![set.iter().map(|s| s.methods.get(method.key)?.run_time_s).sum()],
-    });
-    Table {
-        title: format!("Table VI: total time for {hours:.2} h of driving, this machine, one core, s"),
-        simulated: set.iter().any(|sequence| sequence.simulated),
-        columns: names(&["s"]),
-        decimals: 2,
-        rows: rows.collect(),
-        paper_columns: names(&["s"]),
-        paper_rows: lines(&paper::RUN_TIME),
-        notes: vec![
-            "The paper's times are for urban06 to 17.".into(),
-            "Both rows of GyroNet alone have the time of the same run; the one with the bias loop has its own run.".into(),
-        ],
     }
 }
