@@ -1,7 +1,7 @@
 //! The results of one drive, for the summary that `gyronet demo` prints and for its page.
 
-mod can_excerpt;
 mod page;
+mod sent;
 mod short_table;
 mod trajectory;
 mod tunnel;
@@ -11,10 +11,9 @@ use crate::evaluate::methods::PerMethod;
 use crate::evaluate::outage_table::ByLength;
 use crate::evaluate::rates::Rates;
 use crate::evaluate::report::{Comparisons, DriveErrors, Row};
-use gyronet::can::config::Config;
 use serde::Serialize;
 
-pub use can_excerpt::{Message, Sent};
+pub use sent::write_log;
 pub use short_table::ShortTable;
 pub use trajectory::{Path, Trajectories};
 pub use tunnel::Tunnel;
@@ -29,7 +28,6 @@ pub struct Demo<'a> {
     pub trajectories: Option<Trajectories>,
     /// The tunnels, where the drive has courses.
     pub tunnel: Option<&'a Tunnel>,
-    pub excerpt: Vec<Message>,
     /// Messages of the whole drive.
     pub frames: u64,
 }
@@ -51,7 +49,6 @@ pub struct Summary<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     outage: Option<&'a ByLength>,
     frames: u64,
-    excerpt: &'a [Message],
 }
 
 impl<'a> Demo<'a> {
@@ -62,7 +59,7 @@ impl<'a> Demo<'a> {
         rates: &'a Rates,
         errors: Option<&'a DriveErrors>,
         tunnel: Option<&'a Tunnel>,
-        sent: &Sent,
+        frames: u64,
     ) -> Self {
         Self {
             drive,
@@ -71,8 +68,7 @@ impl<'a> Demo<'a> {
             errors,
             trajectories: Trajectories::new(drive, rates),
             tunnel,
-            excerpt: can_excerpt::in_words(sent.fastest.as_ref(), drive.facts.first, Config::DEFAULT),
-            frames: sent.frames,
+            frames,
         }
     }
 
@@ -88,7 +84,6 @@ impl<'a> Demo<'a> {
             outage: self.tunnel.map(|tunnel| &tunnel.outages.outage),
             paths: self.trajectories.as_ref().map(|trajectories| trajectories.paths.as_slice()),
             frames: self.frames,
-            excerpt: &self.excerpt,
         }
     }
 

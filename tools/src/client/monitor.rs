@@ -8,7 +8,6 @@ pub mod source;
 mod view;
 mod yaw_set;
 
-pub use view::fault_names;
 pub use yaw_set::State;
 
 use embedded_can::{Frame, Id};

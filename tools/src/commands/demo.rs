@@ -3,7 +3,7 @@
 use super::{Common, WriteError, paint, print_json, progress, read_drive, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
-use gyronet_tools::demo::{Demo, Sent, ShortTable, Tunnel};
+use gyronet_tools::demo::{Demo, ShortTable, Tunnel, write_log};
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::rates::Rates;
 use gyronet_tools::evaluate::report::EvaluateError;
@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 
 /// Show all results of one drive: a table of errors, a page, a CAN log.
 ///
-/// The page (demo.html) needs only a browser. It has charts of yaw, errors and path that can be zoomed, the table
-/// of methods and decoded CAN messages. Without FILE the command takes the simulated drive that
+/// The page (demo.html) needs only a browser. It has charts of yaw, errors and path that can be zoomed, and the table
+/// of methods. Without FILE the command takes the simulated drive that
 /// comes with it.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
@@ -59,7 +59,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     std::fs::create_dir_all(&folder).map_err(WriteError::to(&folder))?;
     let [log, page] = ["can.log", "demo.html"].map(|name| folder.join(name));
     let file = File::create(&log).map_err(WriteError::to(&log))?;
-    let sent = Sent::run(&drive, GyroNet::new(weights.blob()?), BufWriter::new(file))?;
+    let frames = write_log(&drive, GyroNet::new(weights.blob()?), BufWriter::new(file))?;
     let simulated = args.file.is_none();
     let mut network = GyroNet::new(weights.blob()?);
     // The table above has no courses: a course is an input of ours, and the classical methods have none.
@@ -67,7 +67,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         Some(path) => Tunnel::new(&Drive::open_moving(path)?, &mut network)?,
         None => Tunnel::new(&Drive::from(&with_gnss), &mut network)?,
     };
-    let demo = Demo::new(&drive, simulated, &rates, errors.as_ref(), tunnel.as_ref(), &sent);
+    let demo = Demo::new(&drive, simulated, &rates, errors.as_ref(), tunnel.as_ref(), frames);
     std::fs::write(&page, demo.page()).map_err(WriteError::to(&page))?;
 
     let mut out = std::io::stdout().lock();
@@ -99,7 +99,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     writeln!(
         out,
         "{:<25} {} (cargo gyronet monitor FILE decodes it)",
-        format!("{} CAN frames", grouped(sent.frames)),
+        format!("{} CAN frames", grouped(frames)),
         log.display()
     )?;
     Ok(())

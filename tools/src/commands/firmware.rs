@@ -7,8 +7,14 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::Command;
 
-/// Build the firmware of a board: boot loader and image for a debug probe, and an update for `device update`.
+/// Build the firmware of a board, and an update for `gyronet device update`.
+///
+/// The ELF file holds boot loader and image, for a debug probe.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  gyronet firmware --target-dir out             # out/netduino-plus-2.elf and .update
+  gyronet firmware --board olimex-stm32-h405 --flash")]
 pub struct Args {
     /// Board, as a feature of the images.
     #[arg(long, default_value = "netduino-plus-2")]

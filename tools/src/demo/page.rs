@@ -1,7 +1,7 @@
 //! Writes the page of a drive.
 
 use super::trajectory::Trajectories;
-use super::{Demo, Message, Tunnel};
+use super::{Demo, Tunnel};
 use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
 use crate::evaluate::report::{COLUMNS, columns};
@@ -41,8 +41,6 @@ pub fn page(demo: &Demo<'_>) -> String {
     }
     body += "<h2>Methods</h2>\n";
     body += &methods(demo);
-    body += "<h2>On the bus</h2>\n";
-    body += &excerpt(demo);
     document(&format!("gyronet demo: {name}"), &body)
 }
 
@@ -156,21 +154,4 @@ fn methods(demo: &Demo<'_>) -> String {
         errors.seconds,
         errors.reference
     )
-}
-
-fn excerpt(demo: &Demo<'_>) -> String {
-    let Some(Message { time, .. }) = demo.excerpt.first() else { return String::new() };
-    let mut html = format!(
-        "<p>The messages {time} s into the drive, when the vehicle turns fastest. <code>tools/gyronet.dbc</code> \
-         describes every signal, and <code>can.log</code> has all {} messages.</p>\n<div class=\"scroll\"><table class=\"frames\">\n\
-         <thead><tr><th>identifier</th><th>message</th><th>bytes</th><th>content</th></tr></thead>\n<tbody>\n",
-        grouped(demo.frames)
-    );
-    for Message { name, id, data, says, .. } in &demo.excerpt {
-        html += &format!(
-            "<tr><td class=\"data\">{id}</td><td>{name}</td><td class=\"data\">{data}</td><td>{}</td></tr>\n",
-            escaped(says)
-        );
-    }
-    html + "</tbody></table></div>\n"
 }

@@ -16,7 +16,7 @@ const FAULTS: [(Faults, &str); 8] = [
     (Faults::BUS, "bus"),
 ];
 
-pub fn fault_names(faults: Faults) -> String {
+fn fault_names(faults: Faults) -> String {
     let present = FAULTS.iter().filter(|(fault, _)| faults.0 & fault.0 != 0).map(|(_, name)| *name);
     let names: Vec<&str> = present.collect();
     if names.is_empty() { "none".into() } else { names.join("+") }
