@@ -14,6 +14,7 @@ pub mod event;
 pub mod hardware;
 mod learner;
 pub mod message;
+mod not_good;
 #[doc(hidden)]
 mod text;
 

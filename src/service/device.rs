@@ -15,10 +15,11 @@ use super::conditions::Conditions;
 use super::event::{EventKind, EventLog, LogPage, SensorFault};
 use super::learner::Learner;
 use super::message::{AccessCounters, FAILED_STARTS, FlashState, Identity, Info, Origin, PROTOCOL, Refusal};
+use super::not_good::NotGood;
 use crate::can::wheel::WheelSettings;
 use crate::heading::{CourseState, gain_knowledge};
 use crate::health::slow::Knowledge;
-use crate::health::{Faults, Status};
+use crate::health::{Faults, Quality, Status};
 use crate::mounting::{Rotation, Vertical};
 use crate::sample::{ImuSample, Standstill, WheelSample};
 use crate::standstill::Standing;
@@ -96,6 +97,7 @@ pub struct Device<R: NorFlash, W> {
     sensor: Option<SensorFault>,
     status: Status,
     faults: Faults,
+    not_good: NotGood,
     tick: u32,
     log: EventLog,
     /// Reason why the last request was refused.
@@ -146,6 +148,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             sensor: None,
             status: Status::Init,
             faults: Faults::NONE,
+            not_good: NotGood::START,
             tick: 0,
             log: EventLog::new(),
             refusal: None,
@@ -234,6 +237,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         if let Some(sample) = sample {
             self.add_to_calibration(sample, wheels, standing);
         }
+    }
+
+    /// Takes the quality of each rate, after [`Device::observe`].
+    pub fn rated(&mut self, quality: Quality, standing: &Standing) {
+        self.not_good.observe(quality, self.faults, standing);
     }
 
     /// Learns what standstills and turns have shown of the vertical.
@@ -411,6 +419,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             can_fault: self.identity.can_fault.is_some(),
             crashed: self.identity.crash.is_some() || self.has_failed(),
             course_contradicts: self.course.is_contradicted,
+            not_good_for_long: self.not_good.is_long(),
             firmware_refused: self.firmware.is_refused(),
             access_refused: self.refusal.is_some_and(|refusal| refusal.is_access_denied()),
         }

@@ -63,6 +63,8 @@ enum Cause {
     Clock,
     Can,
     Course,
+    NoBias,
+    NotGood,
     AccessRefused,
     Firmware,
 }
@@ -87,6 +89,8 @@ impl Cause {
             Self::Clock => now.clock_fault,
             Self::Can => now.can_fault,
             Self::Course => now.course_contradicts,
+            Self::NoBias => now.not_good_for_long && now.status == Status::Init,
+            Self::NotGood => now.not_good_for_long && now.status != Status::Init,
             Self::AccessRefused => now.access_refused,
             Self::Firmware => now.firmware_refused,
         }
@@ -94,7 +98,7 @@ impl Cause {
 }
 
 /// All troubles.
-pub static TROUBLES: [Trouble; 16] = [
+pub static TROUBLES: [Trouble; 18] = [
     trouble(
         0x5A01,
         0x31,
@@ -130,6 +134,20 @@ pub static TROUBLES: [Trouble; 16] = [
         "inertial sensor: samples are missing",
         "its wires, its output rate",
         Cause::Fault(Faults::GAP),
+    ),
+    trouble(
+        0x5A01,
+        0x54,
+        "yaw rate: no bias in ten minutes of driving",
+        "let it stand for 3 s; limits in `static_init`; a course on the bus",
+        Cause::NoBias,
+    ),
+    trouble(
+        0x5A01,
+        0x92,
+        "yaw rate: degraded for ten minutes of driving, without a fault",
+        "0x1A3: a coarse bias needs another stop; `device counters`: late or missing windows",
+        Cause::NotGood,
     ),
     trouble(
         0x5A02,

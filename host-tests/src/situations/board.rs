@@ -166,6 +166,7 @@ impl Board {
                 &seen.wheels,
                 &seen.standing,
             );
+            device.rated(live.quality, &seen.standing);
             if device.take_mount_moved() {
                 coprocessor.mount_moved();
             }

@@ -16,6 +16,7 @@ use gyronet::can::queue::TransmitQueue;
 use gyronet::can::slcan::host::StatusFlags;
 use gyronet::can::slcan::port::Port;
 use gyronet::coprocessor::{self, Sink, TimedFrame};
+use gyronet::estimate::YawEstimate;
 use gyronet::health::count;
 use gyronet::units::Micros;
 
@@ -167,9 +168,10 @@ impl Sink for Outgoing {
     #[inline(never)]
     fn observed(&mut self, observation: &coprocessor::Observation) {
         let coprocessor::Observation { sample, vehicle, wheels, standing, vertical, .. } = observation;
-        let (tick, status, faults) = (vehicle.tick, vehicle.live.status, vehicle.live.faults);
+        let YawEstimate { status, quality, faults, .. } = vehicle.live;
         let (sample, wheels, standing, vertical) = (*sample, *wheels, *standing, *vertical);
-        let note = Observation { sample, tick, status, faults, wheels, standing, vertical };
+        let tick = vehicle.tick;
+        let note = Observation { sample, tick, status, quality, faults, wheels, standing, vertical };
         count(&mut self.overruns, u32::from(!OBSERVATIONS.push(note)));
     }
 

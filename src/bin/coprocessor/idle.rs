@@ -11,7 +11,7 @@ use crate::stm32f405::{can, clocks, timer};
 use cortex_m::peripheral::SCB;
 use gyronet::coprocessor::Coprocessor;
 use gyronet::heading::CourseState;
-use gyronet::health::{Faults, Status, count};
+use gyronet::health::{Faults, Quality, Status, count};
 use gyronet::model::background::BackgroundCheck;
 use gyronet::mounting::Vertical;
 use gyronet::sample::{ImuSample, WheelSample};
@@ -35,6 +35,7 @@ pub struct Observation {
     pub sample: Option<ImuSample>,
     pub tick: u32,
     pub status: Status,
+    pub quality: Quality,
     pub faults: Faults,
     pub wheels: WheelSample,
     pub standing: Standing,
@@ -134,9 +135,10 @@ impl Idle {
     #[inline(never)]
     fn observe(&mut self) {
         while let Some(seen) = OBSERVATIONS.pop() {
-            let Observation { sample, tick, status, faults, wheels, standing, vertical } = seen;
+            let Observation { sample, tick, status, quality, faults, wheels, standing, vertical } = seen;
             vertical.into_iter().for_each(|vertical| self.device.learn_vertical(vertical));
             self.device.observe(sample.as_ref(), tick, (status, faults), &wheels, &standing);
+            self.device.rated(quality, &standing);
         }
     }
 

@@ -3,7 +3,7 @@
 
 use super::access::locked;
 use super::{Board, sample, start};
-use gyronet::health::{Faults, Status};
+use gyronet::health::{Faults, Quality, Status};
 use gyronet::model::weights;
 use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::event::SensorFault;
@@ -389,6 +389,36 @@ fn a_trouble_erases_nothing_before_a_tester_s_session_at_standstill() {
     assert_eq!(bench.tester.pending, 1);
     let mut after = Bench::new(&flash);
     after.expect(&[0x19, 6, 0x5A, 0x01, 0x31, 1], &[0x59, 6, 0x5A, 0x01, 0x31, 0x2C, 1, 1]);
+}
+
+/// C1A01-54 and C1A01-92: ten minutes of driving without a good rate, and without a fault that says why.
+#[test]
+fn a_rate_that_is_never_good_is_a_trouble() {
+    const TEN_MINUTES: usize = 60_000;
+    let [driving, parked] = [Standstill::Moving, Standstill::Still].map(judged);
+    for (status, code) in [(Status::Init, 0x54), (Status::Ready, 0x92)] {
+        let (_, mut bench) = bench();
+        let is_present = |bench: &mut Bench| {
+            bench.fail(status, Faults::NONE);
+            bench.ask(&[0x19, 6, 0x5A, 0x01, code, 1]).expect("it is known")[5] & bit::FAILED != 0
+        };
+        let drive = |bench: &mut Bench, samples| {
+            (0..samples).for_each(|_| bench.board.rated(Quality::Degraded, &driving));
+        };
+        (0..TEN_MINUTES).for_each(|_| bench.board.rated(Quality::Degraded, &parked));
+        assert!(!is_present(&mut bench), "a parked board has nothing to wait for");
+        drive(&mut bench, TEN_MINUTES - 1);
+        assert!(!is_present(&mut bench));
+        drive(&mut bench, 1);
+        assert!(is_present(&mut bench));
+        // A good rate ends it, and a fault, which has a trouble of its own.
+        bench.board.rated(Quality::Good, &driving);
+        assert!(!is_present(&mut bench));
+        drive(&mut bench, TEN_MINUTES);
+        bench.fail(status, Faults::GAP);
+        bench.board.rated(Quality::Degraded, &driving);
+        assert!(!is_present(&mut bench));
+    }
 }
 
 #[test]
