@@ -178,7 +178,7 @@ fn what_cannot_be_compared_is_left_out_and_named() {
 #[test]
 fn the_tables_count_what_was_left_out() {
     let scratch = Scratch::new();
-    let sequences = ["a", "b"].map(|name| sequence(name));
+    let sequences = ["a", "b"].map(sequence);
     scratch.write(&sequences[0], &truth(&sequences[0]));
     let both = sequences.each_ref().map(|sequence| scratch.errors(sequence));
     let tables = table::tables(&Results::new(both.to_vec()));
