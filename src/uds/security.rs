@@ -175,7 +175,8 @@ pub(super) fn check<R: NorFlash, W: MappedSlots>(
     let serial = match scope {
         0 => *device.serial(),
         1 => [0; SERIAL],
-        _ => return Err(Nrc::IncorrectMessageLengthOrInvalidFormat),
+        // The end of long data without a signature.
+        _ => return Err(nrc(device.refuse_request(Refusal::Unsigned))),
     };
     if !device.may_interrupt() {
         return Err(nrc(device.refuse_request(Refusal::Moving)));

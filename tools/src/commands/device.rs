@@ -104,7 +104,8 @@ enum Action {
     /// Store the public key that controls who may write; `none` removes it.
     SetKey {
         /// NAME.pub from `gyronet keys`, or `none`.
-        key: PathBuf,
+        #[arg(value_name = "KEY")]
+        public: PathBuf,
     },
     /// Restart the board.
     Restart,
@@ -179,8 +180,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             let access = Access { access: device.access()?, refused: device.access_counters()? };
             print_value(&access, json)?;
         }
-        Action::SetKey { key } => {
-            let public = if key.as_os_str() == "none" { [0; 32] } else { signing::read_public(key)? };
+        Action::SetKey { public } => {
+            let public = if public.as_os_str() == "none" { [0; 32] } else { signing::read_public(public)? };
             device.set_key(&public)?;
             done(json, "stored; it is in force now")?;
         }

@@ -45,11 +45,18 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             .map_err(|error| format!("probe-rs: {error}"))?;
         return if status.success() { Ok(()) } else { Err(format!("probe-rs: {status}").into()) };
     }
-    std::fs::write(&update, linked.update()?.bytes()).map_err(WriteError::to(&update))?;
+    let file = linked.update()?;
+    std::fs::write(&update, file.bytes()).map_err(WriteError::to(&update))?;
+    let (boot, image) = (linked.boot_loader()?.len(), file.images[0].len());
     let out = &mut io::stdout().lock();
     if common.json {
-        return super::print_json(out, &serde_json::json!({ "elf": elf, "update": update }));
+        return super::print_json(
+            out,
+            &serde_json::json!({
+                "elf": elf, "update": update, "boot_bytes": boot, "image_bytes": image,
+            }),
+        );
     }
-    writeln!(out, "{}: for a debug probe", elf.display())?;
-    Ok(writeln!(out, "{}: for `device update`", update.display())?)
+    writeln!(out, "{}: for a debug probe, boot loader of {boot} bytes", elf.display())?;
+    Ok(writeln!(out, "{}: for `device update`, image of {image} bytes", update.display())?)
 }

@@ -47,6 +47,11 @@ impl Linked {
         Ok(Self { boot, images: images.collect::<Result<_, _>>()? })
     }
 
+    /// Returns the bytes of the boot loader.
+    pub fn boot_loader(&self) -> Result<Vec<u8>, FirmwareFileError> {
+        flat(&self.boot, FLASH_BASE..FLASH_BASE + BOOT_SIZE)
+    }
+
     /// Returns the update for diagnosis, of the image for both slots.
     pub fn update(&self) -> Result<Update, FirmwareFileError> {
         let [a, b] = &self.images[..] else { return Err(FirmwareFileError::Lacks("slot B")) };
@@ -60,7 +65,7 @@ impl Linked {
         let image = image(&elf, Slot::A)?;
         let trailer =
             Trailer { is_confirmed: true, ..Trailer::new(image.len() as u32, CRC.checksum(&image), 0, 1) };
-        let boot = flat(&self.boot, FLASH_BASE..FLASH_BASE + BOOT_SIZE)?;
+        let boot = self.boot_loader()?;
         for (name, bytes) in [(".boot", &boot[..]), (".trailer_a", &trailer.bytes())] {
             let place =
                 object::File::parse(&*elf)?.section_by_name(name).and_then(|section| section.file_range());

@@ -179,9 +179,7 @@ fn what_cannot_be_right_is_refused_before_anything_is_erased() {
     ] {
         refused(&signed(&head, &key, 5), 0x31, firmware(why));
     }
-    // Its last bytes are taken for a trailer, of which they have no scope.
-    refused(&write_head(&right.bytes(), &[]), 0x13, None);
-    refused(&write_head(&right.bytes()[..60], &[]), 0x13, Some(Refusal::Unsigned));
+    refused(&write_head(&right.bytes(), &[]), 0x13, Some(Refusal::Unsigned));
     refused(&signed(&right.bytes(), &other_key, 5), 0x35, Some(Refusal::Signature));
     refused(&signed(&right.bytes(), &key, 0), 0x31, Some(Refusal::Counter { found: 0, newest: 0 }));
     let length = right.image(Slot::B).length;
