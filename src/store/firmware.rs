@@ -130,7 +130,7 @@ impl Trailer {
         CRC.checksum(bytemuck::bytes_of(&self.words())) | 1
     }
 
-    /// Returns the bytes of a slot's end, for a programmer: a confirmed image, or one that is on trial.
+    /// Returns the bytes of a slot's end before its image has started.
     pub fn bytes(&self) -> [u8; TRAILER] {
         let mut bytes = [0xFF; TRAILER];
         let confirmed = if self.is_confirmed { 0 } else { u32::MAX };
@@ -172,27 +172,14 @@ const fn place(slot: Slot, word: u32) -> u32 {
     slot.firmware().start + MAX_IMAGE + word
 }
 
-/// Passes the first bytes of a slot to `take`, in pieces; an error if they cannot be read.
-pub fn read<F: ReadNorFlash>(
-    flash: &mut F,
-    slot: Slot,
-    length: u32,
-    mut take: impl FnMut(&[u8]),
-) -> Result<(), F::Error> {
-    let Range { start, .. } = slot.firmware();
-    let mut piece = [0; 256];
+/// Returns the CRC-32 of the first bytes of a slot.
+fn checksum<F: ReadNorFlash>(flash: &mut F, slot: Slot, length: u32) -> Result<u32, F::Error> {
+    let (mut digest, mut piece) = (CRC.digest(), [0; 256]);
     for at in (0..length).step_by(piece.len()) {
         let piece = piece.get_mut(..(length - at).min(256) as usize).unwrap_or_default();
-        flash.read(start + at, piece)?;
-        take(piece);
+        flash.read(slot.firmware().start + at, piece)?;
+        digest.update(piece);
     }
-    Ok(())
-}
-
-/// Returns the CRC-32 of the first bytes of a slot.
-pub fn checksum<F: ReadNorFlash>(flash: &mut F, slot: Slot, length: u32) -> Result<u32, F::Error> {
-    let mut digest = CRC.digest();
-    read(flash, slot, length, |piece| digest.update(piece))?;
     Ok(digest.finalize())
 }
 
@@ -234,8 +221,8 @@ pub fn confirm<F: NorFlash>(flash: &mut F, slot: Slot) -> bool {
     mark(flash, slot, CONFIRMED)
 }
 
-/// Withdraws the image in a slot and erases it. The words of the trailer that count go first: an erase that is cut leaves
-/// no mixture of them that is valid.
+/// Withdraws the image in a slot and erases it. The words of the trailer that count go first: no mixture that a cut leaves
+/// of them is valid.
 ///
 /// # Errors
 /// Those of the flash.

@@ -62,7 +62,7 @@ impl Download {
                     |device: &mut Device<R, W>, error| nrc(device.refuse_request(Refusal::Firmware(error)));
                 let Some(head) = head else { return Err(refused(device, FirmwareError::NoHead)) };
                 let slot = device.firmware_check(&head.label, head.downgrade).map_err(nrc)?;
-                let image = head.image(slot);
+                let image = slot.of(head.images);
                 if image.length != length {
                     return Err(refused(device, FirmwareError::Length(length)));
                 }

@@ -346,7 +346,7 @@ impl Services {
             return Err(nrc(device.refuse_request(FirmwareError::NotAnUpdate.into())));
         };
         let slot = device.firmware_check(&head.label, head.downgrade).map_err(nrc)?;
-        let Digest { length, .. } = head.image(slot);
+        let Digest { length, .. } = slot.of(head.images);
         if length > MAX_IMAGE {
             return Err(nrc(device.refuse_request(FirmwareError::Length(length).into())));
         }

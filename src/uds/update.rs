@@ -4,7 +4,6 @@
 //! its signature is used up when the image is activated: an update that was interrupted can be repeated.
 
 use super::signature::{DIGEST, Digest};
-use crate::store::Slot;
 use crate::store::firmware::{LABEL_SIZE, Label};
 
 /// Size of the head of an update, bytes: a label, 1 if an older version is wanted, length and SHA-512 of the image for
@@ -43,10 +42,5 @@ impl Head {
         let (a, b) = rest.split_at_checked(4 + DIGEST)?;
         (*downgrade <= 1).then_some(())?;
         Some(Self { label: Label::parse(label)?, downgrade: *downgrade == 1, images: [image(a)?, image(b)?] })
-    }
-
-    /// Returns length and hash of the image for a slot.
-    pub const fn image(&self, slot: Slot) -> Digest {
-        slot.of(self.images)
     }
 }

@@ -178,27 +178,24 @@ fn rolled_back(board: &mut Board) {
 }
 
 #[test]
-fn an_image_that_hangs_is_rolled_back_by_the_first_reset_of_the_watchdog() {
-    const TEST: &str = "an_image_that_hangs_is_rolled_back_by_the_first_reset_of_the_watchdog";
+fn an_image_that_hangs_or_crashes_is_rolled_back_by_the_first_reset() {
+    const TEST: &str = "an_image_that_hangs_or_crashes_is_rolled_back_by_the_first_reset";
+    const HANG: [u8; 2] = [0xFE, 0xE7];
+    const UNDEFINED: [u8; 2] = [0, 0xDE];
     // Its idle task, its output task, and its first instruction, before it has started the watchdog.
-    for function in ["idle::Idle::step", "output::Output::step", "Reset"] {
-        let spoil = |board: &mut Board, image: &mut Vec<u8>| replace(board, image, function, &[0xFE, 0xE7]);
+    for (function, code) in [
+        ("idle::Idle::step", HANG),
+        ("output::Output::step", HANG),
+        ("Reset", HANG),
+        ("idle::Idle::step", UNDEFINED),
+    ] {
+        let spoil = |board: &mut Board, image: &mut Vec<u8>| replace(board, image, function, &code);
         let Some(mut board) = try_on(TEST, 0, spoil) else { return };
         board.run(5 * S);
         let causes: Vec<String> = resets(&mut board).into_iter().map(|(_, cause)| cause).collect();
         assert!(causes.len() <= 1 && causes.iter().all(|cause| cause == "iwdg"), "{function}: {causes:?}");
         rolled_back(&mut board);
     }
-}
-
-#[test]
-fn an_image_that_crashes_is_rolled_back() {
-    const TEST: &str = "an_image_that_crashes_is_rolled_back";
-    // UDF
-    let spoil =
-        |board: &mut Board, image: &mut Vec<u8>| replace(board, image, "idle::Idle::step", &[0, 0xDE]);
-    let Some(mut board) = try_on(TEST, 0, spoil) else { return };
-    rolled_back(&mut board);
 }
 
 #[test]

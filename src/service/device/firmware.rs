@@ -53,10 +53,8 @@ impl Firmware {
     pub(super) const ALONE: Self = Self { slot: None, state: FirmwareState::Alone };
 
     pub(super) fn of<W: MappedSlots>(flash: &mut W) -> Self {
-        let slot = flash.running();
-        let Some((slot, own)) = slot.and_then(|slot| Some((slot, Trailer::read(flash, slot)?))) else {
-            return Self::ALONE;
-        };
+        let Some(slot) = flash.running() else { return Self::ALONE };
+        let Some(own) = Trailer::read(flash, slot) else { return Self::ALONE };
         let newer = Trailer::read(flash, slot.other()).filter(|other| other.number > own.number);
         let state = match newer {
             _ if !own.is_confirmed => FirmwareState::OnTrial,
@@ -84,27 +82,23 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// # Errors
     /// [`Refusal::Firmware`].
     pub fn firmware_check(&mut self, label: &Label, downgrade: bool) -> Result<Slot, Refusal> {
-        let spare = self.spare(label, downgrade);
-        self.refusal = spare.err().map(Refusal::Firmware);
-        Ok(spare?)
-    }
-
-    fn spare(&mut self, label: &Label, downgrade: bool) -> Result<Slot, FirmwareError> {
-        let (slot, flash) = self.firmware.slot.zip(self.slots.as_mut()).ok_or(FirmwareError::NoBootLoader)?;
-        let own = firmware::label(flash, slot).ok_or(FirmwareError::NoBootLoader)?;
-        if label.board != own.board {
-            return Err(FirmwareError::Board);
-        }
-        if label.layout != own.layout {
-            return Err(FirmwareError::Layout { found: label.layout, expected: own.layout });
-        }
-        if label.version < own.version && !downgrade {
-            return Err(FirmwareError::Older);
-        }
-        if self.firmware.state == FirmwareState::OnTrial {
-            return Err(FirmwareError::OnTrial);
-        }
-        Ok(slot.other())
+        self.request(false, |device| {
+            let running = device.firmware.slot.zip(device.slots.as_mut());
+            let own = running.and_then(|(slot, flash)| Some((slot, firmware::label(flash, slot)?)));
+            let (slot, own) = own.ok_or(FirmwareError::NoBootLoader)?;
+            let refused = if label.board != own.board {
+                FirmwareError::Board
+            } else if label.layout != own.layout {
+                FirmwareError::Layout { found: label.layout, expected: own.layout }
+            } else if label.version < own.version && !downgrade {
+                FirmwareError::Older
+            } else if device.firmware.state == FirmwareState::OnTrial {
+                FirmwareError::OnTrial
+            } else {
+                return Ok(slot.other());
+            };
+            Err(refused.into())
+        })
     }
 
     /// Begins the upload of an image to a slot that does not run, and erases it.

@@ -182,7 +182,7 @@ fn what_cannot_be_right_is_refused_before_anything_is_erased() {
     refused(&write_head(&right.bytes(), &[]), 0x13, Some(Refusal::Unsigned));
     refused(&signed(&right.bytes(), &other_key, 5), 0x35, Some(Refusal::Signature));
     refused(&signed(&right.bytes(), &key, 0), 0x31, Some(Refusal::Counter { found: 0, newest: 0 }));
-    let length = right.image(Slot::B).length;
+    let length = right.images[1].length;
     refused(&begin(length), 0x24, firmware(FirmwareError::NoHead));
     bench.expect(&signed(&right.bytes(), &key, 5), &[0x6E, 1, 0x1A]);
     bench.expect(&begin(length + 4), &[0x7F, 0x34, 0x31]);
