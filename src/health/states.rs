@@ -135,7 +135,7 @@ pub const STATES: [State; 15] = [
     remark(
         "sensor moved",
         "its up or forward direction differs from earlier drives",
-        "as in the present state, whose quality does not change; IMPLAUSIBLE",
+        "as in the present state, at best degraded; IMPLAUSIBLE",
         "the next start, or `calibrate static` or `calibrate forget`",
         "`moved_mounts`",
     ),

@@ -36,7 +36,7 @@ impl Pipeline {
         let mut delayed = self.estimate(frame, rates.delayed, early, board, covered);
         for estimate in [&mut live, &mut delayed] {
             estimate.faults = estimate.faults.with(faults);
-            if estimate.quality == Quality::Good && !self.is_bias_confirmed() {
+            if estimate.quality == Quality::Good && (self.state.moved || !self.is_bias_confirmed()) {
                 estimate.quality = Quality::Degraded;
             }
         }
