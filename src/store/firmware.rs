@@ -25,7 +25,7 @@ pub const TRAILER: usize = 64;
 /// Largest size of an image, bytes.
 pub const MAX_IMAGE: u32 = FIRMWARE_SIZE - TRAILER as u32;
 const MAGIC: [u8; 4] = *b"GNFW";
-/// Starts on trial, if each ends because the supply fails.
+/// Starts on trial, if each ends in another way than by the watchdog: the supply fails, or the image resets itself.
 const TRIALS: u32 = 3;
 const CHECK: u32 = 16;
 const TRIAL: u32 = 20;
@@ -191,24 +191,37 @@ pub fn label<F: ReadNorFlash>(flash: &mut F, slot: Slot) -> Option<Label> {
 }
 
 /// Chooses the image to start, and uses up one of its trials if it is not confirmed. `has_failed` says whether the last
-/// run has ended in a reset by the watchdog or by software.
+/// run has ended in a reset by the watchdog. If neither image is confirmed or on trial, a whole one that has failed is better
+/// than none.
 pub fn select<F: NorFlash>(flash: &mut F, has_failed: bool) -> Option<Slot> {
     let numbers = Slot::ALL.map(|slot| Trailer::read(flash, slot).map_or(0, |trailer| trailer.number));
     let newest = if Slot::B.of(numbers) > Slot::A.of(numbers) { Slot::B } else { Slot::A };
-    [newest, newest.other()].into_iter().find(|slot| {
+    let order = [newest, newest.other()];
+    let chosen = order.into_iter().find(|slot| {
         let Some(trailer) = Trailer::read(flash, *slot) else { return false };
         let trials = trailer.trials;
         let is_over = !trailer.is_confirmed && (trials >= TRIALS || trials > 0 && has_failed);
         if is_over {
-            // If they cannot be programmed, the next start tries again.
-            for trial in trials..TRIALS {
-                mark(flash, *slot, TRIAL + 4 * trial);
-            }
+            withdraw(flash, *slot, &trailer);
         }
         !is_over
-            && checksum(flash, *slot, trailer.length).is_ok_and(|crc| crc == trailer.crc)
+            && is_whole(flash, *slot, &trailer)
             && (trailer.is_confirmed || mark(flash, *slot, TRIAL + 4 * trials))
-    })
+    });
+    let whole =
+        |slot: &Slot| Trailer::read(flash, *slot).is_some_and(|trailer| is_whole(flash, *slot, &trailer));
+    chosen.or_else(|| order.into_iter().find(whole))
+}
+
+fn is_whole<F: ReadNorFlash>(flash: &mut F, slot: Slot, trailer: &Trailer) -> bool {
+    checksum(flash, slot, trailer.length).is_ok_and(|crc| crc == trailer.crc)
+}
+
+/// Uses up the trials that an image has left: it has failed. If they cannot be programmed, the next start tries again.
+pub fn withdraw<F: NorFlash>(flash: &mut F, slot: Slot, trailer: &Trailer) {
+    for trial in trailer.trials..TRIALS {
+        mark(flash, slot, TRIAL + 4 * trial);
+    }
 }
 
 /// Programs a word of a trailer to zero. Returns whether it was.

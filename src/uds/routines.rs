@@ -99,8 +99,13 @@ impl Services {
         let checked = self.download.as_ref().and_then(Download::checked);
         if let Some((_, true)) = checked {
             let [] = exactly(trailer)?;
-            let (_, counter) = self.update.take().ok_or(Nrc::RequestSequenceError)?;
+            let (_, counter) = self.update.ok_or(Nrc::RequestSequenceError)?;
+            // A refused request uses up no signature.
+            if !device.may_interrupt() {
+                return Err(nrc(device.refuse_request(Refusal::Moving)));
+            }
             security::use_up(counter, device)?;
+            self.update = None;
             return device.firmware_activate().map_err(nrc);
         }
         if device.access().is_some_and(|access| access.key.is_none()) {

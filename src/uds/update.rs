@@ -6,8 +6,8 @@
 use super::signature::{DIGEST, Digest};
 use crate::store::firmware::{LABEL_SIZE, Label};
 
-/// Size of the head of an update, bytes: a label, 1 if an older version is wanted, length and SHA-512 of the image for
-/// slot A and of that for slot B.
+/// Size of the head of an update, bytes: a label, 1 if an older version is wanted, length (high byte first) and SHA-512 of
+/// the image for slot A and of that for slot B. In a file the images follow, A first.
 pub const HEAD: usize = LABEL_SIZE + 1 + 2 * (4 + DIGEST);
 
 /// The head of an update.

@@ -122,7 +122,7 @@ fn no_mixture_of_a_cut_erase_is_a_trailer() {
             let flash = Rc::new(RefCell::new(before.clone()));
             // Other torn words in each round.
             for _ in 0..round {
-                flash.borrow_mut().cut_after(0, Cut::Before);
+                flash.borrow_mut().cut_after(0, Cut::Front);
                 let _ = region(&flash).write(0x1_0000, &[0; 4]);
                 flash.borrow_mut().restore();
             }

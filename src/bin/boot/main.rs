@@ -46,8 +46,8 @@ mod firmware {
         watchdog::start(&p.DBGMCU);
         // The image reads the flags of the reset and clears them.
         let flags = p.RCC.csr().read();
-        let has_failed =
-            flags.wdgrstf().bit_is_set() || flags.wwdgrstf().bit_is_set() || flags.sftrstf().bit_is_set();
+        // The image resets itself, too, when the supply falls and when the crystal has started: no fault of its own.
+        let has_failed = flags.wdgrstf().bit_is_set() || flags.wwdgrstf().bit_is_set();
         let mut slots = Slots { flash: Flash::new(p.FLASH), rcc: &p.RCC, pwr: &p.PWR };
         if let Some(slot) = select(&mut slots, has_failed) {
             start(FLASH_BASE + slot.firmware().start);

@@ -62,7 +62,7 @@ impl Bench {
         })
     }
 
-    fn turn(&mut self) {
+    pub fn turn(&mut self) {
         let turning = sample(0, [0.0, 0.0, 9.81], 0.3);
         self.board.observe(
             Some(&turning),

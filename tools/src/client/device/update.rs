@@ -59,6 +59,6 @@ pub fn update<B: Bus>(
     let spare = usize::from(runs.first() == Some(&0));
     let image = &update.images[spare];
     let uploaded = transfer(device, ADDRESS, image, |sent| progress(sent, image.len()))?;
-    device.ask(&[&[0x31, 1][..], &USE_DOWNLOAD.to_be_bytes()].concat())?;
+    device.ask_at_rest(&[&[0x31, 1][..], &USE_DOWNLOAD.to_be_bytes()].concat())?;
     Ok(uploaded.slot)
 }
