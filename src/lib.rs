@@ -87,9 +87,6 @@
 //! | `serde` | `Serialize` and `Deserialize` for configuration and counters |
 //! | `defmt` | `defmt::Format` for the public types |
 //!
-//! `stm32f405`, `netduino-plus-2`, `olimex-stm32-h405`, `rtt`, `small-core`, `microbit` and `lm3s6965evb` build the
-//! images of the repository; users of the library need none of them.
-//!
 //! Unsafe code is denied except in one kernel file for Cortex-M with the DSP extension
 //! (`src/nn/simd`), whose results equal those of portable code to the last bit.
 //!

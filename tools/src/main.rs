@@ -15,7 +15,7 @@ use std::process::ExitCode;
 /// Start with `gyronet demo`. `gyronet import` converts logs of other tools to a
 /// drive, and `gyronet doctor` checks a drive.
 ///
-/// A drive is a CSV file at 100 Hz with a header. The vehicle must stand still for
+/// A drive is a CSV file with a header, best at 100 Hz. The vehicle must stand still for
 /// the first 3 s. Columns may be in any order; other columns are ignored:
 ///
 ///   t_s                    time, s

@@ -27,6 +27,8 @@ const SLCAN: usize = 2;
 const SERVICE: usize = 6;
 /// Source address of the GNSS receiver on the bus.
 const RECEIVER: u8 = 0x23;
+/// Rows at the start of a drive in which the vehicle stands.
+const PARKED: usize = 350;
 /// Board time from one report of the speed to the next.
 const REPORT: Duration = Duration::from_secs(30);
 
@@ -40,6 +42,9 @@ struct Args {
     /// Drive that the vehicle drives; without it one is simulated, with a GNSS receiver.
     #[arg(value_name = "DRIVE.csv")]
     drive: Option<PathBuf>,
+    /// Let the vehicle stand: the first three and a half seconds again and again.
+    #[arg(long)]
+    parked: bool,
     /// Port of the service line (USART6).
     #[arg(long, default_value_t = 4006)]
     service: u16,
@@ -62,10 +67,13 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Box<dyn Error>> {
-    let drive = match &args.drive {
+    let mut drive = match &args.drive {
         Some(path) => Recording::read(path)?,
         None => bundled::demo_drive(true)?,
     };
+    if args.parked {
+        drive.rows.truncate(PARKED);
+    }
     let mut lines = [
         Line::open("service line (USART6)", SERVICE, args.service)?,
         Line::open("SLCAN (USART2)", SLCAN, args.slcan)?,
