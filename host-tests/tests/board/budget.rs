@@ -170,7 +170,7 @@ fn accepted_settings_run_and_refused_ones_do_not() {
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     let (over, under): (Vec<_>, Vec<_>) = all.into_iter().partition(|(cost, ..)| *cost > 1.0);
     assert!(over.len() >= refused && under.len() >= accepted);
-    let others = under.len().saturating_sub(costliest).div_ceil((accepted - costliest).max(1)).max(1);
+    let others = (under.len().saturating_sub(costliest) / (accepted - costliest).max(1)).max(1);
     let rest = under.iter().skip(costliest).step_by(others).take(accepted - costliest);
     let runs: Vec<_> = under.iter().take(costliest).chain(rest).collect();
     let mut counts = [0; 2];
