@@ -57,7 +57,7 @@ pub struct CompensateConfig {
     /// Largest part of the revisions that one rate carries.
     pub max_revision: AngularRate,
     /// True if the model's corrections are subtracted. Without them the rate is that of the gyro less bias, level and
-    /// gain; the windows still state its expected error.
+    /// gain, with the expected error of the gyro.
     pub model: bool,
 }
 

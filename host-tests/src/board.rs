@@ -201,7 +201,7 @@ impl Board {
     }
 
     /// Changes flash or RAM: a stored record, or an instruction (`FEE7` is a branch to itself). An image that is changed at
-    /// a symbol gets the checksum of what it is now, so that the boot loader starts it.
+    /// a symbol gets the checksum of its changed bytes, so that the boot loader starts it.
     pub fn patch(&mut self, at: At, bytes: &[u8]) {
         self.ask("memory_write", place(at, json!({ "hex": hex(bytes) })));
         let start = FLASH_BASE + Slot::A.firmware().start;

@@ -126,7 +126,7 @@ impl Pipeline {
     /// Returns what a delayed rate contributes to the expected error; before there is one, the reading itself.
     fn turning(&self, frame: &Frame, rates: &Rates, status: Status, shift: f32) -> Turning {
         let (rate, bias) = (rates.delayed.as_ref(), self.bias_sigma(rates.early_sigma, shift));
-        let origin = origin(status, rate);
+        let origin = self.origin(status, rate);
         let Some(Compensated { rate, roll_and_pitch: [roll, pitch], estimate, withheld, .. }) = rate else {
             let (rates, none) = (frame.sample.angular_rate, AngularRate::ZERO);
             return Turning { rates, estimate: none, withheld: none, origin, bias };
@@ -171,7 +171,7 @@ impl Pipeline {
             rate: rate.map_or(raw, |rate| rate.rate),
             correction: rate.map_or(AngularRate::ZERO, |rate| rate.correction),
             yaw: Yaw(0),
-            sigma: has_sigma.then(|| self.state.uncertainty.sigma(origin(status, rate.as_ref()), bias)),
+            sigma: has_sigma.then(|| self.state.uncertainty.sigma(self.origin(status, rate.as_ref()), bias)),
             status,
             source,
             quality: board.faults.cap_quality(quality),
@@ -180,13 +180,13 @@ impl Pipeline {
             latency_us: Some(frame.tick.wrapping_sub(tick).saturating_mul(PERIOD_US as u32)),
         }
     }
-}
 
-/// Returns how a usable rate was found.
-fn origin(status: Status, rate: Option<&Compensated>) -> Origin {
-    match (rate.and_then(|rate| rate.withheld), status) {
-        (Some(_), _) => Origin::Standstill,
-        (None, Status::Ready) => Origin::Network,
-        (None, _) => Origin::Gyro,
+    /// Returns how a usable rate was found; without the model's corrections it is the gyro's.
+    fn origin(&self, status: Status, rate: Option<&Compensated>) -> Origin {
+        match (rate.and_then(|rate| rate.withheld), status) {
+            (Some(_), _) => Origin::Standstill,
+            (None, Status::Ready) if self.config.compensate.model => Origin::Network,
+            (None, _) => Origin::Gyro,
+        }
     }
 }

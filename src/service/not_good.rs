@@ -1,7 +1,7 @@
 //! A rate that is not good for long, although no fault says why.
 //!
 //! Such a rate is honest, but it stays so for ever where nothing that would end it comes about: a vehicle that never
-//! stands, a second standstill. A workshop has to be told. Time in which the vehicle stands does not count, since a parked
+//! stands, a second standstill. So it becomes a trouble. Time in which the vehicle stands does not count, since a parked
 //! board has nothing to wait for.
 
 use crate::health::{Faults, Quality};

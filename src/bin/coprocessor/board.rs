@@ -140,7 +140,7 @@ const fn number(text: &str) -> u8 {
     number
 }
 
-/// Says of an update what it is, and for which board.
+/// The label of the image: version, flash layout and board, by which an update is accepted.
 #[used]
 #[unsafe(link_section = ".label")]
 static LABEL: [u8; LABEL_SIZE] = Label::new(VERSION, BOARD.name).bytes();
