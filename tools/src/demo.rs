@@ -2,7 +2,6 @@
 
 mod page;
 mod sent;
-mod short_table;
 mod trajectory;
 mod tunnel;
 
@@ -14,7 +13,6 @@ use crate::evaluate::report::{Comparisons, DriveErrors, Row};
 use serde::Serialize;
 
 pub use sent::write_log;
-pub use short_table::ShortTable;
 pub use trajectory::{Path, Trajectories};
 pub use tunnel::Tunnel;
 

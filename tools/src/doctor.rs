@@ -122,7 +122,8 @@ fn start(path: &Path, doctor: &Doctor, rows: &Rows) -> Result<Finding, DataError
             "it can start at {from} s: `gyronet import {name}.csv --from {from} --out {name}_from_{from}.csv`"
         ),
         None => {
-            "it succeeds in no standstill: record it again, and let it stand for the first 3 s".to_owned()
+            "it succeeds in no standstill: record it again, and let it stand for the first 3 s; `evaluate` simulates them where a \
+             course is known".to_owned()
         }
     };
     Ok(Finding::bad("start", format!("{reason}; {remedy}.")))

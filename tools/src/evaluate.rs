@@ -15,7 +15,7 @@ pub mod outage_path;
 pub mod outage_table;
 pub mod rates;
 pub mod report;
-mod rest;
+pub mod rest;
 pub mod trajectory_error;
 pub mod variant;
 pub mod vqf;

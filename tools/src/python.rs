@@ -14,7 +14,7 @@ pub enum PythonError {
     )]
     NoPython { source: std::io::Error },
     #[error(
-        "logs are read by Python 3.11 or later, and python3 is older: set GYRONET_PYTHON to a later one with tools/python/requirements.txt"
+        "logs are read by Python 3.11 or later, and python3 is older: set GYRONET_PYTHON to a later one with tools/requirements.txt"
     )]
     OldPython,
     #[error(
@@ -24,7 +24,7 @@ pub enum PythonError {
     #[error("{}: {source}", folder.display())]
     Folder { folder: PathBuf, source: std::io::Error },
     #[error(
-        "the Python packages that read logs could not be installed: {step}: {reason} (without a network: pip install -r tools/python/requirements.txt from a mirror, and GYRONET_PYTHON)"
+        "the Python packages that read logs could not be installed: {step}: {reason} (without a network: pip install -r tools/requirements.txt from a mirror, and GYRONET_PYTHON)"
     )]
     Install { step: &'static str, reason: String },
 }

@@ -266,6 +266,7 @@ impl Sequence {
                 wheels,
                 speed: None,
                 heading: None,
+                place: None,
             })
         });
         let path = self.path.display().to_string();

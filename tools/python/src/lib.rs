@@ -195,8 +195,8 @@ impl Coprocessor {
         };
         self.rows += 1;
         let wheels = wheels.unwrap_or([f64::NAN; WHEELS]).map(|rate| rate.is_finite().then_some(rate));
-        let row =
-            Row { line: number, sample, reference: None, course: None, wheels, speed: None, heading: None };
+        let [reference, course, speed] = [None; 3];
+        let row = Row { line: number, sample, reference, course, wheels, speed, heading: None, place: None };
         self.board.row(&row).map_err(|error| refused(format!("row {number}: {error}")))
     }
 

@@ -3,14 +3,15 @@
 use super::{Common, WriteError, paint, print_json, progress, read_drive, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
-use gyronet_tools::demo::{Demo, ShortTable, Tunnel, write_log};
+use gyronet_tools::demo::{Demo, Tunnel, write_log};
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::rates::Rates;
-use gyronet_tools::evaluate::report::EvaluateError;
+use gyronet_tools::evaluate::report::{EvaluateError, MARKS, Table};
+use gyronet_tools::evaluate::rest;
 use gyronet_tools::plot::page::grouped;
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Show all results of one drive: a table of errors, a page, a CAN log.
 ///
@@ -23,7 +24,7 @@ Examples:
   gyronet demo                                  # the simulated drive
   gyronet demo drive.csv --out report           # yours; see `gyronet --help` for its columns")]
 pub struct Args {
-    /// Recorded drive (CSV, 100 Hz); errors need its column ref_gyr_z or ref_yaw, and a path needs wheelN_rate.
+    /// Recorded drive (CSV, 100 Hz); errors need its column ref_gyr_z or ref_yaw, and a path needs wheelN_rate or gnss_speed.
     #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
     /// Folder for demo.html and can.log [default: target/demo].
@@ -55,11 +56,16 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         Err(error) => return Err(error),
     };
 
-    let folder = args.out.clone().unwrap_or_else(default_folder);
+    // What begins in motion has a simulated standstill before it, as in the errors.
+    let starts_moving = errors.as_ref().is_some_and(|errors| errors.simulated_rest);
+    let rested = if starts_moving { rest::before(&drive)? } else { None };
+    let drive = rested.as_ref().unwrap_or(&drive);
+
+    let folder = args.out.clone().unwrap_or_else(|| "target/demo".into());
     std::fs::create_dir_all(&folder).map_err(WriteError::to(&folder))?;
     let [log, page] = ["can.log", "demo.html"].map(|name| folder.join(name));
     let file = File::create(&log).map_err(WriteError::to(&log))?;
-    let frames = write_log(&drive, GyroNet::new(weights.blob()?), BufWriter::new(file))?;
+    let frames = write_log(drive, GyroNet::new(weights.blob()?), BufWriter::new(file))?;
     let simulated = args.file.is_none();
     let mut network = GyroNet::new(weights.blob()?);
     // The table above has no courses: a course is an input of ours, and the classical methods have none.
@@ -67,7 +73,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         Some(path) => Tunnel::new(&Drive::open_moving(path)?, &mut network)?,
         None => Tunnel::new(&Drive::from(&with_gnss), &mut network)?,
     };
-    let demo = Demo::new(&drive, simulated, &rates, errors.as_ref(), tunnel.as_ref(), frames);
+    let demo = Demo::new(drive, simulated, &rates, errors.as_ref(), tunnel.as_ref(), frames);
     std::fs::write(&page, demo.page()).map_err(WriteError::to(&page))?;
 
     let mut out = std::io::stdout().lock();
@@ -86,10 +92,14 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         )?;
         writeln!(out, "does, not what you gain. Your own drive: cargo demo DRIVE.csv\n")?;
     } else {
-        writeln!(out, "{}, {seconds:.0} s\n", drive.name())?;
+        let note = if starts_moving { "; starts in motion: 3 s at rest are simulated before it" } else { "" };
+        writeln!(out, "{}, {seconds:.0} s{note}\n", drive.name())?;
     }
     match &errors {
-        Some(errors) => writeln!(out, "{}", ShortTable(errors))?,
+        Some(errors) => {
+            let table = Table { rows: &errors.methods, few: true };
+            writeln!(out, "{}  {MARKS}\n", paint::report(&table.to_string()))?;
+        }
         None => writeln!(out, "No reference (ref_gyr_z or ref_yaw), so no errors.\n")?,
     }
     if let Some(tunnel) = &tunnel {
@@ -103,13 +113,4 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         log.display()
     )?;
     Ok(())
-}
-
-/// Returns `target/demo` of the workspace when cargo runs the command, else of the working directory.
-fn default_folder() -> PathBuf {
-    let workspace = std::env::var_os("CARGO_MANIFEST_DIR")
-        .and_then(|manifest| Some(Path::new(&manifest).parent()?.to_owned()));
-    // A short path where the user stands in the workspace.
-    let elsewhere = workspace.filter(|folder| std::env::current_dir().is_ok_and(|here| here != *folder));
-    elsewhere.unwrap_or_default().join("target/demo")
 }

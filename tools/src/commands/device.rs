@@ -341,7 +341,7 @@ fn update_firmware(
     let file = std::fs::read(path).map_err(super::WriteError::to(path))?;
     let mut file = Update::parse(&file).map_err(|error| format!("{}: {error}", path.display()))?;
     file.head.downgrade = downgrade;
-    let bar = super::progress::bar(common, 0, "update");
+    let bar = super::progress::bar(common, None, "update");
     let slot = update(device, &file, |sent, size| {
         bar.set_length(size as u64);
         bar.set_position(sent as u64);

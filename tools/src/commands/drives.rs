@@ -25,7 +25,8 @@ pub fn errors(
             Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|k| files.get(k).zip(results.get(k)))
         {
             let name = file.file_stem().unwrap_or_default().to_string_lossy();
-            let bar = bars.add(progress::bar(common, 0, &name));
+            let bar = bars.add(progress::bar(common, None, &name));
+            bar.tick();
             let judged = judge(file, &bar);
             bar.finish_and_clear();
             if judged.is_err() {

@@ -27,11 +27,11 @@ use std::path::{Path, PathBuf};
 /// prints the share of the good seconds whose error lies inside the expected error that is sent with the delayed rate,
 /// driving straight (and standing) and turning.
 ///
-/// One row for each method follows: the error over 1 s, 10 s, 60 s and the drive (rad; RMS and at the end), its ratio
-/// to that of static initialisation (1 s, or RMS against a course), the mean correction beyond static initialisation
-/// and zero-rate updates, multiplications per sample, and delay. The linear window (and GyroNet, with --all) is an
-/// estimate of all windows after static initialisation. The last two rows are the rates that the board sends: the live
-/// rate, with the sample (Bosch TX1, J1939 VDC2), and the delayed rate, some samples later in its own yaw messages.
+/// One row for each method follows: the error over 1 s, 60 s and the drive (RMS and at the end) in degrees, in JSON in
+/// rad. With --all come the error over 10 s, the ratio to static initialisation (1 s, or RMS against a course), the mean
+/// correction beyond static initialisation and zero-rate updates, multiplications per sample, and delay. The linear
+/// window is an estimate of all windows after static initialisation. The last two rows are the rates that the board
+/// sends: the live rate, with the sample (Bosch TX1, J1939 VDC2), and the delayed rate, in its own yaw messages.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -51,16 +51,19 @@ pub struct Args {
     /// and after 20 s. The drives have `course` and `gnss_speed`, or `gnss_lat` and `gnss_lon`, besides a reference; they
     /// may begin in motion.
     #[arg(long, value_name = "SECONDS", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=3600))]
-    #[arg(conflicts_with_all = ["lags", "all"])]
+    #[arg(conflicts_with_all = ["lags", "all", "gyronet"])]
     outage: Vec<u16>,
     /// With --outage, write pictures of the median and of the worst outage into this folder: median.svg, worst.svg.
     #[arg(long, value_name = "FOLDER", requires = "outage")]
     pictures: Option<PathBuf>,
-    /// Add rows for the paper's GyroNet, in f32 and in integers; they take twenty times as long as all others together.
+    /// Print every column: errors in 10 s, to static initialisation, corrections, multiplications, delay.
     #[arg(long, conflicts_with = "lags")]
     all: bool,
+    /// Add rows for the paper's GyroNet, in f32 and in integers; they take twenty times as long as all others together.
+    #[arg(long, conflicts_with = "lags")]
+    gyronet: bool,
     /// Checkpoint of the f32 network (safetensors) [default: the one that comes with the tools].
-    #[arg(long, value_name = "FILE", requires = "all")]
+    #[arg(long, value_name = "FILE", requires = "gyronet")]
     checkpoint: Option<PathBuf>,
     #[command(flatten)]
     unit: weights::Unit,
@@ -74,11 +77,12 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         return outages(args, common);
     }
     let checkpoint =
-        args.all.then(|| args.checkpoint.as_deref().map_or_else(bundled::checkpoint, Checkpoint::read));
+        args.gyronet.then(|| args.checkpoint.as_deref().map_or_else(bundled::checkpoint, Checkpoint::read));
     let checkpoint = checkpoint.transpose()?;
     let judge = |file: &Path, bar: &ProgressBar| {
         let drive = args.unit.drive(file, common)?;
         bar.set_length(drive.facts.rows as u64);
+        bar.reset();
         args.unit.sent.errors(&drive, checkpoint.as_ref(), |_| bar.inc(1))
     };
     let report = Report::new(drives::errors(&args.files, common, judge)?);
@@ -86,7 +90,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if common.json {
         return print_json(&mut out, &report);
     }
-    Ok(write!(out, "{}", paint::report(&report))?)
+    let text = if args.all { format!("{report:#}") } else { report.to_string() };
+    Ok(write!(out, "{}", paint::report(&text))?)
 }
 
 /// The outages of a drive, with its file.
@@ -199,13 +204,15 @@ fn lags(args: &Args, common: Common) -> super::Result {
 }
 
 fn print(out: &mut impl Write, scores: &[Score]) -> std::io::Result<()> {
-    writeln!(out, "  {:<22}{:>14}{:>14}{:>12}", "yaw error", "in 1 s, rad", "sample, rad/s", "final, rad")?;
+    writeln!(
+        out,
+        "  {:<22}{:>14}{:>15}{:>15}",
+        "yaw error", "in 1 s, deg", "sample, deg/s", "at the end, deg"
+    )?;
     for Score { name, error, rms_rad_per_s } in scores {
-        writeln!(
-            out,
-            "  {name:<22}{:>14.6}{rms_rad_per_s:>14.6}{:>12.6}",
-            error.mean_1s_rad, error.final_rad
-        )?;
+        let [in_1s, sample, end] =
+            [error.mean_1s_rad, *rms_rad_per_s, error.final_unwrapped_rad].map(f64::to_degrees);
+        writeln!(out, "  {name:<22}{in_1s:>14.4}{sample:>15.4}{end:>15.3}")?;
     }
     Ok(())
 }

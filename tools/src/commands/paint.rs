@@ -3,15 +3,15 @@
 use console::style;
 use gyronet_tools::demo::Tunnel;
 use gyronet_tools::evaluate::methods::Method;
-use gyronet_tools::evaluate::report::{COLUMNS, Report};
+use gyronet_tools::evaluate::report::TITLE;
 
-/// Returns a report with its headings and the delayed rate highlighted.
-pub fn report(report: &Report) -> String {
+/// Returns a printed report with its headings and the delayed rate highlighted.
+pub fn report(report: &str) -> String {
     let mut text = String::new();
-    for line in report.to_string().lines() {
+    for line in report.lines() {
         let line = if !line.starts_with(' ') {
             style(line).bold()
-        } else if line.trim_start().starts_with(COLUMNS[0]) {
+        } else if line.trim_start().starts_with(TITLE) {
             style(line).dim()
         } else if line.trim_start().starts_with(Method::DELAYED.name) {
             style(line).green().bold()

@@ -4,7 +4,7 @@ use super::trajectory::Trajectories;
 use super::{Demo, Tunnel};
 use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
-use crate::evaluate::report::{COLUMNS, columns};
+use crate::evaluate::report::{MARKS, columns};
 use crate::plot::page::chart::{Chart, Curve};
 use crate::plot::page::{HINT, document, escaped, grouped, table};
 use gyronet::sample::RATE_HZ;
@@ -53,9 +53,9 @@ fn facts(demo: &Demo<'_>) -> String {
             facts
                 .push(("error over that of the best classical method", format!("{:.2}", ours.default.ratio)));
         }
-        let mrad = |rad: f64| format!("{:.3} <small>mrad</small>", 1e3 * rad);
-        facts.extend(sent.mean_1s_rad.map(|rad| ("error in 1 s, delayed rate", mrad(rad))));
-        facts.extend(sent.rms_rad.map(|rad| ("its RMS over the drive", mrad(rad))));
+        let degrees = |rad: f64, decimals| format!("{:.decimals$}°", rad.to_degrees());
+        facts.extend(sent.mean_1s_rad.map(|rad| ("error in 1 s, delayed rate", degrees(rad, 4))));
+        facts.extend(sent.rms_rad.map(|rad| ("RMS over the drive, delayed rate", degrees(rad, 2))));
     }
     facts.push(("CAN messages", grouped(demo.frames)));
     let rows = facts.iter().map(|(name, figure)| format!("<div><dt>{name}</dt><dd>{figure}</dd></div>\n"));
@@ -65,39 +65,43 @@ fn facts(demo: &Demo<'_>) -> String {
 /// Returns the charts of the yaw and, with a reference, of each method's error.
 fn yaw(demo: &Demo<'_>) -> String {
     let rates = demo.rates;
-    let points = |values: Vec<f64>| rates.seconds.iter().copied().zip(values).collect::<Vec<(f64, f64)>>();
-    let truth = rates.reference.as_deref().map(integral);
+    // Where the value is known.
+    let points = |degrees: &mut dyn Iterator<Item = Option<f64>>| {
+        let times = rates.seconds.iter().copied();
+        times.zip(degrees).filter_map(|(time, value)| Some((time, value?.to_degrees()))).collect::<Vec<_>>()
+    };
+    let truth = rates.truth();
     let mut angles: Vec<Curve> = Vec::new();
     let mut errors: Vec<Curve> = Vec::new();
     for method in DRAWN {
         let yaw = integral(&rates.rates[method]);
         // A method that keeps its bias may leave the errors' scale.
         let in_scale = method != Method::RAW;
-        let curve = |note, values, in_scale| Curve {
+        let curve = |note, points, in_scale| Curve {
             class: method.key,
             label: method.name.into(),
             note,
-            points: points(values),
+            points,
             in_scale,
         };
         if let Some(truth) = &truth {
-            let off: Vec<f64> = yaw.iter().zip(truth).map(|(yaw, truth)| 1e3 * (yaw - truth)).collect();
-            let note = format!("ends {:+.1} mrad off", off.last().copied().unwrap_or(0.0));
+            let off = points(&mut yaw.iter().zip(truth).map(|(yaw, truth)| Some(yaw - (*truth)?)));
+            let note = format!("ends {:+.2}° off", off.last().map_or(0.0, |(_, degrees)| *degrees));
             errors.push(curve(note, off, in_scale));
         }
-        angles.push(curve(String::new(), yaw.iter().map(|rad| rad.to_degrees()).collect(), true));
+        angles.push(curve(String::new(), points(&mut yaw.into_iter().map(Some)), true));
     }
     if let Some(truth) = &truth {
-        let degrees = truth.iter().map(|rad| rad.to_degrees()).collect();
-        let (label, note) = (REFERENCE.into(), String::new());
-        angles.push(Curve { class: REFERENCE, label, note, points: points(degrees), in_scale: true });
+        let label = if rates.by_course() { "course by GNSS" } else { REFERENCE }.into();
+        let points = points(&mut truth.iter().copied());
+        angles.push(Curve { class: REFERENCE, label, note: String::new(), points, in_scale: true });
     }
     let mut html =
         Chart { title: "Angle", axes: "deg, over time in s", same_scale: false, curves: angles }.html();
     if truth.is_some() {
         html += &Chart {
             title: "Error against the reference",
-            axes: "mrad, over time in s",
+            axes: "deg, over time in s",
             same_scale: false,
             curves: errors,
         }
@@ -107,9 +111,12 @@ fn yaw(demo: &Demo<'_>) -> String {
         &format!("<p class=\"note\">{HINT} Time begins at the end of static initialisation (3 s at rest).");
     html += match truth {
         Some(_) => {
-            " The scale of the errors fits the corrected methods; a method that keeps its bias leaves the chart.</p>\n"
+            " The scale of the errors fits the corrected methods; a method that keeps its bias leaves the chart. A course \
+             scatters by degrees from one second to the next, and is laid onto the delayed rate's first 20 s with it.</p>\n"
         }
-        None => " The drive has no reference yaw rate (<code>ref_gyr_z</code>), so no error is drawn.</p>\n",
+        None => {
+            " The drive has no reference (<code>ref_gyr_z</code> or <code>ref_yaw</code>), so no error is drawn.</p>\n"
+        }
     };
     html
 }
@@ -130,10 +137,14 @@ fn paths(trajectories: &Trajectories, radius: f64) -> String {
     curves.sort_by_key(|curve| (curve.in_scale, curve.class != REFERENCE));
     let chart =
         Chart { title: "Seen from above", axes: "m, from where it started", same_scale: true, curves }.html();
-    let of_wheels = if *wheels == 1 { "one wheel".into() } else { format!("the mean of {wheels} wheels") };
+    let speed = match wheels {
+        0 => "speed by GNSS".to_owned(),
+        1 => format!("speed of one wheel (radius {radius} m)"),
+        _ => format!("speed of the mean of {wheels} wheels (radius {radius} m)"),
+    };
     format!(
         "{chart}<p class=\"note\">Dead reckoning over {metres:.0} m: each method's yaw rate and the recorded \
-         speed of {of_wheels} (radius {radius} m). The reference path uses the reference's yaw rate and the same speed.</p>\n"
+         {speed}. The reference's path has its heading and the same speed; a GNSS receiver's positions are laid onto it.</p>\n"
     )
 }
 
@@ -142,15 +153,14 @@ fn methods(demo: &Demo<'_>) -> String {
         return "<p>The drive has no reference, so there are no errors.</p>\n".into();
     };
     let ours = errors.over_best_classical.map(|ours| format!("<p>Delayed rate: {ours}.</p>\n"));
-    let rows = columns(&errors.methods).map(|(_, columns)| columns.to_vec());
+    let (headings, rows) = columns(&errors.methods, false);
     format!(
-        "{}{}<p class=\"note\">Heading error over {:.1} s against <code>{}</code>: mean over windows of 1, 10 and 60 s, RMS \
-         and value at the end. To static: the error in 1 s (the RMS where the reference is a course) over that of static \
-         initialisation. Mean: the mean correction beyond static initialisation and zero-rate updates. The linear \
+        "{}{}<p class=\"note\">Heading error over {:.1} s against <code>{}</code>: mean over windows of 1 and 60 s, RMS \
+         and value at the end; {MARKS}. <code>gyronet evaluate --all</code> prints more columns. The linear \
          window is a complete estimate after static initialisation. The last two rows are the rates that the board \
          sends: with the sample (Bosch TX1, VDC2), and in its own messages some samples later.</p>\n",
         ours.unwrap_or_default(),
-        table("methods", "", &COLUMNS, rows),
+        table("methods", &headings, rows),
         errors.seconds,
         errors.reference
     )

@@ -4,8 +4,9 @@ use crate::drive::DT;
 use crate::drive::stream::Drive;
 use crate::drive::track::Track;
 use crate::evaluate::methods::Method;
+use crate::evaluate::metrics::integral;
 use crate::evaluate::rates::Rates;
-use crate::evaluate::trajectory_error::{Point, TrajectoryError};
+use crate::evaluate::trajectory_error::{Alignment, Point, TrajectoryError};
 use serde::Serialize;
 
 /// The paths of these methods are drawn.
@@ -31,37 +32,56 @@ fn key<S: serde::Serializer>(method: &Option<Method>, serializer: S) -> Result<S
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectories {
-    /// The paths, the reference's first if there is one.
+    /// The paths, the reference's first if there is one; the GNSS receiver's last.
     pub paths: Vec<Path>,
-    /// The number of wheels that the speed is the mean of.
+    /// The number of wheels that the speed is the mean of; 0 by GNSS.
     pub wheels: usize,
     pub metres: f64,
 }
 
 impl Trajectories {
-    /// Computes the paths; `None` for a drive without wheels.
+    /// Computes the paths; `None` for a drive without speeds.
     pub fn new(drive: &Drive<'_>, rates: &Rates) -> Option<Self> {
-        let ways: Vec<f64> = rates.speeds.as_ref()?.iter().map(|speed| speed * DT).collect();
-        let wheels = drive.speeds()?.wheels();
-        let path = |rates: &[f64]| {
+        let ways: Vec<f64> = rates.speeds()?.iter().map(|speed| speed * DT).collect();
+        let wheels = drive.speeds().map_or(0, |speeds| speeds.wheels());
+        let path = |angles: &[f64]| {
             let mut track = Track::default();
-            let step = |(way, rate): (&f64, &f64)| {
-                track.step([*way; 2], rate * DT);
+            let step = |(way, angle): (&f64, &f64)| {
+                track.step([*way; 2], angle - track.yaw);
                 track.position
             };
-            ways.iter().zip(rates).map(step).collect::<Vec<Point>>()
+            ways.iter().zip(angles).map(step).collect::<Vec<Point>>()
         };
-        let truth = rates.reference.as_deref().map(path);
+        // Between two courses the delayed rate's heading goes on.
+        let mut off = 0.0;
+        let yaw = integral(&rates.rates[Method::DELAYED]);
+        let truth = rates.truth().map(|truth| {
+            let known = |(yaw, truth): (&f64, Option<f64>)| {
+                off = truth.map_or(off, |truth| yaw - truth);
+                yaw - off
+            };
+            path(&yaw.iter().zip(truth).map(known).collect::<Vec<f64>>())
+        });
         let mut paths = Vec::new();
         for method in METHODS {
-            let points = path(&rates.rates[method]);
+            let points = path(&integral(&rates.rates[method]));
             let error = truth.as_ref().and_then(|truth| TrajectoryError::new(&points, truth));
             paths.push(Path { method: Some(method), error_m: error.map(|error| error.rmse_m), points });
         }
         paths.splice(0..0, truth.map(|points| Path { method: None, points, error_m: None }));
+        paths.extend(received(rates, &paths.first()?.points));
         lay_across(&mut paths);
         Some(Self { paths, wheels, metres: ways.iter().map(|way| way.abs()).sum() })
     }
+}
+
+/// The positions of the GNSS receiver, laid onto a path.
+fn received(rates: &Rates, onto: &[Point]) -> Option<Path> {
+    let places: Vec<Point> = rates.places.iter().map(|(_, place)| *place).collect();
+    let there: Vec<Point> = rates.places.iter().map(|(sample, _)| onto[*sample]).collect();
+    let laid = Alignment::new(&places, &there)?;
+    let points = places.into_iter().map(|place| laid.apply(place)).collect();
+    Some(Path { method: Some(Method::GNSS), points, error_m: None })
 }
 
 /// Turns all paths by the same right angles, so that the farthest point of the first one lies to the right.

@@ -60,11 +60,7 @@ impl fmt::Display for Tunnel {
         for method in ROWS {
             let Some(Figures { heading_deg, position_m, .. }) = self.row(method) else { continue };
             let two = |spread: &Spread| format!("{:.2}{:>8.2}", spread.median, spread.worst);
-            let name = match method {
-                Method::DELAYED => "gyronet",
-                Method::NO_MODEL => "gyronet without its model",
-                method => method.name,
-            };
+            let name = if method == Method::DELAYED { "gyronet" } else { method.name };
             let position = position_m.as_ref().map_or_else(|| "-".to_owned(), two);
             writeln!(f, "  {name:<45}{:>15}{position:>16}", two(heading_deg))?;
         }

@@ -24,6 +24,7 @@ mod reader;
 mod resampled;
 mod survey;
 
+pub use position::between;
 pub use reader::Reader;
 pub use resampled::resampled;
 pub use survey::{Facts, Survey};
@@ -54,6 +55,8 @@ pub struct Row {
     pub speed: Option<f64>,
     /// Course over ground by GNSS that arrives with the sample.
     pub heading: Option<Heading>,
+    /// Latitude and longitude by GNSS, degrees.
+    pub place: Option<[f64; 2]>,
 }
 
 /// A complete drive in memory; [`super::stream::Drive`] is for drives of any length.

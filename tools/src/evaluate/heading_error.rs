@@ -20,7 +20,7 @@ pub const BLOCK_S: usize = 10;
 /// Fewest values of the course for a median.
 const BLOCK_VALUES: usize = 3;
 /// Samples of known course over whose median both headings are aligned: 20 s.
-const ALIGNED: usize = 20 * SECOND;
+pub(super) const ALIGNED: usize = 20 * SECOND;
 /// Largest [`Errors::typical_10s`] that a bias can explain, rad.
 pub const PLAUSIBLE_10S_RAD: f64 = 0.5;
 /// Lengths of the windows over which the heading change is judged, s.
@@ -45,7 +45,7 @@ pub struct HeadingError {
     pub mean_60s_rad: Option<f64>,
     /// RMS of the error over the drive.
     pub rms_rad: Option<f64>,
-    /// The absolute error at the end, wrapped to at most pi.
+    /// The absolute error at the end; a whole turn counts.
     pub final_rad: Option<f64>,
 }
 
@@ -91,7 +91,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     mean.get()
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
 }
@@ -177,7 +177,7 @@ impl Changes {
             mean_10s_rad: next(),
             mean_60s_rad: next(),
             rms_rad: self.squares.get().map(f64::sqrt),
-            final_rad: Some(wrap(last).abs()),
+            final_rad: Some(last.abs()),
         };
         Errors { figures, typical_10s: self.typical.median() }
     }
@@ -228,6 +228,11 @@ pub struct OffCourse {
 }
 
 impl OffCourse {
+    /// The integral of the rate.
+    pub fn yaw(&self) -> f64 {
+        self.yaw
+    }
+
     /// Adds a sample; returns the difference if the course is known.
     pub fn add(&mut self, rate: f64, course: Option<f64>) -> Option<f64> {
         self.yaw += rate * DT;

@@ -37,6 +37,8 @@ impl Method {
         Self { key: name, name, gyro: Gyro::Given }
     }
 
+    /// The positions of a GNSS receiver: a path, no rate.
+    pub const GNSS: Self = Self { key: "gnss", name: "GNSS receiver", gyro: Gyro::Given };
     /// The inertial sensor's gyro without any correction.
     pub const RAW: Self = mems("raw", "raw gyro");
     /// The gyro less its mean over the first 3 s.
@@ -55,13 +57,13 @@ impl Method {
     /// The same as [`Method::LINEAR`] with the paper's GyroNet in integers.
     pub const GYRONET_INT: Self = mems("gyronet_int", "GyroNet, integer");
     /// The live rate, which the board sends at once: Bosch TX1, VDC2.
-    pub const LIVE: Self = mems("live", "live rate");
+    pub const LIVE: Self = mems("live", "gyronet, live rate");
     /// The delayed rate, which the board sends in its own yaw messages, some samples later.
-    pub const DELAYED: Self = mems("default", "delayed rate");
+    pub const DELAYED: Self = mems("default", "gyronet, delayed rate");
     /// A filter of heading, bias and gain by courses, as a user of a GNSS receiver would write it.
     pub const EKF: Self = mems("ekf", "EKF with the course");
     /// The delayed rate without a network, learnt from courses.
-    pub const NO_MODEL: Self = mems("no_model", "delayed rate, no model");
+    pub const NO_MODEL: Self = mems("no_model", "gyronet without its model");
     /// The orientation filter VQF ([`crate::evaluate::vqf`]). On a drive it starts from static initialisation; in the
     /// paper's tables it replaces the vendor's filter and estimates the bias itself.
     pub const VQF: Self = mems("vqf", "VQF filter");

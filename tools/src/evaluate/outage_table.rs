@@ -28,11 +28,9 @@ impl Spread {
 pub struct Figures {
     pub starts: usize,
     pub heading_deg: Spread,
-    /// What the heading moves the end of the path by wheels, m and % of the distance; absent without wheels.
+    /// What the heading moves the end of the path by wheels, m; absent without wheels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_m: Option<Spread>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub position_percent: Option<Spread>,
 }
 
 /// By length of the outage, s, and by method.
@@ -59,18 +57,13 @@ impl Outages {
                 let chosen =
                     outages.clone().filter(|one| one.seconds == *length && one.driven_s >= after as f64);
                 for (k, method) in METHODS.iter().enumerate() {
-                    let moved = || chosen.clone().filter_map(|one| one.position);
+                    let moved = chosen.clone().filter_map(|one| one.position);
                     let heading_deg = Spread::of(chosen.clone().map(|one| one.heading[k].to_degrees()));
                     methods.extend(heading_deg.map(|heading_deg| {
                         let figures = Figures {
                             starts: chosen.clone().count(),
                             heading_deg,
-                            position_m: Spread::of(moved().map(|(_, ends)| ends[k])),
-                            position_percent: Spread::of(
-                                moved()
-                                    .filter(|(distance, _)| *distance > 50.0)
-                                    .map(|(distance, ends)| 100.0 * ends[k] / distance),
-                            ),
+                            position_m: Spread::of(moved.map(|(_, ends)| ends[k])),
                         };
                         (method.key, figures)
                     }));
@@ -92,26 +85,16 @@ impl fmt::Display for Outages {
                     "{}, {} drives: {length} s without GNSS after {after} s with it, {starts} starts",
                     self.set, self.drives
                 )?;
-                writeln!(
-                    f,
-                    "  {:<26}{:>27}{:>27}{:>24}",
-                    "median, 90 %, worst", "heading, deg", "position, m", "position, %"
-                )?;
+                writeln!(f, "  {:<26}{:>25}{:>25}", "median, 90 %, worst", "heading, deg", "position, m")?;
                 for method in METHODS {
                     let Some(figures) = methods.get(method.key) else { continue };
-                    let three = |spread: Option<Spread>, width: usize| {
-                        spread.map_or_else(String::new, |Spread { median, p90, worst }| {
-                            format!("{median:>width$.2}{p90:>width$.2}{worst:>width$.2}")
-                        })
-                    };
-                    writeln!(
-                        f,
-                        "  {:<26}{}{:>27}{:>24}",
-                        method.name,
-                        three(Some(figures.heading_deg), 9),
-                        three(figures.position_m, 9),
-                        three(figures.position_percent, 8)
-                    )?;
+                    write!(f, "  {:<26}", method.name)?;
+                    for Spread { median, p90, worst } in
+                        [Some(figures.heading_deg), figures.position_m].into_iter().flatten()
+                    {
+                        write!(f, "{median:>9.2}{p90:>8.2}{worst:>8.2}")?;
+                    }
+                    writeln!(f)?;
                 }
             }
         }

@@ -6,12 +6,16 @@
 //! in motion is read once more before that, for the best constant bias (`rest`).
 
 use crate::board::{Board, Step, Uncorrected};
+use crate::drive::recording::between;
 use crate::drive::replay::{ReplayError, initialise};
 use crate::drive::stream::Drive;
 use crate::drive::wheel_frames::Speeds;
 use crate::evaluate::cost::{Cost, Shapes};
 use crate::evaluate::fir::{Line, LowPass};
-use crate::evaluate::methods::PerMethod;
+use crate::evaluate::heading_error::{ALIGNED, OffCourse, median};
+use crate::evaluate::methods::{Method, PerMethod};
+use crate::evaluate::metrics::integral;
+use crate::evaluate::trajectory_error::Point;
 use crate::evaluate::{rest, vqf};
 use gyronet::can;
 use gyronet::compensate::{CompensateConfig, Lag};
@@ -212,7 +216,7 @@ impl SideBySide {
     }
 }
 
-/// The rates of the compared samples of a drive in memory, for its curves.
+/// The rates of the compared samples of a drive in memory, for its curves, with what its references say.
 #[derive(Debug, Clone)]
 pub struct Rates {
     /// Time of each sample since the first sample of the recording, s.
@@ -220,34 +224,55 @@ pub struct Rates {
     /// The rates by each method, rad/s.
     pub rates: PerMethod<Vec<f64>>,
     /// The true yaw rate of each sample, rad/s; `None` if one has none.
-    pub reference: Option<Vec<f64>>,
-    /// The speed of the vehicle at each sample, m/s; `None` without wheels.
-    pub speeds: Option<Vec<f64>>,
+    reference: Option<Vec<f64>>,
+    /// The course at each sample, unwrapped, from any zero direction, rad.
+    courses: Vec<Option<f64>>,
+    /// The speed of the vehicle at each sample, m/s, by its wheels, else by GNSS.
+    speeds: Vec<f64>,
+    /// New positions by GNSS: the number of the sample, and the place east and north of the first one, m.
+    pub places: Vec<(usize, Point)>,
     first: Micros,
     wheels: Option<Speeds>,
+    speed: Option<f64>,
+    off_course: OffCourse,
+    place: Option<[[f64; 2]; 2]>,
 }
 
 impl Rates {
     pub fn of(drive: &Drive<'_>) -> Self {
-        let wheels = drive.speeds();
         Self {
             seconds: Vec::new(),
             rates: PerMethod::new(|_| None),
             reference: Some(Vec::new()),
-            speeds: wheels.as_ref().map(|_| Vec::new()),
+            courses: Vec::new(),
+            speeds: Vec::new(),
+            places: Vec::new(),
             first: drive.facts.first,
-            wheels,
+            wheels: drive.speeds(),
+            speed: None,
+            off_course: OffCourse::default(),
+            place: None,
         }
     }
 
     pub fn add(&mut self, Sample { step, rates }: &Sample) {
-        let speed = self.wheels.as_mut().map(|wheels| wheels.next(&step.input));
+        let row = &step.input;
+        let by_wheels = self.wheels.as_mut().map(|wheels| wheels.next(row));
+        self.speed = by_wheels.or(row.speed).or(self.speed);
         if !step.is_compared {
             return;
         }
+        if let Some(place) = row.place.filter(|place| self.place.is_none_or(|[_, last]| last != *place)) {
+            let [first, _] = self.place.unwrap_or([place; 2]);
+            self.place = Some([first, place]);
+            self.places.push((self.seconds.len(), between(first, place)));
+        }
         self.seconds.push((step.time.0 - self.first.0) as f64 * 1e-6);
-        self.speeds.iter_mut().zip(speed).for_each(|(speeds, speed)| speeds.push(speed));
-        match (&mut self.reference, step.input.reference) {
+        self.speeds.push(self.speed.unwrap_or(0.0));
+        let [.., gyro] = row.sample.angular_rate;
+        let off = self.off_course.add(gyro.rad_per_sec(), row.course);
+        self.courses.push(off.map(|off| self.off_course.yaw() - off));
+        match (&mut self.reference, row.reference) {
             (Some(reference), Some(rate)) => reference.push(rate),
             (reference, _) => *reference = None,
         }
@@ -256,5 +281,28 @@ impl Rates {
                 all.get_or_insert_default().push(*rate);
             }
         }
+    }
+
+    /// The heading by each reference after each sample, rad, where it is known; `None` without a reference. The course
+    /// is laid onto the delayed rate's heading of its first 20 s.
+    pub fn truth(&self) -> Option<Vec<Option<f64>>> {
+        if let Some(rates) = &self.reference {
+            return Some(integral(rates).into_iter().map(Some).collect());
+        }
+        let first = self.courses.iter().position(Option::is_some)?;
+        let yaw = integral(&self.rates[Method::DELAYED]);
+        let both = yaw.iter().zip(&self.courses).skip(first).take(ALIGNED);
+        let off = median(both.filter_map(|(yaw, course)| Some(yaw - (*course)?)).collect())?;
+        Some(self.courses.iter().map(|course| Some((*course)? + off)).collect())
+    }
+
+    /// True if the reference is a course.
+    pub fn by_course(&self) -> bool {
+        self.reference.is_none()
+    }
+
+    /// The speeds; `None` where nothing measures them.
+    pub fn speeds(&self) -> Option<&[f64]> {
+        self.speed.map(|_| self.speeds.as_slice())
     }
 }

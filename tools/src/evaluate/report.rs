@@ -58,44 +58,59 @@ pub struct Row {
     pub cost: Cost,
 }
 
-pub const COLUMNS: [&str; 10] = [
-    "heading error, rad",
-    "in 1 s",
-    "in 10 s",
-    "in 60 s",
-    "rms",
-    "final",
-    "to static",
-    "mean, deg/h",
-    "mult./sample",
-    "delay, ms",
+/// What the table shows.
+pub const TITLE: &str = "heading error, deg";
+/// The columns after the methods' names. People see the first [`SHORT`] ones.
+const COLUMNS: [(&str, usize); 9] = [
+    ("in 1 s", 12),
+    ("in 60 s", 12),
+    ("RMS", 12),
+    ("at the end", 12),
+    ("in 10 s", 10),
+    ("to static", 11),
+    ("mean, deg/h", 13),
+    ("mult./sample", 14),
+    ("delay, ms", 11),
 ];
+const SHORT: usize = 4;
+/// A method has failed whose error is so many times that of static initialisation.
+const FAILED: f64 = 10.0;
+pub const MARKS: &str =
+    "* best classical method of its column; ? failed: ten times static initialisation's error";
 
-/// Returns the table of a drive or of a mean: the name of each method and its figures, a dash for a missing figure.
-pub fn columns(rows: &PerMethod<Row>) -> impl Iterator<Item = (Method, [String; 10])> {
-    let still = rows[Method::STATIC].error.compared();
-    rows.each().map(move |(method, row)| {
-        let figure = |figure: Option<f64>, decimals| {
-            figure.map_or_else(|| "-".to_owned(), |figure| format!("{figure:.decimals$}"))
-        };
+/// Returns the headings of the table, and the name and figures of each method: the columns for people, or all. A dash
+/// is a missing figure; [`MARKS`] explains the marks.
+pub fn columns(rows: &PerMethod<Row>, all: bool) -> (Vec<&'static str>, Vec<Vec<String>>) {
+    let errors = |row: &Row| {
         let HeadingError { mean_1s_rad, mean_10s_rad, mean_60s_rad, rms_rad, final_rad } = row.error;
-        let to_static = row.error.compared().zip(still).map(|(own, still)| own / still);
-        let [in_1s, in_10s, in_60s, rms, end] =
-            [mean_1s_rad, mean_10s_rad, mean_60s_rad, rms_rad, final_rad].map(|error| figure(error, 6));
-        let columns = [
-            method.name.to_owned(),
-            in_1s,
-            in_10s,
-            in_60s,
-            rms,
-            end,
-            figure(to_static, 3),
-            format!("{:+.1}", row.mean_correction_deg_h),
-            format!("{:.0}", row.cost.multiplications_per_sample),
-            row.cost.delay_ms.to_string(),
-        ];
-        (method, columns)
-    })
+        [mean_1s_rad, mean_60s_rad, rms_rad, final_rad, mean_10s_rad]
+    };
+    let still = &rows[Method::STATIC];
+    let best: [Option<f64>; 5] = std::array::from_fn(|column| {
+        let errors = Method::CLASSICAL.into_iter().filter_map(|method| errors(&rows[method])[column]);
+        errors.min_by(f64::total_cmp)
+    });
+    let figures = rows.each().map(|(method, row)| {
+        let has_failed =
+            method != Method::RAW && row.error.rms_rad > still.error.rms_rad.map(|rms| FAILED * rms);
+        let mut figures = vec![method.name.to_owned()];
+        for ((error, best), decimals) in errors(row).into_iter().zip(best).zip([4, 3, 3, 3, 3]) {
+            let is_best = error == best && Method::CLASSICAL.contains(&method);
+            let mark = [" ", "*", "?"][if has_failed { 2 } else { usize::from(is_best) }];
+            let figure = error.map(|rad| format!("{:.decimals$}{mark}", rad.to_degrees()));
+            figures.push(figure.unwrap_or_else(|| "- ".to_owned()));
+        }
+        let to_static = row.error.compared().zip(still.error.compared()).map(|(own, still)| own / still);
+        figures.push(to_static.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.3}")));
+        figures.push(format!("{:+.1}", row.mean_correction_deg_h));
+        figures.push(format!("{:.0}", row.cost.multiplications_per_sample));
+        figures.push(row.cost.delay_ms.to_string());
+        figures.truncate(1 + if all { COLUMNS.len() } else { SHORT });
+        figures
+    });
+    let figures: Vec<_> = figures.collect();
+    let shown = figures.first().map_or(0, Vec::len);
+    (std::iter::once(TITLE).chain(COLUMNS.map(|(name, _)| name)).take(shown).collect(), figures)
 }
 
 /// Comparison of one of our rates with the best classical method that has the same inputs and no more delay.
@@ -305,6 +320,7 @@ impl Report {
     }
 }
 
+/// The alternate form has all columns.
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for drive in &self.drives {
@@ -329,7 +345,7 @@ impl fmt::Display for Report {
                 table(f, *over_best_classical, methods)?;
             }
         }
-        Ok(())
+        writeln!(f, "{MARKS}")
     }
 }
 
@@ -337,17 +353,34 @@ fn table(f: &mut fmt::Formatter<'_>, ours: Option<Comparisons>, rows: &PerMethod
     if let Some(ours) = ours {
         writeln!(f, "  delayed rate: {ours}")?;
     }
-    let mut line = |columns: [&str; 10]| {
-        write!(f, "  {:<26}", columns[0])?;
-        columns[1..7].iter().try_for_each(|column| write!(f, "{column:>10}"))?;
-        columns[7..].iter().try_for_each(|column| write!(f, "{column:>14}"))?;
-        writeln!(f)
-    };
-    line(COLUMNS)?;
-    for (_, row) in columns(rows) {
-        line(row.each_ref().map(String::as_str))?;
-    }
+    fmt::Display::fmt(&Table { rows, few: false }, f)?;
     writeln!(f)
+}
+
+/// The table of a drive or of a mean; the alternate form has all columns.
+pub struct Table<'a> {
+    pub rows: &'a PerMethod<Row>,
+    /// Only the gyro alone, static initialisation, the best classical methods, and the rates that are sent.
+    pub few: bool,
+}
+
+impl fmt::Display for Table<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (headings, mut rows) = columns(self.rows, f.alternate());
+        let always = [Method::RAW, Method::STATIC, Method::LIVE, Method::DELAYED].map(|method| method.name);
+        let is_best = |row: &[String]| row.iter().any(|figure| figure.ends_with('*'));
+        rows.retain(|row| !self.few || is_best(row) || always.contains(&row[0].as_str()));
+        rows.insert(0, headings.into_iter().map(String::from).collect());
+        for row in rows {
+            let mut line = format!("  {:<26}", row[0]);
+            row[1..]
+                .iter()
+                .zip(COLUMNS)
+                .for_each(|(figure, (_, width))| line += &format!("{figure:>width$}"));
+            writeln!(f, "{}", line.trim_end())?;
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -435,15 +468,22 @@ mod tests {
     }
 
     #[test]
-    fn table_is_aligned_and_the_ratio_comes_first() {
+    fn tables_are_aligned_and_80_wide_and_the_ratio_comes_first() {
         let text = report().to_string();
         let lines: Vec<&str> = text.lines().collect();
         assert!(lines[1].contains("0.80 of the best classical method (fir_zero_rate)"), "{text}");
-        let rows = lines.iter().filter(|line| line.starts_with("  ") && !line.contains("classical"));
-        let widths: Vec<usize> = rows.map(|line| line.len()).collect();
+        let rows = |text: &str| {
+            let rows = text.lines().filter(|line| line.starts_with("  ") && !line.contains("classical"));
+            rows.map(str::len).collect::<Vec<_>>()
+        };
+        let widths = rows(&text);
         // The table has three drives and one mean of two.
         assert_eq!(widths.len(), 4 * (1 + Method::ON_A_DRIVE.len()));
-        assert!(widths.iter().all(|width| *width == widths[0]), "{text}");
+        assert!(widths.iter().all(|width| (75..=76).contains(width)), "{text}");
+        let all = format!("{:#}", report());
+        assert!(rows(&all).iter().all(|width| *width == rows(&all)[0]) && all.contains("delay, ms"), "{all}");
+        let fir = lines.iter().find(|line| line.contains(Method::FIR_ZERO_RATE.name)).unwrap();
+        assert_eq!(fir.matches('*').count(), SHORT, "best in each column: {fir}");
         assert!(text.contains("mean of 2 drives of a") && !text.contains("mean of 1"), "{text}");
     }
 }

@@ -48,5 +48,5 @@ fn at_rest(first: &Row, k: u32, force: [f64; 3], bias: [f64; 3]) -> Option<Row> 
         angular_rate: [wx?, wy?, wz?],
         ..first.sample
     };
-    Some(Row { sample, reference: None, course: None, heading: None, ..*first })
+    Some(Row { sample, reference: None, course: None, heading: None, place: None, ..*first })
 }

@@ -3,11 +3,10 @@
 
 pub mod chart;
 
-use std::fmt::{Display, Write};
-
 const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/zoom.js");
-pub const HINT: &str = "Drag over a chart, or press + and - on it, to zoom; tap a name to hide its curve.";
+pub const HINT: &str =
+    "Point at a chart to read it; drag over it, or press + and -, to zoom; tap a name to hide its curve.";
 
 pub fn document(title: &str, body: &str) -> String {
     format!(
@@ -19,31 +18,18 @@ pub fn document(title: &str, body: &str) -> String {
     )
 }
 
-/// Returns a table; an empty caption is left out. The first column is text, the others are figures.
-pub fn table<C: Display>(
-    class: &str,
-    caption: &str,
-    header: &[&str],
-    rows: impl IntoIterator<Item = Vec<C>>,
-) -> String {
-    let mut html = format!("<div class=\"scroll\"><table class=\"{class}\">");
-    if !caption.is_empty() {
-        html += &format!("<caption>{}</caption>", escaped(caption));
-    }
-    html += "<thead><tr>";
-    for column in header {
-        html += &format!("<th>{}</th>", escaped(column));
-    }
-    html += "</tr></thead>\n<tbody>\n";
-    for row in rows {
-        html += "<tr>";
-        for cell in row {
-            // Writing to a string does not fail.
-            let _ = write!(html, "<td>{}</td>", escaped(&cell.to_string()));
-        }
-        html += "</tr>\n";
-    }
-    html + "</tbody></table></div>\n"
+/// Returns a table. The first column is text, the others are figures.
+pub fn table(class: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let row = |kind: &str, cells: &mut dyn Iterator<Item = &str>| {
+        let cells = cells.map(|cell| format!("<{kind}>{}</{kind}>", escaped(cell)));
+        format!("<tr>{}</tr>\n", cells.collect::<String>())
+    };
+    let body = rows.into_iter().map(|cells| row("td", &mut cells.iter().map(String::as_str)));
+    format!(
+        "<div class=\"scroll\"><table class=\"{class}\"><thead>{}</thead>\n<tbody>\n{}</tbody></table></div>\n",
+        row("th", &mut header.iter().copied()),
+        body.collect::<String>()
+    )
 }
 
 /// Returns text with the special characters of HTML escaped.
@@ -70,7 +56,7 @@ mod tests {
 
     #[test]
     fn a_name_cannot_become_markup() {
-        let page = document("<b>", &table("t", "", &["a&b"], [vec!["<script>"]]));
+        let page = document("<b>", &table("t", &["a&b"], [vec!["<script>".into()]]));
         assert!(page.contains("<title>&lt;b&gt;</title>") && page.contains("a&amp;b"));
         assert_eq!(page.matches("<script>").count(), 1, "our own");
     }

@@ -10,7 +10,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const REQUIREMENTS: &str = include_str!("../../python/requirements.txt");
+const REQUIREMENTS: &str = include_str!("../../requirements.txt");
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// The file of an environment that holds its requirements; written last.
 const STAMP: &str = "made-of.txt";
@@ -130,7 +130,8 @@ fn install(environment: &Path, python: &Path) -> Result<(), PythonError> {
 mod tests {
     #[test]
     fn the_package_has_the_version_of_the_command() {
-        let project = include_str!("../../python/pyproject.toml");
+        let project = concat!(env!("CARGO_MANIFEST_DIR"), "/python/pyproject.toml");
+        let project = std::fs::read_to_string(project).unwrap();
         assert!(project.contains(&format!("\nversion = \"{}\"\n", super::VERSION)), "{project}");
     }
 }

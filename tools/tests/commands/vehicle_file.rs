@@ -71,7 +71,7 @@ fn imports() -> bool {
     let found = std::env::var_os("GYRONET_PYTHON")
         .is_some_and(|python| Command::new(python).args(["-c", program]).status().is_ok_and(|s| s.success()));
     let required = std::env::var("GYRONET_REQUIRE").is_ok_and(|required| required.contains("python"));
-    assert!(found || !required, "GYRONET_PYTHON has not the packages of tools/python/requirements.txt");
+    assert!(found || !required, "GYRONET_PYTHON has not the packages of tools/requirements.txt");
     if !found {
         // Not `eprintln!`: the test harness would keep it to itself.
         std::io::stderr().write_all(b"SKIPPED: GYRONET_PYTHON names no Python that reads logs\n").unwrap();

@@ -19,7 +19,7 @@ SHORTEST, LONGEST = 3.0, 86_400.0
 RATES = (24.5, 1_020.0)
 CHUNK = 50_000  # rows in memory
 DAY = 1e9  # s: later stamps are times of day
-NAMES = ["t_s", *select.IMU_COLUMNS, "ref_gyr_z", "ref_yaw", "ref_yaw_sigma", "gnss_speed", *select.COLUMNS]
+NAMES = ["t_s", *select.IMU_COLUMNS, "ref_gyr_z", "ref_yaw", "ref_yaw_sigma", "gnss_speed", *select.COLUMNS, "gnss_lat", "gnss_lon"]
 ROLES = [f"wheel {name.replace('_', ' ')}" for name in WHEELS]
 
 
@@ -141,25 +141,31 @@ class Drive:
                 f"{used.name} {c:.2f} to {d:.2f} s")
 
     def place_courses(self):
-        at = (self.courses[:, 0] + (self.position.offset if self.position else 0) - self.start) / grid.DT
+        fixes = self.position.channel.rows()[:, :3] if self.position else np.empty((0, 3))
+        self.gnss = [(slice(8, 11), *self.placed(self.courses)), (slice(15, 17), *self.placed(fixes))]
+
+    def placed(self, received):
+        """The rows of the drive in which something was received, and its values."""
+        at = (received[:, 0] + (self.position.offset if self.position else 0) - self.start) / grid.DT
         at = np.sign(at) * np.floor(np.abs(at) + 0.5)
         near = (at >= 0) & (at < self.count)
-        self.course_rows, self.course_values = at[near].astype(int), self.courses[near, 1:]
+        return at[near].astype(int), received[near, 1:]
 
     def chunks(self):
-        """Rows by the thousand: t_s, six of the IMU, reference, three of the course, four wheels; NaN is unknown."""
+        """Rows by the thousand: t_s, six of the IMU, reference, three of the course, four wheels, two of the position; NaN is unknown."""
         for first in range(0, self.count, CHUNK):
             index = np.arange(first, min(first + CHUNK, self.count))
             times = self.start + grid.DT * index
-            rows = np.full((len(index), 15), np.nan)
+            rows = np.full((len(index), len(NAMES)), np.nan)
             rows[:, 0] = grid.DT * index
             gyro = self.gyro.at(times)
             force = gyro[:, :3] if self.accel is self.gyro else self.accel.at(times)
             rows[:, 1:4], rows[:, 4:7] = self.vehicle.turn(force), self.vehicle.turn(gyro[:, -3:])
             if self.reference:
                 rows[:, 7] = self.reference.at(times)[:, 0]
-            here = (self.course_rows >= first) & (self.course_rows <= index[-1])
-            rows[self.course_rows[here] - first, 8:11] = self.course_values[here]
+            for columns, at, values in self.gnss:
+                here = (at >= first) & (at <= index[-1])
+                rows[at[here] - first, columns] = values[here]
             for k, wheel in enumerate(self.wheels):
                 if wheel:
                     rows[:, 11 + k] = wheel.at(times)[:, 0] * (1.0 if wheel.dimension == "rate" else 1.0 / self.vehicle.radius)
@@ -172,7 +178,7 @@ class Drive:
             yield rows[np.isfinite(rows[:, 1:7]).all(axis=1)]
 
     def count_rows(self):
-        filled, self.rows, self.seconds = np.zeros(15, int), 0, 0.0
+        filled, self.rows, self.seconds = np.zeros(len(NAMES), int), 0, 0.0
         for table in self.chunks():
             filled += np.isfinite(table).sum(axis=0)
             self.rows += len(table)
@@ -245,9 +251,9 @@ class Drive:
         return beside
 
     def write_csv(self, file):
-        columns = [k for k in range(15) if k < 7 or self.seen[k]]
+        columns = [k for k in range(len(NAMES)) if k < 7 or self.seen[k]]
         file.write(",".join(NAMES[k] for k in columns) + "\n")
-        form = ",".join(["%.2f"] + ["%.7f"] * 6 + ["%.6f"] * (len(columns) - 7)) + "\n"
+        form = ",".join(["%.2f"] + ["%.7f"] * 6 + ["%.8f" if k > 14 else "%.6f" for k in columns[7:]]) + "\n"
         for table in self.chunks():
             for row in table[:, columns].tolist():
                 line = form % tuple(row)

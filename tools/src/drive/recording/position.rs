@@ -18,6 +18,11 @@ const ACROSS_M: f64 = 0.07;
 /// Length of a degree of latitude, m.
 const DEGREE_M: f64 = 111_132.0;
 
+/// The way east and north, m, between two places near each other, degrees of latitude and longitude.
+pub fn between(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {
+    [DEGREE_M * to[0].to_radians().cos() * (to[1] - from[1]), DEGREE_M * (to[0] - from[0])]
+}
+
 #[derive(Debug, Default)]
 pub(super) struct Track {
     newest: Option<(f64, f64)>,
@@ -33,16 +38,14 @@ impl Track {
             return None;
         }
         self.newest = Some(position);
-        let (latitude, longitude) = position;
-        let here = [latitude, longitude];
-        let metres = [DEGREE_M, DEGREE_M * latitude.to_radians().cos()];
+        let here = [position.0, position.1];
         let [least, longest] = BETWEEN_US;
         let age = |then: &Micros| time.0.saturating_sub(then.0);
         while self.kept.front().is_some_and(|(then, _)| age(then) > longest) {
             self.kept.pop_front();
         }
         let found = self.kept.iter().rev().find_map(|(then, there)| {
-            let [north, east] = [0, 1].map(|axis| metres[axis] * (here[axis] - there[axis]));
+            let [east, north] = between(*there, here);
             let distance = north.hypot(east);
             (age(then) >= least && distance >= LEAST_M).then(|| Heading {
                 course: Some(east.atan2(north).rem_euclid(TAU) as f32),

@@ -153,7 +153,8 @@ impl<R: std::io::Read> Reader<R> {
             }),
         };
         self.last = Some(time);
-        Ok(Row { line, sample, reference, course, wheels, speed, heading })
+        let place = position.map(|(latitude, longitude)| [latitude, longitude]);
+        Ok(Row { line, sample, reference, course, wheels, speed, heading, place })
     }
 }
 

@@ -1,6 +1,6 @@
 // Drag over a chart to zoom in; a double click or "whole drive" shows the whole chart again; a name in
 // the legend hides its curve. On the keyboard, + and - zoom, arrows move, Escape shows the whole chart.
-// Charts over time move together.
+// Charts over time move together. The pointer reads each curve: at its time, on a map the nearest point.
 'use strict';
 (() => {
   const SIDE = 10000, AIR = 0.06, LEAST = SIDE / 500;
@@ -14,6 +14,7 @@
     const [x0, x1, y0, y1] = figure.dataset.range.split(' ').map(Number);
     const curves = [...svg.children].map(line => ({
       line, free: line.classList.contains('free'),
+      name: figure.querySelector(`.key.${line.classList[0]}`).firstChild.textContent.trim(),
       points: line.getAttribute('points').split(' ').map(pair => pair.split(',').map(Number)),
     }));
     return { figure, svg, plot, curves, x0, x1, y0, y1, view: [0, SIDE, 0, SIDE],
@@ -101,6 +102,34 @@
       const [x, y] = [start((left + right) / 2, across), start((top + bottom) / 2, down)];
       show(chart, [x, x + side, y, y + side]);
     };
+    const tip = Object.assign(document.createElement('div'), { className: 'tip hidden' });
+    const mark = Object.assign(document.createElement('div'), { className: 'mark hidden' });
+    plot.append(mark, tip);
+    const [unit] = figure.querySelector('figcaption span').textContent.split(',');
+    const figures = (from, to) => Math.max(0, 4 - Math.ceil(Math.log10((to - from) * 1.001)));
+    const hush = () => [tip, mark].forEach(part => part.classList.add('hidden'));
+    const read = event => {
+      const [left, right, top, bottom] = chart.view, { x0, x1, y0, y1 } = chart, [u, v] = at(event);
+      const [x, y] = [left + u * (right - left), top + v * (bottom - top)];
+      const far = ([a, b]) => chart.isMap ? Math.hypot((a - x) * (x1 - x0), (b - y) * (y1 - y0)) : Math.abs(a - x);
+      const value = (at, from, to) => (from + at / SIDE * (to - from)).toFixed(figures(from, to));
+      const rows = chart.curves.filter(({ line }) => !line.classList.contains('hidden')).map(({ line, name, points }) => {
+        const [a, b] = points.reduce((near, point) => far(point) < far(near) ? point : near);
+        const row = Object.assign(document.createElement('div'), { className: `key ${line.classList[0]}` });
+        // A point that far out was moved to the edge when the page was written.
+        const height = b <= -9 * SIDE || b >= 10 * SIDE ? 'outside' : value(SIDE - b, y0, y1);
+        row.textContent = `${name} ${chart.isMap ? value(a, x0, x1) + ', ' : ''}${height}`;
+        return row;
+      });
+      const head = document.createElement('div');
+      head.textContent = chart.isMap ? `across, up, ${unit}` : `${value(x, x0, x1)} s: ${unit}`;
+      tip.replaceChildren(head, ...rows);
+      tip.style.cssText = u < 0.5 ? 'right:.4rem' : 'left:.4rem';
+      mark.style.left = 100 * u + '%';
+      tip.classList.remove('hidden');
+      mark.classList.toggle('hidden', chart.isMap);
+    };
+    plot.onpointerleave = hush;
     let from = null, brush = null;
     const at = event => {
       const box = plot.getBoundingClientRect();
@@ -120,7 +149,8 @@
       plot.setPointerCapture(event.pointerId);
     };
     plot.onpointermove = event => {
-      if (!from) return;
+      if (!from) return read(event);
+      hush();
       const [u0, u1, v0, v1] = span(from, at(event)).map(part => 100 * part);
       brush.style.cssText = `left:${u0}%;width:${u1 - u0}%;top:${v0}%;height:${v1 - v0}%`;
     };
@@ -129,7 +159,8 @@
       const [u0, u1, v0, v1] = span(from, at(event));
       from = null;
       brush.remove();
-      if (event.type !== 'pointerup' || u1 - u0 < 0.01) return;
+      if (event.type !== 'pointerup') return;
+      if (u1 - u0 < 0.01) return read(event);
       const [left, right, top, bottom] = chart.view, width = right - left, height = bottom - top;
       let view = [left + u0 * width, left + u1 * width, top + v0 * height, top + v1 * height];
       if (chart.isMap) {
