@@ -51,6 +51,7 @@ use crate::sample::{FogSample, Frame, ImuSample, NO_STAMP, WheelSample};
 use crate::standstill::Standing;
 use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use clock::Timeline;
+pub use second_source::Contradiction;
 use second_source::{Doubts, SecondSource, Shown};
 
 /// The results of one sample, or of its absence, for a log or diagnosis.
@@ -469,6 +470,12 @@ impl Coprocessor {
     /// Returns the counters of inputs that were refused or replaced.
     pub fn input_counters(&self) -> &InputCounters {
         &self.counters
+    }
+
+    /// Returns what the sources showed when they last contradicted each other.
+    #[must_use]
+    pub fn contradiction(&self) -> &Contradiction {
+        self.second.contradiction()
     }
 
     fn advance(&mut self, now: Micros) -> Result<Micros, InputError> {

@@ -14,6 +14,20 @@
 //! contradicts no other, and is doubted at once.
 
 use crate::sample::{RATE_HZ, WheelSample};
+use serde::{Deserialize, Serialize};
+
+/// What the sources showed in the newest second in which one was alone: means, each `None` for a source that was silent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Contradiction {
+    /// Such seconds since the start.
+    pub seconds: u32,
+    /// Yaw rate of the inertial and of the fibre-optic gyro less their bias, 0.01 deg/s.
+    pub gyros: [Option<i16>; 2],
+    /// Lateral specific force to the left, 0.01 m/s^2.
+    pub lateral: Option<i16>,
+    /// Speed of an axle, and how much faster its right wheel is than its left one, 0.01 m/s.
+    pub wheels: Option<[i16; 2]>,
+}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Doubts {
@@ -71,6 +85,7 @@ pub(super) struct SecondSource {
     is_fog_confirmed: bool,
     /// Sums over turns of the product of both gyros' rates, and of the inertial one's square.
     products: [f32; 2],
+    contradiction: Contradiction,
 }
 
 impl SecondSource {
@@ -84,6 +99,7 @@ impl SecondSource {
         judged: false,
         is_fog_confirmed: false,
         products: [0.0; 2],
+        contradiction: Contradiction { seconds: 0, gyros: [None; 2], lateral: None, wheels: None },
     };
 
     /// Adds a step of 10 ms.
@@ -109,6 +125,10 @@ impl SecondSource {
     pub fn doubts(&self) -> Option<Doubts> {
         let [inertial, fog, wheels] = self.doubts;
         self.judged.then_some(Doubts { inertial, fog, wheels })
+    }
+
+    pub fn contradiction(&self) -> &Contradiction {
+        &self.contradiction
     }
 
     /// Returns whether the gyros have agreed in a turn, or a standstill has shown the fibre-optic one's unit.
@@ -163,6 +183,15 @@ impl SecondSource {
                 [gyro || wheels && against_inertial > for_inertial, against_fog > for_fog, wheels && !gyro]
             }
         };
+        if alone.contains(&true) {
+            let code = |value: f32| libm::roundf(100.0 * value) as i16;
+            self.contradiction = Contradiction {
+                seconds: self.contradiction.seconds.saturating_add(1),
+                gyros: gyros.map(|rate| rate.map(|rate| code(rate.to_degrees()))),
+                lateral: lateral.map(code),
+                wheels: wheels.map(|(speed, difference)| [speed, difference].map(code)),
+            };
+        }
         if gyros_agree == Some(false) {
             self.is_bias = turns.contains(&false);
         }

@@ -2,6 +2,7 @@
 
 use super::device::Firmware;
 use super::event::{CanFault, ClockFault, Crash, ResetCause, SensorFault};
+use crate::coprocessor::Contradiction;
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters, Status};
 use crate::store::StoreError;
@@ -192,6 +193,8 @@ pub struct AllCounters {
     pub fog: FogCounters,
     /// Counters of the coprocessor's inputs.
     pub inputs: InputCounters,
+    /// Seconds in which the sources of the yaw rate contradicted each other, and the newest one's numbers.
+    pub contradiction: Contradiction,
 }
 
 /// The counters of requests that were refused for lack of access since the start.

@@ -8,6 +8,7 @@ use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, decode, nrc, put, put_record};
 use super::security::{self, Security};
 use super::services::UPDATE;
+use crate::coprocessor::Contradiction;
 use crate::fog::FogCounters;
 use crate::heading::CourseCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters};
@@ -61,7 +62,7 @@ const fn write_only(id: u16, name: &'static str, bytes: &'static str, content: &
 }
 
 /// All data identifiers.
-pub const IDENTIFIERS: [Identifier; 28] = [
+pub const IDENTIFIERS: [Identifier; 29] = [
     read_only(0xF186, "session", "1", "session: 1 default, 2 programming, 3 extended"),
     read_only(0xF189, "firmware_version", "1, 1, 1", "version of the firmware"),
     read_only(0xF18C, "serial_number", "text", "serial number of the chip, 24 hexadecimal digits"),
@@ -138,6 +139,12 @@ pub const IDENTIFIERS: [Identifier; 28] = [
         "course",
         "1, 2, 2, 4, 4, 4, 1",
         "gain of the yaw gyro by courses: 0 unknown, 1 coarse, 2 fine, 3 they contradict the gyro; gain and sigma, 1e-5; courses used, refused, and starts of the heading after contradictions; the newest course: 0 used, 1 far from the gyro's heading, 2 the same in a turn, 3 the vehicle stands",
+    ),
+    read_only(
+        0x011B,
+        "contradiction",
+        "4, 2, 2, 2, 2, 2",
+        "seconds in which wheels, accelerometer or another gyro contradicted a gyro or the wheels; of the newest: inertial and fibre-optic rate, 0.01 deg/s, lateral force to the left, 0.01 m/s^2, speed, right wheel less left, 0.01 m/s; 7FFF for none",
     ),
     writable(
         0x011A,
@@ -265,6 +272,14 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             codes.iter().try_for_each(|share| put(out, &(libm::roundf(1e5 * share) as i16).to_be_bytes()))?;
             put_words(out, &words!(course.counters => CourseCounters { used, refused, restarts }))?;
             put(out, &[course.refusal.map_or(0, |refusal| refusal as u8)])
+        }
+        0x011B => {
+            let Contradiction { seconds, gyros: [inertial, fog], lateral, wheels } = counters.contradiction;
+            put(out, &seconds.to_be_bytes())?;
+            let [speed, difference] = wheels.map_or([None; 2], |values| values.map(Some));
+            [inertial, fog, lateral, speed, difference]
+                .into_iter()
+                .try_for_each(|code: Option<i16>| put(out, &code.unwrap_or(i16::MAX).to_be_bytes()))
         }
         0x011A => {
             let Firmware { slot, state } = device.firmware();

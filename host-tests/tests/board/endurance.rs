@@ -214,8 +214,9 @@ impl Received {
         );
         // The last question for them is one of the last four, or five where an answer is under way.
         let counters = self.counters.expect("they were asked for");
-        let AllCounters { lines, pipeline, watch, fog, inputs } = counters;
+        let AllCounters { lines, pipeline, watch, fog, inputs, contradiction } = counters;
         assert_eq!((lines, inputs), (LineCounters::NONE, InputCounters::default()));
+        assert_eq!(contradiction.seconds, 0);
         let taken = pipeline.samples as usize;
         assert!(samples - taken <= 4 * QUESTION + under_way, "{taken} of {samples} samples");
         assert_eq!([pipeline.missing, pipeline.misplaced, pipeline.clock_jumps, pipeline.late], [0; 4]);

@@ -4,7 +4,7 @@ use embedded_can::{Frame, StandardId};
 use gyronet::bias::Latitude;
 use gyronet::can::DataFrame;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
-use gyronet::coprocessor::{Observation, Sink, TimedFrame};
+use gyronet::coprocessor::{Contradiction, Observation, Sink, TimedFrame};
 use gyronet::estimate::YawEstimate;
 use gyronet::fog::FogConfig;
 use gyronet::health::{Faults, Quality};
@@ -47,6 +47,12 @@ impl Sink for Seen {
 
 /// The last rates of both gyros after 8 s of turn.
 fn turned(read: &Read) -> (YawEstimate, Option<YawEstimate>) {
+    let (rates, _) = shown(read);
+    rates
+}
+
+/// Also what the sources showed when they last contradicted each other.
+fn shown(read: &Read) -> ((YawEstimate, Option<YawEstimate>), Contradiction) {
     let wheels = WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings");
     let fog = FogConfig { latitude: Latitude::from_degrees(48.0), ..FogConfig::DEFAULT };
     let config = Config { wheels: Some(wheels), fog, fog_expected: read.fog != 0.0, ..Config::DEFAULT };
@@ -76,7 +82,8 @@ fn turned(read: &Read) -> (YawEstimate, Option<YawEstimate>) {
             coprocessor.fog(sample, now, &mut seen).expect("in order");
         }
     }
-    (*seen.inertial.last().expect("a step"), seen.fog.last().copied())
+    let rates = (*seen.inertial.last().expect("a step"), seen.fog.last().copied());
+    (rates, *coprocessor.contradiction())
 }
 
 const DOUBTED: (bool, bool) = (true, true);
@@ -109,6 +116,23 @@ fn a_fibre_optic_gyro_that_is_alone_is_doubted() {
             "{factor}"
         );
     }
+}
+
+/// In a turn of 5 deg/s at 15 m/s the gyro shows half; the wheels are 1.5 m apart, the lateral force is 1.31 m/s^2.
+#[test]
+fn a_contradiction_leaves_its_numbers() {
+    let (_, Contradiction { seconds, gyros, lateral, wheels }) = shown(&Read { fog: 0.5, ..TRUE });
+    let near = |code: Option<i16>, shown: f64, within: f64| {
+        let code = f64::from(code.expect("it was shown")) / 100.0;
+        assert!((code - shown).abs() <= within, "{code}, {shown} was shown");
+    };
+    assert!((6..=8).contains(&seconds), "{seconds}");
+    near(gyros[0], 5.0, 0.06);
+    near(gyros[1], 2.5, 0.06);
+    near(lateral, 1.31, 0.02);
+    near(wheels.map(|[speed, _]| speed), 15.0, 0.02);
+    near(wheels.map(|[_, difference]| difference), 0.13, 0.02);
+    assert_eq!(shown(&TRUE).1, Contradiction::default());
 }
 
 #[test]

@@ -151,6 +151,7 @@ impl Output {
             lines: self.lines,
             fog: *coprocessor.fog_counters(),
             inputs: *coprocessor.input_counters(),
+            contradiction: *coprocessor.contradiction(),
         };
         // The LED blinks as long as this task runs.
         if let Some((led, lit)) = BOARD.led {

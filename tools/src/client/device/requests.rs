@@ -9,6 +9,7 @@ use gyronet::heading::CourseCounters;
 use gyronet::health::{Counters, InputCounters, MonitorCounters};
 use gyronet::service::calibrate::{State, Task};
 use gyronet::service::event::LogPage;
+use gyronet::coprocessor::Contradiction;
 use gyronet::service::message::{AccessCounters, AllCounters, Info, LineCounters, PROTOCOL};
 use gyronet::store::{Calibration, Configuration, Learned, Record, UnitMap};
 use gyronet::uds::Session;
@@ -36,13 +37,15 @@ const LEARNED: u16 = 0x0115;
 const FORWARD: u16 = 0x0116;
 const LEVEL: u16 = 0x0118;
 const COURSE: u16 = 0x0119;
+const CONTRADICTION: u16 = 0x011B;
 /// Data identifier of the firmware and of the head of its update.
 pub const FIRMWARE: u16 = 0x011A;
-pub const COUNTERS: [u8; 7] = {
+pub const COUNTERS: [u8; 9] = {
     let [a, b] = PIPELINE_COUNTERS.to_be_bytes();
     let [c, d] = INPUT_COUNTERS.to_be_bytes();
     let [e, f] = FOG_COUNTERS.to_be_bytes();
-    [0x22, a, b, c, d, e, f]
+    let [g, h] = CONTRADICTION.to_be_bytes();
+    [0x22, a, b, c, d, e, f, g, h]
 };
 pub const USE_DOWNLOAD: u16 = 0xFF01;
 /// The other routines.
@@ -242,11 +245,22 @@ pub fn counters(response: &[u8]) -> Result<AllCounters> {
         (words.fields()?, words.fields()?, words.fields()?);
     words.identifier(FOG_COUNTERS)?;
     let fog: FogCounters = words.fields()?;
-    if words.0.is_empty() {
-        Ok(AllCounters { pipeline, watch, lines, fog, inputs })
-    } else {
-        Err(DeviceError::Mismatch)
-    }
+    words.identifier(CONTRADICTION)?;
+    let contradiction = contradiction(words.0).ok_or(DeviceError::Mismatch)?;
+    Ok(AllCounters { pipeline, watch, lines, fog, inputs, contradiction })
+}
+
+/// Decodes a count and five codes, of which the largest says that there is none.
+fn contradiction(bytes: &[u8]) -> Option<Contradiction> {
+    let (seconds, codes) = bytes.split_first_chunk()?;
+    let codes: &[[u8; 2]; 5] = codes.as_chunks().0.try_into().ok().filter(|_| codes.len() == 10)?;
+    let code = |at: usize| Some(i16::from_be_bytes(codes[at])).filter(|code| *code != i16::MAX);
+    Some(Contradiction {
+        seconds: u32::from_be_bytes(*seconds),
+        gyros: [code(0), code(1)],
+        lateral: code(2),
+        wheels: code(3).zip(code(4)).map(|(speed, difference)| [speed, difference]),
+    })
 }
 
 /// The words of a response that are not decoded yet.
@@ -292,12 +306,23 @@ mod tests {
             &words(100, 19),
             &FOG_COUNTERS.to_be_bytes(),
             &words(200, 12),
+            &CONTRADICTION.to_be_bytes(),
+            &[0, 0, 0, 7, 0x01, 0xF4, 0x7F, 0xFF, 0xFF, 0x9C, 0x05, 0xDC, 0x00, 0x0B],
         ]
         .concat();
         let all = counters(&response).expect("whole");
         assert_eq!((all.pipeline.samples, all.pipeline.moved_mounts), (0, 13));
         assert_eq!((all.watch.silences, all.inputs.imu_errors, all.lines.unsent), (100, 105, 114));
         assert_eq!((all.lines.frames_lost, all.fog.samples, all.fog.dropped), (118, 200, 211));
+        assert_eq!(
+            all.contradiction,
+            Contradiction {
+                seconds: 7,
+                gyros: [Some(500), None],
+                lateral: Some(-100),
+                wheels: Some([1500, 11])
+            }
+        );
         for length in 0..response.len() {
             assert!(counters(&response[..length]).is_err(), "{length}");
         }
