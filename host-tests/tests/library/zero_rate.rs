@@ -268,6 +268,10 @@ fn a_stop_that_agrees_with_the_bias_withdraws_the_doubt() {
     for left in [0.01, -0.02, 0.03, -0.04] {
         assert!(stop(&mut zero_rate, left).1.abs() < 3e-4);
     }
+    // Three that do are the bias, which one that agrees with it defends in turn.
+    let (_, bias) = [0.02; 3].map(|left| stop(&mut zero_rate, left))[2];
+    assert!((bias - 0.02).abs() < 3e-4, "{bias}");
+    assert_eq!([0.03, 0.02].map(|left| stop(&mut zero_rate, left).0), [true, false]);
 }
 
 #[test]
@@ -307,6 +311,42 @@ fn a_second_of_standing_counts_only_when_the_next_one_is_over() {
     assert_eq!(second(&mut zero_rate, 0.0), Some(ZeroRateOutcome::Used));
     let bias = zero_rate.bias().rad_per_sec();
     assert!(bias > 0.0004, "the first second is used, not the second: {bias}");
+}
+
+#[test]
+fn one_steady_second_contradicts_the_bias_and_one_in_which_a_turn_begins_does_not() {
+    for (begin, end, doubted) in [(0.01, 0.01, true), (0.0, 0.02, false)] {
+        let mut zero_rate = ZeroRate::new(ZeroRateConfig::DEFAULT);
+        for _ in 0..2 {
+            let _ = second(&mut zero_rate, 0.0);
+        }
+        for sample in 0..RATE_HZ {
+            let left = begin + (end - begin) * f64::from(sample) / f64::from(RATE_HZ);
+            zero_rate.observe(Some(rate(left)), Standing::WHEELS, 0.0);
+        }
+        assert_eq!(zero_rate.is_doubted(), doubted, "{begin} to {end} rad/s");
+    }
+}
+
+/// A bias that steps while the vehicle stands: for two seconds the judge sees the step, and no standstill.
+#[test]
+fn a_turn_at_a_standstill_without_wheels_is_expected_until_the_vehicle_has_driven_off() {
+    let quiet = Standing { source: StandstillSource::Inertial, probability: 0.98, ..Standing::UNKNOWN };
+    let pass = |zero_rate: &mut ZeroRate, left: f64, standing, samples: u32| {
+        for _ in 0..samples {
+            zero_rate.observe(Some(rate(left)), standing, 0.0);
+            zero_rate.contradicts_wheels(rate(left));
+        }
+        zero_rate.sigma()
+    };
+    let mut zero_rate = ZeroRate::new(ZeroRateConfig::DEFAULT);
+    assert!(pass(&mut zero_rate, 0.0, quiet, 300) < 3e-4);
+    assert!(pass(&mut zero_rate, 0.01, quiet, 90) > 5e-3);
+    assert!(pass(&mut zero_rate, 0.01, Standing::UNKNOWN, 2 * RATE_HZ - 5) > 5e-3);
+    let mut driven = zero_rate.clone();
+    driven.moves();
+    assert!(driven.sigma() < 3e-4);
+    assert!(pass(&mut zero_rate, 0.01, Standing::UNKNOWN, 10) < 3e-4);
 }
 
 #[test]
