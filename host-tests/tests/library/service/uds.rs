@@ -283,6 +283,9 @@ fn a_trouble_is_kept_when_its_cause_is_over_and_until_it_is_cleared() {
     bench.expect(&[0x85, 2], &[0xC5, 2]);
     bench.fail(Status::Stuck, Faults::NONE);
     bench.expect(&[0x19, 1, 8], &[0x59, 1, bit::AVAILABLE, 0, 0, 1]);
+    // ISO 14229-1 D.2: not tested since the memory was cleared, nor in this cycle.
+    bench.expect(&[0x14, 0xFF, 0xFF, 0xFF], &[0x54]);
+    bench.expect(&[0x19, 6, 0x5A, 0x01, 0x31, 1], &[0x59, 6, 0x5A, 0x01, 0x31, 0x50, 1, 0]);
     bench.expect(&[0x10, 1], &[0x50, 1, 0, 50, 0x01, 0xF4]);
     bench.fail(Status::Stuck, Faults::NONE);
     bench.expect(&[0x19, 1, 8], &[0x59, 1, bit::AVAILABLE, 0, 0, 2]);
