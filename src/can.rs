@@ -9,7 +9,6 @@ pub mod e2e;
 pub mod encoder;
 #[doc(hidden)]
 pub mod fog_encoder;
-pub mod j1939;
 #[doc(hidden)]
 pub mod load;
 #[doc(hidden)]

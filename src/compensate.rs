@@ -1,6 +1,6 @@
 //! Computes corrected rates from the network's estimates.
 //!
-//! A sample's best estimate is the mean of the estimates of all windows that cover it ([`Mode`]). It is complete only
+//! A sample's best estimate is the mean of the estimates of all windows that cover it ([`Stride`]). It is complete only
 //! some samples later, so two rates are sent for every sample:
 //!
 //! - the **live** rate at once, for a receiver that uses it for control. No window covers the sample yet, so only
@@ -30,10 +30,10 @@
 //!
 //! The lag counts samples, not time: a gap delays earlier samples and drops none.
 
-mod mode;
+mod stride;
 mod unit;
 
-pub use mode::{DELAY, Lag, Mode, OutOfRange, Stride};
+pub use stride::{DELAY, Lag, OutOfRange, Stride};
 
 use crate::model::window::WINDOW;
 use crate::model::{Estimate, SteadyGain};
@@ -45,8 +45,8 @@ use unit::{MountingCheck, SlowMean};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CompensateConfig {
-    /// The rule that selects the estimates.
-    pub mode: Mode,
+    /// The samples between two windows.
+    pub stride: Stride,
     /// The delay of the delayed rate, in samples.
     pub lag: Lag,
     /// Largest mean correction of a window that is accepted (rad/s code). Vibration makes single corrections large;
@@ -66,7 +66,7 @@ impl CompensateConfig {
     /// not increase the error on the validation drive (`cargo gyronet evaluate --lags`); 3 deg/s for a window's mean,
     /// 30 deg/s for one correction, 1 deg/s of revisions in one rate.
     pub const DEFAULT: Self = Self {
-        mode: Mode::Overlap { stride: Stride::HALF },
+        stride: Stride::HALF,
         lag: match Lag::new(7) {
             Some(lag) => lag,
             None => Lag::MAX,
@@ -228,12 +228,12 @@ impl Compensator {
         }
     }
 
-    /// Revises the samples of the window that ended [`Mode::delay`] samples before the next one.
+    /// Revises the samples of the window that ended [`Stride::delay`] samples before the next one.
     ///
     /// # Errors
     /// [`Implausible`]: nothing was revised, and the next samples have no steady part.
     pub fn revise(&mut self, estimate: &Estimate) -> Result<(), Implausible> {
-        let CompensateConfig { mode, lag, max_mean, max_single, model, .. } = self.config;
+        let CompensateConfig { stride, lag, max_mean, max_single, model, .. } = self.config;
         let (corrections, steady_gain) = if model {
             (&estimate.corrections, estimate.steady_gain)
         } else {
@@ -249,18 +249,16 @@ impl Compensator {
         }
         self.steady_gain = steady_gain;
         self.mounting = steady_gain.mounting();
-        let used = mode.used();
-        let oldest = KEPT - (mode.delay() as usize - 1) - WINDOW;
-        let window = self.kept.iter().skip(oldest).zip(corrections).take(used.end).skip(used.start);
+        let oldest = KEPT - (stride.delay() as usize - 1) - WINDOW;
+        let window = self.kept.iter().skip(oldest).zip(corrections);
         let mismatched = self.mismatched_mounting();
         let own =
             |entry: &Entry, c: &AngularRate| i64::from(c.0) - i64::from(mismatched.correction(entry.rates).0);
         let seen = window.filter_map(|(entry, c)| entry.as_ref().map(|entry| own(entry, c)));
-        let used_mean = seen.sum::<i64>().checked_div(used.len() as i64).unwrap_or(0);
-        self.slow_mean.observe(used_mean, mode.stride());
+        self.slow_mean.observe(seen.sum::<i64>() / WINDOW as i64, stride.samples());
         let constant = self.slow_mean.get();
         for (place, (entry, correction)) in self.kept.iter_mut().skip(oldest).zip(corrections).enumerate() {
-            let (Some(entry), true) = (entry, used.contains(&place)) else { continue };
+            let Some(entry) = entry else { continue };
             entry.sum += own(entry, correction) - constant;
             entry.count += 1;
             let estimate = entry.sum.checked_div(i64::from(entry.count)).unwrap_or(0);
@@ -372,7 +370,7 @@ impl Compensator {
 
     /// Returns the newest sample that no window changes any more; each sample is returned once.
     pub fn complete(&self) -> Option<Complete> {
-        let entry = self.kept.iter().nth_back(self.config.mode.complete_after())?.as_ref()?;
+        let entry = self.kept.iter().nth_back(self.config.stride.complete_after())?.as_ref()?;
         Some(Complete {
             tick: entry.tick,
             rate: entry.rate(),

@@ -2,9 +2,9 @@
 
 pub use crate::align::clock_ratio::ClockRatioConfig;
 pub use crate::bias::{EarthRate, Latitude, StaticConfig, ZeroRateConfig};
-pub use crate::compensate::{CompensateConfig, Lag, Mode, Stride};
+pub use crate::compensate::{CompensateConfig, Lag, Stride};
 pub use crate::coprocessor::StorageFaults;
-pub use crate::fog::{FogConfig, FogErrors, FogNetUse, Tilt};
+pub use crate::fog::{FogConfig, FogErrors, Tilt};
 pub use crate::mounting::{Rotation, Vertical};
 pub use crate::pipeline::{PipelineConfig, UncertaintyConfig};
 pub use crate::standstill::StandstillConfig;

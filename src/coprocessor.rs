@@ -11,10 +11,10 @@
 //! 1. Pass in the inputs that have arrived: [`Coprocessor::imu`], [`Coprocessor::fog`], [`Coprocessor::can`]. Call
 //!    [`Coprocessor::poll`] about every millisecond, because it detects a silent sensor. The frames go to the
 //!    [`Sink`] that each call gets.
-//! 2. Run the windows of [`Coprocessor::window`] and [`Coprocessor::fog_second`] through the networks, at once or in
-//!    a task of lower priority, and pass the estimates to [`Coprocessor::deliver`] and [`Coprocessor::deliver_fog`].
+//! 2. Run the windows of [`Coprocessor::window`] through the network, at once or in a task of lower priority, and pass
+//!    the estimates to [`Coprocessor::deliver`].
 //!
-//! A window's estimate is used [`crate::compensate::Mode::delay`] samples after the window, however early it arrives,
+//! A window's estimate is used [`crate::compensate::Stride::delay`] samples after the window, however early it arrives,
 //! so the frames do not depend on the speed of the machine. If samples arrive faster than 100 times a second,
 //! [`Coprocessor::is_ready`] tells when the next one has to wait for an estimate.
 
@@ -42,8 +42,6 @@ use crate::heading::{Heading, HeadingError, HeadingReceiver, Received};
 use crate::health::slow::SlowStatus;
 use crate::health::{BoardFaults, Faults, InputCounters, MonitorCounters, Quality, Source, count};
 use crate::model::Estimate;
-use crate::model::fognet::FogEstimate;
-use crate::model::seconds::NewSecond;
 use crate::monitor::{SensorMonitor, TIMEOUT_US};
 use crate::mounting::Vertical;
 use crate::pipeline::{self, BoardState, Handover, Pipeline};
@@ -121,14 +119,10 @@ impl Coprocessor {
             bus: BusState { lost: 0, is_off: false, reported: 0 },
             timeline: Timeline::new(config.clock),
             monitor: SensorMonitor::new(clock_ratio),
-            handover: Handover::new(config.has_gyronet, config.pipeline.compensate.mode.delay()),
+            handover: Handover::new(config.has_gyronet, config.pipeline.compensate.stride.delay()),
             pipeline: Pipeline::new(config.pipeline),
             wheels: config.wheels,
-            fog: FogPipeline::new(
-                FogConfig { clock_ratio, ..config.fog },
-                config.has_fognet,
-                config.fog_expected,
-            ),
+            fog: FogPipeline::new(FogConfig { clock_ratio, ..config.fog }, config.fog_expected),
             heading: config.heading,
             second: SecondSource::START,
             inertial_rate: None,
@@ -410,21 +404,6 @@ impl Coprocessor {
         self.claim(wanted, end)
     }
 
-    /// Returns the second that ends the window that is due for FoGNet, once: add it to a
-    /// [`Minute`](crate::model::seconds::Minute).
-    pub fn fog_second(&mut self) -> Option<NewSecond> {
-        self.fog.second()
-    }
-
-    /// Accepts FoGNet's estimate of a window.
-    ///
-    /// # Errors
-    /// [`InputError::NoWindow`], as [`Coprocessor::deliver`].
-    pub fn deliver_fog(&mut self, number: u32, estimate: FogEstimate) -> Result<(), InputError> {
-        let wanted = self.fog.deliver(number, estimate);
-        self.claim(wanted, number)
-    }
-
     /// Notes that GyroNet's weights are corrupt: no window becomes due any more, and the messages report it.
     pub fn weights_damaged(&mut self) {
         self.handover.stop();
@@ -497,14 +476,13 @@ impl Coprocessor {
         while self.fog.is_due(time) {
             let wheels = self.poll_wheels();
             let fresh = self.timeline.is_sensors() || !self.monitor.is_stale(self.timeline.now());
-            let inertial = self.pipeline.inertial().filter(|_| fresh);
             let doubted = self.second.doubts().is_some_and(|doubts| doubts.inertial);
             let inertial_rate = self.inertial_rate.filter(|_| fresh && !doubted);
             let rate = inertial_rate.map(|(at, [rate, _])| (at, rate));
             let sigma = inertial_rate.map_or(0.0, |(_, [_, sigma])| sigma);
             let (tilted, leaning) = (self.pipeline.tilted(), self.pipeline.leaning());
             self.fog.beside(Beside { rate, sigma, tilted, leaning, scale: self.second.scale() });
-            let Some(mut estimate) = self.fog.next_step(time, inertial, wheels.as_ref()) else { return };
+            let Some(mut estimate) = self.fog.next_step(time, wheels.as_ref()) else { return };
             self.fog_rate = self.fog.shown();
             if self.second.doubts().is_some_and(|doubts| doubts.fog) && self.fog_rate.is_some() {
                 estimate.quality = Quality::Degraded;

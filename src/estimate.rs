@@ -69,7 +69,7 @@ impl VehicleSample {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VehicleSample {
-    /// The rate of this sample, for receivers that use it for control: the Bosch messages and VDC2.
+    /// The rate of this sample, for receivers that use it for control: the Bosch messages.
     pub live: YawEstimate,
     /// The rate of the sample [`crate::compensate::CompensateConfig::lag`] before it, for receivers that
     /// integrate it to a heading: our own messages.

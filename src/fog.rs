@@ -1,5 +1,5 @@
 //! Corrects the turns of a fibre-optic gyro, frame by frame: it subtracts the Earth's rate and the gyro's
-//! bias (`earth_and_bias`), and, if the configuration selects FoGNet, its estimate of the remaining error.
+//! bias (`earth_and_bias`). [`FogCorrector`] also subtracts FoGNet's estimate of the remaining error; it runs on recordings.
 //!
 //! # FoGNet
 //!
@@ -23,7 +23,6 @@
 
 mod beside;
 mod earth_and_bias;
-mod fognet_watch;
 mod part;
 mod pipeline;
 mod rate;
@@ -39,62 +38,13 @@ pub use rest::{RestOutcome, RestReading};
 use crate::align::clock_ratio::ClockRatioConfig;
 use crate::bias::Latitude;
 use crate::model::fognet::{FogEstimate, GAIN_FRACTION_BITS};
-use crate::model::fognet_blob::{Gyro, Training};
 use crate::model::seconds::{FRAMES, FogFrame, Incomplete, NewSecond, STEPS, SecondSums};
 use crate::units::Angle;
 
 /// A window's correction is spread over this many frames.
 const WINDOW_FRAMES: i64 = STEPS as i64 * FRAMES as i64;
 
-/// Says whether FoGNet is used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum FogNetUse {
-    /// FoGNet does not run.
-    #[default]
-    Off,
-    /// FoGNet also runs on weights that were trained on simulated drives. The rate is degraded at best.
-    Simulated,
-    /// FoGNet runs on weights that were trained on recordings of this gyro.
-    Recorded,
-}
-
-/// The reason why weights do not fit the gyro that is configured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[allow(missing_docs, reason = "its messages say it")]
-pub enum GyroMismatch {
-    #[error("trained for a {trained}, the configuration has a {part} number {serial}")]
-    Other {
-        trained: Training,
-        part: Gyro,
-        /// Serial number of the configured gyro, 0 where none is configured.
-        serial: u32,
-    },
-    #[error("trained on a {0}, which runs only where the configuration says Simulated")]
-    Simulated(Training),
-}
-
-/// Checks that weights are for a gyro: trained for its part and for its serial number or any, and on simulated drives
-/// only where `wanted` allows it.
-pub fn check_training(
-    trained: Training,
-    part: Gyro,
-    serial: u32,
-    wanted: FogNetUse,
-) -> Result<(), GyroMismatch> {
-    if trained.gyro != part || trained.serial != 0 && trained.serial != serial {
-        return Err(GyroMismatch::Other { trained, part, serial });
-    }
-    if trained.simulated && wanted != FogNetUse::Simulated {
-        return Err(GyroMismatch::Simulated(trained));
-    }
-    Ok(())
-}
-
-/// Configures the correction of a fibre-optic gyro, and the limits within which FoGNet is used.
+/// Configures the correction of a fibre-optic gyro.
 #[derive(Debug, Clone, Copy)]
 pub struct FogConfig {
     /// The expected errors of the gyro.
@@ -108,14 +58,12 @@ pub struct FogConfig {
     pub shake: [f32; 2],
     /// The limit on the departure of the gyro's clock from the caller's; `None` where the caller's is no better.
     pub clock_ratio: Option<ClockRatioConfig>,
-    /// Says whether FoGNet is used.
-    pub fognet: FogNetUse,
-    /// Largest correction of a window that is accepted.
+    /// Largest correction of a window of FoGNet that is accepted.
     pub max_correction: Angle,
 }
 
 impl FogConfig {
-    /// A level DSP-1760 on a car, without a latitude and without FoGNet. The shaking is that of the simulated car on
+    /// A level DSP-1760 on a car, without a latitude. The shaking is that of the simulated car on
     /// its training drives. The limit of 0.02 rad a minute on FoGNet's correction is four times what the Earth's rate
     /// can add to it, and leaves room for 0.1 % of scale error over two full turns.
     pub const DEFAULT: Self = Self {
@@ -124,7 +72,6 @@ impl FogConfig {
         tilt: Tilt::NONE,
         shake: [6e-5, 1.7e-4],
         clock_ratio: None,
-        fognet: FogNetUse::Off,
         max_correction: Angle((0.02 * Angle::PER_RAD as f64) as i64),
     };
 }

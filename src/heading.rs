@@ -19,7 +19,7 @@ pub(crate) use estimator::{FINE_BIAS, gain_knowledge};
 pub use gain::Gain;
 pub use receiver::{HeadingConfigError, HeadingReceiver, HeadingSettings, Received};
 
-use embedded_can::{Frame, Id};
+use embedded_can::{ExtendedId, Frame, Id};
 
 /// Course and speed over ground.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -73,6 +73,11 @@ impl Heading {
         }
         Ok(self)
     }
+}
+
+/// Returns the identifier of a parameter group that is sent to all, for a priority of 0 to 7.
+const fn broadcast_id(group: u32, priority: u8, source: u8) -> Option<ExtendedId> {
+    ExtendedId::new((priority as u32) << 26 | group << 8 | source as u32)
 }
 
 /// Returns the parameter group of a frame that is sent to all (SAE J1939-21, 5.2.5), with its eight bytes.

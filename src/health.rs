@@ -53,8 +53,6 @@ pub enum Source {
     Static = 1,
     /// Corrected by the window model.
     Model = 2,
-    /// The fibre-optic gyro, corrected by FoGNet.
-    FogNet = 3,
     /// The fibre-optic gyro less the Earth's rate at the latitude and its bias.
     EarthRate = 4,
 }

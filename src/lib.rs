@@ -12,7 +12,7 @@
 //! | [`sensor`] | decodes bytes into samples: Xsens MTi, KVH DSP-1760, ICM-42688 |
 //! | [`sample`], [`units`] | hold samples in fixed point: 2^-27 rad/s, 2^-20 m/s^2, microseconds |
 //! | [`model`] | runs the networks: ten samples in, the gyro's error out |
-//! | [`can`] | encodes Bosch MM5.10, our own messages, J1939, E2E, SLCAN; decodes wheel speeds |
+//! | [`can`] | encodes Bosch MM5.10, our own messages, E2E, SLCAN; decodes wheel speeds |
 //! | [`estimate`], [`health`] | describe a corrected rate, its state and the counters |
 //! | [`store`], [`service`] | keep configuration and weights in flash, and change them on request |
 //!

@@ -6,7 +6,7 @@
 //!
 //! The network does not run inside the processing of a sample: [`Output::window`] is a window that is due, the caller
 //! runs it when it has time, and [`Pipeline::deliver`] accepts its estimate. The estimate is used exactly
-//! [`crate::compensate::Mode::delay`] samples after the window's newest one, so fast and slow machines send the same
+//! [`crate::compensate::Stride::delay`] samples after the window's newest one, so fast and slow machines send the same
 //! frames.
 
 mod config;
@@ -36,7 +36,7 @@ use crate::monitor::{AXIS_STUCK_AFTER, STUCK_AFTER};
 use crate::sample::{Frame, ImuSample, PERIOD_US, Standstill, Validity, WHEELS, WheelSample};
 use crate::standstill::{Judge, Standing};
 
-use crate::model::window::{self, Features, WINDOW};
+use crate::model::window::{self, WINDOW};
 use crate::mounting::Vertical;
 use crate::units::{AngularRate, Yaw};
 use course::Start;
@@ -68,7 +68,7 @@ pub struct Output {
     /// The sample whose estimate is final with this one.
     pub complete: Option<Complete>,
     /// A window that is due: run it through the network and [`Pipeline::deliver`] the estimate before the sample
-    /// [`crate::compensate::Mode::delay`] steps later.
+    /// [`crate::compensate::Stride::delay`] steps later.
     pub window: Option<DueWindow>,
     /// The judgement of standstill; not likely where the gyro contradicts it.
     pub standing: Standing,
@@ -124,8 +124,6 @@ struct State {
     silent: u32,
     /// Samples until the last gap is a whole window in the past.
     gap_within: u32,
-    /// The newest sample as the networks see it.
-    inertial: Option<Features>,
     /// The sensor is mounted differently than in earlier drives.
     moved: bool,
     /// The newest reading was a repeated one.
@@ -168,7 +166,6 @@ impl Pipeline {
             tick: 0,
             silent: 0,
             gap_within: 0,
-            inertial: None,
             moved: false,
             stuck: false,
             rate_refused: false,
@@ -272,7 +269,7 @@ impl Pipeline {
         }
         self.state.standing = self.judged(standing);
         let vehicle = self.report(&frame, &rates, wheels, board);
-        let stride = self.config.compensate.mode.stride();
+        let stride = self.config.compensate.stride.samples();
         let window = self.state.windows.due(frame.tick, stride);
         self.state.gap_within = self.state.gap_within.saturating_sub(1);
         let standing = self.state.standing;
@@ -292,13 +289,6 @@ impl Pipeline {
     /// window waits for it, or if it is late or a duplicate. A window without an estimate is counted at its deadline.
     pub fn deliver(&mut self, end: u32, estimate: Estimate) -> bool {
         self.state.windows.deliver(end, estimate)
-    }
-
-    /// Returns the newest sample as the networks see it, for [`crate::fog`]; `None` before the bias is known and
-    /// while the reading cannot be used.
-    #[must_use]
-    pub fn inertial(&self) -> Option<Features> {
-        self.state.inertial
     }
 
     /// Returns the grid step of the newest message set.
@@ -429,7 +419,7 @@ impl Pipeline {
     /// Applies the estimate that is due at this tick; counts one that did not arrive in time.
     fn use_estimate(&mut self, tick: u32) -> Option<Implausible> {
         let State { windows, compensator, uncertainty, counters, .. } = &mut self.state;
-        let Some(estimate) = windows.take_estimate(tick, self.config.compensate.mode.delay())? else {
+        let Some(estimate) = windows.take_estimate(tick, self.config.compensate.stride.delay())? else {
             count(&mut counters.late, 1);
             windows.reject(Faults::LATE);
             compensator.forget();
@@ -459,7 +449,6 @@ impl Pipeline {
         let [.., rate] = rates;
         let good = sample.validity.is_good();
         self.state.compensator.add(frame.tick, rates, sample.validity);
-        self.state.inertial = good.then_some(features);
         if good {
             self.state.windows.add(features);
         }

@@ -62,7 +62,6 @@ impl Board {
         let config = coprocessor::Config {
             wheels: Some(wheels),
             clock: Clock::Sensor,
-            has_fognet: false,
             ..configuration.coprocessor(&Calibration::NONE, &Learned::NOTHING, 0)
         };
         Self {

@@ -3,12 +3,12 @@
 use crate::noise::Noise;
 use embedded_can::{ExtendedId, Id, StandardId};
 use gyronet::can::config::{
-    BIT_RATES, BoschSettings, DataIdMode, E2e, Settings, StatusSettings, Vdc2Settings, YawSettings,
+    BIT_RATES, BoschSettings, DataIdMode, E2e, Settings, StatusSettings, YawSettings,
 };
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{WheelFrame, WheelSettings};
-use gyronet::compensate::{CompensateConfig, Lag, Mode, Stride};
+use gyronet::compensate::{CompensateConfig, Lag, Stride};
 use gyronet::heading::{HeadingSettings, HeadingSignal};
 use gyronet::store::{Configuration, Field, FogGyro, FogPart, Mounting};
 use gyronet::units::AngularRate;
@@ -18,7 +18,7 @@ const IDS: [u16; 24] = [
     0x0A0, 0x0A1, 0x0AA, 0x0AB, 0x0B0, 0x130, 0x174, 0x178, 0x17C, 0x1A0, 0x1A1, 0x1A2, 0x1A3, 0x1A4, 0x1A5,
     0x1A6, 0x200, 0x201, 0x202, 0x300, 0x301, 0x6F0, 0x700, 0x708,
 ];
-/// The frame VDC2 of some addresses, and other frames of 29 bits.
+/// Frames of 29 bits.
 const LONG_IDS: [u32; 6] = [0x0CFD_C50B, 0x0CFD_C52A, 0x18FE_F31C, 0x18DA_10F1, 0x18DB_33F1, 0x18DA_F110];
 
 /// A value between the bounds of a field, its bounds among them.
@@ -50,14 +50,6 @@ fn three(noise: &mut Noise, usual: [u16; 3]) -> [u16; 3] {
     if noise.int(0, 1) == 0 { usual } else { [(); 3].map(|()| one(noise, &IDS)) }
 }
 
-fn mode(noise: &mut Noise) -> Mode {
-    match noise.int(0, 11) {
-        0 => Mode::Newest,
-        1 => Mode::Middle,
-        samples => Mode::Overlap { stride: Stride::new(samples as u8 - 1).expect("1 to 10") },
-    }
-}
-
 pub fn configuration(noise: &mut Noise) -> Configuration {
     let default = Configuration::DEFAULT;
     let yaw = default.can.yaw.expect("it is sent");
@@ -69,7 +61,6 @@ pub fn configuration(noise: &mut Noise) -> Configuration {
             period_ms: 10 * noise.int(1, 100) as u16,
             e2e: E2e::P01 { mode: DataIdMode::Both, data_ids: [1, 2, 3] },
         }),
-        vdc2: maybe(noise, |noise| Vdc2Settings { source: one(noise, &[0x0B, 0x2A, 253]) }),
         status: maybe(noise, |noise| StatusSettings { id: one(noise, &IDS) }),
     };
     let place = |noise: &mut Noise| HeadingSignal {
@@ -126,7 +117,7 @@ pub fn configuration(noise: &mut Noise) -> Configuration {
         },
         static_init,
         compensate: CompensateConfig {
-            mode: mode(noise),
+            stride: Stride::new(noise.int(1, 10) as u8).expect("1 to 10"),
             lag: Lag::new(noise.int(0, 11) as u8).expect("up to 11"),
             max_mean: rate(noise, Field::CompensateMaxMean),
             max_single: rate(noise, Field::CompensateMaxSingle),

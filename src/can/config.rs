@@ -7,10 +7,9 @@ mod settings;
 
 pub use super::e2e::{DataIdMode, P11Mode};
 pub use error::ConfigError;
-pub use settings::{BoschSettings, E2e, Settings, StatusSettings, Vdc2Settings, YawSettings};
+pub use settings::{BoschSettings, E2e, Settings, StatusSettings, YawSettings};
 
 use super::bosch::LAYOUTS;
-use super::j1939::{VDC2_PGN, VDC2_PRIORITY, broadcast_id};
 use super::load::{Periodic, per_mille};
 use super::status;
 use crate::sample::PERIOD_US;
@@ -23,8 +22,6 @@ pub(super) const SAMPLE_MS: u16 = (PERIOD_US / 1000) as u16;
 const MAX_PERIOD_MS: u16 = 1000;
 /// Identifiers reserved for diagnosis (ISO 15765-4).
 const DIAGNOSIS: core::ops::RangeInclusive<u16> = 0x7DF..=0x7EF;
-/// Highest J1939 source address; 254 and 255 have other meanings.
-const MAX_SOURCE: u8 = 253;
 /// The bit rates of the bus, bit/s.
 pub const BIT_RATES: [u32; 4] = [125_000, 250_000, 500_000, 1_000_000];
 /// Highest worst-case bus load, 1/1000; above it other nodes would wait too long.
@@ -45,8 +42,7 @@ impl Config {
     /// [`Settings::SLCAN_115200`], which also pass the check.
     pub const SLCAN_115200: Self = Self { settings: Settings::SLCAN_115200 };
     /// No message at all, for a replay of which only the rates are used. [`Config::new`] refuses it for a bus.
-    pub const SILENT: Self =
-        Self { settings: Settings { bosch: None, yaw: None, vdc2: None, ..Settings::DEFAULT } };
+    pub const SILENT: Self = Self { settings: Settings { bosch: None, yaw: None, ..Settings::DEFAULT } };
 
     /// Checks settings.
     pub fn new(settings: Settings) -> Result<Self, ConfigError> {
@@ -55,11 +51,6 @@ impl Config {
         }
         if let Some(yaw) = &settings.yaw {
             check_yaw(yaw, settings.bosch)?;
-        }
-        if let Some(Vdc2Settings { source }) = settings.vdc2
-            && source > MAX_SOURCE
-        {
-            return Err(ConfigError::SourceAddress(source));
         }
         if let Some(StatusSettings { id }) = settings.status {
             let others = Self { settings: Settings { status: None, ..settings } };
@@ -92,20 +83,16 @@ impl Config {
 
     /// Returns every message that is sent, in the order of sending.
     pub fn messages(&self) -> Vec<Periodic, MAX_MESSAGES> {
-        let Settings { bosch, yaw, vdc2, status, .. } = self.settings;
+        let Settings { bosch, yaw, status, .. } = self.settings;
         let bosch = bosch_ids(bosch).map(|id| Periodic { id: Id::Standard(id), period_ms: SAMPLE_MS });
         let yaw = yaw.into_iter().flat_map(|yaw| {
             let message = move |id| Some(Periodic { id: Id::Standard(id?), period_ms: yaw.period_ms });
             yaw.ids.into_iter().filter_map(move |id| message(StandardId::new(id)))
         });
-        let vdc2 = vdc2.and_then(|vdc2| {
-            let id = broadcast_id(VDC2_PGN, VDC2_PRIORITY, vdc2.source)?;
-            Some(Periodic { id: Id::Extended(id), period_ms: SAMPLE_MS })
-        });
         let status = status.and_then(|status| StandardId::new(status.id));
         let status = status.map(|id| Periodic { id: Id::Standard(id), period_ms: status::PERIOD_MS });
         let mut messages = Vec::new();
-        for message in bosch.chain(yaw).chain(vdc2).chain(status) {
+        for message in bosch.chain(yaw).chain(status) {
             // MAX_MESSAGES holds every message that can be configured.
             let _ = messages.push(message);
         }

@@ -3,7 +3,6 @@
 use super::DataFrame;
 use super::bosch::{LAYOUTS, Motion, SetEncoder, SignalStatus};
 use super::config::{BoschSettings, Config, MAX_MESSAGES};
-use super::j1939::{Validity, Vdc2Encoder};
 use super::status::{SlowStatus, StatusEncoder};
 use super::yaw::Quality;
 use super::yaw_encoder::YawEncoder;
@@ -17,7 +16,6 @@ pub struct CanEncoder {
     config: Config,
     bosch: SetEncoder,
     yaw: Option<YawEncoder>,
-    vdc2: Vdc2Encoder,
     status: Option<StatusEncoder>,
     out_of_range: u32,
 }
@@ -33,7 +31,7 @@ impl CanEncoder {
             Some(status) => StatusEncoder::new(status.id),
             None => None,
         };
-        Self { config, bosch: SetEncoder::START, yaw, vdc2: Vdc2Encoder::START, status, out_of_range: 0 }
+        Self { config, bosch: SetEncoder::START, yaw, status, out_of_range: 0 }
     }
 
     /// Returns the number of messages marked "failed" because a value was outside its signal's range.
@@ -54,10 +52,10 @@ impl CanEncoder {
     /// Encodes the frames of one sample and passes each to `send`.
     #[inline(never)]
     pub fn send(&mut self, sample: &VehicleSample, mut send: impl FnMut(DataFrame)) {
-        let (status, validity) = match sample.live.quality {
-            Quality::Good | Quality::Degraded => (SignalStatus::OK, Validity::Valid),
-            Quality::Initialising => (SignalStatus::INITIALISING, Validity::NotAvailable),
-            Quality::Unusable => (SignalStatus::FAILURE, Validity::Error),
+        let status = match sample.live.quality {
+            Quality::Good | Quality::Degraded => SignalStatus::OK,
+            Quality::Initialising => SignalStatus::INITIALISING,
+            Quality::Unusable => SignalStatus::FAILURE,
         };
         // The accelerometer is in the same sensor as the gyro.
         let unusable = sample.live.quality == Quality::Unusable;
@@ -73,12 +71,7 @@ impl CanEncoder {
             }
         }
         if let (Some(feed), Some(yaw)) = (self.yaw.as_mut(), settings.yaw) {
-            feed.frames(&sample.delayed, yaw.ids).for_each(&mut send);
-        }
-        if let Some(vdc2) = settings.vdc2 {
-            let message = self.vdc2.encode(sample.live.rate, validity, &sample.specific_force);
-            count(&mut self.out_of_range, u32::from(validity != Validity::Error && message.has_error()));
-            message.frame(vdc2.source).into_iter().for_each(send);
+            feed.frames(&sample.delayed, yaw.ids).for_each(send);
         }
     }
 }

@@ -13,15 +13,13 @@ pub(super) struct Scale {
     /// Signal LSBs per rate code, times 2^32; at most 2^31, because a signal LSB below two rate codes would gain
     /// nothing.
     pub(super) factor_q32: i64,
-    /// Code of rate zero, times 2^32; below 2^60. The code need not be a whole number.
-    pub(super) zero_q32: i64,
 }
 
 impl Scale {
     /// Scale for a signal LSB of 1e-6 deg/s: 180 / pi / 2^27 / 1e-6, too small by 2.3e-10.
-    pub(super) const MICRO_DEG_PER_SEC: Self = Self { factor_q32: 1_833_464_944, zero_q32: 0 };
+    pub(super) const MICRO_DEG_PER_SEC: Self = Self { factor_q32: 1_833_464_944 };
     /// Scale for a signal LSB of 2e-4 deg/s.
-    pub(super) const FIFTH_MILLI_DEG_PER_SEC: Self = Self { factor_q32: 9_167_325, zero_q32: 0 };
+    pub(super) const FIFTH_MILLI_DEG_PER_SEC: Self = Self { factor_q32: 9_167_325 };
 }
 
 /// Carries the rounding residual of one signal to its next code.
@@ -39,8 +37,8 @@ impl RoundingResidual {
 
     /// Returns the code nearest to the rate plus the residual of earlier rates.
     pub(super) fn encode(&mut self, rate: AngularRate) -> i32 {
-        // At most 2^62 + 2^60 + 2^31.
-        let wanted = i64::from(rate.0) * self.scale.factor_q32 + self.scale.zero_q32 + self.residual;
+        // At most 2^62 + 2^31.
+        let wanted = i64::from(rate.0) * self.scale.factor_q32 + self.residual;
         let sent = (wanted + (1 << 31)) >> 32;
         self.residual = wanted - (sent << 32);
         sent as i32

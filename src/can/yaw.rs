@@ -82,7 +82,6 @@ impl RateMessage {
             0 => Source::Raw,
             1 => Source::Static,
             2 => Source::Model,
-            3 => Source::FogNet,
             4 => Source::EarthRate,
             unknown => return Err(YawError::Source(unknown)),
         };

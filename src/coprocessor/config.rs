@@ -42,9 +42,6 @@ pub struct Config {
     pub fog_expected: bool,
     /// The caller runs GyroNet. Without it no window is due, and the messages report damaged data.
     pub has_gyronet: bool,
-    /// The caller runs FoGNet where [`FogConfig::fognet`] selects it. Without it none of its windows is due, and the
-    /// gyro's messages report damaged data.
-    pub has_fognet: bool,
     /// The clock that `now` comes from.
     pub clock: Clock,
     /// The limit on the departure of the sensor's clock from an outside clock; `None` where the outside clock is no
@@ -65,7 +62,6 @@ impl Config {
         fog_ids: FOG_IDS,
         fog_expected: false,
         has_gyronet: true,
-        has_fognet: true,
         clock: Clock::Outside,
         clock_ratio: None,
         storage: StorageFaults { damaged: false, configuration_lost: false },

@@ -2,8 +2,7 @@
 //!
 //! The gyro's increments are summed over steps of the caller's time ([`FogGrid`]). Each step uses the newest
 //! readings of inertial sensor and wheels. They are a step or two old, which hardly changes their means over a
-//! second. If FoGNet is configured, it runs outside the pipeline, as GyroNet does: [`FogPipeline::window`] returns
-//! the window that is due, the caller runs the network on it, and [`FogPipeline::deliver`] takes the estimate.
+//! second.
 //!
 //! | state | rate | source | quality | faults |
 //! |---|---|---|---|---|
@@ -14,9 +13,6 @@
 //! | the latitude on the bus contradicts the one in use | the same | Earth rate | degraded | IMPLAUSIBLE |
 //! | no latitude is known, the vehicle has stood still | less the reading at standstill | static | degraded | |
 //! | no latitude is known, and no standstill yet | uncorrected | raw | degraded | |
-//! | FoGNet is configured, the latitude is known, and an estimate is in use | also less the correction | FoGNet | as without; degraded with weights from simulated drives | |
-//! | standstills show that FoGNet makes the rate worse: it is dropped until the next start | as without FoGNet | | | |
-//! | FoGNet's estimate is late, rejected, or there are no weights for this gyro | as without FoGNet | | degraded | LATE, IMPLAUSIBLE, STORED |
 //! | a step differs from the inertial gyro as no vehicle turns in 10 ms; after two seconds of that it is degraded | not available | raw | unusable | IMPLAUSIBLE |
 //! | increments are missing in the step, or none have come yet from a gyro that is expected | not available | raw | unusable | GAP |
 //! | increments repeat themselves ([`STUCK_AFTER`], [`STUCK_US`]), until one differs | not available | raw | unusable | STUCK |
@@ -25,20 +21,16 @@
 //! the grid is split, and its rounding makes sums of equal increments differ.
 
 use super::beside::{Beside, Comparison};
-use super::fognet_watch::FogNetWatch;
-use super::{EarthAndBias, FogConfig, FogCorrector, FogNetUse, FogOutput, IncrementRate, RestOutcome};
+use super::{EarthAndBias, FogConfig, IncrementRate, RestOutcome};
 use crate::align::clock::ClockError;
 use crate::align::clock_ratio::{ClockRatio, RatioEstimator};
 use crate::align::fog_grid::FogGrid;
 use crate::bias::Latitude;
 use crate::estimate::{AccumulatedYaw, YawEstimate};
 use crate::health::{Faults, Quality, Source, Status, count};
-use crate::model::fognet::FogEstimate;
-use crate::model::seconds::{FogFrame, NewSecond};
-use crate::model::window::Features;
 use crate::sample::{FogSample, PERIOD_US, RATE_HZ, Standstill, WheelSample};
 use crate::sqrt::sqrt;
-use crate::units::{Angle, AngularRate, Micros, WheelSpeed, Yaw};
+use crate::units::{Angle, AngularRate, Micros, Yaw};
 
 /// The gyro counts as stuck after this many increments in a row that equal the one before, if they last [`STUCK_US`].
 /// A DSP-3000's noise in 10 ms is a hundred of its units: one increment in four hundred repeats, and four in a row do
@@ -64,23 +56,12 @@ pub struct FogCounters {
     pub gaps: u32,
     /// Times that the gyro was stuck.
     pub stuck: u32,
-    /// Windows whose estimate arrived in time.
-    pub windows: u32,
-    /// Windows whose estimate did not arrive in time.
-    pub late: u32,
-    /// Estimates rejected as implausible.
-    pub implausible: u32,
-    /// Windows that ended early: a gap, or too few readings of the other sensors.
-    pub broken: u32,
     /// Steps without a known latitude: the Earth's rate is not subtracted.
     pub no_latitude: u32,
     /// Seconds at standstill that updated the bias.
     pub zero_rate_updates: u32,
     /// Seconds in which the gyro contradicted that the vehicle stands.
     pub contradicted: u32,
-    /// Times that FoGNet was dropped, because standstills showed that it makes the rate worse: at most once per
-    /// start.
-    pub dropped: u32,
 }
 
 impl FogCounters {
@@ -90,14 +71,9 @@ impl FogCounters {
         misplaced: 0,
         gaps: 0,
         stuck: 0,
-        windows: 0,
-        late: 0,
-        implausible: 0,
-        broken: 0,
         no_latitude: 0,
         zero_rate_updates: 0,
         contradicted: 0,
-        dropped: 0,
     };
 }
 
@@ -117,28 +93,19 @@ pub struct FogPipeline {
     /// The latitude on the bus contradicts the one in use.
     latitude_contested: bool,
     shake: [f32; 2],
-    corrector: FogCorrector,
-    fognet_watch: FogNetWatch,
-    /// The configured use; [`FogNetUse::Off`] once FoGNet has been dropped.
-    fognet: FogNetUse,
-    has_network: bool,
     rate: IncrementRate,
     correction: IncrementRate,
     yaw: AccumulatedYaw,
     repeats: Repeats,
     /// An increment of the next step was stuck.
     stuck_in_step: bool,
-    due: Option<NewSecond>,
-    /// An estimate is due at the end of the second.
-    awaited: bool,
-    estimate_faults: Faults,
     counters: FogCounters,
 }
 
 impl FogPipeline {
-    /// Creates a pipeline before its first sample. Without a network no window is due, and the messages report that.
-    /// Where a gyro is `expected`, rates are sent from time 0 on, and its silence is reported.
-    pub const fn new(config: FogConfig, has_network: bool, expected: bool) -> Self {
+    /// Creates a pipeline before its first sample. Where a gyro is `expected`, rates are sent from time 0 on, and its
+    /// silence is reported.
+    pub const fn new(config: FogConfig, expected: bool) -> Self {
         Self {
             grid: FogGrid::new(expected),
             earth_and_bias: EarthAndBias::new(config.errors, config.tilt, config.latitude),
@@ -152,18 +119,11 @@ impl FogPipeline {
             shown: None,
             latitude_contested: false,
             shake: config.shake,
-            corrector: FogCorrector::new(config),
-            fognet_watch: FogNetWatch::START,
-            fognet: config.fognet,
-            has_network,
             rate: IncrementRate::START,
             correction: IncrementRate::START,
             yaw: AccumulatedYaw::START,
             repeats: Repeats::NONE,
             stuck_in_step: false,
-            due: None,
-            awaited: false,
-            estimate_faults: Faults::NONE,
             counters: FogCounters::NONE,
         }
     }
@@ -237,12 +197,7 @@ impl FogPipeline {
     /// Returns the rate of the next 10 ms, if they are complete or due; `None` before the first sample, unless one is
     /// expected. Also call it every few milliseconds, because it detects silence.
     #[inline(never)]
-    pub fn next_step(
-        &mut self,
-        now: Micros,
-        inertial: Option<Features>,
-        wheels: Option<&WheelSample>,
-    ) -> Option<YawEstimate> {
+    pub fn next_step(&mut self, now: Micros, wheels: Option<&WheelSample>) -> Option<YawEstimate> {
         let step = self.grid.next_step(now)?;
         let [.., turn] = step.turn.angle;
         let turn = turn.filter(|_| u64::from(step.turn.covered) == PERIOD_US);
@@ -261,45 +216,28 @@ impl FogPipeline {
         self.is_confirmed |= outcome == Some(RestOutcome::Used) && self.earth_and_bias.rest().shows_unit();
         let is_clock_off = self.clock.as_ref().is_some_and(RatioEstimator::fault);
         let contradicts_unit = self.was_refused && !self.is_confirmed;
-        let wheels = wheels.and_then(rear);
-        let uses_network = self.fognet != FogNetUse::Off;
+        let has_rear = wheels.is_some_and(has_rear);
         let has_latitude = self.earth_and_bias.latitude().is_some();
-        let by_network = uses_network.then(|| {
-            let output = self.corrector.correct(&FogFrame { turn: kept, inertial, wheels });
-            self.note(&output);
-            output.turn.filter(|_| output.corrected && has_latitude && self.has_network)
-        });
-        let by_network = by_network.flatten();
-        let both = kept.zip(by_network).map(|(kept, by_network)| [kept, by_network]);
-        if self.fognet_watch.observe(both, standstill) {
-            self.drop_fognet();
-        }
         count(&mut self.counters.gaps, u32::from(turn.is_none()));
         let latency_us = u32::try_from(now.0.saturating_sub(step.time.0)).ok();
         let contradicted = self.earth_and_bias.rest().is_contradicted();
         count(&mut self.counters.no_latitude, u32::from(!has_latitude));
-        let faults = self
-            .estimate_faults
-            .with(Faults::STUCK.when(stuck))
+        let faults = Faults::STUCK
+            .when(stuck)
             .with(Faults::GAP.when(turn.is_none() && !stuck && !wrong))
-            .with(Faults::WHEELS.when(wheels.is_none() || contradicted))
+            .with(Faults::WHEELS.when(!has_rear || contradicted))
             .with(
                 Faults::IMPLAUSIBLE
                     .when(self.latitude_contested || is_clock_off || contradicts_unit || contradicts_other),
-            )
-            .with(Faults::STORED.when(uses_network && !self.has_network));
+            );
         let is_good = faults == Faults::NONE && self.is_confirmed;
-        let (status, source, quality) = match (turn, by_network) {
-            (None, _) if stuck => (Status::Stuck, Source::Raw, Quality::Unusable),
-            (None, _) => (Status::Silent, Source::Raw, Quality::Unusable),
-            (Some(_), Some(_)) if self.fognet == FogNetUse::Recorded && is_good => {
-                (Status::Ready, Source::FogNet, Quality::Good)
-            }
-            (Some(_), Some(_)) => (Status::Degraded, Source::FogNet, Quality::Degraded),
-            (Some(_), None) if has_latitude && is_good => (Status::Ready, Source::EarthRate, Quality::Good),
-            (Some(_), None) => (Status::Degraded, self.source(), Quality::Degraded),
+        let (status, source, quality) = match turn {
+            None if stuck => (Status::Stuck, Source::Raw, Quality::Unusable),
+            None => (Status::Silent, Source::Raw, Quality::Unusable),
+            Some(_) if has_latitude && is_good => (Status::Ready, Source::EarthRate, Quality::Good),
+            Some(_) => (Status::Degraded, self.source(), Quality::Degraded),
         };
-        let (rate, correction) = match (turn, by_network.or(kept)) {
+        let (rate, correction) = match (turn, kept) {
             (Some(turn), Some(kept)) => {
                 let correction = Angle(turn.0.saturating_sub(kept.0));
                 (self.rate.rate(kept), self.correction.rate(correction))
@@ -309,14 +247,10 @@ impl FogPipeline {
         let tick = (step.time.0 / PERIOD_US) as u32;
         let [standing, moving] = self.shake;
         let shake = if standstill == Standstill::Still { standing } else { moving };
-        // FoGNet reports no uncertainty, so everything that it changes counts as a possible error.
-        let changed =
-            kept.zip(by_network).map_or(0, |(kept, by_network)| kept.0.saturating_sub(by_network.0));
-        let changed = changed as f32 * (RATE_HZ as f32 / Angle::PER_RAD);
         let unknown = self.clock.as_ref().is_some_and(|clock| !clock.is_known());
         let clock = if unknown { CLOCK } else { 0.0 };
         let beside = self.beside.sigma(rate.0 as f32 / AngularRate::PER_RAD_PER_SEC, clock);
-        let spread = sqrt(shake * shake + changed * changed + beside * beside);
+        let spread = sqrt(shake * shake + beside * beside);
         let sigma = turn.is_some().then(|| self.earth_and_bias.sigma(rate, spread));
         let yaw = Yaw(0);
         let mut estimate =
@@ -325,15 +259,6 @@ impl FogPipeline {
         Some(estimate)
     }
 
-    /// Stops FoGNet until the next start. This step's rate still contains its estimate.
-    fn drop_fognet(&mut self) {
-        count(&mut self.counters.dropped, 1);
-        self.fognet = FogNetUse::Off;
-        self.due = None;
-        self.estimate_faults = Faults::NONE;
-    }
-
-    /// Returns the source of the rate without FoGNet.
     fn source(&self) -> Source {
         match self.earth_and_bias.latitude() {
             Some(_) => Source::EarthRate,
@@ -347,46 +272,9 @@ impl FogPipeline {
         count(&mut self.counters.contradicted, u32::from(outcome == Some(RestOutcome::Refused)));
     }
 
-    /// Returns the second that ends the window that is due, once.
-    pub fn second(&mut self) -> Option<NewSecond> {
-        self.due.take()
-    }
-
-    /// Accepts the estimate of a window. Returns whether it will be used: not if no window waits for it, or if it is
-    /// late or a duplicate.
-    pub fn deliver(&mut self, number: u32, estimate: FogEstimate) -> bool {
-        self.corrector.deliver(number, estimate)
-    }
-
     /// Returns the event counters since the start.
     pub fn counters(&self) -> &FogCounters {
         &self.counters
-    }
-
-    fn note(&mut self, output: &FogOutput) {
-        let FogOutput { corrected, due, broken, implausible, late, .. } = output;
-        if let Some(second) = due.filter(|_| self.has_network) {
-            let used = self.awaited && !*late && implausible.is_none();
-            count(&mut self.counters.windows, u32::from(used));
-            self.due = Some(second);
-            self.awaited = true;
-        }
-        count(&mut self.counters.broken, u32::from(broken.is_some()));
-        // A window ends with its second; its estimate is checked at the end of the next one.
-        if implausible.is_some() {
-            count(&mut self.counters.implausible, 1);
-            self.estimate_faults = Faults::IMPLAUSIBLE;
-        } else if *late && self.has_network {
-            count(&mut self.counters.late, 1);
-            self.estimate_faults = Faults::LATE;
-        } else if *corrected {
-            self.estimate_faults = Faults::NONE;
-        }
-        if broken.is_some() {
-            self.due = None;
-            self.awaited = false;
-            self.estimate_faults = Faults::NONE;
-        }
     }
 }
 
@@ -419,9 +307,8 @@ impl Repeats {
     }
 }
 
-/// Returns the left and right wheel of the rear axle, which is not steered, or of the front one where there is no
-/// other.
-fn rear(wheels: &WheelSample) -> Option<[WheelSpeed; 2]> {
+/// Returns whether the wheels of the rear axle, which is not steered, are known, or those of the front one.
+fn has_rear(wheels: &WheelSample) -> bool {
     let [front_left, front_right, rear_left, rear_right] = wheels.speeds;
-    Some([rear_left.or(front_left)?, rear_right.or(front_right)?])
+    rear_left.or(front_left).is_some() && rear_right.or(front_right).is_some()
 }

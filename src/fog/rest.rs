@@ -82,11 +82,6 @@ impl Second {
         self.steps += 1;
     }
 
-    /// Returns the number of steps.
-    pub const fn steps(&self) -> u8 {
-        self.steps
-    }
-
     /// Returns the mean rate over this second and the next one, rad/s, with triangular weights.
     pub fn triangle(&self, next: &Self) -> f32 {
         let codes = self.rising + 2 * STEPS * next.sum - next.rising;

@@ -1,8 +1,7 @@
 //! Rapid updates of position and of course and speed over ground of NMEA 2000 (PGN 129025 and 129026), by the
 //! definitions of canboat.
 
-use super::{Heading, HeadingError, code, group, word};
-use crate::can::j1939::broadcast_id;
+use super::{Heading, HeadingError, broadcast_id, code, group, word};
 use embedded_can::Frame;
 
 /// Parameter group of the position.

@@ -40,8 +40,7 @@ const fn remark(
     State { status: None, name, entered, rate, left, counter }
 }
 
-/// All states. In a fault state there is no yaw rate: our own messages report "not available", Bosch's set "failed"
-/// and VDC2 "error".
+/// All states. In a fault state there is no yaw rate: our own messages report "not available", Bosch's set "failed".
 ///
 /// From a fault the state returns to init where no bias is known, otherwise to degraded.
 pub const STATES: [State; 15] = [
@@ -49,7 +48,7 @@ pub const STATES: [State; 15] = [
         Status::Init,
         "init",
         "the start; a jump of the clock before the bias was known",
-        "gyro without correction, marked initialising (VDC2: not available)",
+        "gyro without correction, marked initialising",
         "3 s at rest",
         "`moving`",
     ),

@@ -82,7 +82,7 @@ pub struct Configuration {
     pub mounting: Mounting,
     /// Limits within which the vehicle counts as standing.
     pub static_init: StaticConfig,
-    /// Mode, lag and limits of the correction.
+    /// Stride, lag and limits of the correction.
     pub compensate: CompensateConfig,
     /// Identifiers (11 bits) of the fibre-optic gyro's messages: rate, angle, detail.
     pub fog_ids: [u16; 3],
@@ -214,7 +214,7 @@ impl Configuration {
 
 impl Record for Configuration {
     const KEY: u8 = 1;
-    const VERSION: u8 = 10;
+    const VERSION: u8 = 11;
 
     fn check(&self) -> Result<(), FieldError> {
         let config = Config::new(self.can).map_err(FieldError::Can)?;
@@ -232,8 +232,8 @@ impl Record for Configuration {
         }
         let Mounting { roll_deg, pitch_deg, yaw_deg } = self.mounting;
         let StaticConfig { gyro_std, accel_std, gyro_drift, accel_drift, gyro_bias } = self.static_init;
-        // All lags are valid, and all modes that leave a window of the weights enough time: see the device.
-        let CompensateConfig { mode: _, lag: _, max_mean, max_single, max_revision, model: _ } =
+        // All lags are valid, and all strides that leave a window of the weights enough time: see the device.
+        let CompensateConfig { stride: _, lag: _, max_mean, max_single, max_revision, model: _ } =
             self.compensate;
         let rate = |rate: AngularRate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC;
         for (field, value) in [

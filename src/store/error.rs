@@ -105,7 +105,7 @@ pub enum FieldError {
     Wheels(WheelConfigError),
     #[error("sensor: this firmware image does not drive the part")]
     PartNotInImage,
-    #[error("compensate.mode: a window of the weights takes {cycles} cycles, and it leaves {available}")]
+    #[error("compensate.stride: a window of the weights takes {cycles} cycles, and it leaves {available}")]
     Window { cycles: u32, available: u32 },
     #[error("diagnosis: identifier {0:#x} has too many bits, or is used twice")]
     Diagnosis(u32),

@@ -83,7 +83,7 @@ pub enum SlotError {
     /// The file's checksum is not that of the accepted file; the file has this checksum.
     #[error("file {0:08x} is not the one that was accepted")]
     NotAccepted(u32),
-    #[error("a window takes {cycles} cycles, and clock and `compensate.mode` leave {available}")]
+    #[error("a window takes {cycles} cycles, and clock and `compensate.stride` leave {available}")]
     Slow { cycles: u32, available: u32 },
     /// The content of the file is invalid.
     #[error(transparent)]

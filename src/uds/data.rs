@@ -235,8 +235,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
         0x0109 => put_words(
             out,
             &words!(counters.fog => FogCounters {
-                samples, misplaced, gaps, stuck, windows, late, implausible, broken, no_latitude, zero_rate_updates,
-                contradicted, dropped
+                samples, misplaced, gaps, stuck, no_latitude, zero_rate_updates, contradicted
             }),
         ),
         0x010A => put_record(out, &device.info()),

@@ -8,7 +8,7 @@
 
 use crate::common::{self, IMU, SAMPLE, SERVICE, START};
 use crate::service::{self, on_bus, on_line};
-use gyronet::compensate::Mode;
+use gyronet::compensate::Stride;
 use gyronet::model::blob::Shape;
 use gyronet::model::weights;
 use gyronet::service::message::{FAILED_STARTS, Origin, Refusal};
@@ -116,7 +116,7 @@ fn three_resets_by_the_watchdog_lead_to_the_built_in_configuration() {
     const TEST: &str = "three_resets_by_the_watchdog_lead_to_the_built_in_configuration";
     let Some(mut board) = common::unpowered(TEST) else { return };
     let mut configuration = Configuration::DEFAULT;
-    configuration.compensate.mode = Mode::Newest;
+    configuration.compensate.stride = Stride::new(1).expect("one sample");
     Stored::default().record(&configuration).weights(Slot::A, &other_weights(1)).write_to(&mut board);
     board.patch(At::Symbol(FITS), TRUE);
     board.power_on();
@@ -149,7 +149,8 @@ fn accepted_settings_run_and_refused_ones_do_not() {
     let numbers: Vec<usize> = numbers.split(',').map(|text| text.parse().expect("a number")).collect();
     let [accepted, costliest, refused, seconds] = numbers[..] else { panic!("four numbers") };
     let cost = |configuration: &Configuration, shape: Shape| {
-        f64::from(shape.window_cycles()) / f64::from(configuration.compensate.mode.window_cycles(168_000_000))
+        f64::from(shape.window_cycles())
+            / f64::from(configuration.compensate.stride.window_cycles(168_000_000))
     };
     let shapes = [Shape { units: 4, linear: true }, Shape::PAPER];
     let mut all: Vec<(f64, Configuration, Shape)> = (0..4_000)
@@ -197,7 +198,7 @@ fn accepted_settings_run_and_refused_ones_do_not() {
         };
         println!(
             "{TEST}: {cost:.2} of the limit, {:?}, {} units: fails {fails}",
-            configuration.compensate.mode, shape.units
+            configuration.compensate.stride, shape.units
         );
         assert!(is_forced || !fails, "{configuration:?}");
         counts[usize::from(is_forced)] += usize::from(fails == is_forced);

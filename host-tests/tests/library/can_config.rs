@@ -1,9 +1,7 @@
 //! The configuration of the vehicle bus: what is refused, what it costs, what goes out.
 
-use embedded_can::{ExtendedId, Frame, Id, StandardId};
-use gyronet::can::config::{
-    BoschSettings, Config, ConfigError, E2e, Settings, StatusSettings, Vdc2Settings, YawSettings,
-};
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::config::{BoschSettings, Config, ConfigError, E2e, Settings, StatusSettings, YawSettings};
 use gyronet::can::e2e::{DataIdMode, P11Mode};
 use gyronet::can::encoder::CanEncoder;
 use gyronet::can::load::per_mille;
@@ -17,7 +15,7 @@ const YAW: YawSettings = match Settings::DEFAULT.yaw {
     Some(yaw) => yaw,
     None => panic!("the default has our own messages"),
 };
-const ALL: Settings = Settings { vdc2: Some(Vdc2Settings { source: 0x80 }), ..Settings::DEFAULT };
+const ALL: Settings = Settings { status: Some(StatusSettings { id: STATUS_ID }), ..Settings::DEFAULT };
 
 fn with_yaw(yaw: YawSettings) -> Settings {
     Settings { yaw: Some(yaw), ..Settings::DEFAULT }
@@ -29,10 +27,9 @@ fn with_e2e(e2e: E2e) -> Settings {
 
 #[test]
 fn bus_loads_equal_those_by_hand() {
-    // Six frames of 135 bits a hundred times a second; 29-bit identifiers have 160.
+    // Six frames of 135 bits a hundred times a second.
     let config = Config::new(Settings::DEFAULT).expect("checked");
     assert_eq!(config.bus_load_per_mille(), 6 * 135 * 100 / 500);
-    assert_eq!(Config::new(ALL).expect("checked").bus_load_per_mille(), (6 * 135 + 160) * 100 / 500);
     // 22 characters of ten bits.
     let line = |stamped, bits| per_mille(&config.messages(), |message| message.slcan_bits(stamped), bits);
     assert_eq!((line(false, 1_320_000), line(true, 1_560_000)), (100, 100));
@@ -55,9 +52,6 @@ fn settings_that_cannot_be_are_refused() {
         let settings = with_yaw(YawSettings { period_ms, ..YAW });
         assert_eq!(refused(settings), ConfigError::Period(period_ms));
     }
-    let vdc2 = |source| Settings { vdc2: Some(Vdc2Settings { source }), ..Settings::DEFAULT };
-    assert_eq!(refused(vdc2(254)), ConfigError::SourceAddress(254));
-    assert!(Config::new(vdc2(253)).is_ok());
     let status = |id| Settings { status: Some(StatusSettings { id }), ..Settings::DEFAULT };
     assert_eq!(refused(status(0x1A2)), ConfigError::DuplicateIdentifier(0x1A2));
     assert_eq!(refused(status(0x7E0)), ConfigError::Identifier(0x7E0));
@@ -108,7 +102,7 @@ fn sample(tick: u32) -> VehicleSample {
 
 #[test]
 fn frames_go_out_as_configured() {
-    for settings in [Settings::DEFAULT, ALL, Settings::SLCAN_115200] {
+    for settings in [Settings::DEFAULT, Settings::SLCAN_115200] {
         let config = Config::new(settings).expect("checked");
         let mut encoder = CanEncoder::new(config);
         let mut sent = Vec::new();
@@ -122,8 +116,6 @@ fn frames_go_out_as_configured() {
         }
         assert!(sent.iter().all(|frame| config.sends(frame.id()) && frame.dlc() == 8));
     }
-    let vdc2 = ExtendedId::new(0x18F0_0980).expect("29 bits");
-    assert!(Config::new(ALL).expect("checked").sends(Id::Extended(vdc2)));
     let other = StandardId::new(0x123).expect("11 bits");
     assert!(!Config::new(ALL).expect("checked").sends(Id::Standard(other)));
 }
@@ -131,9 +123,7 @@ fn frames_go_out_as_configured() {
 #[test]
 fn every_message_reports_that_the_rate_is_not_to_be_used() {
     let mut encoder = CanEncoder::new(Config::new(ALL).expect("checked"));
-    for (quality, nibble, rate, vdc2) in
-        [(Quality::Initialising, 4, 426_887, 0xFFFF), (Quality::Unusable, 2, i32::MIN, 0xFE00)]
-    {
+    for (quality, nibble, rate) in [(Quality::Initialising, 4, 426_887), (Quality::Unusable, 2, i32::MIN)] {
         let mut unusable = sample(0);
         unusable.delayed.quality = quality;
         unusable.live.quality = quality;
@@ -143,6 +133,5 @@ fn every_message_reports_that_the_rate_is_not_to_be_used() {
         let force = if quality == Quality::Unusable { 2 } else { 0 };
         assert_eq!(frames[0].data()[6] >> 4, force);
         assert_eq!(frames[3].data()[3..7], i32::to_le_bytes(rate));
-        assert_eq!(frames[6].data()[3..5], u16::to_le_bytes(vdc2));
     }
 }

@@ -4,10 +4,9 @@ use can_dbc::{AttributeValue, ByteOrder, Dbc, Message, MessageId, NumericValue, 
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::bosch;
-use gyronet::can::config::{Config, Settings, StatusSettings, Vdc2Settings};
+use gyronet::can::config::{Config, Settings, StatusSettings};
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::encoder::CanEncoder;
-use gyronet::can::j1939::Vdc2;
 use gyronet::can::load::Periodic;
 use gyronet::can::status::{Evidence, Knowledge, STATUS_ID, SlowStatus, StatusEncoder, Verdict};
 use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Faults, Quality, RateMessage, Source};
@@ -17,11 +16,7 @@ use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-const ALL: Settings = Settings {
-    vdc2: Some(Vdc2Settings { source: 0x80 }),
-    status: Some(StatusSettings { id: STATUS_ID }),
-    ..Settings::DEFAULT
-};
+const ALL: Settings = Settings { status: Some(StatusSettings { id: STATUS_ID }), ..Settings::DEFAULT };
 
 static DBC: LazyLock<Dbc> =
     LazyLock::new(|| Dbc::try_from(include_str!("../../../tools/gyronet.dbc")).expect("a DBC file"));
@@ -114,7 +109,7 @@ fn signals_lie_apart_and_their_ranges_are_what_their_bits_hold() {
             };
             let physical = |raw: i64| raw as f64 * signal.factor + signal.offset;
             let (min, max) = (number(signal.min), number(signal.max));
-            // J1939 and value tables keep some codes; a range never promises more than there is.
+            // Value tables keep some codes; a range never promises more than there is.
             let slack = signal.factor * 1e-6;
             assert!(min >= physical(low) - slack && max <= physical(high) + slack, "{}", signal.name);
             assert!(min < max, "{}", signal.name);
@@ -151,7 +146,7 @@ fn value_tables_are_our_enumerations() {
         table.iter().map(|value| (value.id, value.description.to_lowercase())).collect()
     };
     let named = |code: u8, name: &str| (i64::from(code), name.to_owned());
-    let sources = [Source::Raw, Source::Static, Source::Model, Source::FogNet, Source::EarthRate]
+    let sources = [Source::Raw, Source::Static, Source::Model, Source::EarthRate]
         .map(|source| named(source as u8, &format!("{source:?}").to_lowercase()));
     assert_eq!(table(0x1A0, "Source"), sources);
     let qualities = [Quality::Good, Quality::Degraded, Quality::Initialising, Quality::Unusable]
@@ -251,13 +246,8 @@ fn the_slow_status_means_what_the_file_says() {
 }
 
 fn any_sample() -> impl Strategy<Value = VehicleSample> {
-    let source = prop_oneof![
-        Just(Source::Raw),
-        Just(Source::Static),
-        Just(Source::Model),
-        Just(Source::FogNet),
-        Just(Source::EarthRate)
-    ];
+    let source =
+        prop_oneof![Just(Source::Raw), Just(Source::Static), Just(Source::Model), Just(Source::EarthRate)];
     let quality = prop_oneof![
         Just(Quality::Good),
         Just(Quality::Degraded),
@@ -337,8 +327,8 @@ proptest! {
             let mut encoder = encoder();
         for sample in &samples {
             let frames = encoder.encode(sample);
-            let [tx1, tx2, tx3, rate, angle, detail, vdc2] = frames.as_slice() else {
-                return Err(TestCaseError::fail("seven frames"));
+            let [tx1, tx2, tx3, rate, angle, detail] = frames.as_slice() else {
+                return Err(TestCaseError::fail("six frames"));
             };
             let [forward, left, up] = sample.specific_force;
             let negated = AngularRate(-sample.roll_rate.0);
@@ -390,21 +380,6 @@ proptest! {
             }
             if let Some(us) = sample.delayed.latency_us && us <= 127_000 {
                 close(decoded["Latency"].1, f64::from(us) / 1000.0, 0.5);
-            }
-
-            let decoded = decode(vdc2);
-            let message = Vdc2::parse(vdc2.data()).expect("eight bytes");
-            prop_assert_eq!(decoded["YawRate_VDC2"].0, i64::from(message.yaw_rate));
-            prop_assert_eq!(decoded["SteerWhlAngle"].0, 0xFFFF);
-            if let Some(sent) = message.yaw_rate_rad_per_sec() {
-                close(decoded["YawRate_VDC2"].1, sent, 1e-12);
-                close(sent, sample.live.rate.rad_per_sec(), 1.1 / 8192.0);
-            }
-            if message.lateral <= 0xFAFF {
-                close(decoded["LateralAccel"].1, left.metre_per_sec2(), 0.51 / 2048.0);
-            }
-            if message.longitudinal <= 250 {
-                close(decoded["LongitudinalAccel"].1, forward.metre_per_sec2(), 0.051);
             }
         }
     }

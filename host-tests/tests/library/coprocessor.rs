@@ -8,9 +8,7 @@ use gyronet::can::wheel::{WheelError, WheelReceiver, WheelSettings};
 use gyronet::can::yaw::FOG_IDS;
 use gyronet::compensate::DELAY;
 use gyronet::coprocessor::{Clock, InputError, Observation, StorageFaults};
-use gyronet::fog::{FogConfig, FogNetUse};
 use gyronet::health::{Faults, InputCounters, Quality, Status};
-use gyronet::model::fognet::FogEstimate;
 use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::DueWindow;
@@ -118,9 +116,7 @@ fn an_estimate_for_no_window_is_an_error_and_counted() {
         let _ = car.sample();
     }
     assert_eq!(car.coprocessor.deliver(late.end, NOTHING), missing(late.end), "its turn has passed");
-    let fog = FogEstimate { correction: Angle::ZERO, linear: Angle::ZERO, gain: 0, clamped_inputs: 0 };
-    assert_eq!(car.coprocessor.deliver_fog(0, fog), missing(0));
-    assert_eq!(car.counted().unclaimed_estimates, 5);
+    assert_eq!(car.counted().unclaimed_estimates, 4);
     assert_eq!(car.coprocessor.pipeline().counters().late, 1);
     assert!(missing(3).is_err_and(|error: InputError| error.to_string() == "no window waits for estimate 3"));
 }
@@ -260,10 +256,9 @@ fn damage_and_losses_are_reported_with_every_set() {
 }
 
 #[test]
-fn a_fibre_optic_gyro_sends_its_own_messages_and_hands_out_its_own_windows() {
-    let fog_config = FogConfig { fognet: FogNetUse::Simulated, ..FogConfig::DEFAULT };
-    let mut car = Car::new(Config { wheels: wheels(), fog: fog_config, ..Config::DEFAULT });
-    let (mut sent, mut windows) = (0, 0);
+fn a_fibre_optic_gyro_sends_its_own_messages() {
+    let mut car = Car::new(Config { wheels: wheels(), ..Config::DEFAULT });
+    let mut sent = 0;
     for millisecond in 1..6_000_u64 {
         let now = Micros(millisecond * 1_000);
         if millisecond.is_multiple_of(10) {
@@ -276,17 +271,8 @@ fn a_fibre_optic_gyro_sends_its_own_messages_and_hands_out_its_own_windows() {
             FOG_IDS.iter().any(|id| frame.id() == Id::Standard(StandardId::new(*id).expect("11 bits")))
         };
         sent += car.sent.frames.drain(..).filter(|sent| own(&sent.frame)).count();
-        if let Some(second) = car.coprocessor.fog_second() {
-            assert_eq!((second.number, second.is_first), (windows, windows == 0));
-            windows += 1;
-            let correction = Angle(600_000_000);
-            let estimate = FogEstimate { correction, linear: Angle::ZERO, gain: 0, clamped_inputs: 0 };
-            car.coprocessor.deliver_fog(second.number, estimate).expect("the window that is due");
-        }
     }
     assert_eq!(sent, 3 * 599, "a set of three messages every 10 ms");
-    // The inertial sensor is known after three seconds, then there is a window every second.
-    assert!((1..=2).contains(&windows), "{windows}");
     let estimate = *car.sent.fog.last().expect("it was heard");
     assert_eq!(estimate.faults, Faults::NONE);
 }

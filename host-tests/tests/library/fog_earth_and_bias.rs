@@ -5,11 +5,10 @@ use gyronet::bias::Latitude;
 use gyronet::can::DataFrame;
 use gyronet::coprocessor::{Config, Coprocessor, InputError};
 use gyronet::estimate::YawEstimate;
-use gyronet::fog::{FogConfig, FogErrors, FogNetUse, FogPipeline};
+use gyronet::fog::{FogConfig, FogErrors, FogPipeline};
 use gyronet::heading::latitude::CONFIRM;
 use gyronet::heading::{HeadingError, HeadingReceiver, HeadingSettings, Received};
 use gyronet::health::{Faults, Quality, Source};
-use gyronet::model::fognet::FogEstimate;
 use gyronet::sample::{FogSample, PERIOD_US, Standstill, WheelSample};
 use gyronet::units::{Angle, Micros, WheelSpeed};
 use gyronet_host_tests::noise::Noise;
@@ -24,20 +23,12 @@ struct Gyro {
     rate: f64,
     step: u64,
     standstill: Standstill,
-    /// FoGNet's estimate of every minute.
-    correction: Angle,
 }
 
 impl Gyro {
     fn new(seed: u64, latitude_deg: f64, bias_deg_per_hour: f64) -> Self {
         let rate = EARTH * latitude_deg.to_radians().sin() + bias_deg_per_hour * DEG_PER_HOUR;
-        Self {
-            noise: Noise::new(seed),
-            rate,
-            step: 0,
-            standstill: Standstill::Still,
-            correction: Angle::ZERO,
-        }
+        Self { noise: Noise::new(seed), rate, step: 0, standstill: Standstill::Still }
     }
 
     fn sample(&mut self) -> FogSample {
@@ -58,14 +49,7 @@ impl Gyro {
             fog.add(sample.time, sample).expect("in order");
             let speeds = [Some(WheelSpeed(0)); 4];
             let wheels = WheelSample { time: sample.time, speeds, standstill: self.standstill };
-            sent.extend(std::iter::from_fn(|| fog.next_step(sample.time, Some([0; 6]), Some(&wheels))));
-            if let Some(second) = fog.second() {
-                let correction = self.correction;
-                fog.deliver(
-                    second.number,
-                    FogEstimate { correction, linear: Angle::ZERO, gain: 0, clamped_inputs: 0 },
-                );
-            }
+            sent.extend(std::iter::from_fn(|| fog.next_step(sample.time, Some(&wheels))));
         }
         sent
     }
@@ -73,7 +57,7 @@ impl Gyro {
 
 fn at_latitude(latitude_deg: Option<f32>) -> FogPipeline {
     let config = FogConfig { latitude: latitude_deg.and_then(Latitude::from_degrees), ..FogConfig::DEFAULT };
-    FogPipeline::new(config, true, false)
+    FogPipeline::new(config, false)
 }
 
 fn mean_deg_per_hour(sent: &[YawEstimate]) -> f64 {
@@ -133,61 +117,6 @@ fn a_turn_on_standing_wheels_is_reported_and_not_learnt() {
     assert_eq!((last.quality, last.faults), (Quality::Degraded, Faults::WHEELS));
     assert!(fog.counters().contradicted > 55);
     assert!((mean_deg_per_hour(&sent) - 100.0).abs() < 1.0, "{}", mean_deg_per_hour(&sent));
-}
-
-/// A correction of a minute that takes off so much all the time.
-fn constant(deg_per_hour: f64) -> Angle {
-    Angle((60.0 * deg_per_hour * DEG_PER_HOUR * f64::from(Angle::PER_RAD)).round() as i64)
-}
-
-fn with_fognet(fognet: FogNetUse) -> FogPipeline {
-    let config = FogConfig { latitude: Latitude::from_degrees(36.37), fognet, ..FogConfig::DEFAULT };
-    FogPipeline::new(config, true, false)
-}
-
-#[test]
-fn fognet_is_dropped_where_a_standstill_shows_harm() {
-    let mut fog = with_fognet(FogNetUse::Simulated);
-    let mut gyro = Gyro::new(5, 36.37, 0.0);
-    gyro.correction = constant(2.0);
-    gyro.standstill = Standstill::Moving;
-    let sent = gyro.run(&mut fog, 30);
-    let last = sent.last().expect("a step");
-    assert_eq!((last.source, last.quality), (Source::FogNet, Quality::Degraded));
-    gyro.standstill = Standstill::Still;
-    gyro.run(&mut fog, 15);
-    assert_eq!(fog.counters().dropped, 1);
-    gyro.standstill = Standstill::Moving;
-    let sent = gyro.run(&mut fog, 60);
-    assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::EarthRate, Quality::Good)));
-    assert!(mean_deg_per_hour(&sent).abs() < 1.0 && fog.second().is_none());
-}
-
-#[test]
-fn fognet_stays_where_it_does_no_harm() {
-    for (fognet, quality) in [(FogNetUse::Simulated, Quality::Degraded), (FogNetUse::Recorded, Quality::Good)]
-    {
-        let mut fog = with_fognet(fognet);
-        let mut gyro = Gyro::new(6, 36.37, 0.0);
-        gyro.correction = constant(0.05);
-        gyro.run(&mut fog, 10);
-        let sent = gyro.run(&mut fog, 600);
-        assert_eq!(fog.counters().dropped, 0);
-        assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::FogNet, quality)));
-        assert!(sent.iter().all(|yaw| yaw.sigma.is_some()), "no rate without its expected error");
-    }
-}
-
-#[test]
-fn without_a_latitude_fognet_changes_nothing() {
-    let config = FogConfig { fognet: FogNetUse::Simulated, ..FogConfig::DEFAULT };
-    let mut fog = FogPipeline::new(config, true, false);
-    let mut gyro = Gyro::new(7, 36.37, 0.0);
-    gyro.correction = constant(2.0);
-    gyro.standstill = Standstill::Moving;
-    let sent = gyro.run(&mut fog, 30);
-    assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::Raw, Quality::Degraded)));
-    assert!((mean_deg_per_hour(&sent) - 8.9).abs() < 1.0, "{}", mean_deg_per_hour(&sent));
 }
 
 /// Reads J1939's position.

@@ -1,27 +1,19 @@
-//! A fibre-optic gyro's messages: what they say of its correction, of gaps, and of what is missing.
+//! A fibre-optic gyro's messages: what they say of gaps, and of what is missing.
 
 use gyronet::bias::Latitude;
 use gyronet::estimate::YawEstimate;
-use gyronet::fog::{FogConfig, FogNetUse, FogPipeline};
+use gyronet::fog::{FogConfig, FogPipeline};
 use gyronet::health::{Faults, Quality, Source};
-use gyronet::model::fognet::FogEstimate;
 use gyronet::sample::{FogSample, PERIOD_US, Standstill, WheelSample};
 use gyronet::units::{Angle, Micros, WheelSpeed, Yaw};
 
 /// Codes that the gyro turns in 10 ms.
 const TURN: i64 = 1 << 40;
-const NOTHING: FogEstimate =
-    FogEstimate { correction: Angle(600_000_000), linear: Angle::ZERO, gain: 0, clamped_inputs: 0 };
 
-/// A gyro with FoGNet at the equator, where the Earth's rate adds nothing.
-fn with_fognet(has_network: bool) -> FogPipeline {
-    fognet_on(has_network, false)
-}
-
-fn fognet_on(has_network: bool, expected: bool) -> FogPipeline {
-    let latitude = Latitude::from_degrees(0.0);
-    let config = FogConfig { latitude, fognet: FogNetUse::Simulated, ..FogConfig::DEFAULT };
-    let mut fog = FogPipeline::new(config, has_network, expected);
+/// A gyro at the equator, where the Earth's rate adds nothing.
+fn fog(expected: bool) -> FogPipeline {
+    let config = FogConfig { latitude: Latitude::from_degrees(0.0), ..FogConfig::DEFAULT };
+    let mut fog = FogPipeline::new(config, expected);
     // Another gyro has agreed in a turn.
     fog.confirm();
     fog
@@ -42,7 +34,7 @@ fn wheels() -> WheelSample {
     WheelSample { time: Micros(0), speeds: [Some(WheelSpeed(1_000)); 4], standstill: Standstill::Moving }
 }
 
-/// Steps of 10 ms; `with` says whether the gyro sends in one. What is due is answered at once.
+/// Steps of 10 ms; `with` says whether the gyro sends in one.
 fn run(fog: &mut FogPipeline, steps: core::ops::Range<u64>, with: impl Fn(u64) -> bool) -> Vec<YawEstimate> {
     let mut sent = Vec::new();
     for step in steps {
@@ -50,54 +42,36 @@ fn run(fog: &mut FogPipeline, steps: core::ops::Range<u64>, with: impl Fn(u64) -
         if with(step) {
             fog.add(now, sample(step)).expect("in order");
         }
-        while let Some(yaw) = fog.next_step(now, Some([0; 6]), Some(&wheels())) {
+        while let Some(yaw) = fog.next_step(now, Some(&wheels())) {
             sent.push(yaw);
-        }
-        if let Some(second) = fog.second() {
-            fog.deliver(second.number, NOTHING);
         }
     }
     sent
 }
 
 #[test]
-fn corrected_when_an_estimate_is_in_use() {
-    let mut fog = with_fognet(true);
-    let sent = run(&mut fog, 1..401, |_| true);
-    assert_eq!(sent.len(), 400);
-    // A window after the first second, its estimate after the second one.
-    let first = sent.iter().position(|yaw| yaw.source == Source::FogNet);
-    assert_eq!(first, Some(200));
-    assert!(sent[..200].iter().all(|yaw| (yaw.source, yaw.quality) == (Source::EarthRate, Quality::Good)));
-    assert!(sent[200..].iter().all(|yaw| yaw.quality == Quality::Degraded && yaw.faults == Faults::NONE));
-    // The yaw is the sum of the rates.
-    let sum = sent.iter().map(|yaw| i64::from(yaw.rate.0)).sum::<i64>();
-    assert_eq!(sent[399].yaw, Yaw(sum));
-    assert_eq!((fog.counters().windows, fog.counters().late, fog.counters().gaps), (3, 0, 0));
-}
-
-#[test]
-fn a_gap_is_no_rate_and_ends_the_window() {
-    let mut fog = with_fognet(true);
+fn a_gap_is_no_rate() {
+    let mut fog = fog(false);
     let sent = run(&mut fog, 1..501, |step| !(301..306).contains(&step));
     let gap: Vec<_> = sent.iter().filter(|yaw| yaw.quality == Quality::Unusable).collect();
     assert!((5..=6).contains(&gap.len()), "{}", gap.len());
     assert!(gap.iter().all(|yaw| yaw.faults.0 & Faults::GAP.0 != 0 && yaw.rate.0 == 0));
-    // Not by the estimate from before it.
-    let behind = sent.iter().rposition(|yaw| yaw.quality == Quality::Unusable).expect("a gap") + 1;
-    assert_eq!(sent[behind].source, Source::EarthRate);
-    assert!(fog.counters().broken > 0);
+    let others = sent.iter().filter(|yaw| yaw.quality != Quality::Unusable);
+    assert!(others.clone().all(|yaw| (yaw.source, yaw.quality) == (Source::EarthRate, Quality::Good)));
+    // The yaw is the sum of the rates.
+    let sum = others.map(|yaw| i64::from(yaw.rate.0)).sum::<i64>();
+    assert_eq!(sent.last().map(|yaw| yaw.yaw), Some(Yaw(sum)));
 }
 
 #[test]
 fn a_gyro_that_says_the_same_is_stuck() {
-    let mut fog = with_fognet(true);
+    let mut fog = fog(false);
     let mut sent = run(&mut fog, 1..301, |_| true);
     // From step 301 on it repeats what it said in step 300.
     for step in 301..351 {
         let repeated = FogSample { time: Micros(step * PERIOD_US), ..sample(300) };
         fog.add(Micros(step * PERIOD_US), repeated).expect("in order");
-        let yaw = fog.next_step(Micros(step * PERIOD_US), Some([0; 6]), Some(&wheels())).expect("a step");
+        let yaw = fog.next_step(Micros(step * PERIOD_US), Some(&wheels())).expect("a step");
         sent.push(yaw);
     }
     sent.extend(run(&mut fog, 351..700, |_| true));
@@ -107,9 +81,8 @@ fn a_gyro_that_says_the_same_is_stuck() {
     assert_eq!(sent.iter().rposition(stuck), Some(349));
     let during = &sent[303..350];
     assert!(during.iter().all(|yaw| stuck(yaw) && yaw.quality == Quality::Unusable && yaw.rate.0 == 0));
-    // The window has to begin again.
     assert_eq!((sent[350].source, sent[350].quality), (Source::EarthRate, Quality::Good));
-    assert_eq!(sent.last().map(|yaw| (yaw.source, yaw.faults)), Some((Source::FogNet, Faults::NONE)));
+    assert_eq!(sent.last().map(|yaw| (yaw.source, yaw.faults)), Some((Source::EarthRate, Faults::NONE)));
     assert_eq!((fog.counters().stuck, fog.counters().gaps), (1, 47));
 }
 
@@ -118,7 +91,7 @@ fn a_gyro_that_says_the_same_is_stuck() {
 #[test]
 fn a_stuck_gyro_is_found_while_its_clock_drifts() {
     for ppm in [-20_000_i64, -137, 0, 137, 20_000] {
-        let mut fog = with_fognet(true);
+        let mut fog = fog(false);
         let (mut first, mut sent) = (None, 0);
         for millisecond in 1..=1_000_u64 {
             let now = Micros(millisecond * 1_000);
@@ -127,7 +100,7 @@ fn a_stuck_gyro_is_found_while_its_clock_drifts() {
             let increment = [None, None, Some(Angle(TURN / 10 + noise))];
             let reading = FogSample { time: Micros(stamp), span: 1_000, increment, ..sample(0) };
             fog.add(now, reading).expect("in order");
-            while let Some(yaw) = fog.next_step(now, Some([0; 6]), Some(&wheels())) {
+            while let Some(yaw) = fog.next_step(now, Some(&wheels())) {
                 sent += 1;
                 let stuck = yaw.faults.contains(Faults::STUCK);
                 assert!(first.is_none() || stuck, "{ppm} ppm: for as long as it lasts");
@@ -142,9 +115,8 @@ fn a_stuck_gyro_is_found_while_its_clock_drifts() {
 
 #[test]
 fn a_gyro_that_is_expected_is_missed_from_the_start() {
-    let mut fog = with_fognet(true);
-    assert_eq!(run(&mut fog, 0..101, |_| false), []);
-    let mut fog = fognet_on(true, true);
+    assert_eq!(run(&mut fog(false), 0..101, |_| false), []);
+    let mut fog = fog(true);
     let sent = run(&mut fog, 0..501, |step| step > 100);
     // Step 0 is due 10 ms on; each of silence is no rate.
     assert_eq!(sent.len(), 501);
@@ -152,42 +124,29 @@ fn a_gyro_that_is_expected_is_missed_from_the_start() {
     assert!((100..=102).contains(&silent), "{silent}");
     assert!(sent[..silent].iter().all(|yaw| yaw.faults.0 & Faults::GAP.0 != 0 && yaw.rate.0 == 0));
     // Then all is as if it had been heard from the start.
-    assert_eq!(sent.last().map(|yaw| (yaw.source, yaw.faults)), Some((Source::FogNet, Faults::NONE)));
+    assert_eq!(sent.last().map(|yaw| (yaw.source, yaw.faults)), Some((Source::EarthRate, Faults::NONE)));
     assert_eq!(fog.counters().gaps as usize, silent);
 }
 
 #[test]
 fn a_missing_input_is_reported() {
-    let mut fog = with_fognet(false);
-    let sent = run(&mut fog, 1..301, |_| true);
-    assert!(sent.iter().all(|yaw| yaw.source == Source::EarthRate && yaw.faults == Faults::STORED));
-    assert!(fog.second().is_none());
-    let mut fog = with_fognet(true);
+    let mut fog = fog(false);
     fog.add(Micros(PERIOD_US), sample(1)).expect("the first one");
-    let yaw = fog.next_step(Micros(PERIOD_US), Some([0; 6]), None).expect("a step");
+    let yaw = fog.next_step(Micros(PERIOD_US), None).expect("a step");
     assert_eq!(yaw.faults, Faults::WHEELS);
-    // Nobody runs the window in time.
-    let mut fog = with_fognet(true);
-    let mut late = 0;
-    for step in 1..251 {
-        fog.add(Micros(step * PERIOD_US), sample(step)).expect("in order");
-        let yaw = fog.next_step(Micros(step * PERIOD_US), Some([0; 6]), Some(&wheels())).expect("a step");
-        late += u32::from(yaw.faults == Faults::LATE && yaw.source == Source::EarthRate);
-    }
-    assert_eq!((late, fog.counters().late), (51, 1));
 }
 
 /// An increment that straddles two steps is in both: the one that holds the end of the last equal increment is stuck,
 /// too.
 #[test]
 fn every_step_that_holds_an_equal_increment_is_reported_as_stuck() {
-    let mut fog = with_fognet(true);
+    let mut fog = fog(false);
     let mut sent = Vec::new();
     for step in 1..400 {
         let now = Micros(step * PERIOD_US + PERIOD_US / 2);
         let increment = sample(if (300..350).contains(&step) { 300 } else { step }).increment;
         fog.add(now, FogSample { time: now, increment, ..sample(step) }).expect("in order");
-        sent.extend(std::iter::from_fn(|| fog.next_step(now, Some([0; 6]), Some(&wheels()))));
+        sent.extend(std::iter::from_fn(|| fog.next_step(now, Some(&wheels()))));
     }
     let unusable: Vec<_> =
         sent.iter().skip(10).filter(|yaw| yaw.quality == Quality::Unusable).map(|yaw| yaw.faults).collect();
@@ -199,13 +158,13 @@ fn every_step_that_holds_an_equal_increment_is_reported_as_stuck() {
 /// A gyro whose messages cover half of each 10 ms.
 #[test]
 fn a_step_that_is_partly_covered_has_no_rate() {
-    let mut fog = with_fognet(false);
+    let mut fog = fog(false);
     run(&mut fog, 1..101, |_| true);
     for step in 101..201 {
         let now = Micros(step * PERIOD_US);
         let half = FogSample { span: PERIOD_US as u32 / 2, lost: 1, ..sample(step) };
         fog.add(now, half).expect("in order");
-        let yaw = fog.next_step(now, Some([0; 6]), Some(&wheels())).expect("a step");
+        let yaw = fog.next_step(now, Some(&wheels())).expect("a step");
         assert_eq!((yaw.rate.0, yaw.quality), (0, Quality::Unusable), "step {step}");
         assert!(yaw.faults.0 & Faults::GAP.0 != 0, "step {step}");
     }

@@ -24,7 +24,6 @@ mod framer;
 mod gyronet_scale;
 mod heading;
 mod icm42688;
-mod j1939;
 mod jump;
 mod kaist_fog;
 mod kvh_dsp1760;

@@ -44,7 +44,7 @@ fn init_then_degraded_then_ready() {
     let ends: Vec<u32> = outputs.iter().filter_map(|output| Some(output.window?.end)).collect();
     assert_eq!(
         ends,
-        (309..400).step_by(CompensateConfig::DEFAULT.mode.stride() as usize).collect::<Vec<u32>>()
+        (309..400).step_by(CompensateConfig::DEFAULT.stride.samples() as usize).collect::<Vec<u32>>()
     );
     assert_eq!(pipeline.counters().windows, 18, "the one that ended at 399 is still out");
 }

@@ -23,7 +23,7 @@ fn waiting(last: &YawEstimate) -> Yaw {
 
 #[test]
 fn an_estimate_that_is_late_or_missing_is_counted() {
-    for lateness in [DELAY as usize, CompensateConfig::DEFAULT.mode.stride() as usize, 20, usize::MAX] {
+    for lateness in [DELAY as usize, CompensateConfig::DEFAULT.stride.samples() as usize, 20, usize::MAX] {
         let mut pipeline = new();
         let mut waiting: Vec<(usize, DueWindow)> = Vec::new();
         for (now, sample) in drive(0..400).enumerate() {

@@ -1,7 +1,7 @@
 //! No angle is lost between the network's revised estimates and the rates on the bus: a ledger
 //! beside the pipeline, exact to the last code.
 
-use gyronet::compensate::{CompensateConfig, Compensator, Lag, Mode, Remaining, Stride};
+use gyronet::compensate::{CompensateConfig, Compensator, Lag, Remaining, Stride};
 use gyronet::health::Status;
 use gyronet::model::window::WINDOW;
 use gyronet::model::{Estimate, SteadyGain};
@@ -64,8 +64,10 @@ impl Ledger {
         self.steady_gain = SteadyGain::NONE;
     }
 
-    fn take_estimate(&mut self, tick: u32, mode: Mode, max_mean: i64) {
-        let Some((end, estimate)) = self.out.take_if(|(end, _)| tick >= *end + mode.delay()) else { return };
+    fn take_estimate(&mut self, tick: u32, stride: Stride, max_mean: i64) {
+        let Some((end, estimate)) = self.out.take_if(|(end, _)| tick >= *end + stride.delay()) else {
+            return;
+        };
         let mean = |values: &[i64]| values.iter().sum::<i64>() / values.len() as i64;
         if mean(&estimate).abs() > max_mean {
             self.steady_gain = SteadyGain::NONE;
@@ -75,12 +77,11 @@ impl Ledger {
         let covered = self.samples.range_mut(end + 1 - WINDOW as u32..=end);
         let mut window: Vec<(&mut Sample, i64)> = covered.map(|(_, sample)| sample).zip(estimate).collect();
         assert_eq!(window.len(), WINDOW, "windows cover samples that went out");
-        let used = &window[mode.used()];
-        let sum: i64 = used.iter().map(|(_, estimate)| estimate).sum();
+        let sum: i64 = window.iter().map(|(_, estimate)| estimate).sum();
         let (constant, windows) = &mut self.constant;
-        *windows = (*windows + 1).min(1_280 / i64::from(mode.stride()));
-        *constant += ((sum / used.len() as i64 * 65_536) - *constant) / *windows;
-        for (sample, estimate) in &mut window[mode.used()] {
+        *windows = (*windows + 1).min(1_280 / i64::from(stride.samples()));
+        *constant += ((sum / WINDOW as i64 * 65_536) - *constant) / *windows;
+        for (sample, estimate) in &mut window {
             sample.estimates.push(*estimate - (*constant >> 16));
         }
     }
@@ -100,7 +101,7 @@ struct Faults {
 /// 30 s with the ledger checked about five times a second; returns how often the revisions of a rate were bounded
 /// and how many samples were complete.
 fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) {
-    let CompensateConfig { mode, lag, max_mean, max_revision, .. } = compensate;
+    let CompensateConfig { stride, lag, max_mean, max_revision, .. } = compensate;
     let mut noise = Noise::new(seed);
     let config = PipelineConfig { compensate, zero_rate: None, ..PipelineConfig::DEFAULT };
     let mut pipeline = Pipeline::new(config);
@@ -123,7 +124,7 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
         if clipped || broken.is_some_and(|last| live.tick != last + 1) {
             ledger.break_window();
         }
-        ledger.take_estimate(live.tick, mode, max_mean.0.into());
+        ledger.take_estimate(live.tick, stride, max_mean.0.into());
         let rates: [AngularRate; 3] =
             std::array::from_fn(|k| AngularRate(sample.angular_rate[k].0 - bias[k].0));
         let (gyro, steady) = (i64::from(rates[2].0), ledger.steady(rates));
@@ -163,13 +164,12 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
     (bounded, complete)
 }
 
-/// Returns every mode with every kind of lag.
+/// Strides with every kind of lag.
 fn configs() -> impl Iterator<Item = CompensateConfig> {
-    let overlap = [1, 3, 5, 10].into_iter().filter_map(Stride::new).map(|stride| Mode::Overlap { stride });
-    let modes = overlap.chain([Mode::Middle, Mode::Newest]);
     let lags = [0, 2, 7, 11].into_iter().filter_map(Lag::new);
-    let with = |mode, lag| CompensateConfig { mode, lag, ..CompensateConfig::DEFAULT };
-    modes.flat_map(move |mode| lags.clone().map(move |lag| with(mode, lag)))
+    let with = |stride, lag| CompensateConfig { stride, lag, ..CompensateConfig::DEFAULT };
+    let strides = [1, 3, 5, 10].into_iter().filter_map(Stride::new);
+    strides.flat_map(move |stride| lags.clone().map(move |lag| with(stride, lag)))
 }
 
 const CALM: Faults = Faults { gaps: false, clipping: false, spread: 0.0002 };
@@ -180,7 +180,7 @@ fn the_sum_of_a_clean_stream_is_that_of_the_estimates() {
         let (bounded, complete) = check(config, CALM, 1);
         assert_eq!(bounded, 0, "nothing here needs the bound");
         // What comes before the first used output has no estimate, and the last are under way.
-        let without = config.mode.used().start + config.mode.complete_after();
+        let without = config.stride.complete_after();
         assert_eq!(complete as usize, 3_000 - 300 - without, "{config:?}");
     }
 }

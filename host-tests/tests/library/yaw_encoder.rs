@@ -102,7 +102,7 @@ fn a_rate_that_is_unusable_is_not_sent() {
 
 #[test]
 fn every_judgement_is_read_as_it_was_sent() {
-    for source in [Source::Raw, Source::Static, Source::Model, Source::FogNet, Source::EarthRate] {
+    for source in [Source::Raw, Source::Static, Source::Model, Source::EarthRate] {
         for quality in [Quality::Good, Quality::Degraded, Quality::Initialising, Quality::Unusable] {
             let message = RateMessage { rate: -7, source, quality };
             assert_eq!(RateMessage::parse(&message.emit()), Ok(message));

@@ -2,7 +2,7 @@
 //! what standstills add to the Earth's rate, and whether the expected errors are as large as the true ones.
 
 use gyronet_host_tests::sequence::{path_error, simulate};
-use gyronet_paper::fog_replay::{default_config, run_board};
+use gyronet_paper::fog_replay::run_board;
 use gyronet_paper::simulate::fog::{self, Fog};
 use gyronet_paper::simulate::vehicles::KAIST;
 use gyronet_paper::simulate::world::EARTH_RATE;
@@ -57,7 +57,7 @@ impl Errors {
 
     fn add(&mut self, spec: &Spec) {
         let sequence = simulate(spec);
-        let (sent, _) = run_board(&sequence, default_config(&sequence), None);
+        let sent = run_board(&sequence);
         let quiet = fog::Config { angle_walk: 0.0, ..KAIST.fog };
         let [.., bias] = Fog::of_device(&quiet, spec.device, spec.run).increment([0.0; 3], 1.0);
         let earth = EARTH_RATE * sequence.latitude_deg().to_radians().sin();

@@ -59,7 +59,6 @@ fn yaw(gyro: &[Vec<f64>], speed: &[Vec<f64>], latitude: f64) -> Vec<f64> {
     let mut coprocessor = Coprocessor::new(Config {
         fog: FogConfig { errors: HG1700, latitude, ..FogConfig::DEFAULT },
         wheels: Some(wheel_frames::receiver()),
-        has_fognet: false,
         ..Config::DEFAULT
     });
     let mut yaw = vec![0.0; gyro.len()];

@@ -75,7 +75,6 @@ pub fn parts(board: &Board) -> Option<Parts> {
     let config = &*cortex_m::singleton!(: Config = Config {
         wheels: WheelReceiver::new(*device.wheels()).ok(),
         has_gyronet: blob.is_some(),
-        has_fognet: false,
         clock: Clock::Outside,
         clock_ratio: board.clocks.exact().then_some(ClockRatioConfig::DEFAULT),
         storage: StorageFaults {

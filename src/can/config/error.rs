@@ -25,8 +25,6 @@ pub enum ConfigError {
     /// Two messages have the same E2E identifier; a receiver would not notice if they were swapped.
     #[error("an E2E identifier is used twice")]
     DuplicateDataId,
-    #[error("{0} is not a J1939 source address")]
-    SourceAddress(u8),
     #[error(
         "the messages are {}.{} % of the bus at {} kbit/s, above {} %",
         .per_mille / 10, .per_mille % 10, .bits_per_second / 1_000, MAX_BUS_LOAD / 10

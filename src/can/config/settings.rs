@@ -71,15 +71,6 @@ pub struct YawSettings {
     pub e2e: E2e,
 }
 
-/// The J1939 message VDC2; the standard fixes its period at 10 ms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Vdc2Settings {
-    /// Our J1939 source address.
-    pub source: u8,
-}
-
 /// The slow status message ([`crate::can::status`]), which is sent once a second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -100,8 +91,6 @@ pub struct Settings {
     pub bosch: Option<BoschSettings>,
     /// Our own yaw messages, if sent.
     pub yaw: Option<YawSettings>,
-    /// J1939 VDC2 for trucks and machines, if sent.
-    pub vdc2: Option<Vdc2Settings>,
     /// Slow status message, if sent.
     pub status: Option<StatusSettings>,
 }
@@ -116,7 +105,6 @@ impl Settings {
             period_ms: 10,
             e2e: E2e::P01 { mode: DataIdMode::Both, data_ids: [0x1A0, 0x1A1, 0x1A2] },
         }),
-        vdc2: None,
         status: None,
     };
 

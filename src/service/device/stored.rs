@@ -150,7 +150,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             configuration.check().map_err(StoreError::from)?;
             device.check_supported(configuration)?;
             configuration.check_wheels(&device.next_wheels).map_err(StoreError::from)?;
-            let available = configuration.compensate.mode.window_cycles(device.supported.clock_hz);
+            let available = configuration.compensate.stride.window_cycles(device.supported.clock_hz);
             let cycles = device.next_window;
             if cycles > available {
                 return Err(StoreError::Field(FieldError::Window { cycles, available }).into());

@@ -49,7 +49,7 @@ pub(super) struct Checked {
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// Selects the weights to run from `slots`, as the processor reads them, else from the image itself.
     pub fn weights<'w>(&mut self, slots: Option<[&'w [u8]; 2]>, built_in: &'w [u8]) -> Option<Blob<'w>> {
-        let available = self.configuration.compensate.mode.window_cycles(self.identity.clock_hz);
+        let available = self.configuration.compensate.stride.window_cycles(self.identity.clock_hz);
         let accepted = if self.has_failed() { &Accepted::NONE } else { &self.accepted };
         let Selection { weights, source, refused } =
             select(accepted, slots.unwrap_or_default(), built_in, available);
@@ -167,8 +167,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             let Uploading { upload, checked } = uploading.ok_or(SlotError::NotBegun)?;
             let Checked { crc, window: cycles } =
                 checked.ok_or(SlotError::Incomplete { written: upload.written() })?;
-            let mode = device.next_configuration.compensate.mode;
-            let available = mode.window_cycles(device.supported.clock_hz);
+            let stride = device.next_configuration.compensate.stride;
+            let available = stride.window_cycles(device.supported.clock_hz);
             if cycles > available {
                 return Err(SlotError::Slow { cycles, available }.into());
             }

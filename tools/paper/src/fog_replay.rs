@@ -1,14 +1,12 @@
-//! Runs a sequence through the coprocessor, to get the rates that the board sends with or without FoGNet,
-//! and through FoGNet alone, to correct the turns of the sequence.
+//! Runs a sequence through the coprocessor, to get the rates that the board sends, and through FoGNet, to correct the
+//! turns of the sequence.
 
 use crate::sequence::Layout;
 use crate::sequence::{Sequence, Step};
 use gyronet::bias::Latitude;
 use gyronet::coprocessor::{Clock, Config, Coprocessor, Sink, TimedFrame};
 use gyronet::estimate::YawEstimate;
-use gyronet::fog::{
-    FogConfig, FogCorrector, FogCounters, FogErrors, FogNetUse, GyroMismatch, check_training,
-};
+use gyronet::fog::{FogConfig, FogCorrector, FogErrors};
 use gyronet::model::fognet::MinuteNetwork;
 use gyronet::model::fognet_blob::{Gyro, Training};
 use gyronet::model::seconds::{FogFrame, Minute};
@@ -34,7 +32,7 @@ pub struct FogReplay {
     pub broken: u64,
 }
 
-pub fn run(sequence: &Sequence, network: &mut impl MinuteNetwork, config: FogConfig) -> FogReplay {
+pub fn run(sequence: &Sequence, network: &mut dyn MinuteNetwork, config: FogConfig) -> FogReplay {
     let inertial = features(sequence);
     let mut corrector = FogCorrector::new(config);
     let mut minute = Minute::EMPTY;
@@ -66,13 +64,22 @@ pub fn run(sequence: &Sequence, network: &mut impl MinuteNetwork, config: FogCon
 }
 
 /// Returns the default configuration for a sequence's gyro and latitude.
-pub fn default_config(sequence: &Sequence) -> FogConfig {
+fn default_config(sequence: &Sequence) -> FogConfig {
     let errors = match sequence.layout {
         Layout::Kaist => FogErrors::DSP1760,
         Layout::Nclt => FogErrors::DSP3000,
     };
     let latitude = Latitude::from_degrees(sequence.latitude_deg() as f32);
     FogConfig { errors, latitude, ..FogConfig::DEFAULT }
+}
+
+/// The weights are for another gyro than the sequence's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("trained for a {trained}, the sequence has a {part} number {serial}")]
+pub struct GyroMismatch {
+    trained: Training,
+    part: Gyro,
+    pub serial: u32,
 }
 
 /// Checks that weights are for the gyro of a sequence. A simulated gyro has its device number as serial number; a
@@ -83,29 +90,22 @@ pub fn check_weights(sequence: &Sequence, trained: Training) -> Result<(), GyroM
         Layout::Nclt => Gyro::Dsp3000,
     };
     let serial = sequence.simulated.as_ref().map_or(trained.serial, |spec| spec.device as u32);
-    check_training(trained, part, serial, FogNetUse::Simulated)
+    if trained.gyro != part || trained.serial != 0 && trained.serial != serial {
+        return Err(GyroMismatch { trained, part, serial });
+    }
+    Ok(())
 }
 
-/// Runs a sequence through the coprocessor, with wheel speeds in frames as the board receives them, and with FoGNet
-/// if it is given. Returns the rate sent for each step (zero for the first, whose begin no sample marks), and the
-/// counters.
-pub fn run_board(
-    sequence: &Sequence,
-    config: FogConfig,
-    mut fognet: Option<&mut dyn MinuteNetwork>,
-) -> (Vec<YawEstimate>, FogCounters) {
+/// Runs a sequence through the coprocessor, with wheel speeds in frames as the board receives them. Returns the rate
+/// sent for each step (zero for the first, whose begin no sample marks).
+pub fn run_board(sequence: &Sequence) -> Vec<YawEstimate> {
     let mut coprocessor = Coprocessor::new(Config {
-        fog: FogConfig {
-            fognet: if fognet.is_some() { FogNetUse::Simulated } else { FogNetUse::Off },
-            ..config
-        },
+        fog: default_config(sequence),
         wheels: Some(wheel_frames::receiver()),
-        has_fognet: fognet.is_some(),
         has_gyronet: false,
         clock: Clock::Sensor,
         ..Config::DEFAULT
     });
-    let mut minute = Minute::EMPTY;
     let mut way = [0.0; 2];
     let mut sent = Rates(vec![YawEstimate::default(); sequence.steps.len()]);
     for (number, step) in sequence.steps.iter().enumerate() {
@@ -135,13 +135,8 @@ pub fn run_board(
         let increment = [None, None, Some(angle(step.fog))];
         let sample = FogSample { time, span: PERIOD_US as u32, lost: 0, increment, temperature: None };
         let _ = coprocessor.fog(sample, time, &mut sent);
-        if let (Some(network), Some(second)) = (&mut fognet, coprocessor.fog_second()) {
-            let estimate = network.estimate(&minute.follow(second));
-            // The estimate is in time, so it is not refused.
-            let _ = coprocessor.deliver_fog(second.number, estimate);
-        }
     }
-    (sent.0, *coprocessor.fog_counters())
+    sent.0
 }
 
 struct Rates(Vec<YawEstimate>);
@@ -161,7 +156,7 @@ impl Sink for Rates {
 /// Returns the sequence with the Earth's rate and the bias subtracted from the gyro, as the board computes it and
 /// FoGNet receives it.
 pub fn after_base(sequence: &Sequence) -> Sequence {
-    let (sent, _) = run_board(sequence, default_config(sequence), None);
+    let sent = run_board(sequence);
     let mut corrected = sequence.clone();
     for (step, sent) in corrected.steps.iter_mut().zip(sent) {
         step.fog = sent.rate.rad_per_sec() * DT;

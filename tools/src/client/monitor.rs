@@ -15,7 +15,6 @@ use gyronet::can::bosch::{self, LAYOUTS};
 use gyronet::can::config::Config;
 use gyronet::can::e2e::{Fault, Sequence, Verdict};
 use gyronet::can::fog_encoder::FogEncoder;
-use gyronet::can::j1939::{VDC2_PGN, Vdc2};
 use gyronet::can::yaw::FOG_IDS;
 use yaw_set::{Part, YawSet};
 
@@ -60,8 +59,6 @@ pub struct Monitor {
     pub fog: Option<State>,
     /// Yaw rate of the drop-in message, deg/s; `None` unless its status is good.
     pub drop_in: Option<f64>,
-    /// Yaw rate of VDC2, deg/s; `None` if not available.
-    pub vdc2: Option<f64>,
 }
 
 impl Monitor {
@@ -79,7 +76,6 @@ impl Monitor {
             state: State::default(),
             fog: None,
             drop_in: None,
-            vdc2: None,
         }
     }
 
@@ -116,10 +112,6 @@ impl Monitor {
         } else if let Some((_, verdict)) = self.fog_set.take(id, data) {
             self.fog = Some(self.fog_set.state());
             self.account(verdict);
-        } else if is_vdc2(id) {
-            self.counts.frames += 1;
-            let rate = Vdc2::parse(data).ok().and_then(|message| message.yaw_rate_rad_per_sec());
-            self.vdc2 = rate.map(f64::to_degrees);
         } else {
             self.counts.foreign += 1;
         }
@@ -175,8 +167,4 @@ impl Monitor {
             self.drop_in = good.then(|| message.rate_deg_per_sec());
         }
     }
-}
-
-fn is_vdc2(id: Id) -> bool {
-    matches!(id, Id::Extended(id) if id.as_raw() >> 8 & 0x3_FFFF == VDC2_PGN)
 }

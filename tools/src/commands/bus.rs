@@ -2,7 +2,7 @@
 
 use super::{Common, print_json};
 use embedded_can::Id;
-use gyronet::can::config::{Config, Settings, Vdc2Settings};
+use gyronet::can::config::Config;
 use gyronet::can::fog_encoder::FogEncoder;
 use gyronet::can::load::{Periodic, per_mille};
 use gyronet::can::yaw::FOG_IDS;
@@ -10,7 +10,7 @@ use std::io::{self, Write};
 
 /// Print the CAN messages that a board sends, and the bus load.
 ///
-/// For each of four configurations the command prints the identifier, period (ms) and worst-case length (bits) of
+/// For each of three configurations the command prints the identifier, period (ms) and worst-case length (bits) of
 /// every message. It also prints the load of the CAN bus with the most stuff bits possible, and the load of SLCAN
 /// lines. A board sends the messages of a fibre-optic gyro once the gyro's first data arrive, or from the start if
 /// such a gyro is configured.
@@ -43,13 +43,10 @@ impl Traffic {
 }
 
 pub fn run(_: &Args, common: Common) -> super::Result {
-    let vdc2 = Some(Vdc2Settings { source: 0x80 });
-    let all = Config::new(Settings { vdc2, ..Settings::DEFAULT })?;
     let traffics = [
         Traffic::new("default", &Config::DEFAULT, &[]),
         Traffic::new("default, with a fibre-optic gyro", &Config::DEFAULT, &FogEncoder::messages(FOG_IDS)),
         Traffic::new("for SLCAN at 115200 bit/s", &Config::SLCAN_115200, &[]),
-        Traffic::new("default and J1939 VDC2", &all, &[]),
     ];
     let mut out = io::stdout().lock();
     if common.json {

@@ -31,7 +31,7 @@ use std::path::{Path, PathBuf};
 /// rad. With --all come the error over 10 s, the ratio to static initialisation (1 s, or RMS against a course), the mean
 /// correction beyond static initialisation and zero-rate updates, multiplications per sample, and delay. The linear
 /// window is an estimate of all windows after static initialisation. The last two rows are the rates that the board
-/// sends: the live rate, with the sample (Bosch TX1, J1939 VDC2), and the delayed rate, in its own yaw messages.
+/// sends: the live rate, with the sample (Bosch TX1), and the delayed rate, in its own yaw messages.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:

@@ -158,7 +158,7 @@ fn methods(demo: &Demo<'_>) -> String {
         "{}{}<p class=\"note\">Heading error over {:.1} s against <code>{}</code>: mean over windows of 1 and 60 s, RMS \
          and value at the end; {MARKS}. <code>gyronet evaluate --all</code> prints more columns. The linear \
          window is a complete estimate after static initialisation. The last two rows are the rates that the board \
-         sends: with the sample (Bosch TX1, VDC2), and in its own messages some samples later.</p>\n",
+         sends: with the sample (Bosch TX1), and in its own messages some samples later.</p>\n",
         ours.unwrap_or_default(),
         table("methods", &headings, rows),
         errors.seconds,

@@ -29,10 +29,10 @@ const LINEAR: Shape = Shape { units: 0, linear: true };
 impl Cost {
     /// Returns the cost of a method of [`Method::ON_A_DRIVE`]; `None` if it does not run.
     pub fn new(method: Method, shapes: &Shapes) -> Option<Self> {
-        let CompensateConfig { mode, lag, .. } = CompensateConfig::DEFAULT;
+        let CompensateConfig { stride, lag, .. } = CompensateConfig::DEFAULT;
         let low_pass = LowPass::chosen();
-        let windows = |shape| multiplications(shape) as f64 / f64::from(mode.stride());
-        let complete = mode.complete_after();
+        let windows = |shape| multiplications(shape) as f64 / f64::from(stride.samples());
+        let complete = stride.complete_after();
         let (multiplications_per_sample, samples) = match method {
             Method::FIR | Method::FIR_ZERO_RATE => (low_pass.multiplications() as f64, low_pass.delay()),
             Method::VQF => (vqf::MULTIPLICATIONS as f64, 0),

@@ -56,7 +56,7 @@ impl Method {
     pub const GYRONET_F32: Self = mems("gyronet_f32", "GyroNet, f32");
     /// The same as [`Method::LINEAR`] with the paper's GyroNet in integers.
     pub const GYRONET_INT: Self = mems("gyronet_int", "GyroNet, integer");
-    /// The live rate, which the board sends at once: Bosch TX1, VDC2.
+    /// The live rate, which the board sends at once: Bosch TX1.
     pub const LIVE: Self = mems("live", "gyronet, live rate");
     /// The delayed rate, which the board sends in its own yaw messages, some samples later.
     pub const DELAYED: Self = mems("default", "gyronet, delayed rate");

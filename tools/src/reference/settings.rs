@@ -37,7 +37,6 @@ const SETTINGS: &[(&str, Takes)] = &[
         "can.yaw.e2e.P01.data_ids",
         Other("", "three different E2E identifiers; `can.yaw.e2e` also `P02`, `P05`, `P11`"),
     ),
-    ("can.vdc2", Other("", "`null`, or `{\"source\":ADDRESS}` with a J1939 address of 0 to 253")),
     (
         "can.status",
         Other(
@@ -64,10 +63,7 @@ const SETTINGS: &[(&str, Takes)] = &[
         Number("m/s^2", Field::StaticAccelDrift, "spread of one-second means at rest"),
     ),
     ("static_init.gyro_bias", Number("rad/s", Field::StaticGyroBias, "largest bias")),
-    (
-        "compensate.mode.Overlap.stride",
-        Other("samples", "1 to 10; `compensate.mode` also `Newest`, `Middle`"),
-    ),
+    ("compensate.stride", Other("samples", "1 to 10")),
     ("compensate.lag", Other("samples", "0 to 11, of 10 ms: how late the delayed rate is sent")),
     ("compensate.max_mean", Number("rad/s", Field::CompensateMaxMean, "largest mean correction of a window")),
     ("compensate.max_single", Number("rad/s", Field::CompensateMaxSingle, "largest single correction")),

@@ -31,13 +31,14 @@ fn values_are_set_by_name() {
     };
     assert_eq!(refused("imu"), "imu: not NAME=VALUE");
     assert!(refused("latitude=1").contains("no such setting"));
+    assert!(refused("can.vdc2.source=128").contains("retired, since VDC2"));
     for retired in ["fog_lane.fognet=Simulated", "fog_serial=1"] {
         assert!(refused(retired).contains("retired, because FoGNet"), "{}", refused(retired));
     }
     for (renamed, name) in [
         ("fog_lane.tilt_deg=3", "fog_gyro"),
         ("compensate.max_carry=0.01", "compensate.max_revision"),
-        ("compensate.mode.Overlap.hop=5", "compensate.mode.Overlap.stride"),
+        ("compensate.mode.Overlap.stride=5", "compensate.stride"),
     ] {
         assert!(refused(renamed).ends_with(&format!(": its name is {name} now")), "{}", refused(renamed));
     }

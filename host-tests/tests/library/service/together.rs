@@ -5,7 +5,7 @@ use embedded_can::{Id, StandardId};
 use gyronet::can::config::Config;
 use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{WheelConfigError, WheelSettings};
-use gyronet::compensate::{Mode, Stride};
+use gyronet::compensate::Stride;
 use gyronet::heading::{HeadingConfigError, HeadingSettings, HeadingSignal};
 use gyronet::model::blob::Shape;
 use gyronet::model::weights;
@@ -111,7 +111,7 @@ fn what_is_accepted_together_can_run() {
         let (stored, wheels_first) = (store(false), store(true));
         let runs = |configuration: &Configuration| {
             let compensate = &configuration.compensate;
-            let time = f64::from(compensate.mode.delay()) * 0.01;
+            let time = f64::from(compensate.stride.delay()) * 0.01;
             let fits = f64::from(measured[units]) / f64::from(HZ) < 0.75 * time;
             let limits = [compensate.max_mean, compensate.max_single, compensate.max_revision];
             fits && limits.iter().all(|limit| limit.0 > 0) && are_distinct(configuration, &wheels)
@@ -183,43 +183,37 @@ fn neither_order_makes_the_board_send_what_it_receives() {
 /// Records that do not fit each other, as a tool may have put them into the flash.
 #[test]
 fn a_start_uses_what_fits_and_reports_the_rest() {
-    let newest = |mode| {
-        let mut configuration = Configuration { fog_ids: [0xAA, 0x1A5, 0x1A6], ..Configuration::DEFAULT };
-        configuration.compensate.mode = mode;
-        configuration
-    };
-    let hop = Mode::Overlap { stride: Stride::new(1).expect("a sample") };
-    for mode in [Mode::Newest, hop] {
-        let flash = Rc::new(RefCell::new(F405::default()));
-        upload(&flash, Slot::A, &other_weights(1)).expect("it is stored");
-        open(&flash).and_then(|mut store| store.set(&newest(mode))).expect("it is stored");
-        let mut board = super::start(&flash);
-        let info = board.info();
-        assert_eq!((info.configuration, info.weights), (Origin::Stored, WeightSource::BuiltIn));
-        let slow = |error| matches!(error, Some(SlotError::Slow { cycles, available }) if cycles > available);
-        assert!(slow(info.refused_slots[0]) && board.stored_damaged(), "{info:?}");
-        assert!(matches!(info.wheels, Origin::Refused(StoreError::Field(FieldError::Wheels(_)))));
-        assert_eq!(board.wheels().frames, [None; 4], "no frame of its own is taken for the wheels");
-        // And nothing heavier may be stored beside it.
-        assert!(matches!(
-            board.set_configuration(&newest(mode)),
-            Err(Refusal::Store(StoreError::Field(FieldError::Wheels(_))))
-        ));
-        assert_eq!(board.set_wheels(&NO_WHEELS), Ok(()));
-        let window = board.set_configuration(&newest(mode));
-        assert!(
-            matches!(window, Err(Refusal::Store(StoreError::Field(FieldError::Window { .. })))),
-            "{window:?}"
-        );
-    }
+    let mut costly = Configuration { fog_ids: [0xAA, 0x1A5, 0x1A6], ..Configuration::DEFAULT };
+    costly.compensate.stride = Stride::new(1).expect("a sample");
+    let flash = Rc::new(RefCell::new(F405::default()));
+    upload(&flash, Slot::A, &other_weights(1)).expect("it is stored");
+    open(&flash).and_then(|mut store| store.set(&costly)).expect("it is stored");
+    let mut board = super::start(&flash);
+    let info = board.info();
+    assert_eq!((info.configuration, info.weights), (Origin::Stored, WeightSource::BuiltIn));
+    let slow = |error| matches!(error, Some(SlotError::Slow { cycles, available }) if cycles > available);
+    assert!(slow(info.refused_slots[0]) && board.stored_damaged(), "{info:?}");
+    assert!(matches!(info.wheels, Origin::Refused(StoreError::Field(FieldError::Wheels(_)))));
+    assert_eq!(board.wheels().frames, [None; 4], "no frame of its own is taken for the wheels");
+    // And nothing heavier may be stored beside it.
+    assert!(matches!(
+        board.set_configuration(&costly),
+        Err(Refusal::Store(StoreError::Field(FieldError::Wheels(_))))
+    ));
+    assert_eq!(board.set_wheels(&NO_WHEELS), Ok(()));
+    let window = board.set_configuration(&costly);
+    assert!(
+        matches!(window, Err(Refusal::Store(StoreError::Field(FieldError::Window { .. })))),
+        "{window:?}"
+    );
 }
 
 #[test]
-fn weights_that_are_too_slow_for_the_mode_are_not_activated() {
+fn weights_that_are_too_slow_for_the_stride_are_not_activated() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = super::start(&flash);
     let mut configuration = Configuration::DEFAULT;
-    configuration.compensate.mode = Mode::Newest;
+    configuration.compensate.stride = Stride::new(1).expect("a sample");
     assert_eq!(board.set_configuration(&configuration), Ok(()), "with the built-in weights");
     let file = other_weights(1);
     let send = |board: &mut super::Board| {

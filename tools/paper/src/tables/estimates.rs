@@ -62,14 +62,14 @@ pub fn run(sequence: &Sequence, network: &mut impl WindowNetwork) -> Estimates {
     estimates.add(Method::FOG, fog.clone());
     let earth = EARTH_RATE * libm::sin(sequence.latitude_deg().to_radians());
     estimates.add(Method::FOG_EARTH, fog.iter().map(|rate| rate - earth).collect());
-    let (sent, _) = fog_replay::run_board(sequence, fog_replay::default_config(sequence), None);
+    let sent = fog_replay::run_board(sequence);
     estimates.add(Method::FOG_DEFAULT, sent.iter().map(|sent| sent.rate.rad_per_sec()).collect());
     estimates
 }
 
 impl Estimates {
-    /// Adds the rates that the board sends with FoGNet, with and without padding, if there is an inertial sensor. The
-    /// board does not run weights for another gyro.
+    /// Adds the rates that the board sends, corrected by FoGNet with and without padding, if there is an inertial sensor.
+    /// Weights for another gyro are not run.
     pub fn add_fognet(&mut self, sequence: &Sequence, network: &mut impl MinuteNetwork, trained: Training) {
         if !sequence.has_gyro {
             return;
@@ -79,14 +79,16 @@ impl Estimates {
             let before = self.refused.take().map(|before| before + "; ").unwrap_or_default();
             self.refused = Some(format!("{before}FoGNet's weights were not run: {error}"));
         }
-        let config = fog_replay::default_config(sequence);
+        let base = fog_replay::after_base(sequence);
         let mut whole = WholeMinutes(network);
         for method in [Method::FOGNET, Method::FOGNET_NOPAD] {
             let network: &mut dyn MinuteNetwork =
                 if method == Method::FOGNET { &mut *whole.0 } else { &mut whole };
-            let network = fits.is_ok().then_some(network);
-            let (sent, _) = fog_replay::run_board(sequence, config, network);
-            self.add(method, sent.iter().map(|sent| sent.rate.rad_per_sec()).collect());
+            let turns = match fits {
+                Ok(()) => fog_replay::run(&base, network, FogConfig::DEFAULT).turns,
+                Err(_) => base.steps.iter().map(|step| step.fog).collect(),
+            };
+            self.add(method, turns.iter().map(|turn| turn / DT).collect());
         }
     }
 

@@ -305,7 +305,7 @@ mod tests {
             &INPUT_COUNTERS.to_be_bytes(),
             &words(100, 19),
             &FOG_COUNTERS.to_be_bytes(),
-            &words(200, 12),
+            &words(200, 7),
             &CONTRADICTION.to_be_bytes(),
             &[0, 0, 0, 7, 0x01, 0xF4, 0x7F, 0xFF, 0xFF, 0x9C, 0x05, 0xDC, 0x00, 0x0B],
         ]
@@ -313,7 +313,7 @@ mod tests {
         let all = counters(&response).expect("whole");
         assert_eq!((all.pipeline.samples, all.pipeline.moved_mounts), (0, 13));
         assert_eq!((all.watch.silences, all.inputs.imu_errors, all.lines.unsent), (100, 105, 114));
-        assert_eq!((all.lines.frames_lost, all.fog.samples, all.fog.dropped), (118, 200, 211));
+        assert_eq!((all.lines.frames_lost, all.fog.samples, all.fog.contradicted), (118, 200, 206));
         assert_eq!(
             all.contradiction,
             Contradiction {

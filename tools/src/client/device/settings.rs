@@ -13,12 +13,16 @@ const RATES: [&str; 3] = ["max_mean", "max_single", "max_revision"];
 const NO_FOGNET: &str =
     "retired, because FoGNet no longer runs on this board (`cargo paper tables` runs it on recordings)";
 /// Settings that have gone, with the reason or the successor. A name stands for those below it too.
-const RETIRED: [(&str, &str); 5] = [
+const RETIRED: [(&str, &str); 6] = [
     ("fog_lane.fognet", NO_FOGNET),
     ("fog_serial", NO_FOGNET),
     ("fog_lane", "its name is fog_gyro now"),
+    (
+        "can.vdc2",
+        "retired, since VDC2 has no place for quality and expected error: use the board's own messages (can.yaw)",
+    ),
     ("compensate.max_carry", "its name is compensate.max_revision now"),
-    ("compensate.mode.Overlap.hop", "its name is compensate.mode.Overlap.stride now"),
+    ("compensate.mode", "its name is compensate.stride now"),
 ];
 /// Decimals, in rad/s, that distinguish any two codes.
 const RATE_DECIMALS: usize = 9;

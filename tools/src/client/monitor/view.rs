@@ -56,7 +56,6 @@ impl Monitor {
         for (name, value) in [
             ("time_s", rounded(Some(time), 6).into()),
             ("drop_in_deg_per_s", rounded(self.drop_in, 3).into()),
-            ("vdc2_deg_per_s", rounded(self.vdc2, 4).into()),
             ("fog", self.fog.as_ref().map(values).into()),
             ("frames", frames.into()),
             ("foreign", foreign.into()),
@@ -115,9 +114,6 @@ impl fmt::Display for Monitor {
         row(f, "correction", number(correction, 4), " deg/s")?;
         row(f, "latency", number(latency, 1), " ms")?;
         row(f, "drop-in rate", number(self.drop_in, 3), " deg/s")?;
-        if self.vdc2.is_some() {
-            row(f, "VDC2 rate", number(self.vdc2, 4), " deg/s")?;
-        }
         let pace = number(self.frames_per_second, 1);
         row(f, "messages", frames, format_args!(", {foreign} of others, {pace} a second"))?;
         row(f, "lost", lost, format_args!(", repeated {repeated}, out of sequence {out_of_sequence}"))?;

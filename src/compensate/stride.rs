@@ -1,8 +1,7 @@
-//! Defines which outputs of a window are used, the samples between windows, and the lag of the rate.
+//! Defines the samples between windows, and the lag of the rate.
 
 use crate::model::window::WINDOW;
 use crate::sample::RATE_HZ;
-use core::ops::Range;
 
 /// An estimate is used this many samples after its window's newest one, however long the network took, so that the
 /// board's frames do not depend on its speed. With a window every sample, the estimate has to be ready with the next
@@ -12,7 +11,8 @@ pub const DELAY: u32 = 2;
 /// Cycles of the other tasks between two samples: health, compensation, frames.
 const OUTPUT_CYCLES: u32 = 30_000;
 
-/// Samples between two windows: 1 to [`WINDOW`].
+/// Samples between two windows: 1 to [`WINDOW`]. A sample's estimate is the mean of those of all windows that cover it: the
+/// newest output of a window depends only on the past and is the worst; those in the middle depend on both sides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
@@ -32,6 +32,30 @@ impl Stride {
     #[must_use]
     pub const fn samples(self) -> u32 {
         self.0 as u32
+    }
+
+    /// Returns the number of samples from a window's newest one to the use of its estimate.
+    #[must_use]
+    pub const fn delay(self) -> u32 {
+        if self.samples() < DELAY { self.samples() } else { DELAY }
+    }
+
+    /// Returns the cycles that a window may take, so that its estimate is ready in time and three tenths of the processor
+    /// are left to the tasks of lower priority; `u32::MAX` where the clock is not known.
+    #[must_use]
+    pub const fn window_cycles(self, clock_hz: u32) -> u32 {
+        if clock_hz == 0 {
+            return u32::MAX;
+        }
+        let sample = (clock_hz / RATE_HZ).saturating_sub(OUTPUT_CYCLES);
+        self.delay() * (sample / 10 * 7)
+    }
+
+    /// Returns the number of samples after which no window changes an estimate any more.
+    #[must_use]
+    #[doc(hidden)]
+    pub const fn complete_after(self) -> usize {
+        WINDOW - 1 + self.delay() as usize
     }
 }
 
@@ -98,73 +122,6 @@ pub struct OutOfRange {
     high: u8,
 }
 
-/// The rule that chooses the estimate of a sample from the windows that cover it.
-///
-/// The newest output of a window depends only on the past and is the worst; those in the middle depend on both sides.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Mode {
-    /// A window every sample, of which the newest output is used: the obvious online choice.
-    Newest,
-    /// A window every five samples, of which the five in the middle are used.
-    Middle,
-    /// The mean of all windows that cover a sample.
-    Overlap {
-        /// Samples between two windows.
-        stride: Stride,
-    },
-}
-
-impl Mode {
-    /// Returns the number of samples between two windows.
-    #[must_use]
-    pub const fn stride(self) -> u32 {
-        match self {
-            Self::Newest => 1,
-            Self::Middle => Stride::HALF.samples(),
-            Self::Overlap { stride } => stride.samples(),
-        }
-    }
-
-    /// Returns the number of samples from a window's newest one to the use of its estimate.
-    #[must_use]
-    pub const fn delay(self) -> u32 {
-        if self.stride() < DELAY { self.stride() } else { DELAY }
-    }
-
-    /// Returns the cycles that a window may take, so that its estimate is ready in time and three tenths of the processor
-    /// are left to the tasks of lower priority; `u32::MAX` where the clock is not known.
-    #[must_use]
-    pub const fn window_cycles(self, clock_hz: u32) -> u32 {
-        if clock_hz == 0 {
-            return u32::MAX;
-        }
-        let sample = (clock_hz / RATE_HZ).saturating_sub(OUTPUT_CYCLES);
-        self.delay() * (sample / 10 * 7)
-    }
-
-    /// Returns the outputs of a window that are used, oldest first.
-    #[must_use]
-    #[doc(hidden)]
-    pub const fn used(self) -> Range<usize> {
-        match self {
-            Self::Newest => WINDOW - 1..WINDOW,
-            // One output for every sample, and as many unused ones after the newest as before the oldest, where the
-            // number allows.
-            Self::Middle => 3..8,
-            Self::Overlap { .. } => 0..WINDOW,
-        }
-    }
-
-    /// Returns the number of samples after which no window changes an estimate any more.
-    #[must_use]
-    #[doc(hidden)]
-    pub const fn complete_after(self) -> usize {
-        WINDOW - 1 - self.used().start + self.delay() as usize
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -177,15 +134,11 @@ mod tests {
     }
 
     #[test]
-    fn every_sample_gets_an_estimate_and_none_is_read_too_late() {
-        let overlap = (1..=10).filter_map(Stride::new).map(|stride| Mode::Overlap { stride });
-        for mode in [Mode::Newest, Mode::Middle].into_iter().chain(overlap) {
-            assert!(mode.used().len() >= mode.stride() as usize, "{mode:?}");
-            assert!(mode.delay() >= 1 && mode.delay() <= mode.stride(), "{mode:?}");
-            assert!(mode.complete_after() <= Lag::MAX.samples(), "{mode:?}");
+    fn no_estimate_is_read_too_late() {
+        for stride in (1..=10).filter_map(Stride::new) {
+            assert!(stride.delay() >= 1 && stride.delay() <= stride.samples(), "{stride:?}");
+            assert!(stride.complete_after() <= Lag::MAX.samples(), "{stride:?}");
         }
-        assert_eq!(Mode::Newest.complete_after(), 1);
-        assert_eq!(Mode::Middle.complete_after(), 8);
-        assert_eq!(Mode::Overlap { stride: Stride::HALF }.complete_after(), 11);
+        assert_eq!(Stride::HALF.complete_after(), 11);
     }
 }
