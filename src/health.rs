@@ -11,7 +11,6 @@ use crate::sample::Validity;
 /// [`states::STATES`] says when each state is entered and left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Status {
     /// The bias is not known yet: the rate is sent but not good.
     #[default]
@@ -43,7 +42,6 @@ impl core::fmt::Display for Status {
 
 /// Says where a rate comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Source {
     /// The gyro without a correction.
@@ -59,7 +57,6 @@ pub enum Source {
 
 /// Says how far a rate can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Quality {
     /// The rate is fully corrected, without restrictions.
@@ -75,7 +72,6 @@ pub enum Quality {
 
 /// The present faults, one bit each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Faults(pub u8);
 
 impl Faults {
@@ -129,7 +125,6 @@ impl Faults {
 
 /// The faults of the board other than those of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoardFaults {
     /// Frames were lost on the bus, or the controller is off it.
     pub bus: bool,
@@ -191,7 +186,6 @@ pub const fn judge(status: Status) -> (Source, Quality) {
 /// Event counters since the start. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters {
     /// Samples that became frames.
     pub samples: u32,
@@ -246,7 +240,6 @@ impl Counters {
 /// Fault counters of the sensor ([`crate::monitor`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MonitorCounters {
     /// Times that the sensor became silent.
     pub silences: u32,
@@ -268,7 +261,6 @@ impl MonitorCounters {
 /// Counters of inputs that were refused or replaced ([`crate::coprocessor`]). They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct InputCounters {
     /// Messages of the inertial sensor that were not valid samples.
     pub imu_errors: u32,

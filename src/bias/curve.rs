@@ -50,7 +50,6 @@ pub struct CurveBias {
 /// Holds the gyro's bias by temperature, in the sensor's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BiasCurve {
     /// Coefficients of x, y and z, rad/s, by rising power of (temperature - 25 deg C) / 25 K.
     coefficients: [[f32; COEFFICIENTS]; 3],

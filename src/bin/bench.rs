@@ -1,4 +1,4 @@
-//! Benchmark of the kernels, networks and parsers on the target. Prints one line for each: `name stack=N`, with
+//! Benchmark of the kernels and networks on the target. Prints one line for each: `name stack=N`, with
 //! `cycles=N` from the DWT cycle counter where that runs (on a board).
 //!
 //! Each measured region is enclosed by two marker instructions that do nothing; a plugin of the emulator counts the
@@ -23,9 +23,6 @@ mod checkpoint;
 mod meter;
 
 #[cfg(target_os = "none")]
-#[path = "support/parsers.rs"]
-mod parsers;
-
 #[cfg(target_os = "none")]
 mod firmware {
     use crate::meter::Meter;
@@ -73,7 +70,6 @@ mod firmware {
         gyronet(meter);
         coprocessor(meter);
         kernels(meter);
-        crate::parsers::run(meter);
         signature(meter);
         hprintln!("gyronet/state bytes={}", size_of::<GyroNetState<HIDDEN>>());
         hprintln!("gyronet/weights bytes={}", weights::GYRONET.0.len());

@@ -49,7 +49,4 @@ fn main() {
     for (image, code) in [("coprocessor", slot + BEHIND_LABEL), ("bringup", a), ("boot", BEHIND_VECTORS)] {
         println!("cargo:rustc-link-arg-bin={image}=--defsym=_flashed_code={code:#010x}");
     }
-    if has("CARGO_FEATURE_RTT") {
-        println!("cargo:rustc-link-arg-bin=coprocessor=-Tdefmt.x");
-    }
 }

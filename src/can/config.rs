@@ -31,7 +31,6 @@ pub const MAX_MESSAGES: usize = 8;
 
 /// Checked [`Settings`]: the messages that are sent, their periods and their protection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
     settings: Settings,
 }
@@ -67,8 +66,7 @@ impl Config {
     /// Checks the worst-case load of the messages and of further ones.
     fn check_load(&self, further: &[Periodic]) -> Result<(), ConfigError> {
         let bits_per_second = self.settings.bits_per_second;
-        let load = |messages: &[Periodic]| per_mille(messages, Periodic::worst_case_bits, bits_per_second);
-        let per_mille = load(&self.messages()) + load(further);
+        let per_mille = per_mille(&self.messages(), bits_per_second) + per_mille(further, bits_per_second);
         if per_mille > MAX_BUS_LOAD {
             Err(ConfigError::Overload { per_mille, bits_per_second })
         } else {
@@ -124,7 +122,7 @@ impl Config {
 
     /// Returns the bus load of the messages in 1/1000, with the largest possible number of stuff bits.
     pub fn bus_load_per_mille(&self) -> u32 {
-        per_mille(&self.messages(), Periodic::worst_case_bits, self.settings.bits_per_second)
+        per_mille(&self.messages(), self.settings.bits_per_second)
     }
 
     /// Returns the number of samples for each set of our own messages.

@@ -30,7 +30,6 @@ pub use sequence::{Sequence, Verdict};
 
 /// The reason why protected data must not be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum Fault {
@@ -48,7 +47,6 @@ pub enum Fault {
 /// An E2E profile and its data identifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Profile {
     /// Profile 1.
     P01(P01),

@@ -1,4 +1,4 @@
-//! The load of periodic messages on a CAN bus (worst case) and on a serial line.
+//! The load of periodic messages on a CAN bus, at worst.
 
 use embedded_can::Id;
 
@@ -13,8 +13,6 @@ pub struct Periodic {
 
 /// Data bits of a frame; all our frames have eight bytes.
 const DATA_BITS: u32 = 64;
-/// Line bits per character: start, eight data bits, stop.
-const BITS_PER_CHARACTER: u32 = 10;
 
 impl Periodic {
     /// Returns the bits of one frame with the largest possible number of stuff bits, interframe space included.
@@ -30,25 +28,16 @@ impl Periodic {
             };
         stuffed + 13 + (stuffed - 1) / 4
     }
-
-    /// Returns the line bits of the same frame as an SLCAN line, with or without a time stamp.
-    pub const fn slcan_bits(&self, stamped: bool) -> u32 {
-        let identifier = match self.id {
-            Id::Standard(_) => 3,
-            Id::Extended(_) => 8,
-        };
-        // Letter, identifier, length, data, stamp, CR.
-        let characters = 1 + identifier + 1 + 2 * 8 + (if stamped { 4 } else { 0 }) + 1;
-        characters * BITS_PER_CHARACTER
-    }
 }
 
-/// Returns the load of the messages on a bus or line, in 1/1000, rounded up.
-pub fn per_mille(messages: &[Periodic], bits: impl Fn(&Periodic) -> u32, bits_per_second: u32) -> u32 {
+/// Returns the load of the messages on a bus, in 1/1000, rounded up.
+pub fn per_mille(messages: &[Periodic], bits_per_second: u32) -> u32 {
     // Bits in 1000 s, exact for every period that divides 1,000,000 ms, rounded up for others.
     let bits: u64 = messages
         .iter()
-        .map(|message| (u64::from(bits(message)) * 1_000_000).div_ceil(message.period_ms.max(1).into()))
+        .map(|message| {
+            (u64::from(message.worst_case_bits()) * 1_000_000).div_ceil(message.period_ms.max(1).into())
+        })
         .sum();
     u32::try_from(bits.div_ceil(bits_per_second.max(1).into())).unwrap_or(u32::MAX)
 }

@@ -3,7 +3,6 @@
 /// The byte order of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ByteOrder {
     /// Little-endian (DBC `@1`): the start bit is the lowest bit.
     Intel,
@@ -13,7 +12,6 @@ pub enum ByteOrder {
 
 /// The error for a bit field that does not lie inside eight bytes, or whose length is not 1 to 32 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("{} bits from bit {} do not lie inside a frame", .len, .start)]
 pub struct OutsideFrame {
     /// Requested start bit.
@@ -26,7 +24,6 @@ pub struct OutsideFrame {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Place", into = "Place"))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BitField {
     /// Number of bits below the value when the frame is read in its byte order.
     shift: u8,

@@ -16,7 +16,6 @@ const OUTPUT_CYCLES: u32 = 30_000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Stride(u8);
 
 impl Stride {
@@ -77,7 +76,6 @@ impl From<Stride> for u8 {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Lag(u8);
 
 impl Lag {
@@ -114,7 +112,6 @@ impl From<Lag> for u8 {
 
 /// A number of samples outside its range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("{} samples are not within {} to {}", .samples, .low, .high)]
 pub struct OutOfRange {
     samples: u8,

@@ -46,7 +46,6 @@ const CLOCK: f32 = 0.01;
 /// Event counters since the start. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogCounters {
     /// Samples accepted.
     pub samples: u32,

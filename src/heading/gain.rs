@@ -14,7 +14,6 @@ const BETTER: f32 = 0.7;
 /// A gain of the yaw gyro.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Gain {
     /// Share of the rate that the gyro reads too much.
     pub share: f32,

@@ -40,7 +40,6 @@ pub const TOPOLOGY: Topology = [FOGNET, STEPS as u16, INPUTS as u16, HIDDEN1 as 
 /// Names the source of the turns that a FoGNet corrects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Gyro {
     /// A KVH DSP-1760, less the Earth's rate and its bias.
     Dsp1760,
@@ -68,7 +67,6 @@ impl core::fmt::Display for Gyro {
 /// Says what a FoGNet was trained on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Training {
     /// The source of the turns.
     pub gyro: Gyro,

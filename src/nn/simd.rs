@@ -5,15 +5,10 @@ mod cortex_m;
 #[cfg(gyronet_dsp)]
 pub(super) use cortex_m::{copy, project, step};
 
-#[cfg(not(target_os = "none"))]
-mod host;
-#[cfg(not(target_os = "none"))]
-pub(super) use host::{project, step};
-
 #[cfg(not(gyronet_dsp))]
 pub(super) fn copy(from: &[u32], to: &mut [u32]) {
     to.copy_from_slice(from);
 }
 
-#[cfg(all(target_os = "none", not(gyronet_dsp)))]
+#[cfg(not(gyronet_dsp))]
 pub(super) use super::lstm::{project_portable as project, step_portable as step};

@@ -15,7 +15,6 @@ pub const PAGE: usize = 8;
 
 /// The cause of the last reset, from the reset flags (RM0090 7.3.21).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ResetCause {
     /// No flag is set.
@@ -36,7 +35,6 @@ pub enum ResetCause {
 
 /// The reason why a sensor could not be set up or read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SensorFault {
     /// The SPI controller did not answer.
@@ -62,7 +60,6 @@ pub enum SensorFault {
 
 /// The kinds of events.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum EventKind {
     /// The image started.
@@ -127,7 +124,6 @@ pub enum EventKind {
 
 /// An entry of the event log.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Event {
     /// Number of the event, from 1 at the start.
     pub number: u32,
@@ -161,15 +157,13 @@ impl EventLog {
         Self { events: Deque::new(), total: 0 }
     }
 
-    /// Appends an event, and with feature `defmt` also prints it.
+    /// Appends an event.
     pub fn record(&mut self, tick: u32, kind: EventKind) {
         self.total = self.total.saturating_add(1);
         if self.events.is_full() {
             self.events.pop_front();
         }
         let event = Event { number: self.total, tick, kind };
-        #[cfg(feature = "defmt")]
-        defmt::info!("{}", event);
         // Cannot fail: the log has room now.
         let _ = self.events.push_back(event);
     }

@@ -2,7 +2,6 @@
 //! the code that they share.
 
 pub mod bench_target;
-pub mod bus;
 pub mod calibrate;
 pub mod completions;
 pub mod demo;

@@ -84,27 +84,6 @@ fn a_sensor_that_falls_silent_is_a_trouble_and_the_rates_keep_their_place() {
 }
 
 #[test]
-fn a_tester_stops_the_messages_until_it_is_gone() {
-    const TEST: &str = "a_tester_stops_the_messages_until_it_is_gone";
-    let Some(mut board) = common::boot(TEST) else { return };
-    board.run(START);
-    let now = board.counts().time;
-    common::send(&mut board, &drive(1_000), now);
-    board.run(Duration::from_secs(4));
-    assert_eq!(ask(&mut board, &[0x10, 3]), Some(vec![0x50, 3, 0, 50, 0x01, 0xF4]));
-    assert_eq!(ask(&mut board, &[0x28, 1, 1]), Some(vec![0x68, 1]));
-    board.run(Duration::from_millis(20));
-    let _ = board.can_frames();
-    board.run(Duration::from_secs(1));
-    assert_eq!(board.can_frames().len(), 0);
-    // The session ends by itself.
-    board.run(Duration::from_millis(4_500));
-    let _ = board.can_frames();
-    board.run(Duration::from_millis(200));
-    assert!(board.can_frames().len() >= 6 * 19);
-}
-
-#[test]
 fn diagnosis_with_29_bits_is_configured_over_itself() {
     const TEST: &str = "diagnosis_with_29_bits_is_configured_over_itself";
     let Some(mut board) = common::boot(TEST) else { return };

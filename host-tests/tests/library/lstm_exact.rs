@@ -3,8 +3,8 @@
 
 use gyronet::nn::activation::{saturate, sigmoid, tanh};
 use gyronet::nn::bilstm::{Direction, Layer, Run, word_index};
-use gyronet::nn::lstm::{Accumulators, DirectionWeights, ROW_LIMIT, Scratch, row_bound};
-use gyronet::nn::lstm::{project, project_portable, step, step_portable};
+use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT, Scratch, row_bound};
+use gyronet::nn::lstm::{project, step};
 use gyronet::nn::{GATES, HIDDEN_MAX};
 use gyronet_host_tests::noise::{Noise, cases};
 use gyronet_host_tests::packing::{Row, Rows, word};
@@ -80,7 +80,7 @@ fn values(noise: &mut Noise, max: i32, row: Option<(&Row, &[i8])>, len: usize) -
     }
 }
 
-/// One pair of steps: the library's kernel and its portable definition against the naive one.
+/// One pair of steps: the library's definition against the naive one.
 fn check_step<const U: usize, const W: usize>(inputs: usize, seed: u64) {
     let mut noise = Noise::new(seed);
     let input_max = [HIDDEN_MAX, 24 * HIDDEN_MAX, i16::MAX.into()][noise.int(0, 2) as usize];
@@ -98,26 +98,15 @@ fn check_step<const U: usize, const W: usize>(inputs: usize, seed: u64) {
     previous[..U / 2].copy_from_slice(&words(&hidden));
 
     let interleaved = interleave(&x[0], &x[1]);
-    let mut projections = [[[[0; GATES]; U]; 2]; 2];
-    project(&direction, &interleaved, from_mut(&mut projections[0]));
-    project_portable(&direction, &interleaved, from_mut(&mut projections[1]));
-    assert_eq!(projections[0], projections[1], "projection");
+    let mut projections = [[[0; GATES]; U]; 2];
+    project(&direction, &interleaved, from_mut(&mut projections));
     for previous in [Some(&previous), None] {
-        for (x, projection) in x.iter().zip(&projections[0]) {
+        for (x, projection) in x.iter().zip(&projections) {
             let zero = vec![0; U];
             let expected = naive_step(&rows, x, if previous.is_some() { &hidden } else { &zero }, &cell);
-            type Step<const U: usize, const W: usize> = fn(
-                &DirectionWeights<'_>,
-                &[Accumulators; U],
-                Option<&[u32; W]>,
-                &mut [i32; U],
-                &mut [u32; W],
-            );
-            for kernel in [step::<U, W> as Step<U, W>, step_portable::<U, W>] {
-                let (mut cell, mut hidden) = (cell, [0; W]);
-                kernel(&direction, projection, previous, &mut cell, &mut hidden);
-                assert_eq!((&cell[..], &unpack::<U>(&hidden)[..]), (&expected.0[..], &expected.1[..]));
-            }
+            let (mut cell, mut hidden) = (cell, [0; W]);
+            step(&direction, projection, previous, &mut cell, &mut hidden);
+            assert_eq!((&cell[..], &unpack::<U>(&hidden)[..]), (&expected.0[..], &expected.1[..]));
         }
     }
 }

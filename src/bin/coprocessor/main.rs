@@ -32,9 +32,6 @@ fn main() {
     eprintln!("this is a firmware image: build it with `cargo fw`");
 }
 
-#[cfg(all(target_os = "none", feature = "rtt"))]
-use defmt_rtt as _;
-
 #[cfg(target_os = "none")]
 mod board;
 #[cfg(target_os = "none")]

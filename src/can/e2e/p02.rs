@@ -14,7 +14,6 @@ const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS }
 /// Protects and checks one message with profile 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct P02 {
     /// Data identifier for each counter value.
     pub data_ids: [u8; 16],

@@ -6,7 +6,6 @@ use super::p01::{DataIdMode, P01};
 /// The choice of bytes of the identifier that enter the CRC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum P11Mode {
     /// Low byte, high byte (variant 11A).
     Both,
@@ -17,7 +16,6 @@ pub enum P11Mode {
 /// Protects and checks one message with profile 11.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct P11 {
     /// Data identifier, known to both sides. With [`P11Mode::Nibble`] it has 12 bits.
     pub data_id: u16,

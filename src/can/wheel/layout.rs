@@ -9,7 +9,6 @@ use embedded_can::Id;
 /// A value of a field that says something: that a speed is valid, that a wheel turns backwards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Code {
     /// Position of the field.
     pub field: BitField,
@@ -20,7 +19,6 @@ pub struct Code {
 /// The position and scale of one wheel's speed in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WheelSignal {
     /// Index of the frame that carries the speed, in [`WheelSettings::frames`](super::WheelSettings::frames).
     pub frame: u8,
@@ -127,7 +125,6 @@ impl Pulses {
 /// A number in one or two parts of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Parts {
     /// The low bits.
     pub low: BitField,
@@ -163,7 +160,6 @@ impl Parts {
 /// low bits as the field has. The checksum's own bits count as zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ByteSum {
     /// Position of the checksum, at most 8 bits.
     pub field: Parts,
@@ -211,7 +207,6 @@ impl ByteSum {
 /// The protection of a wheel frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Checksum {
     /// The frame is not protected.
     None,
@@ -267,7 +262,6 @@ pub(crate) mod stored_id {
 
 /// The reason why a frame gives no wheel speeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum WheelError {

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// from the Cortex-M4's manual at zero wait states, not measured on silicon: `cargo bringup` counts them on a board.
 ///
 /// It prints one line for each kernel, network and sensor parser: `name instructions=N cycles=N stack=BYTES`. Sizes
-/// follow: of states, weights, parsers, and of the frames that the parsers got.
+/// follow: of states and weights.
 ///
 /// With --cmsis-nn it prints GyroNet's network by CMSIS-NN beside ours, in the same emulator with the same counter. That
 /// needs arm-none-eabi-gcc, and the sources: git clone --depth 1 https://github.com/ARM-software/CMSIS-NN

@@ -19,9 +19,6 @@ pub struct Args {
     /// Board, as a feature of the images.
     #[arg(long, default_value = "netduino-plus-2")]
     board: String,
-    /// Another feature of the images, such as `rtt`.
-    #[arg(long)]
-    features: Option<String>,
     /// Folder of the build and of its results [default: cargo's target folder].
     #[arg(long, value_name = "DIR")]
     target_dir: Option<PathBuf>,
@@ -33,8 +30,7 @@ pub struct Args {
 pub fn run(args: &Args, common: Common) -> super::Result {
     let folder = args.target_dir.clone().unwrap_or_else(bench::target_folder);
     let folder = std::path::absolute(folder)?;
-    let features = args.features.iter().fold(args.board.clone(), |all, one| format!("{all},{one}"));
-    let linked = Linked::build(&features, if args.flash { 1 } else { 2 }, &folder)?;
+    let linked = Linked::build(&args.board, if args.flash { 1 } else { 2 }, &folder)?;
     let [elf, update] = ["elf", "update"].map(|end| folder.join(format!("{}.{end}", args.board)));
     std::fs::write(&elf, linked.for_programmer()?).map_err(WriteError::to(&elf))?;
     if args.flash {
