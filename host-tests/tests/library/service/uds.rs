@@ -318,8 +318,12 @@ fn a_trouble_survives_a_restart_with_the_state_in_which_it_came() {
     let response = [&[0x59, 4, 0x5A, 0x01, 0x31, 0x2C][..], &snapshot].concat();
     after.fail(Status::Ready, Faults::NONE);
     after.expect(&[0x19, 4, 0x5A, 0x01, 0x31, 1], &response);
-    after.expect(&[0x14, 0xFF, 0xFF, 0xFF], &[0x54]);
-    after.fail(Status::Ready, Faults::NONE);
+    for is_stored in [true, false] {
+        let operations = flash.borrow().operations();
+        after.expect(&[0x14, 0x5A, 0x01, 0x31], &[0x54]);
+        after.fail(Status::Ready, Faults::NONE);
+        assert_eq!(flash.borrow().operations() > operations, is_stored);
+    }
     let mut cleared = Bench::new(&flash);
     cleared.expect(&[0x19, 4, 0x5A, 0x01, 0x31, 1], &[0x59, 4, 0x5A, 0x01, 0x31, 0]);
 }
