@@ -56,7 +56,9 @@ impl Arrivals {
     fn late(&mut self, time: Micros, now: Micros) -> (u64, u64) {
         let measured = (now.0 as i64).wrapping_sub(time.0 as i64);
         let (last, before) = self.newest.unwrap_or((time.0, measured));
-        let expected = before.saturating_add((time.0.saturating_sub(last) / CREEP) as i64);
+        // While samples are late nothing creeps up, or the lost time would look like a slow clock before patience ends.
+        let creep = if self.late_since.is_some() { 0 } else { time.0.saturating_sub(last) / CREEP };
+        let expected = before.saturating_add(creep as i64);
         let late = measured.saturating_sub(expected).max(0) as u64;
         let since = if late > TIMEOUT_US { Some(*self.late_since.get_or_insert(now.0)) } else { None };
         self.late_since = since;

@@ -385,7 +385,8 @@ impl Pipeline {
 
     /// Notes that the sensor's clock has lost this time, microseconds: the next step ends a gap.
     pub(crate) fn lose_time(&mut self, lost: u64) {
-        let steps = (lost / PERIOD_US).min(u64::from(u16::MAX)) as u32;
+        let steps = (lost.saturating_add(PERIOD_US / 2) / PERIOD_US).min(u64::from(u16::MAX)) as u32;
+        count(&mut self.state.counters.missing, steps);
         self.lose(self.state.tick, steps);
         self.gap();
     }

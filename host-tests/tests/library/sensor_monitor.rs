@@ -71,6 +71,21 @@ fn silence_keeps_the_yaw() {
     assert_eq!((silent.yaw, silent.source, set.sample), (last.yaw, Source::Raw, None));
 }
 
+/// The counter of an ICM-42688-P wraps every 69.9 ms, so that its stamps show a gap of 80 ms as one of 10 ms: for a second
+/// the samples come late, then the time is lost.
+#[test]
+fn a_gap_that_the_stamps_do_not_show_is_found_by_the_arrivals() {
+    const WRAP_US: u64 = 69_905;
+    let (mut coprocessor, mut noise) = fed(400);
+    for tick in 407..520 {
+        let time = Micros(tick * PERIOD_US - WRAP_US);
+        let sample = ImuSample { time, ..idling(tick, 0.001, &mut noise) };
+        let set = coprocessor.imu(sample, at(tick), &mut ()).expect("in order").expect("a step").vehicle;
+        assert_ne!(set.live.quality, Quality::Good, "{tick}");
+    }
+    assert_eq!(coprocessor.pipeline().counters().missing, 7);
+}
+
 #[test]
 fn a_part_has_time_to_start() {
     let mut coprocessor = coprocessor();

@@ -58,6 +58,22 @@ fn access(bench: &mut Bench) -> (u8, u32, u8) {
     (read[3], u32::from_be_bytes([read[4], read[5], read[6], read[7]]), read[8])
 }
 
+/// Whoever signs with a tool of their own needs these bytes. The hash is FIPS 180-2's of "abc".
+#[test]
+fn the_signed_bytes_are_those_of_the_page() {
+    let hash: [u8; 64] = unhex(
+        "ddaf35a193617abacc417349ae20413112e6fa4e89a97ea20a9eeee64b55d39a2192992a274fc1a836ba3c23a3feebbd454d4423643ce80e2a9ac94fa54ca49f",
+    )
+    .expect("a hash");
+    let statement = signature::Statement { target: CONFIGURATION, serial: SERIAL, counter: 5 };
+    let signed = signature::message(&statement, &signature::digest(b"abc"));
+    let content =
+        [&b"gyronet content 1"[..], &[1, 0], b"a test board", &[0, 0, 0, 5], &[0, 0, 0, 3], &hash].concat();
+    assert_eq!(signed[..], content);
+    let answer = [&b"gyronet access 1"[..], b"a test board", &[9; 32]].concat();
+    assert_eq!(signature::challenge(&SERIAL, &[9; 32])[..], answer);
+}
+
 /// RFC 8032, section 7.1, tests 1 to 3, and each with a bit flipped.
 #[test]
 fn signatures_are_those_of_rfc_8032() {
