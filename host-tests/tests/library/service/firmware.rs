@@ -202,6 +202,11 @@ fn what_cannot_be_right_is_refused_before_anything_is_erased() {
     assert_eq!(alone, Err(FirmwareError::NoBootLoader.into()));
     let own = start_from(&flash, Some(Slot::A)).firmware_begin(Slot::A, length);
     assert_eq!(own, Err(FirmwareError::NoBootLoader.into()));
+    for length in [0, MAX_IMAGE - 1, MAX_IMAGE, MAX_IMAGE + 4] {
+        let begun = start_from(&flash, Some(Slot::A)).firmware_begin(Slot::B, length);
+        let refused = Err(FirmwareError::Length(length).into());
+        assert_eq!(begun, if length == MAX_IMAGE { Ok(()) } else { refused });
+    }
     // An older version is taken on request.
     let mut older = update(Label { version: [0, 9, 9], ..OWN }).head;
     older.downgrade = true;
