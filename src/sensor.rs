@@ -9,6 +9,7 @@
 //! | Xsens MTi | UART | [`xsens::Mti`] | [`ImuSample`] |
 //! | KVH DSP-1760, 17xx | RS-422 | [`dsp1760::Dsp1760`] | [`FogSample`] |
 //! | TDK ICM-42688-P | SPI | [`icm42688::Icm42688`] | [`ImuSample`] |
+//! | Bosch BMI088 | SPI, two chip selects | [`bmi088::Bmi088`] | [`ImuSample`] |
 //!
 //! UART parts are read through [`serial::Serial`] over any port with the traits of `embedded-io`; the maker's tool sets
 //! them up once. SPI parts take an `embedded_hal::spi::SpiDevice`. Either way it is a [`Source`].
@@ -20,11 +21,13 @@
 //! | MTData2 | sum of bytes, 8 bits | refused | one in 256 other errors |
 //! | DSP-1760 | CRC of 32 bits | refused | one in 4 x 10^9 |
 //! | ICM-42688 packet | none, except its header | a reading may be another one | that reading |
+//! | BMI088 frame | none, except the accelerometer's header | a reading may be another one | that reading |
 //!
-//! The last one has no check on the wire: keep its line short, and rely on the pipeline's own limits.
+//! The last two have no check on the wire: keep their lines short, and rely on the pipeline's own limits.
 //!
 //! `src/bin/PORTING.md` lists the six steps to add a part.
 
+pub mod bmi088;
 #[doc(hidden)]
 pub mod crc;
 pub mod dsp1760;
@@ -100,6 +103,15 @@ impl ByteSource for dsp1760::Dsp1760 {
 
     fn bad_checksums(&self) -> u32 {
         self.bad_checksums()
+    }
+}
+
+impl<SPI: embedded_hal::spi::SpiDevice> Source for bmi088::Bmi088<SPI> {
+    type Sample = ImuSample;
+    type Error = bmi088::Bmi088Error<SPI::Error>;
+
+    fn next_sample(&mut self) -> Option<Result<ImuSample, Self::Error>> {
+        self.next_sample().transpose()
     }
 }
 

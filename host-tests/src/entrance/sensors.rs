@@ -2,11 +2,13 @@
 
 use super::Seed;
 use crate::wire::{bytes, feed, message, synthetic_frame};
+use gyronet::sensor::bmi088::frame::{self, FORCE_FRAME, RATE_FRAME, STATE, State};
 use gyronet::sensor::crc::CRC_32_MPEG_2;
 use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::sensor::icm42688::packet::{PACKET, Packet};
 use gyronet::sensor::xsens::{MtData2, Mti, Xbus};
+use gyronet::units::Micros;
 
 /// Passes bytes as a stream to the MTi's parser, and as the data of a message.
 pub fn xsens(data: &[u8]) {
@@ -65,6 +67,29 @@ pub fn dsp1760_seeds() -> Vec<Seed> {
         [bytes("fe 81 00 aa 7f 7f 7f 7f 7f 7f 55"), message(4, Extra::Temperature(25))].concat(),
     ];
     vec![("stream", extras.concat()), ("self_test", self_test)]
+}
+
+/// Passes bytes as the state of the accelerometer, a frame of its FIFO and a frame of the gyro's: all readings are in range.
+pub fn bmi088(data: &[u8]) {
+    let (samples, _) = data.as_chunks::<{ STATE + FORCE_FRAME + RATE_FRAME }>();
+    for bytes in samples {
+        let (state, rest) = bytes.split_first_chunk().expect("long enough");
+        let (force, rest) = rest.split_first_chunk().expect("long enough");
+        let state = State::parse(state);
+        let rate = frame::vector(rest.as_array().expect("the rest"));
+        let Some(force) = frame::acceleration(force) else { continue };
+        let sample =
+            frame::sample(Micros(0), force, rate, state.temperature).expect("any reading is in range");
+        assert!(sample.angular_rate.iter().all(|rate| rate.rad_per_sec().abs() < 4.4));
+        assert!(sample.specific_force.iter().all(|force| force.metre_per_sec2().abs() < 118.0));
+        assert!(sample.temperature.is_none_or(|code| (-10_500..=15_100).contains(&code.0)));
+        assert!(state.bytes < 1 << 14 && state.time < 1 << 24);
+    }
+}
+
+pub fn bmi088_seeds() -> Vec<Seed> {
+    let state = bytes("01 02 03 00 00 00 00 00 00 00 00 60 07 00");
+    vec![("sample", [state, bytes("84 00 00 fc ff ab 0a"), bytes("00 00 fe ff 1f 05")].concat())]
 }
 
 pub fn icm42688(data: &[u8]) {

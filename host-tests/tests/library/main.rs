@@ -5,6 +5,7 @@ mod align;
 mod bias;
 mod bias_curve;
 mod blob;
+mod bmi088;
 mod bosch;
 mod can_config;
 mod can_dbc;

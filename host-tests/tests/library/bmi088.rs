@@ -1,0 +1,431 @@
+//! BMI088: frames, the driver on a mocked bus, and its two clocks on a simulated one.
+
+use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use embedded_hal_mock::eh1::delay::NoopDelay;
+use embedded_hal_mock::eh1::spi::{Mock, Transaction};
+use gyronet::sample::{ImuSample, Validity};
+use gyronet::sensor::Source;
+use gyronet::sensor::bmi088::frame::{self, State};
+use gyronet::sensor::bmi088::{Bmi088, Bmi088Error, Die, OLDEST, SETTINGS};
+use gyronet::units::{CentiCelsius, Micros};
+use std::cell::RefCell;
+use std::convert::Infallible;
+use std::rc::Rc;
+
+/// Registers 18 to 25: time 0x030201, 23.375 deg C, this many bytes in the FIFO.
+const fn state(bytes: u8) -> [u8; 14] {
+    let empty = if bytes == 0 { 0x80 } else { 0 };
+    [1, 2, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0x60, bytes, empty]
+}
+
+/// 10 deg/s about z in the range of 250, and 1 g along z in that of 12 g.
+const RATE: [u8; 6] = [0, 0, 0xFE, 0xFF, 0x1F, 0x05];
+const FORCE: [u8; 7] = [0x84, 0, 0, 0xFC, 0xFF, 0xAB, 0x0A];
+
+#[test]
+fn frames_are_read_as_the_data_sheet_says() {
+    assert_eq!(frame::vector(&RATE), [0, -2, 1311]);
+    for (header, is_read) in [
+        (0x84, true),
+        (0x87, true),
+        (0x40, false),
+        (0x44, false),
+        (0x48, false),
+        (0x50, false),
+        (0x80, false),
+    ] {
+        let mut bytes = FORCE;
+        bytes[0] = header;
+        assert_eq!(frame::acceleration(&bytes), is_read.then_some([0, -4, 2731]), "{header:02x}");
+    }
+    let parsed = State::parse(&state(14));
+    assert_eq!(parsed, State { time: 0x03_0201, temperature: Some(3), bytes: 14 });
+    assert_eq!(State::parse(&state(0)).bytes, 0);
+    // The data sheet's examples (5.3.7), in hundredths of a degree.
+    for (high, low, expected) in [
+        (0x3E, 0, Some(8_500)),
+        (0, 0x60, Some(2_337)),
+        (0, 0, Some(2_300)),
+        (0xC1, 0, Some(-4_000)),
+        (0x80, 0, None),
+    ] {
+        let mut bytes = state(0);
+        (bytes[10], bytes[11]) = (high, low);
+        let sample =
+            frame::sample(Micros(7), [0; 3], [0; 3], State::parse(&bytes).temperature).expect("zeros");
+        assert_eq!((sample.time, sample.temperature), (Micros(7), expected.map(CentiCelsius)));
+    }
+}
+
+#[test]
+fn either_end_of_the_range_is_saturation() {
+    for (count, expected) in [
+        (i16::MAX, Validity::Saturated),
+        (i16::MIN, Validity::Saturated),
+        (-i16::MAX, Validity::Saturated),
+        (i16::MAX - 1, Validity::Good),
+        (2 - i16::MAX, Validity::Good),
+    ] {
+        for axis in 0..6 {
+            let mut counts = [[0; 3]; 2];
+            counts[axis / 3][axis % 3] = count;
+            let [force, rate] = counts;
+            assert_eq!(frame::sample(Micros(0), force, rate, None).expect("in range").validity, expected);
+        }
+    }
+}
+
+/// What the two chip selects see.
+#[derive(Default)]
+struct Buses([Vec<Transaction<u8>>; 2]);
+
+const ACC: usize = 0;
+const GYRO: usize = 1;
+
+impl Buses {
+    fn write(&mut self, die: usize, address: u8, value: u8) {
+        let seen = &mut self.0[die];
+        seen.push(Transaction::transaction_start());
+        seen.push(Transaction::write_vec(vec![address, value]));
+        seen.push(Transaction::transaction_end());
+    }
+
+    /// The accelerometer sends one byte before the value.
+    fn read(&mut self, die: usize, address: u8, values: &[u8]) {
+        let command = if die == ACC { vec![address | 0x80, 0] } else { vec![address | 0x80] };
+        let seen = &mut self.0[die];
+        seen.push(Transaction::transaction_start());
+        seen.push(Transaction::write_vec(command));
+        seen.push(Transaction::read_vec(values.to_vec()));
+        seen.push(Transaction::transaction_end());
+    }
+
+    fn reset(&mut self, identities: [u8; 2]) {
+        self.read(ACC, 0x00, &[0]);
+        self.write(ACC, 0x7E, 0xB6);
+        self.write(GYRO, 0x14, 0xB6);
+        self.read(ACC, 0x00, &[0]);
+        self.read(ACC, 0x00, &[identities[ACC]]);
+        if identities[ACC] == 0x1E {
+            self.read(GYRO, 0x00, &[identities[GYRO]]);
+        }
+    }
+
+    fn power(&mut self) {
+        self.write(ACC, 0x7C, 0);
+        self.write(ACC, 0x7D, 4);
+    }
+
+    fn test_gyro(&mut self, result: &[u8]) {
+        self.write(GYRO, 0x3C, 0x01);
+        result.iter().for_each(|result| self.read(GYRO, 0x3C, &[*result]));
+    }
+
+    /// Both readings are counts at 24 g, 1365 per g.
+    fn test_accelerometer(&mut self, [up, down]: [[i16; 3]; 2]) {
+        let bytes = |axes: [i16; 3]| axes.map(i16::to_le_bytes).concat();
+        self.write(ACC, 0x41, 3);
+        self.write(ACC, 0x40, 0xAC);
+        self.write(ACC, 0x6D, 0x0D);
+        self.read(ACC, 0x12, &bytes(up));
+        self.write(ACC, 0x6D, 0x09);
+        self.read(ACC, 0x12, &bytes(down));
+        self.write(ACC, 0x6D, 0);
+    }
+
+    fn configure(&mut self) {
+        REGISTERS.iter().for_each(|(die, address, value)| self.write(*die, *address, *value));
+        REGISTERS.iter().for_each(|(die, address, value)| self.read(*die, *address, &[*value]));
+        self.write(GYRO, 0x3E, 0x40);
+    }
+
+    /// The driver checks the setting of this number and reads the fill of the gyro's FIFO.
+    fn poll(&mut self, setting: usize, status: u8) {
+        let (die, address, value) = REGISTERS[setting];
+        self.read(die, address, &[value]);
+        self.read(GYRO, 0x0E, &[status]);
+    }
+
+    fn mocks(&self) -> [Mock<u8>; 2] {
+        self.0.each_ref().map(|seen| Mock::new(seen))
+    }
+
+    /// Starts the driver, which must do all that is expected.
+    fn start(&self, self_test: bool) -> Result<(), Bmi088Error<embedded_hal::spi::ErrorKind>> {
+        let mut mocks = self.mocks();
+        let started = Bmi088::new(mocks.clone(), self_test, &mut NoopDelay::new());
+        mocks.iter_mut().for_each(Mock::done);
+        started.map(drop)
+    }
+}
+
+/// Die, address, value; written from the data sheet, not from the driver's constants.
+const REGISTERS: [(usize, u8, u8); SETTINGS] = [
+    (ACC, 0x7C, 0x00),
+    (ACC, 0x7D, 0x04),
+    (ACC, 0x40, 0x89),
+    (ACC, 0x41, 0x02),
+    (ACC, 0x48, 0x02),
+    (ACC, 0x49, 0x50),
+    (GYRO, 0x0F, 0x03),
+    (GYRO, 0x10, 0x84),
+    (GYRO, 0x11, 0x00),
+    (GYRO, 0x3E, 0x40),
+];
+
+#[test]
+fn the_driver_tests_configures_and_reads() {
+    let mut bus = Buses::default();
+    bus.reset([0x1E, 0x0F]);
+    bus.power();
+    bus.test_gyro(&[0, 0x12]);
+    bus.test_accelerometer([[700, 700, 1700], [-700, -700, 1000]]);
+    bus.configure();
+    // Nothing waits; one frame each.
+    bus.poll(0, 0);
+    bus.poll(1, 1);
+    bus.read(ACC, 0x18, &state(7));
+    bus.read(GYRO, 0x3F, &RATE);
+    bus.read(ACC, 0x26, &FORCE);
+    // Five rates and no acceleration: the last one serves for four.
+    for n in 0..=OLDEST {
+        bus.poll(2 + usize::from(n), 1);
+        bus.read(ACC, 0x18, &state(0));
+        bus.read(GYRO, 0x3F, &RATE);
+    }
+    // The FIFO overflows and is emptied; a quarter of a second later, by the accelerometer, a frame comes.
+    bus.poll(7, 0xE4);
+    bus.write(ACC, 0x7E, 0xB0);
+    bus.write(GYRO, 0x3E, 0x40);
+    bus.poll(8, 1);
+    let mut later = state(7);
+    later[1] += 25;
+    bus.read(ACC, 0x18, &later);
+    bus.read(GYRO, 0x3F, &RATE);
+    bus.read(ACC, 0x26, &FORCE);
+    // The gyro was reset.
+    bus.read(GYRO, 0x3E, &[0]);
+    let mut mocks = bus.mocks();
+    let mut part = Bmi088::new(mocks.clone(), true, &mut NoopDelay::new()).expect("a good part");
+    assert_eq!(part.next_sample(), Ok(None));
+    let sample = Source::next_sample(&mut part).expect("one waits").expect("good");
+    assert!((sample.angular_rate[2].rad_per_sec().to_degrees() - 1311.0 / 131.072).abs() < 1e-5);
+    assert!((sample.specific_force[2].metre_per_sec2() - 9.806_65 * 2731.0 * 12.0 / 32_768.0).abs() < 1e-5);
+    assert_eq!((sample.time, sample.temperature), (Micros(5_000), Some(CentiCelsius(2_337))));
+    assert_eq!(sample.validity, Validity::Good);
+    for n in 0..u64::from(OLDEST) {
+        assert_eq!(part.next_sample().expect("good").expect("one waits").time, Micros(5_000 * (n + 2)));
+    }
+    assert_eq!(part.next_sample(), Err(Bmi088Error::NoReading));
+    assert_eq!(part.next_sample(), Err(Bmi088Error::Overflow));
+    // 25 x 256 counts are 50 periods after the last frame that was read alone, the sixth.
+    assert_eq!(part.next_sample().expect("good").expect("one waits").time, Micros(5_000 * 56));
+    let changed = Bmi088Error::Setting { die: Die::Gyro, address: 0x3E, got: 0, expected: 0x40 };
+    assert_eq!(part.next_sample(), Err(changed));
+    drop(part);
+    mocks.iter_mut().for_each(Mock::done);
+}
+
+#[test]
+fn another_part_or_none_is_named() {
+    // A BMI085, nothing (high), nothing (low), no gyro.
+    for identities in [[0x1F, 0x0F], [0xFF; 2], [0x00; 2], [0x1E, 0xFF]] {
+        let mut bus = Buses::default();
+        bus.reset(identities);
+        let [accelerometer, gyro] = identities;
+        let (die, got) =
+            if accelerometer == 0x1E { (Die::Gyro, gyro) } else { (Die::Accelerometer, accelerometer) };
+        assert_eq!(bus.start(true), Err(Bmi088Error::Identity { die, got }));
+    }
+}
+
+#[test]
+fn a_failed_self_test_is_named() {
+    // The gyro fails, its drive is not in order, its test never ends.
+    for gyro in [&[0x16][..], &[0x02], &[0; 100]] {
+        let mut bus = Buses::default();
+        bus.reset([0x1E, 0x0F]);
+        bus.power();
+        bus.test_gyro(gyro);
+        assert_eq!(bus.start(true), Err(Bmi088Error::SelfTest { die: Die::Gyro }));
+    }
+    // y and z move too little, all move the wrong way.
+    for deflected in [
+        [[683, 682, 1366], [-683, -683, 0]],
+        [[683, 683, 1365], [-683, -683, 683]],
+        [[-683, -683, -683], [683, 683, 683]],
+    ] {
+        let mut bus = Buses::default();
+        bus.reset([0x1E, 0x0F]);
+        bus.power();
+        bus.test_gyro(&[0x12]);
+        bus.test_accelerometer(deflected);
+        assert_eq!(bus.start(true), Err(Bmi088Error::SelfTest { die: Die::Accelerometer }));
+    }
+}
+
+#[test]
+fn a_setting_that_does_not_read_back_is_refused() {
+    let mut bus = Buses::default();
+    bus.reset([0x1E, 0x0F]);
+    bus.power();
+    REGISTERS.iter().for_each(|(die, address, value)| bus.write(*die, *address, *value));
+    bus.read(ACC, 0x7C, &[0]);
+    bus.read(ACC, 0x7D, &[4]);
+    bus.read(ACC, 0x40, &[0xA8]);
+    let refused = Bmi088Error::Setting { die: Die::Accelerometer, address: 0x40, got: 0xA8, expected: 0x89 };
+    assert_eq!(bus.start(false), Err(refused));
+}
+
+/// A reading is the true time of its frame in units of 100 us, modulo this.
+const WRAP_MS: f64 = 3_276.8;
+
+/// Two dies with a FIFO each, of which only the gyro's can be full.
+struct Dies {
+    now_us: f64,
+    period_us: [f64; 2],
+    /// Frames made and read.
+    made: [u64; 2],
+    read: [u64; 2],
+    overrun: bool,
+    registers: [[u8; 128]; 2],
+}
+
+impl Dies {
+    fn new(fast: [f64; 2]) -> Self {
+        let period_us = fast.map(|fast| 5_000.0 / (1.0 + fast));
+        Self { now_us: 0.0, period_us, made: [0; 2], read: [0; 2], overrun: false, registers: [[0; 128]; 2] }
+    }
+
+    fn run_until(&mut self, now_us: f64) {
+        self.now_us = now_us;
+        for die in [ACC, GYRO] {
+            let due = (now_us / self.period_us[die]) as u64;
+            if die == GYRO && due - self.read[GYRO] > 100 {
+                (self.overrun, self.made[GYRO]) = (true, self.read[GYRO] + 100);
+            } else if !(die == GYRO && self.overrun) {
+                self.made[die] = due;
+            }
+        }
+    }
+
+    fn reading(&mut self, die: usize) -> [u8; 6] {
+        self.read[die] += 1;
+        let at = (self.read[die] as f64 * self.period_us[die] / 100.0) as u64 % 32_768;
+        [at as i16; 3].map(i16::to_le_bytes).concat().try_into().expect("six bytes")
+    }
+
+    fn answer(&mut self, die: usize, address: u8, to: &mut [u8]) {
+        match (die, address) {
+            (_, 0x00) => to.fill([0x1E, 0x0F][die]),
+            (GYRO, 0x0E) => {
+                to.fill((self.made[GYRO] - self.read[GYRO]) as u8 | if self.overrun { 0x80 } else { 0 });
+            }
+            (GYRO, 0x3F) => to.copy_from_slice(&self.reading(GYRO)),
+            (ACC, 0x18) => {
+                let time = (self.now_us / self.period_us[ACC] * 128.0) as u32 & 0xFF_FFFF;
+                to.fill(0);
+                to[..3].copy_from_slice(&time.to_le_bytes()[..3]);
+                to[12..].copy_from_slice(&((self.made[ACC] - self.read[ACC]) as u16 * 7).to_le_bytes());
+            }
+            (ACC, 0x26) => {
+                to[0] = 0x84;
+                to[1..].copy_from_slice(&self.reading(ACC));
+            }
+            _ => to.fill(self.registers[die][usize::from(address)]),
+        }
+    }
+
+    fn write(&mut self, die: usize, address: u8, value: u8) {
+        if (die, address) == (GYRO, 0x3E) {
+            self.overrun = false;
+            self.made[GYRO] = (self.now_us / self.period_us[GYRO]) as u64;
+        }
+        if matches!((die, address), (GYRO, 0x3E) | (ACC, 0x7E)) {
+            self.read[die] = self.made[die];
+        }
+        self.registers[die][usize::from(address)] = value;
+    }
+}
+
+#[derive(Clone)]
+struct Select(Rc<RefCell<Dies>>, usize);
+
+impl ErrorType for Select {
+    type Error = Infallible;
+}
+
+impl SpiDevice for Select {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+        let (mut dies, die) = (self.0.borrow_mut(), self.1);
+        match operations {
+            [Operation::Write([address, value])] => dies.write(die, *address, *value),
+            [Operation::Write([address, ..]), Operation::Read(to)] => dies.answer(die, address & 0x7F, to),
+            other => panic!("{other:?}"),
+        }
+        Ok(())
+    }
+}
+
+/// For each difference of the clocks: a minute with a poll every millisecond, stalls of 0.4 s (the FIFO holds them) and of
+/// 0.9 s (it overflows). The bounds are those of the module's table.
+#[test]
+fn two_clocks_cost_what_the_module_says() {
+    for fast in [[0.0, 0.0], [0.01, -0.01], [-0.01, 0.01], [0.01, 0.01]] {
+        let dies = Rc::new(RefCell::new(Dies::new(fast)));
+        let difference: f64 = (fast[ACC] - fast[GYRO]).abs();
+        let select = [ACC, GYRO].map(|die| Select(dies.clone(), die));
+        let Ok(mut part) = Bmi088::new(select, false, &mut NoopDelay::new()) else { panic!("a good part") };
+        let [mut in_step, mut behind] = [[0.0f64; 2]; 2];
+        let (mut misplaced, mut overflows, mut samples, mut now) = (0.0f64, 0, 0, 0.0);
+        while now < 60e6 {
+            let stall = match (now / 1e3) as u64 % 10_000 {
+                4_000 => 400e3,
+                8_000 => 900e3,
+                _ => 1e3,
+            };
+            now += stall;
+            dies.borrow_mut().run_until(now);
+            loop {
+                match part.next_sample() {
+                    Ok(None) => break,
+                    Ok(Some(sample)) => {
+                        samples += 1;
+                        let [rate, force] = taken(&sample);
+                        let older = wrapped(rate - force);
+                        let worst = if stall < 2e3 { &mut in_step } else { &mut behind };
+                        *worst = [worst[0].min(older), worst[1].max(older)];
+                        // The time stamps tell the gyro's clock.
+                        let stamp = sample.time.0 as f64 / 1e3 / (1.0 + fast[GYRO]);
+                        misplaced = misplaced.max(wrapped(rate - stamp).abs());
+                    }
+                    Err(Bmi088Error::Overflow) => overflows += 1,
+                    Err(Bmi088Error::NoReading) => {}
+                    Err(other) => panic!("{other}"),
+                }
+            }
+        }
+        println!(
+            "clocks {difference} apart: the force is {in_step:.1?} ms older in step, {behind:.1?} ms after a stall; \
+             after {overflows} overflows {misplaced:.1} ms misplaced"
+        );
+        assert!(samples > 10_000 && overflows == 6, "{samples} samples, {overflows} overflows");
+        assert!(in_step[0] >= -1.1 && in_step[1] <= 5.2, "{in_step:?}");
+        assert!(
+            behind[0] >= -6.0 - 400.0 * difference && behind[1] <= 6.0 + 400.0 * difference,
+            "{behind:?}"
+        );
+        assert!(misplaced <= 6.0 * (1_000.0 * difference + 2.6), "{misplaced}");
+    }
+}
+
+/// Times at which rate and force were taken, ms modulo [`WRAP_MS`].
+fn taken(sample: &ImuSample) -> [f64; 2] {
+    let rate = sample.angular_rate[0].rad_per_sec().to_degrees() * 131.072;
+    let force = sample.specific_force[0].metre_per_sec2() * (32_768.0 / 12.0 / 9.806_65);
+    [rate, force].map(|count| f64::from(count.round()) / 10.0)
+}
+
+fn wrapped(ms: f64) -> f64 {
+    (ms + WRAP_MS / 2.0).rem_euclid(WRAP_MS) - WRAP_MS / 2.0
+}

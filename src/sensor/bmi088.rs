@@ -1,0 +1,273 @@
+//! Reads the Bosch BMI088 over SPI (mode 0 or 3, at most 10 MHz): two dies, each with its own chip select.
+//!
+//! [`frame`] parses what the dies send without I/O, `registers` lists their registers, and this file does the SPI transfers.
+//! Every wait is a bounded number of [`DelayNs`] delays. Each call for a sample also reads back one register of the
+//! configuration, so that a reset or a flipped bit in either die is detected within [`SETTINGS`] calls.
+//!
+//! # Two dies on one time line
+//!
+//! Each die has its own oscillator, and the data sheet bounds neither. The gyro's frames have no time stamps: a sample's time
+//! is its number times 5 ms. [`crate::align::clock_ratio`] measures that clock against the board's, as any sensor's.
+//! The accelerometer has the same nominal rate. A frame of the gyro with n newer ones behind it in the FIFO goes with the
+//! acceleration that has n newer ones behind it: both FIFOs end now, so the two are of one time after a stall, too.
+//!
+//! | | what the second clock costs |
+//! |---|---|
+//! | in step | the force is up to 5 ms older than the rate, or newer by less than the time between two polls, and drifts through that |
+//! | a difference of 2 % | every 50th force is used twice or left out |
+//! | n frames behind | n times the difference more: 10 ms after a stall of 0.5 s at 2 % |
+//!
+//! The rate and its time are the gyro's alone. A force that is older than [`OLDEST`] frames is none
+//! ([`Bmi088Error::NoReading`]).
+//!
+//! **A full FIFO** (100 frames of the gyro, 0.5 s) is emptied, with [`Bmi088Error::Overflow`]. The accelerometer's time,
+//! which runs on, counts the lost frames: the gap in the time stamps is right within the difference of the clocks.
+//! The gyro's FIFO stops when it is full, since in the mode that drops the oldest its axes have been seen to change places
+//! (ArduPilot's history; no data sheet says so).
+
+#[doc(hidden)]
+pub mod frame;
+mod registers;
+
+pub use registers::Die;
+
+use crate::sample::ImuSample;
+use crate::units::Micros;
+use embedded_hal::delay::DelayNs;
+use embedded_hal::spi::{Operation, SpiDevice};
+use frame::{FORCE_FRAME, State};
+use registers::{self as reg, Setting};
+
+/// Number of registers that are set, and checked one after the other.
+pub const SETTINGS: usize = reg::SETTINGS.len();
+/// Samples after which the newest force is too old to go with a rate.
+pub const OLDEST: u8 = 4;
+/// Time in which both dies have restarted, ms: 30 of the gyro, 1 of the accelerometer.
+const RESET_MS: u32 = 30;
+/// Time between two writes to an accelerometer that may be suspended, ms.
+const WRITE_MS: u32 = 1;
+/// Time of an accelerometer after it was switched on, and of both filters after a change, ms.
+const SETTLE_MS: u32 = 50;
+/// Largest number of polls of the gyro's self-test, 1 ms apart.
+const TEST_POLLS: u8 = 100;
+/// Frames of the accelerometer that one call reads at most: more than come in [`SETTLE_MS`].
+const MAX_FRAMES: usize = 16;
+
+/// The error of the sensor or its bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
+pub enum Bmi088Error<E> {
+    #[error("BMI088: the bus failed: {0:?}")]
+    Bus(E),
+    #[error("BMI088: identity of the {die} is {got:02x}, should be {:02x}", .die.identity())]
+    Identity { die: Die, got: u8 },
+    #[error("BMI088: the self-test of the {die} has failed")]
+    SelfTest { die: Die },
+    /// A register does not hold the value that was written: configure the sensor again.
+    #[error("BMI088: register {address:02x} of the {die} holds {got:02x}, not {expected:02x}")]
+    Setting { die: Die, address: u8, got: u8, expected: u8 },
+    #[error("BMI088: no acceleration that belongs to the rate")]
+    NoReading,
+    #[error("BMI088: the FIFO was full; its frames are lost")]
+    Overflow,
+}
+
+/// The driver of a configured sensor.
+#[derive(Debug)]
+pub struct Bmi088<SPI> {
+    accelerometer: SPI,
+    gyro: SPI,
+    next_check: usize,
+    /// Number of the newest frame of the gyro.
+    number: u64,
+    /// Number of a frame that was read when it was the only one, and the accelerometer's time then.
+    mark: Option<(u64, u32)>,
+    has_lost: bool,
+    /// Newest acceleration, and the samples that it has been used for.
+    force: Option<([i16; 3], u8)>,
+}
+
+impl<SPI: SpiDevice> Bmi088<SPI> {
+    /// Resets both dies, checks their identities, configures them and reads every setting back, in 0.15 s. The self-test
+    /// takes 0.1 s more and deflects the accelerometer's masses, so the vehicle should stand.
+    ///
+    /// # Errors
+    /// `Bus`, `Identity`, `SelfTest` or `Setting`.
+    pub fn new(
+        [accelerometer, gyro]: [SPI; 2],
+        self_test: bool,
+        delay: &mut impl DelayNs,
+    ) -> Result<Self, Bmi088Error<SPI::Error>> {
+        let (next_check, number, mark, has_lost, force) = (0, 0, None, false, None);
+        let mut part = Self { accelerometer, gyro, next_check, number, mark, has_lost, force };
+        // The rising edge of the chip select switches the accelerometer from I2C to SPI, now and after a reset.
+        part.read::<1>(Die::Accelerometer, reg::CHIP_ID)?;
+        delay.delay_ms(WRITE_MS);
+        part.write(Die::Accelerometer, reg::ACC_SOFTRESET, reg::RESET)?;
+        part.write(Die::Gyro, reg::GYRO_SOFTRESET, reg::RESET)?;
+        delay.delay_ms(RESET_MS);
+        part.read::<1>(Die::Accelerometer, reg::CHIP_ID)?;
+        for die in [Die::Accelerometer, Die::Gyro] {
+            let [got] = part.read(die, reg::CHIP_ID)?;
+            if got != die.identity() {
+                return Err(Bmi088Error::Identity { die, got });
+            }
+        }
+        part.set(reg::POWER, delay)?;
+        delay.delay_ms(SETTLE_MS);
+        if self_test {
+            part.test_gyro(delay)?;
+            part.test_accelerometer(delay)?;
+        }
+        part.set(reg::SETTINGS, delay)?;
+        delay.delay_ms(SETTLE_MS);
+        for _ in 0..SETTINGS {
+            part.check_next_setting()?;
+        }
+        // The accelerations of the wait stay, so that the first rate has one.
+        part.empty_gyro()?;
+        Ok(part)
+    }
+
+    /// Releases the SPI devices of accelerometer and gyro.
+    pub fn destroy(self) -> [SPI; 2] {
+        [self.accelerometer, self.gyro]
+    }
+
+    /// Returns the oldest sample in the FIFO, if any, and checks one setting.
+    ///
+    /// # Errors
+    /// `Bus`, `Setting`, `NoReading` or `Overflow`.
+    pub fn next_sample(&mut self) -> Result<Option<ImuSample>, Bmi088Error<SPI::Error>> {
+        self.check_next_setting()?;
+        let [status] = self.read(Die::Gyro, reg::GYRO_FIFO_STATUS)?;
+        if status & reg::OVERRUN != 0 {
+            self.has_lost = true;
+            self.force = None;
+            self.flush()?;
+            return Err(Bmi088Error::Overflow);
+        }
+        let Some(newer) = status.checked_sub(1) else { return Ok(None) };
+        let state = State::parse(&self.read(Die::Accelerometer, reg::ACC_SENSORTIME)?);
+        let rate = frame::vector(&self.read(Die::Gyro, reg::GYRO_FIFO_DATA)?);
+        self.count(newer, state.time);
+        let force = self.force(state.bytes / FORCE_FRAME, newer)?.ok_or(Bmi088Error::NoReading)?;
+        let time = Micros(self.number * reg::PERIOD_US);
+        frame::sample(time, force, rate, state.temperature).map(Some).ok_or(Bmi088Error::NoReading)
+    }
+
+    /// Numbers a frame of the gyro that was read with `newer` ones behind it, at this time of the accelerometer.
+    fn count(&mut self, newer: u8, now: u32) {
+        self.number += 1;
+        let newer = u64::from(newer);
+        if core::mem::take(&mut self.has_lost)
+            && let Some((number, then)) = self.mark
+        {
+            let since = (now.wrapping_sub(then) & frame::TIME_MASK) + reg::PERIOD_COUNTS / 2;
+            let newest = number + u64::from(since / reg::PERIOD_COUNTS);
+            self.number = self.number.max(newest.saturating_sub(newer));
+        }
+        if newer == 0 {
+            self.mark = Some((self.number, now));
+        }
+    }
+
+    /// Returns the acceleration with `newer` ones behind it, or the one before, of the frames that wait.
+    fn force(&mut self, waiting: usize, newer: u8) -> Result<Option<[i16; 3]>, Bmi088Error<SPI::Error>> {
+        self.force = self.force.map(|(force, used)| (force, used.saturating_add(1)));
+        for _ in 0..waiting.saturating_sub(newer.into()).min(MAX_FRAMES) {
+            if let Some(force) = frame::acceleration(&self.read(Die::Accelerometer, reg::ACC_FIFO_DATA)?) {
+                self.force = Some((force, 0));
+            }
+        }
+        Ok(self.force.filter(|(_, used)| *used <= OLDEST).map(|(force, _)| force))
+    }
+
+    /// Checks one register of the configuration; each call checks the next one.
+    fn check_next_setting(&mut self) -> Result<(), Bmi088Error<SPI::Error>> {
+        let at = self.next_check % SETTINGS;
+        self.next_check = at + 1;
+        let Some(&(die, address, expected)) = reg::SETTINGS.get(at) else { return Ok(()) };
+        let [got] = self.read(die, address)?;
+        if got == expected { Ok(()) } else { Err(Bmi088Error::Setting { die, address, got, expected }) }
+    }
+
+    /// Lets the gyro test its drive and its electronics.
+    fn test_gyro(&mut self, delay: &mut impl DelayNs) -> Result<(), Bmi088Error<SPI::Error>> {
+        self.write(Die::Gyro, reg::GYRO_SELF_TEST, reg::TEST_BEGIN)?;
+        for _ in 0..TEST_POLLS {
+            delay.delay_ms(1);
+            let [result] = self.read(Die::Gyro, reg::GYRO_SELF_TEST)?;
+            if result & reg::TEST_READY != 0 {
+                let passed = result & (reg::TEST_FAILED | reg::RATE_OK) == reg::RATE_OK;
+                return if passed { Ok(()) } else { Err(Bmi088Error::SelfTest { die: Die::Gyro }) };
+            }
+        }
+        Err(Bmi088Error::SelfTest { die: Die::Gyro })
+    }
+
+    /// Deflects the accelerometer's masses both ways, and compares the difference with the least one of a good part.
+    fn test_accelerometer(&mut self, delay: &mut impl DelayNs) -> Result<(), Bmi088Error<SPI::Error>> {
+        let die = Die::Accelerometer;
+        self.set(reg::TEST, delay)?;
+        delay.delay_ms(2);
+        let mut deflected = [[0; 3]; 2];
+        for (way, read) in reg::DEFLECTIONS.into_iter().zip(&mut deflected) {
+            self.write(die, reg::ACC_SELF_TEST, way)?;
+            delay.delay_ms(SETTLE_MS + 1);
+            *read = frame::vector(&self.read(die, reg::ACC_DATA)?);
+        }
+        self.write(die, reg::ACC_SELF_TEST, 0)?;
+        delay.delay_ms(WRITE_MS);
+        let [up, down] = deflected.map(|axes: [i16; 3]| axes.map(i32::from));
+        let mut moved = up.iter().zip(down).zip(reg::LEAST_DEFLECTION);
+        let passed = moved.all(|((up, down), least)| up - down >= least);
+        if passed { Ok(()) } else { Err(Bmi088Error::SelfTest { die }) }
+    }
+
+    fn set(
+        &mut self,
+        settings: impl IntoIterator<Item = Setting>,
+        delay: &mut impl DelayNs,
+    ) -> Result<(), Bmi088Error<SPI::Error>> {
+        for (die, address, value) in settings {
+            self.write(die, address, value)?;
+            delay.delay_ms(WRITE_MS);
+        }
+        Ok(())
+    }
+
+    /// Empties both FIFOs.
+    fn flush(&mut self) -> Result<(), Bmi088Error<SPI::Error>> {
+        self.write(Die::Accelerometer, reg::ACC_SOFTRESET, reg::FIFO_FLUSH)?;
+        self.empty_gyro()
+    }
+
+    fn empty_gyro(&mut self) -> Result<(), Bmi088Error<SPI::Error>> {
+        self.write(Die::Gyro, reg::GYRO_FIFO_CONFIG_1, reg::STOP_WHEN_FULL)
+    }
+
+    fn write(&mut self, die: Die, address: u8, value: u8) -> Result<(), Bmi088Error<SPI::Error>> {
+        self.transaction(die, &mut [Operation::Write(&[address, value])])
+    }
+
+    /// Reads from an address on; the accelerometer sends a byte without meaning first.
+    fn read<const N: usize>(&mut self, die: Die, address: u8) -> Result<[u8; N], Bmi088Error<SPI::Error>> {
+        let mut values = [0; N];
+        let (plain, with_dummy) = ([address | reg::READ], [address | reg::READ, 0]);
+        let command: &[u8] = if die == Die::Gyro { &plain } else { &with_dummy };
+        self.transaction(die, &mut [Operation::Write(command), Operation::Read(&mut values)])?;
+        Ok(values)
+    }
+
+    fn transaction(
+        &mut self,
+        die: Die,
+        operations: &mut [Operation<'_, u8>],
+    ) -> Result<(), Bmi088Error<SPI::Error>> {
+        let spi = if die == Die::Gyro { &mut self.gyro } else { &mut self.accelerometer };
+        spi.transaction(operations).map_err(Bmi088Error::Bus)
+    }
+}
