@@ -29,11 +29,11 @@ class Gpio(unittest.TestCase):
         self.assertEqual([event["level"] for event in self.board.events("pin")], [True])
 
     def test_inputs(self):
-        self.assertEqual(self.board.read("GPIOC", 0x10), 0)
-        self.board.write("GPIOC", 0x0C, 1)
-        self.assertEqual(self.board.read("GPIOC", 0x10), 1)
-        self.board.configure("GPIOC", "drive", (0, False))
-        self.assertEqual(self.board.read("GPIOC", 0x10), 0)
+        self.assertEqual(self.board.read("GPIOD", 0x10), 0)
+        self.board.write("GPIOD", 0x0C, 1)
+        self.assertEqual(self.board.read("GPIOD", 0x10), 1)
+        self.board.configure("GPIOD", "drive", (0, False))
+        self.assertEqual(self.board.read("GPIOD", 0x10), 0)
 
     def test_locked_pins_keep_their_configuration(self):
         for value in (0x1_0001, 0x0_0001, 0x1_0001):

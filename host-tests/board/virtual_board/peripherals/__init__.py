@@ -1,5 +1,6 @@
 """Peripherals of the STM32F405, one file each, written from RM0090 and the data sheets."""
 
+from .bmi088 import Bmi088
 from .bxcan import BxCan
 from .dbgmcu import Dbgmcu
 from .dma import Dma
@@ -18,13 +19,15 @@ from .usart import usarts
 
 
 def create(board):
-    """Creates all modelled peripherals, with the inertial sensor soldered to SPI1 and PA4.
+    """Creates all modelled peripherals, with an inertial sensor on SPI1: an ICM-42688-P at PA4, or a BMI088 at PA4 and PC4.
 
     The clock tree comes first, because the others read their clocks from it.
     """
     ports = [Gpio(board, letter) for letter in "ABCDEFGHI"]
     serial = spis(board)
-    serial[0].attach(Icm42688(board), ports[0], 4)
+    icm42688, bmi088 = Icm42688(board), Bmi088(board)
+    serial[0].attach(icm42688, [(icm42688, ports[0], 4)])
+    serial[0].attach(bmi088, [(bmi088.accelerometer, ports[0], 4), (bmi088.gyro, ports[2], 4)])
     return [Rcc(board), Pwr(board), Flash(board), Exti(board), Syscfg(board), *ports, Dbgmcu(board),
             Iwdg(board), *usarts(board), *timers(board), BxCan(board), *serial,
             Dma(board, "DMA1", 0x4002_6000), Dma(board, "DMA2", 0x4002_6400), Rng(board)]

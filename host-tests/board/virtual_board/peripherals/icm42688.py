@@ -13,16 +13,11 @@ Left out: anti-alias and notch filters, their delay, I2C and I3C, APEX, FSYNC, s
 Assumed where the data sheet is silent: accesses within 1 ms of a reset read 0 and write nothing; a write within 200 us of leaving OFF is
 ignored; packets hold the low 16 bits of the time-stamp counter.
 
-Settings (JSON values): `rates_dps`, `acceleration_g` ([x, y, z]), `temperature_c`, `tones` ([[axis, hz, dps], ...]), `motion`
-([[time_us, rates, acceleration], ...], interpolated), `samples` ([[rates, acceleration], ...], one per output, without noise),
-`noise` (a factor, 0 for none), `oscillator_error_percent`, `int1` ([port letter, pin] or None), `who_am_i`.
+Settings: those of `motion`, `oscillator_error_percent`, `int1` ([port letter, pin] or None), `who_am_i`.
 """
 
-from bisect import bisect_right
-from math import pi, sin
-from random import Random
-
 from . import icm42688_registers as reg
+from .motion import Motion, clamp, words
 
 PS = 1_000_000_000_000
 US, MS = 1_000_000, 1_000_000_000
@@ -42,9 +37,7 @@ class Icm42688:
 
     def __init__(self, board):
         self.board = board
-        self.rates, self.acceleration, self.temperature = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 25.0
-        self.tones, self.motion, self.samples = [], [], []
-        self.noise, self.random = 1.0, Random(42688)
+        self.motion = Motion(42688)
         self.clock_ppm = 1_000_000
         self.int1 = None
         self.reading = False
@@ -134,15 +127,6 @@ class Icm42688:
 
     # -- outputs -----------------------------------------------------------------------------------------------------
 
-    def _truth(self, at):
-        """Returns rates in degrees per second and acceleration in g at a board time."""
-        if self.samples:
-            rates, acceleration = self.samples[0] if len(self.samples) == 1 else self.samples.pop(0)
-            return list(rates), list(acceleration)
-        if self.motion:
-            return _interpolated(self.motion, at / US)
-        return list(self.rates), list(self.acceleration)
-
     def bandwidth_hz(self):
         """Returns the gyro's 3 dB bandwidth by GYRO_UI_FILT_BW in low-noise mode (section 14.42)."""
         code = self.banks[0][reg.GYRO_ACCEL_CONFIG0] & 15
@@ -158,22 +142,19 @@ class Icm42688:
         return (1 + (hz / self.bandwidth_hz()) ** (2 * order)) ** -0.5
 
     def _output(self, at):
-        rates, acceleration = self._truth(at)
-        for axis, hz, dps in self.tones:
-            rates[axis] += dps * self._gain(hz) * sin(2 * pi * hz * at / PS)
-        if self.noise and not self.samples:
-            root = self.noise * (self.bandwidth_hz() * NOISE_BANDWIDTH) ** 0.5
-            gauss = self.random.gauss
-            rates = [rate + gauss(0, GYRO_NOISE_DPS * root) for rate in rates]
-            acceleration = [g + gauss(0, ACCEL_NOISE_G * root) for g in acceleration]
+        rates, acceleration = self.motion.truth(at)
+        self.motion.swing(rates, at, self._gain)
+        bandwidth = self.bandwidth_hz() * NOISE_BANDWIDTH
+        rates = self.motion.noisy(rates, GYRO_NOISE_DPS, bandwidth)
+        acceleration = self.motion.noisy(acceleration, ACCEL_NOISE_G, bandwidth)
         gyro_valid = self.gyro_on is not None and at >= self.gyro_on + GYRO_START_PS
         accel_valid = self.accel_on is not None and at >= self.accel_on + ACCEL_START_PS
         bank = self.banks[0]
         gyro_scale = 32768 / (2000 / (1 << (bank[reg.GYRO_CONFIG0] >> 5)))
         accel_scale = 2048 << (bank[reg.ACCEL_CONFIG0] >> 5 & 3)
-        gyro = [_clamp(rate * gyro_scale, 16) if gyro_valid else INVALID for rate in rates]
-        accel = [_clamp(g * accel_scale, 16) if accel_valid else INVALID for g in acceleration]
-        temperature = _clamp((self.temperature - 25) * 132.48, 16)
+        gyro = [clamp(rate * gyro_scale, 16) if gyro_valid else INVALID for rate in rates]
+        accel = [clamp(g * accel_scale, 16) if accel_valid else INVALID for g in acceleration]
+        temperature = clamp((self.motion.temperature - 25) * 132.48, 16)
         big = bool(bank[reg.INTF_CONFIG0] & 0x10)
         for address, value in zip(reg.DATA[::2], (temperature, *accel, *gyro)):
             high, low = value >> 8 & 0xFF, value & 0xFF
@@ -192,18 +173,18 @@ class Icm42688:
         stamped = self.banks[0][reg.TMST_CONFIG] & 1
         header = (0x40 if with_accel else 0) | (0x20 if with_gyro else 0) | (0x10 if fine else 0) | (8 if stamped else 0)
         stamp = (self.time_stamp(at) & 0xFFFF).to_bytes(2, order)
-        coarse_temperature = (_clamp((self.temperature - 25) * 2.07, 8)).to_bytes(1, "little", signed=True)
+        coarse_temperature = (clamp((self.motion.temperature - 25) * 2.07, 8)).to_bytes(1, "little", signed=True)
         if fine:
-            gyro = [_clamp(rate * 131, 19) << 1 if gyro_valid else -0x80000 for rate in rates]
-            accel = [_clamp(g * 8192, 18) << 2 if accel_valid else -0x80000 for g in acceleration]
-            temperature = _clamp((self.temperature - 25) * 132.48, 16).to_bytes(2, order, signed=True)
+            gyro = [clamp(rate * 131, 19) << 1 if gyro_valid else -0x80000 for rate in rates]
+            accel = [clamp(g * 8192, 18) << 2 if accel_valid else -0x80000 for g in acceleration]
+            temperature = clamp((self.motion.temperature - 25) * 132.48, 16).to_bytes(2, order, signed=True)
             extension = bytes((a & 15) << 4 | g & 15 for a, g in zip(accel, gyro))
-            packet = _words([value >> 4 for value in accel + gyro], order) + temperature + stamp + extension
+            packet = words([value >> 4 for value in accel + gyro], order) + temperature + stamp + extension
             packet = bytes([header | 0x60]) + packet
         elif with_accel and with_gyro:
-            packet = bytes([header]) + _words(accel + gyro, order) + coarse_temperature + stamp
+            packet = bytes([header]) + words(accel + gyro, order) + coarse_temperature + stamp
         else:
-            packet = bytes([header & ~8]) + _words(accel if with_accel else gyro, order) + coarse_temperature
+            packet = bytes([header & ~8]) + words(accel if with_accel else gyro, order) + coarse_temperature
         if (len(self.fifo) + 1) * len(packet) > FIFO_BYTES:
             self.lost = min(self.lost + 1, 0xFFFF)
             self.status |= reg.FIFO_FULL
@@ -388,30 +369,5 @@ class Icm42688:
             self._plan()
         elif key == "who_am_i":
             self.identity = value
-        elif key in ("tones", "motion", "samples"):
-            setattr(self, key, list(value))
         else:
-            names = {"noise": "noise", "rates_dps": "rates", "acceleration_g": "acceleration", "temperature_c": "temperature"}
-            if key not in names:
-                raise KeyError(f"the ICM-42688-P has no setting {key}")
-            setattr(self, names[key], value)
-
-
-def _clamp(value, bits):
-    limit = 1 << bits - 1
-    return max(1 - limit, min(limit - 1, round(value)))
-
-
-def _words(values, order):
-    return b"".join(value.to_bytes(2, order, signed=True) for value in values)
-
-
-def _interpolated(table, time_us):
-    """Returns the motion interpolated between the two rows around a time; constant before the first and after the last row."""
-    index = bisect_right(table, time_us, key=lambda row: row[0])
-    if index in (0, len(table)):
-        row = table[min(index, len(table) - 1)]
-        return list(row[1]), list(row[2])
-    (t0, r0, a0), (t1, r1, a1) = table[index - 1], table[index]
-    part = (time_us - t0) / (t1 - t0)
-    return [a + part * (b - a) for a, b in zip(r0, r1)], [a + part * (b - a) for a, b in zip(a0, a1)]
+            self.motion.configure(key, value)

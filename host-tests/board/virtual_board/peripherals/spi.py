@@ -6,7 +6,8 @@ Left out: slave mode, receive-only and one-wire modes, CRC, TI mode, I2S.
 Assumed: a chip-select line has a pull-up on the board, so a pin that is not yet an output does not select; MISO without its alternate
 function reads 0, and a line that no slave drives reads 1.
 
-Settings: `fitted` (False: no slave answers, MISO floats high); settings that begin with `imu_` are passed to the ICM-42688-P on SPI1.
+Settings: `fitted` (False: no slave answers, MISO floats high); `part` (the class of the part whose dies answer, the first at the start);
+settings that begin with `imu_` are passed to that part.
 """
 
 from ..peripheral import Peripheral
@@ -31,6 +32,8 @@ class Spi(Peripheral):
         self.base, self.interrupt, self.bus, self.function = base, interrupt, bus, function
         self.dma = "DMA2" if bus == "PCLK2" else "DMA1"
         self.nss, self.sck, self.miso, self.mosi = pins
+        #: Parts that may be fitted, and of each slave its number in them.
+        self.parts, self.part, self.owners = [], 0, []
         self.slaves, self.selected = [], []
         self.fitted = True
         self.departure = None
@@ -61,15 +64,20 @@ class Spi(Peripheral):
         for slave in self.slaves:
             slave.power_off()
 
-    def attach(self, slave, port, pin):
-        """Adds a slave to the bus, with its chip select, active low and pulled up, at a pin of a port."""
-        port.configure("drive", (pin, True))
-        port.listen(pin, Select(self, len(self.slaves)))
-        self.slaves.append(slave)
+    def attach(self, part, slaves):
+        """Adds a part: slaves, each with its chip select, active low and pulled up, at a pin of a port."""
+        self.parts.append(part)
+        for slave, port, pin in slaves:
+            port.configure("drive", (pin, True))
+            port.listen(pin, Select(self, len(self.slaves)))
+            self.slaves.append(slave)
+            self.owners.append(len(self.parts) - 1)
 
     def select(self, index, active):
         """Handles a change of a chip select."""
         slave = self.slaves[index]
+        if self.owners[index] != self.part:
+            return
         if active:
             self.selected = [*self.selected, slave]
             if self.fitted:
@@ -263,8 +271,10 @@ class Spi(Peripheral):
     def configure(self, key, value):
         if key == "fitted":
             self.fitted = bool(value)
-        elif key.startswith("imu_") and self.slaves:
-            self.slaves[0].configure(key[4:], value)
+        elif key == "part":
+            self.part = [type(part).__name__ for part in self.parts].index(value)
+        elif key.startswith("imu_") and self.parts:
+            self.parts[self.part].configure(key[4:], value)
         else:
             super().configure(key, value)
 
