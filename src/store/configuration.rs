@@ -11,7 +11,7 @@ use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};
 use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
 use crate::coprocessor;
-use crate::fog::{FogConfig, FogErrors, Tilt};
+use crate::fog::{FogConfig, Tilt};
 use crate::heading::{Gain, HeadingReceiver, HeadingSettings};
 use crate::mounting::{GyroMap, Rotation};
 use crate::pipeline::PipelineConfig;
@@ -178,7 +178,6 @@ impl Configuration {
 
     fn fog(&self) -> FogConfig {
         FogConfig {
-            errors: FogErrors::DSP1760,
             latitude: self.latitude(),
             // A stored configuration has been checked.
             tilt: Tilt::from_degrees(self.fog_gyro.tilt_deg).unwrap_or(Tilt::NONE),
