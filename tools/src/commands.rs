@@ -18,6 +18,7 @@ mod progress;
 pub mod quantize;
 pub mod reference;
 pub mod replay;
+pub mod retired;
 pub mod sign;
 pub mod simulate;
 pub mod size;

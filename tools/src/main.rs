@@ -71,7 +71,13 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let Cli { command, common } = Cli::parse();
+    let Cli { command, common } = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => match commands::retired::line(&error) {
+            Some(line) => return fail(&line, 2),
+            None => error.exit(),
+        },
+    };
     let result = match &command {
         Command::Demo(args) => commands::demo::run(args, common),
         Command::Evaluate(args) => commands::evaluate::run(args, common),
@@ -99,8 +105,12 @@ fn main() -> ExitCode {
     if error.downcast_ref().is_some_and(closed) {
         return ExitCode::SUCCESS;
     }
+    fail(&error, 1)
+}
+
+fn fail(error: &dyn std::fmt::Display, status: u8) -> ExitCode {
     // If even stderr is closed, the error cannot be reported.
     let mark = console::style("error:").for_stderr().red().bold();
     let _ = writeln!(std::io::stderr(), "{mark} {error}");
-    ExitCode::FAILURE
+    ExitCode::from(status)
 }

@@ -135,3 +135,31 @@ fn bash_completes() {
     let output = Command::new("bash").args(["--norc", "-c", &script]).output().unwrap();
     assert_eq!(text(&output.stdout).trim(), "evaluate", "{}", text(&output.stderr));
 }
+
+#[test]
+fn retired_names_say_what_does_their_work() {
+    for (retired, successor) in [
+        (&["campaign", "--upsets"][..], "--bin situations"),
+        (&["--json", "soak"], "--bin situations"),
+        (&["paper", "KAIST", "--out", "OUT"], "make -f tools/paper/Makefile"),
+        (&["tables", "SEQUENCES"], "cargo paper tables"),
+        (&["train", "DRIVES"], "python -m gyronet_train.beside"),
+        (&["bus", "--can"], "gyronet device set"),
+        (&["warm-up"], "gyronet simulate --trip motorway"),
+        (&["bench-target", "--policies"], "cargo bringup"),
+        (&["demo", "--image"], "--test board"),
+        (&["monitor", "can.log", "--csv", "yaw.csv"], "gyronet monitor --json"),
+        (&["doctor", "drive.csv", "--weights", "mine.blob"], "gyronet evaluate --weights"),
+        (&["simulate", "--layout", "kaist", "--out", "OUT"], "cargo paper simulate"),
+        (&["import", "urban06", "--training", "--out", "a.csv"], "cargo paper import"),
+        (&["doctor", "drive.csv", "--out", "page.html"], "gyronet doctor --json"),
+        (&["evaluate", "drive.csv", "--ablation"], "gyronet evaluate"),
+        (&["replay", "drive.csv", "--mcap", "drive.mcap"], "gyronet correct"),
+        (&["import", "kaist", "urban06"], "cargo paper import urban06"),
+    ] {
+        let output = gyronet(retired);
+        let error = text(&output.stderr);
+        assert!(!output.status.success() && error.contains(successor), "{retired:?}: {error}");
+        assert_eq!(error.lines().count(), 1, "{retired:?}: {error}");
+    }
+}
