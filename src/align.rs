@@ -49,6 +49,7 @@ const PERIODS: usize = 8;
 
 /// The reason why a sample is not used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum AlignError {

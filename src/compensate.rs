@@ -129,6 +129,7 @@ pub struct Remaining {
 
 /// A compensated rate and the correction that was subtracted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Compensated {
     /// Grid step of the sample.
     pub tick: u32,
@@ -150,6 +151,7 @@ pub struct Compensated {
 
 /// A sample that no window will change any more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Complete {
     /// Grid step of the sample.
     pub tick: u32,
@@ -177,6 +179,7 @@ impl Complete {
 
 /// The reason why a window's estimate was rejected: its corrections are too large.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Implausible {
     /// The mean correction of the window.
     pub mean: AngularRate,

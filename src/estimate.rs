@@ -10,6 +10,7 @@ use crate::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
 
 /// Holds the corrected yaw rate of one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct YawEstimate {
     /// Grid step of the sample that the rate belongs to.
     pub tick: u32,
@@ -66,6 +67,7 @@ impl VehicleSample {
 
 /// Holds everything that is sent for one sample of the inertial sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VehicleSample {
     /// The rate of this sample, for receivers that use it for control: the Bosch messages.
     pub live: YawEstimate,

@@ -78,6 +78,7 @@ impl FogConfig {
 
 /// The reason why a window's estimate was rejected: its correction is too large.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ImplausibleTurn {
     /// The correction of the window.
     pub correction: Angle,
@@ -85,6 +86,7 @@ pub struct ImplausibleTurn {
 
 /// Holds the results of one frame of 10 ms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogOutput {
     /// The frame's turn less the correction; `None` where the gyro has a gap.
     pub turn: Option<Angle>,

@@ -23,6 +23,7 @@ use embedded_can::{ExtendedId, Frame, Id};
 
 /// Course and speed over ground.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Heading {
     /// Direction of motion, rad from true north, clockwise from above, 0 to 2 pi.
     pub course: Option<f32>,
@@ -36,6 +37,7 @@ pub struct Heading {
 
 /// The reason why a frame gives no heading.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum HeadingError {

@@ -10,6 +10,7 @@ use crate::sample::Validity;
 /// damaged weights the state is `Degraded` at best.
 /// [`states::STATES`] says when each state is entered and left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Status {
     /// The bias is not known yet: the rate is sent but not good.
@@ -42,6 +43,7 @@ impl core::fmt::Display for Status {
 
 /// Says where a rate comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Source {
     /// The gyro without a correction.
@@ -57,6 +59,7 @@ pub enum Source {
 
 /// Says how far a rate can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Quality {
     /// The rate is fully corrected, without restrictions.
@@ -72,6 +75,7 @@ pub enum Quality {
 
 /// The present faults, one bit each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Faults(pub u8);
 
 impl Faults {
@@ -125,6 +129,7 @@ impl Faults {
 
 /// The faults of the board other than those of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoardFaults {
     /// Frames were lost on the bus, or the controller is off it.
     pub bus: bool,
@@ -185,6 +190,7 @@ pub const fn judge(status: Status) -> (Source, Quality) {
 
 /// Event counters since the start. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Counters {
     /// Samples that became frames.
@@ -239,6 +245,7 @@ impl Counters {
 
 /// Fault counters of the sensor ([`crate::monitor`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MonitorCounters {
     /// Times that the sensor became silent.
@@ -260,6 +267,7 @@ impl MonitorCounters {
 
 /// Counters of inputs that were refused or replaced ([`crate::coprocessor`]). They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InputCounters {
     /// Messages of the inertial sensor that were not valid samples.

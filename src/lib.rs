@@ -85,8 +85,7 @@
 //! | `store` | [`store`]: configuration, calibration and weights in flash (serde, postcard, embedded-storage) |
 //! | `service` | [`service`] and [`uds`]: stored data and diagnosis, and `store` (automotive_diag) |
 //! | `serde` | `Serialize` and `Deserialize` for configuration and counters |
-//!
-//! `defmt::Debug2Format` logs any of the public types.
+//! | `defmt` | `defmt::Format` for the public types |
 //!
 //! Unsafe code is denied except in one kernel file for Cortex-M with the DSP extension
 //! (`src/nn/simd`), whose results equal those of portable code to the last bit.

@@ -42,6 +42,7 @@ fn metre_per_sec2(force: &[SpecificForce; 3]) -> [f32; 3] {
 
 /// The reason why the accelerometer shows no vertical.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum LevelError {
     /// The mean specific force is not gravity, m/s^2.
@@ -54,6 +55,7 @@ pub enum LevelError {
 
 /// Rotates the sensor's axes into the vehicle's (x forward, y left, z up).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rotation([[i32; 3]; 3]);
 
 impl Rotation {
@@ -167,6 +169,7 @@ fn product(rows: &[[i32; 3]; 3], vector: [i32; 3]) -> [i32; 3] {
 /// Its matrix is close to the identity: within [`GyroMap::MAX_GAIN`] on the diagonal and [`GyroMap::MAX_CROSS`] off it.
 /// A larger deviation is a mounting that has to be configured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GyroMap([[i32; 3]; 3]);
 

@@ -82,6 +82,7 @@ pub struct Output {
 
 /// Holds the corrections that [`crate::estimate::YawEstimate::yaw`] does not contain yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pending {
     /// Missing from the live yaw: revisions that have not been carried over yet.
     pub live: Yaw,

@@ -11,6 +11,7 @@ pub const NO_STAMP: Micros = Micros(u64::MAX);
 
 /// Holds one reading of an inertial measurement unit: x forward, y left, z up (FLU).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ImuSample {
     /// Time of the reading by the part's own clock, unwrapped, or [`NO_STAMP`].
     pub time: Micros,
@@ -27,6 +28,7 @@ pub struct ImuSample {
 
 /// Says whether a reading can be used, and if not, why.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Validity {
     /// The reading can be used.
     #[default]
@@ -91,6 +93,7 @@ impl TestSignal {
 /// Holds the angle through which a fibre-optic gyro has turned since its previous message: x forward, y left, z up
 /// (FLU).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogSample {
     /// The time at which the increment ended, by the part's own clock, unwrapped.
     pub time: Micros,
@@ -106,6 +109,7 @@ pub struct FogSample {
 
 /// Holds a sample with its place on the 100 Hz grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Frame {
     /// Number of the grid step, counted from the first sample.
     pub tick: u32,
@@ -120,6 +124,7 @@ pub const WHEELS: usize = 4;
 
 /// Says whether the vehicle stands, as its wheels show it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Standstill {
     /// Standstill is not known: wheels are silent, or have only just become slow.
     #[default]
@@ -132,6 +137,7 @@ pub enum Standstill {
 
 /// Holds the newest speeds of the wheels, and whether they stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WheelSample {
     /// The time by the caller's clock.
     pub time: Micros,

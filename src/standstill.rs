@@ -74,6 +74,7 @@ const BEFORE: [f32; 2] = [490.0, 10.0];
 
 /// The evidence that the vehicle stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StandstillSource {
     /// There is no evidence.
     #[default]
@@ -86,6 +87,7 @@ pub enum StandstillSource {
 
 /// The judgement of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Standing {
     /// The evidence.
     pub source: StandstillSource,

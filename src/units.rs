@@ -12,6 +12,7 @@ pub const STANDARD_GRAVITY: f32 = 9.806_65;
 
 /// The reason why a reading does not fit the fixed-point format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RangeError {
     /// The reading is NaN or infinite.
@@ -24,6 +25,7 @@ pub enum RangeError {
 
 /// Holds an angular rate, signed 32 bit, LSB 2^-27 rad/s (4.3e-7 deg/s), range +-16 rad/s (+-916 deg/s).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AngularRate(pub i32);
 
@@ -58,6 +60,7 @@ impl AngularRate {
 
 /// Holds a specific force, signed 32 bit, LSB 2^-20 m/s^2, range +-2048 m/s^2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SpecificForce(pub i32);
 
@@ -88,6 +91,7 @@ impl SpecificForce {
 ///
 /// This is so fine that rounding 1000 increments a second, always in the same direction, stays below 6e-6 deg/h.
 #[derive(Debug, Clone, Copy, PartialEq, Hash, Eq, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Angle(pub i64);
 
 impl Angle {
@@ -124,6 +128,7 @@ impl Angle {
 /// Holds an accumulated yaw, signed 64 bit, LSB 2^-27 rad/s x 10 ms: the sum of emitted rates, where a step of the
 /// sensor's clock is 10 ms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Yaw(pub i64);
 
 impl Yaw {
@@ -137,6 +142,7 @@ impl Yaw {
 
 /// Holds the speed of a wheel over ground, signed 32 bit, LSB 2^-16 m/s, range +-32768 m/s.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelSpeed(pub i32);
 
@@ -153,11 +159,13 @@ impl WheelSpeed {
 
 /// Holds a temperature of the part, in 1/100 deg C.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CentiCelsius(pub i16);
 
 /// Holds an instant in microseconds: the time of a part by its own clock, unwrapped, or of the caller's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Micros(pub u64);
 
 impl Micros {
@@ -176,6 +184,7 @@ impl Micros {
 
 /// Holds a duration in microseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Duration(pub u64);
 

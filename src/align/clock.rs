@@ -31,6 +31,7 @@ pub const JITTER_US: u64 = 2_000;
 
 /// The reason why a time stamp is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum ClockError {
@@ -42,6 +43,7 @@ pub enum ClockError {
 
 /// Event counters. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClockCounters {
     /// Samples accepted.
     pub samples: u32,
@@ -62,6 +64,7 @@ impl ClockCounters {
 
 /// Holds a sample's time by the board's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoardTime {
     /// The time at which the sample was taken, plus the shortest delay of the line.
     pub time: Micros,

@@ -45,6 +45,7 @@ pub const GAP_US: u64 = BLOCK_US;
 
 /// True time over the sensor's time: LSB 2^-30, so one is 2^30.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClockRatio(pub u32);
 
 impl ClockRatio {
@@ -94,6 +95,7 @@ impl ClockRatio {
 
 /// Configures when the two clocks contradict each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClockRatioConfig {
     /// Largest departure from one of a working oscillator, millionths.
     pub limit_ppm: u32,

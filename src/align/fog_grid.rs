@@ -16,6 +16,7 @@ pub const MAX_SILENCE_US: u64 = 1_000_000;
 
 /// The turn of one grid step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Step {
     /// The step's time by the board's clock, a multiple of [`PERIOD_US`].
     pub time: Micros,

@@ -22,6 +22,7 @@ pub const KEPT: usize = 32;
 
 /// The turn between two grid steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Turn {
     /// About x, y, z; `None` where an axis was not good throughout, or no increment arrived.
     pub angle: [Option<Angle>; 3],
@@ -45,6 +46,7 @@ impl Turn {
 
 /// Event counters. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct IncrementCounters {
     /// Times that messages were missing between two increments.
     pub gaps: u32,

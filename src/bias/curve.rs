@@ -49,6 +49,7 @@ pub struct CurveBias {
 
 /// Holds the gyro's bias by temperature, in the sensor's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BiasCurve {
     /// Coefficients of x, y and z, rad/s, by rising power of (temperature - 25 deg C) / 25 K.

@@ -12,6 +12,7 @@ pub(crate) const EARTH_RATE: f32 = 7.292_115e-5;
 /// Holds a geographic latitude as the Earth's rate about the vertical there, so that the sine is computed once and not
 /// for each sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Latitude {
     vertical_rate: AngularRate,
     step_turn: Angle,
@@ -47,6 +48,7 @@ impl Latitude {
 
 /// Says how the Earth's rotation is treated.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum EarthRate {
     /// The Earth's rate is part of the bias. This suits a gyro that is initialised at rest on each start, and whose
     /// bias has no other use.

@@ -43,6 +43,7 @@ impl StaticConfig {
 
 /// The sign of motion that was detected; `axis` is 0, 1, 2 for x, y, z.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum StaticError {
@@ -101,6 +102,7 @@ impl Axis {
 
 /// The mean readings of the sensor at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rest {
     /// Mean angular rate: bias and Earth rate.
     pub angular_rate: [AngularRate; 3],

@@ -59,6 +59,7 @@ const DISTRUSTED: u32 = 10 * RATE_HZ;
 const TURNING: u32 = 2 * RATE_HZ;
 /// Says how a whole second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ZeroRateOutcome {
     /// The second before this one was used.
     Used,

@@ -44,6 +44,7 @@ const AY_PER_CODE_Q32: i64 = 3_276_788;
 
 /// The status nibble of one signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SignalStatus(pub u8);
 
 impl SignalStatus {
@@ -59,6 +60,7 @@ impl SignalStatus {
 
 /// The reason why a frame is not a valid message of the set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum MessageError {

@@ -31,6 +31,7 @@ pub const MAX_MESSAGES: usize = 8;
 
 /// Checked [`Settings`]: the messages that are sent, their periods and their protection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
     settings: Settings,
 }

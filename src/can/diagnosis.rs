@@ -4,6 +4,7 @@ use embedded_can::{ExtendedId, Id, StandardId};
 
 /// The identifiers of diagnosis, as a user writes them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DiagnosisIds {
     /// True if all three identifiers have 29 bits instead of 11.

@@ -30,6 +30,7 @@ pub use sequence::{Sequence, Verdict};
 
 /// The reason why protected data must not be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum Fault {
@@ -46,6 +47,7 @@ pub enum Fault {
 
 /// An E2E profile and its data identifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Profile {
     /// Profile 1.

@@ -2,6 +2,7 @@
 
 /// The byte order of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ByteOrder {
     /// Little-endian (DBC `@1`): the start bit is the lowest bit.
@@ -12,6 +13,7 @@ pub enum ByteOrder {
 
 /// The error for a bit field that does not lie inside eight bytes, or whose length is not 1 to 32 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("{} bits from bit {} do not lie inside a frame", .len, .start)]
 pub struct OutsideFrame {
     /// Requested start bit.
@@ -22,6 +24,7 @@ pub struct OutsideFrame {
 
 /// The position, byte order and sign of a value in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Place", into = "Place"))]
 pub struct BitField {

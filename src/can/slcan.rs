@@ -70,6 +70,7 @@ fn hex(byte: u8) -> [u8; 2] {
 
 /// The reason why a line is not a data frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum SlcanError {

@@ -120,6 +120,7 @@ impl WheelReceiver {
 
 /// The limits for a wheel that is still and for a speed that is stale.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StandstillRule {
     /// Age above which a speed is stale.
     pub timeout: Duration,

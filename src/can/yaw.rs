@@ -43,6 +43,7 @@ const SIGMA_PER_CODE_Q32: u64 = 183_346_494;
 
 /// The reason why bytes are not a yaw message. The E2E check is done before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum YawError {
     /// The frame does not have eight bytes.
@@ -55,6 +56,7 @@ pub enum YawError {
 
 /// The rate message: the rate (1e-6 deg/s per code), its source and its quality.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RateMessage {
     /// Code of the rate.
     pub rate: i32,
@@ -100,6 +102,7 @@ impl RateMessage {
 
 /// The angle message: accumulated yaw (360 deg / 2^32 per code) and the faults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AngleMessage {
     /// Code of the accumulated yaw.
     pub yaw: i32,
@@ -133,6 +136,7 @@ impl AngleMessage {
 
 /// The detail message: correction (2e-4 deg/s per code), expected error (1e-5 deg/s), latency (0.5 ms).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DetailMessage {
     /// Code of the correction.
     pub correction: i16,

@@ -11,6 +11,7 @@ const END: Micros = Micros(1 << 62);
 
 /// The clock that `now` comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Clock {
     /// `now` is an independent clock, and inputs arrive when they are measured: a board in a vehicle.
     #[default]

@@ -14,6 +14,7 @@ use crate::units::Duration;
 
 /// Stored data that was found damaged at the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StorageFaults {
     /// Weights, configuration or calibration are damaged; the messages report it.
     pub damaged: bool,
@@ -75,6 +76,7 @@ impl Default for Config {
 
 /// The reason why an input is not used.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum InputError {

@@ -13,6 +13,7 @@ const TILT_FRACTION_BITS: u32 = 30;
 /// the cosine of this angle. It also measures part of the Earth's horizontal rate, which depends on the heading and is
 /// not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tilt {
     /// One over the cosine, less one.
     secant_minus_one: i32,

@@ -2,6 +2,7 @@
 
 /// The errors of a part, without the Earth's rate, 1 sigma.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogErrors {
     /// Angle random walk, rad per square root of a second.
     pub angle_walk: f32,

@@ -45,6 +45,7 @@ const CLOCK: f32 = 0.01;
 
 /// Event counters since the start. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FogCounters {
     /// Samples accepted.

@@ -45,6 +45,7 @@ const OWN_UNIT: f32 = 16.0;
 
 /// Says how a second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RestOutcome {
     /// The mean that ended a second before was used.
     Used,

@@ -101,6 +101,7 @@ const FINE_GAIN: f32 = 0.0015;
 
 /// The reason why a course teaches nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refusal {
     /// It is far from the heading that the gyro shows.
     Jump = 1,

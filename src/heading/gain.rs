@@ -13,6 +13,7 @@ const BETTER: f32 = 0.7;
 
 /// A gain of the yaw gyro.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gain {
     /// Share of the rate that the gyro reads too much.

@@ -27,6 +27,7 @@ pub const HEADER_LEN: usize = header_len(FEATURES);
 
 /// Describes the parts of a window model and their sizes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Shape {
     /// Units of the Bi-LSTMs a direction, up to [`HIDDEN`] in steps of 4; with 0 there are none.
     pub units: u16,

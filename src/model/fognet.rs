@@ -32,6 +32,7 @@ pub const GAIN_FRACTION_BITS: u32 = 31;
 
 /// Holds the result of a FoGNet window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogEstimate {
     /// The error of the gyro's turn in the window.
     pub correction: Angle,

@@ -39,6 +39,7 @@ pub const TOPOLOGY: Topology = [FOGNET, STEPS as u16, INPUTS as u16, HIDDEN1 as 
 
 /// Names the source of the turns that a FoGNet corrects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Gyro {
     /// A KVH DSP-1760, less the Earth's rate and its bias.
@@ -66,6 +67,7 @@ impl core::fmt::Display for Gyro {
 
 /// Says what a FoGNet was trained on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Training {
     /// The source of the turns.

@@ -19,6 +19,7 @@ pub const FRAMES: u32 = RATE_HZ;
 
 /// Holds the part of a second that one 10 ms frame adds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogFrame {
     /// Angle turned about z (up) since the frame before; `None` if part of it is unknown.
     pub turn: Option<Angle>,
@@ -30,6 +31,7 @@ pub struct FogFrame {
 
 /// Holds the features of one second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Second {
     /// Means in the codes of [`crate::units`]. A wheel's mean speed over a second is also its distance.
     pub features: [i32; FEATURES],
@@ -39,6 +41,7 @@ pub struct Second {
 
 /// Says why the window ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Incomplete {
     /// The gyro's increments have a gap.
@@ -111,6 +114,7 @@ impl SecondSums {
 
 /// A second for the window, with its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NewSecond {
     /// Number of the second, and of the window that it ends.
     pub number: u32,

@@ -91,6 +91,7 @@ impl<N: WindowNetwork + ?Sized> WindowNetwork for &mut N {
 
 /// Holds the result of a window: the gyro's error in each sample, and the expected error of the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
     /// The corrections.
     pub corrections: Corrections,
@@ -116,6 +117,7 @@ impl Estimate {
 /// The factors that turn a constant angular rate about x, y and z into its correction: a linear part models the
 /// unit's mounting and gain with them. Q24, from rate codes to a rate code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SteadyGain(pub [i32; 3]);
 
 impl SteadyGain {

@@ -26,6 +26,7 @@ const PLAUSIBLE: [f32; 2] = [0.5, 2.0];
 
 /// Holds the forward direction of the vehicle in the sensor's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Forward {
     /// The direction, a unit vector.

@@ -48,6 +48,7 @@ const FINE_DEG: f32 = 3.0;
 
 /// The mean of directions that pointed up, each weighted with the inverse of its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Vertical {
     sum: [f32; 3],

@@ -19,6 +19,7 @@ pub struct Layer<'w> {
 
 /// The order in which a direction runs its steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Direction {
     /// The first step runs first.
     Forward,

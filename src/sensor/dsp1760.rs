@@ -21,6 +21,7 @@ use message::{Extra, MAX_MESSAGE, MAX_SEQUENCE, Message, MessageError, Validity}
 
 /// The reason why an intact frame gives no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Dsp1760Error {
     /// The content of the frame is invalid.
@@ -36,6 +37,7 @@ pub enum Dsp1760Error {
 
 /// The event counters; they saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Dsp1760Counters {
     /// Times that the sequence number advanced by more than one.
     pub gaps: u32,

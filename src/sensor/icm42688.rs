@@ -29,6 +29,7 @@ const START_MS: u32 = 45;
 
 /// The error of the sensor or its bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum Icm42688Error<E> {

@@ -14,6 +14,7 @@ const MAX_READ: usize = 1024;
 
 /// The error of a serial sensor: of the port or of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SerialError<P, E> {
     /// The port failed, for example by an overrun or a framing error.
     #[error("the serial port failed: {0:?}")]

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 /// The kind of calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Task {
     /// The gyro's bias, while the vehicle stands.
     Static,
@@ -23,6 +24,7 @@ pub enum Task {
 
 /// The reason why a calibration has failed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CalibrationFault {
     /// The vehicle moved, as detected by gyro axis 0 to 2, accelerometer axis 3 to 5 (x, y, z), or 6, the wheels.
@@ -37,6 +39,7 @@ pub enum CalibrationFault {
 
 /// The progress of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
     /// No calibration was requested.
     #[default]

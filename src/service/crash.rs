@@ -8,6 +8,7 @@ pub const FILE: usize = 24;
 
 /// The reason why the image stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CrashKind {
     /// The program panicked.
@@ -24,6 +25,7 @@ pub enum CrashKind {
 
 /// The record of a crash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Crash {
     /// Reason why the image stopped.
     pub kind: CrashKind,

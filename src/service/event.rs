@@ -15,6 +15,7 @@ pub const PAGE: usize = 8;
 
 /// The cause of the last reset, from the reset flags (RM0090 7.3.21).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ResetCause {
     /// No flag is set.
@@ -35,6 +36,7 @@ pub enum ResetCause {
 
 /// The reason why a sensor could not be set up or read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SensorFault {
     /// The SPI controller did not answer.
@@ -60,6 +62,7 @@ pub enum SensorFault {
 
 /// The kinds of events.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum EventKind {
     /// The image started.
@@ -124,6 +127,7 @@ pub enum EventKind {
 
 /// An entry of the event log.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Event {
     /// Number of the event, from 1 at the start.
     pub number: u32,

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// The tilt of the configured sensor frame against level ground.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Level {
     /// Tilt about x, deg.
     pub roll_deg: f32,
@@ -25,6 +26,7 @@ impl Level {
 /// The gain and misalignment of the unit's gyro, determined from a drive with a reference yaw rate
 /// (`gyronet calibrate`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct UnitMap {
     /// Matrix of gain and misalignment.
     pub gyro_map: GyroMap,

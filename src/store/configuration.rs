@@ -21,6 +21,7 @@ use serde::{Deserialize, Serialize};
 
 /// The inertial sensor that is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ImuPart {
     /// Xsens MTi, MTData2 on a UART.
@@ -31,6 +32,7 @@ pub enum ImuPart {
 
 /// The fibre-optic gyro that is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FogPart {
     /// KVH DSP-1760 or 17xx.
@@ -39,6 +41,7 @@ pub enum FogPart {
 
 /// The rotation of the sensor against the vehicle: about x (forward), then y (left), then z (up).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mounting {
     /// Rotation about x, -180 to 180 deg.
     pub roll_deg: f32,
@@ -57,6 +60,7 @@ impl Mounting {
 
 /// The settings of the correction of the fibre-optic gyro.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogGyro {
     /// Angle between the axis of the gyro and the vertical of the level vehicle, 0 to 45 deg.
     pub tilt_deg: f32,

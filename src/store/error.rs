@@ -10,6 +10,7 @@ pub(crate) const MAX_TILT_DEG: f32 = 45.0;
 
 /// A value of a record that has a range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "named as the fields that they stand for")]
 pub enum Field {
@@ -88,6 +89,7 @@ impl Field {
 
 /// The reason why a configuration or calibration is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum FieldError {
@@ -118,6 +120,7 @@ pub(super) fn within(field: Field, value: f32) -> Result<(), FieldError> {
 
 /// The reason why a flash operation failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum FlashFault {
@@ -133,6 +136,7 @@ pub enum FlashFault {
 
 /// The reason why the store has failed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum StoreError {

@@ -17,6 +17,7 @@ const FINE_DEG: f32 = 3.0;
 
 /// The sensor data that the board learns at standstills and while driving, in sensor axes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Learned {
     /// Bias of the gyro over temperature.
     pub bias_curve: BiasCurve,

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// One of two slots: for GyroNet's weights, or for firmware ([`Slot::firmware`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Slot {
     /// Sector 10; firmware in sectors 8 and 9.
     A,

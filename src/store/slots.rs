@@ -59,6 +59,7 @@ impl Record for Accepted {
 
 /// The reason why a slot, or the upload to it, is not used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum SlotError {
@@ -119,6 +120,7 @@ pub fn file(slot: &[u8]) -> Result<Blob<'_>, SlotError> {
 
 /// The origin of the weights in use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WeightSource {
     /// Weights from a slot.
     Slot(Slot),

@@ -52,6 +52,7 @@ pub const LAYOUTS: [Layout; 3] = [
 
 /// One message of the set as codes: 0.005 deg/s and 0.127465e-3 g each, zero at 0x8000.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Message {
     /// Code of the rate.
     pub rate: u16,
@@ -123,6 +124,7 @@ impl Message {
 
 /// One sample of the vehicle's motion (axes forward, left, up): the input of [`SetEncoder`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Motion {
     /// Angular rates about x (roll), y (pitch) and z (yaw).
     pub angular_rate: [AngularRate; 3],

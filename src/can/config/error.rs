@@ -4,6 +4,7 @@ use super::{BIT_RATES, MAX_BUS_LOAD, MAX_PERIOD_MS, SAMPLE_MS};
 
 /// The reason why settings are refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]

@@ -4,6 +4,7 @@ use crate::can::e2e::{DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
 
 /// The E2E profile of the three yaw messages, with their data identifiers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum E2e {
     /// Profile 1.
@@ -50,6 +51,7 @@ impl E2e {
 
 /// The Bosch MM5.10 set; its layout fixes the period at 10 ms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BoschSettings {
     /// True if only TX1 is sent, for receivers that use only the yaw rate.
@@ -58,6 +60,7 @@ pub struct BoschSettings {
 
 /// Our own yaw messages: rate, angle, detail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct YawSettings {
     /// 11-bit identifiers of rate, angle, detail.
@@ -70,6 +73,7 @@ pub struct YawSettings {
 
 /// The slow status message ([`crate::can::status`]), which is sent once a second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StatusSettings {
     /// 11-bit identifier, which is also the E2E data identifier; [`crate::can::status::STATUS_ID`] is free by default.
@@ -78,6 +82,7 @@ pub struct StatusSettings {
 
 /// The messages on the bus; [`super::Config::new`] checks them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Settings {
     /// Bit rate of the bus, bit/s.

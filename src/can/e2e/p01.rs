@@ -26,6 +26,7 @@ const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS }
 
 /// The choice of bytes of the 16-bit identifier that enter the CRC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum DataIdMode {
     /// Low byte, high byte (variant 1A).
@@ -40,6 +41,7 @@ pub enum DataIdMode {
 
 /// Protects and checks one message with profile 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct P01 {
     /// Data identifier, known to both sides. With [`DataIdMode::Nibble`] it has 12 bits.

@@ -13,6 +13,7 @@ const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS }
 
 /// Protects and checks one message with profile 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct P02 {
     /// Data identifier for each counter value.

@@ -11,6 +11,7 @@ const MAX_LEN: usize = 64;
 
 /// Protects and checks one message with profile 5.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct P05 {
     /// Data identifier, known to both sides; it enters the CRC last, low byte first.

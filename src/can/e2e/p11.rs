@@ -5,6 +5,7 @@ use super::p01::{DataIdMode, P01};
 
 /// The choice of bytes of the identifier that enter the CRC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum P11Mode {
     /// Low byte, high byte (variant 11A).
@@ -15,6 +16,7 @@ pub enum P11Mode {
 
 /// Protects and checks one message with profile 11.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct P11 {
     /// Data identifier, known to both sides. With [`P11Mode::Nibble`] it has 12 bits.

@@ -2,6 +2,7 @@
 
 /// The result of checking the counter of an intact message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
     /// The first message; its counter is the reference for the next one.
     First,

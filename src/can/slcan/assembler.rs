@@ -7,6 +7,7 @@ pub const MAX_HOST_LINE: usize = 32;
 
 /// The error for a line longer than [`MAX_HOST_LINE`]; the line is discarded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("line has more than {MAX_HOST_LINE} characters")]
 pub struct TooLong;
 

@@ -27,6 +27,7 @@ const SERIAL: &[u8] = b"NGYRO\r";
 
 /// Status byte of the command `F` (CAN232 manual).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StatusFlags(pub u8);
 
 impl StatusFlags {

@@ -8,6 +8,7 @@ use embedded_can::Id;
 
 /// A value of a field that says something: that a speed is valid, that a wheel turns backwards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Code {
     /// Position of the field.
@@ -18,6 +19,7 @@ pub struct Code {
 
 /// The position and scale of one wheel's speed in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelSignal {
     /// Index of the frame that carries the speed, in [`WheelSettings::frames`](super::WheelSettings::frames).
@@ -124,6 +126,7 @@ impl Pulses {
 
 /// A number in one or two parts of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Parts {
     /// The low bits.
@@ -159,6 +162,7 @@ impl Parts {
 /// A sum of a frame's bytes as its checksum, as cars have it: `start` plus or less the sum, exclusive or `last`, as many
 /// low bits as the field has. The checksum's own bits count as zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ByteSum {
     /// Position of the checksum, at most 8 bits.
@@ -206,6 +210,7 @@ impl ByteSum {
 
 /// The protection of a wheel frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Checksum {
     /// The frame is not protected.
@@ -262,6 +267,7 @@ pub(crate) mod stored_id {
 
 /// The reason why a frame gives no wheel speeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum WheelError {

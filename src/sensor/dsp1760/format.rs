@@ -6,6 +6,7 @@ pub(super) const PREFIX: [u8; 3] = [0xFE, 0x81, 0xFF];
 
 /// The format of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Format {
     /// Message without a time stamp.
     A,
@@ -42,6 +43,7 @@ impl Format {
 
 /// The status bits of the readings, 1 for good; bits 3 and 7 are 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Validity(pub u8);
 
 impl Validity {
@@ -65,6 +67,7 @@ impl Validity {
 
 /// The fields in which the formats differ.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Extra {
     /// Temperature of format A, deg C.
     Temperature(i16),

@@ -25,6 +25,7 @@ pub const MAX_SEQUENCE: u8 = 127;
 
 /// The reason why bytes are not a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum MessageError {
@@ -41,6 +42,7 @@ pub enum MessageError {
 
 /// A data message, in the units of the wire format.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Message {
     /// Increment about x, y, z, rad.
     pub rotation: [f32; 3],

@@ -24,6 +24,7 @@ use super::registers::{self as reg, Register, Setting, aaf_258_hz};
 
 /// The output rate of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum OutputRate {
     /// 100 samples per second.
     #[default]
@@ -45,6 +46,7 @@ impl OutputRate {
 /// The -3 dB point of the last filter of gyro and accelerometer, as a fraction of the filter's rate: the output rate,
 /// but at least 400 Hz. Wider settings are not offered, because with them vibration is aliased at 100 Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Bandwidth {
     /// 39.2 Hz at 100 Hz, 97.9 Hz at 1 kHz.
     Tenth,
@@ -71,6 +73,7 @@ impl Bandwidth {
 
 /// The settings of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Icm42688Config {
     /// Samples per second.
     pub rate: OutputRate,

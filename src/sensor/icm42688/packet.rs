@@ -23,6 +23,7 @@ const NO_READING: i32 = -524_288;
 
 /// The reason why bytes are not a packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum PacketError {
     /// The FIFO was empty.
@@ -35,6 +36,7 @@ pub enum PacketError {
 
 /// The readings of a packet in raw counts; `None` is a missing reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Packet {
     /// Acceleration x, y, z, 20 bits.
     pub acceleration: [Option<i32>; 3],

@@ -2,6 +2,7 @@
 
 /// A register: its bank and its address in the bank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Register {
     /// Bank, 0 to 4.
     pub bank: u8,
@@ -11,6 +12,7 @@ pub struct Register {
 
 /// The value that a register of the configuration must hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Setting {
     /// Register to write.
     pub register: Register,

@@ -28,6 +28,7 @@ pub mod id {
 
 /// The reason why an intact MTData2 frame gives no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum XsensError {
