@@ -28,6 +28,8 @@ pub enum ImuPart {
     XsensMti,
     /// TDK ICM-42688-P on SPI.
     Icm42688,
+    /// Bosch BMI088 on SPI, with two chip selects.
+    Bmi088,
 }
 
 /// The fibre-optic gyro that is fitted.

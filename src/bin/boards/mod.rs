@@ -41,8 +41,8 @@ pub struct Board {
     pub service: Line,
     /// CAN1, receive and transmit.
     pub can: [Pin; 2],
-    /// SPI1: clock, data in, data out, and the sensor's chip select.
-    pub spi: Option<[Pin; 4]>,
+    /// SPI1: clock, data in, data out, the sensor's chip select, and that of the gyro of a sensor with two.
+    pub spi: Option<[Pin; 5]>,
 }
 
 impl Board {

@@ -8,13 +8,16 @@ use crate::stm32f405::clocks::Clocks;
 use crate::stm32f405::flash::{Flash, FlashError};
 use crate::stm32f405::{Chip, pac, spi, supply as pvd, timer};
 use embedded_can::{Frame as _, Id, StandardId};
-use embedded_hal::spi::{Operation, SpiDevice as _};
+use embedded_hal::spi::{ErrorKind, Operation, SpiDevice as _};
 use gyronet::can::DataFrame;
 use gyronet::store::layout::{SLOT_SIZE, SLOTS};
 
 /// Register WHO_AM_I of an ICM-42688-P with the read bit, and its value (DS-000347 14.55).
 const WHO_AM_I: u8 = 0x75 | 0x80;
 const ICM_42688: u8 = 0x47;
+/// Chip identities of a BMI088's accelerometer and gyro, both in register 0, and the bytes to read either.
+const BMI_088: [u8; 2] = [0x1E, 0x0F];
+const BMI_088_READ: [&[u8]; 2] = [&[0x80, 0], &[0x80]];
 /// Time limit for the frames in loopback, us. A frame at 500 kbit/s takes 0.25 ms.
 const FRAME_US: u64 = 5_000;
 
@@ -108,13 +111,27 @@ pub fn sensor(report: &mut Report, registers: &pac::SPI1) {
     let Some(pins) = BOARD.spi else {
         return report.manual_check(NAME, format_args!("the board has no sensor there"));
     };
-    let mut spi = spi::start(registers, pins);
-    let mut identity = [0];
-    match spi.transaction(&mut [Operation::Write(&[WHO_AM_I]), Operation::Read(&mut identity)]) {
+    let mut parts = spi::start(registers, pins);
+    let mut read = |part: usize, command: &[u8]| {
+        let mut identity = [0];
+        parts[part].transaction(&mut [Operation::Write(command), Operation::Read(&mut identity)])?;
+        Ok(identity[0])
+    };
+    let mut identities = || {
+        let icm = read(0, &[WHO_AM_I])?;
+        // The rising chip select has switched a BMI088's accelerometer to SPI.
+        Ok::<_, ErrorKind>((icm, [read(0, BMI_088_READ[0])?, read(1, BMI_088_READ[1])?]))
+    };
+    match identities() {
         Err(error) => report.fail(NAME, format_args!("{error:?}")),
-        Ok(()) if identity == [ICM_42688] => report.pass(NAME, format_args!("an ICM-42688-P answers")),
-        Ok(()) => report
-            .manual_check(NAME, format_args!("no ICM-42688-P answers (WHO_AM_I is {:#04x})", identity[0])),
+        Ok((ICM_42688, _)) => report.pass(NAME, format_args!("an ICM-42688-P answers")),
+        Ok((_, BMI_088)) => report.pass(NAME, format_args!("a BMI088 answers")),
+        Ok((icm, [accelerometer, gyro])) => report.manual_check(
+            NAME,
+            format_args!(
+                "no sensor answers (ICM-42688-P {icm:#04x}, BMI088 {accelerometer:#04x} {gyro:#04x})"
+            ),
+        ),
     }
 }
 

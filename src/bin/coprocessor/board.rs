@@ -29,7 +29,7 @@ pub struct Board {
     pub service: serial::Port,
     /// The CAN controller; `None` if it does not answer or the clock is not exact enough.
     pub can: Option<Can>,
-    pub spi: Option<Spi>,
+    pub spi: Option<[Spi; 2]>,
     pub clocks: Clocks,
     /// The identity that the board reports: firmware version, chip, clock and serial number.
     pub identity: Identity,

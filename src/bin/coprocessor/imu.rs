@@ -1,6 +1,6 @@
-//! The configured inertial sensor: an MTi on USART1, or an ICM-42688-P on SPI1.
+//! The configured inertial sensor: an MTi on USART1, an ICM-42688-P or a BMI088 on SPI1.
 //!
-//! Idle brings up the part on SPI, because that takes 50 ms, and retries every second while the part does not answer.
+//! Idle brings up the part on SPI, because that takes up to 0.3 s, and retries every second while the part does not answer.
 //! It then passes the part to the output task through [`READY`]; [`WANTED`] says which of the two may use the bus.
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
@@ -11,6 +11,7 @@ use crate::{output, serial};
 use core::sync::atomic::{AtomicBool, AtomicU16, Ordering};
 use embedded_hal::delay::DelayNs;
 use gyronet::sample::{ImuSample, PERIOD_US};
+use gyronet::sensor::bmi088::{Bmi088, Bmi088Error};
 use gyronet::sensor::icm42688::{Bandwidth, Icm42688, Icm42688Config, Icm42688Error, OutputRate};
 use gyronet::sensor::xsens::{Mti, XsensError};
 use gyronet::service::event::SensorFault;
@@ -26,7 +27,35 @@ const RETRY_MS: u32 = 1_000;
 
 const ICM: Icm42688Config = Icm42688Config { rate: OutputRate::Hz100, bandwidth: Bandwidth::Sixteenth };
 
-type Part = Icm42688<Spi>;
+/// A part on SPI.
+enum Part {
+    Icm(Icm42688<Spi>),
+    Bmi(Bmi088<Spi>),
+}
+
+impl Part {
+    /// Brings the part up. A BMI088 tests itself if it is to, which takes 0.1 s and is best done at rest.
+    fn new(part: ImuPart, [first, second]: [Spi; 2], self_test: bool) -> Result<Self, SensorFault> {
+        if part == ImuPart::Bmi088 {
+            let part = Bmi088::new([first, second], self_test, &mut Delay);
+            part.map(Self::Bmi).map_err(bmi_fault)
+        } else {
+            Icm42688::new(first, ICM, &mut Delay).map(Self::Icm).map_err(fault)
+        }
+    }
+
+    /// Returns the next sample; `Err(true)` if the part must be brought up again.
+    fn next_sample(&mut self) -> Option<Result<ImuSample, bool>> {
+        match self {
+            Self::Icm(part) => part.next_sample().transpose().map(|sample| {
+                sample.map_err(|error| !matches!(error, Icm42688Error::Packet(_) | Icm42688Error::NoReading))
+            }),
+            Self::Bmi(part) => part.next_sample().transpose().map(|sample| {
+                sample.map_err(|error| !matches!(error, Bmi088Error::NoReading | Bmi088Error::Overflow))
+            }),
+        }
+    }
+}
 
 static READY: Ring<Part, 1> =
     // SAFETY: idle writes, the output task reads.
@@ -51,10 +80,10 @@ impl Imu {
     /// supports.
     #[inline]
     pub fn new(part: ImuPart, line: serial::Port) -> Self {
-        if part == ImuPart::Icm42688 {
-            Self::Spi(SpiPart::default())
-        } else {
+        if part == ImuPart::XsensMti {
             Self::Line(line, Mti::new(), 0)
+        } else {
+            Self::Spi(SpiPart::default())
         }
     }
 
@@ -136,13 +165,13 @@ impl SpiPart {
             self.part = READY.pop();
             self.is_fresh = true;
         }
-        match self.part.as_mut()?.next_sample().transpose()? {
+        match self.part.as_mut()?.next_sample()? {
             Ok(sample) => Some(Ok(self.placed(sample))),
-            Err(Icm42688Error::Packet(_) | Icm42688Error::NoReading) => Some(Err(())),
-            // The part must be brought up again.
-            Err(_) => {
-                self.part = None;
-                WANTED.store(true, Ordering::Release);
+            Err(is_lost) => {
+                if is_lost {
+                    self.part = None;
+                    WANTED.store(true, Ordering::Release);
+                }
                 Some(Err(()))
             }
         }
@@ -163,14 +192,17 @@ impl SpiPart {
 
 /// Idle's end of a part on SPI: brings the part up.
 pub struct BringUp {
-    spi: Spi,
+    part: ImuPart,
+    spi: [Spi; 2],
     tried: Option<u32>,
+    /// True once the part was up: it is not tested again, because the vehicle may move.
+    is_tested: bool,
 }
 
 impl BringUp {
     /// Returns idle's end if such a part is configured.
-    pub fn new(part: ImuPart, spi: Option<Spi>) -> Option<Self> {
-        spi.filter(|_| part == ImuPart::Icm42688).map(|spi| Self { spi, tried: None })
+    pub fn new(part: ImuPart, spi: Option<[Spi; 2]>) -> Option<Self> {
+        spi.filter(|_| part != ImuPart::XsensMti).map(|spi| Self { part, spi, tried: None, is_tested: false })
     }
 
     /// Tries to bring the part up, if it is wanted and the last attempt is long enough ago.
@@ -182,10 +214,11 @@ impl BringUp {
             return None;
         }
         self.tried = Some(now);
-        let part = match Icm42688::new(self.spi, ICM, &mut Delay) {
+        let part = match Part::new(self.part, self.spi, !self.is_tested) {
             Ok(part) => part,
-            Err(error) => return Some(Err(fault(error))),
+            Err(fault) => return Some(Err(fault)),
         };
+        self.is_tested = true;
         WANTED.store(false, Ordering::Release);
         // There is room: the part is wanted only after the previous one was taken.
         let _ = READY.push(part);
@@ -199,6 +232,18 @@ fn fault<E>(error: Icm42688Error<E>) -> SensorFault {
         Icm42688Error::Identity { got } => SensorFault::Identity(got),
         Icm42688Error::Setting { register, got, .. } => {
             SensorFault::Setting { bank: register.bank, address: register.address, got }
+        }
+        _ => SensorFault::Bus,
+    }
+}
+
+/// The accelerometer's registers are reported as bank 0, the gyro's as bank 1.
+fn bmi_fault<E>(error: Bmi088Error<E>) -> SensorFault {
+    match error {
+        Bmi088Error::Identity { got, .. } => SensorFault::Identity(got),
+        Bmi088Error::SelfTest { .. } => SensorFault::SelfTest,
+        Bmi088Error::Setting { die, address, got, .. } => {
+            SensorFault::Setting { bank: die as u8, address, got }
         }
         _ => SensorFault::Bus,
     }

@@ -5,7 +5,7 @@
 //! | line | use |
 //! |---|---|
 //! | USART1 | Xsens MTi |
-//! | SPI1 | ICM-42688-P, where one is configured |
+//! | SPI1 | ICM-42688-P or BMI088, where one is configured |
 //! | USART3 | KVH DSP-1760 |
 //! | USART2 | SLCAN |
 //! | USART6 | service line: SLCAN with diagnosis alone |

@@ -1,4 +1,4 @@
-//! SPI1 (RM0090 28) with one sensor on it, polled.
+//! SPI1 (RM0090 28) with the chip selects of one sensor, polled.
 //!
 //! Every wait has a limit, so a transaction ends whatever the controller does.
 #![allow(unsafe_code, reason = "raw register values; each block says why it is sound")]
@@ -10,26 +10,27 @@ use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
 /// Polls before a byte times out. A byte takes 1.5 us, about 20 polls.
 const POLLS: u32 = 1_000;
 
-/// A handle of the controller, which [`start`] has initialised. Its holder is the only user of the controller.
+/// A handle of the controller, which [`start`] has initialised, with a chip select. Whoever holds the handles is the only
+/// user of the controller.
 #[derive(Debug, Clone, Copy)]
 pub struct Spi {
     select: Pin,
 }
 
-/// Starts mode 3 at 84 / 16 = 5.25 MHz (1 MHz on the internal oscillator); an ICM-42688-P allows 24 MHz. Pins are the
-/// clock, data in, data out, and the sensor's chip select.
-pub fn start(spi: &pac::SPI1, [clock, input, output, select]: [Pin; 4]) -> Spi {
+/// Starts mode 3 at 84 / 16 = 5.25 MHz (1 MHz on the internal oscillator); an ICM-42688-P allows 24 MHz, a
+/// BMI088 10 MHz. Pins are the clock, data in, data out, and two chip selects.
+pub fn start(spi: &pac::SPI1, [clock, input, output, selects @ ..]: [Pin; 5]) -> [Spi; 2] {
     // At low speed the edges are too slow for 5 MHz, and the last bit of a transfer can be corrupted
     // (ES0182 2.11).
     for pin in [clock, input, output] {
         pin.alternate(pins::SPI_1, Speed::Fast);
     }
-    select.output(true);
+    selects.iter().for_each(|select| select.output(true));
     spi.cr1().write(|w| {
         w.mstr().master().br().div16().cpol().idle_high().cpha().second_edge();
         w.ssm().enabled().ssi().slave_not_selected().spe().enabled()
     });
-    Spi { select }
+    selects.map(|select| Spi { select })
 }
 
 impl Spi {
