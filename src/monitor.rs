@@ -37,6 +37,8 @@ pub const HOLD: u8 = 5;
 
 /// Rate at which arrivals may become later without being late, parts of 16: a sensor's clock that is 6 % slow.
 const CREEP: u64 = 16;
+/// Part of the time by which the slowest clock that is used falls behind: 4 %.
+const SLOW: u64 = 25;
 /// Arrivals that vary by less are in time, microseconds.
 const IN_TIME_US: u64 = 5_000;
 /// Late arrivals are a new normal after this time, microseconds.
@@ -47,12 +49,13 @@ const PATIENCE_US: u64 = 1_000_000;
 struct Arrivals {
     /// Time stamp of the newest sample, and the least time from stamp to arrival, which creeps up.
     newest: Option<(u64, i64)>,
-    late_since: Option<u64>,
+    /// Arrival of the first late sample, and the time stamp of the one before.
+    late_since: Option<(u64, u64)>,
 }
 
 impl Arrivals {
     /// Returns by how many microseconds a sample arrives later than the least late ones, and what the sensor's clock has lost
-    /// if they all do for a second: a counter that has wrapped unseen.
+    /// if they all do for a second, by more than a slow clock explains: a counter that has wrapped unseen.
     fn late(&mut self, time: Micros, now: Micros) -> (u64, u64) {
         let measured = (now.0 as i64).wrapping_sub(time.0 as i64);
         let (last, before) = self.newest.unwrap_or((time.0, measured));
@@ -60,11 +63,15 @@ impl Arrivals {
         let creep = if self.late_since.is_some() { 0 } else { time.0.saturating_sub(last) / CREEP };
         let expected = before.saturating_add(creep as i64);
         let late = measured.saturating_sub(expected).max(0) as u64;
-        let since = if late > TIMEOUT_US { Some(*self.late_since.get_or_insert(now.0)) } else { None };
-        self.late_since = since;
-        if since.is_some_and(|since| now.0.saturating_sub(since) > PATIENCE_US) {
+        self.late_since =
+            if late > TIMEOUT_US { Some(self.late_since.unwrap_or((now.0, last))) } else { None };
+        if let Some((since, stamp)) = self.late_since
+            && now.0.saturating_sub(since) > PATIENCE_US
+        {
             (self.newest, self.late_since) = (Some((time.0, measured)), None);
-            return (0, late);
+            // A stall of seconds, in which a slow clock has fallen behind, loses nothing.
+            let is_slow = late <= time.0.saturating_sub(stamp) / SLOW;
+            return (0, if is_slow { 0 } else { late });
         }
         self.newest = Some((time.0, expected.min(measured)));
         (late, 0)

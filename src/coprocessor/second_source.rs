@@ -14,10 +14,11 @@
 //! contradicts no other, and is doubted at once.
 
 use crate::sample::{RATE_HZ, WheelSample};
-use serde::{Deserialize, Serialize};
 
 /// What the sources showed in the newest second in which one was alone: means, each `None` for a source that was silent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Contradiction {
     /// Such seconds since the start.
     pub seconds: u32,
@@ -184,7 +185,8 @@ impl SecondSource {
             }
         };
         if alone.contains(&true) {
-            let code = |value: f32| libm::roundf(100.0 * value) as i16;
+            // The largest code is that of a silent source on the bus.
+            let code = |value: f32| (libm::roundf(100.0 * value) as i16).min(i16::MAX - 1);
             self.contradiction = Contradiction {
                 seconds: self.contradiction.seconds.saturating_add(1),
                 gyros: gyros.map(|rate| rate.map(|rate| code(rate.to_degrees()))),

@@ -86,6 +86,19 @@ fn a_gap_that_the_stamps_do_not_show_is_found_by_the_arrivals() {
     assert_eq!(coprocessor.pipeline().counters().missing, 7);
 }
 
+/// The sensor's clock is 3 % slow, and the board reads nothing for four seconds: the samples wait.
+#[test]
+fn a_stall_with_a_slow_clock_loses_nothing() {
+    let (mut coprocessor, mut noise) = fed(400);
+    for tick in 400..1_400 {
+        let taken = |tick| at(400).0 + (tick - 400) * (PERIOD_US + 300);
+        let now = if (500..900).contains(&tick) { taken(900) } else { taken(tick) };
+        let sample = ImuSample { time: Micros(tick * PERIOD_US), ..idling(tick, 0.001, &mut noise) };
+        coprocessor.imu(sample, Micros(now), &mut ()).expect("in order");
+    }
+    assert_eq!(coprocessor.pipeline().counters().missing, 0);
+}
+
 #[test]
 fn a_part_has_time_to_start() {
     let mut coprocessor = coprocessor();

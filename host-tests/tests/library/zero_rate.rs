@@ -330,7 +330,7 @@ fn one_steady_second_contradicts_the_bias_and_one_in_which_a_turn_begins_does_no
 
 /// A bias that steps while the vehicle stands: for two seconds the judge sees the step, and no standstill.
 #[test]
-fn a_turn_at_a_standstill_without_wheels_is_expected_until_the_vehicle_has_driven_off() {
+fn a_turn_at_a_standstill_without_wheels_is_expected_for_two_seconds_or_until_the_vehicle_drives_off() {
     let quiet = Standing { source: StandstillSource::Inertial, probability: 0.98, ..Standing::UNKNOWN };
     let pass = |zero_rate: &mut ZeroRate, left: f64, standing, samples: u32| {
         for _ in 0..samples {

@@ -3,6 +3,7 @@
 
 use super::access::locked;
 use super::{Board, sample, start};
+use gyronet::coprocessor::Contradiction;
 use gyronet::health::{Faults, Quality, Status};
 use gyronet::model::weights;
 use gyronet::sample::{Standstill, WheelSample};
@@ -41,10 +42,14 @@ impl Bench {
 
     /// Asks over frames, a millisecond each turn.
     pub fn ask(&mut self, request: &[u8]) -> Option<Vec<u8>> {
+        self.ask_with(&AllCounters::default(), request)
+    }
+
+    fn ask_with(&mut self, counters: &AllCounters, request: &[u8]) -> Option<Vec<u8>> {
         let Self { server, board, now, tester, seeds } = self;
         tester.ask(request, 400, |frames| {
             frames.iter().for_each(|data| server.receive(data, *now));
-            server.poll(board, &AllCounters::default(), *now, || seeds.pop());
+            server.poll(board, counters, *now, || seeds.pop());
             *now += 1;
             std::iter::from_fn(|| server.next_frame(*now)).collect()
         })
@@ -609,6 +614,22 @@ fn the_list_of_identifiers_is_that_of_the_server_and_of_the_description() {
         assert!(data.contains(&multi) || data.contains(&single), "{id:04X} {name}");
     }
     assert_eq!(data.matches("\n  0x").count(), IDENTIFIERS.len());
+}
+
+#[test]
+fn a_contradiction_is_read_with_its_numbers() {
+    let (_, mut bench) = bench();
+    let mut read = |contradiction| {
+        let counters = AllCounters { contradiction, ..AllCounters::default() };
+        bench.ask_with(&counters, &[0x22, 1, 0x1B]).expect("an answer")[3..].to_vec()
+    };
+    let seen = Contradiction { seconds: 7, gyros: [Some(500), None], lateral: Some(-100), wheels: None };
+    let none = [0x7F, 0xFF];
+    assert_eq!(read(seen), [&[0, 0, 0, 7, 0x01, 0xF4], &none[..], &[0xFF, 0x9C], &none, &none].concat());
+    let seen =
+        Contradiction { gyros: [None, Some(-2)], wheels: Some([1500, 11]), ..Contradiction::default() };
+    let numbers = [&none[..], &[0xFF, 0xFE], &none, &[0x05, 0xDC, 0, 11]].concat();
+    assert_eq!(read(seen), [&[0; 4], &numbers[..]].concat());
 }
 
 #[test]

@@ -1,0 +1,142 @@
+//! Flash contents at the start, in order or damaged: the board runs on, and the bus, the log and the
+//! service line report it from the first frame on.
+
+use crate::common::{self, IMU, SAMPLE, START, frames};
+use crate::service::{self, on_bus, on_line};
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::can::config::{Settings, YawSettings};
+use gyronet::can::yaw::{AngleMessage, FOG_IDS, Quality, RateMessage};
+use gyronet::health::Faults;
+use gyronet::service::event::EventKind;
+use gyronet::service::message::{FlashState, Info, Origin, Refusal};
+use gyronet::store::layout::{FLASH_BASE, SLOT_SIZE, STORE};
+use gyronet::store::slots::{SlotError, WeightSource};
+use gyronet::store::{Configuration, FlashFault, FogPart, Slot, StoreError};
+use gyronet_host_tests::board::{At, Board};
+use gyronet_host_tests::inputs;
+use gyronet_host_tests::stored::{Stored, other_weights};
+use gyronet_tools::client::device::error::DeviceError;
+use std::time::Duration;
+
+const SAMPLES: usize = 20;
+const RATE: u16 = 0x1A0;
+/// Time from power-on until the image listens, where its start has mended a sector of the records.
+const MENDED: Duration = START.saturating_add(Duration::from_millis(300));
+
+/// A board that has run for [`SAMPLES`] with this flash.
+struct Started {
+    board: Board,
+    frames: Vec<DataFrame>,
+    info: Info,
+    events: Vec<EventKind>,
+}
+
+impl Started {
+    fn with(test: &str, stored: &Stored, prepare: impl FnOnce(&mut Board)) -> Option<Self> {
+        let mut board = common::unpowered(test)?;
+        stored.write_to(&mut board);
+        prepare(&mut board);
+        board.power_on();
+        common::send(&mut board, &common::drive(SAMPLES), MENDED);
+        board.run(MENDED + SAMPLE * SAMPLES as u32);
+        let frames = frames(&board.can_frames());
+        let info = service::info(&mut board);
+        let page = on_line(&mut board).log(0).expect("a response");
+        let events = page.events.iter().map(|event| event.kind).collect();
+        Some(Self { board, frames, info, events })
+    }
+
+    fn of(&self, id: u16) -> impl Iterator<Item = &[u8]> {
+        let id = Id::Standard(StandardId::new(id).expect("11 bits"));
+        self.frames.iter().filter(move |frame| frame.id() == id).map(Frame::data)
+    }
+
+    /// Returns whether the messages report that something stored is damaged: from the first one on, or never.
+    fn flagged(&self) -> bool {
+        let faults = self.of(RATE + 1).map(|data| AngleMessage::parse(data).expect("eight bytes").faults);
+        let flags: Vec<bool> = faults.map(|faults| faults.0 & Faults::STORED.0 != 0).collect();
+        assert!(flags.len() >= SAMPLES - 1 && flags.windows(2).all(|pair| pair[0] == pair[1]), "{flags:?}");
+        flags[0]
+    }
+}
+
+#[test]
+fn a_stored_configuration_takes_effect() {
+    const OTHER: u16 = 0x2B0;
+    let yaw = Settings::DEFAULT.yaw.map(|yaw| YawSettings { ids: [OTHER, OTHER + 1, OTHER + 2], ..yaw });
+    let configuration = Configuration {
+        can: Settings { yaw, bosch: None, ..Settings::DEFAULT },
+        fog: Some(FogPart::Dsp1760),
+        ..Configuration::DEFAULT
+    };
+    let stored = Stored::default().record(&configuration);
+    let Some(started) = Started::with("a_stored_configuration_takes_effect", &stored, |_| ()) else { return };
+    assert_eq!(started.info.configuration, Origin::Stored);
+    assert_eq!(started.of(RATE).count(), 0);
+    assert!(started.of(OTHER).count() >= SAMPLES - 1);
+    // No byte of the fibre-optic gyro has come: the bus says so every 10 ms.
+    let missed = started.of(FOG_IDS[0]).map(|data| RateMessage::parse(data).expect("a rate").quality);
+    let missed: Vec<Quality> = missed.collect();
+    assert!(missed.len() >= SAMPLES - 2 && missed.iter().all(|is| *is == Quality::Unusable), "{missed:?}");
+}
+
+/// What a start makes of each damage is in `library::service::configuration` and `weights`; here the image reports it.
+#[test]
+fn a_damaged_configuration_and_a_damaged_slot_give_way_and_are_reported() {
+    let [a, b] = [other_weights(0x10), other_weights(0x20)];
+    let stored = Stored::default().record(&Configuration::DEFAULT).weights(Slot::A, &a).weights(Slot::B, &b);
+    let inside = Slot::B.offset() + SLOT_SIZE as u32 / 2;
+    let stored = stored.damaged(STORE.start + 20, 4).damaged(inside, 0x10);
+    let test = "a_damaged_configuration_and_a_damaged_slot_give_way_and_are_reported";
+    let Some(Started { info, events, .. }) = Started::with(test, &stored, |_| ()).inspect(|started| {
+        assert!(started.flagged());
+    }) else {
+        return;
+    };
+    assert_eq!((info.flash, info.weights), (FlashState::Damaged, WeightSource::Slot(Slot::A)));
+    assert_ne!(info.configuration, Origin::Stored);
+    assert!(matches!(info.refused_slots, [None, Some(SlotError::Blob(_))]), "{:?}", info.refused_slots);
+    assert!(events.contains(&EventKind::RecordsDamaged), "{events:?}");
+    assert!(events.iter().any(|event| matches!(event, EventKind::SlotRefused(Slot::B, _))), "{events:?}");
+}
+
+/// A controller that a reset does not lock is a fault: what is stored is read, nothing is written, and the gate of the
+/// standstill holds as ever.
+#[test]
+fn nothing_is_written_with_an_unlocked_flash_controller() {
+    let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
+    let stored = Stored::default().record(&configuration);
+    let unlocked = |board: &mut Board| board.configure("FLASH.starts_unlocked", true);
+    let started = Started::with("nothing_is_written_with_an_unlocked_flash_controller", &stored, unlocked);
+    let Some(mut started) = started else { return };
+    assert!(started.flagged());
+    assert_eq!((started.info.configuration, started.info.writable), (Origin::Stored, false));
+    let event = EventKind::FlashRefused(FlashFault::Unlocked);
+    assert!(started.events.contains(&event), "{:?}", started.events);
+    let board = &mut started.board;
+    let records = |board: &mut Board| board.read(At::Address(FLASH_BASE + STORE.start), STORE.len());
+    let before = records(board);
+    let refused = |result| match result {
+        Err(DeviceError::Refused(refusal)) => refusal,
+        other => panic!("{other:?}"),
+    };
+    let stores = on_bus(board).set_configuration(&Configuration::DEFAULT);
+    assert_eq!(refused(stores), Refusal::Store(StoreError::NoFlash));
+    // The wheels turn.
+    let turning = inputs::wheels(20.0);
+    let now = board.counts().time;
+    for (k, sample) in common::drive(100).iter().enumerate() {
+        board.send_at(IMU, sample, now + SAMPLE * k as u32);
+        board.can_send_at(&turning, now + SAMPLE * k as u32);
+    }
+    board.run(Duration::from_millis(900));
+    match on_bus(board).restart() {
+        Err(DeviceError::Refused(Refusal::Moving)) => {}
+        other => panic!("{other:?}"),
+    }
+    assert!(records(board) == before);
+    let events = board.events();
+    let flash: Vec<_> = events.iter().filter(|event| event.kind.starts_with("flash")).collect();
+    assert!(flash.is_empty(), "{flash:?}");
+}
