@@ -40,12 +40,12 @@ const COURSE: u16 = 0x0119;
 const CONTRADICTION: u16 = 0x011B;
 /// Data identifier of the firmware and of the head of its update.
 pub const FIRMWARE: u16 = 0x011A;
-pub const COUNTERS: [u8; 9] = {
+/// The request for the counters: one frame.
+pub const COUNTERS: [u8; 7] = {
     let [a, b] = PIPELINE_COUNTERS.to_be_bytes();
     let [c, d] = INPUT_COUNTERS.to_be_bytes();
     let [e, f] = FOG_COUNTERS.to_be_bytes();
-    let [g, h] = CONTRADICTION.to_be_bytes();
-    [0x22, a, b, c, d, e, f, g, h]
+    [0x22, a, b, c, d, e, f]
 };
 pub const USE_DOWNLOAD: u16 = 0xFF01;
 /// The other routines.
@@ -171,7 +171,9 @@ impl<B: Bus> Device<B> {
     }
 
     pub fn counters(&mut self) -> Result<AllCounters> {
-        counters(&self.ask(&COUNTERS)?)
+        let counters = counters(&self.ask(&COUNTERS)?)?;
+        let contradiction = contradiction(&self.read(CONTRADICTION)?).ok_or(DeviceError::Mismatch)?;
+        Ok(AllCounters { contradiction, ..counters })
     }
 
     /// Returns the counts of requests that were refused for lack of access since the board started.
@@ -235,7 +237,7 @@ fn versioned<R: Record>(bytes: &[u8]) -> Result<R> {
     }
 }
 
-/// Decodes all counters from a response to [`COUNTERS`] without its first byte.
+/// Decodes the counters from a response to [`COUNTERS`] without its first byte; a contradiction is not among them.
 pub fn counters(response: &[u8]) -> Result<AllCounters> {
     let mut words = Words(response);
     words.identifier(PIPELINE_COUNTERS)?;
@@ -245,9 +247,11 @@ pub fn counters(response: &[u8]) -> Result<AllCounters> {
         (words.fields()?, words.fields()?, words.fields()?);
     words.identifier(FOG_COUNTERS)?;
     let fog: FogCounters = words.fields()?;
-    words.identifier(CONTRADICTION)?;
-    let contradiction = contradiction(words.0).ok_or(DeviceError::Mismatch)?;
-    Ok(AllCounters { pipeline, watch, lines, fog, inputs, contradiction })
+    if words.0.is_empty() {
+        Ok(AllCounters { pipeline, watch, lines, fog, inputs, ..AllCounters::default() })
+    } else {
+        Err(DeviceError::Mismatch)
+    }
 }
 
 /// Decodes a count and five codes, of which the largest says that there is none.
@@ -306,25 +310,27 @@ mod tests {
             &words(100, 19),
             &FOG_COUNTERS.to_be_bytes(),
             &words(200, 7),
-            &CONTRADICTION.to_be_bytes(),
-            &[0, 0, 0, 7, 0x01, 0xF4, 0x7F, 0xFF, 0xFF, 0x9C, 0x05, 0xDC, 0x00, 0x0B],
         ]
         .concat();
         let all = counters(&response).expect("whole");
         assert_eq!((all.pipeline.samples, all.pipeline.moved_mounts), (0, 13));
         assert_eq!((all.watch.silences, all.inputs.imu_errors, all.lines.unsent), (100, 105, 114));
         assert_eq!((all.lines.frames_lost, all.fog.samples, all.fog.contradicted), (118, 200, 206));
-        assert_eq!(
-            all.contradiction,
-            Contradiction {
-                seconds: 7,
-                gyros: [Some(500), None],
-                lateral: Some(-100),
-                wheels: Some([1500, 11])
-            }
-        );
         for length in 0..response.len() {
             assert!(counters(&response[..length]).is_err(), "{length}");
         }
+    }
+
+    #[test]
+    fn a_contradiction_has_five_numbers_or_none() {
+        let bytes = [0, 0, 0, 7, 0x01, 0xF4, 0x7F, 0xFF, 0xFF, 0x9C, 0x05, 0xDC, 0x00, 0x0B];
+        let expected = Contradiction {
+            seconds: 7,
+            gyros: [Some(500), None],
+            lateral: Some(-100),
+            wheels: Some([1500, 11]),
+        };
+        assert_eq!(contradiction(&bytes), Some(expected));
+        assert_eq!(contradiction(&bytes[..13]), None);
     }
 }
