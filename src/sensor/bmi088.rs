@@ -177,10 +177,15 @@ impl<SPI: SpiDevice> Bmi088<SPI> {
     /// Returns the acceleration with `newer` ones behind it, or the one before, of the frames that wait.
     fn force(&mut self, waiting: usize, newer: u8) -> Result<Option<[i16; 3]>, Bmi088Error<SPI::Error>> {
         self.force = self.force.map(|(force, used)| (force, used.saturating_add(1)));
-        for _ in 0..waiting.saturating_sub(newer.into()).min(MAX_FRAMES) {
+        let older = waiting.saturating_sub(newer.into());
+        for _ in 0..older.min(MAX_FRAMES) {
             if let Some(force) = frame::acceleration(&self.read(Die::Accelerometer, reg::ACC_FIFO_DATA)?) {
                 self.force = Some((force, 0));
             }
+        }
+        // A FIFO that was not emptied in time: these are old.
+        if older > MAX_FRAMES {
+            self.force = None;
         }
         Ok(self.force.filter(|(_, used)| *used <= OLDEST).map(|(force, _)| force))
     }

@@ -1,5 +1,5 @@
 //! The registers of the BMI088 that the driver uses, and the values that it writes (BST-BMI088-DS001). Only code was a
-//! witness that B0 empties the accelerometer's FIFO, and that bit 7 of the gyro's bandwidth reads as 1 (PX4, ArduPilot).
+//! witness that bit 7 of the gyro's bandwidth reads as 1 (PX4, ArduPilot).
 //!
 //! Both dies deliver 200 samples a second with the narrowest filter for it, -3 dB at 23 Hz (gyro) and 20 Hz. Vibration
 //! below 177 Hz is not aliased into the gyro's band; the mean over 10 ms ([`crate::align`]) has a null at 100 Hz.
