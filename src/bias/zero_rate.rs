@@ -54,8 +54,9 @@ const STEADY: f32 = 9.0;
 const BOARDING: f32 = 1e-3;
 /// Samples for which a standstill that the gyro has contradicted is not believed: a slide may turn now and then.
 const DISTRUSTED: u32 = 10 * RATE_HZ;
-/// Samples for which a turn at a standstill without wheels stays part of sigma, unless the vehicle drives off: the judge's
-/// window of two seconds contains the step of a bias and shows no standstill; then the seconds of the next one count.
+/// Samples for which a turn at a standstill without wheels stays part of sigma after that standstill, unless the vehicle
+/// drives off: the judge's window of two seconds contains the step of a bias and shows no standstill; then the seconds of the
+/// next one count.
 const TURNING: u32 = 2 * RATE_HZ;
 /// Says how a whole second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -215,7 +216,7 @@ impl ZeroRate {
         let (turns, (largest, left)) = (self.turns(), self.turning);
         self.turning = if turns > 0.0 {
             (largest.max(turns), TURNING)
-        } else if left == 0 {
+        } else if self.standing.is_likely() || left == 0 {
             (0.0, 0)
         } else {
             (largest, left - 1)
