@@ -147,7 +147,7 @@ impl Buses {
     }
 
     fn mocks(&self) -> [Mock<u8>; 2] {
-        self.0.each_ref().map(|seen| Mock::new(seen))
+        self.0.each_ref().map(Mock::new)
     }
 
     /// Starts the driver, which must do all that is expected.
@@ -452,7 +452,7 @@ fn accelerations_from_before_an_overflow_go_with_no_rate() {
 fn taken(sample: &ImuSample) -> [f64; 2] {
     let rate = sample.angular_rate[0].rad_per_sec().to_degrees() * 131.072;
     let force = sample.specific_force[0].metre_per_sec2() * (32_768.0 / 12.0 / 9.806_65);
-    [rate, force].map(|count| f64::from(count.round()) / 10.0)
+    [rate, force].map(|count| count.round() / 10.0)
 }
 
 fn wrapped(ms: f64) -> f64 {
