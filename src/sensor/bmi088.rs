@@ -17,11 +17,11 @@
 //! | a difference of 2 % | every 50th force is used twice or left out |
 //! | n frames behind | n times the difference more: 10 ms after a stall of 0.5 s at 2 % |
 //!
-//! The rate and its time are the gyro's alone. A force that is older than [`OLDEST`] frames is none
+//! Rate and time come from the gyro alone. A force that is older than [`OLDEST`] frames is not used
 //! ([`Bmi088Error::NoReading`]).
 //!
 //! **A full FIFO** (100 frames of the gyro, 0.5 s) is emptied, with [`Bmi088Error::Overflow`]. The accelerometer's time,
-//! which runs on, counts the lost frames: the gap in the time stamps is right within the difference of the clocks.
+//! which runs on, counts the lost frames: each such gap is right within half a frame and the difference of the clocks.
 //! The gyro's FIFO stops when it is full, since in the mode that drops the oldest its axes have been seen to change places
 //! (ArduPilot's history; no data sheet says so).
 

@@ -140,17 +140,17 @@ pub const IDENTIFIERS: [Identifier; 29] = [
         "1, 2, 2, 4, 4, 4, 1",
         "gain of the yaw gyro by courses: 0 unknown, 1 coarse, 2 fine, 3 they contradict the gyro; gain and sigma, 1e-5; courses used, refused, and starts of the heading after contradictions; the newest course: 0 used, 1 far from the gyro's heading, 2 the same in a turn, 3 the vehicle stands",
     ),
-    read_only(
-        0x011B,
-        "contradiction",
-        "4, 2, 2, 2, 2, 2",
-        "seconds in which wheels, accelerometer or another gyro contradicted a gyro or the wheels; of the newest: inertial and fibre-optic rate, 0.01 deg/s, lateral force to the left, 0.01 m/s^2, speed, right wheel less left, 0.01 m/s; 7FFF for none",
-    ),
     writable(
         0x011A,
         "firmware",
         "1, 1",
         "slot of the firmware that runs: 0 A, 1 B, FF none; 0 not updatable, 1 confirmed, 2 on trial, 3 the update was rolled back, 4 it is damaged. Written: the head of an update",
+    ),
+    read_only(
+        0x011B,
+        "contradiction",
+        "4, 2, 2, 2, 2, 2",
+        "seconds in which wheels, accelerometer or another gyro contradicted a gyro or the wheels; of the newest: inertial and fibre-optic rate, 0.01 deg/s, lateral force to the left, 0.01 m/s^2, speed, right wheel less left, 0.01 m/s; 7FFF for none",
     ),
 ];
 
