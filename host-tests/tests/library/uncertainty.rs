@@ -146,6 +146,13 @@ fn a_turn_on_a_bank_is_as_uncertain_as_what_its_axis_misses() {
     let due = root(&[3e-4, 0.01 * 0.5, 0.02 * 0.1, 0.02 * 0.5]);
     let found = uncertainty.sigma(Origin::Gyro, 0.0).rad_per_sec();
     assert!((found / due - 1.0).abs() < 1e-5, "{found} is not {due}");
+    // Also where the turn began before the newest of the parts that a minute is counted in.
+    turn(&mut uncertainty, 30.0, [0.0, 0.1, 0.5, 0.0]);
+    for _ in 0..10 {
+        turn(&mut uncertainty, 1.0, [0.0, 0.1, 0.5, 0.0]);
+        let tilted = f64::from(uncertainty.tilted());
+        assert!((tilted - 0.02).abs() < 1e-5, "{tilted}: 1 - cos of 0.2 rad");
+    }
 }
 
 /// The angles that many gaps leave out of one turn add up.

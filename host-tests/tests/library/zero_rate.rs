@@ -4,7 +4,7 @@ use gyronet::bias::{ZeroRate, ZeroRateConfig, ZeroRateOutcome};
 use gyronet::estimate::YawEstimate;
 use gyronet::health::{Faults, Status};
 use gyronet::pipeline::{BoardState, Output, Pipeline, PipelineConfig};
-use gyronet::sample::{ImuSample, RATE_HZ, Standstill, WHEELS, WheelSample};
+use gyronet::sample::{ImuSample, RATE_HZ, Standstill, Validity, WHEELS, WheelSample};
 use gyronet::standstill::{Standing, StandstillSource};
 use gyronet::units::{AngularRate, WheelSpeed};
 use gyronet_host_tests::noise::Noise;
@@ -347,6 +347,38 @@ fn a_turn_at_a_standstill_without_wheels_is_expected_for_two_seconds_or_until_th
     driven.moves();
     assert!(driven.sigma() < 3e-4);
     assert!(pass(&mut zero_rate, 0.01, Standing::UNKNOWN, 10) < 3e-4);
+}
+
+/// The reading at rest before a vehicle drives off is its bias. Neither a saturated reading nor creeping, in which the wheels
+/// turn and nothing else shows, is part of it.
+#[test]
+fn only_valid_readings_of_standing_wheels_are_a_reading_at_rest() {
+    let bias_after = |validity: Validity, speed: WheelSpeed, added: f64| {
+        let (mut noise, mut pipeline) = (Noise::new(3), Pipeline::new(PipelineConfig::DEFAULT));
+        for tick in 0..2_000 {
+            let mut sample = parked(tick, &mut noise);
+            if (1_000..1_700).contains(&tick) {
+                sample.angular_rate[2].0 += rate(added).0;
+                sample.validity = if tick % 10 == 0 { validity } else { Validity::Good };
+            }
+            let speed = match tick {
+                ..1_000 => WheelSpeed(0),
+                ..1_700 => speed,
+                _ => WheelSpeed(5 << WheelSpeed::FRACTION_BITS),
+            };
+            let standstill = if speed.0 == 0 { Standstill::Unknown } else { Standstill::Moving };
+            let report = WheelSample { time: sample.time, speeds: [Some(speed); WHEELS], standstill };
+            pipeline.correct(sample, Some(&report), &BoardState::GOOD).expect("a place on the grid");
+        }
+        pipeline.bias().rad_per_sec()
+    };
+    let half = WheelSpeed(1 << (WheelSpeed::FRACTION_BITS - 1));
+    let rest = bias_after(Validity::Good, WheelSpeed(0), 0.004);
+    assert!((rest - 0.004).abs() < 2e-4, "a deck that turned until then: {rest}");
+    for (validity, speed) in [(Validity::Saturated, WheelSpeed(0)), (Validity::Good, half)] {
+        let bias = bias_after(validity, speed, 0.004);
+        assert!(bias.abs() < 2e-4, "{validity:?} at {speed:?}: {bias}");
+    }
 }
 
 #[test]
