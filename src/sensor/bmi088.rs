@@ -2,7 +2,8 @@
 //!
 //! [`frame`] parses what the dies send without I/O, `registers` lists their registers, and this file does the SPI transfers.
 //! Every wait is a bounded number of [`DelayNs`] delays. Each call for a sample also reads back one register of the
-//! configuration, so that a reset or a flipped bit in either die is detected within [`SETTINGS`] calls.
+//! configuration, or the gyro's report of its own drive, so that a reset, a flipped bit or a gyro that fails is detected
+//! within [`CHECKS`] calls.
 //!
 //! # Two dies on one time line
 //!
@@ -38,8 +39,8 @@ use embedded_hal::spi::{Operation, SpiDevice};
 use frame::{FORCE_FRAME, State};
 use registers::{self as reg, Setting};
 
-/// Number of registers that are set, and checked one after the other.
-pub const SETTINGS: usize = reg::SETTINGS.len();
+/// Number of registers that are checked one after the other: those that are set, and the state of the gyro's drive.
+pub const CHECKS: usize = reg::SETTINGS.len() + 1;
 /// Samples after which the newest force is too old to go with a rate.
 pub const OLDEST: u8 = 4;
 /// Time in which both dies have restarted, ms: 30 of the gyro, 1 of the accelerometer.
@@ -82,7 +83,7 @@ pub struct Bmi088<SPI> {
     next_check: usize,
     /// Number of the newest frame of the gyro.
     number: u64,
-    /// Number of a frame that was read when it was the only one, and the accelerometer's time then.
+    /// Number of a frame that was the newest one when it was read, and the accelerometer's time then.
     mark: Option<(u64, u32)>,
     has_lost: bool,
     /// Newest acceleration, and the samples that it has been used for.
@@ -123,11 +124,12 @@ impl<SPI: SpiDevice> Bmi088<SPI> {
         }
         part.set(reg::SETTINGS, delay)?;
         delay.delay_ms(SETTLE_MS);
-        for _ in 0..SETTINGS {
-            part.check_next_setting()?;
+        for _ in 0..CHECKS {
+            part.check_next()?;
         }
         // The accelerations of the wait stay, so that the first rate has one.
         part.empty_gyro()?;
+        part.mark = Some((0, part.state()?.time));
         Ok(part)
     }
 
@@ -136,12 +138,12 @@ impl<SPI: SpiDevice> Bmi088<SPI> {
         [self.accelerometer, self.gyro]
     }
 
-    /// Returns the oldest sample in the FIFO, if any, and checks one setting.
+    /// Returns the oldest sample in the FIFO, if any, and checks one register.
     ///
     /// # Errors
-    /// `Bus`, `Setting`, `NoReading` or `Overflow`.
+    /// `Bus`, `Setting`, `NoReading` or `Overflow`; `SelfTest` if the gyro's drive is not in order.
     pub fn next_sample(&mut self) -> Result<Option<ImuSample>, Bmi088Error<SPI::Error>> {
-        self.check_next_setting()?;
+        self.check_next()?;
         let [status] = self.read(Die::Gyro, reg::GYRO_FIFO_STATUS)?;
         if status & reg::OVERRUN != 0 {
             self.has_lost = true;
@@ -150,7 +152,7 @@ impl<SPI: SpiDevice> Bmi088<SPI> {
             return Err(Bmi088Error::Overflow);
         }
         let Some(newer) = status.checked_sub(1) else { return Ok(None) };
-        let state = State::parse(&self.read(Die::Accelerometer, reg::ACC_SENSORTIME)?);
+        let state = self.state()?;
         let rate = frame::vector(&self.read(Die::Gyro, reg::GYRO_FIFO_DATA)?);
         self.count(newer, state.time);
         let force = self.force(state.bytes / FORCE_FRAME, newer)?.ok_or(Bmi088Error::NoReading)?;
@@ -190,11 +192,19 @@ impl<SPI: SpiDevice> Bmi088<SPI> {
         Ok(self.force.filter(|(_, used)| *used <= OLDEST).map(|(force, _)| force))
     }
 
-    /// Checks one register of the configuration; each call checks the next one.
-    fn check_next_setting(&mut self) -> Result<(), Bmi088Error<SPI::Error>> {
-        let at = self.next_check % SETTINGS;
+    fn state(&mut self) -> Result<State, Bmi088Error<SPI::Error>> {
+        Ok(State::parse(&self.read(Die::Accelerometer, reg::ACC_SENSORTIME)?))
+    }
+
+    /// Checks one register; each call checks the next one.
+    fn check_next(&mut self) -> Result<(), Bmi088Error<SPI::Error>> {
+        let at = self.next_check % CHECKS;
         self.next_check = at + 1;
-        let Some(&(die, address, expected)) = reg::SETTINGS.get(at) else { return Ok(()) };
+        let Some(&(die, address, expected)) = reg::SETTINGS.get(at) else {
+            let [state] = self.read(Die::Gyro, reg::GYRO_SELF_TEST)?;
+            let is_driven = state & reg::RATE_OK != 0;
+            return if is_driven { Ok(()) } else { Err(Bmi088Error::SelfTest { die: Die::Gyro }) };
+        };
         let [got] = self.read(die, address)?;
         if got == expected { Ok(()) } else { Err(Bmi088Error::Setting { die, address, got, expected }) }
     }

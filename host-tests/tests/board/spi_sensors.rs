@@ -243,8 +243,14 @@ fn part_that_falls_silent_comes_back(test: &str, fitted: &Fitted) {
     let turning = back.iter().rev().take(5).map(|(_, rate)| rate.expect("a rate"));
     turning.for_each(|rate| assert!((rate - 10.0).abs() < 0.2, "{rate} deg/s"));
     assert_eq!(service::info(&mut board).sensor, None);
+    // It answers and measures nothing.
+    board.configure("SPI1.imu_stopped", true);
+    board.run(SECOND / 2);
+    assert_eq!(known(&rates(&mut board).split_off(10)), 0);
+    board.run(SECOND * 3 / 2 + fitted.up[0] + 40 * MS);
+    assert!(rates(&mut board).iter().rev().take(5).all(|(_, rate)| rate.is_some()));
     let AllCounters { pipeline, watch, .. } = common::counters(&mut board);
-    assert_eq!(watch.silences, 1);
+    assert_eq!(watch.silences, 2);
     assert_eq!(pipeline.misplaced, 0, "every sample has a place on the grid");
 }
 
@@ -370,7 +376,7 @@ fn what_a_standstill_has_shown_corrects_the_next_start_before_it_stands(test: &s
 fn failed_self_test_is_named_and_is_tried_again() {
     const TEST: &str = "bmi088_failed_self_test_is_named_and_is_tried_again";
     let Some(mut board) = equipped(TEST, &BMI088, Configuration::DEFAULT) else { return };
-    for die in ["SPI1.imu_self_test", "SPI1.imu_acc_self_test"] {
+    for die in ["SPI1.imu_self_test", "SPI1.imu_acc_self_test", "SPI1.imu_drive"] {
         board.configure(die, false);
         start(&mut board, &BMI088);
         assert_eq!(service::info(&mut board).sensor, Some(SensorFault::SelfTest), "{die}");

@@ -6,7 +6,7 @@ use embedded_hal_mock::eh1::spi::{Mock, Transaction};
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::sensor::Source;
 use gyronet::sensor::bmi088::frame::{self, State};
-use gyronet::sensor::bmi088::{Bmi088, Bmi088Error, Die, OLDEST, SETTINGS};
+use gyronet::sensor::bmi088::{Bmi088, Bmi088Error, CHECKS, Die, OLDEST};
 use gyronet::units::{CentiCelsius, Micros};
 use std::cell::RefCell;
 use std::convert::Infallible;
@@ -136,7 +136,9 @@ impl Buses {
     fn configure(&mut self) {
         REGISTERS.iter().for_each(|(die, address, value)| self.write(*die, *address, *value));
         REGISTERS.iter().for_each(|(die, address, value)| self.read(*die, *address, &[*value]));
+        self.read(GYRO, 0x3C, &[0x10]);
         self.write(GYRO, 0x3E, 0x40);
+        self.read(ACC, 0x18, &state(0));
     }
 
     /// The driver checks the setting of this number and reads the fill of the gyro's FIFO.
@@ -160,7 +162,7 @@ impl Buses {
 }
 
 /// Die, address, value; written from the data sheet, not from the driver's constants.
-const REGISTERS: [(usize, u8, u8); SETTINGS] = [
+const REGISTERS: [(usize, u8, u8); CHECKS - 1] = [
     (ACC, 0x7C, 0x00),
     (ACC, 0x7D, 0x04),
     (ACC, 0x40, 0x89),
@@ -205,6 +207,8 @@ fn the_driver_tests_configures_and_reads() {
     bus.read(ACC, 0x26, &FORCE);
     // The gyro was reset.
     bus.read(GYRO, 0x3E, &[0]);
+    // Its drive is not in order.
+    bus.read(GYRO, 0x3C, &[0x02]);
     let mut mocks = bus.mocks();
     let mut part = Bmi088::new(mocks.clone(), true, &mut NoopDelay::new()).expect("a good part");
     assert_eq!(part.next_sample(), Ok(None));
@@ -222,6 +226,7 @@ fn the_driver_tests_configures_and_reads() {
     assert_eq!(part.next_sample().expect("good").expect("one waits").time, Micros(5_000 * 56));
     let changed = Bmi088Error::Setting { die: Die::Gyro, address: 0x3E, got: 0, expected: 0x40 };
     assert_eq!(part.next_sample(), Err(changed));
+    assert_eq!(part.next_sample(), Err(Bmi088Error::SelfTest { die: Die::Gyro }));
     drop(part);
     mocks.iter_mut().for_each(Mock::done);
 }
@@ -335,6 +340,7 @@ impl Dies {
                 to[0] = 0x84;
                 to[1..].copy_from_slice(&self.reading(ACC));
             }
+            (GYRO, 0x3C) => to.fill(0x10),
             _ => to.fill(self.registers[die][usize::from(address)]),
         }
     }

@@ -24,6 +24,8 @@ pub const BYTES_PER_STEP: usize = serial::RECEIVED;
 const BYTES_PER_POLL: usize = BYTES_PER_STEP / 4;
 /// Interval between attempts to bring up the part, ms.
 const RETRY_MS: u32 = 1_000;
+/// Time after which a part that answers and has no sample is brought up again, microseconds.
+const SILENT_US: u64 = 1_000_000;
 
 const ICM: Icm42688Config = Icm42688Config { rate: OutputRate::Hz100, bandwidth: Bandwidth::Sixteenth };
 
@@ -150,6 +152,8 @@ pub fn refusal() -> Option<SensorFault> {
 pub struct SpiPart {
     /// `None` until the part is brought up.
     part: Option<Part>,
+    /// Board time of the newest sample, or of the bring-up.
+    heard: u64,
     /// True until the first sample after the part was brought up.
     is_fresh: bool,
     /// Time that is added to the part's clock, microseconds.
@@ -164,17 +168,29 @@ impl SpiPart {
         if self.part.is_none() {
             self.part = READY.pop();
             self.is_fresh = true;
+            self.heard = timer::micros();
         }
-        match self.part.as_mut()?.next_sample()? {
+        let Some(sample) = self.part.as_mut()?.next_sample() else {
+            if timer::micros().saturating_sub(self.heard) > SILENT_US {
+                self.give_back();
+            }
+            return None;
+        };
+        match sample {
             Ok(sample) => Some(Ok(self.placed(sample))),
             Err(is_lost) => {
                 if is_lost {
-                    self.part = None;
-                    WANTED.store(true, Ordering::Release);
+                    self.give_back();
                 }
                 Some(Err(()))
             }
         }
+    }
+
+    /// Lets idle bring the part up again.
+    fn give_back(&mut self) {
+        self.part = None;
+        WANTED.store(true, Ordering::Release);
     }
 
     /// Returns the sample with a time that continues across a reset of the part.
@@ -185,7 +201,7 @@ impl SpiPart {
             self.offset = (newest.0 + steps.max(1) * PERIOD_US).wrapping_sub(sample.time.0);
         }
         let time = Micros(sample.time.0.wrapping_add(self.offset));
-        self.newest = Some((time, now));
+        (self.newest, self.heard) = (Some((time, now)), now);
         ImuSample { time, ..sample }
     }
 }

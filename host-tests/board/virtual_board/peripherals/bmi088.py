@@ -35,7 +35,7 @@ class Die:
 
     def __init__(self, board, motion):
         self.board, self.motion = board, motion
-        self.clock_ppm, self.powered, self.passes = 1_000_000, True, True
+        self.clock_ppm, self.powered, self.passes, self.driven = 1_000_000, True, True, True
         self.reset(0)
 
     def power_on(self):
@@ -49,7 +49,7 @@ class Die:
 
     def reset(self, takes):
         """Returns all registers to their reset values; the die answers after a time."""
-        self.registers = dict(self.reset_values)
+        self.registers, self.motion.stopped = dict(self.reset_values), False
         self.answers_from = self.board.now + takes
         self.written_at = -PS
         self.fifo, self.lost = [], 0
@@ -75,7 +75,8 @@ class Die:
             return
         while self.due_at(self.made + 1) <= self.board.now:
             self.made += 1
-            self.output(self.due_at(self.made))
+            if not self.motion.stopped:
+                self.output(self.due_at(self.made))
 
     def gain(self, hz):
         """Returns the gain of the filter."""
@@ -193,7 +194,7 @@ class Gyro(Die):
             return self.overrun << 7 | len(self.fifo)
         if address == 0x3C:
             ready = self.tested_at is not None and self.board.now >= self.tested_at
-            return 0x10 | (0x02 | (0 if self.passes else 0x04) if ready else 0)
+            return (0x10 if self.driven else 0) | (0x02 | (0 if self.passes else 0x04) if ready else 0)
         if address == 0x3F:
             if not self.frame:
                 self.frame = self.fifo.pop(0) if self.fifo else b""
@@ -386,6 +387,8 @@ class Bmi088:
             die.identity = value
         elif name == "self_test":
             die.passes = value
+        elif name == "drive":
+            die.driven = value
         else:
             self.accelerometer.catch_up()
             self.motion.configure(key, value)

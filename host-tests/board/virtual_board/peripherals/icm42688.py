@@ -64,7 +64,7 @@ class Icm42688:
         self.answers_from = now + RESET_PS
         self.locked_until = 0
         self.gyro_on = self.accel_on = None
-        self.started, self.made = now, 0
+        self.started, self.made, self.motion.stopped = now, 0, False
         self.epoch = now
         self.status = reg.RESET_DONE
         self.data = {**{address: 0x80 for address in reg.DATA[::2]}, **{address: 0 for address in reg.DATA[1::2]}}
@@ -110,7 +110,8 @@ class Icm42688:
         now = self.board.now
         while self._sample_time(self.made + 1) <= now:
             self.made += 1
-            self._output(self._sample_time(self.made))
+            if not self.motion.stopped:
+                self._output(self._sample_time(self.made))
 
     def _plan(self):
         """Schedules the next output as an event if INT1 is wired."""

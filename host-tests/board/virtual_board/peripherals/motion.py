@@ -1,7 +1,8 @@
 """Motion, temperature and noise that an inertial sensor measures, and its settings for them.
 
 `rates_dps`, `acceleration_g` ([x, y, z]), `temperature_c`, `tones` ([[axis, hz, dps], ...]), `motion` ([[time_us, rates, acceleration],
-...], interpolated), `samples` ([[rates, acceleration], ...], one per output, without noise), `noise` (a factor, 0 for none).
+...], interpolated), `samples` ([[rates, acceleration], ...], one per output, without noise), `noise` (a factor, 0 for none),
+`stopped` (True: the part answers and measures nothing until its next reset).
 """
 
 from bisect import bisect_right
@@ -10,7 +11,7 @@ from random import Random
 
 PS, US = 1_000_000_000_000, 1_000_000
 NAMES = {"noise": "noise", "rates_dps": "rates", "acceleration_g": "acceleration", "temperature_c": "temperature",
-         "tones": "tones", "motion": "table", "samples": "samples"}
+         "tones": "tones", "motion": "table", "samples": "samples", "stopped": "stopped"}
 
 
 class Motion:
@@ -19,7 +20,7 @@ class Motion:
     def __init__(self, seed):
         self.rates, self.acceleration, self.temperature = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 25.0
         self.tones, self.table, self.samples = [], [], []
-        self.noise, self.random = 1.0, Random(seed)
+        self.noise, self.random, self.stopped = 1.0, Random(seed), False
 
     def configure(self, key, value):
         """Takes a setting."""
