@@ -1,4 +1,4 @@
-//! The virtual STM32F405 for tests: runs the image as flashed, on a model of the chip in Python (`host-tests/README.md`).
+//! The virtual board for tests: runs the image as flashed, on a model of its chip in Python (`host-tests/README.md`).
 //!
 //! The model runs in a process of its own. Board time passes only in [`Board::run`] and the `run_until` methods, so a
 //! test behaves the same on any machine. Whatever the model refuses (an unmodelled register, a peripheral without its
@@ -60,8 +60,13 @@ impl Board {
     /// Returns a board without power, with the image in its flash. Reports the test as skipped if the model's
     /// packages are missing.
     pub fn unpowered(test: &str, image: &Path) -> Option<Self> {
+        Self::of("stm32f405", test, image)
+    }
+
+    /// Returns a board with this chip, otherwise as [`Board::unpowered`] does.
+    pub fn of(chip: &str, test: &str, image: &Path) -> Option<Self> {
         let python = require::python(test, PACKAGES)?;
-        Some(Self { link: Link::open(&python, image) })
+        Some(Self { link: Link::open(&python, image, chip) })
     }
 
     /// Returns a board that has just been switched on.
@@ -162,15 +167,22 @@ impl Board {
         self.ask("can_send", arguments);
     }
 
+    /// Sends a CAN FD frame of another node on the bus, its data at the higher bit rate, not before a time.
+    pub fn can_fd_send_at(&mut self, id: u16, data: &[u8], time: Duration) {
+        let at = micros(time);
+        self.ask("can_send", json!({ "id": id, "data": hex(data), "fd": true, "fast": true, "at_us": at }));
+    }
+
     /// Takes the frames that the board has sent completely, with the time of their end.
     pub fn can_frames(&mut self) -> Vec<(Duration, DataFrame)> {
         self.bus_log().into_iter().filter(|seen| seen.own).map(|seen| (seen.end, seen.frame)).collect()
     }
 
-    /// Takes all complete frames that were on the bus.
+    /// Takes all complete classic frames that were on the bus.
     pub fn bus_log(&mut self) -> Vec<Seen> {
         let answer = self.ask("can_take", json!({}));
-        let complete = list(&answer["frames"]).iter().filter(|entry| entry["error"].is_null());
+        let complete =
+            list(&answer["frames"]).iter().filter(|entry| entry["error"].is_null() && entry["fd"] == false);
         let seen = complete.map(|entry| Seen {
             start: duration(&entry["start_us"]),
             end: duration(&entry["time_us"]),

@@ -1,178 +1,145 @@
-//! The coprocessor on an STM32F405 with embassy: an Xsens MTi on USART1 in, frames on CAN1 out.
+//! The coprocessor on a NUCLEO-H563ZI: an Xsens MTi in, frames on CAN out. Copy this folder for a board of your own.
 //!
-//! Pins and crystal are those of the Netduino Plus 2. The network has its own executor, with a priority below that of
-//! bytes and frames. Build it in the repository's root:
+//! The bus may carry CAN FD: the controller receives such frames and sends classic ones.
 //!
-//! ```sh
-//! cargo build --release --manifest-path examples/embassy/Cargo.toml --target thumbv7em-none-eabihf
-//! probe-rs run --chip STM32F405RGTx examples/embassy/target/thumbv7em-none-eabihf/release/gyronet-embassy
-//! ```
+//! | line | pins | use |
+//! |---|---|---|
+//! | USART1 | D0 (PB7), D1 (PB6) | Xsens MTi, 115200 baud |
+//! | FDCAN1 | PD0, PD1 (CN9), to a transceiver | 500 kbit/s; data of others at 2 Mbit/s |
 //!
-//! It has no watchdog, stores nothing and answers no tester; the repository's own image does all that.
+//! Every millisecond `drive` calls [`Coprocessor::step`]. The network runs in the main program, below all interrupts.
+//! The watchdog is fed while both get on.
 #![no_std]
 #![no_main]
 
+mod can;
+
+use can::CanBus;
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::SCB;
 use embassy_executor::InterruptExecutor;
-use embassy_futures::select::{Either3, select3};
-use embassy_stm32::can::{self, Can, Frame};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::time::Hertz;
-use embassy_stm32::usart::{self, RingBufferedUartRx, UartRx};
-use embassy_stm32::{bind_interrupts, dma, peripherals, rcc};
+use embassy_stm32::usart::{self, BufferedUart};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{bind_interrupts, peripherals, rcc};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::{channel::Channel, signal::Signal};
-use embassy_time::{Duration, Instant, Timer, with_timeout};
+use embassy_sync::signal::Signal;
+use embassy_time::{Duration, Instant, Ticker};
+use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::coprocessor::DueWindow;
-use gyronet::model::{Estimate, GyroNetState};
+use gyronet::model::Estimate;
+use gyronet::sensor::serial::Serial;
 use gyronet::sensor::xsens::Mti;
-use gyronet::{Config, Coprocessor, GyroNet, Micros, TimedFrame, WindowNetwork};
+use gyronet::{Config, Coprocessor, GyroNet, Micros, WindowNetwork};
 use static_cell::ConstStaticCell;
 
 bind_interrupts!(struct Interrupts {
-    USART1 => usart::InterruptHandler<peripherals::USART1>;
-    DMA2_STREAM2 => dma::InterruptHandler<peripherals::DMA2_CH2>;
-    CAN1_TX => can::TxInterruptHandler<peripherals::CAN1>;
-    CAN1_RX0 => can::Rx0InterruptHandler<peripherals::CAN1>;
-    CAN1_RX1 => can::Rx1InterruptHandler<peripherals::CAN1>;
-    CAN1_SCE => can::SceInterruptHandler<peripherals::CAN1>;
+    USART1 => usart::BufferedInterruptHandler<peripherals::USART1>;
+    FDCAN1_IT0 => embassy_stm32::can::IT0InterruptHandler<peripherals::FDCAN1>;
+    FDCAN1_IT1 => embassy_stm32::can::IT1InterruptHandler<peripherals::FDCAN1>;
 });
 
-/// The tasks share a window and its estimate, and the frames with the number of those that were lost.
+type Imu = Serial<BufferedUart<'static>, Mti>;
+type Watchdog = IndependentWatchdog<'static, peripherals::IWDG>;
+
+/// Time without a cycle of the main program after which the watchdog is no longer fed.
+const STUCK: Duration = Duration::from_millis(100);
+/// Time after which the watchdog resets the chip, us.
+const WATCHDOG_US: u32 = 100_000;
+
+/// A window for the network, and its estimate.
 static WINDOW: Signal<CriticalSectionRawMutex, DueWindow> = Signal::new();
 static ESTIMATE: Signal<CriticalSectionRawMutex, (u32, Estimate)> = Signal::new();
-static FRAMES: Channel<CriticalSectionRawMutex, Frame, 24> = Channel::new();
-static LOST: AtomicU32 = AtomicU32::new(0);
+/// Number of cycles of the main program.
+static CYCLES: AtomicU32 = AtomicU32::new(0);
 
-/// Corrects the samples in the bytes of the sensor.
+/// Does every millisecond what is due.
 #[embassy_executor::task]
-async fn correct(coprocessor: &'static mut Coprocessor, mut uart: RingBufferedUartRx<'static>) {
-    let (mut mti, mut bytes) = (Mti::new(), [0; 64]);
+async fn drive(coprocessor: &'static mut Coprocessor, mut imu: Imu, mut can: CanBus, mut watchdog: Watchdog) {
+    let mut tick = Ticker::every(Duration::from_millis(1));
+    let (mut seen, mut seen_at) = (0, Instant::now());
     loop {
-        let event = select3(uart.read(&mut bytes), ESTIMATE.wait(), Timer::after_millis(1)).await;
-        let now = Micros(Instant::now().as_micros());
-        coprocessor.bus(LOST.load(Relaxed), false);
-        match event {
-            Either3::First(Ok(count)) => {
-                for byte in &bytes[..count] {
-                    mti.receive(*byte);
-                    while let Some(sample) = mti.next_sample() {
-                        match sample {
-                            Ok(sample) => drop(coprocessor.imu(sample, now, &mut send)),
-                            Err(_) => coprocessor.imu_error(),
-                        }
-                        hand_over(coprocessor);
-                    }
-                }
-            }
-            Either3::First(Err(_)) => coprocessor.imu_error(),
+        tick.next().await;
+        let now = Instant::now();
+        if let Some((end, estimate)) = ESTIMATE.try_take() {
             // A late estimate is counted.
-            Either3::Second((end, estimate)) => drop(coprocessor.deliver(end, estimate)),
-            // A silent sensor is reported.
-            Either3::Third(()) => drop(coprocessor.poll(now, &mut send)),
+            let _ = coprocessor.deliver(end, estimate);
         }
-        hand_over(coprocessor);
-    }
-}
-
-/// Passes a frame to the bus.
-fn send(sent: TimedFrame) {
-    if sent.frame.convert().is_none_or(|frame| FRAMES.try_send(frame).is_err()) {
-        LOST.fetch_add(1, Relaxed);
-    }
-}
-
-/// Passes a window to the network.
-fn hand_over(coprocessor: &mut Coprocessor) {
-    if let Some(window) = coprocessor.window() {
-        WINDOW.signal(window);
-    }
-}
-
-/// Sends the frames. If the bus has not accepted a frame for 20 ms, all are dropped, because old rates are useless.
-#[embassy_executor::task]
-async fn transmit(mut can: Can<'static>) {
-    can.enable().await;
-    let (mut can, _) = can.split();
-    loop {
-        let frame = FRAMES.receive().await;
-        let mailbox = can.write(&frame).await.mailbox();
-        if with_timeout(Duration::from_millis(20), can.flush(mailbox)).await.is_err() {
-            can.abort(mailbox);
-            LOST.fetch_add(1 + FRAMES.len() as u32, Relaxed);
-            FRAMES.clear();
+        // Errors of the sensor are counted.
+        let _ = coprocessor.step(Micros(now.as_micros()), &mut imu, &mut can, None);
+        if let Some(window) = coprocessor.window() {
+            WINDOW.signal(window);
+        }
+        let cycles = CYCLES.load(Relaxed);
+        if cycles != seen {
+            (seen, seen_at) = (cycles, now);
+        }
+        if now - seen_at < STUCK {
+            watchdog.pet();
         }
     }
 }
 
-/// Computes the windows, below all other tasks.
-#[embassy_executor::task]
-async fn compute(mut network: GyroNet<'static, GyroNetState>) {
-    loop {
-        let window = WINDOW.wait().await;
-        ESTIMATE.signal((window.end, network.estimate(&window.features)));
-    }
-}
+static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
-/// The executors run in the interrupts of peripherals that are not used.
-static ABOVE: InterruptExecutor = InterruptExecutor::new();
-static BELOW: InterruptExecutor = InterruptExecutor::new();
-
+/// Runs `drive` in the interrupt of a peripheral that is not used, below those of the drivers.
 #[embassy_stm32::interrupt]
 unsafe fn UART4() {
     // SAFETY: it is called here alone, and the interrupt is enabled by `start`.
-    unsafe { ABOVE.on_interrupt() }
-}
-
-#[embassy_stm32::interrupt]
-unsafe fn UART5() {
-    // SAFETY: as above.
-    unsafe { BELOW.on_interrupt() }
+    unsafe { EXECUTOR.on_interrupt() }
 }
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
     static COPROCESSOR: ConstStaticCell<Coprocessor> =
         ConstStaticCell::new(Coprocessor::new(Config::DEFAULT));
-    static RECEIVED: ConstStaticCell<[u8; 256]> = ConstStaticCell::new([0; 256]);
+    static RECEIVED: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
+    static UNSENT: ConstStaticCell<[u8; 1]> = ConstStaticCell::new([0]);
 
     let parts = embassy_stm32::init(clocks());
-    let uart = UartRx::new(parts.USART1, parts.PB7, parts.DMA2_CH2, Interrupts, usart::Config::default())
-        .expect("115200 baud from 84 MHz")
-        .into_ring_buffered(RECEIVED.take());
-    let mut can = Can::new(parts.CAN1, parts.PB8, parts.PB9, Interrupts);
-    can.set_bitrate(500_000);
-    let network = GyroNet::shipped().expect("it comes with the library");
+    let mut watchdog = IndependentWatchdog::new(parts.IWDG, WATCHDOG_US);
+    watchdog.unleash();
+    let (unsent, received) = (UNSENT.take(), RECEIVED.take());
+    let baud = usart::Config::default();
+    let line = BufferedUart::new(parts.USART1, parts.PB7, parts.PB6, unsent, received, Interrupts, baud)
+        .expect("115200 baud from 250 MHz");
+    let wheels = WheelSettings::TOYOTA;
+    let can = CanBus::start(parts.FDCAN1, parts.PD0, parts.PD1, Interrupts, &wheels);
+    let coprocessor = COPROCESSOR.take();
+    *coprocessor = Coprocessor::new(Config { wheels: WheelReceiver::new(wheels).ok(), ..Config::DEFAULT });
+    let mut network = GyroNet::shipped().expect("it comes with the library");
 
     interrupt::UART4.set_priority(Priority::P6);
-    interrupt::UART5.set_priority(Priority::P7);
-    let above = ABOVE.start(interrupt::UART4);
-    above.spawn(correct(COPROCESSOR.take(), uart).expect("its only one"));
-    above.spawn(transmit(can).expect("its only one"));
-    BELOW.start(interrupt::UART5).spawn(compute(network).expect("its only one"));
+    let imu = Serial::new(line, Mti::new());
+    EXECUTOR.start(interrupt::UART4).spawn(drive(coprocessor, imu, can, watchdog).expect("its only one"));
     loop {
+        if let Some(window) = WINDOW.try_take() {
+            ESTIMATE.signal((window.end, network.estimate(&window.features)));
+        }
+        CYCLES.fetch_add(1, Relaxed);
+        // The tick ends the sleep.
         cortex_m::asm::wfi();
     }
 }
 
-/// 168 MHz from a crystal of 25 MHz.
+/// 250 MHz, and 50 MHz for CAN, from the 8 MHz that the board's debug probe supplies.
 fn clocks() -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
-    config.rcc.hse = Some(rcc::Hse { freq: Hertz(25_000_000), mode: rcc::HseMode::Oscillator });
-    config.rcc.pll_src = rcc::PllSource::HSE;
-    config.rcc.pll = Some(rcc::Pll {
-        prediv: rcc::PllPreDiv::DIV25,
-        mul: rcc::PllMul::MUL336,
-        divp: Some(rcc::PllPDiv::DIV2),
-        // The reset value of Q is not allowed.
-        divq: Some(rcc::PllQDiv::DIV7),
+    (config.rcc.hsi, config.rcc.hsi48) = (None, None);
+    config.rcc.hse = Some(rcc::Hse { freq: Hertz(8_000_000), mode: rcc::HseMode::BypassDigital });
+    config.rcc.pll1 = Some(rcc::Pll {
+        source: rcc::PllSource::HSE,
+        prediv: rcc::PllPreDiv::DIV2,
+        mul: rcc::PllMul::MUL125,
+        divp: Some(rcc::PllDiv::DIV2),
+        divq: Some(rcc::PllDiv::DIV10),
         divr: None,
     });
     config.rcc.sys = rcc::Sysclk::PLL1_P;
-    config.rcc.apb1_pre = rcc::APBPrescaler::DIV4;
-    config.rcc.apb2_pre = rcc::APBPrescaler::DIV2;
+    config.rcc.voltage_scale = rcc::VoltageScale::Scale0;
+    config.rcc.mux.fdcan12sel = rcc::mux::Fdcansel::PLL1_Q;
     config
 }
 

@@ -27,7 +27,7 @@ class Handle:
 class FakeBoard:
     """The board's side of the interface between core and peripherals."""
 
-    def __init__(self):
+    def __init__(self, create=create):
         self.now = 0
         self.queue, self.order = [], count()
         self.lines, self.log, self.resets, self.nmis = {}, [], [], 0

@@ -2,7 +2,8 @@
 
 import unittest
 
-from virtual_board.memory import FLASH_KIB, Memory
+from virtual_board.chips import STM32F405
+from virtual_board.memory import Memory
 
 from .fake_board import FakeBoard
 
@@ -60,7 +61,7 @@ class Gpio(unittest.TestCase):
 
     def test_identity(self):
         self.assertEqual(self.board.read("DBGMCU", 0) & 0xFFF, 0x413)
-        self.assertEqual(Memory(0).read(FLASH_KIB, 2), (1024).to_bytes(2, "little"))
+        self.assertEqual(Memory(0).read(STM32F405.flash_kib, 2), (1024).to_bytes(2, "little"))
 
 
 if __name__ == "__main__":

@@ -155,11 +155,6 @@ class Rcc(unittest.TestCase):
         self.write(BDCR, 0x8200)
         self.assertEqual(self.read(BDCR), 0x8200)
 
-    def test_the_word_of_another_part_takes_nothing(self):
-        self.write(0x8C, 1 << 24)
-        self.assertEqual(self.read(0x8C), 0)
-        self.assertEqual(self.board.log[-1]["kind"], "ignored_write")
-
     def test_unmodelled_register(self):
         with self.assertRaises(Violation):
             self.read(0x28)

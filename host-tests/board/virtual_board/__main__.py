@@ -7,6 +7,7 @@ import argparse
 import json
 import sys
 
+from .chips import CHIPS, STM32F405
 from .session import Session
 from .violation import Violation
 
@@ -16,8 +17,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="virtual_board", description=__doc__)
     parser.add_argument("--elf", required=True, help="the image, as it is flashed")
     parser.add_argument("--seed", type=int, default=1, help="seed of the noise in RAM at power-on")
+    parser.add_argument("--chip", choices=CHIPS, default=STM32F405.name)
     arguments = parser.parse_args()
-    session = Session(arguments.elf, arguments.seed)
+    session = Session(arguments.elf, arguments.seed, arguments.chip)
     for line in sys.stdin:
         try:
             answer = session.answer(json.loads(line))

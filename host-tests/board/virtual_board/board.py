@@ -9,6 +9,7 @@ from unicorn.unicorn_const import UC_MEM_FETCH as FETCH
 from unicorn.unicorn_const import UC_MEM_WRITE as WRITE
 
 from .bus import Bus, Fixed
+from .chips import STM32F405
 from .dwt import CoreDebug, Dwt
 from .events import EventQueue, Handle
 from .exceptions import (
@@ -33,11 +34,11 @@ SLEEPDEEP = 4
 
 
 class Board:
-    """A virtual STM32F405 with its environment."""
+    """A virtual microcontroller with its environment."""
 
-    def __init__(self, elf=None, create=lambda board: [], seed: int = 1):
-        self.elf = elf
-        self.memory = Memory(seed)
+    def __init__(self, elf=None, create=lambda board: [], seed: int = 1, chip=STM32F405):
+        self.elf, self.chip = elf, chip
+        self.memory = Memory(seed, chip)
         self.events = EventQueue()
         self.log: list[dict] = []
         self.bus = Bus(self)
@@ -238,7 +239,7 @@ class Board:
         for peripheral in self.peripherals.values():
             peripheral.reset(cause)
         self.clocks_changed()
-        vectors = self.memory.read(0, 8)
+        vectors = self.memory.read(self.chip.boot, 8)
         self.processor.reset(int.from_bytes(vectors[:4], "little"), int.from_bytes(vectors[4:], "little"))
         self.paths.begin()
         self.record("reset", cause=cause)

@@ -21,8 +21,6 @@ VECTTBL, FORCED, DEBUGEVT = 1 << 1, 1 << 30, 1 << 31
 # CONTROL has FPCA without SFPA a new FPSCR with its next FPU instruction: both are set and cleared together.
 SPSEL, FPCA, SFPA = 2, 4, 8
 
-#: The values of LR that return from a handler.
-EXC_RETURNS = {0xFFFF_FFE1, 0xFFFF_FFE9, 0xFFFF_FFED, 0xFFFF_FFF1, 0xFFFF_FFF9, 0xFFFF_FFFD}
 #: Unicorn's numbers for the exceptions that a program raises.
 UC_SVC, UC_BKPT, UC_EXCEPTION_RETURN, UC_NOCP, UC_INVSTATE = 2, 7, 8, 17, 18
 #: A bit of SCR.
@@ -40,6 +38,9 @@ class Exceptions:
     def __init__(self, board):
         self.board = board
         processor = board.processor
+        #: The lowest value of LR that returns from a handler, and all of them.
+        self.base = board.chip.exc_return
+        self.returns = {self.base + more for more in (0, 0x8, 0xC, 0x10, 0x18, 0x1C)}
         self.frame = Batch(processor.handle, "r0 r1 r2 r3 r12 lr pc xpsr sp control primask basepri faultmask")
         self.enter_batch = Batch(processor.handle, "sp control all_xpsr apsr_nzcv lr pc")
         self.at_return = Batch(processor.handle, "pc control faultmask msp psp")
@@ -87,7 +88,7 @@ class Exceptions:
             data += self.fpu.read_bytes()
             board.scb.fpcar = frame + 32
         in_thread = self.current == 0
-        excret = 0xFFFF_FFE1 | (0 if extended else 0x10) | (0x8 if in_thread else 0)
+        excret = self.base | (0 if extended else 0x10) | (0x8 if in_thread else 0)
         if in_thread and control & SPSEL:
             excret |= 4
         if not board.memory.write_stack(frame, data):
@@ -161,8 +162,8 @@ class Exceptions:
         board = self.board
         nvic = board.nvic
         excret, control, faultmask, msp, psp = self.at_return.read()
-        excret |= 1
-        known = excret in EXC_RETURNS
+        excret |= self.base & 1
+        known = excret in self.returns
         to_thread = bool(excret & 8)
         leaving = self.current
         bit = 1 << leaving

@@ -1,27 +1,16 @@
-"""The memories of the STM32F405 (RM0090 section 2.3) as buffers that the processor and the model share.
+"""The memories of the chip as buffers that the processor and the model share.
 
-Flash is at 0x0800_0000 and, for a boot from flash, also at address 0 (section 2.4). The core-coupled memory is only on the data
-bus, so nothing can be fetched from it. RAM keeps its contents over a reset and holds noise after power-on.
+For a boot from flash, the STM32F405 shows it also at address 0 (RM0090 section 2.4). RAM keeps its contents over a reset
+and holds noise after power-on.
 """
 
 import ctypes
 import random
 import struct
 
-FLASH = 0x0800_0000
-FLASH_SIZE = 1 << 20
-SRAM = 0x2000_0000
-SRAM_SIZE = 128 << 10
-CCM = 0x1000_0000
-CCM_SIZE = 64 << 10
-SYSTEM = 0x1FFF_0000
-#: Up to the page of the option bytes (table 5); nothing is between it and SRAM.
-SYSTEM_SIZE = 0xC400
+from .chips import FLASH, SRAM, STM32F405
+
 WORD = struct.Struct("<I")
-#: Section 39.1: the unique identifier, 96 bits. This one is the model's own.
-UNIQUE_ID = 0x1FFF_7A10
-#: Section 39.2: the flash size in KiB, 16 bits.
-FLASH_KIB = 0x1FFF_7A22
 
 
 class Region:
@@ -37,50 +26,58 @@ class Region:
 class Memory:
     """Holds all memories."""
 
-    def __init__(self, seed: int):
-        self.flash = Region(FLASH, FLASH_SIZE, 0xFF)
-        self.sram = Region(SRAM, SRAM_SIZE, 0)
-        self.ccm = Region(CCM, CCM_SIZE, 0)
-        self.system = Region(SYSTEM, SYSTEM_SIZE, 0xFF)
-        self.regions = (self.sram, self.flash, self.ccm, self.system)
+    def __init__(self, seed: int, chip=STM32F405):
+        self.chip = chip
+        self.flash = Region(FLASH, chip.flash_size, 0xFF)
+        self.sram = Region(SRAM, chip.sram_size, 0)
+        self.ccm = Region(*chip.data_ram, 0) if chip.data_ram else None
+        self.system = Region(*chip.system, 0xFF)
+        self.ram = tuple(region for region in (self.sram, self.ccm) if region)
+        self.regions = (self.sram, self.flash, *self.ram[1:], self.system)
+        #: Bytes of flash that appear at address 0.
+        self.alias = 0 if chip.boot else chip.flash_size
         self.random = random.Random(seed)
         #: Called with an address and a length after a write to flash or SRAM: code translated from there must be discarded.
         self.on_code_change = None
-        self._set_system(UNIQUE_ID, b"\x31\x00\x2a\x00\x0fGYRONET")
-        self._set_system(FLASH_KIB, (FLASH_SIZE >> 10).to_bytes(2, "little"))
+        # The unique identifier of 96 bits is the model's own; the flash size has 16 bits.
+        self._set_system(chip.unique_id, b"\x31\x00\x2a\x00\x0fGYRONET")
+        self._set_system(chip.flash_kib, (chip.flash_size >> 10).to_bytes(2, "little"))
 
     def _set_system(self, address: int, data: bytes) -> None:
-        offset = address - SYSTEM
+        offset = address - self.system.base
         self.system.view[offset : offset + len(data)] = data
 
     def power_on(self) -> None:
         """Fills RAM with noise."""
-        for region in (self.sram, self.ccm):
+        for region in self.ram:
             region.view[:] = self.random.randbytes(region.size)
 
     def region(self, address: int, length: int) -> Region | None:
         """Returns the memory that contains a whole range."""
-        if address + length <= FLASH_SIZE:
+        if address + length <= self.alias:
             return self.flash
         for region in self.regions:
             if region.base <= address and address + length <= region.base + region.size:
                 return region
         return None
 
+    def _offset(self, region: Region, address: int) -> int:
+        return address if address < self.alias else address - region.base
+
     def read(self, address: int, length: int) -> bytes | None:
         """Reads a range, or returns `None` if there is no memory."""
         offset = address - SRAM
-        if 0 <= offset <= SRAM_SIZE - length:
+        if 0 <= offset <= self.sram.size - length:
             return bytes(self.sram.view[offset : offset + length])
         region = self.region(address, length)
         if region is None:
             return None
-        offset = (address - region.base) & (FLASH_SIZE - 1)
+        offset = self._offset(region, address)
         return bytes(region.view[offset : offset + length])
 
     def word(self, address: int) -> int | None:
         """Reads 32 bits, or returns `None` if there is no memory."""
-        if 0 <= address - FLASH <= FLASH_SIZE - 4:
+        if 0 <= address - FLASH <= self.flash.size - 4:
             return WORD.unpack_from(self.flash.view, address - FLASH)[0]
         data = self.read(address, 4)
         return None if data is None else WORD.unpack(data)[0]
@@ -90,7 +87,7 @@ class Memory:
         region = self.region(address, len(data))
         if region is None:
             return False
-        offset = (address - region.base) & (FLASH_SIZE - 1)
+        offset = self._offset(region, address)
         region.view[offset : offset + len(data)] = data
         if self.on_code_change and region is not self.ccm:
             self.on_code_change(region.base + offset, len(data))
@@ -98,7 +95,7 @@ class Memory:
 
     def write_stack(self, address: int, data: bytes) -> bool:
         """Writes an exception frame. Returns whether there is RAM. Does not check for translated code there."""
-        region = self.sram if address >= SRAM else self.ccm
+        region = self.sram if address >= SRAM or not self.ccm else self.ccm
         offset = address - region.base
         if offset < 0 or offset + len(data) > region.size:
             return False

@@ -1,14 +1,11 @@
 """The interrupt controller (DDI0403 B3.4) and the priorities of all exceptions (B1.5.4).
 
 Exceptions are numbered as in IPSR: 2 NMI, 3 HardFault, 11 SVCall, 14 PendSV, 15 SysTick, and from 16 on the external
-interrupts. Sets of exceptions are integers with one bit each. The STM32F405 has 82 interrupts and 4 priority bits (RM0090
-section 12.1).
+interrupts. Sets of exceptions are integers with one bit each. The chips have 4 priority bits (RM0090 section 12.1).
 """
 
 from .violation import Violation
 
-INTERRUPTS = 82
-COUNT = 16 + INTERRUPTS
 PRIORITY_MASK = 0xF0
 NMI, HARD_FAULT, MEM_MANAGE, BUS_FAULT, USAGE_FAULT, SVCALL, PENDSV, SYSTICK = 2, 3, 4, 5, 6, 11, 14, 15
 #: The execution priority of Thread mode with nothing masked.
@@ -30,6 +27,7 @@ class Nvic:
 
     def __init__(self, board):
         self.board = board
+        self.count = 16 + board.chip.interrupts
         self.reset()
 
     def reset(self) -> None:
@@ -38,7 +36,7 @@ class Nvic:
         self.pending = 0
         self.active = 0
         self.lines = getattr(self, "lines", 0)
-        self.priority = [LOWEST] * 2 + [-2, -1] + [0] * (COUNT - 4)
+        self.priority = [LOWEST] * 2 + [-2, -1] + [0] * (self.count - 4)
         self.group_mask = 0xFF  # AIRCR.PRIGROUP = 0: bits 7 to 1 preempt, and bit 0 is not implemented.
         self.priorities_changed()
 
@@ -50,7 +48,7 @@ class Nvic:
     def set_line(self, number: int, level: bool) -> None:
         """Drives an interrupt line. A rising edge makes the interrupt pending; if it is active, it runs once more after its end."""
         bit = 1 << 16 + number
-        if not 0 <= number < INTERRUPTS:
+        if not 16 <= 16 + number < self.count:
             raise ValueError(f"interrupt {number}")
         if not level:
             self.lines &= ~bit
@@ -113,7 +111,7 @@ class Nvic:
             return source >> 16 + 32 * word & 0xFFFF_FFFF
         if 0x300 <= offset < 0x3F0:
             first = 16 + offset - 0x300
-            values = (self.priority[n] if n < COUNT else 0 for n in range(first, first + size))
+            values = (self.priority[n] if n < self.count else 0 for n in range(first, first + size))
             return int.from_bytes(bytes(values), "little")
         raise Violation(f"NVIC: {size}-byte read at offset 0x{offset:X} is not modelled")
 
@@ -121,7 +119,7 @@ class Nvic:
         """Writes the registers that `read` supports, and STIR."""
         block, word = offset >> 7, offset >> 2 & 0x1F
         if block in (0, 1, 2, 3) and size == 4 and word < 16:
-            chosen = (value << 16 + 32 * word) & ((1 << COUNT) - 1)
+            chosen = (value << 16 + 32 * word) & ((1 << self.count) - 1)
             if block == 0:
                 self.enabled |= chosen
             elif block == 1:
@@ -133,11 +131,11 @@ class Nvic:
                 self.pending &= ~chosen | self.lines & ~self.active
         elif 0x300 <= offset < 0x3F0:
             for n in range(size):
-                if 16 + offset - 0x300 + n < COUNT:
+                if 16 + offset - 0x300 + n < self.count:
                     self.priority[16 + offset - 0x300 + n] = value >> 8 * n & PRIORITY_MASK
             self.priorities_changed()
         elif offset == 0xE00 and size == 4:
-            if value & 0x1FF < INTERRUPTS:
+            if 16 + (value & 0x1FF) < self.count:
                 self.pending |= 1 << 16 + (value & 0x1FF)
         else:
             raise Violation(f"NVIC: {size}-byte write at offset 0x{offset:X} is not modelled")

@@ -1,4 +1,4 @@
-"""The instruction set: a Cortex-M4 core of `unicorn` without interrupts, run in slices of a known number of instructions.
+"""The instruction set: a Cortex-M core of `unicorn` without interrupts, run in slices of a known number of instructions.
 
 Unicorn executes Thumb code and has the special registers and both stack pointers. It has no NVIC, takes no exception and keeps
 no time; `Exceptions` and `Board` add these. The following was found in the sources of unicorn 2.1.4:
@@ -21,7 +21,7 @@ import unicorn
 from unicorn import arm_const, unicorn_const as const
 from unicorn.unicorn_py3.unicorn import uclib
 
-from . import memory as map_
+from .chips import FLASH, SRAM
 from .registers import LIBRARY, Batch
 from .violation import Violation
 
@@ -76,7 +76,7 @@ class Processor:
     def __init__(self, board):
         self.board = board
         self.uc = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
-        self.uc.ctl_set_cpu_model(arm_const.UC_CPU_ARM_CORTEX_M4)
+        self.uc.ctl_set_cpu_model(board.chip.model)
         self.handle = self.uc._uch
         self._start = LIBRARY.uc_emu_start
         self._begin = ctypes.c_uint64()
@@ -85,8 +85,7 @@ class Processor:
         self._map(board.memory)
         self._hook(const.UC_HOOK_INTR, INTERRUPT(self._on_interrupt))
         self._hook(const.UC_HOOK_TLB_FILL, TLB(self._on_tlb))
-        flash_end = map_.FLASH + map_.FLASH_SIZE - 1
-        self._hook(const.UC_HOOK_MEM_WRITE_PROT, INVALID(self._on_flash_write), map_.FLASH, flash_end)
+        self._hook(const.UC_HOOK_MEM_WRITE_PROT, INVALID(self._on_flash_write), FLASH, FLASH + board.memory.flash.size - 1)
         self.uc.ctl_set_tlb_mode(const.UC_TLB_VIRTUAL)
         self.general = Batch(self.handle, GENERAL)
         self.pc = Batch(self.handle, "pc")
@@ -148,11 +147,10 @@ class Processor:
     def _map(self, memory) -> None:
         every, fixed = const.UC_PROT_ALL, const.UC_PROT_READ | const.UC_PROT_EXEC
         for base, region, access in (
-            (0, memory.flash, fixed),
-            (map_.FLASH, memory.flash, fixed),
-            (map_.SRAM, memory.sram, every),
-            (map_.CCM, memory.ccm, every),
-            (map_.SYSTEM, memory.system, fixed),
+            *([(0, memory.flash, fixed)] if memory.alias else ()),
+            (FLASH, memory.flash, fixed),
+            *((ram.base, ram, every) for ram in memory.ram),
+            (memory.system.base, memory.system, fixed),
         ):
             self.uc.mem_map_ptr(base, region.size, every, ctypes.addressof(region.buffer))
             # Only a change of the protection makes unicorn discard writes to memory that was passed to it.
@@ -232,20 +230,21 @@ class Processor:
     def _permissions(self, address: int, kind: int) -> int | None:
         """Returns the permissions of a page, or `None` when it refuses this access."""
         read, write, execute = const.UC_PROT_READ, const.UC_PROT_WRITE, const.UC_PROT_EXEC
-        if map_.SRAM <= address < map_.SRAM + map_.SRAM_SIZE:
+        memory = self.board.memory
+        if SRAM <= address < SRAM + memory.sram.size:
             if kind != const.UC_MEM_FETCH:
                 return read | write
             self._code_pages.add(address & -PAGE)
             return read | write | execute
-        if map_.FLASH <= address < map_.FLASH + map_.FLASH_SIZE:
+        if FLASH <= address < FLASH + memory.flash.size:
             return read | write | execute  # A write goes to the flash controller.
         if PERIPHERALS <= address < PERIPHERALS + PERIPHERALS_SIZE or PRIVATE <= address < PRIVATE + PRIVATE_SIZE:
             allowed = read | write
-        elif address < map_.FLASH_SIZE:
+        elif address < memory.alias:
             allowed = read | execute
-        elif map_.CCM <= address < map_.CCM + map_.CCM_SIZE:
+        elif memory.ccm and 0 <= address - memory.ccm.base < memory.ccm.size:
             allowed = read | write
-        elif map_.SYSTEM <= address < map_.SYSTEM + map_.SYSTEM_SIZE:
+        elif 0 <= address - memory.system.base < memory.system.size:
             allowed = read
         else:
             return None
@@ -259,7 +258,7 @@ class Processor:
 
     def _on_code_change(self, address: int, size: int) -> None:
         first, last = address & -PAGE, address + size - 1 & -PAGE
-        if address < map_.SRAM or any(page in self._code_pages for page in range(first, last + 1, PAGE)):
+        if address < SRAM or any(page in self._code_pages for page in range(first, last + 1, PAGE)):
             self._stale_code.append((address, size))
 
     def forget_code(self) -> None:

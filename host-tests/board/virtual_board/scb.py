@@ -10,7 +10,6 @@ import struct
 from .nvic import BUS_FAULT, MEM_MANAGE, NMI, PENDSV, PRIORITY_MASK, SVCALL, SYSTICK, USAGE_FAULT
 from .violation import Violation
 
-CPUID = 0x410F_C241  # Cortex-M4 r0p1
 VECTKEY, VECTKEYSTAT = 0x05FA, 0xFA05
 STKALIGN, BFHFNMIGN = 1 << 9, 1 << 8
 ASPEN_LSPEN = 0xC000_0000
@@ -34,8 +33,8 @@ class Scb:
         self.reset()
 
     def reset(self) -> None:
-        """Sets the reset values. VTOR is 0: the vectors come from the boot alias."""
-        self.vtor = 0
+        """Sets the reset values."""
+        self.vtor = self.board.chip.boot
         self.scr = 0
         self.ccr = STKALIGN
         self.cfsr = 0
@@ -92,7 +91,7 @@ class Scb:
         if 0xED40 <= at < 0xED74:
             return IDENTITY[(at - 0xED40) // 4]
         simple = {
-            0xED00: CPUID, 0xED08: self.vtor, 0xED0C: VECTKEYSTAT << 16 | self.prigroup << 8, 0xED10: self.scr,
+            0xED00: self.board.chip.cpuid, 0xED08: self.vtor, 0xED0C: VECTKEYSTAT << 16 | self.prigroup << 8, 0xED10: self.scr,
             0xED14: self.ccr, 0xED2C: self.hfsr, 0xED30: 0, 0xED34: self.mmfar, 0xED38: self.bfar, 0xED3C: 0,
             0xED88: self.cpacr, 0xED90: 0x800, 0xED94: 0, **self.mpu,
         }  # fmt: skip

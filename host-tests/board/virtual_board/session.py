@@ -9,7 +9,9 @@ sent and nobody has taken: `{"usart": 2, "bytes": 10}`, `{"can": 6}`.
 
 from . import peripherals
 from .board import Board
+from .chips import CHIPS, STM32F405
 from .elf import Elf
+from .peripherals import h5
 from .snapshot import Snapshot
 
 US = 1_000_000
@@ -20,9 +22,10 @@ CHUNK_GAP = 300 * US
 class Session:
     """A board that a test controls."""
 
-    def __init__(self, image: str, seed: int):
+    def __init__(self, image: str, seed: int, chip: str = STM32F405.name):
         self.elf = Elf.open(image)
-        self.board = Board(self.elf, peripherals.create, seed)
+        create = peripherals.create if chip == STM32F405.name else h5.create
+        self.board = Board(self.elf, create, seed, CHIPS[chip])
         self.snapshots: dict[str, Snapshot] = {}
 
     def answer(self, request: dict) -> dict:
@@ -102,15 +105,16 @@ class Session:
         name = f"USART{usart}" if isinstance(usart, int) else usart
         return self.board.peripherals[name]
 
-    def can_send(self, id: int, ext: bool = False, data: str = "", remote: bool = False, at_us: float | None = None) -> None:
-        """Sends a frame of another node as soon as the bus is free for it."""
+    def can_send(self, id: int, ext: bool = False, data: str = "", remote: bool = False, at_us: float | None = None,
+                 fd: bool = False, fast: bool = False) -> None:  # fmt: skip
+        """Sends a frame of another node as soon as the bus is free for it; `fast`: CAN FD with the higher bit rate."""
         at = None if at_us is None else round(at_us * US)
-        self.board.peripherals["CAN1"].bus.send(id, bytes.fromhex(data), ext, remote, at)
+        _can(self.board).bus.send(id, bytes.fromhex(data), ext, remote, at, fd, fast)
 
     def can_take(self) -> dict:
         """Returns the frames on the bus since the last call: of the board and of other nodes, complete and broken ones."""
         frames = []
-        for entry in self.board.peripherals["CAN1"].bus.take_log():
+        for entry in _can(self.board).bus.take_log():
             frame = entry.frame
             frames.append(
                 {
@@ -119,6 +123,7 @@ class Session:
                     "id": frame.identifier,
                     "ext": frame.extended,
                     "remote": frame.remote,
+                    "fd": frame.fd,
                     "data": frame.data.hex(),
                     "source": entry.source,
                     "error": entry.error,
@@ -192,7 +197,7 @@ class Session:
             "accesses_left": board.bus.left,
             "powered": board.powered,
             "locked_up": board.locked_up,
-            "can_filtered": board.peripherals["CAN1"].filtered,
+            "can_filtered": _can(board).filtered,
         }
 
     def paths_take(self) -> dict:
@@ -212,6 +217,10 @@ class Session:
         self.snapshots[name].restore(self.board)
 
 
+def _can(board):
+    return board.peripherals.get("CAN1") or board.peripherals["FDCAN1"]
+
+
 def _condition(board, wanted):
     """Converts a condition to a function of a log entry, or of `None` after any scheduled call."""
     if isinstance(wanted, str):
@@ -222,7 +231,7 @@ def _condition(board, wanted):
         usart.watch()
         return lambda entry: len(usart.sent) >= wanted["bytes"]
     if "can" in wanted:
-        return _FrameCount(board.peripherals["CAN1"].bus, wanted["can"])
+        return _FrameCount(_can(board).bus, wanted["can"])
     fields = {key: value for key, value in wanted.items() if key != "event"}
     return lambda entry: (
         entry is not None

@@ -15,10 +15,10 @@ pub struct Link {
 }
 
 impl Link {
-    /// Starts the model with an image in its flash.
-    pub fn open(python: &str, image: &Path) -> Self {
+    /// Starts the model of a chip with an image in its flash.
+    pub fn open(python: &str, image: &Path, chip: &str) -> Self {
         let mut child = Command::new(python)
-            .args(["-m", "virtual_board", "--elf"])
+            .args(["-m", "virtual_board", "--chip", chip, "--elf"])
             .arg(image)
             .current_dir(workspace().join("host-tests/board"))
             .stdin(Stdio::piped())

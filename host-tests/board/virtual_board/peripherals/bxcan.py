@@ -39,6 +39,8 @@ class BxCan(Peripheral):
     """CAN1 with its registers of section 32.9."""
 
     name, base, clock = "CAN1", 0x4000_6400, "CAN1"
+    #: It reads no CAN FD frame.
+    takes_fd = False
 
     def __init__(self, board):
         super().__init__(board)

@@ -2,7 +2,8 @@
 
 Frames follow each other on one time line. When the bus is free, the first frame of the board and the due frames of the other nodes
 contend, and the lowest arbitration field wins. A frame lasts exactly as long as its bits, stuff bits included, at the sender's bit rate.
-The other nodes use `bit_rate`; a board whose rate differs by more than 0.5 % receives and causes error frames.
+The other nodes use `bit_rate`, and `data_bit_rate` in the data of CAN FD frames; a board whose rate differs by more than 0.5 %
+receives and causes error frames, and so does one that knows only classic frames when it hears a CAN FD frame.
 
 Faults: `acknowledge` False (no other node listens), `connected` False (the board is alone on its line), `short` "recessive" (CAN_H on
 CAN_L: the board reads recessive whatever it sends, which ends in bus-off) or "dominant" (nothing can be sent; a frame in progress ends
@@ -14,7 +15,7 @@ import heapq
 from functools import partial
 from typing import NamedTuple
 
-from .can_frame import INTERMISSION_BITS, Frame, frame_bits, priority, stuffed_bits
+from .can_frame import INTERMISSION_BITS, Frame, duration, frame_bits, priority, stuffed_bits
 
 PS = 1_000_000_000_000
 RATE_TOLERANCE = 0.005
@@ -23,7 +24,7 @@ ERROR_BITS_ALONE, ERROR_BITS = 6 + 8, 12 + 8
 #: A receiver at another rate detects a stuffing violation within the first bits.
 MISMATCH_BITS = 20
 #: Codes of CAN_ESR.LEC (section 32.9.2).
-STUFF_ERROR, ACKNOWLEDGE_ERROR, RECESSIVE_ERROR, DOMINANT_ERROR = 1, 3, 4, 5
+STUFF_ERROR, FORM_ERROR, ACKNOWLEDGE_ERROR, RECESSIVE_ERROR, DOMINANT_ERROR = 1, 2, 3, 4, 5
 BABBLE = Frame.of(0, bytes(8))
 
 
@@ -47,7 +48,7 @@ class CanBus:
 
     def __init__(self, board, node):
         self.board, self.node = board, node
-        self.bit_rate = 500_000
+        self.bit_rate, self.data_bit_rate = 500_000, 2_000_000
         self.acknowledge = self.connected = True
         self.short = None
         self.babble = None
@@ -63,11 +64,11 @@ class CanBus:
 
     # -- for tests ---------------------------------------------------------------------------------------------------
 
-    def send(self, identifier, data=b"", extended=False, remote=False, at_ps=None):
+    def send(self, identifier, data=b"", extended=False, remote=False, at_ps=None, fd=False, fast=False):
         """Sends a frame of another node as soon as possible, not before `at_ps`."""
         self.order += 1
         at = self.board.now if at_ps is None else at_ps
-        heapq.heappush(self.waiting, (at, self.order, Frame.of(identifier, data, extended, remote)))
+        heapq.heappush(self.waiting, (at, self.order, Frame.of(identifier, data, extended, remote, fd, fast)))
         self.wake()
 
     def take_log(self):
@@ -163,6 +164,15 @@ class CanBus:
         """Returns whether the board's bit rate does not match the bus."""
         return abs(self.node.bit_ps * self.bit_rate / PS - 1) > RATE_TOLERANCE
 
+    def _unreadable(self, frame):
+        """Returns whether the board cannot read a CAN FD frame, and its error."""
+        if not frame.fd:
+            return None
+        if not self.node.takes_fd:
+            return FORM_ERROR
+        wrong = frame.fast and abs(self.node.data_bit_ps * self.data_bit_rate / PS - 1) > RATE_TOLERANCE
+        return STUFF_ERROR if wrong else None
+
     def _send_own(self, frame):
         if self.short == "recessive":
             bits, error, code = 1 + ERROR_BITS_ALONE, "bit", DOMINANT_ERROR
@@ -180,8 +190,13 @@ class CanBus:
             error = "bit rate" if self.node.disturbs() else None
             bits = MISMATCH_BITS + ERROR_BITS if error else frame_bits(frame)
             self._transmit(frame, source, bits * self.bit_ps, error, STUFF_ERROR)
+            return
+        time = duration(frame, self.bit_ps, PS // self.data_bit_rate)
+        code = self._unreadable(frame) if heard else None
+        if code and self.node.disturbs():
+            self._transmit(frame, source, (MISMATCH_BITS + ERROR_BITS) * self.bit_ps, "CAN FD", code)
         else:
-            self._transmit(frame, source, frame_bits(frame) * self.bit_ps, None, 0)
+            self._transmit(frame, source, time, None, code or 0)
 
     def _transmit(self, frame, source, duration, error, code):
         now = self.board.now

@@ -19,12 +19,13 @@ LCKK = 1 << 16
 class Gpio(Peripheral):
     """One port with its sixteen pins."""
 
-    def __init__(self, board, letter):
+    def __init__(self, board, letter, base=0x4002_0000, reset=None):
         super().__init__(board)
+        self.reset_values = reset or RESET.get(letter, (0, 0, 0))
         self.letter = letter
         self.number = ord(letter) - ord("A")
         self.name = self.clock = "GPIO" + letter
-        self.base = 0x4002_0000 + 0x400 * self.number
+        self.base = base + 0x400 * self.number
         self.driven, self.outside = 0, 0
         self.listeners = {}
         self.watched = 0
@@ -32,7 +33,7 @@ class Gpio(Peripheral):
         self._registers()
 
     def _registers(self):
-        self.moder, self.ospeedr, self.pupdr = RESET.get(self.letter, (0, 0, 0))
+        self.moder, self.ospeedr, self.pupdr = self.reset_values
         self.otyper = self.odr = self.lckr = self.lock_step = 0
         self.afr = [0, 0]
         self._find_functions()

@@ -18,6 +18,8 @@ class Iwdg(Peripheral):
     """KR, PR, RLR and SR of section 21.4."""
 
     name, base = "IWDG", 0x4000_3000
+    #: The greatest value of PR that makes a difference.
+    PRESCALERS = 6
 
     def __init__(self, board):
         super().__init__(board)
@@ -47,7 +49,7 @@ class Iwdg(Peripheral):
 
     def _tick_ps(self):
         """Returns one step of the counter in picoseconds times the LSI's frequency: a divider of 4 to 256 (section 21.4.2)."""
-        return PS * (4 << min(self.prescaler, 6))
+        return PS * (4 << min(self.prescaler, self.PRESCALERS))
 
     def _count(self):
         """Updates the counter to its value now; `since` keeps the phase within a step."""
@@ -76,7 +78,7 @@ class Iwdg(Peripheral):
         self.running, self.waiting = True, True
         self.counter = 0xFFF
         self.board.rcc.force_lsi()
-        if self.board.rcc.csr & 2:
+        if self.board.rcc.lsi_ready:
             self.lsi_ready()
 
     def lsi_ready(self):
@@ -133,7 +135,7 @@ class Iwdg(Peripheral):
         if offset == 0x00:
             self._key(value & 0xFFFF)
         elif offset == 0x04:
-            self._update(PVU, value & 7)
+            self._update(PVU, value & (7 if self.PRESCALERS < 8 else 15))
         elif offset == 0x08:
             self._update(RVU, value & 0xFFF)
         else:
@@ -154,7 +156,7 @@ class Iwdg(Peripheral):
             return
         self.busy |= flag
         self.written[flag] = value
-        if self.board.rcc.csr & 2:
+        if self.board.rcc.lsi_ready:
             self._schedule_takeover(flag)
 
     def configure(self, key, value):

@@ -5,8 +5,7 @@ of the HSI oscillator and the frequency of the LSI. Times are those of DS8626 (t
 
 Left out: the I2S PLL, spread spectrum, HSI trimming, the clock outputs MCO1 and MCO2, gates in Sleep mode (the LPENR registers keep
 their values and gate nothing), and the LSE crystal unless a test fits one.
-Assumed where the manual is silent: the reserved word at 0x8C reads 0 and ignores writes; without CSS a core that runs from a dead crystal
-stops until a reset; a system clock changes 0.2 us after its source is ready.
+Assumed where the manual is silent: without CSS a core that runs from a dead crystal stops until a reset; a system clock changes 0.2 us after its source is ready.
 
 Settings: `hsi_error_percent`, `crystal_hz` (None: no crystal), `crystal_stop` (True stops the crystal; False lets it start again,
 though a core that it stopped stays stopped until a reset), `lsi_hz`, `lse_hz`, `hse_startup_us`, `pll_lock_us`, `strict`
@@ -34,8 +33,6 @@ CFGR_WRITABLE = 0xFFFF_FCF3
 AHB_SHIFT = {8: 1, 9: 2, 10: 3, 11: 4, 12: 6, 13: 7, 14: 8, 15: 9}
 APB_SHIFT = {4: 1, 5: 2, 6: 3, 7: 4}
 BUS_OF_ENABLE = {0x30: "HCLK", 0x34: "HCLK", 0x38: "HCLK", 0x40: "PCLK1", 0x44: "PCLK2"}
-#: A register of the STM32F42x, which embassy-stm32 writes on this part too; here it reads 0 and ignores writes.
-DCKCFGR = 0x8C
 OSCILLATOR_SWITCH_PS = 200_000
 
 
@@ -96,6 +93,11 @@ class Rcc(Peripheral):
         """Returns HSE divided by RTCPRE in hertz as (numerator, denominator); (0, 1) if there is no output (section 7.3.3)."""
         divider = (self.cfgr >> 16) & 0x1F
         return (self.hse_hz, divider) if divider >= 2 else (0, 1)
+
+    @property
+    def lsi_ready(self):
+        """Returns whether the LSI's clock can be used."""
+        return bool(self.csr & LSIRDY)
 
     @property
     def lsi_runs(self):
@@ -317,8 +319,6 @@ class Rcc(Peripheral):
             value = self.sscgr
         elif word == 0x84:
             value = self.plli2scfgr
-        elif word == DCKCFGR:
-            value = 0
         else:
             raise registers.unmodelled(self, offset, "read")
         return registers.cut(value, offset, size)
@@ -343,8 +343,6 @@ class Rcc(Peripheral):
             self._write_csr(value)
         elif word == 0x84:
             self.plli2scfgr = value & 0x7000_7FC0
-        elif word == DCKCFGR:
-            self.board.record("ignored_write", register="RCC_DCKCFGR", value=value)
         else:
             raise registers.unmodelled(self, offset, "write")
 

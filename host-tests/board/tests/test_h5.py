@@ -1,0 +1,195 @@
+"""The STM32H563: clocks, USART and FDCAN behave as the manual, or what stood in for it, says."""
+
+import unittest
+
+from virtual_board.peripherals import h5
+from virtual_board.violation import Violation
+
+from .fake_board import MS, US, FakeBoard
+
+RF0N, TC, BO = 1, 1 << 7, 1 << 19
+
+
+class H5(unittest.TestCase):
+    def setUp(self):
+        self.board = FakeBoard(h5.create)
+
+    def start_pll(self, latency=5, scale=3):
+        """HSE of 8 MHz, PLL1 with 250 MHz at P and 50 MHz at Q."""
+        write = self.board.write
+        write("PWR", 0x10, scale << 4)
+        write("FLASH", 0, latency | 2 << 4)
+        write("RCC", 0x00, 0x0015_0023)
+        self.board.advance(1 * MS)
+        write("RCC", 0x28, 0x0003_0000 | 2 << 8 | 1 << 2 | 3)
+        write("RCC", 0x34, 124 | 1 << 9 | 9 << 16)
+        write("RCC", 0x00, 0x0115_0023)
+        self.board.advance(1 * MS)
+        write("RCC", 0x1C, 3)
+        self.board.advance(1 * MS)
+
+    def test_clocks_after_reset_and_from_the_pll(self):
+        rcc = self.board.rcc
+        self.assertEqual((rcc.core_hz, self.board.read("RCC", 0xF4)), (64_000_000, 0x0C00_0000))
+        self.start_pll()
+        self.assertEqual(self.board.read("RCC", 0x1C), 3 | 3 << 3)
+        self.assertEqual((rcc.core_hz, rcc.clock_hz("TIM_APB1"), rcc.clock_hz("FDCAN")), (250_000_000, 250_000_000, 8_000_000))
+        self.board.write("RCC", 0xE8, 1 << 8)
+        self.assertEqual(rcc.clock_hz("FDCAN"), 50_000_000)
+
+    def test_too_few_wait_states_and_too_low_a_voltage_are_violations(self):
+        for latency, scale in ((4, 3), (5, 2)):
+            self.board = FakeBoard(h5.create)
+            with self.assertRaises(Violation):
+                self.start_pll(latency, scale)
+
+    def test_the_pll_needs_a_fitting_input_range(self):
+        self.board.write("RCC", 0x28, 0x0001_0000 | 4 << 8 | 0 << 2 | 1)
+        with self.assertRaises(Violation):
+            self.board.write("RCC", 0x00, 0x0100_0023)
+
+    def test_gates_and_resets(self):
+        self.assertFalse(self.board.rcc.enabled("USART1"))
+        self.board.write("RCC", 0xA4, 1 << 14)
+        self.assertTrue(self.board.rcc.enabled("USART1"))
+        self.board.write("USART1", 0x0C, 0x123)
+        self.board.write("RCC", 0x7C, 1 << 14)
+        self.assertFalse(self.board.rcc.enabled("USART1"))
+        self.assertEqual(self.board.read("USART1", 0x0C), 0)
+
+    def test_the_usart_keeps_eight_bytes_and_then_overruns(self):
+        self.board.write("GPIOB", 0x00, 2 << 14)
+        self.board.write("GPIOB", 0x20, 7 << 28)
+        self.board.write("USART1", 0x0C, 64_000_000 // 115_200)
+        self.board.write("USART1", 0x00, 1 << 29 | 1 << 5 | 1 << 2 | 1)
+        self.board.peripherals["USART1"].inject(bytes(range(9)))
+        self.board.advance(2 * MS)
+        self.assertEqual(self.board.read("USART1", 0x1C) & 0x28, 0x28)
+        self.assertTrue(self.board.lines[58])
+        self.assertEqual([self.board.read("USART1", 0x24) for _ in range(8)], list(range(8)))
+        self.assertEqual(self.board.read("USART1", 0x1C) & 0x28, 8)
+        self.board.write("USART1", 0x20, 8)
+        self.assertEqual(self.board.read("USART1", 0x1C) & 0x28, 0)
+        self.assertFalse(self.board.lines[58])
+
+    def test_the_watchdog_has_longer_prescalers_and_says_that_it_runs(self):
+        self.board.write("IWDG", 0x00, 0x5555)
+        self.board.write("IWDG", 0x04, 8)
+        self.board.write("IWDG", 0x08, 9)
+        self.board.write("IWDG", 0x00, 0xCCCC)
+        self.board.advance(10 * MS)
+        self.assertEqual(self.board.read("IWDG", 0x0C), 1 << 8)
+        self.board.write("IWDG", 0x00, 0xAAAA)
+        self.board.advance(319 * MS)
+        self.assertEqual(self.board.resets, [])
+        self.board.advance(2 * MS)
+        self.assertEqual([cause for _, cause in self.board.resets], ["iwdg"])
+
+    # -- FDCAN -------------------------------------------------------------------------------------------------------
+
+    def start_can(self, cccr=0x300):
+        """500 kbit/s and 2 Mbit/s from 8 MHz; one filter for 0xAA."""
+        write = self.board.write
+        self.board.alternate("D", 0, 9)
+        self.board.alternate("D", 1, 9)
+        write("RCC", 0x00, 0x0015_0023)
+        self.board.advance(1 * MS)
+        write("FDCAN1", 0x18, 1)
+        write("FDCAN1", 0x18, 3)
+        write("FDCAN1", 0x1C, 13 << 8 | 0)
+        write("FDCAN1", 0x0C, 1 << 8)
+        write("FDCAN1", 0x80, 1 << 16 | 2 << 4 | 2 << 2)
+        write("SRAMCAN", 0x00, 2 << 30 | 1 << 27 | 0xAA << 16 | 0x7FF)
+        write("FDCAN1", 0xDC, 7)
+        write("FDCAN1", 0x54, RF0N | TC | BO)
+        write("FDCAN1", 0x5C, 1)
+        write("FDCAN1", 0x18, 3 | cccr)
+        write("FDCAN1", 0x18, cccr)
+        self.board.advance(1 * MS)
+        return self.board.peripherals["FDCAN1"].bus
+
+    def request(self, index, identifier):
+        """Puts a frame of two bytes into a transmit buffer."""
+        base = 0x278 + 72 * index
+        for offset, word in ((0, identifier << 18), (4, 2 << 16), (8, 0x2211)):
+            self.board.write("SRAMCAN", base + offset, word)
+        self.board.write("FDCAN1", 0xCC, 1 << index)
+
+    def test_configuration_needs_init_and_cce(self):
+        self.board.write("FDCAN1", 0x1C, 0x1234)
+        self.assertEqual(self.board.read("FDCAN1", 0x1C), 0x0600_0A03)
+        self.board.write("FDCAN1", 0x18, 0x101)
+        self.assertEqual(self.board.read("FDCAN1", 0x18), 1)
+        self.assertEqual(len(self.board.events("ignored_write")), 2)
+
+    def test_the_fifo_sends_in_order_whatever_the_identifiers(self):
+        bus = self.start_can()
+        for index, identifier in enumerate((0x300, 0x200, 0x100)):
+            self.request(index, identifier)
+        self.assertEqual(self.board.read("FDCAN1", 0xC4), 1 << 21)
+        self.board.advance(1 * MS)
+        self.assertEqual([entry.frame.identifier for entry in bus.take_log()], [0x300, 0x200, 0x100])
+        self.assertEqual((self.board.read("FDCAN1", 0xC4), self.board.read("FDCAN1", 0xD4)), (3, 7))
+        self.assertTrue(self.board.read("FDCAN1", 0x50) & TC and self.board.lines[39])
+
+    def test_a_cancelled_request_ends_at_once_or_with_its_attempt(self):
+        bus = self.start_can()
+        bus.configure("acknowledge", False)
+        self.request(0, 0x100)
+        self.board.advance(50 * US)
+        self.request(1, 0x200)
+        self.board.write("FDCAN1", 0xD0, 3)
+        self.assertEqual((self.board.read("FDCAN1", 0xC8), self.board.read("FDCAN1", 0xD8)), (1, 2))
+        self.board.advance(1 * MS)
+        self.assertEqual((self.board.read("FDCAN1", 0xC8), self.board.read("FDCAN1", 0xD8)), (0, 3))
+        self.assertEqual(self.board.read("FDCAN1", 0xD4), 0)
+
+    def test_filters_and_the_full_fifo(self):
+        bus = self.start_can()
+        for number in range(4):
+            bus.send(0xAA, bytes([number]))
+        bus.send(0xAB, b"")
+        self.board.advance(2 * MS)
+        # Full, three elements, the first at 0; the fourth was lost; and 0xAB is not for this node.
+        self.assertEqual(self.board.read("FDCAN1", 0x90), 1 << 25 | 1 << 24 | 3)
+        self.assertEqual(self.board.peripherals["FDCAN1"].filtered, 1)
+        self.assertEqual([self.board.read("SRAMCAN", 0xB0 + 72 * place + 8) for place in range(3)], [0, 1, 2])
+        self.board.write("FDCAN1", 0x94, 0)
+        self.assertEqual(self.board.read("FDCAN1", 0x90) & 0x3030F, 1 << 8 | 2)
+
+    def test_can_fd_is_received_or_an_error(self):
+        for cccr, error in ((0x300, None), (0, "CAN FD")):
+            self.board = FakeBoard(h5.create)
+            bus = self.start_can(cccr)
+            bus.send(0xAA, bytes(range(64)), fd=True, fast=True)
+            self.board.advance(500 * US)
+            first = bus.take_log()[0]
+            self.assertEqual((first.error, self.board.read("FDCAN1", 0x90) & 0xF), (error, 0 if error else 1))
+            if not error:
+                # 64 bytes alone take 256 us at 2 Mbit/s; 27 more bits take 54 us at 500 kbit/s.
+                self.assertTrue(310 < (first.end_ps - first.start_ps) / US < 400)
+
+    def test_bus_off_ends_129_sequences_after_init_is_cleared(self):
+        bus = self.start_can()
+        bus.configure("short", "recessive")
+        self.request(0, 0x100)
+        self.board.advance(20 * MS)
+        self.assertEqual(self.board.read("FDCAN1", 0x44) >> 7 & 1, 1)
+        self.assertEqual(self.board.read("FDCAN1", 0x18) & 1, 1)
+        bus.configure("short", None)
+        self.board.advance(10 * MS)
+        self.assertEqual(self.board.read("FDCAN1", 0x44) >> 7 & 1, 1)
+        self.board.write("FDCAN1", 0x50, BO)
+        self.board.write("FDCAN1", 0x18, 0x300)
+        self.board.advance(129 * 11 * 2 * US - 1 * US)
+        self.assertEqual(self.board.read("FDCAN1", 0x50) & BO, 0)
+        self.board.advance(2 * US)
+        self.assertEqual((self.board.read("FDCAN1", 0x44) >> 7 & 1, self.board.read("FDCAN1", 0x50) & BO), (0, BO))
+
+    def test_the_last_error_is_read_once(self):
+        bus = self.start_can()
+        bus.configure("acknowledge", False)
+        self.request(0, 0x100)
+        self.board.advance(200 * US)
+        self.assertEqual([self.board.read("FDCAN1", 0x44) & 7 for _ in range(2)], [3, 7])
+
