@@ -38,7 +38,7 @@ use crate::can::wheel::WheelReceiver;
 use crate::compensate::Complete;
 use crate::estimate::{VehicleSample, YawEstimate};
 use crate::fog::{Beside, FogConfig, FogCounters, FogPipeline};
-use crate::heading::{Heading, HeadingError, HeadingReceiver, Received};
+use crate::heading::{Fix, Heading, HeadingError, HeadingReceiver, Received, Refusal};
 use crate::health::slow::SlowStatus;
 use crate::health::{BoardFaults, Faults, InputCounters, MonitorCounters, Quality, Source, count};
 use crate::model::Estimate;
@@ -315,7 +315,25 @@ impl Coprocessor {
         Ok(())
     }
 
+    /// Processes a message of a GNSS receiver on a line of its own ([`crate::heading::GnssLine`]) that arrived at `now`,
+    /// where the configuration names one.
+    ///
+    /// # Errors
+    /// [`InputError::Heading`] for a damaged message, for values that can be no vehicle's, and for a course that the
+    /// receiver reckons itself, [`InputError::ClockWentBack`]; it is counted and not used.
+    pub fn gnss(&mut self, fix: Result<Fix, HeadingError>, now: Micros) -> Result<(), InputError> {
+        self.advance(now)?;
+        let time = self.timeline.time();
+        let Some(receiver) = &mut self.heading else { return Ok(()) };
+        let received = fix.and_then(|fix| receiver.judge(fix, time));
+        self.use_heading(received)
+    }
+
     fn refuse_heading(&mut self, error: HeadingError) -> InputError {
+        if error == HeadingError::Reckoned {
+            self.pipeline.refuse_course(Refusal::Reckoned);
+            return InputError::Heading(error);
+        }
         let InputCounters { latitude_errors, heading_errors, .. } = &mut self.counters;
         let is_jump = matches!(error, HeadingError::Jump { .. });
         count(if is_jump { latitude_errors } else { heading_errors }, 1);
@@ -325,10 +343,13 @@ impl Coprocessor {
     #[inline(never)]
     fn take_heading(&mut self, frame: &DataFrame, time: Micros) -> Result<bool, InputError> {
         let Some(receiver) = &mut self.heading else { return Ok(false) };
-        let received = receiver.decode(frame, time);
-        self.fog.contest_latitude(receiver.is_contested());
-        let received = received.transpose().map_err(|error| self.refuse_heading(error))?;
-        let Some(Received { heading, latitude }) = received else { return Ok(false) };
+        let Some(received) = receiver.decode(frame, time) else { return Ok(false) };
+        self.use_heading(received).map(|()| true)
+    }
+
+    fn use_heading(&mut self, received: Result<Received, HeadingError>) -> Result<(), InputError> {
+        self.fog.contest_latitude(self.heading.as_ref().is_some_and(HeadingReceiver::is_contested));
+        let Received { heading, latitude } = received.map_err(|error| self.refuse_heading(error))?;
         if let Some(heading) = &heading {
             self.pipeline.course(heading);
         }
@@ -337,7 +358,7 @@ impl Coprocessor {
         {
             self.fog.set_latitude(latitude, is_near);
         }
-        Ok(true)
+        Ok(())
     }
 
     /// Does the work that is due at `now` without an input: it sends the messages of silent sensors, and of steps that

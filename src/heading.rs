@@ -1,22 +1,27 @@
-//! A heading reference of the vehicle: course and speed over ground with their accuracies, from CAN.
+//! A heading reference of the vehicle: course and speed over ground with their accuracies, from CAN or a serial line.
 //!
 //! [`nmea2000`] has the messages of GNSS receivers on boats and machines, [`j1939`] those of trucks; any other frame is
-//! read by its description. [`HeadingReceiver`] takes those that the configuration names, and [`Estimator`] learns.
+//! read by its description. [`GnssLine`] reads UBX and NMEA 0183. [`HeadingReceiver`] takes what the configuration names,
+//! and [`Estimator`] learns.
 
 mod described;
 mod estimator;
 pub(crate) mod filter;
 mod gain;
+mod gnss;
 pub mod j1939;
 pub mod latitude;
+mod nmea;
 pub mod nmea2000;
 mod receiver;
 mod turns;
+mod ubx;
 
 pub use described::HeadingSignal;
 pub use estimator::{CourseConfig, CourseCounters, CourseState, Estimator, Refusal};
 pub(crate) use estimator::{FINE_BIAS, gain_knowledge};
 pub use gain::Gain;
+pub use gnss::{Fix, GnssLine, GnssProtocol, GnssSettings};
 pub use receiver::{HeadingConfigError, HeadingReceiver, HeadingSettings, Received};
 
 use embedded_can::{ExtendedId, Frame, Id};
@@ -35,7 +40,7 @@ pub struct Heading {
     pub speed_sigma: Option<f32>,
 }
 
-/// The reason why a frame gives no heading.
+/// The reason why a frame or message gives no heading.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -49,6 +54,14 @@ pub enum HeadingError {
     Range { what: &'static str, value: f32 },
     #[error("latitude jumps from {from} to {to}")]
     Jump { from: f32, to: f32 },
+    #[error("the checksum of a GNSS message is wrong")]
+    Checksum,
+    #[error("a GNSS message of {0} bytes is cut, too long or of another version")]
+    Length(usize),
+    #[error("a GNSS message: its {0} does not read")]
+    Field(&'static str),
+    #[error("the GNSS receiver reckons its course by sensors of its own")]
+    Reckoned,
 }
 
 impl Heading {

@@ -278,7 +278,8 @@ pub struct InputCounters {
     pub wheel_errors: u32,
     /// Frames whose latitude was too far from the one in use.
     pub latitude_errors: u32,
-    /// Courses, speeds over ground or latitudes that no vehicle has, and frames of them that are too short.
+    /// Courses, speeds over ground or latitudes that no vehicle has, frames of them that are too short, and damaged
+    /// messages of a GNSS receiver.
     pub heading_errors: u32,
     /// Inputs with a time before the newest one.
     pub clock_back: u32,

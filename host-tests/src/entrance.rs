@@ -26,11 +26,12 @@ pub struct Entrance {
     pub mutations: u64,
 }
 
-pub const ALL: [Entrance; 13] = [
+pub const ALL: [Entrance; 14] = [
     Entrance { name: "xsens", run: sensors::xsens, seeds: sensors::xsens_seeds, mutations: 20_000 },
     Entrance { name: "dsp1760", run: sensors::dsp1760, seeds: sensors::dsp1760_seeds, mutations: 20_000 },
     Entrance { name: "bmi088", run: sensors::bmi088, seeds: sensors::bmi088_seeds, mutations: 20_000 },
     Entrance { name: "icm42688", run: sensors::icm42688, seeds: sensors::icm42688_seeds, mutations: 20_000 },
+    Entrance { name: "gnss", run: sensors::gnss, seeds: sensors::gnss_seeds, mutations: 20_000 },
     Entrance { name: "slcan_board", run: slcan::board, seeds: slcan::board_seeds, mutations: 20_000 },
     Entrance { name: "slcan_host", run: slcan::host, seeds: slcan::host_seeds, mutations: 20_000 },
     Entrance { name: "can_wheels", run: can::wheels, seeds: can::wheel_seeds, mutations: 20_000 },

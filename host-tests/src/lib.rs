@@ -4,6 +4,7 @@
 pub mod board;
 pub mod entrance;
 pub mod flash;
+pub mod gnss;
 pub mod golden;
 pub mod image;
 pub mod inputs;

@@ -9,7 +9,7 @@ use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{WheelFrame, WheelSettings};
 use gyronet::compensate::{CompensateConfig, Lag, Stride};
-use gyronet::heading::{HeadingSettings, HeadingSignal};
+use gyronet::heading::{GnssProtocol, GnssSettings, HeadingSettings, HeadingSignal};
 use gyronet::store::{Configuration, Field, FogGyro, FogPart, Mounting};
 use gyronet::units::AngularRate;
 
@@ -80,6 +80,10 @@ pub fn configuration(noise: &mut Noise) -> Configuration {
         speed: maybe(noise, place),
         course: maybe(noise, place),
         latitude: maybe(noise, place),
+        line: (noise.int(0, 3) == 0).then(|| GnssSettings {
+            protocol: GnssProtocol::Ubx,
+            baud: one(noise, &[4_800, 38_400, 460_800]),
+        }),
         ..HeadingSettings::NONE
     };
     let diagnosis = match noise.int(0, 3) {

@@ -1,6 +1,7 @@
 //! A vehicle that is on a winding road, with turns both ways, from the start on: its inertial samples, whose bias and gain
 //! nobody knows, and its course by a GNSS receiver, as frames of NMEA 2000.
 
+use crate::gnss::Pvt;
 use crate::noise::Noise;
 use crate::synthetic::{force, rate, turning};
 use gyronet::can::DataFrame;
@@ -45,10 +46,21 @@ impl Winding {
         sample
     }
 
-    pub fn course(&mut self) -> DataFrame {
+    /// Direction of travel by the receiver, rad clockwise from north.
+    pub fn direction(&mut self) -> f64 {
         let heading = self.headings[self.headings.len().saturating_sub(1 + LATENCY)];
-        let course = (-(heading + NOISE * self.receiver.normal())).rem_euclid(TAU) as f32;
-        let heading = Heading { course: Some(course), speed: Some(15.0), ..Heading::default() };
+        (-(heading + NOISE * self.receiver.normal())).rem_euclid(TAU)
+    }
+
+    pub fn course(&mut self) -> DataFrame {
+        let course = Some(self.direction() as f32);
+        let heading = Heading { course, speed: Some(15.0), ..Heading::default() };
         nmea2000::course_speed_frame(&heading, 0, 0x23).expect("a frame")
+    }
+
+    /// The same by a receiver on a line of its own.
+    pub fn pvt(&mut self) -> Pvt {
+        let course = (self.direction().to_degrees() * 1e5) as i32;
+        Pvt { course, speed: 15_000, course_sigma: 60_000, ..Pvt::GOOD }
     }
 }

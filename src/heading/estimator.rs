@@ -109,6 +109,8 @@ pub enum Refusal {
     Stands = 2,
     /// The vehicle stands.
     Standstill = 3,
+    /// The receiver reckons it by sensors of its own.
+    Reckoned = 4,
 }
 
 /// A course that has arrived: its tick, direction to the left, variance and weight.
@@ -267,12 +269,15 @@ impl Estimator {
                     self.refusal = None;
                     count(&mut self.counters.used, 1);
                 }
-                Err(refusal) => {
-                    self.refusal = Some(refusal);
-                    count(&mut self.counters.refused, 1);
-                }
+                Err(refusal) => self.refuse(refusal),
             }
         }
+    }
+
+    /// Notes that a course is not used.
+    pub(crate) fn refuse(&mut self, why: Refusal) {
+        self.refusal = Some(why);
+        count(&mut self.counters.refused, 1);
     }
 
     /// Starts the heading again, because a turn may have been missed.

@@ -1,4 +1,4 @@
-//! The receiver of courses, speeds and latitudes from the frames that the configuration names.
+//! The receiver of courses, speeds and latitudes from the frames, or the serial line, that the configuration names.
 //!
 //! Of the messages of NMEA 2000 and J1939, those of one sender are used, and those of another once that one has been
 //! silent for [`SILENT`]: two receivers on a bus differ in latency. Described values may be in frames of their own;
@@ -6,7 +6,7 @@
 
 use super::described::HeadingSignal;
 use super::latitude::{LatitudeJudge, ReceivedLatitude};
-use super::{Heading, HeadingError, j1939, nmea2000};
+use super::{Fix, GnssSettings, Heading, HeadingError, j1939, nmea2000};
 use crate::can::wheel::raw_id;
 use crate::units::{Duration, Micros};
 use embedded_can::{ExtendedId, Frame, Id};
@@ -20,8 +20,10 @@ const ALL: u32 = u32::MAX;
 const GROUP: u32 = 0x3_FFFF << 8;
 /// The two groups of NMEA 2000 differ in the lowest two bits, which this leaves out.
 const BOTH: u32 = GROUP & !(3 << 8);
+/// Bit rates of a serial line.
+const BAUDS: core::ops::RangeInclusive<u32> = 4_800..=460_800;
 
-/// The frames from which courses, speeds and latitudes are taken. By default there are none.
+/// The source of courses, speeds and latitudes. By default there is none.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HeadingSettings {
@@ -39,6 +41,8 @@ pub struct HeadingSettings {
     pub speed_sigma: Option<HeadingSignal>,
     /// Latitude, degrees, north positive.
     pub latitude: Option<HeadingSignal>,
+    /// A receiver on the board's line for one, in place of all frames.
+    pub line: Option<GnssSettings>,
 }
 
 /// The reason why heading settings are refused.
@@ -54,6 +58,10 @@ pub enum HeadingConfigError {
     Scale(u32),
     #[error("a course needs a speed")]
     NoSpeed,
+    #[error("line: frames of the bus are named, too; a board has one source of courses")]
+    TwoSources,
+    #[error("line: {0} baud is not within 4800 to 460800")]
+    Baud(u32),
 }
 
 impl HeadingSettings {
@@ -66,6 +74,7 @@ impl HeadingSettings {
         speed: None,
         speed_sigma: None,
         latitude: None,
+        line: None,
     };
 
     fn signals(&self) -> [Option<HeadingSignal>; 5] {
@@ -98,6 +107,14 @@ impl HeadingSettings {
         if self.course.is_some() && self.speed.is_none() {
             return Err(HeadingConfigError::NoSpeed);
         }
+        if let Some(GnssSettings { baud, .. }) = self.line {
+            if self.filters().next().is_some() {
+                return Err(HeadingConfigError::TwoSources);
+            }
+            if !BAUDS.contains(&baud) {
+                return Err(HeadingConfigError::Baud(baud));
+            }
+        }
         let matches = |id: Id, (own, mask): (Id, u32)| {
             let is_extended = |id| matches!(id, Id::Extended(_));
             is_extended(id) == is_extended(own) && raw_id(id) & mask == raw_id(own) & mask
@@ -107,7 +124,7 @@ impl HeadingSettings {
     }
 }
 
-/// The content of a frame.
+/// The content of a frame or message.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Received {
     /// Course and speed.
@@ -162,11 +179,17 @@ impl HeadingReceiver {
             Some(read) => read,
             None => self.described(frame, now).transpose()?,
         };
-        Some(read.and_then(|(heading, latitude)| {
-            let heading = heading.map(Heading::checked).transpose()?;
-            let latitude = latitude.map(|latitude| self.latitude.take(latitude, now)).transpose()?.flatten();
-            Ok(Received { heading, latitude })
-        }))
+        Some(read.and_then(|(heading, latitude)| self.judge(Fix { heading, latitude }, now)))
+    }
+
+    /// Judges what a receiver says at `now`.
+    ///
+    /// # Errors
+    /// [`HeadingError`]; nothing of it is used.
+    pub fn judge(&mut self, Fix { heading, latitude }: Fix, now: Micros) -> Result<Received, HeadingError> {
+        let heading = heading.map(Heading::checked).transpose()?;
+        let latitude = latitude.map(|latitude| self.latitude.take(latitude, now)).transpose()?.flatten();
+        Ok(Received { heading, latitude })
     }
 
     fn is_sender(&mut self, id: Id, now: Micros) -> bool {

@@ -9,7 +9,7 @@ use super::{Pipeline, State};
 use crate::bias::ZeroRate;
 use crate::compensate::Remaining;
 use crate::heading::filter::{BIAS, Filter, GAIN};
-use crate::heading::{CourseState, FINE_BIAS, Gain, Heading, gain_knowledge};
+use crate::heading::{CourseState, FINE_BIAS, Gain, Heading, Refusal, gain_knowledge};
 use crate::health::slow::Knowledge;
 use crate::mounting::{Rotation, Vertical};
 use crate::sample::Frame;
@@ -37,6 +37,11 @@ impl Pipeline {
     /// Takes a course that arrives now: the vehicle's direction of travel up to two seconds ago.
     pub fn course(&mut self, heading: &Heading) {
         self.state.course.arrived(heading, self.state.tick);
+    }
+
+    /// Notes that a course is not used.
+    pub fn refuse_course(&mut self, why: Refusal) {
+        self.state.course.refuse(why);
     }
 
     /// Returns the gain that courses have shown, a share, and its sigma once it is estimated.

@@ -40,6 +40,8 @@ pub struct SupportedHardware {
     pub imus: &'static [ImuPart],
     /// Supported fibre-optic gyros.
     pub fogs: &'static [FogPart],
+    /// True if there is a line for a GNSS receiver.
+    pub gnss: bool,
     /// Clock frequency of the processor on its crystal, Hz.
     pub clock_hz: u32,
 }

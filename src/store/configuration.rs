@@ -90,7 +90,7 @@ pub struct Configuration {
     pub fog_ids: [u16; 3],
     /// Correction of the fibre-optic gyro.
     pub fog_gyro: FogGyro,
-    /// Frames with the vehicle's course, speed over ground and latitude, from which bias and gain are learnt in motion.
+    /// Where the vehicle's course, speed over ground and latitude come from, from which bias and gain are learnt in motion.
     pub heading: HeadingSettings,
     /// True if wheel, course and latitude frames from a host on SLCAN are used, for a bench without a bus. On a vehicle,
     /// anyone with access to that line could then influence the rate.
@@ -215,7 +215,7 @@ impl Configuration {
 
 impl Record for Configuration {
     const KEY: u8 = 1;
-    const VERSION: u8 = 11;
+    const VERSION: u8 = 12;
 
     fn check(&self) -> Result<(), FieldError> {
         let config = Config::new(self.can).map_err(FieldError::Can)?;

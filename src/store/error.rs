@@ -109,6 +109,8 @@ pub enum FieldError {
     Window { cycles: u32, available: u32 },
     #[error("diagnosis: identifier {0:#x} has too many bits, or is used twice")]
     Diagnosis(u32),
+    #[error("heading.line: the board has no line for a GNSS receiver")]
+    NoLine,
 }
 
 /// Checks that a value is inside its range.

@@ -138,7 +138,7 @@ pub const IDENTIFIERS: [Identifier; 29] = [
         0x0119,
         "course",
         "1, 2, 2, 4, 4, 4, 1",
-        "gain of the yaw gyro by courses: 0 unknown, 1 coarse, 2 fine, 3 they contradict the gyro; gain and sigma, 1e-5; courses used, refused, and starts of the heading after contradictions; the newest course: 0 used, 1 far from the gyro's heading, 2 the same in a turn, 3 the vehicle stands",
+        "gain of the yaw gyro by courses: 0 unknown, 1 coarse, 2 fine, 3 they contradict the gyro; gain and sigma, 1e-5; courses used, refused, and starts of the heading after contradictions; the newest course: 0 used, 1 far from the gyro's heading, 2 the same in a turn, 3 the vehicle stands, 4 reckoned by the receiver's own sensors",
     ),
     writable(
         0x011A,

@@ -16,8 +16,12 @@ use gyronet::store::{FlashFault, FogPart, ImuPart, Record as _};
 use gyronet::uds::update::Head;
 use gyronet::uds::{Server, signature};
 
-const SUPPORTED_HARDWARE: SupportedHardware =
-    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760], clock_hz: 168_000_000 };
+const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
+    imus: &[ImuPart::XsensMti],
+    fogs: &[FogPart::Dsp1760],
+    gnss: false,
+    clock_hz: 168_000_000,
+};
 
 type Board = Device<RamFlash<SECTOR>, RamFlash<RECORD_SECTOR>>;
 

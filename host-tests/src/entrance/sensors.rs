@@ -1,7 +1,9 @@
 //! Passes bytes to the parsers of the sensors.
 
 use super::Seed;
+use crate::gnss::{Pvt, sentence};
 use crate::wire::{bytes, feed, message, synthetic_frame};
+use gyronet::heading::{GnssLine, GnssProtocol};
 use gyronet::sensor::bmi088::frame::{self, FORCE_FRAME, RATE_FRAME, STATE, State};
 use gyronet::sensor::crc::CRC_32_MPEG_2;
 use gyronet::sensor::dsp1760::Dsp1760;
@@ -67,6 +69,23 @@ pub fn dsp1760_seeds() -> Vec<Seed> {
         [bytes("fe 81 00 aa 7f 7f 7f 7f 7f 7f 55"), message(4, Extra::Temperature(25))].concat(),
     ];
     vec![("stream", extras.concat()), ("self_test", self_test)]
+}
+
+/// Passes bytes as a stream in both protocols, and checks that a good message behind them and what a header among them may
+/// announce is read.
+pub fn gnss(data: &[u8]) {
+    let good =
+        [(GnssProtocol::Ubx, Pvt::GOOD.bytes()), (GnssProtocol::Nmea, sentence("GPRMC,,A,,,,,,210.0,,"))];
+    for (protocol, good) in good {
+        let fixes = feed(&mut GnssLine::new(protocol), [data, &[0; 100], &good].concat());
+        assert!(fixes.last().is_some_and(Result::is_ok), "{protocol:?}");
+    }
+}
+
+pub fn gnss_seeds() -> Vec<Seed> {
+    let rmc = sentence("GNRMC,092633.00,A,4722.61400,N,00832.50200,E,19.438,210.00,170524,,,A,V");
+    let vtg = sentence("GPVTG,210.00,T,,M,19.438,N,36.000,K,D");
+    vec![("nmea", [rmc, vtg].concat()), ("ubx", Pvt::GOOD.bytes())]
 }
 
 /// Passes bytes as the state of the accelerometer, a frame of its FIFO and a frame of the gyro's: all readings are in range.

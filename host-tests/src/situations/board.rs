@@ -22,7 +22,8 @@ use gyronet::store::{Calibration, Configuration, FogPart, ImuPart, Learned};
 use gyronet::units::Micros;
 use std::collections::VecDeque;
 
-const HARDWARE: SupportedHardware = SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[], clock_hz: 0 };
+const HARDWARE: SupportedHardware =
+    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[], gnss: false, clock_hz: 0 };
 /// The board fetches at most this many packets from a FIFO at once.
 const MAX_FETCHED: usize = 32;
 

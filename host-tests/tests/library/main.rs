@@ -22,6 +22,7 @@ mod fog_grid;
 mod fog_pipeline;
 mod fognet_blob;
 mod framer;
+mod gnss;
 mod gyronet_scale;
 mod heading;
 mod icm42688;

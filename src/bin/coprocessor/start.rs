@@ -27,6 +27,7 @@ const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
         (false, false) => &[],
     },
     fogs: if BOARD.fog.is_some() { &[FogPart::Dsp1760] } else { &[] },
+    gnss: false,
     clock_hz: FULL_HZ,
 };
 

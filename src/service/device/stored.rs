@@ -128,9 +128,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     fn check_supported(&self, configuration: &Configuration) -> Result<(), StoreError> {
-        let SupportedHardware { imus, fogs, .. } = self.supported;
+        let SupportedHardware { imus, fogs, gnss, .. } = self.supported;
         if !imus.contains(&configuration.imu) || configuration.fog.is_some_and(|fog| !fogs.contains(&fog)) {
             return Err(StoreError::Field(FieldError::PartNotInImage));
+        }
+        if configuration.heading.line.is_some() && !gnss {
+            return Err(StoreError::Field(FieldError::NoLine));
         }
         Ok(())
     }

@@ -94,6 +94,13 @@ const SETTINGS: &[(&str, Takes)] = &[
     ("heading.speed_sigma", Other("", "the same, m/s")),
     ("heading.latitude", Other("", "the same, deg")),
     (
+        "heading.line",
+        Other(
+            "",
+            "`null`, or a receiver on UART4 in place of frames: `{\"protocol\":\"Ubx\",\"baud\":38400}`, or `Nmea`",
+        ),
+    ),
+    (
         "slcan_inputs",
         Other(
             "",

@@ -5,6 +5,7 @@ use embedded_can::{Id, StandardId};
 use gyronet::can::config::{ConfigError, Settings};
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::wheel::{WheelFrame, WheelSettings};
+use gyronet::heading::{GnssProtocol, GnssSettings};
 use gyronet::health::{Faults, Status};
 use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::event::EventKind;
@@ -56,6 +57,9 @@ fn configuration_is_kept_whole() {
     assert_eq!(board.set_configuration(&twice), refused(duplicate));
     let with_fog = Configuration { fog, ..wanted };
     assert_eq!(board.set_configuration(&with_fog), refused(FieldError::PartNotInImage));
+    let mut with_line = wanted;
+    with_line.heading.line = Some(GnssSettings { protocol: GnssProtocol::Nmea, baud: 9_600 });
+    assert_eq!(board.set_configuration(&with_line), refused(FieldError::NoLine));
     assert_eq!(*start(&flash).configuration(), wanted);
 }
 

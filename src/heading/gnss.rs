@@ -1,0 +1,136 @@
+//! A GNSS receiver on a serial line of its own, in place of one on the bus.
+//!
+//! A fix counts from its arrival: the time that the receiver and the line take is part of the lag that the estimator
+//! finds.
+
+use super::nmea::Sentences;
+use super::ubx::{self, Ubx};
+use super::{Heading, HeadingError};
+use crate::health::count;
+use crate::sensor::framer::Framer;
+use crate::sensor::{ByteSource, Source};
+
+/// The line of a GNSS receiver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct GnssSettings {
+    /// What the receiver sends. UBX may come beside NMEA, NMEA comes alone.
+    pub protocol: GnssProtocol,
+    /// Bit rate, 4800 to 460800.
+    pub baud: u32,
+}
+
+/// Messages with a course.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum GnssProtocol {
+    /// UBX-NAV-PVT of u-blox, with accuracies.
+    Ubx,
+    /// RMC or VTG of NMEA 0183.
+    Nmea,
+}
+
+/// What a message of a receiver says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Fix {
+    /// Course and speed, by satellites alone.
+    pub heading: Option<Heading>,
+    /// Degrees, north positive.
+    pub latitude: Option<f32>,
+}
+
+impl Fix {
+    /// The receiver works and sees too few satellites.
+    pub const NONE: Self = Self { heading: None, latitude: None };
+}
+
+/// The parser of a line: bytes in, fixes out.
+///
+/// A damaged message is an error, and the next good one is not lost with it.
+#[derive(Debug, Clone)]
+pub struct GnssLine {
+    parser: Parser,
+    /// An error that is returned first, and what was read behind it.
+    damage: Option<HeadingError>,
+    kept: Option<Read>,
+    bad_checksums: u32,
+    others: u32,
+}
+
+/// The content of an intact message; `None` for one that is not used.
+pub(super) type Read = Option<Result<Fix, HeadingError>>;
+
+#[derive(Debug, Clone)]
+enum Parser {
+    Ubx(Framer<Ubx, { ubx::MAX_FRAME }>),
+    Nmea(Sentences),
+}
+
+impl GnssLine {
+    /// Creates a parser that has received nothing.
+    #[must_use]
+    pub const fn new(protocol: GnssProtocol) -> Self {
+        let parser = match protocol {
+            GnssProtocol::Ubx => Parser::Ubx(Framer::new()),
+            GnssProtocol::Nmea => Parser::Nmea(Sentences::new()),
+        };
+        Self { parser, damage: None, kept: None, bad_checksums: 0, others: 0 }
+    }
+
+    /// Returns the number of intact messages that were passed over: of another kind or talker, or VTG beside RMC.
+    #[must_use]
+    pub const fn others(&self) -> u32 {
+        self.others
+    }
+
+    fn read(&mut self) -> Option<Read> {
+        match &mut self.parser {
+            Parser::Ubx(framer) => {
+                let bad = framer.bad_checksums();
+                let read = framer.next_frame().map(ubx::read);
+                self.damage = (framer.bad_checksums() != bad).then_some(HeadingError::Checksum);
+                read
+            }
+            Parser::Nmea(sentences) => sentences.read(),
+        }
+    }
+}
+
+impl Source for GnssLine {
+    type Sample = Fix;
+    type Error = HeadingError;
+
+    fn next_sample(&mut self) -> Option<Result<Fix, HeadingError>> {
+        loop {
+            if self.kept.is_none() {
+                self.kept = self.read();
+            }
+            let read = match self.damage.take() {
+                Some(damage) => Some(Err(damage)),
+                None => self.kept.take()?,
+            };
+            let Some(read) = read else {
+                count(&mut self.others, 1);
+                continue;
+            };
+            count(&mut self.bad_checksums, u32::from(read == Err(HeadingError::Checksum)));
+            return Some(read);
+        }
+    }
+}
+
+impl ByteSource for GnssLine {
+    fn receive(&mut self, byte: u8) {
+        match &mut self.parser {
+            Parser::Ubx(framer) => framer.receive(byte),
+            Parser::Nmea(sentences) => self.damage = sentences.receive(byte).err(),
+        }
+    }
+
+    fn bad_checksums(&self) -> u32 {
+        self.bad_checksums
+    }
+}

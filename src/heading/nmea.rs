@@ -1,0 +1,147 @@
+//! Sentences RMC and VTG of NMEA 0183 (IEC 61162-1), of any satellite system.
+//!
+//! A sentence is `$TTSSS,FIELD,..*HH` with CR and LF: a talker, a name, fields and, in capital digits, the exclusive or of all
+//! between `$` and `*`. Each `$` begins a sentence, so that a damaged one takes none behind it along.
+//!
+//! RMC and VTG have the same course: VTG counts only where no RMC comes.
+
+use super::gnss::{Fix, Read};
+use super::{Heading, HeadingError};
+use heapless::Vec;
+
+/// Length of the longest sentence, bytes. The standard allows 82, and receivers of high precision send a little more.
+const MAX_SENTENCE: usize = 100;
+/// Talkers that are GNSS receivers: one system each, several, and one that changes with what is in sight.
+const TALKERS: [&[u8; 2]; 9] = [b"GN", b"GP", b"GL", b"GA", b"GB", b"BD", b"GQ", b"QZ", b"GI"];
+/// VTG counts after this many sentences without RMC, more than a receiver sends for a fix.
+const WITHOUT_RMC: u8 = 60;
+/// A knot, m/s.
+const KNOT: f32 = 1852.0 / 3600.0;
+
+/// The sentences of a line.
+#[derive(Debug, Clone)]
+pub(super) struct Sentences {
+    /// The sentence so far, from its `$` on.
+    bytes: Vec<u8, MAX_SENTENCE>,
+    since_rmc: u8,
+}
+
+impl Sentences {
+    pub const fn new() -> Self {
+        Self { bytes: Vec::new(), since_rmc: WITHOUT_RMC }
+    }
+
+    /// Processes a byte; an error is that of a sentence that was cut, or is too long. Call [`Self::read`] after each.
+    pub fn receive(&mut self, byte: u8) -> Result<(), HeadingError> {
+        let length = self.bytes.len();
+        let begins = byte == b'$';
+        if begins {
+            self.bytes.clear();
+        }
+        let is_lost = if begins || length > 0 { self.bytes.push(byte).is_err() } else { byte == b'\n' };
+        if is_lost {
+            self.bytes.clear();
+        }
+        if is_lost || begins && length > 0 { Err(HeadingError::Length(length)) } else { Ok(()) }
+    }
+
+    /// Reads the sentence, if it is complete.
+    pub fn read(&mut self) -> Option<Read> {
+        let bytes = core::mem::take(self.bytes.ends_with(b"\n").then_some(&mut self.bytes)?);
+        Some(checked(&bytes).map_or_else(|error| Some(Err(error)), |body| self.content(body)))
+    }
+
+    fn content(&mut self, body: &[u8]) -> Read {
+        let mut fields = body.split(|byte| *byte == b',');
+        let (talker, name) = fields.next()?.split_last_chunk::<3>()?;
+        if !TALKERS.iter().any(|known| talker == known.as_slice()) {
+            return None;
+        }
+        self.since_rmc = self.since_rmc.saturating_add(1);
+        match name {
+            b"RMC" => {
+                self.since_rmc = 0;
+                Some(rmc(fields))
+            }
+            b"VTG" if self.since_rmc > WITHOUT_RMC => Some(vtg(fields)),
+            _ => None,
+        }
+    }
+}
+
+/// Returns what is between `$` and `*` where the checksum is right.
+fn checked(sentence: &[u8]) -> Result<&[u8], HeadingError> {
+    let [b'$', body @ .., b'*', high, low, b'\r', b'\n'] = sentence else {
+        return Err(HeadingError::Checksum);
+    };
+    let sum = body.iter().fold(0, |sum, byte| sum ^ byte);
+    let digit = |value: u8| *b"0123456789ABCDEF".get(usize::from(value)).unwrap_or(&0);
+    if [*high, *low] == [digit(sum >> 4), digit(sum & 0xF)] { Ok(body) } else { Err(HeadingError::Checksum) }
+}
+
+/// Reads time, status, latitude, N or S, longitude, E or W, speed, course, date, declination, E or W and, of newer
+/// receivers, the mode.
+fn rmc<'a>(mut fields: impl Iterator<Item = &'a [u8]>) -> Result<Fix, HeadingError> {
+    let mut next = || fields.next().unwrap_or_default();
+    let [_, status, latitude, side, _, _, speed, course, _, _, _, mode] = core::array::from_fn(|_| next());
+    if !is_fix(mode)? || status != b"A" {
+        return Ok(Fix::NONE);
+    }
+    let latitude = match (number(latitude, "latitude")?, side) {
+        (None, _) => None,
+        // Degrees and minutes are written as one number.
+        (Some((whole, part)), b"N" | b"S") => {
+            let degrees = (whole / 100) as f32 + ((whole % 100) as f32 + part) / 60.0;
+            Some(if side == b"S" { -degrees } else { degrees })
+        }
+        _ => return Err(HeadingError::Field("latitude")),
+    };
+    Ok(Fix { heading: Some(heading(course, speed)?), latitude })
+}
+
+/// Reads course, `T`, magnetic course, `M`, speed, `N` and, of newer receivers, speed in km/h, `K` and the mode.
+fn vtg<'a>(mut fields: impl Iterator<Item = &'a [u8]>) -> Result<Fix, HeadingError> {
+    let mut next = || fields.next().unwrap_or_default();
+    let [course, from, _, _, speed, unit, _, _, mode] = core::array::from_fn(|_| next());
+    if !is_fix(mode)? {
+        return Ok(Fix::NONE);
+    }
+    if from != b"T" || unit != b"N" {
+        return Err(HeadingError::Field("course"));
+    }
+    Ok(Fix { heading: Some(heading(course, speed)?), latitude: None })
+}
+
+/// Returns whether a mode is that of a position by satellites; sentences of old receivers have none.
+fn is_fix(mode: &[u8]) -> Result<bool, HeadingError> {
+    match mode {
+        b"E" => Err(HeadingError::Reckoned),
+        b"" | b"A" | b"D" | b"F" | b"P" | b"R" => Ok(true),
+        _ => Ok(false),
+    }
+}
+
+fn heading(course: &[u8], speed: &[u8]) -> Result<Heading, HeadingError> {
+    let value = |(whole, part): (u32, f32)| whole as f32 + part;
+    let course = number(course, "course")?.map(|degrees| value(degrees).to_radians());
+    let speed = number(speed, "speed")?.map(|knots| value(knots) * KNOT);
+    Ok(Heading { course, speed, ..Heading::default() })
+}
+
+/// Reads a number without sign, its whole part and the rest; `None` where the field is empty.
+fn number(field: &[u8], what: &'static str) -> Result<Option<(u32, f32)>, HeadingError> {
+    if field.is_empty() {
+        return Ok(None);
+    }
+    let digits = |text: &[u8]| -> Option<u32> {
+        text.iter().try_fold(0u32, |sum, byte| {
+            let digit = byte.checked_sub(b'0').filter(|digit| *digit <= 9)?;
+            sum.checked_mul(10)?.checked_add(digit.into())
+        })
+    };
+    let mut parts = field.splitn(2, |byte| *byte == b'.');
+    let (whole, part) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
+    let scale = part.iter().fold(1.0, |scale, _| 10.0 * scale);
+    let read = digits(whole).zip(digits(part)).map(|(whole, part)| (whole, part as f32 / scale));
+    read.map(Some).ok_or(HeadingError::Field(what))
+}
