@@ -38,7 +38,7 @@ use crate::can::wheel::WheelReceiver;
 use crate::compensate::Complete;
 use crate::estimate::{VehicleSample, YawEstimate};
 use crate::fog::{Beside, FogConfig, FogCounters, FogPipeline};
-use crate::heading::{Fix, Heading, HeadingError, HeadingReceiver, Received, Refusal};
+use crate::heading::{CourseState, Fix, Heading, HeadingError, HeadingReceiver, Received, Refusal};
 use crate::health::slow::SlowStatus;
 use crate::health::{BoardFaults, Faults, InputCounters, MonitorCounters, Quality, Source, count};
 use crate::model::Estimate;
@@ -51,6 +51,10 @@ use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use clock::Timeline;
 pub use second_source::Contradiction;
 use second_source::{Doubts, SecondSource, Shown};
+
+/// Silence of a configured source of courses that is a trouble, and the time that its start may take.
+const COURSE_SILENCE_US: u64 = 10_000_000;
+const FIRST_COURSE: Micros = Micros(60_000_000);
 
 /// The results of one sample, or of its absence, for a log or diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,6 +96,8 @@ pub struct Coprocessor {
     wheels: Option<WheelReceiver>,
     fog: FogPipeline,
     heading: Option<HeadingReceiver>,
+    /// Time from which the receiver of courses counts as silent.
+    heading_due: Micros,
     second: SecondSource,
     /// The newest usable rates of the inertial gyro, with its expected error, and of the fibre-optic one, rad/s.
     inertial_rate: Option<(Micros, [f32; 2])>,
@@ -124,6 +130,7 @@ impl Coprocessor {
             wheels: config.wheels,
             fog: FogPipeline::new(FogConfig { clock_ratio, ..config.fog }, config.fog_expected),
             heading: config.heading,
+            heading_due: FIRST_COURSE,
             second: SecondSource::START,
             inertial_rate: None,
             fog_rate: None,
@@ -349,6 +356,9 @@ impl Coprocessor {
 
     fn use_heading(&mut self, received: Result<Received, HeadingError>) -> Result<(), InputError> {
         self.fog.contest_latitude(self.heading.as_ref().is_some_and(HeadingReceiver::is_contested));
+        if matches!(received, Ok(_) | Err(HeadingError::Reckoned)) {
+            self.heading_due = Micros(self.timeline.time().0.saturating_add(COURSE_SILENCE_US));
+        }
         let Received { heading, latitude } = received.map_err(|error| self.refuse_heading(error))?;
         if let Some(heading) = &heading {
             self.pipeline.course(heading);
@@ -444,6 +454,13 @@ impl Coprocessor {
     /// Returns the pipeline, to read its state.
     pub fn pipeline(&self) -> &Pipeline {
         &self.pipeline
+    }
+
+    /// Returns what courses have shown since the start, and whether their source is silent.
+    #[must_use]
+    pub fn course_state(&self) -> CourseState {
+        let is_silent = self.heading.is_some() && self.timeline.time() > self.heading_due;
+        CourseState { is_silent, ..self.pipeline.course_state() }
     }
 
     /// Returns the fault counters of the sensor monitor.

@@ -1,5 +1,10 @@
 //! Bytes of GNSS receivers, made by the pages of their protocols: UBX-NAV-PVT and sentences of NMEA 0183.
 
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::DataFrame;
+use gyronet::can::signal::{BitField, ByteOrder};
+use gyronet::heading::{GnssSettings, HeadingSettings, HeadingSignal};
+
 /// What a NAV-PVT message says, in its own units.
 #[derive(Debug, Clone, Copy)]
 pub struct Pvt {
@@ -44,6 +49,39 @@ impl Pvt {
         put(78, &[self.more_flags]);
         ubx([0x01, 0x07], &payload)
     }
+
+    /// The same numbers in frames, as [`sources`] describes them.
+    pub fn frames(&self) -> [DataFrame; 2] {
+        let speed = [self.speed as u32, self.speed_sigma];
+        let course = [self.course as u32, self.course_sigma];
+        [(SPEED, speed), (COURSE, course)].map(|(id, words)| {
+            let id = StandardId::new(id).expect("11 bits");
+            DataFrame::new(id, words.map(u32::to_le_bytes).as_flattened()).expect("eight bytes")
+        })
+    }
+}
+
+const COURSE: u16 = 0x321;
+const SPEED: u16 = 0x322;
+
+/// The settings of a receiver on its line, and those of the same numbers in frames.
+pub fn sources(line: GnssSettings) -> [HeadingSettings; 2] {
+    let signal = |id, start, factor| {
+        let id = Id::Standard(StandardId::new(id).expect("11 bits"));
+        let field = BitField::new(start, 32, ByteOrder::Intel, false).expect("inside the frame");
+        Some(HeadingSignal { id, field, factor, offset: 0.0, invalid: None })
+    };
+    let rad = 1e-5 * std::f32::consts::PI / 180.0;
+    [
+        HeadingSettings { line: Some(line), ..HeadingSettings::NONE },
+        HeadingSettings {
+            course: signal(COURSE, 0, rad),
+            course_sigma: signal(COURSE, 32, rad),
+            speed: signal(SPEED, 0, 1e-3),
+            speed_sigma: signal(SPEED, 32, 1e-3),
+            ..HeadingSettings::NONE
+        },
+    ]
 }
 
 /// A frame of a class and number.

@@ -58,11 +58,16 @@ impl Board {
     }
 
     pub fn configured(configuration: &Configuration, blob: Blob<'static>) -> Self {
+        Self::experienced(configuration, &Learned::NOTHING, blob)
+    }
+
+    /// Returns a board that has learnt on earlier drives.
+    pub fn experienced(configuration: &Configuration, learned: &Learned, blob: Blob<'static>) -> Self {
         let wheels = WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings");
         let config = coprocessor::Config {
             wheels: Some(wheels),
             clock: Clock::Sensor,
-            ..configuration.coprocessor(&Calibration::NONE, &Learned::NOTHING, 0)
+            ..configuration.coprocessor(&Calibration::NONE, learned, blob.crc)
         };
         Self {
             coprocessor: Coprocessor::new(config),
@@ -85,7 +90,7 @@ impl Board {
         }
     }
 
-    pub fn wheel(&mut self, frame: &DataFrame) {
+    pub fn can(&mut self, frame: &DataFrame) {
         // A wrong frame shows as silent wheels.
         let _ = self.coprocessor.can(frame, NOW);
     }

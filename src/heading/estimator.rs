@@ -172,6 +172,8 @@ pub struct CourseState {
     pub counters: CourseCounters,
     /// True while courses contradict the gyro: for 10 s none has matched, and since then they have not for a minute.
     pub is_contradicted: bool,
+    /// True while a source is configured and sends no message.
+    pub is_silent: bool,
     /// Why the newest course taught nothing; `None` where it was used.
     pub refusal: Option<Refusal>,
     /// The gain, once it is estimated.
@@ -183,6 +185,7 @@ impl CourseState {
     pub const START: Self = Self {
         counters: CourseCounters { used: 0, refused: 0, restarts: 0 },
         is_contradicted: false,
+        is_silent: false,
         refusal: None,
         gain: None,
     };
@@ -406,7 +409,7 @@ impl Estimator {
     #[must_use]
     pub fn state(&self) -> CourseState {
         let Self { counters, refusal, failing, .. } = *self;
-        CourseState { counters, refusal, is_contradicted: failing.times > 0, gain: None }
+        CourseState { counters, refusal, is_contradicted: failing.times > 0, ..CourseState::START }
     }
 }
 

@@ -23,6 +23,8 @@ pub struct Conditions {
     pub crashed: bool,
     /// Courses contradict the gyro.
     pub course_contradicts: bool,
+    /// The configured source of courses is silent.
+    pub course_silent: bool,
     /// The rate has not been good for long, although no fault says why.
     pub not_good_for_long: bool,
     /// The newest firmware does not run.

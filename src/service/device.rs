@@ -421,6 +421,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             can_fault: self.identity.can_fault.is_some(),
             crashed: self.identity.crash.is_some() || self.has_failed(),
             course_contradicts: self.course.is_contradicted,
+            course_silent: self.course.is_silent,
             not_good_for_long: self.not_good.is_long(),
             firmware_refused: self.firmware.is_refused(),
             access_refused: self.refusal.is_some_and(|refusal| refusal.is_access_denied()),

@@ -6,7 +6,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Capacity of the record.
-pub const MAX_TROUBLES: usize = 18;
+pub const MAX_TROUBLES: usize = 19;
 
 /// The state of the board when a trouble first appeared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

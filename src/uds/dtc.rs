@@ -63,6 +63,7 @@ enum Cause {
     Clock,
     Can,
     Course,
+    NoCourse,
     NoBias,
     NotGood,
     AccessRefused,
@@ -89,6 +90,7 @@ impl Cause {
             Self::Clock => now.clock_fault,
             Self::Can => now.can_fault,
             Self::Course => now.course_contradicts,
+            Self::NoCourse => now.course_silent,
             Self::NoBias => now.not_good_for_long && now.status == Status::Init,
             Self::NotGood => now.not_good_for_long && now.status != Status::Init,
             Self::AccessRefused => now.access_refused,
@@ -98,7 +100,7 @@ impl Cause {
 }
 
 /// All troubles.
-pub static TROUBLES: [Trouble; 18] = [
+pub static TROUBLES: [Trouble; 19] = [
     trouble(
         0x5A01,
         0x31,
@@ -187,6 +189,13 @@ pub static TROUBLES: [Trouble; 18] = [
         "course: contradicts the gyro",
         "the GNSS receiver, its antenna; who else sends courses",
         Cause::Course,
+    ),
+    trouble(
+        0xDA04,
+        0x87,
+        "course: its source is silent",
+        "the GNSS receiver, its wires, bit rate and messages; setting `heading`",
+        Cause::NoCourse,
     ),
     trouble(
         0xDA03,

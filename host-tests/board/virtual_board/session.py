@@ -102,8 +102,7 @@ class Session:
         return {"chunks": chunks}
 
     def _usart(self, usart):
-        name = f"USART{usart}" if isinstance(usart, int) else usart
-        return self.board.peripherals[name]
+        return self.board.peripherals[_line(usart)]
 
     def can_send(self, id: int, ext: bool = False, data: str = "", remote: bool = False, at_us: float | None = None,
                  fd: bool = False, fast: bool = False) -> None:  # fmt: skip
@@ -221,13 +220,17 @@ def _can(board):
     return board.peripherals.get("CAN1") or board.peripherals["FDCAN1"]
 
 
+def _line(usart):
+    """Names a serial line by its number: 4 and 5 have no synchronous mode, and are called UART."""
+    return usart if isinstance(usart, str) else f"{'UART' if usart in (4, 5) else 'USART'}{usart}"
+
+
 def _condition(board, wanted):
     """Converts a condition to a function of a log entry, or of `None` after any scheduled call."""
     if isinstance(wanted, str):
         wanted = {"event": wanted}
     if "usart" in wanted:
-        name = wanted["usart"] if isinstance(wanted["usart"], str) else f"USART{wanted['usart']}"
-        usart = board.peripherals[name]
+        usart = board.peripherals[_line(wanted["usart"])]
         usart.watch()
         return lambda entry: len(usart.sent) >= wanted["bytes"]
     if "can" in wanted:

@@ -60,6 +60,7 @@ fn board_in_order() {
         ("USART1", "----", "sends at 115200 baud; connect TX with RX to see it receive"),
         ("USART2", "----", "sends at 921600 baud; connect TX with RX to see it receive"),
         ("USART3", "----", "sends at 921600 baud; connect TX with RX to see it receive"),
+        ("UART4", "----", "sends at 38400 baud; connect TX with RX to see it receive"),
         ("USART6", "----", "sends these lines; reading them over RTT does not check it"),
     ] {
         assert_eq!(check(&lines, name), (verdict, text), "{name}");

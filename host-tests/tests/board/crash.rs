@@ -31,7 +31,7 @@ fn hang_of_each_task() {
         "SysTick",
         "CAN1_RX0",
         "CAN1_TX",
-        "UART4",
+        "SPI3",
         "UART5",
         "idle::Idle::step",
         "output::Output::step",

@@ -98,7 +98,7 @@ impl Outside {
         }
         if let Some(wheels) = wheels {
             board.can_send_at(&wheels, begin + WHEELS_AFTER);
-            self.host.wheel(&wheels);
+            self.host.can(&wheels);
             for id in OTHERS {
                 let id = StandardId::new(id).expect("11 bits");
                 let other = DataFrame::new(id, &[number as u8; 8]).expect("eight bytes");

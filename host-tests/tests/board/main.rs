@@ -9,6 +9,7 @@ mod common;
 mod course;
 mod crash;
 mod endurance;
+mod gnss;
 mod minimal;
 mod model;
 mod nucleo;

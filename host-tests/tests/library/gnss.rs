@@ -1,16 +1,14 @@
 //! A GNSS receiver on a line of its own: bytes by the documents, damage, and the same drive as with frames.
 
-use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::DataFrame;
-use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::coprocessor::{Clock, Config, Coprocessor, InputError};
 use gyronet::heading::{
     Fix, GnssLine, GnssProtocol, GnssSettings, Heading, HeadingConfigError, HeadingError, HeadingReceiver,
-    HeadingSettings, HeadingSignal, Refusal,
+    HeadingSettings, Refusal,
 };
 use gyronet::sensor::ByteSource;
 use gyronet::units::Micros;
-use gyronet_host_tests::gnss::{Pvt, sentence, ubx};
+use gyronet_host_tests::gnss::{Pvt, sentence, sources, ubx};
 use gyronet_host_tests::sent::Sent;
 use gyronet_host_tests::stream::constant;
 use gyronet_host_tests::winding::Winding;
@@ -165,32 +163,8 @@ fn damaged_messages_are_refused_and_the_next_one_is_read() {
     assert!(!text.is_empty() && text.iter().all(Result::is_err));
 }
 
-/// The settings of a receiver on its line, and those of the same numbers in frames.
-fn sources() -> [HeadingSettings; 2] {
-    let signal = |id, start, factor| {
-        let id = Id::Standard(StandardId::new(id).expect("11 bits"));
-        let field = BitField::new(start, 32, ByteOrder::Intel, false).expect("inside the frame");
-        Some(HeadingSignal { id, field, factor, offset: 0.0, invalid: None })
-    };
-    let rad = 1e-5 * std::f32::consts::PI / 180.0;
-    [
-        HeadingSettings { line: Some(UBX), ..HeadingSettings::NONE },
-        HeadingSettings {
-            course: signal(0x321, 0, rad),
-            course_sigma: signal(0x321, 32, rad),
-            speed: signal(0x322, 0, 1e-3),
-            speed_sigma: signal(0x322, 32, 1e-3),
-            ..HeadingSettings::NONE
-        },
-    ]
-}
-
 /// Drives with ten courses a second, and returns the frames with the number of courses used.
 fn drive(settings: HeadingSettings, clock: Clock) -> (Vec<DataFrame>, u32) {
-    let frame = |id, words: [u32; 2]| {
-        let id = StandardId::new(id).expect("11 bits");
-        DataFrame::new(id, words.map(u32::to_le_bytes).as_flattened()).expect("eight bytes")
-    };
     let (mut vehicle, mut sent, mut line) = (Winding::new(7), Sent::default(), GnssLine::new(UBX.protocol));
     let heading = Some(HeadingReceiver::new(settings, None));
     let mut coprocessor = Coprocessor::new(Config { heading, clock, ..Config::DEFAULT });
@@ -198,10 +172,9 @@ fn drive(settings: HeadingSettings, clock: Clock) -> (Vec<DataFrame>, u32) {
         let sample = vehicle.sample();
         if tick % 10 == 7 {
             let now = sample.time;
-            let pvt = Pvt { latitude: 0, ..vehicle.pvt() };
-            let words = [[pvt.speed as u32, pvt.speed_sigma], [pvt.course as u32, pvt.course_sigma]];
-            for (id, words) in [0x322, 0x321].into_iter().zip(words) {
-                assert_eq!(coprocessor.can(&frame(id, words), now), Ok(settings.line.is_none()));
+            let pvt = vehicle.pvt();
+            for frame in pvt.frames() {
+                assert_eq!(coprocessor.can(&frame, now), Ok(settings.line.is_none()));
             }
             for fix in feed(&mut line, pvt.bytes()).into_iter().filter(|_| settings.line.is_some()) {
                 coprocessor.gnss(fix, now).expect("it is used");
@@ -220,14 +193,14 @@ fn drive(settings: HeadingSettings, clock: Clock) -> (Vec<DataFrame>, u32) {
 #[test]
 fn a_line_gives_the_same_frames_as_the_bus_by_both_clocks() {
     for clock in [Clock::Outside, Clock::Sensor] {
-        let [line, bus] = sources().map(|settings| drive(settings, clock));
+        let [line, bus] = sources(UBX).map(|settings| drive(settings, clock));
         assert!(line == bus && line.1 >= 250, "{clock:?}: {} and {} courses", line.1, bus.1);
     }
 }
 
 #[test]
 fn what_is_not_used_is_counted() {
-    let heading = Some(HeadingReceiver::new(sources()[0], None));
+    let heading = Some(HeadingReceiver::new(sources(UBX)[0], None));
     let mut coprocessor = Coprocessor::new(Config { heading, ..Config::DEFAULT });
     let mut take = |fix| coprocessor.gnss(fix, Micros(0));
     let reckoned = HeadingError::Reckoned;
@@ -240,13 +213,26 @@ fn what_is_not_used_is_counted() {
     let course = coprocessor.pipeline().course_state();
     assert_eq!((course.counters.refused, course.refusal), (1, Some(Refusal::Reckoned)));
     assert_eq!(coprocessor.input_counters().heading_errors, 3);
+    // A receiver is silent ten seconds after its last good message, and has a minute to start.
+    let second = |seconds: u64| Micros(1_000_000 * seconds);
+    let silent = |coprocessor: &mut Coprocessor, seconds| {
+        coprocessor.poll(second(seconds), &mut Sent::default()).expect("in order");
+        coprocessor.course_state().is_silent
+    };
+    assert!(!silent(&mut coprocessor, 10) && silent(&mut coprocessor, 11));
+    let _ = coprocessor.gnss(Err(HeadingError::Checksum), second(11));
+    assert!(silent(&mut coprocessor, 11));
+    let _ = coprocessor.gnss(Err(reckoned), second(12));
+    assert!(!silent(&mut coprocessor, 22) && silent(&mut coprocessor, 23));
+    let mut started = Coprocessor::new(Config { heading, ..Config::DEFAULT });
+    assert!(!silent(&mut started, 60) && silent(&mut started, 61));
     // Without a line in the settings there is none.
     assert_eq!(Coprocessor::new(Config::DEFAULT).gnss(Err(reckoned), Micros(0)), Ok(()));
 }
 
 #[test]
 fn a_line_and_frames_are_refused_by_name() {
-    let [line, bus] = sources();
+    let [line, bus] = sources(UBX);
     let check = |settings: HeadingSettings| settings.check(std::iter::empty());
     assert_eq!((check(line), check(bus)), (Ok(()), Ok(())));
     let both = [bus, HeadingSettings { nmea2000: true, ..line }, HeadingSettings { j1939: true, ..line }];

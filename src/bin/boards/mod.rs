@@ -21,7 +21,7 @@ compile_error!(
     "an image is built for one board: --features netduino-plus-2, olimex-stm32-h405 or minimal-board"
 );
 
-use crate::stm32f405::pins::Pin;
+use crate::stm32f405::pins::{Pin, Speed};
 
 /// Describes a board. What a board does not have is left out of its file.
 pub struct Board {
@@ -37,6 +37,8 @@ pub struct Board {
     pub slcan: Option<Line>,
     /// USART3: the fibre-optic gyro.
     pub fog: Option<Line>,
+    /// UART4: a GNSS receiver. Its bit rate is that of the configuration; the one here is the bring-up's.
+    pub gnss: Option<Line>,
     /// USART6: the service line.
     pub service: Line,
     /// CAN1, receive and transmit.
@@ -48,7 +50,8 @@ pub struct Board {
 impl Board {
     /// Describes a board with nothing but the service line and CAN. A board's file adds what it has.
     pub const fn new(name: &'static str, crystal_hz: u32, service: Line, can: [Pin; 2]) -> Self {
-        Self { name, crystal_hz, led: None, imu: None, slcan: None, fog: None, service, can, spi: None }
+        let (led, spi, [imu, slcan, fog, gnss]) = (None, None, [const { None }; 4]);
+        Self { name, crystal_hz, led, imu, slcan, fog, gnss, service, can, spi }
     }
 }
 
@@ -58,4 +61,13 @@ pub struct Line {
     pub baud: u32,
     /// Bit rate while the board runs on its internal oscillator at 16 MHz.
     pub fallback_baud: u32,
+}
+
+impl Line {
+    /// Connects both pins with a USART, by its alternate function. An open input reads as idle.
+    pub fn connect(&self, function: u8) {
+        self.rx.pull_up();
+        self.rx.alternate(function, Speed::Low);
+        self.tx.alternate(function, Speed::Low);
+    }
 }

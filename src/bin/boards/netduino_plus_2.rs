@@ -9,6 +9,8 @@ pub const BOARD: Board = Board {
     imu: Some(Line { tx: Pin::new('B', 6), rx: Pin::new('B', 7), baud: 115_200, fallback_baud: 115_200 }),
     slcan: Some(Line { tx: Pin::new('A', 2), rx: Pin::new('A', 3), baud: 921_600, fallback_baud: 500_000 }),
     fog: Some(Line { tx: Pin::new('B', 10), rx: Pin::new('B', 11), baud: 921_600, fallback_baud: 921_600 }),
+    // D8 and D7 of the shield.
+    gnss: Some(Line { tx: Pin::new('A', 0), rx: Pin::new('A', 1), baud: 38_400, fallback_baud: 38_400 }),
     spi: Some([Pin::new('A', 5), Pin::new('A', 6), Pin::new('A', 7), Pin::new('A', 4), Pin::new('C', 4)]),
     ..Board::new("Netduino Plus 2", 25_000_000, SERVICE, [Pin::new('B', 8), Pin::new('B', 9)])
 };

@@ -5,7 +5,7 @@
 use crate::boards::{BOARD, Line};
 use crate::report::Report;
 use crate::stm32f405::clocks::Clocks;
-use crate::stm32f405::pins::{self, Speed};
+use crate::stm32f405::pins;
 use crate::stm32f405::usart::Usart;
 use crate::stm32f405::wait_until;
 
@@ -19,6 +19,7 @@ pub fn check_all(report: &mut Report, clocks: &Clocks) {
         ("USART1", &BOARD.imu, clocks.apb2_hz, Usart::one()),
         ("USART2", &BOARD.slcan, clocks.apb1_hz, Usart::two()),
         ("USART3", &BOARD.fog, clocks.apb1_hz, Usart::three()),
+        ("UART4", &BOARD.gnss, clocks.apb1_hz, Usart::four()),
     ];
     for (name, line, bus_hz, usart) in lines {
         let Some(line) = line else {
@@ -53,9 +54,8 @@ fn check_dma(report: &mut Report, usarts: [Usart; 2]) {
 }
 
 fn check(report: &mut Report, name: &str, line: &Line, (bus_hz, baud): (u32, u32), usart: Usart) {
-    line.rx.pull_up();
-    line.rx.alternate(pins::USART_1_TO_3, Speed::Low);
-    line.tx.alternate(pins::USART_1_TO_3, Speed::Low);
+    let function = if name == "UART4" { pins::UART_4_AND_6 } else { pins::USART_1_TO_3 };
+    line.connect(function);
     usart.start(bus_hz, baud);
     let mut received = 0;
     for byte in PATTERN {

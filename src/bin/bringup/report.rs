@@ -1,7 +1,7 @@
 //! Prints lines on USART6 and over RTT.
 
 use crate::boards::BOARD;
-use crate::stm32f405::pins::{self, Speed};
+use crate::stm32f405::pins;
 use crate::stm32f405::usart::Usart;
 use crate::stm32f405::{Chip, wait_until, watchdog};
 use core::fmt::{self, Write};
@@ -20,9 +20,7 @@ impl Report {
     pub fn start(chip: &Chip) -> Self {
         rtt_target::rtt_init_print!();
         let line = &BOARD.service;
-        line.rx.pull_up();
-        line.rx.alternate(pins::USART_6, Speed::Low);
-        line.tx.alternate(pins::USART_6, Speed::Low);
+        line.connect(pins::UART_4_AND_6);
         let mut report = Self::attach();
         let baud = if chip.clocks.exact() { line.baud } else { line.fallback_baud };
         report.usart.start(chip.clocks.apb2_hz, baud);

@@ -14,12 +14,13 @@ use crate::stm32f405::usart::Usart;
 use crate::stm32f405::{Chip, pac, serial_number, supply, timer};
 use crate::{crash, serial};
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
+use gyronet::heading::GnssSettings;
 use gyronet::service::event::CanFault;
 use gyronet::service::message::Identity;
 use gyronet::store::firmware::{LABEL_SIZE, Label};
 
-// SAFETY: each element belongs to one line, which `Board::start` starts.
-static MEMORY: [serial::Memory; 4] = [const { unsafe { serial::Memory::new() } }; 4];
+// SAFETY: each element belongs to one line, which `Board::start` or `gnss` starts.
+static MEMORY: [serial::Memory; 5] = [const { unsafe { serial::Memory::new() } }; 5];
 
 /// The parts of the board that the tasks own.
 pub struct Board {
@@ -82,12 +83,22 @@ impl Board {
     }
 }
 
+/// Starts the line of a GNSS receiver, where the configuration names one. Its pins are left alone otherwise.
+pub fn gnss(clocks: &Clocks, settings: Option<GnssSettings>) -> serial::Ends {
+    let [.., memory] = &MEMORY;
+    let rates = BOARD.gnss.as_ref().zip(settings).map(|(line, settings)| {
+        line.connect(pins::UART_4_AND_6);
+        (clocks.apb1_hz, settings.baud)
+    });
+    serial::start(Usart::four(), memory, rates, timer::micros() as u32)
+}
+
 /// USART of a line, its bus frequency and bit rate where the board has the line, and its memory.
 type Line = (Usart, Option<(u32, u32)>, &'static serial::Memory);
 
 /// Returns the lines in the order IMU, SLCAN, fibre-optic gyro, service.
 fn lines(clocks: &Clocks) -> [Line; 4] {
-    let [imu, slcan, fog, service] = &MEMORY;
+    let [imu, slcan, fog, service, _] = &MEMORY;
     // At 16 MHz, 921600 baud would be 2.1 % off before the oscillator's own error.
     let rates = |bus_hz, line: &Option<boards::Line>| {
         line.as_ref().map(|line| (bus_hz, if clocks.exact() { line.baud } else { line.fallback_baud }))
@@ -112,12 +123,8 @@ fn start_ticks(mut systick: SYST, clocks: &Clocks) {
 /// Assigns the pins of USARTs, LED and CAN. An unconnected line reads as idle.
 fn assign_pins() {
     let lines = [BOARD.imu, BOARD.slcan, BOARD.fog].into_iter().flatten();
-    let lines = lines.map(|line| (line, pins::USART_1_TO_3)).chain([(BOARD.service, pins::USART_6)]);
-    for (line, function) in lines {
-        line.rx.pull_up();
-        line.rx.alternate(function, Speed::Low);
-        line.tx.alternate(function, Speed::Low);
-    }
+    lines.for_each(|line| line.connect(pins::USART_1_TO_3));
+    BOARD.service.connect(pins::UART_4_AND_6);
     if let Some((led, lit)) = BOARD.led {
         led.output(!lit);
     }

@@ -146,7 +146,7 @@ impl Diagnosis {
                 Line::Can | Line::Slcan => {
                     let _ = RESPONSES.push((*line, frame));
                     // The output task sends it now, not with the next tick.
-                    rtic::pend(Interrupt::UART4);
+                    rtic::pend(Interrupt::SPI3);
                 }
             }
         }

@@ -7,6 +7,7 @@
 //! | USART1 | Xsens MTi |
 //! | SPI1 | ICM-42688-P or BMI088, where one is configured |
 //! | USART3 | KVH DSP-1760 |
+//! | UART4 | a GNSS receiver, where one is configured |
 //! | USART2 | SLCAN |
 //! | USART6 | service line: SLCAN with diagnosis alone |
 //! | CAN1 | 500 kbit/s: messages, wheels, diagnosis |
@@ -15,7 +16,7 @@
 //! | priority | task | when | what |
 //! |---|---|---|---|
 //! | 4 | `tick` | 1 ms | board time; counts the bytes that DMA has received |
-//! | 4, 3 | `imu_line`, `fog_line`, `slcan_line`; `service_line` | a damaged byte | counts it |
+//! | 4, 3 | `imu_line`, `fog_line`, `slcan_line`, `gnss_line`; `service_line` | a damaged byte | counts it |
 //! | 3 | `can_received`, `can_sent` | a frame | into and out of their queues |
 //! | 3 | `can_went_off` | bus-off | notes the time |
 //! | 2 | `output` | pended by `tick`, `can_sent`, `window` | samples, frames, watchdog |
@@ -67,7 +68,7 @@ mod stm32f405;
 #[allow(unsafe_code, reason = "a section that is not loaded")]
 #[used]
 #[unsafe(link_section = ".priorities")]
-static PRIORITIES: [[u8; 2]; 11] = {
+static PRIORITIES: [[u8; 2]; 12] = {
     use crate::stm32f405::pac::Interrupt;
     const SYSTICK: u8 = 15;
     const FIRST: u8 = 16;
@@ -76,17 +77,18 @@ static PRIORITIES: [[u8; 2]; 11] = {
         [FIRST + Interrupt::USART3 as u8, 4],
         [SYSTICK, 4],
         [FIRST + Interrupt::USART2 as u8, 4],
+        [FIRST + Interrupt::UART4 as u8, 4],
         [FIRST + Interrupt::PVD as u8, 4],
         [FIRST + Interrupt::USART6 as u8, 3],
         [FIRST + Interrupt::CAN1_RX0 as u8, 3],
         [FIRST + Interrupt::CAN1_TX as u8, 3],
         [FIRST + Interrupt::CAN1_SCE as u8, 3],
-        [FIRST + Interrupt::UART4 as u8, 2],
+        [FIRST + Interrupt::SPI3 as u8, 2],
         [FIRST + Interrupt::UART5 as u8, 1],
     ]
 };
 
-// This board does not use UART4 and UART5; software pends their interrupts to run `output` and `window`.
+// This image does not use SPI3 and UART5; software pends their interrupts to run `output` and `window`.
 #[cfg(target_os = "none")]
 #[allow(unsafe_code, reason = "what RTIC generates; nothing in here is written with it")]
 #[rtic::app(device = crate::stm32f405::pac, peripherals = true)]
@@ -119,7 +121,8 @@ mod app {
         fog_handler: serial::Handler,
         slcan: serial::Handler,
         service: serial::Handler,
-        receptions: [Option<serial::Reception>; 4],
+        gnss: serial::Handler,
+        receptions: [Option<serial::Reception>; 5],
         sender: &'static mut Output,
         network: Option<GyroNet<'static, &'static mut GyroNetState<HIDDEN>>>,
         rest: &'static mut Idle,
@@ -139,15 +142,17 @@ mod app {
         let network = weights.and_then(|blob| GyroNet::with_state(blob, cx.local.network_state).ok());
         let service = board.service;
         let (bits_per_second, bring_up) = (output.bits_per_second, BringUp::new(output.part, board.spi));
-        let ports = (board.imu, board.fog, board.slcan, board.can);
+        let (gnss, gnss_reception, gnss_port) = board::gnss(&board.clocks, output.gnss);
+        let ports = ([board.imu, board.fog, board.slcan, gnss_port], board.can);
         let sender = start::init_static(cx.local.sender_place, || output.connect(ports));
         let rest = start::init_static(cx.local.rest_place, || {
             let diagnosis = Diagnosis::new(service, bits_per_second);
             Idle::new(device, diagnosis, bring_up, board.clocks.fault)
         });
-        let board::Handlers { imu, fog: fog_handler, slcan, service, receptions } = handlers;
+        let board::Handlers { imu, fog: fog_handler, slcan, service, receptions: [a, b, c, d] } = handlers;
+        let receptions = [a, b, c, d, gnss_reception];
         let shared = Shared { coprocessor, counters: AllCounters::default() };
-        (shared, Local { imu, fog_handler, slcan, service, receptions, sender, network, rest })
+        (shared, Local { imu, fog_handler, slcan, service, gnss, receptions, sender, network, rest })
     }
 
     // Short handlers end with a barrier: a store that is still pending when the handler returns can make the
@@ -172,7 +177,7 @@ mod app {
         let now = timer::tick();
         cx.local.receptions.iter_mut().flatten().for_each(|reception| reception.count(now));
         report(Task::Tick);
-        rtic::pend(Interrupt::UART4);
+        rtic::pend(Interrupt::SPI3);
         dsb();
     }
 
@@ -180,6 +185,13 @@ mod app {
     #[unsafe(link_section = ".ram_code.slcan_line")]
     fn slcan_line(cx: slcan_line::Context) {
         cx.local.slcan.serve();
+        dsb();
+    }
+
+    #[task(binds = UART4, priority = 4, local = [gnss])]
+    #[unsafe(link_section = ".ram_code.gnss_line")]
+    fn gnss_line(cx: gnss_line::Context) {
+        cx.local.gnss.serve();
         dsb();
     }
 
@@ -199,7 +211,7 @@ mod app {
     #[task(binds = CAN1_TX, priority = 3)]
     fn can_sent(_: can_sent::Context) {
         can::transmitted();
-        rtic::pend(Interrupt::UART4);
+        rtic::pend(Interrupt::SPI3);
         dsb();
     }
 
@@ -215,7 +227,7 @@ mod app {
         crash::supply_low();
     }
 
-    #[task(binds = UART4, priority = 2, local = [sender], shared = [coprocessor, counters])]
+    #[task(binds = SPI3, priority = 2, local = [sender], shared = [coprocessor, counters])]
     fn output(cx: output::Context) {
         (cx.shared.coprocessor, cx.shared.counters)
             .lock(|coprocessor, counters| cx.local.sender.step(coprocessor, counters));
@@ -231,7 +243,7 @@ mod app {
                 *end = None;
                 // A late estimate is counted.
                 let _ = cx.shared.coprocessor.lock(|coprocessor| coprocessor.deliver(under_way, estimate));
-                rtic::pend(Interrupt::UART4);
+                rtic::pend(Interrupt::SPI3);
             }
         } else {
             let due = cx.shared.coprocessor.lock(|coprocessor| coprocessor.window());
@@ -251,7 +263,7 @@ mod app {
         loop {
             let mut counters = cx.shared.counters.lock(|counters| *counters);
             let coprocessor = &mut cx.shared.coprocessor;
-            let course = || coprocessor.lock(|coprocessor| coprocessor.pipeline().course_state());
+            let course = || coprocessor.lock(|coprocessor| coprocessor.course_state());
             let found = cx.local.rest.step(&mut counters, course);
             if found.any() {
                 cx.shared.coprocessor.lock(|coprocessor| found.report(coprocessor));

@@ -14,8 +14,10 @@ use crate::stm32f405::{timer, watchdog};
 use core::sync::atomic::{AtomicU8, Ordering};
 use embedded_can::Frame as _;
 use gyronet::coprocessor::Coprocessor;
+use gyronet::heading::{GnssLine, GnssSettings};
 use gyronet::health::count;
 use gyronet::sensor::dsp1760::Dsp1760;
+use gyronet::sensor::{ByteSource as _, Source as _};
 use gyronet::service::message::{AllCounters, LineCounters};
 use gyronet::store::ImuPart;
 use gyronet::units::Micros;
@@ -60,6 +62,8 @@ pub fn report(task: Task) {
 pub struct OutputParts {
     pub part: ImuPart,
     pub bits_per_second: u32,
+    /// The line of a GNSS receiver, if it is used.
+    pub gnss: Option<GnssSettings>,
     /// True if wheel, course and latitude frames of a host on SLCAN are used.
     pub slcan_inputs: bool,
 }
@@ -68,6 +72,8 @@ pub struct Output {
     imu: Imu,
     fog: serial::Port,
     dsp1760: Dsp1760,
+    gnss: serial::Port,
+    receiver: Option<GnssLine>,
     outgoing: Outgoing,
     /// Millisecond of the last poll of the other lines.
     polled_at: u32,
@@ -80,15 +86,17 @@ pub struct Output {
     unread: u32,
 }
 
-type Ports = (serial::Port, serial::Port, serial::Port, Option<Can>);
+type Ports = ([serial::Port; 4], Option<Can>);
 
 impl OutputParts {
     #[inline]
-    pub fn connect(self, (imu, fog, slcan, can): Ports) -> Output {
+    pub fn connect(self, ([imu, fog, slcan, gnss], can): Ports) -> Output {
         Output {
             imu: Imu::new(self.part, imu),
             fog,
             dsp1760: Dsp1760::new(),
+            gnss,
+            receiver: self.gnss.map(|line| GnssLine::new(line.protocol)),
             outgoing: Outgoing::new(slcan, self.bits_per_second, can),
             polled_at: 0,
             joined: false,
@@ -185,7 +193,22 @@ impl Output {
                 }
             }
         }
+        self.poll_receiver(coprocessor, now);
         self.send(coprocessor, now);
+    }
+
+    /// Passes the GNSS receiver's bytes to the coprocessor.
+    #[inline(never)]
+    fn poll_receiver(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
+        let Some(receiver) = &mut self.receiver else { return };
+        for _ in 0..serial::RECEIVED {
+            let Some(byte) = self.gnss.received().first() else { break };
+            receiver.receive(*byte);
+            self.gnss.consume(1);
+            while let Some(fix) = receiver.next_sample() {
+                let _ = coprocessor.gnss(fix, now);
+            }
+        }
     }
 
     /// Reports lost frames and the state of the bus to the coprocessor.
@@ -210,7 +233,7 @@ impl Output {
             }
         });
         self.lines.service_errors = self.outgoing.refused();
-        let lost = [self.imu.lost(), self.fog.lost(), self.outgoing.lost()];
+        let lost = [self.imu.lost(), self.fog.lost(), self.outgoing.lost(), self.gnss.lost()];
         self.lines.overruns = self.outgoing.overruns();
         self.lines.line_errors = lost.into_iter().fold(0, u32::saturating_add);
     }

@@ -27,7 +27,7 @@ const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
         (false, false) => &[],
     },
     fogs: if BOARD.fog.is_some() { &[FogPart::Dsp1760] } else { &[] },
-    gnss: false,
+    gnss: BOARD.gnss.is_some(),
     clock_hz: FULL_HZ,
 };
 
@@ -86,8 +86,9 @@ pub fn parts(board: &Board) -> Option<Parts> {
     })?;
     receive(board, configuration, device.wheels());
     let (part, bits_per_second) = (configuration.imu, config.can.settings().bits_per_second);
+    let (gnss, slcan_inputs) = (configuration.heading.line, configuration.slcan_inputs);
     Some(Parts {
-        output: OutputParts { part, bits_per_second, slcan_inputs: configuration.slcan_inputs },
+        output: OutputParts { part, bits_per_second, gnss, slcan_inputs },
         config,
         weights: blob,
         device: (device, check),

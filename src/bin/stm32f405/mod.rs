@@ -70,7 +70,8 @@ fn enable_peripherals(rcc: &pac::RCC) {
         w.dma1en().enabled().dma2en().enabled()
     });
     rcc.ahb2enr().modify(|_, w| w.rngen().enabled());
-    rcc.apb1enr().modify(|_, w| w.usart2en().enabled().usart3en().enabled().can1en().enabled());
+    rcc.apb1enr()
+        .modify(|_, w| w.usart2en().enabled().usart3en().enabled().uart4en().enabled().can1en().enabled());
     rcc.apb2enr()
         .modify(|_, w| w.usart1en().enabled().usart6en().enabled().spi1en().enabled().syscfgen().enabled());
     clock_delay();

@@ -5,8 +5,8 @@ use super::pac;
 
 /// Alternate function of USART1 to USART3 (DS8626 table 9).
 pub const USART_1_TO_3: u8 = 7;
-/// Alternate function of USART6.
-pub const USART_6: u8 = 8;
+/// Alternate function of UART4 and USART6.
+pub const UART_4_AND_6: u8 = 8;
 /// Alternate function of CAN1.
 pub const CAN_1: u8 = 9;
 /// Alternate function of SPI1.

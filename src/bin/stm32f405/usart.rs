@@ -70,6 +70,11 @@ impl Usart {
         Self::new(pac::USART3::ptr(), [(pac::DMA1::ptr(), 1, 4), (pac::DMA1::ptr(), 3, 4)])
     }
 
+    /// Returns UART4, on APB1, which has the registers of a USART without those for synchronous mode.
+    pub const fn four() -> Self {
+        Self::new(pac::UART4::ptr().cast(), [(pac::DMA1::ptr(), 2, 4), (pac::DMA1::ptr(), 4, 4)])
+    }
+
     /// Returns USART6, on APB2.
     pub const fn six() -> Self {
         Self::new(pac::USART6::ptr(), [(pac::DMA2::ptr(), 1, 5), (pac::DMA2::ptr(), 6, 5)])

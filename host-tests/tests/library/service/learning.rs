@@ -398,7 +398,8 @@ fn courses_that_contradict_the_gyro_are_a_trouble() {
     status(&mut bench, 0);
     let counters = CourseCounters { used: 10, refused: 11, restarts: 1 };
     let refusal = Some(Refusal::Jump);
-    bench.board.learn_course(&CourseState { counters, is_contradicted: true, refusal, gain: None });
+    let contradicted = CourseState { counters, is_contradicted: true, refusal, ..CourseState::START };
+    bench.board.learn_course(&contradicted);
     bench.expect(
         &[0x22, 0x01, 0x19],
         &[0x62, 0x01, 0x19, 3, 0, 0, 0, 0, 0, 0, 0, 10, 0, 0, 0, 11, 0, 0, 0, 1, 1],

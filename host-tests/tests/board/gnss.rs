@@ -1,0 +1,98 @@
+//! A GNSS receiver on UART4 of the flashed image: its frames are the host's with the same courses from CAN.
+
+use crate::common::{self, IMU, SAMPLE, START};
+use crate::service;
+use gyronet::can::config::{Settings, StatusSettings};
+use gyronet::can::status::STATUS_ID;
+use gyronet::can::{DataFrame, slcan};
+use gyronet::heading::{Gain, GnssProtocol, GnssSettings, HeadingSettings};
+use gyronet::model::{Blob, weights};
+use gyronet::store::{Calibration, Configuration, Learned};
+use gyronet_host_tests::board::Board;
+use gyronet_host_tests::gnss::{Pvt, sources};
+use gyronet_host_tests::replay;
+use gyronet_host_tests::stored::Stored;
+use gyronet_host_tests::winding::Winding;
+use std::time::Duration;
+
+const UART4: usize = 4;
+const LINE: GnssSettings = GnssSettings { protocol: GnssProtocol::Ubx, baud: 230_400 };
+const MS: Duration = Duration::from_millis(1);
+/// Samples from a course to the next.
+const STEP: usize = 10;
+
+fn configuration(heading: HeadingSettings) -> Configuration {
+    let status = Some(StatusSettings { id: STATUS_ID });
+    let can = Settings { status, ..Settings::DEFAULT };
+    Configuration { can, heading, ..Configuration::DEFAULT }
+}
+
+/// Drives some seconds, the first ones with courses, on the board by the line and on a host by CAN, both just started;
+/// returns the frames of both.
+fn drive(
+    board: &mut Board,
+    host: &mut replay::Board,
+    vehicle: &mut Winding,
+    [with, without]: [usize; 2],
+) -> [Vec<DataFrame>; 2] {
+    for step in 0..10 * (with + without) {
+        let now = board.counts().time;
+        for k in 0..STEP as u32 {
+            let sample = replay::message(vehicle.headings.len(), &vehicle.sample());
+            board.send_at(IMU, &sample, now + SAMPLE * k);
+            host.push(&sample);
+        }
+        if step < 10 * with {
+            let pvt = vehicle.pvt();
+            // It ends 3 ms before the next sample is on its line.
+            board.send_at(UART4, &pvt.bytes(), now + SAMPLE * STEP as u32 - 7 * MS);
+            pvt.frames().iter().for_each(|frame| host.can(frame));
+        }
+        board.run(SAMPLE * STEP as u32);
+    }
+    let frames = host.lines.drain(..).map(|line| slcan::parse(&line).expect("a frame")).collect();
+    [common::frames(&board.can_frames()), frames]
+}
+
+#[test]
+fn a_receiver_on_its_line_teaches_what_frames_teach() {
+    const TEST: &str = "a_receiver_on_its_line_teaches_what_frames_teach";
+    let Some(mut board) = common::unpowered(TEST) else { return };
+    board.configure("UART4.baud", LINE.baud);
+    let [line, bus] = sources(LINE).map(configuration);
+    let blob = || Blob::new_checked(&weights::DEFAULT.0).expect("it comes with the library");
+    let of = line.pipeline(&Calibration::NONE, &Learned::NOTHING, blob().crc).gain_of;
+    let learned = Learned { gain: Some(Gain { share: 0.007, sigma: 0.001, of }), ..Learned::NOTHING };
+    Stored::default().record(&line).record(&learned).write_to(&mut board);
+    // The power is cut on the way. The gain of earlier drives is there after it, and the receiver is unplugged later.
+    for seconds in [[16, 0], [16, 11]] {
+        board.power_cycle(MS);
+        board.run(START);
+        board.can_frames();
+        let mut vehicle = Winding::new(7);
+        let mut host = replay::Board::experienced(&bus, &learned, blob());
+        let [sent, same] = drive(&mut board, &mut host, &mut vehicle, seconds);
+        let samples = 100 * seconds.iter().sum::<usize>();
+        println!("{TEST}: {} of {} frames", sent.len(), same.len());
+        assert!(sent.len() > common::SET * (samples - 2) && sent == same[..sent.len()], "{}", sent.len());
+        let (_, [gain, sigma], courses) = service::on_line(&mut board).course().expect("a response");
+        println!("{TEST}: gain {gain} +- {sigma}, {courses:?}");
+        assert!(courses.used > 40 && (gain - 0.007).abs() < 0.002 && sigma < 0.002, "{gain} {sigma}");
+    }
+    let silent = |board: &mut Board| {
+        let trouble = service::on_line(board).ask(&[0x19, 6, 0xDA, 0x04, 0x87, 1]).expect("a response");
+        trouble[4] & 1 == 1
+    };
+    let counters = common::counters(&mut board);
+    assert_eq!((counters.lines.line_errors, counters.inputs.heading_errors), (0, 0));
+    assert!(silent(&mut board), "it is unplugged");
+    // At another bit rate its bytes are damaged, and damage is no message.
+    board.configure("UART4.baud", 38_400);
+    board.send(UART4, &Pvt::GOOD.bytes());
+    board.run(200 * MS);
+    assert!(silent(&mut board) && common::counters(&mut board).lines.line_errors > 10);
+    board.configure("UART4.baud", LINE.baud);
+    board.send(UART4, &Pvt::GOOD.bytes().repeat(2));
+    board.run(200 * MS);
+    assert!(!silent(&mut board));
+}
