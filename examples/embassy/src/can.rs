@@ -4,7 +4,9 @@
 //! What the bus does not take within [`STALE`] is dropped, because old rates are useless. After bus-off the controller
 //! returns at growing intervals, so that a broken node does not disturb the bus all the time.
 
-use embassy_stm32::can::config::{GlobalFilter, TxBufferMode};
+use crate::service;
+use core::sync::atomic::Ordering::Relaxed;
+use embassy_stm32::can::config::{GlobalFilter, NonMatchingFilter, TxBufferMode};
 use embassy_stm32::can::filter::{Action, ExtendedFilter, FilterType, StandardFilter};
 use embassy_stm32::can::{
     BufferedCan, BufferedCanReceiver, BufferedCanSender, CanConfigurator, Frame, IT0InterruptHandler,
@@ -18,12 +20,13 @@ use embedded_can::{Frame as _, Id};
 use gyronet::TimedFrame;
 use gyronet::can::DataFrame;
 use gyronet::can::wheel::WheelSettings;
-use gyronet::coprocessor::{Bus, Sink};
+use gyronet::coprocessor::{Bus, Observation, Sink};
+use gyronet::heading::HeadingSettings;
+use gyronet::service::message::LineCounters;
 use static_cell::ConstStaticCell;
 
 /// Frames of four samples.
 const QUEUE: usize = 24;
-const BITS_PER_SECOND: u32 = 500_000;
 /// Bit rate of the data in the frames of others.
 const DATA_BITS_PER_SECOND: u32 = 2_000_000;
 const STALE: Duration = Duration::from_millis(20);
@@ -32,15 +35,40 @@ const STALE: Duration = Duration::from_millis(20);
 const FIRST_RETURN: Duration = Duration::from_millis(10);
 const LAST_RETURN: Duration = Duration::from_millis(1_280);
 
+/// Filters of the controller for identifiers of 11 and of 29 bits.
+const STANDARD_FILTERS: u8 = 28;
+const EXTENDED_FILTERS: u8 = 8;
+
 static SENT: ConstStaticCell<TxBuf<QUEUE>> = ConstStaticCell::new(TxBuf::new());
 static RECEIVED: ConstStaticCell<RxBuf<QUEUE>> = ConstStaticCell::new(RxBuf::new());
+
+/// What the bus is to receive, and at which bit rate.
+pub struct Received<'a> {
+    /// Identifiers of requests to this board and to all servers, and of responses.
+    pub ids: [Id; 3],
+    pub wheels: &'a WheelSettings,
+    pub heading: &'a HeadingSettings,
+    pub bits_per_second: u32,
+}
+
+impl Received<'_> {
+    /// Returns identifiers, each with the mask of its bits that count.
+    fn filters(&self) -> impl Iterator<Item = (Id, u32)> {
+        let [request, functional, _] = self.ids;
+        let wheels = self.wheels.frames.iter().flatten().map(|frame| frame.id);
+        let exactly = [request, functional].into_iter().chain(wheels).map(|id| (id, u32::MAX));
+        exactly.chain(self.heading.filters())
+    }
+}
 
 /// The bus, for [`gyronet::Coprocessor::step`].
 pub struct CanBus {
     _driver: BufferedCan<'static, QUEUE, QUEUE>,
     sender: BufferedCanSender,
     receiver: BufferedCanReceiver,
-    lost: u32,
+    /// Identifiers of requests.
+    requests: [Id; 2],
+    counters: LineCounters,
     /// Frames received since the last step.
     taken: usize,
     /// When one of the last three frames had been sent, or none waited.
@@ -52,7 +80,7 @@ pub struct CanBus {
 }
 
 impl CanBus {
-    /// Joins the bus. Of the frames of others only those with wheel speeds are received.
+    /// Joins the bus, of whose frames it receives only what is used.
     pub fn start(
         peripheral: Peri<'static, FDCAN1>,
         rx: Peri<'static, impl RxPin<FDCAN1>>,
@@ -60,35 +88,48 @@ impl CanBus {
         interrupts: impl Binding<FDCAN1_IT0, IT0InterruptHandler<FDCAN1>>
         + Binding<FDCAN1_IT1, IT1InterruptHandler<FDCAN1>>
         + 'static,
-        wheels: &WheelSettings,
+        received: &Received,
     ) -> Self {
         let mut can = CanConfigurator::new(peripheral, rx, tx, interrupts);
-        can.set_bitrate(BITS_PER_SECOND);
+        can.set_bitrate(received.bits_per_second);
         // This also lets it receive CAN FD; without it, each such frame would be an error.
         can.set_fd_data_bitrate(DATA_BITS_PER_SECOND, false);
-        let config = can.config().set_global_filter(GlobalFilter::reject_all());
-        let config = config.set_tx_buffer_mode(TxBufferMode::Fifo);
-        can.set_config(config.set_automatic_bus_off_recovery(false));
-        for (slot, frame) in wheels.frames.iter().flatten().enumerate() {
-            let (slot, action) = (slot as u8, Action::StoreInFifo0);
-            match frame.id {
-                Id::Standard(id) => can.properties().set_standard_filter(
-                    slot.into(),
-                    StandardFilter { filter: FilterType::DedicatedSingle(id), action },
-                ),
-                Id::Extended(id) => can.properties().set_extended_filter(
-                    slot.into(),
-                    ExtendedFilter { filter: FilterType::DedicatedSingle(id), action },
-                ),
+        let action = Action::StoreInFifo0;
+        let (mut standard, mut extended) = (0, 0);
+        for (id, mask) in received.filters() {
+            match id {
+                Id::Standard(id) if standard < STANDARD_FILTERS => {
+                    let filter = FilterType::BitMask { filter: id.as_raw(), mask: mask as u16 & 0x7FF };
+                    can.properties().set_standard_filter(standard.into(), StandardFilter { filter, action });
+                    standard += 1;
+                }
+                Id::Extended(id) if extended < EXTENDED_FILTERS => {
+                    let filter = FilterType::BitMask { filter: id.as_raw(), mask: mask & 0x1FFF_FFFF };
+                    can.properties().set_extended_filter(extended.into(), ExtendedFilter { filter, action });
+                    extended += 1;
+                }
+                // All others share what no filter takes.
+                Id::Standard(_) => standard = u8::MAX,
+                Id::Extended(_) => extended = u8::MAX,
             }
         }
+        let rest = |filters| match filters {
+            u8::MAX => NonMatchingFilter::IntoRxFifo0,
+            _ => NonMatchingFilter::Reject,
+        };
+        let others = GlobalFilter::reject_all()
+            .set_handle_standard_frames(rest(standard))
+            .set_handle_extended_frames(rest(extended));
+        let config = can.config().set_global_filter(others).set_tx_buffer_mode(TxBufferMode::Fifo);
+        can.set_config(config.set_automatic_bus_off_recovery(false));
         let driver = can.into_normal_mode().buffered(SENT.take(), RECEIVED.take());
         let now = Instant::now();
         Self {
             sender: driver.writer(),
             receiver: driver.reader(),
             _driver: driver,
-            lost: 0,
+            requests: [received.ids[0], received.ids[1]],
+            counters: LineCounters::NONE,
             taken: 0,
             alive: now,
             changed: now,
@@ -97,8 +138,25 @@ impl CanBus {
         }
     }
 
-    fn lose(&mut self, frames: u32) {
-        self.lost = self.lost.saturating_add(frames);
+    pub fn counters(&self) -> LineCounters {
+        self.counters
+    }
+
+    /// Counts frames that were not sent.
+    fn drop_sent(&mut self, frames: u32) {
+        self.counters.unsent = self.counters.unsent.saturating_add(frames);
+    }
+
+    /// Counts a received frame that was lost.
+    fn lose(&mut self) {
+        self.counters.frames_lost = self.counters.frames_lost.saturating_add(1);
+    }
+
+    fn transmit(&mut self, frame: DataFrame) {
+        let frame = frame.convert::<Frame>();
+        if frame.is_none_or(|frame| self.sender.try_write(frame).is_err()) {
+            self.drop_sent(1);
+        }
     }
 
     /// Drops what waits to be sent. A frame under way and those behind it can take a few calls.
@@ -108,7 +166,7 @@ impl CanBus {
             interrupt::FDCAN1_IT0.pend();
             let places = pac::FDCAN1.txbrp().read().0;
             pac::FDCAN1.txbcr().write(|w| w.0 = places);
-            self.lose((pac::FDCAN1.txbcf().read().0 & places).count_ones());
+            self.drop_sent((pac::FDCAN1.txbcf().read().0 & places).count_ones());
         }
     }
 
@@ -135,9 +193,14 @@ impl CanBus {
 
 impl Sink for CanBus {
     fn frame(&mut self, sent: TimedFrame) {
-        let frame = sent.frame.convert::<Frame>();
-        if frame.is_none_or(|frame| self.sender.try_write(frame).is_err()) {
-            self.lose(1);
+        if !service::SILENCED.load(Relaxed) {
+            self.transmit(sent.frame);
+        }
+    }
+
+    fn observed(&mut self, observation: &Observation) {
+        if service::OBSERVATIONS.try_send(*observation).is_err() {
+            self.counters.overruns = self.counters.overruns.saturating_add(1);
         }
     }
 }
@@ -149,8 +212,13 @@ impl Bus for CanBus {
             self.taken += 1;
             // The driver also passes errors of the bus, which the controller counts.
             if let Ok(received) = received {
-                let frame = received.frame;
-                return DataFrame::new(*frame.id(), frame.data());
+                let frame = DataFrame::new(*received.frame.id(), received.frame.data())?;
+                if !self.requests.contains(&frame.id()) {
+                    return Some(frame);
+                }
+                if service::REQUESTS.try_send(frame).is_err() {
+                    self.lose();
+                }
             }
         }
     }
@@ -159,13 +227,16 @@ impl Bus for CanBus {
         let now = Instant::now();
         // The driver drops what finds its queue full.
         if core::mem::take(&mut self.taken) >= QUEUE {
-            self.lose(1);
+            self.lose();
         }
         if pac::FDCAN1.ir().read().rfl(0) {
             pac::FDCAN1.ir().write(|w| w.set_rfl(0, true));
-            self.lose(1);
+            self.lose();
         }
         self.follow(now);
+        while let Ok(frame) = service::RESPONSES.try_receive() {
+            self.transmit(frame);
+        }
         let (waiting, sent) = (pac::FDCAN1.txbrp().read().0, pac::FDCAN1.txbto().read().0);
         let is_stale = now - self.alive > STALE;
         if sent != 0 || waiting == 0 && !is_stale {
@@ -176,7 +247,7 @@ impl Bus for CanBus {
     }
 
     fn lost(&self) -> u32 {
-        self.lost
+        self.counters.unsent.saturating_add(self.counters.frames_lost)
     }
 
     fn is_off(&self) -> bool {

@@ -7,18 +7,24 @@
 //! | USART1 | D0 (PB7), D1 (PB6) | Xsens MTi, 115200 baud |
 //! | FDCAN1 | PD0, PD1 (CN9), to a transceiver | 500 kbit/s; data of others at 2 Mbit/s |
 //!
-//! Every millisecond `drive` calls [`Coprocessor::step`]. The network runs in the main program, below all interrupts.
-//! The watchdog is fed while both get on.
+//! | flash | bank 2 | records: settings, calibration, what was learnt, troubles |
+//!
+//! Every millisecond `drive` calls [`Coprocessor::step`]. Below it `compute` runs the network, and below both the main program
+//! serves diagnosis and the store ([`service`]). The watchdog is fed while `drive` and the main program get on. Not here yet: sensors on SPI, update of
+//! weights and firmware, keys, the fibre-optic gyro.
 #![no_std]
 #![no_main]
 
 mod can;
+mod service;
+mod store;
 
-use can::CanBus;
+use can::{CanBus, Received};
 use core::panic::PanicInfo;
-use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::Ordering::Relaxed;
 use cortex_m::peripheral::SCB;
 use embassy_executor::InterruptExecutor;
+use embassy_stm32::flash::Flash;
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::usart::{self, BufferedUart};
@@ -27,13 +33,18 @@ use embassy_stm32::{bind_interrupts, peripherals, rcc};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Ticker};
-use gyronet::can::wheel::{WheelReceiver, WheelSettings};
-use gyronet::coprocessor::DueWindow;
-use gyronet::model::Estimate;
+use gyronet::align::clock_ratio::ClockRatioConfig;
+use gyronet::can::wheel::WheelReceiver;
+use gyronet::coprocessor::{Clock, DueWindow, StorageFaults};
+use gyronet::model::background::BackgroundCheck;
+use gyronet::model::{Estimate, WindowNetwork, weights};
 use gyronet::sensor::serial::Serial;
 use gyronet::sensor::xsens::Mti;
-use gyronet::{Config, Coprocessor, GyroNet, Micros, WindowNetwork};
+use gyronet::service::message::{AllCounters, LineCounters};
+use gyronet::{Config, Coprocessor, GyroNet, Micros};
+use service::{Service, Stored, alive};
 use static_cell::ConstStaticCell;
+use store::Records;
 
 bind_interrupts!(struct Interrupts {
     USART1 => usart::BufferedInterruptHandler<peripherals::USART1>;
@@ -48,18 +59,19 @@ type Watchdog = IndependentWatchdog<'static, peripherals::IWDG>;
 const STUCK: Duration = Duration::from_millis(100);
 /// Time after which the watchdog resets the chip, us.
 const WATCHDOG_US: u32 = 100_000;
+/// Steps from one reading of the state of the courses to the next; a course comes once a second.
+const COURSE_STEPS: u32 = 100;
 
 /// A window for the network, and its estimate.
 static WINDOW: Signal<CriticalSectionRawMutex, DueWindow> = Signal::new();
 static ESTIMATE: Signal<CriticalSectionRawMutex, (u32, Estimate)> = Signal::new();
-/// Number of cycles of the main program.
-static CYCLES: AtomicU32 = AtomicU32::new(0);
 
 /// Does every millisecond what is due.
 #[embassy_executor::task]
 async fn drive(coprocessor: &'static mut Coprocessor, mut imu: Imu, mut can: CanBus, mut watchdog: Watchdog) {
     let mut tick = Ticker::every(Duration::from_millis(1));
     let (mut seen, mut seen_at) = (0, Instant::now());
+    let (mut steps, mut line_errors) = (0u32, 0u32);
     loop {
         tick.next().await;
         let now = Instant::now();
@@ -67,12 +79,31 @@ async fn drive(coprocessor: &'static mut Coprocessor, mut imu: Imu, mut can: Can
             // A late estimate is counted.
             let _ = coprocessor.deliver(end, estimate);
         }
-        // Errors of the sensor are counted.
-        let _ = coprocessor.step(Micros(now.as_micros()), &mut imu, &mut can, None);
+        if service::WEIGHTS_DAMAGED.swap(false, Relaxed) {
+            coprocessor.weights_damaged();
+        }
+        if service::MOUNT_MOVED.swap(false, Relaxed) {
+            coprocessor.mount_moved();
+        }
+        coprocessor.pause(service::PAUSED.load(Relaxed), &mut can);
+        let step = coprocessor.step(Micros(now.as_micros()), &mut imu, &mut can, None);
+        line_errors = line_errors.saturating_add(u32::from(step.imu_error.is_some()));
         if let Some(window) = coprocessor.window() {
             WINDOW.signal(window);
         }
-        let cycles = CYCLES.load(Relaxed);
+        service::COUNTERS.signal(AllCounters {
+            pipeline: *coprocessor.pipeline().counters(),
+            watch: *coprocessor.monitor_counters(),
+            lines: LineCounters { line_errors, ..can.counters() },
+            fog: *coprocessor.fog_counters(),
+            inputs: *coprocessor.input_counters(),
+            contradiction: *coprocessor.contradiction(),
+        });
+        steps = steps.wrapping_add(1);
+        if steps.is_multiple_of(COURSE_STEPS) {
+            service::COURSE.signal(coprocessor.pipeline().course_state());
+        }
+        let cycles = service::cycles();
         if cycles != seen {
             (seen, seen_at) = (cycles, now);
         }
@@ -82,43 +113,88 @@ async fn drive(coprocessor: &'static mut Coprocessor, mut imu: Imu, mut can: Can
     }
 }
 
-static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
+/// Computes the windows, below `drive` and above the main program, which waits for the flash.
+#[embassy_executor::task]
+async fn compute(mut network: GyroNet<'static>) {
+    loop {
+        let window = WINDOW.wait().await;
+        ESTIMATE.signal((window.end, network.estimate(&window.features)));
+    }
+}
 
-/// Runs `drive` in the interrupt of a peripheral that is not used, below those of the drivers.
+/// The executors run in the interrupts of peripherals that are not used, below those of the drivers.
+static ABOVE: InterruptExecutor = InterruptExecutor::new();
+static BELOW: InterruptExecutor = InterruptExecutor::new();
+
 #[embassy_stm32::interrupt]
 unsafe fn UART4() {
     // SAFETY: it is called here alone, and the interrupt is enabled by `start`.
-    unsafe { EXECUTOR.on_interrupt() }
+    unsafe { ABOVE.on_interrupt() }
+}
+
+#[embassy_stm32::interrupt]
+unsafe fn UART5() {
+    // SAFETY: as above.
+    unsafe { BELOW.on_interrupt() }
 }
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
     static COPROCESSOR: ConstStaticCell<Coprocessor> =
         ConstStaticCell::new(Coprocessor::new(Config::DEFAULT));
+    static DEVICE: ConstStaticCell<Stored> = ConstStaticCell::new(Stored::new(&service::SUPPORTED));
     static RECEIVED: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
     static UNSENT: ConstStaticCell<[u8; 1]> = ConstStaticCell::new([0]);
 
+    let identity = service::identity();
     let parts = embassy_stm32::init(clocks());
     let mut watchdog = IndependentWatchdog::new(parts.IWDG, WATCHDOG_US);
     watchdog.unleash();
+
+    let device = DEVICE.take();
+    device.begin(Some(Records::new(Flash::new_blocking(parts.FLASH))), None, Ok(()), identity);
+    watchdog.pet();
+    let blob = device.weights(None, &weights::DEFAULT.0);
+    let weights = blob.map_or(0, |blob| blob.crc);
+    let configuration = device.configuration();
+    let of_other_weights = device.calibration().unit.is_some_and(|unit| unit.weights != weights);
+    let coprocessor = COPROCESSOR.take();
+    *coprocessor = Coprocessor::new(Config {
+        wheels: WheelReceiver::new(*device.wheels()).ok(),
+        has_gyronet: blob.is_some(),
+        clock: Clock::Outside,
+        clock_ratio: Some(ClockRatioConfig::DEFAULT),
+        storage: StorageFaults {
+            damaged: device.stored_damaged() || of_other_weights,
+            configuration_lost: device.configuration_lost(),
+        },
+        ..configuration.coprocessor(device.calibration(), device.learned(), weights)
+    });
+    let ids = configuration.diagnosis.ids().expect("a stored configuration has been checked");
+    let received = Received {
+        ids,
+        wheels: device.wheels(),
+        heading: &configuration.heading,
+        bits_per_second: configuration.can.bits_per_second,
+    };
+    let can = CanBus::start(parts.FDCAN1, parts.PD0, parts.PD1, Interrupts, &received);
     let (unsent, received) = (UNSENT.take(), RECEIVED.take());
     let baud = usart::Config::default();
     let line = BufferedUart::new(parts.USART1, parts.PB7, parts.PB6, unsent, received, Interrupts, baud)
         .expect("115200 baud from 250 MHz");
-    let wheels = WheelSettings::TOYOTA;
-    let can = CanBus::start(parts.FDCAN1, parts.PD0, parts.PD1, Interrupts, &wheels);
-    let coprocessor = COPROCESSOR.take();
-    *coprocessor = Coprocessor::new(Config { wheels: WheelReceiver::new(wheels).ok(), ..Config::DEFAULT });
-    let mut network = GyroNet::shipped().expect("it comes with the library");
+    let check = blob.as_ref().map(|blob| BackgroundCheck::new(blob.content, blob.crc));
+    let mut service = Service::new(device, ids, check);
 
     interrupt::UART4.set_priority(Priority::P6);
+    interrupt::UART5.set_priority(Priority::P7);
     let imu = Serial::new(line, Mti::new());
-    EXECUTOR.start(interrupt::UART4).spawn(drive(coprocessor, imu, can, watchdog).expect("its only one"));
+    ABOVE.start(interrupt::UART4).spawn(drive(coprocessor, imu, can, watchdog).expect("its only one"));
+    if let Some(blob) = blob {
+        BELOW.start(interrupt::UART5).spawn(compute(GyroNet::new(blob)).expect("its only one"));
+    }
     loop {
-        if let Some(window) = WINDOW.try_take() {
-            ESTIMATE.signal((window.end, network.estimate(&window.features)));
-        }
-        CYCLES.fetch_add(1, Relaxed);
+        service.step();
+        alive();
         // The tick ends the sleep.
         cortex_m::asm::wfi();
     }

@@ -32,7 +32,7 @@ class FakeBoard:
         self.queue, self.order = [], count()
         self.lines, self.log, self.resets, self.nmis = {}, [], [], 0
         self.stalled_until, self.clock_changes = 0, 0
-        self.flash, self.ram = bytearray(b"\xFF" * SIZE), bytearray(0x2_0000)
+        self.flash, self.ram = bytearray(b"\xFF" * 2 * SIZE), bytearray(0x2_0000)
         self.peripherals = {}
         for peripheral in create(self):
             self.peripherals[peripheral.name] = peripheral

@@ -85,6 +85,60 @@ class H5(unittest.TestCase):
         self.board.advance(2 * MS)
         self.assertEqual([cause for _, cause in self.board.resets], ["iwdg"])
 
+    # -- flash -------------------------------------------------------------------------------------------------------
+
+    def unlock(self):
+        for key in (0x4567_0123, 0xCDEF_89AB):
+            self.board.write("FLASH", 0x04, key)
+
+    def program(self, address, words):
+        """Stores words to the array, as a program does."""
+        for number, word in enumerate(words):
+            self.board.peripherals["FLASH"].program(address + 4 * number, word, 4)
+
+    def test_a_quad_word_is_programmed_when_it_is_full(self):
+        self.unlock()
+        self.board.write("FLASH", 0x28, 2)
+        self.program(0x0810_0000, (1, 2, 3))
+        self.assertEqual(self.board.read("FLASH", 0x20), 2)
+        self.program(0x0810_000C, (4,))
+        self.assertEqual(self.board.read("FLASH", 0x20), 1)
+        self.assertEqual(self.board.memory_read(0x0810_0000, 4), b"\xFF" * 4)
+        self.board.advance(1 * MS)
+        self.assertEqual(self.board.read("FLASH", 0x20), 1 << 16)
+        self.assertEqual(self.board.memory_read(0x0810_0000, 8), bytes((1, 0, 0, 0, 2, 0, 0, 0)))
+        with self.assertRaises(Violation):
+            self.program(0x0810_0000, (0, 0, 0, 0))
+
+    def test_stores_that_do_not_fit_are_flagged_until_nsccr(self):
+        self.program(0x0810_0000, (1,))
+        self.unlock()
+        self.board.write("FLASH", 0x28, 2)
+        self.program(0x0810_0000, (1,))
+        self.program(0x0810_0010, (1,))
+        self.board.write("FLASH", 0x20, 0)
+        self.assertEqual(self.board.read("FLASH", 0x20), 1 << 18 | 1 << 20)
+        self.board.write("FLASH", 0x30, 1 << 18 | 1 << 20)
+        self.assertEqual(self.board.read("FLASH", 0x20), 0)
+
+    def test_a_sector_of_the_second_bank_is_erased(self):
+        self.board.write("FLASH", 0x28, 1 << 31 | 3 << 6 | 1 << 5 | 4)
+        self.assertEqual(self.board.read("FLASH", 0x28), 1)
+        self.board.memory_write(0x0810_5FF0, bytes(32))
+        self.unlock()
+        self.board.write("FLASH", 0x28, 1 << 31 | 2 << 6 | 1 << 5 | 4)
+        self.assertEqual(self.board.read("FLASH", 0x20), 1)
+        self.board.advance(10 * MS)
+        self.assertEqual(self.board.memory_read(0x0810_5FF0, 32), b"\xFF" * 16 + bytes(16))
+
+    def test_a_wrong_key_locks_until_a_reset(self):
+        self.board.write("FLASH", 0x04, 1)
+        self.unlock()
+        self.assertEqual(self.board.read("FLASH", 0x28), 1)
+        self.board.reset("software")
+        self.unlock()
+        self.assertEqual(self.board.read("FLASH", 0x28), 0)
+
     # -- FDCAN -------------------------------------------------------------------------------------------------------
 
     def start_can(self, cccr=0x300):

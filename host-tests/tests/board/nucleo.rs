@@ -1,19 +1,28 @@
 //! `examples/embassy` on the virtual NUCLEO-H563ZI: it sends what the host makes of the same samples on a bus with CAN FD, and
 //! nothing old after the bus was away.
 
-use crate::common::{IMU, SAMPLE, SET, drive, frames};
+use crate::common::{IMU, SAMPLE, SET, drive, frames, host};
+use crate::service::{answer, on_bus, send, storing};
+use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
-use gyronet::can::wheel::{WheelReceiver, WheelSettings};
-use gyronet::sensor::xsens::Mti;
-use gyronet::{Blob, Config, Coprocessor, GyroNet, Micros, TimedFrame, WindowNetwork, weights};
-use gyronet_host_tests::board::Board;
+use gyronet::can::yaw::AngleMessage;
+use gyronet::health::Faults;
+use gyronet::service::event::ResetCause;
+use gyronet::service::message::FlashState;
+use gyronet::store::Configuration;
+use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::recordings::workspace;
+use gyronet_host_tests::{inputs, replay};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
 /// Time from power-on to the first sample.
 const BEGIN: Duration = Duration::from_millis(100);
+const MS: Duration = Duration::from_millis(1);
+/// The second bank of the flash, where the records are, and the size of a sector.
+const BANK_2: u32 = 0x0810_0000;
+const SECTOR: u32 = 8 << 10;
 
 fn elf() -> PathBuf {
     const TARGET: &str = "thumbv8m.main-none-eabihf";
@@ -28,39 +37,14 @@ fn elf() -> PathBuf {
     folder.join(TARGET).join("release/gyronet-nucleo")
 }
 
-fn host(samples: &[Vec<u8>]) -> Vec<DataFrame> {
-    let wheels = WheelReceiver::new(WheelSettings::TOYOTA).ok();
-    let mut coprocessor = Coprocessor::new(Config { wheels, ..Config::DEFAULT });
-    let mut network =
-        GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
-    let (mut mti, mut made) = (Mti::new(), Vec::new());
-    for (k, byte) in
-        samples.iter().enumerate().flat_map(|(k, sample)| sample.iter().map(move |byte| (k, byte)))
-    {
-        mti.receive(*byte);
-        while let Some(sample) = mti.next_sample() {
-            let now = Micros(10_000 * k as u64);
-            let mut send = |sent: TimedFrame| made.push(sent.frame);
-            coprocessor.imu(sample.expect("a sample"), now, &mut send).expect("in order");
-            if let Some(window) = coprocessor.window() {
-                coprocessor
-                    .deliver(window.end, network.estimate(&window.features))
-                    .expect("the one that is due");
-            }
-        }
-    }
-    made
-}
-
-/// A board that has just been switched on, and the samples that it will receive.
-fn boot(test: &str, samples: usize) -> Option<(Board, Vec<Vec<u8>>)> {
+/// A board that has just been switched on, and will receive these samples.
+fn boot(test: &str, samples: &[Vec<u8>]) -> Option<Board> {
     let mut board = Board::of("stm32h563", test, &elf())?;
     board.power_on();
-    let samples = drive(samples);
     for (k, sample) in samples.iter().enumerate() {
         board.send_at(IMU, sample, BEGIN + SAMPLE * k as u32);
     }
-    Some((board, samples))
+    Some(board)
 }
 
 #[test]
@@ -70,7 +54,8 @@ fn a_nucleo_sends_what_the_host_makes_and_nothing_old() {
     const AWAY: usize = 40;
     const FD: usize = 64;
     let test = "a_nucleo_sends_what_the_host_makes_and_nothing_old";
-    let Some((mut board, samples)) = boot(test, SAMPLES + 2 * AWAY) else { return };
+    let samples = drive(SAMPLES + 2 * AWAY);
+    let Some(mut board) = boot(test, &samples) else { return };
     let made = host(&samples);
     for k in 0..SAMPLES / 2 {
         board.can_fd_send_at(0x300, &[k as u8; FD], BEGIN + SAMPLE * 2 * k as u32);
@@ -90,4 +75,113 @@ fn a_nucleo_sends_what_the_host_makes_and_nothing_old() {
     let first = made.iter().position(|frame| *frame == sent[0]).expect("the host's");
     println!("{test}: sample {} is the first after {}", first / SET, SAMPLES + AWAY);
     assert!(first >= SET * (SAMPLES + AWAY - 3) && sent.len() > SET * (AWAY - 10));
+}
+
+fn rates(timed: Vec<(Duration, DataFrame)>) -> Vec<(Duration, DataFrame)> {
+    let is_rate = |id| matches!(id, Id::Standard(id) if id.as_raw() < 0x700);
+    timed.into_iter().filter(|(_, frame)| is_rate(frame.id())).collect()
+}
+
+/// The fault bits of the last angle message.
+fn faults(sent: &[(Duration, DataFrame)]) -> Faults {
+    let is_angle = |id| matches!(id, Id::Standard(id) if id.as_raw() == 0x1A1);
+    let angle = sent.iter().rfind(|(_, frame)| is_angle(frame.id())).expect("an angle message");
+    AngleMessage::parse(angle.1.data()).expect("eight bytes").faults
+}
+
+#[test]
+#[ignore = "it builds embassy, which takes a minute"]
+fn a_nucleo_stores_over_the_bus_without_a_gap() {
+    const TIME: Duration = Duration::from_millis(1_500);
+    let test = "a_nucleo_stores_over_the_bus_without_a_gap";
+    let parked: Vec<_> = (0..600).map(|k| replay::turning(k, 0.0)).collect();
+    let Some(mut board) = boot(test, &parked) else { return };
+    // Something in each sector of the records, so that all are erased before their first use.
+    for sector in 0..16 {
+        board.patch(At::Address(BANK_2 + SECTOR * (sector + 1) - 16), &[0x55; 16]);
+    }
+    for k in 0..600 {
+        board.can_send_at(&inputs::wheels(0.0), BEGIN + SAMPLE * k + 8 * MS);
+    }
+    board.run(Duration::from_secs(4));
+    let _ = board.can_frames();
+    board.snapshot("parked");
+    board.run(TIME);
+    let undisturbed = board.can_frames();
+    board.restore("parked");
+    let mut configuration = Configuration::DEFAULT;
+    let mut sent = Vec::new();
+    for bits_per_second in [250_000, 1_000_000, 250_000] {
+        configuration.can.bits_per_second = bits_per_second;
+        send(&mut board, &[0x10, 0x03]);
+        board.run(20 * MS);
+        send(&mut board, &storing(&configuration));
+        board.run(TIME / 4);
+        sent.extend(board.can_frames());
+    }
+    let stored = sent.iter().filter(|(_, frame)| frame.id() == response() && frame.data()[1] == 0x6E);
+    assert_eq!(stored.count(), 3);
+    let erased = board.events().iter().filter(|event| event.kind == "flash_erase").count();
+    let sent = rates(sent);
+    let gap = sent.windows(2).map(|pair| pair[1].0 - pair[0].0).max().expect("frames");
+    println!("{test}: {} frames, {erased} sectors erased, at most {gap:?} without a frame", sent.len());
+    assert_eq!(erased, 8, "a sector of the records takes eight of the flash");
+    assert!(gap < SAMPLE, "{gap:?}");
+    let other = sent.iter().zip(&undisturbed).find(|((_, sent), (_, alone))| sent != alone);
+    assert_eq!(other, None, "the same as without a store");
+
+    board.power_cycle(MS);
+    board.configure("FDCAN1.bit_rate", configuration.can.bits_per_second);
+    board.run(100 * MS);
+    assert_eq!(on_bus(&mut board).configuration().expect("a response"), configuration);
+    // The samples end, so that nothing forbids a restart.
+    board.run(Duration::from_secs(1));
+    send(&mut board, &[0x11, 1]);
+    assert_eq!(answer(&mut board, 100 * MS), Some(vec![0x51, 1]));
+    board.run(100 * MS);
+    let info = on_bus(&mut board).info().expect("a response");
+    assert_eq!((info.identity.reset, info.flash), (ResetCause::Software, FlashState::Ready));
+}
+
+fn response() -> Id {
+    Id::Standard(embedded_can::StandardId::new(0x7E8).expect("11 bits"))
+}
+
+#[test]
+#[ignore = "it builds embassy, which takes a minute"]
+fn a_nucleo_hears_wheels_and_returns_from_bus_off_at_growing_intervals() {
+    let test = "a_nucleo_hears_wheels_and_returns_from_bus_off_at_growing_intervals";
+    let samples = drive(400);
+    let Some(mut board) = boot(test, &samples) else { return };
+    let made = host(&samples);
+    for k in 0..50 {
+        board.can_send_at(&inputs::wheels(0.0), BEGIN + SAMPLE * k);
+    }
+    board.run(BEGIN + 500 * MS);
+    assert!(faults(&board.can_frames()).0 & Faults::WHEELS.0 == 0);
+    board.run(500 * MS);
+    assert!(faults(&board.can_frames()).0 & Faults::WHEELS.0 != 0, "those that were heard are silent");
+
+    let _ = board.events();
+    board.configure("FDCAN1.short", "recessive");
+    board.run(400 * MS);
+    board.configure("FDCAN1.short", serde_json::Value::Null);
+    let _ = board.can_frames();
+    board.run(600 * MS);
+    let events = board.events();
+    let times =
+        |kind: &str| events.iter().filter(|event| event.kind == kind).map(|event| event.time).collect();
+    let (off, back): (Vec<Duration>, Vec<Duration>) = (times("bus_off"), times("bus_off_ended"));
+    println!("{test}: off at {off:?}, back at {back:?}");
+    assert_eq!((off.len(), back.len()), (6, 6));
+    for (k, (off, back)) in off.iter().zip(&back).enumerate() {
+        let promised = 10 * MS * (1 << k) + Duration::from_micros(129 * 11 * 2);
+        assert!((*back - *off).abs_diff(promised) < 2 * MS, "{:?} for {promised:?}", *back - *off);
+    }
+    let sent = rates(board.can_frames());
+    let (first, frame) = sent[0];
+    assert!(first - back[5] < SAMPLE + 2 * MS, "{:?}", first - back[5]);
+    let number = made.iter().position(|made| *made == frame).expect("the host's") / SET;
+    let newest = ((first - BEGIN).as_millis() / SAMPLE.as_millis()) as usize;
+    assert!(newest - number <= 1, "sample {number} at the time of {newest}");
 }

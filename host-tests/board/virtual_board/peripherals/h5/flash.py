@@ -1,22 +1,127 @@
-"""Flash interface of the STM32H563: so far only the access control register."""
+"""Flash interface of the STM32H563: two banks of 128 sectors of 8 KiB, of which one is read while the other is written.
+
+A store to the array fills a buffer of sixteen bytes, which are programmed when it is full. What is executed from the bank that
+is busy stalls the core. Witnesses: the header, the HAL, and for NSSR (which NSCCR clears), INCERR and an incomplete buffer what
+others measured on a NUCLEO-H563ZI (w1ne/labwired-core, pull request 335). Left out: option bytes and with them the swap of the
+banks, high-cycle data, bank and mass erase, protection. A second programming of a quad-word, whose ECC would no longer
+fit, and a power cut during an operation are violations. Assumed: the times, since no data sheet was at hand.
+"""
 
 from ...violation import Violation
+from ..registers import WORD, check, unmodelled
 from .system import Registers
+
+BASE, BANK, SECTOR, QUAD = 0x0800_0000, 1 << 20, 8 << 10, 16
+KEYS = (0x4567_0123, 0xCDEF_89AB)
+ACR, NSKEYR, NSSR, NSCR, NSCCR = 0x00, 0x04, 0x20, 0x28, 0x30
+BSY, WBNE, EOP, PGSERR, STRBERR, INCERR = (1 << bit for bit in (0, 1, 16, 18, 19, 20))
+FLAGS = 0x00FF_0000
+LOCK, PG, SER, START, BKSEL = (1 << bit for bit in (0, 1, 2, 5, 31))
+#: All that NSCR keeps: PG, SER, SNB, BKSEL; the rest is not modelled.
+KEPT = PG | SER | 0x7F << 6 | BKSEL
+PROGRAM_PS, ERASE_PS = 100_000_000, 4_000_000_000
 
 
 class Flash(Registers):
-    """FLASH_ACR: wait states, programming delay, prefetch."""
+    """ACR, the keys, and the status and control registers of non-secure code."""
 
     name, base = "FLASH", 0x4002_2000
-    kept = {0x00: (0x13, 0x13F)}
+    kept = {ACR: (0x13, 0x13F)}
     #: As on the STM32F405, bit 5 set: software starts the watchdog.
     options = 1 << 5
+
+    def reset(self, cause):
+        super().reset(cause)
+        if getattr(self, "busy", None):
+            raise Violation(f"{self.name}: a reset during an operation is not modelled")
+        self.status, self.control, self.step, self.refused = 0, LOCK, 0, False
+        self.busy = None
+        self.buffer, self.at = {}, 0
 
     @property
     def latency(self):
         """Returns the wait states."""
-        return self.values[0] & 15
+        return self.values[ACR] & 15
+
+    def read(self, offset, size):
+        check(self, offset, size, WORD)
+        if offset == NSSR:
+            return self.status | (BSY if self.busy else 0) | (WBNE if self.buffer else 0)
+        if offset == NSCR:
+            return self.control
+        return super().read(offset, size)
+
+    def write(self, offset, value, size):
+        check(self, offset, size, WORD)
+        if offset == NSKEYR:
+            self._key(value)
+        elif offset == NSCCR:
+            self.status &= ~(value & FLAGS)
+        elif offset == NSCR:
+            self._write_control(value)
+        elif offset == NSSR:
+            self.board.record("ignored_write", register="FLASH_NSSR", value=value)
+        else:
+            super().write(offset, value, size)
+
+    def _key(self, value):
+        """Unlocks NSCR by both keys in order; a wrong one locks it until a reset."""
+        if self.refused or not self.control & LOCK or value != KEYS[self.step]:
+            self.refused = self.refused or bool(self.control & LOCK)
+            self.board.record("ignored_write", register="FLASH_NSKEYR", value=value)
+            return
+        self.step = (self.step + 1) % 2
+        if not self.step:
+            self.control &= ~LOCK
+
+    def _write_control(self, value):
+        if self.control & LOCK or self.busy:
+            self.board.record("ignored_write", register="FLASH_NSCR", value=value)
+            return
+        if value & ~(KEPT | LOCK | START):
+            raise Violation(f"{self.name}: NSCR {value:#x} asks for what is not modelled")
+        self.control = value & (KEPT | LOCK)
+        if value & START:
+            if not value & SER or value & PG:
+                raise Violation(f"{self.name}: NSCR {value:#x} starts no sector erase")
+            at = (BANK if value & BKSEL else 0) + (value >> 6 & 0x7F) * SECTOR
+            self.board.record("flash_erase", sectors=[at // SECTOR])
+            self._begin(BASE + at, b"\xFF" * SECTOR, ERASE_PS)
 
     def program(self, address, value, size):
-        """Refuses a write to the array."""
-        raise Violation(f"{self.name}: a write of {size} bytes to {address:#x} is not modelled")
+        """Takes a store to the array into the buffer."""
+        quad = address & -QUAD
+        if not self.control & PG or self.control & LOCK:
+            self.status |= PGSERR
+        elif self.buffer and quad != self.at:
+            self.status |= INCERR
+            self.buffer = {}
+        elif any(address + n in self.buffer for n in range(size)):
+            self.status |= STRBERR
+        else:
+            if self.busy:
+                raise Violation(f"{self.name}: a store to the array during an operation is not modelled")
+            self.at = quad
+            self.buffer.update((address + n, value >> 8 * n & 0xFF) for n in range(size))
+            if len(self.buffer) == QUAD:
+                data = bytes(self.buffer[quad + n] for n in range(QUAD))
+                self.buffer = {}
+                if self.board.memory_read(quad, QUAD) != b"\xFF" * QUAD:
+                    raise Violation(f"{self.name}: the quad-word at {quad:#x} is programmed a second time")
+                self._begin(quad, data, PROGRAM_PS)
+
+    def _begin(self, address, data, duration):
+        self.busy = self.board.schedule(duration, lambda: self._end(address, data))
+        processor = getattr(self.board, "processor", None)
+        if processor and (processor.get("pc") - BASE) // BANK == (address - BASE) // BANK:
+            self.board.stall(self.board.now + duration)
+
+    def _end(self, address, data):
+        self.busy = None
+        self.board.memory_write(address, data)
+        self.status |= EOP
+
+    def power_off(self):
+        """Refuses a power cut during an operation."""
+        if self.busy:
+            raise Violation(f"{self.name}: a power cut during an operation is not modelled")
