@@ -3,8 +3,8 @@
 //! A sample's best estimate is the mean of the estimates of all windows that cover it ([`Stride`]). It is complete only
 //! some samples later, so two rates are sent for every sample:
 //!
-//! - the **live** rate at once, for a receiver that uses it for control. No window covers the sample yet, so only
-//!   the steady part of its correction is known ([`SteadyGain`]: the mounting).
+//! - the **live** rate at once, for a receiver that uses it for control. No window covers the sample yet, so it is the
+//!   gyro less bias, level and gain.
 //! - the **delayed** rate [`CompensateConfig::lag`] samples later, for a receiver that integrates it to a heading.
 //!   Most windows that cover the sample have been evaluated by then.
 //!
@@ -17,29 +17,30 @@
 //! rate.
 //!
 //! A window of 0.1 s cannot observe a constant error, and one that a model has learnt is wrong on another vehicle.
-//! The slow mean of the corrections is therefore subtracted from them: standstill finds the bias, and `calibrate` the
-//! gain. Another vehicle's unit is also mounted differently from the one that a model was trained with. If driving
-//! shows that, the mounting's part is subtracted as well, until driving shows otherwise.
+//! The slow mean of the network's corrections is therefore subtracted from them: standstill finds the bias, gravity the
+//! level, and a course or `calibrate` the gain. A linear part answers no constant input
+//! ([`crate::model::BlobError::Constant`]); the slow mean of its corrections would be an error of its own on a vehicle that
+//! shakes.
 //!
 //! | when | live | delayed |
 //! |---|---|---|
 //! | the first window is not full yet | gyro less bias | no rate during the lag, then gyro less bias |
-//! | after a gap, clipping, a late or implausible estimate | gyro less bias until the next window | the best estimate of each sample, gyro less bias where it has none |
+//! | after a gap, clipping, a late or implausible estimate | gyro less bias | the best estimate of each sample, gyro less bias where it has none |
 //! | clipped sample | gyro less bias, marked; nothing is carried into it | the same |
 //! | wheels prove that the vehicle stands | unchanged | zero |
 //!
 //! The lag counts samples, not time: a gap delays earlier samples and drops none.
 
+mod slow_mean;
 mod stride;
-mod unit;
 
 pub use stride::{DELAY, Lag, OutOfRange, Stride};
 
+use crate::model::Estimate;
 use crate::model::window::WINDOW;
-use crate::model::{Estimate, SteadyGain};
 use crate::sample::{RATE_HZ, Validity};
 use crate::units::AngularRate;
-use unit::{MountingCheck, SlowMean};
+use slow_mean::SlowMean;
 
 /// Configures how estimates of the gyro's error become corrected rates.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,7 +101,7 @@ struct Entry {
     held: bool,
     sum: i64,
     count: i32,
-    /// The estimate; while `count` is 0, the steady part, which is known with the sample.
+    /// The estimate; 0 while `count` is 0.
     estimate: i32,
 }
 
@@ -193,12 +194,6 @@ pub struct Compensator {
     config: CompensateConfig,
     /// The newest sample last.
     kept: [Option<Entry>; KEPT],
-    /// The steady gain of the newest estimate's model; zero without an estimate.
-    steady_gain: SteadyGain,
-    mounting_check: MountingCheck,
-    /// The newest model's mounting; and whether levelling has replaced it.
-    mounting: SteadyGain,
-    is_levelled: bool,
     slow_mean: SlowMean,
     /// Revisions not yet in the live rate, and in the delayed rate.
     live_revisions: i64,
@@ -216,10 +211,6 @@ impl Compensator {
         Self {
             config,
             kept: [None; KEPT],
-            steady_gain: SteadyGain::NONE,
-            mounting_check: MountingCheck::START,
-            mounting: SteadyGain::NONE,
-            is_levelled: false,
             slow_mean: SlowMean::NONE,
             live_revisions: 0,
             delayed_revisions: 0,
@@ -231,35 +222,24 @@ impl Compensator {
     /// Revises the samples of the window that ended [`Stride::delay`] samples before the next one.
     ///
     /// # Errors
-    /// [`Implausible`]: nothing was revised, and the next samples have no steady part.
+    /// [`Implausible`]: nothing was revised.
     pub fn revise(&mut self, estimate: &Estimate) -> Result<(), Implausible> {
         let CompensateConfig { stride, lag, max_mean, max_single, model, .. } = self.config;
-        let (corrections, steady_gain) = if model {
-            (&estimate.corrections, estimate.steady_gain)
-        } else {
-            (&[AngularRate::ZERO; WINDOW], SteadyGain::NONE)
-        };
-        let average = mean(corrections);
+        let corrections = if model { &estimate.corrections } else { &[AngularRate::ZERO; WINDOW] };
+        let average = AngularRate::mean(corrections);
         let largest = corrections.iter().max_by_key(|c| c.0.unsigned_abs()).copied().unwrap_or_default();
-        if average.unsigned_abs() > max_mean.0.unsigned_abs()
+        if average.0.unsigned_abs() > max_mean.0.unsigned_abs()
             || largest.0.unsigned_abs() > max_single.0.unsigned_abs()
         {
-            self.forget();
-            return Err(Implausible { mean: AngularRate(average), largest });
+            return Err(Implausible { mean: average, largest });
         }
-        self.steady_gain = steady_gain;
-        self.mounting = steady_gain.mounting();
         let oldest = KEPT - (stride.delay() as usize - 1) - WINDOW;
-        let window = self.kept.iter().skip(oldest).zip(corrections);
-        let mismatched = self.mismatched_mounting();
-        let own =
-            |entry: &Entry, c: &AngularRate| i64::from(c.0) - i64::from(mismatched.correction(entry.rates).0);
-        let seen = window.filter_map(|(entry, c)| entry.as_ref().map(|entry| own(entry, c)));
-        self.slow_mean.observe(seen.sum::<i64>() / WINDOW as i64, stride.samples());
+        let by_network = if model { average.0.saturating_sub(estimate.linear_mean.0) } else { 0 };
+        self.slow_mean.observe(by_network.into(), stride.samples());
         let constant = self.slow_mean.get();
         for (place, (entry, correction)) in self.kept.iter_mut().skip(oldest).zip(corrections).enumerate() {
             let Some(entry) = entry else { continue };
-            entry.sum += own(entry, correction) - constant;
+            entry.sum += i64::from(correction.0) - constant;
             entry.count += 1;
             let estimate = entry.sum.checked_div(i64::from(entry.count)).unwrap_or(0);
             let revision = estimate - i64::from(entry.estimate);
@@ -278,59 +258,14 @@ impl Compensator {
     /// Adds a sample: its gyro rates less static bias.
     pub fn add(&mut self, tick: u32, rates: [AngularRate; 3], validity: Validity) {
         self.kept.rotate_left(1);
-        let steady = match self.steady_gain {
-            SteadyGain::NONE => 0,
-            gain => gain
-                .minus(self.mismatched_mounting())
-                .correction(rates)
-                .0
-                .saturating_sub(self.slow_mean.get() as i32),
-        };
         self.kept[KEPT - 1] =
-            Some(Entry { tick, rates, validity, held: false, sum: 0, count: 0, estimate: steady });
-    }
-
-    /// Compares a sample's rates, less static bias and not levelled, with the model's mounting. `drives` is true when
-    /// the vehicle is known to move. Returns whether the mounting has just been found to be another unit's.
-    pub fn check_mounting(&mut self, rates: [AngularRate; 3], validity: Validity, drives: bool) -> bool {
-        let mounting = self.steady_gain.mounting();
-        if !drives || !validity.is_good() || mounting == SteadyGain::NONE {
-            self.mounting_check.interrupt();
-            return false;
-        }
-        let [.., yaw_rate] = rates;
-        self.mounting_check.observe(yaw_rate, mounting.correction(rates))
+            Some(Entry { tick, rates, validity, held: false, sum: 0, count: 0, estimate: 0 });
     }
 
     /// Marks this many of the newest samples as [`Validity::Stuck`], because a later one has shown it.
     pub fn distrust(&mut self, samples: usize) {
         let newest = self.kept.iter_mut().rev().flatten().take(samples);
         newest.filter(|entry| entry.validity.is_good()).for_each(|entry| entry.validity = Validity::Stuck);
-    }
-
-    /// Returns the mounting's part of the newest estimate's model if it is another unit's, or levelled already.
-    fn mismatched_mounting(&self) -> SteadyGain {
-        let is_out = self.is_levelled || self.mounting_check.is_own() == Some(false);
-        if is_out { self.steady_gain.mounting() } else { SteadyGain::NONE }
-    }
-
-    /// Notes whether levelling has taken the tilt off that a model's mounting corrects.
-    pub fn level(&mut self, is_levelled: bool) {
-        self.is_levelled = is_levelled;
-    }
-
-    /// Returns whether driving has shown that the model's mounting is this unit's.
-    pub fn is_own_mounting(&self) -> bool {
-        self.mounting_check.is_own() == Some(true)
-    }
-
-    /// Returns how far up deviates from z, along x and y, on the unit that the model was trained with, or by nothing if
-    /// driving has shown that this is another one; `None` without a model that has a mounting.
-    pub fn learnt_up(&self) -> Option<[f32; 2]> {
-        let SteadyGain([x, y, _]) = self.mounting;
-        let is_other = self.mounting_check.is_own() == Some(false);
-        let own = [x, y].map(|gain| if is_other { 0.0 } else { -gain as f32 / (1u32 << 24) as f32 });
-        (self.mounting != SteadyGain::NONE).then_some(own)
     }
 
     /// Returns the rate of the newest sample, less the estimate and what remains.
@@ -378,11 +313,6 @@ impl Compensator {
             good: entry.count > 0 && entry.validity.is_good(),
             valid: entry.validity.is_good(),
         })
-    }
-
-    /// Clears the steady part of the samples that follow, because no estimate arrived.
-    pub fn forget(&mut self) {
-        self.steady_gain = SteadyGain::NONE;
     }
 
     /// Notes that the vehicle no longer stands. It may have moved before that was detected, so the angle held at zero
@@ -453,10 +383,4 @@ fn emit(
 /// Saturates at the ends of the code.
 fn code(rate: i64) -> AngularRate {
     AngularRate(rate.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
-}
-
-/// Returns the mean correction, rounded towards zero.
-fn mean(corrections: &[AngularRate]) -> i32 {
-    let sum: i64 = corrections.iter().map(|c| i64::from(c.0)).sum();
-    (sum / corrections.len().max(1) as i64) as i32
 }

@@ -217,8 +217,6 @@ pub struct Counters {
     pub zero_rate_updates: u32,
     /// Seconds in which the gyro contradicted that the vehicle stands.
     pub contradicted: u32,
-    /// Times that the model's mounting was found to be another unit's, and removed from the correction.
-    pub foreign_mountings: u32,
     /// Times that the sensor was found to be mounted differently than in earlier drives.
     pub moved_mounts: u32,
 }
@@ -238,7 +236,6 @@ impl Counters {
         late: 0,
         zero_rate_updates: 0,
         contradicted: 0,
-        foreign_mountings: 0,
         moved_mounts: 0,
     };
 }

@@ -251,7 +251,7 @@ impl Pipeline {
         let implausible = self.use_estimate(frame.tick);
         let standing = self.state.standstill.observe(&frame.sample, wheels);
         let moves = wheels.is_some_and(|wheels| wheels.standstill == Standstill::Moving);
-        let (rates, refused) = match self.level(&mut frame.sample, standing, moves) {
+        let (rates, refused) = match self.level(&mut frame.sample, standing) {
             None => {
                 let refused = self.initialise(&frame, standing, moves);
                 let early = self.state.sensor_bias.early(&sample);
@@ -355,16 +355,12 @@ impl Pipeline {
     }
 
     /// Levels a sample and returns the gyro's reading at rest; does nothing and returns `None` before initialisation.
-    fn level(&mut self, sample: &mut ImuSample, standing: Standing, moves: bool) -> Option<ZeroPoint> {
+    fn level(&mut self, sample: &mut ImuSample, standing: Standing) -> Option<ZeroPoint> {
         let stands = self.judged(standing).is_likely();
-        let State { initialised, compensator, counters, .. } = &mut self.state;
-        let known = initialised.as_mut()?;
-        if known.level.add(sample, stands, compensator) {
+        let known = self.state.initialised.as_mut()?;
+        if known.level.add(sample, stands) {
             known.zero = known.level.zero(self.config.earth_rate);
         }
-        // A model's mounting is that of a sensor as it is mounted.
-        let is_foreign = compensator.check_mounting(known.level.rates(sample), sample.validity, moves);
-        count(&mut counters.foreign_mountings, u32::from(is_foreign));
         *sample = known.level.rotation().sample(sample);
         Some(known.zero)
     }
@@ -411,7 +407,6 @@ impl Pipeline {
     /// Drops the current window and static initialisation, because neither may span a gap.
     fn break_window(&mut self) {
         self.state.windows.break_off();
-        self.state.compensator.forget();
         if self.state.initialised.is_none() {
             self.state.static_init.restart();
         }
@@ -423,7 +418,6 @@ impl Pipeline {
         let Some(estimate) = windows.take_estimate(tick, self.config.compensate.stride.delay())? else {
             count(&mut counters.late, 1);
             windows.reject(Faults::LATE);
-            compensator.forget();
             return None;
         };
         count(&mut counters.windows, 1);

@@ -103,6 +103,19 @@ pub struct Blob<'w> {
     pub content: &'w [u8],
 }
 
+/// Refuses a linear part that answers a constant input by more than its weights are rounded.
+fn differential(linear: Linear<'_>) -> Result<Linear<'_>, BlobError> {
+    for (output, row) in linear.rows().enumerate() {
+        for input in 0..FEATURES {
+            let weights = row.iter().skip(input).step_by(FEATURES);
+            if weights.map(|weight| i64::from(*weight)).sum::<i64>().unsigned_abs() > WINDOW as u64 {
+                return Err(BlobError::Constant { output: output as u16, input: input as u16 });
+            }
+        }
+    }
+    Ok(linear)
+}
+
 impl<'w> Blob<'w> {
     /// Checks everything about a weight file, then gives access to it in place.
     pub fn new_checked(bytes: &'w [u8]) -> Result<Self, BlobError> {
@@ -114,7 +127,7 @@ impl<'w> Blob<'w> {
         let provenance = reader.provenance(provenance_len)?;
         let units = usize::from(shape.units);
         let linear = match shape.linear {
-            true => Some(reader.linear(WINDOW, LINEAR_INPUTS)?),
+            true => Some(differential(reader.linear(WINDOW, LINEAR_INPUTS)?)?),
             false => None,
         };
         let (mut layers, mut gyro_error, mut log_scale) = (None, Dense::EMPTY, Dense::EMPTY);

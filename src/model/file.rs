@@ -94,6 +94,11 @@ pub enum BlobError {
     Gyro(u16),
     #[error("weight file: output {output} of the linear part could overflow its accumulator")]
     LinearBound { output: u16 },
+    #[error(
+        "weight file: output {output} of the linear part answers a constant input {input}; mounting and gain belong to the \
+         unit, and `calibrate` finds them"
+    )]
+    Constant { output: u16, input: u16 },
     #[error("weight file: {found} units a direction, memory holds {largest}")]
     Units { found: u16, largest: u16 },
 }

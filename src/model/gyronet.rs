@@ -7,7 +7,7 @@
 use super::blob::{Blob, BlobError, HIDDEN};
 use super::input::load_step;
 use super::weights;
-use super::{Estimate, SCALE_MAX, SCALE_MIN, SteadyGain, WindowNetwork};
+use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
 use crate::model::window::{FEATURES, Features, WINDOW};
 use crate::nn::bilstm::{self, Direction, Pass, Run};
 use crate::nn::lstm::{DirectionWeights, Scratch};
@@ -88,7 +88,7 @@ pub trait WindowRun {
     /// Loads a window and runs the linear part on it.
     fn start(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]);
     /// Runs a piece of the window; returns the estimate with the last one.
-    fn advance(&mut self, blob: &Blob<'_>, steady_gain: SteadyGain) -> Option<Estimate>;
+    fn advance(&mut self, blob: &Blob<'_>) -> Option<Estimate>;
     /// Runs a whole window for its newest correction alone.
     fn newest(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]) -> (AngularRate, u16);
     /// Drops the window in progress.
@@ -142,7 +142,7 @@ impl<const U: usize, const W: usize, const R: usize> WindowRun for Arrays<U, W, 
         self.under_way = true;
     }
 
-    fn advance(&mut self, blob: &Blob<'_>, steady_gain: SteadyGain) -> Option<Estimate> {
+    fn advance(&mut self, blob: &Blob<'_>) -> Option<Estimate> {
         let Self { input, layer1, scratch, recurrent, linear, sums, clamped_inputs, run, under_way } = self;
         if !*under_way {
             return None;
@@ -170,7 +170,8 @@ impl<const U: usize, const W: usize, const R: usize> WindowRun for Arrays<U, W, 
         let log_scale =
             sums.iter().fold(0, |sum: i32, [_, log]| sum.saturating_add(blob.log_scale.scale(*log)));
         let scale = AngularRate(times_exp2(blob.scale_unit, log_scale)).clamp(SCALE_MIN, SCALE_MAX);
-        Some(Estimate { corrections, scale, clamped_inputs: *clamped_inputs, steady_gain })
+        let linear_mean = AngularRate::mean(&linear.map(AngularRate));
+        Some(Estimate { corrections, scale, clamped_inputs: *clamped_inputs, linear_mean })
     }
 
     fn newest(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]) -> (AngularRate, u16) {
@@ -221,14 +222,13 @@ impl<const U: usize, const W: usize, const R: usize> WindowRun for Arrays<U, W, 
 #[derive(Debug, Clone)]
 pub struct GyroNet<'w, S = GyroNetState<HIDDEN>> {
     blob: Blob<'w>,
-    steady_gain: SteadyGain,
     state: S,
 }
 
 impl<'w> GyroNet<'w> {
     /// Creates a network over checked weights, with a state for the largest network: 27 KB.
     pub fn new(blob: Blob<'w>) -> Self {
-        Self { blob, steady_gain: steady_gain(&blob), state: GyroNetState::ZERO }
+        Self { blob, state: GyroNetState::ZERO }
     }
 }
 
@@ -254,7 +254,7 @@ impl<'w, S: Memory> GyroNet<'w, S> {
             return Err(BlobError::Units { found, largest: S::UNITS as u16 });
         }
         state.arrays().stop();
-        Ok(Self { blob, steady_gain: steady_gain(&blob), state })
+        Ok(Self { blob, state })
     }
 
     /// Returns the network's weights.
@@ -271,7 +271,7 @@ impl<'w, S: Memory> GyroNet<'w, S> {
     /// Runs a bounded piece of the window (one direction of one layer, a third of it or less); returns the estimate
     /// with the last piece, `None` before that and when no window is in progress.
     pub fn advance(&mut self) -> Option<Estimate> {
-        self.state.arrays().advance(&self.blob, self.steady_gain)
+        self.state.arrays().advance(&self.blob)
     }
 
     /// Returns the newest sample's correction without a scale, and the clamped inputs. The backward half of layer 2
@@ -280,19 +280,6 @@ impl<'w, S: Memory> GyroNet<'w, S> {
     pub fn estimate_newest(&mut self, window: &[Features; WINDOW]) -> (AngularRate, u16) {
         self.state.arrays().newest(&self.blob, window)
     }
-}
-
-/// Returns the linear part's gains for constant rates, averaged over its outputs.
-fn steady_gain(blob: &Blob<'_>) -> SteadyGain {
-    const RATES: core::ops::Range<usize> = FEATURES - 3..FEATURES;
-    let mut sums = [0; 3];
-    for sample in blob.linear.iter().flat_map(Linear::rows).flat_map(|row| row.chunks_exact(FEATURES)) {
-        for (sum, weight) in sums.iter_mut().zip(sample.get(RATES).unwrap_or_default()) {
-            *sum += i64::from(*weight);
-        }
-    }
-    // A row's sum is below 2^32 in magnitude; no unit has a gain of 128 or more.
-    SteadyGain(sums.map(|sum| i32::try_from(sum / WINDOW as i64).unwrap_or(0)))
 }
 
 /// Normalises the window into the first layer's input, if there is one; returns how many values had to be clamped.

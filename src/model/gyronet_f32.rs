@@ -1,9 +1,8 @@
 //! Computes GyroNet in f32 from the tensors of training; it defines what the integer network approximates.
 
 use super::blob::{HIDDEN, LINEAR_INPUTS};
-use super::{Estimate, SCALE_MAX, SCALE_MIN, SteadyGain, WindowNetwork};
+use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
 use crate::model::window::{FEATURES, Features, WINDOW};
-use crate::nn::linear::Linear;
 use crate::nn::reference::{LstmWeights, dense, lstm};
 use crate::units::{AngularRate, SpecificForce};
 
@@ -71,18 +70,6 @@ impl GyroNetF32<'_> {
     }
 }
 
-impl GyroNetF32<'_> {
-    fn steady_gain(&self) -> SteadyGain {
-        let mut sums = [0.0; 3];
-        for sample in self.linear.unwrap_or_default().as_chunks::<FEATURES>().0 {
-            let [_, _, _, rates @ ..] = sample;
-            sums.iter_mut().zip(rates).for_each(|(sum, weight)| *sum += weight);
-        }
-        let one = (1u32 << Linear::FRACTION_BITS) as f32;
-        SteadyGain(sums.map(|sum| libm::roundf(sum / WINDOW as f32 * one) as i32))
-    }
-}
-
 impl NetworkF32<'_> {
     /// Fills in the layers' outputs, and adds the last one to the gyro error.
     fn run(&self, output_scale: f32, outputs: &mut LayerOutputs) {
@@ -118,13 +105,12 @@ impl WindowNetwork for GyroNetF32<'_> {
                 features[k] as f32 / per_unit
             })
         });
-        let LayerOutputs { gyro_error, log_scale, .. } = self.layers(&units);
-        let corrections = gyro_error.map(|error| {
-            // A number that does not fit is as implausible as the largest one that fits.
-            AngularRate::from_rad_per_sec(error).unwrap_or(AngularRate(i32::MAX))
-        });
+        let LayerOutputs { linear, gyro_error, log_scale, .. } = self.layers(&units);
+        // A number that does not fit is as implausible as the largest one that fits.
+        let code = |rate| AngularRate::from_rad_per_sec(rate).unwrap_or(AngularRate(i32::MAX));
+        let (corrections, linear_mean) = (gyro_error.map(code), AngularRate::mean(&linear.map(code)));
         let scale = AngularRate::from_rad_per_sec(self.output_scale * libm::expf(log_scale))
             .map_or(SCALE_MAX, |scale| scale.clamp(SCALE_MIN, SCALE_MAX));
-        Estimate { corrections, scale, clamped_inputs: 0, steady_gain: self.steady_gain() }
+        Estimate { corrections, scale, clamped_inputs: 0, linear_mean }
     }
 }

@@ -1,6 +1,5 @@
 //! A window holds the last ten samples as the networks see them: integer codes, the angular rate less the static bias.
 
-use crate::nn::linear::Linear;
 use crate::units::{AngularRate, SpecificForce};
 
 /// A GyroNet window has this many samples: 0.1 s at 100 Hz (section III-B of the paper).
@@ -100,8 +99,8 @@ pub struct Estimate {
     pub scale: AngularRate,
     /// Input values that had to be clamped to the network's range.
     pub clamped_inputs: u16,
-    /// The part of the corrections that follows from a sample's own rates.
-    pub steady_gain: SteadyGain,
+    /// The linear part of the corrections, as their mean: it answers no constant, so it contains none.
+    pub linear_mean: AngularRate,
 }
 
 impl Estimate {
@@ -110,35 +109,6 @@ impl Estimate {
         corrections: [AngularRate::ZERO; WINDOW],
         scale: SCALE_MAX,
         clamped_inputs: 0,
-        steady_gain: SteadyGain::NONE,
+        linear_mean: AngularRate::ZERO,
     };
-}
-
-/// The factors that turn a constant angular rate about x, y and z into its correction: a linear part models the
-/// unit's mounting and gain with them. Q24, from rate codes to a rate code.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct SteadyGain(pub [i32; 3]);
-
-impl SteadyGain {
-    /// The gain of a model without a linear part: zero.
-    pub const NONE: Self = Self([0; 3]);
-
-    /// Returns the factors of the roll and pitch rates, which model the mounting.
-    #[must_use]
-    pub const fn mounting(self) -> Self {
-        let Self([roll, pitch, _]) = self;
-        Self([roll, pitch, 0])
-    }
-
-    /// Returns the gain less `part`.
-    #[must_use]
-    pub fn minus(self, part: Self) -> Self {
-        Self(core::array::from_fn(|axis| self.0[axis].saturating_sub(part.0[axis])))
-    }
-
-    /// Returns the correction of a sample with these rates.
-    pub fn correction(&self, rates: [AngularRate; 3]) -> AngularRate {
-        AngularRate(Linear::output(&self.0, &rates.map(|rate| rate.0)))
-    }
 }

@@ -5,7 +5,6 @@
 use super::sensor_bias::ZeroPoint;
 use super::{Pipeline, PipelineConfig};
 use crate::bias::EarthRate;
-use crate::compensate::Compensator;
 use crate::mounting::{Judgement, Rotation, Vertical, VerticalEstimator};
 use crate::sample::ImuSample;
 use crate::sqrt::sqrt;
@@ -55,8 +54,7 @@ impl Level {
         };
         if let Some(estimator) = &mut level.estimator {
             force.into_iter().for_each(|force| estimator.rest(force));
-            // A model's mounting is known only with its first window.
-            let judgement = estimator.judge(None, false);
+            let judgement = estimator.judge();
             level.take(judgement);
             level.up = level.goal;
             level.rotation = Rotation::upright(&level.up);
@@ -78,22 +76,16 @@ impl Level {
         &self.rotation
     }
 
-    /// Returns the rates less those at rest, not levelled.
-    pub(super) fn rates(&self, sample: &ImuSample) -> [AngularRate; 3] {
-        core::array::from_fn(|axis| {
-            AngularRate(sample.angular_rate[axis].0.saturating_sub(self.rest[axis].0))
-        })
-    }
-
     /// Adds a sample that is not levelled yet. Returns true where the rotation has changed.
-    pub(super) fn add(&mut self, sample: &ImuSample, stands: bool, compensator: &mut Compensator) -> bool {
-        let rates = self.rates(sample);
+    pub(super) fn add(&mut self, sample: &ImuSample, stands: bool) -> bool {
+        let rates = core::array::from_fn(|axis| {
+            AngularRate(sample.angular_rate[axis].0.saturating_sub(self.rest[axis].0))
+        });
         let Some(estimator) = &mut self.estimator else { return false };
         if !sample.validity.is_good() {
             estimator.restart();
         } else if estimator.add(&sample.specific_force, &rates, stands) {
-            let judgement = estimator.judge(compensator.learnt_up(), compensator.is_own_mounting());
-            compensator.level(judgement.up.is_some());
+            let judgement = estimator.judge();
             self.take(judgement);
         }
         self.samples = (self.samples + 1) % STEP_SAMPLES;
@@ -152,6 +144,6 @@ impl Pipeline {
 /// Returns the rotation that earlier drives have shown.
 pub(super) fn early(config: &PipelineConfig) -> Rotation {
     let known = config.vertical.turned(&config.mounting);
-    let judged = VerticalEstimator::new(known).judge(None, false);
+    let judged = VerticalEstimator::new(known).judge();
     judged.up.filter(|_| config.levelling).map_or(Rotation::IDENTITY, |up| Rotation::upright(&up))
 }

@@ -211,7 +211,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             out,
             &words!(counters.pipeline => Counters {
                 samples, missing, misplaced, clock_jumps, invalid, moving, windows, clamped_inputs, implausible, late,
-                zero_rate_updates, contradicted, foreign_mountings, moved_mounts
+                zero_rate_updates, contradicted, moved_mounts
             }),
         ),
         0x0106 => {

@@ -196,11 +196,23 @@ fn a_linear_part_that_could_overflow_is_refused() {
     let largest = |file: &mut [u8]| {
         file[row..row + 4 * LINEAR_INPUTS].fill(0);
         set(file, 0, i32::MIN);
-        set(file, 59, i32::MAX);
+        set(file, 54, i32::MAX);
     };
     assert_eq!(check(&largest), Ok(SHAPE));
     assert_eq!(check(&|file| set(file, 30, 1)), Err(BlobError::LinearBound { output: 9 }));
     assert_eq!(check(&|file| set(file, 30, -1)), Err(BlobError::LinearBound { output: 9 }));
+    // Ten weights round by at most ten LSBs; more is an answer to a constant.
+    let constant = |sum: i32| {
+        move |file: &mut [u8]| {
+            file[row..row + 4 * LINEAR_INPUTS].fill(0);
+            set(file, 2, 100);
+            set(file, 56, sum - 100);
+        }
+    };
+    assert_eq!(check(&constant(-10)), Ok(SHAPE));
+    for sum in [11, -11] {
+        assert_eq!(check(&constant(sum)), Err(BlobError::Constant { output: 9, input: 2 }));
+    }
 }
 
 #[test]

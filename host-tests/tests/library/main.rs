@@ -31,7 +31,6 @@ mod kaist_fog;
 mod kvh_dsp1760;
 mod links;
 mod lstm_exact;
-mod mounting_check;
 mod pipeline;
 mod pipeline_estimates;
 mod pipeline_wheels;

@@ -1,10 +1,10 @@
-//! No angle is lost between the network's revised estimates and the rates on the bus: a ledger
+//! No angle is lost between the network's revised estimates and the rates on the bus: sums kept
 //! beside the pipeline, exact to the last code.
 
 use gyronet::compensate::{CompensateConfig, Compensator, Lag, Remaining, Stride};
 use gyronet::health::Status;
+use gyronet::model::Estimate;
 use gyronet::model::window::WINDOW;
-use gyronet::model::{Estimate, SteadyGain};
 use gyronet::pipeline::{BoardState, Pending, Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::units::{AngularRate, Yaw};
@@ -16,8 +16,6 @@ use std::collections::BTreeMap;
 #[derive(Default)]
 struct Ledger {
     samples: BTreeMap<u32, Sample>,
-    /// The steady gain of the last believed window.
-    steady_gain: SteadyGain,
     /// The constant that is taken out of the corrections, Q16, and the windows that it is the mean of.
     constant: (i64, i64),
     out: Option<(u32, [i64; WINDOW])>,
@@ -30,17 +28,13 @@ struct Sample {
     /// Gyro less bias.
     gyro: i64,
     clipped: bool,
-    steady: i64,
     estimates: Vec<i64>,
 }
 
 impl Sample {
     /// Returns its best estimate as known now.
     fn estimate(&self) -> i64 {
-        match self.estimates.len() as i64 {
-            0 => self.steady,
-            n => self.estimates.iter().sum::<i64>() / n,
-        }
+        self.estimates.iter().sum::<i64>().checked_div(self.estimates.len() as i64).unwrap_or(0)
     }
 }
 
@@ -51,29 +45,14 @@ impl Ledger {
         usable.map(|sample| sample.gyro - sample.estimate()).sum()
     }
 
-    /// The part of a sample's correction that is known with it.
-    fn steady(&self, rates: [AngularRate; 3]) -> i64 {
-        match self.steady_gain {
-            SteadyGain::NONE => 0,
-            gain => i64::from(gain.correction(rates).0) - (self.constant.0 >> 16),
-        }
-    }
-
-    fn break_window(&mut self) {
-        self.out = None;
-        self.steady_gain = SteadyGain::NONE;
-    }
-
     fn take_estimate(&mut self, tick: u32, stride: Stride, max_mean: i64) {
         let Some((end, estimate)) = self.out.take_if(|(end, _)| tick >= *end + stride.delay()) else {
             return;
         };
         let mean = |values: &[i64]| values.iter().sum::<i64>() / values.len() as i64;
         if mean(&estimate).abs() > max_mean {
-            self.steady_gain = SteadyGain::NONE;
             return;
         }
-        self.steady_gain = STEADY_GAIN;
         let covered = self.samples.range_mut(end + 1 - WINDOW as u32..=end);
         let mut window: Vec<(&mut Sample, i64)> = covered.map(|(_, sample)| sample).zip(estimate).collect();
         assert_eq!(window.len(), WINDOW, "windows cover samples that went out");
@@ -86,9 +65,6 @@ impl Ledger {
         }
     }
 }
-
-/// The steady gain of every estimate here: 3 and 2 % of roll and pitch rate, 0.1 % of the yaw rate.
-const STEADY_GAIN: SteadyGain = SteadyGain([503_316, -335_544, 16_777]);
 
 #[derive(Clone, Copy)]
 struct Faults {
@@ -122,13 +98,11 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
             continue;
         };
         if clipped || broken.is_some_and(|last| live.tick != last + 1) {
-            ledger.break_window();
+            ledger.out = None;
         }
         ledger.take_estimate(live.tick, stride, max_mean.0.into());
-        let rates: [AngularRate; 3] =
-            std::array::from_fn(|k| AngularRate(sample.angular_rate[k].0 - bias[k].0));
-        let (gyro, steady) = (i64::from(rates[2].0), ledger.steady(rates));
-        ledger.samples.insert(live.tick, Sample { gyro, clipped, steady, estimates: Vec::new() });
+        let gyro = i64::from(sample.angular_rate[2].0 - bias[2].0);
+        ledger.samples.insert(live.tick, Sample { gyro, clipped, estimates: Vec::new() });
         let usable = |status| status != Status::Init && status != Status::Clipped;
         ledger.live += if usable(live.status) { i64::from(live.rate.0) } else { 0 };
         ledger.delayed += if usable(delayed.status) { i64::from(delayed.rate.0) } else { 0 };
@@ -157,7 +131,7 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
             let mean = faults.spread * noise.normal();
             let corrections = [(); WINDOW].map(|()| rate(mean + faults.spread * noise.normal()));
             ledger.out = Some((due.end, corrections.map(|c| c.0.into())));
-            pipeline.deliver(due.end, Estimate { corrections, steady_gain: STEADY_GAIN, ..Estimate::NONE });
+            pipeline.deliver(due.end, Estimate { corrections, ..Estimate::NONE });
         }
     }
     assert!(ready > 1_000, "only {ready} samples were corrected");
@@ -209,14 +183,10 @@ fn a_revision_while_the_vehicle_stands_is_given_back_when_it_moves() {
     let (mut compensator, mut noise) = (Compensator::new(CompensateConfig::DEFAULT), Noise::new(9));
     let (mut sent, mut best, mut complete) = (0, 0, 0);
     for tick in 0..ALL {
-        match tick {
-            // The last estimates are known by then: those of the samples that follow are zero.
-            350.. => compensator.forget(),
-            20.. if tick % 5 == 0 => {
-                let corrections = [(); WINDOW].map(|()| rate(0.001 * noise.normal()));
-                compensator.revise(&Estimate { corrections, ..Estimate::NONE }).expect("a small one");
-            }
-            _ => {}
+        // The last estimates are known by then: those of the samples that follow are zero.
+        if (20..350).contains(&tick) && tick % 5 == 0 {
+            let corrections = [(); WINDOW].map(|()| rate(0.001 * noise.normal()));
+            compensator.revise(&Estimate { corrections, ..Estimate::NONE }).expect("a small one");
         }
         let gyro = rate(0.002 + 0.001 * noise.normal());
         compensator.add(tick, [AngularRate::ZERO, AngularRate::ZERO, gyro], Validity::Good);

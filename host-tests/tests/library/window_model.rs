@@ -103,7 +103,13 @@ fn the_linear_part_saturates() {
     let mut file = Aligned(models::file::<{ SHAPE.file_len(0) }>(SHAPE, 4));
     let (header, end) = (gyronet::model::blob::HEADER_LEN, SHAPE.file_len(0) - 4);
     for (at, weight) in file.0[header..end - 4].as_chunks_mut::<4>().0.iter_mut().enumerate() {
-        *weight = if at % LINEAR_INPUTS < 2 { i32::MAX } else { 0 }.to_le_bytes();
+        // Differences of the first and the last sample in two inputs.
+        *weight = match at % LINEAR_INPUTS {
+            0 => i32::MAX,
+            54 => -i32::MAX,
+            _ => 0,
+        }
+        .to_le_bytes();
     }
     file.0[end - 4..end].fill(0);
     let crc = gyronet::model::blob::CRC.checksum(&file.0[..end]).to_le_bytes();
@@ -111,7 +117,9 @@ fn the_linear_part_saturates() {
     let blob = Blob::new_checked(&file.0).expect("it is within its bound");
     let mut network = GyroNet::with_state(blob, GyroNetState::<0>::ZERO).expect("it has no units");
     for (input, output) in [(i32::MAX, i32::MAX), (i32::MIN, i32::MIN), (0, 0)] {
-        let estimate = network.estimate(&[[input; 6]; WINDOW]);
+        let mut window = [[0; 6]; WINDOW];
+        (window[0], window[WINDOW - 1]) = ([input; 6], [input.saturating_neg(); 6]);
+        let estimate = network.estimate(&window);
         assert_eq!(estimate.corrections.map(|rate| rate.0), [output; WINDOW]);
         assert_eq!((estimate.scale, estimate.clamped_inputs), (SCALE_MIN, 0));
     }

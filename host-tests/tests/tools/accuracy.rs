@@ -1,8 +1,11 @@
 //! Real drives that training has not seen: the README's ratios to static initialisation, drive by drive, and what
 //! quantisation costs, the integer network against the f32 one in its output and in the yaw that comes of it.
 
+use gyronet::Config;
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet_host_tests::{parallel, recordings};
+use gyronet_tools::board::Board;
+use gyronet_tools::calibrate::{Cut, calibrate};
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::methods::{Method, PerMethod};
 use gyronet_tools::evaluate::rates::{Network, Networks};
@@ -109,6 +112,47 @@ fn rates_are_as_good_as_the_pages_say() {
     }
     let ours = report.sets[0].over_best_classical.expect("two drives").default;
     hold(ours.best_classical, ours.ratio, number_before(OVER_BEST_CLASSICAL));
+}
+
+/// The unit is calibrated on the training drives; static initialisation is that without it.
+#[test]
+fn a_calibrated_unit_is_as_good_as_the_page_says() {
+    const TEST: &str = "a_calibrated_unit_is_as_good_as_the_page_says";
+    const TRAINING: [u32; 6] = [2, 3, 4, 6, 7, 8];
+    let (Some(training), Some(test)) =
+        (recordings::trials(TEST, &TRAINING), recordings::trials(TEST, &TRIALS))
+    else {
+        return;
+    };
+    let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
+    let cuts = parallel::map(&training, |path| {
+        let drive = Drive::open(path).expect("a recording");
+        let board = Board::new(Config::DEFAULT, drive.wheels(), GyroNet::new(blob));
+        Cut::new(&drive, board, || {}).expect("it has a reference")
+    });
+    let unit = calibrate(&cuts, blob.crc).expect("they turn");
+    let errors = parallel::map(&test, |path| {
+        let mut drive = Drive::open(path).expect("a recording");
+        [None, Some(unit.gyro_map)].map(|map| {
+            drive.gyro_map = map;
+            let mut default = GyroNet::new(blob);
+            let default = Network::new(&mut default, blob.shape);
+            let mut networks = Networks { default, sent: None, paper: None };
+            let errors = DriveErrors::of(&drive, &mut networks, |_| {}).expect("it stands first");
+            let error = |method| errors.methods[method].error.mean_1s_rad.expect("whole seconds");
+            [Method::STATIC, Method::LIVE, Method::DELAYED].map(error)
+        })
+    });
+    for (at, row) in [(1, "| gyronet, live rate, calibrated |"), (2, "| gyronet, delayed rate, calibrated |")]
+    {
+        let page = numbers("tools/MEASUREMENTS.md", row);
+        let [uncalibrated, calibrated] =
+            [(0, 0), (1, at)].map(|(run, method)| errors.iter().map(|drive| drive[run][method]).sum::<f64>());
+        hold(row, calibrated / uncalibrated, page[1]);
+        for (drive, page) in errors.iter().zip(&page[2..]) {
+            hold(row, drive[1][at] / drive[0][0], *page);
+        }
+    }
 }
 
 #[test]

@@ -10,7 +10,6 @@ mod fog_kingston;
 mod fognet_golden;
 mod fognet_integer;
 mod fognet_simulated;
-mod foreign_mounting;
 mod gyronet_golden;
 mod mounting;
 mod python_seconds;

@@ -109,9 +109,12 @@ pub const fn file<const LEN: usize>(shape: Shape, seed: u32) -> [u8; LEN] {
         feature += 1;
     }
     assert!(to.at == HEADER_LEN);
-    let mut k = 0;
+    // No input's weights in a row add up to anything.
+    let (mut k, mut sums) = (0, [0; FEATURES]);
     while shape.linear && k < WINDOW * LINEAR_INPUTS {
-        let weight = to.numbers.within(1 << 20);
+        let (input, is_last) = (k % FEATURES, k % LINEAR_INPUTS >= LINEAR_INPUTS - FEATURES);
+        let weight = if is_last { -sums[input] } else { to.numbers.within(1 << 20) };
+        sums[input] = if is_last { 0 } else { sums[input] + weight };
         to.word(weight);
         k += 1;
     }

@@ -65,8 +65,9 @@ def sums(drive: Drive, basis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return seconds(inputs[STATIC_SAMPLES:]), seconds(drive.gyro_error[STATIC_SAMPLES:].astype(np.float64))
 
 
-def fit(drives: list[tuple[np.ndarray, np.ndarray]], basis: np.ndarray) -> np.ndarray:
-    """Returns the combination of the basis (TAPS, FEATURES) with the least absolute errors on some drives' sums."""
+def fit(drives: list[tuple[np.ndarray, np.ndarray]], basis: np.ndarray, kept: int) -> np.ndarray:
+    """Returns the combination of the basis with the least absolute errors on some drives' sums, of its first `kept` filters
+    and of all: (2, TAPS, FEATURES)."""
     inputs, errors = (np.concatenate(part) for part in zip(*drives))
     size = np.sqrt((inputs**2).mean(axis=0))
     inputs = inputs / size
@@ -76,7 +77,8 @@ def fit(drives: list[tuple[np.ndarray, np.ndarray]], basis: np.ndarray) -> np.nd
         normal = weighted.T @ inputs + RIDGE * np.eye(len(size))
         solution = np.linalg.solve(normal, weighted.T @ errors)
         weight = 1 / np.maximum(abs(errors - inputs @ solution), SMALLEST_ERROR)
-    return np.tensordot(solution / size, basis, axes=1)
+    part = solution / size
+    return np.stack([np.tensordot(part[:upto], basis[:upto], axes=1) for upto in (kept, len(basis))])
 
 
 def on_grid(taps: np.ndarray) -> np.ndarray:

@@ -161,7 +161,6 @@ fn events(c: &Counters, out_of_range: u32) -> Vec<(&'static str, u32)> {
         ("clamped inputs", c.clamped_inputs),
         ("implausible", c.implausible),
         ("late", c.late),
-        ("mounting found to be another unit's", c.foreign_mountings),
         ("out of range", out_of_range),
     ];
     all.into_iter().filter(|(_, count)| *count > 0).collect()

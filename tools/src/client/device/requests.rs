@@ -305,7 +305,7 @@ mod tests {
             |from: u32, count: u32| (from..from + count).flat_map(u32::to_be_bytes).collect::<Vec<u8>>();
         let response = [
             &PIPELINE_COUNTERS.to_be_bytes()[..],
-            &words(0, 14),
+            &words(0, 13),
             &INPUT_COUNTERS.to_be_bytes(),
             &words(100, 19),
             &FOG_COUNTERS.to_be_bytes(),
@@ -313,7 +313,7 @@ mod tests {
         ]
         .concat();
         let all = counters(&response).expect("whole");
-        assert_eq!((all.pipeline.samples, all.pipeline.moved_mounts), (0, 13));
+        assert_eq!((all.pipeline.samples, all.pipeline.moved_mounts), (0, 12));
         assert_eq!((all.watch.silences, all.inputs.imu_errors, all.lines.unsent), (100, 105, 114));
         assert_eq!((all.lines.frames_lost, all.fog.samples, all.fog.contradicted), (118, 200, 206));
         for length in 0..response.len() {
