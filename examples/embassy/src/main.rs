@@ -57,8 +57,8 @@ type Watchdog = IndependentWatchdog<'static, peripherals::IWDG>;
 
 /// Time without a cycle of the main program after which the watchdog is no longer fed.
 const STUCK: Duration = Duration::from_millis(100);
-/// Time after which the watchdog resets the chip, us.
-const WATCHDOG_US: u32 = 100_000;
+/// Time after which the watchdog resets the chip, us. A start after a power cut moves all records, unfed.
+const WATCHDOG_US: u32 = 1_000_000;
 /// Steps from one reading of the state of the courses to the next; a course comes once a second.
 const COURSE_STEPS: u32 = 100;
 

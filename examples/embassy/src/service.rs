@@ -23,7 +23,7 @@ use gyronet::uds::Server;
 /// Clock of the core, Hz.
 pub const CORE_HZ: u32 = 250_000_000;
 pub const SUPPORTED: SupportedHardware =
-    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[], clock_hz: CORE_HZ };
+    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[], gnss: false, clock_hz: CORE_HZ };
 /// Time for the announcement of a restart to leave.
 const LEAVE: Duration = Duration::from_millis(25);
 /// Duration of one pass over the weights, ms.

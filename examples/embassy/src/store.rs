@@ -1,10 +1,13 @@
 //! The records, in the flash bank that is not executed from: the core and the frames go on while it is erased and written.
 //!
 //! This flash programs quad-words of 16 bytes, each once, since it keeps a code of each. The library's store writes words and
-//! later overwrites some with zeros. So a word takes two quad-words: its value, and a mark that it is zero by now.
+//! later overwrites some with zeros. So a word takes two quad-words: its value, and a mark that it is zero by now. A power cut
+//! leaves a quad-word whose code does not fit; reading it is an NMI, and its word reads as zero, which no record's checksum fits.
 
 use crate::service::alive;
 use core::convert::Infallible;
+use core::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use cortex_m::peripheral::SCB;
 use embassy_stm32::flash::{Blocking, Flash};
 use embassy_stm32::pac;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
@@ -23,6 +26,19 @@ const PIECE: usize = 256;
 /// Every flag of NSCCR.
 const FLAGS: u32 = 0x00FF_0000;
 
+/// True once flash was read whose code does not fit.
+static IS_TORN: AtomicBool = AtomicBool::new(false);
+
+/// Notes flash whose code does not fit; no other NMI is expected.
+#[cortex_m_rt::exception]
+unsafe fn NonMaskableInt() {
+    if !pac::FLASH.eccdetr().read().eccd() {
+        SCB::sys_reset();
+    }
+    pac::FLASH.eccdetr().modify(|w| w.set_eccd(true));
+    IS_TORN.store(true, Relaxed);
+}
+
 pub struct Records(Flash<'static, Blocking>);
 
 impl Records {
@@ -30,23 +46,26 @@ impl Records {
         Self(flash)
     }
 
-    fn read_flash<const N: usize>(&mut self, at: u32) -> Result<[u8; N], NorFlashErrorKind> {
+    /// Reads flash; `None` if its code does not fit.
+    fn read_flash<const N: usize>(&mut self, at: u32) -> Result<Option<[u8; N]>, NorFlashErrorKind> {
         let mut bytes = [0; N];
+        IS_TORN.store(false, Relaxed);
         self.0.blocking_read(at, &mut bytes).map_err(|error| error.kind())?;
-        Ok(bytes)
+        cortex_m::asm::dsb();
+        Ok(Some(bytes).filter(|_| !IS_TORN.load(Relaxed)))
     }
 
     /// Returns the word at an offset into the records.
     fn word(&mut self, offset: u32) -> Result<[u8; WORD], NorFlashErrorKind> {
         let place = BANK_2 + offset * SPREAD;
-        let value: [u8; WORD] = self.read_flash(place)?;
-        let mark: [u8; QUAD] = self.read_flash(place + QUAD as u32)?;
-        Ok(if mark == [0xFF; QUAD] { value } else { [0; WORD] })
+        let value = self.read_flash(place)?;
+        let mark = self.read_flash(place + QUAD as u32)?;
+        Ok(value.filter(|_| mark == Some([0xFF; QUAD])).unwrap_or([0; WORD]))
     }
 
     fn is_erased(&mut self, sector: u32) -> Result<bool, NorFlashErrorKind> {
         for at in (sector..sector + SECTOR).step_by(PIECE) {
-            if self.read_flash(at)? != [0xFF; PIECE] {
+            if self.read_flash(at)? != Some([0xFF; PIECE]) {
                 return Ok(false);
             }
         }

@@ -1,6 +1,8 @@
 """The STM32H563: clocks, USART and FDCAN behave as the manual, or what stood in for it, says."""
 
 import unittest
+from random import Random
+from types import SimpleNamespace
 
 from virtual_board.peripherals import h5
 from virtual_board.violation import Violation
@@ -130,6 +132,26 @@ class H5(unittest.TestCase):
         self.assertEqual(self.board.read("FLASH", 0x20), 1)
         self.board.advance(10 * MS)
         self.assertEqual(self.board.memory_read(0x0810_5FF0, 32), b"\xFF" * 16 + bytes(16))
+
+    def test_a_reset_during_an_operation_leaves_quad_words_without_their_ecc(self):
+        flash = self.board.peripherals["FLASH"]
+        flash.hook = True
+        self.board.memory = SimpleNamespace(random=Random(1))
+        self.unlock()
+        self.board.write("FLASH", 0x28, 2)
+        self.program(0x0810_0010, (1, 2, 3, 4))
+        self.board.reset("iwdg")
+        self.assertEqual(flash.torn, {0x0810_0010})
+        flash._was_read(0x0810_0000)
+        self.assertEqual((self.board.read("FLASH", 0x104), self.board.nmis), (0, 0))
+        flash._was_read(0x0810_0014)
+        self.assertEqual((self.board.read("FLASH", 0x104), self.board.nmis), (1 << 31 | 1 << 22 | 1, 1))
+        self.board.write("FLASH", 0x104, 1 << 31)
+        self.assertEqual(self.board.read("FLASH", 0x104), 0)
+        self.unlock()
+        self.board.write("FLASH", 0x28, 1 << 31 | 1 << 5 | 4)
+        self.board.advance(10 * MS)
+        self.assertEqual(flash.torn, set())
 
     def test_a_wrong_key_locks_until_a_reset(self):
         self.board.write("FLASH", 0x04, 1)

@@ -287,6 +287,13 @@ class Processor:
         self._fpu_blocks.clear()
         self.uc.ctl_flush_tb()
 
+    def watch_reads(self, begin: int, end: int, callback):
+        """Calls back with the address of each read of a range."""
+        call = INVALID(lambda _, kind, address, size, value, __: self._guard(callback, address))
+        hook = self._hook(const.UC_HOOK_MEM_READ, call, begin, end)
+        self.forget_code()
+        return hook
+
     def end_slice(self) -> None:
         """Ends the slice after the current instruction."""
         if self.limit.value > self.executed.value:

@@ -185,3 +185,53 @@ fn a_nucleo_hears_wheels_and_returns_from_bus_off_at_growing_intervals() {
     let newest = ((first - BEGIN).as_millis() / SAMPLE.as_millis()) as usize;
     assert!(newest - number <= 1, "sample {number} at the time of {newest}");
 }
+
+/// The configuration that a board has after the power was cut, and whether its records are damaged.
+fn after_cut(board: &mut Board) -> (Configuration, FlashState) {
+    board.power_off();
+    board.run(MS);
+    board.power_on();
+    board.run(400 * MS);
+    let configuration = on_bus(board).configuration().expect("it runs, and answers");
+    (configuration, on_bus(board).info().expect("a response").flash)
+}
+
+#[test]
+#[ignore = "it builds embassy, which takes a minute"]
+fn a_nucleo_survives_a_power_cut_at_any_time_of_a_store() {
+    const CUTS: u32 = 20;
+    let test = "a_nucleo_survives_a_power_cut_at_any_time_of_a_store";
+    let Some(mut board) = boot(test, &[]) else { return };
+    for sector in 0..16 {
+        board.patch(At::Address(BANK_2 + SECTOR * (sector + 1) - 16), &[0x55; 16]);
+    }
+    board.run(200 * MS);
+    let of = |latitude| Configuration { latitude_deg: Some(latitude), ..Configuration::DEFAULT };
+    // The first store erases eight sectors, the second only appends.
+    let (mut states, mut kept) = (Vec::new(), 0);
+    for (old, new, step) in [(None, of(1.0), 2_100), (Some(of(1.0)), of(2.0), 1_000)] {
+        let old = old.unwrap_or(Configuration::DEFAULT);
+        send(&mut board, &[0x10, 0x03]);
+        board.run(20 * MS);
+        send(&mut board, &storing(&new));
+        board.snapshot("storing");
+        for cut in 0..CUTS {
+            board.restore("storing");
+            board.run(Duration::from_micros(u64::from(step * cut)));
+            let (configuration, flash) = after_cut(&mut board);
+            assert!(configuration == old || configuration == new, "cut {cut}: {configuration:?}");
+            kept += u32::from(configuration == old);
+            states.push(flash);
+        }
+        board.restore("storing");
+        board.run(100 * MS);
+        assert_eq!(after_cut(&mut board), (new, FlashState::Ready));
+    }
+    let damaged = states.iter().filter(|flash| **flash == FlashState::Damaged).count();
+    println!("{test}: {} cuts, {kept} with the old settings, {damaged} with a damaged record", states.len());
+    assert!(
+        states.iter().all(|flash| matches!(flash, FlashState::Ready | FlashState::Damaged)),
+        "{states:?}"
+    );
+    assert!((1..2 * CUTS).contains(&kept) && damaged > 0);
+}

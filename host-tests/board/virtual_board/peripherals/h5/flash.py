@@ -2,9 +2,10 @@
 
 A store to the array fills a buffer of sixteen bytes, which are programmed when it is full. What is executed from the bank that
 is busy stalls the core. Witnesses: the header, the HAL, and for NSSR (which NSCCR clears), INCERR and an incomplete buffer what
-others measured on a NUCLEO-H563ZI (w1ne/labwired-core, pull request 335). Left out: option bytes and with them the swap of the
-banks, high-cycle data, bank and mass erase, protection. A second programming of a quad-word, whose ECC would no longer
-fit, and a power cut during an operation are violations. Assumed: the times, since no data sheet was at hand.
+others measured on a NUCLEO-H563ZI (w1ne/labwired-core, pull request 335). A power cut or reset during an operation leaves
+quad-words whose ECC does not fit; reading one sets ECCDETR.ECCD, which is an NMI until it is cleared. Left out: option bytes and
+with them the swap of the banks, high-cycle data, bank and mass erase, protection. A second programming of a quad-word, whose ECC
+would no longer fit either, is a violation. Assumed: the times, since no data sheet was at hand.
 """
 
 from ...violation import Violation
@@ -13,12 +14,13 @@ from .system import Registers
 
 BASE, BANK, SECTOR, QUAD = 0x0800_0000, 1 << 20, 8 << 10, 16
 KEYS = (0x4567_0123, 0xCDEF_89AB)
-ACR, NSKEYR, NSSR, NSCR, NSCCR = 0x00, 0x04, 0x20, 0x28, 0x30
+ACR, NSKEYR, NSSR, NSCR, NSCCR, ECCDETR = 0x00, 0x04, 0x20, 0x28, 0x30, 0x104
 BSY, WBNE, EOP, PGSERR, STRBERR, INCERR = (1 << bit for bit in (0, 1, 16, 18, 19, 20))
 FLAGS = 0x00FF_0000
 LOCK, PG, SER, START, BKSEL = (1 << bit for bit in (0, 1, 2, 5, 31))
 #: All that NSCR keeps: PG, SER, SNB, BKSEL; the rest is not modelled.
 KEPT = PG | SER | 0x7F << 6 | BKSEL
+ECCD = 1 << 31
 PROGRAM_PS, ERASE_PS = 100_000_000, 4_000_000_000
 
 
@@ -30,13 +32,21 @@ class Flash(Registers):
     #: As on the STM32F405, bit 5 set: software starts the watchdog.
     options = 1 << 5
 
+    def __init__(self, board):
+        super().__init__(board)
+        #: The operation: its end, address, new content. The quad-words whose ECC does not fit, and the hook on their reads.
+        self.busy = None
+        self.torn, self.hook = set(), None
+
     def reset(self, cause):
         super().reset(cause)
-        if getattr(self, "busy", None):
-            raise Violation(f"{self.name}: a reset during an operation is not modelled")
+        if self.busy:
+            self.busy[0].cancel()
+            self._tear()
         self.status, self.control, self.step, self.refused = 0, LOCK, 0, False
-        self.busy = None
+        self.detected = 0
         self.buffer, self.at = {}, 0
+        self._watch()
 
     @property
     def latency(self):
@@ -49,6 +59,8 @@ class Flash(Registers):
             return self.status | (BSY if self.busy else 0) | (WBNE if self.buffer else 0)
         if offset == NSCR:
             return self.control
+        if offset == ECCDETR:
+            return self.detected
         return super().read(offset, size)
 
     def write(self, offset, value, size):
@@ -59,6 +71,8 @@ class Flash(Registers):
             self.status &= ~(value & FLAGS)
         elif offset == NSCR:
             self._write_control(value)
+        elif offset == ECCDETR:
+            self.detected = 0 if value & ECCD else self.detected
         elif offset == NSSR:
             self.board.record("ignored_write", register="FLASH_NSSR", value=value)
         else:
@@ -106,22 +120,41 @@ class Flash(Registers):
             if len(self.buffer) == QUAD:
                 data = bytes(self.buffer[quad + n] for n in range(QUAD))
                 self.buffer = {}
-                if self.board.memory_read(quad, QUAD) != b"\xFF" * QUAD:
+                if quad in self.torn or self.board.memory_read(quad, QUAD) != b"\xFF" * QUAD:
                     raise Violation(f"{self.name}: the quad-word at {quad:#x} is programmed a second time")
                 self._begin(quad, data, PROGRAM_PS)
 
     def _begin(self, address, data, duration):
-        self.busy = self.board.schedule(duration, lambda: self._end(address, data))
+        self.busy = self.board.schedule(duration, self._end), address, data
         processor = getattr(self.board, "processor", None)
         if processor and (processor.get("pc") - BASE) // BANK == (address - BASE) // BANK:
             self.board.stall(self.board.now + duration)
 
-    def _end(self, address, data):
-        self.busy = None
+    def _end(self):
+        (_, address, data), self.busy = self.busy, None
         self.board.memory_write(address, data)
+        self.torn.difference_update(range(address, address + len(data), QUAD))
         self.status |= EOP
 
+    def _tear(self):
+        """Leaves the operation half done: each bit is the old or the new one."""
+        (_, address, data), self.busy = self.busy, None
+        noise = self.board.memory.random.randbytes(len(data))
+        old = self.board.memory_read(address, len(data))
+        self.board.memory_write(address, bytes(a & n | b & ~n for a, b, n in zip(old, data, noise)))
+        self.torn.update(range(address, address + len(data), QUAD))
+
     def power_off(self):
-        """Refuses a power cut during an operation."""
+        """Leaves an operation half done."""
         if self.busy:
-            raise Violation(f"{self.name}: a power cut during an operation is not modelled")
+            self._tear()
+
+    def _watch(self):
+        """Watches the reads of the array, if an ECC does not fit."""
+        if self.torn and not self.hook:
+            self.hook = self.board.processor.watch_reads(BASE + BANK, BASE + 2 * BANK - 1, self._was_read)
+
+    def _was_read(self, address):
+        if address & -QUAD in self.torn and not self.detected:
+            self.detected = ECCD | 1 << 22 | (address - BASE) % BANK // QUAD
+            self.board.nmi()
