@@ -226,7 +226,8 @@ impl Compensator {
     pub fn revise(&mut self, estimate: &Estimate) -> Result<(), Implausible> {
         let CompensateConfig { stride, lag, max_mean, max_single, model, .. } = self.config;
         let corrections = if model { &estimate.corrections } else { &[AngularRate::ZERO; WINDOW] };
-        let average = AngularRate::mean(corrections);
+        let sum: i64 = corrections.iter().map(|correction| i64::from(correction.0)).sum();
+        let average = AngularRate((sum / WINDOW as i64) as i32);
         let largest = corrections.iter().max_by_key(|c| c.0.unsigned_abs()).copied().unwrap_or_default();
         if average.0.unsigned_abs() > max_mean.0.unsigned_abs()
             || largest.0.unsigned_abs() > max_single.0.unsigned_abs()
@@ -234,8 +235,8 @@ impl Compensator {
             return Err(Implausible { mean: average, largest });
         }
         let oldest = KEPT - (stride.delay() as usize - 1) - WINDOW;
-        let by_network = if model { average.0.saturating_sub(estimate.linear_mean.0) } else { 0 };
-        self.slow_mean.observe(by_network.into(), stride.samples());
+        let by_network = if model { sum - estimate.linear_sum } else { 0 };
+        self.slow_mean.observe(by_network / WINDOW as i64, stride.samples());
         let constant = self.slow_mean.get();
         for (place, (entry, correction)) in self.kept.iter_mut().skip(oldest).zip(corrections).enumerate() {
             let Some(entry) = entry else { continue };

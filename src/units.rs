@@ -56,13 +56,6 @@ impl AngularRate {
     pub fn rad_per_sec(self) -> f64 {
         f64::from(self.0) / f64::from(Self::PER_RAD_PER_SEC)
     }
-
-    /// Returns the mean, rounded towards zero; zero without rates.
-    #[must_use]
-    pub fn mean(rates: &[Self]) -> Self {
-        let sum: i64 = rates.iter().map(|rate| i64::from(rate.0)).sum();
-        Self((sum / rates.len().max(1) as i64) as i32)
-    }
 }
 
 /// Holds a specific force, signed 32 bit, LSB 2^-20 m/s^2, range +-2048 m/s^2.

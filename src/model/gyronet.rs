@@ -170,8 +170,8 @@ impl<const U: usize, const W: usize, const R: usize> WindowRun for Arrays<U, W, 
         let log_scale =
             sums.iter().fold(0, |sum: i32, [_, log]| sum.saturating_add(blob.log_scale.scale(*log)));
         let scale = AngularRate(times_exp2(blob.scale_unit, log_scale)).clamp(SCALE_MIN, SCALE_MAX);
-        let linear_mean = AngularRate::mean(&linear.map(AngularRate));
-        Some(Estimate { corrections, scale, clamped_inputs: *clamped_inputs, linear_mean })
+        let linear_sum = linear.iter().map(|part| i64::from(*part)).sum();
+        Some(Estimate { corrections, scale, clamped_inputs: *clamped_inputs, linear_sum })
     }
 
     fn newest(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]) -> (AngularRate, u16) {

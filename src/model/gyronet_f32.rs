@@ -108,9 +108,10 @@ impl WindowNetwork for GyroNetF32<'_> {
         let LayerOutputs { linear, gyro_error, log_scale, .. } = self.layers(&units);
         // A number that does not fit is as implausible as the largest one that fits.
         let code = |rate| AngularRate::from_rad_per_sec(rate).unwrap_or(AngularRate(i32::MAX));
-        let (corrections, linear_mean) = (gyro_error.map(code), AngularRate::mean(&linear.map(code)));
+        let (corrections, linear) = (gyro_error.map(code), linear.map(code));
+        let linear_sum = linear.iter().map(|part| i64::from(part.0)).sum();
         let scale = AngularRate::from_rad_per_sec(self.output_scale * libm::expf(log_scale))
             .map_or(SCALE_MAX, |scale| scale.clamp(SCALE_MIN, SCALE_MAX));
-        Estimate { corrections, scale, clamped_inputs: 0, linear_mean }
+        Estimate { corrections, scale, clamped_inputs: 0, linear_sum }
     }
 }

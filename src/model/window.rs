@@ -99,16 +99,12 @@ pub struct Estimate {
     pub scale: AngularRate,
     /// Input values that had to be clamped to the network's range.
     pub clamped_inputs: u16,
-    /// The linear part of the corrections, as their mean: it answers no constant, so it contains none.
-    pub linear_mean: AngularRate,
+    /// Sum of the linear parts of the corrections, codes: they answer no constant, so they contain none.
+    pub linear_sum: i64,
 }
 
 impl Estimate {
     /// An estimate without a correction, with the largest scale.
-    pub const NONE: Self = Self {
-        corrections: [AngularRate::ZERO; WINDOW],
-        scale: SCALE_MAX,
-        clamped_inputs: 0,
-        linear_mean: AngularRate::ZERO,
-    };
+    pub const NONE: Self =
+        Self { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MAX, clamped_inputs: 0, linear_sum: 0 };
 }
