@@ -54,7 +54,7 @@ use second_source::{Doubts, SecondSource, Shown};
 
 /// Silence of a configured source of courses that is a trouble, and the time that its start may take.
 const COURSE_SILENCE_US: u64 = 10_000_000;
-const FIRST_COURSE: Micros = Micros(60_000_000);
+const FIRST_COURSE_US: u64 = 60_000_000;
 
 /// The results of one sample, or of its absence, for a log or diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,8 +96,8 @@ pub struct Coprocessor {
     wheels: Option<WheelReceiver>,
     fog: FogPipeline,
     heading: Option<HeadingReceiver>,
-    /// Time from which the receiver of courses counts as silent.
-    heading_due: Micros,
+    /// Time from which the receiver of courses counts as silent, once the clock is known.
+    heading_due: Option<Micros>,
     second: SecondSource,
     /// The newest usable rates of the inertial gyro, with its expected error, and of the fibre-optic one, rad/s.
     inertial_rate: Option<(Micros, [f32; 2])>,
@@ -130,7 +130,7 @@ impl Coprocessor {
             wheels: config.wheels,
             fog: FogPipeline::new(FogConfig { clock_ratio, ..config.fog }, config.fog_expected),
             heading: config.heading,
-            heading_due: FIRST_COURSE,
+            heading_due: None,
             second: SecondSource::START,
             inertial_rate: None,
             fog_rate: None,
@@ -326,12 +326,14 @@ impl Coprocessor {
     /// where the configuration names one.
     ///
     /// # Errors
-    /// [`InputError::Heading`] for a damaged message, for values that can be no vehicle's, and for a course that the
-    /// receiver reckons itself, [`InputError::ClockWentBack`]; it is counted and not used.
+    /// [`InputError::Heading`] for a damaged message, for values that can be no vehicle's (a good course is used even if
+    /// the latitude is refused), and for a course that the receiver reckons itself, [`InputError::ClockWentBack`]; it is
+    /// counted and not used.
     pub fn gnss(&mut self, fix: Result<Fix, HeadingError>, now: Micros) -> Result<(), InputError> {
         self.advance(now)?;
         let time = self.timeline.time();
-        let Some(receiver) = &mut self.heading else { return Ok(()) };
+        let receiver = self.heading.as_mut().filter(|receiver| receiver.settings().line.is_some());
+        let Some(receiver) = receiver else { return Ok(()) };
         let received = fix.and_then(|fix| receiver.judge(fix, time));
         self.use_heading(received)
     }
@@ -356,13 +358,14 @@ impl Coprocessor {
 
     fn use_heading(&mut self, received: Result<Received, HeadingError>) -> Result<(), InputError> {
         self.fog.contest_latitude(self.heading.as_ref().is_some_and(HeadingReceiver::is_contested));
-        if matches!(received, Ok(_) | Err(HeadingError::Reckoned)) {
-            self.heading_due = Micros(self.timeline.time().0.saturating_add(COURSE_SILENCE_US));
+        if matches!(received, Ok(Received { heading: Some(_), .. }) | Err(HeadingError::Reckoned)) {
+            self.heading_due = Some(Micros(self.timeline.time().0.saturating_add(COURSE_SILENCE_US)));
         }
         let Received { heading, latitude } = received.map_err(|error| self.refuse_heading(error))?;
         if let Some(heading) = &heading {
             self.pipeline.course(heading);
         }
+        let latitude = latitude.map_err(|error| self.refuse_heading(error))?;
         if let Some((latitude, is_near)) =
             latitude.and_then(|found| Some((Latitude::from_degrees(found.degrees)?, found.moved)))
         {
@@ -459,7 +462,8 @@ impl Coprocessor {
     /// Returns what courses have shown since the start, and whether their source is silent.
     #[must_use]
     pub fn course_state(&self) -> CourseState {
-        let is_silent = self.heading.is_some() && self.timeline.time() > self.heading_due;
+        let is_named = self.heading.as_ref().is_some_and(|receiver| receiver.settings().has_course());
+        let is_silent = is_named && self.heading_due.is_some_and(|due| self.timeline.time() > due);
         CourseState { is_silent, ..self.pipeline.course_state() }
     }
 
@@ -496,10 +500,17 @@ impl Coprocessor {
     }
 
     fn advance(&mut self, now: Micros) -> Result<Micros, InputError> {
-        self.timeline.advance(now).map_err(|by| {
+        let now = self.timeline.advance(now).map_err(|by| {
             count(&mut self.counters.clock_back, 1);
             InputError::ClockWentBack { by }
-        })
+        })?;
+        // The sensor's clock is at 0 before its first sample.
+        if let time @ Micros(1..) = self.timeline.time()
+            && self.heading_due.is_none()
+        {
+            self.heading_due = Some(Micros(time.0.saturating_add(FIRST_COURSE_US)));
+        }
+        Ok(now)
     }
 
     fn poll_wheels(&mut self) -> Option<WheelSample> {

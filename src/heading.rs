@@ -65,6 +65,9 @@ pub enum HeadingError {
 }
 
 impl Heading {
+    /// A message without values.
+    pub const UNKNOWN: Self = Self { course: None, course_sigma: None, speed: None, speed_sigma: None };
+
     /// Checks that each value can be that of a vehicle.
     ///
     /// # Errors

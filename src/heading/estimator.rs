@@ -172,7 +172,7 @@ pub struct CourseState {
     pub counters: CourseCounters,
     /// True while courses contradict the gyro: for 10 s none has matched, and since then they have not for a minute.
     pub is_contradicted: bool,
-    /// True while a source is configured and sends no message.
+    /// True while a source of courses is configured and sends no message of one.
     pub is_silent: bool,
     /// Why the newest course taught nothing; `None` where it was used.
     pub refusal: Option<Refusal>,

@@ -28,7 +28,8 @@ pub struct GnssSettings {
 pub enum GnssProtocol {
     /// UBX-NAV-PVT of u-blox, with accuracies.
     Ubx,
-    /// RMC or VTG of NMEA 0183.
+    /// RMC or VTG of NMEA 0183 from 2.3 on, which have a mode. It does not tell a course by satellites from one that
+    /// the receiver's own gyro took part in: a receiver with sensors of its own needs [`Self::Ubx`].
     Nmea,
 }
 
@@ -36,15 +37,15 @@ pub enum GnssProtocol {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fix {
-    /// Course and speed, by satellites alone.
+    /// Course and speed; `None` where it is no message of them.
     pub heading: Option<Heading>,
-    /// Degrees, north positive.
-    pub latitude: Option<f32>,
+    /// Degrees, north positive. A bad one leaves the course as it is.
+    pub latitude: Result<Option<f32>, HeadingError>,
 }
 
 impl Fix {
     /// The receiver works and sees too few satellites.
-    pub const NONE: Self = Self { heading: None, latitude: None };
+    pub const NONE: Self = Self { heading: Some(Heading::UNKNOWN), latitude: Ok(None) };
 }
 
 /// The parser of a line: bytes in, fixes out.
@@ -84,6 +85,15 @@ impl GnssLine {
     #[must_use]
     pub const fn others(&self) -> u32 {
         self.others
+    }
+
+    /// Drops the message in progress, of which the line has damaged or lost a byte: a checksum of eight bits may not see
+    /// it.
+    pub fn interrupt(&mut self) {
+        match &mut self.parser {
+            Parser::Ubx(framer) => *framer = Framer::new(),
+            Parser::Nmea(sentences) => sentences.interrupt(),
+        }
     }
 
     fn read(&mut self) -> Option<Read> {

@@ -3,7 +3,8 @@
 //! A sentence is `$TTSSS,FIELD,..*HH` with CR and LF: a talker, a name, fields and, in capital digits, the exclusive or of all
 //! between `$` and `*`. Each `$` begins a sentence, so that a damaged one takes none behind it along.
 //!
-//! RMC and VTG have the same course: VTG counts only where no RMC comes.
+//! RMC and VTG have the same course: VTG counts only where no RMC has one. Of several talkers one is used: two receivers
+//! differ in latency.
 
 use super::gnss::{Fix, Read};
 use super::{Heading, HeadingError};
@@ -13,8 +14,10 @@ use heapless::Vec;
 const MAX_SENTENCE: usize = 100;
 /// Talkers that are GNSS receivers: one system each, several, and one that changes with what is in sight.
 const TALKERS: [&[u8; 2]; 9] = [b"GN", b"GP", b"GL", b"GA", b"GB", b"BD", b"GQ", b"QZ", b"GI"];
-/// VTG counts after this many sentences without RMC, more than a receiver sends for a fix.
-const WITHOUT_RMC: u8 = 60;
+/// VTG counts after this many others without a course of RMC between them.
+const WITHOUT_RMC: u8 = 3;
+/// Another talker is used after this many RMC and VTG that are not of the one in use: five seconds at ten a second.
+const WITHOUT_TALKER: u8 = 50;
 /// A knot, m/s.
 const KNOT: f32 = 1852.0 / 3600.0;
 
@@ -23,12 +26,16 @@ const KNOT: f32 = 1852.0 / 3600.0;
 pub(super) struct Sentences {
     /// The sentence so far, from its `$` on.
     bytes: Vec<u8, MAX_SENTENCE>,
-    since_rmc: u8,
+    /// The talker in use, and the number of RMC and VTG of others since its newest.
+    talker: Option<&'static [u8; 2]>,
+    of_others: u8,
+    /// VTG since the newest RMC with a course.
+    without_rmc: u8,
 }
 
 impl Sentences {
     pub const fn new() -> Self {
-        Self { bytes: Vec::new(), since_rmc: WITHOUT_RMC }
+        Self { bytes: Vec::new(), talker: None, of_others: 0, without_rmc: WITHOUT_RMC }
     }
 
     /// Processes a byte; an error is that of a sentence that was cut, or is too long. Call [`Self::read`] after each.
@@ -45,6 +52,11 @@ impl Sentences {
         if is_lost || begins && length > 0 { Err(HeadingError::Length(length)) } else { Ok(()) }
     }
 
+    /// Drops the sentence in progress.
+    pub fn interrupt(&mut self) {
+        self.bytes.clear();
+    }
+
     /// Reads the sentence, if it is complete.
     pub fn read(&mut self) -> Option<Read> {
         let bytes = core::mem::take(self.bytes.ends_with(b"\n").then_some(&mut self.bytes)?);
@@ -54,18 +66,24 @@ impl Sentences {
     fn content(&mut self, body: &[u8]) -> Read {
         let mut fields = body.split(|byte| *byte == b',');
         let (talker, name) = fields.next()?.split_last_chunk::<3>()?;
-        if !TALKERS.iter().any(|known| talker == known.as_slice()) {
+        let talker = *TALKERS.iter().find(|known| talker == known.as_slice())?;
+        if !matches!(name, b"RMC" | b"VTG") {
             return None;
         }
-        self.since_rmc = self.since_rmc.saturating_add(1);
-        match name {
-            b"RMC" => {
-                self.since_rmc = 0;
-                Some(rmc(fields))
-            }
-            b"VTG" if self.since_rmc > WITHOUT_RMC => Some(vtg(fields)),
-            _ => None,
+        if self.talker.is_some_and(|used| used != talker) && self.of_others < WITHOUT_TALKER {
+            self.of_others += 1;
+            return None;
         }
+        (self.talker, self.of_others) = (Some(talker), 0);
+        if name == b"VTG" {
+            self.without_rmc = self.without_rmc.saturating_add(1);
+            return (self.without_rmc > WITHOUT_RMC).then(|| vtg(fields));
+        }
+        let read = rmc(fields);
+        if matches!(read, Ok(Fix { heading: Some(Heading { course: Some(_), .. }), .. })) {
+            self.without_rmc = 0;
+        }
+        Some(read)
     }
 }
 
@@ -79,27 +97,30 @@ fn checked(sentence: &[u8]) -> Result<&[u8], HeadingError> {
     if [*high, *low] == [digit(sum >> 4), digit(sum & 0xF)] { Ok(body) } else { Err(HeadingError::Checksum) }
 }
 
-/// Reads time, status, latitude, N or S, longitude, E or W, speed, course, date, declination, E or W and, of newer
-/// receivers, the mode.
+/// Reads time, status, latitude, N or S, longitude, E or W, speed, course, date, declination, E or W and the
+/// mode.
 fn rmc<'a>(mut fields: impl Iterator<Item = &'a [u8]>) -> Result<Fix, HeadingError> {
     let mut next = || fields.next().unwrap_or_default();
     let [_, status, latitude, side, _, _, speed, course, _, _, _, mode] = core::array::from_fn(|_| next());
     if !is_fix(mode)? || status != b"A" {
         return Ok(Fix::NONE);
     }
-    let latitude = match (number(latitude, "latitude")?, side) {
-        (None, _) => None,
-        // Degrees and minutes are written as one number.
-        (Some((whole, part)), b"N" | b"S") => {
-            let degrees = (whole / 100) as f32 + ((whole % 100) as f32 + part) / 60.0;
-            Some(if side == b"S" { -degrees } else { degrees })
-        }
-        _ => return Err(HeadingError::Field("latitude")),
-    };
-    Ok(Fix { heading: Some(heading(course, speed)?), latitude })
+    Ok(Fix { heading: Some(heading(course, speed)?), latitude: degrees(latitude, side) })
 }
 
-/// Reads course, `T`, magnetic course, `M`, speed, `N` and, of newer receivers, speed in km/h, `K` and the mode.
+/// Reads a latitude: degrees and minutes are written as one number.
+fn degrees(latitude: &[u8], side: &[u8]) -> Result<Option<f32>, HeadingError> {
+    match (number(latitude, "latitude")?, side) {
+        (None, _) => Ok(None),
+        (Some((whole, part)), b"N" | b"S") if whole % 100 < 60 => {
+            let degrees = (whole / 100) as f32 + ((whole % 100) as f32 + part) / 60.0;
+            Ok(Some(if side == b"S" { -degrees } else { degrees }))
+        }
+        _ => Err(HeadingError::Field("latitude")),
+    }
+}
+
+/// Reads course, `T`, magnetic course, `M`, speed, `N`, speed in km/h, `K` and the mode.
 fn vtg<'a>(mut fields: impl Iterator<Item = &'a [u8]>) -> Result<Fix, HeadingError> {
     let mut next = || fields.next().unwrap_or_default();
     let [course, from, _, _, speed, unit, _, _, mode] = core::array::from_fn(|_| next());
@@ -109,14 +130,15 @@ fn vtg<'a>(mut fields: impl Iterator<Item = &'a [u8]>) -> Result<Fix, HeadingErr
     if from != b"T" || unit != b"N" {
         return Err(HeadingError::Field("course"));
     }
-    Ok(Fix { heading: Some(heading(course, speed)?), latitude: None })
+    Ok(Fix { heading: Some(heading(course, speed)?), latitude: Ok(None) })
 }
 
-/// Returns whether a mode is that of a position by satellites; sentences of old receivers have none.
+/// Returns whether a mode is that of a position by satellites. Without one (NMEA 2.1) nobody knows.
 fn is_fix(mode: &[u8]) -> Result<bool, HeadingError> {
     match mode {
         b"E" => Err(HeadingError::Reckoned),
-        b"" | b"A" | b"D" | b"F" | b"P" | b"R" => Ok(true),
+        b"" => Err(HeadingError::Field("mode")),
+        b"A" | b"D" | b"F" | b"P" | b"R" => Ok(true),
         _ => Ok(false),
     }
 }
@@ -133,15 +155,14 @@ fn number(field: &[u8], what: &'static str) -> Result<Option<(u32, f32)>, Headin
     if field.is_empty() {
         return Ok(None);
     }
-    let digits = |text: &[u8]| -> Option<u32> {
-        text.iter().try_fold(0u32, |sum, byte| {
-            let digit = byte.checked_sub(b'0').filter(|digit| *digit <= 9)?;
-            sum.checked_mul(10)?.checked_add(digit.into())
-        })
-    };
     let mut parts = field.splitn(2, |byte| *byte == b'.');
-    let (whole, part) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
-    let scale = part.iter().fold(1.0, |scale, _| 10.0 * scale);
-    let read = digits(whole).zip(digits(part)).map(|(whole, part)| (whole, part as f32 / scale));
-    read.map(Some).ok_or(HeadingError::Field(what))
+    let (whole, part) = (parts.next().unwrap_or_default(), parts.next().unwrap_or(b"0"));
+    let is_number = |text: &[u8]| !text.is_empty() && text.iter().all(u8::is_ascii_digit);
+    let digit = |byte: &u8| byte.wrapping_sub(b'0');
+    let value = whole
+        .iter()
+        .try_fold(0u32, |sum, byte| sum.checked_mul(10)?.checked_add(digit(byte).into()))
+        .filter(|_| is_number(whole) && is_number(part))
+        .ok_or(HeadingError::Field(what))?;
+    Ok(Some((value, part.iter().rev().fold(0.0, |sum, byte| (sum + f32::from(digit(byte))) / 10.0))))
 }

@@ -77,6 +77,11 @@ impl HeadingSettings {
         line: None,
     };
 
+    /// Returns whether messages with a course are named.
+    pub(crate) const fn has_course(&self) -> bool {
+        self.nmea2000 || self.j1939 || self.course.is_some() || self.line.is_some()
+    }
+
     fn signals(&self) -> [Option<HeadingSignal>; 5] {
         [self.course, self.course_sigma, self.speed, self.speed_sigma, self.latitude]
     }
@@ -125,12 +130,17 @@ impl HeadingSettings {
 }
 
 /// The content of a frame or message.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Received {
-    /// Course and speed.
+    /// Course and speed; `None` where it is no message of them.
     pub heading: Option<Heading>,
-    /// A latitude that is confirmed.
-    pub latitude: Option<ReceivedLatitude>,
+    /// A latitude that is confirmed, or why it is refused. It leaves the course as it is.
+    pub latitude: Result<Option<ReceivedLatitude>, HeadingError>,
+}
+
+impl Received {
+    /// Nothing to use.
+    pub const NONE: Self = Self { heading: None, latitude: Ok(None) };
 }
 
 /// Reads the frames of [`HeadingSettings`].
@@ -149,6 +159,11 @@ impl HeadingReceiver {
     #[must_use]
     pub fn new(settings: HeadingSettings, latitude: Option<f32>) -> Self {
         Self { settings, sender: None, kept: [None; 3], latitude: LatitudeJudge::new(latitude) }
+    }
+
+    /// Returns the settings.
+    pub(crate) const fn settings(&self) -> &HeadingSettings {
+        &self.settings
     }
 
     /// Returns whether frames contradict the latitude in use.
@@ -175,20 +190,21 @@ impl HeadingReceiver {
                 .or_else(|| Some(j1939::latitude(frame)?.map(|latitude| (None, latitude))));
         }
         let read = match read {
-            Some(_) if !self.is_sender(frame.id(), now) => return Some(Ok(Received::default())),
+            Some(_) if !self.is_sender(frame.id(), now) => return Some(Ok(Received::NONE)),
             Some(read) => read,
             None => self.described(frame, now).transpose()?,
         };
-        Some(read.and_then(|(heading, latitude)| self.judge(Fix { heading, latitude }, now)))
+        Some(read.and_then(|(heading, latitude)| self.judge(Fix { heading, latitude: Ok(latitude) }, now)))
     }
 
     /// Judges what a receiver says at `now`.
     ///
     /// # Errors
-    /// [`HeadingError`]; nothing of it is used.
+    /// [`HeadingError`] of course and speed; nothing of it is used.
     pub fn judge(&mut self, Fix { heading, latitude }: Fix, now: Micros) -> Result<Received, HeadingError> {
         let heading = heading.map(Heading::checked).transpose()?;
-        let latitude = latitude.map(|latitude| self.latitude.take(latitude, now)).transpose()?.flatten();
+        let latitude =
+            latitude.and_then(|degrees| degrees.map_or(Ok(None), |degrees| self.latitude.take(degrees, now)));
         Ok(Received { heading, latitude })
     }
 
@@ -216,12 +232,8 @@ impl HeadingReceiver {
         }
         let [course_sigma, speed, speed_sigma] = self.kept.map(|kept| kept.map(|(value, _)| value));
         let whole = |course: f32| if course < 0.0 { course + core::f32::consts::TAU } else { course };
-        let heading = course.flatten().map(|course| Heading {
-            course: Some(whole(course)),
-            course_sigma,
-            speed,
-            speed_sigma,
-        });
+        let heading =
+            course.map(|course| Heading { course: course.map(whole), course_sigma, speed, speed_sigma });
         Ok(read.iter().any(Option::is_some).then_some((heading, latitude.flatten())))
     }
 }

@@ -65,7 +65,7 @@ fn nav_pvt(payload: &[u8; PAYLOAD]) -> Result<Fix, HeadingError> {
                 speed_sigma: Some(unsigned(68) * SPEED),
             };
             let is_placed = byte(78) & 1 == 0;
-            Ok(Fix { heading: Some(heading), latitude: is_placed.then(|| word(28) as f32 * LATITUDE) })
+            Ok(Fix { heading: Some(heading), latitude: Ok(is_placed.then(|| word(28) as f32 * LATITUDE)) })
         }
         _ => Ok(Fix::NONE),
     }

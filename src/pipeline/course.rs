@@ -9,7 +9,7 @@ use super::{Pipeline, State};
 use crate::bias::ZeroRate;
 use crate::compensate::Remaining;
 use crate::heading::filter::{BIAS, Filter, GAIN};
-use crate::heading::{CourseState, FINE_BIAS, Gain, Heading, Refusal, gain_knowledge};
+use crate::heading::{CourseCounters, CourseState, FINE_BIAS, Gain, Heading, Refusal, gain_knowledge};
 use crate::health::slow::Knowledge;
 use crate::mounting::{Rotation, Vertical};
 use crate::sample::Frame;
@@ -96,9 +96,14 @@ impl Pipeline {
         });
     }
 
-    /// Returns what courses have shown since the start.
+    /// Returns the counters of courses since the start.
     #[must_use]
-    pub fn course_state(&self) -> CourseState {
+    pub fn course_counters(&self) -> CourseCounters {
+        self.state.course.state().counters
+    }
+
+    /// Returns what courses have shown since the start; whether their source is silent, the coprocessor knows.
+    pub(crate) fn course_state(&self) -> CourseState {
         let (share, sigma) = self.gain();
         let gain = sigma.map(|sigma| Gain { share, sigma, of: self.config.gain_of });
         CourseState { gain, ..self.state.course.state() }

@@ -101,7 +101,7 @@ async fn drive(coprocessor: &'static mut Coprocessor, mut imu: Imu, mut can: Can
         });
         steps = steps.wrapping_add(1);
         if steps.is_multiple_of(COURSE_STEPS) {
-            service::COURSE.signal(coprocessor.pipeline().course_state());
+            service::COURSE.signal(coprocessor.course_state());
         }
         let cycles = service::cycles();
         if cycles != seen {

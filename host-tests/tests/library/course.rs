@@ -111,7 +111,7 @@ fn a_vehicle_that_never_stands_is_usable_in_20_s_and_good_in_60() {
     let first = |wanted: &dyn Fn(&Output) -> bool| outputs.iter().position(wanted).map(|at| at as f64 * 0.01);
     let usable = first(&|output| output.vehicle.delayed.status != Status::Init).expect("a rate");
     let good = first(&|output| output.vehicle.delayed.quality == Quality::Good).expect("a good rate");
-    println!("usable after {usable} s, good after {good} s, {:?}", pipeline.course_state().counters);
+    println!("usable after {usable} s, good after {good} s, {:?}", pipeline.course_counters());
     assert!(usable <= 20.0 && good <= 60.0);
     let held = error(&outputs, &headings, 58).to_degrees();
     println!("heading held for a minute: {held:.3} deg");
@@ -131,7 +131,8 @@ fn the_gain_is_learnt_where_the_vehicle_turns_both_ways() {
     assert!(pipeline.status(None).gain != Knowledge::Unknown);
 
     // At the next start it holds from the first sample on, without a course.
-    let known = pipeline.course_state().gain.map(Gain::aged);
+    let of = PipelineConfig::DEFAULT.gain_of;
+    let known = sigma.map(|sigma| Gain { share: gain, sigma, of }.aged());
     assert!(known.is_some_and(|known| known.sigma < 0.002), "{known:?}");
     let config = PipelineConfig { gain: known, ..PipelineConfig::DEFAULT };
     let without = Drive { stands: 5, creeps: 0.0, turn: &|_| 0.3, course: &|_, _| None };
@@ -166,12 +167,8 @@ fn false_courses_teach_nothing_and_are_counted() {
     for (name, course) in bad {
         let (pipeline, ..) = drive(300, &Drive { course, ..known });
         let moved = (pipeline.bias().rad_per_sec() - without.bias().rad_per_sec()).to_degrees() * 60.0;
-        println!("{name}: bias moved by {moved:+.3} deg/min, {:?}", pipeline.course_state().counters);
-        assert!(
-            pipeline.course_state().counters.refused > 20,
-            "{name}: {:?}",
-            pipeline.course_state().counters
-        );
+        println!("{name}: bias moved by {moved:+.3} deg/min, {:?}", pipeline.course_counters());
+        assert!(pipeline.course_counters().refused > 20, "{name}: {:?}", pipeline.course_counters());
         assert!(moved.abs() < 0.01 && pipeline.gain().0 == 0.0, "{name}: bias moved by {moved} deg/min");
     }
 }

@@ -138,7 +138,7 @@ fn a_latitude_over_can_is_used_when_it_is_confirmed() {
     let mut take = |receiver: &mut HeadingReceiver, degrees: f64| {
         now += 100_000;
         let received = receiver.decode(&position(degrees), Micros(now)).expect("its frame");
-        received.map(|received| received.latitude).transpose()
+        received.and_then(|received| received.latitude).transpose()
     };
     // Frames that do not agree never confirm each other.
     for k in 0..4 * CONFIRM {
@@ -162,7 +162,7 @@ fn a_latitude_over_can_is_used_when_it_is_confirmed() {
     // What no latitude can be.
     assert!(matches!(take(&mut receiver, 95.0), Some(Err(HeadingError::Range { what: "latitude", .. }))));
     let marked = DataFrame::new(position(0.0).id(), &[0xFF; 8]).expect("eight bytes");
-    assert_eq!(receiver.decode(&marked, Micros(now)), Some(Ok(Received::default())));
+    assert_eq!(receiver.decode(&marked, Micros(now)), Some(Ok(Received::NONE)));
     let short = DataFrame::new(position(0.0).id(), &[0; 3]).expect("three bytes");
     assert_eq!(receiver.decode(&short, Micros(now)), Some(Err(HeadingError::Short(3))));
 }

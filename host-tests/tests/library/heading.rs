@@ -85,7 +85,7 @@ fn described_values_may_be_in_frames_of_their_own() {
         receiver.decode(&DataFrame::new(id(raw), bytes).expect("eight bytes"), Micros(1_000 * ms))
     };
     // 400 codes; a latitude that is not confirmed.
-    assert_eq!(read(0x322, &[0, 0, 0, 0x90, 0x01], 0), Some(Ok(Received::default())));
+    assert_eq!(read(0x322, &[0, 0, 0, 0x90, 0x01], 0), Some(Ok(Received::NONE)));
     // -1.0000 rad, 20 mrad.
     let heading =
         |read: Option<Result<Received, HeadingError>>| read.expect("its frame").map(|read| read.heading);
@@ -96,7 +96,9 @@ fn described_values_may_be_in_frames_of_their_own() {
     assert_eq!(fresh.speed_sigma, None);
     let stale = heading(read(0x321, &[0xF0, 0xD8, 20], 2_000)).expect("in range").expect("a course");
     assert_eq!(stale.speed, None);
-    assert_eq!(heading(read(0x321, &[0xFF, 0xFF, 20], 2_100)), Ok(None));
+    // Marked as unknown, it is a message all the same.
+    let marked = heading(read(0x321, &[0xFF, 0xFF, 20], 2_100)).expect("in range").expect("a message");
+    assert_eq!(marked.course, None);
     assert_eq!(heading(read(0x321, &[0; 2], 2_200)), Err(HeadingError::Short(2)));
     assert_eq!(read(0x323, &[0; 8], 2_300), None);
 }

@@ -73,6 +73,8 @@ pub struct Output {
     fog: serial::Port,
     dsp1760: Dsp1760,
     gnss: serial::Port,
+    /// Damaged and overwritten bytes of that line so far.
+    gnss_lost: u32,
     receiver: Option<GnssLine>,
     outgoing: Outgoing,
     /// Millisecond of the last poll of the other lines.
@@ -96,6 +98,7 @@ impl OutputParts {
             fog,
             dsp1760: Dsp1760::new(),
             gnss,
+            gnss_lost: 0,
             receiver: self.gnss.map(|line| GnssLine::new(line.protocol)),
             outgoing: Outgoing::new(slcan, self.bits_per_second, can),
             polled_at: 0,
@@ -201,10 +204,23 @@ impl Output {
     #[inline(never)]
     fn poll_receiver(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
         let Some(receiver) = &mut self.receiver else { return };
+        let mut is_damaged = false;
         for _ in 0..serial::RECEIVED {
-            let Some(byte) = self.gnss.received().first() else { break };
-            receiver.receive(*byte);
+            let waiting = self.gnss.received();
+            let (length, byte) = (waiting.len(), waiting.first().copied());
+            let lost = self.gnss.lost();
+            if lost != core::mem::replace(&mut self.gnss_lost, lost) {
+                is_damaged = true;
+                receiver.interrupt();
+            }
+            let Some(byte) = byte else { break };
+            if is_damaged {
+                // The damaged byte is one of those that wait.
+                self.gnss.consume(length);
+                continue;
+            }
             self.gnss.consume(1);
+            receiver.receive(byte);
             while let Some(fix) = receiver.next_sample() {
                 let _ = coprocessor.gnss(fix, now);
             }

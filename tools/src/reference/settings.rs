@@ -97,7 +97,7 @@ const SETTINGS: &[(&str, Takes)] = &[
         "heading.line",
         Other(
             "",
-            "`null`, or a receiver on UART4 in place of frames: `{\"protocol\":\"Ubx\",\"baud\":38400}`, or `Nmea`",
+            "`null`, or a receiver on UART4 in place of frames: `{\"protocol\":\"Ubx\",\"baud\":38400}` (4800 to 460800), or `Nmea`",
         ),
     ),
     (
