@@ -26,6 +26,9 @@ const SHORTEST_S: f64 = 30.0;
 /// Largest sigma of the share of the roll or pitch rate: 1.1 deg of mounting.
 const MAX_CROSS_SIGMA: f64 = 0.02;
 const MAX_GAIN_SIGMA: f64 = 0.005;
+/// Least angle turned in all drives for a gain, as the doctor says, rad; and in a second that turns.
+pub const LEAST_TURNED_RAD: f64 = 6.0;
+pub const STRAIGHT_RAD: f64 = 0.02;
 /// Largest robust deviation of the spans' angles from the fit, rad. No corrected gyro has an error that large in that
 /// time.
 const MAX_RESIDUAL_RAD: f64 = 0.05;
@@ -71,6 +74,8 @@ pub struct Cut {
     name: String,
     /// The gyro's static bias, rad/s.
     gyro_bias: [f64; 3],
+    /// The sum of all turns, rad.
+    turned: f64,
     spans: Vec<Span>,
 }
 
@@ -88,8 +93,8 @@ impl Cut {
             tick();
             spans.add(&step?, &gyro_bias);
         }
-        let spans = spans.finish(&drive.path)?;
-        Ok(Self { path: drive.path.clone(), name: drive.name().to_owned(), gyro_bias, spans })
+        let (turned, spans) = (spans.turned(), spans.finish(&drive.path)?);
+        Ok(Self { path: drive.path.clone(), name: drive.name().to_owned(), gyro_bias, turned, spans })
     }
 }
 
@@ -97,16 +102,22 @@ impl Cut {
 const SHARES: [(&str, f64, &str); 3] = [
     ("roll", MAX_CROSS_SIGMA, "too little rolling in the drives to observe it"),
     ("pitch", MAX_CROSS_SIGMA, "too little pitching in the drives to observe it"),
-    ("gain", MAX_GAIN_SIGMA, "too few turns, or all alike: the drives cannot tell it from a bias"),
+    (
+        "gain",
+        MAX_GAIN_SIGMA,
+        "too few turns (6 rad are needed), or all alike: the drives cannot tell it from a bias",
+    ),
 ];
 
 pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, CalibrateError> {
     let spans: Vec<&[Span]> = drives.iter().map(|drive| drive.spans.as_slice()).collect();
     // A share that the drives hardly show makes the others uncertain, so the least certain one is removed first.
     let (mut fitted, mut refused) = ([true; 3], [None; 3]);
+    let has_turned = drives.iter().map(|drive| drive.turned).sum::<f64>() >= LEAST_TURNED_RAD;
     let fit = loop {
         let fit = Fit::new(&spans, fitted);
-        let excess = |k: &usize| fit.sigmas[*k] / SHARES[*k].1;
+        let excess =
+            |k: &usize| if *k < 2 || has_turned { fit.sigmas[*k] / SHARES[*k].1 } else { f64::INFINITY };
         let worst = (0..3).filter(|k| fitted[*k]).max_by(|a, b| excess(a).total_cmp(&excess(b)));
         match worst.filter(|k| excess(k) > 1.0) {
             Some(k) => (fitted[k], refused[k]) = (false, Some(fit.sigmas[k])),
@@ -183,6 +194,26 @@ mod tests {
         assert_eq!(gain.refused, None, "{gain:?}");
         // The true rate is the reading over 1.02; the simulated part adds a gain with a sigma of 0.1 %.
         assert!((gain.value + 0.02).abs() < 0.003 + 3.0 * gain.sigma, "{gain:?}");
+    }
+
+    #[test]
+    fn few_turns_show_no_gain_however_well_they_fit() {
+        let gain = |turn: f64| {
+            let span = |k: u32| Span {
+                error: 0.01 * turn,
+                turns: [0.0, 0.0, turn],
+                seconds: 1.0 + f64::from(k % 2),
+            };
+            let (path, name, spans) = (String::new(), String::new(), (0..100).map(span).collect());
+            calibrate(&[Cut { path, name, gyro_bias: [0.0; 3], turned: 100.0 * turn, spans }], 0)
+                .unwrap()
+                .shares[2]
+        };
+        assert!(
+            gain(0.059).refused.is_some() && (gain(0.061).value - 0.01).abs() < 1e-6,
+            "{:?}",
+            gain(0.061)
+        );
     }
 
     #[test]

@@ -15,8 +15,8 @@ use std::process::ExitCode;
 /// Start with `gyronet demo`. `gyronet import` converts logs of other tools to a
 /// drive, and `gyronet doctor` checks a drive.
 ///
-/// A drive is a CSV file with a header, best at 100 Hz. The vehicle must stand still for
-/// the first 3 s. Columns may be in any order; other columns are ignored:
+/// A drive is a CSV file with a header, of 50 to 1000 Hz, best 100. The vehicle must stand still
+/// for the first 3 s. Columns may be in any order; other columns are ignored:
 ///
 ///   t_s                    time, s
 ///   acc_x, acc_y, acc_z    specific force, m/s^2 (x forward, y left, z up)
@@ -24,6 +24,9 @@ use std::process::ExitCode;
 ///   ref_gyr_z              true yaw rate, rad/s; optional
 ///   ref_yaw                course over ground by GNSS, rad, left positive;
 ///                          optional, empty where unknown
+///   course, gnss_speed     what the board gets of a GNSS receiver: course clockwise from
+///                          north, rad, and speed, m/s; optional; or instead of both
+///   gnss_lat, gnss_lon     position, deg
 ///   temp_c                 temperature of the sensor, deg C; optional
 ///   wheel1_rate ..4        wheel rates, rad/s; optional
 ///                          (front right, rear right, front left, rear left)

@@ -18,9 +18,10 @@ pub enum PythonError {
     )]
     OldPython,
     #[error(
-        "this needs the Python package gyronet {version}, which python3 does not have: pip install ./tools/python in gyronet's repository"
+        "{} does not have the Python package gyronet {version}, which the board, and logs outside a checkout of gyronet, need: \
+         pip install ./tools/python in a checkout", python.display()
     )]
-    NoPackage { version: &'static str },
+    NoPackage { python: PathBuf, version: &'static str },
     #[error("{}: {source}", folder.display())]
     Folder { folder: PathBuf, source: std::io::Error },
     #[error(

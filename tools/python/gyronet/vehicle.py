@@ -22,7 +22,7 @@ WHEELS = ["front_right", "rear_right", "front_left", "rear_left"]  # the order o
 
 class Vehicle:
     def __init__(self):
-        self.path, self.columns, self.start, self.turned = None, {}, None, None
+        self.path, self.columns, self.start, self.turned, self.rates = None, {}, None, None, {}
         for table, keys in KEYS.items():
             setattr(self, table, dict(keys))
 
@@ -43,7 +43,8 @@ class Vehicle:
                 vehicle.columns = {name: _column(path, name, entry) for name, entry in entries.items()}
                 continue
             if table == "recording" and isinstance(entries, dict):
-                vehicle.start, vehicle.turned = entries.get("start"), {**ZERO, **entries.get("mounting", {})}
+                vehicle.start, vehicle.rates = entries.get("start"), entries.get("rates", {})
+                vehicle.turned = {**ZERO, **entries.get("mounting", {})}
                 continue
             if table not in KEYS or not isinstance(entries, dict):
                 raise Refused(f"{path}: unknown table [{table}]; known are {', '.join([*KEYS, 'columns'])}")
@@ -67,7 +68,7 @@ class Vehicle:
     def of_log(self):
         """The vehicle as a log needs it: what a drive's rows have been turned by comes first."""
         if self.turned:
-            self.mounting, self.turned, self.start = self.whole(), None, None
+            self.mounting, self.turned, self.start, self.rates = self.whole(), None, None, {}
 
     def whole(self):
         """The mounting of the sensor: what the rows have been turned by, then what they still need."""

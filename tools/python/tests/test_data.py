@@ -59,17 +59,20 @@ class Logs(Folder):
 
 
 class Again(Folder):
-    def test_a_part_of_a_drive_keeps_the_time_of_day(self):
+    def test_a_part_of_a_drive_keeps_the_time_of_day_and_the_rates(self):
         t = made.times()
         made.mcap(self.folder / "d.mcap", made.imu_messages(t, made.imu(t)))
         self.assertEqual(made.run(self.folder, "import", "d.mcap", "--out", "first.csv")[0], 0)
         self.imports("first.csv", "--from", "2")
-        starts = [tomllib.loads((self.folder / name).read_text())["recording"]["start"] for name in ("first.toml", "out.toml")]
+        said = [tomllib.loads((self.folder / name).read_text())["recording"] for name in ("first.toml", "out.toml")]
+        self.assertEqual([recording["rates"]["imu"] for recording in said], [50.0, 50.0])
+        starts = [recording["start"] for recording in said]
         np.testing.assert_allclose(starts, [made.START, made.START + 2], atol=2e-6)
         # Another drive's file says nothing about this one.
         shutil.copy(self.folder / "first.csv", self.folder / "other.csv")
         self.imports("other.csv", "--vehicle", "first.toml", "--imu", "imu")
-        self.assertNotIn("start", tomllib.loads((self.folder / "out.toml").read_text())["recording"])
+        said = tomllib.loads((self.folder / "out.toml").read_text())["recording"]
+        self.assertEqual((said.get("start"), said["rates"]["imu"]), (None, 100.0))
 
     def test_a_mounting_that_is_edited_counts(self):
         t = made.times()

@@ -4,7 +4,7 @@
 //! A reference yaw rate gives one span per second. A GNSS course is noisy from one second to the next, so its spans
 //! reach from the median of ten seconds to the median of the next ten.
 
-use super::{CalibrateError, SHORTEST_S};
+use super::{CalibrateError, SHORTEST_S, STRAIGHT_RAD};
 use crate::board::Step;
 use crate::drive::DT;
 use crate::evaluate::heading_error::{BLOCK_S, Blocks, OffCourse};
@@ -47,6 +47,11 @@ impl Spans {
         self.by_course.add(corrected, turns, row.course);
     }
 
+    /// The sum of the turns of all seconds, rad, which noise does not add to.
+    pub fn turned(&self) -> f64 {
+        self.by_rate.turned
+    }
+
     /// The spans by the reference yaw rate, or else by the course.
     pub fn finish(mut self, path: &str) -> Result<Vec<Span>, CalibrateError> {
         let path = || path.to_owned();
@@ -74,6 +79,7 @@ struct ByRate {
     /// The error and the turns of the second in progress.
     error: Option<f64>,
     turns: [f64; 3],
+    turned: f64,
     spans: Vec<Span>,
 }
 
@@ -88,6 +94,7 @@ impl ByRate {
         self.samples += 1;
         if self.samples == RATE_SPAN {
             let (turns, seconds) = (self.turns, RATE_SPAN as f64 * DT);
+            self.turned += Some(turns[2].abs()).filter(|turn| *turn >= STRAIGHT_RAD).unwrap_or_default();
             self.spans.extend(self.error.map(|error| Span { error, turns, seconds }));
             self.samples = 0;
         }

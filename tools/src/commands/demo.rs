@@ -24,7 +24,7 @@ Examples:
   gyronet demo                                  # the simulated drive
   gyronet demo drive.csv --out report           # yours; see `gyronet --help` for its columns")]
 pub struct Args {
-    /// Recorded drive (CSV, 100 Hz); errors need its column ref_gyr_z or ref_yaw, and a path needs wheelN_rate or gnss_speed.
+    /// Recorded drive (CSV); errors need its column ref_gyr_z or ref_yaw, and a path needs wheelN_rate or gnss_speed.
     #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
     /// Folder for demo.html and can.log [default: target/demo].

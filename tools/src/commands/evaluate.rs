@@ -4,7 +4,7 @@ use super::{Common, drives, paint, print_json, progress, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::stream::Drive;
-use gyronet_tools::evaluate::outage::{self, Outage};
+use gyronet_tools::evaluate::outage::{self, NoStart, Outage};
 use gyronet_tools::evaluate::outage_chart;
 use gyronet_tools::evaluate::outage_table::Outages;
 use gyronet_tools::evaluate::report::Report;
@@ -47,9 +47,9 @@ pub struct Args {
     /// Print the error of the delayed rate at every lag from 0 to 110 ms (the board's default is 70).
     #[arg(long)]
     lags: bool,
-    /// Print the heading error after a loss of GNSS for so many seconds, from every second on after 60 s with a course,
-    /// and after 20 s. The drives have `course` and `gnss_speed`, or `gnss_lat` and `gnss_lon`, besides a reference; they
-    /// may begin in motion.
+    /// Print the heading error after a loss of GNSS for so many seconds, which begins every 2 s, after 60 s of driving with
+    /// a course, and after 20 s. The drives have `course` and `gnss_speed`, or `gnss_lat` and `gnss_lon`, besides a
+    /// reference; they may begin in motion.
     #[arg(long, value_name = "SECONDS", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=3600))]
     #[arg(conflicts_with_all = ["lags", "all", "gyronet"])]
     outage: Vec<u16>,
@@ -97,6 +97,10 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 /// The outages of a drive, with its file.
 type Found<'a> = (&'a Path, Vec<Outage>);
 
+fn starts_of<'a>((_, found): &'a Found<'_>) -> &'a [Outage] {
+    found
+}
+
 /// Hides the courses of each drive from every start on.
 fn outages(args: &Args, common: Common) -> super::Result {
     let weights = args.unit.sent.open()?;
@@ -112,6 +116,7 @@ fn outages(args: &Args, common: Common) -> super::Result {
         if found.is_empty() {
             let remark = format_args!("{}: no start: too little course or reference", drive.path);
             super::remark(common, remark)?;
+            continue;
         }
         let set = file.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned();
         match sets.iter_mut().find(|(own, _)| *own == set) {
@@ -119,16 +124,17 @@ fn outages(args: &Args, common: Common) -> super::Result {
             None => sets.push((set, vec![(file, found)])),
         }
     }
+    if sets.is_empty() {
+        return Err(NoStart { seconds: lengths.into_iter().min().unwrap_or_default() }.into());
+    }
     let drives = sets.iter().flat_map(|(_, drives)| drives);
     if let Some(folder) = &args.pictures {
         pictures(folder, drives.clone(), &mut GyroNet::new(weights.blob()?))?;
     }
     let mut out = std::io::stdout().lock();
-    let each: Vec<Outages> = sets
-        .iter()
-        .map(|(set, drives)| Outages::new(set, drives.len(), drives.iter().flat_map(|(_, found)| found)))
-        .collect();
-    let all = Outages::new("all", args.files.len(), drives.flat_map(|(_, found)| found));
+    let each: Vec<Outages> =
+        sets.iter().map(|(set, drives)| Outages::new(set, drives.iter().map(starts_of))).collect();
+    let all = Outages::new("all", drives.map(starts_of));
     if common.json {
         let Outages { outage, outage_after_20_s, .. } = all;
         let json =

@@ -29,7 +29,7 @@ impl Tunnel {
             return Ok(None);
         }
         let found = outage::run(drive, network, &[SECONDS], EVERY_S, || {})?;
-        let outages = Outages::new(drive.name(), 1, found.iter());
+        let outages = Outages::new(drive.name(), std::iter::once(found.as_slice()));
         let Some([median, _]) = outage_chart::typical(found.iter()).filter(|_| !outages.outage.is_empty())
         else {
             return Ok(None);

@@ -7,6 +7,8 @@ use gyronet::align::PERIODS_US;
 
 /// A longer period than this is a gap, s.
 const GAP: f64 = 0.015;
+/// Sources whose rate the results depend on.
+const RESAMPLED: [&str; 4] = ["imu", "gyro", "accelerometer", "reference rate"];
 
 pub fn findings(rows: &Rows) -> Vec<Finding> {
     let mut findings = Vec::new();
@@ -26,6 +28,16 @@ pub fn findings(rows: &Rows) -> Vec<Finding> {
                 findings.push(gaps(&periods, rows.len()));
             }
         }
+    }
+    let is_slow = |hz: f64| hz > 0.0 && 1e6 / hz > *PERIODS_US.end() as f64;
+    let rates = rows.vehicle.recording.rates.iter();
+    let slow = rates.filter(|(role, hz)| RESAMPLED.contains(&role.as_str()) && is_slow(**hz));
+    let slow: Vec<String> = slow.map(|(role, hz)| format!("{role} {hz} Hz")).collect();
+    if !slow.is_empty() {
+        let slow = slow.join(", ");
+        let text =
+            format!("{slow}: `import` has interpolated the rows between; the board uses 50 to 1000 Hz.");
+        findings.push(Finding::note("source rate", text));
     }
     if rows.bad > 0 {
         let first = rows.first_bad.as_deref().unwrap_or("the recording is longer than a day");

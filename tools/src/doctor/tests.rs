@@ -68,6 +68,19 @@ fn a_good_recording_has_nothing_to_cure() {
 }
 
 #[test]
+fn a_source_slower_than_the_board_takes_is_named_behind_an_import() {
+    let folder = tempfile::tempdir().unwrap();
+    let csv = folder.path().join("car.csv");
+    std::fs::write(&csv, crate::bundled::SIMULATED_DRIVE).unwrap();
+    for (rates, named) in [("imu = 25.0", true), ("imu = 50.0\nposition = 1.0", false)] {
+        std::fs::write(csv.with_extension("toml"), format!("[recording.rates]\n{rates}\n")).unwrap();
+        let doctor = Doctor::examine(&csv).unwrap();
+        let found = doctor.finding("source rate").filter(|finding| finding.text.starts_with("imu 25 Hz: "));
+        assert_eq!(found.is_some(), named, "{rates}: {:?}", doctor.findings);
+    }
+}
+
+#[test]
 fn a_standing_sensor_neither_turns_nor_stops() {
     let doctor = doctor(|k, row| {
         row[6..].copy_from_slice(&[0.01 + 0.002 * (k % 3) as f64, 0.0, 0.0, 0.0]);

@@ -47,6 +47,8 @@ pub struct Origin {
     pub mounting: Mounting,
     /// Unit of each channel that was used.
     pub units: BTreeMap<String, String>,
+    /// Samples a second of each source, by its role.
+    pub rates: BTreeMap<String, f64>,
     /// Records that could not be used, by reason.
     pub dropped: BTreeMap<String, u64>,
 }
@@ -195,8 +197,9 @@ mod tests {
                     dbc = 'car.dbc'\n[columns]\nt_s = { name = 'zeit', unit = 'ms' }\n";
         let old = Vehicle::parse("car.toml", text).unwrap();
         assert_eq!((old.mounting.yaw_deg, &old.recording), (90.0, &Origin::default()));
-        let text =
-            format!("{text}[recording]\nstart = 1700000000.25\nunits = {{ '/imu' = 'm/s^2, rad/s' }}\n");
+        let text = format!(
+            "{text}[recording]\nstart = 1700000000.25\nunits = {{ '/imu' = 'm/s^2, rad/s' }}\nrates = {{ imu = 25 }}\n"
+        );
         let new = Vehicle::parse("car.toml", &text).unwrap();
         assert_eq!(new.recording.start, Some(1_700_000_000.25));
     }

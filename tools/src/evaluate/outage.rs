@@ -56,6 +56,17 @@ pub struct Outage {
     pub position: Option<(f64, ByMethod<f64>)>,
 }
 
+/// No outage has an error: no drive has what it takes.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "no start of an outage: a drive needs {} s at {SLOWEST} m/s or more with a course every 2 s (columns course and \
+     gnss_speed, or gnss_lat and gnss_lon), then {seconds} s, and a reference (ref_gyr_z or ref_yaw)", AFTER_S[1]
+)]
+pub struct NoStart {
+    /// Length of the shortest outage.
+    pub seconds: usize,
+}
+
 /// A network that several boards share.
 #[derive(Clone)]
 struct Shared<'a>(Rc<RefCell<&'a mut dyn WindowNetwork>>);

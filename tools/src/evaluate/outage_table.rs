@@ -26,6 +26,8 @@ impl Spread {
 /// The errors of one method over all outages of one length.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Figures {
+    /// Drives with a start, and all their starts.
+    pub drives: usize,
     pub starts: usize,
     pub heading_deg: Spread,
     /// What the heading moves the end of the path by wheels, m; absent without wheels.
@@ -39,28 +41,29 @@ pub type ByLength = BTreeMap<usize, BTreeMap<&'static str, Figures>>;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outages {
     pub set: String,
-    pub drives: usize,
     /// After 60 s with a course.
     pub outage: ByLength,
     pub outage_after_20_s: ByLength,
 }
 
 impl Outages {
-    /// Sums up the outages of some drives.
-    pub fn new<'a>(set: &str, drives: usize, outages: impl Iterator<Item = &'a Outage> + Clone) -> Self {
+    /// Sums up the outages of each drive.
+    pub fn new<'a>(set: &str, drives: impl Iterator<Item = &'a [Outage]> + Clone) -> Self {
         let [outage, outage_after_20_s] = AFTER_S.map(|after| {
             let mut lengths = ByLength::new();
-            for length in outages.clone().map(|outage| outage.seconds) {
+            for length in drives.clone().flatten().map(|outage| outage.seconds) {
                 lengths.entry(length).or_default();
             }
             for (length, methods) in &mut lengths {
-                let chosen =
-                    outages.clone().filter(|one| one.seconds == *length && one.driven_s >= after as f64);
+                let is_of = |one: &&Outage| one.seconds == *length && one.driven_s >= after as f64;
+                let chosen = drives.clone().flatten().filter(is_of);
+                let with_one = drives.clone().filter(|drive| drive.iter().any(|one| is_of(&one))).count();
                 for (k, method) in METHODS.iter().enumerate() {
                     let moved = chosen.clone().filter_map(|one| one.position);
                     let heading_deg = Spread::of(chosen.clone().map(|one| one.heading[k].to_degrees()));
                     methods.extend(heading_deg.map(|heading_deg| {
                         let figures = Figures {
+                            drives: with_one,
                             starts: chosen.clone().count(),
                             heading_deg,
                             position_m: Spread::of(moved.map(|(_, ends)| ends[k])),
@@ -71,19 +74,21 @@ impl Outages {
             }
             lengths
         });
-        Self { set: set.to_owned(), drives, outage, outage_after_20_s }
+        Self { set: set.to_owned(), outage, outage_after_20_s }
     }
 }
 
 impl fmt::Display for Outages {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (after, lengths) in AFTER_S.iter().zip([&self.outage, &self.outage_after_20_s]) {
-            for (length, methods) in lengths.iter().filter(|(_, methods)| !methods.is_empty()) {
-                let starts = methods.values().map(|figures| figures.starts).max().unwrap_or(0);
+            for (length, methods) in lengths {
+                let Some(Figures { drives, starts, .. }) = methods.values().next() else { continue };
+                let [drives, starts] = [(drives, "drive"), (starts, "start")]
+                    .map(|(count, noun)| format!("{count} {noun}{}", if *count == 1 { "" } else { "s" }));
                 writeln!(
                     f,
-                    "{}, {} drives: {length} s without GNSS after {after} s with it, {starts} starts",
-                    self.set, self.drives
+                    "{}, {drives}: {length} s without GNSS after {after} s with it, {starts}",
+                    self.set
                 )?;
                 writeln!(f, "  {:<26}{:>25}{:>25}", "median, 90 %, worst", "heading, deg", "position, m")?;
                 for method in METHODS {
@@ -117,10 +122,13 @@ mod tests {
         };
         let all =
             [outage(30.0, 60, 0.3), outage(70.0, 60, 0.1), outage(90.0, 60, 0.2), outage(90.0, 30, 0.4)];
-        let table = Outages::new("x", 1, all.iter());
+        let table = Outages::new("x", [&all[..1], &all[1..], &[]].into_iter());
         let of = |lengths: &ByLength, length: usize| lengths[&length]["static"];
         assert_eq!((of(&table.outage, 60).starts, of(&table.outage, 30).starts), (2, 1));
+        assert_eq!((of(&table.outage, 60).drives, of(&table.outage_after_20_s, 60).drives), (1, 2));
         assert_eq!(of(&table.outage_after_20_s, 60).starts, 3);
+        let text = table.to_string();
+        assert!(text.starts_with("x, 1 drive: 30 s without GNSS after 60 s with it, 1 start\n"), "{text}");
         let heading = of(&table.outage_after_20_s, 60).heading_deg;
         assert!((heading.median - 0.2f64.to_degrees()).abs() < 1e-9, "{heading:?}");
         assert!((heading.worst - 0.3f64.to_degrees()).abs() < 1e-9, "{heading:?}");

@@ -34,7 +34,7 @@ pub fn package(sources: &Path, board: bool, remark: impl FnOnce(&Path)) -> Resul
         remark(environment);
         (make(environment)?, sources)
     } else {
-        return Err(PythonError::NoPackage { version: VERSION });
+        return Err(PythonError::NoPackage { python, version: VERSION });
     };
     let mut command = Command::new(python);
     command.args(["-m", "gyronet"]);

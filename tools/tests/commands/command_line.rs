@@ -98,6 +98,16 @@ fn json_is_json_and_quiet_is_quiet() {
 }
 
 #[test]
+fn an_outage_without_a_start_is_a_failure_that_names_the_columns() {
+    let drive = format!("{}/no_course.csv", env!("CARGO_TARGET_TMPDIR"));
+    assert!(gyronet(&["simulate", "--seconds", "12", "--out", &drive]).status.success());
+    let output = gyronet(&["evaluate", &drive, "--outage", "5", "--quiet"]);
+    let error = text(&output.stderr);
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{error}");
+    assert!(error.contains("gnss_lat and gnss_lon") && error.contains("then 5 s"), "{error}");
+}
+
+#[test]
 fn colours_are_for_terminals() {
     let colored = |variable: &str| {
         let mut command = command(&["size", "--elf", "/nowhere/image"]);

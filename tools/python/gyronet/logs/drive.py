@@ -220,9 +220,11 @@ class Drive:
 
     def recording(self):
         """What is known of the import, as tables of the vehicle file."""
+        before = self.vehicle.rates  # those of the drive's own sources, of which this is a part
         return {
             "recording": {"start": None if self.start_time is None else round(self.start_time, 6)},
             "recording.units": {used.name: used.unit for used in self.used()},
+            "recording.rates": {**before, **{used.role: min(round(used.hz, 2), before.get(used.role, used.hz)) for used in self.used()}},
             "recording.dropped": self.dropped,
         }
 
