@@ -7,12 +7,10 @@
 mod can;
 mod diagnosis;
 mod recording;
-mod records;
+pub mod records;
 mod sensors;
 mod slcan;
 mod weights;
-
-pub type Seed = (&'static str, Vec<u8>);
 
 #[derive(Debug, Clone, Copy)]
 pub struct Entrance {
@@ -20,27 +18,25 @@ pub struct Entrance {
     pub name: &'static str,
     /// The function, which accepts any bytes.
     pub run: fn(&[u8]),
-    /// The initial corpus, which is generated and not recorded.
-    pub seeds: fn() -> Vec<Seed>,
     /// The number of damaged copies that a test runs in well under a second.
     pub mutations: u64,
 }
 
 pub const ALL: [Entrance; 14] = [
-    Entrance { name: "xsens", run: sensors::xsens, seeds: sensors::xsens_seeds, mutations: 20_000 },
-    Entrance { name: "dsp1760", run: sensors::dsp1760, seeds: sensors::dsp1760_seeds, mutations: 20_000 },
-    Entrance { name: "bmi088", run: sensors::bmi088, seeds: sensors::bmi088_seeds, mutations: 20_000 },
-    Entrance { name: "icm42688", run: sensors::icm42688, seeds: sensors::icm42688_seeds, mutations: 20_000 },
-    Entrance { name: "gnss", run: sensors::gnss, seeds: sensors::gnss_seeds, mutations: 20_000 },
-    Entrance { name: "slcan_board", run: slcan::board, seeds: slcan::board_seeds, mutations: 20_000 },
-    Entrance { name: "slcan_host", run: slcan::host, seeds: slcan::host_seeds, mutations: 20_000 },
-    Entrance { name: "can_wheels", run: can::wheels, seeds: can::wheel_seeds, mutations: 20_000 },
-    Entrance { name: "can_messages", run: can::messages, seeds: can::message_seeds, mutations: 20_000 },
-    Entrance { name: "diagnosis", run: diagnosis::frames, seeds: diagnosis::seeds, mutations: 5_000 },
-    Entrance { name: "records", run: records::flash, seeds: records::seeds, mutations: 5_000 },
-    Entrance { name: "gyronet_blob", run: weights::gyronet, seeds: weights::seeds, mutations: 100 },
-    Entrance { name: "fognet_blob", run: weights::fognet, seeds: weights::seeds, mutations: 50 },
-    Entrance { name: "recording", run: recording::csv, seeds: recording::seeds, mutations: 1_000 },
+    Entrance { name: "xsens", run: sensors::xsens, mutations: 20_000 },
+    Entrance { name: "dsp1760", run: sensors::dsp1760, mutations: 20_000 },
+    Entrance { name: "bmi088", run: sensors::bmi088, mutations: 20_000 },
+    Entrance { name: "icm42688", run: sensors::icm42688, mutations: 20_000 },
+    Entrance { name: "gnss", run: sensors::gnss, mutations: 20_000 },
+    Entrance { name: "slcan_board", run: slcan::board, mutations: 20_000 },
+    Entrance { name: "slcan_host", run: slcan::host, mutations: 20_000 },
+    Entrance { name: "can_wheels", run: can::wheels, mutations: 20_000 },
+    Entrance { name: "can_messages", run: can::messages, mutations: 20_000 },
+    Entrance { name: "diagnosis", run: diagnosis::frames, mutations: 5_000 },
+    Entrance { name: "records", run: records::flash, mutations: 5_000 },
+    Entrance { name: "gyronet_blob", run: weights::gyronet, mutations: 100 },
+    Entrance { name: "fognet_blob", run: weights::fognet, mutations: 50 },
+    Entrance { name: "recording", run: recording::csv, mutations: 1_000 },
 ];
 
 pub fn run(name: &str, data: &[u8]) {

@@ -16,6 +16,11 @@ pub fn open(flash: &Rc<RefCell<F405>>) -> Result<Store<Region<RECORD_SECTOR>>, S
     Store::open(Region::new(flash, layout::STORE), 0)
 }
 
+/// Returns the checksum at the end of a weight file.
+pub fn crc(file: &[u8]) -> u32 {
+    u32::from_le_bytes(*file.last_chunk().expect("a checksum"))
+}
+
 pub fn slots(flash: &F405) -> [&[u8]; 2] {
     let bytes = &flash.bytes()[layout::SLOTS.start as usize..layout::SLOTS.end as usize];
     bytes.split_at(SLOT_SIZE).into()

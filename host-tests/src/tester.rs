@@ -22,12 +22,6 @@ pub fn frame(head: &[u8], bytes: &[u8]) -> [u8; 8] {
     frame
 }
 
-/// Returns the bytes that hexadecimal digits stand for.
-pub fn bytes(digits: &str) -> Vec<u8> {
-    let byte = |k| u8::from_str_radix(&digits[k..k + 2], 16).expect("hexadecimal");
-    (0..digits.len()).step_by(2).map(byte).collect()
-}
-
 /// A tester: sends a request as the server's flow control allows, accepts the whole response, and returns its bytes.
 /// It waits on "response pending", and counts these responses.
 #[derive(Debug, Default)]

@@ -14,30 +14,29 @@ class Timers(unittest.TestCase):
         self.board = FakeBoard()
         self.board.enable("TIM2", "TIM5", "TIM11")
 
+    def microseconds(self, timer, **registers):
+        """Starts a timer that counts microseconds of 16 MHz."""
+        values = {"psc": 15, "egr": 1, "sr": 0, **registers, "cr1": 1}
+        for name, value in values.items():
+            self.board.write(timer, globals()[name.upper()], value)
+
+    def crystal_on_tim11(self, mode):
+        self.board.run_at_168_mhz()
+        self.board.write("RCC", 0x08, self.board.read("RCC", 0x08) & ~(31 << 16) | 25 << 16)
+        for offset, value in ((OR, 2), (CCMR1, mode), (CCER, 1), (CR1, 1)):
+            self.board.write("TIM11", offset, value)
+
     def test_free_running_microseconds_over_the_wrap(self):
-        self.board.write("TIM5", PSC, 15)
-        self.board.write("TIM5", EGR, 1)
-        self.board.write("TIM5", SR, 0)
-        self.board.write("TIM5", CR1, 1)
+        self.microseconds("TIM5")
         self.board.advance(123 * US)
         self.assertEqual(self.board.read("TIM5", CNT), 123)
         self.board.advance(2**32 * US)
         self.assertEqual(self.board.read("TIM5", CNT), 123)
         self.assertEqual(self.board.read("TIM5", SR) & 1, 1)
 
-    def test_prescaler_waits_for_an_update(self):
-        self.board.write("TIM2", PSC, 15)
-        self.board.write("TIM2", CR1, 1)
-        self.board.advance(1 * US)
-        self.assertEqual(self.board.read("TIM2", CNT), 16)
-
     def test_update_interrupt(self):
-        self.board.write("TIM2", PSC, 15)
         self.board.write("TIM2", ARR, 999)
-        self.board.write("TIM2", EGR, 1)
-        self.board.write("TIM2", SR, 0)
-        self.board.write("TIM2", DIER, 1)
-        self.board.write("TIM2", CR1, 1)
+        self.microseconds("TIM2", dier=1)
         self.board.advance(999 * US)
         self.assertFalse(self.board.lines[28])
         self.board.advance(1 * US)
@@ -48,12 +47,7 @@ class Timers(unittest.TestCase):
         self.assertTrue(self.board.lines[28])
 
     def test_compare_interrupt(self):
-        self.board.write("TIM5", PSC, 15)
-        self.board.write("TIM5", EGR, 1)
-        self.board.write("TIM5", SR, 0)
-        self.board.write("TIM5", CCR1, 500)
-        self.board.write("TIM5", CR1, 1)
-        self.board.write("TIM5", DIER, 2)
+        self.microseconds("TIM5", ccr1=500, dier=2)
         self.board.advance(499 * US)
         self.assertFalse(self.board.lines.get(50))
         self.board.advance(2 * US)
@@ -65,9 +59,7 @@ class Timers(unittest.TestCase):
         self.assertTrue(self.board.lines[50])
 
     def test_a_change_of_clock_keeps_the_count(self):
-        self.board.write("TIM5", PSC, 15)
-        self.board.write("TIM5", EGR, 1)
-        self.board.write("TIM5", CR1, 1)
+        self.microseconds("TIM5")
         self.board.advance(1 * MS)
         self.board.run_at_168_mhz()
         after = self.board.read("TIM5", CNT)
@@ -75,12 +67,7 @@ class Timers(unittest.TestCase):
         self.assertAlmostEqual(self.board.read("TIM5", CNT) - after, 84_000 / 16, delta=1)
 
     def test_tim11_measures_the_crystal_against_the_bus_clock(self):
-        self.board.run_at_168_mhz()
-        self.board.write("RCC", 0x08, self.board.read("RCC", 0x08) & ~(31 << 16) | 25 << 16)
-        self.board.write("TIM11", OR, 2)
-        self.board.write("TIM11", CCMR1, 1 | 3 << 2)
-        self.board.write("TIM11", CCER, 1)
-        self.board.write("TIM11", CR1, 1)
+        self.crystal_on_tim11(1 | 3 << 2)
         captures = []
         while len(captures) < 3:
             self.board.advance(1 * US)
@@ -90,12 +77,7 @@ class Timers(unittest.TestCase):
         self.assertEqual(differences, {8 * 168})
 
     def test_overcapture(self):
-        self.board.run_at_168_mhz()
-        self.board.write("RCC", 0x08, self.board.read("RCC", 0x08) & ~(31 << 16) | 25 << 16)
-        self.board.write("TIM11", OR, 2)
-        self.board.write("TIM11", CCMR1, 1)
-        self.board.write("TIM11", CCER, 1)
-        self.board.write("TIM11", CR1, 1)
+        self.crystal_on_tim11(1)
         self.board.advance(10 * US)
         self.assertEqual(self.board.read("TIM11", SR) & 0x202, 0x202)
 

@@ -1,6 +1,7 @@
 //! The process of the model, which reads a JSON object per line and answers with one.
 
 use crate::recordings::workspace;
+use crate::wire::bytes;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -52,13 +53,7 @@ impl Drop for Link {
     }
 }
 
-pub fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
 /// Returns the bytes of hexadecimal digits from the model.
 pub fn unhex(digits: &Value) -> Vec<u8> {
-    let digits = digits.as_str().expect("the model gives digits");
-    let byte = |at| u8::from_str_radix(digits.get(at..at + 2).expect("two digits"), 16).expect("digits");
-    (0..digits.len()).step_by(2).map(byte).collect()
+    bytes(digits.as_str().expect("the model gives digits"))
 }

@@ -1,6 +1,6 @@
 //! Parses frames from the vehicle bus: wheel speeds, and our own messages as a receiver parses them.
 
-use super::{Seed, byte, take};
+use super::{byte, take};
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::bosch::Message;
@@ -84,26 +84,6 @@ pub fn wheels(mut data: &[u8]) {
     }
 }
 
-pub fn wheel_seeds() -> Vec<Seed> {
-    let frames = |choice: u8, kind: u8, content: [u8; 8]| {
-        let mut data = vec![choice];
-        for k in 0..4 {
-            data.extend([20, kind | k << 5]);
-            data.extend(content);
-        }
-        data
-    };
-    let standing = [0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F];
-    vec![
-        ("toyota", frames(0x80, 0x1E, standing)),
-        ("p01", frames(3, 0x1E, [0, 0, 0, 1, 0, 1, 0, 0])),
-        ("p02", frames(4, 0x1E, [0, 0, 0, 200, 0, 200, 0, 0])),
-        ("p05", frames(5, 0x1E, [0, 0, 0, 1, 0, 1, 0, 0])),
-        ("p11", frames(6, 0x1E, [0, 0, 0, 0, 0x80, 1, 0, 0])),
-        ("xor", frames(1, 0x1E, [1, 1, 0, 0, 0, 0, 0, 0])),
-    ]
-}
-
 /// Parses blocks of eight bytes and a last short one as every message type, and with the checks of every profile; the
 /// first three bytes select a signal's bit field in the block. A parsed message must be emitted as the same bytes.
 pub fn messages(mut data: &[u8]) {
@@ -138,22 +118,4 @@ pub fn messages(mut data: &[u8]) {
         assert!(AngleMessage::parse(block).map_or(true, |message| behind(message.emit())));
         assert!(DetailMessage::parse(block).map_or(true, |message| behind(message.emit())));
     }
-}
-
-pub fn message_seeds() -> Vec<Seed> {
-    let with = |place: [u8; 3], blocks: &[[u8; 8]]| [&place[..], &blocks.concat()].concat();
-    let tx1 = Message {
-        rate: 32_768,
-        rate_status: gyronet::can::bosch::SignalStatus::OK,
-        nibble: 0,
-        temperature: 125,
-        acceleration: 32_768,
-        acceleration_status: gyronet::can::bosch::SignalStatus::OK,
-        counter: 5,
-    };
-    let detail = DetailMessage { correction: -100, sigma: 300, latency: 140 };
-    vec![
-        ("intel", with([12, 16, 2], &[tx1.emit(), [0xFF; 8]])),
-        ("motorola", with([7, 16, 1], &[detail.emit(), tx1.emit(), tx1.emit()])),
-    ]
 }

@@ -1,9 +1,9 @@
 //! Tests the diagnostic server: any frames, at any times, on a board with or without flash.
 
 use super::records::SECTOR;
-use super::{Seed, byte, take};
+use super::{byte, take};
 use crate::noise::Noise;
-use crate::ram_flash::{self, RamFlash};
+use crate::ram_flash::RamFlash;
 use crate::synthetic::idling;
 use crate::synthetic::judged;
 use crate::tester::segment;
@@ -13,8 +13,7 @@ use gyronet::service::message::{AllCounters, Identity};
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::layout::RECORD_SECTOR;
 use gyronet::store::{FlashFault, FogPart, ImuPart, Record as _};
-use gyronet::uds::update::Head;
-use gyronet::uds::{Server, signature};
+use gyronet::uds::Server;
 
 const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
     imus: &[ImuPart::XsensMti],
@@ -97,54 +96,4 @@ fn give(bench: &mut Bench, functional: bool, frame: &[u8]) {
             }
         }
     }
-}
-
-pub fn seeds() -> Vec<Seed> {
-    let message = |request: &[u8]| [&[0, 1, request.len() as u8], request].concat();
-    let script = |choice: u8, requests: &[&[u8]]| {
-        let messages = requests.iter().flat_map(|request| message(request));
-        std::iter::once(choice).chain(messages).collect::<Vec<u8>>()
-    };
-    let block = [&[0x36, 1][..], &[0; 16]].concat();
-    let images = [signature::digest(&[0; 16]); 2];
-    let head = Head { label: ram_flash::FIRMWARE, downgrade: false, images }.bytes();
-    let head = [&[0x2E, 1, 0x1A][..], &head].concat();
-    vec![
-        (
-            "reads",
-            script(
-                0,
-                &[
-                    &[0x22, 1, 0, 0xF1, 0x89],
-                    &[0x22, 1, 2],
-                    &[0x19, 2, 0xFF],
-                    &[0x19, 0x0A],
-                    &[0x14, 255, 255, 255],
-                ],
-            ),
-        ),
-        ("sessions", script(0, &[&[0x10, 3], &[0x3E, 0], &[0x85, 2], &[0x11, 1]])),
-        ("download", script(7, &[&[0x10, 2], &[0x34, 0, 0x11, 0, 16], &block, &[0x37], &[0x31, 1, 0xFF, 1]])),
-        (
-            "update",
-            script(7, &[&[0x10, 2], &head, &[0x34, 0, 0x11, 2, 16], &block, &[0x37], &[0x31, 1, 0xFF, 1]]),
-        ),
-        ("routine", script(7, &[&[0x10, 3], &[0x31, 1, 2, 0], &[0x31, 3, 2, 0], &[0x31, 1, 2, 2]])),
-        (
-            "key",
-            script(
-                7,
-                &[
-                    &[0x10, 3],
-                    &[&[0x2E, 1, 0x10][..], &[0x66; 32]].concat(),
-                    &[0x10, 3],
-                    &[0x27, 1],
-                    &[&[0x27, 2][..], &[0; 64]].concat(),
-                    &[&[0x2E, 2, 4, 0, 0, 0, 0, 1, 0, 0, 0, 1][..], &[0; 64]].concat(),
-                    &[0x22, 1, 0x11],
-                ],
-            ),
-        ),
-        ("frames", vec![1, 0x28, 1, 0x10, 20, 0x22, 1, 0, 1, 1, 1, 0x28, 1, 0x21, 1, 2, 3, 4, 5, 6, 7]),
-    ]
 }

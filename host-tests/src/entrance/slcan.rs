@@ -1,17 +1,13 @@
 //! Tests SLCAN: a host's commands to the board, and the bytes that the monitor reads from a line or a log.
 
-use super::Seed;
-use crate::synthetic::{rate, vehicle};
 use embedded_can::{Frame, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::config::Config;
-use gyronet::can::encoder::CanEncoder;
 use gyronet::can::slcan::port::Port;
-use gyronet::can::slcan::{emit, emit_stamped, parse, parse_stamped};
-use gyronet::units::{Micros, Yaw};
+use gyronet::can::slcan::{emit, parse, parse_stamped};
+use gyronet::units::Micros;
 use gyronet_tools::client::monitor::Monitor;
 use gyronet_tools::client::monitor::line::{Splitter, parse_line};
-use gyronet_tools::drive::candump::Log;
 
 /// The answers of a board besides frames.
 const ANSWERS: [&[u8]; 3] = [b"", b"V0101", b"NGYRO"];
@@ -52,14 +48,6 @@ pub fn board(data: &[u8]) {
     }
 }
 
-pub fn board_seeds() -> Vec<Seed> {
-    vec![
-        ("python_can", b"C\rS6\r\rO\rt0AA81A6F1A6F1A6F1A6F\r".to_vec()),
-        ("stamps", b"Z1\rF\rV\rN\rT18FEBF0B21234\rZ0\r".to_vec()),
-        ("refused", b"S9\rt9FF0\rt0AA8zz\rtoo long a line for anybody to have reason to send it\r".to_vec()),
-    ]
-}
-
 /// Passes bytes to the monitor as from a serial line or a log. A parsed frame must survive emitting and parsing.
 pub fn host(data: &[u8]) {
     let mut splitter = Splitter::default();
@@ -76,21 +64,4 @@ pub fn host(data: &[u8]) {
     let state = &monitor.state;
     let values = [state.rate, state.yaw, state.correction, state.sigma, state.latency];
     assert!(values.into_iter().chain([monitor.drop_in]).flatten().all(f64::is_finite));
-}
-
-pub fn host_seeds() -> Vec<Seed> {
-    let mut encoder = CanEncoder::new(Config::DEFAULT);
-    let (mut plain, mut stamped, mut log) = (Vec::new(), Vec::new(), Vec::new());
-    let mut candump = Log::new(&mut log);
-    for tick in 0..2 {
-        let time = Micros(u64::from(tick) * 10_000);
-        let sample = vehicle(tick, rate(0.25), Yaw(i64::from(tick) << 20));
-        for frame in encoder.encode(&sample) {
-            plain.extend(emit(&frame).expect("a data frame"));
-            stamped.extend(emit_stamped(&frame, time).expect("a data frame"));
-            candump.frame(time, &frame).expect("a vector accepts everything");
-        }
-    }
-    candump.finish().expect("a vector accepts everything");
-    vec![("plain", plain), ("stamped", stamped), ("candump", log)]
 }

@@ -1,8 +1,8 @@
 //! Passes weight files of both networks to the checks of an upload.
 
-use super::{Seed, byte, take};
+use super::{byte, take};
 use crate::models;
-use gyronet::model::blob::{Blob, CRC, HEADER_LEN, Shape};
+use gyronet::model::blob::{Blob, CRC, Shape};
 use gyronet::model::fognet_blob::FogBlob;
 use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::model::{GyroNet, WindowNetwork, weights};
@@ -76,23 +76,4 @@ pub fn fognet(data: &[u8]) {
             }
         }
     }
-}
-
-pub fn seeds() -> Vec<Seed> {
-    let header = &weights::GYRONET.0[..HEADER_LEN];
-    let change = |at: usize, content: &[u8]| {
-        let [a, b, c, ..] = at.to_le_bytes();
-        [&[a, b, c, content.len() as u8], content].concat()
-    };
-    let one = |at, content: &[u8]| [&[1][..], &change(at, content)].concat();
-    vec![
-        ("header", [&[0][..], header].concat()),
-        ("untouched", vec![1]),
-        ("clamp", one(28, &[0xFF, 0x7F, 0, 0])),
-        ("topology", one(12, &[11, 0])),
-        ("weights", [one(2_000, &[0x7F; 8]), change(40_000, &[0x80; 8])].concat()),
-        ("provenance", one(84, &[0xFF, 0xFE])),
-        ("small", [&[3][..], &change(2_000, &[0x7F; 8]), &change(4_000, &[0x80; 8])].concat()),
-        ("linear", [&[3][..], &change(HEADER_LEN, &[0xFF, 0xFF, 0xFF, 0x7F, 0, 0, 0, 0x80])].concat()),
-    ]
 }

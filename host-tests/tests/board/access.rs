@@ -1,8 +1,8 @@
 //! Who may write, on the image as flashed: keys, signatures, and challenges of the chip's random numbers.
 
-use crate::common::{self, START};
+use crate::common::{self, START, id};
 use crate::service::{self, on_bus};
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::Frame;
 use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
 use gyronet_tools::client::device::Authority;
@@ -94,8 +94,4 @@ fn a_signature_is_checked_while_the_rates_go_out() {
     );
     assert!(took < Duration::from_secs(1), "{took:?}");
     assert!(gap < Duration::from_millis(15), "{gap:?}");
-}
-
-fn id(raw: u16) -> Id {
-    Id::Standard(StandardId::new(raw).expect("11 bits"))
 }

@@ -1,12 +1,14 @@
 //! CAN on the virtual board: what goes out is what the host makes, what comes in is heard, and a bus that is
 //! away gets nothing old when it is back.
 
-use crate::common::{self, SAMPLE, SET, SLCAN, START, boot, counters, drive, frames, host, resets};
+use crate::common::{
+    self, SAMPLE, SET, SLCAN, START, boot, counters, drive, faults, frames, host, id, resets,
+};
 use crate::service;
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::config::{BIT_RATES, Settings};
-use gyronet::can::yaw::{AngleMessage, RateMessage};
+use gyronet::can::yaw::RateMessage;
 use gyronet::health::{Faults, Quality};
 use gyronet::store::Configuration;
 use gyronet_host_tests::board::{Board, Event};
@@ -23,15 +25,6 @@ const MS: Duration = Duration::from_millis(1);
 const STALE: Duration = Duration::from_millis(25);
 const ANGLE: u16 = 0x1A1;
 
-fn id(id: u16) -> Id {
-    Id::Standard(StandardId::new(id).expect("11 bits"))
-}
-
-fn flags(frames: &[DataFrame]) -> Vec<Faults> {
-    let angles = frames.iter().filter(|frame| frame.id() == id(ANGLE));
-    angles.map(|frame| AngleMessage::parse(frame.data()).expect("eight bytes").faults).collect()
-}
-
 fn has(faults: Faults, fault: Faults) -> bool {
     faults.0 & fault.0 != 0
 }
@@ -44,7 +37,7 @@ fn stale(sent: &[(Duration, DataFrame)], made: &[DataFrame]) -> Vec<(Duration, u
     let newest = |time: Duration| ((sample(time) + 1) * SET).min(made.len());
     let fresh = |time: Duration, frame| made[oldest(time).min(newest(time))..newest(time)].contains(frame);
     sent.iter()
-        .filter(|(_, frame)| frame.id() != id(ANGLE) || !has(flags(&[*frame])[0], Faults::BUS))
+        .filter(|(_, frame)| frame.id() != id(ANGLE) || !has(faults(&[*frame])[0], Faults::BUS))
         .filter(|(time, frame)| !fresh(*time, frame))
         .map(|(time, frame)| (*time, made.iter().position(|made| made == frame).unwrap_or(usize::MAX)))
         .collect()
@@ -160,7 +153,7 @@ fn every_bit_rate_is_the_configured_one() {
             };
             // The host has no wheels, which the angle message reports.
             assert!(own(&sent) == own(&made[..sent.len()]), "{bits_per_second}");
-            let missed = flags(&sent).iter().filter(|faults| has(**faults, Faults::WHEELS)).count();
+            let missed = faults(&sent).iter().filter(|faults| has(**faults, Faults::WHEELS)).count();
             assert!(missed < 3, "{missed} sets without wheels at {bits_per_second}");
         }
     }
@@ -208,13 +201,13 @@ fn wheel_frames_come_in_through_the_filters_and_none_is_lost_at_the_start() {
     let counters = counters(&mut board);
     assert_eq!((counters.lines.frames_lost, counters.lines.unsent), (0, 0));
     let sent = frames(&board.can_frames());
-    let faults = flags(&sent);
-    assert!(!has(faults[0], Faults::BUS), "the first 0x1A1 reports a bus without faults");
-    let silent = faults.iter().filter(|faults| has(**faults, Faults::WHEELS)).count();
+    let known = faults(&sent);
+    assert!(!has(known[0], Faults::BUS), "the first 0x1A1 reports a bus without faults");
+    let silent = known.iter().filter(|faults| has(**faults, Faults::WHEELS)).count();
     board.run(Duration::from_millis(500));
-    let later = flags(&frames(&board.can_frames()));
-    println!("wheels: {} of {} sets without wheels; then {}", silent, faults.len(), later.len());
-    assert!(silent < 3, "{silent} of {} sets miss the wheels", faults.len());
+    let later = faults(&frames(&board.can_frames()));
+    println!("wheels: {} of {} sets without wheels; then {}", silent, known.len(), later.len());
+    assert!(silent < 3, "{silent} of {} sets miss the wheels", known.len());
 }
 
 /// The status byte that SLCAN answers to `F`.
@@ -260,7 +253,7 @@ fn no_acknowledgement_for_a_while() {
     assert!(frames(&run.before)[..] == run.made[..run.before.len()]);
     assert_eq!(run.during.len(), 0, "nothing is acknowledged");
     assert_eq!(stale(&run.after, &run.made), [], "nothing old goes out");
-    let faults = flags(&frames(&run.after));
+    let faults = faults(&frames(&run.after));
     assert!(has(faults[0], Faults::BUS), "the first angle message reports frames that were dropped");
     assert!(!has(faults[faults.len() - 1], Faults::BUS), "and the last one of a bus in order");
     let mut board = run.board;
@@ -319,7 +312,7 @@ fn bus_off_again_and_again() {
         assert!((*back - *off).abs_diff(returns_after(10 * MS * (1 << k))) < MS, "{:?}", *back - *off);
     }
     assert_eq!(stale(&run.after, &run.made), []);
-    assert!(has(flags(&frames(&run.after))[0], Faults::BUS));
+    assert!(has(faults(&frames(&run.after))[0], Faults::BUS));
     assert!(run.after[0].0 - back[5] < SAMPLE + 2 * MS, "{:?}", run.after[0].0 - back[5]);
 }
 
@@ -330,7 +323,7 @@ fn babbling_bus() {
     let Some(run) = disturbed("babbling_bus", lasts, set, false.into()) else { return };
     assert_eq!(run.during.len(), 0, "the other node always wins");
     assert_eq!(stale(&run.after, &run.made), []);
-    assert!(has(flags(&frames(&run.after))[0], Faults::BUS));
+    assert!(has(faults(&frames(&run.after))[0], Faults::BUS));
     let last = frames(&run.after);
     assert!(
         last.len() > 90 * SET && last.ends_with(&run.made[run.made.len() - SET..][..SET])

@@ -1,10 +1,13 @@
 //! The board of these tests: an MTi on USART1, SLCAN on USART2 at 921600, the service line on USART6, CAN.
 
 use crate::service;
+use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::yaw::AngleMessage;
 use gyronet::can::{DataFrame, slcan};
+use gyronet::health::Faults;
 use gyronet::service::message::{AllCounters, Info};
 use gyronet_host_tests::board::{self, Board};
-use gyronet_host_tests::replay;
+use gyronet_host_tests::{inputs, replay};
 use gyronet_tools::bundled;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -59,6 +62,25 @@ pub fn host(samples: &[Vec<u8>]) -> Vec<DataFrame> {
 
 pub fn frames(timed: &[(Duration, DataFrame)]) -> Vec<DataFrame> {
     timed.iter().map(|(_, frame)| *frame).collect()
+}
+
+pub fn id(raw: u16) -> Id {
+    Id::Standard(StandardId::new(raw).expect("11 bits"))
+}
+
+/// Faults of the angle messages.
+pub fn faults(frames: &[DataFrame]) -> Vec<Faults> {
+    let angles = frames.iter().filter(|frame| frame.id() == id(0x1A1));
+    angles.map(|frame| AngleMessage::parse(frame.data()).expect("eight bytes").faults).collect()
+}
+
+/// A vehicle that stands, with its wheels and all that the board computes, from now on.
+pub fn stand(board: &mut Board, samples: u32) {
+    let now = board.counts().time;
+    for k in 0..samples {
+        board.send_at(IMU, &replay::turning(k as usize, 0.001), now + SAMPLE * k);
+        board.can_send_at(&inputs::wheels(0.0), now + SAMPLE * k);
+    }
 }
 
 pub fn info(board: &mut Board) -> Info {

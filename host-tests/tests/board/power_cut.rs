@@ -12,7 +12,7 @@ use gyronet::store::layout::{FLASH_BASE, SLOTS, STORE};
 use gyronet::store::slots::WeightSource;
 use gyronet::store::{Calibration, Configuration, Level, Mounting, Slot};
 use gyronet_host_tests::board::{At, Board};
-use gyronet_host_tests::stored::{Stored, other_weights};
+use gyronet_host_tests::stored::{Stored, crc, other_weights};
 use std::collections::HashSet;
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
@@ -39,10 +39,6 @@ fn configuration(k: usize) -> Configuration {
 
 fn calibration() -> Calibration {
     Calibration { level: Some(Level { roll_deg: 1.5, pitch_deg: -2.0 }), ..Calibration::default() }
-}
-
-fn crc(file: &[u8]) -> u32 {
-    u32::from_le_bytes(*file.last_chunk().expect("a checksum"))
 }
 
 /// A board with accepted weights in slot A, a calibration, and so many configurations in its records, the last one in

@@ -10,7 +10,7 @@ use gyronet::store::slots::WeightSource;
 use gyronet::store::{Configuration, Slot};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::replay;
-use gyronet_host_tests::stored::other_weights;
+use gyronet_host_tests::stored::{crc, other_weights};
 use gyronet_tools::client::device::Authority;
 use gyronet_tools::client::device::upload::{Uploaded, upload};
 use gyronet_tools::signing::PrivateKey;
@@ -172,7 +172,7 @@ fn uploaded_weights_run_from_their_slot() {
     let Some(mut board) = common::boot(TEST) else { return };
     board.run(START);
     let file = other_weights(1);
-    let crc = u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
+    let crc = crc(&file);
     let key = PrivateKey::generate().expect("random numbers");
     on_bus(&mut board).set_key(&key.public()).expect("there was none");
     let (done, took) = timed(&mut board, |board| {

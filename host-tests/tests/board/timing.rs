@@ -1,16 +1,16 @@
 //! Times of diagnosis on the virtual board's bus, with all messages of the board beside it:
 //! `cargo test --test board -- timing --nocapture` prints them.
 
-use crate::common::{self, SAMPLE, START, drive};
+use crate::common::{self, SAMPLE, START, drive, id, stand};
 use crate::service;
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
 use gyronet::store::Configuration;
 use gyronet::uds::data::{Access, IDENTIFIERS};
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::stored::other_weights;
-use gyronet_host_tests::tester::{bytes, frame, segment};
-use gyronet_host_tests::{inputs, replay};
+use gyronet_host_tests::tester::{frame, segment};
+use gyronet_host_tests::wire::bytes;
 use std::time::Duration;
 
 const MS: Duration = Duration::from_millis(1);
@@ -28,17 +28,7 @@ fn raw(frame: &DataFrame) -> u16 {
 }
 
 fn tester(board: &mut Board, data: &[u8]) {
-    let id = StandardId::new(0x7E0).expect("11 bits");
-    board.can_send(&DataFrame::new(id, &frame(data, &[])).expect("eight bytes"));
-}
-
-/// A vehicle that stands, with its wheels and all that the board computes, from now on.
-fn stand(board: &mut Board, samples: usize) {
-    let now = board.counts().time;
-    for k in 0..samples {
-        board.send_at(common::IMU, &replay::turning(k, 0.001), now + SAMPLE * k as u32);
-        board.can_send_at(&inputs::wheels(0.0), now + SAMPLE * k as u32);
-    }
+    board.can_send(&DataFrame::new(id(0x7E0), &frame(data, &[])).expect("eight bytes"));
 }
 
 /// A response, and the time from the end of the request on the bus to the begin of the first response to it.

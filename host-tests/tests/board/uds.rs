@@ -9,7 +9,8 @@ use gyronet::store::{Configuration, Record};
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::stored::other_weights;
-use gyronet_host_tests::tester::{Tester, bytes};
+use gyronet_host_tests::tester::Tester;
+use gyronet_host_tests::wire::bytes;
 use gyronet_host_tests::{image, require};
 use gyronet_tools::client::device::requests::FIRMWARE;
 use gyronet_tools::client::device::update::Update;
@@ -117,7 +118,7 @@ fn diagnosis_with_29_bits_is_configured_over_itself() {
 #[test]
 fn udsoncan_reads_writes_downloads_and_updates() {
     const TEST: &str = "udsoncan_reads_writes_downloads_and_updates";
-    let Some(python) = require::python(TEST, &["can", "isotp", "udsoncan", "yaml"]) else { return };
+    let Some(python) = require::python(TEST, &["isotp", "udsoncan", "yaml"]) else { return };
     let (Some(whole), Some(mut board)) =
         (image::update(TEST, env!("CARGO_TARGET_TMPDIR")), common::boot(TEST))
     else {
@@ -140,7 +141,6 @@ fn udsoncan_reads_writes_downloads_and_updates() {
     std::fs::write(file.with_extension("bin.json"), keys.to_string()).expect("there is room");
     let mut client = Command::new(python)
         .arg(workspace().join("host-tests/tests/clients/uds_client.py"))
-        .arg("pipes")
         .arg(&file)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

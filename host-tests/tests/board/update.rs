@@ -1,9 +1,9 @@
 //! Firmware updates with the images as they are flashed: boot loader, download over CAN, trial, confirmation, and the way
 //! back from images that are bad.
 
-use crate::common::{self, IMU, SAMPLE, START, resets};
+use crate::common::{self, START, id, resets, stand};
 use crate::service::{self, on_bus, on_line};
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::Frame;
 use gyronet::can::DataFrame;
 use gyronet::can::yaw::{Quality, RateMessage};
 use gyronet::model::blob::CRC;
@@ -12,7 +12,7 @@ use gyronet::store::firmware::{MAX_IMAGE, Trailer};
 use gyronet::store::layout::FLASH_BASE;
 use gyronet::store::{Configuration, Slot};
 use gyronet_host_tests::board::{At, Board, CanBus, Seen};
-use gyronet_host_tests::{image, inputs, replay};
+use gyronet_host_tests::image;
 use gyronet_tools::client::bus::Bus;
 use gyronet_tools::client::device::update::{Update, update};
 use gyronet_tools::client::device::{Authority, Device};
@@ -40,15 +40,6 @@ fn firmware(board: &mut Board) -> (Option<Slot>, FirmwareState) {
 
 fn address(slot: Slot) -> u32 {
     FLASH_BASE + slot.firmware().start
-}
-
-/// A vehicle that stands, with its wheels, from now on.
-fn stand(board: &mut Board, seconds: u32) {
-    let now = board.counts().time;
-    for k in 0..seconds * 100 {
-        board.send_at(IMU, &replay::turning(k as usize, 0.001), now + SAMPLE * k);
-        board.can_send_at(&inputs::wheels(0.0), now + SAMPLE * k);
-    }
 }
 
 /// A tester on CAN that also keeps what it sees.
@@ -83,7 +74,7 @@ fn the_whole_image_is_updated_over_can_while_rates_are_sent() {
     on_bus(&mut board).set_key(&key.public()).expect("there was none");
     on_bus(&mut board).authorise(Authority::None);
     assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::Confirmed));
-    stand(&mut board, 60);
+    stand(&mut board, 6_000);
     board.run(6 * S);
     let _ = (board.events(), board.can_frames());
     let (begin, mut log, mut at) = (board.counts().time, Vec::new(), 0);
@@ -96,7 +87,7 @@ fn the_whole_image_is_updated_over_can_while_rates_are_sent() {
     assert_eq!(slot, Slot::B);
     let size = update_file.images[1].len();
     // No rate is missing but where the board erases, which it announces.
-    let rate = Id::from(StandardId::new(RATE).expect("11 bits"));
+    let rate = id(RATE);
     let rates: Vec<_> = log.iter().filter(|(_, frame)| frame.id() == rate).collect();
     let gaps: Vec<_> = rates.windows(2).filter(|pair| pair[1].0 - pair[0].0 > 15 * MS).collect();
     println!(
@@ -261,7 +252,7 @@ fn an_image_that_lacks_the_sensor_is_rolled_back_after_its_trial() {
     };
     let Some(mut board) = try_on(TEST, SENSOR | CAN, spoil) else { return };
     let _ = board.events();
-    stand(&mut board, 62);
+    stand(&mut board, 6_200);
     board.run(TRIAL - BACK);
     assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::OnTrial));
     board.run(2 * BACK);

@@ -1,9 +1,8 @@
 //! Wheel frames of another maker: from a settings file to the record in the board's flash, and on the bus.
 
-use crate::common::{self, SAMPLE, START, drive, frames};
+use crate::common::{self, SAMPLE, START, drive, faults, frames, id};
 use crate::service;
-use embedded_can::{ExtendedId, Frame, Id, StandardId};
-use gyronet::can::yaw::AngleMessage;
+use embedded_can::{ExtendedId, Frame, Id};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::health::Faults;
 use gyronet::store::Configuration;
@@ -47,15 +46,6 @@ fn settings() -> gyronet::can::wheel::WheelSettings {
     WheelFile::parse("wheels.toml", SETTINGS).and_then(|file| file.settings("wheels.toml")).expect("settings")
 }
 
-fn faults(board: &mut Board) -> Vec<Faults> {
-    let sent = frames(&board.can_frames());
-    let angles = sent.iter().filter_map(|frame| {
-        let is_angle = matches!(frame.id(), Id::Standard(id) if id.as_raw() == 0x1A1);
-        is_angle.then(|| AngleMessage::parse(frame.data()).expect("eight bytes").faults)
-    });
-    angles.collect()
-}
-
 #[test]
 fn another_maker_s_frames_are_understood_without_a_new_image() {
     const TEST: &str = "another_maker_s_frames_are_understood_without_a_new_image";
@@ -74,7 +64,7 @@ fn another_maker_s_frames_are_understood_without_a_new_image() {
         }
         board.run(SAMPLE);
     }
-    let known = faults(&mut board);
+    let known = faults(&frames(&board.can_frames()));
     let without = known.iter().filter(|faults| faults.0 & Faults::WHEELS.0 != 0).count();
     let stored = known.iter().filter(|faults| faults.0 & Faults::STORED.0 != 0).count();
     println!("{} sets, {without} without wheels", known.len());
@@ -94,7 +84,7 @@ fn another_maker_s_frames_are_understood_without_a_new_image() {
         }
         board.run(SAMPLE);
     }
-    let silent = faults(&mut board);
+    let silent = faults(&frames(&board.can_frames()));
     let without = silent.iter().filter(|faults| faults.0 & Faults::WHEELS.0 != 0).count();
     assert!(without > 10, "{without} of {} sets report the wheels", silent.len());
     assert_eq!(common::counters(&mut board).inputs.wheel_errors, 60);
@@ -106,8 +96,7 @@ fn wheel_frames_over_slcan_are_used_on_a_bench_alone() {
     const TEST: &str = "wheel_frames_over_slcan_are_used_on_a_bench_alone";
     let Some(mut board) = common::boot(TEST) else { return };
     board.run(START);
-    let damaged =
-        DataFrame::new(Id::Standard(StandardId::new(0xAA).expect("11 bits")), &[1; 7]).expect("a frame");
+    let damaged = DataFrame::new(id(0xAA), &[1; 7]).expect("a frame");
     let refused = |board: &mut Board| {
         board.send(common::SLCAN, b"O\r");
         for _ in 0..3 {

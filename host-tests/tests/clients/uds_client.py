@@ -1,8 +1,7 @@
 """Diagnoses the board with udsoncan over can-isotp, as they are published.
 
-`uds_client.py socketcan vcan0` reads over an interface of Linux. `uds_client.py pipes WEIGHTS` reads and writes over a bus that is two
-pipes, with the key and signatures in WEIGHTS.json and
-an update in WEIGHTS.update: each line "turn ID#DATA ..." that goes out carries the frames of a millisecond, and the line that
+`uds_client.py WEIGHTS` reads and writes over a bus that is two pipes, with the key and signatures in WEIGHTS.json and an
+update in WEIGHTS.update: each line "turn ID#DATA ..." that goes out carries the frames of a millisecond, and the line that
 comes back the server's frames. Both packages run with their default settings, and their clock counts these turns.
 """
 
@@ -12,12 +11,11 @@ import sys
 import time
 from pathlib import Path
 
-import can
 import isotp
 import udsoncan
 import yaml
 from udsoncan.client import Client
-from udsoncan.connections import BaseConnection, PythonIsoTpConnection
+from udsoncan.connections import BaseConnection
 from udsoncan.exceptions import NegativeResponseException, TimeoutException
 from udsoncan.services import ControlDTCSetting, DiagnosticSessionControl, ECUReset
 
@@ -197,22 +195,12 @@ def update(client, pipes, file, signature):
 
 
 def main():
-    line, name = sys.argv[1:]
-    if line == "pipes":
-        pipes = Pipes()
-        with Client(pipes, config=CONFIG) as client:
-            signed = json.loads(Path(name + ".json").read_text())
-            write(client, pipes, Path(name).read_bytes(), signed)
-            update(client, pipes, Path(name + ".update").read_bytes(), bytes.fromhex(signed["update"]))
-    else:
-        bus = can.Bus(interface=line, channel=name, bitrate=500_000)
-        notifier = can.Notifier(bus, [])
-        address = isotp.Address(isotp.AddressingMode.Normal_11bits, txid=SERVER, rxid=RESPONSE)
-        stack = isotp.NotifierBasedCanStack(bus=bus, notifier=notifier, address=address, params={"tx_padding": 0xAA})
-        with Client(PythonIsoTpConnection(stack), config=CONFIG) as client:
-            examine(client)
-        notifier.stop()
-        bus.shutdown()
+    name = sys.argv[1]
+    pipes = Pipes()
+    with Client(pipes, config=CONFIG) as client:
+        signed = json.loads(Path(name + ".json").read_text())
+        write(client, pipes, Path(name).read_bytes(), signed)
+        update(client, pipes, Path(name + ".update").read_bytes(), bytes.fromhex(signed["update"]))
     print("done")
 
 

@@ -48,15 +48,6 @@ fn errors_stay_below_their_documented_bounds() {
 }
 
 #[test]
-fn zero_and_the_ends_are_right_to_two_lsb() {
-    let q15 = |word: i32| word >> 16;
-    assert!((q15(activation::sigmoid(0)) - 16_384).abs() <= 1, "{}", q15(activation::sigmoid(0)));
-    assert!(q15(activation::tanh(0)).abs() <= 1, "{}", q15(activation::tanh(0)));
-    assert!(q15(activation::tanh(MAX)) >= 32_766 && q15(activation::tanh(MIN)) <= -32_766);
-    assert!(q15(activation::sigmoid(MIN)) >= 0 && q15(activation::sigmoid(MAX)) >= 32_755);
-}
-
-#[test]
 fn inputs_beyond_the_table_saturate() {
     for (x, y) in
         [(MAX, MAX), (MAX + 1, MAX), (i32::MAX, MAX), (MIN, MIN), (MIN - 1, MIN), (i32::MIN, MIN), (5, 5)]

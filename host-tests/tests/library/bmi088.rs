@@ -1,13 +1,11 @@
-//! BMI088: frames, the driver on a mocked bus, and its two clocks on a simulated one.
+//! BMI088: frames, and the driver and its two clocks on a simulated bus.
 
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
-use embedded_hal_mock::eh1::delay::NoopDelay;
-use embedded_hal_mock::eh1::spi::{Mock, Transaction};
 use gyronet::sample::{ImuSample, Validity};
-use gyronet::sensor::Source;
 use gyronet::sensor::bmi088::frame::{self, State};
 use gyronet::sensor::bmi088::{Bmi088, Bmi088Error, CHECKS, Die, OLDEST};
 use gyronet::units::{CentiCelsius, Micros};
+use gyronet_host_tests::situations::parts::icm42688::NoDelay;
 use std::cell::RefCell;
 use std::convert::Infallible;
 use std::rc::Rc;
@@ -25,6 +23,9 @@ const FORCE: [u8; 7] = [0x84, 0, 0, 0xFC, 0xFF, 0xAB, 0x0A];
 #[test]
 fn frames_are_read_as_the_data_sheet_says() {
     assert_eq!(frame::vector(&RATE), [0, -2, 1311]);
+    let sample = frame::sample(Micros(7), [0, -4, 2731], [0, -2, 1311], None).expect("in range");
+    assert!((sample.angular_rate[2].rad_per_sec().to_degrees() - 1311.0 / 131.072).abs() < 1e-5);
+    assert!((sample.specific_force[2].metre_per_sec2() - 9.806_65 * 2731.0 * 12.0 / 32_768.0).abs() < 1e-5);
     for (header, is_read) in [
         (0x84, true),
         (0x87, true),
@@ -75,91 +76,8 @@ fn either_end_of_the_range_is_saturation() {
     }
 }
 
-/// What the two chip selects see.
-#[derive(Default)]
-struct Buses([Vec<Transaction<u8>>; 2]);
-
 const ACC: usize = 0;
 const GYRO: usize = 1;
-
-impl Buses {
-    fn write(&mut self, die: usize, address: u8, value: u8) {
-        let seen = &mut self.0[die];
-        seen.push(Transaction::transaction_start());
-        seen.push(Transaction::write_vec(vec![address, value]));
-        seen.push(Transaction::transaction_end());
-    }
-
-    /// The accelerometer sends one byte before the value.
-    fn read(&mut self, die: usize, address: u8, values: &[u8]) {
-        let command = if die == ACC { vec![address | 0x80, 0] } else { vec![address | 0x80] };
-        let seen = &mut self.0[die];
-        seen.push(Transaction::transaction_start());
-        seen.push(Transaction::write_vec(command));
-        seen.push(Transaction::read_vec(values.to_vec()));
-        seen.push(Transaction::transaction_end());
-    }
-
-    fn reset(&mut self, identities: [u8; 2]) {
-        self.read(ACC, 0x00, &[0]);
-        self.write(ACC, 0x7E, 0xB6);
-        self.write(GYRO, 0x14, 0xB6);
-        self.read(ACC, 0x00, &[0]);
-        self.read(ACC, 0x00, &[identities[ACC]]);
-        if identities[ACC] == 0x1E {
-            self.read(GYRO, 0x00, &[identities[GYRO]]);
-        }
-    }
-
-    fn power(&mut self) {
-        self.write(ACC, 0x7C, 0);
-        self.write(ACC, 0x7D, 4);
-    }
-
-    fn test_gyro(&mut self, result: &[u8]) {
-        self.write(GYRO, 0x3C, 0x01);
-        result.iter().for_each(|result| self.read(GYRO, 0x3C, &[*result]));
-    }
-
-    /// Both readings are counts at 24 g, 1365 per g.
-    fn test_accelerometer(&mut self, [up, down]: [[i16; 3]; 2]) {
-        let bytes = |axes: [i16; 3]| axes.map(i16::to_le_bytes).concat();
-        self.write(ACC, 0x41, 3);
-        self.write(ACC, 0x40, 0xAC);
-        self.write(ACC, 0x6D, 0x0D);
-        self.read(ACC, 0x12, &bytes(up));
-        self.write(ACC, 0x6D, 0x09);
-        self.read(ACC, 0x12, &bytes(down));
-        self.write(ACC, 0x6D, 0);
-    }
-
-    fn configure(&mut self) {
-        REGISTERS.iter().for_each(|(die, address, value)| self.write(*die, *address, *value));
-        REGISTERS.iter().for_each(|(die, address, value)| self.read(*die, *address, &[*value]));
-        self.read(GYRO, 0x3C, &[0x10]);
-        self.write(GYRO, 0x3E, 0x40);
-        self.read(ACC, 0x18, &state(0));
-    }
-
-    /// The driver checks the setting of this number and reads the fill of the gyro's FIFO.
-    fn poll(&mut self, setting: usize, status: u8) {
-        let (die, address, value) = REGISTERS[setting];
-        self.read(die, address, &[value]);
-        self.read(GYRO, 0x0E, &[status]);
-    }
-
-    fn mocks(&self) -> [Mock<u8>; 2] {
-        self.0.each_ref().map(Mock::new)
-    }
-
-    /// Starts the driver, which must do all that is expected.
-    fn start(&self, self_test: bool) -> Result<(), Bmi088Error<embedded_hal::spi::ErrorKind>> {
-        let mut mocks = self.mocks();
-        let started = Bmi088::new(mocks.clone(), self_test, &mut NoopDelay::new());
-        mocks.iter_mut().for_each(Mock::done);
-        started.map(drop)
-    }
-}
 
 /// Die, address, value; written from the data sheet, not from the driver's constants.
 const REGISTERS: [(usize, u8, u8); CHECKS - 1] = [
@@ -176,110 +94,57 @@ const REGISTERS: [(usize, u8, u8); CHECKS - 1] = [
 ];
 
 #[test]
-fn the_driver_tests_configures_and_reads() {
-    let mut bus = Buses::default();
-    bus.reset([0x1E, 0x0F]);
-    bus.power();
-    bus.test_gyro(&[0, 0x12]);
-    bus.test_accelerometer([[700, 700, 1700], [-700, -700, 1000]]);
-    bus.configure();
-    // Nothing waits; one frame each.
-    bus.poll(0, 0);
-    bus.poll(1, 1);
-    bus.read(ACC, 0x18, &state(7));
-    bus.read(GYRO, 0x3F, &RATE);
-    bus.read(ACC, 0x26, &FORCE);
-    // Five rates and no acceleration: the last one serves for four.
-    for n in 0..=OLDEST {
-        bus.poll(2 + usize::from(n), 1);
-        bus.read(ACC, 0x18, &state(0));
-        bus.read(GYRO, 0x3F, &RATE);
-    }
-    // The FIFO overflows and is emptied; a quarter of a second later, by the accelerometer, a frame comes.
-    bus.poll(7, 0xE4);
-    bus.write(ACC, 0x7E, 0xB0);
-    bus.write(GYRO, 0x3E, 0x40);
-    bus.poll(8, 1);
-    let mut later = state(7);
-    later[1] += 25;
-    bus.read(ACC, 0x18, &later);
-    bus.read(GYRO, 0x3F, &RATE);
-    bus.read(ACC, 0x26, &FORCE);
-    // The gyro was reset.
-    bus.read(GYRO, 0x3E, &[0]);
-    // Its drive is not in order.
-    bus.read(GYRO, 0x3C, &[0x02]);
-    let mut mocks = bus.mocks();
-    let mut part = Bmi088::new(mocks.clone(), true, &mut NoopDelay::new()).expect("a good part");
-    assert_eq!(part.next_sample(), Ok(None));
-    let sample = Source::next_sample(&mut part).expect("one waits").expect("good");
-    assert!((sample.angular_rate[2].rad_per_sec().to_degrees() - 1311.0 / 131.072).abs() < 1e-5);
-    assert!((sample.specific_force[2].metre_per_sec2() - 9.806_65 * 2731.0 * 12.0 / 32_768.0).abs() < 1e-5);
-    assert_eq!((sample.time, sample.temperature), (Micros(5_000), Some(CentiCelsius(2_337))));
-    assert_eq!(sample.validity, Validity::Good);
-    for n in 0..u64::from(OLDEST) {
-        assert_eq!(part.next_sample().expect("good").expect("one waits").time, Micros(5_000 * (n + 2)));
-    }
-    assert_eq!(part.next_sample(), Err(Bmi088Error::NoReading));
-    assert_eq!(part.next_sample(), Err(Bmi088Error::Overflow));
-    // 25 x 256 counts are 50 periods after the last frame that was read alone, the sixth.
-    assert_eq!(part.next_sample().expect("good").expect("one waits").time, Micros(5_000 * 56));
-    let changed = Bmi088Error::Setting { die: Die::Gyro, address: 0x3E, got: 0, expected: 0x40 };
-    assert_eq!(part.next_sample(), Err(changed));
-    assert_eq!(part.next_sample(), Err(Bmi088Error::SelfTest { die: Die::Gyro }));
-    drop(part);
-    mocks.iter_mut().for_each(Mock::done);
-}
-
-#[test]
 fn another_part_or_none_is_named() {
     // A BMI085, nothing (high), nothing (low), no gyro.
-    for identities in [[0x1F, 0x0F], [0xFF; 2], [0x00; 2], [0x1E, 0xFF]] {
-        let mut bus = Buses::default();
-        bus.reset(identities);
-        let [accelerometer, gyro] = identities;
+    for [accelerometer, gyro] in [[0x1F, 0x0F], [0xFF; 2], [0x00; 2], [0x1E, 0xFF]] {
+        let dies = Dies::new([0.0; 2]);
+        dies.borrow_mut().held = vec![(ACC, 0, accelerometer), (GYRO, 0, gyro)];
         let (die, got) =
             if accelerometer == 0x1E { (Die::Gyro, gyro) } else { (Die::Accelerometer, accelerometer) };
-        assert_eq!(bus.start(true), Err(Bmi088Error::Identity { die, got }));
+        assert_eq!(start(&dies, true).err(), Some(Bmi088Error::Identity { die, got }));
     }
 }
 
 #[test]
 fn a_failed_self_test_is_named() {
+    let failed = |die| Some(Bmi088Error::SelfTest { die });
+    let dies = Dies::new([0.0; 2]);
+    assert_eq!(start(&dies, true).err(), None);
     // The gyro fails, its drive is not in order, its test never ends.
-    for gyro in [&[0x16][..], &[0x02], &[0; 100]] {
-        let mut bus = Buses::default();
-        bus.reset([0x1E, 0x0F]);
-        bus.power();
-        bus.test_gyro(gyro);
-        assert_eq!(bus.start(true), Err(Bmi088Error::SelfTest { die: Die::Gyro }));
+    for gyro in [0x16, 0x02, 0] {
+        dies.borrow_mut().held = vec![(GYRO, 0x3C, gyro)];
+        assert_eq!(start(&dies, true).err(), failed(Die::Gyro));
     }
+    dies.borrow_mut().held.clear();
     // y and z move too little, all move the wrong way.
     for deflected in [
         [[683, 682, 1366], [-683, -683, 0]],
         [[683, 683, 1365], [-683, -683, 683]],
         [[-683, -683, -683], [683, 683, 683]],
     ] {
-        let mut bus = Buses::default();
-        bus.reset([0x1E, 0x0F]);
-        bus.power();
-        bus.test_gyro(&[0x12]);
-        bus.test_accelerometer(deflected);
-        assert_eq!(bus.start(true), Err(Bmi088Error::SelfTest { die: Die::Accelerometer }));
+        dies.borrow_mut().deflected = deflected;
+        assert_eq!(start(&dies, true).err(), failed(Die::Accelerometer));
     }
 }
 
+/// At the start and later.
 #[test]
-fn a_setting_that_does_not_read_back_is_refused() {
-    let mut bus = Buses::default();
-    bus.reset([0x1E, 0x0F]);
-    bus.power();
-    REGISTERS.iter().for_each(|(die, address, value)| bus.write(*die, *address, *value));
-    bus.read(ACC, 0x7C, &[0]);
-    bus.read(ACC, 0x7D, &[4]);
-    bus.read(ACC, 0x40, &[0xA8]);
-    let refused = Bmi088Error::Setting { die: Die::Accelerometer, address: 0x40, got: 0xA8, expected: 0x89 };
-    assert_eq!(bus.start(false), Err(refused));
+fn a_setting_that_does_not_read_back_and_a_drive_that_fails_are_named() {
+    let dies = Dies::new([0.0; 2]);
+    let mut part = start(&dies, false).expect("a good part");
+    assert_eq!([(ACC, 0x7E), (GYRO, 0x14)].map(|(die, at)| dies.borrow().registers[die][at]), [0xB6; 2]);
+    for (die, address, expected) in REGISTERS {
+        assert_eq!(dies.borrow().registers[die][usize::from(address)], expected);
+        let got = expected ^ 0x21;
+        dies.borrow_mut().held = vec![(die, address, got)];
+        let die = if die == ACC { Die::Accelerometer } else { Die::Gyro };
+        let changed = Some(Bmi088Error::Setting { die, address, got, expected });
+        assert_eq!((0..CHECKS).find_map(|_| part.next_sample().err()), changed);
+        assert_eq!(start(&dies, false).err(), changed);
+    }
+    dies.borrow_mut().held = vec![(GYRO, 0x3C, 0x02)];
+    let failed = Some(Bmi088Error::SelfTest { die: Die::Gyro });
+    assert_eq!((0..CHECKS).find_map(|_| part.next_sample().err()), failed);
 }
 
 /// A reading is the true time of its frame in units of 100 us, modulo this.
@@ -296,13 +161,25 @@ struct Dies {
     /// The accelerometer misses what would empty its FIFO.
     is_deaf: bool,
     registers: [[u8; 128]; 2],
+    /// Registers that answer this, whatever is written.
+    held: Vec<(usize, u8, u8)>,
+    /// What the accelerometer reads in its self-test, counts at 24 g, 1365 per g.
+    deflected: [[i16; 3]; 2],
 }
 
 impl Dies {
-    fn new(fast: [f64; 2]) -> Self {
-        let period_us = fast.map(|fast| 5_000.0 / (1.0 + fast));
-        let ([made, read], registers) = ([[0; 2]; 2], [[0; 128]; 2]);
-        Self { now_us: 0.0, period_us, made, read, overrun: false, is_deaf: false, registers }
+    fn new(fast: [f64; 2]) -> Rc<RefCell<Self>> {
+        Rc::new(RefCell::new(Self {
+            now_us: 0.0,
+            period_us: fast.map(|fast| 5_000.0 / (1.0 + fast)),
+            made: [0; 2],
+            read: [0; 2],
+            overrun: false,
+            is_deaf: false,
+            registers: [[0; 128]; 2],
+            held: Vec::new(),
+            deflected: [[683, 683, 1366], [-683, -683, 683]],
+        }))
     }
 
     fn run_until(&mut self, now_us: f64) {
@@ -324,6 +201,9 @@ impl Dies {
     }
 
     fn answer(&mut self, die: usize, address: u8, to: &mut [u8]) {
+        if let Some((.., held)) = self.held.iter().find(|(of, at, _)| (*of, *at) == (die, address)) {
+            return to.fill(*held);
+        }
         match (die, address) {
             (_, 0x00) => to.fill([0x1E, 0x0F][die]),
             (GYRO, 0x0E) => {
@@ -340,7 +220,13 @@ impl Dies {
                 to[0] = 0x84;
                 to[1..].copy_from_slice(&self.reading(ACC));
             }
-            (GYRO, 0x3C) => to.fill(0x10),
+            (GYRO, 0x3C) => to.fill(if self.registers[GYRO][0x3C] == 1 { 0x12 } else { 0x10 }),
+            (ACC, 0x12) => {
+                assert_eq!([0x40, 0x41].map(|at| self.registers[ACC][at]), [0xAC, 3]);
+                let ways = [0x0D, 0x09].map(|way| way == self.registers[ACC][0x6D]);
+                let way = ways.iter().position(|is_set| *is_set).expect("masses are deflected");
+                to.copy_from_slice(&self.deflected[way].map(i16::to_le_bytes).concat());
+            }
             _ => to.fill(self.registers[die][usize::from(address)]),
         }
     }
@@ -352,6 +238,9 @@ impl Dies {
         }
         if matches!((die, address), (GYRO, 0x3E) | (ACC, 0x7E)) && !(self.is_deaf && die == ACC) {
             self.read[die] = self.made[die];
+        }
+        if value == 0xB6 {
+            self.registers[die] = [0; 128];
         }
         self.registers[die][usize::from(address)] = value;
     }
@@ -369,11 +258,19 @@ impl SpiDevice for Select {
         let (mut dies, die) = (self.0.borrow_mut(), self.1);
         match operations {
             [Operation::Write([address, value])] => dies.write(die, *address, *value),
-            [Operation::Write([address, ..]), Operation::Read(to)] => dies.answer(die, address & 0x7F, to),
+            // The accelerometer sends one byte before the value.
+            [Operation::Write([address, dummy @ ..]), Operation::Read(to)] if dummy.len() == 1 - die => {
+                assert!(*address >= 0x80);
+                dies.answer(die, address & 0x7F, to);
+            }
             other => panic!("{other:?}"),
         }
         Ok(())
     }
+}
+
+fn start(dies: &Rc<RefCell<Dies>>, self_test: bool) -> Result<Bmi088<Select>, Bmi088Error<Infallible>> {
+    Bmi088::new([ACC, GYRO].map(|die| Select(dies.clone(), die)), self_test, &mut NoDelay)
 }
 
 /// For each difference of the clocks: a minute with a poll every millisecond, stalls of 0.4 s (the FIFO holds them) and of
@@ -381,10 +278,9 @@ impl SpiDevice for Select {
 #[test]
 fn two_clocks_cost_what_the_module_says() {
     for fast in [[0.0, 0.0], [0.01, -0.01], [-0.01, 0.01], [0.01, 0.01]] {
-        let dies = Rc::new(RefCell::new(Dies::new(fast)));
+        let dies = Dies::new(fast);
         let difference: f64 = (fast[ACC] - fast[GYRO]).abs();
-        let select = [ACC, GYRO].map(|die| Select(dies.clone(), die));
-        let Ok(mut part) = Bmi088::new(select, false, &mut NoopDelay::new()) else { panic!("a good part") };
+        let mut part = start(&dies, false).expect("a good part");
         let [mut in_step, mut behind] = [[0.0f64; 2]; 2];
         let (mut misplaced, mut overflows, mut without, mut samples, mut now) = (0.0f64, 0, 0, 0u32, 0.0);
         while now < 60e6 {
@@ -400,6 +296,9 @@ fn two_clocks_cost_what_the_module_says() {
                     Ok(None) => break,
                     Ok(Some(sample)) => {
                         samples += 1;
+                        if overflows == 0 {
+                            assert_eq!(sample.time, Micros(5_000 * u64::from(samples + without)));
+                        }
                         let [rate, force] = taken(&sample);
                         let older = wrapped(rate - force);
                         let worst = if stall < 2e3 { &mut in_step } else { &mut behind };
@@ -437,9 +336,8 @@ fn two_clocks_cost_what_the_module_says() {
 
 #[test]
 fn accelerations_from_before_an_overflow_go_with_no_rate() {
-    let dies = Rc::new(RefCell::new(Dies::new([0.0; 2])));
-    let select = [ACC, GYRO].map(|die| Select(dies.clone(), die));
-    let Ok(mut part) = Bmi088::new(select, false, &mut NoopDelay::new()) else { panic!("a good part") };
+    let dies = Dies::new([0.0; 2]);
+    let mut part = start(&dies, false).expect("a good part");
     dies.borrow_mut().is_deaf = true;
     dies.borrow_mut().run_until(900e3);
     assert_eq!(part.next_sample(), Err(Bmi088Error::Overflow));
@@ -459,6 +357,12 @@ fn accelerations_from_before_an_overflow_go_with_no_rate() {
         }
     }
     assert!((good, without) == (29, 11), "{good} good, {without} without");
+    // No acceleration comes any more: the last one serves for four samples.
+    dies.borrow_mut().held = vec![(ACC, 0x18, 0)];
+    for frame in 1..=2 * OLDEST {
+        dies.borrow_mut().run_until(1_100e3 + 5e3 * f64::from(frame) + 1.0);
+        assert_eq!(part.next_sample().is_ok(), frame <= OLDEST);
+    }
 }
 
 /// Times at which rate and force were taken, ms modulo [`WRAP_MS`].

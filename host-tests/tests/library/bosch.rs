@@ -95,40 +95,26 @@ fn a_value_beyond_its_signal_is_marked() {
     assert_eq!((tx2.rate, tx2.rate_status), (u16::MAX, SignalStatus::FAILURE));
 }
 
-/// Ten minutes of a parked car whose rate is 0.001 deg/s: plain rounding would send nothing.
+/// A receiver's integral is never off by more than half a step of 0.005 deg/s for a period: in ten minutes at random rates,
+/// and parked at 0.001 deg/s, where plain rounding would send nothing.
 #[test]
 fn integral_is_exact_on_all_three_axes() {
-    let mut encoder = SetEncoder::default();
-    let slow = [rate(0.001), rate(-0.001), rate(0.0007)];
-    let parked = Motion { angular_rate: slow, ..motion(0.0, 0.0, 0) };
-    let mut sums = [0i64; 3];
-    for k in 1..=60_000 {
-        for (sum, message) in sums.iter_mut().zip(encoder.encode(&parked)) {
-            *sum += i64::from(message.rate) - 0x8000;
+    let (mut encoder, mut noise) = (SetEncoder::default(), Noise::new(1));
+    let (mut received, mut turned) = ([0i64; 3], [0i64; 3]);
+    for k in 0..120_000 {
+        let any = |_| AngularRate(noise.int(-380_000_000, 380_000_000) as i32);
+        let rates = if k < 60_000 { [0, 1, 2].map(any) } else { [rate(0.001), rate(-0.001), rate(0.0007)] };
+        let messages = encoder.encode(&Motion { angular_rate: rates, ..motion(0.0, 0.0, 0) });
+        // Yaw, roll against the right-hand rule, pitch.
+        for (axis, (message, sign)) in [2, 0, 1].into_iter().zip(messages.iter().zip([1, -1, 1])) {
+            received[axis] += sign * (i64::from(message.rate) - 0x8000);
+            turned[axis] += i64::from(rates[axis].0);
+            let due = turned[axis] as f64 / f64::from(AngularRate::PER_RAD_PER_SEC);
+            // The scale's own rounding, 0.45 in 447,623,277, and this test's arithmetic.
+            let off =
+                (received[axis] as f64 * 0.005 - due.to_degrees()).abs() - 1e-9 * due.abs().to_degrees();
+            assert!(off <= 0.0025 * (1.0 + 1e-6), "axis {axis}: {off} deg/s x frames after {k}");
         }
-        let [yaw, roll, pitch] = sums.map(|sum| sum as f64 * 0.005);
-        let due = slow.map(|rate| rate.rad_per_sec().to_degrees() * f64::from(k));
-        for error in [yaw - due[2], roll + due[0], pitch - due[1]] {
-            // Half an LSB, and 1e-9 deg/s a frame from the arithmetic.
-            assert!(error.abs() <= 0.0025 + 1e-9 * f64::from(k), "{error} deg/s x frames after {k}");
-        }
-    }
-}
-
-/// A receiver's integral at random rates is never off by more than half a step of 0.005 deg/s for a period of 10 ms.
-#[test]
-fn integral_is_exact_at_random_rates() {
-    const DEG_PER_CODE: f64 = 180.0 / std::f64::consts::PI / (1u64 << 27) as f64;
-    let (mut signal, mut noise) = (YawRateSignal::default(), Noise::new(1));
-    let (mut sent, mut received) = (0i64, 0i64);
-    for _ in 0..60_000 {
-        let rate = AngularRate(noise.int(-380_000_000, 380_000_000) as i32);
-        sent += i64::from(rate.0);
-        received += i64::from(signal.encode(rate).expect("in range")) - 0x8000;
-        let exact = sent as f64 * DEG_PER_CODE * 0.01;
-        // The scale's own rounding, 0.45 in 447,623,277, and a part in a million for the arithmetic of this test.
-        let error = (received as f64 * 0.005 * 0.01 - exact).abs() - 1e-9 * exact.abs();
-        assert!(error <= 0.005 / 2.0 * 0.01 * (1.0 + 1e-6), "{error} deg");
     }
 }
 

@@ -2,12 +2,10 @@
 //! through jitter, stalls, jumps, restarts and silence.
 
 use gyronet::align::clock_ratio::{ClockRatio, ClockRatioConfig, JITTER_US, RatioEstimator};
-use gyronet::coprocessor::{Config, Coprocessor};
-use gyronet::health::{Faults, Status};
-use gyronet::sample::{ImuSample, PERIOD_US};
+use gyronet::sample::PERIOD_US;
 use gyronet::units::{AngularRate, Micros, Yaw};
 use gyronet_host_tests::noise::{Noise, cases};
-use gyronet_host_tests::synthetic::{idling, rate};
+use gyronet_host_tests::synthetic::rate;
 use proptest::prelude::*;
 
 /// The bar: 0.02 % of the angle, 0.018 deg in a quarter of a turn.
@@ -215,66 +213,6 @@ fn an_oscillator_that_warms_up_is_followed() {
         sensor.run(1.0, &mut estimator);
         assert!(error(&estimator, sensor.off) < BAR, "{second}");
     }
-}
-
-/// A car that stands for five seconds and then turns at 0.25 rad/s, by a sensor that is off by a share,
-/// through a coprocessor with and without another clock. The yaw from 60 s to 160 s over that of the same rates
-/// in true time, less one; all rates, and the coprocessor.
-fn turned(off: f64, config: Config) -> (f64, Vec<AngularRate>, Coprocessor) {
-    let (mut coprocessor, mut sensor) = (Coprocessor::new(config), Sensor::new(off, 5_000.0, 8));
-    let (mut noise, mut rates, mut marks) = (Noise::new(9), Vec::new(), Vec::new());
-    for tick in 0..16_001 {
-        let (time, arrival) = sensor.sample();
-        let mut sample = idling(tick, 0.001, &mut noise);
-        if sensor.now > 8.0 {
-            sample.angular_rate[2].0 += rate(0.25).0;
-        }
-        let output = coprocessor
-            .imu(ImuSample { time, ..sample }, arrival, &mut ())
-            .expect("in time")
-            .expect("a step");
-        assert!(tick < 400 || output.vehicle.live.status == Status::Degraded, "{tick}");
-        rates.push(output.vehicle.delayed.rate);
-        if [6_000, 16_000].contains(&tick) {
-            marks.push(output.vehicle.delayed.yaw.rad());
-        }
-    }
-    let period = (1.0 + off) * PERIOD_US as f64 * 1e-6;
-    let truth: f64 = rates[6_001..].iter().map(|rate| rate.rad_per_sec() * period).sum();
-    ((marks[1] - marks[0]) / truth - 1.0, rates, coprocessor)
-}
-
-#[test]
-fn the_monitor_sums_true_periods_where_there_is_another_clock() {
-    let with = Config { clock_ratio: Some(ClockRatioConfig::DEFAULT), ..Config::DEFAULT };
-    for off in [-0.01, 0.01] {
-        let (by_its_own, own_rates, _) = turned(off, Config::DEFAULT);
-        let (by_the_board, rates, coprocessor) = turned(off, with);
-        println!("{off}: {by_its_own:.2e} by the sensor's clock, {by_the_board:.2e} by the board's");
-        assert!((by_its_own + off / (1.0 + off)).abs() < 1e-9, "{by_its_own}");
-        assert!(by_the_board.abs() < BAR, "{by_the_board}");
-        assert_eq!(rates, own_rates, "a rate is right whatever the clock");
-        assert_eq!((coprocessor.monitor_counters().wrong, coprocessor.monitor_counters().clock_off), (0, 0));
-    }
-}
-
-#[test]
-fn a_clock_at_fault_is_on_the_bus() {
-    let config = Config { clock_ratio: Some(ClockRatioConfig::DEFAULT), ..Config::DEFAULT };
-    let (mut coprocessor, mut sensor, mut noise) =
-        (Coprocessor::new(config), Sensor::new(1.0 / 15.0, 1_000.0, 1), Noise::new(2));
-    let mut first = None;
-    for tick in 0..6_000 {
-        let (time, arrival) = sensor.sample();
-        let sample = ImuSample { time, ..idling(tick, 0.001, &mut noise) };
-        let step = coprocessor.imu(sample, arrival, &mut ()).expect("in time").expect("a step");
-        let faults = step.vehicle.delayed.faults;
-        let reported = faults == faults.with(Faults::IMPLAUSIBLE);
-        first = first.or(reported.then_some(tick));
-        assert!(first.is_none() || reported, "for as long as it lasts");
-    }
-    assert!((900..1_100).contains(&first.expect("reported")), "after ten seconds: {first:?}");
-    assert_eq!(coprocessor.monitor_counters().clock_off, 1);
 }
 
 proptest! {

@@ -27,7 +27,6 @@ mod gyronet_scale;
 mod heading;
 mod icm42688;
 mod jump;
-mod kaist_fog;
 mod kvh_dsp1760;
 mod links;
 mod lstm_exact;

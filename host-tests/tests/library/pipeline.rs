@@ -190,9 +190,10 @@ fn a_clock_that_jumps_by_a_few_milliseconds_is_a_gap() {
 }
 
 #[test]
-fn a_clock_jump_is_counted_and_survived() {
+fn a_clock_jump_is_counted_survived_and_a_doubt() {
     let mut pipeline = new();
     run(&mut pipeline, drive(0..400), constant(0.0));
+    let before = pipeline.status(None);
     let later = |tick: u64| tick + 1_000_000;
     assert!(pipeline.correct(drive([later(0)]).next().unwrap(), None, &BoardState::GOOD).is_err());
     let outputs = run(&mut pipeline, drive((1..100).map(later)), constant(0.0));
@@ -200,6 +201,11 @@ fn a_clock_jump_is_counted_and_survived() {
     assert_eq!((pipeline.counters().clock_jumps, pipeline.counters().missing), (1, 0));
     assert_eq!(faults(&outputs), [(Faults::GAP, WINDOW), (Faults::NONE, 99 - WINDOW)]);
     assert_eq!(outputs[0].vehicle.live.tick, 400);
+    // A second at least may be missing: 0.249 rad, and what a rate may do in a second.
+    let after = pipeline.status(None);
+    assert_eq!((before.gaps, after.gaps), (Some(0), Some(1)));
+    let grown = 0.01 * f64::from(after.doubt.expect("known") - before.doubt.expect("known"));
+    assert!((12.0..29.0).contains(&grown), "{grown} deg");
 }
 
 #[test]

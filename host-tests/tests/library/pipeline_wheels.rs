@@ -1,48 +1,26 @@
 //! The pipeline does not initialise while the wheels turn, and reports a fault when they fall silent.
 
-use embedded_can::{Frame, StandardId};
 use gyronet::bias::StaticError;
-use gyronet::can::DataFrame;
-use gyronet::can::signal::{BitField, ByteOrder};
-use gyronet::can::wheel::{Checksum, WheelFrame, WheelReceiver, WheelSettings, WheelSignal};
+use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::health::Faults;
 use gyronet::health::Status::{Degraded, Init};
 use gyronet::pipeline::{BoardState, Output};
 use gyronet::sample::PERIOD_US;
-use gyronet::units::{Duration, Micros, WheelSpeed};
+use gyronet::units::Micros;
+use gyronet_host_tests::inputs;
 use gyronet_host_tests::stream::{faults, new, statuses};
 use gyronet_host_tests::synthetic::{rate, turning};
 
-const ID: StandardId = StandardId::new(0x4B0).unwrap();
-const TIMEOUT: u64 = 100_000;
+const TIMEOUT: u64 = WheelSettings::TOYOTA.timeout.0;
 
-fn receiver() -> WheelReceiver {
-    let signal = |wheel: u8| {
-        let field = BitField::new(16 * wheel, 16, ByteOrder::Intel, false).expect("inside the frame");
-        let factor_q16 = WheelSignal::per_bit_kmh(0.01);
-        Some(WheelSignal::new(0, field, factor_q16))
-    };
-    let frame = WheelFrame { id: ID.into(), counter: None, checksum: Checksum::None };
-    WheelReceiver::new(WheelSettings {
-        frames: [Some(frame), None, None, None],
-        signals: [signal(0), signal(1), None, None],
-        timeout: Duration(TIMEOUT),
-        still_speed: WheelSpeed(0),
-        still_for: Duration(500_000),
-    })
-    .expect("two wheels")
-}
-
-/// A gyro that reads a constant; `wheels` gives the speed of each tick in 0.01 km/h, where a
+/// A gyro that reads a constant; `wheels` gives the speed of each tick in km/h, where a
 /// frame comes with it.
-fn run(ticks: u64, mut wheels: impl FnMut(u64) -> Option<u16>) -> Vec<Output> {
-    let (mut pipeline, mut receiver) = (new(), receiver());
+fn run(ticks: u64, mut wheels: impl FnMut(u64) -> Option<f64>) -> Vec<Output> {
+    let (mut pipeline, mut receiver) = (new(), WheelReceiver::new(WheelSettings::TOYOTA).expect("checked"));
     let step = |tick: u64| {
         let now = Micros(tick * PERIOD_US);
         if let Some(speed) = wheels(tick) {
-            let [low, high] = speed.to_le_bytes();
-            let frame = DataFrame::new(ID, &[low, high, low, high]).expect("four bytes");
-            receiver.decode(&frame, now).expect("a wheel frame").expect("a good one");
+            receiver.decode(&inputs::wheels(speed), now).expect("a wheel frame").expect("a good one");
         }
         let known = receiver.poll(now);
         pipeline
@@ -55,7 +33,7 @@ fn run(ticks: u64, mut wheels: impl FnMut(u64) -> Option<u16>) -> Vec<Output> {
 #[test]
 fn static_initialisation_waits_for_the_wheels() {
     // A steady straight drive looks like standing to the gyro; then it brakes at 11 m/s^2.
-    let outputs = run(1_000, |tick| Some(5_000.min(40 * 500u64.saturating_sub(tick)) as u16));
+    let outputs = run(1_000, |tick| Some(0.4 * 125.min(500u64.saturating_sub(tick)) as f64));
     assert_eq!(statuses(&outputs), [(Init, 800), (Degraded, 200)]);
     let refused: Vec<usize> = (0..1_000).filter(|&k| outputs[k].refused.is_some()).collect();
     assert_eq!(refused, [0], "said once");
@@ -67,7 +45,7 @@ fn static_initialisation_waits_for_the_wheels() {
 
 #[test]
 fn one_turn_of_a_wheel_starts_it_again() {
-    let outputs = run(1_000, |tick| Some(u16::from(tick == 200)));
+    let outputs = run(1_000, |tick| Some(if tick == 200 { 0.2 } else { 0.0 }));
     assert_eq!(outputs[200].refused, Some(StaticError::Wheels));
     assert_eq!(statuses(&outputs)[0], (Init, 201 + 300));
 }
@@ -75,7 +53,7 @@ fn one_turn_of_a_wheel_starts_it_again() {
 #[test]
 fn silent_wheels_are_a_fault() {
     // Not heard yet, which is no fault; then heard, then lost after the time-out, then back.
-    let outputs = run(290, |tick| ((50..100).contains(&tick) || tick >= 200).then_some(0));
+    let outputs = run(290, |tick| ((50..100).contains(&tick) || tick >= 200).then_some(0.0));
     let lost = (99 * PERIOD_US + TIMEOUT) / PERIOD_US + 1;
     assert_eq!(
         faults(&outputs),

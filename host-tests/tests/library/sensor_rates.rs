@@ -28,8 +28,9 @@ const RATE: f64 = 10.0;
 const BEGINS_S: f64 = 12.0;
 const LASTS_S: f64 = 10.0;
 
-/// Rests, turns and rests again; returns the turn by the live yaw over the true one, the observations and errors.
-fn drive(sensor: Sensor) -> (f64, Vec<Observation>, Vec<InputError>) {
+/// Rests, turns and rests again; returns the turn by the live yaw over the true one, the observations and errors, and how
+/// often the clocks were off.
+fn drive(sensor: Sensor) -> (f64, Vec<Observation>, Vec<InputError>, u32) {
     let config = Config { clock_ratio: Some(ClockRatioConfig::DEFAULT), ..Config::DEFAULT };
     let (mut coprocessor, mut noise) = (Coprocessor::new(config), Noise::new(8));
     let (mut seen, mut errors, mut turned) = (Vec::new(), Vec::new(), 0.0);
@@ -60,7 +61,7 @@ fn drive(sensor: Sensor) -> (f64, Vec<Observation>, Vec<InputError>) {
     }
     let Yaw(yaw) = seen.last().expect("a step").vehicle.live.yaw;
     let degrees = (yaw as f64 / f64::from(AngularRate::PER_RAD_PER_SEC) / 100.0).to_degrees();
-    (degrees / turned, seen, errors)
+    (degrees / turned, seen, errors, coprocessor.monitor_counters().clock_off)
 }
 
 struct Seen<'a>(&'a mut Vec<Observation>);
@@ -74,9 +75,9 @@ impl gyronet::coprocessor::Sink for Seen<'_> {
 }
 
 fn check(sensor: Sensor) {
-    let (ratio, seen, errors) = drive(sensor);
+    let (ratio, seen, errors, clock_off) = drive(sensor);
     assert!((ratio - 1.0).abs() < 1e-3, "{sensor:?}: {ratio:.5} of the turn");
-    assert_eq!(errors, [], "{sensor:?}");
+    assert_eq!((&errors[..], clock_off), (&[][..], 0), "{sensor:?}");
     // From the end of static initialisation on there is a step every 10 ms of the sensor's clock, all corrected.
     let good = seen.iter().filter(|step| step.vehicle.live.status == Status::Ready).count() as f64;
     let steps = (BEGINS_S + LASTS_S + 2.0) * 100.0 * sensor.clock;
@@ -108,7 +109,7 @@ fn without_stamps_the_arrival_counts() {
 #[test]
 fn a_rate_that_is_not_used_is_named_and_never_good() {
     for (hz, period_us) in [(10.0, 100_000), (40.0, 25_000), (1_250.0, 800), (2_000.0, 500)] {
-        let (_, seen, errors) = drive(Sensor { hz, ..EXACT });
+        let (_, seen, errors, _) = drive(Sensor { hz, ..EXACT });
         assert_eq!(errors.last(), Some(&InputError::Imu(AlignError::Rate { period_us })));
         let last = seen.last().expect("message sets of a silent sensor").vehicle.live;
         assert_eq!((last.status, last.faults), (Status::Silent, Faults::GAP.with(Faults::IMPLAUSIBLE)));
@@ -118,7 +119,16 @@ fn a_rate_that_is_not_used_is_named_and_never_good() {
 
 #[test]
 fn clocks_that_contradict_each_other_are_not_good() {
-    let (_, seen, _) = drive(Sensor { clock: 1.06, ..EXACT });
-    let last = seen.last().expect("a step").vehicle.live;
-    assert_eq!((last.quality, last.faults), (Quality::Degraded, Faults::IMPLAUSIBLE));
+    let (_, seen, _, clock_off) = drive(Sensor { clock: 1.06, ..EXACT });
+    let is_off = |step: &Observation| step.vehicle.live.faults.contains(Faults::IMPLAUSIBLE);
+    let first = seen.iter().position(is_off).expect("it is reported");
+    assert!((900..1_100).contains(&first), "after ten seconds: {first}");
+    for step in &seen[first..] {
+        assert_eq!(
+            (step.vehicle.live.quality, is_off(step)),
+            (Quality::Degraded, true),
+            "for as long as it lasts"
+        );
+    }
+    assert_eq!(clock_off, 1);
 }

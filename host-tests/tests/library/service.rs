@@ -14,8 +14,9 @@ mod together;
 mod uds;
 mod weights;
 
+use gyronet::health::{Faults, Status};
 use gyronet::model::weights::DEFAULT;
-use gyronet::sample::{ImuSample, PERIOD_US, Validity};
+use gyronet::sample::{ImuSample, PERIOD_US, Standstill, Validity, WheelSample};
 use gyronet::service::crash::FILE;
 use gyronet::service::event::{Crash, CrashKind, ResetCause};
 use gyronet::service::message::{Identity, Info};
@@ -24,6 +25,7 @@ use gyronet::store::layout::{self, RECORD_SECTOR};
 use gyronet::store::{ImuPart, Slot};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use gyronet_host_tests::flash::{F405, MappedRegion, Region};
+use gyronet_host_tests::synthetic::judged;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -70,6 +72,21 @@ fn bare() -> Board {
     board.begin(None, None, Ok(()), IDENTITY);
     board.weights(None, &DEFAULT.0);
     board
+}
+
+const GOOD: (Status, Faults) = (Status::Ready, Faults::NONE);
+/// Specific force of a level sensor at rest, m/s^2.
+const LEVEL: [f32; 3] = [0.0, 0.0, 9.81];
+
+/// Lets a board see a sample, or none, and wheels that nothing contradicts.
+fn observe(
+    board: &mut Board,
+    tick: u32,
+    sample: Option<&ImuSample>,
+    state: (Status, Faults),
+    wheels: Standstill,
+) {
+    board.observe(sample, tick, state, &WheelSample::without_speeds(wheels), &judged(wheels));
 }
 
 fn info(board: &mut Board) -> Info {

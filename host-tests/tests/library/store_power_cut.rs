@@ -7,7 +7,7 @@ use gyronet::store::slots::{Selection, WeightSource, select};
 use gyronet::store::{Accepted, Access, Configuration, Learned, Record, Slot};
 use gyronet::units::SpecificForce;
 use gyronet_host_tests::flash::{Cut, F405};
-use gyronet_host_tests::stored::{open, other_weights, slots, upload};
+use gyronet_host_tests::stored::{crc, open, other_weights, slots, upload};
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -144,7 +144,6 @@ fn running(flash: &Rc<RefCell<F405>>) -> (WeightSource, u32) {
 #[test]
 fn a_cut_during_the_upload_of_weights_leaves_the_accepted_ones() {
     let (old, new) = (weights::DEFAULT.0.to_vec(), other_weights(1));
-    let crc = |file: &[u8]| u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
     let flash = Rc::new(RefCell::new(F405::default()));
     assert_eq!(running(&flash), (WeightSource::BuiltIn, crc(&old)));
     upload(&flash, Slot::A, &old).expect("it is accepted");

@@ -3,16 +3,14 @@
 use gyronet::can::e2e::{DataIdMode, P01, Profile};
 use gyronet::can::yaw::{AngleMessage, DetailMessage, RATE_NOT_AVAILABLE, RateMessage, SIGMA_UNKNOWN};
 use gyronet::can::yaw_encoder::YawEncoder;
-use gyronet::coprocessor::{Config, Coprocessor};
 use gyronet::estimate::YawEstimate;
 use gyronet::health::{Faults, Quality, Source, Status, judge};
 use gyronet::model::window::WINDOW;
-use gyronet::pipeline::{BoardState, Output, Pipeline, PipelineConfig};
-use gyronet::sample::{ImuSample, PERIOD_US, Validity};
-use gyronet::units::{AngularRate, Micros};
-use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::stream::{KNOWN, constant, drive, new, run};
-use gyronet_host_tests::synthetic::{idling, rate};
+use gyronet::pipeline::{Output, Pipeline, PipelineConfig};
+use gyronet::sample::{PERIOD_US, Validity};
+use gyronet::units::AngularRate;
+use gyronet_host_tests::stream::{constant, drive, run};
+use gyronet_host_tests::synthetic::rate;
 
 /// Every validity but [`Validity::Good`], with its status and fault.
 const BAD: [(Validity, Status, Faults); 4] = [
@@ -80,78 +78,6 @@ fn a_bad_reading_is_summed_nowhere_and_leaves_with_its_fault() {
         let hidden = if validity == Validity::Stuck { 0.3 * 0.249 + 0.05 } else { 0.012 };
         assert!((lost..lost + hidden).contains(&grown), "{validity:?}: {grown} for {lost}");
     }
-}
-
-/// The samples are those of a board: what the monitor finds reaches the yaw.
-struct Board {
-    coprocessor: Coprocessor,
-    noise: Noise,
-    tick: u64,
-}
-
-impl Board {
-    fn standing() -> Self {
-        let coprocessor = Coprocessor::new(Config::DEFAULT);
-        let mut board = Self { coprocessor, noise: Noise::new(11), tick: 0 };
-        for _ in 0..KNOWN + 100 {
-            board.step(|_| {});
-        }
-        board
-    }
-
-    fn step(&mut self, change: impl FnOnce(&mut ImuSample)) -> YawEstimate {
-        let mut sample = idling(self.tick, 0.001, &mut self.noise);
-        change(&mut sample);
-        let now = Micros(self.tick * PERIOD_US);
-        self.tick += 1;
-        self.coprocessor.imu(sample, now, &mut ()).expect("in time").expect("a step").vehicle.delayed
-    }
-
-    fn doubt(&self) -> f64 {
-        f64::from(self.coprocessor.pipeline().status(None).doubt.expect("it has begun")) * CODE
-    }
-}
-
-#[test]
-fn one_reading_of_12_rad_per_s_does_not_turn_the_vehicle() {
-    let mut board = Board::standing();
-    let before = board.step(|_| {}).yaw.rad();
-    board.step(|sample| sample.angular_rate[2] = rate(12.0));
-    let after = (0..50).map(|_| board.step(|_| {})).last().expect("fifty").yaw.rad();
-    assert!((after - before).abs() < 2e-3, "{}", after - before);
-}
-
-/// A gyro that repeats 0.5 rad/s for 20 s on a standing vehicle.
-#[test]
-fn a_stuck_gyro_does_not_turn_the_vehicle_and_leaves_a_doubt() {
-    let mut board = Board::standing();
-    let before = board.step(|_| {}).yaw.rad();
-    let doubt = board.doubt();
-    assert!(doubt < 0.01, "{doubt}");
-    let mut good = 0;
-    for _ in 0..2_000 {
-        let sent = board.step(|sample| sample.angular_rate = [rate(0.0), rate(0.0), rate(0.5)]);
-        good += u32::from(sent.quality != Quality::Unusable);
-    }
-    let after = (0..50).map(|_| board.step(|_| {})).last().expect("fifty").yaw.rad();
-    // The first of the equal readings is one that might be right.
-    assert!((after - before).abs() < 6e-3 && good <= 8, "{} in {good}", after - before);
-    // What a vehicle may turn in 20 s, of which the gyro tells nothing.
-    assert!(board.doubt() > 3.0, "{}", board.doubt());
-}
-
-#[test]
-fn a_clock_that_jumps_hides_a_second_at_least() {
-    let mut pipeline = new();
-    run(&mut pipeline, drive(0..500), constant(0.0));
-    let before = pipeline.status(None);
-    let later = |tick: u64| tick + 1_000_000;
-    assert!(pipeline.correct(drive([later(0)]).next().expect("one"), None, &BoardState::GOOD).is_err());
-    run(&mut pipeline, drive((1..50).map(later)), constant(0.0));
-    let after = pipeline.status(None);
-    assert_eq!((before.gaps, after.gaps), (Some(0), Some(1)));
-    let grown = f64::from(after.doubt.expect("known") - before.doubt.expect("known")) * CODE;
-    assert!((0.2..0.5).contains(&grown), "{grown}: 0.249 rad, and what a rate may do in a second");
 }
 
 fn encoder(every: u8) -> YawEncoder {

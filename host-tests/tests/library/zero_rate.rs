@@ -35,13 +35,13 @@ fn run(
     turn: impl Fn(u64) -> f64,
     standstill: impl Fn(u64) -> Option<Standstill>,
 ) -> (Pipeline, Vec<Output>) {
-    run_with(PipelineConfig::DEFAULT, NETWORK, ticks, turn, standstill)
+    run_with(PipelineConfig::DEFAULT, NETWORK, 0..ticks, turn, standstill)
 }
 
 fn run_with(
     config: PipelineConfig,
     network: f64,
-    ticks: u64,
+    ticks: impl IntoIterator<Item = u64>,
     turn: impl Fn(u64) -> f64,
     standstill: impl Fn(u64) -> Option<Standstill>,
 ) -> (Pipeline, Vec<Output>) {
@@ -49,7 +49,7 @@ fn run_with(
     let mut pipeline = Pipeline::new(config);
     let mut network = constant(network);
     let mut outputs = Vec::new();
-    for tick in 0..ticks {
+    for tick in ticks {
         let mut sample = parked(tick, &mut noise);
         sample.angular_rate[2].0 += rate(turn(tick)).0;
         let report = standstill(tick).map(|standstill| wheels(&sample, standstill));
@@ -81,7 +81,7 @@ fn a_constant_of_the_network_turns_nothing() {
     const NETWORK: f64 = 0.0006;
     for moves in [400, 6_000] {
         let [without, with] = [0.0, NETWORK].map(|network| {
-            let run = run_with(PipelineConfig::DEFAULT, network, 12_000, |_| 0.0, moves_from(moves));
+            let run = run_with(PipelineConfig::DEFAULT, network, 0..12_000, |_| 0.0, moves_from(moves));
             run.1.last().map_or(0.0, |output| output.vehicle.delayed.yaw.rad())
         });
         println!("{without:+.5} rad in two minutes without it, {with:+.5} rad with it");
@@ -102,7 +102,7 @@ fn proven_standstill_is_zero_and_the_live_rate_goes_on() {
 /// The sum of the errors of static initialisation and network without any turn, deg.
 fn drift(ticks: u64) -> f64 {
     let alone = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
-    let (_, outputs) = run_with(alone, NETWORK, ticks, |_| 0.0, |_| None);
+    let (_, outputs) = run_with(alone, NETWORK, 0..ticks, |_| 0.0, |_| None);
     outputs.last().map_or(0.0, |output| deg(output.vehicle.delayed.yaw.rad()))
 }
 
@@ -397,20 +397,8 @@ fn a_stop_begins_without_the_offset_of_the_one_before() {
 
 /// Runs a parked car with a gap of some samples at a tick, and with wheels that stand, if there are any.
 fn parked_with_gap(ticks: u64, gap: std::ops::Range<u64>, wheels_stand: bool) -> (Pipeline, Vec<Output>) {
-    let (mut noise, mut pipeline, mut network) =
-        (Noise::new(3), Pipeline::new(PipelineConfig::DEFAULT), constant(0.0));
-    let mut outputs = Vec::new();
-    for tick in (0..ticks).filter(|tick| !gap.contains(tick)) {
-        let sample = parked(tick, &mut noise);
-        let report = wheels_stand.then(|| wheels(&sample, Standstill::Still));
-        let output =
-            pipeline.correct(sample, report.as_ref(), &BoardState::GOOD).expect("a place on the grid");
-        if let Some(due) = &output.window {
-            pipeline.deliver(due.end, network(due).expect("an estimate"));
-        }
-        outputs.push(output);
-    }
-    (pipeline, outputs)
+    let ticks = (0..ticks).filter(|tick| !gap.contains(tick));
+    run_with(PipelineConfig::DEFAULT, 0.0, ticks, |_| 0.0, |_| wheels_stand.then_some(Standstill::Still))
 }
 
 #[test]
@@ -439,7 +427,7 @@ fn too_much_to_carry_is_reported_until_it_is_carried() {
     config.compensate.max_revision = AngularRate::from_deg_per_sec(0.1);
     let implausible = |turn: f64| {
         let turning = move |tick: u64| if (940..1_000).contains(&tick) { turn } else { 0.0 };
-        let (_, outputs) = run_with(config, 0.0, 1_300, turning, moves_from(1_000));
+        let (_, outputs) = run_with(config, 0.0, 0..1_300, turning, moves_from(1_000));
         let is = |output: &&Output| output.vehicle.live.faults.0 & Faults::IMPLAUSIBLE.0 != 0;
         assert!(!outputs[1_250..].iter().any(|output| is(&output)), "it has been carried");
         outputs.iter().filter(is).count()

@@ -51,18 +51,30 @@ struct Simulated {
     registers: std::collections::HashMap<(u8, u8), u8>,
     bank: u8,
     fifo: VecDeque<u8>,
+    /// What was written to the registers but that of the bank: bank, address, value.
+    written: Vec<(u8, u8, u8)>,
+    /// A register that answers this, whatever is written.
+    held: Option<(u8, u8, u8)>,
 }
 
 impl Simulated {
     fn write(&mut self, address: u8, value: u8) {
         if address == reg::BANK_SEL {
             self.bank = value;
+            return;
+        }
+        self.written.push((self.bank, address, value));
+        if (self.bank, address) == (0, reg::SIGNAL_PATH_RESET.address) {
+            self.fifo.clear();
         } else if (self.bank, address) != (0, reg::DEVICE_CONFIG.address) {
             self.registers.insert((self.bank, address), value);
         }
     }
 
     fn read(&mut self, address: u8, to: &mut [u8]) {
+        if let Some((.., held)) = self.held.filter(|(bank, at, _)| (*bank, *at) == (self.bank, address)) {
+            return to.fill(held);
+        }
         let waiting = (self.fifo.len() as u16).to_be_bytes();
         for (offset, byte) in to.iter_mut().enumerate() {
             *byte = match address {
@@ -82,6 +94,21 @@ pub struct Bus(Arc<Mutex<Simulated>>);
 impl Bus {
     pub fn fill(&self, bytes: impl IntoIterator<Item = u8>) {
         self.part().fifo.extend(bytes);
+    }
+
+    /// Sets a register as the part has it after a reset.
+    pub fn set(&self, bank: u8, address: u8, value: u8) {
+        self.part().registers.insert((bank, address), value);
+    }
+
+    /// Bank, address and value of a register that answers this from now on, whatever is written.
+    pub fn hold(&self, held: Option<(u8, u8, u8)>) {
+        self.part().held = held;
+    }
+
+    /// What was written to the registers but that of the bank: bank, address, value.
+    pub fn written(&self) -> Vec<(u8, u8, u8)> {
+        self.part().written.clone()
     }
 
     fn part(&self) -> MutexGuard<'_, Simulated> {

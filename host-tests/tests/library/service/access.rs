@@ -1,6 +1,6 @@
 //! Who may write: a board with a key takes what is signed with its private part, once, and nothing else.
 
-use super::uds::{Bench, bench};
+use super::uds::{Bench, bench, download};
 use embedded_can::{ExtendedId, Id};
 use gyronet::can::e2e::{P02, Profile};
 use gyronet::can::signal::{BitField, ByteOrder};
@@ -13,24 +13,26 @@ use gyronet::store::{Access, Configuration, FieldError, Record, Store, StoreErro
 use gyronet::uds::signature;
 use gyronet::units::{Duration, WheelSpeed};
 use gyronet_host_tests::flash::{Cut, F405, Region};
-use gyronet_host_tests::stored::other_weights;
+use gyronet_host_tests::stored::{crc, other_weights};
 use gyronet_tools::signing::{PrivateKey, unhex};
 use std::cell::RefCell;
 use std::rc::Rc;
 
-const SERIAL: [u8; 12] = *b"a test board";
+pub const SERIAL: [u8; 12] = *b"a test board";
 const CONFIGURATION: u16 = 0x0100;
+
+pub fn a_key() -> PrivateKey {
+    PrivateKey::generate().expect("random numbers")
+}
 
 /// A board with a key, in an extended session at standstill.
 pub fn locked() -> (Rc<RefCell<F405>>, Bench, PrivateKey) {
     let (flash, mut bench) = bench();
-    let key = PrivateKey::generate().expect("random numbers");
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    bench.stand();
+    let key = a_key();
+    bench.enter(3);
     bench.expect(&[&[0x2E, 1, 0x10][..], &key.public()].concat(), &[0x6E, 1, 0x10]);
     let mut bench = Bench::new(&flash);
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    bench.stand();
+    bench.enter(3);
     (flash, bench, key)
 }
 
@@ -39,11 +41,11 @@ fn configuration(k: u8) -> Configuration {
     Configuration { latitude_deg: Some(f32::from(k)), ..Configuration::DEFAULT }
 }
 
-fn content(k: u8) -> Vec<u8> {
+pub fn content(k: u8) -> Vec<u8> {
     [&[Configuration::VERSION][..], &postcard::to_stdvec(&configuration(k)).expect("there is room")].concat()
 }
 
-fn write(content: &[u8], trailer: &[u8]) -> Vec<u8> {
+pub fn write(content: &[u8], trailer: &[u8]) -> Vec<u8> {
     [&[0x2E][..], &CONFIGURATION.to_be_bytes(), content, trailer].concat()
 }
 
@@ -143,8 +145,7 @@ fn what_is_signed_is_accepted_once() {
     bench.expect(&write(&content(3), &key.trailer(CONFIGURATION, None, 6, &content(3))), &[0x6E, 1, 0]);
     // Also after a restart.
     let mut bench = Bench::new(&flash);
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    bench.stand();
+    bench.enter(3);
     bench.expect(&signed(2, 6), &[0x7F, 0x2E, 0x31]);
     assert_eq!(start(&flash).latitude_deg, Some(3.0));
 }
@@ -156,7 +157,7 @@ fn start(flash: &Rc<RefCell<F405>>) -> Configuration {
 #[test]
 fn what_is_unsigned_cut_foreign_or_changed_is_refused() {
     let (flash, mut bench, key) = locked();
-    let other = PrivateKey::generate().expect("random numbers");
+    let other = a_key();
     let good = key.trailer(CONFIGURATION, Some(SERIAL), 9, &content(1));
     let mut elsewhere = SERIAL;
     elsewhere[3] ^= 1;
@@ -285,7 +286,7 @@ fn wrong_answers_cost_time_also_over_a_restart() {
 #[test]
 fn another_key_wants_the_signature_of_the_one_before() {
     let (flash, mut bench, key) = locked();
-    let next = PrivateKey::generate().expect("random numbers");
+    let next = a_key();
     let write = |public: [u8; 32], trailer: &[u8]| [&[0x2E, 1, 0x10][..], &public, trailer].concat();
     bench.expect(&write(next.public(), &[]), &[0x7F, 0x2E, 0x13]);
     // What is no point of the curve, or one of low order, locks out or in everyone.
@@ -303,15 +304,8 @@ fn another_key_wants_the_signature_of_the_one_before() {
 }
 
 /// Downloads a file, and returns the response to the routine that uses it.
-fn download(bench: &mut Bench, file: &[u8], trailer: &[u8]) -> Vec<u8> {
-    bench.expect(&[0x10, 2], &[0x50, 2, 0, 50, 0x01, 0xF4]);
-    bench.stand();
-    let begin = [&[0x34, 0, 0x44, 0, 0, 0, 0][..], &(file.len() as u32).to_be_bytes()].concat();
-    assert_eq!(bench.ask(&begin).expect("a response")[0], 0x74);
-    for (number, bytes) in (1u8..=255).chain(0..=255).cycle().zip(file.chunks(256)) {
-        bench.expect(&[&[0x36, number], bytes].concat(), &[0x76, number]);
-    }
-    assert_eq!(bench.ask(&[0x37]).expect("a response")[0], 0x77);
+fn use_file(bench: &mut Bench, file: &[u8], trailer: &[u8]) -> Vec<u8> {
+    assert_eq!(download(bench, file)[0], 0x77);
     bench.ask(&[&[0x31, 1, 0xFF, 1][..], trailer].concat()).expect("a response")
 }
 
@@ -320,15 +314,14 @@ fn a_weight_file_is_used_with_its_own_signature_alone() {
     let (flash, mut bench, key) = locked();
     let (file, other) = (other_weights(1), other_weights(2));
     let sign = |file: &[u8], counter| key.trailer(0xFF01, None, counter, file);
-    assert_eq!(download(&mut bench, &file, &[]), [0x7F, 0x31, 0x13]);
-    assert_eq!(download(&mut bench, &file, &sign(&other, 1)), [0x7F, 0x31, 0x35]);
+    assert_eq!(use_file(&mut bench, &file, &[]), [0x7F, 0x31, 0x13]);
+    assert_eq!(use_file(&mut bench, &file, &sign(&other, 1)), [0x7F, 0x31, 0x35]);
     let running = |flash: &Rc<RefCell<F405>>| super::start(flash).info().weights_crc;
-    let crc = |file: &[u8]| u32::from_le_bytes(*file.last_chunk().expect("a checksum"));
     assert_eq!(running(&flash), Some(crc(&weights::DEFAULT.0)));
-    assert_eq!(download(&mut bench, &file, &sign(&file, 1)), [0x71, 1, 0xFF, 1]);
+    assert_eq!(use_file(&mut bench, &file, &sign(&file, 1)), [0x71, 1, 0xFF, 1]);
     assert_eq!(running(&flash), Some(crc(&file)));
     // The same file again is a replay.
-    assert_eq!(download(&mut bench, &file, &sign(&file, 1)), [0x7F, 0x31, 0x31]);
+    assert_eq!(use_file(&mut bench, &file, &sign(&file, 1)), [0x7F, 0x31, 0x31]);
 }
 
 /// A cut leaves the counter as it was, or burnt; never a signature that is accepted twice.
@@ -340,8 +333,7 @@ fn a_power_cut_never_takes_the_counter_back() {
     loop {
         let flash = Rc::new(RefCell::new(before.clone()));
         let mut bench = Bench::new(&flash);
-        bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-        bench.stand();
+        bench.enter(3);
         flash.borrow_mut().cut_after(cuts, Cut::ALL[cuts as usize % Cut::ALL.len()]);
         let request = write(&content(1), &key.trailer(CONFIGURATION, None, 1, &content(1)));
         let response = bench.ask(&request).expect("a response");
@@ -408,9 +400,8 @@ fn a_challenge_that_comes_twice_is_none() {
 #[test]
 fn keys_that_come_and_go_are_in_the_log() {
     let (_, mut bench) = bench();
-    let key = PrivateKey::generate().expect("random numbers");
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    bench.stand();
+    let key = a_key();
+    bench.enter(3);
     let before = bench.board.events(0).total;
     bench.expect(&[&[0x2E, 1, 0x10][..], &key.public()].concat(), &[0x6E, 1, 0x10]);
     let remove = [&[0x2E, 1, 0x10][..], &[0; 32], &key.trailer(0x0110, None, 1, &[0; 32])].concat();
@@ -432,8 +423,7 @@ fn a_record_that_cannot_be_read_locks_and_is_reported() {
     let events = bench.board.events(0).events;
     let refused = EventKind::AccessRefused(StoreError::Version { found: 200, expected: Access::VERSION });
     assert!(events.iter().any(|event| event.kind == refused), "{events:?}");
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    bench.stand();
+    bench.enter(3);
     bench.expect(&write(&content(1), &[0; 69]), &[0x7F, 0x2E, 0x33]);
 }
 
@@ -456,10 +446,10 @@ fn the_longest_wheel_settings_fit_with_their_trailer() {
     let (flash, mut bench, key) = locked();
     let frame = |k: u32| WheelFrame {
         id: Id::Extended(ExtendedId::new(0x1FFF_FFF0 + k).expect("29 bits")),
-        counter: None,
+        counter: Some(BitField::new(24, 8, ByteOrder::Intel, false).expect("it fits").into()),
         checksum: Checksum::E2e(Profile::P02(P02 { data_ids: [0xFF; 16] })),
     };
-    let field = BitField::new(32, 32, ByteOrder::Intel, true).expect("it fits");
+    let field = BitField::new(39, 32, ByteOrder::Motorola, true).expect("it fits");
     let signal = |frame| WheelSignal {
         offset: WheelSpeed(i32::MIN),
         invalid: [Some(u32::MAX), None, None],

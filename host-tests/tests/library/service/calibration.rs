@@ -1,6 +1,6 @@
 //! A calibration runs at standstill, and its result is stored when that is asked for.
 
-use super::{Board, sample, start};
+use super::{Board, GOOD, LEVEL, observe, sample, start};
 use gyronet::bias::{BiasCurve, CurveFilter};
 use gyronet::heading::Gain;
 use gyronet::health::{Faults, Status};
@@ -14,7 +14,6 @@ use gyronet::uds::isotp::MAX_MESSAGE;
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
 use gyronet_host_tests::flash::F405;
 use gyronet_host_tests::stored::open;
-use gyronet_host_tests::synthetic::judged;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -32,13 +31,7 @@ fn calibrate_by(
     board.start_calibration(task);
     for k in 0..301u64 {
         let rate = 0.01 + if k % 2 == 0 { wobble } else { -wobble };
-        board.observe(
-            Some(&sample(k, force, rate)),
-            k as u32,
-            (Status::Ready, Faults::NONE),
-            &WheelSample::without_speeds(wheels),
-            &judged(wheels),
-        );
+        observe(board, k as u32, Some(&sample(k, force, rate)), GOOD, wheels);
     }
     board.calibration_state()
 }
@@ -48,11 +41,8 @@ fn calibration_is_found_and_kept() {
     let flash = Rc::new(RefCell::new(F405::default()));
     let mut board = start(&flash);
     assert_eq!(board.store_result(), Err(Refusal::NothingFound));
-    let level = [0.0, 0.0, 9.81];
-    assert_eq!(
-        calibrate(&mut board, Task::Static, level, 0.3),
-        State::Failed(Task::Static, CalibrationFault::Moving(0))
-    );
+    let moving = State::Failed(Task::Static, CalibrationFault::Moving(0));
+    assert_eq!(calibrate(&mut board, Task::Static, LEVEL, 0.3), moving);
     assert_eq!(board.store_result(), Err(Refusal::NothingFound));
     let mut board = start(&flash);
     let before = (*board.learned(), board.calibration().level);
@@ -65,7 +55,7 @@ fn calibration_is_found_and_kept() {
         board.observe(None, 0, (Status::Silent, Faults::NONE), &WheelSample::default(), &Standing::UNKNOWN);
         assert_eq!(board.store_result(), Err(Refusal::NothingFound), "cancelled");
     }
-    assert_eq!(calibrate(&mut board, Task::Static, level, 0.001), State::Found(Task::Static));
+    assert_eq!(calibrate(&mut board, Task::Static, LEVEL, 0.001), State::Found(Task::Static));
     assert_eq!(board.store_result(), Ok(()));
     // Rolled by 30 deg: gravity shows on y.
     let tilted = [0.0, 9.81 * 0.5, 9.81 * 0.866_025_4];
@@ -108,8 +98,8 @@ fn calibration_looks_at_the_wheels() {
     for (wheels, standing) in [(Standstill::Moving, Standing::UNKNOWN), (Standstill::Still, contradicted)] {
         let mut board = start(&Rc::new(RefCell::new(F405::default())));
         board.start_calibration(Task::Static);
-        let (smooth, wheels) = (sample(0, [0.0, 0.0, 9.81], 0.01), WheelSample::without_speeds(wheels));
-        board.observe(Some(&smooth), 0, (Status::Ready, Faults::NONE), &wheels, &standing);
+        let (smooth, wheels) = (sample(0, LEVEL, 0.01), WheelSample::without_speeds(wheels));
+        board.observe(Some(&smooth), 0, GOOD, &wheels, &standing);
         let failed = State::Failed(Task::Static, CalibrationFault::Moving(6));
         assert_eq!(board.calibration_state(), failed);
     }

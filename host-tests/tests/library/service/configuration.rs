@@ -1,6 +1,6 @@
 //! The configuration is stored whole, at standstill alone, and refused where it is wrong.
 
-use super::{Board, IDENTITY, SUPPORTED_HARDWARE, bare, info, sample, start};
+use super::{Board, GOOD, IDENTITY, LEVEL, SUPPORTED_HARDWARE, bare, info, sample, start};
 use embedded_can::{Id, StandardId};
 use gyronet::can::config::{ConfigError, Settings};
 use gyronet::can::diagnosis::DiagnosisIds;
@@ -188,9 +188,9 @@ fn identifiers_of_diagnosis_are_three_that_nobody_else_uses() {
 }
 
 fn see(board: &mut Board, standing: Standing) {
-    let at_rest = sample(0, [0.0, 0.0, 9.81], 0.01);
+    let at_rest = sample(0, LEVEL, 0.01);
     let wheels = WheelSample::without_speeds(Standstill::Unknown);
-    board.observe(Some(&at_rest), 0, (Status::Ready, Faults::NONE), &wheels, &standing);
+    board.observe(Some(&at_rest), 0, GOOD, &wheels, &standing);
 }
 
 fn storable(board: &mut Board) -> bool {

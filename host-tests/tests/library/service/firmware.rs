@@ -1,9 +1,7 @@
 //! Firmware updates over diagnosis: what is refused before anything is erased, the trial, and the way back.
 
 use super::uds::Bench;
-use super::{Board, IDENTITY, sample, start_from};
-use gyronet::health::{Faults, Status};
-use gyronet::sample::{Standstill, WheelSample};
+use super::{Board, IDENTITY, start_from};
 use gyronet::service::device::{Firmware, FirmwareState};
 use gyronet::service::message::{BLOCK, Refusal};
 use gyronet::store::Slot;
@@ -12,7 +10,6 @@ use gyronet::store::layout::RECORD_SECTOR;
 use gyronet::store::slots::SlotError;
 use gyronet_host_tests::flash::{F405, Region};
 use gyronet_host_tests::stored::{flash_image, image};
-use gyronet_host_tests::synthetic::judged;
 use gyronet_tools::client::device::update::Update;
 use gyronet_tools::signing::PrivateKey;
 use std::cell::RefCell;
@@ -40,8 +37,7 @@ fn boot(flash: &Flash, has_failed: bool) -> Option<Slot> {
 
 fn session(flash: &Flash, running: Slot) -> Bench {
     let mut bench = Bench::of(start_from(flash, Some(running)));
-    bench.expect(&[0x10, 2], &[0x50, 2, 0, 50, 0x01, 0xF4]);
-    bench.stand();
+    bench.enter(2);
     bench
 }
 
@@ -273,9 +269,7 @@ fn firmware_of_a_vehicle_that_moves_is_not_touched() {
     let (flash, mut bench) = board();
     let update = update(OWN);
     bench.expect(&write_head(&update.head.bytes(), &[]), &[0x6E, 1, 0x1A]);
-    let moving = WheelSample::without_speeds(Standstill::Moving);
-    let (good, turning) = ((Status::Ready, Faults::NONE), sample(0, [0.0, 0.0, 9.81], 0.3));
-    bench.board.observe(Some(&turning), 0, good, &moving, &judged(Standstill::Moving));
+    bench.turn();
     bench.expect(&begin(update.images[1].len() as u32), &[0x7F, 0x34, 0x22]);
     assert_eq!(refusal(&bench), Some(Refusal::Moving));
     assert_eq!(boot(&flash, true), Some(Slot::A));

@@ -1,28 +1,20 @@
 //! The record of access: what damage, power cuts, relays and guesses do to it.
 
+use super::Board;
+use super::access::{SERIAL, a_key, content, locked, write};
 use super::uds::{Bench, bench};
-use super::{Board, sample};
-use gyronet::health::{Faults, Status};
 use gyronet::model::blob::CRC;
-use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::event::EventKind;
 use gyronet::store::layout::STORE;
 use gyronet::store::{Access, Configuration, Record, StoreError};
 use gyronet_host_tests::flash::{Cut, F405};
 use gyronet_host_tests::stored::open;
-use gyronet_host_tests::synthetic::judged;
 use gyronet_tools::signing::PrivateKey;
 use std::cell::RefCell;
 use std::ops::Range;
 use std::rc::Rc;
 
-const SERIAL: [u8; 12] = *b"a test board";
 type Flash = Rc<RefCell<F405>>;
-
-fn enter(bench: &mut Bench) {
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    bench.stand();
-}
 
 fn write_key(key: [u8; 32], trailer: &[u8]) -> Vec<u8> {
     [&[0x2E, 1, 0x10][..], &key, trailer].concat()
@@ -31,20 +23,6 @@ fn write_key(key: [u8; 32], trailer: &[u8]) -> Vec<u8> {
 fn replace(bench: &mut Bench, [before, next]: [&PrivateKey; 2], counter: u32) {
     let trailer = before.trailer(0x0110, Some(SERIAL), counter, &next.public());
     bench.expect(&write_key(next.public(), &trailer), &[0x6E, 1, 0x10]);
-}
-
-fn keys() -> [PrivateKey; 2] {
-    [(); 2].map(|()| PrivateKey::generate().expect("random numbers"))
-}
-
-/// A board with a key, in an extended session that has not proven it.
-fn locked(key: &PrivateKey) -> (Flash, Bench) {
-    let (flash, mut bench) = bench();
-    enter(&mut bench);
-    bench.expect(&write_key(key.public(), &[]), &[0x6E, 1, 0x10]);
-    let mut bench = Bench::new(&flash);
-    enter(&mut bench);
-    (flash, bench)
 }
 
 fn challenge(bench: &mut Bench, number: u8) -> [u8; 32] {
@@ -79,8 +57,8 @@ fn is_known(flash: &Flash, key: &PrivateKey) -> bool {
 
 #[test]
 fn a_challenge_is_answered_once_by_the_key_that_it_was_made_for() {
-    let [key, next] = keys();
-    let (_, mut bench) = locked(&key);
+    let (_, mut bench, key) = locked();
+    let next = a_key();
     let seed = challenge(&mut bench, 1);
     bench.expect(&answer(&next, seed), &[0x7F, 0x27, 0x35]);
     bench.expect(&answer(&key, seed), &[0x7F, 0x27, 0x24]);
@@ -98,8 +76,8 @@ fn a_challenge_is_answered_once_by_the_key_that_it_was_made_for() {
 /// A signed key may have been recorded elsewhere: whoever sends it has proven nothing.
 #[test]
 fn a_relayed_key_gives_no_access_and_ends_that_of_the_key_before() {
-    let [key, next] = keys();
-    let (_, mut bench) = locked(&key);
+    let (_, mut bench, key) = locked();
+    let next = a_key();
     replace(&mut bench, [&key, &next], 1);
     assert_eq!(state(&mut bench), 1);
     bench.expect(&[0x14, 255, 255, 255], &[0x7F, 0x14, 0x33]);
@@ -111,8 +89,8 @@ fn a_relayed_key_gives_no_access_and_ends_that_of_the_key_before() {
 
 #[test]
 fn wrong_answers_of_others_do_not_keep_the_owner_out() {
-    let [key, other] = keys();
-    let (flash, mut bench) = locked(&key);
+    let (flash, mut bench, key) = locked();
+    let other = a_key();
     for number in 1..=3 {
         let seed = challenge(&mut bench, number);
         assert!(bench.ask(&answer(&other, seed)).is_some_and(|response| response[0] == 0x7F));
@@ -120,10 +98,8 @@ fn wrong_answers_of_others_do_not_keep_the_owner_out() {
     }
     bench.expect(&[0x27, 1], &[0x7F, 0x27, 0x37]);
     // What the owner signs is taken meanwhile, and the delay is over.
-    let record = postcard::to_stdvec(&Configuration::DEFAULT).expect("there is room");
-    let content = [&[Configuration::VERSION][..], &record].concat();
-    let trailer = key.trailer(0x0100, Some(SERIAL), 1, &content);
-    bench.expect(&[&[0x2E, 1, 0][..], &content, &trailer].concat(), &[0x6E, 1, 0]);
+    let trailer = key.trailer(0x0100, Some(SERIAL), 1, &content(1));
+    bench.expect(&write(&content(1), &trailer), &[0x6E, 1, 0]);
     let seed = challenge(&mut bench, 4);
     bench.expect(&answer(&key, seed), &[0x67, 2]);
     assert_eq!(super::start(&flash).access(), Some(Access { key: Some(key.public()), counter: 1, wrong: 0 }));
@@ -132,22 +108,16 @@ fn wrong_answers_of_others_do_not_keep_the_owner_out() {
 /// No byte of the flash changes while the vehicle moves, whatever is asked with a good key.
 #[test]
 fn nothing_is_written_in_motion_whoever_asks() {
-    let [key, other] = keys();
     let (open, mut without_key) = bench();
-    enter(&mut without_key);
-    let (flash, mut bench) = locked(&key);
+    without_key.enter(3);
+    let (flash, mut bench, key) = locked();
+    let other = a_key();
     let seed = challenge(&mut bench, 1);
-    let (wheels, moving) = (WheelSample::without_speeds(Standstill::Moving), judged(Standstill::Moving));
-    let moved = sample(500, [0.0, 0.0, 9.81], 0.0);
-    for bench in [&mut bench, &mut without_key] {
-        bench.board.observe(Some(&moved), 500, (Status::Ready, Faults::NONE), &wheels, &moving);
-    }
+    [&mut bench, &mut without_key].into_iter().for_each(Bench::turn);
     without_key.expect(&write_key(key.public(), &[]), &[0x7F, 0x2E, 0x22]);
     assert_eq!(super::start(&open).access(), Some(Access::OPEN));
     let before = flash.borrow().operations();
-    let record = postcard::to_stdvec(&Configuration::DEFAULT).expect("there is room");
-    let content = [&[Configuration::VERSION][..], &record].concat();
-    let signed = [&[0x2E, 1, 0][..], &content, &key.trailer(0x0100, None, 1, &content)].concat();
+    let signed = write(&content(1), &key.trailer(0x0100, None, 1, &content(1)));
     let next = write_key(other.public(), &key.trailer(0x0110, None, 1, &other.public()));
     for request in [signed, next, answer(&key, seed), answer(&other, seed)] {
         let response = bench.ask(&request).expect("a response");
@@ -158,8 +128,8 @@ fn nothing_is_written_in_motion_whoever_asks() {
 
 #[test]
 fn one_damaged_record_of_access_is_restored_from_the_other() {
-    let [key, next] = keys();
-    let (flash, mut bench) = locked(&key);
+    let (flash, mut bench, key) = locked();
+    let next = a_key();
     replace(&mut bench, [&key, &next], 1);
     let found = records(&flash);
     assert_eq!(found.len(), 2, "superseded ones are erased: {found:?}");
@@ -183,8 +153,8 @@ fn one_damaged_record_of_access_is_restored_from_the_other() {
 
 #[test]
 fn with_both_records_of_access_damaged_nobody_may_write() {
-    let [key, next] = keys();
-    let (flash, mut bench) = locked(&key);
+    let (flash, mut bench, key) = locked();
+    let next = a_key();
     replace(&mut bench, [&key, &next], 1);
     let [first, second] = &records(&flash)[..] else { panic!("two") };
     let (whole, span) = (flash.borrow().clone(), first.len());
@@ -202,7 +172,7 @@ fn with_both_records_of_access_damaged_nobody_may_write() {
                 assert_eq!(board.set_configuration(&Configuration::DEFAULT), Ok(()), "the device itself");
             }
             let mut bench = Bench::new(&flash);
-            enter(&mut bench);
+            bench.enter(3);
             bench.expect(&write_key(key.public(), &[0; 69]), &[0x7F, 0x2E, 0x33]);
             bench.expect(&[0x27, 1], &[0x7F, 0x27, 0x33]);
         }
@@ -212,8 +182,8 @@ fn with_both_records_of_access_damaged_nobody_may_write() {
 /// Whatever single bit flips, the key stays: in headers, in other records, in what marks.
 #[test]
 fn no_flipped_bit_opens_a_board_or_revives_a_key() {
-    let [key, next] = keys();
-    let (flash, mut bench) = locked(&key);
+    let (flash, mut bench, key) = locked();
+    let next = a_key();
     replace(&mut bench, [&key, &next], 1);
     let whole = flash.borrow().clone();
     let is_used = |at: &usize| whole.bytes()[*at] != 0xFF;
@@ -231,7 +201,7 @@ fn no_flipped_bit_opens_a_board_or_revives_a_key() {
 /// A cut, or an older firmware, has left a single record.
 #[test]
 fn a_single_record_of_access_is_doubled_at_the_start() {
-    let [key, _] = keys();
+    let key = a_key();
     let (flash, access) = (Flash::default(), Access { key: Some(key.public()), ..Access::OPEN });
     open(&flash).and_then(|mut store| store.set(&Configuration::DEFAULT)).expect("it is stored");
     // Of the first record's eleven words, and of the next one.

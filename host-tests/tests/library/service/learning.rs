@@ -2,7 +2,7 @@
 //! both over a restart, and forgets them on request.
 
 use super::uds::{Bench, bench};
-use super::{Board, sample, start};
+use super::{Board, GOOD, LEVEL, sample, start};
 use gyronet::bias::StaticConfig;
 use gyronet::heading::{CourseCounters, CourseState, Gain, Refusal};
 use gyronet::health::slow::Knowledge;
@@ -22,8 +22,6 @@ use gyronet_host_tests::synthetic::judged;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-const LEVEL: [f32; 3] = [0.0, 0.0, 9.81];
-
 /// Lets the board see seconds of a sensor at rest with this bias and temperature, while the wheels show this.
 fn observe(
     board: &mut Board,
@@ -35,8 +33,7 @@ fn observe(
     for tick in 0..100 * seconds {
         let temperature = Some(CentiCelsius(celsius * 100));
         let sample = ImuSample { temperature, ..sample(tick, force, bias) };
-        let (wheels, standing) = (WheelSample::without_speeds(wheels), judged(wheels));
-        board.observe(Some(&sample), tick as u32, (Status::Ready, Faults::NONE), &wheels, &standing);
+        super::observe(board, tick as u32, Some(&sample), GOOD, wheels);
     }
 }
 

@@ -1,10 +1,9 @@
 //! The log keeps the latest events and counts those that it has dropped.
 
-use super::{IDENTITY, bare, info, sample};
+use super::{IDENTITY, LEVEL, bare, info, observe, sample};
 use gyronet::health::{Faults, Status};
-use gyronet::sample::{Standstill, WheelSample};
+use gyronet::sample::Standstill;
 use gyronet::service::event::{EventKind, ResetCause, SensorFault};
-use gyronet_host_tests::synthetic::judged;
 
 #[test]
 fn sensor_that_does_not_answer_is_noted_once() {
@@ -29,13 +28,8 @@ fn the_log_is_bounded_and_reports_what_is_lost() {
     assert_eq!(kinds, [EventKind::Started(ResetCause::Software), EventKind::Crashed(crash)]);
     for k in 0..100 {
         let status = if k % 2 == 0 { Status::Ready } else { Status::Degraded };
-        board.observe(
-            Some(&sample(k, [0.0, 0.0, 9.8], 0.0)),
-            k as u32,
-            (status, Faults::NONE),
-            &WheelSample::without_speeds(Standstill::Still),
-            &judged(Standstill::Still),
-        );
+        let state = (status, Faults::NONE);
+        observe(&mut board, k, Some(&sample(k.into(), LEVEL, 0.0)), state, Standstill::Still);
     }
     let (mut after, mut events, mut lost) = (2, 0, 0);
     loop {

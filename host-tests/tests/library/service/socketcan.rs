@@ -1,5 +1,5 @@
-//! Diagnosis over a CAN interface of Linux: the client of `gyronet device`, and udsoncan over can-isotp, against the
-//! library's server, with other frames on the bus.
+//! Diagnosis over a CAN interface of Linux: the client of `gyronet device` against the library's server, with other
+//! frames on the bus.
 //!
 //! A real interface does, or `ip link add vcan0 type vcan && ip link set vcan0 up`. Where the kernel has no CAN,
 //! `host-tests/socketcan/run` starts a virtual machine that has.
@@ -11,8 +11,6 @@ use gyronet::service::message::AllCounters;
 use gyronet::store::{Configuration, Mounting, Slot, slots::WeightSource};
 use gyronet::uds::Server;
 use gyronet_host_tests::flash::F405;
-use gyronet_host_tests::recordings::workspace;
-use gyronet_host_tests::require;
 use gyronet_host_tests::stored::other_weights;
 use gyronet_tools::client::bus::{self, Bus};
 use gyronet_tools::client::device::Device;
@@ -92,17 +90,6 @@ fn diagnose(name: &str) {
     let info = device.info().expect("a response");
     assert_eq!(info.weights, WeightSource::Slot(Slot::A));
     assert_eq!(device.configuration().expect("a response").mounting, mounting);
-
-    if let Some(python) = require::python(TEST, &["can", "isotp", "udsoncan", "yaml"]) {
-        let client = workspace().join("host-tests/tests/clients/uds_client.py");
-        let interface = name.trim_start_matches("can:");
-        let output =
-            Command::new(python).arg(client).args(["socketcan", interface]).output().expect("Python");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let said = String::from_utf8_lossy(&output.stdout);
-        assert!(said.ends_with("done\n"), "{said}");
-        println!("udsoncan: {} values read, and all else as it should be", said.lines().count() - 2);
-    }
 
     // The interface goes down; only its owner may do that.
     let interface = name.trim_start_matches("can:");

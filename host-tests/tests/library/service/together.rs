@@ -1,6 +1,7 @@
 //! Settings that are valid one by one and together: what is accepted can run, in whatever order it is stored.
 
 use super::IDENTITY;
+use super::weights::upload as upload_over;
 use embedded_can::{Id, StandardId};
 use gyronet::can::config::Config;
 use gyronet::can::signal::{BitField, ByteOrder};
@@ -216,15 +217,8 @@ fn weights_that_are_too_slow_for_the_stride_are_not_activated() {
     configuration.compensate.stride = Stride::new(1).expect("a sample");
     assert_eq!(board.set_configuration(&configuration), Ok(()), "with the built-in weights");
     let file = other_weights(1);
-    let send = |board: &mut super::Board| {
-        board.weights_begin(file.len() as u32)?;
-        for (block, offset) in file.chunks(256).zip((0..).step_by(256)) {
-            board.weights_block(offset, block)?;
-        }
-        board.weights_verify(|_| ())?;
-        board.weights_activate()
-    };
-    assert!(matches!(send(&mut board), Err(Refusal::Slot(SlotError::Slow { .. }))));
+    assert_eq!(upload_over(&mut board, &file), Ok(()));
+    assert!(matches!(board.weights_activate(), Err(Refusal::Slot(SlotError::Slow { .. }))));
     assert_eq!(board.set_configuration(&Configuration::DEFAULT), Ok(()));
     assert_eq!(board.weights_activate(), Ok(()));
     let window = board.set_configuration(&configuration);

@@ -2,11 +2,11 @@
 //! ISO 14229-1 word for word.
 
 use super::access::locked;
-use super::{Board, sample, start};
+use super::{Board, GOOD, LEVEL, observe, sample, start};
 use gyronet::coprocessor::Contradiction;
 use gyronet::health::{Faults, Quality, Status};
 use gyronet::model::weights;
-use gyronet::sample::{Standstill, WheelSample};
+use gyronet::sample::Standstill;
 use gyronet::service::event::SensorFault;
 use gyronet::service::message::{AllCounters, Refusal};
 use gyronet::store::{Configuration, Field, FieldError, Record, StoreError};
@@ -15,9 +15,10 @@ use gyronet::uds::data::{Access, IDENTIFIERS, Identifier};
 use gyronet::uds::dtc::{PASSED_TICKS, TROUBLES, bit};
 use gyronet_host_tests::flash::F405;
 use gyronet_host_tests::recordings::workspace;
-use gyronet_host_tests::stored::other_weights;
+use gyronet_host_tests::stored::{crc, other_weights};
 use gyronet_host_tests::synthetic::judged;
-use gyronet_host_tests::tester::{Tester, bytes, frame};
+use gyronet_host_tests::tester::{Tester, frame};
+use gyronet_host_tests::wire::bytes;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -68,14 +69,7 @@ impl Bench {
     }
 
     pub fn turn(&mut self) {
-        let turning = sample(0, [0.0, 0.0, 9.81], 0.3);
-        self.board.observe(
-            Some(&turning),
-            0,
-            (Status::Ready, Faults::NONE),
-            &WheelSample::without_speeds(Standstill::Moving),
-            &judged(Standstill::Moving),
-        );
+        observe(&mut self.board, 0, Some(&sample(0, LEVEL, 0.3)), GOOD, Standstill::Moving);
     }
 
     pub fn expect(&mut self, request: &[u8], response: &[u8]) {
@@ -85,16 +79,14 @@ impl Bench {
     /// Lets a vehicle stand long enough to prove it.
     pub fn stand(&mut self) {
         for k in 0..400 {
-            let at_rest = sample(k, [0.0, 0.0, 9.81], 0.0);
-            let good = (Status::Ready, Faults::NONE);
-            self.board.observe(
-                Some(&at_rest),
-                k as u32,
-                good,
-                &WheelSample::without_speeds(Standstill::Still),
-                &judged(Standstill::Still),
-            );
+            observe(&mut self.board, k, Some(&sample(k.into(), LEVEL, 0.0)), GOOD, Standstill::Still);
         }
+    }
+
+    /// Begins a session, and stands.
+    pub fn enter(&mut self, session: u8) {
+        self.expect(&[0x10, session], &[0x50, session, 0, 50, 0x01, 0xF4]);
+        self.stand();
     }
 
     fn fail(&mut self, status: Status, faults: Faults) {
@@ -102,13 +94,7 @@ impl Bench {
     }
 
     fn fail_at(&mut self, tick: u32, status: Status, faults: Faults) {
-        self.board.observe(
-            None,
-            tick,
-            (status, faults),
-            &WheelSample::without_speeds(Standstill::Unknown),
-            &judged(Standstill::Unknown),
-        );
+        observe(&mut self.board, tick, None, (status, faults), Standstill::Unknown);
         self.server.poll(&mut self.board, &AllCounters::default(), self.now, || None);
     }
 }
@@ -301,13 +287,7 @@ fn a_trouble_survives_a_restart_with_the_state_in_which_it_came() {
     let (flash, mut bench) = bench();
     // Something has been stored before: there is room without an erase.
     assert_eq!(bench.board.set_configuration(&Configuration::DEFAULT), Ok(()));
-    bench.board.observe(
-        None,
-        1_234,
-        (Status::Silent, Faults::GAP),
-        &WheelSample::without_speeds(Standstill::Unknown),
-        &judged(Standstill::Unknown),
-    );
+    observe(&mut bench.board, 1_234, None, (Status::Silent, Faults::GAP), Standstill::Unknown);
     let operations = flash.borrow().operations();
     bench.server.poll(&mut bench.board, &AllCounters::default(), 0, || None);
     assert!(flash.borrow().operations() > operations);
@@ -365,8 +345,7 @@ fn a_trouble_is_pending_for_two_cycles_and_confirmed_until_it_is_cleared() {
 fn a_stall_for_a_request_leaves_no_troubles() {
     let (_, mut bench) = bench();
     bench.expect(&[0x14, 0xFF, 0xFF, 0xFF], &[0x54]);
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    bench.stand();
+    bench.enter(3);
     let before = bench.ask(&[0x19, 2, 8]).expect("the crash of these tests");
     let record = postcard::to_stdvec(&Configuration::DEFAULT).expect("it fits");
     bench.expect(&[&[0x2E, 1, 0, Configuration::VERSION][..], &record].concat(), &[0x6E, 1, 0]);
@@ -388,8 +367,7 @@ fn a_trouble_erases_nothing_before_a_tester_s_session_at_standstill() {
     let (flash, mut bench) = bench();
     bench.fail(Status::Silent, Faults::NONE);
     assert_eq!(flash.borrow().operations(), 0, "the flash of a new board has no room without an erase");
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    bench.stand();
+    bench.enter(3);
     bench.fail(Status::Silent, Faults::NONE);
     // Case bus/05: a request in the middle of an erase would be answered late, so the erase waits for one.
     bench.expect(&[0x3E, 0], &[0x7E, 0]);
@@ -527,9 +505,8 @@ fn a_static_calibration_runs_as_a_routine() {
 }
 
 /// Downloads a file; returns the response to the last step.
-fn download(bench: &mut Bench, file: &[u8]) -> Vec<u8> {
-    bench.expect(&[0x10, 2], &[0x50, 2, 0, 50, 0x01, 0xF4]);
-    bench.stand();
+pub fn download(bench: &mut Bench, file: &[u8]) -> Vec<u8> {
+    bench.enter(2);
     let [a, b, c, d] = (file.len() as u32).to_be_bytes();
     let granted = bench.ask(&[0x34, 0, 0x44, 0, 0, 0, 0, a, b, c, d]).expect("an answer");
     assert_eq!(granted, [0x74, 0x20, 1, 2]);
@@ -550,13 +527,13 @@ fn download(bench: &mut Bench, file: &[u8]) -> Vec<u8> {
 fn weights_are_downloaded_and_used_after_a_restart() {
     let (flash, mut bench) = bench();
     let file = other_weights(1);
-    assert_eq!(download(&mut bench, &file), [&[0x77, 0][..], &crc(&file)].concat(), "slot A");
-    bench.expect(&[0x22, 1, 3], &[&[0x62, 1, 3, 1][..], &crc(&weights::DEFAULT.0)].concat());
+    assert_eq!(download(&mut bench, &file), [&[0x77, 0][..], &crc(&file).to_be_bytes()].concat(), "slot A");
+    bench.expect(&[0x22, 1, 3], &[&[0x62, 1, 3, 1][..], &crc(&weights::DEFAULT.0).to_be_bytes()].concat());
     bench.expect(&[0x31, 1, 0xFF, 1], &[0x71, 1, 0xFF, 1]);
     bench.expect(&[0x11, 1], &[0x51, 1]);
     assert!(bench.server.restart_is_due());
     let mut after = Bench::new(&flash);
-    after.expect(&[0x22, 1, 3], &[&[0x62, 1, 3, 2][..], &crc(&file)].concat());
+    after.expect(&[0x22, 1, 3], &[&[0x62, 1, 3, 2][..], &crc(&file).to_be_bytes()].concat());
 }
 
 #[test]
@@ -571,18 +548,13 @@ fn a_damaged_file_is_not_used() {
     bench.expect(&[0x10, 2], &[0x50, 2, 0, 50, 0x01, 0xF4]);
     bench.expect(&[0x36, 1, 0], &[0x7F, 0x36, 0x24]);
     let mut after = Bench::new(&flash);
-    after.expect(&[0x22, 1, 3], &[&[0x62, 1, 3, 1][..], &crc(&weights::DEFAULT.0)].concat());
-}
-
-fn crc(file: &[u8]) -> [u8; 4] {
-    u32::from_le_bytes(*file.last_chunk().expect("a checksum")).to_be_bytes()
+    after.expect(&[0x22, 1, 3], &[&[0x62, 1, 3, 1][..], &crc(&weights::DEFAULT.0).to_be_bytes()].concat());
 }
 
 #[test]
 fn a_single_setting_is_refused_and_the_successor_named() {
     let (_, mut bench) = bench();
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    bench.stand();
+    bench.enter(3);
     for id in [0x01, 0x0C, 0x1E] {
         bench.expect(&[0x22, 2, id], &[0x7F, 0x22, 0x31]);
         bench.expect(&[0x2E, 2, id, 0x42, 0xB4, 0, 0], &[0x7F, 0x2E, 0x31]);
