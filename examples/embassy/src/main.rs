@@ -29,7 +29,7 @@ use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{bind_interrupts, peripherals, rcc};
+use embassy_stm32::{bind_interrupts, pac, peripherals, rcc};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Ticker};
@@ -146,13 +146,15 @@ fn main() -> ! {
     static RECEIVED: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
     static UNSENT: ConstStaticCell<[u8; 1]> = ConstStaticCell::new([0]);
 
+    // SAFETY: nothing else uses the watchdog; embassy hands it out only after it has waited for the clock, for ever.
+    let mut watchdog = IndependentWatchdog::new(unsafe { peripherals::IWDG::steal() }, WATCHDOG_US);
+    watchdog.unleash();
     let identity = service::identity();
     let parts = embassy_stm32::init(clocks());
-    let mut watchdog = IndependentWatchdog::new(parts.IWDG, WATCHDOG_US);
-    watchdog.unleash();
+    pac::FLASH.acr().modify(|w| w.set_prften(true));
 
     let device = DEVICE.take();
-    device.begin(Some(Records::new(Flash::new_blocking(parts.FLASH))), None, Ok(()), identity);
+    device.begin(Records::new(Flash::new_blocking(parts.FLASH)), None, Ok(()), identity);
     watchdog.pet();
     let blob = device.weights(None, &weights::DEFAULT.0);
     let weights = blob.map_or(0, |blob| blob.crc);

@@ -9,7 +9,7 @@ use core::convert::Infallible;
 use core::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use cortex_m::peripheral::SCB;
 use embassy_stm32::flash::{Blocking, Flash};
-use embassy_stm32::pac;
+use embassy_stm32::pac::{self, flash::vals::OptsrSwapBank};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use gyronet::service::MappedSlots;
 
@@ -42,8 +42,9 @@ unsafe fn NonMaskableInt() {
 pub struct Records(Flash<'static, Blocking>);
 
 impl Records {
-    pub fn new(flash: Flash<'static, Blocking>) -> Self {
-        Self(flash)
+    /// Returns no records if an option has swapped the banks: erases go by the bank itself, where the program lies then.
+    pub fn new(flash: Flash<'static, Blocking>) -> Option<Self> {
+        (pac::FLASH.optsr_cur().read().swap_bank() == OptsrSwapBank::B_0X0).then_some(Self(flash))
     }
 
     /// Reads flash; `None` if its code does not fit.

@@ -133,6 +133,14 @@ class H5(unittest.TestCase):
         self.board.advance(10 * MS)
         self.assertEqual(self.board.memory_read(0x0810_5FF0, 32), b"\xFF" * 16 + bytes(16))
 
+    def test_with_swapped_banks_an_erase_goes_by_the_bank_itself(self):
+        self.assertEqual(self.board.read("FLASH", 0x50), 0)
+        self.board.peripherals["FLASH"].configure("swap_bank", True)
+        self.assertEqual(self.board.read("FLASH", 0x50), 1 << 31)
+        self.unlock()
+        self.board.write("FLASH", 0x28, 1 << 31 | 2 << 6 | 1 << 5 | 4)
+        self.assertEqual(self.board.events("flash_erase")[0]["sectors"], [2])
+
     def test_a_reset_during_an_operation_leaves_quad_words_without_their_ecc(self):
         flash = self.board.peripherals["FLASH"]
         flash.hook = True
@@ -163,7 +171,7 @@ class H5(unittest.TestCase):
 
     # -- FDCAN -------------------------------------------------------------------------------------------------------
 
-    def start_can(self, cccr=0x300):
+    def start_can(self, cccr=0x300, nominal=11 << 8 | 2):
         """500 kbit/s and 2 Mbit/s from 8 MHz; one filter for 0xAA."""
         write = self.board.write
         self.board.alternate("D", 0, 9)
@@ -172,7 +180,7 @@ class H5(unittest.TestCase):
         self.board.advance(1 * MS)
         write("FDCAN1", 0x18, 1)
         write("FDCAN1", 0x18, 3)
-        write("FDCAN1", 0x1C, 13 << 8 | 0)
+        write("FDCAN1", 0x1C, nominal)
         write("FDCAN1", 0x0C, 1 << 8)
         write("FDCAN1", 0x80, 1 << 16 | 2 << 4 | 2 << 2)
         write("SRAMCAN", 0x00, 2 << 30 | 1 << 27 | 0xAA << 16 | 0x7FF)
@@ -197,6 +205,10 @@ class H5(unittest.TestCase):
         self.board.write("FDCAN1", 0x18, 0x101)
         self.assertEqual(self.board.read("FDCAN1", 0x18), 1)
         self.assertEqual(len(self.board.events("ignored_write")), 2)
+
+    def test_a_sample_point_away_from_80_percent_is_a_violation(self):
+        with self.assertRaises(Violation):
+            self.start_can(nominal=13 << 8 | 0)
 
     def test_the_fifo_sends_in_order_whatever_the_identifiers(self):
         bus = self.start_can()

@@ -110,6 +110,16 @@ class Fdcan(Peripheral):
             divider = 2 * self.words[CKDIV] or 1
             self.bit_ps, self.data_bit_ps = (divider * c * q * PS // hz for c, q in zip(clocks, quanta))
 
+    def _check_sample_points(self):
+        """Checks that bits are sampled at 80 %, as the other nodes on this bus do."""
+        nominal, data = self.words[NBTP], self.words[DBTP]
+        times = [("nominal", nominal >> 8 & 0xFF, nominal & 0x7F)]
+        times += [("data", data >> 8 & 0x1F, data >> 4 & 15)] if self.takes_fd else []
+        for name, first, second in times:
+            point = 100 * (2 + first) / (3 + first + second)
+            if not 75 <= point <= 85:
+                raise Violation(f"{self.name}: the sample point of {name} bits is at {point:.0f} %, that of the bus at 80 %")
+
     def _join(self):
         """Takes part in the bus after 11 recessive bits, or after 129 times as many if it was off."""
         self.join_event = None
@@ -153,6 +163,7 @@ class Fdcan(Peripheral):
         elif not self.on_bus and self.join_event is None:
             self.started = self.board.now
             self.clocks_changed()
+            self._check_sample_points()
             self._join()
 
     def bus_recovered(self):

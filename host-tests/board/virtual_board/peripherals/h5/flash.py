@@ -3,9 +3,11 @@
 A store to the array fills a buffer of sixteen bytes, which are programmed when it is full. What is executed from the bank that
 is busy stalls the core. Witnesses: the header, the HAL, and for NSSR (which NSCCR clears), INCERR and an incomplete buffer what
 others measured on a NUCLEO-H563ZI (w1ne/labwired-core, pull request 335). A power cut or reset during an operation leaves
-quad-words whose ECC does not fit; reading one sets ECCDETR.ECCD, which is an NMI until it is cleared. Left out: option bytes and
-with them the swap of the banks, high-cycle data, bank and mass erase, protection. A second programming of a quad-word, whose ECC
-would no longer fit either, is a violation. Assumed: the times, since no data sheet was at hand.
+quad-words whose ECC does not fit; reading one sets ECCDETR.ECCD, which is an NMI until it is cleared. Of the option bytes there
+is SWAP_BANK: addresses follow it, and BKSEL names the bank itself. Left out: high-cycle data, bank and mass erase, protection. A second programming of a quad-word, whose ECC
+would no longer fit either, is a violation. Guessed: the times, since no data sheet (DS14258) was at hand.
+
+Settings: `swap_bank`.
 """
 
 from ...violation import Violation
@@ -14,13 +16,13 @@ from .system import Registers
 
 BASE, BANK, SECTOR, QUAD = 0x0800_0000, 1 << 20, 8 << 10, 16
 KEYS = (0x4567_0123, 0xCDEF_89AB)
-ACR, NSKEYR, NSSR, NSCR, NSCCR, ECCDETR = 0x00, 0x04, 0x20, 0x28, 0x30, 0x104
+ACR, NSKEYR, NSSR, NSCR, NSCCR, OPTSR_CUR, ECCDETR = 0x00, 0x04, 0x20, 0x28, 0x30, 0x50, 0x104
 BSY, WBNE, EOP, PGSERR, STRBERR, INCERR = (1 << bit for bit in (0, 1, 16, 18, 19, 20))
 FLAGS = 0x00FF_0000
 LOCK, PG, SER, START, BKSEL = (1 << bit for bit in (0, 1, 2, 5, 31))
 #: All that NSCR keeps: PG, SER, SNB, BKSEL; the rest is not modelled.
 KEPT = PG | SER | 0x7F << 6 | BKSEL
-ECCD = 1 << 31
+ECCD = SWAP_BANK = 1 << 31
 PROGRAM_PS, ERASE_PS = 100_000_000, 4_000_000_000
 
 
@@ -37,6 +39,7 @@ class Flash(Registers):
         #: The operation: its end, address, new content. The quad-words whose ECC does not fit, and the hook on their reads.
         self.busy = None
         self.torn, self.hook = set(), None
+        self.swapped = False
 
     def reset(self, cause):
         super().reset(cause)
@@ -61,6 +64,8 @@ class Flash(Registers):
             return self.control
         if offset == ECCDETR:
             return self.detected
+        if offset == OPTSR_CUR:
+            return SWAP_BANK if self.swapped else 0
         return super().read(offset, size)
 
     def write(self, offset, value, size):
@@ -98,7 +103,7 @@ class Flash(Registers):
         if value & START:
             if not value & SER or value & PG:
                 raise Violation(f"{self.name}: NSCR {value:#x} starts no sector erase")
-            at = (BANK if value & BKSEL else 0) + (value >> 6 & 0x7F) * SECTOR
+            at = (BANK if bool(value & BKSEL) != self.swapped else 0) + (value >> 6 & 0x7F) * SECTOR
             self.board.record("flash_erase", sectors=[at // SECTOR])
             self._begin(BASE + at, b"\xFF" * SECTOR, ERASE_PS)
 
@@ -158,3 +163,8 @@ class Flash(Registers):
         if address & -QUAD in self.torn and not self.detected:
             self.detected = ECCD | 1 << 22 | (address - BASE) % BANK // QUAD
             self.board.nmi()
+
+    def configure(self, key, value):
+        if key != "swap_bank":
+            super().configure(key, value)
+        self.swapped = value

@@ -1,8 +1,8 @@
 """Reset and clock control of the STM32H563: oscillators, PLL1, prescalers, kernel clocks, clock gates and reset flags.
 
 The frequencies follow from the registers and from the environment. Limits: HCLK by voltage scale and flash latency by HCLK (ST's
-LL driver, stm32h5xx_ll_utils.c). Code was the only witness: the header for places, the SVD for reset values (by which HSI runs
-undivided), the HAL for the PLL's ranges. Left out: PLL2, PLL3, CSI, LSE, the crystal's security system, MCO, and gates in Sleep
+LL driver, stm32h5xx_ll_utils.c). Code was the only witness: the header for places, the SVD for reset values (CR 0x23, by which HSI runs
+undivided; RM0481 is said to give 0x2B, half as fast), the HAL for the PLL's ranges. Left out: PLL2, PLL3, CSI, LSE, the crystal's security system, MCO, and gates in Sleep
 mode. Assumed: oscillators start as on the STM32F405, and the LSI needs no access to the backup domain.
 
 Settings: `hse_hz` (None: the probe supplies no clock), `lsi_hz`.
