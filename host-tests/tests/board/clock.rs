@@ -106,6 +106,7 @@ fn crystal_that_stops() {
 fn bootloader_that_leaves_the_pll_on() {
     let Some(mut board) = boot("bootloader_that_leaves_the_pll_on") else { return };
     board.run(START);
+    common::fall_asleep(&mut board);
     // A jump to the image's start without a reset: everything is still as the image has left it.
     let (reset, _) = board.symbol("Reset");
     board.set_register("primask", 1);

@@ -42,6 +42,17 @@ pub fn boot(test: &str) -> Option<Board> {
     Some(board)
 }
 
+/// Runs until the core sleeps, so that a register can be changed with no instruction and no handler under way.
+pub fn fall_asleep(board: &mut Board) {
+    let step = Duration::from_micros(10);
+    let is_asleep = |board: &mut Board| {
+        let before = board.counts().instructions;
+        board.run(step);
+        board.counts().instructions == before
+    };
+    assert!((0..10_000).any(|_| is_asleep(board)), "the core never sleeps");
+}
+
 /// Samples of the simulated drive, as the sensor sends them.
 pub fn drive(samples: usize) -> Vec<Vec<u8>> {
     let rows = bundled::simulated_drive().expect("it comes with the tools").rows.into_iter();

@@ -95,10 +95,11 @@ fn watchdog_at_the_ends_of_its_oscillator() {
     }
 }
 
-/// Runs the board, changes a register while it sleeps or idles, and gives the crash that follows.
+/// Runs the board, changes a register while it sleeps, and gives the crash that follows.
 fn provoked(test: &str, register: &str, value: u32) -> Option<Crash> {
     let mut board = boot(test)?;
     board.run(START);
+    common::fall_asleep(&mut board);
     board.set_register(register, value);
     let reset = board.run_until("reset", SECOND);
     assert!(reset.is_some(), "no reset");
