@@ -363,7 +363,7 @@ fn only_valid_readings_of_standing_wheels_are_a_reading_at_rest() {
             }
             let speed = match tick {
                 ..1_000 => WheelSpeed(0),
-                ..1_700 => speed,
+                1_000..1_700 => speed,
                 _ => WheelSpeed(5 << WheelSpeed::FRACTION_BITS),
             };
             let standstill = if speed.0 == 0 { Standstill::Unknown } else { Standstill::Moving };
