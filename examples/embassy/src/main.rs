@@ -1,6 +1,6 @@
 //! The coprocessor on a NUCLEO-H563ZI: an Xsens MTi in, frames on CAN out. Copy this folder for a board of your own.
 //!
-//! The bus may carry CAN FD: the controller receives such frames and sends classic ones.
+//! The bus may carry CAN FD: such frames are skipped, and classic ones are sent.
 //!
 //! | line | pins | use |
 //! |---|---|---|
@@ -10,8 +10,8 @@
 //! | flash | bank 2 | records: settings, calibration, what was learnt, troubles |
 //!
 //! Every millisecond `drive` calls [`Coprocessor::step`]. Below it `compute` runs the network, and below both the main program
-//! serves diagnosis and the store ([`service`]). The watchdog is fed while `drive` and the main program get on. Not here yet: sensors on SPI, update of
-//! weights and firmware, keys, the fibre-optic gyro.
+//! serves diagnosis and the store ([`service`]). The watchdog is fed while `drive` and the main program get on. Not here yet:
+//! sensors on SPI, update of weights and firmware, keys, the fibre-optic gyro, counts of failed starts and of UART errors.
 #![no_std]
 #![no_main]
 

@@ -18,7 +18,7 @@ use gyronet::service::event::ResetCause;
 use gyronet::service::message::{AllCounters, Identity};
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::ImuPart;
-use gyronet::uds::Server;
+use gyronet::uds::{Nrc, Server};
 
 /// Clock of the core, Hz.
 pub const CORE_HZ: u32 = 250_000_000;
@@ -62,6 +62,8 @@ pub struct Service {
     ids: [Id; 3],
     weights: Option<BackgroundCheck<'static>>,
     counters: AllCounters,
+    /// Bytes that a tester has still to send of a request that is refused.
+    refused: usize,
     /// Time of the last check of the weights, ms.
     checked: u32,
 }
@@ -69,7 +71,7 @@ pub struct Service {
 impl Service {
     pub fn new(device: &'static mut Stored, ids: [Id; 3], weights: Option<BackgroundCheck<'static>>) -> Self {
         let counters = AllCounters::default();
-        Self { device, server: Server::new(), ids, weights, counters, checked: 0 }
+        Self { device, server: Server::new(), ids, weights, counters, refused: 0, checked: 0 }
     }
 
     /// Does a bounded piece of work.
@@ -104,20 +106,46 @@ impl Service {
         }
     }
 
+    /// Takes the frames (ISO 15765-2) of a request to write the public key, and refuses it. The chip's random numbers are not
+    /// used yet: with a key the board could make no challenge, and who lost the key could never write again.
+    fn refuses_key(&mut self, frame: &[u8]) -> bool {
+        let id = self.ids[2];
+        let respond = |response: [u8; 8]| {
+            // A tester that gets no response asks again.
+            let _ = DataFrame::new(id, &response).map(|frame| RESPONSES.try_send(frame));
+        };
+        let missing = core::mem::take(&mut self.refused);
+        match *frame {
+            [first @ 0x10..=0x1F, second, 0x2E, 0x01, 0x10, ..] => {
+                self.refused = usize::from(u16::from_be_bytes([first & 15, second])).saturating_sub(6);
+                respond([0x30, 0, 0, 0xCC, 0xCC, 0xCC, 0xCC, 0xCC]);
+            }
+            [0x20..=0x2F, ..] if missing > 0 => {
+                self.refused = missing.saturating_sub(7);
+                if self.refused == 0 {
+                    let reason = Nrc::ConditionsNotCorrect as u8;
+                    respond([3, 0x7F, 0x2E, reason, 0xCC, 0xCC, 0xCC, 0xCC]);
+                }
+            }
+            _ => return false,
+        }
+        true
+    }
+
     /// Serves the tester.
     fn serve(&mut self, now: u32) {
-        let Self { device, server, ids: [_, functional, response], counters, .. } = self;
         while let Ok(frame) = REQUESTS.try_receive() {
-            if frame.id() == *functional {
-                server.receive_functional(frame.data(), now);
-            } else {
-                server.receive(frame.data(), now);
+            if frame.id() == self.ids[1] {
+                self.server.receive_functional(frame.data(), now);
+            } else if !self.refuses_key(frame.data()) {
+                self.server.receive(frame.data(), now);
             }
         }
+        let Self { device, server, ids: [_, _, response], counters, .. } = self;
         if RESPONSES.is_empty() && pac::FDCAN1.txbrp().read().0 == 0 {
             server.frames_left(now);
         }
-        // The chip's random numbers are not used yet: with a key the board answers no challenge.
+        // There are no random numbers, and so no keys.
         server.poll(device, counters, now, || None);
         SILENCED.store(server.is_silenced(), Relaxed);
         while !RESPONSES.is_full()

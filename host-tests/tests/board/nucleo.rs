@@ -2,7 +2,7 @@
 //! nothing old after the bus was away.
 
 use crate::common::{IMU, SAMPLE, SET, drive, frames, host};
-use crate::service::{answer, on_bus, send, storing};
+use crate::service::{answer, ask, enter, on_bus, send, storing};
 use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
 use gyronet::can::yaw::AngleMessage;
@@ -191,8 +191,8 @@ fn a_nucleo_hears_wheels_and_returns_from_bus_off_at_growing_intervals() {
 
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
-fn a_nucleo_skips_can_fd_erases_no_swapped_bank_and_starts_again_without_its_clock() {
-    let test = "a_nucleo_skips_can_fd_erases_no_swapped_bank_and_starts_again_without_its_clock";
+fn a_nucleo_takes_no_can_fd_no_swapped_banks_and_no_key_and_starts_again_without_its_clock() {
+    let test = "a_nucleo_takes_no_can_fd_no_swapped_banks_and_no_key_and_starts_again_without_its_clock";
     let Some(mut board) = boot(test, &[]) else { return };
     board.run(200 * MS);
     let session = [2, 0x10, 3, 0xCC, 0xCC, 0xCC, 0xCC, 0xCC];
@@ -224,6 +224,11 @@ fn a_nucleo_skips_can_fd_erases_no_swapped_bank_and_starts_again_without_its_clo
     board.run(Duration::from_millis(1_300));
     let info = on_bus(&mut board).info().expect("a response");
     assert_eq!((info.identity.reset, info.flash), (ResetCause::Watchdog, FlashState::Ready));
+    // It takes no key, and so asks for none later.
+    let key = [&[0x2E, 0x01, 0x10][..], &[7; 32]].concat();
+    enter(&mut board, 3);
+    assert_eq!(ask(&mut board, &key), [0x7F, 0x2E, 0x22]);
+    assert_eq!(ask(&mut board, &storing(&Configuration::DEFAULT)), [0x6E, 0x01, 0x00]);
 }
 
 /// The configuration that a board has after a cut, and whether its records are damaged. A cut is one of the power, a reset, or
