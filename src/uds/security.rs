@@ -120,11 +120,12 @@ impl Security {
     }
 
     /// Stores a key. The caller has checked that the request is signed with the previous key, if there was one. Zeros
-    /// remove the key.
+    /// remove the key. A board without random numbers (`entropy`) takes no key: it could never make a challenge.
     pub fn write_key<R: NorFlash, W: MappedSlots>(
         &mut self,
         bytes: &[u8],
         device: &mut Device<R, W>,
+        entropy: impl FnOnce() -> Option<Seed>,
     ) -> Result<(), Nrc> {
         let key: [u8; 32] = exactly(bytes)?;
         if !device.may_interrupt() {
@@ -134,6 +135,9 @@ impl Security {
         let key = Some(key).filter(|key| *key != [0; 32]);
         if key.as_ref().is_some_and(|key| !device.long(|| signature::is_key(key))) {
             return Err(Nrc::RequestOutOfRange);
+        }
+        if key.is_some() && entropy().is_none() {
+            return Err(Nrc::ConditionsNotCorrect);
         }
         device.store_access(Access { key, ..access }).map_err(nrc)?;
         // The session that stores the first key has access. One that replaces a key has not: a signature does not prove

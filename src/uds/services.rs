@@ -262,7 +262,7 @@ impl Services {
     }
 
     /// Executes a service without sub-functions.
-    fn serve_data<R: NorFlash, W: MappedSlots, E>(
+    fn serve_data<R: NorFlash, W: MappedSlots, E: FnOnce() -> Option<Seed>>(
         &mut self,
         command: UdsCommand,
         rest: &[u8],
@@ -305,7 +305,7 @@ impl Services {
                     0x0110 => {
                         self.update = None;
                         security::use_up(counter, device)?;
-                        self.security.write_key(content, device)?;
+                        self.security.write_key(content, device, surroundings.entropy)?;
                     }
                     _ => {
                         security::use_up(counter, device)?;

@@ -222,6 +222,7 @@ fn what_is_unsigned_cut_foreign_or_changed_is_refused() {
 #[test]
 fn access_is_proven_for_one_session() {
     let (_, mut bench, key) = locked();
+    bench.is_random = false;
     bench.expect(&[0x27, 2], &[0x7F, 0x27, 0x13]);
     bench.expect(&[&[0x27, 2][..], &[0; 64]].concat(), &[0x7F, 0x27, 0x24]);
     bench.expect(&[0x27, 1], &[0x7F, 0x27, 0x22]);
