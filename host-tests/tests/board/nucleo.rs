@@ -1,4 +1,4 @@
-//! `examples/embassy` on the virtual NUCLEO-H563ZI: it sends what the host makes of the same samples on a bus with CAN FD, and
+//! `examples/nucleo` on the virtual NUCLEO-H563ZI: it sends what the host makes of the same samples on a bus with CAN FD, and
 //! nothing old after the bus was away.
 
 use crate::common::{IMU, SAMPLE, SET, drive, frames, host};
@@ -29,7 +29,7 @@ fn elf() -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("nucleo");
     let cargo = Command::new(env!("CARGO"))
         .current_dir(workspace())
-        .args(["build", "--release", "--locked", "--quiet", "--manifest-path", "examples/embassy/Cargo.toml"])
+        .args(["build", "--release", "--locked", "--quiet", "--manifest-path", "examples/nucleo/Cargo.toml"])
         .args(["--target", TARGET, "--target-dir"])
         .arg(&folder)
         .status();

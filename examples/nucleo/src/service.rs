@@ -1,0 +1,174 @@
+//! The main program's service: stored data, diagnosis over the bus, and the check of the weights.
+//!
+//! It runs below everything else. What `drive` passes on waits in channels of fixed length; what finds no room is counted.
+
+use crate::store::{NoSlots, Records};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
+use cortex_m::peripheral::SCB;
+use embassy_stm32::pac;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex as Raw;
+use embassy_sync::{channel::Channel, signal::Signal};
+use embassy_time::{Duration, Instant};
+use embedded_can::{Frame, Id};
+use gyronet::can::DataFrame;
+use gyronet::coprocessor;
+use gyronet::heading::CourseState;
+use gyronet::model::background::BackgroundCheck;
+use gyronet::service::event::ResetCause;
+use gyronet::service::message::{AllCounters, Identity};
+use gyronet::service::{Device, SupportedHardware};
+use gyronet::store::ImuPart;
+use gyronet::uds::Server;
+
+/// Clock of the core, Hz.
+pub const CORE_HZ: u32 = 250_000_000;
+pub const SUPPORTED: SupportedHardware =
+    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[], gnss: false, clock_hz: CORE_HZ };
+/// Time for the announcement of a restart to leave.
+const LEAVE: Duration = Duration::from_millis(25);
+/// Duration of one pass over the weights, ms.
+const CHECK_MS: usize = 10_000;
+
+/// Frames of testers, and the responses to them.
+pub static REQUESTS: Channel<Raw, DataFrame, 16> = Channel::new();
+pub static RESPONSES: Channel<Raw, DataFrame, 16> = Channel::new();
+pub static OBSERVATIONS: Channel<Raw, coprocessor::Observation, 8> = Channel::new();
+pub static COUNTERS: Signal<Raw, AllCounters> = Signal::new();
+pub static COURSE: Signal<Raw, CourseState> = Signal::new();
+/// True while a tester has stopped the messages of the board, and while the rates are withheld before a restart.
+pub static SILENCED: AtomicBool = AtomicBool::new(false);
+pub static PAUSED: AtomicBool = AtomicBool::new(false);
+/// Faults that were found here, for the coprocessor.
+pub static WEIGHTS_DAMAGED: AtomicBool = AtomicBool::new(false);
+pub static MOUNT_MOVED: AtomicBool = AtomicBool::new(false);
+/// Number of cycles of the main program.
+static CYCLES: AtomicU32 = AtomicU32::new(0);
+
+/// Notes that the main program gets on.
+pub fn alive() {
+    CYCLES.fetch_add(1, Relaxed);
+}
+
+pub fn cycles() -> u32 {
+    CYCLES.load(Relaxed)
+}
+
+pub type Stored = Device<Records, NoSlots>;
+
+pub struct Service {
+    device: &'static mut Stored,
+    server: Server,
+    /// Identifiers of requests to this board and to all servers, and of responses.
+    ids: [Id; 3],
+    weights: Option<BackgroundCheck<'static>>,
+    counters: AllCounters,
+    /// Time of the last check of the weights, ms.
+    checked: u32,
+}
+
+impl Service {
+    pub fn new(device: &'static mut Stored, ids: [Id; 3], weights: Option<BackgroundCheck<'static>>) -> Self {
+        let counters = AllCounters::default();
+        Self { device, server: Server::new(), ids, weights, counters, checked: 0 }
+    }
+
+    /// Does a bounded piece of work.
+    pub fn step(&mut self) {
+        let now = Instant::now().as_millis() as u32;
+        while let Ok(seen) = OBSERVATIONS.try_receive() {
+            let coprocessor::Observation { sample, vehicle, wheels, standing, vertical, .. } = seen;
+            let live = &vehicle.live;
+            vertical.into_iter().for_each(|vertical| self.device.learn_vertical(vertical));
+            self.device.observe(
+                sample.as_ref(),
+                vehicle.tick,
+                (live.status, live.faults),
+                &wheels,
+                &standing,
+            );
+            self.device.rated(live.quality, &standing);
+        }
+        COURSE.try_take().into_iter().for_each(|course| self.device.learn_course(&course));
+        self.counters = COUNTERS.try_take().unwrap_or(self.counters);
+        self.serve(now);
+        if core::mem::replace(&mut self.checked, now) != now {
+            let pass = self.weights.as_mut().and_then(|check| check.advance(check.len() / CHECK_MS + 1));
+            if pass.is_some_and(|pass| pass.is_err()) {
+                self.weights = None;
+                self.device.weights_damaged();
+                WEIGHTS_DAMAGED.store(true, Relaxed);
+            }
+        }
+        if self.device.take_mount_moved() {
+            MOUNT_MOVED.store(true, Relaxed);
+        }
+    }
+
+    /// Serves the tester.
+    fn serve(&mut self, now: u32) {
+        while let Ok(frame) = REQUESTS.try_receive() {
+            if frame.id() == self.ids[1] {
+                self.server.receive_functional(frame.data(), now);
+            } else {
+                self.server.receive(frame.data(), now);
+            }
+        }
+        let Self { device, server, ids: [_, _, response], counters, .. } = self;
+        if RESPONSES.is_empty() && pac::FDCAN1.txbrp().read().0 == 0 {
+            server.frames_left(now);
+        }
+        // The chip's random numbers are not used yet, so the server takes no key.
+        server.poll(device, counters, now, || None);
+        SILENCED.store(server.is_silenced(), Relaxed);
+        while !RESPONSES.is_full()
+            && let Some(data) = server.next_frame(now)
+        {
+            if let Some(frame) = DataFrame::new(*response, &data) {
+                // There is room.
+                let _ = RESPONSES.try_send(frame);
+            }
+        }
+        if server.restart_is_due() && RESPONSES.is_empty() {
+            PAUSED.store(true, Relaxed);
+            let until = Instant::now() + LEAVE;
+            while Instant::now() < until {
+                alive();
+                cortex_m::asm::wfi();
+            }
+            SCB::sys_reset();
+        }
+    }
+}
+
+/// Returns what the board says of itself.
+pub fn identity() -> Identity {
+    Identity {
+        firmware: [
+            number(env!("CARGO_PKG_VERSION_MAJOR")),
+            number(env!("CARGO_PKG_VERSION_MINOR")),
+            number(env!("CARGO_PKG_VERSION_PATCH")),
+        ],
+        serial: embassy_stm32::uid::uid(),
+        clock_hz: CORE_HZ,
+        reset: reset_cause(),
+        ..Identity::UNKNOWN
+    }
+}
+
+fn number(text: &str) -> u8 {
+    text.parse().unwrap_or(0)
+}
+
+/// Reads the reset flags and clears them for the next reset. The most specific cause comes first.
+fn reset_cause() -> ResetCause {
+    let flags = pac::RCC.rsr().read();
+    pac::RCC.rsr().modify(|w| w.set_rmvf(true));
+    let causes = [
+        (flags.iwdgrstf() || flags.wwdgrstf(), ResetCause::Watchdog),
+        (flags.sftrstf(), ResetCause::Software),
+        (flags.lpwrrstf(), ResetCause::LowPower),
+        (flags.borrstf(), ResetCause::PowerOn),
+        (flags.pinrstf(), ResetCause::Pin),
+    ];
+    causes.into_iter().find_map(|(set, cause)| set.then_some(cause)).unwrap_or(ResetCause::Unknown)
+}
