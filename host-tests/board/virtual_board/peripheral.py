@@ -34,3 +34,11 @@ class Peripheral:
     def configure(self, name: str, value) -> None:
         """Sets a fault or a condition of the environment, such as the frequency of the crystal."""
         raise KeyError(f"{self.name} has no setting {name!r}")
+
+    def announce_clocks(self) -> None:
+        """Calls everything that counts with a clock. Every chip's RCC calls it after a change."""
+        for peripheral in self.board.peripherals.values():
+            changed = getattr(peripheral, "clocks_changed", None)
+            if changed:
+                changed()
+        self.board.clocks_changed()

@@ -127,7 +127,7 @@ class Rcc(Peripheral):
         self.flags |= RESET_FLAGS.get(cause, 0)
         self._power_on()
         if before != self.hz:
-            self._announce()
+            self.announce_clocks()
         self.board.irq(5, False)
 
     def _open_gates(self):
@@ -183,20 +183,13 @@ class Rcc(Peripheral):
             raise Violation(f"RCC: {text}")
         self.board.record("limit", text=text)
 
-    def _announce(self):
-        for peripheral in self.board.peripherals.values():
-            changed = getattr(peripheral, "clocks_changed", None)
-            if changed:
-                changed()
-        self.board.clocks_changed()
-
     def _update(self):
         """Computes the tree again after a change of source or prescaler, and calls everything that counts."""
         before = self.hz
         self._compute()
         self.check_limits()
         if before != self.hz:
-            self._announce()
+            self.announce_clocks()
 
     # -- oscillators -------------------------------------------------------------------------------------------------
 

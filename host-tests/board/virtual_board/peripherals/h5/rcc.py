@@ -64,7 +64,7 @@ class Rcc(Peripheral):
     def reset(self, cause):
         self.flags = RESET_FLAGS.get(cause, 0) | (0 if cause == "por" else self.flags)
         self._registers()
-        self._announce()
+        self.announce_clocks()
 
     # -- for other parts of the board --------------------------------------------------------------------------------
 
@@ -134,19 +134,12 @@ class Rcc(Peripheral):
         if hclk > for_each * (flash.latency + 1):
             raise Violation(f"RCC: HCLK at {hclk} Hz with {flash.latency} flash wait states")
 
-    def _announce(self):
-        for peripheral in self.board.peripherals.values():
-            changed = getattr(peripheral, "clocks_changed", None)
-            if changed:
-                changed()
-        self.board.clocks_changed()
-
     def _update(self):
         before = dict(self.hz)
         self._compute()
         if before != self.hz:
             self.check_limits()
-        self._announce()
+        self.announce_clocks()
 
     # -- oscillators -------------------------------------------------------------------------------------------------
 
@@ -157,7 +150,7 @@ class Rcc(Peripheral):
             if bit == HSERDY and self.cr & PLLON:
                 self._start_pll()
             self._switch()
-            self._announce()
+            self.announce_clocks()
 
     def _start_pll(self):
         config = self.words[PLL1CFGR]
