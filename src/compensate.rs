@@ -225,7 +225,7 @@ impl Compensator {
     /// [`Implausible`]: nothing was revised.
     pub fn revise(&mut self, estimate: &Estimate) -> Result<(), Implausible> {
         let CompensateConfig { stride, lag, max_mean, max_single, model, .. } = self.config;
-        let corrections = if model { &estimate.corrections } else { &[AngularRate::ZERO; WINDOW] };
+        let Estimate { corrections, linear_sum, .. } = if model { estimate } else { &Estimate::NONE };
         let sum: i64 = corrections.iter().map(|correction| i64::from(correction.0)).sum();
         let average = AngularRate((sum / WINDOW as i64) as i32);
         let largest = corrections.iter().max_by_key(|c| c.0.unsigned_abs()).copied().unwrap_or_default();
@@ -235,8 +235,7 @@ impl Compensator {
             return Err(Implausible { mean: average, largest });
         }
         let oldest = KEPT - (stride.delay() as usize - 1) - WINDOW;
-        let by_network = if model { sum - estimate.linear_sum } else { 0 };
-        self.slow_mean.observe(by_network / WINDOW as i64, stride.samples());
+        self.slow_mean.observe((sum - linear_sum) / WINDOW as i64, stride.samples());
         let constant = self.slow_mean.get();
         for (place, (entry, correction)) in self.kept.iter_mut().skip(oldest).zip(corrections).enumerate() {
             let Some(entry) = entry else { continue };

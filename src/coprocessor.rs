@@ -326,9 +326,9 @@ impl Coprocessor {
     /// where the configuration names one.
     ///
     /// # Errors
-    /// [`InputError::Heading`] for a damaged message, for values that can be no vehicle's (a good course is used even if
-    /// the latitude is refused), and for a course that the receiver reckons itself, [`InputError::ClockWentBack`]; it is
-    /// counted and not used.
+    /// [`InputError::Heading`] for a damaged message, for values outside a vehicle's range (a good course is used even if
+    /// the latitude is refused) and for a course that the receiver computes with sensors of its own;
+    /// [`InputError::ClockWentBack`]. The message is counted and not used.
     pub fn gnss(&mut self, fix: Result<Fix, HeadingError>, now: Micros) -> Result<(), InputError> {
         self.advance(now)?;
         let time = self.timeline.time();

@@ -58,9 +58,9 @@ pub enum HeadingError {
     Checksum,
     #[error("a GNSS message of {0} bytes is cut, too long or of another version")]
     Length(usize),
-    #[error("a GNSS message: its {0} does not read")]
+    #[error("a GNSS message: its {0} is not a valid field")]
     Field(&'static str),
-    #[error("the GNSS receiver reckons its course by sensors of its own")]
+    #[error("the GNSS receiver computes its course with sensors of its own")]
     Reckoned,
 }
 

@@ -109,7 +109,7 @@ pub enum Refusal {
     Stands = 2,
     /// The vehicle stands.
     Standstill = 3,
-    /// The receiver reckons it by sensors of its own.
+    /// The receiver computed the course with sensors of its own.
     Reckoned = 4,
 }
 
@@ -172,7 +172,7 @@ pub struct CourseState {
     pub counters: CourseCounters,
     /// True while courses contradict the gyro: for 10 s none has matched, and since then they have not for a minute.
     pub is_contradicted: bool,
-    /// True while a source of courses is configured and sends no message of one.
+    /// True while a source of courses is configured and sends none.
     pub is_silent: bool,
     /// Why the newest course taught nothing; `None` where it was used.
     pub refusal: Option<Refusal>,
@@ -277,7 +277,7 @@ impl Estimator {
         }
     }
 
-    /// Notes that a course is not used.
+    /// Counts a course that is not used, with the reason.
     pub(crate) fn refuse(&mut self, why: Refusal) {
         self.refusal = Some(why);
         count(&mut self.counters.refused, 1);

@@ -37,24 +37,24 @@ pub enum GnssProtocol {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fix {
-    /// Course and speed; `None` where it is no message of them.
+    /// Course and speed; `None` if the message has neither.
     pub heading: Option<Heading>,
-    /// Degrees, north positive. A bad one leaves the course as it is.
+    /// Degrees, north positive. The course is used even if the latitude is an error.
     pub latitude: Result<Option<f32>, HeadingError>,
 }
 
 impl Fix {
-    /// The receiver works and sees too few satellites.
+    /// A message without a fix: the receiver sees too few satellites.
     pub const NONE: Self = Self { heading: Some(Heading::UNKNOWN), latitude: Ok(None) };
 }
 
 /// The parser of a line: bytes in, fixes out.
 ///
-/// A damaged message is an error, and the next good one is not lost with it.
+/// A damaged message is an error; the next good message is read.
 #[derive(Debug, Clone)]
 pub struct GnssLine {
     parser: Parser,
-    /// An error that is returned first, and what was read behind it.
+    /// The error of a damaged message, and the message behind it, which is returned after the error.
     damage: Option<HeadingError>,
     kept: Option<Read>,
     bad_checksums: u32,
@@ -81,14 +81,14 @@ impl GnssLine {
         Self { parser, damage: None, kept: None, bad_checksums: 0, others: 0 }
     }
 
-    /// Returns the number of intact messages that were passed over: of another kind or talker, or VTG beside RMC.
+    /// Returns the number of intact messages that were not used: another kind, another talker, or VTG beside RMC.
     #[must_use]
     pub const fn others(&self) -> u32 {
         self.others
     }
 
-    /// Drops the message in progress, of which the line has damaged or lost a byte: a checksum of eight bits may not see
-    /// it.
+    /// Drops the message in progress. Call it when the line has damaged or lost a byte, which a checksum of 8 bits may
+    /// miss.
     pub fn interrupt(&mut self) {
         match &mut self.parser {
             Parser::Ubx(framer) => *framer = Framer::new(),

@@ -1,9 +1,10 @@
 //! Sentences RMC and VTG of NMEA 0183 (IEC 61162-1), of any satellite system.
 //!
 //! A sentence is `$TTSSS,FIELD,..*HH` with CR and LF: a talker, a name, fields and, in capital digits, the exclusive or of all
-//! between `$` and `*`. Each `$` begins a sentence, so that a damaged one takes none behind it along.
+//! between `$` and `*`. Each `$` begins a sentence, so that the sentence behind a damaged
+//! one is read.
 //!
-//! RMC and VTG have the same course: VTG counts only where no RMC has one. Of several talkers one is used: two receivers
+//! RMC and VTG contain the same course: VTG is used only where RMC has none. One talker is used, because two receivers
 //! differ in latency.
 
 use super::gnss::{Fix, Read};
@@ -12,11 +13,11 @@ use heapless::Vec;
 
 /// Length of the longest sentence, bytes. The standard allows 82, and receivers of high precision send a little more.
 const MAX_SENTENCE: usize = 100;
-/// Talkers that are GNSS receivers: one system each, several, and one that changes with what is in sight.
+/// Talkers that are GNSS receivers: of several systems (`GN`), or of one.
 const TALKERS: [&[u8; 2]; 9] = [b"GN", b"GP", b"GL", b"GA", b"GB", b"BD", b"GQ", b"QZ", b"GI"];
-/// VTG counts after this many others without a course of RMC between them.
+/// VTG is used after this many VTG with no RMC course between them.
 const WITHOUT_RMC: u8 = 3;
-/// Another talker is used after this many RMC and VTG that are not of the one in use: five seconds at ten a second.
+/// Another talker is used after this many RMC and VTG from talkers other than the one in use: 5 s at ten a second.
 const WITHOUT_TALKER: u8 = 50;
 /// A knot, m/s.
 const KNOT: f32 = 1852.0 / 3600.0;
@@ -133,7 +134,7 @@ fn vtg<'a>(mut fields: impl Iterator<Item = &'a [u8]>) -> Result<Fix, HeadingErr
     Ok(Fix { heading: Some(heading(course, speed)?), latitude: Ok(None) })
 }
 
-/// Returns whether a mode is that of a position by satellites. Without one (NMEA 2.1) nobody knows.
+/// Returns whether a mode is that of a position by satellites. Sentences before NMEA 2.3 have no mode and are refused.
 fn is_fix(mode: &[u8]) -> Result<bool, HeadingError> {
     match mode {
         b"E" => Err(HeadingError::Reckoned),

@@ -132,9 +132,9 @@ impl HeadingSettings {
 /// The content of a frame or message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Received {
-    /// Course and speed; `None` where it is no message of them.
+    /// Course and speed; `None` if the message has neither.
     pub heading: Option<Heading>,
-    /// A latitude that is confirmed, or why it is refused. It leaves the course as it is.
+    /// A confirmed latitude, or the reason why it is refused. The course is used in both cases.
     pub latitude: Result<Option<ReceivedLatitude>, HeadingError>,
 }
 

@@ -99,7 +99,7 @@ pub struct Estimate {
     pub scale: AngularRate,
     /// Input values that had to be clamped to the network's range.
     pub clamped_inputs: u16,
-    /// Sum of the linear parts of the corrections, codes: they answer no constant, so they contain none.
+    /// Sum of the linear parts of the corrections, codes. It contains no constant, because a linear part answers none.
     pub linear_sum: i64,
 }
 

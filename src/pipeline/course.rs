@@ -39,7 +39,7 @@ impl Pipeline {
         self.state.course.arrived(heading, self.state.tick);
     }
 
-    /// Notes that a course is not used.
+    /// Counts a course that is not used, with the reason.
     pub fn refuse_course(&mut self, why: Refusal) {
         self.state.course.refuse(why);
     }
@@ -102,7 +102,7 @@ impl Pipeline {
         self.state.course.state().counters
     }
 
-    /// Returns what courses have shown since the start; whether their source is silent, the coprocessor knows.
+    /// Returns what courses have shown since the start. `is_silent` stays false: the coprocessor sets it.
     pub(crate) fn course_state(&self) -> CourseState {
         let (share, sigma) = self.gain();
         let gain = sigma.map(|sigma| Gain { share, sigma, of: self.config.gain_of });

@@ -109,7 +109,7 @@ pub const fn file<const LEN: usize>(shape: Shape, seed: u32) -> [u8; LEN] {
         feature += 1;
     }
     assert!(to.at == HEADER_LEN);
-    // No input's weights in a row add up to anything.
+    // In each row the weights of an input add up to zero, as a weight file must have them.
     let (mut k, mut sums) = (0, [0; FEATURES]);
     while shape.linear && k < WINDOW * LINEAR_INPUTS {
         let (input, is_last) = (k % FEATURES, k % LINEAR_INPUTS >= LINEAR_INPUTS - FEATURES);
