@@ -2,10 +2,10 @@
 
 The linear part is the filter of linear.py: differences of neighbouring samples, which add nothing for a constant input.
 Mounting and gain of the training unit are fitted beside it and left out: they belong to the unit, and the board or
-`gyronet calibrate` finds those of another. The board removes the slow mean of all corrections, so that no vehicle gets a
-constant. A Bi-LSTM gives the expected error of each window, beside mounting and gain. The program also measures what the
-Bi-LSTM could add to the correction, on each drive with the models of the others. This is not shipped unless it gains more
-than its spread over drives.
+`gyronet calibrate` finds those of another. The board removes the slow mean of the network's corrections, so that no
+vehicle gets a constant. A Bi-LSTM gives the expected error of each window, beside mounting and gain. The program also
+measures what the Bi-LSTM could add to the correction, on each drive with the models of the others. This is not shipped
+unless it gains more than its spread over drives.
 
 Random levels and turns are added to the input (`disturb`), so that the Bi-LSTM does not learn from level and turn.
 """
