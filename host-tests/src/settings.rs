@@ -74,18 +74,19 @@ pub fn configuration(noise: &mut Noise) -> Configuration {
         offset: -210.0,
         invalid: Some(u32::MAX),
     };
-    let heading = HeadingSettings {
+    let line = (noise.int(0, 3) == 0)
+        .then(|| GnssSettings { protocol: GnssProtocol::Ubx, baud: one(noise, &[4_800, 38_400, 460_800]) });
+    let frames = HeadingSettings {
         nmea2000: noise.int(0, 1) == 0,
         j1939: noise.int(0, 3) == 0,
         speed: maybe(noise, place),
         course: maybe(noise, place),
         latitude: maybe(noise, place),
-        line: (noise.int(0, 3) == 0).then(|| GnssSettings {
-            protocol: GnssProtocol::Ubx,
-            baud: one(noise, &[4_800, 38_400, 460_800]),
-        }),
         ..HeadingSettings::NONE
     };
+    // A line beside frames is refused.
+    let is_alone = line.is_some() && noise.int(0, 1) == 0;
+    let heading = HeadingSettings { line, ..if is_alone { HeadingSettings::NONE } else { frames } };
     let diagnosis = match noise.int(0, 3) {
         0 => DiagnosisIds {
             extended: true,
