@@ -8,8 +8,11 @@
 //! identity, because the heading does not depend on them.
 
 mod fit;
+mod normal_equations;
 mod spans;
 pub mod unit_file;
+
+pub use normal_equations::NormalEquations;
 
 use crate::board::Board;
 use crate::drive::replay::{ReplayError, Steps, initialise};

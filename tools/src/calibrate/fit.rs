@@ -3,8 +3,8 @@
 //! Huber's weights (1.345 robust deviations) give little weight to a span whose reference was lost. The sigmas come
 //! from leaving out one block of time after the other (jackknife), so they hold for errors that last for seconds.
 
+use super::normal_equations::NormalEquations;
 use super::spans::Span;
-use nalgebra::{DMatrix, DVector};
 
 /// Number of reweighting iterations.
 const ROUNDS: usize = 30;
@@ -70,40 +70,56 @@ fn deviation(mut residuals: Vec<f64>) -> f64 {
 
 /// Solves for the shares and each drive's constant over the spans that `keep` accepts.
 fn solve(drives: &[&[Span]], fitted: [bool; 3], keep: impl Fn(usize, usize) -> bool) -> ([f64; 3], Vec<f64>) {
-    let columns = 3 + drives.len();
-    let kept: Vec<(usize, &Span)> = drives
-        .iter()
-        .enumerate()
-        .flat_map(|(drive, spans)| spans.iter().enumerate().map(move |(k, span)| (drive, k, span)))
-        .filter(|(drive, k, _)| keep(*drive, *k))
-        .map(|(drive, _, span)| (drive, span))
-        .collect();
-    let inputs = DMatrix::from_fn(kept.len(), columns, |row, column| {
-        let (drive, span) = kept[row];
-        match column {
-            0..3 if fitted[column] => span.turns[column],
-            _ if column == 3 + drive => span.seconds,
-            _ => 0.0,
-        }
-    });
-    let errors = DVector::from_iterator(kept.len(), kept.iter().map(|(_, span)| span.error));
-    let mut solution = DVector::zeros(columns);
-    let mut weights = DVector::from_element(kept.len(), 1.0);
+    let kept_of = |(drive, spans): (usize, &&'_ [Span])| {
+        let spans = spans.iter().enumerate().filter(|(k, _)| keep(drive, *k));
+        spans.map(|(_, span)| Weighted { span: *span, weight: 1.0 }).collect()
+    };
+    let mut kept: Vec<Vec<Weighted>> = drives.iter().enumerate().map(kept_of).collect();
+    let (mut shares, mut biases) = ([0.0; 3], Vec::new());
     for _ in 0..ROUNDS {
-        let weighted =
-            DMatrix::from_fn(kept.len(), columns, |row, column| inputs[(row, column)] * weights[row]);
-        let normal = weighted.transpose() * &inputs;
-        // The pseudoinverse gives zero for a column of zeros.
-        let inverse = normal.svd(true, true).solve(&(weighted.transpose() * &errors), f64::EPSILON);
-        let Ok(found) = inverse else { break };
-        solution = found;
-        let residuals = &errors - &inputs * &solution;
-        let limit = HUBER * deviation(residuals.iter().copied().collect());
-        weights =
-            residuals.map(|residual| if residual.abs() <= limit { 1.0 } else { limit / residual.abs() });
+        (shares, biases) = weighted(&kept, fitted);
+        let left = |bias: f64, kept: &Weighted| residual(&kept.span, &shares, bias);
+        let of_drive = |(spans, bias): (&Vec<Weighted>, &f64)| -> Vec<f64> {
+            spans.iter().map(|kept| left(*bias, kept)).collect()
+        };
+        let limit = HUBER * deviation(kept.iter().zip(&biases).flat_map(of_drive).collect());
+        for (spans, bias) in kept.iter_mut().zip(&biases) {
+            for kept in spans {
+                kept.weight = (limit / left(*bias, kept).abs()).min(1.0);
+            }
+        }
     }
-    let shares = std::array::from_fn(|k| if fitted[k] { solution[k] } else { 0.0 });
-    (shares, solution.iter().skip(3).copied().collect())
+    (shares, biases)
+}
+
+struct Weighted {
+    span: Span,
+    weight: f64,
+}
+
+/// Solves the weighted least squares: what each drive's constant explains is taken off first, which leaves three
+/// equations.
+fn weighted(drives: &[Vec<Weighted>], fitted: [bool; 3]) -> ([f64; 3], Vec<f64>) {
+    let mut equations = NormalEquations::default();
+    let mut constants = Vec::new();
+    for spans in drives {
+        let sum = |value: &dyn Fn(&Span) -> f64| -> f64 {
+            spans.iter().map(|kept| kept.weight * kept.span.seconds * value(&kept.span)).sum()
+        };
+        let seconds = sum(&|span| span.seconds);
+        let constant = |value: &dyn Fn(&Span) -> f64| if seconds > 0.0 { sum(value) / seconds } else { 0.0 };
+        let turns: [f64; 3] = std::array::from_fn(|k| constant(&|span| span.turns[k]));
+        let error = constant(&|span| span.error);
+        for Weighted { span, weight } in spans {
+            let left = |k: usize| if fitted[k] { span.turns[k] - turns[k] * span.seconds } else { 0.0 };
+            equations.add(std::array::from_fn(left), span.error - error * span.seconds, *weight);
+        }
+        constants.push((turns, error));
+    }
+    let shares = equations.solve().map(Option::unwrap_or_default);
+    let explained =
+        |turns: &[f64; 3]| turns.iter().zip(shares).map(|(turn, share)| turn * share).sum::<f64>();
+    (shares, constants.iter().map(|(turns, error)| error - explained(turns)).collect())
 }
 
 #[cfg(test)]

@@ -8,9 +8,9 @@
 
 use super::estimate::{Estimate, Places};
 use crate::sequence::{Sequence, Step};
+use gyronet_tools::calibrate::NormalEquations;
 use gyronet_tools::drive::DT;
 use gyronet_tools::evaluate::methods::Method;
-use nalgebra::{Matrix3, Vector3};
 use std::fmt;
 
 /// Number of steps in a span of the fit: 10 s, in which the accumulated errors exceed an encoder's resolution.
@@ -19,8 +19,7 @@ const SPAN: usize = 1_000;
 /// Holds the sums of a least-squares fit.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Fit {
-    normal: Matrix3<f64>,
-    turned: Vector3<f64>,
+    turns: NormalEquations,
     way_squared: f64,
     way_true: f64,
     names: Vec<String>,
@@ -30,10 +29,8 @@ impl Fit {
     pub fn add(&mut self, sequence: &Sequence) {
         let turns = sequence.turns();
         for (k, steps) in sequence.steps.chunks_exact(SPAN).enumerate() {
-            let inputs = steps.iter().map(inputs).sum::<Vector3<f64>>();
-            let turned: f64 = turns[k * SPAN..][..SPAN].iter().sum();
-            self.normal += inputs * inputs.transpose();
-            self.turned += inputs * turned;
+            let sums = std::array::from_fn(|input| steps.iter().map(|step| inputs(step)[input]).sum());
+            self.turns.add(sums, turns[k * SPAN..][..SPAN].iter().sum(), 1.0);
             // The first step of a span begins in the previous span.
             let way = steps[1..].iter().map(way).sum::<f64>();
             let along: f64 = steps.windows(2).map(|pair| along(&pair[0], &pair[1])).sum();
@@ -45,8 +42,7 @@ impl Fit {
 
     /// Returns the numbers with the least squared errors; `None` if the sequences turn or move too little for a fit.
     pub fn solve(&self) -> Option<Joint> {
-        let inverse = self.normal.try_inverse()?;
-        let [gyro, difference, constant] = (inverse * self.turned).into();
+        let [Some(gyro), Some(difference), Some(constant)] = self.turns.solve() else { return None };
         let way = self.way_true / self.way_squared;
         let is_finite = [gyro, difference, constant, way].iter().all(|number| number.is_finite());
         is_finite.then(|| Joint { gyro, difference, constant, way, names: self.names.clone() })
@@ -69,8 +65,11 @@ pub struct Joint {
 
 impl Joint {
     pub fn estimate(&self, sequence: &Sequence, start: usize) -> Estimate {
-        let shares = Vector3::new(self.gyro, self.difference, self.constant);
-        let turns = sequence.steps[start..].iter().map(|step| shares.dot(&inputs(step))).collect();
+        let turn = |step| {
+            let [gyro, difference, constant] = inputs(step);
+            self.gyro * gyro + self.difference * difference + self.constant * constant
+        };
+        let turns = sequence.steps[start..].iter().map(turn).collect();
         let places = Places::Reckoned { scale: self.way };
         Estimate { method: Method::FOG_WHEELS, turns, places }
     }
@@ -92,8 +91,8 @@ impl fmt::Display for Joint {
 }
 
 /// Returns the inputs of the fit for a step: the gyro's turn, the difference of the wheels' distances, and the time.
-fn inputs(step: &Step) -> Vector3<f64> {
-    Vector3::new(step.fog, step.wheels[1] - step.wheels[0], DT)
+fn inputs(step: &Step) -> [f64; 3] {
+    [step.fog, step.wheels[1] - step.wheels[0], DT]
 }
 
 fn way(step: &Step) -> f64 {
