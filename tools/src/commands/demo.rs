@@ -9,8 +9,10 @@ use gyronet_tools::evaluate::rates::Rates;
 use gyronet_tools::evaluate::report::{EvaluateError, MARKS, Table};
 use gyronet_tools::evaluate::rest;
 use gyronet_tools::plot::page::grouped;
+use std::error::Error;
 use std::fs::File;
 use std::io::{BufWriter, Write};
+use std::panic::resume_unwind;
 use std::path::PathBuf;
 
 /// Show all results of one drive: a table of errors, a page, a CAN log.
@@ -35,9 +37,28 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, common: Common) -> super::Result {
+    // It takes as long as everything else.
+    std::thread::scope(|scope| {
+        let tunnel = scope.spawn(|| tunnel(args));
+        results(args, common, || tunnel.join().unwrap_or_else(|panic| resume_unwind(panic)))
+    })
+}
+
+type TunnelResult = Result<Option<Tunnel>, Box<dyn Error + Send + Sync>>;
+
+/// The table of errors has no courses: a course is an input of ours, and the classical methods have none.
+fn tunnel(args: &Args) -> TunnelResult {
     let weights = args.sent.open()?;
-    let [bundled, with_gnss] = [false, true].map(bundled::demo_drive);
-    let (bundled, with_gnss) = (bundled?, with_gnss?);
+    let mut network = GyroNet::new(weights.blob()?);
+    Ok(match &args.file {
+        Some(path) => Tunnel::new(&Drive::open_moving(path)?, &mut network)?,
+        None => Tunnel::new(&Drive::from(&bundled::demo_drive(true)?), &mut network)?,
+    })
+}
+
+fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -> super::Result {
+    let weights = args.sent.open()?;
+    let bundled = bundled::demo_drive(false)?;
     let drive = match &args.file {
         Some(path) => read_drive(path, common)?,
         None => Drive::from(&bundled),
@@ -67,12 +88,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let file = File::create(&log).map_err(WriteError::to(&log))?;
     let frames = write_log(drive, GyroNet::new(weights.blob()?), BufWriter::new(file))?;
     let simulated = args.file.is_none();
-    let mut network = GyroNet::new(weights.blob()?);
-    // The table above has no courses: a course is an input of ours, and the classical methods have none.
-    let tunnel = match &args.file {
-        Some(path) => Tunnel::new(&Drive::open_moving(path)?, &mut network)?,
-        None => Tunnel::new(&Drive::from(&with_gnss), &mut network)?,
-    };
+    let tunnel = tunnel().map_err(|error| -> Box<dyn Error> { error })?;
     let demo = Demo::new(drive, simulated, &rates, errors.as_ref(), tunnel.as_ref(), frames);
     std::fs::write(&page, demo.page()).map_err(WriteError::to(&page))?;
 

@@ -1,9 +1,9 @@
 //! The heading error after a loss of GNSS: the courses are hidden from a start on, for every start of a drive.
 //!
-//! A start comes every few seconds ([`EVERY_S`] in the table), once the vehicle has driven with a course for long enough. The boards at work
-//! are copied there, and the copies go on without a course. The error of a method is the change of its heading since the
-//! start less that of the reference, which is taken as the median of the last three seconds, at both ends. Every method
-//! has the same samples, wheels and courses.
+//! A start comes every few seconds ([`EVERY_S`] in the table), once the vehicle has driven with a course for long
+//! enough. The boards at work are copied there, and the copies go on without a course. The error of a method is the
+//! change of its heading since the start less that of the reference, which is taken as the median of the last three
+//! seconds, at both ends. Every method has the same samples, wheels and courses.
 
 use crate::board::{Board, Step, Uncorrected};
 use crate::drive::DT;
@@ -208,6 +208,9 @@ impl<'a> Race<'a> {
         for (at, row) in drive.rows()?.enumerate() {
             race.row(at, &row?);
             progress();
+            if matches!(starts, Starts::At(start) if at > start) && race.running.is_empty() {
+                return Ok(race);
+            }
         }
         race.end();
         Ok(race)
@@ -296,16 +299,16 @@ impl<'a> Race<'a> {
             self.ekf.course(heading);
         }
         let speed = self.speeds.as_mut().map(|speeds| speeds.next(row));
-        let (now, found) = (self.reference.median(), &mut self.found);
-        let (newest, lengths) = (self.reference.newest(), &self.lengths);
+        let (reference, lengths, found) = (&self.reference, &self.lengths, &mut self.found);
+        let newest = reference.newest();
         let mut trace = matches!(self.starts, Starts::At(_)).then_some(&mut self.trace);
         let mut copies = copies.into_iter();
         self.running.retain_mut(|outage| {
             let Some(Some([own_no_model, own])) = copies.next() else { return false };
             if own.row <= outage.start {
                 if own.row == outage.start {
-                    outage.begun =
-                        now.zip(newest).map(|(median, off)| Begun { ekf: self.ekf.clone(), median, off });
+                    let begun = |(median, off)| Begun { ekf: self.ekf.clone(), median, off };
+                    outage.begun = reference.median().zip(newest).map(begun);
                 }
                 return own.row < outage.start || outage.begun.is_some();
             }
@@ -327,7 +330,7 @@ impl<'a> Race<'a> {
                 trace.push(outage.path.point(speed.is_some()));
             }
             if let Some(seconds) = lengths.iter().copied().find(|seconds| seconds * SECOND == steps)
-                && let Some(now) = now
+                && let Some(now) = reference.median()
             {
                 let truth = outage.path.gyro() - (now - begun.median);
                 let angles = outage.path.angles();
