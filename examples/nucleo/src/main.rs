@@ -11,11 +11,12 @@
 //!
 //! Every millisecond `drive` calls [`Coprocessor::step`]. Below it `compute` runs the network, and below both the main program
 //! serves diagnosis and the store ([`service`]). The watchdog is fed while `drive` and the main program get on. Not here yet:
-//! sensors on SPI, update of weights and firmware, keys, the fibre-optic gyro, counts of failed starts and of UART errors.
+//! sensors on SPI, update of weights and firmware, the fibre-optic gyro, counts of failed starts and of UART errors.
 #![no_std]
 #![no_main]
 
 mod can;
+mod rng;
 mod service;
 mod store;
 
@@ -205,7 +206,8 @@ fn main() -> ! {
 /// 250 MHz, and 50 MHz for CAN, from the 8 MHz that the board's debug probe supplies.
 fn clocks() -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
-    (config.rcc.hsi, config.rcc.hsi48) = (None, None);
+    // The HSI48 is for the random numbers.
+    (config.rcc.hsi, config.rcc.hsi48) = (None, Some(rcc::Hsi48Config::new()));
     config.rcc.hse = Some(rcc::Hse { freq: Hertz(8_000_000), mode: rcc::HseMode::BypassDigital });
     config.rcc.pll1 = Some(rcc::Pll {
         source: rcc::PllSource::HSE,

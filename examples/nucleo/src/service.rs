@@ -2,6 +2,7 @@
 //!
 //! It runs below everything else. What `drive` passes on waits in channels of fixed length; what finds no room is counted.
 
+use crate::rng;
 use crate::store::{NoSlots, Records};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::SCB;
@@ -117,8 +118,7 @@ impl Service {
         if RESPONSES.is_empty() && pac::FDCAN1.txbrp().read().0 == 0 {
             server.frames_left(now);
         }
-        // The chip's random numbers are not used yet, so the server takes no key.
-        server.poll(device, counters, now, || None);
+        server.poll(device, counters, now, rng::bytes);
         SILENCED.store(server.is_silenced(), Relaxed);
         while !RESPONSES.is_full()
             && let Some(data) = server.next_frame(now)

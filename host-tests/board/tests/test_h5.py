@@ -50,6 +50,31 @@ class H5(unittest.TestCase):
         with self.assertRaises(Violation):
             self.board.write("RCC", 0x00, 0x0100_0023)
 
+    def test_random_numbers_come_by_four_after_a_conditioning_reset(self):
+        read, write = self.board.read, self.board.write
+        write("RCC", 0x00, 0x1023)
+        self.board.advance(10 * US)
+        write("RCC", 0x8C, 1 << 18)
+        write("RNG", 0x00, 0x00F0_0E04)
+        write("RNG", 0x10, 0x6A91)
+        self.assertEqual((read("RNG", 0x00), read("RNG", 0x10)), (0x0087_1F04, 0x72AC), "a configuration needs CONDRST")
+        write("RNG", 0x00, 0)
+        write("RNG", 0x00, 0x40F0_0E00)
+        write("RNG", 0x10, 0x6A91)
+        write("RNG", 0x0C, 0x3AF66)
+        write("RNG", 0x00, 0x00F0_0E00)
+        self.assertEqual(read("RNG", 0x00), 0x40F0_0E00)
+        self.board.advance(1 * US)
+        self.assertEqual((read("RNG", 0x00), read("RNG", 0x10)), (0x00F0_0E00, 0x6A91))
+        write("RNG", 0x00, 0x00F0_0E04)
+        self.assertEqual((read("RNG", 0x04), read("RNG", 0x08)), (0, 0))
+        self.board.advance(10 * US)
+        words = {read("RNG", 0x08) for _ in range(4)}
+        self.assertEqual((len(words), read("RNG", 0x04), read("RNG", 0x08)), (4, 0, 0))
+        self.board.peripherals["RNG"].configure("seed_error", True)
+        self.board.advance(10 * US)
+        self.assertEqual(read("RNG", 0x04), 1 << 6 | 1 << 2)
+
     def test_gates_and_resets(self):
         self.assertFalse(self.board.rcc.enabled("USART1"))
         self.board.write("RCC", 0xA4, 1 << 14)

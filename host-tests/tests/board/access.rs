@@ -23,6 +23,31 @@ fn again(key: &PrivateKey) -> Authority {
     Authority::Key(key.clone())
 }
 
+fn challenge(board: &mut Board) -> Result<Vec<u8>, DeviceError> {
+    let mut device = on_bus(board);
+    device.ask(&[0x10, 3]).expect("a session");
+    device.ask(&[0x27, 1])
+}
+
+/// A board that has a key gives no challenge while its random numbers fail, in each of three ways.
+pub fn fail_with_the_generator(board: &mut Board) {
+    for (setting, value, good) in [
+        ("RNG.seed_error", true.into(), false.into()),
+        ("RNG.clock_error", true.into(), false.into()),
+        ("RNG.stuck", 0x55.into(), serde_json::Value::Null),
+    ] {
+        let value: serde_json::Value = value;
+        let good: serde_json::Value = good;
+        board.configure(setting, value);
+        match challenge(board) {
+            Err(DeviceError::Negative { service: 0x27, code }) => assert_eq!(code.0, 0x22, "{setting}"),
+            other => panic!("{setting}: {other:?}"),
+        }
+        board.configure(setting, good);
+        challenge(board).expect("it works again");
+    }
+}
+
 /// A response to a challenge: the generator's numbers differ from board start to board start.
 #[test]
 fn challenges_never_repeat_and_fail_with_the_generator() {
@@ -30,11 +55,6 @@ fn challenges_never_repeat_and_fail_with_the_generator() {
     let Some((mut board, key)) = locked(TEST) else { return };
     on_bus(&mut board).ask(&[0x11, 1]).expect("this session has stored the key");
     board.run(START);
-    let challenge = |board: &mut Board| {
-        let mut device = on_bus(board);
-        device.ask(&[0x10, 3]).expect("a session");
-        device.ask(&[0x27, 1])
-    };
     let mut seen = Vec::new();
     for _ in 0..3 {
         let seed = challenge(&mut board).expect("a challenge");
@@ -44,21 +64,7 @@ fn challenges_never_repeat_and_fail_with_the_generator() {
         board.reset_pin();
         board.run(START);
     }
-    for (setting, value, good) in [
-        ("RNG.seed_error", true.into(), false.into()),
-        ("RNG.clock_error", true.into(), false.into()),
-        ("RNG.stuck", 0x55.into(), serde_json::Value::Null),
-    ] {
-        let value: serde_json::Value = value;
-        let good: serde_json::Value = good;
-        board.configure(setting, value);
-        match challenge(&mut board) {
-            Err(DeviceError::Negative { service: 0x27, code }) => assert_eq!(code.0, 0x22, "{setting}"),
-            other => panic!("{setting}: {other:?}"),
-        }
-        board.configure(setting, good);
-        challenge(&mut board).expect("it works again");
-    }
+    fail_with_the_generator(&mut board);
     let mut device = on_bus(&mut board);
     device.authorise(again(&key));
     device.restart().expect("access is proven");

@@ -1,6 +1,7 @@
 //! `examples/nucleo` on the virtual NUCLEO-H563ZI: it sends what the host makes of the same samples on a bus with CAN FD, and
 //! nothing old after the bus was away.
 
+use crate::access;
 use crate::common::{IMU, SAMPLE, SET, drive, frames, host};
 use crate::service::{answer, ask, enter, on_bus, send, storing};
 use embedded_can::{Frame, Id};
@@ -13,6 +14,8 @@ use gyronet::store::Configuration;
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::{inputs, replay};
+use gyronet_tools::client::device::Authority;
+use gyronet_tools::signing::PrivateKey;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -191,8 +194,8 @@ fn a_nucleo_hears_wheels_and_returns_from_bus_off_at_growing_intervals() {
 
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
-fn a_nucleo_takes_no_can_fd_no_swapped_banks_and_no_key_and_starts_again_without_its_clock() {
-    let test = "a_nucleo_takes_no_can_fd_no_swapped_banks_and_no_key_and_starts_again_without_its_clock";
+fn a_nucleo_takes_no_can_fd_and_no_swapped_banks_and_starts_again_without_its_clock() {
+    let test = "a_nucleo_takes_no_can_fd_and_no_swapped_banks_and_starts_again_without_its_clock";
     let Some(mut board) = boot(test, &[]) else { return };
     board.run(200 * MS);
     let session = [2, 0x10, 3, 0xCC, 0xCC, 0xCC, 0xCC, 0xCC];
@@ -224,11 +227,35 @@ fn a_nucleo_takes_no_can_fd_no_swapped_banks_and_no_key_and_starts_again_without
     board.run(Duration::from_millis(1_300));
     let info = on_bus(&mut board).info().expect("a response");
     assert_eq!((info.identity.reset, info.flash), (ResetCause::Watchdog, FlashState::Ready));
-    // It takes no key, and so asks for none later.
-    let key = [&[0x2E, 0x01, 0x10][..], &[7; 32]].concat();
+}
+
+#[test]
+#[ignore = "it builds embassy, which takes a minute"]
+fn a_nucleo_with_a_key_is_written_by_its_owner_alone() {
+    let test = "a_nucleo_with_a_key_is_written_by_its_owner_alone";
+    let Some(mut board) = boot(test, &[]) else { return };
+    board.run(200 * MS);
+    let [key, other] = [(); 2].map(|()| PrivateKey::generate().expect("random numbers"));
+    board.configure("RNG.seed_error", true);
     enter(&mut board, 3);
-    assert_eq!(ask(&mut board, &key), [0x7F, 0x2E, 0x22]);
-    assert_eq!(ask(&mut board, &storing(&Configuration::DEFAULT)), [0x6E, 0x01, 0x00]);
+    let content = [&[0x2E, 0x01, 0x10][..], &key.public()].concat();
+    assert_eq!(ask(&mut board, &content), [0x7F, 0x2E, 0x22], "without random numbers it would ask for none");
+    board.configure("RNG.seed_error", false);
+    on_bus(&mut board).set_key(&key.public()).expect("there was none");
+    send(&mut board, &[0x11, 1]);
+    board.run(300 * MS);
+    access::fail_with_the_generator(&mut board);
+    let configuration = Configuration { latitude_deg: Some(1.0), ..Configuration::DEFAULT };
+    let mut write = |authority| {
+        let mut device = on_bus(&mut board);
+        device.authorise(authority);
+        device.set_configuration(&configuration)
+    };
+    assert!(write(Authority::None).is_err() && write(Authority::Key(other)).is_err());
+    write(Authority::Key(key)).expect("it is the owner's");
+    board.power_cycle(MS);
+    board.run(100 * MS);
+    assert_eq!(on_bus(&mut board).configuration().expect("a response"), configuration);
 }
 
 /// The configuration that a board has after a cut, and whether its records are damaged. A cut is one of the power, a reset, or

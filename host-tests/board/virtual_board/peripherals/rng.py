@@ -20,6 +20,7 @@ class Rng(Peripheral):
     """CR, SR and DR of section 24.4. The manual does not say what DR holds while no number is ready; here, the last number read."""
 
     name, base, clock = "RNG", 0x5006_0800, "RNG"
+    interrupt = HASH_RNG
 
     def __init__(self, board):
         super().__init__(board)
@@ -66,7 +67,7 @@ class Rng(Peripheral):
         self._interrupt()
 
     def _interrupt(self):
-        self.board.irq(HASH_RNG, bool(self.cr & IE and (self.ready or self.flags)))
+        self.board.irq(self.interrupt, bool(self.cr & IE and (self.ready or self.flags)))
 
     def read(self, offset, size):
         registers.check(self, offset, size, registers.WORD)

@@ -11,6 +11,7 @@ from ..timer import Timer
 from .fdcan import Fdcan, MessageRam
 from .flash import Flash
 from .rcc import Rcc
+from .rng import Rng
 from .system import Dbgmcu, Pwr, Sbs
 from .usart import usarts
 
@@ -48,5 +49,5 @@ def create(board):
     """Creates all modelled peripherals, the clock tree first."""
     can = Fdcan(board)
     return [Rcc(board), Pwr(board), Flash(board), *(Port(board, letter) for letter in "ABCDEFGHI"), Sbs(board),
-            Dbgmcu(board), Watchdog(board), *usarts(board), Timer(board, "TIM2", 0x4000_0000, 45, "TIM_APB1", 32, 4),
+            Dbgmcu(board), Rng(board), Watchdog(board), *usarts(board), Timer(board, "TIM2", 0x4000_0000, 45, "TIM_APB1", 32, 4),
             can, MessageRam(board, can)]

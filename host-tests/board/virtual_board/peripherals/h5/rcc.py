@@ -14,9 +14,10 @@ from .. import registers
 
 PS = 1_000_000_000_000
 HSI_HZ = 64_000_000
-HSION, HSIRDY, HSEON, HSERDY, HSEBYP, HSEEXT, PLLON, PLLRDY = (1 << bit for bit in (0, 1, 16, 17, 18, 20, 24, 25))
+HSION, HSIRDY, HSI48ON, HSI48RDY, HSEON, HSERDY, HSEBYP, HSEEXT, PLLON, PLLRDY = (
+    1 << bit for bit in (0, 1, 12, 13, 16, 17, 18, 20, 24, 25))
 #: The ready bits of oscillators that are left out; they must stay off.
-ABSENT = 1 << 8 | 1 << 12 | 1 << 19 | 1 << 26 | 1 << 28
+ABSENT = 1 << 8 | 1 << 19 | 1 << 26 | 1 << 28
 CR, CFGR1, CFGR2, PLL1CFGR, PLL1DIVR, PLL1FRACR, BDCR, RSR = 0x00, 0x1C, 0x20, 0x28, 0x34, 0x38, 0xF0, 0xF4
 CCIPR1, CCIPR5 = 0xD8, 0xE8
 LSION, LSIRDY, RMVF = 1 << 26, 1 << 27, 1 << 23
@@ -79,6 +80,11 @@ class Rcc(Peripheral):
             if source > 1:
                 raise Violation("RCC: FDCAN's clock from PLL2 is not modelled")
             return self.pll_hz(16) if source else self.hse_hz if self.cr & HSERDY else 0
+        if name == "RNG":
+            source = self.words[CCIPR5] >> 4 & 3
+            if source > 1:
+                raise Violation("RCC: the RNG's clock from the LSE or LSI is not modelled")
+            return self.pll_hz(16) if source else 48_000_000 if self.cr & HSI48RDY else 0
         if name == "USART1" and self.words[CCIPR1] & 7:
             raise Violation("RCC: of USART1's clocks only PCLK2 is modelled")
         return self.hz["PCLK2" if name == "USART1" else name]
@@ -183,13 +189,16 @@ class Rcc(Peripheral):
             raise Violation(f"RCC: CR {value:#x} starts an oscillator that is not modelled")
         old = self.cr
         held = (HSION if self._uses("HSI") else 0) | (HSEON if self._uses("HSE") else 0) | (PLLON if self.source == "PLL1" else 0)
-        self.cr = value & (HSION | 0x1C | HSEON | HSEBYP | HSEEXT | PLLON) | old & (HSIRDY | HSERDY | PLLRDY) | old & held | 0x20
-        for on, bit in ((HSION, HSIRDY), (HSEON, HSERDY), (PLLON, PLLRDY)):
+        self.cr = (value & (HSION | 0x1C | HSI48ON | HSEON | HSEBYP | HSEEXT | PLLON) | old & (HSIRDY | HSI48RDY | HSERDY | PLLRDY)
+                   | old & held | 0x20)
+        for on, bit in ((HSION, HSIRDY), (HSI48ON, HSI48RDY), (HSEON, HSERDY), (PLLON, PLLRDY)):
             if not self.cr & on:
                 self.cr &= ~bit
         risen = self.cr & ~old
         if risen & HSION:
             self.board.schedule(2_200_000, lambda: self._ready(HSION, HSIRDY))
+        if risen & HSI48ON:
+            self.board.schedule(2_200_000, lambda: self._ready(HSI48ON, HSI48RDY))
         if risen & HSEON and self.hse_hz:
             if not self.cr & HSEBYP:
                 raise Violation("RCC: the board has no crystal at HSE, but the clock of its probe (HSEBYP)")
