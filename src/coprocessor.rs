@@ -554,7 +554,8 @@ impl Coprocessor {
         let wheels = doubts.wheels || self.wheels.as_ref().is_some_and(WheelReceiver::is_invalid);
         let contradicted = doubts.inertial || self.monitor.shift() > 0.0;
         let faults = BoardFaults { bus, wheels, clock, contradicted, stored, configuration_lost };
-        BoardState { faults, clock_ratio: self.monitor.clock_ratio(), shift: self.monitor.shift() }
+        let shift = self.monitor.shift().max(self.monitor.suspect());
+        BoardState { faults, clock_ratio: self.monitor.clock_ratio(), shift }
     }
 
     fn send<SINK: Sink>(&mut self, vehicle: &VehicleSample, time: Micros, sink: &mut SINK) {

@@ -165,6 +165,11 @@ impl SensorMonitor {
         self.jump.shift()
     }
 
+    /// Returns the mean rate of a second by which readings may be off that are unusual and still plausible, rad/s.
+    pub fn suspect(&self) -> f32 {
+        self.jump.suspect()
+    }
+
     /// Notes that the readings are those of a vehicle that stands: whatever has jumped is right.
     pub fn settle(&mut self) {
         self.jump.settle();

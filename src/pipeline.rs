@@ -20,6 +20,7 @@ mod uncertainty;
 mod windows;
 
 pub use config::PipelineConfig;
+pub(crate) use uncertainty::swing::Swing;
 pub use uncertainty::{GyroErrors, Origin, Turning, Uncertainty, UncertaintyConfig};
 pub use windows::DueWindow;
 pub(crate) use windows::Handover;
@@ -51,7 +52,7 @@ pub struct BoardState {
     pub faults: BoardFaults,
     /// The true length of the steps of the sensor's clock, by which the rates are summed.
     pub clock_ratio: ClockRatio,
-    /// The yaw rate by which the readings may be off since they have jumped, rad/s.
+    /// The yaw rate by which the readings may be off since they have jumped or stepped unusually, rad/s.
     pub shift: f32,
 }
 

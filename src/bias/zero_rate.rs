@@ -54,10 +54,7 @@ const STEADY: f32 = 9.0;
 const BOARDING: f32 = 1e-3;
 /// Samples for which a standstill that the gyro has contradicted is not believed: a slide may turn now and then.
 const DISTRUSTED: u32 = 10 * RATE_HZ;
-/// Samples for which a turn at a standstill without wheels stays part of sigma after that standstill, unless the vehicle
-/// drives off: the judge's window of two seconds contains the step of a bias and shows no standstill; then the seconds of the
-/// next one count.
-const TURNING: u32 = 2 * RATE_HZ;
+
 /// Says how a whole second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -100,9 +97,10 @@ pub struct ZeroRate {
     /// `None` once the bias is confirmed.
     claim: Option<Claim>,
     turned: Turned,
-    /// The largest rate at a standstill without wheels since [`ZeroRate::turns`] began, rad/s, and the samples for which it
-    /// still counts.
-    turning: (f32, u32),
+    /// The rate of [`ZeroRate::turns`], rad/s.
+    turning: f32,
+    /// The vehicle has stood without wheels, and not driven off since: it cannot turn.
+    is_parked: bool,
     since_walk: u32,
     /// Sigma of the change of the bias with temperature since the last update, rad/s.
     thermal: f32,
@@ -141,7 +139,8 @@ impl ZeroRate {
             doubt: Doubt::NONE,
             claim: None,
             turned: Turned::NONE,
-            turning: (0.0, 0),
+            turning: 0.0,
+            is_parked: false,
             since_walk: 0,
             thermal: 0.0,
         }
@@ -213,19 +212,14 @@ impl ZeroRate {
     /// applies to the turn in parts of a second: when a sample exceeds it, that sample's delayed rate, which is zero
     /// at standstill, has not been sent yet. Without wheels such a turn is part of sigma.
     pub fn contradicts_wheels(&mut self, rate: AngularRate) -> bool {
-        let (turns, (largest, left)) = (self.turns(), self.turning);
-        self.turning = if turns > 0.0 {
-            (largest.max(turns), TURNING)
-        } else if self.standing.is_likely() || left == 0 {
-            (0.0, 0)
-        } else {
-            (largest, left - 1)
-        };
-        if !self.standing.is_likely() {
+        let is_likely = self.standing.is_likely();
+        self.is_parked |= is_likely && !self.standing.is_by_wheels();
+        if !is_likely && !self.is_parked {
             self.turned = Turned::NONE;
             return false;
         }
         self.turned.add(rate.0.saturating_sub(self.bias().0));
+        self.turning = self.turns();
         let turned = self.turned.angle();
         if !self.standing.is_by_wheels() || libm::fabsf(turned) <= self.turn_gate() {
             return false;
@@ -241,10 +235,11 @@ impl ZeroRate {
         true
     }
 
-    /// Returns the rate of the newest two quarters of a second beyond their noise, at a standstill without wheels, rad/s.
+    /// Returns the rate of the newest two quarters of a second beyond their noise, since a standstill without wheels, rad/s.
     fn turns(&self) -> f32 {
-        let is_inertial = self.standing.source == StandstillSource::Inertial && self.standing.is_likely();
-        let Some(noise) = self.noise.filter(|_| is_inertial) else { return 0.0 };
+        let Some(noise) = self.noise.filter(|_| self.is_parked && !self.standing.is_by_wheels()) else {
+            return 0.0;
+        };
         let least = self.config.noise * self.config.noise;
         self.turned.newest_rate(GATE * sqrt(noise.max(least)))
     }
@@ -282,7 +277,7 @@ impl ZeroRate {
 
     /// Notes that the vehicle moves: what it has just stood on did not turn, so its newest reading there is the bias.
     pub fn moves(&mut self) {
-        self.turning = (0.0, 0);
+        (self.turning, self.is_parked) = (0.0, false);
         let Some((mean, initial)) = self.claim.as_mut().and_then(Claim::moves) else { return };
         self.claim = None;
         let ZeroRateConfig { standstill, noise, max_bias, .. } = self.config;
@@ -324,7 +319,7 @@ impl ZeroRate {
     pub fn sigma(&self) -> f32 {
         let off = self.doubt.off(self.filter.get::<BIAS>());
         let off = if self.refused && self.standing.is_likely() { off.max(self.against) } else { off };
-        let off = off.max(self.turning.0);
+        let off = off.max(self.turning);
         let hidden = self.claim.as_ref().map_or(0.0, Claim::variance);
         sqrt(self.bias_variance() + off * off + hidden).min(self.config.max_bias)
     }

@@ -20,6 +20,7 @@
 
 use super::part::FogErrors;
 use crate::bias::earth::EARTH_RATE;
+use crate::pipeline::Swing;
 use crate::sample::{RATE_HZ, Standstill};
 use crate::sqrt::sqrt;
 use crate::units::Angle;
@@ -112,6 +113,8 @@ pub struct RestReading {
     /// Turn of the standing vehicle in the newest quarters of a second, codes, and the steps for which it stands.
     turned: [i64; 5],
     stood: u32,
+    /// The turn to and fro by an engine.
+    swing: Swing,
     since_walk: u32,
 }
 
@@ -133,6 +136,7 @@ impl RestReading {
             doubt: 0.0,
             turned: [0; 5],
             stood: 0,
+            swing: Swing::over(4.0),
             since_walk: 0,
         }
     }
@@ -178,17 +182,25 @@ impl RestReading {
             self.turned[0] = 0;
         }
         self.turned[0] += turn.0.clamp(-LARGEST_CODE, LARGEST_CODE);
+        self.swing.add(turn.0 as f32 / Angle::PER_RAD);
         self.stood = self.stood.saturating_add(1);
     }
 
-    /// Returns what a standing vehicle has turned in the last second beyond the reading at rest and its noise, rad, or the
-    /// doubt of the newest standstill, rad/s, if that is larger: the vehicle turns, or the gyro's bias has changed.
+    /// Returns the rate by which a standing vehicle turns, rad/s, beyond the reading at rest: of the last second beyond its
+    /// noise, of the newest two quarters beyond an engine's swing, or the doubt of the newest standstill. It turns, or the
+    /// gyro's bias has changed.
     fn against(&self) -> f32 {
         let current = self.stood.saturating_sub(1) % QUARTER + 1;
         let steps = self.stood.min(RATE_HZ + current);
-        let turned = self.turned.iter().sum::<i64>() as f32 / Angle::PER_RAD;
-        let expected = self.combined().mean * steps as f32 / RATE_HZ as f32;
-        self.doubt.max((turned - expected).abs() - 3.0 * sqrt(self.noise))
+        let off = |turned: i64, steps: u32| {
+            (turned as f32 / Angle::PER_RAD - self.combined().mean * steps as f32 / RATE_HZ as f32).abs()
+        };
+        let second = off(self.turned.iter().sum(), steps) - 3.0 * sqrt(self.noise);
+        let [newest, before, ..] = self.turned;
+        let newest_steps = self.stood.min(QUARTER + current);
+        let newest = (off(newest + before, newest_steps) - self.swing.angle()) * RATE_HZ as f32
+            / newest_steps.max(QUARTER) as f32;
+        self.doubt.max(second).max(newest)
     }
 
     /// Returns the reading at rest that is subtracted, rad/s.

@@ -6,7 +6,7 @@
 //! on the recordings of five vehicles none is beyond [`USUAL`] times their RMS but for four, of 0.05 rad/s and 1.8 m/s^2
 //! at most.
 
-use crate::sample::ImuSample;
+use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
 
 /// The part counts as stuck after this many samples in a row that equal the one before: in all axes of the gyro, in
@@ -75,6 +75,10 @@ pub const JUMP_FORCE: f32 = 30.0;
 pub const USUAL: f32 = 12.0;
 /// Steps of that RMS: 0.64 s.
 const STEPS: f32 = 64.0;
+/// Times the RMS of the last steps from which on a plausible step of the yaw rate may be a flipped bit, and the samples for
+/// which the angle that it then turns wrongly is reported: a second, and those whose rates have not been sent yet.
+const SUSPECT: f32 = 6.0;
+const SUSPECTED: u8 = RATE_HZ as u8 + REPORTED;
 /// At most this many readings in a row are rejected; the next one is accepted whatever its value.
 pub const JUMP_PATIENCE: u8 = 3;
 /// Samples for which a shift that has ended is still reported: their rates have not been sent yet.
@@ -104,6 +108,8 @@ pub(super) struct Jump {
     odd_for: u16,
     odd_ago: u16,
     shift: Option<Shift>,
+    /// The largest step that may be a flipped bit, rad/s, and the samples for which it counts.
+    suspect: (f32, u8),
 }
 
 /// Jumps of the yaw rate that were accepted.
@@ -130,6 +136,7 @@ impl Jump {
             odd_for: 0,
             odd_ago: 0,
             shift: None,
+            suspect: (0.0, 0),
         }
     }
 
@@ -155,6 +162,11 @@ impl Jump {
             }
             let [_, _, yaw, ..] = steps;
             self.accept(yaw, is_far);
+            let [_, _, square, ..] = self.squares;
+            if yaw * yaw > SUSPECT * SUSPECT * square {
+                let (before, _) = self.suspect;
+                self.suspect = (before.max(libm::fabsf(yaw)), SUSPECTED);
+            }
             if self.odd_for == 0 || self.odd_for > USUAL_AFTER {
                 for (square, step) in self.squares.iter_mut().zip(steps) {
                     *square += (step * step - *square) / STEPS;
@@ -169,6 +181,8 @@ impl Jump {
     fn pass_on(&mut self) {
         self.odd_ago = self.odd_ago.saturating_add(1);
         let is_odd = self.odd_for > 0 && (self.odd_ago < ODD || self.shift.is_some());
+        let (step, left) = self.suspect;
+        self.suspect = if left > 0 { (step, left - 1) } else { (0.0, 0) };
         self.odd_for = if is_odd { self.odd_for.saturating_add(1) } else { 0 };
         let reported_for = self.shift.as_mut().and_then(|shift| shift.reported_for.as_mut());
         if reported_for.is_some_and(|left| {
@@ -212,6 +226,12 @@ impl Jump {
     pub fn shift(&self) -> f32 {
         let [_, _, yaw, ..] = self.last;
         self.shift.map_or(0.0, |shift| libm::fabsf(shift.sum).max(libm::fabsf(yaw - shift.before)))
+    }
+
+    /// Returns the mean rate of a second by which a plausible step may be off, rad/s.
+    pub fn suspect(&self) -> f32 {
+        let (step, _) = self.suspect;
+        step / RATE_HZ as f32
     }
 
     fn is_far(&self, steps: &[f32; AXES]) -> bool {

@@ -11,7 +11,8 @@
 //!
 //! The vertical of earlier drives is a claim. A standstill whose vertical differs from it by more than a street can slope
 //! drops the claim, because the sensor was moved. Until a turn or another standstill agrees with one of the two, the angle
-//! between them is part of the variance. So is the scatter of the standstills where it exceeds that of streets.
+//! between them is part of the variance. So is the scatter of the standstills where it exceeds that of streets. One standstill and the turns after it may all be on one ramp,
+//! which looks like a tilt: until a second standstill has shown it, the tilt is part of the variance with that probability.
 
 use super::{Rotation, metre_per_sec2};
 use crate::health::slow::Knowledge;
@@ -31,6 +32,8 @@ const CONFIGURED: f32 = 0.84;
 const AGAIN: f32 = 1.0;
 /// Least sigma of a turn's axis, rad: 2.5 deg. The body leans outwards, and a ramp is as steep all the way up.
 const LEAN: f32 = 0.0436;
+/// Probability that a standstill and all turns after it are on one ramp, as steep as the tilt that they show.
+const RAMP: f32 = 0.1;
 /// Sigmas of slope and known vertical, together, beyond which no street explains a standstill.
 const GATE: f32 = 4.0;
 /// Information of a vertical that is known to 1 deg, rad^-2: that of a dozen standstills. Older ones fade beyond it.
@@ -151,6 +154,8 @@ pub struct VerticalEstimator {
     /// Square of the angle between the vertical that a standstill has dropped and its own, rad^2; 0 once a turn or another
     /// standstill has changed the known vertical.
     disputed: f32,
+    /// No second standstill has shown the tilt.
+    is_one_place: bool,
     /// Sums of the current standstill, its samples, and the samples since the one before.
     force: [i64; 3],
     stood: u32,
@@ -169,6 +174,7 @@ impl VerticalEstimator {
             known,
             is_tilted: false,
             disputed: 0.0,
+            is_one_place: known.information == 0.0,
             force: [0; 3],
             stood: 0,
             away: APART,
@@ -190,6 +196,7 @@ impl VerticalEstimator {
             let is_moved =
                 self.known.information > 0.0 && square > GATE * GATE * (SLOPE * SLOPE + sigma * sigma);
             self.disputed = if is_moved { square } else { 0.0 };
+            self.is_one_place = is_moved || self.known.information == 0.0;
             self.known = if is_moved { Vertical::UNKNOWN } else { self.known }.with(&up, SLOPE * SLOPE);
         }
         (self.stood, self.away) = (REST, 0);
@@ -266,11 +273,14 @@ impl VerticalEstimator {
         self.is_tilted = odds < if self.is_tilted { AGAIN } else { 0.0 };
         let up = now.up();
         let disputed = if now == self.known { self.disputed } else { 0.0 };
-        if self.is_tilted {
-            return Judgement { up: Some(up), variance: now.sigma() * now.sigma() + disputed };
-        }
         let [x, y, _] = up;
-        Judgement { up: None, variance: (x * x + y * y) / (1.0 + libm::expf(odds)) + disputed }
+        let square = x * x + y * y;
+        if self.is_tilted {
+            let is_ramp = self.is_one_place && square < GATE * GATE * SLOPE * SLOPE;
+            let ramp = if is_ramp { RAMP * square } else { 0.0 };
+            return Judgement { up: Some(up), variance: now.sigma() * now.sigma() + ramp + disputed };
+        }
+        Judgement { up: None, variance: square / (1.0 + libm::expf(odds)) + disputed }
     }
 }
 
@@ -406,6 +416,17 @@ mod tests {
         // A street is one more.
         let (_, street, _) = drive([0.0, 8.0], NONE);
         assert!(street.up.is_none() && street.variance < before * before, "{street:?}");
+    }
+
+    #[test]
+    fn a_tilt_that_one_place_has_shown_may_be_its_ramp() {
+        let mut estimator = stood(&[[0.0, 12.0]]);
+        run(&mut estimator, 4, [0.0, 12.0], 0.4, false);
+        let ramp = estimator.judge();
+        run(&mut estimator, 30, NONE, 0.0, false);
+        run(&mut estimator, 4, [0.0, 12.0], 0.0, true);
+        let known = estimator.judge();
+        assert!(ramp.up.is_some() && ramp.variance > known.variance + 0.09 * 0.043, "{ramp:?} {known:?}");
     }
 
     #[test]

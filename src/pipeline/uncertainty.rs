@@ -6,17 +6,17 @@
 //!
 //! | part | sigma of a second's mean rate | over a minute |
 //! |---|---|---|
-//! | network, or noise where it has not corrected; at standstill the angle by which an engine shakes the vehicle | from the error that it predicts for its windows ([`crate::model::Estimate::scale`]) | adds in squares |
+//! | network, or noise where it has not corrected; at standstill the angle by which an engine shakes the vehicle | from the error that it predicts for its windows ([`crate::model::Estimate::scale`]), or what it takes off, which may be the vehicle's own shake, if that is larger | adds in squares |
 //! | bias | from the bias curve and the zero-rate updates | adds linearly |
-//! | rate that standstill has set to zero | its mean | adds linearly |
+//! | rate that standstill has set to zero | its mean; of the end of the second where it is larger, by more than an engine shakes | adds linearly |
 //! | revision that is not carried yet | what a second carries of it | adds linearly |
 //! | gain | a share of the yaw rate | of the net turn |
 //! | mounting, and a tilt that may be the street's | a share of the roll and pitch rates | of their net turns |
 //! | slope or bank in a turn | the share 1 - cos of the yaw rate, by the roll and pitch that the turn itself shows | adds linearly |
-//! | unit that the network was not trained with | a share of its mean correction | of its net correction |
+//! | unit that the network was not trained with | (part of the first row) | a share of the net correction |
 //! | gap in the accumulated yaw | | the angle that the rates around it have turned, and what it may hide ([`crate::estimate`]) |
 
-mod swing;
+pub(crate) mod swing;
 
 use crate::estimate::Missed;
 use crate::sample::RATE_HZ;
@@ -44,7 +44,7 @@ pub struct GyroErrors {
     pub gain: f32,
     /// Share of the roll and pitch rates, rad.
     pub mounting: f32,
-    /// Share of the network's mean correction: what it learnt of its own unit is wrong on another.
+    /// Share of the network's net correction: what it learnt of its own unit is wrong on another.
     pub model: f32,
 }
 
@@ -55,7 +55,7 @@ impl UncertaintyConfig {
     pub const DEFAULT: Self = Self {
         per_scale: 0.25,
         uncorrected: 2.5e-4,
-        unknown: GyroErrors { gain: 0.003, mounting: 0.03, model: 0.5 },
+        unknown: GyroErrors { gain: 0.003, mounting: 0.03, model: 0.6 },
         known: GyroErrors { gain: 0.0015, mounting: 0.01, model: 0.0 },
     };
 }
@@ -129,8 +129,9 @@ pub struct Uncertainty {
     /// The last second, the newest block first, and the samples in that block.
     blocks: [Turns; BLOCKS],
     samples: u32,
-    /// What standstill hides besides its mean.
+    /// What standstill hides besides its mean, and what the network takes off.
     swing: Swing,
+    corrected: Swing,
     /// The mean rates of the last second, about z those of its end where they are larger, rad/s.
     rates: Turns,
     /// The last minute, the newest part first, and the samples in that part.
@@ -148,7 +149,8 @@ impl Uncertainty {
             scale_square: None,
             blocks: [[0.0; TURNS]; BLOCKS],
             samples: 0,
-            swing: Swing::NONE,
+            swing: Swing::over(4.0),
+            corrected: Swing::over(1.0),
             rates: [0.0; TURNS],
             parts: [Part::EMPTY; PARTS + 1],
             in_part: 0,
@@ -191,9 +193,11 @@ impl Uncertainty {
         const STEP: f32 = 1.0 / RATE_HZ as f32;
         let [x, y, z] = turning.rates;
         let turns = [x, y, z, turning.estimate, turning.withheld].map(|rate| rad_per_sec(rate) * STEP);
-        if turning.origin == Origin::Standstill {
-            let [.., withheld] = turns;
-            self.swing.add(withheld);
+        let [.., estimate, withheld] = turns;
+        match turning.origin {
+            Origin::Standstill => self.swing.add(withheld),
+            Origin::Network => self.corrected.add(estimate),
+            Origin::Gyro => {}
         }
         let sum = |to: &mut Turns| to.iter_mut().zip(turns).for_each(|(to, turn)| *to += turn);
         sum(&mut self.blocks[0]);
@@ -255,6 +259,8 @@ impl Uncertainty {
         let [second, end] = [BLOCKS, QUICK].map(over);
         self.rates = second;
         self.rates[2] = libm::fabsf(second[2]).max(libm::fabsf(end[2]));
+        let hidden = libm::fabsf(end[4]) - self.swing.angle() * BLOCKS as f32 / QUICK as f32;
+        self.rates[4] = libm::fabsf(second[4]).max(hidden);
         self.blocks.rotate_right(1);
         (self.blocks[0], self.samples) = ([0.0; TURNS], 0);
     }
@@ -265,24 +271,26 @@ impl Uncertainty {
         match (origin, self.scale_square) {
             // From one end of the second to the other.
             (Origin::Standstill, _) => 2.0 * self.swing.variance,
-            (Origin::Network, Some(scale_square)) => per_scale * per_scale * scale_square,
+            (Origin::Network, Some(scale_square)) => {
+                (per_scale * per_scale * scale_square).max(2.0 * self.corrected.variance)
+            }
             _ => uncorrected * uncorrected,
         }
     }
 
     /// The variance of what grows with these turns, rad^2, or rates.
-    fn growing(&self, [x, y, z, estimate, _]: Turns) -> f32 {
-        let GyroErrors { gain, mounting, model } = self.errors;
-        gain * gain * z * z + mounting * mounting * (x * x + y * y) + model * model * estimate * estimate
+    fn growing(&self, [x, y, z, ..]: Turns) -> f32 {
+        let GyroErrors { gain, mounting, .. } = self.errors;
+        gain * gain * z * z + mounting * mounting * (x * x + y * y)
     }
 
     /// Returns the sigma of a rate, rounded up, from the `bias` sigma in rad/s.
     #[must_use]
     pub fn sigma(&self, origin: Origin, bias: f32) -> AngularRate {
-        let [.., withheld] = self.rates;
-        let tilted = self.tilted() * self.rates[2];
+        let [.., estimate, withheld] = self.rates;
+        let (net, tilted) = (self.errors.model * estimate, self.tilted() * self.rates[2]);
         let linear = bias * bias + withheld * withheld + tilted * tilted;
-        let sigma = sqrt(self.own(origin) + linear + self.growing(self.rates));
+        let sigma = sqrt(self.own(origin).max(net * net) + linear + self.growing(self.rates));
         // Beyond the code's range the cast saturates.
         AngularRate(libm::ceilf(sigma * AngularRate::PER_RAD_PER_SEC) as i32)
     }
@@ -298,7 +306,8 @@ impl Uncertainty {
             square += part.square;
             missed += part.missed;
         }
-        sqrt(square + linear * linear + missed * missed + self.growing(turns))
+        let net = self.errors.model * turns[3];
+        sqrt(square + linear * linear + missed * missed + self.growing(turns) + net * net)
     }
 }
 

@@ -119,6 +119,20 @@ fn a_turn_on_standing_wheels_is_reported_and_not_learnt() {
     assert!((mean_deg_per_hour(&sent) - 100.0).abs() < 1.0, "{}", mean_deg_per_hour(&sent));
 }
 
+/// The accumulated yaw is off at once, so the expected errors of its seconds must add up as fast.
+#[test]
+fn a_turn_on_standing_wheels_is_part_of_sigma_before_a_second_is_over() {
+    let mut gyro = Gyro::new(4, 60.0, 0.0);
+    let mut fog = at_latitude(Some(60.0));
+    gyro.run(&mut fog, 60);
+    gyro.rate += 0.01;
+    let mut summed = 0.0;
+    for (step, sent) in gyro.run(&mut fog, 1).iter().enumerate().map(|(step, sent)| (step as f64, sent)) {
+        summed += 0.01 * sent.sigma.expect("a rate").rad_per_sec();
+        assert!(step < 25.0 || 1e-4 * step < 4.0 * summed, "{step}: {summed}");
+    }
+}
+
 /// Reads J1939's position.
 fn receiver() -> HeadingReceiver {
     HeadingReceiver::new(HeadingSettings { j1939: true, ..HeadingSettings::NONE }, None)

@@ -97,6 +97,21 @@ fn a_step_of_the_limit_is_believed_and_a_thousandth_more_is_not() {
     }
 }
 
+/// A bit that flips turns the yaw by less than a limit, which no vehicle's usual steps explain.
+#[test]
+fn a_step_that_is_plausible_and_unusual_is_part_of_sigma_for_a_second() {
+    let mut drive = Drive::new();
+    let sigma = |output: &Observation| output.vehicle.live.sigma.expect("a rate").rad_per_sec();
+    let before = sigma(&drive.shaken(2, 0));
+    let found = sigma(&drive.shaken(2, RATE_LIMIT / 2));
+    assert!((found / before.hypot(1.5e-3) - 1.0).abs() < 0.1, "0.15 rad/s for 10 ms: {found}");
+    for _ in 0..100 {
+        assert!(sigma(&drive.shaken(2, 0)) > 1.4e-3);
+    }
+    let after = (0..20).map(|_| sigma(&drive.shaken(2, 0))).last().expect("a sample");
+    assert!(after < 1.2 * before, "{after}");
+}
+
 #[test]
 fn the_fourth_reading_in_a_row_is_believed_wherever_it_is() {
     for axis in [2, 5] {

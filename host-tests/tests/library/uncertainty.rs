@@ -94,20 +94,39 @@ fn a_turn_is_as_uncertain_as_gain_and_mounting_until_they_are_known() {
     }
 }
 
+/// A rate that a network corrects by this much, and nothing else.
+fn corrected(estimate: f64) -> Turning {
+    let [none, estimate] = [0.0, estimate].map(rate);
+    Turning { rates: [none; 3], estimate, withheld: none, origin: Origin::Network, bias: 0.0 }
+}
+
 /// Half of what the network takes off on average may be wrong, unless the unit is calibrated.
 #[test]
 fn a_lasting_correction_may_be_another_unit_s() {
     for (calibrated, share) in [(false, 0.5), (true, 0.0)] {
         let mut uncertainty = Uncertainty::new(ERRORS);
         uncertainty.calibrated(calibrated);
-        let [none, estimate] = [0.0, -2e-3].map(rate);
-        let turning = Turning { rates: [none; 3], estimate, withheld: none, origin: Origin::Gyro, bias: 0.0 };
-        (0..200).for_each(|_| uncertainty.add(&turning));
-        assert_sigma(uncertainty.sigma(Origin::Gyro, 0.0), root(&[3e-4, share * 2e-3]), "a second");
+        uncertainty.window(rate(1.2e-3));
+        (0..200).for_each(|_| uncertainty.add(&corrected(-2e-3)));
+        let found = uncertainty.sigma(Origin::Network, 0.0).rad_per_sec();
+        let due = f64::max(share * 2e-3, 3e-4);
+        assert!((found / due - 1.0).abs() < 1e-3, "{found} is not {due}");
         let due = root(&[3e-4 * 2f64.sqrt(), share * 4e-3]);
         let found = f64::from(uncertainty.minute(Missed::NOTHING));
         assert!((found / due - 1.0).abs() < 1e-4, "{found} is not {due}");
     }
+}
+
+/// A truck at idle: 0.02 rad/s at 9 Hz swing by 2.5e-4 rad RMS, at either end of a second.
+#[test]
+fn what_the_network_takes_off_to_and_fro_may_be_the_vehicle_s_own_shake() {
+    let mut uncertainty = Uncertainty::new(ERRORS);
+    uncertainty.calibrated(true);
+    uncertainty.window(rate(4e-4));
+    let shake = |step: u32| 0.02 * (f64::from(step) * 0.01 * 9.0 * std::f64::consts::TAU).sin();
+    (0..300).for_each(|step| uncertainty.add(&corrected(shake(step))));
+    let found = uncertainty.sigma(Origin::Network, 0.0).rad_per_sec();
+    assert!((found / 3.5e-4 - 1.0).abs() < 0.1, "{found}");
 }
 
 #[test]
@@ -132,10 +151,14 @@ fn a_rate_that_standstill_hides_may_be_an_error_as_a_whole() {
     assert_sigma(uncertainty.sigma(Origin::Gyro, 0.0), root(&[3e-4, 4e-3]), "the gyro's own rate");
     // Zero has no noise of its own.
     assert_sigma(uncertainty.sigma(Origin::Standstill, 3e-3), 5e-3, "hidden");
+    let mut begins = Uncertainty::new(ERRORS);
+    turn(&mut begins, 3.0, [0.0, 0.0, 0.0, 1e-9]);
+    turn(&mut begins, 0.2, [0.0, 0.0, 0.0, 4e-3]);
+    assert!(begins.sigma(Origin::Standstill, 0.0).rad_per_sec() > 2.5e-3, "a turn that begins");
     turn(&mut uncertainty, 9.0, [0.0, 0.0, 0.0, 4e-3]);
     let found = f64::from(uncertainty.minute(Missed::NOTHING));
-    // The mean of the first second begins at zero.
-    assert!((found / (9.5 * root(&[4e-3, 1e-4])) - 1.0).abs() < 0.02, "{found}");
+    // The rate counts from its first fifth of a second on.
+    assert!((found / (9.85 * root(&[4e-3, 1e-4])) - 1.0).abs() < 0.02, "{found}");
 }
 
 /// A banked turn pitches the vehicle for as long as it lasts: a gyro about z misses 1 - cos of it.

@@ -1,27 +1,36 @@
-//! The angle by which an engine shakes a standing vehicle to and fro, whose rate is sent as zero.
+//! The angle by which a rate turns to and fro: of an engine that shakes a standing vehicle, whose rate is sent as zero, or of
+//! what a network takes off, which may be such a shake.
 
 use crate::sample::RATE_HZ;
+use crate::sqrt::sqrt;
 
 const STEP: f32 = 1.0 / RATE_HZ as f32;
 /// Share of the angle that a sample forgets: the vehicle swings about a mean of a quarter of a second.
 const FORGETS: f32 = 4.0 * STEP;
-/// Seconds at rest over which it is averaged: an engine shakes now more, now less.
-const SECONDS: f32 = 4.0;
 
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Swing {
+pub(crate) struct Swing {
     angle: f32,
     mean: f32,
     /// Its variance, rad^2.
     pub variance: f32,
-    /// The seconds over which it is averaged so far.
+    /// The seconds over which it is averaged so far, and at most: a vibration is now more, now less.
     seconds: f32,
+    longest: f32,
 }
 
 impl Swing {
-    pub const NONE: Self = Self { angle: 0.0, mean: 0.0, variance: 0.0, seconds: 0.0 };
+    /// The state before the first sample, averaged over these seconds.
+    pub const fn over(longest: f32) -> Self {
+        Self { angle: 0.0, mean: 0.0, variance: 0.0, seconds: 0.0, longest }
+    }
 
-    /// Adds the angle of a sample at rest, rad.
+    /// The largest angle between two samples, but for one in twenty, rad.
+    pub fn angle(&self) -> f32 {
+        2.0 * sqrt(2.0 * self.variance)
+    }
+
+    /// Adds the angle of a sample, rad.
     pub fn add(&mut self, turn: f32) {
         if self.seconds == 0.0 {
             // As if it had always been so: a steady rate is no swing.
@@ -29,7 +38,7 @@ impl Swing {
             self.mean = self.angle;
         }
         self.angle += turn - FORGETS * self.angle;
-        self.seconds = (self.seconds + STEP).min(SECONDS);
+        self.seconds = (self.seconds + STEP).min(self.longest);
         let (part, off) = (STEP / self.seconds, self.angle - self.mean);
         self.mean += part * off;
         self.variance += part * (off * off - self.variance);
@@ -43,7 +52,7 @@ mod tests {
     #[test]
     fn an_engine_s_swing_is_found_and_a_steady_rate_is_none() {
         let swing = |rate: fn(f32) -> f32| {
-            let mut swing = Swing::NONE;
+            let mut swing = Swing::over(4.0);
             (0..800).for_each(|step| swing.add(STEP * rate(step as f32 * STEP)));
             swing.variance.sqrt()
         };
