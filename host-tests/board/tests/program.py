@@ -21,7 +21,7 @@ class Clocks(Peripheral):
     """Fixed clocks in the place of RCC."""
 
     name, base = "RCC", 0x4002_3800
-    core_hz, systick_external_hz = CORE_HZ, CORE_HZ // 8
+    core_hz = CORE_HZ
     open = {None}
 
     def enabled(self, name: str) -> bool:

@@ -119,15 +119,6 @@ class Priorities(unittest.TestCase):
         self.assertEqual(program.handler, 16 + 9)
         self.assertEqual(program.get("lr"), 0xFFFF_FFF1)
 
-    def test_one_group_does_not_preempt_within_itself(self):
-        program = Program(HERE)
-        program.board.bus.write(0xE000_ED0C, 0x05FA_0600, 4)  # PRIGROUP = 6: one bit of groups
-        self.pend(program, n3=0x70)
-        program.run(20)
-        self.pend(program, n9=0x00)
-        program.run(20)
-        self.assertEqual(program.handler, 16 + 3)
-
     def test_pending_exceptions_follow_each_other_without_an_instruction_between(self):
         program = Program(HERE, {16 + 3: COUNT, 16 + 4: COUNT}, r0=0x2000_0000)
         program.board.memory_write(0x2000_0000, bytes(4))

@@ -6,7 +6,7 @@ from virtual_board.violation import Violation
 
 from .program import HERE, MAIN, STACK, Program
 
-NMI, HARD_FAULT, MEM_MANAGE, BUS_FAULT, USAGE_FAULT, SVC = 2, 3, 4, 5, 6, 11
+HARD_FAULT, SVC = 3, 11
 FORCED, VECTTBL, DEBUGEVT = 1 << 30, 1 << 1, 1 << 31
 UNDEFINED = "00de"  # udf #0
 # movw r0, #0; movt r0, #0x3000; ldr r1, [r0, #4]; b .
@@ -19,7 +19,6 @@ EVEN_TARGET = "0020c2f200000047"
 OVERFLOW = "ffb4fff7fdbf"
 # vmov.f32 s0, #1.0; b .
 FPU = "b7ee000afee7"
-ENABLE_ALL = 7 << 16
 
 
 def events(program: Program, kind: str) -> list[dict]:
@@ -32,35 +31,19 @@ class Faults(unittest.TestCase):
         self.assertEqual(program.board.scb.cfsr, cfsr)
         self.assertEqual(program.board.scb.hfsr, hfsr)
 
-    def enable(self, program):
-        program.board.bus.write(0xE000_ED24, ENABLE_ALL, 4)
-
     def test_an_undefined_instruction_escalates_to_hardfault(self):
         program = Program(UNDEFINED)
         program.run(20)
         self.check(program, HARD_FAULT, 1 << 16, FORCED)
         self.assertEqual(program.words(STACK - 32, 8)[6], MAIN)
 
-    def test_an_undefined_instruction_is_a_usage_fault_where_that_is_enabled(self):
-        program = Program(UNDEFINED)
-        self.enable(program)
-        program.run(20)
-        self.check(program, USAGE_FAULT, 1 << 16)
-
     def test_a_read_where_nothing_is_gives_a_precise_bus_fault_with_its_address(self):
         program = Program(BAD_READ, r1=77)
-        self.enable(program)
         program.run(20)
-        self.check(program, BUS_FAULT, 1 << 9 | 1 << 15)
+        self.check(program, HARD_FAULT, 1 << 9 | 1 << 15, FORCED)
         self.assertEqual(program.board.scb.bfar, 0x3000_0004)
         self.assertEqual(program.words(STACK - 32, 8)[6], MAIN + 8)
         self.assertEqual(program.get("r1"), 77)
-
-    def test_a_fault_that_its_priority_does_not_allow_escalates(self):
-        program = Program("72b6" + BAD_READ)  # cpsid i
-        self.enable(program)
-        program.run(20)
-        self.check(program, HARD_FAULT, 1 << 9 | 1 << 15, FORCED)
 
     def test_nothing_can_be_fetched_from_the_core_coupled_memory(self):
         program = Program(FETCH_FROM_CCM)
@@ -111,9 +94,8 @@ class Faults(unittest.TestCase):
     def test_a_return_with_a_wrong_exc_return_is_an_invalid_pc(self):
         # movs r0, #14; mvns r0, r0 (0xFFFFFFF1: to a handler, where none is active); bx r0
         program = Program("00dffee7", {SVC: "0e20c0430047"})
-        self.enable(program)
         program.run(40)
-        self.check(program, USAGE_FAULT, 1 << 18)
+        self.check(program, HARD_FAULT, 1 << 18, FORCED)
         # No second frame (B1.5.8): the one of the SVC is still there, and LR keeps the value that was refused.
         self.assertEqual(program.get("sp"), STACK - 32)
         self.assertEqual(program.get("lr"), 0xFFFF_FFF1)
@@ -180,6 +162,12 @@ class Refusals(unittest.TestCase):
     def test_a_peripheral_without_its_clock_ends_the_run(self):
         program = Program("0160fee7", r0=0x4000_0400)  # str r1, [r0]; b .
         self.assertIn("GATED is used while its clock (GATED) is off", self.refused(program))
+
+    def test_what_the_model_leaves_out_ends_the_run(self):
+        bus = Program(HERE).board.bus
+        for address, value in ((0xE000_ED24, 7 << 16), (0xE000_ED0C, 0x05FA_0600), (0xE000_ED94, 1), (0xE000_EF34, 0)):
+            with self.assertRaises(Violation):
+                bus.write(address, value, 4)
 
     def test_a_bit_band_alias_ends_the_run(self):
         for address in (0x2200_0000, 0x4200_0000):

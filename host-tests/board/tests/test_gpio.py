@@ -1,4 +1,4 @@
-"""Ports, SYSCFG, EXTI and the debug component: sections 8, 9, 12 and 38 of RM0090."""
+"""Ports and the debug component: sections 8 and 38 of RM0090."""
 
 import unittest
 
@@ -35,29 +35,6 @@ class Gpio(unittest.TestCase):
         self.assertEqual(self.board.read("GPIOD", 0x10), 1)
         self.board.configure("GPIOD", "drive", (0, False))
         self.assertEqual(self.board.read("GPIOD", 0x10), 0)
-
-    def test_locked_pins_keep_their_configuration(self):
-        for value in (0x1_0001, 0x0_0001, 0x1_0001):
-            self.board.write("GPIOC", 0x1C, value)
-        self.assertTrue(self.board.read("GPIOC", 0x1C) & 1 << 16)
-        self.board.write("GPIOC", 0x00, 0x5)
-        self.assertEqual(self.board.read("GPIOC", 0x00), 0x4)
-
-    def test_a_pin_interrupts_through_syscfg_and_exti(self):
-        self.board.write("SYSCFG", 0x08, 2)
-        self.board.write("EXTI", 0x00, 1)
-        self.board.write("EXTI", 0x08, 1)
-        self.board.configure("GPIOC", "drive", (0, True))
-        self.assertTrue(self.board.lines[6])
-        self.board.write("EXTI", 0x14, 1)
-        self.assertFalse(self.board.lines[6])
-
-    def test_software_interrupt(self):
-        self.board.write("EXTI", 0x00, 1 << 5)
-        self.board.write("EXTI", 0x10, 1 << 5)
-        self.assertTrue(self.board.lines[23])
-        self.board.write("EXTI", 0x14, 1 << 5)
-        self.assertEqual(self.board.read("EXTI", 0x10), 0)
 
     def test_identity(self):
         self.assertEqual(self.board.read("DBGMCU", 0) & 0xFFF, 0x413)

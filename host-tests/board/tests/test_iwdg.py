@@ -25,7 +25,7 @@ class Iwdg(unittest.TestCase):
     def test_default_timeout_is_512_ms_at_32_khz_and_changes_with_the_lsi(self):
         for lsi_hz, milliseconds in ((32_000, 512), (17_000, 963)):
             self.board = FakeBoard()
-            self.board.configure("IWDG", "lsi_hz", lsi_hz)
+            self.board.configure("RCC", "lsi_hz", lsi_hz)
             self.write(KR, 0xCCCC)
             self.board.advance((milliseconds - 1) * MS)
             self.assertEqual(self.board.resets, [])

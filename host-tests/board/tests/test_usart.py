@@ -109,10 +109,10 @@ class Usart(unittest.TestCase):
             value = self.read(DR)
             self.assertEqual((bool(status & FE) or value != 0x35), wrong, baud)
 
-    def test_oversampling_by_8(self):
-        self.write(CR1, 0x8000 | UE_TE_RE)
-        self.write(BRR, 17 << 4 | 3)
-        self.assertEqual(self.usart.bit_ps, 139 * 62_500)
+    def test_modes_left_out(self):
+        for offset, value in ((CR1, 0x8000 | UE_TE_RE), (CR1, UE_TE_RE | 1 << 7), (0x10, 1 << 12), (0x14, 1 << 3), (0x18, 1)):
+            with self.assertRaises(Violation):
+                self.write(offset, value)
 
     def test_bytes_before_the_receiver_is_on_are_lost(self):
         self.write(CR1, 0x2008)

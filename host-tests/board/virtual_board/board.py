@@ -19,7 +19,7 @@ from .memory import Memory
 from .nvic import NMI, Nvic
 from .paths import Paths
 from .processor import COUNT, FAULT, SLEEP, STATE, UNDEFINED, Processor
-from .scb import FpuControl, Scb
+from .scb import Scb
 from .systick import SysTick
 from .violation import Violation
 
@@ -66,7 +66,7 @@ class Board:
         self.dwt, self.debug = Dwt(self), CoreDebug(self)
         self.exceptions = Exceptions(self)
         self.paths = Paths(self)
-        for device in (Fixed(), self.systick, self.nvic, self.scb, self.debug, self.dwt, FpuControl(self)):
+        for device in (Fixed(), self.systick, self.nvic, self.scb, self.debug, self.dwt):
             self.bus.attach_private(device)
         self.bus.private[0xE000EF00 >> 2] = self.nvic
         self.peripherals: dict = {}
@@ -301,7 +301,7 @@ class Board:
         if highest is None:
             return False
         _, basepri, faultmask, _ = self.processor.masks.read()
-        return self.nvic.group(highest[1]) < self.nvic.execution_priority(0, basepri, faultmask)
+        return highest[1] < self.nvic.execution_priority(0, basepri, faultmask)
 
     def _slice_length(self, due: int) -> int:
         count = min(-(-(due - self._now) // self._instruction_ps), LONGEST_SLICE)

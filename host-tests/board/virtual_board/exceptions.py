@@ -7,7 +7,7 @@ runs.
 
 import struct
 
-from .nvic import BUS_FAULT, HARD_FAULT, MEM_MANAGE, NMI, SVCALL, USAGE_FAULT
+from .nvic import HARD_FAULT, NMI, SVCALL
 from .registers import Batch
 from .violation import Violation
 
@@ -65,7 +65,7 @@ class Exceptions:
             return False
         registers = self.frame.read()
         masks = registers[-3:]
-        if masks != UNMASKED and nvic.group(nvic.priority[number]) >= nvic.execution_priority(*masks):
+        if masks != UNMASKED and nvic.priority[number] >= nvic.execution_priority(*masks):
             return False
         self.enter(number, registers)
         return True
@@ -86,7 +86,6 @@ class Exceptions:
         data = FRAME.pack(r0, r1, r2, r3, r12, lr, pc, saved_xpsr)
         if extended:
             data += self.fpu.read_bytes()
-            board.scb.fpcar = frame + 32
         in_thread = self.current == 0
         excret = self.base | (0 if extended else 0x10) | (0x8 if in_thread else 0)
         if in_thread and control & SPSEL:
@@ -107,9 +106,6 @@ class Exceptions:
         if number in (NMI, HARD_FAULT):
             return number
         nvic.pending |= 1 << number
-        own = nvic.group(nvic.priority[BUS_FAULT])
-        if nvic.enabled >> BUS_FAULT & 1 and own < nvic.group(nvic.priority[number]):
-            return BUS_FAULT
         scb.hfsr |= FORCED
         return HARD_FAULT
 
@@ -181,12 +177,12 @@ class Exceptions:
         length = 104 if extended else 32
         data = board.memory.read(frame, length)
         if data is None:
-            self._return_fault(excret, "the frame cannot be read", BUS_FAULT, UNSTKERR)
+            self._return_fault(excret, "the frame cannot be read", UNSTKERR)
             return
         r0, r1, r2, r3, r12, lr, pc, xpsr = FRAME.unpack_from(data)
         number = xpsr & 0x1FF
         if (number == 0) != to_thread:
-            self._return_fault(excret, "the stored xPSR does not fit EXC_RETURN", USAGE_FAULT, INVPC)
+            self._return_fault(excret, "the stored xPSR does not fit EXC_RETURN")
             return
         if extended:
             self.fpu.write_bytes(data[32:])
@@ -201,60 +197,53 @@ class Exceptions:
         if to_thread and board.scb.scr & SLEEPONEXIT:
             board.sleep_on_exit()
 
-    def _return_fault(self, excret: int, why: str, kind: int = USAGE_FAULT, bit: int = INVPC) -> None:
+    def _return_fault(self, excret: int, why: str, bit: int = INVPC) -> None:
         """Takes a fault of the return itself: the frame stays on the stack, and the handler's LR holds EXC_RETURN."""
         board = self.board
         board.processor.set("lr", excret)
         self.current = 0 if excret & 8 else self.current
         board.record("fault", what=why)
-        number = self._fault_number(kind, bit, why)
-        if number is None:
-            return
-        xpsr, sp, control = self.frame.read()[7:10]
-        self._begin(number, sp, xpsr, control, excret)
+        if self._escalates(bit, why):
+            xpsr, sp, control = self.frame.read()[7:10]
+            self._begin(HARD_FAULT, sp, xpsr, control, excret)
 
     def raise_synchronous(self, number: int) -> None:
         """Takes an exception that an instruction requests; one that may not preempt becomes a HardFault."""
         nvic = self.board.nvic
-        if nvic.group(nvic.priority[number]) < self.execution_priority():
+        if nvic.priority[number] < self.execution_priority():
             self.enter(number)
         else:
             self._hard_fault("an SVC that its priority does not allow")
 
     def usage_fault(self, bit: int, why: str) -> None:
         """Takes a UsageFault."""
-        self._fault(USAGE_FAULT, bit, why)
+        self._fault(bit, why)
 
     def bus_fault(self, bit: int, address: int | None, why: str) -> None:
         """Takes a BusFault; `address` is stored in BFAR."""
         if address is not None:
             self.board.scb.bfar = address
             bit |= BFARVALID
-        self._fault(BUS_FAULT, bit, why)
+        self._fault(bit, why)
 
     def mem_manage(self, bit: int, why: str) -> None:
         """Takes a MemManage fault."""
-        self._fault(MEM_MANAGE, bit, why)
+        self._fault(bit, why)
 
-    def _fault(self, kind: int, bit: int, why: str) -> None:
+    def _fault(self, bit: int, why: str) -> None:
         pc, = self.board.processor.pc.read()
         self.board.record("fault", what=why, pc=pc, symbol=self.board.symbol_at(pc))
-        number = self._fault_number(kind, bit, why)
-        if number is not None:
-            self.enter(number)
+        if self._escalates(bit, why):
+            self.enter(HARD_FAULT)
 
-    def _fault_number(self, kind: int, bit: int, why: str) -> int | None:
-        """Sets the status bits and returns the exception to enter. `None`: the core has locked up."""
-        nvic, scb = self.board.nvic, self.board.scb
-        scb.cfsr |= bit
-        priority = self.execution_priority()
-        if nvic.enabled >> kind & 1 and nvic.group(nvic.priority[kind]) < priority:
-            return kind
-        if priority <= -1:
+    def _escalates(self, bit: int, why: str) -> bool:
+        """Sets the status bits of a fault without a handler of its own. False: the core has locked up, instead of a HardFault."""
+        self.board.scb.cfsr |= bit
+        if self.execution_priority() <= -1:
             self.board.lock_up(why)
-            return None
-        scb.hfsr |= FORCED
-        return HARD_FAULT
+            return False
+        self.board.scb.hfsr |= FORCED
+        return True
 
     def _hard_fault(self, why: str) -> None:
         pc, = self.board.processor.pc.read()

@@ -7,7 +7,7 @@ interrupts. Sets of exceptions are integers with one bit each. The chips have 4 
 from .violation import Violation
 
 PRIORITY_MASK = 0xF0
-NMI, HARD_FAULT, MEM_MANAGE, BUS_FAULT, USAGE_FAULT, SVCALL, PENDSV, SYSTICK = 2, 3, 4, 5, 6, 11, 14, 15
+NMI, HARD_FAULT, SVCALL, PENDSV, SYSTICK = 2, 3, 11, 14, 15
 #: The execution priority of Thread mode with nothing masked.
 LOWEST = 256
 
@@ -37,7 +37,6 @@ class Nvic:
         self.active = 0
         self.lines = getattr(self, "lines", 0)
         self.priority = [LOWEST] * 2 + [-2, -1] + [0] * (self.count - 4)
-        self.group_mask = 0xFF  # AIRCR.PRIGROUP = 0: bits 7 to 1 preempt, and bit 0 is not implemented.
         self.priorities_changed()
 
     def priorities_changed(self) -> None:
@@ -79,29 +78,25 @@ class Nvic:
             return None
         number = self.highest_pending()[0] if ready & ready - 1 else ready.bit_length() - 1
         level = self._levels.get(self.active)
-        return number if self.group(self.priority[number]) < (self.level() if level is None else level) else None
+        return number if self.priority[number] < (self.level() if level is None else level) else None
 
     def level(self) -> int:
         """Returns the execution priority that results from the active exceptions."""
         level = self._levels.get(self.active)
         if level is None:
-            level = self._levels[self.active] = min(self.group(self.priority[n]) for n in bits(self.active))
+            level = self._levels[self.active] = min(self.priority[n] for n in bits(self.active))
         return level
 
     def execution_priority(self, primask: int, basepri: int, faultmask: int) -> int:
         """Returns the priority below which an exception must be to be taken."""
         lowest = self.level()
         if basepri & PRIORITY_MASK:
-            lowest = min(lowest, self.group(basepri & PRIORITY_MASK))
+            lowest = min(lowest, basepri & PRIORITY_MASK)
         if primask & 1:
             lowest = min(lowest, 0)
         if faultmask & 1:
             lowest = min(lowest, -1)
         return lowest
-
-    def group(self, priority: int) -> int:
-        """Returns the part of a priority that decides on preemption."""
-        return priority if priority < 0 else priority & self.group_mask
 
     def read(self, offset: int, size: int) -> int:
         """Reads ISER, ICER, ISPR, ICPR, IABR and IPR."""

@@ -1,15 +1,13 @@
 """SysTick (DDI0403 B3.3): a 24-bit counter whose value is computed from the board time, never stepped.
 
-The counter takes the value RELOAD one clock after it was 0, so that a period is RELOAD + 1 clocks. It sets COUNTFLAG and, with
-TICKINT, makes the exception pending when it goes from 1 to 0. CALIB on the STM32F405 is fixed at 18750, which is 1 ms at HCLK/8
-with 150 MHz (PM0214 section 4.5.4 and RM0090 section 12.1.3).
+The counter takes the value RELOAD one clock after it was 0, so that a period is RELOAD + 1 clocks. With TICKINT it makes the
+exception pending when it goes from 1 to 0. It counts the core's clocks. Left out: the external clock, COUNTFLAG, CALIB.
 """
 
 from .nvic import SYSTICK
 from .violation import Violation
 
-ENABLE, TICKINT, CLKSOURCE, COUNTFLAG = 1, 2, 4, 1 << 16
-CALIBRATION = 0x4000_0000 | 18_750
+ENABLE, TICKINT, CLKSOURCE = 1, 2, 4
 
 
 class SysTick:
@@ -29,7 +27,6 @@ class SysTick:
         self.value = 0
         self.start = 0
         self.period_ps = 1
-        self.flag = False
         self._cancel()
 
     def _cancel(self) -> None:
@@ -42,9 +39,8 @@ class SysTick:
         if self.control & ENABLE:
             self.value = self.current()
         self.start = self.board.now
-        rcc = self.board.rcc
         #: The duration of one clock, in picoseconds. Valid until the next call.
-        self.period_ps = round(1e12 / (rcc.core_hz if self.control & CLKSOURCE else rcc.systick_external_hz))
+        self.period_ps = round(1e12 / self.board.rcc.core_hz)
 
     def current(self) -> int:
         """Returns the counter's value now."""
@@ -68,36 +64,28 @@ class SysTick:
     def _reached_zero(self) -> None:
         self.start += (self.value or self.reload + 1) * self.period_ps
         self.value = 0
-        self.flag = True
         if self.control & TICKINT:
             self.board.nvic.pend(SYSTICK)
         self.plan()
 
     def read(self, offset: int, size: int) -> int:
-        """Reads CSR (which clears COUNTFLAG), RVR, CVR or CALIB."""
-        if size != 4:
-            raise Violation(f"SysTick: {size}-byte read")
-        if offset == 0:
-            value = self.control | (COUNTFLAG if self.flag else 0)
-            self.flag = False
-            return value
-        if offset == 4:
-            return self.reload
-        if offset == 8:
-            return self.current()
-        return CALIBRATION
+        """Reads RVR or CVR, or CSR without COUNTFLAG."""
+        if size != 4 or offset > 8:
+            raise Violation(f"SysTick: {size}-byte read at offset {offset}")
+        return (self.control, self.reload, self.current())[offset // 4]
 
     def write(self, offset: int, value: int, size: int) -> None:
-        """Writes CSR, RVR, or CVR, where any value clears the counter and COUNTFLAG."""
+        """Writes CSR, RVR, or CVR, where any value clears the counter."""
         if size != 4:
             raise Violation(f"SysTick: {size}-byte write")
         self.hold()
         if offset == 0:
+            if value & ENABLE and not value & CLKSOURCE:
+                raise Violation("SysTick: the external clock is not modelled")
             self.control = value & 7
             self.hold()
         elif offset == 4:
             self.reload = value & 0xFF_FFFF
         elif offset == 8:
             self.value = 0
-            self.flag = False
         self.plan()

@@ -1,4 +1,4 @@
-"""python -m gyronet_train.fognet LAYOUT --train DIR ... --validate DIR --out FOLDER: train FoGNet.
+"""python -m gyronet_train.fognet --train DRIVE ... --validate DRIVE --out FOLDER: train FoGNet.
 
 As in the paper, training uses windows of 60 s every second, Adam with an initial rate of 0.0015, and the
 two losses of Eq. 14-16 with alpha 0.5. The paper gives no units. Here the first loss is in units of the
@@ -8,9 +8,8 @@ truth of the rows that they repeat. The learning rate follows one cycle, weights
 steps, and the best epoch on the validation drive is kept. If the gyro's bias is known, the constant part of
 the correction is removed at the end. Test drives are never read.
 
-LAYOUT drives: files that `gyronet-paper import --training` wrote, with the Earth's rate and the
-bias subtracted from the gyro; a file with gaps is used in pieces. LAYOUT kingston: the first 60 % of the
-Kingston 2008 recording; the last sixth of these validates.
+Drives are files that `gyronet-paper import --training` wrote, with the Earth's rate and the bias subtracted
+from the gyro; a file with gaps is used in pieces.
 """
 
 from __future__ import annotations
@@ -28,16 +27,14 @@ from tqdm import tqdm
 from .export import export
 from .fognet_loss import fognet_losses
 from .fognet_model import FoGNet
-from .seconds import FOG, STEPS, Seconds, load_grid, load_kingston, window_rows
+from .seconds import FOG, STEPS, Seconds, load_grid, window_rows
 
-ADAPT_SHARE, VALIDATE_SHARE = 0.6, 1 / 6
 AVERAGE = 0.995  # decay of the weights' average per step
 SETTINGS = ("epochs", "windows", "batch", "lr", "alpha", "padded", "weight_decay", "head_only", "seed")
 
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gyronet_train.fognet", description=__doc__)
-    parser.add_argument("layout", choices=["drives", "kingston"])
     parser.add_argument("--train", type=Path, nargs="+", required=True, metavar="PATH")
     parser.add_argument("--validate", type=Path, nargs="+", metavar="PATH", help="validation drives")
     parser.add_argument(
@@ -58,23 +55,15 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--weight-decay", type=float, default=0.0)
     parser.add_argument("--head-only", action="store_true", help="train FC3 and FC4 only")
     parser.add_argument("--seed", type=int, default=1)
-    args = parser.parse_args()
-    if args.rates and args.layout != "drives":
-        parser.error("--rates needs LAYOUT drives")
-    return args
+    return parser.parse_args()
 
 
 def load(args: argparse.Namespace) -> tuple[list[Seconds], list[Seconds]]:
     """Returns the training and the validation drives; pieces of a drive count as drives."""
-    if args.layout != "kingston":
-        rates = lambda path: args.rates and args.rates / path.name
-        pieces = lambda path: load_grid(path, rates(path))
-        train = [piece for path in tqdm(args.train, "reading", disable=None) for piece in pieces(path)]
-        return train, [piece for path in args.validate or [] for piece in pieces(path)]
-    drive = load_kingston(args.train[0])
-    adapt = int(ADAPT_SHARE * len(drive.turn))
-    split = int((1 - VALIDATE_SHARE) * adapt)
-    return [drive.part(0, split)], [drive.part(split, adapt)]
+    rates = lambda path: args.rates and args.rates / path.name
+    pieces = lambda path: load_grid(path, rates(path))
+    train = [piece for path in tqdm(args.train, "reading", disable=None) for piece in pieces(path)]
+    return train, [piece for path in args.validate or [] for piece in pieces(path)]
 
 
 class Windows:
@@ -176,7 +165,7 @@ def main() -> None:
             best = (error, epoch, copy.deepcopy(average.state_dict()))
     model.load_state_dict(best[2])
     model.eval()
-    constant = 0.0 if args.layout == "kingston" else take_out_constant(model, data)
+    constant = take_out_constant(model, data)
     print(f"a constant of {constant:+.7f} rad per minute is removed")
     provenance = {
         "network": "fognet",

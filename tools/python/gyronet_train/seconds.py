@@ -31,26 +31,17 @@ class Seconds:
     features: np.ndarray
     turn: np.ndarray
 
-    def part(self, begin: int, end: int) -> Seconds:
-        """Returns the seconds from `begin` to `end`."""
-        name = f"{self.name}[{begin}:{end}]"
-        return Seconds(name, self.sha256, self.features[begin:end], self.turn[begin:end])
-
 
 def window_rows(end: int, padding: str) -> np.ndarray | None:
     """Returns the rows of the window that ends with row `end - 1`, oldest first.
 
     If there are fewer than 60 rows (Fig. 8 of the paper), `repeat` repeats the existing rows in their
-    order, `edge` repeats the first row, and `none` gives no window.
+    order, and `none` gives no window.
     """
     rows = np.arange(end - STEPS, end)
     if end >= STEPS:
         return rows
-    if padding == "repeat":
-        return rows % end
-    if padding == "edge":
-        return rows.clip(min=0)
-    return None
+    return rows % end if padding == "repeat" else None
 
 
 def kaist_files(folder: Path):
@@ -107,55 +98,17 @@ def turns(path: Path, start: float, row: np.ndarray) -> np.ndarray:
     return turn[row]
 
 
-def load_kingston(folder: Path) -> Seconds:
-    """Reads the Kingston 2008 recording. Its gyro replaces the fibre-optic gyro, and both wheels have the speed of the
-    car. Its azimuth is positive clockwise."""
-    digest = hashlib.sha256()
-    imu, speed, reference = (
-        table(folder / name, columns, digest, header=1)
-        for name, columns in (("imu_10hz.csv", 7), ("obd_speed_1hz.csv", 2), ("reference_1hz.csv", 10))
-    )
-    # Seconds begin at the reference's time stamps, since a heading between two stamps would be a guess.
-    inside = (reference[:, 0] >= imu[0, 0]) & (reference[:, 0] <= imu[-1, 0])
-    edges = reference[inside, 0]
-    if (abs(np.diff(edges) - 1.0) > 0.01).any():
-        raise ValueError(f"{folder}: the reference is not at 1 Hz throughout")
-    # The rate of a sample is that since the previous sample.
-    turned = np.cumsum(imu[:, 6] * np.diff(imu[:, 0], prepend=imu[0, 0]))
-    way = np.cumsum(speed[:, 1] * np.diff(speed[:, 0], prepend=speed[0, 0]))
-    gyro = imu[:, 4:7] - imu[imu[:, 0] < STATIC_S + imu[0, 0], 4:7].mean(axis=0)
-    means = [second_means(imu[:, 0], column, edges) for column in (*imu[:, 1:4].T, *gyro.T)]
-    wheel = np.diff(np.interp(edges, speed[:, 0], way))
-    azimuth = np.unwrap(np.deg2rad(reference[inside, 9]))
-    return Seconds(
-        name=folder.name,
-        sha256=digest.hexdigest(),
-        features=np.stack([*means, wheel, wheel, np.diff(np.interp(edges, imu[:, 0], turned))], axis=1),
-        turn=-np.diff(azimuth),
-    )
-
-
-def second_means(times: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Returns the mean of the values in each second; raises ValueError if a second has none."""
-    first = np.searchsorted(times, edges)
-    count = np.diff(first)
-    if (count == 0).any():
-        raise ValueError(f"no sample in second {int(np.argmin(count))}")
-    total = np.concatenate([[0.0], np.cumsum(values.astype(float))])[first]
-    return np.diff(total) / count
-
-
-def table(path: Path, columns: int, digest, header: int = 0) -> np.ndarray:
+def table(path: Path, columns: int, digest) -> np.ndarray:
     """Reads a CSV of that many columns. Stamps of 1.5e18 ns are rounded to 256 ns, which is precise enough here. Rows
     that are not finite or repeat a stamp are left out and counted."""
     digest.update(path.read_bytes())
     try:
-        values = np.loadtxt(path, delimiter=",", skiprows=header, dtype=np.float64, ndmin=2)
+        values = np.loadtxt(path, delimiter=",", dtype=np.float64, ndmin=2)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
     if values.shape[1] != columns:
         raise ValueError(f"{path}: must have {columns} columns")
-    lines = np.arange(len(values)) + 1 + header
+    lines = np.arange(len(values)) + 1
     finite = np.isfinite(values).all(axis=1)
     values, lines = values[finite], lines[finite]
     new = np.diff(values[:, 0], prepend=-np.inf) != 0

@@ -12,8 +12,7 @@ from .iwdg import Iwdg
 from .pwr import Pwr
 from .rcc import Rcc
 from .rng import Rng
-from .spi import spis
-from .syscfg import Syscfg
+from .spi import Spi
 from .timer import timers
 from .usart import usarts
 
@@ -24,10 +23,10 @@ def create(board):
     The clock tree comes first, because the others read their clocks from it.
     """
     ports = [Gpio(board, letter) for letter in "ABCDEFGHI"]
-    serial = spis(board)
+    spi = Spi(board)
     icm42688, bmi088 = Icm42688(board), Bmi088(board)
-    serial[0].attach(icm42688, [(icm42688, ports[0], 4)])
-    serial[0].attach(bmi088, [(bmi088.accelerometer, ports[0], 4), (bmi088.gyro, ports[2], 4)])
-    return [Rcc(board), Pwr(board), Flash(board), Exti(board), Syscfg(board), *ports, Dbgmcu(board),
-            Iwdg(board), *usarts(board), *timers(board), BxCan(board), *serial,
+    spi.attach(icm42688, [(icm42688, ports[0], 4)])
+    spi.attach(bmi088, [(bmi088.accelerometer, ports[0], 4), (bmi088.gyro, ports[2], 4)])
+    return [Rcc(board), Pwr(board), Flash(board), Exti(board), *ports, Dbgmcu(board),
+            Iwdg(board), *usarts(board), *timers(board), BxCan(board), spi,
             Dma(board, "DMA1", 0x4002_6000), Dma(board, "DMA2", 0x4002_6400), Rng(board)]

@@ -1,7 +1,8 @@
 """bxCAN, controller CAN1 (RM0090 section 32): modes, mailboxes, FIFOs, error management, interrupts.
 
 The bus behind it is `can_bus.CanBus`, reached as `bus`; the filters are `can_filters.Filters`.
-Left out: time stamps (time-triggered mode can be set, and reading a stamp then ends the run), the debug freeze, CAN2.
+Left out: all of MCR but INRQ, SLEEP and TXFP, which must be set on the bus (time-triggered mode, bus-off that ends by itself, waking by
+the bus, single attempts, a locked FIFO), FIFO 1, interrupts but those of mailboxes, of FIFO 0 and of errors, the debug freeze, CAN2.
 Assumed where the manual is silent: a receive pin without its alternate function reads dominant, so the controller does not synchronise;
 mailboxes keep their requests in initialisation and in bus-off; MSR.RX shows the level between frames; entering initialisation or Sleep
 outside of a frame takes one bit; each failed attempt sets ALST and TERR; only software clears FULL.
@@ -19,19 +20,17 @@ from .can_mailboxes import ALST, TERR, TXOK, Mailboxes
 from .gpio import connected
 
 PS = 1_000_000_000_000
-INRQ, SLEEP, TXFP, RFLM, NART, AWUM, ABOM, TTCM, RESET = (1 << bit for bit in (0, 1, 2, 3, 4, 5, 6, 7, 15))
-INAK, SLAK, ERRI, WKUI, SLAKI, TXM, RXM, SAMP, RX = (1 << bit for bit in (0, 1, 2, 3, 4, 8, 9, 10, 11))
-LECIE, ERRIE, WKUIE, SLKIE = 1 << 11, 1 << 15, 1 << 16, 1 << 17
+INRQ, SLEEP, TXFP, DBF = 1 << 0, 1 << 1, 1 << 2, 1 << 16
+INAK, SLAK, ERRI, TXM, RXM, SAMP, RX = (1 << bit for bit in (0, 1, 2, 8, 9, 10, 11))
+TMEIE, FMPIE0, BOFIE, ERRIE = 1 << 0, 1 << 1, 1 << 10, 1 << 15
 EWGF, EPVF, BOFF = 1, 2, 4
 SILM, LBKM = 1 << 31, 1 << 30
 FULL, FOVR, RFOM = 1 << 3, 1 << 4, 1 << 5
-TX_IRQ, RX0_IRQ, RX1_IRQ, SCE_IRQ = 19, 20, 21, 22
+TX_IRQ, RX0_IRQ, SCE_IRQ = IRQS = 19, 20, 22
 MCR_RESET, BTR_RESET = 0x0001_0002, 0x0123_0000
 TX_PINS = (("A", 12), ("B", 9), ("D", 1))
 RX_PINS = (("A", 11), ("B", 8), ("D", 0), ("I", 9))
 FUNCTION = 9
-#: The registers with the lengths of the mailboxes, whose upper halves are the frames' time stamps in time-triggered mode.
-STAMPED = (0x184, 0x194, 0x1A4, 0x1B4, 0x1C4)
 RECOVERY_SEQUENCES, SEQUENCE_BITS = 128, 11
 
 
@@ -57,16 +56,14 @@ class BxCan(Peripheral):
         self.bus_off = False
         self.mailboxes = Mailboxes()
         self.sending = None
-        self.fifos = ([], [])
-        self.fifo_flags = [0, 0]
-        self.output = [(0, 0, 0, 0), (0, 0, 0, 0)]
+        self.fifo, self.fifo_flags, self.output = [], 0, (0, 0, 0, 0)
         self.filters = Filters()
         # Number of good frames of other nodes that no filter accepted, for tests.
         self.filtered = 0
         self.suspended_until = 0
-        self.last_status = 0
+        self.was_off = False
         self.recovering, self.recovery_left, self.recovery_seen = False, 0, (0, 0, 0)
-        self.levels = [False] * 4
+        self.levels = [False] * 3
 
     def reset(self, cause):
         for handle in (self.mode_event, self.recovery, self.loop_event):
@@ -76,7 +73,7 @@ class BxCan(Peripheral):
         self.bus.cut("reset")
         self._registers()
         self.bit_ps = self._bit_time()
-        for number in (TX_IRQ, RX0_IRQ, RX1_IRQ, SCE_IRQ):
+        for number in IRQS:
             self.board.irq(number, False)
         if cause == "por":
             self.bus.power_on()
@@ -142,10 +139,9 @@ class BxCan(Peripheral):
             self.wanted = "normal"
             return
         self.state = wanted
-        if wanted == "sleep":
-            self.flags |= SLAKI if self.ier & SLKIE else 0
-            self._interrupts()
-        elif wanted == "normal":
+        if wanted == "normal":
+            if not self.mcr & TXFP:
+                raise Violation("CAN1: mailboxes that go by identifier (TXFP = 0) are not modelled")
             if self.bus_off:
                 self._recover()
             self._wake_transmitter()
@@ -157,22 +153,13 @@ class BxCan(Peripheral):
         if self.recovering and self.recovery is None and self.state == "normal":
             self._await_recovery()
 
-    def activity(self, source):
-        """Wakes a sleeping controller at a start of frame (section 32.4.3)."""
-        if self.state == "sleep" and source != "board" and self.bus.connected and connected(self.board, RX_PINS, FUNCTION):
-            self.flags |= WKUI
-            if self.mcr & AWUM:
-                self.mcr &= ~SLEEP
-                self._request_mode()
-            self._interrupts()
-
     # -- transmission (section 32.7.1) -------------------------------------------------------------------------------
 
     def _ready(self):
         return self.state == "normal" and self.wanted is None and not self.bus_off
 
     def _next(self):
-        return self.mailboxes.next(self.mcr & TXFP)
+        return self.mailboxes.next()
 
     def contender(self, now):
         """Returns the frame with which the controller enters arbitration now, or None."""
@@ -238,7 +225,7 @@ class BxCan(Peripheral):
         if box is None:
             return
         box.status = flag
-        if box.abort or self.mcr & NART:
+        if box.abort:
             box.end(flag)
             self._interrupts()
 
@@ -267,26 +254,23 @@ class BxCan(Peripheral):
         self.rec = 120 if self.rec > 127 else max(self.rec - 1, 0)
         self._error_changed(0)
         word = identifier_word(frame)
-        match = self.filters.match(word)
-        if match is None:
+        number = self.filters.match(word)
+        if number is None:
             self.filtered += 1
         else:
-            fifo, number = match
             data = int.from_bytes(frame.data, "little")
-            self._store(fifo, (word, frame.length | number << 8, data & 0xFFFF_FFFF, data >> 32))
+            self._store((word, frame.length | number << 8, data & 0xFFFF_FFFF, data >> 32))
         self._interrupts()
 
-    def _store(self, fifo, entry):
-        stored = self.fifos[fifo]
-        if len(stored) < 3:
-            stored.append(entry)
-            if len(stored) == 3:
-                self.fifo_flags[fifo] |= FULL
+    def _store(self, entry):
+        if len(self.fifo) < 3:
+            self.fifo.append(entry)
+            if len(self.fifo) == 3:
+                self.fifo_flags |= FULL
             return
-        self.fifo_flags[fifo] |= FOVR
-        self.board.record("can_overrun", fifo=fifo)
-        if not self.mcr & RFLM:
-            stored[2] = entry
+        self.fifo_flags |= FOVR
+        self.board.record("can_overrun")
+        self.fifo[2] = entry
 
     def reception_failed(self, code):
         """Handles an unreadable frame of another node."""
@@ -319,20 +303,14 @@ class BxCan(Peripheral):
         if self.tec > 255 and not self.bus_off:
             self.bus_off = True
             self.board.record("bus_off")
-            if self.mcr & ABOM and self.state == "normal":
-                self._recover()
-        status = self._status()
-        risen = status & ~self.last_status
-        self.last_status = status
         if code is not None:
             self.lec = code
-        if risen & self.ier >> 8 & 7 or code and self.ier & LECIE:
+        if self.bus_off and not self.was_off and self.ier & BOFIE:
             self.flags |= ERRI
+        self.was_off = self.bus_off
 
     def _recover(self):
-        """Starts the recovery from bus-off: 128 x 11 recessive bits, with ABOM or after software left initialisation (section
-        32.7.6).
-        """
+        """Starts the recovery from bus-off: 128 x 11 recessive bits, after software left initialisation (section 32.7.6)."""
         if self.recovery is None:
             self.recovering = True
             self.recovery_left = RECOVERY_SEQUENCES
@@ -357,7 +335,7 @@ class BxCan(Peripheral):
             return
         self.bus_off = self.recovering = False
         self.tec = self.rec = 0
-        self.last_status = 0
+        self.was_off = False
         self.board.record("bus_off_ended")
         self._wake_transmitter()
 
@@ -365,40 +343,30 @@ class BxCan(Peripheral):
 
     def _interrupts(self):
         ier = self.ier
-        levels = [bool(ier & 1 and self.mailboxes.completed()),
-                  self._fifo_level(0, ier >> 1), self._fifo_level(1, ier >> 4),
-                  bool(self.flags & ERRI and ier & ERRIE or self.flags & WKUI and ier & WKUIE
-                       or self.flags & SLAKI and ier & SLKIE)]
+        levels = [bool(ier & TMEIE and self.mailboxes.completed()), bool(ier & FMPIE0 and self.fifo),
+                  bool(self.flags & ERRI and ier & ERRIE)]
         for index, level in enumerate(levels):
             if level != self.levels[index]:
                 self.levels[index] = level
-                self.board.irq(TX_IRQ + index, level)
-
-    def _fifo_level(self, fifo, enables):
-        flags = self.fifo_flags[fifo]
-        return bool(enables & 1 and self.fifos[fifo] or enables & 2 and flags & FULL or enables & 4 and flags & FOVR)
+                self.board.irq(IRQS[index], level)
 
     # -- registers (section 32.9) ------------------------------------------------------------------------------------
 
     def read(self, offset, size):
         registers.check(self, offset, size, registers.WORD)
-        if self.mcr & TTCM and offset in STAMPED:
-            raise Violation("CAN1: time stamps are not modelled")
         if offset == 0x08:
-            return self.mailboxes.tsr(self.mcr & TXFP)
-        if offset in (0x0C, 0x10):
-            fifo = (offset - 0x0C) // 4
-            return len(self.fifos[fifo]) | self.fifo_flags[fifo]
+            return self.mailboxes.tsr()
+        if offset == 0x0C:
+            return len(self.fifo) | self.fifo_flags
         if offset == 0x04:
             return self._msr()
         if 0x180 <= offset < 0x1B0:
             box = self.mailboxes.boxes[(offset - 0x180) // 16]
             return (box.tir | box.pending, box.tdtr, box.tdlr, box.tdhr)[offset // 4 & 3]
-        if 0x1B0 <= offset < 0x1D0:
-            fifo = (offset - 0x1B0) // 16
-            if self.fifos[fifo]:
-                self.output[fifo] = self.fifos[fifo][0]
-            return self.output[fifo][offset // 4 & 3]
+        if 0x1B0 <= offset < 0x1C0:
+            if self.fifo:
+                self.output = self.fifo[0]
+            return self.output[offset // 4 & 3]
         if offset == 0x00:
             return self.mcr
         if offset == 0x14:
@@ -426,22 +394,22 @@ class BxCan(Peripheral):
         registers.check(self, offset, size, registers.WORD)
         if 0x180 <= offset < 0x1B0:
             self._write_mailbox(self.mailboxes.boxes[(offset - 0x180) // 16], offset // 4 & 3, value)
-        elif offset in (0x0C, 0x10):
-            self._write_fifo((offset - 0x0C) // 4, value)
+        elif offset == 0x0C:
+            self.fifo_flags &= ~(value & (FULL | FOVR))
+            if value & RFOM and self.fifo:
+                self.output = self.fifo.pop(0)
         elif offset == 0x08:
             self.mailboxes.write_tsr(value, self.sending if self.bus.in_progress or self.loop_event else None)
         elif offset == 0x00:
             self._write_mcr(value)
         elif offset == 0x04:
-            self.flags &= ~(value & (ERRI | WKUI | SLAKI))
+            self.flags &= ~(value & ERRI)
         elif offset == 0x14:
-            self.ier = value & 0x0003_8F7F
-        elif offset == 0x18:
-            self.lec = value >> 4 & 7
+            if value & ~(TMEIE | FMPIE0 | BOFIE | ERRIE):
+                raise registers.unmodelled(self, offset, f"write of {value:#x}")
+            self.ier = value
         elif offset == 0x1C:
             self._write_btr(value)
-        elif 0x1B0 <= offset < 0x1D0:
-            raise Violation(f"CAN1: the receive mailbox at offset {offset:#x} is read-only")
         else:
             taken = self.filters.write(offset, value)
             if taken is None:
@@ -451,10 +419,9 @@ class BxCan(Peripheral):
         self._interrupts()
 
     def _write_mcr(self, value):
-        if value & RESET:
-            self.reset("rcc")
-            return
-        self.mcr = value & 0x0001_00FF
+        if value & ~(INRQ | SLEEP | TXFP | DBF):
+            raise registers.unmodelled(self, 0, f"write of {value:#x}")
+        self.mcr = value
         self._request_mode()
 
     def _write_btr(self, value):
@@ -463,11 +430,6 @@ class BxCan(Peripheral):
             return
         self.btr = value & 0xC37F_03FF
         self.bit_ps = self._bit_time()
-
-    def _write_fifo(self, fifo, value):
-        self.fifo_flags[fifo] &= ~(value & (FULL | FOVR))
-        if value & RFOM and self.fifos[fifo]:
-            self.output[fifo] = self.fifos[fifo].pop(0)
 
     def _write_mailbox(self, box, register, value):
         if box.pending:

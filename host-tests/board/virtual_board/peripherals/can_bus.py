@@ -203,7 +203,6 @@ class CanBus:
         self.in_progress = (now, frame, source, error, code)
         bit = self.node.bit_ps if source == "board" else self.bit_ps
         self.free_at = now + duration + INTERMISSION_BITS * bit
-        self.node.activity(source)
         self.event = self.board.schedule(duration, self._end)
 
     def _end(self):

@@ -1,4 +1,9 @@
-"""Acceptance filters of bxCAN: 28 banks in two scales and two modes (RM0090 section 32.7.4)."""
+"""Acceptance filters of bxCAN: 28 banks, here each a mask of 32 bits for FIFO 0 (RM0090 section 32.7.4).
+
+Left out: lists, filters of 16 bits, FIFO 1.
+"""
+
+from ..violation import Violation
 
 BANKS = 28
 FINIT = 1
@@ -11,11 +16,6 @@ def identifier_word(frame):
     if frame.extended:
         return frame.identifier << 3 | 4 | frame.remote << 1
     return frame.identifier << 21 | frame.remote << 1
-
-
-def _half(word):
-    """Returns the identifier word in the layout of a 16-bit filter: STID, RTR, IDE, EXID[17:15]."""
-    return (word >> 21) << 5 | (word >> 1 & 1) << 4 | (word >> 2 & 1) << 3 | word >> 18 & 7
 
 
 class Filters:
@@ -55,37 +55,21 @@ class Filters:
         return True
 
     def match(self, word):
-        """Returns (FIFO, filter match index) for the identifier word of a frame, or None if no filter accepts it."""
+        """Returns the filter match index for the identifier word of a frame, or None if no filter accepts it."""
         if self.fmr & FINIT:
             return None
         if word not in self.known:
-            self.known[word] = self._match(word)
+            self.known[word] = self._match(word & ~1)
         return self.known[word]
 
     def _match(self, word):
-        """Returns the best match: 32 bits before 16, list before mask, then the lower number (section 32.7.4, filter priority rules)."""
-        best = None
-        numbers = [0, 0]
-        end = self.fmr >> 8 & 0x3F
-        for bank in range(min(end, BANKS)):
-            wide, listed, fifo = self.scale >> bank & 1, self.mode >> bank & 1, self.fifo >> bank & 1
-            for hit in self._hits(bank, word, wide, listed):
-                number = numbers[fifo]
-                numbers[fifo] += 1
-                rank = (not wide, not listed, number)
-                if hit and self.active >> bank & 1 and (best is None or rank < best[0]):
-                    best = (rank, fifo, number)
-        return best and best[1:]
-
-    def _hits(self, bank, word, wide, listed):
-        first, second = self.banks[2 * bank], self.banks[2 * bank + 1]
-        if wide:
-            word &= ~1
-            if listed:
-                return [(first ^ word) & ~1 == 0, (second ^ word) & ~1 == 0]
-            return [(first ^ word) & second & ~1 == 0]
-        half = _half(word)
-        parts = [first & 0xFFFF, first >> 16, second & 0xFFFF, second >> 16]
-        if listed:
-            return [part == half for part in parts]
-        return [(parts[0] ^ half) & parts[1] == 0, (parts[2] ^ half) & parts[3] == 0]
+        if self.active & (self.mode | self.fifo | ~self.scale):
+            raise Violation("CAN1: lists, filters of 16 bits and FIFO 1 are not modelled")
+        number = 0
+        for bank in range(min(self.fmr >> 8 & 0x3F, BANKS)):
+            first, second = self.banks[2 * bank], self.banks[2 * bank + 1]
+            if self.active >> bank & 1 and not (first ^ word) & second & ~1:
+                return number
+            # An inactive filter counts, too: a bank of 16 bits has two masks.
+            number += 1 if self.scale >> bank & 1 else 2
+        return None

@@ -1,6 +1,6 @@
 """Transmit mailboxes of bxCAN: requests, their order and CAN_TSR (RM0090 sections 32.7.1 and 32.9.2)."""
 
-from .can_frame import Frame, priority
+from .can_frame import Frame
 
 RQCP, TXOK, ALST, TERR, ABRQ = 1, 2, 4, 8, 0x80
 
@@ -27,7 +27,7 @@ class Mailbox:
 
 
 class Mailboxes:
-    """The three mailboxes; `by_request` is MCR.TXFP: first come, first sent."""
+    """The three mailboxes: first come, first sent (MCR.TXFP)."""
 
     def __init__(self):
         self.boxes = [Mailbox() for _ in range(3)]
@@ -39,22 +39,15 @@ class Mailboxes:
         self.requests += 1
         box.order = self.requests
 
-    def _rank(self, number, by_request):
-        box = self.boxes[number]
-        return box.order if by_request else (priority(box.frame()), number)
-
-    def next(self, by_request):
+    def next(self):
         """Returns the mailbox that is sent first, or None."""
-        numbers = [number for number in range(3) if self.boxes[number].pending]
-        if not numbers:
-            return None
-        return self.boxes[min(numbers, key=lambda number: self._rank(number, by_request))]
+        return min((box for box in self.boxes if box.pending), key=lambda box: box.order, default=None)
 
     def completed(self):
         """Returns whether a request has ended and software has not cleared it."""
         return any(box.status & RQCP for box in self.boxes)
 
-    def tsr(self, by_request):
+    def tsr(self):
         """Returns CAN_TSR. CODE is the next free mailbox or, with none free, the one sent last; LOW marks that one among several."""
         value, pending = 0, []
         for number, box in enumerate(self.boxes):
@@ -64,7 +57,7 @@ class Mailboxes:
             else:
                 value |= 1 << 26 + number
         if len(pending) > 1:
-            lowest = max(pending, key=lambda number: self._rank(number, by_request))
+            lowest = max(pending, key=lambda number: self.boxes[number].order)
             value |= 1 << 29 + lowest
         code = lowest if len(pending) == 3 else next(number for number in range(3) if number not in pending)
         return value | code << 24

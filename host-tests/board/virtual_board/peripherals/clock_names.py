@@ -21,6 +21,5 @@ def _resets(names):
 ENABLE = {0x30: _AHB1, 0x34: _AHB2, 0x38: _AHB3, 0x40: _APB1, 0x44: _APB2}
 #: Reset registers by offset, each a map from bit to the peripherals that it resets.
 RESET = {0x10: _resets(_AHB1), 0x14: _resets(_AHB2), 0x18: _resets(_AHB3), 0x20: _resets(_APB1), 0x24: _resets(_APB2)}
-#: Reset values of the enable, reset and low-power enable registers.
-RESET_VALUES = {0x10: 0, 0x14: 0, 0x18: 0, 0x20: 0, 0x24: 0, 0x30: 0x0010_0000, 0x34: 0, 0x38: 0, 0x40: 0, 0x44: 0,
-                0x50: 0x7E67_91FF, 0x54: 0xF1, 0x58: 1, 0x60: 0x36FE_C9FF, 0x64: 0x0007_5F33}
+#: Reset values of the enable and reset registers.
+RESET_VALUES = {**dict.fromkeys((*RESET, *ENABLE), 0), 0x30: 0x0010_0000}

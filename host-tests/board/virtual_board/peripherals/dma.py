@@ -1,8 +1,9 @@
-"""DMA controllers in direct mode (RM0090 section 10): requests of peripherals move items between a data register and memory.
+"""DMA controllers in direct mode (RM0090 section 10): requests of the serial lines move bytes between a data register and memory.
 
-A request is served at once; requests that raise no interrupt may be served several at a time, before anything can observe them. CCM
-RAM is not on the DMA's bus: an access there is a transfer error (section 2.3.1).
-Left out: the FIFO (DMDIS = 1), bursts, memory to memory, PINCOS, peripheral flow control, different sizes on both sides, priorities.
+A request is served at once, or several at a time, before anything can observe them. CCM RAM is not on the DMA's bus: an access there
+is a transfer error (section 2.3.1). Reception is circular; a transmission ends the stream.
+Left out: interrupts, items wider than a byte, the FIFO (DMDIS = 1), bursts, double buffers, memory to memory, an incremented peripheral
+address, peripheral flow control, priorities.
 Assumed where the manual is silent: a stream that is enabled with old flags set starts anyway, and `dma_flags` is recorded.
 """
 
@@ -10,38 +11,34 @@ from ..peripheral import Peripheral
 from ..violation import Violation
 from . import registers
 
-EN, TEIE, HTIE, TCIE = 1, 4, 8, 16
-TO_MEMORY, TO_PERIPHERAL = 0, 1
-CIRC, PINC, MINC, DBM, CT = 1 << 8, 1 << 9, 1 << 10, 1 << 18, 1 << 19
+EN, TO_PERIPHERAL, CIRC, MINC = 1, 1 << 6, 1 << 8, 1 << 10
+#: Channel, priority, direction and mode: what a stream may ask for.
+MODES = 7 << 25 | 3 << 16 | MINC | CIRC | TO_PERIPHERAL | EN
 TEIF, HTIF, TCIF = 1 << 3, 1 << 4, 1 << 5
 FLAG_SHIFTS = (0, 6, 16, 22)
 CCM = range(0x1000_0000, 0x1001_0000)
 #: Requests by (stream, channel): tables 42 and 43, those of the modelled peripherals.
 REQUESTS = {
-    "DMA1": {(0, 0): "SPI3_RX", (2, 0): "SPI3_RX", (5, 0): "SPI3_TX", (7, 0): "SPI3_TX", (3, 0): "SPI2_RX", (4, 0): "SPI2_TX",
-             (0, 4): "UART5_RX", (7, 4): "UART5_TX", (1, 4): "USART3_RX", (3, 4): "USART3_TX", (4, 7): "USART3_TX",
-             (2, 4): "UART4_RX", (4, 4): "UART4_TX", (5, 4): "USART2_RX", (6, 4): "USART2_TX"},
-    "DMA2": {(0, 3): "SPI1_RX", (2, 3): "SPI1_RX", (3, 3): "SPI1_TX", (5, 3): "SPI1_TX", (2, 4): "USART1_RX", (5, 4): "USART1_RX",
-             (7, 4): "USART1_TX", (1, 5): "USART6_RX", (2, 5): "USART6_RX", (6, 5): "USART6_TX", (7, 5): "USART6_TX"},
+    "DMA1": {(1, 4): "USART3_RX", (3, 4): "USART3_TX", (4, 7): "USART3_TX", (2, 4): "UART4_RX", (4, 4): "UART4_TX",
+             (5, 4): "USART2_RX", (6, 4): "USART2_TX"},
+    "DMA2": {(2, 4): "USART1_RX", (5, 4): "USART1_RX", (7, 4): "USART1_TX", (1, 5): "USART6_RX", (2, 5): "USART6_RX",
+             (6, 5): "USART6_TX", (7, 5): "USART6_TX"},
 }
-INTERRUPTS = {"DMA1": (11, 12, 13, 14, 15, 16, 17, 47), "DMA2": (56, 57, 58, 59, 60, 68, 69, 70)}
 
 
 class Stream:
     """The registers of one stream and its progress."""
 
     def __init__(self):
-        self.cr = self.ndtr = self.par = self.m0ar = self.m1ar = 0
-        self.fcr = 0x21
-        self.flags = 0
+        self.cr = self.par = self.m0ar = self.flags = 0
         self.left = self.total = 0
         #: The peripheral that PAR points to, found when the stream is enabled.
         self.peripheral = None
 
     @property
-    def width(self):
-        """Returns the size of an item in bytes."""
-        return 1 << (self.cr >> 11 & 3)
+    def memory(self):
+        """Returns the address of the next byte."""
+        return self.m0ar + (self.total - self.left)
 
 
 class Dma(Peripheral):
@@ -51,7 +48,6 @@ class Dma(Peripheral):
         super().__init__(board)
         self.name = self.clock = name
         self.base = base
-        self.interrupts = INTERRUPTS[name]
         self.requests = REQUESTS[name]
         self.streams = [Stream() for _ in range(8)]
         self.by_request = {}
@@ -61,8 +57,6 @@ class Dma(Peripheral):
     def reset(self, cause):
         self.streams = [Stream() for _ in range(8)]
         self.by_request, self.sources = {}, []
-        for number in self.interrupts:
-            self.board.irq(number, False)
 
     # -- transfers ---------------------------------------------------------------------------------------------------
 
@@ -75,25 +69,17 @@ class Dma(Peripheral):
         if number is None:
             return False
         stream = self.streams[number]
-        width = stream.width
-        done = stream.total - stream.left
-        memory = stream.m1ar if stream.cr & DBM and stream.cr & CT else stream.m0ar
-        if stream.cr & MINC:
-            memory += done * width
-        offset = stream.par - stream.peripheral.base + (done * width if stream.cr & PINC else 0)
-        if memory in CCM:
-            self._fail(number)
-            return False
-        peripheral = stream.peripheral
-        if stream.cr >> 6 & 3 == TO_MEMORY:
-            item = peripheral.read(offset, 4) & (1 << 8 * width) - 1
-            self.board.memory_write(memory, item.to_bytes(width, "little"))
-            self._advance(number)
+        offset = stream.par - stream.peripheral.base
+        if stream.memory in CCM:
+            stream.flags |= TEIF
+            self.board.record("dma_error", dma=self.name, stream=number)
+            self._disable(number)
+        elif stream.cr & TO_PERIPHERAL:
+            value = self.give(name, 1)[0]
+            stream.peripheral.write(offset, value, 4)
         else:
-            value = int.from_bytes(self.board.memory_read(memory, width), "little")
-            self._advance(number)
-            peripheral.write(offset, value, 4)
-        return True
+            self.take(name, bytes([stream.peripheral.read(offset, 4) & 0xFF]))
+        return not stream.flags & TEIF
 
     def _at(self, address):
         for peripheral in self.board.peripherals.values():
@@ -101,28 +87,12 @@ class Dma(Peripheral):
                 return peripheral
         raise Violation(f"{self.name}: PAR {address:#x} belongs to no modelled peripheral")
 
-    def _advance(self, number):
-        stream = self.streams[number]
-        stream.left -= 1
-        if stream.left == stream.total // 2:
-            stream.flags |= HTIF
-        if stream.left == 0:
-            stream.flags |= TCIF
-            if stream.cr & (CIRC | DBM):
-                stream.left = stream.total
-                if stream.cr & DBM:
-                    stream.cr ^= CT
-            else:
-                self._disable(number)
-        if stream.cr & (TEIE | HTIE | TCIE):
-            self._interrupt(number)
-
     def take(self, name, data):
-        """Writes bytes to memory for a stream that serves silently, as if they had been requested one by one."""
+        """Writes received bytes to memory, in circular mode."""
         stream = self.streams[self.by_request[name]]
         while data:
             part, data = data[:stream.left], data[stream.left:]
-            self.board.memory_write(stream.m0ar + stream.total - stream.left, part)
+            self.board.memory_write(stream.memory, part)
             half = stream.total // 2
             stream.flags |= HTIF if stream.left > half >= stream.left - len(part) else 0
             stream.left -= len(part)
@@ -131,10 +101,10 @@ class Dma(Peripheral):
                 stream.left = stream.total
 
     def give(self, name, count):
-        """Reads bytes from memory for a stream that feeds silently, as if they had been requested one by one."""
+        """Reads bytes to send from memory."""
         number = self.by_request[name]
         stream = self.streams[number]
-        data = self.board.memory_read(stream.m0ar + stream.total - stream.left, count)
+        data = self.board.memory_read(stream.memory, count)
         half = stream.total // 2
         stream.flags |= HTIF if stream.left > half >= stream.left - count else 0
         stream.left -= count
@@ -143,23 +113,15 @@ class Dma(Peripheral):
             self._disable(number)
         return data
 
-    def serves_silently(self, name):
-        """Returns whether a stream writes bytes to memory in circular mode without an interrupt."""
+    def serves(self, name):
+        """Returns whether a stream writes the bytes of a request to memory."""
         number = self.by_request.get(name)
-        if number is None:
-            return False
-        stream = self.streams[number]
-        mode = stream.cr & (CIRC | MINC | PINC | DBM | 3 << 11 | 3 << 6 | TEIE | HTIE | TCIE)
-        return mode == CIRC | MINC and stream.m0ar not in CCM
+        return number is not None and self.streams[number].m0ar not in CCM
 
-    def feeds_silently(self, name):
-        """Returns the number of bytes that a stream will still read from memory, if it raises no interrupt; else 0."""
+    def feeds(self, name):
+        """Returns the number of bytes that a stream will still read from memory for a request."""
         number = self.by_request.get(name)
-        if number is None:
-            return 0
-        stream = self.streams[number]
-        mode = stream.cr & (CIRC | MINC | PINC | DBM | 3 << 11 | 3 << 6 | TEIE | HTIE | TCIE)
-        return stream.left if mode == MINC | TO_PERIPHERAL << 6 and stream.m0ar not in CCM else 0
+        return self.streams[number].left if number is not None and self.streams[number].m0ar not in CCM else 0
 
     def _catch_up(self):
         for source in list(self.sources):
@@ -167,12 +129,6 @@ class Dma(Peripheral):
 
     def _source(self, name):
         return self.board.peripherals[name.rsplit("_", 1)[0]]
-
-    def _fail(self, number):
-        self.streams[number].flags |= TEIF
-        self.board.record("dma_error", dma=self.name, stream=number)
-        self._disable(number)
-        self._interrupt(number)
 
     def _disable(self, number):
         stream = self.streams[number]
@@ -182,11 +138,6 @@ class Dma(Peripheral):
     def _serve(self, by_request):
         self.by_request = by_request
         self.sources = [self._source(name) for name in by_request]
-
-    def _interrupt(self, number):
-        stream = self.streams[number]
-        enabled = (TEIF if stream.cr & TEIE else 0) | (HTIF if stream.cr & HTIE else 0) | (TCIF if stream.cr & TCIE else 0)
-        self.board.irq(self.interrupts[number], bool(stream.flags & enabled))
 
     # -- registers ---------------------------------------------------------------------------------------------------
 
@@ -199,7 +150,7 @@ class Dma(Peripheral):
             value = 0
         elif 0x10 <= word < 0xD0:
             stream = self.streams[(word - 0x10) // 0x18]
-            value = (stream.cr, stream.left, stream.par, stream.m0ar, stream.m1ar, stream.fcr)[(word - 0x10) % 0x18 // 4]
+            value = (stream.cr, stream.left, stream.par, stream.m0ar, 0, 0x21)[(word - 0x10) % 0x18 // 4]
         else:
             raise registers.unmodelled(self, offset, "read")
         return registers.cut(value, offset, size)
@@ -216,7 +167,6 @@ class Dma(Peripheral):
             for index, shift in enumerate(FLAG_SHIFTS):
                 number = word - 8 + index
                 self.streams[number].flags &= ~(value >> shift & 0x3D)
-                self._interrupt(number)
         elif 0x10 <= word < 0xD0:
             self._write_stream((word - 0x10) // 0x18, (word - 0x10) % 0x18 // 4, value)
         else:
@@ -226,33 +176,31 @@ class Dma(Peripheral):
         stream = self.streams[number]
         if register == 0:
             self._write_cr(number, value)
-        elif stream.cr & EN and not (register in (3, 4) and stream.cr & DBM):
+        elif stream.cr & EN:
             self.board.record("ignored_write", register=f"{self.name} stream {number}", value=value)
         elif register == 1:
             stream.left = stream.total = value & 0xFFFF
-        elif register == 5:
-            if value & 4:
-                raise Violation(f"{self.name}: the FIFO (DMDIS = 1) is not modelled")
-            stream.fcr = value & 0x87 | stream.fcr & 0x38
+        elif register > 3:
+            raise Violation(f"{self.name}: double buffers and the FIFO are not modelled")
         else:
-            setattr(stream, ("", "", "par", "m0ar", "m1ar")[register], value)
+            setattr(stream, ("", "", "par", "m0ar")[register], value)
 
     def _write_cr(self, number, value):
         stream = self.streams[number]
-        if stream.cr & EN:
-            stream.cr = stream.cr & ~0x1F | value & 0x1F
-            if not value & EN:
-                self._disable(number)
-                stream.flags |= TCIF
-            self._interrupt(number)
+        is_sending = bool(value & TO_PERIPHERAL)
+        if stream.cr & EN and not value & EN:
+            self._disable(number)
+            stream.flags |= TCIF
             return
-        stream.cr = value & 0x0FEF_FFFF
+        if stream.cr & EN:
+            raise Violation(f"{self.name}: stream {number} runs, and its mode is written (CR {value:#x})")
+        if value & EN and (value & ~MODES or not value & MINC or is_sending == bool(value & CIRC)):
+            raise Violation(f"{self.name}: stream {number} asks for a mode that is not modelled (CR {value:#x})")
+        stream.cr = value
         if not value & EN:
             return
-        if value >> 6 & 3 > TO_PERIPHERAL or value & 0x01E0_8020 or value >> 11 & 3 != value >> 13 & 3:
-            raise Violation(f"{self.name}: stream {number} asks for a mode that is not modelled (CR {value:#x})")
         name = self.requests.get((number, value >> 25 & 7))
-        if name is None:
+        if name is None or is_sending != name.endswith("_TX"):
             raise Violation(f"{self.name}: stream {number} has no modelled request on channel {value >> 25 & 7}")
         if stream.flags:
             self.board.record("dma_flags", dma=self.name, stream=number, flags=stream.flags)

@@ -3,10 +3,10 @@
 The array itself belongs to the board, which calls `program` for each store into the flash. The board is stalled until an
 operation ends, because code runs from flash and a read during an operation waits for its end (section 3.6). The stall begins
 with the operation even if the code runs from RAM; that is stricter than the part.
-Times are those of DS8626 tables 39 and 40 for the parallelism in PSIZE, typical unless `time_factor` is set (2 gives the maximum).
+Times are those of DS8626 tables 39 and 40 for words of 32 bits, typical unless `time_factor` is set (2 gives the maximum).
 
-Left out: read protection, the one-time programmable area, x64 (it needs an external voltage on VPP), read-while-write, stale cache
-lines. Assumed where the manual is silent: a STRT with neither SER nor MER does nothing; error flags that are still set do not stop
+Left out: read protection, the one-time programmable area, other PSIZE than x32, the mass erase, interrupts, read-while-write, stale cache
+lines. Assumed where the manual is silent: a STRT without SER does nothing; error flags that are still set do not stop
 the next operation; PG stays in force after LOCK is set; a key written while FLASH_CR is unlocked is ignored; OPTCR takes the time of a
 16 KiB erase. An interrupted erase has set, and an interrupted word has cleared, about the share of the bits by which it had advanced.
 
@@ -20,19 +20,18 @@ from ..violation import Violation
 from . import registers
 from .flash_map import SECTORS, sector_of
 
-PG, SER, MER, STRT, EOPIE, ERRIE, LOCK = 1 << 0, 1 << 1, 1 << 2, 1 << 16, 1 << 24, 1 << 25, 1 << 31
+PG, SER, SNB, PSIZE, X32, STRT, LOCK = 1 << 0, 1 << 1, 15 << 3, 3 << 8, 2 << 8, 1 << 16, 1 << 31
 EOP, OPERR, WRPERR, PGAERR, PGPERR, PGSERR, BSY = 1 << 0, 1 << 1, 1 << 4, 1 << 5, 1 << 6, 1 << 7, 1 << 16
 FLAGS = EOP | OPERR | WRPERR | PGAERR | PGPERR | PGSERR
 KEYS = (0x4567_0123, 0xCDEF_89AB)
 OPTION_KEYS = (0x0819_2A3B, 0x4C5D_6E7F)
 OPTLOCK, OPTSTRT = 1, 2
 FACTORY_OPTIONS = 0x0FFF_AAED
-#: Erase times in milliseconds by PSIZE for sectors of 16, 64 and 128 KiB, and the mass erase.
-ERASE_MS = ({16: 400, 64: 1200, 128: 2000, "mass": 16000}, {16: 300, 64: 700, 128: 1300, "mass": 11000},
-            {16: 250, 64: 550, 128: 1000, "mass": 8000})
+#: Erase times in milliseconds for sectors of 16, 64 and 128 KiB.
+ERASE_MS = {16: 250, 64: 550, 128: 1000}
 PROGRAM_US = 16
-#: Lowest supply in millivolts for each PSIZE (table 7).
-LEAST_SUPPLY_MV = (1800, 2100, 2700)
+#: Lowest supply in millivolts (table 7).
+LEAST_SUPPLY_MV = 2700
 MS = 1_000_000_000
 US = 1_000_000
 
@@ -70,7 +69,6 @@ class Flash(Peripheral):
             self._interrupted()
         self._registers()
         self.loaded_bor = self.options >> 2 & 3
-        self.board.irq(4, False)
 
     def power_off(self):
         """Handles a power failure: what was being erased or programmed stays half done."""
@@ -109,7 +107,6 @@ class Flash(Peripheral):
             self._write_option_key(value)
         elif word == 0x0C:
             self.sr &= ~(value & FLAGS)
-            self._interrupt()
         elif word == 0x10:
             self._write_cr(value)
         elif word == 0x14:
@@ -153,8 +150,9 @@ class Flash(Peripheral):
         if self.cr & LOCK:
             self.board.record("ignored_write", register="FLASH_CR", value=value)
             return
-        self.cr = value & (LOCK | EOPIE | ERRIE | 0x37F)
-        self._interrupt()
+        if value & ~(PG | SER | SNB | PSIZE | STRT | LOCK):
+            raise Violation(f"FLASH: CR {value:#x}: the mass erase and interrupts are not modelled")
+        self.cr = value & ~STRT
         if value & STRT:
             self._erase()
 
@@ -166,52 +164,42 @@ class Flash(Peripheral):
             raise Violation("FLASH: read protection is not modelled; RDP has to stay 0xAA")
         self.optcr = value & 0x0FFF_FFEF & ~OPTSTRT
         if value & OPTSTRT:
-            self._begin(("options", None, value & 0x0FFF_FFEC), ERASE_MS[2][16] * MS)
-
-    def _interrupt(self):
-        failed = self.sr & (OPERR if self.cr & ERRIE else 0)
-        self.board.irq(4, bool(self.sr & EOP and self.cr & EOPIE or failed))
+            self._begin(("options", None, value & 0x0FFF_FFEC), ERASE_MS[16] * MS)
 
     def _refuse(self, flag):
-        """Sets the flag of an operation that cannot run, and OPERR if error interrupts are enabled (section 3.9.4)."""
-        self.sr |= flag | (OPERR if self.cr & ERRIE else 0)
+        """Sets the flag of an operation that cannot run."""
+        self.sr |= flag
         self.board.record("flash_error", flag=flag)
-        self._interrupt()
 
     # -- operations --------------------------------------------------------------------------------------------------
 
     def _protected(self, sector):
         return not self.optcr >> (16 + sector) & 1
 
-    def _parallelism(self):
-        """Returns PSIZE, and whether the supply is sufficient for it (table 7)."""
-        size = self.cr >> 8 & 3
-        if size == 3:
-            raise Violation("FLASH: PSIZE x64 wants an external VPP (section 3.6.2)")
-        power = self.board.peripherals.get("PWR")
-        supply = 3300 if power is None else power.supply_mv
-        enough = supply >= LEAST_SUPPLY_MV[size]
-        if not enough:
-            self.board.record("program_below_voltage", psize=size, supply_mv=supply)
-        return size, enough
+    def _enough(self):
+        """Returns whether the supply is sufficient for words of 32 bits (table 7)."""
+        if self.cr & PSIZE != X32:
+            raise Violation("FLASH: only PSIZE x32 is modelled")
+        supply = self.board.peripherals["PWR"].supply_mv
+        if supply < LEAST_SUPPLY_MV:
+            self.board.record("program_below_voltage", supply_mv=supply)
+        return supply >= LEAST_SUPPLY_MV
 
     def _erase(self):
-        sector = self.cr >> 3 & 15
-        if self.cr & PG and self.cr & (SER | MER) or self.cr & SER and self.cr & MER:
-            raise Violation("FLASH: more than one of PG, SER and MER is set at STRT")
-        if not self.cr & (SER | MER):
+        sector = (self.cr & SNB) >> 3
+        if self.cr & PG and self.cr & SER:
+            raise Violation("FLASH: PG and SER are set at STRT")
+        if not self.cr & SER:
             self.board.record("ignored_write", register="FLASH_CR", value=self.cr | STRT)
             return
-        if self.cr & SER and sector >= len(SECTORS):
+        if sector >= len(SECTORS):
             raise Violation(f"FLASH: SNB {sector} does not exist on the STM32F405 (table 5)")
-        chosen = range(len(SECTORS)) if self.cr & MER else (sector,)
-        if any(self._protected(number) for number in chosen):
+        if self._protected(sector):
             self._refuse(WRPERR)
             return
-        psize, enough = self._parallelism()
-        kind = "mass" if self.cr & MER else SECTORS[sector][1] // 1024
-        self.board.record("flash_erase", sectors=list(chosen))
-        self._begin(("erase", tuple(chosen), enough), ERASE_MS[psize][kind] * MS)
+        enough = self._enough()
+        self.board.record("flash_erase", sectors=[sector])
+        self._begin(("erase", sector, enough), ERASE_MS[SECTORS[sector][1] // 1024] * MS)
 
     def program(self, address, value, size):
         """Handles a store of `size` bytes by the core at `address` in the array (section 3.6.4)."""
@@ -221,12 +209,12 @@ class Flash(Peripheral):
             self._refuse(PGSERR)
         elif address % 16 + size > 16:
             self._refuse(PGAERR)
-        elif size != 1 << (self.cr >> 8 & 3):
+        elif size != 4:
             self._refuse(PGPERR)
         elif self._protected(sector_of(address)):
             self._refuse(WRPERR)
         else:
-            _, enough = self._parallelism()
+            enough = self._enough()
             old = int.from_bytes(self.board.memory_read(address, size), "little")
             if value & ~old:
                 self.board.record("programmed_over", address=address, old=old, value=value)
@@ -243,9 +231,8 @@ class Flash(Peripheral):
         kind, what, detail, _, _ = self.operation
         self._end()
         if kind == "erase":
-            for sector in what:
-                address, length = SECTORS[sector]
-                self.board.memory_write(address, b"\xFF" * length if detail else self.random.randbytes(length))
+            address, length = SECTORS[what]
+            self.board.memory_write(address, b"\xFF" * length if detail else self.random.randbytes(length))
         elif kind == "program":
             address, size, _, value = what
             if not detail:
@@ -253,9 +240,6 @@ class Flash(Peripheral):
             self.board.memory_write(address, value.to_bytes(size, "little"))
         else:
             self.options = detail | 1
-        if self.cr & EOPIE:
-            self.sr |= EOP
-        self._interrupt()
 
     def _end(self):
         if self.done:
@@ -270,11 +254,10 @@ class Flash(Peripheral):
         share = (self.board.now - begun) / duration if duration else 1.0
         self.board.record("flash_interrupted", operation=kind, share=share)
         if kind == "erase":
-            for sector in what:
-                address, length = SECTORS[sector]
-                old = int.from_bytes(self.board.memory_read(address, length), "little")
-                mixed = old | self._bits(8 * length, share)
-                self.board.memory_write(address, mixed.to_bytes(length, "little"))
+            address, length = SECTORS[what]
+            old = int.from_bytes(self.board.memory_read(address, length), "little")
+            mixed = old | self._bits(8 * length, share)
+            self.board.memory_write(address, mixed.to_bytes(length, "little"))
         elif kind == "program":
             address, size, old, value = what
             mixed = old & (value | ~self._bits(8 * size, share))

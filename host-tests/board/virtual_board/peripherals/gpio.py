@@ -1,7 +1,7 @@
 """General-purpose I/O ports A to I (RM0090 section 8).
 
 Pins have a level, an alternate function and a speed, which other models read; a listener is called when a pin's level changes.
-Left out: analog levels (an analog pin reads 0), shorts between two outputs, and the time that an edge takes.
+Left out: locks, interrupts of pins, analog levels (an analog pin reads 0), shorts between two outputs, and the time that an edge takes.
 
 Settings: `drive` ((pin, level) from outside; level None lets the pin float), `watch` (pins whose output changes are recorded as `pin`).
 """
@@ -10,10 +10,9 @@ from ..peripheral import Peripheral
 from . import registers
 
 OUTPUT, ALTERNATE, ANALOG = 1, 2, 3
-MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR, LCKR, AFRL, AFRH = range(0, 0x28, 4)
+MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR, _, AFRL, AFRH = range(0, 0x28, 4)
 #: Reset values of MODER, OSPEEDR and PUPDR (sections 8.4.1 to 8.4.4): the debug pins.
 RESET = {"A": (0xA800_0000, 0x0C00_0000, 0x6400_0000), "B": (0x0000_0280, 0x0000_00C0, 0x0000_0100)}
-LCKK = 1 << 16
 
 
 class Gpio(Peripheral):
@@ -34,7 +33,7 @@ class Gpio(Peripheral):
 
     def _registers(self):
         self.moder, self.ospeedr, self.pupdr = self.reset_values
-        self.otyper = self.odr = self.lckr = self.lock_step = 0
+        self.otyper = self.odr = 0
         self.afr = [0, 0]
         self._find_functions()
 
@@ -69,15 +68,6 @@ class Gpio(Peripheral):
         """Registers `callback(level)` for changes of the pin's level."""
         self.listeners.setdefault(pin, []).append(callback)
 
-    def drive_lines(self):
-        """Drives the EXTI lines that SYSCFG assigns to this port with the pins' levels."""
-        syscfg, exti = self.board.peripherals.get("SYSCFG"), self.board.peripherals.get("EXTI")
-        if syscfg and exti:
-            levels = self._levels()
-            for pin in range(16):
-                if syscfg.selects(pin, self.number):
-                    exti.line(pin, bool(levels >> pin & 1))
-
     def _levels(self):
         """Returns all levels: ODR for outputs; otherwise what drives the pin from outside, else its pull (a floating pin reads 0)."""
         levels = 0
@@ -108,7 +98,6 @@ class Gpio(Peripheral):
         for pin in range(16) if recorded else ():
             if recorded >> pin & 1:
                 self.board.record("pin", port=self.letter, pin=pin, level=bool(levels >> pin & 1))
-        self.drive_lines()
 
     # -- registers ---------------------------------------------------------------------------------------------------
 
@@ -128,20 +117,11 @@ class Gpio(Peripheral):
             value = self.pupdr
         elif word == BSRR:
             value = 0
-        elif word == LCKR:
-            value = self.lckr
         elif word in (AFRL, AFRH):
             value = self.afr[(word - AFRL) // 4]
         else:
             raise registers.unmodelled(self, offset, "read")
         return registers.cut(value, offset, size)
-
-    def _kept(self, old, new, width):
-        """Returns the new configuration, in which locked pins keep the old one until the next reset (section 8.3.4)."""
-        if not self.lckr & LCKK:
-            return new
-        mask = sum(((1 << width) - 1) << pin * width for pin in range(16) if self.lckr >> pin & 1)
-        return old & mask | new & ~mask
 
     def write(self, offset, value, size):
         word = offset & ~3
@@ -154,40 +134,19 @@ class Gpio(Peripheral):
         if word == ODR:
             self.odr = value & 0xFFFF
         elif word == MODER:
-            self.moder = self._kept(self.moder, value, 2)
+            self.moder = value
         elif word == OTYPER:
-            self.otyper = self._kept(self.otyper, value & 0xFFFF, 1)
+            self.otyper = value & 0xFFFF
         elif word == OSPEEDR:
-            self.ospeedr = self._kept(self.ospeedr, value, 2)
+            self.ospeedr = value
         elif word == PUPDR:
-            self.pupdr = self._kept(self.pupdr, value, 2)
-        elif word == LCKR:
-            self._lock(value)
+            self.pupdr = value
         elif word in (AFRL, AFRH):
-            half = (word - AFRL) // 4
-            both = self._kept(self.afr[0] | self.afr[1] << 32, (self.afr[1 - half] << 32 | value) if half == 0
-                              else (value << 32 | self.afr[0]), 4)
-            self.afr = [both & 0xFFFF_FFFF, both >> 32]
+            self.afr[(word - AFRL) // 4] = value
         elif word != IDR:
             raise registers.unmodelled(self, offset, "write")
         self._find_functions()
         self._changed()
-
-    def _lock(self, value):
-        """Handles the lock sequence: LCKK is written 1, 0, 1 with the same pins; a step out of order starts again (section 8.4.8)."""
-        if self.lckr & LCKK:
-            return
-        pins, key = value & 0xFFFF, bool(value & LCKK)
-        if self.lock_step and pins != self.lckr & 0xFFFF:
-            self.lock_step = 0
-        if key != (True, False, True)[self.lock_step]:
-            self.lock_step = 0
-        else:
-            self.lock_step += 1
-        self.lckr = pins
-        if self.lock_step == 3:
-            self.lckr |= LCKK
-            self.lock_step = 0
 
     def configure(self, key, value):
         if key == "drive":

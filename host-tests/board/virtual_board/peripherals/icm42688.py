@@ -1,21 +1,22 @@
 """ICM-42688-P, an inertial sensor on SPI (DS-000347): registers, power modes, FIFO, time stamps and its own oscillator.
 
-Samples are computed on demand: each access computes those that are due. If the INT1 pin is wired, each sample is an event
-instead. The part keeps its state through a reset of the microcontroller and loses it with the power.
+Samples are computed on demand: each access computes those that are due. The part keeps its state through a reset of the
+microcontroller and loses it with the power. They are read from the FIFO, in packets of 20 bits, big-endian, in stream mode.
 
 Time: the part runs on its own oscillator, `oscillator_error_percent` fast. Without CLKIN its time stamps count units of 32/30 us
-(section 12.7), or sixteen times that with TMST_RES.
+(section 12.7).
 Filters: a tone passes the UI filter of GYRO_ACCEL_CONFIG0 with the gain of a Butterworth low-pass of the order in GYRO_CONFIG1
 (section 5.5) and is then sampled, so frequencies above half the output rate alias. Slow motion passes unchanged, without delay.
 Noise: white, of the data sheet's density (tables 1 and 2) within the filter's bandwidth, times `noise`.
-Left out: anti-alias and notch filters, their delay, I2C and I3C, APEX, FSYNC, self-test, INT2, automatic full-scale switching
-(AFSR), different output rates of the two sensors.
+Left out: data registers, other packets, interrupts, anti-alias and notch filters, their delay, I2C and I3C, APEX, FSYNC, self-test,
+automatic full-scale switching (AFSR), different output rates of the two sensors, and all of them but 100, 200 and 1000 Hz.
 Assumed where the data sheet is silent: accesses within 1 ms of a reset read 0 and write nothing; a write within 200 us of leaving OFF is
 ignored; packets hold the low 16 bits of the time-stamp counter.
 
-Settings: those of `motion`, `oscillator_error_percent`, `int1` ([port letter, pin] or None), `who_am_i`.
+Settings: those of `motion`, `oscillator_error_percent`, `who_am_i`.
 """
 
+from ..violation import Violation
 from . import icm42688_registers as reg
 from .motion import Motion, clamp, words
 
@@ -23,10 +24,9 @@ PS = 1_000_000_000_000
 US, MS = 1_000_000, 1_000_000_000
 RESET_PS, SWITCH_ON_PS, GYRO_START_PS, ACCEL_START_PS = 1 * MS, 200 * US, 30 * MS, 10 * MS
 FIFO_BYTES = 2048
-OUTPUT_MILLIHERTZ = {1: 32_000_000, 2: 16_000_000, 3: 8_000_000, 4: 4_000_000, 5: 2_000_000, 6: 1_000_000, 7: 200_000, 8: 100_000,
-                     9: 50_000, 10: 25_000, 11: 12_500, 12: 6_250, 13: 3_125, 14: 1_562, 15: 500_000}
+OUTPUT_HERTZ = {6: 1000, 7: 200, 8: 100}
 BANDWIDTH_DIVIDER = {1: 4, 2: 5, 3: 8, 4: 10, 5: 16, 6: 20, 7: 40}
-INVALID = -32768
+INVALID = -0x80000
 GYRO_NOISE_DPS, ACCEL_NOISE_G = 0.0028, 70e-6
 #: Noise bandwidth of a second-order Butterworth low-pass by its 3 dB bandwidth.
 NOISE_BANDWIDTH = 1.11
@@ -39,10 +39,8 @@ class Icm42688:
         self.board = board
         self.motion = Motion(42688)
         self.clock_ppm = 1_000_000
-        self.int1 = None
         self.reading = False
         self.identity = 0x47
-        self.event = None
         self.powered = True
         self._reset(0)
 
@@ -56,7 +54,6 @@ class Icm42688:
     def power_off(self):
         """Handles the loss of power."""
         self.powered = False
-        self.event = None
 
     def _reset(self, now):
         self.banks = [dict(bank) for bank in reg.RESET_VALUES]
@@ -66,42 +63,30 @@ class Icm42688:
         self.gyro_on = self.accel_on = None
         self.started, self.made, self.motion.stopped = now, 0, False
         self.epoch = now
-        self.status = reg.RESET_DONE
-        self.data = {**{address: 0x80 for address in reg.DATA[::2]}, **{address: 0 for address in reg.DATA[1::2]}}
         self.fifo, self.read_from = [], 0
-        self.lost = 0
         self.count_latch = 0
         self.address = None
-        if self.event:
-            self.event.cancel()
-            self.event = None
 
     # -- time --------------------------------------------------------------------------------------------------------
 
-    def _output_code(self):
-        """Returns the code of the output rate: the gyro's while it is on, otherwise the accelerometer's."""
-        bank = self.banks[0]
-        if self.gyro_on is not None:
-            return bank[reg.GYRO_CONFIG0] & 15
-        return bank[reg.ACCEL_CONFIG0] & 15
+    def _rate_hz(self):
+        """Returns the output rate: the gyro's while it is on, otherwise the accelerometer's."""
+        code = self.banks[0][reg.ACCEL_CONFIG0 if self.gyro_on is None else reg.GYRO_CONFIG0] & 15
+        if code not in OUTPUT_HERTZ:
+            raise Violation(f"ICM-42688-P: the output rate of code {code} is not modelled")
+        return OUTPUT_HERTZ[code]
 
     def _sample_time(self, index):
         """Returns the board time of an output, counted since the rate was last set."""
-        rate = OUTPUT_MILLIHERTZ.get(self._output_code(), 1_000_000) * self.clock_ppm
-        return self.started + index * PS * 1_000_000_000 // rate
+        return self.started + index * PS * 1_000_000 // (self._rate_hz() * self.clock_ppm)
 
     def time_stamp(self, at):
-        """Returns the time-stamp counter in units of 32/30 us, or 16 times that (section 12.7)."""
-        config = self.banks[0][reg.TMST_CONFIG]
-        if not config & 1:
-            return 0
-        unit = 16 if config & 8 else 1
-        return (at - self.epoch) * 30 * self.clock_ppm // (32 * US * 1_000_000 * unit)
+        """Returns the time-stamp counter in units of 32/30 us (section 12.7)."""
+        return (at - self.epoch) * 30 * self.clock_ppm // (32 * US * 1_000_000)
 
     def _restart(self):
         """Restarts the outputs after a change of rate or mode: the next one is due one period from now."""
         self.started, self.made = self.board.now, 0
-        self._plan()
 
     def _catch_up(self):
         """Computes all outputs that are due."""
@@ -113,30 +98,14 @@ class Icm42688:
             if not self.motion.stopped:
                 self._output(self._sample_time(self.made))
 
-    def _plan(self):
-        """Schedules the next output as an event if INT1 is wired."""
-        if self.event:
-            self.event.cancel()
-            self.event = None
-        if self.int1 and self.powered and (self.gyro_on is not None or self.accel_on is not None):
-            self.event = self.board.schedule(max(self._sample_time(self.made + 1) - self.board.now, 0), self._due)
-
-    def _due(self):
-        self.event = None
-        self._catch_up()
-        self._plan()
-
     # -- outputs -----------------------------------------------------------------------------------------------------
 
     def bandwidth_hz(self):
         """Returns the gyro's 3 dB bandwidth by GYRO_UI_FILT_BW in low-noise mode (section 14.42)."""
         code = self.banks[0][reg.GYRO_ACCEL_CONFIG0] & 15
-        rate = OUTPUT_MILLIHERTZ.get(self.banks[0][reg.GYRO_CONFIG0] & 15, 1_000_000) / 1000
-        if code == 0:
-            return rate / 2
-        if code in BANDWIDTH_DIVIDER:
-            return max(400.0, rate) / BANDWIDTH_DIVIDER[code]
-        return max(400.0, rate) if code == 14 else max(200.0, 8 * rate)
+        if code not in BANDWIDTH_DIVIDER:
+            raise Violation(f"ICM-42688-P: the bandwidth of code {code} is not modelled")
+        return max(400.0, self._rate_hz()) / BANDWIDTH_DIVIDER[code]
 
     def _gain(self, hz):
         order = 1 + (self.banks[0][reg.GYRO_CONFIG1] >> 2 & 3)
@@ -150,73 +119,22 @@ class Icm42688:
         acceleration = self.motion.noisy(acceleration, ACCEL_NOISE_G, bandwidth)
         gyro_valid = self.gyro_on is not None and at >= self.gyro_on + GYRO_START_PS
         accel_valid = self.accel_on is not None and at >= self.accel_on + ACCEL_START_PS
-        bank = self.banks[0]
-        gyro_scale = 32768 / (2000 / (1 << (bank[reg.GYRO_CONFIG0] >> 5)))
-        accel_scale = 2048 << (bank[reg.ACCEL_CONFIG0] >> 5 & 3)
-        gyro = [clamp(rate * gyro_scale, 16) if gyro_valid else INVALID for rate in rates]
-        accel = [clamp(g * accel_scale, 16) if accel_valid else INVALID for g in acceleration]
-        temperature = clamp((self.motion.temperature - 25) * 132.48, 16)
-        big = bool(bank[reg.INTF_CONFIG0] & 0x10)
-        for address, value in zip(reg.DATA[::2], (temperature, *accel, *gyro)):
-            high, low = value >> 8 & 0xFF, value & 0xFF
-            self.data[address], self.data[address + 1] = (high, low) if big else (low, high)
-        self.status |= reg.DATA_READY
-        if bank[reg.FIFO_CONFIG] >> 6:
-            self._store(at, rates, acceleration, gyro, accel, gyro_valid, accel_valid, big)
-        self._drive_int1()
+        if self.banks[0][reg.FIFO_CONFIG] >> 6:
+            gyro = [clamp(rate * 131, 19) << 1 if gyro_valid else INVALID for rate in rates]
+            accel = [clamp(g * 8192, 18) << 2 if accel_valid else INVALID for g in acceleration]
+            self._store(accel, gyro, (self.time_stamp(at) & 0xFFFF).to_bytes(2, "big"))
 
-    def _store(self, at, rates, acceleration, gyro, accel, gyro_valid, accel_valid, big):
-        config = self.banks[0][reg.FIFO_CONFIG1]
-        with_accel, with_gyro, fine = config & 1, config & 2, config & 0x10
-        if not with_accel and not with_gyro:
-            return
-        order = "big" if big else "little"
-        stamped = self.banks[0][reg.TMST_CONFIG] & 1
-        header = (0x40 if with_accel else 0) | (0x20 if with_gyro else 0) | (0x10 if fine else 0) | (8 if stamped else 0)
-        stamp = (self.time_stamp(at) & 0xFFFF).to_bytes(2, order)
-        coarse_temperature = (clamp((self.motion.temperature - 25) * 2.07, 8)).to_bytes(1, "little", signed=True)
-        if fine:
-            gyro = [clamp(rate * 131, 19) << 1 if gyro_valid else -0x80000 for rate in rates]
-            accel = [clamp(g * 8192, 18) << 2 if accel_valid else -0x80000 for g in acceleration]
-            temperature = clamp((self.motion.temperature - 25) * 132.48, 16).to_bytes(2, order, signed=True)
-            extension = bytes((a & 15) << 4 | g & 15 for a, g in zip(accel, gyro))
-            packet = words([value >> 4 for value in accel + gyro], order) + temperature + stamp + extension
-            packet = bytes([header | 0x60]) + packet
-        elif with_accel and with_gyro:
-            packet = bytes([header]) + words(accel + gyro, order) + coarse_temperature + stamp
-        else:
-            packet = bytes([header & ~8]) + words(accel if with_accel else gyro, order) + coarse_temperature
+    def _store(self, accel, gyro, stamp):
+        """Puts packet 4 of section 6.1 into the FIFO, which drops the oldest where it is full."""
+        if self.banks[0][reg.FIFO_CONFIG1] & 0x17 != 0x17 or self.banks[0][reg.INTF_CONFIG0] & 0x70 != 0x30:
+            raise Violation("ICM-42688-P: only packets of 20 bits, big-endian and counted in bytes, are modelled")
+        temperature = clamp((self.motion.temperature - 25) * 132.48, 16).to_bytes(2, "big", signed=True)
+        extension = bytes((a & 15) << 4 | g & 15 for a, g in zip(accel, gyro))
+        packet = b"\x78" + words([value >> 4 for value in accel + gyro], "big") + temperature + stamp + extension
         if (len(self.fifo) + 1) * len(packet) > FIFO_BYTES:
-            self.lost = min(self.lost + 1, 0xFFFF)
-            self.status |= reg.FIFO_FULL
-            if self.banks[0][reg.FIFO_CONFIG] >> 6 != 1:
-                return
             self.fifo.pop(0)
             self.read_from = 0
         self.fifo.append(packet)
-        if self._count() >= (self.banks[0][reg.FIFO_CONFIG2] | (self.banks[0][reg.FIFO_CONFIG3] & 15) << 8) > 0:
-            self.status |= reg.FIFO_THRESHOLD
-
-    def _count(self):
-        """Returns the count in FIFO_COUNT: bytes, or records with FIFO_COUNT_REC."""
-        if self.banks[0][reg.INTF_CONFIG0] & 0x40:
-            return len(self.fifo)
-        return sum(map(len, self.fifo)) - self.read_from
-
-    def _drive_int1(self):
-        if not self.int1:
-            return
-        active = bool(self.status & self.banks[0][reg.INT_SOURCE0])
-        high = active == bool(self.banks[0][reg.INT_CONFIG] & 1)
-        self.board.peripherals["GPIO" + self.int1[0]].configure("drive", (self.int1[1], high))
-        if active and not self.banks[0][reg.INT_CONFIG] & 4:
-            self.board.schedule(100 * US, self._end_pulse)
-
-    def _end_pulse(self):
-        """Ends a pulsed interrupt after 100 us (8 us with INT_TPULSE_DURATION, which the model does not distinguish; section 14.52)."""
-        if self.int1:
-            idle = not self.banks[0][reg.INT_CONFIG] & 1
-            self.board.peripherals["GPIO" + self.int1[0]].configure("drive", (self.int1[1], idle))
 
     # -- serial interface (section 9) --------------------------------------------------------------------------------
 
@@ -225,8 +143,8 @@ class Icm42688:
         self.address = None
 
     def deselect(self):
-        """Handles a rising CS: a packet that was read in part is kept whole, unless reading may resume."""
-        if self.read_from and not self.banks[0][reg.FIFO_CONFIG1] & 0x40:
+        """Handles a rising CS: a packet that was read in part is kept whole."""
+        if self.read_from:
             self.board.record("fifo_partial_read", read=self.read_from)
             self.read_from = 0
         self.address = None
@@ -235,8 +153,7 @@ class Icm42688:
         """Transfers one byte in each direction."""
         if not self.powered:
             return 0xFF
-        inverted = bool(self.banks[0][reg.DEVICE_CONFIG] & 0x10)
-        if (mode[0] != mode[1]) != inverted or hz > 24_000_000:
+        if mode[0] != mode[1] or hz > 24_000_000:
             self.board.record("spi_unreadable", mode=list(mode), hz=hz)
             return 0xFF
         if self.address is None:
@@ -261,36 +178,22 @@ class Icm42688:
             return self._stored(address)
         if address == reg.FIFO_DATA:
             return self._read_fifo()
-        if address in self.data:
-            return self.data[address]
-        if address == reg.INT_STATUS:
-            value, self.status = self.status, 0
-            if self.int1 and self.banks[0][reg.INT_CONFIG] & 4:
-                self._end_pulse()
-            return value
-        if address in (reg.FIFO_COUNTH, reg.FIFO_COUNTL):
-            return self._read_count(address)
-        if address == reg.FIFO_LOST_PKT0:
-            return self.lost & 0xFF
-        if address == reg.FIFO_LOST_PKT1:
-            value, self.lost = self.lost >> 8, 0
-            return value
+        if address == reg.FIFO_COUNTH:
+            # It latches both bytes (section 14.28).
+            self.count_latch = sum(map(len, self.fifo)) - self.read_from
+            return self.count_latch >> 8
+        if address == reg.FIFO_COUNTL:
+            return self.count_latch & 0xFF
         if address == reg.WHO_AM_I:
             return self.identity
         return self._stored(address)
 
     def _stored(self, address):
+        if self.bank == 0 and address in reg.LEFT_OUT:
+            raise Violation(f"ICM-42688-P: register {address:#x} is not modelled")
         if address not in self.banks[self.bank]:
             self.board.record("sensor_reserved", bank=self.bank, address=address, access="read")
         return self.banks[self.bank].get(address, 0)
-
-    def _read_count(self, address):
-        """Reads FIFO_COUNTH, which latches both bytes, or FIFO_COUNTL (section 14.28)."""
-        if address == reg.FIFO_COUNTH:
-            self.count_latch = self._count()
-        big = bool(self.banks[0][reg.INTF_CONFIG0] & 0x20)
-        high = (address == reg.FIFO_COUNTH) == big
-        return self.count_latch >> 8 if high else self.count_latch & 0xFF
 
     def _read_fifo(self):
         if not self.fifo:
@@ -311,6 +214,8 @@ class Icm42688:
             self.bank = min(value & 7, 4)
             return
         bank = self.banks[self.bank]
+        if self.bank == 0 and address in reg.LEFT_OUT:
+            raise Violation(f"ICM-42688-P: register {address:#x} is not modelled")
         if address not in bank or self.bank == 0 and address in reg.READ_ONLY:
             self.board.record("sensor_reserved", bank=self.bank, address=address, access="write", value=value)
             return
@@ -323,13 +228,18 @@ class Icm42688:
         elif address == reg.PWR_MGMT0:
             self._power_modes(value)
         elif address == reg.SIGNAL_PATH_RESET:
-            self._signal_path(value)
             bank[address] = 0
+            if value != 2:
+                raise Violation(f"ICM-42688-P: SIGNAL_PATH_RESET {value:#x} is not modelled")
+            self.fifo, self.read_from = [], 0
         elif address in (reg.GYRO_CONFIG0, reg.ACCEL_CONFIG0):
             if (old ^ value) & 15:
                 self._restart()
-        elif address == reg.FIFO_CONFIG and not value >> 6:
-            self.fifo, self.read_from = [], 0
+        elif address == reg.FIFO_CONFIG:
+            if value >> 6 > 1:
+                raise Violation("ICM-42688-P: a FIFO that stops when it is full is not modelled")
+            if not value >> 6:
+                self.fifo, self.read_from = [], 0
         elif address == reg.GYRO_ACCEL_CONFIG0:
             self.board.record("sensor_bandwidth", hz=self.bandwidth_hz())
 
@@ -344,18 +254,6 @@ class Icm42688:
             self.locked_until = now + SWITCH_ON_PS
         self._restart()
 
-    def _signal_path(self, value):
-        if value & 2:
-            self.fifo, self.read_from = [], 0
-            self.status &= ~(reg.FIFO_FULL | reg.FIFO_THRESHOLD)
-        if value & 4:
-            stamp = self.time_stamp(self.board.now)
-            self.banks[1][reg.TMSTVAL0] = stamp & 0xFF
-            self.banks[1][reg.TMSTVAL0 + 1] = stamp >> 8 & 0xFF
-            self.banks[1][reg.TMSTVAL0 + 2] = stamp >> 16 & 15
-        if value & 8:
-            self._restart()
-
     # -- environment -------------------------------------------------------------------------------------------------
 
     def configure(self, key, value):
@@ -365,9 +263,6 @@ class Icm42688:
         if key == "oscillator_error_percent":
             self.clock_ppm = round(1_000_000 * (1 + value / 100))
             self._restart()
-        elif key == "int1":
-            self.int1 = tuple(value) if value else None
-            self._plan()
         elif key == "who_am_i":
             self.identity = value
         else:

@@ -37,9 +37,6 @@ class Iwdg(Peripheral):
     def reset(self, cause):
         self._cancel()
         self._registers()
-        flash = self.board.peripherals.get("FLASH")
-        if flash is not None and not flash.options & 1 << 5:
-            self._start()
 
     def _cancel(self):
         for handle in (self.end, *self.takeover.values()):
@@ -158,9 +155,3 @@ class Iwdg(Peripheral):
         self.written[flag] = value
         if self.board.rcc.lsi_ready:
             self._schedule_takeover(flag)
-
-    def configure(self, key, value):
-        if key == "lsi_hz":
-            self.board.rcc.configure(key, value)
-        else:
-            super().configure(key, value)

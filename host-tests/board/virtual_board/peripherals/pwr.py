@@ -1,33 +1,27 @@
 """Power control (RM0090 section 5) with the supply that the test sets: voltage detector, brown-out and power-on reset.
 
-Thresholds are those of DS8626 table 19 (embedded reset and power control block); the setting `column` chooses min, typ or max.
-Left out: Stop and Standby, the backup regulator, and the time that the voltage detector needs to start (the manual gives none).
+Thresholds are those of DS8626 table 19 (embedded reset and power control block); typical ones count.
+Left out: Stop and Standby, the backup domain and its regulator, and the time that the voltage detector needs to start (the manual gives none).
 VOSRDY is set 50 us after the regulator's scale was changed; the manual gives no time.
 
-Settings: `supply_mv`, `column`.
+Settings: `supply_mv`.
 """
 
 from ..peripheral import Peripheral
 from . import registers
 
-#: Falling and rising thresholds in millivolts by PLS, each as (min, typ, max).
-PVD = (((1980, 2040, 2080), (2090, 2140, 2190)), ((2130, 2190, 2250), (2230, 2300, 2370)),
-       ((2290, 2350, 2390), (2390, 2450, 2510)), ((2440, 2510, 2560), (2540, 2600, 2650)),
-       ((2590, 2660, 2710), (2700, 2760, 2820)), ((2650, 2840, 2920), (2860, 2930, 2990)),
-       ((2850, 2930, 2990), (2960, 3030, 3100)), ((2950, 3030, 3090), (3070, 3140, 3210)))
+#: Falling and rising thresholds in millivolts by PLS.
+PVD = ((2040, 2140), (2190, 2300), (2350, 2450), (2510, 2600), (2660, 2760), (2840, 2930), (2930, 3030), (3030, 3140))
 #: The same for BOR_LEV; 3 is off, 0 is level 3 (section 3.9.10).
-BOR = {2: ((2130, 2190, 2240), (2230, 2290, 2330)), 1: ((2440, 2500, 2560), (2530, 2590, 2630)),
-       0: ((2750, 2830, 2880), (2850, 2920, 2970))}
-POWER_ON = ((1600, 1680, 1760), (1640, 1720, 1800))
-COLUMNS = {"min": 0, "typ": 1, "max": 2}
+BOR = {2: (2190, 2290), 1: (2500, 2590), 0: (2830, 2920)}
+POWER_ON = (1680, 1720)
 #: TRSTTEMPO, the time from a sufficient supply to the start.
 RESET_TIME_PS = 1_500_000_000
 REGULATOR_PS = 50_000_000
 UNTIL_THE_SUPPLY_RETURNS = 10**21
 
-PVDE, DBP, VOS = 1 << 4, 1 << 8, 1 << 14
+PVDE, PLS, VOS = 1 << 4, 7 << 5, 1 << 14
 PVDO, VOSRDY = 1 << 2, 1 << 14
-CR_WRITABLE = 0x43F3
 
 
 class Pwr(Peripheral):
@@ -38,7 +32,6 @@ class Pwr(Peripheral):
     def __init__(self, board):
         super().__init__(board)
         self.supply_mv = 3300
-        self.column = COLUMNS["typ"]
         self.held = None
         self.release = None
         self.cr, self.low, self.scale_from = VOS, False, 0
@@ -47,11 +40,6 @@ class Pwr(Peripheral):
     def scale_1(self):
         """Returns whether the regulator has scale 1, which allows 168 MHz; scale 2 allows only 144 MHz (section 5.1.3)."""
         return bool(self.cr & VOS)
-
-    @property
-    def backup_writable(self):
-        """Returns whether DBP makes the RTC, its backup registers and RCC_BDCR writable (section 5.1.2)."""
-        return bool(self.cr & DBP)
 
     def reset(self, cause):
         self.cr = VOS
@@ -76,14 +64,14 @@ class Pwr(Peripheral):
     def write(self, offset, value, size):
         registers.check(self, offset, size, registers.HALF_WORD)
         if offset == 0:
-            if value & 3:
-                raise registers.unmodelled(self, offset, "write of LPDS or PDDS (Stop and Standby)")
+            if value & ~(PVDE | PLS | VOS):
+                raise registers.unmodelled(self, offset, f"write of {value:#x}")
             if (value ^ self.cr) & VOS:
                 self.scale_from = self.board.now
-            self.cr = value & CR_WRITABLE
+            self.cr = value
             self._detect()
             self.board.rcc.check_limits()
-        elif offset != 4 or value & 0x300:
+        else:
             raise registers.unmodelled(self, offset, "write")
 
     def _detect(self):
@@ -91,14 +79,14 @@ class Pwr(Peripheral):
         falling, rising = PVD[self.cr >> 5 & 7]
         if not self.cr & PVDE:
             low = False
-        elif self.supply_mv < falling[self.column]:
+        elif self.supply_mv < falling:
             low = True
         else:
-            low = self.low and self.supply_mv < rising[self.column]
+            low = self.low and self.supply_mv < rising
         if low != self.low:
             self.low = low
             self.board.record("pvd", low=low, supply_mv=self.supply_mv)
-            self.board.peripherals["EXTI"].line(16, low)
+            self.board.peripherals["EXTI"].line(low)
 
     def _brown_out(self):
         return BOR.get(self.board.peripherals["FLASH"].bor_level)
@@ -106,11 +94,11 @@ class Pwr(Peripheral):
     def _monitor(self):
         """Holds the part in reset while the supply is too low, and lets it start when the supply has returned."""
         brown_out = self._brown_out()
-        column, supply = self.column, self.supply_mv
+        supply = self.supply_mv
         cause = None
-        if supply < POWER_ON[0][column]:
+        if supply < POWER_ON[0]:
             cause = "por"
-        elif brown_out and supply < brown_out[0][column]:
+        elif brown_out and supply < brown_out[0]:
             cause = "bor"
         if cause and self.held != "por" and cause != self.held:
             self.held = cause
@@ -119,7 +107,7 @@ class Pwr(Peripheral):
             self.board.stall(self.board.now + UNTIL_THE_SUPPLY_RETURNS)
         if not self.held:
             return
-        enough = supply >= POWER_ON[1][column] and (not brown_out or supply >= brown_out[1][column])
+        enough = supply >= POWER_ON[1] and (not brown_out or supply >= brown_out[1])
         if enough and not self.release:
             self.release = self.board.schedule(RESET_TIME_PS if self.held == "por" else 0, self._start)
         elif not enough and self.release:
@@ -135,7 +123,5 @@ class Pwr(Peripheral):
             self.supply_mv = int(value)
             self._detect()
             self._monitor()
-        elif key == "column":
-            self.column = COLUMNS[value]
         else:
             super().configure(key, value)

@@ -3,13 +3,12 @@
 Every frequency of the board follows from these registers and from the environment: the crystal, if one is fitted, the error
 of the HSI oscillator and the frequency of the LSI. Times are those of DS8626 (tables 33 to 43).
 
-Left out: the I2S PLL, spread spectrum, HSI trimming, the clock outputs MCO1 and MCO2, gates in Sleep mode (the LPENR registers keep
-their values and gate nothing), and the LSE crystal unless a test fits one.
+Left out: the I2S PLL, spread spectrum, HSI trimming, the clock outputs MCO1 and MCO2, gates in Sleep mode, interrupts of oscillators,
+the backup domain and its LSE crystal.
 Assumed where the manual is silent: without CSS a core that runs from a dead crystal stops until a reset; a system clock changes 0.2 us after its source is ready.
 
 Settings: `hsi_error_percent`, `crystal_hz` (None: no crystal), `crystal_stop` (True stops the crystal; False lets it start again,
-though a core that it stopped stays stopped until a reset), `lsi_hz`, `lse_hz`, `hse_startup_us`, `pll_lock_us`, `strict`
-(False records a broken limit as `limit` and continues).
+though a core that it stopped stays stopped until a reset), `lsi_hz`.
 """
 
 from ..peripheral import Peripheral
@@ -20,11 +19,11 @@ from .clock_names import ENABLE, RESET, RESET_VALUES
 PS = 1_000_000_000_000
 HSI_NOMINAL = 16_000_000
 
-HSION, HSIRDY, HSEON, HSERDY, HSEBYP, CSSON = 1 << 0, 1 << 1, 1 << 16, 1 << 17, 1 << 18, 1 << 19
-PLLON, PLLRDY, PLLI2SON = 1 << 24, 1 << 25, 1 << 26
+HSION, HSIRDY, HSEON, HSERDY, CSSON = 1 << 0, 1 << 1, 1 << 16, 1 << 17, 1 << 19
+PLLON, PLLRDY = 1 << 24, 1 << 25
+HSE_START_PS, PLL_LOCK_PS = 2_000_000_000, 300_000_000
 PLLSRC_HSE = 1 << 22
 CSSF, CSSC = 1 << 7, 1 << 23
-LSI_READY, LSE_READY, HSI_READY, HSE_READY, PLL_READY = 0, 1, 2, 3, 4
 LSION, LSIRDY, RMVF = 1 << 0, 1 << 1, 1 << 24
 #: Flags of RCC_CSR (section 7.3.21) for each cause; NRST is pulled low by every internal reset (section 7.1.1).
 RESET_FLAGS = {"por": 0x0E00_0000, "bor": 0x0600_0000, "pin": 0x0400_0000, "software": 0x1400_0000,
@@ -47,13 +46,8 @@ class Rcc(Peripheral):
         self.crystal_hz = 25_000_000
         self.crystal_stopped = False
         self.lsi_hz = 32_000
-        self.lse_hz = None
-        self.hse_startup_us = 2_000
-        self.pll_lock_us = 300
-        self.strict = True
         self.pending = {}
         self.flags = 0
-        self.bdcr = 0
         self._power_on()
 
     # -- for other parts of the board --------------------------------------------------------------------------------
@@ -108,7 +102,6 @@ class Rcc(Peripheral):
 
     def _power_on(self):
         self.cr, self.pllcfgr, self.cfgr, self.cir, self.csr = 0x83, 0x2400_3010, 0, 0, 0
-        self.sscgr, self.plli2scfgr = 0, 0x2000_3000
         self.words = dict(RESET_VALUES)
         self.gates = set()
         self.settling, self.settle_until = {}, 0
@@ -123,12 +116,11 @@ class Rcc(Peripheral):
         self.pending = {}
         before = dict(self.hz)
         if cause == "por":
-            self.flags, self.bdcr = 0, 0
+            self.flags = 0
         self.flags |= RESET_FLAGS.get(cause, 0)
         self._power_on()
         if before != self.hz:
             self.announce_clocks()
-        self.board.irq(5, False)
 
     def _open_gates(self):
         #: Gates that need no check at an access; `None` stands for a block that is always clocked.
@@ -166,7 +158,6 @@ class Rcc(Peripheral):
         ratio = 1 + self.hsi_error_percent / 100 if of_hsi else 1
         self.hz = tree if ratio == 1 else {name: round(hz * ratio) for name, hz in tree.items()}
         self.core_hz = self.hz["HCLK"]
-        self.systick_external_hz = self.core_hz // 8
 
     def check_limits(self):
         """Checks the clocks against DS8626 table 14 and the flash latency against RM0090 table 10 (2.7 to 3.6 V)."""
@@ -174,14 +165,9 @@ class Rcc(Peripheral):
         top = 168_000_000 if power is None or power.scale_1 else 144_000_000
         for name, most in (("HCLK", top), ("PCLK1", 42_000_000), ("PCLK2", 84_000_000)):
             if self.nominal[name] > most:
-                self._limit(f"{name} at {self.nominal[name]} Hz is above {most} Hz")
+                raise Violation(f"RCC: {name} at {self.nominal[name]} Hz is above {most} Hz")
         if flash is not None and self.nominal["HCLK"] > 30_000_000 * (flash.latency + 1):
-            self._limit(f"HCLK at {self.nominal['HCLK']} Hz with {flash.latency} flash wait states")
-
-    def _limit(self, text):
-        if self.strict:
-            raise Violation(f"RCC: {text}")
-        self.board.record("limit", text=text)
+            raise Violation(f"RCC: HCLK at {self.nominal['HCLK']} Hz with {flash.latency} flash wait states")
 
     def _update(self):
         """Computes the tree again after a change of source or prescaler, and calls everything that counts."""
@@ -202,28 +188,19 @@ class Rcc(Peripheral):
         if handle:
             handle.cancel()
 
-    def _ready(self, bit):
-        self.cir |= 1 << bit
-        self._interrupt()
-
-    def _interrupt(self):
-        self.board.irq(5, bool(self.cir & self.cir >> 8 & 0x3F))
-
     def _hsi_ready(self):
         self.pending.pop("hsi", None)
         self.cr |= HSIRDY
-        self._ready(HSI_READY)
         self._start_pll()
         self._try_switch()
 
     def _start_hse(self):
         if self.cr & HSEON and self.crystal_hz and not self.crystal_stopped and not self.cr & HSERDY:
-            self._later("hse", self.hse_startup_us * 1_000_000, self._hse_ready)
+            self._later("hse", HSE_START_PS, self._hse_ready)
 
     def _hse_ready(self):
         self.pending.pop("hse", None)
         self.cr |= HSERDY
-        self._ready(HSE_READY)
         self._start_pll()
         self._try_switch()
 
@@ -236,15 +213,14 @@ class Rcc(Peripheral):
         if m < 2 or not 50 <= n <= 432 or q < 2:
             raise Violation(f"RCC: PLLM {m}, PLLN {n} or PLLQ {q} is a wrong configuration (section 7.3.2)")
         if not 950_000 <= source / m <= 2_100_000:
-            self._limit(f"PLL input of {source / m:.0f} Hz is outside 0.95 to 2.1 MHz")
+            raise Violation(f"RCC: PLL input of {source / m:.0f} Hz is outside 0.95 to 2.1 MHz")
         if not 100_000_000 <= source * n / m <= 432_000_000:
-            self._limit(f"PLL oscillator at {source * n / m:.0f} Hz is outside 100 to 432 MHz")
-        self._later("pll", self.pll_lock_us * 1_000_000, self._pll_ready)
+            raise Violation(f"RCC: PLL oscillator at {source * n / m:.0f} Hz is outside 100 to 432 MHz")
+        self._later("pll", PLL_LOCK_PS, self._pll_ready)
 
     def _pll_ready(self):
         self.pending.pop("pll", None)
         self.cr |= PLLRDY
-        self._ready(PLL_READY)
         self._try_switch()
 
     def _uses(self, oscillator):
@@ -304,14 +280,8 @@ class Rcc(Peripheral):
             value = self.cir
         elif word in self.words:
             value = self.words[word]
-        elif word == 0x70:
-            value = self.bdcr
         elif word == 0x74:
             value = self.csr | self.flags
-        elif word == 0x80:
-            value = self.sscgr
-        elif word == 0x84:
-            value = self.plli2scfgr
         else:
             raise registers.unmodelled(self, offset, "read")
         return registers.cut(value, offset, size)
@@ -330,23 +300,16 @@ class Rcc(Peripheral):
             self._write_cir(value)
         elif word in self.words:
             self._write_gate(word, value)
-        elif word == 0x70:
-            self._write_bdcr(value)
         elif word == 0x74:
             self._write_csr(value)
-        elif word == 0x84:
-            self.plli2scfgr = value & 0x7000_7FC0
         else:
             raise registers.unmodelled(self, offset, "write")
 
     def _write_cr(self, value):
-        if value & PLLI2SON:
-            raise Violation("RCC: the I2S PLL is not modelled")
-        if value & 0xF8 != 0x80:
-            raise Violation("RCC: HSI trimming is not modelled")
+        if value & ~0x030B_00FB or value & 0xF8 != 0x80:
+            raise Violation(f"RCC: CR {value:#x}: trimming, a clock instead of the crystal and the I2S PLL are not modelled")
         old = self.cr
         new = old & (HSIRDY | HSERDY | PLLRDY) | value & (0xF8 | HSION | HSEON | CSSON | PLLON)
-        new |= (old if old & HSEON else value) & HSEBYP
         if self._uses("HSI"):
             new |= HSION
         if self._uses("HSE"):
@@ -384,11 +347,10 @@ class Rcc(Peripheral):
         self._try_switch()
 
     def _write_cir(self, value):
-        self.cir &= ~(value >> 16 & 0x3F)
+        if value & ~CSSC:
+            raise Violation("RCC: interrupts of the oscillators are not modelled")
         if value & CSSC:
             self.cir &= ~CSSF
-        self.cir = self.cir & ~0x3F00 | value & 0x3F00
-        self._interrupt()
 
     def _write_gate(self, word, value):
         if word in ENABLE:
@@ -401,7 +363,7 @@ class Rcc(Peripheral):
                 self.settling = {name: end for name, end in self.settling.items() if end > self.board.now}
                 self.settling.update({name: until for bit, name in ENABLE[word].items() if risen >> bit & 1})
                 self.settle_until = max(self.settle_until, until)
-        elif word in RESET:
+        else:
             risen = value & ~self.words[word]
             self.words[word] = value
             self._open_gates()
@@ -410,31 +372,6 @@ class Rcc(Peripheral):
                     for name in names:
                         if name in self.board.peripherals:
                             self.board.peripherals[name].reset("rcc")
-        else:
-            self.words[word] = value
-
-    def _write_bdcr(self, value):
-        power = self.board.peripherals.get("PWR")
-        if power is not None and not power.backup_writable:
-            self.board.record("ignored_write", register="RCC_BDCR", value=value)
-            return
-        if value & 1 << 16:
-            self.bdcr = 1 << 16
-            rtc = self.board.peripherals.get("RTC")
-            if rtc:
-                rtc.backup_reset()
-            return
-        selected = self.bdcr & 0x300 or value & 0x300
-        self.bdcr = value & 0x8005 | selected | self.bdcr & 2
-        if not value & 1:
-            self._drop("lse")
-            self.bdcr &= ~2
-        elif self.lse_hz and not self.bdcr & 2:
-            self._later("lse", 2 * PS, self._lse_ready)
-
-    def _lse_ready(self):
-        self.bdcr |= 2
-        self._ready(LSE_READY)
 
     def _write_csr(self, value):
         if value & RMVF:
@@ -457,7 +394,6 @@ class Rcc(Peripheral):
     def _lsi_ready(self):
         self.pending.pop("lsi", None)
         self.csr |= LSIRDY
-        self._ready(LSI_READY)
         watchdog = self.board.peripherals.get("IWDG")
         if watchdog:
             watchdog.lsi_ready()
@@ -487,7 +423,5 @@ class Rcc(Peripheral):
             watchdog = self.board.peripherals.get("IWDG")
             if watchdog:
                 watchdog.clocks_changed()
-        elif key in ("lse_hz", "hse_startup_us", "pll_lock_us", "strict"):
-            setattr(self, key, value)
         else:
             super().configure(key, value)

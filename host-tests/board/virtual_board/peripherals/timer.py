@@ -1,8 +1,9 @@
-"""General-purpose timers as up-counters with compare and capture (RM0090 sections 18 and 19).
+"""General-purpose timers that count up and compare (RM0090 sections 18 and 19); TIM11 captures the crystal.
 
 The counter is computed from board time; an event is scheduled only while DIER enables an interrupt. TIM11 channel 1 captures HSE
-divided by RTCPRE and TIM5 channel 4 the LSI (sections 19.5.11 and 18.4.20), which lets software measure an oscillator.
-Left out: counting down, PWM outputs and the preload of CCR, slave mode, encoder, DMA requests, captures of a pin.
+divided by RTCPRE (section 19.5.11), which lets software measure it. Prescaler and end of the count are set while the counter stands.
+Left out: counting down, one pulse, PWM outputs and the preload of CCR, slave mode, encoder, DMA requests, captures of a pin, and the
+interrupts of captures.
 """
 
 from ..peripheral import Peripheral
@@ -10,32 +11,31 @@ from ..violation import Violation
 from . import registers
 
 PS = 1_000_000_000_000
-CEN, UDIS, URS, OPM, ARPE = 1 << 0, 1 << 1, 1 << 2, 1 << 3, 1 << 7
+CEN, URS = 1 << 0, 1 << 2
 UIF = 1
-CR1_WRITABLE = CEN | UDIS | URS | OPM | ARPE | 0x300
 
 
 class Timer(Peripheral):
     """One timer of 16 or 32 bits with up to four channels."""
 
-    def __init__(self, board, name, base, interrupt, bus, bits, channels, remap=None):
+    def __init__(self, board, name, base, interrupt, bus, bits, channels, captures=False):
         super().__init__(board)
         self.name = self.clock = name
         self.base, self.interrupt, self.bus = base, interrupt, bus
         self.mask, self.channels = (1 << bits) - 1, channels
-        self.remap = remap
+        self.captures = captures
         self.event = None
         self._registers()
 
     def _registers(self):
-        self.cr1 = self.cr2 = self.dier = self.sr = self.ccer = self.option = 0
+        self.cr1 = self.dier = self.sr = self.ccer = self.option = 0
         self.ccmr = [0, 0]
         self.ccr = [0, 0, 0, 0]
         self.prescaler = self.prescaler_written = 0
-        self.arr = self.arr_written = self.mask
+        self.arr = self.mask
         self.counter, self.since = 0, self.board.now
         self.hz = 0
-        self.capture_source, self.captured = (0, 1), [0, 0, 0, 0]
+        self.capture_source, self.captured = (0, 1), 0
         self.irq_level = False
 
     def reset(self, cause):
@@ -68,30 +68,9 @@ class Timer(Peripheral):
         steps = self._steps(now)
         if not steps:
             return
-        first = self._to_overflow()
-        while steps >= first:
-            whole = steps if self._steady() else first
-            self._matches(whole)
-            self._advance(whole)
-            if not self.cr1 & UDIS:
-                self.sr |= UIF
-                self.prescaler, self.arr = self.prescaler_written, self.arr_written
-                if self.cr1 & OPM:
-                    self.cr1 &= ~CEN
-            steps, first = self._steps(now), self._to_overflow()
-        if steps:
-            self._matches(steps)
-            self._advance(steps)
-
-    def _steady(self):
-        """Returns whether the counter's value follows from the time alone, since no overflow changes how it counts."""
-        return self.prescaler_written == self.prescaler and self.arr_written == self.arr and not self.cr1 & OPM
-
-    def _counted(self):
-        self._sync()
-        return self.counter
-
-    def _advance(self, steps):
+        self._matches(steps)
+        if steps >= self._to_overflow():
+            self.sr |= UIF
         value = self._after(steps)
         self.since += -(-steps * PS * (self.prescaler + 1) // self.hz)
         self.counter = value
@@ -115,30 +94,29 @@ class Timer(Peripheral):
         return self.ccmr[channel >> 1] >> 8 * (channel & 1) & 3
 
     def _capture(self, now):
-        """Stores the time of the last edge of the internal source in CCR, if there were edges since the last call."""
-        if self.remap is None:
+        """Stores the time of the last edge of the divided crystal in CCR1, if there were edges since the last call."""
+        if not self.captures:
             return
-        channel, _, selector = self.remap
-        source = selector(self)
+        # TI1_RMP = 10 connects it to channel 1.
+        source = self.board.rcc.hse_rtc_hz() if self.option & 3 == 2 else (0, 1)
         if source != self.capture_source:
             self.capture_source = source
-            self.captured[channel] = self._edges(now)
+            self.captured = self._edges(now)
             return
-        if not source[0] or not self.ccer >> 4 * channel & 1 or self._selection(channel) != 1 or not self.cr1 & CEN:
-            self.captured[channel] = self._edges(now)
+        if not source[0] or not self.ccer & 1 or self._selection(0) != 1 or not self.cr1 & CEN:
+            self.captured = self._edges(now)
             return
-        divider = 1 << (self.ccmr[channel >> 1] >> 8 * (channel & 1) + 2 & 3)
-        fresh = (self._edges(now) - self.captured[channel]) // divider
+        divider = 1 << (self.ccmr[0] >> 2 & 3)
+        fresh = (self._edges(now) - self.captured) // divider
         if fresh <= 0:
             return
-        self.captured[channel] += fresh * divider
+        self.captured += fresh * divider
         numerator, denominator = source
-        edge = -(-self.captured[channel] * denominator * PS // numerator)
-        self.ccr[channel] = self._after(self._steps(max(edge, self.since)))
-        flag = 2 << channel
-        if self.sr & flag or fresh > 1:
-            self.sr |= flag << 8
-        self.sr |= flag
+        edge = -(-self.captured * denominator * PS // numerator)
+        self.ccr[0] = self._after(self._steps(max(edge, self.since)))
+        if self.sr & 2 or fresh > 1:
+            self.sr |= 2 << 8
+        self.sr |= 2
 
     def _edges(self, now):
         numerator, denominator = self.capture_source
@@ -176,15 +154,9 @@ class Timer(Peripheral):
             flag = 2 << channel
             if not self.dier & flag or self.sr & flag:
                 continue
-            if not self._selection(channel):
-                steps = self._distance(self.ccr[channel])
-                if steps < 1 << 69:
-                    delays.append(self._delay(steps))
-            elif self.remap and self.capture_source[0]:
-                numerator, denominator = self.capture_source
-                divider = 1 << (self.ccmr[channel >> 1] >> 8 * (channel & 1) + 2 & 3)
-                edge = self.captured[channel] + divider
-                delays.append(-(-edge * denominator * PS // numerator) - self.board.now)
+            steps = self._distance(self.ccr[channel])
+            if steps < 1 << 69:
+                delays.append(self._delay(steps))
         if delays:
             self.event = self.board.schedule(max(min(delays), 0), self._happens)
 
@@ -200,16 +172,11 @@ class Timer(Peripheral):
 
     def read(self, offset, size):
         if offset == 0x24:
-            if not self.cr1 & CEN:
-                value = self.counter
-            elif self._steady():
-                steps = self._steps(self.board.now)
-                value = self.counter + steps
-                # The wrap and a counter beyond ARR are rare.
-                if value > self.arr:
-                    value = self._after(steps)
-            else:
-                value = self._counted()
+            steps = self._steps(self.board.now)
+            value = self.counter + steps
+            # The wrap and a counter beyond ARR are rare.
+            if value > self.arr:
+                value = self._after(steps)
             return value if size == 4 else registers.cut(value, offset, size)
         word = offset & ~3
         registers.check(self, offset, size, registers.HALF_WORD)
@@ -226,9 +193,7 @@ class Timer(Peripheral):
         elif word == 0x00:
             self._sync()
             value = self.cr1
-        elif word == 0x04:
-            value = self.cr2
-        elif word == 0x08 or word == 0x14:
+        elif word == 0x14:
             value = 0
         elif word == 0x0C:
             value = self.dier
@@ -239,8 +204,8 @@ class Timer(Peripheral):
         elif word == 0x28:
             value = self.prescaler_written
         elif word == 0x2C:
-            value = self.arr_written
-        elif word == 0x50 and self.remap:
+            value = self.arr
+        elif word == 0x50 and self.captures:
             value = self.option
         else:
             raise registers.unmodelled(self, offset, "read")
@@ -253,18 +218,18 @@ class Timer(Peripheral):
         if size != 4 and word not in (0x10, 0x14):
             value = registers.merge(self._stored(word), value, offset, size)
         if word == 0x00:
-            if value & 0x70:
-                raise Violation(f"{self.name}: counting down and centre-aligned modes are not modelled")
+            if value & ~(CEN | URS):
+                raise Violation(f"{self.name}: CR1 {value:#x} asks for a mode that is not modelled")
             if value & CEN and not self.cr1 & CEN:
+                if self.prescaler != self.prescaler_written:
+                    raise Violation(f"{self.name}: it starts with a prescaler that no UG has loaded, which is not modelled")
                 self.hz = self.board.rcc.clock_hz(self.bus)
                 self.since = self.board.now
-            self.cr1 = value & CR1_WRITABLE
-        elif word == 0x04:
-            self.cr2 = value & 0xF8
+            self.cr1 = value
         elif word == 0x0C:
-            if value & 0x5F00:
-                raise Violation(f"{self.name}: DMA requests of timers are not modelled")
-            self.dier = value & 0x5F
+            if value & ~0x1F or value and self.captures:
+                raise Violation(f"{self.name}: DMA requests, trigger and captures that interrupt are not modelled")
+            self.dier = value
         elif word == 0x10:
             self.sr &= value
         elif word == 0x14:
@@ -275,62 +240,46 @@ class Timer(Peripheral):
             self.ccer = value & 0xBBBB
         elif word == 0x24:
             self.counter, self.since = value & self.mask, self.board.now
+        elif word in (0x28, 0x2C) and self.cr1 & CEN:
+            raise Violation(f"{self.name}: a new prescaler or end of the count while it counts is not modelled")
         elif word == 0x28:
             self.prescaler_written = value & 0xFFFF
         elif word == 0x2C:
-            self.arr_written = value & self.mask
-            if not self.cr1 & ARPE:
-                self.arr = self.arr_written
+            self.arr = value & self.mask
         elif 0x34 <= word < 0x34 + 4 * self.channels:
             self.ccr[(word - 0x34) // 4] = value & self.mask
-        elif word == 0x50 and self.remap:
-            self.option = value & self.remap[1]
-        elif word != 0x08 or value:
+        elif word == 0x50 and self.captures:
+            self.option = value & 3
+        else:
             raise registers.unmodelled(self, offset, "write")
         self._capture(self.board.now)
         self._arm()
 
     def _stored(self, word):
         """Returns the word into which a half-word store is merged, without the side effects of a read."""
-        return {0x24: self.counter, 0x2C: self.arr_written, 0x34: self.ccr[0], 0x38: self.ccr[1], 0x3C: self.ccr[2],
+        return {0x24: self.counter, 0x2C: self.arr, 0x34: self.ccr[0], 0x38: self.ccr[1], 0x3C: self.ccr[2],
                 0x40: self.ccr[3]}.get(word, 0)
 
     def _generate(self, value):
-        """Handles UG, which restarts counter and prescaler and loads the preloaded values (section 18.4.6)."""
-        if value & UIF:
-            self.counter, self.since = 0, self.board.now
-            if not self.cr1 & UDIS:
-                self.prescaler, self.arr = self.prescaler_written, self.arr_written
-                if not self.cr1 & URS:
-                    self.sr |= UIF
-        self.sr |= value & 0x1E
+        """Handles UG, which restarts counter and prescaler and loads the latter (section 18.4.6)."""
+        if value != UIF:
+            raise Violation(f"{self.name}: EGR {value:#x} generates events that are not modelled")
+        self.counter, self.since = 0, self.board.now
+        self.prescaler = self.prescaler_written
+        if not self.cr1 & URS:
+            self.sr |= UIF
 
     def _write_ccmr(self, index, value):
         for half in range(2):
             setting = value >> 8 * half & 0xFF
             if not setting & 3 and setting & 8:
                 raise Violation(f"{self.name}: the preload of CCR is not modelled")
-            if setting & 3 and (self.remap is None or self.remap[0] != 2 * index + half or setting & 3 != 1):
+            if setting & 3 and (not self.captures or index or half or setting & 3 != 1):
                 raise Violation(f"{self.name}: captures of a pin are not modelled")
         self.ccmr[index] = value & 0xFFFF
 
 
-def _hse_rtc(timer):
-    """Returns the frequency of HSE divided by RTCPRE, which TI1_RMP = 10 connects to channel 1 of TIM11 (section 19.5.11)."""
-    return timer.board.rcc.hse_rtc_hz() if timer.option & 3 == 2 else (0, 1)
-
-
-def _lsi(timer):
-    """Returns the frequency of the LSI, which TI4_RMP = 01 connects to channel 4 of TIM5 (section 18.4.20)."""
-    rcc = timer.board.rcc
-    return (rcc.lsi_hz, 1) if timer.option >> 6 & 3 == 1 and rcc.csr & 2 else (0, 1)
-
-
 def timers(board):
     """Creates the modelled timers."""
-    return [Timer(board, "TIM2", 0x4000_0000, 28, "TIM_APB1", 32, 4),
-            Timer(board, "TIM3", 0x4000_0400, 29, "TIM_APB1", 16, 4),
-            Timer(board, "TIM4", 0x4000_0800, 30, "TIM_APB1", 16, 4),
-            Timer(board, "TIM5", 0x4000_0C00, 50, "TIM_APB1", 32, 4, (3, 0xC0, _lsi)),
-            Timer(board, "TIM10", 0x4001_4400, 25, "TIM_APB2", 16, 1),
-            Timer(board, "TIM11", 0x4001_4800, 26, "TIM_APB2", 16, 1, (0, 0x3, _hse_rtc))]
+    return [Timer(board, "TIM5", 0x4000_0C00, 50, "TIM_APB1", 32, 4),
+            Timer(board, "TIM11", 0x4001_4800, 26, "TIM_APB2", 16, 1, captures=True)]

@@ -3,10 +3,12 @@
 The duration of a byte follows from BRR and the peripheral clock. The external device sends and listens at `baud`; if the rates differ
 by more than 3.5 % the receiver samples wrong bits and reports a framing error, and the device gets wrong bytes (table 140: receiver
 tolerance). A byte reaches a pin only if one of the port pins of the USART has the alternate function (DS8626 table 9).
-Left out: synchronous, LIN, IrDA, smartcard and half-duplex modes, flow control, multiprocessor mute, the break character, noise.
+Frames have eight data bits, no parity and one stop bit, oversampled by 16.
+Left out: other frames, interrupts of the transmitter, synchronous, LIN, IrDA, smartcard and half-duplex modes, flow control,
+multiprocessor mute, the break character, noise.
 Assumed where the manual is silent: a frame that began before RE was set is lost completely.
 
-Settings: `baud` (of the external device), `outside_stop_bits`. Calls of a test: `inject`, `take_sent`.
+Settings: `baud` (of the external device). Calls of a test: `inject`, `take_sent`.
 """
 
 from collections import deque
@@ -18,14 +20,12 @@ from . import registers
 from .gpio import connected
 
 PS = 1_000_000_000_000
-PE, FE, NF, ORE, IDLE, RXNE, TC, TXE = (1 << bit for bit in range(8))
-ERRORS = PE | FE | NF | ORE | IDLE
+FE, ORE, IDLE, RXNE, TC, TXE = (1 << bit for bit in (1, 3, 4, 5, 6, 7))
+ERRORS = FE | ORE | IDLE
 CLEARED_BY_ZERO = RXNE | TC
-SBK, RWU, RE, TE, IDLEIE, RXNEIE, TCIE, TXEIE, PEIE, PS_ODD, PCE, M, UE, OVER8 = (
-    1 << bit for bit in (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 13, 15))
+RE, TE, IDLEIE, RXNEIE, UE = (1 << bit for bit in (2, 3, 4, 5, 13))
 EIE, DMAR, DMAT = 1 << 0, 1 << 6, 1 << 7
 TOLERANCE = 0.035
-STOP_HALVES = (2, 1, 4, 3)
 #: Bytes that arrive within this time, in picoseconds, may be received at once if only DMA notices them.
 AT_ONCE = 500_000_000
 
@@ -40,7 +40,6 @@ class Usart(Peripheral):
         self.dma = "DMA1" if bus == "PCLK1" else "DMA2"
         self.function, self.tx_pins, self.rx_pins = function, tx_pins, rx_pins
         self.baud = 115_200
-        self.outside_stop_bits = 1
         self.sent = []
         self.line = deque()
         self.line_free = 0
@@ -57,7 +56,7 @@ class Usart(Peripheral):
         self._registers()
 
     def _registers(self):
-        self.sr, self.cr1, self.cr2, self.cr3, self.brr, self.gtpr = TC | TXE, 0, 0, 0, 0, 0
+        self.sr, self.cr1, self.cr3, self.brr = TC | TXE, 0, 0, 0
         self.rdr, self.tdr, self.shift, self.shift_end = 0, None, None, 0
         self.seen, self.seen_tc = 0, False
         self.preamble_until = 0
@@ -93,14 +92,9 @@ class Usart(Peripheral):
         """Computes bit and frame times from BRR and the bus clock (section 30.3.4)."""
         if self.batch:
             self._send_due()
-        if self.cr1 & OVER8:
-            divider = (self.brr >> 4) * 8 + (self.brr & 7)
-        else:
-            divider = self.brr
         hz = self.board.rcc.clock_hz(self.bus)
-        self.bit_ps = divider * PS // hz if divider and hz else 0
-        halves = 2 * (1 + (9 if self.cr1 & M else 8)) + STOP_HALVES[self.cr2 >> 12 & 3]
-        self.frame_ps = halves * self.bit_ps // 2
+        self.bit_ps = self.brr * PS // hz if hz else 0
+        self.frame_ps = 10 * self.bit_ps
         if self.batch and self.shift is not None:
             self._send()
         self._compare()
@@ -108,7 +102,7 @@ class Usart(Peripheral):
     def _compare(self):
         """Computes, from both sides' rates, the time to the middle of a byte's stop bit, and the relative difference of the rates."""
         bit = self.bit_ps or PS // self.baud
-        self.sampled_ps = (10 if self.cr1 & M else 9) * bit + bit // 2
+        self.sampled_ps = 9 * bit + bit // 2
         #: The relative difference between the USART's bit time and the external device's.
         self.mismatch = self.bit_ps * self.baud / PS - 1
 
@@ -137,9 +131,9 @@ class Usart(Peripheral):
 
     def _fed_silently(self):
         """Returns the number of bytes that DMA will feed without an interrupt, and without a test that waits for a byte."""
-        if self.watched or not self.cr3 & DMAT or self.cr1 & (TXEIE | TCIE):
+        if self.watched or not self.cr3 & DMAT:
             return 0
-        return self.board.peripherals[self.dma].feeds_silently(self.name + "_TX")
+        return self.board.peripherals[self.dma].feeds(self.name + "_TX")
 
     def _departed(self):
         self.departure = None
@@ -210,7 +204,7 @@ class Usart(Peripheral):
     def inject(self, data, at_ps=None):
         """Sends bytes from the external device back to back, not before `at_ps` and after all bytes injected earlier."""
         start = max(self.line_free, self.board.now if at_ps is None else at_ps)
-        frame = (9 + self.outside_stop_bits) * PS // self.baud
+        frame = 10 * PS // self.baud
         for byte in data:
             self.line.append((start, byte))
             start += frame
@@ -230,8 +224,8 @@ class Usart(Peripheral):
 
     def _only_dma_notices(self):
         """Returns whether bytes go to memory without an interrupt."""
-        return bool(self.cr3 & DMAR and not self.cr1 & (RXNEIE | IDLEIE | M | PCE) and abs(self.mismatch) <= 0.02
-                    and self.board.peripherals[self.dma].serves_silently(self.name + "_RX"))
+        return bool(self.cr3 & DMAR and not self.cr1 & (RXNEIE | IDLEIE) and abs(self.mismatch) <= 0.02
+                    and self.board.peripherals[self.dma].serves(self.name + "_RX"))
 
     def _arrived(self):
         """Handles the sampling of the middle of a stop bit."""
@@ -282,8 +276,8 @@ class Usart(Peripheral):
         if self.idle_armed:
             self._detect_idle(start)
         value, framing = byte, False
-        if self.cr1 & (M | PCE) or abs(self.mismatch) > 0.02:
-            value, framing = self._sample(byte, self.mismatch)
+        if abs(self.mismatch) > 0.02:
+            value, framing = self._sample(byte)
         if self.sr & RXNE:
             self.sr |= ORE
             self.board.record("overrun", usart=self.name, byte=byte)
@@ -296,15 +290,11 @@ class Usart(Peripheral):
         if self.cr3 & DMAR:
             self.serve_dma()
 
-    def _sample(self, byte, mismatch):
-        if self.cr1 & M and not self.cr1 & PCE:
-            raise Violation(f"{self.name}: nine data bits without parity are not modelled against an outside of eight")
+    def _sample(self, byte):
         value, framing = _sampled(byte, self.bit_ps, PS / self.baud)
-        if abs(mismatch) > TOLERANCE:
-            self._note_mismatch("rx", mismatch)
+        if abs(self.mismatch) > TOLERANCE:
+            self._note_mismatch("rx", self.mismatch)
             value, framing = (value if value != byte else value ^ 0x80), True
-        if self.cr1 & PCE:
-            self.sr |= PE if value.bit_count() % 2 != bool(self.cr1 & PS_ODD) else 0
         return value, framing
 
     def _detect_idle(self, now):
@@ -330,8 +320,8 @@ class Usart(Peripheral):
 
     def _interrupt(self):
         sr, cr1 = self.sr, self.cr1
-        level = bool(sr & cr1 & (TC | TXE | IDLE) or cr1 & RXNEIE and sr & (RXNE | ORE) or cr1 & PEIE and sr & PE
-                     or self.cr3 & EIE and self.cr3 & DMAR and sr & (FE | ORE | NF))
+        level = bool(sr & cr1 & IDLE or cr1 & RXNEIE and sr & (RXNE | ORE)
+                     or self.cr3 & EIE and self.cr3 & DMAR and sr & (FE | ORE))
         if level != self.irq_level:
             self.irq_level = level
             self.board.irq(self.interrupt, level)
@@ -367,11 +357,9 @@ class Usart(Peripheral):
         if offset == 0x0C:
             return self.cr1
         if offset == 0x10:
-            return self.cr2
+            return 0
         if offset == 0x14:
             return self.cr3
-        if offset == 0x18:
-            return self.gtpr
         raise registers.unmodelled(self, offset, "read")
 
     def write(self, offset, value, size):
@@ -394,14 +382,10 @@ class Usart(Peripheral):
         elif offset == 0x0C:
             self._write_cr1(value)
         elif offset == 0x10:
-            if value & 0x4800:
-                raise Violation(f"{self.name}: LIN and synchronous mode are not modelled")
-            self.cr2 = value & 0x7F6F
-            self.clocks_changed()
+            if value:
+                raise Violation(f"{self.name}: CR2 {value:#x} asks for a mode that is not modelled")
         elif offset == 0x14:
             self._write_cr3(value)
-        elif offset == 0x18:
-            self.gtpr = value & 0xFFFF
         else:
             raise registers.unmodelled(self, offset, "write")
         self._interrupt()
@@ -434,9 +418,9 @@ class Usart(Peripheral):
             self._interrupt()
 
     def _write_cr1(self, value):
-        if value & (SBK | RWU):
-            raise Violation(f"{self.name}: break and mute are not modelled")
-        old, self.cr1 = self.cr1, value & 0xBFFF
+        if value & ~(RE | TE | IDLEIE | RXNEIE | UE):
+            raise Violation(f"{self.name}: CR1 {value:#x} asks for a mode that is not modelled")
+        old, self.cr1 = self.cr1, value
         self.clocks_changed()
         if value & UE and value & TE and not (old & UE and old & TE):
             self.preamble_until = self.board.now + self.frame_ps
@@ -449,14 +433,14 @@ class Usart(Peripheral):
             self._watch_idle()
 
     def _write_cr3(self, value):
-        if value & 0x33E:
-            raise Violation(f"{self.name}: IrDA, smartcard, half-duplex and flow control are not modelled")
-        self.cr3 = value & 0xCC1
+        if value & ~(EIE | DMAR | DMAT):
+            raise Violation(f"{self.name}: CR3 {value:#x} asks for a mode that is not modelled")
+        self.cr3 = value
         self.serve_dma()
 
     def configure(self, key, value):
-        if key in ("baud", "outside_stop_bits"):
-            setattr(self, key, value)
+        if key == "baud":
+            self.baud = value
             self._compare()
         else:
             super().configure(key, value)
@@ -477,11 +461,10 @@ def _sampled(byte, sampler_bit_ps, sender_bit_ps):
 
 
 def usarts(board):
-    """Creates the six USARTs and UARTs of the STM32F405 with their candidate pins."""
+    """Creates the USARTs and UARTs of the STM32F405 that a board uses, with their candidate pins."""
     table = (("USART1", 0x4001_1000, 37, "PCLK2", 7, (("A", 9), ("B", 6)), (("A", 10), ("B", 7))),
              ("USART2", 0x4000_4400, 38, "PCLK1", 7, (("A", 2), ("D", 5)), (("A", 3), ("D", 6))),
              ("USART3", 0x4000_4800, 39, "PCLK1", 7, (("B", 10), ("C", 10), ("D", 8)), (("B", 11), ("C", 11), ("D", 9))),
              ("UART4", 0x4000_4C00, 52, "PCLK1", 8, (("A", 0), ("C", 10)), (("A", 1), ("C", 11))),
-             ("UART5", 0x4000_5000, 53, "PCLK1", 8, (("C", 12),), (("D", 2),)),
              ("USART6", 0x4001_1400, 71, "PCLK2", 8, (("C", 6), ("G", 14)), (("C", 7), ("G", 9))))
     return [Usart(board, *row) for row in table]

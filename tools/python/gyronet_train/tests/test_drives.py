@@ -115,4 +115,3 @@ class Windows(unittest.TestCase):
         self.assertEqual(window_rows(STEPS, "none").tolist(), list(range(STEPS)))
         self.assertIsNone(window_rows(STEPS - 1, "none"))
         self.assertEqual(window_rows(2, "repeat").tolist(), [0, 1] * (STEPS // 2))
-        self.assertEqual(window_rows(2, "edge").tolist(), [0] * (STEPS - 1) + [1])

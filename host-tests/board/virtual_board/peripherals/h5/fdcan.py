@@ -171,9 +171,6 @@ class Fdcan(Peripheral):
         if not self.on_bus and self.join_event is None:
             self._join()
 
-    def activity(self, source):
-        """Nothing wakes this controller."""
-
     def _listens_at_pin(self):
         return connected(self.board, RX_PINS, FUNCTION)
 

@@ -128,7 +128,7 @@ class Rcc(Peripheral):
         shifts = [APB_SHIFT.get(prescalers >> 4 * bus & 7, 0) for bus in (1, 2, 3)]
         self.hz = {"HCLK": hclk, **{f"PCLK{bus + 1}": hclk >> shift for bus, shift in enumerate(shifts)},
                    "TIM_APB1": hclk >> max(shifts[0] - 1, 0), "TIM_APB2": hclk >> max(shifts[1] - 1, 0)}
-        self.core_hz, self.systick_external_hz = hclk, hclk // 8
+        self.core_hz = hclk
 
     def check_limits(self):
         """Checks HCLK against the voltage scale, and the flash latency against both."""

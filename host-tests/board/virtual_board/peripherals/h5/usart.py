@@ -56,7 +56,7 @@ class NewUsart(Usart):
         elif word in (0x10, 0x14, 0x18, 0x20, 0x2C):
             value = 0
         elif word in (0x04, 0x08, 0x0C):
-            value = (self.cr2, self.cr3, self.brr)[word // 4 - 1]
+            value = (0, self.cr3, self.brr)[word // 4 - 1]
         else:
             raise registers.unmodelled(self, offset, "read")
         return registers.cut(value, offset, size)
@@ -71,8 +71,8 @@ class NewUsart(Usart):
         elif offset == 0x04:
             super()._write(0x10, value, 4)
         elif offset == 0x08:
-            if value & (DMAR | DMAT) or value & ~0xFFF:
-                raise Violation(f"{self.name}: CR3 {value:#x}: DMA and thresholds are not modelled")
+            if value & (DMAR | DMAT):
+                raise Violation(f"{self.name}: DMA is not modelled")
             super()._write(0x14, value, 4)
         elif offset == 0x0C:
             super()._write(0x08, value, 4)
