@@ -8,13 +8,12 @@
 //! - the **delayed** rate [`CompensateConfig::lag`] samples later, for a receiver that integrates it to a heading.
 //!   Most windows that cover the sample have been evaluated by then.
 //!
-//! A revision by a later window is not lost: it is carried into the rates that follow, so that the sum of the rates
+//! A revision of a delayed rate by a later window is not lost: it is carried into the rates that follow, so that their sum
 //! reaches the sum of the best estimates. Each rate carries at most a bounded part of the revision, so that no rate
 //! jumps. With c_k(t) the estimate for sample k as known at sample t, and L the lag:
 //! `rate(t) = gyro(t-L) - c_{t-L}(t) - carried part of sum over k < t-L of (c_k(t) - c_k(t-1))`. The live rate
-//! carries an eighth of its outstanding revisions with each sample. A revision mostly concerns the noise of past
-//! samples, which the newest sample does not have; carried at once, the revision would add that noise to the newest
-//! rate.
+//! carries no revision: an estimate mostly concerns the noise of past samples, which the newest sample does not have.
+//! Both carry the angle that standstill has held at zero in the second before it was seen to end.
 //!
 //! A window of 0.1 s cannot observe a constant error, and one that a model has learnt is wrong on another vehicle.
 //! The slow mean of the network's corrections is therefore subtracted from them: standstill finds the bias, gravity the
@@ -27,10 +26,11 @@
 //! | the first window is not full yet | gyro less bias | no rate during the lag, then gyro less bias |
 //! | after a gap, clipping, a late or implausible estimate | gyro less bias | the best estimate of each sample, gyro less bias where it has none |
 //! | clipped sample | gyro less bias, marked; nothing is carried into it | the same |
-//! | wheels prove that the vehicle stands | unchanged | zero |
+//! | wheels prove that the vehicle stands | zero | zero |
 //!
 //! The lag counts samples, not time: a gap delays earlier samples and drops none.
 
+mod carried;
 mod slow_mean;
 mod stride;
 
@@ -40,6 +40,7 @@ use crate::model::Estimate;
 use crate::model::window::WINDOW;
 use crate::sample::{RATE_HZ, Validity};
 use crate::units::AngularRate;
+use carried::Carried;
 use slow_mean::SlowMean;
 
 /// Configures how estimates of the gyro's error become corrected rates.
@@ -79,13 +80,8 @@ impl CompensateConfig {
     };
 }
 
-/// With each sample the live rate carries its outstanding revisions divided by this: a time constant of 80 ms.
-const LIVE_DIVISOR: i64 = 8;
 /// Revisions that need more samples than this are reported: 0.25 deg with the default bound.
 const LONG: u64 = 25;
-/// Quarters of a second at standstill whose angle may still be carried: the last second and the current quarter.
-/// Wheels show late that a vehicle pulls away, but no later than this.
-const HELD_QUARTERS: usize = 5;
 
 /// The number of samples kept: the newest one, and those before it that a window can still change.
 const KEPT: usize = Lag::MAX.samples() + 1;
@@ -109,6 +105,29 @@ impl Entry {
     fn rate(&self) -> AngularRate {
         let [.., rate] = self.rates;
         rate
+    }
+
+    fn send(
+        &self,
+        remaining: Remaining,
+        carried: &mut Carried,
+        stands: bool,
+        most: AngularRate,
+    ) -> Compensated {
+        let gyro = i64::from(self.rate().0);
+        let (rate, withheld) =
+            carried.send(gyro - self.taken(remaining), self.validity.is_good(), stands, most);
+        let [roll, pitch, _] = self.rates;
+        Compensated {
+            tick: self.tick,
+            rate,
+            correction: code(gyro - i64::from(rate.0)),
+            covered: self.count > 0,
+            roll_and_pitch: [roll, pitch],
+            estimate: AngularRate(self.estimate),
+            withheld,
+            validity: self.validity,
+        }
     }
 
     /// Returns what is subtracted from the yaw rate: the estimate, the bias, and the gain's share of the rest.
@@ -195,14 +214,9 @@ pub struct Compensator {
     /// The newest sample last.
     kept: [Option<Entry>; KEPT],
     slow_mean: SlowMean,
-    /// Revisions not yet in the live rate, and in the delayed rate.
-    live_revisions: i64,
-    delayed_revisions: i64,
-    /// Gyro less estimate and bias of the samples that standstill set to zero, summed over the current quarter of a
-    /// second and those before it.
-    held: [i64; HELD_QUARTERS],
-    /// Samples until the next quarter begins.
-    held_until: u32,
+    /// Of the live rates, which no window revises, and of the delayed rates.
+    live: Carried,
+    delayed: Carried,
 }
 
 impl Compensator {
@@ -212,10 +226,8 @@ impl Compensator {
             config,
             kept: [None; KEPT],
             slow_mean: SlowMean::NONE,
-            live_revisions: 0,
-            delayed_revisions: 0,
-            held: [0; HELD_QUARTERS],
-            held_until: 0,
+            live: Carried::NONE,
+            delayed: Carried::NONE,
         }
     }
 
@@ -244,12 +256,9 @@ impl Compensator {
             let estimate = entry.sum.checked_div(i64::from(entry.count)).unwrap_or(0);
             let revision = estimate - i64::from(entry.estimate);
             entry.estimate = estimate as i32;
-            self.live_revisions += revision;
             let age = KEPT - 1 - (oldest + place);
-            match (age >= lag.samples(), entry.held) {
-                (true, false) => self.delayed_revisions += revision,
-                (true, true) => self.held[0] -= revision,
-                (false, _) => {}
+            if age >= lag.samples() {
+                self.delayed.revise(revision, entry.held);
             }
         }
         Ok(())
@@ -268,14 +277,10 @@ impl Compensator {
         newest.filter(|entry| entry.validity.is_good()).for_each(|entry| entry.validity = Validity::Stuck);
     }
 
-    /// Returns the rate of the newest sample, less the estimate and what remains.
-    ///
-    /// Revisions are not carried into a clipped rate, because a receiver drops it.
-    pub fn live(&mut self, remaining: Remaining) -> Option<Compensated> {
+    /// Returns the rate of the newest sample, less what remains; zero while the vehicle stands. Call it once for each sample.
+    pub fn live(&mut self, remaining: Remaining, stands: bool) -> Option<Compensated> {
         let entry = self.kept[KEPT - 1]?;
-        let taken = entry.taken(remaining);
-        let carried = self.live_revisions / LIVE_DIVISOR;
-        Some(emit(&entry, taken, carried, &mut self.live_revisions, self.config.max_revision))
+        Some(entry.send(remaining, &mut self.live, stands, self.config.max_revision))
     }
 
     /// Returns the rate of the sample [`CompensateConfig::lag`] before the newest one; `None` before there is one.
@@ -285,22 +290,7 @@ impl Compensator {
     pub fn delayed(&mut self, remaining: Remaining, stands: bool) -> Option<Compensated> {
         let entry = self.kept.iter_mut().nth_back(self.config.lag.samples())?.as_mut()?;
         entry.held = stands && entry.validity.is_good();
-        let mut taken = entry.taken(remaining);
-        let mut withheld = None;
-        if entry.held {
-            if self.held_until == 0 {
-                self.held.rotate_right(1);
-                (self.held[0], self.held_until) = (0, RATE_HZ / 4);
-            }
-            self.held_until -= 1;
-            let left = i64::from(entry.rate().0) - taken;
-            self.held[0] += left;
-            withheld = Some(code(left));
-            taken = i64::from(entry.rate().0);
-        }
-        let carried = self.delayed_revisions;
-        let sent = emit(entry, taken, carried, &mut self.delayed_revisions, self.config.max_revision);
-        Some(Compensated { withheld, ..sent })
+        Some(entry.send(remaining, &mut self.delayed, stands, self.config.max_revision))
     }
 
     /// Returns the newest sample that no window changes any more; each sample is returned once.
@@ -315,68 +305,33 @@ impl Compensator {
         })
     }
 
-    /// Notes that the vehicle no longer stands. It may have moved before that was detected, so the angle held at zero
-    /// in the last second is carried into the next rates; older angles stay zero.
+    /// Notes that the vehicle no longer stands.
     pub fn end_standstill(&mut self) {
-        self.delayed_revisions -= core::mem::take(&mut self.held).iter().sum::<i64>();
-        self.held_until = 0;
+        self.live.end_standstill();
+        self.delayed.end_standstill();
     }
 
     /// Returns whether the delayed rates have more to carry than a window revises, because the wheels stood while
     /// the vehicle turned. The rates are wrong until all of it is carried.
     pub fn revisions_exceed_limit(&self) -> bool {
         let much = LONG * u64::from(self.config.max_revision.0.unsigned_abs());
-        self.delayed_revisions.unsigned_abs() > much
+        self.delayed.waiting().unsigned_abs() > much
     }
 
     /// Returns how much of the revisions the delayed rates carry in the next second, rad.
     pub fn carried_in_a_second(&self) -> f32 {
         let most = i64::from(RATE_HZ) * i64::from(self.config.max_revision.0).max(0);
-        let carried = self.delayed_revisions.unsigned_abs().min(most.unsigned_abs());
+        let carried = self.delayed.waiting().unsigned_abs().min(most.unsigned_abs());
         carried as f32 / (AngularRate::PER_RAD_PER_SEC * RATE_HZ as f32)
     }
 
-    /// Returns the amount that the sum of the live rates still lacks, codes x samples: revisions that are not carried
-    /// yet.
-    pub fn live_pending(&self) -> i64 {
-        -self.live_revisions
-    }
-
-    /// Returns the amount that the sum of the delayed rates still lacks: revisions that are not carried yet, and
-    /// samples whose rates are not sent yet.
-    pub fn delayed_pending(&self, remaining: Remaining) -> i64 {
+    /// Returns the amount that the sum of the delayed rates still lacks, codes x samples: revisions that are not carried
+    /// yet, and samples whose rates are not sent yet.
+    pub fn pending(&self, remaining: Remaining) -> i64 {
         let waiting = self.kept.iter().rev().take(self.config.lag.samples()).flatten();
         let waiting = waiting.filter(|entry| entry.validity.is_good());
         let best = |entry: &Entry| i64::from(entry.rate().0) - entry.taken(remaining);
-        waiting.map(best).sum::<i64>() - self.delayed_revisions
-    }
-}
-
-/// Subtracts the estimate and, within the bound, `carried` of the revisions that wait. A part that does not fit the
-/// code goes on waiting.
-fn emit(
-    entry: &Entry,
-    taken: i64,
-    carried: i64,
-    waiting: &mut i64,
-    max_revision: AngularRate,
-) -> Compensated {
-    // A negative bound would disable the limit.
-    let bound = if entry.validity.is_good() { i64::from(max_revision.0).max(0) } else { 0 };
-    let carried = carried.clamp(-bound, bound);
-    let wanted = i64::from(entry.rate().0) - taken - carried;
-    let rate = code(wanted);
-    *waiting += i64::from(rate.0) - wanted - carried;
-    let [roll, pitch, _] = entry.rates;
-    Compensated {
-        tick: entry.tick,
-        rate,
-        correction: code(i64::from(entry.rate().0) - i64::from(rate.0)),
-        covered: entry.count > 0,
-        roll_and_pitch: [roll, pitch],
-        estimate: AngularRate(entry.estimate),
-        withheld: None,
-        validity: entry.validity,
+        waiting.map(best).sum::<i64>() - self.delayed.waiting()
     }
 }
 

@@ -81,17 +81,6 @@ pub struct Output {
     pub vertical: Option<Vertical>,
 }
 
-/// Holds the corrections that [`crate::estimate::YawEstimate::yaw`] does not contain yet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Pending {
-    /// Missing from the live yaw: revisions that have not been carried over yet.
-    pub live: Yaw,
-    /// Missing from the delayed yaw: revisions that have not been carried over yet, and the samples whose rates
-    /// are not sent yet.
-    pub delayed: Yaw,
-}
-
 /// Turns the samples of one vehicle's sensor into corrected rates.
 #[derive(Debug, Clone)]
 pub struct Pipeline {
@@ -317,13 +306,10 @@ impl Pipeline {
         &self.state.counters
     }
 
-    /// Returns the corrections that the summed rates do not contain yet.
+    /// Returns what the delayed yaw lacks: revisions that are not carried yet, and the samples whose rates are not sent yet.
     #[must_use]
-    pub fn pending(&self) -> Pending {
-        Pending {
-            live: Yaw(self.state.compensator.live_pending()),
-            delayed: Yaw(self.state.compensator.delayed_pending(self.remaining())),
-        }
+    pub fn pending(&self) -> Yaw {
+        Yaw(self.state.compensator.pending(self.remaining()))
     }
 
     /// Returns the gyro's static bias beyond the bias curve, once known.
@@ -453,7 +439,7 @@ impl Pipeline {
         self.claim_again(sample, rates, standing, drives);
         let remaining = self.remaining();
         let stands = self.state.stood as usize > self.config.compensate.lag.samples();
-        let live = self.state.compensator.live(remaining);
+        let live = self.state.compensator.live(remaining, self.state.stood > 0);
         let delayed = self.state.compensator.delayed(remaining, stands);
         Rates { live, delayed, complete, early_sigma: None }
     }

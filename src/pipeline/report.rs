@@ -24,7 +24,8 @@ impl Pipeline {
         let faults = self.faults(wheels, board);
         let accepted = self.state.windows.is_accepted();
         let early = rates.early_sigma;
-        let mut live = self.estimate(frame, rates.live, early, board, |_| accepted);
+        // No window corrects it.
+        let mut live = self.estimate(frame, rates.live, early, board, (false, accepted));
         let is_calibrated = self.is_calibrated();
         self.state.uncertainty.calibrated(is_calibrated);
         if let Some((_, sigma)) = self.gain_by_course() {
@@ -32,8 +33,9 @@ impl Pipeline {
         }
         let (variance, is_levelled) = self.tilt_variance();
         self.state.uncertainty.tilt(variance, is_levelled);
-        let covered = |rate: &Compensated| rate.covered || accepted;
-        let mut delayed = self.estimate(frame, rates.delayed, early, board, covered);
+        let covered = accepted || rates.delayed.as_ref().is_some_and(|rate| rate.covered);
+        let has_model = self.config.compensate.model;
+        let mut delayed = self.estimate(frame, rates.delayed, early, board, (has_model, covered));
         for estimate in [&mut live, &mut delayed] {
             estimate.faults = estimate.faults.with(faults);
             if estimate.quality == Quality::Good && (self.state.moved || !self.is_bias_confirmed()) {
@@ -126,7 +128,7 @@ impl Pipeline {
     /// Returns what a delayed rate contributes to the expected error; before there is one, the reading itself.
     fn turning(&self, frame: &Frame, rates: &Rates, status: Status, shift: f32) -> Turning {
         let (rate, bias) = (rates.delayed.as_ref(), self.bias_sigma(rates.early_sigma, shift));
-        let origin = self.origin(status, rate);
+        let origin = origin(status, rate, self.config.compensate.model);
         let Some(Compensated { rate, roll_and_pitch: [roll, pitch], estimate, withheld, .. }) = rate else {
             let (rates, none) = (frame.sample.angular_rate, AngularRate::ZERO);
             return Turning { rates, estimate: none, withheld: none, origin, bias };
@@ -139,26 +141,25 @@ impl Pipeline {
     }
 
     /// Builds the estimate of one rate, without its yaw and with the fault of its own sample alone. Until a rate exists
-    /// the estimate carries the gyro's own reading, with the sigma of the bias curve where there is one.
+    /// the estimate carries the gyro's own reading, with the sigma of the bias curve where there is one. `has_model` is true
+    /// for a rate that windows correct, and `is_ready` once they do.
     fn estimate(
         &self,
         frame: &Frame,
         rate: Option<Compensated>,
         early_sigma: Option<f32>,
         board: &BoardState,
-        estimated: impl Fn(&Compensated) -> bool,
+        (has_model, is_ready): (bool, bool),
     ) -> YawEstimate {
-        let estimated = rate.as_ref().is_some_and(estimated);
         let validity = rate.map_or(frame.sample.validity, |rate| rate.validity);
         let status = match validity {
             Validity::Stuck => Status::Stuck,
             Validity::Saturated | Validity::Recovering | Validity::Implausible => Status::Clipped,
             Validity::Good if rate.is_none() && early_sigma.is_none() => Status::Init,
-            Validity::Good if estimated => Status::Ready,
+            Validity::Good if rate.is_some() && is_ready => Status::Ready,
             Validity::Good => Status::Degraded,
         };
         let (source, quality) = judge(status);
-        let has_model = self.config.compensate.model;
         let source = if source == Source::Model && !has_model { Source::Static } else { source };
         let quality =
             if self.is_bias_coarse() && quality == Quality::Good { Quality::Degraded } else { quality };
@@ -171,7 +172,8 @@ impl Pipeline {
             rate: rate.map_or(raw, |rate| rate.rate),
             correction: rate.map_or(AngularRate::ZERO, |rate| rate.correction),
             yaw: Yaw(0),
-            sigma: has_sigma.then(|| self.state.uncertainty.sigma(self.origin(status, rate.as_ref()), bias)),
+            sigma: has_sigma
+                .then(|| self.state.uncertainty.sigma(origin(status, rate.as_ref(), has_model), bias)),
             status,
             source,
             quality: board.faults.cap_quality(quality),
@@ -180,13 +182,13 @@ impl Pipeline {
             latency_us: Some(frame.tick.wrapping_sub(tick).saturating_mul(PERIOD_US as u32)),
         }
     }
+}
 
-    /// Returns how a usable rate was found; without the model's corrections it is the gyro's.
-    fn origin(&self, status: Status, rate: Option<&Compensated>) -> Origin {
-        match (rate.and_then(|rate| rate.withheld), status) {
-            (Some(_), _) => Origin::Standstill,
-            (None, Status::Ready) if self.config.compensate.model => Origin::Network,
-            (None, _) => Origin::Gyro,
-        }
+/// Returns how a usable rate was found; without the model's corrections it is the gyro's.
+fn origin(status: Status, rate: Option<&Compensated>, has_model: bool) -> Origin {
+    match (rate.and_then(|rate| rate.withheld), status) {
+        (Some(_), _) => Origin::Standstill,
+        (None, Status::Ready) if has_model => Origin::Network,
+        (None, _) => Origin::Gyro,
     }
 }

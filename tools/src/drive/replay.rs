@@ -112,7 +112,7 @@ impl Replay {
             .gyro_bias()
             .ok_or_else(|| ReplayError::NeverInitialised { path: recording.path.clone() })?;
         let start = steps.iter().position(|step| step.is_initialised).unwrap_or(steps.len());
-        let (pending, counters) = (pipeline.pending().delayed, *pipeline.counters());
+        let (pending, counters) = (pipeline.pending(), *pipeline.counters());
         Ok(Self { steps, start, gyro_bias, pending, counters })
     }
 

@@ -39,7 +39,6 @@ impl Cost {
             Method::LINEAR => (windows(LINEAR), complete),
             Method::GYRONET_F32 => (windows(shapes.paper?[0]), complete),
             Method::GYRONET_INT => (windows(shapes.paper?[1]), complete),
-            Method::LIVE => (windows(shapes.sent), 0),
             Method::DELAYED => (windows(shapes.sent), lag.samples()),
             // The other methods only subtract a bias from the gyro.
             _ => (0.0, 0),
