@@ -55,6 +55,9 @@ const BOARDING: f32 = 1e-3;
 /// Samples for which a standstill that the gyro has contradicted is not believed: a slide may turn now and then.
 const DISTRUSTED: u32 = 10 * RATE_HZ;
 
+/// Samples of a turn where the vehicle has stood without wheels that contradict the bias: no vehicle pulls away so slowly.
+const LASTING: u32 = 5 * RATE_HZ / 2;
+
 /// Says how a whole second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -99,6 +102,8 @@ pub struct ZeroRate {
     turned: Turned,
     /// The rate of [`ZeroRate::turns`], rad/s.
     turning: f32,
+    /// The sum of the rates while it lasts, rad/s, and their number.
+    lasting: (f32, u32),
     /// The vehicle has stood without wheels, and not driven off since: it cannot turn.
     is_parked: bool,
     since_walk: u32,
@@ -140,6 +145,7 @@ impl ZeroRate {
             claim: None,
             turned: Turned::NONE,
             turning: 0.0,
+            lasting: (0.0, 0),
             is_parked: false,
             since_walk: 0,
             thermal: 0.0,
@@ -218,14 +224,17 @@ impl ZeroRate {
             self.turned = Turned::NONE;
             return false;
         }
-        self.turned.add(rate.0.saturating_sub(self.bias().0));
+        let off = rate.0.saturating_sub(self.bias().0);
+        self.turned.add(off);
+        let now = off as f32 / AngularRate::PER_RAD_PER_SEC;
         self.turning = self.turns();
+        let (sum, samples) = self.lasting;
+        self.lasting = if self.turning > 0.0 { (sum + now, samples + 1) } else { (0.0, 0) };
         let turned = self.turned.angle();
         if !self.standing.is_by_wheels() || libm::fabsf(turned) <= self.turn_gate() {
             return false;
         }
         self.turned = Turned::NONE;
-        let now = rate.0.saturating_sub(self.bias().0) as f32 / AngularRate::PER_RAD_PER_SEC;
         self.against = self.against.max(libm::fabsf(turned)).max(libm::fabsf(now));
         if core::mem::replace(&mut self.refused, true) {
             return false;
@@ -277,6 +286,10 @@ impl ZeroRate {
 
     /// Notes that the vehicle moves: what it has just stood on did not turn, so its newest reading there is the bias.
     pub fn moves(&mut self) {
+        let (sum, samples) = core::mem::take(&mut self.lasting);
+        if samples > LASTING {
+            self.doubt.add(self.filter.get::<BIAS>() + sum / samples as f32, true);
+        }
         (self.turning, self.is_parked) = (0.0, false);
         let Some((mean, initial)) = self.claim.as_mut().and_then(Claim::moves) else { return };
         self.claim = None;

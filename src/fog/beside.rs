@@ -3,10 +3,9 @@
 //! | difference | effect |
 //! |---|---|
 //! | the rate of a step, by more than [`LIMIT`] (late increments add up in one step) | the step is not used; after two seconds of such steps they are used and degraded |
-//! | the mean rate of the last second, or of its end, by more than [`GATE`] of the inertial gyro's expected errors | the difference is part of sigma; if it exceeds the largest sigma of the bus, the rate is degraded |
+//! | the mean rate of the last second, by more than [`GATE`] of the inertial gyro's expected errors | the difference is part of sigma; if it exceeds the largest sigma of the bus, the rate is degraded |
 //! | the gain in turns, by more than the inertial gyro's own gain error | the difference is a share of the rate in sigma, and of the roll and pitch rates, because a misaligned axis reads too little |
 
-use crate::pipeline::Swing;
 use crate::sample::{PERIOD_US, RATE_HZ};
 use crate::sqrt::sqrt;
 use crate::units::Micros;
@@ -20,10 +19,11 @@ const GATE: f32 = 3.0;
 /// Largest expected error on the bus, rad/s: 0.655 deg/s.
 const LARGEST_SIGMA: f32 = 0.0114;
 /// Shares of the rate, 1 sigma: of a unit's gain (200 ppm, DSP-1760) with the mounting; of the slope of a street where
-/// no inertial sensor shows it; and beside an inertial gyro until both have been compared in turns.
+/// no inertial sensor shows it; and beside an inertial gyro until both have been compared in turns: of a mount that has
+/// been turned by 11 degrees since the last drive.
 const UNIT_SHARE: f32 = 0.0002;
 const STREET_SHARE: f32 = 0.00046;
-const UNKNOWN_SHARE: f32 = 0.01;
+const UNKNOWN_SHARE: f32 = 0.02;
 /// Gain of an inertial gyro, 1 sigma: the difference that says nothing about the other one.
 const INERTIAL_GAIN: f32 = 0.003;
 /// Share of the roll and pitch rates, rad: a mount of 0.2 deg.
@@ -31,8 +31,6 @@ const MOUNT: f32 = 0.003;
 /// Steps of a block, and blocks of a second.
 const BLOCK: u32 = 10;
 const BLOCKS: usize = (RATE_HZ / BLOCK) as usize;
-/// Blocks of the second's end.
-const QUICK: usize = 3;
 
 /// The rates and errors of the inertial sensor, with which the fibre-optic gyro is compared.
 #[derive(Debug, Clone, Copy)]
@@ -71,19 +69,12 @@ pub(super) struct Comparison {
     /// Sums of the differences, rad/s, and their numbers: the newest block first.
     blocks: [(f32, u32); BLOCKS],
     steps: u32,
-    /// The angle between both that turns to and fro.
-    swing: Swing,
 }
 
 impl Comparison {
     /// The state before the first step.
-    pub const START: Self = Self {
-        beside: Beside::NOTHING,
-        rejected: 0,
-        blocks: [(0.0, 0); BLOCKS],
-        steps: 0,
-        swing: Swing::over(4.0),
-    };
+    pub const START: Self =
+        Self { beside: Beside::NOTHING, rejected: 0, blocks: [(0.0, 0); BLOCKS], steps: 0 };
 
     pub fn take(&mut self, beside: Beside) {
         self.beside = beside;
@@ -104,7 +95,6 @@ impl Comparison {
         let off = own - rate;
         let [(sum, number), ..] = &mut self.blocks;
         (*sum, *number) = (*sum + off, *number + 1);
-        self.swing.add(off / RATE_HZ as f32);
         let (always, share) = LIMIT;
         let differs = libm::fabsf(off) > always + share * libm::fabsf(rate);
         self.rejected = if differs { self.rejected.saturating_add(1) } else { 0 };
@@ -130,18 +120,8 @@ impl Comparison {
         let askew = if self.beside.scale.is_some() { sqrt(2.0 * gain) } else { 0.0 };
         let street = if self.beside.rate.is_some() { tilted } else { STREET_SHARE };
         let share = sqrt(UNIT_SHARE * UNIT_SHARE + gain * gain + street * street) + clock;
-        let off = self.off().max(self.ends_off());
-        let (grows, leans) = (share * rate, (MOUNT + askew) * leaning);
+        let (grows, leans, off) = (share * rate, (MOUNT + askew) * leaning, self.off());
         sqrt(grows * grows + leans * leans + off * off)
-    }
-
-    /// Returns the difference of the end of the last second beyond what swings, rad/s; 0 within what the inertial gyro
-    /// explains. The mean of a second shows the begin of a turn late.
-    fn ends_off(&self) -> f32 {
-        let (sum, number) =
-            self.blocks.iter().take(QUICK).fold((0.0, 0), |all, one| (all.0 + one.0, all.1 + one.1));
-        let off = (libm::fabsf(sum) - self.swing.angle() * RATE_HZ as f32) / number.max(2 * BLOCK) as f32;
-        if off > GATE * self.beside.sigma { off } else { 0.0 }
     }
 
     /// Returns the difference of the last second, rad/s; 0 within what the inertial gyro explains.
@@ -188,12 +168,6 @@ mod tests {
         second(&mut comparison, 0.5, 0.53);
         let off = comparison.sigma(0.0, 0.0);
         assert!((off - 0.03).abs() < 1e-4, "{off}");
-        // A turn that begins shows at once: its mean over a second is a fifth of it.
-        second(&mut comparison, 0.0, 0.0);
-        comparison.take(Beside { rate: Some((Micros(0), 0.5)), sigma: SIGMA, ..comparison.beside });
-        (0..20).for_each(|_| _ = comparison.differs(0.7, Micros(0)));
-        let off = comparison.sigma(0.0, 0.0);
-        assert!(off > 0.1, "{off}");
     }
 
     #[test]
@@ -202,6 +176,9 @@ mod tests {
             let beside = Beside { scale: Some(scale), leaning, ..Beside::NOTHING };
             Comparison { beside, ..Comparison::START }.sigma(if leaning > 0.0 { 0.0 } else { 0.5 }, 0.0)
         };
+        let beside = Beside { rate: Some((Micros(0), 0.5)), ..Beside::NOTHING };
+        let alone = Comparison { beside, ..Comparison::START }.sigma(0.5, 0.0);
+        assert!((alone / 0.01 - 1.0).abs() < 0.01, "not compared yet, perhaps turned in its mount: {alone}");
         let usual = with(INERTIAL_GAIN, 0.0);
         let own = sqrt(UNIT_SHARE * UNIT_SHARE + STREET_SHARE * STREET_SHARE);
         assert!(usual < 1.01 * own * 0.5, "the inertial one's own: {usual}");

@@ -343,10 +343,13 @@ fn a_turn_since_a_standstill_without_wheels_is_expected_until_the_vehicle_drives
     assert!(pass(&mut zero_rate, 0.01, Standing::UNKNOWN, 90) > 5e-3, "the judge was not sure when it began");
     assert!(pass(&mut zero_rate, 0.01, quiet, 90) > 5e-3);
     assert!(pass(&mut zero_rate, 0.01, Standing::UNKNOWN, 5 * RATE_HZ) > 5e-3);
-    let mut driven = zero_rate.clone();
-    driven.moves();
-    assert!(pass(&mut driven, 0.01, Standing::UNKNOWN, 100) < 3e-4);
-    assert!(pass(&mut zero_rate, 0.0, Standing::UNKNOWN, 100) < 3e-4, "it has ended");
+    let mut ended = zero_rate.clone();
+    assert!(pass(&mut ended, 0.0, Standing::UNKNOWN, 100) < 3e-4, "it has ended");
+    pass(&mut ended, 0.01, Standing::UNKNOWN, 200);
+    ended.moves();
+    assert!(pass(&mut ended, 0.01, Standing::UNKNOWN, 100) < 3e-4, "it pulled away in a turn");
+    zero_rate.moves();
+    assert!(pass(&mut zero_rate, 0.0, Standing::UNKNOWN, 1_000) > 5e-3, "nothing pulls away so slowly");
 }
 
 /// The reading at rest before a vehicle drives off is its bias. Neither a saturated reading nor creeping, in which the wheels

@@ -19,6 +19,31 @@ fn no_situation_is_wrong_and_good() {
     });
 }
 
+/// Situations, vehicles and seeds that were good and off by more than four sigma.
+const CURED: &[(&str, &str, u64)] = &[
+    ("shuttle train", "truck", 2),
+    ("start on a steep slope", "hatch", 3),
+    ("car wash with a conveyor", "truck", 2),
+    ("reversing", "bare", 1),
+    ("bias steps after a knock", "utv", 1),
+    ("bias steps after a knock", "van", 1),
+    ("sensor moved between two drives", "van", 2),
+    ("bits flip on the line", "truck", 2),
+    ("wheel frames frozen at zero on a motorway", "truck", 2),
+];
+
+#[test]
+fn what_was_wrong_and_good_is_not_again() {
+    parallel::table(HEADING, CURED, |(name, vehicle, seed)| {
+        let situation = list::all().find(|one| one.name == *name).expect("a situation of the list");
+        let vehicle =
+            situation.vehicles.iter().find(|one| one.name == *vehicle).expect("one of its vehicles");
+        let outcome = situation.run(vehicle, *seed);
+        let failed = outcome.broken().into_iter().map(|(_, text)| format!("{name}: {text}"));
+        (line(name, vehicle.name, &outcome), failed.collect())
+    });
+}
+
 #[test]
 fn a_recording_is_judged_by_its_reference() {
     let folder = folder();
