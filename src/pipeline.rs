@@ -288,10 +288,10 @@ impl Pipeline {
     }
 
     /// Returns the share of its rate by which a gyro about the vehicle's vertical axis misses the present turn, because it is
-    /// on a slope or banked.
+    /// on a slope or banked, or may be.
     #[must_use]
     pub fn tilted(&self) -> f32 {
-        self.state.uncertainty.tilted().max(self.state.uncertainty.tilted_now())
+        self.state.uncertainty.tilted().max(self.state.uncertainty.tilted_now()).max(self.ramp())
     }
 
     /// Returns the mean roll and pitch rate of the last second, both together, rad/s.

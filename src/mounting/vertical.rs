@@ -266,6 +266,11 @@ impl VerticalEstimator {
         &self.known
     }
 
+    /// Returns whether the tilt may be that of the one ramp that it was shown on.
+    pub const fn is_one_place(&self) -> bool {
+        self.is_one_place
+    }
+
     /// Judges what the tilt is.
     pub fn judge(&mut self) -> Judgement {
         let now = self.now();

@@ -134,6 +134,14 @@ impl Pipeline {
         is_new.then(|| known.turned(&mounting.inverse()))
     }
 
+    /// Returns the share of a turn that a gyro beside this one, which is not levelled, misses if a tilt in use is a ramp's.
+    pub(super) fn ramp(&self) -> f32 {
+        let level = self.state.initialised.as_ref().map(|known| &known.level);
+        let is_one_place =
+            |level: &&Level| level.estimator.as_ref().is_some_and(VerticalEstimator::is_one_place);
+        level.filter(is_one_place).map_or(0.0, |level| 1.0 - level.up[2])
+    }
+
     /// Returns the variance of the direction of the axis in use, rad^2, and whether a tilt is taken off.
     pub(super) fn tilt_variance(&self) -> (f32, bool) {
         let known = self.state.initialised.as_ref();

@@ -5,9 +5,10 @@ use gyronet::bias::STATIC_SAMPLES;
 use gyronet::estimate::Missed;
 use gyronet::pipeline::{BoardState, Pipeline, PipelineConfig};
 use gyronet::pipeline::{GyroErrors, Origin, Turning, Uncertainty, UncertaintyConfig};
+use gyronet::sample::ImuSample;
 use gyronet::units::AngularRate;
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::synthetic::{idling, rate};
+use gyronet_host_tests::synthetic::{force, idling, rate};
 
 /// One part in a million, and the code that rounding up adds: f32's own error.
 fn assert_sigma(found: AngularRate, rad_per_sec: f64, why: &str) {
@@ -176,6 +177,20 @@ fn a_turn_on_a_bank_is_as_uncertain_as_what_its_axis_misses() {
         let tilted = f64::from(uncertainty.tilted());
         assert!((tilted - 0.02).abs() < 1e-5, "{tilted}: 1 - cos of 0.2 rad");
     }
+}
+
+/// A gyro beside this one is not levelled: on what may be a ramp it misses a share of a turn.
+#[test]
+fn a_tilt_that_one_standstill_has_shown_may_be_a_ramp_to_a_gyro_beside() {
+    let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
+    let mut noise = Noise::new(1);
+    for tick in 0..u64::from(STATIC_SAMPLES) + 5 {
+        let specific_force = [2.04, 0.0, 9.59].map(force);
+        let sample = ImuSample { specific_force, ..idling(tick, 0.001, &mut noise) };
+        pipeline.correct(sample, None, &BoardState::GOOD).expect("in time");
+    }
+    let missed = pipeline.tilted();
+    assert!((0.016..0.022).contains(&missed), "1 - cos of 11 degrees: {missed}");
 }
 
 /// The angles that many gaps leave out of one turn add up.

@@ -28,6 +28,8 @@ const CURED: &[(&str, &str, u64)] = &[
     ("bias steps after a knock", "utv", 1),
     ("bias steps after a knock", "van", 1),
     ("sensor moved between two drives", "van", 2),
+    ("serpentines of 15 %", "van", 5),
+    ("parking garage spiral", "van", 5),
     ("bits flip on the line", "truck", 2),
     ("wheel frames frozen at zero on a motorway", "truck", 2),
 ];
