@@ -1,12 +1,10 @@
 """python -m gyronet_train.lwoi --train DIR ... --test DIR ... --out FOLDER: the rival lwoi, from the paper's equations.
 
-Brossard and Bonnabel, Learning wheel odometry and IMU errors for localization, 2019: Gaussian
-processes predict the error of each second of wheel and fibre-optic odometry and of the inertial
-sensor, and a Kalman filter uses both. The program trains both processes on the training sequences, in
-the layout of KAIST Urban. It writes the trajectories of the test sequences in TUM format to
-FOLDER/odometry, FOLDER/constant, FOLDER/model and FOLDER/filter (see lwoi_run.py), and all numbers to
-FOLDER/lwoi.json. A test sequence that cannot be read, or on which the filter diverges, is reported and
-left out.
+Brossard and Bonnabel, Learning wheel odometry and IMU errors for localization, 2019: a Gaussian process
+predicts the error of each second of wheel and fibre-optic odometry. The program trains it on the training
+sequences, in the layout of KAIST Urban. It writes the trajectories of the test sequences in TUM format to
+FOLDER/odometry, FOLDER/constant and FOLDER/model (see lwoi_run.py), and all numbers to FOLDER/lwoi.json. A
+test sequence that cannot be read is reported and left out.
 """
 
 from __future__ import annotations
@@ -22,14 +20,12 @@ import gpytorch
 import numpy as np
 import torch
 
-from .lwoi_motion import inertial_errors, odometry_errors
-from .lwoi_process import Settings, Trained, inertial_features, odometry_features, train
+from .lwoi_motion import odometry_errors
+from .lwoi_process import Settings, Trained, train
 from .lwoi_run import MODES, Expected, run
 from .results import mean_numbers, run_mode, test_all
 from .sequence import STEPS, Sequence, SequenceError, load_pieces
 from .trajectory import Track, trajectory_error
-
-JITTER = {"odometry": 1e-3, "inertial": 1e-4}
 
 
 def arguments() -> argparse.Namespace:
@@ -45,29 +41,18 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def fit(what: str, drives: list[Sequence], args: argparse.Namespace) -> Trained:
-    """Trains the process for the errors of the odometry or of the inertial sensor."""
-    errors_of, features = {
-        "odometry": (odometry_errors, odometry_features),
-        "inertial": (inertial_errors, inertial_features),
-    }[what]
-    windows = np.concatenate([getattr(drive, what) for drive in drives])[:: args.every]
-    errors = np.concatenate([errors_of(drive) for drive in drives])[:: args.every]
-    settings = Settings(args.steps, args.rate, JITTER[what], args.seed)
+def fit(drives: list[Sequence], errors: np.ndarray, args: argparse.Namespace) -> Trained:
+    """Trains the process."""
+    windows = np.concatenate([drive.odometry for drive in drives])[:: args.every]
+    settings = Settings(args.steps, args.rate, seed=args.seed)
 
     def report(step: int, loss: float) -> None:
         if step % max(1, args.steps // 5) == 0:
-            print(f"{what} step {step}/{args.steps}: loss {loss:.4f}", flush=True)
+            print(f"step {step}/{args.steps}: loss {loss:.4f}", flush=True)
 
-    trained = train(windows, errors, features, settings, report)
-    print(f"{what}: {len(windows)} windows, seed {args.seed}, {trained.seconds:.0f} s", flush=True)
+    trained = train(windows, errors[:: args.every], settings, report)
+    print(f"{len(windows)} windows, seed {args.seed}, {trained.seconds:.0f} s", flush=True)
     return trained
-
-
-def speed_variance(drives: list[Sequence]) -> float:
-    """Returns the mean squared error of the wheels' speed at the edges, m^2/s^2."""
-    off = [drive.edge_speed - np.linalg.norm(drive.edge_velocity, axis=1) for drive in drives]
-    return float((np.concatenate(off) ** 2).mean())
 
 
 def remaining(errors: np.ndarray, expected: np.ndarray) -> list[float]:
@@ -77,18 +62,15 @@ def remaining(errors: np.ndarray, expected: np.ndarray) -> list[float]:
 
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """The result of a training: the processes, the variance of the wheels' speed, and mean and mean square of the
-    odometry's errors."""
+    """The result of a training: the process, and mean and mean square of the errors."""
 
-    processes: dict[str, Trained]
-    speed_variance: float
+    process: Trained
     constant: np.ndarray
     mean_square: np.ndarray
 
     def expect(self, drive: Sequence) -> Expected:
         """Predicts the errors of a drive."""
-        errors = [process.predict(getattr(drive, what)) for what, process in self.processes.items()]
-        return Expected(self.constant, self.mean_square, *errors, self.speed_variance)
+        return Expected(self.constant, self.mean_square, self.process.predict(drive.odometry))
 
 
 def test(drive: Sequence, model: Model, out: Path) -> dict:
@@ -98,7 +80,6 @@ def test(drive: Sequence, model: Model, out: Path) -> dict:
     numbers: dict = {
         "sha256": drive.sha256,
         "remaining_odometry": remaining(odometry_errors(drive), expected.odometry.mean),
-        "remaining_inertial": remaining(inertial_errors(drive), expected.inertial.mean),
         "predict_s": round(time.monotonic() - begin, 2),
     }
     for mode in MODES:
@@ -120,18 +101,17 @@ def main() -> None:
         drives = load_pieces(args.train)
     except SequenceError as error:
         raise SystemExit(str(error)) from error
-    processes = {what: fit(what, drives, args) for what in JITTER}
     errors = np.concatenate([odometry_errors(drive) for drive in drives])
-    model = Model(processes, speed_variance(drives), errors.mean(axis=0), (errors**2).mean(axis=0))
+    process = fit(drives, errors, args)
+    model = Model(process, errors.mean(axis=0), (errors**2).mean(axis=0))
     results = test_all(args.test, args.out, MODES, lambda drive: test(drive, model, args.out))
     means = {mode: mean_numbers(results, mode) for mode in MODES}
     report = {
         "method": "lwoi",
         "train": {drive.name: drive.sha256 for drive in drives},
-        "settings": {what: dataclasses.asdict(p.settings) for what, p in processes.items()},
+        "settings": dataclasses.asdict(process.settings),
         "every": args.every,
-        "seconds": {what: round(p.seconds, 1) for what, p in processes.items()},
-        "speed_std_m_per_s": round(model.speed_variance**0.5, 5),
+        "seconds": round(process.seconds, 1),
         "tests": results,
         "means": means,
         "torch": torch.__version__.split("+")[0],

@@ -1,9 +1,7 @@
-"""The motion in a second by odometry and by the inertial sensor, and the errors of both.
+"""The motion in a second by odometry, its errors, and a pose that moves by both.
 
-Windows are independent of each other, so each function processes all windows of a drive at once. The
-errors are what lwoi's processes learn: for odometry the twist from its pose to the true pose
-(translation first), for the inertial sensor the differences of its preintegrated rotation, velocity
-and displacement.
+Windows are independent of each other, so each function processes all windows of a drive at once. The errors
+are what lwoi's process learns: the twist from odometry's pose to the true pose, translation first.
 """
 
 from __future__ import annotations
@@ -11,10 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .motion import GRAVITY, left_jacobian
-from .sequence import DT, STEPS, Sequence
-
-WINDOW_S = STEPS * DT
+from .motion import left_jacobian, skew
+from .sequence import Sequence
 
 
 def odometry_poses(odometry: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -50,30 +46,19 @@ def odometry_errors(sequence: Sequence) -> np.ndarray:
     return np.concatenate([np.linalg.solve(left_jacobian(turn), ahead[..., None])[..., 0], turn], axis=1)
 
 
-def inertial_motion(inertial: np.ndarray) -> np.ndarray:
-    """Returns the rotation vector, velocity and displacement (N, 9) that the inertial sensor measures in each window,
-    including gravity."""
-    attitude = Rotation.identity(len(inertial))
-    velocity, way = np.zeros((2, len(inertial), 3))
-    for k in range(inertial.shape[1]):
-        force = attitude.apply(inertial[:, k, 3:])
-        way = way + velocity * DT + force * DT**2 / 2
-        velocity = velocity + force * DT
-        attitude = attitude * Rotation.from_rotvec(inertial[:, k, :3] * DT)
-    return np.concatenate([attitude.as_rotvec(), velocity, way], axis=1)
+class Pose:
+    """A pose, and the covariance (6, 6) of its error: the true attitude is Exp(turn) times the estimate, in world axes, and
+    the position is off by the rest."""
 
+    def __init__(self, attitude: Rotation, position: np.ndarray):
+        self.attitude, self.position = attitude, np.array(position, dtype=float)
+        self.covariance = np.zeros((6, 6))
 
-def true_inertial_motion(sequence: Sequence) -> np.ndarray:
-    """Returns what an ideal inertial sensor would measure along the true poses (N, 9)."""
-    attitude, position = sequence.attitude[sequence.edges], sequence.position[sequence.edges]
-    velocity = sequence.edge_velocity
-    from_begin = attitude[:-1].inv()
-    gained = np.diff(velocity, axis=0) - GRAVITY * WINDOW_S
-    moved = np.diff(position, axis=0) - velocity[:-1] * WINDOW_S - GRAVITY * WINDOW_S**2 / 2
-    turn = (from_begin * attitude[1:]).as_rotvec()
-    return np.concatenate([turn, from_begin.apply(gained), from_begin.apply(moved)], axis=1)
-
-
-def inertial_errors(sequence: Sequence) -> np.ndarray:
-    """Returns what must be added to the inertial sensor's motion in each window (N, 9)."""
-    return true_inertial_motion(sequence) - inertial_motion(sequence.inertial)
+    def move(self, rotation: Rotation, way: np.ndarray, variance: np.ndarray) -> None:
+        """Moves on by a motion whose twist at its end has this variance."""
+        moves, enters = np.eye(6), np.zeros((6, 6))
+        moves[3:, :3] = -skew(self.attitude.apply(way))
+        self.position = self.position + self.attitude.apply(way)
+        self.attitude = self.attitude * rotation
+        enters[:3, 3:] = enters[3:, :3] = self.attitude.as_matrix()
+        self.covariance = moves @ self.covariance @ moves.T + enters @ np.diag(variance) @ enters.T

@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from torch import nn
 
-FEATURES = 20
+CHANNELS, FEATURES = 3, 20
 INDUCING = 100
 START_NOISE = 0.1
 NOISE_RATE = 10.0  # learning rate of the noise over the others': in 100 steps of 0.01 it could not leave 0.04 to 0.25
@@ -31,32 +31,21 @@ class ProcessError(ValueError):
 
 
 class Features(nn.Module):
-    """Two convolutions and one linear layer, from windows (n, 100 * channels) to 20 features."""
+    """Two convolutions and one linear layer, from windows (n, 100 * 3) to 20 features."""
 
-    def __init__(self, channels: int, kernel: int, stride: int, flat: int):
+    def __init__(self):
         super().__init__()
-        self.channels = channels
         self.layers = nn.Sequential(
-            nn.Conv1d(channels, 100, kernel, stride),
+            nn.Conv1d(CHANNELS, 100, 3, 5),
             nn.ReLU(),
-            nn.Conv1d(100, 50, kernel, stride),
+            nn.Conv1d(100, 50, 3, 5),
             nn.ReLU(),
             nn.Flatten(),
-            nn.Linear(flat, FEATURES),
+            nn.Linear(200, FEATURES),
         )
 
     def forward(self, windows: torch.Tensor) -> torch.Tensor:
-        return self.layers(windows.unflatten(-1, (-1, self.channels)).transpose(-1, -2))
-
-
-def odometry_features() -> Features:
-    """Returns the feature network of the process for the odometry's errors."""
-    return Features(3, 3, 5, 200)
-
-
-def inertial_features() -> Features:
-    """Returns the feature network of the process for the inertial sensor's errors."""
-    return Features(6, 6, 4, 250)
+        return self.layers(windows.unflatten(-1, (-1, CHANNELS)).transpose(-1, -2))
 
 
 class SparseProcess(gpytorch.models.ApproximateGP):
@@ -106,7 +95,7 @@ class Trained:
 
     @torch.no_grad()
     def predict(self, windows: np.ndarray) -> Errors:
-        """Predicts the errors of windows (n, 100, channels)."""
+        """Predicts the errors of windows (n, 100, 3)."""
         inputs = standardised(windows, *self.units)
         with gpytorch.settings.variational_cholesky_jitter(self.settings.jitter):
             parts = [self.likelihood(self.model(part)) for part in inputs.split(CHUNK)]
@@ -123,11 +112,10 @@ def standardised(windows: np.ndarray, mean: np.ndarray, spread: np.ndarray) -> t
 def train(
     windows: np.ndarray,
     errors: np.ndarray,
-    features: Callable[[], Features],
     settings: Settings,
     report: Callable[[int, float], None] = lambda step, loss: None,
 ) -> Trained:
-    """Fits a process to windows (n, 100, channels) and errors (n, outputs); each step of Adam uses all windows."""
+    """Fits a process to windows (n, 100, 3) and errors (n, outputs); each step of Adam uses all windows."""
     begin = time.monotonic()
     torch.manual_seed(settings.seed)
     units = windows.mean(axis=(0, 1)), windows.std(axis=(0, 1))
@@ -137,7 +125,7 @@ def train(
     inputs, targets = standardised(windows, *units), torch.from_numpy(errors / scale).float()
     chosen = np.linspace(0, len(inputs) - 1, min(INDUCING, len(inputs))).astype(int)
     outputs = errors.shape[1]
-    model = SparseProcess(features(), inputs[chosen].clone(), outputs)
+    model = SparseProcess(Features(), inputs[chosen].clone(), outputs)
     likelihood = gpytorch.likelihoods.MultitaskGaussianLikelihood(outputs, has_global_noise=False)
     likelihood.task_noises = torch.full((outputs,), START_NOISE)
     bound = gpytorch.mlls.VariationalELBO(likelihood, model, len(inputs))

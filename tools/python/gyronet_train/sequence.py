@@ -68,21 +68,6 @@ class Sequence:
         """Returns the steps at which windows begin and end."""
         return slice(None, None, STEPS)
 
-    @property
-    def edge_speed(self) -> np.ndarray:
-        """Returns the wheels' speed at the edges, m/s, over 0.1 s around each edge, since one step has few counts."""
-        way = np.concatenate([[0.0], np.cumsum(self.odometry[:, :, :2].mean(axis=2).ravel())])
-        middle = np.arange(0, len(way), STEPS)
-        after, before = np.minimum(middle + 5, len(way) - 1), np.maximum(middle - 5, 0)
-        return (way[after] - way[before]) / ((after - before) * DT)
-
-    @property
-    def edge_velocity(self) -> np.ndarray:
-        """Returns the true velocity at the edges, m/s: the slope of a parabola through five steps (Savitzky and Golay).
-        At both ends of the drive it is that of two steps further inside."""
-        middle = np.clip(np.arange(0, len(self.position), STEPS), 2, len(self.position) - 3)
-        return sum(k * self.position[middle + k] for k in (-2, -1, 1, 2)) / (10 * DT)
-
 
 def load_sequence(folder: Path) -> Sequence:
     """Reads a folder in the KAIST Urban layout. Raises SequenceError with the reason."""

@@ -1,17 +1,11 @@
-"""A second's motion by odometry and by the inertial sensor, and their errors."""
+"""A second's motion by odometry, its errors, and the covariance of a pose that moves by it."""
 
 import unittest
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from gyronet_train.lwoi_motion import (
-    corrected,
-    inertial_errors,
-    inertial_motion,
-    odometry_errors,
-    odometry_motion,
-)
-from gyronet_train.motion import GRAVITY
+from gyronet_train.lwoi_motion import Pose, corrected, odometry_errors, odometry_motion
 
 from .made_drive import START, START_YAW, expected_end, make_drive
 
@@ -57,19 +51,27 @@ class Odometry(unittest.TestCase):
         np.testing.assert_allclose(odometry_errors(drive), np.tile([0.1, 0, 0, 0, 0, 0], (SECONDS, 1)), atol=1e-8)
 
 
-class Inertial(unittest.TestCase):
-    def test_a_constant_force_is_half_its_square_in_way(self):
-        force = np.array([1.0, -0.5, 9.8])
-        inertial = np.tile(np.concatenate([np.zeros(3), force]), (3, 100, 1))
-        motion = inertial_motion(inertial)
-        np.testing.assert_allclose(motion, np.tile([0, 0, 0, *force, *(force / 2)], (3, 1)), atol=1e-12)
+class Poses(unittest.TestCase):
+    def test_the_covariance_moves_as_errors_do(self):
+        attitude, position = Rotation.from_rotvec([0.1, -0.2, 1.5]), np.array([3.0, -7.0, 1.0])
+        rotation, way, step = Rotation.from_rotvec([0.02, -0.05, 0.3]), np.array([9.0, 1.0, 0.2]), 1e-6
 
-    def test_a_car_that_stands_measures_gravity(self):
-        drive = make_drive(np.zeros(100 * SECONDS), np.zeros(100 * SECONDS))
-        against_gravity = np.tile(-GRAVITY, (SECONDS, 1))
-        np.testing.assert_allclose(inertial_motion(drive.inertial)[:, 3:6], against_gravity, atol=1e-9)
-        self.assertLess(abs(inertial_errors(drive)).max(), 1e-8)
+        def after(error):
+            state = Pose(Rotation.from_rotvec(error[:3]) * attitude, position + error[3:6])
+            turned, moved = corrected(rotation, way[None], error[None, 6:])
+            state.move(turned[0], moved[0], np.zeros(6))
+            return state
 
-    def test_a_circle_has_no_error_but_for_the_length_of_a_step(self):
-        drive = make_drive(np.full(100 * SECONDS, 10.0), np.full(100 * SECONDS, 0.1))
-        self.assertLess(abs(inertial_errors(drive)[1:-1]).max(), 0.01)
+        def off(error):
+            state = after(error)
+            turn = (state.attitude * ahead.attitude.inv()).as_rotvec()
+            return np.concatenate([turn, state.position - ahead.position])
+
+        ahead = after(np.zeros(12))
+        jacobian = np.array([(off(step * e) - off(-step * e)) / (2 * step) for e in np.eye(12)]).T
+        state = Pose(attitude, position)
+        state.covariance, variance = np.diag(np.linspace(0.1, 0.6, 6)), np.linspace(0.2, 0.7, 6)
+        before = state.covariance
+        state.move(rotation, way, variance)
+        expected = jacobian[:, :6] @ before @ jacobian[:, :6].T + jacobian[:, 6:] @ np.diag(variance) @ jacobian[:, 6:].T
+        np.testing.assert_allclose(state.covariance, expected, atol=1e-5)

@@ -10,11 +10,10 @@ from torch import nn
 
 from gyronet_train.lwoi_process import (
     FEATURES,
+    Features,
     ProcessError,
     Settings,
     SparseProcess,
-    inertial_features,
-    odometry_features,
     train,
 )
 
@@ -31,14 +30,14 @@ def speed_windows(seed, count):
 
 
 class Size(unittest.TestCase):
-    def test_networks_have_the_papers_number_of_parameters(self):
-        for features, count, channels in ((odometry_features(), 20_070, 3), (inertial_features(), 38_770, 6)):
-            self.assertEqual(sum(p.numel() for p in features.parameters()), count)
-            self.assertEqual(features(torch.zeros(2, 100 * channels)).shape, (2, FEATURES))
+    def test_the_network_has_the_papers_number_of_parameters(self):
+        features = Features()
+        self.assertEqual(sum(p.numel() for p in features.parameters()), 20_070)
+        self.assertEqual(features(torch.zeros(2, 300)).shape, (2, FEATURES))
 
     def test_a_window_keeps_its_channels_apart(self):
         window = torch.arange(300.0).reshape(1, 100, 3)
-        features = odometry_features()
+        features = Features()
         expected = features.layers(window.transpose(1, 2))
         torch.testing.assert_close(features(window.flatten(1)), expected)
 
@@ -94,7 +93,7 @@ class Learning(unittest.TestCase):
             noise = np.random.default_rng(3).normal(size=(len(windows), 1))
             return np.concatenate([ahead[:, None], 1e-3 * noise], axis=1)
 
-        process = train(windows, errors(windows), odometry_features, SETTINGS)
+        process = train(windows, errors(windows), SETTINGS)
         expected = process.predict(held_out)
         left = errors(held_out)[:, 0] - expected.mean[:, 0]
         self.assertLess(abs(left.mean()), 0.1 * abs(errors(held_out)[:, 0].mean()))
@@ -104,9 +103,9 @@ class Learning(unittest.TestCase):
 
     def test_one_seed_gives_one_result(self):
         windows, errors = speed_windows(1, 50), np.random.default_rng(1).normal(size=(50, 2))
-        runs = [train(windows, errors, odometry_features, Settings(steps=3)).predict(windows).mean for _ in range(2)]
+        runs = [train(windows, errors, Settings(steps=3)).predict(windows).mean for _ in range(2)]
         np.testing.assert_array_equal(*runs)
 
     def test_errors_without_spread_are_named(self):
         with self.assertRaisesRegex(ProcessError, "10 windows: .*constant"):
-            train(speed_windows(1, 10), np.zeros((10, 2)), odometry_features, SETTINGS)
+            train(speed_windows(1, 10), np.zeros((10, 2)), SETTINGS)
