@@ -187,7 +187,7 @@ impl RestReading {
     }
 
     /// Returns the rate by which a standing vehicle turns, rad/s, beyond the reading at rest: of the last second beyond its
-    /// noise, of the newest two quarters beyond an engine's swing, or the doubt of the newest standstill. It turns, or the
+    /// noise, of the newest two quarters beyond an engine's swing too, or the doubt of the newest standstill. It turns, or the
     /// gyro's bias has changed.
     fn against(&self) -> f32 {
         let current = self.stood.saturating_sub(1) % QUARTER + 1;
@@ -195,10 +195,12 @@ impl RestReading {
         let off = |turned: i64, steps: u32| {
             (turned as f32 / Angle::PER_RAD - self.combined().mean * steps as f32 / RATE_HZ as f32).abs()
         };
-        let second = off(self.turned.iter().sum(), steps) - 3.0 * sqrt(self.noise);
+        let noise = |steps: u32| 4.0 * sqrt(self.noise * steps as f32 / RATE_HZ as f32);
+        let second = off(self.turned.iter().sum(), steps) - noise(steps);
         let [newest, before, ..] = self.turned;
         let newest_steps = self.stood.min(QUARTER + current);
-        let newest = (off(newest + before, newest_steps) - self.swing.angle()) * RATE_HZ as f32
+        let newest = (off(newest + before, newest_steps) - self.swing.angle() - noise(newest_steps))
+            * RATE_HZ as f32
             / newest_steps.max(QUARTER) as f32;
         self.doubt.max(second).max(newest)
     }
