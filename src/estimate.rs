@@ -32,7 +32,7 @@ pub struct YawEstimate {
     pub quality: Quality,
     /// The faults that are present.
     pub faults: Faults,
-    /// The time from the sample to the message in microseconds, where it is known.
+    /// The age of the sample when its message is made, without the delays of sensor, line and bus, us; where known.
     pub latency_us: Option<u32>,
 }
 

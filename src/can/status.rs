@@ -10,7 +10,7 @@
 //! | 4 to 6 | [`Knowledge`] of the gyro's bias | 7 |
 //! | 7 to 9 | [`Knowledge`] of its gain and misalignment | 7 |
 //! | 10 to 12 | [`Knowledge`] of the sensor's mounting | 7 |
-//! | 13 to 15 | sources of the yaw rate that others contradict: 1 inertial gyro, 2 fibre-optic gyro, 4 wheels, or their sum | 7 |
+//! | 13 to 15 | sources of the yaw rate that others contradict: 1 inertial gyro, 2 fibre-optic gyro, 4 wheels, or their sum | 7, which is also all three |
 //! | 16 to 23 | gaps in the accumulated yaws (inertial, fibre-optic) since they began, modulo 255 | 255 |
 //! | 24 to 39 | expected error of the angle turned in the last minute, 0.01 deg; 65534 also above | 65535 |
 
