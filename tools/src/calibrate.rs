@@ -64,8 +64,9 @@ pub struct Share {
     pub name: &'static str,
     /// The value; 0 if the share is refused.
     pub value: f64,
-    /// Standard deviation of the value, from fits that each leave out one block of time.
+    /// Standard deviation of the value, from fits that each leave out one block of time, and the largest that is taken.
     pub sigma: f64,
+    pub limit: f64,
     /// The reason why the share is refused: what the drives lack to show it.
     pub refused: Option<&'static str>,
 }
@@ -108,7 +109,7 @@ const SHARES: [(&str, f64, &str); 3] = [
     (
         "gain",
         MAX_GAIN_SIGMA,
-        "too few turns (6 rad are needed), or all alike: the drives cannot tell it from a bias",
+        "turns all alike, or a reference that scatters: the drives cannot tell it from a bias",
     ),
 ];
 
@@ -128,10 +129,11 @@ pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, CalibrateErro
         }
     };
     let shares: [Share; 3] = std::array::from_fn(|k| {
-        let (name, _, lacking) = SHARES[k];
+        let (name, limit, lacking) = SHARES[k];
+        let lacking = if k < 2 || has_turned { lacking } else { "too few turns, 6 rad are needed" };
         match refused[k] {
-            None => Share { name, value: fit.shares[k], sigma: fit.sigmas[k], refused: None },
-            Some(sigma) => Share { name, value: 0.0, sigma, refused: Some(lacking) },
+            None => Share { name, value: fit.shares[k], sigma: fit.sigmas[k], limit, refused: None },
+            Some(sigma) => Share { name, value: 0.0, sigma, limit, refused: Some(lacking) },
         }
     });
     for (drive, deviation) in drives.iter().zip(&fit.deviations) {

@@ -19,6 +19,8 @@ const PUBLIC: &str = "gyronet public key 1";
 pub enum KeyError {
     #[error("{}: {source}", path.display())]
     File { path: PathBuf, source: std::io::Error },
+    #[error("{}: it exists, and a key is never overwritten: give another name", path.display())]
+    Exists { path: PathBuf },
     #[error("{}: not a {what}", path.display())]
     Content { path: PathBuf, what: &'static str },
     #[error("the system gives no random numbers: {0}")]
@@ -49,9 +51,8 @@ impl PrivateKey {
             PathBuf::from(path)
         });
         let [private, public] = &paths;
-        if public.exists() {
-            let source = std::io::ErrorKind::AlreadyExists.into();
-            return Err(KeyError::File { path: public.clone(), source });
+        if let Some(path) = paths.iter().find(|path| path.exists()) {
+            return Err(KeyError::Exists { path: path.clone() });
         }
         create(private, PRIVATE, &self.0.to_bytes())?;
         create(public, PUBLIC, &self.public())?;
@@ -134,7 +135,7 @@ mod tests {
         let [private, public] = key.write(&name).expect("it is new");
         assert_eq!(PrivateKey::read(&private).expect("as written").public(), key.public());
         assert_eq!(read_public(&public).expect("as written"), key.public());
-        assert!(matches!(key.write(&name), Err(KeyError::File { .. })), "none is overwritten");
+        assert!(matches!(key.write(&name), Err(KeyError::Exists { .. })), "none is overwritten");
         assert!(matches!(PrivateKey::read(&public), Err(KeyError::Content { .. })));
         #[cfg(unix)]
         {

@@ -50,6 +50,27 @@ class Case(unittest.TestCase):
             self.assertLess(np.nanmax(np.abs(drive[f"wheel{column}_rate"] - truth)[inside]), 0.05)
 
 
+class OfADrive(Case):
+    def test_courses_references_and_temperature_stay(self):
+        t = times(hz=100.0)
+        rows = imu(t, rate=180 / math.pi)
+        known = np.arange(len(t)) % 100 == 0
+        course = np.degrees(np.mod(-0.3 * t, 2 * math.pi))
+        more = {"course": course, "course_sigma": 0 * t + 2.0, "gnss_speed": made.speed(t), "ref_yaw": 0.3 * t, "temp_c": 20 + t}
+        lines = [",".join(["t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z", *more])]
+        for k, has in enumerate(known):
+            rest = [f"{values[k]:.6f}" if has else "" for values in more.values()]
+            lines.append(",".join([f"{t[k]:.2f}", *(f"{value:.6f}" for value in rows[k]), *rest]))
+        self.path("deg.csv").write_text("\n".join(lines) + "\n")
+        drive = self.imports("deg.csv", "--unit", "imu=deg/s", "--unit", "course=deg", "--unit", "course_sigma=deg", "--from", "2", "--out", "out.csv",
+                             says=["columns that stay as they are: ref_yaw, gnss_speed, course, course_sigma, temp_c"])
+        for name, truth in more.items():
+            found, scale = np.flatnonzero(np.isfinite(drive[name])), math.pi / 180 if name.startswith("course") else 1.0
+            self.assertEqual(found.tolist(), list(range(0, 1000, 100)), name)
+            np.testing.assert_allclose(drive[name][found], scale * truth[200::100], atol=2e-6, err_msg=name)
+        self.assertLess(np.abs(drive["gyr_z"] - made.turn(t[200:])).max(), 0.02)
+
+
 class OnTheBus(Case):
     def setUp(self):
         super().setUp()

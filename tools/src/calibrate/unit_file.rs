@@ -33,7 +33,7 @@ pub struct DriveFit {
 pub enum UnitFileError {
     #[error("{path}: {source}")]
     Read { path: String, source: std::io::Error },
-    #[error("{path}: {source}")]
+    #[error("{path}: not a calibration file, as `gyronet calibrate --out` writes it: {source}")]
     Json { path: String, source: serde_json::Error },
     #[error("{path}: gyro_map: an element is too far from the identity")]
     Implausible { path: String },
@@ -59,8 +59,10 @@ struct Content {
 
 impl UnitFile {
     pub fn json(&self) -> serde_json::Value {
-        let shares = self.shares.map(|Share { name, value, sigma, refused }| {
-            (String::from(name), serde_json::json!({ "value": value, "sigma": sigma, "refused": refused }))
+        let shares = self.shares.map(|Share { name, value, sigma, limit, refused }| {
+            let share =
+                serde_json::json!({ "value": value, "sigma": sigma, "limit": limit, "refused": refused });
+            (String::from(name), share)
         });
         let content = Content {
             gyro_map: self.gyro_map.elements(),

@@ -9,7 +9,7 @@ const CONNECT: Duration = Duration::from_secs(5);
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConnectError {
-    #[error("{name}: not host:port, and not a serial port that can be opened: {source}")]
+    #[error("{name}: neither a file, host:port, nor a serial port that can be opened: {source}")]
     Serial { name: String, source: serialport::Error },
     #[error("{name}: cannot connect: {source}")]
     Tcp { name: String, source: io::Error },

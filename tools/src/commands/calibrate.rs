@@ -51,17 +51,17 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if common.json {
         return print_json(&mut out, &unit.json());
     }
-    for Share { name, value, sigma, refused } in &unit.shares {
+    for Share { name, value, sigma, limit, refused } in &unit.shares {
         match refused {
             None => writeln!(out, "{name:<6} {value:+.5}, sigma {sigma:.5}")?,
-            Some(reason) => writeln!(out, "{name:<6} refused, sigma {sigma:.5}: {reason}")?,
+            Some(reason) => writeln!(out, "{name:<6} refused, sigma {sigma:.5} (at most {limit}): {reason}")?,
         }
     }
     for drive in &unit.drives {
         let degrees_per_hour = drive.yaw_rate_bias_rad_per_s.to_degrees() * 3_600.0;
         writeln!(
             out,
-            "{}: remaining bias {degrees_per_hour:+.1} deg/h, spans within {:.6} rad",
+            "{}: remaining bias {degrees_per_hour:+.1} deg/h, its turns scatter by {:.6} rad",
             drive.name, drive.deviation_rad
         )?;
     }

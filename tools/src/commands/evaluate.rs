@@ -3,6 +3,7 @@
 use super::{Common, drives, paint, print_json, progress, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
+use gyronet_tools::drive::recording;
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::outage::{self, NoStart, Outage};
 use gyronet_tools::evaluate::outage_chart;
@@ -112,13 +113,17 @@ fn outages(args: &Args, common: Common) -> super::Result {
         let bar = progress::bar(common, drive.facts.rows, drive.name());
         let found = outage::run(&drive, &mut network, &lengths, outage::EVERY_S, || bar.inc(1));
         bar.finish_and_clear();
-        let found = found?;
+        let (found, driven_s) = found?;
         if found.is_empty() {
-            let remark = format_args!("{}: no start: too little course or reference", drive.path);
+            let (path, [_, needed], slowest) = (&drive.path, outage::AFTER_S, outage::SLOWEST);
+            let remark = format_args!(
+                "{path}: no start: {driven_s:.0} s at {slowest} m/s or more with a course; {needed} s are needed, then the \
+                 outage, with a reference at both ends"
+            );
             super::remark(common, remark)?;
             continue;
         }
-        let set = file.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned();
+        let set = recording::set(file);
         match sets.iter_mut().find(|(own, _)| *own == set) {
             Some((_, drives)) => drives.push((file, found)),
             None => sets.push((set, vec![(file, found)])),

@@ -59,8 +59,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 
 /// Runs a command of the Python package, whose exit status becomes ours.
 pub fn python(command: &[&str], arguments: &[OsString], common: Common) -> super::Result {
-    let board = command == ["correct"];
-    let mut python = package(&workspace().join("tools/python"), board, |environment| {
+    let help = arguments.iter().any(|argument| argument == "--help" || argument == "-h");
+    let needs = [command == ["correct"] && !help, help];
+    let mut python = package(&workspace().join("tools/python"), needs, |environment| {
         let _ = remark(
             common,
             format_args!("makes the Python environment that reads logs, once: {}", environment.display()),

@@ -1,6 +1,7 @@
 //! `gyronet wheels` creates and checks the settings of a vehicle's wheel frames.
 
 use super::{Common, print_json};
+use gyronet::store::Configuration;
 use gyronet_tools::wheels::WheelFile;
 use std::ffi::OsString;
 use std::io::{Write, stdout};
@@ -33,7 +34,7 @@ enum Action {
         #[arg(value_name = "ARGUMENTS", trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<OsString>,
     },
-    /// Check a settings file as the board does.
+    /// Check a settings file as the board does, beside the default identifiers.
     Check {
         /// Settings file (.toml).
         file: PathBuf,
@@ -47,7 +48,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             let path = file.display().to_string();
             let text = std::fs::read_to_string(file).map_err(|error| format!("{path}: {error}"))?;
             let settings = WheelFile::parse(&path, &text)?;
-            settings.settings(&path)?;
+            let board = Configuration::DEFAULT.check_wheels(&settings.settings(&path)?);
+            board.map_err(|error| format!("{path}: {error}"))?;
             if common.json {
                 return print_json(&mut stdout().lock(), &settings);
             }

@@ -1,7 +1,7 @@
 //! Writes the page of a drive.
 
+use super::Demo;
 use super::trajectory::Trajectories;
-use super::{Demo, Tunnel};
 use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
 use crate::evaluate::report::{MARKS, columns};
@@ -28,10 +28,11 @@ pub fn page(demo: &Demo<'_>) -> String {
                  weights were trained on another vehicle. Your own drive: <code>gyronet demo DRIVE.csv</code>.</p>\n";
     }
     body += &facts(demo);
-    if let Some(Tunnel { picture, .. }) = demo.tunnel {
-        body += "<h2>A tunnel</h2>\n<p class=\"note\">The median of the drive's tunnels. Every method had the same courses before \
-                 it.</p>\n";
-        body += &format!("<div class=\"tunnel\">\n{picture}</div>\n");
+    if let Some(tunnel) = demo.tunnel {
+        body += "<h2>A tunnel</h2>\n<p class=\"note\">Drawn is the tunnel whose error of gyronet's heading is the median of \
+                 the drive's tunnels. Every method had the same courses before it.</p>\n";
+        body += &format!("<div class=\"tunnel\">\n{}</div>\n", tunnel.picture);
+        body += &format!("<div class=\"scroll\"><pre>{}</pre></div>\n", escaped(&tunnel.to_string()));
     }
     body += "<h2>Yaw</h2>\n";
     body += &yaw(demo);
@@ -142,9 +143,16 @@ fn paths(trajectories: &Trajectories, radius: f64) -> String {
         1 => format!("speed of one wheel (radius {radius} m)"),
         _ => format!("speed of the mean of {wheels} wheels (radius {radius} m)"),
     };
+    let off = |method| paths.iter().find(|path| path.method == Some(method)).and_then(|path| path.error_m);
+    let farther = match off(Method::DELAYED).zip(off(Method::STATIC)) {
+        Some((ours, theirs)) if ours > theirs => {
+            " Here gyronet's path is farther off than static initialisation's: an early error of the heading moves all that follows."
+        }
+        _ => "",
+    };
     format!(
         "{chart}<p class=\"note\">Dead reckoning over {metres:.0} m: each method's yaw rate and the recorded \
-         {speed}. The reference's path has its heading and the same speed; a GNSS receiver's positions are laid onto it.</p>\n"
+         {speed}.{farther} The reference's path has its heading and the same speed; a GNSS receiver's positions are laid onto it.</p>\n"
     )
 }
 

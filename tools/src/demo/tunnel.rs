@@ -28,7 +28,7 @@ impl Tunnel {
         if !drive.rows()?.any(|row| row.is_ok_and(|row| row.heading.is_some())) {
             return Ok(None);
         }
-        let found = outage::run(drive, network, &[SECONDS], EVERY_S, || {})?;
+        let (found, _) = outage::run(drive, network, &[SECONDS], EVERY_S, || {})?;
         let outages = Outages::new(drive.name(), std::iter::once(found.as_slice()));
         let Some([median, _]) = outage_chart::typical(found.iter()).filter(|_| !outages.outage.is_empty())
         else {

@@ -1,7 +1,8 @@
 //! Computes the roll and pitch of the sensor's mounting from gravity at rest.
 
 use super::finding::Finding;
-use super::recording::Rows;
+use super::line::confused;
+use super::recording::{Rows, sorted};
 use super::remedy;
 
 /// Standard gravity, m/s^2.
@@ -34,8 +35,22 @@ impl Mounting {
     }
 }
 
+/// The accelerometer's unit where it is not m/s^2: by the median of the force, which is that of gravity on every drive.
+fn unit(rows: &Rows) -> Option<String> {
+    let sizes = sorted(rows.force.iter().map(|[x, y, z]| x.hypot(*y).hypot(*z)));
+    let median = *sizes.get(sizes.len() / 2)?;
+    let (_, unit) = [(1.0, "g"), (1e3, "mg")].into_iter().find(|(gravity, _)| confused(median, *gravity))?;
+    Some(format!(
+        "the force is {median:.2} where gravity is {GRAVITY:.2} m/s^2: {}.",
+        remedy::imu(rows, unit)
+    ))
+}
+
 pub fn finding(rows: &Rows, mounting: Option<&Mounting>, left_deg: f64) -> Finding {
     let what = "mounting";
+    if let Some(unit) = unit(rows) {
+        return Finding::bad(what, unit);
+    }
     let Some(level @ Mounting { roll_deg, pitch_deg, force, .. }) = mounting else {
         return Finding::note(what, "No standstill in which to measure gravity.");
     };

@@ -1,10 +1,13 @@
-//! Finds saturated readings and stuck readings.
+//! Finds saturated readings, stuck readings, and a gyro in degrees per second.
 
 use super::finding::Finding;
-use super::recording::Rows;
+use super::recording::{Rows, SECOND};
+use super::remedy;
 
 /// Consecutive samples at the same extreme value that count as saturated.
 const CLIPPED_RUN: usize = 3;
+/// Fastest turn of a vehicle, also of a small one, rad/s as the mean of a second.
+const FASTEST: f64 = 6.0;
 /// Consecutive samples that are equal on all axes and count as stuck.
 const STUCK_RUN: usize = 5;
 
@@ -14,6 +17,14 @@ pub fn findings(rows: &Rows) -> Vec<Finding> {
         limit("gyro range", &rows.rate, "deg/s", degrees),
         limit("accelerometer range", &rows.force, "m/s^2", 1.0),
     ];
+    let turn =
+        |second: &[[f64; 3]]| (second.iter().map(|rate| rate[2]).sum::<f64>() / second.len() as f64).abs();
+    let fastest = rows.rate.chunks_exact(SECOND).map(turn).fold(0.0, f64::max);
+    if fastest > FASTEST {
+        let unit = remedy::imu(rows, "deg/s");
+        let text = format!("It turns by {fastest:.1} rad in a second, as no vehicle does: {unit}.");
+        findings.push(Finding::bad("gyro unit", text));
+    }
     let both: Vec<_> = rows.rate.iter().zip(&rows.force).collect();
     let stuck = in_runs(&both, |a, b| a == b, STUCK_RUN);
     if stuck > 0 {

@@ -66,8 +66,7 @@ fn units(rows: &Rows, gain: f64, column: &str) -> Option<String> {
     } else {
         return None;
     };
-    let import = remedy::import(rows, &format!("--unit {channel}=deg/s"));
-    Some(format!("the gyro turns {gain:.3} times as much: {channel} is in deg/s; {import}"))
+    Some(format!("the gyro turns {gain:.3} times as much: {}", remedy::unit(rows, channel, "deg/s")))
 }
 
 fn of_rate(rows: &Rows, values: &str, noise: &str) -> Finding {

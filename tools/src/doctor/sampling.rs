@@ -2,6 +2,7 @@
 
 use super::finding::{Finding, Verdict};
 use super::recording::{Rows, sorted};
+use super::remedy;
 use crate::drive::DT;
 use gyronet::align::PERIODS_US;
 
@@ -19,8 +20,13 @@ pub fn findings(rows: &Rows) -> Vec<Finding> {
             let is_used = PERIODS_US.contains(&((1e6 * median).round() as u64));
             let text = format!("{:.2} Hz by the median period", 1.0 / median);
             if !is_used {
-                let cure = "the board and the other commands use 50 to 1000 Hz; `gyronet import` resamples to 100 Hz.";
-                findings.push(Finding::bad("rate", format!("{text}: {cure}")));
+                let is_in =
+                    |per_second: f64| PERIODS_US.contains(&((1e6 * median / per_second).round() as u64));
+                let unit = [(1e3, "ms"), (1e6, "us"), (1e9, "ns")].into_iter().find(|(per, _)| is_in(*per));
+                let resample = "`gyronet import` resamples to 100 Hz".to_owned();
+                let cure = unit.map_or(resample, |(_, unit)| remedy::unit(rows, "t_s", unit));
+                let text = format!("{text}: the board and the other commands use 50 to 1000 Hz; {cure}.");
+                findings.push(Finding::bad("rate", text));
             } else {
                 let brought =
                     if (median - DT).abs() < 1e-6 { "" } else { ", brought to 100 Hz as on the board" };

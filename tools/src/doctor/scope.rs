@@ -24,7 +24,10 @@ pub fn finding(rows: &Rows, standstills: &[Range<usize>]) -> Finding {
         (rows.reference.iter().all(Option::is_none), "errors of 1 s and 10 s (no reference rate)"),
     ];
     let lacks: Vec<&str> = lacks.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect();
-    let lacks = if lacks.is_empty() { "nothing".to_owned() } else { lacks.join(", ") };
+    let mut lacks = if lacks.is_empty() { "nothing".to_owned() } else { lacks.join(", ") };
+    if turned >= LEAST_TURNED_RAD {
+        lacks += ". Whether its turns show the gain, `gyronet calibrate` says";
+    }
     Finding::note(
         "what it can judge",
         format!(

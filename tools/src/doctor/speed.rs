@@ -44,9 +44,7 @@ pub fn finding(rows: &Rows) -> Option<Finding> {
     Some(if confused(ratio, KMH) {
         Finding::bad(WHAT, format!("{text}: the wheels are in km/h; {}.", wheels::in_kmh(rows)))
     } else if confused(ratio, DEGREES) {
-        let imu = remedy::channel(rows, "imu", "imu");
-        let import = remedy::import(rows, &format!("--unit {imu}=deg/s"));
-        Finding::bad(WHAT, format!("{text}: {imu} is in deg/s; {import}."))
+        Finding::bad(WHAT, format!("{text}: {}.", remedy::imu(rows, "deg/s")))
     } else if (0.7..1.4).contains(&ratio) {
         Finding::good(WHAT, format!("{text}."))
     } else {

@@ -53,9 +53,7 @@ fn units(rows: &Rows, track: f64, correlation: f64) -> Option<String> {
     if correlation < 0.9 {
         None
     } else if fits(1.0 / DEGREES) {
-        let channel = remedy::channel(rows, "imu", "imu");
-        let import = remedy::import(rows, &format!("--unit {channel}=deg/s"));
-        Some(format!("{channel} is in deg/s; {import}"))
+        Some(remedy::imu(rows, "deg/s"))
     } else if fits(KMH) {
         Some(format!("the wheels are in km/h; {}", in_kmh(rows)))
     } else {

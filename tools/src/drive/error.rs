@@ -100,13 +100,8 @@ pub enum ValueError {
     NotFinite,
     #[error("out of range")]
     OutOfRange,
-}
-
-impl From<gyronet::units::RangeError> for ValueError {
-    fn from(error: gyronet::units::RangeError) -> Self {
-        match error {
-            gyronet::units::RangeError::NotFinite => Self::NotFinite,
-            _ => Self::OutOfRange,
-        }
-    }
+    #[error("outside +-16 rad/s: is it deg/s? `gyronet doctor` says what mends it")]
+    Rate,
+    #[error("outside +-2048 m/s^2")]
+    Force,
 }

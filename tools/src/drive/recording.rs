@@ -116,5 +116,11 @@ pub(super) fn name(path: &str) -> &str {
     Path::new(path).file_stem().and_then(|stem| stem.to_str()).unwrap_or(path)
 }
 
+/// The name of the folder that a drive lies in: its set.
+pub fn set(path: &Path) -> String {
+    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    whole.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned()
+}
+
 #[cfg(test)]
 mod tests;

@@ -31,7 +31,7 @@ pub const EVERY_S: usize = 2;
 /// Seconds of course before a start, one set of rows each.
 pub const AFTER_S: [usize; 2] = [60, 20];
 /// Slowest speed that counts as driven with a course, m/s, and the longest time from one course to the next, s.
-const SLOWEST: f32 = 3.0;
+pub const SLOWEST: f32 = 3.0;
 const APART_S: f64 = 2.1;
 /// Samples over whose median the reference is taken.
 const MEDIAN: usize = 3 * SECOND;
@@ -77,15 +77,17 @@ impl WindowNetwork for Shared<'_> {
     }
 }
 
-/// Runs every method through the outages of a drive, which may begin in motion.
+/// Runs every method through the outages of a drive, which may begin in motion; also returns the time driven with a
+/// course, s.
 pub fn run(
     drive: &Drive<'_>,
     network: &mut dyn WindowNetwork,
     lengths_s: &[usize],
     every_s: usize,
     progress: impl FnMut(),
-) -> Result<Vec<Outage>, DataError> {
-    Ok(Race::run(drive, network, lengths_s, Starts::Every(every_s * SECOND), progress)?.found)
+) -> Result<(Vec<Outage>, f64), DataError> {
+    let race = Race::run(drive, network, lengths_s, Starts::Every(every_s * SECOND), progress)?;
+    Ok((race.found, race.driven_s))
 }
 
 /// Runs one outage again, and returns the way through it at every half second.

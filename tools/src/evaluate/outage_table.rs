@@ -90,7 +90,9 @@ impl fmt::Display for Outages {
                     "{}, {drives}: {length} s without GNSS after {after} s with it, {starts}",
                     self.set
                 )?;
-                writeln!(f, "  {:<26}{:>25}{:>25}", "median, 90 %, worst", "heading, deg", "position, m")?;
+                let wheels = methods.values().any(|figures| figures.position_m.is_some());
+                let position = if wheels { "position, m" } else { "position: no wheels" };
+                writeln!(f, "  {:<26}{:>25}{position:>25}", "median, 90 %, worst", "heading, deg")?;
                 for method in METHODS {
                     let Some(figures) = methods.get(method.key) else { continue };
                     write!(f, "  {:<26}", method.name)?;
@@ -129,6 +131,7 @@ mod tests {
         assert_eq!(of(&table.outage_after_20_s, 60).starts, 3);
         let text = table.to_string();
         assert!(text.starts_with("x, 1 drive: 30 s without GNSS after 60 s with it, 1 start\n"), "{text}");
+        assert!(text.contains("position: no wheels"), "{text}");
         let heading = of(&table.outage_after_20_s, 60).heading_deg;
         assert!((heading.median - 0.2f64.to_degrees()).abs() < 1e-9, "{heading:?}");
         assert!((heading.worst - 0.3f64.to_degrees()).abs() < 1e-9, "{heading:?}");

@@ -1,6 +1,7 @@
 //! The errors and costs of each method on each drive, as a table and as JSON.
 
 use crate::drive::DT;
+use crate::drive::recording;
 use crate::drive::replay::ReplayError;
 use crate::drive::stream::Drive;
 use crate::evaluate::cost::Cost;
@@ -210,10 +211,9 @@ impl DriveErrors {
         if methods.each().count() < comparison.costs.each().count() {
             return Err(EvaluateError::TooShort { path: path(), column: reference, seconds });
         }
-        let set = Path::new(&drive.path).parent().and_then(Path::file_name).unwrap_or_default();
         Ok(Self {
             name: drive.name().to_owned(),
-            set: set.to_string_lossy().into_owned(),
+            set: recording::set(Path::new(&drive.path)),
             seconds,
             missing: comparison.missing,
             reference,
@@ -360,14 +360,16 @@ fn table(f: &mut fmt::Formatter<'_>, ours: Option<Comparisons>, rows: &PerMethod
 /// The table of a drive or of a mean; the alternate form has all columns.
 pub struct Table<'a> {
     pub rows: &'a PerMethod<Row>,
-    /// Only the gyro alone, static initialisation, the best classical methods, and the rates that are sent.
+    /// Only the gyro alone, static initialisation without and with zero-rate updates, the best classical methods, and the
+    /// rates that are sent.
     pub few: bool,
 }
 
 impl fmt::Display for Table<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (headings, mut rows) = columns(self.rows, f.alternate());
-        let always = [Method::RAW, Method::STATIC, Method::LIVE, Method::DELAYED].map(|method| method.name);
+        let always = [Method::RAW, Method::STATIC, Method::STATIC_ZERO_RATE, Method::LIVE, Method::DELAYED];
+        let always = always.map(|method| method.name);
         let is_best = |row: &[String]| row.iter().any(|figure| figure.ends_with('*'));
         rows.retain(|row| !self.few || is_best(row) || always.contains(&row[0].as_str()));
         rows.insert(0, headings.into_iter().map(String::from).collect());

@@ -9,7 +9,7 @@ use std::path::Path;
 pub enum WeightFileError {
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },
-    #[error("{path}: {source}")]
+    #[error("{path}: {source}; `gyronet quantize` makes weight files")]
     Blob { path: String, source: BlobError },
 }
 

@@ -15,9 +15,14 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// The file of an environment that holds its requirements; written last.
 const STAMP: &str = "made-of.txt";
 
-/// Returns `python -m gyronet` without arguments, with the `board` or for logs alone. `sources` is the package's folder
-/// in a checkout. `remark` gets a line before an environment is made.
-pub fn package(sources: &Path, board: bool, remark: impl FnOnce(&Path)) -> Result<Command, PythonError> {
+/// Returns `python -m gyronet` without arguments, with the `board`, for logs alone, or to print `help`, which needs
+/// nothing but the sources. `sources` is the package's folder in a checkout. `remark` gets a line before an environment
+/// is made.
+pub fn package(
+    sources: &Path,
+    [board, help]: [bool; 2],
+    remark: impl FnOnce(&Path),
+) -> Result<Command, PythonError> {
     let sources = Some(sources).filter(|folder| folder.join("gyronet").is_dir());
     let named = std::env::var_os("GYRONET_PYTHON").map(PathBuf::from);
     let python = named.clone().unwrap_or_else(|| "python3".into());
@@ -28,7 +33,7 @@ pub fn package(sources: &Path, board: bool, remark: impl FnOnce(&Path)) -> Resul
         (interpreter(environment), sources)
     } else if is_installed(&python) {
         (python, None)
-    } else if named.is_some() && sources.is_some() {
+    } else if (named.is_some() || help) && sources.is_some() {
         (python, sources)
     } else if let Some(environment) = &environment {
         remark(environment);

@@ -46,6 +46,8 @@ fn the_readme_has_the_table_that_the_demo_prints() {
     let table = text.split("\n\n").find(|part| part.starts_with("  heading error")).expect("a table");
     assert!(readme.contains(table), "{table}");
     assert!(page.contains("<h2>A tunnel</h2>") && page.contains("60 s without GNSS</text>"));
+    let tunnels = text.split("\n\n").find(|part| part.starts_with("60 s without")).expect("a table");
+    assert!(page.contains(tunnels), "{tunnels}");
 }
 
 #[test]

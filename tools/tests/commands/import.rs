@@ -83,8 +83,8 @@ fn an_environment_is_made_once_and_arguments_and_status_pass_through() {
     // Another version of the command needed other packages.
     std::fs::write(machine.environment().join("made-of.txt"), "rosbags==0.1\n").unwrap();
     std::fs::write(machine.environment().join("old"), "").unwrap();
-    let (output, calls) = machine.run(&["import", "--help"], &[]);
-    assert_eq!(text(&output.stdout), ran("import --help"));
+    let (output, calls) = machine.run(&["import", "a.bag"], &[]);
+    assert_eq!(text(&output.stdout), ran("import a.bag"));
     assert!(
         calls.iter().any(|call| call.starts_with("-m pip")) && !machine.environment().join("old").exists()
     );
@@ -114,6 +114,10 @@ fn a_python_with_the_package_is_used_as_it_is() {
     );
     let (output, _) = machine.run(&correct, &[]);
     assert!(refused(&output).contains("pip install ./tools/python"));
+    // Its help needs nothing.
+    let (output, calls) = machine.run(&["correct", "--help"], &[]);
+    assert!(text(&output.stdout).ends_with("/tools/python|-m gyronet correct --help\n"), "{output:?}");
+    assert_eq!(calls.len(), 2, "{calls:?}");
     // An older one is not.
     let (_, calls) = machine.run(&["import", "a.bag"], &[("INSTALLED", "0.0.1")]);
     assert!(calls.iter().any(|call| call.starts_with("-m venv")), "{calls:?}");

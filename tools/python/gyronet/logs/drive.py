@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gyronet import units
 from gyronet.logs import clocks, course, grid, opened, select
 from gyronet.logs.can import Bus
 from gyronet.units import Flags
@@ -19,7 +20,7 @@ SHORTEST, LONGEST = 3.0, 86_400.0
 RATES = (24.5, 1_020.0)
 CHUNK = 50_000  # rows in memory
 DAY = 1e9  # s: later stamps are times of day
-NAMES = ["t_s", *select.IMU_COLUMNS, "ref_gyr_z", "ref_yaw", "ref_yaw_sigma", "gnss_speed", *select.COLUMNS, "gnss_lat", "gnss_lon"]
+NAMES = ["t_s", *select.IMU_COLUMNS, "ref_gyr_z", "ref_yaw", "ref_yaw_sigma", "gnss_speed", *select.COLUMNS, "gnss_lat", "gnss_lon", "course", "course_sigma", "temp_c"]
 ROLES = [f"wheel {name.replace('_', ' ')}" for name in WHEELS]
 
 
@@ -37,7 +38,7 @@ class Request:
 
     def wanted(self):
         names = [self.vehicle.wheels[wheel] for wheel in WHEELS] + [self.vehicle.signals["reference_rate"]]
-        return [name for name in names if name] + [*select.COLUMNS, "ref_gyr_z"]
+        return [name for name in names if name] + [*select.COLUMNS, *select.CARRIED, "ref_gyr_z"]
 
 
 def merged(logs):
@@ -141,18 +142,34 @@ class Drive:
                 f"{used.name} {c:.2f} to {d:.2f} s")
 
     def place_courses(self):
-        fixes = self.position.channel.rows()[:, :3] if self.position else np.empty((0, 3))
-        self.gnss = [(slice(8, 11), *self.placed(self.courses)), (slice(15, 17), *self.placed(fixes))]
+        fixes, offset = self.position.channel.rows()[:, :3] if self.position else np.empty((0, 3)), self.position.offset if self.position else 0
+        self.gnss = [(slice(15, 17), *self.placed(fixes, offset))]
+        log, carried = self.logs[self.gyro.file], []
+        for name, dimension in select.CARRIED.items():
+            channel = log.channels.get(name) if log.is_table else None
+            if channel is None or channel.kind != "number":
+                continue
+            unit = self.request.units.get(name) or channel.unit
+            scale = units.scale(name, unit, [dimension], f"{name} column")[0] if unit and dimension else 1.0
+            column = NAMES.index(name)
+            self.gnss.append((slice(column, column + 1), *self.placed(channel.rows() * [1.0, scale], self.request.offsets.get(name, 0.0))))
+            carried.append(name)
+        courses = self.courses.copy()
+        courses[:, 1:3] = np.nan if "ref_yaw" in carried else courses[:, 1:3]
+        courses[:, 3] = np.nan if "gnss_speed" in carried else courses[:, 3]
+        self.gnss.insert(0, (slice(8, 11), *self.placed(courses, offset)))
+        if carried:
+            self.report.append(f"{log.path}: columns that stay as they are: {', '.join(carried)}")
 
-    def placed(self, received):
+    def placed(self, received, offset):
         """The rows of the drive in which something was received, and its values."""
-        at = (received[:, 0] + (self.position.offset if self.position else 0) - self.start) / grid.DT
+        at = (received[:, 0] + offset - self.start) / grid.DT
         at = np.sign(at) * np.floor(np.abs(at) + 0.5)
         near = (at >= 0) & (at < self.count)
         return at[near].astype(int), received[near, 1:]
 
     def chunks(self):
-        """Rows by the thousand: t_s, six of the IMU, reference, three of the course, four wheels, two of the position; NaN is unknown."""
+        """Rows by the thousand: t_s, six of the IMU, reference, three of the course, four wheels, two of the position, three more; NaN is unknown."""
         for first in range(0, self.count, CHUNK):
             index = np.arange(first, min(first + CHUNK, self.count))
             times = self.start + grid.DT * index

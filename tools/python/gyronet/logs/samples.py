@@ -118,6 +118,7 @@ class Log:
     def __init__(self, path, wanted=None, recorded=False):
         self.path, self.wanted, self.recorded = path, wanted, recorded
         self.channels, self.dropped, self.passed, self.notes = {}, Counter(), Counter(), []
+        self.is_table = False
         self.epoch = None  # time of day at time 0, s, where the log gives it
 
     def channel(self, name, kind, unit=""):

@@ -7,6 +7,8 @@ from gyronet.refused import Refused, listed
 
 IMU_COLUMNS = ["acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z"]
 COLUMNS = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"]
+# What a drive has besides, as it is: column, and dimension of its unit.
+CARRIED = {"ref_yaw": "angle", "ref_yaw_sigma": "angle", "gnss_speed": "speed", "course": "angle", "course_sigma": "angle", "temp_c": None}
 # Of these two only the first is a drive's: every PX4 log since 1.13 has both.
 PREFERRED = ("vehicle_gps_position", "sensor_gps")
 

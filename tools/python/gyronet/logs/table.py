@@ -10,7 +10,7 @@ import numpy as np
 import pandas
 
 from gyronet import units
-from gyronet.logs.select import COLUMNS, IMU_COLUMNS
+from gyronet.logs.select import CARRIED, COLUMNS, IMU_COLUMNS
 from gyronet.refused import Refused, listed
 
 POSITION = ["latitude", "longitude", "position_sigma", "ground_speed", "course", "course_sigma"]
@@ -123,7 +123,7 @@ class Columns:
                               "--unit latitude=1e-7deg --unit longitude=1e-7deg")
             log.channel("position", "position").extend(np.column_stack([seconds, fix])[known])
         for at, name in enumerate(self.names):
-            if at not in self.places.values():
+            if at not in self.places.values() or name in CARRIED:
                 unit = self.flags.get(name) or self.vehicle.unit_of(name) or self.units.get(name) or ("rad/s" if name in ("ref_gyr_z", *COLUMNS) else "")
                 known = np.isfinite(rows[:, at])
                 log.channel(name, "number", unit).extend(np.column_stack([seconds, rows[:, at]])[known])
@@ -159,7 +159,7 @@ class Clock:
 
 
 def read(path, log, vehicle, flags, rate, several):
-    header = Header(path)
+    header, log.is_table = Header(path), True
     columns = Columns(path, header, vehicle, flags, several)
     count, clock = len(header.names), None
     with open(path, encoding="utf-8-sig", errors="replace") as file, warnings.catch_warnings(record=True) as longer:

@@ -8,7 +8,7 @@ use csv::StringRecord;
 use gyronet::heading::Heading;
 use gyronet::mounting::Rotation;
 use gyronet::sample::{ImuSample, Validity};
-use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
+use gyronet::units::{AngularRate, CentiCelsius, Micros, RangeError, SpecificForce};
 use std::f64::consts::TAU;
 use std::str::FromStr;
 
@@ -126,8 +126,10 @@ impl<R: std::io::Read> Reader<R> {
             let [last_s, at_s] = [last, time].map(|time| time.0 as f64 * 1e-6);
             return Err(DataError::at(&self.path, line, DataFault::Time { last_s, at_s }));
         }
-        let force = force.map(|column| fields.quantity(column, SpecificForce::from_metre_per_sec2));
-        let rate = rate.map(|column| fields.quantity(column, AngularRate::from_rad_per_sec));
+        let force = force
+            .map(|column| fields.quantity(column, ValueError::Force, SpecificForce::from_metre_per_sec2));
+        let rate =
+            rate.map(|column| fields.quantity(column, ValueError::Rate, AngularRate::from_rad_per_sec));
         let ([fx, fy, fz], [wx, wy, wz]) = (force, rate);
         let optional = |column: Option<Column>| column.map_or(Ok(None), |column| fields.optional(column));
         let [w1, w2, w3, w4] = wheels.map(optional);
@@ -218,10 +220,13 @@ impl Fields<'_> {
     fn quantity<T>(
         &self,
         column: Column,
-        code: impl Fn(f32) -> Result<T, gyronet::units::RangeError>,
+        outside: ValueError,
+        code: impl Fn(f32) -> Result<T, RangeError>,
     ) -> Result<T, DataError> {
         let value = self.number(column)?.ok_or_else(|| self.error(column, ValueError::Empty))?;
-        code(value).map_err(|error| self.error(column, error.into()))
+        code(value).map_err(|error| {
+            self.error(column, if error == RangeError::NotFinite { ValueError::NotFinite } else { outside })
+        })
     }
 
     fn time(&self, column: Column) -> Result<Micros, DataError> {

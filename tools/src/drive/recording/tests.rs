@@ -78,7 +78,10 @@ fn a_bad_value_is_named_with_line_column_and_text() {
     assert_eq!(message(40, gyr_z, ",NaN,"), format!("{at}\"NaN\" is not finite"));
     assert_eq!(message(40, gyr_z, ",-inf,"), format!("{at}\"-inf\" is not finite"));
     assert_eq!(message(40, gyr_z, ",1e39,"), format!("{at}\"1e39\" is not finite"));
-    assert_eq!(message(40, gyr_z, ",17,"), format!("{at}\"17\" is out of range"));
+    assert_eq!(
+        message(40, gyr_z, ",17,"),
+        format!("{at}\"17\" is outside +-16 rad/s: is it deg/s? `gyronet doctor` says what mends it")
+    );
     assert_eq!(message(2, "12.000000", "-1"), "drives/a.csv: line 2, column t_s: \"-1\" is out of range");
     assert_eq!(
         message(7, ",0.01,", ",?,"),
