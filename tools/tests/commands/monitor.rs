@@ -158,6 +158,20 @@ fn it_ends_when_it_should() {
     assert!(out.contains(" 6, 0 of others"), "the first set only: {out}");
 }
 
+/// Those by which a receiver's checksums can be tried out.
+#[test]
+fn the_frames_on_the_page_are_good() {
+    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../src/can/README.md")).unwrap();
+    let frames = page.split('`').filter(|word| word.len() == 20 && word.contains('#'));
+    let good: String = frames.map(|frame| format!("(1.000000) can0 {frame}\n")).collect();
+    let bad = good.replace("D1\n", "D0\n").replace("02\n", "03\n");
+    for (text, damaged) in [(good, 0), (bad, 2)] {
+        let (_, out, err) = monitor(&[file("page.log", text.as_bytes()).to_str().unwrap(), "--json"]);
+        let json: serde_json::Value = serde_json::from_str(&out).expect(&err);
+        assert_eq!((&json["frames"], &json["damaged"]), (&2.into(), &damaged.into()), "{text}");
+    }
+}
+
 #[test]
 fn what_cannot_be_read_is_named() {
     let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
@@ -165,7 +179,7 @@ fn what_cannot_be_read_is_named() {
     let foreign = file("foreign.log", b"(1.000000) can0 123#00\n");
     let (text, foreign) = (text.to_str().unwrap(), foreign.to_str().unwrap());
     for (arguments, part) in [
-        (&["/no/such/port"][..], "/no/such/port: not host:port, and not a serial port"),
+        (&["/no/such/port"][..], "/no/such/port: neither a file, host:port, nor a serial port"),
         (&[&closed], "cannot connect"),
         (&[text], "no.log: no CAN frame in it"),
         (&[foreign, "--once"], "foreign.log: no complete set of messages"),

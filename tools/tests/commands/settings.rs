@@ -1,5 +1,6 @@
 //! The settings of `gyronet device set`: nothing lost on the way through text.
 
+use super::{gyronet, scratch, text};
 use gyronet::store::{Configuration, Record};
 use gyronet::units::AngularRate;
 use gyronet_tools::client::device::settings::{assign, from_value, to_value};
@@ -49,4 +50,24 @@ fn values_are_set_by_name() {
     // The board's own code for 3 deg/s.
     assert_eq!(refused("compensate.max_mean=7027624"), "compensate.max_mean: 7027624 is not a rate in rad/s");
     assert!(refused("imu=None").starts_with("no configuration: unknown variant"));
+}
+
+#[test]
+fn wheel_frames_with_an_identifier_of_the_board_are_refused() {
+    let file = scratch("wheels-check").join("wheels.toml");
+    for (id, is_free) in [("0x1A1", false), ("0x7E8", false), ("0x1A6", false), ("0x1A7", true)] {
+        let signal = |wheel: &str, bit: u8| {
+            format!(
+                "{{ wheel = '{wheel}', start_bit = {bit}, bits = 16, order = 'intel', factor_kmh = 0.01, offset_kmh = 0 }}"
+            )
+        };
+        let signals = [signal("rear-left", 0), signal("rear-right", 16)].join(", ");
+        std::fs::write(&file, format!("[[frame]]\nid = {id}\nsignal = [{signals}]\n")).unwrap();
+        let output = gyronet(&["wheels", "check", file.to_str().unwrap()]);
+        let error = text(&output.stderr);
+        assert!(
+            output.status.success() == is_free && error.contains("one of our own") != is_free,
+            "{id}: {error}"
+        );
+    }
 }
