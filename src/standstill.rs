@@ -283,7 +283,9 @@ impl Judge {
             Standstill::Unknown => is_quiet && self.is_stop,
         };
         if stands {
-            (self.rest, self.pull) = (Some(motion.force), None);
+            // Passive wheel sensors show zero while the vehicle still brakes.
+            let force = if wheels == Standstill::Still { motion.newest } else { motion.force };
+            (self.rest, self.pull) = (Some(force), None);
         } else if let (None, Some(rest)) = (self.pull, self.rest) {
             let pull = minus(motion.force, rest);
             self.pull = (norm(pull) >= PULL).then_some(pull);

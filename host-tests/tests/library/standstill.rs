@@ -124,6 +124,20 @@ fn wheels_that_stand_while_the_vehicle_speeds_up_prove_nothing_until_they_turn()
 }
 
 /// It pulls away and goes on smoothly, then brakes and stands: only the second quiet is a stop.
+/// Passive wheel sensors show zero below 0.76 m/s, while the vehicle brakes.
+#[test]
+fn wheels_that_stand_before_the_braking_ends_are_believed_after_it() {
+    let (stands, drives) = (wheels(0.0, Standstill::Still), wheels(1.0, Standstill::Moving));
+    let mut car = Vehicle::new();
+    car.go(5.0, 0.0, 0.0, Some(&stands));
+    car.go(5.0, 4e-3, 0.5, Some(&drives));
+    car.go(3.0, 4e-3, -2.0, Some(&drives));
+    car.go(0.7, 0.0, -1.2, Some(&stands));
+    for _ in 0..100 {
+        assert_eq!(car.go(0.1, 0.0, 0.0, Some(&stands)), Standing::WHEELS);
+    }
+}
+
 #[test]
 fn quiet_after_speeding_up_is_no_stop() {
     let mut car = Vehicle::new();

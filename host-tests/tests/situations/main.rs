@@ -27,6 +27,7 @@ const CURED: &[(&str, &str, u64)] = &[
     ("reversing", "bare", 1),
     ("bias steps after a knock", "utv", 1),
     ("bias steps after a knock", "van", 1),
+    ("bias steps after a knock", "hatch", 4),
     ("sensor moved between two drives", "van", 2),
     ("serpentines of 15 %", "van", 5),
     ("parking garage spiral", "van", 5),
