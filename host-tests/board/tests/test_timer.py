@@ -114,9 +114,11 @@ class Timers(unittest.TestCase):
         for offset, value in ((CR1, 0x11), (CR1, 8), (DIER, 1 << 8), (EGR, 2), (0x04, 0)):
             with self.assertRaises(Violation):
                 self.board.write("TIM5", offset, value)
-        self.microseconds("TIM5")
-        with self.assertRaises(Violation):
-            self.board.write("TIM5", ARR, 9)
+        self.microseconds("TIM5", arr=999)
+        self.board.write("TIM5", PSC, 7)
+        self.board.advance(2 * MS)
+        with self.assertRaisesRegex(Violation, "an overflow loads"):
+            self.board.read("TIM5", SR)
 
 
 if __name__ == "__main__":

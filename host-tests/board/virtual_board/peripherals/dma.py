@@ -193,15 +193,16 @@ class Dma(Peripheral):
             stream.flags |= TCIF
             return
         if stream.cr & EN:
-            raise Violation(f"{self.name}: stream {number} runs, and its mode is written (CR {value:#x})")
+            self.board.record("ignored_write", register=f"{self.name} stream {number}", value=value)
+            return
         if value & EN and (value & ~MODES or not value & MINC or is_sending == bool(value & CIRC)):
             raise Violation(f"{self.name}: stream {number} asks for a mode that is not modelled (CR {value:#x})")
+        name = self.requests.get((number, value >> 25 & 7), "")
+        if value & EN and not name.endswith("_TX" if is_sending else "_RX"):
+            raise Violation(f"{self.name}: stream {number} has no modelled request on channel {value >> 25 & 7}")
         stream.cr = value
         if not value & EN:
             return
-        name = self.requests.get((number, value >> 25 & 7))
-        if name is None or is_sending != name.endswith("_TX"):
-            raise Violation(f"{self.name}: stream {number} has no modelled request on channel {value >> 25 & 7}")
         if stream.flags:
             self.board.record("dma_flags", dma=self.name, stream=number, flags=stream.flags)
         if not stream.left:

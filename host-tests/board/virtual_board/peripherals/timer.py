@@ -1,7 +1,7 @@
 """General-purpose timers that count up and compare (RM0090 sections 18 and 19); TIM11 captures the crystal.
 
 The counter is computed from board time; an event is scheduled only while DIER enables an interrupt. TIM11 channel 1 captures HSE
-divided by RTCPRE (section 19.5.11), which lets software measure it. Prescaler and end of the count are set while the counter stands.
+divided by RTCPRE (section 19.5.11), which lets software measure it. A prescaler that is written is loaded by UG.
 Left out: counting down, one pulse, PWM outputs and the preload of CCR, slave mode, encoder, DMA requests, captures of a pin, and the
 interrupts of captures.
 """
@@ -70,10 +70,11 @@ class Timer(Peripheral):
             return
         self._matches(steps)
         if steps >= self._to_overflow():
+            if self.prescaler != self.prescaler_written:
+                raise Violation(f"{self.name}: a prescaler that an overflow loads, not UG, is not modelled")
             self.sr |= UIF
-        value = self._after(steps)
+        self.counter = self._after(steps)
         self.since += -(-steps * PS * (self.prescaler + 1) // self.hz)
-        self.counter = value
 
     def _matches(self, steps):
         """Sets the flag of each compare channel whose value the counter passes (section 18.3.7)."""
@@ -221,8 +222,6 @@ class Timer(Peripheral):
             if value & ~(CEN | URS):
                 raise Violation(f"{self.name}: CR1 {value:#x} asks for a mode that is not modelled")
             if value & CEN and not self.cr1 & CEN:
-                if self.prescaler != self.prescaler_written:
-                    raise Violation(f"{self.name}: it starts with a prescaler that no UG has loaded, which is not modelled")
                 self.hz = self.board.rcc.clock_hz(self.bus)
                 self.since = self.board.now
             self.cr1 = value
@@ -240,8 +239,6 @@ class Timer(Peripheral):
             self.ccer = value & 0xBBBB
         elif word == 0x24:
             self.counter, self.since = value & self.mask, self.board.now
-        elif word in (0x28, 0x2C) and self.cr1 & CEN:
-            raise Violation(f"{self.name}: a new prescaler or end of the count while it counts is not modelled")
         elif word == 0x28:
             self.prescaler_written = value & 0xFFFF
         elif word == 0x2C:
