@@ -18,10 +18,9 @@ const DOUBTED: u32 = 2 * RATE_HZ;
 const GATE: f32 = 3.0;
 /// Largest expected error on the bus, rad/s: 0.655 deg/s.
 const LARGEST_SIGMA: f32 = 0.0114;
-/// Shares of the rate, 1 sigma: of a unit's gain (200 ppm, DSP-1760) with the mounting; of the slope of a street where
-/// no inertial sensor shows it; and beside an inertial gyro until both have been compared in turns: of a mount that has
-/// been turned by 11 degrees since the last drive.
-const UNIT_SHARE: f32 = 0.0002;
+/// Shares of the rate, 1 sigma, beside the unit's own ([`super::FogErrors::scale`]): of the slope of a street where no inertial
+/// sensor shows it; and beside an inertial gyro until both have been compared in turns: of a mount that has been turned by
+/// 11 degrees since the last drive.
 const STREET_SHARE: f32 = 0.00046;
 const UNKNOWN_SHARE: f32 = 0.02;
 /// Gain of an inertial gyro, 1 sigma: the difference that says nothing about the other one.
@@ -119,7 +118,7 @@ impl Comparison {
         // An axis that is askew by an angle reads the cosine of a turn, and the sine of a roll.
         let askew = if self.beside.scale.is_some() { sqrt(2.0 * gain) } else { 0.0 };
         let street = if self.beside.rate.is_some() { tilted } else { STREET_SHARE };
-        let share = sqrt(UNIT_SHARE * UNIT_SHARE + gain * gain + street * street) + clock;
+        let share = sqrt(gain * gain + street * street) + clock;
         let (grows, leans, off) = (share * rate, (MOUNT + askew) * leaning, self.off());
         sqrt(grows * grows + leans * leans + off * off)
     }
@@ -180,8 +179,7 @@ mod tests {
         let alone = Comparison { beside, ..Comparison::START }.sigma(0.5, 0.0);
         assert!((alone / 0.01 - 1.0).abs() < 0.01, "not compared yet, perhaps turned in its mount: {alone}");
         let usual = with(INERTIAL_GAIN, 0.0);
-        let own = sqrt(UNIT_SHARE * UNIT_SHARE + STREET_SHARE * STREET_SHARE);
-        assert!(usual < 1.01 * own * 0.5, "the inertial one's own: {usual}");
+        assert!(usual < 1.01 * STREET_SHARE * 0.5, "the inertial one's own: {usual}");
         assert!((with(0.008, 0.0) / (0.5 * 0.0074) - 1.0).abs() < 0.02);
         let [upright, askew] = [INERTIAL_GAIN, 0.0055].map(|scale| with(scale, 0.1));
         assert!((upright - 0.1 * MOUNT).abs() < 1e-6 && (8e-3..12e-3).contains(&askew), "{upright} {askew}");

@@ -195,7 +195,7 @@ impl RestReading {
         let off = |turned: i64, steps: u32| {
             (turned as f32 / Angle::PER_RAD - self.combined().mean * steps as f32 / RATE_HZ as f32).abs()
         };
-        let noise = |steps: u32| 4.0 * sqrt(self.noise * steps as f32 / RATE_HZ as f32);
+        let noise = |steps: u32| 5.0 * sqrt(self.noise * steps as f32 / RATE_HZ as f32);
         let second = off(self.turned.iter().sum(), steps) - noise(steps);
         let [newest, before, ..] = self.turned;
         let newest_steps = self.stood.min(QUARTER + current);
