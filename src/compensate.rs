@@ -214,7 +214,7 @@ pub struct Compensator {
     /// The newest sample last.
     kept: [Option<Entry>; KEPT],
     slow_mean: SlowMean,
-    /// Of the live rates, which no window revises, and of the delayed rates.
+    /// What the live rates (no window revises them) and the delayed rates still have to carry.
     live: Carried,
     delayed: Carried,
 }

@@ -54,10 +54,9 @@ const STEADY: f32 = 9.0;
 const BOARDING: f32 = 1e-3;
 /// Samples for which a standstill that the gyro has contradicted is not believed: a slide may turn now and then.
 const DISTRUSTED: u32 = 10 * RATE_HZ;
-
-/// Samples of a turn where the vehicle has stood without wheels that contradict the bias: no vehicle pulls away so slowly.
+/// A turn of more samples than this, where the vehicle has stood without wheels, contradicts the bias: no vehicle pulls away so
+/// slowly.
 const LASTING: u32 = 5 * RATE_HZ / 2;
-
 /// Says how a whole second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -284,7 +283,8 @@ impl ZeroRate {
         }
     }
 
-    /// Notes that the vehicle moves: what it has just stood on did not turn, so its newest reading there is the bias.
+    /// Notes that the vehicle moves: what it has just stood on did not turn, so its newest reading there is the bias. A turn
+    /// that has lasted until now ([`LASTING`]) contradicts the bias, as a standstill does.
     pub fn moves(&mut self) {
         let (sum, samples) = core::mem::take(&mut self.lasting);
         if samples > LASTING {

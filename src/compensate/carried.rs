@@ -31,8 +31,9 @@ impl Carried {
         }
     }
 
-    /// Returns the rate that is sent for this one, with what waits up to `most`, and the rate that standstill withholds.
-    /// Nothing is carried into a reading that is not good, because a receiver drops it.
+    /// Returns the rate to send for `rate`: zero at standstill, less what waits, of which one rate carries at most `most`. The
+    /// second value is the rate that standstill has withheld. A reading that is not good carries nothing, because a receiver
+    /// drops it.
     pub fn send(
         &mut self,
         rate: i64,

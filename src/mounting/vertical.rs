@@ -11,8 +11,9 @@
 //!
 //! The vertical of earlier drives is a claim. A standstill whose vertical differs from it by more than a street can slope
 //! drops the claim, because the sensor was moved. Until a turn or another standstill agrees with one of the two, the angle
-//! between them is part of the variance. So is the scatter of the standstills where it exceeds that of streets. One standstill and the turns after it may all be on one ramp,
-//! which looks like a tilt: until a second standstill has shown it, the tilt is part of the variance with that probability.
+//! between them is part of the variance. So is the scatter of the standstills where it exceeds that of streets. One
+//! standstill and the turns after it may all be on one ramp, which looks like a tilt: until a second standstill has shown
+//! the tilt, its square times that probability ([`RAMP`]) is part of the variance.
 
 use super::{Rotation, metre_per_sec2};
 use crate::health::slow::Knowledge;

@@ -54,11 +54,11 @@ fn number() -> Option<u32> {
     (status == READY).then(|| RNG.dr().read()).filter(|number| *number != 0)
 }
 
-/// Waits for a value, for [`LONGEST`].
-fn within<T>(mut look: impl FnMut() -> Option<T>) -> Option<T> {
+/// Reads until there is a value, for [`LONGEST`] at most.
+fn within<T>(mut read: impl FnMut() -> Option<T>) -> Option<T> {
     let start = Instant::now();
     loop {
-        let found = look();
+        let found = read();
         if found.is_some() || start.elapsed() > LONGEST {
             return found;
         }

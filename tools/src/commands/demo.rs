@@ -37,7 +37,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, common: Common) -> super::Result {
-    // It takes as long as everything else.
+    // The tunnels take as long as everything else.
     std::thread::scope(|scope| {
         let tunnel = scope.spawn(|| tunnel(args));
         results(args, common, || tunnel.join().unwrap_or_else(|panic| resume_unwind(panic)))
