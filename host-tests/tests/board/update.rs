@@ -11,8 +11,8 @@ use gyronet::service::device::{Firmware, FirmwareState};
 use gyronet::store::firmware::{MAX_IMAGE, Trailer};
 use gyronet::store::layout::FLASH_BASE;
 use gyronet::store::{Configuration, Slot};
-use gyronet_host_tests::board::{At, Board, CanBus, Seen};
-use gyronet_host_tests::image;
+use gyronet_host_tests::board::{At, Board, CanBus, PACKAGES, Seen};
+use gyronet_host_tests::{image, require};
 use gyronet_tools::client::bus::Bus;
 use gyronet_tools::client::device::update::{Update, update};
 use gyronet_tools::client::device::{Authority, Device};
@@ -30,6 +30,7 @@ const TRIAL: Duration = Duration::from_secs(60);
 const BACK: Duration = Duration::from_secs(1);
 
 fn built(test: &str) -> Option<Update> {
+    require::python(test, PACKAGES)?;
     image::update(test, env!("CARGO_TARGET_TMPDIR"))
 }
 

@@ -27,7 +27,7 @@ fn learned(k: usize) -> Learned {
 /// Flash contents before writes that need the most different operations: the first of all, a
 /// plain one, and each that changes to another sector, until both sectors have been used twice.
 fn starts<R: Record>(make: fn(usize) -> R) -> Vec<(F405, usize, u64)> {
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Rc::new(RefCell::new(F405::up_to(layout::STORE.end as usize)));
     // The other records must survive too.
     let mut store = open(&flash).expect("an empty flash");
     store.set(&Accepted::NONE.with(Slot::B, 7)).expect("it is stored");
