@@ -12,8 +12,8 @@
 //! - A span longer than a grid step is refused: set the part to 100 Hz or more.
 
 use crate::health::count;
-use crate::sample::{FogSample, PERIOD_US, RATE_HZ};
-use crate::units::{Angle, AngularRate, Micros};
+use crate::sample::{FogSample, PERIOD_US};
+use crate::units::{Angle, Micros};
 use heapless::Deque;
 
 /// The number of increments kept: those that a 1 kHz part sends in the 20 ms that a step can wait, and half as many
@@ -28,20 +28,6 @@ pub struct Turn {
     pub angle: [Option<Angle>; 3],
     /// The part of the step that the increments cover, microseconds; less than [`PERIOD_US`] marks a gap.
     pub covered: u32,
-}
-
-impl Turn {
-    /// Returns the mean rate about an axis over the step, rounded to nearest; `None` where the axis was not good
-    /// throughout, or a part of the step is not covered.
-    pub fn rate(&self, axis: usize) -> Option<AngularRate> {
-        let Angle(angle) = self.angle.get(axis).copied().flatten()?;
-        if u64::from(self.covered) != PERIOD_US {
-            return None;
-        }
-        const SHIFT: u32 = Angle::FRACTION_BITS - AngularRate::FRACTION_BITS;
-        let per_second = angle.checked_mul(i64::from(RATE_HZ))?.checked_add(1 << (SHIFT - 1))? >> SHIFT;
-        i32::try_from(per_second).ok().map(AngularRate)
-    }
 }
 
 /// Event counters. They saturate.

@@ -215,3 +215,15 @@ proptest! {
         prop_assert!(taken[second..].iter().all(|taken| *taken), "{:?}", taken);
     }
 }
+
+/// At 400 Hz a step has four samples; of jitter the next one may come early.
+#[test]
+fn a_caller_is_told_before_the_sample_that_completes_a_step() {
+    let mut aligner = Aligner::default();
+    assert!(aligner.is_nearly_complete(), "the first sample is a step");
+    (0..=40).for_each(|k| drop(steps(&mut aligner, sample(k * 2_500, 0))));
+    for (after, is_nearly) in [(2_500, false), (5_000, false), (7_400, true), (10_000, false)] {
+        steps(&mut aligner, sample(100_000 + after, 0)).expect("used");
+        assert_eq!(aligner.is_nearly_complete(), is_nearly, "{after} us after the step");
+    }
+}

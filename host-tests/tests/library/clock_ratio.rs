@@ -3,7 +3,7 @@
 
 use gyronet::align::clock_ratio::{ClockRatio, ClockRatioConfig, JITTER_US, RatioEstimator};
 use gyronet::sample::PERIOD_US;
-use gyronet::units::{AngularRate, Micros, Yaw};
+use gyronet::units::{Angle, AngularRate, Micros, Yaw};
 use gyronet_host_tests::noise::{Noise, cases};
 use gyronet_host_tests::synthetic::rate;
 use proptest::prelude::*;
@@ -126,6 +126,19 @@ fn a_ratio_multiplies_to_the_nearest_code() {
         assert_eq!(one_percent.turned(AngularRate(code)), turned, "{code}");
     }
     assert_eq!(ClockRatio(u32::MAX).turned(AngularRate(i32::MIN)), -8_589_934_590);
+}
+
+/// The increments of a fibre-optic gyro whose clock is off are multiplied so, to within a code.
+#[test]
+fn a_ratio_multiplies_an_angle_of_any_size() {
+    for share in [0.96, 0.999, 1.0, 1.001, 1.04] {
+        let ratio = ClockRatio((share * f64::from(ClockRatio::ONE.0)) as u32);
+        for code in [0, 1, -1, 65_535, -65_537, 123_456_789_012, -123_456_789_012, 1 << 45, -(1 << 45)] {
+            let exact = i128::from(code) * i128::from(ratio.0);
+            let off = i128::from(ratio.angle(Angle(code)).0) * i128::from(ClockRatio::ONE.0) - exact;
+            assert!(off.abs() <= i128::from(ClockRatio::ONE.0), "{code} by {share}: off by {off}");
+        }
+    }
 }
 
 /// 6.67 %: time stamps that were taken for microseconds and are none.

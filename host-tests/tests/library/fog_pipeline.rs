@@ -1,5 +1,6 @@
 //! A fibre-optic gyro's messages: what they say of gaps, and of what is missing.
 
+use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::bias::Latitude;
 use gyronet::estimate::YawEstimate;
 use gyronet::fog::{FogConfig, FogPipeline};
@@ -168,4 +169,30 @@ fn a_step_that_is_partly_covered_has_no_rate() {
         assert_eq!((yaw.rate.0, yaw.quality), (0, Quality::Unusable), "step {step}");
         assert!(yaw.faults.0 & Faults::GAP.0 != 0, "step {step}");
     }
+}
+
+/// Where the board's clock is exact, a gyro's clock that is 1 % fast turns nothing; before it is measured, sigma says so.
+#[test]
+fn a_clock_that_is_off_is_expected_until_it_is_measured() {
+    let config = FogConfig {
+        latitude: Latitude::from_degrees(0.0),
+        clock_ratio: Some(ClockRatioConfig::DEFAULT),
+        ..FogConfig::DEFAULT
+    };
+    let mut fog = FogPipeline::new(config, false);
+    fog.confirm();
+    let mut sent = Vec::new();
+    for step in 1..4_001 {
+        let now = Micros(step * (PERIOD_US - PERIOD_US / 100));
+        fog.add(now, sample(step)).expect("in order");
+        sent.extend(std::iter::from_fn(|| fog.next_step(now, Some(&wheels()))));
+    }
+    let rate = 100.0 * TURN as f64 / f64::from(Angle::PER_RAD);
+    let mean = |sent: &[YawEstimate]| {
+        let sum = |of: fn(&YawEstimate) -> f64| sent.iter().map(of).sum::<f64>() / sent.len() as f64 / rate;
+        [sum(|yaw| yaw.rate.rad_per_sec()), sum(|yaw| yaw.sigma.expect("known").rad_per_sec())]
+    };
+    let ([before, expected], [after, known]) = (mean(&sent[200..500]), mean(&sent[3_000..]));
+    assert!((before - 1.0 / 0.99).abs() < 1e-3 && (0.009..0.02).contains(&expected), "{before} {expected}");
+    assert!((after - 1.0).abs() < 2e-4 && known < expected - 5e-3, "{after} {known}");
 }

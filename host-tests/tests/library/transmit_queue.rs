@@ -89,6 +89,18 @@ fn a_frame_that_is_given_back_is_not_lost() {
     assert_eq!(queue.pop(), None);
 }
 
+#[test]
+fn the_oldest_frame_can_be_looked_at_and_dropped() {
+    let mut queue = TransmitQueue::<DataFrame, 3>::new();
+    queue.drop_front();
+    assert_eq!((queue.front(), queue.dropped()), (None, 0));
+    (0..2).for_each(|number| queue.enqueue(frame(number)));
+    assert_eq!(queue.front(), Some(&frame(0)));
+    queue.drop_front();
+    assert_eq!((queue.front(), queue.dropped()), (Some(&frame(1)), 1));
+    assert!(!frame(0).is_extended(), "an identifier of 11 bits");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 

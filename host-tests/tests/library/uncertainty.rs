@@ -193,6 +193,63 @@ fn a_tilt_that_one_standstill_has_shown_may_be_a_ramp_to_a_gyro_beside() {
     assert!((0.016..0.022).contains(&missed), "1 - cos of 11 degrees: {missed}");
 }
 
+/// A tilt that is not taken off adds to a mounting by eye, one that is takes its place; half its square is missed.
+#[test]
+fn a_tilt_in_use_is_part_of_the_expected_error() {
+    for (levelled, mounting) in [(false, root(&[0.02, 0.2])), (true, 0.2)] {
+        let mut uncertainty = Uncertainty::new(ERRORS);
+        uncertainty.tilt(0.04, levelled);
+        turn(&mut uncertainty, 2.0, [0.03, -0.04, 0.5, 0.0]);
+        let due = root(&[3e-4, root(&[0.01, 0.02]) * 0.5, mounting * 0.05, 0.005 * 0.5]);
+        let found = uncertainty.sigma(Origin::Gyro, 0.0).rad_per_sec();
+        assert!((found / due - 1.0).abs() < 1e-4, "{levelled}: {found} is not {due}");
+    }
+    let mut precise = Uncertainty::new(ERRORS);
+    precise.tilt(1e-6, true);
+    turn(&mut precise, 2.0, [0.3, -0.4, 0.0, 0.0]);
+    assert_sigma(
+        precise.sigma(Origin::Gyro, 0.0),
+        root(&[3e-4, 0.002 * 0.5]),
+        "no better than a calibration",
+    );
+}
+
+#[test]
+fn a_gain_by_courses_counts_where_it_is_better() {
+    let mut uncertainty = Uncertainty::new(ERRORS);
+    turn(&mut uncertainty, 2.0, [0.0, 0.0, 0.5, 0.0]);
+    for (sigma, gain) in [(0.02, 0.01), (0.004, 0.004)] {
+        uncertainty.gain(sigma);
+        assert_sigma(
+            uncertainty.sigma(Origin::Gyro, 0.0),
+            root(&[3e-4, gain * 0.5]),
+            "the better of the two",
+        );
+    }
+}
+
+#[test]
+fn the_last_second_shows_how_far_the_vehicle_leans_and_a_turn_s_axis() {
+    let mut uncertainty = Uncertainty::new(ERRORS);
+    turn(&mut uncertainty, 1.0, [0.012, -0.016, 0.1, 0.0]);
+    assert!((uncertainty.leaning() - 0.02).abs() < 1e-6, "{}", uncertainty.leaning());
+    // 1 - cos of 0.2 rad; 0.1 rad are no turn yet by which the minute could show it.
+    assert_eq!(uncertainty.tilted(), 0.0);
+    assert!((uncertainty.tilted_now() - 0.02).abs() < 1e-5, "{}", uncertainty.tilted_now());
+    turn(&mut uncertainty, 1.0, [0.0, 0.02, 0.04, 0.0]);
+    assert_eq!(uncertainty.tilted_now(), 0.0, "too slow a turn to tell");
+}
+
+/// What a banked turn misses adds linearly with the bias.
+#[test]
+fn a_minute_of_a_banked_turn_misses_the_same_share_throughout() {
+    let mut uncertainty = Uncertainty::new(ERRORS);
+    turn(&mut uncertainty, 100.0, [0.0, 0.1, 0.5, 0.0]);
+    let due = root(&[3e-4 * 60f64.sqrt(), root(&[1e-4, 0.02 * 0.5]) * 60.0, 0.01 * 30.0, 0.02 * 6.0]);
+    let found = f64::from(uncertainty.minute(Missed::NOTHING));
+    assert!((found / due - 1.0).abs() < 1e-3, "{found} is not {due}");
+}
+
 /// The angles that many gaps leave out of one turn add up.
 #[test]
 fn gaps_in_one_turn_add_linearly_and_those_in_opposite_turns_cancel() {
@@ -200,6 +257,7 @@ fn gaps_in_one_turn_add_linearly_and_those_in_opposite_turns_cancel() {
     let gap = |angle: f32| Missed { angle, variance: 0.0 };
     (0..20).for_each(|_| uncertainty.miss(gap(0.01)));
     assert!((uncertainty.minute(Missed::NOTHING) - 0.2).abs() < 1e-5);
+    assert!((uncertainty.minute(gap(0.05)) - 0.25).abs() < 1e-5, "and that of a gap that is still open");
     (0..20).for_each(|_| uncertainty.miss(gap(-0.01)));
     assert!(uncertainty.minute(Missed::NOTHING) < 1e-5);
 }

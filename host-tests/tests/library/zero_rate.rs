@@ -349,7 +349,23 @@ fn a_turn_since_a_standstill_without_wheels_is_expected_until_the_vehicle_drives
     ended.moves();
     assert!(pass(&mut ended, 0.01, Standing::UNKNOWN, 100) < 3e-4, "it pulled away in a turn");
     zero_rate.moves();
-    assert!(pass(&mut zero_rate, 0.0, Standing::UNKNOWN, 1_000) > 5e-3, "nothing pulls away so slowly");
+    let doubt = pass(&mut zero_rate, 0.0, Standing::UNKNOWN, 1_000);
+    assert!((0.009..0.011).contains(&doubt), "nothing pulls away so slowly: {doubt}");
+}
+
+/// A deck may have turned since the bias was read: four sigma of two means that each have an offset and a noise.
+#[test]
+fn the_last_reading_before_driving_off_is_the_bias_where_it_differs_by_more_than_noise() {
+    let ZeroRateConfig { initial, standstill, noise, .. } = ZeroRateConfig::DEFAULT;
+    let gate = 4.0 * (2.0 * (initial * initial + standstill * standstill + noise * noise)).sqrt();
+    for (share, is_taken) in [(0.95, false), (1.05, true), (-0.95, false), (-1.05, true)] {
+        let mut zero_rate = ZeroRate::claimed(ZeroRateConfig::DEFAULT, 0.0, Some(0.0), 0.0);
+        zero_rate.rest(share * gate, 0.0);
+        zero_rate.moves();
+        let due = if is_taken { f64::from(share * gate) } else { 0.0 };
+        let bias = zero_rate.bias().rad_per_sec();
+        assert!((bias - due).abs() < 1e-7 && zero_rate.is_confirmed(), "{share} of the gate: {bias}");
+    }
 }
 
 /// The reading at rest before a vehicle drives off is its bias. Neither a saturated reading nor creeping, in which the wheels

@@ -1,5 +1,6 @@
 //! A calibration runs at standstill, and its result is stored when that is asked for.
 
+use super::uds::Bench;
 use super::{Board, GOOD, LEVEL, observe, sample, start};
 use gyronet::bias::{BiasCurve, CurveFilter};
 use gyronet::heading::Gain;
@@ -82,7 +83,10 @@ fn the_map_of_a_unit_is_kept_for_the_weights_it_was_found_with() {
     let unit = |weights| Some(UnitMap { gyro_map, weights });
     let refused = Refusal::OtherWeights { found: runs ^ 1, runs };
     assert_eq!(board.set_unit(unit(runs ^ 1)), Err(refused));
-    assert_eq!(board.set_unit(unit(runs)), Ok(()));
+    let mut tester = Bench::new(&flash);
+    tester.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    let record = postcard::to_allocvec(&unit(runs)).expect("memory");
+    tester.expect(&[&[0x2E, 1, 0x0D][..], &record].concat(), &[0x6E, 1, 0x0D]);
     let board = start(&flash);
     assert_eq!(board.calibration().gyro_map(runs), Some(gyro_map));
     let of =

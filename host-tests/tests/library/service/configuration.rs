@@ -2,10 +2,13 @@
 
 use super::{Board, GOOD, IDENTITY, LEVEL, SUPPORTED_HARDWARE, bare, info, sample, start};
 use embedded_can::{Id, StandardId};
-use gyronet::can::config::{ConfigError, Settings};
+use gyronet::bias::{EarthRate, Latitude, StaticConfig};
+use gyronet::can::config::{Config, ConfigError, Settings};
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::wheel::{WheelFrame, WheelSettings};
-use gyronet::heading::{GnssProtocol, GnssSettings};
+use gyronet::compensate::CompensateConfig;
+use gyronet::fog::Tilt;
+use gyronet::heading::{GnssProtocol, GnssSettings, HeadingSettings};
 use gyronet::health::{Faults, Status};
 use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::event::EventKind;
@@ -13,7 +16,9 @@ use gyronet::service::message::{FlashState, Origin, Refusal};
 use gyronet::standstill::{Standing, StandstillSource};
 use gyronet::store::layout;
 use gyronet::store::slots::{SlotError, WeightSource};
-use gyronet::store::{Configuration, Field, FieldError, FlashFault, FogPart, ImuPart, Mounting, StoreError};
+use gyronet::store::{Calibration, Learned, Level, StoreError};
+use gyronet::store::{Configuration, Field, FieldError, FlashFault, FogGyro, FogPart, ImuPart, Mounting};
+use gyronet::units::SpecificForce;
 use gyronet_host_tests::flash::{F405, MappedRegion, Region};
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -240,4 +245,46 @@ fn flash_is_written_at_standstill_alone() {
         assert_eq!(request(&mut board), Err(Refusal::Moving), "{number}");
         assert_eq!(board.refusal(), Some(Refusal::Moving), "testers can read it");
     }
+}
+
+/// Each value differs from the default.
+#[test]
+fn every_setting_reaches_the_coprocessor() {
+    let static_init = StaticConfig { gyro_bias: 0.05, ..StaticConfig::DEFAULT };
+    let compensate = CompensateConfig { model: false, ..CompensateConfig::DEFAULT };
+    let heading = HeadingSettings { nmea2000: true, ..HeadingSettings::NONE };
+    let mut can = Settings::DEFAULT;
+    can.bits_per_second = 1_000_000;
+    let set = Configuration {
+        fog: Some(FogPart::Dsp1760),
+        can,
+        latitude_deg: Some(37.0),
+        mounting: Mounting { roll_deg: 0.0, pitch_deg: 0.0, yaw_deg: 90.0 },
+        static_init,
+        compensate,
+        fog_ids: [0x2A0, 0x2A1, 0x2A2],
+        fog_gyro: FogGyro { tilt_deg: 10.0 },
+        heading,
+        ..Configuration::DEFAULT
+    };
+    let force = [SpecificForce(1), SpecificForce(2), SpecificForce(3)];
+    let learned = Learned { specific_force: Some(force), ..Learned::NOTHING };
+    let config = set.coprocessor(&Calibration::NONE, &learned, 0);
+    assert_eq!(
+        (config.can, config.fog_ids, config.fog_expected),
+        (Config::new(can).expect("valid"), set.fog_ids, true)
+    );
+    let (latitude, tilt) = (Latitude::from_degrees(37.0), Tilt::from_degrees(10.0).expect("valid"));
+    assert_eq!((config.fog.latitude, config.fog.tilt, config.heading.is_some()), (latitude, tilt, true));
+    let pipeline = config.pipeline;
+    assert_eq!((pipeline.static_init, pipeline.compensate), (static_init, compensate));
+    assert_eq!(pipeline.earth_rate, latitude.map(EarthRate::Subtracted).expect("valid"));
+    assert_eq!(Some(pipeline.mounting), set.mounting.rotation());
+    assert!(pipeline.levelling && pipeline.rest_force == Some(force));
+    let level = Some(Level { roll_deg: 1.0, pitch_deg: 2.0 });
+    let calibrated = set.pipeline(&Calibration { level, ..Calibration::NONE }, &learned, 0);
+    let both = level.and_then(|level| Some(set.mounting.rotation()?.then(&level.rotation()?)));
+    assert_eq!((calibrated.levelling, Some(calibrated.mounting)), (false, both));
+    let bare = Configuration::DEFAULT.coprocessor(&Calibration::NONE, &learned, 0);
+    assert!(!bare.fog_expected && bare.heading.is_none() && bare.fog.latitude.is_none());
 }

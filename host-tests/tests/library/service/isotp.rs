@@ -177,3 +177,42 @@ fn what_the_standard_does_not_have_is_counted_and_answered_by_nothing() {
         assert_eq!(transport.errors().unexpected, k as u32 + 1, "{data:02x?}");
     }
 }
+
+#[test]
+fn a_tester_s_request_arrives_whole_and_one_that_is_too_long_is_not_sent() {
+    let (mut tester, mut board) = (Transport::new(), Transport::new());
+    assert!(!tester.send(&long(MAX_MESSAGE + 1)));
+    for length in [1, 7, 8, 300, MAX_MESSAGE] {
+        let request = long(length);
+        assert!(tester.send(&request), "{length}");
+        for now in 0..1_000 {
+            if let Some(data) = tester.next_frame(now) {
+                board.receive(&data, now);
+                tester.frames_left(now);
+            }
+            if let Some(data) = board.next_frame(now) {
+                tester.receive(&data, now);
+            }
+        }
+        assert_eq!(board.request(), Some(&*request), "{length}");
+        assert!(board.answer(|_, _| ()) && tester.is_idle());
+    }
+}
+
+/// ISO 15765-2 9.6.5.5: codes from 0xF1 to 0xF9 are hundreds of microseconds.
+#[test]
+fn a_flow_control_sets_the_gap_or_ends_the_response() {
+    for (code, gap) in [(0, 0), (3, 3), (0xF1, 1), (0xF9, 1), (0xF0, 0x7F), (0xFA, 0x7F)] {
+        let mut transport = Transport::new();
+        assert!(transport.send(&long(30)) && transport.next_frame(0).is_some());
+        transport.receive(&[0x30, 0, code], 0);
+        assert!(transport.next_frame(0).is_some());
+        transport.frames_left(0);
+        let next = (0..200).find(|now| transport.next_frame(*now).is_some());
+        assert_eq!(next, Some(if gap == 0 { 0 } else { gap + 1 }), "{code:x}");
+    }
+    let mut transport = Transport::new();
+    assert!(transport.send(&long(30)) && transport.next_frame(0).is_some());
+    transport.receive(&[0x32, 0, 0], 0);
+    assert!(transport.is_idle() && transport.errors().overflow == 1);
+}

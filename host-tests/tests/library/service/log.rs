@@ -3,7 +3,7 @@
 use super::{IDENTITY, LEVEL, bare, info, observe, sample};
 use gyronet::health::{Faults, Status};
 use gyronet::sample::Standstill;
-use gyronet::service::event::{EventKind, ResetCause, SensorFault};
+use gyronet::service::event::{Crash, CrashKind, EventKind, ResetCause, SensorFault};
 
 #[test]
 fn sensor_that_does_not_answer_is_noted_once() {
@@ -40,4 +40,21 @@ fn the_log_is_bounded_and_reports_what_is_lost() {
         after = last.number;
     }
     assert_eq!((events, lost, after), (32, 68, 102));
+}
+
+#[test]
+fn a_crash_is_told_with_its_place() {
+    let crash = IDENTITY.crash.expect("there is one");
+    let mut panic = Crash { kind: CrashKind::Panic, place: 12, count: 3, ..crash };
+    panic.file[..11].copy_from_slice(b"src/main.rs");
+    assert_eq!(panic.to_string(), "panic in line 12 of src/main.rs, 3 since power-on");
+    let place = "hard fault at 0x08001234, called from 0x08000101, CFSR ";
+    for (status, rest) in [
+        (1 << 9, "0x00000200"),
+        (1 << 7, "0x00000080, address 0x20000004"),
+        (1 << 15, "0x00008000, address 0x20000004"),
+    ] {
+        let fault = Crash { link: 0x0800_0101, status, address: 0x2000_0004, ..crash };
+        assert_eq!(fault.to_string(), format!("{place}{rest}, 1 since power-on"));
+    }
 }

@@ -275,7 +275,9 @@ fn a_trouble_is_kept_when_its_cause_is_over_and_until_it_is_cleared() {
     // Stopped, the memory takes nothing; the end of the session starts it again.
     bench.expect(&[0x14, 0xFF, 0xFF, 0xFF], &[0x54]);
     bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.expect(&[0x85, 1], &[0xC5, 1]);
     bench.expect(&[0x85, 2], &[0xC5, 2]);
+    assert!(bench.server.has_session());
     bench.fail(Status::Stuck, Faults::NONE);
     bench.expect(&[0x19, 1, 8], &[0x59, 1, bit::AVAILABLE, 0, 0, 1]);
     // ISO 14229-1 D.2: not tested since the memory was cleared, nor in this cycle.
@@ -534,8 +536,11 @@ fn weights_are_downloaded_and_used_after_a_restart() {
     assert_eq!(download(&mut bench, &file), [&[0x77, 0][..], &crc(&file).to_be_bytes()].concat(), "slot A");
     bench.expect(&[0x22, 1, 3], &[&[0x62, 1, 3, 1][..], &crc(&weights::DEFAULT.0).to_be_bytes()].concat());
     bench.expect(&[0x31, 1, 0xFF, 1], &[0x71, 1, 0xFF, 1]);
+    assert!(bench.server.is_idle() && !bench.server.restart_is_due());
     bench.expect(&[0x11, 1], &[0x51, 1]);
     assert!(bench.server.restart_is_due());
+    bench.server.receive(&frame(&[0x10, 20], &[]), bench.now);
+    assert!(!bench.server.is_idle() && !bench.server.restart_is_due(), "a request is being received");
     let mut after = Bench::new(&flash);
     after.expect(&[0x22, 1, 3], &[&[0x62, 1, 3, 2][..], &crc(&file).to_be_bytes()].concat());
 }
