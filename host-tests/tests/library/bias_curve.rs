@@ -2,6 +2,7 @@
 //! warms up, and after the sensor was moved.
 
 use gyronet::bias::{BiasCurve, CurveFilter};
+use gyronet::health::slow::Knowledge;
 use gyronet::health::{Faults, Quality, Status};
 use gyronet::pipeline::{BoardState, Output, Pipeline, PipelineConfig, UncertaintyConfig};
 use gyronet::sample::{ImuSample, Standstill, WHEELS, WheelSample};
@@ -73,9 +74,11 @@ fn bias_sigma(output: &Output) -> f64 {
 
 #[test]
 fn a_vehicle_that_drives_off_at_once_has_a_rate_with_its_sigma() {
-    let (_, without) = run(PipelineConfig::DEFAULT, 500, |_| 35.0, 0, 0.1);
+    let (pipeline, without) = run(PipelineConfig::DEFAULT, 500, |_| 35.0, 0, 0.1);
+    assert_eq!(pipeline.status(None).bias, Knowledge::Unknown);
     assert!(without.iter().all(|output| output.vehicle.delayed.status == Status::Init));
-    let (_, with) = run(known(), 500, |_| 35.0, 0, 0.1);
+    let (pipeline, with) = run(known(), 500, |_| 35.0, 0, 0.1);
+    assert_eq!(pipeline.status(None).bias, Knowledge::Coarse);
     // The first second shows whether the sensor is where it was.
     let (first, with) = with.split_at(100);
     assert!(first.iter().all(|output| output.vehicle.delayed.status == Status::Init));

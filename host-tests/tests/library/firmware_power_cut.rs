@@ -3,7 +3,7 @@
 
 use embedded_storage::nor_flash::NorFlash;
 use gyronet::model::blob::CRC;
-use gyronet::store::firmware::{self, Label, Trailer, confirm, select};
+use gyronet::store::firmware::{self, Label, MAX_IMAGE, Trailer, confirm, select};
 use gyronet::store::layout::RECORD_SECTOR;
 use gyronet::store::{Slot, Upload};
 use gyronet_host_tests::flash::{Cut, F405, Region};
@@ -21,12 +21,16 @@ fn region(flash: &Flash) -> Region<RECORD_SECTOR> {
 
 /// Writes an image to a slot and has it tried at the next start, as the device does; what fails is given up.
 fn update(flash: &Flash, slot: Slot, seed: u64, number: u32) -> Option<()> {
-    let (mut region, image) = (region(flash), image(&LABEL, seed));
+    write(flash, slot, &image(&LABEL, seed), number)
+}
+
+fn write(flash: &Flash, slot: Slot, image: &[u8], number: u32) -> Option<()> {
+    let mut region = region(flash);
     let mut upload = Upload::firmware(&mut region, slot, image.len() as u32).ok()?;
     for (block, offset) in image.chunks(256).zip((0..).step_by(256)) {
         upload.block(&mut region, offset, block).ok()?;
     }
-    let trailer = Trailer::new(image.len() as u32, CRC.checksum(&image), 0, number);
+    let trailer = Trailer::new(image.len() as u32, CRC.checksum(image), 0, number);
     firmware::activate(&mut region, slot, &trailer).ok()
 }
 
@@ -132,5 +136,27 @@ fn no_mixture_of_a_cut_erase_is_a_trailer() {
             assert_eq!(Trailer::read(&mut region(&flash), Slot::B), None, "{cut:?} {round}");
             assert_eq!(start(&flash, false), Some(Slot::A));
         }
+    }
+}
+
+#[test]
+fn a_trial_that_the_watchdog_has_ended_is_over() {
+    let flash = Flash::default();
+    assert!(update(&flash, Slot::A, 1, 1).is_some() && start(&flash, false) == Some(Slot::A));
+    assert!(confirm(&mut region(&flash), Slot::A));
+    // Its last block is a short one.
+    let short = image(&LABEL, 2);
+    assert!(write(&flash, Slot::B, &short[..short.len() - 100], 2).is_some());
+    assert_eq!(start(&flash, true), Some(Slot::B), "what failed was not on trial");
+    assert_eq!([true, false].map(|has_failed| start(&flash, has_failed)), [Some(Slot::A); 2]);
+}
+
+#[test]
+fn a_trailer_of_an_image_longer_than_its_slot_is_none() {
+    for (length, is_read) in [(MAX_IMAGE, true), (MAX_IMAGE + 4, false)] {
+        let flash = Flash::default();
+        let trailer = Trailer::new(length, 0, 0, 1);
+        firmware::activate(&mut region(&flash), Slot::B, &trailer).expect("an erased flash");
+        assert_eq!(Trailer::read(&mut region(&flash), Slot::B).is_some(), is_read, "{length}");
     }
 }

@@ -5,8 +5,8 @@ use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::health::Faults;
 use gyronet::health::Status::{Degraded, Init};
 use gyronet::pipeline::{BoardState, Output};
-use gyronet::sample::PERIOD_US;
-use gyronet::units::Micros;
+use gyronet::sample::{PERIOD_US, Standstill, WheelSample};
+use gyronet::units::{Micros, WheelSpeed};
 use gyronet_host_tests::inputs;
 use gyronet_host_tests::stream::{faults, new, statuses};
 use gyronet_host_tests::synthetic::{rate, turning};
@@ -59,4 +59,24 @@ fn silent_wheels_are_a_fault() {
         faults(&outputs),
         [(Faults::NONE, lost as usize), (Faults::WHEELS, 200 - lost as usize), (Faults::NONE, 90)]
     );
+}
+
+/// A vehicle of which two wheels are read has lost none.
+#[test]
+fn one_wheel_that_falls_silent_is_a_fault_and_one_that_never_spoke_is_none() {
+    let [speed, none] = [Some(WheelSpeed(0)), None];
+    let mut pipeline = new();
+    for (tick, speeds, is_lost) in [
+        (0, [speed, speed, none, none], false),
+        (1, [speed, none, none, none], true),
+        (2, [speed, speed, none, none], false),
+        (3, [none; 4], true),
+    ] {
+        let sample = turning(tick, rate(0.001));
+        let wheels = WheelSample { time: sample.time, speeds, standstill: Standstill::Unknown };
+        let output = pipeline.correct(sample, Some(&wheels), &BoardState::GOOD).expect("in time");
+        assert_eq!(output.vehicle.live.faults.0 & Faults::WHEELS.0 != 0, is_lost, "{speeds:?}");
+    }
+    let (tick, silent) = (pipeline.tick(), pipeline.silent(3, &BoardState::GOOD));
+    assert_eq!([silent.live.tick, silent.delayed.tick, silent.tick], [tick + 3; 3]);
 }

@@ -206,3 +206,19 @@ fn a_revision_while_the_vehicle_stands_is_given_back_when_it_moves() {
     assert!(complete > ALL - 20);
     assert_eq!(sent + compensator.pending(Remaining::default()), best);
 }
+
+/// The delayed rates are seven samples behind; a second carries at most 100 revisions of 1 deg/s.
+#[test]
+fn what_a_second_carries_is_known_and_bounded() {
+    for (hidden, due) in [(0.01, 0.005), (0.05, 1f64.to_radians())] {
+        let mut compensator = Compensator::new(CompensateConfig::DEFAULT);
+        for tick in 0..57 {
+            compensator.add(tick, [AngularRate::ZERO, AngularRate::ZERO, rate(hidden)], Validity::Good);
+            compensator.delayed(Remaining::default(), true);
+        }
+        assert_eq!(compensator.carried_in_a_second(), 0.0);
+        compensator.end_standstill();
+        let found = f64::from(compensator.carried_in_a_second());
+        assert!((found - due).abs() < 1e-6, "{hidden}: {found}");
+    }
+}

@@ -7,6 +7,8 @@ use gyronet::can::e2e::{Checker, DataIdMode, P01, Profile, Verdict as Received};
 use gyronet::can::status::{Evidence, Knowledge, STATUS_ID, SlowStatus, Verdict, emit};
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::coprocessor::TimedFrame;
+use gyronet::mounting::GyroMap;
+use gyronet::pipeline::{Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::units::Micros;
 use gyronet::{Config, Coprocessor};
@@ -154,4 +156,21 @@ fn wheels_decide_where_they_are_known() {
     let frames = run(&mut board, 701..1201, None);
     let silent = SlowStatus { evidence: Evidence::Inertial, ..stands };
     assert_says(frames.last().expect("the newest"), silent);
+}
+
+#[test]
+fn what_calibration_and_earlier_drives_have_shown_is_known_before_the_first_standstill() {
+    use Knowledge::{Coarse, Fine, Unknown};
+    let gyro_map =
+        GyroMap::from_elements([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.002]]).expect("a unit's");
+    let default = PipelineConfig::DEFAULT;
+    for (config, gain, mounting) in [
+        (default, Unknown, Unknown),
+        (PipelineConfig { gyro_map, ..default }, Fine, Unknown),
+        (PipelineConfig { levelling: false, ..default }, Unknown, Coarse),
+        (PipelineConfig { levelling: false, forward: Fine, ..default }, Unknown, Fine),
+    ] {
+        let status = Pipeline::new(config).status(None);
+        assert_eq!((status.bias, status.gain, status.mounting), (Unknown, gain, mounting));
+    }
 }

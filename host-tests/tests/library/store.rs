@@ -1,6 +1,6 @@
 //! Records: ranges, versions, damage, and where they lie.
 
-use embedded_storage::nor_flash::NorFlash;
+use embedded_storage::nor_flash::{NorFlash, NorFlashErrorKind};
 use gyronet::bias::{BiasCurve, CurveFilter};
 use gyronet::can::config::{ConfigError, YawSettings};
 use gyronet::can::wheel::{WheelConfigError, WheelSettings};
@@ -9,9 +9,10 @@ use gyronet::store::firmware;
 use gyronet::store::layout::{self, RECORD_SECTOR, SECTORS, SLOT_SIZE, sector_at};
 use gyronet::store::slots::{SlotError, file, select};
 use gyronet::store::{
-    Accepted, Access, Configuration, Field, FieldError, Learned, Mounting, Record, Slot, Store, StoreError,
+    Accepted, Access, Calibration, Configuration, Field, FieldError, FlashFault, Learned, Level, Mounting,
+    Record, Slot, Store, StoreError,
 };
-use gyronet::units::{AngularRate, CentiCelsius};
+use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
 use gyronet_host_tests::flash::{F405, Region};
 use gyronet_host_tests::noise::{Noise, cases};
 use gyronet_host_tests::recordings::workspace;
@@ -290,4 +291,35 @@ fn a_damaged_header_heals_with_the_next_record() {
     assert!(store.damaged() && store.get() == Ok(Some(Configuration::DEFAULT)), "a copy stands for it");
     store.set(&Configuration::DEFAULT).expect("it is stored");
     assert!(!store.damaged() && store.has_room() && !open(&flash).damaged());
+}
+
+#[test]
+fn a_calibration_that_cannot_be_is_refused_by_its_field() {
+    let of = |roll_deg, pitch_deg| {
+        Calibration { level: Some(Level { roll_deg, pitch_deg }), ..Calibration::NONE }.check()
+    };
+    assert_eq!(of(30.0, -30.0), Ok(()));
+    for (calibration, expected) in
+        [(of(f32::NAN, 0.0), Field::CalibrationRollDeg), (of(0.0, 1e3), Field::CalibrationPitchDeg)]
+    {
+        assert!(
+            matches!(calibration, Err(FieldError::Range { field, .. }) if field == expected),
+            "{calibration:?}"
+        );
+    }
+}
+
+#[test]
+fn a_fault_of_the_flash_keeps_its_kind() {
+    let kinds = [NorFlashErrorKind::NotAligned, NorFlashErrorKind::OutOfBounds, NorFlashErrorKind::Other];
+    let faults = [FlashFault::NotAligned, FlashFault::OutOfBounds, FlashFault::Refused];
+    assert_eq!(kinds.map(FlashFault::from), faults);
+}
+
+#[test]
+fn a_reading_at_rest_that_repeats_stays_the_same() {
+    let force = [100, -200, 1_000_000].map(SpecificForce);
+    let mut learned = Learned::NOTHING;
+    (0..3).for_each(|_| learned.add_standstill(force));
+    assert_eq!(learned.specific_force, Some(force));
 }

@@ -368,6 +368,86 @@ fn the_last_reading_before_driving_off_is_the_bias_where_it_differs_by_more_than
     }
 }
 
+/// The largest bias bounds what is learnt, and how far the warming of the sensor opens the gate.
+#[test]
+fn no_standstill_teaches_more_than_the_largest_bias() {
+    let largest = f64::from(ZeroRateConfig::DEFAULT.max_bias);
+    let mut zero_rate = ZeroRate::new(ZeroRateConfig { initial: 0.1, ..ZeroRateConfig::DEFAULT });
+    for _ in 0..5 {
+        let _ = second(&mut zero_rate, 0.3);
+    }
+    assert!(zero_rate.bias().rad_per_sec() <= 2.0 * largest, "with the offset of this standstill");
+    zero_rate.observe(None, Standing::UNKNOWN, 0.0);
+    assert!((zero_rate.bias().rad_per_sec() - largest).abs() < 1e-6);
+    let mut hot = ZeroRate::new(ZeroRateConfig::DEFAULT);
+    let outcome = (0..RATE_HZ).filter_map(|_| hot.observe(Some(rate(0.6)), Standing::WHEELS, 10.0)).last();
+    assert_eq!(outcome, Some(ZeroRateOutcome::Refused));
+}
+
+/// The bias and the offset of the standstill are both part of what the reading is held against.
+#[test]
+fn a_second_in_which_a_turn_begins_is_expected_as_far_as_it_is_off() {
+    let config = ZeroRateConfig { initial: 0.01, standstill: 0.01, ..ZeroRateConfig::DEFAULT };
+    let mut zero_rate = ZeroRate::new(config);
+    for _ in 0..10 {
+        let _ = second(&mut zero_rate, 0.02);
+    }
+    for sample in 0..RATE_HZ {
+        let left = 0.06 + 0.04 * f64::from(sample) / f64::from(RATE_HZ);
+        zero_rate.observe(Some(rate(left)), Standing::WHEELS, 0.0);
+    }
+    let sigma = f64::from(zero_rate.sigma());
+    assert!((0.058..0.064).contains(&sigma), "0.08 rad/s, of which 0.02 are known: {sigma}");
+}
+
+/// What is hardly taken for a standstill may be a bend that begins: its rate is not the bias.
+#[test]
+fn a_bend_that_may_be_a_standstill_is_no_bias() {
+    let quiet = Standing { source: StandstillSource::Inertial, probability: 0.5, ..Standing::UNKNOWN };
+    let mut zero_rate = ZeroRate::new(ZeroRateConfig::DEFAULT);
+    for second in 0..60 {
+        for _ in 0..RATE_HZ {
+            zero_rate.observe(Some(rate(5e-5 * f64::from(second))), quiet, 0.0);
+        }
+    }
+    zero_rate.observe(None, Standing::UNKNOWN, 0.0);
+    let found = zero_rate.bias().rad_per_sec();
+    assert!((1e-7..1e-5).contains(&found), "a hundredth of it at most: {found:e}");
+}
+
+/// Ten seconds; then another stop must confirm the bias, once the vehicle has moved.
+#[test]
+fn a_reading_at_rest_is_evidence_for_ten_seconds() {
+    let claimed = || ZeroRate::claimed(ZeroRateConfig::DEFAULT, 0.0, Some(0.0), 0.0);
+    let pass = |zero_rate: &mut ZeroRate, samples: u32| {
+        for _ in 0..samples {
+            zero_rate.observe(None, Standing::UNKNOWN, 0.0);
+        }
+    };
+    for (samples, is_evidence) in [(10 * RATE_HZ - 1, true), (10 * RATE_HZ, false)] {
+        let mut zero_rate = claimed();
+        zero_rate.rest(0.0, 0.0);
+        pass(&mut zero_rate, samples);
+        zero_rate.moves();
+        assert_eq!(zero_rate.is_confirmed(), is_evidence, "{samples}");
+    }
+    for (has_moved, left) in [(false, 0.0), (true, 0.0), (false, 0.01), (true, 0.01)] {
+        let mut zero_rate = claimed();
+        pass(&mut zero_rate, 10 * RATE_HZ);
+        if has_moved {
+            zero_rate.moves();
+        }
+        for _ in 0..3 {
+            let _ = second(&mut zero_rate, left);
+        }
+        pass(&mut zero_rate, 1);
+        assert_eq!(zero_rate.is_confirmed(), has_moved, "{left}");
+        let bias = zero_rate.bias().rad_per_sec();
+        let due = if has_moved { left } else { 0.0 };
+        assert!((bias - due).abs() < 1e-4, "{has_moved} {left}: {bias}");
+    }
+}
+
 /// The reading at rest before a vehicle drives off is its bias. Neither a saturated reading nor creeping, in which the wheels
 /// turn and nothing else shows, is part of it.
 #[test]

@@ -58,8 +58,8 @@ fn calibration_is_found_and_kept() {
     }
     assert_eq!(calibrate(&mut board, Task::Static, LEVEL, 0.001), State::Found(Task::Static));
     assert_eq!(board.store_result(), Ok(()));
-    // Rolled by 30 deg: gravity shows on y.
-    let tilted = [0.0, 9.81 * 0.5, 9.81 * 0.866_025_4];
+    // Rolled and then pitched by 30 deg: gravity shows on all axes.
+    let tilted = [-9.81 * 0.5, 9.81 * 0.433_012_7, 9.81 * 0.75];
     assert_eq!(calibrate(&mut board, Task::Mounting, tilted, 0.001), State::Found(Task::Mounting));
     assert_eq!(board.store_result(), Ok(()));
     assert_eq!(
@@ -68,7 +68,7 @@ fn calibration_is_found_and_kept() {
     );
     let board = start(&flash);
     let level = board.calibration().level.expect("it was stored");
-    assert!((level.roll_deg - 30.0).abs() < 1e-3 && level.pitch_deg.abs() < 1e-3, "{level:?}");
+    assert!((level.roll_deg - 30.0).abs() < 1e-3 && (level.pitch_deg - 30.0).abs() < 1e-3, "{level:?}");
     let bias = board.learned().bias_curve.at(30.0).expect("it was stored").gyro_bias;
     assert!(bias.iter().all(|rate| (rate.rad_per_sec() - 0.01).abs() < 1e-4), "{bias:?}");
 }

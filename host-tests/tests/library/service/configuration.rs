@@ -36,8 +36,9 @@ fn configuration_is_kept_whole() {
     // Refused, and named, and the old one stays.
     let wild = Configuration { mounting: Mounting { pitch_deg: 91.0, ..Mounting::default() }, ..wanted };
     match board.set_configuration(&wild) {
-        Err(Refusal::Store(StoreError::Field(FieldError::Range { field, value, .. }))) => {
+        Err(Refusal::Store(StoreError::Field(error @ FieldError::Range { field, value, .. }))) => {
             assert_eq!((field, value), (Field::MountingPitchDeg, 91.0));
+            assert!(error.to_string().contains("mounting.pitch_deg"), "{error}");
         }
         other => panic!("{other:?}"),
     }

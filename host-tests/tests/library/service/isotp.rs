@@ -213,6 +213,8 @@ fn a_flow_control_sets_the_gap_or_ends_the_response() {
     }
     let mut transport = Transport::new();
     assert!(transport.send(&long(30)) && transport.next_frame(0).is_some());
+    transport.receive(&[0x42, 0, 0], 0);
+    assert!(!transport.is_idle(), "no flow control");
     transport.receive(&[0x32, 0, 0], 0);
     assert!(transport.is_idle() && transport.errors().overflow == 1);
 }

@@ -3,7 +3,7 @@
 use super::{IDENTITY, LEVEL, bare, info, observe, sample};
 use gyronet::health::{Faults, Status};
 use gyronet::sample::Standstill;
-use gyronet::service::event::{Crash, CrashKind, EventKind, ResetCause, SensorFault};
+use gyronet::service::event::{ClockFault, Crash, CrashKind, EventKind, ResetCause, SensorFault};
 
 #[test]
 fn sensor_that_does_not_answer_is_noted_once() {
@@ -57,4 +57,11 @@ fn a_crash_is_told_with_its_place() {
         let fault = Crash { link: 0x0800_0101, status, address: 0x2000_0004, ..crash };
         assert_eq!(fault.to_string(), format!("{place}{rest}, 1 since power-on"));
     }
+}
+
+#[test]
+fn a_clock_s_fault_is_told_in_words() {
+    let text = |khz| ClockFault::CrystalFrequency { khz }.to_string();
+    assert_eq!(text(25_012), "the crystal has 25.012 MHz");
+    assert_eq!(text(0), "the crystal's frequency could not be measured");
 }

@@ -6,13 +6,15 @@ use super::{Board, GOOD, LEVEL, observe, sample, start};
 use gyronet::coprocessor::Contradiction;
 use gyronet::health::{Faults, Quality, Status};
 use gyronet::model::weights;
-use gyronet::sample::Standstill;
+use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::event::SensorFault;
 use gyronet::service::message::{AllCounters, Refusal};
+use gyronet::standstill::Standing;
 use gyronet::store::{Configuration, Field, FieldError, Record, StoreError};
 use gyronet::uds::Server;
 use gyronet::uds::data::{Access, IDENTIFIERS, Identifier};
 use gyronet::uds::dtc::{PASSED_TICKS, TROUBLES, bit};
+use gyronet::units::WheelSpeed;
 use gyronet_host_tests::flash::F405;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::stored::{crc, other_weights};
@@ -221,6 +223,50 @@ fn a_second_tester_neither_uses_nor_ends_the_session_of_the_first() {
     assert!(!bench.server.has_session(), "nor keeps it");
 }
 
+#[test]
+fn the_log_is_read_in_any_session_and_other_routines_are_not() {
+    let (_, mut bench) = bench();
+    assert!(bench.ask(&[0x31, 1, 2, 3, 0, 0, 0, 0]).is_some_and(|response| response[0] == 0x71));
+    bench.expect(&[0x31, 1, 2, 0], &[0x7F, 0x31, 0x7F]);
+}
+
+/// The result of a calibration is that of the one that is asked for: running, found, failed.
+#[test]
+fn the_result_of_another_calibration_is_none() {
+    let (_, mut bench) = bench();
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    for (id, other) in [(0, 1), (1, 0)] {
+        for (shakes, state) in [(0.001, 2), (0.3, 3)] {
+            bench.expect(&[0x31, 1, 2, id], &[0x71, 1, 2, id]);
+            bench.expect(&[0x31, 3, 2, id], &[0x71, 3, 2, id, 1]);
+            bench.expect(&[0x31, 3, 2, other], &[0x7F, 0x31, 0x24]);
+            for tick in 0..400 {
+                let noise = if tick % 2 == 0 { shakes } else { -shakes };
+                observe(
+                    &mut bench.board,
+                    tick,
+                    Some(&sample(tick.into(), LEVEL, noise)),
+                    GOOD,
+                    Standstill::Still,
+                );
+            }
+            bench.expect(&[0x31, 3, 2, id], &[0x71, 3, 2, id, state]);
+            bench.expect(&[0x31, 3, 2, other], &[0x7F, 0x31, 0x24]);
+        }
+    }
+}
+
+/// Wheel speeds in 0.01 m/s, 0x7FFF where one is not known; then whether the vehicle stands.
+#[test]
+fn live_wheel_speeds_are_read_in_centimetres_a_second() {
+    let (_, mut bench) = bench();
+    let speeds = [Some(WheelSpeed(10 << 16)), Some(WheelSpeed(-(1 << 15))), None, Some(WheelSpeed(0))];
+    let wheels = WheelSample { speeds, standstill: Standstill::Moving, ..WheelSample::default() };
+    bench.board.observe(Some(&sample(0, LEVEL, 0.0)), 0, GOOD, &wheels, &Standing::UNKNOWN);
+    let codes = [0x03, 0xE8, 0xFF, 0xCE, 0x7F, 0xFF, 0, 0];
+    bench.expect(&[0x22, 1, 0x17], &[&[0x62, 1, 0x17][..], &codes, &[Standstill::Moving as u8, 0]].concat());
+}
+
 /// Case bus/06.
 #[test]
 fn a_list_with_unknown_identifiers_gives_the_known_ones() {
@@ -240,12 +286,12 @@ fn requests_to_all_servers_are_counted_where_they_come_between() {
     bench.expect(&[0xBA], &[0x7F, 0xBA, 0x11]);
     bench.server.receive(&[0x10, 20, 0x22, 1, 0, 1, 1, 1], bench.now);
     bench.server.receive_functional(&[2, 0x3E, 0x80], bench.now);
-    bench.server.receive_functional(&[2, 0x10, 1], bench.now);
+    (0..2).for_each(|_| bench.server.receive_functional(&[2, 0x10, 1], bench.now));
     let _ = bench.server.next_frame(bench.now);
     bench.now += 1_001;
     bench.fail(Status::Ready, Faults::NONE);
     let errors = bench.ask(&[0x22, 1, 7]).expect("the errors");
-    assert_eq!(errors[3..7], [0, 0, 0, 2], "the empty one and the one that had to wait");
+    assert_eq!(errors[3..7], [0, 0, 0, 3], "the empty one and the two that had to wait");
     assert_eq!(errors[15..19], [0, 0, 0, 1], "the request that stayed in pieces");
 }
 
