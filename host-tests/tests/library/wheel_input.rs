@@ -2,7 +2,7 @@
 
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use gyronet::can::DataFrame;
-use gyronet::can::e2e::{DataIdMode, Fault, P01, Profile};
+use gyronet::can::e2e::{DataIdMode, Fault, P01, P05, Profile};
 use gyronet::can::signal::{BitField, ByteOrder, OutsideFrame};
 use gyronet::can::wheel::{
     ByteSum, Checksum, Code, Parts, WheelConfigError, WheelError, WheelFrame, WheelReceiver, WheelSettings,
@@ -361,6 +361,12 @@ fn settings_that_cannot_be_are_refused() {
     assert_eq!(refused(WheelFrame { checksum, ..car() }), WheelConfigError::Overlap(0xAA));
     let checksum = Checksum::E2e(Profile::P01(P01 { data_id: 1, mode: DataIdMode::Both }));
     assert_eq!(refused(WheelFrame { checksum, ..car() }), WheelConfigError::Overlap(0xAA));
+    for checksum in [Checksum::E2e(Profile::P05(P05 { data_id: 1 })), Checksum::J1850 { at: 4 }] {
+        let mut over = two_wheels(checksum);
+        over.frames[0] = over.frames[0].map(|frame| WheelFrame { counter: None, ..frame });
+        let error = WheelReceiver::new(over).err();
+        assert!(matches!(error, Some(WheelConfigError::Overlap(_))), "{checksum:?}: {error:?}");
+    }
     let flat = first.map(|signal| WheelSignal { factor_q16: 0, ..signal });
     assert_eq!(with([flat, second, None, None]), WheelConfigError::Factor(0));
     let endless = WheelSettings { still_for: Duration(10_000_001), ..settings(car()) };

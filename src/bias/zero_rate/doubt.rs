@@ -106,5 +106,9 @@ mod tests {
         let mut doubt = Doubt::NONE;
         doubt.add(2e-3, true);
         assert!(doubt.is_nearer(1.5e-3, 1.5e-3) && !doubt.is_nearer(5e-4, 5e-4));
+        doubt.add(3e-3, true);
+        assert!((doubt.off(0.0) - 2.5e-3).abs() < 1e-6, "the mean of both");
+        assert_eq!(doubt.end_stop(GATE, false), None);
+        assert!(doubt.is_nearer(2e-3, 2e-3) && !doubt.is_nearer(5e-4, 5e-4), "nor in a later stop");
     }
 }

@@ -7,6 +7,7 @@ use gyronet::coprocessor::Contradiction;
 use gyronet::health::{Faults, Quality, Status};
 use gyronet::model::weights;
 use gyronet::sample::{Standstill, WheelSample};
+use gyronet::service::calibrate::{CalibrationFault, State, Task};
 use gyronet::service::event::SensorFault;
 use gyronet::service::message::{AllCounters, Refusal};
 use gyronet::standstill::Standing;
@@ -254,6 +255,14 @@ fn the_result_of_another_calibration_is_none() {
             bench.expect(&[0x31, 3, 2, other], &[0x7F, 0x31, 0x24]);
         }
     }
+    // Axes of the accelerometer are counted after those of the gyro.
+    bench.expect(&[0x31, 1, 2, 0], &[0x71, 1, 2, 0]);
+    for tick in 0..400 {
+        let force = [LEVEL[0], if tick % 2 == 0 { 5.0 } else { -5.0 }, LEVEL[2]];
+        observe(&mut bench.board, tick, Some(&sample(tick.into(), force, 0.0)), GOOD, Standstill::Still);
+    }
+    let failed = State::Failed(Task::Static, CalibrationFault::Moving(4));
+    assert_eq!(bench.board.calibration_state(), failed);
 }
 
 /// Wheel speeds in 0.01 m/s, 0x7FFF where one is not known; then whether the vehicle stands.
