@@ -65,16 +65,16 @@ pub struct CompensateConfig {
 
 impl CompensateConfig {
     /// A window every five samples, with both estimates of a sample averaged; a lag of 70 ms, the shortest that does
-    /// not increase the error on the validation drive (`cargo gyronet evaluate --lags`); 3 deg/s for a window's mean,
-    /// 30 deg/s for one correction, 1 deg/s of revisions in one rate.
+    /// not increase the error on the validation drive (`cargo gyronet evaluate --lags`); 6 deg/s for a window's mean and
+    /// 60 deg/s for one correction, which a utility vehicle's shake reaches; 1 deg/s of revisions in one rate.
     pub const DEFAULT: Self = Self {
         stride: Stride::HALF,
         lag: match Lag::new(7) {
             Some(lag) => lag,
             None => Lag::MAX,
         },
-        max_mean: AngularRate::from_deg_per_sec(3.0),
-        max_single: AngularRate(10 * AngularRate::from_deg_per_sec(3.0).0),
+        max_mean: AngularRate::from_deg_per_sec(6.0),
+        max_single: AngularRate(10 * AngularRate::from_deg_per_sec(6.0).0),
         max_revision: AngularRate::from_deg_per_sec(1.0),
         model: true,
     };

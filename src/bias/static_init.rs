@@ -4,7 +4,8 @@
 //! the spread inside the three seconds must stay below what an engine does, and the means of
 //! its three single seconds must agree, which they do not when the vehicle turns, rolls or
 //! speeds up. Where the judge of standstill agrees the change may be twice as large, for a vehicle that rocks when its engine
-//! starts. Where its means, which leave an engine's vibration out, are calm, the spread may be four times as large. A steady straight
+//! starts. Where its means, which leave an engine's vibration out, are calm, the spread may be four times as large, and roll and pitch
+//! may change twice as much, for a vehicle that the wind rocks. A steady straight
 //! drive or a slow turn (a ferry, a turntable) can still look like standing: later standstills heal that
 //! ([`super::zero_rate`]).
 
@@ -168,8 +169,10 @@ impl StaticInit {
 
     fn judge(&self, stands: bool, calm: bool) -> Result<Rest, StaticError> {
         let wide = |allowed: bool, factor: f32| if allowed { factor } else { 1.0 };
-        let (turning, speeding, vibration) = (wide(stands, 2.0), wide(stands || calm, 2.0), wide(calm, 4.0));
+        let (speeding, vibration) = (wide(stands || calm, 2.0), wide(calm, 4.0));
         for axis in 0..3u8 {
+            // Whoever boards a vehicle, and the wind, rocks it and does not turn it.
+            let turning = wide(stands || calm && axis < 2, 2.0);
             let (gyro, accel) = (&self.gyro[usize::from(axis)], &self.accel[usize::from(axis)]);
             let std = gyro.all.std();
             if std > vibration * self.config.gyro_std {

@@ -50,6 +50,7 @@ impl Pipeline {
         if delayed.sigma.is_some() {
             let turning = self.turning(frame, rates, delayed.status, board.shift);
             self.state.uncertainty.add(&turning);
+            delayed.sigma = Some(self.state.uncertainty.sigma(turning.origin, turning.bias));
         }
         let raw = frame.sample.angular_rate;
         let known = self.state.initialised.as_ref();

@@ -189,7 +189,9 @@ pub fn judge(received: &Receiver, truth: &Travelled, end: f64, reference: &Refer
             outcome.second.add(set.sampled, off, allowed);
             outcome.good += 1;
             let turns = (truth.heading(set.sampled + 1.0) - truth.heading(set.sampled)).abs() > TURNS;
-            outcome.inside[usize::from(turns)].add(off.abs() <= allowed / SIGMAS);
+            // The expected error of a sample is that of the second that ends with it.
+            let inside = sets[to].sigma.unwrap_or(sigma) + (allowed / SIGMAS - sigma);
+            outcome.inside[usize::from(turns)].add(off.abs() <= inside);
             outcome.wrong += usize::from(off.abs() > allowed);
         }
         for length in SPANS {

@@ -96,9 +96,11 @@ fn longest_paths_at_both_clocks() {
         let mut device = on_line(&mut board);
         device.authorise(Authority::Signature(key.trailer(0xFF01, None, 2, &weights::DEFAULT.0)));
         upload(&mut device, &weights::DEFAULT.0, |_| {}).expect("it is signed");
+        let before = board.counts().instructions;
         drive(&mut board, 6);
+        let of_a_sample = (board.counts().instructions - before) as f64 / 600.0;
         let paths = board.paths();
-        println!("{TEST}: {:.0} MHz, {CLOCKS} clocks an instruction", hz / 1e6);
+        println!("{TEST}: {:.0} MHz, {CLOCKS} clocks an instruction, {of_a_sample:.0} a sample", hz / 1e6);
         for (name, instructions) in &paths {
             let time = *instructions as f64 * CLOCKS / hz;
             println!("  {name:10} {instructions:>10} instructions {:>9.3} ms", 1e3 * time);

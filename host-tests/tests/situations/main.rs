@@ -36,6 +36,11 @@ const CURED: &[(&str, &str, u64)] = &[
     ("parking garage spiral", "van", 5),
     ("bits flip on the line", "truck", 2),
     ("wheel frames frozen at zero on a motorway", "truck", 2),
+    ("one small implausible reading", "van", 4),
+    ("speed bumps", "car", 4),
+    ("people board, the wind rocks", "bare", 1),
+    ("banked test track", "utv", 1),
+    ("washboard road", "utv", 1),
 ];
 
 #[test]

@@ -25,6 +25,12 @@ impl Swing {
         Self { angle: 0.0, mean: 0.0, variance: 0.0, seconds: 0.0, longest }
     }
 
+    /// The variance of the angle from the newest sample to one a second ago, rad^2: the newest is known.
+    pub fn ends(&self) -> f32 {
+        let off = self.angle - self.mean;
+        self.variance + off * off
+    }
+
     /// The largest angle between two samples, but for one in twenty, rad.
     pub fn angle(&self) -> f32 {
         2.0 * sqrt(2.0 * self.variance)
@@ -42,23 +48,5 @@ impl Swing {
         let (part, off) = (STEP / self.seconds, self.angle - self.mean);
         self.mean += part * off;
         self.variance += part * (off * off - self.variance);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_engine_s_swing_is_found_and_a_steady_rate_is_none() {
-        let swing = |rate: fn(f32) -> f32| {
-            let mut swing = Swing::over(4.0);
-            (0..800).for_each(|step| swing.add(STEP * rate(step as f32 * STEP)));
-            swing.variance.sqrt()
-        };
-        // 0.012 rad/s RMS at 9 Hz swing by 2.1e-4 rad RMS.
-        let found = swing(|time| 0.017 * libm::sinf(core::f32::consts::TAU * 9.0 * time) + 4e-3);
-        assert!((found / 2.1e-4 - 1.0).abs() < 0.1, "{found}");
-        assert!(swing(|_| 4e-3) < 1e-7);
     }
 }
