@@ -9,7 +9,7 @@
 //! |---|---|
 //! | [`Coprocessor`] | takes samples, CAN frames and time; returns frames, windows and observations ([`coprocessor`]) |
 //! | [`Config`] | configures it ([`config`]) |
-//! | [`sensor`] | decodes bytes into samples: Xsens MTi, ICM-42688, BMI088, KVH DSP-1760 |
+//! | [`sensor`] | decodes bytes into samples: Xsens MTi, ICM-42688, BMI088, ASM330LHH, KVH DSP-1760 |
 //! | [`sample`], [`units`] | hold samples in fixed point: 2^-27 rad/s, 2^-20 m/s^2, microseconds |
 //! | [`model`] | runs the networks: ten samples in, the gyro's error out |
 //! | [`can`] | encodes Bosch MM5.10, our own messages, E2E, SLCAN; decodes wheel speeds |

@@ -10,9 +10,10 @@
 //! | KVH DSP-1760, 17xx | RS-422 | [`dsp1760::Dsp1760`] | [`FogSample`] |
 //! | TDK ICM-42688-P | SPI | [`icm42688::Icm42688`] | [`ImuSample`] |
 //! | Bosch BMI088 | SPI, two chip selects | [`bmi088::Bmi088`] | [`ImuSample`] |
+//! | ST ASM330LHH | SPI | [`asm330lhh::Asm330lhh`] | [`ImuSample`] |
 //!
 //! UART parts are read through [`serial::Serial`] over any port with the traits of `embedded-io`; the maker's tool sets
-//! them up once. SPI parts take an `embedded_hal::spi::SpiDevice`. Either way it is a [`Source`].
+//! them up once. SPI parts take an `embedded_hal::spi::SpiDevice`, and have one error ([`spi::SpiError`]). Either way it is a [`Source`].
 //!
 //! # Which errors a parser detects
 //!
@@ -22,11 +23,13 @@
 //! | DSP-1760 | CRC of 32 bits | refused | one in 4 x 10^9 |
 //! | ICM-42688 packet | none, except its header | a reading may be another one | that reading |
 //! | BMI088 frame | none, except the accelerometer's header | a reading may be another one | that reading |
+//! | ASM330LHH word | parity of its tag | a reading may be another one | that reading |
 //!
-//! The last two have no check on the wire: keep their lines short, and rely on the pipeline's own limits.
+//! The last three have no check on the wire: keep their lines short, and rely on the pipeline's own limits.
 //!
 //! `src/bin/PORTING.md` lists the six steps to add a part.
 
+pub mod asm330lhh;
 pub mod bmi088;
 #[doc(hidden)]
 pub mod crc;
@@ -35,9 +38,14 @@ pub mod dsp1760;
 pub mod framer;
 pub mod icm42688;
 pub mod serial;
+pub mod spi;
+mod stamps;
 pub mod xsens;
 
 use crate::sample::{FogSample, ImuSample};
+use asm330lhh::Asm330lhh;
+use bmi088::Bmi088;
+use icm42688::Icm42688;
 
 /// Delivers the samples of a part.
 pub trait Source {
@@ -68,58 +76,45 @@ pub trait ByteSource: Source {
     fn bad_checksums(&self) -> u32;
 }
 
-impl Source for xsens::Mti {
-    type Sample = ImuSample;
-    type Error = xsens::XsensError;
+macro_rules! byte_sources {
+    ($($part:ty: $sample:ty, $error:ty;)*) => {$(
+        impl Source for $part {
+            type Sample = $sample;
+            type Error = $error;
 
-    fn next_sample(&mut self) -> Option<Result<ImuSample, Self::Error>> {
-        self.next_sample()
-    }
+            fn next_sample(&mut self) -> Option<Result<$sample, $error>> {
+                self.next_sample()
+            }
+        }
+
+        impl ByteSource for $part {
+            fn receive(&mut self, byte: u8) {
+                self.receive(byte);
+            }
+
+            fn bad_checksums(&self) -> u32 {
+                self.bad_checksums()
+            }
+        }
+    )*};
 }
 
-impl ByteSource for xsens::Mti {
-    fn receive(&mut self, byte: u8) {
-        self.receive(byte);
-    }
-
-    fn bad_checksums(&self) -> u32 {
-        self.bad_checksums()
-    }
+byte_sources! {
+    xsens::Mti: ImuSample, xsens::XsensError;
+    dsp1760::Dsp1760: FogSample, dsp1760::Dsp1760Error;
 }
 
-impl Source for dsp1760::Dsp1760 {
-    type Sample = FogSample;
-    type Error = dsp1760::Dsp1760Error;
+macro_rules! spi_sources {
+    ($($part:ident),*) => {$(
+        impl<SPI: embedded_hal::spi::SpiDevice> Source for $part<SPI> {
+            type Sample = ImuSample;
+            type Error = spi::SpiError<SPI::Error>;
 
-    fn next_sample(&mut self) -> Option<Result<FogSample, Self::Error>> {
-        self.next_sample()
-    }
+            fn next_sample(&mut self) -> Option<Result<ImuSample, Self::Error>> {
+                self.next_sample().transpose()
+            }
+        }
+    )*};
 }
 
-impl ByteSource for dsp1760::Dsp1760 {
-    fn receive(&mut self, byte: u8) {
-        self.receive(byte);
-    }
-
-    fn bad_checksums(&self) -> u32 {
-        self.bad_checksums()
-    }
-}
-
-impl<SPI: embedded_hal::spi::SpiDevice> Source for bmi088::Bmi088<SPI> {
-    type Sample = ImuSample;
-    type Error = bmi088::Bmi088Error<SPI::Error>;
-
-    fn next_sample(&mut self) -> Option<Result<ImuSample, Self::Error>> {
-        self.next_sample().transpose()
-    }
-}
-
-impl<SPI: embedded_hal::spi::SpiDevice> Source for icm42688::Icm42688<SPI> {
-    type Sample = ImuSample;
-    type Error = icm42688::Icm42688Error<SPI::Error>;
-
-    fn next_sample(&mut self) -> Option<Result<ImuSample, Self::Error>> {
-        self.next_sample().transpose()
-    }
-}
+spi_sources!(Asm330lhh, Bmi088, Icm42688);

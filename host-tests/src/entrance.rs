@@ -22,9 +22,10 @@ pub struct Entrance {
     pub mutations: u64,
 }
 
-pub const ALL: [Entrance; 14] = [
+pub const ALL: [Entrance; 15] = [
     Entrance { name: "xsens", run: sensors::xsens, mutations: 20_000 },
     Entrance { name: "dsp1760", run: sensors::dsp1760, mutations: 20_000 },
+    Entrance { name: "asm330lhh", run: sensors::asm330lhh, mutations: 20_000 },
     Entrance { name: "bmi088", run: sensors::bmi088, mutations: 20_000 },
     Entrance { name: "icm42688", run: sensors::icm42688, mutations: 20_000 },
     Entrance { name: "gnss", run: sensors::gnss, mutations: 20_000 },

@@ -19,9 +19,9 @@
 //! | n frames behind | n times the difference more: 10 ms after a stall of 0.5 s at 2 % |
 //!
 //! Rate and time come from the gyro alone. A force that is older than [`OLDEST`] frames is not used
-//! ([`Bmi088Error::NoReading`]).
+//! ([`SpiError::NoReading`]).
 //!
-//! **A full FIFO** (100 frames of the gyro, 0.5 s) is emptied, with [`Bmi088Error::Overflow`]. The accelerometer's time,
+//! **A full FIFO** (100 frames of the gyro, 0.5 s) is emptied, with [`SpiError::Overflow`]. The accelerometer's time,
 //! which runs on, counts the lost frames: each such gap is right within half a frame and the difference of the clocks.
 //! The gyro's FIFO stops when it is full, since in the mode that drops the oldest its axes have been seen to change places
 //! (ArduPilot's history; no data sheet says so).
@@ -30,14 +30,13 @@
 pub mod frame;
 mod registers;
 
-pub use registers::Die;
-
+use super::spi::{self, Chip, Setting, SpiError, passed};
 use crate::sample::ImuSample;
 use crate::units::Micros;
 use embedded_hal::delay::DelayNs;
-use embedded_hal::spi::{Operation, SpiDevice};
+use embedded_hal::spi::SpiDevice;
 use frame::{FORCE_FRAME, State};
-use registers::{self as reg, Setting};
+use registers as reg;
 
 /// Number of registers that are checked one after the other: those that are set, and the state of the gyro's drive.
 pub const CHECKS: usize = reg::SETTINGS.len() + 1;
@@ -54,32 +53,11 @@ const TEST_POLLS: u8 = 100;
 /// Frames of the accelerometer that one call reads at most: more than come in [`SETTLE_MS`].
 const MAX_FRAMES: usize = 16;
 
-/// The error of the sensor or its bus.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-#[allow(missing_docs, reason = "its messages say it")]
-pub enum Bmi088Error<E> {
-    #[error("BMI088: the bus failed: {0:?}")]
-    Bus(E),
-    #[error("BMI088: identity of the {die} is {got:02x}, should be {:02x}", .die.identity())]
-    Identity { die: Die, got: u8 },
-    #[error("BMI088: the self-test of the {die} has failed")]
-    SelfTest { die: Die },
-    /// A register does not hold the value that was written: configure the sensor again.
-    #[error("BMI088: register {address:02x} of the {die} holds {got:02x}, not {expected:02x}")]
-    Setting { die: Die, address: u8, got: u8, expected: u8 },
-    #[error("BMI088: no acceleration that belongs to the rate")]
-    NoReading,
-    #[error("BMI088: the FIFO was full; its frames are lost")]
-    Overflow,
-}
-
 /// The driver of a configured sensor.
 #[derive(Debug)]
 pub struct Bmi088<SPI> {
-    accelerometer: SPI,
-    gyro: SPI,
+    accelerometer: Chip<SPI>,
+    gyro: Chip<SPI>,
     next_check: usize,
     /// Number of the newest frame of the gyro.
     number: u64,
@@ -100,21 +78,20 @@ impl<SPI: SpiDevice> Bmi088<SPI> {
         [accelerometer, gyro]: [SPI; 2],
         self_test: bool,
         delay: &mut impl DelayNs,
-    ) -> Result<Self, Bmi088Error<SPI::Error>> {
+    ) -> Result<Self, SpiError<SPI::Error>> {
+        let (accelerometer, gyro) =
+            (Chip { spi: accelerometer, has_dummy: true }, Chip { spi: gyro, has_dummy: false });
         let (next_check, number, mark, has_lost, force) = (0, 0, None, false, None);
         let mut part = Self { accelerometer, gyro, next_check, number, mark, has_lost, force };
         // The rising edge of the chip select switches the accelerometer from I2C to SPI, now and after a reset.
-        part.read::<1>(Die::Accelerometer, reg::CHIP_ID)?;
+        part.accelerometer.read::<1>(reg::CHIP_ID)?;
         delay.delay_ms(WRITE_MS);
-        part.write(Die::Accelerometer, reg::ACC_SOFTRESET, reg::RESET)?;
-        part.write(Die::Gyro, reg::GYRO_SOFTRESET, reg::RESET)?;
+        part.accelerometer.write(reg::ACC_SOFTRESET, reg::RESET)?;
+        part.gyro.write(reg::GYRO_SOFTRESET, reg::RESET)?;
         delay.delay_ms(RESET_MS);
-        part.read::<1>(Die::Accelerometer, reg::CHIP_ID)?;
-        for die in [Die::Accelerometer, Die::Gyro] {
-            let [got] = part.read(die, reg::CHIP_ID)?;
-            if got != die.identity() {
-                return Err(Bmi088Error::Identity { die, got });
-            }
+        part.accelerometer.read::<1>(reg::CHIP_ID)?;
+        for (bank, expected) in (0..).zip(reg::IDENTITIES) {
+            part.die(bank).identify(bank, reg::CHIP_ID, expected)?;
         }
         part.set(reg::POWER, delay)?;
         delay.delay_ms(SETTLE_MS);
@@ -135,29 +112,29 @@ impl<SPI: SpiDevice> Bmi088<SPI> {
 
     /// Releases the SPI devices of accelerometer and gyro.
     pub fn destroy(self) -> [SPI; 2] {
-        [self.accelerometer, self.gyro]
+        [self.accelerometer.spi, self.gyro.spi]
     }
 
     /// Returns the oldest sample in the FIFO, if any, and checks one register.
     ///
     /// # Errors
     /// `Bus`, `Setting`, `NoReading` or `Overflow`; `SelfTest` if the gyro's drive is not in order.
-    pub fn next_sample(&mut self) -> Result<Option<ImuSample>, Bmi088Error<SPI::Error>> {
+    pub fn next_sample(&mut self) -> Result<Option<ImuSample>, SpiError<SPI::Error>> {
         self.check_next()?;
-        let [status] = self.read(Die::Gyro, reg::GYRO_FIFO_STATUS)?;
+        let [status] = self.gyro.read(reg::GYRO_FIFO_STATUS)?;
         if status & reg::OVERRUN != 0 {
             self.has_lost = true;
             self.force = None;
             self.flush()?;
-            return Err(Bmi088Error::Overflow);
+            return Err(SpiError::Overflow);
         }
         let Some(newer) = status.checked_sub(1) else { return Ok(None) };
         let state = self.state()?;
-        let rate = frame::vector(&self.read(Die::Gyro, reg::GYRO_FIFO_DATA)?);
+        let rate = spi::vector(&self.gyro.read(reg::GYRO_FIFO_DATA)?);
         self.count(newer, state.time);
-        let force = self.force(state.bytes / FORCE_FRAME, newer)?.ok_or(Bmi088Error::NoReading)?;
+        let force = self.force(state.bytes / FORCE_FRAME, newer)?.ok_or(SpiError::NoReading)?;
         let time = Micros(self.number * reg::PERIOD_US);
-        frame::sample(time, force, rate, state.temperature).map(Some).ok_or(Bmi088Error::NoReading)
+        frame::sample(time, force, rate, state.temperature).map(Some).ok_or(SpiError::NoReading)
     }
 
     /// Numbers a frame of the gyro that was read with `newer` ones behind it, at this time of the accelerometer.
@@ -177,11 +154,11 @@ impl<SPI: SpiDevice> Bmi088<SPI> {
     }
 
     /// Returns the acceleration with `newer` ones behind it, or the one before, of the frames that wait.
-    fn force(&mut self, waiting: usize, newer: u8) -> Result<Option<[i16; 3]>, Bmi088Error<SPI::Error>> {
+    fn force(&mut self, waiting: usize, newer: u8) -> Result<Option<[i16; 3]>, SpiError<SPI::Error>> {
         self.force = self.force.map(|(force, used)| (force, used.saturating_add(1)));
         let older = waiting.saturating_sub(newer.into());
         for _ in 0..older.min(MAX_FRAMES) {
-            if let Some(force) = frame::acceleration(&self.read(Die::Accelerometer, reg::ACC_FIFO_DATA)?) {
+            if let Some(force) = frame::acceleration(&self.accelerometer.read(reg::ACC_FIFO_DATA)?) {
                 self.force = Some((force, 0));
             }
         }
@@ -192,97 +169,75 @@ impl<SPI: SpiDevice> Bmi088<SPI> {
         Ok(self.force.filter(|(_, used)| *used <= OLDEST).map(|(force, _)| force))
     }
 
-    fn state(&mut self) -> Result<State, Bmi088Error<SPI::Error>> {
-        Ok(State::parse(&self.read(Die::Accelerometer, reg::ACC_SENSORTIME)?))
+    fn state(&mut self) -> Result<State, SpiError<SPI::Error>> {
+        Ok(State::parse(&self.accelerometer.read(reg::ACC_SENSORTIME)?))
     }
 
     /// Checks one register; each call checks the next one.
-    fn check_next(&mut self) -> Result<(), Bmi088Error<SPI::Error>> {
+    fn check_next(&mut self) -> Result<(), SpiError<SPI::Error>> {
         let at = self.next_check % CHECKS;
         self.next_check = at + 1;
-        let Some(&(die, address, expected)) = reg::SETTINGS.get(at) else {
-            let [state] = self.read(Die::Gyro, reg::GYRO_SELF_TEST)?;
-            let is_driven = state & reg::RATE_OK != 0;
-            return if is_driven { Ok(()) } else { Err(Bmi088Error::SelfTest { die: Die::Gyro }) };
+        let Some(setting) = reg::SETTINGS.get(at) else {
+            let [state] = self.gyro.read(reg::GYRO_SELF_TEST)?;
+            return passed(reg::GYRO, state & reg::RATE_OK != 0);
         };
-        let [got] = self.read(die, address)?;
-        if got == expected { Ok(()) } else { Err(Bmi088Error::Setting { die, address, got, expected }) }
+        let [held] = self.die(setting.bank).read(setting.address)?;
+        setting.check(held)
     }
 
     /// Lets the gyro test its drive and its electronics.
-    fn test_gyro(&mut self, delay: &mut impl DelayNs) -> Result<(), Bmi088Error<SPI::Error>> {
-        self.write(Die::Gyro, reg::GYRO_SELF_TEST, reg::TEST_BEGIN)?;
+    fn test_gyro(&mut self, delay: &mut impl DelayNs) -> Result<(), SpiError<SPI::Error>> {
+        self.gyro.write(reg::GYRO_SELF_TEST, reg::TEST_BEGIN)?;
         for _ in 0..TEST_POLLS {
             delay.delay_ms(1);
-            let [result] = self.read(Die::Gyro, reg::GYRO_SELF_TEST)?;
+            let [result] = self.gyro.read(reg::GYRO_SELF_TEST)?;
             if result & reg::TEST_READY != 0 {
-                let passed = result & (reg::TEST_FAILED | reg::RATE_OK) == reg::RATE_OK;
-                return if passed { Ok(()) } else { Err(Bmi088Error::SelfTest { die: Die::Gyro }) };
+                return passed(reg::GYRO, result & (reg::TEST_FAILED | reg::RATE_OK) == reg::RATE_OK);
             }
         }
-        Err(Bmi088Error::SelfTest { die: Die::Gyro })
+        passed(reg::GYRO, false)
     }
 
     /// Deflects the accelerometer's masses both ways, and compares the difference with the least one of a good part.
-    fn test_accelerometer(&mut self, delay: &mut impl DelayNs) -> Result<(), Bmi088Error<SPI::Error>> {
-        let die = Die::Accelerometer;
+    fn test_accelerometer(&mut self, delay: &mut impl DelayNs) -> Result<(), SpiError<SPI::Error>> {
         self.set(reg::TEST, delay)?;
         delay.delay_ms(2);
         let mut deflected = [[0; 3]; 2];
         for (way, read) in reg::DEFLECTIONS.into_iter().zip(&mut deflected) {
-            self.write(die, reg::ACC_SELF_TEST, way)?;
+            self.accelerometer.write(reg::ACC_SELF_TEST, way)?;
             delay.delay_ms(SETTLE_MS + 1);
-            *read = frame::vector(&self.read(die, reg::ACC_DATA)?);
+            *read = spi::vector(&self.accelerometer.read(reg::ACC_DATA)?);
         }
-        self.write(die, reg::ACC_SELF_TEST, 0)?;
+        self.accelerometer.write(reg::ACC_SELF_TEST, 0)?;
         delay.delay_ms(WRITE_MS);
         let [up, down] = deflected.map(|axes: [i16; 3]| axes.map(i32::from));
         let mut moved = up.iter().zip(down).zip(reg::LEAST_DEFLECTION);
-        let passed = moved.all(|((up, down), least)| up - down >= least);
-        if passed { Ok(()) } else { Err(Bmi088Error::SelfTest { die }) }
+        passed(reg::ACCELEROMETER, moved.all(|((up, down), least)| up - down >= least))
     }
 
     fn set(
         &mut self,
         settings: impl IntoIterator<Item = Setting>,
         delay: &mut impl DelayNs,
-    ) -> Result<(), Bmi088Error<SPI::Error>> {
-        for (die, address, value) in settings {
-            self.write(die, address, value)?;
+    ) -> Result<(), SpiError<SPI::Error>> {
+        for Setting { bank, address, value, .. } in settings {
+            self.die(bank).write(address, value)?;
             delay.delay_ms(WRITE_MS);
         }
         Ok(())
     }
 
     /// Empties both FIFOs.
-    fn flush(&mut self) -> Result<(), Bmi088Error<SPI::Error>> {
-        self.write(Die::Accelerometer, reg::ACC_SOFTRESET, reg::FIFO_FLUSH)?;
+    fn flush(&mut self) -> Result<(), SpiError<SPI::Error>> {
+        self.accelerometer.write(reg::ACC_SOFTRESET, reg::FIFO_FLUSH)?;
         self.empty_gyro()
     }
 
-    fn empty_gyro(&mut self) -> Result<(), Bmi088Error<SPI::Error>> {
-        self.write(Die::Gyro, reg::GYRO_FIFO_CONFIG_1, reg::STOP_WHEN_FULL)
+    fn empty_gyro(&mut self) -> Result<(), SpiError<SPI::Error>> {
+        self.gyro.write(reg::GYRO_FIFO_CONFIG_1, reg::STOP_WHEN_FULL)
     }
 
-    fn write(&mut self, die: Die, address: u8, value: u8) -> Result<(), Bmi088Error<SPI::Error>> {
-        self.transaction(die, &mut [Operation::Write(&[address, value])])
-    }
-
-    /// Reads from an address on; the accelerometer sends a byte without meaning first.
-    fn read<const N: usize>(&mut self, die: Die, address: u8) -> Result<[u8; N], Bmi088Error<SPI::Error>> {
-        let mut values = [0; N];
-        let (plain, with_dummy) = ([address | reg::READ], [address | reg::READ, 0]);
-        let command: &[u8] = if die == Die::Gyro { &plain } else { &with_dummy };
-        self.transaction(die, &mut [Operation::Write(command), Operation::Read(&mut values)])?;
-        Ok(values)
-    }
-
-    fn transaction(
-        &mut self,
-        die: Die,
-        operations: &mut [Operation<'_, u8>],
-    ) -> Result<(), Bmi088Error<SPI::Error>> {
-        let spi = if die == Die::Gyro { &mut self.gyro } else { &mut self.accelerometer };
-        spi.transaction(operations).map_err(Bmi088Error::Bus)
+    fn die(&mut self, bank: u8) -> &mut Chip<SPI> {
+        if bank == reg::GYRO { &mut self.gyro } else { &mut self.accelerometer }
     }
 }

@@ -30,6 +30,8 @@ pub enum ImuPart {
     Icm42688,
     /// Bosch BMI088 on SPI, with two chip selects.
     Bmi088,
+    /// ST ASM330LHH on SPI.
+    Asm330lhh,
 }
 
 /// The fibre-optic gyro that is fitted.

@@ -3,11 +3,13 @@
 use crate::gnss::{Pvt, sentence};
 use crate::wire::feed;
 use gyronet::heading::{GnssLine, GnssProtocol};
+use gyronet::sensor::asm330lhh::word::{Outputs, WORD, Word};
 use gyronet::sensor::bmi088::frame::{self, FORCE_FRAME, RATE_FRAME, STATE, State};
 use gyronet::sensor::crc::CRC_32_MPEG_2;
 use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::dsp1760::message::Message;
 use gyronet::sensor::icm42688::packet::{PACKET, Packet};
+use gyronet::sensor::spi;
 use gyronet::sensor::xsens::{MtData2, Mti, Xbus};
 use gyronet::units::Micros;
 
@@ -69,7 +71,7 @@ pub fn bmi088(data: &[u8]) {
         let (state, rest) = bytes.split_first_chunk().expect("long enough");
         let (force, rest) = rest.split_first_chunk().expect("long enough");
         let state = State::parse(state);
-        let rate = frame::vector(rest.as_array().expect("the rest"));
+        let rate = spi::vector(rest.as_array().expect("the rest"));
         let Some(force) = frame::acceleration(force) else { continue };
         let sample =
             frame::sample(Micros(0), force, rate, state.temperature).expect("any reading is in range");
@@ -77,6 +79,25 @@ pub fn bmi088(data: &[u8]) {
         assert!(sample.specific_force.iter().all(|force| force.metre_per_sec2().abs() < 118.0));
         assert!(sample.temperature.is_none_or(|code| (-10_500..=15_100).contains(&code.0)));
         assert!(state.bytes < 1 << 14 && state.time < 1 << 24);
+    }
+}
+
+/// Passes bytes as words of the FIFO: all readings are in range, and a damaged tag is refused.
+pub fn asm330lhh(data: &[u8]) {
+    let mut outputs = Outputs::default();
+    let (words, _) = data.as_chunks::<WORD>();
+    for bytes in words {
+        let Some(word) = Word::parse(bytes) else { continue };
+        for bit in 0..8 {
+            let mut damaged = *bytes;
+            damaged[0] ^= 1 << bit;
+            assert_eq!(Word::parse(&damaged), None);
+        }
+        let Ok(Some(readings)) = outputs.add(word) else { continue };
+        let sample = readings.sample(Micros(0)).expect("any reading is in range");
+        assert!(sample.angular_rate.iter().all(|rate| rate.rad_per_sec().abs() < 5.01));
+        assert!(sample.specific_force.iter().all(|force| force.metre_per_sec2().abs() < 157.0));
+        assert!(sample.temperature.is_none_or(|code| (-10_300..=15_300).contains(&code.0)));
     }
 }
 

@@ -88,8 +88,12 @@ fn board_in_order() {
 
 #[test]
 fn crystal_that_is_not_the_board_s() {
-    let wrong = |board: &mut Board| board.configure("RCC.crystal_hz", 16_000_000);
+    let wrong = |board: &mut Board| {
+        board.configure("RCC.crystal_hz", 16_000_000);
+        board.configure("SPI1.part", "Bmi088");
+    };
     let Some((_, lines)) = lines("crystal_that_is_not_the_board_s", wrong) else { return };
+    assert_eq!(check(&lines, "SPI1"), ("PASS", "a BMI088 answers"));
     assert_eq!(check(&lines, "clock"), ("FAIL", "16 MHz: the crystal has 16.000 MHz"));
     assert_eq!(check(&lines, "CAN"), ("FAIL", "the clock is not exact enough"));
     assert_eq!(lines.last().map(String::as_str), Some("2 checks failed"));
@@ -97,8 +101,12 @@ fn crystal_that_is_not_the_board_s() {
 
 #[test]
 fn olimex_board_in_order() {
-    let crystal = |board: &mut Board| board.configure("RCC.crystal_hz", 8_000_000);
+    let crystal = |board: &mut Board| {
+        board.configure("RCC.crystal_hz", 8_000_000);
+        board.configure("SPI1.part", "Asm330lhh");
+    };
     let Some((_, lines)) = lines_of("olimex-stm32-h405", "olimex_board_in_order", crystal) else { return };
+    assert_eq!(check(&lines, "SPI1"), ("PASS", "an ASM330LHH answers"));
     assert!(lines[0].contains("Olimex STM32-H405"), "{}", lines[0]);
     assert_eq!(
         check(&lines, "clock"),

@@ -3,7 +3,8 @@
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::sensor::bmi088::frame::{self, State};
-use gyronet::sensor::bmi088::{Bmi088, Bmi088Error, CHECKS, Die, OLDEST};
+use gyronet::sensor::bmi088::{Bmi088, CHECKS, OLDEST};
+use gyronet::sensor::spi::{self, SpiError};
 use gyronet::units::{CentiCelsius, Micros};
 use gyronet_host_tests::situations::parts::icm42688::NoDelay;
 use std::cell::RefCell;
@@ -22,7 +23,7 @@ const FORCE: [u8; 7] = [0x84, 0, 0, 0xFC, 0xFF, 0xAB, 0x0A];
 
 #[test]
 fn frames_are_read_as_the_data_sheet_says() {
-    assert_eq!(frame::vector(&RATE), [0, -2, 1311]);
+    assert_eq!(spi::vector(&RATE), [0, -2, 1311]);
     let sample = frame::sample(Micros(7), [0, -4, 2731], [0, -2, 1311], None).expect("in range");
     assert!((sample.angular_rate[2].rad_per_sec().to_degrees() - 1311.0 / 131.072).abs() < 1e-5);
     assert!((sample.specific_force[2].metre_per_sec2() - 9.806_65 * 2731.0 * 12.0 / 32_768.0).abs() < 1e-5);
@@ -99,21 +100,21 @@ fn another_part_or_none_is_named() {
     for [accelerometer, gyro] in [[0x1F, 0x0F], [0xFF; 2], [0x00; 2], [0x1E, 0xFF]] {
         let dies = Dies::new([0.0; 2]);
         dies.borrow_mut().held = vec![(ACC, 0, accelerometer), (GYRO, 0, gyro)];
-        let (die, got) =
-            if accelerometer == 0x1E { (Die::Gyro, gyro) } else { (Die::Accelerometer, accelerometer) };
-        assert_eq!(start(&dies, true).err(), Some(Bmi088Error::Identity { die, got }));
+        let (bank, got, expected) =
+            if accelerometer == 0x1E { (1, gyro, 0x0F) } else { (0, accelerometer, 0x1E) };
+        assert_eq!(start(&dies, true).err(), Some(SpiError::Identity { bank, got, expected }));
     }
 }
 
 #[test]
 fn a_failed_self_test_is_named() {
-    let failed = |die| Some(Bmi088Error::SelfTest { die });
+    let failed = |bank| Some(SpiError::SelfTest { bank });
     let dies = Dies::new([0.0; 2]);
     assert_eq!(start(&dies, true).err(), None);
     // The gyro fails, its drive is not in order, its test never ends.
     for gyro in [0x16, 0x02, 0] {
         dies.borrow_mut().held = vec![(GYRO, 0x3C, gyro)];
-        assert_eq!(start(&dies, true).err(), failed(Die::Gyro));
+        assert_eq!(start(&dies, true).err(), failed(1));
     }
     dies.borrow_mut().held.clear();
     // y and z move too little, all move the wrong way.
@@ -123,7 +124,7 @@ fn a_failed_self_test_is_named() {
         [[-683, -683, -683], [683, 683, 683]],
     ] {
         dies.borrow_mut().deflected = deflected;
-        assert_eq!(start(&dies, true).err(), failed(Die::Accelerometer));
+        assert_eq!(start(&dies, true).err(), failed(0));
     }
 }
 
@@ -137,13 +138,12 @@ fn a_setting_that_does_not_read_back_and_a_drive_that_fails_are_named() {
         assert_eq!(dies.borrow().registers[die][usize::from(address)], expected);
         let got = expected ^ 0x21;
         dies.borrow_mut().held = vec![(die, address, got)];
-        let die = if die == ACC { Die::Accelerometer } else { Die::Gyro };
-        let changed = Some(Bmi088Error::Setting { die, address, got, expected });
+        let changed = Some(SpiError::Setting { bank: die as u8, address, got, expected });
         assert_eq!((0..CHECKS).find_map(|_| part.next_sample().err()), changed);
         assert_eq!(start(&dies, false).err(), changed);
     }
     dies.borrow_mut().held = vec![(GYRO, 0x3C, 0x02)];
-    let failed = Some(Bmi088Error::SelfTest { die: Die::Gyro });
+    let failed = Some(SpiError::SelfTest { bank: 1 });
     assert_eq!((0..CHECKS).find_map(|_| part.next_sample().err()), failed);
 }
 
@@ -269,7 +269,7 @@ impl SpiDevice for Select {
     }
 }
 
-fn start(dies: &Rc<RefCell<Dies>>, self_test: bool) -> Result<Bmi088<Select>, Bmi088Error<Infallible>> {
+fn start(dies: &Rc<RefCell<Dies>>, self_test: bool) -> Result<Bmi088<Select>, SpiError<Infallible>> {
     Bmi088::new([ACC, GYRO].map(|die| Select(dies.clone(), die)), self_test, &mut NoDelay)
 }
 
@@ -307,8 +307,8 @@ fn two_clocks_cost_what_the_module_says() {
                         let stamp = sample.time.0 as f64 / 1e3 / (1.0 + fast[GYRO]);
                         misplaced = misplaced.max(wrapped(rate - stamp).abs());
                     }
-                    Err(Bmi088Error::Overflow) => overflows += 1,
-                    Err(Bmi088Error::NoReading) => without += 1,
+                    Err(SpiError::Overflow) => overflows += 1,
+                    Err(SpiError::NoReading) => without += 1,
                     Err(other) => panic!("{other}"),
                 }
             }
@@ -340,7 +340,7 @@ fn accelerations_from_before_an_overflow_go_with_no_rate() {
     let mut part = start(&dies, false).expect("a good part");
     dies.borrow_mut().is_deaf = true;
     dies.borrow_mut().run_until(900e3);
-    assert_eq!(part.next_sample(), Err(Bmi088Error::Overflow));
+    assert_eq!(part.next_sample(), Err(SpiError::Overflow));
     let (mut good, mut without) = (0, 0);
     for frame in 1..=40 {
         dies.borrow_mut().run_until(900e3 + 5e3 * f64::from(frame) + 1.0);
@@ -351,7 +351,7 @@ fn accelerations_from_before_an_overflow_go_with_no_rate() {
                 good += 1;
             }
             Err(error) => {
-                assert_eq!(error, Bmi088Error::NoReading);
+                assert_eq!(error, SpiError::NoReading);
                 without += 1;
             }
         }

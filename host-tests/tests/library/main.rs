@@ -2,6 +2,7 @@
 
 mod activation;
 mod align;
+mod asm330lhh;
 mod bias;
 mod bias_curve;
 mod blob;

@@ -15,6 +15,9 @@ use gyronet::store::layout::{SLOT_SIZE, SLOTS};
 /// Register WHO_AM_I of an ICM-42688-P with the read bit, and its value (DS-000347 14.55).
 const WHO_AM_I: u8 = 0x75 | 0x80;
 const ICM_42688: u8 = 0x47;
+/// The same of an ASM330LHH.
+const WHO_AM_I_ASM: u8 = 0x0F | 0x80;
+const ASM_330: u8 = 0x6B;
 /// Chip identities of a BMI088's accelerometer and gyro, both in register 0, and the bytes to read either.
 const BMI_088: [u8; 2] = [0x1E, 0x0F];
 const BMI_088_READ: [&[u8]; 2] = [&[0x80, 0], &[0x80]];
@@ -119,17 +122,19 @@ pub fn sensor(report: &mut Report, registers: &pac::SPI1) {
     };
     let mut identities = || {
         let icm = read(0, &[WHO_AM_I])?;
+        let asm = read(0, &[WHO_AM_I_ASM])?;
         // The rising chip select has switched a BMI088's accelerometer to SPI.
-        Ok::<_, ErrorKind>((icm, [read(0, BMI_088_READ[0])?, read(1, BMI_088_READ[1])?]))
+        Ok::<_, ErrorKind>((icm, asm, [read(0, BMI_088_READ[0])?, read(1, BMI_088_READ[1])?]))
     };
     match identities() {
         Err(error) => report.fail(NAME, format_args!("{error:?}")),
-        Ok((ICM_42688, _)) => report.pass(NAME, format_args!("an ICM-42688-P answers")),
-        Ok((_, BMI_088)) => report.pass(NAME, format_args!("a BMI088 answers")),
-        Ok((icm, [accelerometer, gyro])) => report.manual_check(
+        Ok((ICM_42688, ..)) => report.pass(NAME, format_args!("an ICM-42688-P answers")),
+        Ok((.., BMI_088)) => report.pass(NAME, format_args!("a BMI088 answers")),
+        Ok((_, ASM_330, _)) => report.pass(NAME, format_args!("an ASM330LHH answers")),
+        Ok((icm, asm, [accelerometer, gyro])) => report.manual_check(
             NAME,
             format_args!(
-                "no sensor answers (ICM-42688-P {icm:#04x}, BMI088 {accelerometer:#04x} {gyro:#04x})"
+                "no sensor answers (ICM-42688-P {icm:#04x}, ASM330LHH {asm:#04x}, BMI088 {accelerometer:#04x} {gyro:#04x})"
             ),
         ),
     }

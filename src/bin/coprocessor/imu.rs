@@ -1,6 +1,6 @@
-//! The configured inertial sensor: an MTi on USART1, an ICM-42688-P or a BMI088 on SPI1.
+//! The configured inertial sensor: an MTi on USART1, or an ICM-42688-P, a BMI088 or an ASM330LHH on SPI1.
 //!
-//! Idle brings up the part on SPI, because that takes up to 0.3 s, and retries every second while the part does not answer.
+//! Idle brings up the part on SPI, because that takes up to 0.4 s, and retries every second while the part does not answer.
 //! It then passes the part to the output task through [`READY`]; [`WANTED`] says which of the two may use the bus.
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
@@ -11,8 +11,11 @@ use crate::{output, serial};
 use core::sync::atomic::{AtomicBool, AtomicU16, Ordering};
 use embedded_hal::delay::DelayNs;
 use gyronet::sample::{ImuSample, PERIOD_US};
-use gyronet::sensor::bmi088::{Bmi088, Bmi088Error};
-use gyronet::sensor::icm42688::{Bandwidth, Icm42688, Icm42688Config, Icm42688Error, OutputRate};
+use gyronet::sensor::Source;
+use gyronet::sensor::asm330lhh::Asm330lhh;
+use gyronet::sensor::bmi088::Bmi088;
+use gyronet::sensor::icm42688::{Bandwidth, Icm42688, Icm42688Config, OutputRate};
+use gyronet::sensor::spi::SpiError;
 use gyronet::sensor::xsens::{Mti, XsensError};
 use gyronet::service::event::SensorFault;
 use gyronet::store::ImuPart;
@@ -33,29 +36,29 @@ const ICM: Icm42688Config = Icm42688Config { rate: OutputRate::Hz100, bandwidth:
 enum Part {
     Icm(Icm42688<Spi>),
     Bmi(Bmi088<Spi>),
+    Asm(Asm330lhh<Spi>),
 }
 
 impl Part {
-    /// Brings the part up. A BMI088 tests itself if it is to, which takes 0.1 s and is best done at rest.
+    /// Brings the part up. All but the ICM-42688-P test themselves if they are to, which takes up to 0.3 s and is best done
+    /// at rest.
     fn new(part: ImuPart, [first, second]: [Spi; 2], self_test: bool) -> Result<Self, SensorFault> {
-        if part == ImuPart::Bmi088 {
-            let part = Bmi088::new([first, second], self_test, &mut Delay);
-            part.map(Self::Bmi).map_err(bmi_fault)
-        } else {
-            Icm42688::new(first, ICM, &mut Delay).map(Self::Icm).map_err(fault)
+        match part {
+            ImuPart::Bmi088 => Bmi088::new([first, second], self_test, &mut Delay).map(Self::Bmi),
+            ImuPart::Asm330lhh => Asm330lhh::new(first, self_test, &mut Delay).map(Self::Asm),
+            _ => Icm42688::new(first, ICM, &mut Delay).map(Self::Icm),
         }
+        .map_err(fault)
     }
 
     /// Returns the next sample; `Err(true)` if the part must be brought up again.
     fn next_sample(&mut self) -> Option<Result<ImuSample, bool>> {
-        match self {
-            Self::Icm(part) => part.next_sample().transpose().map(|sample| {
-                sample.map_err(|error| !matches!(error, Icm42688Error::Packet(_) | Icm42688Error::NoReading))
-            }),
-            Self::Bmi(part) => part.next_sample().transpose().map(|sample| {
-                sample.map_err(|error| !matches!(error, Bmi088Error::NoReading | Bmi088Error::Overflow))
-            }),
-        }
+        let sample = match self {
+            Self::Icm(part) => Source::next_sample(part),
+            Self::Bmi(part) => Source::next_sample(part),
+            Self::Asm(part) => Source::next_sample(part),
+        };
+        sample.map(|sample| sample.map_err(|error| error.is_lost()))
     }
 }
 
@@ -242,25 +245,12 @@ impl BringUp {
     }
 }
 
-fn fault<E>(error: Icm42688Error<E>) -> SensorFault {
+fn fault<E>(error: SpiError<E>) -> SensorFault {
     match error {
-        Icm42688Error::Reset => SensorFault::Reset,
-        Icm42688Error::Identity { got } => SensorFault::Identity(got),
-        Icm42688Error::Setting { register, got, .. } => {
-            SensorFault::Setting { bank: register.bank, address: register.address, got }
-        }
-        _ => SensorFault::Bus,
-    }
-}
-
-/// The accelerometer's registers are reported as bank 0, the gyro's as bank 1.
-fn bmi_fault<E>(error: Bmi088Error<E>) -> SensorFault {
-    match error {
-        Bmi088Error::Identity { got, .. } => SensorFault::Identity(got),
-        Bmi088Error::SelfTest { .. } => SensorFault::SelfTest,
-        Bmi088Error::Setting { die, address, got, .. } => {
-            SensorFault::Setting { bank: die as u8, address, got }
-        }
+        SpiError::Reset => SensorFault::Reset,
+        SpiError::Identity { got, .. } => SensorFault::Identity(got),
+        SpiError::SelfTest { .. } => SensorFault::SelfTest,
+        SpiError::Setting { bank, address, got, .. } => SensorFault::Setting { bank, address, got },
         _ => SensorFault::Bus,
     }
 }

@@ -5,7 +5,7 @@
 //! | line | use |
 //! |---|---|
 //! | USART1 | Xsens MTi |
-//! | SPI1 | ICM-42688-P or BMI088, where one is configured |
+//! | SPI1 | ICM-42688-P, BMI088 or ASM330LHH, where one is configured |
 //! | USART3 | KVH DSP-1760 |
 //! | UART4 | a GNSS receiver, where one is configured |
 //! | USART2 | SLCAN |

@@ -21,9 +21,9 @@ use gyronet::store::{Configuration, FogPart, ImuPart};
 /// whether one is configured or not.
 const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
     imus: match (BOARD.imu.is_some(), BOARD.spi.is_some()) {
-        (true, true) => &[ImuPart::XsensMti, ImuPart::Icm42688, ImuPart::Bmi088],
+        (true, true) => &[ImuPart::XsensMti, ImuPart::Icm42688, ImuPart::Bmi088, ImuPart::Asm330lhh],
         (true, false) => &[ImuPart::XsensMti],
-        (false, true) => &[ImuPart::Icm42688, ImuPart::Bmi088],
+        (false, true) => &[ImuPart::Icm42688, ImuPart::Bmi088, ImuPart::Asm330lhh],
         (false, false) => &[],
     },
     fogs: if BOARD.fog.is_some() { &[FogPart::Dsp1760] } else { &[] },

@@ -18,7 +18,7 @@ pub struct Spi {
 }
 
 /// Starts mode 3 at 84 / 16 = 5.25 MHz (1 MHz on the internal oscillator); an ICM-42688-P allows 24 MHz, a
-/// BMI088 10 MHz. Pins are the clock, data in, data out, and two chip selects.
+/// BMI088 or an ASM330LHH 10 MHz. Pins are the clock, data in, data out, and two chip selects.
 pub fn start(spi: &pac::SPI1, [clock, input, output, selects @ ..]: [Pin; 5]) -> [Spi; 2] {
     // At low speed the edges are too slow for 5 MHz, and the last bit of a transfer can be corrupted
     // (ES0182 2.11).

@@ -10,8 +10,9 @@
 //!
 //! The other frames are shorter. What was read beyond one is given again, since a frame that is read in part stays.
 
-use crate::sample::{ImuSample, Validity};
-use crate::units::{AngularRate, CentiCelsius, Micros, STANDARD_GRAVITY, SpecificForce};
+use crate::sample::ImuSample;
+use crate::sensor::spi;
+use crate::units::{CentiCelsius, Micros};
 
 /// Length of a frame of the gyro, bytes.
 pub const RATE_FRAME: usize = 6;
@@ -32,14 +33,9 @@ const NO_TEMPERATURE: u8 = 0x80;
 const PER_DPS: f32 = 131.072;
 const PER_G: f32 = 32_768.0 / 12.0;
 
-/// Parses three readings.
-pub fn vector(&[x0, x1, y0, y1, z0, z1]: &[u8; RATE_FRAME]) -> [i16; 3] {
-    [[x0, x1], [y0, y1], [z0, z1]].map(i16::from_le_bytes)
-}
-
 /// Parses an acceleration; `None` for another frame.
 pub fn acceleration(&[header, ref axes @ ..]: &[u8; FORCE_FRAME]) -> Option<[i16; 3]> {
-    (header & CONTENT == FORCE_HEADER).then(|| vector(axes))
+    (header & CONTENT == FORCE_HEADER).then(|| spi::vector(axes))
 }
 
 /// The accelerometer's state beside its readings.
@@ -68,17 +64,9 @@ impl State {
 /// Converts readings to the pipeline's units; `None` if one does not fit.
 pub fn sample(time: Micros, force: [i16; 3], rate: [i16; 3], temperature: Option<i16>) -> Option<ImuSample> {
     let clipped = |count: &i16| *count == i16::MAX || *count <= -i16::MAX;
-    let validity = Validity::reported(force.iter().chain(&rate).any(clipped));
-    let rate = rate.map(|n| AngularRate::from_rad_per_sec((f32::from(n) / PER_DPS).to_radians()).ok());
-    let force =
-        force.map(|n| SpecificForce::from_metre_per_sec2(f32::from(n) / PER_G * STANDARD_GRAVITY).ok());
-    let ([Some(ax), Some(ay), Some(az)], [Some(gx), Some(gy), Some(gz)]) = (force, rate) else { return None };
-    Some(ImuSample {
-        time,
-        specific_force: [ax, ay, az],
-        angular_rate: [gx, gy, gz],
-        // A reading of 11 bits is within -105 and 151 deg C.
-        temperature: temperature.map(|eighths| CentiCelsius((i32::from(eighths) * 25 / 2 + 2_300) as i16)),
-        validity,
-    })
+    let is_clipped = force.iter().chain(&rate).any(clipped);
+    // A reading of 11 bits is within -105 and 151 deg C.
+    let temperature = temperature.map(|eighths| CentiCelsius((i32::from(eighths) * 25 / 2 + 2_300) as i16));
+    let (g, dps) = (force.map(|n| f32::from(n) / PER_G), rate.map(|n| f32::from(n) / PER_DPS));
+    spi::sample(time, g, dps, temperature, is_clipped)
 }

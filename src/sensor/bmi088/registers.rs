@@ -4,60 +4,46 @@
 //! Both dies deliver 200 samples a second with the narrowest filter for it, -3 dB at 23 Hz (gyro) and 20 Hz. Vibration
 //! below 177 Hz is not aliased into the gyro's band; the mean over 10 ms ([`crate::align`]) has a null at 100 Hz.
 
-use core::fmt::{Display, Formatter, Result};
+use crate::sensor::spi::Setting;
 
-/// One of the two dies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Die {
-    /// The accelerometer, which also measures the temperature.
-    Accelerometer,
-    /// The gyro.
-    Gyro,
+/// The two dies, as the banks of a setting and of an error.
+pub const ACCELEROMETER: u8 = 0;
+pub const GYRO: u8 = 1;
+/// Values of their identity registers.
+pub const IDENTITIES: [u8; 2] = [0x1E, 0x0F];
+
+const fn acc(address: u8, value: u8) -> Setting {
+    Setting::new(ACCELEROMETER, address, value)
 }
 
-impl Die {
-    /// Returns the value of the die's identity register.
-    pub const fn identity(self) -> u8 {
-        if matches!(self, Self::Gyro) { 0x0F } else { 0x1E }
-    }
+const fn gyro(address: u8, value: u8) -> Setting {
+    Setting::new(GYRO, address, value)
 }
-
-impl Display for Die {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        f.write_str(if *self == Self::Gyro { "gyro" } else { "accelerometer" })
-    }
-}
-
-/// A register and the value that it must hold.
-pub type Setting = (Die, u8, u8);
 
 /// Switches the accelerometer on, which starts suspended and off.
-pub const POWER: [Setting; 2] = [(Die::Accelerometer, 0x7C, 0), (Die::Accelerometer, 0x7D, 4)];
+pub const POWER: [Setting; 2] = [acc(0x7C, 0), acc(0x7D, 4)];
 /// For the accelerometer's self-test: 24 g and 1.6 kHz. The data sheet prints A7 beside bits that make AC.
-pub const TEST: [Setting; 2] = [(Die::Accelerometer, 0x41, 3), (Die::Accelerometer, 0x40, 0xAC)];
+pub const TEST: [Setting; 2] = [acc(0x41, 3), acc(0x40, 0xAC)];
 /// All settings, in the order in which they are written.
 pub const SETTINGS: [Setting; 10] = [
     POWER[0],
     POWER[1],
     // 200 Hz, four times oversampled; 12 g, which no pothole reaches.
-    (Die::Accelerometer, 0x40, 0x89),
-    (Die::Accelerometer, 0x41, 2),
+    acc(0x40, 0x89),
+    acc(0x41, 2),
     // FIFO of accelerations, where the oldest is dropped.
-    (Die::Accelerometer, 0x48, 0x02),
-    (Die::Accelerometer, 0x49, 0x50),
+    acc(0x48, 0x02),
+    acc(0x49, 0x50),
     // 250 deg/s: a car turns at less than 100. 200 Hz with 23 Hz. Normal power.
-    (Die::Gyro, 0x0F, 3),
-    (Die::Gyro, 0x10, 0x84),
-    (Die::Gyro, 0x11, 0),
-    (Die::Gyro, GYRO_FIFO_CONFIG_1, STOP_WHEN_FULL),
+    gyro(0x0F, 3),
+    gyro(0x10, 0x84),
+    gyro(0x11, 0),
+    gyro(GYRO_FIFO_CONFIG_1, STOP_WHEN_FULL),
 ];
 /// Nominal period of both dies, microseconds, and in counts of the accelerometer's time.
 pub const PERIOD_US: u64 = 5_000;
 pub const PERIOD_COUNTS: u32 = 128;
 
-/// Bit 7 of an address marks a read.
-pub const READ: u8 = 0x80;
 pub const CHIP_ID: u8 = 0x00;
 pub const ACC_DATA: u8 = 0x12;
 /// First of the registers that hold the accelerometer's state.

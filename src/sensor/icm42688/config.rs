@@ -20,7 +20,7 @@
 //! A mean of ten samples at 1 kHz would have a delay of only 4.5 ms and zeros at the frequencies that are aliased,
 //! but would need ten times the SPI traffic and a decimator in the driver. At 100 Hz our filter leaves only 1.4 %.
 
-use super::registers::{self as reg, Register, Setting, aaf_258_hz};
+use crate::sensor::spi::Setting;
 
 /// The output rate of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -85,29 +85,35 @@ impl Icm42688Config {
     /// Returns the register values in the order in which they are written: filters and ranges
     /// before gyro and accelerometer are switched on.
     pub const fn settings(&self) -> [Setting; SETTINGS] {
-        const fn set(register: Register, mask: u8, value: u8) -> Setting {
-            Setting { register, mask, value }
+        const fn set(bank: u8, address: u8, mask: u8, value: u8) -> Setting {
+            Setting { bank, address, mask, value }
         }
-        let [square_high, square_low] = aaf_258_hz::DELTSQR.to_be_bytes();
-        let shift = aaf_258_hz::BITSHIFT << 4 | square_high;
+        let (rate, bandwidth) = (self.rate.code(), self.bandwidth.code());
         [
-            set(reg::INTF_CONFIG0, 0x70, reg::BIG_ENDIAN),
-            set(reg::INTF_CONFIG1, 0xC0, reg::AFSR_OFF),
-            set(reg::GYRO_CONFIG0, 0xEF, reg::GYRO_250_DPS | self.rate.code()),
-            set(reg::ACCEL_CONFIG0, 0xEF, reg::ACCEL_16_G | self.rate.code()),
-            set(reg::GYRO_CONFIG1, 0x0C, reg::GYRO_THIRD_ORDER),
-            set(reg::GYRO_ACCEL_CONFIG0, 0xFF, self.bandwidth.code() << 4 | self.bandwidth.code()),
-            set(reg::ACCEL_CONFIG1, 0x18, reg::ACCEL_THIRD_ORDER),
-            set(reg::GYRO_CONFIG_STATIC2, 0x03, 0),
-            set(reg::GYRO_CONFIG_STATIC3, 0x3F, aaf_258_hz::DELT),
-            set(reg::GYRO_CONFIG_STATIC4, 0xFF, square_low),
-            set(reg::GYRO_CONFIG_STATIC5, 0xFF, shift),
-            set(reg::ACCEL_CONFIG_STATIC2, 0x7F, aaf_258_hz::DELT << 1),
-            set(reg::ACCEL_CONFIG_STATIC3, 0xFF, square_low),
-            set(reg::ACCEL_CONFIG_STATIC4, 0xFF, shift),
-            set(reg::FIFO_CONFIG1, 0x17, reg::FIFO_20_BIT),
-            set(reg::FIFO_CONFIG, 0xC0, reg::FIFO_STREAM),
-            set(reg::PWR_MGMT0, 0x2F, reg::LOW_NOISE),
+            // Counts in bytes and big-endian order, as after a reset.
+            set(0, 0x4C, 0x70, 0x30),
+            // AFSR off: with it on, the gyro repeats samples for a millisecond or two above about 100 deg/s.
+            set(0, 0x4D, 0xC0, 0x40),
+            // 250 deg/s: a car turns at less than 100, so resolution matters more than range. 16 g.
+            set(0, 0x4F, 0xEF, 3 << 5 | rate),
+            set(0, 0x50, 0xEF, rate),
+            // The last filters: third order of the gyro, bandwidth of both, third order of the accelerometer.
+            set(0, 0x51, 0x0C, 2 << 2),
+            set(0, 0x52, 0xFF, bandwidth << 4 | bandwidth),
+            set(0, 0x53, 0x18, 2 << 3),
+            // The anti-alias filters are on, with 258 Hz: DELT 6, DELTSQR 36, BITSHIFT 10 by the data sheet's table.
+            set(1, 0x0B, 0x03, 0),
+            set(1, 0x0C, 0x3F, 6),
+            set(1, 0x0D, 0xFF, 36),
+            set(1, 0x0E, 0xFF, 10 << 4),
+            set(2, 0x03, 0x7F, 6 << 1),
+            set(2, 0x04, 0xFF, 36),
+            set(2, 0x05, 0xFF, 10 << 4),
+            // Temperature, gyro and accelerometer into the FIFO, with readings of 20 bits; a full one drops its oldest.
+            set(0, 0x5F, 0x17, 0x17),
+            set(0, 0x16, 0xC0, 0x40),
+            // Both on, in low-noise mode.
+            set(0, 0x4E, 0x2F, 0x0F),
         ]
     }
 }

@@ -1,8 +1,9 @@
 //! Converts a packet's counts to the pipeline's units.
 
 use super::packet::Packet;
-use crate::sample::{ImuSample, Validity};
-use crate::units::{AngularRate, CentiCelsius, Micros, STANDARD_GRAVITY, SpecificForce};
+use crate::sample::ImuSample;
+use crate::sensor::spi;
+use crate::units::{CentiCelsius, Micros};
 
 /// Counts per deg/s: 131 in the range of 250 deg/s that 16 bits have, twice that because the lowest bit is always 0.
 const PER_DPS: f32 = 262.0;
@@ -17,23 +18,22 @@ const ENDS: [i32; 2] = [-524_256, 524_284];
 impl Packet {
     /// Converts the readings, taken at `time`, to the pipeline's units; `None` where an axis has no reading.
     pub fn sample(&self, time: Micros) -> Option<ImuSample> {
-        let rate = |reading: Option<i32>| {
-            AngularRate::from_rad_per_sec((reading? as f32 / PER_DPS).to_radians()).ok()
+        let ([Some(ax), Some(ay), Some(az)], [Some(gx), Some(gy), Some(gz)]) = (self.acceleration, self.rate)
+        else {
+            return None;
         };
-        let force = |reading: Option<i32>| {
-            SpecificForce::from_metre_per_sec2(reading? as f32 / PER_G * STANDARD_GRAVITY).ok()
-        };
-        let ([ax, ay, az], [gx, gy, gz]) = (self.acceleration, self.rate);
-        let mut readings = self.acceleration.iter().chain(&self.rate).flatten();
-        Some(ImuSample {
+        let (force, rate) = ([ax, ay, az], [gx, gy, gz]);
+        let is_clipped = force.iter().chain(&rate).any(|n| *n <= ENDS[0] || *n >= ENDS[1]);
+        // The temperature is at most 27,000.
+        let temperature = self
+            .temperature
+            .map(|code| CentiCelsius(libm::roundf(f32::from(code) * (100.0 / PER_DEGREE) + 2500.0) as i16));
+        spi::sample(
             time,
-            specific_force: [force(ax)?, force(ay)?, force(az)?],
-            angular_rate: [rate(gx)?, rate(gy)?, rate(gz)?],
-            temperature: self.temperature.map(|code| {
-                // The value is at most 27,000.
-                CentiCelsius(libm::roundf(f32::from(code) * (100.0 / PER_DEGREE) + 2500.0) as i16)
-            }),
-            validity: Validity::reported(readings.any(|reading| *reading <= ENDS[0] || *reading >= ENDS[1])),
-        })
+            force.map(|n| n as f32 / PER_G),
+            rate.map(|n| n as f32 / PER_DPS),
+            temperature,
+            is_clipped,
+        )
     }
 }

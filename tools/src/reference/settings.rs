@@ -13,7 +13,7 @@ enum Takes {
 use Takes::{Number, Other};
 
 const SETTINGS: &[(&str, Takes)] = &[
-    ("imu", Other("", "`XsensMti`, `Icm42688` or `Bmi088`")),
+    ("imu", Other("", "`XsensMti`, `Icm42688`, `Bmi088` or `Asm330lhh`")),
     (
         "fog",
         Other(

@@ -1,5 +1,6 @@
 """Peripherals of the STM32F405, one file each, written from RM0090 and the data sheets."""
 
+from .asm330lhh import Asm330lhh
 from .bmi088 import Bmi088
 from .bxcan import BxCan
 from .dbgmcu import Dbgmcu
@@ -18,15 +19,17 @@ from .usart import usarts
 
 
 def create(board):
-    """Creates all modelled peripherals, with an inertial sensor on SPI1: an ICM-42688-P at PA4, or a BMI088 at PA4 and PC4.
+    """Creates all modelled peripherals, with an inertial sensor on SPI1: an ICM-42688-P or ASM330LHH at PA4, or a BMI088 at PA4 and
+    PC4.
 
     The clock tree comes first, because the others read their clocks from it.
     """
     ports = [Gpio(board, letter) for letter in "ABCDEFGHI"]
     spi = Spi(board)
-    icm42688, bmi088 = Icm42688(board), Bmi088(board)
+    icm42688, bmi088, asm330lhh = Icm42688(board), Bmi088(board), Asm330lhh(board)
     spi.attach(icm42688, [(icm42688, ports[0], 4)])
     spi.attach(bmi088, [(bmi088.accelerometer, ports[0], 4), (bmi088.gyro, ports[2], 4)])
+    spi.attach(asm330lhh, [(asm330lhh, ports[0], 4)])
     return [Rcc(board), Pwr(board), Flash(board), Exti(board), *ports, Dbgmcu(board),
             Iwdg(board), *usarts(board), *timers(board), BxCan(board), spi,
             Dma(board, "DMA1", 0x4002_6000), Dma(board, "DMA2", 0x4002_6400), Rng(board)]

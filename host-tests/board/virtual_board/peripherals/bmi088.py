@@ -1,8 +1,7 @@
 """BMI088, an inertial sensor on SPI (BST-BMI088-DS001): two dies with a chip select, an oscillator and a FIFO each.
 
-Frames are made on demand: each access makes those that are due. Both dies keep their state through a reset of the microcontroller
-and lose it with the power. What the data sheet forbids has no effect and is recorded: `sensor_in_reset`, `sensor_write_too_early`,
-`sensor_reserved`, `sensor_not_spi` (a write before the rising chip select that ends I2C), `sensor_self_test` (without its settings).
+Recorded beside what `spi_part` records: `sensor_not_spi` (a write before the rising chip select that ends I2C), `sensor_self_test`
+(without its settings).
 Filters: a tone passes with the gain of a Butterworth low-pass of the second order at the data sheet's -3 dB, and is then sampled,
 so frequencies above half the output rate alias. Slow motion passes unchanged, without delay.
 Noise: white, of the data sheet's density within the filter's bandwidth.
@@ -16,131 +15,18 @@ Settings: those of `motion`, `oscillator_error_percent` of the gyro and `acc_osc
 """
 
 from .motion import Motion, clamp, words
+from .spi_part import MS, PS, US, Die
 
-PS, MS, US = 1_000_000_000_000, 1_000_000_000, 1_000_000
-MAX_HZ = 10_000_000
-#: Time between two writes in normal mode, and with a suspended accelerometer; from power on to the next access.
-WRITE_PS, SUSPENDED_PS, ON_PS = 2 * US, 1 * MS, 450 * US
+#: Time between two writes with a suspended accelerometer; from power on to the next access.
+SUSPENDED_PS, ON_PS = 1 * MS, 450 * US
 ACC_RESET_PS, GYRO_RESET_PS, SETTLED_PS, BIST_PS = 1 * MS, 30 * MS, 50 * MS, 20 * MS
 GYRO_NOISE_DPS, ACC_NOISE_G, NOISE_BANDWIDTH = 0.014, 175e-6, 1.11
-
-
-class Die:
-    """What the two dies have in common: registers, time and the serial interface."""
-
-    dummies = 0
-    name, identity = "", 0
-    reset_values: dict = {}
-    read_only: frozenset = frozenset()
-
-    def __init__(self, board, motion):
-        self.board, self.motion = board, motion
-        self.clock_ppm, self.powered, self.passes, self.driven = 1_000_000, True, True, True
-        self.reset(0)
-
-    def power_on(self):
-        """Handles power-on."""
-        self.powered = True
-        self.reset(1 * MS)
-
-    def power_off(self):
-        """Handles the loss of power."""
-        self.powered = False
-
-    def reset(self, takes):
-        """Returns all registers to their reset values; the die answers after a time."""
-        self.registers, self.motion.stopped = dict(self.reset_values), False
-        self.answers_from = self.board.now + takes
-        self.written_at = -PS
-        self.fifo, self.lost = [], 0
-        self.address, self.bytes, self.reading = None, 0, False
-        self.restart()
-
-    def restart(self):
-        """Begins the outputs anew: the next one is due one period from now."""
-        self.started, self.made = self.board.now, 0
-
-    def clocked(self, ppm):
-        """Sets the oscillator."""
-        self.clock_ppm = ppm
-        self.restart()
-
-    def due_at(self, index):
-        """Returns the board time of an output, counted since the outputs began."""
-        return self.started + index * PS * 1_000_000 // (self.rate_hz() * self.clock_ppm)
-
-    def catch_up(self):
-        """Makes all frames that are due."""
-        if not self.powered or not self.runs():
-            return
-        while self.due_at(self.made + 1) <= self.board.now:
-            self.made += 1
-            if not self.motion.stopped:
-                self.output(self.due_at(self.made))
-
-    def gain(self, hz):
-        """Returns the gain of the filter."""
-        return (1 + (hz / self.bandwidth_hz()) ** 4) ** -0.5
-
-    def record(self, kind, **more):
-        """Records what the data sheet forbids."""
-        self.board.record(kind, die=self.name, **more)
-
-    # -- serial interface --------------------------------------------------------------------------------------------
-
-    def select(self):
-        """Handles a falling chip select: the next byte is an address."""
-        self.address, self.bytes = None, 0
-
-    def deselect(self):
-        """Handles a rising chip select."""
-        self.address = None
-
-    def transfer(self, byte, mode, hz):
-        """Transfers one byte in each direction."""
-        if not self.powered:
-            return 0xFF
-        if mode[0] != mode[1] or hz > MAX_HZ:
-            self.board.record("spi_unreadable", mode=list(mode), hz=hz)
-            return 0xFF
-        if self.address is None:
-            self.address, self.reading = byte & 0x7F, bool(byte & 0x80)
-            self.catch_up()
-            return 0xFF
-        self.bytes += 1
-        if self.board.now < self.answers_from:
-            self.record("sensor_in_reset", address=self.address)
-            return 0
-        if not self.reading:
-            self.may_write(self.address, byte)
-            return 0xFF
-        if self.bytes <= self.dummies:
-            return 0xA5
-        address = self.address
-        if address != self.fifo_data:
-            self.address = address + 1 & 0x7F
-        return self.read(address)
-
-    def may_write(self, address, value):
-        """Writes a register, if the data sheet allows it now."""
-        early = self.board.now - self.written_at < self.write_takes()
-        self.written_at = self.board.now
-        if early:
-            self.record("sensor_write_too_early", address=address, value=value)
-        elif self.bytes > 1 or address not in self.reset_values or address in self.read_only:
-            self.record("sensor_reserved", access="write", address=address, value=value)
-        else:
-            self.write(address, value)
-
-    def write_takes(self):
-        """Returns the least time between two writes."""
-        return WRITE_PS
 
 
 class Gyro(Die):
     """The gyro (section 5.5); after power-on it runs."""
 
-    name, identity, fifo_data = "gyro", 0x0F, 0x3F
+    name, identity, fifo_data, driven = "gyro", 0x0F, 0x3F, True
     reset_values = {0x00: 0x0F, **dict.fromkeys(range(0x02, 0x08), 0), 0x0A: 0, 0x0E: 0, 0x0F: 0, 0x10: 0x80, 0x11: 0, 0x14: 0, 0x15: 0,
                     0x16: 0x0F, 0x18: 0, 0x1E: 0, 0x34: 0, 0x3C: 0, 0x3D: 0, 0x3E: 0, 0x3F: 0}
     read_only = frozenset((0x00, *range(0x02, 0x08), 0x0A, 0x0E, 0x3F))
@@ -248,7 +134,7 @@ class Accelerometer(Die):
         return self.on_at is not None
 
     def write_takes(self):
-        return WRITE_PS if self.runs() else SUSPENDED_PS
+        return super().write_takes() if self.runs() else SUSPENDED_PS
 
     def rate_hz(self):
         """Returns the output rate."""
@@ -379,16 +265,9 @@ class Bmi088:
     def configure(self, key, value):
         """Sets motion or a fault."""
         die = self.accelerometer if key.startswith("acc_") else self.gyro
-        die.catch_up()
-        name = key.removeprefix("acc_")
-        if name == "oscillator_error_percent":
-            die.clocked(round(1_000_000 * (1 + value / 100)))
-        elif name == "who_am_i":
-            die.identity = value
-        elif name == "self_test":
-            die.passes = value
-        elif name == "drive":
+        if key == "drive":
             die.driven = value
-        else:
-            self.accelerometer.catch_up()
-            self.motion.configure(key, value)
+            return
+        # Both measure the same motion.
+        self.accelerometer.catch_up()
+        die.configure(key.removeprefix("acc_"), value)

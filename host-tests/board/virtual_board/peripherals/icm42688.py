@@ -1,7 +1,6 @@
 """ICM-42688-P, an inertial sensor on SPI (DS-000347): registers, power modes, FIFO, time stamps and its own oscillator.
 
-Samples are computed on demand: each access computes those that are due. The part keeps its state through a reset of the
-microcontroller and loses it with the power. They are read from the FIFO, in packets of 20 bits, big-endian, in stream mode.
+Samples are read from the FIFO, in packets of 20 bits, big-endian, in stream mode.
 
 Time: the part runs on its own oscillator, `oscillator_error_percent` fast. Without CLKIN its time stamps count units of 32/30 us
 (section 12.7).
@@ -19,9 +18,8 @@ Settings: those of `motion`, `oscillator_error_percent`, `who_am_i`.
 from ..violation import Violation
 from . import icm42688_registers as reg
 from .motion import Motion, clamp, words
+from .spi_part import MS, US, Die
 
-PS = 1_000_000_000_000
-US, MS = 1_000_000, 1_000_000_000
 RESET_PS, SWITCH_ON_PS, GYRO_START_PS, ACCEL_START_PS = 1 * MS, 200 * US, 30 * MS, 10 * MS
 FIFO_BYTES = 2048
 OUTPUT_HERTZ = {6: 1000, 7: 200, 8: 100}
@@ -32,71 +30,41 @@ GYRO_NOISE_DPS, ACCEL_NOISE_G = 0.0028, 70e-6
 NOISE_BANDWIDTH = 1.11
 
 
-class Icm42688:
-    """The part with its five register banks; the SPI calls `select`, `transfer` and `deselect`."""
+class Icm42688(Die):
+    """The part with its five register banks."""
+
+    name, identity, max_hz = "icm42688", 0x47, 24_000_000
 
     def __init__(self, board):
-        self.board = board
-        self.motion = Motion(42688)
-        self.clock_ppm = 1_000_000
-        self.reading = False
-        self.identity = 0x47
-        self.powered = True
-        self._reset(0)
+        super().__init__(board, Motion(42688))
 
-    # -- power and reset (sections 4.16 and 14.1) --------------------------------------------------------------------
+    # -- power and reset (sections 3.2, 4.16 and 14.1) ----------------------------------------------------------------
 
-    def power_on(self):
-        """Handles power-on; registers answer after 1 ms (section 3.2)."""
-        self.powered = True
-        self._reset(self.board.now)
-
-    def power_off(self):
-        """Handles the loss of power."""
-        self.powered = False
-
-    def _reset(self, now):
+    def reset(self, takes):
+        super().reset(RESET_PS)
         self.banks = [dict(bank) for bank in reg.RESET_VALUES]
         self.bank = 0
-        self.answers_from = now + RESET_PS
         self.locked_until = 0
         self.gyro_on = self.accel_on = None
-        self.started, self.made, self.motion.stopped = now, 0, False
-        self.epoch = now
-        self.fifo, self.read_from = [], 0
-        self.count_latch = 0
-        self.address = None
+        self.epoch = self.board.now
+        self.read_from = self.count_latch = 0
+
+    def runs(self):
+        """Returns True if a sensor is on."""
+        return self.gyro_on is not None or self.accel_on is not None
 
     # -- time --------------------------------------------------------------------------------------------------------
 
-    def _rate_hz(self):
+    def rate_hz(self):
         """Returns the output rate: the gyro's while it is on, otherwise the accelerometer's."""
         code = self.banks[0][reg.ACCEL_CONFIG0 if self.gyro_on is None else reg.GYRO_CONFIG0] & 15
         if code not in OUTPUT_HERTZ:
             raise Violation(f"ICM-42688-P: the output rate of code {code} is not modelled")
         return OUTPUT_HERTZ[code]
 
-    def _sample_time(self, index):
-        """Returns the board time of an output, counted since the rate was last set."""
-        return self.started + index * PS * 1_000_000 // (self._rate_hz() * self.clock_ppm)
-
     def time_stamp(self, at):
         """Returns the time-stamp counter in units of 32/30 us (section 12.7)."""
         return (at - self.epoch) * 30 * self.clock_ppm // (32 * US * 1_000_000)
-
-    def _restart(self):
-        """Restarts the outputs after a change of rate or mode: the next one is due one period from now."""
-        self.started, self.made = self.board.now, 0
-
-    def _catch_up(self):
-        """Computes all outputs that are due."""
-        if self.gyro_on is None and self.accel_on is None:
-            return
-        now = self.board.now
-        while self._sample_time(self.made + 1) <= now:
-            self.made += 1
-            if not self.motion.stopped:
-                self._output(self._sample_time(self.made))
 
     # -- outputs -----------------------------------------------------------------------------------------------------
 
@@ -105,15 +73,17 @@ class Icm42688:
         code = self.banks[0][reg.GYRO_ACCEL_CONFIG0] & 15
         if code not in BANDWIDTH_DIVIDER:
             raise Violation(f"ICM-42688-P: the bandwidth of code {code} is not modelled")
-        return max(400.0, self._rate_hz()) / BANDWIDTH_DIVIDER[code]
+        return max(400.0, self.rate_hz()) / BANDWIDTH_DIVIDER[code]
 
-    def _gain(self, hz):
+    def gain(self, hz):
+        """Returns the gain of the last filter."""
         order = 1 + (self.banks[0][reg.GYRO_CONFIG1] >> 2 & 3)
         return (1 + (hz / self.bandwidth_hz()) ** (2 * order)) ** -0.5
 
-    def _output(self, at):
+    def output(self, at):
+        """Makes a packet."""
         rates, acceleration = self.motion.truth(at)
-        self.motion.swing(rates, at, self._gain)
+        self.motion.swing(rates, at, self.gain)
         bandwidth = self.bandwidth_hz() * NOISE_BANDWIDTH
         rates = self.motion.noisy(rates, GYRO_NOISE_DPS, bandwidth)
         acceleration = self.motion.noisy(acceleration, ACCEL_NOISE_G, bandwidth)
@@ -138,40 +108,18 @@ class Icm42688:
 
     # -- serial interface (section 9) --------------------------------------------------------------------------------
 
-    def select(self):
-        """Handles a falling CS: the next byte is an address."""
-        self.address = None
-
     def deselect(self):
         """Handles a rising CS: a packet that was read in part is kept whole."""
         if self.read_from:
             self.board.record("fifo_partial_read", read=self.read_from)
             self.read_from = 0
-        self.address = None
+        super().deselect()
 
-    def transfer(self, byte, mode, hz):
-        """Transfers one byte in each direction."""
-        if not self.powered:
-            return 0xFF
-        if mode[0] != mode[1] or hz > 24_000_000:
-            self.board.record("spi_unreadable", mode=list(mode), hz=hz)
-            return 0xFF
-        if self.address is None:
-            self.address, self.reading = byte & 0x7F, bool(byte & 0x80)
-            self._catch_up()
-            return 0xFF
-        address = self.address
-        if not (address == reg.FIFO_DATA and self.bank == 0):
-            self.address = address + 1 & 0x7F
-        if self.board.now < self.answers_from:
-            self.board.record("sensor_in_reset", address=address)
-            return 0
-        if self.reading:
-            return self._read(address)
-        self._write(address, byte)
-        return 0xFF
+    def after(self, address):
+        return address if address == reg.FIFO_DATA and self.bank == 0 else address + 1 & 0x7F
 
-    def _read(self, address):
+    def read(self, address):
+        """Reads a register."""
         if address == reg.REG_BANK_SEL:
             return self.bank
         if self.bank:
@@ -206,7 +154,7 @@ class Icm42688:
             self.read_from = 0
         return byte
 
-    def _write(self, address, value):
+    def may_write(self, address, value):
         if self.board.now < self.locked_until:
             self.board.record("sensor_write_too_early", address=address, value=value)
             return
@@ -224,7 +172,7 @@ class Icm42688:
             return
         if address == reg.DEVICE_CONFIG:
             if value & 1:
-                self._reset(self.board.now)
+                self.reset(RESET_PS)
         elif address == reg.PWR_MGMT0:
             self._power_modes(value)
         elif address == reg.SIGNAL_PATH_RESET:
@@ -234,7 +182,7 @@ class Icm42688:
             self.fifo, self.read_from = [], 0
         elif address in (reg.GYRO_CONFIG0, reg.ACCEL_CONFIG0):
             if (old ^ value) & 15:
-                self._restart()
+                self.restart()
         elif address == reg.FIFO_CONFIG:
             if value >> 6 > 1:
                 raise Violation("ICM-42688-P: a FIFO that stops when it is full is not modelled")
@@ -252,18 +200,4 @@ class Icm42688:
         self.accel_on = (now if self.accel_on is None else self.accel_on) if accel else None
         if was_off and (gyro or accel):
             self.locked_until = now + SWITCH_ON_PS
-        self._restart()
-
-    # -- environment -------------------------------------------------------------------------------------------------
-
-    def configure(self, key, value):
-        """Sets motion or a fault."""
-        if self.powered:
-            self._catch_up()
-        if key == "oscillator_error_percent":
-            self.clock_ppm = round(1_000_000 * (1 + value / 100))
-            self._restart()
-        elif key == "who_am_i":
-            self.identity = value
-        else:
-            self.motion.configure(key, value)
+        self.restart()

@@ -6,6 +6,7 @@ use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use gyronet::sample::ImuSample;
 use gyronet::sensor::icm42688::packet::Packet;
 use gyronet::sensor::icm42688::registers as reg;
+use gyronet::sensor::spi::READ;
 use gyronet::units::{Micros, STANDARD_GRAVITY};
 use std::collections::VecDeque;
 use std::convert::Infallible;
@@ -64,9 +65,9 @@ impl Simulated {
             return;
         }
         self.written.push((self.bank, address, value));
-        if (self.bank, address) == (0, reg::SIGNAL_PATH_RESET.address) {
+        if (self.bank, address) == (0, reg::SIGNAL_PATH_RESET) {
             self.fifo.clear();
-        } else if (self.bank, address) != (0, reg::DEVICE_CONFIG.address) {
+        } else if (self.bank, address) != (0, reg::DEVICE_CONFIG) {
             self.registers.insert((self.bank, address), value);
         }
     }
@@ -78,9 +79,9 @@ impl Simulated {
         let waiting = (self.fifo.len() as u16).to_be_bytes();
         for (offset, byte) in to.iter_mut().enumerate() {
             *byte = match address {
-                a if a == reg::FIFO_DATA.address => self.fifo.pop_front().unwrap_or(0x80),
-                a if a == reg::FIFO_COUNTH.address => waiting[offset % 2],
-                a if a == reg::WHO_AM_I.address => reg::IDENTITY,
+                reg::FIFO_DATA => self.fifo.pop_front().unwrap_or(0x80),
+                reg::FIFO_COUNTH => waiting[offset % 2],
+                reg::WHO_AM_I => reg::IDENTITY,
                 a => self.registers.get(&(self.bank, a)).copied().unwrap_or(0),
             };
         }
@@ -127,7 +128,7 @@ impl SpiDevice for Bus {
         for operation in operations {
             match operation {
                 Operation::Write(bytes) => match **bytes {
-                    [address] => selected = address & !reg::READ,
+                    [address] => selected = address & !READ,
                     [address, value] => part.write(address, value),
                     _ => {}
                 },

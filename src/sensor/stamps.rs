@@ -1,35 +1,36 @@
-//! Converts the ICM-42688-P's 16-bit time stamps to microseconds that never wrap.
+//! Converts the time stamps of a sensor's FIFO to microseconds that never wrap.
 //!
-//! Without a clock on CLKIN the sensor counts in units of 32/30 us, although TMST_RES is 1 us (DS-000347, 12.7): the
-//! 10 ms between two samples at 100 Hz are 9,375 counts. The counts are summed unscaled, and the sum is scaled by
-//! 16/15. A time is thus within half a microsecond of the exact one, however long the sensor has run, and a
-//! difference of two times within one microsecond.
-//!
-//! The counter wraps every 65,536 counts, 69.9 ms: a time is correct only if successive samples are less
-//! than that apart. A longer gap is detected by the arrival times ([`crate::align`]).
+//! The counts are summed unscaled, and the sum is scaled. A time is thus within half a microsecond of the exact one, however
+//! long the sensor has run, and a difference of two times within one microsecond. It is correct only if successive samples
+//! are less than the counter's range apart; a longer gap is detected by the arrival times ([`crate::align`]).
 
 use crate::units::Micros;
+use core::num::NonZeroU64;
 
-/// Microseconds in `COUNTS` counts of 32/30 us.
-const MICROS: u64 = 16;
-/// Counts in `MICROS` microseconds.
-const COUNTS: u64 = 15;
-
-/// The sum of the sensor's counts.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Clock {
-    last: Option<u16>,
+/// The sum of a sensor's counts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stamps {
+    /// Largest value of the counter.
+    mask: u32,
+    /// So many microseconds in so many counts.
+    micros: u64,
+    per: NonZeroU64,
+    last: u32,
     counts: u64,
 }
 
-impl Clock {
-    /// Adds a packet's time stamp, in counts modulo 2^16, and returns its time.
-    pub(super) fn unwrap(&mut self, stamp: u16) -> Micros {
-        let since = stamp.wrapping_sub(self.last.unwrap_or(0));
-        self.counts += u64::from(since);
-        self.last = Some(stamp);
-        // Rounded to the nearest microsecond; the product overflows after 2^60 counts, 39,000 years.
-        Micros((self.counts * MICROS + COUNTS / 2) / COUNTS)
+impl Stamps {
+    /// Begins at 0 of a counter with this largest value and `micros` microseconds in `per` counts.
+    pub(super) const fn new(mask: u32, micros: u64, per: NonZeroU64) -> Self {
+        Self { mask, micros, per, last: 0, counts: 0 }
+    }
+
+    /// Adds a time stamp, and returns its time.
+    pub(super) fn unwrap(&mut self, stamp: u32) -> Micros {
+        self.counts += u64::from(stamp.wrapping_sub(self.last) & self.mask);
+        self.last = stamp;
+        // Rounded to the nearest microsecond; a product of 50,000 a count overflows after 292 years of 25 us counts.
+        Micros((self.counts * self.micros + self.per.get() / 2) / self.per)
     }
 }
 
@@ -38,10 +39,13 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
+    /// Of an ICM-42688-P.
+    const COUNTER: Stamps = Stamps::new(0xFFFF, 16, NonZeroU64::new(15).unwrap());
+
     /// Passes these counter values to the clock, and returns the times.
     fn times(counts: impl IntoIterator<Item = u64>) -> Vec<u64> {
-        let mut clock = Clock::default();
-        counts.into_iter().map(|counts| clock.unwrap(counts as u16).0).collect()
+        let mut stamps = COUNTER;
+        counts.into_iter().map(|counts| stamps.unwrap(counts as u16 as u32).0).collect()
     }
 
     fn periods(times: &[u64]) -> Vec<u64> {
