@@ -1,5 +1,5 @@
 //! Finds the recordings of real drives; a test without them is skipped. They are not part of the
-//! repository, because their licence does not allow it.
+//! repository, because we saw no licence that allows it.
 
 use crate::require::{self, Need};
 use std::path::{Path, PathBuf};

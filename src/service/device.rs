@@ -96,6 +96,8 @@ pub struct Device<R: NorFlash, W> {
     has_sample: bool,
     /// The output may be interrupted: no rate is valid, or the vehicle stands.
     may_interrupt: bool,
+    /// True from a wheel that turns until the wheels stand, also while they are silent.
+    has_turned: bool,
     sensor: Option<SensorFault>,
     status: Status,
     faults: Faults,
@@ -147,6 +149,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             reached: 0,
             has_sample: false,
             may_interrupt: true,
+            has_turned: false,
             sensor: None,
             status: Status::Init,
             faults: Faults::NONE,
@@ -211,7 +214,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     /// Processes each sample of the sensor (`None` while the sensor is silent), the status and faults of the yaw
     /// rate, the wheels, and whether the vehicle stands. A flash erase stalls the processor for up to 2 s, so flash is
-    /// written only at standstill, or while the sensor is silent, when no rate is sent.
+    /// written only at standstill, or while the sensor is silent and no wheel has turned since the wheels stood.
     pub fn observe(
         &mut self,
         sample: Option<&ImuSample>,
@@ -225,7 +228,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         let limits = &self.configuration.static_init;
         self.wheels_seen = *wheels;
         self.has_sample |= sample.is_some();
-        self.may_interrupt = sample.is_none() || standing.is_lasting();
+        self.has_turned = match wheels.standstill {
+            Standstill::Unknown => self.has_turned,
+            known => known == Standstill::Moving,
+        };
+        self.may_interrupt = standing.is_lasting() || sample.is_none() && !self.has_turned;
         if self.configuration.learn
             && self.learner.observe(sample, wheels, standing, limits, &mut self.learned)
         {

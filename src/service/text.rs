@@ -88,6 +88,9 @@ impl Display for Firmware {
         if let Some(slot) = self.slot {
             write!(f, "slot {slot}, ")?;
         }
+        if let Some(crc) = self.crc {
+            write!(f, "CRC {crc:08x}, ")?;
+        }
         f.write_str(match self.state {
             FirmwareState::Alone => "flashed without the boot loader: no update over diagnosis",
             FirmwareState::Confirmed => "confirmed",

@@ -144,7 +144,7 @@ pub const IDENTIFIERS: [Identifier; 29] = [
         0x011A,
         "firmware",
         "1, 1",
-        "slot of the firmware that runs: 0 A, 1 B, FF none; 0 not updatable, 1 confirmed, 2 on trial, 3 the update was rolled back, 4 it is damaged. Written: the head of an update",
+        "slot of the firmware that runs: 0 A, 1 B, FF none; 0 not updatable, 1 confirmed, 2 on trial, 3 the update was rolled back, 4 it is damaged; CRC-32 of the image. Written: the head of an update",
     ),
     read_only(
         0x011B,
@@ -281,8 +281,9 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
                 .try_for_each(|code: Option<i16>| put(out, &code.unwrap_or(i16::MAX).to_be_bytes()))
         }
         0x011A => {
-            let Firmware { slot, state } = device.firmware();
-            put(out, &[slot.map_or(0xFF, |slot| slot as u8), state as u8])
+            let Firmware { slot, crc, state } = device.firmware();
+            put(out, &[slot.map_or(0xFF, |slot| slot as u8), state as u8])?;
+            put(out, &crc.unwrap_or(0).to_be_bytes())
         }
         0x0117 => {
             let (wheels, stands) = device.standing();

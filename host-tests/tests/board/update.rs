@@ -35,7 +35,7 @@ fn built(test: &str) -> Option<Update> {
 }
 
 fn firmware(board: &mut Board) -> (Option<Slot>, FirmwareState) {
-    let Firmware { slot, state } = service::info(board).firmware;
+    let Firmware { slot, state, .. } = service::info(board).firmware;
     (slot, state)
 }
 

@@ -180,7 +180,7 @@ def download(client, address, content):
 def update(client, pipes, file, signature):
     """Updates the firmware to an image that does not start, which is rolled back."""
     head, images = file[:161], file[161:]
-    slot, state = client.read_data_by_identifier(0x011A).service_data.values[0x011A]
+    slot, state, *_crc = client.read_data_by_identifier(0x011A).service_data.values[0x011A]
     assert (slot, state) == (0, 1), (slot, state)
     client.change_session(DiagnosticSessionControl.Session.programmingSession)
     client.write_data_by_identifier(0x011A, head + signature)
@@ -189,7 +189,7 @@ def update(client, pipes, file, signature):
     print("reset", flush=True)
     for _ in range(6000):
         pipes.turn()
-    slot, state = client.read_data_by_identifier(0x011A).service_data.values[0x011A]
+    slot, state, *_crc = client.read_data_by_identifier(0x011A).service_data.values[0x011A]
     assert (slot, state) == (0, 3), (slot, state)
     print("the update was rolled back")
 

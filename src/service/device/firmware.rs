@@ -46,12 +46,14 @@ pub enum FirmwareState {
 pub struct Firmware {
     /// Slot of the image that runs.
     pub slot: Option<Slot>,
+    /// CRC-32 of that image, which tells builds of one version apart.
+    pub crc: Option<u32>,
     /// How it stands to its last update.
     pub state: FirmwareState,
 }
 
 impl Firmware {
-    pub(super) const ALONE: Self = Self { slot: None, state: FirmwareState::Alone };
+    pub(super) const ALONE: Self = Self { slot: None, crc: None, state: FirmwareState::Alone };
 
     pub(super) fn of<W: MappedSlots>(flash: &mut W) -> Self {
         let Some(slot) = flash.running() else { return Self::ALONE };
@@ -63,7 +65,7 @@ impl Firmware {
             Some(_) => FirmwareState::NewerDamaged,
             None => FirmwareState::Confirmed,
         };
-        Self { slot: Some(slot), state }
+        Self { slot: Some(slot), crc: Some(own.crc), state }
     }
 
     /// Returns whether the newest update does not run.

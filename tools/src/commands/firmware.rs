@@ -1,6 +1,7 @@
 //! `gyronet firmware` builds the firmware of a board.
 
 use super::{Common, WriteError};
+use gyronet::model::blob::CRC;
 use gyronet_tools::target::bench;
 use gyronet_tools::target::firmware::Linked;
 use std::io::{self, Write};
@@ -44,15 +45,20 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let file = linked.update()?;
     std::fs::write(&update, file.bytes()).map_err(WriteError::to(&update))?;
     let (boot, image) = (linked.boot_loader()?.len(), file.images[0].len());
+    let [a, b] = [0, 1].map(|slot: usize| format!("{:08x}", CRC.checksum(&file.images[slot])));
     let out = &mut io::stdout().lock();
     if common.json {
         return super::print_json(
             out,
             &serde_json::json!({
-                "elf": elf, "update": update, "boot_bytes": boot, "image_bytes": image,
+                "elf": elf, "update": update, "boot_bytes": boot, "image_bytes": image, "crc": [a, b],
             }),
         );
     }
     writeln!(out, "{}: for a debug probe, boot loader of {boot} bytes", elf.display())?;
-    Ok(writeln!(out, "{}: for `device update`, image of {image} bytes", update.display())?)
+    Ok(writeln!(
+        out,
+        "{}: for `device update`, image of {image} bytes, CRC {a} in slot A, {b} in slot B",
+        update.display()
+    )?)
 }

@@ -227,9 +227,17 @@ fn flash_is_written_at_standstill_alone() {
         assert_eq!(storable(&mut board), may, "{standing:?}");
     }
     see(&mut board, Standing::UNKNOWN);
-    let wheels = WheelSample::without_speeds(Standstill::Unknown);
-    board.observe(None, 700, (Status::Silent, Faults::NONE), &wheels, &Standing::UNKNOWN);
-    assert!(storable(&mut board), "a bench without a sensor");
+    // Without a sensor: a bench, a vehicle that drives, whose wheel frames end, and one that stands.
+    for (wheels, may) in [
+        (Standstill::Unknown, true),
+        (Standstill::Moving, false),
+        (Standstill::Unknown, false),
+        (Standstill::Still, true),
+    ] {
+        let wheels = WheelSample::without_speeds(wheels);
+        board.observe(None, 700, (Status::Silent, Faults::NONE), &wheels, &Standing::UNKNOWN);
+        assert_eq!(storable(&mut board), may, "{:?}", wheels.standstill);
+    }
     see(&mut board, Standing::UNKNOWN);
     type Request = fn(&mut Board) -> Result<(), Refusal>;
     let requests: [Request; 8] = [
