@@ -161,13 +161,14 @@ fn pictures<'a>(
     let all = drives.clone().flat_map(|(_, found)| found);
     let chosen = outage_chart::typical(all).ok_or("no outage to draw: too little course or reference")?;
     std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    for (outage, name) in chosen.into_iter().zip(["median.svg", "worst.svg"]) {
+    for ((outage, which), name) in chosen.into_iter().zip(["median.svg", "worst.svg"]) {
         let is_of = |(_, found): &&Found<'_>| found.iter().any(|own| std::ptr::eq(own, outage));
         let Some((file, _)) = drives.clone().find(is_of) else { continue };
         let drive = Drive::open_moving(file)?;
         let points = outage::trace(&drive, network, outage)?;
+        let title = format!("{}, drive {}", recording::set(file), drive.name());
         let file = folder.join(name);
-        std::fs::write(&file, outage_chart::svg(drive.name(), outage, &points))
+        std::fs::write(&file, outage_chart::svg(&title, &which, outage, &points))
             .map_err(|error| format!("{}: {error}", file.display()))?;
     }
     Ok(())

@@ -29,8 +29,7 @@ pub fn page(demo: &Demo<'_>) -> String {
     }
     body += &facts(demo);
     if let Some(tunnel) = demo.tunnel {
-        body += "<h2>A tunnel</h2>\n<p class=\"note\">Drawn is the tunnel whose error of gyronet's heading is the median of \
-                 the drive's tunnels. Every method had the same courses before it.</p>\n";
+        body += "<h2>A tunnel</h2>\n<p class=\"note\">Every method had the same courses before it.</p>\n";
         body += &format!("<div class=\"tunnel\">\n{}</div>\n", tunnel.picture);
         body += &format!("<div class=\"scroll\"><pre>{}</pre></div>\n", escaped(&tunnel.to_string()));
     }

@@ -30,12 +30,13 @@ impl Tunnel {
         }
         let (found, _) = outage::run(drive, network, &[SECONDS], EVERY_S, || {})?;
         let outages = Outages::new(drive.name(), std::iter::once(found.as_slice()));
-        let Some([median, _]) = outage_chart::typical(found.iter()).filter(|_| !outages.outage.is_empty())
+        let Some([(median, which), _]) =
+            outage_chart::typical(found.iter()).filter(|_| !outages.outage.is_empty())
         else {
             return Ok(None);
         };
         let points = outage::trace(drive, network, median)?;
-        Ok(Some(Self { picture: outage_chart::svg(drive.name(), median, &points), outages }))
+        Ok(Some(Self { picture: outage_chart::svg(drive.name(), &which, median, &points), outages }))
     }
 
     fn row(&self, method: Method) -> Option<&Figures> {

@@ -1,8 +1,9 @@
 //! The filter that a user of a GNSS receiver would write: an extended Kalman filter of heading, bias and gain.
 //!
-//! It integrates the gyro, and gets what the board gets: every course with its accuracy, and the means of the seconds in
-//! which the board's judge of standstill lets the bias be updated. A course is weighed by its accuracy, the speed and the
-//! rate, and left out beyond four sigma; after ten seconds without a match the heading starts again.
+//! It integrates the gyro, and gets what the board gets: every course with its accuracy, the bias of static
+//! initialisation once the board has it, and the means of the seconds in which the board's judge of standstill lets the
+//! bias be updated. A course counts as the heading some lag ago, is weighed by its accuracy, the speed and the rate, and
+//! left out beyond four sigma; after ten seconds without a match the heading starts again.
 
 use super::metrics::wrap;
 use crate::drive::DT;
@@ -14,9 +15,11 @@ const SLOWEST: f64 = 3.0;
 const ACCURACY: f64 = 0.02;
 const TURNING: f64 = 0.3;
 const ACROSS: f64 = 0.1;
+/// Lag of a course behind the heading, s: the board's before it has learnt it.
+const LAG: f64 = 0.3;
 /// Random walks of bias, rad/s, and of heading, rad, per square root of a second.
 const WALKS: [f64; 2] = [2e-5, 3e-4];
-/// Sigma of bias and gain before they are known, and of the mean of a second at standstill, rad/s.
+/// Sigma of bias and gain before they are known, and of a mean at standstill, rad/s.
 const FIRST: [f64; 2] = [0.02, 0.005];
 const STANDSTILL: f64 = 3e-4;
 /// Least time between two courses, and time without a match before the heading starts again, s.
@@ -71,20 +74,21 @@ impl Filter {
         rate
     }
 
-    /// Adds the mean of the gyro over a second at standstill, rad/s.
+    /// Adds the mean of the gyro over some time at standstill, rad/s.
     pub fn standstill(&mut self, mean: f64) {
         self.update(0, mean - self.state[0], STANDSTILL * STANDSTILL);
     }
 
-    pub fn course(&mut self, heading: &Heading) {
-        let (Some(course), Some(speed)) = (heading.course, heading.speed.map(f64::from)) else { return };
+    pub fn course(&mut self, from: &Heading) {
+        let (Some(course), Some(speed)) = (from.course, from.speed.map(f64::from)) else { return };
         if speed < SLOWEST || self.time - self.last < APART {
             return;
         }
         self.last = self.time;
-        let sigma = heading.course_sigma.map_or(ACROSS / speed, f64::from);
+        let sigma = from.course_sigma.map_or(ACROSS / speed, f64::from);
         let variance = sigma * sigma + ACCURACY * ACCURACY + (TURNING * self.rate).powi(2);
-        let off = wrap(-f64::from(course) - self.state[2]);
+        let heading = wrap(LAG * self.rate - f64::from(course));
+        let off = wrap(heading - self.state[2]);
         let is_off = off * off > GATE * GATE * (self.covariance[2][2] + variance);
         match self.matched {
             Some(matched) if is_off && self.time - matched < PATIENCE => return,
@@ -93,7 +97,7 @@ impl Filter {
                 for state in 0..3 {
                     (self.covariance[2][state], self.covariance[state][2]) = (0.0, 0.0);
                 }
-                (self.state[2], self.covariance[2][2]) = (-f64::from(course), variance);
+                (self.state[2], self.covariance[2][2]) = (heading, variance);
             }
         }
         self.matched = Some(self.time);
@@ -124,7 +128,7 @@ mod tests {
             heading += rate * DT;
             filter.sample(1.004 * rate + 0.003, false);
             if step % 100 == 0 {
-                let course = Some((-heading).rem_euclid(std::f64::consts::TAU) as f32);
+                let course = Some((LAG * rate - heading).rem_euclid(std::f64::consts::TAU) as f32);
                 filter.course(&Heading { course, speed: Some(20.0), ..Heading::default() });
             }
         }

@@ -130,7 +130,8 @@ struct Race<'a> {
     /// Time of the newest course, us, and the time driven with one, s.
     newest: Option<u64>,
     driven_s: f64,
-    /// Readings of the last two seconds, and the updates at standstill so far.
+    /// The bias of static initialisation, readings of the last two seconds, and the updates at standstill so far.
+    static_bias: Option<[f64; 3]>,
     gyro: VecDeque<f64>,
     updates: u32,
     reference: Reference,
@@ -158,11 +159,10 @@ struct Running<'a> {
     path: Path,
 }
 
-/// The copy of the filter, and the gyro's sum less the true heading at the start: the median and the newest.
+/// The copy of the filter, and the gyro's sum less the true heading at the start.
 struct Begun {
     ekf: ekf::Filter,
     median: f64,
-    off: f64,
 }
 
 /// The gyro's sum less the true heading.
@@ -191,10 +191,6 @@ impl Reference {
         let mut known: Vec<f64> = self.recent.iter().flatten().copied().collect();
         known.sort_unstable_by(f64::total_cmp);
         known.get(known.len() / 2).copied()
-    }
-
-    fn newest(&self) -> Option<f64> {
-        self.recent.iter().rev().flatten().next().copied()
     }
 }
 
@@ -230,6 +226,7 @@ impl<'a> Race<'a> {
             speeds: drive.speeds(),
             newest: None,
             driven_s: 0.0,
+            static_bias: None,
             gyro: VecDeque::new(),
             updates: 0,
             reference: Reference::default(),
@@ -282,7 +279,10 @@ impl<'a> Race<'a> {
         let [x, y, gyro] = row.sample.angular_rate.map(AngularRate::rad_per_sec);
         self.reference.add(gyro, row);
         let pipeline = self.zero_rate.coprocessor().pipeline();
-        let [bx, by, bias] = pipeline.gyro_bias().unwrap_or_default().map(AngularRate::rad_per_sec);
+        let known = pipeline.gyro_bias().filter(|_| self.static_bias.is_none());
+        let known = known.map(|bias| bias.map(AngularRate::rad_per_sec));
+        self.static_bias = self.static_bias.or(known);
+        let [bx, by, bias] = self.static_bias.unwrap_or_default();
         let updates = pipeline.counters().zero_rate_updates;
         let force = row.sample.specific_force.map(SpecificForce::metre_per_sec2);
         let vqf = self.vqf.rate([x - bx, y - by, gyro - bias], force);
@@ -293,7 +293,7 @@ impl<'a> Race<'a> {
         self.updates = updates;
         let stands = model.standstill == Standstill::Still;
         let filtered = |ekf: &mut ekf::Filter| {
-            mean.into_iter().for_each(|mean| ekf.standstill(mean));
+            known.map(|[.., z]| z).into_iter().chain(mean).for_each(|mean| ekf.standstill(mean));
             ekf.sample(gyro, stands)
         };
         filtered(&mut self.ekf);
@@ -301,16 +301,14 @@ impl<'a> Race<'a> {
             self.ekf.course(heading);
         }
         let speed = self.speeds.as_mut().map(|speeds| speeds.next(row));
-        let (reference, lengths, found) = (&self.reference, &self.lengths, &mut self.found);
-        let newest = reference.newest();
+        let (median, lengths, found) = (self.reference.median(), &self.lengths, &mut self.found);
         let mut trace = matches!(self.starts, Starts::At(_)).then_some(&mut self.trace);
         let mut copies = copies.into_iter();
         self.running.retain_mut(|outage| {
             let Some(Some([own_no_model, own])) = copies.next() else { return false };
             if own.row <= outage.start {
                 if own.row == outage.start {
-                    let begun = |(median, off)| Begun { ekf: self.ekf.clone(), median, off };
-                    outage.begun = reference.median().zip(newest).map(begun);
+                    outage.begun = median.map(|median| Begun { ekf: self.ekf.clone(), median });
                 }
                 return own.row < outage.start || outage.begun.is_some();
             }
@@ -324,7 +322,7 @@ impl<'a> Race<'a> {
                 rate(&own_no_model),
                 rate(&own),
             ];
-            outage.path.add(rates, gyro, newest.map_or(0.0, |off| off - begun.off), speed);
+            outage.path.add(rates, gyro, median.map_or(0.0, |median| median - begun.median), speed);
             let steps = own.row - outage.start;
             if let Some(trace) = &mut trace
                 && steps.is_multiple_of(SECOND / 2)
@@ -332,16 +330,15 @@ impl<'a> Race<'a> {
                 trace.push(outage.path.point(speed.is_some()));
             }
             if let Some(seconds) = lengths.iter().copied().find(|seconds| seconds * SECOND == steps)
-                && let Some(now) = reference.median()
+                && median.is_some()
             {
-                let truth = outage.path.gyro() - (now - begun.median);
-                let angles = outage.path.angles();
+                let Point { heading, position } = outage.path.point(speed.is_some());
                 found.push(Outage {
                     driven_s: outage.driven_s,
                     seconds,
                     start_s: outage.start as f64 * DT,
-                    heading: angles.map(|angle| wrap(angle - truth).abs()),
-                    position: speed.map(|_| outage.path.position()),
+                    heading: heading.map(|off| wrap(off).abs()),
+                    position,
                 });
             }
             lengths.iter().any(|seconds| seconds * SECOND > steps)

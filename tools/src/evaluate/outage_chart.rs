@@ -1,11 +1,11 @@
-//! A picture of one outage, as an SVG that a page shows in a column of 390 px or more, light or dark: the path in
-//! metres, and the error of the heading by time.
+//! A picture of one outage, as an SVG that a page shows in a column of 390 px or more, light or dark: the error of
+//! the heading by time, and how far off each path is.
 
 use crate::evaluate::methods::Method;
-use crate::evaluate::outage::{AFTER_S, METHODS, Outage};
+use crate::evaluate::outage::{AFTER_S, ByMethod, METHODS, Outage};
 use crate::evaluate::outage_path::Point;
 use crate::plot::curve::range;
-use crate::plot::page::chart::{part, same_scale, ticks};
+use crate::plot::page::chart::{part, ticks};
 use crate::plot::page::escaped;
 use std::fmt::Write;
 
@@ -13,14 +13,14 @@ const WIDTH: f64 = 480.0;
 /// Left and right margins of a panel, and the place of its axis' numbers and title.
 const MARGINS: [f64; 2] = [44.0, 12.0];
 const GAP: f64 = 44.0;
-const HEADING_HEIGHT: f64 = 130.0;
-/// The methods that are drawn, from back to front, with their colours on light and on dark ground: those of the page,
-/// where the live rate has the EKF's.
-const DRAWN: [(Method, &str, &str); 4] = [
-    (Method::STATIC, "#0068a8", "#5cb3ef"),
-    (Method::STATIC_ZERO_RATE, "#b5569a", "#e08cc6"),
-    (Method::EKF, "#7d858d", "#9aa3ab"),
-    (Method::DELAYED, "#c8400a", "#ff8152"),
+const HEIGHT: f64 = 150.0;
+/// The methods that are drawn, from back to front, with their colours on light and on dark ground, those of the page,
+/// where the live rate has the EKF's, and their dashes: zero-rate updates may hide static initialisation.
+const DRAWN: [(Method, &str, &str, &str); 4] = [
+    (Method::STATIC, "#0068a8", "#5cb3ef", "none"),
+    (Method::STATIC_ZERO_RATE, "#b5569a", "#e08cc6", "7 7"),
+    (Method::EKF, "#7d858d", "#9aa3ab", "none"),
+    (Method::DELAYED, "#c8400a", "#ff8152", "none"),
 ];
 /// These lie in the picture as a whole; others may leave it.
 const IN_SCALE: [Method; 3] = [Method::STATIC_ZERO_RATE, Method::EKF, Method::DELAYED];
@@ -30,57 +30,64 @@ fn column(method: Method) -> usize {
     METHODS.iter().position(|own| *own == method).expect("the drawn methods are compared ones")
 }
 
-pub fn svg(drive: &str, outage: &Outage, points: &[Point]) -> String {
+/// `which` says which of the outages of a drive or set it is.
+pub fn svg(drive: &str, which: &str, outage: &Outage, points: &[Point]) -> String {
+    let Outage { seconds, start_s, driven_s, .. } = outage;
     let title = format!(
-        "{drive}: {} s without GNSS, {:.0} s after the start, after {:.0} s with it",
-        outage.seconds, outage.start_s, outage.driven_s
+        "{drive}: {seconds} s without GNSS, {start_s:.0} s after the start, after {driven_s:.0} s with it: {which}"
     );
     let mut body = legend(outage);
-    let mut top = 56.0 + 17.0 * (DRAWN.len() + 1) as f64;
-    if points.iter().any(|point| point.places.is_some()) {
-        top = path(&mut body, top, points) + GAP;
+    let top = 58.0 + 17.0 * DRAWN.len() as f64;
+    let time = (1..).map(|k| f64::from(k) * SECONDS_OF_A_POINT);
+    let by_time: Vec<_> = time.zip(points.iter().map(|point| point.heading.map(f64::to_degrees))).collect();
+    let mut bottom = panel(&mut body, top, &by_time, "error of the heading, degrees, by seconds");
+    let by_way: Vec<_> = points.iter().filter_map(|point| point.position).collect();
+    if !by_way.is_empty() {
+        let axes = "distance from the reference's path, m, by metres driven";
+        bottom = panel(&mut body, bottom + GAP, &by_way, axes);
     }
-    let height = heading(&mut body, top, points) + GAP - 8.0;
+    let height = bottom + GAP - 8.0;
     format!(
         "<svg id=\"tunnel\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height:.0}\" \
          font-family=\"system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif\" font-size=\"13\" role=\"img\" \
          aria-label=\"{}\">\n<style>\n{}</style>\n\
          <rect class=\"ground\" width=\"{WIDTH}\" height=\"{height:.0}\" rx=\"8\"/>\n<text x=\"12\" y=\"22\" font-weight=\"600\">\
-         {} s without GNSS</text><text class=\"note\" x=\"12\" y=\"40\">{}</text>\n{body}</svg>\n",
+         {seconds} s without GNSS: {}</text><text class=\"note\" x=\"12\" y=\"40\">{}</text>\n{body}</svg>\n",
         escaped(&title),
         style(),
-        outage.seconds,
-        escaped(&format!("{drive}, {:.0} s after its start", outage.start_s)),
+        escaped(which),
+        escaped(&format!("{drive}, {start_s:.0} s after its start")),
     )
 }
 
 /// Returns the style sheet. Every rule holds in this picture alone, since a page may have the picture in its text.
 fn style() -> String {
     let grounds = [
-        ["#fff", "#f5f6f8", "#dfe3e7", "#1d2126", "#5d6670", "#1d2126"],
-        ["#14171a", "#1c2126", "#333a41", "#e6e9ec", "#98a2ac", "#f2f4f6"],
+        ["#fff", "#f5f6f8", "#dfe3e7", "#1d2126", "#5d6670"],
+        ["#14171a", "#1c2126", "#333a41", "#e6e9ec", "#98a2ac"],
     ];
-    let rules = grounds.into_iter().enumerate().map(|(is_dark, [ground, panel, grid, ink, soft, truth])| {
+    let rules = grounds.into_iter().enumerate().map(|(is_dark, [ground, panel, grid, ink, soft])| {
         let mut rules = format!(
             "#tunnel .ground{{fill:{ground}}}#tunnel .panel{{fill:{panel}}}#tunnel .grid{{stroke:{grid}}}#tunnel text{{fill:{ink}}}\
-             #tunnel .note{{fill:{soft}}}#tunnel .truth{{stroke:{truth}}}"
+             #tunnel .note{{fill:{soft}}}"
         );
-        for (k, (_, on_light, on_dark)) in DRAWN.iter().enumerate() {
+        for (k, (_, on_light, on_dark, dash)) in DRAWN.iter().enumerate() {
             // Writing to a string does not fail.
-            let _ = write!(rules, "#tunnel .m{k}{{stroke:{}}}", [on_light, on_dark][is_dark]);
+            let colour = [on_light, on_dark][is_dark];
+            let _ = write!(rules, "#tunnel .m{k}{{stroke:{colour};stroke-dasharray:{dash}}}");
         }
         rules
     });
     let [light, dark] = [0, 1].map(|at| rules.clone().nth(at).unwrap_or_default());
     format!(
         "#tunnel .note{{font-size:11.5px}}#tunnel .curve{{fill:none;stroke-width:2;stroke-linejoin:round}}\n{light}\n\
-         #tunnel .truth{{stroke-width:2.5}}\n@media (prefers-color-scheme:dark){{{dark}}}\n"
+         @media (prefers-color-scheme:dark){{{dark}}}\n"
     )
 }
 
-/// Returns the median and the worst of the longest outages by the error of the delayed rate's heading; those whose
-/// path is known first.
-pub fn typical<'a>(outages: impl Iterator<Item = &'a Outage> + Clone) -> Option<[&'a Outage; 2]> {
+/// Returns the median and the worst of the longest outages by the error of the delayed rate's heading, those whose
+/// path is known first, each with the words that say so.
+pub fn typical<'a>(outages: impl Iterator<Item = &'a Outage> + Clone) -> Option<[(&'a Outage, String); 2]> {
     let after = f64::from(AFTER_S[0] as u32);
     let longest = outages.clone().map(|outage| outage.seconds).max()?;
     let rank =
@@ -89,82 +96,47 @@ pub fn typical<'a>(outages: impl Iterator<Item = &'a Outage> + Clone) -> Option<
     let mut chosen: Vec<&Outage> = outages.filter(|outage| rank(outage) == best).collect();
     let error = |outage: &Outage| outage.heading[column(Method::DELAYED)];
     chosen.sort_by(|a, b| error(a).total_cmp(&error(b)));
-    Some([chosen.get(chosen.len() / 2)?, chosen.last()?])
+    let which = |rank: &str| format!("{rank} of {} by gyronet's error", chosen.len());
+    Some([(chosen.get(chosen.len() / 2)?, which("the median")), (chosen.last()?, which("the worst"))])
 }
 
 /// The names of the curves, with the errors at the end.
 fn legend(outage: &Outage) -> String {
     let mut text = String::new();
-    let mut line = |y: f64, class: &str, name: &str, note: &str| {
-        let _ = writeln!(
-            text,
-            "<line class=\"curve {class}\" x1=\"12\" x2=\"34\" y1=\"{0:.0}\" y2=\"{0:.0}\"/><text x=\"42\" y=\"{y:.0}\">{name}</text>\
-             <text class=\"note\" x=\"250\" y=\"{y:.0}\">{note}</text>",
-            y - 4.0
-        );
-    };
-    let distance = outage.position.map(|(distance, _)| format!("{distance:.0} m"));
-    line(60.0, "truth", "reference", &distance.unwrap_or_default());
     for (k, (method, ..)) in DRAWN.iter().enumerate() {
         let at = column(*method);
-        let end = outage.position.map(|(_, ends)| format!(", {:.1} m", ends[at]));
+        let end = outage.position.map(|(driven, ends)| format!(", {:.1} m after {driven:.0} m", ends[at]));
         let note =
             format!("{:.1}° off at the end{}", outage.heading[at].to_degrees(), end.unwrap_or_default());
         let name = if *method == Method::DELAYED { "gyronet" } else { method.name };
-        line(77.0 + 17.0 * k as f64, &format!("m{k}"), name, &note);
+        let y = 60.0 + 17.0 * k as f64;
+        let _ = writeln!(
+            text,
+            "<line class=\"curve m{k}\" x1=\"12\" x2=\"34\" y1=\"{0:.0}\" y2=\"{0:.0}\"/><text x=\"42\" y=\"{y:.0}\">{name}</text>\
+             <text class=\"note\" x=\"250\" y=\"{y:.0}\">{note}</text>",
+            y - 4.0
+        );
     }
     text
 }
 
-/// Draws the paths, and returns the lower end.
-fn path(body: &mut String, top: f64, points: &[Point]) -> f64 {
-    let places = || points.iter().filter_map(|point| point.places);
-    let start = std::iter::once([0.0; 2]);
-    let truth: Vec<[f64; 2]> = start.clone().chain(places().map(|(reference, _)| reference)).collect();
-    let by = |method: Method| -> Vec<[f64; 2]> {
-        start.clone().chain(places().map(|(_, ends)| ends[column(method)])).collect()
+/// Draws the errors of each method over a time or a way, with axes, and returns the lower end.
+fn panel(body: &mut String, top: f64, errors: &[(f64, ByMethod<f64>)], axes: &str) -> f64 {
+    let of = |method: Method| {
+        let curve = errors.iter().map(move |(at, errors)| [*at, errors[column(method)]]);
+        std::iter::once([0.0; 2]).chain(curve)
     };
-    let scaled: Vec<[f64; 2]> = IN_SCALE.into_iter().flat_map(by).chain(truth.iter().copied()).collect();
-    let axis = |k: usize| range(scaled.iter().map(|place| place[k]), 0.03);
-    let (x, y, aspect) = same_scale(axis(0), axis(1));
-    let height = (WIDTH - MARGINS[0] - MARGINS[1]) / aspect;
-    let curves = DRAWN.iter().enumerate().map(|(k, (method, ..))| (format!("m{k}"), by(*method)));
-    panel(body, top, height, x, y, "m", std::iter::once(("truth".to_owned(), truth)).chain(curves))
-}
-
-/// Draws the errors of the heading by time, and returns the lower end.
-fn heading(body: &mut String, top: f64, points: &[Point]) -> f64 {
-    let by = |method: Method| -> Vec<[f64; 2]> {
-        let error = |(k, point): (usize, &Point)| {
-            [(k + 1) as f64 * SECONDS_OF_A_POINT, point.heading[column(method)].to_degrees()]
-        };
-        std::iter::once([0.0; 2]).chain(points.iter().enumerate().map(error)).collect()
-    };
-    let scaled: Vec<[f64; 2]> = IN_SCALE.into_iter().flat_map(by).collect();
-    let (_, last) = range(scaled.iter().map(|point| point[0]), 0.0);
+    let scaled: Vec<[f64; 2]> = IN_SCALE.into_iter().flat_map(of).collect();
+    let x = range(scaled.iter().map(|point| point[0]), 0.0);
     let y = range(scaled.iter().map(|point| point[1]), 0.15);
-    let curves = DRAWN.iter().enumerate().map(|(k, (method, ..))| (format!("m{k}"), by(*method)));
-    panel(body, top, HEADING_HEIGHT, (0.0, last), y, "error of the heading, degrees, by seconds", curves)
-}
-
-/// Draws curves with axes, and returns the lower end.
-fn panel(
-    body: &mut String,
-    top: f64,
-    height: f64,
-    x: (f64, f64),
-    y: (f64, f64),
-    axes: &str,
-    curves: impl Iterator<Item = (String, Vec<[f64; 2]>)>,
-) -> f64 {
     let [left, right] = [MARGINS[0], WIDTH - MARGINS[1]];
     let width = right - left;
-    let bottom = top + height;
-    let (across, up) = (|at: f64| left + width * part(at, x), |at: f64| bottom - height * part(at, y));
+    let bottom = top + HEIGHT;
+    let (across, up) = (|at: f64| left + width * part(at, x), |at: f64| bottom - HEIGHT * part(at, y));
     let _ = writeln!(
         body,
-        "<svg x=\"{left}\" y=\"{top:.0}\" width=\"{width}\" height=\"{height:.0}\" viewBox=\"{left} {top:.0} {width} {height:.0}\">\
-         <rect class=\"panel\" x=\"{left}\" y=\"{top:.0}\" width=\"{width}\" height=\"{height:.0}\"/>"
+        "<svg x=\"{left}\" y=\"{top:.0}\" width=\"{width}\" height=\"{HEIGHT}\" viewBox=\"{left} {top:.0} {width} {HEIGHT}\">\
+         <rect class=\"panel\" x=\"{left}\" y=\"{top:.0}\" width=\"{width}\" height=\"{HEIGHT}\"/>"
     );
     let mut numbers = String::new();
     let mut mark = |[x1, x2, y1, y2]: [f64; 4], anchor: &str, [x, y]: [f64; 2], label: &str| {
@@ -185,9 +157,9 @@ fn panel(
         let at = up(tick.at);
         mark([left, right, at, at], "end", [left - 6.0, at + 4.0], &tick.label);
     }
-    for (class, points) in curves {
-        let _ = write!(body, "<polyline class=\"curve {class}\" points=\"");
-        for [at, value] in points {
+    for (k, (method, ..)) in DRAWN.iter().enumerate() {
+        let _ = write!(body, "<polyline class=\"curve m{k}\" points=\"");
+        for [at, value] in of(*method) {
             // A curve that has left the picture stays near it.
             let near = |value: f64| value.clamp(-2_000.0, 2_000.0);
             let _ = write!(body, "{:.1},{:.1} ", near(across(at)), near(up(value)));
@@ -215,7 +187,8 @@ mod tests {
     #[test]
     fn the_median_and_the_worst_of_the_longest_are_typical() {
         let all = [outage(30, 9.0), outage(60, 0.3), outage(60, 0.1), outage(60, 0.2)];
-        assert_eq!(typical(all.iter()), Some([&all[3], &all[1]]));
+        let [(median, words), (worst, _)] = typical(all.iter()).unwrap();
+        assert_eq!((median, worst, &*words), (&all[3], &all[1], "the median of 3 by gyronet's error"));
         assert_eq!(typical([].iter()), None);
     }
 
@@ -224,15 +197,16 @@ mod tests {
         let points: Vec<_> = (1..=120)
             .map(|k| Point {
                 heading: std::array::from_fn(|m| 0.001 * f64::from(k) * m as f64),
-                places: Some(([f64::from(k), 0.0], std::array::from_fn(|m| [f64::from(k), m as f64]))),
+                position: Some((f64::from(k), std::array::from_fn(|m| m as f64))),
             })
             .collect();
-        let svg = svg("<b>", &outage(60, 0.1), &points);
+        let svg = svg("<b>", "the median of 3", &outage(60, 0.1), &points);
         assert!(
-            svg.contains("60 s without GNSS") && svg.contains("&lt;b&gt;, 80 s after its start"),
+            svg.contains("60 s without GNSS: the median of 3<")
+                && svg.contains("&lt;b&gt;, 80 s after its start"),
             "{svg}"
         );
-        assert!(svg.contains("5.7° off at the end, 3.0 m"), "{svg}");
-        assert_eq!(svg.matches("<polyline").count(), 5 + 4, "the paths, and the errors of the methods");
+        assert!(svg.contains("5.7° off at the end, 3.0 m after 500 m"), "{svg}");
+        assert_eq!(svg.matches("<polyline").count(), 4 + 4, "the errors of heading and position");
     }
 }

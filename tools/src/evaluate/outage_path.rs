@@ -8,8 +8,8 @@ use crate::evaluate::outage::ByMethod;
 pub struct Point {
     /// Errors of the heading, rad.
     pub heading: ByMethod<f64>,
-    /// Places by the reference and by each method, m forward and to the left of the start; absent without wheels.
-    pub places: Option<([f64; 2], ByMethod<[f64; 2]>)>,
+    /// The distance driven, and that of each method's place from the reference's, m; absent without wheels.
+    pub position: Option<(f64, ByMethod<f64>)>,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -43,25 +43,16 @@ impl Path {
         self.off = off;
     }
 
-    pub fn gyro(&self) -> f64 {
-        self.gyro
-    }
-
-    /// Returns the angles by each method, rad.
-    pub fn angles(&self) -> ByMethod<f64> {
-        self.angles
-    }
-
     pub fn point(&self, has_speed: bool) -> Point {
         let truth = self.gyro - self.off;
         Point {
             heading: self.angles.map(|angle| angle - truth),
-            places: has_speed.then_some((self.reference, self.ends)),
+            position: has_speed.then(|| self.position()),
         }
     }
 
     /// Returns the distance, and what each heading moves the end by, m.
-    pub fn position(&self) -> (f64, ByMethod<f64>) {
+    fn position(&self) -> (f64, ByMethod<f64>) {
         let [x, y] = self.reference;
         (self.distance, self.ends.map(|end| (end[0] - x).hypot(end[1] - y)))
     }
