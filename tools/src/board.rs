@@ -108,6 +108,11 @@ impl<N: WindowNetwork> Board<N> {
         Self { may_move: true, takes_course, ..self }
     }
 
+    /// Takes the courses of the rows from now on, with which the vehicle may move at the start.
+    pub fn take_courses(&mut self) {
+        (self.may_move, self.takes_course) = (true, true);
+    }
+
     pub fn coprocessor(&self) -> &Coprocessor {
         &self.coprocessor
     }

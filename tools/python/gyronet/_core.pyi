@@ -45,16 +45,24 @@ class Coprocessor:
         wheels: ArrayLike | None = None,
         temp_c: ArrayLike | None = None,
         last: bool = True,
+        gnss: ArrayLike | None = None,
     ) -> NDArray[np.void]:
         """Corrects n rows, and with `last` ends the drive: otherwise the newest rows are held back for the next call.
 
         t_s: (n,) time of the sensor, s, rising, about 10 ms apart. imu: (n, 6) specific force x, y, z, m/s^2, then
         angular rate, rad/s; x forward, y left, z up. wheels: (n, 4) rates of front right, rear right, front left and rear
-        left, rad/s. temp_c: (n,) of the sensor. ValueError: the drive starts in motion, or a number is out of range.
+        left, rad/s. temp_c: (n,) of the sensor. gnss: (n, 5) course over ground, clockwise from north, and its sigma, rad,
+        speed, m/s, latitude and longitude, degrees; NaN in rows without, and without sigma. Positions give a course where
+        the receiver sends none. ValueError: the drive starts in motion and has no gnss, or a number is out of range.
         """
 
     def step(
-        self, t_s: float, imu: Sequence[float], wheels: Sequence[float] | None = None, temp_c: float | None = None
+        self,
+        t_s: float,
+        imu: Sequence[float],
+        wheels: Sequence[float] | None = None,
+        temp_c: float | None = None,
+        gnss: Sequence[float] | None = None,
     ) -> np.void | None:
         """Corrects one row, with the units of `run`; returns the result of the row 12 rows before it, as soon as there is one."""
 

@@ -5,6 +5,7 @@ import struct
 import numpy as np
 
 from gyronet import Coprocessor, bags
+from gyronet.logs.drive import NAMES
 from gyronet.progress import bar
 from gyronet.refused import Refused
 
@@ -15,6 +16,7 @@ QUALITY = ["good", "degraded", "initialising", "unusable"]
 STANDSTILL = ["unknown", "moving", "still"]
 LEVEL = [0, 1, 1, 2]  # of diagnostic_msgs: good is OK, degraded and initialising are WARN, unusable is ERROR
 STALE = 3
+GNSS = [NAMES.index(name) for name in ("course", "course_sigma", "gnss_speed", "gnss_lat", "gnss_lon")]
 
 
 class Corrections:
@@ -24,14 +26,15 @@ class Corrections:
         board = Coprocessor(weights=weights, calibration=calibration, wheels=drive.seen[11:15].tolist(), radius_m=drive.vehicle.radius)
         steps, times, rates = [], [], []
         for table in drive.chunks():
-            # With the digits of a drive's file, so that the rates are those of `import` and `replay`.
+            # With the digits of a drive's file, so that the rates are those of the drive that `import` writes.
+            gnss = np.round(table[:, GNSS], 8) if drive.seen[GNSS].any() else None
             table = np.hstack([table[:, :1], np.round(table[:, 1:7], 7), np.round(table[:, 11:15], 6)])
-            steps.append(board.run(table[:, 0], table[:, 1:7], table[:, 7:11], last=False))
+            steps.append(board.run(table[:, 0], table[:, 1:7], table[:, 7:11], last=False, gnss=gnss))
             times.append(table[:, 0])
             rates.append(table[:, 4:6].astype(np.float32))
         steps = np.concatenate([*steps, board.finish()])
         if board.gyro_bias is None:
-            raise Refused(f"{drive.gyro.name}: never 3 s at rest without a gap, so the bias of the gyro is not known; --from SECONDS starts later")
+            raise Refused(f"{drive.gyro.name}: never 3 s at rest without a gap, and too little course, so the bias of the gyro is not known; --from SECONDS starts later")
         self.times = np.concatenate(times)[steps["row"]] + drive.start
         roll, pitch = np.concatenate(rates)[steps["row"]].T
         sent = np.isfinite(steps["delayed"])

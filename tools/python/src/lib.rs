@@ -9,7 +9,7 @@ use gyronet::store::{Calibration, Configuration, Learned, Record};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, RangeError, SpecificForce};
 use gyronet_tools::board::{Board, Step};
 use gyronet_tools::calibrate::unit_file;
-use gyronet_tools::drive::recording::{Row, WHEELS};
+use gyronet_tools::drive::recording::{Row, Track, WHEELS};
 use gyronet_tools::drive::vehicle::RADIUS;
 use gyronet_tools::drive::wheel_frames::WheelFrames;
 use gyronet_tools::network::weight_file::WeightFile;
@@ -51,12 +51,16 @@ fn refused(error: impl Display) -> PyErr {
 /// Size of a result in bytes.
 const RECORD: usize = 8 + BYTES.len() + 8 * NUMBERS.len();
 
+/// Numbers of a GNSS receiver in a row: course, its sigma, speed, latitude, longitude.
+const GNSS: usize = 5;
+
 /// A CAN frame that the board sent: time in microseconds, identifier, 29 bits or 11, data.
 type Sent = (u64, u32, bool, Vec<u8>);
 
 #[pyclass(module = "gyronet")]
 struct Coprocessor {
     board: Board<GyroNet<'static>>,
+    track: Track,
     rows: u64,
     /// Frames that were not taken yet, where they are wanted.
     frames: Option<Vec<Sent>>,
@@ -94,33 +98,36 @@ impl Coprocessor {
             return Err(refused(format!("radius_m = {radius_m}: must be 0.01 to 10 m")));
         }
         let board = Board::new(config, WheelFrames::of(wheels, radius_m), GyroNet::new(blob));
-        Ok(Self { board, rows: 0, frames: frames.then(Vec::new) })
+        Ok(Self { board, track: Track::default(), rows: 0, frames: frames.then(Vec::new) })
     }
 
-    #[pyo3(signature = (t_s, imu, wheels=None, temp_c=None, last=true))]
+    #[pyo3(signature = (t_s, imu, wheels=None, temp_c=None, last=true, gnss=None))]
     fn run<'p>(
         &mut self,
-        py: Python<'p>,
         t_s: &Bound<'p, PyAny>,
         imu: &Bound<'p, PyAny>,
         wheels: Option<&Bound<'p, PyAny>>,
         temp_c: Option<&Bound<'p, PyAny>>,
         last: bool,
+        gnss: Option<&Bound<'p, PyAny>>,
     ) -> PyResult<Bound<'p, PyAny>> {
+        let py = t_s.py();
         let times = numbers(t_s, "t_s", &[])?;
         let rows = times.len();
         let imu = numbers(imu, "imu", &[rows, 6])?;
         let wheels = wheels.map(|wheels| numbers(wheels, "wheels", &[rows, WHEELS])).transpose()?;
         let temperatures = temp_c.map(|values| numbers(values, "temp_c", &[rows])).transpose()?;
+        let gnss = gnss.map(|gnss| numbers(gnss, "gnss", &[rows, GNSS])).transpose()?;
         let row = |k: usize| {
             let wheels = wheels.as_ref().map(|wheels| array(&wheels[WHEELS * k..]));
-            (times[k], array(&imu[6 * k..]), wheels, temperatures.as_ref().map(|values| values[k]))
+            let gnss = gnss.as_ref().map(|gnss| array(&gnss[GNSS * k..]));
+            (times[k], array(&imu[6 * k..]), wheels, temperatures.as_ref().map(|values| values[k]), gnss)
         };
         let bytes = py.detach(|| {
             let mut bytes = Vec::with_capacity(rows * RECORD);
             for k in 0..rows {
-                let (time, imu, wheels, temperature) = row(k);
-                if let Some(step) = self.row(time, imu, wheels, temperature)? {
+                let (time, imu, wheels, temperature, gnss) = row(k);
+                if let Some(step) = self.row(time, imu, wheels, temperature, gnss)? {
                     self.write(&step, &mut bytes);
                 }
             }
@@ -132,7 +139,7 @@ impl Coprocessor {
         records(py, &bytes)
     }
 
-    #[pyo3(signature = (t_s, imu, wheels=None, temp_c=None))]
+    #[pyo3(signature = (t_s, imu, wheels=None, temp_c=None, gnss=None))]
     fn step<'p>(
         &mut self,
         py: Python<'p>,
@@ -140,8 +147,9 @@ impl Coprocessor {
         imu: [f64; 6],
         wheels: Option<[f64; WHEELS]>,
         temp_c: Option<f64>,
+        gnss: Option<[f64; GNSS]>,
     ) -> PyResult<Option<Bound<'p, PyAny>>> {
-        let Some(step) = self.row(t_s, imu, wheels, temp_c)? else { return Ok(None) };
+        let Some(step) = self.row(t_s, imu, wheels, temp_c, gnss)? else { return Ok(None) };
         let mut bytes = Vec::new();
         self.write(&step, &mut bytes);
         records(py, &bytes)?.get_item(0).map(Some)
@@ -169,14 +177,14 @@ impl Coprocessor {
 }
 
 impl Coprocessor {
-    /// Runs one row: specific force and angular rate, rates of the wheels, temperature. NaN is a wheel or temperature
-    /// that is not known.
+    /// Runs one row: specific force and angular rate, rates of the wheels, temperature, GNSS. NaN is not known.
     fn row(
         &mut self,
         t_s: f64,
         [ax, ay, az, gx, gy, gz]: [f64; 6],
         wheels: Option<[f64; WHEELS]>,
         temp_c: Option<f64>,
+        gnss: Option<[f64; GNSS]>,
     ) -> PyResult<Option<Step>> {
         let (number, ticks) = (self.rows, (t_s * 1e4).round());
         let place = |error: RangeError| refused(format!("row {number}: {error}"));
@@ -194,9 +202,14 @@ impl Coprocessor {
             validity: Validity::Good,
         };
         self.rows += 1;
-        let wheels = wheels.unwrap_or([f64::NAN; WHEELS]).map(|rate| rate.is_finite().then_some(rate));
+        let finite = |value: f64| value.is_finite().then_some(value);
+        let wheels = wheels.unwrap_or([f64::NAN; WHEELS]).map(finite);
+        let heading = gnss.and_then(|gnss| {
+            self.board.take_courses();
+            self.track.heading(sample.time, gnss.map(finite))
+        });
         let [reference, course, speed] = [None; 3];
-        let row = Row { line: number, sample, reference, course, wheels, speed, heading: None, place: None };
+        let row = Row { line: number, sample, reference, course, wheels, speed, heading, place: None };
         self.board.row(&row).map_err(|error| refused(format!("row {number}: {error}")))
     }
 

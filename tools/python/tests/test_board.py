@@ -72,6 +72,7 @@ class Board(unittest.TestCase):
         broken = self.imu.copy()
         broken[7, 2] = np.nan
         for arguments, words in (((self.t, self.imu[:, :5]), "imu has the shape"), ((self.t, self.imu, self.wheels[:9]), "wheels has the shape"),
+                                 ((self.t, self.imu, None, None, True, self.wheels), "gnss has the shape"),
                                  ((self.imu, self.imu), "t_s has the shape"), ((-1 - self.t, self.imu), "row 0: "), ((self.t, broken), "row 7: not a finite"),
                                  ((self.t, moving), "row 299: ")):
             with self.assertRaisesRegex(ValueError, words):

@@ -27,9 +27,9 @@ class Correct(unittest.TestCase):
         self.t = made.times(20.0, 100.0)
         self.rows = made.imu(self.t)
 
-    def make(self, name, **more):
+    def make(self, name, fixes=(), **more):
         store = made.STORE1 if name == "one.bag" else made.STORE
-        messages = [*made.imu_messages(self.t, self.rows, store, **more), *made.odometry_messages(made.times(20.0, 10.0), store)]
+        messages = [*made.imu_messages(self.t, self.rows, store, **more), *made.odometry_messages(made.times(20.0, 10.0), store), *fixes]
         path = self.folder / name
         if name == "one.bag":
             made.bag1(path, messages)
@@ -66,7 +66,9 @@ class Correct(unittest.TestCase):
         drive = made.drive(self.folder, "drive.csv")
         wheels = np.column_stack([drive.get(f"wheel{k}_rate", np.full(len(drive["t_s"]), np.nan)) for k in range(1, 5)])
         imu = np.column_stack([drive[f"{kind}_{axis}"] for kind in ("acc", "gyr") for axis in "xyz"])
-        return Coprocessor(wheels=np.isfinite(wheels).any(axis=0)).run(drive["t_s"], imu, wheels)
+        gnss = [drive.get(name, np.full(len(drive["t_s"]), np.nan)) for name in ("course", "course_sigma", "gnss_speed", "gnss_lat", "gnss_lon")]
+        gnss = np.column_stack(gnss) if "gnss_lat" in drive else None
+        return Coprocessor(wheels=np.isfinite(wheels).any(axis=0)).run(drive["t_s"], imu, wheels, gnss=gnss)
 
     def test_every_kind_of_bag_has_the_rates_of_its_drive(self):
         for name in KINDS:
@@ -105,6 +107,20 @@ class Correct(unittest.TestCase):
         found = turn.T @ new[1000].angular_velocity_covariance.reshape(3, 3) @ turn
         np.testing.assert_allclose(found[2, 2], steps["delayed_sigma"][1000] ** 2, rtol=1e-5)
         np.testing.assert_allclose(found[:2, :2], (turn.T @ old @ turn)[:2, :2], rtol=1e-9)
+
+    def test_positions_correct_a_bias_that_changes_after_the_start(self):
+        self.t = made.times(120.0, 100.0)
+        self.rows = made.imu(self.t) + np.outer(self.t > 4, [0, 0, 0, 0, 0, 0.003])
+        self.make("d.mcap", made.fix_messages(made.times(120.0, 5.0)))
+        late, error = self.t > 90, {}
+        for position in ("/fix", "none"):
+            self.correct("d.mcap", "--odometry", "none", "--position", position, "--out", f"{position[-3:]}.mcap")
+            _, new, _ = self.read(self.folder / f"{position[-3:]}.mcap")
+            error[position] = abs(np.mean(self.rates(new)[late, 2] - made.turn(self.t[late])))
+            steps = self.board("d.mcap", "--odometry", "none", "--position", position)
+            np.testing.assert_allclose(self.rates(new)[300:-8, 2], steps["delayed"][300:-8], atol=2e-7)
+        self.assertLess(error["/fix"], 1e-3, error)
+        self.assertGreater(error["none"], 2e-3, error)
 
     def test_other_rates_and_units(self):
         for hz, unit, scale in ((50.0, None, 1.0), (400.0, None, 1.0), (100.0, "/imu=deg/s", np.degrees(1.0))):

@@ -24,7 +24,7 @@ mod reader;
 mod resampled;
 mod survey;
 
-pub use position::between;
+pub use position::{Track, between};
 pub use reader::Reader;
 pub use resampled::resampled;
 pub use survey::{Facts, Survey};

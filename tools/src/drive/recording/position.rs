@@ -24,14 +24,36 @@ pub fn between(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {
 }
 
 #[derive(Debug, Default)]
-pub(super) struct Track {
+pub struct Track {
+    /// The receiver gives courses of its own.
+    has_course: bool,
     newest: Option<(f64, f64)>,
     kept: VecDeque<(Micros, [f64; 2])>,
 }
 
 impl Track {
+    pub(super) fn new(has_course: bool) -> Self {
+        Self { has_course, ..Self::default() }
+    }
+
+    /// Returns the course that arrives with a row: the receiver's with its accuracy, rad, and the speed, m/s, or in a drive
+    /// without one that of the positions, degrees.
+    pub fn heading(
+        &mut self,
+        time: Micros,
+        [course, sigma, speed, latitude, longitude]: [Option<f64>; 5],
+    ) -> Option<Heading> {
+        self.has_course |= course.is_some();
+        if !self.has_course {
+            return self.add(time, (latitude?, longitude?));
+        }
+        let course = Some(course?.rem_euclid(TAU) as f32);
+        let [course_sigma, speed] = [sigma, speed].map(|value| value.map(|value| value as f32));
+        Some(Heading { course, course_sigma, speed, speed_sigma: None })
+    }
+
     /// Adds latitude and longitude, degrees; returns the course that ends there.
-    pub(super) fn add(&mut self, time: Micros, position: (f64, f64)) -> Option<Heading> {
+    fn add(&mut self, time: Micros, position: (f64, f64)) -> Option<Heading> {
         let is_new = self.newest != Some(position);
         let is_due = self.kept.back().is_none_or(|(last, _)| time.0.saturating_sub(last.0) >= APART_US);
         if !is_new || !is_due {

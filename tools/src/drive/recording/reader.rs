@@ -5,11 +5,9 @@ use super::{Row, WHEELS};
 use crate::drive::error::{DataError, DataFault, ValueError};
 use crate::drive::vehicle::Vehicle;
 use csv::StringRecord;
-use gyronet::heading::Heading;
 use gyronet::mounting::Rotation;
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, RangeError, SpecificForce};
-use std::f64::consts::TAU;
 use std::str::FromStr;
 
 const TIME: &str = "t_s";
@@ -105,7 +103,7 @@ impl<R: std::io::Read> Reader<R> {
             fields,
             last: None,
             rotation: None,
-            track: Track::default(),
+            track: Track::new(columns.direction[0].is_some()),
         })
     }
 
@@ -144,18 +142,10 @@ impl<R: std::io::Read> Reader<R> {
         let (reference, course, speed) = (optional(reference)?, optional(course)?, optional(speed)?);
         let wheels = [w1?, w2?, w3?, w4?];
         let ([direction, sigma], [latitude, longitude]) = (direction.map(optional), position.map(optional));
-        let (direction, sigma, position) = (direction?, sigma?, latitude?.zip(longitude?));
-        let heading = match (self.columns.direction, direction) {
-            ([None, _], _) => position.and_then(|position| self.track.add(time, position)),
-            (_, direction) => direction.map(|course| Heading {
-                course: Some(course.rem_euclid(TAU) as f32),
-                course_sigma: sigma.map(|sigma| sigma as f32),
-                speed: speed.map(|speed| speed as f32),
-                speed_sigma: None,
-            }),
-        };
+        let (latitude, longitude) = (latitude?, longitude?);
+        let heading = self.track.heading(time, [direction?, sigma?, speed, latitude, longitude]);
         self.last = Some(time);
-        let place = position.map(|(latitude, longitude)| [latitude, longitude]);
+        let place = latitude.zip(longitude).map(|(latitude, longitude)| [latitude, longitude]);
         Ok(Row { line, sample, reference, course, wheels, speed, heading, place })
     }
 }
