@@ -154,7 +154,7 @@ fn a_stored_part_that_is_unknown_is_refused() {
     let default = postcard::to_stdvec(&Configuration::DEFAULT).expect("it fits");
     let content = |parts: &[u8]| [parts, &default[2..]].concat();
     let stored = |parts| open(&written(Configuration::VERSION, &content(parts))).get::<Configuration>();
-    assert_eq!(stored(&[3, 0]), Err(StoreError::Encoding));
+    assert_eq!(stored(&[4, 0]), Err(StoreError::Encoding));
     assert_eq!(stored(&[0, 1, 1]), Err(StoreError::Encoding));
     assert_eq!(
         open(&written(Configuration::VERSION, &[200; 3])).get::<Configuration>(),

@@ -212,14 +212,14 @@ fn a_tilt_that_one_standstill_has_shown_may_be_a_ramp_to_a_gyro_beside() {
     assert!((0.016..0.022).contains(&missed), "1 - cos of 11 degrees: {missed}");
 }
 
-/// A tilt that is not taken off adds to a mounting by eye, one that is takes its place; half its square is missed.
+/// A tilt that is not taken off adds to a mounting by eye, one that is takes its place; half its square is missed, of which half counts.
 #[test]
 fn a_tilt_in_use_is_part_of_the_expected_error() {
     for (levelled, mounting) in [(false, root(&[0.02, 0.2])), (true, 0.2)] {
         let mut uncertainty = Uncertainty::new(ERRORS);
         uncertainty.tilt(0.04, levelled);
         turn(&mut uncertainty, 2.0, [0.03, -0.04, 0.5, 0.0]);
-        let due = root(&[3e-4, root(&[0.01, 0.02]) * 0.5, mounting * 0.05, 0.005 * 0.5]);
+        let due = root(&[3e-4, root(&[0.01, 0.02]) * 0.5, mounting * 0.05, 0.5 * 0.005 * 0.5]);
         let found = uncertainty.sigma(Origin::Gyro, 0.0).rad_per_sec();
         assert!((found / due - 1.0).abs() < 1e-4, "{levelled}: {found} is not {due}");
     }
@@ -259,12 +259,12 @@ fn the_last_second_shows_how_far_the_vehicle_leans_and_a_turn_s_axis() {
     assert_eq!(uncertainty.tilted_now(), 0.0, "too slow a turn to tell");
 }
 
-/// What a banked turn misses adds linearly with the bias.
+/// Half of what a banked turn may miss adds linearly with the bias.
 #[test]
 fn a_minute_of_a_banked_turn_misses_the_same_share_throughout() {
     let mut uncertainty = Uncertainty::new(ERRORS);
     turn(&mut uncertainty, 100.0, [0.0, 0.1, 0.5, 0.0]);
-    let due = root(&[3e-4 * 60f64.sqrt(), root(&[1e-4, 0.02 * 0.5]) * 60.0, 0.01 * 30.0, 0.02 * 6.0]);
+    let due = root(&[3e-4 * 60f64.sqrt(), root(&[1e-4, 0.5 * 0.02 * 0.5]) * 60.0, 0.01 * 30.0, 0.02 * 6.0]);
     let found = f64::from(uncertainty.minute(Missed::NOTHING));
     assert!((found / due - 1.0).abs() < 1e-3, "{found} is not {due}");
 }
