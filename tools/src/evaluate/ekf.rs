@@ -6,11 +6,10 @@
 //! left out beyond four sigma; after ten seconds without a match the heading starts again.
 
 use super::metrics::wrap;
+use super::outage::SLOWEST;
 use crate::drive::DT;
 use gyronet::heading::Heading;
 
-/// Slowest speed with a course, m/s.
-const SLOWEST: f64 = 3.0;
 /// Sigma of a course besides its own, rad, and in a turn, rad per rad/s; sigma of the speed across it, m/s.
 const ACCURACY: f64 = 0.02;
 const TURNING: f64 = 0.3;
@@ -81,7 +80,7 @@ impl Filter {
 
     pub fn course(&mut self, from: &Heading) {
         let (Some(course), Some(speed)) = (from.course, from.speed.map(f64::from)) else { return };
-        if speed < SLOWEST || self.time - self.last < APART {
+        if speed < f64::from(SLOWEST) || self.time - self.last < APART {
             return;
         }
         self.last = self.time;

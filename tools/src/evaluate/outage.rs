@@ -17,6 +17,7 @@ use crate::evaluate::metrics::wrap;
 use crate::evaluate::outage_path::{Path, Point};
 use crate::evaluate::rates::silent;
 use crate::evaluate::{ekf, vqf};
+use gyronet::heading::CourseConfig;
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Estimate, WindowNetwork};
 use gyronet::pipeline::PipelineConfig;
@@ -31,7 +32,7 @@ pub const EVERY_S: usize = 2;
 /// Seconds of course before a start, one set of rows each.
 pub const AFTER_S: [usize; 2] = [60, 20];
 /// Slowest speed that counts as driven with a course, m/s, and the longest time from one course to the next, s.
-pub const SLOWEST: f32 = 3.0;
+pub const SLOWEST: f32 = CourseConfig::DEFAULT.slowest;
 const APART_S: f64 = 2.1;
 /// Samples over whose median the reference is taken.
 const MEDIAN: usize = 3 * SECOND;
