@@ -81,12 +81,16 @@ pub fn wants<T>(test: &str, need: Need, found: Result<T, String>) -> Option<T> {
 
 /// Returns the Python with these packages: `GYRONET_PYTHON`, or `python3`.
 pub fn python(test: &str, packages: &[&str]) -> Option<String> {
+    wants(test, Need::Python, python_with(packages))
+}
+
+/// Returns that Python, or why there is none.
+pub fn python_with(packages: &[&str]) -> Result<String, String> {
     let python = std::env::var("GYRONET_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let packages = packages.join(", ");
     let check = Command::new(&python).args(["-c", &format!("import {packages}")]).output();
     let there = check.is_ok_and(|output| output.status.success());
-    let found = there.then(|| python.clone()).ok_or_else(|| format!("{python} has not all of {packages}"));
-    wants(test, Need::Python, found)
+    there.then(|| python.clone()).ok_or_else(|| format!("{python} has not all of {packages}"))
 }
 
 #[cfg(test)]

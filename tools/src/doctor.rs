@@ -109,6 +109,7 @@ fn start(path: &Path, doctor: &Doctor, rows: &Rows) -> Result<Finding, DataError
     let reason = reason.to_string();
     // A finding may be sent to others, so it shows the recording's name instead of a path.
     let reason = reason.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&reason);
+    let reason = reason.split_once("; `gyronet doctor`").map_or(reason, |(reason, _)| reason);
     let is_unit = |finding: &Finding| finding.verdict == Verdict::Bad && finding.text.contains("--unit ");
     if doctor.findings.iter().any(is_unit) {
         return Ok(Finding::bad("start", format!("{reason}; first mend the unit, below.")));

@@ -8,7 +8,7 @@ use clap::Parser;
 use gyronet::can::DataFrame;
 use gyronet::heading::nmea2000;
 use gyronet_host_tests::board::{self, Board};
-use gyronet_host_tests::replay;
+use gyronet_host_tests::{replay, require};
 use gyronet_tools::bundled;
 use gyronet_tools::drive::DT;
 use gyronet_tools::drive::recording::{Recording, Row};
@@ -54,6 +54,9 @@ struct Args {
     /// Image to run, as `cargo fw` writes it; without it, it is built.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
+    /// Crystal of the image's board; the Netduino Plus 2 has 25 MHz.
+    #[arg(long, default_value_t = 25_000_000)]
+    crystal_hz: u32,
 }
 
 fn main() -> ExitCode {
@@ -67,6 +70,12 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+    require::python_with(board::PACKAGES).map_err(|why| {
+        format!(
+            "{why}: `python3 -m venv target/python && target/python/bin/pip install unicorn==2.1.4`, then \
+             `GYRONET_PYTHON=$PWD/target/python/bin/python {NAME}`"
+        )
+    })?;
     let mut drive = match &args.drive {
         Some(path) => Recording::read(path)?,
         None => bundled::demo_drive(true)?,
@@ -74,13 +83,11 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if args.parked {
         drive.rows.truncate(PARKED);
     }
-    let mut lines = [
-        Line::open("service line (USART6)", SERVICE, args.service)?,
-        Line::open("SLCAN (USART2)", SLCAN, args.slcan)?,
-    ];
     let elf = match &args.elf {
-        Some(elf) => elf.clone(),
+        Some(elf) if elf.is_file() => std::path::absolute(elf)?,
+        Some(elf) => return Err(format!("{}: no such file", elf.display()).into()),
         None => {
+            eprintln!("{NAME}: builds the firmware, which takes a minute or more");
             let folder = std::env::current_exe()?.with_file_name("board-image");
             std::fs::create_dir_all(&folder)?;
             let elf = board::firmware("netduino-plus-2", NAME, &folder.display().to_string(), "coprocessor");
@@ -89,7 +96,12 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     };
     let mut board = Board::unpowered(NAME, &elf).ok_or("the model of the board cannot run: see above")?;
     board.configure("USART2.baud", 921_600);
+    board.configure("RCC.crystal_hz", args.crystal_hz);
     board.power_on();
+    let mut lines = [
+        Line::open("service line (USART6)", SERVICE, args.service)?,
+        Line::open("SLCAN (USART2)", SLCAN, args.slcan)?,
+    ];
     let (mut vehicle, began, mut report) = (Vehicle::new(drive), Instant::now(), REPORT);
     loop {
         let sent = vehicle.next();
@@ -159,7 +171,8 @@ struct Line {
 
 impl Line {
     fn open(name: &'static str, usart: usize, port: u16) -> io::Result<Self> {
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
+            .map_err(|error| io::Error::new(error.kind(), format!("{name}: port {port}: {error}")))?;
         listener.set_nonblocking(true)?;
         println!("{name}: localhost:{}", listener.local_addr()?.port());
         Ok(Self { name, usart, listener, client: None })
@@ -193,7 +206,9 @@ impl Line {
         if let Some(client) = &mut self.client
             && let Err(error) = client.write_all(bytes)
         {
-            eprintln!("{}: {error}; disconnected", self.name);
+            if error.kind() != ErrorKind::BrokenPipe {
+                eprintln!("{}: {error}; disconnected", self.name);
+            }
             self.client = None;
         }
     }

@@ -52,7 +52,18 @@ mod firmware {
         if let Some(slot) = select(&mut slots, has_failed) {
             start(FLASH_BASE + slot.firmware().start);
         }
-        p.RCC.ahb1enr().modify(|_, w| w.gpioaen().enabled().gpioben().enabled().gpiocen().enabled());
+        p.RCC.ahb1enr().modify(|_, w| {
+            w.gpioaen()
+                .enabled()
+                .gpioben()
+                .enabled()
+                .gpiocen()
+                .enabled()
+                .gpioden()
+                .enabled()
+                .gpioeen()
+                .enabled()
+        });
         clock_delay();
         if let Some((led, lit)) = BOARD.led {
             led.output(!lit);

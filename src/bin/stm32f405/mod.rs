@@ -66,7 +66,7 @@ pub fn wait_until(polls: u32, is_ready: impl Fn() -> bool) -> bool {
 /// Switches on the clocks of ports and peripherals.
 fn enable_peripherals(rcc: &pac::RCC) {
     rcc.ahb1enr().modify(|_, w| {
-        w.gpioaen().enabled().gpioben().enabled().gpiocen().enabled();
+        w.gpioaen().enabled().gpioben().enabled().gpiocen().enabled().gpioden().enabled().gpioeen().enabled();
         w.dma1en().enabled().dma2en().enabled()
     });
     rcc.ahb2enr().modify(|_, w| w.rngen().enabled());

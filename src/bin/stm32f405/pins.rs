@@ -12,7 +12,7 @@ pub const CAN_1: u8 = 9;
 /// Alternate function of SPI1.
 pub const SPI_1: u8 = 5;
 
-/// A pin of port A, B or C.
+/// A pin of the ports A to E.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pin {
     port: Port,
@@ -24,6 +24,8 @@ enum Port {
     A,
     B,
     C,
+    D,
+    E,
 }
 
 /// The speed of a pin's edges (OSPEEDR).
@@ -46,7 +48,9 @@ impl Pin {
             'A' => Port::A,
             'B' => Port::B,
             'C' => Port::C,
-            _ => panic!("only ports A, B and C are clocked"),
+            'D' => Port::D,
+            'E' => Port::E,
+            _ => panic!("only ports A to E are clocked"),
         };
         Self { port, number }
     }
@@ -56,6 +60,8 @@ impl Pin {
             Port::A => pac::GPIOA::ptr().cast(),
             Port::B => pac::GPIOB::ptr(),
             Port::C => pac::GPIOC::ptr().cast(),
+            Port::D => pac::GPIOD::ptr().cast(),
+            Port::E => pac::GPIOE::ptr().cast(),
         };
         // SAFETY: all ports have the same registers (RM0090 8.4.11) and are always mapped. BSRR is set
         // without reading; everything else is written before interrupts are on.

@@ -175,6 +175,9 @@ def main(arguments=None):
     except Refused as error:
         print("error:", " ".join(str(error).split()), file=sys.stderr)
         return 1
+    except ModuleNotFoundError as error:
+        print(f"error: {sys.executable} has no {error.name}: {sys.executable} -m pip install -r tools/requirements.txt", file=sys.stderr)
+        return 1
     except BrokenPipeError:  # a pager that was left
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     except KeyboardInterrupt:

@@ -222,7 +222,8 @@ fn print_info(info: &Info, access: &str) -> io::Result<()> {
         Some(id) => writeln!(out, "part          {:#05x} revision {:#06x}", id & 0xFFF, id >> 16)?,
         None => writeln!(out, "part          unknown")?,
     }
-    writeln!(out, "clock         {:.3} MHz", f64::from(identity.clock_hz) / 1e6)?;
+    let fault = identity.clock_fault.map_or_else(String::new, |fault| format!(": {fault}"));
+    writeln!(out, "clock         {:.3} MHz{fault}", f64::from(identity.clock_hz) / 1e6)?;
     let bus = match identity.can_fault {
         None => "CAN, SLCAN".to_owned(),
         Some(fault) => format!("SLCAN only: {fault}"),

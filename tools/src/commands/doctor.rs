@@ -47,5 +47,6 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
     }
     let bad = doctor.findings.iter().filter(|finding| finding.verdict == Verdict::Bad).count();
-    if bad > 0 { Err(format!("{bad} findings must be fixed first").into()) } else { Ok(()) }
+    let plural = if bad == 1 { "" } else { "s" };
+    if bad > 0 { Err(format!("{bad} finding{plural} must be fixed first").into()) } else { Ok(()) }
 }

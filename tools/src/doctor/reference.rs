@@ -34,7 +34,10 @@ pub fn finding(rows: &Rows, standstill: Option<&Range<usize>>) -> Finding {
     } else if courses > 0 {
         of_course(rows, &format!("A course, {courses} values"))
     } else {
-        Finding::note(WHAT, "None: the recording can neither judge a method nor train a network.")
+        Finding::note(
+            WHAT,
+            "None: no method can be judged and no network trained. Record a GNSS position, or a better gyro.",
+        )
     }
 }
 

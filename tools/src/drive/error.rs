@@ -79,7 +79,9 @@ pub enum DataFault {
     #[error("is sampled at {hz:.1} Hz, should be 50 to 1000 Hz")]
     Rate { hz: f64 },
     /// A wheel, 1 to 4, turns during static initialisation; its mean rate over a second is in rad/s.
-    #[error("starts moving: line {line}, wheel {wheel} turns at {rate:.2} rad/s in the first 3 s")]
+    #[error(
+        "starts moving: line {line}, wheel {wheel} turns at {rate:.2} rad/s in the first 3 s; `gyronet doctor` looks for a later rest"
+    )]
     Moving { line: u64, wheel: usize, rate: f64 },
     #[error("not a valid vehicle file: {reason}")]
     Vehicle { reason: String },

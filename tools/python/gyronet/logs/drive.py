@@ -220,7 +220,10 @@ class Drive:
         for used in self.used():
             self.report.append(used.line(self.start, self.rows))
         if (self.odometry or any(wheel and wheel.dimension == "speed" for wheel in self.wheels)) and not self.vehicle.wheels["radius_m"]:
-            self.report.append(f"wheels: radius {RADIUS} m is assumed; set wheels.radius_m")
+            track = " and track 0 m (both wheels at the vehicle's speed)" if self.odometry and not self.vehicle.wheels["track_m"] else ""
+            self.report.append(f"wheels: radius {RADIUS} m{track} is assumed; set wheels.radius_m{' and wheels.track_m' if track else ''}")
+        if not self.seen[7:10].any():
+            self.report.append("no GNSS position (in a bag: sensor_msgs/NavSatFix) and no reference: no method can be judged by this drive")
         if self.count > self.rows:
             self.report.append(f"imu: {self.count - self.rows} of {self.count} rows are in gaps and left out")
 

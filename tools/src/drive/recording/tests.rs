@@ -165,7 +165,7 @@ fn a_turning_wheel_is_named() {
     let text = standing(400, |at, row| if at >= 250 { row.replacen(",,x", ",-2.5,x", 1) } else { row });
     assert_eq!(
         parse(&text).unwrap_err().to_string(),
-        "drives/a.csv: starts moving: line 250, wheel 3 turns at -2.50 rad/s in the first 3 s"
+        "drives/a.csv: starts moving: line 250, wheel 3 turns at -2.50 rad/s in the first 3 s; `gyronet doctor` looks for a later rest"
     );
     let later = standing(400, |at, row| if at >= 302 { row.replacen(",,x", ",-2.5,x", 1) } else { row });
     assert!(parse(&later).is_ok());
