@@ -214,7 +214,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     /// Processes each sample of the sensor (`None` while the sensor is silent), the status and faults of the yaw
     /// rate, the wheels, and whether the vehicle stands. A flash erase stalls the processor for up to 2 s, so flash is
-    /// written only at standstill, or while the sensor is silent and no wheel has turned since the wheels stood.
+    /// written only at standstill, or while the sensor is silent and no wheel has turned since the vehicle last stood.
     pub fn observe(
         &mut self,
         sample: Option<&ImuSample>,
