@@ -56,8 +56,7 @@ impl UncertaintyConfig {
     /// The noise is between those of an MTi and of an ICM-42688-P, 0.01 and 0.003 deg/s/sqrt(Hz). The factor of the scales and the
     /// shares below were fitted to the training drives and to situations with a seed that no test has (`situations --seed
     /// 101`): no second may be off by more than four sigma, for which cars have more than 75 % of their straight seconds inside
-    /// one. Gain and mounting are those of parts for which a data sheet states 0.5 % at most, mounted by eye; a calibration
-    /// refuses a gain that it does not know to 0.5 %, and a mounting not known to 0.02.
+    /// one. Gain and mounting: a data sheet's 0.5 % at most, mounted by eye; a calibration refuses what it does not know to 0.5 % and 0.02.
     pub const DEFAULT: Self = Self {
         per_scale: 0.15,
         noise: 1.5e-4,
