@@ -88,6 +88,11 @@ impl Server {
         self.transport.is_idle()
     }
 
+    /// Returns whether a complete request waits for its response.
+    pub fn has_request(&self) -> bool {
+        self.transport.request().is_some()
+    }
+
     /// Returns whether a tester has stopped the messages of the board.
     pub fn is_silenced(&self) -> bool {
         self.services.is_silenced

@@ -18,6 +18,7 @@ use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use embedded_io::Write;
 use gyronet::can::DataFrame;
 use gyronet::can::slcan::port::Port;
+use gyronet::health::count;
 use gyronet::service::Device;
 use gyronet::service::message::AllCounters;
 use gyronet::uds::Server;
@@ -99,14 +100,20 @@ impl Diagnosis {
         Self { tester, service, port: Port::new(bits_per_second) }
     }
 
-    /// Returns the number of lines of the service line that were refused.
-    pub fn refused(&self) -> u32 {
-        self.port.refused()
+    /// Returns whether [`Self::step`] has something to do now, besides what time brings about.
+    #[inline]
+    pub fn is_busy(&self) -> bool {
+        !FROM_CAN.is_empty()
+            || !FROM_SLCAN.is_empty()
+            || !self.tester.server.is_idle()
+            || self.service.is_busy()
+            || self.port.is_sending()
     }
 
-    /// Processes the received frames, answers a request, and sends the frames that are due.
+    /// Processes the received frames, answers a request, and sends the frames that are due. The `counters` are read for a
+    /// request.
     #[inline(never)]
-    pub fn step(&mut self, device: &mut Device<Records, Weights>, counters: &AllCounters) {
+    pub fn step(&mut self, device: &mut Device<Records, Weights>, counters: impl FnOnce() -> AllCounters) {
         let now = timer::milliseconds();
         let Self { tester, service, port } = self;
         service.advance();
@@ -125,17 +132,19 @@ impl Diagnosis {
         }
         let Tester { server, line, .. } = tester;
         let have_left = match line {
-            Line::Service => port.outgoing().is_none() && service.is_sent(),
+            Line::Service => !port.is_sending() && service.is_sent(),
             Line::Can => RESPONSES.is_empty() && can::all_sent(),
             Line::Slcan => RESPONSES.is_empty(),
         };
         if have_left {
             server.frames_left(now);
         }
-        server.poll(device, counters, now, rng::bytes);
+        let mut counters = if server.has_request() { counters() } else { AllCounters::default() };
+        count(&mut counters.lines.service_errors, port.refused());
+        server.poll(device, &counters, now, rng::bytes);
         frames::SILENCED.store(server.is_silenced(), Ordering::Relaxed);
         while match line {
-            Line::Service => port.outgoing().is_none(),
+            Line::Service => !port.is_sending(),
             Line::Can | Line::Slcan => !RESPONSES.is_full(),
         } && let Some(data) = server.next_frame(now)
         {
@@ -150,7 +159,7 @@ impl Diagnosis {
                 }
             }
         }
-        if server.restart_is_due() && RESPONSES.is_empty() && port.outgoing().is_none() {
+        if server.restart_is_due() && RESPONSES.is_empty() && !port.is_sending() {
             // The flush is bounded: a response that cannot be sent does not delay the restart.
             let _ = service.flush();
             output::with_silence_announced(SCB::sys_reset);

@@ -10,15 +10,15 @@ use crate::ring::Ring;
 use crate::stm32f405::{can, clocks, timer};
 use cortex_m::peripheral::SCB;
 use gyronet::coprocessor::Coprocessor;
-use gyronet::heading::CourseState;
-use gyronet::health::{Faults, Quality, Status, count};
+use gyronet::health::{Faults, Quality, Status};
 use gyronet::model::background::BackgroundCheck;
 use gyronet::mounting::Vertical;
 use gyronet::sample::{ImuSample, WheelSample};
 use gyronet::service::Device;
 use gyronet::service::event::{ClockFault, SensorFault};
-use gyronet::service::message::AllCounters;
+use gyronet::service::message::LineCounters;
 use gyronet::standstill::Standing;
+use rtic::mutex_prelude::*;
 
 /// Interval between checks of a failed clock, ms.
 const RETRY_MS: u32 = 1_000;
@@ -26,6 +26,8 @@ const RETRY_MS: u32 = 1_000;
 const COURSE_MS: u32 = 100;
 /// Time after which a start has not failed, ms.
 const SETTLED_MS: u32 = 60_000;
+/// Longest time from one step of idle to the next, ms: of what neither an input nor a tester brings about.
+const STEP_MS: u32 = 10;
 /// Duration of one pass over the weights, ms.
 const CHECK_MS: usize = 10_000;
 
@@ -80,7 +82,8 @@ pub struct Idle {
     retried: u32,
     /// Time at which the state of the courses was read last, ms.
     course_at: u32,
-    milliseconds: u32,
+    /// Time of the last step, ms.
+    stepped: u32,
 }
 
 pub type Stored = (&'static mut Device<Records, Weights>, Option<BackgroundCheck<'static>>);
@@ -102,18 +105,32 @@ impl Idle {
             clock_fault,
             retried: 0,
             course_at: 0,
-            milliseconds: 0,
+            stepped: 0,
         }
+    }
+
+    /// Returns whether [`Self::step`] is to be called now.
+    #[inline]
+    pub fn is_due(&self) -> bool {
+        !OBSERVATIONS.is_empty()
+            || self.diagnosis.is_busy()
+            || timer::milliseconds().wrapping_sub(self.stepped) >= STEP_MS
     }
 
     /// Does a bounded piece of work, and returns the faults that were found.
     #[inline(never)]
-    pub fn step(&mut self, counters: &mut AllCounters, course: impl FnOnce() -> CourseState) -> Found {
+    pub fn step(
+        &mut self,
+        coprocessor: &mut impl Mutex<T = &'static mut Coprocessor>,
+        lines: &mut impl Mutex<T = LineCounters>,
+    ) -> Found {
         self.observe();
         let now = timer::milliseconds();
+        let before = core::mem::replace(&mut self.stepped, now);
         if now.wrapping_sub(self.course_at) >= COURSE_MS {
             self.course_at = now;
-            self.device.learn_course(&course());
+            let course = coprocessor.lock(|coprocessor| coprocessor.course_state());
+            self.device.learn_course(&course);
         }
         if let Some(result) = self.bring_up.as_mut().and_then(BringUp::step) {
             self.device.sensor(result);
@@ -122,13 +139,18 @@ impl Idle {
         if core::mem::replace(&mut self.refusal, refusal) != refusal {
             self.device.sensor(refusal.map_or(Ok(()), Err));
         }
-        count(&mut counters.lines.service_errors, self.diagnosis.refused());
-        self.diagnosis.step(self.device, counters);
-        self.retry_clock();
-        if self.device.firmware_trial(can::is_acknowledged(), counters.pipeline.windows, now) {
+        let windows = coprocessor.lock(|coprocessor| coprocessor.pipeline().counters().windows);
+        self.diagnosis.step(self.device, || {
+            (coprocessor, lines).lock(|coprocessor, lines| output::counters(coprocessor, lines))
+        });
+        self.retry_clock(now);
+        if self.device.firmware_trial(can::is_acknowledged(), windows, now) {
             output::with_silence_announced(SCB::sys_reset);
         }
-        let weights_damaged = self.check();
+        if before < SETTLED_MS && now >= SETTLED_MS {
+            crash::settled();
+        }
+        let weights_damaged = self.check(now.wrapping_sub(before));
         Found { weights_damaged, mount_moved: self.device.take_mount_moved() }
     }
 
@@ -143,8 +165,7 @@ impl Idle {
     }
 
     /// Restarts the board once the fault that keeps it on the internal oscillator is over.
-    fn retry_clock(&mut self) {
-        let now = timer::milliseconds();
+    fn retry_clock(&mut self, now: u32) {
         let Some(fault) = self.clock_fault.filter(|_| now.wrapping_sub(self.retried) >= RETRY_MS) else {
             return;
         };
@@ -154,17 +175,14 @@ impl Idle {
         }
     }
 
-    /// Checks a piece of the weights in use, and returns whether they were found to be damaged.
-    fn check(&mut self) -> bool {
-        let now = timer::milliseconds();
-        if now == self.milliseconds {
+    /// Checks the piece of the weights in use for some milliseconds, and returns whether they were found to be damaged.
+    fn check(&mut self, milliseconds: u32) -> bool {
+        let pieces = milliseconds.min(STEP_MS) as usize;
+        if pieces == 0 {
             return false;
         }
-        let before = core::mem::replace(&mut self.milliseconds, now);
-        if before < SETTLED_MS && now >= SETTLED_MS {
-            crash::settled();
-        }
-        let pass = self.weights.as_mut().and_then(|check| check.advance(check.len() / CHECK_MS + 1));
+        let check = self.weights.as_mut();
+        let pass = check.and_then(|check| check.advance(pieces * (check.len() / CHECK_MS + 1)));
         let damaged = pass.is_some_and(|pass| pass.is_err());
         if damaged {
             self.weights = None;

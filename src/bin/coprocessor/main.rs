@@ -106,13 +106,13 @@ mod app {
     use gyronet::model::GyroNet;
     use gyronet::model::blob::HIDDEN;
     use gyronet::model::gyronet::GyroNetState;
-    use gyronet::service::message::AllCounters;
+    use gyronet::service::message::LineCounters;
 
     #[shared]
     struct Shared {
         coprocessor: &'static mut Coprocessor,
-        /// Counters that idle reports to testers.
-        counters: AllCounters,
+        /// Counters of the lines, which idle reports to testers.
+        lines: LineCounters,
     }
 
     #[local]
@@ -151,7 +151,7 @@ mod app {
         });
         let board::Handlers { imu, fog: fog_handler, slcan, service, receptions: [a, b, c, d] } = handlers;
         let receptions = [a, b, c, d, gnss_reception];
-        let shared = Shared { coprocessor, counters: AllCounters::default() };
+        let shared = Shared { coprocessor, lines: LineCounters::NONE };
         (shared, Local { imu, fog_handler, slcan, service, gnss, receptions, sender, network, rest })
     }
 
@@ -227,11 +227,13 @@ mod app {
         crash::supply_low();
     }
 
-    #[task(binds = SPI3, priority = 2, local = [sender], shared = [coprocessor, counters])]
+    #[task(binds = SPI3, priority = 2, local = [sender], shared = [coprocessor, lines])]
     fn output(cx: output::Context) {
-        (cx.shared.coprocessor, cx.shared.counters)
-            .lock(|coprocessor, counters| cx.local.sender.step(coprocessor, counters));
-        rtic::pend(Interrupt::UART5);
+        let runs_window = (cx.shared.coprocessor, cx.shared.lines)
+            .lock(|coprocessor, lines| cx.local.sender.step(coprocessor, lines));
+        if runs_window {
+            rtic::pend(Interrupt::UART5);
+        }
     }
 
     /// Runs a piece of a window each time, so that the watchdog sees a large model advance at any clock.
@@ -258,15 +260,15 @@ mod app {
         report(Task::Window);
     }
 
-    #[idle(local = [rest], shared = [coprocessor, counters])]
-    fn idle(mut cx: idle::Context) -> ! {
+    #[idle(local = [rest], shared = [coprocessor, lines])]
+    fn idle(cx: idle::Context) -> ! {
+        let idle::SharedResources { mut coprocessor, mut lines, .. } = cx.shared;
         loop {
-            let mut counters = cx.shared.counters.lock(|counters| *counters);
-            let coprocessor = &mut cx.shared.coprocessor;
-            let course = || coprocessor.lock(|coprocessor| coprocessor.course_state());
-            let found = cx.local.rest.step(&mut counters, course);
-            if found.any() {
-                cx.shared.coprocessor.lock(|coprocessor| found.report(coprocessor));
+            if cx.local.rest.is_due() {
+                let found = cx.local.rest.step(&mut coprocessor, &mut lines);
+                if found.any() {
+                    coprocessor.lock(|coprocessor| found.report(coprocessor));
+                }
             }
             report(Task::Idle);
             // Every interrupt ends the sleep, the next tick at the latest.

@@ -113,12 +113,12 @@ impl OutputParts {
 // The coprocessor counts the inputs that it refuses, so the task ignores its errors.
 impl Output {
     #[inline(never)]
-    pub fn step(&mut self, coprocessor: &mut Coprocessor, counters: &mut AllCounters) {
+    pub fn step(&mut self, coprocessor: &mut Coprocessor, lines: &mut LineCounters) -> bool {
         // A step also follows each sent CAN frame and each estimate. Inputs other than the inertial sensor are read
         // once a tick (1 ms), or before a new sample is used. The CAN controller is refilled in every step, because
         // it accepts only three frames at a time.
         let now = Micros(timer::micros());
-        let tick = (now.0 / 1_000) as u32;
+        let tick = timer::whole_milliseconds(now.0);
         if !core::mem::replace(&mut self.joined, true) {
             // From here on, this task takes received frames, and every task reports to the watchdog in time.
             self.outgoing.join();
@@ -151,19 +151,12 @@ impl Output {
         }
         if !polled {
             self.outgoing.refill();
-            return;
+            return false;
         }
         self.report_bus(coprocessor);
         let _ = coprocessor.poll(now, &mut self.outgoing);
         self.send(coprocessor, now);
-        *counters = AllCounters {
-            pipeline: *coprocessor.pipeline().counters(),
-            watch: *coprocessor.monitor_counters(),
-            lines: self.lines,
-            fog: *coprocessor.fog_counters(),
-            inputs: *coprocessor.input_counters(),
-            contradiction: *coprocessor.contradiction(),
-        };
+        *lines = self.lines;
         // The LED blinks as long as this task runs.
         if let Some((led, lit)) = BOARD.led {
             led.set(lit == (tick & BLINK_MS != 0));
@@ -172,6 +165,7 @@ impl Output {
         if REPORTS.compare_exchange(ALL_TASKS, 0, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
             watchdog::feed();
         }
+        true
     }
 
     /// Passes the waiting CAN frames and the fibre-optic gyro's bytes to the coprocessor.
@@ -252,6 +246,18 @@ impl Output {
         let lost = [self.imu.lost(), self.fog.lost(), self.outgoing.lost(), self.gnss.lost()];
         self.lines.overruns = self.outgoing.overruns();
         self.lines.line_errors = lost.into_iter().fold(0, u32::saturating_add);
+    }
+}
+
+/// Returns all counters, for a tester.
+pub fn counters(coprocessor: &Coprocessor, lines: &LineCounters) -> AllCounters {
+    AllCounters {
+        pipeline: *coprocessor.pipeline().counters(),
+        watch: *coprocessor.monitor_counters(),
+        lines: *lines,
+        fog: *coprocessor.fog_counters(),
+        inputs: *coprocessor.input_counters(),
+        contradiction: *coprocessor.contradiction(),
     }
 }
 

@@ -151,6 +151,12 @@ impl Port {
         self.memory.received.drop_oldest(count);
     }
 
+    /// Returns whether bytes have been received, or are being sent.
+    #[inline]
+    pub fn is_busy(&self) -> bool {
+        !self.memory.received.is_empty() || !self.memory.sending.is_empty()
+    }
+
     pub fn lost(&self) -> u32 {
         self.memory.damaged.load(Ordering::Relaxed).saturating_add(self.overwritten)
     }

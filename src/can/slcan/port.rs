@@ -90,11 +90,19 @@ impl<const N: usize> Port<N> {
         count(&mut self.unanswered, u32::from(!fits));
     }
 
+    /// Returns whether bytes wait to be sent.
+    pub fn is_sending(&self) -> bool {
+        self.taken < self.line.len() || !self.answers.is_empty() || !self.queue.is_empty()
+    }
+
     /// Returns the bytes to send next: the rest of the current line, else answers, else the oldest frame.
     pub fn outgoing(&mut self) -> Option<&[u8]> {
         if self.taken == self.line.len() {
             self.taken = 0;
-            self.line = core::mem::take(&mut self.answers);
+            self.line.clear();
+            if !self.answers.is_empty() {
+                core::mem::swap(&mut self.line, &mut self.answers);
+            }
         }
         while self.line.is_empty() {
             let (frame, time) = self.queue.pop()?;
