@@ -13,7 +13,7 @@
 //!   newest of [`MATCHES`] courses that matched well, unless the vehicle has stood since. Where two
 //!   such times show the same drift, the bias is wrong, and becomes uncertain by it. Courses that keep failing teach only
 //!   a heading until they have matched for [`TRUST`];
-//! - after a halt a course may have jumped by half a turn, because the vehicle goes backwards.
+//! - after a halt, and at low speed, a course may have jumped by half a turn, because the vehicle goes backwards.
 
 use super::filter::{BIAS, Filter, GAIN, HEADING, LAG, Measured, wrap};
 use super::gain::MAX_GAIN;
@@ -29,7 +29,7 @@ use core::f32::consts::PI;
 /// Settings of the learning.
 #[derive(Debug, Clone, Copy)]
 pub struct CourseConfig {
-    /// Slowest speed with a course, m/s.
+    /// Slowest speed with a course whose accuracy is not stated, m/s.
     pub slowest: f32,
     /// Accuracy of a course, 1 sigma, besides what the receiver says: slip, wind and the crown of the road, rad.
     pub accuracy: f32,
@@ -56,6 +56,20 @@ impl CourseConfig {
         driving: 3e-4,
         gain: 0.005,
     };
+
+    /// Returns the accuracy of a course, 1 sigma, rad; `None` where it teaches nothing, because the vehicle is too slow or it
+    /// is too inaccurate. Below [`Self::slowest`] it must be stated, and as good as one at that speed that states nothing.
+    #[must_use]
+    pub fn sigma(&self, heading: &Heading) -> Option<f32> {
+        let (_, speed) = heading.course.zip(heading.speed)?;
+        let stated = heading.course_sigma.or(heading.speed_sigma.map(|across| across / speed));
+        if speed >= self.slowest {
+            Some(stated.unwrap_or(self.across / speed)).filter(|sigma| *sigma < INACCURATE)
+        } else {
+            let sigma = stated?.max(LEAST_ACROSS / speed);
+            (sigma <= self.across / self.slowest).then_some(sigma)
+        }
+    }
 }
 
 /// Errors of a course last so long, s.
@@ -88,8 +102,10 @@ const REMEMBERED: f32 = 12.0;
 const BOTH_WAYS: [f32; 2] = [1.0, 0.2];
 /// Turn during which a course that does not change has failed, rad.
 const STANDS: f32 = 0.05;
-/// A course this inaccurate teaches nothing, rad.
+/// A course this inaccurate teaches nothing, rad, and the least accuracy of a speed across the direction of travel, m/s,
+/// whatever a receiver states.
 const INACCURATE: f32 = 0.2;
+const LEAST_ACROSS: f32 = 0.01;
 /// Fewest courses with which a vehicle starts in motion.
 const FEW: u32 = 5;
 /// Sigma of the bias with which a rate can be used, and with which it is as good as after a standstill, rad/s.
@@ -113,13 +129,13 @@ pub enum Refusal {
     Reckoned = 4,
 }
 
-/// A course that has arrived: its tick, direction to the left, variance and weight.
+/// A course that has arrived: its tick, direction to the left, speed and accuracy.
 #[derive(Debug, Clone, Copy)]
 struct Arrived {
     tick: u32,
     course: f32,
     speed: f32,
-    sigma: Option<f32>,
+    sigma: f32,
 }
 
 /// Courses that do not match the heading.
@@ -239,13 +255,9 @@ impl Estimator {
     /// Takes a course that arrives after the sample of a tick. It is used once that sample's rate is final; one that
     /// arrives meanwhile is left out, and so is one without direction or speed, too slow or too inaccurate.
     pub fn arrived(&mut self, heading: &Heading, tick: u32) {
-        let Heading { course: Some(course), speed: Some(speed), course_sigma, speed_sigma } = *heading else {
-            return;
-        };
-        let sigma = course_sigma.or(speed_sigma.map(|across| across / speed));
-        if speed >= self.config.slowest
-            && sigma.is_none_or(|sigma| sigma < INACCURATE)
-            && self.waiting.is_none()
+        let Heading { course: Some(course), speed: Some(speed), .. } = *heading else { return };
+        if self.waiting.is_none()
+            && let Some(sigma) = self.config.sigma(heading)
         {
             // Counted clockwise by receivers.
             self.waiting = Some(Arrived { tick, course: wrap(-course), speed, sigma });
@@ -334,9 +346,8 @@ impl Estimator {
         let back = age + filter.get::<LAG>() / BLOCK_SECONDS;
         // The first seconds are too short for a lag.
         let Some((since, rate)) = self.turns.since(back) else { return Ok(()) };
-        let CourseConfig { accuracy, across, turning, .. } = self.config;
-        let sigma = arrived.sigma.unwrap_or(across / arrived.speed);
-        let own = accuracy * accuracy + sigma * sigma + turning * turning * rate * rate;
+        let CourseConfig { slowest, accuracy, turning, .. } = self.config;
+        let own = accuracy * accuracy + arrived.sigma * arrived.sigma + turning * turning * rate * rate;
         let interval = (paused as f32 / RATE_HZ as f32).max(BLOCK_SECONDS);
         let variance = own * (CORRELATION / interval).max(1.0);
         let half = if self.is_backwards { PI } else { 0.0 };
@@ -352,7 +363,7 @@ impl Estimator {
             (self.used, self.is_backwards) = (Some(arrived.tick), false);
             return Ok(());
         }
-        let turns_round = paused > HALT && libm::fabsf(off) > ROUND;
+        let turns_round = (paused > HALT || arrived.speed < slowest) && libm::fabsf(off) > ROUND;
         self.is_backwards ^= turns_round;
         let off = if turns_round { wrap(off + PI) } else { off };
         let mut measured = Measured { off, rate, variance };

@@ -115,9 +115,9 @@ fn outages(args: &Args, common: Common) -> super::Result {
         bar.finish_and_clear();
         let (found, driven_s) = found?;
         if found.is_empty() {
-            let (path, [_, needed], slowest) = (&drive.path, outage::AFTER_S, outage::SLOWEST);
+            let (path, [_, needed]) = (&drive.path, outage::AFTER_S);
             let remark = format_args!(
-                "{path}: no start: {driven_s:.0} s at {slowest} m/s or more with a course; {needed} s are needed, then the \
+                "{path}: no start: {driven_s:.0} s with a course that the board uses; {needed} s are needed, then the \
                  outage, with a reference at both ends"
             );
             super::remark(common, remark)?;

@@ -6,14 +6,12 @@
 //! left out beyond four sigma; after ten seconds without a match the heading starts again.
 
 use super::metrics::wrap;
-use super::outage::SLOWEST;
 use crate::drive::DT;
-use gyronet::heading::Heading;
+use gyronet::heading::{CourseConfig, Heading};
 
-/// Sigma of a course besides its own, rad, and in a turn, rad per rad/s; sigma of the speed across it, m/s.
+/// Sigma of a course besides its own, rad, and in a turn, rad per rad/s.
 const ACCURACY: f64 = 0.02;
 const TURNING: f64 = 0.3;
-const ACROSS: f64 = 0.1;
 /// Lag of a course behind the heading, s: the board's before it has learnt it.
 const LAG: f64 = 0.3;
 /// Random walks of bias, rad/s, and of heading, rad, per square root of a second.
@@ -79,12 +77,14 @@ impl Filter {
     }
 
     pub fn course(&mut self, from: &Heading) {
-        let (Some(course), Some(speed)) = (from.course, from.speed.map(f64::from)) else { return };
-        if speed < f64::from(SLOWEST) || self.time - self.last < APART {
+        let (Some(course), Some(sigma)) = (from.course, CourseConfig::DEFAULT.sigma(from).map(f64::from))
+        else {
+            return;
+        };
+        if self.time - self.last < APART {
             return;
         }
         self.last = self.time;
-        let sigma = from.course_sigma.map_or(ACROSS / speed, f64::from);
         let variance = sigma * sigma + ACCURACY * ACCURACY + (TURNING * self.rate).powi(2);
         let heading = wrap(LAG * self.rate - f64::from(course));
         let off = wrap(heading - self.state[2]);

@@ -31,8 +31,7 @@ use std::rc::Rc;
 pub const EVERY_S: usize = 2;
 /// Seconds of course before a start, one set of rows each.
 pub const AFTER_S: [usize; 2] = [60, 20];
-/// Slowest speed that counts as driven with a course, m/s, and the longest time from one course to the next, s.
-pub const SLOWEST: f32 = CourseConfig::DEFAULT.slowest;
+/// Longest time from one course to the next of a vehicle that drives with a course, s.
 const APART_S: f64 = 2.1;
 /// Samples over whose median the reference is taken.
 const MEDIAN: usize = 3 * SECOND;
@@ -60,8 +59,9 @@ pub struct Outage {
 /// No outage has an error: no drive has what it takes.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "no start of an outage: a drive needs {} s at {SLOWEST} m/s or more with a course every 2 s (columns course and \
-     gnss_speed, or gnss_lat and gnss_lon), then {seconds} s, and a reference (ref_gyr_z or ref_yaw)", AFTER_S[1]
+    "no start of an outage: a drive needs {} s with a course every 2 s (columns course and gnss_speed, or gnss_lat and \
+     gnss_lon; below {} m/s a course_sigma of {:.3} rad at most), then {seconds} s, and a reference (ref_gyr_z or ref_yaw)",
+    AFTER_S[1], CourseConfig::DEFAULT.slowest, CourseConfig::DEFAULT.across / CourseConfig::DEFAULT.slowest
 )]
 pub struct NoStart {
     /// Length of the shortest outage.
@@ -267,7 +267,7 @@ impl<'a> Race<'a> {
 
     /// Adds up the time with a course.
     fn listen(&mut self, row: &Row) {
-        if row.heading.is_some_and(|heading| heading.speed.is_some_and(|speed| speed >= SLOWEST)) {
+        if row.heading.is_some_and(|heading| CourseConfig::DEFAULT.sigma(&heading).is_some()) {
             let now = row.sample.time.0;
             let since = self.newest.replace(now).map_or(0.0, |last| (now - last) as f64 * 1e-6);
             self.driven_s += if since < APART_S { since } else { 0.0 };

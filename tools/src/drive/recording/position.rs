@@ -1,9 +1,9 @@
 //! The course between positions of a GNSS receiver.
 //!
 //! A position is known to some centimetres against one a second earlier, so the course between them is, after four metres,
-//! as good as a receiver's own. It is that of half a second before.
+//! as good as a receiver's own. It is that of half a second before; of a slow vehicle it would be older, and there is none.
 
-use gyronet::heading::Heading;
+use gyronet::heading::{CourseConfig, Heading};
 use gyronet::units::Micros;
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
@@ -76,6 +76,7 @@ impl Track {
                 speed_sigma: None,
             })
         });
+        let found = found.filter(|found| found.speed >= Some(CourseConfig::DEFAULT.slowest));
         self.kept.push_back((time, here));
         found
     }
