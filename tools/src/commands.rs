@@ -47,7 +47,10 @@ fn remark(common: Common, line: std::fmt::Arguments<'_>) -> std::io::Result<()> 
 
 /// Opens a drive, and prints a remark if it has a vehicle file beside it.
 fn read_drive(path: &Path, common: Common) -> std::result::Result<Drive<'static>, DataError> {
-    let drive = Drive::open(path)?;
+    remarked(Drive::open(path)?, common)
+}
+
+fn remarked(drive: Drive<'static>, common: Common) -> std::result::Result<Drive<'static>, DataError> {
     if let Some(vehicle) = &drive.vehicle.path {
         remark(common, format_args!("{}: vehicle file {}", drive.path, vehicle.display()))
             .map_err(|error| DataError::of("standard error", error.into()))?;

@@ -81,7 +81,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         args.gyronet.then(|| args.checkpoint.as_deref().map_or_else(bundled::checkpoint, Checkpoint::read));
     let checkpoint = checkpoint.transpose()?;
     let judge = |file: &Path, bar: &ProgressBar| {
-        let drive = args.unit.drive(file, common)?;
+        let drive = args.unit.drive(Drive::open(file), common)?;
         bar.set_length(drive.facts.rows as u64);
         bar.reset();
         args.unit.sent.errors(&drive, checkpoint.as_ref(), |_| bar.inc(1))
@@ -187,7 +187,8 @@ fn lags(args: &Args, common: Common) -> super::Result {
     let mut network = GyroNet::new(weights.blob()?);
     let mut drives = Vec::new();
     for file in &args.files {
-        let drive = args.unit.drive(file, common).map_err(|error| -> Box<dyn Error> { error })?;
+        let drive =
+            args.unit.drive(Drive::open(file), common).map_err(|error| -> Box<dyn Error> { error })?;
         let bar = progress::bar(common, variants.len() * drive.facts.rows, drive.name());
         let scores = variant::run(&drive, &mut network, &variants, || bar.inc(1));
         bar.finish_and_clear();

@@ -2,13 +2,14 @@
 
 use super::weights::Unit;
 use super::{Common, WriteError, print_json, progress};
-use gyronet::coprocessor::{Config, TimedFrame};
-use gyronet::health::{Counters, Status};
+use gyronet::coprocessor::{Config, Coprocessor, TimedFrame};
+use gyronet::health::Status;
 use gyronet::model::GyroNet;
 use gyronet_tools::board::{Board, Step};
 use gyronet_tools::drive::candump::Log;
 use gyronet_tools::drive::export;
 use gyronet_tools::drive::replay::{Steps, initialise};
+use gyronet_tools::drive::stream::Drive;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -16,7 +17,8 @@ use std::path::{Path, PathBuf};
 
 /// Write the CAN messages that a board would send on a recorded drive.
 ///
-/// The command runs the drive through the pipeline that is flashed. The log has the format of `candump -L`;
+/// The command runs the drive through the pipeline that is flashed, with its wheels and courses: with courses it may begin
+/// in motion. The log has the format of `candump -L`;
 /// can-utils' canplayer and python-can can play it. All files are in time of day if the vehicle file has the start of
 /// the recording (`gyronet import` writes it), else in the recording's time. It is written to standard output, unless
 /// --out names a file or --csv or --tum is given. The summary is written to standard error; with --json it is
@@ -60,10 +62,12 @@ impl<W> Output<W> {
 
 pub fn run(args: &Args, common: Common) -> super::Result {
     let weights = args.unit.sent.open()?;
-    let drive =
-        args.unit.drive(&args.file, common).map_err(|error| -> Box<dyn std::error::Error> { error })?;
-    // A drive that cannot be replayed leaves no file behind.
-    initialise(&drive)?;
+    let drive = args.unit.drive(Drive::open_with_courses(&args.file), common);
+    let drive = drive.map_err(|error| -> Box<dyn std::error::Error> { error })?;
+    if !drive.facts.has_course {
+        // A drive that cannot be replayed leaves no file behind.
+        initialise(&drive)?;
+    }
     let writes_elsewhere = [&args.csv, &args.tum].into_iter().any(Option::is_some);
     let log: Box<dyn Write> = match &args.out {
         Some(path) => Box::new(BufWriter::new(File::create(path).map_err(WriteError::to(path))?)),
@@ -90,7 +94,10 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 
     let start_us = drive.vehicle.recording.start.map_or(0, |start| (1e6 * start).round() as u64);
     let mut statuses = BTreeMap::from(STATUSES.map(|status| (status_name(status), 0u64)));
-    let board = Board::new(Config::DEFAULT, drive.wheels(), GyroNet::new(weights.blob()?));
+    let mut board = Board::new(Config::DEFAULT, drive.wheels(), GyroNet::new(weights.blob()?));
+    if drive.facts.has_course {
+        board.take_courses();
+    }
     let mut steps = Steps::new(&drive, board)?;
     let bar = progress::bar(common, drive.facts.rows, drive.name());
     for step in &mut steps {
@@ -118,7 +125,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         tum.write(export::Tum::finish)?;
     }
     let coprocessor = steps.board().coprocessor();
-    let events = events(coprocessor.pipeline().counters(), coprocessor.input_counters().out_of_range);
+    let events = events(coprocessor);
     if common.json {
         let summary = serde_json::json!({
             "recording": drive.path,
@@ -149,7 +156,8 @@ fn status_name(status: Status) -> String {
     format!("{status:?}").to_lowercase()
 }
 
-fn events(c: &Counters, out_of_range: u32) -> Vec<(&'static str, u32)> {
+fn events(coprocessor: &Coprocessor) -> Vec<(&'static str, u32)> {
+    let (c, courses) = (coprocessor.pipeline().counters(), coprocessor.pipeline().course_counters());
     let all = [
         ("samples", c.samples),
         ("windows", c.windows),
@@ -161,7 +169,9 @@ fn events(c: &Counters, out_of_range: u32) -> Vec<(&'static str, u32)> {
         ("clamped inputs", c.clamped_inputs),
         ("implausible", c.implausible),
         ("late", c.late),
-        ("out of range", out_of_range),
+        ("courses used", courses.used),
+        ("courses refused", courses.refused),
+        ("out of range", coprocessor.input_counters().out_of_range),
     ];
     all.into_iter().filter(|(_, count)| *count > 0).collect()
 }

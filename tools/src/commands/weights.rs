@@ -1,8 +1,9 @@
 //! Chooses the weights, bundled or from a file, and runs every method with them.
 
-use super::{Common, read_drive};
+use super::{Common, remarked};
 use gyronet::model::{self, Blob, weights};
 use gyronet_tools::calibrate::unit_file;
+use gyronet_tools::drive::error::DataError;
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::rates::{Network, Networks, Sample};
 use gyronet_tools::evaluate::report::DriveErrors;
@@ -50,9 +51,13 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// Opens a drive, and applies the calibration if one is given.
-    pub fn drive(&self, file: &Path, common: Common) -> Result<Drive<'static>, Box<dyn Error + Send + Sync>> {
-        let mut drive = read_drive(file, common)?;
+    /// The opened drive with the calibration, if one is given.
+    pub fn drive(
+        &self,
+        opened: Result<Drive<'static>, DataError>,
+        common: Common,
+    ) -> Result<Drive<'static>, Box<dyn Error + Send + Sync>> {
+        let mut drive = remarked(opened?, common)?;
         if let Some(path) = &self.calibration {
             drive.gyro_map = Some(unit_file::read_for(path, self.sent.open()?.blob()?.crc)?);
         }

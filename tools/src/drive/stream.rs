@@ -46,6 +46,11 @@ impl Drive<'static> {
         Self::checked(path, Survey::finish)
     }
 
+    /// Opens a drive whose courses the board takes: with them it may begin in motion.
+    pub fn open_with_courses(path: &Path) -> Result<Self, DataError> {
+        Self::checked(path, Survey::finish_with_courses)
+    }
+
     /// Opens a drive that may begin in motion.
     pub fn open_moving(path: &Path) -> Result<Self, DataError> {
         Self::checked(path, Survey::finish_moving)

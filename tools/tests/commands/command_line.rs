@@ -1,6 +1,6 @@
 //! The command line as a whole: help, exit statuses, colours, completions.
 
-use super::{command, gyronet, text};
+use super::{column, command, gyronet, gyronet_in, scratch, text};
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
@@ -172,4 +172,23 @@ fn retired_names_say_what_does_their_work() {
         assert!(!output.status.success() && error.contains(successor), "{retired:?}: {error}");
         assert_eq!(error.lines().count(), 1, "{retired:?}: {error}");
     }
+}
+
+#[test]
+fn a_drive_that_begins_in_motion_is_replayed_by_its_courses() {
+    let folder = scratch("replay-courses");
+    let simulate = ["-q", "simulate", "--seconds", "150", "--gnss", "0.5", "--out", "whole.csv"];
+    assert!(gyronet_in(&folder, &simulate).0);
+    let whole = std::fs::read_to_string(folder.join("whole.csv")).unwrap();
+    let (header, rows) = whole.split_once('\n').unwrap();
+    // It stands at 65 s and at 125 s.
+    let rows: String = rows.lines().skip(7_200).map(|row| format!("{row}\n")).collect();
+    std::fs::write(folder.join("moving.csv"), format!("{header}\n{rows}")).unwrap();
+    let (good, said) = gyronet_in(&folder, &["replay", "moving.csv", "--csv", "rates.csv"]);
+    let started = column(&folder.join("rates.csv"), ',', 0)[0];
+    assert!(good && said.contains("courses used 6") && started < 100.0, "from {started} s on: {said}");
+    let blind = header.replace("course,course_sigma,gnss_speed", "a,b,c");
+    std::fs::write(folder.join("blind.csv"), format!("{blind}\n{rows}")).unwrap();
+    let (good, said) = gyronet_in(&folder, &["replay", "blind.csv", "--csv", "none.csv"]);
+    assert!(!good && said.contains("starts moving") && !folder.join("none.csv").exists(), "{said}");
 }

@@ -20,6 +20,7 @@ pub struct Facts {
     pub is_off_grid: bool,
     /// True if each wheel is recorded in any row.
     pub wheels: [bool; WHEELS],
+    pub has_course: bool,
 }
 
 impl Facts {
@@ -68,6 +69,7 @@ impl Survey {
         }
         facts.last = time;
         facts.rows += 1;
+        facts.has_course |= row.heading.is_some();
         for (recorded, rate) in facts.wheels.iter_mut().zip(row.wheels) {
             *recorded |= rate.is_some();
         }
@@ -82,6 +84,11 @@ impl Survey {
         let facts = self.finish_moving(path)?;
         check_wheels(&beginning, path)?;
         Ok(facts)
+    }
+
+    /// As [`Survey::finish`]; where courses start the vehicle its wheels may turn.
+    pub fn finish_with_courses(self, path: &str) -> Result<Facts, DataError> {
+        if self.facts.has_course { self.finish_moving(path) } else { self.finish(path) }
     }
 
     /// As [`Survey::finish`], with wheels that may turn.
