@@ -14,11 +14,11 @@ pub enum ConfigError {
     /// The bit rate is not one of [`BIT_RATES`].
     #[error("bits_per_second: {0} is not one of {BIT_RATES:?}")]
     BitRate(u32),
-    #[error("identifier {0:03x} is reserved or has more than 11 bits")]
+    #[error("identifier {0} (0x{0:03x}) is above 2047, or reserved for diagnosis (0x7df to 0x7ef)")]
     Identifier(u16),
-    #[error("identifier {0:03x} is used twice")]
+    #[error("identifier {0} (0x{0:03x}) is used twice")]
     DuplicateIdentifier(u16),
-    #[error("period {0} ms is not a multiple of {SAMPLE_MS} up to {MAX_PERIOD_MS}")]
+    #[error("period_ms: {0} is not a multiple of {SAMPLE_MS} up to {MAX_PERIOD_MS}")]
     Period(u16),
     #[error("E2E identifier {0:x} has more than 12 bits")]
     DataId(u16),
