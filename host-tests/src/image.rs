@@ -38,24 +38,25 @@ pub fn firmware_for(
     image: &str,
 ) -> Option<PathBuf> {
     require::wants(test, Need::Qemu, bench::target_installed(target))?;
-    static BUILT: Mutex<BTreeMap<String, PathBuf>> = Mutex::new(BTreeMap::new());
+    // Images of different levels of optimisation share little: those to flash and the others are built side by side.
+    static BUILT: [Mutex<BTreeMap<String, PathBuf>>; 2] = [const { Mutex::new(BTreeMap::new()) }; 2];
+    let kind = usize::from(!bench::FLASHED.contains(&image));
+    let folder = ["images", "benches"][kind];
     // A test that panicked here has left the map unchanged.
-    let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut built = BUILT[kind].lock().unwrap_or_else(PoisonError::into_inner);
     let name = format!("{board}/{image}");
     if let Some(elf) = built.get(&name) {
         return Some(elf.clone());
     }
-    // All boards share one folder, and with it everything that does not depend on the board; the next board's image
-    // overwrites this one's there.
+    // The next board's image overwrites this one's in the folder.
     let scratch = Path::new(scratch);
     let elf = scratch.join(format!("{image}-{board}"));
     if image == "coprocessor" {
-        let linked =
-            Linked::build(board, 1, &scratch.join("images")).unwrap_or_else(|error| panic!("{error}"));
+        let linked = Linked::build(board, 1, &scratch.join(folder)).unwrap_or_else(|error| panic!("{error}"));
         let whole = linked.for_programmer().expect("it was linked for this");
         std::fs::write(&elf, whole).expect("there is room");
     } else {
-        let fresh = bench::build_for((board, target), workspace(), image, &scratch.join("images"));
+        let fresh = bench::build_for((board, target), workspace(), image, &scratch.join(folder));
         std::fs::copy(fresh.unwrap_or_else(|error| panic!("{error}")), &elf).expect("there is room");
     }
     built.insert(name, elf.clone());

@@ -113,7 +113,8 @@ fn build(scratch: &Path) -> PathBuf {
     let target = scratch.join("images");
     run(Command::new(env!("CARGO"))
         .current_dir(workspace())
-        .args(["build", "--release", "--quiet", "-p", "gyronet-c", "--lib", "--target", bench::TARGET])
+        .args(["build", "--release", "--config", "profile.release.debug=false", "--quiet"])
+        .args(["-p", "gyronet-c", "--lib", "--target", bench::TARGET])
         .arg("--target-dir")
         .arg(&target));
     let library = target.join(bench::TARGET).join("release/libgyronet_c.a");

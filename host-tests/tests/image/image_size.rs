@@ -33,13 +33,11 @@ fn no_panic_in_the_image() {
 #[test]
 fn budgets_hold() {
     const NAME: &str = "budgets_hold";
-    let Some(image) = elf(NAME, "coprocessor") else { return };
-    let stack = ImageStack::read(&image).expect("a bound");
+    let Some(path) = image::firmware(NAME, env!("CARGO_TARGET_TMPDIR"), "coprocessor") else { return };
+    let stack = ImageStack::read(&std::fs::read(&path).expect("just built")).expect("a bound");
     println!("{stack:?}");
     assert!(stack.deepest.iter().any(|(name, _)| name.contains("main")), "{:?}", stack.deepest);
-    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("size.elf");
-    std::fs::write(&folder, &image).expect("a scratch file");
-    let size = ImageSize::read(&folder).expect("sizes");
+    let size = ImageSize::read(&path).expect("sizes");
     println!("{size:?}");
     let measured = [size.flash, size.static_ram, stack.worst().into()];
     assert!(measured.iter().zip(BUDGETS).all(|(bytes, budget)| *bytes <= budget), "{measured:?} {stack:?}");

@@ -16,7 +16,7 @@ const POLL: Duration = Duration::from_millis(5);
 /// The images that are measured, in order.
 pub const IMAGES: [&str; 2] = ["bench", "bench_fognet"];
 /// The images that are built to be flashed, optimised for size.
-const FLASHED: [&str; 3] = ["boot", "coprocessor", "bringup"];
+pub const FLASHED: [&str; 3] = ["boot", "coprocessor", "bringup"];
 pub const MACHINE: &str = "netduinoplus2";
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
@@ -131,10 +131,10 @@ pub fn build_for(
         "--bin",
         image,
     ]);
-    if FLASHED.contains(&image) {
-        // As `cargo fw` and `cargo bringup` build them.
-        cargo.args(["--config", "profile.release.opt-level='s'"]);
-    }
+    // Those to flash as `cargo fw` builds them; no debugger is attached to the others.
+    let is_flashed = FLASHED.contains(&image);
+    let setting = if is_flashed { "profile.release.opt-level='s'" } else { "profile.release.debug=false" };
+    cargo.args(["--config", setting]);
     cargo.args(["--features", board, "--target", target, "--target-dir"]).arg(folder);
     run(&mut cargo)?;
     Ok(folder.join(target).join("release").join(image))
