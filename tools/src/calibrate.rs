@@ -2,11 +2,13 @@
 //!
 //! The yaw rate that the coprocessor has corrected still contains a share of the roll rate and of the pitch rate (the
 //! sensor or the reference is not level in the vehicle) and a share of itself (gain). Over a second or more these
-//! errors add up to an angle, which the reference shows. The shares are fitted to those angles, with a separate
-//! constant for each drive, because bias belongs to the drive and not to the unit. The shares are the last row of a 3
+//! errors add up to an angle, which a reference yaw rate shows. The shares are fitted to those angles, with a separate
+//! constant for each drive, because bias belongs to the drive and not to the unit. A course is too inaccurate for mounting; the
+//! gain it shows is that which the board learns from it ([`by_course`]). The shares are the last row of a 3
 //! x 3 map ([`gyronet::mounting::GyroMap`]) that the board applies to every sample. The other rows stay those of the
 //! identity, because the heading does not depend on them.
 
+mod by_course;
 mod fit;
 mod normal_equations;
 mod spans;
@@ -17,9 +19,13 @@ pub use normal_equations::NormalEquations;
 use crate::board::Board;
 use crate::drive::replay::{ReplayError, Steps, initialise};
 use crate::drive::stream::Drive;
+use by_course::Learnt;
 use fit::Fit;
+use gyronet::coprocessor::Config;
+use gyronet::heading::CourseConfig;
 use gyronet::model::WindowNetwork;
 use gyronet::mounting::GyroMap;
+use gyronet::pipeline::PipelineConfig;
 use gyronet::units::AngularRate;
 use spans::{Span, Spans};
 use unit_file::UnitFile;
@@ -29,6 +35,8 @@ const SHORTEST_S: f64 = 30.0;
 /// Largest sigma of the share of the roll or pitch rate: 1.1 deg of mounting.
 const MAX_CROSS_SIGMA: f64 = 0.02;
 const MAX_GAIN_SIGMA: f64 = 0.005;
+/// Gain of a unit of which nothing is known, 1 sigma.
+const UNKNOWN_GAIN: f32 = 0.02;
 /// Least angle turned in all drives for a gain, as the doctor says, rad; and in a second that turns.
 pub const LEAST_TURNED_RAD: f64 = 6.0;
 pub const STRAIGHT_RAD: f64 = 0.02;
@@ -54,6 +62,10 @@ pub enum CalibrateError {
         "{path}: reference and gyro differ by {rad:.3} rad from span to span: a wrong unit or clock, or another drive; `gyronet doctor` says which"
     )]
     Contradiction { path: String, rad: f64 },
+    #[error(
+        "{path}: the gyro contradicts {refused} of the courses and fits {used}: `gyronet doctor` says why"
+    )]
+    Refused { path: String, used: u32, refused: u32 },
     #[error("{what} {value:+.4} is too large for any unit; configure how the sensor is mounted")]
     Implausible { what: &'static str, value: f64 },
 }
@@ -64,14 +76,16 @@ pub struct Share {
     pub name: &'static str,
     /// The value; 0 if the share is refused.
     pub value: f64,
-    /// Standard deviation of the value, from fits that each leave out one block of time, and the largest that is taken.
+    /// Standard deviation of the value, from fits that each leave out one block of time, or by the board, and the largest that is
+    /// taken.
     pub sigma: f64,
     pub limit: f64,
     /// The reason why the share is refused: what the drives lack to show it.
     pub refused: Option<&'static str>,
 }
 
-/// A drive, replayed with the weights that the board runs and cut into spans.
+/// A drive, replayed with the weights that the board runs: cut into spans by its reference yaw rate, or what the board has
+/// learnt by its course.
 #[derive(Debug)]
 pub struct Cut {
     path: String,
@@ -81,16 +95,29 @@ pub struct Cut {
     /// The sum of all turns, rad.
     turned: f64,
     spans: Vec<Span>,
+    by_course: Option<Learnt>,
+}
+
+/// The configuration of the board that a drive is cut with: nothing is known of the gain.
+pub fn config() -> Config {
+    let course = CourseConfig { gain: UNKNOWN_GAIN, ..CourseConfig::DEFAULT };
+    Config { pipeline: PipelineConfig { course, ..PipelineConfig::DEFAULT }, ..Config::DEFAULT }
 }
 
 impl Cut {
-    /// Runs a drive on a board that applies no map; `tick` is called for each step. The drive is read twice: its
+    /// Runs a drive on a board that applies no map, of [`config`]; `tick` is called for each step. The drive is read twice: its
     /// beginning for the static bias, then as a whole.
     pub fn new(
         drive: &Drive<'_>,
         board: Board<impl WindowNetwork>,
         mut tick: impl FnMut(),
     ) -> Result<Self, CalibrateError> {
+        let (path, name) = (drive.path.clone(), drive.name().to_owned());
+        if !drive.facts.has_rate {
+            let learnt = by_course::learn(drive, board, tick)?;
+            let (gyro_bias, by_course) = (learnt.gyro_bias, Some(learnt));
+            return Ok(Self { path, name, gyro_bias, turned: 0.0, spans: Vec::new(), by_course });
+        }
         let gyro_bias = initialise(drive)?.map(AngularRate::rad_per_sec);
         let mut spans = Spans::default();
         for step in Steps::new(drive, board)? {
@@ -98,7 +125,7 @@ impl Cut {
             spans.add(&step?, &gyro_bias);
         }
         let (turned, spans) = (spans.turned(), spans.finish(&drive.path)?);
-        Ok(Self { path: drive.path.clone(), name: drive.name().to_owned(), gyro_bias, turned, spans })
+        Ok(Self { path, name, gyro_bias, turned, spans, by_course: None })
     }
 }
 
@@ -114,9 +141,10 @@ const SHARES: [(&str, f64, &str); 3] = [
 ];
 
 pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, CalibrateError> {
-    let spans: Vec<&[Span]> = drives.iter().map(|drive| drive.spans.as_slice()).collect();
+    let by_rate: Vec<&Cut> = drives.iter().filter(|drive| drive.by_course.is_none()).collect();
+    let spans: Vec<&[Span]> = by_rate.iter().map(|drive| drive.spans.as_slice()).collect();
     // A share that the drives hardly show makes the others uncertain, so the least certain one is removed first.
-    let (mut fitted, mut refused) = ([true; 3], [None; 3]);
+    let (mut fitted, mut refused) = ([!spans.is_empty(); 3], [spans.is_empty().then_some(f64::INFINITY); 3]);
     let has_turned = drives.iter().map(|drive| drive.turned).sum::<f64>() >= LEAST_TURNED_RAD;
     let fit = loop {
         let fit = Fit::new(&spans, fitted);
@@ -130,13 +158,21 @@ pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, CalibrateErro
     };
     let shares: [Share; 3] = std::array::from_fn(|k| {
         let (name, limit, lacking) = SHARES[k];
-        let lacking = if k < 2 || has_turned { lacking } else { "too few turns, 6 rad are needed" };
-        match refused[k] {
-            None => Share { name, value: fit.shares[k], sigma: fit.sigmas[k], limit, refused: None },
-            Some(sigma) => Share { name, value: 0.0, sigma, limit, refused: Some(lacking) },
+        let lacking = match (k, spans.is_empty()) {
+            (0 | 1, true) => "a course is too inaccurate to show it",
+            (2, false) if !has_turned => "too few turns, 6 rad are needed",
+            _ => lacking,
+        };
+        let by_fit = [fit.shares[k], refused[k].map_or(fit.sigmas[k], |_| f64::INFINITY)];
+        let by_course = drives.iter().filter_map(|drive| drive.by_course).filter(|_| k == 2);
+        let [value, sigma] = by_course.fold(by_fit, |found, learnt| combined(found, learnt.gain));
+        if sigma <= limit {
+            return Share { name, value, sigma, limit, refused: None };
         }
+        let sigma = refused[k].unwrap_or(sigma).min(sigma);
+        Share { name, value: 0.0, sigma, limit, refused: Some(lacking) }
     });
-    for (drive, deviation) in drives.iter().zip(&fit.deviations) {
+    for (drive, deviation) in by_rate.iter().zip(&fit.deviations) {
         if *deviation > MAX_RESIDUAL_RAD {
             let path = drive.path.clone();
             return Err(CalibrateError::Contradiction { path, rad: *deviation });
@@ -153,12 +189,18 @@ pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, CalibrateErro
     Ok(UnitFile { gyro_map, shares, weights, drives: unit_file::drives(drives, &fit) })
 }
 
+/// The mean of two values, each with its sigma, weighted with their variances.
+fn combined([one, sigma]: [f64; 2], [other, other_sigma]: [f64; 2]) -> [f64; 2] {
+    let [weight, other_weight] = [sigma, other_sigma].map(|sigma| sigma.powi(-2));
+    let sum = (weight + other_weight).max(f64::MIN_POSITIVE);
+    [(weight * one + other_weight * other) / sum, sum.sqrt().recip()]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::drive::recording::Recording;
     use crate::simulate::{self, csv};
-    use gyronet::coprocessor::Config;
     use gyronet::model::Estimate;
     use gyronet::model::window::{Features, WINDOW};
 
@@ -171,8 +213,8 @@ mod tests {
     }
 
     /// Simulates 20 minutes of a unit that reads 2 % too much about z. The reference is a course once a second with a
-    /// sigma of 0.02 rad. It is missing for a minute, and ends at the sample `end`.
-    fn by_course(end: usize) -> Result<UnitFile, CalibrateError> {
+    /// sigma of 0.02 rad, times `sign`. It is missing for a minute, and ends at the sample `end`.
+    fn by_course(end: usize, sign: f64) -> Result<UnitFile, CalibrateError> {
         let mut bytes = Vec::new();
         csv::write(&simulate::Config { seconds: 1_200, seed: 5, ..simulate::Config::DEFAULT }, &mut bytes)
             .unwrap();
@@ -183,19 +225,16 @@ mod tests {
             let rate = row.reference.take().unwrap();
             heading += rate * crate::drive::DT;
             let known = k % 100 == 0 && !(30_000..36_000).contains(&k) && k < end;
-            row.course = known.then(|| heading + 0.02 * random.normal());
+            row.course = known.then(|| sign * heading + 0.02 * random.normal());
             let yaw_rate = &mut row.sample.angular_rate[2];
             *yaw_rate = AngularRate((f64::from(yaw_rate.0) * 1.02) as i32);
         }
-        calibrate(
-            &[Cut::new(&Drive::from(&recording), Board::new(Config::DEFAULT, None, Nothing), || {})?],
-            0,
-        )
+        calibrate(&[Cut::new(&Drive::from(&recording), Board::new(config(), None, Nothing), || {})?], 0)
     }
 
     #[test]
     fn a_course_shows_the_gain() {
-        let [.., gain] = by_course(usize::MAX).unwrap().shares;
+        let [.., gain] = by_course(usize::MAX, 1.0).unwrap().shares;
         assert_eq!(gain.refused, None, "{gain:?}");
         // The true rate is the reading over 1.02; the simulated part adds a gain with a sigma of 0.1 %.
         assert!((gain.value + 0.02).abs() < 0.003 + 3.0 * gain.sigma, "{gain:?}");
@@ -210,9 +249,12 @@ mod tests {
                 seconds: 1.0 + f64::from(k % 2),
             };
             let (path, name, spans) = (String::new(), String::new(), (0..100).map(span).collect());
-            calibrate(&[Cut { path, name, gyro_bias: [0.0; 3], turned: 100.0 * turn, spans }], 0)
-                .unwrap()
-                .shares[2]
+            calibrate(
+                &[Cut { path, name, gyro_bias: [0.0; 3], turned: 100.0 * turn, spans, by_course: None }],
+                0,
+            )
+            .unwrap()
+            .shares[2]
         };
         assert!(
             gain(0.059).refused.is_some() && (gain(0.061).value - 0.01).abs() < 1e-6,
@@ -223,6 +265,13 @@ mod tests {
 
     #[test]
     fn half_a_minute_of_course_is_too_short() {
-        assert!(matches!(by_course(3_000), Err(CalibrateError::TooShort { .. })), "{:?}", by_course(3_000));
+        let unit = by_course(3_000, 1.0);
+        assert!(matches!(unit, Err(CalibrateError::TooShort { .. })), "{unit:?}");
+    }
+
+    #[test]
+    fn a_course_of_the_wrong_sign_is_refused() {
+        let unit = by_course(usize::MAX, -1.0);
+        assert!(matches!(unit, Err(CalibrateError::Refused { .. })), "{unit:?}");
     }
 }

@@ -1,11 +1,10 @@
 //! Real drives that training has not seen: the README's ratios to static initialisation, drive by drive, and what
 //! quantisation costs, the integer network against the f32 one in its output and in the yaw that comes of it.
 
-use gyronet::Config;
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet_host_tests::{parallel, recordings};
 use gyronet_tools::board::Board;
-use gyronet_tools::calibrate::{Cut, calibrate};
+use gyronet_tools::calibrate::{Cut, calibrate, config};
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::methods::{Method, PerMethod};
 use gyronet_tools::evaluate::rates::{Network, Networks};
@@ -127,7 +126,7 @@ fn a_calibrated_unit_is_as_good_as_the_page_says() {
     let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
     let cuts = parallel::map(&training, |path| {
         let drive = Drive::open(path).expect("a recording");
-        let board = Board::new(Config::DEFAULT, drive.wheels(), GyroNet::new(blob));
+        let board = Board::new(config(), drive.wheels(), GyroNet::new(blob));
         Cut::new(&drive, board, || {}).expect("it has a reference")
     });
     let unit = calibrate(&cuts, blob.crc).expect("they turn");

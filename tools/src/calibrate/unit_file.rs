@@ -24,8 +24,8 @@ pub struct DriveFit {
     pub gyro_bias_rad_per_s: [f64; 3],
     /// The remaining bias, rad/s: the reference less the corrected yaw rate.
     pub yaw_rate_bias_rad_per_s: f64,
-    /// The robust standard deviation of the spans' angles from the fit, rad.
-    pub deviation_rad: f64,
+    /// The robust standard deviation of the spans' angles from the fit, rad; `None` by a course.
+    pub deviation_rad: Option<f64>,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -96,15 +96,18 @@ pub fn read_for(path: &Path, runs: u32) -> Result<GyroMap, UnitFileError> {
 }
 
 pub(super) fn drives(drives: &[Cut], fit: &Fit) -> Vec<DriveFit> {
-    let fits = fit.biases.iter().zip(&fit.deviations);
-    drives
-        .iter()
-        .zip(fits)
-        .map(|(drive, (bias, deviation))| DriveFit {
+    let mut fits = fit.biases.iter().zip(&fit.deviations);
+    let of = |drive: &Cut| {
+        let (bias, deviation_rad) = match drive.by_course {
+            Some(learnt) => (learnt.bias, None),
+            None => fits.next().map_or((0.0, None), |(bias, deviation)| (*bias, Some(*deviation))),
+        };
+        DriveFit {
             name: drive.name.clone(),
             gyro_bias_rad_per_s: drive.gyro_bias,
-            yaw_rate_bias_rad_per_s: *bias,
-            deviation_rad: *deviation,
-        })
-        .collect()
+            yaw_rate_bias_rad_per_s: bias,
+            deviation_rad,
+        }
+    };
+    drives.iter().map(of).collect()
 }

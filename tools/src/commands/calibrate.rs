@@ -1,11 +1,10 @@
 //! `gyronet calibrate` fits gain and mounting of a unit's gyro to drives with a reference yaw rate or course.
 
 use super::weights::Sent;
-use super::{Common, WriteError, print_json, progress, read_drive};
-use gyronet::coprocessor::Config;
+use super::{Common, WriteError, print_json, progress, remarked};
 use gyronet::model::{Blob, GyroNet};
 use gyronet_tools::board::Board;
-use gyronet_tools::calibrate::{Cut, Share, calibrate};
+use gyronet_tools::calibrate::{Cut, Share, calibrate, config};
 use gyronet_tools::drive::stream::Drive;
 use std::error::Error;
 use std::io::{Write, stdout};
@@ -14,9 +13,10 @@ use std::path::PathBuf;
 /// Find the gain and mounting errors of a unit's gyro from recorded drives.
 ///
 /// The command runs each drive through the pipeline, with the weights that the board runs. It compares the corrected
-/// yaw rate with the reference (a yaw rate, ref_gyr_z, or a course, ref_yaw). It fits the remaining error to shares
-/// of the yaw rate (gain) and of the roll and pitch rates (mounting), and prints each share with its sigma. A share
-/// that the drives do not show (no turns, no tilt) is refused and left at zero.
+/// yaw rate with the reference. It fits the remaining error to shares of the yaw rate (gain) and of the roll and pitch
+/// rates (mounting), and prints each share with its sigma. A share that the drives do not show (no turns, no tilt) is
+/// refused and left at zero. Without a reference yaw rate (ref_gyr_z) the board itself learns the gain from the courses
+/// of the drive (course and gnss_speed, or positions), or else from the reference's (ref_yaw).
 ///
 /// With --out it writes a calibration file for `gyronet device calibrate unit` and `gyronet evaluate --calibration`.
 /// The file is valid only with the same weights.
@@ -26,7 +26,7 @@ Examples:
   gyronet calibrate drive1.csv drive2.csv --out unit.json
   gyronet evaluate drive3.csv --calibration unit.json")]
 pub struct Args {
-    /// Drives recorded with the unit, with ref_gyr_z or ref_yaw.
+    /// Drives recorded with the unit, with ref_gyr_z, ref_yaw or a course.
     #[arg(required = true, value_name = "DRIVE")]
     files: Vec<PathBuf>,
     /// Write the calibration to this file.
@@ -39,7 +39,8 @@ pub struct Args {
 pub fn run(args: &Args, common: Common) -> super::Result {
     let weights = args.sent.open()?;
     let blob = weights.blob()?;
-    let drives = args.files.iter().map(|file| cut(&read_drive(file, common)?, blob, common));
+    let open = |file: &PathBuf| remarked(Drive::open_with_courses(file)?, common);
+    let drives = args.files.iter().map(|file| cut(&open(file)?, blob, common));
     let drives = drives.collect::<Result<Vec<Cut>, Box<dyn Error>>>()?;
     let unit = calibrate(&drives, blob.crc)?;
     let found = unit.shares.iter().any(|share| share.refused.is_none());
@@ -59,11 +60,11 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     for drive in &unit.drives {
         let degrees_per_hour = drive.yaw_rate_bias_rad_per_s.to_degrees() * 3_600.0;
-        writeln!(
-            out,
-            "{}: remaining bias {degrees_per_hour:+.1} deg/h, its turns scatter by {:.6} rad",
-            drive.name, drive.deviation_rad
-        )?;
+        write!(out, "{}: remaining bias {degrees_per_hour:+.1} deg/h", drive.name)?;
+        match drive.deviation_rad {
+            Some(deviation) => writeln!(out, ", its turns scatter by {deviation:.6} rad")?,
+            None => writeln!(out, ", by its course")?,
+        }
     }
     match &args.out {
         Some(path) if !found => {
@@ -76,7 +77,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
 /// Runs a drive on the board with these weights, with a progress bar.
 pub fn cut(drive: &Drive<'_>, blob: Blob<'_>, common: Common) -> Result<Cut, Box<dyn Error>> {
     let bar = progress::bar(common, drive.facts.rows, drive.name());
-    let board = Board::new(Config::DEFAULT, drive.wheels(), GyroNet::new(blob));
+    let board = Board::new(config(), drive.wheels(), GyroNet::new(blob));
     let cut = Cut::new(drive, board, || bar.inc(1));
     bar.finish_and_clear();
     Ok(cut?)

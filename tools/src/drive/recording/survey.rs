@@ -20,6 +20,8 @@ pub struct Facts {
     pub is_off_grid: bool,
     /// True if each wheel is recorded in any row.
     pub wheels: [bool; WHEELS],
+    /// True if any row has a reference yaw rate, and a course for the board.
+    pub has_rate: bool,
     pub has_course: bool,
 }
 
@@ -69,6 +71,7 @@ impl Survey {
         }
         facts.last = time;
         facts.rows += 1;
+        facts.has_rate |= row.reference.is_some();
         facts.has_course |= row.heading.is_some();
         for (recorded, rate) in facts.wheels.iter_mut().zip(row.wheels) {
             *recorded |= rate.is_some();
