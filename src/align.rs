@@ -171,8 +171,15 @@ impl Aligner {
         self.last.is_none_or(|(_, end)| self.end - end < 2 * i64::from(self.usual))
     }
 
+    /// Returns whether [`Aligner::next_frame`] may return a step.
+    #[inline]
+    pub fn has_piece(&self) -> bool {
+        self.piece.is_some()
+    }
+
     /// Returns the next step that the newest sample has completed.
     pub fn next_frame(&mut self) -> Option<Frame> {
+        self.piece?;
         let (sample, _) = self.last?;
         // As many turns as steps are missing, and one.
         loop {
@@ -248,7 +255,12 @@ impl Aligner {
     /// Returns the end of a step if the time is near it, else the time.
     fn snapped(&self, time: i64, period_us: u64) -> i64 {
         let near = if SNAPPED_US.contains(&period_us) { SNAP_US as i64 } else { 0 };
-        let after = (time - self.end).rem_euclid(STEP);
+        let from_end = time - self.end;
+        let after = match i32::try_from(from_end) {
+            // Nearly always: the processor divides 32 bits alone in hardware.
+            Ok(from_end) => from_end.rem_euclid(STEP as i32).into(),
+            Err(_) => from_end.rem_euclid(STEP),
+        };
         let to_next = STEP - after;
         if after <= near {
             time - after

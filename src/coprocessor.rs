@@ -159,6 +159,14 @@ impl Coprocessor {
         self.take(sample, now, sink, &mut newest).map(|()| newest)
     }
 
+    /// [`Self::imu`] whose observations go to the sink alone.
+    ///
+    /// # Errors
+    /// Those of [`Self::imu`].
+    pub fn imu_to(&mut self, sample: ImuSample, now: Micros, sink: &mut impl Sink) -> Result<(), InputError> {
+        self.take(sample, now, sink, &mut None)
+    }
+
     /// [`Self::imu`] that writes the observation in place: a copy of it is a large part of a small stack.
     fn take(
         &mut self,
@@ -204,7 +212,8 @@ impl Coprocessor {
 
     /// Corrects the steps that need no estimate that is still being computed.
     fn correct_ready(&mut self, now: Micros, sink: &mut impl Sink, newest: &mut Option<Observation>) {
-        while !self.handover.must_wait(self.pipeline.tick(), now)
+        while self.pipeline.has_piece()
+            && !self.handover.must_wait(self.pipeline.tick(), now)
             && let Some(frame) = self.pipeline.next_frame()
         {
             self.correct(frame, now, sink, newest);
@@ -384,6 +393,14 @@ impl Coprocessor {
         self.poll_into(now, sink, &mut newest).map(|()| newest)
     }
 
+    /// [`Self::poll`] whose observations go to the sink alone.
+    ///
+    /// # Errors
+    /// Those of [`Self::poll`].
+    pub fn poll_to(&mut self, now: Micros, sink: &mut impl Sink) -> Result<(), InputError> {
+        self.poll_into(now, sink, &mut None)
+    }
+
     /// [`Self::poll`] that writes the observation in place.
     fn poll_into(
         &mut self,
@@ -392,7 +409,9 @@ impl Coprocessor {
         newest: &mut Option<Observation>,
     ) -> Result<(), InputError> {
         let now = self.advance(now)?;
-        self.correct_ready(now, sink, newest);
+        if self.pipeline.has_piece() {
+            self.correct_ready(now, sink, newest);
+        }
         if let Some(steps) = self.monitor.poll(now) {
             let vehicle = self.pipeline.silent(steps, &self.board_state());
             self.send(&vehicle, self.monitor.time_at(now), sink);
@@ -408,7 +427,10 @@ impl Coprocessor {
                 vertical: None,
             }));
         }
-        self.step_fog(sink);
+        // Not called in vain: its frame is large.
+        if self.fog.is_due(self.timeline.time()) {
+            self.step_fog(sink);
+        }
         Ok(())
     }
 
@@ -505,8 +527,8 @@ impl Coprocessor {
             InputError::ClockWentBack { by }
         })?;
         // The sensor's clock is at 0 before its first sample.
-        if let time @ Micros(1..) = self.timeline.time()
-            && self.heading_due.is_none()
+        if self.heading_due.is_none()
+            && let time @ Micros(1..) = self.timeline.time()
         {
             self.heading_due = Some(Micros(time.0.saturating_add(FIRST_COURSE_US)));
         }

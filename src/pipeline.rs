@@ -180,6 +180,11 @@ impl Pipeline {
         self.state.aligner.next_frame()
     }
 
+    /// Returns whether [`Pipeline::next_frame`] may return a step.
+    pub(crate) fn has_piece(&self) -> bool {
+        self.state.aligner.has_piece()
+    }
+
     /// Returns whether the sensor sends too few or too many samples a second to be used.
     #[must_use]
     pub fn is_rate_refused(&self) -> bool {

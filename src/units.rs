@@ -10,6 +10,24 @@ pub const RATE_HZ: u32 = 100;
 /// Standard gravity converts the readings of parts that measure in g, m/s^2.
 pub const STANDARD_GRAVITY: f32 = 9.806_65;
 
+/// Returns `value / DIVISOR`, rounded down, by divisions of 32 bits, which a microcontroller has in hardware. The value is
+/// below 2^63 / `DIVISOR`.
+#[inline]
+#[must_use]
+pub const fn divided<const DIVISOR: u32>(value: u64) -> u64 {
+    const HIGH: u64 = 1 << 32;
+    let (high, low) = ((value >> 32) as u32, value as u32);
+    let (quotient, remainder) = (HIGH / DIVISOR as u64, (HIGH % DIVISOR as u64) as u32);
+    let rest = (high * remainder + low % DIVISOR) / DIVISOR;
+    high as u64 * quotient + (low / DIVISOR) as u64 + rest as u64
+}
+
+const _: () = {
+    assert!(divided::<1_000>(u32::MAX as u64 * 1_000 + 999) == u32::MAX as u64);
+    assert!(divided::<1_000>((1 << 53) + 7) == ((1 << 53) + 7) / 1_000);
+    assert!(divided::<78_125>((1 << 46) - 1) == ((1 << 46) - 1) / 78_125);
+};
+
 /// The reason why a reading does not fit the fixed-point format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

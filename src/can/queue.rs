@@ -58,6 +58,11 @@ impl<F, const N: usize> TransmitQueue<F, N> {
         }
     }
 
+    /// Removes the oldest frame, which a transport has accepted.
+    pub fn remove_front(&mut self) {
+        let _ = self.frames.pop_front();
+    }
+
     /// Removes and returns the oldest frame, for a transport that always accepts it.
     pub fn pop(&mut self) -> Option<F> {
         self.frames.pop_front()
@@ -123,6 +128,12 @@ pub struct DataFrame {
 }
 
 impl DataFrame {
+    /// Returns the data, followed by zeros.
+    #[must_use]
+    pub const fn padded(&self) -> &[u8; 8] {
+        &self.data
+    }
+
     /// Converts the frame to a driver's own type; `None` if that type cannot hold the frame.
     pub fn convert<F: Frame>(&self) -> Option<F> {
         F::new(self.id(), self.data())

@@ -22,50 +22,65 @@ pub type StampedLine = Vec<u8, MAX_STAMPED_LINE>;
 /// Time stamps are milliseconds modulo one minute.
 const STAMP_MODULUS: u64 = 60_000;
 
-const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
-
 /// Encodes a frame as `tIIILDD..` for a standard identifier or `TIIIIIIIILDD..` for an extended one, with CR at the
 /// end.
 ///
 /// Returns `None` for a frame that is not a classic data frame (remote, or more than eight bytes).
 pub fn emit(frame: &impl Frame) -> Option<Line> {
-    if frame.is_remote_frame() || frame.data().len() > 8 {
+    let mut text = [0; MAX_STAMPED_LINE];
+    let length = encode(frame, None, &mut text)?;
+    Line::from_slice(text.get(..length)?).ok()
+}
+
+/// Writes a frame as [`emit`] and [`emit_stamped`] encode it; returns its length.
+fn encode(frame: &impl Frame, time: Option<Micros>, text: &mut [u8; MAX_STAMPED_LINE]) -> Option<usize> {
+    let data = frame.data();
+    if frame.is_remote_frame() || data.len() > 8 {
         return None;
     }
-    let (letter, id, digits) = match frame.id() {
-        Id::Standard(id) => (b't', u32::from(id.as_raw()), 3),
-        Id::Extended(id) => (b'T', id.as_raw(), 8),
+    let [_, length] = hex(data.len() as u8);
+    let head = match frame.id() {
+        Id::Standard(id) => {
+            let ([_, first], [second, third]) = (hex((id.as_raw() >> 8) as u8), hex(id.as_raw() as u8));
+            text[..5].copy_from_slice(&[b't', first, second, third, length]);
+            5
+        }
+        Id::Extended(id) => {
+            let digits = id.as_raw().to_be_bytes().map(hex);
+            text[0] = b'T';
+            text[1..9].copy_from_slice(digits.as_flattened());
+            text[9] = length;
+            10
+        }
     };
-    let mut line = Line::new();
-    line.push(letter).ok()?;
-    for k in (0..digits).rev() {
-        line.push(DIGITS[(id >> (4 * k)) as usize & 0xF]).ok()?;
+    let pairs = text.get_mut(head..)?.as_chunks_mut().0;
+    pairs.iter_mut().zip(data).for_each(|(pair, byte)| *pair = hex(*byte));
+    let mut length = head + 2 * data.len();
+    if let Some(time) = time {
+        let stamp = (time.0 / 1000 % STAMP_MODULUS) as u16;
+        let digits = stamp.to_be_bytes().map(hex);
+        text.get_mut(length..length + 4)?.copy_from_slice(digits.as_flattened());
+        length += 4;
     }
-    line.push(DIGITS[frame.dlc() & 0xF]).ok()?;
-    for byte in frame.data() {
-        line.extend_from_slice(&hex(*byte)).ok()?;
-    }
-    line.push(b'\r').ok()?;
-    Some(line)
+    *text.get_mut(length)? = b'\r';
+    Some(length + 1)
 }
 
 /// Encodes a frame as [`emit`] does, followed by a time stamp of four hexadecimal digits: milliseconds modulo one
 /// minute. A host enables time stamps with `Z1`.
 pub fn emit_stamped(frame: &impl Frame, time: Micros) -> Option<StampedLine> {
-    let line = emit(frame)?;
-    let (_, frame) = line.split_last()?;
-    let mut stamped = StampedLine::from_slice(frame).ok()?;
-    let stamp = (time.0 / 1000 % STAMP_MODULUS) as u16;
-    for byte in stamp.to_be_bytes() {
-        stamped.extend_from_slice(&hex(byte)).ok()?;
-    }
-    stamped.push(b'\r').ok()?;
-    Some(stamped)
+    let mut text = [0; MAX_STAMPED_LINE];
+    let length = encode(frame, Some(time), &mut text)?;
+    StampedLine::from_slice(text.get(..length)?).ok()
 }
 
-/// Encodes a byte as two hexadecimal digits.
+/// Encodes a byte as two hexadecimal digits, both at once: a board encodes thousands of bytes a second.
+#[inline]
 fn hex(byte: u8) -> [u8; 2] {
-    [DIGITS[usize::from(byte >> 4)], DIGITS[usize::from(byte & 0xF)]]
+    let digits = u16::from(byte >> 4) | u16::from(byte & 0xF) << 8;
+    // One where a digit is above 9: the letters begin 7 behind the character behind '9'.
+    let letters = (digits + 0x0606) >> 4 & 0x0101;
+    (digits + 0x3030 + 7 * letters).to_le_bytes()
 }
 
 /// The reason why a line is not a data frame.

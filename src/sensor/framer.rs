@@ -26,7 +26,7 @@ pub struct Framer<P, const N: usize> {
     /// Number of bytes at the start of `buffer` that belong to the frame returned last.
     used: usize,
     /// Number of bytes that `buffer` must hold before the next search, so that a header is examined once, not at
-    /// every byte. 0 after a frame was returned.
+    /// every byte.
     needed: usize,
     bad_checksums: u32,
     skipped: u32,
@@ -91,6 +91,12 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         self.buffer.len() < self.needed
     }
 
+    /// Returns the number of bytes that must arrive until [`Framer::next_frame`] can return something.
+    #[inline]
+    pub fn missing(&self) -> usize {
+        self.needed.saturating_sub(self.buffer.len())
+    }
+
     /// Returns the number of candidates with a wrong checksum.
     pub fn bad_checksums(&self) -> u32 {
         self.bad_checksums
@@ -124,14 +130,14 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         };
         self.skip(start);
         self.used = found?;
-        self.needed = 0;
+        self.needed = self.used + P::HEADER;
         self.buffer.get(..self.used)
     }
 
     fn release(&mut self) {
         self.drop_front(self.used);
+        self.needed = self.needed.saturating_sub(self.used);
         self.used = 0;
-        self.needed = 0;
     }
 
     fn skip(&mut self, count: usize) {

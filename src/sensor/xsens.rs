@@ -45,8 +45,17 @@ impl Protocol for Xbus {
     }
 
     fn check(frame: &[u8]) -> bool {
-        frame.len() == Self::HEADER
-            || frame.iter().skip(1).fold(0u8, |sum, byte| sum.wrapping_add(*byte)) == 0
+        if frame.len() == Self::HEADER {
+            return true;
+        }
+        let (words, rest) = frame.get(1..).unwrap_or_default().as_chunks();
+        // Two bytes of a word at once; the 64 words of the longest frame cannot carry over.
+        let sums = words.iter().fold(0u32, |sums, word| {
+            let word = u32::from_le_bytes(*word);
+            sums.wrapping_add(word & 0xFF_00FF).wrapping_add(word >> 8 & 0xFF_00FF)
+        });
+        let sum = (sums as u8).wrapping_add((sums >> 16) as u8);
+        rest.iter().fold(sum, |sum, byte| sum.wrapping_add(*byte)) == 0
     }
 }
 
@@ -104,6 +113,12 @@ impl Mti {
             _ => return None,
         };
         Some(message.and_then(|message| self.sample(&message)))
+    }
+
+    /// Returns the number of bytes that must arrive until [`Mti::next_sample`] can return something.
+    #[inline]
+    pub fn missing(&self) -> usize {
+        self.framer.missing()
     }
 
     /// Returns the number of frame candidates with a wrong checksum.

@@ -3,7 +3,7 @@
 use crate::health::{Faults, Status};
 
 /// The present faults of the board, and its state.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Conditions {
     /// Sensor time since the start, 10 ms steps.
     pub tick: u32,

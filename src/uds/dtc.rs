@@ -247,12 +247,29 @@ pub struct Memory {
     pub is_enabled: bool,
     /// True if the confirmed troubles differ from the stored ones.
     pub is_changed: bool,
+    /// What was observed last, and whether there was a stall; `None` once an entry was changed otherwise.
+    observed: Option<(Conditions, bool)>,
 }
 
 impl Memory {
     /// Creates an empty memory.
     pub const fn new() -> Self {
-        Self { entries: [UNTESTED; TROUBLES.len()], is_enabled: true, is_changed: false }
+        Self { entries: [UNTESTED; TROUBLES.len()], is_enabled: true, is_changed: false, observed: None }
+    }
+
+    /// As [`Self::observe`], and does nothing where nothing has changed since.
+    pub fn observe_changes(&mut self, now: &Conditions, has_stalled: bool) {
+        // Of the tick it matters alone whether the cycle has passed.
+        let seen = (Conditions { tick: now.tick.min(PASSED_TICKS), ..*now }, has_stalled);
+        let is_like = |last: &(Conditions, bool)| {
+            last.0.tick / PASSED_TICKS == seen.0.tick / PASSED_TICKS
+                && (Conditions { tick: seen.0.tick, ..last.0 }, last.1) == seen
+        };
+        if !self.is_enabled || self.observed.as_ref().is_some_and(is_like) {
+            return;
+        }
+        self.observed = Some(seen);
+        self.observe(now, has_stalled);
     }
 
     /// Records the faults that are present now, but for those that a stall of the processor causes where there was one.
@@ -291,6 +308,7 @@ impl Memory {
     /// Clears one trouble, or all for `0xFF_FFFF`. Returns whether the code is known.
     pub fn clear(&mut self, code: u32) -> bool {
         let mut found = false;
+        self.observed = None;
         for (trouble, entry) in TROUBLES.iter().zip(&mut self.entries) {
             if code == 0xFF_FFFF || code == trouble.code {
                 self.is_changed |= entry.status & bit::CONFIRMED != 0;
@@ -303,6 +321,7 @@ impl Memory {
 
     /// Restores the troubles that were stored before the start; codes that this firmware does not have are ignored.
     pub fn restore(&mut self, stored: &Troubles) {
+        self.observed = None;
         for (trouble, entry) in TROUBLES.iter().zip(&mut self.entries) {
             let found = stored.confirmed.iter().find(|stored| stored.code == trouble.code);
             if let Some(StoredTrouble { occurrences, snapshot, pending, .. }) = found {

@@ -138,7 +138,7 @@ impl Services {
         self.is_silenced &= device.may_interrupt();
         device.store_learned_if_due();
         self.settles_at = self.settles_at.filter(|until| (now.wrapping_sub(*until) as i32) < 0);
-        self.memory.observe(&device.conditions(), self.settles_at.is_some() || may_erase);
+        self.memory.observe_changes(&device.conditions(), self.settles_at.is_some() || may_erase);
         if self.memory.is_changed {
             self.memory.is_changed = !device.store_troubles(&self.memory.confirmed(), may_erase);
         }

@@ -5,7 +5,7 @@
 #![allow(unsafe_code, reason = "rings with one task at each end; each block names them")]
 
 use crate::diagnosis::{self, FROM_CAN, Line, RESPONSES};
-use crate::idle::{OBSERVATIONS, Observation};
+use crate::idle::{self, OBSERVATIONS, Observation, STEP_MS};
 use crate::ring::Ring;
 use crate::serial;
 use crate::stm32f405::can::{self, Can, Received, STALE_MS, State};
@@ -29,6 +29,13 @@ pub static FRAMES: Ring<DataFrame, 8> =
 /// Number of frames that found no room, in the controller or here. Only the handler counts.
 static LOST: AtomicU32 = AtomicU32::new(0);
 
+/// True while frames wait for the controller, so that the output task is to run when one has left.
+static WAIT_FOR_CAN: AtomicBool = AtomicBool::new(false);
+
+pub fn do_wait_for_can() -> bool {
+    WAIT_FOR_CAN.load(Ordering::Relaxed)
+}
+
 /// Handles the receive interrupt: takes every received frame.
 pub fn take() {
     while let Some(Received { frame, lost }) = can::receive() {
@@ -40,7 +47,12 @@ pub fn take() {
 
 /// Queues a frame for its task. Returns whether there was room.
 fn push(frame: DataFrame) -> bool {
-    if diagnosis::is_request(frame.id()) { FROM_CAN.push(frame) } else { FRAMES.push(frame) }
+    if diagnosis::is_request(frame.id()) {
+        idle::attend();
+        FROM_CAN.push(frame)
+    } else {
+        FRAMES.push(frame)
+    }
 }
 
 /// Returns the number of frames lost since the start. The controller does not count how many it loses at once, so
@@ -63,6 +75,8 @@ pub struct Outgoing {
     now: u32,
     /// Observations that idle missed for lack of time.
     overruns: u32,
+    /// Time at which idle got work last, ms.
+    attended: u32,
     /// True while the oldest response is on its way on SLCAN.
     responds: bool,
 }
@@ -70,17 +84,21 @@ pub struct Outgoing {
 impl Outgoing {
     pub fn new(slcan: serial::Port, bits_per_second: u32, can: Option<Can>) -> Self {
         let (port, queue) = (Port::new(bits_per_second), TransmitQueue::new());
-        Self { slcan, port, can, queue, now: 0, overruns: 0, responds: false }
+        Self { slcan, port, can, queue, now: 0, overruns: 0, attended: 0, responds: false }
     }
 
     pub fn join(&self) {
         self.can.iter().for_each(Can::join);
     }
 
-    /// Sends as much as the lines accept; passes the frames that a host has sent over SLCAN to `take`, which returns
-    /// whether a frame is used.
+    /// Returns whether SLCAN has something to send, or a host has sent something.
+    pub fn is_slcan_busy(&self) -> bool {
+        self.slcan.is_busy() || self.port.is_sending() || self.responds || !RESPONSES.is_empty()
+    }
+
+    /// Sends as much as SLCAN accepts; passes the frames that a host has sent over it to `take`, which returns whether a
+    /// frame is used.
     pub fn service(&mut self, take: impl FnMut(DataFrame) -> bool) {
-        self.refill();
         self.port.set_bus(match self.state() {
             State::Active => StatusFlags::default(),
             State::Warning => StatusFlags::ERROR_WARNING,
@@ -89,13 +107,13 @@ impl Outgoing {
         });
         self.slcan.advance();
         // One response at a time, after the rates have been sent. It stays in the ring until it has left.
-        if self.responds && self.port.outgoing().is_none() && self.slcan.is_sent() {
+        if self.responds && !self.port.is_sending() && self.slcan.is_sent() {
             self.responds = false;
             RESPONSES.drop_oldest(1);
         }
         if let Some((Line::Slcan, frame)) = RESPONSES.oldest().first()
             && !self.responds
-            && self.port.outgoing().is_none()
+            && !self.port.is_sending()
         {
             self.responds = true;
             self.port.enqueue(*frame, self.stamp());
@@ -110,15 +128,30 @@ impl Outgoing {
         self.can.iter_mut().for_each(|can| can.poll(now));
     }
 
+    fn attend(&mut self) {
+        self.attended = self.now;
+        idle::attend();
+    }
+
+    /// Lets idle work if it has got nothing for long.
+    pub fn attend_if_due(&mut self) {
+        if self.now.wrapping_sub(self.attended) >= STEP_MS {
+            self.attend();
+        }
+    }
+
     /// Passes frames to the controller while it has room. Stale frames are dropped; in bus-off, all of them.
     pub fn refill(&mut self) {
         let Some(can) = self.can.as_mut() else { return };
+        if self.queue.is_empty() && RESPONSES.is_empty() {
+            return WAIT_FOR_CAN.store(false, Ordering::Relaxed);
+        }
         let off = can.state() == State::Off;
         while let Some((frame, made)) = self.queue.front() {
             if off || self.now.wrapping_sub(*made) > STALE_MS {
                 self.queue.drop_front();
             } else if can.transmit(frame, *made) {
-                let _ = self.queue.pop();
+                self.queue.remove_front();
             } else {
                 break;
             }
@@ -130,6 +163,7 @@ impl Outgoing {
             }
             RESPONSES.drop_oldest(1);
         }
+        WAIT_FOR_CAN.store(!self.queue.is_empty() || !RESPONSES.is_empty(), Ordering::Relaxed);
     }
 
     /// Returns the time stamp of what is sent now, whoever sends it: board time.
@@ -173,6 +207,7 @@ impl Sink for Outgoing {
         let tick = vehicle.tick;
         let note = Observation { sample, tick, status, quality, faults, wheels, standing, vertical };
         count(&mut self.overruns, u32::from(!OBSERVATIONS.push(note)));
+        self.attend();
     }
 
     /// Queues a frame for both lines, unless a tester has silenced the board.

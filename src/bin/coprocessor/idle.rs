@@ -8,6 +8,7 @@ use crate::output;
 use crate::regions::{Records, Weights};
 use crate::ring::Ring;
 use crate::stm32f405::{can, clocks, timer};
+use core::sync::atomic::{AtomicBool, Ordering};
 use cortex_m::peripheral::SCB;
 use gyronet::coprocessor::Coprocessor;
 use gyronet::health::{Faults, Quality, Status};
@@ -22,12 +23,12 @@ use rtic::mutex_prelude::*;
 
 /// Interval between checks of a failed clock, ms.
 const RETRY_MS: u32 = 1_000;
-/// Time from one reading of the state of the courses to the next; a course comes once a second.
+/// Time from one reading of the state of the courses to the next, unless a tester asks; a course comes once a second.
 const COURSE_MS: u32 = 100;
 /// Time after which a start has not failed, ms.
 const SETTLED_MS: u32 = 60_000;
 /// Longest time from one step of idle to the next, ms: of what neither an input nor a tester brings about.
-const STEP_MS: u32 = 10;
+pub const STEP_MS: u32 = 10;
 /// Duration of one pass over the weights, ms.
 const CHECK_MS: usize = 10_000;
 
@@ -48,6 +49,14 @@ pub struct Observation {
 pub static OBSERVATIONS: Ring<Observation, 8> =
     // SAFETY: the output task writes, idle reads.
     unsafe { Ring::new() };
+
+/// True once something has come for idle.
+static ATTENTION: AtomicBool = AtomicBool::new(false);
+
+/// Lets idle work when it next runs: an observation or a frame of a tester has come, or [`STEP_MS`] have passed.
+pub fn attend() {
+    ATTENTION.store(true, Ordering::Relaxed);
+}
 
 /// Faults that the idle task has found, for the coprocessor.
 pub struct Found {
@@ -84,6 +93,8 @@ pub struct Idle {
     course_at: u32,
     /// Time of the last step, ms.
     stepped: u32,
+    /// A tester is being served.
+    is_busy: bool,
 }
 
 pub type Stored = (&'static mut Device<Records, Weights>, Option<BackgroundCheck<'static>>);
@@ -106,15 +117,14 @@ impl Idle {
             retried: 0,
             course_at: 0,
             stepped: 0,
+            is_busy: false,
         }
     }
 
     /// Returns whether [`Self::step`] is to be called now.
     #[inline]
     pub fn is_due(&self) -> bool {
-        !OBSERVATIONS.is_empty()
-            || self.diagnosis.is_busy()
-            || timer::milliseconds().wrapping_sub(self.stepped) >= STEP_MS
+        ATTENTION.load(Ordering::Relaxed) || self.is_busy
     }
 
     /// Does a bounded piece of work, and returns the faults that were found.
@@ -124,10 +134,11 @@ impl Idle {
         coprocessor: &mut impl Mutex<T = &'static mut Coprocessor>,
         lines: &mut impl Mutex<T = LineCounters>,
     ) -> Found {
+        ATTENTION.store(false, Ordering::Relaxed);
         self.observe();
         let now = timer::milliseconds();
         let before = core::mem::replace(&mut self.stepped, now);
-        if now.wrapping_sub(self.course_at) >= COURSE_MS {
+        if now.wrapping_sub(self.course_at) >= COURSE_MS || self.diagnosis.is_busy() {
             self.course_at = now;
             let course = coprocessor.lock(|coprocessor| coprocessor.course_state());
             self.device.learn_course(&course);
@@ -151,6 +162,7 @@ impl Idle {
             crash::settled();
         }
         let weights_damaged = self.check(now.wrapping_sub(before));
+        self.is_busy = self.diagnosis.is_busy();
         Found { weights_damaged, mount_moved: self.device.take_mount_moved() }
     }
 
@@ -177,7 +189,7 @@ impl Idle {
 
     /// Checks the piece of the weights in use for some milliseconds, and returns whether they were found to be damaged.
     fn check(&mut self, milliseconds: u32) -> bool {
-        let pieces = milliseconds.min(STEP_MS) as usize;
+        let pieces = milliseconds.min(2 * STEP_MS) as usize;
         if pieces == 0 {
             return false;
         }

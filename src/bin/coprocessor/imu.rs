@@ -92,6 +92,14 @@ impl Imu {
         }
     }
 
+    /// Returns whether [`Self::next_sample`] has bytes to work on: the part of a message on the line waits in the ring.
+    pub fn has_input(&self) -> bool {
+        match self {
+            Self::Line(port, mti, _) => port.waiting() >= mti.missing(),
+            Self::Spi(_) => true,
+        }
+    }
+
     /// Returns the next sample, or an error for a damaged one; `None` if nothing is waiting or this step has used up
     /// its `budget` of bytes.
     pub fn next_sample(&mut self, budget: &mut usize) -> Option<Result<ImuSample, ()>> {

@@ -94,7 +94,7 @@ static PRIORITIES: [[u8; 2]; 12] = {
 #[rtic::app(device = crate::stm32f405::pac, peripherals = true)]
 mod app {
     use crate::diagnosis::Diagnosis;
-    use crate::idle::Idle;
+    use crate::idle::{Idle, attend};
     use crate::imu::BringUp;
     use crate::output::{Output, Task, report};
     use crate::stm32f405::pac::Interrupt;
@@ -150,7 +150,7 @@ mod app {
             Idle::new(device, diagnosis, bring_up, board.clocks.fault)
         });
         let board::Handlers { imu, fog: fog_handler, slcan, service, receptions: [a, b, c, d] } = handlers;
-        let receptions = [a, b, c, d, gnss_reception];
+        let receptions = [a, b, c, gnss_reception, d]; // Idle reads the last one's line.
         let shared = Shared { coprocessor, lines: LineCounters::NONE };
         (shared, Local { imu, fog_handler, slcan, service, gnss, receptions, sender, network, rest })
     }
@@ -175,7 +175,13 @@ mod app {
     #[unsafe(link_section = ".ram_code.tick")]
     fn tick(cx: tick::Context) {
         let now = timer::tick();
-        cx.local.receptions.iter_mut().flatten().for_each(|reception| reception.count(now));
+        let [others @ .., service] = cx.local.receptions;
+        for reception in others.iter_mut().flatten() {
+            reception.count(now);
+        }
+        if service.as_mut().is_some_and(|reception| reception.count(now)) {
+            attend();
+        }
         report(Task::Tick);
         rtic::pend(Interrupt::SPI3);
         dsb();
@@ -211,7 +217,9 @@ mod app {
     #[task(binds = CAN1_TX, priority = 3)]
     fn can_sent(_: can_sent::Context) {
         can::transmitted();
-        rtic::pend(Interrupt::SPI3);
+        if frames::do_wait_for_can() {
+            rtic::pend(Interrupt::SPI3);
+        }
         dsb();
     }
 

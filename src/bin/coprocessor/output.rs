@@ -7,6 +7,7 @@
 use crate::boards::BOARD;
 use crate::diagnosis::{self, FROM_SLCAN};
 use crate::frames::{self, FRAMES, Outgoing};
+use crate::idle;
 use crate::imu::{BYTES_PER_STEP, Imu};
 use crate::serial;
 use crate::stm32f405::can::{Can, State};
@@ -22,6 +23,8 @@ use gyronet::service::message::{AllCounters, LineCounters};
 use gyronet::store::ImuPart;
 use gyronet::units::Micros;
 
+/// Interval of what needs no millisecond: counters of the lines, and the watchdog, ms.
+const SLOW_MS: u32 = 4;
 /// Half a period of the LED, ms; a power of two.
 const BLINK_MS: u32 = 512;
 
@@ -79,6 +82,8 @@ pub struct Output {
     outgoing: Outgoing,
     /// Millisecond of the last poll of the other lines.
     polled_at: u32,
+    /// Millisecond of the last report.
+    reported_at: u32,
     /// True once CAN takes part in the bus.
     joined: bool,
     lines: LineCounters,
@@ -102,6 +107,7 @@ impl OutputParts {
             receiver: self.gnss.map(|line| GnssLine::new(line.protocol)),
             outgoing: Outgoing::new(slcan, self.bits_per_second, can),
             polled_at: 0,
+            reported_at: 0,
             joined: false,
             lines: LineCounters::NONE,
             slcan_inputs: self.slcan_inputs,
@@ -112,6 +118,7 @@ impl OutputParts {
 
 // The coprocessor counts the inputs that it refuses, so the task ignores its errors.
 impl Output {
+    /// Returns whether the window's task is to run: a sample may have made one due, and it reports to the watchdog.
     #[inline(never)]
     pub fn step(&mut self, coprocessor: &mut Coprocessor, lines: &mut LineCounters) -> bool {
         // A step also follows each sent CAN frame and each estimate. Inputs other than the inertial sensor are read
@@ -124,48 +131,80 @@ impl Output {
             self.outgoing.join();
             watchdog::set(watchdog::Limit::Short);
         }
-        let mut polled = core::mem::replace(&mut self.polled_at, tick) != tick;
-        if polled {
+        let before = core::mem::replace(&mut self.polled_at, tick);
+        let has_ticked = before != tick;
+        // The LED blinks as long as this task runs.
+        if let Some((led, lit)) = BOARD.led.filter(|_| (before ^ tick) & BLINK_MS != 0) {
+            led.set(lit == (tick & BLINK_MS != 0));
+        }
+        if has_ticked {
             self.outgoing.tick(tick);
             self.poll_inputs(coprocessor, now);
         }
-        coprocessor.pause(is_requested(), &mut self.outgoing);
-        if is_requested() {
+        let is_requested = is_requested();
+        coprocessor.pause(is_requested, &mut self.outgoing);
+        if is_requested {
             self.send(coprocessor, now);
             announce();
         }
+        let is_slow = has_ticked && tick.wrapping_sub(self.reported_at) >= SLOW_MS;
+        let has_sample = self.imu.has_input() && self.take_samples(coprocessor, now, has_ticked);
+        if !has_ticked && !has_sample {
+            self.outgoing.refill();
+            return false;
+        }
+        if is_slow {
+            self.report_bus(coprocessor);
+        }
+        let _ = coprocessor.poll_to(now, &mut self.outgoing);
+        self.send(coprocessor, now);
+        if is_slow {
+            self.report(tick, lines);
+        }
+        has_sample || is_slow
+    }
+
+    /// Passes the waiting samples to the coprocessor, as far as they need not wait for an estimate; returns whether there
+    /// was one. Before the first one the other inputs are read, unless they have been.
+    // Not inlined, since most steps have no sample, and this has a large frame.
+    #[inline(never)]
+    fn take_samples(&mut self, coprocessor: &mut Coprocessor, now: Micros, mut is_polled: bool) -> bool {
+        let mut has_sample = false;
         let mut budget = BYTES_PER_STEP;
         while coprocessor.is_ready(now) {
             match self.imu.next_sample(&mut budget) {
                 Some(Ok(sample)) => {
-                    if !core::mem::replace(&mut polled, true) {
+                    if !core::mem::replace(&mut is_polled, true) {
                         self.poll_inputs(coprocessor, now);
                     }
                     self.report_bus(coprocessor);
-                    let _ = coprocessor.imu(sample, now, &mut self.outgoing);
+                    let _ = coprocessor.imu_to(sample, now, &mut self.outgoing);
                     self.send(coprocessor, now);
+                    has_sample = true;
                 }
                 Some(Err(())) => coprocessor.imu_error(),
                 None => break,
             }
         }
-        if !polled {
-            self.outgoing.refill();
-            return false;
-        }
-        self.report_bus(coprocessor);
-        let _ = coprocessor.poll(now, &mut self.outgoing);
-        self.send(coprocessor, now);
-        *lines = self.lines;
-        // The LED blinks as long as this task runs.
-        if let Some((led, lit)) = BOARD.led {
-            led.set(lit == (tick & BLINK_MS != 0));
-        }
+        has_sample
+    }
+
+    /// Does what needs no millisecond.
+    #[inline(never)]
+    fn report(&mut self, tick: u32, lines: &mut LineCounters) {
+        self.reported_at = tick;
+        let lost = [self.imu.lost(), self.fog.lost(), self.outgoing.lost(), self.gnss.lost()];
+        *lines = LineCounters {
+            service_errors: self.outgoing.refused(),
+            overruns: self.outgoing.overruns(),
+            line_errors: lost.into_iter().fold(0, u32::saturating_add),
+            ..self.lines
+        };
+        self.outgoing.attend_if_due();
         // A new cycle begins once every task has reported.
         if REPORTS.compare_exchange(ALL_TASKS, 0, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
             watchdog::feed();
         }
-        true
     }
 
     /// Passes the waiting CAN frames and the fibre-optic gyro's bytes to the coprocessor.
@@ -174,7 +213,7 @@ impl Output {
         while let Some(frame) = FRAMES.pop() {
             let _ = coprocessor.can(&frame, now);
         }
-        for _ in 0..serial::RECEIVED {
+        for _ in 0..self.fog.waiting() {
             let waiting = self.fog.received();
             if waiting.is_empty() {
                 break;
@@ -190,8 +229,9 @@ impl Output {
                 }
             }
         }
-        self.poll_receiver(coprocessor, now);
-        self.send(coprocessor, now);
+        if self.receiver.is_some() {
+            self.poll_receiver(coprocessor, now);
+        }
     }
 
     /// Passes the GNSS receiver's bytes to the coprocessor.
@@ -232,20 +272,21 @@ impl Output {
     /// Sends the queued frames, and takes the frames that a host has sent over SLCAN.
     #[inline(never)]
     fn send(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
+        self.outgoing.refill();
+        if !self.outgoing.is_slcan_busy() {
+            return;
+        }
         let (unread, takes_inputs) = (&mut self.unread, self.slcan_inputs);
         self.outgoing.service(|frame| {
             if diagnosis::is_request(frame.id()) {
                 let has_room = FROM_SLCAN.push(frame);
+                idle::attend();
                 count(unread, u32::from(!has_room));
                 has_room
             } else {
                 takes_inputs && coprocessor.can(&frame, now) == Ok(true)
             }
         });
-        self.lines.service_errors = self.outgoing.refused();
-        let lost = [self.imu.lost(), self.fog.lost(), self.outgoing.lost(), self.gnss.lost()];
-        self.lines.overruns = self.outgoing.overruns();
-        self.lines.line_errors = lost.into_iter().fold(0, u32::saturating_add);
     }
 }
 

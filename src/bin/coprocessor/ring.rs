@@ -75,6 +75,26 @@ impl<T, const N: usize> Ring<T, N> {
         true
     }
 
+    /// Appends as many of the values as there is room for; returns their number. For the writing task.
+    pub fn extend(&self, values: &[T]) -> usize
+    where
+        T: Copy,
+    {
+        let count = values.len().min(N.saturating_sub(self.len()));
+        let written = self.written.load(Ordering::Relaxed);
+        let to_end = count.min(N - (written & Self::MASK));
+        // SAFETY: `count` values and places, of which the first `to_end` are in a row and the rest begin the buffer; the
+        // places are free, and this task alone writes.
+        unsafe {
+            self.place(written).copy_from_nonoverlapping(values.as_ptr(), to_end);
+            if count > to_end {
+                self.place(0).copy_from_nonoverlapping(values.as_ptr().add(to_end), count - to_end);
+            }
+        }
+        self.advance_write(count);
+        count
+    }
+
     /// Takes the oldest value. For the reading task.
     #[inline(always)]
     pub fn pop(&self) -> Option<T> {

@@ -112,9 +112,22 @@ impl Reception {
         Self { stream, ring, place: 0, counted_at: now, lap_us }
     }
 
-    /// Counts the bytes received until `now`, us. Called at least twice a lap; the reader must not run meanwhile.
+    /// Counts the bytes received until `now`, us; returns whether there may be new ones. Called at least twice a lap; the
+    /// reader must not run meanwhile.
     #[inline(always)]
-    pub fn count(&mut self, now: u32) {
+    pub fn count(&mut self, now: u32) -> bool {
+        let late = now.wrapping_sub(core::mem::replace(&mut self.counted_at, now)) >= self.lap_us;
+        if !late && RECEIVED - self.place == self.stream.remaining() {
+            // Less than a lap has passed, so no byte has come.
+            return false;
+        }
+        self.advance(late);
+        true
+    }
+
+    #[inline(never)]
+    #[unsafe(link_section = ".ram_code.advance")]
+    fn advance(&mut self, late: bool) {
         let around = self.stream.take_complete();
         let place = RECEIVED - self.stream.remaining().clamp(1, RECEIVED);
         let wrapped = place < self.place;
@@ -122,12 +135,10 @@ impl Reception {
             // The stream wrapped after the flag was read.
             self.stream.take_complete();
         }
-        let late = now.wrapping_sub(self.counted_at) >= self.lap_us;
         let lapped = around && (late || !wrapped);
         let received = place.wrapping_sub(self.place) % RECEIVED + if lapped { RECEIVED } else { 0 };
         self.ring.advance_write(received);
         self.place = place;
-        self.counted_at = now;
     }
 }
 
@@ -149,6 +160,12 @@ impl Port {
     #[inline]
     pub fn consume(&mut self, count: usize) {
         self.memory.received.drop_oldest(count);
+    }
+
+    /// Returns the number of received bytes that wait.
+    #[inline]
+    pub fn waiting(&self) -> usize {
+        self.memory.received.len()
     }
 
     /// Returns whether bytes have been received, or are being sent.
@@ -214,7 +231,7 @@ impl WriteReady for Port {
 
 impl Write for Port {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
-        let accepted = bytes.iter().take_while(|byte| self.memory.sending.push(**byte)).count();
+        let accepted = self.memory.sending.extend(bytes);
         if accepted == 0 && !bytes.is_empty() {
             return Err(ErrorKind::TimedOut);
         }

@@ -165,6 +165,11 @@ impl Can {
     /// Aborts frames that have become stale, and restarts the controller after bus-off. Called every
     /// millisecond, with the time in milliseconds.
     pub fn poll(&mut self, now: u32) {
+        let is_on = matches!(self.recovery, Recovery::On { .. }) && self.interval_ms == FIRST_RESTART_MS;
+        if is_on && OFF_AT.load(Ordering::Relaxed) == 0 && all_sent() {
+            // Nothing can be stale, nor is there anything to recover from.
+            return;
+        }
         let micros = timer::micros() as u32;
         let is_off = self.registers.esr().read().boff().bit_is_set();
         let off_at = Some(OFF_AT.swap(0, Ordering::Relaxed)).filter(|at| *at != 0);
@@ -220,15 +225,11 @@ impl Can {
         if let Some(requested) = self.requested.get_mut(index) {
             *requested = now;
         }
-        let mut data = [0; 8];
-        for (byte, from) in data.iter_mut().zip(frame.data()) {
-            *byte = *from;
-        }
-        let [a, b, c, d, e, f, g, h] = data;
+        let [a, b, c, d, e, f, g, h] = *frame.padded();
         let mailbox = self.registers.tx(index);
         // SAFETY: an empty mailbox; a length up to 8, any data, an identifier, then the request.
         unsafe {
-            mailbox.tdtr().write(|w| w.dlc().bits(frame.data().len() as u8));
+            mailbox.tdtr().write(|w| w.dlc().bits(frame.dlc() as u8));
             mailbox.tdlr().write(|w| w.bits(u32::from_le_bytes([a, b, c, d])));
             mailbox.tdhr().write(|w| w.bits(u32::from_le_bytes([e, f, g, h])));
             mailbox.tir().write(|w| w.bits(word(frame.id())).txrq().set_bit());
@@ -297,7 +298,7 @@ pub fn is_acknowledged() -> bool {
 pub fn all_sent() -> bool {
     // SAFETY: the register is only read.
     let status = unsafe { &*pac::CAN1::ptr() }.tsr().read().bits();
-    (0..MAILBOXES).all(|k| status & EMPTY << k != 0)
+    !status & (EMPTY | EMPTY << 1 | EMPTY << 2) == 0
 }
 
 /// Handles the transmit interrupt: clears it and counts frames that were aborted.

@@ -12,6 +12,7 @@ use core::sync::atomic::{Ordering, compiler_fence};
 #[derive(Debug, Clone, Copy)]
 pub struct Stream {
     controller: *const RegisterBlock,
+    registers: *const ST,
     number: usize,
     channel: u8,
 }
@@ -27,7 +28,9 @@ impl Stream {
 
     /// Returns the handle of a stream, 0 to 7, with a channel, 0 to 7, of a controller of the chip.
     pub const fn new(controller: *const RegisterBlock, number: usize, channel: u8) -> Self {
-        Self { controller, number, channel }
+        // Registers of a stream follow those of the controller (RM0090 10.5.11).
+        let registers = controller.wrapping_byte_add(0x10 + 0x18 * (number % 8)).cast();
+        Self { controller, registers, number, channel }
     }
 
     fn controller(&self) -> &RegisterBlock {
@@ -36,8 +39,8 @@ impl Stream {
     }
 
     fn stream(&self) -> &ST {
-        // The compiler sees that the number is in range, so there is no panic.
-        self.controller().st(self.number % 8)
+        // SAFETY: see above.
+        unsafe { &*self.registers }
     }
 
     /// Returns the offset of the stream's flags in a status register, bits.

@@ -7,6 +7,7 @@
 
 use super::{clock_delay, clocks::Clocks, pac};
 use core::sync::atomic::{AtomicU32, Ordering};
+use gyronet::units::divided;
 
 const HZ: u32 = 1_000_000;
 
@@ -55,11 +56,8 @@ pub fn milliseconds() -> u32 {
     whole_milliseconds(micros())
 }
 
-/// Returns microseconds as whole milliseconds, which wrap. The processor divides 32 bits alone in hardware.
+/// Returns microseconds as whole milliseconds, which wrap.
 #[inline]
 pub const fn whole_milliseconds(us: u64) -> u32 {
-    // 2^32 = 1,000 * 4,294,967 + 296; the sum below ends after 1,900 years.
-    let (high, low) = ((us >> 32) as u32, us as u32);
-    let rest = high.wrapping_mul(296).wrapping_add(low % 1_000);
-    high.wrapping_mul(4_294_967).wrapping_add(low / 1_000).wrapping_add(rest / 1_000)
+    divided::<1_000>(us) as u32
 }

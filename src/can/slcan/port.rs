@@ -7,7 +7,7 @@
 
 use super::assembler::{LineAssembler, TooLong};
 use super::host::{Session, StatusFlags};
-use super::{MAX_STAMPED_LINE, StampedLine, emit, emit_stamped};
+use super::{MAX_STAMPED_LINE, encode};
 use crate::can::DataFrame;
 use crate::can::queue::TransmitQueue;
 use crate::health::count;
@@ -34,7 +34,8 @@ pub struct Port<const N: usize> {
     answers: Vec<u8, MAX_ANSWERS>,
     unanswered: u32,
     /// The text line or answers being sent; `taken` bytes of it have been sent.
-    line: Vec<u8, MAX_ANSWERS>,
+    line: [u8; MAX_ANSWERS],
+    length: usize,
     taken: usize,
     /// Number of dropped frames when `F` was last answered.
     reported: u32,
@@ -50,7 +51,8 @@ impl<const N: usize> Port<N> {
             queue: TransmitQueue::new(),
             answers: Vec::new(),
             unanswered: 0,
-            line: Vec::new(),
+            line: [0; MAX_ANSWERS],
+            length: 0,
             taken: 0,
             reported: 0,
             bus: StatusFlags(0),
@@ -92,29 +94,32 @@ impl<const N: usize> Port<N> {
 
     /// Returns whether bytes wait to be sent.
     pub fn is_sending(&self) -> bool {
-        self.taken < self.line.len() || !self.answers.is_empty() || !self.queue.is_empty()
+        self.taken < self.length || !self.answers.is_empty() || !self.queue.is_empty()
     }
 
     /// Returns the bytes to send next: the rest of the current line, else answers, else the oldest frame.
     pub fn outgoing(&mut self) -> Option<&[u8]> {
-        if self.taken == self.line.len() {
-            self.taken = 0;
-            self.line.clear();
-            if !self.answers.is_empty() {
-                core::mem::swap(&mut self.line, &mut self.answers);
+        if self.taken == self.length {
+            (self.taken, self.length) = (0, self.answers.len());
+            if let Some(line) = self.line.get_mut(..self.length) {
+                line.copy_from_slice(&self.answers);
             }
+            self.answers.clear();
         }
-        while self.line.is_empty() {
-            let (frame, time) = self.queue.pop()?;
+        while self.length == 0 {
+            let (frame, time) = self.queue.front()?;
+            let time = self.session.stamped().then_some(*time);
+            let room = self.line.first_chunk_mut();
             // All our frames fit SLCAN; any other is skipped.
-            self.line = self.format(&frame, time).unwrap_or_default();
+            self.length = room.and_then(|room| encode(frame, time, room)).unwrap_or(0);
+            self.queue.remove_front();
         }
-        self.line.get(self.taken..)
+        self.line.get(self.taken..self.length)
     }
 
     /// Removes bytes of [`Port::outgoing`] that have been sent.
     pub fn sent(&mut self, bytes: usize) {
-        self.taken = self.taken.saturating_add(bytes).min(self.line.len());
+        self.taken = self.taken.saturating_add(bytes).min(self.length);
     }
 
     /// Reads and writes as many bytes as the line allows without blocking; `take` is called with the host's frames, and
@@ -138,7 +143,7 @@ impl<const N: usize> Port<N> {
             let [byte] = byte;
             self.receive(byte, &mut take);
         }
-        while line.write_ready()? {
+        while self.is_sending() && line.write_ready()? {
             let Some(outgoing) = self.outgoing() else { break };
             let taken = line.write(outgoing)?;
             if taken == 0 {
@@ -157,14 +162,5 @@ impl<const N: usize> Port<N> {
     /// Returns the number of refused lines from the host plus the number of answers for which there was no room.
     pub fn refused(&self) -> u32 {
         self.session.refused().saturating_add(self.unanswered)
-    }
-
-    fn format(&self, frame: &DataFrame, time: Micros) -> Option<Vec<u8, MAX_ANSWERS>> {
-        let line: StampedLine = if self.session.stamped() {
-            emit_stamped(frame, time)?
-        } else {
-            StampedLine::from_slice(&emit(frame)?).ok()?
-        };
-        Vec::from_slice(&line).ok()
     }
 }
