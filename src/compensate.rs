@@ -211,8 +211,9 @@ pub struct Implausible {
 #[derive(Debug, Clone)]
 pub struct Compensator {
     config: CompensateConfig,
-    /// The newest sample last.
+    /// The newest samples, a ring; the next one comes in place of the oldest.
     kept: [Option<Entry>; KEPT],
+    next: usize,
     slow_mean: SlowMean,
     /// What the live rates (no window revises them) and the delayed rates still have to carry.
     live: Carried,
@@ -225,6 +226,7 @@ impl Compensator {
         Self {
             config,
             kept: [None; KEPT],
+            next: 0,
             slow_mean: SlowMean::NONE,
             live: Carried::NONE,
             delayed: Carried::NONE,
@@ -246,17 +248,19 @@ impl Compensator {
         {
             return Err(Implausible { mean: average, largest });
         }
-        let oldest = KEPT - (stride.delay() as usize - 1) - WINDOW;
+        // Ages of the window's samples, which the corrections follow backwards.
+        let newest = stride.delay() as usize - 1;
         self.slow_mean.observe((sum - linear_sum) / WINDOW as i64, stride.samples());
         let constant = self.slow_mean.get();
-        for (place, (entry, correction)) in self.kept.iter_mut().skip(oldest).zip(corrections).enumerate() {
-            let Some(entry) = entry else { continue };
+        for (age, correction) in (newest..newest + WINDOW).zip(corrections.iter().rev()) {
+            let Some(entry) = self.kept.get_mut(place(self.next, age)).and_then(Option::as_mut) else {
+                continue;
+            };
             entry.sum += i64::from(correction.0) - constant;
             entry.count += 1;
-            let estimate = entry.sum.checked_div(i64::from(entry.count)).unwrap_or(0);
+            let estimate = mean(entry.sum, entry.count);
             let revision = estimate - i64::from(entry.estimate);
             entry.estimate = estimate as i32;
-            let age = KEPT - 1 - (oldest + place);
             if age >= lag.samples() {
                 self.delayed.revise(revision, entry.held);
             }
@@ -266,20 +270,34 @@ impl Compensator {
 
     /// Adds a sample: its gyro rates less static bias.
     pub fn add(&mut self, tick: u32, rates: [AngularRate; 3], validity: Validity) {
-        self.kept.rotate_left(1);
-        self.kept[KEPT - 1] =
-            Some(Entry { tick, rates, validity, held: false, sum: 0, count: 0, estimate: 0 });
+        let entry = Entry { tick, rates, validity, held: false, sum: 0, count: 0, estimate: 0 };
+        if let Some(oldest) = self.kept.get_mut(self.next) {
+            *oldest = Some(entry);
+        }
+        self.next = (self.next + 1) % KEPT;
     }
 
     /// Marks this many of the newest samples as [`Validity::Stuck`], because a later one has shown it.
     pub fn distrust(&mut self, samples: usize) {
-        let newest = self.kept.iter_mut().rev().flatten().take(samples);
-        newest.filter(|entry| entry.validity.is_good()).for_each(|entry| entry.validity = Validity::Stuck);
+        for age in 0..samples.min(KEPT) {
+            if let Some(entry) = self.at_mut(age).filter(|entry| entry.validity.is_good()) {
+                entry.validity = Validity::Stuck;
+            }
+        }
+    }
+
+    /// Returns the sample this many before the newest one.
+    fn at(&self, age: usize) -> Option<&Entry> {
+        self.kept.get(place(self.next, age))?.as_ref()
+    }
+
+    fn at_mut(&mut self, age: usize) -> Option<&mut Entry> {
+        self.kept.get_mut(place(self.next, age))?.as_mut()
     }
 
     /// Returns the rate of the newest sample, less what remains; zero while the vehicle stands. Call it once for each sample.
     pub fn live(&mut self, remaining: Remaining, stands: bool) -> Option<Compensated> {
-        let entry = self.kept[KEPT - 1]?;
+        let entry = self.kept.get(place(self.next, 0))?.as_ref()?;
         Some(entry.send(remaining, &mut self.live, stands, self.config.max_revision))
     }
 
@@ -288,14 +306,14 @@ impl Compensator {
     ///
     /// `stands` is true when the vehicle has stood since before that sample was taken; its rate is then zero.
     pub fn delayed(&mut self, remaining: Remaining, stands: bool) -> Option<Compensated> {
-        let entry = self.kept.iter_mut().nth_back(self.config.lag.samples())?.as_mut()?;
+        let entry = self.kept.get_mut(place(self.next, self.config.lag.samples()))?.as_mut()?;
         entry.held = stands && entry.validity.is_good();
         Some(entry.send(remaining, &mut self.delayed, stands, self.config.max_revision))
     }
 
     /// Returns the newest sample that no window changes any more; each sample is returned once.
     pub fn complete(&self) -> Option<Complete> {
-        let entry = self.kept.iter().nth_back(self.config.stride.complete_after())?.as_ref()?;
+        let entry = self.at(self.config.stride.complete_after())?;
         Some(Complete {
             tick: entry.tick,
             rate: entry.rate(),
@@ -328,10 +346,25 @@ impl Compensator {
     /// Returns the amount that the sum of the delayed rates still lacks, codes x samples: revisions that are not carried
     /// yet, and samples whose rates are not sent yet.
     pub fn pending(&self, remaining: Remaining) -> i64 {
-        let waiting = self.kept.iter().rev().take(self.config.lag.samples()).flatten();
+        let waiting = (0..self.config.lag.samples()).flat_map(|age| self.at(age));
         let waiting = waiting.filter(|entry| entry.validity.is_good());
         let best = |entry: &Entry| i64::from(entry.rate().0) - entry.taken(remaining);
         waiting.map(best).sum::<i64>() - self.delayed.waiting()
+    }
+}
+
+/// Returns the place of the sample this many before the newest one, where `next` is that of the next sample.
+const fn place(next: usize, age: usize) -> usize {
+    let place = next + KEPT - 1 - age;
+    if place >= KEPT { place - KEPT } else { place }
+}
+
+/// Returns the mean of so many values, rounded towards zero; 0 of none.
+fn mean(sum: i64, count: i32) -> i64 {
+    match i32::try_from(sum) {
+        // The processor divides 32 bits alone in hardware.
+        Ok(sum) => sum.checked_div(count).unwrap_or(0).into(),
+        Err(_) => sum.checked_div(count.into()).unwrap_or(0),
     }
 }
 

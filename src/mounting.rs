@@ -138,6 +138,9 @@ impl Rotation {
     /// Returns a sample in the vehicle's axes: x forward, y left, z up.
     #[doc(hidden)]
     pub fn sample(&self, sample: &ImuSample) -> ImuSample {
+        if is_identity(&self.0) {
+            return *sample;
+        }
         ImuSample {
             angular_rate: self.rate(sample.angular_rate),
             specific_force: self.force(sample.specific_force),
@@ -157,11 +160,19 @@ impl Rotation {
 }
 
 /// Returns a Q30 matrix times a vector, rounded to nearest and saturated.
-fn product(rows: &[[i32; 3]; 3], vector: [i32; 3]) -> [i32; 3] {
-    rows.map(|row| {
-        let sum: i64 = row.iter().zip(vector).map(|(m, v)| i64::from(*m) * i64::from(v)).sum();
+fn product([x, y, z]: &[[i32; 3]; 3], vector: [i32; 3]) -> [i32; 3] {
+    let [a, b, c] = vector.map(i64::from);
+    let row = |[x, y, z]: &[i32; 3]| {
+        let sum = i64::from(*x) * a + i64::from(*y) * b + i64::from(*z) * c;
         ((sum + (1 << (Q - 1))) >> Q).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
-    })
+    };
+    [row(x), row(y), row(z)]
+}
+
+/// Returns whether a matrix changes no bit.
+fn is_identity(rows: &[[i32; 3]; 3]) -> bool {
+    // Not `==`, which on a microcontroller compares byte by byte.
+    rows.as_flattened().iter().zip(Rotation::IDENTITY.0.as_flattened()).all(|(a, b)| a == b)
 }
 
 /// Maps the gyro's three rates, in the vehicle's axes, to the true ones: it corrects gain and mounting of one unit.
@@ -186,6 +197,10 @@ impl GyroMap {
         let map = Self(elements.map(|row| row.map(|element| libm::roundf(element * ONE) as i32)));
         let finite = elements.as_flattened().iter().all(|element| element.is_finite());
         (finite && map.is_plausible()).then_some(map)
+    }
+
+    pub(crate) fn is_identity(&self) -> bool {
+        is_identity(&self.0)
     }
 
     /// Returns the matrix, row by row.

@@ -25,7 +25,7 @@ mod set;
 #[doc(hidden)]
 pub use set::{LAYOUTS, Layout, Message, Motion, SetEncoder};
 
-use crate::units::{AngularRate, CentiCelsius, SpecificForce};
+use crate::units::{AngularRate, CentiCelsius, SpecificForce, divided};
 use embedded_can::StandardId;
 
 /// Identifier of the message that carries yaw rate and lateral acceleration (TX1).
@@ -36,7 +36,9 @@ pub static CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_SAE_J1850);
 /// Code of zero rate and of zero acceleration.
 const ZERO: i32 = 0x8000;
 /// LSB of the yaw rate, 0.005 deg/s, in units of 1e-9 deg/s x 2^-20.
-const YAW_RATE_LSB: i64 = 5_000_000 << 20;
+const YAW_RATE_LSB: i64 = (YAW_RATE_ODD as i64) << YAW_RATE_SHIFT;
+const YAW_RATE_ODD: u32 = 5_000_000 >> 6;
+const YAW_RATE_SHIFT: u32 = 20 + 6;
 /// One rate code in units of 1e-9 deg/s x 2^-20 (180e9 / pi / 2^27).
 const NANO_DEG_PER_CODE_Q20: i64 = 447_623_277;
 /// Signal codes per acceleration code of 2^-20 m/s^2 (1 / (0.000127465 * 9.80665 * 2^20)), times 2^32.
@@ -95,7 +97,10 @@ impl YawRateSignal {
     /// [`OutOfRange`]; the residual is then dropped, since the frame is marked bad.
     pub fn encode(&mut self, rate: AngularRate) -> Result<u16, OutOfRange> {
         let wanted = i64::from(rate.0) * NANO_DEG_PER_CODE_Q20 + self.residual;
-        let code = (wanted + YAW_RATE_LSB / 2).div_euclid(YAW_RATE_LSB);
+        // From the smallest code on: of 2^61 at most, 35 bits are left to be divided.
+        let above = wanted + YAW_RATE_LSB / 2 + i64::from(ZERO) * YAW_RATE_LSB;
+        let raw = u64::try_from(above >> YAW_RATE_SHIFT).map(divided::<YAW_RATE_ODD>);
+        let code = raw.map_or(-1, |raw| raw as i64) - i64::from(ZERO);
         match u16::try_from(code + i64::from(ZERO)) {
             Ok(raw) => {
                 self.residual = wanted - code * YAW_RATE_LSB;

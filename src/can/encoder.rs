@@ -60,7 +60,7 @@ impl CanEncoder {
         // The accelerometer is in the same sensor as the gyro.
         let unusable = sample.live.quality == Quality::Unusable;
         let force_status = if unusable { SignalStatus::FAILURE } else { SignalStatus::OK };
-        let settings = *self.config.settings();
+        let settings = self.config.settings();
         if let Some(BoschSettings { tx1_only }) = settings.bosch {
             let messages = self.bosch.encode(&motion(sample, status, force_status));
             let sent = if tx1_only { 1 } else { LAYOUTS.len() };
@@ -70,8 +70,8 @@ impl CanEncoder {
                 message.frame(layout).into_iter().for_each(&mut send);
             }
         }
-        if let (Some(feed), Some(yaw)) = (self.yaw.as_mut(), settings.yaw) {
-            feed.frames(&sample.delayed, yaw.ids).for_each(send);
+        if let (Some(feed), Some(yaw)) = (self.yaw.as_mut(), settings.yaw.as_ref()) {
+            feed.send(&sample.delayed, yaw.ids, send);
         }
     }
 }

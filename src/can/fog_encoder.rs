@@ -42,6 +42,6 @@ impl FogEncoder {
     /// Encodes the frames of one step and passes each to `send`.
     #[inline(never)]
     pub fn send(&mut self, sample: &YawEstimate, send: impl FnMut(DataFrame)) {
-        self.encoder.frames(sample, self.ids).for_each(send);
+        self.encoder.send(sample, self.ids, send);
     }
 }

@@ -100,10 +100,14 @@ impl BitField {
         if data.len() < usize::from(self.bytes) {
             return None;
         }
-        let mut bytes = [0; 8];
-        for (byte, value) in bytes.iter_mut().zip(data) {
-            *byte = *value;
-        }
+        let bytes = match data.first_chunk() {
+            Some(bytes) => *bytes,
+            None => {
+                let mut bytes = [0; 8];
+                bytes.iter_mut().zip(data).for_each(|(byte, value)| *byte = *value);
+                bytes
+            }
+        };
         let word = match self.order {
             ByteOrder::Intel => u64::from_le_bytes(bytes),
             ByteOrder::Motorola => u64::from_be_bytes(bytes),
@@ -113,9 +117,14 @@ impl BitField {
 
     /// Returns the value, sign-extended if the field is signed; `None` if the frame is too short.
     pub fn value(&self, data: &[u8]) -> Option<i64> {
-        let raw = i64::from(self.raw(data)?);
+        self.raw(data).map(|raw| self.extended(raw))
+    }
+
+    /// Returns the value of raw bits, sign-extended if the field is signed.
+    pub(super) fn extended(&self, raw: u32) -> i64 {
+        let raw = i64::from(raw);
         let negative = self.signed && raw >> (self.len - 1) & 1 == 1;
-        Some(if negative { raw - (1 << self.len) } else { raw })
+        if negative { raw - (1 << self.len) } else { raw }
     }
 }
 

@@ -57,11 +57,10 @@ impl WheelReceiver {
     /// except those whose speed is not valid.
     pub fn decode(&mut self, frame: &impl Frame, now: Micros) -> Option<Result<WheelSample, WheelError>> {
         let id = frame.id();
-        let is_meant = |candidate: &Option<WheelFrame>| candidate.is_some_and(|candidate| candidate.id == id);
+        let is_meant = |place: &Option<WheelFrame>| place.as_ref().is_some_and(|layout| layout.id == id);
         let index = self.settings.frames.iter().position(is_meant)?;
-        let layout = self.settings.frames.get(index).copied().flatten()?;
         self.wheels.expire(now);
-        let result = self.take(index, &layout, frame.data(), now);
+        let result = self.take(index, frame.data(), now);
         self.wheels.judge(now);
         self.has_received |= matches!(result, Ok(()) | Err(WheelError::Invalid { .. }));
         Some(result.map(|()| self.wheels.sample(now)))
@@ -84,33 +83,28 @@ impl WheelReceiver {
         self.lost
     }
 
-    fn take(
-        &mut self,
-        index: usize,
-        layout: &WheelFrame,
-        data: &[u8],
-        now: Micros,
-    ) -> Result<(), WheelError> {
+    fn take(&mut self, index: usize, data: &[u8], now: Micros) -> Result<(), WheelError> {
+        let Self { settings, sequences, wheels, pulses, invalid, lost, .. } = self;
+        let Some(Some(layout)) = settings.frames.get(index) else { return Ok(()) };
         if let Some(counter) = layout.check(data)?
-            && let Some(sequence) = self.sequences.get_mut(index)
+            && let Some(sequence) = sequences.get_mut(index)
         {
             match sequence.check(counter) {
                 Verdict::Repeated => return Err(WheelError::Repeated),
-                Verdict::Lost(count) => self.lost = self.lost.saturating_add(count.into()),
+                Verdict::Lost(count) => *lost = lost.saturating_add(count.into()),
                 Verdict::First | Verdict::Ok | Verdict::WrongSequence { .. } => {}
             }
         }
         let mut result = Ok(());
-        for (wheel, signal) in self.settings.signals.iter().enumerate() {
-            let Some(signal) = signal.filter(|signal| usize::from(signal.frame) == index) else { continue };
-            let (Some(pulses), Some(invalid)) = (self.pulses.get_mut(wheel), self.invalid.get_mut(wheel))
-            else {
+        let signals = settings.signals.iter().zip(pulses).zip(invalid).enumerate();
+        for (wheel, ((signal, pulses), invalid)) in signals {
+            let Some(signal) = signal.as_ref().filter(|signal| usize::from(signal.frame) == index) else {
                 continue;
             };
             let speed = signal.speed(wheel, data, now, pulses);
             *invalid = speed.is_err();
             if speed != Ok(None) {
-                self.wheels.set(wheel, speed.ok().flatten(), now);
+                wheels.set(wheel, speed.ok().flatten(), now);
             }
             result = result.and(speed.map(drop));
         }

@@ -43,10 +43,13 @@ impl YawEncoder {
         }
     }
 
-    /// Adds a sample, and returns the frames when they are due; `ids` (11 bits) are of rate, angle and detail.
-    pub fn frames(&mut self, sample: &YawEstimate, ids: [u16; 3]) -> impl Iterator<Item = DataFrame> {
-        let messages = self.encode(sample).into_iter().flatten();
-        messages.zip(ids).filter_map(|(message, id)| DataFrame::new(StandardId::new(id)?, &message))
+    /// Adds a sample, and passes the frames to `send` when they are due; `ids` (11 bits) are of rate, angle and detail.
+    pub fn send(&mut self, sample: &YawEstimate, ids: [u16; 3], mut send: impl FnMut(DataFrame)) {
+        let Some(messages) = self.encode(sample) else { return };
+        for (message, id) in messages.iter().zip(ids) {
+            let frame = StandardId::new(id).and_then(|id| DataFrame::new(id, message));
+            frame.into_iter().for_each(&mut send);
+        }
     }
 
     /// Adds a sample, and returns the messages of rate, angle and detail when they are due.
@@ -54,13 +57,17 @@ impl YawEncoder {
     pub fn encode(&mut self, sample: &YawEstimate) -> Option<[[u8; 8]; 3]> {
         self.rate.sum += i64::from(sample.rate.0);
         self.correction.sum += i64::from(sample.correction.0);
+        let joined;
         let sample = match &self.together {
-            Some(earlier) => sample.with_earlier(earlier),
-            None => *sample,
+            Some(earlier) => {
+                joined = sample.with_earlier(earlier);
+                &joined
+            }
+            None => sample,
         };
         self.samples += 1;
         if self.samples < self.every {
-            self.together = Some(sample);
+            self.together = Some(*sample);
             return None;
         }
         (self.samples, self.together) = (0, None);
@@ -125,7 +132,9 @@ impl Mean {
     }
 
     fn take(&mut self, samples: u8) -> i32 {
-        let mean = self.sum.checked_div_euclid(samples.into()).unwrap_or(0);
+        // Of one sample it is the sample. The processor divides 32 bits alone in hardware.
+        let mean =
+            if samples == 1 { self.sum } else { self.sum.checked_div_euclid(samples.into()).unwrap_or(0) };
         self.sum -= mean * i64::from(samples);
         // The mean of i32 values fits an i32.
         self.residual.encode(AngularRate(mean as i32))

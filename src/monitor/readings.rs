@@ -50,10 +50,10 @@ impl Repeats {
         let ([fx, fy, fz], [wx, wy, wz]) = (sample.specific_force, sample.angular_rate);
         let axes = [fx.0, fy.0, fz.0, wx.0, wy.0, wz.0];
         let last = self.last.replace(axes);
-        let pairs = last.unwrap_or(axes).into_iter().zip(axes);
-        let counts = self.equal.iter_mut().zip(&mut self.repeats).zip(&mut self.stuck);
-        for ((before, now), ((equal, repeats), stuck)) in pairs.zip(counts) {
-            let repeated = last.is_some() && before == now;
+        let Self { equal, repeats, stuck, .. } = self;
+        for axis in 0..AXES {
+            let (equal, repeats, stuck) = (&mut equal[axis], &mut repeats[axis], &mut stuck[axis]);
+            let repeated = last.is_some_and(|last| last[axis] == axes[axis]);
             *equal = if repeated { equal.saturating_add(1) } else { 0 };
             *repeats -= *repeats >> AVERAGE;
             *repeats += if repeated { ALWAYS >> AVERAGE } else { 0 };

@@ -23,9 +23,14 @@ impl Pipeline {
         (self.state.tick, self.state.silent) = (frame.tick, 0);
         let faults = self.faults(wheels, board);
         let accepted = self.state.windows.is_accepted();
-        let early = rates.early_sigma;
+        let is_early = rates.early_sigma.is_some();
+        let bias = self.bias_sigma(rates.early_sigma, board.shift);
         // No window corrects it.
-        let mut live = self.estimate(frame, rates.live, early, board, (false, accepted));
+        let mut live = self.estimate(frame, rates.live.as_ref(), is_early, board, (false, accepted));
+        if has_sigma(live.status) {
+            let origin = origin(live.status, rates.live.as_ref(), false);
+            live.sigma = Some(self.state.uncertainty.sigma(origin, bias));
+        }
         let is_calibrated = self.is_calibrated();
         self.state.uncertainty.calibrated(is_calibrated);
         if let Some((_, sigma)) = self.gain_by_course() {
@@ -35,7 +40,7 @@ impl Pipeline {
         self.state.uncertainty.tilt(variance, is_levelled);
         let covered = accepted || rates.delayed.as_ref().is_some_and(|rate| rate.covered);
         let has_model = self.config.compensate.model;
-        let mut delayed = self.estimate(frame, rates.delayed, early, board, (has_model, covered));
+        let mut delayed = self.estimate(frame, rates.delayed.as_ref(), is_early, board, (has_model, covered));
         for estimate in [&mut live, &mut delayed] {
             estimate.faults = estimate.faults.with(faults);
             if estimate.quality == Quality::Good && (self.state.moved || !self.is_bias_confirmed()) {
@@ -47,10 +52,10 @@ impl Pipeline {
         self.state.live_yaw.add(&mut live, live_turn);
         let missed = self.state.delayed_yaw.add(&mut delayed, delayed_turn);
         self.state.uncertainty.miss(missed);
-        if delayed.sigma.is_some() {
-            let turning = self.turning(frame, rates, delayed.status, board.shift);
+        if has_sigma(delayed.status) {
+            let turning = self.turning(frame, rates, delayed.status, bias);
             self.state.uncertainty.add(&turning);
-            delayed.sigma = Some(self.state.uncertainty.sigma(turning.origin, turning.bias));
+            delayed.sigma = Some(self.state.uncertainty.sigma(turning.origin, bias));
         }
         let raw = frame.sample.angular_rate;
         let known = self.state.initialised.as_ref();
@@ -127,8 +132,8 @@ impl Pipeline {
     }
 
     /// Returns what a delayed rate contributes to the expected error; before there is one, the reading itself.
-    fn turning(&self, frame: &Frame, rates: &Rates, status: Status, shift: f32) -> Turning {
-        let (rate, bias) = (rates.delayed.as_ref(), self.bias_sigma(rates.early_sigma, shift));
+    fn turning(&self, frame: &Frame, rates: &Rates, status: Status, bias: f32) -> Turning {
+        let rate = rates.delayed.as_ref();
         let origin = origin(status, rate, self.config.compensate.model);
         let Some(Compensated { rate, roll_and_pitch: [roll, pitch], estimate, withheld, .. }) = rate else {
             let (rates, none) = (frame.sample.angular_rate, AngularRate::ZERO);
@@ -141,14 +146,14 @@ impl Pipeline {
         }
     }
 
-    /// Builds the estimate of one rate, without its yaw and with the fault of its own sample alone. Until a rate exists
-    /// the estimate carries the gyro's own reading, with the sigma of the bias curve where there is one. `has_model` is true
-    /// for a rate that windows correct, and `is_ready` once they do.
+    /// Builds the estimate of one rate, without its yaw and its sigma, and with the fault of its own sample alone. Until a
+    /// rate exists the estimate carries the gyro's own reading, which is degraded where a bias is known early. `has_model` is
+    /// true for a rate that windows correct, and `is_ready` once they do.
     fn estimate(
         &self,
         frame: &Frame,
-        rate: Option<Compensated>,
-        early_sigma: Option<f32>,
+        rate: Option<&Compensated>,
+        is_early: bool,
         board: &BoardState,
         (has_model, is_ready): (bool, bool),
     ) -> YawEstimate {
@@ -156,7 +161,7 @@ impl Pipeline {
         let status = match validity {
             Validity::Stuck => Status::Stuck,
             Validity::Saturated | Validity::Recovering | Validity::Implausible => Status::Clipped,
-            Validity::Good if rate.is_none() && early_sigma.is_none() => Status::Init,
+            Validity::Good if rate.is_none() && !is_early => Status::Init,
             Validity::Good if rate.is_some() && is_ready => Status::Ready,
             Validity::Good => Status::Degraded,
         };
@@ -166,15 +171,12 @@ impl Pipeline {
             if self.is_bias_coarse() && quality == Quality::Good { Quality::Degraded } else { quality };
         let [.., raw] = frame.sample.angular_rate;
         let tick = rate.map_or(frame.tick, |rate| rate.tick);
-        let bias = self.bias_sigma(early_sigma, board.shift);
-        let has_sigma = matches!(status, Status::Ready | Status::Degraded);
         YawEstimate {
             tick,
             rate: rate.map_or(raw, |rate| rate.rate),
             correction: rate.map_or(AngularRate::ZERO, |rate| rate.correction),
             yaw: Yaw(0),
-            sigma: has_sigma
-                .then(|| self.state.uncertainty.sigma(origin(status, rate.as_ref(), has_model), bias)),
+            sigma: None,
             status,
             source,
             quality: board.faults.cap_quality(quality),
@@ -183,6 +185,11 @@ impl Pipeline {
             latency_us: Some(frame.tick.wrapping_sub(tick).saturating_mul(PERIOD_US as u32)),
         }
     }
+}
+
+/// Returns whether a rate has an expected error.
+fn has_sigma(status: Status) -> bool {
+    matches!(status, Status::Ready | Status::Degraded)
 }
 
 /// Returns how a usable rate was found; without the model's corrections it is the gyro's.

@@ -4,7 +4,6 @@ use super::Pipeline;
 use super::level::Level;
 use crate::bias::ZeroRate;
 use crate::health::slow::{Evidence, Knowledge, SlowStatus, Verdict};
-use crate::mounting::GyroMap;
 use crate::sample::Standstill;
 use crate::standstill::StandstillSource;
 
@@ -48,7 +47,7 @@ impl Pipeline {
 
     /// True if this unit's gain and misalignment are calibrated.
     pub(super) fn is_calibrated(&self) -> bool {
-        self.config.gyro_map != GyroMap::IDENTITY
+        !self.config.gyro_map.is_identity()
     }
 
     /// The expected error of the angle turned in the last minute, 0.01 deg, rounded up.

@@ -11,7 +11,7 @@ use crate::sqrt::sqrt;
 use crate::units::{AngularRate, SpecificForce};
 
 /// Weights of a batch's samples in the mean that begins with it; in the one that ends with it they fall. Then their sum.
-const RISING: [i64; 10] = [1, 9, 24, 44, 68, 94, 118, 138, 153, 161];
+const RISING: [i32; 10] = [1, 9, 24, 44, 68, 94, 118, 138, 153, 161];
 const WEIGHT: f32 = 1_620.0;
 /// Means in a window: 2 s.
 pub(super) const WINDOW: usize = 20;
@@ -70,10 +70,11 @@ impl Inertial {
         let weights = [weight((RISING.len() - 1).saturating_sub(self.count)), weight(self.count)];
         self.count += 1;
         let codes = [sample.angular_rate.map(|rate| rate.0), sample.specific_force.map(|force| force.0)];
-        for (sums, weight) in self.sums.iter_mut().zip(weights) {
-            for (sum, code) in sums.as_flattened_mut().iter_mut().zip(codes.as_flattened()) {
-                *sum += weight * i64::from(*code);
-            }
+        let ([falling, rising], [current, next]) = (weights.map(i64::from), &mut self.sums);
+        let sums = current.as_flattened_mut().iter_mut().zip(next.as_flattened_mut());
+        for ((current, next), code) in sums.zip(codes.as_flattened()) {
+            *current += falling * i64::from(*code);
+            *next += rising * i64::from(*code);
         }
         if self.count < RISING.len() {
             return None;

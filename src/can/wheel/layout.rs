@@ -81,7 +81,7 @@ impl WheelSignal {
             speed
         } else {
             // The product is at most 2^32 x 2^31.
-            let value = self.field.value(data).ok_or(short)?;
+            let value = self.field.extended(raw);
             ((value * i64::from(self.factor_q16)) >> 16) + i64::from(self.offset.0)
         };
         let code = if says(self.reverse_when)? == Some(true) { -code } else { code };

@@ -97,12 +97,14 @@ impl MtData2 {
 }
 
 fn word(packet: &[u8]) -> Option<u32> {
-    packet.try_into().ok().map(u32::from_be_bytes)
+    let &[a, b, c, d] = packet else { return None };
+    Some(u32::from_be_bytes([a, b, c, d]))
 }
 
 /// Decodes numbers of f32, the MTi's default precision; `None` for another one, or another length.
 fn numbers<const N: usize>(id: u16, packet: &[u8]) -> Option<[f32; N]> {
     let (words, rest) = packet.as_chunks::<4>();
-    let words: [[u8; 4]; N] = words.try_into().ok()?;
-    (id & id::PRECISION == 0 && rest.is_empty()).then(|| words.map(f32::from_be_bytes))
+    let words: &[[u8; 4]; N] = words.try_into().ok()?;
+    let number = |word: &[u8; 4]| f32::from_be_bytes(*word);
+    (id & id::PRECISION == 0 && rest.is_empty()).then(|| words.each_ref().map(number))
 }
