@@ -3,6 +3,7 @@
 //!
 //! | command | what |
 //! |---|---|
+//! | `cargo test -p gyronet-host-tests --test board moving_vehicle -- --nocapture` | the whole image's cycles a sample |
 //! | `cargo test -p gyronet-host-tests --test board longest_paths -- --nocapture` | the table of paths |
 //! | `GYRONET_SETTINGS=50,10,20,60 cargo test -p gyronet-host-tests --test board accepted -- --nocapture` | so many accepted configurations (and of them the costliest), refused ones, and seconds for each |
 
@@ -17,11 +18,13 @@ use gyronet::store::{Configuration, Record, Slot, StoreError};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::stored::{Stored, other_weights};
-use gyronet_host_tests::{inputs, settings};
+use gyronet_host_tests::{inputs, replay, settings};
+use gyronet_tools::bundled;
 use gyronet_tools::client::bus::SlcanBus;
 use gyronet_tools::client::device::error::DeviceError;
 use gyronet_tools::client::device::upload::upload;
 use gyronet_tools::client::device::{Authority, Device};
+use gyronet_tools::drive::wheel_frames::WheelFrames;
 use gyronet_tools::signing::PrivateKey;
 use std::time::Duration;
 
@@ -51,6 +54,37 @@ fn drive(board: &mut Board, seconds: usize) {
         board.run(SECOND);
         board.can_frames();
     }
+}
+
+/// The whole image while the vehicle drives, with the default model: interrupts, pipeline, network, both lines and idle.
+#[test]
+fn a_moving_vehicle_costs_what_the_page_says() {
+    const TEST: &str = "a_moving_vehicle_costs_what_the_page_says";
+    const CYCLES: u64 = 43_500;
+    /// Samples before the count and in it: the simulated car drives off after six seconds.
+    const SAMPLES: [usize; 2] = [1_200, 300];
+    let Some(mut board) = common::boot(TEST) else { return };
+    board.run(START);
+    let drive = bundled::simulated_drive().expect("it comes with the tools");
+    let mut wheels = WheelFrames::new(&drive).expect("it has wheels");
+    let mut before = board.counts();
+    for (k, row) in drive.rows.iter().take(SAMPLES.iter().sum()).enumerate() {
+        if k == SAMPLES[0] {
+            before = board.counts();
+        }
+        board.send(IMU, &replay::message(k, &row.sample));
+        wheels.next(row).iter().for_each(|frame| board.can_send(frame));
+        board.run(SAMPLE);
+    }
+    let after = board.counts();
+    let awake = (after.time - before.time) - (after.asleep - before.asleep);
+    let [cycles, instructions] =
+        [awake.as_secs_f64() * 168e6, (after.instructions - before.instructions) as f64]
+            .map(|of_all| (of_all / SAMPLES[1] as f64) as u64);
+    println!("{TEST}: {instructions} instructions a sample, {cycles} cycles awake");
+    assert!(cycles <= CYCLES, "{cycles}");
+    let page = include_str!("../../../tools/MEASUREMENTS.md");
+    assert!(page.contains("takes 43,500 cycles a sample"), "the page says another number");
 }
 
 /// With and without the crystal, signed writes, an upload and windows run, and the watchdog resets nothing.
