@@ -39,6 +39,8 @@ mod board;
 #[path = "../boards/mod.rs"]
 mod boards;
 #[cfg(target_os = "none")]
+mod copy;
+#[cfg(target_os = "none")]
 mod crash;
 #[cfg(target_os = "none")]
 mod diagnosis;
