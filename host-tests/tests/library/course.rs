@@ -17,14 +17,17 @@ const NOISE: f64 = 0.01;
 const ACROSS: f64 = 0.02;
 const SECOND: usize = RATE_HZ as usize;
 
-/// A drive: how long it stands first, s, its yaw rate, and the course that arrives at a second, from the headings so far.
+/// The course that arrives at a second, from the headings so far.
+type Course<'a> = dyn Fn(usize, &[f64]) -> Option<f64> + 'a;
+
+/// A drive: how long it stands first, s, its yaw rate, and its courses.
 #[derive(Clone, Copy)]
 struct Drive<'a> {
     stands: usize,
     /// Yaw rate while the wheels stand, rad/s.
     creeps: f64,
     turn: &'a dyn Fn(f64) -> f64,
-    course: &'a dyn Fn(usize, &[f64]) -> Option<f64>,
+    course: &'a Course<'a>,
 }
 
 struct Part {
@@ -168,8 +171,7 @@ fn the_gain_is_learnt_where_the_vehicle_turns_both_ways() {
 
 #[test]
 fn false_courses_teach_nothing_and_are_counted() {
-    type Course = dyn Fn(usize, &[f64]) -> Option<f64>;
-    let bad: [(&str, &Course); 5] = [
+    let bad: [(&str, &Course<'_>); 5] = [
         ("stands", &|_, _| Some(1.0)),
         ("is 18 s old", &|_, headings| ago(headings, 18.0)),
         ("jumps by pi", &|second, headings| Some(headings.last()? + if second % 40 < 20 { PI } else { 0.0 })),
@@ -190,7 +192,7 @@ fn false_courses_teach_nothing_and_are_counted() {
 /// The median and the 90 % of the errors of a minute without courses after three with them, over 20 parts, deg.
 fn after_courses(
     turn: &dyn Fn(f64) -> f64,
-    course: &dyn Fn(usize, &[f64]) -> Option<f64>,
+    course: &Course<'_>,
     speed: fn(f64) -> f64,
     check: impl Fn(&Pipeline),
 ) -> [f64; 2] {
@@ -211,10 +213,18 @@ fn after_courses(
 fn a_slow_vehicle_that_reverses_learns_where_the_accuracy_is_stated() {
     let course = |second, headings: &[f64]| ago(headings, 0.0).filter(|_| second < 180);
     let due = after_courses(&road, &|_, _| None, fast, |_| {});
-    let speeds: [(&str, fn(f64) -> f64); 2] =
-        [("forwards", |_| 0.85), ("to and fro", |second| if second % 40.0 < 20.0 { 0.7 } else { -0.7 })];
-    for (name, speed) in speeds {
-        let own = after_courses(&road, &course, speed, |pipeline| {
+    let to_and_fro = |second: f64| if second % 40.0 < 20.0 { 0.7 } else { -0.7 };
+    // The heading of two antennas stays as it is while the vehicle goes backwards.
+    let antennas = |second: usize, headings: &[f64]| {
+        course(second, headings).map(|course| course + if second % 40 < 20 { 0.0 } else { PI })
+    };
+    let cases: [(&str, fn(f64) -> f64, &Course<'_>); 3] = [
+        ("forwards", |_| 0.85, &course),
+        ("to and fro", to_and_fro, &course),
+        ("to and fro, two antennas", to_and_fro, &antennas),
+    ];
+    for (name, speed, course) in cases {
+        let own = after_courses(&road, course, speed, |pipeline| {
             let counters = pipeline.course_counters();
             assert!(counters.refused == 0 && counters.restarts == 0, "{name}: {counters:?}");
         });
@@ -231,13 +241,12 @@ fn a_slow_vehicle_that_reverses_learns_where_the_accuracy_is_stated() {
 /// Courses against zero-rate updates alone.
 #[test]
 fn courses_never_make_the_heading_worse_than_zero_rate_updates() {
-    type Course<'a> = &'a dyn Fn(usize, &[f64]) -> Option<f64>;
-    type Road<'a> = (&'a str, &'a dyn Fn(f64) -> f64, &'a [(&'a str, Course<'a>)]);
+    type Road<'a> = (&'a str, &'a dyn Fn(f64) -> f64, &'a [(&'a str, &'a Course<'a>)]);
     fn straight(second: f64) -> f64 {
         0.01 * (second / 40.0).sin()
     }
     let after = |second: usize, off: f64| if second > 100 { off } else { 0.0 };
-    let winding: [(&str, Course<'_>); 8] = [
+    let winding: [(&str, &Course<'_>); 8] = [
         ("latency 0 s", &|_, headings| ago(headings, 0.0)),
         ("latency 1 s", &|_, headings| ago(headings, 1.0)),
         ("latency 2 s", &|_, headings| ago(headings, 2.0)),
@@ -249,7 +258,7 @@ fn courses_never_make_the_heading_worse_than_zero_rate_updates() {
         }),
         ("outages", &|second, headings| ago(headings, 0.5).filter(|_| second % 60 < 30)),
     ];
-    let steady: [(&str, Course<'_>); 2] = [
+    let steady: [(&str, &Course<'_>); 2] = [
         ("true", &|_, headings| ago(headings, 0.5)),
         ("slip grows", &|second, headings| Some(headings.last()? + 2e-4 * second as f64)),
     ];
@@ -257,7 +266,7 @@ fn courses_never_make_the_heading_worse_than_zero_rate_updates() {
         [("winding", &road, &winding), ("circle", &|_| 0.3, &steady), ("straight", &straight, &steady[..1])];
     for (name, turn, courses) in roads {
         // A slip that grows as the driver goes faster looks like a gain.
-        let errors = |course: Course<'_>| {
+        let errors = |course: &Course<'_>| {
             after_courses(turn, course, fast, |pipeline| {
                 assert!(name == "winding" || pipeline.gain().0 == 0.0)
             })

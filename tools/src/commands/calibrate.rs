@@ -55,6 +55,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     for Share { name, value, sigma, limit, refused } in &unit.shares {
         match refused {
             None => writeln!(out, "{name:<6} {value:+.5}, sigma {sigma:.5}")?,
+            Some(reason) if sigma.is_infinite() => writeln!(out, "{name:<6} refused: {reason}")?,
             Some(reason) => writeln!(out, "{name:<6} refused, sigma {sigma:.5} (at most {limit}): {reason}")?,
         }
     }
