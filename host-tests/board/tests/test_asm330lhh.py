@@ -170,7 +170,3 @@ class Sensor(unittest.TestCase):
                 self.read(0x0F)
             self.setUp()
             self.stream()
-
-
-if __name__ == "__main__":
-    unittest.main()

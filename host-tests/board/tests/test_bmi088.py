@@ -216,7 +216,3 @@ class Sensor(unittest.TestCase):
         self.assertEqual(self.exchange(self.gyro, 0x80, 0, mode=MODE_0)[1], 0x0F)
         self.assertEqual(self.exchange(self.gyro, 0x80, 0, mode=(False, True))[1], 0xFF)
         self.assertEqual(self.exchange(self.gyro, 0x80, 0, hz=10_500_000)[1], 0xFF)
-
-
-if __name__ == "__main__":
-    unittest.main()

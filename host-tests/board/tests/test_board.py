@@ -100,7 +100,3 @@ class Images(unittest.TestCase):
     def test_what_is_no_elf_file_is_refused(self):
         with self.assertRaises(ValueError):
             Elf(b"\x7fELF\x02\x01" + bytes(60))
-
-
-if __name__ == "__main__":
-    unittest.main()

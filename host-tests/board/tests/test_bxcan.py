@@ -354,7 +354,3 @@ class BxCan(unittest.TestCase):
         self.assertEqual(self.bus.take_log()[0].error, "reset")
         self.board.advance(1 * MS)
         self.assertEqual(self.bus.take_log(), [])
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -106,7 +106,3 @@ class Gates(unittest.TestCase):
         board = chip("00bf00bf00bf1a68fee7", r3=0x4000_4400)
         with self.assertRaisesRegex(Violation, "USART2"):
             board.run(10 * US)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -79,7 +79,3 @@ class Dma(unittest.TestCase):
         base = self.stream(5, 4 << 25 | 1 << 10 | 1 << 8, 8)
         self.board.write("DMA1", base + 8, 0)
         self.assertEqual(self.board.read("DMA1", base + 8), DR)
-
-
-if __name__ == "__main__":
-    unittest.main()

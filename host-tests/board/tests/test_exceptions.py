@@ -209,7 +209,3 @@ class Priorities(unittest.TestCase):
         self.assertEqual(bus.read(0xE000_E424, 4), 0x00F0_0000)
         bus.write(0xE000_ED23, 0xC7, 1)  # the priority of SysTick
         self.assertEqual(bus.read(0xE000_ED20, 4), 0xC000_0000)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -177,7 +177,3 @@ class Refusals(unittest.TestCase):
         program = Program("01600924fee7", r0=0x4000_0400, r4=0)  # str r1, [r0]; movs r4, #9; b .
         self.refused(program)
         self.assertEqual(program.get("r4"), 0)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -162,7 +162,3 @@ class Flash(unittest.TestCase):
         self.board.reset("software")
         self.assertEqual(self.flash.bor_level, 0)
         self.assertEqual(self.read(OPTCR), 0x0FFF_AAE1)
-
-
-if __name__ == "__main__":
-    unittest.main()

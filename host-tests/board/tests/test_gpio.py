@@ -39,7 +39,3 @@ class Gpio(unittest.TestCase):
     def test_identity(self):
         self.assertEqual(self.board.read("DBGMCU", 0) & 0xFFF, 0x413)
         self.assertEqual(Memory(0).read(STM32F405.flash_kib, 2), (1024).to_bytes(2, "little"))
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -305,4 +305,3 @@ class H5(unittest.TestCase):
         self.request(0, 0x100)
         self.board.advance(200 * US)
         self.assertEqual([self.board.read("FDCAN1", 0x44) & 7 for _ in range(2)], [3, 7])
-

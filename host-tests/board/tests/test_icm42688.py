@@ -189,7 +189,3 @@ class Sensor(unittest.TestCase):
         self.sensor.select()
         self.sensor.transfer(0xF5, (False, True), 1_000_000)
         self.assertEqual(self.sensor.transfer(0, (False, True), 1_000_000), 0xFF)
-
-
-if __name__ == "__main__":
-    unittest.main()

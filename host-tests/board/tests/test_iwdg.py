@@ -74,7 +74,3 @@ class Iwdg(unittest.TestCase):
         self.write(KR, 0xCCCC)
         self.board.advance(1 * MS)
         self.assertEqual(self.read(SR), 0)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -84,7 +84,3 @@ class Pwr(unittest.TestCase):
         self.supply(3300)
         self.board.advance(MS)
         self.assertEqual(self.board.read("RCC", 0x74) & 0xFE00_0000, 0x0600_0000)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -143,7 +143,3 @@ class Rcc(unittest.TestCase):
                 self.write(offset, value)
         with self.assertRaises(Violation):
             self.read(0x28)
-
-
-if __name__ == "__main__":
-    unittest.main()

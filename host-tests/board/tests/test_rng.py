@@ -53,7 +53,3 @@ class RngTest(unittest.TestCase):
         self.board.write("RNG", CR, 4)
         self.board.advance(10 * US)
         self.assertEqual(self.board.read("RNG", SR), 1 << 5 | 1 << 1)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -106,7 +106,3 @@ class Spi(unittest.TestCase):
         for offset, value in ((CR1, MASTER | 1 << 15), (CR1, MASTER | 1 << 11), (CR1, MASTER & ~(1 << 8)), (CR1, 1 << 6), (CR2, 1 << 6)):
             with self.assertRaises(Violation):
                 self.write(offset, value)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -123,7 +123,3 @@ class Sleep(unittest.TestCase):
         self.assertEqual(program.board.instructions, 0)
         program.board.run(1_001 * US)
         self.assertGreater(program.board.instructions, 0)
-
-
-if __name__ == "__main__":
-    unittest.main()

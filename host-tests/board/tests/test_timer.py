@@ -119,7 +119,3 @@ class Timers(unittest.TestCase):
         self.board.advance(2 * MS)
         with self.assertRaisesRegex(Violation, "an overflow loads"):
             self.board.read("TIM5", SR)
-
-
-if __name__ == "__main__":
-    unittest.main()

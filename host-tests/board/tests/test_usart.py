@@ -122,7 +122,3 @@ class Usart(unittest.TestCase):
         self.board.advance(1 * MS)
         self.assertFalse(self.read(SR) & RXNE)
         self.assertEqual(self.usart.lost, 1)
-
-
-if __name__ == "__main__":
-    unittest.main()

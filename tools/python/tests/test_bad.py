@@ -144,7 +144,3 @@ class Bad(unittest.TestCase):
                                   env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
             peak.append(int(done.stdout.split("VmHWM ")[1]) // 1024)
         self.assertLess(peak[1] - peak[0], 100, peak)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -85,7 +85,3 @@ class Board(unittest.TestCase):
         self.assertIsNotNone(yaw, done.stdout + done.stderr)
         board, gyro, truth = map(float, yaw.groups())
         self.assertLess(abs(board - truth), abs(gyro - truth))
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -391,7 +391,3 @@ class InTables(Case):
         self.assertLess(np.abs(drive["gyr_z"] - made.turn(drive["t_s"])).max(), 0.03)
         self.path("v.toml").write_text("[columns]\nt_s = { name = 'PacketCounter', unit = 'ms' }\n")
         self.refuses("MT.txt", "--vehicle", "v.toml", says=["counts samples and is no time"])
-
-
-if __name__ == "__main__":
-    unittest.main()

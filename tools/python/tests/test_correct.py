@@ -151,7 +151,3 @@ class Correct(unittest.TestCase):
             self.assertEqual((status, text.count("\n"), text[:7]), (1, 1, "error: "), (arguments, text))
             self.assertIn(words, text)
             self.assertEqual(sorted(self.folder.rglob("*")), before, arguments)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -92,7 +92,3 @@ class Again(Folder):
         for vehicle in ("again.toml", "old.toml"):
             self.assertEqual(made.run(self.folder, "import", "d.mcap", "--vehicle", vehicle, "--imu", "/imu", "--out", "both.csv")[0], 0)
             np.testing.assert_allclose(made.drive(self.folder, "both.csv")["acc_x"], again["acc_x"], atol=3e-7)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -137,7 +137,3 @@ class Equal(unittest.TestCase):
         status, text = made.run(self.folder, "import", "d.mf4", "--out", "out.csv")
         self.assertEqual((status, text.count("\n")), (1, 1), text)
         self.assertIn("asammdf cannot read this MDF file", text)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -100,7 +100,3 @@ class FromDbc(unittest.TestCase):
         self.assertEqual((status, file), (1, None))
         for words in ("WHEELS (0x4b0, 8 bytes)", 'WHEELS.FL: 16 bits from 0, x 0.01 +0 "km/h", 65535 "SNA"', "nothing is written"):
             self.assertIn(words, text)
-
-
-if __name__ == "__main__":
-    unittest.main()

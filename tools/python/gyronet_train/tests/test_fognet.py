@@ -40,7 +40,3 @@ class ConstantTest(unittest.TestCase):
         self.assertLess(abs(after.mean().item()), 1e-4 * abs(taken))
         self.assertTrue(torch.equal(linear, same))
         self.assertTrue(torch.allclose(before - after, torch.full_like(before, taken), rtol=1e-3))
-
-
-if __name__ == "__main__":
-    unittest.main()
