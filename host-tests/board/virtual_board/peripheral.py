@@ -13,6 +13,8 @@ class Peripheral:
     size: int = 0x400
     #: The RCC enable bit that gates the block, such as "CAN1" or "PWR". `None`: always clocked.
     clock: str | None = None
+    #: Settings that are attributes of the same name.
+    settings: frozenset[str] = frozenset()
 
     def __init__(self, board):
         self.board = board
@@ -33,7 +35,9 @@ class Peripheral:
 
     def configure(self, name: str, value) -> None:
         """Sets a fault or a condition of the environment, such as the frequency of the crystal."""
-        raise KeyError(f"{self.name} has no setting {name!r}")
+        if name not in self.settings:
+            raise KeyError(f"{self.name} has no setting {name!r}")
+        setattr(self, name, value)
 
     def announce_clocks(self) -> None:
         """Calls everything that counts with a clock. Every chip's RCC calls it after a change."""

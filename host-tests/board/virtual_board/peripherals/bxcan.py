@@ -10,14 +10,13 @@ outside of a frame takes one bit; each failed attempt sets ALST and TERR; only s
 Settings: those of `CanBus`: `bit_rate`, `acknowledge`, `connected`, `short`, `babble`, `keep_log`.
 """
 
-from ..peripheral import Peripheral
 from ..violation import Violation
-from . import registers
 from .can_bus import ACKNOWLEDGE_ERROR, CanBus
 from .can_filters import Filters, identifier_word
 from .can_frame import frame_bits
 from .can_mailboxes import ALST, TERR, TXOK, Mailboxes
 from .gpio import connected
+from .registers import Registers, unmodelled
 
 PS = 1_000_000_000_000
 INRQ, SLEEP, TXFP, DBF = 1 << 0, 1 << 1, 1 << 2, 1 << 16
@@ -34,10 +33,12 @@ FUNCTION = 9
 RECOVERY_SEQUENCES, SEQUENCE_BITS = 128, 11
 
 
-class BxCan(Peripheral):
+class BxCan(Registers):
     """CAN1 with its registers of section 32.9."""
 
     name, base, clock = "CAN1", 0x4000_6400, "CAN1"
+    readers = {0x00: "mcr", 0x14: "ier", 0x1C: "btr"}
+    writers = {0x00: "_write_mcr", 0x14: "_write_ier", 0x1C: "_write_btr"}
     #: It reads no CAN FD frame.
     takes_fd = False
 
@@ -352,8 +353,7 @@ class BxCan(Peripheral):
 
     # -- registers (section 32.9) ------------------------------------------------------------------------------------
 
-    def read(self, offset, size):
-        registers.check(self, offset, size, registers.WORD)
+    def load(self, offset):
         if offset == 0x08:
             return self.mailboxes.tsr()
         if offset == 0x0C:
@@ -367,18 +367,10 @@ class BxCan(Peripheral):
             if self.fifo:
                 self.output = self.fifo[0]
             return self.output[offset // 4 & 3]
-        if offset == 0x00:
-            return self.mcr
-        if offset == 0x14:
-            return self.ier
         if offset == 0x18:
             return self._status() | self.lec << 4 | min(self.tec, 255) << 16 | self.rec << 24
-        if offset == 0x1C:
-            return self.btr
         value = self.filters.read(offset)
-        if value is None:
-            raise registers.unmodelled(self, offset, "read")
-        return value
+        return super().load(offset) if value is None else value
 
     def _msr(self):
         if self.wanted == "normal" and self.mode_event is None:
@@ -390,8 +382,7 @@ class BxCan(Peripheral):
             value |= TXM if self.bus.in_progress[2] == "board" else RXM
         return value
 
-    def write(self, offset, value, size):
-        registers.check(self, offset, size, registers.WORD)
+    def store(self, offset, value):
         if 0x180 <= offset < 0x1B0:
             self._write_mailbox(self.mailboxes.boxes[(offset - 0x180) // 16], offset // 4 & 3, value)
         elif offset == 0x0C:
@@ -400,27 +391,24 @@ class BxCan(Peripheral):
                 self.output = self.fifo.pop(0)
         elif offset == 0x08:
             self.mailboxes.write_tsr(value, self.sending if self.bus.in_progress or self.loop_event else None)
-        elif offset == 0x00:
-            self._write_mcr(value)
         elif offset == 0x04:
             self.flags &= ~(value & ERRI)
-        elif offset == 0x14:
-            if value & ~(TMEIE | FMPIE0 | BOFIE | ERRIE):
-                raise registers.unmodelled(self, offset, f"write of {value:#x}")
-            self.ier = value
-        elif offset == 0x1C:
-            self._write_btr(value)
         else:
             taken = self.filters.write(offset, value)
             if taken is None:
-                raise registers.unmodelled(self, offset, "write")
-            if not taken:
+                super().store(offset, value)
+            elif not taken:
                 self.board.record("ignored_write", register=f"CAN1 filter {offset:#x}", value=value)
         self._interrupts()
 
+    def _write_ier(self, value):
+        if value & ~(TMEIE | FMPIE0 | BOFIE | ERRIE):
+            raise unmodelled(self, 0x14, f"write of {value:#x}")
+        self.ier = value
+
     def _write_mcr(self, value):
         if value & ~(INRQ | SLEEP | TXFP | DBF):
-            raise registers.unmodelled(self, 0, f"write of {value:#x}")
+            raise unmodelled(self, 0, f"write of {value:#x}")
         self.mcr = value
         self._request_mode()
 

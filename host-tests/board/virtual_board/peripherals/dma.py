@@ -7,9 +7,8 @@ address, peripheral flow control, priorities.
 Assumed where the manual is silent: a stream that is enabled with old flags set starts anyway, and `dma_flags` is recorded.
 """
 
-from ..peripheral import Peripheral
 from ..violation import Violation
-from . import registers
+from .registers import ANY, Registers
 
 EN, TO_PERIPHERAL, CIRC, MINC = 1, 1 << 6, 1 << 8, 1 << 10
 #: Channel, priority, direction and mode: what a stream may ask for.
@@ -41,8 +40,10 @@ class Stream:
         return self.m0ar + (self.total - self.left)
 
 
-class Dma(Peripheral):
+class Dma(Registers):
     """DMA1 or DMA2 with eight streams."""
+
+    sizes, kept = ANY, {0x08: (0, 0), 0x0C: (0, 0)}
 
     def __init__(self, board, name, base):
         super().__init__(board)
@@ -141,36 +142,28 @@ class Dma(Peripheral):
 
     # -- registers ---------------------------------------------------------------------------------------------------
 
-    def read(self, offset, size):
+    def load(self, offset):
         self._catch_up()
-        word = offset & ~3
-        if word in (0x00, 0x04):
-            value = sum(self.streams[word + index].flags << shift for index, shift in enumerate(FLAG_SHIFTS))
-        elif word in (0x08, 0x0C):
-            value = 0
-        elif 0x10 <= word < 0xD0:
-            stream = self.streams[(word - 0x10) // 0x18]
-            value = (stream.cr, stream.left, stream.par, stream.m0ar, 0, 0x21)[(word - 0x10) % 0x18 // 4]
-        else:
-            raise registers.unmodelled(self, offset, "read")
-        return registers.cut(value, offset, size)
+        if offset in (0x00, 0x04):
+            return sum(self.streams[offset + index].flags << shift for index, shift in enumerate(FLAG_SHIFTS))
+        if 0x10 <= offset < 0xD0:
+            stream = self.streams[(offset - 0x10) // 0x18]
+            return (stream.cr, stream.left, stream.par, stream.m0ar, 0, 0x21)[(offset - 0x10) % 0x18 // 4]
+        return super().load(offset)
 
-    def write(self, offset, value, size):
-        self._catch_up()
-        self._write(offset, value, size)
-        self._catch_up()
+    def under(self, offset):
+        return self.load(offset)
 
-    def _write(self, offset, value, size):
-        word = offset & ~3
-        value = registers.merge(0 if word < 0x10 else self.read(word, 4), value, offset, size)
-        if word in (0x08, 0x0C):
+    def store(self, offset, value):
+        self._catch_up()
+        if offset in (0x08, 0x0C):
             for index, shift in enumerate(FLAG_SHIFTS):
-                number = word - 8 + index
-                self.streams[number].flags &= ~(value >> shift & 0x3D)
-        elif 0x10 <= word < 0xD0:
-            self._write_stream((word - 0x10) // 0x18, (word - 0x10) % 0x18 // 4, value)
+                self.streams[offset - 8 + index].flags &= ~(value >> shift & 0x3D)
+        elif 0x10 <= offset < 0xD0:
+            self._write_stream((offset - 0x10) // 0x18, (offset - 0x10) % 0x18 // 4, value)
         else:
-            raise registers.unmodelled(self, offset, "write")
+            super().store(offset, value)
+        self._catch_up()
 
     def _write_stream(self, number, register, value):
         stream = self.streams[number]

@@ -15,10 +15,9 @@ Settings: `time_factor`, `seed` (of the content after a power cut), `option_byte
 
 import random
 
-from ..peripheral import Peripheral
 from ..violation import Violation
-from . import registers
 from .flash_map import SECTORS, sector_of
+from .registers import ANY, WORD, Registers, check
 
 PG, SER, SNB, PSIZE, X32, STRT, LOCK = 1 << 0, 1 << 1, 15 << 3, 3 << 8, 2 << 8, 1 << 16, 1 << 31
 EOP, OPERR, WRPERR, PGAERR, PGPERR, PGSERR, BSY = 1 << 0, 1 << 1, 1 << 4, 1 << 5, 1 << 6, 1 << 7, 1 << 16
@@ -36,10 +35,14 @@ MS = 1_000_000_000
 US = 1_000_000
 
 
-class Flash(Peripheral):
+class Flash(Registers):
     """The registers of section 3.9 and the operations that they start."""
 
-    name, base = "FLASH", 0x4002_3C00
+    name, base, sizes = "FLASH", 0x4002_3C00, ANY
+    kept = {0x04: (0, 0), 0x08: (0, 0)}
+    readers = {0x00: "acr", 0x0C: "sr", 0x10: "cr", 0x14: "optcr"}
+    writers = {0x00: "_write_acr", 0x04: "_write_key", 0x08: "_write_option_key", 0x0C: "_write_sr", 0x10: "_write_cr", 0x14: "_write_optcr"}
+    settings = {"time_factor", "starts_unlocked"}
 
     def __init__(self, board):
         super().__init__(board)
@@ -49,6 +52,7 @@ class Flash(Peripheral):
         self.operation = None
         self.done = None
         self.loaded_bor = self.options >> 2 & 3
+        #: Whether a reset does not lock the controller: a fault of the chip.
         self.starts_unlocked = False
         self._registers()
 
@@ -77,42 +81,16 @@ class Flash(Peripheral):
 
     # -- registers ---------------------------------------------------------------------------------------------------
 
-    def read(self, offset, size):
-        word = offset & ~3
-        if word == 0x0C:
-            value = self.sr
-        elif word == 0x10:
-            value = self.cr
-        elif word == 0x00:
-            value = self.acr
-        elif word == 0x14:
-            value = self.optcr
-        elif word in (0x04, 0x08):
-            value = 0
-        else:
-            raise registers.unmodelled(self, offset, "read")
-        return registers.cut(value, offset, size)
+    def under(self, offset):
+        return 0 if offset == 0x0C else self.load(offset)
 
     def write(self, offset, value, size):
-        word = offset & ~3
-        if word in (0x04, 0x08):
-            registers.check(self, offset, size, registers.WORD)
-        elif size != 4:
-            value = registers.merge(0 if word == 0x0C else self.read(word, 4), value, offset, size)
-        if word == 0x00:
-            self._write_acr(value)
-        elif word == 0x04:
-            self._write_key(value)
-        elif word == 0x08:
-            self._write_option_key(value)
-        elif word == 0x0C:
-            self.sr &= ~(value & FLAGS)
-        elif word == 0x10:
-            self._write_cr(value)
-        elif word == 0x14:
-            self._write_optcr(value)
-        else:
-            raise registers.unmodelled(self, offset, "write")
+        if offset & ~3 in (0x04, 0x08):
+            check(self, offset, size, WORD)
+        super().write(offset, value, size)
+
+    def _write_sr(self, value):
+        self.sr &= ~(value & FLAGS)
 
     def _write_acr(self, value):
         for reset_bit, enable_bit, what in ((1 << 11, 1 << 9, "ICRST"), (1 << 12, 1 << 10, "DCRST")):
@@ -272,16 +250,11 @@ class Flash(Peripheral):
         return bits
 
     def configure(self, key, value):
-        if key == "time_factor":
-            self.time_factor = float(value)
-        elif key == "seed":
+        if key == "seed":
             self.random = random.Random(value)
         elif key == "error_flags":
             # Flags that an operation before this program has left in SR.
             self.sr |= value & FLAGS & ~EOP
-        elif key == "starts_unlocked":
-            # A controller that a reset does not lock: a fault of the chip.
-            self.starts_unlocked = bool(value)
         elif key == "option_bytes":
             self.options = value & 0x0FFF_FFED
             self.loaded_bor = value >> 2 & 3

@@ -6,21 +6,25 @@ Left out: locks, interrupts of pins, analog levels (an analog pin reads 0), shor
 Settings: `drive` ((pin, level) from outside; level None lets the pin float), `watch` (pins whose output changes are recorded as `pin`).
 """
 
-from ..peripheral import Peripheral
-from . import registers
+from .registers import ANY, Registers
 
 OUTPUT, ALTERNATE, ANALOG = 1, 2, 3
 MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR, _, AFRL, AFRH = range(0, 0x28, 4)
 #: Reset values of MODER, OSPEEDR and PUPDR (sections 8.4.1 to 8.4.4): the debug pins.
+EVERY = 0xFFFF_FFFF
 RESET = {"A": (0xA800_0000, 0x0C00_0000, 0x6400_0000), "B": (0x0000_0280, 0x0000_00C0, 0x0000_0100)}
 
 
-class Gpio(Peripheral):
+class Gpio(Registers):
     """One port with its sixteen pins."""
 
+    sizes = ANY
+
     def __init__(self, board, letter, base=0x4002_0000, reset=None):
+        modes, speeds, pulls = reset or RESET.get(letter, (0, 0, 0))
+        self.kept = {MODER: (modes, EVERY), OTYPER: (0, 0xFFFF), OSPEEDR: (speeds, EVERY), PUPDR: (pulls, EVERY), ODR: (0, 0xFFFF),
+                     AFRL: (0, EVERY), AFRH: (0, EVERY)}
         super().__init__(board)
-        self.reset_values = reset or RESET.get(letter, (0, 0, 0))
         self.letter = letter
         self.number = ord(letter) - ord("A")
         self.name = self.clock = "GPIO" + letter
@@ -29,28 +33,23 @@ class Gpio(Peripheral):
         self.listeners = {}
         self.watched = 0
         self.output = 0
-        self._registers()
-
-    def _registers(self):
-        self.moder, self.ospeedr, self.pupdr = self.reset_values
-        self.otyper = self.odr = 0
-        self.afr = [0, 0]
         self._find_functions()
 
     def _find_functions(self):
         #: The result of `alternate` for each pin.
-        self.functions = [self.afr[pin >> 3] >> 4 * (pin & 7) & 15 if self.mode(pin) == ALTERNATE else None
+        self.functions = [self.values[AFRH if pin > 7 else AFRL] >> 4 * (pin & 7) & 15 if self.mode(pin) == ALTERNATE else None
                           for pin in range(16)]
 
     def reset(self, cause):
-        self._registers()
+        super().reset(cause)
+        self._find_functions()
         self._changed()
 
     # -- for other models --------------------------------------------------------------------------------------------
 
     def mode(self, pin):
         """Returns 0 for an input, 1 for an output, 2 for an alternate function, 3 for analog."""
-        return self.moder >> 2 * pin & 3
+        return self.values[MODER] >> 2 * pin & 3
 
     def alternate(self, pin):
         """Returns the number of the pin's alternate function, or None if the pin is in another mode."""
@@ -58,7 +57,7 @@ class Gpio(Peripheral):
 
     def speed(self, pin):
         """Returns OSPEEDR: 0 low (2 MHz), 1 medium (25 MHz), 2 high (50 MHz), 3 very high (100 MHz)."""
-        return self.ospeedr >> 2 * pin & 3
+        return self.values[OSPEEDR] >> 2 * pin & 3
 
     def level(self, pin):
         """Returns the pin's level as seen from outside."""
@@ -71,16 +70,17 @@ class Gpio(Peripheral):
     def _levels(self):
         """Returns all levels: ODR for outputs; otherwise what drives the pin from outside, else its pull (a floating pin reads 0)."""
         levels = 0
+        modes, types, _, pulls, out, *_ = self.values.values()
         for pin in range(16):
-            mode = self.moder >> 2 * pin & 3
+            mode = modes >> 2 * pin & 3
             bit = 1 << pin
-            if mode == OUTPUT and not (self.otyper & bit and self.odr & bit):
-                levels |= self.odr & bit
+            if mode == OUTPUT and not types & out & bit:
+                levels |= out & bit
             elif mode == ANALOG:
                 continue
             elif self.driven & bit:
                 levels |= self.outside & bit
-            elif self.pupdr >> 2 * pin & 3 == 1:
+            elif pulls >> 2 * pin & 3 == 1:
                 levels |= bit
         return levels
 
@@ -101,51 +101,18 @@ class Gpio(Peripheral):
 
     # -- registers ---------------------------------------------------------------------------------------------------
 
-    def read(self, offset, size):
-        word = offset & ~3
-        if word == IDR:
-            value = self._levels()
-        elif word == ODR:
-            value = self.odr
-        elif word == MODER:
-            value = self.moder
-        elif word == OTYPER:
-            value = self.otyper
-        elif word == OSPEEDR:
-            value = self.ospeedr
-        elif word == PUPDR:
-            value = self.pupdr
-        elif word == BSRR:
-            value = 0
-        elif word in (AFRL, AFRH):
-            value = self.afr[(word - AFRL) // 4]
-        else:
-            raise registers.unmodelled(self, offset, "read")
-        return registers.cut(value, offset, size)
+    def load(self, offset):
+        if offset == IDR:
+            return self._levels()
+        return 0 if offset == BSRR else super().load(offset)
 
-    def write(self, offset, value, size):
-        word = offset & ~3
-        if word == BSRR:
-            value = registers.merge(0, value, offset, size)
-            self.odr = self.odr & ~(value >> 16) | value & 0xFFFF
-            self._changed()
-            return
-        value = registers.merge(self.read(word, 4), value, offset, size)
-        if word == ODR:
-            self.odr = value & 0xFFFF
-        elif word == MODER:
-            self.moder = value
-        elif word == OTYPER:
-            self.otyper = value & 0xFFFF
-        elif word == OSPEEDR:
-            self.ospeedr = value
-        elif word == PUPDR:
-            self.pupdr = value
-        elif word in (AFRL, AFRH):
-            self.afr[(word - AFRL) // 4] = value
-        elif word != IDR:
-            raise registers.unmodelled(self, offset, "write")
-        self._find_functions()
+    def store(self, offset, value):
+        if offset == BSRR:
+            offset, value = ODR, self.values[ODR] & ~(value >> 16) | value & 0xFFFF
+        if offset != IDR:
+            super().store(offset, value)
+        if offset not in (IDR, ODR):
+            self._find_functions()
         self._changed()
 
     def configure(self, key, value):

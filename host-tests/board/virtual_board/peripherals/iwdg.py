@@ -5,8 +5,7 @@ reload value takes effect five LSI periods after its write and only while the LS
 Assumed where the manual is silent: a new prescaler keeps the counter's value, and the update takes the full five periods.
 """
 
-from ..peripheral import Peripheral
-from . import registers
+from .registers import HALF_WORD, Registers
 
 PS = 1_000_000_000_000
 OPEN, RELOAD, START = 0x5555, 0xAAAA, 0xCCCC
@@ -14,10 +13,10 @@ PVU, RVU = 1, 2
 TAKEOVER_PERIODS = 5
 
 
-class Iwdg(Peripheral):
+class Iwdg(Registers):
     """KR, PR, RLR and SR of section 21.4."""
 
-    name, base = "IWDG", 0x4000_3000
+    name, base, sizes = "IWDG", 0x4000_3000, HALF_WORD
     #: The greatest value of PR that makes a difference.
     PRESCALERS = 6
 
@@ -35,6 +34,7 @@ class Iwdg(Peripheral):
         self.counter, self.since, self.hz = 0xFFF, 0, 1
 
     def reset(self, cause):
+        super().reset(cause)
         self._cancel()
         self._registers()
 
@@ -115,20 +115,12 @@ class Iwdg(Peripheral):
         self.busy &= ~flag
         del self.takeover[flag]
 
-    def read(self, offset, size):
-        registers.check(self, offset, size, registers.HALF_WORD)
-        if offset == 0x00:
-            return 0
-        if offset == 0x04:
-            return self.written[PVU] if self.busy & PVU else self.prescaler
-        if offset == 0x08:
-            return self.written[RVU] if self.busy & RVU else self.reload
-        if offset == 0x0C:
-            return self.busy
-        raise registers.unmodelled(self, offset, "read")
+    def load(self, offset):
+        current = {0x00: 0, 0x04: self.written[PVU] if self.busy & PVU else self.prescaler,
+                   0x08: self.written[RVU] if self.busy & RVU else self.reload, 0x0C: self.busy}
+        return current[offset] if offset in current else super().load(offset)
 
-    def write(self, offset, value, size):
-        registers.check(self, offset, size, registers.HALF_WORD)
+    def store(self, offset, value):
         if offset == 0x00:
             self._key(value & 0xFFFF)
         elif offset == 0x04:
@@ -136,7 +128,7 @@ class Iwdg(Peripheral):
         elif offset == 0x08:
             self._update(RVU, value & 0xFFF)
         else:
-            raise registers.unmodelled(self, offset, "write")
+            super().store(offset, value)
 
     def _key(self, key):
         self.open = key == OPEN

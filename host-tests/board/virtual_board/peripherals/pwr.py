@@ -7,8 +7,7 @@ VOSRDY is set 50 us after the regulator's scale was changed; the manual gives no
 Settings: `supply_mv`.
 """
 
-from ..peripheral import Peripheral
-from . import registers
+from .registers import HALF_WORD, Registers, unmodelled
 
 #: Falling and rising thresholds in millivolts by PLS.
 PVD = ((2040, 2140), (2190, 2300), (2350, 2450), (2510, 2600), (2660, 2760), (2840, 2930), (2930, 3030), (3030, 3140))
@@ -24,10 +23,11 @@ PVDE, PLS, VOS = 1 << 4, 7 << 5, 1 << 14
 PVDO, VOSRDY = 1 << 2, 1 << 14
 
 
-class Pwr(Peripheral):
+class Pwr(Registers):
     """The registers of section 5.4 (STM32F405) and the supply monitors of section 5.2."""
 
     name, base, clock = "PWR", 0x4000_7000, "PWR"
+    sizes, readers = HALF_WORD, {0x00: "cr"}
 
     def __init__(self, board):
         super().__init__(board)
@@ -52,27 +52,20 @@ class Pwr(Peripheral):
         """Cancels the hold; the board handles the next start."""
         self.held = self.release = None
 
-    def read(self, offset, size):
-        registers.check(self, offset, size, registers.HALF_WORD)
-        if offset == 0:
-            return self.cr
+    def load(self, offset):
         if offset == 4:
             settled = self.board.now - self.scale_from >= REGULATOR_PS
             return (PVDO if self.low else 0) | (VOSRDY if settled else 0)
-        raise registers.unmodelled(self, offset, "read")
+        return super().load(offset)
 
-    def write(self, offset, value, size):
-        registers.check(self, offset, size, registers.HALF_WORD)
-        if offset == 0:
-            if value & ~(PVDE | PLS | VOS):
-                raise registers.unmodelled(self, offset, f"write of {value:#x}")
-            if (value ^ self.cr) & VOS:
-                self.scale_from = self.board.now
-            self.cr = value
-            self._detect()
-            self.board.rcc.check_limits()
-        else:
-            raise registers.unmodelled(self, offset, "write")
+    def store(self, offset, value):
+        if offset or value & ~(PVDE | PLS | VOS):
+            raise unmodelled(self, offset, f"write of {value:#x}")
+        if (value ^ self.cr) & VOS:
+            self.scale_from = self.board.now
+        self.cr = value
+        self._detect()
+        self.board.rcc.check_limits()
 
     def _detect(self):
         """Updates PVDO by comparing the supply with the selected level, with hysteresis, and drives EXTI line 16 (section 5.2.3)."""

@@ -11,10 +11,9 @@ Settings: `hsi_error_percent`, `crystal_hz` (None: no crystal), `crystal_stop` (
 though a core that it stopped stays stopped until a reset), `lsi_hz`.
 """
 
-from ..peripheral import Peripheral
 from ..violation import Violation
-from . import registers
 from .clock_names import ENABLE, RESET, RESET_VALUES
+from .registers import ANY, Registers
 
 PS = 1_000_000_000_000
 HSI_NOMINAL = 16_000_000
@@ -35,10 +34,13 @@ BUS_OF_ENABLE = {0x30: "HCLK", 0x34: "HCLK", 0x38: "HCLK", 0x40: "PCLK1", 0x44: 
 OSCILLATOR_SWITCH_PS = 200_000
 
 
-class Rcc(Peripheral):
+class Rcc(Registers):
     """The clock tree of section 7.2 with its gates and flags."""
 
-    name, base = "RCC", 0x4002_3800
+    name, base, sizes = "RCC", 0x4002_3800, ANY
+    kept = {offset: (value, 0xFFFF_FFFF) for offset, value in RESET_VALUES.items()}
+    readers = {0x00: "cr", 0x04: "pllcfgr", 0x08: "clock_configuration", 0x0C: "cir", 0x74: "control_status"}
+    writers = {0x00: "_write_cr", 0x04: "_write_pllcfgr", 0x08: "_write_cfgr", 0x0C: "_write_cir", 0x74: "_write_csr"}
 
     def __init__(self, board):
         super().__init__(board)
@@ -102,7 +104,6 @@ class Rcc(Peripheral):
 
     def _power_on(self):
         self.cr, self.pllcfgr, self.cfgr, self.cir, self.csr = 0x83, 0x2400_3010, 0, 0, 0
-        self.words = dict(RESET_VALUES)
         self.gates = set()
         self.settling, self.settle_until = {}, 0
         self.lsi_forced = False
@@ -118,6 +119,7 @@ class Rcc(Peripheral):
         if cause == "por":
             self.flags = 0
         self.flags |= RESET_FLAGS.get(cause, 0)
+        super().reset(cause)
         self._power_on()
         if before != self.hz:
             self.announce_clocks()
@@ -127,10 +129,10 @@ class Rcc(Peripheral):
         self.open = {None}
         self.settle_until = max(self.settle_until, 1)
         self.gates = {name for offset, names in ENABLE.items() for bit, name in names.items()
-                      if self.words[offset] >> bit & 1}
+                      if self.values[offset] >> bit & 1}
         for offset, names in RESET.items():
             for bit, held in names.items():
-                if self.words[offset] >> bit & 1:
+                if self.values[offset] >> bit & 1:
                     self.gates.difference_update(held)
 
     # -- frequencies -------------------------------------------------------------------------------------------------
@@ -268,42 +270,24 @@ class Rcc(Peripheral):
 
     # -- registers ---------------------------------------------------------------------------------------------------
 
-    def read(self, offset, size):
-        word = offset & ~3
-        if word == 0x00:
-            value = self.cr
-        elif word == 0x04:
-            value = self.pllcfgr
-        elif word == 0x08:
-            value = self.cfgr & ~0xC | {"HSI": 0, "HSE": 4, "PLL": 8}[self.source]
-        elif word == 0x0C:
-            value = self.cir
-        elif word in self.words:
-            value = self.words[word]
-        elif word == 0x74:
-            value = self.csr | self.flags
-        else:
-            raise registers.unmodelled(self, offset, "read")
-        return registers.cut(value, offset, size)
+    @property
+    def clock_configuration(self):
+        """Returns CFGR with SWS, the clock in use."""
+        return self.cfgr & ~0xC | {"HSI": 0, "HSE": 4, "PLL": 8}[self.source]
 
-    def write(self, offset, value, size):
-        word = offset & ~3
-        if size != 4:
-            value = registers.merge(0 if word == 0x0C else self.read(word, 4), value, offset, size)
-        if word == 0x00:
-            self._write_cr(value)
-        elif word == 0x04:
-            self._write_pllcfgr(value)
-        elif word == 0x08:
-            self._write_cfgr(value)
-        elif word == 0x0C:
-            self._write_cir(value)
-        elif word in self.words:
-            self._write_gate(word, value)
-        elif word == 0x74:
-            self._write_csr(value)
+    @property
+    def control_status(self):
+        """Returns CSR with the reset flags."""
+        return self.csr | self.flags
+
+    def under(self, offset):
+        return 0 if offset == 0x0C else self.load(offset)
+
+    def store(self, offset, value):
+        if offset in self.kept:
+            self._write_gate(offset, value)
         else:
-            raise registers.unmodelled(self, offset, "write")
+            super().store(offset, value)
 
     def _write_cr(self, value):
         if value & ~0x030B_00FB or value & 0xF8 != 0x80:
@@ -355,8 +339,8 @@ class Rcc(Peripheral):
     def _write_gate(self, word, value):
         if word in ENABLE:
             mask = sum(1 << bit for bit in ENABLE[word])
-            risen = value & mask & ~self.words[word]
-            self.words[word] = value & mask
+            risen = value & mask & ~self.values[word]
+            self.values[word] = value & mask
             self._open_gates()
             if risen:
                 until = self.board.now + 2 * PS // max(self.hz[BUS_OF_ENABLE[word]], 1)
@@ -364,8 +348,8 @@ class Rcc(Peripheral):
                 self.settling.update({name: until for bit, name in ENABLE[word].items() if risen >> bit & 1})
                 self.settle_until = max(self.settle_until, until)
         else:
-            risen = value & ~self.words[word]
-            self.words[word] = value
+            risen = value & ~self.values[word]
+            self.values[word] = value
             self._open_gates()
             for bit, names in RESET[word].items():
                 if risen >> bit & 1:

@@ -6,8 +6,7 @@ None), `clock_error` (its clock has failed: CECS). The noise continues through r
 
 from random import Random
 
-from ..peripheral import Peripheral
-from . import registers
+from .registers import Registers
 
 IE, RNGEN = 1 << 3, 1 << 2
 SEIS, CEIS, SECS, CECS, DRDY = 1 << 6, 1 << 5, 1 << 2, 1 << 1, 1 << 0
@@ -16,11 +15,12 @@ PERIODS = 40
 HASH_RNG = 80
 
 
-class Rng(Peripheral):
+class Rng(Registers):
     """CR, SR and DR of section 24.4. The manual does not say what DR holds while no number is ready; here, the last number read."""
 
     name, base, clock = "RNG", 0x5006_0800, "RNG"
-    interrupt = HASH_RNG
+    readers = {0x00: "cr"}
+    interrupt, settings = HASH_RNG, {"seed_error", "clock_error", "stuck"}
 
     def __init__(self, board):
         super().__init__(board)
@@ -29,6 +29,7 @@ class Rng(Peripheral):
         self.cr, self.flags, self.data, self.ready, self.pending = 0, 0, 0, False, None
 
     def reset(self, cause):
+        super().reset(cause)
         self.cr, self.flags, self.data, self.ready = 0, 0, 0, False
         self._stop()
 
@@ -69,10 +70,7 @@ class Rng(Peripheral):
     def _interrupt(self):
         self.board.irq(self.interrupt, bool(self.cr & IE and (self.ready or self.flags)))
 
-    def read(self, offset, size):
-        registers.check(self, offset, size, registers.WORD)
-        if offset == 0x00:
-            return self.cr
+    def load(self, offset):
         if offset == 0x04:
             return self._errors() | self.flags | (DRDY if self.ready else 0)
         if offset == 0x08:
@@ -80,32 +78,24 @@ class Rng(Peripheral):
             self._start()
             self._interrupt()
             return self.data
-        raise registers.unmodelled(self, offset, "read")
+        return super().load(offset)
 
-    def write(self, offset, value, size):
-        registers.check(self, offset, size, registers.WORD)
+    def store(self, offset, value):
         if offset == 0x00:
             self.cr = value & (IE | RNGEN)
             if not self.cr & RNGEN:
                 self._stop()
                 self.ready = False
-            self._start()
         elif offset == 0x04:
             # Cleared by writing 0; the other bits are read-only.
             self.flags &= value
-            self._start()
         else:
-            raise registers.unmodelled(self, offset, "write")
+            super().store(offset, value)
+        self._start()
         self._interrupt()
 
     def configure(self, key, value):
         if key == "seed":
             self.random = Random(value)
-        elif key == "seed_error":
-            self.seed_error = value
-        elif key == "clock_error":
-            self.clock_error = value
-        elif key == "stuck":
-            self.stuck = value
         else:
             super().configure(key, value)

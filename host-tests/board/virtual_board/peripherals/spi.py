@@ -10,10 +10,9 @@ Settings: `fitted` (False: no slave answers, MISO floats high); `part` (the clas
 settings that begin with `imu_` are passed to that part.
 """
 
-from ..peripheral import Peripheral
 from ..violation import Violation
-from . import registers
 from .gpio import connected
+from .registers import HALF_WORD, Registers
 
 PS = 1_000_000_000_000
 CPHA, CPOL, MSTR, SPE, SSI, SSM = (1 << bit for bit in (0, 1, 2, 6, 8, 9))
@@ -27,10 +26,12 @@ SCK, MISO, MOSI = (("A", 5), ("B", 3)), (("A", 6), ("B", 4)), (("A", 7), ("B", 5
 FUNCTION = 5
 
 
-class Spi(Peripheral):
+class Spi(Registers):
     """SPI1."""
 
     name, base, clock = "SPI1", 0x4001_3000, "SPI1"
+    sizes, settings = HALF_WORD, {"fitted"}
+    readers, writers = {0x00: "cr1"}, {0x00: "_write_cr1"}
 
     def __init__(self, board):
         super().__init__(board)
@@ -149,20 +150,13 @@ class Spi(Peripheral):
             self.sr &= ~RXNE
             self.overrun_read = bool(self.sr & OVR)
             return self.rdr
-        registers.check(self, offset, size, registers.HALF_WORD)
-        if offset == 0x00:
-            return self.cr1
-        raise registers.unmodelled(self, offset, "read")
+        return super().read(offset, size)
 
     def write(self, offset, value, size):
         if offset == 0x0C:
             self._write_dr(value)
-            return
-        registers.check(self, offset, size, registers.HALF_WORD)
-        if offset == 0x00:
-            self._write_cr1(value & 0xFFFF)
         else:
-            raise registers.unmodelled(self, offset, "write")
+            super().write(offset, value, size)
 
     def _write_dr(self, value):
         if not self.cr1 & SPE:
@@ -176,6 +170,7 @@ class Spi(Peripheral):
             self._load()
 
     def _write_cr1(self, value):
+        value &= 0xFFFF
         if value & ~(CPHA | CPOL | SPE | MASTER | RATE) or value & SPE and value & MASTER != MASTER:
             raise Violation(f"{self.name}: CR1 {value:#x} asks for a mode that is not modelled")
         if self.shift is not None and (value ^ self.cr1) & ~(SSI | SPE):
@@ -190,9 +185,7 @@ class Spi(Peripheral):
         self.cr1 = value
 
     def configure(self, key, value):
-        if key == "fitted":
-            self.fitted = bool(value)
-        elif key == "part":
+        if key == "part":
             self.part = [type(part).__name__ for part in self.parts].index(value)
         elif key.startswith("imu_") and self.parts:
             self.parts[self.part].configure(key[4:], value)

@@ -6,17 +6,20 @@ Left out: counting down, one pulse, PWM outputs and the preload of CCR, slave mo
 interrupts of captures.
 """
 
-from ..peripheral import Peripheral
 from ..violation import Violation
-from . import registers
+from .registers import HALF_WORD, Registers, cut
 
 PS = 1_000_000_000_000
 CEN, URS = 1 << 0, 1 << 2
 UIF = 1
+CR1, DIER, SR, EGR, CCMR1, CCMR2, CCER, CNT, PSC, ARR, CCR1, OR = 0, 0x0C, 0x10, 0x14, 0x18, 0x1C, 0x20, 0x24, 0x28, 0x2C, 0x34, 0x50
 
 
-class Timer(Peripheral):
+class Timer(Registers):
     """One timer of 16 or 32 bits with up to four channels."""
+
+    sizes, kept, writers = HALF_WORD, {EGR: (0, 0)}, {EGR: "_generate"}
+    readers = {CR1: "cr1", DIER: "dier", SR: "sr", CCER: "ccer", PSC: "prescaler_written", ARR: "arr"}
 
     def __init__(self, board, name, base, interrupt, bus, bits, channels, captures=False):
         super().__init__(board)
@@ -172,90 +175,63 @@ class Timer(Peripheral):
     # -- registers ---------------------------------------------------------------------------------------------------
 
     def read(self, offset, size):
-        if offset == 0x24:
-            steps = self._steps(self.board.now)
-            value = self.counter + steps
-            # The wrap and a counter beyond ARR are rare.
-            if value > self.arr:
-                value = self._after(steps)
-            return value if size == 4 else registers.cut(value, offset, size)
-        word = offset & ~3
-        registers.check(self, offset, size, registers.HALF_WORD)
-        if word == 0x10:
-            self._sync()
-            value = self.sr
-        elif 0x34 <= word < 0x34 + 4 * self.channels:
-            self._sync()
-            channel = (word - 0x34) // 4
-            value = self.ccr[channel]
+        if offset != CNT:
+            return super().read(offset, size)
+        steps = self._steps(self.board.now)
+        value = self.counter + steps
+        # The wrap and a counter beyond ARR are rare.
+        if value > self.arr:
+            value = self._after(steps)
+        return cut(value, offset, size)
+
+    def load(self, offset):
+        self._sync()
+        if CCR1 <= offset < CCR1 + 4 * self.channels:
+            channel = (offset - CCR1) // 4
             if self._selection(channel):
                 self.sr &= ~(2 << channel)
                 self._arm()
-        elif word == 0x00:
-            self._sync()
-            value = self.cr1
-        elif word == 0x14:
-            value = 0
-        elif word == 0x0C:
-            value = self.dier
-        elif word in (0x18, 0x1C) and (word - 0x18) // 2 < self.channels:
-            value = self.ccmr[(word - 0x18) // 4]
-        elif word == 0x20:
-            value = self.ccer
-        elif word == 0x28:
-            value = self.prescaler_written
-        elif word == 0x2C:
-            value = self.arr
-        elif word == 0x50 and self.captures:
-            value = self.option
-        else:
-            raise registers.unmodelled(self, offset, "read")
-        return registers.cut(value, offset, size)
+            return self.ccr[channel]
+        if offset in (CCMR1, CCMR2) and (offset - CCMR1) // 2 < self.channels:
+            return self.ccmr[(offset - CCMR1) // 4]
+        return self.option if offset == OR and self.captures else super().load(offset)
 
-    def write(self, offset, value, size):
-        registers.check(self, offset, size, registers.HALF_WORD)
-        word = offset & ~3
+    def store(self, offset, value):
         self._sync()
-        if size != 4 and word not in (0x10, 0x14):
-            value = registers.merge(self._stored(word), value, offset, size)
-        if word == 0x00:
+        if offset == CR1:
             if value & ~(CEN | URS):
                 raise Violation(f"{self.name}: CR1 {value:#x} asks for a mode that is not modelled")
             if value & CEN and not self.cr1 & CEN:
                 self.hz = self.board.rcc.clock_hz(self.bus)
                 self.since = self.board.now
             self.cr1 = value
-        elif word == 0x0C:
+        elif offset == DIER:
             if value & ~0x1F or value and self.captures:
                 raise Violation(f"{self.name}: DMA requests, trigger and captures that interrupt are not modelled")
             self.dier = value
-        elif word == 0x10:
+        elif offset == SR:
             self.sr &= value
-        elif word == 0x14:
-            self._generate(value)
-        elif word in (0x18, 0x1C) and (word - 0x18) // 2 < self.channels:
-            self._write_ccmr((word - 0x18) // 4, value)
-        elif word == 0x20:
+        elif offset in (CCMR1, CCMR2) and (offset - CCMR1) // 2 < self.channels:
+            self._write_ccmr((offset - CCMR1) // 4, value)
+        elif offset == CCER:
             self.ccer = value & 0xBBBB
-        elif word == 0x24:
+        elif offset == CNT:
             self.counter, self.since = value & self.mask, self.board.now
-        elif word == 0x28:
+        elif offset == PSC:
             self.prescaler_written = value & 0xFFFF
-        elif word == 0x2C:
+        elif offset == ARR:
             self.arr = value & self.mask
-        elif 0x34 <= word < 0x34 + 4 * self.channels:
-            self.ccr[(word - 0x34) // 4] = value & self.mask
-        elif word == 0x50 and self.captures:
+        elif CCR1 <= offset < CCR1 + 4 * self.channels:
+            self.ccr[(offset - CCR1) // 4] = value & self.mask
+        elif offset == OR and self.captures:
             self.option = value & 3
         else:
-            raise registers.unmodelled(self, offset, "write")
+            super().store(offset, value)
         self._capture(self.board.now)
         self._arm()
 
-    def _stored(self, word):
-        """Returns the word into which a half-word store is merged, without the side effects of a read."""
-        return {0x24: self.counter, 0x2C: self.arr, 0x34: self.ccr[0], 0x38: self.ccr[1], 0x3C: self.ccr[2],
-                0x40: self.ccr[3]}.get(word, 0)
+    def under(self, offset):
+        return {CNT: self.counter, ARR: self.arr, **{CCR1 + 4 * channel: value for channel, value in enumerate(self.ccr)}}.get(offset, 0)
 
     def _generate(self, value):
         """Handles UG, which restarts counter and prescaler and loads the latter (section 18.4.6)."""

@@ -14,24 +14,28 @@ Settings: `baud` (of the external device). Calls of a test: `inject`, `take_sent
 from collections import deque
 from itertools import takewhile
 
-from ..peripheral import Peripheral
 from ..violation import Violation
-from . import registers
 from .gpio import connected
+from .registers import HALF_WORD, Registers
 
 PS = 1_000_000_000_000
 FE, ORE, IDLE, RXNE, TC, TXE = (1 << bit for bit in (1, 3, 4, 5, 6, 7))
 ERRORS = FE | ORE | IDLE
 CLEARED_BY_ZERO = RXNE | TC
 RE, TE, IDLEIE, RXNEIE, UE = (1 << bit for bit in (2, 3, 4, 5, 13))
+SR, DR, BRR, CR1, CR2, CR3 = range(0, 0x18, 4)
 EIE, DMAR, DMAT = 1 << 0, 1 << 6, 1 << 7
 TOLERANCE = 0.035
 #: Bytes that arrive within this time, in picoseconds, may be received at once if only DMA notices them.
 AT_ONCE = 500_000_000
 
 
-class Usart(Peripheral):
+class Usart(Registers):
     """One USART or UART with its interrupt, bus clock and candidate pins."""
+
+    sizes, kept = HALF_WORD, {CR2: (0, 0)}
+    readers = {BRR: "brr", CR1: "cr1", CR3: "cr3"}
+    writers = {DR: "_write_dr", CR1: "_write_cr1", CR2: "_write_cr2", CR3: "_write_cr3"}
 
     def __init__(self, board, name, base, interrupt, bus, function, tx_pins, rx_pins):
         super().__init__(board)
@@ -340,54 +344,36 @@ class Usart(Peripheral):
         if self.at_once or self.batch:
             self.catch_up()
         # Section 30.6 requires half-words or words; the bus bridge converts all reads to words, as it does for DMA.
-        if size == 1 and offset != 0x04:
-            registers.check(self, offset, size, registers.HALF_WORD)
-        if offset == 0x00:
+        return self.load(offset) if offset == DR else super().read(offset, size)
+
+    def load(self, offset):
+        if offset == SR:
             if self.idle_armed:
                 self._detect_idle(self.board.now)
             self.seen, self.seen_tc = self.sr & ERRORS, True
             return self.sr
-        if offset == 0x04:
+        if offset == DR:
             self.sr &= ~(RXNE | self.seen)
             self.seen = 0
             self._interrupt()
             return self.rdr
-        if offset == 0x08:
-            return self.brr
-        if offset == 0x0C:
-            return self.cr1
-        if offset == 0x10:
-            return 0
-        if offset == 0x14:
-            return self.cr3
-        raise registers.unmodelled(self, offset, "read")
+        return super().load(offset)
 
     def write(self, offset, value, size):
         if self.at_once or self.batch:
             self.catch_up()
-        self._write(offset, value, size)
+        super().write(offset, value, size)
         if self.at_once or self.batch:
             self.catch_up()
 
-    def _write(self, offset, value, size):
-        registers.check(self, offset, size, registers.HALF_WORD)
-        if offset == 0x04:
-            self._write_dr(value)
-            return
-        if offset == 0x00:
+    def store(self, offset, value):
+        if offset == SR:
             self.sr &= value | ~CLEARED_BY_ZERO
-        elif offset == 0x08:
+        elif offset == BRR:
             self.brr = value & 0xFFFF
             self.clocks_changed()
-        elif offset == 0x0C:
-            self._write_cr1(value)
-        elif offset == 0x10:
-            if value:
-                raise Violation(f"{self.name}: CR2 {value:#x} asks for a mode that is not modelled")
-        elif offset == 0x14:
-            self._write_cr3(value)
         else:
-            raise registers.unmodelled(self, offset, "write")
+            super().store(offset, value)
         self._interrupt()
 
     def _write_dr(self, value):
@@ -409,7 +395,6 @@ class Usart(Peripheral):
                 self._send()
             else:
                 self.board.schedule(self.preamble_until - self.board.now, self._preamble_over)
-        self._interrupt()
 
     def _preamble_over(self):
         if self.tdr is not None and self.shift is None and self.board.now >= self.preamble_until:
@@ -431,6 +416,10 @@ class Usart(Peripheral):
             self.listening_since = self.board.now
         if self.idle_armed and value & IDLEIE and not old & IDLEIE:
             self._watch_idle()
+
+    def _write_cr2(self, value):
+        if value:
+            raise Violation(f"{self.name}: CR2 {value:#x} asks for a mode that is not modelled")
 
     def _write_cr3(self, value):
         if value & ~(EIE | DMAR | DMAT):

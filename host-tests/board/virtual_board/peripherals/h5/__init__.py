@@ -34,15 +34,15 @@ class Watchdog(Iwdg):
     #: WINR and EWCR: reset value.
     FIXED = {0x10: 0xFFF, 0x14: 0}
 
-    def read(self, offset, size):
+    def load(self, offset):
         if offset in self.FIXED:
             return self.FIXED[offset]
         # SR.ONF: the watchdog runs.
-        return super().read(offset, size) | (1 << 8 if offset == 0x0C and self.running else 0)
+        return super().load(offset) | (1 << 8 if offset == 0x0C and self.running else 0)
 
-    def write(self, offset, value, size):
+    def store(self, offset, value):
         if self.FIXED.get(offset) != value:
-            super().write(offset, value, size)
+            super().store(offset, value)
 
 
 def create(board):

@@ -8,12 +8,11 @@ Assumed: INIT can be read back at once; a FIFO skips requests that were cancelle
 Settings: those of `CanBus`.
 """
 
-from ...peripheral import Peripheral
 from ...violation import Violation
-from .. import registers
 from ..can_bus import ACKNOWLEDGE_ERROR, CanBus
 from ..can_frame import LENGTHS, Frame, priority
 from ..gpio import connected
+from ..registers import Registers, unmodelled
 
 PS = 1_000_000_000_000
 INIT, CCE, CSA, CSR, MON, DAR, TEST, FDOE = (1 << bit for bit in (0, 1, 3, 4, 5, 6, 7, 8))
@@ -42,10 +41,14 @@ SEQUENCE_BITS, RECOVERY_SEQUENCES = 11, 129
 NO_CHANGE = 7
 
 
-class Fdcan(Peripheral):
+class Fdcan(Registers):
     """FDCAN1 with its registers, and CKDIV of the configuration block behind it."""
 
     name, base, clock = "FDCAN1", 0x4000_A400, "FDCAN"
+    kept = {**{offset: (value, 0xFFFF_FFFF) for offset, value in {**PROTECTED, **KEPT}.items()},
+            **{offset: (value, 0) for offset, value in {**FIXED, TXBAR: 0, RXF0A: 0, RXF1A: 0}.items()}}
+    readers = {CCCR: "cccr", IR: "flags", TXBRP: "pending", TXBCR: "cancelled", TXBTO: "sent", TXBCF: "finished"}
+    writers = {CCCR: "_write_cccr", TXBAR: "_request", TXBCR: "_write_cancel"}
 
     def __init__(self, board):
         super().__init__(board)
@@ -58,7 +61,6 @@ class Fdcan(Peripheral):
 
     def _registers(self):
         self.cccr = INIT
-        self.words = {**PROTECTED, **KEPT}
         self.flags, self.lec = 0, NO_CHANGE
         self.tec = self.rec = 0
         self.bus_off, self.on_bus = False, False
@@ -80,6 +82,7 @@ class Fdcan(Peripheral):
             self.join_event.cancel()
         self.join_event = None
         self.bus.cut("reset")
+        super().reset(cause)
         self._registers()
         for line in LINES:
             self.board.irq(line, False)
@@ -104,15 +107,15 @@ class Fdcan(Peripheral):
         """Computes both bit times from the kernel clock."""
         hz = self.board.rcc.clock_hz("FDCAN")
         if hz:
-            nominal, data = self.words[NBTP], self.words[DBTP]
+            nominal, data = self.values[NBTP], self.values[DBTP]
             clocks = (nominal >> 16 & 0x1FF) + 1, (data >> 16 & 0x1F) + 1
             quanta = 3 + (nominal >> 8 & 0xFF) + (nominal & 0x7F), 3 + (data >> 8 & 0x1F) + (data >> 4 & 15)
-            divider = 2 * self.words[CKDIV] or 1
+            divider = 2 * self.values[CKDIV] or 1
             self.bit_ps, self.data_bit_ps = (divider * c * q * PS // hz for c, q in zip(clocks, quanta))
 
     def _check_sample_points(self):
         """Checks that bits are sampled at 80 %, as the other nodes on this bus do."""
-        nominal, data = self.words[NBTP], self.words[DBTP]
+        nominal, data = self.values[NBTP], self.values[DBTP]
         times = [("nominal", nominal >> 8 & 0xFF, nominal & 0x7F)]
         times += [("data", data >> 8 & 0x1F, data >> 4 & 15)] if self.takes_fd else []
         for name, first, second in times:
@@ -186,7 +189,7 @@ class Fdcan(Peripheral):
 
     def _next(self):
         """Returns the buffer that is sent next: the oldest of the FIFO, or the most urgent of the queue."""
-        if self.words[TXBC] >> 24 & 1:
+        if self.values[TXBC] >> 24 & 1:
             return min(self.queue, key=lambda index: (priority(self._frame(index)), index), default=None)
         return self.queue[0] if self.queue else None
 
@@ -223,7 +226,7 @@ class Fdcan(Peripheral):
         bit = 1 << self.sending
         self.sent |= bit
         self._end(bit)
-        if self.words[TXBTIE] & bit:
+        if self.values[TXBTIE] & bit:
             self.flags |= TC
         self.tec = max(self.tec - 1, 0)
         self._errors(0)
@@ -243,7 +246,7 @@ class Fdcan(Peripheral):
     def _cancel(self, bits):
         self.finished |= bits
         self._end(bits)
-        if self.words[TXBCIE] & bits:
+        if self.values[TXBCIE] & bits:
             self.flags |= TCF
 
     def _end(self, bits):
@@ -276,7 +279,7 @@ class Fdcan(Peripheral):
 
     def _put(self):
         """Returns the buffer for the next request: the next of the FIFO, or the first free one of the queue."""
-        if not self.words[TXBC] >> 24 & 1:
+        if not self.values[TXBC] >> 24 & 1:
             return self.put
         return next((index for index in range(PLACES) if index not in self.queue), 0)
 
@@ -303,14 +306,14 @@ class Fdcan(Peripheral):
 
     def _match(self, frame):
         """Returns the FIFO of a frame and the number of its filter; FIFO None rejects it."""
-        config = self.words[RXGFC]
+        config = self.values[RXGFC]
         if frame.remote and config >> (0 if frame.extended else 1) & 1:
             return None, 0
         for number in range(config >> (24 if frame.extended else 16) & 0x1F):
             if frame.extended:
                 first, second = self._words(EXTENDED_FILTERS + 8 * number, 2)
                 kind, action, a, b = second >> 30, first >> 29, first & 0x1FFF_FFFF, second & 0x1FFF_FFFF
-                identifier = frame.identifier & (self.words[XIDAM] if kind == 0 else 0x1FFF_FFFF)
+                identifier = frame.identifier & (self.values[XIDAM] if kind == 0 else 0x1FFF_FFFF)
             else:
                 word, = self._words(4 * number, 1)
                 kind, action, a, b = word >> 30, word >> 27 & 7, word >> 16 & 0x7FF, word & 0x7FF
@@ -327,7 +330,7 @@ class Fdcan(Peripheral):
     def _store(self, fifo, frame, index):
         shift = 3 * fifo
         if self.fill[fifo] == PLACES:
-            if not self.words[RXGFC] >> 9 - fifo & 1:
+            if not self.values[RXGFC] >> 9 - fifo & 1:
                 self.flags |= RFL << shift
                 self.board.record("can_overrun", fifo=fifo)
                 return
@@ -384,10 +387,10 @@ class Fdcan(Peripheral):
         self._interrupts()
 
     def _interrupts(self):
-        active = self.flags & self.words[IE]
-        second = sum(flags for group, flags in enumerate(GROUPS) if self.words[ILS] >> group & 1)
+        active = self.flags & self.values[IE]
+        second = sum(flags for group, flags in enumerate(GROUPS) if self.values[ILS] >> group & 1)
         for line, flags in enumerate((active & ~second, active & second)):
-            level = bool(flags and self.words[ILE] >> line & 1)
+            level = bool(flags and self.values[ILE] >> line & 1)
             if level != self.levels[line]:
                 self.levels[line] = level
                 self.board.irq(LINES[line], level)
@@ -396,7 +399,7 @@ class Fdcan(Peripheral):
 
     def _stamp(self):
         """Returns the time stamp counter, which counts bit times."""
-        config = self.words[TSCC]
+        config = self.values[TSCC]
         if config & 3 != 1:
             return 0
         return (self.board.now - self.started) // (self.bit_ps * ((config >> 16 & 15) + 1)) & 0xFFFF
@@ -410,7 +413,7 @@ class Fdcan(Peripheral):
         return value | NO_CHANGE << 8
 
     def _txfqs(self):
-        put, is_queue = self._put(), self.words[TXBC] >> 24 & 1
+        put, is_queue = self._put(), self.values[TXBC] >> 24 & 1
         get = self.queue[0] if self.queue and not is_queue else 0 if is_queue else put
         if put in self.queue:
             return FULL_QUEUE | get << 8 | put << 16
@@ -422,41 +425,19 @@ class Fdcan(Peripheral):
         lost = bool(self.flags & RFL << 3 * fifo)
         return fill | first << 8 | (first + fill) % PLACES << 16 | (FIFO_FULL if fill == PLACES else 0) | lost << 25
 
-    def read(self, offset, size):
-        registers.check(self, offset, size, registers.WORD)
-        if offset in self.words:
-            return self.words[offset]
-        if offset in FIXED:
-            return FIXED[offset]
-        simple = {CCCR: self.cccr, IR: self.flags, TXBRP: self.pending, TXBCR: self.cancelled, TXBTO: self.sent, TXBCF: self.finished,
-                  TXBAR: 0, ECR: min(self.tec, 255) | (self.rec & 0x7F) << 8 | (self.rec > 127) << 15, RXF0A: 0, RXF1A: 0}
-        if offset in simple:
-            return simple[offset]
+    def load(self, offset):
+        if offset == ECR:
+            return min(self.tec, 255) | (self.rec & 0x7F) << 8 | (self.rec > 127) << 15
         if offset in (RXF0S, RXF1S):
             return self._fifo_status(offset == RXF1S)
         special = {PSR: self._psr, TXFQS: self._txfqs, TSCV: self._stamp}.get(offset)
-        if special is None:
-            raise registers.unmodelled(self, offset, "read")
-        return special()
+        return special() if special else super().load(offset)
 
-    def write(self, offset, value, size):
-        registers.check(self, offset, size, registers.WORD)
-        if offset in PROTECTED:
-            if self.cccr & (INIT | CCE) == INIT | CCE:
-                self.words[offset] = value
-                self.clocks_changed()
-            else:
-                self.board.record("ignored_write", register=f"FDCAN {offset:#x}", value=value)
-        elif offset in KEPT:
-            self.words[offset] = value
-        elif offset == CCCR:
-            self._write_cccr(value)
+    def store(self, offset, value):
+        if offset in PROTECTED and self.cccr & (INIT | CCE) != INIT | CCE:
+            self.board.record("ignored_write", register=f"FDCAN {offset:#x}", value=value)
         elif offset == IR:
             self.flags &= ~value
-        elif offset == TXBAR:
-            self._request(value)
-        elif offset == TXBCR:
-            self._write_cancel(value)
         elif offset in (RXF0A, RXF1A):
             fifo = int(offset == RXF1A)
             released = ((value & 3) - self.first[fifo]) % PLACES + 1
@@ -465,8 +446,12 @@ class Fdcan(Peripheral):
                 self.fill[fifo] -= released
         elif offset == TSCV:
             self.started = self.board.now
-        elif offset != TEST_REGISTER or value:
-            raise registers.unmodelled(self, offset, "write")
+        elif offset in FIXED and (offset != TEST_REGISTER or value):
+            raise unmodelled(self, offset, "write")
+        else:
+            super().store(offset, value)
+        if offset in PROTECTED:
+            self.clocks_changed()
         self._interrupts()
 
     def configure(self, key, value):
@@ -475,7 +460,7 @@ class Fdcan(Peripheral):
         self.bus.configure(key, value)
 
 
-class MessageRam(Peripheral):
+class MessageRam(Registers):
     """FDCAN1's part of the message RAM, which is accessed by words."""
 
     name, base, clock = "SRAMCAN", 0x4000_AC00, "FDCAN"
@@ -484,14 +469,12 @@ class MessageRam(Peripheral):
         super().__init__(board)
         self.can = can
 
-    def read(self, offset, size):
-        registers.check(self, offset, size, registers.WORD)
+    def load(self, offset):
         if offset >= RAM_SIZE:
-            raise registers.unmodelled(self, offset, "read")
+            raise unmodelled(self, offset, "read")
         return self.can._words(offset, 1)[0]
 
-    def write(self, offset, value, size):
-        registers.check(self, offset, size, registers.WORD)
+    def store(self, offset, value):
         if offset >= RAM_SIZE:
-            raise registers.unmodelled(self, offset, "write")
+            raise unmodelled(self, offset, "write")
         self.can.ram[offset : offset + 4] = value.to_bytes(4, "little")

@@ -11,8 +11,7 @@ Settings: `swap_bank`.
 """
 
 from ...violation import Violation
-from ..registers import WORD, check, unmodelled
-from .system import Registers
+from ..registers import Registers
 
 BASE, BANK, SECTOR, QUAD = 0x0800_0000, 1 << 20, 8 << 10, 16
 KEYS = (0x4567_0123, 0xCDEF_89AB)
@@ -30,7 +29,9 @@ class Flash(Registers):
     """ACR, the keys, and the status and control registers of non-secure code."""
 
     name, base = "FLASH", 0x4002_2000
-    kept = {ACR: (0x13, 0x13F)}
+    kept, settings = {ACR: (0x13, 0x13F)}, {"swap_bank"}
+    readers = {NSCR: "control", ECCDETR: "detected"}
+    writers = {NSKEYR: "_key", NSCR: "_write_control"}
     #: As on the STM32F405, bit 5 set: software starts the watchdog.
     options = 1 << 5
 
@@ -39,7 +40,7 @@ class Flash(Registers):
         #: The operation: its end, address, new content. The quad-words whose ECC does not fit, and the hook on their reads.
         self.busy = None
         self.torn, self.hook = set(), None
-        self.swapped = False
+        self.swap_bank = False
 
     def reset(self, cause):
         super().reset(cause)
@@ -56,32 +57,22 @@ class Flash(Registers):
         """Returns the wait states."""
         return self.values[ACR] & 15
 
-    def read(self, offset, size):
-        check(self, offset, size, WORD)
+    def load(self, offset):
         if offset == NSSR:
             return self.status | (BSY if self.busy else 0) | (WBNE if self.buffer else 0)
-        if offset == NSCR:
-            return self.control
-        if offset == ECCDETR:
-            return self.detected
         if offset == OPTSR_CUR:
-            return SWAP_BANK if self.swapped else 0
-        return super().read(offset, size)
+            return SWAP_BANK if self.swap_bank else 0
+        return super().load(offset)
 
-    def write(self, offset, value, size):
-        check(self, offset, size, WORD)
-        if offset == NSKEYR:
-            self._key(value)
-        elif offset == NSCCR:
+    def store(self, offset, value):
+        if offset == NSCCR:
             self.status &= ~(value & FLAGS)
-        elif offset == NSCR:
-            self._write_control(value)
         elif offset == ECCDETR:
             self.detected = 0 if value & ECCD else self.detected
         elif offset == NSSR:
             self.board.record("ignored_write", register="FLASH_NSSR", value=value)
         else:
-            super().write(offset, value, size)
+            super().store(offset, value)
 
     def _key(self, value):
         """Unlocks NSCR by both keys in order; a wrong one locks it until a reset."""
@@ -103,7 +94,7 @@ class Flash(Registers):
         if value & START:
             if not value & SER or value & PG:
                 raise Violation(f"{self.name}: NSCR {value:#x} starts no sector erase")
-            at = (BANK if bool(value & BKSEL) != self.swapped else 0) + (value >> 6 & 0x7F) * SECTOR
+            at = (BANK if bool(value & BKSEL) != self.swap_bank else 0) + (value >> 6 & 0x7F) * SECTOR
             self.board.record("flash_erase", sectors=[at // SECTOR])
             self._begin(BASE + at, b"\xFF" * SECTOR, ERASE_PS)
 
@@ -163,8 +154,3 @@ class Flash(Registers):
         if address & -QUAD in self.torn and not self.detected:
             self.detected = ECCD | 1 << 22 | (address - BASE) % BANK // QUAD
             self.board.nmi()
-
-    def configure(self, key, value):
-        if key != "swap_bank":
-            super().configure(key, value)
-        self.swapped = value

@@ -8,9 +8,8 @@ mode. Assumed: oscillators start as on the STM32F405, and the LSI needs no acces
 Settings: `hse_hz` (None: the probe supplies no clock), `lsi_hz`.
 """
 
-from ...peripheral import Peripheral
 from ...violation import Violation
-from .. import registers
+from ..registers import Registers
 
 PS = 1_000_000_000_000
 HSI_HZ = 64_000_000
@@ -44,10 +43,13 @@ PLL_INPUT = ((1e6, 2e6), (2e6, 4e6), (4e6, 8e6), (8e6, 16e6))
 PLL_VCO = ((192e6, 836e6), (150e6, 420e6))
 
 
-class Rcc(Peripheral):
+class Rcc(Registers):
     """The clock tree with its gates and flags."""
 
     name, base = "RCC", 0x4402_0C00
+    kept = {offset: (RESET_VALUES.get(offset, 0), 0xFFFF_FFFF) for offset in KEPT}
+    readers, writers = {CR: "cr", BDCR: "bdcr", RSR: "flags"}, {CR: "_write_cr", BDCR: "_write_bdcr"}
+    settings = {"hse_hz", "lsi_hz"}
 
     def __init__(self, board):
         super().__init__(board)
@@ -57,13 +59,13 @@ class Rcc(Peripheral):
 
     def _registers(self):
         self.cr, self.bdcr = 0x23, 0
-        self.words = {offset: RESET_VALUES.get(offset, 0) for offset in KEPT}
         self.source, self.lsi_forced = "HSI", False
         self._open_gates()
         self._compute()
 
     def reset(self, cause):
         self.flags = RESET_FLAGS.get(cause, 0) | (0 if cause == "por" else self.flags)
+        super().reset(cause)
         self._registers()
         self.announce_clocks()
 
@@ -76,16 +78,16 @@ class Rcc(Peripheral):
     def clock_hz(self, name):
         """Returns a bus, timer or kernel clock in hertz; 0 while it stands."""
         if name == "FDCAN":
-            source = self.words[CCIPR5] >> 8 & 3
+            source = self.values[CCIPR5] >> 8 & 3
             if source > 1:
                 raise Violation("RCC: FDCAN's clock from PLL2 is not modelled")
             return self.pll_hz(16) if source else self.hse_hz if self.cr & HSERDY else 0
         if name == "RNG":
-            source = self.words[CCIPR5] >> 4 & 3
+            source = self.values[CCIPR5] >> 4 & 3
             if source > 1:
                 raise Violation("RCC: the RNG's clock from the LSE or LSI is not modelled")
             return self.pll_hz(16) if source else 48_000_000 if self.cr & HSI48RDY else 0
-        if name == "USART1" and self.words[CCIPR1] & 7:
+        if name == "USART1" and self.values[CCIPR1] & 7:
             raise Violation("RCC: of USART1's clocks only PCLK2 is modelled")
         return self.hz["PCLK2" if name == "USART1" else name]
 
@@ -101,29 +103,29 @@ class Rcc(Peripheral):
 
     def _open_gates(self):
         self.open = {None, *(name for offset, names in ENABLE.items() for bit, name in names.items()
-                             if self.words[offset] >> bit & 1 and not self.words[offset - DISTANCE] >> bit & 1)}
+                             if self.values[offset] >> bit & 1 and not self.values[offset - DISTANCE] >> bit & 1)}
 
     # -- frequencies -------------------------------------------------------------------------------------------------
 
     def pll_hz(self, shift):
         """Returns an output of PLL1 in hertz: 9 for P, 16 for Q, 24 for R; 0 while it is off."""
-        config, dividers = self.words[PLL1CFGR], self.words[PLL1DIVR]
+        config, dividers = self.values[PLL1CFGR], self.values[PLL1DIVR]
         if not self.cr & PLLRDY or not config >> {9: 16, 16: 17, 24: 18}[shift] & 1:
             return 0
         return self._vco_hz() // ((dividers >> shift & 0x7F) + 1)
 
     def _input_hz(self):
-        return {1: self._hsi_hz(), 3: self.hse_hz or 0}.get(self.words[PLL1CFGR] & 3, 0)
+        return {1: self._hsi_hz(), 3: self.hse_hz or 0}.get(self.values[PLL1CFGR] & 3, 0)
 
     def _vco_hz(self):
-        return self._input_hz() * ((self.words[PLL1DIVR] & 0x1FF) + 1) // max(self.words[PLL1CFGR] >> 8 & 0x3F, 1)
+        return self._input_hz() * ((self.values[PLL1DIVR] & 0x1FF) + 1) // max(self.values[PLL1CFGR] >> 8 & 0x3F, 1)
 
     def _hsi_hz(self):
         return HSI_HZ >> (self.cr >> 3 & 3)
 
     def _compute(self):
         system = {"HSI": self._hsi_hz(), "HSE": self.hse_hz or 0, "PLL1": self.pll_hz(9)}[self.source]
-        prescalers = self.words[CFGR2]
+        prescalers = self.values[CFGR2]
         hclk = system >> AHB_SHIFT.get(prescalers & 15, 0)
         shifts = [APB_SHIFT.get(prescalers >> 4 * bus & 7, 0) for bus in (1, 2, 3)]
         self.hz = {"HCLK": hclk, **{f"PCLK{bus + 1}": hclk >> shift for bus, shift in enumerate(shifts)},
@@ -159,12 +161,12 @@ class Rcc(Peripheral):
             self.announce_clocks()
 
     def _start_pll(self):
-        config = self.words[PLL1CFGR]
+        config = self.values[PLL1CFGR]
         if not (self.cr & HSIRDY if config & 3 == 1 else self.cr & HSERDY if config & 3 == 3 else 0):
             return
         reference = self._input_hz() / max(config >> 8 & 0x3F, 1)
         low, high = PLL_INPUT[config >> 2 & 3]
-        if not config >> 8 & 0x3F or not low <= reference <= high or self.words[PLL1FRACR] or config & 0x10:
+        if not config >> 8 & 0x3F or not low <= reference <= high or self.values[PLL1FRACR] or config & 0x10:
             raise Violation(f"RCC: PLL1 with an input of {reference:.0f} Hz and PLL1CFGR {config:#x}")
         low, high = PLL_VCO[config >> 5 & 1]
         if not low <= self._vco_hz() <= high:
@@ -172,7 +174,7 @@ class Rcc(Peripheral):
         self.board.schedule(100_000_000, lambda: self._ready(PLLON, PLLRDY))
 
     def _switch(self):
-        wanted = SOURCES[self.words[CFGR1] & 3]
+        wanted = SOURCES[self.values[CFGR1] & 3]
         ready = {"HSI": HSIRDY, "HSE": HSERDY, "PLL1": PLLRDY}.get(wanted)
         if ready is None:
             raise Violation("RCC: CSI is not modelled")
@@ -181,7 +183,7 @@ class Rcc(Peripheral):
             self._update()
 
     def _uses(self, oscillator):
-        through = {1: "HSI", 3: "HSE"}.get(self.words[PLL1CFGR] & 3)
+        through = {1: "HSI", 3: "HSE"}.get(self.values[PLL1CFGR] & 3)
         return oscillator == self.source or self.source == "PLL1" and oscillator == through
 
     def _write_cr(self, value):
@@ -232,34 +234,17 @@ class Rcc(Peripheral):
 
     # -- registers ---------------------------------------------------------------------------------------------------
 
-    def read(self, offset, size):
-        registers.check(self, offset, size, registers.WORD)
-        if offset == CR:
-            return self.cr
-        if offset == CFGR1:
-            return self.words[CFGR1] | SOURCES.index(self.source) << 3
-        if offset == BDCR:
-            return self.bdcr
-        if offset == RSR:
-            return self.flags
-        if offset not in self.words:
-            raise registers.unmodelled(self, offset, "read")
-        return self.words[offset]
+    def load(self, offset):
+        return super().load(offset) | (SOURCES.index(self.source) << 3 if offset == CFGR1 else 0)
 
-    def write(self, offset, value, size):
-        registers.check(self, offset, size, registers.WORD)
-        if offset == CR:
-            self._write_cr(value)
-        elif offset == BDCR:
-            self._write_bdcr(value)
-        elif offset == RSR:
+    def store(self, offset, value):
+        if offset == RSR:
             self.flags = 0 if value & RMVF else self.flags
-        elif offset not in self.words:
-            raise registers.unmodelled(self, offset, "write")
         elif offset in (PLL1CFGR, PLL1DIVR) and self.cr & PLLON:
             self.board.record("ignored_write", register=f"RCC {offset:#x}", value=value)
         else:
-            old, self.words[offset] = self.words[offset], value & (~0x38 if offset == CFGR1 else 0xFFFF_FFFF)
+            old = self.values.get(offset, 0)
+            super().store(offset, value & ~0x38 if offset == CFGR1 else value)
             if offset == CFGR1:
                 self._switch()
             elif offset in (CFGR2, CCIPR5):
@@ -271,7 +256,5 @@ class Rcc(Peripheral):
                         self.board.peripherals[name].reset("rcc")
 
     def configure(self, key, value):
-        if key not in ("hse_hz", "lsi_hz"):
-            super().configure(key, value)
-        setattr(self, key, value)
+        super().configure(key, value)
         self.board.peripherals["IWDG"].clocks_changed()

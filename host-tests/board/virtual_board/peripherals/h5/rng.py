@@ -5,7 +5,6 @@ are written while CONDRST is set, and only then here. Assumed: the time of four 
 on ST's other generators of this kind. Settings as on the STM32F405.
 """
 
-from .. import registers
 from ..rng import IE, RNGEN
 from ..rng import Rng as Shared
 
@@ -21,10 +20,11 @@ class Rng(Shared):
     """CR, SR, DR, NSCR and HTCR."""
 
     base, interrupt = 0x420C_0800, 114
+    kept = {NSCR: (0x0003_FFFF, 0xFFFF_FFFF), HTCR: (0x0000_72AC, 0xFFFF_FFFF)}
 
     def reset(self, cause):
         super().reset(cause)
-        self.cr, self.left, self.kept = 0x0087_1F00, 0, {NSCR: 0x0003_FFFF, HTCR: 0x0000_72AC}
+        self.cr, self.left = 0x0087_1F00, 0
 
     def _clock_hz(self):
         return self.board.rcc.clock_hz("RNG") >> (self.cr >> 16 & 15)
@@ -46,13 +46,9 @@ class Rng(Shared):
         self.cr &= ~CONDRST
         self._start()
 
-    def read(self, offset, size):
-        if offset in self.kept:
-            registers.check(self, offset, size, registers.WORD)
-            return self.kept[offset]
+    def load(self, offset):
         if offset != DR:
-            return super().read(offset, size)
-        registers.check(self, offset, size, registers.WORD)
+            return super().load(offset)
         if not self.left:
             return 0
         self.left -= 1
@@ -63,17 +59,13 @@ class Rng(Shared):
         self._interrupt()
         return value
 
-    def write(self, offset, value, size):
-        registers.check(self, offset, size, registers.WORD)
-        if offset in self.kept:
-            if self.cr & CONDRST and not self.cr & CONFIGLOCK:
-                self.kept[offset] = value
-            else:
-                self.board.record("ignored_write", register=f"RNG {offset:#x}", value=value)
+    def store(self, offset, value):
+        if offset in self.kept and (not self.cr & CONDRST or self.cr & CONFIGLOCK):
+            self.board.record("ignored_write", register=f"RNG {offset:#x}", value=value)
         elif offset == CR:
             self._write_cr(value)
         else:
-            super().write(offset, value, size)
+            super().store(offset, value)
 
     def _write_cr(self, value):
         configured = value & CONDRST and not self.cr & CONFIGLOCK

@@ -1,33 +1,10 @@
 """Power control, system configuration and debug support of the STM32H563, each with the registers that an image touches."""
 
-from ...peripheral import Peripheral
-from .. import registers
+from ..registers import Registers
 
 VOSRDY, ACTVOSRDY = 1 << 3, 1 << 13
 #: A new voltage scale is reached after this time, picoseconds. Assumed: the header and the SVD give none.
 SCALE_PS = 20_000_000
-
-
-class Registers(Peripheral):
-    """Registers that keep what is written to their bits: `kept` maps an offset to (reset value, writable bits)."""
-
-    kept: dict[int, tuple[int, int]] = {}
-
-    def reset(self, cause):
-        self.values = {offset: value for offset, (value, _) in self.kept.items()}
-
-    def read(self, offset, size):
-        registers.check(self, offset, size, registers.WORD)
-        if offset not in self.values:
-            raise registers.unmodelled(self, offset, "read")
-        return self.values[offset]
-
-    def write(self, offset, value, size):
-        registers.check(self, offset, size, registers.WORD)
-        if offset not in self.values:
-            raise registers.unmodelled(self, offset, "write")
-        writable = self.kept[offset][1]
-        self.values[offset] = self.values[offset] & ~writable | value & writable
 
 
 class Pwr(Registers):
@@ -45,8 +22,8 @@ class Pwr(Registers):
         """Returns whether DBPCR.DBP lets the backup domain be written."""
         return bool(self.values[0x24])
 
-    def write(self, offset, value, size):
-        super().write(offset, value, size)
+    def store(self, offset, value):
+        super().store(offset, value)
         wanted = self.values[0x10] >> 4
         if offset == 0x10 and wanted != self.scale:
             self.values[0x14] &= ~(VOSRDY | ACTVOSRDY)

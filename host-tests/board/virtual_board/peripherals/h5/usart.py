@@ -8,12 +8,14 @@ second to eighth are not used, since nothing modelled here sends.
 from collections import deque
 
 from ...violation import Violation
-from .. import registers
-from ..usart import DMAR, DMAT, RE, RXNE, TC, TE, UE, Usart
+from ..registers import ANY, WORD, check, cut, unmodelled
+from ..usart import BRR, CR1, CR2, CR3, DMAR, DMAT, DR, RE, RXNE, TC, TE, UE, Usart
 
 FIFOEN, TEACK, REACK = 1 << 29, 1 << 21, 1 << 22
 CLEARABLE = 0x5F
 PLACES = 8
+#: CR2, CR3 and BRR, by where they were.
+MOVED = {0x04: CR2, 0x08: CR3, 0x0C: BRR}
 
 
 class NewUsart(Usart):
@@ -37,45 +39,41 @@ class NewUsart(Usart):
         self.rdr = oldest
 
     def read(self, offset, size):
-        registers.check(self, offset, size, registers.ANY)
-        word = offset & ~3
-        if word == 0x00:
-            value = self.cr1 & 0x9FFC | bool(self.cr1 & UE) | (FIFOEN if self.fifo else 0)
-        elif word == 0x1C:
+        check(self, offset, size, ANY)
+        return cut(self.load(offset & ~3), offset, size)
+
+    def load(self, offset):
+        if offset == 0x00:
+            return self.cr1 & 0x9FFC | bool(self.cr1 & UE) | (FIFOEN if self.fifo else 0)
+        if offset == 0x1C:
             if self.idle_armed:
                 self._detect_idle(self.board.now)
             on = self.cr1 & UE
-            value = self.sr | (TEACK if on and self.cr1 & TE else 0) | (REACK if on and self.cr1 & RE else 0)
-        elif word == 0x24:
+            return self.sr | (TEACK if on and self.cr1 & TE else 0) | (REACK if on and self.cr1 & RE else 0)
+        if offset == 0x24:
             value = self.rdr
             if self.waiting:
                 self.rdr = self.waiting.popleft()
             else:
                 self.sr &= ~RXNE
             self._interrupt()
-        elif word in (0x10, 0x14, 0x18, 0x20, 0x2C):
-            value = 0
-        elif word in (0x04, 0x08, 0x0C):
-            value = (0, self.cr3, self.brr)[word // 4 - 1]
-        else:
-            raise registers.unmodelled(self, offset, "read")
-        return registers.cut(value, offset, size)
+            return value
+        known = {0x04: 0, 0x08: self.cr3, 0x0C: self.brr, **dict.fromkeys((0x10, 0x14, 0x18, 0x20, 0x2C), 0)}
+        if offset not in known:
+            raise unmodelled(self, offset, "read")
+        return known[offset]
 
     def write(self, offset, value, size):
-        registers.check(self, offset, size, registers.ANY if offset == 0x28 else registers.WORD)
+        check(self, offset, size, ANY if offset == 0x28 else WORD)
         if offset == 0x00:
             if value & 0xDFFF_0002:
                 raise Violation(f"{self.name}: CR1 {value:#x} asks for a mode that is not modelled")
             self.fifo = bool(value & FIFOEN)
-            super()._write(0x0C, value & 0xBFFC | (UE if value & 1 else 0), 4)
-        elif offset == 0x04:
-            super()._write(0x10, value, 4)
-        elif offset == 0x08:
-            if value & (DMAR | DMAT):
-                raise Violation(f"{self.name}: DMA is not modelled")
-            super()._write(0x14, value, 4)
-        elif offset == 0x0C:
-            super()._write(0x08, value, 4)
+            self.store(CR1, value & 0xBFFC | (UE if value & 1 else 0))
+        elif offset == 0x08 and value & (DMAR | DMAT):
+            raise Violation(f"{self.name}: DMA is not modelled")
+        elif offset in MOVED:
+            self.store(MOVED[offset], value)
         elif offset == 0x18:
             if value & 8:
                 self.waiting.clear()
@@ -86,9 +84,9 @@ class NewUsart(Usart):
             self._interrupt()
         elif offset == 0x28:
             self.seen_tc = bool(self.sr & TC)
-            super()._write(0x04, value, 2)
+            self.store(DR, value)
         elif offset not in (0x10, 0x14, 0x2C) or value:
-            raise registers.unmodelled(self, offset, "write")
+            raise unmodelled(self, offset, "write")
 
 
 def usarts(board):
