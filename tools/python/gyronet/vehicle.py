@@ -34,7 +34,7 @@ class Vehicle:
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise Refused(f"{path}: not a vehicle file: {error}") from None
         vehicle.path = path
-        if text.get("mounting", {}).get("applied") is True:
+        if isinstance(text.get("mounting"), dict) and text["mounting"].get("applied") is True:
             # As imports wrote it before they wrote what the rows have been turned by.
             turned = {**text.pop("mounting")}
             text.setdefault("recording", {})["mounting"] = {key: turned[key] for key in turned if key in ZERO}

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import datetime
 import json
 import statistics
 from pathlib import Path
@@ -22,8 +21,7 @@ from tqdm import tqdm
 from .export import export
 from .model import GyroNet
 from .recordings import Drive, find_drive, load_pieces, mean_1s_error
-from .spans import Spans
-from .training import Epoch, Settings, Trained, train
+from .training import Epoch, Settings, Trained, Windows, train
 from .validation import Validation
 
 
@@ -41,7 +39,6 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], metavar="N")
     parser.add_argument("--threads", type=int, default=torch.get_num_threads(), help="CPU threads")
     parser.add_argument("--no-turns", dest="turns", action="store_false", help="do not add turns")
-    parser.add_argument("--windows", type=int, default=1, help="windows per span")
     parser.add_argument("--note", help="a sentence for the provenance")
     return parser.parse_args()
 
@@ -73,8 +70,7 @@ def run(args: argparse.Namespace) -> None:
     model, provenance = best_of_seeds(args, validation)
     if args.note:
         provenance["note"] = args.note
-    for path in export(model, provenance, args.out, args.stem):
-        print(path)
+    export(model, provenance, args.out, args.stem)
 
 
 def pieces(folder: Path, names: list[str]) -> list[Drive]:
@@ -87,8 +83,8 @@ def best_of_seeds(args: argparse.Namespace, validation: list[Drive]) -> tuple[Gy
     weights = [len(drive.gyro_error) for drive in validation]
     static = float(np.average([mean_1s_error(drive.gyro_error) for drive in validation], weights=weights))
     print(f"static initialisation: 1 s error {static:.6f} rad")
-    settings = Settings(args.epochs, args.batch, args.lr, args.turns, args.windows, args.patience)
-    spans = Spans(pieces(args.data, args.train), args.windows)
+    settings = Settings(args.epochs, args.batch, args.lr, args.turns, args.patience)
+    data = Windows(pieces(args.data, args.train))
     networks: dict[int, Trained] = {}
     for seed in args.seeds:
 
@@ -96,7 +92,7 @@ def best_of_seeds(args: argparse.Namespace, validation: list[Drive]) -> tuple[Gy
             print(line(f"seed {seed} epoch {epoch.epoch}, loss {epoch.loss:.4f}", epoch.validation), flush=True)
 
         state = args.out / f"{args.stem}.seed{seed}.state"
-        networks[seed] = train(spans, validation, settings, seed, on_epoch, state)
+        networks[seed] = train(data, validation, settings, seed, on_epoch, state)
         print(line(f"seed {seed}, {networks[seed].seconds:.0f} s", networks[seed].validation))
     errors = [network.validation.mean_1s_rad for network in networks.values()]
     seconds = sum(network.seconds for network in networks.values())
@@ -123,9 +119,9 @@ def best_of_seeds(args: argparse.Namespace, validation: list[Drive]) -> tuple[Gy
     (args.out / f"{args.stem}.history.json").write_text(json.dumps(history))
     provenance = {
         "network": "gyronet",
-        "train": list(spans.names),
+        "train": list(data.names),
         "validate": ", ".join(names(validation)),
-        "sha256": {**spans.names, **{d.name: d.sha256 for d in validation}},
+        "sha256": {**data.names, **{d.name: d.sha256 for d in validation}},
         "validation_mean_1s_rad": round(chosen.validation.mean_1s_rad, 7),
         "validation_static_mean_1s_rad": round(static, 7),
         "validation_mean_1s_rad_of_seeds": {s: round(e, 7) for s, e in zip(networks, errors)},
@@ -133,8 +129,6 @@ def best_of_seeds(args: argparse.Namespace, validation: list[Drive]) -> tuple[Gy
         "seed": seed,
         "seconds": round(seconds),
         **dataclasses.asdict(settings),
-        "torch": torch.__version__.split("+")[0],
-        "date": datetime.date.today().isoformat(),
     }
     return chosen.model, provenance
 

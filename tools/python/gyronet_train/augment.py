@@ -1,7 +1,7 @@
 """Turns that the training drives lack, added to the inputs.
 
 A network that is trained on a few drives mistakes an unusual turn for a gyro error. So a yaw rate is added to half of
-the spans, the same to gyro and reference, which does not change their difference, the label. The matching lateral
+the windows, the same to gyro and reference, which does not change their difference, the label. The matching lateral
 acceleration at a random speed and a random longitudinal acceleration are also added.
 """
 
@@ -18,7 +18,7 @@ LONGITUDINAL, LATERAL, YAW_RATE = 0, 1, 5
 
 
 def turn(x: torch.Tensor) -> torch.Tensor:
-    """Adds a turn that is constant over the span to some of the spans (S, L, 6)."""
+    """Adds a turn that is constant over the window to some of the windows (B, WINDOW, 6)."""
     chosen = (torch.rand(len(x)) < TURN_SHARE).float()
     yaw_rate = torch.randn(len(x)) * YAW_RATE_STD
     lateral = (yaw_rate * torch.rand(len(x)) * SPEED_MAX).clamp(-LATERAL_MAX, LATERAL_MAX)

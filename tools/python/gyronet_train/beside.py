@@ -13,7 +13,6 @@ Random levels and turns are added to the input (`disturb`), so that the Bi-LSTM 
 from __future__ import annotations
 
 import argparse
-import datetime
 import statistics
 import time
 from pathlib import Path
@@ -23,9 +22,10 @@ import torch
 
 from .augment import turn
 from .export import export
-from .linear import STRIDE, PARTS, fit, ratio, rows, sums, window_error
+from .linear import PARTS, fit, ratio, rows, sums, window_error
+from .loss import window_loss
 from .model import GyroNet
-from .recordings import STATIC_SAMPLES, WINDOW, Drive, find_drive, load_drive, mean_1s_error, windows
+from .recordings import STATIC_SAMPLES, STRIDE, WINDOW, Drive, find_drive, load_drive, mean_1s_error, overlap_mean, windows
 from .training import calibrate
 
 SHIPPED = ("low pass", "accelerometer")
@@ -33,7 +33,6 @@ UNIT = ("mounting", "gain")
 TILT = 0.5  # m/s^2, 1 sigma: 3 degrees of mounting or street
 BATCH = 512
 LR = 0.004
-LIKELIHOOD_WEIGHT = 0.1
 # Factor on the trained scale. With it 0.85 of the straight seconds of the training drives are within one sigma as the
 # board sends it (`gyronet evaluate`).
 STATED = 0.8
@@ -91,8 +90,7 @@ def train(drives: list[Drive], outputs: np.ndarray, units: int, epochs: int, see
             correction, scale = model(disturb(x))
             by_network = correction - model.linear(x.flatten(1)) if correct else torch.zeros_like(correction)
             error = by_network - data.left[batch]
-            likelihood = (error.detach().mean(1).abs() / scale + torch.log(scale / unit)).mean()
-            loss = LIKELIHOOD_WEIGHT * likelihood + (error.abs().mean() / unit if correct else 0.0)
+            loss = window_loss(error, scale, unit, correct)
             optimiser.zero_grad()
             loss.backward()
             if not correct:
@@ -114,12 +112,7 @@ def estimates(model: GyroNet, drive: Drive) -> tuple[np.ndarray, np.ndarray]:
 def corrected_ratio(model: GyroNet, drive: Drive) -> float:
     """Returns the 1 s error over static initialisation's."""
     corrections, _ = estimates(model, drive)
-    total, count = np.zeros(len(drive.gyro_error)), np.zeros(len(drive.gyro_error))
-    for k in range(WINDOW):
-        samples = np.arange(len(corrections)) * STRIDE + k
-        np.add.at(total, samples, corrections[:, k])
-        np.add.at(count, samples, 1)
-    error = drive.gyro_error - total / np.maximum(count, 1)
+    error = drive.gyro_error - overlap_mean(corrections, len(drive.gyro_error))
     return mean_1s_error(error) / mean_1s_error(drive.gyro_error)
 
 
@@ -191,12 +184,8 @@ def main() -> None:
         "units": args.units,
         "epochs": args.epochs,
         "seed": args.seed,
-        "torch": torch.__version__.split("+")[0],
-        "date": datetime.date.today().isoformat(),
     }
-    args.out.mkdir(parents=True, exist_ok=True)
-    for path in export(model, provenance, args.out, args.stem):
-        print(path)
+    export(model, provenance, args.out, args.stem)
     print(f"{time.monotonic() - started:.0f} s")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import json
 from pathlib import Path
 
@@ -14,15 +15,17 @@ from .model import GyroNet
 GOLDEN_WINDOWS = 8
 
 
-def export(model: GyroNet | FoGNet, provenance: dict, folder: Path, stem: str) -> list[Path]:
-    """Writes STEM.safetensors and STEM.golden.safetensors; returns the paths."""
+def export(model: GyroNet | FoGNet, provenance: dict, folder: Path, stem: str) -> None:
+    """Writes STEM.safetensors and STEM.golden.safetensors, and prints their paths."""
+    provenance = {**provenance, "torch": torch.__version__.split("+")[0], "date": datetime.date.today().isoformat()}
+    folder.mkdir(parents=True, exist_ok=True)
     checkpoint = folder / f"{stem}.safetensors"
     tensors = {name: t.detach().contiguous() for name, t in model.state_dict().items()}
     # There is one metadata value only, since safetensors does not guarantee the order of several.
     save_file(tensors, checkpoint, metadata={"provenance": json.dumps(provenance, sort_keys=True)})
     golden = folder / f"{stem}.golden.safetensors"
     save_file(golden_tensors(model), golden, metadata={"made_by": f"torch {torch.__version__}"})
-    return [checkpoint, golden]
+    print(checkpoint, golden, sep="\n")
 
 
 @torch.no_grad()

@@ -16,21 +16,20 @@ from __future__ import annotations
 
 import argparse
 import copy
-import datetime
 from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors.torch import load_file
 from tqdm import tqdm
 
 from .export import export
 from .fognet_loss import fognet_losses
 from .fognet_model import FoGNet
 from .seconds import FOG, STEPS, Seconds, load_grid, window_rows
+from .training import update_mean
 
 AVERAGE = 0.995  # decay of the weights' average per step
-SETTINGS = ("epochs", "windows", "batch", "lr", "alpha", "padded", "weight_decay", "head_only", "seed")
+SETTINGS = ("epochs", "windows", "batch", "lr", "alpha", "padded", "seed")
 
 
 def arguments() -> argparse.Namespace:
@@ -43,7 +42,6 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--gyro", choices=["DSP-1760", "DSP-3000", "pseudo-FoG"], help="gyro that the weights are for")
     parser.add_argument("--serial", type=int, default=0, help="serial number of the one gyro for the weights; 0: any")
     parser.add_argument("--simulated", action="store_true", help="mark the drives as simulated in the provenance")
-    parser.add_argument("--init", type=Path, metavar="FILE", help="checkpoint to start from")
     parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors files")
     parser.add_argument("--stem", default="fognet", help="name of the files")
     parser.add_argument("--epochs", type=int, default=20)
@@ -52,8 +50,6 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--lr", type=float, default=0.0015)
     parser.add_argument("--alpha", type=float, default=0.5)
     parser.add_argument("--padded", type=float, default=0.1, help="share of padded windows")
-    parser.add_argument("--weight-decay", type=float, default=0.0)
-    parser.add_argument("--head-only", action="store_true", help="train FC3 and FC4 only")
     parser.add_argument("--seed", type=int, default=1)
     return parser.parse_args()
 
@@ -123,14 +119,7 @@ def main() -> None:
         if len(windows.full) == 0:
             raise SystemExit(f"no {what} drive has a minute without a gap")
     model = FoGNet(*normalisation(data))
-    if args.init:
-        # The normalisation constants stay those of these drives.
-        weights = {k: v for k, v in load_file(args.init).items() if k not in dict(model.named_buffers())}
-        model.load_state_dict(weights, strict=False)
-    for name, parameter in model.named_parameters():
-        parameter.requires_grad_(not args.head_only or name.startswith(("fc3", "fc4")))
-    parameters = [p for p in model.parameters() if p.requires_grad]
-    optimiser = torch.optim.AdamW(parameters, lr=args.lr, weight_decay=args.weight_decay)
+    optimiser = torch.optim.Adam(model.parameters(), lr=args.lr)
     batches = min(args.windows, len(data.full)) // args.batch
     if batches == 0:
         raise SystemExit(f"{len(data.full)} full windows to train on, fewer than a batch of {args.batch}")
@@ -153,11 +142,11 @@ def main() -> None:
             loss1, loss2, loss = fognet_losses(correction, label, f1, fog, scale, args.alpha)
             optimiser.zero_grad()
             loss.backward()
-            torch.nn.utils.clip_grad_norm_(parameters, 1.0)
+            torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
             optimiser.step()
             schedule.step()
             step += 1
-            follow(average, model, min(AVERAGE, step / (step + 10)))
+            update_mean(average, model, min(AVERAGE, step / (step + 10)))
             losses += torch.tensor([loss1.item(), loss2.item()]) / batches
         error = validation_error(average, held_out)
         print(f"epoch {epoch}: losses {losses[0]:.4f} {losses[1]:.4f}, validation {error:.7f}", flush=True)
@@ -177,16 +166,11 @@ def main() -> None:
         "sha256": {d.name: d.sha256 for d in [*train, *validate]},
         "validation_mean_60s_rad": round(best[0], 8),
         "validation_uncorrected_mean_60s_rad": round(none, 8),
-        "init": args.init.name if args.init else None,
         "epoch": best[1],
         "constant_taken_out_rad": round(constant, 8),
         **{name: getattr(args, name) for name in SETTINGS},
-        "torch": torch.__version__.split("+")[0],
-        "date": datetime.date.today().isoformat(),
     }
-    args.out.mkdir(parents=True, exist_ok=True)
-    for path in export(model, provenance, args.out, args.stem):
-        print(path)
+    export(model, provenance, args.out, args.stem)
 
 
 @torch.no_grad()
@@ -202,13 +186,6 @@ def take_out_constant(model: FoGNet, data: Windows) -> float:
     mean = total / len(data.full)
     model.fc4.bias -= mean / model.correction_scale
     return mean
-
-
-@torch.no_grad()
-def follow(average: FoGNet, model: FoGNet, decay: float) -> None:
-    """Updates the average of the weights by one step."""
-    for mean, weight in zip(average.parameters(), model.parameters()):
-        mean.lerp_(weight, 1 - decay)
 
 
 if __name__ == "__main__":

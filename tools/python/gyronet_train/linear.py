@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .recordings import RATE_HZ, STATIC_SAMPLES, WINDOW, Drive, mean_1s_error, windows
+from .recordings import RATE_HZ, STATIC_SAMPLES, STRIDE, WINDOW, Drive, mean_1s_error, overlap_mean, windows
 
-STRIDE = 5
 REACH = 5
 FEATURES = 6
 ROLL, PITCH, YAW = 3, 4, 5
@@ -124,13 +123,7 @@ def corrections(outputs: np.ndarray, drive: Drive) -> np.ndarray:
 
 def rate_error(outputs: np.ndarray, drive: Drive) -> np.ndarray:
     """Returns the error (T,) of the rate that is corrected by the mean of overlapping windows."""
-    total, count = np.zeros(len(drive.gyro_error)), np.zeros(len(drive.gyro_error))
-    estimates = corrections(outputs, drive)
-    for k in range(WINDOW):
-        samples = np.arange(len(estimates)) * STRIDE + k
-        total[samples] += estimates[:, k]
-        count[samples] += 1
-    return drive.gyro_error - total / np.maximum(count, 1)
+    return drive.gyro_error - overlap_mean(corrections(outputs, drive), len(drive.gyro_error))
 
 
 def ratio(outputs: np.ndarray, drive: Drive) -> float:

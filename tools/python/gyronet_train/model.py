@@ -69,17 +69,3 @@ class GyroNet(nn.Module):
     def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         outputs = self.layers(x)
         return outputs["gyro_error"], self.output_scale * outputs["log_scale"].exp()
-
-
-def overlap_mean(outputs: torch.Tensor, stride: int, length: int) -> torch.Tensor:
-    """Returns the mean of each sample's estimates from windows `stride` apart; 0 if no window covers the sample.
-
-    `outputs` is (W, N) for the windows that start at 0, stride, 2 stride, ...; the result is (length,).
-    """
-    total = torch.zeros(length)
-    count = torch.zeros(length)
-    starts = torch.arange(outputs.shape[0]) * stride
-    for k in range(outputs.shape[1]):
-        total.index_add_(0, starts + k, outputs[:, k])
-        count.index_add_(0, starts + k, torch.ones(outputs.shape[0]))
-    return total / count.clamp(min=1)

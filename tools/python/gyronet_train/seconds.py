@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .vehicle import read_mounting
+from .recordings import vehicle_of
 
 STEPS = 60  # per window
 FOG = 8  # column of the gyro increment
@@ -61,14 +61,14 @@ def load_grid(path: Path, rates: Path | None = None) -> list[Seconds]:
     """Reads a drive that `gyronet-paper import` wrote: the pieces of whole seconds between its gaps, counted
     from its first row. If `rates` is given, the delayed rates of `gyronet replay --csv` replace the fibre-optic
     gyro: the paper's pseudo-FoG. Raises ValueError with the reason."""
-    mounting = read_mounting(path)
-    digest = hashlib.sha256(path.read_bytes() + mounting.text)
+    vehicle, text = vehicle_of(path)
+    digest = hashlib.sha256(path.read_bytes() + text)
     table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
     missing = [name for name in DRIVE if name not in (table.dtype.names or ())]
     if missing:
         raise ValueError(f"{path}: missing columns {', '.join(missing)}")
     values = np.stack([table[name] for name in DRIVE], axis=1)
-    values[:, 1:4], values[:, 4:7] = mounting.turn(values[:, 1:4]), mounting.turn(values[:, 4:7])
+    values[:, 1:4], values[:, 4:7] = vehicle.turn(values[:, 1:4]), vehicle.turn(values[:, 4:7])
     row = np.round((values[:, 0] - values[0, 0]) * RATE_HZ).astype(int)
     second = row // RATE_HZ
     if rates:

@@ -2,9 +2,7 @@
 
 As in the paper, training uses Adam with an initial rate of 0.0015 and mean absolute error over shuffled
 windows of 0.1 s. Unlike in the paper, turns are added (augment.py), the rate follows one cycle, the
-running mean of the weights is kept, and a scale is trained (loss.py). Windows can be grouped in spans
-that overlap as in the firmware; by default they are not, since it improved neither the 1 s error nor the
-windows' mean error on the validation drive.
+running mean of the weights is kept, and a scale is trained (loss.py).
 
 Random numbers are seeded in each epoch from seed and epoch, so that a resumed training gives the same result as one that
 was not interrupted.
@@ -16,18 +14,18 @@ import copy
 import dataclasses
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import torch
 from tqdm import tqdm
 
 from .augment import turn
-from .loss import span_loss
+from .loss import window_loss
 from .model import GyroNet
-from .recordings import Drive
-from .spans import Spans, cut
+from .recordings import WINDOW, Drive
 from .state import load_state, save_state
 from .validation import Validation, validate_all
 
@@ -39,13 +37,11 @@ class Settings:
     epochs: int
     """Number of passes, each with as many windows as the training drives have samples."""
     batch: int
-    """Approximate number of windows of a batch."""
+    """Number of windows of a batch."""
     lr: float
     """Largest learning rate."""
     turns: bool
     """Whether to add turns."""
-    windows: int
-    """Windows of a span; with one window, the loss ignores the overlap."""
     patience: int
     """Epochs without improvement after which training stops."""
     memory: float = 0.999
@@ -76,8 +72,35 @@ class Trained:
     """All epochs that were run."""
 
 
+class Windows:
+    """All windows of some drives, one from each sample."""
+
+    def __init__(self, drives: list[Drive]):
+        self.names = {drive.name: drive.sha256 for drive in drives}
+        features, gyro_error = (np.concatenate([getattr(d, name) for d in drives]) for name in ("features", "gyro_error"))
+        self.mean = torch.from_numpy(features.mean(axis=0, dtype=float)).float()
+        # Standard deviations of the features, followed by that of the gyro error.
+        deviations = [values.std(axis=0, dtype=float, ddof=1) for values in (features, gyro_error)]
+        self.deviations = torch.from_numpy(np.append(*deviations)).float()
+        self.features, self.gyro_error = torch.from_numpy(features), torch.from_numpy(gyro_error)
+        ends = np.cumsum([len(d.gyro_error) for d in drives])
+        starts = [np.arange(end - len(d.gyro_error), end - WINDOW + 1) for d, end in zip(drives, ends)]
+        self.starts = torch.from_numpy(np.concatenate(starts))
+
+    def batches(self, size: int) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
+        """Yields the windows of an epoch in shuffled batches: features (B, WINDOW, 6), gyro error (B, WINDOW)."""
+        order = self.starts[torch.randperm(len(self.starts))]
+        for chosen in order[: self.epoch(size) * size].view(-1, size):
+            rows = chosen[:, None] + torch.arange(WINDOW)
+            yield self.features[rows], self.gyro_error[rows]
+
+    def epoch(self, size: int) -> int:
+        """Returns the number of batches of an epoch."""
+        return len(self.starts) // size
+
+
 def train(
-    data: Spans,
+    data: Windows,
     validation: list[Drive],
     settings: Settings,
     seed: int,
@@ -115,9 +138,8 @@ def train(
         total = 0.0
         for x, gyro_error in batches:
             x = turn(x) if settings.turns else x
-            correction, scale = model(cut(x).flatten(0, 1))
-            shape = (len(x), settings.windows)
-            loss = span_loss(correction.unflatten(0, shape), scale.view(shape), gyro_error, unit)
+            correction, scale = model(x)
+            loss = window_loss(correction - gyro_error, scale, unit)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()

@@ -7,9 +7,8 @@ from dataclasses import astuple, dataclass
 import numpy as np
 import torch
 
-from .model import GyroNet, overlap_mean
-from .recordings import RATE_HZ, STATIC_SAMPLES, Drive, mean_1s_error, windows
-from .spans import STRIDE
+from .model import GyroNet
+from .recordings import RATE_HZ, STATIC_SAMPLES, STRIDE, Drive, mean_1s_error, overlap_mean, windows
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ def corrections(model: GyroNet, features: np.ndarray) -> tuple[torch.Tensor, tor
 def validate(model: GyroNet, drive: Drive) -> Validation:
     """Runs the network on a drive; returns its errors."""
     output, scale = corrections(model, drive.features)
-    rate_error = drive.gyro_error - overlap_mean(output, STRIDE, len(drive.gyro_error)).numpy()
+    rate_error = drive.gyro_error - overlap_mean(output.numpy(), len(drive.gyro_error))
     yaw_error = np.cumsum(np.append(0.0, rate_error[STATIC_SAMPLES:])) / RATE_HZ
     moving = slice(STATIC_SAMPLES // STRIDE, None)
     label = windows(drive.gyro_error)[::STRIDE].mean(axis=1)[moving]

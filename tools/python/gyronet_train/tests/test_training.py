@@ -7,12 +7,11 @@ from pathlib import Path
 from .needs_torch import torch
 
 from gyronet_train.recordings import find_drive, load_drive
-from gyronet_train.spans import Spans
-from gyronet_train.training import Settings, train
+from gyronet_train.training import Settings, Windows, train
 
 from .made_csv import write_drive
 
-SETTINGS = Settings(epochs=3, batch=256, lr=0.0015, turns=True, windows=1, patience=9)
+SETTINGS = Settings(epochs=3, batch=256, lr=0.0015, turns=True, patience=9)
 
 
 torch.set_num_threads(1)  # Several wait for each other on a busy machine.
@@ -28,11 +27,11 @@ class Training(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = Path(folder.name)
         drives = [load_drive(write_drive(self.folder / f"{name}.csv", 12, k)) for k, name in enumerate("abc")]
-        self.spans, self.validation = Spans(drives[:2], 1), drives[2:]
+        self.data, self.validation = Windows(drives[:2]), drives[2:]
         self.state = self.folder / "a.state"
 
     def train(self, settings=SETTINGS, on_epoch=lambda epoch: None, state=None):
-        return train(self.spans, self.validation, settings, 1, on_epoch, state)
+        return train(self.data, self.validation, settings, 1, on_epoch, state)
 
     def test_a_killed_training_ends_as_the_unbroken_one(self):
         def kill(epoch):
@@ -55,14 +54,14 @@ class Training(unittest.TestCase):
     def test_the_state_of_another_training_is_refused(self):
         self.train(state=self.state)
         with self.assertRaisesRegex(ValueError, r"a\.state: is of a training with other settings"):
-            self.train(Settings(4, 256, 0.0015, True, 1, 9), state=self.state)
-        self.spans.names = {"d": "0"}
+            self.train(Settings(4, 256, 0.0015, True, 9), state=self.state)
+        self.data.names = {"d": "0"}
         with self.assertRaisesRegex(ValueError, "other drives"):
             self.train(state=self.state)
 
     def test_it_stops_early_and_keeps_the_best(self):
         # Steps so large that nothing is learnt.
-        trained = self.train(Settings(9, 256, 100.0, False, 1, 2))
+        trained = self.train(Settings(9, 256, 100.0, False, 2))
         self.assertEqual(len(trained.epochs), trained.epoch + 2)
         self.assertLess(len(trained.epochs), 9)
 
@@ -72,7 +71,3 @@ class Training(unittest.TestCase):
         self.assertEqual(find_drive(self.folder, "monday").stem, "monday 1")
         with self.assertRaisesRegex(ValueError, "no drive matching the name tuesday"):
             find_drive(self.folder, "tuesday")
-
-
-if __name__ == "__main__":
-    unittest.main()
