@@ -2,6 +2,7 @@
 
 import heapq
 import sys
+import unittest
 from itertools import count
 from pathlib import Path
 
@@ -132,3 +133,51 @@ class FakeBoard:
         self.advance(1 * MS)
         self.write("RCC", 0x08, 0x0000_9402)
         self.advance(1 * US)
+
+
+class PeripheralTest(unittest.TestCase):
+    """Tests of the registers of one peripheral, on a board of its own with open gates."""
+
+    name, gates = "", ()
+
+    def setUp(self):
+        self.board = FakeBoard()
+        if self.gates:
+            self.board.enable(*self.gates)
+
+    def read(self, offset, size=4):
+        return self.board.read(self.name, offset, size)
+
+    def write(self, offset, value, size=4):
+        self.board.write(self.name, offset, value, size)
+
+
+class SensorTest(unittest.TestCase):
+    """Tests of an inertial sensor that is fitted on SPI, without the controller: its class, and the time until it answers."""
+
+    fitted, answers_ps = "", 0
+
+    def setUp(self):
+        self.board = FakeBoard()
+        spi = self.board.peripherals["SPI1"]
+        spi.configure("part", self.fitted)
+        self.part = spi.parts[spi.part]
+        self.part.configure("noise", 0)
+        self.board.advance(self.answers_ps)
+
+    def exchange(self, die, *out, mode=(True, True), hz=5_000_000):
+        """What a die answers to bytes in one transfer."""
+        die.select()
+        got = [die.transfer(byte, mode, hz) for byte in out]
+        die.deselect()
+        return bytes(got)
+
+    def read(self, address, count=1):
+        return self.exchange(self.part, address | 0x80, *[0] * count)[1:]
+
+    def write(self, address, value):
+        self.exchange(self.part, address, value)
+
+    def recorded(self, *kinds):
+        found = [event["kind"] for event in self.board.log if event["kind"].startswith(("sensor_", "fifo_", "spi_"))]
+        self.assertEqual([kind for kind in found if kind != "sensor_bandwidth"], list(kinds))

@@ -1,40 +1,16 @@
 """ASM330LHH: ST's registers, the tables of the LSM6DSR's data sheet."""
 
-import unittest
-
-from .fake_board import MS, S, US, FakeBoard
+from .fake_board import MS, S, US, SensorTest
 from virtual_board.violation import Violation
 
 SETTINGS = ((0x12, 0x44), (0x13, 0x06), (0x15, 0x06), (0x17, 0x20), (0x18, 0xE2), (0x19, 0x20), (0x10, 0x56), (0x11, 0x50), (0x09, 0x55))
 
 
-class Sensor(unittest.TestCase):
-    def setUp(self):
-        self.board = FakeBoard()
-        spi = self.board.peripherals["SPI1"]
-        spi.configure("part", "Asm330lhh")
-        self.part = spi.parts[spi.part]
-        self.part.configure("noise", 0)
-        self.board.advance(11 * MS)
-
-    def exchange(self, *out):
-        self.part.select()
-        got = [self.part.transfer(byte, (True, True), 10_000_000) for byte in out]
-        self.part.deselect()
-        return bytes(got[1:])
-
-    def read(self, address, count=1):
-        return self.exchange(address | 0x80, *[0] * count)
+class Sensor(SensorTest):
+    fitted, answers_ps = "Asm330lhh", 11 * MS
 
     def number(self, address, signed=True):
         return int.from_bytes(self.read(address, 2), "little", signed=signed)
-
-    def write(self, address, value):
-        self.exchange(address, value)
-
-    def recorded(self, *kinds):
-        found = [event["kind"] for event in self.board.log if event["kind"].startswith(("sensor_", "fifo_"))]
-        self.assertEqual([kind for kind in found if kind != "sensor_bandwidth"], list(kinds))
 
     def stream(self, mode=6):
         for address, value in SETTINGS:

@@ -1,27 +1,16 @@
 """BMI088: BST-BMI088-DS001."""
 
-import unittest
+from .fake_board import MS, S, US, SensorTest
 
-from .fake_board import MS, S, US, FakeBoard
-
-MODE_0, MODE_3 = (False, False), (True, True)
+MODE_0 = (False, False)
 
 
-class Sensor(unittest.TestCase):
+class Sensor(SensorTest):
+    fitted, answers_ps = "Bmi088", 31 * MS
+
     def setUp(self):
-        self.board = FakeBoard()
-        spi = self.board.peripherals["SPI1"]
-        spi.configure("part", "Bmi088")
-        self.part = spi.parts[spi.part]
-        self.part.configure("noise", 0)
+        super().setUp()
         self.acc, self.gyro = self.part.accelerometer, self.part.gyro
-        self.board.advance(31 * MS)
-
-    def exchange(self, die, *out, mode=MODE_3, hz=5_000_000):
-        die.select()
-        got = [die.transfer(byte, mode, hz) for byte in out]
-        die.deselect()
-        return bytes(got)
 
     def read(self, die, address, count=1):
         skipped = 2 if die is self.acc else 1
@@ -30,10 +19,6 @@ class Sensor(unittest.TestCase):
     def write(self, die, address, value, wait=1 * MS):
         self.exchange(die, address, value)
         self.board.advance(wait)
-
-    def recorded(self, *kinds):
-        found = [event["kind"] for event in self.board.log if event["kind"].startswith(("sensor_", "fifo_", "spi_"))]
-        self.assertEqual([kind for kind in found if kind != "sensor_bandwidth"], list(kinds))
 
     def on(self):
         self.read(self.acc, 0)

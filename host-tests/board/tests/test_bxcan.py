@@ -2,7 +2,7 @@
 
 import unittest
 
-from .fake_board import MS, US, FakeBoard
+from .fake_board import MS, US, PeripheralTest
 from virtual_board.peripherals import can_frame
 from virtual_board.peripherals.can_frame import Frame, frame_bits, priority
 from virtual_board.violation import Violation
@@ -48,19 +48,14 @@ class FrameLength(unittest.TestCase):
         self.assertLess(priority(Frame.of(0x100 << 18, extended=True)), priority(Frame.of(0x101)))
 
 
-class BxCan(unittest.TestCase):
+class BxCan(PeripheralTest):
+    name, gates = "CAN1", ("CAN1", "GPIOA")
+
     def setUp(self):
-        self.board = FakeBoard()
-        self.board.enable("CAN1", "GPIOA")
+        super().setUp()
         self.board.alternate("A", 11, 9)
         self.board.alternate("A", 12, 9)
         self.bus = self.board.peripherals["CAN1"].bus
-
-    def read(self, offset):
-        return self.board.read("CAN1", offset)
-
-    def write(self, offset, value):
-        self.board.write("CAN1", offset, value)
 
     def initialise(self, timing=BTR_500K):
         self.write(MCR, INRQ)

@@ -1,8 +1,6 @@
 """Embedded flash interface: section 3 of RM0090."""
 
-import unittest
-
-from .fake_board import MS, US, FakeBoard
+from .fake_board import MS, US, PeripheralTest
 from virtual_board.violation import Violation
 
 ACR, KEYR, OPTKEYR, SR, CR, OPTCR = 0x00, 0x04, 0x08, 0x0C, 0x10, 0x14
@@ -11,16 +9,12 @@ X32 = 2 << 8
 SECTOR_1 = 0x0800_4000
 
 
-class Flash(unittest.TestCase):
+class Flash(PeripheralTest):
+    name = "FLASH"
+
     def setUp(self):
-        self.board = FakeBoard()
+        super().setUp()
         self.flash = self.board.peripherals["FLASH"]
-
-    def read(self, offset):
-        return self.board.read("FLASH", offset)
-
-    def write(self, offset, value, size=4):
-        self.board.write("FLASH", offset, value, size)
 
     def unlock(self):
         self.write(KEYR, 0x4567_0123)

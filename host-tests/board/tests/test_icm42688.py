@@ -1,32 +1,12 @@
 """ICM-42688-P: DS-000347."""
 
-import unittest
-
-from .fake_board import MS, S, US, FakeBoard
+from .fake_board import MS, S, US, SensorTest
 from virtual_board.peripherals import icm42688_registers as reg
 from virtual_board.violation import Violation
 
-MODE_0 = (False, False)
 
-
-class Sensor(unittest.TestCase):
-    def setUp(self):
-        self.board = FakeBoard()
-        self.sensor = self.board.peripherals["SPI1"].slaves[0]
-        self.sensor.configure("noise", 0)
-        self.board.advance(2 * MS)
-
-    def exchange(self, *out):
-        self.sensor.select()
-        got = [self.sensor.transfer(byte, MODE_0, 1_000_000) for byte in out]
-        self.sensor.deselect()
-        return got[1:]
-
-    def read(self, address, count=1):
-        return bytes(self.exchange(address | 0x80, *[0] * count))
-
-    def write(self, address, value):
-        self.exchange(address, value)
+class Sensor(SensorTest):
+    fitted, answers_ps = "Icm42688", 2 * MS
 
     def start(self, output=8):
         self.write(reg.GYRO_CONFIG0, output)
@@ -105,9 +85,9 @@ class Sensor(unittest.TestCase):
             self.packet()
 
     def test_packet_4_has_20_bits(self):
-        self.sensor.configure("rates_dps", (0, -1 / 131, 10))
-        self.sensor.configure("acceleration_g", (0, -1 / 8192, 1))
-        self.sensor.configure("temperature_c", 30)
+        self.part.configure("rates_dps", (0, -1 / 131, 10))
+        self.part.configure("acceleration_g", (0, -1 / 8192, 1))
+        self.part.configure("temperature_c", 30)
         self.stream()
         self.board.advance(10 * MS)
         packet = self.packet()
@@ -122,12 +102,12 @@ class Sensor(unittest.TestCase):
         self.assertEqual({(b - a) % 65_536 for a, b in zip(stamps, stamps[1:])}, {9_375})
 
     def test_the_oscillator_has_an_error(self):
-        self.sensor.configure("oscillator_error_percent", 1.0)
+        self.part.configure("oscillator_error_percent", 1.0)
         self.stream()
         self.board.advance(10 * S)
-        made = self.sensor.made
-        self.exchange(0x80, 0)
-        self.assertAlmostEqual(self.sensor.made - made, 1010, delta=1)
+        made = self.part.made
+        self.read(0)
+        self.assertAlmostEqual(self.part.made - made, 1010, delta=1)
 
     def test_fifo_full_keeps_the_newest_in_stream_mode(self):
         self.stream()
@@ -144,20 +124,20 @@ class Sensor(unittest.TestCase):
         self.start()
         for code, hz in ((1, 100), (4, 40), (7, 10)):
             self.write(reg.GYRO_ACCEL_CONFIG0, code | code << 4)
-            self.assertEqual(self.sensor.bandwidth_hz(), hz)
+            self.assertEqual(self.part.bandwidth_hz(), hz)
 
     def test_a_tone_above_the_bandwidth_is_damped_and_one_above_half_the_rate_folds_back(self):
         def swing(code):
             self.write(reg.GYRO_ACCEL_CONFIG0, code | code << 4)
             return max(abs(self.rate(0)) for _ in range(100))
 
-        self.sensor.configure("tones", [[0, 95, 10]])
+        self.part.configure("tones", [[0, 95, 10]])
         self.stream()
         self.assertGreater(swing(1), 6)
         self.assertLess(swing(4), 2)
 
     def test_noise_has_the_density_of_the_data_sheet(self):
-        self.sensor.configure("noise", 1)
+        self.part.configure("noise", 1)
         self.write(reg.GYRO_ACCEL_CONFIG0, 0x44)
         self.stream()
         values = []
@@ -173,7 +153,7 @@ class Sensor(unittest.TestCase):
     def test_samples_and_motion_from_a_table(self):
         self.stream()
         now = self.board.now / US
-        self.sensor.configure("motion", [[now, [0, 0, 0], [0, 0, 1]], [now + 1_000_000, [0, 0, 100], [0, 0, 1]]])
+        self.part.configure("motion", [[now, [0, 0, 0], [0, 0, 1]], [now + 1_000_000, [0, 0, 100], [0, 0, 1]]])
         rates = [self.rate(2) for _ in range(50)]
         self.assertAlmostEqual(rates[-1], 50, delta=1.1)
 
@@ -186,6 +166,4 @@ class Sensor(unittest.TestCase):
         self.assertEqual(self.read(reg.PWR_MGMT0)[0], 0)
 
     def test_the_wrong_mode_is_unreadable(self):
-        self.sensor.select()
-        self.sensor.transfer(0xF5, (False, True), 1_000_000)
-        self.assertEqual(self.sensor.transfer(0, (False, True), 1_000_000), 0xFF)
+        self.assertEqual(self.exchange(self.part, 0xF5, 0, mode=(False, True)), b"\xff\xff")

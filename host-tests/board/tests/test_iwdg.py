@@ -1,21 +1,12 @@
 """Independent watchdog: section 21 of RM0090."""
 
-import unittest
-
-from .fake_board import MS, S, US, FakeBoard
+from .fake_board import MS, S, US, FakeBoard, PeripheralTest
 
 KR, PR, RLR, SR = 0, 4, 8, 12
 
 
-class Iwdg(unittest.TestCase):
-    def setUp(self):
-        self.board = FakeBoard()
-
-    def read(self, offset):
-        return self.board.read("IWDG", offset)
-
-    def write(self, offset, value):
-        self.board.write("IWDG", offset, value)
+class Iwdg(PeripheralTest):
+    name = "IWDG"
 
     def test_reset_values_and_lock(self):
         self.assertEqual([self.read(offset) for offset in (KR, PR, RLR, SR)], [0, 0, 0xFFF, 0])

@@ -1,36 +1,32 @@
 """Power control: section 5 of RM0090 with the thresholds of DS8626."""
 
-import unittest
-
-from .fake_board import MS, S, FakeBoard
+from .fake_board import MS, S, PeripheralTest
 
 PVDE = 1 << 4
 
 
-class Pwr(unittest.TestCase):
-    def setUp(self):
-        self.board = FakeBoard()
-        self.board.enable("PWR")
+class Pwr(PeripheralTest):
+    name, gates = "PWR", ("PWR",)
 
     def supply(self, millivolts):
         self.board.configure("PWR", "supply_mv", millivolts)
 
     def pvdo(self):
-        return bool(self.board.read("PWR", 4) & 4)
+        return bool(self.read(4) & 4)
 
     def test_reset_value_selects_scale_1(self):
-        self.assertEqual(self.board.read("PWR", 0), 0x4000)
+        self.assertEqual(self.read(0), 0x4000)
 
     def test_pvdo_only_while_enabled(self):
         self.supply(2000)
         self.assertFalse(self.pvdo())
-        self.board.write("PWR", 0, 0x4000 | PVDE)
+        self.write(0, 0x4000 | PVDE)
         self.assertTrue(self.pvdo())
 
     def test_levels_and_hysteresis(self):
         for level, (falling, rising) in {0: (2040, 2140), 4: (2660, 2760), 7: (3030, 3140)}.items():
             self.supply(3300)
-            self.board.write("PWR", 0, 0x4000 | PVDE | level << 5)
+            self.write(0, 0x4000 | PVDE | level << 5)
             self.supply(falling + 1)
             self.assertFalse(self.pvdo(), level)
             self.supply(falling - 1)
@@ -43,7 +39,7 @@ class Pwr(unittest.TestCase):
     def test_exti_line_16_interrupts_on_the_rising_edge_of_pvdo(self):
         self.board.write("EXTI", 0x00, 1 << 16)
         self.board.write("EXTI", 0x08, 1 << 16)
-        self.board.write("PWR", 0, 0x4000 | PVDE | 4 << 5)
+        self.write(0, 0x4000 | PVDE | 4 << 5)
         self.supply(2600)
         self.assertTrue(self.board.lines[1])
         self.board.write("EXTI", 0x14, 1 << 16)

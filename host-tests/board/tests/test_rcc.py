@@ -1,22 +1,13 @@
 """Reset and clock control: section 7 of RM0090."""
 
-import unittest
-
-from .fake_board import MS, S, US, FakeBoard
+from .fake_board import MS, S, US, PeripheralTest
 from virtual_board.violation import Violation
 
 CR, PLLCFGR, CFGR, CIR, APB1RSTR, AHB1ENR, APB1ENR, CSR = 0x00, 0x04, 0x08, 0x0C, 0x20, 0x30, 0x40, 0x74
 
 
-class Rcc(unittest.TestCase):
-    def setUp(self):
-        self.board = FakeBoard()
-
-    def read(self, offset, size=4):
-        return self.board.read("RCC", offset, size)
-
-    def write(self, offset, value, size=4):
-        self.board.write("RCC", offset, value, size)
+class Rcc(PeripheralTest):
+    name = "RCC"
 
     def test_reset_values(self):
         expected = {CR: 0x83, PLLCFGR: 0x2400_3010, CFGR: 0, CIR: 0, AHB1ENR: 0x0010_0000, APB1ENR: 0, CSR: 0x0E00_0000}

@@ -1,8 +1,6 @@
 """SPI master: section 28 of RM0090."""
 
-import unittest
-
-from .fake_board import US, FakeBoard
+from .fake_board import US, PeripheralTest
 from virtual_board.violation import Violation
 
 CR1, CR2, SR, DR = 0, 4, 8, 12
@@ -27,22 +25,17 @@ class Echo:
         return byte ^ 0xFF
 
 
-class Spi(unittest.TestCase):
+class Spi(PeripheralTest):
+    name, gates = "SPI1", ("SPI1", "GPIOA")
+
     def setUp(self):
-        self.board = FakeBoard()
-        self.board.enable("SPI1", "GPIOA")
+        super().setUp()
         for pin in (5, 6, 7):
             self.board.alternate("A", pin, 5)
         self.spi = self.board.peripherals["SPI1"]
         self.echo = self.spi.slaves[0] = Echo()
         self.board.write("GPIOA", 0x18, 1 << 4)
         self.board.write("GPIOA", 0x00, self.board.read("GPIOA", 0) & ~0x300 | 0x100)
-
-    def read(self, offset):
-        return self.board.read("SPI1", offset)
-
-    def write(self, offset, value):
-        self.board.write("SPI1", offset, value)
 
     def chip_select(self, low):
         self.board.write("GPIOA", 0x18, 1 << 20 if low else 1 << 4)

@@ -1,8 +1,6 @@
 """USARTs: section 30 of RM0090."""
 
-import unittest
-
-from .fake_board import MS, US, FakeBoard
+from .fake_board import MS, US, PeripheralTest
 from virtual_board.violation import Violation
 
 SR, DR, BRR, CR1 = range(0, 0x10, 4)
@@ -10,22 +8,17 @@ RXNE, TC, TXE, ORE, FE, IDLE = 1 << 5, 1 << 6, 1 << 7, 1 << 3, 1 << 1, 1 << 4
 UE_TE_RE = 0x200C
 
 
-class Usart(unittest.TestCase):
+class Usart(PeripheralTest):
+    name, gates = "USART2", ("USART2", "GPIOA")
+
     def setUp(self):
-        self.board = FakeBoard()
-        self.board.enable("USART2", "GPIOA")
+        super().setUp()
         self.usart = self.board.peripherals["USART2"]
         self.board.alternate("A", 2, 7)
         self.board.alternate("A", 3, 7)
         self.write(BRR, 139)
         self.write(CR1, UE_TE_RE)
         self.board.advance(1 * MS)
-
-    def read(self, offset):
-        return self.board.read("USART2", offset)
-
-    def write(self, offset, value):
-        self.board.write("USART2", offset, value)
 
     def test_reset_value(self):
         self.assertEqual(self.board.read("USART6", SR), 0xC0)

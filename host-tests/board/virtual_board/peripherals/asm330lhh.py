@@ -63,7 +63,7 @@ class Asm330lhh(Die):
         self.registers[FREQ_FINE] = self.fine & 0xFF
         self.gyro_on = self.acc_on = None
         self.deflected_at = self.epoch = self.board.now
-        self.number, self.read_from, self.overrun = 0, 0, False
+        self.number, self.overrun = 0, False
 
     def write_takes(self):
         return 0
@@ -135,12 +135,6 @@ class Asm330lhh(Die):
 
     # -- serial interface --------------------------------------------------------------------------------------------
 
-    def deselect(self):
-        if self.read_from:
-            self.board.record("fifo_partial_read", read=self.read_from)
-            self.read_from = 0
-        super().deselect()
-
     def after(self, address):
         return TAG if address == LAST else address + 1 & 0x7F
 
@@ -156,20 +150,13 @@ class Asm330lhh(Die):
         if 0x40 <= address <= 0x43:
             return self.time_stamp(self.board.now) >> 8 * (address - 0x40) & 0xFF if self.registers[CTRL10_C] & 0x20 else 0
         if TAG <= address <= LAST:
-            return self.read_word(address - TAG)
+            if not self.fifo:
+                return 0
+            self.read_from = address - TAG
+            return self.next_byte()
         if address not in self.reset_values:
             self.record("sensor_reserved", access="read", address=address)
         return self.registers.get(address, 0)
-
-    def read_word(self, offset):
-        """Returns a byte of the oldest word, which is gone with its last one."""
-        if not self.fifo:
-            return 0
-        byte, self.read_from = self.fifo[0][offset], offset + 1
-        if self.read_from == 7:
-            self.fifo.pop(0)
-            self.read_from = 0
-        return byte
 
     def write(self, address, value):
         """Writes a register."""

@@ -127,7 +127,7 @@ class Accelerometer(Die):
     def reset(self, takes):
         super().reset(takes)
         self.epoch, self.on_at, self.deflected_at = self.board.now, None, 0
-        self.spi, self.read_from, self.latch, self.over = False, 0, 0, b""
+        self.spi, self.latch, self.over = False, 0, b""
 
     def runs(self):
         """Returns True if the accelerometer is on and not suspended."""
@@ -218,13 +218,7 @@ class Accelerometer(Die):
                 self.over = b"\x44" + self.time(self.board.now).to_bytes(3, "little") + b"\x80\x00" * 512
             byte, self.over = self.over[0], self.over[1:]
             return byte
-        frame = self.fifo[0]
-        byte = frame[self.read_from]
-        self.read_from += 1
-        if self.read_from == len(frame):
-            self.fifo.pop(0)
-            self.read_from = 0
-        return byte
+        return self.next_byte()
 
     def write(self, address, value):
         """Writes a register."""

@@ -47,7 +47,7 @@ class Icm42688(Die):
         self.locked_until = 0
         self.gyro_on = self.accel_on = None
         self.epoch = self.board.now
-        self.read_from = self.count_latch = 0
+        self.count_latch = 0
 
     def runs(self):
         """Returns True if a sensor is on."""
@@ -108,13 +108,6 @@ class Icm42688(Die):
 
     # -- serial interface (section 9) --------------------------------------------------------------------------------
 
-    def deselect(self):
-        """Handles a rising CS: a packet that was read in part is kept whole."""
-        if self.read_from:
-            self.board.record("fifo_partial_read", read=self.read_from)
-            self.read_from = 0
-        super().deselect()
-
     def after(self, address):
         return address if address == reg.FIFO_DATA and self.bank == 0 else address + 1 & 0x7F
 
@@ -125,7 +118,7 @@ class Icm42688(Die):
         if self.bank:
             return self._stored(address)
         if address == reg.FIFO_DATA:
-            return self._read_fifo()
+            return self.next_byte() if self.fifo else 0xFF
         if address == reg.FIFO_COUNTH:
             # It latches both bytes (section 14.28).
             self.count_latch = sum(map(len, self.fifo)) - self.read_from
@@ -142,17 +135,6 @@ class Icm42688(Die):
         if address not in self.banks[self.bank]:
             self.board.record("sensor_reserved", bank=self.bank, address=address, access="read")
         return self.banks[self.bank].get(address, 0)
-
-    def _read_fifo(self):
-        if not self.fifo:
-            return 0xFF
-        packet = self.fifo[0]
-        byte = packet[self.read_from]
-        self.read_from += 1
-        if self.read_from == len(packet):
-            self.fifo.pop(0)
-            self.read_from = 0
-        return byte
 
     def may_write(self, address, value):
         if self.board.now < self.locked_until:

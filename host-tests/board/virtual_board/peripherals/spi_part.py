@@ -36,7 +36,7 @@ class Die:
         self.registers, self.motion.stopped = dict(self.reset_values), False
         self.answers_from = self.board.now + takes
         self.written_at = -PS
-        self.fifo, self.lost = [], 0
+        self.fifo, self.read_from, self.lost = [], 0, 0
         self.address, self.bytes, self.reading = None, 0, False
         self.restart()
 
@@ -77,7 +77,10 @@ class Die:
         self.address, self.bytes = None, 0
 
     def deselect(self):
-        """Handles a rising chip select."""
+        """Handles a rising chip select. A frame that was read in part is kept whole."""
+        if self.read_from:
+            self.board.record("fifo_partial_read", read=self.read_from)
+            self.read_from = 0
         self.address = None
 
     def transfer(self, byte, mode, hz):
@@ -103,6 +106,15 @@ class Die:
         address = self.address
         self.address = self.after(address)
         return self.read(address)
+
+    def next_byte(self):
+        """Returns the next byte of the oldest frame in the FIFO; with its last one the frame is gone."""
+        frame, at = self.fifo[0], self.read_from
+        self.read_from = at + 1
+        if self.read_from == len(frame):
+            self.fifo.pop(0)
+            self.read_from = 0
+        return frame[at]
 
     def after(self, address):
         """Returns the address that is read next."""
