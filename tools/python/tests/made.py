@@ -2,7 +2,10 @@
 
 import contextlib
 import io
+import shutil
 import struct
+import tempfile
+import unittest
 import warnings
 from pathlib import Path
 
@@ -207,3 +210,38 @@ def ulog(path, topics, version=1, rubbish_at=None, rubbish=bytes(37)):
     for k, (_, _, bytes_) in enumerate(sorted(data)):
         out += record("D", bytes_) + (sync if k % 50 == 49 else b"") + (rubbish + sync if k == rubbish_at else b"")
     Path(path).write_bytes(out)
+
+
+class Case(unittest.TestCase):
+    """Imports of logs in a folder of its own."""
+
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def path(self, name):
+        return self.folder / name
+
+    def imports(self, *arguments, says=()):
+        status, text = run(self.folder, "import", *arguments)
+        self.assertEqual(status, 0, text)
+        for words in says:
+            self.assertIn(words, text)
+        return drive(self.folder) if "out.csv" in arguments else text
+
+    def refuses(self, *arguments, says=()):
+        before = sorted(self.folder.rglob("*"))
+        status, text = run(self.folder, "import", *arguments)
+        self.assertEqual(status, 1, text)
+        self.assertEqual((text.count("\n"), text[:7]), (1, "error: "), text)
+        for words in says:
+            self.assertIn(words, text)
+        self.assertEqual(sorted(self.folder.rglob("*")), before, "something was left behind")
+
+    def has_wheels(self, drive, first=0.0):
+        """The wheels of the made drive, within the bus's resolution and its 40 ms."""
+        t = drive["t_s"]
+        inside = (t > max(first, 4.2)) & (t < 11.8)
+        for column, side in ((1, 1), (2, 1), (3, -1), (4, -1)):
+            truth = (speed(t) + side * 0.75 * turn(t)) / 0.3
+            self.assertLess(np.nanmax(np.abs(drive[f"wheel{column}_rate"] - truth)[inside]), 0.05)

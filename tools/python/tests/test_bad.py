@@ -2,13 +2,10 @@
 
 import os
 import random
-import shutil
 import subprocess
 import sys
-import tempfile
 import tomllib
 import unittest
-from pathlib import Path
 
 import made
 
@@ -50,10 +47,9 @@ ARGUMENTS = [
 ]
 
 
-class Bad(unittest.TestCase):
+class Bad(made.Case):
     def setUp(self):
-        self.folder = Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, self.folder)
+        super().setUp()
         t = made.times()
         made.table(self.folder / "d.csv", t, made.imu(t))
         made.table(self.folder / "slow.csv", 5 * t, made.imu(t))
@@ -62,23 +58,16 @@ class Bad(unittest.TestCase):
         (self.folder / "bad.toml").write_text("[wheels]\nradius = 0.3\n")
         (self.folder / "long.toml").write_text("[wheels]\nradius_m = 30\n")
 
-    def refused(self, arguments, words):
-        before = sorted(self.folder.rglob("*"))
-        status, text = made.run(self.folder, "import", *arguments)
-        self.assertEqual((status, text.count("\n"), text[:7]), (1, 1, "error: "), (arguments, text))
-        self.assertIn(words, text)
-        self.assertEqual(sorted(self.folder.rglob("*")), before, arguments)
-
     def test_files_that_are_no_logs(self):
         for name, (content, words) in TEXTS.items():
             with self.subTest(name):
                 (self.folder / name).write_bytes(content)
-                self.refused([name, "--out", "out.csv"], words)
+                self.refuses(name, "--out", "out.csv", says=[words])
 
     def test_arguments(self):
         for arguments, words in ARGUMENTS:
             with self.subTest(arguments):
-                self.refused(arguments if "--out" in arguments else [*arguments, "--out", "out.csv"], words)
+                self.refuses(*arguments, *([] if "--out" in arguments else ["--out", "out.csv"]), says=[words])
 
     def test_damaged_bytes_never_end_in_a_traceback(self):
         t, rng = made.times(5.0), random.Random(36)
@@ -107,7 +96,7 @@ class Bad(unittest.TestCase):
         self.assertLess(abs(drive["gyr_z"] - made.turn(drive["t_s"])).max(), 0.03)
         stamp = int(made.START).to_bytes(4)[:3]
         path.write_bytes(path.read_bytes().replace(bytes(4) + stamp, b"\x00\x01\x00\x00" + stamp))
-        self.refused(["d.mcap", "--out", "wrong.csv"], "no IMU in the files")
+        self.refuses("d.mcap", "--out", "wrong.csv", says=["no IMU in the files"])
 
     def test_a_cut_mcap_gives_what_is_there(self):
         t = made.times()

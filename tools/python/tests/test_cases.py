@@ -2,52 +2,15 @@
 
 import gzip
 import math
-import shutil
-import tempfile
-import unittest
 from datetime import datetime, timezone
-from pathlib import Path
 
 import can
 import numpy as np
 
 import made
-from made import START, VEHICLE, bus, dbc, frames, imu, run, table, times
+from made import START, VEHICLE, Case, bus, dbc, frames, imu, run, table, times
 
 SAME = ["--same-clock", "--vehicle", "v.toml", "--out", "out.csv"]
-
-
-class Case(unittest.TestCase):
-    def setUp(self):
-        self.folder = Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, self.folder)
-
-    def path(self, name):
-        return self.folder / name
-
-    def imports(self, *arguments, says=()):
-        status, text = run(self.folder, "import", *arguments)
-        self.assertEqual(status, 0, text)
-        for words in says:
-            self.assertIn(words, text)
-        return made.drive(self.folder) if "out.csv" in arguments else text
-
-    def refuses(self, *arguments, says=()):
-        before = sorted(self.folder.iterdir())
-        status, text = run(self.folder, "import", *arguments)
-        self.assertEqual(status, 1, text)
-        self.assertEqual((text.count("\n"), text[:7]), (1, "error: "), text)
-        for words in says:
-            self.assertIn(words, text)
-        self.assertEqual(sorted(self.folder.iterdir()), before, "something was left behind")
-
-    def has_wheels(self, drive, first=0.0):
-        """The wheels of the made drive, within the bus's resolution and its 40 ms."""
-        t = drive["t_s"]
-        inside = (t > max(first, 4.2)) & (t < 11.8)
-        for column, side in ((1, 1), (2, 1), (3, -1), (4, -1)):
-            truth = (made.speed(t) + side * 0.75 * made.turn(t)) / 0.3
-            self.assertLess(np.nanmax(np.abs(drive[f"wheel{column}_rate"] - truth)[inside]), 0.05)
 
 
 class OfADrive(Case):

@@ -1,9 +1,7 @@
 """Corrected bags: the board's rates in the IMU's messages, its quality beside them, and nothing else changed."""
 
 import shutil
-import tempfile
 import unittest
-from pathlib import Path
 
 import numpy as np
 from rosbags.highlevel import AnyReader
@@ -20,10 +18,9 @@ KINDS = ["one.bag", "lite", "cap", "zst", "d.mcap", "lone.db3"]
 MOUNTING = "[mounting]\nroll_deg = 10.0\npitch_deg = -20.0\nyaw_deg = 90.0\n"
 
 
-class Correct(unittest.TestCase):
+class Correct(made.Case):
     def setUp(self):
-        self.folder = Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, self.folder)
+        super().setUp()
         self.t = made.times(20.0, 100.0)
         self.rows = made.imu(self.t)
 

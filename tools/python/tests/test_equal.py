@@ -2,9 +2,6 @@
 
 import os
 import random
-import shutil
-import tempfile
-import unittest
 from pathlib import Path
 
 import asammdf
@@ -26,11 +23,7 @@ def channels(path, bus=None):
     return opened.read(Path(path), Request([path]), bus or Bus(None, []), False).channels
 
 
-class Equal(unittest.TestCase):
-    def setUp(self):
-        self.folder = Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, self.folder)
-
+class Equal(made.Case):
     def test_random_dbc_files_as_cantools(self):
         rng = random.Random(36)
         for number in range(300):

@@ -1,11 +1,7 @@
 """Wheel settings from DBC files."""
 
 import json
-import shutil
-import tempfile
 import tomllib
-import unittest
-from pathlib import Path
 
 import made
 
@@ -20,11 +16,7 @@ REFUSED = [
 ]
 
 
-class FromDbc(unittest.TestCase):
-    def setUp(self):
-        self.folder = Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, self.folder)
-
+class FromDbc(made.Case):
     def run_(self, *arguments, **more):
         made.dbc(self.folder / "car.dbc", **more)
         status, text = made.run(self.folder, "wheels", "from-dbc", "car.dbc", *arguments)
