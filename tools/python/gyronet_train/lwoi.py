@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import datetime
-import json
 import time
 from pathlib import Path
 
@@ -23,7 +21,7 @@ import torch
 from .lwoi_motion import odometry_errors
 from .lwoi_process import Settings, Trained, train
 from .lwoi_run import MODES, Expected, run
-from .results import mean_numbers, run_mode, test_all
+from .results import run_mode, test_all, write_report
 from .sequence import STEPS, Sequence, SequenceError, load_pieces
 from .trajectory import Track, trajectory_error
 
@@ -105,24 +103,16 @@ def main() -> None:
     process = fit(drives, errors, args)
     model = Model(process, errors.mean(axis=0), (errors**2).mean(axis=0))
     results = test_all(args.test, args.out, MODES, lambda drive: test(drive, model, args.out))
-    means = {mode: mean_numbers(results, mode) for mode in MODES}
     report = {
         "method": "lwoi",
         "train": {drive.name: drive.sha256 for drive in drives},
         "settings": dataclasses.asdict(process.settings),
         "every": args.every,
         "seconds": round(process.seconds, 1),
-        "tests": results,
-        "means": means,
         "torch": torch.__version__.split("+")[0],
         "gpytorch": gpytorch.__version__,
-        "date": datetime.date.today().isoformat(),
     }
-    path = args.out / "lwoi.json"
-    path.write_text(json.dumps(report, indent=2) + "\n")
-    for mode in MODES:
-        print(f"means of {mode}: {means[mode]}")
-    print(path)
+    write_report(args.out / "lwoi.json", report, results, MODES)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,8 @@ it has a reason instead of numbers, and no trajectory.
 
 from __future__ import annotations
 
+import datetime
+import json
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -72,3 +74,13 @@ def mean_numbers(results: dict[str, dict], mode: str) -> dict:
     rows = [row for row in rows if "left_out" not in row]
     means = {key: round(float(np.mean([row[key] for row in rows])), 3) for key in (rows[0] if rows else {})}
     return {"sequences": len(rows), "left_out": len(results) - len(rows), **means}
+
+
+def write_report(path: Path, report: dict, results: dict[str, dict], modes: Iterable[str]) -> None:
+    """Writes a report with the numbers of the tests, their means and the date; prints the means."""
+    means = {mode: mean_numbers(results, mode) for mode in modes}
+    report = {**report, "tests": results, "means": means, "date": datetime.date.today().isoformat()}
+    path.write_text(json.dumps(report, indent=2) + "\n")
+    for mode, numbers in means.items():
+        print(f"means of {mode}: {numbers}")
+    print(path)

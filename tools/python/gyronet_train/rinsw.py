@@ -13,14 +13,12 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import datetime
-import json
 import time
 from pathlib import Path
 
 import torch
 
-from .results import mean_numbers, run_mode, test_all
+from .results import run_mode, test_all, write_report
 from .rinsw_detector import THRESHOLDS, DetectorError, Detectors, Settings, load_detectors, train
 from .rinsw_filter import Noise
 from .rinsw_profiles import PROFILES, Limits, agreement, label
@@ -93,16 +91,9 @@ def main() -> None:
         "thresholds": dict(zip(PROFILES, THRESHOLDS.tolist())),
         "limits": dataclasses.asdict(Limits()),
         "noise": dataclasses.asdict(Noise()),
-        "tests": results,
-        "means": {mode: mean_numbers(results, mode) for mode in args.modes},
         "torch": torch.__version__.split("+")[0],
-        "date": datetime.date.today().isoformat(),
     }
-    path = args.out / "rinsw.json"
-    path.write_text(json.dumps(report, indent=2) + "\n")
-    for mode, means in report["means"].items():
-        print(f"means of {mode}: {means}")
-    print(path)
+    write_report(args.out / "rinsw.json", report, results, args.modes)
 
 
 if __name__ == "__main__":

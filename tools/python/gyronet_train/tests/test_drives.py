@@ -1,22 +1,21 @@
 """Drives as `gyronet import` writes them: pieces between gaps, for GyroNet and for FoGNet."""
 
-import tempfile
 import unittest
-from pathlib import Path
 
 import numpy as np
 
 from gyronet_train.recordings import load_drive, load_pieces
 from gyronet_train.seconds import DRIVE, STEPS, load_grid, window_rows
 
+from .in_folder import InFolder
+
 GYR_Z, FOG, REFERENCE = DRIVE.index("gyr_z"), DRIVE.index("fog_rad"), DRIVE.index("ref_gyr_z")
 
 
-class Gaps(unittest.TestCase):
+class Gaps(InFolder):
     def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.path = Path(temporary.name) / "any name.csv"
+        super().setUp()
+        self.path = self.folder / "any name.csv"
         rows = np.random.default_rng(1).normal(size=(2400, len(DRIVE)))
         rows[:, 0] = np.arange(2400) / 100
         self.rows = rows

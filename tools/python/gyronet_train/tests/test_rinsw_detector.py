@@ -1,9 +1,7 @@
 """RINS-W's detectors: what they learn, what they may see, their files; and the labels of the profiles."""
 
-import tempfile
 import unittest
 from dataclasses import replace
-from pathlib import Path
 
 from .needs_torch import torch
 
@@ -12,6 +10,7 @@ import numpy as np
 from gyronet_train.rinsw_detector import WINDOW, DetectorError, Detectors, Settings, load_detectors, train
 from gyronet_train.rinsw_profiles import Limits, agreement, label
 
+from .in_folder import InFolder
 from .made_drive import make_drive
 
 SETTINGS = Settings(units=8, steps=60, batch=8, rate=0.02)
@@ -83,11 +82,10 @@ class Past(unittest.TestCase):
         self.assertEqual(sum(p.numel() for p in network.parameters()), count)
 
 
-class Files(unittest.TestCase):
+class Files(InFolder):
     def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.path = Path(temporary.name) / "detectors.safetensors"
+        super().setUp()
+        self.path = self.folder / "detectors.safetensors"
 
     def test_what_is_written_is_read_as_it_was(self):
         samples, labels = shaken_or_still(1, 6)

@@ -3,10 +3,8 @@
 import contextlib
 import io
 import json
-import tempfile
 import unittest
 from dataclasses import replace
-from pathlib import Path
 from unittest.mock import patch
 
 from .needs_torch import torch
@@ -19,6 +17,7 @@ from gyronet_train.rinsw_detector import Detectors, Settings
 from gyronet_train.rinsw_profiles import label
 from gyronet_train.rinsw_run import gates, run
 
+from .in_folder import InFolder
 from .made_drive import START, make_drive, start_and_go, write_kaist
 
 
@@ -70,12 +69,7 @@ class Runs(unittest.TestCase):
         self.assertFalse(gates(detected, true, "inertial").any())
 
 
-class Command(unittest.TestCase):
-    def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.folder = Path(temporary.name)
-
+class Command(InFolder):
     def call(self, *words):
         with patch("sys.argv", ["rinsw", *map(str, words)]), contextlib.redirect_stdout(io.StringIO()):
             main()

@@ -1,21 +1,17 @@
 """Sequences in the layout of KAIST Urban: what is read, and what is refused."""
 
-import tempfile
-import unittest
-from pathlib import Path
-
 import numpy as np
 
 from gyronet_train.sequence import SequenceError, load_sequence
 
+from .in_folder import InFolder
 from .made_drive import SECONDS, SPEED, make_drive, start_and_go, write_kaist
 
 
-class Files(unittest.TestCase):
+class Files(InFolder):
     def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.folder = Path(temporary.name) / "made"
+        super().setUp()
+        self.folder = self.folder / "made"
         self.drive = start_and_go()
         write_kaist(self.drive, self.folder)
 

@@ -1,14 +1,11 @@
 """Training goes on from its state, and stops early."""
 
-import tempfile
-import unittest
-from pathlib import Path
-
 from .needs_torch import torch
 
 from gyronet_train.recordings import find_drive, load_drive
 from gyronet_train.training import Settings, Windows, train
 
+from .in_folder import InFolder
 from .made_csv import write_drive
 
 SETTINGS = Settings(epochs=3, batch=256, lr=0.0015, turns=True, patience=9)
@@ -21,11 +18,9 @@ class Killed(Exception):
     pass
 
 
-class Training(unittest.TestCase):
+class Training(InFolder):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = Path(folder.name)
+        super().setUp()
         drives = [load_drive(write_drive(self.folder / f"{name}.csv", 12, k)) for k, name in enumerate("abc")]
         self.data, self.validation = Windows(drives[:2]), drives[2:]
         self.state = self.folder / "a.state"

@@ -2,9 +2,7 @@
 
 import contextlib
 import io
-import tempfile
 import unittest
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -13,6 +11,7 @@ from gyronet_train.results import mean_numbers, run_mode, test_all
 from gyronet_train.sequence import STEPS
 from gyronet_train.trajectory import FilterError, Track, consistency, trajectory_error, write_tum
 
+from .in_folder import InFolder
 from .made_drive import SECONDS, START, make_drive, start_and_go, write_kaist
 
 
@@ -37,13 +36,6 @@ class Errors(unittest.TestCase):
         across = np.linalg.inv(track.covariance[1:, 2:5, 2:5])[:, 1, 1] * sigma[1:] ** 2
         drive.position[::STEPS, 0] += sigma
         self.assertAlmostEqual(consistency(drive, track), across.mean() / 3, places=6)
-
-
-class InFolder(unittest.TestCase):
-    def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.folder = Path(temporary.name)
 
 
 class Files(InFolder):
