@@ -82,9 +82,10 @@ class Program:
         """Reads a processor register."""
         return self.board.processor.get(name)
 
-    def run(self, instructions: int) -> None:
-        """Runs for the time of so many instructions."""
+    def run(self, instructions: int) -> "Program":
+        """Runs for the time of so many instructions; returns itself."""
         self.board.run(self.board.now + instructions * INSTRUCTION)
+        return self
 
     def words(self, address: int, count: int) -> tuple[int, ...]:
         """Reads words of memory."""

@@ -25,8 +25,7 @@ class Resets(unittest.TestCase):
     def test_software_resets_with_the_key_alone(self):
         # str r1, [r0]; movs r4, #9; b .
         for value, reset in ((0x05FA_0004, True), (0x1234_0004, False)):
-            program = Program("01600924fee7", r0=0xE000_ED0C, r1=value, r4=0)
-            program.run(1)
+            program = Program("01600924fee7", r0=0xE000_ED0C, r1=value, r4=0).run(1)
             program.run(6)
             self.assertEqual(program.board.log[-1].get("cause") == "software", reset)
 
@@ -40,8 +39,7 @@ class Resets(unittest.TestCase):
         self.assertNotEqual(before, first.memory_read(0x2000_4000, 64))
 
     def test_nothing_happens_without_power_but_time(self):
-        program = Program(HERE)
-        program.run(10)
+        program = Program(HERE).run(10)
         program.board.power_off()
         instructions = program.board.instructions
         program.board.run(program.board.now + 1_000 * US)
@@ -70,8 +68,7 @@ class Snapshots(unittest.TestCase):
 
     def test_a_restored_board_does_the_same_again(self):
         # str r1, [r0]; adds r1, r1, #1; push {r1}; b .-6
-        program = Program("0160491c02b4fff7fbbf", r0=0x4000_0000, r1=1)
-        program.run(50)
+        program = Program("0160491c02b4fff7fbbf", r0=0x4000_0000, r1=1).run(50)
         snapshot = Snapshot(program.board)
         program.run(100)
         later = self.state(program)

@@ -24,8 +24,7 @@ SPOIL_FPU = "b0ee000a7047"
 
 class Entry(unittest.TestCase):
     def test_an_svc_stores_the_frame_of_eight_words(self):
-        program = Program(SVC_WITH_REGISTERS, lr=0xAAAA_AAAA)
-        program.run(30)
+        program = Program(SVC_WITH_REGISTERS, lr=0xAAAA_AAAA).run(30)
         self.assertEqual(program.handler, SVC)
         self.assertEqual(program.get("sp"), STACK - 32)
         *general, pc, xpsr = program.words(STACK - 32, 8)
@@ -43,8 +42,7 @@ class Entry(unittest.TestCase):
 
     def test_a_return_goes_on_behind_the_svc_with_the_old_stack_and_flags(self):
         # movs r5, #0 (sets Z); svc #0; mov r4, r7; b . -- the handler clears Z: movs r5, #1; bx lr
-        program = Program("002500df3c46fee7", {SVC: "01257047"}, stack=STACK - 4, r4=0, r7=9)
-        program.run(2)
+        program = Program("002500df3c46fee7", {SVC: "01257047"}, stack=STACK - 4, r4=0, r7=9).run(2)
         program.run(20)
         self.assertEqual(program.get("r4"), 9)
         self.assertEqual(program.get("sp"), STACK - 4)
@@ -53,16 +51,14 @@ class Entry(unittest.TestCase):
         self.assertIsNone(program.handler)
 
     def test_a_thread_on_the_process_stack_returns_to_it(self):
-        program = Program(ON_PROCESS_STACK, {SVC: RETURN}, r4=0)
-        program.run(60)
+        program = Program(ON_PROCESS_STACK, {SVC: RETURN}, r4=0).run(60)
         self.assertEqual(program.get("r4"), 9)
         self.assertEqual(program.get("sp"), STACK - 256)
         self.assertEqual(program.get("msp"), STACK)
         self.assertEqual(program.get("control") & 2, 2)
 
     def test_a_handler_runs_on_the_main_stack(self):
-        program = Program(ON_PROCESS_STACK)
-        program.run(30)
+        program = Program(ON_PROCESS_STACK).run(30)
         self.assertEqual(program.handler, SVC)
         self.assertEqual(program.get("lr"), 0xFFFF_FFFD)
         self.assertEqual(program.get("psp"), STACK - 256 - 32)
@@ -70,8 +66,7 @@ class Entry(unittest.TestCase):
         self.assertEqual(program.get("control") & 2, 0)
 
     def test_a_program_that_used_the_fpu_has_a_frame_of_26_words(self):
-        program = Program(WITH_FPU)
-        program.run(30)
+        program = Program(WITH_FPU).run(30)
         self.assertEqual(program.get("sp"), STACK - 104)
         self.assertEqual(program.get("lr"), 0xFFFF_FFE9)
         stored = program.words(STACK - 104, 26)
@@ -80,8 +75,7 @@ class Entry(unittest.TestCase):
 
     def test_a_return_restores_the_fpu_and_fpscr_for_its_next_instruction(self):
         """DDI0403 B1.5.8, PopStack: FPSCR comes from the frame, with the flags of the comparison before the exception."""
-        program = Program(COMPARED, {SVC: SPOIL_FPU})
-        program.run(60)
+        program = Program(COMPARED, {SVC: SPOIL_FPU}).run(60)
         self.assertIsNone(program.handler)
         self.assertEqual(program.get("d0") & 0xFFFF_FFFF, 0x3F80_0000)
         self.assertEqual(program.get("control") & 4, 4)
@@ -129,8 +123,7 @@ class Priorities(unittest.TestCase):
         self.assertEqual(program.board.nvic.active, 0)
 
     def test_primask_holds_an_interrupt_back_until_it_is_cleared(self):
-        program = Program(MASKED)
-        program.run(2)
+        program = Program(MASKED).run(2)
         self.pend(program, n3=0)
         program.run(2)
         self.assertIsNone(program.handler)
@@ -138,8 +131,7 @@ class Priorities(unittest.TestCase):
         self.assertEqual(program.handler, 16 + 3)
 
     def test_basepri_holds_back_its_own_priority_and_lower_ones(self):
-        program = Program(MASKED_BY_PRIORITY)
-        program.run(2)
+        program = Program(MASKED_BY_PRIORITY).run(2)
         self.pend(program, n3=0x40)
         program.run(2)
         self.assertIsNone(program.handler)
@@ -148,8 +140,7 @@ class Priorities(unittest.TestCase):
         self.assertEqual(program.handler, 16 + 9)
 
     def test_basepri_releases_what_it_held_back(self):
-        program = Program(MASKED_BY_PRIORITY)
-        program.run(2)
+        program = Program(MASKED_BY_PRIORITY).run(2)
         self.pend(program, n3=0x40)
         program.run(60)
         self.assertEqual(program.handler, 16 + 3)

@@ -13,6 +13,7 @@ UNDEFINED = "00de"  # udf #0
 BAD_READ = "40f20000c3f200004168fee7"
 # movw r0, #1; movt r0, #0x1000; bx r0
 FETCH_FROM_CCM = "40f20100c1f200000047"
+FETCH_FROM_REGISTERS = "40f20100c4f200000047"  # as above, 0x4000_0000
 # movs r0, #0; movt r0, #0x2000; bx r0
 EVEN_TARGET = "0020c2f200000047"
 # push {r0-r7}; b .-2
@@ -31,15 +32,18 @@ class Faults(unittest.TestCase):
         self.assertEqual(program.board.scb.cfsr, cfsr)
         self.assertEqual(program.board.scb.hfsr, hfsr)
 
-    def test_an_undefined_instruction_escalates_to_hardfault(self):
-        program = Program(UNDEFINED)
-        program.run(20)
-        self.check(program, HARD_FAULT, 1 << 16, FORCED)
-        self.assertEqual(program.words(STACK - 32, 8)[6], MAIN)
+    def test_faults_without_a_handler_of_their_own_are_hardfaults(self):
+        for name, main, cfsr, hfsr in (("an undefined instruction", UNDEFINED, 1 << 16, FORCED), ("a fetch from registers", FETCH_FROM_REGISTERS, 1 << 0, FORCED),
+                                       ("a branch to an even address", EVEN_TARGET, 1 << 17, FORCED), ("the FPU is off", FPU, 1 << 19, FORCED),
+                                       ("a breakpoint without a debugger", "00befee7", 0, DEBUGEVT)):
+            with self.subTest(name):
+                program = Program(main, fpu=False).run(20)
+                self.check(program, HARD_FAULT, cfsr, hfsr)
+                if main in (UNDEFINED, FPU):
+                    self.assertEqual(program.words(STACK - 32, 8)[6], MAIN)
 
     def test_a_read_where_nothing_is_gives_a_precise_bus_fault_with_its_address(self):
-        program = Program(BAD_READ, r1=77)
-        program.run(20)
+        program = Program(BAD_READ, r1=77).run(20)
         self.check(program, HARD_FAULT, 1 << 9 | 1 << 15, FORCED)
         self.assertEqual(program.board.scb.bfar, 0x3000_0004)
         self.assertEqual(program.words(STACK - 32, 8)[6], MAIN + 8)
@@ -51,11 +55,6 @@ class Faults(unittest.TestCase):
         program.run(20)
         self.check(program, HARD_FAULT, 1 << 8, FORCED)
 
-    def test_nothing_can_be_fetched_from_registers(self):
-        program = Program("40f20100c4f200000047")  # as above, 0x4000_0000
-        program.run(20)
-        self.check(program, HARD_FAULT, 1 << 0, FORCED)
-
     def test_code_runs_from_ram(self):
         program = Program("40f20100c2f200000047")  # as above, 0x2000_0000
         program.board.memory_write(0x2000_0000, bytes.fromhex("0924fee7"))  # movs r4, #9; b .
@@ -63,28 +62,11 @@ class Faults(unittest.TestCase):
         self.assertEqual(program.get("r4"), 9)
         self.assertIsNone(program.handler)
 
-    def test_a_branch_to_an_even_address_is_an_invalid_state(self):
-        program = Program(EVEN_TARGET)
-        program.run(20)
-        self.check(program, HARD_FAULT, 1 << 17, FORCED)
-
-    def test_an_fpu_instruction_with_the_fpu_off_is_a_missing_coprocessor(self):
-        program = Program(FPU, fpu=False)
-        program.run(20)
-        self.check(program, HARD_FAULT, 1 << 19, FORCED)
-        self.assertEqual(program.words(STACK - 32, 8)[6], MAIN)
-
     def test_the_fpu_works_once_it_is_on(self):
         # ldr r0, =0xE000ED88 (movw, movt); movs r1, #0xF0; lsls r1, #16; str r1, [r0]; vmov.f32 s0, #1.0; b .
-        program = Program("4ef68850cef20000f0210904" + "0160" + FPU, fpu=False)
-        program.run(30)
+        program = Program("4ef68850cef20000f0210904" + "0160" + FPU, fpu=False).run(30)
         self.assertIsNone(program.handler)
         self.assertEqual(program.get("d0") & 0xFFFF_FFFF, 0x3F80_0000)
-
-    def test_a_breakpoint_without_a_debugger_is_a_hardfault(self):
-        program = Program("00befee7")
-        program.run(20)
-        self.check(program, HARD_FAULT, 0, DEBUGEVT)
 
     def test_an_svc_that_is_masked_is_a_hardfault(self):
         program = Program("72b600dffee7")  # cpsid i; svc #0; b .
@@ -93,16 +75,14 @@ class Faults(unittest.TestCase):
 
     def test_a_return_with_a_wrong_exc_return_is_an_invalid_pc(self):
         # movs r0, #14; mvns r0, r0 (0xFFFFFFF1: to a handler, where none is active); bx r0
-        program = Program("00dffee7", {SVC: "0e20c0430047"})
-        program.run(40)
+        program = Program("00dffee7", {SVC: "0e20c0430047"}).run(40)
         self.check(program, HARD_FAULT, 1 << 18, FORCED)
         # No second frame (B1.5.8): the one of the SVC is still there, and LR keeps the value that was refused.
         self.assertEqual(program.get("sp"), STACK - 32)
         self.assertEqual(program.get("lr"), 0xFFFF_FFF1)
 
     def test_a_fault_in_hardfault_locks_the_core_up_and_time_goes_on(self):
-        program = Program(UNDEFINED, {HARD_FAULT: UNDEFINED})
-        program.run(50)
+        program = Program(UNDEFINED, {HARD_FAULT: UNDEFINED}).run(50)
         self.assertTrue(program.board.locked_up)
         self.assertEqual(len(events(program, "lockup")), 1)
         instructions, now = program.board.instructions, program.board.now
@@ -111,8 +91,7 @@ class Faults(unittest.TestCase):
         self.assertGreater(program.board.now, now)
 
     def test_a_reset_ends_the_lockup(self):
-        program = Program(UNDEFINED, {HARD_FAULT: UNDEFINED})
-        program.run(50)
+        program = Program(UNDEFINED, {HARD_FAULT: UNDEFINED}).run(50)
         program.board.memory_write(MAIN, bytes.fromhex(HERE))
         program.board.schedule(0, lambda: program.board.request_reset("iwdg"))
         program.run(20)
@@ -121,8 +100,7 @@ class Faults(unittest.TestCase):
         self.assertEqual(events(program, "reset")[-1]["cause"], "iwdg")
 
     def test_a_stack_overflow_enters_hardfault_with_the_bad_stack_pointer(self):
-        program = Program(OVERFLOW, stack=0x2000_0040)
-        program.run(40)
+        program = Program(OVERFLOW, stack=0x2000_0040).run(40)
         self.assertEqual(program.handler, HARD_FAULT)
         self.assertTrue(program.board.scb.cfsr & 1 << 12)  # STKERR
         self.assertLess(program.get("sp"), 0x2000_0000)
