@@ -9,7 +9,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from virtual_board.peripherals import create  # noqa: E402
-from virtual_board.peripherals.flash_map import BASE, SIZE  # noqa: E402
+from virtual_board.peripherals.flash import BASE, SIZE  # noqa: E402
 
 US, MS, S = 1_000_000, 1_000_000_000, 1_000_000_000_000
 RAM = 0x2000_0000

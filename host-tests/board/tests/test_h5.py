@@ -196,7 +196,7 @@ class H5(unittest.TestCase):
 
     # -- FDCAN -------------------------------------------------------------------------------------------------------
 
-    def start_can(self, cccr=0x300, nominal=11 << 8 | 2):
+    def start_can(self, cccr=0x300, nominal=11 << 8 | 2, config=1 << 16 | 2 << 4 | 2 << 2):
         """500 kbit/s and 2 Mbit/s from 8 MHz; one filter for 0xAA."""
         write = self.board.write
         self.board.alternate("D", 0, 9)
@@ -207,7 +207,7 @@ class H5(unittest.TestCase):
         write("FDCAN1", 0x18, 3)
         write("FDCAN1", 0x1C, nominal)
         write("FDCAN1", 0x0C, 1 << 8)
-        write("FDCAN1", 0x80, 1 << 16 | 2 << 4 | 2 << 2)
+        write("FDCAN1", 0x80, config)
         write("SRAMCAN", 0x00, 2 << 30 | 1 << 27 | 0xAA << 16 | 0x7FF)
         write("FDCAN1", 0xDC, 7)
         write("FDCAN1", 0x54, RF0N | TC | BO)
@@ -269,6 +269,22 @@ class H5(unittest.TestCase):
         self.assertEqual([self.board.read("SRAMCAN", 0xB0 + 72 * place + 8) for place in range(3)], [0, 1, 2])
         self.board.write("FDCAN1", 0x94, 0)
         self.assertEqual(self.board.read("FDCAN1", 0x90) & 0x3030F, 1 << 8 | 2)
+
+    def test_what_is_left_out_ends_the_run(self):
+        for offset, value in ((0xC0, 1 << 24), (0x9C, 0), (0xF0, 0)):
+            self.board = FakeBoard(h5.create)
+            self.board.write("FDCAN1", 0x18, 1)
+            self.board.write("FDCAN1", 0x18, 3)
+            with self.assertRaises(Violation):
+                self.board.write("FDCAN1", offset, value)
+        # A range, two identifiers, a mask for FIFO 1; the rest in FIFO 1; a FIFO that overwrites.
+        for kind, action, config in ((0, 1, 0), (1, 1, 0), (2, 2, 0), (2, 0, 1 << 4), (2, 1, 1 << 9)):
+            self.board = FakeBoard(h5.create)
+            bus = self.start_can(config=1 << 16 | config)
+            self.board.write("SRAMCAN", 0x00, kind << 30 | action << 27 | 0xAA << 16 | 0x7FF)
+            bus.send(0xAA)
+            with self.assertRaises(Violation):
+                self.board.advance(1 * MS)
 
     def test_can_fd_is_received_or_an_error(self):
         for cccr, error in ((0x300, None), (0, "CAN FD")):

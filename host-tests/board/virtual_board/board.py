@@ -322,7 +322,7 @@ class Board:
         if processor.fpu_ahead:
             if self.scb.next_is_fpu_instruction(processor.get("pc")):
                 processor.fpu_ahead = False
-                self.exceptions.usage_fault(NOCP, "an FPU instruction while CPACR keeps the FPU off")
+                self.exceptions.fault(NOCP, "an FPU instruction while CPACR keeps the FPU off")
                 return
             count = 1
         stepping = processor.fpu_ahead
@@ -349,7 +349,7 @@ class Board:
         elif why == UNDEFINED:
             self._undefined()
         elif why == STATE:
-            self.exceptions.usage_fault(INVSTATE, "a branch to an even address: EPSR.T = 0")
+            self.exceptions.fault(INVSTATE, "a branch to an even address: EPSR.T = 0")
 
     def _undefined(self) -> None:
         pc = self.processor.get("pc")
@@ -357,7 +357,7 @@ class Board:
         if before in (b"\x20\xbf", b"\x10\xbf"):
             # WFE and YIELD stop unicorn. WFE may end at once (DDI0403 B1.5.18), YIELD does nothing.
             return
-        self.exceptions.usage_fault(UNDEFINSTR, "an undefined instruction")
+        self.exceptions.fault(UNDEFINSTR, "an undefined instruction")
 
     def _memory_fault(self) -> None:
         """Takes the fault of an access that the memory map refused (DDI0403 B3.1, RM0090 section 2.3)."""
@@ -368,6 +368,6 @@ class Board:
             what = f"a {'write to' if kind == WRITE else 'read of'} 0x{address:08X}, where that cannot be done"
             self.exceptions.bus_fault(PRECISERR, address, what)
         elif 0x4000_0000 <= address < 0x6000_0000 or address >= 0xA000_0000:
-            self.exceptions.mem_manage(IACCVIOL, f"an instruction fetch from 0x{address:08X}, a region without execution")
+            self.exceptions.fault(IACCVIOL, f"an instruction fetch from 0x{address:08X}, a region without execution")
         else:
             self.exceptions.bus_fault(IBUSERR, None, f"an instruction fetch from 0x{address:08X}")

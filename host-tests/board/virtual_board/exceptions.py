@@ -148,9 +148,9 @@ class Exceptions:
             self.board.scb.hfsr |= DEBUGEVT
             self._hard_fault("a breakpoint without a debugger")
         elif number == UC_NOCP:
-            self.usage_fault(NOCP, "an instruction for a coprocessor that is absent or off")
+            self.fault(NOCP, "an instruction for a coprocessor that is absent or off")
         elif number == UC_INVSTATE:
-            self.usage_fault(INVSTATE, "an instruction with EPSR.T = 0")
+            self.fault(INVSTATE, "an instruction with EPSR.T = 0")
         else:
             raise Violation(f"unicorn raised event {number}")
 
@@ -215,22 +215,15 @@ class Exceptions:
         else:
             self._hard_fault("an SVC that its priority does not allow")
 
-    def usage_fault(self, bit: int, why: str) -> None:
-        """Takes a UsageFault."""
-        self._fault(bit, why)
-
     def bus_fault(self, bit: int, address: int | None, why: str) -> None:
         """Takes a BusFault; `address` is stored in BFAR."""
         if address is not None:
             self.board.scb.bfar = address
             bit |= BFARVALID
-        self._fault(bit, why)
+        self.fault(bit, why)
 
-    def mem_manage(self, bit: int, why: str) -> None:
-        """Takes a MemManage fault."""
-        self._fault(bit, why)
-
-    def _fault(self, bit: int, why: str) -> None:
+    def fault(self, bit: int, why: str) -> None:
+        """Takes a fault: all become a HardFault."""
         pc, = self.board.processor.pc.read()
         self.board.record("fault", what=why, pc=pc, symbol=self.board.symbol_at(pc))
         if self._escalates(bit, why):

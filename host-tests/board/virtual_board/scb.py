@@ -35,11 +35,6 @@ class Scb:
         self.bfar = 0
         self.cpacr = 0
 
-    @property
-    def fpu_on(self) -> bool:
-        """Returns whether CPACR gives access to CP10."""
-        return bool(self.cpacr >> 20 & 1)
-
     def block_has_fpu_instruction(self, address: int, size: int) -> bool:
         """Returns whether a block of code may hold an FPU instruction; only halfword boundaries are searched."""
         code = self.board.memory.read(address, size) or b""

@@ -139,7 +139,6 @@ class Asm330lhh(Die):
         return TAG if address == LAST else address + 1 & 0x7F
 
     def read(self, address):
-        """Reads a register."""
         if address == 0x0F:
             return self.identity
         if address in (0x3A, 0x3B):
@@ -159,7 +158,6 @@ class Asm330lhh(Die):
         return self.registers.get(address, 0)
 
     def write(self, address, value):
-        """Writes a register."""
         if (value ^ self.reset_values[address]) & ~WRITABLE[address]:
             self.record("sensor_reserved", access="value", address=address, value=value)
             return

@@ -73,7 +73,6 @@ class Gyro(Die):
         super().deselect()
 
     def read(self, address):
-        """Reads a register."""
         if address == 0x00:
             return self.identity
         if address == 0x0E:
@@ -89,7 +88,6 @@ class Gyro(Die):
         return self.registers.get(address, 0)
 
     def write(self, address, value):
-        """Writes a register."""
         if address == 0x14:
             if value == 0xB6:
                 self.reset(GYRO_RESET_PS)
@@ -191,7 +189,6 @@ class Accelerometer(Die):
         return super().transfer(byte, mode, hz)
 
     def read(self, address):
-        """Reads a register."""
         if address == 0x00:
             return self.identity
         if 0x18 <= address <= 0x1A:
@@ -221,7 +218,6 @@ class Accelerometer(Die):
         return self.next_byte()
 
     def write(self, address, value):
-        """Writes a register."""
         if address == 0x7E:
             if value == 0xB6:
                 self.reset(ACC_RESET_PS)

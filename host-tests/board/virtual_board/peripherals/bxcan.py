@@ -6,17 +6,14 @@ the bus, single attempts, a locked FIFO), FIFO 1, interrupts but those of mailbo
 Assumed where the manual is silent: a receive pin without its alternate function reads dominant, so the controller does not synchronise;
 mailboxes keep their requests in initialisation and in bus-off; MSR.RX shows the level between frames; entering initialisation or Sleep
 outside of a frame takes one bit; each failed attempt sets ALST and TERR; only software clears FULL.
-
-Settings: those of `CanBus`: `bit_rate`, `acknowledge`, `connected`, `short`, `babble`, `keep_log`.
 """
 
 from ..violation import Violation
-from .can_bus import ACKNOWLEDGE_ERROR, CanBus
 from .can_filters import Filters, identifier_word
 from .can_frame import frame_bits
 from .can_mailboxes import ALST, TERR, TXOK, Mailboxes
-from .gpio import connected
-from .registers import Registers, unmodelled
+from .can_node import CanNode
+from .registers import unmodelled
 
 PS = 1_000_000_000_000
 INRQ, SLEEP, TXFP, DBF = 1 << 0, 1 << 1, 1 << 2, 1 << 16
@@ -25,66 +22,29 @@ TMEIE, FMPIE0, BOFIE, ERRIE = 1 << 0, 1 << 1, 1 << 10, 1 << 15
 EWGF, EPVF, BOFF = 1, 2, 4
 SILM, LBKM = 1 << 31, 1 << 30
 FULL, FOVR, RFOM = 1 << 3, 1 << 4, 1 << 5
-TX_IRQ, RX0_IRQ, SCE_IRQ = IRQS = 19, 20, 22
 MCR_RESET, BTR_RESET = 0x0001_0002, 0x0123_0000
-TX_PINS = (("A", 12), ("B", 9), ("D", 1))
-RX_PINS = (("A", 11), ("B", 8), ("D", 0), ("I", 9))
-FUNCTION = 9
 RECOVERY_SEQUENCES, SEQUENCE_BITS = 128, 11
 
 
-class BxCan(Registers):
+class BxCan(CanNode):
     """CAN1 with its registers of section 32.9."""
 
     name, base, clock = "CAN1", 0x4000_6400, "CAN1"
+    tx_pins, rx_pins = (("A", 12), ("B", 9), ("D", 1)), (("A", 11), ("B", 8), ("D", 0), ("I", 9))
+    #: Of mailboxes, FIFO 0 and errors.
+    irqs, calls = (19, 20, 22), ("mode_event", "recovery", "loop_event")
     readers = {0x00: "mcr", 0x14: "ier", 0x1C: "btr"}
     writers = {0x00: "_write_mcr", 0x14: "_write_ier", 0x1C: "_write_btr"}
     #: It reads no CAN FD frame.
     takes_fd = False
 
-    def __init__(self, board):
-        super().__init__(board)
-        self.bus = CanBus(board, self)
-        self.mode_event = self.recovery = self.loop_event = None
-        self.bit_ps = 1_000_000
-        self._registers()
-
     def _registers(self):
-        self.mcr, self.btr, self.ier = MCR_RESET, BTR_RESET, 0
+        super()._registers()
+        self.mcr, self.btr, self.ier, self.lec = MCR_RESET, BTR_RESET, 0, 0
         self.state, self.wanted = "sleep", None
-        self.flags = 0
-        self.tec = self.rec = self.lec = 0
-        self.bus_off = False
-        self.mailboxes = Mailboxes()
-        self.sending = None
+        self.mailboxes, self.filters = Mailboxes(), Filters()
         self.fifo, self.fifo_flags, self.output = [], 0, (0, 0, 0, 0)
-        self.filters = Filters()
-        # Number of good frames of other nodes that no filter accepted, for tests.
-        self.filtered = 0
-        self.suspended_until = 0
-        self.was_off = False
         self.recovering, self.recovery_left, self.recovery_seen = False, 0, (0, 0, 0)
-        self.levels = [False] * 3
-
-    def reset(self, cause):
-        for handle in (self.mode_event, self.recovery, self.loop_event):
-            if handle:
-                handle.cancel()
-        self.mode_event = self.recovery = self.loop_event = None
-        self.bus.cut("reset")
-        self._registers()
-        self.bit_ps = self._bit_time()
-        for number in IRQS:
-            self.board.irq(number, False)
-        if cause == "por":
-            self.bus.power_on()
-        else:
-            self.bus.wake()
-
-    def power_off(self):
-        """Drops the scheduled events, which are lost with the power."""
-        self.mode_event = self.recovery = self.loop_event = None
-        self.bus.power_off()
 
     # -- modes (section 32.4) ----------------------------------------------------------------------------------------
 
@@ -126,7 +86,7 @@ class BxCan(Registers):
         self.bit_ps = self._bit_time()
         if self.btr & LBKM:
             delay = SEQUENCE_BITS * self.bit_ps
-        elif not connected(self.board, RX_PINS, FUNCTION):
+        elif not self.hears():
             return
         else:
             delay = self.bus.idle_delay(SEQUENCE_BITS)
@@ -162,21 +122,22 @@ class BxCan(Registers):
     def _next(self):
         return self.mailboxes.next()
 
-    def contender(self, now):
-        """Returns the frame with which the controller enters arbitration now, or None."""
-        if not self._ready() or self.btr & (SILM | LBKM) or now < self.suspended_until:
-            return None
-        box = self._next()
-        if box is None or not connected(self.board, TX_PINS, FUNCTION):
-            return None
-        self.sending = box
+    def _frame(self, box):
         return box.frame()
 
-    def not_before(self, now):
-        """Returns the end of the suspended transmission of an error-passive node, if a frame waits for it."""
-        if self.suspended_until > now and self._ready() and self._next() is not None:
-            return self.suspended_until
-        return None
+    def sends(self):
+        """Returns whether the controller may send on the bus now."""
+        return self._ready() and not self.btr & (SILM | LBKM)
+
+    @property
+    def silent(self):
+        """Returns whether the controller only listens."""
+        return bool(self.btr & SILM)
+
+    @property
+    def on_bus(self):
+        """Returns whether the controller takes part in the traffic of the bus, if its pins do."""
+        return self.state == "normal" and not self.bus_off and not self.btr & LBKM
 
     def _wake_transmitter(self):
         if not self._ready() or self._next() is None:
@@ -193,35 +154,16 @@ class BxCan(Registers):
         """Ends a loop-back: the sender receives its own frame, and a missing acknowledgement does not matter (section 32.5.2)."""
         self.loop_event = None
         frame = self.sending.frame()
-        if not self.btr & SILM and connected(self.board, TX_PINS, FUNCTION):
-            self.bus.observe_loopback(self.board.now - frame_bits(frame) * self.bit_ps, frame)
         self.transmission_done()
         self._accept(frame)
         self._wake_transmitter()
 
-    def arbitration_lost(self):
-        """Handles lost arbitration: another node had an identifier of higher priority."""
-        self._attempt_failed(ALST)
-
-    def transmission_done(self):
-        """Handles a frame that another node acknowledged, or that was looped back."""
+    def _succeeded(self):
         box, self.sending = self.sending, None
         box.end(TXOK)
-        self.tec = max(self.tec - 1, 0)
-        self._error_changed(0)
-        self._suspend()
-        self._interrupts()
 
-    def transmission_failed(self, code):
-        """Handles an error during transmission; an error-passive node does not count a missing acknowledgement (ISO 11898-1 12.1.4.2)."""
-        if not (code == ACKNOWLEDGE_ERROR and self.tec > 127):
-            self.tec += 8
-        self._attempt_failed(TERR)
-        self._error_changed(code)
-        self._suspend()
-        self._interrupts()
-
-    def _attempt_failed(self, flag):
+    def _attempt_failed(self, code):
+        flag = TERR if code else ALST
         box, self.sending = self.sending, None
         if box is None:
             return
@@ -230,30 +172,9 @@ class BxCan(Registers):
             box.end(flag)
             self._interrupts()
 
-    def _suspend(self):
-        """Makes an error-passive node wait eight bits after the intermission before it sends again."""
-        if self.tec > 127 or self.rec > 127:
-            self.suspended_until = self.bus.free_at + 8 * self.bit_ps
-
     # -- reception (sections 32.7.3 and 32.7.4) ----------------------------------------------------------------------
 
-    def listens(self):
-        """Returns whether the controller takes part in the traffic on the bus."""
-        return (self.state == "normal" and not self.bus_off and not self.btr & LBKM and self.bus.connected
-                and connected(self.board, RX_PINS, FUNCTION))
-
-    def disturbs(self):
-        """Returns whether the controller destroys frames that it cannot read: it is error-active and not silent."""
-        return not self.btr & SILM and self.tec <= 127 and self.rec <= 127
-
-    def received(self, frame):
-        """Handles a good frame, which the filters accept or not."""
-        if self.listens():
-            self._accept(frame)
-
-    def _accept(self, frame):
-        self.rec = 120 if self.rec > 127 else max(self.rec - 1, 0)
-        self._error_changed(0)
+    def _filter(self, frame):
         word = identifier_word(frame)
         number = self.filters.match(word)
         if number is None:
@@ -261,7 +182,6 @@ class BxCan(Registers):
         else:
             data = int.from_bytes(frame.data, "little")
             self._store((word, frame.length | number << 8, data & 0xFFFF_FFFF, data >> 32))
-        self._interrupts()
 
     def _store(self, entry):
         if len(self.fifo) < 3:
@@ -273,25 +193,6 @@ class BxCan(Registers):
         self.board.record("can_overrun")
         self.fifo[2] = entry
 
-    def reception_failed(self, code):
-        """Handles an unreadable frame of another node."""
-        if self.listens():
-            self.rec = min(self.rec + 1, 255)
-            self._error_changed(code)
-            self._interrupts()
-
-    def count_dominant(self, transmitting):
-        """Counts eight more dominant bits; returns False when they no longer change anything."""
-        if self.bus_off or self.state != "normal":
-            return False
-        if transmitting:
-            self.tec += 8
-        else:
-            self.rec = min(self.rec + 8, 255)
-        self._error_changed(None)
-        self._interrupts()
-        return transmitting or self.rec < 255
-
     # -- errors (section 32.7.6) -------------------------------------------------------------------------------------
 
     def _status(self):
@@ -299,16 +200,9 @@ class BxCan(Registers):
         worst = max(self.tec, self.rec)
         return (EWGF if worst >= 96 else 0) | (EPVF if worst > 127 else 0) | (BOFF if self.bus_off else 0)
 
-    def _error_changed(self, code):
-        """Updates bus-off, the flags of CAN_ESR and ERRI after the counters have changed."""
-        if self.tec > 255 and not self.bus_off:
-            self.bus_off = True
-            self.board.record("bus_off")
-        if code is not None:
-            self.lec = code
-        if self.bus_off and not self.was_off and self.ier & BOFIE:
+    def _went_off(self):
+        if self.ier & BOFIE:
             self.flags |= ERRI
-        self.was_off = self.bus_off
 
     def _recover(self):
         """Starts the recovery from bus-off: 128 x 11 recessive bits, after software left initialisation (section 32.7.6)."""
@@ -336,20 +230,14 @@ class BxCan(Registers):
             return
         self.bus_off = self.recovering = False
         self.tec = self.rec = 0
-        self.was_off = False
         self.board.record("bus_off_ended")
         self._wake_transmitter()
 
     # -- interrupts (section 32.8) -----------------------------------------------------------------------------------
 
-    def _interrupts(self):
+    def _lines(self):
         ier = self.ier
-        levels = [bool(ier & TMEIE and self.mailboxes.completed()), bool(ier & FMPIE0 and self.fifo),
-                  bool(self.flags & ERRI and ier & ERRIE)]
-        for index, level in enumerate(levels):
-            if level != self.levels[index]:
-                self.levels[index] = level
-                self.board.irq(IRQS[index], level)
+        return bool(ier & TMEIE and self.mailboxes.completed()), bool(ier & FMPIE0 and self.fifo), bool(self.flags & ERRI and ier & ERRIE)
 
     # -- registers (section 32.9) ------------------------------------------------------------------------------------
 
@@ -416,6 +304,8 @@ class BxCan(Registers):
         if self.state != "init":
             self.board.record("ignored_write", register="CAN_BTR", value=value)
             return
+        if value & LBKM and not value & SILM:
+            raise Violation("CAN1: loop-back that is not silent is not modelled")
         self.btr = value & 0xC37F_03FF
         self.bit_ps = self._bit_time()
 
@@ -436,8 +326,3 @@ class BxCan(Registers):
             box.tdlr = value
         else:
             box.tdhr = value
-
-    def configure(self, key, value):
-        if key not in ("bit_rate", "acknowledge", "connected", "short", "babble", "keep_log"):
-            super().configure(key, value)
-        self.bus.configure(key, value)

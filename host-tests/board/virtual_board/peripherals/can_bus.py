@@ -231,10 +231,6 @@ class CanBus:
         if self.keep_log:
             self.log.append(Logged(start, self.board.now, frame, source, error))
 
-    def observe_loopback(self, start, frame):
-        """Logs a frame in loop-back mode: it is on the transmit line, though the controller ignores the bus."""
-        self._note(start, frame, "board", None)
-
     # -- faults ------------------------------------------------------------------------------------------------------
 
     def cut(self, why):

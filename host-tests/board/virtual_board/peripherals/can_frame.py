@@ -4,7 +4,6 @@ import re
 from functools import lru_cache
 from typing import NamedTuple
 
-
 #: Data bytes by DLC.
 LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 
@@ -35,14 +34,6 @@ def priority(frame):
     return frame.identifier << 21 | frame.remote << 20
 
 
-def _crc_step(byte):
-    crc = byte << 7
-    for _ in range(8):
-        crc = crc << 1 ^ (0x4599 if crc & 0x4000 else 0)
-    return crc & 0x7FFF
-
-
-CRC_TABLE = [_crc_step(byte) for byte in range(256)]
 RUNS = re.compile("0+|1+")
 
 
@@ -74,8 +65,8 @@ def _stuffed(bits):
 def _crc(bits):
     """Returns the CRC-15 with the polynomial 0x4599, which begins at 0, so that leading zeros change nothing."""
     crc = 0
-    for byte in int(bits, 2).to_bytes(len(bits) // 8 + 1, "big"):
-        crc = crc << 8 & 0x7FFF ^ CRC_TABLE[crc >> 7 ^ byte]
+    for bit in bits:
+        crc = crc << 1 & 0x7FFF ^ (0x4599 if crc >> 14 ^ (bit == "1") else 0)
     return crc
 
 

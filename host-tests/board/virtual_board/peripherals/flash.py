@@ -16,7 +16,6 @@ Settings: `time_factor`, `seed` (of the content after a power cut), `option_byte
 import random
 
 from ..violation import Violation
-from .flash_map import SECTORS, sector_of
 from .registers import ANY, WORD, Registers, check
 
 PG, SER, SNB, PSIZE, X32, STRT, LOCK = 1 << 0, 1 << 1, 15 << 3, 3 << 8, 2 << 8, 1 << 16, 1 << 31
@@ -33,6 +32,12 @@ PROGRAM_US = 16
 LEAST_SUPPLY_MV = 2700
 MS = 1_000_000_000
 US = 1_000_000
+#: The main memory of the STM32F405xG, 1 MiB in twelve sectors: (address, length) of each (table 5).
+BASE = 0x0800_0000
+_KIB = 1024
+_LENGTHS = [16 * _KIB] * 4 + [64 * _KIB] + [128 * _KIB] * 7
+SECTORS = tuple((BASE + sum(_LENGTHS[:number]), length) for number, length in enumerate(_LENGTHS))
+SIZE = sum(_LENGTHS)
 
 
 class Flash(Registers):
@@ -262,3 +267,10 @@ class Flash(Registers):
         else:
             super().configure(key, value)
 
+
+def sector_of(address):
+    """Returns the number of the sector that holds an address."""
+    for number, (start, length) in enumerate(SECTORS):
+        if start <= address < start + length:
+            return number
+    raise ValueError(f"{address:#x} is outside of the main memory")

@@ -112,7 +112,6 @@ class Icm42688(Die):
         return address if address == reg.FIFO_DATA and self.bank == 0 else address + 1 & 0x7F
 
     def read(self, address):
-        """Reads a register."""
         if address == reg.REG_BANK_SEL:
             return self.bank
         if self.bank:

@@ -9,7 +9,7 @@ PS, MS, US = 1_000_000_000_000, 1_000_000_000, 1_000_000
 
 
 class Die:
-    """A die behind a chip select."""
+    """A die behind a chip select. A subclass reads and writes its registers, says whether it runs, and makes its outputs."""
 
     #: Bytes without meaning before what is read, and the fastest clock.
     dummies, max_hz = 0, 10_000_000

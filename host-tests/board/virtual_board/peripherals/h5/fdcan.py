@@ -2,16 +2,14 @@
 
 The bus behind it is `can_bus.CanBus`. Witnesses: the header (registers, bits), the SVD (reset values), the HAL (layout of the
 message RAM, order of accesses), Bosch's M_CAN user's manual as remembered (what CCE resets, 129 sequences after bus-off, PSR set
-by a read). Left out: tx events, high-priority messages, timeout, transmitter delay, loop-back and restricted modes, sending CAN FD.
+by a read). Left out: tx events, high-priority messages, timeout, transmitter delay, loop-back and restricted modes, sending CAN FD, the
+transmit queue, FIFO 1, FIFOs that overwrite, and filters but masks.
 Assumed: INIT can be read back at once; a FIFO skips requests that were cancelled.
-
-Settings: those of `CanBus`.
 """
 
 from ...violation import Violation
-from ..can_bus import ACKNOWLEDGE_ERROR, CanBus
-from ..can_frame import LENGTHS, Frame, priority
-from ..gpio import connected
+from ..can_frame import LENGTHS, Frame
+from ..can_node import CanNode
 from ..registers import Registers, unmodelled
 
 PS = 1_000_000_000_000
@@ -19,54 +17,45 @@ INIT, CCE, CSA, CSR, MON, DAR, TEST, FDOE = (1 << bit for bit in (0, 1, 3, 4, 5,
 CCCR_PROTECTED, ABSENT = 0xF3E4, 1 << 2 | TEST
 (CREL, ENDN, DBTP, TEST_REGISTER, RWD, CCCR, NBTP, TSCC, TSCV, TOCC, TOCV, ECR, PSR, TDCR) = (
     0x00, 0x04, 0x0C, 0x10, 0x14, 0x18, 0x1C, 0x20, 0x24, 0x28, 0x2C, 0x40, 0x44, 0x48)
-IR, IE, ILS, ILE, RXGFC, XIDAM, HPMS, RXF0S, RXF0A, RXF1S, RXF1A, TXBC = (
-    0x50, 0x54, 0x58, 0x5C, 0x80, 0x84, 0x88, 0x90, 0x94, 0x98, 0x9C, 0xC0)
+IR, IE, ILS, ILE, RXGFC, XIDAM, HPMS, RXF0S, RXF0A, RXF1S, TXBC = (
+    0x50, 0x54, 0x58, 0x5C, 0x80, 0x84, 0x88, 0x90, 0x94, 0x98, 0xC0)
 TXFQS, TXBRP, TXBAR, TXBCR, TXBTO, TXBCF, TXBTIE, TXBCIE, TXEFS, TXEFA, CKDIV = (
     0xC4, 0xC8, 0xCC, 0xD0, 0xD4, 0xD8, 0xDC, 0xE0, 0xE4, 0xE8, 0x100)
 #: Registers that keep their words, with reset values; the first group is written only with INIT and CCE.
 PROTECTED = {DBTP: 0x0A33, NBTP: 0x0600_0A03, TSCC: 0, TOCC: 0xFFFF_0000, TDCR: 0, RXGFC: 0, XIDAM: 0x1FFF_FFFF, TXBC: 0,
              RWD: 0, CKDIV: 0}
 KEPT = {IE: 0, ILS: 0, ILE: 0, TXBTIE: 0, TXBCIE: 0}
-FIXED = {CREL: 0x3214_1218, ENDN: 0x8765_4321, HPMS: 0, TXEFS: 0, TOCV: 0xFFFF, TEST_REGISTER: 0}
+FIXED = {CREL: 0x3214_1218, ENDN: 0x8765_4321, HPMS: 0, RXF1S: 0, TXEFS: 0, TOCV: 0xFFFF, TEST_REGISTER: 0}
 RFN, RFF, RFL, TC, TCF, TSW, EP, EW, BO, PEA = (1 << bit for bit in (0, 1, 2, 7, 8, 13, 17, 18, 19, 21))
 #: The flags of each group that ILS assigns to an interrupt line.
 GROUPS = (0x7, 0x38, 0x1C0, 0x1E00, 0xE000, 0x3_0000, 0xFC_0000)
-LINES = (39, 40)
 #: Message RAM, bytes from its start: filters, receive FIFOs, transmit buffers; an element of a FIFO has 18 words.
-EXTENDED_FILTERS, FIFOS, BUFFERS, ELEMENT, RAM_SIZE = 0x70, (0xB0, 0x188), 0x278, 72, 0x350
+EXTENDED_FILTERS, FIFO, BUFFERS, ELEMENT, RAM_SIZE = 0x70, 0xB0, 0x278, 72, 0x350
 PLACES = 3
-FULL_QUEUE, FIFO_FULL, OVERWRITE = 1 << 21, 1 << 24, 1 << 9
-RX_PINS, TX_PINS, FUNCTION = (("D", 0), ("A", 11), ("B", 8)), (("D", 1), ("A", 12), ("B", 9)), 9
+FULL_QUEUE, FIFO_FULL, OVERWRITE, QUEUE = 1 << 21, 1 << 24, 3 << 8, 1 << 24
 SEQUENCE_BITS, RECOVERY_SEQUENCES = 11, 129
 NO_CHANGE = 7
 
 
-class Fdcan(Registers):
+class Fdcan(CanNode):
     """FDCAN1 with its registers, and CKDIV of the configuration block behind it."""
 
     name, base, clock = "FDCAN1", 0x4000_A400, "FDCAN"
+    rx_pins, tx_pins = (("D", 0), ("A", 11), ("B", 8)), (("D", 1), ("A", 12), ("B", 9))
+    irqs, calls = (39, 40), ("join_event",)
     kept = {**{offset: (value, 0xFFFF_FFFF) for offset, value in {**PROTECTED, **KEPT}.items()},
-            **{offset: (value, 0) for offset, value in {**FIXED, TXBAR: 0, RXF0A: 0, RXF1A: 0}.items()}}
+            **{offset: (value, 0) for offset, value in {**FIXED, TXBAR: 0, RXF0A: 0}.items()}}
     readers = {CCCR: "cccr", IR: "flags", TXBRP: "pending", TXBCR: "cancelled", TXBTO: "sent", TXBCF: "finished"}
     writers = {CCCR: "_write_cccr", TXBAR: "_request", TXBCR: "_write_cancel"}
 
     def __init__(self, board):
-        super().__init__(board)
-        self.bus = CanBus(board, self)
         self.ram = bytearray(RAM_SIZE)
-        self.join_event = None
-        self.bit_ps = self.data_bit_ps = 1_000_000
-        self.filtered = 0
-        self._registers()
+        super().__init__(board)
 
     def _registers(self):
-        self.cccr = INIT
-        self.flags, self.lec = 0, NO_CHANGE
-        self.tec = self.rec = 0
-        self.bus_off, self.on_bus = False, False
-        self.suspended_until = self.started = 0
-        self.status = 0
-        self.levels = [False, False]
+        super()._registers()
+        self.cccr, self.lec, self.status = INIT, NO_CHANGE, 0
+        self.on_bus, self.started = False, 0
         self._clear()
 
     def _clear(self):
@@ -75,26 +64,7 @@ class Fdcan(Registers):
         #: The requested buffers, the oldest first.
         self.queue = []
         self.sending = None
-        self.fill, self.first = [0, 0], [0, 0]
-
-    def reset(self, cause):
-        if self.join_event:
-            self.join_event.cancel()
-        self.join_event = None
-        self.bus.cut("reset")
-        super().reset(cause)
-        self._registers()
-        for line in LINES:
-            self.board.irq(line, False)
-        if cause == "por":
-            self.bus.power_on()
-        else:
-            self.bus.wake()
-
-    def power_off(self):
-        """Drops the scheduled events, which are lost with the power."""
-        self.join_event = None
-        self.bus.power_off()
+        self.fill = self.first = 0
 
     # -- modes -------------------------------------------------------------------------------------------------------
 
@@ -127,7 +97,7 @@ class Fdcan(Registers):
         """Takes part in the bus after 11 recessive bits, or after 129 times as many if it was off."""
         self.join_event = None
         delay = self.bus.idle_delay(SEQUENCE_BITS)
-        if self.cccr & INIT or delay is None or not self._listens_at_pin():
+        if self.cccr & INIT or delay is None or not self.hears():
             return
         if self.bus_off:
             delay = RECOVERY_SEQUENCES * SEQUENCE_BITS * self.bit_ps
@@ -174,23 +144,18 @@ class Fdcan(Registers):
         if not self.on_bus and self.join_event is None:
             self._join()
 
-    def _listens_at_pin(self):
-        return connected(self.board, RX_PINS, FUNCTION)
+    @property
+    def silent(self):
+        """Returns whether the controller only listens."""
+        return bool(self.cccr & MON)
 
-    def listens(self):
-        """Returns whether the controller takes part in the traffic on the bus."""
-        return self.on_bus and self.bus.connected and self._listens_at_pin()
-
-    def disturbs(self):
-        """Returns whether the controller destroys frames that it cannot read."""
-        return not self.cccr & MON and self.tec <= 127 and self.rec <= 127
+    def sends(self):
+        """Returns whether the controller may send."""
+        return self.on_bus and not self.silent
 
     # -- transmission ------------------------------------------------------------------------------------------------
 
     def _next(self):
-        """Returns the buffer that is sent next: the oldest of the FIFO, or the most urgent of the queue."""
-        if self.values[TXBC] >> 24 & 1:
-            return min(self.queue, key=lambda index: (priority(self._frame(index)), index), default=None)
         return self.queue[0] if self.queue else None
 
     def _words(self, offset, count):
@@ -206,39 +171,14 @@ class Fdcan(Registers):
         data = b"" if remote else bytes(self.ram[offset + 8 : offset + 8 + length])
         return Frame(identifier & 0x1FFF_FFFF if extended else identifier >> 18 & 0x7FF, data, extended, remote, length)
 
-    def contender(self, now):
-        """Returns the frame with which the controller enters arbitration now, or None."""
-        if not self.on_bus or self.cccr & MON or now < self.suspended_until or not connected(self.board, TX_PINS, FUNCTION):
-            return None
-        self.sending = self._next()
-        return None if self.sending is None else self._frame(self.sending)
-
-    def not_before(self, now):
-        """Returns the end of the suspended transmission of an error-passive node, if a frame waits for it."""
-        return self.suspended_until if self.suspended_until > now and self.on_bus and self.queue else None
-
-    def arbitration_lost(self):
-        """Handles lost arbitration."""
-        self._attempt_failed()
-
-    def transmission_done(self):
-        """Handles a frame that another node acknowledged."""
+    def _succeeded(self):
         bit = 1 << self.sending
         self.sent |= bit
         self._end(bit)
         if self.values[TXBTIE] & bit:
             self.flags |= TC
-        self.tec = max(self.tec - 1, 0)
-        self._errors(0)
 
-    def transmission_failed(self, code):
-        """Handles an error; an error-passive node does not count a missing acknowledgement (ISO 11898-1 12.1.4.2)."""
-        if not (code == ACKNOWLEDGE_ERROR and self.tec > 127):
-            self.tec += 8
-        self._attempt_failed()
-        self._errors(code)
-
-    def _attempt_failed(self):
+    def _attempt_failed(self, _):
         index, self.sending = self.sending, None
         if index is not None and (self.cancelled >> index & 1 or self.cccr & DAR):
             self._cancel(1 << index)
@@ -267,7 +207,7 @@ class Fdcan(Registers):
         self.sent &= ~fresh
         self.finished &= ~fresh
         for _ in range(PLACES):
-            index = self._put()
+            index = self.put
             if not fresh >> index & 1:
                 break
             fresh &= ~(1 << index)
@@ -276,12 +216,6 @@ class Fdcan(Registers):
         if fresh:
             raise Violation(f"{self.name}: buffers {fresh:#b} are requested out of their order")
         self.bus.wake()
-
-    def _put(self):
-        """Returns the buffer for the next request: the next of the FIFO, or the first free one of the queue."""
-        if not self.values[TXBC] >> 24 & 1:
-            return self.put
-        return next((index for index in range(PLACES) if index not in self.queue), 0)
 
     def _write_cancel(self, value):
         bits = value & self.pending
@@ -292,108 +226,71 @@ class Fdcan(Registers):
 
     # -- reception ---------------------------------------------------------------------------------------------------
 
-    def received(self, frame):
-        """Handles a good frame: the filters assign it to a FIFO, or reject it."""
-        if not self.listens():
-            return
-        self.rec = 120 if self.rec > 127 else max(self.rec - 1, 0)
-        target, index = self._match(frame)
-        if target is None:
+    def _filter(self, frame):
+        number = self._match(frame)
+        if number is None:
             self.filtered += 1
         else:
-            self._store(target, frame, index)
-        self._errors(0)
+            self._store(frame, number)
 
     def _match(self, frame):
-        """Returns the FIFO of a frame and the number of its filter; FIFO None rejects it."""
+        """Returns the number of the filter that puts a frame into FIFO 0, 128 without one; None if the frame is rejected."""
         config = self.values[RXGFC]
         if frame.remote and config >> (0 if frame.extended else 1) & 1:
-            return None, 0
+            return None
         for number in range(config >> (24 if frame.extended else 16) & 0x1F):
             if frame.extended:
                 first, second = self._words(EXTENDED_FILTERS + 8 * number, 2)
                 kind, action, a, b = second >> 30, first >> 29, first & 0x1FFF_FFFF, second & 0x1FFF_FFFF
-                identifier = frame.identifier & (self.values[XIDAM] if kind == 0 else 0x1FFF_FFFF)
             else:
                 word, = self._words(4 * number, 1)
                 kind, action, a, b = word >> 30, word >> 27 & 7, word >> 16 & 0x7FF, word & 0x7FF
-                identifier = frame.identifier
-            ranged = kind == 0 or kind == 3 and frame.extended
-            hit = (a <= identifier <= b) if ranged else identifier in (a, b) if kind == 1 else kind == 2 and not (identifier ^ a) & b
-            if action and hit:
-                if action > 3:
-                    raise Violation(f"{self.name}: high-priority messages are not modelled")
-                return (0, 1, None)[action - 1], number
+            if action and (kind != 2 or action not in (1, 3)):
+                raise Violation(f"{self.name}: of filters only masks for FIFO 0 and masks that reject are modelled")
+            if action and not (frame.identifier ^ a) & b:
+                return number if action == 1 else None
         rest = config >> (2 if frame.extended else 4) & 3
-        return (rest if rest < 2 else None), 1 << 7
+        if rest == 1:
+            raise Violation(f"{self.name}: FIFO 1 is not modelled")
+        return None if rest else 1 << 7
 
-    def _store(self, fifo, frame, index):
-        shift = 3 * fifo
-        if self.fill[fifo] == PLACES:
-            if not self.values[RXGFC] >> 9 - fifo & 1:
-                self.flags |= RFL << shift
-                self.board.record("can_overrun", fifo=fifo)
-                return
-            self.first[fifo] = (self.first[fifo] + 1) % PLACES
-            self.fill[fifo] -= 1
-        place = (self.first[fifo] + self.fill[fifo]) % PLACES
+    def _store(self, frame, index):
+        if self.values[RXGFC] & OVERWRITE:
+            raise Violation(f"{self.name}: a FIFO that overwrites is not modelled")
+        if self.fill == PLACES:
+            self.flags |= RFL
+            self.board.record("can_overrun", fifo=0)
+            return
+        place = (self.first + self.fill) % PLACES
         identifier = frame.identifier if frame.extended else frame.identifier << 18
         head = identifier | frame.remote << 29 | frame.extended << 30
         control = self._stamp() | frame.length << 16 | frame.fast << 20 | frame.fd << 21 | index << 24
         data = frame.data.ljust(-(-len(frame.data) // 4) * 4, b"\0")
         element = head.to_bytes(4, "little") + control.to_bytes(4, "little") + data
-        offset = FIFOS[fifo] + ELEMENT * place
+        offset = FIFO + ELEMENT * place
         self.ram[offset : offset + len(element)] = element
         assert len(frame.data) == (0 if frame.remote else LENGTHS[frame.length])
-        self.fill[fifo] += 1
-        self.flags |= (RFN | (RFF if self.fill[fifo] == PLACES else 0)) << shift
-
-    def reception_failed(self, code):
-        """Handles an unreadable frame of another node."""
-        if self.listens():
-            self.rec = min(self.rec + 1, 255)
-            self._errors(code)
-
-    def count_dominant(self, transmitting):
-        """Counts eight more dominant bits; returns False when they no longer change anything."""
-        if self.bus_off or not self.on_bus:
-            return False
-        if transmitting:
-            self.tec += 8
-        else:
-            self.rec = min(self.rec + 8, 255)
-        self._errors(None)
-        return transmitting or self.rec < 255
+        self.fill += 1
+        self.flags |= RFN | (RFF if self.fill == PLACES else 0)
 
     # -- errors and interrupts ---------------------------------------------------------------------------------------
 
-    def _errors(self, code):
-        """Updates the states of error confinement and their flags after the counters have changed."""
-        if self.tec > 255 and not self.bus_off:
-            self.bus_off, self.on_bus = True, False
-            self.cccr |= INIT
-            self.flags |= BO
-            self.board.record("bus_off")
-        if self.tec > 127 or self.rec > 127:
-            self.suspended_until = self.bus.free_at + 8 * self.bit_ps
+    def _went_off(self):
+        self.on_bus = False
+        self.cccr |= INIT
+        self.flags |= BO
+
+    def _count_changed(self, code):
         worst = max(self.tec, self.rec)
         status = (EW if worst >= 96 else 0) | (EP if worst > 127 else 0)
-        self.flags |= status ^ self.status
+        self.flags |= status ^ self.status | (PEA if code else 0)
         self.status = status
-        if code is not None:
-            self.lec = code
-        if code:
-            self.flags |= PEA
-        self._interrupts()
+        super()._count_changed(code)
 
-    def _interrupts(self):
+    def _lines(self):
         active = self.flags & self.values[IE]
         second = sum(flags for group, flags in enumerate(GROUPS) if self.values[ILS] >> group & 1)
-        for line, flags in enumerate((active & ~second, active & second)):
-            level = bool(flags and self.values[ILE] >> line & 1)
-            if level != self.levels[line]:
-                self.levels[line] = level
-                self.board.irq(LINES[line], level)
+        return [bool(flags and self.values[ILE] >> line & 1) for line, flags in enumerate((active & ~second, active & second))]
 
     # -- registers ---------------------------------------------------------------------------------------------------
 
@@ -413,24 +310,20 @@ class Fdcan(Registers):
         return value | NO_CHANGE << 8
 
     def _txfqs(self):
-        put, is_queue = self._put(), self.values[TXBC] >> 24 & 1
-        get = self.queue[0] if self.queue and not is_queue else 0 if is_queue else put
-        if put in self.queue:
-            return FULL_QUEUE | get << 8 | put << 16
-        free = 0 if is_queue else (get - put) % PLACES or PLACES
-        return free | get << 8 | put << 16
+        get = self.queue[0] if self.queue else self.put
+        if self.put in self.queue:
+            return FULL_QUEUE | get << 8 | self.put << 16
+        free = (get - self.put) % PLACES or PLACES
+        return free | get << 8 | self.put << 16
 
-    def _fifo_status(self, fifo):
-        fill, first = self.fill[fifo], self.first[fifo]
-        lost = bool(self.flags & RFL << 3 * fifo)
-        return fill | first << 8 | (first + fill) % PLACES << 16 | (FIFO_FULL if fill == PLACES else 0) | lost << 25
+    def _fifo_status(self):
+        full = FIFO_FULL if self.fill == PLACES else 0
+        return self.fill | self.first << 8 | (self.first + self.fill) % PLACES << 16 | full | bool(self.flags & RFL) << 25
 
     def load(self, offset):
         if offset == ECR:
             return min(self.tec, 255) | (self.rec & 0x7F) << 8 | (self.rec > 127) << 15
-        if offset in (RXF0S, RXF1S):
-            return self._fifo_status(offset == RXF1S)
-        special = {PSR: self._psr, TXFQS: self._txfqs, TSCV: self._stamp}.get(offset)
+        special = {PSR: self._psr, TXFQS: self._txfqs, TSCV: self._stamp, RXF0S: self._fifo_status}.get(offset)
         return special() if special else super().load(offset)
 
     def store(self, offset, value):
@@ -438,26 +331,20 @@ class Fdcan(Registers):
             self.board.record("ignored_write", register=f"FDCAN {offset:#x}", value=value)
         elif offset == IR:
             self.flags &= ~value
-        elif offset in (RXF0A, RXF1A):
-            fifo = int(offset == RXF1A)
-            released = ((value & 3) - self.first[fifo]) % PLACES + 1
-            if released <= self.fill[fifo]:
-                self.first[fifo] = (self.first[fifo] + released) % PLACES
-                self.fill[fifo] -= released
+        elif offset == RXF0A:
+            released = ((value & 3) - self.first) % PLACES + 1
+            if released <= self.fill:
+                self.first = (self.first + released) % PLACES
+                self.fill -= released
         elif offset == TSCV:
             self.started = self.board.now
-        elif offset in FIXED and (offset != TEST_REGISTER or value):
+        elif offset in FIXED and (offset != TEST_REGISTER or value) or offset == TXBC and value & QUEUE:
             raise unmodelled(self, offset, "write")
         else:
             super().store(offset, value)
         if offset in PROTECTED:
             self.clocks_changed()
         self._interrupts()
-
-    def configure(self, key, value):
-        if key not in ("bit_rate", "data_bit_rate", "acknowledge", "connected", "short", "babble", "keep_log"):
-            super().configure(key, value)
-        self.bus.configure(key, value)
 
 
 class MessageRam(Registers):

@@ -9,6 +9,8 @@ Settings: `hse_hz` (None: the probe supplies no clock), `lsi_hz`.
 """
 
 from ...violation import Violation
+from ..rcc import AHB_SHIFT, APB_SHIFT
+from ..rcc import RESET_FLAGS as F405_FLAGS
 from ..registers import Registers
 
 PS = 1_000_000_000_000
@@ -20,10 +22,8 @@ ABSENT = 1 << 8 | 1 << 19 | 1 << 26 | 1 << 28
 CR, CFGR1, CFGR2, PLL1CFGR, PLL1DIVR, PLL1FRACR, BDCR, RSR = 0x00, 0x1C, 0x20, 0x28, 0x34, 0x38, 0xF0, 0xF4
 CCIPR1, CCIPR5 = 0xD8, 0xE8
 LSION, LSIRDY, RMVF = 1 << 26, 1 << 27, 1 << 23
-RESET_FLAGS = {"por": 0x0C00_0000, "bor": 0x0C00_0000, "pin": 0x0400_0000, "software": 0x1400_0000, "iwdg": 0x2400_0000,
-               "wwdg": 0x4400_0000, "lowpower": 0x8400_0000}
-AHB_SHIFT = {8: 1, 9: 2, 10: 3, 11: 4, 12: 6, 13: 7, 14: 8, 15: 9}
-APB_SHIFT = {4: 1, 5: 2, 6: 3, 7: 4}
+#: A power-on and a brown-out have one flag.
+RESET_FLAGS = {**F405_FLAGS, "por": 0x0C00_0000, "bor": 0x0C00_0000}
 #: Gates by enable register; the reset registers are 0x28 bytes before them, those for Sleep mode 0x28 behind.
 ENABLE = {0x88: {0: "GPDMA1", 1: "GPDMA2", 8: "FLITF", 28: "BKPRAM", 30: "DCACHE1", 31: "SRAM1"},
           0x8C: {**{bit: f"GPIO{letter}" for bit, letter in enumerate("ABCDEFGHI")}, 18: "RNG", 30: "SRAM2", 31: "SRAM3"},
