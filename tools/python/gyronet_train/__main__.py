@@ -2,15 +2,13 @@
 
 Trains once for each seed, prints each seed's errors on the validation drives with mean and spread, and
 keeps the best network. Test drives are never read. training.py describes the training and where it
-differs from the paper. A training that was killed resumes from the files STEM.seedN.state in --out;
-STEM.history.json has every epoch.
+differs from the paper. A training that was killed resumes from the files STEM.seedN.state in --out, which have every epoch.
 """
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 import statistics
 from pathlib import Path
 
@@ -103,20 +101,6 @@ def best_of_seeds(args: argparse.Namespace, validation: list[Drive]) -> tuple[Gy
         )
     seed = min(networks, key=lambda seed: networks[seed].validation.any_1s_rad)
     chosen = networks[seed]
-    history = {
-        "static_1s_rad": static,
-        "seed": seed,
-        "seeds": {
-            s: {
-                "best": n.epoch,
-                "seconds": n.seconds,
-                "loss": [e.loss for e in n.epochs],
-                "mean_1s_rad": [e.validation.mean_1s_rad for e in n.epochs],
-            }
-            for s, n in networks.items()
-        },
-    }
-    (args.out / f"{args.stem}.history.json").write_text(json.dumps(history))
     provenance = {
         "network": "gyronet",
         "train": list(data.names),

@@ -13,6 +13,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import math
+import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -26,7 +27,6 @@ from .augment import turn
 from .loss import window_loss
 from .model import GyroNet
 from .recordings import WINDOW, Drive
-from .state import load_state, save_state
 from .validation import Validation, validate_all
 
 
@@ -157,6 +157,26 @@ def train(
     chosen = best_of(epochs)
     calibrate(best, chosen.validation.scale_ratio)
     return Trained(best, validate_all(best, validation), chosen.epoch, seconds, epochs)
+
+
+def save_state(path: Path, of: dict, state: dict) -> None:
+    """Writes a state; `of` identifies the training. After a crash the old or the new file is complete."""
+    written = path.with_suffix(".part")
+    torch.save({"of": of, "state": state}, written)
+    os.replace(written, path)
+
+
+def load_state(path: Path, of: dict) -> dict | None:
+    """Reads a state; returns None if there is no file. Raises ValueError for the state of another training."""
+    if not path.exists():
+        return None
+    saved = torch.load(path, weights_only=True)
+    other = [name for name in of if saved["of"].get(name) != of[name]]
+    if other:
+        raise ValueError(
+            f"{path}: is of a training with other {', '.join(other)}; remove it to start again, or pass another --out"
+        )
+    return saved["state"]
 
 
 def best_of(epochs: list[Epoch]) -> Epoch:
