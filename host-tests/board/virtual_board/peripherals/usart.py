@@ -175,7 +175,7 @@ class Usart(Registers):
         if connected(self.board, self.tx_pins, self.function):
             if abs(mismatch) > TOLERANCE:
                 self._note_mismatch("tx", mismatch)
-                value = _sampled(value & 0xFF, PS / self.baud, self.bit_ps)[0]
+                value = _sampled(value & 0xFF, PS / self.baud, self.bit_ps)
             self.sent.append((now, value & 0xFF))
         if self.tdr is not None:
             self._load(now)
@@ -228,7 +228,7 @@ class Usart(Registers):
 
     def _only_dma_notices(self):
         """Returns whether bytes go to memory without an interrupt."""
-        return bool(self.cr3 & DMAR and not self.cr1 & (RXNEIE | IDLEIE) and abs(self.mismatch) <= 0.02
+        return bool(self.cr3 & DMAR and not self.cr1 & (RXNEIE | IDLEIE) and abs(self.mismatch) <= TOLERANCE
                     and self.board.peripherals[self.dma].serves(self.name + "_RX"))
 
     def _arrived(self):
@@ -279,9 +279,11 @@ class Usart(Registers):
     def _receive(self, start, byte):
         if self.idle_armed:
             self._detect_idle(start)
-        value, framing = byte, False
-        if abs(self.mismatch) > 0.02:
-            value, framing = self._sample(byte)
+        value, framing = byte, abs(self.mismatch) > TOLERANCE
+        if framing:
+            self._note_mismatch("rx", self.mismatch)
+            value = _sampled(byte, self.bit_ps, PS / self.baud)
+            value = value if value != byte else value ^ 0x80
         if self.sr & RXNE:
             self.sr |= ORE
             self.board.record("overrun", usart=self.name, byte=byte)
@@ -293,13 +295,6 @@ class Usart(Registers):
             self._interrupt()
         if self.cr3 & DMAR:
             self.serve_dma()
-
-    def _sample(self, byte):
-        value, framing = _sampled(byte, self.bit_ps, PS / self.baud)
-        if abs(self.mismatch) > TOLERANCE:
-            self._note_mismatch("rx", self.mismatch)
-            value, framing = (value if value != byte else value ^ 0x80), True
-        return value, framing
 
     def _detect_idle(self, now):
         """Sets IDLE once after a whole frame of ones since the last byte (section 30.3.3)."""
@@ -436,17 +431,12 @@ class Usart(Registers):
 
 
 def _sampled(byte, sampler_bit_ps, sender_bit_ps):
-    """Returns the byte and the framing error of a receiver that samples the middle of its own bits."""
-    levels = [0, *(byte >> bit & 1 for bit in range(8)), 1]
-    value, stop = 0, 1
-    for bit in range(1, 10):
-        index = int((bit + 0.5) * sampler_bit_ps / sender_bit_ps)
-        level = levels[index] if index < len(levels) else 1
-        if bit == 9:
-            stop = level
-        else:
-            value |= level << (bit - 1)
-    return value, not stop
+    """Returns the byte of a receiver that samples the middle of its own bits."""
+    levels, value = [0, *(byte >> bit & 1 for bit in range(8)), 1], 0
+    for bit in range(8):
+        index = int((bit + 1.5) * sampler_bit_ps / sender_bit_ps)
+        value |= (levels[index] if index < len(levels) else 1) << bit
+    return value
 
 
 def usarts(board):
