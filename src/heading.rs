@@ -18,8 +18,8 @@ mod turns;
 mod ubx;
 
 pub use described::HeadingSignal;
+pub(crate) use estimator::{BRIDGED, FINE_BIAS, gain_knowledge};
 pub use estimator::{CourseConfig, CourseCounters, CourseState, Estimator, Refusal};
-pub(crate) use estimator::{FINE_BIAS, gain_knowledge};
 pub use gain::Gain;
 pub use gnss::{Fix, GnssLine, GnssProtocol, GnssSettings};
 pub use receiver::{HeadingConfigError, HeadingReceiver, HeadingSettings, Received};

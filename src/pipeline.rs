@@ -30,7 +30,7 @@ use crate::align::{AlignError, Aligner, MAX_GAP};
 use crate::bias::{StaticError, StaticInit, ZeroRate, ZeroRateOutcome};
 use crate::compensate::{Compensated, Compensator, Complete, Implausible};
 use crate::estimate::{AccumulatedYaw, VehicleSample};
-use crate::heading::Estimator;
+use crate::heading::{BRIDGED, Estimator};
 use crate::health::{BoardFaults, Counters, Faults, count};
 use crate::model::Estimate;
 use crate::monitor::{AXIS_STUCK_AFTER, STUCK_AFTER};
@@ -230,7 +230,7 @@ impl Pipeline {
         count(&mut self.state.counters.samples, 1);
         if frame.missing > 0 {
             count(&mut self.state.counters.missing, frame.missing);
-            self.gap();
+            self.gap(frame.missing);
         }
         if !sample.validity.is_good() {
             count(&mut self.state.counters.invalid, 1);
@@ -368,7 +368,7 @@ impl Pipeline {
         }
         // The refused sample may be the only one of its step, so it counts as a gap.
         if !matches!(error, AlignError::Duplicate { .. }) {
-            self.gap();
+            self.gap(u32::MAX);
         }
     }
 
@@ -377,7 +377,7 @@ impl Pipeline {
         let steps = (lost.saturating_add(PERIOD_US / 2) / PERIOD_US).min(u64::from(u16::MAX)) as u32;
         count(&mut self.state.counters.missing, steps);
         self.lose(self.state.tick, steps);
-        self.gap();
+        self.gap(u32::MAX);
     }
 
     /// Notes that the gap in the yaw that ends after a tick is longer than the grid shows.
@@ -386,17 +386,20 @@ impl Pipeline {
         self.state.delayed_yaw.lose(after, steps);
     }
 
-    fn gap(&mut self) {
+    /// Notes that samples are missing. What they hide while the vehicle starts is little where they are few.
+    fn gap(&mut self, missing: u32) {
         self.state.gap_within = WINDOW as u32;
-        self.break_window();
+        self.state.windows.break_off();
         if let Some(known) = &mut self.state.initialised {
             self.state.standstill.restart();
             known.zero_rate.as_mut().map(ZeroRate::restart);
             known.level.restart();
+        } else if missing > BRIDGED {
+            self.state.static_init.restart();
         }
     }
 
-    /// Drops the current window and static initialisation, because neither may span a gap.
+    /// Drops the current window and static initialisation, because neither may span a sample that is not good.
     fn break_window(&mut self) {
         self.state.windows.break_off();
         if self.state.initialised.is_none() {

@@ -106,6 +106,8 @@ const STANDS: f32 = 0.05;
 /// whatever a receiver states.
 const INACCURATE: f32 = 0.2;
 const LEAST_ACROSS: f32 = 0.01;
+/// Longest gap that is bridged by the mean of the rates around it, samples.
+pub(crate) const BRIDGED: u32 = RATE_HZ / 5;
 /// Fewest courses with which a vehicle starts in motion.
 const FEW: u32 = 5;
 /// Sigma of the bias with which a rate can be used, and with which it is as good as after a standstill, rad/s.
@@ -212,8 +214,9 @@ impl CourseState {
 pub struct Estimator {
     config: CourseConfig,
     turns: Turns,
-    /// Tick of the newest sample in the turns.
+    /// Tick and rate of the newest sample in the turns.
     tick: u32,
+    rate: AngularRate,
     waiting: Option<Arrived>,
     /// The newest course, and the turn since it changed, rad.
     newest: Option<f32>,
@@ -238,6 +241,7 @@ impl Estimator {
             config,
             turns: Turns::EMPTY,
             tick: 0,
+            rate: AngularRate::ZERO,
             waiting: None,
             newest: None,
             unchanged: 0.0,
@@ -267,15 +271,20 @@ impl Estimator {
     /// Adds a sample: its rate less what is known of the bias; `None` where it cannot be used. `stands` is true at a
     /// standstill.
     pub(crate) fn add(&mut self, filter: &mut Filter, tick: u32, rate: Option<AngularRate>, stands: bool) {
-        let follows = tick.wrapping_sub(self.tick) == 1;
-        self.tick = tick;
-        let Some(rate) = rate else { return self.restart() };
-        if !follows {
+        let Some(rate) = rate else { return };
+        let missing = tick.wrapping_sub(core::mem::replace(&mut self.tick, tick)).wrapping_sub(1);
+        let between = AngularRate(core::mem::replace(&mut self.rate, rate).0.midpoint(rate.0));
+        let mut has_ended = false;
+        if missing > BRIDGED {
             self.restart();
+        } else if missing > 0 {
+            let half = (rate.0 - between.0) as f32 / AngularRate::PER_RAD_PER_SEC;
+            let half = half * missing as f32 / RATE_HZ as f32;
+            filter.put_variance::<HEADING>(filter.variance::<HEADING>() + half * half);
+            (0..missing).for_each(|_| has_ended |= self.advance(filter, between, stands));
         }
-        let Some(turned) = self.turns.add(rate) else { return };
-        if self.used.is_some() {
-            self.walk(filter, turned, stands);
+        if !(has_ended | self.advance(filter, rate, stands)) {
+            return;
         }
         if let Some(arrived) = self.waiting.take_if(|arrived| tick.wrapping_sub(arrived.tick) < u32::MAX / 2)
         {
@@ -298,6 +307,15 @@ impl Estimator {
     /// Starts the heading again, because a turn may have been missed.
     pub(crate) fn restart(&mut self) {
         (self.turns, self.used, self.waiting) = (Turns::EMPTY, None, None);
+    }
+
+    /// Adds the turn of a sample; returns whether a block has ended.
+    fn advance(&mut self, filter: &mut Filter, rate: AngularRate, stands: bool) -> bool {
+        let Some(turned) = self.turns.add(rate) else { return false };
+        if self.used.is_some() {
+            self.walk(filter, turned, stands);
+        }
+        true
     }
 
     /// Advances the states by a block.

@@ -63,7 +63,7 @@ impl Pipeline {
             return;
         };
         let State { course, start, .. } = &mut self.state;
-        if !course.has_begun() {
+        if course.state().counters.used == 0 {
             let sigma = early.map_or(zero_rate.max_bias, |(_, sigma)| sigma);
             *start = Start { filter: Filter::new(sigma * sigma, 0.0), ..Start::EMPTY };
             give_back(&mut start.filter, self.config.gain);

@@ -37,6 +37,8 @@ struct Part {
     walk: f64,
     /// Speed of the vehicle that it is on, m/s; backwards negative.
     speed: fn(f64) -> f64,
+    /// True if every three seconds three samples are lost.
+    is_lossy: bool,
 }
 
 fn fast(_second: f64) -> f64 {
@@ -45,13 +47,13 @@ fn fast(_second: f64) -> f64 {
 
 /// The pipeline after a drive of `seconds`, its outputs, and the true headings of every sample.
 fn drive(seconds: usize, drive: &Drive<'_>) -> (Pipeline, Vec<Output>, Vec<f64>) {
-    let part = Part { noise: Noise::new(7), gain: GAIN, walk: 0.0, speed: fast };
+    let part = Part { noise: Noise::new(7), gain: GAIN, walk: 0.0, speed: fast, is_lossy: false };
     drive_with(PipelineConfig::DEFAULT, part, seconds, drive)
 }
 
 fn drive_with(
     config: PipelineConfig,
-    Part { mut noise, gain, walk, speed }: Part,
+    Part { mut noise, gain, walk, speed, is_lossy }: Part,
     seconds: usize,
     drive: &Drive<'_>,
 ) -> (Pipeline, Vec<Output>, Vec<f64>) {
@@ -95,6 +97,9 @@ fn drive_with(
             (0, Standstill::Still)
         };
         let wheels = WheelSample { time: sample.time, speeds: [Some(WheelSpeed(speed)); WHEELS], standstill };
+        if is_lossy && tick % (3 * SECOND) < 3 {
+            continue;
+        }
         let output = pipeline.correct(sample, Some(&wheels), &BoardState::GOOD).expect("a place on the grid");
         if let Some(due) = &output.window {
             pipeline.deliver(due.end, network(due).expect("an estimate"));
@@ -123,17 +128,22 @@ fn true_course(second: usize, headings: &[f64]) -> Option<f64> {
 #[test]
 fn a_vehicle_that_never_stands_is_usable_in_20_s_and_good_in_60() {
     let course = |second, headings: &[f64]| true_course(second, headings).filter(|_| second < 90);
-    let (pipeline, outputs, headings) =
-        drive(150, &Drive { stands: 0, creeps: 0.0, turn: &road, course: &course });
-    let first = |wanted: &dyn Fn(&Output) -> bool| outputs.iter().position(wanted).map(|at| at as f64 * 0.01);
-    let usable = first(&|output| output.vehicle.delayed.status != Status::Init).expect("a rate");
-    let good = first(&|output| output.vehicle.delayed.quality == Quality::Good).expect("a good rate");
-    println!("usable after {usable} s, good after {good} s, {:?}", pipeline.course_counters());
-    assert!(usable <= 20.0 && good <= 60.0);
-    let held = error(&outputs, &headings, 58).to_degrees();
-    println!("heading held for a minute: {held:.3} deg");
-    assert!(held.abs() < 0.6, "{held} deg");
-    assert_eq!(pipeline.status(None).bias, Knowledge::Fine);
+    for is_lossy in [false, true] {
+        let part = Part { noise: Noise::new(7), gain: GAIN, walk: 0.0, speed: fast, is_lossy };
+        let moving = Drive { stands: 0, creeps: 0.0, turn: &road, course: &course };
+        let (pipeline, outputs, headings) = drive_with(PipelineConfig::DEFAULT, part, 150, &moving);
+        let first = |wanted: &dyn Fn(&Output) -> bool| {
+            outputs.iter().find(|output| wanted(output)).map(|output| f64::from(output.vehicle.tick) * 0.01)
+        };
+        let usable = first(&|output| output.vehicle.delayed.status != Status::Init).expect("a rate");
+        let good = first(&|output| output.vehicle.delayed.quality == Quality::Good).expect("a good rate");
+        println!("usable after {usable} s, good after {good} s, {:?}", pipeline.course_counters());
+        assert!(usable <= 20.0 && good <= 60.0);
+        let held = error(&outputs, &headings, 58).to_degrees();
+        println!("heading held for a minute: {held:.3} deg");
+        assert!(held.abs() < 0.6, "{held} deg");
+        assert_eq!(pipeline.status(None).bias, Knowledge::Fine);
+    }
     // Without courses it never starts.
     let (_, outputs, _) = drive(60, &Drive { stands: 0, creeps: 0.0, turn: &road, course: &|_, _| None });
     assert!(outputs.iter().all(|output| output.vehicle.delayed.status == Status::Init));
@@ -153,7 +163,7 @@ fn the_gain_is_learnt_where_the_vehicle_turns_both_ways() {
     assert!(known.is_some_and(|known| known.sigma < 0.002), "{known:?}");
     let config = PipelineConfig { gain: known, ..PipelineConfig::DEFAULT };
     let without = Drive { stands: 5, creeps: 0.0, turn: &|_| 0.3, course: &|_, _| None };
-    let part = Part { noise: Noise::new(8), gain: GAIN, walk: 0.0, speed: fast };
+    let part = Part { noise: Noise::new(8), gain: GAIN, walk: 0.0, speed: fast, is_lossy: false };
     let (pipeline, outputs, headings) = drive_with(config, part, 60, &without);
     assert_eq!(pipeline.status(None).gain, Knowledge::Coarse);
     let (_, alone, _) = drive(60, &without);
@@ -198,7 +208,7 @@ fn after_courses(
 ) -> [f64; 2] {
     let part = |seed: u64| {
         let mut noise = Noise::new(100 + seed);
-        let part = Part { gain: 0.005 * noise.normal(), noise, walk: 2e-6, speed };
+        let part = Part { gain: 0.005 * noise.normal(), noise, walk: 2e-6, speed, is_lossy: false };
         let drive = Drive { stands: 10, creeps: 0.0, turn, course };
         let (pipeline, outputs, headings) = drive_with(PipelineConfig::DEFAULT, part, 240, &drive);
         check(&pipeline);
@@ -218,7 +228,8 @@ fn a_slow_vehicle_that_reverses_learns_where_the_accuracy_is_stated() {
     let antennas = |second: usize, headings: &[f64]| {
         course(second, headings).map(|course| course + if second % 40 < 20 { 0.0 } else { PI })
     };
-    let cases: [(&str, fn(f64) -> f64, &Course<'_>); 3] = [
+    type Case<'a> = (&'a str, fn(f64) -> f64, &'a Course<'a>);
+    let cases: [Case<'_>; 3] = [
         ("forwards", |_| 0.85, &course),
         ("to and fro", to_and_fro, &course),
         ("to and fro, two antennas", to_and_fro, &antennas),

@@ -86,13 +86,12 @@ fn a_gap_degrades_and_heals() {
 }
 
 #[test]
-fn a_gap_restarts_static_initialisation() {
-    let outputs = run(
-        &mut new(),
-        drive((0..200).chain(210..290)).chain((290..700).map(|t| turning(t, rate(0.001)))),
-        constant(0.0),
-    );
-    assert_eq!(statuses(&outputs)[0], (Init, 500));
+fn a_gap_of_more_than_a_fifth_of_a_second_restarts_static_initialisation() {
+    for (lost, init) in [(21, 500), (20, 300)] {
+        let ticks = (0..200).chain(200 + lost..700);
+        let outputs = run(&mut new(), ticks.map(|t| turning(t, rate(0.001))), constant(0.0));
+        assert_eq!(statuses(&outputs)[0], (Init, init));
+    }
 }
 
 #[test]
