@@ -128,7 +128,7 @@ fn start(path: &Path, doctor: &Doctor, rows: &Rows) -> Result<Finding, DataError
         ),
         None => {
             "it succeeds in no standstill: record it again, and let it stand for the first 3 s; `evaluate` simulates them where a \
-             course is known".to_owned()
+             course is known and the wheels do not turn in them".to_owned()
         }
     };
     Ok(Finding::bad("start", format!("{reason}; {remedy}.")))

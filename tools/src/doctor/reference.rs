@@ -22,6 +22,8 @@ const GPS_AHEAD: f64 = 18.0;
 const GAIN: f64 = 0.003;
 /// A reference that never turns faster has nothing to compare, rad/s.
 const STILL: f64 = 0.01;
+/// A mean rate of a second that is no gyro's bias, deg/s.
+const NO_BIAS_DEG: f64 = 6.0;
 const FAR: Range<f64> = 0.8..1.25;
 
 pub fn finding(rows: &Rows, standstill: Option<&Range<usize>>) -> Finding {
@@ -77,7 +79,13 @@ fn of_rate(rows: &Rows, values: &str, noise: &str) -> Finding {
     let Offset { seconds: late, coefficient } = match aligned(&gyro, &rate) {
         Ok(offset) => offset,
         Err(_) if turns(&rate) < STILL => {
-            return Finding::note(WHAT, format!("{values}{noise}; it shows no turn."));
+            let text = format!("{values}{noise}; it shows no turn");
+            return match turns(&gyro).to_degrees() {
+                deg if deg > NO_BIAS_DEG => {
+                    Finding::bad(WHAT, format!("{text}, and the gyro turns by {deg:.0} deg/s."))
+                }
+                _ => Finding::note(WHAT, text + "."),
+            };
         }
         Err(reason) => return unfit(values, reason),
     };

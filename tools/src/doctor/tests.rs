@@ -165,6 +165,10 @@ fn each_defect_is_found() {
         row[9] = -row[9];
         true
     });
+    bad("reference", "it shows no turn, and the gyro turns by ", &|_, row| {
+        row[9] = 0.0;
+        true
+    });
     bad("wheels", "--unit wheel2_rate=km/h --unit wheel4_rate=km/h", &|_, row| {
         row[7..9].iter_mut().for_each(|rate| *rate *= KMH);
         true
