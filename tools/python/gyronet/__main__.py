@@ -151,6 +151,8 @@ def run_logs(args):
         else:
             beside = drive.write(args.out)
             report.append(f"{args.out}: {drive.rows} rows; {beside} beside it")
+    else:
+        report.append("nothing is written without --out")
     if args.json:
         print(json.dumps({"seconds": round(drive.seconds, 2), "rows": drive.rows, "dropped": dropped, "start": start, "report": report,
                           "warnings": drive.warnings, "dropped_by_reason": drive.dropped}))

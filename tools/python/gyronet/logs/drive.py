@@ -221,7 +221,7 @@ class Drive:
             self.report.append(used.line(self.start, self.rows))
         if (self.odometry or any(wheel and wheel.dimension == "speed" for wheel in self.wheels)) and not self.vehicle.wheels["radius_m"]:
             track = " and track 0 m (both wheels at the vehicle's speed)" if self.odometry and not self.vehicle.wheels["track_m"] else ""
-            self.report.append(f"wheels: radius {RADIUS} m{track} is assumed; set wheels.radius_m{' and wheels.track_m' if track else ''}")
+            self.report.append(f"wheels: radius {RADIUS} m{track} is assumed; set wheels.radius_m{' and wheels.track_m' if track else ''} in a --vehicle file")
         if not self.seen[7:10].any():
             self.report.append("no GNSS position (in a bag: sensor_msgs/NavSatFix) and no reference: no method can be judged by this drive")
         if self.count > self.rows:
