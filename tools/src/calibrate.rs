@@ -4,7 +4,7 @@
 //! sensor or the reference is not level in the vehicle) and a share of itself (gain). Over a second or more these
 //! errors add up to an angle, which a reference yaw rate shows. The shares are fitted to those angles, with a separate
 //! constant for each drive, because bias belongs to the drive and not to the unit. A course is too inaccurate for mounting; the
-//! gain it shows is that which the board learns from it ([`by_course`]). The shares are the last row of a 3
+//! gain it shows is that which the board learns from it (`by_course`). The shares are the last row of a 3
 //! x 3 map ([`gyronet::mounting::GyroMap`]) that the board applies to every sample. The other rows stay those of the
 //! identity, because the heading does not depend on them.
 
