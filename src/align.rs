@@ -257,7 +257,7 @@ impl Aligner {
         let near = if SNAPPED_US.contains(&period_us) { SNAP_US as i64 } else { 0 };
         let from_end = time - self.end;
         let after = match i32::try_from(from_end) {
-            // Nearly always: the processor divides 32 bits alone in hardware.
+            // The usual case: a Cortex-M4 divides 32 bits in hardware, and 64 bits in software.
             Ok(from_end) => from_end.rem_euclid(STEP as i32).into(),
             Err(_) => from_end.rem_euclid(STEP),
         };

@@ -97,7 +97,7 @@ impl YawRateSignal {
     /// [`OutOfRange`]; the residual is then dropped, since the frame is marked bad.
     pub fn encode(&mut self, rate: AngularRate) -> Result<u16, OutOfRange> {
         let wanted = i64::from(rate.0) * NANO_DEG_PER_CODE_Q20 + self.residual;
-        // From the smallest code on: of 2^61 at most, 35 bits are left to be divided.
+        // Counted from the smallest code, so that it is positive; the shift leaves at most 35 bits to divide.
         let above = wanted + YAW_RATE_LSB / 2 + i64::from(ZERO) * YAW_RATE_LSB;
         let raw = u64::try_from(above >> YAW_RATE_SHIFT).map(divided::<YAW_RATE_ODD>);
         let code = raw.map_or(-1, |raw| raw as i64) - i64::from(ZERO);

@@ -268,10 +268,10 @@ impl Estimator {
         }
     }
 
-    /// Adds a sample: its rate less what is known of the bias; `None` where it cannot be used. `stands` is true at a
+    /// Adds a sample: its rate less what is known of the bias; `None` where it cannot be used and may hide a turn. `stands` is true at a
     /// standstill.
     pub(crate) fn add(&mut self, filter: &mut Filter, tick: u32, rate: Option<AngularRate>, stands: bool) {
-        let Some(rate) = rate else { return };
+        let Some(rate) = rate else { return self.restart() };
         let missing = tick.wrapping_sub(core::mem::replace(&mut self.tick, tick)).wrapping_sub(1);
         let between = AngularRate(core::mem::replace(&mut self.rate, rate).0.midpoint(rate.0));
         let mut has_ended = false;

@@ -27,7 +27,7 @@ const RETRY_MS: u32 = 1_000;
 const COURSE_MS: u32 = 100;
 /// Time after which a start has not failed, ms.
 const SETTLED_MS: u32 = 60_000;
-/// Longest time from one step of idle to the next, ms: of what neither an input nor a tester brings about.
+/// Longest time from one step of idle to the next without an input or a request, ms.
 pub const STEP_MS: u32 = 10;
 /// Duration of one pass over the weights, ms.
 const CHECK_MS: usize = 10_000;

@@ -23,7 +23,7 @@ use gyronet::service::message::{AllCounters, LineCounters};
 use gyronet::store::ImuPart;
 use gyronet::units::Micros;
 
-/// Interval of what needs no millisecond: counters of the lines, and the watchdog, ms.
+/// Interval at which the counters of the lines are summed and the watchdog is fed, ms.
 const SLOW_MS: u32 = 4;
 /// Half a period of the LED, ms; a power of two.
 const BLINK_MS: u32 = 512;
@@ -189,7 +189,7 @@ impl Output {
         has_sample
     }
 
-    /// Does what needs no millisecond.
+    /// Sums the counters of the lines and feeds the watchdog, every [`SLOW_MS`].
     #[inline(never)]
     fn report(&mut self, tick: u32, lines: &mut LineCounters) {
         self.reported_at = tick;

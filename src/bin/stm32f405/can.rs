@@ -167,7 +167,7 @@ impl Can {
     pub fn poll(&mut self, now: u32) {
         let is_on = matches!(self.recovery, Recovery::On { .. }) && self.interval_ms == FIRST_RESTART_MS;
         if is_on && OFF_AT.load(Ordering::Relaxed) == 0 && all_sent() {
-            // Nothing can be stale, nor is there anything to recover from.
+            // The mailboxes are empty and the controller is on the bus: no frame is stale.
             return;
         }
         let micros = timer::micros() as u32;

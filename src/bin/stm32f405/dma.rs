@@ -34,12 +34,12 @@ impl Stream {
     }
 
     fn controller(&self) -> &RegisterBlock {
-        // SAFETY: see above.
+        // SAFETY: `new` computed the address of this stream's registers.
         unsafe { &*self.controller }
     }
 
     fn stream(&self) -> &ST {
-        // SAFETY: see above.
+        // SAFETY: `new` computed the address of this stream's registers.
         unsafe { &*self.registers }
     }
 
