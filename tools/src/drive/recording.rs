@@ -22,6 +22,7 @@
 mod position;
 mod reader;
 mod resampled;
+mod rest;
 mod survey;
 
 pub use position::{Track, between};
@@ -45,7 +46,7 @@ pub struct Row {
     /// Line number in the file; the header is line 1.
     pub line: u64,
     pub sample: ImuSample,
-    /// The true yaw rate, rad/s.
+    /// The true yaw rate, rad/s, less [`Facts::reference_bias`] in a [`Recording`] or [`super::stream::Drive`].
     pub reference: Option<f64>,
     /// The true course, rad, positive to the left, from any zero direction, wrapped or not.
     pub course: Option<f64>,
@@ -94,6 +95,8 @@ impl Recording {
             rows = resampled(path, rows.into_iter().map(Ok)).collect::<Result<_, _>>()?;
             facts = Survey::of(&rows).finish(path)?;
         }
+        let bias = facts.reference_bias.unwrap_or_default();
+        rows.iter_mut().for_each(|row| row.reference = row.reference.map(|rate| rate - bias));
         Ok(Self { path: path.to_owned(), rows, missing: facts.missing, vehicle })
     }
 

@@ -79,6 +79,7 @@ impl Drive<'static> {
         let mut drive = Self { path: name, vehicle, facts, is_off_grid, gyro_map: None, before, source };
         if is_off_grid {
             let mut survey = Survey::default();
+            drive.facts.reference_bias = None;
             for row in drive.rows()? {
                 survey.row(&row?);
             }
@@ -119,13 +120,12 @@ impl Drive<'_> {
             }
         };
         let rows: Rows<'_> = if self.is_off_grid { Box::new(resampled(&self.path, rows)) } else { rows };
-        if self.gyro_map.is_none() && self.before.is_empty() {
-            return Ok(rows);
-        }
+        let bias = self.facts.reference_bias.unwrap_or_default();
         let (map, later) = (self.gyro_map, self.before.len() as u64 * PERIOD_US);
         let placed = rows.map(move |row| {
             row.map(|mut row| {
                 row.sample.time.0 += later;
+                row.reference = row.reference.map(|rate| rate - bias);
                 if let Some(map) = map {
                     row.sample.angular_rate = map.rate(row.sample.angular_rate);
                 }

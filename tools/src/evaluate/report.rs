@@ -164,6 +164,8 @@ pub struct DriveErrors {
     /// Number of grid steps without a sample; they are left out of every method's errors.
     pub missing: u32,
     pub reference: &'static str,
+    /// The mean of the reference rate at rest, which was taken off; `None` where no wheel shows the rest.
+    pub reference_bias_deg_h: Option<f64>,
     pub wheels: bool,
     /// True if the standstill at the start is simulated.
     pub simulated_rest: bool,
@@ -217,6 +219,7 @@ impl DriveErrors {
             seconds,
             missing: comparison.missing,
             reference,
+            reference_bias_deg_h: drive.facts.reference_bias.map(|rate| 3600.0 * rate.to_degrees()),
             wheels: drive.facts.has_wheels(),
             simulated_rest: comparison.simulated_rest,
             over_best_classical: Comparisons::new(&methods),
@@ -326,6 +329,9 @@ impl fmt::Display for Report {
         for drive in &self.drives {
             let DriveErrors { name, seconds, reference, missing, .. } = drive;
             write!(f, "{name}: {seconds:.1} s after static initialisation, against {reference}, ")?;
+            if let Some(bias) = drive.reference_bias_deg_h.filter(|bias| bias.abs() >= 0.05) {
+                write!(f, "less its {bias:.1} deg/h at rest, ")?;
+            }
             write!(f, "{}", if drive.wheels { "with wheels" } else { "no wheels" })?;
             if *missing > 0 {
                 write!(f, ", {missing} samples missing")?;
@@ -424,6 +430,7 @@ mod tests {
             seconds: 10.0,
             missing: 0,
             reference,
+            reference_bias_deg_h: None,
             wheels: false,
             simulated_rest: reference == "ref_yaw",
             over_best_classical: Comparisons::new(&methods),

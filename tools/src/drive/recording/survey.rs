@@ -1,7 +1,8 @@
 //! The first reading of a drive: it checks the drive as a whole, and notes what a replay must know before its first
 //! row.
 
-use super::{Row, WHEEL_STANDS, WHEELS};
+use super::rest::Rest;
+use super::{Row, WHEELS};
 use crate::drive::error::{DataError, DataFault};
 use gyronet::align::{PERIODS_US, SNAP_US};
 use gyronet::bias::STATIC_SAMPLES;
@@ -23,6 +24,8 @@ pub struct Facts {
     /// True if any row has a reference yaw rate, and a course for the board.
     pub has_rate: bool,
     pub has_course: bool,
+    /// Bias of the reference yaw rate, rad/s: its mean over the rest at the start, if wheels show that rest.
+    pub reference_bias: Option<f64>,
 }
 
 impl Facts {
@@ -44,8 +47,7 @@ impl Facts {
 #[derive(Debug, Default)]
 pub struct Survey {
     facts: Facts,
-    /// The rows of static initialisation, in which the wheels must stand.
-    beginning: Vec<Row>,
+    rest: Rest,
     /// How often each sample period occurs. Different periods add up to the length of the drive, so their number grows
     /// with its square root at most.
     periods: BTreeMap<u64, u64>,
@@ -76,16 +78,13 @@ impl Survey {
         for (recorded, rate) in facts.wheels.iter_mut().zip(row.wheels) {
             *recorded |= rate.is_some();
         }
-        if self.beginning.len() < STATIC_SAMPLES as usize {
-            self.beginning.push(*row);
-        }
+        self.rest.row(row);
     }
 
     /// Checks that the drive can be replayed: at least 3 s long, at 50 to 1000 Hz, with any wheels at rest in the first 3 s.
     pub fn finish(mut self, path: &str) -> Result<Facts, DataError> {
-        let beginning = std::mem::take(&mut self.beginning);
-        let facts = self.finish_moving(path)?;
-        check_wheels(&beginning, path)?;
+        let facts = self.checked(path)?;
+        self.rest.check(path)?;
         Ok(facts)
     }
 
@@ -96,6 +95,10 @@ impl Survey {
 
     /// As [`Survey::finish`], with wheels that may turn.
     pub fn finish_moving(mut self, path: &str) -> Result<Facts, DataError> {
+        self.checked(path)
+    }
+
+    fn checked(&mut self, path: &str) -> Result<Facts, DataError> {
         if self.facts.rows == 0 {
             return Err(DataError::of(path, DataFault::Empty));
         }
@@ -108,6 +111,7 @@ impl Survey {
             return Err(DataError::of(path, DataFault::Rate { hz: 1e6 / median as f64 }));
         }
         self.facts.is_off_grid |= median.abs_diff(PERIOD_US) > SNAP_US;
+        self.facts.reference_bias = self.rest.reference_bias();
         Ok(self.facts)
     }
 
@@ -120,24 +124,4 @@ impl Survey {
         });
         found.map(|(period, _)| *period)
     }
-}
-
-/// Checks that the wheels stand in each of the first three seconds. Each second is checked on its own, so that a
-/// car that pulls away in the last one is found.
-fn check_wheels(beginning: &[Row], path: &str) -> Result<(), DataError> {
-    for second in beginning.chunks(RATE_HZ as usize) {
-        for wheel in 0..WHEELS {
-            let rates = || second.iter().filter_map(|row| row.wheels[wheel]);
-            let mean = rates().sum::<f64>() / rates().count().max(1) as f64;
-            if mean.abs() <= WHEEL_STANDS {
-                continue;
-            }
-            let turns = |row: &&Row| row.wheels[wheel].is_some_and(|rate| rate.abs() > WHEEL_STANDS);
-            // At least one rate is above the limit, since the mean is.
-            let line = second.iter().find(turns).map_or(0, |row| row.line);
-            let fault = DataFault::Moving { line, wheel: wheel + 1, rate: mean };
-            return Err(DataError::of(path, fault));
-        }
-    }
-    Ok(())
 }

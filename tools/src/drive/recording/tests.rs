@@ -43,8 +43,26 @@ fn reads_what_is_there() {
     assert_eq!(row.sample.time.0, 12_010_000);
     assert_eq!(row.sample.angular_rate[2].0, (0.003f32 * 134_217_728.0).round() as i32);
     assert_eq!(row.sample.specific_force[1].0, (-0.2f32 * 1_048_576.0).round() as i32);
-    assert_eq!(row.reference, Some(0.0005));
     assert_eq!(row.wheels, [Some(0.01), None, None, None]);
+}
+
+#[test]
+fn the_bias_of_a_reference_shows_at_rest() {
+    // From the sixth second the car turns by 0.1 rad/s, with wheels that are reported half a second late.
+    let text = |wheel: &str| {
+        let turning = |row: String| row.replacen(",0.0005,", ",0.1005,", 1);
+        standing(1000, |line, row| match line {
+            0..500 => row,
+            500..550 => turning(row),
+            _ => turning(row).replacen(",0.01,,", wheel, 1),
+        })
+    };
+    let recording = parse(&text(",20.0,,")).unwrap();
+    let rate = |row: usize| recording.rows[row].reference.unwrap();
+    assert!(rate(0).abs() < 1e-9 && (rate(900) - 0.1).abs() < 1e-9, "{} {}", rate(0), rate(900));
+    // Without wheels nothing shows that the car stands.
+    let text = text(",,,").replace(",0.01,,", ",,,");
+    assert_eq!(parse(&text).unwrap().rows[0].reference, Some(0.0005));
 }
 
 #[test]
