@@ -28,7 +28,6 @@ pub mod wheels;
 use gyronet_tools::drive::error::DataError;
 use gyronet_tools::drive::stream::Drive;
 use std::error::Error;
-use std::path::Path;
 
 /// The result of a subcommand. The library's errors are typed; here an error only needs to print as one clear line
 /// that names the file.
@@ -45,11 +44,7 @@ fn remark(common: Common, line: std::fmt::Arguments<'_>) -> std::io::Result<()> 
     if common.quiet { Ok(()) } else { writeln!(std::io::stderr(), "{line}") }
 }
 
-/// Opens a drive, and prints a remark if it has a vehicle file beside it.
-fn read_drive(path: &Path, common: Common) -> std::result::Result<Drive<'static>, DataError> {
-    remarked(Drive::open(path)?, common)
-}
-
+/// Prints a remark if the drive has a vehicle file beside it.
 fn remarked(drive: Drive<'static>, common: Common) -> std::result::Result<Drive<'static>, DataError> {
     if let Some(vehicle) = &drive.vehicle.path {
         remark(common, format_args!("{}: vehicle file {}", drive.path, vehicle.display()))

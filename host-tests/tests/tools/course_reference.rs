@@ -84,6 +84,18 @@ fn a_drive_that_starts_moving_gets_a_simulated_standstill() {
     assert!((seconds[0] - 3.0).abs() < 1e-9 && seconds.len() + 10 > ROWS, "{}", seconds.len());
 }
 
+/// The gyro shows a rest, which the wheels deny.
+#[test]
+fn a_drive_whose_wheels_turn_at_the_start_gets_one_too() {
+    let mut recording = drive(500, 1.0, "ref_yaw");
+    assert!(!errors(&recording).expect("enough course").simulated_rest);
+    recording.rows.iter_mut().for_each(|row| row.wheels = [Some(20.0); 4]);
+    assert!(errors(&recording).expect("enough course").simulated_rest);
+    recording.rows.iter_mut().for_each(|row| row.course = None);
+    let error = errors(&recording).expect_err("nothing shows the bias").to_string();
+    assert!(error.starts_with("made/up.csv: starts moving: line 2, wheel 1 turns at 20.00 rad/s"), "{error}");
+}
+
 #[test]
 fn references_that_cannot_be_used_are_refused_with_the_reason() {
     let text = |recording: &Recording| errors(recording).expect_err("it cannot be used").to_string();

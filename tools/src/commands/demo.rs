@@ -1,6 +1,6 @@
 //! `gyronet demo`: all results of one drive.
 
-use super::{Common, WriteError, paint, print_json, progress, read_drive, weights};
+use super::{Common, WriteError, paint, print_json, progress, remarked, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
 use gyronet_tools::demo::{Demo, Tunnel, write_log};
@@ -60,7 +60,7 @@ fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -
     let weights = args.sent.open()?;
     let bundled = bundled::demo_drive(false)?;
     let drive = match &args.file {
-        Some(path) => read_drive(path, common)?,
+        Some(path) => remarked(Drive::open_moving(path)?, common)?,
         None => Drive::from(&bundled),
     };
     let bar = progress::bar(common, drive.facts.rows, drive.name());
@@ -118,8 +118,13 @@ fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -
         }
         None => writeln!(out, "No reference (ref_gyr_z or ref_yaw), so no errors.\n")?,
     }
-    if let Some(tunnel) = &tunnel {
-        writeln!(out, "{}", paint::tunnel(tunnel))?;
+    match (&tunnel, &args.file) {
+        (Some(tunnel), _) => writeln!(out, "{}", paint::tunnel(tunnel))?,
+        (None, Some(file)) => {
+            let file = file.display();
+            writeln!(out, "No tunnel: cargo gyronet evaluate {file} --outage 60 says what it lacks.\n")?;
+        }
+        (None, None) => {}
     }
     writeln!(out, "every result, as a page   {}", page.display())?;
     writeln!(

@@ -81,7 +81,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         args.gyronet.then(|| args.checkpoint.as_deref().map_or_else(bundled::checkpoint, Checkpoint::read));
     let checkpoint = checkpoint.transpose()?;
     let judge = |file: &Path, bar: &ProgressBar| {
-        let drive = args.unit.drive(Drive::open(file), common)?;
+        let drive = args.unit.drive(Drive::open_moving(file), common)?;
         bar.set_length(drive.facts.rows as u64);
         bar.reset();
         args.unit.sent.errors(&drive, checkpoint.as_ref(), |_| bar.inc(1))

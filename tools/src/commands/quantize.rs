@@ -1,6 +1,6 @@
 //! `gyronet quantize` converts an f32 checkpoint to a weight file for the integer kernels.
 
-use super::{Common, WriteError, print_json, read_drive};
+use super::{Common, WriteError, print_json, remarked};
 use gyronet::coprocessor::Config;
 use gyronet::model::GyroNet;
 use gyronet_tools::board::Board;
@@ -98,7 +98,7 @@ fn convert(args: &Args, common: Common) -> Made {
     let drives: Vec<Drive<'_>> = if args.drives.is_empty() {
         vec![Drive::from(&bundled)]
     } else {
-        args.drives.iter().map(|path| read_drive(path, common)).collect::<Result<_, _>>()?
+        args.drives.iter().map(|path| remarked(Drive::open(path)?, common)).collect::<Result<_, _>>()?
     };
     let mut added = Vec::new();
     for drive in &drives {

@@ -56,7 +56,8 @@ impl Tunnel {
 impl fmt::Display for Tunnel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let starts = self.row(Method::DELAYED).map_or(0, |figures| figures.starts);
-        let title = format!("{SECONDS} s without GNSS, {starts} times (median, worst)");
+        let starts = if starts == 1 { "1 start".to_owned() } else { format!("{starts} starts") };
+        let title = format!("{SECONDS} s without GNSS, {starts} (median, worst)");
         writeln!(f, "{title:<47}{:>15}{:>16}", "heading, deg", "position, m")?;
         for method in ROWS {
             let Some(Figures { heading_deg, position_m, .. }) = self.row(method) else { continue };

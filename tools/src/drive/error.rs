@@ -1,5 +1,6 @@
 //! The errors of recorded drives and of data sets. They name the file and, if known, the line and the column.
 
+use super::recording::Turning;
 use std::fmt;
 
 /// An error in a file: where it is, and what is wrong.
@@ -80,9 +81,10 @@ pub enum DataFault {
     Rate { hz: f64 },
     /// A wheel, 1 to 4, turns during static initialisation; its mean rate over a second is in rad/s.
     #[error(
-        "starts moving: line {line}, wheel {wheel} turns at {rate:.2} rad/s in the first 3 s; `gyronet doctor` looks for a later rest"
+        "starts moving: line {}, wheel {} turns at {:.2} rad/s in the first 3 s; `gyronet doctor` looks for a later rest",
+        .0.line, .0.wheel, .0.rate
     )]
-    Moving { line: u64, wheel: usize, rate: f64 },
+    Moving(Turning),
     #[error("not a valid vehicle file: {reason}")]
     Vehicle { reason: String },
     #[error("{format}, not a drive; import it first: {command}")]

@@ -28,6 +28,7 @@ mod survey;
 pub use position::{Track, between};
 pub use reader::Reader;
 pub use resampled::resampled;
+pub use rest::Turning;
 pub use survey::{Facts, Survey};
 
 use crate::drive::error::DataError;
@@ -95,6 +96,7 @@ impl Recording {
             rows = resampled(path, rows.into_iter().map(Ok)).collect::<Result<_, _>>()?;
             facts = Survey::of(&rows).finish(path)?;
         }
+        facts.check_rest(path)?;
         let bias = facts.reference_bias.unwrap_or_default();
         rows.iter_mut().for_each(|row| row.reference = row.reference.map(|rate| rate - bias));
         Ok(Self { path: path.to_owned(), rows, missing: facts.missing, vehicle })

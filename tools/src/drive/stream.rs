@@ -43,23 +43,19 @@ impl Drive<'static> {
     /// Reads a file and the vehicle file beside it, and checks both. What cannot be read twice (a pipe) is kept in
     /// memory.
     pub fn open(path: &Path) -> Result<Self, DataError> {
-        Self::checked(path, Survey::finish)
+        let drive = Self::open_moving(path)?;
+        drive.facts.check_rest(&drive.path)?;
+        Ok(drive)
     }
 
     /// Opens a drive whose courses the board takes: with them it may begin in motion.
     pub fn open_with_courses(path: &Path) -> Result<Self, DataError> {
-        Self::checked(path, Survey::finish_with_courses)
+        let drive = Self::open_moving(path)?;
+        if drive.facts.has_course { Ok(drive) } else { drive.facts.check_rest(&drive.path).map(|()| drive) }
     }
 
     /// Opens a drive that may begin in motion.
     pub fn open_moving(path: &Path) -> Result<Self, DataError> {
-        Self::checked(path, Survey::finish_moving)
-    }
-
-    fn checked(
-        path: &Path,
-        check: impl Fn(Survey, &str) -> Result<Facts, DataError>,
-    ) -> Result<Self, DataError> {
         let name = path.display().to_string();
         let file = foreign::open(path)?;
         let vehicle = Vehicle::of_drive(path)?;
@@ -72,7 +68,7 @@ impl Drive<'static> {
                 kept.push(row);
             }
         }
-        let facts = check(survey, &name)?;
+        let facts = survey.finish(&name)?;
         let source = if again { Source::File(path.to_owned()) } else { Source::Memory(Cow::Owned(kept)) };
         let (vehicle, before) = (Cow::Owned(vehicle), Vec::new());
         let is_off_grid = facts.is_off_grid;
@@ -83,7 +79,7 @@ impl Drive<'static> {
             for row in drive.rows()? {
                 survey.row(&row?);
             }
-            drive.facts = check(survey, &drive.path)?;
+            drive.facts = survey.finish(&drive.path)?;
         }
         Ok(drive)
     }

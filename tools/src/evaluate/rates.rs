@@ -90,7 +90,8 @@ pub fn run(
     networks: &mut Networks<'_>,
     mut visit: impl FnMut(&Sample),
 ) -> Result<Comparison, ReplayError> {
-    let (drive, bias, simulated_rest) = match initialise(drive) {
+    let at_rest = drive.facts.check_rest(&drive.path).map_err(ReplayError::Data);
+    let (drive, bias, simulated_rest) = match at_rest.and_then(|()| initialise(drive)) {
         Ok(bias) => (Cow::Borrowed(drive), bias, false),
         Err(error) => {
             let rested = rest::before(drive)?.ok_or(error)?;

@@ -48,5 +48,15 @@ fn at_rest(first: &Row, k: u32, force: [f64; 3], bias: [f64; 3]) -> Option<Row> 
         angular_rate: [wx?, wy?, wz?],
         ..first.sample
     };
-    Some(Row { sample, reference: None, course: None, heading: None, place: None, ..*first })
+    let wheels = first.wheels.map(|rate| rate.map(|_| 0.0));
+    Some(Row {
+        line: first.line,
+        sample,
+        reference: None,
+        course: None,
+        wheels,
+        speed: None,
+        heading: None,
+        place: None,
+    })
 }

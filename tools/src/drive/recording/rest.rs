@@ -2,7 +2,6 @@
 //! reference rate.
 
 use super::{Row, WHEEL_STANDS, WHEELS};
-use crate::drive::error::{DataError, DataFault};
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::RATE_HZ;
 
@@ -12,6 +11,14 @@ const NEEDED: usize = STATIC_SAMPLES as usize / SECOND;
 /// Longest rest that is taken for the bias, s.
 const LONGEST: usize = 600;
 
+/// A wheel, counted from 1, that turns at this mean rate in a second, rad/s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turning {
+    pub line: u64,
+    pub wheel: usize,
+    pub rate: f64,
+}
+
 /// The seconds from the start of a drive in which the wheels stand. Each is checked on its own, so that a car that pulls
 /// away in the last one of static initialisation is found.
 #[derive(Debug, Default)]
@@ -20,7 +27,7 @@ pub struct Rest {
     /// Mean of the reference yaw rate in each second, rad/s, where it and a wheel are known.
     references: Vec<Option<f64>>,
     /// The wheel that ended the rest, if its mean shows that it turned.
-    fault: Option<DataFault>,
+    turning: Option<Turning>,
     is_over: bool,
 }
 
@@ -35,11 +42,11 @@ impl Rest {
     }
 
     fn second(&mut self) {
-        self.fault = turning(&self.rows);
+        self.turning = turning(&self.rows);
         let known = |row: &Row| row.wheels.iter().any(Option::is_some).then_some(row.reference).flatten();
         let sum = self.rows.iter().map(known).sum::<Option<f64>>();
         let moves = |row: &Row| row.wheels.iter().flatten().any(|rate| rate.abs() > WHEEL_STANDS);
-        self.is_over = self.fault.is_some()
+        self.is_over = self.turning.is_some()
             || self.references.len() == LONGEST
             || self.references.len() >= NEEDED && self.rows.iter().any(moves);
         if !self.is_over {
@@ -48,15 +55,12 @@ impl Rest {
         self.rows.clear();
     }
 
-    /// Checks that the wheels stand during static initialisation.
-    pub fn check(&mut self, path: &str) -> Result<(), DataError> {
+    /// The wheel that turns during static initialisation.
+    pub fn turning(&mut self) -> Option<Turning> {
         if self.references.len() < NEEDED && !self.is_over {
             self.second();
         }
-        match self.fault.take() {
-            Some(fault) if self.references.len() < NEEDED => Err(DataError::of(path, fault)),
-            _ => Ok(()),
-        }
+        self.turning.filter(|_| self.references.len() < NEEDED)
     }
 
     /// Mean of the reference over the rest, rad/s, if it lasts as long as static initialisation. The last second is left
@@ -68,13 +72,13 @@ impl Rest {
 }
 
 /// Returns the first wheel whose mean rate is not that of a standing one.
-fn turning(second: &[Row]) -> Option<DataFault> {
+fn turning(second: &[Row]) -> Option<Turning> {
     (0..WHEELS).find_map(|wheel| {
         let rates = || second.iter().filter_map(|row| row.wheels[wheel]);
         let rate = rates().sum::<f64>() / rates().count().max(1) as f64;
         let turns = |row: &&Row| row.wheels[wheel].is_some_and(|rate| rate.abs() > WHEEL_STANDS);
         // At least one rate is above the limit, since the mean is.
         let line = second.iter().find(turns).map_or(0, |row| row.line);
-        (rate.abs() > WHEEL_STANDS).then_some(DataFault::Moving { line, wheel: wheel + 1, rate })
+        (rate.abs() > WHEEL_STANDS).then_some(Turning { line, wheel: wheel + 1, rate })
     })
 }

@@ -1,7 +1,7 @@
 //! The first reading of a drive: it checks the drive as a whole, and notes what a replay must know before its first
 //! row.
 
-use super::rest::Rest;
+use super::rest::{Rest, Turning};
 use super::{Row, WHEELS};
 use crate::drive::error::{DataError, DataFault};
 use gyronet::align::{PERIODS_US, SNAP_US};
@@ -24,6 +24,8 @@ pub struct Facts {
     /// True if any row has a reference yaw rate, and a course for the board.
     pub has_rate: bool,
     pub has_course: bool,
+    /// The wheel that turns during static initialisation.
+    pub turning: Option<Turning>,
     /// Bias of the reference yaw rate, rad/s: its mean over the rest at the start, if wheels show that rest.
     pub reference_bias: Option<f64>,
 }
@@ -31,12 +33,18 @@ pub struct Facts {
 impl Facts {
     /// The content of these rows, whether they can be replayed or not.
     pub fn of(rows: &[Row]) -> Self {
-        Survey::of(rows).facts
+        let mut survey = Survey::of(rows);
+        Self { turning: survey.rest.turning(), ..survey.facts }
     }
 
     /// Time from the first sample to the end of the last one, s.
     pub fn seconds(&self) -> f64 {
         (self.last.0 - self.first.0 + PERIOD_US) as f64 * 1e-6
+    }
+
+    /// Fails if a wheel turns during static initialisation.
+    pub fn check_rest(&self, path: &str) -> Result<(), DataError> {
+        self.turning.map_or(Ok(()), |turning| Err(DataError::of(path, DataFault::Moving(turning))))
     }
 
     pub fn has_wheels(&self) -> bool {
@@ -81,24 +89,8 @@ impl Survey {
         self.rest.row(row);
     }
 
-    /// Checks that the drive can be replayed: at least 3 s long, at 50 to 1000 Hz, with any wheels at rest in the first 3 s.
+    /// Checks that the drive can be replayed, from a rest or in motion: at least 3 s long, at 50 to 1000 Hz.
     pub fn finish(mut self, path: &str) -> Result<Facts, DataError> {
-        let facts = self.checked(path)?;
-        self.rest.check(path)?;
-        Ok(facts)
-    }
-
-    /// As [`Survey::finish`]; where courses start the vehicle its wheels may turn.
-    pub fn finish_with_courses(self, path: &str) -> Result<Facts, DataError> {
-        if self.facts.has_course { self.finish_moving(path) } else { self.finish(path) }
-    }
-
-    /// As [`Survey::finish`], with wheels that may turn.
-    pub fn finish_moving(mut self, path: &str) -> Result<Facts, DataError> {
-        self.checked(path)
-    }
-
-    fn checked(&mut self, path: &str) -> Result<Facts, DataError> {
         if self.facts.rows == 0 {
             return Err(DataError::of(path, DataFault::Empty));
         }
@@ -111,6 +103,7 @@ impl Survey {
             return Err(DataError::of(path, DataFault::Rate { hz: 1e6 / median as f64 }));
         }
         self.facts.is_off_grid |= median.abs_diff(PERIOD_US) > SNAP_US;
+        self.facts.turning = self.rest.turning();
         self.facts.reference_bias = self.rest.reference_bias();
         Ok(self.facts)
     }
