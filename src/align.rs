@@ -124,8 +124,8 @@ impl Aligner {
     /// Adds a sample; then call [`Aligner::next_frame`] until `None`.
     ///
     /// # Errors
-    /// [`AlignError`]; the sample is not used. After [`AlignError::Jump`] and [`AlignError::Rate`] the grid continues from
-    /// that sample's time stamp, at the following tick.
+    /// [`AlignError`]; the sample is not used. After [`AlignError::Jump`] the grid continues from that sample's time stamp, at
+    /// the following tick; after [`AlignError::Rate`] the steps up to it are missing.
     pub fn add(&mut self, sample: ImuSample) -> Result<(), AlignError> {
         let at = sample.time;
         let time = at.0.min(END) as i64;
@@ -158,7 +158,7 @@ impl Aligner {
         let end = self.snapped(time, period_us).max(begin);
         self.last = Some((sample, end));
         if !PERIODS_US.contains(&period_us) {
-            (self.end, self.sums) = (end + STEP, Sums::NONE);
+            self.omit_to(end);
             return Err(AlignError::Rate { period_us });
         }
         let begin = if is_gap { begin.max(end - usual as i64) } else { begin };
@@ -206,6 +206,14 @@ impl Aligner {
             }
             self.missing = missing.saturating_add(1);
         }
+    }
+
+    /// Leaves out the steps that end by this time, and what the open one has.
+    fn omit_to(&mut self, time: i64) {
+        let steps = ((time - self.end).div_euclid(STEP) + 1).max(0);
+        let number = u32::try_from(steps).unwrap_or(u32::MAX);
+        (self.tick, self.missing) = (self.tick.wrapping_add(number), self.missing.saturating_add(number));
+        (self.end, self.sums) = (self.end + steps * STEP, Sums::NONE);
     }
 
     fn sum(&mut self, sample: &ImuSample, covered: i64) {

@@ -163,6 +163,11 @@ fn rates_that_are_not_used_are_named_and_left_again() {
         }
         let error = AlignError::Rate { period_us: period };
         assert_eq!(newest.as_ref().err(), (!is_used).then_some(&error), "{period} us");
+        // Their time is missing from the steps, not from the grid.
+        if let Some(step) = newest.iter().flatten().last() {
+            let due = (time - PERIODS_US.start()) / PERIOD_US;
+            assert!(u64::from(step.tick).abs_diff(due) <= 1, "{period} us: {} for {due}", step.tick);
+        }
         if !is_used {
             let text = format!("a sample every {period} us: 50 to 1000 a second are used");
             assert_eq!(error.to_string(), text);

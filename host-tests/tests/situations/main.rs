@@ -41,6 +41,7 @@ const CURED: &[(&str, &str, u64)] = &[
     ("people board, the wind rocks", "bare", 1),
     ("banked test track", "utv", 1),
     ("washboard road", "utv", 1),
+    ("two faults, drawn", "car", 201),
 ];
 
 #[test]
