@@ -1,7 +1,6 @@
-//! Clients of a board: [`device`] queries and configures a board over diagnosis on a [`bus`], and [`monitor`] checks
-//! the board's CAN messages as a receiver would. A [`connection`] is a serial line or a socket.
+//! The client of a board: [`device`] queries and configures it over diagnosis on a [`bus`]. A [`connection`] is a serial
+//! line or a socket.
 
 pub mod bus;
 pub mod connection;
 pub mod device;
-pub mod monitor;

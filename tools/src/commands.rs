@@ -12,7 +12,6 @@ pub mod evaluate;
 pub mod firmware;
 pub mod import;
 pub mod keys;
-pub mod monitor;
 mod paint;
 mod progress;
 pub mod quantize;

@@ -37,7 +37,7 @@ const REPORT: Duration = Duration::from_secs(30);
 #[command(after_help = "\
 Examples, in another terminal:
   gyronet device --port localhost:4006 info
-  gyronet monitor localhost:4002")]
+  cantools monitor -i slcan -c socket://localhost:4002 -b 500000 tools/gyronet.dbc")]
 struct Args {
     /// Drive that the vehicle drives; without it one is simulated, with a GNSS receiver.
     #[arg(value_name = "DRIVE.csv")]

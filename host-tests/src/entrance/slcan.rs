@@ -1,13 +1,13 @@
-//! Tests SLCAN: a host's commands to the board, and the bytes that the monitor reads from a line or a log.
+//! Tests SLCAN: a host's commands to the board, and the bytes that a host reads from a line.
 
 use embedded_can::{Frame, StandardId};
 use gyronet::can::DataFrame;
-use gyronet::can::config::Config;
 use gyronet::can::slcan::port::Port;
 use gyronet::can::slcan::{emit, parse, parse_stamped};
 use gyronet::units::Micros;
-use gyronet_tools::client::monitor::Monitor;
-use gyronet_tools::client::monitor::line::{Splitter, parse_line};
+use gyronet_tools::client::bus::{Bus, Line, SlcanBus};
+use std::io::{Read, Result, Write};
+use std::time::Duration;
 
 /// The answers of a board besides frames.
 const ANSWERS: [&[u8]; 3] = [b"", b"V0101", b"NGYRO"];
@@ -48,20 +48,38 @@ pub fn board(data: &[u8]) {
     }
 }
 
-/// Passes bytes to the monitor as from a serial line or a log. A parsed frame must survive emitting and parsing.
+/// A line that ends after these bytes.
+struct Bytes<'a>(&'a [u8]);
+
+impl Read for Bytes<'_> {
+    fn read(&mut self, to: &mut [u8]) -> Result<usize> {
+        self.0.read(to)
+    }
+}
+
+impl Write for Bytes<'_> {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize> {
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        Ok(())
+    }
+}
+
+impl Line for Bytes<'_> {
+    fn now(&mut self) -> Duration {
+        Duration::ZERO
+    }
+}
+
+/// Passes bytes to a host as from a serial line. A parsed frame must survive emitting and parsing.
 pub fn host(data: &[u8]) {
-    let mut splitter = Splitter::default();
-    let mut monitor = Monitor::new(&Config::DEFAULT);
-    for (k, byte) in data.iter().enumerate() {
-        let Some(line) = splitter.feed(*byte) else { continue };
-        let _ = monitor.take_line(&line, k as f64 * 1e-3);
-        if let Ok((_, frame)) = parse_line(&line) {
+    let mut bus = SlcanBus::new(Bytes(data));
+    while let Ok(frames) = bus.receive() {
+        for frame in frames {
             let line = emit(&frame).expect("a data frame");
-            let line = std::str::from_utf8(&line).expect("ASCII");
-            assert_eq!(parse_line(line), Ok((None, frame)));
+            assert_eq!(parse(&line[..line.len() - 1]), Ok(frame));
         }
     }
-    let state = &monitor.state;
-    let values = [state.rate, state.yaw, state.correction, state.sigma, state.latency];
-    assert!(values.into_iter().chain([monitor.drop_in]).flatten().all(f64::is_finite));
 }

@@ -3,6 +3,8 @@
 use crate::common::{self, SLCAN, START};
 use crate::service;
 use embedded_can::{Frame, Id};
+use gyronet::can::DataFrame;
+use gyronet::can::slcan::parse_stamped;
 use gyronet::can::yaw::{AngleMessage, Quality, RateMessage};
 use gyronet::service::event::{EventKind, SensorFault};
 use gyronet::service::message::AllCounters;
@@ -11,7 +13,6 @@ use gyronet::units::AngularRate;
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::inputs::wheels;
 use gyronet_host_tests::stored::Stored;
-use gyronet_tools::client::monitor::line::parse_line;
 use serde_json::json;
 use std::time::Duration;
 
@@ -163,11 +164,11 @@ fn on_the_grid(board: &mut Board, late: i64, seconds: usize) -> Vec<usize> {
             of(board, RATE).len()
         })
         .collect();
-    for line in String::from_utf8(text).expect("ASCII").split('\r') {
-        if let Ok((Some(stamp), frame)) = parse_line(line)
+    for line in text.split(|byte| *byte == b'\r') {
+        if let Ok((frame, stamp)) = parse_stamped::<DataFrame>(line)
             && matches!(frame.id(), Id::Standard(id) if id.as_raw() == RATE)
         {
-            stamps.push((stamp * 1e3).round() as i64);
+            stamps.push(i64::from(stamp));
         }
     }
     assert!(stamps.len() >= seconds * 99, "{} stamps", stamps.len());

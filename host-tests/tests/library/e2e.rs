@@ -1,8 +1,11 @@
 //! AUTOSAR E2E: published vectors, and the sequence judgement.
 
+use gyronet::can::bosch::Message;
 use gyronet::can::e2e::{
     Checker, DataIdMode, Fault, P01, P02, P05, P11, P11Mode, Profile, Protector, Verdict,
 };
+use gyronet_host_tests::recordings::workspace;
+use gyronet_host_tests::wire::bytes;
 use proptest::prelude::*;
 
 const ZEROS: [u8; 6] = [0; 6];
@@ -82,6 +85,20 @@ fn frames_equal_vectors_of_profile_5() {
         assert_eq!(data[..3], header);
         assert_eq!(p05().check(&data), Ok(counter));
     }
+}
+
+/// Those by which a receiver's checksums can be tried out.
+#[test]
+fn the_frames_on_the_page_are_good() {
+    let page = std::fs::read_to_string(workspace().join("src/can/README.md")).expect("the page");
+    let frames = page.split('`').filter(|word| word.len() == 20 && word.contains('#'));
+    let frames: Vec<_> = frames.filter_map(|word| word.split_once('#')).collect();
+    let [("174", bosch), ("1A0", own)] = frames[..] else { panic!("{frames:?}") };
+    let (mut bosch, mut own) = (bytes(bosch), bytes(own));
+    let profile = Profile::P01(P01 { data_id: 0x1A0, mode: DataIdMode::Both });
+    assert!(Message::parse(&bosch).is_ok() && profile.check(&own).is_ok());
+    (bosch[7], own[7]) = (bosch[7] ^ 1, own[7] ^ 1);
+    assert!(Message::parse(&bosch).is_err() && profile.check(&own).is_err());
 }
 
 #[test]

@@ -129,7 +129,7 @@ fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -
     writeln!(out, "every result, as a page   {}", page.display())?;
     writeln!(
         out,
-        "{:<25} {} (cargo gyronet monitor FILE decodes it)",
+        "{:<25} {} (cantools decode tools/gyronet.dbc reads it)",
         format!("{} CAN frames", grouped(frames)),
         log.display()
     )?;

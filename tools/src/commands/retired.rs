@@ -16,7 +16,10 @@ const RETIRED: [(&str, &str); 16] = [
         "`cargo test -p gyronet-host-tests --test board` (`size` and `bench-target` measure the image)",
     ),
     ("--policies", "`cargo bringup`, which counts cycles on a board,"),
-    ("--csv", "`gyronet monitor --json`, or can-utils' candump with tools/gyronet.dbc,"),
+    (
+        "monitor",
+        "`cantools monitor`, for a log `cantools decode`, with tools/gyronet.dbc (src/can/README.md)",
+    ),
     ("--weights", "`gyronet evaluate --weights`"),
     ("--ablation", "`gyronet evaluate` (its rows), with `gyronet doctor` (the reference's own error),"),
     ("--mcap", "`gyronet correct`, or `gyronet replay --csv` for a plot,"),

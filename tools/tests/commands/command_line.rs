@@ -66,7 +66,6 @@ fn wrong_arguments_are_status_2_and_failures_1() {
         &["simulate", "--out", "/nowhere/drive.csv"],
         &["import", "kaist", "/nowhere"],
         &["quantize", "/nowhere/a.safetensors", "--out", "/nowhere/a.blob"],
-        &["monitor", "/nowhere/can.log"],
         &["size", "--elf", "/nowhere/image"],
         &["device", "--port", "/nowhere/tty", "info"],
     ] {
@@ -87,7 +86,6 @@ fn json_is_json_and_quiet_is_quiet() {
         (&["evaluate", &drive], "drives"),
         (&["evaluate", "--lags", &drive], "drives"),
         (&["replay", &drive, "--out", &log], "frames"),
-        (&["monitor", &log], "rate_deg_per_s"),
     ] {
         let output = gyronet(&[arguments, &["--json"]].concat());
         let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -158,7 +156,7 @@ fn retired_names_say_what_does_their_work() {
         (&["warm-up"], "gyronet simulate --trip motorway"),
         (&["bench-target", "--policies"], "cargo bringup"),
         (&["demo", "--image"], "--test board"),
-        (&["monitor", "can.log", "--csv", "yaw.csv"], "gyronet monitor --json"),
+        (&["monitor", "can.log"], "cantools decode"),
         (&["doctor", "drive.csv", "--weights", "mine.blob"], "gyronet evaluate --weights"),
         (&["simulate", "--layout", "kaist", "--out", "OUT"], "cargo paper simulate"),
         (&["import", "urban06", "--training", "--out", "a.csv"], "cargo paper import"),

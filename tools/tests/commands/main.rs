@@ -8,7 +8,6 @@ mod demo;
 mod drive_memory;
 #[cfg(unix)]
 mod import;
-mod monitor;
 mod settings;
 mod vehicle_file;
 
