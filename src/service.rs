@@ -4,7 +4,6 @@
 //! Testers reach it over diagnosis ([`crate::uds`]). Every request is checked completely before anything is written;
 //! a refusal has a reason ([`message::Refusal`]).
 
-pub mod calibrate;
 mod conditions;
 #[doc(hidden)]
 pub mod crash;

@@ -29,10 +29,8 @@ mod upload;
 mod wheels;
 
 pub use access::Access;
-pub use calibration::{Calibration, Level, UnitMap};
+pub use calibration::{Calibration, UnitMap};
 pub use configuration::{Configuration, FogGyro, FogPart, ImuPart, Mounting};
-#[cfg(feature = "service")]
-pub(crate) use error::MAX_TILT_DEG;
 pub use error::{Field, FieldError, FlashFault, StoreError};
 pub use learned::Learned;
 pub use record::{Record, Store};

@@ -135,7 +135,7 @@ pub const STATES: [State; 15] = [
         "sensor moved",
         "its up or forward direction differs from earlier drives",
         "as in the present state, at best degraded; IMPLAUSIBLE",
-        "the next start, or `calibrate static` or `calibrate forget`",
+        "the next start, or `calibrate forget`",
         "`moved_mounts`",
     ),
     remark(

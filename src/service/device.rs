@@ -10,7 +10,6 @@ mod weights;
 pub use firmware::{Firmware, FirmwareState};
 pub use weights::MappedSlots;
 
-use super::calibrate::{Calibrator, Finding, State, Task, level};
 use super::conditions::Conditions;
 use super::event::{EventKind, EventLog, LogPage, SensorFault};
 use super::learner::Learner;
@@ -74,10 +73,6 @@ pub struct Device<R: NorFlash, W> {
     course: CourseState,
     /// True if the sensor was found to have moved; cleared by [`Self::take_mount_moved`].
     mount_moved: bool,
-    calibrator: Option<Calibrator>,
-    /// The result of the calibration, until it is stored.
-    found: Option<Finding>,
-    calibration_state: State,
     accepted: Accepted,
     troubles: Troubles,
     /// `None` if the record could not be read; nobody may write then.
@@ -133,9 +128,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             learner: Learner::new(),
             course: CourseState::START,
             mount_moved: false,
-            calibrator: None,
-            found: None,
-            calibration_state: State::Idle,
             accepted: Accepted::NONE,
             troubles: Troubles::NONE,
             access: Some(Access::OPEN),
@@ -243,9 +235,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             self.status = status;
             self.note(EventKind::Status(status));
         }
-        if let Some(sample) = sample {
-            self.add_to_calibration(sample, wheels, standing);
-        }
     }
 
     /// Takes the quality of each rate, after [`Device::observe`].
@@ -283,23 +272,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         let mounting = self.configuration.mounting.rotation().unwrap_or(Rotation::IDENTITY);
         let vertical = self.learned.vertical.turned(&mounting);
         (vertical.knowledge(), vertical.tilt_deg())
-    }
-
-    fn add_to_calibration(&mut self, sample: &ImuSample, wheels: &WheelSample, standing: &Standing) {
-        let Some(calibrator) = self.calibrator.as_mut() else { return };
-        let task = calibrator.task();
-        let Some(rest) = calibrator.add(sample, standing, wheels.standstill) else { return };
-        let found = rest.and_then(|rest| match task {
-            Task::Static => Ok(Finding::Static(rest, sample.temperature)),
-            Task::Mounting => level(rest.specific_force, &self.configuration.mounting).map(Finding::Mounting),
-        });
-        self.calibrator = None;
-        self.calibration_state = match found {
-            Ok(_) => State::Found(task),
-            Err(fault) => State::Failed(task, fault),
-        };
-        self.note(EventKind::Calibrated(found.err()));
-        self.found = found.ok();
     }
 
     /// Carries out a request, unless it interrupts the output of a vehicle that is not proven to stand, and keeps the
@@ -433,46 +405,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             firmware_refused: self.firmware.is_refused(),
             access_refused: self.refusal.is_some_and(|refusal| refusal.is_access_denied()),
         }
-    }
-
-    /// Returns the progress of the calibration.
-    pub fn calibration_state(&self) -> State {
-        self.calibration_state
-    }
-
-    /// Starts a calibration.
-    #[inline(never)]
-    pub fn start_calibration(&mut self, task: Task) {
-        self.forget_refusal();
-        self.found = None;
-        self.calibrator = Some(Calibrator::new(task, self.configuration.static_init));
-        self.calibration_state = State::Running(task);
-    }
-
-    /// Stops the calibration without a result.
-    pub fn cancel_calibration(&mut self) {
-        self.forget_refusal();
-        (self.calibrator, self.found) = (None, None);
-        self.calibration_state = State::Idle;
-    }
-
-    /// Stores the result of the calibration.
-    ///
-    /// # Errors
-    /// [`Refusal::NothingFound`], [`Refusal::Store`], [`Refusal::Moving`].
-    pub fn store_result(&mut self) -> Result<(), Refusal> {
-        self.request(INTERRUPTS, |device| {
-            match device.found.ok_or(Refusal::NothingFound)? {
-                Finding::Static(rest, temperature) => device.store_rest(&rest, temperature)?,
-                Finding::Mounting(level) => {
-                    let calibration = Calibration { level: Some(level), ..device.calibration };
-                    device.store_calibration(calibration)?;
-                }
-            }
-            device.found = None;
-            device.calibration_state = State::Idle;
-            Ok(())
-        })
     }
 
     /// Erases what the board has learnt about its sensor.

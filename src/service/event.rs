@@ -1,6 +1,5 @@
 //! The event log holds the newest events of the board.
 
-use super::calibrate::CalibrationFault;
 pub use super::crash::{Crash, CrashKind};
 pub use super::hardware::{CanFault, ClockFault};
 use crate::health::Status;
@@ -89,8 +88,6 @@ pub enum EventKind {
     WheelsStored,
     /// A calibration was stored.
     CalibrationStored,
-    /// A calibration ended, or failed for this reason.
-    Calibrated(Option<CalibrationFault>),
     /// The weight file in this slot was accepted.
     WeightsAccepted(Slot),
     /// Firmware in this slot starts on trial at the next start.

@@ -2,7 +2,7 @@
 //! up at standstills and in turns ([`crate::mounting::VerticalEstimator`]), forward while the vehicle drives. The gain comes
 //! from the pipeline, which learns it from courses.
 //!
-//! Without wheels, a long straight can look like a standstill, so only static calibrations add to the bias curve.
+//! Without wheels, a long straight can look like a standstill, so nothing is added to the bias curve.
 //! Learnt values are stored after the first, second, fourth, ... period of three seconds at rest, about ten times
 //! per start. It is also stored each time the sigma of the forward direction has decreased by 30 %, about six times
 //! in total.
@@ -92,14 +92,6 @@ impl Learner {
             (learned.vertical, learned.gain, self.is_changed) = (Vertical::UNKNOWN, None, true);
         }
         self.is_moved && !was_moved
-    }
-
-    /// Learns from the three seconds at rest of a static calibration, which are also valid for a sensor that has
-    /// moved; the learner is a new one.
-    pub fn calibrated(&mut self, rest: &Rest, temperature: Option<CentiCelsius>, learned: &mut Learned) {
-        (learned.specific_force, learned.forward) = (None, None);
-        learned.vertical = Vertical::UNKNOWN;
-        self.learn_rest(rest, temperature, learned);
     }
 
     /// Learns what standstills and turns have shown of the vertical. It is stored when

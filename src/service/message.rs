@@ -11,7 +11,7 @@ use crate::store::slots::{SlotError, WeightSource};
 use serde::{Deserialize, Serialize};
 
 /// Version of the encoding of these types; every change of a type increments it.
-pub const PROTOCOL: u8 = 20;
+pub const PROTOCOL: u8 = 21;
 /// Size of a full block of a download, bytes.
 pub const BLOCK: usize = 256;
 
@@ -31,8 +31,6 @@ pub enum Refusal {
     /// The firmware was refused.
     #[error(transparent)]
     Firmware(FirmwareError),
-    #[error("there is no calibration result to store")]
-    NothingFound,
     #[error("calibrated with weights {found:08x}, but the board runs {runs:08x}")]
     OtherWeights { found: u32, runs: u32 },
     #[error("the board has a key, and this session has no access: give its private part with --key")]

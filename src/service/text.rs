@@ -1,32 +1,9 @@
 //! Formats the board's reports as text, for the host tools; the image does not use it.
 
-use super::calibrate::CalibrationFault;
 use super::device::{Firmware, FirmwareState};
 use super::event::{EventKind, ResetCause, SensorFault};
 use super::message::{FlashState, Origin};
 use core::fmt::{Display, Formatter, Result};
-
-impl Display for CalibrationFault {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        let axis = |axis: u8| ["x", "y", "z"].get(usize::from(axis)).copied().unwrap_or("unknown");
-        match *self {
-            Self::Moving(gyro @ 0..=2) => {
-                write!(f, "the vehicle moved (gyro, {} axis: not still, or its mean too large)", axis(gyro))
-            }
-            Self::Moving(6) => f.write_str("the vehicle moved (its wheels turned)"),
-            Self::Moving(other) => {
-                write!(f, "the vehicle moved (accelerometer, {} axis: not still)", axis(other - 3))
-            }
-            Self::Clipped => f.write_str("a sample was saturated"),
-            Self::Tilted(deg) => {
-                write!(f, "{deg:.1} deg from level; is the configured mounting right?")
-            }
-            Self::NotGravity(force) => {
-                write!(f, "the mean specific force, {force:.2} m/s^2, is not gravity")
-            }
-        }
-    }
-}
 
 impl Display for ResetCause {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
@@ -120,8 +97,6 @@ impl Display for EventKind {
             Self::ConfigurationStored => f.write_str("configuration stored"),
             Self::WheelsStored => f.write_str("wheel settings stored"),
             Self::CalibrationStored => f.write_str("calibration stored"),
-            Self::Calibrated(None) => f.write_str("calibration done"),
-            Self::Calibrated(Some(fault)) => write!(f, "calibration failed: {fault}"),
             Self::WeightsAccepted(slot) => write!(f, "weights in slot {slot} accepted"),
             Self::FirmwareStored(slot) => {
                 write!(f, "firmware in slot {slot} starts on trial at the next start")

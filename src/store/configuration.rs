@@ -3,7 +3,7 @@
 
 use super::error::{Field, FieldError, within};
 use super::record::Record;
-use super::{Calibration, Learned, Level};
+use super::{Calibration, Learned};
 use crate::bias::{EarthRate, Latitude, StaticConfig};
 use crate::can::config::{Config, Settings};
 use crate::can::diagnosis::DiagnosisIds;
@@ -123,13 +123,11 @@ impl Configuration {
 }
 
 impl Configuration {
-    /// Returns the pipeline's configuration, from this one, a calibration and what the board has learnt. If the
-    /// calibration has a level, it is applied after the mounting, and no other levelling is done. The map of the gyro
-    /// is used only with the weights it was determined with.
+    /// Returns the pipeline's configuration, from this one, a calibration and what the board has learnt. The map of the
+    /// gyro is used only with the weights it was determined with.
     pub fn pipeline(&self, calibration: &Calibration, learned: &Learned, weights: u32) -> PipelineConfig {
         // The angles are finite: they have been checked.
         let mounting = self.mounting.rotation().unwrap_or(Rotation::IDENTITY);
-        let level = calibration.level.as_ref().and_then(Level::rotation);
         let learned = if self.learn { learned } else { &Learned::NOTHING };
         let gyro_map = calibration.gyro_map(weights).unwrap_or(GyroMap::IDENTITY);
         let elements = gyro_map.elements();
@@ -140,12 +138,11 @@ impl Configuration {
             bias_curve: learned.bias_curve,
             rest_force: learned.specific_force,
             vertical: learned.vertical,
-            mounting: level.map_or(mounting, |level| mounting.then(&level)),
+            mounting,
             forward: learned.forward_knowledge(&mounting),
             gyro_map,
             gain: gain.map(Gain::aged),
             gain_of,
-            levelling: level.is_none(),
             static_init: self.static_init,
             earth_rate: self.latitude().map_or(EarthRate::LeftInBias, EarthRate::Subtracted),
             compensate: self.compensate,

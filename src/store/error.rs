@@ -5,9 +5,6 @@ use crate::can::wheel::WheelConfigError;
 use crate::heading::HeadingConfigError;
 use serde::{Deserialize, Serialize};
 
-/// Largest tilt that a mounting calibration may find, deg; a larger one means a wrong rotation.
-pub(crate) const MAX_TILT_DEG: f32 = 45.0;
-
 /// A value of a record that has a range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -27,8 +24,6 @@ pub enum Field {
     CompensateMaxMean,
     CompensateMaxSingle,
     CompensateMaxRevision,
-    CalibrationRollDeg,
-    CalibrationPitchDeg,
     CalibrationGyroMap,
     BiasCurve,
     Forward,
@@ -54,8 +49,6 @@ impl Field {
             Self::CompensateMaxMean => "compensate.max_mean",
             Self::CompensateMaxSingle => "compensate.max_single",
             Self::CompensateMaxRevision => "compensate.max_revision",
-            Self::CalibrationRollDeg => "level.roll_deg",
-            Self::CalibrationPitchDeg => "level.pitch_deg",
             Self::CalibrationGyroMap => "gyro_map",
             Self::BiasCurve => "bias_curve",
             Self::Forward => "forward",
@@ -79,7 +72,6 @@ impl Field {
             // With none at all, no estimate is ever accepted, and no revision ever carried.
             Self::CompensateMaxMean | Self::CompensateMaxRevision => [1e-3, 0.5],
             Self::CompensateMaxSingle => [1e-3, 5.0],
-            Self::CalibrationRollDeg | Self::CalibrationPitchDeg => [-MAX_TILT_DEG, MAX_TILT_DEG],
             Self::CalibrationGyroMap | Self::BiasCurve | Self::Forward | Self::Vertical | Self::Gain => {
                 return None;
             }

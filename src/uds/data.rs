@@ -62,7 +62,7 @@ const fn write_only(id: u16, name: &'static str, bytes: &'static str, content: &
 }
 
 /// All data identifiers.
-pub const IDENTIFIERS: [Identifier; 29] = [
+pub const IDENTIFIERS: [Identifier; 28] = [
     read_only(0xF186, "session", "1", "session: 1 default, 2 programming, 3 extended"),
     read_only(0xF189, "firmware_version", "1, 1, 1", "version of the firmware"),
     read_only(0xF18C, "serial_number", "text", "serial number of the chip, 24 hexadecimal digits"),
@@ -94,7 +94,6 @@ pub const IDENTIFIERS: [Identifier; 29] = [
     read_only(0x0109, "fog_counters", "4 each", "counters of the fibre-optic gyro"),
     read_only(0x010A, "info", "postcard", "versions, part, reset, clock, stored data, weights and status"),
     read_only(0x010B, "last_refusal", "postcard", "the reason why the last request was refused, if it was"),
-    read_only(0x010C, "calibration_state", "postcard", "progress of a calibration"),
     write_only(
         0x010D,
         "unit_map",
@@ -240,7 +239,6 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
         ),
         0x010A => put_record(out, &device.info()),
         0x010B => put_record(out, &device.refusal()),
-        0x010C => put_record(out, &device.calibration_state()),
         0x0111 => security::state(security, device, out),
         0x0112 => put(out, &counters.fog.samples.to_be_bytes()),
         0x0113 => put_words(

@@ -43,9 +43,7 @@ pub(super) fn put_record(out: &mut Response, record: &impl Serialize) -> Result<
 
 pub(super) fn nrc(refusal: Refusal) -> Nrc {
     match refusal {
-        Refusal::Moving
-        | Refusal::NothingFound
-        | Refusal::Firmware(FirmwareError::NoBootLoader | FirmwareError::OnTrial) => {
+        Refusal::Moving | Refusal::Firmware(FirmwareError::NoBootLoader | FirmwareError::OnTrial) => {
             Nrc::ConditionsNotCorrect
         }
         Refusal::Firmware(FirmwareError::NoHead) => Nrc::RequestSequenceError,

@@ -1,12 +1,10 @@
-//! Runs the routines (service 0x31): calibrations, the log, a self-test, and the activation of a
-//! download.
+//! Runs the routines (service 0x31): the log, a self-test, to forget what was learnt, and the activation of a download.
 
 use super::download::Download;
 use super::response::{Nrc, Response, exactly, nrc, put, put_record};
 use super::security::{self, Seed};
 use super::services::Services;
 use super::session::Session;
-use crate::service::calibrate::{State, Task};
 use crate::service::message::Refusal;
 use crate::service::{Device, MappedSlots};
 use automotive_diag::uds::RoutineControlType;
@@ -16,10 +14,7 @@ const SELF_TEST: u16 = 0x0204;
 /// Routine that erases what the board has learnt about its sensor.
 const FORGET: u16 = 0x0205;
 const LOG: u16 = 0x0203;
-const STORE: u16 = 0x0202;
 const USE_DOWNLOAD: u16 = 0xFF01;
-
-const REQUEST_RESULT: RoutineControlType = RoutineControlType::RequestRoutineResult;
 
 /// Returns a bit for each component that fails: 0 the processor's clock, 1 the CAN controller, 2 the inertial
 /// sensor's set-up, 3 stored data, 4 the weights, 5 the flash controller, 6 the random number generator.
@@ -50,43 +45,30 @@ impl Services {
         let (id, option) = rest.split_first_chunk().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
         put(out, id)?;
         let id = u16::from_be_bytes(*id);
-        let task = match id {
-            0x0200 => Some(Task::Static),
-            0x0201 => Some(Task::Mounting),
-            STORE | LOG | SELF_TEST | FORGET => None,
-            USE_DOWNLOAD if self.require_session(Session::Programming).is_ok() => None,
-            _ => return Err(Nrc::RequestOutOfRange),
+        let is_known = match id {
+            LOG | SELF_TEST | FORGET => true,
+            USE_DOWNLOAD => self.require_session(Session::Programming).is_ok(),
+            _ => false,
         };
-        let control = RoutineControlType::from_repr(sub);
+        if !is_known {
+            return Err(Nrc::RequestOutOfRange);
+        }
         // The other routines only read, or check a signature of their own.
-        if matches!(id, STORE | FORGET) || task.is_some() && control != Some(REQUEST_RESULT) {
+        if id == FORGET {
             self.security.check(device)?;
         }
-        let control =
-            control.filter(|control| task.is_some() || *control == RoutineControlType::StartRoutine);
-        let control = control.ok_or(Nrc::SubFunctionNotSupported)?;
+        if RoutineControlType::from_repr(sub) != Some(RoutineControlType::StartRoutine) {
+            return Err(Nrc::SubFunctionNotSupported);
+        }
         match id {
             LOG => return put_record(out, &device.events(u32::from_be_bytes(exactly(option)?))),
             USE_DOWNLOAD => return self.use_download(option, device),
             _ => exactly(option).map(|[]: [u8; 0]| ())?,
         }
-        match (task, control) {
-            (Some(task), RoutineControlType::StartRoutine) => device.start_calibration(task),
-            (Some(_), RoutineControlType::StopRoutine) => device.cancel_calibration(),
-            (Some(task), REQUEST_RESULT) => {
-                let state = match device.calibration_state() {
-                    State::Running(of) if of == task => 1,
-                    State::Found(of) if of == task => 2,
-                    State::Failed(of, _) if of == task => 3,
-                    _ => return Err(Nrc::RequestSequenceError),
-                };
-                put(out, &[state])?;
-            }
-            (None, _) if id == SELF_TEST => put(out, &[self_test(device, entropy().is_some())])?,
-            (None, _) if id == STORE => device.store_result().map_err(nrc)?,
-            (None, _) => device.forget_learned().map_err(nrc)?,
+        if id == SELF_TEST {
+            return put(out, &[self_test(device, entropy().is_some())]);
         }
-        Ok(())
+        device.forget_learned().map_err(nrc)
     }
 
     /// Checks the signature of a download, if the board has a key, and has it used from the next start on. Firmware was

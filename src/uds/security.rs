@@ -1,7 +1,7 @@
 //! Controls access: challenge and response (service 0x27), and signatures of written data.
 //!
 //! Without a key everyone may write. With a key, written data must be signed. A tester that proves once per session
-//! that it has the private key may also restart, silence and calibrate the board, and clear its troubles. A challenge
+//! that it has the private key may also restart and silence the board, and clear what it has learnt and its troubles. A challenge
 //! is answered once, and by the key that it was made for. The number of wrong answers is stored before the response is
 //! sent, so a restart does not help an attacker to guess. From the third wrong answer in a row on, a delay follows each
 //! one and doubles each time; it also runs after a restart. Signed data are not delayed, and end the delay: answers of

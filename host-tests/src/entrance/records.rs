@@ -9,9 +9,9 @@ use gyronet::Coprocessor;
 use gyronet::bias::{BiasCurve, CurveFilter};
 use gyronet::heading::Gain;
 use gyronet::model::blob::CRC;
-use gyronet::mounting::{Forward, Vertical};
+use gyronet::mounting::{Forward, GyroMap, Vertical};
 use gyronet::sample::ImuSample;
-use gyronet::store::{Accepted, Calibration, Configuration, Learned, Level, Record, Store};
+use gyronet::store::{Accepted, Calibration, Configuration, Learned, Record, Store, UnitMap};
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
 
 /// Size of a sector, smaller than the part's, so that it is soon full.
@@ -68,8 +68,7 @@ fn fitting(mut data: &[u8]) -> Vec<u8> {
 
 /// Its corpus, as this version of the store writes it.
 pub fn seeds() -> [(&'static str, Vec<u8>); 4] {
-    let calibration =
-        Calibration { level: Some(Level { roll_deg: 1.5, pitch_deg: -2.0 }), ..Calibration::default() };
+    let calibration = Calibration { unit: Some(UnitMap { gyro_map: GyroMap::IDENTITY, weights: 0 }) };
     let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
     let mut filter = CurveFilter::new(&BiasCurve::UNKNOWN);
     filter.add(CentiCelsius(2_500), [AngularRate(5), AngularRate(-5), AngularRate(7)]);
@@ -97,17 +96,17 @@ pub fn seeds() -> [(&'static str, Vec<u8>); 4] {
         [&[1, key, version, content.len() as u8][..], content].concat()
     };
     // A record in flash: its first word, its content, its checksum.
-    let content = |at: usize| {
-        let len = usize::from(raw[at + 2]);
-        (raw[at + 4..at + 4 + len].to_vec(), at + 8 + len.next_multiple_of(4))
+    let stored = |key: u8, version: u8| {
+        let mut at = 1 + 8;
+        while raw[at] != key {
+            at += 8 + usize::from(raw[at + 2]).next_multiple_of(4);
+        }
+        record(key, version, &raw[at + 4..][..usize::from(raw[at + 2])])
     };
-    let (first, next) = content(1 + 8);
-    let (second, next) = content(next);
-    let (third, _) = content(next);
     [
         ("sectors", raw.clone()),
-        ("configuration", record(Configuration::KEY, Configuration::VERSION, &first)),
-        ("calibration", record(Calibration::KEY, Calibration::VERSION, &second)),
-        ("learned", record(Learned::KEY, Learned::VERSION, &third)),
+        ("configuration", stored(Configuration::KEY, Configuration::VERSION)),
+        ("calibration", stored(Calibration::KEY, Calibration::VERSION)),
+        ("learned", stored(Learned::KEY, Learned::VERSION)),
     ]
 }

@@ -7,10 +7,11 @@
 use crate::common::{self, SLCAN, START};
 use crate::service::{self, storing};
 use gyronet::model::weights;
+use gyronet::mounting::GyroMap;
 use gyronet::service::message::{BLOCK, FlashState, Info, Origin};
 use gyronet::store::layout::{FLASH_BASE, SLOTS, STORE};
 use gyronet::store::slots::WeightSource;
-use gyronet::store::{Calibration, Configuration, Level, Mounting, Slot};
+use gyronet::store::{Calibration, Configuration, Mounting, Slot, UnitMap};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::stored::{Stored, crc, other_weights};
 use std::collections::HashSet;
@@ -38,7 +39,7 @@ fn configuration(k: usize) -> Configuration {
 }
 
 fn calibration() -> Calibration {
-    Calibration { level: Some(Level { roll_deg: 1.5, pitch_deg: -2.0 }), ..Calibration::default() }
+    Calibration { unit: Some(UnitMap { gyro_map: GyroMap::IDENTITY, weights: 0 }) }
 }
 
 /// A board with accepted weights in slot A, a calibration, and so many configurations in its records, the last one in

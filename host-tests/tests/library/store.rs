@@ -9,8 +9,8 @@ use gyronet::store::firmware;
 use gyronet::store::layout::{self, RECORD_SECTOR, SECTORS, SLOT_SIZE, sector_at};
 use gyronet::store::slots::{SlotError, file, select};
 use gyronet::store::{
-    Accepted, Access, Calibration, Configuration, Field, FieldError, FlashFault, Learned, Level, Mounting,
-    Record, Slot, Store, StoreError,
+    Accepted, Access, Configuration, Field, FieldError, FlashFault, Learned, Mounting, Record, Slot, Store,
+    StoreError,
 };
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
 use gyronet_host_tests::flash::{F405, Region};
@@ -291,22 +291,6 @@ fn a_damaged_header_heals_with_the_next_record() {
     assert!(store.damaged() && store.get() == Ok(Some(Configuration::DEFAULT)), "a copy stands for it");
     store.set(&Configuration::DEFAULT).expect("it is stored");
     assert!(!store.damaged() && store.has_room() && !open(&flash).damaged());
-}
-
-#[test]
-fn a_calibration_that_cannot_be_is_refused_by_its_field() {
-    let of = |roll_deg, pitch_deg| {
-        Calibration { level: Some(Level { roll_deg, pitch_deg }), ..Calibration::NONE }.check()
-    };
-    assert_eq!(of(30.0, -30.0), Ok(()));
-    for (calibration, expected) in
-        [(of(f32::NAN, 0.0), Field::CalibrationRollDeg), (of(0.0, 1e3), Field::CalibrationPitchDeg)]
-    {
-        assert!(
-            matches!(calibration, Err(FieldError::Range { field, .. }) if field == expected),
-            "{calibration:?}"
-        );
-    }
 }
 
 #[test]

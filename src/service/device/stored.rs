@@ -1,16 +1,13 @@
 //! Reads the stored records at the start, and stores them on request.
 
 use super::{Device, Firmware, INTERRUPTS, MappedSlots, SupportedHardware};
-use crate::bias::Rest;
 use crate::can::wheel::WheelSettings;
 use crate::service::event::EventKind;
-use crate::service::learner::Learner;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
 use crate::store::{
     Accepted, Access, Calibration, Configuration, FieldError, FlashFault, Learned, Record, Store, StoreError,
     Troubles, UnitMap,
 };
-use crate::units::CentiCelsius;
 use embedded_storage::nor_flash::NorFlash;
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
@@ -198,19 +195,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             calibration.check().map_err(StoreError::from)?;
             device.store_calibration(calibration)
         })
-    }
-
-    /// Stores the readings at rest of a calibration, which are valid even for a sensor that has moved.
-    pub(super) fn store_rest(
-        &mut self,
-        rest: &Rest,
-        temperature: Option<CentiCelsius>,
-    ) -> Result<(), Refusal> {
-        let (mut learner, mut learned) = (Learner::new(), self.learned);
-        learner.calibrated(rest, temperature, &mut learned);
-        self.store_learned(learned)?;
-        self.learner = learner;
-        Ok(())
     }
 
     /// Stores what was learnt, and then uses it.

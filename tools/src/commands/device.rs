@@ -31,7 +31,7 @@ use std::path::PathBuf;
 Examples:
   gyronet device --port /dev/ttyUSB1 info
   gyronet device --port can:can0 set latitude_deg=48.1 mounting.roll_deg=1.5
-  gyronet device --port /dev/ttyUSB1 calibrate static --store
+  gyronet device --port /dev/ttyUSB1 calibrate unit --file unit.json
   gyronet device --port localhost:4000 weights gyronet.blob      # then: restart")]
 pub struct Args {
     /// Serial port or host:port of an SLCAN line, or can:INTERFACE for a CAN interface of Linux; required.
@@ -70,17 +70,14 @@ enum Action {
     },
     /// Print the settings of the wheel frames that the board receives, as a file for `set --file`.
     Wheels,
-    /// Calibrate the sensor while the vehicle stands still (3 s), and print the result.
+    /// Change the calibration or what the board has learnt, and print both.
     Calibrate {
-        /// The calibration, or another action; `show` only prints the calibration.
+        /// What to change; `show` only prints.
         #[arg(value_enum)]
-        task: calibration::What,
+        what: calibration::What,
         /// Calibration file from `gyronet calibrate`, for `unit`.
         #[arg(long, value_name = "FILE.json")]
         file: Option<PathBuf>,
-        /// Store the result, so that it survives a restart.
-        #[arg(long)]
-        store: bool,
     },
     /// Print the events since the board started.
     Log,
@@ -166,9 +163,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         Action::Get => settings::print(&device.configuration()?, json)?,
         Action::Set { settings, file } => settings::set(&mut device, settings, file.as_deref(), json)?,
         Action::Wheels => settings::print_wheels(&mut device, json)?,
-        Action::Calibrate { task, file, store } => {
-            calibration::run(&mut device, *task, file.as_deref(), *store, json)?;
-        }
+        Action::Calibrate { what, file } => calibration::run(&mut device, *what, file.as_deref(), json)?,
         Action::Log => log(&mut device, json)?,
         Action::Counters => {
             let counters = device.counters()?;

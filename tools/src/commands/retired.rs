@@ -3,13 +3,18 @@
 use clap::error::{ContextKind, ContextValue};
 
 const SITUATIONS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin situations`";
-const RETIRED: [(&str, &str); 16] = [
+const LEARNT: &str =
+    "the board itself at its standstills (`device info`: tilt; `device calibrate show`: bias)";
+const RETIRED: [(&str, &str); 19] = [
     ("campaign", SITUATIONS),
     ("soak", SITUATIONS),
     ("bus", "tools/gyronet.dbc, with `gyronet device set`, which refuses what loads the bus too much,"),
     ("paper", "`make -f tools/paper/Makefile`"),
     ("tables", "`cargo paper tables`"),
     ("train", "`python -m gyronet_train.beside` (tools/python/gyronet_train/README.md)"),
+    ("calibrate static", LEARNT),
+    ("calibrate mounting", LEARNT),
+    ("calibrate --store", LEARNT),
     ("warm-up", "`gyronet simulate --trip motorway` with `gyronet evaluate`"),
     (
         "--image",
@@ -30,7 +35,7 @@ const RETIRED: [(&str, &str); 16] = [
 
 /// The line about a retired name, if that is what the arguments are wrong about.
 pub fn line(error: &clap::Error) -> Option<String> {
-    let kinds = [ContextKind::InvalidSubcommand, ContextKind::InvalidArg];
+    let kinds = [ContextKind::InvalidSubcommand, ContextKind::InvalidValue, ContextKind::InvalidArg];
     let ContextValue::String(word) = kinds.into_iter().find_map(|kind| error.get(kind))? else { return None };
     let is_it = |name: &str| {
         let (command, option) = name.rsplit_once(' ').unwrap_or(("", name));

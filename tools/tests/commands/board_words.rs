@@ -1,7 +1,6 @@
 //! A board's answers are printed as sentences, with the cause in them.
 
 use gyronet::health::Status;
-use gyronet::service::calibrate::CalibrationFault;
 use gyronet::service::crash::FILE;
 use gyronet::service::event::{Crash, CrashKind, EventKind, ResetCause, SensorFault};
 use gyronet::service::message::{FlashState, Origin};
@@ -31,17 +30,6 @@ fn states_are_sentences() {
 }
 
 #[test]
-fn calibrations_name_the_axis() {
-    let moving = |axis| CalibrationFault::Moving(axis).to_string();
-    for (axis, part) in [(0, "gyro, x"), (2, "gyro, z"), (3, "accelerometer, x"), (5, "accelerometer, z")] {
-        assert!(moving(axis).contains(part), "{}", moving(axis));
-    }
-    assert!(moving(6).contains("wheels"));
-    // Of a later firmware.
-    assert!(moving(u8::MAX).contains("unknown"));
-}
-
-#[test]
 fn events_are_sentences() {
     let crash = Crash {
         kind: CrashKind::HardFault,
@@ -65,10 +53,6 @@ fn events_are_sentences() {
         ),
         (EventKind::SlotRefused(Slot::A, SlotError::Empty), "slot A not used: the slot is empty"),
         (EventKind::Status(Status::Init), "status: initialising, no bias yet"),
-        (
-            EventKind::Calibrated(Some(CalibrationFault::Clipped)),
-            "calibration failed: a sample was saturated",
-        ),
         (
             EventKind::Sensor(Some(SensorFault::Setting { bank: 1, address: 0x0A, got: 0xFF })),
             "sensor not set up: register 0x0a of bank 1 holds 0xff, not what was written",

@@ -153,6 +153,8 @@ fn retired_names_say_what_does_their_work() {
         (&["tables", "SEQUENCES"], "cargo paper tables"),
         (&["train", "DRIVES"], "python -m gyronet_train.beside"),
         (&["bus", "--can"], "gyronet device set"),
+        (&["device", "calibrate", "mounting", "--store"], "the board itself"),
+        (&["device", "calibrate", "static"], "the board itself"),
         (&["warm-up"], "gyronet simulate --trip motorway"),
         (&["bench-target", "--policies"], "cargo bringup"),
         (&["demo", "--image"], "--test board"),

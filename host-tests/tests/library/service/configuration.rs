@@ -16,7 +16,7 @@ use gyronet::service::message::{FlashState, Origin, Refusal};
 use gyronet::standstill::{Standing, StandstillSource};
 use gyronet::store::layout;
 use gyronet::store::slots::{SlotError, WeightSource};
-use gyronet::store::{Calibration, Learned, Level, StoreError};
+use gyronet::store::{Calibration, Learned, StoreError};
 use gyronet::store::{Configuration, Field, FieldError, FlashFault, FogGyro, FogPart, ImuPart, Mounting};
 use gyronet::units::SpecificForce;
 use gyronet_host_tests::flash::{F405, MappedRegion, Region};
@@ -240,13 +240,12 @@ fn flash_is_written_at_standstill_alone() {
     }
     see(&mut board, Standing::UNKNOWN);
     type Request = fn(&mut Board) -> Result<(), Refusal>;
-    let requests: [Request; 8] = [
+    let requests: [Request; 7] = [
         |board| board.set_wheels(&WheelSettings::TOYOTA),
         |board| board.set_unit(None),
         |board| board.weights_begin(64),
         |board| board.weights_block(0, &[]),
         Board::weights_activate,
-        Board::store_result,
         Board::forget_learned,
         Board::restart,
     ];
@@ -290,10 +289,6 @@ fn every_setting_reaches_the_coprocessor() {
     assert_eq!(pipeline.earth_rate, latitude.map(EarthRate::Subtracted).expect("valid"));
     assert_eq!(Some(pipeline.mounting), set.mounting.rotation());
     assert!(pipeline.levelling && pipeline.rest_force == Some(force));
-    let level = Some(Level { roll_deg: 1.0, pitch_deg: 2.0 });
-    let calibrated = set.pipeline(&Calibration { level, ..Calibration::NONE }, &learned, 0);
-    let both = level.and_then(|level| Some(set.mounting.rotation()?.then(&level.rotation()?)));
-    assert_eq!((calibrated.levelling, Some(calibrated.mounting)), (false, both));
     let bare = Configuration::DEFAULT.coprocessor(&Calibration::NONE, &learned, 0);
     assert!(!bare.fog_expected && bare.heading.is_none() && bare.fog.latitude.is_none());
 }

@@ -7,7 +7,6 @@ use gyronet::coprocessor::Contradiction;
 use gyronet::health::{Faults, Quality, Status};
 use gyronet::model::weights;
 use gyronet::sample::{Standstill, WheelSample};
-use gyronet::service::calibrate::{CalibrationFault, State, Task};
 use gyronet::service::event::SensorFault;
 use gyronet::service::message::{AllCounters, Refusal};
 use gyronet::standstill::Standing;
@@ -150,10 +149,10 @@ const CHECKS: &str = "
     default     2E=7F                                                   WriteDataByIdentifier
     locked      2E0100=13 2EF18601=31 2E010000=13
     extended    2E01006300=31 2E011A00=31
-    default     31=7F 31010200=7F                                       RoutineControl
-    locked      31090909=31 3109020200=33
-    extended    310902=13 3109FF01=31 3109020000=12 3102020200=12 31030204=12
-    extended    3103020000=13 3101020200=13 31030200=24 31010202=22
+    default     31=7F 31010205=7F                                       RoutineControl
+    locked      31090909=31 3109020500=33
+    extended    310902=13 3109FF01=31 31010200=31 3109020500=12 31030204=12
+    extended    3101020500=13 31010205=22
     extended    34=7F                                                   RequestDownload
     programming 3410=13 341011=31 3400550004=31 34001100=13 3400110304=31 3400110204=24 3400110004=22
     extended    36=7F 37=7F                                             TransferData, RequestTransferExit
@@ -229,40 +228,6 @@ fn the_log_is_read_in_any_session_and_other_routines_are_not() {
     let (_, mut bench) = bench();
     assert!(bench.ask(&[0x31, 1, 2, 3, 0, 0, 0, 0]).is_some_and(|response| response[0] == 0x71));
     bench.expect(&[0x31, 1, 2, 0], &[0x7F, 0x31, 0x7F]);
-}
-
-/// The result of a calibration is that of the one that is asked for: running, found, failed.
-#[test]
-fn the_result_of_another_calibration_is_none() {
-    let (_, mut bench) = bench();
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    for (id, other) in [(0, 1), (1, 0)] {
-        for (shakes, state) in [(0.001, 2), (0.3, 3)] {
-            bench.expect(&[0x31, 1, 2, id], &[0x71, 1, 2, id]);
-            bench.expect(&[0x31, 3, 2, id], &[0x71, 3, 2, id, 1]);
-            bench.expect(&[0x31, 3, 2, other], &[0x7F, 0x31, 0x24]);
-            for tick in 0..400 {
-                let noise = if tick % 2 == 0 { shakes } else { -shakes };
-                observe(
-                    &mut bench.board,
-                    tick,
-                    Some(&sample(tick.into(), LEVEL, noise)),
-                    GOOD,
-                    Standstill::Still,
-                );
-            }
-            bench.expect(&[0x31, 3, 2, id], &[0x71, 3, 2, id, state]);
-            bench.expect(&[0x31, 3, 2, other], &[0x7F, 0x31, 0x24]);
-        }
-    }
-    // Axes of the accelerometer are counted after those of the gyro.
-    bench.expect(&[0x31, 1, 2, 0], &[0x71, 1, 2, 0]);
-    for tick in 0..400 {
-        let force = [LEVEL[0], if tick % 2 == 0 { 5.0 } else { -5.0 }, LEVEL[2]];
-        observe(&mut bench.board, tick, Some(&sample(tick.into(), force, 0.0)), GOOD, Standstill::Still);
-    }
-    let failed = State::Failed(Task::Static, CalibrationFault::Moving(4));
-    assert_eq!(bench.board.calibration_state(), failed);
 }
 
 /// Wheel speeds in 0.01 m/s, 0x7FFF where one is not known; then whether the vehicle stands.
@@ -548,21 +513,6 @@ fn a_configuration_is_read_changed_and_written_at_standstill() {
     assert_eq!(refusal(&mut bench), Some(Refusal::Store(StoreError::Field(range))));
     bench.expect(&[0x3E, 0], &[0x7E, 0]);
     assert_eq!(refusal(&mut bench), None);
-}
-
-#[test]
-fn a_static_calibration_runs_as_a_routine() {
-    let (flash, mut bench) = bench();
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    bench.expect(&[0x31, 1, 2, 2], &[0x7F, 0x31, 0x22]);
-    bench.expect(&[0x31, 1, 2, 0], &[0x71, 1, 2, 0]);
-    bench.expect(&[0x31, 3, 2, 0], &[0x71, 3, 2, 0, 1]);
-    bench.expect(&[0x31, 3, 2, 1], &[0x7F, 0x31, 0x24]);
-    bench.stand();
-    bench.expect(&[0x31, 3, 2, 0], &[0x71, 3, 2, 0, 2]);
-    bench.expect(&[0x31, 1, 2, 2], &[0x71, 1, 2, 2]);
-    assert_eq!(start(&flash).learned(), bench.board.learned());
-    assert_ne!(start(&flash).learned(), &gyronet::store::Learned::NOTHING);
 }
 
 /// Downloads a file; returns the response to the last step.

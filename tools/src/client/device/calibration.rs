@@ -1,6 +1,6 @@
 //! Converts a calibration, and what the board has learnt about its sensor, to readable names and values.
 
-use super::settings::{shortest, value};
+use super::settings::shortest;
 use gyronet::store::{Calibration, Learned};
 use gyronet::units::SpecificForce;
 use serde_json::{Value, json};
@@ -14,7 +14,7 @@ pub fn to_value(
     learned: &Learned,
     forward: Option<[f32; 2]>,
     tilt: Option<[f32; 3]>,
-) -> serde_json::Result<Value> {
+) -> Value {
     let points = TEMPERATURES.into_iter().filter_map(|celsius| {
         let bias = learned.bias_curve.at(celsius)?;
         Some(json!({
@@ -23,39 +23,36 @@ pub fn to_value(
             "sigma_rad_per_s": bias.sigma,
         }))
     });
-    Ok(json!({
+    json!({
         "bias_curve": points.collect::<Value>(),
         "specific_force_m_per_s2": learned.specific_force.map(|force| force.map(SpecificForce::metre_per_sec2)),
         "forward": forward.map(|[yaw, sigma]| json!({ "yaw_deg": yaw, "sigma_deg": sigma })),
         "tilt": tilt.map(|[roll, pitch, sigma]| json!({ "roll_deg": roll, "pitch_deg": pitch, "sigma_deg": sigma })),
-        "level": value(&calibration.level)?,
         "unit": calibration.unit.map(|unit| {
             json!({ "gyro_map": unit.gyro_map.elements(), "weights": unit.weights })
         }),
-    }))
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use gyronet::bias::CurveFilter;
-    use gyronet::store::Level;
     use gyronet::units::{AngularRate, CentiCelsius};
 
     #[test]
     fn codes_have_units() {
         let bias = [0.01, -0.002, 0.0].map(|rate| AngularRate::from_rad_per_sec(rate).unwrap());
-        let (mut calibration, mut learned) = (Calibration::NONE, Learned::NOTHING);
+        let (calibration, mut learned) = (Calibration::NONE, Learned::NOTHING);
         assert_eq!(
-            to_value(&calibration, &learned, None, None).unwrap(),
-            json!({ "bias_curve": [], "specific_force_m_per_s2": null, "forward": null, "tilt": null, "level": null, "unit": null })
+            to_value(&calibration, &learned, None, None),
+            json!({ "bias_curve": [], "specific_force_m_per_s2": null, "forward": null, "tilt": null, "unit": null })
         );
         let mut filter = CurveFilter::new(&learned.bias_curve);
         (0..100).for_each(|_| filter.add(CentiCelsius(2_000), bias));
         learned.bias_curve = filter.curve();
         learned.specific_force = Some([SpecificForce(1 << 20); 3]);
-        calibration.level = Some(Level { roll_deg: 1.5, pitch_deg: -0.25 });
-        let value = to_value(&calibration, &learned, Some([1.5, 2.0]), Some([6.5, -1.5, 2.0])).unwrap();
+        let value = to_value(&calibration, &learned, Some([1.5, 2.0]), Some([6.5, -1.5, 2.0]));
         assert_eq!(value["forward"], json!({ "yaw_deg": 1.5, "sigma_deg": 2.0 }));
         assert_eq!(value["tilt"], json!({ "roll_deg": 6.5, "pitch_deg": -1.5, "sigma_deg": 2.0 }));
         let point = &value["bias_curve"][2];
@@ -63,6 +60,5 @@ mod tests {
         assert!((x - 0.01).abs() < 1e-4 && (y + 0.002).abs() < 1e-4 && z == 0.0, "{value}");
         assert_eq!(point["temperature_c"], 20.0);
         assert_eq!(value["specific_force_m_per_s2"], json!([1.0, 1.0, 1.0]));
-        assert_eq!(value["level"], json!({ "roll_deg": 1.5, "pitch_deg": -0.25 }));
     }
 }

@@ -8,7 +8,6 @@ use gyronet::coprocessor::Contradiction;
 use gyronet::fog::FogCounters;
 use gyronet::heading::CourseCounters;
 use gyronet::health::{Counters, InputCounters, MonitorCounters};
-use gyronet::service::calibrate::{State, Task};
 use gyronet::service::event::LogPage;
 use gyronet::service::message::{AccessCounters, AllCounters, Info, LineCounters, PROTOCOL};
 use gyronet::store::{Calibration, Configuration, Learned, Record, UnitMap};
@@ -25,7 +24,6 @@ const PIPELINE_COUNTERS: u16 = 0x0105;
 const INPUT_COUNTERS: u16 = 0x0106;
 const FOG_COUNTERS: u16 = 0x0109;
 const INFO: u16 = 0x010A;
-const CALIBRATION_STATE: u16 = 0x010C;
 /// Data identifier of the map of the unit's gyro.
 pub const UNIT: u16 = 0x010D;
 /// Data identifier of the public key that controls who may write.
@@ -49,14 +47,10 @@ pub const COUNTERS: [u8; 7] = {
 };
 pub const USE_DOWNLOAD: u16 = 0xFF01;
 /// The other routines.
-const STATIC: u16 = 0x0200;
-const MOUNTING: u16 = 0x0201;
-const STORE_CALIBRATION: u16 = 0x0202;
 const LOG: u16 = 0x0203;
 const FORGET: u16 = 0x0205;
-/// The sub-functions that start and stop a routine.
+/// The sub-function that starts a routine.
 const START: u8 = 1;
-const STOP: u8 = 2;
 
 type Result<T> = std::result::Result<T, DeviceError>;
 
@@ -139,28 +133,14 @@ impl<B: Bus> Device<B> {
 
     /// Makes the board forget what it has learnt about its sensor.
     pub fn forget_learned(&mut self) -> Result<()> {
-        self.routine(START, FORGET)
+        self.enter(Session::Extended)?;
+        let [high, low] = FORGET.to_be_bytes();
+        self.ask(&[0x31, START, high, low]).map(drop)
     }
 
     /// Stores the map of this unit's gyro, or removes it; this takes effect after a restart.
     pub fn set_unit(&mut self, unit: Option<UnitMap>) -> Result<()> {
         self.write(UNIT, &content(&unit)?)
-    }
-
-    pub fn start_calibration(&mut self, task: Task) -> Result<()> {
-        self.routine(START, routine(task))
-    }
-
-    pub fn cancel_calibration(&mut self) -> Result<()> {
-        self.routine(STOP, STATIC)
-    }
-
-    pub fn calibration_state(&mut self) -> Result<State> {
-        decode(&self.read(CALIBRATION_STATE)?)
-    }
-
-    pub fn store_calibration(&mut self) -> Result<()> {
-        self.routine(START, STORE_CALIBRATION)
     }
 
     /// Returns the events after an event number, at most one page.
@@ -200,12 +180,6 @@ impl<B: Bus> Device<B> {
         let trailer = self.trailer(id, content)?;
         self.ask(&[&[0x2E][..], &id.to_be_bytes(), content, &trailer].concat()).map(drop)
     }
-
-    fn routine(&mut self, control: u8, id: u16) -> Result<()> {
-        self.enter(Session::Extended)?;
-        let [high, low] = id.to_be_bytes();
-        self.ask(&[0x31, control, high, low]).map(drop)
-    }
 }
 
 /// Encodes a record as it is written to a board, and signed.
@@ -216,13 +190,6 @@ pub fn content(record: &impl serde::Serialize) -> Result<Vec<u8>> {
 /// Encodes a configuration as it is written to a board, and signed: the version of its layout, then the record.
 pub fn configuration_content(configuration: &Configuration) -> Result<Vec<u8>> {
     Ok([&[Configuration::VERSION][..], &content(configuration)?].concat())
-}
-
-const fn routine(task: Task) -> u16 {
-    match task {
-        Task::Static => STATIC,
-        Task::Mounting => MOUNTING,
-    }
 }
 
 fn decode<T: DeserializeOwned>(record: &[u8]) -> Result<T> {
