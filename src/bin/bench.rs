@@ -15,37 +15,36 @@ fn main() {
 mod support;
 
 #[cfg(target_os = "none")]
-#[path = "support/checkpoint.rs"]
-mod checkpoint;
-
-#[cfg(target_os = "none")]
 #[path = "support/meter.rs"]
 mod meter;
 
-#[cfg(target_os = "none")]
 #[cfg(target_os = "none")]
 mod firmware {
     use crate::meter::Meter;
     use crate::random_records;
     use crate::support::Numbers;
     use crate::support::random_model;
+    use core::cell::RefCell;
     use core::hint::black_box;
     use core::mem::MaybeUninit;
+    use cortex_m::interrupt::Mutex;
     use cortex_m_semihosting::{debug, hprintln};
     use embedded_can::{Frame, StandardId};
     use gyronet::can::DataFrame;
     use gyronet::can::wheel::{WheelReceiver, WheelSettings};
-    use gyronet::model::blob::HIDDEN;
-    use gyronet::model::blob::Shape;
+    use gyronet::fog::FogCorrector;
+    use gyronet::model::blob::{HIDDEN, Shape};
+    use gyronet::model::fognet::{FogNetState, MinuteNetwork};
     use gyronet::model::gyronet::GyroNetState;
+    use gyronet::model::seconds::{Minute, STEPS, Second};
     use gyronet::model::window::{FEATURES, Features, WINDOW};
-    use gyronet::model::{Blob, Estimate, GyroNet, SCALE_MIN, WindowNetwork, weights};
+    use gyronet::model::{Blob, Estimate, FogBlob, FogNet, GyroNet, SCALE_MIN, WindowNetwork, weights};
     use gyronet::nn::Aligned;
     use gyronet::nn::dense::Dense;
     use gyronet::nn::lstm::{self, DirectionWeights, Scratch};
     use gyronet::sample::{ImuSample, PERIOD_US, Validity};
     use gyronet::uds::signature;
-    use gyronet::units::{AngularRate, Micros, SpecificForce};
+    use gyronet::units::{Angle, AngularRate, Micros, SpecificForce};
     use gyronet::{Config, Coprocessor, TimedFrame};
     use panic_semihosting as _;
     #[expect(unused_imports, reason = "brings the interrupt vectors to the linker")]
@@ -53,6 +52,9 @@ mod firmware {
 
     random_records!(FOG_2_2, 60, 120, 40, 3);
     random_records!(GYRO_1, 60, 6, 127, 2);
+
+    static FOG: Mutex<RefCell<(FogNetState, Minute)>> =
+        Mutex::new(RefCell::new((FogNetState::ZERO, Minute::EMPTY)));
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
@@ -68,11 +70,15 @@ mod firmware {
     fn run(meter: &mut Meter) {
         meter.run("empty", || {});
         gyronet(meter);
+        cortex_m::interrupt::free(|cs| fognet(meter, &mut FOG.borrow(cs).borrow_mut()));
         coprocessor(meter);
         kernels(meter);
         signature(meter);
         hprintln!("gyronet/state bytes={}", size_of::<GyroNetState<HIDDEN>>());
         hprintln!("gyronet/weights bytes={}", weights::GYRONET.0.len());
+        hprintln!("fognet/state bytes={}", size_of::<FogNetState>());
+        hprintln!("fognet/corrector bytes={}", size_of::<FogCorrector>());
+        hprintln!("fognet/weights bytes={}", weights::FOGNET.0.len());
     }
 
     fn gyronet(meter: &mut Meter) {
@@ -105,19 +111,43 @@ mod firmware {
                 black_box(network.estimate(black_box(&window)));
             });
         }
-        meter.run("gyronet/newest", || {
-            black_box(network.estimate_newest(black_box(&window)));
-        });
         network.start(&window);
         meter.run("gyronet/piece", || {
             black_box(network.advance());
         });
-        match crate::checkpoint::network() {
-            Some(mut reference) => meter.run("gyronet/f32", || {
-                black_box(reference.estimate(black_box(&window)));
-            }),
-            None => hprintln!("FAILED: the checkpoint is not to be read"),
+    }
+
+    /// Measures whole windows of FoGNet, the start of one, and its longest piece.
+    fn fognet(meter: &mut Meter, (state, minute): &mut (FogNetState, Minute)) {
+        let Ok(blob) = FogBlob::new_checked(&weights::FOGNET.0) else {
+            hprintln!("FAILED: FoGNet's weight file is refused");
+            return;
+        };
+        let mut network = FogNet::new(blob, state);
+        let mut numbers = Numbers::new(11);
+        for name in ["fognet/window", "fognet/window/random", "fognet/window/zero"] {
+            for _ in 0..STEPS {
+                let mut second = Second { features: [0; _], turn: Angle::ZERO };
+                if name != "fognet/window/zero" {
+                    second.features.iter_mut().for_each(|value| *value = numbers.within(1 << 24));
+                    second.turn = Angle(i64::from(numbers.within(1 << 29)) << 12);
+                }
+                minute.add(second);
+            }
+            let Some(window) = minute.window() else { return };
+            meter.run(name, || {
+                black_box(network.estimate(black_box(&window)));
+            });
         }
+        let Some(window) = minute.window() else { return };
+        meter.run("fognet/start", || network.start(&window));
+        // Skip both directions of layer 1, and the first piece of layer 2: the pieces that follow are the longest.
+        for _ in 0..=STEPS {
+            network.advance();
+        }
+        meter.run("fognet/piece", || {
+            black_box(network.advance());
+        });
     }
 
     /// Measures a window of models with a linear part and 0 to 32 units, of the paper's model, and of the default

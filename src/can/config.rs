@@ -39,8 +39,6 @@ pub struct Config {
 impl Config {
     /// [`Settings::DEFAULT`], which pass the check (as a test shows).
     pub const DEFAULT: Self = Self { settings: Settings::DEFAULT };
-    /// [`Settings::SLCAN_115200`], which also pass the check.
-    pub const SLCAN_115200: Self = Self { settings: Settings::SLCAN_115200 };
     /// No message at all, for a replay of which only the rates are used. [`Config::new`] refuses it for a bus.
     pub const SILENT: Self = Self { settings: Settings { bosch: None, yaw: None, ..Settings::DEFAULT } };
 

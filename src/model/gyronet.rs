@@ -9,7 +9,7 @@ use super::input::load_step;
 use super::weights;
 use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
 use crate::model::window::{FEATURES, Features, WINDOW};
-use crate::nn::bilstm::{self, Direction, Pass, Run};
+use crate::nn::bilstm::{Direction, Run};
 use crate::nn::lstm::{DirectionWeights, Scratch};
 use crate::nn::{dense::Dense, exp2::times_exp2, linear::Linear};
 use crate::units::AngularRate;
@@ -89,8 +89,6 @@ pub trait WindowRun {
     fn start(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]);
     /// Runs a piece of the window; returns the estimate with the last one.
     fn advance(&mut self, blob: &Blob<'_>) -> Option<Estimate>;
-    /// Runs a whole window for its newest correction alone.
-    fn newest(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]) -> (AngularRate, u16);
     /// Drops the window in progress.
     fn stop(&mut self);
 }
@@ -174,44 +172,6 @@ impl<const U: usize, const W: usize, const R: usize> WindowRun for Arrays<U, W, 
         Some(Estimate { corrections, scale, clamped_inputs: *clamped_inputs, linear_sum })
     }
 
-    fn newest(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]) -> (AngularRate, u16) {
-        let Self { input, layer1, scratch, recurrent, .. } = self;
-        let clamped_inputs = load(blob, window, input);
-        let newest = blob.linear.and_then(|linear| linear.rows().last());
-        let linear = newest.map_or(0, |row| Linear::output(row, window.as_flattened()));
-        let mut sum = blob.gyro_error.bias;
-        if let Some([first, second]) = &blob.layers {
-            let units = first.forward.units();
-            let layer1 = layer1.as_flattened_mut().get_mut(..WINDOW * units).unwrap_or_default();
-            for (weights, direction, offset) in
-                [(&first.forward, Direction::Forward, 0), (&first.backward, Direction::Backward, units)]
-            {
-                Pass::new(direction).finish(weights, input, scratch, recurrent, |step, hidden| {
-                    bilstm::store(layer1, step, offset, 2 * units, units, hidden);
-                });
-            }
-            let (forward, backward) = blob.gyro_error.weights.split_at_checked(units).unwrap_or_default();
-            let mut add = |weights, step, hidden: &[u32]| {
-                if step == WINDOW - 1 {
-                    sum = sum.wrapping_add(Dense::partial(weights, hidden));
-                }
-            };
-            Pass::new(Direction::Forward).finish(
-                &second.forward,
-                layer1,
-                scratch,
-                recurrent,
-                |step, hidden| {
-                    add(forward, step, hidden);
-                },
-            );
-            Pass::first(Direction::Backward, &second.backward, layer1, scratch, |step, hidden| {
-                add(backward, step, hidden);
-            });
-        }
-        (AngularRate(blob.gyro_error.scale(sum).saturating_add(linear)), clamped_inputs)
-    }
-
     fn stop(&mut self) {
         self.under_way = false;
     }
@@ -272,13 +232,6 @@ impl<'w, S: Memory> GyroNet<'w, S> {
     /// with the last piece, `None` before that and when no window is in progress.
     pub fn advance(&mut self) -> Option<Estimate> {
         self.state.arrays().advance(&self.blob)
-    }
-
-    /// Returns the newest sample's correction without a scale, and the clamped inputs. The backward half of layer 2
-    /// needs only its first step for that, which saves a third of the work; the result equals the last correction of
-    /// [`WindowNetwork::estimate`], bit for bit.
-    pub fn estimate_newest(&mut self, window: &[Features; WINDOW]) -> (AngularRate, u16) {
-        self.state.arrays().newest(&self.blob, window)
     }
 }
 

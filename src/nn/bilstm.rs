@@ -111,18 +111,6 @@ impl Pass {
         lstm::step(weights, &projection[first], None, cell_state, hidden);
         emit(2 * pair + first, hidden);
     }
-
-    /// Runs all remaining steps.
-    pub fn finish<const U: usize, const W: usize, const P: usize>(
-        mut self,
-        weights: &DirectionWeights<'_>,
-        input: &[u32],
-        scratch: &mut Scratch<U, W, P>,
-        room: &mut [u32],
-        mut emit: impl FnMut(usize, &[u32; W]),
-    ) {
-        while self.advance(weights, input, scratch, room, &mut emit) {}
-    }
 }
 
 /// Returns the index of word `column / 2` of `step` in a sequence of `columns` values a step.

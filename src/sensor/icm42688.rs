@@ -2,7 +2,7 @@
 //!
 //! [`packet`] parses the entries of its FIFO without I/O, [`registers`] lists its registers, and this file does the
 //! SPI transfers. Every wait is a bounded number of [`DelayNs`] delays. Each call for a sample also reads back one
-//! register of the configuration, so that a reset or a flipped bit in the sensor is detected within [`SETTINGS`]
+//! register of the configuration, so that a reset or a flipped bit in the sensor is detected within [`CHECKS`]
 //! calls.
 
 mod config;
@@ -12,17 +12,18 @@ pub mod packet;
 pub mod registers;
 mod sample;
 
-pub use config::{Bandwidth, Icm42688Config, OutputRate, SETTINGS};
-
 use super::spi::{Chip, Setting, SpiError};
 use super::stamps::Stamps;
 use crate::sample::ImuSample;
+use config::SETTINGS;
 use core::num::NonZeroU64;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
 use packet::{PACKET, Packet, PacketError};
 use registers as reg;
 
+/// Number of registers that are set, and checked one after the other.
+pub const CHECKS: usize = SETTINGS.len();
 /// Start-up time of the gyro until its readings are valid, ms.
 const START_MS: u32 = 45;
 /// Without a clock on CLKIN the sensor counts in units of 32/30 us, although TMST_RES is 1 us (DS-000347, 12.7): the 10 ms
@@ -33,7 +34,6 @@ const STAMPS: Stamps = Stamps::new(0xFFFF, 16, NonZeroU64::new(15).unwrap());
 #[derive(Debug)]
 pub struct Icm42688<SPI> {
     chip: Chip<SPI>,
-    config: Icm42688Config,
     next_check: usize,
     stamps: Stamps,
 }
@@ -43,25 +43,21 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
     ///
     /// # Errors
     /// `Bus`, `Reset`, `Identity` or `Setting`.
-    pub fn new(
-        spi: SPI,
-        config: Icm42688Config,
-        delay: &mut impl DelayNs,
-    ) -> Result<Self, SpiError<SPI::Error>> {
+    pub fn new(spi: SPI, delay: &mut impl DelayNs) -> Result<Self, SpiError<SPI::Error>> {
         let chip = Chip { spi, has_dummy: false };
-        let mut part = Self { chip, config, next_check: 0, stamps: STAMPS };
+        let mut part = Self { chip, next_check: 0, stamps: STAMPS };
         part.chip.write(reg::BANK_SEL, 0)?;
         part.chip.write(reg::DEVICE_CONFIG, reg::RESET)?;
         part.chip.wait_for_reset(reg::DEVICE_CONFIG, reg::RESET, delay)?;
         part.chip.identify(0, reg::WHO_AM_I, reg::IDENTITY)?;
-        for Setting { bank, address, mask, value } in config.settings() {
+        for Setting { bank, address, mask, value } in SETTINGS {
             part.in_bank(bank, |chip| {
                 let [held] = chip.read(address)?;
                 chip.write(address, held & !mask | value)
             })?;
         }
         delay.delay_ms(START_MS);
-        for _ in 0..SETTINGS {
+        for _ in 0..CHECKS {
             part.check_next_setting()?;
         }
         part.flush()?;
@@ -98,8 +94,8 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
 
     /// Checks one register of the configuration; each call checks the next one.
     fn check_next_setting(&mut self) -> Result<(), SpiError<SPI::Error>> {
-        let setting = self.config.settings()[self.next_check % SETTINGS];
-        self.next_check = (self.next_check + 1) % SETTINGS;
+        let setting = SETTINGS[self.next_check % CHECKS];
+        self.next_check = (self.next_check + 1) % CHECKS;
         let [held] = self.in_bank(setting.bank, |chip| chip.read(setting.address))?;
         setting.check(held)
     }

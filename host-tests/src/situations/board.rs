@@ -15,7 +15,7 @@ use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::sample::ImuSample;
 use gyronet::sensor::Source;
 use gyronet::sensor::dsp1760::Dsp1760;
-use gyronet::sensor::icm42688::{Icm42688, Icm42688Config};
+use gyronet::sensor::icm42688::Icm42688;
 use gyronet::sensor::xsens::Mti;
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::{Calibration, Configuration, FogPart, ImuPart, Learned};
@@ -99,7 +99,7 @@ impl Board {
         let line = match part {
             Part::Icm42688 => {
                 let bus = icm42688::Bus::default();
-                let driver = Icm42688::new(bus.clone(), Icm42688Config::default(), &mut NoDelay);
+                let driver = Icm42688::new(bus.clone(), &mut NoDelay);
                 Line::Fifo(Box::new(driver.expect("a simulated part that is well")), bus)
             }
             Part::Xsens | Part::Dsp1760 => Line::Mti(Box::default()),

@@ -52,8 +52,6 @@ where
         let window = models::window(&mut models::Numbers::new(1 + round), round);
         let estimate = own.estimate(&window);
         assert_eq!(estimate, large.estimate(&window), "{shape:?}");
-        let newest = own.estimate_newest(&window);
-        assert_eq!(newest, (estimate.corrections[WINDOW - 1], estimate.clamped_inputs), "{shape:?}");
         let linear = exact(&blob, &window);
         different += u32::from(estimate.corrections.map(|rate| rate.0) != linear);
         assert!(shape.units > 0 || estimate.clamped_inputs == 0);

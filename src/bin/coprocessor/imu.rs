@@ -14,7 +14,7 @@ use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::sensor::Source;
 use gyronet::sensor::asm330lhh::Asm330lhh;
 use gyronet::sensor::bmi088::Bmi088;
-use gyronet::sensor::icm42688::{Bandwidth, Icm42688, Icm42688Config, OutputRate};
+use gyronet::sensor::icm42688::Icm42688;
 use gyronet::sensor::spi::SpiError;
 use gyronet::sensor::xsens::{Mti, XsensError};
 use gyronet::service::event::SensorFault;
@@ -30,8 +30,6 @@ const RETRY_MS: u32 = 1_000;
 /// Time after which a part that answers and has no sample is brought up again, microseconds.
 const SILENT_US: u64 = 1_000_000;
 
-const ICM: Icm42688Config = Icm42688Config { rate: OutputRate::Hz100, bandwidth: Bandwidth::Sixteenth };
-
 /// A part on SPI.
 enum Part {
     Icm(Icm42688<Spi>),
@@ -46,7 +44,7 @@ impl Part {
         match part {
             ImuPart::Bmi088 => Bmi088::new([first, second], self_test, &mut Delay).map(Self::Bmi),
             ImuPart::Asm330lhh => Asm330lhh::new(first, self_test, &mut Delay).map(Self::Asm),
-            _ => Icm42688::new(first, ICM, &mut Delay).map(Self::Icm),
+            _ => Icm42688::new(first, &mut Delay).map(Self::Icm),
         }
         .map_err(fault)
     }

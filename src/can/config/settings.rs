@@ -107,14 +107,4 @@ impl Settings {
         }),
         status: None,
     };
-
-    /// Settings that fit an SLCAN line of 115200 bit/s, time stamps included. Our own messages are sent every
-    /// 50 ms instead of 10 ms; they carry the mean rate over the period, so no rotation is lost.
-    pub const SLCAN_115200: Self = Self {
-        yaw: match Self::DEFAULT.yaw {
-            Some(yaw) => Some(YawSettings { period_ms: 50, ..yaw }),
-            None => None,
-        },
-        ..Self::DEFAULT
-    };
 }

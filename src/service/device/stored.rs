@@ -191,7 +191,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             {
                 return Err(Refusal::OtherWeights { found, runs });
             }
-            let calibration = Calibration { unit, ..device.calibration };
+            let calibration = Calibration { unit };
             calibration.check().map_err(StoreError::from)?;
             device.store_calibration(calibration)
         })

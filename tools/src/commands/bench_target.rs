@@ -31,11 +31,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if let Some(sources) = &args.cmsis_nn {
         return compare(&workspace, &folder, sources, common);
     }
-    let mut counts = Counts::default();
-    for image in bench::IMAGES {
-        let image = bench::build(&workspace, image, &folder)?;
-        counts.extend(bench::measure(&workspace, &image)?);
-    }
+    let counts = measure(&workspace, &folder)?;
     let out = &mut io::stdout().lock();
     let written = if common.json { writeln!(out, "{}", json(&counts)) } else { print(out, &counts) };
     // A failed check is reported even if the output could not be written.
@@ -43,6 +39,10 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         return Err("the instruction count of a window depends on its input".into());
     }
     Ok(written?)
+}
+
+fn measure(workspace: &Path, folder: &Path) -> Result<Counts, bench::BenchError> {
+    bench::measure(workspace, &bench::build(workspace, bench::IMAGE, folder)?)
 }
 
 fn print(out: &mut impl Write, counts: &Counts) -> io::Result<()> {
@@ -60,36 +60,28 @@ fn json(counts: &Counts) -> serde_json::Value {
     })
 }
 
-/// Prints GyroNet's window, and its newest output alone, by our kernels and by CMSIS-NN's.
+/// Prints GyroNet's window by our kernels and by CMSIS-NN's.
 fn compare(workspace: &Path, folder: &Path, sources: &Path, common: Common) -> super::Result {
     // CMSIS-NN first: where its sources or its compiler are missing, nothing of ours is built.
     let (theirs, compiler) = cmsis_nn::measure(workspace, sources)?;
-    let counts = bench::measure(workspace, &bench::build(workspace, bench::IMAGES[0], folder)?)?;
-    let rows = ["window", "newest"].map(|extent| {
-        let ours = counts.get(&format!("gyronet/{extent}"));
-        let theirs: Vec<&Region> = theirs.iter().filter(|region| region.name.ends_with(extent)).collect();
-        (ours, theirs)
-    });
+    let counts = measure(workspace, folder)?;
+    let ours = counts.get("gyronet/window").ok_or("the bench image has printed no window")?;
+    let Count { name, instructions, cycles, .. } = ours;
     let out = &mut io::stdout().lock();
     if common.json {
         let row = |name: &str, instructions: u64, cycles: u64| serde_json::json!({ "name": name, "instructions": instructions, "cycles": cycles });
-        let rows = rows.iter().flat_map(|(ours, theirs)| {
-            let ours = ours.iter().map(|ours| row(&ours.name, ours.instructions, ours.cycles));
-            ours.chain(theirs.iter().map(|region| row(&region.name, region.instructions, region.cycles)))
-        });
+        let theirs = theirs.iter().map(|region| row(&region.name, region.instructions, region.cycles));
+        let rows = std::iter::once(row(name, *instructions, *cycles)).chain(theirs);
         writeln!(out, "{}", rows.collect::<serde_json::Value>())?;
         return Ok(());
     }
     writeln!(out, "GyroNet's network on a Cortex-M4, zero wait states; CMSIS-NN by gcc {compiler} -O3")?;
-    for (ours, theirs) in rows {
-        let Some(Count { name, instructions, cycles, .. }) = ours else { continue };
-        writeln!(out, "{name} instructions={instructions} cycles={cycles}")?;
-        for region in theirs {
-            let [more, longer] = [(region.instructions, *instructions), (region.cycles, *cycles)]
-                .map(|(theirs, ours)| theirs as f64 / ours.max(1) as f64);
-            let Region { name, instructions, cycles } = region;
-            writeln!(out, "{name} instructions={instructions} ({more:.2}x) cycles={cycles} ({longer:.2}x)")?;
-        }
+    writeln!(out, "{name} instructions={instructions} cycles={cycles}")?;
+    for region in theirs {
+        let [more, longer] = [(region.instructions, *instructions), (region.cycles, *cycles)]
+            .map(|(theirs, ours)| theirs as f64 / ours.max(1) as f64);
+        let Region { name, instructions, cycles } = region;
+        writeln!(out, "{name} instructions={instructions} ({more:.2}x) cycles={cycles} ({longer:.2}x)")?;
     }
     Ok(())
 }

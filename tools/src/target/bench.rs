@@ -1,4 +1,4 @@
-//! The bench images in the emulator, and the counts in their output.
+//! The bench image in the emulator, and the counts in their output.
 //!
 //! QEMU's plugin `tools/bench/m4count.c` counts instructions exactly and models Cortex-M4 cycles at zero wait states. It
 //! is built with the C compiler that Rust's linker needs anyway.
@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 /// Timeout of an image's run or a build.
 const LIMIT: Duration = Duration::from_secs(900);
 const POLL: Duration = Duration::from_millis(5);
-/// The images that are measured, in order.
-pub const IMAGES: [&str; 2] = ["bench", "bench_fognet"];
+/// The image that is measured.
+pub const IMAGE: &str = "bench";
 /// The images that are built to be flashed, optimised for size.
 pub const FLASHED: [&str; 3] = ["boot", "coprocessor", "bringup"];
 pub const MACHINE: &str = "netduinoplus2";
@@ -51,11 +51,6 @@ pub struct Counts {
 }
 
 impl Counts {
-    pub fn extend(&mut self, other: Self) {
-        self.regions.extend(other.regions);
-        self.sizes.extend(other.sizes);
-    }
-
     pub fn get(&self, name: &str) -> Option<&Count> {
         self.regions.iter().find(|count| count.name == name)
     }

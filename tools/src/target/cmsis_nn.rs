@@ -48,7 +48,7 @@ pub enum CmsisError {
 
 #[derive(Debug)]
 pub struct Region {
-    /// Activations and extent, such as `cmsis-nn/s8/window`.
+    /// The width of the activations, such as `cmsis-nn/s8/window`.
     pub name: String,
     pub instructions: u64,
     /// Modelled Cortex-M4 cycles at zero wait states.
