@@ -1,4 +1,4 @@
-//! The device holds what a user configures or examines: stored data, weights, calibration and the log of events.
+//! The device holds what a user configures or examines: stored data, weights and calibration.
 //!
 //! [`Device`] owns the flash, changes it on request and reports its state; it does no input or output of its own.
 //! Testers reach it over diagnosis ([`crate::uds`]). Every request is checked completely before anything is written;

@@ -11,7 +11,7 @@ pub use firmware::{Firmware, FirmwareState};
 pub use weights::MappedSlots;
 
 use super::conditions::Conditions;
-use super::event::{EventKind, EventLog, LogPage, SensorFault};
+use super::event::SensorFault;
 use super::learner::Learner;
 use super::message::{AccessCounters, FAILED_STARTS, FlashState, Identity, Info, Origin, PROTOCOL, Refusal};
 use super::not_good::NotGood;
@@ -24,7 +24,8 @@ use crate::sample::{ImuSample, Standstill, WheelSample};
 use crate::standstill::Standing;
 use crate::store::slots::{SlotError, WeightSource};
 use crate::store::{
-    Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Learned, Record, Slot, Store, Troubles,
+    Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Learned, Record, Slot, Store, StoreError,
+    Troubles,
 };
 use embedded_storage::nor_flash::NorFlash;
 use weights::Uploading;
@@ -45,7 +46,7 @@ pub struct SupportedHardware {
     pub clock_hz: u32,
 }
 
-/// The state of the board apart from the pipeline: stored data, weights, calibration and event log.
+/// The state of the board apart from the pipeline: stored data, weights and calibration.
 ///
 /// The device owns the flash: records in `R`, weight files in `W`. Both are `None` if nothing can be stored.
 pub struct Device<R: NorFlash, W> {
@@ -98,7 +99,8 @@ pub struct Device<R: NorFlash, W> {
     faults: Faults,
     not_good: NotGood,
     tick: u32,
-    log: EventLog,
+    /// The newest reason why stored data were refused, or could not be stored by the board itself.
+    stored_fault: Option<StoreError>,
     /// Reason why the last request was refused.
     refusal: Option<Refusal>,
 }
@@ -147,7 +149,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             faults: Faults::NONE,
             not_good: NotGood::START,
             tick: 0,
-            log: EventLog::new(),
+            stored_fault: None,
             refusal: None,
         }
     }
@@ -195,13 +197,9 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         mounting.map_or(Knowledge::Unknown, |mounting| self.learned.forward_knowledge(&mounting))
     }
 
-    /// Records the result of setting up the sensor. A repeated fault is logged only once.
+    /// Records the result of setting up the sensor.
     pub fn sensor(&mut self, result: Result<(), SensorFault>) {
-        let fault = result.err();
-        if fault.is_none() || fault != self.sensor {
-            self.note(EventKind::Sensor(fault));
-        }
-        self.sensor = fault;
+        self.sensor = result.err();
     }
 
     /// Processes each sample of the sensor (`None` while the sensor is silent), the status and faults of the yaw
@@ -229,12 +227,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             && self.learner.observe(sample, wheels, standing, limits, &mut self.learned)
         {
             self.mount_moved = true;
-            self.note(EventKind::MountMoved);
         }
-        if status != self.status {
-            self.status = status;
-            self.note(EventKind::Status(status));
-        }
+        self.status = status;
     }
 
     /// Takes the quality of each rate, after [`Device::observe`].
@@ -325,11 +319,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.refusal = None;
     }
 
-    /// Returns a page of the events after number `after`; 0 for all.
-    pub fn events(&self, after: u32) -> LogPage {
-        self.log.page(after)
-    }
-
     /// Returns the slot and the checksum of the uploaded file, once the file has been checked.
     pub fn uploaded(&self) -> Option<(Slot, u32)> {
         let Uploading { upload, checked } = self.uploading?;
@@ -359,13 +348,9 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    fn refuse(&mut self, kind: EventKind) {
+    fn refuse(&mut self, error: StoreError) {
         self.refused = true;
-        self.note(kind);
-    }
-
-    fn note(&mut self, kind: EventKind) {
-        self.log.record(self.tick, kind);
+        self.stored_fault = Some(error);
     }
 
     /// Returns the board's identity and state.
@@ -384,6 +369,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             sensor: self.sensor,
             refused_slots: self.refused_slots,
             firmware: self.firmware,
+            stored_fault: self.stored_fault,
             status: self.status,
         }
     }

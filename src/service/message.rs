@@ -11,7 +11,7 @@ use crate::store::slots::{SlotError, WeightSource};
 use serde::{Deserialize, Serialize};
 
 /// Version of the encoding of these types; every change of a type increments it.
-pub const PROTOCOL: u8 = 21;
+pub const PROTOCOL: u8 = 22;
 /// Size of a full block of a download, bytes.
 pub const BLOCK: usize = 256;
 
@@ -174,6 +174,8 @@ pub struct Info {
     pub refused_slots: [Option<SlotError>; 2],
     /// The firmware that runs, and what became of its update.
     pub firmware: Firmware,
+    /// The newest reason why stored data were refused, or could not be stored by the board itself.
+    pub stored_fault: Option<StoreError>,
     /// Status of the corrected yaw rate.
     pub status: Status,
 }

@@ -155,7 +155,7 @@ pub static TROUBLES: [Trouble; 19] = [
         0x5A02,
         0x44,
         "stored data are damaged",
-        "`device log`; store the missing data again",
+        "`device info` says which; store the missing data again",
         Cause::Fault(Faults::STORED),
     ),
     trouble(0x5A02, 0x46, "no weights that can be used", "`device info`; upload weights", Cause::NoWeights),

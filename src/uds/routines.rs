@@ -1,7 +1,7 @@
-//! Runs the routines (service 0x31): the log, a self-test, to forget what was learnt, and the activation of a download.
+//! Runs the routines (service 0x31): a self-test, to forget what was learnt, and the activation of a download.
 
 use super::download::Download;
-use super::response::{Nrc, Response, exactly, nrc, put, put_record};
+use super::response::{Nrc, Response, exactly, nrc, put};
 use super::security::{self, Seed};
 use super::services::Services;
 use super::session::Session;
@@ -13,7 +13,6 @@ use embedded_storage::nor_flash::NorFlash;
 const SELF_TEST: u16 = 0x0204;
 /// Routine that erases what the board has learnt about its sensor.
 const FORGET: u16 = 0x0205;
-const LOG: u16 = 0x0203;
 const USE_DOWNLOAD: u16 = 0xFF01;
 
 /// Returns a bit for each component that fails: 0 the processor's clock, 1 the CAN controller, 2 the inertial
@@ -46,7 +45,7 @@ impl Services {
         put(out, id)?;
         let id = u16::from_be_bytes(*id);
         let is_known = match id {
-            LOG | SELF_TEST | FORGET => true,
+            SELF_TEST | FORGET => true,
             USE_DOWNLOAD => self.require_session(Session::Programming).is_ok(),
             _ => false,
         };
@@ -60,11 +59,10 @@ impl Services {
         if RoutineControlType::from_repr(sub) != Some(RoutineControlType::StartRoutine) {
             return Err(Nrc::SubFunctionNotSupported);
         }
-        match id {
-            LOG => return put_record(out, &device.events(u32::from_be_bytes(exactly(option)?))),
-            USE_DOWNLOAD => return self.use_download(option, device),
-            _ => exactly(option).map(|[]: [u8; 0]| ())?,
+        if id == USE_DOWNLOAD {
+            return self.use_download(option, device);
         }
+        let [] = exactly(option)?;
         if id == SELF_TEST {
             return put(out, &[self_test(device, entropy().is_some())]);
         }

@@ -220,7 +220,7 @@ impl Services {
         if command != UdsCommand::ReadDataByIdentifier {
             device.forget_refusal();
         }
-        self.require_session(session::needed(command, rest))?;
+        self.require_session(session::needed(command))?;
         if self.is_guest
             && matches!(
                 command,

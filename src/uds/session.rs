@@ -2,9 +2,6 @@
 
 use automotive_diag::uds::UdsCommand;
 
-/// First bytes of a request for the log: start of routine 0203.
-const READ_LOG: [u8; 3] = [1, 0x02, 0x03];
-
 /// A diagnostic session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
@@ -17,10 +14,8 @@ pub enum Session {
     Extended = 3,
 }
 
-pub(super) fn needed(command: UdsCommand, rest: &[u8]) -> Session {
+pub(super) fn needed(command: UdsCommand) -> Session {
     match command {
-        // The log can be read in any session.
-        UdsCommand::RoutineControl if rest.starts_with(&READ_LOG) => Session::Default,
         UdsCommand::CommunicationControl
         | UdsCommand::ControlDTCSetting
         | UdsCommand::WriteDataByIdentifier

@@ -1,14 +1,13 @@
-//! Flash contents at the start, in order or damaged: the board runs on, and the bus, the log and the
-//! service line report it from the first frame on.
+//! Flash contents at the start, in order or damaged: the board runs on, and the bus and the service
+//! line report it from the first frame on.
 
 use crate::common::{self, SAMPLE, START, frames};
-use crate::service::{self, on_bus, on_line};
+use crate::service::{self, on_bus};
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::config::{Settings, YawSettings};
 use gyronet::can::yaw::{AngleMessage, FOG_IDS, Quality, RateMessage};
 use gyronet::health::Faults;
-use gyronet::service::event::EventKind;
 use gyronet::service::message::{FlashState, Info, Origin, Refusal};
 use gyronet::store::layout::{FLASH_BASE, SLOT_SIZE, STORE};
 use gyronet::store::slots::{SlotError, WeightSource};
@@ -28,7 +27,6 @@ struct Started {
     board: Board,
     frames: Vec<DataFrame>,
     info: Info,
-    events: Vec<EventKind>,
 }
 
 impl Started {
@@ -41,9 +39,7 @@ impl Started {
         board.run(MENDED + SAMPLE * SAMPLES as u32);
         let frames = frames(&board.can_frames());
         let info = service::info(&mut board);
-        let page = on_line(&mut board).log(0).expect("a response");
-        let events = page.events.iter().map(|event| event.kind).collect();
-        Some(Self { board, frames, info, events })
+        Some(Self { board, frames, info })
     }
 
     fn of(&self, id: u16) -> impl Iterator<Item = &[u8]> {
@@ -88,7 +84,7 @@ fn a_damaged_configuration_and_a_damaged_slot_give_way_and_are_reported() {
     let inside = Slot::B.offset() + SLOT_SIZE as u32 / 2;
     let stored = stored.damaged(STORE.start + 20, 4).damaged(inside, 0x10);
     let test = "a_damaged_configuration_and_a_damaged_slot_give_way_and_are_reported";
-    let Some(Started { info, events, .. }) = Started::with(test, &stored, |_| ()).inspect(|started| {
+    let Some(Started { info, .. }) = Started::with(test, &stored, |_| ()).inspect(|started| {
         assert!(started.flagged());
     }) else {
         return;
@@ -96,8 +92,6 @@ fn a_damaged_configuration_and_a_damaged_slot_give_way_and_are_reported() {
     assert_eq!((info.flash, info.weights), (FlashState::Damaged, WeightSource::Slot(Slot::A)));
     assert_ne!(info.configuration, Origin::Stored);
     assert!(matches!(info.refused_slots, [None, Some(SlotError::Blob(_))]), "{:?}", info.refused_slots);
-    assert!(events.contains(&EventKind::RecordsDamaged), "{events:?}");
-    assert!(events.iter().any(|event| matches!(event, EventKind::SlotRefused(Slot::B, _))), "{events:?}");
 }
 
 /// A controller that a reset does not lock is a fault: what is stored is read, and nothing is written. That the gate of the
@@ -111,8 +105,7 @@ fn nothing_is_written_with_an_unlocked_flash_controller() {
     let Some(mut started) = started else { return };
     assert!(started.flagged());
     assert_eq!((started.info.configuration, started.info.writable), (Origin::Stored, false));
-    let event = EventKind::FlashRefused(FlashFault::Unlocked);
-    assert!(started.events.contains(&event), "{:?}", started.events);
+    assert_eq!(started.info.stored_fault, Some(StoreError::Flash(FlashFault::Unlocked)));
     let board = &mut started.board;
     let records = |board: &mut Board| board.read(At::Address(FLASH_BASE + STORE.start), STORE.len());
     let before = records(board);

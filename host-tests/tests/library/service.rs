@@ -3,11 +3,11 @@
 mod access;
 mod calibration;
 mod configuration;
+mod crash;
 mod firmware;
 mod isotp;
 mod keys;
 mod learning;
-mod log;
 #[cfg(target_os = "linux")]
 mod socketcan;
 mod together;

@@ -8,7 +8,6 @@
 use super::weights::{Checked, Uploading};
 use super::{Device, INTERRUPTS, MappedSlots};
 use crate::model::blob::CRC;
-use crate::service::event::EventKind;
 use crate::service::message::Refusal;
 use crate::store::firmware::{self, FirmwareError, Label, MAX_IMAGE, Trailer};
 use crate::store::slots::SlotError;
@@ -167,7 +166,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             firmware::activate(flash, slot, &trailer)
                 .map_err(|error| SlotError::Flash(FlashFault::from(error.kind())))?;
             device.uploading = None;
-            device.note(EventKind::FirmwareStored(slot));
             Ok(())
         })
     }
@@ -188,7 +186,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         let expected = trailer.map_or(u32::MAX, |trailer| trailer.expected);
         if milliseconds >= LEAST_MS && expected & !self.reached == 0 && firmware::confirm(flash, slot) {
             self.firmware.state = FirmwareState::Confirmed;
-            self.note(EventKind::FirmwareConfirmed(slot));
             return false;
         }
         let has_failed = milliseconds >= LONGEST_MS;

@@ -2,7 +2,6 @@
 
 use super::{Device, Firmware, INTERRUPTS, MappedSlots, SupportedHardware};
 use crate::can::wheel::WheelSettings;
-use crate::service::event::EventKind;
 use crate::service::message::{FlashState, Identity, Origin, Refusal};
 use crate::store::{
     Accepted, Access, Calibration, Configuration, FieldError, FlashFault, Learned, Record, Store, StoreError,
@@ -11,7 +10,7 @@ use crate::store::{
 use embedded_storage::nor_flash::NorFlash;
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
-    /// Reads the stored records; records that are damaged or out of range are logged and not used. `controller` is
+    /// Reads the stored records; records that are damaged or out of range are reported and not used. `controller` is
     /// what the check of the flash controller has found: after a fault, which is reported as damaged stored data,
     /// records are read but nothing is written.
     pub fn begin(
@@ -25,25 +24,15 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.writable = controller.is_ok() && records.is_some();
         // After a fault, records are read only here, and nothing is kept for writing.
         self.slots = slots.filter(|_| controller.is_ok());
-        self.note(EventKind::Started(identity.reset));
         self.firmware = self.slots.as_mut().map_or(Firmware::ALONE, Firmware::of);
-        if let Some(slot) = self.firmware.slot.filter(|_| self.firmware.is_refused()) {
-            self.note(EventKind::FirmwareRefused(slot.other()));
-        }
         if let Err(fault) = controller {
-            self.refuse(EventKind::FlashRefused(fault));
-        }
-        if let Some(crash) = identity.crash {
-            self.note(EventKind::Crashed(crash));
+            self.refuse(StoreError::Flash(fault));
         }
         if let Some(records) = records {
             match Store::open(records, 0) {
                 Ok(store) => self.load(store),
                 Err(error) => (self.flash, self.access) = (FlashState::Failed(error), None),
             }
-        }
-        if self.records_damaged() {
-            self.note(EventKind::RecordsDamaged);
         }
     }
 
@@ -69,33 +58,33 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         let found = store.get::<Configuration>();
         let supported = |found: Configuration| self.check_supported(&found).map(|()| found);
         let found = found.and_then(|found| found.map(supported).transpose());
-        let (configuration, origin) = self.take(found, EventKind::ConfigurationRefused);
+        let (configuration, origin) = self.take(found);
         (self.configuration, self.configuration_origin) =
             (configuration.unwrap_or(Configuration::DEFAULT), origin);
         self.next_configuration = self.configuration;
-        let (wheels, origin) = self.take(store.get(), EventKind::WheelsRefused);
+        let (wheels, origin) = self.take(store.get());
         (self.wheels, self.wheels_origin) = (wheels.unwrap_or(WheelSettings::TOYOTA), origin);
         self.next_wheels = self.wheels;
         if let Err(error) = self.configuration.check_wheels(&self.wheels) {
-            let (_, origin) = self.take::<()>(Err(error.into()), EventKind::WheelsRefused);
+            let (_, origin) = self.take::<()>(Err(error.into()));
             (self.wheels, self.wheels_origin) = (WheelSettings::NONE, origin);
         }
         if self.has_failed() {
-            let (_, origin) = self.take::<()>(Err(StoreError::Resets), EventKind::ConfigurationRefused);
+            let (_, origin) = self.take::<()>(Err(StoreError::Resets));
             (self.configuration, self.configuration_origin) = (self.configuration.bus_alone(), origin);
             self.wheels = WheelSettings::NONE;
         }
-        let (calibration, origin) = self.take(store.get(), EventKind::CalibrationRefused);
+        let (calibration, origin) = self.take(store.get());
         (self.calibration, self.calibration_origin) = (calibration.unwrap_or(Calibration::NONE), origin);
-        let (learned, _) = self.take(store.get(), EventKind::LearnedRefused);
+        let (learned, _) = self.take(store.get());
         self.learned = learned.unwrap_or(Learned::NOTHING);
-        let (accepted, _) = self.take(store.get(), EventKind::AcceptedRefused);
+        let (accepted, _) = self.take(store.get());
         self.accepted = accepted.unwrap_or(Accepted::NONE);
         match store.get() {
             Ok(troubles) => self.troubles = troubles.unwrap_or(Troubles::NONE),
-            Err(error) => self.note(EventKind::TroublesRefused(error)),
+            Err(error) => self.stored_fault = Some(error),
         }
-        self.access = match self.take(store.get(), EventKind::AccessRefused) {
+        self.access = match self.take(store.get()) {
             (_, Origin::Refused(_)) => None,
             (access, _) => Some(access.unwrap_or(Access::OPEN)),
         };
@@ -103,22 +92,18 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         if self.writable
             && let Err(error) = store.make_room()
         {
-            self.refuse(EventKind::NoRoom(error));
+            self.refuse(error);
         }
         self.store = self.writable.then_some(store);
     }
 
     /// Returns the record that was read, if valid, and its origin.
-    fn take<T>(
-        &mut self,
-        found: Result<Option<T>, StoreError>,
-        refused: fn(StoreError) -> EventKind,
-    ) -> (Option<T>, Origin) {
+    fn take<T>(&mut self, found: Result<Option<T>, StoreError>) -> (Option<T>, Origin) {
         match found {
             Ok(Some(record)) => (Some(record), Origin::Stored),
             Ok(None) => (None, Origin::BuiltIn),
             Err(error) => {
-                self.refuse(refused(error));
+                self.refuse(error);
                 (None, Origin::Refused(error))
             }
         }
@@ -157,7 +142,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             }
             device.store()?.set(configuration)?;
             device.next_configuration = *configuration;
-            device.note(EventKind::ConfigurationStored);
             Ok(())
         })
     }
@@ -173,7 +157,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             device.next_configuration.check_wheels(wheels).map_err(StoreError::from)?;
             device.store()?.set(wheels)?;
             device.next_wheels = *wheels;
-            device.note(EventKind::WheelsStored);
             Ok(())
         })
     }
@@ -203,7 +186,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         store.set(&learned)?;
         self.learned = learned;
         self.learner.is_changed = false;
-        self.note(EventKind::LearnedStored);
         Ok(())
     }
 
@@ -212,18 +194,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         store.set(&calibration)?;
         self.calibration = calibration;
         self.calibration_origin = Origin::Stored;
-        self.note(EventKind::CalibrationStored);
         Ok(())
     }
 
     pub(crate) fn store_access(&mut self, access: Access) -> Result<(), Refusal> {
         self.store()?.set(&access)?;
-        let before = self.access.replace(access).and_then(|access| access.key);
-        match access.key {
-            None if before.is_some() => self.note(EventKind::KeyRemoved),
-            Some(_) if before != access.key => self.note(EventKind::KeyStored),
-            _ => {}
-        }
+        self.access = Some(access);
         Ok(())
     }
 
@@ -240,7 +216,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             // If the flash refuses the record, do not try again each time.
             self.learner.is_changed = false;
             if let Err(Refusal::Store(error)) = self.store_learned(self.learned) {
-                self.note(EventKind::LearnedRefused(error));
+                self.stored_fault = Some(error);
             }
         }
     }
@@ -261,7 +237,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
         // If the flash refuses the record, do not try again each time.
         if let Err(error) = store.set(troubles) {
-            self.note(EventKind::TroublesRefused(error));
+            self.stored_fault = Some(error);
         }
         true
     }

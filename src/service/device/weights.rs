@@ -2,7 +2,6 @@
 
 use super::{Device, INTERRUPTS};
 use crate::model::Blob;
-use crate::service::event::EventKind;
 use crate::service::message::{BLOCK, Refusal};
 use crate::store::slots::{Selection, SlotError, WeightSource, select};
 use crate::store::{Accepted, Slot, Upload};
@@ -61,14 +60,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         });
         self.next_window = slow.or(weights.map(|blob| blob.shape.window_cycles())).unwrap_or(0);
         self.refused_slots = refused;
-        for (slot, error) in Slot::ALL.into_iter().zip(refused) {
-            if let Some(error) = error {
-                self.refuse(EventKind::SlotRefused(slot, error));
-            }
-        }
-        if source == WeightSource::None {
-            self.refuse(EventKind::NoWeights);
-        }
+        self.refused |= refused.iter().any(Option::is_some) || source == WeightSource::None;
         weights
     }
 
@@ -77,7 +69,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     pub fn weights_damaged(&mut self) {
         self.weights = WeightSource::None;
         self.weights_crc = None;
-        self.note(EventKind::WeightsDamaged);
     }
 
     /// Returns the slot to overwrite: one that GyroNet does not run on.
@@ -176,7 +167,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             device.store()?.set(&accepted)?;
             (device.accepted, device.next_window) = (accepted, cycles);
             device.uploading = None;
-            device.note(EventKind::WeightsAccepted(upload.slot()));
             Ok(())
         })
     }

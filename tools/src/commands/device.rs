@@ -79,8 +79,6 @@ enum Action {
         #[arg(long, value_name = "FILE.json")]
         file: Option<PathBuf>,
     },
-    /// Print the events since the board started.
-    Log,
     /// Print all counters since the board started.
     Counters,
     /// Upload a weight file; the board checks it and uses it after a restart.
@@ -164,7 +162,6 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         Action::Set { settings, file } => settings::set(&mut device, settings, file.as_deref(), json)?,
         Action::Wheels => settings::print_wheels(&mut device, json)?,
         Action::Calibrate { what, file } => calibration::run(&mut device, *what, file.as_deref(), json)?,
-        Action::Log => log(&mut device, json)?,
         Action::Counters => {
             let counters = device.counters()?;
             print_value(&counters, json)?;
@@ -237,6 +234,9 @@ fn print_info(info: &Info, access: &str) -> io::Result<()> {
     }
     let writable = if info.writable { "" } else { ", no flash that may be written: nothing can be stored" };
     writeln!(out, "flash         {}{writable}", info.flash)?;
+    if let Some(fault) = info.stored_fault {
+        writeln!(out, "stored data   newest fault: {fault}")?;
+    }
     let open = if access == "open" { ": no key is stored, anyone may write at standstill" } else { "" };
     writeln!(out, "access        {access}{open}")?;
     writeln!(out, "configuration {}, layout {}", info.configuration, info.record_versions[0])?;
@@ -278,29 +278,6 @@ fn print_course((state, [gain, sigma], counters): (u8, [f32; 2], CourseCounters)
         ),
     };
     writeln!(io::stdout().lock(), "course        {text}")
-}
-
-fn log(device: &mut Board, json: bool) -> super::Result {
-    let (mut after, mut events, mut lost) = (0, Vec::new(), 0);
-    loop {
-        let page = device.log(after)?;
-        lost += page.lost;
-        // A page without new events is the end.
-        let Some(last) = page.events.last().filter(|last| last.number > after) else { break };
-        after = last.number;
-        events.extend(page.events);
-    }
-    if json {
-        return print_json(&serde_json::json!({ "events": events, "lost": lost }));
-    }
-    let out = &mut io::stdout().lock();
-    if lost > 0 {
-        writeln!(out, "{lost} older events were lost")?;
-    }
-    for event in events {
-        writeln!(out, "{:6} {:9.2} s  {}", event.number, f64::from(event.tick) / 100.0, event.kind)?;
-    }
-    Ok(())
 }
 
 fn weights(device: &mut Board, path: &std::path::Path, json: bool, common: Common) -> super::Result {

@@ -5,7 +5,7 @@ use clap::error::{ContextKind, ContextValue};
 const SITUATIONS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin situations`";
 const LEARNT: &str =
     "the board itself at its standstills (`device info`: tilt; `device calibrate show`: bias)";
-const RETIRED: [(&str, &str); 19] = [
+const RETIRED: [(&str, &str); 20] = [
     ("campaign", SITUATIONS),
     ("soak", SITUATIONS),
     ("bus", "tools/gyronet.dbc, with `gyronet device set`, which refuses what loads the bus too much,"),
@@ -15,6 +15,7 @@ const RETIRED: [(&str, &str); 19] = [
     ("calibrate static", LEARNT),
     ("calibrate mounting", LEARNT),
     ("calibrate --store", LEARNT),
+    ("device log", "`device info`, with the troubles (any UDS tester, `cargo gyronet reference troubles`),"),
     ("warm-up", "`gyronet simulate --trip motorway` with `gyronet evaluate`"),
     (
         "--image",

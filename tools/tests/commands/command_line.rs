@@ -155,6 +155,7 @@ fn retired_names_say_what_does_their_work() {
         (&["bus", "--can"], "gyronet device set"),
         (&["device", "calibrate", "mounting", "--store"], "the board itself"),
         (&["device", "calibrate", "static"], "the board itself"),
+        (&["device", "log"], "`device info`"),
         (&["warm-up"], "gyronet simulate --trip motorway"),
         (&["bench-target", "--policies"], "cargo bringup"),
         (&["demo", "--image"], "--test board"),

@@ -6,7 +6,6 @@ use gyronet::can::e2e::{P02, Profile};
 use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{Checksum, WheelFrame, WheelSettings, WheelSignal};
 use gyronet::model::weights;
-use gyronet::service::event::EventKind;
 use gyronet::service::message::Refusal;
 use gyronet::store::layout::{RECORD_SECTOR, STORE};
 use gyronet::store::{Access, Configuration, FieldError, Record, Store, StoreError};
@@ -208,7 +207,7 @@ fn what_is_unsigned_cut_foreign_or_changed_is_refused() {
     assert_eq!(refusal(&mut bench), Some(Refusal::Locked));
     assert_eq!((start(&flash), access(&mut bench)), (Configuration::DEFAULT, (1, 0, 0)));
     // And reading does not.
-    assert!(bench.ask(&[0x31, 1, 2, 3, 0, 0, 0, 0]).is_some_and(|response| response[0] == 0x71));
+    assert!(bench.ask(&[0x22, 1, 0]).is_some_and(|response| response[0] == 0x62));
     bench.expect(&write(&content(1), &good), &[0x6E, 1, 0]);
 }
 
@@ -391,20 +390,6 @@ fn a_challenge_that_comes_twice_is_none() {
     assert_eq!(access(&mut bench).0, 2);
 }
 
-#[test]
-fn keys_that_come_and_go_are_in_the_log() {
-    let (_, mut bench) = bench();
-    let key = a_key();
-    bench.enter(3);
-    let before = bench.board.events(0).total;
-    bench.expect(&[&[0x2E, 1, 0x10][..], &key.public()].concat(), &[0x6E, 1, 0x10]);
-    let remove = [&[0x2E, 1, 0x10][..], &[0; 32], &key.trailer(0x0110, None, 1, &[0; 32])].concat();
-    bench.expect(&remove, &[0x6E, 1, 0x10]);
-    let kinds: Vec<EventKind> = bench.board.events(before).events.iter().map(|event| event.kind).collect();
-    let keys = kinds.into_iter().filter(|kind| *kind != EventKind::LearnedStored);
-    assert_eq!(keys.collect::<Vec<_>>(), [EventKind::KeyStored, EventKind::KeyRemoved]);
-}
-
 /// A record of a later firmware, for one: nobody may write, and the board reports why.
 #[test]
 fn a_record_that_cannot_be_read_locks_and_is_reported() {
@@ -414,9 +399,8 @@ fn a_record_that_cannot_be_read_locks_and_is_reported() {
     let mut bench = Bench::new(&flash);
     assert_eq!(access(&mut bench).0, 1);
     assert!(bench.board.stored_damaged());
-    let events = bench.board.events(0).events;
-    let refused = EventKind::AccessRefused(StoreError::Version { found: 200, expected: Access::VERSION });
-    assert!(events.iter().any(|event| event.kind == refused), "{events:?}");
+    let refused = StoreError::Version { found: 200, expected: Access::VERSION };
+    assert_eq!(bench.board.info().stored_fault, Some(refused));
     bench.enter(3);
     bench.expect(&write(&content(1), &[0; 69]), &[0x7F, 0x2E, 0x33]);
 }

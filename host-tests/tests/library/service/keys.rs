@@ -4,7 +4,6 @@ use super::Board;
 use super::access::{SERIAL, a_key, content, locked, write};
 use super::uds::{Bench, bench};
 use gyronet::model::blob::CRC;
-use gyronet::service::event::EventKind;
 use gyronet::store::layout::STORE;
 use gyronet::store::{Access, Configuration, Record, StoreError};
 use gyronet_host_tests::flash::{Cut, F405};
@@ -177,8 +176,7 @@ fn with_both_records_of_access_damaged_nobody_may_write() {
             for start in 0..3 {
                 let mut board: Board = super::start(&flash);
                 assert_eq!(board.access(), None, "byte {place} at start {start}");
-                let refused = EventKind::AccessRefused(StoreError::Lost);
-                assert!(board.events(0).events.iter().any(|event| event.kind == refused));
+                assert_eq!(board.info().stored_fault, Some(StoreError::Lost));
                 assert_eq!(board.set_configuration(&Configuration::DEFAULT), Ok(()), "the device itself");
             }
             let mut bench = Bench::new(&flash);

@@ -223,13 +223,6 @@ fn a_second_tester_neither_uses_nor_ends_the_session_of_the_first() {
     assert!(!bench.server.has_session(), "nor keeps it");
 }
 
-#[test]
-fn the_log_is_read_in_any_session_and_other_routines_are_not() {
-    let (_, mut bench) = bench();
-    assert!(bench.ask(&[0x31, 1, 2, 3, 0, 0, 0, 0]).is_some_and(|response| response[0] == 0x71));
-    bench.expect(&[0x31, 1, 2, 0], &[0x7F, 0x31, 0x7F]);
-}
-
 /// Wheel speeds in 0.01 m/s, 0x7FFF where one is not known; then whether the vehicle stands.
 #[test]
 fn live_wheel_speeds_are_read_in_centimetres_a_second() {

@@ -8,7 +8,6 @@ use gyronet::coprocessor::Contradiction;
 use gyronet::fog::FogCounters;
 use gyronet::heading::CourseCounters;
 use gyronet::health::{Counters, InputCounters, MonitorCounters};
-use gyronet::service::event::LogPage;
 use gyronet::service::message::{AccessCounters, AllCounters, Info, LineCounters, PROTOCOL};
 use gyronet::store::{Calibration, Configuration, Learned, Record, UnitMap};
 use gyronet::uds::Session;
@@ -47,7 +46,6 @@ pub const COUNTERS: [u8; 7] = {
 };
 pub const USE_DOWNLOAD: u16 = 0xFF01;
 /// The other routines.
-const LOG: u16 = 0x0203;
 const FORGET: u16 = 0x0205;
 /// The sub-function that starts a routine.
 const START: u8 = 1;
@@ -141,13 +139,6 @@ impl<B: Bus> Device<B> {
     /// Stores the map of this unit's gyro, or removes it; this takes effect after a restart.
     pub fn set_unit(&mut self, unit: Option<UnitMap>) -> Result<()> {
         self.write(UNIT, &content(&unit)?)
-    }
-
-    /// Returns the events after an event number, at most one page.
-    pub fn log(&mut self, after: u32) -> Result<LogPage> {
-        let [high, low] = LOG.to_be_bytes();
-        let request = [&[0x31, START, high, low][..], &after.to_be_bytes()].concat();
-        decode(self.ask(&request)?.get(3..).unwrap_or_default())
     }
 
     pub fn counters(&mut self) -> Result<AllCounters> {
