@@ -43,6 +43,12 @@ use crate::units::AngularRate;
 use carried::Carried;
 use slow_mean::SlowMean;
 
+/// Largest mean correction of a window that is accepted. Vibration makes single corrections large; their mean is bias-like
+/// and small.
+pub const MAX_MEAN: AngularRate = AngularRate::from_deg_per_sec(6.0);
+/// Largest single correction of a window that is accepted, which a utility vehicle's shake reaches.
+const MAX_SINGLE: AngularRate = AngularRate(10 * MAX_MEAN.0);
+
 /// Configures how estimates of the gyro's error become corrected rates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -51,12 +57,8 @@ pub struct CompensateConfig {
     pub stride: Stride,
     /// The delay of the delayed rate, in samples.
     pub lag: Lag,
-    /// Largest mean correction of a window that is accepted (rad/s code). Vibration makes single corrections large;
-    /// their mean is bias-like and small.
-    pub max_mean: AngularRate,
-    /// Largest single correction of a window that is accepted.
-    pub max_single: AngularRate,
-    /// Largest part of the revisions that one rate carries.
+    /// Largest part of the revisions that one rate carries; no setting of a board.
+    #[cfg_attr(feature = "serde", serde(skip, default = "max_revision"))]
     pub max_revision: AngularRate,
     /// True if the model's corrections are subtracted. Without them the rate is that of the gyro less bias, level and
     /// gain, with the expected error of the gyro.
@@ -65,19 +67,20 @@ pub struct CompensateConfig {
 
 impl CompensateConfig {
     /// A window every five samples, with both estimates of a sample averaged; a lag of 70 ms, the shortest that does
-    /// not increase the error on the validation drive (`cargo gyronet evaluate --lags`); 6 deg/s for a window's mean and
-    /// 60 deg/s for one correction, which a utility vehicle's shake reaches; 1 deg/s of revisions in one rate.
+    /// not increase the error on the validation drive (`cargo gyronet evaluate --lags`); 1 deg/s of revisions in one rate.
     pub const DEFAULT: Self = Self {
         stride: Stride::HALF,
         lag: match Lag::new(7) {
             Some(lag) => lag,
             None => Lag::MAX,
         },
-        max_mean: AngularRate::from_deg_per_sec(6.0),
-        max_single: AngularRate(10 * AngularRate::from_deg_per_sec(6.0).0),
-        max_revision: AngularRate::from_deg_per_sec(1.0),
+        max_revision: max_revision(),
         model: true,
     };
+}
+
+const fn max_revision() -> AngularRate {
+    AngularRate::from_deg_per_sec(1.0)
 }
 
 /// Revisions that need more samples than this are reported: 0.25 deg with the default bound.
@@ -238,13 +241,13 @@ impl Compensator {
     /// # Errors
     /// [`Implausible`]: nothing was revised.
     pub fn revise(&mut self, estimate: &Estimate) -> Result<(), Implausible> {
-        let CompensateConfig { stride, lag, max_mean, max_single, model, .. } = self.config;
+        let CompensateConfig { stride, lag, model, .. } = self.config;
         let Estimate { corrections, linear_sum, .. } = if model { estimate } else { &Estimate::NONE };
         let sum: i64 = corrections.iter().map(|correction| i64::from(correction.0)).sum();
         let average = AngularRate((sum / WINDOW as i64) as i32);
         let largest = corrections.iter().max_by_key(|c| c.0.unsigned_abs()).copied().unwrap_or_default();
-        if average.0.unsigned_abs() > max_mean.0.unsigned_abs()
-            || largest.0.unsigned_abs() > max_single.0.unsigned_abs()
+        if average.0.unsigned_abs() > MAX_MEAN.0.unsigned_abs()
+            || largest.0.unsigned_abs() > MAX_SINGLE.0.unsigned_abs()
         {
             return Err(Implausible { mean: average, largest });
         }

@@ -11,7 +11,6 @@ use gyronet::can::wheel::{WheelFrame, WheelSettings};
 use gyronet::compensate::{CompensateConfig, Lag, Stride};
 use gyronet::heading::{GnssProtocol, GnssSettings, HeadingSettings, HeadingSignal};
 use gyronet::store::{Configuration, Field, FogGyro, FogPart, Mounting};
-use gyronet::units::AngularRate;
 
 /// Identifiers of all kinds of frames, few enough that they meet.
 const IDS: [u16; 24] = [
@@ -29,13 +28,6 @@ fn within(noise: &mut Noise, field: Field) -> f32 {
         1 => high,
         _ => (low + (high - low) * noise.int(0, 1_000) as f32 / 1_000.0).clamp(low, high),
     }
-}
-
-fn rate(noise: &mut Noise, field: Field) -> AngularRate {
-    let [low, high] = field.range().expect("it has a range");
-    let code = |value: f32| (f64::from(value) * f64::from(AngularRate::PER_RAD_PER_SEC)) as i64;
-    // Rounded inwards.
-    AngularRate((code(within(noise, field))).clamp(code(low) + 1, code(high) - 1) as i32)
 }
 
 fn one<T: Copy>(noise: &mut Noise, of: &[T]) -> T {
@@ -124,15 +116,12 @@ pub fn configuration(noise: &mut Noise) -> Configuration {
         compensate: CompensateConfig {
             stride: Stride::new(noise.int(1, 10) as u8).expect("1 to 10"),
             lag: Lag::new(noise.int(0, 11) as u8).expect("up to 11"),
-            max_mean: rate(noise, Field::CompensateMaxMean),
-            max_single: rate(noise, Field::CompensateMaxSingle),
-            max_revision: rate(noise, Field::CompensateMaxRevision),
             model: noise.int(0, 1) == 0,
+            ..default.compensate
         },
         fog_ids: three(noise, default.fog_ids),
         fog_gyro: FogGyro { tilt_deg: within(noise, Field::FogTiltDeg) },
         heading,
-        slcan_inputs: noise.int(0, 1) == 0,
         diagnosis,
         learn: noise.int(0, 1) == 0,
         ..default

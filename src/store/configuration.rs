@@ -15,7 +15,6 @@ use crate::fog::{FogConfig, Tilt};
 use crate::heading::{Gain, HeadingReceiver, HeadingSettings};
 use crate::mounting::{GyroMap, Rotation};
 use crate::pipeline::PipelineConfig;
-use crate::units::AngularRate;
 use embedded_can::{Id, StandardId};
 use serde::{Deserialize, Serialize};
 
@@ -94,9 +93,6 @@ pub struct Configuration {
     pub fog_gyro: FogGyro,
     /// Where the vehicle's course, speed over ground and latitude come from, from which bias and gain are learnt in motion.
     pub heading: HeadingSettings,
-    /// True if wheel, course and latitude frames from a host on SLCAN are used, for a bench without a bus. On a vehicle,
-    /// anyone with access to that line could then influence the rate.
-    pub slcan_inputs: bool,
     /// Identifiers of diagnosis.
     pub diagnosis: DiagnosisIds,
     /// True if the board learns the sensor's bias over temperature and the forward direction, and uses them.
@@ -116,7 +112,6 @@ impl Configuration {
         fog_ids: FOG_IDS,
         fog_gyro: FogGyro { tilt_deg: 0.0 },
         heading: HeadingSettings::NONE,
-        slcan_inputs: false,
         diagnosis: DiagnosisIds::DEFAULT,
         learn: true,
     };
@@ -214,7 +209,7 @@ impl Configuration {
 
 impl Record for Configuration {
     const KEY: u8 = 1;
-    const VERSION: u8 = 12;
+    const VERSION: u8 = 13;
 
     fn check(&self) -> Result<(), FieldError> {
         let config = Config::new(self.can).map_err(FieldError::Can)?;
@@ -232,10 +227,7 @@ impl Record for Configuration {
         }
         let Mounting { roll_deg, pitch_deg, yaw_deg } = self.mounting;
         let StaticConfig { gyro_std, accel_std, gyro_drift, accel_drift, gyro_bias } = self.static_init;
-        // All lags are valid, and all strides that leave a window of the weights enough time: see the device.
-        let CompensateConfig { stride: _, lag: _, max_mean, max_single, max_revision, model: _ } =
-            self.compensate;
-        let rate = |rate: AngularRate| rate.0 as f32 / AngularRate::PER_RAD_PER_SEC;
+        // Of `compensate` all lags are valid, and all strides that leave a window of the weights enough time: see the device.
         for (field, value) in [
             (Field::LatitudeDeg, self.latitude_deg.unwrap_or(0.0)),
             (Field::FogTiltDeg, self.fog_gyro.tilt_deg),
@@ -247,9 +239,6 @@ impl Record for Configuration {
             (Field::StaticGyroDrift, gyro_drift),
             (Field::StaticAccelDrift, accel_drift),
             (Field::StaticGyroBias, gyro_bias),
-            (Field::CompensateMaxMean, rate(max_mean)),
-            (Field::CompensateMaxSingle, rate(max_single)),
-            (Field::CompensateMaxRevision, rate(max_revision)),
         ] {
             within(field, value)?;
         }

@@ -21,9 +21,6 @@ pub enum Field {
     StaticGyroDrift,
     StaticAccelDrift,
     StaticGyroBias,
-    CompensateMaxMean,
-    CompensateMaxSingle,
-    CompensateMaxRevision,
     CalibrationGyroMap,
     BiasCurve,
     Forward,
@@ -46,9 +43,6 @@ impl Field {
             Self::StaticGyroDrift => "static_init.gyro_drift",
             Self::StaticAccelDrift => "static_init.accel_drift",
             Self::StaticGyroBias => "static_init.gyro_bias",
-            Self::CompensateMaxMean => "compensate.max_mean",
-            Self::CompensateMaxSingle => "compensate.max_single",
-            Self::CompensateMaxRevision => "compensate.max_revision",
             Self::CalibrationGyroMap => "gyro_map",
             Self::BiasCurve => "bias_curve",
             Self::Forward => "forward",
@@ -70,8 +64,6 @@ impl Field {
             Self::StaticGyroDrift => [2e-4, 0.1],
             Self::StaticAccelDrift => [1e-3, 2.0],
             // With none at all, no estimate is ever accepted, and no revision ever carried.
-            Self::CompensateMaxMean | Self::CompensateMaxRevision => [1e-3, 0.5],
-            Self::CompensateMaxSingle => [1e-3, 5.0],
             Self::CalibrationGyroMap | Self::BiasCurve | Self::Forward | Self::Vertical | Self::Gain => {
                 return None;
             }

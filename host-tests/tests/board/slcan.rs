@@ -60,7 +60,7 @@ fn a_frame_that_the_board_does_not_use_is_refused_and_counted() {
     let before = common::counters(&mut board).lines.service_errors;
     board.send(SLCAN, b"t1232AABB\rT000001232AABB\rt0AA81A6F1A6F1A6F1A6F\r");
     board.run(SAMPLE);
-    assert_eq!(board.sent(SLCAN), b"\x07\x07\x07", "without `slcan_inputs` wheels are not used either");
+    assert_eq!(board.sent(SLCAN), b"\x07\x07\x07", "wheels are not used either");
     assert_eq!(common::counters(&mut board).lines.service_errors - before, 3);
     assert_eq!(common::frames(&board.can_frames()), [], "and nothing is passed on");
 }

@@ -1,12 +1,10 @@
 //! Wheel frames of another maker: from a settings file to the record in the board's flash, and on the bus.
 
-use crate::common::{self, SAMPLE, START, drive, faults, frames, id};
+use crate::common::{self, SAMPLE, START, drive, faults, frames};
 use crate::service;
 use embedded_can::{ExtendedId, Frame, Id};
-use gyronet::can::{DataFrame, slcan};
+use gyronet::can::DataFrame;
 use gyronet::health::Faults;
-use gyronet::store::Configuration;
-use gyronet_host_tests::board::Board;
 use gyronet_tools::wheels::WheelFile;
 
 /// Two axles in two frames with 29 bits of identifier, little-endian, 1/32 m/s, with a counter in byte 6 and the exclusive
@@ -88,27 +86,4 @@ fn another_maker_s_frames_are_understood_without_a_new_image() {
     let without = silent.iter().filter(|faults| faults.0 & Faults::WHEELS.0 != 0).count();
     assert!(without > 10, "{without} of {} sets report the wheels", silent.len());
     assert_eq!(common::counters(&mut board).inputs.wheel_errors, 60);
-}
-
-/// The frames are damaged: one that is taken is counted.
-#[test]
-fn wheel_frames_over_slcan_are_used_on_a_bench_alone() {
-    const TEST: &str = "wheel_frames_over_slcan_are_used_on_a_bench_alone";
-    let Some(mut board) = common::boot(TEST) else { return };
-    board.run(START);
-    let damaged = DataFrame::new(id(0xAA), &[1; 7]).expect("a frame");
-    let refused = |board: &mut Board| {
-        board.send(common::SLCAN, b"O\r");
-        for _ in 0..3 {
-            board.send(common::SLCAN, &slcan::emit(&damaged).expect("a data frame"));
-            board.run(SAMPLE);
-        }
-        common::counters(board).inputs.wheel_errors
-    };
-    assert_eq!(refused(&mut board), 0);
-    let bench = Configuration { slcan_inputs: true, ..Configuration::DEFAULT };
-    service::on_line(&mut board).set_configuration(&bench).expect("it is stored");
-    service::on_line(&mut board).restart().expect("a response");
-    board.run(START);
-    assert_eq!(refused(&mut board), 3);
 }

@@ -5,7 +5,7 @@ use embedded_can::Frame;
 use gyronet::can::bosch::{Message, SignalStatus};
 use gyronet::can::config::Config;
 use gyronet::can::encoder::CanEncoder;
-use gyronet::compensate::{CompensateConfig, DELAY};
+use gyronet::compensate::{CompensateConfig, DELAY, MAX_MEAN};
 use gyronet::estimate::YawEstimate;
 use gyronet::health::Status::{Degraded, Init, Ready};
 use gyronet::health::{Faults, Quality, Source};
@@ -73,7 +73,7 @@ fn a_network_that_dies_leaves_the_gyro_less_its_bias() {
 #[test]
 fn an_implausible_estimate_is_not_believed() {
     let mut pipeline = new();
-    let limit = CompensateConfig::DEFAULT.max_mean;
+    let limit = MAX_MEAN;
     let corrections = |due: &DueWindow| if due.end < 350 { limit } else { AngularRate(limit.0 + 1) };
     let outputs = run(&mut pipeline, drive(0..400), |due| {
         Some(Estimate {

@@ -1,7 +1,7 @@
 //! No angle is lost between the network's revised estimates and the rates on the bus: sums kept
 //! beside the pipeline, exact to the last code.
 
-use gyronet::compensate::{CompensateConfig, Compensator, Lag, Remaining, Stride};
+use gyronet::compensate::{CompensateConfig, Compensator, Lag, MAX_MEAN, Remaining, Stride};
 use gyronet::health::Status;
 use gyronet::model::Estimate;
 use gyronet::model::window::WINDOW;
@@ -45,12 +45,12 @@ impl Ledger {
         usable.map(|sample| sample.gyro - sample.estimate()).sum()
     }
 
-    fn take_estimate(&mut self, tick: u32, stride: Stride, max_mean: i64) {
+    fn take_estimate(&mut self, tick: u32, stride: Stride) {
         let Some((end, estimate)) = self.out.take_if(|(end, _)| tick >= *end + stride.delay()) else {
             return;
         };
         let mean = |values: &[i64]| values.iter().sum::<i64>() / values.len() as i64;
-        if mean(&estimate).abs() > max_mean {
+        if mean(&estimate).abs() > MAX_MEAN.0.into() {
             return;
         }
         let covered = self.samples.range_mut(end + 1 - WINDOW as u32..=end);
@@ -77,7 +77,7 @@ struct Faults {
 /// 30 s with the ledger checked about five times a second; returns how often the revisions of a rate were bounded
 /// and how many samples were complete.
 fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) {
-    let CompensateConfig { stride, lag, max_mean, max_revision, .. } = compensate;
+    let CompensateConfig { stride, lag, max_revision, .. } = compensate;
     let mut noise = Noise::new(seed);
     let config = PipelineConfig { compensate, zero_rate: None, ..PipelineConfig::DEFAULT };
     let mut pipeline = Pipeline::new(config);
@@ -100,7 +100,7 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
         if clipped || broken.is_some_and(|last| live.tick != last + 1) {
             ledger.out = None;
         }
-        ledger.take_estimate(live.tick, stride, max_mean.0.into());
+        ledger.take_estimate(live.tick, stride);
         let gyro = i64::from(sample.angular_rate[2].0 - bias[2].0);
         ledger.samples.insert(live.tick, Sample { gyro, clipped, estimates: Vec::new() });
         let usable = |status| status != Status::Init && status != Status::Clipped;

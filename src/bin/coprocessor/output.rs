@@ -67,8 +67,6 @@ pub struct OutputParts {
     pub bits_per_second: u32,
     /// The line of a GNSS receiver, if it is used.
     pub gnss: Option<GnssSettings>,
-    /// True if wheel, course and latitude frames of a host on SLCAN are used.
-    pub slcan_inputs: bool,
 }
 
 pub struct Output {
@@ -87,8 +85,6 @@ pub struct Output {
     /// True once CAN takes part in the bus.
     joined: bool,
     lines: LineCounters,
-    /// True if wheel, course and latitude frames of a host on SLCAN are used.
-    slcan_inputs: bool,
     /// Number of tester frames on SLCAN that found no room.
     unread: u32,
 }
@@ -110,7 +106,6 @@ impl OutputParts {
             reported_at: 0,
             joined: false,
             lines: LineCounters::NONE,
-            slcan_inputs: self.slcan_inputs,
             unread: 0,
         }
     }
@@ -144,7 +139,7 @@ impl Output {
         let is_requested = is_requested();
         coprocessor.pause(is_requested, &mut self.outgoing);
         if is_requested {
-            self.send(coprocessor, now);
+            self.send();
             announce();
         }
         let is_slow = has_ticked && tick.wrapping_sub(self.reported_at) >= SLOW_MS;
@@ -157,7 +152,7 @@ impl Output {
             self.report_bus(coprocessor);
         }
         let _ = coprocessor.poll_to(now, &mut self.outgoing);
-        self.send(coprocessor, now);
+        self.send();
         if is_slow {
             self.report(tick, lines);
         }
@@ -179,7 +174,7 @@ impl Output {
                     }
                     self.report_bus(coprocessor);
                     let _ = coprocessor.imu_to(sample, now, &mut self.outgoing);
-                    self.send(coprocessor, now);
+                    self.send();
                     has_sample = true;
                 }
                 Some(Err(())) => coprocessor.imu_error(),
@@ -269,23 +264,22 @@ impl Output {
         coprocessor.bus(lost, self.outgoing.state() >= State::Passive);
     }
 
-    /// Sends the queued frames, and takes the frames that a host has sent over SLCAN.
+    /// Sends the queued frames, and takes the requests that a host has sent over SLCAN: of its other frames none is used.
     #[inline(never)]
-    fn send(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
+    fn send(&mut self) {
         self.outgoing.refill();
         if !self.outgoing.is_slcan_busy() {
             return;
         }
-        let (unread, takes_inputs) = (&mut self.unread, self.slcan_inputs);
+        let unread = &mut self.unread;
         self.outgoing.service(|frame| {
-            if diagnosis::is_request(frame.id()) {
-                let has_room = FROM_SLCAN.push(frame);
-                idle::attend();
-                count(unread, u32::from(!has_room));
-                has_room
-            } else {
-                takes_inputs && coprocessor.can(&frame, now) == Ok(true)
+            if !diagnosis::is_request(frame.id()) {
+                return false;
             }
+            let has_room = FROM_SLCAN.push(frame);
+            idle::attend();
+            count(unread, u32::from(!has_room));
+            has_room
         });
     }
 }

@@ -86,9 +86,8 @@ pub fn parts(board: &Board) -> Option<Parts> {
     })?;
     receive(board, configuration, device.wheels());
     let (part, bits_per_second) = (configuration.imu, config.can.settings().bits_per_second);
-    let (gnss, slcan_inputs) = (configuration.heading.line, configuration.slcan_inputs);
     Some(Parts {
-        output: OutputParts { part, bits_per_second, gnss, slcan_inputs },
+        output: OutputParts { part, bits_per_second, gnss: configuration.heading.line },
         config,
         weights: blob,
         device: (device, check),

@@ -65,12 +65,6 @@ const SETTINGS: &[(&str, Takes)] = &[
     ("static_init.gyro_bias", Number("rad/s", Field::StaticGyroBias, "largest bias")),
     ("compensate.stride", Other("samples", "1 to 10")),
     ("compensate.lag", Other("samples", "0 to 11, of 10 ms: how late the delayed rate is sent")),
-    ("compensate.max_mean", Number("rad/s", Field::CompensateMaxMean, "largest mean correction of a window")),
-    ("compensate.max_single", Number("rad/s", Field::CompensateMaxSingle, "largest single correction")),
-    (
-        "compensate.max_revision",
-        Number("rad/s", Field::CompensateMaxRevision, "largest part of a revision that is added to one rate"),
-    ),
     (
         "compensate.model",
         Other("", "`false`: the model's corrections are not subtracted, only bias, level and gain"),
@@ -98,13 +92,6 @@ const SETTINGS: &[(&str, Takes)] = &[
         Other(
             "",
             "`null`, or a receiver on UART4 in place of frames: `{\"protocol\":\"Ubx\",\"baud\":38400}` (4800 to 460800), or `Nmea`",
-        ),
-    ),
-    (
-        "slcan_inputs",
-        Other(
-            "",
-            "`true` accepts wheel, course and latitude frames that a host sends over SLCAN: for a bench only",
         ),
     ),
     ("diagnosis.extended", Other("", "`true`: the three identifiers have 29 bits")),

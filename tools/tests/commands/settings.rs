@@ -2,28 +2,17 @@
 
 use super::{gyronet, scratch, text};
 use gyronet::store::{Configuration, Record};
-use gyronet::units::AngularRate;
 use gyronet_tools::client::device::settings::{assign, from_value, to_value};
-
-#[test]
-fn rates_are_in_rad_per_second_and_exact() {
-    let mut configuration = Configuration::DEFAULT;
-    assert_eq!(from_value(to_value(&configuration).unwrap()).unwrap(), configuration);
-    for code in [0, 1, -1, 70_276_239, 70_276_241, 0x7FFF_FFFF, -0x8000_0000] {
-        configuration.compensate.max_single = AngularRate(code);
-        assert_eq!(from_value(to_value(&configuration).unwrap()).unwrap(), configuration, "{code}");
-    }
-}
 
 #[test]
 fn values_are_set_by_name() {
     let mut value = to_value(&Configuration::DEFAULT).unwrap();
-    for setting in ["imu=Icm42688", "latitude_deg=48.1", "compensate.max_mean=0.1", "can.yaw.ids.2=419"] {
+    for setting in ["imu=Icm42688", "latitude_deg=48.1", "compensate.model=false", "can.yaw.ids.2=419"] {
         assign(&mut value, setting).unwrap();
     }
     let configuration = from_value(value.clone()).unwrap();
     configuration.check().unwrap();
-    assert_eq!(configuration.compensate.max_mean, AngularRate::from_rad_per_sec(0.1).unwrap());
+    assert!(!configuration.compensate.model);
     assert_eq!(configuration.can.yaw.unwrap().ids, [416, 417, 419]);
     let refused = |setting: &str| {
         let mut value = value.clone();
@@ -33,22 +22,20 @@ fn values_are_set_by_name() {
     assert_eq!(refused("imu"), "imu: not NAME=VALUE");
     assert!(refused("latitude=1").contains("no such setting"));
     assert!(refused("can.vdc2.source=128").contains("retired, since VDC2"));
+    assert!(refused("slcan_inputs=true").contains("come over CAN"));
     for retired in ["fog_lane.fognet=Simulated", "fog_serial=1"] {
         assert!(refused(retired).contains("retired, because FoGNet"), "{}", refused(retired));
     }
-    for (renamed, name) in [
-        ("fog_lane.tilt_deg=3", "fog_gyro"),
-        ("compensate.max_carry=0.01", "compensate.max_revision"),
-        ("compensate.mode.Overlap.stride=5", "compensate.stride"),
-    ] {
+    for (renamed, name) in
+        [("fog_lane.tilt_deg=3", "fog_gyro"), ("compensate.mode.Overlap.stride=5", "compensate.stride")]
+    {
         assert!(refused(renamed).ends_with(&format!(": its name is {name} now")), "{}", refused(renamed));
     }
     // A configuration that was written before.
     let mut old = value.clone();
     old["fog_lane"] = serde_json::json!({ "tilt_deg": 0.0, "fognet": "Simulated" });
     assert!(from_value(old).unwrap_err().to_string().starts_with("fog_lane.fognet: retired"));
-    // The board's own code for 3 deg/s.
-    assert_eq!(refused("compensate.max_mean=7027624"), "compensate.max_mean: 7027624 is not a rate in rad/s");
+    assert!(refused("compensate.max_mean=0.1").contains("retired: a correction is limited"));
     assert!(refused("imu=None").starts_with("no configuration: unknown variant"));
 }
 

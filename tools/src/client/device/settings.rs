@@ -8,12 +8,12 @@ use gyronet::units::AngularRate;
 use serde::Serialize;
 use serde_json::Value;
 
-/// Names inside `compensate` of the rates that a record stores as codes.
-const RATES: [&str; 3] = ["max_mean", "max_single", "max_revision"];
 const NO_FOGNET: &str =
     "retired, because FoGNet no longer runs on this board (`cargo paper tables` runs it on recordings)";
+const NO_LIMITS: &str =
+    "retired: a correction is limited to 6 deg/s in the mean of a window, 60 deg/s and 1 deg/s of revisions";
 /// Settings that have gone, with the reason or the successor. A name stands for those below it too.
-const RETIRED: [(&str, &str); 6] = [
+const RETIRED: [(&str, &str); 10] = [
     ("fog_lane.fognet", NO_FOGNET),
     ("fog_serial", NO_FOGNET),
     ("fog_lane", "its name is fog_gyro now"),
@@ -21,7 +21,11 @@ const RETIRED: [(&str, &str); 6] = [
         "can.vdc2",
         "retired, since VDC2 has no place for quality and expected error: use the board's own messages (can.yaw)",
     ),
-    ("compensate.max_carry", "its name is compensate.max_revision now"),
+    ("compensate.max_mean", NO_LIMITS),
+    ("compensate.max_single", NO_LIMITS),
+    ("compensate.max_revision", NO_LIMITS),
+    ("compensate.max_carry", NO_LIMITS),
+    ("slcan_inputs", "retired: wheels and courses come over CAN, without a vehicle from `cargo board`"),
     ("compensate.mode", "its name is compensate.stride now"),
 ];
 /// Decimals, in rad/s, that distinguish any two codes.
@@ -35,36 +39,20 @@ pub enum SettingError {
     Name(String),
     #[error("{0}: {1}")]
     Retired(&'static str, &'static str),
-    #[error("compensate.{name}: {value} is not a rate in rad/s")]
-    Rate { name: &'static str, value: Value },
     #[error("no configuration: {0}")]
     Json(#[from] serde_json::Error),
 }
 
-/// Converts a configuration to names and values, with rates in rad/s.
+/// Converts a configuration to names and values.
 pub fn to_value(configuration: &Configuration) -> Result<Value, SettingError> {
-    let mut value = value(configuration)?;
-    for name in RATES {
-        if let Some(rate) = value.pointer_mut(&format!("/compensate/{name}"))
-            && let Some(code) = rate.as_i64().and_then(|code| i32::try_from(code).ok())
-        {
-            *rate = shortest(AngularRate(code)).into();
-        }
-    }
-    Ok(value)
+    Ok(value(configuration)?)
 }
 
 /// Converts names and values to a configuration; ranges are not checked.
-pub fn from_value(mut value: Value) -> Result<Configuration, SettingError> {
+pub fn from_value(value: Value) -> Result<Configuration, SettingError> {
     let path = |name: &str| format!("/{}", name.replace('.', "/"));
     if let Some((name, instead)) = RETIRED.iter().find(|(name, _)| value.pointer(&path(name)).is_some()) {
         return Err(SettingError::Retired(name, instead));
-    }
-    for name in RATES {
-        // `serde_json` reports a missing rate below.
-        let Some(rate) = value.pointer_mut(&format!("/compensate/{name}")) else { continue };
-        let refused = SettingError::Rate { name, value: rate.clone() };
-        *rate = rate.as_f64().and_then(code).ok_or(refused)?.into();
     }
     Ok(serde_json::from_value(value)?)
 }
