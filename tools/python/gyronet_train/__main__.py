@@ -2,10 +2,8 @@
 
 Trains once for each seed, prints each seed's errors on the validation drives with mean and spread, and
 keeps the best network. Test drives are never read. training.py describes the training and where it
-differs from the paper. A training that was killed resumes from the files STEM.seedN.state in --out, which have every epoch.
+differs from the paper.
 """
-
-from __future__ import annotations
 
 import argparse
 import dataclasses
@@ -57,8 +55,6 @@ def main() -> None:
         run(args)
     except ValueError as error:
         raise SystemExit(str(error)) from error
-    except KeyboardInterrupt:
-        raise SystemExit("stopped; the same command resumes after the last complete epoch") from None
 
 
 def run(args: argparse.Namespace) -> None:
@@ -89,8 +85,7 @@ def best_of_seeds(args: argparse.Namespace, validation: list[Drive]) -> tuple[Gy
         def on_epoch(epoch: Epoch) -> None:
             print(line(f"seed {seed} epoch {epoch.epoch}, loss {epoch.loss:.4f}", epoch.validation), flush=True)
 
-        state = args.out / f"{args.stem}.seed{seed}.state"
-        networks[seed] = train(data, validation, settings, seed, on_epoch, state)
+        networks[seed] = train(data, validation, settings, seed, on_epoch)
         print(line(f"seed {seed}, {networks[seed].seconds:.0f} s", networks[seed].validation))
     errors = [network.validation.mean_1s_rad for network in networks.values()]
     seconds = sum(network.seconds for network in networks.values())
@@ -104,7 +99,7 @@ def best_of_seeds(args: argparse.Namespace, validation: list[Drive]) -> tuple[Gy
     provenance = {
         "network": "gyronet",
         "train": list(data.names),
-        "validate": ", ".join(names(validation)),
+        "validate": ", ".join(dict.fromkeys(drive.name for drive in validation)),
         "sha256": {**data.names, **{d.name: d.sha256 for d in validation}},
         "validation_mean_1s_rad": round(chosen.validation.mean_1s_rad, 7),
         "validation_static_mean_1s_rad": round(static, 7),
@@ -115,11 +110,6 @@ def best_of_seeds(args: argparse.Namespace, validation: list[Drive]) -> tuple[Gy
         **dataclasses.asdict(settings),
     }
     return chosen.model, provenance
-
-
-def names(drives: list[Drive]) -> list[str]:
-    """Returns the names of drives, each once even if the drive has several pieces."""
-    return list(dict.fromkeys(drive.name for drive in drives))
 
 
 if __name__ == "__main__":

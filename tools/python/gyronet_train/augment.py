@@ -5,8 +5,6 @@ the windows, the same to gyro and reference, which does not change their differe
 acceleration at a random speed and a random longitudinal acceleration are also added.
 """
 
-from __future__ import annotations
-
 import torch
 
 TURN_SHARE = 0.5

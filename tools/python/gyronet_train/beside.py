@@ -10,8 +10,6 @@ unless it gains more than its spread over drives.
 Random levels and turns are added to the input (`disturb`), so that the Bi-LSTM does not learn from level and turn.
 """
 
-from __future__ import annotations
-
 import argparse
 import statistics
 import time
@@ -22,11 +20,12 @@ import torch
 
 from .augment import turn
 from .export import export
-from .linear import PARTS, fit, ratio, rows, sums, window_error
+from .linear import PARTS, corrections, fit, ratio, rows, sums, window_error
 from .loss import window_loss
 from .model import GyroNet
-from .recordings import STATIC_SAMPLES, STRIDE, WINDOW, Drive, find_drive, load_drive, mean_1s_error, overlap_mean, windows
+from .recordings import STATIC_SAMPLES, STRIDE, WINDOW, Drive, find_drive, load_drive, windows
 from .training import calibrate
+from .validation import estimates
 
 SHIPPED = ("low pass", "accelerometer")
 UNIT = ("mounting", "gain")
@@ -36,19 +35,6 @@ LR = 0.004
 # Factor on the trained scale. With it 0.85 of the straight seconds of the training drives are within one sigma as the
 # board sends it (`gyronet evaluate`).
 STATED = 0.8
-
-
-def basis_of(parts: list[str]) -> tuple[np.ndarray, int]:
-    """Returns the filters of some parts and of the unit, and how many of them are those of the parts."""
-    others = [part for part in UNIT if part not in parts]
-    basis = np.concatenate([PARTS[part] for part in (*parts, *others)])
-    return basis, sum(len(PARTS[part]) for part in parts)
-
-
-def linear_part(made: list[tuple[np.ndarray, np.ndarray]], basis: np.ndarray, kept: int) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the outputs of a window, fitted to the sums of some drives: of what is kept, and with the unit's part."""
-    part, whole = fit(made, basis, kept)
-    return rows(part), rows(whole)
 
 
 def disturb(x: torch.Tensor) -> torch.Tensor:
@@ -101,21 +87,6 @@ def train(drives: list[Drive], outputs: np.ndarray, units: int, epochs: int, see
     return model.eval()
 
 
-@torch.no_grad()
-def estimates(model: GyroNet, drive: Drive) -> tuple[np.ndarray, np.ndarray]:
-    """Returns corrections (W, N) and scales (W,) of the windows STRIDE apart."""
-    x = torch.from_numpy(np.ascontiguousarray(windows(drive.features)[::STRIDE]))
-    correction, scale = zip(*(model(part) for part in x.split(4096)))
-    return torch.cat(correction).numpy(), torch.cat(scale).numpy()
-
-
-def corrected_ratio(model: GyroNet, drive: Drive) -> float:
-    """Returns the 1 s error over static initialisation's."""
-    corrections, _ = estimates(model, drive)
-    error = drive.gyro_error - overlap_mean(corrections, len(drive.gyro_error))
-    return mean_1s_error(error) / mean_1s_error(drive.gyro_error)
-
-
 def log_loss(model: GyroNet | None, outputs: np.ndarray, drive: Drive, unit: float) -> float:
     """Returns the mean negative log likelihood of the windows' mean errors, in units of the training drives' mean
     error; without a model, with the same scale for all windows."""
@@ -134,16 +105,16 @@ def report(drives: list[Drive], basis: np.ndarray, kept: int, sizes: list[int], 
     add = lambda name, value: rows_of.setdefault(name, []).append(value)
     for k, drive in enumerate(drives):
         others = drives[:k] + drives[k + 1 :]
-        part, outputs = linear_part(made[:k] + made[k + 1 :], basis, kept)
+        part, outputs = map(rows, fit(made[:k] + made[k + 1 :], basis, kept))
         unit = window_error(outputs, others)
-        add("linear: ratio", ratio(part, drive))
-        add("with the unit's part: ratio", ratio(outputs, drive))
+        add("linear: ratio", ratio(corrections(part, drive), drive))
+        add("with the unit's part: ratio", ratio(corrections(outputs, drive), drive))
         add("one scale: log loss", log_loss(None, outputs, drive, unit))
         for units in sizes:
             model = train(others, outputs, units, epochs, seed, correct=False)
             add(f"{units} units: log loss", log_loss(model, outputs, drive, unit))
             model = train(others, outputs, units, epochs, seed, correct=True)
-            add(f"{units} units, correcting: ratio", corrected_ratio(model, drive))
+            add(f"{units} units, correcting: ratio", ratio(estimates(model, drive)[0], drive))
         print(f"{drive.name}: " + ", ".join(f"{name} {each[-1]:.3f}" for name, each in rows_of.items()), flush=True)
     return {name: [round(statistics.mean(v), 4), round(statistics.stdev(v), 4)] for name, v in rows_of.items()}
 
@@ -167,11 +138,13 @@ def main() -> None:
     args = arguments()
     started = time.monotonic()
     drives = [load_drive(find_drive(args.data, n)) for n in args.train]
-    basis, kept = basis_of(args.parts)
+    # The filters of the parts, then those of the unit.
+    basis = np.concatenate([PARTS[part] for part in dict.fromkeys([*args.parts, *UNIT])])
+    kept = sum(len(PARTS[part]) for part in args.parts)
     found = report(drives, basis, kept, args.report, args.epochs, args.seed) if args.report else {}
     for name, (mean, deviation) in found.items():
         print(f"{name}: {mean:.3f}, standard deviation over drives {deviation:.3f}")
-    part, outputs = linear_part([sums(drive, basis) for drive in drives], basis, kept)
+    part, outputs = map(rows, fit([sums(drive, basis) for drive in drives], basis, kept))
     model = train(drives, outputs, args.units, args.epochs, args.seed, args.correct)
     calibrate(model, STATED)
     model.linear.weight.data = torch.from_numpy(part.reshape(WINDOW, -1)).float()

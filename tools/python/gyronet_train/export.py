@@ -1,7 +1,5 @@
 """Writes checkpoint and golden tensors as safetensors, with the provenance in the metadata."""
 
-from __future__ import annotations
-
 import datetime
 import json
 from pathlib import Path

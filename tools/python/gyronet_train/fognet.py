@@ -12,8 +12,6 @@ Drives are files that `gyronet-paper import --training` wrote, with the Earth's 
 from the gyro; a file with gaps is used in pieces.
 """
 
-from __future__ import annotations
-
 import argparse
 import copy
 from pathlib import Path
@@ -36,9 +34,7 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gyronet_train.fognet", description=__doc__)
     parser.add_argument("--train", type=Path, nargs="+", required=True, metavar="PATH")
     parser.add_argument("--validate", type=Path, nargs="+", metavar="PATH", help="validation drives")
-    parser.add_argument(
-        "--rates", type=Path, metavar="FOLDER", help="rates of `gyronet replay --csv` (DRIVE.csv) instead of the FoG's"
-    )
+    parser.add_argument("--rates", type=Path, metavar="FOLDER", help="rates of `gyronet replay --csv` (DRIVE.csv), not the FoG's")
     parser.add_argument("--gyro", choices=["DSP-1760", "DSP-3000", "pseudo-FoG"], help="gyro that the weights are for")
     parser.add_argument("--serial", type=int, default=0, help="serial number of the one gyro for the weights; 0: any")
     parser.add_argument("--simulated", action="store_true", help="mark the drives as simulated in the provenance")

@@ -1,7 +1,5 @@
 """FoGNet of Zhao et al., section III-C, with N = 60 one-second steps."""
 
-from __future__ import annotations
-
 import torch
 from torch import nn
 

@@ -6,8 +6,6 @@ a constant error do not contribute (`PARTS`). The fit minimises the absolute err
 number that the tools print.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .recordings import RATE_HZ, STATIC_SAMPLES, STRIDE, WINDOW, Drive, mean_1s_error, overlap_mean, windows
@@ -121,14 +119,10 @@ def corrections(outputs: np.ndarray, drive: Drive) -> np.ndarray:
     return np.tensordot(windows(drive.features)[::STRIDE].astype(np.float64), outputs, axes=([1, 2], [1, 2]))
 
 
-def rate_error(outputs: np.ndarray, drive: Drive) -> np.ndarray:
-    """Returns the error (T,) of the rate that is corrected by the mean of overlapping windows."""
-    return drive.gyro_error - overlap_mean(corrections(outputs, drive), len(drive.gyro_error))
-
-
-def ratio(outputs: np.ndarray, drive: Drive) -> float:
-    """Returns the 1 s error over static initialisation's."""
-    return mean_1s_error(rate_error(outputs, drive)) / mean_1s_error(drive.gyro_error)
+def ratio(corrected: np.ndarray, drive: Drive) -> float:
+    """Returns the 1 s error with the mean of overlapping windows' corrections, over static initialisation's."""
+    error = drive.gyro_error - overlap_mean(corrected, len(drive.gyro_error))
+    return mean_1s_error(error) / mean_1s_error(drive.gyro_error)
 
 
 def window_error(outputs: np.ndarray, drives: list[Drive]) -> float:

@@ -1,7 +1,5 @@
 """The loss of windows: the gyro error, sample by sample, and the likelihood of the stated scale."""
 
-from __future__ import annotations
-
 import torch
 
 SCALE_WEIGHT = 0.1

@@ -7,8 +7,6 @@ FOLDER/odometry, FOLDER/constant and FOLDER/model (see lwoi_run.py), and all num
 test sequence that cannot be read is reported and left out.
 """
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import time
@@ -58,23 +56,10 @@ def remaining(errors: np.ndarray, expected: np.ndarray) -> list[float]:
     return [round(float(x), 4) for x in np.sqrt(((errors - expected) ** 2).mean(0) / (errors**2).mean(0))]
 
 
-@dataclasses.dataclass(frozen=True)
-class Model:
-    """The result of a training: the process, and mean and mean square of the errors."""
-
-    process: Trained
-    constant: np.ndarray
-    mean_square: np.ndarray
-
-    def expect(self, drive: Sequence) -> Expected:
-        """Predicts the errors of a drive."""
-        return Expected(self.constant, self.mean_square, self.process.predict(drive.odometry))
-
-
-def test(drive: Sequence, model: Model, out: Path) -> dict:
-    """Runs a drive in every mode, writes its trajectories and returns its numbers."""
+def test(drive: Sequence, process: Trained, errors: np.ndarray, out: Path) -> dict:
+    """Runs a drive in every mode with a process and the errors of its training, writes its trajectories and returns its numbers."""
     begin = time.monotonic()
-    expected = model.expect(drive)
+    expected = Expected(errors.mean(axis=0), (errors**2).mean(axis=0), process.predict(drive.odometry))
     numbers: dict = {
         "sha256": drive.sha256,
         "remaining_odometry": remaining(odometry_errors(drive), expected.odometry.mean),
@@ -101,8 +86,7 @@ def main() -> None:
         raise SystemExit(str(error)) from error
     errors = np.concatenate([odometry_errors(drive) for drive in drives])
     process = fit(drives, errors, args)
-    model = Model(process, errors.mean(axis=0), (errors**2).mean(axis=0))
-    results = test_all(args.test, args.out, MODES, lambda drive: test(drive, model, args.out))
+    results = test_all(args.test, args.out, MODES, lambda drive: test(drive, process, errors, args.out))
     report = {
         "method": "lwoi",
         "train": {drive.name: drive.sha256 for drive in drives},

@@ -4,8 +4,6 @@ Windows are independent of each other, so each function processes all windows of
 are what lwoi's process learns: the twist from odometry's pose to the true pose, translation first.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

@@ -7,8 +7,6 @@ windows. Targets are divided by their RMS in training, but not centred: far from
 process then predicts no correction, with the full RMS as standard deviation.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

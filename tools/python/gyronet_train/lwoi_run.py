@@ -5,8 +5,6 @@ error over the training's seconds, to show how much of the gain four numbers giv
 the process expects for each second, without roll and pitch.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ The second output is the paper's future work, "learning uncertainty": the log of
 Laplace error.
 """
 
-from __future__ import annotations
-
 import torch
 from torch import nn
 

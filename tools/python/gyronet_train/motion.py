@@ -1,7 +1,5 @@
 """Rotation vectors and gravity, for the filters of all rivals."""
 
-from __future__ import annotations
-
 import numpy as np
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])  # m/s^2

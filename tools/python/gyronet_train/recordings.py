@@ -6,8 +6,6 @@ initialisation); the accelerometer is unchanged, in m/s^2. Both are rotated by
 the mounting in the vehicle file beside the drive.
 """
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path

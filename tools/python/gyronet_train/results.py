@@ -4,8 +4,6 @@ A sequence that cannot be read, or a mode in which the filter diverges, is repor
 it has a reason instead of numbers, and no trajectory.
 """
 
-from __future__ import annotations
-
 import datetime
 import json
 import time
@@ -18,9 +16,7 @@ from .sequence import Sequence, SequenceError, load_sequence
 from .trajectory import FilterError, Track, consistency, trajectory_error, write_tum
 
 
-def test_all(
-    folders: Iterable[Path], out: Path, modes: Iterable[str], test: Callable[[Sequence], dict]
-) -> dict[str, dict]:
+def test_all(folders: Iterable[Path], out: Path, modes: Iterable[str], test: Callable[[Sequence], dict]) -> dict[str, dict]:
     """Tests the sequence of each folder; returns the numbers by folder name. Removes trajectories of an earlier run."""
     results: dict[str, dict] = {}
     for folder in folders:

@@ -9,8 +9,6 @@ FOLDER/inertial (see rinsw_run.py), and all numbers to FOLDER/rinsw.json. A test
 read, or on which the filter diverges, is reported and left out.
 """
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import time

@@ -6,8 +6,6 @@ earlier on. Trained on windows of 4 s, a network that ran through a whole drive 
 the stops.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable
@@ -154,9 +152,7 @@ def train_one(
         report(step, loss.item())
 
 
-def windows(
-    drives: list[np.ndarray], targets: list[np.ndarray], count: int, random: np.random.Generator
-) -> tuple[np.ndarray, torch.Tensor]:
+def windows(drives: list[np.ndarray], targets: list[np.ndarray], count: int, random: np.random.Generator) -> tuple:
     """Draws random windows (count, WINDOW, 6) and their labels; noise and a bias are added to each window."""
     chosen = random.integers(len(drives), size=count)
     places = [(k, random.integers(len(drives[k]) - WINDOW + 1)) for k in chosen]

@@ -7,8 +7,6 @@ true position likewise, with J the left Jacobian; biases add. A detected profile
 zero, and a motion that is detected as zero is not integrated.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ The true poses give the labels for training and report. They are smoothed over 1
 Golay), before and after differentiation.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

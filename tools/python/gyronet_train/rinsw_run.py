@@ -6,8 +6,6 @@ velocity as zero, like the program that the authors released later. `truth` uses
 show what better detectors would gain. `inertial` detects nothing.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

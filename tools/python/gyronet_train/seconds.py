@@ -4,8 +4,6 @@ Increments (gyro, wheels) are summed over a second, the inertial sensor is avera
 over the first three seconds, at standstill, is subtracted.
 """
 
-from __future__ import annotations
-
 import hashlib
 import sys
 from dataclasses import dataclass
@@ -13,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .recordings import vehicle_of
+from .recordings import read_table
 
 STEPS = 60  # per window
 FOG = 8  # column of the gyro increment
@@ -61,12 +59,7 @@ def load_grid(path: Path, rates: Path | None = None) -> list[Seconds]:
     """Reads a drive that `gyronet-paper import` wrote: the pieces of whole seconds between its gaps, counted
     from its first row. If `rates` is given, the delayed rates of `gyronet replay --csv` replace the fibre-optic
     gyro: the paper's pseudo-FoG. Raises ValueError with the reason."""
-    vehicle, text = vehicle_of(path)
-    digest = hashlib.sha256(path.read_bytes() + text)
-    table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
-    missing = [name for name in DRIVE if name not in (table.dtype.names or ())]
-    if missing:
-        raise ValueError(f"{path}: missing columns {', '.join(missing)}")
+    table, vehicle, digest = read_table(path, DRIVE)
     values = np.stack([table[name] for name in DRIVE], axis=1)
     values[:, 1:4], values[:, 4:7] = vehicle.turn(values[:, 1:4]), vehicle.turn(values[:, 4:7])
     row = np.round((values[:, 0] - values[0, 0]) * RATE_HZ).astype(int)
@@ -81,7 +74,7 @@ def load_grid(path: Path, rates: Path | None = None) -> list[Seconds]:
     turn = rows[:, :, 10].sum(axis=1)
     edges = [0, *np.flatnonzero(np.diff(whole) > 1) + 1, len(whole)]
     return [
-        Seconds(path.stem, digest.hexdigest(), features[begin:end], turn[begin:end])
+        Seconds(path.stem, digest, features[begin:end], turn[begin:end])
         for begin, end in zip(edges, edges[1:])
     ]
 

@@ -6,8 +6,6 @@ increment is lost or counted twice; the inertial sensor's values are means over 
 over the first three seconds, at standstill, is subtracted from the gyro.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -44,7 +42,7 @@ class Sequence:
     def __len__(self) -> int:
         return len(self.odometry)
 
-    def part(self, begin: int, end: int) -> Sequence:
+    def part(self, begin: int, end: int) -> "Sequence":
         """Returns the windows from `begin` to `end`."""
         windows, steps = slice(begin, end), slice(begin * STEPS, end * STEPS + 1)
         return replace(
@@ -57,7 +55,7 @@ class Sequence:
             whole=self.whole[windows],
         )
 
-    def pieces(self) -> list[Sequence]:
+    def pieces(self) -> list["Sequence"]:
         """Returns the pieces between gaps, for training."""
         inside = np.concatenate([[0], self.whole.astype(int), [0]])
         edges = np.flatnonzero(np.diff(inside)).reshape(-1, 2)

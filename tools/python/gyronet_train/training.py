@@ -4,20 +4,14 @@ As in the paper, training uses Adam with an initial rate of 0.0015 and mean abso
 windows of 0.1 s. Unlike in the paper, turns are added (augment.py), the rate follows one cycle, the
 running mean of the weights is kept, and a scale is trained (loss.py).
 
-Random numbers are seeded in each epoch from seed and epoch, so that a resumed training gives the same result as one that
-was not interrupted.
+Random numbers are seeded in each epoch, from seed and epoch.
 """
 
-from __future__ import annotations
-
 import copy
-import dataclasses
 import math
-import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -34,18 +28,12 @@ from .validation import Validation, validate_all
 class Settings:
     """Settings of a training."""
 
-    epochs: int
-    """Number of passes, each with as many windows as the training drives have samples."""
-    batch: int
-    """Number of windows of a batch."""
-    lr: float
-    """Largest learning rate."""
-    turns: bool
-    """Whether to add turns."""
-    patience: int
-    """Epochs without improvement after which training stops."""
-    memory: float = 0.999
-    """Decay of the running mean of the weights per batch."""
+    epochs: int  # passes, each with as many windows as the training drives have samples
+    batch: int  # windows
+    lr: float  # the largest learning rate
+    turns: bool  # whether to add turns
+    patience: int  # epochs without improvement after which training stops
+    memory: float = 0.999  # decay of the running mean of the weights per batch
 
 
 @dataclass(frozen=True)
@@ -53,8 +41,7 @@ class Epoch:
     """The result of an epoch."""
 
     epoch: int
-    loss: float
-    """Mean loss over the batches."""
+    loss: float  # mean over the batches
     validation: Validation
 
 
@@ -64,12 +51,9 @@ class Trained:
 
     model: GyroNet
     validation: Validation
-    epoch: int
-    """The epoch of these weights: the best on the validation drives."""
-    seconds: float
-    """Wall time, s."""
-    epochs: list[Epoch]
-    """All epochs that were run."""
+    epoch: int  # of these weights: the best on the validation drives
+    seconds: float  # wall time
+    epochs: list[Epoch]  # all that were run
 
 
 class Windows:
@@ -99,17 +83,8 @@ class Windows:
         return len(self.starts) // size
 
 
-def train(
-    data: Windows,
-    validation: list[Drive],
-    settings: Settings,
-    seed: int,
-    on_epoch: Callable[[Epoch], None],
-    state: Path | None = None,
-) -> Trained:
-    """Trains GyroNet; calls `on_epoch` after each epoch. Resumes from the file `state` if it exists, and updates it."""
-    of = {"settings": dataclasses.asdict(settings), "seed": seed, "drives": data.names}
-    of["validation drives"] = [drive.sha256 for drive in validation]
+def train(data: Windows, validation: list[Drive], settings: Settings, seed: int, on_epoch: Callable[[Epoch], None]) -> Trained:
+    """Trains GyroNet; calls `on_epoch` after each epoch."""
     torch.manual_seed(seed)
     unit = data.deviations[-1].item()
     model = GyroNet(data.mean, data.deviations[:-1], unit)
@@ -118,16 +93,8 @@ def train(
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, settings.lr, total_steps=data.epoch(settings.batch) * settings.epochs
     )
-    parts = {"model": model, "mean": mean, "best": best, "optimiser": optimiser, "schedule": schedule}
     epochs: list[Epoch] = []
-    seconds = 0.0
-    saved = load_state(state, of) if state else None
-    if saved:
-        for name, part in parts.items():
-            part.load_state_dict(saved[name])
-        epochs = [Epoch(e["epoch"], e["loss"], Validation(**e["validation"])) for e in saved["epochs"]]
-        seconds = saved["seconds"]
-    started = time.monotonic() - seconds
+    started = time.monotonic()
     while not finished(epochs, settings):
         epoch = len(epochs) + 1
         torch.manual_seed((seed << 32) + (epoch << 16))
@@ -150,33 +117,9 @@ def train(
         if best_of(epochs).epoch == epoch:
             best.load_state_dict(mean.state_dict())
         on_epoch(epochs[-1])
-        seconds = time.monotonic() - started
-        if state:
-            told = {"epochs": [dataclasses.asdict(e) for e in epochs], "seconds": seconds}
-            save_state(state, of, {name: part.state_dict() for name, part in parts.items()} | told)
     chosen = best_of(epochs)
     calibrate(best, chosen.validation.scale_ratio)
-    return Trained(best, validate_all(best, validation), chosen.epoch, seconds, epochs)
-
-
-def save_state(path: Path, of: dict, state: dict) -> None:
-    """Writes a state; `of` identifies the training. After a crash the old or the new file is complete."""
-    written = path.with_suffix(".part")
-    torch.save({"of": of, "state": state}, written)
-    os.replace(written, path)
-
-
-def load_state(path: Path, of: dict) -> dict | None:
-    """Reads a state; returns None if there is no file. Raises ValueError for the state of another training."""
-    if not path.exists():
-        return None
-    saved = torch.load(path, weights_only=True)
-    other = [name for name in of if saved["of"].get(name) != of[name]]
-    if other:
-        raise ValueError(
-            f"{path}: is of a training with other {', '.join(other)}; remove it to start again, or pass another --out"
-        )
-    return saved["state"]
+    return Trained(best, validate_all(best, validation), chosen.epoch, time.monotonic() - started, epochs)
 
 
 def best_of(epochs: list[Epoch]) -> Epoch:

@@ -1,7 +1,5 @@
 """Trajectories that a rival estimates: their representation, their errors and their files."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Errors of a network on a drive, run as in the firmware."""
 
-from __future__ import annotations
-
 from dataclasses import astuple, dataclass
 
 import numpy as np
@@ -15,16 +13,11 @@ from .recordings import RATE_HZ, STATIC_SAMPLES, STRIDE, Drive, mean_1s_error, o
 class Validation:
     """Errors after the static phase, with overlapping windows STRIDE apart."""
 
-    mean_1s_rad: float
-    """Mean |yaw error| over consecutive 1 s windows: the number that the tools print."""
-    any_1s_rad: float
-    """Mean |yaw error| over all 1 s windows, one from each sample, which scatters less."""
-    window_rad_per_sec: float
-    """Mean |error| of the mean of a window's corrected rates."""
-    scale_ratio: float
-    """The window error over the scale that the network gives, on average: 1 if the scale is calibrated."""
-    log_loss: float
-    """Mean Laplace log loss of the windows' errors, scale in rad/s."""
+    mean_1s_rad: float  # mean |yaw error| over consecutive 1 s windows: the number that the tools print
+    any_1s_rad: float  # mean |yaw error| over all 1 s windows, one from each sample, which scatters less
+    window_rad_per_sec: float  # mean |error| of the mean of a window's corrected rates
+    scale_ratio: float  # the window error over the scale that the network gives, on average: 1 if it is calibrated
+    log_loss: float  # mean Laplace log loss of the windows' errors, scale in rad/s
 
 
 def validate_all(model: GyroNet, drives: list[Drive]) -> Validation:
@@ -34,21 +27,22 @@ def validate_all(model: GyroNet, drives: list[Drive]) -> Validation:
 
 
 @torch.no_grad()
-def corrections(model: GyroNet, features: np.ndarray) -> tuple[torch.Tensor, torch.Tensor]:
-    """Returns outputs (W, N) and scales (W,) of the windows STRIDE apart."""
-    model.eval()
-    return model(torch.from_numpy(np.ascontiguousarray(windows(features)[::STRIDE])))
+def estimates(model: GyroNet, drive: Drive) -> tuple[np.ndarray, np.ndarray]:
+    """Returns corrections (W, N) and scales (W,) of the windows STRIDE apart."""
+    x = torch.from_numpy(np.ascontiguousarray(windows(drive.features)[::STRIDE]))
+    correction, scale = zip(*(model.eval()(part) for part in x.split(4096)))
+    return torch.cat(correction).numpy(), torch.cat(scale).numpy()
 
 
 def validate(model: GyroNet, drive: Drive) -> Validation:
     """Runs the network on a drive; returns its errors."""
-    output, scale = corrections(model, drive.features)
-    rate_error = drive.gyro_error - overlap_mean(output.numpy(), len(drive.gyro_error))
+    output, scale = estimates(model, drive)
+    rate_error = drive.gyro_error - overlap_mean(output, len(drive.gyro_error))
     yaw_error = np.cumsum(np.append(0.0, rate_error[STATIC_SAMPLES:])) / RATE_HZ
     moving = slice(STATIC_SAMPLES // STRIDE, None)
     label = windows(drive.gyro_error)[::STRIDE].mean(axis=1)[moving]
-    window_error = np.abs(output.numpy().mean(axis=1)[moving] - label)
-    scale = scale.numpy()[moving]
+    window_error = np.abs(output.mean(axis=1)[moving] - label)
+    scale = scale[moving]
     return Validation(
         mean_1s_rad=mean_1s_error(rate_error),
         any_1s_rad=float(np.abs(yaw_error[RATE_HZ:] - yaw_error[:-RATE_HZ]).mean()),

@@ -14,7 +14,6 @@ from gyronet_train.trajectory import trajectory_error
 from .made_drive import SECONDS, SPEED, start_and_go
 
 
-
 def expect(drive, ahead=0.0):
     """Expects an error ahead in every window, and little else."""
     count = len(drive)
