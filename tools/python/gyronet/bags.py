@@ -2,13 +2,13 @@
 
 import os
 import shutil
-import sqlite3
 from pathlib import Path
 
 from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_typestore
 
 from gyronet.logs.opened import MCAP, SQLITE
+from gyronet.logs.ros import REINDEX
 from gyronet.refused import Refused
 
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
@@ -50,9 +50,11 @@ def copier_of(path, out):
                 head = file.read(16)
         except OSError as error:
             raise Refused(f"{path}: {error.strerror}") from None
-    for magic, copier in ((b"folder", bag2), (b"#ROSBAG V2.0", bag1), (MCAP, mcap), (SQLITE, sqlite)):
+    for magic, copier in ((b"folder", bag2), (b"#ROSBAG V2.0", bag1), (MCAP, mcap)):
         if head.startswith(magic):
             return copier
+    if head.startswith(SQLITE):
+        raise Refused(f"{path}: of a ROS 2 bag the whole folder is copied; {REINDEX.replace('import', 'correct')}")
     raise Refused(f"{path}: not a ROS bag, bag folder or MCAP file; for other logs: import, then gyronet replay")
 
 
@@ -131,33 +133,3 @@ def mcap(path, out, change):
             elif isinstance(record, records.Metadata):
                 writer.add_metadata(record.name, record.metadata)
         writer.finish()
-
-
-def sqlite(path, out, change):
-    shutil.copyfile(path, out)
-    base = sqlite3.connect(out)
-    topics = {row[0]: row[1:] for row in base.execute("SELECT id, name, type FROM topics")}
-    check([name for name, _ in topics.values()])
-    digest = ROS2.hash_rihs01(DIAGNOSTICS)
-    insert(base, "topics", id=max(topics, default=0) + 1, name=TOPIC, type=DIAGNOSTICS, serialization_format="cdr", type_description_hash=digest)
-    insert(base, "message_definitions", topic_type=DIAGNOSTICS, encoding="ros2msg", type_description_hash=digest,
-           encoded_message_definition=ROS2.generate_msgdef(DIAGNOSTICS, ros_version=2)[0])
-    # Read from the original, so that what is added is not read again.
-    original = sqlite3.connect(f"file:{path}?mode=ro&immutable=1", uri=True)
-    for number, topic, recorded, data in original.execute("SELECT id, topic_id, timestamp, data FROM messages ORDER BY timestamp, id"):
-        changed, said = change(*topics.get(topic, ("", "")), recorded, data, False)
-        if changed is not data:
-            base.execute("UPDATE messages SET data = ? WHERE id = ?", (changed, number))
-        if said:
-            insert(base, "messages", topic_id=max(topics, default=0) + 1, timestamp=recorded, data=bytes(ROS2.serialize_cdr(said, DIAGNOSTICS)))
-    base.commit()
-    base.close()
-    original.close()
-
-
-def insert(base, table, **values):
-    """Adds a row; old releases lack the table of types, and columns."""
-    columns = [row[1] for row in base.execute(f"PRAGMA table_info({table})") if row[1] != "id" or "id" in values]
-    if columns:
-        places = ", ".join("?" * len(columns))
-        base.execute(f"INSERT INTO {table} ({', '.join(columns)}) VALUES ({places})", [values.get(column, "") for column in columns])
