@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import unittest
 from pathlib import Path
 
@@ -79,9 +80,19 @@ class Board(unittest.TestCase):
                 self.board().run(*arguments)
 
     def test_the_example(self):
-        done = subprocess.run([sys.executable, Path(__file__).parents[1] / "example.py", DRIVE], capture_output=True, text=True,
-                              env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
+        def example(*arguments):
+            return subprocess.run([sys.executable, Path(__file__).parents[1] / "example.py", *arguments], capture_output=True, text=True,
+                                  env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
+
+        done = example(DRIVE)
         yaw = re.search(r"yaw at the end: ([\d.]+) deg by the board, ([\d.]+) deg by the gyro alone\ntrue yaw ([\d.]+) deg", done.stdout)
         self.assertIsNotNone(yaw, done.stdout + done.stderr)
         board, gyro, truth = map(float, yaw.groups())
         self.assertLess(abs(board - truth), abs(gyro - truth))
+        lines = DRIVE.read_text().splitlines()
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "d.csv"
+            for rows, words in ((lines[:1] + lines[3000:], "d.csv: row .*moves"), (lines[:200], "199 rows, of which none"), ([__doc__], "not a drive")):
+                path.write_text("\n".join(rows) + "\n")
+                self.assertRegex(example(path).stderr, rf"^[^\n]*{words}[^\n]*\n$")
+        self.assertRegex(example().stderr, r"^[^\n]*python example.py DRIVE.csv\n$")
