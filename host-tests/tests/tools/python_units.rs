@@ -38,7 +38,7 @@ fn the_unit_tests_of_the_python_package_pass() {
     if !wheel {
         command.env("PYTHONPATH", &folder);
     }
-    pass(test, &mut command, ".", if wheel { 56 } else { 46 });
+    pass(test, &mut command, ".", if wheel { 63 } else { 53 });
 }
 
 /// Writes the log and the table of `gyronet replay` for the simulated drive.

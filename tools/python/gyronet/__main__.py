@@ -88,7 +88,7 @@ def vehicle_of(args):
 
     first = Path(args.files[0]).resolve()
     own, shared = first.with_suffix(".toml"), first.with_name("vehicle.toml")
-    own = own if not args.vehicle and own.is_file() else None
+    own = own if own.is_file() and (not args.vehicle or own == Path(args.vehicle).resolve()) else None
     path = own or args.vehicle or (shared if shared.is_file() else None)
     vehicle = Vehicle.read(path) if path else Vehicle()
     # A drive's own file: its rows are turned already, and its names are those of the original logs.
@@ -97,12 +97,14 @@ def vehicle_of(args):
     else:
         vehicle.of_log()
     if args.command == "import" and args.out:
-        written = [Path(args.out).resolve(), Path(args.out).with_suffix(".toml").resolve()]
-        for read in [*args.files, *([vehicle.path] if vehicle.path else [])]:
-            if Path(read).resolve() in written:
-                raise Refused(f"{read}: --out would overwrite it; give the drive another name")
-        if Path(args.out).suffix == ".toml":
-            raise Refused(f"{args.out}: the drive is a CSV file; its vehicle file has that suffix")
+        out, beside = Path(args.out), Path(args.out).with_suffix(".toml")
+        if out.suffix == ".toml":
+            raise Refused(f"{out}: the drive is a CSV file; its vehicle file has that suffix")
+        for read in args.files:
+            if Path(read).resolve() in (out.resolve(), beside.resolve()):
+                raise Refused(f"{read}: --out would overwrite it, a log of this import; give the drive another name")
+        if beside.is_file() and (vehicle.path and beside.samefile(vehicle.path) or "[recording" not in beside.read_text(errors="replace")):
+            raise Refused(f"{beside}: --out {out} would overwrite this vehicle file by the drive's own; give the drive another name")
     if dbc := args.dbc or vehicle.bus["dbc"]:
         vehicle.bus["dbc"] = os.path.abspath(dbc)
     for name in ("imu", "odometry", "position"):
@@ -114,6 +116,7 @@ def drive_of(args):
     from gyronet import progress
     from gyronet.logs import Drive, Request
     from gyronet.units import Flags
+    from gyronet.vehicle import COLUMNS
 
     progress.QUIET = args.quiet
     if not 0 <= args.start < 1e6 or args.to is not None and not args.start < args.to:
@@ -132,7 +135,10 @@ def drive_of(args):
     vehicle = vehicle_of(args)
     flags = Flags(args.unit)
     for name in [name for name in flags if isinstance(name, str)]:
-        vehicle.columns.setdefault(name, {"name": name, "unit": flags[name]})
+        given = ", ".join(unit for key, unit in flags.items() if isinstance(key, tuple) and key[0] == name)
+        vehicle.columns[name] = {**vehicle.columns.get(name, {}), "unit": given}
+    for name in set(vehicle.columns) - set(COLUMNS):
+        flags.add(name, vehicle.columns[name]["unit"], vehicle.path)
     return Drive(Request(args.files, vehicle, args.same_clock, args.stamps == "recorded", args.start, args.to, flags, offsets, args.rate))
 
 

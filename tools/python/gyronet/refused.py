@@ -9,3 +9,16 @@ def listed(names, before="; there are ", most=20):
     names = list(names)
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return before + ", ".join(names[:most]) + more if names else ""
+
+
+def gathered(*calls):
+    """What the calls return; what any of them refuse, in one line."""
+    found, said = [], []
+    for call in calls:
+        try:
+            found.append(call())
+        except Refused as error:
+            said.append(str(error))
+    if said:
+        raise Refused("; ".join(said))
+    return found

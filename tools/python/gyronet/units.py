@@ -27,11 +27,11 @@ KNOWN = [
     ("angle", 1.0, "rad"),
     ("angle", DEG, "deg|°|degree|degrees"),
     ("angle", 1e-7 * DEG, "1e-7deg|1e-7°|dege7|deg*1e7|1e7deg"),
-    ("length", 1.0, "m|meter|metre"),
-    ("length", 1e-3, "mm"),
+    ("temperature", 1.0, "degc|°c|c|celsius|degcelsius"),
 ]
 BY_NAME = {name: (kind, scale, names.split("|")[0]) for kind, scale, names in KNOWN for name in names.split("|")}
-EXAMPLES = {"wheel": "km/h", "rate": "deg/s", "speed": "km/h", "time": "ms", "acceleration": "g", "angle": "1e-7deg", "length": "m"}
+EXAMPLES = {"wheel": "km/h", "rate": "deg/s", "speed": "km/h", "time": "ms", "acceleration": "g", "angle": "1e-7deg", "temperature": "degC"}
+LISTED = "known are " + ", ".join(names.split("|")[0] for _, _, names in KNOWN)
 
 
 def find(unit):
@@ -51,24 +51,36 @@ def scale(name, unit, dimensions, what):
 
 
 class Flags(dict):
-    """The units of --unit, by name and by (name, dimension); remembers which were asked for."""
+    """The units of --unit and of a vehicle file, by name and by (name, dimension); remembers which were asked for."""
 
     def __init__(self, flags=()):
         super().__init__()
-        self.asked = set()
+        self.asked, self.of_file = set(), {}
         for flag in flags:
             name, equals, unit = flag.rpartition("=")
             if not equals or not name:
                 raise Refused(f"--unit {flag}: write NAME=UNIT, such as WHEELS.FL=km/h")
             if not find(unit):
-                raise Refused(f"--unit {flag}: unknown unit; known are {', '.join(row[2].split('|')[0] for row in KNOWN)}")
+                raise Refused(f"--unit {flag}: unknown unit; {LISTED}")
             self[name] = self[name, find(unit)[0]] = unit
+
+    def add(self, name, said, path):
+        """Units of a channel or column by a vehicle file, where --unit gives none."""
+        for unit in said.split(", "):
+            key = name, find(unit)[0]
+            if key not in self:
+                self[key] = unit
+                self.setdefault(name, unit)
+                self.of_file[key] = path
 
     def get(self, key, default=None):
         self.asked.add(key)
         return super().get(key, default)
 
-    def check(self):
-        for name, dimension in (key for key in self if isinstance(key, tuple)):
-            if not self.asked & {name, (name, dimension)}:
-                raise Refused(f"--unit {name}={self[name, dimension]}: no channel or column of that name is used with such a unit")
+    def check(self, unused=()):
+        """Refuses a unit that nothing asked for; a vehicle file may have those of channels that are not used."""
+        for key in (key for key in self if isinstance(key, tuple)):
+            path, (name, _) = self.of_file.get(key), key
+            if not self.asked & {name, key} and not (path and name in unused):
+                said = f"{path}: the unit {self[key]} of columns.{name}" if path else f"--unit {name}={self[key]}"
+                raise Refused(f"{said}: no channel or column of that name is used with such a unit")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gyronet import units
 from gyronet.refused import Refused
 
 RADIUS = 0.289  # m; that of the recorded car
@@ -18,6 +19,13 @@ KEYS = {
     "bus": {"dbc": None},
 }
 WHEELS = ["front_right", "rear_right", "front_left", "rear_left"]  # the order of a drive's columns
+IMU_COLUMNS = ["acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z"]
+WHEEL_COLUMNS = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"]
+POSITION = ["gnss_lat", "gnss_lon"]
+# What a drive has besides, as it is: column, and dimension of its unit.
+CARRIED = {"ref_yaw": "angle", "ref_yaw_sigma": "angle", "gnss_speed": "speed", "course": "angle", "course_sigma": "angle", "temp_c": "temperature"}
+NUMBERS = ["ref_gyr_z", *WHEEL_COLUMNS, *CARRIED]  # columns that are channels of their own
+COLUMNS = ["t_s", *IMU_COLUMNS, *POSITION, *NUMBERS]  # of a drive: the keys of [columns]
 
 
 class Vehicle:
@@ -89,9 +97,13 @@ class Vehicle:
     def radius(self):
         return self.wheels["radius_m"] or RADIUS
 
-    def unit_of(self, name):
-        """The unit that [columns] gives a channel of that name."""
-        return next((column.get("unit") for column in self.columns.values() if column["name"] == name), None)
+    def unit(self, flags, ours, name):
+        """The unit that is given for a column of ours, by its own name or the log's."""
+        return flags.get(ours) or flags.get(name) or self.columns.get(ours, {}).get("unit")
+
+    def column(self, ours):
+        """The name of a log's column that [columns] gives for ours, if it does."""
+        return self.columns.get(ours, {}).get("name")
 
     def turn(self, vectors):
         """Rows of x, y, z from the sensor's axes to the vehicle's."""
@@ -110,9 +122,18 @@ class Vehicle:
         return "\n".join(lines) + "\n"
 
 
-def _column(path, name, entry):
-    if not isinstance(entry, dict) or "name" not in entry or set(entry) - {"name", "unit"}:
-        raise Refused(f'{path}: columns.{name}: write {{ name = "...", unit = "..." }}')
+def _column(path, key, entry):
+    """Name and unit of a column of ours; under the name of a log's column or channel, its unit alone."""
+    entry = {"name": entry} if isinstance(entry, str) else entry
+    if not isinstance(entry, dict) or not entry or set(entry) - {"name", "unit"} or not all(isinstance(value, str) and value for value in entry.values()):
+        raise Refused(f'{path}: columns.{key}: write "NAME" or {{ name = "...", unit = "..." }}')
+    if key not in COLUMNS and entry.get("name") == key:
+        entry = {"unit": entry["unit"]} if "unit" in entry else {}
+    if key not in COLUMNS and "name" in entry or not entry:
+        raise Refused(f"{path}: unknown key columns.{key}; known are {', '.join(COLUMNS)}; a log's own name has a unit alone: NAME = {{ unit = \"km/h\" }}")
+    for unit in entry.get("unit", "s").split(", "):
+        if not units.find(unit):
+            raise Refused(f"{path}: columns.{key}: unknown unit {unit}; {units.LISTED}")
     return entry
 
 

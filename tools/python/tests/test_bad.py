@@ -34,6 +34,7 @@ ARGUMENTS = [
     (["absent.csv"], "no such file"),
     (["d.csv", "d.csv"], "given twice"),
     (["others"], "neither metadata.yaml"),
+    (["tables"], "tables: a folder of text tables: name those of one drive: tables/a.csv"),
     (["d.csv", "--from", "11"], "a drive is 3 s to a day long"),
     (["d.csv", "--from", "5", "--to", "4"], "--from below --to"),
     (["d.csv", "--unit", "acc_x"], "write NAME=UNIT"),
@@ -55,6 +56,8 @@ class Bad(made.Case):
         made.table(self.folder / "slow.csv", 5 * t, made.imu(t))
         (self.folder / "others").mkdir()
         (self.folder / "others" / "photo.jpg").write_bytes(b"\xff\xd8")
+        (self.folder / "tables").mkdir()
+        (self.folder / "tables" / "a.csv").touch()
         (self.folder / "bad.toml").write_text("[wheels]\nradius = 0.3\n")
         (self.folder / "long.toml").write_text("[wheels]\nradius_m = 30\n")
 
@@ -113,7 +116,7 @@ class Bad(made.Case):
         text = (self.folder / "o.toml").read_text()
         written = tomllib.loads(text)
         self.assertEqual((written["mounting"]["yaw_deg"], written["recording"]["mounting"]["yaw_deg"], written["wheels"]["radius_m"]), (0.0, 90.0, 0.31))
-        self.assertEqual(written["columns"], {"acc_x": {"name": "acc_x", "unit": "m/s^2"}})
+        self.assertEqual(written["columns"], {"acc_x": {"unit": "m/s^2"}})
         self.assertEqual((written["recording"]["units"], written["recording"]["dropped"]), ({"imu": "m/s^2, rad/s"}, {}))
         self.assertEqual(made.run(self.folder, "import", "o.csv", "--out", "p.csv")[0], 0)
         self.assertEqual((self.folder / "p.csv").read_text(), (self.folder / "o.csv").read_text())

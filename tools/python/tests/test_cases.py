@@ -8,7 +8,7 @@ import can
 import numpy as np
 
 import made
-from made import START, VEHICLE, Case, bus, dbc, frames, imu, run, table, times
+from made import START, VEHICLE, Case, bus, dbc, frames, imu, table, times
 
 SAME = ["--same-clock", "--vehicle", "v.toml", "--out", "out.csv"]
 

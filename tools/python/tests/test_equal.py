@@ -13,7 +13,7 @@ from rosbags.highlevel import AnyReader
 
 from gyronet.logs import opened
 from gyronet.logs.can import Bus
-from gyronet.logs.drive import Request
+from gyronet.logs.opened import Request
 import made
 
 DATA = Path(os.environ.get("GYRONET_DATA", "/nonexistent")) / "logs"
@@ -26,26 +26,20 @@ def channels(path, bus=None):
 class Equal(made.Case):
     def test_random_dbc_files_as_cantools(self):
         rng = random.Random(36)
-        for number in range(300):
-            path, at, signals, names = self.folder / "car.dbc", 0, [], []
-            multiplexed = rng.random() < 0.4
-            if multiplexed:
-                signals.append(' SG_ Page M : 0|2@1+ (1,0) [0|3] "" E')
-                at = 8
-            while at < 60:
-                bits = min(rng.randint(1, 20), 64 - at)
-                sign = rng.choice("+-") if bits > 1 else "+"
-                motorola = rng.random() < 0.4
-                start = 8 * (at // 8) + 7 - at % 8 if motorola else at
-                if not motorola or at % 8 + bits <= 8:  # of both orders in one message only what cannot overlap
-                    names.append(f"S{len(names)}")
-                    page = f" m{rng.randrange(3)}" if multiplexed and rng.random() < 0.7 else ""
-                    factor, offset = rng.choice([1, 0.01, -0.5, 3e-3]), rng.choice([0, -40, 12.5])
-                    signals.append(f' SG_ {names[-1]}{page} : {start}|{bits}@{0 if motorola else 1}{sign} ({factor},{offset}) [0|0] "m" E')
-                at += bits + rng.randint(0, 5) + (8 - at % 8 if motorola else 0)
+        for _ in range(300):
+            path, at, names, multiplexed = self.folder / "car.dbc", 8, [], rng.random() < 0.4
+            signals = [f' SG_ Page {"M " * multiplexed}: 0|2@1+ (1,0) [0|3] "" E']
+            while at < 56:
+                bits, intel = rng.randint(1, min(20, 64 - at)), rng.randint(0, 1)
+                place, sign = rng.randint(0, -bits % 8), rng.choice("+-") if bits > 1 else "+"
+                names.append(f"S{len(names)}")
+                page = f" m{rng.randrange(3)}" if multiplexed and rng.random() < 0.7 else ""
+                factor, offset = rng.choice([1, 0.01, -0.5, 3e-3]), rng.choice([0, -40, 12.5])
+                signals.append(f' SG_ {names[-1]}{page} : {at + place if intel else at + 7 - place}|{bits}@{intel}{sign} ({factor},{offset}) [0|0] "m" E')
+                at += 8 * -(-bits // 8)
             extended = rng.random() < 0.3
             identifier = rng.randrange(0x800, 1 << 29) | 1 << 31 if extended else rng.randrange(0x800)
-            made.dbc(path, identifier, name="M", signals=signals or [' SG_ S0 : 0|8@1+ (1,0) [0|0] "m" E'])
+            made.dbc(path, identifier, name="M", signals=signals)
             bus, reference = Bus(str(path), [f"M.{name}" for name in names]), cantools.database.load_file(path, strict=False)
             for k in range(20):
                 data, log = rng.randbytes(8), opened.Log("x")

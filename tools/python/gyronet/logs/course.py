@@ -13,14 +13,14 @@ SLOWEST, WORST, LONGEST, LEAST_SCATTER, METRES = 1.0, 0.15, 4.0, 0.01, 111_320.0
 
 def courses(rows):
     """Rows of time, course (rad to the left, unwrapped), its standard deviation and speed."""
-    found = by_velocity(rows) if np.isfinite(rows[:, 4]).any() else by_positions(rows) if len(rows) > 3 else []
+    found = by_velocity(rows) if np.isfinite(rows[:, 3]).any() else by_positions(rows) if len(rows) > 3 else []
     found = np.array(found, float).reshape(-1, 4)
     found[:, 1] = np.unwrap(found[:, 1])
     return found
 
 
 def by_velocity(rows):
-    seconds, _, _, _, speed, clockwise, sigma = rows.T
+    seconds, _, _, speed, clockwise, sigma = rows.T
     good = (speed >= SLOWEST) & (sigma > 0) & (sigma < WORST) & np.isfinite(clockwise)
     return np.column_stack([seconds, -clockwise, sigma, speed])[good]
 

@@ -2,8 +2,8 @@
 
 import os
 from contextlib import suppress
-from dataclasses import dataclass, field
 from datetime import datetime, timezone
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,70 +11,37 @@ import numpy as np
 from gyronet import units
 from gyronet.logs import clocks, course, grid, opened, select
 from gyronet.logs.can import Bus
-from gyronet.units import Flags
 from gyronet.logs.used import Used
-from gyronet.vehicle import RADIUS, WHEELS, Vehicle
-from gyronet.refused import Refused
+from gyronet.refused import Refused, gathered
+from gyronet.vehicle import CARRIED, IMU_COLUMNS, POSITION, RADIUS, WHEEL_COLUMNS, WHEELS
 
 SHORTEST, LONGEST = 3.0, 86_400.0
 RATES = (24.5, 1_020.0)
 CHUNK = 50_000  # rows in memory
 DAY = 1e9  # s: later stamps are times of day
-NAMES = ["t_s", *select.IMU_COLUMNS, "ref_gyr_z", "ref_yaw", "ref_yaw_sigma", "gnss_speed", *select.COLUMNS, "gnss_lat", "gnss_lon", "course", "course_sigma", "temp_c"]
+NAMES = ["t_s", *IMU_COLUMNS, "ref_gyr_z", "ref_yaw", "ref_yaw_sigma", "gnss_speed", *WHEEL_COLUMNS, *POSITION, "course", "course_sigma", "temp_c"]
 ROLES = [f"wheel {name.replace('_', ' ')}" for name in WHEELS]
-
-
-@dataclass
-class Request:
-    files: list
-    vehicle: Vehicle = field(default_factory=Vehicle)
-    same_clock: bool = False
-    recorded: bool = False  # the recording times of a bag in place of the header stamps
-    start: float = 0.0  # s after the first sample
-    to: float | None = None
-    units: Flags = field(default_factory=Flags)
-    offsets: dict = field(default_factory=dict)
-    rate: float | None = None
-
-    def wanted(self):
-        names = [self.vehicle.wheels[wheel] for wheel in WHEELS] + [self.vehicle.signals["reference_rate"]]
-        return [name for name in names if name] + [*select.COLUMNS, *select.CARRIED, "ref_gyr_z"]
-
-
-def merged(logs):
-    """Joins the parts of a split recording: the same channels, one after the other."""
-    whole = []
-    for log in sorted(logs, key=lambda log: min([channel.first for channel in log.channels.values()], default=0.0)):
-        before = next((other for other in whole if _goes_on(other, log)), None)
-        if before is None:
-            whole.append(log)
-            continue
-        before.notes.append(f"{log.path} goes on where {before.path} ends")
-        for name, channel in log.channels.items():
-            before.channels.setdefault(name, channel).append(channel)
-        before.dropped.update(log.dropped)
-        before.passed.update(log.passed)
-    return whole
-
-
-def _goes_on(before, log):
-    common = set(before.channels) & set(log.channels)
-    same = common and not common & {"imu", "gyro", "accel", "position"}
-    return same and all(log.channels[name].first >= before.channels[name].last - 1.0 for name in common)
 
 
 class Drive:
     def __init__(self, request):
         self.request, self.vehicle = request, request.vehicle
-        self.report, self.warnings = [], []
+        self.warnings = []
         bus = Bus(self.vehicle.bus["dbc"], request.wanted())
         paths = opened.expand(request.files)
-        logs = merged([opened.read(path, request, bus, len(paths) > 1) for path in paths])
-        self.logs = logs
-        self.dropped = {f"{log.path}: {reason}": count for log in logs for reason, count in log.dropped.items()}
+        logs = [opened.read(path, request, bus, len(paths) > 1) for path in paths]
+        self.report = opened.check_columns(self.vehicle, logs)
+        self.logs = logs = opened.merged(logs)
         files = select.Files(logs, bus)
         self.choose(files)
+        self.dropped = {}
         for log in logs:
+            unused = set(log.channels) - {used.name for used in self.used()}
+            for reason, count in log.dropped.items():
+                if reason.partition(": ")[0] in unused:
+                    log.passed[reason] += count
+                else:
+                    self.dropped[f"{log.path}: {reason}"] = count
             self.report += [f"{log.path}: {note}" for note in log.notes]
             if passed := +log.passed:
                 self.report.append(f"{log.path}: {passed.total()} records that this drive does not need: {', '.join(list(passed)[:6])}")
@@ -96,23 +63,26 @@ class Drive:
         def used(role, entry):
             return Used(role, entry, request) if entry else None
 
-        gyro, accel = files.imu(signals["imu"])
+        def motion():
+            wheels = files.wheels(self.vehicle)
+            # If wheels are found, no odometry is needed.
+            return wheels, files.one("odometry", signals["odometry"] or any(wheels) and "none")
+
+        (gyro, accel), (wheels, odometry), position = gathered(lambda: files.imu(signals["imu"]), motion, lambda: files.one("position", signals["position"]))
         if gyro is accel:
             self.gyro = self.accel = used("imu", gyro)
         else:
             self.gyro, self.accel = used("gyro", gyro), used("accelerometer", accel)
         self.accel.check_gravity()
-        wheels = files.wheels(self.vehicle)
-        self.wheels = list(map(used, ROLES, wheels))
+        self.wheels = gathered(*(partial(used, role, wheel) for role, wheel in zip(ROLES, wheels)))
         name = signals["reference_rate"] or ("ref_gyr_z" if any(c.name == "ref_gyr_z" for _, c in files.all) else None)
         self.reference = used("reference rate", name and files.named("the reference rate", name, ("number", "imu", "gyro", "odometry")))
-        # If wheels are found, no odometry is needed.
-        self.odometry = used("odometry", files.one("odometry", signals["odometry"] or any(wheels) and "none"))
-        self.position = used("position", files.one("position", signals["position"]))
+        self.odometry, self.position = used("odometry", odometry), used("position", position)
         self.courses = course.courses(self.position.channel.rows()) if self.position else np.empty((0, 4))
         if unknown := set(request.offsets) - {channel.name for _, channel in files.all}:
             raise Refused(f"--offset {min(unknown)}: no such channel" + files.listed(files.all))
-        request.units.check()
+        known = {name for log in self.logs for name in [*log.channels, *(log.columns or ())]}
+        request.units.check(known - {used.name for used in self.used()})
 
     def used(self):
         roles = [self.gyro, self.accel, self.reference, self.odometry, self.position, *self.wheels]
@@ -131,10 +101,12 @@ class Drive:
             if not RATES[0] <= used.hz <= RATES[1]:
                 raise Refused(f"{used.name}: {used.hz:.4g} Hz by the median period, {used.channel.rate:.4g} Hz by count and span, "
                               "but an IMU needs 25 to 1000 Hz; is the time's unit right? --unit t_s=ms")
-        seconds = last - self.start
-        if not SHORTEST <= seconds < LONGEST:
-            raise Refused(f"{self.gyro.name}: {seconds:.2f} s, but a drive is 3 s to a day long; --from and --to choose a part")
-        self.count = int(seconds / grid.DT) + 1
+        self.length = last - self.start
+        if request.start and self.length < 0:
+            raise Refused(f"--from {request.start:g} is after the end, {last - first:.1f} s")
+        if not SHORTEST <= self.length < LONGEST:
+            raise Refused(f"{self.gyro.name}: {self.length:.2f} s, but a drive is 3 s to a day long; --from and --to choose a part")
+        self.count = int(self.length / grid.DT) + 1
 
     def apart(self, used):
         (a, b), (c, d) = self.gyro.span(), used.span()
@@ -145,12 +117,11 @@ class Drive:
         fixes, offset = self.position.channel.rows()[:, :3] if self.position else np.empty((0, 3)), self.position.offset if self.position else 0
         self.gnss = [(slice(15, 17), *self.placed(fixes, offset))]
         log, carried = self.logs[self.gyro.file], []
-        for name, dimension in select.CARRIED.items():
-            channel = log.channels.get(name) if log.is_table else None
+        for name, dimension in CARRIED.items():
+            channel = log.channels.get(name)
             if channel is None or channel.kind != "number":
                 continue
-            unit = self.request.units.get(name) or channel.unit
-            scale = units.scale(name, unit, [dimension], f"{name} column")[0] if unit and dimension else 1.0
+            scale = units.scale(name, channel.unit, [dimension], f"{name} column")[0] if channel.unit else 1.0
             column = NAMES.index(name)
             self.gnss.append((slice(column, column + 1), *self.placed(channel.rows() * [1.0, scale], self.request.offsets.get(name, 0.0))))
             carried.append(name)
@@ -218,12 +189,17 @@ class Drive:
             if not used.filled:
                 used.remarks.append("no course: it stands, is too slow or too noisy")
         for used in self.used():
-            self.report.append(used.line(self.start, self.rows))
-        if (self.odometry or any(wheel and wheel.dimension == "speed" for wheel in self.wheels)) and not self.vehicle.wheels["radius_m"]:
-            track = " and track 0 m (both wheels at the vehicle's speed)" if self.odometry and not self.vehicle.wheels["track_m"] else ""
-            self.report.append(f"wheels: radius {RADIUS} m{track} is assumed; set wheels.radius_m{' and wheels.track_m' if track else ''} in a --vehicle file")
+            self.report.append(used.line(self.start, self.length, self.rows))
+        rates, given = any(wheel and wheel.dimension == "rate" for wheel in self.wheels), self.vehicle.wheels
+        if (self.odometry or any(self.wheels)) and not given["radius_m"]:
+            why = "speeds and paths scale with it" if rates else "paths do not depend on it, since speeds are given"
+            self.report.append(f"wheels: radius {RADIUS} m is assumed ({why}); set wheels.radius_m in a --vehicle file")
+            given["radius_m"] = None if rates else RADIUS  # by which the drive's rates are made of speeds
+        if self.odometry and not given["track_m"]:
+            self.report.append("wheels: track 0 m is assumed (both at the vehicle's speed); set wheels.track_m in a --vehicle file")
         if not self.seen[7:10].any():
-            self.report.append("no GNSS position (in a bag: sensor_msgs/NavSatFix) and no reference: no method can be judged by this drive")
+            lacks = "no course" if self.position else "no GNSS position (sensor_msgs/NavSatFix, columns gnss_lat and gnss_lon)"
+            self.report.append(f"{lacks} and no reference: no method can be judged by this drive")
         if self.count > self.rows:
             self.report.append(f"imu: {self.count - self.rows} of {self.count} rows are in gaps and left out")
 

@@ -7,7 +7,7 @@ from asammdf import MDF
 
 from gyronet import units
 from gyronet.logs import can
-from gyronet.logs.select import IMU_COLUMNS
+from gyronet.vehicle import IMU_COLUMNS, NUMBERS, POSITION
 from gyronet.refused import Refused, listed
 
 
@@ -44,22 +44,24 @@ class Signals:
         return scale * signal.timestamps + self.start, signal.samples.astype(float), signal.unit
 
     def give(self, log):
-        mapped = self.vehicle.columns
-        names = {ours: mapped.get(ours, {}).get("name", ours) for ours in IMU_COLUMNS}
-        for half, kind in ((IMU_COLUMNS[:3], "accel"), (IMU_COLUMNS[3:], "gyro")):
-            if all(names[ours] in self.mdf for ours in half):
+        log.columns, log.mapped = sorted(self.mdf.channels_db), {"t_s"}  # each group of signals has its time
+        names = {ours: log.find(ours, self.vehicle, lambda name: name if name in self.mdf else None) for ours in [*IMU_COLUMNS, *POSITION, *NUMBERS]}
+        for half, kind, dimension in ((IMU_COLUMNS[:3], "accel", "acceleration"), (IMU_COLUMNS[3:], "gyro", "rate"), (POSITION, "position", "angle")):
+            if all(names[ours] for ours in half):
                 axes, columns = [self.get(names[ours]) for ours in half], []
                 if any(len(axis[0]) != len(axes[0][0]) or (axis[0] != axes[0][0]).any() for axis in axes):
                     raise Refused(f"{self.path}: {', '.join(names[ours] for ours in half)} have different time stamps")
                 for ours, (_, values, unit) in zip(half, axes):
-                    unit = self.flags.get(ours) or self.flags.get(names[ours]) or mapped.get(ours, {}).get("unit") or unit
-                    columns.append(values * units.scale(names[ours], unit, ["acceleration" if kind == "accel" else "rate"], f"{kind} column")[0])
+                    unit = self.vehicle.unit(self.flags, ours, names[ours]) or unit or ("deg" if kind == "position" else "")
+                    columns.append(values * units.scale(names[ours], unit, [dimension], f"{kind} column")[0])
+                if kind == "position":
+                    columns = [*np.degrees(columns), *np.full((3, len(columns[0])), np.nan)]
                 log.channel(kind, kind).extend(np.column_stack([axes[0][0], *columns]))
-        for name in log.wanted or ():
-            name = name.rpartition(":")[2]
-            if name in self.mdf and name not in log.channels:
+        signals = {ours: names[ours] for ours in NUMBERS if names[ours]}
+        for ours, name in {**{name.rpartition(":")[2]: name.rpartition(":")[2] for name in log.wanted or ()}, **signals}.items():
+            if name in self.mdf and ours not in log.channels:
                 seconds, values, unit = self.get(name)
-                log.channel(name, "number", unit).extend(np.column_stack([seconds, values]))
+                log.channel(ours, "number", self.vehicle.unit(self.flags, ours, name) or unit).extend(np.column_stack([seconds, values]))
         others = set(self.mdf.channels_db) - {*log.channels, *names.values(), "t", "time"}
         log.passed.update({f"MDF signal {name}": 1 for name in sorted(others)[:64]})
         if not log.channels:

@@ -121,9 +121,7 @@ class Messages:
         if message.status.status < 0:
             self.log.passed[f"sensor_msgs/msg/NavSatFix of {topic} without a fix"] += 1
             return
-        variance = 0.5 * (message.position_covariance[0] + message.position_covariance[4])
-        sigma = math.sqrt(variance) if message.position_covariance_type > 0 and variance > 0 else math.nan
-        self.log.add(topic, "position", seconds, (message.latitude, message.longitude, sigma, math.nan, math.nan, math.nan))
+        self.log.add(topic, "position", seconds, (message.latitude, message.longitude, math.nan, math.nan, math.nan))
 
     def joint(self, topic, seconds, message):
         for name, rate in zip(message.name, message.velocity):

@@ -5,10 +5,13 @@ import tempfile
 import weakref
 from array import array
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 
-WIDTH = {"imu": 6, "gyro": 3, "accel": 3, "odometry": 2, "position": 6, "number": 1}
+from gyronet.refused import Refused, listed
+
+WIDTH = {"imu": 6, "gyro": 3, "accel": 3, "odometry": 2, "position": 5, "number": 1}
 NAMES = {"imu": "IMU", "number": "signal"}
 BLOCK = 1 << 16  # numbers in memory, of each channel
 STEP = 0.5  # s: a step back that is more than messages out of order
@@ -115,18 +118,32 @@ class Channel:
 class Log:
     """The channels of one file, and counts of what was not used."""
 
-    def __init__(self, path, wanted=None, recorded=False):
-        self.path, self.wanted, self.recorded = path, wanted, recorded
+    def __init__(self, path, wanted=None, recorded=False, several=False):
+        self.path, self.wanted, self.recorded, self.several = path, wanted, recorded, several
         self.channels, self.dropped, self.passed, self.notes = {}, Counter(), Counter(), []
-        self.is_table = False
+        self.columns, self.mapped = None, set()  # of a table: its names, and those of ours that the vehicle file finds
         self.epoch = None  # time of day at time 0, s, where the log gives it
 
     def channel(self, name, kind, unit=""):
         channel = self.channels.get(name)
         if channel is None:
-            kept = kind != "number" or self.wanted is None or any(want.endswith(name) for want in self.wanted)
-            channel = self.channels[name] = Channel(self, name, kind, unit, kept)
+            channel = self.channels[name] = Channel(self, name, kind, unit, kind != "number" or self.wants(name))
         return channel
+
+    def wants(self, name):
+        return self.wanted is None or any(want == name or want.endswith(":" + name) for want in self.wanted)
+
+    def find(self, ours, vehicle, find):
+        """What `find` finds under the name that the vehicle file gives a column of ours, as NAME or FILE:NAME; else under ours."""
+        name = vehicle.column(ours)
+        if not name:
+            return find(ours)
+        found = find(name.removeprefix(Path(self.path).name + ":"))
+        if found is not None:
+            self.mapped.add(ours)
+        elif not self.several:
+            raise Refused(f"{self.path}: no column {name}, which {vehicle.path} names for {ours}" + listed(self.columns, "; the columns are "))
+        return found
 
     def add(self, name, kind, seconds, values, unit=""):
         channel = self.channel(name, kind, unit)

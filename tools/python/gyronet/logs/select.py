@@ -2,13 +2,9 @@
 
 from pathlib import Path
 
-from gyronet.vehicle import WHEELS
+from gyronet.vehicle import WHEEL_COLUMNS, WHEELS
 from gyronet.refused import Refused, listed
 
-IMU_COLUMNS = ["acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z"]
-COLUMNS = ["wheel1_rate", "wheel2_rate", "wheel3_rate", "wheel4_rate"]
-# What a drive has besides, as it is: column, and dimension of its unit.
-CARRIED = {"ref_yaw": "angle", "ref_yaw_sigma": "angle", "gnss_speed": "speed", "course": "angle", "course_sigma": "angle", "temp_c": None}
 # Of these two only the first is a drive's: every PX4 log since 1.13 has both.
 PREFERRED = ("vehicle_gps_position", "sensor_gps")
 
@@ -44,6 +40,8 @@ class Files:
         if found:
             return found[0]
         why = self.bus.missing(name.partition(":")[2] or name) if self.bus.path else ""
+        if kinds == ("position",) and any(log.columns for log in self.logs):
+            why += "; in a table it is the columns gnss_lat and gnss_lon, which [columns] of a vehicle file can name"
         others = self.of(*kinds)
         seen = sorted(set(self.bus.candidates())) if kinds != ("imu",) and self.bus.path else []
         raise Refused(f"no channel {name} for {role}{why}" + (self.listed(others) or listed(seen)) + ("" if why else self.passed()))
@@ -51,7 +49,7 @@ class Files:
     def one(self, kind, name):
         """The only channel of a kind, or the one of a name."""
         if name:
-            return None if name == "none" else self.named(kind, name, (kind,))
+            return None if name == "none" else self.named(f"the {kind}", name, (kind,))
         found = self.of(kind)
         names = [channel.name for _, channel in found]
         if len(found) == 2 and sorted(names) == sorted(PREFERRED):
@@ -89,8 +87,7 @@ class Files:
         raise Refused(lacks + self.listed(self.all) + self.passed())
 
     def wheels(self, vehicle):
-        names = [vehicle.wheels[wheel] for wheel in WHEELS]
-        if names == [None] * 4:
-            have = {channel.name for _, channel in self.of("number")}
-            names = [name if name in have else None for name in COLUMNS]
+        names, have = [vehicle.wheels[wheel] for wheel in WHEELS], {channel.name for _, channel in self.of("number")}
+        named = [column for column in WHEEL_COLUMNS if vehicle.column(column) or not any(names)]
+        names = [name or (column if column in have and column in named else None) for name, column in zip(names, WHEEL_COLUMNS)]
         return [self.named("a wheel", name, ("number",)) if name else None for name in names]

@@ -4,21 +4,18 @@ import csv
 import itertools
 import re
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pandas
 
 from gyronet import units
-from gyronet.logs.select import CARRIED, COLUMNS, IMU_COLUMNS
 from gyronet.refused import Refused, listed
+from gyronet.vehicle import CARRIED, COLUMNS, IMU_COLUMNS, NUMBERS, POSITION
 
-POSITION = ["latitude", "longitude", "position_sigma", "ground_speed", "course", "course_sigma"]
 # Names that common exports use for the same column in the same unit.
 KNOWN = {"t_s": ["time_s", "timestamp_s", "timestamps"], **{name: [name.title()] for name in IMU_COLUMNS},
-         **{name: [] for name in POSITION}, "latitude": ["Latitude", "gnss_lat"], "longitude": ["Longitude", "gnss_lon"]}
-DIMENSION = {"t_s": "time", **dict(zip(POSITION, ["angle", "angle", "length", "speed", "angle", "angle"])),
-             **dict(zip(IMU_COLUMNS, 3 * ["acceleration"] + 3 * ["rate"]))}
+         "gnss_lat": ["latitude", "Latitude"], "gnss_lon": ["longitude", "Longitude"], "gnss_speed": ["ground_speed"]}
+DIMENSION = {"t_s": "time", **dict(zip(IMU_COLUMNS, 3 * ["acceleration"] + 3 * ["rate"])), "gnss_lat": "angle", "gnss_lon": "angle"}
 REMARKS = 1_000  # lines before the header
 ROWS = 50_000  # in memory
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*([eE][+-]?\d+)?|\.\d+([eE][+-]?\d+)?|nan|inf)$", re.IGNORECASE)
@@ -66,41 +63,37 @@ class Header:
 class Columns:
     """Where our columns are in a table, and their scales."""
 
-    def __init__(self, path, header, vehicle, flags, several):
+    def __init__(self, path, header, vehicle, flags, log):
         self.path, self.names, self.units, self.flags, self.vehicle = path, header.names, header.units, flags, vehicle
-        self.places, self.scales = {}, {}
-        for ours, others in KNOWN.items():
-            if ours in vehicle.columns:
-                place = self.mapped(ours, several)
-            else:
-                place = next((at for at in map(self.column, [ours, *others]) if at is not None), None)
-            if place is not None:
-                self.places[ours], self.scales[ours] = place, self.scale(ours, place)
+        log.columns = header.names
+        found = {ours: log.find(ours, vehicle, self.column) for ours in COLUMNS}
+        self.places = {ours: place for ours, place in found.items() if place is not None}
+        for group in (IMU_COLUMNS[:3], IMU_COLUMNS[3:], POSITION):
+            if missing := [ours for ours in group if ours not in self.places]:
+                for ours in group:
+                    if self.places.pop(ours, None) is not None and vehicle.column(ours):
+                        raise Refused(f"{path}: {vehicle.path} names {ours}, but {missing[0]} is missing" + listed(self.names, "; the columns are "))
+        self.scales = {ours: self.scale(ours, self.places[ours]) for ours in DIMENSION if ours in self.places}
 
     def column(self, name):
         """The index of a column; a leading # belongs to the header, and the unit in brackets may be left out."""
-        for at, own in enumerate(self.names):
-            if name.lstrip("# ") in (own, re.sub(r"\s*[\[(][^\])]*[\])]$", "", own)) or name == own:
-                return at
+        for name in [name, *KNOWN.get(name, [])]:
+            for at, own in enumerate(self.names):
+                if name.lstrip("# ") in (own, re.sub(r"\s*[\[(][^\])]*[\])]$", "", own)) or name == own:
+                    return at
         return None
 
-    def mapped(self, ours, several):
-        """The index of a column that the vehicle file names, as NAME or FILE:NAME."""
-        name = self.vehicle.columns[ours]["name"].removeprefix(Path(self.path).name + ":")
-        at = self.column(name)
-        if at is None and not several:
-            raise Refused(f"{self.path}: no column {name}" + listed(self.names, "; the columns are "))
-        return at
+    def unit(self, ours, place):
+        return self.vehicle.unit(self.flags, ours, self.names[place]) or self.units.get(self.names[place])
 
     def scale(self, ours, place):
-        name, dimension = self.names[place], DIMENSION[ours]
-        unit = self.flags.get(ours) or self.flags.get(name) or self.vehicle.columns.get(ours, {}).get("unit") or self.units.get(name)
+        name, dimension, unit = self.names[place], DIMENSION[ours], self.unit(ours, place)
         if not unit:
             return 1.0
         if dimension == "rate" and (units.find(unit) or [""])[0] == "angle" and name not in self.units:
             raise Refused(f"{self.path}: {name}: {unit} is an angle, not a rate; write {unit}/s")
         scale = units.scale(name, unit, [dimension], f"{dimension} column")[0]
-        return scale / units.DEG if ours in ("latitude", "longitude") else scale
+        return scale / units.DEG if ours in POSITION else scale
 
     def add(self, log, seconds, rows):
         """Gives the columns of some rows to the log's channels."""
@@ -115,18 +108,25 @@ class Columns:
             kind = "imu" if len(halves) == 2 else "accel" if all(has_force) else "gyro"
             log.channel(kind, kind).extend(np.column_stack([seconds, *halves]))
         fix, has_fix = scaled(POSITION)
-        if has_fix[0] and has_fix[1]:
-            known = np.isfinite(fix[:, :2]).all(axis=1)
+        if all(has_fix):
+            known = np.isfinite(fix).all(axis=1)
             if (wrong := known & ((np.abs(fix[:, 0]) > 90) | (np.abs(fix[:, 1]) > 360))).any():
-                latitude, longitude = fix[wrong][0, :2]
-                raise Refused(f"{self.path}: latitude {latitude:g}, longitude {longitude:g} are outside 90 and 360 degrees: another unit? "
-                              "--unit latitude=1e-7deg --unit longitude=1e-7deg")
-            log.channel("position", "position").extend(np.column_stack([seconds, fix])[known])
-        for at, name in enumerate(self.names):
-            if at not in self.places.values() or name in CARRIED:
-                unit = self.flags.get(name) or self.vehicle.unit_of(name) or self.units.get(name) or ("rad/s" if name in ("ref_gyr_z", *COLUMNS) else "")
-                known = np.isfinite(rows[:, at])
-                log.channel(name, "number", unit).extend(np.column_stack([seconds, rows[:, at]])[known])
+                latitude, longitude = fix[wrong][0]
+                flags = " ".join(f"--unit {self.names[self.places[ours]]}=1e-7deg" for ours in POSITION)
+                raise Refused(f"{self.path}: latitude {latitude:g}, longitude {longitude:g} are outside 90 and 360 degrees: another unit? {flags}")
+            log.channel("position", "position").extend(np.column_stack([seconds, fix, np.full((len(fix), 3), np.nan)])[known])
+        numbers = {ours: place for ours, place in self.places.items() if ours in NUMBERS}
+        others = {name: at for at, name in enumerate(self.names) if name not in numbers and self.is_other(at, log)}
+        for name, at in {**others, **numbers}.items():
+            ours = next((ours for ours, place in numbers.items() if place == at), name)
+            unit = self.unit(ours, at) or ("rad/s" if ours in NUMBERS and ours not in CARRIED else "")
+            known = np.isfinite(rows[:, at])
+            log.channel(name, "number", unit).extend(np.column_stack([seconds, rows[:, at]])[known])
+
+    def is_other(self, at, log):
+        """Whether a column is none of ours, or is wanted under its own name, too."""
+        ours = [ours for ours, place in self.places.items() if place == at]
+        return not ours or ours[0] in NUMBERS and log.wants(self.names[at])
 
 
 class Clock:
@@ -158,10 +158,11 @@ class Clock:
         return self.scale * counts
 
 
-def read(path, log, vehicle, flags, rate, several):
-    header, log.is_table = Header(path), True
-    columns = Columns(path, header, vehicle, flags, several)
+def read(path, log, vehicle, flags, rate):
+    header = Header(path)
+    columns = Columns(path, header, vehicle, flags, log)
     count, clock = len(header.names), None
+    seen = np.zeros(count + 1, bool)
     with open(path, encoding="utf-8-sig", errors="replace") as file, warnings.catch_warnings(record=True) as longer:
         warnings.simplefilter("always", pandas.errors.ParserWarning)
         list(itertools.islice(file, header.lines))
@@ -177,6 +178,11 @@ def read(path, log, vehicle, flags, rate, several):
             log.drop("rows without a time", np.count_nonzero(~timed & whole))
             log.drop("rows that are longer than the header", np.count_nonzero(~whole))
             rows = rows[timed & whole]
+            seen |= np.isfinite(rows).any(axis=0)
             if len(rows):
                 columns.add(log, clock.seconds(rows[:, clock.at]), rows)
     log.drop("rows that are longer than the header", sum(str(warning.message).count("Skipping line") for warning in longer))
+    used = {at for at, name in enumerate(header.names) if at == clock.at or not columns.is_other(at, log) or log.wants(name)}
+    for said, names in (("columns that are left out: ", [name for at, name in enumerate(header.names) if name and at not in used]),
+                        ("columns without a number: ", [name for at, name in enumerate(header.names) if at in used and not seen[at]])):
+        log.notes += [listed(names, said)] if names else []

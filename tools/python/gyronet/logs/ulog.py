@@ -62,7 +62,7 @@ def take(name, data, seconds, log):
         degrees = fields("latitude_deg", "longitude_deg") if "latitude_deg" in data else 1e-7 * fields("lat", "lon")
         degrees[data["fix_type"] < 2] = np.nan
         unknown = np.full(len(seconds), np.nan)
-        known = np.column_stack([data.get(field, unknown).astype(float) for field in ("eph", "vel_m_s", "cog_rad", "c_variance_rad")])
+        known = np.column_stack([data.get(field, unknown).astype(float) for field in ("vel_m_s", "cog_rad", "c_variance_rad")])
         # Despite its name, c_variance_rad holds the receiver's standard deviation.
         yield "", "position", np.hstack([degrees, known]), ""
         utc = data.get("time_utc_usec")

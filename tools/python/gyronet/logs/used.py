@@ -40,12 +40,12 @@ class Used:
             first, axes = 3 if self.role == "gyro" and width == 7 else 0, 3 if self.role in IMU else 1
             return slice(first, first + axes * len(given)), np.repeat(scales, axes), said, None
         if self.role == "position":
-            return slice(0, 6), 1.0, "deg", None
+            return slice(0, 5), 1.0, "deg", None
         if kind != "number":
             unit = request.units.get((name, "rate"))
             return slice(width - 2, width - 1), units.find(unit)[1] if unit else 1.0, unit or "rad/s", "rate"
         wheel = self.role.startswith("wheel")
-        unit = request.units.get(name) or request.vehicle.unit_of(name) or self.channel.unit
+        unit = request.units.get(name) or self.channel.unit
         scale, dimension, said = units.scale(name, unit, ["speed", "rate"] if wheel else ["rate"], "wheel speed" if wheel else "yaw rate")
         return slice(0, 1), scale, said, dimension
 
@@ -78,9 +78,9 @@ class Used:
     def span(self):
         return self.seconds[0] + self.offset, self.seconds[-1] + self.offset
 
-    def line(self, start, rows):
-        """The report: unit, rate, span, offset and how many rows it filled."""
-        first, last = (time - start for time in self.span())
+    def line(self, start, seconds, rows):
+        """The report: unit, rate, span within the drive, offset and how many rows it filled."""
+        first, last = (min(max(time - start, 0.0), seconds) for time in self.span())
         return (f"{self.role}: {self.name}, {self.unit}, {self.hz:.1f} Hz, {first:.2f} to {last:.2f} s, offset {self.offset:+.3f} s, "
                 f"{self.filled} of {rows} rows" + "".join(f"; {remark}" for remark in self.remarks))
 
