@@ -12,6 +12,8 @@
 //! [`crate::model::Blob::new_checked`]. [`layout`] defines the addresses in flash.
 
 pub mod access;
+#[doc(hidden)]
+pub mod banks;
 pub mod calibration;
 pub mod configuration;
 mod error;

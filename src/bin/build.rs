@@ -16,7 +16,7 @@ const SCRIPTS: [(&str, &str); 2] = [("coprocessor", "stm32f405/slots.x"), ("boot
 /// Start of the slots for firmware (`store::layout`), of which feature `slot-b` selects the second.
 const FIRMWARE: [u32; 2] = [0x0808_0000, 0x0804_0000];
 /// Place of an image's code behind vectors and label, and of the boot loader's behind its vectors.
-const BEHIND_LABEL: u32 = 0x220;
+const BEHIND_LABEL: u32 = 0x280;
 const BEHIND_VECTORS: u32 = 0x0800_0200;
 
 fn main() {

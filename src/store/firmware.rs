@@ -16,8 +16,8 @@ use core::ops::Range;
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use serde::{Deserialize, Serialize};
 
-/// Place of the label in an image, behind the vectors of an STM32F405.
-pub const LABEL: usize = 0x200;
+/// Place of the label in an image, behind the vectors of an STM32F405 or STM32H563.
+pub const LABEL: usize = 0x260;
 /// Size of a label, bytes.
 pub const LABEL_SIZE: usize = 24;
 /// Size of a trailer, bytes.
@@ -30,6 +30,21 @@ const TRIALS: u32 = 3;
 const CHECK: u32 = 16;
 const TRIAL: u32 = 20;
 const CONFIRMED: u32 = TRIAL + 4 * TRIALS;
+
+/// Returns the three numbers of a version such as `env!("CARGO_PKG_VERSION")`.
+pub const fn version(text: &str) -> [u8; 3] {
+    let (mut numbers, mut k, mut rest) = ([0; 3], 0, text.as_bytes());
+    while let [byte, behind @ ..] = rest
+        && k < numbers.len()
+    {
+        match byte.wrapping_sub(b'0') {
+            digit @ 0..=9 => numbers[k] = numbers[k] * 10 + digit,
+            _ => k += 1,
+        }
+        rest = behind;
+    }
+    numbers
+}
 
 /// What an image is, and for which board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,25 +7,25 @@
 //! | USART1 | D0 (PB7), D1 (PB6) | Xsens MTi, 115200 baud |
 //! | FDCAN1 | PD0, PD1 (CN9), to a transceiver | 500 kbit/s; data of others at 2 Mbit/s |
 //!
-//! | flash | bank 2 | records: settings, calibration, what was learnt, troubles |
+//! Boot loader, image and records lie as [`gyronet::store::banks`] says. `gyronet firmware --board nucleo-h563zi` makes what a
+//! probe flashes, and the update.
 //!
 //! Every millisecond `drive` calls [`Coprocessor::step`]. Below it `compute` runs the network, and below both the main program
 //! serves diagnosis and the store ([`service`]). The watchdog is fed while `drive` and the main program get on. Not here yet:
-//! sensors on SPI, update of weights and firmware, the fibre-optic gyro, counts of failed starts and of UART errors.
+//! sensors on SPI, update of weights alone, the fibre-optic gyro, counts of failed starts and of UART errors.
 #![no_std]
 #![no_main]
 
 mod can;
+mod flash;
 mod rng;
 mod service;
-mod store;
 
 use can::{CanBus, Received};
 use core::panic::PanicInfo;
 use core::sync::atomic::Ordering::Relaxed;
 use cortex_m::peripheral::SCB;
 use embassy_executor::InterruptExecutor;
-use embassy_stm32::flash::Flash;
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::usart::{self, BufferedUart};
@@ -42,10 +42,10 @@ use gyronet::model::{Estimate, WindowNetwork, weights};
 use gyronet::sensor::serial::Serial;
 use gyronet::sensor::xsens::Mti;
 use gyronet::service::message::{AllCounters, LineCounters};
+use gyronet::store::banks::{Records, Slots};
 use gyronet::{Config, Coprocessor, GyroNet, Micros};
 use service::{Service, Stored, alive};
 use static_cell::ConstStaticCell;
-use store::Records;
 
 bind_interrupts!(struct Interrupts {
     USART1 => usart::BufferedInterruptHandler<peripherals::USART1>;
@@ -155,7 +155,9 @@ fn main() -> ! {
     pac::FLASH.acr().modify(|w| w.set_prften(true));
 
     let device = DEVICE.take();
-    device.begin(Records::new(Flash::new_blocking(parts.FLASH)), None, Ok(()), identity);
+    // SAFETY: `device` uses both, here and in the main program.
+    let [records, slots] = unsafe { [flash::Array::new(alive), flash::Array::new(alive)] };
+    device.begin(Records::open(records).ok(), Some(Slots(slots)), Ok(()), identity);
     watchdog.pet();
     let blob = device.weights(None, &weights::DEFAULT.0);
     let weights = blob.map_or(0, |blob| blob.crc);

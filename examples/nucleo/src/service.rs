@@ -2,8 +2,7 @@
 //!
 //! It runs below everything else. What `drive` passes on waits in channels of fixed length; what finds no room is counted.
 
-use crate::rng;
-use crate::store::{NoSlots, Records};
+use crate::{flash::Array, rng};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::SCB;
 use embassy_stm32::pac;
@@ -19,6 +18,8 @@ use gyronet::service::event::ResetCause;
 use gyronet::service::message::{AllCounters, Identity};
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::ImuPart;
+use gyronet::store::banks::{Records, Slots};
+use gyronet::store::firmware::{LABEL_SIZE, Label};
 use gyronet::uds::Server;
 
 /// Clock of the core, Hz.
@@ -54,7 +55,7 @@ pub fn cycles() -> u32 {
     CYCLES.load(Relaxed)
 }
 
-pub type Stored = Device<Records, NoSlots>;
+pub type Stored = Device<Records<Array>, Slots<Array>>;
 
 pub struct Service {
     device: &'static mut Stored,
@@ -103,6 +104,10 @@ impl Service {
         if self.device.take_mount_moved() {
             MOUNT_MOVED.store(true, Relaxed);
         }
+        let is_acknowledged = pac::FDCAN1.txbto().read().0 != 0;
+        if self.device.firmware_trial(is_acknowledged, self.counters.pipeline.windows, now) {
+            restart();
+        }
     }
 
     /// Serves the tester.
@@ -129,34 +134,37 @@ impl Service {
             }
         }
         if server.restart_is_due() && RESPONSES.is_empty() {
-            PAUSED.store(true, Relaxed);
-            let until = Instant::now() + LEAVE;
-            while Instant::now() < until {
-                alive();
-                cortex_m::asm::wfi();
-            }
-            SCB::sys_reset();
+            restart();
         }
     }
 }
 
+/// Restarts the board, after announcing it.
+fn restart() -> ! {
+    PAUSED.store(true, Relaxed);
+    let until = Instant::now() + LEAVE;
+    while Instant::now() < until {
+        alive();
+        cortex_m::asm::wfi();
+    }
+    SCB::sys_reset()
+}
+
+/// The label of the image, by which an update is accepted.
+#[used]
+#[unsafe(link_section = ".label")]
+static LABEL: [u8; LABEL_SIZE] = Label::new(VERSION, "nucleo-h563zi").bytes();
+const VERSION: [u8; 3] = gyronet::store::firmware::version(env!("CARGO_PKG_VERSION"));
+
 /// Returns what the board says of itself.
 pub fn identity() -> Identity {
     Identity {
-        firmware: [
-            number(env!("CARGO_PKG_VERSION_MAJOR")),
-            number(env!("CARGO_PKG_VERSION_MINOR")),
-            number(env!("CARGO_PKG_VERSION_PATCH")),
-        ],
+        firmware: VERSION,
         serial: embassy_stm32::uid::uid(),
         clock_hz: CORE_HZ,
         reset: reset_cause(),
         ..Identity::UNKNOWN
     }
-}
-
-fn number(text: &str) -> u8 {
-    text.parse().unwrap_or(0)
 }
 
 /// Reads the reset flags and clears them for the next reset. The most specific cause comes first.

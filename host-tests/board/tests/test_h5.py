@@ -158,17 +158,48 @@ class H5(unittest.TestCase):
         self.board.advance(10 * MS)
         self.assertEqual(self.board.memory_read(0x0810_5FF0, 32), b"\xFF" * 16 + bytes(16))
 
+    def swap(self, value=1 << 31):
+        for key in (0x0819_2A3B, 0x4C5D_6E7F):
+            self.board.write("FLASH", 0x0C, key)
+        self.board.write("FLASH", 0x54, value)
+        self.board.write("FLASH", 0x1C, 2)
+
     def test_with_swapped_banks_an_erase_goes_by_the_bank_itself(self):
+        self.board.memory_write(0x0810_0000, bytes(4))
         self.assertEqual(self.board.read("FLASH", 0x50), 0)
-        self.board.peripherals["FLASH"].configure("swap_bank", True)
-        self.assertEqual(self.board.read("FLASH", 0x50), 1 << 31)
+        self.swap()
+        self.assertEqual((self.board.read("FLASH", 0x20), self.board.read("FLASH", 0x50)), (1, 0))
+        self.board.advance(20 * MS)
+        self.assertEqual((self.board.read("FLASH", 0x20), self.board.read("FLASH", 0x50)), (0, 1 << 31))
+        self.assertEqual(self.board.memory_read(0x0810_0000, 4), bytes(4), "until the next reset")
+        self.board.reset("software")
+        self.assertEqual((self.board.read("FLASH", 0x1C), self.board.read("FLASH", 0x18)), (1 << 31 | 1, 0))
+        self.assertEqual(self.board.memory_read(0x0800_0000, 4), bytes(4))
         self.unlock()
         self.board.write("FLASH", 0x28, 1 << 31 | 2 << 6 | 1 << 5 | 4)
         self.assertEqual(self.board.events("flash_erase")[0]["sectors"], [2])
 
+    def test_options_need_their_keys_and_a_change_that_is_interrupted_leaves_either_value(self):
+        self.board.write("FLASH", 0x54, 1 << 31)
+        self.board.write("FLASH", 0x1C, 2)
+        self.board.write("FLASH", 0x0C, 1)
+        self.swap()
+        self.assertEqual((self.board.read("FLASH", 0x20), self.board.events("options")), (0, []))
+        left = set()
+        for seed in range(8):
+            self.board = FakeBoard(h5.create)
+            self.board.memory = SimpleNamespace(random=Random(seed))
+            self.swap()
+            self.board.reset("iwdg")
+            self.assertEqual(self.board.read("FLASH", 0x18), 6 << 29)
+            left.add(self.board.read("FLASH", 0x50) >> 31)
+        self.assertEqual(left, {0, 1})
+        with self.assertRaises(Violation):
+            self.swap(1)
+
     def test_a_reset_during_an_operation_leaves_quad_words_without_their_ecc(self):
         flash = self.board.peripherals["FLASH"]
-        flash.hook = True
+        self.board.watched_from = 0x0800_0000
         self.board.memory = SimpleNamespace(random=Random(1))
         self.unlock()
         self.board.write("FLASH", 0x28, 2)

@@ -11,38 +11,40 @@ use gyronet::health::Faults;
 use gyronet::service::event::ResetCause;
 use gyronet::service::message::FlashState;
 use gyronet::store::Configuration;
+use gyronet::store::banks::{BANK, RECORDS, SECTOR};
+use gyronet::store::layout::FLASH_BASE;
 use gyronet_host_tests::board::{At, Board};
-use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::{inputs, replay};
 use gyronet_tools::client::device::Authority;
+use gyronet_tools::client::device::update::Update;
 use gyronet_tools::signing::PrivateKey;
+use gyronet_tools::target::firmware::{Linked, NUCLEO};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::sync::OnceLock;
 use std::time::Duration;
 
 /// Time from power-on to the first sample.
 const BEGIN: Duration = Duration::from_millis(100);
 const MS: Duration = Duration::from_millis(1);
-/// The second bank of the flash, where the records are, and the size of a sector.
-const BANK_2: u32 = 0x0810_0000;
-const SECTOR: u32 = 8 << 10;
+/// The records, in the second bank of the flash.
+const STORED: u32 = FLASH_BASE + BANK + RECORDS;
 
-fn elf() -> PathBuf {
-    const TARGET: &str = "thumbv8m.main-none-eabihf";
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("nucleo");
-    let cargo = Command::new(env!("CARGO"))
-        .current_dir(workspace())
-        .args(["build", "--release", "--locked", "--quiet", "--manifest-path", "examples/nucleo/Cargo.toml"])
-        .args(["--target", TARGET, "--target-dir"])
-        .arg(&folder)
-        .status();
-    assert!(cargo.is_ok_and(|status| status.success()), "the example is built");
-    folder.join(TARGET).join("release/gyronet-nucleo")
+/// What a programmer flashes, and the update to the same.
+pub fn built() -> &'static (PathBuf, Update) {
+    static BUILT: OnceLock<(PathBuf, Update)> = OnceLock::new();
+    BUILT.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("nucleo");
+        let linked = Linked::build(NUCLEO, 2, &folder).unwrap_or_else(|error| panic!("{error}"));
+        let elf = folder.join("nucleo.elf");
+        std::fs::write(&elf, linked.for_programmer().expect("it was linked for this"))
+            .expect("there is room");
+        (elf, linked.update().expect("it was linked for this too"))
+    })
 }
 
 /// A board that has just been switched on, and will receive these samples.
-fn boot(test: &str, samples: &[Vec<u8>]) -> Option<Board> {
-    let mut board = Board::of("stm32h563", test, &elf())?;
+pub fn boot(test: &str, samples: &[Vec<u8>]) -> Option<Board> {
+    let mut board = Board::of("stm32h563", test, &built().0)?;
     board.power_on();
     for (k, sample) in samples.iter().enumerate() {
         board.send_at(IMU, sample, BEGIN + SAMPLE * k as u32);
@@ -104,7 +106,7 @@ fn a_nucleo_stores_over_the_bus_without_a_gap() {
     let Some(mut board) = boot(test, &parked) else { return };
     // Something in each sector of the records, so that all are erased before their first use.
     for sector in 0..16 {
-        board.patch(At::Address(BANK_2 + SECTOR * (sector + 1) - 16), &[0x55; 16]);
+        board.patch(At::Address(STORED + SECTOR * (sector + 1) - 16), &[0x55; 16]);
     }
     for k in 0..600 {
         board.can_send_at(&inputs::wheels(0.0), BEGIN + SAMPLE * k + 8 * MS);
@@ -194,8 +196,8 @@ fn a_nucleo_hears_wheels_and_returns_from_bus_off_at_growing_intervals() {
 
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
-fn a_nucleo_takes_no_can_fd_and_no_swapped_banks_and_starts_again_without_its_clock() {
-    let test = "a_nucleo_takes_no_can_fd_and_no_swapped_banks_and_starts_again_without_its_clock";
+fn a_nucleo_takes_no_can_fd_and_starts_again_without_its_clock() {
+    let test = "a_nucleo_takes_no_can_fd_and_starts_again_without_its_clock";
     let Some(mut board) = boot(test, &[]) else { return };
     board.run(200 * MS);
     let session = [2, 0x10, 3, 0xCC, 0xCC, 0xCC, 0xCC, 0xCC];
@@ -208,18 +210,6 @@ fn a_nucleo_takes_no_can_fd_and_no_swapped_banks_and_starts_again_without_its_cl
         }
     }
 
-    board.configure("FLASH.swap_bank", true);
-    board.power_cycle(MS);
-    board.run(200 * MS);
-    send(&mut board, &[0x10, 3]);
-    board.run(20 * MS);
-    send(&mut board, &storing(&Configuration { latitude_deg: Some(1.0), ..Configuration::DEFAULT }));
-    board.run(200 * MS);
-    let info = on_bus(&mut board).info().expect("a response");
-    assert_eq!((info.flash, info.writable), (FlashState::Absent, false));
-    assert!(board.events().iter().all(|event| event.kind != "flash_erase"));
-
-    board.configure("FLASH.swap_bank", false);
     board.configure("RCC.hse_hz", serde_json::Value::Null);
     board.power_cycle(MS);
     assert!(board.run_until("iwdg_expired", Duration::from_millis(1_300)).is_some());
@@ -282,7 +272,7 @@ fn a_nucleo_survives_a_power_cut_at_any_time_of_a_store() {
     let test = "a_nucleo_survives_a_power_cut_at_any_time_of_a_store";
     let Some(mut board) = boot(test, &[]) else { return };
     for sector in 0..16 {
-        board.patch(At::Address(BANK_2 + SECTOR * (sector + 1) - 16), &[0x55; 16]);
+        board.patch(At::Address(STORED + SECTOR * (sector + 1) - 16), &[0x55; 16]);
     }
     board.run(200 * MS);
     let of = |latitude| Configuration { latitude_deg: Some(latitude), ..Configuration::DEFAULT };

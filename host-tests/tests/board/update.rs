@@ -44,7 +44,7 @@ fn address(slot: Slot) -> u32 {
 }
 
 /// A tester on CAN that also keeps what it sees.
-struct Recorder<'a>(CanBus<'a>, &'a mut Vec<(Duration, DataFrame)>);
+pub struct Recorder<'a>(pub CanBus<'a>, pub &'a mut Vec<(Duration, DataFrame)>);
 
 impl Bus for Recorder<'_> {
     fn send(&mut self, frame: &DataFrame) -> std::io::Result<()> {
@@ -292,18 +292,32 @@ fn an_image_that_is_damaged_after_its_confirmation_gives_way_and_without_any_the
     assert_eq!(firmware(&mut board).0, Some(Slot::A));
 }
 
-/// Cuts the power at accesses to the flash while an image is downloaded, activated, tried, rolled back and confirmed, at all
-/// of them or at some, and at `delays` after each. The image that is rolled back is the first KiB of one.
-fn cut_power(test: &str, all: bool, delays: &[Duration]) {
-    const MANY: usize = 1 << 30;
-    const TINY: usize = 1_024;
-    let (Some(file), Some(mut board)) = (built(test), common::boot(test)) else { return };
-    board.run(3 * S);
-    service::enter(&mut board, 2);
-    let [a, b] = &file.images;
-    let tiny = Update::new(file.head.label, [a.clone(), b[..TINY].to_vec()]);
-    let mut cuts = 0;
-    let mut cut = |board: &mut Board, name: &str, every: usize, act: &dyn Fn(&mut Board), limit: Duration| {
+/// Cuts of the power while a board acts.
+pub struct Cuts<'a> {
+    pub test: &'a str,
+    /// Cuts at all accesses to the flash, or at some.
+    pub all: bool,
+    /// Number of these at most in a step.
+    pub most: usize,
+    /// Times of a cut after its access.
+    pub delays: &'a [Duration],
+    /// Lets a board start, and returns whether an image runs.
+    pub starts: &'a dyn Fn(&mut Board) -> bool,
+    pub count: usize,
+}
+
+impl Cuts<'_> {
+    /// Cuts the power while the board acts, and checks that an image starts, at the third start at the latest. The board goes on
+    /// from what is without a cut.
+    pub fn during(
+        &mut self,
+        board: &mut Board,
+        name: &str,
+        every: usize,
+        act: &dyn Fn(&mut Board),
+        limit: Duration,
+    ) {
+        const MANY: usize = 1 << 30;
         board.snapshot("before");
         board.cut_after(MANY, Duration::ZERO);
         act(board);
@@ -312,24 +326,40 @@ fn cut_power(test: &str, all: bool, delays: &[Duration]) {
         assert!(count > 0, "{name}");
         let _ = board.can_frames();
         board.snapshot("after");
-        for access in (1..=count).step_by(if all { 1 } else { every }) {
-            for &delay in delays {
+        let every = every.max(count.div_ceil(self.most));
+        for access in (1..=count).step_by(if self.all { 1 } else { every }) {
+            for &delay in self.delays {
                 board.restore("before");
                 board.cut_after(access, delay);
                 act(board);
                 let _ = board.run_until("power_off", limit + 300 * MS);
                 board.power_cycle(MS);
-                cuts += 1;
-                // The boot loader may try the new one first, until its watchdog ends that.
-                let starts = |board: &mut Board| {
-                    board.run(2 * START);
-                    on_line(board).info().is_ok_and(|info| info.firmware.slot.is_some())
-                };
-                assert!((0..3).any(|_| starts(board)), "{name}: {access} of {count}, {delay:?}");
+                self.count += 1;
+                assert!((0..3).any(|_| (self.starts)(board)), "{name}: {access} of {count}, {delay:?}");
             }
         }
-        println!("{test}: {name}: {count} accesses, {cuts} cuts so far");
+        println!("{}: {name}: {count} accesses, {} cuts so far", self.test, self.count);
         board.restore("after");
+    }
+}
+
+/// Cuts the power at accesses to the flash while an image is downloaded, activated, tried, rolled back and confirmed, at all
+/// of them or at some, and at `delays` after each. The image that is rolled back is the first KiB of one.
+fn cut_power(test: &str, all: bool, delays: &[Duration]) {
+    const TINY: usize = 1_024;
+    let (Some(file), Some(mut board)) = (built(test), common::boot(test)) else { return };
+    board.run(3 * S);
+    service::enter(&mut board, 2);
+    let [a, b] = &file.images;
+    let tiny = Update::new(file.head.label, [a.clone(), b[..TINY].to_vec()]);
+    // The boot loader may try the new one first, until its watchdog ends that.
+    let starts = |board: &mut Board| {
+        board.run(2 * START);
+        on_line(board).info().is_ok_and(|info| info.firmware.slot.is_some())
+    };
+    let mut cuts = Cuts { test, all, most: usize::MAX, delays, starts: &starts, count: 0 };
+    let mut cut = |board: &mut Board, name: &str, every: usize, act: &dyn Fn(&mut Board), limit: Duration| {
+        cuts.during(board, name, every, act, limit);
     };
     let head = [&[0x2E, 1, 0x1A][..], &tiny.head.bytes()].concat();
     assert_eq!(service::ask(&mut board, &head), [0x6E, 1, 0x1A]);
@@ -353,7 +383,7 @@ fn cut_power(test: &str, all: bool, delays: &[Duration]) {
     board.run(START + 14_700 * MS);
     cut(&mut board, "confirmation", 3, &|_| (), S);
     assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
-    println!("{test}: {cuts} cuts");
+    println!("{test}: {} cuts", cuts.count);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 mod activation;
 mod align;
 mod asm330lhh;
+mod banks;
 mod bias;
 mod bias_curve;
 mod blob;

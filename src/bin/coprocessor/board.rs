@@ -17,7 +17,7 @@ use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use gyronet::heading::GnssSettings;
 use gyronet::service::event::CanFault;
 use gyronet::service::message::Identity;
-use gyronet::store::firmware::{LABEL_SIZE, Label};
+use gyronet::store::firmware::{LABEL_SIZE, Label, version};
 
 // SAFETY: each element belongs to one line, which `Board::start` or `gnss` starts.
 static MEMORY: [serial::Memory; 5] = [const { unsafe { serial::Memory::new() } }; 5];
@@ -133,19 +133,7 @@ fn assign_pins() {
     }
 }
 
-const VERSION: [u8; 3] = {
-    let [major, minor, patch] =
-        [env!("CARGO_PKG_VERSION_MAJOR"), env!("CARGO_PKG_VERSION_MINOR"), env!("CARGO_PKG_VERSION_PATCH")];
-    [number(major), number(minor), number(patch)]
-};
-
-const fn number(text: &str) -> u8 {
-    let (mut number, mut digits) = (0, text.as_bytes());
-    while let [digit, rest @ ..] = digits {
-        (number, digits) = (10 * number + (*digit - b'0'), rest);
-    }
-    number
-}
+const VERSION: [u8; 3] = version(env!("CARGO_PKG_VERSION"));
 
 /// The label of the image: version, flash layout and board, by which an update is accepted.
 #[used]

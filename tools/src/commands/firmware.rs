@@ -3,7 +3,7 @@
 use super::{Common, WriteError};
 use gyronet::model::blob::CRC;
 use gyronet_tools::target::bench;
-use gyronet_tools::target::firmware::Linked;
+use gyronet_tools::target::firmware::{Linked, NUCLEO};
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::Command;
@@ -17,7 +17,7 @@ Examples:
   gyronet firmware --target-dir out             # out/netduino-plus-2.elf and .update
   gyronet firmware --board olimex-stm32-h405 --flash")]
 pub struct Args {
-    /// Board, as a feature of the images.
+    /// Board, as a feature of the images, or nucleo-h563zi (examples/nucleo).
     #[arg(long, default_value = "netduino-plus-2")]
     board: String,
     /// Folder of the build and of its results [default: cargo's target folder].
@@ -35,8 +35,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let [elf, update] = ["elf", "update"].map(|end| folder.join(format!("{}.{end}", args.board)));
     std::fs::write(&elf, linked.for_programmer()?).map_err(WriteError::to(&elf))?;
     if args.flash {
+        let chip = if args.board == NUCLEO { "STM32H563ZITx" } else { "STM32F405RGTx" };
         let status = Command::new("probe-rs")
-            .args(["run", "--chip", "STM32F405RGTx"])
+            .args(["run", "--chip", chip])
             .arg(&elf)
             .status()
             .map_err(|error| format!("probe-rs: {error}"))?;

@@ -8,6 +8,7 @@ use super::bench::{self, BenchError, TARGET};
 use crate::client::device::update::Update;
 use gyronet::model::blob::CRC;
 use gyronet::store::Slot;
+use gyronet::store::banks;
 use gyronet::store::firmware::{LABEL, LABEL_SIZE, Label, MAX_IMAGE, Trailer};
 use gyronet::store::layout::{BOOT_SIZE, FLASH_BASE};
 use object::{Object, ObjectSection, ObjectSegment};
@@ -26,25 +27,35 @@ pub enum FirmwareFileError {
     Lacks(&'static str),
 }
 
+/// The board whose flash has two banks that swap ([`gyronet::store::banks`]): one image fits both slots.
+pub const NUCLEO: &str = "nucleo-h563zi";
+
 /// The linked images of a board.
 pub struct Linked {
     /// The boot loader.
     pub boot: Vec<u8>,
     /// The image for slots A and B, if it was linked for both, as ELF files.
     pub images: Vec<Vec<u8>>,
+    swaps: bool,
 }
 
 impl Linked {
     /// Builds the boot loader, and the image for the first `slots` slots, for a board, named by its features.
     pub fn build(board: &str, slots: usize, folder: &Path) -> Result<Self, FirmwareFileError> {
+        let read =
+            |path: PathBuf| std::fs::read(&path).map_err(|source| FirmwareFileError::Io { path, source });
+        if board == NUCLEO {
+            let built = bench::build_nucleo(folder)?;
+            let image = read(built.join("gyronet-nucleo"))?;
+            return Ok(Self { boot: read(built.join("boot"))?, images: vec![image; slots], swaps: true });
+        }
         let build = |features: &str, image: &str| {
-            let path = bench::build_for((features, TARGET), &bench::workspace(), image, folder)?;
-            std::fs::read(&path).map_err(|source| FirmwareFileError::Io { path, source })
+            read(bench::build_for((features, TARGET), &bench::workspace(), image, folder)?)
         };
         let boot = build(board, "boot")?;
         let features = [board.to_owned(), format!("{board},slot-b")];
         let images = features.iter().take(slots).map(|features| build(features, "coprocessor"));
-        Ok(Self { boot, images: images.collect::<Result<_, _>>()? })
+        Ok(Self { boot, images: images.collect::<Result<_, _>>()?, swaps: false })
     }
 
     /// Returns the bytes of the boot loader.
@@ -55,32 +66,41 @@ impl Linked {
     /// Returns the update for diagnosis, of the image for both slots.
     pub fn update(&self) -> Result<Update, FirmwareFileError> {
         let [a, b] = &self.images[..] else { return Err(FirmwareFileError::Lacks("slot B")) };
-        let images = [image(a, Slot::A)?, image(b, Slot::B)?];
+        let images = [self.image(a, Slot::A)?, self.image(b, Slot::B)?];
         Ok(Update::new(label(&images[0])?, images))
     }
 
     /// Returns the ELF file for a programmer: boot loader and confirmed image in slot A, none in slot B.
     pub fn for_programmer(&self) -> Result<Vec<u8>, FirmwareFileError> {
         let mut elf = self.images.first().ok_or(FirmwareFileError::Lacks("slot A"))?.clone();
-        let image = image(&elf, Slot::A)?;
+        let image = self.image(&elf, Slot::A)?;
         let trailer =
             Trailer { is_confirmed: true, ..Trailer::new(image.len() as u32, CRC.checksum(&image), 0, 1) };
         let boot = self.boot_loader()?;
-        for (name, bytes) in [(".boot", &boot[..]), (".trailer_a", &trailer.bytes())] {
+        let parts = if self.swaps {
+            vec![
+                (".boot_a", boot.clone()),
+                (".boot_b", boot),
+                (".trailer_a", banks::spread(&trailer.bytes()).to_vec()),
+            ]
+        } else {
+            vec![(".boot", boot), (".trailer_a", trailer.bytes().to_vec())]
+        };
+        for (name, bytes) in parts {
             let place =
                 object::File::parse(&*elf)?.section_by_name(name).and_then(|section| section.file_range());
             let (start, _) = place.ok_or(FirmwareFileError::Lacks("room for the boot loader"))?;
-            elf[start as usize..][..bytes.len()].copy_from_slice(bytes);
+            elf[start as usize..][..bytes.len()].copy_from_slice(&bytes);
         }
         Ok(elf)
     }
-}
 
-/// Returns the bytes of an image that was linked for a slot, whole words; what is not linked is erased.
-pub fn image(elf: &[u8], slot: Slot) -> Result<Vec<u8>, FirmwareFileError> {
-    let start = FLASH_BASE + slot.firmware().start;
-    let image = flat(elf, start..start + MAX_IMAGE)?;
-    label(&image).map(|_| image)
+    /// Returns the bytes of an image that was linked for a slot, whole words; what is not linked is erased.
+    fn image(&self, elf: &[u8], slot: Slot) -> Result<Vec<u8>, FirmwareFileError> {
+        let start = FLASH_BASE + if self.swaps { banks::IMAGE } else { slot.firmware().start };
+        let image = flat(elf, start..start + MAX_IMAGE)?;
+        label(&image).map(|_| image)
+    }
 }
 
 /// Returns the label of an image.

@@ -3,53 +3,71 @@
 A store to the array fills a buffer of sixteen bytes, which are programmed when it is full. What is executed from the bank that
 is busy stalls the core. Witnesses: the header, the HAL, and for NSSR (which NSCCR clears), INCERR and an incomplete buffer what
 others measured on a NUCLEO-H563ZI (w1ne/labwired-core, pull request 335). A power cut or reset during an operation leaves
-quad-words whose ECC does not fit; reading one sets ECCDETR.ECCD, which is an NMI until it is cleared. Of the option bytes there
-is SWAP_BANK: addresses follow it, and BKSEL names the bank itself. Left out: high-cycle data, bank and mass erase, protection. A second programming of a quad-word, whose ECC
-would no longer fit either, is a violation. Guessed: the times, since no data sheet (DS14258) was at hand.
+quad-words whose ECC does not fit; reading one sets ECCDETR.ECCD, which is an NMI until it is cleared. A second programming of a
+quad-word, whose ECC would no longer fit either, is a violation.
 
-Settings: `swap_bank`.
+Of the option bytes there is SWAP_BANK, which OPTSTRT programs from OPTSR_PRG. From the next reset on addresses follow it; BKSEL
+names the bank itself. Witnesses: ST's GetBank and SystemInit, which starts a change again that OPSR says a reset has interrupted,
+and wolfBoot. No witness says what a power cut leaves of a change: here, either value of SWAP_BANK, and all others as they were.
+(Of other families ST's manuals say that mismatching option bytes may lock the part.) Left out: all other option bytes, high-cycle
+data, bank and mass erase, protection. Guessed: the times, since no data sheet (DS14258) was at hand.
+
+Settings: `swap_bank`, the option as a programmer writes it.
 """
 
 from ...violation import Violation
 from ..registers import Registers
 
 BASE, BANK, SECTOR, QUAD = 0x0800_0000, 1 << 20, 8 << 10, 16
-KEYS = (0x4567_0123, 0xCDEF_89AB)
-ACR, NSKEYR, NSSR, NSCR, NSCCR, OPTSR_CUR, ECCDETR = 0x00, 0x04, 0x20, 0x28, 0x30, 0x50, 0x104
+KEYS, OPTION_KEYS = (0x4567_0123, 0xCDEF_89AB), (0x0819_2A3B, 0x4C5D_6E7F)
+ACR, NSKEYR, OPTKEYR, OPSR, OPTCR, NSSR, NSCR, NSCCR, OPTSR_CUR, OPTSR_PRG, ECCDETR = (
+    0x00, 0x04, 0x0C, 0x18, 0x1C, 0x20, 0x28, 0x30, 0x50, 0x54, 0x104)
 BSY, WBNE, EOP, PGSERR, STRBERR, INCERR = (1 << bit for bit in (0, 1, 16, 18, 19, 20))
 FLAGS = 0x00FF_0000
 LOCK, PG, SER, START, BKSEL = (1 << bit for bit in (0, 1, 2, 5, 31))
 #: All that NSCR keeps: PG, SER, SNB, BKSEL; the rest is not modelled.
 KEPT = PG | SER | 0x7F << 6 | BKSEL
 ECCD = SWAP_BANK = 1 << 31
-PROGRAM_PS, ERASE_PS = 100_000_000, 4_000_000_000
+OPTLOCK, OPTSTRT = 1, 2
+#: OPSR.CODE_OP of a quad-word, a sector, and a change of option bytes.
+WRITING, ERASING, CHANGING = 1 << 29, 3 << 29, 6 << 29
+PROGRAM_PS, ERASE_PS, OPTIONS_PS = 100_000_000, 4_000_000_000, 10_000_000_000
 
 
 class Flash(Registers):
-    """ACR, the keys, and the status and control registers of non-secure code."""
+    """ACR, the keys, the status and control registers of non-secure code, and SWAP_BANK."""
 
     name, base = "FLASH", 0x4002_2000
     kept, settings = {ACR: (0x13, 0x13F)}, {"swap_bank"}
-    readers = {NSCR: "control", ECCDETR: "detected"}
-    writers = {NSKEYR: "_key", NSCR: "_write_control"}
+    readers = {NSCR: "control", ECCDETR: "detected", OPSR: "interrupted", OPTSR_PRG: "wanted"}
+    writers = {NSKEYR: "_key", NSCR: "_write_control", OPTKEYR: "_option_key", OPTCR: "_write_options", OPTSR_PRG: "_want"}
     #: As on the STM32F405, bit 5 set: software starts the watchdog.
     options = 1 << 5
 
     def __init__(self, board):
         super().__init__(board)
-        #: The operation: its end, address, new content. The quad-words whose ECC does not fit, and the hook on their reads.
+        #: The operation: its end, address, new content (None: option bytes). The quad-words whose ECC does not fit.
         self.busy = None
-        self.torn, self.hook = set(), None
-        self.swap_bank = False
+        self.torn = set()
+        #: SWAP_BANK, and whether the banks are swapped now.
+        self.swap_bank = self.swapped = False
 
     def reset(self, cause):
         super().reset(cause)
+        self.interrupted = 0
         if self.busy:
             self.busy[0].cancel()
             self._tear()
         self.status, self.control, self.step, self.refused = 0, LOCK, 0, False
+        self.option_lock, self.option_step, self.option_refused = OPTLOCK, 0, False
         self.detected = 0
         self.buffer, self.at = {}, 0
+        if self.swap_bank != self.swapped:
+            self.swapped = self.swap_bank
+            both = self.board.memory_read(BASE, 2 * BANK)
+            self.board.memory_write(BASE, both[BANK:] + both[:BANK])
+            self.torn = {quad ^ BANK for quad in self.torn}
+        self.wanted = SWAP_BANK if self.swap_bank else 0
         self._watch()
 
     @property
@@ -62,6 +80,8 @@ class Flash(Registers):
             return self.status | (BSY if self.busy else 0) | (WBNE if self.buffer else 0)
         if offset == OPTSR_CUR:
             return SWAP_BANK if self.swap_bank else 0
+        if offset == OPTCR:
+            return self.option_lock | (SWAP_BANK if self.swapped else 0)
         return super().load(offset)
 
     def store(self, offset, value):
@@ -84,6 +104,34 @@ class Flash(Registers):
         if not self.step:
             self.control &= ~LOCK
 
+    def _option_key(self, value):
+        """Unlocks OPTCR and OPTSR_PRG, as NSKEYR does NSCR."""
+        if self.option_refused or not self.option_lock or value != OPTION_KEYS[self.option_step]:
+            self.option_refused = self.option_refused or bool(self.option_lock)
+            self.board.record("ignored_write", register="FLASH_OPTKEYR", value=value)
+            return
+        self.option_step = (self.option_step + 1) % 2
+        self.option_lock = OPTLOCK if self.option_step else 0
+
+    def _want(self, value):
+        if self.option_lock:
+            self.board.record("ignored_write", register="FLASH_OPTSR_PRG", value=value)
+        elif value & ~SWAP_BANK:
+            raise Violation(f"{self.name}: OPTSR_PRG {value:#x} changes what is not modelled")
+        else:
+            self.wanted = value
+
+    def _write_options(self, value):
+        if self.option_lock or self.busy:
+            self.board.record("ignored_write", register="FLASH_OPTCR", value=value)
+            return
+        if value & ~(OPTLOCK | OPTSTRT | SWAP_BANK):
+            raise Violation(f"{self.name}: OPTCR {value:#x} asks for what is not modelled")
+        if value & OPTSTRT:
+            self.board.record("options", swap_bank=bool(self.wanted))
+            self.busy = self.board.schedule(OPTIONS_PS, self._end), None, bool(self.wanted)
+        self.option_lock = value & OPTLOCK
+
     def _write_control(self, value):
         if self.control & LOCK or self.busy:
             self.board.record("ignored_write", register="FLASH_NSCR", value=value)
@@ -94,7 +142,7 @@ class Flash(Registers):
         if value & START:
             if not value & SER or value & PG:
                 raise Violation(f"{self.name}: NSCR {value:#x} starts no sector erase")
-            at = (BANK if bool(value & BKSEL) != self.swap_bank else 0) + (value >> 6 & 0x7F) * SECTOR
+            at = (BANK if bool(value & BKSEL) != self.swapped else 0) + (value >> 6 & 0x7F) * SECTOR
             self.board.record("flash_erase", sectors=[at // SECTOR])
             self._begin(BASE + at, b"\xFF" * SECTOR, ERASE_PS)
 
@@ -128,6 +176,9 @@ class Flash(Registers):
 
     def _end(self):
         (_, address, data), self.busy = self.busy, None
+        if address is None:
+            self.swap_bank = data
+            return
         self.board.memory_write(address, data)
         self.torn.difference_update(range(address, address + len(data), QUAD))
         self.status |= EOP
@@ -135,6 +186,10 @@ class Flash(Registers):
     def _tear(self):
         """Leaves the operation half done: each bit is the old or the new one."""
         (_, address, data), self.busy = self.busy, None
+        self.interrupted = CHANGING if address is None else WRITING if len(data) == QUAD else ERASING
+        if address is None:
+            self.swap_bank = self.board.memory.random.choice((self.swap_bank, data))
+            return
         noise = self.board.memory.random.randbytes(len(data))
         old = self.board.memory_read(address, len(data))
         self.board.memory_write(address, bytes(a & n | b & ~n for a, b, n in zip(old, data, noise)))
@@ -146,9 +201,13 @@ class Flash(Registers):
             self._tear()
 
     def _watch(self):
-        """Watches the reads of the array, if an ECC does not fit."""
-        if self.torn and not self.hook:
-            self.hook = self.board.processor.watch_reads(BASE + BANK, BASE + 2 * BANK - 1, self._was_read)
+        """Watches the reads of the array from the first quad-word on whose ECC does not fit."""
+        # The hook outlives a restored snapshot, so the board keeps its range.
+        end = getattr(self.board, "watched_from", BASE + 2 * BANK)
+        begin = min(self.torn, default=end) & -SECTOR
+        if begin < end:
+            self.board.watched_from = begin
+            self.board.processor.watch_reads(begin, end - 1, self._was_read)
 
     def _was_read(self, address):
         if address & -QUAD in self.torn and not self.detected:

@@ -1,0 +1,7 @@
+//! Tells the linker which program is the boot loader, and leaves room in the image's file for what the tools fill in.
+
+fn main() {
+    println!("cargo:rerun-if-changed=image.x");
+    println!("cargo:rustc-link-arg-bin=boot=--defsym=_boot=1");
+    println!("cargo:rustc-link-arg-bin=gyronet-nucleo=-Timage.x");
+}

@@ -1,0 +1,319 @@
+//! Firmware updates of the virtual NUCLEO-H563ZI, whose two banks of flash swap: download without a gap, trial, confirmation,
+//! the way back from images that are bad, and cuts of the power at the accesses to flash and option bytes.
+
+use crate::common::{SAMPLE, id, resets, stand};
+use crate::nucleo::{boot, built};
+use crate::service::{self, on_bus, send};
+use crate::update::{Cuts, Recorder};
+use embedded_can::Frame;
+use gyronet::can::DataFrame;
+use gyronet::model::blob::CRC;
+use gyronet::service::device::FirmwareState;
+use gyronet::store::banks::{BANK, IMAGE, TRAILER, spread};
+use gyronet::store::firmware::{FirmwareError, Trailer};
+use gyronet::store::layout::{BOOT_SIZE, FLASH_BASE};
+use gyronet::store::{Configuration, Slot};
+use gyronet_host_tests::board::{At, Board};
+use gyronet_tools::client::device::update::{Update, update};
+use gyronet_tools::client::device::{Authority, Device};
+use gyronet_tools::signing::PrivateKey;
+use std::time::Duration;
+
+const MS: Duration = Duration::from_millis(1);
+const S: Duration = Duration::from_secs(1);
+/// Time from power-on to diagnosis: a swap, both checks of the images, and a copy of the records.
+const START: Duration = Duration::from_millis(500);
+const CAN: u32 = 2;
+
+fn firmware(board: &mut Board) -> (Option<Slot>, FirmwareState) {
+    let firmware = on_bus(board).info().expect("a response").firmware;
+    (firmware.slot, firmware.state)
+}
+
+fn settings(latitude: f32) -> Configuration {
+    Configuration { latitude_deg: Some(latitude), ..Configuration::DEFAULT }
+}
+
+/// Longest time between two rates.
+fn gap(log: &[(Duration, DataFrame)]) -> Duration {
+    let rates: Vec<_> =
+        log.iter().filter(|(_, frame)| frame.id() == id(0x1A0)).map(|(end, _)| *end).collect();
+    assert!(rates.len() > 100);
+    rates.windows(2).map(|pair| pair[1] - pair[0]).max().expect("rates")
+}
+
+/// Updates a board over CAN with a key, and returns what it sent meanwhile and how long that took.
+fn update_with(
+    board: &mut Board,
+    file: &Update,
+    key: &PrivateKey,
+) -> (Vec<(Duration, DataFrame)>, Result<Slot, String>) {
+    let mut log = Vec::new();
+    let mut device = Device::new(Recorder(board.bus(), &mut log), "the virtual board");
+    device.authorise(Authority::Key(key.clone()));
+    let slot = update(&mut device, file, |_, _| ()).map_err(|error| error.to_string());
+    drop(device);
+    (log, slot)
+}
+
+#[test]
+#[ignore = "it builds embassy, which takes a minute"]
+fn a_nucleo_is_updated_over_can_without_a_gap_and_keeps_its_records() {
+    const TEST: &str = "a_nucleo_is_updated_over_can_without_a_gap_and_keeps_its_records";
+    let Some(mut board) = boot(TEST, &[]) else { return };
+    let (_, file) = built();
+    board.run(START);
+    on_bus(&mut board).set_configuration(&settings(48.0)).expect("it stands");
+    let key = PrivateKey::generate().expect("random numbers");
+    on_bus(&mut board).set_key(&key.public()).expect("there was none");
+    assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::Confirmed));
+    // To the other bank, and back to the first: an image and records are there already.
+    for (round, (to, latitude)) in [(Slot::B, 49.0), (Slot::A, 50.0)].into_iter().enumerate() {
+        stand(&mut board, 4_700);
+        board.run(3 * S);
+        let _ = (board.events(), board.can_frames());
+        let begin = board.counts().time;
+        let (log, slot) = update_with(&mut board, file, &key);
+        assert_eq!(slot.expect("the owner's"), to);
+        let took = board.counts().time - begin;
+        let erased = board.events().iter().filter(|event| event.kind == "flash_erase").count();
+        println!(
+            "{TEST}: {} bytes in {took:.2?}, {erased} sectors erased, at most {:.2?} from one rate to the next",
+            file.images[0].len(),
+            gap(&log)
+        );
+        assert!(took < 60 * S && gap(&log) < SAMPLE + MS, "{took:?} {:?}", gap(&log));
+        assert!(round == 0 || erased >= 29, "the image before is erased");
+        let mut device = on_bus(&mut board);
+        device.authorise(Authority::Key(key.clone()));
+        device.restart().expect("it stands");
+        board.run(30 * MS);
+        let _ = board.can_frames();
+        board.run(START);
+        let reset = resets(&mut board)[0].0;
+        let sent = board.can_frames();
+        let first = sent.iter().find(|(_, frame)| frame.id() == id(0x1A0)).expect("rates").0;
+        println!("{TEST}: first rate {:.0?} after the restart", first - reset);
+        assert!(first - reset < 400 * MS);
+        assert_eq!(firmware(&mut board), (Some(to), FirmwareState::OnTrial));
+        assert_eq!(on_bus(&mut board).configuration().expect("a response"), settings(latitude - 1.0));
+        board.run(3 * S);
+        let (_, refused) = update_with(&mut board, file, &key);
+        let refused = refused.expect_err("it is on trial");
+        assert!(refused.contains(&FirmwareError::OnTrial.to_string()), "{refused}");
+        // Settings that are stored on trial are those of both images.
+        let mut device = on_bus(&mut board);
+        device.authorise(Authority::Key(key.clone()));
+        device.set_configuration(&settings(latitude)).expect("it stands");
+        let _ = board.can_frames();
+        board.run(13 * S);
+        println!("{TEST}: at most {:.2?} while it is confirmed", gap(&board.can_frames()));
+        assert_eq!(firmware(&mut board), (Some(to), FirmwareState::Confirmed));
+        board.power_cycle(10 * MS);
+        board.run(START);
+        assert_eq!(firmware(&mut board), (Some(to), FirmwareState::Confirmed));
+        assert_eq!(on_bus(&mut board).configuration().expect("a response"), settings(latitude));
+        assert_eq!(on_bus(&mut board).access().expect("a response").state, "locked");
+    }
+}
+
+#[test]
+#[ignore = "it builds embassy, which takes a minute"]
+fn a_nucleo_refuses_what_is_no_update_of_its_own_before_it_erases() {
+    const TEST: &str = "a_nucleo_refuses_what_is_no_update_of_its_own_before_it_erases";
+    let Some(mut board) = boot(TEST, &[]) else { return };
+    let (_, file) = built();
+    board.run(START);
+    let [key, other] = [(); 2].map(|()| PrivateKey::generate().expect("random numbers"));
+    on_bus(&mut board).set_key(&key.public()).expect("there was none");
+    let _ = board.events();
+    let of = |board: &[u8], version: [u8; 3]| {
+        let mut update = file.clone();
+        update.head.label.board[..board.len()].copy_from_slice(board);
+        update.head.label.version = version;
+        update
+    };
+    let own = file.head.label.version;
+    for (update, key, expected) in [
+        (of(b"netduino-plus-2", own), &key, Some(FirmwareError::Board)),
+        (of(b"", [0, 0, 9]), &key, Some(FirmwareError::Older)),
+        (of(b"", own), &other, None),
+    ] {
+        let (_, refused) = update_with(&mut board, &update, key);
+        let (refused, expected) =
+            (refused.expect_err("it is refused"), expected.map(|error| error.to_string()));
+        assert!(expected.is_none_or(|expected| refused.contains(&expected)), "{refused}");
+    }
+    // A file without a head, a truncated one, and an image that is not the one of the head.
+    assert!(Update::parse(&file.images[0]).is_err() && Update::parse(&file.bytes()[..99_999]).is_err());
+    assert!(board.events().iter().all(|event| event.kind != "flash_erase"));
+    let mut changed = file.clone();
+    changed.images[1][0x1_0000] ^= 1;
+    let (_, refused) = update_with(&mut board, &changed, &key);
+    assert!(refused.is_err(), "the received image is not the one that was signed");
+    board.power_cycle(MS);
+    board.run(START);
+    assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::Confirmed));
+    // Without the boot loader in the other bank a swap would start nothing.
+    board.patch(At::Address(FLASH_BASE + BANK + BOOT_SIZE - 16), &[0; 16]);
+    board.power_cycle(MS);
+    board.run(START);
+    assert_eq!(firmware(&mut board), (None, FirmwareState::Alone));
+}
+
+/// Writes an image to the other bank, to start on trial.
+fn install(board: &mut Board, image: &[u8], expected: u32) {
+    let trailer = Trailer::new(image.len() as u32, CRC.checksum(image), expected, 2);
+    board.patch(At::Address(FLASH_BASE + BANK + IMAGE), image);
+    board.patch(At::Address(FLASH_BASE + BANK + TRAILER), &spread(&trailer.bytes()));
+}
+
+/// A board whose image in the other bank is on trial from the next reset on, with other instructions at the beginning of a
+/// function.
+fn bad(test: &str, function: &str, code: &[u8], expected: u32) -> Option<Board> {
+    let mut board = boot(test, &[])?;
+    board.run(START);
+    on_bus(&mut board).set_configuration(&settings(48.0)).expect("it stands");
+    let mut image = built().1.images[1].clone();
+    let at = (board.symbol(function).0 - FLASH_BASE - IMAGE) as usize;
+    image[at..at + code.len()].copy_from_slice(code);
+    install(&mut board, &image, expected);
+    let _ = board.events();
+    on_bus(&mut board).restart().expect("it stands");
+    Some(board)
+}
+
+fn rolled_back(board: &mut Board) {
+    for _ in 0..2 {
+        board.run(START);
+        assert_eq!(firmware(board), (Some(Slot::A), FirmwareState::RolledBack));
+        assert_eq!(on_bus(board).configuration().expect("a response"), settings(48.0));
+        board.power_cycle(10 * MS);
+    }
+}
+
+#[test]
+#[ignore = "it builds embassy, which takes a minute"]
+fn a_nucleo_goes_back_from_an_image_that_hangs_or_resets_itself() {
+    const TEST: &str = "a_nucleo_goes_back_from_an_image_that_hangs_or_resets_itself";
+    const HANG: &[u8] = &[0xFE, 0xE7];
+    const UNDEFINED: &[u8] = &[0, 0xDE];
+    // It writes SYSRESETREQ to AIRCR.
+    const RESET: &[u8] = &[
+        0x4E, 0xF6, 0x0C, 0x50, 0xCE, 0xF2, 0x00, 0x00, 0x40, 0xF2, 0x04, 0x01, 0xC0, 0xF2, 0xFA, 0x51, 0x01,
+        0x60, 0xFE, 0xE7,
+    ];
+    // Its first instruction, its start, its task, which calls that function after two seconds without wheels.
+    for (function, code, causes) in [
+        ("Reset", HANG, &["software", "iwdg", "software"][..]),
+        ("store::firmware::Trailer::read", HANG, &["software", "iwdg", "software"]),
+        ("can::wheel::WheelReceiver::poll", HANG, &["software", "iwdg", "software"]),
+        ("can::wheel::WheelReceiver::poll", UNDEFINED, &["software", "iwdg", "software"]),
+        ("can::wheel::WheelReceiver::poll", RESET, &["software"; 5]),
+    ] {
+        let Some(mut board) = bad(TEST, function, code, 0) else { return };
+        board.run(12 * S);
+        let found: Vec<String> = resets(&mut board).into_iter().map(|(_, cause)| cause).collect();
+        // The restart, then one for each swap and each failure.
+        assert_eq!(found[0], "software", "{function}");
+        assert_eq!(found[1..], *causes, "{function}");
+        rolled_back(&mut board);
+    }
+}
+
+#[test]
+#[ignore = "it builds embassy, which takes a minute"]
+fn a_nucleo_goes_back_from_an_image_without_can_after_its_trial() {
+    const TEST: &str = "a_nucleo_goes_back_from_an_image_without_can_after_its_trial";
+    // bx lr
+    let Some(mut board) = bad(TEST, "can::CanBus::transmit", &[0x70, 0x47], CAN) else { return };
+    board.run(59 * S);
+    assert_eq!(resets(&mut board).len(), 2, "the restart and the swap");
+    board.run(2 * S);
+    assert_eq!(resets(&mut board).len(), 2, "the end of the trial and the swap");
+    rolled_back(&mut board);
+}
+
+/// A reset leaves either value of the option bytes while they are changed; each start mends that.
+#[test]
+#[ignore = "it builds embassy, which takes a minute"]
+fn a_nucleo_starts_after_a_reset_or_a_cut_at_any_time_of_a_swap() {
+    const TEST: &str = "a_nucleo_starts_after_a_reset_or_a_cut_at_any_time_of_a_swap";
+    let Some(mut board) = boot(TEST, &[]) else { return };
+    board.run(START);
+    install(&mut board, &built().1.images[1], 0);
+    board.snapshot("installed");
+    let mut outcomes = std::collections::BTreeSet::new();
+    for at in (0..160).step_by(4) {
+        for is_reset in [true, false] {
+            board.restore("installed");
+            board.reset_pin();
+            // Near the change of the option bytes, after the checks of both images.
+            board.run(Duration::from_millis(40) + MS * at / 2);
+            let _ = board.events();
+            if is_reset {
+                board.reset_pin();
+            } else {
+                board.power_cycle(MS);
+            }
+            board.run(START);
+            let state = firmware(&mut board);
+            outcomes.insert((at, is_reset, format!("{state:?}")));
+            assert_eq!(state, (Some(Slot::B), FirmwareState::OnTrial), "{at} {is_reset}");
+        }
+    }
+    println!("{TEST}: {} interruptions", outcomes.len());
+}
+
+/// Most accesses are polls while the controller is busy, so a few of them are any time of each step; `library::banks` cuts at
+/// each operation.
+#[test]
+#[ignore = "it builds embassy, which takes a minute"]
+fn a_nucleo_starts_an_image_after_a_cut_at_an_access_of_its_update() {
+    let test = "a_nucleo_starts_an_image_after_a_cut_at_an_access_of_its_update";
+    let delays = &[Duration::ZERO, Duration::from_micros(50)];
+    const TINY: usize = 1_024;
+    let Some(mut board) = boot(test, &[]) else { return };
+    let (_, file) = built();
+    board.run(START);
+    on_bus(&mut board).set_configuration(&settings(48.0)).expect("it stands");
+    // So that two sectors are erased, and the trailer's.
+    install(&mut board, &file.images[1][..2 * TINY], 0);
+    board.patch(At::Address(FLASH_BASE + BANK + TRAILER), &spread(&[0; 64]));
+    let starts = |board: &mut Board| {
+        board.run(200 * MS);
+        let Ok(info) = on_bus(board).info() else { return false };
+        assert_eq!(on_bus(board).configuration().expect("it answered"), settings(48.0));
+        info.firmware.slot.is_some()
+    };
+    let mut cuts = Cuts { test, all: false, most: 12, delays, starts: &starts, count: 0 };
+    let [a, b] = &file.images;
+    let tiny = Update::new(file.head.label, [a.clone(), b[..TINY].to_vec()]);
+    service::enter(&mut board, 2);
+    let head = [&[0x2E, 1, 0x1A][..], &tiny.head.bytes()].concat();
+    assert_eq!(service::ask(&mut board, &head), [0x6E, 1, 0x1A]);
+    let begin = [&[0x34, 0, 0x44, 0, 0, 0, 2][..], &(TINY as u32).to_be_bytes()].concat();
+    cuts.during(&mut board, "erase", 1, &|board| send(board, &begin), S);
+    for (number, block) in (1u8..).zip(tiny.images[1].chunks(256)) {
+        let block = [&[0x36, number][..], block].concat();
+        match number {
+            2 => cuts.during(&mut board, "block", 1, &|board| send(board, &block), 100 * MS),
+            _ => assert_eq!(service::ask(&mut board, &block), [0x76, number]),
+        }
+    }
+    assert_eq!(service::ask(&mut board, &[0x37])[..2], [0x77, 1]);
+    let activate = [0x31, 1, 0xFF, 1];
+    cuts.during(&mut board, "activation", 1, &|board| send(board, &activate), 100 * MS);
+    // The piece of an image that is on trial hangs, and the banks swap back.
+    cuts.during(&mut board, "start on trial", 1, &|board| board.reset_pin(), START);
+    cuts.during(&mut board, "rollback", 1, &|_| (), 3 * S);
+    board.run(START);
+    assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::RolledBack));
+    install(&mut board, b, 0);
+    cuts.during(&mut board, "start of a whole image", 1, &|board| board.reset_pin(), START);
+    assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::OnTrial));
+    board.run(14_200 * MS);
+    cuts.during(&mut board, "confirmation", 1, &|_| (), S);
+    assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
+    println!("{test}: {} cuts", cuts.count);
+}
