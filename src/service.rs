@@ -15,6 +15,8 @@ mod learner;
 pub mod message;
 mod not_good;
 #[doc(hidden)]
+pub mod spi_imu;
+#[doc(hidden)]
 mod text;
 
 pub use conditions::Conditions;

@@ -4,6 +4,7 @@
 //! while they run.
 
 mod firmware;
+mod start;
 mod stored;
 mod weights;
 

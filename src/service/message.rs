@@ -2,7 +2,7 @@
 
 use super::device::Firmware;
 use super::event::{CanFault, ClockFault, Crash, ResetCause, SensorFault};
-use crate::coprocessor::Contradiction;
+use crate::coprocessor::{Contradiction, Coprocessor};
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters, Status};
 use crate::store::StoreError;
@@ -195,6 +195,21 @@ pub struct AllCounters {
     pub inputs: InputCounters,
     /// Seconds in which the sources of the yaw rate contradicted each other, and the newest one's numbers.
     pub contradiction: Contradiction,
+}
+
+impl AllCounters {
+    /// Returns a board's counters.
+    #[inline]
+    pub fn of(coprocessor: &Coprocessor, lines: &LineCounters) -> Self {
+        Self {
+            pipeline: *coprocessor.pipeline().counters(),
+            watch: *coprocessor.monitor_counters(),
+            lines: *lines,
+            fog: *coprocessor.fog_counters(),
+            inputs: *coprocessor.input_counters(),
+            contradiction: *coprocessor.contradiction(),
+        }
+    }
 }
 
 /// The counters of requests that were refused for lack of access since the start.

@@ -45,14 +45,23 @@ const SPREAD: u32 = (2 * QUAD / WORD) as u32;
 const RECORDS_SIZE: u32 = (BANK - RECORDS) / SPREAD;
 const ERASED: [u8; QUAD] = [0xFF; QUAD];
 
-/// The flash, by offset into the memory map. Reading a quad-word whose code does not fit is an error. [`NorFlash::write`]
-/// gets whole quad-words, and [`NorFlash::erase`] one sector.
-pub trait Banks: NorFlash<Error = Kind> {
+/// The flash, by offset into the memory map.
+#[allow(clippy::missing_errors_doc, reason = "they are the part's own, but that of `read`")]
+pub trait Banks {
     /// Returns whether bank 2 is the lower one.
     fn is_swapped(&self) -> bool;
 
     /// Returns flash in place.
     fn mapped(&self, range: Range<u32>) -> &[u8];
+
+    /// Reads flash; a quad-word whose code does not fit is an error.
+    fn read(&mut self, at: u32, bytes: &mut [u8]) -> Result<(), Kind>;
+
+    /// Erases the sector at an offset.
+    fn erase(&mut self, sector: u32) -> Result<(), Kind>;
+
+    /// Programs a quad-word.
+    fn write(&mut self, at: u32, quad: &[u8; QUAD]) -> Result<(), Kind>;
 }
 
 fn quad<F: Banks>(flash: &mut F, at: u32) -> Option<[u8; QUAD]> {
@@ -73,7 +82,7 @@ fn is_erased<F: Banks>(flash: &mut F, sector: u32) -> bool {
 fn erase<F: Banks>(flash: &mut F, range: Range<u32>) -> Result<(), Kind> {
     for sector in range.step_by(SECTOR as usize) {
         if !is_erased(flash, sector) {
-            flash.erase(sector, sector + SECTOR)?;
+            flash.erase(sector)?;
             if !is_erased(flash, sector) {
                 return Err(Kind::Other);
             }

@@ -25,9 +25,8 @@ use embassy_time::{Duration, Instant};
 use embedded_can::{Frame as _, Id};
 use gyronet::TimedFrame;
 use gyronet::can::DataFrame;
-use gyronet::can::wheel::WheelSettings;
 use gyronet::coprocessor::{Bus, Observation, Sink};
-use gyronet::heading::HeadingSettings;
+use gyronet::health::count;
 use gyronet::service::message::LineCounters;
 use static_cell::ConstStaticCell;
 
@@ -53,22 +52,12 @@ static SENT: ConstStaticCell<TxFdBuf<QUEUE>> = ConstStaticCell::new(TxFdBuf::new
 static RECEIVED: ConstStaticCell<RxFdBuf<QUEUE>> = ConstStaticCell::new(RxFdBuf::new());
 
 /// What the bus is to receive, and at which bit rate.
-pub struct Received<'a> {
+pub struct Received<F> {
     /// Identifiers of requests to this board and to all servers, and of responses.
     pub ids: [Id; 3],
-    pub wheels: &'a WheelSettings,
-    pub heading: &'a HeadingSettings,
+    /// Identifiers, each with the mask of its bits that count.
+    pub filters: F,
     pub bits_per_second: u32,
-}
-
-impl Received<'_> {
-    /// Returns identifiers, each with the mask of its bits that count.
-    fn filters(&self) -> impl Iterator<Item = (Id, u32)> {
-        let [request, functional, _] = self.ids;
-        let wheels = self.wheels.frames.iter().flatten().map(|frame| frame.id);
-        let exactly = [request, functional].into_iter().chain(wheels).map(|id| (id, u32::MAX));
-        exactly.chain(self.heading.filters())
-    }
 }
 
 /// The bus, for [`gyronet::Coprocessor::step`].
@@ -78,7 +67,7 @@ pub struct CanBus {
     receiver: BufferedFdCanReceiver,
     /// Identifiers of requests.
     requests: [Id; 2],
-    counters: LineCounters,
+    pub counters: LineCounters,
     /// Frames received since the last step.
     taken: usize,
     /// The controller's places whose last frame had been sent at the last step, and those whose frame is being cancelled.
@@ -101,12 +90,12 @@ impl CanBus {
         interrupts: impl Binding<FDCAN1_IT0, IT0InterruptHandler<FDCAN1>>
         + Binding<FDCAN1_IT1, IT1InterruptHandler<FDCAN1>>
         + 'static,
-        received: &Received,
+        received: Received<impl Iterator<Item = (Id, u32)>>,
     ) -> Self {
         let mut can = CanConfigurator::new(peripheral, rx, tx, interrupts);
         let action = Action::StoreInFifo0;
         let (mut standard, mut extended) = (0, 0);
-        for (id, mask) in received.filters() {
+        for (id, mask) in received.filters {
             match id {
                 Id::Standard(id) if standard < STANDARD_FILTERS => {
                     let filter = FilterType::BitMask { filter: id.as_raw(), mask: mask as u16 & 0x7FF };
@@ -159,25 +148,11 @@ impl CanBus {
         }
     }
 
-    pub fn counters(&self) -> LineCounters {
-        self.counters
-    }
-
-    /// Counts frames that were not sent.
-    fn drop_sent(&mut self, frames: u32) {
-        self.counters.unsent = self.counters.unsent.saturating_add(frames);
-    }
-
-    /// Counts a received frame that was lost.
-    fn lose(&mut self) {
-        self.counters.frames_lost = self.counters.frames_lost.saturating_add(1);
-    }
-
     fn transmit(&mut self, frame: DataFrame) {
         let classic = Header::new(frame.id(), frame.data().len() as u8, false);
         let frame = FdFrame::new(classic, frame.data());
         if frame.is_err() || frame.is_ok_and(|frame| self.sender.try_write(frame).is_err()) {
-            self.drop_sent(1);
+            count(&mut self.counters.unsent, 1);
         }
     }
 
@@ -201,7 +176,7 @@ impl CanBus {
     fn count_cancelled(&mut self) {
         let ended = self.cancelled & !pac::FDCAN1.txbcr().read().0;
         self.cancelled &= !ended;
-        self.drop_sent((ended & !pac::FDCAN1.txbto().read().0).count_ones());
+        count(&mut self.counters.unsent, (ended & !pac::FDCAN1.txbto().read().0).count_ones());
     }
 
     /// Follows the controller off the bus and back.
@@ -234,7 +209,7 @@ impl Sink for CanBus {
 
     fn observed(&mut self, observation: &Observation) {
         if service::OBSERVATIONS.try_send(*observation).is_err() {
-            self.counters.overruns = self.counters.overruns.saturating_add(1);
+            count(&mut self.counters.overruns, 1);
         }
     }
 }
@@ -253,7 +228,7 @@ impl Bus for CanBus {
                     return Some(frame);
                 }
                 if service::REQUESTS.try_send(frame).is_err() {
-                    self.lose();
+                    count(&mut self.counters.frames_lost, 1);
                 }
             }
         }
@@ -263,11 +238,11 @@ impl Bus for CanBus {
         let now = Instant::now();
         // The driver drops what finds its queue full.
         if core::mem::take(&mut self.taken) >= QUEUE {
-            self.lose();
+            count(&mut self.counters.frames_lost, 1);
         }
         if pac::FDCAN1.ir().read().rfl(0) {
             pac::FDCAN1.ir().write(|w| w.set_rfl(0, true));
-            self.lose();
+            count(&mut self.counters.frames_lost, 1);
         }
         self.follow(now);
         while let Ok(frame) = service::RESPONSES.try_receive() {

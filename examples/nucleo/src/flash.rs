@@ -6,7 +6,7 @@ use cortex_m::peripheral::SCB;
 use embassy_stm32::flash::{Blocking, Flash};
 use embassy_stm32::pac::{self, flash::vals::OptsrSwapBank};
 use embassy_stm32::peripherals;
-use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use embedded_storage::nor_flash::{NorFlashError, NorFlashErrorKind as Kind};
 use gyronet::store::banks::{BANK, Banks, QUAD, SECTOR};
 
 const BASE: u32 = 0x0800_0000;
@@ -39,11 +39,6 @@ impl Array {
         // SAFETY: see above.
         Self { driver: Flash::new_blocking(unsafe { peripherals::FLASH::steal() }), alive }
     }
-
-    /// Clears the flags of earlier operations, which embassy's driver writes to a read-only register.
-    fn clear() {
-        pac::FLASH.nsccr().write(|w| w.0 = FLAGS);
-    }
 }
 
 impl Banks for Array {
@@ -55,42 +50,30 @@ impl Banks for Array {
         // SAFETY: the library asks for flash alone, and uses it while nothing is written.
         unsafe { core::slice::from_raw_parts((BASE + range.start) as *const u8, range.len()) }
     }
-}
 
-impl ErrorType for Array {
-    type Error = NorFlashErrorKind;
-}
-
-impl ReadNorFlash for Array {
-    const READ_SIZE: usize = 1;
-
-    fn read(&mut self, at: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+    fn read(&mut self, at: u32, bytes: &mut [u8]) -> Result<(), Kind> {
         IS_TORN.store(false, Relaxed);
         self.driver.blocking_read(at, bytes).map_err(|error| error.kind())?;
         cortex_m::asm::dsb();
-        if IS_TORN.load(Relaxed) { Err(NorFlashErrorKind::Other) } else { Ok(()) }
+        if IS_TORN.load(Relaxed) { Err(Kind::Other) } else { Ok(()) }
     }
 
-    fn capacity(&self) -> usize {
-        2 * BANK as usize
-    }
-}
-
-impl NorFlash for Array {
-    const WRITE_SIZE: usize = QUAD;
-    const ERASE_SIZE: usize = SECTOR as usize;
-
-    fn erase(&mut self, from: u32, _: u32) -> Result<(), Self::Error> {
-        Self::clear();
+    fn erase(&mut self, sector: u32) -> Result<(), Kind> {
+        clear();
         // embassy's driver names the bank by the address, the controller by its place on the chip.
-        let sector = if self.is_swapped() { from ^ BANK } else { from };
+        let sector = if self.is_swapped() { sector ^ BANK } else { sector };
         let erased = self.driver.blocking_erase(sector, sector + SECTOR);
         (self.alive)();
         erased.map_err(|error| error.kind())
     }
 
-    fn write(&mut self, at: u32, bytes: &[u8]) -> Result<(), Self::Error> {
-        Self::clear();
-        self.driver.blocking_write(at, bytes).map_err(|error| error.kind())
+    fn write(&mut self, at: u32, quad: &[u8; QUAD]) -> Result<(), Kind> {
+        clear();
+        self.driver.blocking_write(at, quad).map_err(|error| error.kind())
     }
+}
+
+/// Clears the flags of earlier operations, which embassy's driver writes to a read-only register.
+fn clear() {
+    pac::FLASH.nsccr().write(|w| w.0 = FLAGS);
 }

@@ -5,6 +5,7 @@
 //! | line | pins | use |
 //! |---|---|---|
 //! | USART1 | D0 (PB7), D1 (PB6) | Xsens MTi, 115200 baud |
+//! | SPI1 | D13 (PA5), D12 (PG9), D11 (PB5); selects D10 (PD14), D9 (PD15) | ICM-42688-P, BMI088 or ASM330LHH, where one is configured |
 //! | FDCAN1 | PD0, PD1 (CN9), to a transceiver | 500 kbit/s; data of others at 2 Mbit/s |
 //!
 //! Boot loader, image and records lie as [`gyronet::store::banks`] says. `gyronet firmware --board nucleo-h563zi` makes what a
@@ -12,12 +13,13 @@
 //!
 //! Every millisecond `drive` calls [`Coprocessor::step`]. Below it `compute` runs the network, and below both the main program
 //! serves diagnosis and the store ([`service`]). The watchdog is fed while `drive` and the main program get on. Not here yet:
-//! sensors on SPI, update of weights alone, the fibre-optic gyro, counts of failed starts and of UART errors.
+//! update of weights alone, the fibre-optic gyro, counts of failed starts and of UART errors.
 #![no_std]
 #![no_main]
 
 mod can;
 mod flash;
+mod imu;
 mod rng;
 mod service;
 
@@ -34,16 +36,17 @@ use embassy_stm32::{bind_interrupts, pac, peripherals, rcc};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Ticker};
-use gyronet::align::clock_ratio::ClockRatioConfig;
-use gyronet::can::wheel::WheelReceiver;
-use gyronet::coprocessor::{Clock, DueWindow, StorageFaults};
+use gyronet::coprocessor::DueWindow;
+use gyronet::health::count;
 use gyronet::model::background::BackgroundCheck;
 use gyronet::model::{Estimate, WindowNetwork, weights};
 use gyronet::sensor::serial::Serial;
 use gyronet::sensor::xsens::Mti;
 use gyronet::service::message::{AllCounters, LineCounters};
+use gyronet::service::spi_imu::{BringUp, Reader};
 use gyronet::store::banks::{Records, Slots};
 use gyronet::{Config, Coprocessor, GyroNet, Micros};
+use imu::{Imu, PASSED, WANTED};
 use service::{Service, Stored, alive};
 use static_cell::ConstStaticCell;
 
@@ -53,7 +56,6 @@ bind_interrupts!(struct Interrupts {
     FDCAN1_IT1 => embassy_stm32::can::IT1InterruptHandler<peripherals::FDCAN1>;
 });
 
-type Imu = Serial<BufferedUart<'static>, Mti>;
 type Watchdog = IndependentWatchdog<'static, peripherals::IWDG>;
 
 /// Time without a cycle of the main program after which the watchdog is no longer fed.
@@ -88,23 +90,16 @@ async fn drive(coprocessor: &'static mut Coprocessor, mut imu: Imu, mut can: Can
         }
         coprocessor.pause(service::PAUSED.load(Relaxed), &mut can);
         let step = coprocessor.step(Micros(now.as_micros()), &mut imu, &mut can, None);
-        line_errors = line_errors.saturating_add(u32::from(step.imu_error.is_some()));
+        count(&mut line_errors, u32::from(step.imu_error.is_some()));
         if let Some(window) = coprocessor.window() {
             WINDOW.signal(window);
         }
-        service::COUNTERS.signal(AllCounters {
-            pipeline: *coprocessor.pipeline().counters(),
-            watch: *coprocessor.monitor_counters(),
-            lines: LineCounters { line_errors, ..can.counters() },
-            fog: *coprocessor.fog_counters(),
-            inputs: *coprocessor.input_counters(),
-            contradiction: *coprocessor.contradiction(),
-        });
+        service::COUNTERS.signal(AllCounters::of(coprocessor, &LineCounters { line_errors, ..can.counters }));
         steps = steps.wrapping_add(1);
         if steps.is_multiple_of(COURSE_STEPS) {
             service::COURSE.signal(coprocessor.course_state());
         }
-        let cycles = service::cycles();
+        let cycles = service::CYCLES.load(Relaxed);
         if cycles != seen {
             (seen, seen_at) = (cycles, now);
         }
@@ -144,7 +139,7 @@ fn main() -> ! {
     static COPROCESSOR: ConstStaticCell<Coprocessor> =
         ConstStaticCell::new(Coprocessor::new(Config::DEFAULT));
     static DEVICE: ConstStaticCell<Stored> = ConstStaticCell::new(Stored::new(&service::SUPPORTED));
-    static RECEIVED: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
+    static BYTES: ConstStaticCell<[u8; 1024]> = ConstStaticCell::new([0; 1024]);
     static UNSENT: ConstStaticCell<[u8; 1]> = ConstStaticCell::new([0]);
 
     // SAFETY: nothing else uses the watchdog; embassy hands it out only after it has waited for the clock, for ever.
@@ -160,39 +155,28 @@ fn main() -> ! {
     device.begin(Records::open(records).ok(), Some(Slots(slots)), Ok(()), identity);
     watchdog.pet();
     let blob = device.weights(None, &weights::DEFAULT.0);
-    let weights = blob.map_or(0, |blob| blob.crc);
-    let configuration = device.configuration();
-    let of_other_weights = device.calibration().unit.is_some_and(|unit| unit.weights != weights);
     let coprocessor = COPROCESSOR.take();
-    *coprocessor = Coprocessor::new(Config {
-        wheels: WheelReceiver::new(*device.wheels()).ok(),
-        has_gyronet: blob.is_some(),
-        clock: Clock::Outside,
-        clock_ratio: Some(ClockRatioConfig::DEFAULT),
-        storage: StorageFaults {
-            damaged: device.stored_damaged() || of_other_weights,
-            configuration_lost: device.configuration_lost(),
-        },
-        ..configuration.coprocessor(device.calibration(), device.learned(), weights)
-    });
+    *coprocessor = Coprocessor::new(device.coprocessor(true));
+    let configuration = device.configuration();
     let ids = configuration.diagnosis.ids().expect("a stored configuration has been checked");
-    let received = Received {
-        ids,
-        wheels: device.wheels(),
-        heading: &configuration.heading,
-        bits_per_second: configuration.can.bits_per_second,
-    };
-    let can = CanBus::start(parts.FDCAN1, parts.PD0, parts.PD1, Interrupts, &received);
-    let (unsent, received) = (UNSENT.take(), RECEIVED.take());
-    let baud = usart::Config::default();
-    let line = BufferedUart::new(parts.USART1, parts.PB7, parts.PB6, unsent, received, Interrupts, baud)
-        .expect("115200 baud from 250 MHz");
+    let received =
+        Received { ids, filters: device.received(), bits_per_second: configuration.can.bits_per_second };
+    let can = CanBus::start(parts.FDCAN1, parts.PD0, parts.PD1, Interrupts, received);
     let check = blob.as_ref().map(|blob| BackgroundCheck::new(blob.content, blob.crc));
-    let mut service = Service::new(device, ids, check);
 
     interrupt::UART4.set_priority(Priority::P6);
     interrupt::UART5.set_priority(Priority::P7);
-    let imu = Serial::new(line, Mti::new());
+    let spi = imu::start(parts.SPI1, parts.PA5, parts.PB5, parts.PG9, parts.PD14, parts.PD15);
+    let bring_up = BringUp::new(configuration.imu, Some(spi), &WANTED);
+    let imu = if bring_up.is_some() {
+        Imu::Spi(Reader::new(&WANTED, || Instant::now().as_micros(), || PASSED.try_take()))
+    } else {
+        let (unsent, received) = (UNSENT.take(), BYTES.take());
+        let baud = usart::Config::default();
+        let line = BufferedUart::new(parts.USART1, parts.PB7, parts.PB6, unsent, received, Interrupts, baud);
+        Imu::Line(Serial::new(line.expect("115200 baud from 250 MHz"), Mti::new()))
+    };
+    let mut service = Service::new(device, ids, check, bring_up);
     ABOVE.start(interrupt::UART4).spawn(drive(coprocessor, imu, can, watchdog).expect("its only one"));
     if let Some(blob) = blob {
         BELOW.start(interrupt::UART5).spawn(compute(GyroNet::new(blob)).expect("its only one"));

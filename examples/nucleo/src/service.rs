@@ -2,13 +2,15 @@
 //!
 //! It runs below everything else. What `drive` passes on waits in channels of fixed length; what finds no room is counted.
 
-use crate::{flash::Array, rng};
+use crate::flash::Array;
+use crate::imu::{PASSED, Spi};
+use crate::rng;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use cortex_m::peripheral::SCB;
 use embassy_stm32::pac;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex as Raw;
 use embassy_sync::{channel::Channel, signal::Signal};
-use embassy_time::{Duration, Instant};
+use embassy_time::{Delay, Duration, Instant};
 use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
 use gyronet::coprocessor;
@@ -16,7 +18,7 @@ use gyronet::heading::CourseState;
 use gyronet::model::background::BackgroundCheck;
 use gyronet::service::event::ResetCause;
 use gyronet::service::message::{AllCounters, Identity};
-use gyronet::service::{Device, SupportedHardware};
+use gyronet::service::{Device, SupportedHardware, spi_imu::BringUp};
 use gyronet::store::ImuPart;
 use gyronet::store::banks::{Records, Slots};
 use gyronet::store::firmware::{LABEL_SIZE, Label};
@@ -24,8 +26,12 @@ use gyronet::uds::Server;
 
 /// Clock of the core, Hz.
 pub const CORE_HZ: u32 = 250_000_000;
-pub const SUPPORTED: SupportedHardware =
-    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[], gnss: false, clock_hz: CORE_HZ };
+pub const SUPPORTED: SupportedHardware = SupportedHardware {
+    imus: &[ImuPart::XsensMti, ImuPart::Icm42688, ImuPart::Bmi088, ImuPart::Asm330lhh],
+    fogs: &[],
+    gnss: false,
+    clock_hz: CORE_HZ,
+};
 /// Time for the announcement of a restart to leave.
 const LEAVE: Duration = Duration::from_millis(25);
 /// Duration of one pass over the weights, ms.
@@ -34,7 +40,7 @@ const CHECK_MS: usize = 10_000;
 /// Frames of testers, and the responses to them.
 pub static REQUESTS: Channel<Raw, DataFrame, 16> = Channel::new();
 pub static RESPONSES: Channel<Raw, DataFrame, 16> = Channel::new();
-pub static OBSERVATIONS: Channel<Raw, coprocessor::Observation, 8> = Channel::new();
+pub static OBSERVATIONS: Channel<Raw, coprocessor::Observation, 32> = Channel::new();
 pub static COUNTERS: Signal<Raw, AllCounters> = Signal::new();
 pub static COURSE: Signal<Raw, CourseState> = Signal::new();
 /// True while a tester has stopped the messages of the board, and while the rates are withheld before a restart.
@@ -44,15 +50,11 @@ pub static PAUSED: AtomicBool = AtomicBool::new(false);
 pub static WEIGHTS_DAMAGED: AtomicBool = AtomicBool::new(false);
 pub static MOUNT_MOVED: AtomicBool = AtomicBool::new(false);
 /// Number of cycles of the main program.
-static CYCLES: AtomicU32 = AtomicU32::new(0);
+pub static CYCLES: AtomicU32 = AtomicU32::new(0);
 
 /// Notes that the main program gets on.
 pub fn alive() {
     CYCLES.fetch_add(1, Relaxed);
-}
-
-pub fn cycles() -> u32 {
-    CYCLES.load(Relaxed)
 }
 
 pub type Stored = Device<Records<Array>, Slots<Array>>;
@@ -63,32 +65,32 @@ pub struct Service {
     /// Identifiers of requests to this board and to all servers, and of responses.
     ids: [Id; 3],
     weights: Option<BackgroundCheck<'static>>,
+    bring_up: Option<BringUp<Spi>>,
     counters: AllCounters,
     /// Time of the last check of the weights, ms.
     checked: u32,
 }
 
 impl Service {
-    pub fn new(device: &'static mut Stored, ids: [Id; 3], weights: Option<BackgroundCheck<'static>>) -> Self {
+    pub fn new(
+        device: &'static mut Stored,
+        ids: [Id; 3],
+        weights: Option<BackgroundCheck<'static>>,
+        bring_up: Option<BringUp<Spi>>,
+    ) -> Self {
         let counters = AllCounters::default();
-        Self { device, server: Server::new(), ids, weights, counters, checked: 0 }
+        Self { device, server: Server::new(), ids, weights, bring_up, counters, checked: 0 }
     }
 
     /// Does a bounded piece of work.
     pub fn step(&mut self) {
         let now = Instant::now().as_millis() as u32;
         while let Ok(seen) = OBSERVATIONS.try_receive() {
-            let coprocessor::Observation { sample, vehicle, wheels, standing, vertical, .. } = seen;
-            let live = &vehicle.live;
-            vertical.into_iter().for_each(|vertical| self.device.learn_vertical(vertical));
-            self.device.observe(
-                sample.as_ref(),
-                vehicle.tick,
-                (live.status, live.faults),
-                &wheels,
-                &standing,
-            );
-            self.device.rated(live.quality, &standing);
+            self.device.observed(&seen);
+        }
+        let step = |up: &mut BringUp<Spi>| up.step(now, &mut Delay, |part| PASSED.signal(part));
+        if let Some(result) = self.bring_up.as_mut().and_then(step) {
+            self.device.sensor(result);
         }
         COURSE.try_take().into_iter().for_each(|course| self.device.learn_course(&course));
         self.counters = COUNTERS.try_take().unwrap_or(self.counters);

@@ -225,6 +225,59 @@ class H5(unittest.TestCase):
         self.unlock()
         self.assertEqual(self.board.read("FLASH", 0x28), 0)
 
+    # -- SPI ---------------------------------------------------------------------------------------------------------
+
+    def start_spi(self, config_2=1 << 22 | 1 << 24 | 1 << 25 | 1 << 26 | 1 << 28):
+        """Mode 3 at 50 MHz / 8 from PLL1, with a slave at PD14 that answers each byte with its complement."""
+        self.start_pll()
+        self.board.write("RCC", 0xA4, 1 << 12)
+        for letter, pin in (("A", 5), ("B", 5), ("G", 9)):
+            self.board.alternate(letter, pin, 5)
+        self.heard = []
+        answer = lambda byte, mode, hz: self.heard.append((byte, mode, hz)) or byte ^ 0xFF
+        self.board.peripherals["SPI1"].slaves[0] = SimpleNamespace(select=lambda: None, deselect=lambda: None, transfer=answer)
+        self.board.write("GPIOD", 0x18, 1 << 14)
+        self.board.write("GPIOD", 0x00, self.board.read("GPIOD", 0) & ~(2 << 28))
+        self.board.write("SPI1", 0x0C, config_2)
+        self.board.write("SPI1", 0x08, 0x2007_0007)
+        self.board.write("SPI1", 0x00, 1)
+        self.board.write("SPI1", 0x00, 1 | 1 << 9)
+        self.board.write("GPIOD", 0x18, 1 << 30)
+
+    def test_spi_sends_the_bytes_of_its_fifo_and_keeps_what_comes(self):
+        self.start_spi()
+        self.assertEqual(self.board.read("SPI1", 0x14), 1 << 12 | 2)
+        for byte in (0x5A, 1):
+            self.board.write("SPI1", 0x20, byte, 1)
+        self.assertEqual(self.board.read("SPI1", 0x14), 2)
+        self.board.advance(3 * US)
+        self.assertEqual(self.board.read("SPI1", 0x14), 1 << 12 | 7)
+        self.assertEqual([self.board.read("SPI1", 0x30, 1) for _ in range(2)], [0xA5, 0xFE])
+        self.assertEqual(self.heard, [(byte, (True, True), 6_250_000) for byte in (0x5A, 1)])
+        self.board.write("SPI1", 0x20, 7, 1)
+        self.board.write("SPI1", 0x00, 0)
+        self.assertEqual(len(self.board.events("disabled_in_transfer")), 1)
+
+    def test_a_full_receive_fifo_overruns(self):
+        self.start_spi()
+        for byte in range(17):
+            self.board.write("SPI1", 0x20, byte, 1)
+        self.board.advance(40 * US)
+        self.assertEqual((len(self.heard), self.board.read("SPI1", 0x14) & 1 << 6), (17, 1 << 6))
+        self.board.write("SPI1", 0x18, 1 << 6)
+        self.assertEqual(self.board.read("SPI1", 0x14) & 1 << 6, 0)
+
+    def test_modes_of_spi_that_are_left_out_end_the_run(self):
+        for offset, value in ((0x08, 0x2007_000F), (0x08, 0x2047_0007), (0x0C, 1 << 22), (0x0C, 1 << 26 | 1 << 23), (0x10, 1), (0x04, 5)):
+            self.board = FakeBoard(h5.create)
+            self.board.write("RCC", 0xA4, 1 << 12)
+            with self.assertRaises(Violation):
+                self.board.write("SPI1", offset, value)
+        for config_2 in (1 << 26, 1 << 22 | 1 << 26):
+            self.board = FakeBoard(h5.create)
+            with self.assertRaises(Violation):
+                self.start_spi(config_2)
+
     # -- FDCAN -------------------------------------------------------------------------------------------------------
 
     def start_can(self, cccr=0x300, nominal=11 << 8 | 2, config=1 << 16 | 2 << 4 | 2 << 2):

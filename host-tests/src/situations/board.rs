@@ -158,16 +158,7 @@ impl Board {
     pub fn step(&mut self, now: Micros) -> Vec<DataFrame> {
         let Self { coprocessor, device, network, waiting, wire, .. } = self;
         if let Some(seen) = coprocessor.step(now, waiting, wire, Some(network)).observation {
-            seen.vertical.into_iter().for_each(|vertical| device.learn_vertical(vertical));
-            let (live, tick) = (&seen.vehicle.live, seen.vehicle.tick);
-            device.observe(
-                seen.sample.as_ref(),
-                tick,
-                (live.status, live.faults),
-                &seen.wheels,
-                &seen.standing,
-            );
-            device.rated(live.quality, &seen.standing);
+            device.observed(&seen);
             if device.take_mount_moved() {
                 coprocessor.mount_moved();
             }

@@ -2,17 +2,18 @@
 //! nothing old after the bus was away.
 
 use crate::access;
-use crate::common::{IMU, SAMPLE, SET, drive, frames, host};
+use crate::common::{IMU, SAMPLE, SET, drive, frames, host, id};
 use crate::service::{answer, ask, enter, on_bus, send, storing};
+use crate::spi_sensors::FAULTS;
 use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
-use gyronet::can::yaw::AngleMessage;
+use gyronet::can::yaw::{AngleMessage, RateMessage};
 use gyronet::health::Faults;
 use gyronet::service::event::ResetCause;
 use gyronet::service::message::FlashState;
-use gyronet::store::Configuration;
 use gyronet::store::banks::{BANK, RECORDS, SECTOR};
 use gyronet::store::layout::FLASH_BASE;
+use gyronet::store::{Configuration, ImuPart};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::{inputs, replay};
 use gyronet_tools::client::device::Authority;
@@ -303,4 +304,54 @@ fn a_nucleo_survives_a_power_cut_at_any_time_of_a_store() {
         "{states:?}"
     );
     assert!((1..2 * CUTS).contains(&kept) && damaged > 0);
+}
+
+/// Known rates, deg/s, that a board sends in a second, and the number of all.
+fn second_of_rates(board: &mut Board) -> (Vec<f64>, usize) {
+    let _ = board.can_frames();
+    board.run(Duration::from_secs(1));
+    let frames = board.can_frames().into_iter().filter(|(_, frame)| frame.id() == id(0x1A0));
+    let rates: Vec<_> = frames
+        .map(|(_, frame)| RateMessage::parse(frame.data()).expect("eight bytes").deg_per_sec())
+        .collect();
+    (rates.iter().copied().flatten().collect(), rates.len())
+}
+
+#[test]
+#[ignore = "it builds embassy, which takes a minute"]
+fn a_nucleo_reads_the_part_on_spi_that_is_configured() {
+    let test = "a_nucleo_reads_the_part_on_spi_that_is_configured";
+    for (part, model) in
+        [(ImuPart::Icm42688, "Icm42688"), (ImuPart::Bmi088, "Bmi088"), (ImuPart::Asm330lhh, "Asm330lhh")]
+    {
+        let Some(mut board) = boot(test, &[]) else { return };
+        board.configure("SPI1.part", model);
+        board.run(200 * MS);
+        on_bus(&mut board)
+            .set_configuration(&Configuration { imu: part, ..Configuration::DEFAULT })
+            .expect("it stands");
+        on_bus(&mut board).restart().expect("it stands");
+        // Its self-test is at rest.
+        board.run(Duration::from_secs(1));
+        board.configure("SPI1.imu_rates_dps", serde_json::json!([0.0, 0.0, 10.0]));
+        board.run(500 * MS);
+        let turning = |board: &mut Board| {
+            let (rates, all) = second_of_rates(board);
+            println!("{test}: {model}: {} of {all} rates are known", rates.len());
+            assert!((99..=101).contains(&all) && rates.len() == all, "{} of {all}", rates.len());
+            assert!(rates.iter().all(|rate| (rate - 10.0).abs() < 0.3), "{rates:?}");
+            assert_eq!(on_bus(board).info().expect("a response").sensor, None);
+        };
+        turning(&mut board);
+        board.configure("SPI1.fitted", false);
+        board.run(500 * MS);
+        assert!(second_of_rates(&mut board).0.is_empty());
+        assert!(on_bus(&mut board).info().expect("a response").sensor.is_some());
+        board.configure("SPI1.fitted", true);
+        board.run(Duration::from_millis(1_500));
+        turning(&mut board);
+        let events = board.events();
+        let faults = events.iter().filter(|event| FAULTS.contains(&&*event.kind));
+        assert_eq!(faults.map(|event| &event.kind).collect::<Vec<_>>(), Vec::<&String>::new());
+    }
 }

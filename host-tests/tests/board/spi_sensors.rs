@@ -24,7 +24,7 @@ const Z: u32 = 2;
 /// Acceleration of a level part, g.
 const LEVEL: [f64; 3] = [0.0, 0.0, 1.0];
 /// Events that a driver in order does not cause.
-const FAULTS: [&str; 14] = [
+pub const FAULTS: [&str; 14] = [
     "slow_pin",
     "spi_unreadable",
     "mode_fault",

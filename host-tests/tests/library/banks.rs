@@ -1,7 +1,7 @@
 //! Flash of two banks that swap: power cuts at every operation while records are stored and copied, and while firmware is
 //! downloaded, tried, confirmed and rolled back.
 
-use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind as Kind, ReadNorFlash};
+use embedded_storage::nor_flash::{NorFlash, NorFlashErrorKind as Kind, ReadNorFlash};
 use gyronet::model::blob::CRC;
 use gyronet::store::banks::{BANK, Banks, QUAD, Records, SECTOR, Slots};
 use gyronet::store::firmware::{self, Label, Trailer, confirm, select};
@@ -81,12 +81,14 @@ impl Flash {
     }
 }
 
-impl ErrorType for Flash {
-    type Error = Kind;
-}
+impl Banks for Flash {
+    fn is_swapped(&self) -> bool {
+        self.0.borrow().is_swapped
+    }
 
-impl ReadNorFlash for Flash {
-    const READ_SIZE: usize = 1;
+    fn mapped(&self, _: Range<u32>) -> &[u8] {
+        unreachable!("it is not used here")
+    }
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Kind> {
         let part = self.0.borrow();
@@ -100,34 +102,14 @@ impl ReadNorFlash for Flash {
         Ok(())
     }
 
-    fn capacity(&self) -> usize {
-        2 * BANK as usize
-    }
-}
-
-impl NorFlash for Flash {
-    const WRITE_SIZE: usize = QUAD;
-    const ERASE_SIZE: usize = SECTOR as usize;
-
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Kind> {
-        assert_eq!((from % SECTOR, to - from), (0, SECTOR));
-        self.operate(from, &[Quad::Erased; SECTOR as usize / QUAD])
+    fn erase(&mut self, sector: u32) -> Result<(), Kind> {
+        assert_eq!(sector % SECTOR, 0);
+        self.operate(sector, &[Quad::Erased; SECTOR as usize / QUAD])
     }
 
-    fn write(&mut self, at: u32, bytes: &[u8]) -> Result<(), Kind> {
-        let quad = bytes.try_into().expect("one quad-word");
+    fn write(&mut self, at: u32, quad: &[u8; QUAD]) -> Result<(), Kind> {
         assert_eq!(self.0.borrow().quads[self.at(at)], Quad::Erased, "{at:#x} is programmed twice");
-        self.operate(at, &[Quad::Written(quad)])
-    }
-}
-
-impl Banks for Flash {
-    fn is_swapped(&self) -> bool {
-        self.0.borrow().is_swapped
-    }
-
-    fn mapped(&self, _: Range<u32>) -> &[u8] {
-        unreachable!("it is not used here")
+        self.operate(at, &[Quad::Written(*quad)])
     }
 }
 

@@ -17,7 +17,7 @@ use gyronet::mounting::Vertical;
 use gyronet::sample::{ImuSample, WheelSample};
 use gyronet::service::Device;
 use gyronet::service::event::{ClockFault, SensorFault};
-use gyronet::service::message::LineCounters;
+use gyronet::service::message::{AllCounters, LineCounters};
 use gyronet::standstill::Standing;
 use rtic::mutex_prelude::*;
 
@@ -152,7 +152,7 @@ impl Idle {
         }
         let windows = coprocessor.lock(|coprocessor| coprocessor.pipeline().counters().windows);
         self.diagnosis.step(self.device, || {
-            (coprocessor, lines).lock(|coprocessor, lines| output::counters(coprocessor, lines))
+            (coprocessor, lines).lock(|coprocessor, lines| AllCounters::of(coprocessor, lines))
         });
         self.retry_clock(now);
         if self.device.firmware_trial(can::is_acknowledged(), windows, now) {

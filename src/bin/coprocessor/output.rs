@@ -19,7 +19,7 @@ use gyronet::heading::{GnssLine, GnssSettings};
 use gyronet::health::count;
 use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::{ByteSource as _, Source as _};
-use gyronet::service::message::{AllCounters, LineCounters};
+use gyronet::service::message::LineCounters;
 use gyronet::store::ImuPart;
 use gyronet::units::Micros;
 
@@ -281,18 +281,6 @@ impl Output {
             count(unread, u32::from(!has_room));
             has_room
         });
-    }
-}
-
-/// Returns all counters, for a tester.
-pub fn counters(coprocessor: &Coprocessor, lines: &LineCounters) -> AllCounters {
-    AllCounters {
-        pipeline: *coprocessor.pipeline().counters(),
-        watch: *coprocessor.monitor_counters(),
-        lines: *lines,
-        fog: *coprocessor.fog_counters(),
-        inputs: *coprocessor.input_counters(),
-        contradiction: *coprocessor.contradiction(),
     }
 }
 

@@ -9,13 +9,11 @@ use crate::output::OutputParts;
 use crate::regions::{self, Records, Weights};
 use crate::stm32f405::{clocks::FULL_HZ, flash::Flash, pac};
 use core::mem::MaybeUninit;
-use gyronet::align::clock_ratio::ClockRatioConfig;
-use gyronet::can::wheel::{WheelReceiver, WheelSettings};
-use gyronet::coprocessor::{Clock, Config, StorageFaults};
+use gyronet::coprocessor::Config;
 use gyronet::model::background::BackgroundCheck;
 use gyronet::model::{Blob, weights};
 use gyronet::service::{Device, SupportedHardware};
-use gyronet::store::{Configuration, FogPart, ImuPart};
+use gyronet::store::{FogPart, ImuPart};
 
 /// The hardware that this image supports: what the board has the lines for. The image listens to a fibre-optic gyro
 /// whether one is configured or not.
@@ -36,16 +34,13 @@ const BUILT_IN: &[u8] = &weights::DEFAULT.0;
 
 /// Sets the bit rate of CAN and the identifiers of diagnosis, and makes CAN receive only the frames that the
 /// configuration names.
-fn receive(board: &Board, configuration: &Configuration, wheels: &WheelSettings) {
-    let exactly = |id| (id, u32::MAX);
-    let wheels = wheels.frames.into_iter().flatten().map(|frame| exactly(frame.id));
+fn receive(board: &Board, device: &Device<Records, Weights>) {
+    let configuration = device.configuration();
     // A stored configuration has been checked.
-    let ids = configuration.diagnosis.ids().ok();
-    ids.into_iter().for_each(diagnosis::set_ids);
-    let requests = ids.into_iter().flat_map(|[request, functional, _]| [request, functional].map(exactly));
+    configuration.diagnosis.ids().into_iter().for_each(diagnosis::set_ids);
     if let Some(can) = &board.can {
         can.set_bit_rate(configuration.can.bits_per_second);
-        can.receive_only(requests.into_iter().chain(wheels).chain(configuration.heading.filters()));
+        can.receive_only(device.received());
     }
 }
 
@@ -70,21 +65,9 @@ pub fn parts(board: &Board) -> Option<Parts> {
     let blob = device.weights(Some(regions::slots_at_start()), BUILT_IN);
     let check = blob.as_ref().map(|blob| BackgroundCheck::new(blob.content, blob.crc));
     let configuration = device.configuration();
-    let weights = blob.map_or(0, |blob| blob.crc);
-    let of_other_weights = device.calibration().unit.is_some_and(|unit| unit.weights != weights);
     // In a static, since the stack is at its deepest where the coprocessor is made of it.
-    let config = &*cortex_m::singleton!(: Config = Config {
-        wheels: WheelReceiver::new(*device.wheels()).ok(),
-        has_gyronet: blob.is_some(),
-        clock: Clock::Outside,
-        clock_ratio: board.clocks.exact().then_some(ClockRatioConfig::DEFAULT),
-        storage: StorageFaults {
-            damaged: device.stored_damaged() || of_other_weights,
-            configuration_lost: device.configuration_lost(),
-        },
-        ..configuration.coprocessor(device.calibration(), device.learned(), weights)
-    })?;
-    receive(board, configuration, device.wheels());
+    let config = &*cortex_m::singleton!(: Config = device.coprocessor(board.clocks.exact()))?;
+    receive(board, device);
     let (part, bits_per_second) = (configuration.imu, config.can.settings().bits_per_second);
     Some(Parts {
         output: OutputParts { part, bits_per_second, gnss: configuration.heading.line },

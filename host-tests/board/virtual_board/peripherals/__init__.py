@@ -18,6 +18,14 @@ from .timer import timers
 from .usart import usarts
 
 
+def fit(board, spi, select, second):
+    """Fits an inertial sensor to SPI1, each chip select at a pin of a port."""
+    icm42688, bmi088, asm330lhh = Icm42688(board), Bmi088(board), Asm330lhh(board)
+    spi.attach(icm42688, [(icm42688, *select)])
+    spi.attach(bmi088, [(bmi088.accelerometer, *select), (bmi088.gyro, *second)])
+    spi.attach(asm330lhh, [(asm330lhh, *select)])
+
+
 def create(board):
     """Creates all modelled peripherals, with an inertial sensor on SPI1: an ICM-42688-P or ASM330LHH at PA4, or a BMI088 at PA4 and
     PC4.
@@ -26,10 +34,7 @@ def create(board):
     """
     ports = [Gpio(board, letter) for letter in "ABCDEFGHI"]
     spi = Spi(board)
-    icm42688, bmi088, asm330lhh = Icm42688(board), Bmi088(board), Asm330lhh(board)
-    spi.attach(icm42688, [(icm42688, ports[0], 4)])
-    spi.attach(bmi088, [(bmi088.accelerometer, ports[0], 4), (bmi088.gyro, ports[2], 4)])
-    spi.attach(asm330lhh, [(asm330lhh, ports[0], 4)])
+    fit(board, spi, (ports[0], 4), (ports[2], 4))
     return [Rcc(board), Pwr(board), Flash(board), Exti(board), *ports, Dbgmcu(board),
             Iwdg(board), *usarts(board), *timers(board), BxCan(board), spi,
             Dma(board, "DMA1", 0x4002_6000), Dma(board, "DMA2", 0x4002_6400), Rng(board)]

@@ -18,11 +18,7 @@ PS = 1_000_000_000_000
 CPHA, CPOL, MSTR, SPE, SSI, SSM = (1 << bit for bit in (0, 1, 2, 6, 8, 9))
 MASTER, RATE = MSTR | SSI | SSM, 7 << 3
 RXNE, TXE, OVR, BSY = (1 << bit for bit in (0, 1, 6, 7))
-SLOW_PIN_HZ = 2_000_000
-
-
-#: Candidates of each pin, (port letter, number), and their alternate function.
-SCK, MISO, MOSI = (("A", 5), ("B", 3)), (("A", 6), ("B", 4)), (("A", 7), ("B", 5))
+#: Alternate function of the pins.
 FUNCTION = 5
 
 
@@ -31,6 +27,9 @@ class Spi(Registers):
 
     name, base, clock = "SPI1", 0x4001_3000, "SPI1"
     sizes, settings = HALF_WORD, {"fitted"}
+    #: Candidates of each pin, (port letter, number), and the fastest clock of a pin of low speed.
+    sck, miso, mosi = (("A", 5), ("B", 3)), (("A", 6), ("B", 4)), (("A", 7), ("B", 5))
+    slow_hz = 2_000_000
     readers, writers = {0x00: "cr1"}, {0x00: "_write_cr1"}
 
     def __init__(self, board):
@@ -95,6 +94,11 @@ class Spi(Registers):
         """Returns the frequency of the serial clock in hertz."""
         return self.board.rcc.clock_hz("PCLK2") >> (self.cr1 >> 3 & 7) + 1
 
+    @property
+    def mode(self):
+        """Returns CPOL and CPHA."""
+        return bool(self.cr1 & CPOL), bool(self.cr1 & CPHA)
+
     def _load(self):
         self.shift, self.tdr = self.tdr, None
         self.sr |= TXE | BSY
@@ -118,20 +122,19 @@ class Spi(Registers):
 
     def _exchange(self, byte):
         """Returns the byte that MISO delivers; a line without a driver is high."""
-        if not connected(self.board, SCK, FUNCTION):
+        if not connected(self.board, self.sck, FUNCTION):
             return 0xFF
-        if self.bit_hz > SLOW_PIN_HZ and not self.slow_noted and self._slow():
+        if self.bit_hz > self.slow_hz and not self.slow_noted and self._slow():
             self.slow_noted = True
             self.board.record("slow_pin", spi=self.name, hz=self.bit_hz)
-        mode = (bool(self.cr1 & CPOL), bool(self.cr1 & CPHA))
-        byte = byte if connected(self.board, MOSI, FUNCTION) else 0
+        byte = byte if connected(self.board, self.mosi, FUNCTION) else 0
         answer = 0xFF
         for slave in self.selected if self.fitted else ():
-            answer &= slave.transfer(byte, mode, self.bit_hz)
-        return answer if connected(self.board, MISO, FUNCTION) else 0
+            answer &= slave.transfer(byte, self.mode, self.bit_hz)
+        return answer if connected(self.board, self.miso, FUNCTION) else 0
 
     def _slow(self):
-        for letter, number in (*SCK, *MOSI):
+        for letter, number in (*self.sck, *self.mosi):
             port = self.board.peripherals["GPIO" + letter]
             if port.alternate(number) == FUNCTION and port.speed(number) == 0:
                 return True

@@ -12,6 +12,7 @@ from .fdcan import Fdcan, MessageRam
 from .flash import Flash
 from .rcc import Rcc
 from .rng import Rng
+from .spi import Spi
 from .system import Dbgmcu, Pwr, Sbs
 from .usart import usarts
 
@@ -47,7 +48,9 @@ class Watchdog(Iwdg):
 
 def create(board):
     """Creates all modelled peripherals, the clock tree first."""
-    can = Fdcan(board)
-    return [Rcc(board), Pwr(board), Flash(board), *(Port(board, letter) for letter in "ABCDEFGHI"), Sbs(board),
-            Dbgmcu(board), Rng(board), Watchdog(board), *usarts(board), Timer(board, "TIM2", 0x4000_0000, 45, "TIM_APB1", 32, 4),
+    from .. import fit
+
+    can, spi, ports = Fdcan(board), Spi(board), [Port(board, letter) for letter in "ABCDEFGHI"]
+    fit(board, spi, (ports[3], 14), (ports[3], 15))
+    return [Rcc(board), Pwr(board), Flash(board), *ports, Sbs(board), spi, Dbgmcu(board), Rng(board), Watchdog(board), *usarts(board), Timer(board, "TIM2", 0x4000_0000, 45, "TIM_APB1", 32, 4),
             can, MessageRam(board, can)]

@@ -20,7 +20,7 @@ HSION, HSIRDY, HSI48ON, HSI48RDY, HSEON, HSERDY, HSEBYP, HSEEXT, PLLON, PLLRDY =
 #: The ready bits of oscillators that are left out; they must stay off.
 ABSENT = 1 << 8 | 1 << 19 | 1 << 26 | 1 << 28
 CR, CFGR1, CFGR2, PLL1CFGR, PLL1DIVR, PLL1FRACR, BDCR, RSR = 0x00, 0x1C, 0x20, 0x28, 0x34, 0x38, 0xF0, 0xF4
-CCIPR1, CCIPR5 = 0xD8, 0xE8
+CCIPR1, CCIPR3, CCIPR5 = 0xD8, 0xE0, 0xE8
 LSION, LSIRDY, RMVF = 1 << 26, 1 << 27, 1 << 23
 #: A power-on and a brown-out have one flag.
 RESET_FLAGS = {**F405_FLAGS, "por": 0x0C00_0000, "bor": 0x0C00_0000}
@@ -87,6 +87,10 @@ class Rcc(Registers):
             if source > 1:
                 raise Violation("RCC: the RNG's clock from the LSE or LSI is not modelled")
             return self.pll_hz(16) if source else 48_000_000 if self.cr & HSI48RDY else 0
+        if name == "SPI1":
+            if self.values[CCIPR3] & 7:
+                raise Violation("RCC: of SPI1's clocks only PLL1's Q is modelled")
+            return self.pll_hz(16)
         if name == "USART1" and self.values[CCIPR1] & 7:
             raise Violation("RCC: of USART1's clocks only PCLK2 is modelled")
         return self.hz["PCLK2" if name == "USART1" else name]
