@@ -5,6 +5,7 @@ use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
 use gyronet_tools::demo::{Demo, Tunnel, write_log};
 use gyronet_tools::drive::stream::Drive;
+use gyronet_tools::evaluate::outage::EVERY_S;
 use gyronet_tools::evaluate::rates::Rates;
 use gyronet_tools::evaluate::report::{EvaluateError, MARKS, Table};
 use gyronet_tools::evaluate::rest;
@@ -51,8 +52,9 @@ fn tunnel(args: &Args) -> TunnelResult {
     let weights = args.sent.open()?;
     let mut network = GyroNet::new(weights.blob()?);
     Ok(match &args.file {
-        Some(path) => Tunnel::new(&Drive::open_moving(path)?, &mut network)?,
-        None => Tunnel::new(&Drive::from(&bundled::demo_drive(true)?), &mut network)?,
+        Some(path) => Tunnel::new(&Drive::open_moving(path)?, &mut network, EVERY_S)?,
+        // A first try takes little time.
+        None => Tunnel::new(&Drive::from(&bundled::demo_drive(true)?), &mut network, 5 * EVERY_S)?,
     })
 }
 
@@ -119,7 +121,7 @@ fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -
         None => writeln!(out, "No reference (ref_gyr_z or ref_yaw), so no errors.\n")?,
     }
     match (&tunnel, &args.file) {
-        (Some(tunnel), _) => writeln!(out, "{}", paint::tunnel(tunnel))?,
+        (Some(tunnel), _) => writeln!(out, "{}", paint::report(&tunnel.to_string()))?,
         (None, Some(file)) => {
             let file = file.display();
             writeln!(out, "No tunnel: cargo gyronet evaluate {file} --outage 60 says what it lacks.\n")?;

@@ -138,8 +138,8 @@ fn outages(args: &Args, common: Common) -> super::Result {
     }
     let mut out = std::io::stdout().lock();
     let each: Vec<Outages> =
-        sets.iter().map(|(set, drives)| Outages::new(set, drives.iter().map(starts_of))).collect();
-    let all = Outages::new("all", drives.map(starts_of));
+        sets.iter().map(|(set, drives)| Outages::new(set, &lengths, drives.iter().map(starts_of))).collect();
+    let all = Outages::new("all", &lengths, drives.map(starts_of));
     if common.json {
         let Outages { outage, outage_after_20_s, .. } = all;
         let json =

@@ -2,8 +2,10 @@
 
 use super::Demo;
 use super::trajectory::Trajectories;
+use crate::evaluate::heading_error::{AgainstCourse, BLOCK_S};
 use crate::evaluate::methods::Method;
 use crate::evaluate::metrics::integral;
+use crate::evaluate::rates::Rates;
 use crate::evaluate::report::{MARKS, columns};
 use crate::plot::page::chart::{Chart, Curve};
 use crate::plot::page::{HINT, document, escaped, grouped, table};
@@ -31,7 +33,12 @@ pub fn page(demo: &Demo<'_>) -> String {
     if let Some(tunnel) = demo.tunnel {
         body += "<h2>A tunnel</h2>\n<p class=\"note\">Every method had the same courses before it.</p>\n";
         body += &format!("<div class=\"tunnel\">\n{}</div>\n", tunnel.picture);
-        body += &format!("<div class=\"scroll\"><pre>{}</pre></div>\n", escaped(&tunnel.to_string()));
+        let title = tunnel.title();
+        let header = [&title, "heading, deg: median", "worst", "position, m: median", "worst"];
+        body += &table("ours", &header, tunnel.rows().map(Vec::from));
+        body += &tunnel.command.as_ref().map_or_else(String::new, |command| {
+            format!("<p class=\"note\">All starts: <code>{}</code></p>\n", escaped(command))
+        });
     }
     body += "<h2>Yaw</h2>\n";
     body += &yaw(demo);
@@ -85,14 +92,17 @@ fn yaw(demo: &Demo<'_>) -> String {
             in_scale,
         };
         if let Some(truth) = &truth {
-            let off = points(&mut yaw.iter().zip(truth).map(|(yaw, truth)| Some(yaw - (*truth)?)));
+            let off = match rates.courses() {
+                Some(courses) => by_course(rates, method, courses),
+                None => points(&mut yaw.iter().zip(truth).map(|(yaw, truth)| Some(yaw - (*truth)?))),
+            };
             let note = format!("ends {:+.2}° off", off.last().map_or(0.0, |(_, degrees)| *degrees));
             errors.push(curve(note, off, in_scale));
         }
         angles.push(curve(String::new(), points(&mut yaw.into_iter().map(Some)), true));
     }
     if let Some(truth) = &truth {
-        let label = if rates.by_course() { "course by GNSS" } else { REFERENCE }.into();
+        let label = if rates.courses().is_some() { "course by GNSS" } else { REFERENCE }.into();
         let points = points(&mut truth.iter().copied());
         angles.push(Curve { class: REFERENCE, label, note: String::new(), points, in_scale: true });
     }
@@ -111,14 +121,29 @@ fn yaw(demo: &Demo<'_>) -> String {
         &format!("<p class=\"note\">{HINT} Time begins at the end of static initialisation (3 s at rest).");
     html += match truth {
         Some(_) => {
-            " The scale of the errors fits the corrected methods; a method that keeps its bias leaves the chart. A course \
-             scatters by degrees from one second to the next, and is laid onto the delayed rate's first 20 s with it.</p>\n"
+            " The scale of the errors fits the corrected methods; a method that keeps its bias leaves the chart."
         }
         None => {
-            " The drive has no reference (<code>ref_gyr_z</code> or <code>ref_yaw</code>), so no error is drawn.</p>\n"
+            " The drive has no reference (<code>ref_gyr_z</code> or <code>ref_yaw</code>), so no error is drawn."
         }
     };
-    html
+    if rates.courses().is_some() {
+        html += " A course scatters by degrees from one second to the next, so the errors are medians over 10 s, aligned \
+                 on the first 20 s, as in the table.";
+    }
+    html + "</p>\n"
+}
+
+/// The errors of a method against the courses as the table has them, degrees, each at the middle of its block.
+fn by_course(rates: &Rates, method: Method, courses: &[Option<f64>]) -> Vec<(f64, f64)> {
+    let mut against = AgainstCourse::new();
+    rates.rates[method].iter().zip(courses).for_each(|(rate, course)| against.add(*rate, *course));
+    let errors = against.finish().into_iter().enumerate();
+    let middle = |block: usize| {
+        let samples = BLOCK_S * RATE_HZ as usize;
+        rates.seconds[(block * samples + samples / 2).min(rates.seconds.len() - 1)]
+    };
+    errors.filter_map(|(block, error)| Some((middle(block), error?.to_degrees()))).collect()
 }
 
 fn paths(trajectories: &Trajectories, radius: f64) -> String {
@@ -167,7 +192,7 @@ fn methods(demo: &Demo<'_>) -> String {
          window is a complete estimate after static initialisation. The last two rows are the rates that the board \
          sends: with the sample (Bosch TX1), and in its own messages some samples later.</p>\n",
         ours.unwrap_or_default(),
-        table("methods", &headings, rows),
+        table("ours", &headings, rows),
         errors.seconds,
         errors.reference
     )

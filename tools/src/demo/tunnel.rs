@@ -5,67 +5,89 @@ use crate::drive::stream::Drive;
 use crate::evaluate::methods::Method;
 use crate::evaluate::outage;
 use crate::evaluate::outage_chart;
-use crate::evaluate::outage_table::{Figures, Outages, Spread};
+use crate::evaluate::outage_table::{Figures, Outages};
 use gyronet::model::WindowNetwork;
 use std::fmt;
 
-/// Length of a tunnel, and the time from one entrance to the next, s.
+/// Length of a tunnel, s.
 const SECONDS: usize = 60;
-const EVERY_S: usize = 100;
+/// Length of a drive up to which every start is taken, s; of longer drives as many.
+const ALL_S: f64 = 1_800.0;
+/// Fewest starts whose worst says something.
+const FOR_WORST: usize = 20;
 /// The rows of the table; ours is the last one.
 const ROWS: [Method; 4] = [Method::STATIC_ZERO_RATE, Method::EKF, Method::NO_MODEL, Method::DELAYED];
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tunnel {
     pub outages: Outages,
+    /// The command for all starts of the drive, if these are fewer.
+    pub command: Option<String>,
     /// The median tunnel, as an SVG.
     pub picture: String,
 }
 
 impl Tunnel {
-    /// Runs the tunnels; `None` if the drive has too little course or reference for one.
-    pub fn new(drive: &Drive<'_>, network: &mut dyn WindowNetwork) -> Result<Option<Self>, DataError> {
+    /// Runs the tunnels with a start every so many seconds; `None` if the drive has too little course or reference for
+    /// one.
+    pub fn new(
+        drive: &Drive<'_>,
+        network: &mut dyn WindowNetwork,
+        every_s: usize,
+    ) -> Result<Option<Self>, DataError> {
         if !drive.rows()?.any(|row| row.is_ok_and(|row| row.heading.is_some())) {
             return Ok(None);
         }
-        let (found, _) = outage::run(drive, network, &[SECONDS], EVERY_S, || {})?;
-        let outages = Outages::new(drive.name(), std::iter::once(found.as_slice()));
+        let fewer = (drive.facts.seconds() / ALL_S).ceil() as usize;
+        let (found, _) = outage::run(drive, network, &[SECONDS], every_s * fewer, || {})?;
+        let outages = Outages::new(drive.name(), &[SECONDS], std::iter::once(found.as_slice()));
         let Some([(median, which), _]) =
-            outage_chart::typical(found.iter()).filter(|_| !outages.outage.is_empty())
+            outage_chart::typical(found.iter()).filter(|_| !outages.outage[&SECONDS].is_empty())
         else {
             return Ok(None);
         };
+        let command =
+            (fewer > 1).then(|| format!("cargo gyronet evaluate {} --outage {SECONDS}", drive.path));
         let points = outage::trace(drive, network, median)?;
-        Ok(Some(Self { picture: outage_chart::svg(drive.name(), &which, median, &points), outages }))
+        let picture = outage_chart::svg(drive.name(), &which, median, &points);
+        Ok(Some(Self { outages, command, picture }))
     }
 
     fn row(&self, method: Method) -> Option<&Figures> {
         self.outages.outage.get(&SECONDS)?.get(method.key)
     }
 
-    /// Returns how much of the best other row's median error ours has.
+    /// What the figures are of.
     #[must_use]
-    pub fn over_best(&self) -> Option<f64> {
-        let others = ROWS.iter().filter(|method| **method != Method::DELAYED && **method != Method::NO_MODEL);
-        let best =
-            others.filter_map(|method| Some(self.row(*method)?.heading_deg.median)).min_by(f64::total_cmp)?;
-        Some(self.row(Method::DELAYED)?.heading_deg.median / best)
+    pub fn title(&self) -> String {
+        let starts = self.row(Method::DELAYED).map_or(0, |figures| figures.starts);
+        format!("{SECONDS} s without GNSS, {starts} start{}", if starts == 1 { "" } else { "s" })
+    }
+
+    /// Returns the name of each method, and its median and worst error of heading and position.
+    pub fn rows(&self) -> impl Iterator<Item = [String; 5]> {
+        ROWS.into_iter().filter_map(|method| {
+            let Figures { heading_deg, position_m, starts, .. } = self.row(method)?;
+            let figure =
+                |known: Option<f64>| known.map_or_else(|| "-".to_owned(), |known| format!("{known:.2}"));
+            let [heading, position] = [Some(heading_deg), position_m.as_ref()].map(|spread| {
+                let worst = spread.map(|spread| spread.worst).filter(|_| *starts >= FOR_WORST);
+                [spread.map(|spread| spread.median), worst].map(figure)
+            });
+            let name = if method == Method::DELAYED { "gyronet" } else { method.name };
+            let ([heading, worst], [position, farthest]) = (heading, position);
+            Some([name.to_owned(), heading, worst, position, farthest])
+        })
     }
 }
 
 impl fmt::Display for Tunnel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let starts = self.row(Method::DELAYED).map_or(0, |figures| figures.starts);
-        let starts = if starts == 1 { "1 start".to_owned() } else { format!("{starts} starts") };
-        let title = format!("{SECONDS} s without GNSS, {starts} (median, worst)");
+        let title = format!("{} (median, worst)", self.title());
         writeln!(f, "{title:<47}{:>15}{:>16}", "heading, deg", "position, m")?;
-        for method in ROWS {
-            let Some(Figures { heading_deg, position_m, .. }) = self.row(method) else { continue };
-            let two = |spread: &Spread| format!("{:.2}{:>8.2}", spread.median, spread.worst);
-            let name = if method == Method::DELAYED { "gyronet" } else { method.name };
-            let position = position_m.as_ref().map_or_else(|| "-".to_owned(), two);
-            writeln!(f, "  {name:<45}{:>15}{position:>16}", two(heading_deg))?;
+        for [name, heading, worst, position, farthest] in self.rows() {
+            writeln!(f, "  {name:<45}{heading:>7}{worst:>8}{position:>8}{farthest:>8}")?;
         }
-        Ok(())
+        self.command.iter().try_for_each(|command| writeln!(f, "  All starts: {command}"))
     }
 }

@@ -4,8 +4,8 @@
 //! latency, side slip and noise give it errors of 0.05 to 0.1 rad from one second to the next. So errors against a
 //! course are medians over 10 s, which still scatter by 0.02 rad. A course cannot judge 1 s and 10 s.
 //!
-//! The figures are computed sample by sample, and nothing older than a minute is kept: means and squares are sums, the
-//! medians against a course are over ten and twenty seconds. Only the median error in 10 s over the whole drive
+//! The figures are computed sample by sample, and nothing older than a minute is kept but the medians of ten seconds
+//! against a course: means and squares are sums. Only the median error in 10 s over the whole drive
 //! ([`Errors::typical_10s`]) is counted in classes of 5 mrad.
 
 use super::metrics::wrap;
@@ -276,7 +276,8 @@ pub struct AgainstCourse {
     aligned: Option<f64>,
     /// Medians of blocks that wait for the alignment.
     waiting: Vec<Option<f64>>,
-    last: Option<f64>,
+    /// The errors, one for each block.
+    errors: Vec<Option<f64>>,
     changes: Changes,
 }
 
@@ -296,7 +297,7 @@ impl AgainstCourse {
             begin: Vec::new(),
             aligned: None,
             waiting: Vec::new(),
-            last: None,
+            errors: Vec::new(),
             changes: Changes::new(BLOCK_S, 6 * BLOCK_S),
         }
     }
@@ -323,13 +324,24 @@ impl AgainstCourse {
     /// The errors so far; `None` for less than 20 s of course.
     pub fn errors(mut self) -> Option<Errors> {
         let (first, last) = self.known?;
+        self.end();
+        let enough = last - first + SECOND >= ALIGNED;
+        let end = self.errors.iter().flatten().last()?;
+        Some(self.changes.errors(*end)).filter(|_| enough)
+    }
+
+    /// Returns the median error of each block of [`BLOCK_S`] seconds, rad.
+    pub fn finish(mut self) -> Vec<Option<f64>> {
+        self.end();
+        self.errors
+    }
+
+    fn end(&mut self) {
         if self.aligned.is_none() {
             self.align();
         }
         let median = self.blocks.end();
         median.into_iter().for_each(|median| self.block(median));
-        let enough = last - first + SECOND >= ALIGNED;
-        Some(self.changes.errors(self.last?)).filter(|_| enough)
     }
 
     fn align(&mut self) {
@@ -346,7 +358,7 @@ impl AgainstCourse {
             (median, None) => return self.waiting.push(median),
             (median, Some(aligned)) => median.map(|median| median - aligned),
         };
-        self.last = error.or(self.last);
+        self.errors.push(error);
         self.changes.add(error);
     }
 }

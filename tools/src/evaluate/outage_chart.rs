@@ -85,8 +85,8 @@ fn style() -> String {
     )
 }
 
-/// Returns the median and the worst of the longest outages by the error of the delayed rate's heading, those whose
-/// path is known first, each with the words that say so.
+/// Returns the median and the worst of the longest outages by the mean error of the drawn methods' headings, those
+/// whose path is known first, each with the words that say so.
 pub fn typical<'a>(outages: impl Iterator<Item = &'a Outage> + Clone) -> Option<[(&'a Outage, String); 2]> {
     let after = f64::from(AFTER_S[0] as u32);
     let longest = outages.clone().map(|outage| outage.seconds).max()?;
@@ -94,9 +94,10 @@ pub fn typical<'a>(outages: impl Iterator<Item = &'a Outage> + Clone) -> Option<
         |outage: &Outage| (outage.seconds == longest, outage.position.is_some(), outage.driven_s >= after);
     let best = outages.clone().map(rank).max()?;
     let mut chosen: Vec<&Outage> = outages.filter(|outage| rank(outage) == best).collect();
-    let error = |outage: &Outage| outage.heading[column(Method::DELAYED)];
+    let error =
+        |outage: &Outage| DRAWN.iter().map(|(method, ..)| outage.heading[column(*method)]).sum::<f64>();
     chosen.sort_by(|a, b| error(a).total_cmp(&error(b)));
-    let which = |rank: &str| format!("{rank} of {} by gyronet's error", chosen.len());
+    let which = |rank: &str| format!("{rank} of {} by these methods' mean", chosen.len());
     Some([(chosen.get(chosen.len() / 2)?, which("the median")), (chosen.last()?, which("the worst"))])
 }
 
@@ -188,7 +189,7 @@ mod tests {
     fn the_median_and_the_worst_of_the_longest_are_typical() {
         let all = [outage(30, 9.0), outage(60, 0.3), outage(60, 0.1), outage(60, 0.2)];
         let [(median, words), (worst, _)] = typical(all.iter()).unwrap();
-        assert_eq!((median, worst, &*words), (&all[3], &all[1], "the median of 3 by gyronet's error"));
+        assert_eq!((median, worst, &*words), (&all[3], &all[1], "the median of 3 by these methods' mean"));
         assert_eq!(typical([].iter()), None);
     }
 

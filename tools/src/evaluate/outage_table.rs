@@ -1,6 +1,8 @@
 //! The errors of many outages, as a table and as JSON: median, 90 % and worst of each method.
 
+use super::methods::Method;
 use super::outage::{AFTER_S, METHODS, Outage};
+use super::report::FAILED;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -47,13 +49,10 @@ pub struct Outages {
 }
 
 impl Outages {
-    /// Sums up the outages of each drive.
-    pub fn new<'a>(set: &str, drives: impl Iterator<Item = &'a [Outage]> + Clone) -> Self {
+    /// Sums up the outages of these lengths of each drive.
+    pub fn new<'a>(set: &str, lengths: &[usize], drives: impl Iterator<Item = &'a [Outage]> + Clone) -> Self {
         let [outage, outage_after_20_s] = AFTER_S.map(|after| {
-            let mut lengths = ByLength::new();
-            for length in drives.clone().flatten().map(|outage| outage.seconds) {
-                lengths.entry(length).or_default();
-            }
+            let mut lengths: ByLength = lengths.iter().map(|length| (*length, BTreeMap::new())).collect();
             for (length, methods) in &mut lengths {
                 let is_of = |one: &&Outage| one.seconds == *length && one.driven_s >= after as f64;
                 let chosen = drives.clone().flatten().filter(is_of);
@@ -82,7 +81,15 @@ impl fmt::Display for Outages {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (after, lengths) in AFTER_S.iter().zip([&self.outage, &self.outage_after_20_s]) {
             for (length, methods) in lengths {
-                let Some(Figures { drives, starts, .. }) = methods.values().next() else { continue };
+                let Some(Figures { drives, starts, .. }) = methods.values().next() else {
+                    writeln!(
+                        f,
+                        "{}: {length} s without GNSS after {after} s with it: no start; it needs {after} s with a course \
+                         every 2 s, then {length} s, and a reference at both ends",
+                        self.set
+                    )?;
+                    continue;
+                };
                 let [drives, starts] = [(drives, "drive"), (starts, "start")]
                     .map(|(count, noun)| format!("{count} {noun}{}", if *count == 1 { "" } else { "s" }));
                 writeln!(
@@ -93,15 +100,23 @@ impl fmt::Display for Outages {
                 let wheels = methods.values().any(|figures| figures.position_m.is_some());
                 let position = if wheels { "position, m" } else { "position: no wheels" };
                 writeln!(f, "  {:<26}{:>25}{position:>25}", "median, 90 %, worst", "heading, deg")?;
+                let median = |method: Method| Some(methods.get(method.key)?.heading_deg.median);
+                let has_failed = |method| median(method) > median(Method::STATIC).map(|still| FAILED * still);
                 for method in METHODS {
                     let Some(figures) = methods.get(method.key) else { continue };
-                    write!(f, "  {:<26}", method.name)?;
+                    let mark = if has_failed(method) { " ?" } else { "" };
+                    write!(f, "  {:<26}", format!("{}{mark}", method.name))?;
                     for Spread { median, p90, worst } in
                         [Some(figures.heading_deg), figures.position_m].into_iter().flatten()
                     {
-                        write!(f, "{median:>9.2}{p90:>8.2}{worst:>8.2}")?;
+                        // Of fewer starts it is the worst one.
+                        let p90 = if figures.starts < 10 { "-".into() } else { format!("{p90:.2}") };
+                        write!(f, "{median:>9.2}{p90:>8}{worst:>8.2}")?;
                     }
                     writeln!(f)?;
+                }
+                if METHODS.into_iter().any(has_failed) {
+                    writeln!(f, "  ? failed: {FAILED} times static initialisation's median error")?;
                 }
             }
         }
@@ -124,7 +139,7 @@ mod tests {
         };
         let all =
             [outage(30.0, 60, 0.3), outage(70.0, 60, 0.1), outage(90.0, 60, 0.2), outage(90.0, 30, 0.4)];
-        let table = Outages::new("x", [&all[..1], &all[1..], &[]].into_iter());
+        let table = Outages::new("x", &[30, 60, 90], [&all[..1], &all[1..], &[]].into_iter());
         let of = |lengths: &ByLength, length: usize| lengths[&length]["static"];
         assert_eq!((of(&table.outage, 60).starts, of(&table.outage, 30).starts), (2, 1));
         assert_eq!((of(&table.outage, 60).drives, of(&table.outage_after_20_s, 60).drives), (1, 2));
@@ -132,6 +147,16 @@ mod tests {
         let text = table.to_string();
         assert!(text.starts_with("x, 1 drive: 30 s without GNSS after 60 s with it, 1 start\n"), "{text}");
         assert!(text.contains("position: no wheels"), "{text}");
+        assert!(
+            text.contains("x: 90 s without GNSS after 60 s with it: no start; it needs 60 s with"),
+            "{text}"
+        );
+        // The errors of two starts have no 90 %, and no method fails but one of ten times the first one's error.
+        assert!(text.contains("  static initialisation         11.46       -   11.46\n"), "{text}");
+        assert!(!text.contains('?'), "{text}");
+        let failing = Outage { heading: [0.1, 0.1, 1.1, 0.1, 0.1, 0.1], ..outage(70.0, 60, 0.1) };
+        let text = Outages::new("x", &[60], std::iter::once(&[failing][..])).to_string();
+        assert!(text.contains("VQF filter ?") && text.matches("? failed: 10 times").count() == 2, "{text}");
         let heading = of(&table.outage_after_20_s, 60).heading_deg;
         assert!((heading.median - 0.2f64.to_degrees()).abs() < 1e-9, "{heading:?}");
         assert!((heading.worst - 0.3f64.to_degrees()).abs() < 1e-9, "{heading:?}");

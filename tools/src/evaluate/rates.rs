@@ -297,9 +297,9 @@ impl Rates {
         Some(self.courses.iter().map(|course| Some((*course)? + off)).collect())
     }
 
-    /// True if the reference is a course.
-    pub fn by_course(&self) -> bool {
-        self.reference.is_none()
+    /// The course at each sample, if it is the reference.
+    pub fn courses(&self) -> Option<&[Option<f64>]> {
+        Some(&*self.courses).filter(|known| self.reference.is_none() && known.iter().any(Option::is_some))
     }
 
     /// The speeds; `None` where nothing measures them.

@@ -75,7 +75,7 @@ const COLUMNS: [(&str, usize); 9] = [
 ];
 const SHORT: usize = 4;
 /// A method has failed whose error is so many times that of static initialisation.
-const FAILED: f64 = 10.0;
+pub(super) const FAILED: f64 = 10.0;
 pub const MARKS: &str =
     "* best classical method of its column; ? failed: ten times static initialisation's error";
 
