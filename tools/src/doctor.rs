@@ -33,8 +33,9 @@ use crate::drive::vehicle::Vehicle;
 use recording::Rows;
 use std::path::Path;
 
-/// Shortest standstill in which a drive can start, s.
+/// Shortest standstill in which a drive can start, and what is worth a start after it, s.
 const LEAST_REST_S: f64 = 4.0;
+const LEAST_DRIVE_S: f64 = 60.0;
 
 #[derive(Debug)]
 pub struct Doctor {
@@ -110,25 +111,30 @@ fn start(path: &Path, doctor: &Doctor, rows: &Rows) -> Result<Finding, DataError
     // A finding may be sent to others, so it shows the recording's name instead of a path.
     let reason = reason.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&reason);
     let reason = reason.split_once("; `gyronet doctor`").map_or(reason, |(reason, _)| reason);
-    let is_unit = |finding: &Finding| finding.verdict == Verdict::Bad && finding.text.contains("--unit ");
-    if doctor.findings.iter().any(is_unit) {
-        return Ok(Finding::bad("start", format!("{reason}; first mend the unit, below.")));
+    let is_first = |finding: &&Finding| {
+        finding.verdict == Verdict::Bad && (finding.what == "rate" || finding.text.contains("--unit "))
+    };
+    if let Some(first) = doctor.findings.iter().find(is_first) {
+        let what = if first.what == "rate" { "rate" } else { "unit" };
+        return Ok(Finding::bad("start", format!("{reason}; first mend the {what}, below.")));
     }
     let mut from = None;
-    for (begin, end) in doctor.standstills.iter().filter(|(begin, end)| end - begin >= LEAST_REST_S) {
+    let is_enough =
+        |(begin, end): &&(f64, f64)| end - begin >= LEAST_REST_S && doctor.seconds - end >= LEAST_DRIVE_S;
+    for (begin, end) in doctor.standstills.iter().filter(is_enough) {
         if starts(path, *begin, *end)? {
             from = Some(begin.ceil());
             break;
         }
     }
-    let name = &rows.name;
     let remedy = match from {
         Some(from) => format!(
-            "it can start at {from} s: `gyronet import {name}.csv --from {from} --out {name}_from_{from}.csv`"
+            "it can start at {from} s: {}",
+            remedy::command(rows, &format!("--from {from}"), &format!("from_{from}"))
         ),
         None => {
-            "it succeeds in no standstill: record it again, and let it stand for the first 3 s; `evaluate` simulates them where a \
-             course is known and the wheels do not turn in them".to_owned()
+            "no later rest of 3 s has a minute of driving after it: record it again, and let it stand for the first 3 s; \
+             `evaluate` simulates them where a course is known (ref_yaw)".to_owned()
         }
     };
     Ok(Finding::bad("start", format!("{reason}; {remedy}.")))

@@ -5,8 +5,6 @@ use crate::drive::DT;
 
 /// Largest share by which a slope may differ from a confusion of units.
 const NEAR: f64 = 0.15;
-/// Fewest values in a second for a mean.
-const LEAST: usize = 5;
 /// Kilometres per hour in a metre per second.
 pub const KMH: f64 = 3.6;
 pub const DEGREES: f64 = 180.0 / std::f64::consts::PI;
@@ -58,13 +56,13 @@ pub fn turned(rows: &Rows) -> Vec<f64> {
     rows.rate.iter().map(sum).collect()
 }
 
-/// The means of two values over the seconds in which some rows have both.
-pub fn seconds(rows: &Rows, of: impl Fn(usize) -> Option<(f64, f64)>) -> Vec<(f64, f64)> {
+/// The means of two values over the seconds in which at least so many rows have both.
+pub fn seconds(rows: &Rows, least: usize, of: impl Fn(usize) -> Option<(f64, f64)>) -> Vec<(f64, f64)> {
     let second = |from: usize| {
         let known: Vec<_> = (from..(from + SECOND).min(rows.len())).filter_map(&of).collect();
         let count = known.len() as f64;
         let sum = known.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0, y + p.1));
-        (known.len() >= LEAST).then_some((sum.0 / count, sum.1 / count))
+        (known.len() >= least).then_some((sum.0 / count, sum.1 / count))
     };
     (0..rows.len()).step_by(SECOND).filter_map(second).collect()
 }

@@ -18,6 +18,8 @@ const MOST: usize = 8_640_000;
 #[derive(Debug)]
 pub struct Rows {
     pub name: String,
+    /// The path of the file, as in the command.
+    pub file: String,
     /// Median of the first periods, s; if it is not that of 100 Hz and is used, the rows are brought to 100 Hz.
     pub period: Option<f64>,
     /// Seconds since the first row.
@@ -28,7 +30,7 @@ pub struct Rows {
     /// True yaw rate, rad/s, and course, rad.
     pub reference: Vec<Option<f64>>,
     pub course: Vec<Option<f64>>,
-    /// Speed by GNSS, m/s.
+    /// Speed by GNSS, m/s, or else by its positions.
     pub speed: Vec<Option<f64>>,
     /// Rate of each wheel, rad/s.
     pub wheels: [Vec<Option<f64>>; WHEELS],
@@ -46,7 +48,7 @@ impl Rows {
         let name = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or(&shown).to_owned();
         let vehicle = Vehicle::of_drive(path)?;
         let reader = Reader::new(&shown, std::io::BufReader::new(file))?.mounted(&vehicle);
-        Ok(Self { vehicle, ..Self::parse(&name, reader)? })
+        Ok(Self { vehicle, file: shown.clone(), ..Self::parse(&name, reader)? })
     }
 
     pub fn parse(
@@ -65,6 +67,7 @@ impl Rows {
         };
         let mut rows = Self {
             name: name.to_owned(),
+            file: format!("{name}.csv"),
             period: period.map(|us| 1e-6 * us),
             seconds: Vec::new(),
             force: Vec::new(),
@@ -97,7 +100,8 @@ impl Rows {
             rows.rate.push(row.sample.angular_rate.map(|rate| rate.rad_per_sec()));
             rows.reference.push(row.reference);
             rows.course.push(row.course);
-            rows.speed.push(row.speed);
+            let by_positions = row.heading.and_then(|heading| heading.speed).map(f64::from);
+            rows.speed.push(row.speed.or(by_positions));
             for (wheel, rate) in rows.wheels.iter_mut().zip(row.wheels) {
                 wheel.push(rate);
             }

@@ -91,7 +91,7 @@ fn of_rate(rows: &Rows, values: &str, noise: &str) -> Finding {
     };
     let shift = (late / DT).round() as isize;
     let pair = |k: usize| Some((rows.rate.get(k.checked_add_signed(shift)?)?[2], rows.reference[k]?));
-    let line = Line::of(&seconds(rows, pair));
+    let line = Line::of(&seconds(rows, 5, pair));
     let gain = line.map_or(1.0, |line| 1.0 / line.slope);
     let text = format!("{values}, correlation with the gyro {coefficient:.4}, {}{noise}", delay(late));
     if let Some(units) = units(rows, gain, "ref_gyr_z") {

@@ -47,8 +47,15 @@ pub fn unit(rows: &Rows, channel: &str, unit: &str) -> String {
 
 pub fn import(rows: &Rows, flags: &str) -> String {
     if rows.vehicle.recording.units.is_empty() {
-        format!("`gyronet import {0}.csv {flags} --out {0}_fixed.csv`", rows.name)
+        command(rows, flags, "fixed")
     } else {
         format!("import the log again with `{flags}`")
     }
+}
+
+/// The import of the drive itself, into a file beside it.
+pub fn command(rows: &Rows, flags: &str, end: &str) -> String {
+    let stem = Path::new(&rows.file).with_extension("");
+    let import = format!("cargo gyronet import {} {flags}", rows.file);
+    format!("`{} --out {}_{end}.csv`", import.trim_end(), stem.display())
 }

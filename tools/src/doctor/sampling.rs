@@ -5,9 +5,12 @@ use super::recording::{Rows, sorted};
 use super::remedy;
 use crate::drive::DT;
 use gyronet::align::PERIODS_US;
+use std::ops::RangeInclusive;
 
 /// A longer period than this is a gap, s.
 const GAP: f64 = 0.015;
+/// Rates that the import takes.
+const IMPORTED_HZ: RangeInclusive<f64> = 24.9..=1_001.0;
 /// Sources whose rate the results depend on.
 const RESAMPLED: [&str; 4] = ["imu", "gyro", "accelerometer", "reference rate"];
 
@@ -23,8 +26,14 @@ pub fn findings(rows: &Rows) -> Vec<Finding> {
                 let is_in =
                     |per_second: f64| PERIODS_US.contains(&((1e6 * median / per_second).round() as u64));
                 let unit = [(1e3, "ms"), (1e6, "us"), (1e9, "ns")].into_iter().find(|(per, _)| is_in(*per));
-                let resample = "`gyronet import` resamples to 100 Hz".to_owned();
-                let cure = unit.map_or(resample, |(_, unit)| remedy::unit(rows, "t_s", unit));
+                let resample = || {
+                    if IMPORTED_HZ.contains(&(1.0 / median)) {
+                        remedy::command(rows, "", "100hz") + " makes 100 Hz of 25 to 1000 Hz"
+                    } else {
+                        "record it again at such a rate".to_owned()
+                    }
+                };
+                let cure = unit.map_or_else(resample, |(_, unit)| remedy::unit(rows, "t_s", unit));
                 let text = format!("{text}: the board and the other commands use 50 to 1000 Hz; {cure}.");
                 findings.push(Finding::bad("rate", text));
             } else {

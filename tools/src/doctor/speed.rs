@@ -2,7 +2,7 @@
 
 use super::finding::Finding;
 use super::line::{DEGREES, KMH, Line, confused, seconds};
-use super::recording::Rows;
+use super::recording::{Rows, sorted};
 use super::{remedy, wheels};
 
 const WHAT: &str = "speed";
@@ -10,6 +10,10 @@ const WHAT: &str = "speed";
 const LEAST: (usize, f64) = (10, 0.9);
 /// Slower speeds, m/s, and slower turns, rad/s, are not compared.
 const SLOW: (f64, f64) = (2.0, 0.03);
+/// Yaw rate of a bend in which positions cut the way short, rad/s.
+const BEND: f64 = 0.2;
+/// Largest ratio of the upper to the lower quartile.
+const SPREAD: f64 = 1.3;
 /// Error of the rolling radius that is worth a word.
 const RADIUS: f64 = 0.02;
 
@@ -19,16 +23,23 @@ pub fn finding(rows: &Rows) -> Option<Finding> {
         let known: Vec<f64> = rows.wheels.iter().filter_map(|wheel| wheel[k]).collect();
         (!known.is_empty()).then(|| rows.vehicle.radius_m() * known.iter().sum::<f64>() / known.len() as f64)
     };
-    let gnss = fit(&seconds(rows, |k| Some((rows.speed[k]?, by_wheels(k)?.abs()))), SLOW.0);
-    if let Some(Line { slope, .. }) = gnss {
-        let text = format!("Wheels turn {slope:.3} times as fast as the speed by GNSS");
-        return Some(if confused(slope, KMH) {
+    let radius =
+        |slope| format!("radius_m = {:.3} in the vehicle file fits", rows.vehicle.radius_m() / slope);
+    // A speed by positions is late and smooth, which bends a line, but not the middle of the ratios; in bends it is small.
+    let both =
+        |k: usize| Some((rows.speed[k]?, by_wheels(k)?.abs())).filter(|_| rows.rate[k][2].abs() < BEND);
+    let both = seconds(rows, 1, both);
+    let ratios = sorted(both.iter().filter(|(gnss, _)| *gnss > SLOW.0).map(|(gnss, wheels)| wheels / gnss));
+    let part = |quarters: usize| ratios.get(quarters * ratios.len() / 4).copied().unwrap_or_default();
+    if ratios.len() >= LEAST.0 && part(3) < SPREAD * part(1) {
+        let ratio = part(2);
+        let text = format!("Wheels turn {ratio:.3} times as fast as the speed by GNSS");
+        return Some(if confused(ratio, KMH) {
             Finding::bad(WHAT, format!("{text}: they are in km/h; {}.", wheels::in_kmh(rows)))
-        } else if !(0.6..1.6).contains(&slope) {
-            Finding::bad(WHAT, format!("{text}: their unit or radius_m is wrong."))
-        } else if (slope - 1.0).abs() > RADIUS {
-            let radius = rows.vehicle.radius_m() / slope;
-            Finding::note(WHAT, format!("{text}: radius_m = {radius:.3} in the vehicle file fits."))
+        } else if !(0.6..1.6).contains(&ratio) {
+            Finding::bad(WHAT, format!("{text}: their unit is wrong, or {}.", radius(ratio)))
+        } else if (ratio - 1.0).abs() > RADIUS {
+            Finding::note(WHAT, format!("{text}: {}.", radius(ratio)))
         } else {
             Finding::good(WHAT, format!("{text}."))
         });
@@ -38,8 +49,10 @@ pub fn finding(rows: &Rows) -> Option<Finding> {
         let (speed, rate) = (rows.speed[k].or_else(|| by_wheels(k))?, rows.rate[k][2]);
         Some((speed * rate, rows.force[k][1]))
     };
-    let Line { slope, .. } = fit(&seconds(rows, side), SLOW.0 * SLOW.1)?;
-    let ratio = 1.0 / slope;
+    let sides = seconds(rows, 1, side);
+    let enough = sides.iter().filter(|(x, _)| x.abs() > SLOW.0 * SLOW.1).count() >= LEAST.0;
+    let line = Line::of(&sides).filter(|line| enough && line.correlation > LEAST.1)?;
+    let ratio = 1.0 / line.slope;
     let text = format!("Speed times yaw rate is {ratio:.2} times the force to the side");
     Some(if confused(ratio, KMH) {
         Finding::bad(WHAT, format!("{text}: the wheels are in km/h; {}.", wheels::in_kmh(rows)))
@@ -50,10 +63,4 @@ pub fn finding(rows: &Rows) -> Option<Finding> {
     } else {
         Finding::note(WHAT, format!("{text}: a unit, the radius or the mounting is wrong."))
     })
-}
-
-/// The line through seconds of which enough have an x above `least`, if it is one.
-fn fit(seconds: &[(f64, f64)], least: f64) -> Option<Line> {
-    let enough = seconds.iter().filter(|(x, _)| x.abs() > least).count() >= LEAST.0;
-    Line::of(seconds).filter(|line| enough && line.correlation > LEAST.1)
 }

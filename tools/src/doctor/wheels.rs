@@ -83,7 +83,7 @@ pub fn in_kmh(rows: &Rows) -> String {
 fn compare(rows: &Rows) -> Option<Line> {
     for (right, left) in [(1, 3), (0, 2)] {
         let (right, left) = (&rows.wheels[right], &rows.wheels[left]);
-        let seconds = seconds(rows, |k| Some((rows.rate[k][2], right[k]? - left[k]?)));
+        let seconds = seconds(rows, 5, |k| Some((rows.rate[k][2], right[k]? - left[k]?)));
         if seconds.iter().filter(|(rate, _)| rate.abs() > TURNS).count() >= LEAST_TURNING_S {
             return Line::of(&seconds);
         }

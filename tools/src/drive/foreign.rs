@@ -48,7 +48,8 @@ pub fn open(path: &Path) -> Result<File, DataError> {
 }
 
 fn refused(path: &Path, format: &'static str) -> DataError {
-    let command = format!("gyronet import {} --out {}", path.display(), path.with_extension("csv").display());
+    let command =
+        format!("cargo gyronet import {} --out {}", path.display(), path.with_extension("csv").display());
     DataError::of(path.display(), DataFault::Foreign { format, command })
 }
 
@@ -65,7 +66,7 @@ mod tests {
             let error = open(&path).unwrap_err().to_string();
             let out = folder.path().join("drive.csv");
             let expected = format!(
-                "{0}: {format}, not a drive; import it first: gyronet import {0} --out {1}",
+                "{0}: {format}, not a drive; import it first: cargo gyronet import {0} --out {1}",
                 path.display(),
                 out.display()
             );

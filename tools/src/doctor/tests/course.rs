@@ -82,4 +82,24 @@ fn speed_and_course_show_units_and_clocks() {
     assert!(found(&doctor, "speed").1.ends_with("import the log again with `--unit /odom=km/h`."));
     let smaller = with_course(1.0, 1.05, 0, named);
     assert!(found(&smaller, "speed").1.contains("radius_m = 0.275 in the vehicle file fits"));
+    let larger = with_course(1.0, 0.576, 0, named);
+    let (verdict, text) = found(&larger, "speed");
+    assert!(verdict == Verdict::Bad && text.contains("radius_m = 0.502 in the vehicle file fits"), "{text}");
+}
+
+#[test]
+fn positions_give_the_speed_that_a_receiver_does_not() {
+    let mut text = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,wheel2_rate,gnss_lat,gnss_lon\n");
+    let mut north = 0.0;
+    for k in 0..6_000 {
+        let (time, flicker) = (0.01 * f64::from(k), 1e-3 * f64::from(k % 3));
+        let speed = 8.0 + 3.0 * (0.2 * time).sin();
+        north += 0.01 * speed / 111_132.0;
+        let place = if k % 20 == 0 { format!("{north:.9},11.0") } else { ",".to_owned() };
+        let wheel = 0.576 * speed / 0.289;
+        writeln!(text, "{time:.2},{flicker},{flicker},9.81,{flicker},0,{flicker},{wheel:.4},{place}")
+            .unwrap();
+    }
+    let doctor = Doctor::of(&Rows::parse("made", Reader::new("made.csv", text.as_bytes()).unwrap()).unwrap());
+    assert!(found(&doctor, "speed").1.contains("radius_m = 0.50"), "{}", found(&doctor, "speed").1);
 }
