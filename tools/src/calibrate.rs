@@ -40,6 +40,8 @@ const UNKNOWN_GAIN: f32 = 0.02;
 /// Least angle turned in all drives for a gain, as the doctor says, rad; and in a second that turns.
 pub const LEAST_TURNED_RAD: f64 = 6.0;
 pub const STRAIGHT_RAD: f64 = 0.02;
+/// Least share of the turns to either side.
+const LEAST_OTHER_SIDE: f64 = 0.1;
 /// Largest robust deviation of the spans' angles from the fit, rad. No corrected gyro has an error that large in that
 /// time.
 const MAX_RESIDUAL_RAD: f64 = 0.05;
@@ -82,6 +84,8 @@ pub struct Share {
     pub limit: f64,
     /// The reason why the share is refused: what the drives lack to show it.
     pub refused: Option<&'static str>,
+    /// The reason to doubt a share that is not refused.
+    pub remark: Option<&'static str>,
 }
 
 /// A drive, replayed with the weights that the board runs: cut into spans by its reference yaw rate, or what the board has
@@ -92,8 +96,8 @@ pub struct Cut {
     name: String,
     /// The gyro's static bias, rad/s.
     gyro_bias: [f64; 3],
-    /// The sum of all turns, rad.
-    turned: f64,
+    /// The sums of all turns to the left and to the right, rad.
+    turned: [f64; 2],
     spans: Vec<Span>,
     by_course: Option<Learnt>,
 }
@@ -116,7 +120,7 @@ impl Cut {
         if !drive.facts.has_rate {
             let learnt = by_course::learn(drive, board, tick)?;
             let (gyro_bias, by_course) = (learnt.gyro_bias, Some(learnt));
-            return Ok(Self { path, name, gyro_bias, turned: 0.0, spans: Vec::new(), by_course });
+            return Ok(Self { path, name, gyro_bias, turned: [0.0; 2], spans: Vec::new(), by_course });
         }
         let gyro_bias = initialise(drive)?.map(AngularRate::rad_per_sec);
         let mut spans = Spans::default();
@@ -145,7 +149,9 @@ pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, CalibrateErro
     let spans: Vec<&[Span]> = by_rate.iter().map(|drive| drive.spans.as_slice()).collect();
     // A share that the drives hardly show makes the others uncertain, so the least certain one is removed first.
     let (mut fitted, mut refused) = ([!spans.is_empty(); 3], [spans.is_empty().then_some(f64::INFINITY); 3]);
-    let has_turned = drives.iter().map(|drive| drive.turned).sum::<f64>() >= LEAST_TURNED_RAD;
+    let [left, right] = [0, 1].map(|side| drives.iter().map(|drive| drive.turned[side]).sum::<f64>());
+    let (has_turned, has_two_sides) =
+        (left + right >= LEAST_TURNED_RAD, left.min(right) > LEAST_OTHER_SIDE * (left + right));
     let fit = loop {
         let fit = Fit::new(&spans, fitted);
         let excess =
@@ -167,10 +173,16 @@ pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, CalibrateErro
         let by_course = drives.iter().filter_map(|drive| drive.by_course).filter(|_| k == 2);
         let [value, sigma] = by_course.fold(by_fit, |found, learnt| combined(found, learnt.gain));
         if sigma <= limit {
-            return Share { name, value, sigma, limit, refused: None };
+            let remark = match (value.abs() < sigma, has_two_sides || spans.is_empty()) {
+                (false, true) => None,
+                (true, true) => Some("smaller than its sigma"),
+                (false, false) => Some("turns to one side only"),
+                (true, false) => Some("smaller than its sigma; turns to one side only"),
+            };
+            return Share { name, value, sigma, limit, refused: None, remark };
         }
         let sigma = refused[k].unwrap_or(sigma).min(sigma);
-        Share { name, value: 0.0, sigma, limit, refused: Some(lacking) }
+        Share { name, value: 0.0, sigma, limit, refused: Some(lacking), remark: None }
     });
     for (drive, deviation) in by_rate.iter().zip(&fit.deviations) {
         if *deviation > MAX_RESIDUAL_RAD {
@@ -250,17 +262,22 @@ mod tests {
             };
             let (path, name, spans) = (String::new(), String::new(), (0..100).map(span).collect());
             calibrate(
-                &[Cut { path, name, gyro_bias: [0.0; 3], turned: 100.0 * turn, spans, by_course: None }],
+                &[Cut {
+                    path,
+                    name,
+                    gyro_bias: [0.0; 3],
+                    turned: [100.0 * turn, 0.0],
+                    spans,
+                    by_course: None,
+                }],
                 0,
             )
             .unwrap()
             .shares[2]
         };
-        assert!(
-            gain(0.059).refused.is_some() && (gain(0.061).value - 0.01).abs() < 1e-6,
-            "{:?}",
-            gain(0.061)
-        );
+        let found = gain(0.061);
+        assert!(gain(0.059).refused.is_some() && (found.value - 0.01).abs() < 1e-6, "{found:?}");
+        assert_eq!(found.remark, Some("turns to one side only"));
     }
 
     #[test]

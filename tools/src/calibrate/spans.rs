@@ -27,7 +27,7 @@ pub struct Spans {
     /// The error and the turns of the second in progress.
     error: Option<f64>,
     turns: [f64; 3],
-    turned: f64,
+    turned: [f64; 2],
     spans: Vec<Span>,
 }
 
@@ -49,14 +49,15 @@ impl Spans {
         self.samples += 1;
         if self.samples == SPAN {
             let (turns, seconds) = (self.turns, SPAN as f64 * DT);
-            self.turned += Some(turns[2].abs()).filter(|turn| *turn >= STRAIGHT_RAD).unwrap_or_default();
+            let turn = if turns[2].abs() < STRAIGHT_RAD { 0.0 } else { turns[2] };
+            self.turned[usize::from(turn < 0.0)] += turn.abs();
             self.spans.extend(self.error.map(|error| Span { error, turns, seconds }));
             self.samples = 0;
         }
     }
 
-    /// The sum of the turns of all seconds, rad, which noise does not add to.
-    pub fn turned(&self) -> f64 {
+    /// The sums of the turns of all seconds to the left and to the right, rad, which noise does not add to.
+    pub fn turned(&self) -> [f64; 2] {
         self.turned
     }
 

@@ -59,9 +59,9 @@ struct Content {
 
 impl UnitFile {
     pub fn json(&self) -> serde_json::Value {
-        let shares = self.shares.map(|Share { name, value, sigma, limit, refused }| {
+        let shares = self.shares.map(|Share { name, value, sigma, limit, refused, remark }| {
             let share =
-                serde_json::json!({ "value": value, "sigma": sigma, "limit": limit, "refused": refused });
+                serde_json::json!({ "value": value, "sigma": sigma, "limit": limit, "refused": refused, "remark": remark });
             (String::from(name), share)
         });
         let content = Content {

@@ -52,9 +52,12 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if common.json {
         return print_json(&mut out, &unit.json());
     }
-    for Share { name, value, sigma, limit, refused } in &unit.shares {
+    for Share { name, value, sigma, limit, refused, remark } in &unit.shares {
         match refused {
-            None => writeln!(out, "{name:<6} {value:+.5}, sigma {sigma:.5}")?,
+            None => {
+                let remark = remark.map(|remark| format!(": {remark}")).unwrap_or_default();
+                writeln!(out, "{name:<6} {value:+.5}, sigma {sigma:.5}{remark}")?;
+            }
             Some(reason) if sigma.is_infinite() => writeln!(out, "{name:<6} refused: {reason}")?,
             Some(reason) => writeln!(out, "{name:<6} refused, sigma {sigma:.5} (at most {limit}): {reason}")?,
         }

@@ -34,6 +34,9 @@ impl Seconds {
 impl fmt::Display for Seconds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { seconds, inside, worst } = self;
+        if *seconds == 0 {
+            return write!(f, "no seconds counted");
+        }
         write!(f, "{inside:.2} of {seconds} s (worst {worst:.1})")
     }
 }
@@ -88,6 +91,8 @@ mod tests {
     #[test]
     fn a_second_is_inside_or_outside_straight_or_turning_and_good() {
         let mut found = ExpectedError::default();
+        let none = "inside 1 sigma: straight no seconds counted, turning no seconds counted";
+        assert_eq!(found.to_string(), none);
         let rate = |rad_per_s: f32| AngularRate::from_rad_per_sec(rad_per_s).unwrap();
         // Rate, truth, sigma at the end and quality of a second.
         let seconds = [
