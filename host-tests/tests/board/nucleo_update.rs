@@ -69,7 +69,7 @@ fn a_nucleo_is_updated_over_can_without_a_gap_and_keeps_its_records() {
     assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::Confirmed));
     // To the other bank, and back to the first: an image and records are there already.
     for (round, (to, latitude)) in [(Slot::B, 49.0), (Slot::A, 50.0)].into_iter().enumerate() {
-        stand(&mut board, 4_700);
+        stand(&mut board, 4_700 + 500 * round as u32);
         board.run(3 * S);
         let _ = (board.events(), board.can_frames());
         let begin = board.counts().time;
@@ -232,6 +232,40 @@ fn a_nucleo_goes_back_from_an_image_without_can_after_its_trial() {
     board.run(2 * S);
     assert_eq!(resets(&mut board).len(), 2, "the end of the trial and the swap");
     rolled_back(&mut board);
+}
+
+#[test]
+#[ignore = "it builds embassy, which takes a minute"]
+fn a_nucleo_whose_image_is_damaged_starts_the_other_one_and_without_any_flashes() {
+    const TEST: &str = "a_nucleo_whose_image_is_damaged_starts_the_other_one_and_without_any_flashes";
+    let Some(mut board) = boot(TEST, &[]) else { return };
+    board.run(START);
+    let image = &built().1.images[1];
+    install(&mut board, image, 0);
+    let own = Trailer::new(image.len() as u32, CRC.checksum(image), 0, 2);
+    let confirmed = Trailer { is_confirmed: true, ..own };
+    board.patch(At::Address(FLASH_BASE + BANK + TRAILER), &spread(&confirmed.bytes()));
+    board.reset_pin();
+    board.run(START);
+    assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
+    // The image that runs is the lower one.
+    let place = At::Address(FLASH_BASE + IMAGE + 100_000);
+    let damage = |board: &mut Board| {
+        let byte = board.read(place, 1)[0];
+        board.patch(place, &[byte ^ 0x10]);
+        board.power_cycle(10 * MS);
+        let _ = (board.run(START), board.events(), board.bus_log());
+    };
+    damage(&mut board);
+    assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::NewerDamaged));
+    board.configure("GPIOB.watch", vec![0]);
+    damage(&mut board);
+    board.run(3 * S);
+    let events = board.events();
+    let count = |kind: &str| events.iter().filter(|event| event.kind == kind).count();
+    println!("{TEST}: {} edges, {} resets in 3 s", count("pin"), count("reset"));
+    assert!((8..=15).contains(&count("pin")) && count("options") == 0);
+    assert_eq!(board.bus_log().len(), 0);
 }
 
 /// A reset leaves either value of the option bytes while they are changed; each start mends that.

@@ -26,8 +26,8 @@ const SWAPPED: [u64; 2] = [0x5357_4150_4241_4E4B, 0x4B4E_4142_5041_5753];
 /// OPSR: a reset has interrupted a change of option bytes.
 const INTERRUPTED: u8 = 6;
 const WATCHDOG_US: u32 = 1_000_000;
-/// An eighth of a second at 64 MHz.
-const EIGHTH: u32 = 8_000_000;
+/// Steps of a delay of about a quarter of a second at 64 MHz.
+const QUARTER: u32 = 6_000_000;
 
 #[unsafe(link_section = ".uninit.swapped")]
 static mut MARK: MaybeUninit<u64> = MaybeUninit::uninit();
@@ -88,7 +88,7 @@ fn flash_led() -> ! {
     pac::GPIOB.moder().modify(|w| w.set_moder(0, Moder::OUTPUT));
     loop {
         pac::GPIOB.odr().modify(|w| w.0 ^= 1);
-        cortex_m::asm::delay(2 * EIGHTH);
+        cortex_m::asm::delay(QUARTER);
     }
 }
 
