@@ -3,7 +3,7 @@
 //! | letter | what | promise |
 //! |---|---|---|
 //! | s | a second whose sets are all good | its yaw is off by at most four of the largest expected errors that it sent |
-//! | y | a span between two good sets, with anything between them | its yaw is off by at most four times the sum of the expected errors of its seconds, unless the count of gaps changes by a second later |
+//! | y | a span between two good sets, with anything between them | its yaw is off by at most four times the sum, over its seconds, of the largest expected error that each sent, unless the count of gaps changes by a second later |
 //! | d | the last minute before a slow status, between two good sets | its yaw is off by at most four times the doubt of the status, gaps or not |
 //! | t | a status that says "stands" | the vehicle's speed over ground is below 0.3 m/s, but for half a second in all |
 //! | g | the time in all | good for the share that the situation allows |
@@ -168,7 +168,7 @@ impl Outcome {
 pub fn judge(received: &Receiver, truth: &Travelled, end: f64, reference: &Reference) -> Outcome {
     let sets = &received.sets;
     let mut outcome = Outcome::default();
-    let (errors, sums) = integrate(sets, truth);
+    let errors: Vec<f64> = sets.iter().map(|set| set.yaw - truth.heading(set.sampled)).collect();
     let last_good = runs(sets);
     let slack = |from: &Set, to: &Set| {
         let Reference { noise, drift, timing } = reference;
@@ -201,7 +201,7 @@ pub fn judge(received: &Receiver, truth: &Travelled, end: f64, reference: &Refer
             if seen.windows(2).any(|pair| pair[0].gaps != pair[1].gaps) {
                 continue;
             }
-            let allowed = SIGMAS * (sums[to] - sums[from]) + slack(set, end);
+            let allowed = SIGMAS * sum_of_seconds(&sets[from..=to]) + slack(set, end);
             let off = errors[to] - errors[from];
             outcome.span.add(set.sampled, off, allowed);
             outcome.wrong_spans += usize::from(off.abs() > allowed);
@@ -236,19 +236,17 @@ pub fn judge(received: &Receiver, truth: &Travelled, end: f64, reference: &Refer
     outcome
 }
 
-/// The yaw's error at each set, and the sum of the expected errors up to it, rad.
-fn integrate(sets: &[Set], truth: &Travelled) -> (Vec<f64>, Vec<f64>) {
-    let errors = sets.iter().map(|set| set.yaw - truth.heading(set.sampled)).collect();
-    let (mut sum, mut last) = (0.0, None::<&Set>);
-    let mut sums = Vec::with_capacity(sets.len());
-    for set in sets {
-        let length = last.map_or(0.0, |last| set.sampled - last.sampled);
-        // Where no expected error is sent, nothing is allowed.
-        sum += set.sigma.unwrap_or(0.0) * length.min(1.0);
-        sums.push(sum);
-        last = Some(set);
+/// The sum over seconds, back from the last set, of the largest expected error that each has sent, rad. Where none is sent,
+/// nothing is allowed.
+fn sum_of_seconds(sets: &[Set]) -> f64 {
+    let (mut rest, mut sum) = (sets, 0.0);
+    while let [_, .., last] = rest {
+        let begin = rest.partition_point(|set| set.sampled < last.sampled - 1.0 + 1e-6);
+        let (before, second) = rest.split_at(begin);
+        sum += second.iter().filter_map(|set| set.sigma).fold(0.0, f64::max);
+        rest = before;
     }
-    (errors, sums)
+    sum
 }
 
 /// The last set of the good ones in a row from each set on.
