@@ -25,6 +25,7 @@
 mod claim;
 mod config;
 mod doubt;
+mod parked;
 mod turned;
 
 pub use config::ZeroRateConfig;
@@ -37,6 +38,7 @@ use crate::standstill::{Standing, StandstillSource};
 use crate::units::AngularRate;
 use claim::Claim;
 use doubt::Doubt;
+use parked::Parked;
 use turned::Turned;
 
 /// Samples in each of the means whose spread is taken.
@@ -54,9 +56,6 @@ const STEADY: f32 = 9.0;
 const BOARDING: f32 = 1e-3;
 /// Samples for which a standstill that the gyro has contradicted is not believed: a slide may turn now and then.
 const DISTRUSTED: u32 = 10 * RATE_HZ;
-/// A turn of more samples than this, where the vehicle has stood without wheels, contradicts the bias: no vehicle pulls away so
-/// slowly.
-const LASTING: u32 = 5 * RATE_HZ / 2;
 /// Says how a whole second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -101,8 +100,7 @@ pub struct ZeroRate {
     turned: Turned,
     /// The rate of [`ZeroRate::turns`], rad/s.
     turning: f32,
-    /// The sum of the rates while it lasts, rad/s, and their number.
-    lasting: (f32, u32),
+    parked: Parked,
     /// The vehicle has stood without wheels, and not driven off since: it cannot turn.
     is_parked: bool,
     since_walk: u32,
@@ -144,7 +142,7 @@ impl ZeroRate {
             claim: None,
             turned: Turned::NONE,
             turning: 0.0,
-            lasting: (0.0, 0),
+            parked: Parked::NONE,
             is_parked: false,
             since_walk: 0,
             thermal: 0.0,
@@ -227,8 +225,7 @@ impl ZeroRate {
         self.turned.add(off);
         let now = off as f32 / AngularRate::PER_RAD_PER_SEC;
         self.turning = self.turns();
-        let (sum, samples) = self.lasting;
-        self.lasting = if self.turning > 0.0 { (sum + now, samples + 1) } else { (0.0, 0) };
+        self.parked.add(now);
         let turned = self.turned.angle();
         if !self.standing.is_by_wheels() || libm::fabsf(turned) <= self.turn_gate() {
             return false;
@@ -284,13 +281,12 @@ impl ZeroRate {
     }
 
     /// Notes that the vehicle moves: what it has just stood on did not turn, so its newest reading there is the bias. A turn
-    /// that has lasted until now ([`LASTING`]) contradicts the bias, as a standstill does.
+    /// before it pulled away contradicts the bias, as a standstill does.
     pub fn moves(&mut self) {
-        let (sum, samples) = core::mem::take(&mut self.lasting);
-        if samples > LASTING {
-            self.doubt.add(self.filter.get::<BIAS>() + sum / samples as f32, true);
+        self.turning = 0.0;
+        if core::mem::take(&mut self.is_parked) {
+            self.leave();
         }
-        (self.turning, self.is_parked) = (0.0, false);
         let Some((mean, initial)) = self.claim.as_mut().and_then(Claim::moves) else { return };
         self.claim = None;
         let ZeroRateConfig { standstill, noise, max_bias, .. } = self.config;
@@ -357,12 +353,28 @@ impl ZeroRate {
     }
 
     fn stop_begins(&mut self, standing: Standing) {
-        self.end_doubt();
         self.standing = standing;
         (self.refused, self.against, self.distrusted_for) = (false, 0.0, 0);
         self.restart();
+        // It is the same stop, with the same offset, until the vehicle moves.
+        if self.is_parked && !standing.is_by_wheels() {
+            return;
+        }
+        self.end_doubt();
         let offset = self.config.standstill * self.config.standstill + self.mistaken();
         self.filter.restart::<STOP>(0.0, offset);
+    }
+
+    /// Ends a stop without wheels.
+    fn leave(&mut self) {
+        let turned = core::mem::replace(&mut self.parked, Parked::NONE).before_pulling_away();
+        let ZeroRateConfig { noise, standstill, .. } = self.config;
+        let noise = self.noise.unwrap_or_default().max(noise * noise) + BOARDING * BOARDING;
+        let limit = GATE * sqrt(self.bias_variance() + standstill * standstill + noise);
+        if let Some(turned) = turned.filter(|turned| libm::fabsf(*turned) > limit) {
+            self.doubt.add(self.filter.get::<BIAS>() + turned, true);
+        }
+        self.end_doubt();
     }
 
     /// Compares a stop that contradicted the bias with earlier ones, and replaces the bias once enough agree.

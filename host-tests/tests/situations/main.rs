@@ -42,6 +42,10 @@ const CURED: &[(&str, &str, u64)] = &[
     ("banked test track", "utv", 1),
     ("washboard road", "utv", 1),
     ("two faults, drawn", "car", 201),
+    ("bias steps after a knock", "utv", 326),
+    ("one small implausible reading", "van", 303),
+    ("mounted 5 deg askew", "van", 508),
+    ("loading ramp", "van", 507),
 ];
 
 #[test]
