@@ -13,9 +13,8 @@
 //! | 0x27 | 2, 3 | [access](security) by challenge (1) and response (2), where a key is stored |
 //! | 0x28 | 2, 3 | stop (1) and continue (0) the messages of the board, at standstill |
 //! | 0x2E | 2, 3 | write [data by identifier](data) where permitted, at standstill |
-//! | 0x31 | any | 0203 reads the log: events after a number (4 bytes) |
 //! | 0x31 | 2, 3 | 0204 tests the board: a bit for each part that fails, see the YAML |
-//! | 0x31 | 2, 3 | 0200 static, 0201 mounting calibration; 0202 stores it; FF01 (session 2) uses the download |
+//! | 0x31 | 2 | FF01 uses the download |
 //! | 0x34, 0x36, 0x37 | 2 | download of a weight file to address 0, of [firmware](update) to address 2 |
 //! | 0x3E | any | tester present |
 //! | 0x85 | 2, 3 | stop and continue the recording of troubles |
