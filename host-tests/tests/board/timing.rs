@@ -146,7 +146,7 @@ fn no_response_is_later_than_p2_without_a_wait() {
     board.run(Duration::from_secs(5));
     let reads = IDENTIFIERS.iter().filter(|identifier| identifier.access != Access::Write);
     let reads = reads.map(|identifier| [&[0x22][..], &identifier.id.to_be_bytes()].concat());
-    let others = "1003 3E00 1901FF 1902FF 190A 14FFFFFF 8502 8501 280301 280001 3101020300000000 31010204 31010200 2701";
+    let others = "1003 3E00 1901FF 1902FF 190A 14FFFFFF 8502 8501 280301 280001 31010204 2701";
     let others = others.split(' ').map(bytes);
     let stores = service::storing(&Configuration { latitude_deg: Some(48.0), ..Configuration::DEFAULT });
     let file = other_weights(1);
