@@ -9,7 +9,6 @@ test sequence that cannot be read is reported and left out.
 
 import argparse
 import dataclasses
-import time
 from pathlib import Path
 
 import gpytorch
@@ -20,8 +19,7 @@ from .lwoi_motion import odometry_errors
 from .lwoi_process import Settings, Trained, train
 from .lwoi_run import MODES, Expected, run
 from .results import run_mode, test_all, write_report
-from .sequence import STEPS, Sequence, SequenceError, load_pieces
-from .trajectory import Track, trajectory_error
+from .sequence import Sequence, SequenceError, load_pieces
 
 
 def arguments() -> argparse.Namespace:
@@ -51,29 +49,12 @@ def fit(drives: list[Sequence], errors: np.ndarray, args: argparse.Namespace) ->
     return trained
 
 
-def remaining(errors: np.ndarray, expected: np.ndarray) -> list[float]:
-    """Returns the RMS of each component after the expected error is subtracted, over the RMS before: 1 is no gain."""
-    return [round(float(x), 4) for x in np.sqrt(((errors - expected) ** 2).mean(0) / (errors**2).mean(0))]
-
-
 def test(drive: Sequence, process: Trained, errors: np.ndarray, out: Path) -> dict:
     """Runs a drive in every mode with a process and the errors of its training, writes its trajectories and returns its numbers."""
-    begin = time.monotonic()
-    expected = Expected(errors.mean(axis=0), (errors**2).mean(axis=0), process.predict(drive.odometry))
-    numbers: dict = {
-        "sha256": drive.sha256,
-        "remaining_odometry": remaining(odometry_errors(drive), expected.odometry.mean),
-        "predict_s": round(time.monotonic() - begin, 2),
-    }
+    expected = Expected(errors.mean(axis=0), process.predict(drive.odometry))
+    numbers: dict = {"sha256": drive.sha256}
     for mode in MODES:
-
-        def late(track: Track) -> dict:
-            """Returns the error if each pose is used one second late."""
-            error = trajectory_error(track.position[STEPS:], drive.position[:-STEPS], False)
-            return {"ate_a_second_late_m": round(error, 3)}
-
-        path = out / mode / f"{drive.name}.txt"
-        numbers[mode] = run_mode(drive, path, lambda: run(drive, expected, mode), late)
+        numbers[mode] = run_mode(drive, out / mode / f"{drive.name}.txt", lambda: run(drive, expected, mode))
     return numbers
 
 

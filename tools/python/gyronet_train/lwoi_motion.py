@@ -1,4 +1,4 @@
-"""The motion in a second by odometry, its errors, and a pose that moves by both.
+"""The motion in a second by odometry, and its errors.
 
 Windows are independent of each other, so each function processes all windows of a drive at once. The errors
 are what lwoi's process learns: the twist from odometry's pose to the true pose, translation first.
@@ -7,7 +7,7 @@ are what lwoi's process learns: the twist from odometry's pose to the true pose,
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .motion import left_jacobian, skew
+from .motion import left_jacobian
 from .sequence import Sequence
 
 
@@ -42,21 +42,3 @@ def odometry_errors(sequence: Sequence) -> np.ndarray:
     turn = (rotation.inv() * attitude[:-1].inv() * attitude[1:]).as_rotvec()
     ahead = rotation.inv().apply(moved - way)
     return np.concatenate([np.linalg.solve(left_jacobian(turn), ahead[..., None])[..., 0], turn], axis=1)
-
-
-class Pose:
-    """A pose, and the covariance (6, 6) of its error: the true attitude is Exp(turn) times the estimate, in world axes, and
-    the position is off by the rest."""
-
-    def __init__(self, attitude: Rotation, position: np.ndarray):
-        self.attitude, self.position = attitude, np.array(position, dtype=float)
-        self.covariance = np.zeros((6, 6))
-
-    def move(self, rotation: Rotation, way: np.ndarray, variance: np.ndarray) -> None:
-        """Moves on by a motion whose twist at its end has this variance."""
-        moves, enters = np.eye(6), np.zeros((6, 6))
-        moves[3:, :3] = -skew(self.attitude.apply(way))
-        self.position = self.position + self.attitude.apply(way)
-        self.attitude = self.attitude * rotation
-        enters[:3, 3:] = enters[3:, :3] = self.attitude.as_matrix()
-        self.covariance = moves @ self.covariance @ moves.T + enters @ np.diag(variance) @ enters.T

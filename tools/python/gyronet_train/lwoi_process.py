@@ -1,10 +1,10 @@
-"""The Gaussian processes of lwoi: they predict the error of a second's measurements and its variance.
+"""The Gaussian processes of lwoi: they predict the error of a second's measurements.
 
 There is an independent process for each component of the error. All share the features that a small
 convolutional network extracts from a window. The inducing points are 100 windows, which are optimised
 with the other parameters; the cost of exact processes would grow with the cube of the number of
 windows. Targets are divided by their RMS in training, but not centred: far from the training data a
-process then predicts no correction, with the full RMS as standard deviation.
+process then predicts no correction.
 """
 
 import time
@@ -76,14 +76,6 @@ class Settings:
     seed: int = 1
 
 
-@dataclass(frozen=True)
-class Errors:
-    """The expected errors of windows (n, outputs) and their variances, which include the noise of one window."""
-
-    mean: np.ndarray
-    variance: np.ndarray
-
-
 class Trained:
     """A trained process, with mean and standard deviation of its inputs and the scale of its targets."""
 
@@ -92,14 +84,12 @@ class Trained:
         self.scale, self.settings, self.seconds = scale, settings, seconds
 
     @torch.no_grad()
-    def predict(self, windows: np.ndarray) -> Errors:
-        """Predicts the errors of windows (n, 100, 3)."""
+    def predict(self, windows: np.ndarray) -> np.ndarray:
+        """Predicts the errors (n, outputs) of windows (n, 100, 3)."""
         inputs = standardised(windows, *self.units)
         with gpytorch.settings.variational_cholesky_jitter(self.settings.jitter):
             parts = [self.likelihood(self.model(part)) for part in inputs.split(CHUNK)]
-            mean = torch.cat([part.mean for part in parts]).double().numpy()
-            variance = torch.cat([part.variance for part in parts]).double().numpy()
-        return Errors(mean * self.scale, variance * self.scale**2)
+            return torch.cat([part.mean for part in parts]).double().numpy() * self.scale
 
 
 def standardised(windows: np.ndarray, mean: np.ndarray, spread: np.ndarray) -> torch.Tensor:

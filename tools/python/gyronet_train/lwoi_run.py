@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .lwoi_motion import Pose, corrected, odometry_motion, odometry_poses
-from .lwoi_process import Errors
+from .lwoi_motion import corrected, odometry_motion, odometry_poses
 from .sequence import STEPS, Sequence
 from .trajectory import Track
 
@@ -21,38 +20,33 @@ LEVEL = slice(3, 5)  # of a twist: roll and pitch
 
 @dataclass(frozen=True)
 class Expected:
-    """The expected errors of a drive's odometry; `constant` and `mean_square` are those of the training (6)."""
+    """The expected errors: the mean of the training's (6), and those of the drive's odometry (n, 6)."""
 
     constant: np.ndarray
-    mean_square: np.ndarray
-    odometry: Errors
+    odometry: np.ndarray
 
-    def twists(self, mode: str) -> Errors:
+    def twists(self, mode: str) -> np.ndarray:
         """Returns the expected errors of the odometry in a mode, without roll and pitch."""
-        like = np.ones_like(self.odometry.mean)
-        mean, variance = {
-            "odometry": (0.0 * like, self.mean_square * like),
-            "constant": (self.constant * like, (self.mean_square - self.constant**2) * like),
-        }.get(mode, (self.odometry.mean.copy(), self.odometry.variance))
+        like = np.ones_like(self.odometry)
+        mean = {"odometry": 0.0 * like, "constant": self.constant * like}.get(mode, self.odometry.copy())
         mean[:, LEVEL] = 0.0
-        return Errors(mean, variance)
+        return mean
 
 
 def run(sequence: Sequence, expected: Expected, mode: str) -> Track:
     """Runs a drive from its true first position and heading."""
     twists = expected.twists(mode)
-    rotation, way = corrected(*odometry_motion(sequence.odometry), twists.mean)
-    state = Pose(Rotation.from_euler("z", sequence.attitude[0].as_euler("ZYX")[0]), sequence.position[0])
-    attitudes, positions, covariances = [state.attitude.as_quat()[None]], [state.position[None]], [state.covariance]
+    rotation, way = corrected(*odometry_motion(sequence.odometry), twists)
+    attitude, position = Rotation.from_euler("z", sequence.attitude[0].as_euler("ZYX")[0]), sequence.position[0]
+    attitudes, positions = [attitude.as_quat()[None]], [position[None]]
     for k in range(len(sequence)):
-        within = steps_within(sequence.odometry[k], twists.mean[k])
-        attitudes.append((state.attitude * within[0]).as_quat())
-        positions.append(state.position + state.attitude.apply(within[1]))
-        state.move(rotation[k], way[k], twists.variance[k])
-        attitudes[-1][-1], positions[-1][-1] = state.attitude.as_quat(), state.position
-        covariances.append(state.covariance)
-    track = Rotation.from_quat(np.concatenate(attitudes)), np.concatenate(positions)
-    return Track(*track, np.array(covariances), 0)
+        within = steps_within(sequence.odometry[k], twists[k])
+        attitudes.append((attitude * within[0]).as_quat())
+        positions.append(position + attitude.apply(within[1]))
+        position = position + attitude.apply(way[k])
+        attitude = attitude * rotation[k]
+        attitudes[-1][-1], positions[-1][-1] = attitude.as_quat(), position
+    return Track(Rotation.from_quat(np.concatenate(attitudes)), np.concatenate(positions), 0)
 
 
 def steps_within(odometry: np.ndarray, twist: np.ndarray) -> tuple[Rotation, np.ndarray]:

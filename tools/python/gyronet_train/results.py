@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from .sequence import Sequence, SequenceError, load_sequence
-from .trajectory import FilterError, Track, consistency, trajectory_error, write_tum
+from .trajectory import FilterError, Track, trajectory_error, write_tum
 
 
 def test_all(folders: Iterable[Path], out: Path, modes: Iterable[str], test: Callable[[Sequence], dict]) -> dict[str, dict]:
@@ -34,10 +34,8 @@ def test_all(folders: Iterable[Path], out: Path, modes: Iterable[str], test: Cal
     return results
 
 
-def run_mode(
-    drive: Sequence, path: Path, run: Callable[[], Track], further: Callable[[Track], dict] = lambda track: {}
-) -> dict:
-    """Runs a drive in one mode, writes its trajectory to `path` and returns its numbers and those of `further`."""
+def run_mode(drive: Sequence, path: Path, run: Callable[[], Track]) -> dict:
+    """Runs a drive in one mode, writes its trajectory to `path` and returns its numbers."""
     begin = time.monotonic()
     name = f"{drive.name} {path.parent.name}"
     try:
@@ -48,9 +46,7 @@ def run_mode(
     numbers = {
         "ate_m": round(trajectory_error(track.position, drive.position, False), 3),
         "aligned_ate_m": round(trajectory_error(track.position, drive.position, True), 3),
-        "squared_error_by_covariance": round(consistency(drive, track), 3),
         "refused": track.refused,
-        **further(track),
         "run_s": round(seconds, 2),
     }
     print(f"{name}: {numbers}", flush=True)

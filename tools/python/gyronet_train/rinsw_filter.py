@@ -159,13 +159,6 @@ class Filter:
         self.gyro_bias = self.gyro_bias + error[GYRO_BIAS]
         self.force_bias = self.force_bias + error[FORCE_BIAS]
 
-    def pose_covariance(self) -> np.ndarray:
-        """Returns the covariance (6, 6) of the turn and of the position's plain (not invariant) difference."""
-        plain = np.eye(6)
-        plain[3:, :3] = -skew(self.position)
-        within = np.r_[TURN, PLACE]
-        return plain @ self.covariance[np.ix_(within, within)] @ plain.T
-
     def check(self) -> None:
         """Raises FilterError if the filter has diverged; orthonormalises the attitude every 10,000 steps."""
         if not self.velocity @ self.velocity < FASTEST**2:

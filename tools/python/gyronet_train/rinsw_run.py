@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from .rinsw_filter import Filter, Noise
 from .rinsw_profiles import ROTATION, VELOCITY
 from .seconds import STATIC_S
-from .sequence import DT, STEPS, Sequence
+from .sequence import DT, Sequence
 from .trajectory import Track
 
 MODES = ("rinsw", "stops", "truth", "inertial")
@@ -41,14 +41,11 @@ def run(sequence: Sequence, detected: np.ndarray, noise: Noise = Noise()) -> Tra
     state = Filter(sequence.attitude[0].as_matrix(), noise)
     state.start(samples[:standing])
     attitudes, positions = [state.attitude], [state.position]
-    covariances = [state.pose_covariance()]
     for k, (sample, gate) in enumerate(zip(samples, detected), start=1):
         if k > standing:
             state.move(sample, gate)
             state.measure(sample, gate)
         attitudes.append(state.attitude)
         positions.append(state.position)
-        if k % STEPS == 0:
-            covariances.append(state.pose_covariance())
     attitude = Rotation.from_matrix(np.array(attitudes))
-    return Track(attitude, sequence.position[0] + np.array(positions), np.array(covariances), state.refused)
+    return Track(attitude, sequence.position[0] + np.array(positions), state.refused)

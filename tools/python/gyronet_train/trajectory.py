@@ -15,11 +15,10 @@ class FilterError(ValueError):
 
 @dataclass(frozen=True)
 class Track:
-    """A pose at each step, the pose covariances (N + 1, 6, 6) at the edges, and the number of refused measurements."""
+    """A pose at each step, and the number of refused measurements."""
 
     attitude: Rotation
     position: np.ndarray
-    covariance: np.ndarray
     refused: int
 
 
@@ -43,13 +42,3 @@ def trajectory_error(estimate: np.ndarray, truth: np.ndarray, align: bool) -> fl
         turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         estimate = estimate @ turn
     return float(np.sqrt(((estimate - truth) ** 2).sum(axis=1).mean()))
-
-
-def consistency(sequence: Sequence, track: Track) -> float:
-    """Returns a third of the squared error of position and heading in the plane, normalised by its covariance and
-    averaged over the edges after the first. It is 1 if the covariance is right."""
-    attitude, position = track.attitude[sequence.edges], track.position[sequence.edges]
-    turn = (sequence.attitude[sequence.edges] * attitude.inv()).as_rotvec()[:, 2:]
-    error = np.concatenate([turn, (sequence.position[sequence.edges] - position)[:, :2]], axis=1)[1:]
-    spread = track.covariance[1:, 2:5, 2:5]
-    return float(np.einsum("ni,ni->n", error, np.linalg.solve(spread, error[..., None])[..., 0]).mean() / 3)

@@ -1,11 +1,10 @@
-"""A second's motion by odometry, its errors, and the covariance of a pose that moves by it."""
+"""A second's motion by odometry, and its errors."""
 
 import unittest
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from gyronet_train.lwoi_motion import Pose, corrected, odometry_errors, odometry_motion
+from gyronet_train.lwoi_motion import corrected, odometry_errors, odometry_motion
 
 from .made_drive import START, START_YAW, expected_end, make_drive
 
@@ -49,29 +48,3 @@ class Odometry(unittest.TestCase):
         drive = make_drive(np.full(100 * SECONDS, 10.0), np.zeros(100 * SECONDS))
         drive.odometry[:, :, :2] *= 0.99
         np.testing.assert_allclose(odometry_errors(drive), np.tile([0.1, 0, 0, 0, 0, 0], (SECONDS, 1)), atol=1e-8)
-
-
-class Poses(unittest.TestCase):
-    def test_the_covariance_moves_as_errors_do(self):
-        attitude, position = Rotation.from_rotvec([0.1, -0.2, 1.5]), np.array([3.0, -7.0, 1.0])
-        rotation, way, step = Rotation.from_rotvec([0.02, -0.05, 0.3]), np.array([9.0, 1.0, 0.2]), 1e-6
-
-        def after(error):
-            state = Pose(Rotation.from_rotvec(error[:3]) * attitude, position + error[3:6])
-            turned, moved = corrected(rotation, way[None], error[None, 6:])
-            state.move(turned[0], moved[0], np.zeros(6))
-            return state
-
-        def off(error):
-            state = after(error)
-            turn = (state.attitude * ahead.attitude.inv()).as_rotvec()
-            return np.concatenate([turn, state.position - ahead.position])
-
-        ahead = after(np.zeros(12))
-        jacobian = np.array([(off(step * e) - off(-step * e)) / (2 * step) for e in np.eye(12)]).T
-        state = Pose(attitude, position)
-        state.covariance, variance = np.diag(np.linspace(0.1, 0.6, 6)), np.linspace(0.2, 0.7, 6)
-        before = state.covariance
-        state.move(rotation, way, variance)
-        expected = jacobian[:, :6] @ before @ jacobian[:, :6].T + jacobian[:, 6:] @ np.diag(variance) @ jacobian[:, 6:].T
-        np.testing.assert_allclose(state.covariance, expected, atol=1e-5)
