@@ -1,49 +1,33 @@
 """A board without a processor: time, events, interrupt lines and memory for the tests of single peripherals."""
 
-import heapq
-import sys
 import unittest
-from itertools import count
-from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from virtual_board.peripherals import create  # noqa: E402
-from virtual_board.peripherals.flash import BASE, SIZE  # noqa: E402
+from virtual_board.chips import STM32F405, STM32H563
+from virtual_board.events import EventQueue
+from virtual_board.memory import Memory
+from virtual_board.peripherals import create, h5
 
 US, MS, S = 1_000_000, 1_000_000_000, 1_000_000_000_000
 RAM = 0x2000_0000
 
 
-class Handle:
-    """A scheduled call that can be cancelled."""
-
-    def __init__(self, callback):
-        self.callback = callback
-
-    def cancel(self):
-        self.callback = None
-
-
 class FakeBoard:
     """The board's side of the interface between core and peripherals."""
 
-    def __init__(self, create=create):
+    def __init__(self, chip=STM32F405):
         self.now = 0
-        self.queue, self.order = [], count()
+        self.queue, self.memory = EventQueue(), Memory(1, chip)
+        self.memory_read, self.memory_write = self.memory.read, self.memory.write
         self.lines, self.log, self.resets, self.nmis = {}, [], [], 0
-        self.stalled_until, self.clock_changes = 0, 0
-        self.flash, self.ram = bytearray(b"\xFF" * 2 * SIZE), bytearray(0x2_0000)
+        self.stalled_until = 0
         self.peripherals = {}
-        for peripheral in create(self):
+        for peripheral in (h5.create if chip is STM32H563 else create)(self):
             self.peripherals[peripheral.name] = peripheral
         self.rcc = self.peripherals["RCC"]
         self.reset("por")
 
     def schedule(self, delay_ps, callback):
-        handle = Handle(callback)
-        heapq.heappush(self.queue, (self.now + delay_ps, next(self.order), handle))
-        return handle
+        return self.queue.schedule(self.now + delay_ps, callback)
 
     def irq(self, number, level):
         self.lines[number] = level
@@ -67,30 +51,16 @@ class FakeBoard:
         self.log.append({"at": self.now, "kind": kind, **fields})
 
     def clocks_changed(self):
-        self.clock_changes += 1
-
-    def _memory(self, address):
-        return (self.flash, address - BASE) if address < RAM else (self.ram, address - RAM)
-
-    def memory_read(self, address, length):
-        memory, start = self._memory(address)
-        return bytes(memory[start:start + length])
-
-    def memory_write(self, address, data):
-        memory, start = self._memory(address)
-        memory[start:start + len(data)] = data
+        pass
 
     # -- what a test does ------------------------------------------------------------------------------------------
 
     def advance(self, duration_ps):
         """Time passes, and every event on the way happens."""
         end = self.now + duration_ps
-        while self.queue and self.queue[0][0] <= end:
-            at, _, handle = heapq.heappop(self.queue)
-            if handle.callback:
-                self.now = max(self.now, at)
-                callback, handle.callback = handle.callback, None
-                callback()
+        while (at := self.queue.next_time()) is not None and at <= end:
+            self.now = max(self.now, at)
+            self.queue.pop_due(self.now)()
         self.now = end
 
     def read(self, name, offset, size=4):

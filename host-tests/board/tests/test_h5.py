@@ -1,10 +1,9 @@
 """The STM32H563: clocks, USART and FDCAN behave as the manual, or what stood in for it, says."""
 
 import unittest
-from random import Random
 from types import SimpleNamespace
 
-from virtual_board.peripherals import h5
+from virtual_board.chips import STM32H563
 from virtual_board.violation import Violation
 
 from .fake_board import MS, US, FakeBoard
@@ -14,7 +13,7 @@ RF0N, TC, BO = 1, 1 << 7, 1 << 19
 
 class H5(unittest.TestCase):
     def setUp(self):
-        self.board = FakeBoard(h5.create)
+        self.board = FakeBoard(STM32H563)
 
     def start_pll(self, latency=5, scale=3):
         """HSE of 8 MHz, PLL1 with 250 MHz at P and 50 MHz at Q."""
@@ -41,7 +40,7 @@ class H5(unittest.TestCase):
 
     def test_too_few_wait_states_and_too_low_a_voltage_are_violations(self):
         for latency, scale in ((4, 3), (5, 2)):
-            self.board = FakeBoard(h5.create)
+            self.board = FakeBoard(STM32H563)
             with self.assertRaises(Violation):
                 self.start_pll(latency, scale)
 
@@ -187,8 +186,8 @@ class H5(unittest.TestCase):
         self.assertEqual((self.board.read("FLASH", 0x20), self.board.events("options")), (0, []))
         left = set()
         for seed in range(8):
-            self.board = FakeBoard(h5.create)
-            self.board.memory = SimpleNamespace(random=Random(seed))
+            self.board = FakeBoard(STM32H563)
+            self.board.memory.random.seed(seed)
             self.swap()
             self.board.reset("iwdg")
             self.assertEqual(self.board.read("FLASH", 0x18), 6 << 29)
@@ -200,7 +199,6 @@ class H5(unittest.TestCase):
     def test_a_reset_during_an_operation_leaves_quad_words_without_their_ecc(self):
         flash = self.board.peripherals["FLASH"]
         self.board.watched_from = 0x0800_0000
-        self.board.memory = SimpleNamespace(random=Random(1))
         self.unlock()
         self.board.write("FLASH", 0x28, 2)
         self.program(0x0810_0010, (1, 2, 3, 4))
@@ -269,12 +267,12 @@ class H5(unittest.TestCase):
 
     def test_modes_of_spi_that_are_left_out_end_the_run(self):
         for offset, value in ((0x08, 0x2007_000F), (0x08, 0x2047_0007), (0x0C, 1 << 22), (0x0C, 1 << 26 | 1 << 23), (0x10, 1), (0x04, 5)):
-            self.board = FakeBoard(h5.create)
+            self.board = FakeBoard(STM32H563)
             self.board.write("RCC", 0xA4, 1 << 12)
             with self.assertRaises(Violation):
                 self.board.write("SPI1", offset, value)
         for config_2 in (1 << 26, 1 << 22 | 1 << 26):
-            self.board = FakeBoard(h5.create)
+            self.board = FakeBoard(STM32H563)
             with self.assertRaises(Violation):
                 self.start_spi(config_2)
 
@@ -356,14 +354,14 @@ class H5(unittest.TestCase):
 
     def test_what_is_left_out_ends_the_run(self):
         for offset, value in ((0xC0, 1 << 24), (0x9C, 0), (0xF0, 0)):
-            self.board = FakeBoard(h5.create)
+            self.board = FakeBoard(STM32H563)
             self.board.write("FDCAN1", 0x18, 1)
             self.board.write("FDCAN1", 0x18, 3)
             with self.assertRaises(Violation):
                 self.board.write("FDCAN1", offset, value)
         # A range, two identifiers, a mask for FIFO 1; the rest in FIFO 1; a FIFO that overwrites.
         for kind, action, config in ((0, 1, 0), (1, 1, 0), (2, 2, 0), (2, 0, 1 << 4), (2, 1, 1 << 9)):
-            self.board = FakeBoard(h5.create)
+            self.board = FakeBoard(STM32H563)
             bus = self.start_can(config=1 << 16 | config)
             self.board.write("SRAMCAN", 0x00, kind << 30 | action << 27 | 0xAA << 16 | 0x7FF)
             bus.send(0xAA)
@@ -372,7 +370,7 @@ class H5(unittest.TestCase):
 
     def test_can_fd_is_received_or_an_error(self):
         for cccr, error in ((0x300, None), (0, "CAN FD")):
-            self.board = FakeBoard(h5.create)
+            self.board = FakeBoard(STM32H563)
             bus = self.start_can(cccr)
             bus.send(0xAA, bytes(range(64)), fd=True, fast=True)
             self.board.advance(500 * US)

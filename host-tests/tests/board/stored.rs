@@ -46,7 +46,7 @@ fn erased_and_reset(board: &mut Board) -> (Vec<u64>, Vec<String>) {
         match event.kind.as_str() {
             "flash_erase" => erased.extend(event.numbers("sectors")),
             "reset" => resets.push(event.text("cause").to_owned()),
-            "flash_error" | "flash_key" | "programmed_over" | "ignored_write" => panic!("{event:?}"),
+            "flash_error" | "programmed_over" | "ignored_write" => panic!("{event:?}"),
             _ => {}
         }
     }

@@ -6,24 +6,22 @@ with the operation even if the code runs from RAM; that is stricter than the par
 Times are those of DS8626 tables 39 and 40 for words of 32 bits, typical unless `time_factor` is set (2 gives the maximum).
 
 Left out: read protection, the one-time programmable area, other PSIZE than x32, the mass erase, interrupts, read-while-write, stale cache
-lines. Assumed where the manual is silent: a STRT without SER does nothing; error flags that are still set do not stop
-the next operation; PG stays in force after LOCK is set; a key written while FLASH_CR is unlocked is ignored; OPTCR takes the time of a
-16 KiB erase. An interrupted erase has set, and an interrupted word has cleared, about the share of the bits by which it had advanced.
+lines, accesses to parts of registers. Assumed where the manual is silent: a STRT without SER does nothing; error flags that are still
+set do not stop the next operation; PG stays in force after LOCK is set; a key written while FLASH_CR is unlocked is ignored; OPTCR takes
+the time of a 16 KiB erase. An interrupted erase has set, and an interrupted word has cleared, about the share of the bits by which it had
+advanced.
 
-Settings: `time_factor`, `seed` (of the content after a power cut), `option_bytes` (OPTCR as loaded at reset).
+Settings: `time_factor`, `option_bytes` (OPTCR as loaded at reset).
 """
 
 import random
 
 from ..violation import Violation
-from .registers import ANY, WORD, Registers, check
+from .flash_keys import KEYS, OPTION_KEYS, OPTLOCK, OPTSTRT, Keyed
 
 PG, SER, SNB, PSIZE, X32, STRT, LOCK = 1 << 0, 1 << 1, 15 << 3, 3 << 8, 2 << 8, 1 << 16, 1 << 31
 EOP, OPERR, WRPERR, PGAERR, PGPERR, PGSERR, BSY = 1 << 0, 1 << 1, 1 << 4, 1 << 5, 1 << 6, 1 << 7, 1 << 16
 FLAGS = EOP | OPERR | WRPERR | PGAERR | PGPERR | PGSERR
-KEYS = (0x4567_0123, 0xCDEF_89AB)
-OPTION_KEYS = (0x0819_2A3B, 0x4C5D_6E7F)
-OPTLOCK, OPTSTRT = 1, 2
 FACTORY_OPTIONS = 0x0FFF_AAED
 #: Erase times in milliseconds for sectors of 16, 64 and 128 KiB.
 ERASE_MS = {16: 250, 64: 550, 128: 1000}
@@ -40,13 +38,13 @@ SECTORS = tuple((BASE + sum(_LENGTHS[:number]), length) for number, length in en
 SIZE = sum(_LENGTHS)
 
 
-class Flash(Registers):
+class Flash(Keyed):
     """The registers of section 3.9 and the operations that they start."""
 
-    name, base, sizes = "FLASH", 0x4002_3C00, ANY
-    kept = {0x04: (0, 0), 0x08: (0, 0)}
+    base, kept = 0x4002_3C00, {0x04: (0, 0), 0x08: (0, 0)}
+    locks = {0x04: ("cr", LOCK, KEYS), 0x08: ("optcr", OPTLOCK, OPTION_KEYS)}
     readers = {0x00: "acr", 0x0C: "sr", 0x10: "cr", 0x14: "optcr"}
-    writers = {0x00: "_write_acr", 0x04: "_write_key", 0x08: "_write_option_key", 0x0C: "_write_sr", 0x10: "_write_cr", 0x14: "_write_optcr"}
+    writers = {0x00: "_write_acr", 0x0C: "_write_sr", 0x10: "_write_cr", 0x14: "_write_optcr"}
     settings = {"time_factor", "starts_unlocked"}
 
     def __init__(self, board):
@@ -64,8 +62,6 @@ class Flash(Registers):
     def _registers(self):
         self.acr, self.latency = 0, 0
         self.sr, self.cr = 0, 0 if self.starts_unlocked else LOCK
-        self.key_step, self.key_failed = 0, False
-        self.option_step, self.option_failed = 0, False
         self.optcr = self.options | OPTLOCK
 
     @property
@@ -74,25 +70,11 @@ class Flash(Registers):
         return self.loaded_bor
 
     def reset(self, cause):
-        if self.operation:
-            self._interrupted()
+        super().reset(cause)
         self._registers()
         self.loaded_bor = self.options >> 2 & 3
 
-    def power_off(self):
-        """Handles a power failure: what was being erased or programmed stays half done."""
-        if self.operation:
-            self._interrupted()
-
     # -- registers ---------------------------------------------------------------------------------------------------
-
-    def under(self, offset):
-        return 0 if offset == 0x0C else self.load(offset)
-
-    def write(self, offset, value, size):
-        if offset & ~3 in (0x04, 0x08):
-            check(self, offset, size, WORD)
-        super().write(offset, value, size)
 
     def _write_sr(self, value):
         self.sr &= ~(value & FLAGS)
@@ -104,30 +86,6 @@ class Flash(Registers):
         self.acr = value & 0x1F07
         self.latency = value & 7
         self.board.rcc.check_limits()
-
-    def _write_key(self, value):
-        if self.key_failed:
-            self.board.record("flash_key", accepted=False)
-        elif not self.cr & LOCK:
-            self.board.record("ignored_write", register="FLASH_KEYR", value=value)
-        elif value != KEYS[self.key_step]:
-            self.key_failed = True
-            self.board.record("flash_key", accepted=False)
-        elif self.key_step == 0:
-            self.key_step = 1
-        else:
-            self.key_step = 0
-            self.cr &= ~LOCK
-
-    def _write_option_key(self, value):
-        if self.option_failed or not self.optcr & OPTLOCK or value != OPTION_KEYS[self.option_step]:
-            self.option_failed = self.option_failed or bool(self.optcr & OPTLOCK)
-            self.board.record("flash_key", accepted=False)
-        elif self.option_step == 0:
-            self.option_step = 1
-        else:
-            self.option_step = 0
-            self.optcr &= ~OPTLOCK
 
     def _write_cr(self, value):
         if self.cr & LOCK:
@@ -255,9 +213,7 @@ class Flash(Registers):
         return bits
 
     def configure(self, key, value):
-        if key == "seed":
-            self.random = random.Random(value)
-        elif key == "error_flags":
+        if key == "error_flags":
             # Flags that an operation before this program has left in SR.
             self.sr |= value & FLAGS & ~EOP
         elif key == "option_bytes":

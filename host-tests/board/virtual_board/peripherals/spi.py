@@ -30,7 +30,9 @@ class Spi(Registers):
     #: Candidates of each pin, (port letter, number), and the fastest clock of a pin of low speed.
     sck, miso, mosi = (("A", 5), ("B", 3)), (("A", 6), ("B", 4)), (("A", 7), ("B", 5))
     slow_hz = 2_000_000
-    readers, writers = {0x00: "cr1"}, {0x00: "_write_cr1"}
+    #: Bytes that wait in each direction.
+    depth = 1
+    readers, writers = {0x00: "cr1", 0x08: "sr"}, {0x00: "_write_cr1"}
 
     def __init__(self, board):
         super().__init__(board)
@@ -42,9 +44,12 @@ class Spi(Registers):
         self._registers()
 
     def _registers(self):
-        self.cr1, self.sr = 0, TXE
-        self.rdr, self.tdr, self.shift = 0, None, None
-        self.overrun_read = self.slow_noted = False
+        self.cr1 = self.rdr = 0
+        self.overrun = self.overrun_read = self.slow_noted = False
+        self._empty()
+
+    def _empty(self):
+        self.received, self.waiting, self.shift = [], [], None
 
     def reset(self, cause):
         if self.departure:
@@ -99,26 +104,22 @@ class Spi(Registers):
         """Returns CPOL and CPHA."""
         return bool(self.cr1 & CPOL), bool(self.cr1 & CPHA)
 
-    def _load(self):
-        self.shift, self.tdr = self.tdr, None
-        self.sr |= TXE | BSY
-        divider = 2 << (self.cr1 >> 3 & 7)
-        self.departure = self.board.schedule(8 * divider * PS // self.board.rcc.clock_hz("PCLK2"), self._finished)
+    def _go_on(self):
+        """Begins the next byte."""
+        if self.shift is None and self.waiting:
+            self.shift = self.waiting.pop(0)
+            self.departure = self.board.schedule(8 * PS // self.bit_hz, self._finished)
 
     def _finished(self):
         self.departure = None
         byte, self.shift = self.shift, None
         value = self._exchange(byte)
-        if self.sr & RXNE:
-            self.sr |= OVR
+        if len(self.received) == self.depth:
+            self.overrun = True
             self.board.record("overrun", spi=self.name)
         else:
-            self.rdr = value
-            self.sr |= RXNE
-        if self.tdr is not None:
-            self._load()
-        else:
-            self.sr &= ~BSY
+            self.received.append(value)
+        self._go_on()
 
     def _exchange(self, byte):
         """Returns the byte that MISO delivers; a line without a driver is high."""
@@ -142,18 +143,21 @@ class Spi(Registers):
 
     # -- registers ---------------------------------------------------------------------------------------------------
 
+    @property
+    def sr(self):
+        """Returns SR."""
+        busy = self.waiting or self.shift is not None
+        return (RXNE if self.received else 0) | (0 if self.waiting else TXE) | (OVR if self.overrun else 0) | (BSY if busy else 0)
+
     def read(self, offset, size):
-        if offset == 0x08:
-            value = self.sr
-            if self.overrun_read:
-                self.sr &= ~OVR
-                self.overrun_read = False
-            return value
         if offset == 0x0C:
-            self.sr &= ~RXNE
-            self.overrun_read = bool(self.sr & OVR)
+            self.rdr, self.received = (self.received or [self.rdr])[0], []
+            self.overrun_read = self.overrun
             return self.rdr
-        return super().read(offset, size)
+        value = super().read(offset, size)
+        if offset == 0x08 and self.overrun_read:
+            self.overrun = self.overrun_read = False
+        return value
 
     def write(self, offset, value, size):
         if offset == 0x0C:
@@ -165,12 +169,10 @@ class Spi(Registers):
         if not self.cr1 & SPE:
             self.board.record("ignored_write", register=self.name + "_DR", value=value)
             return
-        if self.tdr is not None:
+        if self.waiting:
             self.board.record("transmit_overwritten", spi=self.name)
-        self.tdr = value & 0xFF
-        self.sr = self.sr & ~TXE | BSY
-        if self.shift is None:
-            self._load()
+        self.waiting = [value & 0xFF]
+        self._go_on()
 
     def _write_cr1(self, value):
         value &= 0xFFFF
@@ -181,8 +183,7 @@ class Spi(Registers):
         if self.shift is not None and not value & SPE:
             self.board.record("disabled_in_transfer", spi=self.name)
             self.departure.cancel()
-            self.departure = self.shift = self.tdr = None
-            self.sr = self.sr & ~BSY | TXE
+            self.departure, self.shift, self.waiting = None, None, []
         if value & SPE and not self.cr1 & SPE:
             self.slow_noted = False
         self.cr1 = value

@@ -11,15 +11,12 @@ names the bank itself. Witnesses: ST's GetBank and SystemInit, which starts a ch
 and wolfBoot. No witness says what a power cut leaves of a change: here, either value of SWAP_BANK, and all others as they were.
 (Of other families ST's manuals say that mismatching option bytes may lock the part.) Left out: all other option bytes, high-cycle
 data, bank and mass erase, protection. Guessed: the times, since no data sheet (DS14258) was at hand.
-
-Settings: `swap_bank`, the option as a programmer writes it.
 """
 
 from ...violation import Violation
-from ..registers import Registers
+from ..flash_keys import KEYS, OPTION_KEYS, OPTLOCK, OPTSTRT, Keyed
 
 BASE, BANK, SECTOR, QUAD = 0x0800_0000, 1 << 20, 8 << 10, 16
-KEYS, OPTION_KEYS = (0x4567_0123, 0xCDEF_89AB), (0x0819_2A3B, 0x4C5D_6E7F)
 ACR, NSKEYR, OPTKEYR, OPSR, OPTCR, NSSR, NSCR, NSCCR, OPTSR_CUR, OPTSR_PRG, ECCDETR = (
     0x00, 0x04, 0x0C, 0x18, 0x1C, 0x20, 0x28, 0x30, 0x50, 0x54, 0x104)
 BSY, WBNE, EOP, PGSERR, STRBERR, INCERR = (1 << bit for bit in (0, 1, 16, 18, 19, 20))
@@ -28,39 +25,33 @@ LOCK, PG, SER, START, BKSEL = (1 << bit for bit in (0, 1, 2, 5, 31))
 #: All that NSCR keeps: PG, SER, SNB, BKSEL; the rest is not modelled.
 KEPT = PG | SER | 0x7F << 6 | BKSEL
 ECCD = SWAP_BANK = 1 << 31
-OPTLOCK, OPTSTRT = 1, 2
 #: OPSR.CODE_OP of a quad-word, a sector, and a change of option bytes.
 WRITING, ERASING, CHANGING = 1 << 29, 3 << 29, 6 << 29
 PROGRAM_PS, ERASE_PS, OPTIONS_PS = 100_000_000, 4_000_000_000, 10_000_000_000
 
 
-class Flash(Registers):
+class Flash(Keyed):
     """ACR, the keys, the status and control registers of non-secure code, and SWAP_BANK."""
 
-    name, base = "FLASH", 0x4002_2000
-    kept, settings = {ACR: (0x13, 0x13F)}, {"swap_bank"}
+    base, kept = 0x4002_2000, {ACR: (0x13, 0x13F)}
+    locks = {NSKEYR: ("control", LOCK, KEYS), OPTKEYR: ("option_lock", OPTLOCK, OPTION_KEYS)}
     readers = {NSCR: "control", ECCDETR: "detected", OPSR: "interrupted", OPTSR_PRG: "wanted"}
-    writers = {NSKEYR: "_key", NSCR: "_write_control", OPTKEYR: "_option_key", OPTCR: "_write_options", OPTSR_PRG: "_want"}
+    writers = {NSCR: "_write_control", OPTCR: "_write_options", OPTSR_PRG: "_want"}
     #: As on the STM32F405, bit 5 set: software starts the watchdog.
     options = 1 << 5
 
     def __init__(self, board):
         super().__init__(board)
         #: The operation: its end, address, new content (None: option bytes). The quad-words whose ECC does not fit.
-        self.busy = None
+        self.operation = None
         self.torn = set()
         #: SWAP_BANK, and whether the banks are swapped now.
         self.swap_bank = self.swapped = False
 
     def reset(self, cause):
-        super().reset(cause)
         self.interrupted = 0
-        if self.busy:
-            self.busy[0].cancel()
-            self._tear()
-        self.status, self.control, self.step, self.refused = 0, LOCK, 0, False
-        self.option_lock, self.option_step, self.option_refused = OPTLOCK, 0, False
-        self.detected = 0
+        super().reset(cause)
+        self.status, self.control, self.option_lock, self.detected = 0, LOCK, OPTLOCK, 0
         self.buffer, self.at = {}, 0
         if self.swap_bank != self.swapped:
             self.swapped = self.swap_bank
@@ -77,7 +68,7 @@ class Flash(Registers):
 
     def load(self, offset):
         if offset == NSSR:
-            return self.status | (BSY if self.busy else 0) | (WBNE if self.buffer else 0)
+            return self.status | (BSY if self.operation else 0) | (WBNE if self.buffer else 0)
         if offset == OPTSR_CUR:
             return SWAP_BANK if self.swap_bank else 0
         if offset == OPTCR:
@@ -94,25 +85,6 @@ class Flash(Registers):
         else:
             super().store(offset, value)
 
-    def _key(self, value):
-        """Unlocks NSCR by both keys in order; a wrong one locks it until a reset."""
-        if self.refused or not self.control & LOCK or value != KEYS[self.step]:
-            self.refused = self.refused or bool(self.control & LOCK)
-            self.board.record("ignored_write", register="FLASH_NSKEYR", value=value)
-            return
-        self.step = (self.step + 1) % 2
-        if not self.step:
-            self.control &= ~LOCK
-
-    def _option_key(self, value):
-        """Unlocks OPTCR and OPTSR_PRG, as NSKEYR does NSCR."""
-        if self.option_refused or not self.option_lock or value != OPTION_KEYS[self.option_step]:
-            self.option_refused = self.option_refused or bool(self.option_lock)
-            self.board.record("ignored_write", register="FLASH_OPTKEYR", value=value)
-            return
-        self.option_step = (self.option_step + 1) % 2
-        self.option_lock = OPTLOCK if self.option_step else 0
-
     def _want(self, value):
         if self.option_lock:
             self.board.record("ignored_write", register="FLASH_OPTSR_PRG", value=value)
@@ -122,18 +94,18 @@ class Flash(Registers):
             self.wanted = value
 
     def _write_options(self, value):
-        if self.option_lock or self.busy:
+        if self.option_lock or self.operation:
             self.board.record("ignored_write", register="FLASH_OPTCR", value=value)
             return
         if value & ~(OPTLOCK | OPTSTRT | SWAP_BANK):
             raise Violation(f"{self.name}: OPTCR {value:#x} asks for what is not modelled")
         if value & OPTSTRT:
             self.board.record("options", swap_bank=bool(self.wanted))
-            self.busy = self.board.schedule(OPTIONS_PS, self._end), None, bool(self.wanted)
+            self.operation = self.board.schedule(OPTIONS_PS, self._end), None, bool(self.wanted)
         self.option_lock = value & OPTLOCK
 
     def _write_control(self, value):
-        if self.control & LOCK or self.busy:
+        if self.control & LOCK or self.operation:
             self.board.record("ignored_write", register="FLASH_NSCR", value=value)
             return
         if value & ~(KEPT | LOCK | START):
@@ -157,7 +129,7 @@ class Flash(Registers):
         elif any(address + n in self.buffer for n in range(size)):
             self.status |= STRBERR
         else:
-            if self.busy:
+            if self.operation:
                 raise Violation(f"{self.name}: a store to the array during an operation is not modelled")
             self.at = quad
             self.buffer.update((address + n, value >> 8 * n & 0xFF) for n in range(size))
@@ -169,13 +141,13 @@ class Flash(Registers):
                 self._begin(quad, data, PROGRAM_PS)
 
     def _begin(self, address, data, duration):
-        self.busy = self.board.schedule(duration, self._end), address, data
+        self.operation = self.board.schedule(duration, self._end), address, data
         processor = getattr(self.board, "processor", None)
         if processor and (processor.get("pc") - BASE) // BANK == (address - BASE) // BANK:
             self.board.stall(self.board.now + duration)
 
     def _end(self):
-        (_, address, data), self.busy = self.busy, None
+        (_, address, data), self.operation = self.operation, None
         if address is None:
             self.swap_bank = data
             return
@@ -183,9 +155,10 @@ class Flash(Registers):
         self.torn.difference_update(range(address, address + len(data), QUAD))
         self.status |= EOP
 
-    def _tear(self):
+    def _interrupted(self):
         """Leaves the operation half done: each bit is the old or the new one."""
-        (_, address, data), self.busy = self.busy, None
+        (done, address, data), self.operation = self.operation, None
+        done.cancel()
         self.interrupted = CHANGING if address is None else WRITING if len(data) == QUAD else ERASING
         if address is None:
             self.swap_bank = self.board.memory.random.choice((self.swap_bank, data))
@@ -194,11 +167,6 @@ class Flash(Registers):
         old = self.board.memory_read(address, len(data))
         self.board.memory_write(address, bytes(a & n | b & ~n for a, b, n in zip(old, data, noise)))
         self.torn.update(range(address, address + len(data), QUAD))
-
-    def power_off(self):
-        """Leaves an operation half done."""
-        if self.busy:
-            self._tear()
 
     def _watch(self):
         """Watches the reads of the array from the first quad-word on whose ECC does not fit."""

@@ -7,7 +7,6 @@ transfers, LSB first, the NSS pin, slave mode, one-wire modes, CRC, suspension.
 
 from ...violation import Violation
 from ..registers import Registers, unmodelled
-from ..spi import PS
 from ..spi import Spi as F405
 
 SPE, CSTART, SSI = 1, 1 << 9, 1 << 12
@@ -18,24 +17,19 @@ BYTES, RATE = 0x0007_0007, 7 << 28
 MASTER, CPHA, CPOL, SSM, SSIOP = (1 << bit for bit in (22, 24, 25, 26, 28))
 #: Bits of CFG2 beside: SSOE and SSOM, which concern the NSS pin alone, and AFCNTR, by which the pins stay while SPE is 0.
 PIN, AFCNTR = 1 << 29 | 1 << 30, 1 << 31
-DEPTH = 16
 
 
 class Spi(F405):
     """SPI1."""
 
-    base = 0x4001_3000
+    base, depth = 0x4001_3000, 16
     sck, miso, mosi = (("A", 5),), (("G", 9),), (("B", 5),)
     readers, writers = {CR1: "control", SR: "status"}, {CR1: "_write_control", CFG1: "_write_config", CFG2: "_write_config_2"}
     kept = {CR2: (0, 0), IER: (0, 0), IFCR: (0, 0)}
 
     def _registers(self):
+        super()._registers()
         self.control, self.values[CFG1], self.values[CFG2] = 0, BYTES, 0
-        self.overrun = self.slow_noted = False
-        self._empty()
-
-    def _empty(self):
-        self.received, self.waiting, self.shift = [], [], None
 
     @property
     def bit_hz(self):
@@ -50,7 +44,7 @@ class Spi(F405):
     @property
     def status(self):
         """Returns SR."""
-        rx, tx = bool(self.received), len(self.waiting) < DEPTH
+        rx, tx = bool(self.received), len(self.waiting) < self.depth
         idle = not self.waiting and self.shift is None
         return (rx and RXP) | (tx and TXP) | (rx and tx and DXP) | (self.overrun and OVR) | (idle and TXC)
 
@@ -68,7 +62,7 @@ class Spi(F405):
             Registers.write(self, offset, value, size)
         elif size != 1:
             raise Violation(f"{self.name}: only bytes are modelled")
-        elif not self.control & SPE or len(self.waiting) == DEPTH:
+        elif not self.control & SPE or len(self.waiting) == self.depth:
             self.board.record("ignored_write", register=self.name + "_TXDR", value=value)
         else:
             self.waiting.append(value)
@@ -114,18 +108,5 @@ class Spi(F405):
             self.values[offset] = value
 
     def _go_on(self):
-        """Begins the next byte."""
-        if self.control & CSTART and self.shift is None and self.waiting:
-            self.shift = self.waiting.pop(0)
-            self.departure = self.board.schedule(8 * PS // self.bit_hz, self._finished)
-
-    def _finished(self):
-        self.departure = None
-        byte, self.shift = self.shift, None
-        value = self._exchange(byte)
-        if len(self.received) == DEPTH:
-            self.overrun = True
-            self.board.record("overrun", spi=self.name)
-        else:
-            self.received.append(value)
-        self._go_on()
+        if self.control & CSTART:
+            super()._go_on()
