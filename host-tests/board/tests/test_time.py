@@ -109,13 +109,6 @@ class Sleep(unittest.TestCase):
         program.run(10)
         self.assertEqual(program.get("r4"), 9)
 
-    def test_sleep_on_exit_returns_to_sleep(self):
-        program = Program(SLEEP, {SYSTICK: "7047"}, r4=0)
-        program.board.bus.write(0xE000_ED10, 2, 4)
-        start_systick(program, CORE_HZ // 1000 - 1)
-        program.board.run(10_500 * US)
-        self.assertEqual(program.get("r4"), 0)
-
     def test_a_stall_holds_the_core_and_lets_time_pass(self):
         program = Program(HERE)
         program.board.stall(1_000 * US)

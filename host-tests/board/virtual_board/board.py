@@ -8,7 +8,7 @@ while the core does nothing: asleep, stalled by the flash, locked up, or without
 from unicorn.unicorn_const import UC_MEM_FETCH as FETCH
 from unicorn.unicorn_const import UC_MEM_WRITE as WRITE
 
-from .bus import Bus, Fixed
+from .bus import Bus
 from .chips import STM32F405
 from .dwt import CoreDebug, Dwt
 from .events import EventQueue, Handle
@@ -66,7 +66,7 @@ class Board:
         self.dwt, self.debug = Dwt(self), CoreDebug(self)
         self.exceptions = Exceptions(self)
         self.paths = Paths(self)
-        for device in (Fixed(), self.systick, self.nvic, self.scb, self.debug, self.dwt):
+        for device in (self.systick, self.nvic, self.scb, self.debug, self.dwt):
             self.bus.attach_private(device)
         self.bus.private[0xE000EF00 >> 2] = self.nvic
         self.peripherals: dict = {}
@@ -191,11 +191,6 @@ class Board:
         self.locked_up = True
         pc = self.processor.get("pc")
         self.record("lockup", why=why, pc=pc, symbol=self.symbol_at(pc))
-        self.processor.end_slice()
-
-    def sleep_on_exit(self) -> None:
-        """Goes to sleep after the last handler, for SCR.SLEEPONEXIT."""
-        self.sleeping = True
         self.processor.end_slice()
 
     def fpu_switched(self) -> None:

@@ -7,25 +7,6 @@ and the bit-band aliases are not modelled: each such access is a violation.
 from .violation import Violation
 
 
-class Fixed:
-    """Registers of the core with fixed contents: ICTR (96 lines) and ACTLR."""
-
-    base, size = 0xE000E004, 8
-
-    def __init__(self):
-        self.actlr = 0
-
-    def read(self, offset: int, size: int) -> int:
-        """Reads a register."""
-        return self.actlr if offset >= 4 else 2
-
-    def write(self, offset: int, value: int, size: int) -> None:
-        """Writes ACTLR, whose bits only change timing."""
-        if offset < 4:
-            raise Violation("ICTR is read-only")
-        self.actlr = value
-
-
 class Bus:
     """Routes accesses to peripherals and to the core's own registers."""
 

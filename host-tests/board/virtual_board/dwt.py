@@ -58,12 +58,10 @@ class Dwt:
         raise Violation(f"DWT: {size}-byte read at offset 0x{offset:X} is not modelled")
 
     def write(self, offset: int, value: int, size: int) -> None:
-        """Writes CTRL (only CYCCNTENA) or CYCCNT."""
+        """Writes CTRL, only CYCCNTENA."""
         self.hold()
         if size == 4 and offset == 0 and not value & 0x0FFF_FFFE:
             self.control = value & CYCCNTENA
-        elif size == 4 and offset == 4:
-            self.count = value
         else:
             raise Violation(f"DWT: write of 0x{value:X} at offset 0x{offset:X} is not modelled")
 

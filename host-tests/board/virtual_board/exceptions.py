@@ -23,8 +23,6 @@ SPSEL, FPCA, SFPA = 2, 4, 8
 
 #: Unicorn's numbers for the exceptions that a program raises.
 UC_SVC, UC_BKPT, UC_EXCEPTION_RETURN, UC_NOCP, UC_INVSTATE = 2, 7, 8, 17, 18
-#: A bit of SCR.
-SLEEPONEXIT = 2
 #: PRIMASK, BASEPRI and FAULTMASK when they block nothing.
 UNMASKED = (0, 0, 0)
 FRAME = struct.Struct("<8I")
@@ -169,7 +167,7 @@ class Exceptions:
             nvic.pending |= bit
         if faultmask and leaving != NMI:
             board.processor.set("faultmask", 0)
-        if not known or (to_thread and others and not board.scb.ccr & 1) or (not to_thread and not others):
+        if not known or (to_thread and others) or (not to_thread and not others):
             self._return_fault(excret, f"EXC_RETURN 0x{excret:08X} does not fit the active exceptions")
             return
         frame = psp if excret & 4 else msp
@@ -194,8 +192,6 @@ class Exceptions:
         target = pc & ~1 | xpsr >> 24 & 1
         self.leave.write(xpsr, control, r0, r1, r2, r3, r12, lr, sp, xpsr & 0xF000_0000, target)
         board.spend(self.leaving)
-        if to_thread and board.scb.scr & SLEEPONEXIT:
-            board.sleep_on_exit()
 
     def _return_fault(self, excret: int, why: str, bit: int = INVPC) -> None:
         """Takes a fault of the return itself: the frame stays on the stack, and the handler's LR holds EXC_RETURN."""

@@ -1,7 +1,7 @@
 """The system control block (DDI0403 B3.2).
 
 What the model does not support is a violation: traps for unaligned access and division by zero, faults with handlers of their own
-(SHCSR), priority groups, the MPU, the FPU's control but CPACR, Stop mode.
+(SHCSR), priority groups, the MPU, the FPU's control but CPACR, sleep on exit, Stop mode.
 """
 
 import re
@@ -10,7 +10,7 @@ from .nvic import NMI, PENDSV, PRIORITY_MASK, SYSTICK
 from .violation import Violation
 
 VECTKEY, VECTKEYSTAT = 0x05FA, 0xFA05
-STKALIGN, BFHFNMIGN = 1 << 9, 1 << 8
+STKALIGN, SLEEPONEXIT = 1 << 9, 1 << 1
 SHPR = {4: 0x18, 5: 0x19, 6: 0x1A, 11: 0x1F, 14: 0x22, 15: 0x23}
 #: A coprocessor instruction of CP10 or CP11: 111x_11xx_xxxx_xxxx, then xxxx_101x.
 FPU_INSTRUCTION = re.compile(rb"[\x00-\xff][\xec-\xef\xfc-\xff][\x00-\xff][\x0a\x0b\x1a\x1b\x2a\x2b\x3a\x3b\x4a\x4b\x5a\x5b\x6a\x6b\x7a\x7b\x8a\x8b\x9a\x9b\xaa\xab\xba\xbb\xca\xcb\xda\xdb\xea\xeb\xfa\xfb]")
@@ -29,7 +29,6 @@ class Scb:
         """Sets the reset values."""
         self.vtor = self.board.chip.boot
         self.scr = 0
-        self.ccr = STKALIGN
         self.cfsr = 0
         self.hfsr = 0
         self.bfar = 0
@@ -67,7 +66,7 @@ class Scb:
             raise Violation(f"SCB: {size}-byte read at 0x{at:X} is not modelled")
         # No fault of the model sets MMFAR.
         simple = {
-            0xED00: self.board.chip.cpuid, 0xED08: self.vtor, 0xED0C: VECTKEYSTAT << 16, 0xED10: self.scr, 0xED14: self.ccr,
+            0xED00: self.board.chip.cpuid, 0xED08: self.vtor, 0xED0C: VECTKEYSTAT << 16, 0xED10: self.scr, 0xED14: STKALIGN,
             0xED2C: self.hfsr, 0xED34: 0, 0xED38: self.bfar, 0xED88: self.cpacr,
         }  # fmt: skip
         if at in simple:
@@ -96,11 +95,9 @@ class Scb:
         elif at == 0xED0C:
             self._write_aircr(value)
         elif at == 0xED10:
-            self.scr = value & 0x16
-        elif at == 0xED14:
-            if value & 0x18 or not value & STKALIGN:
-                raise Violation(f"CCR = 0x{value:X}: traps and 4-byte stack alignment are not modelled")
-            self.ccr = value & 0x31B
+            if value & SLEEPONEXIT:
+                raise Violation("SCR: sleep on exit is not modelled")
+            self.scr = value & 0x14
         elif at == 0xED88:
             self.cpacr = value & 0x00F0_0000
             self.board.fpu_switched()

@@ -52,7 +52,6 @@ class CanBus:
         self.acknowledge = self.connected = True
         self.short = None
         self.babble = None
-        self.keep_log = True
         self.log = []
         self.waiting, self.ready = [], []
         self.order = 0
@@ -228,8 +227,7 @@ class CanBus:
     def _note(self, start, frame, source, error):
         self.busy_ps += self.board.now - start
         self.frames += 1
-        if self.keep_log:
-            self.log.append(Logged(start, self.board.now, frame, source, error))
+        self.log.append(Logged(start, self.board.now, frame, source, error))
 
     # -- faults ------------------------------------------------------------------------------------------------------
 

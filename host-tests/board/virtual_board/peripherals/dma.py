@@ -3,12 +3,12 @@
 A request is served at once, or several at a time, before anything can observe them. CCM RAM is not on the DMA's bus: an access there
 is a transfer error (section 2.3.1). Reception is circular; a transmission ends the stream.
 Left out: interrupts, items wider than a byte, the FIFO (DMDIS = 1), bursts, double buffers, memory to memory, an incremented peripheral
-address, peripheral flow control, priorities.
+address, peripheral flow control, priorities, accesses to parts of registers.
 Assumed where the manual is silent: a stream that is enabled with old flags set starts anyway, and `dma_flags` is recorded.
 """
 
 from ..violation import Violation
-from .registers import ANY, Registers
+from .registers import Registers
 
 EN, TO_PERIPHERAL, CIRC, MINC = 1, 1 << 6, 1 << 8, 1 << 10
 #: Channel, priority, direction and mode: what a stream may ask for.
@@ -43,7 +43,7 @@ class Stream:
 class Dma(Registers):
     """DMA1 or DMA2 with eight streams."""
 
-    sizes, kept = ANY, {0x08: (0, 0), 0x0C: (0, 0)}
+    kept = {0x08: (0, 0), 0x0C: (0, 0)}
 
     def __init__(self, board, name, base):
         super().__init__(board)
@@ -150,9 +150,6 @@ class Dma(Registers):
             stream = self.streams[(offset - 0x10) // 0x18]
             return (stream.cr, stream.left, stream.par, stream.m0ar, 0, 0x21)[(offset - 0x10) % 0x18 // 4]
         return super().load(offset)
-
-    def under(self, offset):
-        return self.load(offset)
 
     def store(self, offset, value):
         self._catch_up()

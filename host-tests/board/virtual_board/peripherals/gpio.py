@@ -59,10 +59,6 @@ class Gpio(Registers):
         """Returns OSPEEDR: 0 low (2 MHz), 1 medium (25 MHz), 2 high (50 MHz), 3 very high (100 MHz)."""
         return self.values[OSPEEDR] >> 2 * pin & 3
 
-    def level(self, pin):
-        """Returns the pin's level as seen from outside."""
-        return bool(self._levels() >> pin & 1)
-
     def listen(self, pin, callback):
         """Registers `callback(level)` for changes of the pin's level."""
         self.listeners.setdefault(pin, []).append(callback)

@@ -1,7 +1,7 @@
 """Motion, temperature and noise that an inertial sensor measures, and its settings for them.
 
 `rates_dps`, `acceleration_g` ([x, y, z]), `temperature_c`, `tones` ([[axis, hz, dps], ...]), `motion` ([[time_us, rates, acceleration],
-...], interpolated), `samples` ([[rates, acceleration], ...], one per output, without noise), `noise` (a factor, 0 for none),
+...], interpolated), `noise` (a factor, 0 for none),
 `stopped` (True: the part answers and measures nothing until its next reset).
 """
 
@@ -11,7 +11,7 @@ from random import Random
 
 PS, US = 1_000_000_000_000, 1_000_000
 NAMES = {"noise": "noise", "rates_dps": "rates", "acceleration_g": "acceleration", "temperature_c": "temperature",
-         "tones": "tones", "motion": "table", "samples": "samples", "stopped": "stopped"}
+         "tones": "tones", "motion": "table", "stopped": "stopped"}
 
 
 class Motion:
@@ -19,7 +19,7 @@ class Motion:
 
     def __init__(self, seed):
         self.rates, self.acceleration, self.temperature = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 25.0
-        self.tones, self.table, self.samples = [], [], []
+        self.tones, self.table = [], []
         self.noise, self.random, self.stopped = 1.0, Random(seed), False
 
     def configure(self, key, value):
@@ -30,9 +30,6 @@ class Motion:
 
     def truth(self, at):
         """Returns rates in degrees per second and acceleration in g at a board time."""
-        if self.samples:
-            rates, acceleration = self.samples[0] if len(self.samples) == 1 else self.samples.pop(0)
-            return list(rates), list(acceleration)
         if self.table:
             return _interpolated(self.table, at / US)
         return list(self.rates), list(self.acceleration)
@@ -44,7 +41,7 @@ class Motion:
 
     def noisy(self, values, density, bandwidth_hz):
         """Returns the values with white noise of this density within a bandwidth."""
-        if not self.noise or self.samples:
+        if not self.noise:
             return values
         sigma = self.noise * density * bandwidth_hz ** 0.5
         return [value + self.random.gauss(0, sigma) for value in values]

@@ -1,8 +1,7 @@
 """Power control (RM0090 section 5) with the supply that the test sets: voltage detector, brown-out and power-on reset.
 
 Thresholds are those of DS8626 table 19 (embedded reset and power control block); typical ones count.
-Left out: Stop and Standby, the backup domain and its regulator, and the time that the voltage detector needs to start (the manual gives none).
-VOSRDY is set 50 us after the regulator's scale was changed; the manual gives no time.
+Left out: Stop and Standby, scale 2, the backup domain and its regulator, and the time that the voltage detector needs to start.
 
 Settings: `supply_mv`.
 """
@@ -16,7 +15,6 @@ BOR = {2: (2190, 2290), 1: (2500, 2590), 0: (2830, 2920)}
 POWER_ON = (1680, 1720)
 #: TRSTTEMPO, the time from a sufficient supply to the start.
 RESET_TIME_PS = 1_500_000_000
-REGULATOR_PS = 50_000_000
 UNTIL_THE_SUPPLY_RETURNS = 10**21
 
 PVDE, PLS, VOS = 1 << 4, 7 << 5, 1 << 14
@@ -34,16 +32,10 @@ class Pwr(Registers):
         self.supply_mv = 3300
         self.held = None
         self.release = None
-        self.cr, self.low, self.scale_from = VOS, False, 0
-
-    @property
-    def scale_1(self):
-        """Returns whether the regulator has scale 1, which allows 168 MHz; scale 2 allows only 144 MHz (section 5.1.3)."""
-        return bool(self.cr & VOS)
+        self.cr, self.low = VOS, False
 
     def reset(self, cause):
         self.cr = VOS
-        self.scale_from = self.board.now
         self._detect()
         if self.held:
             self.board.stall(self.board.now + UNTIL_THE_SUPPLY_RETURNS)
@@ -54,18 +46,14 @@ class Pwr(Registers):
 
     def load(self, offset):
         if offset == 4:
-            settled = self.board.now - self.scale_from >= REGULATOR_PS
-            return (PVDO if self.low else 0) | (VOSRDY if settled else 0)
+            return VOSRDY | (PVDO if self.low else 0)
         return super().load(offset)
 
     def store(self, offset, value):
-        if offset or value & ~(PVDE | PLS | VOS):
+        if offset or value & ~(PVDE | PLS) != VOS:
             raise unmodelled(self, offset, f"write of {value:#x}")
-        if (value ^ self.cr) & VOS:
-            self.scale_from = self.board.now
         self.cr = value
         self._detect()
-        self.board.rcc.check_limits()
 
     def _detect(self):
         """Updates PVDO by comparing the supply with the selected level, with hysteresis, and drives EXTI line 16 (section 5.2.3)."""

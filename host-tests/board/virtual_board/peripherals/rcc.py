@@ -4,7 +4,7 @@ Every frequency of the board follows from these registers and from the environme
 of the HSI oscillator and the frequency of the LSI. Times are those of DS8626 (tables 33 to 43).
 
 Left out: the I2S PLL, spread spectrum, HSI trimming, the clock outputs MCO1 and MCO2, gates in Sleep mode, interrupts of oscillators,
-the backup domain and its LSE crystal.
+the backup domain and its LSE crystal, switching the HSI off, accesses to parts of registers.
 Assumed where the manual is silent: without CSS a core that runs from a dead crystal stops until a reset; a system clock changes 0.2 us after its source is ready.
 
 Settings: `hsi_error_percent`, `crystal_hz` (None: no crystal), `crystal_stop` (True stops the crystal; False lets it start again,
@@ -13,7 +13,7 @@ though a core that it stopped stays stopped until a reset), `lsi_hz`.
 
 from ..violation import Violation
 from .clock_names import ENABLE, RESET, RESET_VALUES
-from .registers import ANY, Registers
+from .registers import Registers
 
 PS = 1_000_000_000_000
 HSI_NOMINAL = 16_000_000
@@ -37,7 +37,7 @@ OSCILLATOR_SWITCH_PS = 200_000
 class Rcc(Registers):
     """The clock tree of section 7.2 with its gates and flags."""
 
-    name, base, sizes = "RCC", 0x4002_3800, ANY
+    name, base = "RCC", 0x4002_3800
     kept = {offset: (value, 0xFFFF_FFFF) for offset, value in RESET_VALUES.items()}
     readers = {0x00: "cr", 0x04: "pllcfgr", 0x08: "clock_configuration", 0x0C: "cir", 0x74: "control_status"}
     writers = {0x00: "_write_cr", 0x04: "_write_pllcfgr", 0x08: "_write_cfgr", 0x0C: "_write_cir", 0x74: "_write_csr"}
@@ -163,9 +163,8 @@ class Rcc(Registers):
 
     def check_limits(self):
         """Checks the clocks against DS8626 table 14 and the flash latency against RM0090 table 10 (2.7 to 3.6 V)."""
-        flash, power = self.board.peripherals.get("FLASH"), self.board.peripherals.get("PWR")
-        top = 168_000_000 if power is None or power.scale_1 else 144_000_000
-        for name, most in (("HCLK", top), ("PCLK1", 42_000_000), ("PCLK2", 84_000_000)):
+        flash = self.board.peripherals.get("FLASH")
+        for name, most in (("HCLK", 168_000_000), ("PCLK1", 42_000_000), ("PCLK2", 84_000_000)):
             if self.nominal[name] > most:
                 raise Violation(f"RCC: {name} at {self.nominal[name]} Hz is above {most} Hz")
         if flash is not None and self.nominal["HCLK"] > 30_000_000 * (flash.latency + 1):
@@ -189,12 +188,6 @@ class Rcc(Registers):
         handle = self.pending.pop(key, None)
         if handle:
             handle.cancel()
-
-    def _hsi_ready(self):
-        self.pending.pop("hsi", None)
-        self.cr |= HSIRDY
-        self._start_pll()
-        self._try_switch()
 
     def _start_hse(self):
         if self.cr & HSEON and self.crystal_hz and not self.crystal_stopped and not self.cr & HSERDY:
@@ -258,7 +251,6 @@ class Rcc(Registers):
         used = self._uses("HSE")
         self.cr &= ~HSEON
         if used:
-            self.cr |= HSION | HSIRDY
             if self.source == "PLL":
                 self.cr &= ~(PLLON | PLLRDY)
             self.cfgr &= ~3
@@ -280,9 +272,6 @@ class Rcc(Registers):
         """Returns CSR with the reset flags."""
         return self.csr | self.flags
 
-    def under(self, offset):
-        return 0 if offset == 0x0C else self.load(offset)
-
     def store(self, offset, value):
         if offset in self.kept:
             self._write_gate(offset, value)
@@ -290,19 +279,14 @@ class Rcc(Registers):
             super().store(offset, value)
 
     def _write_cr(self, value):
-        if value & ~0x030B_00FB or value & 0xF8 != 0x80:
-            raise Violation(f"RCC: CR {value:#x}: trimming, a clock instead of the crystal and the I2S PLL are not modelled")
+        if value & ~0x030B_00FB or value & 0xF9 != 0x81:
+            raise Violation(f"RCC: CR {value:#x}: trimming, no HSI, a clock instead of the crystal and the I2S PLL are not modelled")
         old = self.cr
         new = old & (HSIRDY | HSERDY | PLLRDY) | value & (0xF8 | HSION | HSEON | CSSON | PLLON)
-        if self._uses("HSI"):
-            new |= HSION
         if self._uses("HSE"):
             new |= old & HSEON
         if self.source == "PLL":
             new |= old & PLLON
-        if not new & HSION:
-            self._drop("hsi")
-            new &= ~HSIRDY
         if not new & HSEON:
             self._drop("hse")
             new &= ~HSERDY
@@ -310,8 +294,6 @@ class Rcc(Registers):
             self._drop("pll")
             new &= ~PLLRDY
         self.cr = new
-        if new & HSION and not old & HSION:
-            self._later("hsi", 2_200_000, self._hsi_ready)
         if new & HSEON and not old & HSEON:
             self._start_hse()
         if new & PLLON and not old & PLLON:

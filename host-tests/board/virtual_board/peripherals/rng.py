@@ -1,6 +1,6 @@
 """Random number generator (RM0090 section 24): a number of 32 bits every 40 periods of the 48 MHz clock of the PLL.
 
-Settings: `seed` of the noise, `seed_error` (the noise is a constant: SECS), `stuck` (a number that is repeated forever, or
+Settings: `seed_error` (the noise is a constant: SECS), `stuck` (a number that is repeated forever, or
 None), `clock_error` (its clock has failed: CECS). The noise continues through resets, as that of an analogue source does.
 """
 
@@ -93,9 +93,3 @@ class Rng(Registers):
             super().store(offset, value)
         self._start()
         self._interrupt()
-
-    def configure(self, key, value):
-        if key == "seed":
-            self.random = Random(value)
-        else:
-            super().configure(key, value)
