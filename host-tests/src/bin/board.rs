@@ -39,7 +39,8 @@ Examples, in another terminal:
   gyronet device --port localhost:4006 info
   cantools monitor -i slcan -c socket://localhost:4002 -b 500000 tools/gyronet.dbc")]
 struct Args {
-    /// Drive that the vehicle drives; without it one is simulated, with a GNSS receiver.
+    /// Drive that the vehicle drives; without it one is simulated, with a GNSS receiver whose NMEA 2000 frames the board
+    /// takes once it is told to: `cargo gyronet device --port localhost:4006 set heading.nmea2000=true`, then `restart`.
     #[arg(value_name = "DRIVE.csv")]
     drive: Option<PathBuf>,
     /// Let the vehicle stand: the first three and a half seconds again and again.

@@ -32,7 +32,7 @@ Examples:
   gyronet device --port /dev/ttyUSB1 info
   gyronet device --port can:can0 set latitude_deg=48.1 mounting.roll_deg=1.5
   gyronet device --port /dev/ttyUSB1 calibrate unit --file unit.json
-  gyronet device --port localhost:4000 weights gyronet.blob      # then: restart")]
+  gyronet device --port localhost:4006 weights gyronet.blob      # then: restart")]
 pub struct Args {
     /// Serial port or host:port of an SLCAN line, or can:INTERFACE for a CAN interface of Linux; required.
     #[arg(long, global = true, value_name = "PORT|HOST:PORT|can:INTERFACE")]
