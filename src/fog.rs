@@ -70,7 +70,7 @@ impl FogConfig {
         errors: FogErrors::DSP1760,
         latitude: None,
         tilt: Tilt::NONE,
-        shake: [6e-5, 1.5e-4],
+        shake: [6e-5, 1.56e-4],
         clock_ratio: None,
         max_correction: Angle((0.02 * Angle::PER_RAD as f64) as i64),
     };

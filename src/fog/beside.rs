@@ -25,8 +25,8 @@ const STREET_SHARE: f32 = 0.00046;
 const UNKNOWN_SHARE: f32 = 0.02;
 /// Gain of an inertial gyro, 1 sigma: the difference that says nothing about the other one.
 const INERTIAL_GAIN: f32 = 0.003;
-/// Share of the roll and pitch rates, rad: a mount of 0.35 deg.
-const MOUNT: f32 = 0.006;
+/// Share of the roll and pitch rates, rad: a mount of 0.3 deg.
+const MOUNT: f32 = 0.005;
 /// Share of the rate that a mount by eye takes off, 1 sigma, which an inertial gyro of such a gain hides: of 3.4 deg.
 const ASKEW: f32 = 0.0018;
 /// Steps of a block, and blocks of a second.
