@@ -30,9 +30,9 @@ pub const PACKAGES: &[&str] = &["unicorn"];
 
 /// Returns the ELF file of an image for a board, named by its feature. The test is reported as skipped if the model
 /// cannot run (then nothing is built) or the image cannot be built.
-pub fn firmware(board: &str, test: &str, scratch: &str, name: &str) -> Option<PathBuf> {
-    require::python(test, PACKAGES)?;
-    image::firmware_for((board, bench::TARGET), test, scratch, name)
+pub fn firmware(board: &str, scratch: &str, name: &str) -> Option<PathBuf> {
+    require::python(PACKAGES)?;
+    image::firmware_for((board, bench::TARGET), scratch, name)
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -60,19 +60,19 @@ pub struct Board {
 impl Board {
     /// Returns a board without power, with the image in its flash. Reports the test as skipped if the model's
     /// packages are missing.
-    pub fn unpowered(test: &str, image: &Path) -> Option<Self> {
-        Self::of("stm32f405", test, image)
+    pub fn unpowered(image: &Path) -> Option<Self> {
+        Self::of("stm32f405", image)
     }
 
     /// Returns a board with this chip, otherwise as [`Board::unpowered`] does.
-    pub fn of(chip: &str, test: &str, image: &Path) -> Option<Self> {
-        let python = require::python(test, PACKAGES)?;
+    pub fn of(chip: &str, image: &Path) -> Option<Self> {
+        let python = require::python(PACKAGES)?;
         Some(Self { link: Link::open(&python, image, chip) })
     }
 
     /// Returns a board that has just been switched on.
-    pub fn boot(test: &str, image: &Path) -> Option<Self> {
-        let mut board = Self::unpowered(test, image)?;
+    pub fn boot(image: &Path) -> Option<Self> {
+        let mut board = Self::unpowered(image)?;
         board.power_on();
         Some(board)
     }

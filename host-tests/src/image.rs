@@ -15,13 +15,13 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 ///
 /// Each image is built once in a process, under `scratch` (a test's `env!("CARGO_TARGET_TMPDIR")`): the
 /// build folder of `cargo test` itself may be locked.
-pub fn firmware(test: &str, scratch: &str, image: &str) -> Option<PathBuf> {
-    firmware_for(("netduino-plus-2", bench::TARGET), test, scratch, image)
+pub fn firmware(scratch: &str, image: &str) -> Option<PathBuf> {
+    firmware_for(("netduino-plus-2", bench::TARGET), scratch, image)
 }
 
 /// Returns an update of the Netduino Plus 2 to what is in this checkout.
-pub fn update(test: &str, scratch: &str) -> Option<Update> {
-    require::wants(test, Need::Qemu, bench::target_installed(bench::TARGET))?;
+pub fn update(scratch: &str) -> Option<Update> {
+    require::wants(Need::Qemu, bench::target_installed(bench::TARGET))?;
     static BUILT: OnceLock<Update> = OnceLock::new();
     let build = || {
         let linked = Linked::build("netduino-plus-2", 2, &Path::new(scratch).join("images"));
@@ -31,13 +31,8 @@ pub fn update(test: &str, scratch: &str) -> Option<Update> {
 }
 
 /// Returns the ELF file of an image for another board, named by its feature, and its target.
-pub fn firmware_for(
-    (board, target): (&str, &str),
-    test: &str,
-    scratch: &str,
-    image: &str,
-) -> Option<PathBuf> {
-    require::wants(test, Need::Qemu, bench::target_installed(target))?;
+pub fn firmware_for((board, target): (&str, &str), scratch: &str, image: &str) -> Option<PathBuf> {
+    require::wants(Need::Qemu, bench::target_installed(target))?;
     // Images of different levels of optimisation share little: those to flash and the others are built side by side.
     static BUILT: [Mutex<BTreeMap<String, PathBuf>>; 2] = [const { Mutex::new(BTreeMap::new()) }; 2];
     let kind = usize::from(!bench::FLASHED.contains(&image));

@@ -19,17 +19,17 @@ pub fn folder() -> PathBuf {
 }
 
 /// Returns the file of one drive of `wid_car`; without it reports that the test is skipped.
-pub fn trial(test: &str, number: u32) -> Option<PathBuf> {
+pub fn trial(number: u32) -> Option<PathBuf> {
     let path = folder().join(format!("wid_car/trial{number:02}_100hz.csv"));
     let found = if path.is_file() {
         Ok(path)
     } else {
         Err(format!("no recording {} ({VARIABLE} names another folder)", path.display()))
     };
-    require::wants(test, Need::Data, found)
+    require::wants(Need::Data, found)
 }
 
 /// Returns the files of these drives; where one is missing, reports that the test is skipped.
-pub fn trials(test: &str, numbers: &[u32]) -> Option<Vec<PathBuf>> {
-    numbers.iter().map(|number| trial(test, *number)).collect()
+pub fn trials(numbers: &[u32]) -> Option<Vec<PathBuf>> {
+    numbers.iter().map(|number| trial(*number)).collect()
 }

@@ -64,9 +64,14 @@ impl Required {
     }
 }
 
-/// Reports that a test is skipped on this machine, whatever is required.
-pub fn skipped(test: &str, why: &str) {
-    say(test, why, &mut std::io::stderr());
+/// Reports that this test is skipped on this machine, whatever is required.
+pub fn skipped(why: &str) {
+    say(&running(), why, &mut std::io::stderr());
+}
+
+/// The name of the test that runs: the test harness gives its thread this name.
+fn running() -> String {
+    std::thread::current().name().unwrap_or("a test").to_owned()
 }
 
 fn say(test: &str, why: &str, out: &mut impl Write) {
@@ -74,14 +79,14 @@ fn say(test: &str, why: &str, out: &mut impl Write) {
     let _ = out.write_all(format!("SKIPPED {test}: {why}\n").as_bytes());
 }
 
-/// Returns what was found, or reports on standard error that the test is skipped.
-pub fn wants<T>(test: &str, need: Need, found: Result<T, String>) -> Option<T> {
-    Required::from_env().wants(test, need, found, &mut std::io::stderr())
+/// Returns what was found, or reports on standard error that this test is skipped.
+pub fn wants<T>(need: Need, found: Result<T, String>) -> Option<T> {
+    Required::from_env().wants(&running(), need, found, &mut std::io::stderr())
 }
 
 /// Returns the Python with these packages: `GYRONET_PYTHON`, or `python3`.
-pub fn python(test: &str, packages: &[&str]) -> Option<String> {
-    wants(test, Need::Python, python_with(packages))
+pub fn python(packages: &[&str]) -> Option<String> {
+    wants(Need::Python, python_with(packages))
 }
 
 /// Returns that Python, or why there is none.

@@ -91,11 +91,11 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
             eprintln!("{NAME}: builds the firmware, which takes a minute or more");
             let folder = std::env::current_exe()?.with_file_name("board-image");
             std::fs::create_dir_all(&folder)?;
-            let elf = board::firmware("netduino-plus-2", NAME, &folder.display().to_string(), "coprocessor");
+            let elf = board::firmware("netduino-plus-2", &folder.display().to_string(), "coprocessor");
             elf.ok_or("the firmware cannot be built: see above")?
         }
     };
-    let mut board = Board::unpowered(NAME, &elf).ok_or("the model of the board cannot run: see above")?;
+    let mut board = Board::unpowered(&elf).ok_or("the model of the board cannot run: see above")?;
     board.configure("USART2.baud", 921_600);
     board.configure("RCC.crystal_hz", args.crystal_hz);
     board.power_on();

@@ -10,8 +10,8 @@ use gyronet_tools::client::device::error::DeviceError;
 use gyronet_tools::signing::PrivateKey;
 use std::time::Duration;
 
-fn locked(test: &str) -> Option<(Board, PrivateKey)> {
-    let mut board = common::boot(test)?;
+fn locked() -> Option<(Board, PrivateKey)> {
+    let mut board = common::boot()?;
     board.run(START);
     let key = PrivateKey::generate().expect("random numbers");
     assert_eq!(on_bus(&mut board).access().expect("a response").state, "open");
@@ -51,8 +51,7 @@ pub fn fail_with_the_generator(board: &mut Board) {
 /// A response to a challenge: the generator's numbers differ from board start to board start.
 #[test]
 fn challenges_never_repeat_and_fail_with_the_generator() {
-    const TEST: &str = "challenges_never_repeat_and_fail_with_the_generator";
-    let Some((mut board, key)) = locked(TEST) else { return };
+    let Some((mut board, key)) = locked() else { return };
     on_bus(&mut board).ask(&[0x11, 1]).expect("this session has stored the key");
     board.run(START);
     let mut seen = Vec::new();
@@ -72,8 +71,7 @@ fn challenges_never_repeat_and_fail_with_the_generator() {
 
 #[test]
 fn a_signature_is_checked_while_the_rates_go_out() {
-    const TEST: &str = "a_signature_is_checked_while_the_rates_go_out";
-    let Some((mut board, key)) = locked(TEST) else { return };
+    let Some((mut board, key)) = locked() else { return };
     let configuration = Configuration { latitude_deg: Some(48.0), ..Configuration::DEFAULT };
     // Standing for long enough.
     let now = board.counts().time;
@@ -96,7 +94,7 @@ fn a_signature_is_checked_while_the_rates_go_out() {
         frames.filter(|(_, frame)| frame.id() == id(0x1A0)).map(|(time, _)| time).collect();
     let gap = rates.windows(2).map(|pair| pair[1] - pair[0]).max().expect("rates");
     println!(
-        "{TEST}: two signatures are checked and stored in {took:?} of board time; longest gap between rates {gap:?}"
+        "two signatures are checked and stored in {took:?} of board time; longest gap between rates {gap:?}"
     );
     assert!(took < Duration::from_secs(1), "{took:?}");
     assert!(gap < Duration::from_millis(15), "{gap:?}");

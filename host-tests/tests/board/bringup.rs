@@ -10,14 +10,14 @@ const SECOND: Duration = Duration::from_secs(1);
 const SPARE: u32 = FLASH_BASE + SLOTS.start + SLOT_SIZE as u32;
 
 /// Runs the Netduino's image to its end and gives its lines.
-fn lines(test: &str, prepare: impl FnOnce(&mut Board)) -> Option<(Board, Vec<String>)> {
-    lines_of("netduino-plus-2", test, prepare)
+fn lines(prepare: impl FnOnce(&mut Board)) -> Option<(Board, Vec<String>)> {
+    lines_of("netduino-plus-2", prepare)
 }
 
 /// Runs a board's image to its end and gives its lines.
-fn lines_of(feature: &str, test: &str, prepare: impl FnOnce(&mut Board)) -> Option<(Board, Vec<String>)> {
-    let elf = board::firmware(feature, test, env!("CARGO_TARGET_TMPDIR"), "bringup")?;
-    let mut board = Board::unpowered(test, &elf)?;
+fn lines_of(feature: &str, prepare: impl FnOnce(&mut Board)) -> Option<(Board, Vec<String>)> {
+    let elf = board::firmware(feature, env!("CARGO_TARGET_TMPDIR"), "bringup")?;
+    let mut board = Board::unpowered(&elf)?;
     board.configure("USART2.baud", 921_600);
     board.configure("USART3.baud", 921_600);
     prepare(&mut board);
@@ -44,7 +44,7 @@ fn check<'l>(lines: &'l [String], name: &str) -> (&'l str, &'l str) {
 
 #[test]
 fn board_in_order() {
-    let Some((mut board, lines)) = lines("board_in_order", |_| ()) else { return };
+    let Some((mut board, lines)) = lines(|_| ()) else { return };
     assert!(
         lines[0].starts_with("gyronet bringup") && lines[0].ends_with("started by power on"),
         "{}",
@@ -92,7 +92,7 @@ fn crystal_that_is_not_the_board_s() {
         board.configure("RCC.crystal_hz", 16_000_000);
         board.configure("SPI1.part", "Bmi088");
     };
-    let Some((_, lines)) = lines("crystal_that_is_not_the_board_s", wrong) else { return };
+    let Some((_, lines)) = lines(wrong) else { return };
     assert_eq!(check(&lines, "SPI1"), ("PASS", "a BMI088 answers"));
     assert_eq!(check(&lines, "clock"), ("FAIL", "16 MHz: the crystal has 16.000 MHz"));
     assert_eq!(check(&lines, "CAN"), ("FAIL", "the clock is not exact enough"));
@@ -105,7 +105,7 @@ fn olimex_board_in_order() {
         board.configure("RCC.crystal_hz", 8_000_000);
         board.configure("SPI1.part", "Asm330lhh");
     };
-    let Some((_, lines)) = lines_of("olimex-stm32-h405", "olimex_board_in_order", crystal) else { return };
+    let Some((_, lines)) = lines_of("olimex-stm32-h405", crystal) else { return };
     assert_eq!(check(&lines, "SPI1"), ("PASS", "an ASM330LHH answers"));
     assert!(lines[0].contains("Olimex STM32-H405"), "{}", lines[0]);
     assert_eq!(
@@ -121,7 +121,7 @@ fn sensor_missing_and_sector_in_use() {
         board.configure("SPI1.fitted", false);
         board.patch(At::Address(SPARE), b"weights");
     };
-    let Some((_, lines)) = lines("sensor_missing_and_sector_in_use", prepare) else { return };
+    let Some((_, lines)) = lines(prepare) else { return };
     let (verdict, text) = check(&lines, "SPI1");
     assert!(verdict == "----" && text.starts_with("no sensor answers"), "{verdict} {text}");
     assert_eq!(check(&lines, "flash"), ("----", "sector 11 holds a weight file: not tried"));
@@ -129,14 +129,13 @@ fn sensor_missing_and_sector_in_use() {
 
 #[test]
 fn panic_leaves_its_reason_on_the_line_and_starts_again() {
-    const TEST: &str = "panic_leaves_its_reason_on_the_line_and_starts_again";
     /// A place in memory that the image does not use, for the panic's location: file, its length, line, column.
     const LOCATION: u32 = 0x1000_0000;
     const FILE: &[u8] = b"src/provoked.rs";
-    let Some(elf) = board::firmware("netduino-plus-2", TEST, env!("CARGO_TARGET_TMPDIR"), "bringup") else {
+    let Some(elf) = board::firmware("netduino-plus-2", env!("CARGO_TARGET_TMPDIR"), "bringup") else {
         return;
     };
-    let Some(mut board) = Board::boot(TEST, &elf) else { return };
+    let Some(mut board) = Board::boot(&elf) else { return };
     board.run(Duration::from_millis(300));
     let _ = (board.sent(REPORT), board.events());
     let location = [LOCATION + 16, FILE.len() as u32, 42, 7].map(u32::to_le_bytes).concat();

@@ -59,11 +59,10 @@ fn drive(board: &mut Board, seconds: usize) {
 /// The whole image while the vehicle drives, with the default model: interrupts, pipeline, network, both lines and idle.
 #[test]
 fn a_moving_vehicle_costs_what_the_page_says() {
-    const TEST: &str = "a_moving_vehicle_costs_what_the_page_says";
     const CYCLES: u64 = 41_000;
     /// Samples before the count and in it: the simulated car drives off after six seconds.
     const SAMPLES: [usize; 2] = [1_200, 300];
-    let Some(mut board) = common::boot(TEST) else { return };
+    let Some(mut board) = common::boot() else { return };
     board.run(START);
     let drive = bundled::simulated_drive().expect("it comes with the tools");
     let mut wheels = WheelFrames::new(&drive).expect("it has wheels");
@@ -81,7 +80,7 @@ fn a_moving_vehicle_costs_what_the_page_says() {
     let [cycles, instructions] =
         [awake.as_secs_f64() * 168e6, (after.instructions - before.instructions) as f64]
             .map(|of_all| (of_all / SAMPLES[1] as f64) as u64);
-    println!("{TEST}: {instructions} instructions a sample, {cycles} cycles awake");
+    println!("{instructions} instructions a sample, {cycles} cycles awake");
     assert!(cycles <= CYCLES, "{cycles}");
     let page = include_str!("../../../tools/MEASUREMENTS.md");
     assert!(page.contains("takes 41,000 cycles a sample"), "the page says another number");
@@ -90,9 +89,8 @@ fn a_moving_vehicle_costs_what_the_page_says() {
 /// With and without the crystal, signed writes, an upload and windows run, and the watchdog resets nothing.
 #[test]
 fn longest_paths_at_both_clocks() {
-    const TEST: &str = "longest_paths_at_both_clocks";
     for (slow, hz) in [(0, 168e6), (1, 16e6)] {
-        let Some(mut board) = common::unpowered(TEST) else { return };
+        let Some(mut board) = common::unpowered() else { return };
         Stored::default().weights(Slot::B, &weights::GYRONET.0).write_to(&mut board);
         board.configure("RCC.lsi_hz", 47_000); // The fastest watchdog.
         board.power_on();
@@ -134,7 +132,7 @@ fn longest_paths_at_both_clocks() {
         drive(&mut board, 6);
         let of_a_sample = (board.counts().instructions - before) as f64 / 600.0;
         let paths = board.paths();
-        println!("{TEST}: {:.0} MHz, {CLOCKS} clocks an instruction, {of_a_sample:.0} a sample", hz / 1e6);
+        println!("{:.0} MHz, {CLOCKS} clocks an instruction, {of_a_sample:.0} a sample", hz / 1e6);
         for (name, instructions) in &paths {
             let time = *instructions as f64 * CLOCKS / hz;
             println!("  {name:10} {instructions:>10} instructions {:>9.3} ms", 1e3 * time);
@@ -149,8 +147,7 @@ fn longest_paths_at_both_clocks() {
 /// Weights that cannot run are forced upon the board: it ends with the built-in configuration, and answers.
 #[test]
 fn three_resets_by_the_watchdog_lead_to_the_built_in_configuration() {
-    const TEST: &str = "three_resets_by_the_watchdog_lead_to_the_built_in_configuration";
-    let Some(mut board) = common::unpowered(TEST) else { return };
+    let Some(mut board) = common::unpowered() else { return };
     let mut configuration = Configuration::DEFAULT;
     configuration.compensate.stride = Stride::new(1).expect("one sample");
     Stored::default().record(&configuration).weights(Slot::A, &other_weights(1)).write_to(&mut board);
@@ -180,7 +177,6 @@ fn three_resets_by_the_watchdog_lead_to_the_built_in_configuration() {
 /// What the check accepts runs, the costliest first; what it refuses for its cost, forced upon the board, does not.
 #[test]
 fn accepted_settings_run_and_refused_ones_do_not() {
-    const TEST: &str = "accepted_settings_run_and_refused_ones_do_not";
     let numbers = std::env::var("GYRONET_SETTINGS").unwrap_or_else(|_| "2,1,4,6".to_owned());
     let numbers: Vec<usize> = numbers.split(',').flat_map(str::parse).collect();
     let [accepted, costliest, refused, seconds] = numbers[..] else { panic!("four numbers") };
@@ -215,7 +211,7 @@ fn accepted_settings_run_and_refused_ones_do_not() {
         runs.iter().copied().chain(over.iter().take(refused)).enumerate()
     {
         let is_forced = number >= runs.len();
-        let Some(mut board) = common::unpowered(TEST) else { return };
+        let Some(mut board) = common::unpowered() else { return };
         let stored = Stored::default().record(configuration);
         let stored = if shape.units > 4 { stored.weights(Slot::A, &weights::GYRONET.0) } else { stored };
         stored.write_to(&mut board);
@@ -234,15 +230,12 @@ fn accepted_settings_run_and_refused_ones_do_not() {
             device.and_then(|mut device| device.counters()).expect("a response").pipeline.late > 0
         };
         println!(
-            "{TEST}: {cost:.2} of the limit, {:?}, {} units: fails {fails}",
+            "{cost:.2} of the limit, {:?}, {} units: fails {fails}",
             configuration.compensate.stride, shape.units
         );
         assert!(is_forced || !fails, "{configuration:?}");
         counts[usize::from(is_forced)] += usize::from(fails == is_forced);
     }
-    println!(
-        "{TEST}: {} of {accepted} accepted run {seconds} s, {} of {refused} refused fail",
-        counts[0], counts[1]
-    );
+    println!("{} of {accepted} accepted run {seconds} s, {} of {refused} refused fail", counts[0], counts[1]);
     assert!(4 * counts[1] >= 3 * refused);
 }

@@ -52,13 +52,8 @@ struct Disturbed {
     made: Vec<DataFrame>,
 }
 
-fn disturbed(
-    test: &str,
-    lasts: Duration,
-    set: (&str, serde_json::Value),
-    back: serde_json::Value,
-) -> Option<Disturbed> {
-    let mut board = boot(test)?;
+fn disturbed(lasts: Duration, set: (&str, serde_json::Value), back: serde_json::Value) -> Option<Disturbed> {
+    let mut board = boot()?;
     let span = Duration::from_secs(1);
     let samples = drive(((span + lasts + span).as_millis() / SAMPLE.as_millis()) as usize);
     common::send(&mut board, &samples, START);
@@ -75,33 +70,28 @@ fn disturbed(
 
 #[test]
 fn frames_are_those_of_the_host_byte_for_byte() {
-    compare("frames_are_those_of_the_host_byte_for_byte", &drive(600));
+    compare(&drive(600));
 }
 
 #[test]
 fn frames_of_a_real_drive_are_those_of_the_host() {
-    const TEST: &str = "frames_of_a_real_drive_are_those_of_the_host";
-    let Some(path) = recordings::trial(TEST, 11) else { return };
+    let Some(path) = recordings::trial(11) else { return };
     let rows = Recording::read(&path).expect("a recording").rows.into_iter().take(3_000).enumerate();
     let samples: Vec<Vec<u8>> = rows.map(|(k, row)| replay::message(k, &row.sample)).collect();
-    compare(TEST, &samples);
+    compare(&samples);
 }
 
 /// Sends samples to a board, and compares its frames with the host's.
-fn compare(test: &str, samples: &[Vec<u8>]) {
-    let Some(mut board) = boot(test) else { return };
+fn compare(samples: &[Vec<u8>]) {
+    let Some(mut board) = boot() else { return };
     common::send(&mut board, samples, START);
     let begun = Instant::now();
     board.run(START + SAMPLE * samples.len() as u32);
     let (took, instructions) = (begun.elapsed().as_secs_f64(), board.counts().instructions as f64);
-    println!(
-        "{test}: {} samples in {took:.1} s, {:.1} M instructions/s",
-        samples.len(),
-        instructions / took * 1e-6
-    );
+    println!("{} samples in {took:.1} s, {:.1} M instructions/s", samples.len(), instructions / took * 1e-6);
     let sent = board.can_frames();
     let made = host(samples);
-    println!("{test}: first frame {:?} after the first sample began", sent[0].0 - START);
+    println!("first frame {:?} after the first sample began", sent[0].0 - START);
     assert!(sent[0].0 - START < 10 * MS);
     assert!(sent.len() >= SET * (samples.len() - 1), "{} frames", sent.len());
     assert!(frames(&sent) == made[..sent.len()], "in order, and the same");
@@ -117,13 +107,12 @@ fn compare(test: &str, samples: &[Vec<u8>]) {
     }
     let counters = counters(&mut board);
     assert_eq!((counters.lines.unsent, counters.lines.line_errors, counters.lines.overruns), (0, 0, 0));
-    sums(test, &sent);
+    sums(&sent);
 }
 
 /// A bus at each bit rate that can be configured: frames out as the host's, wheel frames in; at another rate none.
 #[test]
 fn every_bit_rate_is_the_configured_one() {
-    const TEST: &str = "every_bit_rate_is_the_configured_one";
     const SAMPLES: usize = 30;
     let wheel = DataFrame::new(StandardId::new(0xAA).expect("11 bits"), &[0x1A, 0x6F].repeat(4)).expect("8");
     let made = host(&drive(SAMPLES));
@@ -131,7 +120,7 @@ fn every_bit_rate_is_the_configured_one() {
         for bus in [bits_per_second, bits_per_second / 2] {
             let can = Settings { bits_per_second, ..Settings::DEFAULT };
             let configuration = Configuration { can, ..Configuration::DEFAULT };
-            let Some(mut board) = common::unpowered(TEST) else { return };
+            let Some(mut board) = common::unpowered() else { return };
             Stored::default().record(&configuration).write_to(&mut board);
             board.configure("CAN1.bit_rate", bus);
             board.power_on();
@@ -141,7 +130,7 @@ fn every_bit_rate_is_the_configured_one() {
             }
             board.run(START + SAMPLE * SAMPLES as u32);
             let sent = frames(&board.can_frames());
-            println!("{TEST}: {bits_per_second} on a bus of {bus}: {} frames", sent.len());
+            println!("{bits_per_second} on a bus of {bus}: {} frames", sent.len());
             if bus != bits_per_second {
                 assert_eq!(sent, [], "{bits_per_second} on {bus}");
                 continue;
@@ -160,8 +149,8 @@ fn every_bit_rate_is_the_configured_one() {
 }
 
 /// cantools reads the log: the sum of the rates is the accumulated angle.
-fn sums(test: &str, sent: &[(Duration, DataFrame)]) {
-    let Some(python) = require::python(test, &["cantools"]) else { return };
+fn sums(sent: &[(Duration, DataFrame)]) {
+    let Some(python) = require::python(&["cantools"]) else { return };
     let folder = workspace().join("host-tests/tests/clients");
     let mut child = Command::new(python)
         .args([folder.join("log_sums.py"), workspace().join("tools/gyronet.dbc")])
@@ -178,14 +167,14 @@ fn sums(test: &str, sent: &[(Duration, DataFrame)]) {
     drop(input);
     let output = child.wait_with_output().expect("it ends");
     let text = String::from_utf8_lossy(&output.stdout);
-    println!("{test}: {}", text.trim());
+    println!("{}", text.trim());
     let off: f64 = text.split_whitespace().last().and_then(|word| word.parse().ok()).expect("a difference");
     assert!(output.status.success() && off < 1e-6, "{text}");
 }
 
 #[test]
 fn wheel_frames_come_in_through_the_filters_and_none_is_lost_at_the_start() {
-    let Some(mut board) = boot("wheel_frames_come_in_through_the_filters") else { return };
+    let Some(mut board) = boot() else { return };
     let wheel =
         |id: u16| DataFrame::new(StandardId::new(id).expect("11 bits"), &[0x1A, 0x6F].repeat(4)).expect("8");
     // From power-on: wheels at 0xAA, and a neighbour that the filter must stop.
@@ -227,7 +216,7 @@ fn status(board: &mut Board) -> String {
 
 #[test]
 fn slcan_reports_warning_passive_and_bus_off() {
-    let Some(mut board) = boot("slcan_reports_warning_passive_and_bus_off") else { return };
+    let Some(mut board) = boot() else { return };
     common::send(&mut board, &drive(80), START);
     board.run(START + 50 * MS);
     assert_eq!(status(&mut board), "00");
@@ -249,7 +238,7 @@ fn slcan_reports_warning_passive_and_bus_off() {
 fn no_acknowledgement_for_a_while() {
     let lasts = Duration::from_millis(200);
     let set = ("CAN1.acknowledge", false.into());
-    let Some(run) = disturbed("no_acknowledgement_for_a_while", lasts, set, true.into()) else { return };
+    let Some(run) = disturbed(lasts, set, true.into()) else { return };
     assert!(frames(&run.before)[..] == run.made[..run.before.len()]);
     assert_eq!(run.during.len(), 0, "nothing is acknowledged");
     assert_eq!(stale(&run.after, &run.made), [], "nothing old goes out");
@@ -274,8 +263,7 @@ fn returns_after(wait: Duration) -> Duration {
 /// Case bus/03: the bus is in order again as soon as the controller is off it.
 #[test]
 fn bus_off_lasts_10_20_and_40_ms_and_the_standard_s_wait() {
-    const TEST: &str = "bus_off_lasts_10_20_and_40_ms_and_the_standard_s_wait";
-    let Some(mut board) = boot(TEST) else { return };
+    let Some(mut board) = boot() else { return };
     common::send(&mut board, &drive(500), START);
     board.run(START + Duration::from_millis(500));
     for (wait, pause) in [(10, 703), (20, 703), (40, 1_400), (10, 103)] {
@@ -290,7 +278,7 @@ fn bus_off_lasts_10_20_and_40_ms_and_the_standard_s_wait() {
             panic!("{wait} ms: {events:?}")
         };
         let first = board.can_frames()[0].0;
-        println!("{TEST}: {wait} ms: back after {:?}, first frame {:?} later", *back - *off, first - *back);
+        println!("{wait} ms: back after {:?}, first frame {:?} later", *back - *off, first - *back);
         let promised = returns_after(wait * MS);
         assert!((*back - *off).abs_diff(promised) < MS, "{:?} for {promised:?}", *back - *off);
         assert!(first - *back < SAMPLE + 2 * MS, "the next sample's frames are sent");
@@ -301,7 +289,7 @@ fn bus_off_lasts_10_20_and_40_ms_and_the_standard_s_wait() {
 fn bus_off_again_and_again() {
     let lasts = Duration::from_millis(400);
     let set = ("CAN1.short", "recessive".into());
-    let Some(run) = disturbed("bus_off_again_and_again", lasts, set, serde_json::Value::Null) else { return };
+    let Some(run) = disturbed(lasts, set, serde_json::Value::Null) else { return };
     let mut board = run.board;
     let events = board.events();
     let (off, back) = (times("bus_off", &events), times("bus_off_ended", &events));
@@ -320,7 +308,7 @@ fn bus_off_again_and_again() {
 fn babbling_bus() {
     let lasts = Duration::from_millis(200);
     let set = ("CAN1.babble", true.into());
-    let Some(run) = disturbed("babbling_bus", lasts, set, false.into()) else { return };
+    let Some(run) = disturbed(lasts, set, false.into()) else { return };
     assert_eq!(run.during.len(), 0, "the other node always wins");
     assert_eq!(stale(&run.after, &run.made), []);
     assert!(has(faults(&frames(&run.after))[0], Faults::BUS));
@@ -335,7 +323,7 @@ fn babbling_bus() {
 fn bus_back_after_ten_seconds() {
     let lasts = Duration::from_secs(10);
     let set = ("CAN1.connected", false.into());
-    let Some(run) = disturbed("bus_back_after_ten_seconds", lasts, set, true.into()) else { return };
+    let Some(run) = disturbed(lasts, set, true.into()) else { return };
     assert_eq!(run.during.len(), 0);
     assert_eq!(stale(&run.after, &run.made), [], "no old frame goes out");
     let back = START + Duration::from_secs(11);
@@ -345,8 +333,7 @@ fn bus_back_after_ten_seconds() {
 
 #[test]
 fn an_erase_is_announced_and_costs_no_time() {
-    const TEST: &str = "an_erase_is_announced_and_costs_no_time";
-    let Some(mut board) = boot(TEST) else { return };
+    let Some(mut board) = boot() else { return };
     // Wheels that stand prove that the vehicle does, whatever the gyro says.
     let still = inputs::wheels(0.0);
     let samples = drive(400);
@@ -371,7 +358,7 @@ fn an_erase_is_announced_and_costs_no_time() {
     };
     let silence = after[0].0 - before[before.len() - 1].0;
     println!(
-        "{TEST}: silent for {silence:?}, the erase began {:?} from the last frame",
+        "silent for {silence:?}, the erase began {:?} from the last frame",
         erased.time.abs_diff(before[before.len() - 1].0)
     );
     assert!(silence > 200 * MS, "an erase of 16 KiB takes 250 ms");

@@ -12,8 +12,8 @@ const SECOND: Duration = Duration::from_secs(1);
 /// The start takes longer at 16 MHz: the networks' weights are checked.
 const SLOW_START: Duration = Duration::from_secs(2);
 
-fn with_crystal(test: &str, hz: Value) -> Option<Board> {
-    let mut board = unpowered(test)?;
+fn with_crystal(hz: Value) -> Option<Board> {
+    let mut board = unpowered()?;
     board.configure(CRYSTAL, hz);
     board.configure("USART2.baud", 500_000);
     board.power_on();
@@ -22,7 +22,7 @@ fn with_crystal(test: &str, hz: Value) -> Option<Board> {
 
 #[test]
 fn no_crystal_and_then_one() {
-    let Some(mut board) = with_crystal("no_crystal_and_then_one", Value::Null) else { return };
+    let Some(mut board) = with_crystal(Value::Null) else { return };
     let samples = drive(100);
     common::send(&mut board, &samples, SLOW_START);
     board.run(SLOW_START + SECOND);
@@ -45,7 +45,7 @@ fn no_crystal_and_then_one() {
 #[test]
 fn revision_a_runs_without_prefetch() {
     for (idcode, prefetch) in [(0x100F_6413_u32, 1), (0x1001_6413, 1), (0x1000_6411, 0), (0x1000_6413, 0)] {
-        let Some(mut board) = unpowered("revision_a_runs_without_prefetch") else { return };
+        let Some(mut board) = unpowered() else { return };
         board.configure("DBGMCU.idcode", idcode);
         board.trace("FLASH", true);
         board.power_on();
@@ -62,7 +62,7 @@ fn revision_a_runs_without_prefetch() {
 #[test]
 fn crystal_of_another_frequency() {
     for (hz, khz) in [(16_000_000, 16_000), (8_000_000, 8_000), (20_000_000, 20_000)] {
-        let Some(mut board) = with_crystal("crystal_of_another_frequency", hz.into()) else { return };
+        let Some(mut board) = with_crystal(hz.into()) else { return };
         board.run(SLOW_START + SECOND);
         assert_eq!(board.can_frames().len(), 0, "{hz} Hz: no frame at a wrong bit rate");
         let identity = info(&mut board).identity;
@@ -78,7 +78,7 @@ fn crystal_of_another_frequency() {
 #[test]
 fn internal_oscillator_at_the_ends_of_its_tolerance() {
     for percent in [-8.0, 4.5] {
-        let Some(mut board) = unpowered("internal_oscillator_at_the_ends_of_its_tolerance") else { return };
+        let Some(mut board) = unpowered() else { return };
         board.configure("RCC.hsi_error_percent", percent);
         board.power_on();
         board.run(START);
@@ -88,7 +88,7 @@ fn internal_oscillator_at_the_ends_of_its_tolerance() {
 
 #[test]
 fn crystal_that_stops() {
-    let Some(mut board) = boot("crystal_that_stops") else { return };
+    let Some(mut board) = boot() else { return };
     let samples = drive(50);
     common::send(&mut board, &samples, START);
     board.run(START + SAMPLE * 50);
@@ -104,7 +104,7 @@ fn crystal_that_stops() {
 
 #[test]
 fn bootloader_that_leaves_the_pll_on() {
-    let Some(mut board) = boot("bootloader_that_leaves_the_pll_on") else { return };
+    let Some(mut board) = boot() else { return };
     board.run(START);
     common::fall_asleep(&mut board);
     // A jump to the image's start without a reset: everything is still as the image has left it.
@@ -125,9 +125,8 @@ fn bootloader_that_leaves_the_pll_on() {
 
 #[test]
 fn olimex_board_with_its_crystal_of_8_mhz() {
-    const TEST: &str = "olimex_board_with_its_crystal_of_8_mhz";
-    let elf = board::firmware("olimex-stm32-h405", TEST, env!("CARGO_TARGET_TMPDIR"), "coprocessor");
-    let Some(mut board) = elf.and_then(|elf| Board::unpowered(TEST, &elf)) else { return };
+    let elf = board::firmware("olimex-stm32-h405", env!("CARGO_TARGET_TMPDIR"), "coprocessor");
+    let Some(mut board) = elf.and_then(|elf| Board::unpowered(&elf)) else { return };
     board.configure(CRYSTAL, 8_000_000);
     board.configure("USART2.baud", 921_600);
     board.power_on();

@@ -23,21 +23,21 @@ pub const START: Duration = Duration::from_millis(300);
 pub const SET: usize = 6;
 
 /// The image that is flashed, for a test that is skipped (aloud) where it cannot be built.
-pub fn elf(test: &str) -> Option<PathBuf> {
-    board::firmware("netduino-plus-2", test, env!("CARGO_TARGET_TMPDIR"), "coprocessor")
+pub fn elf() -> Option<PathBuf> {
+    board::firmware("netduino-plus-2", env!("CARGO_TARGET_TMPDIR"), "coprocessor")
 }
 
 /// A board with the image in its flash and without power.
-pub fn unpowered(test: &str) -> Option<Board> {
-    let mut board = Board::unpowered(test, &elf(test)?)?;
+pub fn unpowered() -> Option<Board> {
+    let mut board = Board::unpowered(&elf()?)?;
     board.configure("USART2.baud", 921_600);
     board.configure("USART3.baud", 921_600);
     Some(board)
 }
 
 /// A board that has just been switched on.
-pub fn boot(test: &str) -> Option<Board> {
-    let mut board = unpowered(test)?;
+pub fn boot() -> Option<Board> {
+    let mut board = unpowered()?;
     board.power_on();
     Some(board)
 }

@@ -47,8 +47,7 @@ fn drive(board: &mut Board, vehicle: &mut Winding, seconds: usize, has_courses: 
 
 #[test]
 fn courses_on_the_bus_teach_the_bias_and_hold_the_heading() {
-    const TEST: &str = "courses_on_the_bus_teach_the_bias_and_hold_the_heading";
-    let Some(mut board) = common::boot(TEST) else { return };
+    let Some(mut board) = common::boot() else { return };
     board.run(START);
     service::on_line(&mut board).set_configuration(&configuration()).expect("it is stored");
     service::on_line(&mut board).restart().expect("a response");
@@ -58,10 +57,7 @@ fn courses_on_the_bus_teach_the_bias_and_hold_the_heading() {
     let learning = drive(&mut board, &mut vehicle, 55, true);
     let statuses: Vec<&[u8]> = learning.iter().filter_map(|frame| content(frame, STATUS_ID)).collect();
     let bias = |status: &[u8]| status[3] >> 4 & 7;
-    println!(
-        "{TEST}: bias by the second {:?}",
-        statuses.iter().map(|status| bias(status)).collect::<Vec<_>>()
-    );
+    println!("bias by the second {:?}", statuses.iter().map(|status| bias(status)).collect::<Vec<_>>());
     assert_eq!(bias(statuses[1]), Knowledge::Unknown as u8);
     assert_eq!(bias(statuses[statuses.len() - 1]), Knowledge::Fine as u8);
 
@@ -74,7 +70,7 @@ fn courses_on_the_bus_teach_the_bias_and_hold_the_heading() {
     // The gain takes twenty minutes to learn.
     let by_gain = GAIN * turned;
     println!(
-        "{TEST}: {off:.2} deg in 15 s without courses, {by_gain:.2} of it by the gain; {:.2} by the bias alone",
+        "{off:.2} deg in 15 s without courses, {by_gain:.2} of it by the gain; {:.2} by the bias alone",
         BIAS.to_degrees() * 15.0
     );
     assert!(yaws.len() > 1_490 && (off - by_gain).abs() < 0.3, "{} sets, {off} deg, {by_gain}", yaws.len());
@@ -97,7 +93,7 @@ fn courses_on_the_bus_teach_the_bias_and_hold_the_heading() {
         contradicted = drive(&mut board, &mut vehicle, 1, false);
     }
     let (state, _, courses) = service::on_line(&mut board).course().expect("a response");
-    println!("{TEST}: {courses:?}");
+    println!("{courses:?}");
     assert_eq!((gain(&contradicted), state), (Knowledge::Refused as u16, 3));
     assert!(courses.refused >= 10 && courses.restarts >= 1, "{courses:?}");
     let trouble = service::on_line(&mut board).ask(&[0x19, 6, 0xDA, 0x04, 0x62, 1]).expect("a response");

@@ -36,7 +36,7 @@ fn hang_of_each_task() {
         "idle::Idle::step",
         "output::Output::step",
     ];
-    let Some(mut board) = boot("hang_of_each_task") else { return };
+    let Some(mut board) = boot() else { return };
     let samples = drive(40);
     common::send(&mut board, &samples, START);
     board.run(START + 50 * MS);
@@ -71,7 +71,7 @@ fn hang_of_each_task() {
 
 #[test]
 fn hang_of_the_start() {
-    let Some(mut board) = boot("hang_of_the_start") else { return };
+    let Some(mut board) = boot() else { return };
     let original = board.read(At::Symbol("idle::Idle::new"), 2);
     board.patch(At::Symbol("idle::Idle::new"), HANG);
     board.run(8 * SECOND);
@@ -85,7 +85,7 @@ fn hang_of_the_start() {
 #[test]
 fn watchdog_at_the_ends_of_its_oscillator() {
     for hz in [17_000, 47_000] {
-        let Some(mut board) = common::unpowered("watchdog_at_the_ends_of_its_oscillator") else { return };
+        let Some(mut board) = common::unpowered() else { return };
         board.configure("RCC.lsi_hz", hz);
         board.power_on();
         let samples = drive(150);
@@ -96,8 +96,8 @@ fn watchdog_at_the_ends_of_its_oscillator() {
 }
 
 /// Runs the board, changes a register while it sleeps, and gives the crash that follows.
-fn provoked(test: &str, register: &str, value: u32) -> Option<Crash> {
-    let mut board = boot(test)?;
+fn provoked(register: &str, value: u32) -> Option<Crash> {
+    let mut board = boot()?;
     board.run(START);
     common::fall_asleep(&mut board);
     board.set_register(register, value);
@@ -109,14 +109,14 @@ fn provoked(test: &str, register: &str, value: u32) -> Option<Crash> {
     board.reset_pin();
     board.run(START);
     assert_eq!(crash_of(&mut board), None);
-    println!("{test}: {}", crash.expect("a reason"));
+    println!("{}", crash.expect("a reason"));
     crash
 }
 
 #[test]
 fn stack_overflow() {
     // The lowest words of the RAM: the next exception frame does not fit.
-    let Some(crash) = provoked("stack_overflow", "sp", 0x2000_0008) else { return };
+    let Some(crash) = provoked("sp", 0x2000_0008) else { return };
     assert_eq!((crash.kind, crash.count), (CrashKind::HardFault, 1));
     // STKERR: a bus fault on stacking for exception entry (PM0214 4.4.10).
     assert_ne!(crash.status & 1 << 12, 0, "CFSR {:#010x}", crash.status);
@@ -124,7 +124,7 @@ fn stack_overflow() {
 
 #[test]
 fn hard_fault() {
-    let Some(crash) = provoked("hard_fault", "pc", 0x3000_0000) else { return };
+    let Some(crash) = provoked("pc", 0x3000_0000) else { return };
     assert_eq!((crash.kind, crash.count), (CrashKind::HardFault, 1));
     assert_eq!(crash.place & !1, 0x3000_0000, "{crash}");
     assert_ne!(crash.status, 0);

@@ -242,8 +242,8 @@ fn stack_used(board: &mut Board) -> usize {
     stack.len() - stack.iter().position(|byte| *byte != PAINT).unwrap_or(stack.len())
 }
 
-fn run(test: &str, seconds: usize) {
-    let Some(mut board) = common::boot(test) else { return };
+fn run(seconds: usize) {
+    let Some(mut board) = common::boot() else { return };
     let (mut outside, mut received) = (Outside::new(), Received::new());
     let (begun, mut early) = (Instant::now(), None);
     board.run(START);
@@ -266,7 +266,7 @@ fn run(test: &str, seconds: usize) {
             assert!(stack <= STACK_BUDGET, "{stack} bytes of stack");
             let took = begun.elapsed();
             println!(
-                "{test}: {second} s of board time in {took:.0?}: {own} + {fog} frames, {answers} answers, {stack} bytes of stack"
+                "{second} s of board time in {took:.0?}: {own} + {fog} frames, {answers} answers, {stack} bytes of stack"
             );
         }
     }
@@ -277,13 +277,13 @@ fn run(test: &str, seconds: usize) {
     received.check(seconds * SAMPLES, 0);
     let AllCounters { pipeline, fog, .. } = received.counters.expect("they were asked for");
     let (early, late) = (early.expect("a tenth has passed"), stack_used(&mut board));
-    println!("{test}: {early} bytes of stack after a tenth, {late} at the end; {pipeline:?}; {fog:?}");
+    println!("{early} bytes of stack after a tenth, {late} at the end; {pipeline:?}; {fog:?}");
     assert!(late <= STACK_BUDGET, "{late} bytes of stack");
 }
 
 #[test]
 fn all_lines_busy_for_seconds() {
-    run("all_lines_busy_for_seconds", 8);
+    run(8);
 }
 
 /// Names how many seconds of board time [`all_lines_busy_for_an_hour`] takes instead.
@@ -294,5 +294,5 @@ const SECONDS: &str = "GYRONET_ENDURANCE_S";
 #[ignore = "an hour of board time"]
 fn all_lines_busy_for_an_hour() {
     let seconds = std::env::var(SECONDS).map_or(3_600, |text| text.parse().expect("whole seconds"));
-    run("all_lines_busy_for_an_hour", seconds);
+    run(seconds);
 }

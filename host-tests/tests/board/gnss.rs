@@ -56,8 +56,7 @@ fn drive(
 
 #[test]
 fn a_receiver_on_its_line_teaches_what_frames_teach() {
-    const TEST: &str = "a_receiver_on_its_line_teaches_what_frames_teach";
-    let Some(mut board) = common::unpowered(TEST) else { return };
+    let Some(mut board) = common::unpowered() else { return };
     board.configure("UART4.baud", LINE.baud);
     let [line, bus] = sources(LINE).map(configuration);
     let blob = || Blob::new_checked(&weights::DEFAULT.0).expect("it comes with the library");
@@ -73,10 +72,10 @@ fn a_receiver_on_its_line_teaches_what_frames_teach() {
         let mut host = replay::Board::experienced(&bus, &learned, blob());
         let [sent, same] = drive(&mut board, &mut host, &mut vehicle, seconds);
         let samples = 100 * seconds.iter().sum::<usize>();
-        println!("{TEST}: {} of {} frames", sent.len(), same.len());
+        println!("{} of {} frames", sent.len(), same.len());
         assert!(sent.len() > common::SET * (samples - 2) && sent == same[..sent.len()], "{}", sent.len());
         let (_, [gain, sigma], courses) = service::on_line(&mut board).course().expect("a response");
-        println!("{TEST}: gain {gain} +- {sigma}, {courses:?}");
+        println!("gain {gain} +- {sigma}, {courses:?}");
         assert!(
             (147..=148).contains(&courses.used) && (gain - 0.007).abs() < 0.002 && sigma < 0.002,
             "{gain} {sigma}"
@@ -118,6 +117,6 @@ fn a_receiver_on_its_line_teaches_what_frames_teach() {
     board.run(50 * MS);
     let (.., courses) = service::on_line(&mut board).course().expect("a response");
     let counters = common::counters(&mut board);
-    println!("{TEST}: {courses:?}, {}, {}", counters.lines.line_errors, counters.inputs.heading_errors);
+    println!("{courses:?}, {}, {}", counters.lines.line_errors, counters.inputs.heading_errors);
     assert_eq!((courses.refused, counters.inputs.heading_errors), (2, 1));
 }

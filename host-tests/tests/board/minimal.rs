@@ -10,12 +10,11 @@ use gyronet_tools::client::device::error::DeviceError;
 
 #[test]
 fn board_without_led_slcan_gyro_and_spi_sends_the_hosts_frames() {
-    const TEST: &str = "board_without_led_slcan_gyro_and_spi_sends_the_hosts_frames";
     const SAMPLES: usize = 50;
-    let Some(elf) = board::firmware("minimal-board", TEST, env!("CARGO_TARGET_TMPDIR"), "coprocessor") else {
+    let Some(elf) = board::firmware("minimal-board", env!("CARGO_TARGET_TMPDIR"), "coprocessor") else {
         return;
     };
-    let Some(mut board) = Board::unpowered(TEST, &elf) else { return };
+    let Some(mut board) = Board::unpowered(&elf) else { return };
     board.configure("RCC.crystal_hz", 8_000_000);
     board.power_on();
     let samples = common::drive(SAMPLES);

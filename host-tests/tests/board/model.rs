@@ -13,7 +13,7 @@ use std::time::Duration;
 
 #[test]
 fn model_passes_its_own_tests() {
-    let Some(python) = require::python("model_passes_its_own_tests", PACKAGES) else { return };
+    let Some(python) = require::python(PACKAGES) else { return };
     let output = Command::new(python)
         .args(["-m", "unittest", "discover", "--start-directory", "tests", "--top-level-directory", "."])
         .current_dir(workspace().join("host-tests/board"))
@@ -27,9 +27,8 @@ fn model_passes_its_own_tests() {
 /// The image's own list of priorities, which the bound of the stack rests on, is what its code sets.
 #[test]
 fn priorities_are_those_that_the_stack_bound_rests_on() {
-    const TEST: &str = "priorities_are_those_that_the_stack_bound_rests_on";
-    let Some(elf) = common::elf(TEST) else { return };
-    let Some(mut board) = Board::boot(TEST, &elf) else { return };
+    let Some(elf) = common::elf() else { return };
+    let Some(mut board) = Board::boot(&elf) else { return };
     board.run(START);
     let set = board.priorities();
     let listed = priorities(&std::fs::read(&elf).expect("it was just built")).expect("a firmware image");
@@ -42,7 +41,7 @@ fn priorities_are_those_that_the_stack_bound_rests_on() {
 
 #[test]
 fn image_answers_on_the_service_line_and_restarts_on_request() {
-    let Some(mut board) = boot("image_answers_on_the_service_line_and_restarts_on_request") else { return };
+    let Some(mut board) = boot() else { return };
     board.run(START);
     let about = info(&mut board);
     assert_eq!((about.flash, about.writable), (FlashState::Ready, true));
@@ -62,7 +61,7 @@ fn image_answers_on_the_service_line_and_restarts_on_request() {
 
 #[test]
 fn board_does_the_same_again_after_a_snapshot_is_restored() {
-    let Some(mut board) = boot("board_does_the_same_again_after_a_snapshot_is_restored") else { return };
+    let Some(mut board) = boot() else { return };
     board.run(START);
     board.snapshot("started");
     let mut runs = Vec::new();

@@ -44,8 +44,8 @@ pub fn built() -> &'static (PathBuf, Update) {
 }
 
 /// A board that has just been switched on, and will receive these samples.
-pub fn boot(test: &str, samples: &[Vec<u8>]) -> Option<Board> {
-    let mut board = Board::of("stm32h563", test, &built().0)?;
+pub fn boot(samples: &[Vec<u8>]) -> Option<Board> {
+    let mut board = Board::of("stm32h563", &built().0)?;
     board.power_on();
     for (k, sample) in samples.iter().enumerate() {
         board.send_at(IMU, sample, BEGIN + SAMPLE * k as u32);
@@ -59,16 +59,15 @@ fn a_nucleo_sends_what_the_host_makes_and_nothing_old() {
     const SAMPLES: usize = 450;
     const AWAY: usize = 40;
     const FD: usize = 64;
-    let test = "a_nucleo_sends_what_the_host_makes_and_nothing_old";
     let samples = drive(SAMPLES + 2 * AWAY);
-    let Some(mut board) = boot(test, &samples) else { return };
+    let Some(mut board) = boot(&samples) else { return };
     let made = host(&samples);
     for k in 0..SAMPLES / 2 {
         board.can_fd_send_at(0x300, &[k as u8; FD], BEGIN + SAMPLE * 2 * k as u32);
     }
     board.run(BEGIN + SAMPLE * SAMPLES as u32);
     let sent = frames(&board.can_frames());
-    println!("{test}: {} frames", sent.len());
+    println!("{} frames", sent.len());
     assert_eq!(sent.len(), SET * SAMPLES);
     assert!(sent == made[..sent.len()], "in order, and the same");
 
@@ -79,7 +78,7 @@ fn a_nucleo_sends_what_the_host_makes_and_nothing_old() {
     board.run(SAMPLE * AWAY as u32);
     let sent = frames(&board.can_frames());
     let first = made.iter().position(|frame| *frame == sent[0]).expect("the host's");
-    println!("{test}: sample {} is the first after {}", first / SET, SAMPLES + AWAY);
+    println!("sample {} is the first after {}", first / SET, SAMPLES + AWAY);
     assert!(first >= SET * (SAMPLES + AWAY - 3) && sent.len() > SET * (AWAY - 10));
     // Each frame was sent or is counted.
     let unsent = on_bus(&mut board).counters().expect("a response").lines.unsent as usize;
@@ -102,9 +101,8 @@ fn faults(sent: &[(Duration, DataFrame)]) -> Faults {
 #[ignore = "it builds embassy, which takes a minute"]
 fn a_nucleo_stores_over_the_bus_without_a_gap() {
     const TIME: Duration = Duration::from_millis(1_500);
-    let test = "a_nucleo_stores_over_the_bus_without_a_gap";
     let parked: Vec<_> = (0..600).map(|k| replay::turning(k, 0.0)).collect();
-    let Some(mut board) = boot(test, &parked) else { return };
+    let Some(mut board) = boot(&parked) else { return };
     // Something in each sector of the records, so that all are erased before their first use.
     for sector in 0..16 {
         board.patch(At::Address(STORED + SECTOR * (sector + 1) - 16), &[0x55; 16]);
@@ -133,7 +131,7 @@ fn a_nucleo_stores_over_the_bus_without_a_gap() {
     let erased = board.events().iter().filter(|event| event.kind == "flash_erase").count();
     let sent = rates(sent);
     let gap = sent.windows(2).map(|pair| pair[1].0 - pair[0].0).max().expect("frames");
-    println!("{test}: {} frames, {erased} sectors erased, at most {gap:?} without a frame", sent.len());
+    println!("{} frames, {erased} sectors erased, at most {gap:?} without a frame", sent.len());
     assert_eq!(erased, 8, "a sector of the records takes eight of the flash");
     assert!(gap < SAMPLE, "{gap:?}");
     let other = sent.iter().zip(&undisturbed).find(|((_, sent), (_, alone))| sent != alone);
@@ -159,9 +157,8 @@ fn response() -> Id {
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
 fn a_nucleo_hears_wheels_and_returns_from_bus_off_at_growing_intervals() {
-    let test = "a_nucleo_hears_wheels_and_returns_from_bus_off_at_growing_intervals";
     let samples = drive(400);
-    let Some(mut board) = boot(test, &samples) else { return };
+    let Some(mut board) = boot(&samples) else { return };
     let made = host(&samples);
     for k in 0..50 {
         board.can_send_at(&inputs::wheels(0.0), BEGIN + SAMPLE * k);
@@ -181,7 +178,7 @@ fn a_nucleo_hears_wheels_and_returns_from_bus_off_at_growing_intervals() {
     let times =
         |kind: &str| events.iter().filter(|event| event.kind == kind).map(|event| event.time).collect();
     let (off, back): (Vec<Duration>, Vec<Duration>) = (times("bus_off"), times("bus_off_ended"));
-    println!("{test}: off at {off:?}, back at {back:?}");
+    println!("off at {off:?}, back at {back:?}");
     assert_eq!((off.len(), back.len()), (6, 6));
     for (k, (off, back)) in off.iter().zip(&back).enumerate() {
         let promised = 10 * MS * (1 << k) + Duration::from_micros(129 * 11 * 2);
@@ -198,8 +195,7 @@ fn a_nucleo_hears_wheels_and_returns_from_bus_off_at_growing_intervals() {
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
 fn a_nucleo_takes_no_can_fd_and_starts_again_without_its_clock() {
-    let test = "a_nucleo_takes_no_can_fd_and_starts_again_without_its_clock";
-    let Some(mut board) = boot(test, &[]) else { return };
+    let Some(mut board) = boot(&[]) else { return };
     board.run(200 * MS);
     let session = [2, 0x10, 3, 0xCC, 0xCC, 0xCC, 0xCC, 0xCC];
     for id in [0xAA, 0x7E0] {
@@ -223,8 +219,7 @@ fn a_nucleo_takes_no_can_fd_and_starts_again_without_its_clock() {
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
 fn a_nucleo_with_a_key_is_written_by_its_owner_alone() {
-    let test = "a_nucleo_with_a_key_is_written_by_its_owner_alone";
-    let Some(mut board) = boot(test, &[]) else { return };
+    let Some(mut board) = boot(&[]) else { return };
     board.run(200 * MS);
     let [key, other] = [(); 2].map(|()| PrivateKey::generate().expect("random numbers"));
     board.configure("RNG.seed_error", true);
@@ -270,8 +265,7 @@ fn after_cut(board: &mut Board, cut: u32) -> (Configuration, FlashState) {
 #[ignore = "it builds embassy, which takes a minute"]
 fn a_nucleo_survives_a_power_cut_at_any_time_of_a_store() {
     const CUTS: u32 = 20;
-    let test = "a_nucleo_survives_a_power_cut_at_any_time_of_a_store";
-    let Some(mut board) = boot(test, &[]) else { return };
+    let Some(mut board) = boot(&[]) else { return };
     for sector in 0..16 {
         board.patch(At::Address(STORED + SECTOR * (sector + 1) - 16), &[0x55; 16]);
     }
@@ -298,7 +292,7 @@ fn a_nucleo_survives_a_power_cut_at_any_time_of_a_store() {
         assert_eq!(after_cut(&mut board, 0), (new, FlashState::Ready));
     }
     let damaged = states.iter().filter(|flash| **flash == FlashState::Damaged).count();
-    println!("{test}: {} cuts, {kept} with the old settings, {damaged} with a damaged record", states.len());
+    println!("{} cuts, {kept} with the old settings, {damaged} with a damaged record", states.len());
     assert!(
         states.iter().all(|flash| matches!(flash, FlashState::Ready | FlashState::Damaged)),
         "{states:?}"
@@ -320,11 +314,10 @@ fn second_of_rates(board: &mut Board) -> (Vec<f64>, usize) {
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
 fn a_nucleo_reads_the_part_on_spi_that_is_configured() {
-    let test = "a_nucleo_reads_the_part_on_spi_that_is_configured";
     for (part, model) in
         [(ImuPart::Icm42688, "Icm42688"), (ImuPart::Bmi088, "Bmi088"), (ImuPart::Asm330lhh, "Asm330lhh")]
     {
-        let Some(mut board) = boot(test, &[]) else { return };
+        let Some(mut board) = boot(&[]) else { return };
         board.configure("SPI1.part", model);
         board.run(200 * MS);
         on_bus(&mut board)
@@ -337,7 +330,7 @@ fn a_nucleo_reads_the_part_on_spi_that_is_configured() {
         board.run(500 * MS);
         let turning = |board: &mut Board| {
             let (rates, all) = second_of_rates(board);
-            println!("{test}: {model}: {} of {all} rates are known", rates.len());
+            println!("{model}: {} of {all} rates are known", rates.len());
             assert!((99..=101).contains(&all) && rates.len() == all, "{} of {all}", rates.len());
             assert!(rates.iter().all(|rate| (rate - 10.0).abs() < 0.3), "{rates:?}");
             assert_eq!(on_bus(board).info().expect("a response").sensor, None);

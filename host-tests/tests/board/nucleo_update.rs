@@ -59,8 +59,7 @@ fn update_with(
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
 fn a_nucleo_is_updated_over_can_without_a_gap_and_keeps_its_records() {
-    const TEST: &str = "a_nucleo_is_updated_over_can_without_a_gap_and_keeps_its_records";
-    let Some(mut board) = boot(TEST, &[]) else { return };
+    let Some(mut board) = boot(&[]) else { return };
     let (_, file) = built();
     board.run(START);
     on_bus(&mut board).set_configuration(&settings(48.0)).expect("it stands");
@@ -78,7 +77,7 @@ fn a_nucleo_is_updated_over_can_without_a_gap_and_keeps_its_records() {
         let took = board.counts().time - begin;
         let erased = board.events().iter().filter(|event| event.kind == "flash_erase").count();
         println!(
-            "{TEST}: {} bytes in {took:.2?}, {erased} sectors erased, at most {:.2?} from one rate to the next",
+            "{} bytes in {took:.2?}, {erased} sectors erased, at most {:.2?} from one rate to the next",
             file.images[0].len(),
             gap(&log)
         );
@@ -93,7 +92,7 @@ fn a_nucleo_is_updated_over_can_without_a_gap_and_keeps_its_records() {
         let reset = resets(&mut board)[0].0;
         let sent = board.can_frames();
         let first = sent.iter().find(|(_, frame)| frame.id() == id(0x1A0)).expect("rates").0;
-        println!("{TEST}: first rate {:.0?} after the restart", first - reset);
+        println!("first rate {:.0?} after the restart", first - reset);
         assert!(first - reset < 400 * MS);
         assert_eq!(firmware(&mut board), (Some(to), FirmwareState::OnTrial));
         assert_eq!(on_bus(&mut board).configuration().expect("a response"), settings(latitude - 1.0));
@@ -107,7 +106,7 @@ fn a_nucleo_is_updated_over_can_without_a_gap_and_keeps_its_records() {
         device.set_configuration(&settings(latitude)).expect("it stands");
         let _ = board.can_frames();
         board.run(13 * S);
-        println!("{TEST}: at most {:.2?} while it is confirmed", gap(&board.can_frames()));
+        println!("at most {:.2?} while it is confirmed", gap(&board.can_frames()));
         assert_eq!(firmware(&mut board), (Some(to), FirmwareState::Confirmed));
         board.power_cycle(10 * MS);
         board.run(START);
@@ -120,8 +119,7 @@ fn a_nucleo_is_updated_over_can_without_a_gap_and_keeps_its_records() {
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
 fn a_nucleo_refuses_what_is_no_update_of_its_own_before_it_erases() {
-    const TEST: &str = "a_nucleo_refuses_what_is_no_update_of_its_own_before_it_erases";
-    let Some(mut board) = boot(TEST, &[]) else { return };
+    let Some(mut board) = boot(&[]) else { return };
     let (_, file) = built();
     board.run(START);
     let [key, other] = [(); 2].map(|()| PrivateKey::generate().expect("random numbers"));
@@ -170,8 +168,8 @@ fn install(board: &mut Board, image: &[u8], expected: u32) {
 
 /// A board whose image in the other bank is on trial from the next reset on, with other instructions at the beginning of a
 /// function.
-fn bad(test: &str, function: &str, code: &[u8], expected: u32) -> Option<Board> {
-    let mut board = boot(test, &[])?;
+fn bad(function: &str, code: &[u8], expected: u32) -> Option<Board> {
+    let mut board = boot(&[])?;
     board.run(START);
     on_bus(&mut board).set_configuration(&settings(48.0)).expect("it stands");
     let mut image = built().1.images[1].clone();
@@ -195,7 +193,6 @@ fn rolled_back(board: &mut Board) {
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
 fn a_nucleo_goes_back_from_an_image_that_hangs_or_resets_itself() {
-    const TEST: &str = "a_nucleo_goes_back_from_an_image_that_hangs_or_resets_itself";
     const HANG: &[u8] = &[0xFE, 0xE7];
     const UNDEFINED: &[u8] = &[0, 0xDE];
     // It writes SYSRESETREQ to AIRCR.
@@ -211,7 +208,7 @@ fn a_nucleo_goes_back_from_an_image_that_hangs_or_resets_itself() {
         ("can::wheel::WheelReceiver::poll", UNDEFINED, &["software", "iwdg", "software"]),
         ("can::wheel::WheelReceiver::poll", RESET, &["software"; 5]),
     ] {
-        let Some(mut board) = bad(TEST, function, code, 0) else { return };
+        let Some(mut board) = bad(function, code, 0) else { return };
         board.run(12 * S);
         let found: Vec<String> = resets(&mut board).into_iter().map(|(_, cause)| cause).collect();
         // The restart, then one for each swap and each failure.
@@ -224,9 +221,8 @@ fn a_nucleo_goes_back_from_an_image_that_hangs_or_resets_itself() {
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
 fn a_nucleo_goes_back_from_an_image_without_can_after_its_trial() {
-    const TEST: &str = "a_nucleo_goes_back_from_an_image_without_can_after_its_trial";
     // bx lr
-    let Some(mut board) = bad(TEST, "can::CanBus::transmit", &[0x70, 0x47], CAN) else { return };
+    let Some(mut board) = bad("can::CanBus::transmit", &[0x70, 0x47], CAN) else { return };
     board.run(59 * S);
     assert_eq!(resets(&mut board).len(), 2, "the restart and the swap");
     board.run(2 * S);
@@ -237,8 +233,7 @@ fn a_nucleo_goes_back_from_an_image_without_can_after_its_trial() {
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
 fn a_nucleo_whose_image_is_damaged_starts_the_other_one_and_without_any_flashes() {
-    const TEST: &str = "a_nucleo_whose_image_is_damaged_starts_the_other_one_and_without_any_flashes";
-    let Some(mut board) = boot(TEST, &[]) else { return };
+    let Some(mut board) = boot(&[]) else { return };
     board.run(START);
     let image = &built().1.images[1];
     install(&mut board, image, 0);
@@ -263,7 +258,7 @@ fn a_nucleo_whose_image_is_damaged_starts_the_other_one_and_without_any_flashes(
     board.run(3 * S);
     let events = board.events();
     let count = |kind: &str| events.iter().filter(|event| event.kind == kind).count();
-    println!("{TEST}: {} edges, {} resets in 3 s", count("pin"), count("reset"));
+    println!("{} edges, {} resets in 3 s", count("pin"), count("reset"));
     assert!((8..=15).contains(&count("pin")) && count("options") == 0);
     assert_eq!(board.bus_log().len(), 0);
 }
@@ -272,8 +267,7 @@ fn a_nucleo_whose_image_is_damaged_starts_the_other_one_and_without_any_flashes(
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
 fn a_nucleo_starts_after_a_reset_or_a_cut_at_any_time_of_a_swap() {
-    const TEST: &str = "a_nucleo_starts_after_a_reset_or_a_cut_at_any_time_of_a_swap";
-    let Some(mut board) = boot(TEST, &[]) else { return };
+    let Some(mut board) = boot(&[]) else { return };
     board.run(START);
     install(&mut board, &built().1.images[1], 0);
     board.snapshot("installed");
@@ -296,7 +290,7 @@ fn a_nucleo_starts_after_a_reset_or_a_cut_at_any_time_of_a_swap() {
             assert_eq!(state, (Some(Slot::B), FirmwareState::OnTrial), "{at} {is_reset}");
         }
     }
-    println!("{TEST}: {} interruptions", outcomes.len());
+    println!("{} interruptions", outcomes.len());
 }
 
 /// Most accesses are polls while the controller is busy, so a few of them are any time of each step; `library::banks` cuts at
@@ -304,10 +298,9 @@ fn a_nucleo_starts_after_a_reset_or_a_cut_at_any_time_of_a_swap() {
 #[test]
 #[ignore = "it builds embassy, which takes a minute"]
 fn a_nucleo_starts_an_image_after_a_cut_at_an_access_of_its_update() {
-    let test = "a_nucleo_starts_an_image_after_a_cut_at_an_access_of_its_update";
     let delays = &[Duration::ZERO, Duration::from_micros(50)];
     const TINY: usize = 1_024;
-    let Some(mut board) = boot(test, &[]) else { return };
+    let Some(mut board) = boot(&[]) else { return };
     let (_, file) = built();
     board.run(START);
     on_bus(&mut board).set_configuration(&settings(48.0)).expect("it stands");
@@ -320,7 +313,7 @@ fn a_nucleo_starts_an_image_after_a_cut_at_an_access_of_its_update() {
         assert_eq!(on_bus(board).configuration().expect("it answered"), settings(48.0));
         info.firmware.slot.is_some()
     };
-    let mut cuts = Cuts { test, all: false, most: 12, delays, starts: &starts, count: 0 };
+    let mut cuts = Cuts { all: false, most: 12, delays, starts: &starts, count: 0 };
     let [a, b] = &file.images;
     let tiny = Update::new(file.head.label, [a.clone(), b[..TINY].to_vec()]);
     service::enter(&mut board, 2);
@@ -349,5 +342,5 @@ fn a_nucleo_starts_an_image_after_a_cut_at_an_access_of_its_update() {
     board.run(14_200 * MS);
     cuts.during(&mut board, "confirmation", 1, &|_| (), S);
     assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
-    println!("{test}: {} cuts", cuts.count);
+    println!("{} cuts", cuts.count);
 }

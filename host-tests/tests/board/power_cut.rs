@@ -44,8 +44,8 @@ fn calibration() -> Calibration {
 
 /// A board with accepted weights in slot A, a calibration, and so many configurations in its records, the last one in
 /// force.
-fn used(test: &str, configurations: usize) -> Option<Board> {
-    let mut board = common::unpowered(test)?;
+fn used(configurations: usize) -> Option<Board> {
+    let mut board = common::unpowered()?;
     let stored = Stored::default().weights(Slot::A, &other_weights(2)).record(&calibration());
     (1..=configurations).fold(stored, |stored, k| stored.record(&configuration(k))).write_to(&mut board);
     board.power_on();
@@ -140,7 +140,7 @@ fn accesses(board: &mut Board, before: &str, request: &[u8], after: &str) -> usi
 }
 
 /// Cuts a store of configuration `k` at each access, from a kept state on.
-fn store(test: &str, board: &mut Board, k: usize) {
+fn store(board: &mut Board, k: usize) {
     let request = storing(&configuration(k));
     let (mut tried, begun) = (Tried::default(), Instant::now());
     let count = accesses(board, "before", &request, "after");
@@ -158,7 +158,7 @@ fn store(test: &str, board: &mut Board, k: usize) {
     }
     let Tried { cuts, seen } = tried;
     println!(
-        "{test}: {cuts} cuts at {count} accesses, {} contents of the flash, {:.0?}",
+        "{cuts} cuts at {count} accesses, {} contents of the flash, {:.0?}",
         seen.len(),
         begun.elapsed()
     );
@@ -166,19 +166,17 @@ fn store(test: &str, board: &mut Board, k: usize) {
 
 #[test]
 fn configuration_is_the_old_or_the_new_one_after_a_cut_of_an_append() {
-    const TEST: &str = "configuration_is_the_old_or_the_new_one_after_a_cut_of_an_append";
-    let Some(mut board) = used(TEST, 5) else { return };
+    let Some(mut board) = used(5) else { return };
     service::enter(&mut board, 3);
     keep(&mut board, "before");
-    store(TEST, &mut board, 6);
+    store(&mut board, 6);
 }
 
 #[test]
 fn configuration_is_the_old_or_the_new_one_after_a_cut_of_an_erase_and_copy() {
-    const TEST: &str = "configuration_is_the_old_or_the_new_one_after_a_cut_of_an_erase_and_copy";
     // The records' sector is nearly full.
     const NEARLY: usize = 175;
-    let Some(mut board) = used(TEST, NEARLY) else { return };
+    let Some(mut board) = used(NEARLY) else { return };
     for k in NEARLY + 1.. {
         service::enter(&mut board, 3);
         let _ = board.events();
@@ -186,15 +184,15 @@ fn configuration_is_the_old_or_the_new_one_after_a_cut_of_an_erase_and_copy() {
         assert_eq!(service::ask(&mut board, &storing(&configuration(k)))[0], 0x6E);
         if board.events().iter().any(|event| event.kind == "flash_erase") {
             // The board is still the one that was started with an older configuration.
-            return store(TEST, &mut board, k);
+            return store(&mut board, k);
         }
     }
 }
 
 /// Cuts an upload at the accesses of each request that `chosen` picks by the request's number, the number of requests,
 /// and the accesses that it takes.
-fn upload(test: &str, chosen: impl Fn(usize, usize, usize) -> Vec<usize>) {
-    let Some(mut board) = used(test, 3) else { return };
+fn upload(chosen: impl Fn(usize, usize, usize) -> Vec<usize>) {
+    let Some(mut board) = used(3) else { return };
     let (old, new) = (crc(&other_weights(2)), other_weights(1));
     let begin = [&[0x34, 0, 0x44, 0, 0, 0, 0][..], &(new.len() as u32).to_be_bytes()].concat();
     let blocks = new.chunks(BLOCK).zip((1u8..=255).chain(0..=255).cycle());
@@ -234,7 +232,7 @@ fn upload(test: &str, chosen: impl Fn(usize, usize, usize) -> Vec<usize>) {
     assert_ne!(crc(&new), crc(&weights::DEFAULT.0));
     let Tried { cuts, seen } = tried;
     println!(
-        "{test}: {cuts} cuts in {total} accesses, {} contents of the flash, {:.0?}",
+        "{cuts} cuts in {total} accesses, {} contents of the flash, {:.0?}",
         seen.len(),
         begun.elapsed()
     );
@@ -244,7 +242,7 @@ fn upload(test: &str, chosen: impl Fn(usize, usize, usize) -> Vec<usize>) {
 fn old_weights_stay_usable_until_the_new_ones_are_activated() {
     /// Blocks from one sample to the next.
     const EVERY: usize = 16;
-    upload("old_weights_stay_usable_until_the_new_ones_are_activated", |number, requests, accesses| {
+    upload(|number, requests, accesses| {
         let edge = number <= 1 || number + 3 >= requests;
         if edge {
             (1..=accesses).collect()
@@ -263,5 +261,5 @@ fn old_weights_stay_usable_until_the_new_ones_are_activated() {
 #[test]
 #[ignore = "a cut at each access of an upload takes six hours"]
 fn old_weights_stay_usable_after_a_cut_at_each_access() {
-    upload("old_weights_stay_usable_after_a_cut_at_each_access", |_, _, accesses| (1..=accesses).collect());
+    upload(|_, _, accesses| (1..=accesses).collect());
 }

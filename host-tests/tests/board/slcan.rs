@@ -16,7 +16,7 @@ fn standing(board: &mut Board, samples: std::ops::Range<usize>) {
 
 #[test]
 fn board_answers_the_commands_of_a_host() {
-    let Some(mut board) = common::boot("board_answers_the_commands_of_a_host") else { return };
+    let Some(mut board) = common::boot() else { return };
     board.run(START);
     // Frames come before anybody has asked for any.
     standing(&mut board, 0..5);
@@ -52,7 +52,7 @@ fn board_answers_the_commands_of_a_host() {
 /// Case bus/11: the line is no adapter.
 #[test]
 fn a_frame_that_the_board_does_not_use_is_refused_and_counted() {
-    let Some(mut board) = common::boot("a_frame_that_the_board_does_not_use_is_refused_and_counted") else {
+    let Some(mut board) = common::boot() else {
         return;
     };
     board.run(START);

@@ -26,8 +26,7 @@ impl Drop for Running {
 
 #[test]
 fn a_board_without_hardware_answers_on_its_sockets() {
-    const TEST: &str = "a_board_without_hardware_answers_on_its_sockets";
-    let (Some(elf), Some(_)) = (common::elf(TEST), require::python(TEST, &["unicorn"])) else { return };
+    let (Some(elf), Some(_)) = (common::elf(), require::python(&["unicorn"])) else { return };
     let mut command = Command::new(env!("CARGO_BIN_EXE_board"));
     command.args(["--service", "0", "--slcan", "0", "--elf"]).arg(elf).stdout(Stdio::piped());
     let mut child = Running(command.spawn().expect("it was built"));

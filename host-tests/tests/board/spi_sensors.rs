@@ -94,13 +94,13 @@ const ASM330LHH: Fitted = Fitted {
 macro_rules! for_each_part {
     ($($name:ident)*) => {
         mod icm42688 {
-            $(#[test] fn $name() { super::$name(concat!("icm42688_", stringify!($name)), &super::ICM42688) })*
+            $(#[test] fn $name() { super::$name(&super::ICM42688) })*
         }
         mod bmi088 {
-            $(#[test] fn $name() { super::$name(concat!("bmi088_", stringify!($name)), &super::BMI088) })*
+            $(#[test] fn $name() { super::$name(&super::BMI088) })*
         }
         mod asm330lhh {
-            $(#[test] fn $name() { super::$name(concat!("asm330lhh_", stringify!($name)), &super::ASM330LHH) })*
+            $(#[test] fn $name() { super::$name(&super::ASM330LHH) })*
         }
     };
 }
@@ -115,8 +115,8 @@ for_each_part! {
 }
 
 /// A board whose stored configuration names the part; without power.
-fn equipped(test: &str, fitted: &Fitted, configuration: Configuration) -> Option<Board> {
-    let mut board = common::unpowered(test)?;
+fn equipped(fitted: &Fitted, configuration: Configuration) -> Option<Board> {
+    let mut board = common::unpowered()?;
     board.configure("SPI1.part", fitted.model);
     Stored::default().record(&Configuration { imu: fitted.part, ..configuration }).write_to(&mut board);
     Some(board)
@@ -182,36 +182,36 @@ fn on_the_grid(board: &mut Board, late: i64, seconds: usize) -> Vec<usize> {
 
 /// A part in order for so many seconds: each sample is a message set, on the grid, and nothing is counted that should
 /// not be.
-fn in_order(test: &str, fitted: &Fitted, seconds: usize) {
-    let Some(mut board) = equipped(test, fitted, Configuration::DEFAULT) else { return };
+fn in_order(fitted: &Fitted, seconds: usize) {
+    let Some(mut board) = equipped(fitted, Configuration::DEFAULT) else { return };
     start(&mut board, fitted);
     assert_eq!(service::info(&mut board).sensor, None);
     let per_second = on_the_grid(&mut board, fitted.late, seconds);
     assert!(per_second.iter().all(|samples| (99..=101).contains(samples)), "{per_second:?}");
     let AllCounters { pipeline, watch, inputs, .. } = common::counters(&mut board);
-    println!("{test}: {} samples in {seconds} s", per_second.iter().sum::<usize>());
+    println!("{} samples in {seconds} s", per_second.iter().sum::<usize>());
     assert_eq!([pipeline.missing, pipeline.misplaced, pipeline.clock_jumps, inputs.imu_errors], [0; 4]);
     assert_eq!([watch.silences, watch.stuck, watch.clock_off], [0; 3]);
     assert_driven_well(&mut board);
 }
 
-fn samples_come_at_their_rate_and_on_the_grid(test: &str, fitted: &Fitted) {
-    in_order(test, fitted, 4);
+fn samples_come_at_their_rate_and_on_the_grid(fitted: &Fitted) {
+    in_order(fitted, 4);
 }
 
 /// `cargo test -p gyronet-host-tests --test board spi_sensors -- --ignored --nocapture`
 #[test]
 #[ignore = "a minute of board time takes up to three of processor time"]
 fn samples_come_for_a_minute() {
-    in_order("icm42688_samples_come_for_a_minute", &ICM42688, 60);
-    in_order("bmi088_samples_come_for_a_minute", &BMI088, 60);
-    in_order("asm330lhh_samples_come_for_a_minute", &ASM330LHH, 60);
+    in_order(&ICM42688, 60);
+    in_order(&BMI088, 60);
+    in_order(&ASM330LHH, 60);
 }
 
-fn vibration_above_the_bandwidth_does_not_become_a_turn(test: &str, fitted: &Fitted) {
+fn vibration_above_the_bandwidth_does_not_become_a_turn(fitted: &Fitted) {
     /// Amplitude of both tones, deg/s.
     const AMPLITUDE: f64 = 5.0;
-    let Some(mut board) = equipped(test, fitted, Configuration::DEFAULT) else { return };
+    let Some(mut board) = equipped(fitted, Configuration::DEFAULT) else { return };
     board.configure("SPI1.imu_noise", fitted.noise[1]);
     start(&mut board, fitted);
     let set = board.events().into_iter().filter(|event| event.kind == "sensor_bandwidth");
@@ -227,15 +227,15 @@ fn vibration_above_the_bandwidth_does_not_become_a_turn(test: &str, fitted: &Fit
     };
     // 80 Hz would fold to 20 Hz.
     let (folded, slow) = (swing(80.0), swing(3.0));
-    println!("{test}: {AMPLITUDE} deg/s at 80 Hz become {folded:.3} deg/s, at 3 Hz {slow:.3} deg/s");
+    println!("{AMPLITUDE} deg/s at 80 Hz become {folded:.3} deg/s, at 3 Hz {slow:.3} deg/s");
     assert!((slow - AMPLITUDE).abs() < 0.02 * AMPLITUDE, "{slow}");
     // A filter of the third order (25 Hz); one of the second (23 Hz) and the mean of two samples 5 ms apart.
     assert!(folded < 0.04 * AMPLITUDE, "{folded}");
     assert_driven_well(&mut board);
 }
 
-fn part_that_falls_silent_comes_back(test: &str, fitted: &Fitted) {
-    let Some(mut board) = equipped(test, fitted, Configuration::DEFAULT) else { return };
+fn part_that_falls_silent_comes_back(fitted: &Fitted) {
+    let Some(mut board) = equipped(fitted, Configuration::DEFAULT) else { return };
     board.configure("SPI1.imu_rates_dps", json!([0.0, 0.0, 10.0]));
     start(&mut board, fitted);
     board.run(SECOND / 2);
@@ -246,7 +246,7 @@ fn part_that_falls_silent_comes_back(test: &str, fitted: &Fitted) {
     board.run(SECOND / 2);
     let without = rates(&mut board);
     let first = without.iter().find(|(_, rate)| rate.is_none()).expect("silence is reported").0;
-    println!("{test}: silence is reported after {:?}", first - silent);
+    println!("silence is reported after {:?}", first - silent);
     assert!(first - silent < 45 * MS, "{:?}", first - silent);
     assert!(known(&without) <= 2, "no rate is made up");
     assert!(without.len() >= 44, "{} message sets", without.len());
@@ -257,7 +257,7 @@ fn part_that_falls_silent_comes_back(test: &str, fitted: &Fitted) {
     board.run(2 * SECOND);
     let back = rates(&mut board);
     let first = back.iter().find(|(_, rate)| rate.is_some()).expect("it comes back").0;
-    println!("{test}: the first rate comes {:?} after the part", first - since);
+    println!("the first rate comes {:?} after the part", first - since);
     assert!(first - since < SECOND + fitted.up[0] + 40 * MS, "{:?}", first - since);
     let turning = back.iter().rev().take(5).map(|(_, rate)| rate.expect("a rate"));
     turning.for_each(|rate| assert!((rate - 10.0).abs() < 0.2, "{rate} deg/s"));
@@ -273,9 +273,9 @@ fn part_that_falls_silent_comes_back(test: &str, fitted: &Fitted) {
     assert_eq!(pipeline.misplaced, 0, "every sample has a place on the grid");
 }
 
-fn wrong_part_is_named_and_gives_no_rate(test: &str, fitted: &Fitted) {
+fn wrong_part_is_named_and_gives_no_rate(fitted: &Fitted) {
     const OTHER: u8 = 0x42;
-    let Some(mut board) = equipped(test, fitted, Configuration::DEFAULT) else { return };
+    let Some(mut board) = equipped(fitted, Configuration::DEFAULT) else { return };
     let (identity, own) = fitted.identity;
     board.configure(identity, OTHER);
     board.power_on();
@@ -301,7 +301,7 @@ fn turned(angles: &[(Duration, Vec<u8>)]) -> f64 {
     steps.sum::<i64>() as f64 * 360.0 / 4_294_967_296.0
 }
 
-fn yaw_is_right_though_the_parts_oscillator_is_one_percent_off(test: &str, fitted: &Fitted) {
+fn yaw_is_right_though_the_parts_oscillator_is_one_percent_off(fitted: &Fitted) {
     /// Deg/s, and seconds of it.
     const RATE: f64 = 30.0;
     const LASTS: f64 = 4.0;
@@ -310,7 +310,7 @@ fn yaw_is_right_though_the_parts_oscillator_is_one_percent_off(test: &str, fitte
     // Without corrections by the network: what is integrated is the part's rate less its static bias.
     let mut configuration = Configuration::DEFAULT;
     configuration.compensate.model = false;
-    let Some(mut board) = equipped(test, fitted, configuration) else { return };
+    let Some(mut board) = equipped(fitted, configuration) else { return };
     let row = |seconds: f64, rate: f64| json!([seconds * 1e6, [0.0, 0.0, rate], LEVEL]);
     let turn = [
         row(BEGINS - 0.1, 0.0),
@@ -330,7 +330,7 @@ fn yaw_is_right_though_the_parts_oscillator_is_one_percent_off(test: &str, fitte
     let angles = of(&mut board, ANGLE);
     let (turned, expected) = (turned(&angles), RATE * LASTS);
     let per_second = angles.len() as f64 / (LASTS + 1.0);
-    println!("{test}: {turned:.4} deg of {expected}, {per_second} samples a second");
+    println!("{turned:.4} deg of {expected}, {per_second} samples a second");
     assert!((100.5..=101.5).contains(&per_second), "{per_second}");
     assert!((turned / expected - 1.0).abs() < 1e-3, "{turned} deg of {expected}");
     assert_eq!(common::counters(&mut board).watch.clock_off, 0);
@@ -353,10 +353,10 @@ fn judged(board: &mut Board) -> Vec<(f64, Quality)> {
     known.filter_map(|rate| Some((rate.deg_per_sec()?, rate.quality))).collect()
 }
 
-fn what_a_standstill_has_shown_corrects_the_next_start_before_it_stands(test: &str, fitted: &Fitted) {
+fn what_a_standstill_has_shown_corrects_the_next_start_before_it_stands(fitted: &Fitted) {
     /// The bias of the part about its three axes, deg/s.
     const BIAS: [f64; 3] = [0.2, -0.1, 0.4];
-    let Some(mut board) = equipped(test, fitted, Configuration::DEFAULT) else { return };
+    let Some(mut board) = equipped(fitted, Configuration::DEFAULT) else { return };
     board.configure("SPI1.imu_rates_dps", json!(BIAS));
     start(&mut board, fitted);
     roll(&mut board, 8, 0.0);
@@ -366,7 +366,7 @@ fn what_a_standstill_has_shown_corrects_the_next_start_before_it_stands(test: &s
         found.map(|rate| rate.rad_per_sec().to_degrees())
     };
     let found = bias(&learned, 25.0);
-    println!("{test}: {found:.3?} deg/s");
+    println!("{found:.3?} deg/s");
     assert!(found.iter().zip(BIAS).all(|(found, bias)| (found - bias).abs() < 0.01), "{found:?}");
 
     // It drives off with power on, and turns at 5 deg/s.
@@ -396,8 +396,7 @@ fn failed_self_test_is_named_and_is_tried_again() {
         (&ASM330LHH, "SPI1.imu_self_test"),
         (&ASM330LHH, "SPI1.imu_acc_self_test"),
     ] {
-        let test = format!("{}_failed_self_test", fitted.model);
-        let Some(mut board) = equipped(&test, fitted, Configuration::DEFAULT) else { return };
+        let Some(mut board) = equipped(fitted, Configuration::DEFAULT) else { return };
         board.configure(die, false);
         start(&mut board, fitted);
         assert_eq!(service::info(&mut board).sensor, Some(SensorFault::SelfTest), "{die}");
@@ -413,8 +412,7 @@ fn failed_self_test_is_named_and_is_tried_again() {
 #[test]
 fn rate_beyond_the_range_is_not_used() {
     for fitted in [&BMI088, &ASM330LHH] {
-        let test = format!("{}_rate_beyond_the_range", fitted.model);
-        let Some(mut board) = equipped(&test, fitted, Configuration::DEFAULT) else { return };
+        let Some(mut board) = equipped(fitted, Configuration::DEFAULT) else { return };
         start(&mut board, fitted);
         board.run(SECOND / 2);
         board.configure("SPI1.imu_rates_dps", json!([0.0, 0.0, 251.0]));

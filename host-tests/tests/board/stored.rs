@@ -55,10 +55,9 @@ fn erased_and_reset(board: &mut Board) -> (Vec<u64>, Vec<String>) {
 
 #[test]
 fn configuration_survives_restarts_while_sectors_fill_and_are_used_again() {
-    const TEST: &str = "configuration_survives_restarts_while_sectors_fill_and_are_used_again";
     /// Stores between two restarts.
     const STORES: usize = 40;
-    let Some(mut board) = common::boot(TEST) else { return };
+    let Some(mut board) = common::boot() else { return };
     board.run(START);
     let (mut erased, mut resets) = erased_and_reset(&mut board);
     let mut stores = 0;
@@ -86,7 +85,7 @@ fn configuration_survives_restarts_while_sectors_fill_and_are_used_again() {
         erased.extend(sectors);
         resets.extend(causes);
     }
-    println!("{TEST}: {stores} stores, sectors erased: {erased:?}");
+    println!("{stores} stores, sectors erased: {erased:?}");
     assert_eq!(erased[..4], [1, 2, 1, 2]);
     assert_eq!(resets[0], "por");
     assert!(resets[1..].iter().all(|cause| cause == "software"), "{resets:?}");
@@ -96,7 +95,7 @@ fn configuration_survives_restarts_while_sectors_fill_and_are_used_again() {
 fn stale_error_flags_of_the_flash_controller_refuse_no_store() {
     /// OPERR, WRPERR, PGAERR, PGPERR and PGSERR of FLASH_SR, as an operation before this image may leave them.
     const ERRORS: u32 = 0xF2;
-    let Some(mut board) = common::boot("stale_error_flags_of_the_flash_controller_refuse_no_store") else {
+    let Some(mut board) = common::boot() else {
         return;
     };
     board.run(START);
@@ -110,8 +109,7 @@ fn stale_error_flags_of_the_flash_controller_refuse_no_store() {
 
 #[test]
 fn board_time_goes_on_over_an_erase() {
-    const TEST: &str = "board_time_goes_on_over_an_erase";
-    let Some(mut board) = common::boot(TEST) else { return };
+    let Some(mut board) = common::boot() else { return };
     board.configure("GPIOA.watch", vec![LED]);
     board.run(START + 2 * BLINK);
     // The first store erases a sector, whatever is in it.
@@ -124,7 +122,7 @@ fn board_time_goes_on_over_an_erase() {
     let edges: Vec<Duration> =
         events.iter().filter(|event| event.kind == "pin").map(|event| event.time).collect();
     let first = edges[0];
-    println!("{TEST}: edges {edges:?}, erase at {erase:?}");
+    println!("edges {edges:?}, erase at {erase:?}");
     let late = |time: Duration| (time - first).as_micros() % BLINK.as_micros();
     let stalled = |time: &Duration| (erase..erase + ERASE + MS).contains(time);
     for edge in edges.iter().filter(|time| !stalled(time)) {
@@ -136,8 +134,7 @@ fn board_time_goes_on_over_an_erase() {
 
 #[test]
 fn longest_erase_fits_the_watchdogs_limit_and_the_short_limit_returns() {
-    const TEST: &str = "longest_erase_fits_the_watchdogs_limit_and_the_short_limit_returns";
-    let Some(mut board) = common::unpowered(TEST) else { return };
+    let Some(mut board) = common::unpowered() else { return };
     // The slowest flash and the fastest watchdog (DS8626 tables 39 and 34).
     board.configure("FLASH.time_factor", 2.0);
     board.configure("RCC.lsi_hz", 47_000);
@@ -150,7 +147,7 @@ fn longest_erase_fits_the_watchdogs_limit_and_the_short_limit_returns() {
         service::answer(board, Duration::from_secs(4))
     });
     assert_eq!(response, Some(vec![0x74, 0x20, 1, 2]));
-    println!("{TEST}: a slot is erased in {took:?}");
+    println!("a slot is erased in {took:?}");
     assert!(took >= Duration::from_secs(2));
     // The sensor's silence outlasts that of the erase, and is stored with the next request.
     board.run(Duration::from_millis(1_500));
@@ -166,10 +163,9 @@ fn longest_erase_fits_the_watchdogs_limit_and_the_short_limit_returns() {
 
 #[test]
 fn uploaded_weights_run_from_their_slot() {
-    const TEST: &str = "uploaded_weights_run_from_their_slot";
     /// Samples: static initialisation takes three seconds, the first windows follow.
     const SAMPLES: usize = 400;
-    let Some(mut board) = common::boot(TEST) else { return };
+    let Some(mut board) = common::boot() else { return };
     board.run(START);
     let file = other_weights(1);
     let crc = crc(&file);
@@ -184,7 +180,7 @@ fn uploaded_weights_run_from_their_slot() {
         done
     });
     assert_eq!(done.expect("it is signed"), Uploaded { slot: Slot::A, crc });
-    println!("{TEST}: {} bytes, signed, running after {took:?}", file.len());
+    println!("{} bytes, signed, running after {took:?}", file.len());
     assert!(took < Duration::from_secs(60), "{took:?}");
     assert_eq!(common::counters(&mut board).lines.frames_lost, 0);
     let info = service::info(&mut board);

@@ -30,8 +30,8 @@ struct Started {
 }
 
 impl Started {
-    fn with(test: &str, stored: &Stored, prepare: impl FnOnce(&mut Board)) -> Option<Self> {
-        let mut board = common::unpowered(test)?;
+    fn with(stored: &Stored, prepare: impl FnOnce(&mut Board)) -> Option<Self> {
+        let mut board = common::unpowered()?;
         stored.write_to(&mut board);
         prepare(&mut board);
         board.power_on();
@@ -66,7 +66,7 @@ fn a_stored_configuration_takes_effect() {
         ..Configuration::DEFAULT
     };
     let stored = Stored::default().record(&configuration);
-    let Some(started) = Started::with("a_stored_configuration_takes_effect", &stored, |_| ()) else { return };
+    let Some(started) = Started::with(&stored, |_| ()) else { return };
     assert_eq!(started.info.configuration, Origin::Stored);
     assert_eq!(started.of(RATE).count(), 0);
     assert!(started.of(OTHER).count() >= SAMPLES - 1);
@@ -83,8 +83,7 @@ fn a_damaged_configuration_and_a_damaged_slot_give_way_and_are_reported() {
     let stored = Stored::default().record(&Configuration::DEFAULT).weights(Slot::A, &a).weights(Slot::B, &b);
     let inside = Slot::B.offset() + SLOT_SIZE as u32 / 2;
     let stored = stored.damaged(STORE.start + 20, 4).damaged(inside, 0x10);
-    let test = "a_damaged_configuration_and_a_damaged_slot_give_way_and_are_reported";
-    let Some(Started { info, .. }) = Started::with(test, &stored, |_| ()).inspect(|started| {
+    let Some(Started { info, .. }) = Started::with(&stored, |_| ()).inspect(|started| {
         assert!(started.flagged());
     }) else {
         return;
@@ -101,7 +100,7 @@ fn nothing_is_written_with_an_unlocked_flash_controller() {
     let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
     let stored = Stored::default().record(&configuration);
     let unlocked = |board: &mut Board| board.configure("FLASH.starts_unlocked", true);
-    let started = Started::with("nothing_is_written_with_an_unlocked_flash_controller", &stored, unlocked);
+    let started = Started::with(&stored, unlocked);
     let Some(mut started) = started else { return };
     assert!(started.flagged());
     assert_eq!((started.info.configuration, started.info.writable), (Origin::Stored, false));

@@ -15,7 +15,7 @@ const SECOND: Duration = Duration::from_secs(1);
 
 #[test]
 fn low_for_the_first_50_ms() {
-    let Some(mut board) = unpowered("low_for_the_first_50_ms") else { return };
+    let Some(mut board) = unpowered() else { return };
     board.configure(SUPPLY, LOW);
     board.power_on();
     board.run(Duration::from_millis(50));
@@ -29,7 +29,7 @@ fn low_for_the_first_50_ms() {
 
 #[test]
 fn low_for_seconds() {
-    let Some(mut board) = unpowered("low_for_seconds") else { return };
+    let Some(mut board) = unpowered() else { return };
     board.configure(SUPPLY, LOW);
     board.power_on();
     board.run(3 * SECOND);
@@ -43,7 +43,7 @@ fn low_for_seconds() {
 
 #[test]
 fn falling_while_the_image_runs() {
-    let Some(mut board) = boot("falling_while_the_image_runs") else { return };
+    let Some(mut board) = boot() else { return };
     board.run(START);
     board.configure(SUPPLY, 2_700);
     board.run(START);
@@ -67,7 +67,7 @@ fn stored(board: &mut Board) -> u16 {
 
 #[test]
 fn falling_during_an_erase() {
-    let Some(mut board) = boot("falling_during_an_erase") else { return };
+    let Some(mut board) = boot() else { return };
     board.run(START);
     // Until a store has to erase a sector; the supply falls in the middle of that.
     let last = (1..1_000).find(|number| {

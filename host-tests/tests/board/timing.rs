@@ -80,11 +80,10 @@ fn timed(board: &mut Board, request: &[u8]) -> Timed {
 /// Case bus/04: ISO 15765-2 counts the separation time from the end of a frame to the begin of the next one.
 #[test]
 fn separation_times_are_kept_on_the_bus() {
-    const TEST: &str = "separation_times_are_kept_on_the_bus";
-    let Some(mut board) = common::boot(TEST) else { return };
+    let Some(mut board) = common::boot() else { return };
     common::send(&mut board, &drive(500), START);
     board.run(START + SAMPLE * 50);
-    println!("{TEST}: wanted, then least, median and largest gap in ms");
+    println!("wanted, then least, median and largest gap in ms");
     for code in [0x00, 0xF1, 0xF5, 0xF9, 0x01, 0x02, 0x03, 0x05, 0x0A, 0x14] {
         let wanted = match code {
             0xF1..=0xF9 => Duration::from_micros(100 * (code - 0xF0)),
@@ -117,7 +116,7 @@ fn separation_times_are_kept_on_the_bus() {
 /// Case bus/05: a trouble waits to be stored with an erase.
 #[test]
 fn the_first_requests_of_a_session_are_answered_in_time() {
-    let Some(mut board) = common::boot("the_first_requests_of_a_session_are_answered_in_time") else {
+    let Some(mut board) = common::boot() else {
         return;
     };
     board.run(START + Duration::from_secs(3));
@@ -139,8 +138,7 @@ fn the_first_requests_of_a_session_are_answered_in_time() {
 /// Every request under full load, one behind the other.
 #[test]
 fn no_response_is_later_than_p2_without_a_wait() {
-    const TEST: &str = "no_response_is_later_than_p2_without_a_wait";
-    let Some(mut board) = common::boot(TEST) else { return };
+    let Some(mut board) = common::boot() else { return };
     board.run(START);
     stand(&mut board, 3_500);
     board.run(Duration::from_secs(5));
@@ -166,15 +164,15 @@ fn no_response_is_later_than_p2_without_a_wait() {
     times.sort();
     for (low, high) in [(0, 1), (1, 2), (2, 3), (3, 5), (5, 10), (10, 20), (20, 50)] {
         let count = times.iter().filter(|time| (low * MS..high * MS).contains(*time)).count();
-        println!("{TEST}: {low:2} to {high:2} ms: {count}");
+        println!("{low:2} to {high:2} ms: {count}");
     }
-    println!("{TEST}: the longest {:?}", times[times.len() - 1]);
+    println!("the longest {:?}", times[times.len() - 1]);
 }
 
 /// Case bus/20.
 #[test]
 fn a_setting_that_is_stored_leaves_no_troubles() {
-    let Some(mut board) = common::boot("a_setting_that_is_stored_leaves_no_troubles") else { return };
+    let Some(mut board) = common::boot() else { return };
     board.run(START);
     stand(&mut board, 1_200);
     board.run(Duration::from_secs(5));
@@ -190,7 +188,7 @@ fn a_setting_that_is_stored_leaves_no_troubles() {
 /// Two testers at once, and one that vanishes in the middle of a response and of a request.
 #[test]
 fn a_second_tester_waits_in_silence_and_no_longer_than_a_second() {
-    let Some(mut board) = common::boot("a_second_tester_waits_in_silence_and_no_longer_than_a_second") else {
+    let Some(mut board) = common::boot() else {
         return;
     };
     board.run(START);

@@ -48,8 +48,7 @@ fn ask(board: &mut Board, request: &[u8]) -> Option<Vec<u8>> {
 
 #[test]
 fn a_sensor_that_falls_silent_is_a_trouble_and_the_rates_keep_their_place() {
-    const TEST: &str = "a_sensor_that_falls_silent_is_a_trouble_and_the_rates_keep_their_place";
-    let Some(mut board) = common::boot(TEST) else { return };
+    let Some(mut board) = common::boot() else { return };
     board.run(START);
     let now = board.counts().time;
     common::send(&mut board, &drive(100), now);
@@ -86,8 +85,7 @@ fn a_sensor_that_falls_silent_is_a_trouble_and_the_rates_keep_their_place() {
 
 #[test]
 fn diagnosis_with_29_bits_is_configured_over_itself() {
-    const TEST: &str = "diagnosis_with_29_bits_is_configured_over_itself";
-    let Some(mut board) = common::boot(TEST) else { return };
+    let Some(mut board) = common::boot() else { return };
     board.run(START);
     let ids =
         DiagnosisIds { extended: true, request: 0x18DA_10F1, functional: 0x18DB_33F1, response: 0x18DA_F110 };
@@ -117,11 +115,8 @@ fn diagnosis_with_29_bits_is_configured_over_itself() {
 /// Relays frames between the client's pipes and the board, a millisecond of the board's time for each turn.
 #[test]
 fn udsoncan_reads_writes_downloads_and_updates() {
-    const TEST: &str = "udsoncan_reads_writes_downloads_and_updates";
-    let Some(python) = require::python(TEST, &["isotp", "udsoncan", "yaml"]) else { return };
-    let (Some(whole), Some(mut board)) =
-        (image::update(TEST, env!("CARGO_TARGET_TMPDIR")), common::boot(TEST))
-    else {
+    let Some(python) = require::python(&["isotp", "udsoncan", "yaml"]) else { return };
+    let (Some(whole), Some(mut board)) = (image::update(env!("CARGO_TARGET_TMPDIR")), common::boot()) else {
         return;
     };
     board.run(START);

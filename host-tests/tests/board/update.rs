@@ -29,9 +29,9 @@ const CAN: u32 = 2;
 const TRIAL: Duration = Duration::from_secs(60);
 const BACK: Duration = Duration::from_secs(1);
 
-fn built(test: &str) -> Option<Update> {
-    require::python(test, PACKAGES)?;
-    image::update(test, env!("CARGO_TARGET_TMPDIR"))
+fn built() -> Option<Update> {
+    require::python(PACKAGES)?;
+    image::update(env!("CARGO_TARGET_TMPDIR"))
 }
 
 fn firmware(board: &mut Board) -> (Option<Slot>, FirmwareState) {
@@ -66,8 +66,7 @@ impl Bus for Recorder<'_> {
 
 #[test]
 fn the_whole_image_is_updated_over_can_while_rates_are_sent() {
-    const TEST: &str = "the_whole_image_is_updated_over_can_while_rates_are_sent";
-    let (Some(update_file), Some(mut board)) = (built(TEST), common::boot(TEST)) else { return };
+    let (Some(update_file), Some(mut board)) = (built(), common::boot()) else { return };
     board.run(START);
     let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
     on_bus(&mut board).set_configuration(&configuration).expect("it stands");
@@ -92,7 +91,7 @@ fn the_whole_image_is_updated_over_can_while_rates_are_sent() {
     let rates: Vec<_> = log.iter().filter(|(_, frame)| frame.id() == rate).collect();
     let gaps: Vec<_> = rates.windows(2).filter(|pair| pair[1].0 - pair[0].0 > 15 * MS).collect();
     println!(
-        "{TEST}: {size} bytes in {took:.2?}, {} rates, silences {:.0?}",
+        "{size} bytes in {took:.2?}, {} rates, silences {:.0?}",
         rates.len(),
         gaps.iter().map(|pair| pair[1].0 - pair[0].0).collect::<Vec<_>>()
     );
@@ -121,7 +120,7 @@ fn the_whole_image_is_updated_over_can_while_rates_are_sent() {
     assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::OnTrial));
     let first = board.can_frames().into_iter().find(|(_, frame)| frame.id() == rate).expect("rates").0;
     let reset = resets(&mut board).pop().expect("a restart");
-    println!("{TEST}: first rate {:.0?} after the reset", first - reset.0);
+    println!("first rate {:.0?} after the reset", first - reset.0);
     assert!(first - reset.0 < 300 * MS);
     board.run(16 * S);
     assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
@@ -141,8 +140,8 @@ fn install(board: &mut Board, image: &[u8], expected: u32) {
 
 /// Starts the board with the image in slot A, and restarts it with another one on trial in slot B. That restart is the first
 /// event.
-fn try_on(test: &str, expected: u32, spoil: impl FnOnce(&mut Board, &mut Vec<u8>)) -> Option<Board> {
-    let (Update { images: [_, mut image], .. }, mut board) = (built(test)?, common::boot(test)?);
+fn try_on(expected: u32, spoil: impl FnOnce(&mut Board, &mut Vec<u8>)) -> Option<Board> {
+    let (Update { images: [_, mut image], .. }, mut board) = (built()?, common::boot()?);
     board.run(START);
     assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::Confirmed));
     spoil(&mut board, &mut image);
@@ -188,8 +187,6 @@ fn rolled_back(board: &mut Board) {
 
 #[test]
 fn an_image_that_hangs_is_rolled_back_by_the_first_reset_and_one_that_crashes_by_the_third() {
-    const TEST: &str =
-        "an_image_that_hangs_is_rolled_back_by_the_first_reset_and_one_that_crashes_by_the_third";
     const HANG: [u8; 2] = [0xFE, 0xE7];
     const UNDEFINED: [u8; 2] = [0, 0xDE];
     // Its idle task, its output task, and its first instruction, before it has started the watchdog.
@@ -200,7 +197,7 @@ fn an_image_that_hangs_is_rolled_back_by_the_first_reset_and_one_that_crashes_by
         ("idle::Idle::step", UNDEFINED, &["software"; 3]),
     ] {
         let spoil = |board: &mut Board, image: &mut Vec<u8>| replace(board, image, function, &code);
-        let Some(mut board) = try_on(TEST, 0, spoil) else { return };
+        let Some(mut board) = try_on(0, spoil) else { return };
         board.run(5 * S);
         let causes: Vec<String> = common::resets(&mut board).into_iter().map(|(_, cause)| cause).collect();
         assert_eq!(causes[1..], *resets, "{function}");
@@ -211,8 +208,7 @@ fn an_image_that_hangs_is_rolled_back_by_the_first_reset_and_one_that_crashes_by
 /// The image resets itself where the supply is too low to program flash: no fault of its own.
 #[test]
 fn a_supply_that_dips_does_not_end_a_trial() {
-    const TEST: &str = "a_supply_that_dips_does_not_end_a_trial";
-    let Some(mut board) = try_on(TEST, 0, |_, _| {}) else { return };
+    let Some(mut board) = try_on(0, |_, _| {}) else { return };
     board.run(2 * S);
     board.configure("PWR.supply_mv", 2_700);
     board.run(50 * MS);
@@ -225,12 +221,11 @@ fn a_supply_that_dips_does_not_end_a_trial() {
 
 #[test]
 fn an_image_without_can_is_rolled_back_after_its_trial() {
-    const TEST: &str = "an_image_without_can_is_rolled_back_after_its_trial";
     // It says of each frame that no mailbox was free: movs r0, #0; bx lr
     let spoil = |board: &mut Board, image: &mut Vec<u8>| {
         replace(board, image, "stm32f405::can::Can::transmit", &[0, 0x20, 0x70, 0x47]);
     };
-    let Some(mut board) = try_on(TEST, CAN, spoil) else { return };
+    let Some(mut board) = try_on(CAN, spoil) else { return };
     let _ = board.events();
     assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::OnTrial));
     board.run(TRIAL - BACK);
@@ -242,7 +237,6 @@ fn an_image_without_can_is_rolled_back_after_its_trial() {
 
 #[test]
 fn an_image_that_lacks_the_sensor_is_rolled_back_after_its_trial() {
-    const TEST: &str = "an_image_that_lacks_the_sensor_is_rolled_back_after_its_trial";
     // It waits for another preamble: cmp r_, #FA becomes cmp r_, #FB.
     let spoil = |board: &mut Board, image: &mut Vec<u8>| {
         let function = function(board, image, "sensor::xsens::Mti::next_message");
@@ -251,7 +245,7 @@ fn an_image_that_lacks_the_sensor_is_rolled_back_after_its_trial() {
         assert_eq!(places.len(), 1, "where the preamble is compared");
         places.into_iter().for_each(|code| code[0] = 0xFB);
     };
-    let Some(mut board) = try_on(TEST, SENSOR | CAN, spoil) else { return };
+    let Some(mut board) = try_on(SENSOR | CAN, spoil) else { return };
     let _ = board.events();
     stand(&mut board, 6_200);
     board.run(TRIAL - BACK);
@@ -263,9 +257,7 @@ fn an_image_that_lacks_the_sensor_is_rolled_back_after_its_trial() {
 
 #[test]
 fn an_image_that_is_damaged_after_its_confirmation_gives_way_and_without_any_the_led_says_so() {
-    const TEST: &str =
-        "an_image_that_is_damaged_after_its_confirmation_gives_way_and_without_any_the_led_says_so";
-    let Some(mut board) = try_on(TEST, 0, |_, _| {}) else { return };
+    let Some(mut board) = try_on(0, |_, _| {}) else { return };
     board.run(16 * S);
     assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
     let damage = |board: &mut Board, slot| {
@@ -294,7 +286,6 @@ fn an_image_that_is_damaged_after_its_confirmation_gives_way_and_without_any_the
 
 /// Cuts of the power while a board acts.
 pub struct Cuts<'a> {
-    pub test: &'a str,
     /// Cuts at all accesses to the flash, or at some.
     pub all: bool,
     /// Number of these at most in a step.
@@ -338,16 +329,16 @@ impl Cuts<'_> {
                 assert!((0..3).any(|_| (self.starts)(board)), "{name}: {access} of {count}, {delay:?}");
             }
         }
-        println!("{}: {name}: {count} accesses, {} cuts so far", self.test, self.count);
+        println!("{name}: {count} accesses, {} cuts so far", self.count);
         board.restore("after");
     }
 }
 
 /// Cuts the power at accesses to the flash while an image is downloaded, activated, tried, rolled back and confirmed, at all
 /// of them or at some, and at `delays` after each. The image that is rolled back is the first KiB of one.
-fn cut_power(test: &str, all: bool, delays: &[Duration]) {
+fn cut_power(all: bool, delays: &[Duration]) {
     const TINY: usize = 1_024;
-    let (Some(file), Some(mut board)) = (built(test), common::boot(test)) else { return };
+    let (Some(file), Some(mut board)) = (built(), common::boot()) else { return };
     board.run(3 * S);
     service::enter(&mut board, 2);
     let [a, b] = &file.images;
@@ -357,7 +348,7 @@ fn cut_power(test: &str, all: bool, delays: &[Duration]) {
         board.run(2 * START);
         on_line(board).info().is_ok_and(|info| info.firmware.slot.is_some())
     };
-    let mut cuts = Cuts { test, all, most: usize::MAX, delays, starts: &starts, count: 0 };
+    let mut cuts = Cuts { all, most: usize::MAX, delays, starts: &starts, count: 0 };
     let mut cut = |board: &mut Board, name: &str, every: usize, act: &dyn Fn(&mut Board), limit: Duration| {
         cuts.during(board, name, every, act, limit);
     };
@@ -383,22 +374,19 @@ fn cut_power(test: &str, all: bool, delays: &[Duration]) {
     board.run(START + 14_700 * MS);
     cut(&mut board, "confirmation", 3, &|_| (), S);
     assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::Confirmed));
-    println!("{test}: {} cuts", cuts.count);
+    println!("{} cuts", cuts.count);
 }
 
 #[test]
 fn an_image_starts_after_a_cut_at_an_access_of_the_update() {
-    const TEST: &str = "an_image_starts_after_a_cut_at_an_access_of_the_update";
-    cut_power(TEST, false, &[Duration::ZERO, Duration::from_micros(8), 300 * MS]);
+    cut_power(false, &[Duration::ZERO, Duration::from_micros(8), 300 * MS]);
 }
 
 /// `cargo test -p gyronet-host-tests --test board cut_at_each_access_of_the_update -- --ignored --nocapture`
 #[test]
 #[ignore = "2,000 cuts take half an hour"]
 fn an_image_starts_after_a_cut_at_each_access_of_the_update() {
-    const TEST: &str = "an_image_starts_after_a_cut_at_each_access_of_the_update";
     cut_power(
-        TEST,
         true,
         &[Duration::ZERO, Duration::from_micros(4), Duration::from_micros(12), 300 * MS, 900 * MS],
     );

@@ -46,8 +46,7 @@ fn settings() -> gyronet::can::wheel::WheelSettings {
 
 #[test]
 fn another_maker_s_frames_are_understood_without_a_new_image() {
-    const TEST: &str = "another_maker_s_frames_are_understood_without_a_new_image";
-    let Some(mut board) = common::boot(TEST) else { return };
+    let Some(mut board) = common::boot() else { return };
     board.run(START);
     service::on_line(&mut board).set_wheels(&settings()).expect("they are stored");
     service::on_line(&mut board).restart().expect("a response");

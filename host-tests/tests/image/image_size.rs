@@ -4,8 +4,8 @@ use gyronet_host_tests::{image, qemu};
 use gyronet_tools::target::size::{BUDGETS, ImageSize};
 use gyronet_tools::target::stack::{ImageStack, functions};
 
-fn elf(test: &str, name: &str) -> Option<Vec<u8>> {
-    let path = image::firmware(test, env!("CARGO_TARGET_TMPDIR"), name)?;
+fn elf(name: &str) -> Option<Vec<u8>> {
+    let path = image::firmware(env!("CARGO_TARGET_TMPDIR"), name)?;
     Some(std::fs::read(path).expect("it was just built"))
 }
 
@@ -18,22 +18,20 @@ fn panics(elf: &[u8]) -> Vec<String> {
 
 #[test]
 fn no_panic_in_the_image() {
-    const NAME: &str = "no_panic_in_the_image";
-    let Some(image) = elf(NAME, "coprocessor") else { return };
+    let Some(image) = elf("coprocessor") else { return };
     // The linker keeps what is reached: what is not there is reached from nowhere.
     assert_eq!(panics(&image), [""; 0], "the image can panic");
     // The bench image can panic, and that is seen. It takes 20 s to build, and only the tests in QEMU need it as well.
-    if qemu::available(NAME).is_none() {
+    if qemu::available().is_none() {
         return;
     }
-    let Some(bench) = elf(NAME, "bench") else { return };
+    let Some(bench) = elf("bench") else { return };
     assert!(!panics(&bench).is_empty(), "the bench image has no panic handler: is the symbol table read?");
 }
 
 #[test]
 fn budgets_hold() {
-    const NAME: &str = "budgets_hold";
-    let Some(path) = image::firmware(NAME, env!("CARGO_TARGET_TMPDIR"), "coprocessor") else { return };
+    let Some(path) = image::firmware(env!("CARGO_TARGET_TMPDIR"), "coprocessor") else { return };
     let stack = ImageStack::read(&std::fs::read(&path).expect("just built")).expect("a bound");
     println!("{stack:?}");
     assert!(stack.deepest.iter().any(|(name, _)| name.contains("main")), "{:?}", stack.deepest);

@@ -27,9 +27,8 @@ const BARS: [Bar; 4] = [
 
 #[test]
 fn kernels_cost_no_more_than_their_bars() {
-    let test = "kernels_cost_no_more_than_their_bars";
-    let Some(()) = qemu::available(test) else { return };
-    let Some(bench) = image::firmware(test, env!("CARGO_TARGET_TMPDIR"), bench::IMAGE) else { return };
+    let Some(()) = qemu::available() else { return };
+    let Some(bench) = image::firmware(env!("CARGO_TARGET_TMPDIR"), bench::IMAGE) else { return };
     let counts = bench::measure(&bench::workspace(), &bench).unwrap_or_else(|error| panic!("{error}"));
     for Bar { name, instructions, cycles } in BARS {
         let count = counts.get(name).expect(name);
@@ -50,8 +49,7 @@ fn kernels_cost_no_more_than_their_bars() {
 
 #[test]
 fn kernels_fit_in_8_kib() {
-    let Some(elf) = image::firmware("kernels_fit_in_8_kib", env!("CARGO_TARGET_TMPDIR"), "coprocessor")
-    else {
+    let Some(elf) = image::firmware(env!("CARGO_TARGET_TMPDIR"), "coprocessor") else {
         return;
     };
     let size = ImageSize::read(&elf).expect("an ELF file");
@@ -63,9 +61,8 @@ fn kernels_fit_in_8_kib() {
 /// equal this host's.
 #[test]
 fn kernels_on_the_target_equal_the_hosts() {
-    let Some(()) = qemu::available("kernels_on_the_target_equal_the_hosts") else { return };
-    let name = "kernels_on_the_target_equal_the_hosts";
-    let Some(elf) = image::firmware(name, env!("CARGO_TARGET_TMPDIR"), "selftest") else { return };
+    let Some(()) = qemu::available() else { return };
+    let Some(elf) = image::firmware(env!("CARGO_TARGET_TMPDIR"), "selftest") else { return };
     let (printed, _) = bench::emulate(bench::MACHINE, &elf, &[]).unwrap_or_else(|error| panic!("{error}"));
     println!("{printed}");
     assert!(printed.contains(&format!("gyronet hash={:08x}\n", hash())), "{printed}");

@@ -206,7 +206,7 @@ fn a_limit_follows_the_steps_of_its_axis() {
 /// No reading of any recording is doubted.
 #[test]
 fn nothing_that_was_recorded_is_implausible() {
-    let Some(_) = recordings::trial("nothing_that_was_recorded_is_implausible", 9) else { return };
+    let Some(_) = recordings::trial(9) else { return };
     let folders = ["wid_car", "car_mti710", "rc_car", "real_car", "truck", "utv"]
         .map(|set| recordings::folder().join(set));
     let files = folders.iter().flat_map(|folder| std::fs::read_dir(folder).expect("a set"));

@@ -61,7 +61,7 @@ fn a_cured_pair_of_situation_and_vehicle_stays_within_four_sigma() {
 fn a_recording_is_judged_by_its_reference() {
     let folder = folder();
     let found = folder.join("truck").is_dir().then_some(&folder).ok_or("no recordings of truck".to_owned());
-    let Some(folder) = require::wants("a_recording_is_judged_by_its_reference", Need::Data, found) else {
+    let Some(folder) = require::wants(Need::Data, found) else {
         return;
     };
     let judged = situations::recordings::judged(folder, "truck/joined");

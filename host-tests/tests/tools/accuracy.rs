@@ -57,9 +57,9 @@ impl Trial {
 }
 
 /// The trials, run once for both tests; `None` without the recordings.
-fn trials(test: &str) -> Option<&'static [Trial]> {
+fn trials() -> Option<&'static [Trial]> {
     static RUN: OnceLock<Vec<Trial>> = OnceLock::new();
-    let drives: Vec<_> = TRIALS.into_iter().zip(recordings::trials(test, &TRIALS)?).collect();
+    let drives: Vec<_> = TRIALS.into_iter().zip(recordings::trials(&TRIALS)?).collect();
     Some(RUN.get_or_init(|| parallel::map(&drives, |(trial, path)| Trial::new(*trial, path))))
 }
 
@@ -96,7 +96,7 @@ fn hold(what: &str, ratio: f64, readme: f64) {
 
 #[test]
 fn rates_are_as_good_as_the_pages_say() {
-    let Some(trials) = trials("rates_are_as_good_as_the_pages_say") else { return };
+    let Some(trials) = trials() else { return };
     let report = Report::new(trials.iter().map(|trial| trial.drive.clone()).collect());
     let rows = report.mean.expect("two drives");
     let error = |rows: &PerMethod<Row>, method| rows[method].error.mean_1s_rad.expect("whole seconds");
@@ -116,11 +116,8 @@ fn rates_are_as_good_as_the_pages_say() {
 /// The unit is calibrated on the training drives; static initialisation is that without it.
 #[test]
 fn a_calibrated_unit_is_as_good_as_the_page_says() {
-    const TEST: &str = "a_calibrated_unit_is_as_good_as_the_page_says";
     const TRAINING: [u32; 6] = [2, 3, 4, 6, 7, 8];
-    let (Some(training), Some(test)) =
-        (recordings::trials(TEST, &TRAINING), recordings::trials(TEST, &TRIALS))
-    else {
+    let (Some(training), Some(test)) = (recordings::trials(&TRAINING), recordings::trials(&TRIALS)) else {
         return;
     };
     let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
@@ -156,7 +153,7 @@ fn a_calibrated_unit_is_as_good_as_the_page_says() {
 
 #[test]
 fn the_integer_network_is_as_good_as_f32_on_real_drives() {
-    let Some(trials) = trials("the_integer_network_is_as_good_as_f32_on_real_drives") else { return };
+    let Some(trials) = trials() else { return };
     for Trial { number, drive, quantization } in trials {
         let error = |method| drive.methods[method].error.mean_1s_rad.expect("whole seconds");
         let ratio = error(Method::GYRONET_INT) / error(Method::GYRONET_F32);

@@ -8,9 +8,8 @@ use std::fmt::Write as _;
 
 #[test]
 fn a_car_is_fit_and_its_reference_has_the_known_floor() {
-    let test = "a_car_is_fit_and_its_reference_has_the_known_floor";
     for number in [8, 11] {
-        let Some(path) = trial(test, number) else { return };
+        let Some(path) = trial(number) else { return };
         let doctor = Doctor::examine(&path).unwrap();
         let bad: Vec<_> = doctor.findings.iter().filter(|finding| finding.verdict == Verdict::Bad).collect();
         assert!(bad.is_empty(), "{bad:?}");
@@ -24,10 +23,9 @@ fn a_car_is_fit_and_its_reference_has_the_known_floor() {
 /// An ADIS16405 at rest, upside down, in g and deg/s: a table with other names and units.
 #[test]
 fn a_sensor_at_rest_has_the_noise_of_its_data_sheet() {
-    let test = "a_sensor_at_rest_has_the_noise_of_its_data_sheet";
     let path = folder().join("static_adis16405/static_100hz.csv");
     let found = if path.is_file() { Ok(path) } else { Err("no static_adis16405".to_owned()) };
-    let Some(path) = wants(test, Need::Data, found) else { return };
+    let Some(path) = wants(Need::Data, found) else { return };
     // In our names and units, the right way up.
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines();
@@ -92,7 +90,7 @@ fn wheels_and_accelerometer_show_where_forward_is() {
     }
     // The recorded car's sensor looks to the right; five of its drives agree.
     for number in [2, 3, 4, 7, 8] {
-        let Some(path) = trial("wheels_and_accelerometer_show_where_forward_is", number) else { return };
+        let Some(path) = trial(number) else { return };
         let [yaw, sigma] = forward(&Doctor::examine(&path).unwrap());
         assert!((yaw - 98.0).abs() < 2.0 * sigma && sigma < 10.0, "{number}: {yaw} +- {sigma}");
     }

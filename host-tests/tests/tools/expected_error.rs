@@ -30,8 +30,7 @@ fn expected_error(path: &Path) -> ExpectedError {
 
 #[test]
 fn recorded_errors_lie_inside_it() {
-    let test = "recorded_errors_lie_inside_it";
-    if recordings::trial(test, 9).is_none() {
+    if recordings::trial(9).is_none() {
         return;
     }
     for (vehicle, drives) in VEHICLES {

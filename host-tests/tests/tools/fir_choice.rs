@@ -40,8 +40,7 @@ impl Drive {
 
 #[test]
 fn no_other_low_pass_is_better_on_the_training_drives() {
-    let test = "no_other_low_pass_is_better_on_the_training_drives";
-    let Some(paths) = recordings::trials(test, &TRIALS) else { return };
+    let Some(paths) = recordings::trials(&TRIALS) else { return };
     let drives: Vec<Drive> =
         paths.iter().map(|path| Drive::new(&Recording::read(path).expect("a recording"))).collect();
     let ratio = |filter: &LowPass| {

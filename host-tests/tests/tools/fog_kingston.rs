@@ -90,7 +90,7 @@ fn yaw(gyro: &[Vec<f64>], speed: &[Vec<f64>], latitude: f64) -> Vec<f64> {
 fn the_heading_of_an_hour_in_kingston() {
     let folder = recordings::folder().join("kingston2008");
     let found = if folder.is_dir() { Ok(folder) } else { Err("no recording kingston2008".to_owned()) };
-    let Some(folder) = require::wants("the_heading_of_an_hour_in_kingston", Need::Data, found) else {
+    let Some(folder) = require::wants(Need::Data, found) else {
         return;
     };
     let [gyro, speed, mut reference] =

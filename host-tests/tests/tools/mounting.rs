@@ -85,8 +85,7 @@ fn a_sensor_turned_by_30_degrees_gives_the_same_yaw_on_the_simulated_drive() {
 
 #[test]
 fn a_sensor_turned_by_30_degrees_gives_the_same_yaw_on_a_real_drive() {
-    let Some(path) = recordings::trial("a_sensor_turned_by_30_degrees_gives_the_same_yaw_on_a_real_drive", 8)
-    else {
+    let Some(path) = recordings::trial(8) else {
         return;
     };
     check(&Recording::read(&path).expect("a recording"), 0.0014, 0.01);

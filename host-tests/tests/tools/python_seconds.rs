@@ -59,8 +59,7 @@ impl MinuteNetwork for Windows {
 
 #[test]
 fn python_and_the_library_make_the_same_windows_and_losses() {
-    let test = "python_and_the_library_make_the_same_windows_and_losses";
-    let Some(python) = require::python(test, &["numpy"]) else { return };
+    let Some(python) = require::python(&["numpy"]) else { return };
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let spec = Spec { name: "made".into(), seconds: 90, device: 1, run: 4 };

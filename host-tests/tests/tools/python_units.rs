@@ -18,27 +18,26 @@ use std::process::Command;
 
 #[test]
 fn the_trainers_unit_tests_pass() {
-    let test = "the_trainers_unit_tests_pass";
-    let Some(python) = require::python(test, &["numpy", "scipy"]) else { return };
+    let Some(python) = require::python(&["numpy", "scipy"]) else { return };
     let folder = workspace().join("tools/python");
-    pass(test, Command::new(python).arg("-B").current_dir(folder), "gyronet_train/tests", 39);
+    pass(Command::new(python).arg("-B").current_dir(folder), "gyronet_train/tests", 39);
 }
 
 /// `GYRONET_WHEEL` is set where the wheel is installed in `GYRONET_PYTHON`: then it is tested, not the sources.
 #[test]
 fn the_unit_tests_of_the_python_package_pass() {
-    let (test, folder) = ("the_unit_tests_of_the_python_package_pass", workspace().join("tools/python"));
+    let folder = workspace().join("tools/python");
     let mut packages = vec!["asammdf", "can", "cantools", "mcap", "numpy", "pyulog", "rosbags"];
     let wheel = std::env::var_os("GYRONET_WHEEL").is_some();
     packages.extend(wheel.then_some("gyronet._core"));
-    let Some(python) = require::python(test, &packages) else { return };
+    let Some(python) = require::python(&packages) else { return };
     let (mut command, replay) = (Command::new(python), tempfile::tempdir().unwrap());
     replayed(replay.path());
     command.arg("-B").current_dir(folder.join("tests")).env("GYRONET_REPLAY", replay.path());
     if !wheel {
         command.env("PYTHONPATH", &folder);
     }
-    pass(test, &mut command, ".", if wheel { 63 } else { 53 });
+    pass(&mut command, ".", if wheel { 63 } else { 53 });
 }
 
 /// Writes the log and the table of `gyronet replay` for the simulated drive.
@@ -58,7 +57,7 @@ fn replayed(folder: &Path) {
 }
 
 /// Runs the unit tests in a folder of the command's, of which `least` must not be skipped.
-fn pass(test: &str, python: &mut Command, tests: &str, least: usize) {
+fn pass(python: &mut Command, tests: &str, least: usize) {
     let discover = ["-m", "unittest", "discover", "--start-directory", tests, "--top-level-directory", "."];
     let output = python.args(discover).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
@@ -70,7 +69,7 @@ fn pass(test: &str, python: &mut Command, tests: &str, least: usize) {
         .split_once("skipped=")
         .map_or(0, |(_, count)| count.trim_end().trim_end_matches(')').parse().unwrap());
     if skipped > 0 {
-        require::skipped(test, &format!("{skipped} unit tests were skipped"));
+        require::skipped(&format!("{skipped} unit tests were skipped"));
     }
     assert!(ran - skipped >= least, "{said}");
 }

@@ -60,9 +60,7 @@ fn stand(text: &str, config: PipelineConfig, wheels: bool) -> (f64, f64, u32) {
 fn half_an_hour_at_rest_turns_by_no_more_than_the_bias_allows() {
     let path = recordings::folder().join("static_adis16405/static_100hz.csv");
     let text = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()));
-    let Some(text) =
-        require::wants("half_an_hour_at_rest_turns_by_no_more_than_the_bias_allows", Need::Data, text)
-    else {
+    let Some(text) = require::wants(Need::Data, text) else {
         return;
     };
     assert_eq!(text.lines().count(), 180_001);
@@ -112,7 +110,7 @@ fn claims(recording: &Recording, with_wheels: bool) -> Option<Vec<bool>> {
 fn standstills_of_every_recording_with_a_speed() {
     let paths = standstill_truth::recordings();
     let found = if paths.is_empty() { Err("no recording with a speed".to_owned()) } else { Ok(()) };
-    if require::wants("standstills_of_every_recording_with_a_speed", Need::Data, found).is_none() {
+    if require::wants(Need::Data, found).is_none() {
         return;
     }
     println!("recording; with wheels, without: s of motion claimed, stops of 3 s found");

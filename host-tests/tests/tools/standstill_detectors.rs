@@ -81,7 +81,7 @@ fn statistics(recording: &Recording) -> Vec<(usize, [f64; 5])> {
 fn detectors_without_wheels_beside_each_other() {
     let paths = standstill_truth::recordings();
     let found = if paths.is_empty() { Err("no recording with a speed".to_owned()) } else { Ok(()) };
-    if require::wants("detectors_without_wheels_beside_each_other", Need::Data, found).is_none() {
+    if require::wants(Need::Data, found).is_none() {
         return;
     }
     let drives: Vec<_> = parallel::map(&paths, |path| {

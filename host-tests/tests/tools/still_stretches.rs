@@ -34,8 +34,7 @@ fn accepted(rows: &[Row]) -> bool {
 
 #[test]
 fn static_initialisation_tells_rest_from_driving_on_real_drives() {
-    let test = "static_initialisation_tells_rest_from_driving_on_real_drives";
-    let Some(paths) = recordings::trials(test, &TRIALS) else { return };
+    let Some(paths) = recordings::trials(&TRIALS) else { return };
     let (mut still, mut refused_still, mut driven, mut refused_driven) = (0, 0, 0, 0);
     for path in paths {
         let recording = Recording::read(&path).expect("a recording");

@@ -66,6 +66,6 @@ fn a_turn_is_no_error_on_the_simulated_drive() {
 
 #[test]
 fn a_turn_is_no_error_on_a_real_drive() {
-    let Some(path) = recordings::trial("a_turn_is_no_error_on_a_real_drive", 8) else { return };
+    let Some(path) = recordings::trial(8) else { return };
     check(&Recording::read(&path).expect("a recording"));
 }

@@ -21,8 +21,6 @@ use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-const TEST: &str = "a_board_on_a_can_interface_is_diagnosed";
-
 fn frame(id: u16, data: &[u8]) -> DataFrame {
     DataFrame::new(StandardId::new(id).expect("11 bits"), data).expect("eight bytes at most")
 }
@@ -72,7 +70,7 @@ fn a_board_on_a_can_interface_is_diagnosed() {
         board.join().expect("the board's thread");
         diagnosed.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
     });
-    println!("{TEST}: done");
+    println!("done");
 }
 
 fn diagnose(name: &str) {
@@ -106,6 +104,6 @@ fn diagnose(name: &str) {
         }
         println!("up: it answers again");
     } else {
-        println!("SKIPPED {TEST}: an interface that goes down wants its owner");
+        println!("SKIPPED an interface that goes down wants its owner");
     }
 }
