@@ -208,7 +208,7 @@ impl Aligner {
         }
     }
 
-    /// Leaves out the steps that end by this time, and what the open one has.
+    /// Skips the steps that end by this time, and drops the samples of the open one.
     fn omit_to(&mut self, time: i64) {
         let steps = ((time - self.end).div_euclid(STEP) + 1).max(0);
         let number = u32::try_from(steps).unwrap_or(u32::MAX);

@@ -225,7 +225,9 @@ impl ZeroRate {
         self.turned.add(off);
         let now = off as f32 / AngularRate::PER_RAD_PER_SEC;
         self.turning = self.turns();
-        self.parked.add(now);
+        if self.is_parked {
+            self.parked.add(now);
+        }
         let turned = self.turned.angle();
         if !self.standing.is_by_wheels() || libm::fabsf(turned) <= self.turn_gate() {
             return false;

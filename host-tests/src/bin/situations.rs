@@ -34,7 +34,7 @@ struct Args {
 fn main() -> ExitCode {
     let args = Args::parse();
     let threads: Vec<u64> = (0..std::thread::available_parallelism().map_or(1, usize::from) as u64).collect();
-    let mut is_broken = false;
+    let (mut is_broken, mut good, mut wrong) = (false, 0, 0);
     println!("{HEADING}");
     for (name, outcome) in args.recordings.iter().flat_map(|folder| recordings::judged(folder, &args.name)) {
         print!("{}", line(&name, "", &outcome));
@@ -59,7 +59,11 @@ fn main() -> ExitCode {
             outcomes.iter().filter(|one| one.seconds > 0).for_each(|one| outcome.add(one));
             print!("{}", line(situation.name, vehicle.name, &outcome));
             is_broken |= !outcome.broken().is_empty();
+            (good, wrong) = (good + outcome.good, wrong + outcome.wrong);
         }
+    }
+    if is_simulated {
+        println!("{wrong} of {good} good seconds were off by more than four of their expected errors");
     }
     ExitCode::from(u8::from(is_broken))
 }

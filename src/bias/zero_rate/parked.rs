@@ -38,3 +38,25 @@ impl Parked {
         is_whole.then(|| compared.iter().sum::<f32>() / (PART * COMPARED as u32) as f32)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_second_that_ended_two_seconds_ago_is_compared() {
+        let mut parked = Parked::NONE;
+        for sample in 0..6 * RATE_HZ {
+            let expected = match sample / PART {
+                0..6 => None,
+                9 | 11 => Some(0.01),
+                10 => Some(0.02),
+                _ => Some(0.0),
+            };
+            let is_close = |mean: f32| expected.is_some_and(|expected: f32| (mean - expected).abs() < 1e-6);
+            assert_eq!(parked.before_pulling_away().map(is_close), expected.map(|_| true), "sample {sample}");
+            // A turn of a second, the third of six.
+            parked.add(if sample / RATE_HZ == 2 { 0.02 } else { 0.0 });
+        }
+    }
+}

@@ -98,7 +98,7 @@ pub static SITUATIONS: &[Situation] = &[
     Situation::new("sensor swapped", ALL, |scene| {
         after_a_restart(scene, Fault::Shift(2, 0.02));
         // No fibre-optic gyro has such a bias.
-        scene.least = if scene.fibre_optic.is_some() { 0.55 } else { 0.7 };
+        scene.least = if scene.fibre_optic.is_some() { 0.5 } else { 0.7 };
     }),
     Situation::new("messages every 50 ms", ALL, |scene| {
         scene.period_ms = 50;

@@ -21,6 +21,8 @@ pub static SITUATIONS: &[Situation] = &[
         scene.ride.now.speed = 0.25;
         scene.ride.turn(40.0, 30.0).stop(1.0, 10.0);
         scene.town(3);
+        // Nothing confirms the bias before it drives off, after 42 s of some 140.
+        scene.least = 0.65;
     }),
     Situation::new("smooth motorway", WITHOUT, |scene| {
         scene.ride.now.road = 0.04;
@@ -45,7 +47,8 @@ pub static SITUATIONS: &[Situation] = &[
         scene.ride.hold(1.0);
         scene.ride.now.engine = 1.0;
         scene.town(2);
-        scene.least = 0.65;
+        // A stop of a few seconds in town may show too little to confirm the bias of the second start.
+        scene.least = 0.5;
     }),
     Situation::new("long idle", ALL, |scene| {
         scene.ride.hold(100.0);
@@ -164,5 +167,7 @@ pub static SITUATIONS: &[Situation] = &[
         scene.ride.hold(8.0);
         scene.ride.now.road = 3.0;
         scene.town(3);
+        // No vehicle turns as the shake does, again and again.
+        scene.least = 0.55;
     }),
 ];
