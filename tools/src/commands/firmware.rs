@@ -31,6 +31,10 @@ pub struct Args {
 pub fn run(args: &Args, common: Common) -> super::Result {
     let folder = args.target_dir.clone().unwrap_or_else(bench::target_folder);
     let folder = std::path::absolute(folder)?;
+    if args.flash {
+        let probe_rs = Command::new("probe-rs").arg("--version").output();
+        probe_rs.map_err(|error| format!("probe-rs: {error} (cargo install probe-rs-tools)"))?;
+    }
     let linked = Linked::build(&args.board, if args.flash { 1 } else { 2 }, &folder)?;
     let [elf, update] = ["elf", "update"].map(|end| folder.join(format!("{}.{end}", args.board)));
     std::fs::write(&elf, linked.for_programmer()?).map_err(WriteError::to(&elf))?;

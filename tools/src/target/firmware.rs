@@ -23,12 +23,23 @@ pub enum FirmwareFileError {
     Io { path: PathBuf, source: std::io::Error },
     #[error("not a linked image: {0}")]
     Format(#[from] object::Error),
+    #[error("no board {name}, but {}", boards.join(", "))]
+    Board { name: String, boards: Vec<String> },
     #[error("the image has no {0}")]
     Lacks(&'static str),
 }
 
 /// The board whose flash has two banks that swap ([`gyronet::store::banks`]): one image fits both slots.
 pub const NUCLEO: &str = "nucleo-h563zi";
+
+/// Returns the boards for which the images are built: those with an STM32F405 in the manifest of the images, and
+/// [`NUCLEO`].
+fn boards() -> Vec<String> {
+    let manifest = std::fs::read_to_string(bench::workspace().join("src/bin/Cargo.toml")).unwrap_or_default();
+    let features = manifest.lines().take_while(|line| *line != "[dependencies]");
+    let boards = features.filter_map(|line| line.strip_suffix(" = [\"stm32f405\"]"));
+    boards.chain([NUCLEO]).map(str::to_owned).collect()
+}
 
 /// The linked images of a board.
 pub struct Linked {
@@ -48,6 +59,10 @@ impl Linked {
             let built = bench::build_nucleo(folder)?;
             let image = read(built.join("gyronet-nucleo"))?;
             return Ok(Self { boot: read(built.join("boot"))?, images: vec![image; slots], swaps: true });
+        }
+        let boards = boards();
+        if !boards.iter().any(|known| known == board) {
+            return Err(FirmwareFileError::Board { name: board.to_owned(), boards });
         }
         let build = |features: &str, image: &str| {
             read(bench::build_for((features, TARGET), &bench::workspace(), image, folder)?)
