@@ -1,12 +1,14 @@
 //! Encoding, decoding, queueing and transport of the messages on the vehicle's bus.
 
 pub mod bosch;
+pub mod bus_off;
 pub mod config;
 pub mod diagnosis;
 #[doc(hidden)]
 pub mod e2e;
 #[doc(hidden)]
 pub mod encoder;
+pub mod fd;
 #[doc(hidden)]
 pub mod fog_encoder;
 #[doc(hidden)]

@@ -52,6 +52,15 @@ pub struct Seen {
     pub frame: DataFrame,
 }
 
+/// A complete frame of the board's own, as an observer that knows CAN FD sees it.
+#[derive(Debug, Clone)]
+pub struct Own {
+    pub id: u32,
+    pub data: Vec<u8>,
+    /// True for a CAN FD frame with the higher bit rate.
+    pub is_fast: bool,
+}
+
 #[derive(Debug)]
 pub struct Board {
     link: Link,
@@ -177,6 +186,20 @@ impl Board {
     /// Takes the frames that the board has sent completely, with the time of their end.
     pub fn can_frames(&mut self) -> Vec<(Duration, DataFrame)> {
         self.bus_log().into_iter().filter(|seen| seen.own).map(|seen| (seen.end, seen.frame)).collect()
+    }
+
+    /// Takes the complete frames of the board, CAN FD among them.
+    pub fn own_frames(&mut self) -> Vec<Own> {
+        let answer = self.ask("can_take", json!({}));
+        let own = list(&answer["frames"])
+            .iter()
+            .filter(|entry| entry["error"].is_null() && entry["source"] == "board");
+        let own = own.map(|entry| Own {
+            id: word(&entry["id"]),
+            data: unhex(&entry["data"]),
+            is_fast: entry["fast"] == true,
+        });
+        own.collect()
     }
 
     /// Takes all complete classic frames that were on the bus.

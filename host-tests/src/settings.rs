@@ -52,6 +52,7 @@ pub fn configuration(noise: &mut Noise) -> Configuration {
             ids: three(noise, yaw.ids),
             period_ms: 10 * noise.int(1, 100) as u16,
             e2e: E2e::P01 { mode: DataIdMode::Both, data_ids: [1, 2, 3] },
+            fd: (noise.int(0, 7) == 0).then(|| one(noise, &IDS)),
         }),
         status: maybe(noise, |noise| StatusSettings { id: one(noise, &IDS) }),
     };

@@ -81,13 +81,15 @@ impl Config {
     /// Returns every message that is sent, in the order of sending.
     pub fn messages(&self) -> Vec<Periodic, MAX_MESSAGES> {
         let Settings { bosch, yaw, status, .. } = self.settings;
-        let bosch = bosch_ids(bosch).map(|id| Periodic { id: Id::Standard(id), period_ms: SAMPLE_MS });
+        let classic = |id, period_ms| Periodic { id: Id::Standard(id), period_ms, is_fd: false };
+        let bosch = bosch_ids(bosch).map(|id| classic(id, SAMPLE_MS));
         let yaw = yaw.into_iter().flat_map(|yaw| {
-            let message = move |id| Some(Periodic { id: Id::Standard(id?), period_ms: yaw.period_ms });
-            yaw.ids.into_iter().filter_map(move |id| message(StandardId::new(id)))
+            let ids = yaw.ids.into_iter().filter(move |_| yaw.fd.is_none()).chain(yaw.fd);
+            let message = move |id| Periodic { is_fd: yaw.fd.is_some(), ..classic(id, yaw.period_ms) };
+            ids.filter_map(StandardId::new).map(message)
         });
         let status = status.and_then(|status| StandardId::new(status.id));
-        let status = status.map(|id| Periodic { id: Id::Standard(id), period_ms: status::PERIOD_MS });
+        let status = status.map(|id| classic(id, status::PERIOD_MS));
         let mut messages = Vec::new();
         for message in bosch.chain(yaw).chain(status) {
             // MAX_MESSAGES holds every message that can be configured.
@@ -111,12 +113,15 @@ impl Config {
     /// [`ConfigError::Overload`].
     #[cfg(feature = "store")]
     pub(crate) fn check_further_load(&self) -> Result<(), ConfigError> {
-        self.check_load(&[Periodic { id: Id::Standard(StandardId::ZERO), period_ms: SAMPLE_MS }; 3])
+        let id = Id::Standard(StandardId::ZERO);
+        self.check_load(&[Periodic { id, period_ms: SAMPLE_MS, is_fd: false }; 3])
     }
 
-    /// Returns whether one of our messages has this identifier; no input may use such an identifier.
+    /// Returns whether one of our messages, or a part of the CAN FD frame, has this identifier; no input may use it.
     pub fn sends(&self, id: Id) -> bool {
-        self.messages().iter().any(|message| message.id == id)
+        let is_part = |id: StandardId| self.settings.yaw.is_some_and(|yaw| yaw.ids.contains(&id.as_raw()));
+        matches!(id, Id::Standard(id) if is_part(id))
+            || self.messages().iter().any(|message| message.id == id)
     }
 
     /// Returns the bus load of the messages in 1/1000, with the largest possible number of stuff bits.
@@ -144,7 +149,12 @@ fn bosch_ids(bosch: Option<BoschSettings>) -> impl Iterator<Item = StandardId> {
 }
 
 fn check_yaw(yaw: &YawSettings, bosch: Option<BoschSettings>) -> Result<(), ConfigError> {
-    check_ids(yaw.ids, |id| bosch_ids(bosch).any(|other| other == id))?;
+    let is_bosch = |id| bosch_ids(bosch).any(|other| other == id);
+    check_ids(yaw.ids, is_bosch)?;
+    if let Some(fd) = yaw.fd {
+        // The three are the names of its parts.
+        check_ids([fd], |id| is_bosch(id) || yaw.ids.contains(&id.as_raw()))?;
+    }
     if yaw.period_ms == 0 || yaw.period_ms > MAX_PERIOD_MS || !yaw.period_ms.is_multiple_of(SAMPLE_MS) {
         return Err(ConfigError::Period(yaw.period_ms));
     }

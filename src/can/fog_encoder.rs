@@ -35,7 +35,7 @@ impl FogEncoder {
 
     /// Returns every message of the gyro, without those whose identifier has more than 11 bits.
     pub fn messages(ids: [u16; 3]) -> Vec<Periodic, 3> {
-        let message = |id| Periodic { id: Id::Standard(id), period_ms: SAMPLE_MS };
+        let message = |id| Periodic { id: Id::Standard(id), period_ms: SAMPLE_MS, is_fd: false };
         ids.into_iter().filter_map(StandardId::new).map(message).collect()
     }
 

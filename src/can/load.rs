@@ -1,26 +1,40 @@
 //! The load of periodic messages on a CAN bus, at worst.
 
+use super::fd::{DATA_BITS_PER_SECOND, LENGTH};
 use embedded_can::Id;
 
-/// A classic data frame of eight bytes that is sent periodically.
+/// A data frame that is sent periodically: a classic one of eight bytes, or the CAN FD frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Periodic {
     /// Identifier of the frame.
     pub id: Id,
     /// Period, ms.
     pub period_ms: u16,
+    /// True for the CAN FD frame.
+    pub is_fd: bool,
 }
 
-/// Data bits of a frame; all our frames have eight bytes.
+/// Data bits of a classic frame; all of ours have eight bytes.
 const DATA_BITS: u32 = 64;
 
 impl Periodic {
-    /// Returns the bits of one frame with the largest possible number of stuff bits, interframe space included.
+    /// Returns the bits of one frame with the largest possible number of stuff bits, interframe space included, in
+    /// bits of the nominal rate.
     ///
     /// 13 bits are never stuffed (CRC delimiter, acknowledgement, end of frame, space); in the
     /// others, of which 34 or 54 are not data, there is at most one stuff bit for every four
     /// bits after the first (Davis et al., 2007).
-    pub const fn worst_case_bits(&self) -> u32 {
+    pub const fn worst_case_bits(&self, bits_per_second: u32) -> u32 {
+        if self.is_fd {
+            // 17 bits up to the switch, with their stuff bits, and the 13; ESI, DLC and data with theirs, then the stuff
+            // count and the CRC of 21 bits, with fixed stuff bits (ISO 11898-1).
+            const FAST: u32 = 1 + 4 + 8 * LENGTH as u32;
+            const BITS: u32 = FAST + FAST / 4 + 4 + 21 + 7;
+            return 17
+                + 16 / 4
+                + 13
+                + (BITS * (bits_per_second / 1_000)).div_ceil(DATA_BITS_PER_SECOND / 1_000);
+        }
         let stuffed = DATA_BITS
             + match self.id {
                 Id::Standard(_) => 34,
@@ -30,13 +44,23 @@ impl Periodic {
     }
 }
 
+/// Returns the prescaler of a controller's clock, and both segments of a bit with its sample point at 80 %, with up to `most`
+/// quanta, which are more where that can be.
+pub fn bit_time(clock_hz: u32, bits_per_second: u32, most: u32) -> (u16, u8, u8) {
+    let clocks = clock_hz / bits_per_second.max(1);
+    let prescaler = clocks.div_ceil(most.max(1)).max(1);
+    let quanta = clocks / prescaler;
+    (prescaler as u16, quanta.saturating_sub(1 + quanta / 5) as u8, (quanta / 5) as u8)
+}
+
 /// Returns the load of the messages on a bus, in 1/1000, rounded up.
 pub fn per_mille(messages: &[Periodic], bits_per_second: u32) -> u32 {
     // Bits in 1000 s, exact for every period that divides 1,000,000 ms, rounded up for others.
     let bits: u64 = messages
         .iter()
         .map(|message| {
-            (u64::from(message.worst_case_bits()) * 1_000_000).div_ceil(message.period_ms.max(1).into())
+            (u64::from(message.worst_case_bits(bits_per_second)) * 1_000_000)
+                .div_ceil(message.period_ms.max(1).into())
         })
         .sum();
     u32::try_from(bits.div_ceil(bits_per_second.max(1).into())).unwrap_or(u32::MAX)

@@ -12,7 +12,7 @@ pub use firmware::{Firmware, FirmwareState};
 pub use weights::MappedSlots;
 
 use super::conditions::Conditions;
-use super::event::SensorFault;
+use super::event::{CanFault, SensorFault};
 use super::learner::Learner;
 use super::message::{AccessCounters, FAILED_STARTS, FlashState, Identity, Info, Origin, PROTOCOL, Refusal};
 use super::not_good::NotGood;
@@ -43,6 +43,8 @@ pub struct SupportedHardware {
     pub fogs: &'static [FogPart],
     /// True if there is a line for a GNSS receiver.
     pub gnss: bool,
+    /// True if the CAN controller has CAN FD.
+    pub fd: bool,
     /// Clock frequency of the processor on its crystal, Hz.
     pub clock_hz: u32,
 }
@@ -201,6 +203,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// Records the result of setting up the sensor.
     pub fn sensor(&mut self, result: Result<(), SensorFault>) {
         self.sensor = result.err();
+    }
+
+    /// Records a fault of the CAN controller that was found after the start.
+    pub fn can_fault(&mut self, fault: CanFault) {
+        self.identity.can_fault = Some(fault);
     }
 
     /// Processes each sample of the sensor (`None` while the sensor is silent), the status and faults of the yaw

@@ -21,7 +21,7 @@ pub enum ClockFault {
     Pll,
 }
 
-/// The reason why the CAN controller did not start.
+/// The reason why the CAN controller did not start, or sends no CAN FD.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -33,6 +33,8 @@ pub enum CanFault {
     Sleeping,
     #[error("the controller does not enter initialisation mode")]
     NotInitialising,
+    #[error("no node takes CAN FD frames, so they are no longer sent")]
+    Fd,
 }
 
 impl fmt::Display for ClockFault {

@@ -209,7 +209,7 @@ impl Configuration {
 
 impl Record for Configuration {
     const KEY: u8 = 1;
-    const VERSION: u8 = 13;
+    const VERSION: u8 = 14;
 
     fn check(&self) -> Result<(), FieldError> {
         let config = Config::new(self.can).map_err(FieldError::Can)?;

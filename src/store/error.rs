@@ -95,6 +95,8 @@ pub enum FieldError {
     Diagnosis(u32),
     #[error("heading.line: the board has no line for a GNSS receiver")]
     NoLine,
+    #[error("can.yaw.fd: the board's controller has no CAN FD")]
+    NoFd,
 }
 
 /// Checks that a value is inside its range.

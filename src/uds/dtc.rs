@@ -175,7 +175,13 @@ pub static TROUBLES: [Trouble; 19] = [
         "wires, terminators, bit rate",
         Cause::Fault(Faults::BUS),
     ),
-    trouble(0xDA01, 0x49, "CAN: the controller does not start", "the transceiver", Cause::Can),
+    trouble(
+        0xDA01,
+        0x49,
+        "CAN: the controller does not start, or no node takes CAN FD",
+        "`device info` has the reason: the transceiver, setting `can.yaw.fd`",
+        Cause::Can,
+    ),
     trouble(
         0xDA02,
         0x87,

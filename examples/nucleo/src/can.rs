@@ -1,10 +1,10 @@
-//! CAN: classic frames on a bus that may carry CAN FD, whose frames are skipped. embassy's driver moves the frames between
-//! the controller and two queues in its interrupt.
+//! CAN: classic frames, and one of CAN FD where it is configured; those of others are skipped. embassy's driver moves the frames
+//! between the controller and two queues in its interrupt.
 //!
-//! The driver computes bit times with a sample point at 90 %; most networks use 80 %, which the times here have.
+//! The driver computes bit times with a sample point at 90 %; most networks use 80 %, which the times here have. There 400 ns of
+//! a data bit have passed, more than the 255 ns that a transceiver takes (ISO 11898-2): its delay needs no compensation.
 //!
-//! What the bus does not take within [`STALE`] is dropped, because old rates are useless. After bus-off the controller
-//! returns at growing intervals, so that a broken node does not disturb the bus all the time.
+//! What the bus does not take within [`STALE`] is dropped, because old rates are useless. For bus-off see [`BusOff`].
 
 use crate::service;
 use core::num::{NonZeroU8, NonZeroU16};
@@ -24,7 +24,10 @@ use embassy_stm32::{Peri, pac, peripherals::FDCAN1};
 use embassy_time::{Duration, Instant};
 use embedded_can::{Frame as _, Id};
 use gyronet::TimedFrame;
-use gyronet::can::DataFrame;
+use gyronet::can::bus_off::BusOff;
+use gyronet::can::config::Settings;
+use gyronet::can::fd::{DATA_BITS_PER_SECOND, Joiner};
+use gyronet::can::{DataFrame, load};
 use gyronet::coprocessor::{Bus, Observation, Sink};
 use gyronet::health::count;
 use gyronet::service::message::LineCounters;
@@ -34,15 +37,9 @@ use static_cell::ConstStaticCell;
 const QUEUE: usize = 24;
 /// The controller's clock.
 const CLOCK_HZ: u32 = 50_000_000;
-/// Bit rate of the data in the frames of others.
-const DATA_BITS_PER_SECOND: u32 = 2_000_000;
 /// Quanta of a bit that the controller can count, with a sample point at 80 %.
 const MOST_QUANTA: u32 = 250;
 const STALE: Duration = Duration::from_millis(20);
-/// Interval from bus-off to a return: the first one, and the longest. It doubles every time, until the controller has
-/// stayed on the bus for as long as the longest.
-const FIRST_RETURN: Duration = Duration::from_millis(10);
-const LAST_RETURN: Duration = Duration::from_millis(1_280);
 
 /// Filters of the controller for identifiers of 11 and of 29 bits.
 const STANDARD_FILTERS: u8 = 28;
@@ -51,13 +48,13 @@ const EXTENDED_FILTERS: u8 = 8;
 static SENT: ConstStaticCell<TxFdBuf<QUEUE>> = ConstStaticCell::new(TxFdBuf::new());
 static RECEIVED: ConstStaticCell<RxFdBuf<QUEUE>> = ConstStaticCell::new(RxFdBuf::new());
 
-/// What the bus is to receive, and at which bit rate.
+/// What the bus is to receive, and how it sends.
 pub struct Received<F> {
     /// Identifiers of requests to this board and to all servers, and of responses.
     pub ids: [Id; 3],
     /// Identifiers, each with the mask of its bits that count.
     pub filters: F,
-    pub bits_per_second: u32,
+    pub settings: Settings,
 }
 
 /// The bus, for [`gyronet::Coprocessor::step`].
@@ -75,10 +72,8 @@ pub struct CanBus {
     cancelled: u32,
     /// When a frame had been sent since the step before, or none waited.
     alive: Instant,
-    /// Since when the controller is on the bus, or off it.
-    changed: Instant,
-    is_off: bool,
-    interval: Duration,
+    bus_off: BusOff,
+    joiner: Joiner,
 }
 
 impl CanBus {
@@ -120,7 +115,7 @@ impl CanBus {
             .set_handle_standard_frames(rest(standard))
             .set_handle_extended_frames(rest(extended));
         let config = can.config().set_global_filter(others).set_tx_buffer_mode(TxBufferMode::Fifo);
-        let (prescaler, seg1, seg2) = bit_time(received.bits_per_second);
+        let (prescaler, seg1, seg2) = bit_time(received.settings.bits_per_second);
         let nominal = NominalBitTiming { prescaler, seg1, seg2, sync_jump_width: seg2 };
         let (prescaler, seg1, seg2) = bit_time(DATA_BITS_PER_SECOND);
         let transceiver_delay_compensation = false;
@@ -142,16 +137,20 @@ impl CanBus {
             sent: 0,
             cancelled: 0,
             alive: now,
-            changed: now,
-            is_off: false,
-            interval: FIRST_RETURN,
+            bus_off: BusOff::new(now.as_micros()),
+            joiner: Joiner::new(&received.settings),
         }
     }
 
     fn transmit(&mut self, frame: DataFrame) {
-        let classic = Header::new(frame.id(), frame.data().len() as u8, false);
-        let frame = FdFrame::new(classic, frame.data());
-        if frame.is_err() || frame.is_ok_and(|frame| self.sender.try_write(frame).is_err()) {
+        let Some((id, data)) = self.joiner.join(&frame) else { return };
+        let (length, is_fd) = (data.len() as u8, data.len() > frame.padded().len());
+        let header =
+            if is_fd { Header::new_fd(id, length, false, true) } else { Header::new(id, length, false) };
+        let is_taken = !is_fd || self.bus_off.takes_fd(Instant::now().as_micros());
+        service::FD_REFUSED.fetch_or(!is_taken && self.bus_off.refuses_fd(), Relaxed);
+        let frame = FdFrame::new(header, data).ok().filter(|_| is_taken);
+        if frame.is_none_or(|frame| self.sender.try_write(frame).is_err()) {
             count(&mut self.counters.unsent, 1);
         }
     }
@@ -180,22 +179,15 @@ impl CanBus {
     }
 
     /// Follows the controller off the bus and back.
-    fn follow(&mut self, now: Instant) {
-        let is_off = pac::FDCAN1.psr().read().bo();
-        if is_off != self.is_off {
-            (self.is_off, self.changed) = (is_off, now);
-        }
-        if !is_off {
-            if now - self.changed > LAST_RETURN {
-                self.interval = FIRST_RETURN;
-            }
+    fn follow(&mut self, has_sent: bool, now: Instant) {
+        self.bus_off.follow(pac::FDCAN1.psr().read().bo(), has_sent, now.as_micros());
+        if !self.bus_off.is_off() {
             return;
         }
         self.drop_waiting();
         // The controller sets INIT when it goes off; from its end on it counts 129 times 11 recessive bits.
-        if pac::FDCAN1.cccr().read().init() && now - self.changed >= self.interval {
+        if pac::FDCAN1.cccr().read().init() && self.bus_off.returns(now.as_micros()) {
             pac::FDCAN1.cccr().modify(|w| w.set_init(false));
-            self.interval = (self.interval * 2).min(LAST_RETURN);
         }
     }
 }
@@ -244,13 +236,13 @@ impl Bus for CanBus {
             pac::FDCAN1.ir().write(|w| w.set_rfl(0, true));
             count(&mut self.counters.frames_lost, 1);
         }
-        self.follow(now);
+        let sent = pac::FDCAN1.txbto().read().0;
+        let has_sent = sent & !core::mem::replace(&mut self.sent, sent) != 0;
+        self.follow(has_sent, now);
         while let Ok(frame) = service::RESPONSES.try_receive() {
             self.transmit(frame);
         }
         self.count_cancelled();
-        let sent = pac::FDCAN1.txbto().read().0;
-        let has_sent = sent & !core::mem::replace(&mut self.sent, sent) != 0;
         let is_stale = !has_sent && now - self.alive > STALE;
         let is_empty = if is_stale { self.drop_waiting() } else { pac::FDCAN1.txbrp().read().0 == 0 };
         if has_sent || is_empty {
@@ -263,17 +255,13 @@ impl Bus for CanBus {
     }
 
     fn is_off(&self) -> bool {
-        self.is_off
+        self.bus_off.is_off()
     }
 }
 
-/// Returns the prescaler and both segments of a bit with its sample point at 80 %, the prescaler 1 where that can be.
+/// Returns the prescaler and both segments of a bit.
 fn bit_time(bits_per_second: u32) -> (NonZeroU16, NonZeroU8, NonZeroU8) {
-    let clocks = CLOCK_HZ / bits_per_second;
-    let prescaler = clocks.div_ceil(MOST_QUANTA);
-    let quanta = clocks / prescaler;
-    let seg2 = quanta / 5;
-    let segment = |quanta| NonZeroU8::new(quanta as u8).unwrap_or(NonZeroU8::MIN);
-    let prescaler = NonZeroU16::new(prescaler as u16).unwrap_or(NonZeroU16::MIN);
-    (prescaler, segment(quanta - 1 - seg2), segment(seg2))
+    let (prescaler, seg1, seg2) = load::bit_time(CLOCK_HZ, bits_per_second, MOST_QUANTA);
+    let segment = |quanta| NonZeroU8::new(quanta).unwrap_or(NonZeroU8::MIN);
+    (NonZeroU16::new(prescaler).unwrap_or(NonZeroU16::MIN), segment(seg1), segment(seg2))
 }

@@ -1,12 +1,12 @@
 //! The coprocessor on a NUCLEO-H563ZI: an Xsens MTi in, frames on CAN out. Copy this folder for a board of your own.
 //!
-//! The bus may carry CAN FD: such frames are skipped, and classic ones are sent.
+//! The bus may carry CAN FD: such frames are skipped, and one is sent where `can.yaw.fd` names it.
 //!
 //! | line | pins | use |
 //! |---|---|---|
 //! | USART1 | D0 (PB7), D1 (PB6) | Xsens MTi, 115200 baud |
 //! | SPI1 | D13 (PA5), D12 (PG9), D11 (PB5); selects D10 (PD14), D9 (PD15) | ICM-42688-P, BMI088 or ASM330LHH, where one is configured |
-//! | FDCAN1 | PD0, PD1 (CN9), to a transceiver | 500 kbit/s; data of others at 2 Mbit/s |
+//! | FDCAN1 | PD0, PD1 (CN9), to a transceiver | 500 kbit/s; data of CAN FD at 2 Mbit/s |
 //!
 //! Boot loader, image and records lie as [`gyronet::store::banks`] says. `gyronet firmware --board nucleo-h563zi` makes what a
 //! probe flashes, and the update.
@@ -159,8 +159,7 @@ fn main() -> ! {
     *coprocessor = Coprocessor::new(device.coprocessor(true));
     let configuration = device.configuration();
     let ids = configuration.diagnosis.ids().expect("a stored configuration has been checked");
-    let received =
-        Received { ids, filters: device.received(), bits_per_second: configuration.can.bits_per_second };
+    let received = Received { ids, filters: device.received(), settings: configuration.can };
     let can = CanBus::start(parts.FDCAN1, parts.PD0, parts.PD1, Interrupts, received);
     let check = blob.as_ref().map(|blob| BackgroundCheck::new(blob.content, blob.crc));
 

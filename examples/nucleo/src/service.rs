@@ -16,7 +16,7 @@ use gyronet::can::DataFrame;
 use gyronet::coprocessor;
 use gyronet::heading::CourseState;
 use gyronet::model::background::BackgroundCheck;
-use gyronet::service::event::ResetCause;
+use gyronet::service::event::{CanFault, ResetCause};
 use gyronet::service::message::{AllCounters, Identity};
 use gyronet::service::{Device, SupportedHardware, spi_imu::BringUp};
 use gyronet::store::ImuPart;
@@ -30,6 +30,7 @@ pub const SUPPORTED: SupportedHardware = SupportedHardware {
     imus: &[ImuPart::XsensMti, ImuPart::Icm42688, ImuPart::Bmi088, ImuPart::Asm330lhh],
     fogs: &[],
     gnss: false,
+    fd: true,
     clock_hz: CORE_HZ,
 };
 /// Time for the announcement of a restart to leave.
@@ -49,6 +50,8 @@ pub static PAUSED: AtomicBool = AtomicBool::new(false);
 /// Faults that were found here, for the coprocessor.
 pub static WEIGHTS_DAMAGED: AtomicBool = AtomicBool::new(false);
 pub static MOUNT_MOVED: AtomicBool = AtomicBool::new(false);
+/// Found in `drive`: no node takes CAN FD.
+pub static FD_REFUSED: AtomicBool = AtomicBool::new(false);
 /// Number of cycles of the main program.
 pub static CYCLES: AtomicU32 = AtomicU32::new(0);
 
@@ -102,6 +105,9 @@ impl Service {
                 self.device.weights_damaged();
                 WEIGHTS_DAMAGED.store(true, Relaxed);
             }
+        }
+        if FD_REFUSED.load(Relaxed) {
+            self.device.can_fault(CanFault::Fd);
         }
         if self.device.take_mount_moved() {
             MOUNT_MOVED.store(true, Relaxed);

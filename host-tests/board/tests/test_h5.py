@@ -380,6 +380,30 @@ class H5(unittest.TestCase):
                 # 64 bytes alone take 256 us at 2 Mbit/s; 27 more bits take 54 us at 500 kbit/s.
                 self.assertTrue(310 < (first.end_ps - first.start_ps) / US < 400)
 
+    def test_can_fd_is_sent_where_it_is_enabled_and_ends_at_a_classic_node(self):
+        data = bytes(range(24))
+        cases = ((0x300, False, "24f", None), (0x100, False, "24-", None), (0, False, "8", None), (0x300, True, "24f", "CAN FD"))
+        for cccr, classic, expected, error in cases:
+            self.board = FakeBoard(STM32H563)
+            bus = self.start_can(cccr)
+            bus.configure("classic", classic)
+            for offset, word in ((0, 0x1A7 << 18), (4, 12 << 16 | 1 << 20 | 1 << 21)):
+                self.board.write("SRAMCAN", 0x278 + offset, word)
+            for at in range(0, 24, 4):
+                self.board.write("SRAMCAN", 0x280 + at, int.from_bytes(data[at : at + 4], "little"))
+            self.board.write("FDCAN1", 0xCC, 1)
+            self.board.advance(800 * US)
+            first = bus.take_log()[0]
+            frame = first.frame
+            sent = f"{len(frame.data)}{('-', 'f')[frame.fast] if frame.fd else ''}"
+            self.assertEqual((sent, first.error, frame.data), (expected, error, data[: len(frame.data)]))
+            self.assertEqual(self.board.read("FDCAN1", 0xD4), 0 if error else 1)
+            if expected == "24f" and not error:
+                # 27 bits at 500 kbit/s, about 226 at 2 Mbit/s, and stuff bits.
+                self.assertTrue(160 < (first.end_ps - first.start_ps) / US < 200)
+        self.board.advance(50 * MS)
+        self.assertEqual(self.board.read("FDCAN1", 0x44) >> 7 & 1, 1)
+
     def test_bus_off_ends_129_sequences_after_init_is_cleared(self):
         bus = self.start_can()
         bus.configure("short", "recessive")

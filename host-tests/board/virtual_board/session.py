@@ -116,7 +116,7 @@ class Session:
         for entry in _can(self.board).bus.take_log():
             frame = entry.frame
             frames.append({"time_us": entry.end_ps / US, "start_us": entry.start_ps / US, "source": entry.source, "error": entry.error,
-                           "id": frame.identifier, "ext": frame.extended, "remote": frame.remote, "fd": frame.fd, "data": frame.data.hex()})
+                           "id": frame.identifier, "ext": frame.extended, "remote": frame.remote, "fd": frame.fd, "fast": frame.fast, "data": frame.data.hex()})
         return {"frames": frames}
 
     def set(self, values: dict) -> None:

@@ -19,6 +19,7 @@ const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
     imus: &[ImuPart::XsensMti],
     fogs: &[FogPart::Dsp1760],
     gnss: false,
+    fd: false,
     clock_hz: 168_000_000,
 };
 

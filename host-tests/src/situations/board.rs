@@ -23,7 +23,7 @@ use gyronet::units::Micros;
 use std::collections::VecDeque;
 
 const HARDWARE: SupportedHardware =
-    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[], gnss: false, clock_hz: 0 };
+    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[], gnss: false, fd: false, clock_hz: 0 };
 /// The board fetches at most this many packets from a FIFO at once.
 const MAX_FETCHED: usize = 32;
 

@@ -12,12 +12,10 @@ use gyronet::can::yaw::RateMessage;
 use gyronet::health::{Faults, Quality};
 use gyronet::store::Configuration;
 use gyronet_host_tests::board::{Board, Event};
-use gyronet_host_tests::recordings::{self, workspace};
+use gyronet_host_tests::recordings;
 use gyronet_host_tests::stored::Stored;
-use gyronet_host_tests::{inputs, replay, require};
+use gyronet_host_tests::{inputs, replay};
 use gyronet_tools::drive::recording::Recording;
-use std::io::Write;
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 const MS: Duration = Duration::from_millis(1);
@@ -150,26 +148,14 @@ fn every_bit_rate_is_the_configured_one() {
 
 /// cantools reads the log: the sum of the rates is the accumulated angle.
 fn sums(sent: &[(Duration, DataFrame)]) {
-    let Some(python) = require::python(&["cantools"]) else { return };
-    let folder = workspace().join("host-tests/tests/clients");
-    let mut child = Command::new(python)
-        .args([folder.join("log_sums.py"), workspace().join("tools/gyronet.dbc")])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("Python runs");
-    let mut input = child.stdin.take().expect("piped");
+    let mut log = String::new();
     for (time, frame) in sent {
         let Id::Standard(id) = frame.id() else { panic!("11 bits") };
-        let data: String = frame.data().iter().map(|byte| format!("{byte:02X}")).collect();
-        writeln!(input, "({:.6}) can0 {:03X}#{data}", time.as_secs_f64(), id.as_raw()).expect("it reads");
+        log += &common::logged(*time, id.as_raw(), "#", frame.data());
     }
-    drop(input);
-    let output = child.wait_with_output().expect("it ends");
-    let text = String::from_utf8_lossy(&output.stdout);
-    println!("{}", text.trim());
+    let Some(text) = common::read_log("log_sums.py", &log) else { return };
     let off: f64 = text.split_whitespace().last().and_then(|word| word.parse().ok()).expect("a difference");
-    assert!(output.status.success() && off < 1e-6, "{text}");
+    assert!(off < 1e-6, "{text}");
 }
 
 #[test]

@@ -7,9 +7,12 @@ use gyronet::can::{DataFrame, slcan};
 use gyronet::health::Faults;
 use gyronet::service::message::{AllCounters, Info};
 use gyronet_host_tests::board::{self, Board};
-use gyronet_host_tests::{inputs, replay};
+use gyronet_host_tests::recordings::workspace;
+use gyronet_host_tests::{inputs, replay, require};
 use gyronet_tools::bundled;
+use std::io::Write;
 use std::path::PathBuf;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 /// Lines of the board.
@@ -100,6 +103,30 @@ pub fn info(board: &mut Board) -> Info {
 
 pub fn counters(board: &mut Board) -> AllCounters {
     service::on_line(board).counters().expect("a response")
+}
+
+/// A line of a candump log; `separator` is `#`, or `##1` for CAN FD with the higher bit rate.
+pub fn logged(time: Duration, id: u16, separator: &str, data: &[u8]) -> String {
+    let digits: String = data.iter().map(|byte| format!("{byte:02X}")).collect();
+    format!("({:.6}) can0 {id:03X}{separator}{digits}\n", time.as_secs_f64())
+}
+
+/// What a client with cantools and the DBC file prints of a candump log; `None`, said aloud, without Python.
+pub fn read_log(client: &str, log: &str) -> Option<String> {
+    let python = require::python(&["cantools"])?;
+    let mut child = Command::new(python)
+        .arg(workspace().join("host-tests/tests/clients").join(client))
+        .arg(workspace().join("tools/gyronet.dbc"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("Python runs");
+    child.stdin.take().expect("piped").write_all(log.as_bytes()).expect("it reads");
+    let output = child.wait_with_output().expect("it ends");
+    let text = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+    println!("{text}");
+    assert!(output.status.success(), "{text}");
+    Some(text)
 }
 
 pub fn resets(board: &mut Board) -> Vec<(Duration, String)> {

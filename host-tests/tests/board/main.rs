@@ -13,6 +13,7 @@ mod gnss;
 mod minimal;
 mod model;
 mod nucleo;
+mod nucleo_fd;
 mod nucleo_update;
 mod power_cut;
 mod service;

@@ -1,9 +1,12 @@
 //! The configuration of the vehicle bus: what is refused, what it costs, what goes out.
 
 use embedded_can::{Frame, Id, StandardId};
+use gyronet::can::bus_off::BusOff;
 use gyronet::can::config::{BoschSettings, Config, ConfigError, E2e, Settings, StatusSettings, YawSettings};
 use gyronet::can::e2e::{DataIdMode, P11Mode};
 use gyronet::can::encoder::CanEncoder;
+use gyronet::can::fd::{FD_ID, Joiner};
+use gyronet::can::load::bit_time;
 use gyronet::can::status::STATUS_ID;
 use gyronet::can::yaw::Quality;
 use gyronet::estimate::VehicleSample;
@@ -29,6 +32,22 @@ fn bus_loads_equal_those_by_hand() {
     // Six frames of 135 bits a hundred times a second.
     let config = Config::new(Settings::DEFAULT).expect("checked");
     assert_eq!(config.bus_load_per_mille(), 6 * 135 * 100 / 500);
+    // 34 bits, and 278 at 2 Mbit/s.
+    for (bits_per_second, per_mille) in [(250_000, 28), (500_000, 21), (1_000_000, 18)] {
+        let yaw = Some(YawSettings { fd: Some(FD_ID), ..YAW });
+        let config = Config::new(Settings { bits_per_second, bosch: None, yaw, ..Settings::DEFAULT });
+        assert_eq!(config.expect("checked").bus_load_per_mille(), per_mille);
+    }
+}
+
+#[test]
+fn a_bit_is_sampled_at_80_percent() {
+    for (bits_per_second, expected) in
+        [(125_000, (2, 159, 40)), (250_000, (1, 159, 40)), (500_000, (1, 79, 20)), (2_000_000, (1, 19, 5))]
+    {
+        assert_eq!(bit_time(50_000_000, bits_per_second, 250), expected);
+    }
+    assert_eq!(bit_time(0, 0, 0).0, 1);
 }
 
 #[test]
@@ -44,6 +63,11 @@ fn settings_that_cannot_be_are_refused() {
     assert_eq!(refused(ids([0x1A0, 0x178, 0x1A2])), ConfigError::DuplicateIdentifier(0x178));
     let tx1_only = Settings { bosch: Some(BoschSettings { tx1_only: true }), ..ids([0x1A0, 0x178, 0x1A2]) };
     assert!(Config::new(tx1_only).is_ok(), "0x178 is free then");
+    let fd = |fd| with_yaw(YawSettings { fd: Some(fd), ..YAW });
+    assert_eq!(refused(fd(0x800)), ConfigError::Identifier(0x800));
+    for id in [0x1A1, 0x178] {
+        assert_eq!(refused(fd(id)), ConfigError::DuplicateIdentifier(id));
+    }
     for period_ms in [0, 5, 15, 1010] {
         let settings = with_yaw(YawSettings { period_ms, ..YAW });
         assert_eq!(refused(settings), ConfigError::Period(period_ms));
@@ -93,6 +117,57 @@ fn the_settings_of_the_library_pass_their_own_check() {
 
 fn sample(tick: u32) -> VehicleSample {
     synthetic::vehicle(tick, AngularRate(1_000_000), Yaw::default())
+}
+
+#[test]
+fn one_frame_of_can_fd_carries_a_set_as_it_is() {
+    let joined = with_yaw(YawSettings { fd: Some(FD_ID), ..YAW });
+    let id = |id| Id::Standard(StandardId::new(id).expect("11 bits"));
+    for settings in [Settings::DEFAULT, joined] {
+        let mut encoder = CanEncoder::new(Config::new(settings).expect("checked"));
+        let mut joiner = Joiner::new(&settings);
+        for tick in 0..20 {
+            let frames = encoder.encode(&sample(tick));
+            let join = |frame| joiner.join(frame).map(|(id, data)| (id, data.to_vec()));
+            let sent: Vec<_> = frames.iter().filter_map(join).collect();
+            let mut due: Vec<_> = frames.iter().map(|frame| (frame.id(), frame.data().to_vec())).collect();
+            if settings == joined {
+                let set = due.split_off(due.len() - 3);
+                assert_eq!(set.iter().map(|(id, _)| *id).collect::<Vec<_>>(), YAW.ids.map(id));
+                due.push((id(FD_ID), set.into_iter().flat_map(|(_, data)| data).collect()));
+            }
+            assert_eq!(sent, due);
+        }
+    }
+}
+
+/// The controller goes off the bus at each CAN FD frame, or, with a short circuit, at each frame.
+#[test]
+fn can_fd_frames_end_where_they_alone_take_the_board_off_the_bus() {
+    for (takes_fd, short_until) in [(false, 0), (true, 0), (true, 20_000)] {
+        let mut bus = BusOff::new(0);
+        let (mut is_off, mut times_off, mut sent_at) = (false, 0, 0);
+        for now in 0..30_000 {
+            let is_short = now < short_until;
+            let has_sent = !is_off && !is_short && now % 10 == 0;
+            bus.follow(is_off, has_sent, 1_000 * now);
+            if bus.is_off() && bus.returns(1_000 * now) {
+                is_off = false;
+            } else if now % 10 == 5 && !is_off {
+                let is_sent = bus.takes_fd(1_000 * now);
+                is_off = is_short || is_sent && !takes_fd;
+                times_off += u32::from(is_off);
+                sent_at = if is_sent && !is_off { now } else { sent_at };
+            }
+        }
+        assert_eq!(bus.refuses_fd(), !takes_fd);
+        assert!(bus.is_off() == is_off && !is_off);
+        if takes_fd {
+            assert_eq!(sent_at, 29_995);
+        } else {
+            assert_eq!(times_off, 8);
+        }
+    }
 }
 
 #[test]

@@ -4,9 +4,10 @@ use can_dbc::{AttributeValue, ByteOrder, Dbc, Message, MessageId, NumericValue, 
 use embedded_can::{Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::bosch;
-use gyronet::can::config::{Config, Settings, StatusSettings};
+use gyronet::can::config::{Config, Settings, StatusSettings, YawSettings};
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::can::encoder::CanEncoder;
+use gyronet::can::fd::{FD_ID, LENGTH};
 use gyronet::can::load::Periodic;
 use gyronet::can::status::{Evidence, Knowledge, STATUS_ID, SlowStatus, StatusEncoder, Verdict};
 use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Faults, Quality, RateMessage, Source};
@@ -67,13 +68,24 @@ fn encoder() -> CanEncoder {
 #[test]
 fn the_file_has_every_message_with_its_cycle_time() {
     let config = Config::new(ALL).expect("checked");
-    let fog =
-        FOG_IDS.map(|id| Periodic { id: Id::Standard(StandardId::new(id).expect("11 bits")), period_ms: 10 });
-    let sent: Vec<Periodic> = config.messages().iter().copied().chain(fog).collect();
+    let fog = FOG_IDS.map(|id| Periodic {
+        id: Id::Standard(StandardId::new(id).expect("11 bits")),
+        period_ms: 10,
+        is_fd: false,
+    });
+    let yaw = ALL.yaw.map(|yaw| YawSettings { fd: Some(FD_ID), ..yaw });
+    let fd = Config::new(Settings { bosch: None, yaw, ..Settings::DEFAULT }).expect("checked").messages();
+    assert_eq!(fd.len(), 1);
+    let sent: Vec<Periodic> = config.messages().iter().chain(&fd).copied().chain(fog).collect();
     assert_eq!(DBC.messages.len(), sent.len() + DIAGNOSIS.len());
     for sent in sent {
         let message = message(sent.id);
-        assert_eq!(message.size, 8);
+        assert_eq!(message.size, if sent.is_fd { LENGTH as u64 } else { 8 });
+        // Of the list of Vector's tools: StandardCAN_FD, with the higher bit rate.
+        let format = sent.is_fd.then_some(&AttributeValue::Uint(14));
+        assert_eq!(DBC.message_attribute(message.id, "VFrameFormat"), format);
+        let switches = sent.is_fd.then_some(&AttributeValue::Uint(1));
+        assert_eq!(DBC.message_attribute(message.id, "CANFD_BRS"), switches);
         let cycle = DBC.message_attribute(message.id, "GenMsgCycleTime");
         assert_eq!(cycle, Some(&AttributeValue::Uint(sent.period_ms.into())), "{}", message.name);
         assert!(DBC.message_comment(message.id).is_some(), "{}", message.name);
@@ -97,11 +109,13 @@ fn the_file_has_the_frames_of_diagnosis() {
 #[test]
 fn signals_lie_apart_and_their_ranges_are_what_their_bits_hold() {
     for message in &DBC.messages {
-        let mut taken = 0u64;
+        let mut taken = [false; 8 * LENGTH];
         for signal in &message.signals {
-            let bits = ((1u64 << signal.size) - 1) << signal.start_bit;
-            assert!(signal.start_bit + signal.size <= 64 && taken & bits == 0, "{}", signal.name);
-            taken |= bits;
+            let end = signal.start_bit + signal.size;
+            assert!(end <= 8 * message.size, "{}", signal.name);
+            for bit in &mut taken[signal.start_bit as usize..end as usize] {
+                assert!(!core::mem::replace(bit, true), "{}", signal.name);
+            }
             let span = 1i64 << signal.size;
             let (low, high) = match signal.value_type {
                 ValueType::Signed => (-span / 2, span / 2 - 1),
@@ -118,25 +132,20 @@ fn signals_lie_apart_and_their_ranges_are_what_their_bits_hold() {
 }
 
 #[test]
-fn a_fibre_optic_gyros_messages_have_the_layout_of_the_inertial_sensors() {
-    let layout = |id: u16| {
-        let signals = &message(Id::Standard(StandardId::new(id).expect("11 bits"))).signals;
+fn other_messages_have_the_layout_of_the_inertial_sensors() {
+    let layout = |id: u16, start: u64| {
+        let message = message(Id::Standard(StandardId::new(id).expect("11 bits")));
         let of = |signal: &Signal| {
-            let name = signal.name.replace("Fog", "");
-            (
-                name,
-                signal.start_bit,
-                signal.size,
-                signal.value_type,
-                signal.factor,
-                signal.offset,
-                signal.unit.clone(),
-            )
+            let values = DBC.value_descriptions_for_signal(message.id, &signal.name);
+            let signal = Signal { start_bit: start + signal.start_bit, ..signal.clone() };
+            format!("{signal:?} {values:?}")
         };
-        signals.iter().map(of).collect::<Vec<_>>()
+        message.signals.iter().map(of).collect::<Vec<_>>()
     };
     let own = ALL.yaw.expect("sent by default").ids;
-    assert_eq!(FOG_IDS.map(layout), own.map(layout));
+    assert_eq!(FOG_IDS.map(|id| layout(id, 0)), own.map(|id| layout(id, 0)));
+    let parts: Vec<_> = own.into_iter().zip([0, 64, 128]).flat_map(|(id, start)| layout(id, start)).collect();
+    assert_eq!(layout(FD_ID, 0), parts, "one after the other");
 }
 
 #[test]

@@ -30,8 +30,13 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 type Board = Device<Region<RECORD_SECTOR>, MappedRegion>;
-const SUPPORTED_HARDWARE: SupportedHardware =
-    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[], gnss: false, clock_hz: 168_000_000 };
+const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
+    imus: &[ImuPart::XsensMti],
+    fogs: &[],
+    gnss: false,
+    fd: false,
+    clock_hz: 168_000_000,
+};
 const IDENTITY: Identity = Identity {
     firmware: [0, 1, 0],
     device_id: Some(0x413),

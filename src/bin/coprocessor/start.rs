@@ -26,6 +26,7 @@ const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
     },
     fogs: if BOARD.fog.is_some() { &[FogPart::Dsp1760] } else { &[] },
     gnss: BOARD.gnss.is_some(),
+    fd: false,
     clock_hz: FULL_HZ,
 };
 

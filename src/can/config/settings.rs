@@ -69,6 +69,8 @@ pub struct YawSettings {
     pub period_ms: u16,
     /// E2E protection.
     pub e2e: E2e,
+    /// Identifier of one CAN FD frame in place of the three ([`crate::can::fd`]), of 11 bits; `None` for classic frames.
+    pub fd: Option<u16>,
 }
 
 /// The slow status message ([`crate::can::status`]), which is sent once a second.
@@ -104,6 +106,7 @@ impl Settings {
             ids: [0x1A0, 0x1A1, 0x1A2],
             period_ms: 10,
             e2e: E2e::P01 { mode: DataIdMode::Both, data_ids: [0x1A0, 0x1A1, 0x1A2] },
+            fd: None,
         }),
         status: None,
     };

@@ -110,12 +110,15 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     fn check_supported(&self, configuration: &Configuration) -> Result<(), StoreError> {
-        let SupportedHardware { imus, fogs, gnss, .. } = self.supported;
+        let SupportedHardware { imus, fogs, gnss, fd, .. } = self.supported;
         if !imus.contains(&configuration.imu) || configuration.fog.is_some_and(|fog| !fogs.contains(&fog)) {
             return Err(StoreError::Field(FieldError::PartNotInImage));
         }
         if configuration.heading.line.is_some() && !gnss {
             return Err(StoreError::Field(FieldError::NoLine));
+        }
+        if configuration.can.yaw.is_some_and(|yaw| yaw.fd.is_some()) && !fd {
+            return Err(StoreError::Field(FieldError::NoFd));
         }
         Ok(())
     }

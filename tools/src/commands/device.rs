@@ -9,6 +9,7 @@ use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::heading::CourseCounters;
 use gyronet::model::Blob;
 use gyronet::model::fognet_blob::FOGNET;
+use gyronet::service::event::CanFault;
 use gyronet::service::message::{AccessCounters, Info};
 use gyronet_tools::client::bus::{self, Bus};
 use gyronet_tools::client::device::settings::{flat, value as value_of};
@@ -218,6 +219,7 @@ fn print_info(info: &Info, access: &str) -> io::Result<()> {
     writeln!(out, "clock         {:.3} MHz{fault}", f64::from(identity.clock_hz) / 1e6)?;
     let bus = match identity.can_fault {
         None => "CAN, SLCAN".to_owned(),
+        Some(fault @ CanFault::Fd) => format!("CAN, SLCAN: {fault}"),
         Some(fault) => format!("SLCAN only: {fault}"),
     };
     writeln!(out, "bus           {bus}")?;

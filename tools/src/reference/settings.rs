@@ -32,6 +32,13 @@ const SETTINGS: &[(&str, Takes)] = &[
     ),
     ("can.yaw.ids", Other("", "as `fog_ids`; `can.yaw=null` sends none of the three")),
     ("can.yaw.period_ms", Other("ms", "10 to 1000, multiples of 10")),
+    (
+        "can.yaw.fd",
+        Other(
+            "",
+            "`null`, or the identifier of one CAN FD frame in place of the three, on the NUCLEO-H563ZI; `423` is free",
+        ),
+    ),
     ("can.yaw.e2e.P01.mode", Other("", "`Both`, `Alternating`, `Low`, `Nibble`")),
     (
         "can.yaw.e2e.P01.data_ids",

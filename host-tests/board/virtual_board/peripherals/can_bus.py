@@ -3,7 +3,8 @@
 Frames follow each other on one time line. When the bus is free, the first frame of the board and the due frames of the other nodes
 contend, and the lowest arbitration field wins. A frame lasts exactly as long as its bits, stuff bits included, at the sender's bit rate.
 The other nodes use `bit_rate`, and `data_bit_rate` in the data of CAN FD frames; a board whose rate differs by more than 0.5 %
-receives and causes error frames, and so does one that knows only classic frames when it hears a CAN FD frame.
+receives and causes error frames, and so does one that knows only classic frames when it hears a CAN FD frame. `classic` True: the
+other nodes know only these, and destroy the board's CAN FD frames.
 
 Faults: `acknowledge` False (no other node listens), `connected` False (the board is alone on its line), `short` "recessive" (CAN_H on
 CAN_L: the board reads recessive whatever it sends, which ends in bus-off) or "dominant" (nothing can be sent; a frame in progress ends
@@ -15,7 +16,7 @@ import heapq
 from functools import partial
 from typing import NamedTuple
 
-from .can_frame import INTERMISSION_BITS, Frame, duration, frame_bits, priority, stuffed_bits
+from .can_frame import INTERMISSION_BITS, TAIL_BITS, Frame, duration, frame_bits, priority
 
 PS = 1_000_000_000_000
 RATE_TOLERANCE = 0.005
@@ -50,6 +51,7 @@ class CanBus:
         self.board, self.node = board, node
         self.bit_rate, self.data_bit_rate = 500_000, 2_000_000
         self.acknowledge = self.connected = True
+        self.classic = False
         self.short = None
         self.babble = None
         self.log = []
@@ -169,19 +171,26 @@ class CanBus:
             return None
         if not self.node.takes_fd:
             return FORM_ERROR
-        wrong = frame.fast and abs(self.node.data_bit_ps * self.data_bit_rate / PS - 1) > RATE_TOLERANCE
-        return STUFF_ERROR if wrong else None
+        return STUFF_ERROR if self._fast_mismatched(frame) else None
+
+    def _fast_mismatched(self, frame):
+        """Returns whether the board's bit rate of the data does not match the bus."""
+        return frame.fast and abs(self.node.data_bit_ps * self.data_bit_rate / PS - 1) > RATE_TOLERANCE
 
     def _send_own(self, frame):
+        bit = self.node.bit_ps
+        whole = duration(frame, bit, self.node.data_bit_ps)
         if self.short == "recessive":
-            bits, error, code = 1 + ERROR_BITS_ALONE, "bit", DOMINANT_ERROR
+            time, error, code = (1 + ERROR_BITS_ALONE) * bit, "bit", DOMINANT_ERROR
         elif not self.shared:
-            bits, error, code = stuffed_bits(frame) + 2 + ERROR_BITS_ALONE, "acknowledge", ACKNOWLEDGE_ERROR
-        elif self.mismatched():
-            bits, error, code = MISMATCH_BITS + ERROR_BITS, "bit rate", RECESSIVE_ERROR
+            # Up to the acknowledge slot.
+            time, error, code = whole + (2 - TAIL_BITS + ERROR_BITS_ALONE) * bit, "acknowledge", ACKNOWLEDGE_ERROR
+        elif self.mismatched() or frame.fd and (self.classic or self._fast_mismatched(frame)):
+            error = "CAN FD" if frame.fd else "bit rate"
+            time, code = (MISMATCH_BITS + ERROR_BITS) * bit, RECESSIVE_ERROR
         else:
-            bits, error, code = frame_bits(frame), None, 0
-        self._transmit(frame, "board", bits * self.node.bit_ps, error, code)
+            time, error, code = whole, None, 0
+        self._transmit(frame, "board", time, error, code)
 
     def _send_other(self, frame, source):
         heard = self.node.listens()

@@ -1,6 +1,6 @@
 """What the CAN controllers have in common: their way to the bus, the error counters and what follows from them (ISO 11898-1 12.1.4).
 
-Settings: those of `CanBus`: `bit_rate`, `data_bit_rate`, `acknowledge`, `connected`, `short`, `babble`.
+Settings: those of `CanBus`: `bit_rate`, `data_bit_rate`, `classic`, `acknowledge`, `connected`, `short`, `babble`.
 """
 
 from .can_bus import ACKNOWLEDGE_ERROR, CanBus
@@ -147,6 +147,6 @@ class CanNode(Registers):
                 self.board.irq(self.irqs[index], level)
 
     def configure(self, key, value):
-        if key not in ("bit_rate", "data_bit_rate", "acknowledge", "connected", "short", "babble"):
+        if key not in ("bit_rate", "data_bit_rate", "classic", "acknowledge", "connected", "short", "babble"):
             super().configure(key, value)
         self.bus.configure(key, value)

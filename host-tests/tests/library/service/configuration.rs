@@ -3,8 +3,9 @@
 use super::{Board, GOOD, IDENTITY, LEVEL, SUPPORTED_HARDWARE, bare, info, sample, start};
 use embedded_can::{Id, StandardId};
 use gyronet::bias::{EarthRate, Latitude, StaticConfig};
-use gyronet::can::config::{Config, ConfigError, Settings};
+use gyronet::can::config::{Config, ConfigError, Settings, YawSettings};
 use gyronet::can::diagnosis::DiagnosisIds;
+use gyronet::can::fd::FD_ID;
 use gyronet::can::wheel::{WheelFrame, WheelSettings};
 use gyronet::compensate::CompensateConfig;
 use gyronet::fog::Tilt;
@@ -65,6 +66,9 @@ fn configuration_is_kept_whole() {
     let mut with_line = wanted;
     with_line.heading.line = Some(GnssSettings { protocol: GnssProtocol::Nmea, baud: 9_600 });
     assert_eq!(board.set_configuration(&with_line), refused(FieldError::NoLine));
+    let yaw = wanted.can.yaw.map(|yaw| YawSettings { fd: Some(FD_ID), ..yaw });
+    let with_fd = Configuration { can: Settings { yaw, ..wanted.can }, ..wanted };
+    assert_eq!(board.set_configuration(&with_fd), refused(FieldError::NoFd));
     assert_eq!(*start(&flash).configuration(), wanted);
 }
 

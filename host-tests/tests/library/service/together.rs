@@ -26,8 +26,13 @@ use std::collections::{BTreeMap, HashSet};
 use std::rc::Rc;
 
 const HZ: u32 = 168_000_000;
-const HARDWARE: SupportedHardware =
-    SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[FogPart::Dsp1760], gnss: true, clock_hz: HZ };
+const HARDWARE: SupportedHardware = SupportedHardware {
+    imus: &[ImuPart::XsensMti],
+    fogs: &[FogPart::Dsp1760],
+    gnss: true,
+    fd: true,
+    clock_hz: HZ,
+};
 
 const NO_WHEELS: WheelSettings =
     WheelSettings { frames: [None; 4], signals: [None; 4], ..WheelSettings::TOYOTA };

@@ -2,8 +2,8 @@
 
 The bus behind it is `can_bus.CanBus`. Witnesses: the header (registers, bits), the SVD (reset values), the HAL (layout of the
 message RAM, order of accesses), Bosch's M_CAN user's manual as remembered (what CCE resets, 129 sequences after bus-off, PSR set
-by a read). Left out: tx events, high-priority messages, timeout, transmitter delay, loop-back and restricted modes, sending CAN FD, the
-transmit queue, FIFO 1, FIFOs that overwrite, and filters but masks.
+by a read). Left out: tx events, high-priority messages, timeout, transmitter delay, loop-back and restricted modes, PSR's error of the
+data phase, the transmit queue, FIFO 1, FIFOs that overwrite, and filters but masks.
 Assumed: INIT can be read back at once; a FIFO skips requests that were cancelled.
 """
 
@@ -13,7 +13,7 @@ from ..can_node import CanNode
 from ..registers import Registers, unmodelled
 
 PS = 1_000_000_000_000
-INIT, CCE, CSA, CSR, MON, DAR, TEST, FDOE = (1 << bit for bit in (0, 1, 3, 4, 5, 6, 7, 8))
+INIT, CCE, CSA, CSR, MON, DAR, TEST, FDOE, BRSE = (1 << bit for bit in (0, 1, 3, 4, 5, 6, 7, 8, 9))
 CCCR_PROTECTED, ABSENT = 0xF3E4, 1 << 2 | TEST
 (CREL, ENDN, DBTP, TEST_REGISTER, RWD, CCCR, NBTP, TSCC, TSCV, TOCC, TOCV, ECR, PSR, TDCR) = (
     0x00, 0x04, 0x0C, 0x10, 0x14, 0x18, 0x1C, 0x20, 0x24, 0x28, 0x2C, 0x40, 0x44, 0x48)
@@ -164,12 +164,17 @@ class Fdcan(CanNode):
     def _frame(self, index):
         offset = BUFFERS + ELEMENT * index
         identifier, control = self._words(offset, 2)
-        if control & 1 << 23 or control & 1 << 21:
-            raise Violation(f"{self.name}: a transmit buffer asks for an event or for CAN FD, which is not modelled")
-        extended, remote = bool(identifier >> 30 & 1), bool(identifier >> 29 & 1)
-        length = min(control >> 16 & 15, 8)
-        data = b"" if remote else bytes(self.ram[offset + 8 : offset + 8 + length])
-        return Frame(identifier & 0x1FFF_FFFF if extended else identifier >> 18 & 0x7FF, data, extended, remote, length)
+        if control & 1 << 23:
+            raise Violation(f"{self.name}: a transmit buffer asks for an event, which is not modelled")
+        # FDF and BRS count where CCCR allows them; a CAN FD frame is never remote.
+        fd = bool(control & 1 << 21) and self.takes_fd
+        fast = fd and bool(control & 1 << 20) and bool(self.cccr & BRSE)
+        extended, remote = bool(identifier >> 30 & 1), bool(identifier >> 29 & 1) and not fd
+        length = control >> 16 & 15
+        size = LENGTHS[length] if fd else min(length, 8)
+        data = b"" if remote else bytes(self.ram[offset + 8 : offset + 8 + size])
+        identifier = identifier & 0x1FFF_FFFF if extended else identifier >> 18 & 0x7FF
+        return Frame(identifier, data, extended, remote, length if fd else size, fd, fast)
 
     def _succeeded(self):
         bit = 1 << self.sending
