@@ -154,9 +154,10 @@ impl<B: Bus> Device<B> {
         words.fields()
     }
 
+    /// Restarts the board, once the vehicle is proven to stand: what was stored just before may have interrupted the proof.
     pub fn restart(&mut self) -> Result<()> {
         self.enter(Session::Extended)?;
-        self.ask(&[0x11, 1]).map(drop)
+        self.ask_at_rest(&[0x11, 1]).map(drop)
     }
 
     pub fn read(&mut self, id: u16) -> Result<Vec<u8>> {
