@@ -9,9 +9,10 @@ mod event;
 pub mod line;
 mod link;
 
+use crate::wire::{data_frame, id11, id29};
 use crate::{image, require};
 pub use bus::CanBus;
-use embedded_can::{ExtendedId, Frame, Id, StandardId};
+use embedded_can::{Frame, Id};
 pub use event::{Counts, Event};
 use gyronet::can::DataFrame;
 use gyronet::model::blob::CRC;
@@ -145,16 +146,8 @@ impl Board {
     }
 
     pub fn sent(&mut self, usart: usize) -> Vec<u8> {
-        self.sent_chunks(usart).into_iter().flat_map(|(_, bytes)| bytes).collect()
-    }
-
-    /// Takes the bytes that the board has sent, in pieces without a gap, with the time of each first byte.
-    pub fn sent_chunks(&mut self, usart: usize) -> Vec<(Duration, Vec<u8>)> {
         let answer = self.ask("usart_take", json!({ "usart": usart }));
-        list(&answer["chunks"])
-            .iter()
-            .map(|chunk| (duration(&chunk["time_us"]), unhex(&chunk["hex"])))
-            .collect()
+        list(&answer["chunks"]).iter().flat_map(|chunk| unhex(&chunk["hex"])).collect()
     }
 
     pub fn bus(&mut self) -> CanBus<'_> {
@@ -327,12 +320,8 @@ fn foreign(frame: &DataFrame) -> Value {
 
 fn frame(entry: &Value) -> DataFrame {
     let id = word(&entry["id"]);
-    let id = if entry["ext"] == true {
-        Id::from(ExtendedId::new(id).expect("29 bits"))
-    } else {
-        Id::from(StandardId::new(id as u16).expect("11 bits"))
-    };
-    DataFrame::new(id, &unhex(&entry["data"])).expect("at most eight bytes")
+    let id = if entry["ext"] == true { id29(id) } else { id11(id as u16) };
+    data_frame(id, &unhex(&entry["data"]))
 }
 
 fn place(at: At, mut arguments: Value) -> Value {

@@ -77,6 +77,13 @@ pub struct F405 {
     noise: Noise,
 }
 
+/// The flash of a board, which everything on the board shares.
+pub type Flash = Rc<RefCell<F405>>;
+
+pub fn shared(content: F405) -> Flash {
+    Rc::new(RefCell::new(content))
+}
+
 impl Default for F405 {
     fn default() -> Self {
         Self::up_to(BYTES)
@@ -172,12 +179,12 @@ impl F405 {
 /// Gives access to a part of the flash whose smallest sectors are `SECTOR` bytes long; offsets count from its start.
 #[derive(Debug, Clone)]
 pub struct Region<const SECTOR: usize> {
-    flash: Rc<RefCell<F405>>,
+    flash: Flash,
     range: Range<usize>,
 }
 
 impl<const SECTOR: usize> Region<SECTOR> {
-    pub fn new(flash: &Rc<RefCell<F405>>, range: Range<u32>) -> Self {
+    pub fn new(flash: &Flash, range: Range<u32>) -> Self {
         Self { flash: Rc::clone(flash), range: range.start as usize..range.end as usize }
     }
 
@@ -249,13 +256,13 @@ pub struct MappedRegion {
 }
 
 impl MappedRegion {
-    pub fn new(flash: &Rc<RefCell<F405>>) -> Self {
+    pub fn new(flash: &Flash) -> Self {
         let copy = flash.borrow().words.clone();
         Self { region: Region::new(flash, 0..BYTES as u32), copy, running: None }
     }
 
     /// Gives access to the flash of a board whose boot loader has started a slot.
-    pub fn of_running(flash: &Rc<RefCell<F405>>, running: Option<Slot>) -> Self {
+    pub fn of_running(flash: &Flash, running: Option<Slot>) -> Self {
         Self { running, ..Self::new(flash) }
     }
 

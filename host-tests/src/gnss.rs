@@ -1,6 +1,6 @@
 //! Bytes of GNSS receivers, made by the pages of their protocols: UBX-NAV-PVT and sentences of NMEA 0183.
 
-use embedded_can::{Frame, Id, StandardId};
+use crate::wire::{data_frame, id11};
 use gyronet::can::DataFrame;
 use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::heading::{GnssSettings, HeadingSettings, HeadingSignal};
@@ -54,10 +54,8 @@ impl Pvt {
     pub fn frames(&self) -> [DataFrame; 2] {
         let speed = [self.speed as u32, self.speed_sigma];
         let course = [self.course as u32, self.course_sigma];
-        [(SPEED, speed), (COURSE, course)].map(|(id, words)| {
-            let id = StandardId::new(id).expect("11 bits");
-            DataFrame::new(id, words.map(u32::to_le_bytes).as_flattened()).expect("eight bytes")
-        })
+        [(SPEED, speed), (COURSE, course)]
+            .map(|(id, words)| data_frame(id11(id), words.map(u32::to_le_bytes).as_flattened()))
     }
 }
 
@@ -67,7 +65,7 @@ const SPEED: u16 = 0x322;
 /// The settings of a receiver on its line, and those of the same numbers in frames.
 pub fn sources(line: GnssSettings) -> [HeadingSettings; 2] {
     let signal = |id, start, factor| {
-        let id = Id::Standard(StandardId::new(id).expect("11 bits"));
+        let id = id11(id);
         let field = BitField::new(start, 32, ByteOrder::Intel, false).expect("inside the frame");
         Some(HeadingSignal { id, field, factor, offset: 0.0, invalid: None })
     };

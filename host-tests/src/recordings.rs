@@ -18,15 +18,28 @@ pub fn folder() -> PathBuf {
     std::env::var_os(VARIABLE).map_or_else(beside, |folder| workspace().join(folder))
 }
 
-/// Returns the file of one drive of `wid_car`; without it reports that the test is skipped.
+/// Returns a file or folder among the recordings; without it reports that the test is skipped.
+pub fn found(name: &str) -> Option<PathBuf> {
+    let path = folder().join(name);
+    let missing = format!("no recording {} ({VARIABLE} names another folder)", path.display());
+    require::wants(Need::Data, path.exists().then_some(path).ok_or(missing))
+}
+
+/// Returns the file of one drive of `wid_car`.
 pub fn trial(number: u32) -> Option<PathBuf> {
-    let path = folder().join(format!("wid_car/trial{number:02}_100hz.csv"));
-    let found = if path.is_file() {
-        Ok(path)
-    } else {
-        Err(format!("no recording {} ({VARIABLE} names another folder)", path.display()))
-    };
-    require::wants(Need::Data, found)
+    found(&format!("wid_car/trial{number:02}_100hz.csv"))
+}
+
+/// Returns the recordings with a speed or wheels, in order; without the drives of `wid_car` reports that the test is skipped.
+pub fn with_speed() -> Option<Vec<PathBuf>> {
+    found("wid_car")?;
+    let sets = ["wid_car", "real_car", "rc_car", "utv", "truck", "car_mti710"];
+    let folders = sets.map(|set| folder().join(set));
+    let files = folders.iter().filter_map(|set| std::fs::read_dir(set).ok()).flatten().flatten();
+    let is_drive = |path: &PathBuf| path.extension().is_some_and(|e| e == "csv");
+    let mut paths: Vec<_> = files.map(|file| file.path()).filter(is_drive).collect();
+    paths.sort();
+    Some(paths)
 }
 
 /// Returns the files of these drives; where one is missing, reports that the test is skipped.

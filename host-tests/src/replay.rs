@@ -2,7 +2,6 @@
 //! image, it does the input and output around the library's [`Coprocessor`].
 
 use crate::synthetic;
-use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::coprocessor::{self, Clock, Coprocessor, TimedFrame};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
@@ -10,6 +9,7 @@ use gyronet::sample::ImuSample;
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::store::{Calibration, Configuration, Learned};
 use gyronet::units::Micros;
+use gyronet_tools::drive::wheel_frames::receiver;
 
 /// Returns the bytes of message `number` of an MTi, one every 10 ms, when the vehicle is level and turns at
 /// `yaw_rate`, rad/s.
@@ -63,9 +63,8 @@ impl Board {
 
     /// Returns a board that has learnt on earlier drives.
     pub fn experienced(configuration: &Configuration, learned: &Learned, blob: Blob<'static>) -> Self {
-        let wheels = WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings");
         let config = coprocessor::Config {
-            wheels: Some(wheels),
+            wheels: Some(receiver()),
             clock: Clock::Sensor,
             ..configuration.coprocessor(&Calibration::NONE, learned, blob.crc)
         };

@@ -1,7 +1,7 @@
 //! The flash of a board before it starts: the library's own store writes to the mock of the F405's flash, and the
 //! content is copied into the virtual board's.
 
-use crate::flash::{F405, Region};
+use crate::flash::{F405, Flash, Region};
 use crate::noise::Noise;
 use embedded_storage::nor_flash::NorFlash;
 use gyronet::model::blob::CRC;
@@ -9,10 +9,8 @@ use gyronet::model::weights;
 use gyronet::store::firmware::{LABEL, LABEL_SIZE, Label, MAX_IMAGE, Trailer};
 use gyronet::store::layout::{self, FLASH_BASE, RECORD_SECTOR, SLOT_SIZE};
 use gyronet::store::{Accepted, Record, Slot, Store, StoreError, Upload};
-use std::cell::RefCell;
-use std::rc::Rc;
 
-pub fn open(flash: &Rc<RefCell<F405>>) -> Result<Store<Region<RECORD_SECTOR>>, StoreError> {
+pub fn open(flash: &Flash) -> Result<Store<Region<RECORD_SECTOR>>, StoreError> {
     Store::open(Region::new(flash, layout::STORE), 0)
 }
 
@@ -27,7 +25,7 @@ pub fn slots(flash: &F405) -> [&[u8]; 2] {
 }
 
 /// Uploads a file to a slot, checks it and accepts it, as the board does.
-pub fn upload(flash: &Rc<RefCell<F405>>, slot: Slot, file: &[u8]) -> Result<(), String> {
+pub fn upload(flash: &Flash, slot: Slot, file: &[u8]) -> Result<(), String> {
     let text = |error: &dyn std::error::Error| error.to_string();
     let mut region = Region::<RECORD_SECTOR>::new(flash, 0..1 << 20);
     let mut upload = Upload::begin(&mut region, slot, file.len() as u32).map_err(|e| text(&e))?;
@@ -62,7 +60,7 @@ pub fn image(label: &Label, seed: u64) -> Vec<u8> {
 }
 
 /// Writes an image to an erased slot as a programmer does.
-pub fn flash_image(flash: &Rc<RefCell<F405>>, slot: Slot, image: &[u8]) {
+pub fn flash_image(flash: &Flash, slot: Slot, image: &[u8]) {
     let trailer =
         Trailer { is_confirmed: true, ..Trailer::new(image.len() as u32, CRC.checksum(image), 0, 1) };
     let mut region = Region::<RECORD_SECTOR>::new(flash, 0..1 << 20);
@@ -73,7 +71,7 @@ pub fn flash_image(flash: &Rc<RefCell<F405>>, slot: Slot, image: &[u8]) {
 
 /// Holds a board's flash before it starts.
 #[derive(Debug, Default)]
-pub struct Stored(Rc<RefCell<F405>>);
+pub struct Stored(Flash);
 
 impl Stored {
     pub fn record<R: Record>(self, record: &R) -> Self {

@@ -1,9 +1,23 @@
-//! Creates bytes of an Xsens MTi, and collects the samples that a part's driver delivers for bytes.
+//! Creates CAN frames and bytes of an Xsens MTi, and collects the samples that a part's driver delivers for bytes.
 
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
+use gyronet::can::DataFrame;
 use gyronet::sample::ImuSample;
 use gyronet::sensor::ByteSource;
 use gyronet::sensor::xsens::{MtData2, Mti, XsensError};
 use std::borrow::Borrow;
+
+pub const fn id11(raw: u16) -> Id {
+    Id::Standard(StandardId::new(raw).expect("11 bits"))
+}
+
+pub const fn id29(raw: u32) -> Id {
+    Id::Extended(ExtendedId::new(raw).expect("29 bits"))
+}
+
+pub fn data_frame(id: Id, data: &[u8]) -> DataFrame {
+    DataFrame::new(id, data).expect("at most eight bytes")
+}
 
 /// Parses bytes that are written in hexadecimal, with or without spaces between them.
 pub fn bytes(hex: &str) -> Vec<u8> {

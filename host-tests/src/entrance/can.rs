@@ -1,8 +1,8 @@
 //! Parses frames from the vehicle bus: wheel speeds, and our own messages as a receiver parses them.
 
 use super::{byte, take};
-use embedded_can::{ExtendedId, Frame, Id, StandardId};
-use gyronet::can::DataFrame;
+use crate::wire::{data_frame, id11, id29};
+use embedded_can::Id;
 use gyronet::can::bosch::Message;
 use gyronet::can::e2e::{Checker, DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
 use gyronet::can::signal::{BitField, ByteOrder};
@@ -11,8 +11,8 @@ use gyronet::can::yaw::{AngleMessage, DetailMessage, RateMessage};
 use gyronet::sample::Standstill;
 use gyronet::units::{Duration, Micros, WheelSpeed};
 
-const ID: Id = Id::Standard(StandardId::new(0xAA).expect("11 bits"));
-const OTHER: Id = Id::Extended(ExtendedId::new(0x18FE_BF0B).expect("29 bits"));
+const ID: Id = id11(0xAA);
+const OTHER: Id = id29(0x18FE_BF0B);
 const PROFILES: [Profile; 4] = [
     Profile::P01(P01 { data_id: 0x123, mode: DataIdMode::Both }),
     Profile::P02(P02 { data_ids: [7; 16] }),
@@ -68,7 +68,7 @@ pub fn wheels(mut data: &[u8]) {
         }
         let id = if kind & 0x0F == 0x0F { OTHER } else { ID };
         let len = if kind & 0x0F < 8 { usize::from(kind & 0x0F) + 1 } else { 8 };
-        let frame = DataFrame::new(id, &content[..len]).expect("eight bytes at most");
+        let frame = data_frame(id, &content[..len]);
         let judged = receiver.decode(&frame, Micros(now));
         assert_eq!(judged.is_none(), id == OTHER);
         let known = receiver.poll(Micros(now));

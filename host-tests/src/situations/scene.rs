@@ -58,6 +58,12 @@ impl Scene {
         }
     }
 
+    /// Stands for eight seconds, and rides through so many blocks of a town.
+    pub fn start(&mut self, blocks: usize) {
+        self.ride.hold(8.0);
+        self.town(blocks);
+    }
+
     /// Rides through so many blocks of a town.
     pub fn town(&mut self, blocks: usize) {
         self.ride.town(blocks, &mut self.random);

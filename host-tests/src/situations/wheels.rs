@@ -2,7 +2,7 @@
 
 use super::ride::Travelled;
 use super::sensor::During;
-use embedded_can::{Frame, StandardId};
+use crate::wire::{data_frame, id11};
 use gyronet::can::DataFrame;
 use gyronet_tools::random::Random;
 
@@ -65,8 +65,7 @@ pub fn frames(
             ((speed * 3.6 + 67.67) * 100.0).round() as u16 | marked[wheel]
         });
         let data = codes.map(u16::to_be_bytes).concat();
-        let id = StandardId::new(0xAA).expect("11 bits");
-        frames.push((at, DataFrame::new(id, &data).expect("eight bytes")));
+        frames.push((at, data_frame(id11(0xAA), &data)));
     }
     frames
 }

@@ -1,11 +1,11 @@
 //! The bring-up image on the virtual board: every line of its output, on a board in order and on one that is not.
 
+use crate::common::SECOND;
 use gyronet::store::layout::{FLASH_BASE, SLOT_SIZE, SLOTS};
 use gyronet_host_tests::board::{self, At, Board};
 use std::time::Duration;
 
 const REPORT: usize = 6;
-const SECOND: Duration = Duration::from_secs(1);
 /// The last sector of the flash.
 const SPARE: u32 = FLASH_BASE + SLOTS.start + SLOT_SIZE as u32;
 

@@ -7,7 +7,7 @@
 //! | `cargo test -p gyronet-host-tests --test board longest_paths -- --nocapture` | the table of paths |
 //! | `GYRONET_SETTINGS=50,10,20,60 cargo test -p gyronet-host-tests --test board accepted -- --nocapture` | so many accepted configurations (and of them the costliest), refused ones, and seconds for each |
 
-use crate::common::{self, IMU, SAMPLE, SERVICE, START};
+use crate::common::{self, IMU, SAMPLE, SECOND, SERVICE, START};
 use crate::service::{self, on_bus, on_line};
 use gyronet::compensate::Stride;
 use gyronet::model::blob::Shape;
@@ -26,9 +26,7 @@ use gyronet_tools::client::device::upload::upload;
 use gyronet_tools::client::device::{Authority, Device};
 use gyronet_tools::drive::wheel_frames::WheelFrames;
 use gyronet_tools::signing::PrivateKey;
-use std::time::Duration;
 
-const SECOND: Duration = Duration::from_secs(1);
 /// Clocks of an instruction that the virtual board assumes.
 const CLOCKS: f64 = 1.3;
 /// Least times until the watchdog resets the board, s: all tasks, and idle while it checks a signature or a file.
@@ -62,8 +60,7 @@ fn a_moving_vehicle_costs_what_the_page_says() {
     const CYCLES: u64 = 41_000;
     /// Samples before the count and in it: the simulated car drives off after six seconds.
     const SAMPLES: [usize; 2] = [1_200, 300];
-    let Some(mut board) = common::boot() else { return };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     let drive = bundled::simulated_drive().expect("it comes with the tools");
     let mut wheels = WheelFrames::new(&drive).expect("it has wheels");
     let mut before = board.counts();

@@ -1,14 +1,15 @@
 //! The clock on the virtual board: a crystal that is missing, wrong, or stops.
 
-use crate::common::{self, SAMPLE, SET, SLCAN, START, boot, drive, frames, host, info, resets, unpowered};
+use crate::common::{
+    self, SAMPLE, SECOND, SET, SLCAN, START, boot, drive, frames, host, info, resets, unpowered,
+};
 use gyronet::service::crash::CrashKind;
 use gyronet::service::event::{CanFault, ClockFault, ResetCause};
-use gyronet_host_tests::board::{self, Board};
+use gyronet_host_tests::board::Board;
 use serde_json::Value;
 use std::time::Duration;
 
 const CRYSTAL: &str = "RCC.crystal_hz";
-const SECOND: Duration = Duration::from_secs(1);
 /// The start takes longer at 16 MHz: the networks' weights are checked.
 const SLOW_START: Duration = Duration::from_secs(2);
 
@@ -104,8 +105,7 @@ fn crystal_that_stops() {
 
 #[test]
 fn bootloader_that_leaves_the_pll_on() {
-    let Some(mut board) = boot() else { return };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     common::fall_asleep(&mut board);
     // A jump to the image's start without a reset: everything is still as the image has left it.
     let (reset, _) = board.symbol("Reset");
@@ -121,19 +121,4 @@ fn bootloader_that_leaves_the_pll_on() {
     assert_eq!((identity.clock_hz, identity.clock_fault, identity.can_fault), (168_000_000, None, None));
     assert!(board.can_frames().len() >= 19 * SET);
     assert_eq!(resets(&mut board).len(), 1, "power-on alone");
-}
-
-#[test]
-fn olimex_board_with_its_crystal_of_8_mhz() {
-    let elf = board::firmware("olimex-stm32-h405", env!("CARGO_TARGET_TMPDIR"), "coprocessor");
-    let Some(mut board) = elf.and_then(|elf| Board::unpowered(&elf)) else { return };
-    board.configure(CRYSTAL, 8_000_000);
-    board.configure("USART2.baud", 921_600);
-    board.power_on();
-    let samples = drive(50);
-    common::send(&mut board, &samples, START);
-    board.run(START + SAMPLE * 50);
-    let sent = frames(&board.can_frames());
-    assert!(sent[..] == host(&samples)[..sent.len()] && sent.len() >= 49 * SET, "{} frames", sent.len());
-    assert_eq!(info(&mut board).identity.clock_fault, None);
 }

@@ -1,13 +1,14 @@
 //! The board of these tests: an MTi on USART1, SLCAN on USART2 at 921600, the service line on USART6, CAN.
 
 use crate::service;
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::Frame;
 use gyronet::can::yaw::AngleMessage;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::health::Faults;
 use gyronet::service::message::{AllCounters, Info};
 use gyronet_host_tests::board::{self, Board};
 use gyronet_host_tests::recordings::workspace;
+pub use gyronet_host_tests::wire::id11 as id;
 use gyronet_host_tests::{inputs, replay, require};
 use gyronet_tools::bundled;
 use std::io::Write;
@@ -19,6 +20,8 @@ use std::time::Duration;
 pub const IMU: usize = 1;
 pub const SLCAN: usize = 2;
 pub const SERVICE: usize = 6;
+pub const MS: Duration = Duration::from_millis(1);
+pub const SECOND: Duration = Duration::from_secs(1);
 pub const SAMPLE: Duration = Duration::from_millis(10);
 /// Time from power-on until the image listens to all lines: the boot loader checks the image for 170 ms.
 pub const START: Duration = Duration::from_millis(300);
@@ -42,6 +45,13 @@ pub fn unpowered() -> Option<Board> {
 pub fn boot() -> Option<Board> {
     let mut board = unpowered()?;
     board.power_on();
+    Some(board)
+}
+
+/// A board that listens to all lines.
+pub fn started() -> Option<Board> {
+    let mut board = boot()?;
+    board.run(START);
     Some(board)
 }
 
@@ -76,10 +86,6 @@ pub fn host(samples: &[Vec<u8>]) -> Vec<DataFrame> {
 
 pub fn frames(timed: &[(Duration, DataFrame)]) -> Vec<DataFrame> {
     timed.iter().map(|(_, frame)| *frame).collect()
-}
-
-pub fn id(raw: u16) -> Id {
-    Id::Standard(StandardId::new(raw).expect("11 bits"))
 }
 
 /// Faults of the angle messages.

@@ -1,18 +1,15 @@
 //! Crashes and hangs on the virtual board: each resets the chip within the watchdog's limit at the latest, and
 //! leaves its reason.
 
-use crate::common::{self, START, boot, drive, info, resets};
-use embedded_can::{Frame, StandardId};
-use gyronet::can::DataFrame;
+use crate::common::{self, MS, SECOND, START, boot, drive, info, resets};
 use gyronet::service::crash::{Crash, CrashKind};
 use gyronet::service::event::ResetCause;
 use gyronet_host_tests::board::{At, Board};
+use gyronet_host_tests::wire::{data_frame, id11};
 use std::time::Duration;
 
 /// `b .`: a branch to itself.
 const HANG: &[u8] = &[0xFE, 0xE7];
-const SECOND: Duration = Duration::from_secs(1);
-const MS: Duration = Duration::from_millis(1);
 
 fn crash_of(board: &mut Board) -> Option<Crash> {
     let identity = info(board).identity;
@@ -51,8 +48,7 @@ fn hang_of_each_task() {
             board.send(line.parse().expect("a digit"), &[0]);
         }
         if task == "CAN1_RX0" {
-            let wheels = StandardId::new(0xAA).expect("11 bits");
-            board.can_send(&DataFrame::new(wheels, &[0; 8]).expect("eight bytes"));
+            board.can_send(&data_frame(id11(0xAA), &[0; 8]));
         }
         let began = board.run(Duration::ZERO);
         let reset = board.run_until("reset", SECOND);

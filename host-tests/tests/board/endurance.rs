@@ -8,8 +8,8 @@
 //! | CAN | the board's 900 frames a second; wheel frames at 50 Hz, and three identifiers at 50 Hz that the filters stop |
 //! | USART6 | a question every 100 ms |
 
-use crate::common::{self, IMU, SAMPLE, SERVICE, SET, SLCAN, START};
-use embedded_can::{Frame, StandardId};
+use crate::common::{self, IMU, MS, SAMPLE, SECOND, SERVICE, SET, SLCAN, START};
+use embedded_can::Frame;
 use gyronet::can::e2e::{Checker, Verdict};
 use gyronet::can::fog_encoder::FogEncoder;
 use gyronet::can::yaw::FOG_IDS;
@@ -22,16 +22,15 @@ use gyronet::units::AngularRate;
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::inputs::Step;
 use gyronet_host_tests::tester::segment;
+use gyronet_host_tests::wire::{data_frame, id11};
 use gyronet_host_tests::{replay, synthetic};
 use gyronet_tools::client::device::requests;
 use gyronet_tools::simulate::{self, Simulation};
 use std::time::{Duration, Instant};
 
 const FOG: usize = 3;
-const SECOND: Duration = Duration::from_secs(1);
 /// Seconds between two lines that say how far a run is.
 const MINUTE: usize = 60;
-const MS: Duration = Duration::from_millis(1);
 /// Samples in a second, and messages of the fibre-optic gyro in a sample.
 const SAMPLES: usize = 100;
 const MESSAGES: usize = 10;
@@ -60,8 +59,7 @@ const STACK_BUDGET: usize = 12 << 10;
 const PAINT: u8 = 0xA5;
 
 fn line(data: &[u8; 8]) -> Vec<u8> {
-    let id = StandardId::new(0x7E0).expect("11 bits");
-    slcan::emit(&DataFrame::new(id, data).expect("eight bytes")).expect("a data frame").to_vec()
+    slcan::emit(&data_frame(id11(0x7E0), data)).expect("a data frame").to_vec()
 }
 
 /// Holds the inputs that the outside sends and the frames that the host computes from them.
@@ -100,8 +98,7 @@ impl Outside {
             board.can_send_at(&wheels, begin + WHEELS_AFTER);
             self.host.can(&wheels);
             for id in OTHERS {
-                let id = StandardId::new(id).expect("11 bits");
-                let other = DataFrame::new(id, &[number as u8; 8]).expect("eight bytes");
+                let other = data_frame(id11(id), &[number as u8; 8]);
                 board.can_send_at(&other, begin + WHEELS_AFTER);
             }
         }

@@ -1,6 +1,7 @@
-//! A GNSS receiver on UART4 of the flashed image: its frames are the host's with the same courses from CAN.
+//! Courses on the flashed image, from a GNSS receiver on UART4 or from CAN: its frames are the host's with the same courses
+//! from CAN. What they teach is in `library::course`.
 
-use crate::common::{self, IMU, SAMPLE, START};
+use crate::common::{self, IMU, MS, SAMPLE, START};
 use crate::service;
 use gyronet::can::config::{Settings, StatusSettings};
 use gyronet::can::status::STATUS_ID;
@@ -13,11 +14,9 @@ use gyronet_host_tests::gnss::{Pvt, sentence, sources};
 use gyronet_host_tests::replay;
 use gyronet_host_tests::stored::Stored;
 use gyronet_host_tests::winding::Winding;
-use std::time::Duration;
 
 const UART4: usize = 4;
 const LINE: GnssSettings = GnssSettings { protocol: GnssProtocol::Ubx, baud: 230_400 };
-const MS: Duration = Duration::from_millis(1);
 /// Samples from a course to the next.
 const STEP: usize = 10;
 
@@ -27,13 +26,14 @@ fn configuration(heading: HeadingSettings) -> Configuration {
     Configuration { can, heading, ..Configuration::DEFAULT }
 }
 
-/// Drives some seconds, the first ones with courses, on the board by the line and on a host by CAN, both just started;
-/// returns the frames of both.
+/// Drives some seconds, the first ones with courses, on the board by its line, or by NMEA 2000 on CAN, and on a host by CAN,
+/// both just started; returns the frames of both.
 fn drive(
     board: &mut Board,
     host: &mut replay::Board,
     vehicle: &mut Winding,
     [with, without]: [usize; 2],
+    is_line: bool,
 ) -> [Vec<DataFrame>; 2] {
     for step in 0..10 * (with + without) {
         let now = board.counts().time;
@@ -42,7 +42,11 @@ fn drive(
             board.send_at(IMU, &sample, now + SAMPLE * k);
             host.push(&sample);
         }
-        if step < 10 * with {
+        if step < 10 * with && !is_line {
+            let course = vehicle.course();
+            board.can_send_at(&course, now + SAMPLE * STEP as u32 - 3 * MS);
+            host.can(&course);
+        } else if step < 10 * with {
             let pvt = vehicle.pvt();
             // It ends 3 ms before the next sample is on its line.
             board.send_at(UART4, &pvt.bytes(), now + SAMPLE * STEP as u32 - 7 * MS);
@@ -54,12 +58,33 @@ fn drive(
     [common::frames(&board.can_frames()), frames]
 }
 
+fn blob() -> Blob<'static> {
+    Blob::new_checked(&weights::DEFAULT.0).expect("it comes with the library")
+}
+
+#[test]
+fn courses_on_the_bus_are_used_as_on_the_host() {
+    let configuration = configuration(HeadingSettings { nmea2000: true, ..HeadingSettings::NONE });
+    let Some(mut board) = common::unpowered() else { return };
+    Stored::default().record(&configuration).write_to(&mut board);
+    board.power_on();
+    board.run(START);
+    board.can_frames();
+    let mut host = replay::Board::configured(&configuration, blob());
+    let [sent, same] = drive(&mut board, &mut host, &mut Winding::new(7), [16, 4], false);
+    assert!(sent.len() > common::SET * 1_998 && sent == same[..sent.len()], "{}", sent.len());
+    let (.., courses) = service::on_line(&mut board).course().expect("a response");
+    let counters = common::counters(&mut board);
+    println!("{courses:?}");
+    assert!(courses.used > 100, "{courses:?}");
+    assert_eq!((counters.lines.frames_lost, counters.inputs.heading_errors), (0, 0));
+}
+
 #[test]
 fn a_receiver_on_its_line_teaches_what_frames_teach() {
     let Some(mut board) = common::unpowered() else { return };
     board.configure("UART4.baud", LINE.baud);
     let [line, bus] = sources(LINE).map(configuration);
-    let blob = || Blob::new_checked(&weights::DEFAULT.0).expect("it comes with the library");
     let of = line.pipeline(&Calibration::NONE, &Learned::NOTHING, blob().crc).gain_of;
     let learned = Learned { gain: Some(Gain { share: 0.007, sigma: 0.001, of }), ..Learned::NOTHING };
     Stored::default().record(&line).record(&learned).write_to(&mut board);
@@ -70,7 +95,7 @@ fn a_receiver_on_its_line_teaches_what_frames_teach() {
         board.can_frames();
         let mut vehicle = Winding::new(7);
         let mut host = replay::Board::experienced(&bus, &learned, blob());
-        let [sent, same] = drive(&mut board, &mut host, &mut vehicle, seconds);
+        let [sent, same] = drive(&mut board, &mut host, &mut vehicle, seconds, true);
         let samples = 100 * seconds.iter().sum::<usize>();
         println!("{} of {} frames", sent.len(), same.len());
         assert!(sent.len() > common::SET * (samples - 2) && sent == same[..sent.len()], "{}", sent.len());

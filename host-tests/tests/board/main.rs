@@ -6,7 +6,6 @@ mod budget;
 mod can;
 mod clock;
 mod common;
-mod course;
 mod crash;
 mod endurance;
 mod gnss;

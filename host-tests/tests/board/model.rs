@@ -1,6 +1,6 @@
 //! The model of the STM32F405 itself: its own tests, and the image as it is flashed running on it.
 
-use crate::common::{self, IMU, SERVICE, SLCAN, START, boot};
+use crate::common::{self, IMU, SERVICE, SLCAN, START};
 use crate::service::{self, info};
 use gyronet::service::event::ResetCause;
 use gyronet::service::message::{FlashState, Identity, Info, Origin};
@@ -41,8 +41,7 @@ fn priorities_are_those_that_the_stack_bound_rests_on() {
 
 #[test]
 fn image_answers_on_the_service_line_and_restarts_on_request() {
-    let Some(mut board) = boot() else { return };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     let about = info(&mut board);
     assert_eq!((about.flash, about.writable), (FlashState::Ready, true));
     assert_eq!(about.configuration, Origin::BuiltIn);
@@ -61,8 +60,7 @@ fn image_answers_on_the_service_line_and_restarts_on_request() {
 
 #[test]
 fn board_does_the_same_again_after_a_snapshot_is_restored() {
-    let Some(mut board) = boot() else { return };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     board.snapshot("started");
     let mut runs = Vec::new();
     for _ in 0..2 {

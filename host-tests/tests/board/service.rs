@@ -1,12 +1,12 @@
 //! Testers of the virtual board, with limits of board time: a test does the same however busy the host is.
 
 use crate::common::SERVICE;
-use embedded_can::{Frame, Id, StandardId};
-use gyronet::can::DataFrame;
+use embedded_can::Frame;
 use gyronet::service::message::Info;
 use gyronet::store::{Configuration, Record};
 use gyronet_host_tests::board::{Board, CanBus, Line};
 use gyronet_host_tests::tester::segment;
+use gyronet_host_tests::wire::{data_frame, id11};
 use gyronet_tools::client::bus::SlcanBus;
 use gyronet_tools::client::device::Device;
 use std::time::Duration;
@@ -46,8 +46,7 @@ pub fn send(board: &mut Board, request: &[u8]) {
     let frames = segment(request);
     let last = frames.len() - 1;
     for (number, data) in frames.iter().enumerate() {
-        let id = StandardId::new(REQUEST).expect("11 bits");
-        board.can_send(&DataFrame::new(id, data).expect("eight bytes"));
+        board.can_send(&data_frame(id11(REQUEST), data));
         // The board grants the frames behind the first one, and behind each block.
         if number % BLOCK == 0 && number < last {
             board.run(BLOCK_TIME);
@@ -60,7 +59,7 @@ pub fn answer(board: &mut Board, limit: Duration) -> Option<Vec<u8>> {
     let until = board.counts().time + limit;
     while board.counts().time < until {
         board.run(Duration::from_millis(1));
-        let own = Id::from(StandardId::new(RESPONSE).expect("11 bits"));
+        let own = id11(RESPONSE);
         let frames = board.can_frames().into_iter().map(|(_, frame)| frame).filter(|frame| frame.id() == own);
         let messages = frames.filter(|frame| frame.data()[0] < 8);
         let mut messages = messages.map(|frame| frame.data()[1..=usize::from(frame.data()[0])].to_vec());

@@ -1,10 +1,11 @@
 //! The SLCAN line of the board: a host's commands.
 
 use crate::common::{self, SAMPLE, SET, SLCAN, START};
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::Frame;
 use gyronet::can::{DataFrame, slcan};
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::replay;
+use gyronet_host_tests::wire::id11;
 use std::time::Duration;
 
 fn standing(board: &mut Board, samples: std::ops::Range<usize>) {
@@ -16,8 +17,7 @@ fn standing(board: &mut Board, samples: std::ops::Range<usize>) {
 
 #[test]
 fn board_answers_the_commands_of_a_host() {
-    let Some(mut board) = common::boot() else { return };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     // Frames come before anybody has asked for any.
     standing(&mut board, 0..5);
     board.run(SAMPLE * 6);
@@ -41,7 +41,7 @@ fn board_answers_the_commands_of_a_host() {
     let stamped =
         sent.split(|byte| *byte == b'\r').filter_map(|line| slcan::parse_stamped::<DataFrame>(line).ok());
     let stamps: Vec<_> = stamped.map(|(frame, at)| (frame.id(), Duration::from_millis(at.into()))).collect();
-    let response = Id::from(StandardId::new(0x7E8).expect("11 bits"));
+    let response = id11(0x7E8);
     assert!(stamps.iter().any(|(id, _)| *id == response) && stamps.len() > 3 * SET, "{stamps:?}");
     // Stamps count from the image's start, which follows the boot loader.
     let past = begun - START..begun + SAMPLE * 4;

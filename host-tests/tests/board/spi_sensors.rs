@@ -1,6 +1,6 @@
 //! An ICM-42688-P, a BMI088 or an ASM330LHH on SPI1, from the stored configuration to the frames on CAN.
 
-use crate::common::{self, SLCAN, START};
+use crate::common::{self, MS, SECOND, SLCAN, START};
 use crate::service;
 use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
@@ -15,8 +15,6 @@ use gyronet_host_tests::stored::Stored;
 use serde_json::json;
 use std::time::Duration;
 
-const SECOND: Duration = Duration::from_secs(1);
-const MS: Duration = Duration::from_millis(1);
 const RATE: u16 = 0x1A0;
 const ANGLE: u16 = 0x1A1;
 /// The axis of yaw, as the model numbers them.
@@ -48,8 +46,6 @@ struct Fitted {
     model: &'static str,
     /// Bandwidth in hertz to which the image sets its gyro.
     bandwidth: f64,
-    /// The model's setting of its identity, and its value.
-    identity: (&'static str, u8),
     /// Deviation of a rate by noise, deg/s, six sigma; share of it with which readings still differ at rest.
     noise: [f64; 2],
     /// Time that its bring-up takes, and its first with a self-test.
@@ -63,7 +59,6 @@ const ICM42688: Fitted = Fitted {
     model: "Icm42688",
     // A sixteenth of 400 Hz (DS-000347, 5.5).
     bandwidth: 25.0,
-    identity: ("SPI1.imu_who_am_i", 0x47),
     noise: [0.1, 1.0],
     up: [Duration::from_millis(60); 2],
     late: 0,
@@ -73,7 +68,6 @@ const BMI088: Fitted = Fitted {
     part: ImuPart::Bmi088,
     model: "Bmi088",
     bandwidth: 23.0,
-    identity: ("SPI1.imu_acc_who_am_i", 0x1E),
     noise: [0.3, 0.1],
     up: [Duration::from_millis(160), Duration::from_millis(300)],
     late: 0,
@@ -83,7 +77,6 @@ const ASM330LHH: Fitted = Fitted {
     part: ImuPart::Asm330lhh,
     model: "Asm330lhh",
     bandwidth: 23.1,
-    identity: ("SPI1.imu_who_am_i", 0x6B),
     noise: [0.1, 1.0],
     up: [Duration::from_millis(130), Duration::from_millis(380)],
     // A sample comes every 4.8 ms.
@@ -109,7 +102,6 @@ for_each_part! {
     samples_come_at_their_rate_and_on_the_grid
     vibration_above_the_bandwidth_does_not_become_a_turn
     part_that_falls_silent_comes_back
-    wrong_part_is_named_and_gives_no_rate
     yaw_is_right_though_the_parts_oscillator_is_one_percent_off
     what_a_standstill_has_shown_corrects_the_next_start_before_it_stands
 }
@@ -273,24 +265,37 @@ fn part_that_falls_silent_comes_back(fitted: &Fitted) {
     assert_eq!(pipeline.misplaced, 0, "every sample has a place on the grid");
 }
 
-fn wrong_part_is_named_and_gives_no_rate(fitted: &Fitted) {
+/// Another part, and parts whose self-test fails.
+#[test]
+fn fault_at_the_start_is_named_gives_no_rate_and_is_tried_again() {
     const OTHER: u8 = 0x42;
-    let Some(mut board) = equipped(fitted, Configuration::DEFAULT) else { return };
-    let (identity, own) = fitted.identity;
-    board.configure(identity, OTHER);
-    board.power_on();
-    board.run(START + SECOND);
-    assert_eq!(service::info(&mut board).sensor, Some(SensorFault::Identity(OTHER)));
-    // Silence is reported from two seconds on.
-    board.run(SECOND * 3 / 2);
-    let silent = rates(&mut board);
-    assert!(silent.len() > 30 && silent.iter().all(|(_, rate)| rate.is_none()), "{silent:?}");
-    // It is tried again every second.
-    board.configure(identity, own);
-    board.run(SECOND + fitted.up[1] + 140 * MS);
-    assert_eq!(service::info(&mut board).sensor, None);
-    assert!(rates(&mut board).iter().any(|(_, rate)| rate.is_some()));
-    assert_driven_well(&mut board);
+    let identity =
+        |name: &'static str, own: u8| (name, json!(OTHER), json!(own), SensorFault::Identity(OTHER));
+    let self_test = |name: &'static str| (name, json!(false), json!(true), SensorFault::SelfTest);
+    for (fitted, (setting, bad, good, fault)) in [
+        (&ICM42688, identity("SPI1.imu_who_am_i", 0x47)),
+        (&BMI088, identity("SPI1.imu_acc_who_am_i", 0x1E)),
+        (&ASM330LHH, identity("SPI1.imu_who_am_i", 0x6B)),
+        (&BMI088, self_test("SPI1.imu_self_test")),
+        (&BMI088, self_test("SPI1.imu_acc_self_test")),
+        (&BMI088, self_test("SPI1.imu_drive")),
+        (&ASM330LHH, self_test("SPI1.imu_self_test")),
+        (&ASM330LHH, self_test("SPI1.imu_acc_self_test")),
+    ] {
+        let Some(mut board) = equipped(fitted, Configuration::DEFAULT) else { return };
+        board.configure(setting, bad);
+        start(&mut board, fitted);
+        assert_eq!(service::info(&mut board).sensor, Some(fault), "{} {setting}", fitted.model);
+        // Silence is reported from two seconds on; it is tried again every second.
+        board.run(SECOND * 5 / 2);
+        let silent = rates(&mut board);
+        assert!(silent.len() > 30 && silent.iter().all(|(_, rate)| rate.is_none()), "{silent:?}");
+        board.configure(setting, good);
+        board.run(SECOND + fitted.up[1] + 140 * MS);
+        assert_eq!(service::info(&mut board).sensor, None);
+        assert!(rates(&mut board).iter().any(|(_, rate)| rate.is_some()));
+        assert_driven_well(&mut board);
+    }
 }
 
 /// Turned angle by the angle messages, deg.
@@ -385,28 +390,6 @@ fn what_a_standstill_has_shown_corrects_the_next_start_before_it_stands(fitted: 
     }
     assert_eq!(service::on_line(&mut board).learned().expect("a response").bias_curve, learned.bias_curve);
     assert_driven_well(&mut board);
-}
-
-#[test]
-fn failed_self_test_is_named_and_is_tried_again() {
-    for (fitted, die) in [
-        (&BMI088, "SPI1.imu_self_test"),
-        (&BMI088, "SPI1.imu_acc_self_test"),
-        (&BMI088, "SPI1.imu_drive"),
-        (&ASM330LHH, "SPI1.imu_self_test"),
-        (&ASM330LHH, "SPI1.imu_acc_self_test"),
-    ] {
-        let Some(mut board) = equipped(fitted, Configuration::DEFAULT) else { return };
-        board.configure(die, false);
-        start(&mut board, fitted);
-        assert_eq!(service::info(&mut board).sensor, Some(SensorFault::SelfTest), "{die}");
-        assert!(rates(&mut board).iter().all(|(_, rate)| rate.is_none()));
-        board.configure(die, true);
-        board.run(SECOND + fitted.up[1] + 140 * MS);
-        assert_eq!(service::info(&mut board).sensor, None);
-        assert!(rates(&mut board).iter().any(|(_, rate)| rate.is_some()));
-        assert_driven_well(&mut board);
-    }
 }
 
 #[test]

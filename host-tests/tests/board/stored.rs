@@ -1,7 +1,7 @@
 //! The board stores records over used sectors and signed weight files, through diagnosis and the flash
 //! controller, and works on while it erases as far as the part lets it.
 
-use crate::common::{self, IMU, START};
+use crate::common::{self, IMU, MS, START};
 use crate::service::{self, on_bus};
 use gyronet::can::{DataFrame, slcan};
 use gyronet::model::{Blob, weights};
@@ -16,7 +16,6 @@ use gyronet_tools::client::device::upload::{Uploaded, upload};
 use gyronet_tools::signing::PrivateKey;
 use std::time::Duration;
 
-const MS: Duration = Duration::from_millis(1);
 /// Typical time of an erase of 16 KiB (DS8626 table 39), and what the rest of a store may take.
 const ERASE: Duration = Duration::from_millis(250);
 const STORE_TIME: Duration = Duration::from_millis(70);
@@ -57,8 +56,7 @@ fn erased_and_reset(board: &mut Board) -> (Vec<u64>, Vec<String>) {
 fn configuration_survives_restarts_while_sectors_fill_and_are_used_again() {
     /// Stores between two restarts.
     const STORES: usize = 40;
-    let Some(mut board) = common::boot() else { return };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     let (mut erased, mut resets) = erased_and_reset(&mut board);
     let mut stores = 0;
     while erased.len() < 4 {
@@ -165,8 +163,7 @@ fn longest_erase_fits_the_watchdogs_limit_and_the_short_limit_returns() {
 fn uploaded_weights_run_from_their_slot() {
     /// Samples: static initialisation takes three seconds, the first windows follow.
     const SAMPLES: usize = 400;
-    let Some(mut board) = common::boot() else { return };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     let file = other_weights(1);
     let crc = crc(&file);
     let key = PrivateKey::generate().expect("random numbers");

@@ -3,7 +3,7 @@
 
 use crate::common::{self, SAMPLE, START, frames};
 use crate::service::{self, on_bus};
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::Frame;
 use gyronet::can::DataFrame;
 use gyronet::can::config::{Settings, YawSettings};
 use gyronet::can::yaw::{AngleMessage, FOG_IDS, Quality, RateMessage};
@@ -14,6 +14,7 @@ use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, FlashFault, FogPart, Slot, StoreError};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::stored::{Stored, other_weights};
+use gyronet_host_tests::wire::id11;
 use gyronet_tools::client::device::error::DeviceError;
 use std::time::Duration;
 
@@ -43,7 +44,7 @@ impl Started {
     }
 
     fn of(&self, id: u16) -> impl Iterator<Item = &[u8]> {
-        let id = Id::Standard(StandardId::new(id).expect("11 bits"));
+        let id = id11(id);
         self.frames.iter().filter(move |frame| frame.id() == id).map(Frame::data)
     }
 

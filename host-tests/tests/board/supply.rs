@@ -1,6 +1,6 @@
 //! The supply on the virtual board: low at the start, falling while the image runs, falling during an erase.
 
-use crate::common::{START, boot, info, resets, unpowered};
+use crate::common::{SECOND, START, info, resets, started, unpowered};
 use crate::service;
 use gyronet::service::crash::CrashKind;
 use gyronet::service::event::ClockFault;
@@ -11,7 +11,6 @@ use std::time::Duration;
 const SUPPLY: &str = "PWR.supply_mv";
 const LOW: u32 = 2_500;
 const GOOD: u32 = 3_300;
-const SECOND: Duration = Duration::from_secs(1);
 
 #[test]
 fn low_for_the_first_50_ms() {
@@ -43,8 +42,7 @@ fn low_for_seconds() {
 
 #[test]
 fn falling_while_the_image_runs() {
-    let Some(mut board) = boot() else { return };
-    board.run(START);
+    let Some(mut board) = started() else { return };
     board.configure(SUPPLY, 2_700);
     board.run(START);
     board.configure(SUPPLY, GOOD);
@@ -67,8 +65,7 @@ fn stored(board: &mut Board) -> u16 {
 
 #[test]
 fn falling_during_an_erase() {
-    let Some(mut board) = boot() else { return };
-    board.run(START);
+    let Some(mut board) = started() else { return };
     // Until a store has to erase a sector; the supply falls in the middle of that.
     let last = (1..1_000).find(|number| {
         service::enter(&mut board, 3);

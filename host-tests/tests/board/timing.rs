@@ -1,7 +1,7 @@
 //! Times of diagnosis on the virtual board's bus, with all messages of the board beside it:
 //! `cargo test --test board -- timing --nocapture` prints them.
 
-use crate::common::{self, SAMPLE, START, drive, id, stand};
+use crate::common::{self, MS, SAMPLE, START, drive, id, stand};
 use crate::service;
 use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
@@ -10,10 +10,9 @@ use gyronet::uds::data::{Access, IDENTIFIERS};
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::stored::other_weights;
 use gyronet_host_tests::tester::{frame, segment};
-use gyronet_host_tests::wire::bytes;
+use gyronet_host_tests::wire::{bytes, data_frame};
 use std::time::Duration;
 
-const MS: Duration = Duration::from_millis(1);
 /// P2 and P2* of the standard, as the board's answer to 10 03 has them.
 const P2: Duration = Duration::from_millis(50);
 const P2_STAR: Duration = Duration::from_secs(5);
@@ -28,7 +27,7 @@ fn raw(frame: &DataFrame) -> u16 {
 }
 
 fn tester(board: &mut Board, data: &[u8]) {
-    board.can_send(&DataFrame::new(id(0x7E0), &frame(data, &[])).expect("eight bytes"));
+    board.can_send(&data_frame(id(0x7E0), &frame(data, &[])));
 }
 
 /// A response, and the time from the end of the request on the bus to the begin of the first response to it.
@@ -138,8 +137,7 @@ fn the_first_requests_of_a_session_are_answered_in_time() {
 /// Every request under full load, one behind the other.
 #[test]
 fn no_response_is_later_than_p2_without_a_wait() {
-    let Some(mut board) = common::boot() else { return };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     stand(&mut board, 3_500);
     board.run(Duration::from_secs(5));
     let reads = IDENTIFIERS.iter().filter(|identifier| identifier.access != Access::Write);
@@ -172,8 +170,7 @@ fn no_response_is_later_than_p2_without_a_wait() {
 /// Case bus/20.
 #[test]
 fn a_setting_that_is_stored_leaves_no_troubles() {
-    let Some(mut board) = common::boot() else { return };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     stand(&mut board, 1_200);
     board.run(Duration::from_secs(5));
     assert_eq!(timed(&mut board, &[0x19, 2, 8]).message, [0x59, 2, 0x7F], "a healthy board");

@@ -2,7 +2,7 @@
 //! authors.
 
 use crate::common::{self, START, drive};
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::store::{Configuration, Record};
@@ -10,7 +10,7 @@ use gyronet_host_tests::board::Board;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::stored::other_weights;
 use gyronet_host_tests::tester::Tester;
-use gyronet_host_tests::wire::bytes;
+use gyronet_host_tests::wire::{bytes, data_frame, id11};
 use gyronet_host_tests::{image, require};
 use gyronet_tools::client::device::requests::FIRMWARE;
 use gyronet_tools::client::device::update::Update;
@@ -22,10 +22,6 @@ use std::time::Duration;
 /// Time that passes while a tester waits for the next frame.
 const TURN: Duration = Duration::from_millis(1);
 
-fn frame(id: u16, data: &[u8]) -> DataFrame {
-    DataFrame::new(Id::Standard(StandardId::new(id).expect("11 bits")), data).expect("eight bytes")
-}
-
 fn raw(frame: &DataFrame) -> u16 {
     match frame.id() {
         Id::Standard(id) => id.as_raw(),
@@ -35,7 +31,7 @@ fn raw(frame: &DataFrame) -> u16 {
 
 /// Sends frames to the server and returns its own of the next millisecond.
 fn exchange(board: &mut Board, frames: &[[u8; 8]]) -> Vec<[u8; 8]> {
-    frames.iter().for_each(|data| board.can_send(&frame(0x7E0, data)));
+    frames.iter().for_each(|data| board.can_send(&data_frame(id11(0x7E0), data)));
     board.run(TURN);
     let sent = common::frames(&board.can_frames());
     let ours = sent.iter().filter(|frame| raw(frame) == 0x7E8);
@@ -48,8 +44,7 @@ fn ask(board: &mut Board, request: &[u8]) -> Option<Vec<u8>> {
 
 #[test]
 fn a_sensor_that_falls_silent_is_a_trouble_and_the_rates_keep_their_place() {
-    let Some(mut board) = common::boot() else { return };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     let now = board.counts().time;
     common::send(&mut board, &drive(100), now);
     // A tester that reads all the time takes nothing from the rates.
@@ -57,7 +52,7 @@ fn a_sensor_that_falls_silent_is_a_trouble_and_the_rates_keep_their_place() {
     let mut rates = 0;
     while board.counts().time < now + Duration::from_secs(1) {
         let read = Tester::default().ask(&[0x22, 1, 6], 100, |frames| {
-            frames.iter().for_each(|data| board.can_send(&frame(0x7E0, data)));
+            frames.iter().for_each(|data| board.can_send(&data_frame(id11(0x7E0), data)));
             board.run(TURN);
             let sent = common::frames(&board.can_frames());
             rates += sent.iter().filter(|frame| raw(frame) < 0x700).count();
@@ -85,8 +80,7 @@ fn a_sensor_that_falls_silent_is_a_trouble_and_the_rates_keep_their_place() {
 
 #[test]
 fn diagnosis_with_29_bits_is_configured_over_itself() {
-    let Some(mut board) = common::boot() else { return };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     let ids =
         DiagnosisIds { extended: true, request: 0x18DA_10F1, functional: 0x18DB_33F1, response: 0x18DA_F110 };
     let configuration = Configuration { diagnosis: ids, ..Configuration::DEFAULT };
@@ -101,8 +95,7 @@ fn diagnosis_with_29_bits_is_configured_over_itself() {
     for (id, answer) in [(request, Some(vec![0x7E, 0])), (functional, Some(vec![0x7E, 0])), (response, None)]
     {
         let received = Tester::default().ask(&[0x3E, 0], 100, |frames| {
-            let frame = |data: &[u8; 8]| DataFrame::new(id, data).expect("eight bytes");
-            frames.iter().for_each(|data| board.can_send(&frame(data)));
+            frames.iter().for_each(|data| board.can_send(&data_frame(id, data)));
             board.run(TURN);
             let sent = common::frames(&board.can_frames());
             let ours = sent.iter().filter(|frame| frame.id() == response);
@@ -156,7 +149,8 @@ fn udsoncan_reads_writes_downloads_and_updates() {
         };
         for text in frames.split_whitespace() {
             let (id, data) = text.split_once('#').expect("identifier#data");
-            board.can_send(&frame(u16::from_str_radix(id, 16).expect("hexadecimal"), &bytes(data)));
+            board
+                .can_send(&data_frame(id11(u16::from_str_radix(id, 16).expect("hexadecimal")), &bytes(data)));
         }
         board.run(TURN);
         let sent = common::frames(&board.can_frames());

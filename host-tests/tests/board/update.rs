@@ -1,7 +1,7 @@
 //! Firmware updates with the images as they are flashed: boot loader, download over CAN, trial, confirmation, and the way
 //! back from images that are bad.
 
-use crate::common::{self, START, id, resets, stand};
+use crate::common::{self, MS, START, id, resets, stand};
 use crate::service::{self, on_bus, on_line};
 use embedded_can::Frame;
 use gyronet::can::DataFrame;
@@ -19,7 +19,6 @@ use gyronet_tools::client::device::{Authority, Device};
 use gyronet_tools::signing::PrivateKey;
 use std::time::Duration;
 
-const MS: Duration = Duration::from_millis(1);
 const S: Duration = Duration::from_secs(1);
 const RATE: u16 = 0x1A0;
 /// What an image has reached: samples, a frame that was acknowledged.

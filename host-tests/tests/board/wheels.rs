@@ -2,9 +2,10 @@
 
 use crate::common::{self, SAMPLE, START, drive, faults, frames};
 use crate::service;
-use embedded_can::{ExtendedId, Frame, Id};
+use embedded_can::Frame;
 use gyronet::can::DataFrame;
 use gyronet::health::Faults;
+use gyronet_host_tests::wire::{data_frame, id29};
 use gyronet_tools::wheels::WheelFile;
 
 /// Two axles in two frames with 29 bits of identifier, little-endian, 1/32 m/s, with a counter in byte 6 and the exclusive
@@ -36,8 +37,7 @@ fn axle(id: u32, code: u16, counter: u8) -> DataFrame {
     let [low, high] = code.to_le_bytes();
     let mut data = [0, low, high, low, high, 0, counter & 0xF, 0];
     data[7] = data.iter().fold(0, |sum, byte| sum ^ byte);
-    let id = Id::Extended(ExtendedId::new(id).expect("29 bits"));
-    DataFrame::new(id, &data).expect("eight bytes")
+    data_frame(id29(id), &data)
 }
 
 fn settings() -> gyronet::can::wheel::WheelSettings {
@@ -46,8 +46,7 @@ fn settings() -> gyronet::can::wheel::WheelSettings {
 
 #[test]
 fn another_maker_s_frames_are_understood_without_a_new_image() {
-    let Some(mut board) = common::boot() else { return };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     service::on_line(&mut board).set_wheels(&settings()).expect("they are stored");
     service::on_line(&mut board).restart().expect("a response");
     board.run(START);
@@ -77,7 +76,7 @@ fn another_maker_s_frames_are_understood_without_a_new_image() {
             let good = axle(id, 320, row);
             let mut data: [u8; 8] = good.data().try_into().expect("eight bytes");
             data[7] ^= 0x40;
-            board.can_send(&DataFrame::new(good.id(), &data).expect("eight bytes"));
+            board.can_send(&data_frame(good.id(), &data));
         }
         board.run(SAMPLE);
     }

@@ -8,6 +8,7 @@ use gyronet::sample::{PERIOD_US, TestSignal};
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::{GyroNet, Micros};
 use gyronet_host_tests::recordings::workspace;
+use gyronet_host_tests::wire::{data_frame, id11};
 use gyronet_host_tests::{qemu, require};
 use gyronet_tools::target::bench;
 use gyronet_tools::target::stack::functions;
@@ -93,8 +94,7 @@ fn host() -> Vec<[u8; 16]> {
     for (now, frames, bytes) in inputs() {
         let now = Micros(now);
         for data in frames {
-            let id = embedded_can::StandardId::new(0xAA).expect("11 bits");
-            let frame = gyronet::DataFrame::new(id, &data).expect("eight bytes");
+            let frame = data_frame(id11(0xAA), &data);
             coprocessor.can(&frame, now).expect("a wheel frame");
         }
         for byte in bytes {

@@ -8,7 +8,6 @@ use gyronet::can::bosch::{
 };
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
 use gyronet_host_tests::noise::Noise;
-use proptest::prelude::*;
 
 const STANDARD_GRAVITY: f32 = 9.806_65;
 
@@ -164,6 +163,7 @@ fn a_rate_beyond_the_range_is_marked_and_leaves_no_residual() {
 fn flips_of_one_and_two_bits_are_detected() {
     let [tx1, ..] = SetEncoder::default().encode(&motion(-12.345, -0.5, 15));
     let bytes = tx1.emit();
+    assert_eq!(Message::parse(&bytes[..7]), Err(MessageError::Length(7)));
     let flip = |bytes: [u8; 8], bit: usize| {
         let mut bytes = bytes;
         bytes[bit / 8] ^= 1 << (bit % 8);
@@ -175,24 +175,5 @@ fn flips_of_one_and_two_bits_are_detected() {
         for second in 0..first {
             assert!(Message::parse(&flip(once, second)).is_err(), "bits {first} and {second}");
         }
-    }
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
-
-    #[test]
-    fn messages_survive_the_bus(bytes in any::<[u8; 7]>()) {
-        let mut frame = [0; 8];
-        frame[..7].copy_from_slice(&bytes);
-        frame[7] = gyronet::can::bosch::CRC.checksum(&bytes);
-        let message = Message::parse(&frame).expect("checksum");
-        prop_assert_eq!(message.emit(), frame);
-        frame[7] ^= 1;
-        prop_assert!(
-            matches!(Message::parse(&frame), Err(MessageError::Crc { .. })),
-            "a wrong checksum is refused"
-        );
-        prop_assert_eq!(Message::parse(&bytes), Err(MessageError::Length(7)));
     }
 }

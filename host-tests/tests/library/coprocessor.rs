@@ -1,41 +1,31 @@
 //! The coprocessor as a caller sees it: frames, windows, lateness, and every way to use it wrongly.
 
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::Frame;
 use gyronet::align::AlignError;
 use gyronet::align::clock::ClockError;
 use gyronet::can::DataFrame;
-use gyronet::can::wheel::{WheelError, WheelReceiver, WheelSettings};
+use gyronet::can::wheel::WheelError;
 use gyronet::can::yaw::FOG_IDS;
 use gyronet::compensate::DELAY;
 use gyronet::coprocessor::{Clock, InputError, Observation, StorageFaults};
 use gyronet::health::{Faults, InputCounters, Quality, Status};
-use gyronet::model::window::WINDOW;
-use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::DueWindow;
 use gyronet::sample::{FogSample, PERIOD_US, Standstill};
-use gyronet::units::{Angle, AngularRate, Duration, Micros};
+use gyronet::units::{Angle, Duration, Micros};
 use gyronet::{Config, Coprocessor};
+use gyronet_host_tests::inputs::wheels;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::sent::Sent;
+use gyronet_host_tests::stream::NOTHING;
 use gyronet_host_tests::synthetic::idling;
+use gyronet_host_tests::wire::{data_frame, id11};
+use gyronet_tools::drive::wheel_frames::receiver;
 
-const NOTHING: Estimate =
-    Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, ..Estimate::NONE };
-/// Returns a frame of four wheels at 0 km/h.
-const STANDS: [u8; 8] = [0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F];
 /// Frames of a sample.
 const SET: usize = 6;
 
 fn at(tick: u64) -> Micros {
     Micros(tick * PERIOD_US)
-}
-
-fn wheels() -> Option<WheelReceiver> {
-    Some(WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings"))
-}
-
-fn wheel_frame(data: &[u8]) -> DataFrame {
-    DataFrame::new(StandardId::new(0xAA).expect("11 bits"), data).expect("at most eight bytes")
 }
 
 fn fog(millisecond: u64) -> FogSample {
@@ -158,7 +148,7 @@ fn a_clock_that_goes_back_is_an_error_and_followed_from_there() {
         let _ = car.coprocessor.poll(Micros(time), &mut ());
         let _ = car.coprocessor.imu(idling(400, 0.001, &mut car.noise), Micros(time), &mut ());
         let _ = car.coprocessor.fog(fog(time % 1_000), Micros(time), &mut ());
-        let _ = car.coprocessor.can(&wheel_frame(&STANDS), Micros(time));
+        let _ = car.coprocessor.can(&wheels(0.0), Micros(time));
     }
 }
 
@@ -195,13 +185,13 @@ fn the_next_sample_waits_for_the_estimate_until_it_is_late() {
 
 #[test]
 fn wheel_frames_that_are_damaged_are_errors_and_others_are_passed_over() {
-    let mut coprocessor = Coprocessor::new(Config { wheels: wheels(), ..Config::DEFAULT });
-    assert_eq!(coprocessor.can(&wheel_frame(&STANDS), at(1)), Ok(true));
+    let mut coprocessor = Coprocessor::new(Config { wheels: Some(receiver()), ..Config::DEFAULT });
+    assert_eq!(coprocessor.can(&wheels(0.0), at(1)), Ok(true));
     assert_eq!(
-        coprocessor.can(&wheel_frame(&STANDS[..3]), at(1)),
+        coprocessor.can(&data_frame(id11(0xAA), &[0x1A; 3]), at(1)),
         Err(InputError::Wheels(WheelError::Short(3)))
     );
-    let other = DataFrame::new(StandardId::new(0x123).expect("11 bits"), &[0; 8]).expect("eight bytes");
+    let other = data_frame(id11(0x123), &[0; 8]);
     assert_eq!(coprocessor.can(&other, at(1)), Ok(false));
     assert_eq!(coprocessor.input_counters().wheel_errors, 1);
 }
@@ -211,12 +201,12 @@ fn wheel_frames_that_are_damaged_are_errors_and_others_are_passed_over() {
 fn wheels_are_judged_by_the_clock_that_is_configured() {
     for (clock, pace) in [(Clock::Outside, 1), (Clock::Outside, 10), (Clock::Sensor, 1), (Clock::Sensor, 10)]
     {
-        let mut coprocessor = Coprocessor::new(Config { wheels: wheels(), clock, ..Config::DEFAULT });
+        let mut coprocessor = Coprocessor::new(Config { wheels: Some(receiver()), clock, ..Config::DEFAULT });
         let mut noise = Noise::new(5);
         let still = (0..200).find(|tick| {
             // Samples that come at ten times their pace.
             let now = Micros(at(*tick).0 / pace);
-            coprocessor.can(&wheel_frame(&STANDS), now).expect("a wheel frame");
+            coprocessor.can(&wheels(0.0), now).expect("a wheel frame");
             let observation =
                 coprocessor.imu(idling(*tick, 0.001, &mut noise), now, &mut ()).expect("in time");
             observation.is_some_and(|seen| seen.wheels.standstill == Standstill::Still)
@@ -257,19 +247,17 @@ fn damage_and_losses_are_reported_with_every_set() {
 
 #[test]
 fn a_fibre_optic_gyro_sends_its_own_messages() {
-    let mut car = Car::new(Config { wheels: wheels(), ..Config::DEFAULT });
+    let mut car = Car::new(Config { wheels: Some(receiver()), ..Config::DEFAULT });
     let mut sent = 0;
     for millisecond in 1..6_000_u64 {
         let now = Micros(millisecond * 1_000);
         if millisecond.is_multiple_of(10) {
-            car.coprocessor.can(&wheel_frame(&STANDS), now).expect("a wheel frame");
+            car.coprocessor.can(&wheels(0.0), now).expect("a wheel frame");
             car.tick = millisecond / 10 - 1;
             car.sample();
         }
         car.coprocessor.fog(fog(millisecond), now, &mut car.sent).expect("in order");
-        let own = |frame: &DataFrame| {
-            FOG_IDS.iter().any(|id| frame.id() == Id::Standard(StandardId::new(*id).expect("11 bits")))
-        };
+        let own = |frame: &DataFrame| FOG_IDS.iter().any(|id| frame.id() == id11(*id));
         sent += car.sent.frames.drain(..).filter(|sent| own(&sent.frame)).count();
     }
     assert_eq!(sent, 3 * 599, "a set of three messages every 10 ms");
@@ -280,8 +268,8 @@ fn a_fibre_optic_gyro_sends_its_own_messages() {
 /// An inertial sensor, or wheels, that have fallen silent are not taken for those of the gyro's step.
 #[test]
 fn a_fibre_optic_gyro_does_not_use_old_wheels() {
-    let mut car = Car::new(Config { wheels: wheels(), ..Config::DEFAULT });
-    car.coprocessor.can(&wheel_frame(&STANDS), at(1)).expect("a wheel frame");
+    let mut car = Car::new(Config { wheels: Some(receiver()), ..Config::DEFAULT });
+    car.coprocessor.can(&wheels(0.0), at(1)).expect("a wheel frame");
     car.sample();
     let mut silent = None;
     for millisecond in 11..400_u64 {

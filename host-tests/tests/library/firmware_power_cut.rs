@@ -6,13 +6,10 @@ use gyronet::model::blob::CRC;
 use gyronet::store::firmware::{self, Label, MAX_IMAGE, Trailer, confirm, select};
 use gyronet::store::layout::RECORD_SECTOR;
 use gyronet::store::{Slot, Upload};
-use gyronet_host_tests::flash::{Cut, F405, Region};
+use gyronet_host_tests::flash::{Cut, Flash, Region, shared};
 use gyronet_host_tests::stored::{flash_image, image};
-use std::cell::RefCell;
-use std::rc::Rc;
 
 const LABEL: Label = Label::new([1, 0, 0], "a board");
-type Flash = Rc<RefCell<F405>>;
 type Step = fn(&Flash);
 
 fn region(flash: &Flash) -> Region<RECORD_SECTOR> {
@@ -51,20 +48,20 @@ fn holds(flash: &Flash, slot: Slot, seeds: &[u64]) -> bool {
 /// Cuts the power at each operation of a step, and checks what starts then: with a supply that stays, when the image on
 /// trial works, and when it does not.
 fn every_cut(name: &str, before: &Flash, step: Step, seeds: &[u64]) -> usize {
-    let whole = Rc::new(RefCell::new(before.borrow().clone()));
+    let whole = shared(before.borrow().clone());
     step(&whole);
     let operations = whole.borrow().operations() - before.borrow().operations();
     let mut cuts = 0;
     for (after, cut) in (0..operations).flat_map(|after| Cut::ALL.map(|cut| (after, cut))) {
         let at = format!("{name}: {cut:?} at operation {after} of {operations}");
-        let flash = Rc::new(RefCell::new(before.borrow().clone()));
+        let flash = shared(before.borrow().clone());
         flash.borrow_mut().cut_after(after, cut);
         step(&flash);
         assert!(flash.borrow_mut().restore(), "{at}: the power was cut");
         cuts += 1;
         let torn = flash.borrow().clone();
         for has_failed in [false, true] {
-            let flash = Rc::new(RefCell::new(torn.clone()));
+            let flash = shared(torn.clone());
             let first = start(&flash, false).unwrap_or_else(|| panic!("{at}: nothing starts"));
             assert!(holds(&flash, first, seeds), "{at}: {first} is not whole");
             let second = start(&flash, has_failed).unwrap_or_else(|| panic!("{at}: nothing starts again"));
@@ -123,7 +120,7 @@ fn no_mixture_of_a_cut_erase_is_a_trailer() {
     let before = flash.borrow().clone();
     for round in 0..64u64 {
         for cut in [Cut::Anywhere, Cut::Zeros, Cut::Front] {
-            let flash = Rc::new(RefCell::new(before.clone()));
+            let flash = shared(before.clone());
             // Other torn words in each round.
             for _ in 0..round {
                 flash.borrow_mut().cut_after(0, Cut::Front);

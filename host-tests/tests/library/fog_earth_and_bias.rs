@@ -1,6 +1,6 @@
 //! The corrections of a fibre-optic gyro without a network: Earth's rate, bias by standstills, and what its messages say of both.
 
-use embedded_can::{ExtendedId, Frame};
+use embedded_can::Frame;
 use gyronet::bias::Latitude;
 use gyronet::can::DataFrame;
 use gyronet::coprocessor::{Config, Coprocessor, InputError};
@@ -13,6 +13,7 @@ use gyronet::sample::{FogSample, PERIOD_US, Standstill, WheelSample};
 use gyronet::units::{Angle, Micros, WheelSpeed};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::sent::Sent;
+use gyronet_host_tests::wire::{data_frame, id29};
 
 const DEG_PER_HOUR: f64 = std::f64::consts::PI / 180.0 / 3600.0;
 const EARTH: f64 = 7.292_115e-5;
@@ -141,8 +142,7 @@ fn receiver() -> HeadingReceiver {
 /// J1939's vehicle position: 1e-7 deg from -210.
 fn position(degrees: f64) -> DataFrame {
     let raw = ((degrees + 210.0) * 1e7).round() as u32;
-    let id = ExtendedId::new(0x18FE_F31C).expect("29 bits");
-    DataFrame::new(id, &[raw.to_le_bytes(), [0; 4]].concat()).expect("eight bytes")
+    data_frame(id29(0x18FE_F31C), &[raw.to_le_bytes(), [0; 4]].concat())
 }
 
 #[test]
@@ -175,9 +175,9 @@ fn a_latitude_over_can_is_used_when_it_is_confirmed() {
     assert!(refused.iter().all(Result::is_err) && last.is_ok_and(|last| !last.moved));
     // What no latitude can be.
     assert!(matches!(take(&mut receiver, 95.0), Some(Err(HeadingError::Range { what: "latitude", .. }))));
-    let marked = DataFrame::new(position(0.0).id(), &[0xFF; 8]).expect("eight bytes");
+    let marked = data_frame(position(0.0).id(), &[0xFF; 8]);
     assert_eq!(receiver.decode(&marked, Micros(now)), Some(Ok(Received::NONE)));
-    let short = DataFrame::new(position(0.0).id(), &[0; 3]).expect("three bytes");
+    let short = data_frame(position(0.0).id(), &[0; 3]);
     assert_eq!(receiver.decode(&short, Micros(now)), Some(Err(HeadingError::Short(3))));
 }
 

@@ -10,7 +10,7 @@ use gyronet::sensor::ByteSource;
 use gyronet::units::Micros;
 use gyronet_host_tests::gnss::{Pvt, sentence, sources, ubx};
 use gyronet_host_tests::sent::Sent;
-use gyronet_host_tests::stream::constant;
+use gyronet_host_tests::stream::NOTHING;
 use gyronet_host_tests::winding::Winding;
 use gyronet_host_tests::wire::{bytes, feed};
 
@@ -208,8 +208,7 @@ fn drive(settings: HeadingSettings, clock: Clock) -> (Vec<DataFrame>, u32) {
         }
         let _ = coprocessor.imu(sample, sample.time, &mut sent).expect("in order");
         while let Some(due) = coprocessor.window() {
-            let estimate = constant(0.0)(&due).expect("an estimate");
-            coprocessor.deliver(due.end, estimate).expect("the window that is due");
+            coprocessor.deliver(due.end, NOTHING).expect("the window that is due");
         }
     }
     let used = coprocessor.course_state().counters.used;

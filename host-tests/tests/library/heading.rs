@@ -1,6 +1,5 @@
 //! Courses and speeds from CAN: bytes by the documents, refusals, and the way back.
 
-use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::coprocessor::{Config, Coprocessor};
@@ -10,12 +9,13 @@ use gyronet::heading::{
 use gyronet::health::slow::Knowledge;
 use gyronet::units::Micros;
 use gyronet_host_tests::sent::Sent;
-use gyronet_host_tests::stream::constant;
+use gyronet_host_tests::stream::NOTHING;
 use gyronet_host_tests::winding::Winding;
+use gyronet_host_tests::wire::{data_frame, id11, id29};
 use proptest::prelude::*;
 
 fn frame(id: u32, data: &[u8]) -> DataFrame {
-    DataFrame::new(ExtendedId::new(id).expect("29 bits"), data).expect("eight bytes")
+    data_frame(id29(id), data)
 }
 
 #[test]
@@ -68,10 +68,9 @@ fn j1939_direction_and_speed_by_its_bytes() {
 
 #[test]
 fn described_values_may_be_in_frames_of_their_own() {
-    let id = |raw| Id::Standard(StandardId::new(raw).expect("11 bits"));
     let signal = |raw, start, bits, factor| {
         let field = BitField::new(start, bits, ByteOrder::Intel, bits == 16).expect("inside the frame");
-        Some(HeadingSignal { id: id(raw), field, factor, offset: 0.0, invalid: Some((1 << bits) - 1) })
+        Some(HeadingSignal { id: id11(raw), field, factor, offset: 0.0, invalid: Some((1 << bits) - 1) })
     };
     let settings = HeadingSettings {
         course: signal(0x321, 0, 16, 1e-4),
@@ -81,9 +80,8 @@ fn described_values_may_be_in_frames_of_their_own() {
         ..HeadingSettings::NONE
     };
     let mut receiver = HeadingReceiver::new(settings, None);
-    let mut read = |raw, bytes: &[u8], ms: u64| {
-        receiver.decode(&DataFrame::new(id(raw), bytes).expect("eight bytes"), Micros(1_000 * ms))
-    };
+    let mut read =
+        |raw, bytes: &[u8], ms: u64| receiver.decode(&data_frame(id11(raw), bytes), Micros(1_000 * ms));
     // 400 codes; a latitude that is not confirmed.
     assert_eq!(read(0x322, &[0, 0, 0, 0x90, 0x01], 0), Some(Ok(Received::NONE)));
     // -1.0000 rad, 20 mrad.
@@ -131,9 +129,7 @@ fn drive(heading: Option<HeadingReceiver>, has_courses: bool) -> (Vec<DataFrame>
             yaws.push((seen.vehicle.live.tick as usize, seen.vehicle.live.yaw.rad()));
         }
         while let Some(due) = coprocessor.window() {
-            coprocessor
-                .deliver(due.end, constant(0.0)(&due).expect("an estimate"))
-                .expect("the window that is due");
+            coprocessor.deliver(due.end, NOTHING).expect("the window that is due");
         }
     }
     let [(from, before), (to, after)] = [yaws[9_100], yaws[11_900]];

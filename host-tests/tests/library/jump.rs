@@ -206,14 +206,7 @@ fn a_limit_follows_the_steps_of_its_axis() {
 /// No reading of any recording is doubted.
 #[test]
 fn nothing_that_was_recorded_is_implausible() {
-    let Some(_) = recordings::trial(9) else { return };
-    let folders = ["wid_car", "car_mti710", "rc_car", "real_car", "truck", "utv"]
-        .map(|set| recordings::folder().join(set));
-    let files = folders.iter().flat_map(|folder| std::fs::read_dir(folder).expect("a set"));
-    let files = files
-        .map(|file| file.expect("a file").path())
-        .filter(|path| path.extension().is_some_and(|e| e == "csv"));
-    let files: Vec<_> = files.collect();
+    let Some(files) = recordings::with_speed() else { return };
     assert!(files.len() > 40, "{}", files.len());
     let doubted = parallel::map(&files, |path| {
         let (reader, mut monitor) =

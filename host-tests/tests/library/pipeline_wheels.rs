@@ -1,7 +1,7 @@
 //! The pipeline does not initialise while the wheels turn, and reports a fault when they fall silent.
 
 use gyronet::bias::StaticError;
-use gyronet::can::wheel::{WheelReceiver, WheelSettings};
+use gyronet::can::wheel::WheelSettings;
 use gyronet::health::Faults;
 use gyronet::health::Status::{Degraded, Init};
 use gyronet::pipeline::{BoardState, Output};
@@ -10,13 +10,14 @@ use gyronet::units::{Micros, WheelSpeed};
 use gyronet_host_tests::inputs;
 use gyronet_host_tests::stream::{faults, new, statuses};
 use gyronet_host_tests::synthetic::{rate, turning};
+use gyronet_tools::drive::wheel_frames::receiver;
 
 const TIMEOUT: u64 = WheelSettings::TOYOTA.timeout.0;
 
 /// A gyro that reads a constant; `wheels` gives the speed of each tick in km/h, where a
 /// frame comes with it.
 fn run(ticks: u64, mut wheels: impl FnMut(u64) -> Option<f64>) -> Vec<Output> {
-    let (mut pipeline, mut receiver) = (new(), WheelReceiver::new(WheelSettings::TOYOTA).expect("checked"));
+    let (mut pipeline, mut receiver) = (new(), receiver());
     let step = |tick: u64| {
         let now = Micros(tick * PERIOD_US);
         if let Some(speed) = wheels(tick) {

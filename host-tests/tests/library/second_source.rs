@@ -1,9 +1,6 @@
 //! Sources of the yaw rate that contradict each other: the one that is alone is doubted, and no other.
 
-use embedded_can::{Frame, StandardId};
 use gyronet::bias::Latitude;
-use gyronet::can::DataFrame;
-use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::coprocessor::{Contradiction, Observation, Sink, TimedFrame};
 use gyronet::estimate::YawEstimate;
 use gyronet::fog::FogConfig;
@@ -13,6 +10,8 @@ use gyronet::units::{Angle, Micros};
 use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::synthetic::{force, rate, turning};
+use gyronet_host_tests::wire::{data_frame, id11};
+use gyronet_tools::drive::wheel_frames::receiver;
 
 /// Factors on what each source reads of a turn of 5 deg/s at 15 m/s: inertial gyro, fibre-optic gyro (0: none), and
 /// left and right wheel.
@@ -53,7 +52,7 @@ fn turned(read: &Read) -> (YawEstimate, Option<YawEstimate>) {
 
 /// Also what the sources showed when they last contradicted each other.
 fn shown(read: &Read) -> ((YawEstimate, Option<YawEstimate>), Contradiction) {
-    let wheels = WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings");
+    let wheels = receiver();
     let fog = FogConfig { latitude: Latitude::from_degrees(48.0), ..FogConfig::DEFAULT };
     let config = Config { wheels: Some(wheels), fog, fog_expected: read.fog != 0.0, ..Config::DEFAULT };
     let (mut coprocessor, mut noise, mut seen) = (Coprocessor::new(config), Noise::new(3), Seen::default());
@@ -65,7 +64,7 @@ fn shown(read: &Read) -> ((YawEstimate, Option<YawEstimate>), Contradiction) {
         let raw = |speed: f64| ((speed * 3.6 + 67.67) * 100.0).round() as u16;
         let bytes: Vec<u8> =
             [right, left, right, left].iter().flat_map(|speed| raw(*speed).to_be_bytes()).collect();
-        let frame = DataFrame::new(StandardId::new(0xAA).expect("11 bits"), &bytes).expect("eight bytes");
+        let frame = data_frame(id11(0xAA), &bytes);
         coprocessor.can(&frame, now).expect("a good frame");
         let mut sample = turning(tick, rate(0.001 + yaw * read.inertial));
         sample.specific_force[1] = force(speed * yaw);

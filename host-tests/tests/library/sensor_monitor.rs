@@ -1,7 +1,6 @@
 //! The sensor monitor in the coprocessor: silence by the outside clock, readings that repeat themselves,
 //! saturation, implausible readings; and the weights' checksum in the background.
 
-use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::coprocessor::{Config, Coprocessor, Observation};
 use gyronet::health::{Faults, Quality, Source, Status};
 use gyronet::model::background::BackgroundCheck;
@@ -11,12 +10,13 @@ use gyronet::sample::{ImuSample, PERIOD_US, Validity};
 use gyronet::units::Micros;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::synthetic::idling;
+use gyronet_tools::drive::wheel_frames::receiver;
 
 /// Both clocks agree, but for an offset.
 const OFFSET_US: u64 = 7_000_003;
 
 fn coprocessor() -> Coprocessor {
-    let wheels = Some(WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings"));
+    let wheels = Some(receiver());
     Coprocessor::new(Config { wheels, ..Config::DEFAULT })
 }
 

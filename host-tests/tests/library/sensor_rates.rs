@@ -4,12 +4,11 @@ use gyronet::align::AlignError;
 use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::coprocessor::{InputError, Observation};
 use gyronet::health::{Faults, Quality, Status};
-use gyronet::model::window::WINDOW;
-use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::sample::{ImuSample, NO_STAMP};
 use gyronet::units::{AngularRate, Micros, Yaw};
 use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::stream::NOTHING;
 use gyronet_host_tests::synthetic::{force, rate, turning};
 
 /// A sensor and its stamps: samples a second of true time, the sensor's clock against true time, jitter of the stamps
@@ -53,9 +52,7 @@ fn drive(sensor: Sensor) -> (f64, Vec<Observation>, Vec<InputError>, u32) {
             errors.push(error);
         }
         if let Some(window) = coprocessor.window() {
-            let estimate =
-                Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, ..Estimate::NONE };
-            coprocessor.deliver(window.end, estimate).expect("the window that is due");
+            coprocessor.deliver(window.end, NOTHING).expect("the window that is due");
         }
         let _ = coprocessor.poll(now, &mut Seen(&mut seen));
     }

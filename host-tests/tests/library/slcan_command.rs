@@ -1,11 +1,12 @@
 //! The host's side of an SLCAN line: what python-can and slcand send, and what must never be.
 
-use embedded_can::{Frame, StandardId};
+use embedded_can::Frame;
 use gyronet::can::DataFrame;
 use gyronet::can::slcan::assembler::{LineAssembler, MAX_HOST_LINE, TooLong};
 use gyronet::can::slcan::host::{Session, StatusFlags};
 use gyronet::can::slcan::{self, SlcanError};
 use gyronet::units::Micros;
+use gyronet_host_tests::wire::{data_frame, id11};
 use proptest::prelude::*;
 
 /// Everything that is answered to what a host sends.
@@ -107,7 +108,7 @@ fn time_stamps_come_on_demand() {
     converse(&mut session, b"Z0\r");
     assert!(!session.stamped());
 
-    let frame = DataFrame::new(StandardId::new(0x174).expect("11 bits"), &[1, 2]).expect("two bytes");
+    let frame = data_frame(id11(0x174), &[1, 2]);
     for (ms, text) in [(0, "0000"), (59_999, "EA5F"), (60_000, "0000"), (123_456, "0D80")] {
         let line = slcan::emit_stamped(&frame, Micros(ms * 1000 + 999)).expect("a data frame");
         assert_eq!(line, format!("t17420102{text}\r").as_bytes());

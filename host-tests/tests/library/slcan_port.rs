@@ -1,6 +1,6 @@
 //! The board's end of an SLCAN line, over a line that takes what it likes.
 
-use embedded_can::{Frame, StandardId};
+use embedded_can::Frame;
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 use gyronet::can::config::Config;
 use gyronet::can::encoder::CanEncoder;
@@ -10,6 +10,7 @@ use gyronet::can::{DataFrame, slcan};
 use gyronet::sample::PERIOD_US;
 use gyronet::units::Micros;
 use gyronet_host_tests::synthetic;
+use gyronet_host_tests::wire::{data_frame, id11};
 use proptest::prelude::*;
 use std::collections::VecDeque;
 
@@ -65,7 +66,7 @@ impl Write for Line {
 }
 
 fn frame(number: u64) -> DataFrame {
-    DataFrame::new(StandardId::new(0x174).expect("11 bits"), &number.to_le_bytes()).expect("eight bytes")
+    data_frame(id11(0x174), &number.to_le_bytes())
 }
 
 /// Returns the lines as a host splits them: CR ends a line, BEL is an answer of its own.

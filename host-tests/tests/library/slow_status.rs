@@ -1,27 +1,24 @@
 //! The slow status message of a coprocessor: once a second where it is configured, and no more than the board knows.
 
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
 use gyronet::can::config::{self, Settings, StatusSettings};
 use gyronet::can::e2e::{Checker, DataIdMode, P01, Profile, Verdict as Received};
 use gyronet::can::status::{Evidence, Knowledge, STATUS_ID, SlowStatus, Verdict, emit};
-use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::coprocessor::TimedFrame;
 use gyronet::mounting::GyroMap;
 use gyronet::pipeline::{Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::units::Micros;
 use gyronet::{Config, Coprocessor};
+use gyronet_host_tests::inputs::wheels;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::synthetic::{force, rate, turning};
-
-/// Wheels of the built-in settings at 0 and at 3.6 km/h.
-const STANDS: [u8; 8] = [0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F];
-const DRIVES: [u8; 8] = [0x1B, 0xD7, 0x1B, 0xD7, 0x1B, 0xD7, 0x1B, 0xD7];
+use gyronet_tools::drive::wheel_frames::receiver;
 
 fn coprocessor(status: Option<StatusSettings>, wheels: bool) -> Coprocessor {
     let can = config::Config::new(Settings { status, ..Settings::DEFAULT }).expect("checked");
-    let wheels = wheels.then(|| WheelReceiver::new(WheelSettings::TOYOTA).expect("checked"));
+    let wheels = wheels.then(receiver);
     Coprocessor::new(Config { can, wheels, ..Config::DEFAULT })
 }
 
@@ -35,18 +32,13 @@ fn parked(tick: u64, noise: &mut Noise) -> ImuSample {
     sample
 }
 
-/// Feeds samples of a car at rest, with a wheel frame before each where one is given; returns the status frames.
-fn run(
-    coprocessor: &mut Coprocessor,
-    ticks: std::ops::Range<u64>,
-    wheels: Option<[u8; 8]>,
-) -> Vec<DataFrame> {
+/// Feeds samples of a car at rest, with a wheel frame of this speed, km/h, before each where one is given; returns the status frames.
+fn run(coprocessor: &mut Coprocessor, ticks: std::ops::Range<u64>, speed: Option<f64>) -> Vec<DataFrame> {
     let (mut noise, mut found) = (Noise::new(7), Vec::new());
     for tick in ticks {
         let now = Micros((tick + 1) * PERIOD_US);
-        if let Some(data) = wheels {
-            let id = StandardId::new(0xAA).expect("11 bits");
-            coprocessor.can(&DataFrame::new(id, &data).expect("8 bytes"), now).expect("a wheel frame");
+        if let Some(speed) = speed {
+            coprocessor.can(&wheels(speed), now).expect("a wheel frame");
         }
         let mut sink = |sent: TimedFrame| {
             if matches!(sent.frame.id(), Id::Standard(id) if id.as_raw() == STATUS_ID) {
@@ -138,7 +130,7 @@ fn a_silence_is_a_doubt_while_it_lasts_and_for_a_minute() {
 #[test]
 fn wheels_decide_where_they_are_known() {
     let mut board = coprocessor(Some(StatusSettings { id: STATUS_ID }), true);
-    let frames = run(&mut board, 0..501, Some(STANDS));
+    let frames = run(&mut board, 0..501, Some(0.0));
     let stands = SlowStatus {
         verdict: Verdict::Standing,
         evidence: Evidence::Wheels,
@@ -148,7 +140,7 @@ fn wheels_decide_where_they_are_known() {
         ..SlowStatus::default()
     };
     assert_says(frames.last().expect("the newest"), stands);
-    let frames = run(&mut board, 501..701, Some(DRIVES));
+    let frames = run(&mut board, 501..701, Some(3.6));
     // Whoever drives off stood on ground that does not turn.
     let stands = SlowStatus { bias: Knowledge::Fine, ..stands };
     assert_says(frames.last().expect("the newest"), SlowStatus { verdict: Verdict::Moving, ..stands });

@@ -1,13 +1,15 @@
 //! A board's loop in one call: what it reads, receives, estimates, sends and reports.
 
-use embedded_can::{Frame, StandardId, nb::Can};
+use embedded_can::{Frame, nb::Can};
 use gyronet::can::DataFrame;
-use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::coprocessor::{Bus, Config, Coprocessor, QueuedCan, Step};
 use gyronet::health::{Faults, Status};
 use gyronet::model::{GyroNet, WindowNetwork};
 use gyronet::sample::{ImuSample, PERIOD_US, Standstill, TestSignal};
 use gyronet::units::{Micros, RangeError};
+use gyronet_host_tests::inputs::wheels;
+use gyronet_host_tests::wire::data_frame;
+use gyronet_tools::drive::wheel_frames::receiver;
 use std::collections::VecDeque;
 use std::convert::Infallible;
 
@@ -52,7 +54,7 @@ type Reading = Option<Result<ImuSample, RangeError>>;
 
 impl Car {
     fn new() -> Self {
-        let wheels = Some(WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings"));
+        let wheels = Some(receiver());
         let coprocessor = Coprocessor::new(Config { wheels, ..Config::DEFAULT });
         Self { coprocessor, network: GyroNet::shipped().expect("it comes with the library"), number: 0 }
     }
@@ -67,11 +69,6 @@ impl Car {
         let sample = TestSignal::turning(0.5).sample(self.number);
         self.step(Some(Ok(sample)), bus)
     }
-}
-
-fn standing() -> DataFrame {
-    let id = StandardId::new(0xAA).expect("11 bits");
-    DataFrame::new(id, &[0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]).expect("eight bytes")
 }
 
 #[test]
@@ -134,12 +131,12 @@ fn frames_that_the_bus_does_not_take_are_lost_and_reported() {
 
 #[test]
 fn received_wheel_frames_are_used_and_damaged_ones_counted() {
-    let controller = Controller { received: [standing()].into(), ..Controller::default() };
+    let controller = Controller { received: [wheels(0.0)].into(), ..Controller::default() };
     let (mut car, mut can) = (Car::new(), QueuedCan::<_>::new(controller));
     let seen = car.sample(&mut can).observation.expect("a message set");
     assert!(seen.wheels.speeds.iter().all(Option::is_some));
     assert_eq!(seen.wheels.standstill, Standstill::Unknown, "for half a second");
-    let short = DataFrame::new(standing().id(), &standing().data()[..3]).expect("three bytes");
+    let short = data_frame(wheels(0.0).id(), &wheels(0.0).data()[..3]);
     let controller = Controller { received: [short].into(), ..Controller::default() };
     let (mut car, mut can) = (Car::new(), QueuedCan::<_>::new(controller));
     car.sample(&mut can);

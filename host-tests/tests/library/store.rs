@@ -13,14 +13,10 @@ use gyronet::store::{
     StoreError,
 };
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
-use gyronet_host_tests::flash::{F405, Region};
+use gyronet_host_tests::flash::{F405, Flash, Region, shared};
 use gyronet_host_tests::noise::{Noise, cases};
 use gyronet_host_tests::recordings::workspace;
 use proptest::prelude::*;
-use std::cell::RefCell;
-use std::rc::Rc;
-
-type Flash = Rc<RefCell<F405>>;
 
 fn region(flash: &Flash) -> Region<RECORD_SECTOR> {
     Region::new(flash, layout::STORE)
@@ -176,7 +172,7 @@ fn no_flipped_bit_is_believed() {
     let mut flips = 0;
     for offset in from..=end.expect("something is stored") {
         for bit in 0..8 {
-            let damaged = Rc::new(RefCell::new(flash.borrow().clone()));
+            let damaged = shared(flash.borrow().clone());
             damaged.borrow_mut().damage(offset, 1 << bit);
             let mut store = open(&damaged);
             let found = store.get::<Configuration>();
@@ -224,7 +220,7 @@ fn slots_are_checked() {
     let [a, _] = slots(&flash);
     assert_eq!(file(&a).err(), Some(SlotError::Length(u32::MAX)));
     // A file that nobody accepted is not used, however good it is.
-    let shared = Rc::new(RefCell::new(F405::default()));
+    let shared = Flash::default();
     Region::<SLOT_SIZE>::new(&shared, layout::SLOTS).write(0, built_in).expect("it is blank");
     let held = shared.borrow();
     let bytes = &held.bytes()[start..];
@@ -265,7 +261,7 @@ fn a_start_makes_room_where_little_is_left() {
 
 #[test]
 fn sectors_of_zeros_are_damaged() {
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     for offset in layout::STORE {
         flash.borrow_mut().damage(offset as usize, 0xFF);
     }

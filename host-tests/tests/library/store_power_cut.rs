@@ -6,10 +6,8 @@ use gyronet::store::layout::{self, SLOT_SIZE};
 use gyronet::store::slots::{Selection, WeightSource, select};
 use gyronet::store::{Accepted, Access, Configuration, Learned, Record, Slot};
 use gyronet::units::SpecificForce;
-use gyronet_host_tests::flash::{Cut, F405};
+use gyronet_host_tests::flash::{Cut, F405, Flash, shared};
 use gyronet_host_tests::stored::{crc, open, other_weights, slots, upload};
-use std::cell::RefCell;
-use std::rc::Rc;
 
 fn configuration(k: usize) -> Configuration {
     Configuration { latitude_deg: Some((k % 90) as f32), ..Configuration::DEFAULT }
@@ -27,7 +25,7 @@ fn learned(k: usize) -> Learned {
 /// Flash contents before writes that need the most different operations: the first of all, a
 /// plain one, and each that changes to another sector, until both sectors have been used twice.
 fn starts<R: Record>(make: fn(usize) -> R) -> Vec<(F405, usize, u64)> {
-    let flash = Rc::new(RefCell::new(F405::up_to(layout::STORE.end as usize)));
+    let flash = shared(F405::up_to(layout::STORE.end as usize));
     // The other records must survive too.
     let mut store = open(&flash).expect("an empty flash");
     store.set(&Accepted::NONE.with(Slot::B, 7)).expect("it is stored");
@@ -56,12 +54,7 @@ fn starts<R: Record>(make: fn(usize) -> R) -> Vec<(F405, usize, u64)> {
 }
 
 /// Checks that after a cut the record before or the new one is there, and all others.
-fn whole<R: Record + PartialEq + std::fmt::Debug>(
-    flash: &Rc<RefCell<F405>>,
-    make: fn(usize) -> R,
-    k: usize,
-    at: &str,
-) {
+fn whole<R: Record + PartialEq + std::fmt::Debug>(flash: &Flash, make: fn(usize) -> R, k: usize, at: &str) {
     let mut store = open(flash).unwrap_or_else(|error| panic!("{at}: {error}"));
     let found = store.get::<R>().unwrap_or_else(|error| panic!("{at}: {error}"));
     assert!(found == Some(make(k - 1)) || found == Some(make(k)), "{at}: {found:?}");
@@ -84,7 +77,7 @@ fn every_cut<R: Record + PartialEq + std::fmt::Debug>(name: &str, make: fn(usize
         for cut in Cut::ALL {
             for after in 0..operations {
                 let at = format!("{name} {k}, cut {cut:?} operation {after} of {operations}");
-                let flash = Rc::new(RefCell::new(start.clone()));
+                let flash = shared(start.clone());
                 let mut store = open(&flash).expect("it was whole");
                 flash.borrow_mut().cut_after(after, cut);
                 assert!(store.set(&make(k)).is_err(), "{at}: nobody can have heard of success");
@@ -92,18 +85,18 @@ fn every_cut<R: Record + PartialEq + std::fmt::Debug>(name: &str, make: fn(usize
                 cuts += 1;
                 let torn = flash.borrow().clone();
                 whole(&flash, make, k, &at);
-                let started = Rc::new(RefCell::new(torn.clone()));
+                let started = shared(torn.clone());
                 open(&started).and_then(|mut store| store.make_room()).expect("the flash answers");
                 whole(&started, make, k, &at);
                 assert!(open(&started).is_ok_and(|store| !store.damaged()), "{at}: a start mends it");
                 // The next attempt works, and may be cut itself.
-                let retry = |flash: &Rc<RefCell<F405>>| open(flash).and_then(|mut store| store.set(&make(k)));
+                let retry = |flash: &Flash| open(flash).and_then(|mut store| store.set(&make(k)));
                 retry(&flash).unwrap_or_else(|error| panic!("{at}: {error}"));
                 assert_eq!(open(&flash).and_then(|mut store| store.get::<R>()), Ok(Some(make(k))), "{at}");
                 let retried = flash.borrow().operations() - torn.operations();
                 // In turns: every fourth of them.
                 for again in (after % 4..retried).step_by(4) {
-                    let flash = Rc::new(RefCell::new(torn.clone()));
+                    let flash = shared(torn.clone());
                     flash.borrow_mut().cut_after(again, cut);
                     assert!(retry(&flash).is_err(), "{at}");
                     flash.borrow_mut().restore();
@@ -133,7 +126,7 @@ fn a_cut_while_a_key_is_replaced_leaves_the_old_or_the_new_one() {
 }
 
 /// Returns the weights that the board would run on after a restart.
-fn running(flash: &Rc<RefCell<F405>>) -> (WeightSource, u32) {
+fn running(flash: &Flash) -> (WeightSource, u32) {
     let accepted = open(flash).and_then(|mut store| store.get::<Accepted>());
     let accepted = accepted.expect("records are whole").unwrap_or(Accepted::NONE);
     let flash = flash.borrow();
@@ -144,7 +137,7 @@ fn running(flash: &Rc<RefCell<F405>>) -> (WeightSource, u32) {
 #[test]
 fn a_cut_during_the_upload_of_weights_leaves_the_accepted_ones() {
     let (old, new) = (weights::DEFAULT.0.to_vec(), other_weights(1));
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     assert_eq!(running(&flash), (WeightSource::BuiltIn, crc(&old)));
     upload(&flash, Slot::A, &old).expect("it is accepted");
     assert_eq!(running(&flash), (WeightSource::Slot(Slot::A), crc(&old)));
@@ -159,7 +152,7 @@ fn a_cut_during_the_upload_of_weights_leaves_the_accepted_ones() {
     for after in (0..operations).filter(|&after| edge(after) || after % 3 == 0) {
         let turn = Cut::ALL[after as usize % Cut::ALL.len()];
         for cut in Cut::ALL.into_iter().filter(|cut| edge(after) || *cut == turn) {
-            let flash = Rc::new(RefCell::new(start.clone()));
+            let flash = shared(start.clone());
             flash.borrow_mut().cut_after(after, cut);
             assert!(upload(&flash, Slot::B, &new).is_err());
             assert!(flash.borrow_mut().restore());

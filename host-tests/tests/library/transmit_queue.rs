@@ -1,9 +1,10 @@
 //! A bus that is off, full or gone never blocks: the oldest frames are dropped, and counted.
 
 use embedded_can::nb::Can;
-use embedded_can::{ErrorKind, Frame, StandardId};
+use embedded_can::{ErrorKind, Frame};
 use gyronet::can::DataFrame;
 use gyronet::can::queue::TransmitQueue;
+use gyronet_host_tests::wire::{data_frame, id11};
 use proptest::prelude::*;
 use std::collections::VecDeque;
 
@@ -53,7 +54,7 @@ impl Can for Controller {
 }
 
 fn frame(number: usize) -> DataFrame {
-    DataFrame::new(StandardId::new(0x174).expect("11 bits"), &number.to_le_bytes()).expect("eight bytes")
+    data_frame(id11(0x174), &number.to_le_bytes())
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Wheel speeds from a vehicle's frames, and standing still decided from them.
 
-use embedded_can::{ExtendedId, Frame, Id, StandardId};
+use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
 use gyronet::can::e2e::{DataIdMode, Fault, P01, P05, Profile};
 use gyronet::can::signal::{BitField, ByteOrder, OutsideFrame};
@@ -10,11 +10,12 @@ use gyronet::can::wheel::{
 };
 use gyronet::sample::Standstill;
 use gyronet::units::{Duration, Micros, WheelSpeed};
+use gyronet_host_tests::wire::{data_frame, id11, id29};
 use proptest::prelude::*;
 
 const MS: u64 = 1000;
-const ID: Id = Id::Standard(StandardId::new(0xAA).unwrap());
-const OTHER: Id = Id::Extended(ExtendedId::new(0x18FE_BF0B).unwrap());
+const ID: Id = id11(0xAA);
+const OTHER: Id = id29(0x18FE_BF0B);
 
 fn intel(start: u8, len: u8) -> BitField {
     BitField::new(start, len, ByteOrder::Intel, false).expect("inside a frame")
@@ -44,14 +45,10 @@ fn settings(frame: WheelFrame) -> WheelSettings {
     }
 }
 
-fn frame(id: Id, data: &[u8]) -> DataFrame {
-    DataFrame::new(id, data).expect("at most eight bytes")
-}
-
 /// The car's frame at one speed for all wheels.
 fn at_kmh(kmh: f64) -> DataFrame {
     let [hi, lo] = (((kmh + 67.67) * 100.0).round() as u16).to_be_bytes();
-    frame(ID, &[hi, lo, hi, lo, hi, lo, hi, lo])
+    data_frame(ID, &[hi, lo, hi, lo, hi, lo, hi, lo])
 }
 
 #[test]
@@ -59,14 +56,14 @@ fn speeds_are_read_in_metres_per_second() {
     let mut receiver = WheelReceiver::new(settings(car())).expect("checked");
     // 0.01 km/h: 6767 + 3600 for the front right wheel, standstill for the others.
     let sample = receiver
-        .decode(&frame(ID, &[0x28, 0x7F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]), Micros(0))
+        .decode(&data_frame(ID, &[0x28, 0x7F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]), Micros(0))
         .expect("a wheel frame")
         .expect("valid");
     let [front_left, front_right, ..] = sample.speeds.map(|speed| speed.expect("known").metre_per_sec());
     assert!((front_right - 10.0).abs() < 1e-3, "{front_right}");
     assert!(front_left.abs() < 1e-3, "{front_left}");
     assert_eq!(sample.standstill, Standstill::Moving);
-    assert!(receiver.decode(&frame(OTHER, &[0; 8]), Micros(0)).is_none(), "not a wheel frame");
+    assert!(receiver.decode(&data_frame(OTHER, &[0; 8]), Micros(0)).is_none(), "not a wheel frame");
 }
 
 #[test]
@@ -113,7 +110,7 @@ fn one_wheel_that_is_not_valid_ends_standing() {
     for k in 0..=20 {
         let _ = receiver.decode(&at_kmh(0.0), Micros(k * 20 * MS));
     }
-    let marked = frame(ID, &[0xFF, 0xFF, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]);
+    let marked = data_frame(ID, &[0xFF, 0xFF, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]);
     let refused = receiver.decode(&marked, Micros(420 * MS)).expect("a wheel frame");
     assert_eq!(refused, Err(WheelError::Invalid { wheel: 1 }));
     let sample = receiver.poll(Micros(420 * MS)).expect("frames have come");
@@ -123,8 +120,7 @@ fn one_wheel_that_is_not_valid_ends_standing() {
 
 #[test]
 fn wheels_may_be_spread_over_frames() {
-    let id = |raw| Id::Standard(StandardId::new(raw).expect("11 bits"));
-    let frame_of = |raw| Some(WheelFrame { id: id(raw), ..car() });
+    let frame_of = |raw| Some(WheelFrame { id: id11(raw), ..car() });
     let [front_left, front_right, rear_left, rear_right] = settings(car()).signals;
     let behind = |signal: Option<WheelSignal>| signal.map(|signal| WheelSignal { frame: 2, ..signal });
     let spread = WheelSettings {
@@ -135,14 +131,14 @@ fn wheels_may_be_spread_over_frames() {
     let mut receiver = WheelReceiver::new(spread).expect("checked");
     let still = at_kmh(0.0);
     for k in 0..20 {
-        let _ = receiver.decode(&frame(id(0x100), still.data()), Micros(k * 20 * MS));
+        let _ = receiver.decode(&data_frame(id11(0x100), still.data()), Micros(k * 20 * MS));
     }
     assert_eq!(
         receiver.poll(Micros(400 * MS)).expect("frames have come").standstill,
         Standstill::Unknown,
         "the rear is silent"
     );
-    let _ = receiver.decode(&frame(id(0x101), still.data()), Micros(400 * MS));
+    let _ = receiver.decode(&data_frame(id11(0x101), still.data()), Micros(400 * MS));
     assert_eq!(
         receiver.poll(Micros(401 * MS)).expect("frames have come").speeds.map(|speed| speed.is_some()),
         [true; 4]
@@ -166,7 +162,7 @@ fn wrong_checksums_and_counters_are_refused() {
             let mut data = [0x55, 0xAA, 0x9C, 0xFF, 0x2C, 0x01, counter, 0];
             data[7] = compute(&data);
             data[2] ^= damage;
-            receiver.decode(&frame(OTHER, &data), Micros(0)).expect("a wheel frame")
+            receiver.decode(&data_frame(OTHER, &data), Micros(0)).expect("a wheel frame")
         };
         let [.., left, right] = send(0, 0).expect("valid").speeds;
         assert!((left.expect("known").metre_per_sec() + 1.0).abs() < 1e-3);
@@ -177,7 +173,7 @@ fn wrong_checksums_and_counters_are_refused() {
         assert!(send(15, 0).is_ok());
         assert!(send(0, 0).is_ok());
         assert_eq!(receiver.lost(), 1 + 12);
-        let short = receiver.decode(&frame(OTHER, &[0; 3]), Micros(0)).expect("a wheel frame");
+        let short = receiver.decode(&data_frame(OTHER, &[0; 3]), Micros(0)).expect("a wheel frame");
         assert_eq!(short, Err(WheelError::Short(3)));
     }
 }
@@ -202,8 +198,7 @@ fn sums_of_other_makers_are_checked() {
         ("Hyundai", 0x386, split, Some(parts(14, 30)), 0x12B4_5678_9A7C_DE20, 6),
     ];
     for (maker, id, sum, counter, data, count) in cases {
-        let id = Id::Standard(StandardId::new(id).expect("11 bits"));
-        let frame = WheelFrame { id, counter, checksum: Checksum::Sum(sum) };
+        let frame = WheelFrame { id: id11(id), counter, checksum: Checksum::Sum(sum) };
         assert_eq!(frame.check(&data.to_be_bytes()), Ok(counter.map(|_| count)), "{maker}");
         // Four bits of a sum of bytes see the lower half of each.
         for bit in (0..64).filter(|bit| !sum.without_counter || bit % 8 < 4) {
@@ -217,7 +212,7 @@ fn sums_of_other_makers_are_checked() {
 #[test]
 fn a_wheel_that_says_it_is_at_fault_has_no_speed() {
     let mut receiver = WheelReceiver::new(WheelSettings::TOYOTA).expect("checked");
-    let faulty = frame(ID, &[0x1A, 0x6F, 0x9A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]);
+    let faulty = data_frame(ID, &[0x1A, 0x6F, 0x9A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]);
     for k in 0..100 {
         let error = receiver.decode(&faulty, Micros(k * 12 * MS)).expect("a wheel frame");
         assert_eq!(error, Err(WheelError::Invalid { wheel: 0 }));
@@ -229,7 +224,7 @@ fn a_wheel_that_says_it_is_at_fault_has_no_speed() {
         [None, Some(true), Some(true), Some(true)]
     );
     assert_eq!(sample.standstill, Standstill::Unknown);
-    let good = frame(ID, &[0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]);
+    let good = data_frame(ID, &[0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]);
     assert!(receiver.decode(&good, Micros(1_212 * MS)).expect("a wheel frame").is_ok());
     assert!(!receiver.is_invalid());
 }
@@ -252,8 +247,9 @@ fn codes_ranges_and_directions_are_what_the_settings_say() {
     let mut receiver = WheelReceiver::new(WheelSettings { signals, ..settings(plain) }).expect("checked");
     let mut read = |raw: u16, says: u8| {
         let [lo, hi] = raw.to_le_bytes();
-        let sample =
-            receiver.decode(&frame(ID, &[lo, hi, lo, hi, 0, 0, 0, says]), Micros(0)).expect("a wheel frame");
+        let sample = receiver
+            .decode(&data_frame(ID, &[lo, hi, lo, hi, 0, 0, 0, says]), Micros(0))
+            .expect("a wheel frame");
         sample.ok().map(|sample| (sample.speeds[2].expect("known").metre_per_sec() * 360.0).round() as i32)
     };
     for (raw, says, expected) in [
@@ -289,7 +285,7 @@ fn pulses_become_speeds_and_standstill() {
                 way += speed * 0.01;
                 let raw = (way / 0.02) as u64 as u8;
                 receiver
-                    .decode(&frame(ID, &[raw, raw]), Micros(k * 10 * MS))
+                    .decode(&data_frame(ID, &[raw, raw]), Micros(k * 10 * MS))
                     .expect("a wheel frame")
                     .expect("valid")
             })
@@ -311,11 +307,11 @@ fn e2e_protected_frames_are_checked() {
     let mut receiver = WheelReceiver::new(WheelSettings { frames, ..two_wheels }).expect("checked");
     let mut data = [0; 8];
     profile.protect(&mut data, 3).expect("eight bytes");
-    assert!(receiver.decode(&frame(OTHER, &data), Micros(0)).expect("a wheel frame").is_ok());
-    let again = receiver.decode(&frame(OTHER, &data), Micros(0)).expect("a wheel frame");
+    assert!(receiver.decode(&data_frame(OTHER, &data), Micros(0)).expect("a wheel frame").is_ok());
+    let again = receiver.decode(&data_frame(OTHER, &data), Micros(0)).expect("a wheel frame");
     assert_eq!(again, Err(WheelError::Repeated));
     data[5] ^= 4;
-    let damaged = receiver.decode(&frame(OTHER, &data), Micros(0)).expect("a wheel frame");
+    let damaged = receiver.decode(&data_frame(OTHER, &data), Micros(0)).expect("a wheel frame");
     assert!(matches!(damaged, Err(WheelError::E2e(Fault::Crc { .. }))));
 }
 

@@ -62,8 +62,7 @@ fn a_sensors_bytes_hold_its_readings() {
 fn the_same_seed_gives_the_same_outcome_and_another_seed_another_one() {
     let run = |seed| {
         let mut scene = Scene::new(&CAR, seed);
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         scene.run()
     };
     let [one, again, other] = [run(1), run(1), run(2)];

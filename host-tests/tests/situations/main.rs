@@ -2,12 +2,10 @@
 
 mod judge;
 
-use gyronet_host_tests::recordings::folder;
-use gyronet_host_tests::require::{self, Need};
 use gyronet_host_tests::situations::list::{self, Situation};
 use gyronet_host_tests::situations::report::{HEADING, line};
 use gyronet_host_tests::situations::vehicle::Vehicle;
-use gyronet_host_tests::{parallel, situations};
+use gyronet_host_tests::{parallel, recordings, situations};
 
 #[test]
 fn no_situation_is_wrong_and_good() {
@@ -59,12 +57,10 @@ fn a_cured_pair_of_situation_and_vehicle_stays_within_four_sigma() {
 
 #[test]
 fn a_recording_is_judged_by_its_reference() {
-    let folder = folder();
-    let found = folder.join("truck").is_dir().then_some(&folder).ok_or("no recordings of truck".to_owned());
-    let Some(folder) = require::wants(Need::Data, found) else {
+    if recordings::found("truck").is_none() {
         return;
-    };
-    let judged = situations::recordings::judged(folder, "truck/joined");
+    }
+    let judged = situations::recordings::judged(&recordings::folder(), "truck/joined");
     assert_eq!(judged.len(), 2);
     for (name, outcome) in judged {
         assert_eq!(outcome.broken(), [], "{name}");

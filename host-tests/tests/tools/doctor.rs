@@ -1,7 +1,6 @@
 //! `gyronet doctor` on real recordings: figures that are known from elsewhere.
 
-use gyronet_host_tests::recordings::{folder, trial};
-use gyronet_host_tests::require::{Need, wants};
+use gyronet_host_tests::recordings::{found, trial};
 use gyronet_tools::bundled;
 use gyronet_tools::doctor::{Doctor, Mounting, Noise, Verdict};
 use std::fmt::Write as _;
@@ -23,9 +22,7 @@ fn a_car_is_fit_and_its_reference_has_the_known_floor() {
 /// An ADIS16405 at rest, upside down, in g and deg/s: a table with other names and units.
 #[test]
 fn a_sensor_at_rest_has_the_noise_of_its_data_sheet() {
-    let path = folder().join("static_adis16405/static_100hz.csv");
-    let found = if path.is_file() { Ok(path) } else { Err("no static_adis16405".to_owned()) };
-    let Some(path) = wants(Need::Data, found) else { return };
+    let Some(path) = found("static_adis16405/static_100hz.csv") else { return };
     // In our names and units, the right way up.
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines();

@@ -8,7 +8,6 @@ use gyronet::fog::{FogConfig, FogErrors};
 use gyronet::sample::FogSample;
 use gyronet::units::{Angle, Micros};
 use gyronet_host_tests::recordings;
-use gyronet_host_tests::require::{self, Need};
 use gyronet_paper::simulate::world::EARTH_RATE;
 use gyronet_tools::drive::wheel_frames;
 use std::path::Path;
@@ -88,11 +87,7 @@ fn yaw(gyro: &[Vec<f64>], speed: &[Vec<f64>], latitude: f64) -> Vec<f64> {
 
 #[test]
 fn the_heading_of_an_hour_in_kingston() {
-    let folder = recordings::folder().join("kingston2008");
-    let found = if folder.is_dir() { Ok(folder) } else { Err("no recording kingston2008".to_owned()) };
-    let Some(folder) = require::wants(Need::Data, found) else {
-        return;
-    };
+    let Some(folder) = recordings::found("kingston2008") else { return };
     let [gyro, speed, mut reference] =
         ["imu_10hz.csv", "obd_speed_1hz.csv", "reference_1hz.csv"].map(|name| table(&folder.join(name)));
     // Azimuth grows clockwise, and jumps at north.

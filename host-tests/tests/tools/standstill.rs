@@ -1,14 +1,12 @@
 //! Standing still on recordings: half an hour of it, and what looks like it on the road.
 
-use crate::standstill_truth::{self, Truth, read};
+use crate::standstill_truth::{Truth, read};
 use gyronet::coprocessor::{Clock, Config, Coprocessor};
-use gyronet::model::window::WINDOW;
-use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::{BoardState, Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, PERIOD_US, Standstill, Validity, WHEELS, WheelSample};
-use gyronet::units::{AngularRate, Micros, WheelSpeed};
+use gyronet::units::{Micros, WheelSpeed};
 use gyronet_host_tests::recordings;
-use gyronet_host_tests::require::{self, Need};
+use gyronet_host_tests::stream::NOTHING;
 use gyronet_host_tests::synthetic::{force, rate};
 use gyronet_tools::board::Uncorrected;
 use gyronet_tools::drive::recording::{Recording, Row};
@@ -46,9 +44,7 @@ fn stand(text: &str, config: PipelineConfig, wheels: bool) -> (f64, f64, u32) {
         assert_eq!(output.refused, None);
         // No network has been trained for this part.
         if let Some(due) = output.window {
-            let estimate =
-                Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, ..Estimate::NONE };
-            pipeline.deliver(due.end, estimate);
+            pipeline.deliver(due.end, NOTHING);
         }
         last = output.vehicle.delayed.yaw.rad().to_degrees();
         largest = largest.max(f64::abs(last));
@@ -58,11 +54,8 @@ fn stand(text: &str, config: PipelineConfig, wheels: bool) -> (f64, f64, u32) {
 
 #[test]
 fn half_an_hour_at_rest_turns_by_no_more_than_the_bias_allows() {
-    let path = recordings::folder().join("static_adis16405/static_100hz.csv");
-    let text = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()));
-    let Some(text) = require::wants(Need::Data, text) else {
-        return;
-    };
+    let Some(path) = recordings::found("static_adis16405/static_100hz.csv") else { return };
+    let text = std::fs::read_to_string(path).expect("a recording");
     assert_eq!(text.lines().count(), 180_001);
     let alone = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
     let [alone, quiet, stands] = [
@@ -108,11 +101,7 @@ fn claims(recording: &Recording, with_wheels: bool) -> Option<Vec<bool>> {
 
 #[test]
 fn standstills_of_every_recording_with_a_speed() {
-    let paths = standstill_truth::recordings();
-    let found = if paths.is_empty() { Err("no recording with a speed".to_owned()) } else { Ok(()) };
-    if require::wants(Need::Data, found).is_none() {
-        return;
-    }
+    let Some(paths) = recordings::with_speed() else { return };
     println!("recording; with wheels, without: s of motion claimed, stops of 3 s found");
     let (mut stops, mut used, mut failed) = ([0; 2], [0; 2], Vec::new());
     let rows = gyronet_host_tests::parallel::map(&paths, |path| {

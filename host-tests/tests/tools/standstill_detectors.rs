@@ -4,10 +4,9 @@
 //! Windows of 2 s, ten a second: moving variance, angular rate energy and SHOE of raw samples (Skog, Handel, Nilsson and
 //! Rantakokko, IEEE Trans. Biomed. Eng. 57, 2010), and the one in use, without its condition of braking.
 
-use crate::standstill_truth::{self, Truth, read};
+use crate::standstill_truth::{Truth, read};
 use gyronet::standstill::{Inertial, StandstillConfig};
-use gyronet_host_tests::parallel;
-use gyronet_host_tests::require::{self, Need};
+use gyronet_host_tests::{parallel, recordings};
 use gyronet_tools::drive::recording::{Recording, Row};
 
 const WINDOW: usize = 200;
@@ -79,11 +78,7 @@ fn statistics(recording: &Recording) -> Vec<(usize, [f64; 5])> {
 
 #[test]
 fn detectors_without_wheels_beside_each_other() {
-    let paths = standstill_truth::recordings();
-    let found = if paths.is_empty() { Err("no recording with a speed".to_owned()) } else { Ok(()) };
-    if require::wants(Need::Data, found).is_none() {
-        return;
-    }
+    let Some(paths) = recordings::with_speed() else { return };
     let drives: Vec<_> = parallel::map(&paths, |path| {
         let recording = read(path);
         let is_training =

@@ -1,26 +1,14 @@
 //! The recordings with a speed, and when their vehicles move and stand.
 
-use gyronet_host_tests::recordings;
 use gyronet_tools::drive::recording::{Reader, Recording, Row};
 use gyronet_tools::drive::vehicle::Vehicle;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Above this speed the vehicle moves, and below that it stands, m/s.
 const MOVES: f64 = 0.3;
 const STANDS: f64 = 0.15;
 /// Rows by which the wheels of `utv` are late.
 const LATE: usize = 100;
-
-/// The recordings with a speed or wheels; none where they are not on this machine.
-pub fn recordings() -> Vec<PathBuf> {
-    let sets = ["wid_car", "real_car", "rc_car", "utv", "truck", "car_mti710"];
-    let folders = sets.map(|set| recordings::folder().join(set));
-    let files = folders.iter().filter_map(|set| std::fs::read_dir(set).ok()).flatten().flatten();
-    let mut paths: Vec<_> =
-        files.map(|file| file.path()).filter(|path| path.extension().is_some_and(|e| e == "csv")).collect();
-    paths.sort();
-    paths
-}
 
 /// The truth in a recording: whether the vehicle moves or stands at each row, where that is known.
 pub struct Truth {

@@ -23,8 +23,7 @@ pub static SITUATIONS: &[Situation] = &[
         of_rate(scene, 100.0);
     }),
     Situation::new("sensor whose clock jumps", &[CAR, HATCH], |scene| {
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         scene.ride.reach(10.0, 5.0).turn(40.0, 4.0);
         scene.sensor_fault(1e3, Fault::ClockJump(0.35));
         scene.ride.turn(40.0, 4.0).stop(5.0, 5.0);
@@ -85,8 +84,7 @@ pub static SITUATIONS: &[Situation] = &[
     }),
     Situation::new("gyro beyond its range", ALL, |scene| in_a_turn(scene, 0.5, Fault::Gain(2, 60.0))),
     Situation::new("bias steps after a knock", ALL, |scene| {
-        scene.ride.hold(8.0);
-        scene.town(2);
+        scene.start(2);
         scene.ride.hold(1.0);
         scene.sensor_fault(1e3, Fault::Shift(2, 0.01));
         scene.ride.hold(4.0);
@@ -120,8 +118,7 @@ pub static SITUATIONS: &[Situation] = &[
     }),
     Situation::new("line stalls in a turn", &[CAR, UTV], stall),
     Situation::new("two faults, drawn", ALL, |scene| {
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         scene.ride.reach(9.0, 5.0);
         drawn(scene);
         scene.ride.turn(70.0, 6.0);
@@ -147,8 +144,7 @@ pub static SITUATIONS: &[Situation] = &[
         scene.town(2);
     }),
     Situation::new("wheel frames frozen at zero on a motorway", WHEELED, |scene| {
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         scene.wheel_fault(1e3, WheelFault::All(0.0));
         scene.ride.now.road = 0.1;
         scene.ride.reach(30.0, 20.0).hold(10.0).turn(5.0, 40.0).turn(-4.0, 30.0).hold(10.0);
@@ -158,13 +154,11 @@ pub static SITUATIONS: &[Situation] = &[
 
 fn of_rate(scene: &mut Scene, hz: f64) {
     scene.sensor.hz = hz;
-    scene.ride.hold(8.0);
-    scene.town(3);
+    scene.start(3);
 }
 
 fn in_a_turn(scene: &mut Scene, seconds: f64, what: Fault) {
-    scene.ride.hold(8.0);
-    scene.town(1);
+    scene.start(1);
     scene.ride.reach(10.0, 6.0).turn(30.0, 3.0);
     scene.sensor_fault(seconds, what);
     scene.ride.turn(60.0, 5.0).hold(5.0).stop(5.0, 3.0);
@@ -172,33 +166,28 @@ fn in_a_turn(scene: &mut Scene, seconds: f64, what: Fault) {
 }
 
 fn after_a_restart(scene: &mut Scene, what: Fault) {
-    scene.ride.hold(8.0);
-    scene.town(2);
+    scene.start(2);
     scene.ride.hold(5.0);
     scene.restart();
     scene.sensor_fault(1e3, what);
-    scene.ride.hold(8.0);
-    scene.town(2);
+    scene.start(2);
 }
 
 fn on_the_line(scene: &mut Scene, what: Damage) {
-    scene.ride.hold(8.0);
-    scene.town(1);
+    scene.start(1);
     scene.line_fault(25.0, what);
     scene.town(2);
     scene.least = 0.2;
 }
 
 fn wheels(scene: &mut Scene, what: WheelFault) {
-    scene.ride.hold(8.0);
-    scene.town(1);
+    scene.start(1);
     scene.wheel_fault(1e3, what);
     scene.town(2);
 }
 
 fn stall(scene: &mut Scene) {
-    scene.ride.hold(8.0);
-    scene.town(1);
+    scene.start(1);
     scene.ride.reach(10.0, 5.0).turn(30.0, 3.0);
     scene.line_fault(0.7, Damage::Stall);
     scene.ride.turn(60.0, 5.0).stop(5.0, 5.0);

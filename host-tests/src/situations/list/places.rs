@@ -12,14 +12,12 @@ pub static SITUATIONS: &[Situation] = &[
         scene.town(4);
     }),
     Situation::new("ferry that turns on the way", WHEELED, |scene| {
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         deck(scene, 0.3, 0.01, 40.0);
         scene.town(2);
     }),
     Situation::new("turntable of 0.2 deg/s", WHEELED, |scene| {
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         deck(scene, 0.2, 0.0, 40.0);
         scene.town(2);
     }),
@@ -32,8 +30,7 @@ pub static SITUATIONS: &[Situation] = &[
         for rate in [0.1, -0.1, 0.1] {
             deck(scene, rate, 0.005, 15.0);
         }
-        scene.ride.hold(8.0);
-        scene.town(2);
+        scene.start(2);
         // Half of the time it has not driven off yet.
         scene.least = 0.48;
     }),
@@ -42,12 +39,10 @@ pub static SITUATIONS: &[Situation] = &[
         scene.ride.now.rolling = 0.0;
         scene.town(3);
         scene.ride.now.rolling = 1.0;
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
     }),
     Situation::new("shuttle train", WHEELED, |scene| {
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         (scene.ride.now.rolling, scene.ride.now.road) = (0.0, 0.05);
         scene.ride.reach(35.0, 30.0).turn(12.0, 40.0).turn(-8.0, 25.0).stop(30.0, 5.0);
         (scene.ride.now.rolling, scene.ride.now.road) = (1.0, 1.0);
@@ -100,8 +95,7 @@ pub static SITUATIONS: &[Situation] = &[
         scene.ride.hold(10.0).stop(12.0, 5.0);
     }),
     Situation::new("car wash with a conveyor", &[CAR, HATCH, TRUCK], |scene| {
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         (scene.ride.now.engine, scene.ride.now.swell) = (0.0, 0.004);
         scene.ride.reach(0.2, 2.0).hold(25.0).turn(4.0, 5.0).stop(2.0, 3.0);
         (scene.ride.now.engine, scene.ride.now.swell) = (1.0, 0.0);

@@ -6,12 +6,10 @@ use super::{ALL, Situation, WHEELED, WITHOUT};
 
 pub static SITUATIONS: &[Situation] = &[
     Situation::new("town", ALL, |scene| {
-        scene.ride.hold(8.0);
-        scene.town(4);
+        scene.start(4);
     }),
     Situation::new("creeping below the wheels' threshold", &[HATCH, TRUCK], |scene| {
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         for _ in 0..3 {
             scene.ride.reach(0.25, 2.0).turn(20.0, 20.0).turn(-8.0, 10.0).stop(1.0, 2.0);
         }
@@ -39,8 +37,7 @@ pub static SITUATIONS: &[Situation] = &[
     }),
     Situation::new("night of cooling", ALL, |scene| {
         scene.sensor.warming = [45.0, -40.0, 60.0];
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         scene.ride.now.engine = 0.0;
         scene.ride.hold(60.0);
         scene.restart();
@@ -78,8 +75,7 @@ pub static SITUATIONS: &[Situation] = &[
         scene.least = 0.65;
     }),
     Situation::new("restart in motion", ALL, |scene| {
-        scene.ride.hold(8.0);
-        scene.town(2);
+        scene.start(2);
         scene.ride.reach(12.0, 6.0);
         scene.restart();
         scene.ride.hold(5.0).turn(80.0, 6.0).hold(8.0).stop(6.0, 8.0);
@@ -108,8 +104,7 @@ pub static SITUATIONS: &[Situation] = &[
         scene.town(1);
     }),
     Situation::new("wheels locked on ice", WHEELED, |scene| {
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         scene.ride.reach(14.0, 8.0).hold(5.0);
         scene.wheel_fault(4.0, WheelFault::All(0.0));
         (scene.ride.now.road, scene.ride.now.speed, scene.ride.now.grip) = (0.2, 4.0, 0.0);
@@ -118,8 +113,7 @@ pub static SITUATIONS: &[Situation] = &[
         scene.ride.reach(10.0, 5.0).turn(-60.0, 5.0).stop(5.0, 5.0);
     }),
     Situation::new("slow slide with locked wheels", WHEELED, |scene| {
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         scene.wheel_fault(30.0, WheelFault::All(0.0));
         (scene.ride.now.road, scene.ride.now.speed) = (0.1, 1.5);
         scene.ride.turn(3.0, 15.0).turn(1.0, 13.0).stop(2.0, 3.0);
@@ -127,8 +121,7 @@ pub static SITUATIONS: &[Situation] = &[
         scene.town(1);
     }),
     Situation::new("spin on ice", ALL, |scene| {
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         scene.ride.reach(14.0, 8.0);
         (scene.ride.now.grip, scene.ride.now.speed) = (0.0, 3.0);
         scene.ride.turn(540.0, 4.0).stop(3.0, 6.0);
@@ -136,8 +129,7 @@ pub static SITUATIONS: &[Situation] = &[
         scene.town(1);
     }),
     Situation::new("wheels spin at a standstill", WHEELED, |scene| {
-        scene.ride.hold(8.0);
-        scene.town(1);
+        scene.start(1);
         scene.wheel_fault(8.0, WheelFault::Spin(6.0));
         scene.ride.hold(10.0);
         scene.town(1);

@@ -1,7 +1,6 @@
 //! Who may write: a board with a key takes what is signed with its private part, once, and nothing else.
 
 use super::uds::{Bench, bench, download};
-use embedded_can::{ExtendedId, Id};
 use gyronet::can::e2e::{P02, Profile};
 use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{Checksum, WheelFrame, WheelSettings, WheelSignal};
@@ -11,11 +10,10 @@ use gyronet::store::layout::{RECORD_SECTOR, STORE};
 use gyronet::store::{Access, Configuration, FieldError, Record, Store, StoreError};
 use gyronet::uds::signature;
 use gyronet::units::{Duration, WheelSpeed};
-use gyronet_host_tests::flash::{Cut, F405, Region};
+use gyronet_host_tests::flash::{Cut, Flash, Region, shared};
 use gyronet_host_tests::stored::{crc, other_weights};
+use gyronet_host_tests::wire::id29;
 use gyronet_tools::signing::{PrivateKey, unhex};
-use std::cell::RefCell;
-use std::rc::Rc;
 
 pub const SERIAL: [u8; 12] = *b"a test board";
 const CONFIGURATION: u16 = 0x0100;
@@ -25,7 +23,7 @@ pub fn a_key() -> PrivateKey {
 }
 
 /// A board with a key, in an extended session at standstill.
-pub fn locked() -> (Rc<RefCell<F405>>, Bench, PrivateKey) {
+pub fn locked() -> (Flash, Bench, PrivateKey) {
     let (flash, mut bench) = bench();
     let key = a_key();
     bench.enter(3);
@@ -149,7 +147,7 @@ fn what_is_signed_is_accepted_once() {
     assert_eq!(start(&flash).latitude_deg, Some(3.0));
 }
 
-fn start(flash: &Rc<RefCell<F405>>) -> Configuration {
+fn start(flash: &Flash) -> Configuration {
     *super::start(flash).configuration()
 }
 
@@ -309,7 +307,7 @@ fn a_weight_file_is_used_with_its_own_signature_alone() {
     let sign = |file: &[u8], counter| key.trailer(0xFF01, None, counter, file);
     assert_eq!(use_file(&mut bench, &file, &[]), [0x7F, 0x31, 0x13]);
     assert_eq!(use_file(&mut bench, &file, &sign(&other, 1)), [0x7F, 0x31, 0x35]);
-    let running = |flash: &Rc<RefCell<F405>>| super::start(flash).info().weights_crc;
+    let running = |flash: &Flash| super::start(flash).info().weights_crc;
     assert_eq!(running(&flash), Some(crc(&weights::DEFAULT.0)));
     assert_eq!(use_file(&mut bench, &file, &sign(&file, 1)), [0x71, 1, 0xFF, 1]);
     assert_eq!(running(&flash), Some(crc(&file)));
@@ -324,7 +322,7 @@ fn a_power_cut_never_takes_the_counter_back() {
     let before = flash.borrow().clone();
     let mut cuts = 0;
     loop {
-        let flash = Rc::new(RefCell::new(before.clone()));
+        let flash = shared(before.clone());
         let mut bench = Bench::new(&flash);
         bench.enter(3);
         flash.borrow_mut().cut_after(cuts, Cut::ALL[cuts as usize % Cut::ALL.len()]);
@@ -423,7 +421,7 @@ impl Record for Later {
 fn the_longest_wheel_settings_fit_with_their_trailer() {
     let (flash, mut bench, key) = locked();
     let frame = |k: u32| WheelFrame {
-        id: Id::Extended(ExtendedId::new(0x1FFF_FFF0 + k).expect("29 bits")),
+        id: id29(0x1FFF_FFF0 + k),
         counter: Some(BitField::new(24, 8, ByteOrder::Intel, false).expect("it fits").into()),
         checksum: Checksum::E2e(Profile::P02(P02 { data_ids: [0xFF; 16] })),
     };

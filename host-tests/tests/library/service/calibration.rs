@@ -9,14 +9,12 @@ use gyronet::service::message::Refusal;
 use gyronet::store::{Configuration, Learned, UnitMap};
 use gyronet::uds::isotp::MAX_MESSAGE;
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
-use gyronet_host_tests::flash::F405;
+use gyronet_host_tests::flash::Flash;
 use gyronet_host_tests::stored::open;
-use std::cell::RefCell;
-use std::rc::Rc;
 
 #[test]
 fn the_map_of_a_unit_is_kept_for_the_weights_it_was_found_with() {
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     let mut board = start(&flash);
     let runs = board.info().weights_crc.unwrap_or(0);
     let elements = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.006, 0.029, 1.001]];
@@ -50,6 +48,6 @@ fn what_was_learnt_fits_a_response_and_a_record() {
     };
     let record = postcard::to_stdvec(&learned).expect("there is room");
     assert!(record.len() + 4 <= MAX_MESSAGE, "{} bytes", record.len());
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     assert_eq!(open(&flash).expect("an empty flash").set(&learned), Ok(()));
 }

@@ -9,16 +9,14 @@ use gyronet::store::Slot;
 use gyronet::store::firmware::{FirmwareError, LABEL, Label, MAX_IMAGE, Trailer, select};
 use gyronet::store::layout::RECORD_SECTOR;
 use gyronet::store::slots::SlotError;
-use gyronet_host_tests::flash::{F405, Region};
+use gyronet_host_tests::flash::{Flash, Region};
 use gyronet_host_tests::stored::{flash_image, image};
 use gyronet_tools::client::device::update::Update;
 use gyronet_tools::signing::PrivateKey;
-use std::cell::RefCell;
 use std::rc::Rc;
 
 const OWN: Label = Label::new([1, 2, 3], "a board");
 const HEAD: u16 = 0x011A;
-type Flash = Rc<RefCell<F405>>;
 
 fn update(label: Label) -> Update {
     Update::new(label, [image(&label, 1), image(&label, 2)])

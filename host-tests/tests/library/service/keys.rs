@@ -6,14 +6,10 @@ use super::uds::{Bench, bench};
 use gyronet::model::blob::CRC;
 use gyronet::store::layout::STORE;
 use gyronet::store::{Access, Configuration, Record, StoreError};
-use gyronet_host_tests::flash::{Cut, F405};
+use gyronet_host_tests::flash::{Cut, Flash, shared};
 use gyronet_host_tests::stored::open;
 use gyronet_tools::signing::PrivateKey;
-use std::cell::RefCell;
 use std::ops::Range;
-use std::rc::Rc;
-
-type Flash = Rc<RefCell<F405>>;
 
 fn write_key(key: [u8; 32], trailer: &[u8]) -> Vec<u8> {
     [&[0x2E, 1, 0x10][..], &key, trailer].concat()
@@ -146,7 +142,7 @@ fn one_damaged_record_of_access_is_restored_from_the_other() {
     for (copy, other) in [(0, 1), (1, 0)] {
         for offset in found[copy].clone() {
             for bit in [1, 0x80] {
-                let flash = Rc::new(RefCell::new(whole.clone()));
+                let flash = shared(whole.clone());
                 flash.borrow_mut().damage(offset, bit);
                 assert!(is_known(&flash, &next), "byte {offset:#x}");
                 // The start has restored it: the other one may go now.
@@ -169,7 +165,7 @@ fn with_both_records_of_access_damaged_nobody_may_write() {
     let (whole, span) = (flash.borrow().clone(), first.len());
     for place in 0..span {
         for (first_place, second_place) in [(place, place), (place, span - 1 - place)] {
-            let flash = Rc::new(RefCell::new(whole.clone()));
+            let flash = shared(whole.clone());
             flash.borrow_mut().damage(first.start + first_place, 1 << (place % 8));
             flash.borrow_mut().damage(second.start + second_place, 1 << (place % 8));
             // At this start, and at those after the rest was moved to the other sector.
@@ -197,7 +193,7 @@ fn no_flipped_bit_opens_a_board_or_revives_a_key() {
     let is_used = |at: &usize| whole.bytes()[*at] != 0xFF;
     for at in (STORE.start as usize..STORE.end as usize).filter(is_used) {
         for bit in 0..8 {
-            let flash = Rc::new(RefCell::new(whole.clone()));
+            let flash = shared(whole.clone());
             flash.borrow_mut().damage(at, 1 << bit);
             assert!(is_known(&flash, &next), "byte {at:#x} bit {bit}");
             let is_mended = open(&flash).is_ok_and(|store| !store.damaged());

@@ -13,12 +13,10 @@ use gyronet::service::Learner;
 use gyronet::standstill::Standing;
 use gyronet::store::{Calibration, Configuration, Learned};
 use gyronet::units::{CentiCelsius, WheelSpeed};
-use gyronet_host_tests::flash::F405;
+use gyronet_host_tests::flash::Flash;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::stored::open;
 use gyronet_host_tests::synthetic::judged;
-use std::cell::RefCell;
-use std::rc::Rc;
 
 /// Lets the board see seconds of a sensor at rest with this bias and temperature, while the wheels show this.
 fn observe(
@@ -46,7 +44,7 @@ fn is_near(found: Option<f64>, expected: f64) -> bool {
 
 #[test]
 fn a_standstill_that_the_wheels_prove_is_learnt_from() {
-    let mut board = start(&Rc::new(RefCell::new(F405::default())));
+    let mut board = start(&Flash::default());
     for wheels in [Standstill::Moving, Standstill::Unknown] {
         observe(&mut board, 10, (0.01, 20), LEVEL, wheels);
     }
@@ -185,7 +183,7 @@ fn how_far_a_sensor_must_be_moved_depends_on_how_well_forward_was_known() {
 
 #[test]
 fn a_minute_on_a_ramp_is_one_standstill() {
-    let mut board = start(&Rc::new(RefCell::new(F405::default())));
+    let mut board = start(&Flash::default());
     observe(&mut board, 4, (0.01, 20), LEVEL, Standstill::Still);
     let ramp = [2.2, 0.0, 9.56];
     observe(&mut board, 1, (0.01, 20), LEVEL, Standstill::Moving);
@@ -201,7 +199,7 @@ fn a_minute_on_a_ramp_is_one_standstill() {
 
 #[test]
 fn a_board_that_must_not_learn_does_not_look_for_forward() {
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     let off = Configuration { learn: false, ..Configuration::DEFAULT };
     assert_eq!(start(&flash).set_configuration(&off), Ok(()));
     let mut board = start(&flash);
@@ -212,7 +210,7 @@ fn a_board_that_must_not_learn_does_not_look_for_forward() {
 
 #[test]
 fn readings_that_are_not_good_teach_nothing() {
-    let mut board = start(&Rc::new(RefCell::new(F405::default())));
+    let mut board = start(&Flash::default());
     let before = *board.learned();
     for validity in [Validity::Saturated, Validity::Recovering, Validity::Implausible, Validity::Stuck] {
         for tick in 0..400 {
@@ -228,7 +226,7 @@ fn readings_that_are_not_good_teach_nothing() {
 #[test]
 fn a_contradicted_standstill_teaches_nothing() {
     let contradicted = Standing { is_contradicted: true, ..Standing::UNKNOWN };
-    let mut board = start(&Rc::new(RefCell::new(F405::default())));
+    let mut board = start(&Flash::default());
     let before = *board.learned();
     for tick in 0..1_000 {
         let wheels = WheelSample::without_speeds(Standstill::Still);

@@ -5,25 +5,19 @@
 //! `host-tests/socketcan/run` starts a virtual machine that has.
 
 use super::start;
-use embedded_can::{Frame, Id, StandardId};
-use gyronet::can::DataFrame;
+use embedded_can::{Frame, Id};
 use gyronet::service::message::AllCounters;
 use gyronet::store::{Configuration, Mounting, Slot, slots::WeightSource};
 use gyronet::uds::Server;
-use gyronet_host_tests::flash::F405;
+use gyronet_host_tests::flash::Flash;
 use gyronet_host_tests::stored::other_weights;
+use gyronet_host_tests::wire::{data_frame, id11};
 use gyronet_tools::client::bus::{self, Bus};
 use gyronet_tools::client::device::Device;
 use gyronet_tools::client::device::upload::upload;
-use std::cell::RefCell;
 use std::process::Command;
-use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-
-fn frame(id: u16, data: &[u8]) -> DataFrame {
-    DataFrame::new(StandardId::new(id).expect("11 bits"), data).expect("eight bytes at most")
-}
 
 fn open(name: &str) -> Box<dyn Bus> {
     bus::open(name, 0).unwrap_or_else(|error| panic!("{error}"))
@@ -31,7 +25,7 @@ fn open(name: &str) -> Box<dyn Bus> {
 
 /// A board on the interface, which sends its rates as well, until it is stopped.
 fn serve(name: &str, stop: &AtomicBool) {
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     let (mut server, mut board) = (Server::new(), start(&flash));
     let (mut line, began, mut rates) = (open(name), Instant::now(), 0);
     while !stop.load(Ordering::Relaxed) {
@@ -46,11 +40,11 @@ fn serve(name: &str, stop: &AtomicBool) {
         }
         server.poll(&mut board, &AllCounters::default(), now, || None);
         while let Some(data) = server.next_frame(now) {
-            let _ = line.send(&frame(0x7E8, &data));
+            let _ = line.send(&data_frame(id11(0x7E8), &data));
         }
         while rates < now / 10 {
             rates += 1;
-            let _ = line.send(&frame(0x1A0, &[0; 8]));
+            let _ = line.send(&data_frame(id11(0x1A0), &[0; 8]));
         }
         if server.restart_is_due() {
             (server, board) = (Server::new(), start(&flash));

@@ -15,14 +15,12 @@ use gyronet::uds::Server;
 use gyronet::uds::data::{Access, IDENTIFIERS, Identifier};
 use gyronet::uds::dtc::{PASSED_TICKS, TROUBLES, bit};
 use gyronet::units::WheelSpeed;
-use gyronet_host_tests::flash::F405;
+use gyronet_host_tests::flash::Flash;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::stored::{crc, other_weights};
 use gyronet_host_tests::synthetic::judged;
 use gyronet_host_tests::tester::{Tester, frame};
 use gyronet_host_tests::wire::bytes;
-use std::cell::RefCell;
-use std::rc::Rc;
 
 /// A board with its server, and the time in milliseconds.
 pub struct Bench {
@@ -37,7 +35,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    pub fn new(flash: &Rc<RefCell<F405>>) -> Self {
+    pub fn new(flash: &Flash) -> Self {
         Self::of(start(flash))
     }
 
@@ -104,8 +102,8 @@ impl Bench {
     }
 }
 
-pub fn bench() -> (Rc<RefCell<F405>>, Bench) {
-    let flash = Rc::new(RefCell::new(F405::default()));
+pub fn bench() -> (Flash, Bench) {
+    let flash = Flash::default();
     let bench = Bench::new(&flash);
     (flash, bench)
 }

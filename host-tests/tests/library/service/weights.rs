@@ -5,14 +5,12 @@ use gyronet::model::weights;
 use gyronet::service::message::Refusal;
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Accepted, Slot};
-use gyronet_host_tests::flash::F405;
+use gyronet_host_tests::flash::Flash;
 use gyronet_host_tests::stored::{crc, open};
-use std::cell::RefCell;
-use std::rc::Rc;
 
 #[test]
 fn weights_are_replaced() {
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     let file = &weights::GYRONET.0;
     let crc = crc(file);
     for (round, slot) in [Slot::A, Slot::B, Slot::A].into_iter().enumerate() {
@@ -64,7 +62,7 @@ pub fn upload(board: &mut Board, file: &[u8]) -> Result<(), Refusal> {
 /// A checksum is no signature: four bytes of a file give it any.
 #[test]
 fn a_file_with_the_checksum_of_an_accepted_one_is_not_accepted_with_it() {
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     let file = &weights::GYRONET.0[..];
     let mut board = start(&flash);
     for _ in 0..2 {
@@ -81,7 +79,7 @@ fn a_file_with_the_checksum_of_an_accepted_one_is_not_accepted_with_it() {
 
 #[test]
 fn an_upload_that_is_refused_erases_nothing() {
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     let mut board = start(&flash);
     assert_eq!(upload(&mut board, &weights::GYRONET.0), Ok(()));
     assert_eq!(board.weights_activate(), Ok(()));
@@ -95,7 +93,7 @@ fn an_upload_that_is_refused_erases_nothing() {
 /// FoGNet's file is refused under its own name by the client and at its old address, and by its topology at GyroNet's.
 #[test]
 fn a_file_of_fognet_is_refused() {
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     let file = &weights::FOGNET.0;
     let too_long = Err(Refusal::Slot(SlotError::Length(file.len() as u32)));
     assert_eq!(start(&flash).weights_begin(file.len() as u32), too_long);
