@@ -51,6 +51,7 @@ impl Scratch {
 const FOG: &str = "sensor_data/fog.csv";
 const IMU: &str = "sensor_data/xsens_imu.csv";
 const ENCODER: &str = "sensor_data/encoder.csv";
+const CALIBRATION: &str = "calibration/EncoderParameter.txt";
 
 fn set(line: &mut String, column: usize, to: &str) {
     let mut fields: Vec<&str> = line.split(',').collect();
@@ -136,14 +137,53 @@ fn a_missing_file_is_named() {
     }
 }
 
+/// A file, an edit of its lines, and what the error says then.
+type Case<'a> = (&'a str, &'a dyn Fn(&mut Vec<String>), &'a str);
+
 #[test]
-fn columns_are_counted() {
-    let scratch = Scratch::new("columns", 10);
-    scratch.edit(FOG, |lines| lines[41].push_str(",0.5"));
-    assert!(scratch.error().ends_with("fog.csv: line 42: 5 columns, expected 4"), "{}", scratch.error());
-    scratch.edit(FOG, |lines| lines[41] = lines[0].clone());
-    scratch.edit(IMU, |lines| lines[1].push_str(",0.5"));
-    assert!(scratch.error().ends_with("xsens_imu.csv: line 2: 18 columns, expected 17"));
+fn what_a_file_must_not_hold_is_named_with_its_place() {
+    const POSE: &str = "global_pose.csv";
+    let cases: [Case<'_>; 13] = [
+        (FOG, &|lines| lines[41].push_str(",0.5"), "fog.csv: line 42: 5 columns, expected 4"),
+        (IMU, &|lines| lines[1].push_str(",0.5"), "xsens_imu.csv: line 2: 18 columns, expected 17"),
+        (
+            ENCODER,
+            &|lines| set(&mut lines[6], 2, "x7"),
+            "encoder.csv: line 7, column 3: \"x7\" is not a number",
+        ),
+        (ENCODER, &|lines| set(&mut lines[6], 2, ""), "encoder.csv: line 7, column 3: \"\" is empty"),
+        (
+            FOG,
+            &|lines| set(&mut lines[2], 0, "1.5e18"),
+            "fog.csv: line 3, column 1: \"1.5e18\" is not a number",
+        ),
+        (FOG, &|lines| lines.swap(500, 501), "fog.csv: line 502: time goes backwards from 15240"),
+        // A stamp that is far off gives no endless grid, and a value beyond sense no NaN.
+        (POSE, &|lines| set(&mut lines[900], 0, "9223372036854775807"), "line 901: silent for 76993720"),
+        (
+            FOG,
+            &|lines| set(&mut lines[0], 0, "-9223372036854775808"),
+            "line 1, column 1: \"-9223372036854775808\" is out of range",
+        ),
+        (
+            FOG,
+            &|lines| set(&mut lines[10], 3, "1.7e308"),
+            "fog.csv: line 11, column 4: \"1.7e308\" is out of range",
+        ),
+        (ENCODER, &|lines| lines.clear(), "encoder.csv: holds no samples"),
+        (ENCODER, &|lines| lines.truncate(200), "in common, needed are 4 s"),
+        (
+            CALIBRATION,
+            &|lines| lines[2] = "Encoder left wheel diameter: 0".into(),
+            "no usable parameter \"Encoder left wheel diameter\"",
+        ),
+        (CALIBRATION, &|lines| lines.clear(), "no usable parameter"),
+    ];
+    for (file, edit, expected) in cases {
+        let scratch = Scratch::new("bad", 10);
+        scratch.edit(file, edit);
+        assert!(scratch.error().contains(expected), "{}", scratch.error());
+    }
 }
 
 #[test]
@@ -161,71 +201,6 @@ fn the_early_sequences_have_no_gyro() {
     assert!(error.ends_with("xsens_imu.csv has 8 columns: no gyro and no accelerometer"), "{error}");
     let [first, last] = [&sequence.steps[0], &sequence.steps[sequence.steps.len() - 1]];
     assert!((last.vendor_yaw - last.yaw - first.vendor_yaw + first.yaw).abs() < 0.1);
-}
-
-#[test]
-fn text_for_a_number_is_an_error() {
-    let scratch = Scratch::new("text", 10);
-    scratch.edit(ENCODER, |lines| set(&mut lines[6], 2, "x7"));
-    assert!(scratch.error().ends_with("encoder.csv: line 7, column 3: \"x7\" is not a number"));
-    scratch.edit(ENCODER, |lines| set(&mut lines[6], 2, ""));
-    assert!(scratch.error().ends_with("encoder.csv: line 7, column 3: \"\" is empty"));
-    let scratch = Scratch::new("float-stamp", 10);
-    scratch.edit(FOG, |lines| set(&mut lines[2], 0, "1.5e18"));
-    assert!(scratch.error().ends_with("fog.csv: line 3, column 1: \"1.5e18\" is not a number"));
-}
-
-#[test]
-fn time_must_not_go_back() {
-    let scratch = Scratch::new("back", 10);
-    scratch.edit(FOG, |lines| lines.swap(500, 501));
-    let error = scratch.error();
-    assert!(error.contains("fog.csv: line 502: time goes backwards from 15240"), "{error}");
-}
-
-#[test]
-fn a_stamp_far_off_is_an_error_and_no_endless_grid() {
-    let scratch = Scratch::new("far", 10);
-    scratch.edit("global_pose.csv", |lines| set(&mut lines[900], 0, "9223372036854775807"));
-    let error = scratch.error();
-    assert!(error.contains("global_pose.csv: line 901: silent for 76993720"), "{error}");
-    let scratch = Scratch::new("before", 10);
-    scratch.edit(FOG, |lines| set(&mut lines[0], 0, "-9223372036854775808"));
-    let error = scratch.error();
-    assert!(
-        error.ends_with("fog.csv: line 1, column 1: \"-9223372036854775808\" is out of range"),
-        "{error}"
-    );
-}
-
-#[test]
-fn a_value_beyond_sense_is_an_error_and_no_nan() {
-    let scratch = Scratch::new("huge", 10);
-    scratch.edit(FOG, |lines| {
-        for line in &mut lines[10..12] {
-            set(line, 3, "1.7e308");
-        }
-    });
-    assert!(scratch.error().ends_with("fog.csv: line 11, column 4: \"1.7e308\" is out of range"));
-}
-
-#[test]
-fn an_empty_file_is_an_error() {
-    let scratch = Scratch::new("empty", 10);
-    fs::write(scratch.0.path().join(ENCODER), "").unwrap();
-    assert!(scratch.error().ends_with("encoder.csv: holds no samples"));
-    let scratch = Scratch::new("short", 10);
-    scratch.edit(ENCODER, |lines| lines.truncate(200));
-    let error = scratch.error();
-    assert!(error.contains("in common, needed are 4 s"), "{error}");
-}
-
-#[test]
-fn a_bad_calibration_is_an_error() {
-    let scratch = Scratch::new("calibration", 10);
-    scratch
-        .edit("calibration/EncoderParameter.txt", |lines| lines[2] = "Encoder left wheel diameter: 0".into());
-    assert!(scratch.error().ends_with("no usable parameter \"Encoder left wheel diameter\""));
 }
 
 #[test]

@@ -25,12 +25,6 @@ fn parse(text: &str) -> Result<Recording, DataError> {
     Recording::parse("drives/a.csv", text.as_bytes())
 }
 
-/// Returns the error message for a good recording in which `from` is replaced by `to` in `line`.
-fn message(line: usize, from: &str, to: &str) -> String {
-    let text = standing(400, |at, row| if at == line { row.replacen(from, to, 1) } else { row });
-    parse(&text).unwrap_err().to_string()
-}
-
 #[test]
 fn reads_what_is_there() {
     let recording = parse(&unedited(400)).unwrap();
@@ -88,44 +82,25 @@ fn a_missing_column_is_named() {
 }
 
 #[test]
-fn a_bad_value_is_named_with_line_column_and_text() {
-    let gyr_z = ",0.003,";
-    let at = "drives/a.csv: line 40, column gyr_z: ";
-    assert_eq!(message(40, gyr_z, ",fast,"), format!("{at}\"fast\" is not a number"));
-    assert_eq!(message(40, gyr_z, ",,"), format!("{at}\"\" is empty"));
-    assert_eq!(message(40, gyr_z, ",NaN,"), format!("{at}\"NaN\" is not finite"));
-    assert_eq!(message(40, gyr_z, ",-inf,"), format!("{at}\"-inf\" is not finite"));
-    assert_eq!(message(40, gyr_z, ",1e39,"), format!("{at}\"1e39\" is not finite"));
-    assert_eq!(
-        message(40, gyr_z, ",17,"),
-        format!("{at}\"17\" is outside +-16 rad/s: is it deg/s? `gyronet doctor` says what mends it")
-    );
-    assert_eq!(message(2, "12.000000", "-1"), "drives/a.csv: line 2, column t_s: \"-1\" is out of range");
-    assert_eq!(
-        message(7, ",0.01,", ",?,"),
-        "drives/a.csv: line 7, column wheel1_rate: \"?\" is not a number"
-    );
-    assert_eq!(
-        message(7, ",0.0005,", ",nan,"),
-        "drives/a.csv: line 7, column ref_gyr_z: \"nan\" is not finite"
-    );
-}
-
-#[test]
-fn a_row_cut_short_is_named() {
-    assert_eq!(message(401, ",0.01,,x", ""), "drives/a.csv: line 401: 8 fields, the header has 11");
-}
-
-#[test]
-fn time_must_rise() {
-    assert_eq!(
-        message(50, "12.480000", "12.460000"),
-        "drives/a.csv: line 50: time goes backwards from 12.4700 s to 12.4600 s"
-    );
-    assert_eq!(
-        message(50, "12.480000", "12.47"),
-        "drives/a.csv: line 50: time goes nowhere from 12.4700 s to 12.4700 s"
-    );
+fn a_bad_row_is_named_with_line_column_and_text() {
+    let deg = "\"17\" is outside +-16 rad/s: is it deg/s? `gyronet doctor` says what mends it";
+    for (line, from, to, expected) in [
+        (40, ",0.003,", ",fast,", "line 40, column gyr_z: \"fast\" is not a number"),
+        (40, ",0.003,", ",,", "line 40, column gyr_z: \"\" is empty"),
+        (40, ",0.003,", ",NaN,", "line 40, column gyr_z: \"NaN\" is not finite"),
+        (40, ",0.003,", ",-inf,", "line 40, column gyr_z: \"-inf\" is not finite"),
+        (40, ",0.003,", ",1e39,", "line 40, column gyr_z: \"1e39\" is not finite"),
+        (40, ",0.003,", ",17,", &format!("line 40, column gyr_z: {deg}")),
+        (2, "12.000000", "-1", "line 2, column t_s: \"-1\" is out of range"),
+        (7, ",0.01,", ",?,", "line 7, column wheel1_rate: \"?\" is not a number"),
+        (7, ",0.0005,", ",nan,", "line 7, column ref_gyr_z: \"nan\" is not finite"),
+        (401, ",0.01,,x", "", "line 401: 8 fields, the header has 11"),
+        (50, "12.480000", "12.460000", "line 50: time goes backwards from 12.4700 s to 12.4600 s"),
+        (50, "12.480000", "12.47", "line 50: time goes nowhere from 12.4700 s to 12.4700 s"),
+    ] {
+        let text = standing(400, |at, row| if at == line { row.replacen(from, to, 1) } else { row });
+        assert_eq!(parse(&text).unwrap_err().to_string(), format!("drives/a.csv: {expected}"));
+    }
 }
 
 #[test]
