@@ -2,17 +2,17 @@
 //!
 //! `static_init` takes the mean of the first three seconds. `zero_rate` continues whenever the vehicle stands: it
 //! estimates the rate that remains after the network, so that the loop is closed around gyro and network together.
-//! [`crate::standstill`] judges whether the vehicle stands. `curve` stores the bias by temperature that standstills
+//! [`crate::standstill`] judges whether the vehicle stands. `thermal` keeps the bias by temperature that standstills
 //! have shown. `earth` keeps the rotation of the Earth from being subtracted twice.
 
-mod curve;
 pub(crate) mod earth;
 mod static_init;
+mod thermal;
 mod zero_rate;
 
-pub use curve::{BiasCurve, CurveBias, CurveFilter};
 pub use earth::{EarthRate, Latitude};
 pub use static_init::{Rest, STATIC_SAMPLES, StaticConfig, StaticError, StaticInit};
+pub use thermal::ThermalBias;
 pub use zero_rate::{ZeroRate, ZeroRateConfig, ZeroRateOutcome};
 
 use crate::sqrt::sqrt;

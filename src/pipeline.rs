@@ -317,7 +317,7 @@ impl Pipeline {
         Yaw(self.state.compensator.pending(self.remaining()))
     }
 
-    /// Returns the gyro's static bias beyond the bias curve, once known.
+    /// Returns the gyro's static bias beyond that of earlier drives, once known.
     #[must_use]
     pub fn gyro_bias(&self) -> Option<[AngularRate; 3]> {
         self.state.initialised.as_ref().map(|known| known.zero.bias())

@@ -56,7 +56,7 @@ pub const STATES: [State; 15] = [
         Status::Degraded,
         "degraded",
         "the start, if earlier drives have shown the bias",
-        "gyro less bias curve",
+        "gyro less that bias",
         "3 s at rest",
         "`moving`",
     ),

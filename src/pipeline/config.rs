@@ -1,6 +1,6 @@
 //! The pipeline's configuration is a plain value, separate from the pipeline's state.
 
-use crate::bias::{BiasCurve, EarthRate, StaticConfig, ZeroRateConfig};
+use crate::bias::{EarthRate, StaticConfig, ThermalBias, ZeroRateConfig};
 use crate::compensate::CompensateConfig;
 use crate::heading::{CourseConfig, Gain};
 use crate::health::slow::Knowledge;
@@ -15,7 +15,7 @@ pub struct PipelineConfig {
     /// The rotation of the board in the vehicle.
     pub mounting: Rotation,
     /// The gyro's bias by temperature, in the sensor's axes, as earlier drives have shown it.
-    pub bias_curve: BiasCurve,
+    pub thermal_bias: ThermalBias,
     /// Mean specific force at standstill, in the sensor's axes, where earlier drives have shown it.
     pub rest_force: Option<[SpecificForce; 3]>,
     /// How well earlier drives have shown the forward direction.
@@ -50,7 +50,7 @@ impl PipelineConfig {
     /// The configuration of a MEMS part on a car, x forward, y left, z up.
     pub const DEFAULT: Self = Self {
         mounting: Rotation::IDENTITY,
-        bias_curve: BiasCurve::UNKNOWN,
+        thermal_bias: ThermalBias::UNKNOWN,
         rest_force: None,
         forward: Knowledge::Unknown,
         gyro_map: GyroMap::IDENTITY,

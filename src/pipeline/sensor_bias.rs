@@ -6,7 +6,7 @@
 
 use super::PipelineConfig;
 use super::level;
-use crate::bias::{CurveBias, EarthRate};
+use crate::bias::EarthRate;
 use crate::mounting::{Rotation, is_moved};
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
@@ -24,7 +24,8 @@ pub(super) struct SensorBias {
     celsius: Option<f32>,
     /// The samples until the next second.
     wait: u32,
-    newest: Option<CurveBias>,
+    /// The bias there and its sigma, rad/s.
+    newest: Option<([AngularRate; 3], f32)>,
     /// The part of the bias that static initialisation has already found, if the first temperature was reported after
     /// it.
     found: [AngularRate; 3],
@@ -58,7 +59,7 @@ impl SensorBias {
         elsewhere: 0,
     };
 
-    /// Subtracts the curve's bias from a reading in the sensor's axes; `initialised` is true after static
+    /// Subtracts the learnt bias from a reading in the sensor's axes; `initialised` is true after static
     /// initialisation. Returns whether this is the first reading that a bias is subtracted from: static
     /// initialisation must not mix it with earlier readings.
     pub(super) fn subtract(
@@ -79,7 +80,7 @@ impl SensorBias {
             sums.iter_mut().zip(sample.specific_force).for_each(|(sum, axis)| *sum += i64::from(axis.0));
             *count += 1;
         }
-        let Some(CurveBias { gyro_bias, .. }) = self.newest else { return false };
+        let Some((gyro_bias, _)) = self.newest else { return false };
         if !before && initialised {
             self.found = gyro_bias;
         }
@@ -96,7 +97,7 @@ impl SensorBias {
 
     /// Returns the sigma of that bias, rad/s.
     pub(super) fn sigma(&self) -> Option<f32> {
-        self.newest.map(|newest| newest.sigma)
+        self.newest.map(|(_, sigma)| sigma)
     }
 
     /// Compares a second's mean specific force with that of earlier drives: a single sample also shows bumps and
@@ -119,9 +120,9 @@ impl SensorBias {
         let before = self.celsius.unwrap_or(measured);
         let now = before + SMOOTHING * (measured - before);
         self.celsius = Some(now);
-        self.newest = config.bias_curve.at(now);
+        self.newest = config.thermal_bias.at(now);
         let reference = *self.reference.get_or_insert(now);
-        self.change_sigma = config.bias_curve.change_sigma(reference, now);
+        self.change_sigma = config.thermal_bias.change_sigma(reference, now);
         if self.early.is_none() {
             self.early = config.rest_force.map(|force| (level::early(config), force));
         }
@@ -144,7 +145,7 @@ impl SensorBias {
     /// reading that is not good.
     pub(super) fn early(&self, sample: &ImuSample) -> Option<(Rotation, f32)> {
         let (levelling, _) = self.early?;
-        let sigma = self.newest?.sigma;
+        let (_, sigma) = self.newest?;
         (self.in_place && sample.validity.is_good()).then_some((levelling, sigma))
     }
 }

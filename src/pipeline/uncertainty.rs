@@ -9,7 +9,7 @@
 //! | noise of the gyro; at standstill the angle by which an engine shakes the vehicle | a constant | adds in squares |
 //! | network | a share of the error that it predicts for its windows ([`crate::model::Estimate::scale`]), and of the angle that it takes off to and fro, now and a second ago, which may be the vehicle's own shake | adds in squares |
 //! | network in a turn that begins or ends | a share of its correction, at most one of the rates | |
-//! | bias | from the bias curve and the zero-rate updates | adds linearly |
+//! | bias | from earlier drives and the zero-rate updates | adds linearly |
 //! | rate that standstill has set to zero | its mean; of the end of the second where it is larger, by more than an engine shakes | adds linearly |
 //! | revision that is not carried yet | what a second carries of it | adds linearly |
 //! | gain | a share of the yaw rate | of the net turn |

@@ -2,12 +2,12 @@
 //! up at standstills and in turns ([`crate::mounting::VerticalEstimator`]), forward while the vehicle drives. The gain comes
 //! from the pipeline, which learns it from courses.
 //!
-//! Without wheels, a long straight can look like a standstill, so nothing is added to the bias curve.
+//! Without wheels, a long straight can look like a standstill, so no bias is learnt.
 //! Learnt values are stored after the first, second, fourth, ... period of three seconds at rest, about ten times
 //! per start. It is also stored each time the sigma of the forward direction has decreased by 30 %, about six times
 //! in total.
 
-use crate::bias::{CurveFilter, Rest, StaticConfig, StaticInit};
+use crate::bias::{Rest, StaticConfig, StaticInit};
 use crate::heading::Gain;
 use crate::mounting::{Forward, ForwardEstimator, Vertical};
 use crate::sample::{ImuSample, WheelSample};
@@ -27,9 +27,9 @@ const BETTER: f32 = 0.7;
 #[derive(Debug)]
 pub struct Learner {
     rest: Option<StaticInit>,
-    /// `None` until the first period at rest.
-    filter: Option<CurveFilter>,
     rests: u32,
+    /// True if a bias with its temperature was learnt since the start.
+    has_bias: bool,
     /// True if the specific force of this standstill has been used.
     has_stood: bool,
     forward: ForwardEstimator,
@@ -48,8 +48,8 @@ impl Learner {
         let forward = ForwardEstimator::START;
         Self {
             rest: None,
-            filter: None,
             rests: 0,
+            has_bias: false,
             has_stood: false,
             forward,
             vertical: None,
@@ -124,9 +124,8 @@ impl Learner {
             learned.add_standstill(rest.specific_force);
         }
         if let Some(temperature) = temperature {
-            let filter = self.filter.get_or_insert_with(|| CurveFilter::new(&learned.bias_curve));
-            filter.add(temperature, rest.angular_rate);
-            learned.bias_curve = filter.curve();
+            let is_first = !core::mem::replace(&mut self.has_bias, true);
+            learned.thermal_bias.add(is_first, temperature, rest.angular_rate);
         }
         self.rests = self.rests.saturating_add(1);
         self.is_changed |= self.rests.is_power_of_two();

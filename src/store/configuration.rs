@@ -130,7 +130,7 @@ impl Configuration {
         let gain_of = elements.as_flattened().iter().fold(weights, fold);
         let gain = learned.gain.filter(|gain| gain.of == gain_of && self.heading != HeadingSettings::NONE);
         PipelineConfig {
-            bias_curve: learned.bias_curve,
+            thermal_bias: learned.thermal_bias,
             rest_force: learned.specific_force,
             vertical: learned.vertical,
             mounting,

@@ -22,7 +22,7 @@ pub enum Field {
     StaticAccelDrift,
     StaticGyroBias,
     CalibrationGyroMap,
-    BiasCurve,
+    ThermalBias,
     Forward,
     Vertical,
     Gain,
@@ -44,7 +44,7 @@ impl Field {
             Self::StaticAccelDrift => "static_init.accel_drift",
             Self::StaticGyroBias => "static_init.gyro_bias",
             Self::CalibrationGyroMap => "gyro_map",
-            Self::BiasCurve => "bias_curve",
+            Self::ThermalBias => "thermal_bias",
             Self::Forward => "forward",
             Self::Vertical => "vertical",
             Self::Gain => "gain",
@@ -64,7 +64,7 @@ impl Field {
             Self::StaticGyroDrift => [2e-4, 0.1],
             Self::StaticAccelDrift => [1e-3, 2.0],
             // With none at all, no estimate is ever accepted, and no revision ever carried.
-            Self::CalibrationGyroMap | Self::BiasCurve | Self::Forward | Self::Vertical | Self::Gain => {
+            Self::CalibrationGyroMap | Self::ThermalBias | Self::Forward | Self::Vertical | Self::Gain => {
                 return None;
             }
         })

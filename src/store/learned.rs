@@ -3,7 +3,7 @@
 
 use super::error::{Field, FieldError};
 use super::record::Record;
-use crate::bias::BiasCurve;
+use crate::bias::ThermalBias;
 use crate::heading::Gain;
 use crate::health::slow::Knowledge;
 use crate::mounting::{Forward, Rotation, Vertical, is_moved};
@@ -19,8 +19,8 @@ const FINE_DEG: f32 = 3.0;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Learned {
-    /// Bias of the gyro over temperature.
-    pub bias_curve: BiasCurve,
+    /// Bias of the gyro by temperature.
+    pub thermal_bias: ThermalBias,
     /// Mean specific force at standstill; `None` before the first standstill.
     pub specific_force: Option<[SpecificForce; 3]>,
     /// What standstills and turns have shown of the vertical.
@@ -34,7 +34,7 @@ pub struct Learned {
 impl Learned {
     /// Record before anything was learnt.
     pub const NOTHING: Self = Self {
-        bias_curve: BiasCurve::UNKNOWN,
+        thermal_bias: ThermalBias::UNKNOWN,
         specific_force: None,
         vertical: Vertical::UNKNOWN,
         forward: None,
@@ -78,11 +78,11 @@ impl Learned {
 
 impl Record for Learned {
     const KEY: u8 = 7;
-    const VERSION: u8 = 3;
+    const VERSION: u8 = 4;
 
     fn check(&self) -> Result<(), FieldError> {
-        if !self.bias_curve.is_plausible() {
-            return Err(FieldError::Implausible(Field::BiasCurve));
+        if !self.thermal_bias.is_plausible() {
+            return Err(FieldError::Implausible(Field::ThermalBias));
         }
         if !self.vertical.is_plausible() {
             return Err(FieldError::Implausible(Field::Vertical));

@@ -6,7 +6,7 @@ use crate::sent::Sent;
 use crate::synthetic::turning;
 use embedded_storage::nor_flash::ReadNorFlash;
 use gyronet::Coprocessor;
-use gyronet::bias::{BiasCurve, CurveFilter};
+use gyronet::bias::ThermalBias;
 use gyronet::heading::Gain;
 use gyronet::model::blob::CRC;
 use gyronet::mounting::{Forward, GyroMap, Vertical};
@@ -70,10 +70,10 @@ fn fitting(mut data: &[u8]) -> Vec<u8> {
 pub fn seeds() -> [(&'static str, Vec<u8>); 4] {
     let calibration = Calibration { unit: Some(UnitMap { gyro_map: GyroMap::IDENTITY, weights: 0 }) };
     let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
-    let mut filter = CurveFilter::new(&BiasCurve::UNKNOWN);
-    filter.add(CentiCelsius(2_500), [AngularRate(5), AngularRate(-5), AngularRate(7)]);
+    let mut thermal_bias = ThermalBias::UNKNOWN;
+    thermal_bias.add(true, CentiCelsius(2_500), [AngularRate(5), AngularRate(-5), AngularRate(7)]);
     let learned = Learned {
-        bias_curve: filter.curve(),
+        thermal_bias,
         specific_force: Some([SpecificForce(1 << 20); 3]),
         vertical: Vertical::UNKNOWN,
         forward: Some(Forward { direction: [0.6, 0.8, 0.0], sigma: 0.05 }),

@@ -367,7 +367,7 @@ fn what_a_standstill_has_shown_corrects_the_next_start_before_it_stands(fitted: 
     roll(&mut board, 8, 0.0);
     let learned = service::on_line(&mut board).learned().expect("a response");
     let bias = |learned: &Learned, celsius: f32| {
-        let found = learned.bias_curve.at(celsius).expect("it was learnt").gyro_bias;
+        let (found, _) = learned.thermal_bias.at(celsius).expect("it was learnt");
         found.map(|rate| rate.rad_per_sec().to_degrees())
     };
     let found = bias(&learned, 25.0);
@@ -388,7 +388,10 @@ fn what_a_standstill_has_shown_corrects_the_next_start_before_it_stands(fitted: 
         let is_right = (rate - 5.0).abs() < fitted.noise[0];
         assert!(is_right && *quality == Quality::Degraded, "{rate} deg/s, {quality:?}");
     }
-    assert_eq!(service::on_line(&mut board).learned().expect("a response").bias_curve, learned.bias_curve);
+    assert_eq!(
+        service::on_line(&mut board).learned().expect("a response").thermal_bias,
+        learned.thermal_bias
+    );
     assert_driven_well(&mut board);
 }
 

@@ -1,7 +1,7 @@
 //! Records: ranges, versions, damage, and where they lie.
 
 use embedded_storage::nor_flash::{NorFlash, NorFlashErrorKind};
-use gyronet::bias::{BiasCurve, CurveFilter};
+use gyronet::bias::ThermalBias;
 use gyronet::can::config::{ConfigError, YawSettings};
 use gyronet::can::wheel::{WheelConfigError, WheelSettings};
 use gyronet::model::blob::CRC;
@@ -99,10 +99,10 @@ fn a_value_out_of_its_range_is_refused() {
     can.yaw = can.yaw.map(|yaw| YawSettings { period_ms: 15, ..yaw });
     let refused = store.set(&Configuration { can, ..default });
     assert_eq!(refused, Err(StoreError::Field(FieldError::Can(ConfigError::Period(15)))));
-    let mut filter = CurveFilter::new(&BiasCurve::UNKNOWN);
-    (0..100).for_each(|_| filter.add(CentiCelsius(11_000), [AngularRate(i32::MAX); 3]));
-    let wild = Learned { bias_curve: filter.curve(), ..Learned::NOTHING };
-    let refused = Err(StoreError::Field(FieldError::Implausible(Field::BiasCurve)));
+    let mut thermal_bias = ThermalBias::UNKNOWN;
+    (0..100).for_each(|_| thermal_bias.add(true, CentiCelsius(11_000), [AngularRate(i32::MAX); 3]));
+    let wild = Learned { thermal_bias, ..Learned::NOTHING };
+    let refused = Err(StoreError::Field(FieldError::Implausible(Field::ThermalBias)));
     assert_eq!(store.set(&wild), refused);
     let none = WheelSettings { signals: [None; 4], ..WheelSettings::TOYOTA };
     let refused = StoreError::Field(FieldError::Wheels(WheelConfigError::Wheels(0)));

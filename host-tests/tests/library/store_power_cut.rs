@@ -1,4 +1,4 @@
-//! Power cuts at every operation of a configuration write, a write of the bias curve, a change of the key and a weight
+//! Power cuts at every operation of a configuration write, a write of what was learnt, a change of the key and a weight
 //! upload, on a flash with the F405's rules: the old or the new is always there, whole.
 
 use gyronet::model::weights;

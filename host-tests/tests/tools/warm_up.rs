@@ -1,5 +1,5 @@
-//! Half an hour on a motorway without a stop while the sensor warms up, simulated: what the bias curve that the board
-//! learnt on trips through a town leaves of the heading error. The bound is the promise of the page of measurements.
+//! Half an hour on a motorway without a stop while the sensor warms up, simulated: what the bias by temperature that the
+//! board learnt on trips through a town leaves of the heading error. The bound is the promise of the page of measurements.
 
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::pipeline::PipelineConfig;
@@ -21,8 +21,8 @@ const DAYS: u64 = 6;
 const TOWN_S: u32 = 1_200;
 /// Some four minutes of streets come first.
 const MOTORWAY_S: u32 = 2_040;
-/// Largest heading error with the curve, over that of static initialisation with zero-rate updates.
-const PROMISED: f64 = 0.25;
+/// Largest heading error with what was learnt, over that of static initialisation with zero-rate updates.
+const PROMISED: f64 = 0.3;
 /// A wheel stands once it has been slow for so many samples, as in the board's default settings.
 const STANDS: usize = 50;
 
@@ -51,7 +51,7 @@ fn learn(trip: &Recording, learned: &mut Learned) {
     }
 }
 
-/// Returns the heading errors at the end of the motorway, deg: by zero-rate updates, and with the curve.
+/// Returns the heading errors at the end of the motorway, deg: by zero-rate updates, and with what was learnt.
 fn errors(device: u64) -> [f64; 2] {
     let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("the built-in weights"));
     let mut learned = Learned::NOTHING;
@@ -69,18 +69,20 @@ fn errors(device: u64) -> [f64; 2] {
 }
 
 #[test]
-fn the_bias_curve_leaves_a_quarter_of_the_drift_at_most() {
+fn the_learnt_bias_leaves_three_tenths_of_the_drift_at_most() {
     let number = std::env::var("GYRONET_DEVICES").map_or(DEVICES, |text| text.parse().expect("a number"));
     let devices: Vec<u64> = (FIRST_DEVICE..FIRST_DEVICE + number).collect();
     let errors = parallel::map(&devices, |device| errors(*device));
     let mut squares = [0.0; 2];
     for (device, errors) in devices.iter().zip(&errors) {
-        let [zero_rate, curve] = errors;
-        println!("device {device}: {zero_rate:.2} deg by zero-rate updates, {curve:.2} with the curve");
+        let [zero_rate, learnt] = errors;
+        println!(
+            "device {device}: {zero_rate:.2} deg by zero-rate updates, {learnt:.2} with what was learnt"
+        );
         squares.iter_mut().zip(errors).for_each(|(sum, error)| *sum += error * error);
     }
-    let harmed = errors.iter().filter(|[zero_rate, curve]| curve > zero_rate).count();
-    println!("the curve does harm on {harmed} of {number} devices");
+    let harmed = errors.iter().filter(|[zero_rate, learnt]| learnt > zero_rate).count();
+    println!("what was learnt does harm on {harmed} of {number} devices");
     let ratio = (squares[1] / squares[0]).sqrt();
     println!("{ratio:.3} of the heading error by static initialisation and zero-rate updates");
     assert!(ratio <= PROMISED, "{ratio}");

@@ -2,7 +2,7 @@
 
 use super::start;
 use super::uds::Bench;
-use gyronet::bias::{BiasCurve, CurveFilter};
+use gyronet::bias::ThermalBias;
 use gyronet::heading::Gain;
 use gyronet::mounting::{Forward, GyroMap, Vertical};
 use gyronet::service::message::Refusal;
@@ -37,10 +37,10 @@ fn the_map_of_a_unit_is_kept_for_the_weights_it_was_found_with() {
 
 #[test]
 fn what_was_learnt_fits_a_response_and_a_record() {
-    let mut filter = CurveFilter::new(&BiasCurve::UNKNOWN);
-    filter.add(CentiCelsius(-3_000), [AngularRate(-11_000_000); 3]);
+    let mut thermal_bias = ThermalBias::UNKNOWN;
+    thermal_bias.add(true, CentiCelsius(-3_000), [AngularRate(-11_000_000); 3]);
     let learned = Learned {
-        bias_curve: filter.curve(),
+        thermal_bias,
         specific_force: Some([SpecificForce(-10_000_000); 3]),
         vertical: Vertical::UNKNOWN,
         forward: Some(Forward { direction: [-0.577; 3], sigma: 0.171 }),

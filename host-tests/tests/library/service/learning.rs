@@ -35,7 +35,7 @@ fn observe(
 
 /// Returns the yaw bias that the board has learnt for a temperature.
 fn learned(board: &Board, celsius: f32) -> Option<f64> {
-    board.learned().bias_curve.at(celsius).map(|bias| bias.gyro_bias[2].rad_per_sec())
+    board.learned().thermal_bias.at(celsius).map(|([.., yaw], _)| yaw.rad_per_sec())
 }
 
 fn is_near(found: Option<f64>, expected: f64) -> bool {
@@ -72,8 +72,8 @@ fn what_was_learnt_survives_a_restart_and_is_used_where_the_configuration_wants_
     let mut bench = Bench::new(&flash);
     assert!(is_near(learned(&bench.board, 20.0), 0.01));
     let used = |configuration: Configuration, board: &Board| {
-        let table = configuration.pipeline(&Calibration::NONE, board.learned(), 0).bias_curve;
-        table.at(20.0).map(|bias| bias.gyro_bias[2].rad_per_sec())
+        let used = configuration.pipeline(&Calibration::NONE, board.learned(), 0).thermal_bias;
+        used.at(20.0).map(|([.., yaw], _)| yaw.rad_per_sec())
     };
     assert!(is_near(used(Configuration::DEFAULT, &bench.board), 0.01));
     let off = Configuration { learn: false, ..Configuration::DEFAULT };

@@ -14,7 +14,7 @@ pub enum What {
     NoUnit,
     /// Erase what the board has learnt, after another sensor was fitted or the sensor was moved.
     Forget,
-    /// Print the calibration, and what the board has learnt: the bias curve, the tilt and the forward direction.
+    /// Print the calibration, and what the board has learnt: the bias by temperature, the tilt and the forward direction.
     Show,
 }
 
