@@ -28,12 +28,4 @@ impl FogErrors {
         bias_walk: 0.05 * DEG_PER_HOUR / ROOT_HOUR,
         scale: 200e-6,
     };
-    /// KVH DSP-3000: 4 deg/h per square root of a hertz; an offset of 20 deg/h, taken as 2 sigma; a stability of
-    /// 1 deg/h, taken as the random walk of an hour; 1000 ppm.
-    pub const DSP3000: Self = Self {
-        angle_walk: 4.0 * DEG_PER_HOUR,
-        bias: 10.0 * DEG_PER_HOUR,
-        bias_walk: 1.0 * DEG_PER_HOUR / ROOT_HOUR,
-        scale: 1000e-6,
-    };
 }

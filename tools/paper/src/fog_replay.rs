@@ -1,7 +1,6 @@
 //! Runs a sequence through the coprocessor, to get the rates that the board sends, and through FoGNet, to correct the
 //! turns of the sequence.
 
-use crate::sequence::Layout;
 use crate::sequence::{Sequence, Step};
 use gyronet::bias::Latitude;
 use gyronet::coprocessor::{Clock, Config, Coprocessor, Sink, TimedFrame};
@@ -65,12 +64,8 @@ pub fn run(sequence: &Sequence, network: &mut dyn MinuteNetwork, config: FogConf
 
 /// Returns the default configuration for a sequence's gyro and latitude.
 fn default_config(sequence: &Sequence) -> FogConfig {
-    let errors = match sequence.layout {
-        Layout::Kaist => FogErrors::DSP1760,
-        Layout::Nclt => FogErrors::DSP3000,
-    };
     let latitude = Latitude::from_degrees(sequence.latitude_deg() as f32);
-    FogConfig { errors, latitude, ..FogConfig::DEFAULT }
+    FogConfig { errors: FogErrors::DSP1760, latitude, ..FogConfig::DEFAULT }
 }
 
 /// The weights are for another gyro than the sequence's.
@@ -85,10 +80,7 @@ pub struct GyroMismatch {
 /// Checks that weights are for the gyro of a sequence. A simulated gyro has its device number as serial number; a
 /// recorded gyro is assumed to have the serial number that the weights name.
 pub fn check_weights(sequence: &Sequence, trained: Training) -> Result<(), GyroMismatch> {
-    let part = match sequence.layout {
-        Layout::Kaist => Gyro::Dsp1760,
-        Layout::Nclt => Gyro::Dsp3000,
-    };
+    let part = Gyro::Dsp1760;
     let serial = sequence.simulated.as_ref().map_or(trained.serial, |spec| spec.device as u32);
     if trained.gyro != part || trained.serial != 0 && trained.serial != serial {
         return Err(GyroMismatch { trained, part, serial });

@@ -10,9 +10,9 @@ use clap::{Parser, Subcommand};
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-/// Reproduce the paper's tables on sequences of KAIST Complex Urban or NCLT.
+/// Reproduce the paper's tables on sequences of KAIST Complex Urban.
 ///
-/// A sequence is a folder in the layout of one of these data sets, recorded or simulated. The file tools/paper/Makefile
+/// A sequence is a folder in the layout of this data set, recorded or simulated. The file tools/paper/Makefile
 /// trains, tests and compares on a whole data set with these commands.
 #[derive(Debug, Parser)]
 #[command(name = "gyronet-paper", version, arg_required_else_help = true)]

@@ -1,4 +1,4 @@
-//! Reads sequences of KAIST Complex Urban and NCLT, real or simulated: it merges several files of different
+//! Reads sequences of KAIST Complex Urban, real or simulated: it merges several files of different
 //! rates into one drive on a 100 Hz grid.
 //!
 //! Files are read in parallel, one row at a time: an hour of a 1 kHz gyro needs no more memory than its 100 Hz steps.
@@ -9,7 +9,6 @@
 mod export;
 mod fault;
 mod kaist;
-mod nclt;
 mod rows;
 mod summary;
 mod track;
@@ -28,7 +27,6 @@ use gyronet_tools::drive::DT;
 use gyronet_tools::drive::error::{DataError, DataFault};
 use gyronet_tools::drive::recording::{Recording, Row as RecordingRow};
 use gyronet_tools::drive::vehicle::Vehicle;
-use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
 use track::Stream;
@@ -39,33 +37,6 @@ pub const MAX_GAP: f64 = 0.1;
 const STANDING: f64 = 0.01;
 /// Minimum length of a sequence, s: static initialisation and one second.
 const NEEDED: f64 = 4.0;
-
-/// The data set whose folders and formats a sequence has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Layout {
-    /// KAIST Complex Urban: a car, Xsens MTi-300, KVH DSP-1760, wheel encoders.
-    Kaist,
-    /// NCLT: a Segway, MicroStrain 3DM-GX3-45, KVH DSP-3000, wheel speeds.
-    Nclt,
-}
-
-impl Layout {
-    pub fn wheel_radius_m(self) -> f64 {
-        match self {
-            Self::Kaist => KAIST.world.car.wheel_radius,
-            Self::Nclt => 0.24,
-        }
-    }
-
-    /// The latitude of the place where the data set was recorded: Daejeon, Ann Arbor.
-    fn latitude_deg(self) -> f64 {
-        match self {
-            Self::Kaist => KAIST.world.latitude_deg,
-            Self::Nclt => 42.29,
-        }
-    }
-}
 
 /// A step of the grid. Axes are x forward, y left, z up; heading is counter-clockwise from east.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,7 +67,6 @@ pub struct Step {
 pub struct Sequence {
     pub name: String,
     pub path: PathBuf,
-    pub layout: Layout,
     /// The specification of a simulated sequence; `None` for a recorded one.
     pub simulated: Option<Spec>,
     /// Says whether [`Step::specific_force`] and [`Step::angular_rate`] were measured; otherwise they are zero.
@@ -131,40 +101,34 @@ struct Files {
     wheel_base: Option<f64>,
 }
 
-pub fn layout(folder: &Path) -> Result<Layout, DataError> {
-    if folder.join("sensor_data").is_dir() {
-        Ok(Layout::Kaist)
-    } else if folder.join("kvh.csv").is_file() || folder.join("ms25.csv").is_file() {
-        Ok(Layout::Nclt)
-    } else {
-        let fault = fs::metadata(folder).map_or_else(DataFault::Io, |_| SequenceFault::UnknownLayout.into());
-        Err(DataError::of(folder.display(), fault))
-    }
+fn is_sequence(folder: &Path) -> bool {
+    folder.join("sensor_data").is_dir()
+}
+
+fn unknown(folder: &Path) -> DataError {
+    let fault = fs::metadata(folder).map_or_else(DataFault::Io, |_| SequenceFault::UnknownLayout.into());
+    DataError::of(folder.display(), fault)
 }
 
 /// Finds the sequences of a folder: the folder itself, or the folders directly below it, sorted by name.
 pub fn find(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
-    if layout(folder).is_ok() {
+    if is_sequence(folder) {
         return Ok(vec![folder.to_owned()]);
     }
-    let error = |fault| DataError::of(folder.display(), fault);
-    let entries = fs::read_dir(folder).map_err(|source| error(source.into()))?;
-    let mut found: Vec<PathBuf> = entries
-        .filter_map(|entry| entry.ok().map(|e| e.path()))
-        .filter(|path| layout(path).is_ok())
-        .collect();
+    let entries = fs::read_dir(folder).map_err(|source| DataError::of(folder.display(), source.into()))?;
+    let mut found: Vec<PathBuf> =
+        entries.filter_map(|entry| entry.ok().map(|e| e.path())).filter(|path| is_sequence(path)).collect();
     found.sort();
-    if found.is_empty() { Err(error(SequenceFault::UnknownLayout.into())) } else { Ok(found) }
+    if found.is_empty() { Err(unknown(folder)) } else { Ok(found) }
 }
 
 impl Sequence {
     pub fn read(folder: &Path) -> Result<Self, DataError> {
-        let layout = layout(folder)?;
+        if !is_sequence(folder) {
+            return Err(unknown(folder));
+        }
         let simulated = marker(folder)?;
-        let mut files = match layout {
-            Layout::Kaist => kaist::open(folder)?,
-            Layout::Nclt => nclt::open(folder)?,
-        };
+        let mut files = kaist::open(folder)?;
         // The heading beside the sensor's data in a simulated sequence does not come from a vendor's filter.
         let has_vendor = files.has_vendor && simulated.is_none();
         let begin = files.begin()?;
@@ -184,7 +148,7 @@ impl Sequence {
             return Err(DataError::of(folder.display(), fault));
         }
         let [x, y] = steps.first().map_or([0.0; 2], |step: &Step| step.position);
-        let latitude = (layout == Layout::Kaist).then(|| utm::latitude_deg([x, y])).flatten();
+        let latitude = utm::latitude_deg([x, y]);
         for step in &mut steps {
             step.position = [step.position[0] - x, step.position[1] - y];
         }
@@ -198,7 +162,6 @@ impl Sequence {
         Ok(Self {
             name,
             path,
-            layout,
             simulated,
             has_gyro,
             has_vendor,
@@ -219,7 +182,7 @@ impl Sequence {
     /// Returns the latitude for the Earth's rate: that of the simulation, or of the place where the data set was
     /// recorded.
     pub fn latitude_deg(&self) -> f64 {
-        let made = self.layout.latitude_deg();
+        let made = KAIST.world.latitude_deg;
         // A simulated world rotates as at the latitude of its settings, whatever the position of its map.
         self.latitude.filter(|_| self.simulated.is_none()).unwrap_or(made)
     }
@@ -234,7 +197,7 @@ impl Sequence {
     /// Returns the rates of the left and the right wheel in a step, rad/s, by the wheel radius of the data set's
     /// vehicle.
     pub fn wheel_rates(&self, step: &Step) -> [f64; 2] {
-        let radius = self.layout.wheel_radius_m();
+        let radius = KAIST.world.car.wheel_radius;
         step.wheels.map(|way| way / DT / radius)
     }
 

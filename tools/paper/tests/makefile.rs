@@ -127,13 +127,8 @@ fn a_failed_step_is_named_and_the_others_go_on() {
 }
 
 #[test]
-fn nclt_has_no_rivals_and_a_set_needs_its_roles() {
-    let run = Run::new("nclt", &["2012-01-08", "2012-08-20", "2013-04-05"]);
-    let Some((output, ran)) = run.make("nclt", "") else { return };
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(ran.iter().all(|line| !line.contains("lwoi") && !line.contains("rinsw")), "{ran:#?}");
-    assert!(ran.iter().any(|line| line.contains("--gyro DSP-3000 --serial 0")), "{ran:#?}");
-    let (output, _) = Run::new("kaist", &["urban06"]).make("kaist", "").unwrap();
+fn a_set_needs_its_roles() {
+    let Some((output, _)) = Run::new("kaist", &["urban06"]).make("kaist", "") else { return };
     assert!(
         text(&output.stderr).contains("one of urban14 urban15 urban16 urban17"),
         "{}",

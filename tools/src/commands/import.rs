@@ -46,7 +46,10 @@ pub fn correct(args: &Correct, common: Common) -> super::Result {
 
 pub fn run(args: &Args, common: Common) -> super::Result {
     let sequence = match &args.arguments[..] {
-        [layout, folder, ..] if layout == "kaist" || layout == "nclt" => Some(folder),
+        [layout, ..] if layout == "nclt" => {
+            return Err("NCLT is not read any more; `cargo paper import` reads KAIST Complex Urban".into());
+        }
+        [layout, folder, ..] if layout == "kaist" => Some(folder),
         [folder, ..] if args.arguments.iter().any(|argument| argument == "--training") => Some(folder),
         _ => None,
     };

@@ -167,6 +167,7 @@ fn retired_names_say_what_does_their_work() {
         (&["evaluate", "drive.csv", "--ablation"], "gyronet evaluate"),
         (&["replay", "drive.csv", "--mcap", "drive.mcap"], "gyronet correct"),
         (&["import", "kaist", "urban06"], "cargo paper import urban06"),
+        (&["import", "nclt", "2012-01-08"], "reads KAIST Complex Urban"),
     ] {
         let output = gyronet(retired);
         let error = text(&output.stderr);

@@ -3,6 +3,7 @@
 use super::{named, print_json, remark};
 use gyronet_paper::fog_replay;
 use gyronet_paper::sequence::{self, Sequence};
+use gyronet_paper::simulate::vehicles::KAIST;
 use gyronet_tools::drive::vehicle::Vehicle;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -10,8 +11,8 @@ use std::path::PathBuf;
 
 /// Summarise a sequence, and convert it to one drive.
 ///
-/// KAIST has sensor_data/{xsens_imu,fog,encoder}.csv, calibration/EncoderParameter.txt and global_pose.csv; NCLT has
-/// ms25.csv, kvh.csv, wheels.csv and groundtruth_*.csv. Missing files, wrong columns, fields that are not numbers, and
+/// KAIST has sensor_data/{xsens_imu,fog,encoder}.csv, calibration/EncoderParameter.txt and global_pose.csv.
+/// Missing files, wrong columns, fields that are not numbers, and
 /// time that goes backwards are errors. Rows with NaN, repeated stamps, gaps and encoder resets are counted and
 /// reported.
 #[derive(Debug, Clone, clap::Args)]
@@ -75,7 +76,7 @@ fn write(args: &Args, sequence: &Sequence) -> super::Result {
             sequence::write_csv(sequence, out)
         };
         let rows = rows.map_err(named(path))?;
-        let radius = sequence.layout.wheel_radius_m();
+        let radius = KAIST.world.car.wheel_radius;
         let beside = Vehicle::beside(path);
         super::write(&beside, format!("[wheels]\nradius_m = {radius:?}\n"))?;
         remark(format_args!("{}: {rows} rows; {} beside it", path.display(), beside.display()))?;

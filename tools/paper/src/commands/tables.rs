@@ -4,7 +4,6 @@ use super::{print_json, remark};
 use gyronet::model::fognet::FogNetState;
 use gyronet::model::weights::{FOGNET, GYRONET};
 use gyronet::model::{FogNet, GyroNet};
-use gyronet_paper::sequence::Layout;
 use gyronet_paper::sequence::{self, Sequence};
 use gyronet_paper::tables::given::Given;
 use gyronet_paper::tables::joint::{Fit, Joint};
@@ -16,10 +15,10 @@ use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Compute the paper's tables on sequences of KAIST Urban or NCLT.
+/// Compute the paper's tables on sequences of KAIST Urban.
 ///
-/// The input is sequences: folders in the layout of KAIST Complex Urban or NCLT, recorded or written by
-/// `gyronet-paper simulate`. The command prints Tables I to VII beside the paper's own results, except tables that these
+/// The input is sequences: folders in the layout of KAIST Complex Urban, recorded or written by
+/// `gyronet-paper simulate`. The command prints Tables I to V beside the paper's own results, except tables that these
 /// sequences have no results for. Results of simulated sequences are marked. If the vehicle does not stand still for the first 3 s, methods that need static initialisation are
 /// left out, and the reason is printed.
 ///
@@ -56,23 +55,18 @@ pub struct Args {
     pseudo_fog_weights: Option<PathBuf>,
 }
 
-/// Fits the fibre-optic gyro and the wheels to the sequences of each data set's layout.
-fn fit(folders: &[PathBuf]) -> super::Result<Vec<(Layout, Joint)>> {
-    let mut fits: Vec<(Layout, Fit)> = Vec::new();
+/// Fits the fibre-optic gyro and the wheels to sequences; `None` without any.
+fn fit(folders: &[PathBuf]) -> super::Result<Option<Joint>> {
+    let mut fit = Fit::default();
     for folder in folders {
         for path in sequence::find(folder)? {
-            let sequence = Sequence::read(&path)?;
-            let known = fits.iter().position(|(layout, _)| *layout == sequence.layout);
-            let at = known.unwrap_or_else(|| {
-                fits.push((sequence.layout, Fit::default()));
-                fits.len() - 1
-            });
-            fits[at].1.add(&sequence);
+            fit.add(&Sequence::read(&path)?);
         }
     }
-    let solved =
-        fits.into_iter().map(|(layout, fit)| Some((layout, fit.solve()?))).collect::<Option<Vec<_>>>();
-    solved.ok_or_else(|| "--train: these sequences turn or move too little for a fit".into())
+    if folders.is_empty() {
+        return Ok(None);
+    }
+    fit.solve().map(Some).ok_or_else(|| "--train: these sequences turn or move too little for a fit".into())
 }
 
 pub fn run(args: &Args, json: bool) -> super::Result {
@@ -110,7 +104,7 @@ pub fn run(args: &Args, json: bool) -> super::Result {
         let mut estimates = estimates::run(&sequence, &mut network);
         estimates.add_fognet(&sequence, &mut fognet, fog_blob.training);
         estimates.add_pseudo_fog(&sequence, &mut pseudo_fog);
-        if let Some((_, joint)) = joint.iter().find(|(layout, _)| *layout == sequence.layout) {
+        if let Some(joint) = &joint {
             estimates.add_joint(&sequence, joint);
         }
         args.methods.iter().for_each(|given| estimates.add_given(&sequence, given));

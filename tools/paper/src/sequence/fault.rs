@@ -4,9 +4,7 @@ use gyronet_tools::drive::error::DataFault;
 
 #[derive(Debug, thiserror::Error)]
 pub enum SequenceFault {
-    #[error(
-        "neither a KAIST Urban sequence (a folder with sensor_data in it) nor an NCLT one (with kvh.csv or ms25.csv)"
-    )]
+    #[error("no KAIST Urban sequence, which is a folder with sensor_data in it")]
     UnknownLayout,
     #[error("{found} columns, expected {expected}")]
     Columns { found: usize, expected: usize },

@@ -1,8 +1,7 @@
 //! Compares another program's trajectories with our methods: those of a folder, one file for each
 //! sequence, named `SEQUENCE.txt`.
 //!
-//! A trajectory is compared without alignment, so it must be in the truth's frame (KAIST: that of `global_pose.csv`;
-//! NCLT: x east, y north, heading counter-clockwise from east) and on the clock of the sequence's files. It must
+//! A trajectory is compared without alignment, so it must be in the truth's frame (that of `global_pose.csv`) and on the clock of the sequence's files. It must
 //! cover the sequence from the end of static initialisation, where our methods start, to within [`MISSING_END`] of
 //! the end. Poses at the sequence's steps are interpolated. A trajectory that cannot be compared is an error and
 //! gives no numbers.

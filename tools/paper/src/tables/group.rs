@@ -1,6 +1,5 @@
 //! Groups the sequences that are averaged together.
 
-use crate::sequence::Layout;
 use crate::sequence::Sequence;
 use serde::Serialize;
 
@@ -21,7 +20,7 @@ impl Group {
             return if spec.device == 1 { Self::First } else { Self::OtherDevices };
         }
         let number = sequence.name.trim_start_matches(|c: char| !c.is_ascii_digit());
-        let is_new = sequence.layout == Layout::Kaist && number.parse().is_ok_and(|number: u32| number >= 18);
+        let is_new = number.parse().is_ok_and(|number: u32| number >= 18);
         if is_new { Self::NewlyReleased } else { Self::First }
     }
 }

@@ -63,10 +63,6 @@ pub const NEW_SEQUENCES: [Line; 3] = [
     line("FoGNet + odometry", &[14.60, 4.31]),
 ];
 
-/// Table VII: ATE and aligned ATE, m, average on NCLT.
-pub const NCLT: [Line; 2] =
-    [line("FoG + odometry", &[41.98, 18.15]), line("FoGNet + odometry", &[38.64, 16.66])];
-
 pub fn average(lines: &[Line]) -> Vec<f64> {
     let columns = lines.first().map_or(0, |line| line.figures.len());
     let mean = |k: usize| lines.iter().map(|line| line.figures[k]).sum::<f64>() / lines.len() as f64;

@@ -3,7 +3,6 @@
 use super::estimate::{Estimate, Places};
 use super::estimates::Estimates;
 use super::group::Group;
-use crate::sequence::Layout;
 use crate::sequence::Sequence;
 use gyronet_tools::drive::track::Track;
 use gyronet_tools::evaluate::methods::Method;
@@ -36,8 +35,6 @@ pub type ByMethod = BTreeMap<&'static str, Errors>;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SequenceErrors {
     pub name: String,
-    /// The data set whose layout it has.
-    pub layout: Layout,
     pub simulated: bool,
     pub group: Group,
     /// Length of the compared part, s.
@@ -85,7 +82,6 @@ impl SequenceErrors {
         }
         Self {
             name: sequence.name.clone(),
-            layout: sequence.layout,
             simulated: sequence.simulated.is_some(),
             group: Group::of(sequence),
             seconds: steps.len() as f64 * gyronet_tools::drive::DT,
@@ -153,8 +149,6 @@ pub struct Results {
     pub sequences: Vec<SequenceErrors>,
     /// The means over all sequences, for the methods that were run on all of them.
     pub mean: ByMethod,
-    /// The means over the sequences of each data set's layout.
-    pub mean_of_layout: BTreeMap<&'static str, ByMethod>,
     /// GyroNet's mean error in 1 s relative to that of static initialisation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyronet_to_static: Option<f64>,
@@ -165,18 +159,11 @@ pub struct Results {
 impl Results {
     pub fn new(sequences: Vec<SequenceErrors>) -> Self {
         let mean_all = mean(sequences.iter());
-        let of = |layout| sequences.iter().filter(move |sequence| sequence.layout == layout);
-        let mean_of_layout = [("kaist", Layout::Kaist), ("nclt", Layout::Nclt)]
-            .into_iter()
-            .filter(|(_, layout)| of(*layout).next().is_some())
-            .map(|(name, layout)| (name, mean(of(layout))))
-            .collect();
         let error = |key: &str| mean_all.get(key).map(|errors| errors.mean_1s_rad);
         let gyronet_to_static = error("gyronet").zip(error("static")).map(|(network, still)| network / still);
         Self {
             simulated: sequences.iter().any(|sequence| sequence.simulated),
             mean: mean_all,
-            mean_of_layout,
             gyronet_to_static,
             gyronet_to_static_paper: super::paper::GYRONET_TO_STATIC,
             sequences,

@@ -4,7 +4,6 @@ use super::group::Group;
 use super::notes;
 use super::paper::{self, Line};
 use super::results::{ByMethod, Errors, Results, SequenceErrors, mean};
-use crate::sequence::Layout;
 use gyronet_tools::evaluate::methods::{Gyro, Method};
 use std::path::Path;
 
@@ -44,18 +43,13 @@ impl Table {
 }
 
 pub fn tables(results: &Results) -> Vec<Table> {
-    let kaist: Vec<&SequenceErrors> =
-        results.sequences.iter().filter(|sequence| sequence.layout == Layout::Kaist).collect();
-    let nclt: Vec<&SequenceErrors> =
-        results.sequences.iter().filter(|sequence| sequence.layout == Layout::Nclt).collect();
-    let of = |group| kaist.iter().copied().filter(|s| s.group == group).collect::<Vec<&SequenceErrors>>();
+    let all: Vec<&SequenceErrors> = results.sequences.iter().collect();
+    let of = |group| all.iter().copied().filter(|s| s.group == group).collect::<Vec<&SequenceErrors>>();
     let first = of(Group::First);
     let mut tables = Vec::new();
-    for (set, name) in [(&kaist, "KAIST Urban"), (&nclt, "NCLT")] {
-        tables.extend(some(set, |set| orientation(set, name)));
-    }
+    tables.extend(some(&all, orientation));
     tables.extend(some(&first, urban));
-    tables.extend(some(&kaist, padding).filter(|table| !table.rows.is_empty()));
+    tables.extend(some(&all, padding).filter(|table| !table.rows.is_empty()));
     // The paper has Table IV for three of its sequences; here it also has all simulated ones of the first group.
     let with_rivals: Vec<&SequenceErrors> = first
         .iter()
@@ -70,7 +64,6 @@ pub fn tables(results: &Results) -> Vec<Table> {
         let title = format!("Table V: average ATE on {what}");
         tables.extend(some(&of(group), |set| average(set, &title, &paper::NEW_SEQUENCES)));
     }
-    tables.extend(some(&nclt, |set| average(set, "Table VII: average ATE on NCLT", &paper::NCLT)));
     tables
 }
 
@@ -105,15 +98,14 @@ fn figures(errors: Option<&Errors>, of: &[fn(&Errors) -> f64]) -> Vec<Option<f64
     of.iter().map(|of| errors.map(of)).collect()
 }
 
-/// Builds Table I for a data set; the paper has it only for KAIST.
-fn orientation(set: &[&SequenceErrors], data_set: &str) -> Table {
+fn orientation(set: &[&SequenceErrors]) -> Table {
     let means: ByMethod = mean(set.iter().copied());
     let of: [fn(&Errors) -> f64; 3] = [|e| e.mean_1s_rad, |e| e.final_rad, |e| e.final_unwrapped_rad];
     let rows = methods_of(set, |_| true)
         .into_iter()
         .map(|method| Row { name: method.name.to_owned(), figures: figures(means.get(method.key), &of) });
     Table {
-        title: format!("Table I: orientation error on {data_set}, mean of {} sequences, rad", set.len()),
+        title: format!("Table I: orientation error on KAIST Urban, mean of {} sequences, rad", set.len()),
         simulated: set.iter().any(|sequence| sequence.simulated),
         columns: names(&["in 1 s", "final", "final, not wrapped"]),
         decimals: 6,

@@ -4,7 +4,7 @@ use super::group::Group;
 use super::joint::Fit;
 use super::results::{Results, SequenceErrors};
 use super::{estimates, table};
-use crate::sequence::{Layout, Sequence, Step, StreamSummary};
+use crate::sequence::{Sequence, Step, StreamSummary};
 use crate::simulate::{self, Spec};
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Estimate as WindowEstimate, WindowNetwork};
@@ -55,7 +55,6 @@ fn exact() -> Sequence {
     Sequence {
         name: "urban18".into(),
         path: PathBuf::from("urban18"),
-        layout: Layout::Kaist,
         simulated: None,
         has_gyro: true,
         has_vendor: true,
@@ -205,21 +204,19 @@ fn sequences_of_the_paper_get_the_tables_that_it_has_for_them() {
 
 #[test]
 fn json_and_tables_of_simulated_sequences() {
-    let of = |name: &str, layout| {
-        let sequence = Sequence { layout, ..sequence(name, 60) };
+    let of = |name: &str| {
+        let sequence = sequence(name, 60);
         SequenceErrors::new(&sequence, &estimates::run(&sequence, &mut Nothing))
     };
-    let results = Results::new(vec![of("k", Layout::Kaist), of("n", Layout::Nclt)]);
+    let results = Results::new(vec![of("k"), of("n")]);
     let json = serde_json::to_value(&results).unwrap();
     assert_eq!(json["simulated"], true);
-    assert_eq!(json["sequences"][0]["layout"], "kaist");
     for method in ["raw", "static", "fir", "vqf", "gyronet", "fog", "fog_earth"] {
         for error in ["mean_1s_rad", "final_rad", "ate_m", "aligned_ate_m"] {
             assert!(json["sequences"][1]["methods"][method][error].is_f64(), "{method} {error}");
             let mean = json["mean"][method][error].as_f64().unwrap();
             let each = [0, 1].map(|k| json["sequences"][k]["methods"][method][error].as_f64().unwrap());
             assert!((mean - (each[0] + each[1]) / 2.0).abs() < 1e-12);
-            assert_eq!(json["mean_of_layout"]["nclt"][method][error].as_f64(), Some(each[1]));
         }
     }
     assert!(json["sequences"][0]["methods"].get("vendor").is_none(), "a simulation has no vendor");
@@ -227,7 +224,7 @@ fn json_and_tables_of_simulated_sequences() {
 
     let tables = table::tables(&results);
     let titles: Vec<&str> = tables.iter().map(|table| table.title.split(':').next().unwrap()).collect();
-    assert_eq!(titles, ["Table I", "Table I", "Table II", "Table VII"], "no FoGNet, no Table IV");
+    assert_eq!(titles, ["Table I", "Table II"], "no FoGNet, no Table IV");
     for table in &tables {
         assert!(table.to_string().lines().next().unwrap().ends_with("(simulated)"));
         let columns = table.columns.len();
