@@ -5,7 +5,7 @@
 mod error;
 mod settings;
 
-pub use super::e2e::{DataIdMode, P11Mode};
+pub use super::e2e::DataIdMode;
 pub use error::ConfigError;
 pub use settings::{BoschSettings, E2e, Settings, StatusSettings, YawSettings};
 
@@ -175,26 +175,20 @@ fn check_ids<const N: usize>(ids: [u16; N], taken: impl Fn(StandardId) -> bool) 
 
 fn check_e2e(e2e: &E2e) -> Result<(), ConfigError> {
     let distinct = |seen: [u16; 3]| seen[0] != seen[1] && seen[1] != seen[2] && seen[0] != seen[2];
-    let unique = match e2e {
-        E2e::P01 { mode: DataIdMode::Low, data_ids } => distinct(data_ids.map(|id| id & 0xFF)),
-        E2e::P01 { mode: DataIdMode::Nibble, data_ids } | E2e::P11 { mode: P11Mode::Nibble, data_ids } => {
+    let E2e::P01 { mode, data_ids } = e2e;
+    let unique = match mode {
+        DataIdMode::Low => distinct(data_ids.map(|id| id & 0xFF)),
+        DataIdMode::Nibble => {
             if let Some(id) = data_ids.iter().find(|id| **id > 0xFFF) {
                 return Err(ConfigError::DataId(*id));
             }
             distinct(*data_ids)
         }
         // Each byte alone must distinguish the messages.
-        E2e::P01 { mode: DataIdMode::Alternating, data_ids } => {
+        DataIdMode::Alternating => {
             distinct(data_ids.map(|id| id & 0xFF)) && distinct(data_ids.map(|id| id >> 8))
         }
-        E2e::P01 { mode: DataIdMode::Both, data_ids }
-        | E2e::P11 { mode: P11Mode::Both, data_ids }
-        | E2e::P05 { data_ids } => distinct(*data_ids),
-        E2e::P02 { data_ids: [rate, angle, detail] } => {
-            rate.iter().zip(angle).zip(detail).all(|((rate, angle), detail)| {
-                distinct([u16::from(*rate), u16::from(*angle), u16::from(*detail)])
-            })
-        }
+        DataIdMode::Both => distinct(*data_ids),
     };
     if unique { Ok(()) } else { Err(ConfigError::DuplicateDataId) }
 }

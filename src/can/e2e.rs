@@ -6,7 +6,6 @@
 //! | [`P01`] | 2 bytes | 8 bit, 0x1D, start 0, final XOR 0 | 0 to 14 |
 //! | [`P02`] | 2 bytes | 8 bit, 0x2F, start and final XOR FF | 0 to 15 |
 //! | [`P05`] | 3 bytes | 16 bit, 0x1021, start FFFF | 0 to 255 |
-//! | [`P11`] | 2 bytes | as P01 | 0 to 14 |
 //!
 //! Over 8 bytes, the CRC detects every error of one or two bits (0x1D has order
 //! 255, 0x2F 127, 0x1021 32767 bits). Two profiles are an exception, because their counter selects the identifier
@@ -14,18 +13,16 @@
 //! second bit error can hide it from the CRC; the counter is then out of sequence. The counter detects
 //! every loss except that of a whole multiple of its cycle, so a receiver also needs a timeout.
 //!
-//! The header is at the start of the data in all profiles.
+//! The header is at the start of the data in all profiles. Profile 11 sends the bytes of profile 1.
 
 mod p01;
 mod p02;
 mod p05;
-mod p11;
 mod sequence;
 
 pub use p01::{DataIdMode, P01};
 pub use p02::P02;
 pub use p05::P05;
-pub use p11::{P11, P11Mode};
 pub use sequence::{Sequence, Verdict};
 
 /// The reason why protected data must not be used.
@@ -56,15 +53,13 @@ pub enum Profile {
     P02(P02),
     /// Profile 5.
     P05(P05),
-    /// Profile 11.
-    P11(P11),
 }
 
 impl Profile {
     /// Returns the number of bytes at the start of the data that belong to the profile.
     pub const fn header_len(&self) -> usize {
         match self {
-            Self::P01(_) | Self::P02(_) | Self::P11(_) => 2,
+            Self::P01(_) | Self::P02(_) => 2,
             Self::P05(_) => 3,
         }
     }
@@ -72,9 +67,8 @@ impl Profile {
     /// Returns a mask of the header's bits; bit `8 * byte + bit` of the frame is the same bit of the mask.
     pub const fn header_mask(&self) -> u64 {
         match self {
-            Self::P01(P01 { mode: DataIdMode::Nibble, .. })
-            | Self::P11(P11 { mode: P11Mode::Nibble, .. }) => 0xFFFF,
-            Self::P01(_) | Self::P02(_) | Self::P11(_) => 0x0FFF,
+            Self::P01(P01 { mode: DataIdMode::Nibble, .. }) => 0xFFFF,
+            Self::P01(_) | Self::P02(_) => 0x0FFF,
             Self::P05(_) => 0x00FF_FFFF,
         }
     }
@@ -82,7 +76,7 @@ impl Profile {
     /// Returns the number of counter values; 0 follows the last one.
     pub const fn counters(&self) -> u16 {
         match self {
-            Self::P01(_) | Self::P11(_) => p01::COUNTERS,
+            Self::P01(_) => p01::COUNTERS,
             Self::P02(_) => p02::COUNTERS,
             Self::P05(_) => p05::COUNTERS,
         }
@@ -97,7 +91,6 @@ impl Profile {
             Self::P01(profile) => profile.protect(data, counter),
             Self::P02(profile) => profile.protect(data, counter),
             Self::P05(profile) => profile.protect(data, counter),
-            Self::P11(profile) => profile.protect(data, counter),
         }
     }
 
@@ -107,7 +100,6 @@ impl Profile {
             Self::P01(profile) => profile.check(data),
             Self::P02(profile) => profile.check(data),
             Self::P05(profile) => profile.check(data),
-            Self::P11(profile) => profile.check(data),
         }
     }
 }
@@ -158,7 +150,7 @@ impl Checker {
     }
 }
 
-/// The two-byte header of profiles 1, 2 and 11: CRC in byte 0, counter in the low nibble of byte 1. The profiles differ in
+/// The two-byte header of profiles 1 and 2: CRC in byte 0, counter in the low nibble of byte 1. The profiles differ in
 /// these limits and in what enters the CRC besides the data.
 #[derive(Debug, Clone, Copy)]
 struct ShortHeader {

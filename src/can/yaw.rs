@@ -1,8 +1,7 @@
 //! Our own yaw messages carry rate and accumulated yaw at full resolution, with their quality.
 //!
-//! There are three messages of eight bytes. Bytes 0 to 2 are the header: bytes 0 and 1, with profile 5
-//! also byte 2, belong to the E2E profile. With the other profiles byte 2 is the sample counter, the same in
-//! the three messages of one sample. Bytes 3 to 7, little-endian:
+//! There are three messages of eight bytes. Bytes 0 to 2 are the header: bytes 0 and 1 belong to the E2E profile, byte 2 is
+//! the sample counter, the same in the three messages of one sample. Bytes 3 to 7, little-endian:
 //!
 //! | message | bytes | signal | scale |
 //! |---|---|---|---|

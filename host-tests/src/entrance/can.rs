@@ -4,7 +4,7 @@ use super::{byte, take};
 use crate::wire::{data_frame, id11, id29};
 use embedded_can::Id;
 use gyronet::can::bosch::Message;
-use gyronet::can::e2e::{Checker, DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
+use gyronet::can::e2e::{Checker, DataIdMode, P01, P02, P05, Profile};
 use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{ByteSum, Checksum, WheelFrame, WheelReceiver, WheelSettings, WheelSignal};
 use gyronet::can::yaw::{AngleMessage, DetailMessage, RateMessage};
@@ -17,7 +17,7 @@ const PROFILES: [Profile; 4] = [
     Profile::P01(P01 { data_id: 0x123, mode: DataIdMode::Both }),
     Profile::P02(P02 { data_ids: [7; 16] }),
     Profile::P05(P05 { data_id: 0x1234 }),
-    Profile::P11(P11 { data_id: 0x123, mode: P11Mode::Both }),
+    Profile::P01(P01 { data_id: 0x123, mode: DataIdMode::Nibble }),
 ];
 
 /// Returns settings for two signed wheel speeds from byte 3 on, with a counter in byte 7's upper half.

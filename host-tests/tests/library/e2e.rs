@@ -1,9 +1,7 @@
 //! AUTOSAR E2E: published vectors, and the sequence judgement.
 
 use gyronet::can::bosch::Message;
-use gyronet::can::e2e::{
-    Checker, DataIdMode, Fault, P01, P02, P05, P11, P11Mode, Profile, Protector, Verdict,
-};
+use gyronet::can::e2e::{Checker, DataIdMode, Fault, P01, P02, P05, Profile, Protector, Verdict};
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::wire::bytes;
 use proptest::prelude::*;
@@ -16,10 +14,6 @@ fn p01(mode: DataIdMode) -> Profile {
     Profile::P01(P01 { data_id: 0x123, mode })
 }
 
-fn p11(mode: P11Mode) -> Profile {
-    Profile::P11(P11 { data_id: 0x123, mode })
-}
-
 fn p02(first: u8, step: u8) -> Profile {
     Profile::P02(P02 { data_ids: core::array::from_fn(|k| first + step * k as u8) })
 }
@@ -28,19 +22,9 @@ fn p05() -> Profile {
     Profile::P05(P05 { data_id: 0x1234 })
 }
 
-fn all() -> [Profile; 9] {
+fn all() -> [Profile; 7] {
     use DataIdMode::{Alternating, Both, Low, Nibble};
-    [
-        p01(Both),
-        p01(Alternating),
-        p01(Low),
-        p01(Nibble),
-        p02(0, 0),
-        p02(1, 1),
-        p05(),
-        p11(P11Mode::Both),
-        p11(P11Mode::Nibble),
-    ]
+    [p01(Both), p01(Alternating), p01(Low), p01(Nibble), p02(0, 0), p02(1, 1), p05()]
 }
 
 #[test]
@@ -49,18 +33,14 @@ fn frames_equal_vectors_of_the_two_byte_headers() {
     let vectors = [
         (p01(Both), 0, ZEROS, [0xCC, 0x00]),
         (p01(Both), 1, ZEROS, [0x91, 0x01]),
-        (p11(P11Mode::Both), 0, ZEROS, [0xCC, 0x00]),
-        (p11(P11Mode::Both), 1, ZEROS, [0x91, 0x01]),
         (p01(Alternating), 0, ZEROS, [0xCE, 0x00]),
         (p01(Alternating), 1, ZEROS, [0x02, 0x01]),
         (p01(Low), 0, ZEROS, [0xCE, 0x00]),
         (p01(Low), 1, ZEROS, [0x93, 0x01]),
         (p01(Nibble), 0, ZEROS, [0x2A, 0x10]),
         (p01(Nibble), 1, ZEROS, [0x77, 0x11]),
-        (p11(P11Mode::Nibble), 0, ZEROS, [0x2A, 0x10]),
-        (p11(P11Mode::Nibble), 1, ZEROS, [0x77, 0x11]),
-        (p11(P11Mode::Both), 1, ONE_TO_SIX, [0x90, 0x01]),
-        (p11(P11Mode::Nibble), 1, ONE_TO_SIX, [0x76, 0x11]),
+        (p01(Both), 1, ONE_TO_SIX, [0x90, 0x01]),
+        (p01(Nibble), 1, ONE_TO_SIX, [0x76, 0x11]),
         (p02(0, 0), 1, ZEROS, [0x45, 0x01]),
         (p02(0, 1), 1, ZEROS, [0x6A, 0x01]),
         (p02(0, 1), 2, TWO_TO_SEVEN, [0xBC, 0x02]),
@@ -113,8 +93,8 @@ fn a_verdict_decides_what_is_used() {
 
 #[test]
 fn lengths_and_counters_that_cannot_be_are_refused() {
-    let lengths = [p01(DataIdMode::Both), p02(0, 0), p05(), p11(P11Mode::Both)].map(|p| p.header_len());
-    assert_eq!(lengths, [2, 2, 3, 2]);
+    let lengths = [p01(DataIdMode::Both), p02(0, 0), p05()].map(|p| p.header_len());
+    assert_eq!(lengths, [2, 2, 3]);
     for profile in all() {
         for len in (0..profile.header_len()).chain([65]) {
             let mut data = vec![0; len];
@@ -122,9 +102,7 @@ fn lengths_and_counters_that_cannot_be_are_refused() {
             assert_eq!(profile.check(&data), Err(Fault::Length(len)), "{profile:?}");
         }
     }
-    for (profile, longest) in
-        [(p01(DataIdMode::Both), 30), (p11(P11Mode::Both), 30), (p02(0, 0), 14), (p05(), 64)]
-    {
+    for (profile, longest) in [(p01(DataIdMode::Both), 30), (p02(0, 0), 14), (p05(), 64)] {
         let mut data = vec![0; longest];
         assert_eq!(profile.protect(&mut data, 1), Ok(()), "{profile:?}");
         assert_eq!(profile.check(&data), Ok(1), "{profile:?}");
@@ -151,7 +129,6 @@ fn a_foreign_identifier_is_noticed() {
             Profile::P01(p) => Profile::P01(P01 { data_id: p.data_id ^ 0x301, ..p }),
             Profile::P02(p) => Profile::P02(P02 { data_ids: p.data_ids.map(|id| id ^ 1) }),
             Profile::P05(p) => Profile::P05(P05 { data_id: p.data_id ^ 0x301 }),
-            Profile::P11(p) => Profile::P11(P11 { data_id: p.data_id ^ 0x301, ..p }),
         };
         for counter in 0..14 {
             let mut data = [0x5A; 8];
@@ -216,7 +193,7 @@ proptest! {
     /// Whatever is lost, doubled or exchanged: the verdict where it shows is not Ok.
     #[test]
     fn every_lost_repeated_and_reordered_message_shows(
-        which in 0..9_usize, at in 1..500_usize, distance in 1..14_usize,
+        which in 0..7_usize, at in 1..500_usize, distance in 1..14_usize,
     ) {
         let profile = all()[which];
         let sent = messages(profile, 540);

@@ -1,33 +1,16 @@
 //! Defines the bus settings that a user can change.
 
-use crate::can::e2e::{DataIdMode, P01, P02, P05, P11, P11Mode, Profile};
+use crate::can::e2e::{DataIdMode, P01, Profile};
 
 /// The E2E profile of the three yaw messages, with their data identifiers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum E2e {
-    /// Profile 1.
+    /// Profile 1, whose bytes profile 11 also sends.
     P01 {
         /// Bytes of the identifier that enter the CRC.
         mode: DataIdMode,
-        /// Data identifiers of rate, angle, detail.
-        data_ids: [u16; 3],
-    },
-    /// Profile 2.
-    P02 {
-        /// Data identifiers of rate, angle, detail: one for each counter value.
-        data_ids: [[u8; 16]; 3],
-    },
-    /// Profile 5.
-    P05 {
-        /// Data identifiers of rate, angle, detail.
-        data_ids: [u16; 3],
-    },
-    /// Profile 11.
-    P11 {
-        /// Bytes of the identifier that enter the CRC.
-        mode: P11Mode,
         /// Data identifiers of rate, angle, detail.
         data_ids: [u16; 3],
     },
@@ -36,16 +19,12 @@ pub enum E2e {
 impl E2e {
     /// Returns the profile of each message.
     pub const fn profiles(&self) -> [Profile; 3] {
-        [self.profile(0), self.profile(1), self.profile(2)]
-    }
-
-    const fn profile(&self, message: usize) -> Profile {
-        match *self {
-            Self::P01 { mode, data_ids } => Profile::P01(P01 { data_id: data_ids[message], mode }),
-            Self::P02 { data_ids } => Profile::P02(P02 { data_ids: data_ids[message] }),
-            Self::P05 { data_ids } => Profile::P05(P05 { data_id: data_ids[message] }),
-            Self::P11 { mode, data_ids } => Profile::P11(P11 { data_id: data_ids[message], mode }),
-        }
+        let Self::P01 { mode, data_ids: [rate, angle, detail] } = *self;
+        [
+            Profile::P01(P01 { data_id: rate, mode }),
+            Profile::P01(P01 { data_id: angle, mode }),
+            Profile::P01(P01 { data_id: detail, mode }),
+        ]
     }
 }
 

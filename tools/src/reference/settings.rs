@@ -40,10 +40,7 @@ const SETTINGS: &[(&str, Takes)] = &[
         ),
     ),
     ("can.yaw.e2e.P01.mode", Other("", "`Both`, `Alternating`, `Low`, `Nibble`")),
-    (
-        "can.yaw.e2e.P01.data_ids",
-        Other("", "three different E2E identifiers; `can.yaw.e2e` also `P02`, `P05`, `P11`"),
-    ),
+    ("can.yaw.e2e.P01.data_ids", Other("", "three different E2E identifiers")),
     (
         "can.status",
         Other(

@@ -4,7 +4,7 @@ mod frame;
 mod protection;
 
 use frame::{kmh, speed};
-use gyronet::can::e2e::{DataIdMode, P11Mode};
+use gyronet::can::e2e::DataIdMode;
 use gyronet::can::signal::OutsideFrame;
 use gyronet::can::wheel::{MAX_FRAMES, WheelConfigError, WheelReceiver, WheelSettings};
 use gyronet::sample::WHEELS;
@@ -92,8 +92,8 @@ pub enum Protection {
     },
     Xor(Sum),
     Sum(Sum),
-    /// AUTOSAR E2E profile 1.
-    #[serde(rename = "e2e-p01")]
+    /// AUTOSAR E2E profile 1, and 11, which sends the same bytes.
+    #[serde(rename = "e2e-p01", alias = "e2e-p11")]
     P01 {
         data_id: u16,
         /// The bytes of the identifier that enter the checksum.
@@ -109,13 +109,6 @@ pub enum Protection {
     #[serde(rename = "e2e-p05")]
     P05 {
         data_id: u16,
-    },
-    /// AUTOSAR E2E profile 11.
-    #[serde(rename = "e2e-p11")]
-    P11 {
-        data_id: u16,
-        /// The bytes of the identifier that enter the checksum.
-        mode: P11Mode,
     },
 }
 

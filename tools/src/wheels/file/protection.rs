@@ -1,7 +1,7 @@
 //! Positions, codes and protection of a frame as those of the board, and back.
 
 use super::{Order, Place, Protection, Says, Sum};
-use gyronet::can::e2e::{P01, P02, P05, P11, Profile};
+use gyronet::can::e2e::{P01, P02, P05, Profile};
 use gyronet::can::signal::{BitField, ByteOrder, OutsideFrame};
 use gyronet::can::wheel::{ByteSum, Checksum, Code, Parts};
 
@@ -88,7 +88,6 @@ impl Protection {
             Checksum::E2e(Profile::P01(P01 { data_id, mode })) => Self::P01 { data_id, mode },
             Checksum::E2e(Profile::P02(P02 { data_ids })) => Self::P02 { data_ids },
             Checksum::E2e(Profile::P05(P05 { data_id })) => Self::P05 { data_id },
-            Checksum::E2e(Profile::P11(P11 { data_id, mode })) => Self::P11 { data_id, mode },
         })
     }
 
@@ -100,7 +99,6 @@ impl Protection {
             Self::P01 { data_id, mode } => Checksum::E2e(Profile::P01(P01 { data_id, mode })),
             Self::P02 { data_ids } => Checksum::E2e(Profile::P02(P02 { data_ids })),
             Self::P05 { data_id } => Checksum::E2e(Profile::P05(P05 { data_id })),
-            Self::P11 { data_id, mode } => Checksum::E2e(Profile::P11(P11 { data_id, mode })),
         })
     }
 }
