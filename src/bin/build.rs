@@ -6,10 +6,11 @@ use std::{env, fs};
 /// Memory map of the STM32F405's images, from the root of the repository, and memory regions of the chip.
 const MEMORY: &str = "../../memory.x";
 const REGIONS: &str = "stm32f405/regions.x";
-/// Memory maps of the boards without the DSP extension, each with the Cargo feature that selects it.
-const SMALL: [(&str, &str); 2] = [
+/// Memory maps of the boards that are emulated alone, each with the Cargo feature that selects it.
+const EMULATED: [(&str, &str); 3] = [
     ("CARGO_FEATURE_MICROBIT", "small_core/microbit.x"),
     ("CARGO_FEATURE_LM3S6965EVB", "small_core/lm3s6965evb.x"),
+    ("CARGO_FEATURE_MPS2_AN505", "small_core/mps2_an505.x"),
 ];
 /// Linker scripts with the conditions of an image.
 const SCRIPTS: [(&str, &str); 2] = [("coprocessor", "stm32f405/slots.x"), ("boot", "stm32f405/boot.x")];
@@ -23,7 +24,7 @@ fn main() {
     for input in ["build.rs", MEMORY, REGIONS] {
         println!("cargo:rerun-if-changed={input}");
     }
-    SMALL.iter().for_each(|(_, map)| println!("cargo:rerun-if-changed={map}"));
+    EMULATED.iter().for_each(|(_, map)| println!("cargo:rerun-if-changed={map}"));
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
@@ -33,7 +34,7 @@ fn main() {
     // cortex-m-rt's link.x includes memory.x from the search path, and memory.x includes regions.x.
     let copy = |from: &str, name: &str| fs::copy(from, out.join(name)).expect("the memory map can be copied");
     copy(MEMORY, "memory.x");
-    if let Some((_, map)) = SMALL.iter().find(|(feature, _)| has(feature)) {
+    if let Some((_, map)) = EMULATED.iter().find(|(feature, _)| has(feature)) {
         copy(map, "regions.x");
         return;
     }

@@ -57,16 +57,21 @@ fn kernels_fit_in_8_kib() {
     assert!(size.kernels > 0 && size.kernels <= 8 * 1024, "{size:?}");
 }
 
-/// The kernels on the target equal their portable definition, and GyroNet's outputs there
-/// equal this host's.
+/// The kernels on the targets, the Cortex-M4 and the NUCLEO-H563ZI's Cortex-M33, equal their portable definition, and
+/// the outputs of GyroNet and FoGNet there equal this host's.
 #[test]
 fn kernels_on_the_target_equal_the_hosts() {
     let Some(()) = qemu::available() else { return };
-    let Some(elf) = image::firmware(env!("CARGO_TARGET_TMPDIR"), "selftest") else { return };
-    let (printed, _) = bench::emulate(bench::MACHINE, &elf, &[]).unwrap_or_else(|error| panic!("{error}"));
-    println!("{printed}");
-    assert!(printed.contains(&format!("gyronet hash={:08x}\n", hash())), "{printed}");
-    assert!(printed.contains(&format!("fognet hash={:08x}\n", fognet_hash())), "{printed}");
+    let m33 = ("mps2-an505", "thumbv8m.main-none-eabihf");
+    for (board, machine) in [(("netduino-plus-2", bench::TARGET), bench::MACHINE), (m33, m33.0)] {
+        let scratch = env!("CARGO_TARGET_TMPDIR");
+        let Some(elf) = image::firmware_for(board, scratch, "selftest") else { return };
+        assert!(ImageSize::read(&elf).expect("an ELF file").kernels > 0, "{machine} has the DSP extension");
+        let (printed, _) = bench::emulate(machine, &elf, &[]).unwrap_or_else(|error| panic!("{error}"));
+        println!("{printed}");
+        assert!(printed.contains(&format!("gyronet hash={:08x}\n", hash())), "{printed}");
+        assert!(printed.contains(&format!("fognet hash={:08x}\n", fognet_hash())), "{printed}");
+    }
 }
 
 /// Returns the CRC-32 that the self-test prints: over the corrections and scales of sixteen random windows.
