@@ -66,7 +66,7 @@ fn a_board_without_hardware_answers_on_its_sockets() {
 /// At 50 ms a tester gives up; the product promises its responses in time at the pace of the model.
 #[test]
 fn udsoncan_with_its_defaults_reads_and_writes_on_the_sockets() {
-    let Some(python) = require::python(&["isotp", "udsoncan"]) else { return };
+    let Some(python) = require::python(&["isotp", "udsoncan", "yaml"]) else { return };
     let Some(update) = image::update(env!("CARGO_TARGET_TMPDIR")) else { return };
     let Some((_child, [service, bus])) = start(&["--parked", "--spi", "Bmi088"]) else { return };
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("sockets.update");

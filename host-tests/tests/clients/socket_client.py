@@ -10,12 +10,11 @@ import time
 from pathlib import Path
 
 import isotp
-import udsoncan
+from uds_client import CONFIG, RESPONSE, SERVER
 from udsoncan.client import Client
 from udsoncan.connections import PythonIsoTpConnection
 from udsoncan.services import DiagnosticSessionControl
 
-SERVER, RESPONSE = 0x7E0, 0x7E8
 HEAD = 161
 
 
@@ -51,26 +50,12 @@ class Slcan:
                 return None
 
 
-class Bytes(udsoncan.DidCodec):
-    """Leaves data as they are."""
-
-    def encode(self, value):
-        return value
-
-    def decode(self, payload):
-        return payload
-
-    def __len__(self):
-        raise udsoncan.DidCodec.ReadAllRemainingData
-
-
 def main():
     line, head = Slcan(sys.argv[1]), Path(sys.argv[2]).read_bytes()[:HEAD]
     address = isotp.Address(isotp.AddressingMode.Normal_11bits, txid=SERVER, rxid=RESPONSE)
     layer = isotp.TransportLayer(line.receive, line.send, address, params={"tx_padding": 0xAA})
-    config = dict(udsoncan.configs.default_client_config, data_identifiers={"default": Bytes})
     longest = 0.0
-    with Client(PythonIsoTpConnection(layer), config=config) as client:
+    with Client(PythonIsoTpConnection(layer), config=CONFIG) as client:
         def timed(call, *arguments):
             nonlocal longest
             began = time.monotonic()
