@@ -130,25 +130,22 @@ impl Outcome {
     /// The broken promises, each with a letter and in words.
     pub fn broken(&self) -> Vec<(char, String)> {
         let mut broken = Vec::new();
+        let worst = |Worst { ratio, at, error }: Worst| (SIGMAS * ratio, error.to_degrees(), at);
         if self.wrong > self.good / CHANCE {
-            let Worst { ratio, at, error } = self.second;
-            let (sigma, error) = (SIGMAS * ratio, error.to_degrees());
-            let text =
-                format!("{} good seconds off, {sigma:.1} sigma ({error:.2} deg) at {at:.0} s", self.wrong);
-            broken.push(('s', text));
+            let (wrong, (sigma, error, at)) = (self.wrong, worst(self.second));
+            broken.push((
+                's',
+                format!("{wrong} good seconds off, {sigma:.1} sigma ({error:.2} deg) at {at:.0} s"),
+            ));
         }
         if self.wrong_spans > 0 {
-            let Worst { ratio, at, error } = self.span;
-            let (sigma, error) = (SIGMAS * ratio, error.to_degrees());
+            let (sigma, error, at) = worst(self.span);
             broken.push(('y', format!("yaw off by {error:.2} deg, {sigma:.1} sigma, from {at:.0} s")));
         }
         if self.wrong_minutes > 0 {
-            let Worst { ratio, at, error } = self.minute;
-            let (sigma, error) = (SIGMAS * ratio, error.to_degrees());
-            broken.push((
-                'd',
-                format!("a minute off by {error:.2} deg, {sigma:.1} of its doubt, at {at:.0} s"),
-            ));
+            let (sigma, error, at) = worst(self.minute);
+            let text = format!("a minute off by {error:.2} deg, {sigma:.1} of its doubt, at {at:.0} s");
+            broken.push(('d', text));
         }
         if self.stood > MAY_STAND {
             broken.push(('t', format!("stands for {:.0} s of motion", self.stood)));

@@ -13,9 +13,8 @@ use std::time::Duration;
 fn locked() -> Option<(Board, PrivateKey)> {
     let mut board = common::boot()?;
     board.run(START);
-    let key = PrivateKey::generate().expect("random numbers");
     assert_eq!(on_bus(&mut board).access().expect("a response").state, "open");
-    on_bus(&mut board).set_key(&key.public()).expect("there was none");
+    let key = service::lock(&mut board);
     Some((board, key))
 }
 
@@ -93,9 +92,7 @@ fn a_signature_is_checked_while_the_rates_go_out() {
     let rates: Vec<Duration> =
         frames.filter(|(_, frame)| frame.id() == id(0x1A0)).map(|(time, _)| time).collect();
     let gap = rates.windows(2).map(|pair| pair[1] - pair[0]).max().expect("rates");
-    println!(
-        "two signatures are checked and stored in {took:?} of board time; longest gap between rates {gap:?}"
-    );
+    println!("two signatures are checked and stored in {took:?}; longest gap between rates {gap:?}");
     assert!(took < Duration::from_secs(1), "{took:?}");
     assert!(gap < Duration::from_millis(15), "{gap:?}");
 }

@@ -47,8 +47,7 @@ fn board_in_order() {
     let Some((mut board, lines)) = lines(|_| ()) else { return };
     assert!(
         lines[0].starts_with("gyronet bringup") && lines[0].ends_with("started by power on"),
-        "{}",
-        lines[0]
+        "{lines:?}"
     );
     for (name, verdict, text) in [
         ("LED", "----", "it has blinked twice"),

@@ -166,8 +166,7 @@ fn three_resets_by_the_watchdog_lead_to_the_built_in_configuration() {
         assert!(troubles[2..].chunks(4).any(|trouble| trouble[..3] == code), "{troubles:02x?}");
     }
     // A restart on request tries what is stored.
-    on_bus(&mut board).restart().expect("it answers");
-    board.run(START);
+    service::restart(&mut board);
     assert_eq!(service::info(&mut board).configuration, Origin::Stored);
 }
 
@@ -226,10 +225,7 @@ fn accepted_settings_run_and_refused_ones_do_not() {
             let device = Device::with_ids(bus, "the virtual board", &configuration.diagnosis);
             device.and_then(|mut device| device.counters()).expect("a response").pipeline.late > 0
         };
-        println!(
-            "{cost:.2} of the limit, {:?}, {} units: fails {fails}",
-            configuration.compensate.stride, shape.units
-        );
+        println!("{cost:.2}, {:?}, {} units: fails {fails}", configuration.compensate.stride, shape.units);
         assert!(is_forced || !fails, "{configuration:?}");
         counts[usize::from(is_forced)] += usize::from(fails == is_forced);
     }

@@ -1,7 +1,7 @@
 //! The board of these tests: an MTi on USART1, SLCAN on USART2 at 921600, the service line on USART6, CAN.
 
 use crate::service;
-use embedded_can::Frame;
+use embedded_can::{Frame, Id};
 use gyronet::can::yaw::AngleMessage;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::health::Faults;
@@ -86,6 +86,14 @@ pub fn host(samples: &[Vec<u8>]) -> Vec<DataFrame> {
 
 pub fn frames(timed: &[(Duration, DataFrame)]) -> Vec<DataFrame> {
     timed.iter().map(|(_, frame)| *frame).collect()
+}
+
+/// The identifier of a frame, without those of 29 bits.
+pub fn raw(frame: &DataFrame) -> u16 {
+    match frame.id() {
+        Id::Standard(id) => id.as_raw(),
+        Id::Extended(_) => u16::MAX,
+    }
 }
 
 /// Faults of the angle messages.

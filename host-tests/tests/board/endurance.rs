@@ -216,11 +216,7 @@ impl Received {
         assert!(samples - taken <= 4 * QUESTION + under_way, "{taken} of {samples} samples");
         assert_eq!([pipeline.missing, pipeline.misplaced, pipeline.clock_jumps, pipeline.late], [0; 4]);
         assert_eq!([watch.silences, watch.stuck, watch.wrong, watch.clock_off], [0; 4]);
-        assert!(
-            fog.samples as usize + 2 * MESSAGES > taken * MESSAGES,
-            "{} messages at sample {taken}",
-            fog.samples
-        );
+        assert!(fog.samples as usize + 2 * MESSAGES > taken * MESSAGES, "{} of {taken}", fog.samples);
         // The first message does not fill the step that it begins in.
         assert!(fog.gaps <= 1, "{} gaps", fog.gaps);
         assert_eq!([fog.misplaced, fog.stuck], [0; 2]);

@@ -50,7 +50,6 @@ fn board_without_led_slcan_gyro_and_spi_sends_the_hosts_frames() {
             other => panic!("{other:?}"),
         }
     }
-    on_bus(&mut board).restart().expect("a response");
-    board.run(START);
+    service::restart(&mut board);
     assert_eq!(service::configuration(&mut board), Configuration::DEFAULT);
 }

@@ -45,8 +45,7 @@ fn image_answers_on_the_service_line_and_restarts_on_request() {
     let about = info(&mut board);
     assert_eq!((about.flash, about.writable), (FlashState::Ready, true));
     assert_eq!(about.configuration, Origin::BuiltIn);
-    service::on_line(&mut board).restart().expect("a response");
-    board.run(START);
+    service::restart(&mut board);
     let causes: Vec<_> = board
         .events()
         .iter()

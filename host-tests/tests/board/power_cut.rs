@@ -157,11 +157,7 @@ fn store(board: &mut Board, k: usize) {
         tried.at(board, "before", &request, access, &check);
     }
     let Tried { cuts, seen } = tried;
-    println!(
-        "{cuts} cuts at {count} accesses, {} contents of the flash, {:.0?}",
-        seen.len(),
-        begun.elapsed()
-    );
+    println!("{cuts} cuts at {count} accesses, {} contents of flash, {:.0?}", seen.len(), begun.elapsed());
 }
 
 #[test]
@@ -208,15 +204,8 @@ fn upload(chosen: impl Fn(usize, usize, usize) -> Vec<usize>) {
             let running = (info.weights, info.weights_crc);
             let before = (WeightSource::Slot(Slot::A), Some(old));
             let activated = (WeightSource::Slot(Slot::B), Some(crc(&new)));
-            assert!(
-                running == before || activates && running == activated,
-                "{running:?} in request {number}"
-            );
-            assert_eq!(
-                (found, info.configuration),
-                (configuration(3), Origin::Stored),
-                "in request {number}"
-            );
+            assert!(running == before || activates && running == activated, "{running:?} in {number}");
+            assert_eq!((found, info.configuration), (configuration(3), Origin::Stored), "request {number}");
         };
         let count = accesses(&mut board, "before", request, "after");
         total += count;
@@ -231,11 +220,7 @@ fn upload(chosen: impl Fn(usize, usize, usize) -> Vec<usize>) {
     assert_eq!(service::info(&mut board).weights_crc, Some(crc(&new)), "without a cut");
     assert_ne!(crc(&new), crc(&weights::DEFAULT.0));
     let Tried { cuts, seen } = tried;
-    println!(
-        "{cuts} cuts in {total} accesses, {} contents of the flash, {:.0?}",
-        seen.len(),
-        begun.elapsed()
-    );
+    println!("{cuts} cuts in {total} accesses, {} contents of flash, {:.0?}", seen.len(), begun.elapsed());
 }
 
 #[test]

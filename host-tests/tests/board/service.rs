@@ -1,6 +1,6 @@
 //! Testers of the virtual board, with limits of board time: a test does the same however busy the host is.
 
-use crate::common::SERVICE;
+use crate::common::{SERVICE, START};
 use embedded_can::Frame;
 use gyronet::service::message::Info;
 use gyronet::store::{Configuration, Record};
@@ -9,6 +9,7 @@ use gyronet_host_tests::tester::segment;
 use gyronet_host_tests::wire::{data_frame, id11};
 use gyronet_tools::client::bus::SlcanBus;
 use gyronet_tools::client::device::Device;
+use gyronet_tools::signing::PrivateKey;
 use std::time::Duration;
 
 const REQUEST: u16 = 0x7E0;
@@ -26,6 +27,19 @@ pub fn on_line(board: &mut Board) -> Device<SlcanBus<Line<'_>>> {
 /// A tester on CAN, which takes the frames that the board sends meanwhile.
 pub fn on_bus(board: &mut Board) -> Device<CanBus<'_>> {
     Device::new(board.bus(), "the virtual board")
+}
+
+/// Restarts a board that stands, and waits until it listens.
+pub fn restart(board: &mut Board) {
+    on_bus(board).restart().expect("a response");
+    board.run(START);
+}
+
+/// Gives a board without a key one.
+pub fn lock(board: &mut Board) -> PrivateKey {
+    let key = PrivateKey::generate().expect("random numbers");
+    on_bus(board).set_key(&key.public()).expect("there was none");
+    key
 }
 
 pub fn info(board: &mut Board) -> Info {

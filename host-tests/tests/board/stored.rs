@@ -13,7 +13,6 @@ use gyronet_host_tests::replay;
 use gyronet_host_tests::stored::{crc, other_weights};
 use gyronet_tools::client::device::Authority;
 use gyronet_tools::client::device::upload::{Uploaded, upload};
-use gyronet_tools::signing::PrivateKey;
 use std::time::Duration;
 
 /// Typical time of an erase of 16 KiB (DS8626 table 39), and what the rest of a store may take.
@@ -31,11 +30,6 @@ fn timed<T>(board: &mut Board, work: impl FnOnce(&mut Board) -> T) -> (T, Durati
     let begin = board.counts().time;
     let result = work(board);
     (result, board.counts().time - begin)
-}
-
-fn restart(board: &mut Board) {
-    on_bus(board).restart().expect("a response");
-    board.run(START);
 }
 
 /// Sectors that were erased, and causes of resets.
@@ -67,14 +61,11 @@ fn configuration_survives_restarts_while_sectors_fill_and_are_used_again() {
             stored.unwrap_or_else(|error| panic!("store {stores}: {error}"));
             let (sectors, causes) = erased_and_reset(&mut board);
             let least = ERASE * sectors.len() as u32;
-            assert!(
-                (least..least + STORE_TIME).contains(&took),
-                "store {stores}: {took:?}, erased {sectors:?}"
-            );
+            assert!((least..least + STORE_TIME).contains(&took), "store {stores}: {took:?}, {sectors:?}");
             erased.extend(sectors);
             assert_eq!(causes, Vec::<String>::new(), "store {stores}");
         }
-        restart(&mut board);
+        service::restart(&mut board);
         assert_eq!(service::configuration(&mut board), latitude(stores), "store {stores}");
         let info = service::info(&mut board);
         assert_eq!((info.configuration, info.flash), (Origin::Stored, FlashState::Ready));
@@ -101,7 +92,7 @@ fn stale_error_flags_of_the_flash_controller_refuse_no_store() {
     on_bus(&mut board).set_configuration(&latitude(3)).expect("it is stored");
     board.configure("FLASH.error_flags", ERRORS);
     on_bus(&mut board).set_configuration(&latitude(4)).expect("no sector is erased");
-    restart(&mut board);
+    service::restart(&mut board);
     assert_eq!(service::configuration(&mut board), latitude(4));
 }
 
@@ -166,8 +157,7 @@ fn uploaded_weights_run_from_their_slot() {
     let Some(mut board) = common::started() else { return };
     let file = other_weights(1);
     let crc = crc(&file);
-    let key = PrivateKey::generate().expect("random numbers");
-    on_bus(&mut board).set_key(&key.public()).expect("there was none");
+    let key = service::lock(&mut board);
     let (done, took) = timed(&mut board, |board| {
         let mut device = on_bus(board);
         device.authorise(Authority::Key(key));

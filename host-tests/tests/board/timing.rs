@@ -1,10 +1,9 @@
 //! Times of diagnosis on the virtual board's bus, with all messages of the board beside it:
 //! `cargo test --test board -- timing --nocapture` prints them.
 
-use crate::common::{self, MS, SAMPLE, START, drive, id, stand};
+use crate::common::{self, MS, SAMPLE, START, drive, id, raw, stand};
 use crate::service;
-use embedded_can::{Frame, Id};
-use gyronet::can::DataFrame;
+use embedded_can::Frame;
 use gyronet::store::Configuration;
 use gyronet::uds::data::{Access, IDENTIFIERS};
 use gyronet_host_tests::board::Board;
@@ -18,13 +17,6 @@ const P2: Duration = Duration::from_millis(50);
 const P2_STAR: Duration = Duration::from_secs(5);
 /// The configuration: more than ten frames.
 const LONG: [u8; 3] = [0x22, 1, 0];
-
-fn raw(frame: &DataFrame) -> u16 {
-    match frame.id() {
-        Id::Standard(id) => id.as_raw(),
-        Id::Extended(_) => u16::MAX,
-    }
-}
 
 fn tester(board: &mut Board, data: &[u8]) {
     board.can_send(&data_frame(id(0x7E0), &frame(data, &[])));
@@ -97,11 +89,7 @@ fn separation_times_are_kept_on_the_bus() {
         let sent: Vec<_> = log.iter().filter(|seen| raw(&seen.frame) == 0x7E8).collect();
         let first = sent[0].frame.data();
         let length = usize::from(first[0] & 0xF) << 8 | usize::from(first[1]);
-        assert_eq!(
-            (first[0] >> 4, sent.len() - 1),
-            (1, (length - 6).div_ceil(7)),
-            "all frames of {length} bytes"
-        );
+        assert_eq!((first[0] >> 4, sent.len() - 1), (1, (length - 6).div_ceil(7)), "of {length} bytes");
         let mut gaps: Vec<_> = sent[1..].windows(2).map(|pair| pair[1].start - pair[0].end).collect();
         gaps.sort();
         let ms = |gap: Duration| gap.as_secs_f64() * 1e3;
@@ -122,10 +110,7 @@ fn the_first_requests_of_a_session_are_answered_in_time() {
     let mut pending = 0;
     for request in [&[0x10, 3][..], &[0x22, 0xF1, 0x86], &[0x22, 0xF1, 0x89], &[0x22, 0xF1, 0x97]] {
         let answer = timed(&mut board, request);
-        println!(
-            "{request:02x?}: {:02x?} after {:?}, {} pending",
-            answer.message, answer.first, answer.pending
-        );
+        println!("{request:02x?}: {:02x?} in {:?}, {} pending", answer.message, answer.first, answer.pending);
         assert_eq!(answer.message[0], request[0] + 0x40);
         assert!(answer.first <= P2, "{:?}", answer.first);
         pending += answer.pending;

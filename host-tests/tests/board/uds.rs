@@ -1,9 +1,8 @@
 //! Diagnosis on CAN with the image as flashed: a tester of ours, and udsoncan over can-isotp as they come from their
 //! authors.
 
-use crate::common::{self, START, drive};
-use embedded_can::{Frame, Id};
-use gyronet::can::DataFrame;
+use crate::common::{self, START, drive, raw};
+use embedded_can::Frame;
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::store::{Configuration, Record};
 use gyronet_host_tests::board::Board;
@@ -21,13 +20,6 @@ use std::time::Duration;
 
 /// Time that passes while a tester waits for the next frame.
 const TURN: Duration = Duration::from_millis(1);
-
-fn raw(frame: &DataFrame) -> u16 {
-    match frame.id() {
-        Id::Standard(id) => id.as_raw(),
-        Id::Extended(_) => u16::MAX,
-    }
-}
 
 /// Sends frames to the server and returns its own of the next millisecond.
 fn exchange(board: &mut Board, frames: &[[u8; 8]]) -> Vec<[u8; 8]> {

@@ -16,7 +16,6 @@ use gyronet_host_tests::{image, require};
 use gyronet_tools::client::bus::Bus;
 use gyronet_tools::client::device::update::{Update, update};
 use gyronet_tools::client::device::{Authority, Device};
-use gyronet_tools::signing::PrivateKey;
 use std::time::Duration;
 
 const S: Duration = Duration::from_secs(1);
@@ -69,8 +68,7 @@ fn the_whole_image_is_updated_over_can_while_rates_are_sent() {
     board.run(START);
     let configuration = Configuration { latitude_deg: Some(48.1), ..Configuration::DEFAULT };
     on_bus(&mut board).set_configuration(&configuration).expect("it stands");
-    let key = PrivateKey::generate().expect("random numbers");
-    on_bus(&mut board).set_key(&key.public()).expect("there was none");
+    let key = service::lock(&mut board);
     on_bus(&mut board).authorise(Authority::None);
     assert_eq!(firmware(&mut board), (Some(Slot::A), FirmwareState::Confirmed));
     stand(&mut board, 6_000);
@@ -146,8 +144,7 @@ fn try_on(expected: u32, spoil: impl FnOnce(&mut Board, &mut Vec<u8>)) -> Option
     spoil(&mut board, &mut image);
     install(&mut board, &image, expected);
     let _ = board.events();
-    on_bus(&mut board).restart().expect("it stands");
-    board.run(START);
+    service::restart(&mut board);
     Some(board)
 }
 

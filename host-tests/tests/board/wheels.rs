@@ -8,28 +8,6 @@ use gyronet::health::Faults;
 use gyronet_host_tests::wire::{data_frame, id29};
 use gyronet_tools::wheels::WheelFile;
 
-/// Two axles in two frames with 29 bits of identifier, little-endian, 1/32 m/s, with a counter in byte 6 and the exclusive
-/// or in byte 7.
-const SETTINGS: &str = r#"
-[[frame]]
-id = 0x18FEF1FE
-extended = true
-checksum = { kind = "xor", byte = 7 }
-counter = { start_bit = 48, bits = 4, order = "intel" }
-signal = [
-    { wheel = "front-left", start_bit = 8, bits = 13, order = "intel", factor_kmh = 0.1125, offset_kmh = 0 },
-    { wheel = "front-right", start_bit = 24, bits = 13, order = "intel", factor_kmh = 0.1125, offset_kmh = 0 },
-]
-[[frame]]
-id = 0x18FEF2FE
-extended = true
-checksum = { kind = "xor", byte = 7 }
-counter = { start_bit = 48, bits = 4, order = "intel" }
-signal = [
-    { wheel = "rear-left", start_bit = 8, bits = 13, order = "intel", factor_kmh = 0.1125, offset_kmh = 0 },
-    { wheel = "rear-right", start_bit = 24, bits = 13, order = "intel", factor_kmh = 0.1125, offset_kmh = 0 },
-]
-"#;
 const FRAMES: [u32; 2] = [0x18FE_F1FE, 0x18FE_F2FE];
 
 /// The frame of an axle whose wheels turn at this many thirty-seconds of a metre per second.
@@ -40,8 +18,20 @@ fn axle(id: u32, code: u16, counter: u8) -> DataFrame {
     data_frame(id29(id), &data)
 }
 
+/// Two axles in two frames with 29 bits of identifier, little-endian, 1/32 m/s, with a counter in byte 6 and the exclusive
+/// or in byte 7.
 fn settings() -> gyronet::can::wheel::WheelSettings {
-    WheelFile::parse("wheels.toml", SETTINGS).and_then(|file| file.settings("wheels.toml")).expect("settings")
+    let mut text = String::new();
+    for (id, axle) in FRAMES.iter().zip(["front", "rear"]) {
+        text +=
+            &format!("[[frame]]\nid = {id}\nextended = true\nchecksum = {{ kind = \"xor\", byte = 7 }}\n");
+        text += "counter = { start_bit = 48, bits = 4, order = \"intel\" }\n";
+        for (side, start) in [("left", 8), ("right", 24)] {
+            text += &format!("[[frame.signal]]\nwheel = \"{axle}-{side}\"\nstart_bit = {start}\nbits = 13\n");
+            text += "order = \"intel\"\nfactor_kmh = 0.1125\noffset_kmh = 0\n";
+        }
+    }
+    WheelFile::parse("wheels.toml", &text).and_then(|file| file.settings("wheels.toml")).expect("settings")
 }
 
 #[test]

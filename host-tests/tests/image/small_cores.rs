@@ -76,9 +76,7 @@ fn small_cores_compute_what_the_host_does() {
             let (_, ticks) = line.split_once("ticks=").expect("the ticks of a window");
             let (ticks, wrapped) = ticks.split_once(' ').expect("whether they are all");
             let instructions = ticks.parse::<u64>().expect("a number") * 1_000_000_000 / hertz;
-            println!(
-                "{name}: linear part and {units} units: {instructions} instructions a window (emulated)"
-            );
+            println!("{name}: linear part and {units} units: {instructions} instructions a window");
             assert_eq!(wrapped, "wrapped=false");
             assert!(instructions <= *most, "{name}, {units} units: {instructions}");
             let head = format!("units_{units} ");

@@ -217,11 +217,7 @@ fn a_self_test_out_of_its_limits_is_named() {
         {
             let bus = Bus::new();
             bus.0.borrow_mut().deflected[sensor][axis] = wrong;
-            assert_eq!(
-                bus.start(true).err(),
-                Some(SpiError::SelfTest { bank: 0 }),
-                "{sensor} {axis} {wrong}"
-            );
+            assert_eq!(bus.start(true).err(), Some(SpiError::SelfTest { bank: 0 }), "{axis} {wrong}");
             assert_eq!(bus.start(false).err(), None);
         }
     }

@@ -320,10 +320,7 @@ fn two_clocks_cost_what_the_module_says() {
         // But for what the overflows drop, every frame of the gyro gives a sample; the first one, and the first after each
         // overflow, may come before any force.
         let due = ((60e6 - 6.0 * 900e3) * (1.0 + fast[GYRO]) / 5e3) as u32;
-        assert!(
-            overflows == 6 && without <= overflows + 1,
-            "{overflows} overflows, {without} without a force"
-        );
+        assert!(overflows == 6 && without <= overflows + 1, "{overflows} overflows, {without} without force");
         assert!((samples + without).abs_diff(due) <= 200, "{samples} of {due} samples");
         assert!(in_step[0] >= -1.1 && in_step[1] <= 5.2, "{in_step:?}");
         assert!(

@@ -14,6 +14,7 @@ use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Faults, Quality, R
 use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
 use proptest::prelude::*;
+use proptest::sample::select;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
@@ -255,14 +256,8 @@ fn the_slow_status_means_what_the_file_says() {
 }
 
 fn any_sample() -> impl Strategy<Value = VehicleSample> {
-    let source =
-        prop_oneof![Just(Source::Raw), Just(Source::Static), Just(Source::Model), Just(Source::EarthRate)];
-    let quality = prop_oneof![
-        Just(Quality::Good),
-        Just(Quality::Degraded),
-        Just(Quality::Initialising),
-        Just(Quality::Unusable)
-    ];
+    let source = select(&[Source::Raw, Source::Static, Source::Model, Source::EarthRate]);
+    let quality = select(&[Quality::Good, Quality::Degraded, Quality::Initialising, Quality::Unusable]);
     // A little beyond what the coarse signals hold.
     let rate = || (-500_000_000..500_000_000).prop_map(AngularRate);
     let force = || (-50_000_000..50_000_000).prop_map(SpecificForce);

@@ -168,9 +168,7 @@ fn the_gain_is_learnt_where_the_vehicle_turns_both_ways() {
     assert_eq!(pipeline.status(None).gain, Knowledge::Coarse);
     let (_, alone, _) = drive(60, &without);
     let [with, alone] = [&outputs, &alone].map(|outputs| error(outputs, &headings, 50).abs().to_degrees());
-    println!(
-        "a circle of 50 s without courses: {with:.2} deg with the gain of the drive before, {alone:.2} without"
-    );
+    println!("a circle of 50 s without courses: {with:.2} deg with the gain, {alone:.2} without");
     assert!(with < 0.35 * alone);
     // A sensor that hangs differently has another gain.
     let mut moved = pipeline;
@@ -287,10 +285,7 @@ fn courses_never_make_the_heading_worse_than_zero_rate_updates() {
             let own = errors(&|second, headings| course(second, headings).filter(|_| second < 180));
             println!("{name}, {course_name}: {own:.2?} deg, {due:.2?} without courses");
             for (own, due) in own.into_iter().zip(due) {
-                assert!(
-                    own <= (1.05 * due).max(due + 0.1),
-                    "{name}, {course_name}: {own} deg, {due} without"
-                );
+                assert!(own <= (1.05 * due).max(due + 0.1), "{name}, {course_name}: {own}, {due} without");
             }
         }
     }

@@ -168,10 +168,7 @@ fn sizes_that_do_not_fit_are_refused() {
     let (input, recurrent) = (packed.direction().input(), packed.direction().recurrent());
     assert!(DirectionWeights::new(4, 6, input, recurrent).is_some());
     for (units, inputs) in [(4, 8), (4, 4), (6, 6), (2, 6), (0, 0), (3, 6), (4, 5)] {
-        assert!(
-            DirectionWeights::new(units, inputs, input, recurrent).is_none(),
-            "{units} units, {inputs} inputs"
-        );
+        assert!(DirectionWeights::new(units, inputs, input, recurrent).is_none(), "{units}, {inputs}");
     }
     assert!(DirectionWeights::new(4, 6, &input[1..], recurrent).is_none());
     assert!(DirectionWeights::new(4, 6, input, &recurrent[1..]).is_none());

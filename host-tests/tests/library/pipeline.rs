@@ -95,26 +95,6 @@ fn a_gap_of_more_than_a_fifth_of_a_second_restarts_static_initialisation() {
 }
 
 #[test]
-fn clipping_is_a_failure_until_it_is_over() {
-    let mut pipeline = new();
-    let samples = drive(0..500).map(|sample| ImuSample {
-        validity: Validity::reported((4_000_000..4_030_000).contains(&sample.time.0)),
-        ..sample
-    });
-    let outputs = run(&mut pipeline, samples, constant(0.001));
-    assert_eq!(
-        statuses(&outputs),
-        [(Init, 300), (Degraded, 11), (Ready, 89), (Clipped, 3), (Degraded, 11), (Ready, 86)]
-    );
-    for output in &outputs[400..403] {
-        assert_eq!(output.vehicle.live.quality, Quality::Unusable);
-    }
-    // With the delayed rates of these samples.
-    assert_eq!(faults(&outputs), [(Faults::NONE, 407), (Faults::CLIPPED, 3), (Faults::NONE, 90)]);
-    assert_eq!(pipeline.counters().invalid, 3);
-}
-
-#[test]
 fn a_clipped_sample_is_no_part_of_the_bias() {
     let samples = (0..400).map(|tick| ImuSample {
         validity: Validity::reported(tick == 0),

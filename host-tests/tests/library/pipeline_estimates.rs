@@ -36,10 +36,7 @@ fn an_estimate_that_is_late_or_missing_is_counted() {
                 !deliver
             });
             waiting.extend(output.window.map(|due| (now, due)));
-            assert!(
-                matches!(output.vehicle.live.status, Init | Degraded),
-                "{lateness} samples late at {now}"
-            );
+            assert!(matches!(output.vehicle.live.status, Init | Degraded), "{lateness} late at {now}");
             assert_eq!(output.vehicle.live.correction, AngularRate(0));
         }
         let counters = pipeline.counters();

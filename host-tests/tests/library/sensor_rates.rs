@@ -121,11 +121,7 @@ fn clocks_that_contradict_each_other_are_not_good() {
     let first = seen.iter().position(is_off).expect("it is reported");
     assert!((900..1_100).contains(&first), "after ten seconds: {first}");
     for step in &seen[first..] {
-        assert_eq!(
-            (step.vehicle.live.quality, is_off(step)),
-            (Quality::Degraded, true),
-            "for as long as it lasts"
-        );
+        assert_eq!((step.vehicle.live.quality, is_off(step)), (Quality::Degraded, true), "while it lasts");
     }
     assert_eq!(clock_off, 1);
 }

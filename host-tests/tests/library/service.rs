@@ -24,10 +24,8 @@ use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::layout::{self, RECORD_SECTOR};
 use gyronet::store::{ImuPart, Slot};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
-use gyronet_host_tests::flash::{F405, MappedRegion, Region};
+use gyronet_host_tests::flash::{Flash, MappedRegion, Region};
 use gyronet_host_tests::synthetic::judged;
-use std::cell::RefCell;
-use std::rc::Rc;
 
 type Board = Device<Region<RECORD_SECTOR>, MappedRegion>;
 const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
@@ -57,12 +55,19 @@ const IDENTITY: Identity = Identity {
     failed_starts: 0,
 };
 
-fn start(flash: &Rc<RefCell<F405>>) -> Board {
+fn start(flash: &Flash) -> Board {
     start_from(flash, None)
 }
 
+/// A new board and its flash.
+fn fresh() -> (Flash, Board) {
+    let flash = Flash::default();
+    let board = start(&flash);
+    (flash, board)
+}
+
 /// A board whose boot loader has started a slot.
-fn start_from(flash: &Rc<RefCell<F405>>, running: Option<Slot>) -> Board {
+fn start_from(flash: &Flash, running: Option<Slot>) -> Board {
     let records = Region::new(flash, layout::STORE);
     let mut board = Board::new(&SUPPORTED_HARDWARE);
     board.begin(Some(records), Some(MappedRegion::of_running(flash, running)), Ok(()), IDENTITY);

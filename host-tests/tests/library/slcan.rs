@@ -112,11 +112,7 @@ impl Frame for Other {
 fn what_is_no_classic_data_frame_gives_no_line() {
     assert_eq!(slcan::emit(&Other { remote: true, data: [0; 12] }), None);
     assert_eq!(slcan::emit(&Other { remote: false, data: [0; 12] }), None);
-    assert_eq!(
-        slcan::parse::<Other>(b"t1740").err(),
-        Some(SlcanError::Length),
-        "a driver that refuses the frame"
-    );
+    assert_eq!(slcan::parse::<Other>(b"t1740").err(), Some(SlcanError::Length), "its driver refuses it");
     assert_eq!(DataFrame::new(StandardId::ZERO, &[0; 9]), None);
     assert_eq!(DataFrame::new_remote(StandardId::ZERO, 0), None);
 }

@@ -1,7 +1,7 @@
 //! A board's loop in one call: what it reads, receives, estimates, sends and reports.
 
-use embedded_can::{Frame, nb::Can};
-use gyronet::can::DataFrame;
+use super::transmit_queue::{Controller, Mood};
+use embedded_can::Frame;
 use gyronet::coprocessor::{Bus, Config, Coprocessor, QueuedCan, Step};
 use gyronet::health::{Faults, Status};
 use gyronet::model::{GyroNet, WindowNetwork};
@@ -10,37 +10,15 @@ use gyronet::units::{Micros, RangeError};
 use gyronet_host_tests::inputs::wheels;
 use gyronet_host_tests::wire::data_frame;
 use gyronet_tools::drive::wheel_frames::receiver;
-use std::collections::VecDeque;
-use std::convert::Infallible;
 
 /// Frames of a sample.
 const SET: usize = 6;
 /// Places in the queue before the controller.
 const QUEUE: usize = 24;
 
-/// A controller that takes frames unless it is blocked, and has received some.
-#[derive(Debug, Default)]
-struct Controller {
-    sent: Vec<DataFrame>,
-    received: VecDeque<DataFrame>,
-    is_blocked: bool,
-}
-
-impl Can for Controller {
-    type Frame = DataFrame;
-    type Error = Infallible;
-
-    fn transmit(&mut self, frame: &DataFrame) -> nb::Result<Option<DataFrame>, Infallible> {
-        if self.is_blocked {
-            return Err(nb::Error::WouldBlock);
-        }
-        self.sent.push(*frame);
-        Ok(None)
-    }
-
-    fn receive(&mut self) -> nb::Result<DataFrame, Infallible> {
-        self.received.pop_front().ok_or(nb::Error::WouldBlock)
-    }
+/// A controller that takes all frames.
+fn taking() -> Controller {
+    Controller { then: Mood::Takes, ..Controller::default() }
 }
 
 /// A parked car on a board; the reading of each step is up to the test.
@@ -73,7 +51,7 @@ impl Car {
 
 #[test]
 fn constant_readings_of_a_test_become_good_rates() {
-    let (mut car, mut can) = (Car::new(), QueuedCan::<_>::new(Controller::default()));
+    let (mut car, mut can) = (Car::new(), QueuedCan::<_>::new(taking()));
     let last = (0..400).map(|_| car.sample(&mut can)).last().expect("steps");
     let live = last.observation.expect("a message set").vehicle.live;
     assert_eq!((live.status, live.faults, last.imu_error), (Status::Ready, Faults::NONE, None));
@@ -84,7 +62,7 @@ fn constant_readings_of_a_test_become_good_rates() {
 #[test]
 fn the_network_may_run_elsewhere() {
     let (mut here, mut elsewhere) = (Car::new(), Car::new());
-    let mut buses = [0, 1].map(|_| QueuedCan::<_>::new(Controller::default()));
+    let mut buses = [0, 1].map(|_| QueuedCan::<_>::new(taking()));
     for number in 0..500 {
         here.sample(&mut buses[0]);
         let mut reading: Reading = Some(Ok(TestSignal::turning(0.5).sample(number)));
@@ -100,7 +78,7 @@ fn the_network_may_run_elsewhere() {
 
 #[test]
 fn a_sensor_that_fails_to_read_is_counted_and_reported_as_silent() {
-    let (mut car, mut can) = (Car::new(), QueuedCan::<_>::new(Controller::default()));
+    let (mut car, mut can) = (Car::new(), QueuedCan::<_>::new(taking()));
     for _ in 0..400 {
         car.sample(&mut can);
     }
@@ -119,7 +97,7 @@ fn a_sensor_that_fails_to_read_is_counted_and_reported_as_silent() {
 
 #[test]
 fn frames_that_the_bus_does_not_take_are_lost_and_reported() {
-    let controller = Controller { is_blocked: true, ..Controller::default() };
+    let controller = Controller::default();
     let (mut car, mut can) = (Car::new(), QueuedCan::<_, QUEUE>::new(controller));
     let faults: Vec<Faults> = (0..6)
         .map(|_| car.sample(&mut can).observation.expect("a message set").vehicle.live.faults)
@@ -131,13 +109,13 @@ fn frames_that_the_bus_does_not_take_are_lost_and_reported() {
 
 #[test]
 fn received_wheel_frames_are_used_and_damaged_ones_counted() {
-    let controller = Controller { received: [wheels(0.0)].into(), ..Controller::default() };
+    let controller = Controller { received: [wheels(0.0)].into(), ..taking() };
     let (mut car, mut can) = (Car::new(), QueuedCan::<_>::new(controller));
     let seen = car.sample(&mut can).observation.expect("a message set");
     assert!(seen.wheels.speeds.iter().all(Option::is_some));
     assert_eq!(seen.wheels.standstill, Standstill::Unknown, "for half a second");
     let short = data_frame(wheels(0.0).id(), &wheels(0.0).data()[..3]);
-    let controller = Controller { received: [short].into(), ..Controller::default() };
+    let controller = Controller { received: [short].into(), ..taking() };
     let (mut car, mut can) = (Car::new(), QueuedCan::<_>::new(controller));
     car.sample(&mut can);
     assert_eq!(car.coprocessor.input_counters().wheel_errors, 1);

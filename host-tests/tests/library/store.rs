@@ -177,10 +177,7 @@ fn no_flipped_bit_is_believed() {
             let mut store = open(&damaged);
             let found = store.get::<Configuration>();
             assert!(store.damaged(), "byte {offset} bit {bit} is noticed");
-            assert!(
-                [Ok(Some(old)), Ok(Some(new)), Ok(None)].contains(&found),
-                "byte {offset} bit {bit}: {found:?}"
-            );
+            assert!([Ok(Some(old)), Ok(Some(new)), Ok(None)].contains(&found), "{offset} {bit}: {found:?}");
             flips += 1;
         }
     }

@@ -9,25 +9,30 @@ use proptest::prelude::*;
 use std::collections::VecDeque;
 
 /// The next answer of a controller.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Mood {
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Mood {
     Takes,
+    #[default]
     Busy,
     Off,
     /// Takes the frame and gives back the one that it had.
     Swaps,
 }
 
-struct Controller {
-    moods: VecDeque<Mood>,
-    held: Option<DataFrame>,
-    sent: Vec<DataFrame>,
-    tries: usize,
+#[derive(Debug, Default)]
+pub struct Controller {
+    pub moods: VecDeque<Mood>,
+    /// Its answer after those.
+    pub then: Mood,
+    pub held: Option<DataFrame>,
+    pub sent: Vec<DataFrame>,
+    pub received: VecDeque<DataFrame>,
+    pub tries: usize,
 }
 
 impl Controller {
     fn new(moods: impl IntoIterator<Item = Mood>) -> Self {
-        Self { moods: moods.into_iter().collect(), held: None, sent: Vec::new(), tries: 0 }
+        Self { moods: moods.into_iter().collect(), ..Self::default() }
     }
 }
 
@@ -37,7 +42,7 @@ impl Can for Controller {
 
     fn transmit(&mut self, frame: &DataFrame) -> nb::Result<Option<DataFrame>, ErrorKind> {
         self.tries += 1;
-        match self.moods.pop_front().unwrap_or(Mood::Busy) {
+        match self.moods.pop_front().unwrap_or(self.then) {
             Mood::Takes => {
                 self.sent.push(*frame);
                 Ok(None)
@@ -49,7 +54,7 @@ impl Can for Controller {
     }
 
     fn receive(&mut self) -> nb::Result<DataFrame, ErrorKind> {
-        Err(nb::Error::WouldBlock)
+        self.received.pop_front().ok_or(nb::Error::WouldBlock)
     }
 }
 

@@ -8,7 +8,7 @@ use gyronet::can::wheel::{
     ByteSum, Checksum, Code, Parts, WheelConfigError, WheelError, WheelFrame, WheelReceiver, WheelSettings,
     WheelSignal,
 };
-use gyronet::sample::Standstill;
+use gyronet::sample::{Standstill, WheelSample};
 use gyronet::units::{Duration, Micros, WheelSpeed};
 use gyronet_host_tests::wire::{data_frame, id11, id29};
 use proptest::prelude::*;
@@ -51,14 +51,16 @@ fn at_kmh(kmh: f64) -> DataFrame {
     data_frame(ID, &[hi, lo, hi, lo, hi, lo, hi, lo])
 }
 
+fn good(receiver: &mut WheelReceiver, frame: &DataFrame, at: Micros) -> WheelSample {
+    receiver.decode(frame, at).expect("a wheel frame").expect("valid")
+}
+
 #[test]
 fn speeds_are_read_in_metres_per_second() {
     let mut receiver = WheelReceiver::new(settings(car())).expect("checked");
     // 0.01 km/h: 6767 + 3600 for the front right wheel, standstill for the others.
-    let sample = receiver
-        .decode(&data_frame(ID, &[0x28, 0x7F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]), Micros(0))
-        .expect("a wheel frame")
-        .expect("valid");
+    let sample =
+        good(&mut receiver, &data_frame(ID, &[0x28, 0x7F, 0x1A, 0x6F, 0x1A, 0x6F, 0x1A, 0x6F]), Micros(0));
     let [front_left, front_right, ..] = sample.speeds.map(|speed| speed.expect("known").metre_per_sec());
     assert!((front_right - 10.0).abs() < 1e-3, "{front_right}");
     assert!(front_left.abs() < 1e-3, "{front_left}");
@@ -72,7 +74,7 @@ fn standing_still_is_asserted_late_and_dropped_at_once() {
     let mut now = 0;
     let mut step = |kmh: f64| {
         now += 20 * MS;
-        receiver.decode(&at_kmh(kmh), Micros(now)).expect("a wheel frame").expect("valid").standstill
+        good(&mut receiver, &at_kmh(kmh), Micros(now)).standstill
     };
     assert_eq!(step(5.0), Standstill::Moving);
     for _ in 0..10 {
@@ -95,10 +97,10 @@ fn silence_is_neither_standing_nor_moving() {
     let silent = receiver.poll(Micros(451 * MS)).expect("frames have come");
     assert_eq!((silent.standstill, silent.speeds), (Standstill::Unknown, [None; 4]));
     // After the gap the time of standing starts again.
-    let sample = receiver.decode(&at_kmh(0.0), Micros(800 * MS)).expect("a wheel frame").expect("valid");
+    let sample = good(&mut receiver, &at_kmh(0.0), Micros(800 * MS));
     assert_eq!(sample.standstill, Standstill::Unknown);
     // The same without anyone having asked in between.
-    let sample = receiver.decode(&at_kmh(0.0), Micros(9_000 * MS)).expect("a wheel frame").expect("valid");
+    let sample = good(&mut receiver, &at_kmh(0.0), Micros(9_000 * MS));
     assert_eq!(sample.standstill, Standstill::Unknown);
     // A clock that goes backwards does no harm.
     assert_eq!(receiver.poll(Micros(0)).expect("frames have come").standstill, Standstill::Unknown);
@@ -284,10 +286,7 @@ fn pulses_become_speeds_and_standstill() {
             .map(|k| {
                 way += speed * 0.01;
                 let raw = (way / 0.02) as u64 as u8;
-                receiver
-                    .decode(&data_frame(ID, &[raw, raw]), Micros(k * 10 * MS))
-                    .expect("a wheel frame")
-                    .expect("valid")
+                good(&mut receiver, &data_frame(ID, &[raw, raw]), Micros(k * 10 * MS))
             })
             .last()
             .expect("frames")

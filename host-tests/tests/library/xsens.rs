@@ -110,11 +110,7 @@ fn missing_packets_are_named() {
 fn packets_of_a_wrong_length_are_refused() {
     for id in [0x1020u16, 0x1060, 0x0810, 0x4020, 0x8020, 0xE020] {
         for len in [0, 1, 3, 5, 11, 13] {
-            assert_eq!(
-                feed_new(frame(&[(id, &vec![0; len])])),
-                [Err(XsensError::Format { id })],
-                "{len} bytes"
-            );
+            assert_eq!(feed_new(frame(&[(id, &vec![0; len])])), [Err(XsensError::Format { id })], "{len}");
         }
     }
     // FP12.20, FP16.32 and double.

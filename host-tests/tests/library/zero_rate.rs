@@ -315,9 +315,7 @@ fn a_second_of_standing_counts_only_when_the_next_one_is_over() {
 fn one_steady_second_contradicts_the_bias_and_one_in_which_a_turn_begins_does_not() {
     for (begin, end, doubted) in [(0.01, 0.01, true), (0.0, 0.02, false)] {
         let mut zero_rate = ZeroRate::new(ZeroRateConfig::DEFAULT);
-        for _ in 0..2 {
-            let _ = second(&mut zero_rate, 0.0);
-        }
+        (0..2).for_each(|_| _ = second(&mut zero_rate, 0.0));
         for sample in 0..RATE_HZ {
             let left = begin + (end - begin) * f64::from(sample) / f64::from(RATE_HZ);
             zero_rate.observe(Some(rate(left)), Standing::WHEELS, 0.0);
@@ -374,9 +372,7 @@ fn the_last_reading_before_driving_off_is_the_bias_where_it_differs_by_more_than
 fn no_standstill_teaches_more_than_the_largest_bias() {
     let largest = f64::from(ZeroRateConfig::DEFAULT.max_bias);
     let mut zero_rate = ZeroRate::new(ZeroRateConfig { initial: 0.1, ..ZeroRateConfig::DEFAULT });
-    for _ in 0..5 {
-        let _ = second(&mut zero_rate, 0.3);
-    }
+    (0..5).for_each(|_| _ = second(&mut zero_rate, 0.3));
     assert!(zero_rate.bias().rad_per_sec() <= 2.0 * largest, "with the offset of this standstill");
     zero_rate.observe(None, Standing::UNKNOWN, 0.0);
     assert!((zero_rate.bias().rad_per_sec() - largest).abs() < 1e-6);
@@ -390,9 +386,7 @@ fn no_standstill_teaches_more_than_the_largest_bias() {
 fn a_second_in_which_a_turn_begins_is_expected_as_far_as_it_is_off() {
     let config = ZeroRateConfig { initial: 0.01, standstill: 0.01, ..ZeroRateConfig::DEFAULT };
     let mut zero_rate = ZeroRate::new(config);
-    for _ in 0..10 {
-        let _ = second(&mut zero_rate, 0.02);
-    }
+    (0..10).for_each(|_| _ = second(&mut zero_rate, 0.02));
     for sample in 0..RATE_HZ {
         let left = 0.06 + 0.04 * f64::from(sample) / f64::from(RATE_HZ);
         zero_rate.observe(Some(rate(left)), Standing::WHEELS, 0.0);
@@ -438,9 +432,7 @@ fn a_reading_at_rest_is_evidence_for_ten_seconds() {
         if has_moved {
             zero_rate.moves();
         }
-        for _ in 0..3 {
-            let _ = second(&mut zero_rate, left);
-        }
+        (0..3).for_each(|_| _ = second(&mut zero_rate, left));
         pass(&mut zero_rate, 1);
         assert_eq!(zero_rate.is_confirmed(), has_moved, "{left}");
         let bias = zero_rate.bias().rad_per_sec();
@@ -484,9 +476,7 @@ fn only_valid_readings_of_standing_wheels_are_a_reading_at_rest() {
 #[test]
 fn a_stop_begins_without_the_offset_of_the_one_before() {
     let mut zero_rate = ZeroRate::new(ZeroRateConfig::DEFAULT);
-    for _ in 0..20 {
-        let _ = second(&mut zero_rate, 0.0006);
-    }
+    (0..20).for_each(|_| _ = second(&mut zero_rate, 0.0006));
     let standing = zero_rate.bias();
     zero_rate.observe(None, Standing::UNKNOWN, 0.0);
     let driving = zero_rate.bias();

@@ -48,11 +48,7 @@ fn a_sensor_at_rest_has_the_noise_of_its_data_sheet() {
 
     let doctor = Doctor::examine(&csv).unwrap();
     let Some(Mounting { roll_deg, pitch_deg, force, .. }) = doctor.mounting else { panic!() };
-    assert!(
-        roll_deg.abs() < 2.0 && pitch_deg.abs() < 2.0 && (9.6..10.2).contains(&force),
-        "{:?}",
-        doctor.mounting
-    );
+    assert!(roll_deg.abs() < 2.0 && pitch_deg.abs() < 2.0 && (9.6..10.2).contains(&force), "{force}");
     // The data sheet has 2.0 deg/sqrt(h) and 0.007 deg/s at 25 degrees, typical.
     let noise = doctor.noise.unwrap().map(|noise| noise.unwrap());
     for Noise { random_walk, instability } in noise {

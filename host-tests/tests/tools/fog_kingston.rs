@@ -114,7 +114,7 @@ fn the_heading_of_an_hour_in_kingston() {
     let by_earth =
         turned - EARTH_RATE * latitude.to_radians().sin() * (end - from) - (truth(end) - truth(from));
     println!(
-        "last {:.0} s: {error:+.5} rad at the end by default, {by_earth:+.5} by the Earth's rate alone",
+        "last {:.0} s: {error:+.5} rad at the end, {by_earth:+.5} by the Earth's rate alone",
         end - from
     );
     assert!(error.abs() <= FINAL && error.abs() < by_earth.abs(), "{error} rad");

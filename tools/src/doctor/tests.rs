@@ -113,16 +113,18 @@ fn each_defect_is_found() {
         let (verdict, found) = found(&doctor, what);
         assert!(verdict == Verdict::Bad && found.contains(text), "{what}: {found}");
     };
+    let changed = |what: &str, text: &str, change: &dyn Fn(usize, &mut [f64; 10])| {
+        bad(what, text, &|k, row| {
+            change(k, row);
+            true
+        });
+    };
     bad("gaps", "1 with 150 missing rows", &|k, _| !(3_000..3_150).contains(&k));
-    bad("gyro range", "samples at the limit of 11.5 deg/s", &|_, row| {
-        row[6] = row[6].clamp(-0.2, 0.2);
-        true
-    });
-    bad("stuck samples", "12 samples repeat", &|k, row| {
+    changed("gyro range", "samples at the limit of 11.5 deg/s", &|_, row| row[6] = row[6].clamp(-0.2, 0.2));
+    changed("stuck samples", "12 samples repeat", &|k, row| {
         if (4_000..4_012).contains(&k) {
             row[1..7].fill(0.5);
         }
-        true
     });
     let third = "33.33 Hz by the median period: the board and the other commands use 50 to 1000 Hz; `cargo gyronet import \
                  made.csv --out made_100hz.csv` makes 100 Hz";
@@ -132,57 +134,34 @@ fn each_defect_is_found() {
         "20.00 Hz by the median period: the board and the other commands use 50 to 1000 Hz; record it again",
         &|k, _| k % 5 == 0,
     );
-    bad("unreadable rows", "time goes backwards", &|k, row| {
-        row[0] -= if k == 500 { 1.0 } else { 0.0 };
-        true
+    changed("unreadable rows", "time goes backwards", &|k, row| row[0] -= if k == 500 { 1.0 } else { 0.0 });
+    changed("mounting", "z is not up", &|_, row| row[3] = -row[3]);
+    changed("mounting", "imu is in g; `cargo gyronet import made.csv --unit imu=g --out", &|_, row| {
+        row[1..4].iter_mut().for_each(|force| *force /= 9.8)
     });
-    bad("mounting", "z is not up", &|_, row| {
-        row[3] = -row[3];
-        true
+    changed(
+        "gyro unit",
+        "imu is in deg/s; `cargo gyronet import made.csv --unit imu=deg/s --out",
+        &|_, row| row[4..7].iter_mut().for_each(|rate| *rate *= DEGREES),
+    );
+    changed("rate", "t_s is in ms; `cargo gyronet import made.csv --unit t_s=ms --out", &|_, row| {
+        row[0] *= 1e3
     });
-    bad("mounting", "imu is in g; `cargo gyronet import made.csv --unit imu=g --out", &|_, row| {
-        row[1..4].iter_mut().for_each(|force| *force /= 9.8);
-        true
+    changed("wheels", "swapped", &|_, row| row.swap(7, 8));
+    changed(
+        "reference",
+        "imu is in deg/s; `cargo gyronet import made.csv --unit imu=deg/s --out",
+        &|_, row| row[4..7].iter_mut().for_each(|rate| *rate *= DEGREES),
+    );
+    changed("wheels", "imu is in deg/s", &|_, row| row[4..7].iter_mut().for_each(|rate| *rate *= DEGREES));
+    changed("reference", "ref_gyr_z is in deg/s", &|_, row| row[9] *= DEGREES);
+    changed("reference", "the opposite sign", &|_, row| row[9] = -row[9]);
+    changed("reference", "it shows no turn, and the gyro turns by ", &|_, row| row[9] = 0.0);
+    changed("wheels", "--unit wheel2_rate=km/h --unit wheel4_rate=km/h", &|_, row| {
+        row[7..9].iter_mut().for_each(|rate| *rate *= KMH)
     });
-    bad("gyro unit", "imu is in deg/s; `cargo gyronet import made.csv --unit imu=deg/s --out", &|_, row| {
-        row[4..7].iter_mut().for_each(|rate| *rate *= DEGREES);
-        true
-    });
-    bad("rate", "t_s is in ms; `cargo gyronet import made.csv --unit t_s=ms --out", &|_, row| {
-        row[0] *= 1e3;
-        true
-    });
-    bad("wheels", "swapped", &|_, row| {
-        row.swap(7, 8);
-        true
-    });
-    bad("reference", "imu is in deg/s; `cargo gyronet import made.csv --unit imu=deg/s --out", &|_, row| {
-        row[4..7].iter_mut().for_each(|rate| *rate *= DEGREES);
-        true
-    });
-    bad("wheels", "imu is in deg/s", &|_, row| {
-        row[4..7].iter_mut().for_each(|rate| *rate *= DEGREES);
-        true
-    });
-    bad("reference", "ref_gyr_z is in deg/s", &|_, row| {
-        row[9] *= DEGREES;
-        true
-    });
-    bad("reference", "the opposite sign", &|_, row| {
-        row[9] = -row[9];
-        true
-    });
-    bad("reference", "it shows no turn, and the gyro turns by ", &|_, row| {
-        row[9] = 0.0;
-        true
-    });
-    bad("wheels", "--unit wheel2_rate=km/h --unit wheel4_rate=km/h", &|_, row| {
-        row[7..9].iter_mut().for_each(|rate| *rate *= KMH);
-        true
-    });
-    bad("reference", "does not fit the gyro", &|k, row| {
-        row[9] = (0.3 * row[0] + 1e-4 * k as f64 * row[0]).sin();
-        true
+    changed("reference", "does not fit the gyro", &|k, row| {
+        row[9] = (0.3 * row[0] + 1e-4 * k as f64 * row[0]).sin()
     });
 }
 

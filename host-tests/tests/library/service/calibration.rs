@@ -1,7 +1,7 @@
 //! The map of a unit, and the size of what was learnt.
 
-use super::start;
 use super::uds::Bench;
+use super::{fresh, start};
 use gyronet::bias::ThermalBias;
 use gyronet::heading::Gain;
 use gyronet::mounting::{Forward, GyroMap, Vertical};
@@ -14,8 +14,7 @@ use gyronet_host_tests::stored::open;
 
 #[test]
 fn the_map_of_a_unit_is_kept_for_the_weights_it_was_found_with() {
-    let flash = Flash::default();
-    let mut board = start(&flash);
+    let (flash, mut board) = fresh();
     let runs = board.info().weights_crc.unwrap_or(0);
     let elements = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.006, 0.029, 1.001]];
     let gyro_map = GyroMap::from_elements(elements).expect("a unit's");

@@ -1,6 +1,6 @@
 //! The configuration is stored whole, at standstill alone, and refused where it is wrong.
 
-use super::{Board, GOOD, IDENTITY, LEVEL, SUPPORTED_HARDWARE, bare, info, sample, start};
+use super::{Board, GOOD, IDENTITY, LEVEL, SUPPORTED_HARDWARE, bare, fresh, info, sample, start};
 use embedded_can::{Id, StandardId};
 use gyronet::bias::{EarthRate, Latitude, StaticConfig};
 use gyronet::can::config::{Config, ConfigError, Settings, YawSettings};
@@ -19,14 +19,11 @@ use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Calibration, Learned, StoreError};
 use gyronet::store::{Configuration, Field, FieldError, FlashFault, FogGyro, FogPart, ImuPart, Mounting};
 use gyronet::units::SpecificForce;
-use gyronet_host_tests::flash::{F405, MappedRegion, Region};
-use std::cell::RefCell;
-use std::rc::Rc;
+use gyronet_host_tests::flash::{Flash, MappedRegion, Region};
 
 #[test]
 fn configuration_is_kept_whole() {
-    let flash = Rc::new(RefCell::new(F405::default()));
-    let mut board = start(&flash);
+    let (flash, mut board) = fresh();
     assert_eq!(info(&mut board).configuration, Origin::BuiltIn);
     let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
     assert_eq!(board.set_configuration(&wanted), Ok(()));
@@ -74,8 +71,7 @@ fn configuration_is_kept_whole() {
 
 #[test]
 fn wheel_frames_are_kept() {
-    let flash = Rc::new(RefCell::new(F405::default()));
-    let mut board = start(&flash);
+    let (flash, mut board) = fresh();
     let known = |board: &mut Board| (info(board).wheels, *board.wheels());
     let built_in = (Origin::BuiltIn, WheelSettings::TOYOTA);
     assert_eq!(known(&mut board), built_in);
@@ -92,8 +88,7 @@ fn wheel_frames_are_kept() {
 
 #[test]
 fn damaged_record_is_noted() {
-    let flash = Rc::new(RefCell::new(F405::default()));
-    let mut board = start(&flash);
+    let (flash, mut board) = fresh();
     assert_eq!(board.set_configuration(&Configuration::DEFAULT), Ok(()));
     // Another record is whole.
     assert_eq!(board.set_wheels(&WheelSettings::TOYOTA), Ok(()));
@@ -116,7 +111,7 @@ fn damaged_record_is_noted() {
 
 #[test]
 fn a_torn_record_of_something_else_heals_at_the_next_start() {
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     // No configuration is stored. Of two records of the wheels the second one is torn: its checksum is missing.
     let mut board = start(&flash);
     for _ in 0..2 {
@@ -132,7 +127,7 @@ fn a_torn_record_of_something_else_heals_at_the_next_start() {
 
 #[test]
 fn nothing_is_written_with_an_unlocked_controller_and_the_standstill_gate_holds() {
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
     assert_eq!(start(&flash).set_configuration(&wanted), Ok(()));
     let mut board = Board::new(&SUPPORTED_HARDWARE);
@@ -170,7 +165,7 @@ fn nothing_is_stored_without_flash() {
 
 #[test]
 fn identifiers_of_diagnosis_are_three_that_nobody_else_uses() {
-    let mut board = start(&Rc::new(RefCell::new(F405::default())));
+    let (_, mut board) = fresh();
     let mut ask = |extended, [request, functional, response]: [u32; 3]| {
         let diagnosis = DiagnosisIds { extended, request, functional, response };
         board.set_configuration(&Configuration { diagnosis, ..Configuration::DEFAULT })
@@ -206,8 +201,7 @@ fn storable(board: &mut Board) -> bool {
 
 #[test]
 fn flash_is_written_at_standstill_alone() {
-    let flash = Rc::new(RefCell::new(F405::default()));
-    let mut board = start(&flash);
+    let (_, mut board) = fresh();
     assert!(storable(&mut board), "no rate is valid yet");
     let quiet =
         |probability| Standing { source: StandstillSource::Inertial, probability, ..Standing::UNKNOWN };

@@ -15,15 +15,13 @@ use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::layout::STORE;
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, FieldError, FogPart, ImuPart, Slot, StoreError};
-use gyronet_host_tests::flash::{F405, MappedRegion, Region};
+use gyronet_host_tests::flash::{Flash, MappedRegion, Region};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::ram_flash::RamFlash;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::settings;
 use gyronet_host_tests::stored::{open, other_weights, upload};
-use std::cell::RefCell;
 use std::collections::{BTreeMap, HashSet};
-use std::rc::Rc;
 
 const HZ: u32 = 168_000_000;
 const HARDWARE: SupportedHardware = SupportedHardware {
@@ -189,7 +187,7 @@ fn neither_order_makes_the_board_send_what_it_receives() {
 fn a_start_uses_what_fits_and_reports_the_rest() {
     let mut costly = Configuration { fog_ids: [0xAA, 0x1A5, 0x1A6], ..Configuration::DEFAULT };
     costly.compensate.stride = Stride::new(1).expect("a sample");
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     upload(&flash, Slot::A, &other_weights(1)).expect("it is stored");
     open(&flash).and_then(|mut store| store.set(&costly)).expect("it is stored");
     let mut board = super::start(&flash);
@@ -214,8 +212,7 @@ fn a_start_uses_what_fits_and_reports_the_rest() {
 
 #[test]
 fn weights_that_are_too_slow_for_the_stride_are_not_activated() {
-    let flash = Rc::new(RefCell::new(F405::default()));
-    let mut board = super::start(&flash);
+    let (_, mut board) = super::fresh();
     let mut configuration = Configuration::DEFAULT;
     configuration.compensate.stride = Stride::new(1).expect("a sample");
     assert_eq!(board.set_configuration(&configuration), Ok(()), "with the built-in weights");
@@ -231,7 +228,7 @@ fn weights_that_are_too_slow_for_the_stride_are_not_activated() {
     );
 }
 
-fn started(flash: &Rc<RefCell<F405>>, identity: Identity) -> super::Board {
+fn started(flash: &Flash, identity: Identity) -> super::Board {
     let mut board = super::Board::new(&super::SUPPORTED_HARDWARE);
     board.begin(Some(Region::new(flash, STORE)), None, Ok(()), identity);
     let slots = MappedRegion::new(flash);
@@ -241,7 +238,7 @@ fn started(flash: &Rc<RefCell<F405>>, identity: Identity) -> super::Board {
 
 #[test]
 fn a_model_is_refused_by_name_at_a_clock_that_is_too_slow() {
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     upload(&flash, Slot::A, &other_weights(1)).expect("it is stored");
     let start = |clock_hz| started(&flash, Identity { clock_hz, ..IDENTITY }).info();
     assert_eq!(start(HZ).weights, WeightSource::Slot(Slot::A));
@@ -252,7 +249,7 @@ fn a_model_is_refused_by_name_at_a_clock_that_is_too_slow() {
 
 #[test]
 fn three_failed_starts_leave_the_bus_as_it_is_and_the_rest_built_in() {
-    let flash = Rc::new(RefCell::new(F405::default()));
+    let flash = Flash::default();
     let mut stored = Configuration { latitude_deg: Some(48.0), ..Configuration::DEFAULT };
     stored.diagnosis.request = 0x700;
     stored.can.bits_per_second = 250_000;

@@ -1,6 +1,6 @@
 //! Weights are uploaded block by block, checked, and used after the next start.
 
-use super::{Board, info, start};
+use super::{Board, fresh, info, start};
 use gyronet::model::weights;
 use gyronet::service::message::Refusal;
 use gyronet::store::slots::{SlotError, WeightSource};
@@ -79,8 +79,7 @@ fn a_file_with_the_checksum_of_an_accepted_one_is_not_accepted_with_it() {
 
 #[test]
 fn an_upload_that_is_refused_erases_nothing() {
-    let flash = Flash::default();
-    let mut board = start(&flash);
+    let (flash, mut board) = fresh();
     assert_eq!(upload(&mut board, &weights::GYRONET.0), Ok(()));
     assert_eq!(board.weights_activate(), Ok(()));
     let (mut board, before) = (start(&flash), flash.borrow().operations());

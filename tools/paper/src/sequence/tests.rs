@@ -60,8 +60,13 @@ fn kaist_is_read_whole() {
     assert!((truth - fog).abs() < 0.01, "{truth} {fog}");
     let gyro: f64 = sequence.steps[1..=5_900].iter().map(|step| f64::from(step.angular_rate[2]) * DT).sum();
     assert!((truth - gyro).abs() < 0.6, "{truth} {gyro}");
+    // The wheels roll as far as the vehicle moves.
     let way: f64 = sequence.steps.iter().map(|step| (step.wheels[0] + step.wheels[1]) / 2.0).sum();
-    assert!(way > 50.0, "{way}");
+    let moved = |pair: &[Step]| {
+        (pair[1].position[0] - pair[0].position[0]).hypot(pair[1].position[1] - pair[0].position[1])
+    };
+    let moved: f64 = sequence.steps.windows(2).map(moved).sum();
+    assert!(way > 50.0 && (way / moved - 1.0).abs() < 0.005, "{way} {moved}");
 }
 
 #[test]

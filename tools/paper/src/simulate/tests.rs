@@ -41,32 +41,6 @@ fn kaist_has_its_columns_and_rates() {
     );
 }
 
-/// The increments sum to the turn of the pose, except for the Earth's rate and the gyro's errors, and the counts give
-/// the distance.
-#[test]
-fn kaist_sensors_agree_with_the_pose() {
-    let folder = tempdir().unwrap();
-    write(&spec(600), folder.path()).unwrap();
-    let fog: f64 = rows(&folder.path().join("sensor_data/fog.csv")).iter().map(|row| row.1[2]).sum();
-    let poses = rows(&folder.path().join("global_pose.csv"));
-    let mut yaw = 0.0;
-    let mut metres = 0.0;
-    for pair in poses.windows(2) {
-        let heading = |pose: &(i64, Vec<f64>)| libm::atan2(pose.1[4], pose.1[0]);
-        let step = heading(&pair[1]) - heading(&pair[0]);
-        yaw += libm::atan2(libm::sin(step), libm::cos(step));
-        let moved = |k: usize| pair[1].1[k] - pair[0].1[k];
-        metres += (moved(3) * moved(3) + moved(7) * moved(7) + moved(11) * moved(11)).sqrt();
-    }
-    let earth = 600.0 * 7.292_115e-5 * libm::sin(36.37f64.to_radians());
-    assert!((fog - yaw - earth).abs() < 0.02, "{fog} {yaw} {earth}");
-    let counts = rows(&folder.path().join("sensor_data/encoder.csv"));
-    let last = &counts[counts.len() - 1].1;
-    let wheels = (last[0] * 0.623_022 + last[1] * 0.622_356) / 2.0 / 4096.0 * std::f64::consts::PI;
-    assert!(metres > 1_500.0, "{metres}");
-    assert!((wheels / metres - 1.0).abs() < 0.005, "{wheels} {metres}");
-}
-
 #[test]
 fn sets_share_devices_and_no_run() {
     let all: Vec<Spec> = [Set::Train, Set::Test, Set::Transfer].iter().flat_map(|set| set.specs()).collect();
