@@ -22,6 +22,7 @@ fn values_are_set_by_name() {
     assert_eq!(refused("imu"), "imu: not NAME=VALUE");
     assert!(refused("latitude=1").contains("no such setting"));
     assert!(refused("can.vdc2.source=128").contains("retired, since VDC2"));
+    assert!(refused("can.yaw.e2e.P05.data_ids=[1,2,3]").contains("profile P01"));
     assert!(refused("slcan_inputs=true").contains("come over CAN"));
     for retired in ["fog_lane.fognet=Simulated", "fog_serial=1"] {
         assert!(refused(retired).contains("retired, because FoGNet"), "{}", refused(retired));

@@ -12,8 +12,9 @@ const NO_FOGNET: &str =
     "retired, because FoGNet no longer runs on this board (`cargo paper tables` runs it on recordings)";
 const NO_LIMITS: &str =
     "retired: a correction is limited to 6 deg/s in the mean of a window, 60 deg/s and 1 deg/s of revisions";
+const ONE_PROFILE: &str = "retired: the own messages have profile P01, whose bytes P11 sends too";
 /// Settings that have gone, with the reason or the successor. A name stands for those below it too.
-const RETIRED: [(&str, &str); 10] = [
+const RETIRED: [(&str, &str); 13] = [
     ("fog_lane.fognet", NO_FOGNET),
     ("fog_serial", NO_FOGNET),
     ("fog_lane", "its name is fog_gyro now"),
@@ -21,6 +22,9 @@ const RETIRED: [(&str, &str); 10] = [
         "can.vdc2",
         "retired, since VDC2 has no place for quality and expected error: use the board's own messages (can.yaw)",
     ),
+    ("can.yaw.e2e.P02", ONE_PROFILE),
+    ("can.yaw.e2e.P05", ONE_PROFILE),
+    ("can.yaw.e2e.P11", ONE_PROFILE),
     ("compensate.max_mean", NO_LIMITS),
     ("compensate.max_single", NO_LIMITS),
     ("compensate.max_revision", NO_LIMITS),
