@@ -27,4 +27,4 @@ pub use blob::{Blob, BlobError};
 pub use fognet::FogNet;
 pub use fognet_blob::FogBlob;
 pub use gyronet::{GyroNet, GyroNetState};
-pub use window::{Corrections, Estimate, FEATURES, Features, SCALE_MAX, SCALE_MIN, WINDOW, WindowNetwork};
+pub use window::{Corrections, Estimate, FEATURES, Features, WINDOW, WindowNetwork};

@@ -30,7 +30,6 @@
 pub mod activation;
 pub mod bilstm;
 pub mod dense;
-pub mod exp2;
 pub mod linear;
 pub mod lstm;
 pub mod reference;

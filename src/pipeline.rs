@@ -409,7 +409,7 @@ impl Pipeline {
 
     /// Applies the estimate that is due at this tick; counts one that did not arrive in time.
     fn use_estimate(&mut self, tick: u32) -> Option<Implausible> {
-        let State { windows, compensator, uncertainty, counters, .. } = &mut self.state;
+        let State { windows, compensator, counters, .. } = &mut self.state;
         let Some(estimate) = windows.take_estimate(tick, self.config.compensate.stride.delay())? else {
             count(&mut counters.late, 1);
             windows.reject(Faults::LATE);
@@ -420,7 +420,6 @@ impl Pipeline {
         match compensator.revise(&estimate) {
             Ok(()) => {
                 windows.accept();
-                uncertainty.window(estimate.scale);
                 None
             }
             Err(implausible) => {

@@ -43,9 +43,8 @@ pub fn upload(flash: &Flash, slot: Slot, file: &[u8]) -> Result<(), String> {
 pub fn other_weights(bits: u8) -> Vec<u8> {
     let mut file = weights::GYRONET.0.to_vec();
     let end = file.len() - 4;
-    // After that byte come two more bytes of the bias, the multiplier, the other row (120 weights, 8 bytes) and the
-    // unit.
-    file[end - (2 + 1 + 4 + 2 * 120 + 8 + 4)] ^= bits;
+    // After that byte come two more bytes of the bias, and the multiplier.
+    file[end - (2 + 1 + 4)] ^= bits;
     let crc = CRC.checksum(&file[..end]);
     file[end..].copy_from_slice(&crc.to_le_bytes());
     file

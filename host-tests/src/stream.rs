@@ -2,15 +2,11 @@
 
 use crate::synthetic::{rate, turning};
 use gyronet::health::{Faults, Status};
+use gyronet::model::Estimate;
 use gyronet::model::window::WINDOW;
-use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::{BoardState, DueWindow, Output, Pipeline, PipelineConfig};
 use gyronet::sample::ImuSample;
-use gyronet::units::AngularRate;
 
-/// An estimate of a network that corrects nothing.
-pub const NOTHING: Estimate =
-    Estimate { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MIN, ..Estimate::NONE };
 /// First tick after static initialisation, if nothing disturbs it.
 pub const KNOWN: u64 = 300;
 
@@ -25,7 +21,7 @@ pub fn drive(ticks: impl IntoIterator<Item = u64>) -> impl Iterator<Item = ImuSa
 
 /// Returns a network whose corrections are always the same, rad/s.
 pub fn constant(correction: f64) -> impl FnMut(&DueWindow) -> Option<Estimate> {
-    move |_| Some(Estimate { corrections: [rate(correction); WINDOW], ..NOTHING })
+    move |_| Some(Estimate { corrections: [rate(correction); WINDOW], ..Estimate::NONE })
 }
 
 /// Runs samples through a pipeline; estimates are delivered at once, and for `None` nothing is delivered.

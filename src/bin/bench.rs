@@ -38,7 +38,7 @@ mod firmware {
     use gyronet::model::gyronet::GyroNetState;
     use gyronet::model::seconds::{Minute, STEPS, Second};
     use gyronet::model::window::{FEATURES, Features, WINDOW};
-    use gyronet::model::{Blob, Estimate, FogBlob, FogNet, GyroNet, SCALE_MIN, WindowNetwork, weights};
+    use gyronet::model::{Blob, Estimate, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
     use gyronet::nn::Aligned;
     use gyronet::nn::dense::Dense;
     use gyronet::nn::lstm::{self, DirectionWeights, Scratch};
@@ -211,11 +211,7 @@ mod firmware {
                 };
                 let _ = black_box(coprocessor.imu(black_box(sample), time, &mut send));
                 if let Some(due) = coprocessor.window() {
-                    let estimate = Estimate {
-                        corrections: [AngularRate(1_000); WINDOW],
-                        scale: SCALE_MIN,
-                        ..Estimate::NONE
-                    };
+                    let estimate = Estimate { corrections: [AngularRate(1_000); WINDOW], ..Estimate::NONE };
                     let _ = coprocessor.deliver(due.end, estimate);
                 }
             }

@@ -129,7 +129,7 @@ mod firmware {
         differences
     }
 
-    /// Returns the CRC-32 of the corrections and scales of sixteen random windows.
+    /// Returns the CRC-32 of the corrections of sixteen random windows.
     fn hash() -> Option<u32> {
         // Too large for the stack.
         let state = cortex_m::singleton!(: GyroNetState<HIDDEN> = GyroNetState::ZERO)?;
@@ -145,7 +145,7 @@ mod firmware {
                 }
             }
             let estimate = network.estimate(&window);
-            for rate in estimate.corrections.iter().chain([&estimate.scale]) {
+            for rate in estimate.corrections {
                 digest.update(&rate.0.to_le_bytes());
             }
         }

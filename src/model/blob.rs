@@ -9,8 +9,6 @@
 //! | 80 + P | i32 x 60 x 10 | the linear part, if there is one: a row for each sample's output ([`Blob::linear`]) |
 //! | ... | | four directions, if there are units: layer 1 forward, backward, layer 2 forward, backward |
 //! | ... | i16 x 2H, i32, i32 | if there are units, gyro error: weights, bias, multiplier to a rate code |
-//! | ... | i16 x 2H, i32, i32 | if there are units, log2 of its scale: weights, bias, multiplier to Q16 |
-//! | ... | u32 | [`Blob::scale_unit`] |
 
 pub use super::file::{BlobError, CRC, GYRONET, MAGIC, Normalisation, Topology, VERSION};
 
@@ -62,8 +60,8 @@ impl Shape {
     pub const fn file_len(self, provenance: usize) -> usize {
         let linear = if self.linear { 4 * WINDOW * LINEAR_INPUTS } else { 0 };
         let units = self.units as usize;
-        let network = if units > 0 { layers_len(units, FEATURES) + 2 * dense_len(2 * units) } else { 0 };
-        HEADER_LEN + provenance + linear + network + 4 + 4
+        let network = if units > 0 { layers_len(units, FEATURES) + dense_len(2 * units) } else { 0 };
+        HEADER_LEN + provenance + linear + network + 4
     }
 
     /// Reads a topology; `None` if its sizes are not supported or it has no part.
@@ -92,11 +90,6 @@ pub struct Blob<'w> {
     pub layers: Option<[Layer<'w>; 2]>,
     /// Row of the output layer for a step's gyro error, as a rate code; empty without layers.
     pub gyro_error: Dense<'w>,
-    /// Row of the output layer whose sum over the steps is log2 of scale / [`Blob::scale_unit`], in Q16; empty without
-    /// layers.
-    pub log_scale: Dense<'w>,
-    /// The scale at which the log is zero, as a rate code; without layers, the scale of every window.
-    pub scale_unit: u32,
     /// The file's own checksum, which identifies this set of weights.
     pub crc: u32,
     /// The bytes that the checksum covers.
@@ -130,29 +123,15 @@ impl<'w> Blob<'w> {
             true => Some(differential(reader.linear(WINDOW, LINEAR_INPUTS)?)?),
             false => None,
         };
-        let (mut layers, mut gyro_error, mut log_scale) = (None, Dense::EMPTY, Dense::EMPTY);
+        let (mut layers, mut gyro_error) = (None, Dense::EMPTY);
         if units > 0 {
             let layers = layers.insert(reader.layers(units, FEATURES)?);
-            (gyro_error, log_scale) = (reader.dense(2 * units)?, reader.dense(2 * units)?);
+            gyro_error = reader.dense(2 * units)?;
             check_rows(layers, input_clamp.into(), 0)?;
             check_dense(&gyro_error)?;
-            check_dense(&log_scale)?;
         }
-        let scale_unit = reader.i32()? as u32;
         // The header has been checked, so the checksum is present.
         let content = bytes.get(..bytes.len().saturating_sub(4)).unwrap_or_default();
-        Ok(Self {
-            provenance,
-            shape,
-            normalisation,
-            input_clamp,
-            linear,
-            layers,
-            gyro_error,
-            log_scale,
-            scale_unit,
-            crc,
-            content,
-        })
+        Ok(Self { provenance, shape, normalisation, input_clamp, linear, layers, gyro_error, crc, content })
     }
 }

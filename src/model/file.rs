@@ -6,7 +6,7 @@
 //! | offset | type | field |
 //! |---|---|---|
 //! | 0 | 4 bytes | magic `GYRN` |
-//! | 4 | u16 | format version: 3 for GyroNet, 4 for FoGNet |
+//! | 4 | u16 | format version: 5 for GyroNet, 4 for FoGNet |
 //! | 6 | u16 | network, 1 = GyroNet, 2 = FoGNet |
 //! | 8 | u32 | length of the whole file, checksum included |
 //! | 12 | u16 x 4 | window, inputs, hidden units a direction, layers |
@@ -26,7 +26,7 @@ use crate::nn::{HIDDEN_MAX, bilstm::Layer, dense::Dense, linear::Linear};
 /// A weight file begins with these bytes.
 pub const MAGIC: [u8; 4] = *b"GYRN";
 /// The format version of GyroNet's files that this code reads.
-pub const VERSION: u16 = 3;
+pub const VERSION: u16 = 5;
 /// The format version of FoGNet's files that this code reads.
 pub const FOGNET_VERSION: u16 = 4;
 /// This number in the header stands for GyroNet.
@@ -80,7 +80,7 @@ pub enum BlobError {
     Crc { computed: u32, stored: u32 },
     #[error("weight file: provenance is not UTF-8")]
     Provenance,
-    #[error("weight file: input clamp or output scale out of range")]
+    #[error("weight file: input clamp or output row out of range")]
     Scale,
     #[error("weight file: layer {layer}, direction {direction}, unit {unit} could overflow its accumulator")]
     RowBound {

@@ -1,5 +1,4 @@
-//! Runs GyroNet in integers: from ten samples it estimates the yaw gyro's error at each of them, and the
-//! uncertainty of these estimates.
+//! Runs GyroNet in integers: from ten samples it estimates the yaw gyro's error at each of them.
 //!
 //! The error is the sum of a linear part, computed from the features' codes without rounding them, and of the output
 //! of two layers of Bi-LSTMs. A weight file has one or both, with Bi-LSTMs of any size up to the paper's.
@@ -7,11 +6,11 @@
 use super::blob::{Blob, BlobError, HIDDEN};
 use super::input::load_step;
 use super::weights;
-use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
+use super::{Estimate, WindowNetwork};
 use crate::model::window::{FEATURES, Features, WINDOW};
 use crate::nn::bilstm::{Direction, Run};
 use crate::nn::lstm::{DirectionWeights, Scratch};
-use crate::nn::{dense::Dense, exp2::times_exp2, linear::Linear};
+use crate::nn::{dense::Dense, linear::Linear};
 use crate::units::AngularRate;
 
 /// The working memory of one window, for networks of up to `UNITS` units a direction: 0, 4, 8 and so on up to
@@ -104,8 +103,8 @@ pub struct Arrays<const U: usize, const W: usize, const R: usize> {
     recurrent: [u32; R],
     /// The outputs of the linear part.
     linear: [i32; WINDOW],
-    /// Sums of the gyro error's row and of the log scale's row for each sample; they start from the biases.
-    sums: [[i32; 2]; WINDOW],
+    /// Sums of the gyro error's row for each sample; they start from its bias.
+    sums: [i32; WINDOW],
     clamped_inputs: u16,
     /// The position in the window in progress.
     run: Run,
@@ -120,7 +119,7 @@ impl<const U: usize, const W: usize, const R: usize> Arrays<U, W, R> {
             scratch: Scratch::ZERO,
             recurrent: [0; R],
             linear: [0; _],
-            sums: [[0; _]; _],
+            sums: [0; _],
             clamped_inputs: 0,
             run: Run::new(),
             under_way: false,
@@ -135,7 +134,7 @@ impl<const U: usize, const W: usize, const R: usize> WindowRun for Arrays<U, W, 
         for (output, row) in self.linear.iter_mut().zip(blob.linear.iter().flat_map(Linear::rows)) {
             *output = Linear::output(row, window.as_flattened());
         }
-        self.sums = [[blob.gyro_error.bias, blob.log_scale.bias]; WINDOW];
+        self.sums = [blob.gyro_error.bias; WINDOW];
         self.run = Run::new();
         self.under_way = true;
     }
@@ -149,12 +148,10 @@ impl<const U: usize, const W: usize, const R: usize> WindowRun for Arrays<U, W, 
             let units = layers[0].forward.units();
             let layer1 = layer1.as_flattened_mut().get_mut(..WINDOW * units).unwrap_or_default();
             let more = run.advance(layers, input, layer1, scratch, recurrent, |direction, step, hidden| {
-                let Some(sums) = sums.get_mut(step) else { return };
-                for (sum, row) in sums.iter_mut().zip([&blob.gyro_error, &blob.log_scale]) {
-                    let (forward, backward) = row.weights.split_at_checked(units).unwrap_or_default();
-                    let weights = if direction == Direction::Forward { forward } else { backward };
-                    *sum = sum.wrapping_add(Dense::partial(weights, hidden));
-                }
+                let Some(sum) = sums.get_mut(step) else { return };
+                let (forward, backward) = blob.gyro_error.weights.split_at_checked(units).unwrap_or_default();
+                let weights = if direction == Direction::Forward { forward } else { backward };
+                *sum = sum.wrapping_add(Dense::partial(weights, hidden));
             });
             if more {
                 return None;
@@ -162,14 +159,10 @@ impl<const U: usize, const W: usize, const R: usize> WindowRun for Arrays<U, W, 
         }
         *under_way = false;
         let corrections = core::array::from_fn(|step| {
-            let ([error, _], linear) = (sums[step], linear[step]);
-            AngularRate(blob.gyro_error.scale(error).saturating_add(linear))
+            AngularRate(blob.gyro_error.scale(sums[step]).saturating_add(linear[step]))
         });
-        let log_scale =
-            sums.iter().fold(0, |sum: i32, [_, log]| sum.saturating_add(blob.log_scale.scale(*log)));
-        let scale = AngularRate(times_exp2(blob.scale_unit, log_scale)).clamp(SCALE_MIN, SCALE_MAX);
         let linear_sum = linear.iter().map(|part| i64::from(*part)).sum();
-        Some(Estimate { corrections, scale, clamped_inputs: *clamped_inputs, linear_sum })
+        Some(Estimate { corrections, clamped_inputs: *clamped_inputs, linear_sum })
     }
 
     fn stop(&mut self) {

@@ -1,7 +1,7 @@
 //! Computes GyroNet in f32 from the tensors of training; it defines what the integer network approximates.
 
 use super::blob::{HIDDEN, LINEAR_INPUTS};
-use super::{Estimate, SCALE_MAX, SCALE_MIN, WindowNetwork};
+use super::{Estimate, WindowNetwork};
 use crate::model::window::{FEATURES, Features, WINDOW};
 use crate::nn::reference::{LstmWeights, dense, lstm};
 use crate::units::{AngularRate, SpecificForce};
@@ -13,8 +13,6 @@ pub struct GyroNetF32<'w> {
     pub input_mean: [f32; FEATURES],
     /// Standard deviation of each feature.
     pub input_std: [f32; FEATURES],
-    /// rad/s per unit of the last layer; without Bi-LSTMs the scale of every window.
-    pub output_scale: f32,
     /// (N, N F): weights of each sample's gyro error over all features of the window, if there is a linear part.
     pub linear: Option<&'w [f32]>,
     /// The Bi-LSTMs, if there are any.
@@ -24,14 +22,16 @@ pub struct GyroNetF32<'w> {
 /// Holds the tensors of the Bi-LSTMs and of the layer on top of them.
 #[derive(Debug, Clone, Copy)]
 pub struct NetworkF32<'w> {
+    /// rad/s per unit of the last layer.
+    pub output_scale: f32,
     /// Layer 1: forward, backward.
     pub lstm1: [LstmWeights<'w>; 2],
     /// Layer 2: forward, backward.
     pub lstm2: [LstmWeights<'w>; 2],
-    /// (2, 2H): a row for the gyro error and one for the log of its scale.
+    /// (1, 2H): the row for the gyro error.
     pub fc_weight: &'w [f32],
-    /// (2): the biases of both rows.
-    pub fc_bias: [f32; 2],
+    /// (1): its bias.
+    pub fc_bias: f32,
 }
 
 /// Holds every layer's output for one window; the places of units that a smaller network lacks are zero.
@@ -47,8 +47,6 @@ pub struct LayerOutputs {
     pub layer2: [[f32; 2 * HIDDEN]; WINDOW],
     /// Gyro error, rad/s.
     pub gyro_error: [f32; WINDOW],
-    /// Log of the scale of the mean's Laplace error, in units of the output scale.
-    pub log_scale: f32,
 }
 
 impl GyroNetF32<'_> {
@@ -61,10 +59,9 @@ impl GyroNetF32<'_> {
             row.map_or(0.0, |row| dense(row, 0.0, window.as_flattened()))
         });
         let (layer1, layer2) = ([[0.0; 2 * HIDDEN]; WINDOW], [[0.0; 2 * HIDDEN]; WINDOW]);
-        let mut outputs =
-            LayerOutputs { normalised, linear, layer1, layer2, gyro_error: linear, log_scale: 0.0 };
+        let mut outputs = LayerOutputs { normalised, linear, layer1, layer2, gyro_error: linear };
         if let Some(network) = &self.network {
-            network.run(self.output_scale, &mut outputs);
+            network.run(&mut outputs);
         }
         outputs
     }
@@ -72,8 +69,8 @@ impl GyroNetF32<'_> {
 
 impl NetworkF32<'_> {
     /// Fills in the layers' outputs, and adds the last one to the gyro error.
-    fn run(&self, output_scale: f32, outputs: &mut LayerOutputs) {
-        let LayerOutputs { normalised, layer1, layer2, gyro_error, log_scale, .. } = outputs;
+    fn run(&self, outputs: &mut LayerOutputs) {
+        let LayerOutputs { normalised, layer1, layer2, gyro_error, .. } = outputs;
         let units = self.lstm1[0].units();
         for (direction, backward) in [false, true].into_iter().enumerate() {
             lstm::<FEATURES, HIDDEN, _>(
@@ -87,12 +84,9 @@ impl NetworkF32<'_> {
         for (direction, backward) in [false, true].into_iter().enumerate() {
             lstm::<_, HIDDEN, _>(&self.lstm2[direction], layer1, backward, layer2, direction * units);
         }
-        let (error_weight, log_weight) = self.fc_weight.split_at(2 * units);
-        let [error_bias, log_bias] = self.fc_bias;
         for (error, h) in gyro_error.iter_mut().zip(&*layer2) {
-            *error += dense(error_weight, error_bias, h) * output_scale;
+            *error += dense(self.fc_weight, self.fc_bias, h) * self.output_scale;
         }
-        *log_scale = layer2.iter().map(|h| dense(log_weight, log_bias, h)).sum::<f32>() / WINDOW as f32;
     }
 }
 
@@ -105,13 +99,11 @@ impl WindowNetwork for GyroNetF32<'_> {
                 features[k] as f32 / per_unit
             })
         });
-        let LayerOutputs { linear, gyro_error, log_scale, .. } = self.layers(&units);
+        let LayerOutputs { linear, gyro_error, .. } = self.layers(&units);
         // A number that does not fit is as implausible as the largest one that fits.
         let code = |rate| AngularRate::from_rad_per_sec(rate).unwrap_or(AngularRate(i32::MAX));
         let (corrections, linear) = (gyro_error.map(code), linear.map(code));
         let linear_sum = linear.iter().map(|part| i64::from(part.0)).sum();
-        let scale = AngularRate::from_rad_per_sec(self.output_scale * libm::expf(log_scale))
-            .map_or(SCALE_MAX, |scale| scale.clamp(SCALE_MIN, SCALE_MAX));
-        Estimate { corrections, scale, clamped_inputs: 0, linear_sum }
+        Estimate { corrections, clamped_inputs: 0, linear_sum }
     }
 }

@@ -71,11 +71,6 @@ impl<T: Copy, const N: usize> Ring<T, N> {
 /// Holds estimates of the yaw gyro's error, one for each sample of a window, oldest first.
 pub type Corrections = [AngularRate; WINDOW];
 
-/// The smallest [`Estimate::scale`]: 2^-20 rad/s (0.2 deg/h), far below what a window can resolve.
-pub const SCALE_MIN: AngularRate = AngularRate(1 << 7);
-/// The largest [`Estimate::scale`]: 1 rad/s, which means that the estimate is useless.
-pub const SCALE_MAX: AngularRate = AngularRate(1 << AngularRate::FRACTION_BITS);
-
 /// Turns a window into corrections; the integer network and the f32 reference implement it.
 pub trait WindowNetwork {
     /// Runs the network over one window.
@@ -88,15 +83,12 @@ impl<N: WindowNetwork + ?Sized> WindowNetwork for &mut N {
     }
 }
 
-/// Holds the result of a window: the gyro's error in each sample, and the expected error of the estimate.
+/// Holds the result of a window: the gyro's error in each sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
     /// The corrections.
     pub corrections: Corrections,
-    /// The expected absolute error of the mean of the window's corrected rates, as the scale of a Laplace distribution,
-    /// between [`SCALE_MIN`] and [`SCALE_MAX`].
-    pub scale: AngularRate,
     /// Input values that had to be clamped to the network's range.
     pub clamped_inputs: u16,
     /// Sum of the linear parts of the corrections, codes. It contains no constant, because a linear part answers none.
@@ -104,7 +96,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// An estimate without a correction, with the largest scale.
+    /// An estimate without a correction.
     pub const NONE: Self =
-        Self { corrections: [AngularRate::ZERO; WINDOW], scale: SCALE_MAX, clamped_inputs: 0, linear_sum: 0 };
+        Self { corrections: [AngularRate::ZERO; WINDOW], clamped_inputs: 0, linear_sum: 0 };
 }

@@ -7,7 +7,7 @@
 //! | part | sigma of a second's mean rate | over a minute |
 //! |---|---|---|
 //! | noise of the gyro; at standstill the angle by which an engine shakes the vehicle | a constant | adds in squares |
-//! | network | a share of the error that it predicts for its windows ([`crate::model::Estimate::scale`]), and of the angle that it takes off to and fro, now and a second ago, which may be the vehicle's own shake | adds in squares |
+//! | network | a share of the angle that it takes off to and fro, now and a second ago, which may be the vehicle's own shake | adds in squares |
 //! | network in a turn that begins or ends | a share of its correction, at most one of the rates | |
 //! | bias | from earlier drives and the zero-rate updates | adds linearly |
 //! | rate that standstill has set to zero | its mean; of the end of the second where it is larger, by more than an engine shakes | adds linearly |
@@ -29,9 +29,7 @@ use swing::Swing;
 /// The sizes of the errors that are not estimated while driving.
 #[derive(Debug, Clone, Copy)]
 pub struct UncertaintyConfig {
-    /// Sigma of a second's error over the RMS of the scales of its windows, beside the noise.
-    pub per_scale: f32,
-    /// Sigma of a second by the gyro's noise, which no network knows, rad/s.
+    /// Sigma of a second that the network has corrected, beside the shake, rad/s.
     pub noise: f32,
     /// Sigma of a second that the network has not corrected, rad/s.
     pub uncorrected: f32,
@@ -53,21 +51,18 @@ pub struct GyroErrors {
 }
 
 impl UncertaintyConfig {
-    /// The noise is between those of an MTi and of an ICM-42688-P, 0.01 and 0.003 deg/s/sqrt(Hz). The factor of the scales and the
+    /// The noise is between those of an MTi and of an ICM-42688-P, 0.01 and 0.003 deg/s/sqrt(Hz). It and the
     /// shares below were fitted to the training drives and to situations with a seed that no test has (`situations --seed
     /// 101`): no second may be off by more than four sigma, for which cars have more than 75 % of their straight seconds inside
     /// one. Gain and mounting: a data sheet's 0.5 % at most, mounted by eye; a calibration refuses what it does not know to 0.5 % and 0.02.
     pub const DEFAULT: Self = Self {
-        per_scale: 0.15,
-        noise: 1.5e-4,
+        noise: 1.7e-4,
         uncorrected: 2.5e-4,
         unknown: GyroErrors { gain: 0.003, mounting: 0.03, model: 0.6 },
         known: GyroErrors { gain: 0.0015, mounting: 0.01, model: 0.0 },
     };
 }
 
-/// The network's predicted error is averaged over this many windows: about a second at the default stride.
-const WINDOWS: f32 = 20.0;
 /// Share of the angle taken off to and fro that is the vehicle's own; the rest is noise.
 const SHAKES: f32 = 0.7;
 /// Share of a correction that is the turn's own where the rates change, and its largest share of the rates.
@@ -136,8 +131,6 @@ impl Part {
 pub struct Uncertainty {
     config: UncertaintyConfig,
     errors: GyroErrors,
-    /// Running mean square of the windows' scales, (rad/s)^2.
-    scale_square: Option<f32>,
     /// The last second, the newest block first, and the samples in that block.
     blocks: [Turns; BLOCKS],
     samples: u32,
@@ -158,7 +151,6 @@ impl Uncertainty {
         Self {
             config,
             errors: config.unknown,
-            scale_square: None,
             blocks: [[0.0; TURNS]; BLOCKS],
             samples: 0,
             swing: Swing::over(4.0),
@@ -167,14 +159,6 @@ impl Uncertainty {
             parts: [Part::EMPTY; PARTS + 1],
             in_part: 0,
         }
-    }
-
-    /// Adds the error that the network predicts for a window.
-    pub fn window(&mut self, scale: AngularRate) {
-        let scale = rad_per_sec(scale);
-        let square = scale * scale;
-        let before = self.scale_square.unwrap_or(square);
-        self.scale_square = Some(before + (square - before) / WINDOWS);
     }
 
     /// Notes whether this unit is calibrated.
@@ -279,14 +263,11 @@ impl Uncertainty {
 
     /// The variance of a second's own error, (rad/s)^2.
     fn own(&self, origin: Origin) -> f32 {
-        let UncertaintyConfig { per_scale, noise, uncorrected, .. } = self.config;
-        match (origin, self.scale_square) {
-            (Origin::Standstill, _) => self.swing.ends(),
-            (Origin::Network, Some(scale_square)) => {
-                let shake = SHAKES * SHAKES * self.corrected.ends();
-                noise * noise + per_scale * per_scale * scale_square + shake
-            }
-            _ => uncorrected * uncorrected,
+        let UncertaintyConfig { noise, uncorrected, .. } = self.config;
+        match origin {
+            Origin::Standstill => self.swing.ends(),
+            Origin::Network => noise * noise + SHAKES * SHAKES * self.corrected.ends(),
+            Origin::Gyro => uncorrected * uncorrected,
         }
     }
 

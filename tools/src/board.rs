@@ -32,9 +32,7 @@ pub struct Uncorrected;
 
 impl WindowNetwork for Uncorrected {
     fn estimate(&mut self, _window: &[Features; WINDOW]) -> Estimate {
-        let corrections = [AngularRate::ZERO; WINDOW];
-        // A scale of 1e-3 rad/s gives a second the sigma of an uncorrected rate.
-        Estimate { corrections, scale: AngularRate(134_218), ..Estimate::NONE }
+        Estimate::NONE
     }
 }
 

@@ -40,7 +40,7 @@ fn lines<const LEN: usize>(units: u16) -> Vec<String> {
     let line = |n| {
         let estimate = network.estimate(&models::window(&mut numbers, n));
         let mut line = format!("units_{units} {n}");
-        for rate in estimate.corrections.iter().chain([&estimate.scale]) {
+        for rate in estimate.corrections {
             let _ = write!(line, " {:08x}", rate.0);
         }
         format!("{line} {}", estimate.clamped_inputs)

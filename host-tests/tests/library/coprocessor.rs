@@ -9,6 +9,7 @@ use gyronet::can::yaw::FOG_IDS;
 use gyronet::compensate::DELAY;
 use gyronet::coprocessor::{Clock, InputError, Observation, StorageFaults};
 use gyronet::health::{Faults, InputCounters, Quality, Status};
+use gyronet::model::Estimate;
 use gyronet::pipeline::DueWindow;
 use gyronet::sample::{FogSample, PERIOD_US, Standstill};
 use gyronet::units::{Angle, Duration, Micros};
@@ -16,7 +17,6 @@ use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::inputs::wheels;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::sent::Sent;
-use gyronet_host_tests::stream::NOTHING;
 use gyronet_host_tests::synthetic::idling;
 use gyronet_host_tests::wire::{data_frame, id11};
 use gyronet_tools::drive::wheel_frames::receiver;
@@ -85,7 +85,7 @@ fn a_window_is_handed_out_once_and_its_estimate_is_used_two_samples_later() {
     let mut car = Car::new(Config::DEFAULT);
     let window = car.until_window();
     assert_eq!(car.coprocessor.window(), None);
-    car.coprocessor.deliver(window.end, NOTHING).expect("the window that is due");
+    car.coprocessor.deliver(window.end, Estimate::NONE).expect("the window that is due");
     for sample in 1..=DELAY {
         let status = car.sample().vehicle.live.status;
         assert_eq!(status == Status::Ready, sample == DELAY, "{sample}");
@@ -96,16 +96,16 @@ fn a_window_is_handed_out_once_and_its_estimate_is_used_two_samples_later() {
 fn an_estimate_for_no_window_is_an_error_and_counted() {
     let mut car = Car::new(Config::DEFAULT);
     let missing = |end| Err(InputError::NoWindow { end });
-    assert_eq!(car.coprocessor.deliver(3, NOTHING), missing(3), "before the first window");
+    assert_eq!(car.coprocessor.deliver(3, Estimate::NONE), missing(3), "before the first window");
     let window = car.until_window();
-    assert_eq!(car.coprocessor.deliver(window.end + 1, NOTHING), missing(window.end + 1));
-    assert_eq!(car.coprocessor.deliver(window.end, NOTHING), Ok(()));
-    assert_eq!(car.coprocessor.deliver(window.end, NOTHING), missing(window.end), "twice");
+    assert_eq!(car.coprocessor.deliver(window.end + 1, Estimate::NONE), missing(window.end + 1));
+    assert_eq!(car.coprocessor.deliver(window.end, Estimate::NONE), Ok(()));
+    assert_eq!(car.coprocessor.deliver(window.end, Estimate::NONE), missing(window.end), "twice");
     let late = car.until_window();
     for _ in 0..DELAY {
         let _ = car.sample();
     }
-    assert_eq!(car.coprocessor.deliver(late.end, NOTHING), missing(late.end), "its turn has passed");
+    assert_eq!(car.coprocessor.deliver(late.end, Estimate::NONE), missing(late.end), "its turn has passed");
     assert_eq!(car.counted().unclaimed_estimates, 4);
     assert_eq!(car.coprocessor.pipeline().counters().late, 1);
     assert!(missing(3).is_err_and(|error: InputError| error.to_string() == "no window waits for estimate 3"));
@@ -175,7 +175,7 @@ fn the_next_sample_waits_for_the_estimate_until_it_is_late() {
     assert!(!car.coprocessor.is_ready(now));
     assert!(!car.coprocessor.is_ready(Micros(now.0 + u64::from(DELAY) * PERIOD_US - 1)));
     let mut waited = car.coprocessor.clone();
-    waited.deliver(window.end, NOTHING).expect("the window that is due");
+    waited.deliver(window.end, Estimate::NONE).expect("the window that is due");
     assert!(waited.is_ready(now));
     let late = Micros(now.0 + u64::from(DELAY) * PERIOD_US);
     assert!(car.coprocessor.is_ready(late));
@@ -222,7 +222,7 @@ fn damage_and_losses_are_reported_with_every_set() {
     let mut lost = Car::new(Config { storage, ..Config::DEFAULT });
     loop {
         let window = lost.until_window();
-        lost.coprocessor.deliver(window.end, NOTHING).expect("the window that is due");
+        lost.coprocessor.deliver(window.end, Estimate::NONE).expect("the window that is due");
         let sent = lost.sample().vehicle;
         if sent.live.status == Status::Ready {
             // No rate is better than degraded with another vehicle's configuration.

@@ -6,11 +6,11 @@ use gyronet::heading::{
     Fix, GnssLine, GnssProtocol, GnssSettings, Heading, HeadingConfigError, HeadingError, HeadingReceiver,
     HeadingSettings, Refusal,
 };
+use gyronet::model::Estimate;
 use gyronet::sensor::ByteSource;
 use gyronet::units::Micros;
 use gyronet_host_tests::gnss::{Pvt, sentence, sources, ubx};
 use gyronet_host_tests::sent::Sent;
-use gyronet_host_tests::stream::NOTHING;
 use gyronet_host_tests::winding::Winding;
 use gyronet_host_tests::wire::{bytes, feed};
 
@@ -208,7 +208,7 @@ fn drive(settings: HeadingSettings, clock: Clock) -> (Vec<DataFrame>, u32) {
         }
         let _ = coprocessor.imu(sample, sample.time, &mut sent).expect("in order");
         while let Some(due) = coprocessor.window() {
-            coprocessor.deliver(due.end, NOTHING).expect("the window that is due");
+            coprocessor.deliver(due.end, Estimate::NONE).expect("the window that is due");
         }
     }
     let used = coprocessor.course_state().counters.used;

@@ -7,9 +7,9 @@ use gyronet::heading::{
     Heading, HeadingError, HeadingReceiver, HeadingSettings, HeadingSignal, Received, j1939, nmea2000,
 };
 use gyronet::health::slow::Knowledge;
+use gyronet::model::Estimate;
 use gyronet::units::Micros;
 use gyronet_host_tests::sent::Sent;
-use gyronet_host_tests::stream::NOTHING;
 use gyronet_host_tests::winding::Winding;
 use gyronet_host_tests::wire::{data_frame, id11, id29};
 use proptest::prelude::*;
@@ -129,7 +129,7 @@ fn drive(heading: Option<HeadingReceiver>, has_courses: bool) -> (Vec<DataFrame>
             yaws.push((seen.vehicle.live.tick as usize, seen.vehicle.live.yaw.rad()));
         }
         while let Some(due) = coprocessor.window() {
-            coprocessor.deliver(due.end, NOTHING).expect("the window that is due");
+            coprocessor.deliver(due.end, Estimate::NONE).expect("the window that is due");
         }
     }
     let [(from, before), (to, after)] = [yaws[9_100], yaws[11_900]];

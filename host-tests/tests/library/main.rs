@@ -24,7 +24,6 @@ mod fog_pipeline;
 mod fognet_blob;
 mod framer;
 mod gnss;
-mod gyronet_scale;
 mod heading;
 mod icm42688;
 mod jump;

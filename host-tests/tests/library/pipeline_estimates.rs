@@ -9,8 +9,8 @@ use gyronet::compensate::{CompensateConfig, DELAY, MAX_MEAN};
 use gyronet::estimate::YawEstimate;
 use gyronet::health::Status::{Degraded, Init, Ready};
 use gyronet::health::{Faults, Quality, Source};
+use gyronet::model::Estimate;
 use gyronet::model::window::WINDOW;
-use gyronet::model::{Estimate, SCALE_MIN};
 use gyronet::pipeline::{BoardState, DueWindow, Output, Pipeline, PipelineConfig};
 use gyronet::units::{AngularRate, Yaw};
 use gyronet_host_tests::stream::{constant, drive, faults, new, run, statuses};
@@ -73,12 +73,7 @@ fn an_implausible_estimate_is_not_believed() {
     let limit = MAX_MEAN;
     let corrections = |due: &DueWindow| if due.end < 350 { limit } else { AngularRate(limit.0 + 1) };
     let outputs = run(&mut pipeline, drive(0..400), |due| {
-        Some(Estimate {
-            corrections: [corrections(due); WINDOW],
-            scale: SCALE_MIN,
-            clamped_inputs: 1,
-            ..Estimate::NONE
-        })
+        Some(Estimate { corrections: [corrections(due); WINDOW], clamped_inputs: 1, ..Estimate::NONE })
     });
     assert_eq!(statuses(&outputs), [(Init, 300), (Degraded, 11), (Ready, 45), (Degraded, 44)]);
     assert_eq!((pipeline.counters().implausible, pipeline.counters().clamped_inputs), (9, 18));

@@ -4,11 +4,11 @@ use gyronet::align::AlignError;
 use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::coprocessor::{InputError, Observation};
 use gyronet::health::{Faults, Quality, Status};
+use gyronet::model::Estimate;
 use gyronet::sample::{ImuSample, NO_STAMP};
 use gyronet::units::{AngularRate, Micros, Yaw};
 use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::stream::NOTHING;
 use gyronet_host_tests::synthetic::{force, rate, turning};
 
 /// A sensor and its stamps: samples a second of true time, the sensor's clock against true time, jitter of the stamps
@@ -52,7 +52,7 @@ fn drive(sensor: Sensor) -> (f64, Vec<Observation>, Vec<InputError>, u32) {
             errors.push(error);
         }
         if let Some(window) = coprocessor.window() {
-            coprocessor.deliver(window.end, NOTHING).expect("the window that is due");
+            coprocessor.deliver(window.end, Estimate::NONE).expect("the window that is due");
         }
         let _ = coprocessor.poll(now, &mut Seen(&mut seen));
     }

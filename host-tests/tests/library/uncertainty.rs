@@ -20,45 +20,24 @@ fn assert_sigma(found: AngularRate, rad_per_sec: f64, why: &str) {
     );
 }
 
-fn uncertainty(scales: &[f64]) -> Uncertainty {
-    let mut uncertainty = Uncertainty::new(UncertaintyConfig::DEFAULT);
-    scales.iter().for_each(|scale| uncertainty.window(rate(*scale)));
-    uncertainty
-}
-
+/// 2.5e-4 rad/s are 51 deg/h.
 #[test]
-fn a_rate_that_no_window_corrects_is_worth_what_it_is_without_one() {
-    // 2.5e-4 rad/s: 51 deg/h.
-    assert_sigma(uncertainty(&[]).sigma(Origin::Network, 0.0), 2.5e-4, "no window yet");
-    assert_sigma(uncertainty(&[]).sigma(Origin::Gyro, 0.0), 2.5e-4, "not corrected");
-    assert_sigma(uncertainty(&[0.01]).sigma(Origin::Gyro, 0.0), 2.5e-4, "a window, but not corrected by it");
-}
-
-/// A twentieth of the difference in squares: from 16 to 18.4 (mrad/s)^2.
-#[test]
-fn the_squares_of_twenty_windows_are_averaged_and_a_share_counts_beside_the_noise() {
-    let twenty = 16.0 + 48.0 * (1.0 - 0.95f64.powi(20));
-    let changed = [vec![0.004], vec![0.008; 20]].concat();
-    for (scales, mean_square) in
-        [(&[0.004; 50][..], 16.0), (&[0.004, 0.008], 18.4), (&changed, twenty), (&[0.0], 0.0)]
-    {
-        let due = root(&[1.5e-4, 0.15e-3 * mean_square.sqrt()]);
-        assert_sigma(uncertainty(scales).sigma(Origin::Network, 0.0), due, &format!("{mean_square}"));
-    }
+fn a_rate_that_the_network_corrects_has_less_noise() {
+    let uncertainty = Uncertainty::new(UncertaintyConfig::DEFAULT);
+    assert_sigma(uncertainty.sigma(Origin::Network, 0.0), 1.7e-4, "corrected");
+    assert_sigma(uncertainty.sigma(Origin::Gyro, 0.0), 2.5e-4, "not corrected");
 }
 
 /// 3-4-5 and its like: the parts are independent.
 #[test]
 fn a_bias_adds_in_squares() {
-    assert_sigma(uncertainty(&[]).sigma(Origin::Gyro, 6e-4), 6.5e-4, "2.5, 6 and 6.5");
-    let due = root(&[1.5e-4, 3e-3, 4e-3]);
-    assert_sigma(uncertainty(&[0.02]).sigma(Origin::Network, 4e-3), due, "3, 4 and 5");
+    let uncertainty = Uncertainty::new(UncertaintyConfig::DEFAULT);
+    assert_sigma(uncertainty.sigma(Origin::Gyro, 6e-4), 6.5e-4, "2.5, 6 and 6.5");
 }
 
 /// Errors that are easy to tell apart.
 const ERRORS: UncertaintyConfig = UncertaintyConfig {
-    per_scale: 0.25,
-    noise: 0.0,
+    noise: 3e-4,
     uncorrected: 3e-4,
     unknown: GyroErrors { gain: 0.01, mounting: 0.02, model: 0.5 },
     known: GyroErrors { gain: 0.001, mounting: 0.002, model: 0.0 },
@@ -104,7 +83,6 @@ fn a_lasting_correction_may_be_another_unit_s() {
     for (calibrated, share) in [(false, 0.5), (true, 0.0)] {
         let mut uncertainty = Uncertainty::new(ERRORS);
         uncertainty.calibrated(calibrated);
-        uncertainty.window(rate(1.2e-3));
         (0..999).for_each(|_| uncertainty.add(&corrected(-2e-3)));
         let found = uncertainty.sigma(Origin::Network, 0.0).rad_per_sec();
         let due = root(&[3e-4, share * 2e-3]);
@@ -121,7 +99,6 @@ fn four_tenths_of_the_correction_in_a_bend_may_be_the_bend_s_own() {
     let sigma = |turns: f64, estimate: f64| {
         let mut uncertainty = Uncertainty::new(ERRORS);
         uncertainty.calibrated(true);
-        uncertainty.window(rate(1.2e-3));
         let [none, z] = [0.0, turns].map(rate);
         (0..100).for_each(|_| uncertainty.add(&Turning { rates: [none, none, z], ..corrected(estimate) }));
         uncertainty.sigma(Origin::Network, 0.0)
@@ -134,9 +111,8 @@ fn four_tenths_of_the_correction_in_a_bend_may_be_the_bend_s_own() {
 /// A truck at idle: 0.02 rad/s at 9 Hz swing by 2.5e-4 rad RMS at an end of a second that is not known, and seven tenths count.
 #[test]
 fn what_the_network_takes_off_to_and_fro_may_be_the_vehicle_s_own_shake() {
-    let mut uncertainty = Uncertainty::new(ERRORS);
+    let mut uncertainty = Uncertainty::new(UncertaintyConfig { noise: 0.0, ..ERRORS });
     uncertainty.calibrated(true);
-    uncertainty.window(rate(0.0));
     let shake = |step: u32| 0.02 * (f64::from(step) * 0.01 * 9.0 * std::f64::consts::TAU).sin();
     let mut found = Vec::new();
     for step in 0..300 {
@@ -307,7 +283,7 @@ fn a_minute_adds_each_error_by_its_rule_and_forgets_older_ones() {
 #[test]
 fn a_sigma_is_rounded_up_and_ends_with_its_code() {
     let uncorrected = 1.5 / AngularRate::PER_RAD_PER_SEC;
-    let config = UncertaintyConfig { per_scale: 1.0, uncorrected, ..UncertaintyConfig::DEFAULT };
+    let config = UncertaintyConfig { uncorrected, ..UncertaintyConfig::DEFAULT };
     assert_eq!(Uncertainty::new(config).sigma(Origin::Gyro, 0.0), AngularRate(2));
     assert_eq!(Uncertainty::new(config).sigma(Origin::Gyro, 1e9), AngularRate(i32::MAX));
 }

@@ -4,7 +4,7 @@
 use gyronet::model::blob::{LINEAR_INPUTS, Shape};
 use gyronet::model::gyronet::{GyroNetState, Size, Units};
 use gyronet::model::window::{Features, WINDOW};
-use gyronet::model::{Blob, BlobError, GyroNet, SCALE_MIN, WindowNetwork, weights};
+use gyronet::model::{Blob, BlobError, GyroNet, WindowNetwork, weights};
 use gyronet::nn::Aligned;
 use gyronet_host_tests::models;
 use gyronet_host_tests::noise::Noise;
@@ -18,7 +18,7 @@ fn digest(network: &mut impl WindowNetwork) -> u32 {
         let window: [Features; WINDOW] =
             std::array::from_fn(|_| std::array::from_fn(|_| noise.int(-size, size) as i32));
         let estimate = network.estimate(&window);
-        for rate in estimate.corrections.iter().chain([&estimate.scale]) {
+        for rate in estimate.corrections {
             digest.update(&rate.0.to_le_bytes());
         }
         digest.update(&estimate.clamped_inputs.to_le_bytes());
@@ -30,7 +30,7 @@ fn digest(network: &mut impl WindowNetwork) -> u32 {
 #[test]
 fn the_papers_shape_keeps_its_outputs() {
     let blob = Blob::new_checked(&weights::GYRONET.0).expect("the built-in weights");
-    assert_eq!(digest(&mut GyroNet::new(blob)), 3_891_058_405);
+    assert_eq!(digest(&mut GyroNet::new(blob)), 3_501_887_089);
 }
 
 /// Runs a random model in memory of its own size and in the largest one, whose arrays the paper's network used before:
@@ -94,13 +94,13 @@ fn a_model_that_the_memory_does_not_hold_is_refused() {
     );
 }
 
-/// The largest weights and inputs that there are do not wrap, but saturate; a model without units has one scale.
+/// The largest weights and inputs that there are do not wrap, but saturate.
 #[test]
 fn the_linear_part_saturates() {
     const SHAPE: Shape = Shape { units: 0, linear: true };
     let mut file = Aligned(models::file::<{ SHAPE.file_len(0) }>(SHAPE, 4));
     let (header, end) = (gyronet::model::blob::HEADER_LEN, SHAPE.file_len(0) - 4);
-    for (at, weight) in file.0[header..end - 4].as_chunks_mut::<4>().0.iter_mut().enumerate() {
+    for (at, weight) in file.0[header..end].as_chunks_mut::<4>().0.iter_mut().enumerate() {
         // Differences of the first and the last sample in two inputs.
         *weight = match at % LINEAR_INPUTS {
             0 => i32::MAX,
@@ -109,7 +109,6 @@ fn the_linear_part_saturates() {
         }
         .to_le_bytes();
     }
-    file.0[end - 4..end].fill(0);
     let crc = gyronet::model::blob::CRC.checksum(&file.0[..end]).to_le_bytes();
     file.0[end..].copy_from_slice(&crc);
     let blob = Blob::new_checked(&file.0).expect("it is within its bound");
@@ -119,6 +118,6 @@ fn the_linear_part_saturates() {
         (window[0], window[WINDOW - 1]) = ([input; 6], [input.saturating_neg(); 6]);
         let estimate = network.estimate(&window);
         assert_eq!(estimate.corrections.map(|rate| rate.0), [output; WINDOW]);
-        assert_eq!((estimate.scale, estimate.clamped_inputs), (SCALE_MIN, 0));
+        assert_eq!(estimate.clamped_inputs, 0);
     }
 }

@@ -18,8 +18,6 @@ const TRIALS: [u32; 2] = [9, 11];
 const YAW_ERROR: f64 = 0.03;
 /// Largest RMS of the difference of outputs, over the f32 output's own RMS.
 const OUTPUT: f64 = 0.02;
-/// The largest such difference of the scale of the expected error.
-const SCALE: f64 = 0.02;
 
 /// A change for the worse by more than this share of the README's number fails; one for the better is worth a new number.
 const WORSE: f64 = 0.05;
@@ -160,7 +158,6 @@ fn the_integer_network_is_as_good_as_f32_on_real_drives() {
         println!("trial {number:02}: 1 s error {ratio:.4} times that of f32; {quantization:?}");
         assert!((ratio - 1.0).abs() <= YAW_ERROR, "trial {number:02}: 1 s yaw errors differ");
         assert!(quantization.relative_rms() <= OUTPUT, "trial {number:02}: outputs differ");
-        assert!(quantization.scale_rms() <= SCALE, "trial {number:02}: scales differ");
         assert_eq!(quantization.clamped_inputs, 0, "trial {number:02}: inputs were clamped");
         assert!(quantization.windows > 2_000, "trial {number:02}: too few windows were run");
     }

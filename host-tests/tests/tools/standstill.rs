@@ -2,11 +2,11 @@
 
 use crate::standstill_truth::{Truth, read};
 use gyronet::coprocessor::{Clock, Config, Coprocessor};
+use gyronet::model::Estimate;
 use gyronet::pipeline::{BoardState, Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, PERIOD_US, Standstill, Validity, WHEELS, WheelSample};
 use gyronet::units::{Micros, WheelSpeed};
 use gyronet_host_tests::recordings;
-use gyronet_host_tests::stream::NOTHING;
 use gyronet_host_tests::synthetic::{force, rate};
 use gyronet_tools::board::Uncorrected;
 use gyronet_tools::drive::recording::{Recording, Row};
@@ -44,7 +44,7 @@ fn stand(text: &str, config: PipelineConfig, wheels: bool) -> (f64, f64, u32) {
         assert_eq!(output.refused, None);
         // No network has been trained for this part.
         if let Some(due) = output.window {
-            pipeline.deliver(due.end, NOTHING);
+            pipeline.deliver(due.end, Estimate::NONE);
         }
         last = output.vehicle.delayed.yaw.rad().to_degrees();
         largest = largest.max(f64::abs(last));

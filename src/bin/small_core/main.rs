@@ -93,7 +93,7 @@ mod firmware {
                 hprintln!("{} bytes={} ticks={} wrapped={}", name, file.len(), ticks, syst.has_wrapped());
             }
             hprint!("{} {}", name, n);
-            for rate in estimate.corrections.iter().chain([&estimate.scale]) {
+            for rate in estimate.corrections {
                 hprint!(" {:08x}", rate.0);
             }
             hprintln!(" {}", estimate.clamped_inputs);

@@ -125,9 +125,7 @@ pub const fn file<const LEN: usize>(shape: Shape, seed: u32) -> [u8; LEN] {
         to.direction(units, 2 * units);
         to.direction(units, 2 * units);
         to.row(2 * units, 1 << 20);
-        to.row(2 * units, 1 << 10);
     }
-    to.word(1 << 20);
     let (content, _) = to.bytes.split_at(LEN - 4);
     let crc = CRC.checksum(content);
     to.bytes(&crc.to_le_bytes());

@@ -43,8 +43,7 @@ def line(what: str, validation: Validation) -> str:
     """Returns a line of text with the errors of one network."""
     return (
         f"{what}: 1 s error {validation.mean_1s_rad:.6f} rad, over any 1 s {validation.any_1s_rad:.6f}, "
-        f"window mean {validation.window_rad_per_sec:.6f} rad/s at {validation.scale_ratio:.2f} of its scale, "
-        f"log loss {validation.log_loss:.4f}"
+        f"window mean {validation.window_rad_per_sec:.6f} rad/s"
     )
 
 

@@ -1,14 +1,33 @@
-"""The linear part of a window model: a filter of eleven taps around a sample, fitted to drives.
+"""python -m gyronet_train.linear DATA --out FOLDER: fit the shipped model, a filter of eleven taps around a sample.
 
 It removes from the yaw gyro the unit's mounting (roll and pitch rate), its gain, and noise (differences of neighbouring
 gyro and accelerometer samples). A difference of neighbours is zero for a constant input, so the accelerometer's level and
 a constant error do not contribute (`PARTS`). The fit minimises the absolute error of the yaw change over any second, the
-number that the tools print.
+number that the tools print. Mounting and gain of the training unit are fitted beside the rest and left out: they belong
+to the unit, and the board or `gyronet calibrate` finds those of another.
 """
 
-import numpy as np
+import argparse
+import datetime
+import json
+import statistics
+from pathlib import Path
 
-from .recordings import RATE_HZ, STATIC_SAMPLES, STRIDE, WINDOW, Drive, mean_1s_error, overlap_mean, windows
+import numpy as np
+from safetensors.numpy import save_file
+
+from .recordings import (
+    RATE_HZ,
+    STATIC_SAMPLES,
+    STRIDE,
+    WINDOW,
+    Drive,
+    find_drive,
+    load_drive,
+    mean_1s_error,
+    overlap_mean,
+    windows,
+)
 
 REACH = 5
 FEATURES = 6
@@ -42,6 +61,8 @@ PARTS = {
     "accelerometer": np.concatenate([differences(axis) for axis in range(3)]),
     "gain": level(YAW),
 }
+SHIPPED = ("low pass", "accelerometer")
+UNIT = ("mounting", "gain")
 
 
 def seconds(series: np.ndarray) -> np.ndarray:
@@ -125,10 +146,56 @@ def ratio(corrected: np.ndarray, drive: Drive) -> float:
     return mean_1s_error(error) / mean_1s_error(drive.gyro_error)
 
 
-def window_error(outputs: np.ndarray, drives: list[Drive]) -> float:
-    """Returns the mean |error| of a window's mean corrected rate, rad/s, after the static phase."""
-    from_static = slice(STATIC_SAMPLES // STRIDE, None)
-    errors = [
-        (windows(d.gyro_error)[::STRIDE] - corrections(outputs, d)).mean(axis=1)[from_static] for d in drives
-    ]
-    return float(abs(np.concatenate(errors)).mean())
+def leave_one_out(drives: list[Drive], basis: np.ndarray, kept: int) -> dict:
+    """Returns mean and standard deviation over drives of the ratio, with the filter of the other drives."""
+    made = [sums(drive, basis) for drive in drives]
+    ratios = []
+    for k, drive in enumerate(drives):
+        fitted = fit(made[:k] + made[k + 1 :], basis, kept)
+        ratios.append([ratio(corrections(rows(taps), drive), drive) for taps in fitted])
+    names = ("ratio", "ratio with the unit's part")
+    return {n: [round(statistics.mean(v), 4), round(statistics.stdev(v), 4)] for n, v in zip(names, zip(*ratios))}
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="gyronet_train.linear", description=__doc__)
+    parser.add_argument("data", type=Path, help="folder of drives")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the .safetensors file")
+    parser.add_argument("--stem", default="default", help="name of the file")
+    parser.add_argument("--train", nargs="+", default=["02", "03", "04", "06", "07", "08"], metavar="NN")
+    parser.add_argument("--parts", nargs="+", default=SHIPPED, choices=list(PARTS), help="parts of the filter")
+    return parser.parse_args()
+
+
+def main() -> None:
+    args = arguments()
+    drives = [load_drive(find_drive(args.data, n)) for n in args.train]
+    # The filters of the parts, then those of the unit.
+    basis = np.concatenate([PARTS[part] for part in dict.fromkeys([*args.parts, *UNIT])])
+    kept = sum(len(PARTS[part]) for part in args.parts)
+    found = leave_one_out(drives, basis, kept) if len(drives) > 2 else {}
+    for name, (mean, deviation) in found.items():
+        print(f"{name}: {mean:.3f}, standard deviation over drives {deviation:.3f}")
+    part, _ = fit([sums(drive, basis) for drive in drives], basis, kept)
+    features = np.concatenate([drive.features for drive in drives])
+    tensors = {
+        "input_mean": features.mean(axis=0),
+        "input_std": features.std(axis=0),
+        "linear.weight": rows(part).reshape(WINDOW, -1).astype(np.float32),
+    }
+    provenance = {
+        "network": "gyronet",
+        "parts": list(args.parts),
+        "train": [drive.name for drive in drives],
+        "sha256": {drive.name: drive.sha256 for drive in drives},
+        "leave_one_out": found,
+        "date": datetime.date.today().isoformat(),
+    }
+    args.out.mkdir(parents=True, exist_ok=True)
+    path = args.out / f"{args.stem}.safetensors"
+    save_file(tensors, path, metadata={"provenance": json.dumps(provenance, sort_keys=True)})
+    print(path)
+
+
+if __name__ == "__main__":
+    main()

@@ -2,13 +2,12 @@
 
 As in the paper, training uses Adam with an initial rate of 0.0015 and mean absolute error over shuffled
 windows of 0.1 s. Unlike in the paper, turns are added (augment.py), the rate follows one cycle, the
-running mean of the weights is kept, and a scale is trained (loss.py).
+running mean of the weights is kept.
 
 Random numbers are seeded in each epoch, from seed and epoch.
 """
 
 import copy
-import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -18,7 +17,6 @@ import torch
 from tqdm import tqdm
 
 from .augment import turn
-from .loss import window_loss
 from .model import GyroNet
 from .recordings import WINDOW, Drive
 from .validation import Validation, validate_all
@@ -105,8 +103,7 @@ def train(data: Windows, validation: list[Drive], settings: Settings, seed: int,
         total = 0.0
         for x, gyro_error in batches:
             x = turn(x) if settings.turns else x
-            correction, scale = model(x)
-            loss = window_loss(correction - gyro_error, scale, unit)
+            loss = (model(x) - gyro_error).abs().mean() / unit
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
@@ -118,8 +115,7 @@ def train(data: Windows, validation: list[Drive], settings: Settings, seed: int,
             best.load_state_dict(mean.state_dict())
         on_epoch(epochs[-1])
     chosen = best_of(epochs)
-    calibrate(best, chosen.validation.scale_ratio)
-    return Trained(best, validate_all(best, validation), chosen.epoch, time.monotonic() - started, epochs)
+    return Trained(best, chosen.validation, chosen.epoch, time.monotonic() - started, epochs)
 
 
 def best_of(epochs: list[Epoch]) -> Epoch:
@@ -138,9 +134,3 @@ def update_mean(mean: GyroNet, model: GyroNet, memory: float) -> None:
     """Moves the running mean of the weights towards the weights."""
     for old, new in zip(mean.parameters(), model.parameters(), strict=True):
         old.lerp_(new, 1 - memory)
-
-
-@torch.no_grad()
-def calibrate(model: GyroNet, ratio: float) -> None:
-    """Multiplies the scale by a factor, by changing the bias of its log."""
-    model.fc.bias[1] += math.log(ratio)

@@ -16,8 +16,6 @@ class Validation:
     mean_1s_rad: float  # mean |yaw error| over consecutive 1 s windows: the number that the tools print
     any_1s_rad: float  # mean |yaw error| over all 1 s windows, one from each sample, which scatters less
     window_rad_per_sec: float  # mean |error| of the mean of a window's corrected rates
-    scale_ratio: float  # the window error over the scale that the network gives, on average: 1 if it is calibrated
-    log_loss: float  # mean Laplace log loss of the windows' errors, scale in rad/s
 
 
 def validate_all(model: GyroNet, drives: list[Drive]) -> Validation:
@@ -27,26 +25,22 @@ def validate_all(model: GyroNet, drives: list[Drive]) -> Validation:
 
 
 @torch.no_grad()
-def estimates(model: GyroNet, drive: Drive) -> tuple[np.ndarray, np.ndarray]:
-    """Returns corrections (W, N) and scales (W,) of the windows STRIDE apart."""
+def estimates(model: GyroNet, drive: Drive) -> np.ndarray:
+    """Returns corrections (W, N) of the windows STRIDE apart."""
     x = torch.from_numpy(np.ascontiguousarray(windows(drive.features)[::STRIDE]))
-    correction, scale = zip(*(model.eval()(part) for part in x.split(4096)))
-    return torch.cat(correction).numpy(), torch.cat(scale).numpy()
+    return torch.cat([model.eval()(part) for part in x.split(4096)]).numpy()
 
 
 def validate(model: GyroNet, drive: Drive) -> Validation:
     """Runs the network on a drive; returns its errors."""
-    output, scale = estimates(model, drive)
+    output = estimates(model, drive)
     rate_error = drive.gyro_error - overlap_mean(output, len(drive.gyro_error))
     yaw_error = np.cumsum(np.append(0.0, rate_error[STATIC_SAMPLES:])) / RATE_HZ
     moving = slice(STATIC_SAMPLES // STRIDE, None)
     label = windows(drive.gyro_error)[::STRIDE].mean(axis=1)[moving]
     window_error = np.abs(output.mean(axis=1)[moving] - label)
-    scale = scale[moving]
     return Validation(
         mean_1s_rad=mean_1s_error(rate_error),
         any_1s_rad=float(np.abs(yaw_error[RATE_HZ:] - yaw_error[:-RATE_HZ]).mean()),
         window_rad_per_sec=float(window_error.mean()),
-        scale_ratio=float((window_error / scale).mean()),
-        log_loss=float((window_error / scale + np.log(scale)).mean()),
     )

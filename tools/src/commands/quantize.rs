@@ -45,20 +45,16 @@ struct Added {
     drive: String,
     windows: u64,
     relative_rms: f64,
-    /// Relative error of the scale output.
-    scale_rms: f64,
     clamped_inputs: u64,
 }
 
 impl fmt::Display for Added {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { drive, windows, relative_rms, scale_rms, clamped_inputs } = self;
+        let Self { drive, windows, relative_rms, clamped_inputs } = self;
         write!(
             f,
-            "{drive}: quantisation adds {:.2} % RMS ({:.2} % to the scale) over {windows} windows, {clamped_inputs} inputs \
-             clamped",
-            100.0 * relative_rms,
-            100.0 * scale_rms
+            "{drive}: quantisation adds {:.2} % RMS over {windows} windows, {clamped_inputs} inputs clamped",
+            100.0 * relative_rms
         )
     }
 }
@@ -112,7 +108,6 @@ fn convert(args: &Args, common: Common) -> Made {
             drive: drive.name().into(),
             windows: error.windows,
             relative_rms: error.relative_rms(),
-            scale_rms: error.scale_rms(),
             clamped_inputs: error.clamped_inputs,
         });
     }

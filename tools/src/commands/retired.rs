@@ -11,7 +11,7 @@ const RETIRED: [(&str, &str); 20] = [
     ("bus", "tools/gyronet.dbc, with `gyronet device set`, which refuses what loads the bus too much,"),
     ("paper", "`make -f tools/paper/Makefile`"),
     ("tables", "`cargo paper tables`"),
-    ("train", "`python -m gyronet_train.beside` (tools/python/gyronet_train/README.md)"),
+    ("train", "`python -m gyronet_train.linear` (tools/python/gyronet_train/README.md)"),
     ("calibrate static", LEARNT),
     ("calibrate mounting", LEARNT),
     ("calibrate --store", LEARNT),

@@ -131,8 +131,8 @@ impl Replay {
 mod tests {
     use super::*;
     use gyronet::health::Status;
+    use gyronet::model::Estimate;
     use gyronet::model::window::{Features, WINDOW};
-    use gyronet::model::{Estimate, SCALE_MIN};
     use std::fmt::Write;
 
     /// A network that always estimates a gyro error of 100 codes.
@@ -140,7 +140,7 @@ mod tests {
 
     impl WindowNetwork for Constant {
         fn estimate(&mut self, _window: &[Features; WINDOW]) -> Estimate {
-            Estimate { corrections: [AngularRate(100); WINDOW], scale: SCALE_MIN, ..Estimate::NONE }
+            Estimate { corrections: [AngularRate(100); WINDOW], ..Estimate::NONE }
         }
     }
 

@@ -29,11 +29,7 @@ pub struct FogNet;
 
 impl Network for GyroNet {
     fn shapes(found: Found<'_>) -> Vec<Shape> {
-        let mut shapes = vec![
-            tensor("input_mean", &[FEATURES]),
-            tensor("input_std", &[FEATURES]),
-            tensor("output_scale", &[1]),
-        ];
+        let mut shapes = vec![tensor("input_mean", &[FEATURES]), tensor("input_std", &[FEATURES])];
         let linear = found(LINEAR).is_some();
         if linear {
             shapes.push(tensor(LINEAR, &[WINDOW, LINEAR_INPUTS]));
@@ -43,9 +39,10 @@ impl Network for GyroNet {
             None if linear => return shapes,
             None => HIDDEN,
         };
+        shapes.push(tensor("output_scale", &[1]));
         shapes.extend(bilstm("lstm1", FEATURES, units, 1));
         shapes.extend(bilstm("lstm2", 2 * units, units, 1));
-        shapes.extend(dense("fc", 2 * units, 2));
+        shapes.extend(dense("fc", 2 * units, 1));
         shapes
     }
 }
@@ -107,10 +104,11 @@ impl Checkpoint<GyroNet> {
 
     fn bilstms(&self) -> Option<NetworkF32<'_>> {
         self.tensors.has("fc.weight").then(|| NetworkF32 {
+            output_scale: self.tensors.tensor("output_scale")[0],
             lstm1: [self.direction(1, false), self.direction(1, true)],
             lstm2: [self.direction(2, false), self.direction(2, true)],
             fc_weight: self.tensors.tensor("fc.weight"),
-            fc_bias: self.features("fc.bias"),
+            fc_bias: self.tensors.tensor("fc.bias")[0],
         })
     }
 
@@ -124,7 +122,6 @@ impl Checkpoint<GyroNet> {
         GyroNetF32 {
             input_mean: self.features("input_mean"),
             input_std: self.features("input_std"),
-            output_scale: self.tensors.tensor("output_scale")[0],
             linear: self.linear(),
             network: self.bilstms(),
         }

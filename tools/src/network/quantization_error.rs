@@ -21,7 +21,6 @@ pub struct QuantizationError {
     pub clamped_inputs: u64,
     squared_difference: f64,
     squared_reference: f64,
-    squared_scale: f64,
 }
 
 impl QuantizationError {
@@ -32,11 +31,6 @@ impl QuantizationError {
         } else {
             0.0
         }
-    }
-
-    /// Returns the RMS of the ratio of the scales less one; zero before the first window.
-    pub fn scale_rms(&self) -> f64 {
-        if self.windows > 0 { (self.squared_scale / self.windows as f64).sqrt() } else { 0.0 }
     }
 }
 
@@ -56,8 +50,6 @@ impl<I: WindowNetwork, F: WindowNetwork> WindowNetwork for Both<'_, I, F> {
         let reference = self.reference.estimate(window);
         self.error.windows += 1;
         self.error.clamped_inputs += u64::from(integer.clamped_inputs);
-        let ratio = integer.scale.rad_per_sec() / reference.scale.rad_per_sec();
-        self.error.squared_scale += (ratio - 1.0) * (ratio - 1.0);
         for (ours, theirs) in integer.corrections.iter().zip(&reference.corrections) {
             let (ours, theirs) = (ours.rad_per_sec(), theirs.rad_per_sec());
             self.error.squared_difference += (ours - theirs) * (ours - theirs);

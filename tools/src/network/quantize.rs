@@ -10,10 +10,10 @@ mod rows;
 
 use crate::network::checkpoint::{Checkpoint, GyroNet};
 use crate::network::tensors::Tensors;
-use gyronet::model::blob::{self, Blob, LINEAR_INPUTS, Shape, Topology};
+use gyronet::model::blob::{self, Blob, LINEAR_INPUTS, Topology};
 use gyronet::model::fognet_blob::{FOGNET, FOGNET_VERSION};
-use gyronet::model::window::{FEATURES, WINDOW};
-use gyronet::nn::{HIDDEN_MAX, dense::Dense, exp2, linear::Linear};
+use gyronet::model::window::FEATURES;
+use gyronet::nn::{HIDDEN_MAX, dense::Dense, linear::Linear};
 use gyronet::units::{AngularRate, SpecificForce};
 use serde_json::json;
 
@@ -77,10 +77,8 @@ pub fn quantize(checkpoint: &Checkpoint<GyroNet>) -> Result<(Vec<u8>, Report), Q
                 rows::direction(&mut body, &weights, layer, input_max, &mut report)?;
             }
         }
-        output(&mut body, tensors, shape)?;
+        output(&mut body, tensors)?;
     }
-    let unit = f64::from(tensors.tensor("output_scale")[0]) * rate;
-    body.extend(fixed("output scale", unit)?.to_le_bytes());
     let provenance = provenance(tensors);
     let lengths = (shape.file_len(provenance.len()), provenance.len());
     let mut file = header(tensors, shape.topology(), lengths, clamp, &codes)?;
@@ -112,15 +110,11 @@ fn linear(out: &mut Vec<u8>, weights: &[f32], units: &[f64; FEATURES]) -> Result
     Ok(())
 }
 
-/// Writes both rows of the output layer.
-fn output(out: &mut Vec<u8>, tensors: &Tensors, shape: Shape) -> Result<(), QuantizeError> {
-    let (error, log_scale) = tensors.tensor("fc.weight").split_at(2 * usize::from(shape.units));
-    let bias = tensors.tensor("fc.bias");
+/// Writes the row of the output layer.
+fn output(out: &mut Vec<u8>, tensors: &Tensors) -> Result<(), QuantizeError> {
+    let [weight, bias] = ["fc.weight", "fc.bias"].map(|name| tensors.tensor(name));
     let unit = f64::from(tensors.tensor("output_scale")[0]) * f64::from(AngularRate::PER_RAD_PER_SEC);
-    rows::dense(out, "gyro error", (error, bias[0]), (unit, Dense::SHIFT))?;
-    // The factor 1 / WINDOW makes the sum over the window a mean.
-    let log2 = f64::from(1 << exp2::FRACTION_BITS) * std::f64::consts::LOG2_E / WINDOW as f64;
-    rows::dense(out, "log of the scale", (log_scale, bias[1]), (log2, Dense::SHIFT))
+    rows::dense(out, "gyro error", (weight, bias[0]), (unit, Dense::SHIFT))
 }
 
 /// Returns the header that the weight files of all networks share; `codes` are each feature's codes per unit.

@@ -151,7 +151,7 @@ fn retired_names_say_what_does_their_work() {
         (&["--json", "soak"], "--bin situations"),
         (&["paper", "KAIST", "--out", "OUT"], "make -f tools/paper/Makefile"),
         (&["tables", "SEQUENCES"], "cargo paper tables"),
-        (&["train", "DRIVES"], "python -m gyronet_train.beside"),
+        (&["train", "DRIVES"], "python -m gyronet_train.linear"),
         (&["bus", "--can"], "gyronet device set"),
         (&["device", "calibrate", "mounting", "--store"], "the board itself"),
         (&["device", "calibrate", "static"], "the board itself"),

@@ -84,7 +84,7 @@ fn measured() -> BTreeMap<u16, u32> {
 #[test]
 fn the_cost_of_a_window_is_never_more_than_stated() {
     let measured = measured();
-    assert!(measured.len() >= 6, "{measured:?}");
+    assert!(measured.len() >= 5, "{measured:?}");
     for (units, cycles) in measured {
         let stated = Shape { units, linear: units < 60 }.window_cycles();
         assert!((cycles..cycles + cycles / 4 + 1_000).contains(&stated), "{units} units: {cycles}, {stated}");
@@ -94,7 +94,7 @@ fn the_cost_of_a_window_is_never_more_than_stated() {
 /// 10,000 configurations of values that are valid one by one, with wheels and either model, stored in both orders.
 #[test]
 fn what_is_accepted_together_can_run() {
-    let mut models = [(board(&weights::DEFAULT.0), 4), (board(&weights::GYRONET.0), 60)];
+    let mut models = [(board(&weights::DEFAULT.0), 0), (board(&weights::GYRONET.0), 60)];
     let measured = measured();
     let (mut accepted, mut reasons) = (0, BTreeMap::<String, usize>::new());
     for seed in 0..10_000 {

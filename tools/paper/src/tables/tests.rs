@@ -8,7 +8,6 @@ use crate::sequence::{Sequence, Step, StreamSummary};
 use crate::simulate::{self, Spec};
 use gyronet::model::window::{Features, WINDOW};
 use gyronet::model::{Estimate as WindowEstimate, WindowNetwork};
-use gyronet::units::AngularRate;
 use gyronet_tools::drive::track::Track;
 use gyronet_tools::evaluate::methods::Method;
 use std::path::PathBuf;
@@ -17,8 +16,7 @@ struct Nothing;
 
 impl WindowNetwork for Nothing {
     fn estimate(&mut self, _window: &[Features; WINDOW]) -> WindowEstimate {
-        let (corrections, scale) = ([AngularRate::ZERO; WINDOW], gyronet::model::SCALE_MAX);
-        WindowEstimate { corrections, scale, ..WindowEstimate::NONE }
+        WindowEstimate::NONE
     }
 }
 
