@@ -26,6 +26,7 @@ fn no_crystal_and_then_one() {
     let Some(mut board) = with_crystal(Value::Null) else { return };
     let samples = drive(100);
     common::send(&mut board, &samples, SLOW_START);
+    board.send_at(SLCAN, b"O\r", SLOW_START - SAMPLE);
     board.run(SLOW_START + SECOND);
     let lines = board.sent(SLCAN).split(|byte| *byte == b'\r').filter(|line| line.starts_with(b"t")).count();
     assert!(lines >= 99 * SET, "{lines} SLCAN lines at 500000 baud");

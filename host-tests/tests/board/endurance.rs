@@ -240,6 +240,7 @@ fn run(seconds: usize) {
     let (mut outside, mut received) = (Outside::new(), Received::new());
     let (begun, mut early) = (Instant::now(), None);
     board.run(START);
+    board.send(SLCAN, b"O\r");
     paint_stack(&mut board);
     for second in 1..=seconds {
         (0..SAMPLES).for_each(|_| outside.sample(&mut board));

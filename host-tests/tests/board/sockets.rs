@@ -6,9 +6,10 @@ use gyronet::health::Status;
 use gyronet::store::ImuPart;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::{image, require};
-use gyronet_tools::client::bus::{Bus, SlcanBus};
+use gyronet_tools::client::bus::{Bus, SlcanBus, WAIT};
+use gyronet_tools::client::connection::Connection;
 use gyronet_tools::client::device::Device;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -56,7 +57,9 @@ fn a_board_without_hardware_answers_on_its_sockets() {
         let mut device = Device::new(SlcanBus::open(&service, 0).expect("it listens"), &service);
         device.info().is_ok_and(|info| info.status == Status::Ready)
     });
-    let mut bus = SlcanBus::open(&bus, 0).expect("it listens");
+    let mut line = Connection::open(&bus, 0, WAIT).expect("it listens");
+    line.write_all(b"O\r").expect("it listens");
+    let mut bus = SlcanBus::new(line);
     until("a frame with the rate", &mut || {
         let frames = bus.receive().expect("the line is open");
         frames.iter().any(|frame| matches!(frame.id(), Id::Standard(id) if id.as_raw() == 0x1A0))

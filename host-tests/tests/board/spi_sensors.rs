@@ -144,7 +144,7 @@ fn assert_driven_well(board: &mut Board) {
 /// a step may be late. Gives the number of steps in each second.
 fn on_the_grid(board: &mut Board, late: i64, seconds: usize) -> Vec<usize> {
     // Time stamps of the samples, ms, modulo a minute.
-    board.send(SLCAN, b"Z1\r");
+    board.send(SLCAN, b"Z1\rO\r");
     board.run(30 * MS);
     let _ = (board.sent(SLCAN), board.can_frames());
     let (mut text, mut stamps) = (Vec::new(), Vec::new());

@@ -43,6 +43,17 @@ fn commands_of_known_clients_are_answered() {
 }
 
 #[test]
+fn a_session_is_open_from_o_or_l_until_c() {
+    let mut session = session();
+    let mut after = |line: &[u8]| {
+        converse(&mut session, line);
+        session.open()
+    };
+    let open = [&b"V\r"[..], b"O\r", b"S6\r", b"C\r", b"CO\r", b"L\r", b"C\r"].map(&mut after);
+    assert_eq!(open, [false, true, true, false, false, true, false]);
+}
+
+#[test]
 fn other_commands_are_refused() {
     let bel = b"\x07";
     for line in [

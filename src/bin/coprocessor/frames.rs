@@ -1,4 +1,4 @@
-//! The frames of the two lines that carry them: SLCAN always, CAN if its controller works.
+//! The frames of the two lines that carry them: SLCAN if a host has opened it, CAN if its controller works.
 //!
 //! Frames that CAN receives go from the receive interrupt to the output task, or to idle if they are requests of a
 //! tester.
@@ -210,13 +210,15 @@ impl Sink for Outgoing {
         self.attend();
     }
 
-    /// Queues a frame for both lines, unless a tester has silenced the board.
+    /// Queues a frame for CAN, and for SLCAN if its host has opened it, unless a tester has silenced the board.
     #[inline(never)]
     fn frame(&mut self, TimedFrame { frame, .. }: TimedFrame) {
         if SILENCED.load(Ordering::Relaxed) {
             return;
         }
-        self.port.enqueue(frame, self.stamp());
+        if self.port.is_open() {
+            self.port.enqueue(frame, self.stamp());
+        }
         if self.can.is_some() {
             self.queue.enqueue((frame, self.now));
         }

@@ -4,10 +4,8 @@
 //! `O` and passes the line to the kernel. Neither waits for the answers, but both fail on an
 //! answer in the middle of a frame. Answers are therefore whole lines, sent between frames.
 //!
-//! A host cannot stop the output: the vehicle must not depend on a laptop, and a
-//! logger that is plugged in later should see frames without sending a command. `C` is
-//! therefore answered and otherwise ignored. `S` is confirmed only for the current bit rate of the
-//! bus, which a host cannot change.
+//! A session is closed until a host opens it with `O` or `L`; `C` closes it. CAN does not depend on it. `S` is confirmed
+//! only for the current bit rate of the bus, which a host cannot change.
 
 use super::SlcanError;
 use crate::can::DataFrame;
@@ -79,14 +77,20 @@ pub const fn bit_rate_digit(bits_per_second: u32) -> Option<u8> {
 #[derive(Debug, Clone, Copy)]
 pub struct Session {
     bit_rate: Option<u8>,
+    open: bool,
     stamped: bool,
     refused: u32,
 }
 
 impl Session {
-    /// Creates a session without time stamps, the state that hosts expect at first.
+    /// Creates a closed session without time stamps, the state that hosts expect at first.
     pub const fn new(bits_per_second: u32) -> Self {
-        Self { bit_rate: bit_rate_digit(bits_per_second), stamped: false, refused: 0 }
+        Self { bit_rate: bit_rate_digit(bits_per_second), open: false, stamped: false, refused: 0 }
+    }
+
+    /// Returns whether the host has asked for the frames of the bus.
+    pub const fn open(&self) -> bool {
+        self.open
     }
 
     /// Returns whether the host has enabled time stamps.
@@ -103,7 +107,11 @@ impl Session {
     pub fn execute(&mut self, line: &[u8], status: StatusFlags) -> Reaction {
         match line {
             // Hosts send an empty line to flush an incomplete command.
-            [] | [b'C' | b'O' | b'L'] => Reaction::answer(OK),
+            [] => Reaction::answer(OK),
+            [command @ (b'C' | b'O' | b'L')] => {
+                self.open = *command != b'C';
+                Reaction::answer(OK)
+            }
             [b'S', digit] if Some(*digit) == self.bit_rate => Reaction::answer(OK),
             [b'Z', flag @ (b'0' | b'1')] => {
                 self.stamped = *flag == b'1';

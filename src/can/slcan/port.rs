@@ -64,6 +64,11 @@ impl<const N: usize> Port<N> {
         self.bus = flags;
     }
 
+    /// Returns whether the host has asked for the frames of the bus; without that, answers of diagnosis alone are for it.
+    pub const fn is_open(&self) -> bool {
+        self.session.open()
+    }
+
     /// Appends a frame; if the queue is full, drops the oldest one. `time` is the frame's time stamp, which is sent
     /// if the host has enabled time stamps.
     pub fn enqueue(&mut self, frame: DataFrame, time: Micros) {
