@@ -445,6 +445,12 @@ impl Coprocessor {
         !waits
     }
 
+    /// Returns whether a step waits for time to pass or for an estimate. If not, [`Coprocessor::poll`] has nothing to do
+    /// in the 20 ms after a sample.
+    pub fn is_waiting(&self) -> bool {
+        self.pipeline.has_piece() || self.fog.is_running()
+    }
+
     /// Returns the window that is due for GyroNet, once.
     pub fn window(&mut self) -> Option<DueWindow> {
         self.handover.take()

@@ -54,6 +54,11 @@ impl FogGrid {
         Ok(())
     }
 
+    /// Returns whether there is a next step, which time alone makes due.
+    pub fn is_running(&self) -> bool {
+        self.next.is_some()
+    }
+
     /// Returns whether the next step is complete or due, or so old that the grid restarts.
     pub fn is_due(&self, now: Micros) -> bool {
         self.next.is_some_and(|next| {

@@ -189,6 +189,11 @@ impl FogPipeline {
         Ok(())
     }
 
+    /// Returns whether rates are sent, of a gyro that is expected or has sent something.
+    pub fn is_running(&self) -> bool {
+        self.grid.is_running()
+    }
+
     /// Returns whether the next 10 ms are complete, or due at `now`.
     pub fn is_due(&self, now: Micros) -> bool {
         self.grid.is_due(now)

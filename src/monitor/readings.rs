@@ -237,11 +237,9 @@ impl Jump {
     fn is_far(&self, steps: &[f32; AXES]) -> bool {
         let [x, y, z] = JUMP_RATE;
         let always = [x, y, z, JUMP_FORCE, JUMP_FORCE, JUMP_FORCE];
-        steps
-            .iter()
-            .zip(always)
-            .zip(self.squares)
-            .any(|((step, always), square)| step * step > (always * always).max(USUAL * USUAL * square))
+        steps.iter().zip(always).zip(self.squares).any(|((step, always), square)| {
+            step * step > always * always && step * step > USUAL * USUAL * square
+        })
     }
 }
 

@@ -11,7 +11,7 @@ use crate::stm32f405::clocks::Clocks;
 use crate::stm32f405::pins::{self, Speed};
 use crate::stm32f405::spi::{self, Spi};
 use crate::stm32f405::usart::Usart;
-use crate::stm32f405::{Chip, pac, serial_number, supply, timer};
+use crate::stm32f405::{Chip, pac, serial_number, supply};
 use crate::{crash, serial};
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use gyronet::heading::GnssSettings;
@@ -63,9 +63,8 @@ impl Board {
             crash,
             failed_starts,
         };
-        let now = timer::micros() as u32;
         let [imu, slcan, fog, service] =
-            lines(&clocks).map(|(usart, rates, memory)| serial::start(usart, memory, rates, now));
+            lines(&clocks).map(|(usart, rates, memory)| serial::start(usart, memory, rates));
         let spi = BOARD.spi.map(|pins| spi::start(&p.SPI1, pins));
         if clocks.exact() {
             supply::watch(&p.EXTI);
@@ -90,7 +89,7 @@ pub fn gnss(clocks: &Clocks, settings: Option<GnssSettings>) -> serial::Ends {
         line.connect(pins::UART_4_AND_6);
         (clocks.apb1_hz, settings.baud)
     });
-    serial::start(Usart::four(), memory, rates, timer::micros() as u32)
+    serial::start(Usart::four(), memory, rates)
 }
 
 /// USART of a line, its bus frequency and bit rate where the board has the line, and its memory.

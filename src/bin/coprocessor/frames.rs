@@ -122,7 +122,17 @@ impl Outgoing {
         let _ = self.port.service(&mut self.slcan, take);
     }
 
-    /// Sets the time, ms, and polls the controller. Called every millisecond.
+    /// Returns whether no frame waits for CAN or is being sent.
+    pub fn is_sent(&self) -> bool {
+        self.queue.is_empty() && can::all_sent()
+    }
+
+    /// Returns whether no line needs attention before something comes or a frame has left.
+    pub fn is_at_rest(&self) -> bool {
+        self.can.as_ref().is_none_or(Can::is_on) && !self.is_slcan_busy()
+    }
+
+    /// Sets the time, ms, and polls the controller. Called every millisecond while a line needs attention.
     pub fn tick(&mut self, now: u32) {
         self.now = now;
         self.can.iter_mut().for_each(|can| can.poll(now));
@@ -203,10 +213,12 @@ impl Sink for Outgoing {
     fn observed(&mut self, observation: &coprocessor::Observation) {
         let coprocessor::Observation { sample, vehicle, wheels, standing, vertical, .. } = observation;
         let YawEstimate { status, quality, faults, .. } = vehicle.live;
-        let (sample, wheels, standing, vertical) = (*sample, *wheels, *standing, *vertical);
-        let tick = vehicle.tick;
-        let note = Observation { sample, tick, status, quality, faults, wheels, standing, vertical };
-        count(&mut self.overruns, u32::from(!OBSERVATIONS.push(note)));
+        let has_room = OBSERVATIONS.push_with(|| {
+            let (sample, wheels, standing, vertical) = (*sample, *wheels, *standing, *vertical);
+            let tick = vehicle.tick;
+            Observation { sample, tick, status, quality, faults, wheels, standing, vertical }
+        });
+        count(&mut self.overruns, u32::from(!has_room));
         self.attend();
     }
 

@@ -168,11 +168,12 @@ impl Idle {
 
     #[inline(never)]
     fn observe(&mut self) {
-        while let Some(seen) = OBSERVATIONS.pop() {
+        while let Some(seen) = OBSERVATIONS.oldest().first() {
             let Observation { sample, tick, status, quality, faults, wheels, standing, vertical } = seen;
-            vertical.into_iter().for_each(|vertical| self.device.learn_vertical(vertical));
-            self.device.observe(sample.as_ref(), tick, (status, faults), &wheels, &standing);
-            self.device.rated(quality, &standing);
+            vertical.iter().for_each(|vertical| self.device.learn_vertical(*vertical));
+            self.device.observe(sample.as_ref(), *tick, (*status, *faults), wheels, standing);
+            self.device.rated(*quality, standing);
+            OBSERVATIONS.drop_oldest(1);
         }
     }
 

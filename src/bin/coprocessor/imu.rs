@@ -59,6 +59,14 @@ impl Imu {
         }
     }
 
+    /// Returns whether the tick will see that the part has sent something; a part on SPI is polled.
+    pub fn is_heard(&self) -> bool {
+        if let Self::Line(port, mti, _) = self {
+            port.want(mti.missing());
+        }
+        !self.has_input()
+    }
+
     /// Returns the next sample, or an error for a damaged one; `None` if nothing is waiting or this step has used up
     /// its `budget` of bytes.
     pub fn next_sample(&mut self, budget: &mut usize) -> Option<Result<ImuSample, ()>> {

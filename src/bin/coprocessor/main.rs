@@ -19,7 +19,7 @@
 //! | 4, 3 | `imu_line`, `fog_line`, `slcan_line`, `gnss_line`; `service_line` | a damaged byte | counts it |
 //! | 3 | `can_received`, `can_sent` | a frame | into and out of their queues |
 //! | 3 | `can_went_off` | bus-off | notes the time |
-//! | 2 | `output` | pended by `tick`, `can_sent`, `window` | samples, frames, watchdog |
+//! | 2 | `output` | pended by `tick` when a message or time is due, `can_received`, `can_sent`, `window` | samples, frames, watchdog |
 //! | 1 | `window` | pended by `output` and itself | a piece of a GyroNet window |
 //! | 0 | `idle` | the remaining time | diagnosis, checksums of the weights; otherwise sleep |
 //!
@@ -98,7 +98,7 @@ mod app {
     use crate::diagnosis::Diagnosis;
     use crate::idle::{Idle, attend};
     use crate::imu::BringUp;
-    use crate::output::{Output, Task, report};
+    use crate::output::{Output, Task, is_due, report};
     use crate::stm32f405::pac::Interrupt;
     use crate::stm32f405::{can, timer};
     use crate::{board, crash, frames, serial, start};
@@ -173,19 +173,23 @@ mod app {
         dsb();
     }
 
-    #[task(binds = SysTick, priority = 4, local = [receptions])]
+    #[task(binds = SysTick, priority = 4, local = [receptions, counted_at: u32 = 0])]
     #[unsafe(link_section = ".ram_code.tick")]
     fn tick(cx: tick::Context) {
         let now = timer::tick();
-        let [others @ .., service] = cx.local.receptions;
-        for reception in others.iter_mut().flatten() {
-            reception.count(now);
-        }
-        if service.as_mut().is_some_and(|reception| reception.count(now)) {
+        let elapsed = now.wrapping_sub(core::mem::replace(cx.local.counted_at, now));
+        let count = |reception: &mut Option<serial::Reception>| {
+            reception.as_mut().is_some_and(|reception| reception.count(elapsed))
+        };
+        let [imu, slcan, fog, gnss, service] = cx.local.receptions;
+        let has_work = is_due(now) | count(imu) | count(slcan) | count(fog) | count(gnss);
+        if count(service) {
             attend();
         }
         report(Task::Tick);
-        rtic::pend(Interrupt::SPI3);
+        if has_work {
+            rtic::pend(Interrupt::SPI3);
+        }
         dsb();
     }
 
@@ -213,6 +217,9 @@ mod app {
     #[task(binds = CAN1_RX0, priority = 3)]
     fn can_received(_: can_received::Context) {
         frames::take();
+        if !frames::FRAMES.is_empty() {
+            rtic::pend(Interrupt::SPI3);
+        }
         dsb();
     }
 
@@ -228,6 +235,7 @@ mod app {
     #[task(binds = CAN1_SCE, priority = 3)]
     fn can_went_off(_: can_went_off::Context) {
         can::went_off();
+        rtic::pend(Interrupt::SPI3);
         dsb();
     }
 

@@ -11,8 +11,9 @@ use crate::idle;
 use crate::imu::{BYTES_PER_STEP, Imu};
 use crate::serial;
 use crate::stm32f405::can::{Can, State};
+use crate::stm32f405::pac::Interrupt;
 use crate::stm32f405::{timer, watchdog};
-use core::sync::atomic::{AtomicU8, Ordering};
+use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use embedded_can::Frame as _;
 use gyronet::coprocessor::Coprocessor;
 use gyronet::heading::{GnssLine, GnssSettings};
@@ -23,8 +24,19 @@ use gyronet::service::message::LineCounters;
 use gyronet::store::ImuPart;
 use gyronet::units::Micros;
 
+/// Time after a sample in which the task runs for what comes alone, us. The sensor's silence is judged later.
+const QUIET_US: u32 = 20_000;
+/// The end of that time, us.
+static QUIET_UNTIL: AtomicU32 = AtomicU32::new(0);
+
+/// Returns whether the task is to run at `now`, us, even if nothing has come.
+#[inline]
+pub fn is_due(now: u32) -> bool {
+    now.wrapping_sub(QUIET_UNTIL.load(Ordering::Relaxed)) as i32 >= 0
+}
+
 /// Interval at which the counters of the lines are summed and the watchdog is fed, ms.
-const SLOW_MS: u32 = 4;
+const SLOW_MS: u32 = 6;
 /// Half a period of the LED, ms; a power of two.
 const BLINK_MS: u32 = 512;
 
@@ -36,7 +48,7 @@ const REQUESTED: u8 = 1;
 const ANNOUNCED: u8 = 2;
 /// Limits how long idle waits for the output task's announcement, us.
 const ANNOUNCE_US: u64 = 20_000;
-/// Time for the frames to be sent, us; six frames take 1.7 ms.
+/// Time for the frames to be sent, us; six frames take 1.7 ms. Then each millisecond shows whether one is stale.
 const LEAVE_US: u64 = 5_000;
 /// More interrupts than come in a millisecond, so that a wait ends even if the timer stands still.
 const WAKES_PER_MS: u64 = 1_000;
@@ -78,6 +90,8 @@ pub struct Output {
     gnss_lost: u32,
     receiver: Option<GnssLine>,
     outgoing: Outgoing,
+    /// Time of the last sample, us.
+    sampled_at: u32,
     /// Millisecond of the last poll of the other lines.
     polled_at: u32,
     /// Millisecond of the last report.
@@ -102,6 +116,7 @@ impl OutputParts {
             gnss_lost: 0,
             receiver: self.gnss.map(|line| GnssLine::new(line.protocol)),
             outgoing: Outgoing::new(slcan, self.bits_per_second, can),
+            sampled_at: 0,
             polled_at: 0,
             reported_at: 0,
             joined: false,
@@ -134,6 +149,9 @@ impl Output {
         }
         if has_ticked {
             self.outgoing.tick(tick);
+        }
+        let is_polled = has_ticked || !FRAMES.is_empty();
+        if is_polled {
             self.poll_inputs(coprocessor, now);
         }
         let is_requested = is_requested();
@@ -143,20 +161,39 @@ impl Output {
             announce();
         }
         let is_slow = has_ticked && tick.wrapping_sub(self.reported_at) >= SLOW_MS;
-        let has_sample = self.imu.has_input() && self.take_samples(coprocessor, now, has_ticked);
+        let has_sample = self.imu.has_input() && self.take_samples(coprocessor, now, is_polled);
+        if has_sample {
+            self.sampled_at = now.0 as u32;
+        }
         if !has_ticked && !has_sample {
             self.outgoing.refill();
+            self.rest(now, coprocessor);
             return false;
         }
         if is_slow {
             self.report_bus(coprocessor);
         }
-        let _ = coprocessor.poll_to(now, &mut self.outgoing);
-        self.send();
+        if !has_sample {
+            let _ = coprocessor.poll_to(now, &mut self.outgoing);
+            self.send();
+        }
         if is_slow {
             self.report(tick, lines);
         }
+        self.rest(now, coprocessor);
         has_sample || is_slow
+    }
+
+    /// Lets the tick leave this task alone, where nothing waits but what will come.
+    fn rest(&self, now: Micros, coprocessor: &Coprocessor) {
+        let now = now.0 as u32;
+        let quiet = if self.outgoing.is_sent() { QUIET_US } else { LEAVE_US as u32 };
+        let is_quiet = now.wrapping_sub(self.sampled_at) < quiet
+            && self.outgoing.is_at_rest()
+            && self.imu.is_heard()
+            && !coprocessor.is_waiting();
+        let until = if is_quiet { self.sampled_at.wrapping_add(quiet) } else { now };
+        QUIET_UNTIL.store(until, Ordering::Relaxed);
     }
 
     /// Passes the waiting samples to the coprocessor, as far as they need not wait for an estimate; returns whether there
@@ -287,6 +324,7 @@ impl Output {
 /// Announces that the buses will be silent, then runs `work`, which silences them. Idle calls this.
 pub fn with_silence_announced<T>(work: impl FnOnce() -> T) -> T {
     STATE.store(REQUESTED, Ordering::Relaxed);
+    rtic::pend(Interrupt::SPI3);
     wait(ANNOUNCE_US, || STATE.load(Ordering::Relaxed) == ANNOUNCED);
     wait(LEAVE_US, || false);
     let result = work();

@@ -9,7 +9,7 @@
 use crate::ring::Ring;
 use crate::stm32f405::dma::Stream;
 use crate::stm32f405::usart::Usart;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 
 /// Received bytes that can wait for a task: more than a sensor sends in the 20 ms that the task may wait for an
@@ -33,6 +33,8 @@ pub struct Memory {
     sending: Ring<u8, SENDING>,
     /// Damaged bytes since the start. Only the interrupt counts.
     damaged: AtomicU32,
+    /// Received bytes with which the reader has something to do.
+    wanted: AtomicUsize,
 }
 
 impl Memory {
@@ -42,7 +44,8 @@ impl Memory {
     /// Only one line uses the memory, and each end of its rings belongs to one task.
     pub const unsafe fn new() -> Self {
         // SAFETY: the caller's.
-        unsafe { Self { received: Ring::new(), sending: Ring::new(), damaged: AtomicU32::new(0) } }
+        let (received, sending) = unsafe { (Ring::new(), Ring::new()) };
+        Self { received, sending, damaged: AtomicU32::new(0), wanted: AtomicUsize::new(1) }
     }
 }
 
@@ -61,15 +64,15 @@ pub struct Port {
 /// The ends of a line: the interrupt's, the tick's where the board has the line, and a task's.
 pub type Ends = (Handler, Option<Reception>, Port);
 
-/// Starts a line whose ends have not been used yet, at `now`, us; without rates (clock and baud) the board has none.
-pub fn start(usart: Usart, memory: &'static Memory, rates: Option<(u32, u32)>, now: u32) -> Ends {
+/// Starts a line whose ends have not been used yet; without rates (clock and baud) the board has none.
+pub fn start(usart: Usart, memory: &'static Memory, rates: Option<(u32, u32)>) -> Ends {
     let Memory { received, damaged, .. } = memory;
     let reception = rates.map(|(clock_hz, baud)| {
         // SAFETY: the ring's writing end is the DMA's alone.
         unsafe { usart.receive_to(received.as_mut_ptr(), RECEIVED as u16) };
         usart.request_dma();
         usart.start(clock_hz, baud);
-        Reception::new(usart.receiver(), received, baud, now)
+        Reception::new(usart.receiver(), memory, baud)
     });
     let port = Port { usart, memory, fitted: rates.is_some(), under_way: 0, overwritten: 0 };
     (Handler { usart, damaged }, reception, port)
@@ -97,37 +100,35 @@ impl Handler {
 /// Counts the bytes that a stream writes to a ring.
 pub struct Reception {
     stream: Stream,
-    ring: &'static Ring<u8, RECEIVED>,
+    memory: &'static Memory,
     /// Index of the next byte in the ring.
     place: usize,
-    /// Time of the last count, and the time that the stream takes for a lap, us.
-    counted_at: u32,
+    /// Time that the stream takes for a lap, us.
     lap_us: u32,
 }
 
 impl Reception {
-    /// Returns a reception that counts from the ring's first byte, where the stream begins, at `now`, us.
-    pub fn new(stream: Stream, ring: &'static Ring<u8, RECEIVED>, baud: u32, now: u32) -> Self {
+    /// Returns a reception that counts from the ring's first byte, where the stream begins.
+    pub fn new(stream: Stream, memory: &'static Memory, baud: u32) -> Self {
         let lap_us = (RECEIVED as u32 * BITS).saturating_mul(US_PER_S / 100) / (baud / 100).max(1);
-        Self { stream, ring, place: 0, counted_at: now, lap_us }
+        Self { stream, memory, place: 0, lap_us }
     }
 
-    /// Counts the bytes received until `now`, us; returns whether there may be new ones. Called at least twice a lap; the
-    /// reader must not run meanwhile.
+    /// Counts the bytes received in `elapsed` us since the last count; returns whether they give the reader something to do. Called at least twice
+    /// a lap; the reader must not run meanwhile.
     #[inline(always)]
-    pub fn count(&mut self, now: u32) -> bool {
-        let late = now.wrapping_sub(core::mem::replace(&mut self.counted_at, now)) >= self.lap_us;
+    pub fn count(&mut self, elapsed: u32) -> bool {
+        let late = elapsed >= self.lap_us;
         if !late && RECEIVED - self.place == self.stream.remaining() {
             // Less than a lap has passed, so no byte has come.
             return false;
         }
-        self.advance(late);
-        true
+        self.advance(late)
     }
 
     #[inline(never)]
     #[unsafe(link_section = ".ram_code.advance")]
-    fn advance(&mut self, late: bool) {
+    fn advance(&mut self, late: bool) -> bool {
         let around = self.stream.take_complete();
         let place = RECEIVED - self.stream.remaining().clamp(1, RECEIVED);
         let wrapped = place < self.place;
@@ -137,8 +138,9 @@ impl Reception {
         }
         let lapped = around && (late || !wrapped);
         let received = place.wrapping_sub(self.place) % RECEIVED + if lapped { RECEIVED } else { 0 };
-        self.ring.advance_write(received);
+        self.memory.received.advance_write(received);
         self.place = place;
+        self.memory.received.len() >= self.memory.wanted.load(Ordering::Relaxed)
     }
 }
 
@@ -160,6 +162,12 @@ impl Port {
     #[inline]
     pub fn consume(&mut self, count: usize) {
         self.memory.received.drop_oldest(count);
+    }
+
+    /// Lets the reader run when so many bytes wait.
+    #[inline]
+    pub fn want(&self, count: usize) {
+        self.memory.wanted.store(count, Ordering::Relaxed);
     }
 
     /// Returns the number of received bytes that wait.

@@ -162,12 +162,17 @@ impl Can {
         }
     }
 
-    /// Aborts frames that have become stale, and restarts the controller after bus-off. Called every
-    /// millisecond, with the time in milliseconds.
-    pub fn poll(&mut self, now: u32) {
+    /// Returns whether the controller is on the bus, and has been for long.
+    pub fn is_on(&self) -> bool {
         let is_on = matches!(self.recovery, Recovery::On { .. }) && self.interval_ms == FIRST_RESTART_MS;
-        if is_on && OFF_AT.load(Ordering::Relaxed) == 0 && all_sent() {
-            // The mailboxes are empty and the controller is on the bus: no frame is stale.
+        is_on && OFF_AT.load(Ordering::Relaxed) == 0
+    }
+
+    /// Aborts frames that have become stale, and restarts the controller after bus-off. Called every
+    /// millisecond unless the controller is on the bus, else with each sample, with the time in milliseconds.
+    pub fn poll(&mut self, now: u32) {
+        if self.is_on() && all_sent() {
+            // No frame is stale.
             return;
         }
         let micros = timer::micros() as u32;
