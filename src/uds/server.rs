@@ -88,11 +88,6 @@ impl Server {
         self.transport.is_idle()
     }
 
-    /// Returns whether a complete request waits for its response.
-    pub fn has_request(&self) -> bool {
-        self.transport.request().is_some()
-    }
-
     /// Returns whether a tester has stopped the messages of the board.
     pub fn is_silenced(&self) -> bool {
         self.services.is_silenced
@@ -103,12 +98,12 @@ impl Server {
         self.services.is_restarting && self.is_idle()
     }
 
-    /// Does the periodic work: records present faults, handles timeouts, and answers a complete request. `entropy`
-    /// returns a random challenge, or `None` without random numbers.
+    /// Does the periodic work: records present faults, handles timeouts, and answers a complete request. The `counters` are
+    /// read for a request alone; `entropy` returns a random challenge, or `None` without random numbers.
     pub fn poll<R: NorFlash, W: MappedSlots>(
         &mut self,
         device: &mut Device<R, W>,
-        counters: &AllCounters,
+        counters: impl FnOnce() -> AllCounters,
         now: u32,
         entropy: impl FnOnce() -> Option<Seed>,
     ) {
@@ -131,6 +126,7 @@ impl Server {
         }
         let (is_pending, errors) = (self.is_pending, self.transport.errors());
         let answered = self.transport.answer(|request, out| {
+            let counters = &counters();
             let surroundings = Surroundings { counters, errors, is_pending, now, entropy };
             services.answer(request, device, surroundings, out);
         });

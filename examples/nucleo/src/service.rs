@@ -131,7 +131,7 @@ impl Service {
         if RESPONSES.is_empty() && pac::FDCAN1.txbrp().read().0 == 0 {
             server.frames_left(now);
         }
-        server.poll(device, counters, now, rng::bytes);
+        server.poll(device, || *counters, now, rng::bytes);
         SILENCED.store(server.is_silenced(), Relaxed);
         while !RESPONSES.is_full()
             && let Some(data) = server.next_frame(now)

@@ -34,7 +34,7 @@ struct Bench {
 impl Bench {
     /// Polls the server; returns the frames that it sends.
     fn poll(&mut self) -> Vec<[u8; 8]> {
-        self.server.poll(&mut self.board, &AllCounters::default(), self.now, || Some([7; 32]));
+        self.server.poll(&mut self.board, AllCounters::default, self.now, || Some([7; 32]));
         std::iter::from_fn(|| self.server.next_frame(self.now)).collect()
     }
 }

@@ -10,7 +10,6 @@ use crate::output;
 use crate::regions::{Records, Weights};
 use crate::ring::Ring;
 use crate::serial;
-use crate::stm32f405::pac::Interrupt;
 use crate::stm32f405::{can, rng, timer};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
@@ -139,9 +138,12 @@ impl Diagnosis {
         if have_left {
             server.frames_left(now);
         }
-        let mut counters = if server.has_request() { counters() } else { AllCounters::default() };
-        count(&mut counters.lines.service_errors, port.refused());
-        server.poll(device, &counters, now, rng::bytes);
+        let counters = || {
+            let mut counters = counters();
+            count(&mut counters.lines.service_errors, port.refused());
+            counters
+        };
+        server.poll(device, counters, now, rng::bytes);
         frames::SILENCED.store(server.is_silenced(), Ordering::Relaxed);
         while match line {
             Line::Service => !port.is_sending(),
@@ -154,8 +156,7 @@ impl Diagnosis {
                 Line::Service => port.enqueue(frame, Micros(1_000 * u64::from(now))),
                 Line::Can | Line::Slcan => {
                     let _ = RESPONSES.push((*line, frame));
-                    // The output task sends it now, not with the next tick.
-                    rtic::pend(Interrupt::SPI3);
+                    output::attend();
                 }
             }
         }

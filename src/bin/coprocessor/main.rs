@@ -98,7 +98,7 @@ mod app {
     use crate::diagnosis::Diagnosis;
     use crate::idle::{Idle, attend};
     use crate::imu::BringUp;
-    use crate::output::{Output, Task, is_due, report};
+    use crate::output::{Output, Task, attend as attend_output, is_due, report};
     use crate::stm32f405::pac::Interrupt;
     use crate::stm32f405::{can, timer};
     use crate::{board, crash, frames, serial, start};
@@ -235,7 +235,7 @@ mod app {
     #[task(binds = CAN1_SCE, priority = 3)]
     fn can_went_off(_: can_went_off::Context) {
         can::went_off();
-        rtic::pend(Interrupt::SPI3);
+        attend_output();
         dsb();
     }
 

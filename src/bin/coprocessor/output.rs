@@ -35,6 +35,12 @@ pub fn is_due(now: u32) -> bool {
     now.wrapping_sub(QUIET_UNTIL.load(Ordering::Relaxed)) as i32 >= 0
 }
 
+/// Runs the task now and with the next tick: something other than an input waits for it.
+pub fn attend() {
+    QUIET_UNTIL.store(timer::micros() as u32, Ordering::Relaxed);
+    rtic::pend(Interrupt::SPI3);
+}
+
 /// Interval at which the counters of the lines are summed and the watchdog is fed, ms.
 const SLOW_MS: u32 = 6;
 /// Half a period of the LED, ms; a power of two.
@@ -167,7 +173,6 @@ impl Output {
         }
         if !has_ticked && !has_sample {
             self.outgoing.refill();
-            self.rest(now, coprocessor);
             return false;
         }
         if is_slow {
@@ -324,7 +329,7 @@ impl Output {
 /// Announces that the buses will be silent, then runs `work`, which silences them. Idle calls this.
 pub fn with_silence_announced<T>(work: impl FnOnce() -> T) -> T {
     STATE.store(REQUESTED, Ordering::Relaxed);
-    rtic::pend(Interrupt::SPI3);
+    attend();
     wait(ANNOUNCE_US, || STATE.load(Ordering::Relaxed) == ANNOUNCED);
     wait(LEAVE_US, || false);
     let result = work();

@@ -38,7 +38,7 @@ fn serve(name: &str, stop: &AtomicBool) {
                 _ => {}
             }
         }
-        server.poll(&mut board, &AllCounters::default(), now, || None);
+        server.poll(&mut board, AllCounters::default, now, || None);
         while let Some(data) = server.next_frame(now) {
             let _ = line.send(&data_frame(id11(0x7E8), &data));
         }

@@ -53,7 +53,7 @@ impl Bench {
         let Self { server, board, now, tester, seeds, is_random } = self;
         tester.ask(request, 400, |frames| {
             frames.iter().for_each(|data| server.receive(data, *now));
-            server.poll(board, counters, *now, || seeds.pop().or(is_random.then_some([0x5E; 32])));
+            server.poll(board, || *counters, *now, || seeds.pop().or(is_random.then_some([0x5E; 32])));
             *now += 1;
             std::iter::from_fn(|| server.next_frame(*now)).collect()
         })
@@ -63,7 +63,7 @@ impl Bench {
     fn ask_all(&mut self, request: &[u8]) -> Option<Vec<u8>> {
         self.server.receive_functional(&frame(&[request.len() as u8], request), self.now);
         (0..2).find_map(|_| {
-            self.server.poll(&mut self.board, &AllCounters::default(), self.now, || None);
+            self.server.poll(&mut self.board, AllCounters::default, self.now, || None);
             let answer = self.server.next_frame(self.now)?;
             let is_pending = matches!(answer, [3, 0x7F, _, 0x78, ..]);
             self.tester.pending += usize::from(is_pending);
@@ -98,7 +98,7 @@ impl Bench {
 
     fn fail_at(&mut self, tick: u32, status: Status, faults: Faults) {
         observe(&mut self.board, tick, None, (status, faults), Standstill::Unknown);
-        self.server.poll(&mut self.board, &AllCounters::default(), self.now, || None);
+        self.server.poll(&mut self.board, AllCounters::default, self.now, || None);
     }
 }
 
@@ -306,7 +306,7 @@ fn a_trouble_survives_a_restart_with_the_state_in_which_it_came() {
     assert_eq!(bench.board.set_configuration(&Configuration::DEFAULT), Ok(()));
     observe(&mut bench.board, 1_234, None, (Status::Silent, Faults::GAP), Standstill::Unknown);
     let operations = flash.borrow().operations();
-    bench.server.poll(&mut bench.board, &AllCounters::default(), 0, || None);
+    bench.server.poll(&mut bench.board, AllCounters::default, 0, || None);
     assert!(flash.borrow().operations() > operations);
     // It is stored once, whatever it does afterwards.
     let operations = flash.borrow().operations();
