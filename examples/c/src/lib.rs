@@ -16,6 +16,7 @@ use gyronet::bias::{EarthRate, Latitude};
 use gyronet::can::DataFrame;
 use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{Checksum, WheelFrame, WheelReceiver, WheelSettings, WheelSignal};
+use gyronet::estimate::YawEstimate;
 use gyronet::model::GyroNetState;
 use gyronet::mounting::Rotation;
 use gyronet::sample::{ImuSample, NO_STAMP, Validity};
@@ -139,7 +140,7 @@ pub struct Gyronet {
 
 struct Out {
     frames: TransmitQueue<DataFrame, GYRONET_QUEUE>,
-    rate: GyronetRate,
+    newest: Option<YawEstimate>,
 }
 
 impl Sink for Out {
@@ -148,23 +149,13 @@ impl Sink for Out {
     }
 
     fn observed(&mut self, observation: &gyronet::Observation) {
-        let live = &observation.vehicle.live;
-        self.rate = GyronetRate {
-            rate: live.rate.rad_per_sec() as f32,
-            sigma: live.sigma.map_or(f32::INFINITY, |sigma| sigma.rad_per_sec() as f32),
-            quality: match live.quality {
-                gyronet::health::Quality::Good => 2,
-                gyronet::health::Quality::Degraded => 1,
-                _ => 0,
-            },
-            faults: live.faults.0.into(),
-        };
+        self.newest = Some(observation.vehicle.live);
     }
 }
 
 impl Gyronet {
     fn sample(&mut self, sample: ImuSample, now: Micros) -> GyronetResult {
-        let result = self.coprocessor.imu(sample, now, &mut self.out);
+        let result = self.coprocessor.imu_to(sample, now, &mut self.out);
         self.coprocessor.estimate(&mut self.network);
         if result.is_ok() { GyronetResult::Ok } else { GyronetResult::Refused }
     }
@@ -172,7 +163,7 @@ impl Gyronet {
     fn poll(&mut self, now: Micros) {
         self.coprocessor.bus(self.out.frames.dropped(), false);
         // A clock that goes back is counted.
-        let _ = self.coprocessor.poll(now, &mut self.out);
+        let _ = self.coprocessor.poll_to(now, &mut self.out);
     }
 }
 
@@ -232,7 +223,7 @@ pub unsafe extern "C" fn gyronet_init(
         Err(error) => return error,
     };
     let Ok(network) = GyroNet::shipped() else { return GyronetResult::Refused };
-    let out = Out { frames: TransmitQueue::new(), rate: GyronetRate::default() };
+    let out = Out { frames: TransmitQueue::new(), newest: None };
     // SAFETY: the place is not null, aligned and large enough, and the caller owns it.
     unsafe { place.write(Gyronet { coprocessor: Coprocessor::new(config), network, mti: Mti::new(), out }) };
     *board = place;
@@ -256,10 +247,11 @@ pub unsafe extern "C" fn gyronet_mti(
         return GyronetResult::Null;
     }
     // SAFETY: not null, and readable for that length.
-    let bytes = unsafe { core::slice::from_raw_parts(bytes, length) };
+    let mut bytes = unsafe { core::slice::from_raw_parts(bytes, length) };
     let mut result = GyronetResult::Ok;
-    for byte in bytes {
-        board.mti.receive(*byte);
+    while !bytes.is_empty() {
+        let taken = board.mti.receive_some(bytes);
+        bytes = bytes.get(taken..).unwrap_or_default();
         while let Some(sample) = board.mti.next_sample() {
             let taken = match sample {
                 Ok(sample) => board.sample(sample, Micros(now_us)),
@@ -346,8 +338,7 @@ pub unsafe extern "C" fn gyronet_next_frame(board: *mut Gyronet, frame: *mut Gyr
         Id::Standard(id) => (id.as_raw().into(), false),
         Id::Extended(id) => (id.as_raw(), true),
     };
-    *place = GyronetFrame { id, is_extended, length: frame.dlc() as u8, data: [0; 8] };
-    place.data.iter_mut().zip(frame.data()).for_each(|(place, byte)| *place = *byte);
+    *place = GyronetFrame { id, is_extended, length: frame.dlc() as u8, data: *frame.padded() };
     true
 }
 
@@ -361,7 +352,16 @@ pub unsafe extern "C" fn gyronet_rate(board: *const Gyronet, rate: *mut GyronetR
     let (Some(board), Some(rate)) = (unsafe { board.as_ref() }, unsafe { rate.as_mut() }) else {
         return GyronetResult::Null;
     };
-    *rate = board.out.rate;
+    *rate = board.out.newest.map_or(GyronetRate::default(), |newest| GyronetRate {
+        rate: newest.rate.rad_per_sec() as f32,
+        sigma: newest.sigma.map_or(f32::INFINITY, |sigma| sigma.rad_per_sec() as f32),
+        quality: match newest.quality {
+            gyronet::health::Quality::Good => 2,
+            gyronet::health::Quality::Degraded => 1,
+            _ => 0,
+        },
+        faults: newest.faults.0.into(),
+    });
     GyronetResult::Ok
 }
 
