@@ -5,6 +5,7 @@ use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
 use gyronet_tools::demo::{Demo, Tunnel, write_log};
 use gyronet_tools::drive::stream::Drive;
+use gyronet_tools::drive::word;
 use gyronet_tools::evaluate::outage::EVERY_S;
 use gyronet_tools::evaluate::rates::Rates;
 use gyronet_tools::evaluate::report::{EvaluateError, MARKS, Table};
@@ -123,7 +124,7 @@ fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -
     match (&tunnel, &args.file) {
         (Some(tunnel), _) => writeln!(out, "{}", paint::report(&tunnel.to_string()))?,
         (None, Some(file)) => {
-            let file = file.display();
+            let file = word(file);
             writeln!(out, "No tunnel: cargo gyronet evaluate {file} --outage 60 says what it lacks.\n")?;
         }
         (None, None) => {}

@@ -2,6 +2,7 @@
 
 use crate::drive::error::DataError;
 use crate::drive::stream::Drive;
+use crate::drive::word;
 use crate::evaluate::methods::Method;
 use crate::evaluate::outage;
 use crate::evaluate::outage_chart;
@@ -46,8 +47,8 @@ impl Tunnel {
         else {
             return Ok(None);
         };
-        let command =
-            (fewer > 1).then(|| format!("cargo gyronet evaluate {} --outage {SECONDS}", drive.path));
+        let command = (fewer > 1)
+            .then(|| format!("cargo gyronet evaluate {} --outage {SECONDS}", word(drive.path.as_ref())));
         let points = outage::trace(drive, network, median)?;
         let picture = outage_chart::svg(drive.name(), &which, median, &points);
         Ok(Some(Self { outages, command, picture }))

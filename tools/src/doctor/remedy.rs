@@ -3,6 +3,7 @@
 use super::Mounting;
 use super::recording::Rows;
 use crate::drive::vehicle::{self, Vehicle};
+use crate::drive::word;
 use std::path::Path;
 
 /// The vehicle file whose edit works, with the mounting that turns x forward and z up; `left_deg` is the direction of
@@ -55,7 +56,8 @@ pub fn import(rows: &Rows, flags: &str) -> String {
 
 /// The import of the drive itself, into a file beside it.
 pub fn command(rows: &Rows, flags: &str, end: &str) -> String {
-    let stem = Path::new(&rows.file).with_extension("");
-    let import = format!("cargo gyronet import {} {flags}", rows.file);
-    format!("`{} --out {}_{end}.csv`", import.trim_end(), stem.display())
+    let file = Path::new(&rows.file);
+    let out = format!("{}_{end}.csv", file.with_extension("").display());
+    let import = format!("cargo gyronet import {} {flags}", word(file));
+    format!("`{} --out {}`", import.trim_end(), word(Path::new(&out)))
 }

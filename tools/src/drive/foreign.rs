@@ -1,6 +1,7 @@
 //! Logs of other tools, recognised by their first bytes.
 
 use super::error::{DataError, DataFault};
+use super::word;
 use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
@@ -48,8 +49,7 @@ pub fn open(path: &Path) -> Result<File, DataError> {
 }
 
 fn refused(path: &Path, format: &'static str) -> DataError {
-    let command =
-        format!("cargo gyronet import {} --out {}", path.display(), path.with_extension("csv").display());
+    let command = format!("cargo gyronet import {} --out {}", word(path), word(&path.with_extension("csv")));
     DataError::of(path.display(), DataFault::Foreign { format, command })
 }
 
