@@ -115,7 +115,8 @@ impl ZeroRate {
     pub fn claimed(config: ZeroRateConfig, reading: f32, sigma: Option<f32>, drift: f32) -> Self {
         let initial = config.after_rest(drift);
         let claim = Claim::new(reading, sigma.unwrap_or(config.mistaken), initial);
-        Self { claim: Some(claim), ..Self::new(ZeroRateConfig { initial, ..config }) }
+        let filter = Filter::new(initial * initial, config.standstill * config.standstill);
+        Self { claim: Some(claim), ..Self::with(config, filter) }
     }
 
     /// Creates a filter after a static initialisation whose bias is beyond doubt.

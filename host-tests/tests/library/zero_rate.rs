@@ -367,6 +367,18 @@ fn the_last_reading_before_driving_off_is_the_bias_where_it_differs_by_more_than
     }
 }
 
+/// A first reading that changed while it was taken: a turn had begun.
+#[test]
+fn a_bad_first_reading_leaves_the_later_ones_their_weight() {
+    let mut zero_rate = ZeroRate::claimed(ZeroRateConfig::DEFAULT, 0.0, Some(0.0), 0.006);
+    for _ in 0..20 * RATE_HZ {
+        zero_rate.observe(Some(AngularRate::ZERO), Standing::WHEELS, 0.0);
+    }
+    zero_rate.rest(0.005, 0.0);
+    zero_rate.moves();
+    assert!((zero_rate.bias().rad_per_sec() - 0.005).abs() < 1e-7);
+}
+
 /// The largest bias bounds what is learnt, and how far the warming of the sensor opens the gate.
 #[test]
 fn no_standstill_teaches_more_than_the_largest_bias() {
