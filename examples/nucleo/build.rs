@@ -3,5 +3,5 @@
 fn main() {
     println!("cargo:rerun-if-changed=image.x");
     println!("cargo:rustc-link-arg-bin=boot=--defsym=_boot=1");
-    println!("cargo:rustc-link-arg-bin=gyronet-nucleo=-Timage.x");
+    println!("cargo:rustc-link-arg-bin={}=-Timage.x", env!("CARGO_PKG_NAME"));
 }

@@ -49,8 +49,8 @@ struct Args {
     /// Let the vehicle stand: the first three and a half seconds again and again.
     #[arg(long)]
     parked: bool,
-    /// Part on SPI1, which the board takes once it is told to (`set imu=Bmi088`): `Icm42688`, `Bmi088` or `Asm330lhh`.
-    #[arg(long)]
+    /// Part on SPI1, which the board takes once it is told to (`set imu=Bmi088`).
+    #[arg(long, value_parser = ["Icm42688", "Bmi088", "Asm330lhh"])]
     spi: Option<String>,
     /// Port of the service line (USART6).
     #[arg(long, default_value_t = 4006)]

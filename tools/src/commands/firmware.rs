@@ -5,7 +5,7 @@ use gyronet::model::blob::CRC;
 use gyronet_tools::target::bench;
 use gyronet_tools::target::firmware::{Linked, NUCLEO};
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Build the firmware of a board, and an update for `gyronet device update`.
@@ -17,7 +17,7 @@ Examples:
   gyronet firmware --target-dir out             # out/netduino-plus-2.elf and .update
   gyronet firmware --board olimex-stm32-h405 --flash")]
 pub struct Args {
-    /// Board, as a feature of the images, or nucleo-h563zi (examples/nucleo).
+    /// Board, as a feature of the images, or nucleo-h563zi (examples/nucleo), or the folder of a copy of that.
     #[arg(long, default_value = "netduino-plus-2")]
     board: String,
     /// Folder of the build and of its results [default: cargo's target folder].
@@ -36,7 +36,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         probe_rs.map_err(|error| format!("probe-rs: {error} (cargo install probe-rs-tools)"))?;
     }
     let linked = Linked::build(&args.board, if args.flash { 1 } else { 2 }, &folder)?;
-    let [elf, update] = ["elf", "update"].map(|end| folder.join(format!("{}.{end}", args.board)));
+    let board = Path::new(&args.board).file_name().unwrap_or_default().display();
+    let [elf, update] = ["elf", "update"].map(|end| folder.join(format!("{board}.{end}")));
     std::fs::write(&elf, linked.for_programmer()?).map_err(WriteError::to(&elf))?;
     if args.flash {
         let chip = if args.board == NUCLEO { "STM32H563ZITx" } else { "STM32F405RGTx" };

@@ -109,12 +109,13 @@ pub fn build(workspace: &Path, image: &str, folder: &Path) -> Result<PathBuf, Be
     build_for(("netduino-plus-2", TARGET), workspace, image, folder)
 }
 
-/// Builds image and boot loader of the NUCLEO-H563ZI under `folder`, and returns the folder that holds both.
-pub fn build_nucleo(folder: &Path) -> Result<PathBuf, BenchError> {
+/// Builds image and boot loader of `package`, the NUCLEO-H563ZI's folder or a copy of it, under `folder`, and returns the
+/// folder that holds both.
+pub fn build_banks(package: &Path, folder: &Path) -> Result<PathBuf, BenchError> {
     const TARGET: &str = "thumbv8m.main-none-eabihf";
     let mut cargo = Command::new(std::env::var_os("CARGO").as_deref().unwrap_or(OsStr::new("cargo")));
     cargo.current_dir(workspace()).args(["build", "--release", "--locked", "--quiet", "--manifest-path"]);
-    cargo.args(["examples/nucleo/Cargo.toml", "--target", TARGET, "--target-dir"]).arg(folder);
+    cargo.arg(package.join("Cargo.toml")).args(["--target", TARGET, "--target-dir"]).arg(folder);
     run(&mut cargo)?;
     Ok(folder.join(TARGET).join("release"))
 }

@@ -55,9 +55,16 @@ impl Linked {
     pub fn build(board: &str, slots: usize, folder: &Path) -> Result<Self, FirmwareFileError> {
         let read =
             |path: PathBuf| std::fs::read(&path).map_err(|source| FirmwareFileError::Io { path, source });
-        if board == NUCLEO {
-            let built = bench::build_nucleo(folder)?;
-            let image = read(built.join("gyronet-nucleo"))?;
+        let package = if board == NUCLEO {
+            bench::workspace().join("examples/nucleo")
+        } else {
+            std::path::absolute(board).unwrap_or_default()
+        };
+        if package.join("Cargo.toml").is_file() {
+            let manifest = String::from_utf8_lossy(&read(package.join("Cargo.toml"))?).into_owned();
+            let name = manifest.lines().find_map(|line| line.strip_prefix("name = \"")?.strip_suffix('"'));
+            let built = bench::build_banks(&package, folder)?;
+            let image = read(built.join(name.unwrap_or_default()))?;
             return Ok(Self { boot: read(built.join("boot"))?, images: vec![image; slots], swaps: true });
         }
         let boards = boards();
