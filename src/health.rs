@@ -16,7 +16,7 @@ pub enum Status {
     /// The bias is not known yet: the rate is sent but not good.
     #[default]
     Init,
-    /// Corrected by the network.
+    /// Corrected by the model.
     Ready,
     /// Corrected by static bias only.
     Degraded,
@@ -32,7 +32,7 @@ impl core::fmt::Display for Status {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             Self::Init => "initialising, no bias yet",
-            Self::Ready => "ready, corrected by the network",
+            Self::Ready => "ready, corrected by the model",
             Self::Degraded => "degraded, corrected by the static bias alone",
             Self::Clipped => "clipped, the sensor is saturated",
             Self::Stuck => "stuck, the sensor's readings do not change",

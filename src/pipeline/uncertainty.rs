@@ -84,7 +84,7 @@ const PARTS: usize = (60 * RATE_HZ / PART) as usize;
 /// How a rate was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
-    /// Corrected by the network.
+    /// Corrected by the model.
     Network,
     /// The gyro less its bias.
     Gyro,
