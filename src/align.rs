@@ -44,10 +44,8 @@ const SNAPPED_US: RangeInclusive<u64> = 9_000..=11_000;
 const STEP: i64 = PERIOD_US as i64;
 /// Time ends here, so that sums of times do not overflow.
 const END: u64 = 1 << 62;
-/// The usual period is that of this many.
 const PERIODS: usize = 8;
 
-/// The reason why a sample is not used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -60,10 +58,8 @@ pub enum AlignError {
     /// The sample completes no step ([`crate::pipeline::Pipeline::correct`] alone).
     #[error("the sample at {} us completes no step of 10 ms", .at.0)]
     Open { at: Micros },
-    /// The sensor's usual period is outside [`PERIODS_US`].
     #[error("a sample every {period_us} us: 50 to 1000 a second are used")]
     Rate { period_us: u64 },
-    /// The time stamp is more than [`MAX_GAP`] steps from the last one, either way.
     #[error("time jumps from {} to {} us, more than 1 s", .last.0, .at.0)]
     Jump { last: Micros, at: Micros },
 }
@@ -87,7 +83,6 @@ impl Sums {
     const NONE: Self = Self { axes: [0; 6], covered: 0, validity: Validity::Good };
 }
 
-/// Turns samples into the steps of the grid.
 #[derive(Debug, Clone)]
 pub struct Aligner {
     /// The newest sample, and its end on the grid's time line.
@@ -107,7 +102,6 @@ pub struct Aligner {
 }
 
 impl Aligner {
-    /// The state before the first sample.
     pub const START: Self = Self {
         last: None,
         piece: None,
@@ -121,11 +115,9 @@ impl Aligner {
         usual: PERIOD_US as u32,
     };
 
-    /// Adds a sample; then call [`Aligner::next_frame`] until `None`.
-    ///
-    /// # Errors
-    /// [`AlignError`]; the sample is not used. After [`AlignError::Jump`] the grid continues from that sample's time stamp, at
-    /// the following tick; after [`AlignError::Rate`] the steps up to it are missing.
+    /// Adds a sample; then call [`Aligner::next_frame`] until `None`. After [`AlignError::Jump`] the grid continues
+    /// from that sample's time stamp, at the following tick; after [`AlignError::Rate`] the steps up to it are
+    /// missing.
     pub fn add(&mut self, sample: ImuSample) -> Result<(), AlignError> {
         let at = sample.time;
         let time = at.0.min(END) as i64;
@@ -177,7 +169,6 @@ impl Aligner {
         self.piece.is_some()
     }
 
-    /// Returns the next step that the newest sample has completed.
     pub fn next_frame(&mut self) -> Option<Frame> {
         self.piece?;
         let (sample, _) = self.last?;

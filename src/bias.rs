@@ -27,10 +27,8 @@ struct Spread {
 }
 
 impl Spread {
-    /// The state without a reading.
     pub const EMPTY: Self = Self { count: 0, sum: 0, mean: 0.0, squares: 0.0 };
 
-    /// Adds a reading, as code and as value.
     pub fn add(&mut self, code: i32, value: f32) {
         self.count += 1;
         self.sum += i64::from(code);
@@ -39,7 +37,6 @@ impl Spread {
         self.squares += delta * (value - self.mean);
     }
 
-    /// Returns the number of readings.
     pub fn count(&self) -> u32 {
         self.count
     }
@@ -50,12 +47,10 @@ impl Spread {
         (self.sum + count / 2).div_euclid(count) as i32
     }
 
-    /// Returns the variance of the values.
     pub fn variance(&self) -> f32 {
         self.squares / self.count.max(1) as f32
     }
 
-    /// Returns the standard deviation of the values.
     pub fn std(&self) -> f32 {
         sqrt(self.variance())
     }

@@ -150,17 +150,12 @@ pub struct Remaining {
     pub gain: f32,
 }
 
-/// A compensated rate and the correction that was subtracted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Compensated {
-    /// Grid step of the sample.
     pub tick: u32,
-    /// The corrected rate.
     pub rate: AngularRate,
     /// The correction that was subtracted from the gyro less its static bias.
     pub correction: AngularRate,
-    /// A window has covered this sample.
     pub covered: bool,
     /// The gyro's rates about x and y, less static bias.
     pub roll_and_pitch: [AngularRate; 2],
@@ -168,28 +163,22 @@ pub struct Compensated {
     pub estimate: AngularRate,
     /// The gyro's yaw rate less the bias, where standstill has set the sent rate to zero.
     pub withheld: Option<AngularRate>,
-    /// The validity of the sample's reading.
     pub validity: Validity,
 }
 
 /// A sample that no window will change any more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Complete {
-    /// Grid step of the sample.
     pub tick: u32,
     /// Gyro less static bias.
     pub rate: AngularRate,
-    /// The correction by the network's estimates.
     pub correction: AngularRate,
     /// The sample is good: a window has covered it, and the part was not saturated.
     pub good: bool,
-    /// The part was not saturated.
     pub valid: bool,
 }
 
 impl Complete {
-    /// Returns the rate less the correction; `None` where it is not good.
     pub fn left(&self) -> Option<AngularRate> {
         self.valid_left().filter(|_| self.good)
     }
@@ -202,11 +191,8 @@ impl Complete {
 
 /// The reason why a window's estimate was rejected: its corrections are too large.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Implausible {
-    /// The mean correction of the window.
     pub mean: AngularRate,
-    /// The largest single correction of the window.
     pub largest: AngularRate,
 }
 
@@ -214,7 +200,6 @@ pub struct Implausible {
 #[derive(Debug, Clone)]
 pub struct Compensator {
     config: CompensateConfig,
-    /// The newest samples, a ring; the next one comes in place of the oldest.
     kept: [Option<Entry>; KEPT],
     next: usize,
     slow_mean: SlowMean,
@@ -224,7 +209,6 @@ pub struct Compensator {
 }
 
 impl Compensator {
-    /// Creates a compensator without an estimate.
     pub const fn new(config: CompensateConfig) -> Self {
         Self {
             config,
@@ -236,10 +220,7 @@ impl Compensator {
         }
     }
 
-    /// Revises the samples of the window that ended [`Stride::delay`] samples before the next one.
-    ///
-    /// # Errors
-    /// [`Implausible`]: nothing was revised.
+    /// Revises the samples of the window that ended [`Stride::delay`] samples before the next one, all or none.
     pub fn revise(&mut self, estimate: &Estimate) -> Result<(), Implausible> {
         let CompensateConfig { stride, lag, model, .. } = self.config;
         let Estimate { corrections, linear_sum, .. } = if model { estimate } else { &Estimate::NONE };
@@ -326,7 +307,6 @@ impl Compensator {
         })
     }
 
-    /// Notes that the vehicle no longer stands.
     pub fn end_standstill(&mut self) {
         self.live.end_standstill();
         self.delayed.end_standstill();

@@ -75,7 +75,6 @@ pub struct Observation {
     pub vertical: Option<Vertical>,
 }
 
-/// The state of the bus, as the caller reports it.
 #[derive(Debug, Clone, Copy)]
 struct BusState {
     lost: u32,
@@ -160,9 +159,6 @@ impl Coprocessor {
     }
 
     /// [`Self::imu`] whose observations go to the sink alone.
-    ///
-    /// # Errors
-    /// Those of [`Self::imu`].
     pub fn imu_to(&mut self, sample: ImuSample, now: Micros, sink: &mut impl Sink) -> Result<(), InputError> {
         self.take(sample, now, sink, &mut None)
     }
@@ -394,9 +390,6 @@ impl Coprocessor {
     }
 
     /// [`Self::poll`] whose observations go to the sink alone.
-    ///
-    /// # Errors
-    /// Those of [`Self::poll`].
     pub fn poll_to(&mut self, now: Micros, sink: &mut impl Sink) -> Result<(), InputError> {
         self.poll_into(now, sink, &mut None)
     }
@@ -488,7 +481,6 @@ impl Coprocessor {
     }
 
     /// Returns what courses have shown since the start, and whether their source is silent.
-    #[must_use]
     pub fn course_state(&self) -> CourseState {
         let is_named = self.heading.as_ref().is_some_and(|receiver| receiver.settings().has_course());
         let is_silent = is_named && self.heading_due.is_some_and(|due| self.timeline.time() > due);
@@ -522,7 +514,6 @@ impl Coprocessor {
     }
 
     /// Returns what the sources showed when they last contradicted each other.
-    #[must_use]
     pub fn contradiction(&self) -> &Contradiction {
         self.second.contradiction()
     }

@@ -78,30 +78,22 @@ impl FogConfig {
 
 /// The reason why a window's estimate was rejected: its correction is too large.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ImplausibleTurn {
-    /// The correction of the window.
     pub correction: Angle,
 }
 
-/// Holds the results of one frame of 10 ms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogOutput {
     /// The frame's turn less the correction; `None` where the gyro has a gap.
     pub turn: Option<Angle>,
-    /// The correction that was subtracted.
     pub correction: Angle,
-    /// Says whether an estimate was in use for this frame.
     pub corrected: bool,
     /// A second is over: add it to a [`Minute`](crate::model::seconds::Minute), run the window that it ends through the
     /// network and [`FogCorrector::deliver`] the estimate under its number within a second.
     pub due: Option<NewSecond>,
     /// The window ended here; a new one has begun.
     pub broken: Option<Incomplete>,
-    /// The reason why the estimate due with this frame was rejected.
     pub implausible: Option<ImplausibleTurn>,
-    /// The estimate due with this frame did not arrive in time.
     pub late: bool,
 }
 
@@ -112,7 +104,6 @@ pub struct FogCorrector {
     config: FogConfig,
     sums: SecondSums,
     next: u32,
-    /// The next second begins a new window.
     is_first: bool,
     /// The window that is due, and its estimate once delivered.
     out: Option<(u32, Option<FogEstimate>)>,
@@ -123,7 +114,6 @@ pub struct FogCorrector {
 }
 
 impl FogCorrector {
-    /// Creates a corrector before its first frame.
     pub const fn new(config: FogConfig) -> Self {
         Self {
             config,
@@ -137,7 +127,6 @@ impl FogCorrector {
         }
     }
 
-    /// Corrects the turn of one frame of 10 ms.
     #[inline(never)]
     pub fn correct(&mut self, frame: &FogFrame) -> FogOutput {
         let correction = frame.turn.map_or(Angle::ZERO, |turn| self.correction_of(turn));
@@ -187,7 +176,6 @@ impl FogCorrector {
         self.estimate = None;
     }
 
-    /// Returns the correction of one frame's increment.
     fn correction_of(&mut self, turn: Angle) -> Angle {
         let Some(FogEstimate { correction, linear, gain, .. }) = self.estimate else { return Angle::ZERO };
         let linear_part = self.linear_rest + i128::from(turn.0) * i128::from(gain);

@@ -69,9 +69,6 @@ impl Heading {
     pub const UNKNOWN: Self = Self { course: None, course_sigma: None, speed: None, speed_sigma: None };
 
     /// Checks that each value can be that of a vehicle.
-    ///
-    /// # Errors
-    /// [`HeadingError::Range`].
     pub fn checked(self) -> Result<Self, HeadingError> {
         // A code of a full turn is rounded up, and a vehicle is never faster than 150 m/s.
         let limits = [
@@ -96,10 +93,7 @@ const fn broadcast_id(group: u32, priority: u8, source: u8) -> Option<ExtendedId
     ExtendedId::new((priority as u32) << 26 | group << 8 | source as u32)
 }
 
-/// Returns the parameter group of a frame that is sent to all (SAE J1939-21, 5.2.5), with its eight bytes.
-///
-/// # Errors
-/// [`HeadingError::Short`] for a frame of this group with fewer bytes.
+/// Returns the eight bytes of a frame of a parameter group that is sent to all (SAE J1939-21, 5.2.5).
 fn group(frame: &impl Frame, group: u32) -> Option<Result<[u8; 8], HeadingError>> {
     let Id::Extended(id) = frame.id() else { return None };
     let found = id.as_raw() >> 8 & 0x3_FFFF;

@@ -115,7 +115,6 @@ impl Faults {
     }
 
     /// Returns whether all faults of `other` are among these.
-    #[must_use]
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }

@@ -44,7 +44,6 @@ const IN_TIME_US: u64 = 5_000;
 /// Late arrivals are a new normal after this time, microseconds.
 const PATIENCE_US: u64 = 1_000_000;
 
-/// Judges how late samples arrive.
 #[derive(Debug, Clone, Copy, Default)]
 struct Arrivals {
     /// Time stamp of the newest sample, and the least time from stamp to arrival, which creeps up.
@@ -78,7 +77,6 @@ impl Arrivals {
     }
 }
 
-/// Judges each reading of the sensor, and reports silence and clock faults.
 #[derive(Debug, Clone)]
 pub struct SensorMonitor {
     repeats: Repeats,
@@ -95,13 +93,11 @@ pub struct SensorMonitor {
     heard: Option<Micros>,
     /// The time at which the next message set without a sample is due.
     due: Option<u64>,
-    /// Compares the sensor's clock with the outside one, where the outside one is better.
     clock: Option<RatioEstimator>,
     counters: MonitorCounters,
 }
 
 impl SensorMonitor {
-    /// Creates a monitor before its first sample. With `clock`, the sensor's clock is compared with the outside one.
     pub const fn new(clock: Option<ClockRatioConfig>) -> Self {
         Self {
             repeats: Repeats::new(),
@@ -121,7 +117,6 @@ impl SensorMonitor {
         }
     }
 
-    /// Returns the fault counters.
     pub fn counters(&self) -> &MonitorCounters {
         &self.counters
     }
@@ -155,7 +150,6 @@ impl SensorMonitor {
         lost
     }
 
-    /// Returns the time by which the newest sample came late, microseconds; 0 where it came in time.
     pub fn late(&self) -> u32 {
         self.late
     }
@@ -192,7 +186,6 @@ impl SensorMonitor {
         self.clock.as_ref().map_or(ClockRatio::ONE, RatioEstimator::ratio)
     }
 
-    /// Returns whether the sensor's clock is at fault, as the samples so far show it.
     pub fn is_clock_off(&self) -> bool {
         self.clock.as_ref().is_some_and(RatioEstimator::fault)
     }

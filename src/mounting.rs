@@ -17,7 +17,6 @@ use crate::sqrt::sqrt;
 use crate::units::{AngularRate, STANDARD_GRAVITY, SpecificForce};
 use crate::vector::dot;
 
-/// Fraction bits of a matrix element.
 const Q: u32 = 30;
 const ONE: f32 = (1u32 << Q) as f32;
 /// The largest distance of a mean specific force from standard gravity, m/s^2.
@@ -35,17 +34,14 @@ pub(crate) fn is_moved(before: &[SpecificForce; 3], now: &[SpecificForce; 3]) ->
     dot(&before, &now) < MOVED * sqrt(dot(&before, &before) * dot(&now, &now))
 }
 
-/// Converts a specific force to m/s^2.
 fn metre_per_sec2(force: &[SpecificForce; 3]) -> [f32; 3] {
     force.each_ref().map(|axis| axis.0 as f32 / SpecificForce::PER_METRE_PER_SEC2)
 }
 
-/// The reason why the accelerometer shows no vertical.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum LevelError {
-    /// The mean specific force is not gravity, m/s^2.
     #[error("the accelerometer shows {0:.2} m/s^2 at standstill instead of gravity")]
     NotGravity(f32),
     /// The board hangs upside down, degrees: its mounting has to be configured.
@@ -109,7 +105,6 @@ impl Rotation {
         Self(core::array::from_fn(|row| core::array::from_fn(|column| self.0[column][row])))
     }
 
-    /// Returns a vector of any length in the vehicle's axes.
     pub(crate) fn vector(&self, vector: &[f32; 3]) -> [f32; 3] {
         self.0.map(|row| dot(&row.map(|element| element as f32 / ONE), vector))
     }
@@ -123,19 +118,16 @@ impl Rotation {
         Self(core::array::from_fn(|row| core::array::from_fn(|column| columns[column][row])))
     }
 
-    /// Returns an angular rate in the vehicle's axes.
     #[doc(hidden)]
     pub fn rate(&self, rate: [AngularRate; 3]) -> [AngularRate; 3] {
         self.turn(rate.map(|axis| axis.0)).map(AngularRate)
     }
 
-    /// Returns a specific force in the vehicle's axes.
     #[doc(hidden)]
     pub fn force(&self, force: [SpecificForce; 3]) -> [SpecificForce; 3] {
         self.turn(force.map(|axis| axis.0)).map(SpecificForce)
     }
 
-    /// Returns a sample in the vehicle's axes: x forward, y left, z up.
     #[doc(hidden)]
     pub fn sample(&self, sample: &ImuSample) -> ImuSample {
         if is_identity(&self.0) {
@@ -153,7 +145,6 @@ impl Rotation {
         Self(elements.map(|row| row.map(|element| libm::roundf(element * ONE) as i32)))
     }
 
-    /// Turns a vector, rounded to nearest and saturated.
     fn turn(&self, vector: [i32; 3]) -> [i32; 3] {
         product(&self.0, vector)
     }
@@ -169,7 +160,6 @@ fn product([x, y, z]: &[[i32; 3]; 3], vector: [i32; 3]) -> [i32; 3] {
     [row(x), row(y), row(z)]
 }
 
-/// Returns whether a matrix changes no bit.
 fn is_identity(rows: &[[i32; 3]; 3]) -> bool {
     // Not `==`, which on a microcontroller compares byte by byte.
     rows.as_flattened().iter().zip(Rotation::IDENTITY.0.as_flattened()).all(|(a, b)| a == b)
@@ -185,7 +175,6 @@ fn is_identity(rows: &[[i32; 3]; 3]) -> bool {
 pub struct GyroMap([[i32; 3]; 3]);
 
 impl GyroMap {
-    /// This map changes no bit.
     pub const IDENTITY: Self = Self(Rotation::IDENTITY.0);
     /// The largest plausible gain error of a unit.
     pub const MAX_GAIN: f32 = 0.05;
@@ -208,7 +197,6 @@ impl GyroMap {
         self.0.map(|row| row.map(|element| element as f32 / ONE))
     }
 
-    /// Returns whether every element is near enough to the identity for a real unit.
     pub fn is_plausible(&self) -> bool {
         let [gain, cross] = [Self::MAX_GAIN, Self::MAX_CROSS].map(|limit| (limit * ONE) as u32);
         self.0.iter().zip(Self::IDENTITY.0).enumerate().all(|(row, (elements, identity))| {
@@ -218,7 +206,6 @@ impl GyroMap {
         })
     }
 
-    /// Returns the true rates for the gyro's readings.
     #[doc(hidden)]
     pub fn rate(&self, rate: [AngularRate; 3]) -> [AngularRate; 3] {
         product(&self.0, rate.map(|axis| axis.0)).map(AngularRate)

@@ -55,7 +55,6 @@ pub const fn pack(first: i16, second: i16) -> u32 {
     first as u16 as u32 | (second as u16 as u32) << 16
 }
 
-/// Returns the two columns of a word.
 #[inline]
 pub const fn unpack(word: u32) -> (i32, i32) {
     (word as i16 as i32, word as i32 >> 16)

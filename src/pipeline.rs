@@ -48,7 +48,6 @@ use windows::Windows;
 /// The faults and the clock of the board, on which a sample's rates depend besides the sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoardState {
-    /// The faults other than those of the sensor.
     pub faults: BoardFaults,
     /// The true length of the steps of the sensor's clock, by which the rates are summed.
     pub clock_ratio: ClockRatio,
@@ -61,7 +60,6 @@ impl BoardState {
     pub const GOOD: Self = Self { faults: BoardFaults::NONE, clock_ratio: ClockRatio::ONE, shift: 0.0 };
 }
 
-/// Holds the results of one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Output {
     /// Both rates and everything else that is sent, for [`crate::can::encoder::CanEncoder`].
@@ -73,7 +71,6 @@ pub struct Output {
     pub window: Option<DueWindow>,
     /// The judgement of standstill; not likely where the gyro contradicts it.
     pub standing: Standing,
-    /// The reason why static initialisation failed with this sample and started again.
     pub refused: Option<StaticError>,
     /// The reason why the estimate due with this sample was rejected.
     pub implausible: Option<Implausible>,
@@ -81,14 +78,12 @@ pub struct Output {
     pub vertical: Option<Vertical>,
 }
 
-/// Turns the samples of one vehicle's sensor into corrected rates.
 #[derive(Debug, Clone)]
 pub struct Pipeline {
     config: PipelineConfig,
     state: State,
 }
 
-/// Holds everything that changes from sample to sample.
 #[derive(Debug, Clone)]
 struct State {
     aligner: Aligner,
@@ -102,7 +97,6 @@ struct State {
     windows: Windows,
     compensator: Compensator,
     uncertainty: Uncertainty,
-    /// Wheels that have had a speed.
     wheels_seen: [bool; WHEELS],
     /// Samples for which the vehicle has stood; zero while it moves.
     stood: u32,
@@ -116,14 +110,11 @@ struct State {
     gap_within: u32,
     /// The sensor is mounted differently than in earlier drives.
     moved: bool,
-    /// The newest reading was a repeated one.
     stuck: bool,
-    /// The newest sample was refused for its rate.
     rate_refused: bool,
     counters: Counters,
 }
 
-/// The rates of one sample before they are reported.
 #[derive(Debug, Clone, Copy, Default)]
 struct Rates {
     live: Option<Compensated>,
@@ -134,8 +125,6 @@ struct Rates {
 }
 
 impl Pipeline {
-    /// Creates a pipeline before its first sample.
-    #[must_use]
     pub const fn new(config: PipelineConfig) -> Self {
         let state = State {
             aligner: Aligner::START,
@@ -164,11 +153,9 @@ impl Pipeline {
         Self { config, state }
     }
 
-    /// Adds a sample of the inertial sensor; [`Pipeline::next_frame`] gives the steps of the grid that it completes.
-    ///
-    /// # Errors
-    /// [`AlignError`]; the sample is counted and not used. Unless it was a duplicate, the steps that follow report
-    /// [`Faults::GAP`] for as long as after a missing one.
+    /// Adds a sample; [`Pipeline::next_frame`] gives the steps of the grid that it completes. One that is refused is
+    /// counted; unless it was a duplicate, the steps that follow report [`Faults::GAP`] for as long as after a
+    /// missing one.
     pub fn add(&mut self, sample: ImuSample) -> Result<(), AlignError> {
         let added = self.state.aligner.add(sample);
         self.state.rate_refused = matches!(added, Err(AlignError::Rate { .. }));
@@ -180,28 +167,20 @@ impl Pipeline {
         self.state.aligner.next_frame()
     }
 
-    /// Returns whether [`Pipeline::next_frame`] may return a step.
     pub(crate) fn has_piece(&self) -> bool {
         self.state.aligner.has_piece()
     }
 
-    /// Returns whether the sensor sends too few or too many samples a second to be used.
-    #[must_use]
     pub fn is_rate_refused(&self) -> bool {
         self.state.rate_refused
     }
 
-    /// Returns whether the next sample completes a step of the grid.
-    #[must_use]
     pub fn is_step_due(&self) -> bool {
         self.state.aligner.is_nearly_complete()
     }
 
-    /// Adds a sample of a sensor with 100 samples a second, and corrects the step that it completes; its validity must
-    /// have been set.
-    ///
-    /// # Errors
-    /// As [`Pipeline::add`], and [`AlignError::Open`] where it completes none.
+    /// Adds a sample of a sensor with 100 samples a second, and corrects the step that it completes; its validity
+    /// must have been set.
     pub fn correct(
         &mut self,
         sample: ImuSample,
@@ -286,50 +265,39 @@ impl Pipeline {
         self.state.windows.deliver(end, estimate)
     }
 
-    /// Returns the grid step of the newest message set.
-    #[must_use]
     pub fn tick(&self) -> u32 {
         self.state.tick
     }
 
     /// Returns the share of its rate by which a gyro about the vehicle's vertical axis misses the present turn, because it is
     /// on a slope or banked, or may be.
-    #[must_use]
     pub fn tilted(&self) -> f32 {
         self.state.uncertainty.tilted().max(self.state.uncertainty.tilted_now()).max(self.ramp())
     }
 
-    /// Returns the mean roll and pitch rate of the last second, both together, rad/s.
-    #[must_use]
     pub fn leaning(&self) -> f32 {
         self.state.uncertainty.leaning()
     }
 
-    /// Returns the event counters since the start.
-    #[must_use]
     pub fn counters(&self) -> &Counters {
         &self.state.counters
     }
 
     /// Returns what the delayed yaw lacks: revisions that are not carried yet, and the samples whose rates are not sent yet.
-    #[must_use]
     pub fn pending(&self) -> Yaw {
         Yaw(self.state.compensator.pending(self.remaining()))
     }
 
     /// Returns the gyro's static bias beyond that of earlier drives, once known.
-    #[must_use]
     pub fn gyro_bias(&self) -> Option<[AngularRate; 3]> {
         self.state.initialised.as_ref().map(|known| known.zero.bias())
     }
 
     /// Returns the residual bias that the zero-rate updates have found beyond the static one.
-    #[must_use]
     pub fn bias(&self) -> AngularRate {
         self.zero_rate().map_or(AngularRate::ZERO, ZeroRate::bias)
     }
 
-    /// The judgement of a standstill, with what the gyro says about it.
     fn judged(&self, standing: Standing) -> Standing {
         match self.zero_rate() {
             Some(known) if known.contradicted() => Standing { is_contradicted: true, ..Standing::UNKNOWN },

@@ -50,7 +50,6 @@ impl Validity {
     }
 
     /// Returns whether the reading can be used.
-    #[must_use]
     pub const fn is_good(self) -> bool {
         matches!(self, Self::Good)
     }

@@ -72,11 +72,8 @@ const LASTING: (u8, f32) = (100, 0.5);
 /// Quiet seconds of this vehicle at rest and in motion, before its wheels have shown any; counted in tenths.
 const BEFORE: [f32; 2] = [490.0, 10.0];
 
-/// The evidence that the vehicle stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StandstillSource {
-    /// There is no evidence.
     #[default]
     None,
     /// All wheels stand.
@@ -85,11 +82,8 @@ pub enum StandstillSource {
     Inertial,
 }
 
-/// The judgement of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Standing {
-    /// The evidence.
     pub source: StandstillSource,
     /// Probability that the vehicle stands, 0 to 1; 0 without evidence.
     pub probability: f32,
@@ -101,7 +95,6 @@ impl Standing {
     /// Nothing shows a standstill.
     pub const UNKNOWN: Self =
         Self { source: StandstillSource::None, probability: 0.0, is_contradicted: false };
-    /// The wheels stand.
     pub const WHEELS: Self =
         Self { source: StandstillSource::Wheels, probability: BY_WHEELS, is_contradicted: false };
     const CONTRADICTED: Self = Self { is_contradicted: true, ..Self::UNKNOWN };
@@ -116,13 +109,11 @@ impl Standing {
         self.probability >= LASTING.1
     }
 
-    /// Returns whether the wheels prove it.
     pub fn is_by_wheels(&self) -> bool {
         self.source == StandstillSource::Wheels
     }
 }
 
-/// Judges each sample.
 #[derive(Debug, Clone)]
 pub struct Judge {
     config: StandstillConfig,
@@ -154,7 +145,6 @@ pub struct Judge {
 }
 
 impl Judge {
-    /// Creates a judge before the first sample.
     pub const fn new(config: StandstillConfig) -> Self {
         Self {
             config,
@@ -215,7 +205,6 @@ impl Judge {
         }
     }
 
-    /// Returns the probability that a quiet vehicle stands.
     fn probability(&self) -> f32 {
         let [rest, motion] = self.quiet;
         match self.quiet_for {

@@ -13,7 +13,6 @@ pub const STANDARD_GRAVITY: f32 = 9.806_65;
 /// Returns `value / DIVISOR`, rounded down, by divisions of 32 bits, which a microcontroller has in hardware. The value is
 /// below 2^63 / `DIVISOR`.
 #[inline]
-#[must_use]
 pub const fn divided<const DIVISOR: u32>(value: u64) -> u64 {
     const HIGH: u64 = 1 << 32;
     let (high, low) = ((value >> 32) as u32, value as u32);
@@ -61,16 +60,12 @@ impl AngularRate {
         Self((code + if code < 0.0 { -0.5 } else { 0.5 }) as i32)
     }
 
-    /// Returns the nearest code to a reading in rad/s.
-    ///
-    /// # Errors
-    /// [`RangeError`] when the reading is not finite or not inside +-16 rad/s.
+    /// Returns the nearest code to a reading in rad/s, which must be inside +-16 rad/s.
     pub fn from_rad_per_sec(value: f32) -> Result<Self, RangeError> {
         to_code(value, Self::PER_RAD_PER_SEC).map(Self)
     }
 
     /// Returns the rate in rad/s, for display and evaluation.
-    #[must_use]
     pub fn rad_per_sec(self) -> f64 {
         f64::from(self.0) / f64::from(Self::PER_RAD_PER_SEC)
     }
@@ -90,16 +85,12 @@ impl SpecificForce {
     /// Standard gravity, 9.80665 m/s^2.
     pub const STANDARD_GRAVITY: Self = Self(10_283_018);
 
-    /// Returns the nearest code to a reading in m/s^2.
-    ///
-    /// # Errors
-    /// [`RangeError`] when the reading is not finite or not inside +-2048 m/s^2.
+    /// Returns the nearest code to a reading in m/s^2, which must be inside +-2048 m/s^2.
     pub fn from_metre_per_sec2(value: f32) -> Result<Self, RangeError> {
         to_code(value, Self::PER_METRE_PER_SEC2).map(Self)
     }
 
     /// Returns the specific force in m/s^2, for display and evaluation.
-    #[must_use]
     pub fn metre_per_sec2(self) -> f64 {
         f64::from(self.0) / f64::from(Self::PER_METRE_PER_SEC2)
     }
@@ -120,10 +111,7 @@ impl Angle {
     /// The angle of no turn.
     pub const ZERO: Self = Self(0);
 
-    /// Returns the nearest code to an angle in rad; the conversion is exact from 2^-20 rad on.
-    ///
-    /// # Errors
-    /// [`RangeError`] when the angle is not finite or not inside +-524,288 rad.
+    /// Returns the nearest code to an angle in rad inside +-524,288 rad; the conversion is exact from 2^-20 rad on.
     pub fn from_rad(value: f32) -> Result<Self, RangeError> {
         if !value.is_finite() {
             return Err(RangeError::NotFinite);
@@ -137,7 +125,6 @@ impl Angle {
     }
 
     /// Returns the angle in rad, for display and evaluation.
-    #[must_use]
     pub fn rad(self) -> f64 {
         self.0 as f64 / f64::from(Self::PER_RAD)
     }
@@ -151,7 +138,6 @@ pub struct Yaw(pub i64);
 
 impl Yaw {
     /// Returns the angle in rad, unwrapped.
-    #[must_use]
     pub fn rad(self) -> f64 {
         // Exact to 2^53 codes: 2^53 x 7.5e-11 rad is 671,000 rad.
         self.0 as f64 / (f64::from(AngularRate::PER_RAD_PER_SEC) * f64::from(RATE_HZ))
@@ -169,7 +155,6 @@ impl WheelSpeed {
     pub const FRACTION_BITS: u32 = 16;
 
     /// Returns the speed in m/s, for display and evaluation.
-    #[must_use]
     pub fn metre_per_sec(self) -> f64 {
         f64::from(self.0) / f64::from(1u32 << Self::FRACTION_BITS)
     }
@@ -194,7 +179,6 @@ impl Micros {
     }
 
     /// Returns the time since an earlier instant; zero since a later one.
-    #[must_use]
     pub const fn since(self, earlier: Self) -> Duration {
         Duration(self.0.saturating_sub(earlier.0))
     }

@@ -26,10 +26,8 @@ pub const JUMP_US: u64 = 100_000;
 pub const CREEP_PPM: u64 = 200;
 /// The time for which arrivals may all be late before the clock counts as having jumped.
 pub const PATIENCE_US: u64 = 1_000_000;
-/// Arrivals later than this are counted.
 pub const JITTER_US: u64 = 2_000;
 
-/// The reason why a time stamp is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -41,30 +39,21 @@ pub enum ClockError {
     OutOfOrder { last: Micros, at: Micros },
 }
 
-/// Event counters. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClockCounters {
-    /// Samples accepted.
     pub samples: u32,
     /// Samples that arrived more than [`JITTER_US`] later than the least late one.
     pub late: u32,
-    /// Duplicate time stamps.
     pub duplicates: u32,
-    /// Samples that arrived after a later one.
     pub out_of_order: u32,
-    /// Clock jumps.
     pub jumps: u32,
 }
 
 impl ClockCounters {
-    /// All counters at zero.
     pub const NONE: Self = Self { samples: 0, late: 0, duplicates: 0, out_of_order: 0, jumps: 0 };
 }
 
-/// Holds a sample's time by the board's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BoardTime {
     /// The time at which the sample was taken, plus the shortest delay of the line.
     pub time: Micros,
@@ -72,7 +61,6 @@ pub struct BoardTime {
     pub jumped: bool,
 }
 
-/// Translates a part's clock to the board's.
 #[derive(Debug, Clone, Default)]
 pub struct PartClock {
     /// Last time stamp, its board time, and board minus part time, all microseconds.
@@ -83,13 +71,8 @@ pub struct PartClock {
 }
 
 impl PartClock {
-    /// The state before the first sample.
     pub const START: Self = Self { last: None, late_since: None, counters: ClockCounters::NONE };
 
-    /// Converts a sample's time stamp to the board's time, given its arrival.
-    ///
-    /// # Errors
-    /// [`ClockError`]: the sample must not be used.
     pub fn translate(&mut self, stamp: Micros, arrival: Micros) -> Result<BoardTime, ClockError> {
         let measured = (arrival.0 as i64).wrapping_sub(stamp.0 as i64);
         let Some((last, board, offset)) = self.last else {
@@ -120,7 +103,6 @@ impl PartClock {
         Ok(self.take(stamp, time, offset, false))
     }
 
-    /// Returns the event counters since the start.
     pub fn counters(&self) -> &ClockCounters {
         &self.counters
     }

@@ -45,11 +45,9 @@ pub const GAP_US: u64 = BLOCK_US;
 
 /// True time over the sensor's time: LSB 2^-30, so one is 2^30.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClockRatio(pub u32);
 
 impl ClockRatio {
-    /// Fraction bits of the code.
     pub const FRACTION_BITS: u32 = 30;
     /// Both clocks run alike, or there is only one.
     pub const ONE: Self = Self(1 << Self::FRACTION_BITS);
@@ -67,7 +65,6 @@ impl ClockRatio {
         (sensor * u64::from(self.0)) >> Self::FRACTION_BITS
     }
 
-    /// Returns the distance from one, millionths.
     #[must_use]
     pub fn departure_ppm(self) -> u32 {
         self.0.abs_diff(Self::ONE.0) / Self::PPM
@@ -121,7 +118,6 @@ impl Point {
     }
 }
 
-/// A block collects the samples of [`BLOCK_US`].
 #[derive(Debug, Clone, Copy)]
 struct Block {
     first: Point,
@@ -130,7 +126,6 @@ struct Block {
     best: (Point, i64),
 }
 
-/// Measures a sensor's clock against the board's.
 #[derive(Debug, Clone)]
 pub struct RatioEstimator {
     config: ClockRatioConfig,
@@ -144,7 +139,6 @@ pub struct RatioEstimator {
 }
 
 impl RatioEstimator {
-    /// Creates an estimator before its first sample.
     pub const fn new(config: ClockRatioConfig) -> Self {
         Self {
             config,
@@ -157,7 +151,6 @@ impl RatioEstimator {
         }
     }
 
-    /// Adds a sample: its time stamp and its arrival.
     pub fn observe(&mut self, sensor: Micros, board: Micros) {
         let point = Point { sensor: sensor.0, board: board.0 };
         let Some(block) = &mut self.block else {
@@ -189,7 +182,6 @@ impl RatioEstimator {
         self.ratio
     }
 
-    /// Returns whether enough points show the ratio.
     pub fn is_known(&self) -> bool {
         self.is_known
     }
@@ -199,7 +191,6 @@ impl RatioEstimator {
         self.fault
     }
 
-    /// Takes the least late sample of a block.
     fn take(&mut self, newest: Point) {
         if self.points.is_full() {
             self.points.pop_front();

@@ -14,17 +14,13 @@ pub const MAX_DELAY_US: u64 = 10_000;
 /// The time between two calls after which the grid restarts, at the next step: one second.
 pub const MAX_SILENCE_US: u64 = 1_000_000;
 
-/// The turn of one grid step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Step {
     /// The step's time by the board's clock, a multiple of [`PERIOD_US`].
     pub time: Micros,
-    /// The turn since the step before.
     pub turn: Turn,
 }
 
-/// The gyro's clock, its increments, and the next step of the grid.
 #[derive(Debug, Clone)]
 pub struct FogGrid {
     clock: PartClock,
@@ -40,10 +36,6 @@ impl FogGrid {
         Self { clock: PartClock::START, increments: Increments::EMPTY, next }
     }
 
-    /// Adds a sample that arrived at `now`.
-    ///
-    /// # Errors
-    /// [`ClockError`]: the sample is not used.
     pub fn add(&mut self, now: Micros, sample: FogSample) -> Result<(), ClockError> {
         let board = self.clock.translate(sample.time, now)?;
         if board.jumped {
@@ -86,12 +78,10 @@ impl FogGrid {
         Some(Step { time, turn: self.increments.take(time) })
     }
 
-    /// Returns the events of the gyro's clock since the start.
     pub fn clock(&self) -> &ClockCounters {
         self.clock.counters()
     }
 
-    /// Returns the events of the increments since the start.
     pub fn increments(&self) -> &IncrementCounters {
         self.increments.counters()
     }

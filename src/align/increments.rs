@@ -20,9 +20,7 @@ use heapless::Deque;
 /// again.
 pub const KEPT: usize = 32;
 
-/// The turn between two grid steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Turn {
     /// About x, y, z; `None` where an axis was not good throughout, or no increment arrived.
     pub angle: [Option<Angle>; 3],
@@ -30,22 +28,15 @@ pub struct Turn {
     pub covered: u32,
 }
 
-/// Event counters. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct IncrementCounters {
-    /// Times that messages were missing between two increments.
     pub gaps: u32,
-    /// Increments that arrived after their step had been emitted.
     pub late: u32,
-    /// Increments refused because their span is longer than a grid step.
     pub too_long: u32,
-    /// Increments that were dropped before a step used them.
     pub dropped: u32,
 }
 
 impl IncrementCounters {
-    /// All counters at zero.
     pub const NONE: Self = Self { gaps: 0, late: 0, too_long: 0, dropped: 0 };
 }
 
@@ -68,7 +59,6 @@ pub struct Increments {
 }
 
 impl Increments {
-    /// The state without an increment.
     pub const EMPTY: Self = Self { pieces: Deque::new(), last_end: None, counters: IncrementCounters::NONE };
 
     /// Adds a sample that ended at `time` by the board's clock, later than the last one.
@@ -105,13 +95,11 @@ impl Increments {
         self.last_end = None;
     }
 
-    /// Drops all increments.
     pub fn clear(&mut self) {
         self.pieces.clear();
         self.last_end = None;
     }
 
-    /// Returns whether the increments reach `time`, so that [`Increments::take`] need not wait.
     pub fn has_reached(&self, time: Micros) -> bool {
         self.last_end.is_some_and(|end| end >= time.0)
     }
@@ -155,14 +143,12 @@ impl Increments {
         Turn { angle, covered: covered as u32 }
     }
 
-    /// Returns the event counters since the start.
     pub fn counters(&self) -> &IncrementCounters {
         &self.counters
     }
 }
 
 impl Piece {
-    /// Returns the parts before and after `time`, which lies in the piece.
     fn split(self, time: u64) -> (Self, Self) {
         // One and a half grid steps at most, as `add` ensures: products of the two fit 64 bits.
         let whole = ((self.end - self.begin) as i64).max(1);

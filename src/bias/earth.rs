@@ -20,7 +20,6 @@ pub struct Latitude {
 
 impl Latitude {
     /// Creates a latitude from degrees, north positive; `None` when it is not finite or beyond a pole.
-    #[must_use]
     pub fn from_degrees(degrees: f32) -> Option<Self> {
         if !(-90.0..=90.0).contains(&degrees) {
             return None;
@@ -33,14 +32,12 @@ impl Latitude {
     }
 
     /// Returns the Earth's rate about the upward vertical.
-    #[must_use]
     pub const fn vertical_rate(self) -> AngularRate {
         self.vertical_rate
     }
 
     /// Returns the angle that the Earth turns by about the upward vertical in a step of the grid. It is finer than the
     /// rate: 1e-6 deg/h.
-    #[must_use]
     pub const fn step_turn(self) -> Angle {
         self.step_turn
     }
@@ -60,7 +57,6 @@ pub enum EarthRate {
 
 impl EarthRate {
     /// Returns the rate that is not part of the bias, about the upward vertical.
-    #[must_use]
     pub fn vertical(self) -> AngularRate {
         match self {
             Self::LeftInBias => AngularRate::ZERO,

@@ -14,7 +14,6 @@ use crate::mounting::LevelError;
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
 
-/// The number of samples of static initialisation: 3 s.
 pub const STATIC_SAMPLES: u32 = 3 * RATE_HZ;
 const SECONDS: usize = (STATIC_SAMPLES / RATE_HZ) as usize;
 
@@ -62,22 +61,18 @@ pub enum StaticError {
         name(*.axis)
     )]
     AccelDrift { axis: u8, spread: f32 },
-    /// The mean is larger than any bias: a steady turn, rad/s.
     #[error("the vehicle moves during static initialisation: gyro {} shows a steady {mean:.4} rad/s", name(*.axis))]
     GyroBias { axis: u8, mean: f32 },
     #[error("the vehicle moves during static initialisation: the wheels turn")]
     Wheels,
-    /// The accelerometer shows no vertical.
     #[error(transparent)]
     Level(LevelError),
 }
 
-/// Returns the letter of an axis.
 fn name(axis: u8) -> &'static str {
     ["x", "y", "z"].get(usize::from(axis)).copied().unwrap_or("?")
 }
 
-/// The collected readings of one axis.
 #[derive(Debug, Clone, Copy, Default)]
 struct Axis {
     all: Spread,
@@ -101,9 +96,7 @@ impl Axis {
     }
 }
 
-/// The mean readings of the sensor at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rest {
     /// Mean angular rate: bias and Earth rate.
     pub angular_rate: [AngularRate; 3],
@@ -113,7 +106,6 @@ pub struct Rest {
     pub drift: f32,
 }
 
-/// Collects the samples of a static initialisation.
 #[derive(Debug, Clone)]
 pub struct StaticInit {
     config: StaticConfig,
@@ -124,8 +116,6 @@ pub struct StaticInit {
 }
 
 impl StaticInit {
-    /// Creates a collection without samples.
-    #[must_use]
     pub const fn new(config: StaticConfig) -> Self {
         Self { config, gyro: [Axis::EMPTY; 3], accel: [Axis::EMPTY; 3], wheels_refused: false }
     }
@@ -159,7 +149,6 @@ impl StaticInit {
         (!refused).then_some(StaticError::Wheels)
     }
 
-    /// Drops the collected samples.
     pub fn restart(&mut self) {
         for axis in self.gyro.iter_mut().chain(&mut self.accel) {
             *axis = Axis::default();

@@ -59,7 +59,6 @@ impl ThermalBias {
 
     /// Returns the bias about x, y and z at a temperature, deg C, and its sigma at a start, rad/s; `None` before the first
     /// standstill.
-    #[must_use]
     pub fn at(&self, celsius: f32) -> Option<([AngularRate; 3], f32)> {
         if self.starts == 0 {
             return None;
@@ -72,7 +71,6 @@ impl ThermalBias {
 
     /// Returns the sigma of the change of the bias from one temperature to another (deg C) after the slope's share is
     /// subtracted, rad/s.
-    #[must_use]
     pub fn change_sigma(&self, from: f32, to: f32) -> f32 {
         libm::fabsf(warmer(to) - warmer(from)) * sqrt(self.covariance[1][1].max(0.0) + BENT * BENT)
     }
@@ -108,8 +106,6 @@ impl ThermalBias {
         }
     }
 
-    /// Returns whether all values are plausible for a sensor.
-    #[must_use]
     pub fn is_plausible(&self) -> bool {
         let small = |value: &f32| libm::fabsf(*value) <= LARGEST;
         self.states.as_flattened().iter().chain(self.covariance.as_flattened()).all(small)
@@ -118,7 +114,6 @@ impl ThermalBias {
             && self.starts <= MEMORY
     }
 
-    /// Begins a start, which has another offset.
     fn begin(&mut self) {
         for ((k, ageing), unknown) in AGEING.into_iter().enumerate().zip(UNKNOWN) {
             self.covariance[k][k] = (self.covariance[k][k] + ageing * ageing).min(unknown * unknown);
@@ -140,7 +135,6 @@ impl ThermalBias {
     }
 }
 
-/// Returns how much warmer than 25 deg C a temperature is, deg C.
 fn warmer(celsius: f32) -> f32 {
     let [low, high] = TEMPERATURES;
     celsius.max(low).min(high) - MIDDLE

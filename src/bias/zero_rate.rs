@@ -56,9 +56,7 @@ const STEADY: f32 = 9.0;
 const BOARDING: f32 = 1e-3;
 /// Samples for which a standstill that the gyro has contradicted is not believed: a slide may turn now and then.
 const DISTRUSTED: u32 = 10 * RATE_HZ;
-/// Says how a whole second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ZeroRateOutcome {
     /// The second before this one was used.
     Used,
@@ -77,7 +75,6 @@ struct Measurement {
     usual: f32,
 }
 
-/// Estimates the bias that remains after static initialisation and network.
 #[derive(Debug, Clone)]
 pub struct ZeroRate {
     config: ZeroRateConfig,
@@ -98,7 +95,6 @@ pub struct ZeroRate {
     /// `None` once the bias is confirmed.
     claim: Option<Claim>,
     turned: Turned,
-    /// The rate of [`ZeroRate::turns`], rad/s.
     turning: f32,
     parked: Parked,
     /// The vehicle has stood without wheels, and not driven off since: it cannot turn.
@@ -111,7 +107,6 @@ pub struct ZeroRate {
 impl ZeroRate {
     /// Creates a filter after a static initialisation that showed this reading beyond the bias that is subtracted
     /// already, rad/s, where the sigma of that bias is known; `drift` is the spread of its seconds.
-    #[must_use]
     pub fn claimed(config: ZeroRateConfig, reading: f32, sigma: Option<f32>, drift: f32) -> Self {
         let initial = config.after_rest(drift);
         let claim = Claim::new(reading, sigma.unwrap_or(config.mistaken), initial);
@@ -120,13 +115,11 @@ impl ZeroRate {
     }
 
     /// Creates a filter after a static initialisation whose bias is beyond doubt.
-    #[must_use]
     pub fn new(config: ZeroRateConfig) -> Self {
         let square = |sigma: f32| sigma * sigma;
         Self::with(config, Filter::new(square(config.initial), square(config.standstill)))
     }
 
-    /// Creates it with a filter that has learnt already.
     pub(crate) fn with(config: ZeroRateConfig, filter: Filter) -> Self {
         Self {
             config,
@@ -150,7 +143,6 @@ impl ZeroRate {
         }
     }
 
-    /// Returns the filter, for what is learnt in motion.
     pub(crate) fn filter(&mut self) -> &mut Filter {
         &mut self.filter
     }
@@ -253,13 +245,11 @@ impl ZeroRate {
     }
 
     /// Returns whether the wheels stand while the gyro shows a turn.
-    #[must_use]
     pub fn contradicted(&self) -> bool {
         self.standing.is_by_wheels() && self.is_refused()
     }
 
     /// Returns whether the gyro contradicts that the vehicle stands, or has just done so.
-    #[must_use]
     pub fn is_refused(&self) -> bool {
         self.refused || self.distrusted_for > 0
     }
@@ -305,7 +295,6 @@ impl ZeroRate {
     }
 
     /// Returns whether a second source has confirmed the bias: the vehicle has driven off, or a later standstill agrees.
-    #[must_use]
     pub fn is_confirmed(&self) -> bool {
         self.claim.is_none()
     }
@@ -318,7 +307,6 @@ impl ZeroRate {
     }
 
     /// Returns the bias to subtract; while the wheels stand, it contains the offset of this standstill.
-    #[must_use]
     pub fn bias(&self) -> AngularRate {
         let own = self.filter.get::<BIAS>();
         let bias = if self.stands() { own + self.filter.get::<STOP>() } else { own };
@@ -327,7 +315,6 @@ impl ZeroRate {
     }
 
     /// Returns the uncertainty of the bias when driving, 1 sigma, rad/s; with it the contradiction that is not decided.
-    #[must_use]
     pub fn sigma(&self) -> f32 {
         let off = self.doubt.off(self.filter.get::<BIAS>());
         let off = if self.refused && self.standing.is_likely() { off.max(self.against) } else { off };
@@ -336,8 +323,6 @@ impl ZeroRate {
         sqrt(self.bias_variance() + off * off + hidden).min(self.config.max_bias)
     }
 
-    /// Returns whether standstills contradict the bias.
-    #[must_use]
     pub fn is_doubted(&self) -> bool {
         self.doubt.is_some()
     }
@@ -349,8 +334,6 @@ impl ZeroRate {
         (self.filter.variance::<BIAS>() + self.thermal * self.thermal).min(largest * largest)
     }
 
-    /// Returns whether the wheels stand and the gyro does not contradict them.
-    #[must_use]
     pub fn stands(&self) -> bool {
         self.standing.is_by_wheels() && !self.is_refused()
     }
@@ -368,7 +351,6 @@ impl ZeroRate {
         self.filter.restart::<STOP>(0.0, offset);
     }
 
-    /// Ends a stop without wheels.
     fn leave(&mut self) {
         let turned = core::mem::replace(&mut self.parked, Parked::NONE).before_pulling_away();
         let ZeroRateConfig { noise, standstill, .. } = self.config;
@@ -394,7 +376,6 @@ impl ZeroRate {
         }
     }
 
-    /// Adds a second of the bias' random walk to its variance.
     fn walk(&mut self) {
         let ZeroRateConfig { walk, max_bias, .. } = self.config;
         let variance = self.filter.variance::<BIAS>() + walk * walk;
@@ -443,13 +424,11 @@ impl ZeroRate {
         }
     }
 
-    /// Returns whether a second is off by more than the filter's own sigma explains.
     fn is_off(&self, measured: &Measurement) -> bool {
         let step = measured.mean - self.filter.get::<BIAS>() - self.filter.get::<STOP>();
         libm::fabsf(step) > GATE * sqrt(self.innovation_variance(measured.usual))
     }
 
-    /// Notes a second at a probable standstill that contradicts the bias.
     fn contradict(&mut self, measured: Measurement, is_steady: bool) {
         if self.standing.is_likely() {
             self.doubt.add(measured.mean, is_steady);
@@ -467,7 +446,6 @@ impl ZeroRate {
         self.claim = self.claim.take().filter(|claim| !claim.has_moved());
     }
 
-    /// Applies the Kalman filter's measurement update.
     fn update(&mut self, measured: Measurement) {
         self.take_thermal();
         if self.standing.is_likely() {
@@ -477,7 +455,6 @@ impl ZeroRate {
         self.bound();
     }
 
-    /// Adds the change with temperature to the variance of the bias.
     fn take_thermal(&mut self) {
         self.filter.put_variance::<BIAS>(self.bias_variance());
         self.thermal = 0.0;

@@ -69,11 +69,7 @@ pub enum MessageError {
     #[error("a Bosch message has {0} bytes instead of 8")]
     Length(usize),
     #[error("the checksum of a Bosch message is {received:02x}, should be {computed:02x}")]
-    Crc {
-        /// The checksum of bytes 0 to 6.
-        computed: u8,
-        received: u8,
-    },
+    Crc { computed: u8, received: u8 },
 }
 
 /// Carries the yaw rate's rounding residual from message to message.
@@ -91,10 +87,8 @@ impl YawRateSignal {
     /// Starts without a rounding residual.
     pub const START: Self = Self { residual: 0 };
 
-    /// Encodes a rate, including the rounding residual of earlier rates.
-    ///
-    /// # Errors
-    /// [`OutOfRange`]; the residual is then dropped, since the frame is marked bad.
+    /// Encodes a rate, including the rounding residual of earlier rates, which an error drops: the frame is marked
+    /// bad.
     pub fn encode(&mut self, rate: AngularRate) -> Result<u16, OutOfRange> {
         let wanted = i64::from(rate.0) * NANO_DEG_PER_CODE_Q20 + self.residual;
         // Counted from the smallest code, so that it is positive; the shift leaves at most 35 bits to divide.

@@ -22,7 +22,6 @@ pub struct BusOff {
 
 impl BusOff {
     /// Creates the state of a controller that joins the bus.
-    #[must_use]
     pub const fn new(now: u64) -> Self {
         Self {
             is_off: false,
@@ -48,7 +47,6 @@ impl BusOff {
     }
 
     /// Returns whether the controller is off the bus.
-    #[must_use]
     pub const fn is_off(&self) -> bool {
         self.is_off
     }
@@ -63,13 +61,11 @@ impl BusOff {
     }
 
     /// Returns whether a CAN FD frame may be sent now.
-    #[must_use]
     pub const fn takes_fd(&self, now: u64) -> bool {
         !self.refuses_fd && now >= self.fd_from
     }
 
     /// Returns whether CAN FD frames ended off the bus at every return, where classic ones were taken: none is sent any more.
-    #[must_use]
     pub const fn refuses_fd(&self) -> bool {
         self.refuses_fd
     }

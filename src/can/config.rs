@@ -62,7 +62,6 @@ impl Config {
         Ok(config)
     }
 
-    /// Checks the worst-case load of the messages and of further ones.
     fn check_load(&self, further: &[Periodic]) -> Result<(), ConfigError> {
         let bits_per_second = self.settings.bits_per_second;
         let per_mille = per_mille(&self.messages(), bits_per_second) + per_mille(further, bits_per_second);
@@ -99,18 +98,12 @@ impl Config {
     }
 
     /// Checks the identifiers of further messages (of [`super::fog_encoder`]) against those configured here.
-    ///
-    /// # Errors
-    /// [`ConfigError::Identifier`], [`ConfigError::DuplicateIdentifier`].
     #[doc(hidden)]
     pub fn check_further(&self, ids: [u16; 3]) -> Result<(), ConfigError> {
         check_ids(ids, |id| self.sends(Id::Standard(id)))
     }
 
     /// Checks the load with three further messages of 11-bit identifiers, one for each sample.
-    ///
-    /// # Errors
-    /// [`ConfigError::Overload`].
     #[cfg(feature = "store")]
     pub(crate) fn check_further_load(&self) -> Result<(), ConfigError> {
         let id = Id::Standard(StandardId::ZERO);

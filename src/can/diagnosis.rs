@@ -21,10 +21,8 @@ impl DiagnosisIds {
     /// The first set of identifiers in ISO 15765-4.
     pub const DEFAULT: Self = Self { extended: false, request: 0x7E0, functional: 0x7DF, response: 0x7E8 };
 
-    /// Returns the identifiers: physical requests, functional requests, responses.
-    ///
-    /// # Errors
-    /// An identifier that has too many bits, or is used twice.
+    /// Returns the identifiers: physical requests, functional requests, responses; as an error, one that has too many
+    /// bits, or is used twice.
     pub fn ids(&self) -> Result<[Id; 3], u32> {
         let Self { extended, request, functional, response } = *self;
         let id = |raw: u32| match extended {

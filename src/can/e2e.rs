@@ -25,7 +25,6 @@ pub use p02::P02;
 pub use p05::P05;
 pub use sequence::{Sequence, Verdict};
 
-/// The reason why protected data must not be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -42,21 +41,16 @@ pub enum Fault {
     Counter(u8),
 }
 
-/// An E2E profile and its data identifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Profile {
-    /// Profile 1.
     P01(P01),
-    /// Profile 2.
     P02(P02),
-    /// Profile 5.
     P05(P05),
 }
 
 impl Profile {
-    /// Returns the number of bytes at the start of the data that belong to the profile.
     pub const fn header_len(&self) -> usize {
         match self {
             Self::P01(_) | Self::P02(_) => 2,
@@ -83,9 +77,6 @@ impl Profile {
     }
 
     /// Writes the header for the data that follow it.
-    ///
-    /// # Errors
-    /// [`Fault::Length`] and [`Fault::Counter`].
     pub fn protect(&self, data: &mut [u8], counter: u8) -> Result<(), Fault> {
         match self {
             Self::P01(profile) => profile.protect(data, counter),
@@ -112,15 +103,11 @@ pub struct Protector {
 }
 
 impl Protector {
-    /// Creates a protector whose counter starts at 0.
     pub const fn new(profile: Profile) -> Self {
         Self { profile, counter: 0 }
     }
 
-    /// Writes the header of the next message: its counter and its CRC.
-    ///
-    /// # Errors
-    /// [`Fault::Length`]; the counter does not advance.
+    /// Writes the header of the next message; after an error the counter does not advance.
     pub fn protect(&mut self, data: &mut [u8]) -> Result<(), Fault> {
         self.profile.protect(data, self.counter)?;
         self.counter = ((u16::from(self.counter) + 1) % self.profile.counters()) as u8;
@@ -128,7 +115,6 @@ impl Protector {
     }
 }
 
-/// Checks one message on the receiving side.
 #[derive(Debug, Clone, Copy)]
 pub struct Checker {
     profile: Profile,
@@ -156,7 +142,6 @@ impl Checker {
 struct ShortHeader {
     /// Largest number of bytes that the CRC covers, header included.
     max_len: usize,
-    /// Number of counter values; the counter stays below it.
     counters: u16,
 }
 

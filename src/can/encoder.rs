@@ -21,7 +21,6 @@ pub struct CanEncoder {
 }
 
 impl CanEncoder {
-    /// Creates an encoder whose counters and residuals start at zero.
     pub const fn new(config: Config) -> Self {
         let yaw = match config.settings().yaw {
             Some(yaw) => Some(YawEncoder::new(yaw.e2e.profiles(), config.samples_per_yaw())),
@@ -49,7 +48,6 @@ impl CanEncoder {
         frames
     }
 
-    /// Encodes the frames of one sample and passes each to `send`.
     #[inline(never)]
     pub fn send(&mut self, sample: &VehicleSample, mut send: impl FnMut(DataFrame)) {
         let status = match sample.live.quality {

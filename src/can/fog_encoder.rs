@@ -25,7 +25,6 @@ impl FogEncoder {
         Self { encoder: YawEncoder::new(Self::profiles(ids), 1), ids }
     }
 
-    /// Returns the E2E profile of each message.
     pub const fn profiles([rate, angle, detail]: [u16; 3]) -> [Profile; 3] {
         const fn profile(data_id: u16) -> Profile {
             Profile::P01(P01 { data_id, mode: DataIdMode::Both })
@@ -39,7 +38,6 @@ impl FogEncoder {
         ids.into_iter().filter_map(StandardId::new).map(message).collect()
     }
 
-    /// Encodes the frames of one step and passes each to `send`.
     #[inline(never)]
     pub fn send(&mut self, sample: &YawEstimate, send: impl FnMut(DataFrame)) {
         self.encoder.send(sample, self.ids, send);

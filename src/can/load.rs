@@ -6,11 +6,8 @@ use embedded_can::Id;
 /// A data frame that is sent periodically: a classic one of eight bytes, or the CAN FD frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Periodic {
-    /// Identifier of the frame.
     pub id: Id,
-    /// Period, ms.
     pub period_ms: u16,
-    /// True for the CAN FD frame.
     pub is_fd: bool,
 }
 

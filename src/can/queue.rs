@@ -129,7 +129,6 @@ pub struct DataFrame {
 
 impl DataFrame {
     /// Returns the data, followed by zeros.
-    #[must_use]
     pub const fn padded(&self) -> &[u8; 8] {
         &self.data
     }

@@ -1,6 +1,5 @@
 //! A bit field describes the position of a value in a frame, as in a DBC file.
 
-/// The byte order of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -16,9 +15,7 @@ pub enum ByteOrder {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("{} bits from bit {} do not lie inside a frame", .len, .start)]
 pub struct OutsideFrame {
-    /// Requested start bit.
     pub start: u8,
-    /// Requested length in bits.
     pub len: u8,
 }
 
@@ -71,12 +68,10 @@ impl BitField {
         }
     }
 
-    /// Returns the byte order of the value.
     pub const fn order(&self) -> ByteOrder {
         self.order
     }
 
-    /// Returns whether the value is signed.
     pub const fn is_signed(&self) -> bool {
         self.signed
     }

@@ -99,11 +99,7 @@ pub enum SlcanError {
     Identifier,
 }
 
-/// Parses a line with a time stamp, without its CR, and returns the frame and the time stamp in
-/// milliseconds.
-///
-/// # Errors
-/// [`SlcanError`] for a line that is not a data frame with a time stamp.
+/// Parses a line with a time stamp, without its CR, and returns the frame and the time stamp in milliseconds.
 pub fn parse_stamped<F: Frame>(line: &[u8]) -> Result<(F, u16), SlcanError> {
     let at = line.len().saturating_sub(4);
     let (line, digits) = line.split_at(at);
@@ -116,9 +112,6 @@ pub fn parse_stamped<F: Frame>(line: &[u8]) -> Result<(F, u16), SlcanError> {
 }
 
 /// Parses a data frame line, without its CR.
-///
-/// # Errors
-/// [`SlcanError`] for a line that is not a data frame.
 pub fn parse<F: Frame>(line: &[u8]) -> Result<F, SlcanError> {
     let digits = match line.first() {
         Some(b't') => 3,

@@ -26,11 +26,8 @@ pub const STATUS_ID: u16 = 0x1A3;
 pub const PERIOD_MS: u16 = 1_000;
 /// Samples of 10 ms in a period.
 const SAMPLES: u8 = 100;
-/// Code of an unknown number of gaps.
 const NO_GAPS: u8 = u8::MAX;
-/// Code of unknown doubts of a second source.
 const NO_SOURCE: u8 = 7;
-/// Code of an unknown doubt of the yaw.
 const NO_DOUBT: u16 = u16::MAX;
 
 /// Encodes the message as eight bytes with an empty header.

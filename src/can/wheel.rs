@@ -50,11 +50,8 @@ impl WheelReceiver {
         Ok(Self { settings, sequences, wheels, pulses, invalid, has_received: false, lost: 0 })
     }
 
-    /// Processes a frame received at `now`; `None` if it is not a wheel frame.
-    ///
-    /// # Errors
-    /// [`WheelError`]; the wheels of the frame then keep their last speed until it is stale,
-    /// except those whose speed is not valid.
+    /// Processes a frame received at `now`; `None` if it is not a wheel frame. After an error the wheels of the frame
+    /// keep their last speed until it is stale, except those whose speed is not valid.
     pub fn decode(&mut self, frame: &impl Frame, now: Micros) -> Option<Result<WheelSample, WheelError>> {
         let id = frame.id();
         let is_meant = |place: &Option<WheelFrame>| place.as_ref().is_some_and(|layout| layout.id == id);
@@ -183,7 +180,6 @@ impl Wheels {
         WheelSample { time: now, speeds: self.speeds.map(|speed| speed.map(|(speed, _)| speed)), standstill }
     }
 
-    /// Returns whether every expected wheel has a fresh speed.
     fn complete(&self) -> bool {
         self.speeds.iter().zip(self.expected).all(|(speed, expected)| speed.is_some() || !expected)
     }

@@ -117,9 +117,6 @@ impl AngleMessage {
     }
 
     /// Decodes the content after the header.
-    ///
-    /// # Errors
-    /// [`YawError::Length`].
     pub const fn parse(bytes: &[u8]) -> Result<Self, YawError> {
         let &[_, _, _, a, b, c, d, faults] = bytes else {
             return Err(YawError::Length(bytes.len()));
@@ -154,9 +151,6 @@ impl DetailMessage {
     }
 
     /// Decodes the content after the header.
-    ///
-    /// # Errors
-    /// [`YawError::Length`].
     pub const fn parse(bytes: &[u8]) -> Result<Self, YawError> {
         let &[_, _, _, a, b, c, d, latency] = bytes else {
             return Err(YawError::Length(bytes.len()));

@@ -67,7 +67,6 @@ impl Carried {
         self.held_until = 0;
     }
 
-    /// Returns what waits, codes x samples.
     pub fn waiting(&self) -> i64 {
         self.waiting
     }

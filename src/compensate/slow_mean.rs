@@ -2,7 +2,6 @@
 
 /// The number of samples that the mean covers.
 const MEMORY: i64 = 1_280;
-/// Fraction bits of the mean.
 const Q: u32 = 16;
 
 /// The mean of a value: of all so far, and later of about the last [`MEMORY`] samples.
@@ -13,7 +12,6 @@ pub(super) struct SlowMean {
 }
 
 impl SlowMean {
-    /// The mean before the first value is zero.
     pub(super) const NONE: Self = Self { mean: 0, count: 0 };
 
     /// Adds a value, within 2^32; values arrive every `stride` samples.

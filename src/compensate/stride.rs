@@ -27,21 +27,17 @@ impl Stride {
         if samples >= 1 && samples as usize <= WINDOW { Some(Self(samples)) } else { None }
     }
 
-    /// Returns the number of samples.
-    #[must_use]
     pub const fn samples(self) -> u32 {
         self.0 as u32
     }
 
     /// Returns the number of samples from a window's newest one to the use of its estimate.
-    #[must_use]
     pub const fn delay(self) -> u32 {
         if self.samples() < DELAY { self.samples() } else { DELAY }
     }
 
     /// Returns the cycles that a window may take, so that its estimate is ready in time and three tenths of the processor
     /// are left to the tasks of lower priority; `u32::MAX` where the clock is not known.
-    #[must_use]
     pub const fn window_cycles(self, clock_hz: u32) -> u32 {
         if clock_hz == 0 {
             return u32::MAX;
@@ -51,7 +47,6 @@ impl Stride {
     }
 
     /// Returns the number of samples after which no window changes an estimate any more.
-    #[must_use]
     #[doc(hidden)]
     pub const fn complete_after(self) -> usize {
         WINDOW - 1 + self.delay() as usize
@@ -89,8 +84,6 @@ impl Lag {
         if samples <= Self::MAX.0 { Some(Self(samples)) } else { None }
     }
 
-    /// Returns the number of samples.
-    #[must_use]
     pub const fn samples(self) -> usize {
         self.0 as usize
     }

@@ -33,15 +33,11 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
-    /// Both clocks at time 0.
     pub const fn new(clock: Clock) -> Self {
         Self { clock, now: Micros(0), shift_us: 0, sample: Micros(0) }
     }
 
-    /// Advances to the clock's time and returns the shifted time.
-    ///
-    /// # Errors
-    /// The time by which the clock went back. The next call continues from the newest time.
+    /// Advances to the clock's time and returns the shifted time; as an error, the time by which the clock went back.
     pub fn advance(&mut self, clock: Micros) -> Result<Micros, Duration> {
         let shifted = clock.0.saturating_add(self.shift_us).min(END.0);
         if let Some(by_us @ 1..) = self.now.0.checked_sub(shifted) {
@@ -57,7 +53,6 @@ impl Timeline {
         Micros(clock.0.saturating_add(self.shift_us)).min(END).max(self.now)
     }
 
-    /// Returns the newest outside time.
     pub const fn now(&self) -> Micros {
         self.now
     }

@@ -103,7 +103,6 @@ impl SecondSource {
         contradiction: Contradiction { seconds: 0, gyros: [None; 2], lateral: None, wheels: None },
     };
 
-    /// Adds a step of 10 ms.
     pub fn add(&mut self, shown: &Shown) {
         let Shown { inertial, fog, is_fog_confirmed, lateral, wheels } = *shown;
         self.is_fog_confirmed |= is_fog_confirmed;

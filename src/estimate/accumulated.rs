@@ -24,7 +24,6 @@ pub(crate) struct AccumulatedYaw {
 }
 
 impl AccumulatedYaw {
-    /// The yaw before the first usable rate.
     pub(crate) const START: Self = Self { yaw: Yaw(0), gaps: 0, newest: None, hidden: None };
 
     /// Adds the angle `turned` in a step, a code of [`Yaw`], unless its estimate may not be used; sets the estimate's

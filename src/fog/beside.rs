@@ -29,7 +29,6 @@ const INERTIAL_GAIN: f32 = 0.003;
 const MOUNT: f32 = 0.005;
 /// Share of the rate that a mount by eye takes off, 1 sigma, which an inertial gyro of such a gain hides: of 3.4 deg.
 const ASKEW: f32 = 0.0018;
-/// Steps of a block, and blocks of a second.
 const BLOCK: u32 = 10;
 const BLOCKS: usize = (RATE_HZ / BLOCK) as usize;
 
@@ -49,7 +48,6 @@ pub struct Beside {
 }
 
 impl Beside {
-    /// There is no inertial sensor.
     pub const NOTHING: Self = Self { rate: None, sigma: 0.0, tilted: 0.0, leaning: 0.0, scale: None };
 
     /// Returns the share of the rate by which the gain may be off, 1 sigma.
@@ -75,7 +73,6 @@ pub(super) struct Comparison {
 }
 
 impl Comparison {
-    /// The state before the first step.
     pub const START: Self =
         Self { beside: Beside::NOTHING, rejected: 0, blocks: [(0.0, 0); BLOCKS], steps: 0 };
 
@@ -104,7 +101,6 @@ impl Comparison {
         differs
     }
 
-    /// Returns whether a step that differs is not used.
     pub fn rejects(&self) -> bool {
         self.rejected <= DOUBTED
     }

@@ -15,7 +15,6 @@ const TILT_FRACTION_BITS: u32 = 30;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tilt {
-    /// One over the cosine, less one.
     secant_minus_one: i32,
 }
 
@@ -37,7 +36,6 @@ impl Tilt {
     }
 }
 
-/// Corrects a gyro's turns without a network.
 #[derive(Debug, Clone)]
 pub struct EarthAndBias {
     tilt: Tilt,
@@ -49,7 +47,6 @@ pub struct EarthAndBias {
 }
 
 impl EarthAndBias {
-    /// Creates one before its first step.
     pub const fn new(errors: FogErrors, tilt: Tilt, latitude: Option<Latitude>) -> Self {
         let earth = match latitude {
             Some(latitude) => Some(earth_rate(latitude)),
@@ -65,7 +62,6 @@ impl EarthAndBias {
         self.renew();
     }
 
-    /// Returns the latitude in use.
     pub fn latitude(&self) -> Option<Latitude> {
         self.latitude
     }
@@ -93,7 +89,6 @@ impl EarthAndBias {
         AngularRate(libm::ceilf(sigma * AngularRate::PER_RAD_PER_SEC) as i32)
     }
 
-    /// Returns the filter of the bias.
     pub fn rest(&self) -> &RestReading {
         &self.rest
     }
@@ -111,7 +106,6 @@ impl EarthAndBias {
     }
 }
 
-/// Returns the Earth's rate about the vertical, rad/s.
 const fn earth_rate(latitude: Latitude) -> f32 {
     latitude.step_turn().0 as f32 * (RATE_HZ as f32 / Angle::PER_RAD)
 }

@@ -43,18 +43,15 @@ pub const STUCK_US: u32 = 10_000;
 /// Share by which a clock may be off before it has been measured: a quarter of what is accepted.
 const CLOCK: f32 = 0.01;
 
-/// Event counters since the start. They saturate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FogCounters {
-    /// Samples accepted.
     pub samples: u32,
     /// Samples refused: duplicate or out of order.
     pub misplaced: u32,
     /// Grid steps without a turn: increments are missing, or the gyro is stuck.
     pub gaps: u32,
-    /// Times that the gyro was stuck.
     pub stuck: u32,
     /// Steps without a known latitude: the Earth's rate is not subtracted.
     pub no_latitude: u32,
@@ -65,7 +62,6 @@ pub struct FogCounters {
 }
 
 impl FogCounters {
-    /// All counters at zero.
     pub const NONE: Self = Self {
         samples: 0,
         misplaced: 0,
@@ -77,7 +73,6 @@ impl FogCounters {
     };
 }
 
-/// Computes corrected rates from a fibre-optic gyro's samples.
 #[derive(Debug, Clone)]
 pub struct FogPipeline {
     grid: FogGrid,
@@ -90,7 +85,6 @@ pub struct FogPipeline {
     beside: Comparison,
     /// The newest step's rate, rad/s.
     shown: Option<f32>,
-    /// The latitude on the bus contradicts the one in use.
     latitude_contested: bool,
     shake: [f32; 2],
     rate: IncrementRate,
@@ -134,7 +128,6 @@ impl FogPipeline {
         self.earth_and_bias.set_latitude(Some(latitude), moved);
     }
 
-    /// Notes whether the latitude on the bus contradicts the one in use.
     pub fn contest_latitude(&mut self, contested: bool) {
         self.latitude_contested = contested;
     }
@@ -144,12 +137,10 @@ impl FogPipeline {
         self.is_confirmed = true;
     }
 
-    /// Returns whether unit and sign of the output are known.
     pub fn is_confirmed(&self) -> bool {
         self.is_confirmed
     }
 
-    /// Sets what the inertial sensor shows besides.
     pub fn beside(&mut self, beside: Beside) {
         self.beside.take(beside);
     }
@@ -159,15 +150,12 @@ impl FogPipeline {
         self.shown
     }
 
-    /// Returns the number of gaps in the accumulated yaw; `None` before it begins.
     pub fn gaps(&self) -> Option<u32> {
         self.yaw.gaps()
     }
 
-    /// Adds a sample that arrived at `now`. Call [`FogPipeline::next_step`] until `None` after it.
-    ///
-    /// # Errors
-    /// [`ClockError`]: the sample is a duplicate or out of order. It is counted and not used.
+    /// Adds a sample that arrived at `now`; then call [`FogPipeline::next_step`] until `None`. A refused one is
+    /// counted.
     pub fn add(&mut self, now: Micros, mut sample: FogSample) -> Result<(), ClockError> {
         let repeats = self.repeats.after(&sample);
         let stuck = repeats.are_stuck();
@@ -194,7 +182,6 @@ impl FogPipeline {
         self.grid.is_running()
     }
 
-    /// Returns whether the next 10 ms are complete, or due at `now`.
     pub fn is_due(&self, now: Micros) -> bool {
         self.grid.is_due(now)
     }
@@ -277,7 +264,6 @@ impl FogPipeline {
         count(&mut self.counters.contradicted, u32::from(outcome == Some(RestOutcome::Refused)));
     }
 
-    /// Returns the event counters since the start.
     pub fn counters(&self) -> &FogCounters {
         &self.counters
     }
@@ -292,7 +278,6 @@ struct Repeats {
 }
 
 impl Repeats {
-    /// The state before the first increment.
     const NONE: Self = Self { newest: None, equal: 0, equal_us: 0 };
 
     fn after(self, sample: &FogSample) -> Self {

@@ -15,7 +15,6 @@ pub struct IncrementRate {
 }
 
 impl IncrementRate {
-    /// The state before the first frame, without a remainder.
     pub const START: Self = Self { rest: 0 };
 
     /// Returns the rate of a frame with this turn, saturated at the limits of [`AngularRate`].

@@ -25,9 +25,7 @@ use crate::sample::{RATE_HZ, Standstill};
 use crate::sqrt::sqrt;
 use crate::units::Angle;
 
-/// A second has this many steps.
 const STEPS: i64 = RATE_HZ as i64;
-/// Steps of a quarter of a second.
 const QUARTER: u32 = RATE_HZ / 4;
 /// Largest code of a step, 2,900 deg/s: a second's sums stay within 58 bits.
 const LARGEST_CODE: i64 = 1 << 43;
@@ -44,9 +42,7 @@ const LARGEST: f32 = 9.0;
 const NOISY: f32 = 8.0;
 const OWN_UNIT: f32 = 16.0;
 
-/// Says how a second at standstill was used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RestOutcome {
     /// The mean that ended a second before was used.
     Used,
@@ -71,7 +67,6 @@ pub(super) struct Second {
 }
 
 impl Second {
-    /// A second without a step.
     pub const EMPTY: Self = Self { steps: 0, sum: 0, rising: 0 };
 
     /// Adds a step, saturated far above any gyro's range. An engine shakes a standing vehicle by half a degree a
@@ -90,7 +85,6 @@ impl Second {
     }
 }
 
-/// Estimates the gyro's reading at rest: the Earth's rate and the bias.
 #[derive(Debug, Clone)]
 pub struct RestReading {
     errors: FogErrors,
@@ -219,17 +213,14 @@ impl RestReading {
         sqrt(own + scaled * scaled + shake * shake + against * against)
     }
 
-    /// Returns whether a standstill has been used.
     pub fn is_measured(&self) -> bool {
         self.measured.variance < UNKNOWN * UNKNOWN / 2.0
     }
 
-    /// Returns whether the wheels stand while the gyro shows a turn.
     pub fn is_contradicted(&self) -> bool {
         self.refused
     }
 
-    /// Returns whether the reading at rest proves unit and sign of the gyro's output.
     pub fn shows_unit(&self) -> bool {
         let (earth, Estimate { mean, variance }) = (self.earth.unwrap_or(0.0), self.measured);
         let by_earth = 4.0 * sqrt(variance) + (mean - earth).abs() < 0.5 * earth.abs();
@@ -238,7 +229,6 @@ impl RestReading {
         self.is_measured() && (by_earth || by_noise)
     }
 
-    /// Returns the weighted mean of both sources.
     fn combined(&self) -> Estimate {
         let expected = match self.earth {
             Some(earth) => Estimate { mean: earth, variance: self.bias_variance },
@@ -289,7 +279,6 @@ mod tests {
 
     const DEG_PER_HOUR: f32 = core::f32::consts::PI / 180.0 / 3600.0;
 
-    /// Feeds the filter with this reading and the part's noise.
     fn stand(rest: &mut RestReading, reading: f32, seconds: u32) -> Option<RestOutcome> {
         let noise = FogErrors::DSP1760.angle_walk * sqrt(RATE_HZ as f32);
         let mut last = None;

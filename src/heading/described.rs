@@ -26,7 +26,6 @@ pub struct HeadingSignal {
 }
 
 impl HeadingSignal {
-    /// Returns whether factor and offset can be those of a heading.
     pub(super) fn is_plausible(&self) -> bool {
         FACTORS.contains(&libm::fabsf(self.factor)) && libm::fabsf(self.offset) <= LARGEST_OFFSET
     }

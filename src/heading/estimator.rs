@@ -59,7 +59,6 @@ impl CourseConfig {
 
     /// Returns the accuracy of a course, 1 sigma, rad; `None` where it teaches nothing, because the vehicle is too slow or it
     /// is too inaccurate. Below [`Self::slowest`] it must be stated, and as good as one at that speed that states nothing.
-    #[must_use]
     pub fn sigma(&self, heading: &Heading) -> Option<f32> {
         let (_, speed) = heading.course.zip(heading.speed)?;
         let stated = heading.course_sigma.or(heading.speed_sigma.map(|across| across / speed));
@@ -140,7 +139,6 @@ struct Arrived {
     sigma: f32,
 }
 
-/// Courses that do not match the heading.
 #[derive(Debug, Clone, Copy)]
 struct Failing {
     /// Tick and distance of the first one after one that matched.
@@ -150,7 +148,6 @@ struct Failing {
     /// Times in a row that the heading started again, and the tick of the newest one.
     times: u8,
     trusted: u32,
-    /// Courses in a row that match.
     matches: u8,
     /// Bias and gain with their variances, before the courses that may be false.
     before: Option<[f32; 4]>,
@@ -235,7 +232,6 @@ pub struct Estimator {
 
 impl Estimator {
     /// Creates it before the first course.
-    #[must_use]
     pub const fn new(config: CourseConfig) -> Self {
         Self {
             config,
@@ -298,7 +294,6 @@ impl Estimator {
         }
     }
 
-    /// Counts a course that is not used, with the reason.
     pub(crate) fn refuse(&mut self, why: Refusal) {
         self.refusal = Some(why);
         count(&mut self.counters.refused, 1);
@@ -318,7 +313,6 @@ impl Estimator {
         true
     }
 
-    /// Advances the states by a block.
     fn walk(&mut self, filter: &mut Filter, turned: f32, stands: bool) {
         let [heading, lag] = self.config.walks.map(|walk| walk * walk * BLOCK_SECONDS);
         filter.turn(turned, BLOCK_SECONDS, stands);
@@ -336,7 +330,6 @@ impl Estimator {
         self.unchanged += driven;
     }
 
-    /// Uses a course, or says why not.
     fn take(&mut self, filter: &mut Filter, arrived: &Arrived, stands: bool) -> Result<(), Refusal> {
         if self.newest.replace(arrived.course) != Some(arrived.course) {
             self.unchanged = 0.0;
@@ -424,7 +417,6 @@ impl Estimator {
         Ok(())
     }
 
-    /// Returns whether the heading is known.
     pub(crate) fn has_begun(&self) -> bool {
         self.used.is_some()
     }
@@ -435,14 +427,12 @@ impl Estimator {
     }
 
     /// Returns what courses have shown, without the gain.
-    #[must_use]
     pub fn state(&self) -> CourseState {
         let Self { counters, refusal, failing, .. } = *self;
         CourseState { counters, refusal, is_contradicted: failing.times > 0, ..CourseState::START }
     }
 }
 
-/// Returns bias and gain, each with its variance.
 fn learnt(filter: &Filter) -> [f32; 4] {
     [filter.get::<BIAS>(), filter.variance::<BIAS>(), filter.get::<GAIN>(), filter.variance::<GAIN>()]
 }

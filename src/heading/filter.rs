@@ -13,7 +13,6 @@
 //!
 //! Without a course the last three are independent of the first two, and nothing is computed with them.
 
-/// Index of each state.
 pub(crate) const BIAS: usize = 0;
 pub(crate) const STOP: usize = 1;
 pub(crate) const GAIN: usize = 2;
@@ -48,7 +47,6 @@ impl Filter {
         Self { state: [0.0; STATES], covariance }
     }
 
-    /// Returns a state.
     pub const fn get<const STATE: usize>(&self) -> f32 {
         self.state[STATE]
     }
@@ -58,7 +56,6 @@ impl Filter {
         self.state[STATE] = value;
     }
 
-    /// Returns the variance of a state.
     pub const fn variance<const STATE: usize>(&self) -> f32 {
         self.covariance[STATE][STATE]
     }
@@ -68,7 +65,6 @@ impl Filter {
         self.covariance[STATE][STATE] = variance;
     }
 
-    /// Returns the covariance of bias and offset.
     pub const fn bias_and_stop(&self) -> f32 {
         self.covariance[BIAS][STOP]
     }
@@ -83,7 +79,6 @@ impl Filter {
         self.state[STATE] = value;
     }
 
-    /// Adds the mean of a second at standstill, rad/s, with its variance.
     pub fn standstill(&mut self, mean: f32, variance: f32) {
         let [bias, stop, ..] = self.covariance;
         let with = combined(&bias, 1.0, &stop);
@@ -146,7 +141,6 @@ impl Filter {
         }
     }
 
-    /// Corrects the states by the innovation, and the covariance by the gains.
     fn apply(&mut self, gains: &Vector, innovation: f32, with: &Vector) {
         for ((state, row), gain) in self.state.iter_mut().zip(&mut self.covariance).zip(gains) {
             *state += gain * innovation;

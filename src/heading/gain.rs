@@ -32,7 +32,6 @@ impl Gain {
     }
 
     /// Returns whether it should replace a stored one.
-    #[must_use]
     pub fn replaces(&self, stored: Option<&Self>) -> bool {
         self.sigma <= KEPT
             && stored.is_none_or(|stored| {
@@ -42,7 +41,6 @@ impl Gain {
     }
 
     /// Returns whether it can be a part's.
-    #[must_use]
     pub fn is_plausible(&self) -> bool {
         libm::fabsf(self.share) <= MAX_GAIN && self.sigma > 0.0 && self.sigma <= KEPT
     }

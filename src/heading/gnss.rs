@@ -72,7 +72,6 @@ enum Parser {
 
 impl GnssLine {
     /// Creates a parser that has received nothing.
-    #[must_use]
     pub const fn new(protocol: GnssProtocol) -> Self {
         let parser = match protocol {
             GnssProtocol::Ubx => Parser::Ubx(Framer::new()),
@@ -82,7 +81,6 @@ impl GnssLine {
     }
 
     /// Returns the number of intact messages that were not used: another kind, another talker, or VTG beside RMC.
-    #[must_use]
     pub const fn others(&self) -> u32 {
         self.others
     }

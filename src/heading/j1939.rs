@@ -18,9 +18,6 @@ const PER_RAD: f32 = 128.0 * 180.0 / core::f32::consts::PI;
 const PER_SPEED: f32 = 256.0 * 3.6;
 
 /// Reads bearing and speed; `None` for a frame of another group.
-///
-/// # Errors
-/// [`HeadingError`].
 pub fn direction_speed(frame: &impl Frame) -> Option<Result<Heading, HeadingError>> {
     Some(group(frame, DIRECTION_SPEED)?.and_then(|[c0, c1, s0, s1, ..]| {
         let course = word([c0, c1], STATES).map(|code| code / PER_RAD);
@@ -30,9 +27,6 @@ pub fn direction_speed(frame: &impl Frame) -> Option<Result<Heading, HeadingErro
 }
 
 /// Reads the latitude, degrees, north positive; `None` for a frame of another group, `Ok(None)` where it is not available.
-///
-/// # Errors
-/// [`HeadingError::Short`].
 pub fn latitude(frame: &impl Frame) -> Option<Result<Option<f32>, HeadingError>> {
     Some(group(frame, POSITION)?.map(|[a, b, c, d, ..]| {
         let code = u32::from_le_bytes([a, b, c, d]);

@@ -26,7 +26,6 @@ pub struct ReceivedLatitude {
     pub moved: bool,
 }
 
-/// Judges latitudes by those before.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LatitudeJudge {
     known: Option<(f32, Micros)>,
@@ -40,15 +39,11 @@ impl LatitudeJudge {
         Self { known: known.map(|degrees| (degrees, Micros(0))), candidate: None }
     }
 
-    /// Returns whether frames contradict the latitude in use.
     pub fn is_contested(&self) -> bool {
         self.known.is_some() && self.candidate.is_some()
     }
 
-    /// Takes a latitude received at `now`; `None` while it is not confirmed yet.
-    ///
-    /// # Errors
-    /// [`HeadingError::Range`], [`HeadingError::Jump`]; the latitude in use does not change.
+    /// Takes a latitude received at `now`; `None` while it is not confirmed yet. An error changes nothing.
     pub fn take(&mut self, degrees: f32, now: Micros) -> Result<Option<ReceivedLatitude>, HeadingError> {
         if !(-90.0..=90.0).contains(&degrees) {
             return Err(HeadingError::Range { what: "latitude", value: degrees });

@@ -19,10 +19,8 @@ const TALKERS: [&[u8; 2]; 9] = [b"GN", b"GP", b"GL", b"GA", b"GB", b"BD", b"GQ",
 const WITHOUT_RMC: u8 = 3;
 /// Another talker is used after this many RMC and VTG from talkers other than the one in use: 5 s at ten a second.
 const WITHOUT_TALKER: u8 = 50;
-/// A knot, m/s.
 const KNOT: f32 = 1852.0 / 3600.0;
 
-/// The sentences of a line.
 #[derive(Debug, Clone)]
 pub(super) struct Sentences {
     /// The sentence so far, from its `$` on.
@@ -53,7 +51,6 @@ impl Sentences {
         if is_lost || begins && length > 0 { Err(HeadingError::Length(length)) } else { Ok(()) }
     }
 
-    /// Drops the sentence in progress.
     pub fn interrupt(&mut self) {
         self.bytes.clear();
     }

@@ -8,7 +8,6 @@ use embedded_can::Frame;
 pub const POSITION: u32 = 129_025;
 /// Parameter group of course and speed.
 pub const COURSE_SPEED: u32 = 129_026;
-/// Usual priority.
 const PRIORITY: u8 = 2;
 /// From here on a 16-bit code is reserved, an error or not available.
 const RESERVED: u16 = 0xFFFD;
@@ -18,10 +17,8 @@ const LONG_RESERVED: i32 = i32::MAX - 2;
 const PER_RAD: f32 = 1e4;
 const PER_SPEED: f32 = 100.0;
 
-/// Reads course and speed; `None` for a frame of another group.
-///
-/// # Errors
-/// [`HeadingError`]; a course from magnetic north is refused, because the declination is not known.
+/// Reads course and speed; `None` for a frame of another group. A course from magnetic north is refused, because the
+/// declination is not known.
 pub fn course_speed(frame: &impl Frame) -> Option<Result<Heading, HeadingError>> {
     Some(group(frame, COURSE_SPEED)?.and_then(|[_sequence, reference, c0, c1, s0, s1, ..]| {
         let course = word([c0, c1], RESERVED).map(|code| code / PER_RAD);
@@ -35,7 +32,6 @@ pub fn course_speed(frame: &impl Frame) -> Option<Result<Heading, HeadingError>>
 }
 
 /// Makes a frame with course and speed; accuracies have no place in it.
-#[must_use]
 pub fn course_speed_frame<F: Frame>(heading: &Heading, sequence: u8, source: u8) -> Option<F> {
     let [c0, c1] = code(heading.course, PER_RAD, u16::MAX);
     let [s0, s1] = code(heading.speed, PER_SPEED, u16::MAX);
@@ -44,9 +40,6 @@ pub fn course_speed_frame<F: Frame>(heading: &Heading, sequence: u8, source: u8)
 
 /// Reads the latitude of a position, degrees, north positive; `None` for a frame of another group, `Ok(None)` where it is
 /// not available.
-///
-/// # Errors
-/// [`HeadingError::Short`].
 pub fn latitude(frame: &impl Frame) -> Option<Result<Option<f32>, HeadingError>> {
     Some(group(frame, POSITION)?.map(|[a, b, c, d, ..]| {
         let code = i32::from_le_bytes([a, b, c, d]);

@@ -20,7 +20,6 @@ const ALL: u32 = u32::MAX;
 const GROUP: u32 = 0x3_FFFF << 8;
 /// The two groups of NMEA 2000 differ in the lowest two bits, which this leaves out.
 const BOTH: u32 = GROUP & !(3 << 8);
-/// Bit rates of a serial line.
 const BAUDS: core::ops::RangeInclusive<u32> = 4_800..=460_800;
 
 /// The source of courses, speeds and latitudes. By default there is none.
@@ -77,7 +76,6 @@ impl HeadingSettings {
         line: None,
     };
 
-    /// Returns whether messages with a course are named.
     pub(crate) const fn has_course(&self) -> bool {
         self.nmea2000 || self.j1939 || self.course.is_some() || self.line.is_some()
     }
@@ -102,9 +100,6 @@ impl HeadingSettings {
     }
 
     /// Checks the settings beside the identifiers that are taken already.
-    ///
-    /// # Errors
-    /// [`HeadingConfigError`].
     pub fn check(&self, taken: impl Iterator<Item = Id>) -> Result<(), HeadingConfigError> {
         if let Some(signal) = self.signals().iter().flatten().find(|signal| !signal.is_plausible()) {
             return Err(HeadingConfigError::Scale(raw_id(signal.id)));
@@ -156,26 +151,20 @@ pub struct HeadingReceiver {
 
 impl HeadingReceiver {
     /// Creates a receiver of checked settings; `latitude` is one that is known already, degrees.
-    #[must_use]
     pub fn new(settings: HeadingSettings, latitude: Option<f32>) -> Self {
         Self { settings, sender: None, kept: [None; 3], latitude: LatitudeJudge::new(latitude) }
     }
 
-    /// Returns the settings.
     pub(crate) const fn settings(&self) -> &HeadingSettings {
         &self.settings
     }
 
     /// Returns whether frames contradict the latitude in use.
-    #[must_use]
     pub fn is_contested(&self) -> bool {
         self.latitude.is_contested()
     }
 
     /// Processes a frame received at `now`; `None` if the settings do not name it.
-    ///
-    /// # Errors
-    /// [`HeadingError`]; nothing of the frame is used.
     pub fn decode(&mut self, frame: &impl Frame, now: Micros) -> Option<Result<Received, HeadingError>> {
         let HeadingSettings { nmea2000, j1939, .. } = self.settings;
         let mut read = None;
@@ -198,9 +187,6 @@ impl HeadingReceiver {
     }
 
     /// Judges what a receiver says at `now`.
-    ///
-    /// # Errors
-    /// [`HeadingError`] of course and speed; nothing of it is used.
     pub fn judge(&mut self, Fix { heading, latitude }: Fix, now: Micros) -> Result<Received, HeadingError> {
         let heading = heading.map(Heading::checked).transpose()?;
         let latitude =

@@ -26,7 +26,6 @@ pub(super) struct Turns {
 }
 
 impl Turns {
-    /// Before the first sample.
     pub const EMPTY: Self = Self { ends: [0; KEPT], filled: 0, sum: 0, block: 0, samples: 0 };
 
     /// Adds a sample; returns the turn of the block that ends with it, rad.

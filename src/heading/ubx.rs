@@ -19,7 +19,6 @@ const COURSE: f32 = 1e-5 * PI / 180.0;
 const SPEED: f32 = 1e-3;
 const LATITUDE: f32 = 1e-7;
 
-/// The framing of UBX.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Ubx;
 

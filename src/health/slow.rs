@@ -38,18 +38,12 @@ pub enum Knowledge {
     Refused = 3,
 }
 
-/// All of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SlowStatus {
-    /// The verdict about standstill.
     pub verdict: Verdict,
-    /// The evidence for the verdict.
     pub evidence: Evidence,
-    /// Knowledge of the gyro's bias.
     pub bias: Knowledge,
-    /// Knowledge of the gyro's gain and misalignment.
     pub gain: Knowledge,
-    /// Knowledge of the sensor's mounting.
     pub mounting: Knowledge,
     /// Sources of the yaw rate that others contradict: inertial gyro 1, fibre-optic gyro 2, wheels 4; `None` before two
     /// have been compared.

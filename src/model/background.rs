@@ -30,9 +30,6 @@ impl<'w> BackgroundCheck<'w> {
     }
 
     /// Checks up to `count` more bytes; with the last ones it returns the result of the round and begins the next.
-    ///
-    /// # Errors
-    /// The result is [`BlobError::Crc`] if the weights have changed since they were first checked.
     pub fn advance(&mut self, count: usize) -> Option<Result<(), BlobError>> {
         let end = self.at.saturating_add(count).min(self.content.len());
         self.digest.update(self.content.get(self.at..end).unwrap_or_default());

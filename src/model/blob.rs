@@ -29,18 +29,15 @@ pub const HEADER_LEN: usize = header_len(FEATURES);
 pub struct Shape {
     /// Units of the Bi-LSTMs a direction, up to [`HIDDEN`] in steps of 4; with 0 there are none.
     pub units: u16,
-    /// Says whether the model has a linear part.
     pub linear: bool,
 }
 
 impl Shape {
-    /// The paper's GyroNet has this shape.
     pub const PAPER: Self = Self { units: HIDDEN as u16, linear: false };
     /// The largest shape that a file may have.
     pub const LARGEST: Self = Self { units: HIDDEN as u16, linear: true };
 
     /// Returns the topology that the file's header must state.
-    #[must_use]
     pub const fn topology(self) -> Topology {
         let outputs = if self.linear { WINDOW as u16 } else { 0 };
         [GYRONET, WINDOW as u16, FEATURES as u16, self.units, 2, outputs]
@@ -48,7 +45,6 @@ impl Shape {
 
     /// Returns the largest cost of a window on a Cortex-M4 at zero wait states, modelled cycles (`cargo bench-target`
     /// prints those of some shapes).
-    #[must_use]
     pub const fn window_cycles(self) -> u32 {
         let units = self.units as u32;
         let layers = if units > 0 { 20_000 + 4_400 * units + 355 * units * units } else { 0 };
@@ -56,7 +52,6 @@ impl Shape {
     }
 
     /// Returns the number of bytes of a file with `provenance` bytes of padded text.
-    #[must_use]
     pub const fn file_len(self, provenance: usize) -> usize {
         let linear = if self.linear { 4 * WINDOW * LINEAR_INPUTS } else { 0 };
         let units = self.units as usize;
@@ -86,7 +81,6 @@ pub struct Blob<'w> {
     pub input_clamp: i16,
     /// The part of the gyro error that is linear in the features: from their codes to rate codes.
     pub linear: Option<Linear<'w>>,
-    /// The two Bi-LSTM layers.
     pub layers: Option<[Layer<'w>; 2]>,
     /// Row of the output layer for a step's gyro error, as a rate code; empty without layers.
     pub gyro_error: Dense<'w>,

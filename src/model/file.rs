@@ -36,7 +36,6 @@ pub const FOGNET: u16 = 2;
 /// The lookup table of [`CRC`]: 1 KiB on a microcontroller, the faster 16 KiB on a host.
 #[cfg(target_os = "none")]
 pub type CrcTable = crc::Table<1>;
-/// The lookup table of [`CRC`]: 1 KiB on a microcontroller, the faster 16 KiB on a host.
 #[cfg(not(target_os = "none"))]
 pub type CrcTable = crc::Table<16>;
 /// Computes CRC-32 as in zip and Ethernet.
@@ -56,7 +55,6 @@ pub type Topology = [u16; 6];
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum BlobError {
-    /// The file does not begin with [`MAGIC`].
     #[error("weight file: it begins with {0:02x?}, should be {MAGIC:02x?}")]
     Magic([u8; 4]),
     #[error("weight file: format version {found}, should be {expected}")]
@@ -121,7 +119,6 @@ pub struct Normalisation {
     pub multiplier: i32,
 }
 
-/// Returns the length in bytes of the common header for a network with this many inputs.
 pub(super) const fn header_len(inputs: usize) -> usize {
     32 + 8 * inputs
 }
@@ -130,19 +127,15 @@ pub(super) const fn direction_len(units: usize, inputs: usize) -> usize {
     4 * (DirectionWeights::input_words(units, inputs) + DirectionWeights::recurrent_words(units))
 }
 
-/// Returns the number of bytes of two bidirectional layers.
 pub(super) const fn layers_len(units: usize, inputs: usize) -> usize {
     2 * (direction_len(units, inputs) + direction_len(units, 2 * units))
 }
 
-/// Returns the number of bytes of a row of an output layer.
 pub(super) const fn dense_len(columns: usize) -> usize {
     2 * columns + 8
 }
 
-/// Holds the header's fields, which have been checked against the file.
 pub(super) struct Header<const INPUTS: usize, S> {
-    /// The shape, as the network reads it.
     pub shape: S,
     pub input_clamp: i16,
     pub normalisation: [Normalisation; INPUTS],
@@ -254,7 +247,6 @@ impl<'w> Reader<'w> {
         self.array().map(|bytes| i32::from_le_bytes(*bytes))
     }
 
-    /// Reads `len` elements of `T`, in place.
     pub fn slice<T: bytemuck::AnyBitPattern>(&mut self, len: usize) -> Result<&'w [T], BlobError> {
         let bytes = self.take(len * size_of::<T>())?;
         if !bytes.as_ptr().addr().is_multiple_of(4) {
@@ -268,7 +260,6 @@ impl<'w> Reader<'w> {
         Ok(text.trim_end_matches(' '))
     }
 
-    /// Reads two bidirectional layers.
     pub fn layers(&mut self, units: usize, inputs: usize) -> Result<[Layer<'w>; 2], BlobError> {
         let mut layer = |inputs| {
             Ok(Layer { forward: self.direction(units, inputs)?, backward: self.direction(units, inputs)? })
@@ -282,13 +273,11 @@ impl<'w> Reader<'w> {
         DirectionWeights::new(units, inputs, input, recurrent).ok_or(BlobError::Misaligned)
     }
 
-    /// Reads the rows of a linear part.
     pub fn linear(&mut self, outputs: usize, inputs: usize) -> Result<Linear<'w>, BlobError> {
         let overflow = |output| BlobError::LinearBound { output: output as u16 };
         Linear::new(inputs, self.slice(outputs * inputs)?).map_err(overflow)
     }
 
-    /// Reads a row of an output layer.
     pub fn dense(&mut self, columns: usize) -> Result<Dense<'w>, BlobError> {
         Ok(Dense { weights: self.slice(columns)?, bias: self.i32()?, multiplier: self.i32()? })
     }

@@ -30,9 +30,7 @@ const ANGLE_TO_RATE: u32 = Angle::FRACTION_BITS - AngularRate::FRACTION_BITS;
 /// Fraction bits of [`FogBlob::gains`].
 pub const GAIN_FRACTION_BITS: u32 = 31;
 
-/// Holds the result of a FoGNet window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogEstimate {
     /// The error of the gyro's turn in the window.
     pub correction: Angle,
@@ -45,13 +43,11 @@ pub struct FogEstimate {
 }
 
 impl FogEstimate {
-    /// An estimate without a correction.
     pub const NONE: Self = Self { correction: Angle::ZERO, linear: Angle::ZERO, gain: 0, clamped_inputs: 0 };
 }
 
 /// Turns a minute into a correction; the integer network and the f32 reference implement it.
 pub trait MinuteNetwork {
-    /// Runs the network over one window.
     fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate;
 }
 
@@ -110,7 +106,6 @@ impl<'w, 's> FogNet<'w, 's> {
         Self { blob, state }
     }
 
-    /// Returns the network's weights.
     pub fn blob(&self) -> &FogBlob<'w> {
         &self.blob
     }

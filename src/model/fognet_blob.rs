@@ -34,7 +34,6 @@ pub const COLUMNS: usize = INPUTS + 1;
 pub const CORRECTION_SHIFT: u32 = 16;
 /// Bytes before the provenance text.
 pub const HEADER_LEN: usize = header_len(INPUTS) + 4 * STEPS + 8 + 8;
-/// The file's header must state this topology.
 pub const TOPOLOGY: Topology = [FOGNET, STEPS as u16, INPUTS as u16, HIDDEN1 as u16, 2, 1];
 
 /// Names the source of the turns that a FoGNet corrects.
@@ -70,11 +69,9 @@ impl core::fmt::Display for Gyro {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Training {
-    /// The source of the turns.
     pub gyro: Gyro,
     /// Serial number of the gyro that the network was trained for; 0 stands for any of that part.
     pub serial: u32,
-    /// The drives were simulated.
     pub simulated: bool,
 }
 
@@ -91,9 +88,7 @@ impl core::fmt::Display for Training {
 pub struct FogBlob<'w> {
     /// The provenance of the weights: JSON.
     pub provenance: &'w str,
-    /// The data that the network was trained on.
     pub training: Training,
-    /// The scaling of each feature.
     pub normalisation: [Normalisation; INPUTS],
     /// Network inputs are clamped to +- this, Q10.
     pub input_clamp: i16,
@@ -101,11 +96,8 @@ pub struct FogBlob<'w> {
     pub gains: &'w [i32],
     /// The constant part of the correction: all biases of FC2, FC3 and FC4.
     pub offset: Angle,
-    /// The two layers of LSTM1.
     pub lstm1: [Layer<'w>; 2],
-    /// The weights of FC1.
     pub fc1: Dense<'w>,
-    /// The two layers of LSTM2.
     pub lstm2: [Layer<'w>; 2],
     /// The weights of FC2 times FC4's factor for FC2.
     pub fc2: Dense<'w>,
@@ -114,7 +106,6 @@ pub struct FogBlob<'w> {
     pub content: &'w [u8],
 }
 
-/// Returns the number of bytes of a FoGNet file with `provenance` bytes of padded text.
 pub const fn file_len(provenance: usize) -> usize {
     HEADER_LEN
         + provenance
@@ -173,7 +164,6 @@ impl<'w> FogBlob<'w> {
         Angle(self.offset.0.saturating_add(product >> CORRECTION_SHIFT))
     }
 
-    /// Returns the mean of [`FogBlob::gains`].
     pub fn mean_gain(&self) -> i32 {
         let sum: i64 = self.gains.iter().map(|gain| i64::from(*gain)).sum();
         // A mean of int32s fits an int32.

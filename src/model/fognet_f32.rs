@@ -11,7 +11,6 @@ use crate::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 pub struct FogNetF32<'w> {
     /// Mean of each feature: m/s^2, rad/s, m, rad.
     pub input_mean: [f32; INPUTS],
-    /// Standard deviation of each feature.
     pub input_std: [f32; INPUTS],
     /// rad per unit of the last layer.
     pub correction_scale: f32,
@@ -19,7 +18,6 @@ pub struct FogNetF32<'w> {
     pub lstm1: [[LstmWeights<'w>; 2]; 2],
     /// Weights (180) and bias of FC1.
     pub fc1: (&'w [f32], f32),
-    /// Layer 1, then layer 2; forward, backward.
     pub lstm2: [[LstmWeights<'w>; 2]; 2],
     /// Weights (120) and bias of FC2.
     pub fc2: (&'w [f32], f32),
@@ -29,7 +27,6 @@ pub struct FogNetF32<'w> {
     pub fc4: (&'w [f32], f32),
 }
 
-/// Holds the layers' outputs for one window.
 #[derive(Debug, Clone)]
 pub struct FogLayerOutputs {
     /// Features less mean, over standard deviation.
@@ -38,9 +35,7 @@ pub struct FogLayerOutputs {
     pub f1: [f32; STEPS],
     /// LSTM2's hidden state at the last step, forward then backward.
     pub layer2_last: [f32; 2 * HIDDEN2],
-    /// FC2 of that hidden state.
     pub f2: f32,
-    /// FC3 of the gyro's normalised increments.
     pub f3: f32,
     /// The error of the gyro's turn, rad.
     pub correction: f32,
@@ -48,7 +43,6 @@ pub struct FogLayerOutputs {
     pub prediction: f32,
 }
 
-/// Runs two bidirectional layers over a sequence.
 fn two_layers<const I: usize, const H: usize, const W: usize>(
     weights: &[[LstmWeights<'_>; 2]; 2],
     x: &[[f32; I]; STEPS],

@@ -33,7 +33,6 @@ where
 pub trait Memory {
     /// The most units a direction that there is room for.
     const UNITS: usize;
-    /// The arrays of this size.
     type Arrays: WindowRun;
 
     fn arrays(&mut self) -> &mut Self::Arrays;
@@ -60,15 +59,11 @@ impl<M: Memory> Memory for &mut M {
     }
 }
 
-/// A number of units a direction.
 #[derive(Debug, Clone, Copy)]
 pub struct Units<const UNITS: usize>;
 
-/// A number of units that a network can have.
 pub trait Size {
-    /// The arrays of a state.
     type Arrays: WindowRun + Clone + core::fmt::Debug;
-    /// The arrays, all zeros.
     const ZERO: Self::Arrays;
 }
 
@@ -82,13 +77,11 @@ macro_rules! sizes {
 }
 sizes!(0 4 8 12 16 20 24 28 32 36 40 44 48 52 56 60);
 
-/// A window of a network in arrays of some size.
 pub trait WindowRun {
     /// Loads a window and runs the linear part on it.
     fn start(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]);
     /// Runs a piece of the window; returns the estimate with the last one.
     fn advance(&mut self, blob: &Blob<'_>) -> Option<Estimate>;
-    /// Drops the window in progress.
     fn stop(&mut self);
 }
 
@@ -106,7 +99,6 @@ pub struct Arrays<const U: usize, const W: usize, const R: usize> {
     /// Sums of the gyro error's row for each sample; they start from its bias.
     sums: [i32; WINDOW],
     clamped_inputs: u16,
-    /// The position in the window in progress.
     run: Run,
     under_way: bool,
 }
@@ -186,21 +178,15 @@ impl<'w> GyroNet<'w> {
 }
 
 impl GyroNet<'static, GyroNetState> {
-    /// Creates the library's default model with a state of its size.
-    ///
-    /// # Errors
-    /// [`BlobError`] if the flash is damaged.
+    /// Creates the library's default model with a state of its size; an error is damaged flash.
     pub fn shipped() -> Result<Self, BlobError> {
         Self::with_state(Blob::new_checked(&weights::DEFAULT.0)?, GyroNetState::ZERO)
     }
 }
 
 impl<'w, S: Memory> GyroNet<'w, S> {
-    /// Creates a network over checked weights that works in the caller's state. A window in progress in that state is
-    /// dropped.
-    ///
-    /// # Errors
-    /// [`BlobError::Units`]: the state is too small for this network.
+    /// Creates a network over checked weights that works in the caller's state, unless that is too small. A window in
+    /// progress in that state is dropped.
     pub fn with_state(blob: Blob<'w>, mut state: S) -> Result<Self, BlobError> {
         let found = blob.shape.units;
         if usize::from(found) > S::UNITS {
@@ -210,7 +196,6 @@ impl<'w, S: Memory> GyroNet<'w, S> {
         Ok(Self { blob, state })
     }
 
-    /// Returns the network's weights.
     pub fn blob(&self) -> &Blob<'w> {
         &self.blob
     }

@@ -15,7 +15,6 @@ pub struct GyroNetF32<'w> {
     pub input_std: [f32; FEATURES],
     /// (N, N F): weights of each sample's gyro error over all features of the window, if there is a linear part.
     pub linear: Option<&'w [f32]>,
-    /// The Bi-LSTMs, if there are any.
     pub network: Option<NetworkF32<'w>>,
 }
 
@@ -68,7 +67,6 @@ impl GyroNetF32<'_> {
 }
 
 impl NetworkF32<'_> {
-    /// Fills in the layers' outputs, and adds the last one to the gyro error.
     fn run(&self, outputs: &mut LayerOutputs) {
         let LayerOutputs { normalised, layer1, layer2, gyro_error, .. } = outputs;
         let units = self.lstm1[0].units();

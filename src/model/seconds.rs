@@ -19,32 +19,24 @@ pub const FRAMES: u32 = RATE_HZ;
 
 /// Holds the part of a second that one 10 ms frame adds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogFrame {
     /// Angle turned about z (up) since the frame before; `None` if part of it is unknown.
     pub turn: Option<Angle>,
     /// Reading of the inertial sensor, its gyro less the static bias ([`window::Features`]).
     pub inertial: Option<window::Features>,
-    /// Speeds of the left and the right wheel.
     pub wheels: Option<[WheelSpeed; 2]>,
 }
 
-/// Holds the features of one second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Second {
     /// Means in the codes of [`crate::units`]. A wheel's mean speed over a second is also its distance.
     pub features: [i32; FEATURES],
-    /// Angle turned.
     pub turn: Angle,
 }
 
-/// Says why the window ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Incomplete {
-    /// The gyro's increments have a gap.
     Gyro,
     /// Less than half of the second's frames had an inertial sample.
     Inertial,
@@ -52,7 +44,6 @@ pub enum Incomplete {
     Wheels,
 }
 
-/// Sums the frames of the current second.
 #[derive(Debug, Clone, Copy)]
 pub struct SecondSums {
     frames: u32,
@@ -86,13 +77,9 @@ impl<const N: usize> Mean<N> {
 }
 
 impl SecondSums {
-    /// Starts with empty sums.
     pub const ZERO: Self = Self { frames: 0, turn: 0, inertial: Mean::ZERO, wheels: Mean::ZERO };
 
-    /// Adds a frame; returns the second that it completes.
-    ///
-    /// # Errors
-    /// [`Incomplete`] when the frame, or the second that it ends, cannot be used; the next frame begins a new second.
+    /// Adds a frame; returns the second that it completes. After an error the next frame begins a new second.
     pub fn add(&mut self, frame: &FogFrame) -> Result<Option<Second>, Incomplete> {
         let Some(turn) = frame.turn else {
             *self = Self::ZERO;
@@ -112,19 +99,15 @@ impl SecondSums {
     }
 }
 
-/// A second for the window, with its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NewSecond {
     /// Number of the second, and of the window that it ends.
     pub number: u32,
     /// Says whether it begins a new window: the first one, or the first one after a gap.
     pub is_first: bool,
-    /// Its features.
     pub second: Second,
 }
 
-/// Keeps the last [`STEPS`] seconds without a gap.
 #[derive(Debug, Clone)]
 pub struct Minute {
     seconds: Ring<Second, STEPS>,
@@ -132,7 +115,6 @@ pub struct Minute {
 }
 
 impl Minute {
-    /// A minute without a second.
     pub const EMPTY: Self = Self {
         seconds: Ring::without_elements(Second { features: [0; FEATURES], turn: Angle::ZERO }),
         newest: 0,
@@ -149,7 +131,6 @@ impl Minute {
         SecondsWindow { seconds: &self.seconds }
     }
 
-    /// Adds a second that follows the one before.
     pub fn add(&mut self, second: Second) {
         self.seconds.add(second);
     }
@@ -168,7 +149,6 @@ pub struct SecondsWindow<'m> {
 }
 
 impl<'m> SecondsWindow<'m> {
-    /// Returns whether the window has a whole minute, and repeats no second.
     pub const fn is_whole(&self) -> bool {
         self.seconds.len() == STEPS
     }

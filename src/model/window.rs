@@ -19,11 +19,9 @@ pub fn features([fx, fy, fz]: [SpecificForce; 3], [x, y, z]: [AngularRate; 3]) -
 pub type Window = Ring<Features, WINDOW>;
 
 impl Window {
-    /// A window without a sample.
     pub const EMPTY: Self = Self::without_elements([0; FEATURES]);
 }
 
-/// Keeps the last `N` elements.
 #[derive(Debug, Clone)]
 pub struct Ring<T, const N: usize> {
     places: [T; N],
@@ -33,17 +31,14 @@ pub struct Ring<T, const N: usize> {
 }
 
 impl<T: Copy, const N: usize> Ring<T, N> {
-    /// Creates a ring without elements; its unused places hold `filling`.
     pub(super) const fn without_elements(filling: T) -> Self {
         Self { places: [filling; N], next: 0, filled: 0 }
     }
 
-    /// Removes all elements, because a gap ends the series.
     pub fn clear(&mut self) {
         (self.next, self.filled) = (0, 0);
     }
 
-    /// Adds the newest element; a full ring drops its oldest.
     pub fn add(&mut self, element: T) {
         if let Some(place) = self.places.get_mut(self.next) {
             *place = element;
@@ -73,7 +68,6 @@ pub type Corrections = [AngularRate; WINDOW];
 
 /// Turns a window into corrections; the integer network and the f32 reference implement it.
 pub trait WindowNetwork {
-    /// Runs the network over one window.
     fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate;
 }
 
@@ -87,7 +81,6 @@ impl<N: WindowNetwork + ?Sized> WindowNetwork for &mut N {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
-    /// The corrections.
     pub corrections: Corrections,
     /// Input values that had to be clamped to the network's range.
     pub clamped_inputs: u16,
@@ -96,7 +89,6 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// An estimate without a correction.
     pub const NONE: Self =
         Self { corrections: [AngularRate::ZERO; WINDOW], clamped_inputs: 0, linear_sum: 0 };
 }

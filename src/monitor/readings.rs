@@ -28,7 +28,6 @@ const ALWAYS: u16 = 1 << 15;
 /// [`STUCK_AFTER`] samples.
 const SELDOM: u16 = ALWAYS / 16;
 
-/// Counts how often each axis repeats a reading.
 #[derive(Debug, Clone)]
 pub(super) struct Repeats {
     last: Option<[i32; AXES]>,
@@ -45,7 +44,6 @@ impl Repeats {
         Self { last: None, equal: [0; AXES], repeats: [ALWAYS; AXES], stuck: [false; AXES] }
     }
 
-    /// Adds a sample and returns whether the part is stuck.
     pub fn observe(&mut self, sample: &ImuSample) -> bool {
         let ([fx, fy, fz], [wx, wy, wz]) = (sample.specific_force, sample.angular_rate);
         let axes = [fx.0, fy.0, fz.0, wx.0, wy.0, wz.0];
@@ -92,7 +90,6 @@ const USUAL_AFTER: u16 = 300;
 /// Readings are not compared with a last good reading older than this, microseconds.
 const OLD_US: u32 = 50_000;
 
-/// Compares each reading with the last accepted one.
 #[derive(Debug, Clone)]
 pub(super) struct Jump {
     /// The last accepted reading: gyro in rad/s, accelerometer in m/s^2.
@@ -102,7 +99,6 @@ pub(super) struct Jump {
     known: bool,
     /// Mean squares of the axes' accepted steps.
     squares: [f32; AXES],
-    /// Readings in a row that were rejected.
     rejected: u8,
     /// Samples since the first one that was rejected, and since the last one.
     odd_for: u16,
@@ -125,7 +121,6 @@ struct Shift {
 }
 
 impl Jump {
-    /// Creates the state before the first reading.
     pub const fn new() -> Self {
         Self {
             last: [0.0; AXES],
@@ -228,7 +223,6 @@ impl Jump {
         self.shift.map_or(0.0, |shift| libm::fabsf(shift.sum).max(libm::fabsf(yaw - shift.before)))
     }
 
-    /// Returns the mean rate of a second by which a plausible step may be off, rad/s.
     pub fn suspect(&self) -> f32 {
         let (step, _) = self.suspect;
         step / RATE_HZ as f32

@@ -53,13 +53,11 @@ impl Forward {
         [angle, sqrt(self.sigma * self.sigma + other.sigma * other.sigma)]
     }
 
-    /// Returns whether the direction is a unit vector and the sigma is not negative.
     pub fn is_plausible(&self) -> bool {
         libm::fabsf(dot(&self.direction, &self.direction) - 1.0) < 0.01 && self.sigma >= 0.0
     }
 }
 
-/// Finds the forward direction while the vehicle drives.
 #[derive(Debug, Clone)]
 pub struct ForwardEstimator {
     second: Second,
@@ -88,7 +86,6 @@ impl Second {
 }
 
 impl ForwardEstimator {
-    /// The state before the first sample.
     pub const START: Self =
         Self { second: Second::EMPTY, before: None, turned: [0.0; 3], force: 0.0, motion: 0.0, count: 0.0 };
 
@@ -121,7 +118,6 @@ impl ForwardEstimator {
         has_learnt
     }
 
-    /// Compares a full second with the one before.
     fn end_second(&mut self, end: f32, rest: &[SpecificForce; 3]) -> bool {
         let Second { begin, force, turning, .. } = self.second;
         let rest = metre_per_sec2(rest);
@@ -159,7 +155,6 @@ impl ForwardEstimator {
     }
 }
 
-/// Returns the mean speed of the wheels that have one, m/s.
 fn mean_speed(wheels: &WheelSample) -> Option<f32> {
     let known = || wheels.speeds.iter().flatten();
     let sum: f32 = known().map(|speed| speed.0 as f32).sum();

@@ -59,7 +59,6 @@ pub struct Vertical {
 }
 
 impl Vertical {
-    /// The state before the first standstill.
     pub const UNKNOWN: Self = Self { sum: [0.0; 3], information: 0.0 };
 
     /// Adds a direction, a unit vector, with its variance in rad^2.
@@ -115,7 +114,6 @@ impl Vertical {
         Self { sum: rotation.vector(&self.sum), ..*self }
     }
 
-    /// How well it is known.
     pub fn knowledge(&self) -> Knowledge {
         match self.information {
             0.0 => Knowledge::Unknown,
@@ -131,14 +129,12 @@ impl Vertical {
         [libm::atan2f(y, z), pitch, self.sigma()].map(f32::to_degrees)
     }
 
-    /// Returns whether it is a mean of unit vectors.
     pub fn is_plausible(&self) -> bool {
         (0.0..=1.01 * MOST).contains(&self.information)
             && dot(&self.sum, &self.sum) <= 1.01 * self.information * self.information
     }
 }
 
-/// What is taken for the mounting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judgement {
     /// The direction that points up; `None` where the sensor is mounted as configured.
@@ -169,7 +165,6 @@ pub struct VerticalEstimator {
 }
 
 impl VerticalEstimator {
-    /// Starts with what is known.
     pub const fn new(known: Vertical) -> Self {
         Self {
             known,
@@ -272,7 +267,6 @@ impl VerticalEstimator {
         self.is_one_place
     }
 
-    /// Judges what the tilt is.
     pub fn judge(&mut self) -> Judgement {
         let now = self.now();
         let odds = now.odds();
@@ -307,7 +301,6 @@ mod tests {
         )
     }
 
-    /// Lets it see seconds of a sensor with this tilt.
     fn run(estimator: &mut VerticalEstimator, seconds: u32, tilt: [f32; 2], yaw: f32, stands: bool) {
         let (force, rate) = readings(tilt, yaw);
         (0..100 * seconds).for_each(|_| _ = estimator.add(&force, &rate, stands));

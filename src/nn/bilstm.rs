@@ -8,22 +8,15 @@
 
 use super::lstm::{self, DirectionWeights, Scratch};
 
-/// Holds the weights of a layer: one set for each direction.
 #[derive(Debug, Clone, Copy)]
 pub struct Layer<'w> {
-    /// The direction forward in time.
     pub forward: DirectionWeights<'w>,
-    /// The direction backward in time.
     pub backward: DirectionWeights<'w>,
 }
 
-/// The order in which a direction runs its steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Direction {
-    /// The first step runs first.
     Forward,
-    /// The last step runs first.
     Backward,
 }
 
@@ -35,7 +28,6 @@ pub struct Pass {
 }
 
 impl Pass {
-    /// Creates the state before the first step.
     pub const fn new(direction: Direction) -> Self {
         Self { direction, done: 0 }
     }
@@ -143,7 +135,6 @@ pub struct Run {
 }
 
 impl Run {
-    /// Creates the state before the first step.
     pub const fn new() -> Self {
         Self { stage: 0, pass: Pass::new(Direction::Forward) }
     }

@@ -9,15 +9,12 @@ pub struct Linear<'w> {
 }
 
 impl<'w> Linear<'w> {
-    /// Fraction bits of a weight.
     pub const FRACTION_BITS: u32 = 24;
     /// The magnitudes of a row must not add up to more than this, so that no inputs can overflow a sum of 64 bits.
     pub const ROW_LIMIT: u64 = u32::MAX as u64;
 
-    /// Creates a layer over rows of `inputs` weights, in the layout of a weight file.
-    ///
-    /// # Errors
-    /// The number of the first row that some inputs could overflow.
+    /// Creates a layer over rows of `inputs` weights, in the layout of a weight file; an error is the number of the
+    /// first row that some inputs could overflow.
     pub fn new(inputs: usize, weights: &'w [i32]) -> Result<Self, usize> {
         let layer = Self { inputs, weights };
         let magnitude = |row: &[i32]| row.iter().map(|weight| u64::from(weight.unsigned_abs())).sum::<u64>();
@@ -27,7 +24,6 @@ impl<'w> Linear<'w> {
         }
     }
 
-    /// Returns the rows, one for each output.
     pub fn rows(&self) -> impl Iterator<Item = &'w [i32]> {
         self.weights.chunks_exact(self.inputs.max(1))
     }

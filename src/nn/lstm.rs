@@ -33,12 +33,10 @@ pub struct DirectionWeights<'w> {
 }
 
 impl<'w> DirectionWeights<'w> {
-    /// Returns the number of words of the input records.
     pub const fn input_words(units: usize, inputs: usize) -> usize {
         units * (BIAS_WORDS + inputs)
     }
 
-    /// Returns the number of words of the recurrent records.
     pub const fn recurrent_words(units: usize) -> usize {
         units * (Self::padded(units) + MULTIPLIER_WORDS)
     }
@@ -63,7 +61,6 @@ impl<'w> DirectionWeights<'w> {
         }
     }
 
-    /// Returns the number of hidden units.
     pub const fn units(&self) -> usize {
         self.units
     }
@@ -74,17 +71,14 @@ impl<'w> DirectionWeights<'w> {
         self.units == room || self.units < room && self.units.is_multiple_of(4)
     }
 
-    /// Returns the number of input columns.
     pub const fn inputs(&self) -> usize {
         self.inputs
     }
 
-    /// Returns all input records.
     pub const fn input(&self) -> &'w [u32] {
         self.input
     }
 
-    /// Returns all recurrent records.
     pub const fn recurrent(&self) -> &'w [u32] {
         self.recurrent
     }
@@ -125,7 +119,6 @@ pub struct Scratch<const U: usize, const W: usize, const P: usize = 1> {
     pub cell_state: [i32; U],
     /// Hidden state before and after a step, Q10, two units a word; the two alternate.
     pub hidden: [[u32; W]; 2],
-    /// Input projections of consecutive steps.
     pub projection: [Projection<U>; P],
 }
 
@@ -175,7 +168,6 @@ pub fn step<const U: usize, const W: usize>(
     }
 }
 
-/// Adds the products of packed rows with packed columns to accumulators.
 #[inline]
 fn accumulate(acc: &mut Accumulators, rows: &[u32], x: impl Iterator<Item = u32>) {
     for (rows, x) in rows.as_chunks::<2>().0.iter().zip(x) {
@@ -226,7 +218,6 @@ pub fn step_portable<const U: usize, const W: usize>(
     }
 }
 
-/// Writes one unit's hidden state into its half of the word.
 #[inline]
 fn set_hidden(hidden: &mut [u32], unit: usize, h: i16) {
     let word = &mut hidden[unit / 2];

@@ -19,7 +19,6 @@ pub struct LstmWeights<'w> {
 }
 
 impl LstmWeights<'_> {
-    /// Returns the number of hidden units.
     pub const fn units(&self) -> usize {
         self.bias_ih.len() / GATES
     }
@@ -73,7 +72,6 @@ pub fn dense(weight: &[f32], bias: f32, x: &[f32]) -> f32 {
     weight.iter().zip(x).fold(bias, |sum, (w, x)| sum + w * x)
 }
 
-/// Returns the logistic function, 1 / (1 + e^-x).
 pub fn sigmoid(x: f32) -> f32 {
     1.0 / (1.0 + libm::expf(-x))
 }

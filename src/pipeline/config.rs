@@ -9,7 +9,6 @@ use crate::pipeline::UncertaintyConfig;
 use crate::standstill::StandstillConfig;
 use crate::units::SpecificForce;
 
-/// Holds all settings of the pipeline.
 #[derive(Debug, Clone, Copy)]
 pub struct PipelineConfig {
     /// The rotation of the board in the vehicle.

@@ -16,7 +16,6 @@ use crate::sample::Frame;
 use crate::standstill::Standing;
 use crate::units::AngularRate;
 
-/// The search for a bias in motion.
 #[derive(Debug, Clone)]
 pub(super) struct Start {
     filter: Filter,
@@ -39,13 +38,10 @@ impl Pipeline {
         self.state.course.arrived(heading, self.state.tick);
     }
 
-    /// Counts a course that is not used, with the reason.
     pub fn refuse_course(&mut self, why: Refusal) {
         self.state.course.refuse(why);
     }
 
-    /// Returns the gain that courses have shown, a share, and its sigma once it is estimated.
-    #[must_use]
     pub fn gain(&self) -> (f32, Option<f32>) {
         self.zero_rate().map_or((0.0, None), ZeroRate::gain)
     }
@@ -96,8 +92,6 @@ impl Pipeline {
         });
     }
 
-    /// Returns the counters of courses since the start.
-    #[must_use]
     pub fn course_counters(&self) -> CourseCounters {
         self.state.course.state().counters
     }
@@ -109,7 +103,6 @@ impl Pipeline {
         CourseState { gain, ..self.state.course.state() }
     }
 
-    /// Forgets the gain: the sensor is mounted differently.
     pub(super) fn forget_gain(&mut self) {
         self.config.gain = None;
         let prior = self.config.course.gain;
@@ -127,12 +120,10 @@ impl Pipeline {
         }
     }
 
-    /// Returns whether a bias that was found in motion is not known well yet.
     pub(super) fn is_bias_coarse(&self) -> bool {
         self.state.initialised.as_ref().is_some_and(|known| known.is_coarse)
     }
 
-    /// Returns how well the gain is known by courses, with its sigma.
     pub(super) fn gain_by_course(&self) -> Option<(Knowledge, f32)> {
         let (_, sigma) = self.zero_rate()?.gain();
         sigma.map(|sigma| (gain_knowledge(sigma), sigma))
@@ -145,7 +136,6 @@ impl Pipeline {
     }
 }
 
-/// Puts the gain of earlier drives into a filter.
 pub(super) fn give_back(filter: &mut Filter, gain: Option<Gain>) {
     if let Some(Gain { share, sigma, .. }) = gain {
         filter.restart::<GAIN>(share, sigma * sigma);

@@ -17,7 +17,6 @@ const STEP: f32 = 2.6e-3;
 /// Where a configured sensor's z axis points.
 const Z: [f32; 3] = [0.0, 0.0, 1.0];
 
-/// The mounting beyond the configured one.
 #[derive(Debug, Clone)]
 pub(super) struct Level {
     /// `None` where a calibration has measured the tilt.
@@ -97,7 +96,6 @@ impl Level {
         self.variance = judgement.variance;
     }
 
-    /// Moves up by a step towards its goal.
     fn follow(&mut self) -> bool {
         let way: [f32; 3] = core::array::from_fn(|axis| self.goal[axis] - self.up[axis]);
         let length = sqrt(dot(&way, &way));
@@ -112,7 +110,6 @@ impl Level {
         true
     }
 
-    /// Starts the current turn again after a gap.
     pub(super) fn restart(&mut self) {
         if let Some(estimator) = &mut self.estimator {
             estimator.restart();
@@ -149,7 +146,6 @@ impl Pipeline {
     }
 }
 
-/// Returns the rotation that earlier drives have shown.
 pub(super) fn early(config: &PipelineConfig) -> Rotation {
     let known = config.vertical.turned(&config.mounting);
     let judged = VerticalEstimator::new(known).judge();

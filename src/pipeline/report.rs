@@ -11,7 +11,6 @@ use crate::standstill::Standing;
 use crate::units::{AngularRate, Yaw};
 
 impl Pipeline {
-    /// Builds the message set of a sample.
     #[inline(never)]
     pub(super) fn report(
         &mut self,
@@ -73,7 +72,6 @@ impl Pipeline {
 
     /// Builds the message set of a silent sensor, `steps` grid steps after the last one: no rate, no force, and the
     /// yaw unchanged.
-    #[must_use]
     pub fn silent(&mut self, steps: u32, board: &BoardState) -> VehicleSample {
         self.state.tick = self.state.tick.wrapping_add(steps);
         self.state.silent = self.state.silent.saturating_add(steps);
@@ -187,7 +185,6 @@ impl Pipeline {
     }
 }
 
-/// Returns whether a rate has an expected error.
 fn has_sigma(status: Status) -> bool {
     matches!(status, Status::Ready | Status::Degraded)
 }

@@ -17,12 +17,10 @@ const MOVED_SECONDS: u32 = 4;
 /// reading changes the bias little.
 const SMOOTHING: f32 = 0.125;
 
-/// Holds the sensor's temperature and its bias there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SensorBias {
     /// Smoothed, deg C.
     celsius: Option<f32>,
-    /// The samples until the next second.
     wait: u32,
     /// The bias there and its sigma, rad/s.
     newest: Option<([AngularRate; 3], f32)>,
@@ -45,7 +43,6 @@ pub(super) struct SensorBias {
 }
 
 impl SensorBias {
-    /// Starts before the first sample.
     pub(super) const START: Self = Self {
         celsius: None,
         wait: 0,
@@ -90,12 +87,10 @@ impl SensorBias {
         !before
     }
 
-    /// Returns whether a bias of earlier drives is subtracted.
     pub(super) fn is_known(&self) -> bool {
         self.newest.is_some()
     }
 
-    /// Returns the sigma of that bias, rad/s.
     pub(super) fn sigma(&self) -> Option<f32> {
         self.newest.map(|(_, sigma)| sigma)
     }
@@ -164,13 +159,11 @@ impl ZeroPoint {
         Self { bias: [x, y, AngularRate(z.0.saturating_sub(earth.0))], earth }
     }
 
-    /// Returns the gyro's readings at rest about x, y and z.
     fn reading(&self) -> [AngularRate; 3] {
         let [x, y, z] = self.bias;
         [x, y, AngularRate(z.0.saturating_add(self.earth.0))]
     }
 
-    /// Returns readings of the gyro less those at rest.
     pub(super) fn less(&self, rates: [AngularRate; 3]) -> [AngularRate; 3] {
         let rest = self.reading();
         core::array::from_fn(|axis| AngularRate(rates[axis].0.saturating_sub(rest[axis].0)))

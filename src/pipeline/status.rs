@@ -9,7 +9,6 @@ use crate::standstill::StandstillSource;
 
 impl Pipeline {
     /// The content of the slow status message now, with what the wheels show; `None` before their first report.
-    #[must_use]
     pub fn status(&self, wheels: Option<Standstill>) -> SlowStatus {
         let (verdict, evidence) = self.standstill(wheels);
         let known = self.state.initialised.is_some();
@@ -45,7 +44,6 @@ impl Pipeline {
         }
     }
 
-    /// True if this unit's gain and misalignment are calibrated.
     pub(super) fn is_calibrated(&self) -> bool {
         !self.config.gyro_map.is_identity()
     }

@@ -81,7 +81,6 @@ const TILTED: f32 = 0.13;
 const PART: u32 = 5 * RATE_HZ;
 const PARTS: usize = (60 * RATE_HZ / PART) as usize;
 
-/// How a rate was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
     /// Corrected by the model.
@@ -92,16 +91,13 @@ pub enum Origin {
     Standstill,
 }
 
-/// The rates of a sample, and how they were found.
 #[derive(Debug, Clone, Copy)]
 pub struct Turning {
-    /// The rates about x, y and z.
     pub rates: [AngularRate; 3],
     /// The network's correction of the rate about z.
     pub estimate: AngularRate,
     /// The rate that standstill has set to zero.
     pub withheld: AngularRate,
-    /// How the rate about z was found.
     pub origin: Origin,
     /// Sigma of its bias, rad/s.
     pub bias: f32,
@@ -126,7 +122,6 @@ impl Part {
     const EMPTY: Self = Self { turns: [0.0; TURNS], linear: 0.0, square: 0.0, missed: 0.0 };
 }
 
-/// Tracks the expected error of the corrected rate.
 #[derive(Debug, Clone)]
 pub struct Uncertainty {
     config: UncertaintyConfig,
@@ -145,8 +140,6 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// Creates the state before the first window.
-    #[must_use]
     pub const fn new(config: UncertaintyConfig) -> Self {
         Self {
             config,
@@ -161,13 +154,11 @@ impl Uncertainty {
         }
     }
 
-    /// Notes whether this unit is calibrated.
     pub fn calibrated(&mut self, calibrated: bool) {
         let UncertaintyConfig { known, unknown, .. } = self.config;
         self.errors = if calibrated { known } else { unknown };
     }
 
-    /// Notes that courses have shown the gain with this sigma.
     pub fn gain(&mut self, sigma: f32) {
         self.errors.gain = self.errors.gain.min(sigma);
     }
@@ -184,7 +175,6 @@ impl Uncertainty {
         };
     }
 
-    /// Adds a usable sample.
     pub fn add(&mut self, turning: &Turning) {
         const STEP: f32 = 1.0 / RATE_HZ as f32;
         let [x, y, z] = turning.rates;
@@ -225,21 +215,18 @@ impl Uncertainty {
 
     /// Returns the share of the yaw rate that is missed because the turn's axis is not the sensor's: on a slope a turn also
     /// rolls and pitches the vehicle, for as long as it lasts.
-    #[must_use]
     pub fn tilted(&self) -> f32 {
         let [[x, y, z, ..], [a, b, c, ..]] = [self.parts[0].turns, self.parts[1].turns];
         share([x + a, y + b, z + c], TURN)
     }
 
     /// The same by the last second alone, in which a body that leans into the turn looks like a slope.
-    #[must_use]
     pub fn tilted_now(&self) -> f32 {
         let [x, y, z, ..] = self.rates;
         share([x, y, z], TURN / 4.0)
     }
 
     /// Returns the mean roll and pitch rate of the last second, both together, rad/s.
-    #[must_use]
     pub fn leaning(&self) -> f32 {
         let [x, y, ..] = self.rates;
         sqrt(x * x + y * y)
@@ -287,7 +274,6 @@ impl Uncertainty {
     }
 
     /// Returns the sigma of a rate, rounded up, from the `bias` sigma in rad/s.
-    #[must_use]
     pub fn sigma(&self, origin: Origin, bias: f32) -> AngularRate {
         let [.., withheld] = self.rates;
         let tilted = SLOPES * self.tilted() * self.rates[2];
@@ -299,7 +285,6 @@ impl Uncertainty {
     }
 
     /// Returns the sigma of the angle turned in the last minute, rad; `missing` is what an open gap may hide.
-    #[must_use]
     pub fn minute(&self, missing: Missed) -> f32 {
         let (mut turns, mut linear, mut square) = ([0.0; TURNS], 0.0, missing.variance);
         let mut missed = missing.angle;

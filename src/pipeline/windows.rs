@@ -11,7 +11,6 @@ use crate::model::window::{Features, WINDOW, Window};
 use crate::sample::PERIOD_US;
 use crate::units::Micros;
 
-/// Holds a window that is due for the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DueWindow {
     /// Tick of the newest sample.
@@ -20,7 +19,6 @@ pub struct DueWindow {
     pub features: [Features; WINDOW],
 }
 
-/// Holds the samples of the next window and the state of the last one.
 #[derive(Debug, Clone)]
 pub(super) struct Windows {
     window: Window,
@@ -33,11 +31,9 @@ pub(super) struct Windows {
 }
 
 impl Windows {
-    /// The state without a sample and without a window handed out.
     pub const START: Self =
         Self { window: Window::EMPTY, since: 0, out: None, accepted: false, faults: Faults::NONE };
 
-    /// Adds a good sample.
     pub fn add(&mut self, features: Features) {
         self.window.add(features);
         self.since += 1;
@@ -79,22 +75,18 @@ impl Windows {
         Some(estimate)
     }
 
-    /// Notes that the newest estimate is in use.
     pub fn accept(&mut self) {
         (self.accepted, self.faults) = (true, Faults::NONE);
     }
 
-    /// Notes that the newest estimate was rejected or late.
     pub fn reject(&mut self, fault: Faults) {
         (self.accepted, self.faults) = (false, fault);
     }
 
-    /// Returns whether an estimate is in use.
     pub fn is_accepted(&self) -> bool {
         self.accepted
     }
 
-    /// Returns the fault of the newest estimate.
     pub fn faults(&self) -> Faults {
         self.faults
     }
@@ -117,7 +109,6 @@ impl Handover {
         Self { has_network, delay, due: None, out: None }
     }
 
-    /// Returns whether there is a network with good weights.
     pub const fn has_network(&self) -> bool {
         self.has_network
     }
@@ -134,7 +125,6 @@ impl Handover {
         replaces
     }
 
-    /// Returns the window that is due, once.
     pub fn take(&mut self) -> Option<DueWindow> {
         // Nearly every call finds none, and copies none.
         self.due.as_ref()?;
@@ -152,7 +142,6 @@ impl Handover {
         self.out.is_some_and(|(end, until)| tick.wrapping_sub(end) + 1 >= self.delay && now.0 < until)
     }
 
-    /// Ends the use of the network.
     pub fn stop(&mut self) {
         *self = Self::new(false, self.delay);
     }

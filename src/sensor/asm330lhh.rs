@@ -46,9 +46,6 @@ pub struct Asm330lhh<SPI> {
 impl<SPI: SpiDevice> Asm330lhh<SPI> {
     /// Resets the sensor, checks its identity, configures it and reads every setting back, in 0.11 s. The self-test takes
     /// 0.25 s more and deflects the masses, so the vehicle should stand.
-    ///
-    /// # Errors
-    /// `Bus`, `Reset`, `Identity`, `SelfTest` or `Setting`.
     pub fn new(spi: SPI, self_test: bool, delay: &mut impl DelayNs) -> Result<Self, SpiError<SPI::Error>> {
         let (chip, outputs) = (Chip { spi, has_dummy: false }, Outputs::default());
         let mut part =
@@ -81,9 +78,6 @@ impl<SPI: SpiDevice> Asm330lhh<SPI> {
     }
 
     /// Returns the oldest sample in the FIFO, if any, and checks one setting.
-    ///
-    /// # Errors
-    /// `Bus`, `Setting`, `NoReading`, `Packet` or `Overflow`.
     pub fn next_sample(&mut self) -> Result<Option<ImuSample>, SpiError<SPI::Error>> {
         self.check_next()?;
         let state = u16::from_le_bytes(self.chip.read(reg::FIFO_STATUS1)?);

@@ -71,9 +71,6 @@ pub struct Bmi088<SPI> {
 impl<SPI: SpiDevice> Bmi088<SPI> {
     /// Resets both dies, checks their identities, configures them and reads every setting back, in 0.15 s. The self-test
     /// takes 0.1 s more and deflects the accelerometer's masses, so the vehicle should stand.
-    ///
-    /// # Errors
-    /// `Bus`, `Identity`, `SelfTest` or `Setting`.
     pub fn new(
         [accelerometer, gyro]: [SPI; 2],
         self_test: bool,

@@ -34,7 +34,6 @@ pub struct Framer<P, const N: usize> {
 }
 
 impl<P: Protocol, const N: usize> Framer<P, N> {
-    /// Creates a framer that has received nothing.
     pub const fn new() -> Self {
         Self {
             buffer: Vec::new(),

@@ -40,9 +40,6 @@ pub struct Icm42688<SPI> {
 
 impl<SPI: SpiDevice> Icm42688<SPI> {
     /// Resets the sensor, checks its identity, configures it and reads every setting back.
-    ///
-    /// # Errors
-    /// `Bus`, `Reset`, `Identity` or `Setting`.
     pub fn new(spi: SPI, delay: &mut impl DelayNs) -> Result<Self, SpiError<SPI::Error>> {
         let chip = Chip { spi, has_dummy: false };
         let mut part = Self { chip, next_check: 0, stamps: STAMPS };
@@ -70,9 +67,6 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
     }
 
     /// Returns the oldest sample in the FIFO, if any, and checks one setting.
-    ///
-    /// # Errors
-    /// `Bus`, `Setting`, `NoReading` or `Packet`.
     pub fn next_sample(&mut self) -> Result<Option<ImuSample>, SpiError<SPI::Error>> {
         self.check_next_setting()?;
         let waiting = u16::from_be_bytes(self.chip.read(reg::FIFO_COUNTH)?);

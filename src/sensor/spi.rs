@@ -67,7 +67,6 @@ impl Setting {
         Self { bank, address, mask: 0xFF, value }
     }
 
-    /// Compares what the register holds.
     pub(super) const fn check<E>(self, held: u8) -> Result<(), SpiError<E>> {
         let Self { bank, address, mask, value: expected } = self;
         let got = held & mask;
@@ -88,7 +87,6 @@ impl<SPI: SpiDevice> Chip<SPI> {
         self.transaction(&mut [Operation::Write(&[address, value])])
     }
 
-    /// Reads from an address on.
     pub(super) fn read<const N: usize>(&mut self, address: u8) -> Result<[u8; N], SpiError<SPI::Error>> {
         let mut values = [0; N];
         let (plain, with_dummy) = ([address | READ], [address | READ, 0]);
@@ -97,7 +95,6 @@ impl<SPI: SpiDevice> Chip<SPI> {
         Ok(values)
     }
 
-    /// Compares the identity register.
     pub(super) fn identify(
         &mut self,
         bank: u8,
@@ -130,7 +127,6 @@ impl<SPI: SpiDevice> Chip<SPI> {
     }
 }
 
-/// Returns the result of a self-test.
 pub(super) const fn passed<E>(bank: u8, has_passed: bool) -> Result<(), SpiError<E>> {
     if has_passed { Ok(()) } else { Err(SpiError::SelfTest { bank }) }
 }

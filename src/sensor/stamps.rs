@@ -7,7 +7,6 @@
 use crate::units::Micros;
 use core::num::NonZeroU64;
 
-/// The sum of a sensor's counts.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stamps {
     /// Largest value of the counter.
@@ -25,7 +24,6 @@ impl Stamps {
         Self { mask, micros, per, last: 0, counts: 0 }
     }
 
-    /// Adds a time stamp, and returns its time.
     pub(super) fn unwrap(&mut self, stamp: u32) -> Micros {
         self.counts += u64::from(stamp.wrapping_sub(self.last) & self.mask);
         self.last = stamp;
@@ -42,7 +40,6 @@ mod tests {
     /// Of an ICM-42688-P.
     const COUNTER: Stamps = Stamps::new(0xFFFF, 16, NonZeroU64::new(15).unwrap());
 
-    /// Passes these counter values to the clock, and returns the times.
     fn times(counts: impl IntoIterator<Item = u64>) -> Vec<u64> {
         let mut stamps = COUNTER;
         counts.into_iter().map(|counts| stamps.unwrap(counts as u16 as u32).0).collect()

@@ -6,12 +6,10 @@ use serde::{Deserialize, Serialize};
 /// Number of bytes kept of a source file's path, from its end.
 pub const FILE: usize = 24;
 
-/// The reason why the image stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CrashKind {
-    /// The program panicked.
     Panic,
     /// A bus, usage or memory fault escalated to a hard fault.
     HardFault,
@@ -23,11 +21,9 @@ pub enum CrashKind {
     SupplyLow,
 }
 
-/// The record of a crash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Crash {
-    /// Reason why the image stopped.
     pub kind: CrashKind,
     /// Program counter at a fault, or line of a panic; 0 if neither is known.
     pub place: u32,

@@ -63,11 +63,9 @@ pub struct Device<R: NorFlash, W> {
     refused: bool,
     configuration: Configuration,
     configuration_origin: Origin,
-    /// Configuration that the next start will use.
     next_configuration: Configuration,
     wheels: WheelSettings,
     wheels_origin: Origin,
-    /// Wheel settings that the next start will use.
     next_wheels: WheelSettings,
     wheels_seen: WheelSample,
     calibration: Calibration,
@@ -104,7 +102,6 @@ pub struct Device<R: NorFlash, W> {
     tick: u32,
     /// The newest reason why stored data were refused, or could not be stored by the board itself.
     stored_fault: Option<StoreError>,
-    /// Reason why the last request was refused.
     refusal: Option<Refusal>,
 }
 
@@ -262,7 +259,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Returns what courses have shown since the start, and how well the gain is known.
-    #[must_use]
     pub fn course(&self) -> (&CourseState, Knowledge) {
         let gain = self.course.gain.map_or(Knowledge::Unknown, |gain| gain_knowledge(gain.sigma));
         (&self.course, if self.course.is_contradicted { Knowledge::Refused } else { gain })
@@ -289,9 +285,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Checks that the board may restart; the caller does the reset.
-    ///
-    /// # Errors
-    /// [`Refusal::Moving`].
     pub fn restart(&mut self) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |_| Ok(()))
     }
@@ -322,7 +315,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.access_counters
     }
 
-    /// Clears the reason why the last request was refused.
     pub(crate) fn forget_refusal(&mut self) {
         self.refusal = None;
     }
@@ -338,7 +330,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         (&self.wheels_seen, self.may_interrupt)
     }
 
-    /// Returns whether the output may be interrupted, because the vehicle is proven to stand.
     pub(crate) fn may_interrupt(&self) -> bool {
         self.may_interrupt
     }
@@ -382,7 +373,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
     }
 
-    /// Returns the conditions that the trouble memory observes.
     pub(crate) fn conditions(&self) -> Conditions {
         Conditions {
             status: self.status,
@@ -402,9 +392,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Erases what the board has learnt about its sensor.
-    ///
-    /// # Errors
-    /// [`Refusal::Store`], [`Refusal::Moving`].
     pub fn forget_learned(&mut self) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
             device.store_learned(Learned::NOTHING)?;

@@ -22,13 +22,10 @@ pub const BLOCK: usize = 256;
 pub enum Refusal {
     #[error("configuration layout {found}, but the board has {expected}")]
     Version { found: u8, expected: u8 },
-    /// The store has failed, or a value is out of range.
     #[error(transparent)]
     Store(StoreError),
-    /// The weight file or its place was refused.
     #[error(transparent)]
     Slot(SlotError),
-    /// The firmware was refused.
     #[error(transparent)]
     Firmware(FirmwareError),
     #[error("calibrated with weights {found:08x}, but the board runs {runs:08x}")]

@@ -26,13 +26,11 @@ const SILENT_US: u64 = 1_000_000;
 pub struct Wanted(AtomicBool);
 
 impl Wanted {
-    /// Returns the state of a start.
     pub const fn start() -> Self {
         Self(AtomicBool::new(true))
     }
 }
 
-/// A part on SPI.
 #[derive(Debug)]
 #[allow(missing_docs, reason = "their types say it")]
 pub enum Part<SPI> {
@@ -79,7 +77,6 @@ pub struct Reader<SPI> {
     now: fn() -> u64,
     /// Returns the part that was brought up.
     passed: fn() -> Option<Part<SPI>>,
-    /// `None` until the part is brought up.
     part: Option<Part<SPI>>,
     /// Board time of the newest sample, or of the bring-up.
     heard: u64,

@@ -22,7 +22,6 @@ const BEFORE: f32 = 3.0;
 /// Values about or along x, y and z.
 pub type Axes = [f32; 3];
 
-/// The motion of the newest window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// Root of the sum of the gyro axes' variances, rad/s.
@@ -37,7 +36,6 @@ pub struct Motion {
     pub newest: Axes,
 }
 
-/// Collects the samples of the window.
 #[derive(Debug, Clone)]
 pub struct Inertial {
     /// Weighted sums of the current mean, and of the next one, codes: gyro and force. Then the batch's samples.
@@ -53,7 +51,6 @@ pub struct Inertial {
 }
 
 impl Inertial {
-    /// The state before the first sample.
     pub const START: Self = Self {
         sums: [[[0; 3]; 2]; 2],
         count: 0,

@@ -25,15 +25,11 @@ use super::slot::Slot;
 use core::ops::Range;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind as Kind, ReadNorFlash};
 
-/// Size of a bank, bytes.
 pub const BANK: u32 = 1 << 20;
-/// Size of a sector, bytes.
 pub const SECTOR: u32 = 8 << 10;
 /// Bytes that are programmed at once.
 pub const QUAD: usize = 16;
-/// Offset of the image in its bank.
 pub const IMAGE: u32 = BOOT_SIZE;
-/// Offset of the image's trailer in its bank.
 pub const TRAILER: u32 = IMAGE + FIRMWARE_SIZE;
 const NUMBER: u32 = 111 * SECTOR;
 /// Offset of the records in their bank.
@@ -60,7 +56,6 @@ pub trait Banks {
     /// Erases the sector at an offset.
     fn erase(&mut self, sector: u32) -> Result<(), Kind>;
 
-    /// Programs a quad-word.
     fn write(&mut self, at: u32, quad: &[u8; QUAD]) -> Result<(), Kind>;
 }
 
@@ -128,7 +123,6 @@ fn write_words<F: Banks>(flash: &mut F, at: u32, bytes: &[u8]) -> Result<(), Kin
     words.try_for_each(|(at, written)| set_word(flash, at, *written))
 }
 
-/// Checks that both ends of a range are multiples of a unit.
 fn aligned(from: u32, to: u32, unit: u32) -> Result<(), Kind> {
     let fits = from.is_multiple_of(unit) && to.is_multiple_of(unit);
     if fits { Ok(()) } else { Err(Kind::NotAligned) }
@@ -139,9 +133,6 @@ pub struct Records<F>(F);
 
 impl<F: Banks> Records<F> {
     /// Opens the records. If the newest ones are in the lower bank, it copies them to the upper one first.
-    ///
-    /// # Errors
-    /// Those of the flash.
     pub fn open(mut flash: F) -> Result<Self, Kind> {
         let [lower, upper] = [0, BANK].map(|bank| number(&mut flash, bank));
         if lower > upper {
@@ -224,7 +215,6 @@ enum Place {
 }
 
 impl<F: Banks> Slots<F> {
-    /// Returns the slot of the lower bank.
     pub fn lower(&self) -> Slot {
         if self.0.is_swapped() { Slot::B } else { Slot::A }
     }

@@ -166,9 +166,6 @@ impl Configuration {
     }
 
     /// Checks that the identifier of no wheel frame is that of a message that the board sends, or of diagnosis.
-    ///
-    /// # Errors
-    /// [`FieldError::Wheels`].
     pub fn check_wheels(&self, wheels: &WheelSettings) -> Result<(), FieldError> {
         let ids = || wheels.frames.iter().flatten().map(|frame| frame.id);
         let diagnosis = self.diagnosis.ids().map_err(FieldError::Diagnosis)?;

@@ -30,7 +30,6 @@ pub enum Field {
 
 impl Field {
     /// Returns the name of the field as a user writes it.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::LatitudeDeg => "latitude_deg",
@@ -52,7 +51,6 @@ impl Field {
     }
 
     /// Smallest and largest valid value; `None` for a value that is checked in another way.
-    #[must_use]
     pub const fn range(self) -> Option<[f32; 2]> {
         Some(match self {
             Self::LatitudeDeg | Self::MountingPitchDeg => [-90.0, 90.0],
@@ -99,7 +97,6 @@ pub enum FieldError {
     NoFd,
 }
 
-/// Checks that a value is inside its range.
 pub(super) fn within(field: Field, value: f32) -> Result<(), FieldError> {
     let [low, high] = field.range().ok_or(FieldError::Implausible(field))?;
     // NaN is inside no range.
@@ -138,7 +135,6 @@ pub enum StoreError {
     Version { found: u8, expected: u8 },
     #[error("the record does not decode as its layout version requires")]
     Encoding,
-    /// A value is out of its range.
     #[error(transparent)]
     Field(FieldError),
     #[error("the board was reset three times within a minute of its start")]

@@ -18,11 +18,8 @@ use serde::{Deserialize, Serialize};
 
 /// Place of the label in an image, behind the vectors of an STM32F405 or STM32H563.
 pub const LABEL: usize = 0x260;
-/// Size of a label, bytes.
 pub const LABEL_SIZE: usize = 24;
-/// Size of a trailer, bytes.
 pub const TRAILER: usize = 64;
-/// Largest size of an image, bytes.
 pub const MAX_IMAGE: u32 = FIRMWARE_SIZE - TRAILER as u32;
 const MAGIC: [u8; 4] = *b"GNFW";
 /// Starts on trial, if each ends in another way than by the watchdog: the supply fails, or the image resets itself.
@@ -51,7 +48,6 @@ pub const fn version(text: &str) -> [u8; 3] {
 pub struct Label {
     /// Version of the flash layout, [`LAYOUT`].
     pub layout: u8,
-    /// Version of the firmware.
     pub version: [u8; 3],
     /// Name of the board, zeros behind it.
     pub board: [u8; 16],
@@ -88,7 +84,6 @@ impl Label {
     }
 }
 
-/// The reason why an update is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
@@ -118,7 +113,6 @@ pub enum FirmwareError {
 pub struct Trailer {
     /// Length of the image, bytes.
     pub length: u32,
-    /// CRC-32 of the image.
     pub crc: u32,
     /// Bits of what the image must reach on trial.
     pub expected: u32,
@@ -173,7 +167,6 @@ impl Trailer {
 
 impl Slot {
     /// Returns the flash offsets of the slot for firmware: two sectors.
-    #[must_use]
     pub const fn firmware(self) -> Range<u32> {
         match self {
             Self::A => FIRMWARE_A,
@@ -187,7 +180,6 @@ const fn place(slot: Slot, word: u32) -> u32 {
     slot.firmware().start + MAX_IMAGE + word
 }
 
-/// Returns the CRC-32 of the first bytes of a slot.
 fn checksum<F: ReadNorFlash>(flash: &mut F, slot: Slot, length: u32) -> Result<u32, F::Error> {
     let (mut digest, mut piece) = (CRC.digest(), [0; 256]);
     for at in (0..length).step_by(piece.len()) {
@@ -198,7 +190,6 @@ fn checksum<F: ReadNorFlash>(flash: &mut F, slot: Slot, length: u32) -> Result<u
     Ok(digest.finalize())
 }
 
-/// Returns the label of the image in a slot.
 pub fn label<F: ReadNorFlash>(flash: &mut F, slot: Slot) -> Option<Label> {
     let mut bytes = [0; LABEL_SIZE];
     flash.read(slot.firmware().start + LABEL as u32, &mut bytes).ok()?;
@@ -251,9 +242,6 @@ pub fn confirm<F: NorFlash>(flash: &mut F, slot: Slot) -> bool {
 
 /// Withdraws the image in a slot and erases it. The words of the trailer that count go first: no mixture that a cut leaves
 /// of them is valid.
-///
-/// # Errors
-/// Those of the flash.
 pub fn erase<F: NorFlash>(flash: &mut F, slot: Slot) -> Result<(), F::Error> {
     flash.write(place(slot, CHECK), &[0; 4])?;
     flash.write(place(slot, CHECK - 4), &[0; 4])?;
@@ -262,9 +250,6 @@ pub fn erase<F: NorFlash>(flash: &mut F, slot: Slot) -> Result<(), F::Error> {
 }
 
 /// Makes the boot loader start a slot's image on trial.
-///
-/// # Errors
-/// Those of the flash.
 pub fn activate<F: NorFlash>(flash: &mut F, slot: Slot, trailer: &Trailer) -> Result<(), F::Error> {
     let bytes = trailer.bytes();
     let (values, rest) = bytes.split_at(CHECK as usize);

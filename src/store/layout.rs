@@ -14,7 +14,6 @@
 
 use core::ops::Range;
 
-/// Address of the flash in the memory map.
 pub const FLASH_BASE: u32 = 0x0800_0000;
 /// Size of each sector, bytes.
 pub const SECTORS: [u32; 12] = {

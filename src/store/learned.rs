@@ -42,7 +42,6 @@ impl Learned {
     };
 
     /// Returns whether a specific force at rest shows that the sensor has moved.
-    #[must_use]
     pub fn is_moved(&self, specific_force: &[SpecificForce; 3]) -> bool {
         self.specific_force.is_some_and(|known| is_moved(&known, specific_force))
     }
@@ -59,14 +58,12 @@ impl Learned {
 impl Learned {
     /// Returns the angle from the x axis of a mounting to the forward direction, left positive, and its sigma, deg.
     /// The angle is 0 if the mounting is correct.
-    #[must_use]
     pub fn yaw_deg(&self, mounting: &Rotation) -> Option<[f32; 2]> {
         let (forward, rest) = self.forward.zip(self.specific_force)?;
         Some([forward.yaw(mounting, rest), forward.sigma].map(f32::to_degrees))
     }
 
     /// How well drives have shown the forward direction.
-    #[must_use]
     pub fn forward_knowledge(&self, mounting: &Rotation) -> Knowledge {
         match self.yaw_deg(mounting) {
             None => Knowledge::Unknown,

@@ -54,10 +54,7 @@ pub trait Record: Serialize + DeserializeOwned {
     /// Version of the layout; every change increments it.
     const VERSION: u8;
 
-    /// Checks that all values are inside their ranges.
-    ///
-    /// # Errors
-    /// [`FieldError`], which names the first value out of range.
+    /// Checks that all values are inside their ranges; the error names the first that is not.
     fn check(&self) -> Result<(), FieldError>;
 }
 
@@ -136,7 +133,6 @@ impl Raw {
     }
 }
 
-/// What a walk through a sector has seen.
 #[derive(Clone, Copy, Default)]
 struct Seen {
     damaged: bool,
@@ -162,9 +158,6 @@ pub struct Store<F> {
 impl<F: NorFlash> Store<F> {
     /// Opens the store in the two sectors that begin at offset `start` of `flash`; writes nothing. Erased flash reads
     /// as ones; sectors of zeros were overwritten by a raw image of the flash, and are reported as damaged.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`].
     pub fn open(flash: F, start: u32) -> Result<Self, StoreError> {
         const { assert!(F::READ_SIZE <= WORD && WORD.is_multiple_of(F::WRITE_SIZE)) };
         let mut store =
@@ -195,21 +188,14 @@ impl<F: NorFlash> Store<F> {
         self.seen.damaged || self.header_damaged
     }
 
-    /// Returns the newest intact record; `None` if there is none.
-    ///
-    /// # Errors
-    /// [`StoreError`] if the flash cannot be read, or the record has an unknown layout, does not decode or has a
-    /// value out of range.
+    /// Returns the newest intact record; `None` if there is none. One of another layout, or with a value out of
+    /// range, is an error.
     pub fn get<R: Record>(&mut self) -> Result<Option<R>, StoreError> {
         let mut raw = Raw::EMPTY;
         if self.find_any(R::KEY, &mut raw)? { raw.decode().map(Some) } else { Ok(None) }
     }
 
     /// Stores a record and reads it back. Until the new record is complete, the previous one remains valid.
-    ///
-    /// # Errors
-    /// [`StoreError::Field`] for a value out of range; nothing is written then. [`StoreError::Flash`] or
-    /// [`StoreError::Full`] if the record could not be written.
     #[inline(never)]
     pub fn set<R: Record>(&mut self, record: &R) -> Result<(), StoreError> {
         record.check()?;
@@ -232,9 +218,6 @@ impl<F: NorFlash> Store<F> {
     /// If little room is left, or something is damaged, erases the other sector and moves the newest records there;
     /// completes what a power cut has left undone of a record of access. Call it at the start, when an erase disturbs
     /// nothing: records stored while the vehicle drives must fit without an erase.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`].
     pub fn make_room(&mut self) -> Result<(), StoreError> {
         let mut raw = Raw::EMPTY;
         let Some((sector, _)) = self.current else { return Ok(()) };

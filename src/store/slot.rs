@@ -28,7 +28,6 @@ impl Slot {
     }
 
     /// Returns the flash offset of the slot.
-    #[must_use]
     pub const fn offset(self) -> u32 {
         match self {
             Self::A => SLOTS.start,
@@ -37,7 +36,6 @@ impl Slot {
     }
 
     /// Returns the flash offsets of the slot: a whole sector.
-    #[must_use]
     pub const fn range(self) -> Range<u32> {
         self.offset()..self.offset() + SLOT_SIZE as u32
     }

@@ -21,7 +21,6 @@ pub struct Accepted {
 }
 
 impl Accepted {
-    /// Record without accepted files.
     pub const NONE: Self = Self { active: None, files: [None; 2] };
 
     /// Returns the record without the file in a slot, which is being replaced.
@@ -57,7 +56,6 @@ impl Record for Accepted {
     }
 }
 
-/// The reason why a slot, or the upload to it, is not used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -85,7 +83,6 @@ pub enum SlotError {
     NotAccepted(u32),
     #[error("a window takes {cycles} cycles, and clock and `compensate.stride` leave {available}")]
     Slow { cycles: u32, available: u32 },
-    /// The content of the file is invalid.
     #[error(transparent)]
     Blob(BlobError),
 }
@@ -97,9 +94,6 @@ impl From<BlobError> for SlotError {
 }
 
 /// Returns the bytes of the file in a slot, using the length in its header.
-///
-/// # Errors
-/// [`SlotError::Empty`], [`SlotError::Length`].
 pub fn bytes(slot: &[u8]) -> Result<&[u8], SlotError> {
     let header = slot.first_chunk::<12>().ok_or(SlotError::Empty)?;
     if *header == [0xFF; 12] {
@@ -111,20 +105,14 @@ pub fn bytes(slot: &[u8]) -> Result<&[u8], SlotError> {
 }
 
 /// Checks GyroNet's file in a slot, which must be aligned to words.
-///
-/// # Errors
-/// [`SlotError::Empty`], [`SlotError::Length`], [`SlotError::Blob`].
 pub fn file(slot: &[u8]) -> Result<Blob<'_>, SlotError> {
     Ok(Blob::new_checked(bytes(slot)?)?)
 }
 
-/// The origin of the weights in use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WeightSource {
-    /// Weights from a slot.
     Slot(Slot),
-    /// Weights built into the image.
     BuiltIn,
     /// No valid weights: the network is off, and the rate is that of the gyro minus its bias.
     None,
@@ -140,12 +128,9 @@ impl core::fmt::Display for WeightSource {
     }
 }
 
-/// The result of [`select`].
 #[derive(Debug, Clone, Copy)]
 pub struct Selection<'w> {
-    /// Weights to use, if any passed the checks.
     pub weights: Option<Blob<'w>>,
-    /// Origin of the weights.
     pub source: WeightSource,
     /// Reasons why slots A and B were refused, if they were tried.
     pub refused: [Option<SlotError>; 2],

@@ -19,9 +19,6 @@ pub struct Upload {
 
 impl Upload {
     /// Checks the length of a file.
-    ///
-    /// # Errors
-    /// [`SlotError::Length`].
     pub fn check(slot: Slot, length: u32) -> Result<(), SlotError> {
         let fits = length as usize <= slot.range().len() && length > 0 && length.is_multiple_of(4);
         if fits { Ok(()) } else { Err(SlotError::Length(length)) }
@@ -29,9 +26,6 @@ impl Upload {
 
     /// Begins an upload and erases its slot, which stalls the processor for one to two seconds on an F405 (its
     /// datasheet, 128 KiB sector). Offsets in `flash` are from the start of the whole flash.
-    ///
-    /// # Errors
-    /// [`SlotError::Length`], [`SlotError::Flash`].
     pub fn begin<F: NorFlash>(flash: &mut F, slot: Slot, length: u32) -> Result<Self, SlotError> {
         Self::check(slot, length)?;
         let sector = slot.range();
@@ -42,9 +36,6 @@ impl Upload {
     }
 
     /// Begins an upload of firmware, whose length has been checked, and erases its slot: two sectors.
-    ///
-    /// # Errors
-    /// [`SlotError::Flash`].
     pub fn firmware<F: NorFlash>(flash: &mut F, slot: Slot, length: u32) -> Result<Self, SlotError> {
         firmware::erase(flash, slot).map_err(|error| SlotError::Flash(FlashFault::from(error.kind())))?;
         Ok(Self { slot, start: slot.firmware().start, length, written: 0 })
@@ -59,12 +50,7 @@ impl Upload {
         }
     }
 
-    /// Writes the next block, a whole number of words.
-    ///
-    /// # Errors
-    /// [`SlotError::Offset`] if the block does not follow the previous one; [`SlotError::Length`] if it is not a
-    /// whole number of words, or extends beyond the end of the file; [`SlotError::Flash`], after which
-    /// the upload must begin again.
+    /// Writes the next block, a whole number of words. After an error of the flash the upload must begin again.
     pub fn block<F: NorFlash>(&mut self, flash: &mut F, offset: u32, bytes: &[u8]) -> Result<(), SlotError> {
         if offset != self.written {
             return Err(SlotError::Offset { expected: self.written });
@@ -80,9 +66,6 @@ impl Upload {
     }
 
     /// Checks the whole weight file in flash, and returns its bytes too.
-    ///
-    /// # Errors
-    /// [`SlotError::Incomplete`], and the errors of [`file()`].
     pub fn verify<'s>(&self, slots: [&'s [u8]; 2]) -> Result<(&'s [u8], Blob<'s>), SlotError> {
         if self.written != self.length {
             return Err(SlotError::Incomplete { written: self.written });

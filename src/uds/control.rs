@@ -77,7 +77,6 @@ impl Services {
         Ok(())
     }
 
-    /// Stops or resumes the recording of troubles.
     pub(super) fn dtc_setting<R: NorFlash, W: MappedSlots>(
         &mut self,
         sub: u8,

@@ -170,7 +170,6 @@ pub(super) struct Sources<'a, R: NorFlash, W> {
     pub errors: TransportErrors,
 }
 
-/// Appends the value of an identifier.
 pub(super) fn read<R: NorFlash, W: MappedSlots>(
     id: u16,
     from: &Sources<'_, R, W>,

@@ -333,7 +333,6 @@ const fn flow_control(status: u8) -> Bytes {
     [status, BLOCK, 0, PADDING, PADDING, PADDING, PADDING, PADDING]
 }
 
-/// Returns a frame with these bytes, padded to eight.
 fn frame(head: &[u8], bytes: &[u8]) -> Bytes {
     let mut frame = [PADDING; 8];
     frame.iter_mut().zip(head.iter().chain(bytes)).for_each(|(place, byte)| *place = *byte);

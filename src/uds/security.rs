@@ -50,7 +50,6 @@ impl Security {
         Self { is_unlocked: false, seed: None, newest: [0; SEED], wrong_at: 0 }
     }
 
-    /// Ends the access, at the end of the session.
     pub fn end(&mut self) {
         self.is_unlocked = false;
         self.seed = None;
@@ -164,7 +163,6 @@ pub(super) fn signed<'b, R: NorFlash, W: MappedSlots>(
     Ok((content, check(target, &signature::digest(content), trailer, device)?))
 }
 
-/// Checks a trailer, and returns its counter.
 #[inline(never)]
 pub(super) fn check<R: NorFlash, W: MappedSlots>(
     target: u16,

@@ -36,7 +36,6 @@ pub const NEGATIVE: u8 = 0x7F;
 /// Offset from the service identifier of a request to that of a positive response.
 const POSITIVE: u8 = 0x40;
 
-/// The services and their state between requests.
 #[derive(Debug)]
 pub(super) struct Services {
     session: Session,
@@ -74,7 +73,6 @@ pub(super) struct Surroundings<'a, E> {
 }
 
 impl Services {
-    /// Creates the state in the default session.
     pub const fn new() -> Self {
         Self {
             session: Session::Default,
@@ -99,7 +97,6 @@ impl Services {
         }
     }
 
-    /// Records that a frame of the tester was received.
     pub fn frame_received(&mut self, now: u32) {
         self.expire(now);
         if !self.is_guest {
@@ -107,7 +104,6 @@ impl Services {
         }
     }
 
-    /// Returns whether a tester has a session other than the default one.
     pub fn has_session(&self) -> bool {
         self.session != Session::Default
     }
@@ -261,7 +257,6 @@ impl Services {
         Ok(is_wanted)
     }
 
-    /// Executes a service without sub-functions.
     fn serve_data<R: NorFlash, W: MappedSlots, E: FnOnce() -> Option<Seed>>(
         &mut self,
         command: UdsCommand,

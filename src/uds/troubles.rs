@@ -4,7 +4,6 @@ use super::dtc::{Entry, Memory, bit};
 use super::response::{Nrc, Response, exactly, put};
 use automotive_diag::uds::DtcSubFunction;
 
-/// Appends the report of a sub-function.
 pub(super) fn read(memory: &Memory, sub: u8, rest: &[u8], out: &mut Response) -> Result<(), Nrc> {
     let code = |code: u32| {
         let [_, a, b, c] = code.to_be_bytes();

@@ -22,7 +22,6 @@ pub(super) struct Doubt {
 impl Doubt {
     pub const NONE: Self = Self { mean: 0.0, seconds: 0, is_steady: false, earlier: 0.0, stops: 0 };
 
-    /// Adds a refused second of this stop.
     pub fn add(&mut self, mean: f32, is_steady: bool) {
         self.seconds = self.seconds.saturating_add(1);
         self.is_steady |= is_steady;

@@ -5,7 +5,6 @@
 
 use crate::sample::RATE_HZ;
 
-/// Samples of a part.
 const PART: u32 = RATE_HZ / 2;
 /// Whole parts in which the vehicle may pull away, and those before them that are compared.
 const PULLS_AWAY: usize = 4;

@@ -7,7 +7,6 @@ use crate::units::AngularRate;
 const SHIFT: u32 = AngularRate::FRACTION_BITS - 20;
 /// Sum of codes per rad.
 const PER_RAD: f32 = (AngularRate::PER_RAD_PER_SEC / (1 << SHIFT) as f32) * RATE_HZ as f32;
-/// Samples of a quarter.
 const QUARTER: u8 = RATE_HZ as u8 / 4;
 
 #[derive(Debug, Clone, Copy)]
@@ -32,7 +31,6 @@ impl Turned {
         self.samples[0] += 1;
     }
 
-    /// The angle of all quarters, rad.
     pub fn angle(&self) -> f32 {
         self.sums.iter().sum::<i32>() as f32 / PER_RAD
     }

@@ -83,9 +83,6 @@ impl Message {
     }
 
     /// Decodes eight bytes after checking length and CRC.
-    ///
-    /// # Errors
-    /// [`MessageError`] for a wrong length or checksum.
     pub fn parse(bytes: &[u8]) -> Result<Self, MessageError> {
         let &[rate0, rate1, status, temperature, force0, force1, counter, received] = bytes else {
             return Err(MessageError::Length(bytes.len()));
@@ -140,7 +137,6 @@ pub struct Motion {
     pub counter: u8,
 }
 
-/// Returns the value of one axis, or the default for an index above 2.
 fn axis<T: Copy + Default>(axes: &[T; 3], axis: usize) -> T {
     axes.get(axis).copied().unwrap_or_default()
 }

@@ -11,7 +11,6 @@ use super::{BIT_RATES, MAX_BUS_LOAD, MAX_PERIOD_MS, SAMPLE_MS};
 pub enum ConfigError {
     #[error("no message is configured")]
     Empty,
-    /// The bit rate is not one of [`BIT_RATES`].
     #[error("bits_per_second: {0} is not one of {BIT_RATES:?}")]
     BitRate(u32),
     #[error("identifier {0} (0x{0:03x}) is above 2047, or reserved for diagnosis (0x7df to 0x7ef)")]

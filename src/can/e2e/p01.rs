@@ -39,28 +39,22 @@ pub enum DataIdMode {
     Nibble,
 }
 
-/// Protects and checks one message with profile 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct P01 {
     /// Data identifier, known to both sides. With [`DataIdMode::Nibble`] it has 12 bits.
     pub data_id: u16,
-    /// The bytes of the identifier that enter the CRC.
     pub mode: DataIdMode,
 }
 
 impl P01 {
     /// Writes the header; the high nibble of byte 1 is data except in [`DataIdMode::Nibble`].
-    ///
-    /// # Errors
-    /// [`Fault::Length`] and [`Fault::Counter`].
     pub fn protect(&self, data: &mut [u8], counter: u8) -> Result<(), Fault> {
         let nibble = (self.mode == DataIdMode::Nibble).then(|| self.nibble());
         HEADER.protect(data, counter, nibble, |behind| self.crc(counter, behind))
     }
 
-    /// Checks CRC, identifier and range of the counter, and returns the counter.
     pub fn check(&self, data: &[u8]) -> Result<u8, Fault> {
         let (counter, nibble) = HEADER.check(data, |counter, behind| self.crc(counter, behind))?;
         if self.mode == DataIdMode::Nibble && nibble != self.nibble() {

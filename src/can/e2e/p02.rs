@@ -11,7 +11,6 @@ pub(super) const COUNTERS: u16 = 16;
 const MAX_LEN: usize = 14;
 const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 
-/// Protects and checks one message with profile 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -22,14 +21,10 @@ pub struct P02 {
 
 impl P02 {
     /// Writes the header; the high nibble of byte 1 is data.
-    ///
-    /// # Errors
-    /// [`Fault::Length`] and [`Fault::Counter`].
     pub fn protect(&self, data: &mut [u8], counter: u8) -> Result<(), Fault> {
         HEADER.protect(data, counter, None, |behind| self.crc(counter, behind))
     }
 
-    /// Checks the CRC and returns the counter.
     pub fn check(&self, data: &[u8]) -> Result<u8, Fault> {
         HEADER.check(data, |counter, behind| self.crc(counter, behind)).map(|(counter, _)| counter)
     }

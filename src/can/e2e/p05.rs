@@ -9,7 +9,6 @@ pub(super) const COUNTERS: u16 = 256;
 /// Longest message, bytes. The specification's limit of 4096 is one bit more than the CRC covers; CAN needs 64.
 const MAX_LEN: usize = 64;
 
-/// Protects and checks one message with profile 5.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -19,10 +18,6 @@ pub struct P05 {
 }
 
 impl P05 {
-    /// Writes the header.
-    ///
-    /// # Errors
-    /// [`Fault::Length`].
     pub fn protect(&self, data: &mut [u8], counter: u8) -> Result<(), Fault> {
         let len = data.len();
         let [crc_low, crc_high, header, rest @ ..] = data else { return Err(Fault::Length(len)) };
@@ -34,7 +29,6 @@ impl P05 {
         Ok(())
     }
 
-    /// Checks the CRC and returns the counter.
     pub fn check(&self, data: &[u8]) -> Result<u8, Fault> {
         let &[low, high, counter, ref rest @ ..] = data else {
             return Err(Fault::Length(data.len()));

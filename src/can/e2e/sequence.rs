@@ -1,12 +1,9 @@
 //! A message counter shows whether messages before it were lost or repeated.
 
-/// The result of checking the counter of an intact message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
     /// The first message; its counter is the reference for the next one.
     First,
-    /// The expected counter.
     Ok,
     /// The same counter again: a repeated message, or a sender whose counter does not advance.
     Repeated,
@@ -20,14 +17,11 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Returns whether the content of the message may be used.
-    #[must_use]
     pub const fn usable(self) -> bool {
         matches!(self, Self::First | Self::Ok | Self::Lost(_))
     }
 }
 
-/// The sequence check of one message; it holds the last counter.
 #[derive(Debug, Clone, Copy)]
 pub struct Sequence {
     counters: u16,

@@ -7,11 +7,9 @@ pub const MAX_HOST_LINE: usize = 32;
 
 /// The error for a line longer than [`MAX_HOST_LINE`]; the line is discarded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[error("line has more than {MAX_HOST_LINE} characters")]
 pub struct TooLong;
 
-/// Collects the characters of one line.
 #[derive(Debug, Clone, Default)]
 pub struct LineAssembler {
     line: Vec<u8, MAX_HOST_LINE>,
@@ -21,7 +19,6 @@ pub struct LineAssembler {
 }
 
 impl LineAssembler {
-    /// Creates an assembler with an empty line.
     pub const fn new() -> Self {
         Self { line: Vec::new(), too_long: false, done: false }
     }

@@ -13,7 +13,6 @@ use heapless::Vec;
 
 /// Longest answer: `V`, four digits, CR.
 pub const MAX_ANSWER: usize = 6;
-/// An encoded answer.
 pub type Answer = Vec<u8, MAX_ANSWER>;
 
 const OK: &[u8] = b"\r";
@@ -25,7 +24,6 @@ const SERIAL: &[u8] = b"NGYRO\r";
 
 /// Status byte of the command `F` (CAN232 manual).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StatusFlags(pub u8);
 
 impl StatusFlags {
@@ -41,7 +39,6 @@ impl StatusFlags {
     pub const BUS_ERROR: Self = Self(1 << 7);
 }
 
-/// The result of executing a line from the host.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reaction {
     /// The answer to send before the next frame.
@@ -73,7 +70,6 @@ pub const fn bit_rate_digit(bits_per_second: u32) -> Option<u8> {
     })
 }
 
-/// The device side of an SLCAN session.
 #[derive(Debug, Clone, Copy)]
 pub struct Session {
     bit_rate: Option<u8>,
@@ -93,7 +89,6 @@ impl Session {
         self.open
     }
 
-    /// Returns whether the host has enabled time stamps.
     pub const fn stamped(&self) -> bool {
         self.stamped
     }

@@ -127,11 +127,8 @@ impl<const N: usize> Port<N> {
         self.taken = self.taken.saturating_add(bytes).min(self.length);
     }
 
-    /// Reads and writes as many bytes as the line allows without blocking; `take` is called with the host's frames, and
-    /// returns whether a frame is used.
-    ///
-    /// # Errors
-    /// The error of the serial line. No buffered byte is lost.
+    /// Reads and writes as many bytes as the line allows without blocking; `take` is called with the host's frames,
+    /// and returns whether a frame is used. An error of the line loses no buffered byte.
     pub fn service<L>(
         &mut self,
         line: &mut L,

@@ -151,7 +151,6 @@ impl Parts {
         self.low.mask() | self.high.map_or(0, |high| high.mask())
     }
 
-    /// Returns the number; `None` if the frame is too short.
     fn raw(&self, data: &[u8]) -> Option<u32> {
         let low = self.low.raw(data)?;
         let Some(high) = self.high else { return Some(low) };
@@ -285,7 +284,6 @@ pub enum WheelError {
 }
 
 impl WheelFrame {
-    /// Returns a mask of the bits that the protection uses.
     pub(super) fn protected_mask(&self) -> u64 {
         match self.checksum {
             Checksum::None => 0,
@@ -296,7 +294,6 @@ impl WheelFrame {
         }
     }
 
-    /// Returns the number of values of the frame's counter.
     pub(super) fn counters(&self) -> u16 {
         match (self.checksum, self.counter) {
             (Checksum::E2e(profile), _) => profile.counters(),

@@ -124,7 +124,6 @@ impl WheelSettings {
     }
 }
 
-/// Marks bits of a frame as used by a value.
 fn take(taken: &mut u64, mask: u64, frame: Option<WheelFrame>) -> Result<(), WheelConfigError> {
     if *taken & mask != 0 {
         return Err(WheelConfigError::Overlap(frame.map_or(0, |frame| raw_id(frame.id))));

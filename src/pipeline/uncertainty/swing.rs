@@ -36,7 +36,6 @@ impl Swing {
         2.0 * sqrt(2.0 * self.variance)
     }
 
-    /// Adds the angle of a sample, rad.
     pub fn add(&mut self, turn: f32) {
         if self.seconds == 0.0 {
             // As if it had always been so: a steady rate is no swing.

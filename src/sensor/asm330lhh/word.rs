@@ -24,12 +24,9 @@ const G: f32 = 0.000_488;
 /// The count of 250 deg/s, from which a rate is saturated: a word holds more, and the data sheet promises nothing of it.
 const RATE_END: u16 = 28_571;
 
-/// What a word holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Content {
-    /// Rate x, y, z.
     Rate([i16; 3]),
-    /// Acceleration x, y, z.
     Force([i16; 3]),
     /// Temperature, 1/256 deg C above 25.
     Temperature(i16),
@@ -56,12 +53,9 @@ impl Word {
     }
 }
 
-/// The readings of one output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Readings {
-    /// Rate x, y, z.
     pub rate: [i16; 3],
-    /// Acceleration x, y, z.
     pub force: [i16; 3],
     /// Time, 25 us, modulo 2^32.
     pub time: u32,
@@ -81,7 +75,6 @@ impl Readings {
     }
 }
 
-/// Collects the words of the output that is read.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Outputs {
     number: u8,
@@ -118,7 +111,6 @@ impl Outputs {
         Ok(Some(Readings { rate, force, time, temperature }))
     }
 
-    /// Forgets the output that is read.
     pub fn restart(&mut self) {
         (self.rate, self.force, self.time) = (None, None, None);
     }

@@ -20,7 +20,6 @@ pub const RATE_FRAME: usize = 6;
 pub const FORCE_FRAME: usize = 7;
 /// Length of the accelerometer's state, bytes.
 pub const STATE: usize = 14;
-/// Largest value of the accelerometer's time.
 pub const TIME_MASK: u32 = 0xFF_FFFF;
 
 /// Header of an acceleration, and the bits that identify it; the two below are tags.
@@ -38,9 +37,7 @@ pub fn acceleration(&[header, ref axes @ ..]: &[u8; FORCE_FRAME]) -> Option<[i16
     (header & CONTENT == FORCE_HEADER).then(|| spi::vector(axes))
 }
 
-/// The accelerometer's state beside its readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct State {
     /// Time, counts of 39.0625 us modulo 2^24.
     pub time: u32,
@@ -51,7 +48,6 @@ pub struct State {
 }
 
 impl State {
-    /// Parses the registers 18 to 25.
     pub fn parse(&[t0, t1, t2, .., high, low, l0, l1]: &[u8; STATE]) -> Self {
         Self {
             time: u32::from_le_bytes([t0, t1, t2, 0]),

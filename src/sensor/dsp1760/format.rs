@@ -25,7 +25,6 @@ impl Format {
     }
 
     /// Returns the length of a whole message, bytes.
-    #[must_use]
     pub const fn length(self) -> usize {
         match self {
             Self::A => 36,
@@ -53,13 +52,11 @@ impl Validity {
     pub const ALL: Self = Self(0x77);
 
     /// Returns whether the gyro about `axis` (0 to 2) is good; the bit is 0 when the gyro is saturated.
-    #[must_use]
     pub const fn gyro(self, axis: usize) -> bool {
         axis < 3 && self.0 & 1 << axis != 0
     }
 
     /// Returns whether the accelerometer along `axis` (0 to 2) is good.
-    #[must_use]
     pub const fn accelerometer(self, axis: usize) -> bool {
         axis < 3 && self.0 & 0x10 << axis != 0
     }

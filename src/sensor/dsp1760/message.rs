@@ -35,7 +35,6 @@ pub enum MessageError {
     Length { got: usize, expected: usize },
     #[error("DSP-1760: CRC {computed:08x}, but the message carries {stored:08x}")]
     Crc { computed: u32, stored: u32 },
-    /// The sequence number is above [`MAX_SEQUENCE`].
     #[error("DSP-1760: sequence number {got}, above {MAX_SEQUENCE}")]
     Sequence { got: u8 },
 }

@@ -21,12 +21,9 @@ const HEADER: u8 = 0x78;
 const CONTENT: u8 = 0xFC;
 const NO_READING: i32 = -524_288;
 
-/// The reason why bytes are not a packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum PacketError {
-    /// The FIFO was empty.
     #[error("ICM-42688: the FIFO was empty")]
     Empty,
     /// The header is not that of the configured packet: reading is out of step, or a setting is lost.
@@ -36,20 +33,17 @@ pub enum PacketError {
 
 /// The readings of a packet in raw counts; `None` is a missing reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Packet {
     /// Acceleration x, y, z, 20 bits.
     pub acceleration: [Option<i32>; 3],
     /// Rate about x, y, z, 20 bits.
     pub rate: [Option<i32>; 3],
-    /// Temperature.
     pub temperature: Option<i16>,
     /// Time stamp, counts of 32/30 us modulo 2^16.
     pub time: u16,
 }
 
 impl Packet {
-    /// Parses a packet.
     pub fn parse(bytes: &[u8; PACKET]) -> Result<Self, PacketError> {
         let &[header, ax1, ax0, ay1, ay0, az1, az0, gx1, gx0, gy1, gy0, gz1, gz0, t1, t0, u1, u0, x, y, z] =
             bytes;

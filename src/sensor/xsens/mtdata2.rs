@@ -6,7 +6,6 @@ use crate::units::RangeError;
 /// Message identifier of MTData2.
 pub const MID_MT_DATA2: u8 = 0x36;
 
-/// The data identifiers, without precision and coordinate system.
 pub mod id {
     /// Mask that removes precision and coordinate system.
     pub const MASK: u16 = 0xFFF0;
@@ -66,9 +65,6 @@ pub struct MtData2 {
 
 impl MtData2 {
     /// Parses the packets of a message; unknown packets are skipped.
-    ///
-    /// # Errors
-    /// [`XsensError::Truncated`] and [`XsensError::Format`].
     pub fn parse(mut data: &[u8]) -> Result<Self, XsensError> {
         let mut message = Self::default();
         while let &[hi, lo, len, ref rest @ ..] = data {

@@ -80,9 +80,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Checks what an update is, and returns the slot that it goes to, which does not run.
-    ///
-    /// # Errors
-    /// [`Refusal::Firmware`].
     pub fn firmware_check(&mut self, label: &Label, downgrade: bool) -> Result<Slot, Refusal> {
         self.request(false, |device| {
             let running = device.firmware.slot.zip(device.slots.as_mut());
@@ -104,9 +101,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Begins the upload of an image to a slot that does not run, and erases it.
-    ///
-    /// # Errors
-    /// [`Refusal::Firmware`], [`Refusal::Slot`], [`Refusal::Moving`].
     #[inline(never)]
     pub fn firmware_begin(&mut self, slot: Slot, length: u32) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
@@ -125,9 +119,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Checks the complete image: its label, and by `of`, which makes of its bytes what is returned if they are right.
-    ///
-    /// # Errors
-    /// [`Refusal::Firmware`], [`Refusal::Slot`].
     #[inline(never)]
     pub fn firmware_verify<T>(
         &mut self,
@@ -151,9 +142,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Lets the checked image start on trial at the next start. It has to reach what this one has reached.
-    ///
-    /// # Errors
-    /// [`Refusal::Slot`], [`Refusal::Moving`].
     #[inline(never)]
     pub fn firmware_activate(&mut self) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {

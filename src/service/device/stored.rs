@@ -128,9 +128,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Stores a configuration, which the next start uses.
-    ///
-    /// # Errors
-    /// [`Refusal::Store`], [`Refusal::Moving`].
     #[inline(never)]
     pub fn set_configuration(&mut self, configuration: &Configuration) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
@@ -150,9 +147,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Stores the settings of the wheel frames, which the next start uses.
-    ///
-    /// # Errors
-    /// [`Refusal::Store`], [`Refusal::Moving`].
     #[inline(never)]
     pub fn set_wheels(&mut self, wheels: &WheelSettings) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
@@ -165,9 +159,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Stores gain and misalignment of this unit's gyro, or removes them; used from the next start on.
-    ///
-    /// # Errors
-    /// [`Refusal::OtherWeights`], [`Refusal::Store`], [`Refusal::Moving`].
     #[inline(never)]
     pub fn set_unit(&mut self, unit: Option<UnitMap>) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
@@ -183,7 +174,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         })
     }
 
-    /// Stores what was learnt, and then uses it.
     pub(super) fn store_learned(&mut self, learned: Learned) -> Result<(), Refusal> {
         let store = self.store.as_mut().ok_or(StoreError::NoFlash)?;
         store.set(&learned)?;
@@ -206,7 +196,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         Ok(())
     }
 
-    /// Returns the troubles that were read at the start.
     pub(crate) fn troubles(&self) -> &Troubles {
         &self.troubles
     }

@@ -30,14 +30,12 @@ pub trait MappedSlots: NorFlash {
     }
 }
 
-/// An upload in progress, and its file once checked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Uploading {
     pub(super) upload: Upload,
     pub(super) checked: Option<Checked>,
 }
 
-/// What is known of a file that has been checked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Checked {
     pub(super) crc: u32,
@@ -81,9 +79,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Begins the upload of a weight file of this length, bytes, and erases the unused slot.
-    ///
-    /// # Errors
-    /// [`Refusal::Slot`], [`Refusal::Store`], [`Refusal::Moving`].
     #[inline(never)]
     pub fn weights_begin(&mut self, length: u32) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
@@ -107,9 +102,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Writes a block of the file, a whole number of words, at its offset. A repetition of the last block does no harm.
-    ///
-    /// # Errors
-    /// [`Refusal::Slot`], [`Refusal::Moving`].
     pub fn weights_block(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
             let flash = device.slots.as_mut().ok_or(SlotError::NoFlash)?;
@@ -130,9 +122,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Checks the complete file, and returns what `of` makes of its bytes.
-    ///
-    /// # Errors
-    /// [`Refusal::Slot`].
     #[inline(never)]
     pub fn weights_verify<T>(&mut self, of: impl FnOnce(&[u8]) -> T) -> Result<T, Refusal> {
         self.request(false, |device| {
@@ -148,9 +137,6 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     }
 
     /// Uses the checked file from the next start on.
-    ///
-    /// # Errors
-    /// [`Refusal::Slot`], [`Refusal::Store`], [`Refusal::Moving`].
     #[inline(never)]
     pub fn weights_activate(&mut self) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
