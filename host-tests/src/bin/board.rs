@@ -2,19 +2,23 @@
 //! board can be tried without one.
 //!
 //! An MTi sends the samples of a drive on USART1, and the vehicle's bus has its wheel speeds and courses. The drive begins
-//! again at its end.
+//! again at its end. The bus is a socket, too: an SLCAN adapter on it.
 
 use clap::Parser;
 use gyronet::can::DataFrame;
+use gyronet::can::slcan::port::Port;
 use gyronet::heading::nmea2000;
-use gyronet_host_tests::board::{self, Board};
+use gyronet::units::Micros;
+use gyronet_host_tests::board::{self, Board, Seen};
 use gyronet_host_tests::{replay, require};
 use gyronet_tools::bundled;
 use gyronet_tools::drive::DT;
+use gyronet_tools::drive::candump::Log;
 use gyronet_tools::drive::recording::{Recording, Row};
 use gyronet_tools::drive::wheel_frames::WheelFrames;
 use std::error::Error;
-use std::io::{self, ErrorKind, Read, Write};
+use std::fs::File;
+use std::io::{self, ErrorKind, LineWriter, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -28,6 +32,11 @@ const TURNS: u32 = 10;
 const IMU: usize = 1;
 const SLCAN: usize = 2;
 const SERVICE: usize = 6;
+const BITS_PER_SECOND: u32 = 500_000;
+/// Frames that wait for the adapter's client at most.
+const WAITING: usize = 64;
+/// Board time in which a coprocessor has sent a frame.
+const SENDS: Duration = Duration::from_secs(5);
 /// Source address of the GNSS receiver on the bus.
 const RECEIVER: u8 = 0x23;
 /// Rows at the start of a drive in which the vehicle stands.
@@ -40,7 +49,8 @@ const REPORT: Duration = Duration::from_secs(30);
 #[command(after_help = "\
 Examples, in another terminal:
   gyronet device --port localhost:4006 info
-  cantools monitor -i slcan -c socket://localhost:4002 -b 500000 tools/gyronet.dbc")]
+  gyronet device --port localhost:4005 update target/netduino-plus-2.update
+  cantools monitor -i slcan -c socket://localhost:4005 -b 500000 tools/gyronet.dbc")]
 struct Args {
     /// Drive that the vehicle drives; without it one is simulated, with a GNSS receiver whose NMEA 2000 frames the board
     /// takes once it is told to: `cargo gyronet device --port localhost:4006 set heading.nmea2000=true`, then `restart`.
@@ -58,6 +68,12 @@ struct Args {
     /// Port of the SLCAN line (USART2).
     #[arg(long, default_value_t = 4002)]
     slcan: u16,
+    /// Port of an SLCAN adapter on the CAN bus.
+    #[arg(long, default_value_t = 4005)]
+    can: u16,
+    /// Write the frames on the bus to this file, with the board's time, as `candump -L` does.
+    #[arg(long, value_name = "FILE.log")]
+    log: Option<PathBuf>,
     /// Image to run, as `cargo fw` writes it; without it, it is built.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
@@ -112,8 +128,14 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         Line::open("service line (USART6)", SERVICE, args.service)?,
         Line::open("SLCAN (USART2)", SLCAN, args.slcan)?,
     ];
+    let mut adapter = Adapter::open(args.can)?;
+    let log = args
+        .log
+        .as_ref()
+        .map(|path| File::create(path).map_err(|error| format!("{}: {error}", path.display())));
+    let mut log = log.transpose()?.map(|file| Log::new(LineWriter::new(file)));
     let (mut vehicle, began) = (Vehicle::new(drive), Instant::now());
-    let (mut due, mut report) = (began, REPORT);
+    let (mut due, mut report, mut is_silent) = (began, REPORT, true);
     for turn in (0..TURNS).cycle() {
         if turn == 0 {
             let sent = vehicle.next();
@@ -124,19 +146,35 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
             }
             sent.frames.iter().for_each(|frame| board.can_send(frame));
             // Nobody else takes what the model keeps.
-            board.can_frames();
             board.events();
         }
         for line in &mut lines {
-            let bytes = line.read()?;
+            let bytes = line.socket.read()?;
             if !bytes.is_empty() {
                 board.send(line.usart, &bytes);
             }
         }
+        adapter.read()?.iter().for_each(|frame| board.can_send(frame));
         let now = board.run(TURN);
         for line in &mut lines {
             let bytes = board.sent(line.usart);
-            line.write(&bytes);
+            line.socket.write(&bytes);
+        }
+        for Seen { end, own, frame, .. } in board.bus_log() {
+            is_silent &= !own;
+            if let Some(log) = &mut log {
+                log.frame(Micros(end.as_micros() as u64), &frame)?;
+            }
+            adapter.seen(end, &frame);
+        }
+        adapter.write();
+        if now >= SENDS && std::mem::take(&mut is_silent) {
+            eprintln!(
+                "{NAME}: no frame within {} s: is it a coprocessor for the STM32F405, with a crystal of {} Hz \
+                 (--crystal-hz)?",
+                SENDS.as_secs(),
+                args.crystal_hz
+            );
         }
         // The time of the board passes no faster than that of its testers: it makes up for a step at most.
         due = (due + TURN).max(Instant::now() - TURNS * TURN);
@@ -191,21 +229,87 @@ impl Vehicle {
     }
 }
 
-/// A line of the board as a socket, for one client at a time.
+/// A line of the board, and its socket.
 struct Line {
-    name: &'static str,
     usart: usize,
-    listener: TcpListener,
-    client: Option<TcpStream>,
+    socket: Socket,
 }
 
 impl Line {
     fn open(name: &'static str, usart: usize, port: u16) -> io::Result<Self> {
+        Socket::open(name, port).map(|socket| Self { usart, socket })
+    }
+}
+
+/// An SLCAN adapter on the bus. It is open once its client has sent `O` or a frame, until `C`.
+struct Adapter {
+    socket: Socket,
+    port: Port<WAITING>,
+    /// What the client has sent, which it does not get back.
+    sent: Vec<DataFrame>,
+}
+
+impl Adapter {
+    fn open(port: u16) -> io::Result<Self> {
+        let socket = Socket::open("CAN, as by an SLCAN adapter", port)?;
+        Ok(Self { socket, port: Port::new(BITS_PER_SECOND), sent: Vec::new() })
+    }
+
+    /// Takes what the client sends, for the bus.
+    fn read(&mut self) -> io::Result<Vec<DataFrame>> {
+        let bytes = self.socket.read()?;
+        if self.socket.client.is_none() {
+            (self.port, self.sent) = (Port::new(BITS_PER_SECOND), Vec::new());
+        }
+        let mut frames = Vec::new();
+        for byte in bytes {
+            self.port.receive(byte, |frame| {
+                frames.push(frame);
+                true
+            });
+        }
+        if !frames.is_empty() && !self.port.is_open() {
+            b"O\r".iter().for_each(|byte| self.port.receive(*byte, |_| false));
+        }
+        self.sent.extend(&frames);
+        // What the bus refuses does not come back.
+        self.sent.drain(..self.sent.len().saturating_sub(WAITING));
+        Ok(frames)
+    }
+
+    fn seen(&mut self, time: Duration, frame: &DataFrame) {
+        match self.sent.iter().position(|sent| sent == frame) {
+            Some(own) => drop(self.sent.remove(own)),
+            None if self.port.is_open() => self.port.enqueue(*frame, Micros(time.as_micros() as u64)),
+            None => {}
+        }
+    }
+
+    fn write(&mut self) {
+        let mut bytes = Vec::new();
+        while let Some(next) = self.port.outgoing() {
+            let length = next.len();
+            bytes.extend_from_slice(next);
+            self.port.sent(length);
+        }
+        self.socket.write(&bytes);
+    }
+}
+
+/// A socket for one client at a time.
+struct Socket {
+    name: &'static str,
+    listener: TcpListener,
+    client: Option<TcpStream>,
+}
+
+impl Socket {
+    fn open(name: &'static str, port: u16) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
             .map_err(|error| io::Error::new(error.kind(), format!("{name}: port {port}: {error}")))?;
         listener.set_nonblocking(true)?;
         println!("{name}: localhost:{}", listener.local_addr()?.port());
-        Ok(Self { name, usart, listener, client: None })
+        Ok(Self { name, listener, client: None })
     }
 
     /// Returns what the client has sent since the last call.

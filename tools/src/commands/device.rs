@@ -23,7 +23,7 @@ use std::path::PathBuf;
 
 /// Query and configure a board over diagnosis (UDS).
 ///
-/// The command connects to the board over its service line, any SLCAN adapter, or a CAN interface (--port).
+/// The command connects to the board over its service line, its SLCAN line, or a CAN interface (--port).
 ///
 /// New settings, wheel frames, calibration files and weights take effect after a restart (`device restart`). The exit
 /// status is 1 if the board does not respond or refuses a request.
@@ -35,7 +35,7 @@ Examples:
   gyronet device --port /dev/ttyUSB1 calibrate unit --file unit.json
   gyronet device --port localhost:4006 weights gyronet.blob      # then: restart")]
 pub struct Args {
-    /// Serial port or host:port of an SLCAN line, or can:INTERFACE for a CAN interface of Linux; required.
+    /// Serial port or host:port of such a line, or can:INTERFACE for a CAN interface of Linux; required.
     #[arg(long, global = true, value_name = "PORT|HOST:PORT|can:INTERFACE")]
     port: Option<String>,
     /// Baud rate of a serial port.
