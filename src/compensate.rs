@@ -67,7 +67,7 @@ pub struct CompensateConfig {
 
 impl CompensateConfig {
     /// A window every five samples, with both estimates of a sample averaged; a lag of 70 ms, the shortest that does
-    /// not increase the error on the validation drive (`cargo gyronet evaluate --lags`); 1 deg/s of revisions in one rate.
+    /// not increase the error on the validation drive (tools/MEASUREMENTS.md); 1 deg/s of revisions in one rate.
     pub const DEFAULT: Self = Self {
         stride: Stride::HALF,
         lag: match Lag::new(7) {

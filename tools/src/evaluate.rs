@@ -1,14 +1,12 @@
 //! These modules compare methods of computing a yaw rate. [`rates`] runs each of the [`methods`] on a drive with a
-//! reference, [`heading_error`] and [`trajectory_error`] compute the errors, [`cost`] the multiplications and the
-//! delay, and [`report`] writes the tables. [`variant`] compares configurations of the board.
+//! reference, [`heading_error`] and [`trajectory_error`] compute the errors, and [`report`] writes the tables.
 
-pub mod cost;
+pub mod angle;
 pub mod ekf;
 pub mod expected_error;
 pub mod fir;
 pub mod heading_error;
 pub mod methods;
-pub mod metrics;
 pub mod outage;
 pub mod outage_chart;
 pub mod outage_path;
@@ -17,5 +15,4 @@ pub mod rates;
 pub mod report;
 pub mod rest;
 pub mod trajectory_error;
-pub mod variant;
 pub mod vqf;

@@ -7,7 +7,7 @@ use gyronet_tools::board::Board;
 use gyronet_tools::calibrate::{Cut, calibrate, config};
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::methods::{Method, PerMethod};
-use gyronet_tools::evaluate::rates::{Network, Networks};
+use gyronet_tools::evaluate::rates::Networks;
 use gyronet_tools::evaluate::report::{DriveErrors, Report, Row};
 use gyronet_tools::network::quantization_error::{Both, QuantizationError};
 use std::path::Path;
@@ -39,17 +39,9 @@ impl Trial {
         let mut both = Both::new(&mut integer, &mut beside);
         let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
         let mut default = GyroNet::new(blob);
-        let of_default = default.blob().shape;
-        let mut networks = Networks {
-            default: Network::new(&mut default, of_default),
-            sent: None,
-            paper: Some([
-                Network::new(&mut float, checkpoint.shape()),
-                Network::new(&mut both, checkpoint.shape()),
-            ]),
-        };
-        let drive =
-            DriveErrors::of(&recorded, &mut networks, |_| {}).expect("it stands first, with a reference");
+        let paper = Some([&mut float as _, &mut both as _]);
+        let networks = Networks { default: &mut default, sent: None, paper };
+        let drive = DriveErrors::of(&recorded, networks, |_| {}).expect("it stands first, with a reference");
         Self { number, drive, quantization: both.error() }
     }
 }
@@ -130,9 +122,8 @@ fn a_calibrated_unit_is_as_good_as_the_page_says() {
         [None, Some(unit.gyro_map)].map(|map| {
             drive.gyro_map = map;
             let mut default = GyroNet::new(blob);
-            let default = Network::new(&mut default, blob.shape);
-            let mut networks = Networks { default, sent: None, paper: None };
-            let errors = DriveErrors::of(&drive, &mut networks, |_| {}).expect("it stands first");
+            let networks = Networks { default: &mut default, sent: None, paper: None };
+            let errors = DriveErrors::of(&drive, networks, |_| {}).expect("it stands first");
             let error = |method| errors.methods[method].error.mean_1s_rad.expect("whole seconds");
             [Method::STATIC, Method::LIVE, Method::DELAYED].map(error)
         })

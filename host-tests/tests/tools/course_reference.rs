@@ -1,12 +1,11 @@
 //! Drives whose reference is a course: a made-up one with a known heading error, one that starts moving, and references
 //! that cannot be used.
 
-use gyronet::model::blob::Shape;
 use gyronet_tools::board::Uncorrected;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::methods::Method;
-use gyronet_tools::evaluate::rates::{Network, Networks, Rates, Sample};
+use gyronet_tools::evaluate::rates::{Networks, Rates, Sample};
 use gyronet_tools::evaluate::report::{DriveErrors, EvaluateError};
 use std::fmt::Write;
 
@@ -41,12 +40,8 @@ fn drive(still: usize, sign: f64, column: &str) -> Recording {
 
 fn run(recording: &Recording, visit: impl FnMut(&Sample)) -> Result<DriveErrors, EvaluateError> {
     let mut default = Uncorrected;
-    let mut networks = Networks {
-        default: Network::new(&mut default, Shape { units: 0, linear: true }),
-        sent: None,
-        paper: None,
-    };
-    DriveErrors::of(&Drive::from(recording), &mut networks, visit)
+    let networks = Networks { default: &mut default, sent: None, paper: None };
+    DriveErrors::of(&Drive::from(recording), networks, visit)
 }
 
 fn errors(recording: &Recording) -> Result<DriveErrors, EvaluateError> {

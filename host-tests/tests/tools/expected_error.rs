@@ -5,7 +5,7 @@ use gyronet::model::{Blob, GyroNet, weights};
 use gyronet_host_tests::{parallel, recordings};
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::expected_error::{ExpectedError, Seconds};
-use gyronet_tools::evaluate::rates::{Network, Networks};
+use gyronet_tools::evaluate::rates::Networks;
 use gyronet_tools::evaluate::report::DriveErrors;
 use std::path::Path;
 
@@ -22,9 +22,8 @@ fn expected_error(path: &Path) -> ExpectedError {
     let drive = Drive::open(path).expect("a recording");
     let mut default =
         GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
-    let shape = default.blob().shape;
-    let mut networks = Networks { default: Network::new(&mut default, shape), sent: None, paper: None };
-    let errors = DriveErrors::of(&drive, &mut networks, |_| {}).expect("it stands first, with a reference");
+    let networks = Networks { default: &mut default, sent: None, paper: None };
+    let errors = DriveErrors::of(&drive, networks, |_| {}).expect("it stands first, with a reference");
     errors.expected_error.expect("against a yaw rate")
 }
 

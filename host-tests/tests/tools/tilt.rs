@@ -7,7 +7,7 @@ use gyronet_host_tests::parallel;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::replay::Replay;
 use gyronet_tools::drive::wheel_frames::WheelFrames;
-use gyronet_tools::evaluate::metrics::YawError;
+use gyronet_tools::evaluate::heading_error::AgainstRate;
 use gyronet_tools::simulate::{Config, csv};
 
 const SECONDS: u32 = 1_200;
@@ -29,13 +29,14 @@ fn run(seed: u64, [roll, pitch]: [f64; 2], levelling: bool) -> [f64; 2] {
     let rates: Vec<f64> = drive.delayed().map(|rate| rate.rate.rad_per_sec()).collect();
     let steps = &drive.steps[drive.compared()];
     let truth: Vec<f64> = steps.iter().map(|step| recording.rows[step.row].reference.expect("one")).collect();
-    let error = YawError::new(&rates, &truth).expect("whole seconds");
-    let (mut off, mut squares) = (0.0, 0.0);
+    let (mut against, mut off, mut squares) = (AgainstRate::default(), 0.0, 0.0);
     for (rate, truth) in rates.iter().zip(&truth) {
+        against.add(*rate, *truth);
         off += (rate - truth) * 0.01;
         squares += off * off;
     }
-    [error.mean_1s_rad, (squares / rates.len() as f64).sqrt()]
+    let error = against.errors().expect("whole seconds").figures;
+    [error.mean_1s_rad.expect("a rate gives it"), (squares / rates.len() as f64).sqrt()]
 }
 
 #[test]

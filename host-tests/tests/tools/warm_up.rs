@@ -13,8 +13,8 @@ use gyronet_host_tests::parallel;
 use gyronet_host_tests::synthetic::judged;
 use gyronet_tools::board::{Board, Uncorrected};
 use gyronet_tools::drive::recording::{Recording, Row, WHEEL_STANDS};
+use gyronet_tools::drive::replay::Steps;
 use gyronet_tools::drive::stream::Drive;
-use gyronet_tools::evaluate::variant::{self, Variant};
 use gyronet_tools::simulate::warming::{self, Trip};
 use gyronet_tools::simulate::{Config, csv, gnss};
 
@@ -60,6 +60,16 @@ fn learn(trip: &Recording, learned: &mut Learned) {
     }
 }
 
+/// Returns the heading error at the end of a drive, deg, by this board, which has no courses.
+fn at_the_end(drive: &Drive<'_>, board: Board<impl WindowNetwork>) -> f64 {
+    let steps =
+        Steps::new(drive, board).expect("a drive in memory").map(|step| step.expect("a start at rest"));
+    let off = steps.filter(|step| step.is_compared).filter_map(|step| {
+        Some((step.delayed?.rate.rad_per_sec() - step.input.reference?) / f64::from(RATE_HZ))
+    });
+    off.sum::<f64>().to_degrees()
+}
+
 /// Returns the heading error of the last minute of a drive, deg, by this board, which has no courses in it.
 fn last_minute(drive: &Recording, mut board: Board<impl WindowNetwork>) -> f64 {
     let hidden = drive.rows.len() - MINUTE;
@@ -81,22 +91,18 @@ fn errors(device: u64) -> [[f64; 2]; 2] {
     for day in 0..DAYS {
         learn(&simulate(device, Trip::Town, day, TOWN_S), &mut learned);
     }
-    let with = |config, network| Variant { name: String::new(), config, network };
-    let variants = [
-        with(PipelineConfig::DEFAULT, false),
-        with(Configuration::DEFAULT.pipeline(&Calibration::NONE, &learned, 0), true),
-    ];
+    let pipelines =
+        [PipelineConfig::DEFAULT, Configuration::DEFAULT.pipeline(&Calibration::NONE, &learned, 0)];
     let motorway = simulate(device, Trip::Motorway, DAYS, MOTORWAY_S);
     let drive: Drive<'_> = (&motorway).into();
-    let scores = variant::run(&drive, &mut network, &variants, || {}).expect("a start at rest");
-    let at_the_end = [0, 1].map(|k: usize| scores[k].error.final_rad.to_degrees());
-    let board = |k: usize| {
+    let config = |k: usize| {
         let can = can::config::Config::SILENT;
-        let config =
-            coprocessor::Config { pipeline: variants[k].config, can, ..coprocessor::Config::DEFAULT };
-        Board::new(config, drive.wheels(), Uncorrected).moving(k == 1)
+        coprocessor::Config { pipeline: pipelines[k], can, ..coprocessor::Config::DEFAULT }
     };
-    [at_the_end, [0, 1].map(|k| last_minute(&motorway, board(k)))]
+    let uncorrected = |k| Board::new(config(k), drive.wheels(), Uncorrected);
+    let learnt = at_the_end(&drive, Board::new(config(1), drive.wheels(), &mut network));
+    let last_minutes = [0, 1].map(|k| last_minute(&motorway, uncorrected(k).moving(k == 1)));
+    [[at_the_end(&drive, uncorrected(0)), learnt], last_minutes]
 }
 
 #[test]

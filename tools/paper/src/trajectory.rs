@@ -5,7 +5,7 @@
 use super::sequence::yaw;
 use crate::sequence::SequenceFault;
 use gyronet_tools::drive::error::{DataError, DataFault, ValueError};
-use gyronet_tools::evaluate::metrics::wrap;
+use gyronet_tools::evaluate::angle::wrap;
 use gyronet_tools::evaluate::trajectory_error::Point;
 use std::fs;
 use std::path::Path;

@@ -9,10 +9,8 @@ use gyronet_tools::evaluate::outage::{self, NoStart, Outage};
 use gyronet_tools::evaluate::outage_chart;
 use gyronet_tools::evaluate::outage_table::Outages;
 use gyronet_tools::evaluate::report::Report;
-use gyronet_tools::evaluate::variant::{self, Score};
 use gyronet_tools::network::checkpoint::Checkpoint;
 use indicatif::ProgressBar;
-use std::error::Error;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -29,8 +27,7 @@ use std::path::{Path, PathBuf};
 /// driving straight (and standing) and turning.
 ///
 /// One row for each method follows: the error over 1 s, 60 s and the drive (RMS and at the end) in degrees, in JSON in
-/// rad. With --all come the error over 10 s, the ratio to static initialisation (1 s, or RMS against a course), the mean
-/// correction beyond static initialisation and zero-rate updates, multiplications per sample, and delay. The linear
+/// rad with the error over 10 s and the delay. The linear
 /// window is an estimate of all windows after static initialisation. The last two rows are the rates that the board
 /// sends: the live rate, with the sample (Bosch TX1), and the delayed rate, in its own yaw messages.
 #[derive(Debug, Clone, clap::Args)]
@@ -45,23 +42,17 @@ pub struct Args {
     /// Recorded drives with ref_gyr_z or ref_yaw.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Print the error of the delayed rate at every lag from 0 to 110 ms (the board's default is 70).
-    #[arg(long)]
-    lags: bool,
     /// Print the heading error after a loss of GNSS for so many seconds, which begins every 2 s, after 60 s of driving with
     /// a course, and after 20 s. The drives have `course` and `gnss_speed`, or `gnss_lat` and `gnss_lon`, besides a
     /// reference; they may begin in motion.
     #[arg(long, value_name = "SECONDS", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=3600))]
-    #[arg(conflicts_with_all = ["lags", "all", "gyronet"])]
+    #[arg(conflicts_with = "gyronet")]
     outage: Vec<u16>,
     /// With --outage, write pictures of the median and of the worst outage into this folder: median.svg, worst.svg.
     #[arg(long, value_name = "FOLDER", requires = "outage")]
     pictures: Option<PathBuf>,
-    /// Print every column: errors in 10 s, to static initialisation, corrections, multiplications, delay.
-    #[arg(long, conflicts_with = "lags")]
-    all: bool,
     /// Add rows for the paper's GyroNet, in f32 and in integers; they take twenty times as long as all others together.
-    #[arg(long, conflicts_with = "lags")]
+    #[arg(long)]
     gyronet: bool,
     /// Checkpoint of the f32 network (safetensors) [default: the one that comes with the tools].
     #[arg(long, value_name = "FILE", requires = "gyronet")]
@@ -71,9 +62,6 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, common: Common) -> super::Result {
-    if args.lags {
-        return lags(args, common);
-    }
     if !args.outage.is_empty() {
         return outages(args, common);
     }
@@ -91,8 +79,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if common.json {
         return print_json(&mut out, &report);
     }
-    let text = if args.all { format!("{report:#}") } else { report.to_string() };
-    Ok(write!(out, "{}", paint::report(&text))?)
+    Ok(write!(out, "{}", paint::report(&report.to_string()))?)
 }
 
 /// The outages of a drive, with its file.
@@ -170,62 +157,6 @@ fn pictures<'a>(
         let file = folder.join(name);
         std::fs::write(&file, outage_chart::svg(&title, &which, outage, &points))
             .map_err(|error| format!("{}: {error}", file.display()))?;
-    }
-    Ok(())
-}
-
-/// The scores of one drive, as in the JSON.
-#[derive(serde::Serialize)]
-struct Scored {
-    name: String,
-    scores: Vec<Score>,
-}
-
-fn lags(args: &Args, common: Common) -> super::Result {
-    let variants = variant::lags();
-    let weights = args.unit.sent.open()?;
-    let mut network = GyroNet::new(weights.blob()?);
-    let mut drives = Vec::new();
-    for file in &args.files {
-        let drive =
-            args.unit.drive(Drive::open(file), common).map_err(|error| -> Box<dyn Error> { error })?;
-        let bar = progress::bar(common, variants.len() * drive.facts.rows, drive.name());
-        let scores = variant::run(&drive, &mut network, &variants, || bar.inc(1));
-        bar.finish_and_clear();
-        let scores = scores?;
-        if scores.is_empty() {
-            return Err(format!("{}: no reference yaw rate, which evaluation needs", drive.path).into());
-        }
-        drives.push(Scored { name: drive.name().to_owned(), scores });
-    }
-    let scores: Vec<Vec<Score>> = drives.iter().map(|drive| drive.scores.clone()).collect();
-    let mean = variant::mean(&scores).filter(|_| drives.len() > 1);
-    let mut out = std::io::stdout().lock();
-    if common.json {
-        return print_json(&mut out, &serde_json::json!({ "drives": drives, "mean": mean }));
-    }
-    for Scored { name, scores } in &drives {
-        writeln!(out, "{name}")?;
-        print(&mut out, scores)?;
-        writeln!(out)?;
-    }
-    if let Some(mean) = mean {
-        writeln!(out, "mean of {} drives", drives.len())?;
-        print(&mut out, &mean)?;
-    }
-    Ok(())
-}
-
-fn print(out: &mut impl Write, scores: &[Score]) -> std::io::Result<()> {
-    writeln!(
-        out,
-        "  {:<22}{:>14}{:>15}{:>15}",
-        "yaw error", "in 1 s, deg", "sample, deg/s", "at the end, deg"
-    )?;
-    for Score { name, error, rms_rad_per_s } in scores {
-        let [in_1s, sample, end] =
-            [error.mean_1s_rad, *rms_rad_per_s, error.final_unwrapped_rad].map(f64::to_degrees);
-        writeln!(out, "  {name:<22}{in_1s:>14.4}{sample:>15.4}{end:>15.3}")?;
     }
     Ok(())
 }

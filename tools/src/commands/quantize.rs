@@ -60,10 +60,6 @@ impl fmt::Display for Added {
 }
 
 pub fn run(args: &Args, common: Common) -> super::Result {
-    if Checkpoint::is_in(&args.checkpoint)? {
-        let path = args.checkpoint.display();
-        return Err(format!("{path}: a checkpoint of FoGNet, which `cargo paper quantize` converts").into());
-    }
     let (bytes, report, added) = convert(args, common)?;
     std::fs::write(&args.out, &bytes).map_err(WriteError::to(&args.out))?;
     let Report { rows, raised, largest_raise, bytes } = report;

@@ -1,11 +1,11 @@
 //! Chooses the weights, bundled or from a file, and runs every method with them.
 
 use super::{Common, remarked};
-use gyronet::model::{self, Blob, weights};
+use gyronet::model::{self, Blob, WindowNetwork, weights};
 use gyronet_tools::calibrate::unit_file;
 use gyronet_tools::drive::error::DataError;
 use gyronet_tools::drive::stream::Drive;
-use gyronet_tools::evaluate::rates::{Network, Networks, Sample};
+use gyronet_tools::evaluate::rates::{Networks, Sample};
 use gyronet_tools::evaluate::report::DriveErrors;
 use gyronet_tools::network::checkpoint::{Checkpoint, GyroNet};
 use gyronet_tools::network::weight_file::{WeightFile, WeightFileError};
@@ -82,19 +82,12 @@ impl Sent {
         let chosen = self.open()?;
         let mut sent = self.weights.as_ref().map(|_| chosen.blob().map(model::GyroNet::new)).transpose()?;
         let mut integer = model::GyroNet::new(Blob::new_checked(&weights::GYRONET.0)?);
-        let mut float = paper.map(|checkpoint| (checkpoint.network(), checkpoint.shape()));
-        let of_integer = integer.blob().shape;
-        let of_default = default.blob().shape;
-        let mut networks = Networks {
-            default: Network::new(&mut default, of_default),
-            sent: sent.as_mut().map(|sent| {
-                let shape = sent.blob().shape;
-                Network::new(sent, shape)
-            }),
-            paper: float
-                .as_mut()
-                .map(|(float, shape)| [Network::new(float, *shape), Network::new(&mut integer, of_integer)]),
+        let mut float = paper.map(|checkpoint| checkpoint.network());
+        let networks = Networks {
+            default: &mut default,
+            sent: sent.as_mut().map(|sent| sent as _),
+            paper: float.as_mut().map(|float| -> [&mut dyn WindowNetwork; 2] { [float, &mut integer] }),
         };
-        Ok(DriveErrors::of(drive, &mut networks, visit)?)
+        Ok(DriveErrors::of(drive, networks, visit)?)
     }
 }

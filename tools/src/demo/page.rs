@@ -2,11 +2,11 @@
 
 use super::Demo;
 use super::trajectory::Trajectories;
+use crate::evaluate::angle::integral;
 use crate::evaluate::heading_error::{AgainstCourse, BLOCK_S};
 use crate::evaluate::methods::Method;
-use crate::evaluate::metrics::integral;
 use crate::evaluate::rates::Rates;
-use crate::evaluate::report::{MARKS, columns};
+use crate::evaluate::report::{HEADINGS, MARKS, figures};
 use crate::plot::page::chart::{Chart, Curve};
 use crate::plot::page::{HINT, document, escaped, grouped, table};
 use gyronet::sample::RATE_HZ;
@@ -185,14 +185,13 @@ fn methods(demo: &Demo<'_>) -> String {
         return "<p>The drive has no reference, so there are no errors.</p>\n".into();
     };
     let ours = errors.over_best_classical.map(|ours| format!("<p>Delayed rate: {ours}.</p>\n"));
-    let (headings, rows) = columns(&errors.methods, false);
     format!(
         "{}{}<p class=\"note\">Heading error over {:.1} s against <code>{}</code>: mean over windows of 1 and 60 s, RMS \
-         and value at the end; {MARKS}. <code>gyronet evaluate --all</code> prints more columns. The linear \
+         and value at the end; {MARKS}. The linear \
          window is a complete estimate after static initialisation. The last two rows are the rates that the board \
          sends: with the sample (Bosch TX1), and in its own messages some samples later.</p>\n",
         ours.unwrap_or_default(),
-        table("ours", &headings, rows),
+        table("ours", &HEADINGS, figures(&errors.methods)),
         errors.seconds,
         errors.reference
     )

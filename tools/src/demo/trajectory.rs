@@ -3,8 +3,8 @@
 use crate::drive::DT;
 use crate::drive::stream::Drive;
 use crate::drive::track::Track;
+use crate::evaluate::angle::integral;
 use crate::evaluate::methods::Method;
-use crate::evaluate::metrics::integral;
 use crate::evaluate::rates::Rates;
 use crate::evaluate::trajectory_error::{Alignment, Point, TrajectoryError};
 use serde::Serialize;

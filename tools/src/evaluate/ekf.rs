@@ -5,7 +5,7 @@
 //! bias be updated. A course counts as the heading some lag ago, is weighed by its accuracy, the speed and the rate, and
 //! left out beyond four sigma; after ten seconds without a match the heading starts again.
 
-use super::metrics::wrap;
+use super::angle::wrap;
 use crate::drive::DT;
 use gyronet::heading::{CourseConfig, Heading};
 

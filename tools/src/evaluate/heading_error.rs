@@ -8,7 +8,7 @@
 //! against a course: means and squares are sums. Only the median error in 10 s over the whole drive
 //! ([`Errors::typical_10s`]) is counted in classes of 5 mrad.
 
-use super::metrics::wrap;
+use super::angle::wrap;
 use crate::drive::DT;
 use gyronet::sample::RATE_HZ;
 use serde::Serialize;

@@ -1,6 +1,9 @@
 //! The compared methods of computing a yaw rate, with one set of names for the tables of drives and
 //! for the paper's tables.
 
+use super::fir::LowPass;
+use gyronet::compensate::CompensateConfig;
+use gyronet::sample::PERIOD_US;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -132,6 +135,18 @@ impl Method {
 
     pub const CLASSICAL: [Self; 6] =
         [Self::RAW, Self::STATIC, Self::STATIC_ZERO_RATE, Self::FIR, Self::FIR_ZERO_RATE, Self::VQF];
+
+    /// How long after its sample the rate of a drive is known, ms.
+    pub fn delay_ms(self) -> u64 {
+        let CompensateConfig { stride, lag, .. } = CompensateConfig::DEFAULT;
+        let samples = match self {
+            Self::FIR | Self::FIR_ZERO_RATE => LowPass::chosen().delay(),
+            Self::LINEAR | Self::GYRONET_F32 | Self::GYRONET_INT => stride.complete_after(),
+            Self::DELAYED => lag.samples(),
+            _ => 0,
+        };
+        samples as u64 * PERIOD_US / 1_000
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -184,5 +199,16 @@ impl<T: Serialize> Serialize for PerMethod<T> {
             map.serialize_entry(method.key, value)?;
         }
         map.end()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn delays_are_those_of_the_pipeline() {
+        let delays = Method::ON_A_DRIVE.map(Method::delay_ms);
+        assert_eq!(delays, [0, 0, 0, 50, 50, 0, 110, 110, 110, 0, 70]);
     }
 }

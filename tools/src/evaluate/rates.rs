@@ -10,41 +10,23 @@ use crate::drive::recording::between;
 use crate::drive::replay::{ReplayError, initialise};
 use crate::drive::stream::Drive;
 use crate::drive::wheel_frames::Speeds;
-use crate::evaluate::cost::{Cost, Shapes};
+use crate::evaluate::angle::integral;
 use crate::evaluate::fir::{Line, LowPass};
 use crate::evaluate::heading_error::{ALIGNED, OffCourse, median};
 use crate::evaluate::methods::{Method, PerMethod};
-use crate::evaluate::metrics::integral;
 use crate::evaluate::trajectory_error::Point;
 use crate::evaluate::{rest, vqf};
 use gyronet::can;
 use gyronet::compensate::{CompensateConfig, Lag};
 use gyronet::coprocessor::Config;
 use gyronet::estimate::YawEstimate;
-use gyronet::model::blob::Shape;
-use gyronet::model::window::{Features, WINDOW};
-use gyronet::model::{Estimate, WindowNetwork};
+use gyronet::model::WindowNetwork;
 use gyronet::pipeline::PipelineConfig;
 use gyronet::units::{AngularRate, Micros, SpecificForce};
 use std::borrow::Cow;
 use std::collections::VecDeque;
 
-pub struct Network<'a> {
-    run: &'a mut (dyn WindowNetwork + Send),
-    shape: Shape,
-}
-
-impl<'a> Network<'a> {
-    pub fn new(run: &'a mut (dyn WindowNetwork + Send), shape: Shape) -> Self {
-        Self { run, shape }
-    }
-}
-
-impl WindowNetwork for Network<'_> {
-    fn estimate(&mut self, window: &[Features; WINDOW]) -> Estimate {
-        self.run.estimate(window)
-    }
-}
+type Network<'a> = &'a mut dyn WindowNetwork;
 
 pub struct Networks<'a> {
     /// The model of the default weights, whose linear part corrects the rate.
@@ -65,7 +47,6 @@ pub struct Sample {
 
 #[derive(Debug, Clone)]
 pub struct Comparison {
-    pub costs: PerMethod<Cost>,
     /// True if the drive begins in motion, so that a simulated standstill was inserted before it.
     pub simulated_rest: bool,
     /// Number of grid steps without a sample.
@@ -77,17 +58,11 @@ pub(super) fn silent(pipeline: PipelineConfig) -> Config {
     Config { pipeline, can: can::config::Config::SILENT, ..Config::DEFAULT }
 }
 
-/// Returns a configuration with another lag of the delayed rate.
-pub(crate) fn with_lag(config: PipelineConfig, lag: Lag) -> PipelineConfig {
-    let compensate = CompensateConfig { lag, ..config.compensate };
-    PipelineConfig { compensate, ..config }
-}
-
 /// Runs every method, and passes each sample to `visit`. All networks run in the same pipeline; the pipeline without a
 /// network is [`STATIC_ZERO_RATE`](crate::evaluate::methods::Method::STATIC_ZERO_RATE).
 pub fn run(
     drive: &Drive<'_>,
-    networks: &mut Networks<'_>,
+    networks: Networks<'_>,
     mut visit: impl FnMut(&Sample),
 ) -> Result<Comparison, ReplayError> {
     let at_rest = drive.facts.check_rest(&drive.path).map_err(ReplayError::Data);
@@ -100,16 +75,13 @@ pub fn run(
         }
     };
     let drive = &*drive;
-    let shapes = Shapes {
-        sent: networks.sent.as_ref().unwrap_or(&networks.default).shape,
-        paper: networks.paper.as_ref().map(|[float, integer]| [float.shape, integer.shape]),
-    };
     let board = |network| Board::new(silent(PipelineConfig::DEFAULT), drive.wheels(), network);
-    let mut boards: Vec<Board<&mut Network<'_>>> = vec![board(&mut networks.default)];
-    boards.extend(networks.sent.as_mut().map(board));
+    let mut boards: Vec<Board<Network<'_>>> = vec![board(networks.default)];
+    boards.extend(networks.sent.map(board));
     let sent = boards.len() - 1;
-    boards.extend(networks.paper.iter_mut().flatten().map(board));
-    let at_once = silent(with_lag(PipelineConfig::DEFAULT, Lag::NONE));
+    boards.extend(networks.paper.into_iter().flatten().map(board));
+    let compensate = CompensateConfig { lag: Lag::NONE, ..CompensateConfig::DEFAULT };
+    let at_once = silent(PipelineConfig { compensate, ..PipelineConfig::DEFAULT });
     let mut zero_rate = Board::new(at_once, drive.wheels(), Uncorrected);
     let mut side_by_side = SideBySide::new(bias);
     let mut rows = drive.rows()?;
@@ -142,9 +114,8 @@ pub fn run(
     while let Some(sample) = side_by_side.end() {
         visit(&sample);
     }
-    let costs = PerMethod::new(|method| Cost::new(method, &shapes));
     let missing = boards[sent].coprocessor().pipeline().counters().missing;
-    Ok(Comparison { costs, simulated_rest, missing })
+    Ok(Comparison { simulated_rest, missing })
 }
 
 /// The rates that other boards have found for a step.

@@ -4,7 +4,6 @@ use crate::drive::DT;
 use crate::drive::recording;
 use crate::drive::replay::ReplayError;
 use crate::drive::stream::Drive;
-use crate::evaluate::cost::Cost;
 use crate::evaluate::expected_error::ExpectedError;
 use crate::evaluate::heading_error::{AgainstCourse, AgainstRate, Errors, HeadingError, PLAUSIBLE_10S_RAD};
 use crate::evaluate::methods::{Method, PerMethod};
@@ -53,41 +52,25 @@ pub enum EvaluateError {
 pub struct Row {
     #[serde(flatten)]
     pub error: HeadingError,
-    /// The mean of the corrections beyond static initialisation and zero-rate updates, deg/h.
-    pub mean_correction_deg_h: f64,
-    #[serde(flatten)]
-    pub cost: Cost,
+    pub delay_ms: u64,
 }
 
-/// What the table shows.
+/// What the table shows, and its columns after the methods' names.
 pub const TITLE: &str = "heading error, deg";
-/// The columns after the methods' names. People see the first [`SHORT`] ones.
-const COLUMNS: [(&str, usize); 9] = [
-    ("in 1 s", 12),
-    ("in 60 s", 12),
-    ("RMS", 12),
-    ("at the end", 12),
-    ("in 10 s", 10),
-    ("to static", 11),
-    ("mean, deg/h", 13),
-    ("mult./sample", 14),
-    ("delay, ms", 11),
-];
-const SHORT: usize = 4;
+pub const HEADINGS: [&str; 5] = [TITLE, "in 1 s", "in 60 s", "RMS", "at the end"];
 /// A method has failed whose error is so many times that of static initialisation.
 pub(super) const FAILED: f64 = 10.0;
 pub const MARKS: &str =
     "* best classical method of its column; ? failed: ten times static initialisation's error";
 
-/// Returns the headings of the table, and the name and figures of each method: the columns for people, or all. A dash
-/// is a missing figure; [`MARKS`] explains the marks.
-pub fn columns(rows: &PerMethod<Row>, all: bool) -> (Vec<&'static str>, Vec<Vec<String>>) {
+/// Returns the name and figures of each method. A dash is a missing figure; [`MARKS`] explains the marks.
+pub fn figures(rows: &PerMethod<Row>) -> Vec<Vec<String>> {
     let errors = |row: &Row| {
-        let HeadingError { mean_1s_rad, mean_10s_rad, mean_60s_rad, rms_rad, final_rad } = row.error;
-        [mean_1s_rad, mean_60s_rad, rms_rad, final_rad, mean_10s_rad]
+        let HeadingError { mean_1s_rad, mean_60s_rad, rms_rad, final_rad, .. } = row.error;
+        [mean_1s_rad, mean_60s_rad, rms_rad, final_rad]
     };
     let still = &rows[Method::STATIC];
-    let best: [Option<f64>; 5] = std::array::from_fn(|column| {
+    let best: [Option<f64>; 4] = std::array::from_fn(|column| {
         let errors = Method::CLASSICAL.into_iter().filter_map(|method| errors(&rows[method])[column]);
         errors.min_by(f64::total_cmp)
     });
@@ -95,23 +78,15 @@ pub fn columns(rows: &PerMethod<Row>, all: bool) -> (Vec<&'static str>, Vec<Vec<
         let has_failed =
             method != Method::RAW && row.error.rms_rad > still.error.rms_rad.map(|rms| FAILED * rms);
         let mut figures = vec![method.name.to_owned()];
-        for ((error, best), decimals) in errors(row).into_iter().zip(best).zip([4, 3, 3, 3, 3]) {
+        for ((error, best), decimals) in errors(row).into_iter().zip(best).zip([4, 3, 3, 3]) {
             let is_best = error == best && Method::CLASSICAL.contains(&method);
             let mark = [" ", "*", "?"][if has_failed { 2 } else { usize::from(is_best) }];
             let figure = error.map(|rad| format!("{:.decimals$}{mark}", rad.to_degrees()));
             figures.push(figure.unwrap_or_else(|| "- ".to_owned()));
         }
-        let to_static = row.error.compared().zip(still.error.compared()).map(|(own, still)| own / still);
-        figures.push(to_static.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.3}")));
-        figures.push(format!("{:+.1}", row.mean_correction_deg_h));
-        figures.push(format!("{:.0}", row.cost.multiplications_per_sample));
-        figures.push(row.cost.delay_ms.to_string());
-        figures.truncate(1 + if all { COLUMNS.len() } else { SHORT });
         figures
     });
-    let figures: Vec<_> = figures.collect();
-    let shown = figures.first().map_or(0, Vec::len);
-    (std::iter::once(TITLE).chain(COLUMNS.map(|(name, _)| name)).take(shown).collect(), figures)
+    figures.collect()
 }
 
 /// Comparison of one of our rates with the best classical method that has the same inputs and no more delay.
@@ -133,9 +108,9 @@ impl Comparisons {
     /// Compares the rates; `None` if there is no error to compare.
     pub fn new(rows: &PerMethod<Row>) -> Option<Self> {
         let compare = |ours: Method| {
-            let Row { error, cost, .. } = rows[ours];
+            let Row { error, delay_ms } = rows[ours];
             let classical = Method::CLASSICAL.into_iter();
-            let as_fast = classical.filter(|method| rows[*method].cost.delay_ms <= cost.delay_ms);
+            let as_fast = classical.filter(|method| rows[*method].delay_ms <= delay_ms);
             let errors = as_fast.filter_map(|method| Some((method, rows[method].error.compared()?)));
             let (best, least) = errors.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
             Some(Comparison { best_classical: best.key, ratio: error.compared()? / least })
@@ -179,7 +154,7 @@ impl DriveErrors {
     /// Runs every method on a drive and compares the rates with its reference. Each sample is passed to `visit`.
     pub fn of(
         drive: &Drive<'_>,
-        networks: &mut Networks<'_>,
+        networks: Networks<'_>,
         mut visit: impl FnMut(&Sample),
     ) -> Result<Self, EvaluateError> {
         let mut judges = Judges::default();
@@ -198,21 +173,15 @@ impl DriveErrors {
             Some(line) => return Err(EvaluateError::NoReference { path: path(), line }),
         };
         let errors = PerMethod::of(judged);
-        if let Some(rad) = errors.get(Method::STATIC).and_then(|errors| errors.typical_10s)
-            && rad > PLAUSIBLE_10S_RAD
-        {
+        let Some(still) = errors.get(Method::STATIC) else {
+            return Err(EvaluateError::TooShort { path: path(), column: reference, seconds });
+        };
+        if let Some(rad) = still.typical_10s.filter(|rad| *rad > PLAUSIBLE_10S_RAD) {
             return Err(EvaluateError::Disagrees { path: path(), column: reference, rad });
         }
-        let yaw = PerMethod::of(methods.map(|method| Some(method.yaw)));
         let methods = PerMethod::new(|method| {
-            let mean_correction_deg_h =
-                (yaw[method] - yaw[Method::STATIC_ZERO_RATE]).to_degrees() / seconds * 3600.0;
-            let (error, cost) = (errors.get(method)?.figures, *comparison.costs.get(method)?);
-            Some(Row { error, mean_correction_deg_h, cost })
+            Some(Row { error: errors.get(method)?.figures, delay_ms: method.delay_ms() })
         });
-        if methods.each().count() < comparison.costs.each().count() {
-            return Err(EvaluateError::TooShort { path: path(), column: reference, seconds });
-        }
         Ok(Self {
             name: drive.name().to_owned(),
             set: recording::set(Path::new(&drive.path)),
@@ -244,8 +213,6 @@ struct Judges {
 struct Judge {
     rate: AgainstRate,
     course: AgainstCourse,
-    /// The integral of the rate.
-    yaw: f64,
 }
 
 impl Judges {
@@ -264,7 +231,6 @@ impl Judges {
         }
         for (judge, rate) in self.methods.iter_mut().zip(sample.rates.values()) {
             let Some(rate) = *rate else { continue };
-            judge.yaw += rate * DT;
             if let Some(truth) = row.reference {
                 judge.rate.add(rate, truth);
             }
@@ -284,13 +250,14 @@ pub struct Mean {
 
 impl Mean {
     fn new(set: &str, drives: &[&DriveErrors]) -> Option<Self> {
-        let count = (!drives.is_empty()).then_some(drives.len() as f64)?;
+        if drives.is_empty() {
+            return None;
+        }
         let methods = PerMethod::new(|method| {
             let rows: Vec<Row> =
                 drives.iter().map(|drive| drive.methods.get(method).copied()).collect::<Option<_>>()?;
             let error = HeadingError::mean(&rows.iter().map(|row| row.error).collect::<Vec<_>>());
-            let mean_correction_deg_h = rows.iter().map(|row| row.mean_correction_deg_h).sum::<f64>() / count;
-            Some(Row { error, mean_correction_deg_h, cost: rows[0].cost })
+            Some(Row { error, delay_ms: method.delay_ms() })
         });
         let over_best_classical = Comparisons::new(&methods);
         Some(Self { set: set.to_owned(), drives: drives.len(), over_best_classical, methods })
@@ -323,7 +290,6 @@ impl Report {
     }
 }
 
-/// The alternate form has all columns.
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for drive in &self.drives {
@@ -363,7 +329,7 @@ fn table(f: &mut fmt::Formatter<'_>, ours: Option<Comparisons>, rows: &PerMethod
     writeln!(f)
 }
 
-/// The table of a drive or of a mean; the alternate form has all columns.
+/// The table of a drive or of a mean.
 pub struct Table<'a> {
     pub rows: &'a PerMethod<Row>,
     /// Only the gyro alone, static initialisation without and with zero-rate updates, the best classical methods, and the
@@ -373,18 +339,15 @@ pub struct Table<'a> {
 
 impl fmt::Display for Table<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (headings, mut rows) = columns(self.rows, f.alternate());
+        let mut rows = figures(self.rows);
         let always = [Method::RAW, Method::STATIC, Method::STATIC_ZERO_RATE, Method::LIVE, Method::DELAYED];
         let always = always.map(|method| method.name);
         let is_best = |row: &[String]| row.iter().any(|figure| figure.ends_with('*'));
         rows.retain(|row| !self.few || is_best(row) || always.contains(&row[0].as_str()));
-        rows.insert(0, headings.into_iter().map(String::from).collect());
+        rows.insert(0, HEADINGS.map(String::from).into());
         for row in rows {
             let mut line = format!("  {:<26}", row[0]);
-            row[1..]
-                .iter()
-                .zip(COLUMNS)
-                .for_each(|(figure, (_, width))| line += &format!("{figure:>width$}"));
+            row[1..].iter().for_each(|figure| line += &format!("{figure:>12}"));
             writeln!(f, "{}", line.trim_end())?;
         }
         Ok(())
@@ -418,11 +381,7 @@ mod tests {
                 Method::DELAYED => 70,
                 _ => 0,
             };
-            Some(Row {
-                error,
-                mean_correction_deg_h: -3.0,
-                cost: Cost { multiplications_per_sample: 6.0, delay_ms },
-            })
+            Some(Row { error, delay_ms })
         });
         DriveErrors {
             name: format!("drive{k}"),
@@ -454,8 +413,7 @@ mod tests {
         due.sort_unstable();
         assert_eq!(names, due);
         let row = json["drives"][1]["methods"]["default"].as_object().unwrap();
-        let mut due = vec!["mean_1s_rad", "mean_10s_rad", "mean_60s_rad", "rms_rad", "final_rad"];
-        due.extend(["mean_correction_deg_h", "multiplications_per_sample", "delay_ms"]);
+        let mut due = vec!["mean_1s_rad", "mean_10s_rad", "mean_60s_rad", "rms_rad", "final_rad", "delay_ms"];
         due.sort_unstable();
         assert_eq!(row.keys().map(String::as_str).collect::<Vec<_>>(), due);
         assert!(row["mean_1s_rad"].is_null() && row["mean_10s_rad"].is_null());
@@ -489,10 +447,8 @@ mod tests {
         // The table has three drives and one mean of two.
         assert_eq!(widths.len(), 4 * (1 + Method::ON_A_DRIVE.len()));
         assert!(widths.iter().all(|width| (75..=76).contains(width)), "{text}");
-        let all = format!("{:#}", report());
-        assert!(rows(&all).iter().all(|width| *width == rows(&all)[0]) && all.contains("delay, ms"), "{all}");
         let fir = lines.iter().find(|line| line.contains(Method::FIR_ZERO_RATE.name)).unwrap();
-        assert_eq!(fir.matches('*').count(), SHORT, "best in each column: {fir}");
+        assert_eq!(fir.matches('*').count(), 4, "best in each column: {fir}");
         assert!(text.contains("mean of 2 drives of a") && !text.contains("mean of 1"), "{text}");
     }
 }

@@ -8,23 +8,9 @@
 //! and 0.5 m/s^2 for 1.5 s. On drives the bias estimate in motion is off: it assumes that accelerations average out
 //! in 3 s, which a car's do not, and makes the 1 s error 1.5 times as large on the training drives.
 
-use super::metrics::wrap;
+use super::angle::wrap;
 use crate::drive::DT;
 use vqf_rs::{Quaternion, VQF};
-
-/// Multiplications of a second-order low pass per value.
-const LOW_PASS: usize = 5;
-/// Multiplications of a quaternion product (16) and of normalising the result (8).
-const QUATERNION: usize = 16 + 8;
-/// Multiplications of converting a quaternion to a matrix (9) and of rotating a vector by the matrix (9).
-const ROTATION: usize = 9 + 9;
-
-/// Multiplications and divisions per sample without the bias estimate in motion, in the order of the algorithm: rest
-/// detection, strapdown integration, acceleration in the inertial frame, inclination.
-pub const MULTIPLICATIONS: usize = (6 * LOW_PASS + 2 * 3)
-    + (3 + 6 + QUATERNION)
-    + (ROTATION + 3 * LOW_PASS)
-    + (ROTATION + 6 + 4 + QUATERNION);
 
 /// A filter at work, and its newest heading.
 pub struct Heading {

@@ -129,11 +129,6 @@ impl Checkpoint<GyroNet> {
 }
 
 impl Checkpoint<FogNet> {
-    /// Returns whether a file is a checkpoint of FoGNet, by the names of its tensors.
-    pub fn is_in(path: &Path) -> Result<bool, CheckpointError> {
-        Tensors::names(path).map(|names| names.iter().any(|name| name == "fc4.weight"))
-    }
-
     /// Returns the f32 network over these tensors.
     pub fn network(&self) -> FogNetF32<'_> {
         let dense = |name: &str| {

@@ -1,8 +1,7 @@
-//! The command line as a whole: help, exit statuses, colours, completions.
+//! The command line as a whole: help, exit statuses and colours.
 
 use super::{column, command, gyronet, gyronet_in, scratch, text};
-use std::io::Write as _;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 /// Names of the subcommands, from the help itself.
 fn subcommands() -> Vec<String> {
@@ -53,7 +52,6 @@ fn wrong_arguments_are_status_2_and_failures_1() {
         &["replay", "a.csv", "--via", "icm42688"],
         &["simulate", "--out", "a.csv", "--seconds", "1"],
         &["device", "info"],
-        &["evaluate", "a.csv", "--lags", "--all"],
     ] {
         let output = gyronet(wrong);
         assert_eq!(output.status.code(), Some(2), "{wrong:?}: {}", text(&output.stderr));
@@ -84,7 +82,6 @@ fn json_is_json_and_quiet_is_quiet() {
     for (arguments, field) in [
         (&["simulate", "--seconds", "12", "--out", &drive][..], "samples"),
         (&["evaluate", &drive], "drives"),
-        (&["evaluate", "--lags", &drive], "drives"),
         (&["replay", &drive, "--out", &log], "frames"),
     ] {
         let output = gyronet(&[arguments, &["--json"]].concat());
@@ -117,46 +114,13 @@ fn colours_are_for_terminals() {
 }
 
 #[test]
-fn shells_complete_every_subcommand() {
-    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
-        let output = gyronet(&["completions", shell]);
-        let script = text(&output.stdout);
-        assert!(output.status.success(), "{shell}");
-        for name in subcommands() {
-            assert!(script.contains(&name), "{shell}: {name}");
-        }
-    }
-}
-
-#[test]
-fn bash_completes() {
-    if Command::new("bash").arg("--version").output().is_err() {
-        // Not `eprintln!`: the test harness would keep it to itself.
-        writeln!(std::io::stderr(), "SKIPPED bash_completes: no bash").unwrap();
-        return;
-    }
-    let script = "source /dev/stdin\nCOMP_WORDS=(gyronet ev); COMP_CWORD=1\n_gyronet gyronet ev gyronet\necho \"${COMPREPLY[@]}\"";
-    let completions = gyronet(&["completions", "bash"]).stdout;
-    let path = format!("{}/completions.bash", env!("CARGO_TARGET_TMPDIR"));
-    std::fs::write(&path, completions).unwrap();
-    let script = script.replace("/dev/stdin", &path);
-    let output = Command::new("bash").args(["--norc", "-c", &script]).output().unwrap();
-    assert_eq!(text(&output.stdout).trim(), "evaluate", "{}", text(&output.stderr));
-}
-
-#[test]
 fn retired_names_say_what_does_their_work() {
     for (retired, successor) in [
         (&["campaign", "--upsets"][..], "--bin situations"),
-        (&["--json", "soak"], "--bin situations"),
         (&["paper", "KAIST", "--out", "OUT"], "make -f tools/paper/Makefile"),
-        (&["tables", "SEQUENCES"], "cargo paper tables"),
         (&["train", "DRIVES"], "python -m gyronet_train.linear"),
-        (&["bus", "--can"], "gyronet device set"),
         (&["device", "calibrate", "mounting", "--store"], "the board itself"),
-        (&["device", "calibrate", "static"], "the board itself"),
         (&["device", "log"], "`device info`"),
-        (&["warm-up"], "gyronet simulate --trip motorway"),
         (&["bench-target", "--policies"], "cargo bringup"),
         (&["demo", "--image"], "--test board"),
         (&["monitor", "can.log"], "cantools decode"),
@@ -164,8 +128,8 @@ fn retired_names_say_what_does_their_work() {
         (&["simulate", "--layout", "kaist", "--out", "OUT"], "cargo paper simulate"),
         (&["import", "urban06", "--training", "--out", "a.csv"], "cargo paper import"),
         (&["doctor", "drive.csv", "--out", "page.html"], "gyronet doctor --json"),
-        (&["evaluate", "drive.csv", "--ablation"], "gyronet evaluate"),
         (&["replay", "drive.csv", "--mcap", "drive.mcap"], "gyronet correct"),
+        (&["evaluate", "drive.csv", "--lags"], "`compensate.lag`"),
         (&["import", "kaist", "urban06"], "cargo paper import urban06"),
         (&["import", "nclt", "2012-01-08"], "reads KAIST Complex Urban"),
     ] {

@@ -102,7 +102,7 @@ pub(super) struct Unwrap {
 impl Unwrap {
     pub fn angle(&mut self, angle: f64) -> f64 {
         let last = self.last.unwrap_or(angle);
-        let unwrapped = last + gyronet_tools::evaluate::metrics::wrap(angle - last);
+        let unwrapped = last + gyronet_tools::evaluate::angle::wrap(angle - last);
         self.last = Some(unwrapped);
         unwrapped
     }

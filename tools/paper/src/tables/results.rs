@@ -4,9 +4,11 @@ use super::estimate::{Estimate, Places};
 use super::estimates::Estimates;
 use super::group::Group;
 use crate::sequence::Sequence;
+use gyronet_tools::drive::DT;
 use gyronet_tools::drive::track::Track;
+use gyronet_tools::evaluate::angle::wrap;
+use gyronet_tools::evaluate::heading_error::AgainstRate;
 use gyronet_tools::evaluate::methods::Method;
-use gyronet_tools::evaluate::metrics::YawError;
 use gyronet_tools::evaluate::trajectory_error::{Point, TrajectoryError};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -84,7 +86,7 @@ impl SequenceErrors {
             name: sequence.name.clone(),
             simulated: sequence.simulated.is_some(),
             group: Group::of(sequence),
-            seconds: steps.len() as f64 * gyronet_tools::drive::DT,
+            seconds: steps.len() as f64 * DT,
             metres: steps.iter().map(|step| (step.wheels[0] + step.wheels[1]).abs() / 2.0).sum(),
             refused: estimates.refused.clone(),
             left_out: estimates.left_out.iter().map(|(method, why)| (method.key, why.clone())).collect(),
@@ -99,15 +101,16 @@ impl Errors {
     fn new(turns: &[f64], estimate: &Estimate, points: &[Point], truth: &[Point]) -> Option<Self> {
         // A given trajectory may end before the sequence.
         let (turns, truth) = (turns.get(..points.len())?, truth.get(..points.len())?);
-        let rates =
-            |turns: &[f64]| turns.iter().map(|turn| turn / gyronet_tools::drive::DT).collect::<Vec<f64>>();
-        let yaw = YawError::new(&rates(&estimate.turns), &rates(turns))?;
+        let mut yaw = AgainstRate::default();
+        estimate.turns.iter().zip(turns).for_each(|(turn, truth)| yaw.add(turn / DT, truth / DT));
+        let yaw = yaw.errors()?.figures;
+        let final_rad = yaw.final_rad?;
         let ate = TrajectoryError::new(points, truth)?;
         let aligned = TrajectoryError::aligned(points, truth)?;
         Some(Self {
-            mean_1s_rad: yaw.mean_1s_rad,
-            final_rad: yaw.final_rad,
-            final_unwrapped_rad: yaw.final_unwrapped_rad,
+            mean_1s_rad: yaw.mean_1s_rad?,
+            final_rad: wrap(final_rad).abs(),
+            final_unwrapped_rad: final_rad,
             ate_m: ate.rmse_m,
             ate_mean_m: ate.mean_m,
             aligned_ate_m: aligned.rmse_m,
