@@ -2,7 +2,7 @@
 
 use super::{Device, INTERRUPTS};
 use crate::model::Blob;
-use crate::service::message::{BLOCK, Refusal};
+use crate::service::message::Refusal;
 use crate::store::slots::{Selection, SlotError, WeightSource, select};
 use crate::store::{Accepted, Slot, Upload};
 use embedded_storage::nor_flash::NorFlash;
@@ -101,17 +101,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         })
     }
 
-    /// Writes a block of the file, a whole number of words, at its offset. A repetition of the last block does no harm.
+    /// Writes a block of the file, a whole number of words, at its offset.
     pub fn weights_block(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
             let flash = device.slots.as_mut().ok_or(SlotError::NoFlash)?;
             let uploading = device.uploading.as_mut().ok_or(SlotError::NotBegun)?;
-            // A block that ends where the next one begins is a repetition.
-            let written = uploading.upload.written();
-            let repeated = bytes.len() <= BLOCK && offset.checked_add(bytes.len() as u32) == Some(written);
-            if repeated {
-                return Ok(());
-            }
             uploading.upload.block(flash, offset, bytes).map_err(|error| {
                 if let SlotError::Flash(_) = error {
                     device.uploading = None;

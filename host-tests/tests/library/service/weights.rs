@@ -12,30 +12,26 @@ use gyronet_host_tests::stored::{crc, open};
 fn weights_are_replaced() {
     let flash = Flash::default();
     let file = &weights::GYRONET.0;
-    let crc = crc(file);
     for (round, slot) in [Slot::A, Slot::B, Slot::A].into_iter().enumerate() {
         let mut board = start(&flash);
-        assert_eq!(board.weights_begin(file.len() as u32), Ok(()));
-        for (block, offset) in file.chunks(256).zip((0u32..).step_by(256)) {
-            let written = offset + block.len() as u32;
-            assert_eq!(board.weights_block(offset, block), Ok(()));
-            // The answer was lost: the same again does no harm.
-            assert_eq!(board.weights_block(offset, block), Ok(()));
-            if offset == 512 {
-                let expected = Err(Refusal::Slot(SlotError::Offset { expected: written }));
-                assert_eq!(board.weights_block(4096, &[]), expected);
-                let early = Err(Refusal::Slot(SlotError::Incomplete { written }));
-                assert_eq!(board.weights_verify(|_| ()), early);
-                assert_eq!(board.weights_activate(), early);
-            }
-        }
-        assert_eq!(board.uploaded(), None);
-        assert_eq!(board.weights_verify(|_| ()), Ok(()));
-        assert_eq!(board.uploaded(), Some((slot, crc)));
+        assert_eq!(upload(&mut board, file), Ok(()));
+        assert_eq!(board.uploaded(), Some((slot, crc(file))));
         assert_eq!(board.weights_activate(), Ok(()));
         let about = info(&mut start(&flash));
-        assert_eq!((about.weights, about.weights_crc), (WeightSource::Slot(slot), Some(crc)), "{round}");
+        assert_eq!(
+            (about.weights, about.weights_crc),
+            (WeightSource::Slot(slot), Some(crc(file))),
+            "{round}"
+        );
     }
+    let mut board = start(&flash);
+    assert_eq!(board.weights_begin(file.len() as u32), Ok(()));
+    assert_eq!(board.weights_block(0, &file[..256]), Ok(()));
+    let expected = Err(Refusal::Slot(SlotError::Offset { expected: 256 }));
+    assert_eq!([0, 4_096].map(|offset| board.weights_block(offset, &file[..256])), [expected; 2]);
+    let early = Err(Refusal::Slot(SlotError::Incomplete { written: 256 }));
+    assert_eq!([board.weights_verify(|_| ()), board.weights_activate()], [early; 2]);
+    assert_eq!(board.uploaded(), None);
     // A bad file is not accepted, and what ran before runs on.
     let mut board = start(&flash);
     let refused = upload(&mut board, &[0x55; 256]);
