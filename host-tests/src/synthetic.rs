@@ -28,6 +28,15 @@ pub fn turning(tick: u64, yaw_rate: AngularRate) -> ImuSample {
     }
 }
 
+/// Adds white noise of these sigmas, rad/s and m/s^2, to every axis.
+pub fn noisy(mut sample: ImuSample, [gyro, accelerometer]: [f64; 2], noise: &mut Noise) -> ImuSample {
+    for axis in 0..3 {
+        sample.angular_rate[axis].0 += rate(gyro * noise.normal()).0;
+        sample.specific_force[axis].0 += force(accelerometer * noise.normal()).0;
+    }
+    sample
+}
+
 /// Returns a sample of a vehicle that stands with its engine running: a 27 Hz shake and its overtone on every axis,
 /// with some noise; `bias` (rad/s) on every gyro axis.
 pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {

@@ -13,8 +13,7 @@ use gyronet::can::status::{Evidence, Knowledge, STATUS_ID, SlowStatus, StatusEnc
 use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Faults, Quality, RateMessage, Source};
 use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
-use proptest::prelude::*;
-use proptest::sample::select;
+use gyronet_host_tests::noise::Noise;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
@@ -255,47 +254,37 @@ fn the_slow_status_means_what_the_file_says() {
     }
 }
 
-fn any_sample() -> impl Strategy<Value = VehicleSample> {
-    let source = select(&[Source::Raw, Source::Static, Source::Model, Source::EarthRate]);
-    let quality = select(&[Quality::Good, Quality::Degraded, Quality::Initialising, Quality::Unusable]);
-    // A little beyond what the coarse signals hold.
-    let rate = || (-500_000_000..500_000_000).prop_map(AngularRate);
-    let force = || (-50_000_000..50_000_000).prop_map(SpecificForce);
-    let live = (rate(), quality.clone()).prop_map(|(rate, quality)| YawEstimate {
+/// A sample of anything, a little beyond what the coarse signals hold.
+fn any_sample(noise: &mut Noise) -> VehicleSample {
+    let mut up_to = |size: i64| noise.int(-size, size) as i32;
+    let [rate, live, roll, pitch] = [(); 4].map(|()| AngularRate(up_to(500_000_000)));
+    let [correction, sigma] = [17_000_000, 1_600_000].map(|size| AngularRate(up_to(size)));
+    let specific_force = [(); 3].map(|()| SpecificForce(up_to(50_000_000)));
+    let temperature = CentiCelsius(5_000 + up_to(11_000) as i16);
+    let latency = up_to(150_000) as u32;
+    let bits = noise.bits();
+    let one_of_four = |at: u64| (bits >> at & 3) as usize;
+    let qualities = [Quality::Good, Quality::Degraded, Quality::Initialising, Quality::Unusable];
+    let delayed = YawEstimate {
         rate,
-        quality,
+        correction,
+        yaw: Yaw(noise.bits() as i64),
+        sigma: Some(sigma).filter(|_| one_of_four(0) > 0),
+        source: [Source::Raw, Source::Static, Source::Model, Source::EarthRate][one_of_four(2)],
+        quality: qualities[one_of_four(4)],
+        faults: Faults(noise.byte()),
+        latency_us: Some(latency % 300_000).filter(|_| one_of_four(6) > 0),
         ..YawEstimate::default()
-    });
-    let yaw = (
-        (rate(), rate(), any::<i64>(), proptest::option::of(rate())),
-        (source, quality, any::<u8>(), proptest::option::of(0..300_000_u32)),
-    )
-        .prop_map(|((rate, correction, yaw, sigma), (source, quality, faults, latency_us))| {
-            YawEstimate {
-                rate,
-                correction,
-                yaw: Yaw(yaw),
-                sigma,
-                source,
-                quality,
-                faults: Faults(faults),
-                latency_us,
-                ..YawEstimate::default()
-            }
-        });
-    let force = [force(), force(), force()];
-    let temperature = proptest::option::of(-6000..16_000_i16);
-    (live, yaw, [rate(), rate()], force, temperature, any::<u32>()).prop_map(
-        |(live, delayed, [roll_rate, pitch_rate], specific_force, temperature, tick)| VehicleSample {
-            live,
-            delayed,
-            roll_rate,
-            pitch_rate,
-            specific_force,
-            temperature: temperature.map(CentiCelsius),
-            tick,
-        },
-    )
+    };
+    VehicleSample {
+        live: YawEstimate { rate: live, quality: qualities[one_of_four(8)], ..YawEstimate::default() },
+        delayed,
+        roll_rate: roll,
+        pitch_rate: pitch,
+        specific_force,
+        temperature: Some(temperature).filter(|_| one_of_four(10) > 0),
+        tick: noise.bits() as u32,
+    }
 }
 
 fn close(a: f64, b: f64, tolerance: f64) {
@@ -322,69 +311,70 @@ fn compare_bosch(frame: &DataFrame, names: [&str; 6], due: (AngularRate, Specifi
     }
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+/// The file decodes every frame to what the codecs decode, and to what was put in.
+#[test]
+fn frames_mean_what_the_file_says() {
+    let (mut encoder, mut noise) = (encoder(), Noise::new(1));
+    for _ in 0..5_000 {
+        let sample = &any_sample(&mut noise);
+        let frames = encoder.encode(sample);
+        let [tx1, tx2, tx3, rate, angle, detail] = frames.as_slice() else { panic!("six frames") };
+        let [forward, left, up] = sample.specific_force;
+        let negated = AngularRate(-sample.roll_rate.0);
+        let names = ["YawRate", "YawRate_STAT", "AY", "AY_STAT", "MSG_CNT_TX1", "CRC_TX1"];
+        compare_bosch(tx1, names, (sample.live.rate, left), sample.tick);
+        let names = ["RollRate", "RollRate_STAT", "AX", "AX_STAT", "MSG_CNT_TX2", "CRC_TX2"];
+        compare_bosch(tx2, names, (negated, forward), sample.tick);
+        let names = ["PitchRate", "PitchRate_STAT", "AZ", "AZ_STAT", "MSG_CNT_TX3", "CRC_TX3"];
+        compare_bosch(tx3, names, (sample.pitch_rate, up), sample.tick);
+        if let Some(CentiCelsius(centi)) = sample.temperature
+            && (-5000..=15_000).contains(&centi)
+        {
+            close(decode(tx1)["TEMP"].1, f64::from(centi) / 100.0, 0.51);
+        }
 
-    /// The file decodes every frame to what the codecs decode, and to what was put in.
-    #[test]
-    fn frames_mean_what_the_file_says(samples in proptest::collection::vec(any_sample(), 1..4)) {
-            let mut encoder = encoder();
-        for sample in &samples {
-            let frames = encoder.encode(sample);
-            let [tx1, tx2, tx3, rate, angle, detail] = frames.as_slice() else {
-                return Err(TestCaseError::fail("six frames"));
-            };
-            let [forward, left, up] = sample.specific_force;
-            let negated = AngularRate(-sample.roll_rate.0);
-            let names = ["YawRate", "YawRate_STAT", "AY", "AY_STAT", "MSG_CNT_TX1", "CRC_TX1"];
-            compare_bosch(tx1, names, (sample.live.rate, left), sample.tick);
-            let names = ["RollRate", "RollRate_STAT", "AX", "AX_STAT", "MSG_CNT_TX2", "CRC_TX2"];
-            compare_bosch(tx2, names, (negated, forward), sample.tick);
-            let names = ["PitchRate", "PitchRate_STAT", "AZ", "AZ_STAT", "MSG_CNT_TX3", "CRC_TX3"];
-            compare_bosch(tx3, names, (sample.pitch_rate, up), sample.tick);
-            if let Some(CentiCelsius(centi)) = sample.temperature && (-5000..=15_000).contains(&centi) {
-                close(decode(tx1)["TEMP"].1, f64::from(centi) / 100.0, 0.51);
-            }
+        for (frame, name) in [(rate, "Rate"), (angle, "Angle"), (detail, "Detail")] {
+            let decoded = decode(frame);
+            let [crc, counter, samples, ..] = frame.data() else { continue };
+            assert_eq!(decoded[&format!("{name}_CRC")].0, i64::from(*crc));
+            assert_eq!(decoded[&format!("{name}_Counter")].0, i64::from(*counter));
+            assert_eq!(decoded[&format!("{name}_SampleCounter")].0, i64::from(*samples));
+        }
 
-            for (frame, name) in [(rate, "Rate"), (angle, "Angle"), (detail, "Detail")] {
-                let decoded = decode(frame);
-                let [crc, counter, samples, ..] = frame.data() else { continue };
-                prop_assert_eq!(decoded[&format!("{name}_CRC")].0, i64::from(*crc));
-                prop_assert_eq!(decoded[&format!("{name}_Counter")].0, i64::from(*counter));
-                prop_assert_eq!(decoded[&format!("{name}_SampleCounter")].0, i64::from(*samples));
-            }
+        let decoded = decode(rate);
+        let message = RateMessage::parse(rate.data()).expect("a rate message");
+        assert_eq!(decoded["Rate"].0, i64::from(message.rate));
+        assert_eq!(decoded["Source"].0, sample.delayed.source as i64);
+        assert_eq!(decoded["Quality"].0, sample.delayed.quality as i64);
+        if let Some(sent) = message.deg_per_sec() {
+            close(decoded["Rate"].1, sent, 1e-9);
+            close(sent, sample.delayed.rate.rad_per_sec().to_degrees(), 1.1e-6);
+        }
 
-            let decoded = decode(rate);
-            let message = RateMessage::parse(rate.data()).expect("a rate message");
-            prop_assert_eq!(decoded["Rate"].0, i64::from(message.rate));
-            prop_assert_eq!(decoded["Source"].0, sample.delayed.source as i64);
-            prop_assert_eq!(decoded["Quality"].0, sample.delayed.quality as i64);
-            if let Some(sent) = message.deg_per_sec() {
-                close(decoded["Rate"].1, sent, 1e-9);
-                close(sent, sample.delayed.rate.rad_per_sec().to_degrees(), 1.1e-6);
-            }
+        let decoded = decode(angle);
+        let message = AngleMessage::parse(angle.data()).expect("an angle message");
+        assert_eq!(decoded["Yaw"].0, i64::from(message.yaw));
+        close(decoded["Yaw"].1, message.deg(), 1e-12);
 
-            let decoded = decode(angle);
-            let message = AngleMessage::parse(angle.data()).expect("an angle message");
-            prop_assert_eq!(decoded["Yaw"].0, i64::from(message.yaw));
-            close(decoded["Yaw"].1, message.deg(), 1e-12);
-
-            let decoded = decode(detail);
-            let message = DetailMessage::parse(detail.data()).expect("a detail message");
-            prop_assert_eq!(decoded["Correction"].0, i64::from(message.correction));
-            prop_assert_eq!(decoded["ExpectedError"].0, i64::from(message.sigma));
-            prop_assert_eq!(decoded["Latency"].0, i64::from(message.latency));
-            if let Some(sigma) = sample.delayed.sigma && message.sigma < u16::MAX - 1 {
-                // Rounded up to the next step of 1e-5 deg/s.
-                let beyond = decoded["ExpectedError"].1 - sigma.rad_per_sec().abs().to_degrees();
-                prop_assert!((-1e-9..1.001e-5).contains(&beyond), "{beyond}");
-            }
-            if message.correction.abs() < i16::MAX {
-                close(decoded["Correction"].1, sample.delayed.correction.rad_per_sec().to_degrees(), 2.1e-4);
-            }
-            if let Some(us) = sample.delayed.latency_us && us <= 127_000 {
-                close(decoded["Latency"].1, f64::from(us) / 1000.0, 0.5);
-            }
+        let decoded = decode(detail);
+        let message = DetailMessage::parse(detail.data()).expect("a detail message");
+        assert_eq!(decoded["Correction"].0, i64::from(message.correction));
+        assert_eq!(decoded["ExpectedError"].0, i64::from(message.sigma));
+        assert_eq!(decoded["Latency"].0, i64::from(message.latency));
+        if let Some(sigma) = sample.delayed.sigma
+            && message.sigma < u16::MAX - 1
+        {
+            // Rounded up to the next step of 1e-5 deg/s.
+            let beyond = decoded["ExpectedError"].1 - sigma.rad_per_sec().abs().to_degrees();
+            assert!((-1e-9..1.001e-5).contains(&beyond), "{beyond}");
+        }
+        if message.correction.abs() < i16::MAX {
+            close(decoded["Correction"].1, sample.delayed.correction.rad_per_sec().to_degrees(), 2.1e-4);
+        }
+        if let Some(us) = sample.delayed.latency_us
+            && us <= 127_000
+        {
+            close(decoded["Latency"].1, f64::from(us) / 1000.0, 0.5);
         }
     }
 }

@@ -28,42 +28,34 @@ fn all() -> [Profile; 7] {
 }
 
 #[test]
-fn frames_equal_vectors_of_the_two_byte_headers() {
+fn frames_equal_published_vectors() {
     use DataIdMode::{Alternating, Both, Low, Nibble};
     let vectors = [
-        (p01(Both), 0, ZEROS, [0xCC, 0x00]),
-        (p01(Both), 1, ZEROS, [0x91, 0x01]),
-        (p01(Alternating), 0, ZEROS, [0xCE, 0x00]),
-        (p01(Alternating), 1, ZEROS, [0x02, 0x01]),
-        (p01(Low), 0, ZEROS, [0xCE, 0x00]),
-        (p01(Low), 1, ZEROS, [0x93, 0x01]),
-        (p01(Nibble), 0, ZEROS, [0x2A, 0x10]),
-        (p01(Nibble), 1, ZEROS, [0x77, 0x11]),
-        (p01(Both), 1, ONE_TO_SIX, [0x90, 0x01]),
-        (p01(Nibble), 1, ONE_TO_SIX, [0x76, 0x11]),
-        (p02(0, 0), 1, ZEROS, [0x45, 0x01]),
-        (p02(0, 1), 1, ZEROS, [0x6A, 0x01]),
-        (p02(0, 1), 2, TWO_TO_SEVEN, [0xBC, 0x02]),
-        (p02(0, 1), 1, TWO_TO_SEVEN, [0x61, 0x01]),
-        (p02(1, 1), 0, ZEROS, [0x0E, 0x00]),
+        (p01(Both), 0, ZEROS, &[0xCC, 0x00][..]),
+        (p01(Both), 1, ZEROS, &[0x91, 0x01]),
+        (p01(Alternating), 0, ZEROS, &[0xCE, 0x00]),
+        (p01(Alternating), 1, ZEROS, &[0x02, 0x01]),
+        (p01(Low), 0, ZEROS, &[0xCE, 0x00]),
+        (p01(Low), 1, ZEROS, &[0x93, 0x01]),
+        (p01(Nibble), 0, ZEROS, &[0x2A, 0x10]),
+        (p01(Nibble), 1, ZEROS, &[0x77, 0x11]),
+        (p01(Both), 1, ONE_TO_SIX, &[0x90, 0x01]),
+        (p01(Nibble), 1, ONE_TO_SIX, &[0x76, 0x11]),
+        (p02(0, 0), 1, ZEROS, &[0x45, 0x01]),
+        (p02(0, 1), 1, ZEROS, &[0x6A, 0x01]),
+        (p02(0, 1), 2, TWO_TO_SEVEN, &[0xBC, 0x02]),
+        (p02(0, 1), 1, TWO_TO_SEVEN, &[0x61, 0x01]),
+        (p02(1, 1), 0, ZEROS, &[0x0E, 0x00]),
+        (p05(), 0, ZEROS, &[0x1C, 0xCA, 0x00]),
+        (p05(), 1, ZEROS, &[0xCF, 0x8D, 0x01]),
     ];
     for (profile, counter, payload, header) in vectors {
         let mut data = [0; 8];
         data[2..].copy_from_slice(&payload);
         profile.protect(&mut data, counter).expect("eight bytes");
-        assert_eq!(data[..2], header, "{profile:?} counter {counter}");
-        assert_eq!(data[2..], payload);
+        assert_eq!(data[..header.len()], *header, "{profile:?} counter {counter}");
+        assert_eq!(data[3..], payload[1..]);
         assert_eq!(profile.check(&data), Ok(counter));
-    }
-}
-
-#[test]
-fn frames_equal_vectors_of_profile_5() {
-    for (counter, header) in [(0, [0x1C, 0xCA, 0x00]), (1, [0xCF, 0x8D, 0x01])] {
-        let mut data = [0; 8];
-        p05().protect(&mut data, counter).expect("eight bytes");
-        assert_eq!(data[..3], header);
-        assert_eq!(p05().check(&data), Ok(counter));
     }
 }
 

@@ -1,16 +1,11 @@
-//! Courses and speeds from CAN: bytes by the documents, refusals, and the way back.
+//! Courses and speeds from CAN: bytes by the documents, and refusals.
 
 use gyronet::can::DataFrame;
 use gyronet::can::signal::{BitField, ByteOrder};
-use gyronet::coprocessor::{Config, Coprocessor};
 use gyronet::heading::{
     Heading, HeadingError, HeadingReceiver, HeadingSettings, HeadingSignal, Received, j1939, nmea2000,
 };
-use gyronet::health::slow::Knowledge;
-use gyronet::model::Estimate;
 use gyronet::units::Micros;
-use gyronet_host_tests::sent::Sent;
-use gyronet_host_tests::winding::Winding;
 use gyronet_host_tests::wire::{data_frame, id11, id29};
 use proptest::prelude::*;
 
@@ -112,41 +107,6 @@ fn courses_of_one_sender_are_used_until_it_is_silent() {
     };
     assert!(is_used(0x09F8_0223, 0) && !is_used(0x09F8_0224, 100) && !is_used(0x18FE_E824, 4_000));
     assert!(is_used(0x18FE_E824, 5_100) && !is_used(0x09F8_0223, 5_200) && is_used(0x09F8_0224, 5_300));
-}
-
-/// A drive of two minutes with two courses a second for 90 s: its frames, its yaw error in the last 28 s, deg, and how well
-/// the bias is known.
-fn drive(heading: Option<HeadingReceiver>, has_courses: bool) -> (Vec<DataFrame>, f64, Knowledge) {
-    let (mut vehicle, mut sent) = (Winding::new(7), Sent::default());
-    let mut coprocessor = Coprocessor::new(Config { heading, ..Config::DEFAULT });
-    let mut yaws = Vec::new();
-    for tick in 0..12_000 {
-        let sample = vehicle.sample();
-        if has_courses && tick < 9_000 && tick % 50 == 0 {
-            assert_eq!(coprocessor.can(&vehicle.course(), sample.time), Ok(heading.is_some()));
-        }
-        if let Some(seen) = coprocessor.imu(sample, sample.time, &mut sent).expect("in order") {
-            yaws.push((seen.vehicle.live.tick as usize, seen.vehicle.live.yaw.rad()));
-        }
-        while let Some(due) = coprocessor.window() {
-            coprocessor.deliver(due.end, Estimate::NONE).expect("the window that is due");
-        }
-    }
-    let [(from, before), (to, after)] = [yaws[9_100], yaws[11_900]];
-    let off = (after - before) - (vehicle.headings[to] - vehicle.headings[from]);
-    let frames = sent.frames.iter().map(|sent| sent.frame).collect();
-    (frames, off.to_degrees(), coprocessor.pipeline().status(None).bias)
-}
-
-#[test]
-fn courses_on_the_bus_are_used_where_they_are_configured() {
-    let settings = HeadingSettings { nmea2000: true, ..HeadingSettings::NONE };
-    let (_, held, bias) = drive(Some(HeadingReceiver::new(settings, None)), true);
-    println!("28 s after the last course: {held:.3} deg");
-    assert!(held.abs() < 0.5 && bias == Knowledge::Fine, "{held} deg, {bias:?}");
-    let ((with, ..), (without, lost, unknown)) = (drive(None, true), drive(None, false));
-    assert!(with == without, "frames that are not configured change nothing");
-    assert!(lost.abs() > 5.0 && unknown == Knowledge::Unknown, "{lost} deg, {unknown:?}");
 }
 
 proptest! {

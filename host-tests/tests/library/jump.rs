@@ -5,7 +5,7 @@ use gyronet::coprocessor::{Config, Coprocessor, Observation};
 use gyronet::health::{Faults, Quality, Status};
 use gyronet::monitor::SensorMonitor;
 use gyronet::sample::{ImuSample, PERIOD_US};
-use gyronet::units::{AngularRate, Micros, SpecificForce};
+use gyronet::units::Micros;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::synthetic::idling;
 use gyronet_host_tests::{parallel, recordings};
@@ -168,14 +168,6 @@ fn across_a_gap_any_reading_is_believed() {
         assert_eq!(drive.coprocessor.monitor_counters().wrong, u32::from(refused));
         assert_eq!(output.vehicle.delayed.faults.with(Faults::GAP), output.vehicle.delayed.faults);
     }
-}
-
-/// The limits in physical units, by the types' own conversion.
-#[test]
-fn the_limits_are_1_and_0_3_rad_per_s_and_30_m_per_s2() {
-    assert_eq!(AngularRate::from_rad_per_sec(1.0), Ok(AngularRate(TILT_LIMIT)));
-    assert!((AngularRate(RATE_LIMIT).rad_per_sec() - 0.3).abs() < 1e-8);
-    assert_eq!(SpecificForce::from_metre_per_sec2(30.0), Ok(SpecificForce(FORCE_LIMIT)));
 }
 
 /// A sensor that shakes ever harder, with steps of up to 3 rad/s and 90 m/s^2, is believed; an axis beside it keeps

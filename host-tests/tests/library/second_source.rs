@@ -1,7 +1,7 @@
 //! Sources of the yaw rate that contradict each other: the one that is alone is doubted, and no other.
 
 use gyronet::bias::Latitude;
-use gyronet::coprocessor::{Contradiction, Observation, Sink, TimedFrame};
+use gyronet::coprocessor::Contradiction;
 use gyronet::estimate::YawEstimate;
 use gyronet::fog::FogConfig;
 use gyronet::health::{Faults, Quality};
@@ -9,9 +9,9 @@ use gyronet::sample::{FogSample, PERIOD_US};
 use gyronet::units::{Angle, Micros};
 use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::synthetic::{force, rate, turning};
-use gyronet_host_tests::wire::{data_frame, id11};
-use gyronet_tools::drive::wheel_frames::receiver;
+use gyronet_host_tests::sent::Sent;
+use gyronet_host_tests::synthetic::{force, noisy, rate, turning};
+use gyronet_tools::drive::wheel_frames::{frame, receiver};
 
 /// Factors on what each source reads of a turn of 5 deg/s at 15 m/s: inertial gyro, fibre-optic gyro (0: none), and
 /// left and right wheel.
@@ -26,62 +26,35 @@ const EARTH: f64 = 5.419e-5;
 
 const TRUE: Read = Read { inertial: 1.0, fog: 1.0, wheels: [1.0; 2] };
 
-#[derive(Default)]
-struct Seen {
-    inertial: Vec<YawEstimate>,
-    fog: Vec<YawEstimate>,
-}
-
-impl Sink for Seen {
-    fn frame(&mut self, _frame: TimedFrame) {}
-
-    fn observed(&mut self, observation: &Observation) {
-        self.inertial.push(observation.vehicle.live);
-    }
-
-    fn fog_rate(&mut self, rate: &YawEstimate) {
-        self.fog.push(*rate);
-    }
-}
-
 /// The last rates of both gyros after 8 s of turn.
 fn turned(read: &Read) -> (YawEstimate, Option<YawEstimate>) {
-    let (rates, _) = shown(read);
-    rates
+    shown(read).0
 }
 
 /// Also what the sources showed when they last contradicted each other.
 fn shown(read: &Read) -> ((YawEstimate, Option<YawEstimate>), Contradiction) {
-    let wheels = receiver();
     let fog = FogConfig { latitude: Latitude::from_degrees(48.0), ..FogConfig::DEFAULT };
-    let config = Config { wheels: Some(wheels), fog, fog_expected: read.fog != 0.0, ..Config::DEFAULT };
-    let (mut coprocessor, mut noise, mut seen) = (Coprocessor::new(config), Noise::new(3), Seen::default());
+    let config = Config { wheels: Some(receiver()), fog, fog_expected: read.fog != 0.0, ..Config::DEFAULT };
+    let (mut coprocessor, mut noise, mut sent) = (Coprocessor::new(config), Noise::new(3), Sent::default());
     for tick in 1..=1_300 {
         let now = Micros(tick * PERIOD_US);
         let (speed, yaw) = if tick > 500 { (15.0, 5_f64.to_radians()) } else { (0.0, 0.0) };
         let axle = [-0.75, 0.75].map(|side| speed + side * yaw);
         let [left, right] = [0, 1].map(|wheel| axle[wheel] * read.wheels[wheel]);
-        let raw = |speed: f64| ((speed * 3.6 + 67.67) * 100.0).round() as u16;
-        let bytes: Vec<u8> =
-            [right, left, right, left].iter().flat_map(|speed| raw(*speed).to_be_bytes()).collect();
-        let frame = data_frame(id11(0xAA), &bytes);
-        coprocessor.can(&frame, now).expect("a good frame");
+        let wheels = frame([left, right, left, right].map(|speed| Some(3.6 * speed))).expect("all are known");
+        coprocessor.can(&wheels, now).expect("a good frame");
         let mut sample = turning(tick, rate(0.001 + yaw * read.inertial));
         sample.specific_force[1] = force(speed * yaw);
-        for axis in 0..3 {
-            sample.angular_rate[axis].0 += rate(2e-4 * noise.normal()).0;
-            sample.specific_force[axis].0 += force(2e-3 * noise.normal()).0;
-        }
-        coprocessor.imu(sample, now, &mut seen).expect("in time");
+        coprocessor.imu(noisy(sample, [2e-4, 2e-3], &mut noise), now, &mut sent).expect("in time");
         if read.fog != 0.0 {
             let angle = Angle::from_rad(((yaw + EARTH) * read.fog * 0.01 + 1e-7 * noise.normal()) as f32)
                 .expect("in range");
             let increment = [None, None, Some(angle)];
             let sample = FogSample { time: now, span: 10_000, lost: 0, increment, temperature: None };
-            coprocessor.fog(sample, now, &mut seen).expect("in order");
+            coprocessor.fog(sample, now, &mut sent).expect("in order");
         }
     }
-    let rates = (*seen.inertial.last().expect("a step"), seen.fog.last().copied());
+    let rates = (sent.seen.last().expect("a step").vehicle.live, sent.fog.last().copied());
     (rates, *coprocessor.contradiction())
 }
 

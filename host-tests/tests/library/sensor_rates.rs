@@ -9,7 +9,8 @@ use gyronet::sample::{ImuSample, NO_STAMP};
 use gyronet::units::{AngularRate, Micros, Yaw};
 use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::synthetic::{force, rate, turning};
+use gyronet_host_tests::sent::Sent;
+use gyronet_host_tests::synthetic::{noisy, rate, turning};
 
 /// A sensor and its stamps: samples a second of true time, the sensor's clock against true time, jitter of the stamps
 /// in parts of the period, and of the arrival, microseconds.
@@ -32,43 +33,28 @@ const LASTS_S: f64 = 10.0;
 fn drive(sensor: Sensor) -> (f64, Vec<Observation>, Vec<InputError>, u32) {
     let config = Config { clock_ratio: Some(ClockRatioConfig::DEFAULT), ..Config::DEFAULT };
     let (mut coprocessor, mut noise) = (Coprocessor::new(config), Noise::new(8));
-    let (mut seen, mut errors, mut turned) = (Vec::new(), Vec::new(), 0.0);
+    let (mut sent, mut errors, mut turned) = (Sent::default(), Vec::new(), 0.0);
     for k in 1..=((BEGINS_S + LASTS_S + 2.0) * sensor.hz) as u64 {
         let at = 3.0 + k as f64 / sensor.hz;
         let turns = (BEGINS_S..BEGINS_S + LASTS_S).contains(&(at - 3.0));
         turned += if turns { RATE / sensor.hz } else { 0.0 };
         let yaw_rate = if turns { RATE.to_radians() } else { 0.0 };
-        let mut sample = turning(0, rate(yaw_rate + 0.002));
-        for axis in 0..3 {
-            sample.angular_rate[axis].0 += rate(2e-4 * noise.normal()).0;
-            sample.specific_force[axis].0 += force(2e-3 * noise.normal()).0;
-        }
+        let sample = noisy(turning(0, rate(yaw_rate + 0.002)), [2e-4, 2e-3], &mut noise);
         let jitter = sensor.jitter / sensor.hz * noise.int(-1_000, 1_000) as f64 * 1e-3;
         let stamp = Micros(((at + jitter) * sensor.clock * 1e6) as u64);
         let time = if sensor.stamped { stamp } else { NO_STAMP };
         let now = Micros((at * 1e6) as u64 + noise.int(0, sensor.late_us) as u64);
-        let mut sink = Seen(&mut seen);
-        if let Err(error) = coprocessor.imu(ImuSample { time, ..sample }, now, &mut sink) {
+        if let Err(error) = coprocessor.imu(ImuSample { time, ..sample }, now, &mut sent) {
             errors.push(error);
         }
         if let Some(window) = coprocessor.window() {
             coprocessor.deliver(window.end, Estimate::NONE).expect("the window that is due");
         }
-        let _ = coprocessor.poll(now, &mut Seen(&mut seen));
+        let _ = coprocessor.poll(now, &mut sent);
     }
-    let Yaw(yaw) = seen.last().expect("a step").vehicle.live.yaw;
+    let Yaw(yaw) = sent.seen.last().expect("a step").vehicle.live.yaw;
     let degrees = (yaw as f64 / f64::from(AngularRate::PER_RAD_PER_SEC) / 100.0).to_degrees();
-    (degrees / turned, seen, errors, coprocessor.monitor_counters().clock_off)
-}
-
-struct Seen<'a>(&'a mut Vec<Observation>);
-
-impl gyronet::coprocessor::Sink for Seen<'_> {
-    fn frame(&mut self, _frame: gyronet::coprocessor::TimedFrame) {}
-
-    fn observed(&mut self, observation: &Observation) {
-        self.0.push(*observation);
-    }
+    (degrees / turned, sent.seen, errors, coprocessor.monitor_counters().clock_off)
 }
 
 fn check(sensor: Sensor) {

@@ -1,7 +1,7 @@
 //! The board's end of an SLCAN line, over a line that takes what it likes.
 
+use super::line::Line;
 use embedded_can::Frame;
-use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 use gyronet::can::config::Config;
 use gyronet::can::encoder::CanEncoder;
 use gyronet::can::slcan::host::StatusFlags;
@@ -12,64 +12,17 @@ use gyronet::units::Micros;
 use gyronet_host_tests::synthetic;
 use gyronet_host_tests::wire::{data_frame, id11};
 use proptest::prelude::*;
-use std::collections::VecDeque;
 
 /// The number of frames that may wait, as in the image.
 const QUEUE: usize = 32;
 /// Bits for a byte: start, eight, stop.
 const BITS: u32 = 10;
 
-#[derive(Debug, Default)]
-struct Line {
-    received: VecDeque<u8>,
-    /// Bytes that it still takes.
-    room: usize,
-    broken: bool,
-    sent: Vec<u8>,
-}
-
-impl ErrorType for Line {
-    type Error = ErrorKind;
-}
-
-impl ReadReady for Line {
-    fn read_ready(&mut self) -> Result<bool, ErrorKind> {
-        Ok(!self.received.is_empty())
-    }
-}
-
-impl Read for Line {
-    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, ErrorKind> {
-        let byte = self.received.pop_front();
-        byte.into_iter().zip(bytes).for_each(|(byte, slot)| *slot = byte);
-        Ok(usize::from(byte.is_some()))
-    }
-}
-
-impl WriteReady for Line {
-    fn write_ready(&mut self) -> Result<bool, ErrorKind> {
-        if self.broken { Err(ErrorKind::BrokenPipe) } else { Ok(self.room > 0) }
-    }
-}
-
-impl Write for Line {
-    fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
-        let taken = bytes.len().min(self.room).min(7);
-        self.room -= taken;
-        self.sent.extend(&bytes[..taken]);
-        Ok(taken)
-    }
-
-    fn flush(&mut self) -> Result<(), ErrorKind> {
-        Ok(())
-    }
-}
-
 fn frame(number: u64) -> DataFrame {
     data_frame(id11(0x174), &number.to_le_bytes())
 }
 
-/// Returns the lines as a host splits them: CR ends a line, BEL is an answer of its own.
+/// The lines as a host splits them: CR ends a line, BEL is an answer of its own.
 fn texts(sent: &[u8]) -> impl Iterator<Item = &[u8]> {
     sent.split(|byte| [b'\r', 7].contains(byte))
 }
@@ -82,7 +35,8 @@ fn frames(sent: &[u8]) -> Vec<DataFrame> {
 /// A minute of messages over a line of so many bit/s; how many were dropped.
 fn minute(baud: u32, hello: &[u8]) -> u32 {
     let (mut port, mut encoder) = (Port::<QUEUE>::new(500_000), CanEncoder::new(Config::DEFAULT));
-    let mut line = Line { received: hello.iter().copied().collect(), ..Line::default() };
+    let mut line = Line::default();
+    line.receive(hello);
     for tick in 0..6_000 {
         let sample = synthetic::vehicle(tick, synthetic::rate(0.1), gyronet::units::Yaw(0));
         for frame in encoder.encode(&sample) {
@@ -109,11 +63,11 @@ fn the_messages_fit_the_board_s_line() {
 #[test]
 fn commands_are_answered_between_frames() {
     let mut port = Port::<QUEUE>::new(500_000);
-    let mut line = Line { room: 10, ..Line::default() };
+    let mut line = Line::of_room(10);
     port.enqueue(frame(1), Micros(0));
     port.enqueue(frame(2), Micros(1_234_000));
     port.service(&mut line, |_| true).expect("the line holds");
-    line.received.extend(b"V\rZ1\rt0AA21A6F\r");
+    line.receive(b"V\rZ1\rt0AA21A6F\r");
     line.room = 1_000;
     let mut taken = Vec::new();
     port.service(&mut line, |frame| {
@@ -133,8 +87,8 @@ fn commands_are_answered_between_frames() {
 #[test]
 fn a_frame_that_is_not_used_is_refused_and_counted() {
     let mut port = Port::<QUEUE>::new(500_000);
-    let mut line = Line { room: 1_000, ..Line::default() };
-    line.received.extend(b"t1232AABB\rT000001232AABB\rt0AA21A6F\r");
+    let mut line = Line::of_room(1_000);
+    line.receive(b"t1232AABB\rT000001232AABB\rt0AA21A6F\r");
     port.service(&mut line, |frame| frame.data() == [0x1A, 0x6F]).expect("the line holds");
     assert_eq!(line.sent, b"\x07\x07\r");
     assert_eq!(port.refused(), 2);
@@ -143,16 +97,16 @@ fn a_frame_that_is_not_used_is_refused_and_counted() {
 #[test]
 fn the_bus_state_is_reported_beside_drops() {
     let mut port = Port::<1>::new(500_000);
-    let mut line = Line { room: 1_000, ..Line::default() };
+    let mut line = Line::of_room(1_000);
     port.set_bus(StatusFlags::BUS_ERROR);
     (0..2).for_each(|number| port.enqueue(frame(number), Micros(0)));
-    line.received.extend(b"F\rF\r");
+    line.receive(b"F\rF\r");
     port.service(&mut line, |_| true).expect("the line holds");
     // The drop once, the bus as long as it is off.
     assert!(line.sent.starts_with(b"F82\rF80\r"), "{}", line.sent.escape_ascii());
     port.set_bus(StatusFlags::default());
     line.sent.clear();
-    line.received.extend(b"F\r");
+    line.receive(b"F\r");
     port.service(&mut line, |_| true).expect("the line holds");
     assert_eq!(line.sent, b"F00\r");
 }
@@ -164,15 +118,15 @@ fn drops_are_reported_once() {
     for number in 0..5 {
         port.enqueue(frame(number), Micros(0));
     }
-    line.received.extend(b"F\rF\r");
+    line.receive(b"F\rF\r");
     line.room = 1_000;
     port.service(&mut line, |_| true).expect("the line holds");
     assert!(line.sent.starts_with(b"F02\rF00\r"), "{}", line.sent.escape_ascii());
     assert_eq!(frames(&line.sent), [frame(3), frame(4)]);
     // A host that asks and never reads: no torn answer, no growth, and it is counted.
     line.room = 0;
-    line.received.extend(b"V\r".repeat(1_000));
-    while !line.received.is_empty() {
+    line.receive(&b"V\r".repeat(1_000));
+    while !line.is_read() {
         port.service(&mut line, |_| true).expect("the line holds");
     }
     line.room = usize::MAX;
@@ -198,7 +152,7 @@ proptest! {
                 port.enqueue(frame(number), Micros(0));
                 number += 1;
             }
-            line.received.extend(said.bytes());
+            line.receive(said.as_bytes());
             (line.room, line.broken) = (room, broken);
             let before = line.sent.len();
             let _ = port.service(&mut line, |_| true);

@@ -13,7 +13,7 @@ use gyronet::units::Micros;
 use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::inputs::wheels;
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::synthetic::{force, rate, turning};
+use gyronet_host_tests::synthetic::{noisy, rate, turning};
 use gyronet_tools::drive::wheel_frames::receiver;
 
 fn coprocessor(status: Option<StatusSettings>, wheels: bool) -> Coprocessor {
@@ -22,14 +22,8 @@ fn coprocessor(status: Option<StatusSettings>, wheels: bool) -> Coprocessor {
     Coprocessor::new(Config { can, wheels, ..Config::DEFAULT })
 }
 
-/// A sample of a car at rest, with noise on every axis.
 fn parked(tick: u64, noise: &mut Noise) -> ImuSample {
-    let mut sample = turning(tick, rate(0.0));
-    for axis in 0..3 {
-        sample.angular_rate[axis] = rate(0.001 + 0.001 * noise.normal());
-        sample.specific_force[axis].0 += force(0.02 * noise.normal()).0;
-    }
-    sample
+    noisy(ImuSample { angular_rate: [rate(0.001); 3], ..turning(tick, rate(0.0)) }, [0.001, 0.02], noise)
 }
 
 /// Feeds samples of a car at rest, with a wheel frame of this speed, km/h, before each where one is given; returns the status frames.

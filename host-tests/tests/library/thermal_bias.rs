@@ -9,10 +9,12 @@ use gyronet::sample::{ImuSample, Standstill, WHEELS, WheelSample};
 use gyronet::units::{CentiCelsius, WheelSpeed};
 use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::synthetic::{force, rate, turning};
+use gyronet_host_tests::synthetic::{force, noisy, rate, turning};
 
 const BIAS: f64 = 0.004;
 const PER_KELVIN: f64 = 8.7e-5;
+/// Noise of a gyro and an accelerometer, rad/s and m/s^2.
+const NOISE: [f64; 2] = [0.001, 0.02];
 
 /// Bias of the sensor at a temperature, rad/s.
 fn bias(celsius: f64) -> f64 {
@@ -43,14 +45,11 @@ fn run(
     let mut noise = Noise::new(7);
     let outputs = (0..ticks).map(|tick| {
         let (celsius, drives) = (celsius(tick), tick >= moves);
-        let mut sample = turning(tick, rate(0.0));
         let temperature = Some(CentiCelsius((100.0 * celsius) as i16));
-        for axis in 0..3 {
-            let turn = if axis == 2 && drives { turns } else { 0.0 };
-            sample.angular_rate[axis] = rate(bias(celsius) + turn + 0.001 * noise.normal());
-            sample.specific_force[axis].0 += force(0.02 * noise.normal()).0;
-        }
-        let sample = ImuSample { temperature, ..sample };
+        let turn = if drives { turns } else { 0.0 };
+        let angular_rate = [0.0, 0.0, turn].map(|turn| rate(bias(celsius) + turn));
+        let sample = ImuSample { temperature, angular_rate, ..turning(tick, rate(0.0)) };
+        let sample = noisy(sample, NOISE, &mut noise);
         let standstill = if drives { Standstill::Moving } else { Standstill::Still };
         let speeds = [Some(WheelSpeed(0)); WHEELS];
         let wheels = WheelSample { time: sample.time, speeds, standstill };
@@ -60,7 +59,7 @@ fn run(
     (pipeline, outputs)
 }
 
-/// Returns the sigma of the bias, rad/s: no network corrects these drives.
+/// Sigma of the bias, rad/s: no network corrects these drives.
 fn bias_sigma(output: &Output) -> f64 {
     let sigma = output.vehicle.delayed.sigma.expect("known").rad_per_sec();
     let uncorrected = f64::from(UncertaintyConfig::DEFAULT.uncorrected);
@@ -118,11 +117,7 @@ fn a_first_stop_shows_the_bias_at_its_own_temperature() {
     let mut last = None;
     for tick in 0..3_420u64 {
         let (celsius, stands) = ((tick / 100).min(30) as i16, (3_000..3_400).contains(&tick));
-        let mut sample = turning(tick, rate(bias(30.0)));
-        for axis in 0..3 {
-            sample.angular_rate[axis].0 += rate(0.001 * noise.normal()).0;
-            sample.specific_force[axis].0 += force(0.02 * noise.normal()).0;
-        }
+        let sample = noisy(turning(tick, rate(bias(30.0))), NOISE, &mut noise);
         let standstill = if stands { Standstill::Still } else { Standstill::Moving };
         let wheels = WheelSample::without_speeds(standstill);
         let sample = ImuSample { temperature: Some(CentiCelsius(100 * celsius)), ..sample };
@@ -202,12 +197,10 @@ fn a_temperature_that_comes_late_makes_no_step() {
         let mut noise = Noise::new(8);
         let mut sent = Vec::new();
         for tick in 0..2_000 {
-            let mut sample = turning(tick, rate(0.0));
-            sample.temperature = (tick >= first && tick % 100 == first % 100).then_some(CentiCelsius(3_500));
-            for axis in 0..3 {
-                sample.angular_rate[axis] = rate(bias(35.0) + 0.001 * noise.normal());
-                sample.specific_force[axis].0 += force(0.02 * noise.normal()).0;
-            }
+            let temperature = (tick >= first && tick % 100 == first % 100).then_some(CentiCelsius(3_500));
+            let angular_rate = [rate(bias(35.0)); 3];
+            let sample = ImuSample { temperature, angular_rate, ..turning(tick, rate(0.0)) };
+            let sample = noisy(sample, NOISE, &mut noise);
             let seen = coprocessor.imu(sample, sample.time, &mut ()).expect("in order").expect("a step");
             let known = (tick >= first).then_some(CentiCelsius(3_500));
             assert_eq!(seen.sample.and_then(|sample| sample.temperature), known, "sample {tick}");

@@ -20,19 +20,15 @@ fn assert_sigma(found: AngularRate, rad_per_sec: f64, why: &str) {
     );
 }
 
-/// 2.5e-4 rad/s are 51 deg/h.
+/// 2.5e-4 rad/s are 51 deg/h; 2.5, 6 and 6.5 are like 3, 4 and 5, since the parts are independent.
 #[test]
-fn a_rate_that_the_network_corrects_has_less_noise() {
+fn a_rate_that_the_network_corrects_has_less_noise_and_a_bias_adds_in_squares() {
     let uncertainty = Uncertainty::new(UncertaintyConfig::DEFAULT);
-    assert_sigma(uncertainty.sigma(Origin::Network, 0.0), 1.7e-4, "corrected");
-    assert_sigma(uncertainty.sigma(Origin::Gyro, 0.0), 2.5e-4, "not corrected");
-}
-
-/// 3-4-5 and its like: the parts are independent.
-#[test]
-fn a_bias_adds_in_squares() {
-    let uncertainty = Uncertainty::new(UncertaintyConfig::DEFAULT);
-    assert_sigma(uncertainty.sigma(Origin::Gyro, 6e-4), 6.5e-4, "2.5, 6 and 6.5");
+    for (origin, bias, due) in
+        [(Origin::Network, 0.0, 1.7e-4), (Origin::Gyro, 0.0, 2.5e-4), (Origin::Gyro, 6e-4, 6.5e-4)]
+    {
+        assert_sigma(uncertainty.sigma(origin, bias), due, "at rest");
+    }
 }
 
 /// Errors that are easy to tell apart.
@@ -53,6 +49,10 @@ fn turn(uncertainty: &mut Uncertainty, seconds: f64, [x, y, z, hidden]: [f64; 4]
     }
 }
 
+fn assert_ratio(found: f64, due: f64, within: f64) {
+    assert!((found / due - 1.0).abs() < within, "{found} is not {due}");
+}
+
 fn root(squares: &[f64]) -> f64 {
     squares.iter().map(|value| value * value).sum::<f64>().sqrt()
 }
@@ -66,8 +66,7 @@ fn a_turn_is_as_uncertain_as_gain_and_mounting_until_they_are_known() {
         let due = root(&[3e-4, gain * 0.05, mounting * 0.5]);
         assert_sigma(uncertainty.sigma(Origin::Gyro, 0.0), due, "turning");
         let minute = root(&[3e-4 * 2f64.sqrt(), 2e-4, gain * 0.1, mounting * 1.0]);
-        let found = f64::from(uncertainty.minute(Missed::NOTHING));
-        assert!((found / minute - 1.0).abs() < 1e-4, "{found} is not {minute}");
+        assert_ratio(uncertainty.minute(Missed::NOTHING).into(), minute, 1e-4);
     }
 }
 
@@ -84,12 +83,10 @@ fn a_lasting_correction_may_be_another_unit_s() {
         let mut uncertainty = Uncertainty::new(ERRORS);
         uncertainty.calibrated(calibrated);
         (0..999).for_each(|_| uncertainty.add(&corrected(-2e-3)));
-        let found = uncertainty.sigma(Origin::Network, 0.0).rad_per_sec();
         let due = root(&[3e-4, share * 2e-3]);
-        assert!((found / due - 1.0).abs() < 2e-3, "{found} is not {due}");
+        assert_ratio(uncertainty.sigma(Origin::Network, 0.0).rad_per_sec(), due, 2e-3);
         let due = root(&[3e-4 * 9.99f64.sqrt(), share * 19.98e-3]);
-        let found = f64::from(uncertainty.minute(Missed::NOTHING));
-        assert!((found / due - 1.0).abs() < 1e-4, "{found} is not {due}");
+        assert_ratio(uncertainty.minute(Missed::NOTHING).into(), due, 1e-4);
     }
 }
 
@@ -121,8 +118,9 @@ fn what_the_network_takes_off_to_and_fro_may_be_the_vehicle_s_own_shake() {
     }
     found.drain(..200);
     let [least, most] = [f64::min, f64::max].map(|of| found.iter().copied().reduce(of).expect("a hundred"));
-    assert!((least / (0.7 * 2.5e-4) - 1.0).abs() < 0.1, "in the middle: {least}");
-    assert!((most / (0.7 * 2.5e-4 * 3f64.sqrt()) - 1.0).abs() < 0.1, "at its largest angle: {most}");
+    assert_ratio(least, 0.7 * 2.5e-4, 0.1);
+    // Where the second ends at the largest angle.
+    assert_ratio(most, 0.7 * 2.5e-4 * 3f64.sqrt(), 0.1);
 }
 
 #[test]
@@ -152,9 +150,8 @@ fn a_rate_that_standstill_hides_may_be_an_error_as_a_whole() {
     turn(&mut begins, 0.2, [0.0, 0.0, 0.0, 4e-3]);
     assert!(begins.sigma(Origin::Standstill, 0.0).rad_per_sec() > 2.5e-3, "a turn that begins");
     turn(&mut uncertainty, 9.0, [0.0, 0.0, 0.0, 4e-3]);
-    let found = f64::from(uncertainty.minute(Missed::NOTHING));
     // The rate counts from its first fifth of a second on.
-    assert!((found / (9.85 * root(&[4e-3, 1e-4])) - 1.0).abs() < 0.02, "{found}");
+    assert_ratio(uncertainty.minute(Missed::NOTHING).into(), 9.85 * root(&[4e-3, 1e-4]), 0.02);
 }
 
 /// A banked turn pitches the vehicle for as long as it lasts: a gyro about z misses 1 - cos of it, half of which is sigma.
@@ -163,8 +160,7 @@ fn a_turn_on_a_bank_is_as_uncertain_as_what_its_axis_misses() {
     let mut uncertainty = Uncertainty::new(ERRORS);
     turn(&mut uncertainty, 2.0, [0.0, 0.1, 0.5, 0.0]);
     let due = root(&[3e-4, 0.01 * 0.5, 0.02 * 0.1, 0.5 * 0.02 * 0.5]);
-    let found = uncertainty.sigma(Origin::Gyro, 0.0).rad_per_sec();
-    assert!((found / due - 1.0).abs() < 1e-5, "{found} is not {due}");
+    assert_ratio(uncertainty.sigma(Origin::Gyro, 0.0).rad_per_sec(), due, 1e-5);
     // Also where the turn began before the newest of the parts that a minute is counted in.
     turn(&mut uncertainty, 30.0, [0.0, 0.1, 0.5, 0.0]);
     for _ in 0..10 {
@@ -196,17 +192,12 @@ fn a_tilt_in_use_is_part_of_the_expected_error() {
         uncertainty.tilt(0.04, levelled);
         turn(&mut uncertainty, 2.0, [0.03, -0.04, 0.5, 0.0]);
         let due = root(&[3e-4, root(&[0.01, 0.02]) * 0.5, mounting * 0.05, 0.5 * 0.005 * 0.5]);
-        let found = uncertainty.sigma(Origin::Gyro, 0.0).rad_per_sec();
-        assert!((found / due - 1.0).abs() < 1e-4, "{levelled}: {found} is not {due}");
+        assert_ratio(uncertainty.sigma(Origin::Gyro, 0.0).rad_per_sec(), due, 1e-4);
     }
     let mut precise = Uncertainty::new(ERRORS);
     precise.tilt(1e-6, true);
     turn(&mut precise, 2.0, [0.3, -0.4, 0.0, 0.0]);
-    assert_sigma(
-        precise.sigma(Origin::Gyro, 0.0),
-        root(&[3e-4, 0.002 * 0.5]),
-        "no better than a calibration",
-    );
+    assert_sigma(precise.sigma(Origin::Gyro, 0.0), root(&[3e-4, 0.002 * 0.5]), "as a calibration");
 }
 
 #[test]
@@ -215,11 +206,7 @@ fn a_gain_by_courses_counts_where_it_is_better() {
     turn(&mut uncertainty, 2.0, [0.0, 0.0, 0.5, 0.0]);
     for (sigma, gain) in [(0.02, 0.01), (0.004, 0.004)] {
         uncertainty.gain(sigma);
-        assert_sigma(
-            uncertainty.sigma(Origin::Gyro, 0.0),
-            root(&[3e-4, gain * 0.5]),
-            "the better of the two",
-        );
+        assert_sigma(uncertainty.sigma(Origin::Gyro, 0.0), root(&[3e-4, gain * 0.5]), "the better one");
     }
 }
 
@@ -241,8 +228,7 @@ fn a_minute_of_a_banked_turn_misses_the_same_share_throughout() {
     let mut uncertainty = Uncertainty::new(ERRORS);
     turn(&mut uncertainty, 100.0, [0.0, 0.1, 0.5, 0.0]);
     let due = root(&[3e-4 * 60f64.sqrt(), root(&[1e-4, 0.5 * 0.02 * 0.5]) * 60.0, 0.01 * 30.0, 0.02 * 6.0]);
-    let found = f64::from(uncertainty.minute(Missed::NOTHING));
-    assert!((found / due - 1.0).abs() < 1e-3, "{found} is not {due}");
+    assert_ratio(uncertainty.minute(Missed::NOTHING).into(), due, 1e-3);
 }
 
 /// The angles that many gaps leave out of one turn add up.
@@ -264,20 +250,20 @@ fn a_minute_adds_each_error_by_its_rule_and_forgets_older_ones() {
     let minute = |uncertainty: &Uncertainty, variance: f32| {
         f64::from(uncertainty.minute(Missed { angle: 0.0, variance }))
     };
-    let close =
-        |found: f64, due: f64, why: &str| assert!((found / due - 1.0).abs() < 1e-3, "{why}: {found}, {due}");
     assert_eq!(uncertainty.minute(Missed::NOTHING), 0.0);
-    close(minute(&uncertainty, 0.25), 0.5, "an open gap");
+    // An open gap; a turn; there and back.
+    assert_ratio(minute(&uncertainty, 0.25), 0.5, 1e-3);
     turn(&mut uncertainty, 10.0, [0.0, 0.0, 0.2, 0.0]);
     let noise = |seconds: f64| [3e-4 * seconds.sqrt(), 1e-4 * seconds];
-    close(minute(&uncertainty, 0.0), root(&[root(&noise(10.0)), 0.01 * 2.0]), "a turn");
+    assert_ratio(minute(&uncertainty, 0.0), root(&[root(&noise(10.0)), 0.01 * 2.0]), 1e-3);
     turn(&mut uncertainty, 10.0, [0.0, 0.0, -0.2, 0.0]);
-    close(minute(&uncertainty, 0.0), root(&noise(20.0)), "there and back");
+    assert_ratio(minute(&uncertainty, 0.0), root(&noise(20.0)), 1e-3);
     uncertainty.miss(Missed { angle: 0.0, variance: 0.01 });
     turn(&mut uncertainty, 59.0, [0.0; 4]);
     assert!(minute(&uncertainty, 0.0) > 0.1, "a gap within the minute");
     turn(&mut uncertainty, 6.0, [0.0; 4]);
-    close(minute(&uncertainty, 0.0), root(&noise(60.0)), "over a minute later");
+    // Over a minute later.
+    assert_ratio(minute(&uncertainty, 0.0), root(&noise(60.0)), 1e-3);
 }
 
 #[test]

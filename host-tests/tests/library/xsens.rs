@@ -1,10 +1,9 @@
-//! MTData2 messages: recorded frames, readings that cannot be, packets that are missing or of
-//! another kind.
+//! MTData2 messages, alone and in a stream: recorded frames, bad readings and packets, damage, and time that wraps.
 
 use gyronet::sample::{ImuSample, Validity};
-use gyronet::sensor::xsens::{MID_MT_DATA2, MtData2, Xbus, XsensError};
+use gyronet::sensor::xsens::{MID_MT_DATA2, MtData2, Mti, Xbus, XsensError};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, RangeError, SpecificForce};
-use gyronet_host_tests::wire::{feed_new, message, real_frame, synthetic_frame};
+use gyronet_host_tests::wire::{bytes, feed, feed_new, message, real_frame, synthetic_frame};
 
 fn frame(packets: &[(u16, &[u8])]) -> Vec<u8> {
     let mut data = Vec::new();
@@ -174,4 +173,34 @@ fn a_message_is_read_as_it_was_sent_or_not_at_all() {
             assert_eq!(Xbus::parse(&damaged), None, "bit {bit}");
         }
     }
+}
+
+#[test]
+fn the_parser_resynchronises() {
+    let (first, second) = (synthetic_frame(), real_frame());
+    let expected = feed_new(second.clone());
+    for before in [
+        bytes("fa fa fa ff fa ff 36"),
+        bytes("fa ff 36 ff 00 fa ff ff fa"),
+        bytes("fa ff 36 fe"),
+        first[first.len() - 20..].to_vec(),
+        first[..20].to_vec(),
+        second[..second.len() - 1].to_vec(),
+        bytes("fa ff 30 00 d1 fa ff 3f 00 c2 fa ff 42 01 04 ba"),
+    ] {
+        // A false header may announce 254 bytes more than are there: fill up.
+        let mut samples = feed_new(before.iter().chain(&second).copied().chain([0; 260]));
+        samples.retain(|result| !matches!(result, Err(XsensError::Foreign { .. })));
+        assert_eq!(samples, expected, "after {before:02x?}");
+    }
+}
+
+#[test]
+fn time_wraps_and_steps_back() {
+    let mut mti = Mti::new();
+    let ticks = [u32::MAX - 149, u32::MAX - 49, 50, 150, 100, 250];
+    let samples = feed(&mut mti, ticks.iter().flat_map(|ticks| message(*ticks).emit()));
+    let first = u64::from(u32::MAX - 149) * 100;
+    let times: Vec<u64> = samples.iter().map(|sample| sample.unwrap().time.0 - first).collect();
+    assert_eq!(times, [0, 10_000, 20_000, 30_000, 25_000, 40_000]);
 }

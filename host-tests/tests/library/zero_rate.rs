@@ -9,7 +9,7 @@ use gyronet::standstill::{Standing, StandstillSource};
 use gyronet::units::{AngularRate, WheelSpeed};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::stream::constant;
-use gyronet_host_tests::synthetic::{force, rate, turning};
+use gyronet_host_tests::synthetic::{noisy, rate, turning};
 
 /// Bias of the gyro, rad/s, and of the network's estimates.
 const BIAS: f64 = 0.003;
@@ -19,14 +19,13 @@ fn wheels(sample: &ImuSample, standstill: Standstill) -> WheelSample {
     WheelSample { time: sample.time, speeds: [Some(WheelSpeed(0)); WHEELS], standstill }
 }
 
-/// Returns a sample of a car with its engine off: white noise on every axis.
+/// A car with its engine off.
 fn parked(tick: u64, noise: &mut Noise) -> ImuSample {
-    let mut sample = turning(tick, AngularRate::ZERO);
-    for axis in 0..3 {
-        sample.angular_rate[axis] = rate(BIAS + 0.001 * noise.normal());
-        sample.specific_force[axis].0 += force(0.02 * noise.normal()).0;
-    }
-    sample
+    noisy(
+        ImuSample { angular_rate: [rate(BIAS); 3], ..turning(tick, AngularRate::ZERO) },
+        [0.001, 0.02],
+        noise,
+    )
 }
 
 /// Runs a car that turns at `turn(tick)`, rad/s, and is quiet otherwise, with wheels that report `standstill(tick)`.
@@ -63,7 +62,7 @@ fn run_with(
     (pipeline, outputs)
 }
 
-/// Returns the expected error of the live rate, rad/s.
+/// The expected error of the live rate, rad/s.
 fn sigma(output: &Output) -> f64 {
     output.vehicle.live.sigma.expect("a rate").rad_per_sec()
 }

@@ -223,14 +223,11 @@ fn wrong_answers_cost_time_also_over_a_restart() {
         seed += 1;
         bench.seeds = vec![[seed; 32]];
         bench.stand();
-        match bench.ask(&[0x27, 1]) {
-            Some(response) if response[0] == 0x67 => *bench
-                .ask(&[&[0x27, 2][..], &answer].concat())
-                .and_then(|r| r.last().copied())
-                .as_ref()
-                .expect("a response"),
-            response => response.expect("a response")[2],
+        let mut response = bench.ask(&[0x27, 1]).expect("a response");
+        if response[0] == 0x67 {
+            response = bench.ask(&[&[0x27, 2][..], &answer].concat()).expect("a response");
         }
+        *response.last().expect("a code")
     };
     for code in [0x35, 0x35, 0x36] {
         assert_eq!(attempt(&mut bench, [0; 64]), code);
@@ -239,20 +236,14 @@ fn wrong_answers_cost_time_also_over_a_restart() {
     // A restart does not help: the delay begins again.
     let mut bench = Bench::new(&flash);
     assert_eq!(access(&mut bench), (1, 0, 3));
-    let enter = |bench: &mut Bench| bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    enter(&mut bench);
-    assert_eq!(attempt(&mut bench, [0; 64]), 0x37);
-    bench.now += 9_000;
-    enter(&mut bench);
-    assert_eq!(attempt(&mut bench, [0; 64]), 0x37);
-    bench.now += 1_000;
-    enter(&mut bench);
-    assert_eq!(attempt(&mut bench, [0; 64]), 0x36, "the fourth one");
-    bench.now += 19_000;
-    enter(&mut bench);
-    assert_eq!(attempt(&mut bench, [0; 64]), 0x37, "twenty seconds");
+    // Ten seconds, then twenty after the fourth wrong answer.
+    for (wait, code) in [(0, 0x37), (9_000, 0x37), (1_000, 0x36), (19_000, 0x37)] {
+        bench.now += wait;
+        bench.enter(3);
+        assert_eq!(attempt(&mut bench, [0; 64]), code, "{wait} ms later");
+    }
     bench.now += 1_100;
-    enter(&mut bench);
+    bench.enter(3);
     let right = key.answer(&SERIAL, &[9; 32]);
     assert_eq!(attempt(&mut bench, right), 2, "the right answer");
     assert_eq!(access(&mut bench), (2, 0, 0));
