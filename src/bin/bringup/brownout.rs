@@ -12,7 +12,6 @@ const LEVEL_3: u8 = 0b00;
 /// Polls before programming the option bytes times out; it takes as long as an erase of 16 KiB.
 const POLLS: u32 = 20_000_000;
 
-/// Returns whether the option byte holds level 3.
 pub fn is_level_3(flash: &pac::FLASH) -> bool {
     flash.optcr().read().bor_lev().bits() == LEVEL_3
 }

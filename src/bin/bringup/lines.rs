@@ -40,7 +40,6 @@ pub fn check_all(report: &mut Report, clocks: &Clocks) {
     check_dma(report, [Usart::one(), Usart::two()]);
 }
 
-/// Sends the pattern with one stream of each controller.
 fn check_dma(report: &mut Report, usarts: [Usart; 2]) {
     for usart in usarts {
         usart.request_dma();

@@ -11,10 +11,6 @@ use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 pub fn count(report: &mut Report, mut dcb: DCB, mut dwt: DWT) {
     dcb.enable_trace();
     dwt.enable_cycle_counter();
-    gyronet(report);
-}
-
-fn gyronet(report: &mut Report) {
     let Ok(blob) = Blob::new_checked(&weights::GYRONET.0) else {
         return report.fail("GyroNet", format_args!("the weight file is refused"));
     };

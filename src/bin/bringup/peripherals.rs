@@ -53,7 +53,6 @@ pub fn clock(report: &mut Report, chip: &Chip) {
     }
 }
 
-/// Reports the supply, and sets the level of the brown-out reset.
 pub fn supply(report: &mut Report, flash: &pac::FLASH) {
     if pvd::is_low() {
         report.fail("supply", format_args!("below 3.0 V"));

@@ -9,14 +9,12 @@ use core::fmt::{self, Write};
 /// Polls before a byte is dropped: several byte times at 115200 baud.
 const POLLS: u32 = 100_000;
 
-/// Prints the results, and counts the checks that have failed.
 pub struct Report {
     usart: Usart,
     failed: u32,
 }
 
 impl Report {
-    /// Starts both outputs and prints the heading.
     pub fn start(chip: &Chip) -> Self {
         rtt_target::rtt_init_print!();
         let line = &BOARD.service;

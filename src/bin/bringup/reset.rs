@@ -34,7 +34,6 @@ pub fn elapsed(cause: ResetCause) -> Option<u32> {
     (mark == WAITING && matches!(cause, ResetCause::Watchdog)).then_some(elapsed)
 }
 
-/// Reports the watchdog check, and how many checks have failed in total.
 pub fn report_result(report: &mut Report, elapsed: u32) {
     let (us, failed) = (elapsed & ((1 << TIME_BITS) - 1), elapsed >> TIME_BITS);
     if LIMITS_US.contains(&us) {

@@ -22,7 +22,6 @@ use gyronet::store::firmware::{LABEL_SIZE, Label, version};
 // SAFETY: each element belongs to one line, which `Board::start` or `gnss` starts.
 static MEMORY: [serial::Memory; 5] = [const { unsafe { serial::Memory::new() } }; 5];
 
-/// The parts of the board that the tasks own.
 pub struct Board {
     pub imu: serial::Port,
     pub fog: serial::Port,
@@ -46,7 +45,6 @@ pub struct Handlers {
 }
 
 impl Board {
-    /// Starts the chip and everything on the board; returns what tasks and interrupt handlers own.
     pub fn start(p: pac::Peripherals, systick: SYST) -> (Self, Handlers) {
         let Chip { clocks, device_id, reset } = Chip::start(&p, BOARD.crystal_hz);
         assign_pins();

@@ -87,7 +87,6 @@ fn recorded(words: &Words) -> Option<Crash> {
     Some(Crash { kind, place, link, status, address, file, count })
 }
 
-/// Records a crash and resets the chip.
 fn crash(kind: u32, [place, link, status, address]: [u32; 4], path: &str) -> ! {
     let mut words = [0; WORDS];
     let before = read().unwrap_or(words);

@@ -23,7 +23,6 @@ use gyronet::service::message::AllCounters;
 use gyronet::uds::Server;
 use gyronet::units::Micros;
 
-/// A line that testers use.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Line {
     Can,
@@ -59,7 +58,6 @@ fn ids() -> [u32; 3] {
     [request, functional, response].map(|id| id.load(Ordering::Relaxed))
 }
 
-/// Marks an identifier of 29 bits.
 const EXTENDED: u32 = 1 << 31;
 
 fn pack(id: Id) -> u32 {
@@ -84,7 +82,6 @@ pub struct Diagnosis {
     port: Port<2>,
 }
 
-/// The diagnostic server, and the line of its tester.
 struct Tester {
     server: Server,
     /// Line of the current conversation, or of the last one.

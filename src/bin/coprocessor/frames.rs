@@ -143,7 +143,6 @@ impl Outgoing {
         idle::attend();
     }
 
-    /// Lets idle work if it has got nothing for long.
     pub fn attend_if_due(&mut self) {
         if self.now.wrapping_sub(self.attended) >= STEP_MS {
             self.attend();
@@ -191,12 +190,10 @@ impl Outgoing {
         self.port.dropped().saturating_add(self.queue.dropped()).saturating_add(can::aborted())
     }
 
-    /// Returns the number of observations that idle missed.
     pub const fn overruns(&self) -> u32 {
         self.overruns
     }
 
-    /// Returns the CAN controller's error state, or [`State::Active`] without a controller.
     pub fn state(&self) -> State {
         self.can.as_ref().map_or(State::Active, Can::state)
     }
@@ -208,7 +205,6 @@ impl Outgoing {
 }
 
 impl Sink for Outgoing {
-    /// Hands an observation to idle.
     #[inline(never)]
     fn observed(&mut self, observation: &coprocessor::Observation) {
         let coprocessor::Observation { sample, vehicle, wheels, standing, vertical, .. } = observation;

@@ -32,7 +32,6 @@ pub const STEP_MS: u32 = 10;
 /// Duration of one pass over the weights, ms.
 const CHECK_MS: usize = 10_000;
 
-/// Passes a sample from the output task to idle.
 pub struct Observation {
     /// `None`: the sensor is silent.
     pub sample: Option<ImuSample>,
@@ -50,7 +49,6 @@ pub static OBSERVATIONS: Ring<Observation, 8> =
     // SAFETY: the output task writes, idle reads.
     unsafe { Ring::new() };
 
-/// True once something has come for idle.
 static ATTENTION: AtomicBool = AtomicBool::new(false);
 
 /// Lets idle work when it next runs: an observation or a frame of a tester has come, or [`STEP_MS`] have passed.
@@ -58,7 +56,6 @@ pub fn attend() {
     ATTENTION.store(true, Ordering::Relaxed);
 }
 
-/// Faults that the idle task has found, for the coprocessor.
 pub struct Found {
     weights_damaged: bool,
     mount_moved: bool,
@@ -121,7 +118,6 @@ impl Idle {
         }
     }
 
-    /// Returns whether [`Self::step`] is to be called now.
     #[inline]
     pub fn is_due(&self) -> bool {
         ATTENTION.load(Ordering::Relaxed) || self.is_busy
@@ -177,7 +173,6 @@ impl Idle {
         }
     }
 
-    /// Restarts the board once the fault that keeps it on the internal oscillator is over.
     fn retry_clock(&mut self, now: u32) {
         let Some(fault) = self.clock_fault.filter(|_| now.wrapping_sub(self.retried) >= RETRY_MS) else {
             return;

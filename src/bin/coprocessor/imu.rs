@@ -90,7 +90,6 @@ impl Imu {
         }
     }
 
-    /// Returns the number of bytes that were damaged or lost.
     pub fn lost(&self) -> u32 {
         match self {
             Self::Line(port, ..) => port.lost(),
@@ -125,7 +124,6 @@ pub fn refusal() -> Option<SensorFault> {
 pub struct BringUp(spi_imu::BringUp<Spi>);
 
 impl BringUp {
-    /// Returns idle's end if such a part is configured.
     pub fn new(part: ImuPart, spi: Option<[Spi; 2]>) -> Option<Self> {
         spi_imu::BringUp::new(part, spi, &WANTED).map(Self)
     }

@@ -26,7 +26,6 @@ use gyronet::units::Micros;
 
 /// Time after a sample in which the task runs for what comes alone, us. The sensor's silence is judged later.
 const QUIET_US: u32 = 20_000;
-/// The end of that time, us.
 static QUIET_UNTIL: AtomicU32 = AtomicU32::new(0);
 
 /// Returns whether the task is to run at `now`, us, even if nothing has come.
@@ -74,12 +73,10 @@ pub enum Task {
 const ALL_TASKS: u8 = Task::Tick as u8 | Task::Window as u8 | Task::Idle as u8;
 static REPORTS: AtomicU8 = AtomicU8::new(0);
 
-/// Notes that a task has completed a cycle.
 pub fn report(task: Task) {
     REPORTS.fetch_or(task as u8, Ordering::Relaxed);
 }
 
-/// The configuration of the output task's lines.
 pub struct OutputParts {
     pub part: ImuPart,
     pub bits_per_second: u32,
@@ -271,7 +268,6 @@ impl Output {
         }
     }
 
-    /// Passes the GNSS receiver's bytes to the coprocessor.
     #[inline(never)]
     fn poll_receiver(&mut self, coprocessor: &mut Coprocessor, now: Micros) {
         let Some(receiver) = &mut self.receiver else { return };
@@ -298,7 +294,6 @@ impl Output {
         }
     }
 
-    /// Reports lost frames and the state of the bus to the coprocessor.
     fn report_bus(&mut self, coprocessor: &mut Coprocessor) {
         self.lines.unsent = self.outgoing.dropped();
         self.lines.frames_lost = frames::lost().saturating_add(self.unread);
@@ -337,12 +332,10 @@ pub fn with_silence_announced<T>(work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Returns whether rates are withheld now.
 fn is_requested() -> bool {
     STATE.load(Ordering::Relaxed) != RUNNING
 }
 
-/// Reports to idle that the announcement has been queued.
 fn announce() {
     let _ = STATE.compare_exchange(REQUESTED, ANNOUNCED, Ordering::Relaxed, Ordering::Relaxed);
 }

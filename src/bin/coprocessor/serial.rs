@@ -23,7 +23,6 @@ const _: () = assert!(RECEIVED >= 2 * AHEAD, "the stream must not overtake the r
 /// Polls before a flush gives up: about ten byte times at 115200.
 const FLUSH_POLLS: u32 = 100_000;
 
-/// Bits on the line for each byte.
 const BITS: u32 = 10;
 const US_PER_S: u32 = 1_000_000;
 
@@ -158,7 +157,6 @@ impl Port {
         received.oldest()
     }
 
-    /// Drops received bytes that have been used.
     #[inline]
     pub fn consume(&mut self, count: usize) {
         self.memory.received.drop_oldest(count);
@@ -170,7 +168,6 @@ impl Port {
         self.memory.wanted.store(count, Ordering::Relaxed);
     }
 
-    /// Returns the number of received bytes that wait.
     #[inline]
     pub fn waiting(&self) -> usize {
         self.memory.received.len()

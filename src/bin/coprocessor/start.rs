@@ -30,7 +30,6 @@ const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
     clock_hz: FULL_HZ,
 };
 
-/// Weights that are used if no slot has valid ones.
 const BUILT_IN: &[u8] = &weights::DEFAULT.0;
 
 /// Sets the bit rate of CAN and the identifiers of diagnosis, and makes CAN receive only the frames that the

@@ -39,7 +39,6 @@ mod firmware {
 
     type State = GyroNetState<UNITS>;
 
-    /// Number of windows that each model is compared on.
     const WINDOWS: u32 = 8;
 
     /// Returns the name and the file of a random model with a linear part; the file is a static.
@@ -80,7 +79,6 @@ mod firmware {
         Ok(())
     }
 
-    /// Measures the first window of a model, and prints all its estimates.
     fn compare((name, file): (&str, &[u8]), syst: &mut SYST, state: &mut State) -> Result<(), BlobError> {
         let mut network = GyroNet::with_state(Blob::new_checked(file)?, state)?;
         let mut numbers = Numbers::new(7);

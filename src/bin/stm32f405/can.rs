@@ -18,7 +18,6 @@ const CLOCK_HZ: u32 = 42_000_000;
 /// The bit rates, of which the clock is a whole number of quanta: 42 MHz / 24, 12, 6, 3 / (1 + 11 + 2).
 #[allow(dead_code, reason = "bringup keeps the default")]
 pub const BIT_RATES: [u32; 4] = [125_000, 250_000, 500_000, 1_000_000];
-/// Bit rate until another one is set.
 const DEFAULT_BIT_RATE: u32 = 500_000;
 /// Age at which a frame that waits for the bus is dropped, ms.
 pub const STALE_MS: u32 = 20;
@@ -208,7 +207,6 @@ impl Can {
         };
     }
 
-    /// Aborts the pending frames whose time of request is `chosen`.
     fn abort(&self, chosen: impl Fn(u32) -> bool) {
         let pending = !self.registers.tsr().read().bits();
         let bits = |bits: u32, (k, requested): (usize, &u32)| {
@@ -243,7 +241,6 @@ impl Can {
     }
 }
 
-/// Returns the clocks of a quantum.
 const fn prescaler(bits_per_second: u32) -> u16 {
     match (CLOCK_HZ / QUANTA).checked_div(bits_per_second) {
         Some(clocks @ 1..=1024) => clocks as u16,
@@ -288,12 +285,10 @@ fn compared(id: Id, mask: u32) -> u32 {
     bits | 1 << 2 | 1 << 1
 }
 
-/// Returns the number of frames that left a mailbox unsent since the start.
 pub fn aborted() -> u32 {
     ABORTED.load(Ordering::Relaxed)
 }
 
-/// Returns whether another node has acknowledged a frame since the start.
 #[allow(dead_code, reason = "bringup has no bus")]
 pub fn is_acknowledged() -> bool {
     ACKNOWLEDGED.load(Ordering::Relaxed)
@@ -327,7 +322,6 @@ pub fn transmitted() {
     can.tsr().write(|w| unsafe { w.bits(completed) });
 }
 
-/// Handles the interrupt of a bus-off: notes its time.
 pub fn went_off() {
     OFF_AT.store(timer::micros() as u32 | 1, Ordering::Relaxed);
     // SAFETY: the flag belongs to this handler.
@@ -337,7 +331,6 @@ pub fn went_off() {
     can.msr().write(|w| w.erri().set_bit());
 }
 
-/// Holds a frame from the receive FIFO.
 #[derive(Debug)]
 pub struct Received {
     /// The frame; `None` for a remote frame.

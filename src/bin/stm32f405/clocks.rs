@@ -62,7 +62,6 @@ impl Clocks {
         }
     }
 
-    /// Returns whether the clocks run from the crystal.
     pub fn exact(&self) -> bool {
         self.fault.is_none()
     }

@@ -18,8 +18,7 @@ const EDGES: u32 = 8;
 const CAPTURES: u32 = 32;
 /// Polls before the captures time out: twice as many as a crystal of 4 MHz needs.
 const POLLS: u32 = 20_000;
-/// Largest deviation, percent.
-const TOLERANCE: u32 = 10;
+const TOLERANCE_PERCENT: u32 = 10;
 
 /// Checks that the running crystal has the expected frequency, Hz, and returns the measured one.
 ///
@@ -27,7 +26,7 @@ const TOLERANCE: u32 = 10;
 /// [`ClockFault::CrystalFrequency`] with the measured frequency, kHz, or 0 if the measurement failed.
 pub fn check(rcc: &pac::RCC, expected_hz: u32) -> Result<u32, ClockFault> {
     let measured = measure(rcc).unwrap_or(0);
-    let limit = expected_hz / 100 * TOLERANCE;
+    let limit = expected_hz / 100 * TOLERANCE_PERCENT;
     if measured.abs_diff(expected_hz) <= limit {
         Ok(measured)
     } else {

@@ -90,7 +90,6 @@ impl Stream {
         cortex_m::asm::dmb();
     }
 
-    /// Returns the number of bytes left until the end.
     #[inline(always)]
     pub fn remaining(&self) -> usize {
         let left = self.stream().ndtr().read().bits() as u16;

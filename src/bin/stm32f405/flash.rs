@@ -13,7 +13,6 @@ use embedded_storage::nor_flash::{NorFlashError, NorFlashErrorKind};
 use gyronet::store::FlashFault;
 use gyronet::store::layout::{FLASH_BASE, SECTORS, sector_at};
 
-/// Bytes that are programmed at once.
 pub const WORD: usize = 4;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 const ERASED: u32 = u32::MAX;
@@ -131,7 +130,6 @@ impl Flash {
         }
     }
 
-    /// Unlocks the controller for an operation and locks it again.
     fn operate(
         &self,
         operation: impl FnOnce(&pac::FLASH) -> Result<(), FlashError>,

@@ -24,7 +24,6 @@ pub use stm32f4::stm32f405 as pac;
 use clocks::Clocks;
 use gyronet::service::event::ResetCause;
 
-/// State of the chip once its clocks run.
 pub struct Chip {
     /// Frequencies, and the reason if they are not the full ones.
     pub clocks: Clocks,
@@ -63,7 +62,6 @@ pub fn wait_until(polls: u32, is_ready: impl Fn() -> bool) -> bool {
     (0..polls).any(|_| is_ready())
 }
 
-/// Switches on the clocks of ports and peripherals.
 fn enable_peripherals(rcc: &pac::RCC) {
     rcc.ahb1enr().modify(|_, w| {
         w.gpioaen().enabled().gpioben().enabled().gpiocen().enabled().gpioden().enabled().gpioeen().enabled();

@@ -3,13 +3,10 @@
 
 use super::pac;
 
-/// Alternate function of USART1 to USART3 (DS8626 table 9).
+/// Alternate functions (DS8626 table 9).
 pub const USART_1_TO_3: u8 = 7;
-/// Alternate function of UART4 and USART6.
 pub const UART_4_AND_6: u8 = 8;
-/// Alternate function of CAN1.
 pub const CAN_1: u8 = 9;
-/// Alternate function of SPI1.
 pub const SPI_1: u8 = 5;
 
 /// A pin of the ports A to E.
@@ -95,7 +92,6 @@ impl Pin {
         self.registers().pupdr().modify(|r, w| unsafe { w.bits(self.field(r.bits(), 2, 0b01)) });
     }
 
-    /// Makes the pin an output at a level.
     pub fn output(self, high: bool) {
         self.set(high);
         // SAFETY: the field takes any value of its width.

@@ -28,7 +28,6 @@ pub fn wait(rcc: &pac::RCC, pwr: &pac::PWR) -> bool {
     })
 }
 
-/// Returns whether the supply is below the detector's level now.
 pub fn is_low() -> bool {
     // SAFETY: the register is only read.
     unsafe { &*pac::PWR::ptr() }.csr().read().pvdo().bit_is_set()

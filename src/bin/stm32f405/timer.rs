@@ -41,7 +41,6 @@ pub fn tick() -> u32 {
     count
 }
 
-/// Returns the microseconds since the start.
 #[inline]
 pub fn micros() -> u64 {
     // Read first: a half-wrap that is counted between the two reads then shows in the counter only.

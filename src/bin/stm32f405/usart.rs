@@ -15,7 +15,6 @@ pub struct Usart {
 // only read the status, or set a bit that the handler clears.
 unsafe impl Send for Usart {}
 
-/// A value of the status register.
 #[derive(Debug, Clone, Copy)]
 pub struct Status(u16);
 
@@ -43,12 +42,10 @@ impl Status {
         self.any(Self::PARITY | Self::FRAMING | Self::NOISE | Self::OVERRUN)
     }
 
-    /// Returns whether the data register has room for a byte.
     pub fn room(self) -> bool {
         self.any(Self::ROOM)
     }
 
-    /// Returns whether everything written has been sent.
     pub fn sent(self) -> bool {
         self.any(Self::SENT)
     }
@@ -154,7 +151,7 @@ impl Usart {
         self.registers().dr().read().bits() as u8
     }
 
-    /// Writes a byte to be sent; there must be room.
+    /// There must be room.
     #[allow(dead_code, reason = "coprocessor sends by DMA alone")]
     #[inline]
     pub fn write(&self, byte: u8) {

@@ -22,7 +22,6 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// Prescaler code and reload value.
     const fn settings(self, slow: bool) -> (u8, u16) {
         match (self, slow) {
             // 32 kHz / 256 = 125 Hz.
@@ -86,7 +85,6 @@ pub fn set(limit: Limit) {
     feed();
 }
 
-/// Waits until the last values have taken effect.
 fn wait_until_applied() {
     wait_until(POLLS, || {
         let status = registers().sr().read();

@@ -52,7 +52,6 @@ impl Meter {
     }
 }
 
-/// Fills the unused stack below the stack pointer with a pattern.
 #[inline(never)]
 fn paint() {
     let here = 0u32;

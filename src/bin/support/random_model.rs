@@ -8,13 +8,14 @@ use gyronet::nn::lstm::DirectionWeights;
 /// Limit of an input, Q10. With this limit and [`WEIGHT`] every row of a model of up to 60 units stays within its
 /// bound.
 const CLAMP: i32 = 8_192;
-/// Limit of an int8 weight.
 const WEIGHT: i32 = 40;
 
 struct Writer<const LEN: usize> {
     bytes: [u8; LEN],
     at: usize,
     numbers: Numbers,
+    /// Limit of an int8 weight.
+    weight: i32,
 }
 
 impl<const LEN: usize> Writer<LEN> {
@@ -66,7 +67,7 @@ impl<const LEN: usize> Writer<LEN> {
     const fn columns(&mut self, count: usize) {
         let mut k = 0;
         while k < 2 * count {
-            let packed = self.numbers.within(WEIGHT) * 256 + self.numbers.within(WEIGHT);
+            let packed = self.numbers.within(self.weight) * 256 + self.numbers.within(self.weight);
             self.halfword(packed);
             k += 1;
         }
@@ -84,12 +85,25 @@ impl<const LEN: usize> Writer<LEN> {
     }
 }
 
+/// Returns the input and the recurrent records of a direction, of weights up to +-`weight`.
+#[allow(
+    dead_code,
+    long_running_const_eval,
+    reason = "100,000 random weights; a small core runs models alone"
+)]
+pub const fn records<const LEN: usize>(units: usize, inputs: usize, weight: i32, seed: u32) -> [u8; LEN] {
+    let mut to = Writer { bytes: [0; LEN], at: 0, numbers: Numbers::new(seed), weight };
+    to.direction(units, inputs);
+    assert!(to.at == LEN);
+    to.bytes
+}
+
 /// Returns a weight file of `LEN` bytes, which must be [`Shape::file_len`] without provenance.
 #[allow(long_running_const_eval, reason = "60,000 random weights and their checksum")]
 #[must_use]
 pub const fn file<const LEN: usize>(shape: Shape, seed: u32) -> [u8; LEN] {
     assert!(LEN == shape.file_len(0));
-    let mut to = Writer { bytes: [0; LEN], at: 0, numbers: Numbers::new(seed) };
+    let mut to = Writer { bytes: [0; LEN], at: 0, numbers: Numbers::new(seed), weight: WEIGHT };
     let [network, window, inputs, units, layers, outputs] = shape.topology();
     to.bytes(&MAGIC);
     to.bytes(&VERSION.to_le_bytes());
