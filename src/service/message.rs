@@ -50,6 +50,8 @@ pub enum Refusal {
     /// The vehicle is not proven to stand: writing the flash would interrupt the output.
     #[error("the vehicle is not proven to stand still")]
     Moving,
+    #[error("a tester on another line has a session, which ends 5 s after its last request")]
+    OtherTester,
 }
 
 impl Refusal {

@@ -43,7 +43,9 @@ pub(super) fn put_record(out: &mut Response, record: &impl Serialize) -> Result<
 
 pub(super) fn nrc(refusal: Refusal) -> Nrc {
     match refusal {
-        Refusal::Moving | Refusal::Firmware(FirmwareError::NoBootLoader | FirmwareError::OnTrial) => {
+        Refusal::Moving
+        | Refusal::OtherTester
+        | Refusal::Firmware(FirmwareError::NoBootLoader | FirmwareError::OnTrial) => {
             Nrc::ConditionsNotCorrect
         }
         Refusal::Firmware(FirmwareError::NoHead) => Nrc::RequestSequenceError,

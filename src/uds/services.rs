@@ -16,7 +16,7 @@ use super::session::{self, Session};
 use super::signature::{Digest, SIGNATURE};
 use super::troubles;
 use super::update::Head;
-use crate::service::message::AllCounters;
+use crate::service::message::{AllCounters, Refusal};
 use crate::service::{Device, MappedSlots};
 use crate::store::firmware::{FirmwareError, MAX_IMAGE};
 use automotive_diag::uds::UdsCommand;
@@ -216,17 +216,18 @@ impl Services {
         if command != UdsCommand::ReadDataByIdentifier {
             device.forget_refusal();
         }
-        self.require_session(session::needed(command))?;
-        if self.is_guest
-            && matches!(
+        let needed = session::needed(command);
+        let is_owners = needed != Session::Default
+            || matches!(
                 command,
                 UdsCommand::DiagnosticSessionControl
                     | UdsCommand::ECUReset
                     | UdsCommand::ClearDiagnosticInformation
-            )
-        {
-            return Err(Nrc::ConditionsNotCorrect);
+            );
+        if self.is_guest && is_owners {
+            return Err(nrc(device.refuse_request(Refusal::OtherTester)));
         }
+        self.require_session(needed)?;
         if !session::has_sub_function(command) {
             return self.serve_data(command, rest, device, surroundings, out).map(|()| true);
         }

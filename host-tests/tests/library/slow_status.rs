@@ -131,7 +131,7 @@ fn wheels_decide_where_they_are_known() {
         ..SlowStatus::default()
     };
     assert_says(frames.last().expect("the newest"), stands);
-    let frames = run(&mut board, 501..701, Some(3.6));
+    let frames = run(&mut board, 501..701, Some(7.2));
     // Whoever drives off stood on ground that does not turn.
     let stands = SlowStatus { bias: Knowledge::Fine, ..stands };
     assert_says(frames.last().expect("the newest"), SlowStatus { verdict: Verdict::Moving, ..stands });

@@ -1,4 +1,4 @@
-//! Measures the cycles of GyroNet on this chip with DWT_CYCCNT, to compare with the cycle model.
+//! Measures the cycles of the paper's GyroNet on this chip with DWT_CYCCNT, to compare with the cycle model.
 
 use crate::report::Report;
 use core::hint::black_box;
@@ -20,5 +20,5 @@ pub fn count(report: &mut Report, mut dcb: DCB, mut dwt: DWT) {
     let begin = DWT::cycle_count();
     black_box(network.estimate(black_box(&features)));
     let cycles = DWT::cycle_count().wrapping_sub(begin);
-    report.pass("GyroNet", format_args!("{cycles} cycles a window"));
+    report.pass("GyroNet", format_args!("{cycles} cycles a window of the paper's"));
 }

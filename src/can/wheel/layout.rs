@@ -56,7 +56,7 @@ impl WheelSignal {
 
     /// Converts a DBC factor in km/h per LSB, below 1000, to [`WheelSignal::factor_q16`].
     pub const fn per_bit_kmh(factor: f64) -> i32 {
-        (factor / 3.6 * 4_294_967_296.0) as i32
+        nearest(factor / 3.6 * 4_294_967_296.0)
     }
 
     /// Returns the speed, or with [`WheelSignal::pulses`] the speed by the pulses that `count` has seen, if any.
@@ -330,4 +330,9 @@ impl WheelFrame {
         // At most 8 bits: the settings are checked.
         field.raw(data).map(|raw| Some(raw as u8)).ok_or(WheelError::Short(data.len()))
     }
+}
+
+/// Rounds to the nearest code, which `as` does not.
+pub(super) const fn nearest(value: f64) -> i32 {
+    (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32
 }

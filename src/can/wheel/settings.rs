@@ -1,6 +1,6 @@
 //! The settings describe the frames that carry the wheel speeds, and when the vehicle counts as standing.
 
-use super::layout::{Checksum, Code, WheelFrame, WheelSignal};
+use super::layout::{Checksum, Code, WheelFrame, WheelSignal, nearest};
 use crate::can::signal::{BitField, ByteOrder};
 use crate::sample::WHEELS;
 use crate::units::{Duration, WheelSpeed};
@@ -141,7 +141,7 @@ const fn toyota(start: u8) -> Option<WheelSignal> {
         return None;
     };
     Some(WheelSignal {
-        offset: WheelSpeed((-67.67 / 3.6 * 65_536.0) as i32),
+        offset: WheelSpeed(nearest(-67.67 / 3.6 * 65_536.0)),
         valid_when: Some(Code { field: fault, value: 0 }),
         ..WheelSignal::new(0, field, WheelSignal::per_bit_kmh(0.01))
     })

@@ -36,7 +36,7 @@ pub const NUCLEO: &str = "nucleo-h563zi";
 /// [`NUCLEO`].
 fn boards() -> Vec<String> {
     let manifest = std::fs::read_to_string(bench::workspace().join("src/bin/Cargo.toml")).unwrap_or_default();
-    let features = manifest.lines().take_while(|line| *line != "[dependencies]");
+    let features = manifest.lines().take_while(|line| !line.starts_with("# An emulated"));
     let boards = features.filter_map(|line| line.strip_suffix(" = [\"stm32f405\"]"));
     boards.chain([NUCLEO]).map(str::to_owned).collect()
 }

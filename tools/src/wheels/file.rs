@@ -305,10 +305,10 @@ signal = [
     #[test]
     fn the_built_in_settings_as_a_file() {
         let settings = WheelFile::parse("car.toml", TOYOTA).unwrap().settings("car.toml").unwrap();
-        let offset = |settings: &WheelSettings| settings.signals[0].unwrap().offset.0;
-        // The file's offset is rounded and the constant truncated: they differ by 0.00006 km/h.
-        assert_eq!(offset(&settings), offset(&WheelSettings::TOYOTA) - 1);
-        assert_eq!(settings.signals[0].unwrap().invalid, [Some(0xFFFF), Some(0xFFFE), None]);
+        let built_in = WheelSettings::TOYOTA.signals[0].unwrap();
+        let signal = settings.signals[0].unwrap();
+        assert_eq!((signal.offset, signal.factor_q16), (built_in.offset, built_in.factor_q16));
+        assert_eq!(signal.invalid, [Some(0xFFFF), Some(0xFFFE), None]);
         assert_eq!(settings.still_speed.0, 1_820);
         assert_eq!((settings.timeout, settings.still_for), (Duration(100_000), Duration(500_000)));
     }
@@ -329,6 +329,7 @@ signal = [
         for first in [WheelSettings::TOYOTA, settings(all)] {
             let text = toml::to_string(&WheelFile::of(&first)).unwrap();
             assert_eq!(settings(&text), first);
+            assert!(!text.contains("00000") && !text.contains("99999"), "as a person writes numbers: {text}");
         }
         let [Some(left), Some(right), ..] = settings(all).signals else { panic!() };
         assert_eq!((right.pulses, right.factor_q16), (true, (0.02_f64 * 4_294_967_296.0).round() as i32));

@@ -204,11 +204,9 @@ fn a_second_tester_neither_uses_nor_ends_the_session_of_the_first() {
     bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
     bench.server.set_guest(true);
     bench.expect(&[0x22, 0xF1, 0x86], &[0x62, 0xF1, 0x86, 1]);
-    for (request, code) in
-        [("2E010000", 0x7F), ("2701", 0x7F), ("1003", 0x22), ("1101", 0x22), ("14FFFFFF", 0x22)]
-    {
-        let request = bytes(request);
-        bench.expect(&request, &[0x7F, request[0], code]);
+    for request in ["2E010000", "2701", "1003", "1101", "14FFFFFF"].map(bytes) {
+        bench.expect(&request, &[0x7F, request[0], 0x22]);
+        assert_eq!(bench.board.refusal(), Some(Refusal::OtherTester));
     }
     bench.server.set_guest(false);
     bench.expect(&[0x22, 0xF1, 0x86], &[0x62, 0xF1, 0x86, 3]);

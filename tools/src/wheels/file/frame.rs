@@ -98,8 +98,8 @@ impl Signal {
         Self {
             wheel,
             place: Place::of(&signal.field),
-            factor_kmh: (!signal.pulses).then(|| f64::from(signal.factor_q16) / FACTORS_PER_KMH),
-            metres_per_pulse: signal.pulses.then(|| f64::from(signal.factor_q16) / FACTORS_PER_METRE),
+            factor_kmh: (!signal.pulses).then(|| shortest(signal.factor_q16, FACTORS_PER_KMH)),
+            metres_per_pulse: signal.pulses.then(|| shortest(signal.factor_q16, FACTORS_PER_METRE)),
             offset_kmh: kmh(signal.offset),
             invalid: match signal.invalid.into_iter().flatten().collect::<Vec<_>>()[..] {
                 [] => None,
@@ -134,7 +134,17 @@ pub(super) fn pulse(path: &str, metres: f64) -> Result<i32, WheelFileError> {
 }
 
 pub(super) fn kmh(speed: WheelSpeed) -> f64 {
-    f64::from(speed.0) / CODES_PER_KMH
+    shortest(speed.0, CODES_PER_KMH)
+}
+
+/// The value with the fewest decimals that has this code.
+fn shortest(code: i32, per_unit: f64) -> f64 {
+    let exact = f64::from(code) / per_unit;
+    let mut rounded = (0..12).map(|decimals| {
+        let scale = 10_f64.powi(decimals);
+        (exact * scale).round() / scale
+    });
+    rounded.find(|value| (value * per_unit).round() == f64::from(code)).unwrap_or(exact)
 }
 
 pub(super) fn speed(path: &str, key: &'static str, kmh: f64) -> Result<WheelSpeed, WheelFileError> {
