@@ -1,11 +1,10 @@
-//! A controller that has gone off the bus returns at growing intervals, so that a broken node does not disturb the bus all the
-//! time, and one whose CAN FD frames end there sends them no longer: the other nodes know only classic frames, or data at another
-//! bit rate.
+//! A controller that has gone off the bus returns at growing intervals, so that a broken node does not always disturb it,
+//! and sends no CAN FD frames if they end there: the other nodes know only classic frames, or another bit rate.
 
-/// Interval from bus-off to a return, us: the first one, and the longest. It doubles every time, until the controller has
-/// stayed on the bus for as long as the longest.
-const FIRST_US: u64 = 10_000;
-const LAST_US: u64 = 1_280_000;
+/// First interval from bus-off to a return, us. It doubles every time, until the controller stays for [`LAST_US`].
+pub const FIRST_US: u64 = 10_000;
+/// The longest interval, us.
+pub const LAST_US: u64 = 1_280_000;
 
 /// Follows a controller off the bus and back. Times are in us.
 #[derive(Debug, Clone, Copy)]

@@ -59,8 +59,9 @@ impl Imu {
         }
     }
 
-    /// Returns whether the tick will see that the part has sent something; a part on SPI is polled.
-    pub fn is_heard(&self) -> bool {
+    /// Has the line wake the tick once the bytes that are missing have come, and returns whether the tick can wait for
+    /// that: not if they are there, nor for a part on SPI, which is polled.
+    pub fn arm_wake_up(&self) -> bool {
         if let Self::Line(port, mti, _) = self {
             port.want(mti.missing());
         }

@@ -24,7 +24,7 @@ use gyronet::service::message::LineCounters;
 use gyronet::store::ImuPart;
 use gyronet::units::Micros;
 
-/// Time after a sample in which the task runs for what comes alone, us. The sensor's silence is judged later.
+/// For so long after a sample the task runs only if something has come, us. A silent sensor is noticed later than that.
 const QUIET_US: u32 = 20_000;
 static QUIET_UNTIL: AtomicU32 = AtomicU32::new(0);
 
@@ -192,7 +192,7 @@ impl Output {
         let quiet = if self.outgoing.is_sent() { QUIET_US } else { LEAVE_US as u32 };
         let is_quiet = now.wrapping_sub(self.sampled_at) < quiet
             && self.outgoing.is_at_rest()
-            && self.imu.is_heard()
+            && self.imu.arm_wake_up()
             && !coprocessor.is_waiting();
         let until = if is_quiet { self.sampled_at.wrapping_add(quiet) } else { now };
         QUIET_UNTIL.store(until, Ordering::Relaxed);

@@ -10,6 +10,7 @@ use super::{pac, timer, wait_until};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embedded_can::{ExtendedId, Frame as _, Id, StandardId};
 use gyronet::can::DataFrame;
+use gyronet::can::bus_off::{FIRST_US, LAST_US};
 use gyronet::service::event::CanFault;
 
 /// Clock of the controller: APB1 while the chip runs on its crystal. On the internal oscillator, which may be 8 % wrong,
@@ -40,10 +41,6 @@ const REQUEST_COMPLETED: u32 = 1;
 const TRANSMITTED: u32 = 1 << 1;
 const ABORT: u32 = 1 << 7;
 const EMPTY: u32 = 1 << 26;
-/// Interval from bus-off to a restart, ms: the first one, and the longest. It doubles every time, until the
-/// controller has stayed on the bus for as long as the longest.
-const FIRST_RESTART_MS: u32 = 10;
-const LAST_RESTART_MS: u32 = 1_280;
 /// Half the time between two polls, us: a restart is at most this far from its time.
 const HALF_POLL_US: u32 = 500;
 
@@ -91,7 +88,8 @@ pub struct Can {
     /// The time at which each mailbox got its frame, ms.
     requested: [u32; MAILBOXES],
     recovery: Recovery,
-    interval_ms: u32,
+    /// From a bus-off to a restart, us: see [`FIRST_US`].
+    interval: u32,
 }
 
 impl Can {
@@ -127,7 +125,7 @@ impl Can {
         // Frames leave in the order of their requests.
         can.mcr().modify(|_, w| w.txfp().set_bit());
         let recovery = Recovery::On { since: 0 };
-        Ok(Self { registers: can, requested: [0; MAILBOXES], recovery, interval_ms: FIRST_RESTART_MS })
+        Ok(Self { registers: can, requested: [0; MAILBOXES], recovery, interval: FIRST_US as u32 })
     }
 
     /// Sets the bit rate, one of [`BIT_RATES`]. The controller takes it only before [`Can::join`].
@@ -163,7 +161,7 @@ impl Can {
 
     /// Returns whether the controller is on the bus, and has been for long.
     pub fn is_on(&self) -> bool {
-        let is_on = matches!(self.recovery, Recovery::On { .. }) && self.interval_ms == FIRST_RESTART_MS;
+        let is_on = matches!(self.recovery, Recovery::On { .. }) && self.interval == FIRST_US as u32;
         is_on && OFF_AT.load(Ordering::Relaxed) == 0
     }
 
@@ -182,13 +180,13 @@ impl Can {
                 self.abort(|_| true);
                 // The controller does nothing in this mode; leaving it starts the recovery.
                 self.registers.mcr().modify(|_, w| w.inrq().set_bit());
-                let until = at.wrapping_add(1_000 * self.interval_ms);
-                self.interval_ms = (2 * self.interval_ms).min(LAST_RESTART_MS);
+                let until = at.wrapping_add(self.interval);
+                self.interval = (2 * self.interval).min(LAST_US as u32);
                 Recovery::Waits { until }
             }
             (Recovery::On { since }, None) => {
-                if now.wrapping_sub(since) > LAST_RESTART_MS {
-                    self.interval_ms = FIRST_RESTART_MS;
+                if now.wrapping_sub(since) > LAST_US as u32 / 1_000 {
+                    self.interval = FIRST_US as u32;
                 }
                 self.abort(|requested| now.wrapping_sub(requested) > STALE_MS);
                 self.recovery
