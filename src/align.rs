@@ -33,8 +33,7 @@ use core::ops::RangeInclusive;
 
 /// Sample periods that are used, microseconds: 50 to 1000 Hz, with a tenth to spare for oscillators.
 pub const PERIODS_US: RangeInclusive<u64> = 900..=22_000;
-/// A sample of a sensor at about 100 Hz this near the end of a step counts as taken at it, microseconds: so jitter changes
-/// no reading.
+/// A sample of a sensor at about 100 Hz this near a step's end counts as taken at it, us: jitter changes nothing.
 pub const SNAP_US: u64 = 2_000;
 /// The longest run of missing steps that keeps the grid: one second.
 pub const MAX_GAP: u32 = 100;
@@ -94,8 +93,7 @@ pub struct Aligner {
     missing: u32,
     sums: Sums,
     rest: [i64; 6],
-    /// The newest periods, microseconds, the place of the oldest one, and the usual one: their mean, or where samples
-    /// are missing their median.
+    /// The newest periods, us, the place of the oldest, and their mean, or where samples are missing their median.
     periods: [u32; PERIODS],
     oldest: usize,
     usual: u32,
@@ -116,8 +114,7 @@ impl Aligner {
     };
 
     /// Adds a sample; then call [`Aligner::next_frame`] until `None`. After [`AlignError::Jump`] the grid continues
-    /// from that sample's time stamp, at the following tick; after [`AlignError::Rate`] the steps up to it are
-    /// missing.
+    /// from that sample's stamp, at the next tick; after [`AlignError::Rate`] the steps up to it are missing.
     pub fn add(&mut self, sample: ImuSample) -> Result<(), AlignError> {
         let at = sample.time;
         let time = at.0.min(END) as i64;
@@ -208,9 +205,7 @@ impl Aligner {
     }
 
     fn sum(&mut self, sample: &ImuSample, covered: i64) {
-        let ([fx, fy, fz], [wx, wy, wz]) = (sample.specific_force, sample.angular_rate);
-        let axes = [fx.0, fy.0, fz.0, wx.0, wy.0, wz.0];
-        for (sum, axis) in self.sums.axes.iter_mut().zip(axes) {
+        for (sum, axis) in self.sums.axes.iter_mut().zip(sample.codes()) {
             *sum += i64::from(axis) * covered;
         }
         self.sums.covered += covered;

@@ -1,9 +1,8 @@
 //! Estimators of the gyro's reading at rest, and the uncertainty of that estimate.
 //!
-//! `static_init` takes the mean of the first three seconds. `zero_rate` continues whenever the vehicle stands: it
-//! estimates the rate that remains after the network, so that the loop is closed around gyro and network together.
-//! [`crate::standstill`] judges whether the vehicle stands. `thermal` keeps the bias by temperature that standstills
-//! have shown. `earth` keeps the rotation of the Earth from being subtracted twice.
+//! `static_init` takes the mean of three seconds. `zero_rate` estimates, whenever the vehicle stands, the rate that
+//! remains after the network. `thermal` keeps the bias by temperature. `earth` keeps the Earth's rotation from being
+//! subtracted twice.
 
 pub(crate) mod earth;
 mod static_init;
@@ -35,10 +34,6 @@ impl Spread {
         let delta = value - self.mean;
         self.mean += delta / self.count as f32;
         self.squares += delta * (value - self.mean);
-    }
-
-    pub fn count(&self) -> u32 {
-        self.count
     }
 
     /// Returns the mean of the codes, rounded to nearest; zero without readings.

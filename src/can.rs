@@ -15,7 +15,6 @@ pub mod fog_encoder;
 pub mod load;
 #[doc(hidden)]
 pub mod queue;
-mod residual;
 #[doc(hidden)]
 pub mod signal;
 pub mod slcan;

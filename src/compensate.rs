@@ -1,25 +1,23 @@
 //! Computes corrected rates from the network's estimates.
 //!
-//! A sample's best estimate is the mean of the estimates of all windows that cover it ([`Stride`]). It is complete only
-//! some samples later, so two rates are sent for every sample:
+//! A sample's best estimate is the mean of those of all windows that cover it ([`Stride`]), complete only some samples
+//! later. So two rates are sent for every sample:
 //!
-//! - the **live** rate at once, for a receiver that uses it for control. No window covers the sample yet, so it is the
-//!   gyro less bias, level and gain.
+//! - the **live** rate at once, for control: the gyro less bias, level and gain, since no window covers the sample
+//!   yet.
 //! - the **delayed** rate [`CompensateConfig::lag`] samples later, for a receiver that integrates it to a heading.
-//!   Most windows that cover the sample have been evaluated by then.
 //!
-//! A revision of a delayed rate by a later window is not lost: it is carried into the rates that follow, so that their sum
-//! reaches the sum of the best estimates. Each rate carries at most a bounded part of the revision, so that no rate
-//! jumps. With c_k(t) the estimate for sample k as known at sample t, and L the lag:
-//! `rate(t) = gyro(t-L) - c_{t-L}(t) - carried part of sum over k < t-L of (c_k(t) - c_k(t-1))`. The live rate
-//! carries no revision: an estimate mostly concerns the noise of past samples, which the newest sample does not have.
-//! Both carry the angle that standstill has held at zero in the second before it was seen to end.
+//! A revision of a delayed rate by a later window is carried into the rates that follow, a bounded part in each, so
+//! that their sum reaches the sum of the best estimates. With c_k(t) the estimate for sample k as known at sample t,
+//! and L the lag: `rate(t) = gyro(t-L) - c_{t-L}(t) - carried part of sum over k < t-L of (c_k(t) - c_k(t-1))`. The
+//! live rate carries no revision, which mostly concerns the noise of past samples. Both carry the angle that
+//! standstill has held at zero in the second before it was seen to end. The lag counts samples: a gap delays earlier
+//! ones and drops none.
 //!
-//! A window of 0.1 s cannot observe a constant error, and one that a model has learnt is wrong on another vehicle.
-//! The slow mean of the network's corrections is therefore subtracted from them: standstill finds the bias, gravity the
-//! level, and a course or `calibrate` the gain. A linear part answers no constant input
-//! ([`crate::model::BlobError::Constant`]); the slow mean of its corrections would be an error of its own on a vehicle that
-//! shakes.
+//! A window of 0.1 s cannot observe a constant error, and one that a model has learnt is wrong on another vehicle. The
+//! slow mean of the corrections is therefore subtracted from them: standstill finds the bias, gravity the level, and a
+//! course or `calibrate` the gain. A linear part's share stays: it answers no constant input
+//! ([`crate::model::BlobError::Constant`]), and its slow mean would be an error on a vehicle that shakes.
 //!
 //! | when | live | delayed |
 //! |---|---|---|
@@ -27,8 +25,6 @@
 //! | after a gap, clipping, a late or implausible estimate | gyro less bias | the best estimate of each sample, gyro less bias where it has none |
 //! | clipped sample | gyro less bias, marked; nothing is carried into it | the same |
 //! | wheels prove that the vehicle stands | zero | zero |
-//!
-//! The lag counts samples, not time: a gap delays earlier samples and drops none.
 
 mod carried;
 mod slow_mean;
@@ -43,8 +39,7 @@ use crate::units::AngularRate;
 use carried::Carried;
 use slow_mean::SlowMean;
 
-/// Largest mean correction of a window that is accepted. Vibration makes single corrections large; their mean is bias-like
-/// and small.
+/// Largest mean correction of a window that is accepted: vibration makes single ones large, not their mean.
 pub const MAX_MEAN: AngularRate = AngularRate::from_deg_per_sec(6.0);
 /// Largest single correction of a window that is accepted, which a utility vehicle's shake reaches.
 const MAX_SINGLE: AngularRate = AngularRate(10 * MAX_MEAN.0);
@@ -285,10 +280,8 @@ impl Compensator {
         Some(entry.send(remaining, &mut self.live, stands, self.config.max_revision))
     }
 
-    /// Returns the rate of the sample [`CompensateConfig::lag`] before the newest one; `None` before there is one.
-    /// Call it once for each sample.
-    ///
-    /// `stands` is true when the vehicle has stood since before that sample was taken; its rate is then zero.
+    /// Returns the rate of the sample [`CompensateConfig::lag`] before the newest one, once per sample; `None` before
+    /// there is one. `stands`: the vehicle has stood since before that sample, whose rate is then zero.
     pub fn delayed(&mut self, remaining: Remaining, stands: bool) -> Option<Compensated> {
         let entry = self.kept.get_mut(place(self.next, self.config.lag.samples()))?.as_mut()?;
         entry.held = stands && entry.validity.is_good();
@@ -312,8 +305,7 @@ impl Compensator {
         self.delayed.end_standstill();
     }
 
-    /// Returns whether the delayed rates have more to carry than a window revises, because the wheels stood while
-    /// the vehicle turned. The rates are wrong until all of it is carried.
+    /// Returns whether more waits to be carried than a window revises, as after a turn on standing wheels.
     pub fn revisions_exceed_limit(&self) -> bool {
         let much = LONG * u64::from(self.config.max_revision.0.unsigned_abs());
         self.delayed.waiting().unsigned_abs() > much
@@ -326,8 +318,7 @@ impl Compensator {
         carried as f32 / (AngularRate::PER_RAD_PER_SEC * RATE_HZ as f32)
     }
 
-    /// Returns the amount that the sum of the delayed rates still lacks, codes x samples: revisions that are not carried
-    /// yet, and samples whose rates are not sent yet.
+    /// Returns what the sum of the delayed rates lacks, codes x samples: revisions, and samples not sent yet.
     pub fn pending(&self, remaining: Remaining) -> i64 {
         let waiting = (0..self.config.lag.samples()).flat_map(|age| self.at(age));
         let waiting = waiting.filter(|entry| entry.validity.is_good());

@@ -1,21 +1,15 @@
 //! The coprocessor takes readings, CAN frames and time, and returns CAN frames, windows for the networks and
-//! observations.
-//!
-//! [`Coprocessor`] defines the order in which the parts of the product run, and does no input or output itself. The
-//! firmware image, a replay of a recorded drive, the simulated situations and your own board are adapters around it, so all
-//! of them run the same code. It owns the monitor of the inertial sensor, the pipeline, the wheels, the pipeline of
-//! the fibre-optic gyro, the message encoders, and the rule for late windows.
-//!
-//! Use it in this order:
+//! observations. It does no input or output: the firmware, a replay, the simulated situations and your own board are
+//! adapters around it.
 //!
 //! 1. Pass in the inputs that have arrived: [`Coprocessor::imu`], [`Coprocessor::fog`], [`Coprocessor::can`]. Call
-//!    [`Coprocessor::poll`] about every millisecond, because it detects a silent sensor. The frames go to the
-//!    [`Sink`] that each call gets.
+//!    [`Coprocessor::poll`] about every millisecond, because it detects a silent sensor. The frames go to the [`Sink`]
+//!    that each call gets.
 //! 2. Run the windows of [`Coprocessor::window`] through the network, at once or in a task of lower priority, and pass
 //!    the estimates to [`Coprocessor::deliver`].
 //!
-//! A window's estimate is used [`crate::compensate::Stride::delay`] samples after the window, however early it arrives,
-//! so the frames do not depend on the speed of the machine. If samples arrive faster than 100 times a second,
+//! An estimate is used [`crate::compensate::Stride::delay`] samples after its window, however early it arrives, so the
+//! frames do not depend on the machine's speed. If samples arrive faster than 100 times a second,
 //! [`Coprocessor::is_ready`] tells when the next one has to wait for an estimate.
 
 mod clock;
@@ -111,23 +105,19 @@ pub struct Coprocessor {
 }
 
 impl Coprocessor {
-    /// Creates a coprocessor before its first input, at time 0. It is about 10 KB: on a board with a small stack make it
-    /// in a static.
+    /// Creates a coprocessor at time 0. It is about 10 KB: on a board with a small stack make it in a static.
     #[inline]
     pub const fn new(config: Config) -> Self {
-        let clock_ratio = match config.clock {
-            Clock::Outside => config.clock_ratio,
-            Clock::Sensor => None,
-        };
+        let clock_is_exact = config.clock_is_exact && matches!(config.clock, Clock::Outside);
         Self {
             storage: config.storage,
             bus: BusState { lost: 0, is_off: false, reported: 0 },
             timeline: Timeline::new(config.clock),
-            monitor: SensorMonitor::new(clock_ratio),
+            monitor: SensorMonitor::new(clock_is_exact),
             handover: Handover::new(config.has_gyronet, config.pipeline.compensate.stride.delay()),
             pipeline: Pipeline::new(config.pipeline),
             wheels: config.wheels,
-            fog: FogPipeline::new(FogConfig { clock_ratio, ..config.fog }, config.fog_expected),
+            fog: FogPipeline::new(FogConfig { clock_is_exact, ..config.fog }, config.fog_expected),
             heading: config.heading,
             heading_due: None,
             second: SecondSource::START,
@@ -142,12 +132,9 @@ impl Coprocessor {
     }
 
     /// Processes a sample of the inertial sensor that arrived at `now`, and returns the newest step of 10 ms that it
-    /// completes: at more than 100 samples a second most complete none, at fewer some complete several, of which those that
-    /// wait for an estimate follow with [`Coprocessor::poll`]. Frames and observations of all of them go to `sink`.
-    ///
-    /// # Errors
-    /// [`InputError::Imu`] when its time stamp or the sensor's rate cannot be used, [`InputError::ClockWentBack`]. The
-    /// sample is counted and not used, and no frame is sent for it; the samples that follow report a gap.
+    /// completes. Frames and observations of all that it completes go to `sink`; those that wait for an estimate
+    /// follow with [`Coprocessor::poll`]. An error (its stamp, the rate, [`InputError::ClockWentBack`]) is counted,
+    /// and a gap reported.
     pub fn imu(
         &mut self,
         sample: ImuSample,
@@ -278,12 +265,8 @@ impl Coprocessor {
         count(&mut self.counters.imu_errors, 1);
     }
 
-    /// Processes a sample of the fibre-optic gyro that arrived at `now`; the frames of the steps that it completes go
-    /// to `sink`.
-    ///
-    /// # Errors
-    /// [`InputError::Fog`] when it is a duplicate or out of order, [`InputError::ClockWentBack`]; the sample is
-    /// counted and not used.
+    /// Processes a sample of the fibre-optic gyro that arrived at `now`; frames go to `sink`. One that is a duplicate
+    /// or out of order ([`InputError::Fog`]) is counted.
     pub fn fog(&mut self, sample: FogSample, now: Micros, sink: &mut impl Sink) -> Result<(), InputError> {
         self.advance(now)?;
         let added = self.fog.add(self.timeline.time(), sample).map_err(InputError::Fog);
@@ -296,13 +279,8 @@ impl Coprocessor {
         count(&mut self.counters.fog_errors, 1);
     }
 
-    /// Processes a frame received from the bus at `now`. Returns whether it is used: it carries wheel speeds, a
-    /// course or the latitude.
-    ///
-    /// # Errors
-    /// [`InputError::Wheels`] when a wheel frame is corrupt or marks a speed as invalid, [`InputError::Heading`],
-    /// [`InputError::ClockWentBack`]; the error is counted. Without a valid frame the wheels become silent after a
-    /// while, which is reported; the latitude in use is kept.
+    /// Processes a frame received from the bus at `now`; returns whether it is used: for wheel speeds, a course or the
+    /// latitude. An error is counted; without valid wheel frames the wheels become silent, which is reported.
     pub fn can(&mut self, frame: &DataFrame, now: Micros) -> Result<bool, InputError> {
         self.advance(now)?;
         let time = self.timeline.time();
@@ -315,11 +293,8 @@ impl Coprocessor {
         }
     }
 
-    /// Processes a course over ground that arrived at `now`. It may be up to two seconds older than its arrival.
-    ///
-    /// # Errors
-    /// [`InputError::Heading`] when a value can be no vehicle's, [`InputError::ClockWentBack`]; it is counted and not
-    /// used.
+    /// Processes a course over ground that arrived at `now`, up to two seconds after its time. One that can be no
+    /// vehicle's ([`InputError::Heading`]) is counted and not used.
     pub fn heading(&mut self, heading: &Heading, now: Micros) -> Result<(), InputError> {
         self.advance(now)?;
         let checked = heading.checked().map_err(|error| self.refuse_heading(error))?;
@@ -327,13 +302,9 @@ impl Coprocessor {
         Ok(())
     }
 
-    /// Processes a message of a GNSS receiver on a line of its own ([`crate::heading::GnssLine`]) that arrived at `now`,
-    /// where the configuration names one.
-    ///
-    /// # Errors
-    /// [`InputError::Heading`] for a damaged message, for values outside a vehicle's range (a good course is used even if
-    /// the latitude is refused) and for a course that the receiver computes with sensors of its own;
-    /// [`InputError::ClockWentBack`]. The message is counted and not used.
+    /// Processes a message of a GNSS receiver on a line of its own ([`crate::heading::GnssLine`]), where one is
+    /// configured. A damaged message, values outside a vehicle's range (a good course is used all the same) and a
+    /// course by the receiver's own sensors are errors, which are counted.
     pub fn gnss(&mut self, fix: Result<Fix, HeadingError>, now: Micros) -> Result<(), InputError> {
         self.advance(now)?;
         let time = self.timeline.time();
@@ -379,11 +350,8 @@ impl Coprocessor {
         Ok(())
     }
 
-    /// Does the work that is due at `now` without an input: it sends the messages of silent sensors, and of steps that
-    /// have waited for an estimate, to `sink`.
-    ///
-    /// # Errors
-    /// [`InputError::ClockWentBack`]; the error is counted.
+    /// Does what is due at `now` without an input: messages of silent sensors, and of steps that have waited for an
+    /// estimate, go to `sink`.
     pub fn poll(&mut self, now: Micros, sink: &mut impl Sink) -> Result<Option<Observation>, InputError> {
         let mut newest = None;
         self.poll_into(now, sink, &mut newest).map(|()| newest)
@@ -449,11 +417,8 @@ impl Coprocessor {
         self.handover.take()
     }
 
-    /// Accepts GyroNet's estimate of the window that ended with sample `end`.
-    ///
-    /// # Errors
-    /// [`InputError::NoWindow`] when no window waits for the estimate: it is too late, or the window never existed.
-    /// It is counted and not used.
+    /// Accepts GyroNet's estimate of the window that ended with sample `end`. One that no window waits for is counted
+    /// ([`InputError::NoWindow`]).
     pub fn deliver(&mut self, end: u32, estimate: Estimate) -> Result<(), InputError> {
         let wanted = self.handover.close(end) && self.pipeline.deliver(end, estimate);
         self.claim(wanted, end)
@@ -469,8 +434,7 @@ impl Coprocessor {
         self.pipeline.mount_moved();
     }
 
-    /// Notes the number of frames lost on the bus since the start, and whether the controller is off the bus. The next
-    /// messages report it.
+    /// Notes how many frames the bus has lost since the start, and whether the controller is off it, to report both.
     pub fn bus(&mut self, lost: u32, is_off: bool) {
         self.bus = BusState { lost, is_off, ..self.bus };
     }
@@ -565,7 +529,7 @@ impl Coprocessor {
     }
 
     fn board_state(&self) -> BoardState {
-        let stored = self.storage.damaged || !self.handover.has_network();
+        let stored = self.storage.damaged || !self.handover.has_network;
         let configuration_lost = self.storage.configuration_lost;
         let bus = self.bus.is_off || self.bus.lost != self.bus.reported;
         let clock = self.monitor.is_clock_off() || self.pipeline.is_rate_refused();

@@ -16,11 +16,9 @@ pub struct YawEstimate {
     pub tick: u32,
     /// The corrected rate: the gyro's own reading in [`Status::Init`], zero while the sensor is silent.
     pub rate: AngularRate,
-    /// The amount subtracted from the gyro beyond its static bias: the network's estimate, the bias found by zero-rate
-    /// updates, revisions of earlier samples.
+    /// Subtracted from the gyro beyond its static bias: the network's estimate, zero-rate updates, revisions.
     pub correction: AngularRate,
-    /// The sum of all these rates that may be used since the bias became known, each over a step of the sensor's clock
-    /// ([`crate::align::clock_ratio`]).
+    /// Sum of these rates since the bias is known, over steps of the sensor's clock ([`crate::align::clock_ratio`]).
     pub yaw: Yaw,
     /// The expected error of the mean rate over one second, 1 sigma, once the bias is known.
     pub sigma: Option<AngularRate>,
@@ -49,8 +47,7 @@ impl YawEstimate {
 }
 
 impl VehicleSample {
-    /// Notes that the sample arrived so many microseconds late: its rates are right for its own time, and if it `is_stale`
-    /// too old to be the present ones.
+    /// Notes how late the sample came, us; its rates are those of its time, if it `is_stale` not the present ones.
     pub(crate) fn come_late(&mut self, late_us: u32, is_stale: bool) {
         for estimate in [&mut self.live, &mut self.delayed] {
             estimate.latency_us = estimate.latency_us.map(|latency| latency.saturating_add(late_us));
@@ -71,8 +68,7 @@ impl VehicleSample {
 pub struct VehicleSample {
     /// The rate of this sample, for receivers that use it for control: the Bosch messages.
     pub live: YawEstimate,
-    /// The rate of the sample [`crate::compensate::CompensateConfig::lag`] before it, for receivers that
-    /// integrate it to a heading: our own messages.
+    /// The rate [`crate::compensate::CompensateConfig::lag`] samples earlier, to be integrated: our own messages.
     pub delayed: YawEstimate,
     /// The rate about x (forward) less its bias.
     pub roll_rate: AngularRate,

@@ -1,25 +1,22 @@
-//! Corrects the turns of a fibre-optic gyro, frame by frame: it subtracts the Earth's rate and the gyro's
-//! bias (`earth_and_bias`). [`FogCorrector`] also subtracts FoGNet's estimate of the remaining error; it runs on recordings.
+//! Corrects the turns of a fibre-optic gyro, frame by frame: it subtracts the Earth's rate and the gyro's bias
+//! (`earth_and_bias`). [`FogCorrector`] also subtracts FoGNet's estimate of the remaining error; it runs on
+//! recordings.
 //!
 //! # FoGNet
 //!
-//! A window covers a minute, and a new one is due every second, so 60 windows cover each second. A window's estimate is
-//! used in the second after next. The caller runs the network in the meantime ([`FogOutput::due`],
-//! [`FogCorrector::deliver`]), so fast and slow machines give the same output.
+//! A window covers a minute, and a new one is due every second, so 60 windows cover each second. A window's estimate
+//! is used in the second after next, in which the caller runs the network ([`FogOutput::due`],
+//! [`FogCorrector::deliver`]).
 //!
-//! Only the part of a window's correction that is linear in the gyro's increments can be assigned to the
-//! seconds of the window. So, with d a frame's increment, g the mean factor of the linear part, C the
-//! correction and L its linear part:
+//! Only the part of a correction that is linear in the gyro's increments (an error of scale) can be assigned to
+//! seconds. So, with d a frame's increment, g the mean factor of the linear part, C the correction and L its linear
+//! part:
 //!
 //! `corrected = d - g d - (C - L) / 6000`
 //!
-//! The linear part (the error of the gyro's scale) is subtracted from the frame that it belongs to. The rest is
-//! spread evenly over a window's length, so that each of 60 windows contributes a sixtieth. Both divisions carry
-//! their remainders, so that the sum of the output is exact.
-//!
-//! Spreading all of C evenly would give the same sum, but half a minute late after a turn.
-//! Using differences between overlapping windows instead would give 60 interleaved sums of
-//! single estimates, each with its own error.
+//! The rest is spread evenly over a window's length, so that each of 60 windows contributes a sixtieth. Both divisions
+//! carry their remainders: the sum is exact. All of C spread evenly would come half a minute late after a turn;
+//! differences between windows would be 60 interleaved sums of single estimates, each with its own error.
 
 mod beside;
 mod earth_and_bias;
@@ -35,7 +32,6 @@ pub use pipeline::{FogCounters, FogPipeline, STUCK_AFTER, STUCK_US};
 pub use rate::IncrementRate;
 pub use rest::{RestOutcome, RestReading};
 
-use crate::align::clock_ratio::ClockRatioConfig;
 use crate::bias::Latitude;
 use crate::model::fognet::{FogEstimate, GAIN_FRACTION_BITS};
 use crate::model::seconds::{FRAMES, FogFrame, Incomplete, NewSecond, STEPS, SecondSums};
@@ -53,25 +49,23 @@ pub struct FogConfig {
     pub latitude: Option<Latitude>,
     /// The tilt of the gyro's axis.
     pub tilt: Tilt,
-    /// Vibration that remains in a mean rate over a second, 1 sigma, rad/s: of the standing and of the moving
-    /// vehicle. It is not a turn of the vehicle, and sums to zero.
+    /// Vibration left in a second's mean rate, 1 sigma, rad/s, standing and moving: no turn, its sum is zero.
     pub shake: [f32; 2],
-    /// The limit on the departure of the gyro's clock from the caller's; `None` where the caller's is no better.
-    pub clock_ratio: Option<ClockRatioConfig>,
+    /// The caller's clock is a crystal's, against which that of the gyro is measured.
+    pub clock_is_exact: bool,
     /// Largest correction of a window of FoGNet that is accepted.
     pub max_correction: Angle,
 }
 
 impl FogConfig {
-    /// A level DSP-1760 on a car, without a latitude. The shaking is that of the simulated car on
-    /// its training drives. The limit of 0.02 rad a minute on FoGNet's correction is four times what the Earth's rate
-    /// can add to it, and leaves room for 0.1 % of scale error over two full turns.
+    /// A level DSP-1760 on the simulated car of the training drives. FoGNet's limit, 0.02 rad a minute, is four times
+    /// the Earth's share, and leaves room for 0.1 % of scale error over two full turns.
     pub const DEFAULT: Self = Self {
         errors: FogErrors::DSP1760,
         latitude: None,
         tilt: Tilt::NONE,
         shake: [6e-5, 1.56e-4],
-        clock_ratio: None,
+        clock_is_exact: false,
         max_correction: Angle((0.02 * Angle::PER_RAD as f64) as i64),
     };
 }
@@ -97,8 +91,7 @@ pub struct FogOutput {
     pub late: bool,
 }
 
-/// Applies FoGNet's corrections to a gyro's turns, and collects the seconds of its windows. Who runs the network keeps
-/// the window.
+/// Applies FoGNet's corrections to a gyro's turns, and collects the seconds of windows that the caller keeps.
 #[derive(Debug, Clone)]
 pub struct FogCorrector {
     config: FogConfig,
@@ -156,8 +149,7 @@ impl FogCorrector {
         output
     }
 
-    /// Accepts the estimate of a window that [`FogOutput::due`] announced, to use it when the next second is over.
-    /// Returns false, and does not use the estimate, if it is late or belongs to no window.
+    /// Accepts the estimate of a window from [`FogOutput::due`], for the next second; returns false if it is late.
     pub fn deliver(&mut self, number: u32, estimate: FogEstimate) -> bool {
         match &mut self.out {
             Some((due, slot @ None)) if *due == number => {

@@ -2,6 +2,7 @@
 
 #[doc(hidden)]
 pub mod slow;
+#[doc(hidden)]
 pub mod states;
 
 use crate::sample::Validity;
@@ -87,8 +88,7 @@ impl Faults {
     pub const CLIPPED: Self = Self(1 << 1);
     /// The part's readings repeat themselves.
     pub const STUCK: Self = Self(1 << 2);
-    /// The network's estimate was rejected, a reading of the part or its clock is implausible, the part was moved
-    /// since earlier drives, or the rates have more left to carry than a window revises.
+    /// The estimate, a reading or the clock is implausible, the part was moved, or too much waits to be carried.
     pub const IMPLAUSIBLE: Self = Self(1 << 3);
     /// The network's estimate came too late.
     pub const LATE: Self = Self(1 << 4);
@@ -165,8 +165,7 @@ impl BoardFaults {
             .with(Faults::IMPLAUSIBLE.when(self.clock || self.contradicted))
     }
 
-    /// Caps a quality at degraded where the configuration is lost, the sensor's clock is off, or other
-    /// sources contradict it.
+    /// Caps a quality at degraded without a configuration, with a clock that is off, or a contradiction.
     #[must_use]
     pub const fn cap_quality(self, quality: Quality) -> Quality {
         if (self.configuration_lost || self.clock || self.contradicted) && matches!(quality, Quality::Good) {
@@ -274,8 +273,7 @@ pub struct InputCounters {
     pub wheel_errors: u32,
     /// Frames whose latitude was too far from the one in use.
     pub latitude_errors: u32,
-    /// Courses, speeds over ground or latitudes that no vehicle has, frames of them that are too short, and damaged
-    /// messages of a GNSS receiver.
+    /// Courses, speeds or latitudes that no vehicle has, short frames, damaged messages of a GNSS receiver.
     pub heading_errors: u32,
     /// Inputs with a time before the newest one.
     pub clock_back: u32,

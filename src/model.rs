@@ -1,5 +1,4 @@
-//! The networks of the paper: their topology and weight files, on top of the arithmetic of
-//! [`crate::nn`].
+//! The networks of the paper: their topology and weight files, on top of the arithmetic of [`crate::nn`].
 
 #[doc(hidden)]
 pub mod background;
@@ -26,5 +25,5 @@ pub mod window;
 pub use blob::{Blob, BlobError};
 pub use fognet::FogNet;
 pub use fognet_blob::FogBlob;
-pub use gyronet::{GyroNet, GyroNetState};
+pub use gyronet::{GyroNet, GyroNetState, LargestState};
 pub use window::{Corrections, Estimate, FEATURES, Features, WINDOW, WindowNetwork};

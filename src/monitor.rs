@@ -8,10 +8,11 @@
 //! | silent | no sample for [`TIMEOUT_US`], or for [`START_US`] since the start | every 10 ms a message set without a rate, [`Status::Silent`] | the next sample |
 //! | saturated | the part reports it | [`Status::Clipped`], no window, no initialisation | [`HOLD`] samples later |
 //! | stuck | [`STUCK_AFTER`] samples equal to the one before in gyro, accelerometer or one axis; [`AXIS_STUCK_AFTER`] where an axis often repeats itself | [`Status::Stuck`], no window, no initialisation | a sample that differs |
-//! | clock off | the sensor's clock departs from the outside one by more than [`ClockRatioConfig::limit_ppm`] | fault bit `IMPLAUSIBLE`; the yaw is summed by the sensor's clock | the departure is within the limit again |
+//! | clock off | the sensor's clock departs from the outside one by more than [`LIMIT_PPM`] | fault bit `IMPLAUSIBLE`; the yaw is summed by the sensor's clock | the departure is within the limit again |
 //! | late | samples arrive more than [`TIMEOUT_US`] later than their stamps and the least late ones let expect (a line that stalled) | at best degraded, fault bit `GAP`, the latency contains it | samples that arrive in time, or a second later |
 //! | implausible | a reading is further from the last one than this axis moves in 10 ms ([`JUMP_RATE`], [`JUMP_FORCE`], [`USUAL`]) | as saturated, fault bit `IMPLAUSIBLE` | a reading near the last good one, or [`JUMP_PATIENCE`] samples later: then at best degraded, and the jump of the yaw rate is part of its expected error, until it jumps back or the vehicle stands |
 //!
+//! [`LIMIT_PPM`]: crate::align::clock_ratio::LIMIT_PPM
 //! [`Status::Silent`]: crate::health::Status::Silent
 //! [`Status::Clipped`]: crate::health::Status::Clipped
 //! [`Status::Stuck`]: crate::health::Status::Stuck
@@ -20,17 +21,15 @@ mod readings;
 
 pub use readings::{AXIS_STUCK_AFTER, JUMP_FORCE, JUMP_PATIENCE, JUMP_RATE, STUCK_AFTER, USUAL};
 
-use crate::align::clock_ratio::{ClockRatio, ClockRatioConfig, RatioEstimator};
+use crate::align::clock_ratio::{ClockRatio, RatioEstimator};
 use crate::health::{MonitorCounters, count};
 use crate::sample::{ImuSample, PERIOD_US, Validity};
 use crate::units::Micros;
 use readings::{Jump, Repeats};
 
-/// The sensor counts as silent after this time without a sample, microseconds: two samples are missing, and the silence
-/// is reported before the third one would come.
+/// Silence that counts, us: two samples are missing, and it is reported before the third would come.
 pub const TIMEOUT_US: u64 = 29_000;
-/// The sensor counts as silent after this time since the start without a first sample, microseconds; an MTi needs about
-/// a second before it sends.
+/// The same after the start, us: an MTi needs about a second before it sends.
 pub const START_US: u64 = 2_000_000;
 /// Samples after saturation that are not used: 50 ms, in which the part's filter recovers.
 pub const HOLD: u8 = 5;
@@ -98,7 +97,7 @@ pub struct SensorMonitor {
 }
 
 impl SensorMonitor {
-    pub const fn new(clock: Option<ClockRatioConfig>) -> Self {
+    pub const fn new(clock_is_exact: bool) -> Self {
         Self {
             repeats: Repeats::new(),
             jump: Jump::new(),
@@ -109,10 +108,7 @@ impl SensorMonitor {
             late: 0,
             heard: None,
             due: None,
-            clock: match clock {
-                Some(config) => Some(RatioEstimator::new(config)),
-                None => None,
-            },
+            clock: if clock_is_exact { Some(RatioEstimator::START) } else { None },
             counters: MonitorCounters::NONE,
         }
     }
@@ -142,8 +138,7 @@ impl SensorMonitor {
         }
     }
 
-    /// Notes that a sample with time stamp `time` arrives at `now` by an outside clock. Returns the time that the sensor's
-    /// clock has lost, microseconds.
+    /// Notes that a sample arrives at `now` by an outside clock; returns what the sensor's clock has lost, us.
     pub fn arrives(&mut self, time: Micros, now: Micros) -> u64 {
         let (late, lost) = self.arrivals.late(time, now);
         self.late = if late > IN_TIME_US { late.min(u64::from(u32::MAX)) as u32 } else { 0 };
@@ -207,8 +202,7 @@ impl SensorMonitor {
         self.heard = self.heard.and(Some(now));
     }
 
-    /// Returns the grid steps that have passed since the newest message set, when a set without a sample is due at
-    /// `now`. Call it about every millisecond.
+    /// Returns the steps since the newest message set when a set without a sample is due: call it every ms.
     pub fn poll(&mut self, now: Micros) -> Option<u32> {
         let due = match (self.due, self.heard) {
             (Some(due), _) => due,

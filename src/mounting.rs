@@ -1,10 +1,6 @@
-//! Rotations turn the sensor's axes into the vehicle's: a configured one, and one from levelling at standstill. A
-//! gyro map then corrects the remaining mounting and gain errors of the rates, which a calibration of the unit has
-//! found.
-//!
-//! Both are 3 x 3 matrices of Q30 numbers, applied in integers, so that every machine computes the same bits.
-//!
-//! Levelling turns up what standstills and turns have shown to be the vertical ([`VerticalEstimator`]).
+//! Rotations turn the sensor's axes into the vehicle's: a configured one, and one that turns up what standstills and
+//! turns have shown to be the vertical ([`VerticalEstimator`]). A gyro map then corrects what mounting and gain errors
+//! of the rates a calibration has found. All are 3 x 3 matrices of Q30 numbers, applied in integers.
 
 mod forward;
 mod vertical;
@@ -15,7 +11,7 @@ pub use vertical::{Judgement, Vertical, VerticalEstimator};
 use crate::sample::ImuSample;
 use crate::sqrt::sqrt;
 use crate::units::{AngularRate, STANDARD_GRAVITY, SpecificForce};
-use crate::vector::dot;
+use crate::vector::{dot, norm};
 
 const Q: u32 = 30;
 const ONE: f32 = (1u32 << Q) as f32;
@@ -24,8 +20,7 @@ const GRAVITY_TOLERANCE: f32 = 1.0;
 /// Cosine of 150 degrees: beyond that tilt the direction in which to turn the board upright is too uncertain.
 const UPSIDE_DOWN: f32 = -0.866;
 
-/// Cosine of the angle beyond which a sensor counts as moved: 25 degrees. Streets are no steeper than 15 degrees, and
-/// the mean of several is less.
+/// Cosine of the angle, 25 degrees, beyond which a sensor has moved: streets are no steeper than 15 degrees.
 const MOVED: f32 = 0.906;
 
 /// Returns whether two mean specific forces at standstill are so far apart that the sensor was moved between them.
@@ -77,7 +72,7 @@ impl Rotation {
     #[doc(hidden)]
     pub fn levelling(rest: [SpecificForce; 3]) -> Result<(Self, f32), LevelError> {
         let force = metre_per_sec2(&rest);
-        let norm = sqrt(dot(&force, &force));
+        let norm = norm(&force);
         if libm::fabsf(norm - STANDARD_GRAVITY) > GRAVITY_TOLERANCE {
             return Err(LevelError::NotGravity(norm));
         }
@@ -165,10 +160,8 @@ fn is_identity(rows: &[[i32; 3]; 3]) -> bool {
     rows.as_flattened().iter().zip(Rotation::IDENTITY.0.as_flattened()).all(|(a, b)| a == b)
 }
 
-/// Maps the gyro's three rates, in the vehicle's axes, to the true ones: it corrects gain and mounting of one unit.
-///
-/// Its matrix is close to the identity: within [`GyroMap::MAX_GAIN`] on the diagonal and [`GyroMap::MAX_CROSS`] off it.
-/// A larger deviation is a mounting that has to be configured.
+/// Maps the gyro's rates, in the vehicle's axes, to the true ones. It is close to the identity, within
+/// [`GyroMap::MAX_GAIN`] and off the diagonal [`GyroMap::MAX_CROSS`]: more is a mounting to configure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

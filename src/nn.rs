@@ -1,8 +1,6 @@
-//! Recurrent networks in integers, so that every machine gets the same bits, and in f32 as the
-//! reference.
+//! Recurrent networks in integers, so that every machine gets the same bits, and in f32 as the reference.
 //!
-//! Weights are immutable slices, separate from the state, which the caller owns: one set of weights can drive many
-//! states. The number formats:
+//! Weights are immutable slices, separate from the state, which the caller owns. The number formats:
 //!
 //! | what | type | format |
 //! |---|---|---|
@@ -15,17 +13,13 @@
 //! | cell state `c` | int32 | Q20 |
 //! | weight of a linear layer | int32 | Q24 of output code over input code ([`linear`]) |
 //!
-//! # Two rows in one multiply
-//! The int8 weights of two gates of a unit share a 16-bit halfword: `256 * high + low`, with (low, high) = (i, f) and
-//! (g, o). A 16 x 16 bit multiply-accumulate over it sums `256 * high_row + low_row`; a second one over the
-//! sign-extended low bytes sums `low_row`; the difference is 256 times the high row's sum. Two rows thus cost one
-//! byte extraction instead of two. The sum must stay inside 32 bits, so a high row's accumulator is limited to
-//! +-2^23: [`crate::model::Blob`] proves that for every row, for all possible inputs, before any weight is used
-//! ([`lstm::row_bound`]).
+//! **Two rows in one multiply.** The int8 weights of two gates of a unit share a halfword, `256 * high + low`, with
+//! (low, high) = (i, f) and (g, o). A 16 x 16 bit multiply-accumulate over it sums `256 * high_row + low_row`; a
+//! second one over the sign-extended low bytes sums `low_row`. A high row's accumulator is thus limited to +-2^23,
+//! which [`crate::model::Blob`] proves for every row and all inputs before any weight is used ([`lstm::row_bound`]).
 //!
-//! # Rounding
-//! A product is scaled by an arithmetic right shift (towards minus infinity); where half an
-//! LSB matters it is added before: in the row's bias by the quantiser, in `h` by the kernel.
+//! **Rounding.** A product is scaled by an arithmetic right shift; where half an LSB matters it is added before: in
+//! the row's bias by the quantiser, in `h` by the kernel.
 
 pub mod activation;
 pub mod bilstm;

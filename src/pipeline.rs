@@ -1,13 +1,9 @@
 //! The pipeline computes the corrected yaw rates of each 10 ms of the inertial sensor.
 //!
-//! This file owns the order of the stages (grid, mounting, initialisation, window, compensation, zero-rate
-//! updates, report) and nothing else. The stages do not import each other; they share the types of samples,
-//! windows and units. No clock is read: the samples' own time stamps drive everything.
-//!
-//! The network does not run inside the processing of a sample: [`Output::window`] is a window that is due, the caller
-//! runs it when it has time, and [`Pipeline::deliver`] accepts its estimate. The estimate is used exactly
-//! [`crate::compensate::Stride::delay`] samples after the window's newest one, so fast and slow machines send the same
-//! frames.
+//! This file owns the order of the stages (grid, mounting, initialisation, window, compensation, zero-rate updates,
+//! report), which do not import each other. The samples' own time stamps drive everything. The caller runs the
+//! network: [`Output::window`] is a window that is due, and [`Pipeline::deliver`] accepts its estimate, which is used
+//! exactly [`crate::compensate::Stride::delay`] samples after the window's newest one.
 
 mod config;
 mod course;
@@ -66,8 +62,7 @@ pub struct Output {
     pub vehicle: VehicleSample,
     /// The sample whose estimate is final with this one.
     pub complete: Option<Complete>,
-    /// A window that is due: run it through the network and [`Pipeline::deliver`] the estimate before the sample
-    /// [`crate::compensate::Stride::delay`] steps later.
+    /// A window for the network and [`Pipeline::deliver`], within [`crate::compensate::Stride::delay`] steps.
     pub window: Option<DueWindow>,
     /// The judgement of standstill; not likely where the gyro contradicts it.
     pub standing: Standing,
@@ -129,7 +124,7 @@ impl Pipeline {
         let state = State {
             aligner: Aligner::START,
             sensor_bias: SensorBias::START,
-            standstill: Judge::new(config.standstill),
+            standstill: Judge::START,
             standing: Standing::UNKNOWN,
             static_init: StaticInit::new(config.static_init),
             initialised: None,
@@ -153,9 +148,8 @@ impl Pipeline {
         Self { config, state }
     }
 
-    /// Adds a sample; [`Pipeline::next_frame`] gives the steps of the grid that it completes. One that is refused is
-    /// counted; unless it was a duplicate, the steps that follow report [`Faults::GAP`] for as long as after a
-    /// missing one.
+    /// Adds a sample; [`Pipeline::next_frame`] gives the steps that it completes. A refused one is counted; but for a
+    /// duplicate, the next steps report [`Faults::GAP`].
     pub fn add(&mut self, sample: ImuSample) -> Result<(), AlignError> {
         let added = self.state.aligner.add(sample);
         self.state.rate_refused = matches!(added, Err(AlignError::Rate { .. }));
@@ -179,8 +173,7 @@ impl Pipeline {
         self.state.aligner.is_nearly_complete()
     }
 
-    /// Adds a sample of a sensor with 100 samples a second, and corrects the step that it completes; its validity
-    /// must have been set.
+    /// Adds a sample of a 100 Hz sensor, with its validity set, and corrects the step that it completes.
     pub fn correct(
         &mut self,
         sample: ImuSample,
@@ -259,8 +252,7 @@ impl Pipeline {
         }
     }
 
-    /// Accepts the estimate of a window that [`Output::window`] announced. Returns whether it will be used: not if no
-    /// window waits for it, or if it is late or a duplicate. A window without an estimate is counted at its deadline.
+    /// Accepts an estimate; returns whether it will be used: not if late, or asked for by no [`Output::window`].
     pub fn deliver(&mut self, end: u32, estimate: Estimate) -> bool {
         self.state.windows.deliver(end, estimate)
     }
@@ -269,8 +261,7 @@ impl Pipeline {
         self.state.tick
     }
 
-    /// Returns the share of its rate by which a gyro about the vehicle's vertical axis misses the present turn, because it is
-    /// on a slope or banked, or may be.
+    /// Returns the share of a turn that a gyro about the vehicle's z axis misses, because the street is askew.
     pub fn tilted(&self) -> f32 {
         self.state.uncertainty.tilted().max(self.state.uncertainty.tilted_now()).max(self.ramp())
     }
@@ -321,7 +312,7 @@ impl Pipeline {
         if known.level.add(sample, stands) {
             known.zero = known.level.zero(self.config.earth_rate);
         }
-        *sample = known.level.rotation().sample(sample);
+        *sample = known.level.rotation.sample(sample);
         Some(known.zero)
     }
 
@@ -380,19 +371,19 @@ impl Pipeline {
         let State { windows, compensator, counters, .. } = &mut self.state;
         let Some(estimate) = windows.take_estimate(tick, self.config.compensate.stride.delay())? else {
             count(&mut counters.late, 1);
-            windows.reject(Faults::LATE);
+            (windows.accepted, windows.faults) = (false, Faults::LATE);
             return None;
         };
         count(&mut counters.windows, 1);
         count(&mut counters.clamped_inputs, u32::from(estimate.clamped_inputs));
         match compensator.revise(&estimate) {
             Ok(()) => {
-                windows.accept();
+                (windows.accepted, windows.faults) = (true, Faults::NONE);
                 None
             }
             Err(implausible) => {
                 count(&mut counters.implausible, 1);
-                windows.reject(Faults::IMPLAUSIBLE);
+                (windows.accepted, windows.faults) = (false, Faults::IMPLAUSIBLE);
                 Some(implausible)
             }
         }

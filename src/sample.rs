@@ -21,8 +21,7 @@ pub struct ImuSample {
     pub angular_rate: [AngularRate; 3],
     /// Temperature of the part, where it reports one.
     pub temperature: Option<CentiCelsius>,
-    /// The validity of the reading. A parser reports [`Validity::Saturated`] where the part does;
-    /// [`crate::monitor`] finds the rest.
+    /// A parser reports [`Validity::Saturated`] where the part does; [`crate::monitor`] finds the rest.
     pub validity: Validity,
 }
 
@@ -55,10 +54,7 @@ impl Validity {
     }
 }
 
-/// Constant readings for a test, with the least noise that a real part has: one bit.
-///
-/// The monitor takes readings that never change for those of a part that is stuck, so a test of a board needs this
-/// noise.
+/// Constant readings with noise of one bit, for tests: readings that never change are those of a part that is stuck.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TestSignal {
     /// Specific force x, y, z.
@@ -89,8 +85,7 @@ impl TestSignal {
     }
 }
 
-/// Holds the angle through which a fibre-optic gyro has turned since its previous message: x forward, y left, z up
-/// (FLU).
+/// The turn of a fibre-optic gyro since its previous message: x forward, y left, z up (FLU).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FogSample {
@@ -104,6 +99,14 @@ pub struct FogSample {
     pub increment: [Option<Angle>; 3],
     /// Temperature of the part, where it reports one.
     pub temperature: Option<CentiCelsius>,
+}
+
+impl ImuSample {
+    /// The codes of specific force and angular rate.
+    pub(crate) fn codes(&self) -> [i32; 6] {
+        let ([fx, fy, fz], [wx, wy, wz]) = (self.specific_force, self.angular_rate);
+        [fx.0, fy.0, fz.0, wx.0, wy.0, wz.0]
+    }
 }
 
 /// Holds a sample with its place on the 100 Hz grid.
@@ -147,6 +150,12 @@ pub struct WheelSample {
 }
 
 impl WheelSample {
+    /// Returns the left and right speed of the rear axle, which is not steered, or else of the front one.
+    pub(crate) fn axle(&self) -> Option<[WheelSpeed; 2]> {
+        let [front_left, front_right, rear_left, rear_right] = self.speeds;
+        Some([rear_left.or(front_left)?, rear_right.or(front_right)?])
+    }
+
     /// Returns whether a wheel has a speed.
     pub fn has_speed(&self) -> bool {
         self.speeds.iter().any(Option::is_some)
@@ -158,8 +167,7 @@ impl WheelSample {
     }
 }
 
-/// The extension of 32-bit stamps (71 minutes of microseconds, 119 hours at 10 kHz) to 64 bits, which never wrap. A
-/// stamp that is up to half the range smaller than the previous one is a step back, not a wrap.
+/// Extends 32-bit stamps (71 minutes of us) to 64 bits. One that is smaller by up to half the range steps back.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct StampClock {
     /// Last stamp and its unwrapped time.

@@ -31,8 +31,6 @@
 
 pub mod asm330lhh;
 pub mod bmi088;
-#[doc(hidden)]
-pub mod crc;
 pub mod dsp1760;
 #[doc(hidden)]
 pub mod framer;

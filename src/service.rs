@@ -1,8 +1,7 @@
 //! The device holds what a user configures or examines: stored data, weights and calibration.
 //!
-//! [`Device`] owns the flash, changes it on request and reports its state; it does no input or output of its own.
-//! Testers reach it over diagnosis ([`crate::uds`]). Every request is checked completely before anything is written;
-//! a refusal has a reason ([`message::Refusal`]).
+//! [`Device`] owns the flash; testers reach it over diagnosis ([`crate::uds`]). Every request is checked completely
+//! before anything is written; a refusal has a reason ([`message::Refusal`]).
 
 mod conditions;
 #[doc(hidden)]

@@ -1,7 +1,5 @@
-//! Computes square roots for sigmas and gates, where a relative error of 2e-6 does not matter.
-//!
-//! micromath's estimate is up to 6 % off; two steps of Newton's method leave 2e-6. That is enough where a sigma is
-//! formed or a force is compared with gravity, and takes a fraction of the code of a correctly rounded root.
+//! Square roots for sigmas and gates: micromath's estimate, up to 6 % off, and two steps of Newton's method leave a
+//! relative error of 2e-6, in a fraction of the code of a correctly rounded root.
 
 use micromath::F32Ext;
 

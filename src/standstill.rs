@@ -1,16 +1,13 @@
 //! The judge of standstill: whether the vehicle stands, by wheels and inertial sensor, and how probably.
 //!
-//! Bias, static initialisation, learning, calibration and the writing of the flash rest on this judge alone.
-//!
-//! - **Wheels** that stand prove a standstill, unless the inertial sensor contradicts them: the vehicle shakes for
-//!   seconds as only a driven one does, or the wheels came to rest faster than a vehicle can brake (locked, or frames
-//!   frozen at zero). They are believed again once they have turned, or once the inertial sensor is quiet. Wheels that
-//!   stand while the vehicle speeds up (carried, or frozen at zero) are believed again only once they have turned.
-//! - **A quiet inertial sensor** (`inertial`) shows a standstill where no wheel tells, or all are silent. A smooth
-//!   road can be as quiet, so it counts as a stop only since the start, or after the vehicle has slowed down: by a
-//!   force against the one by which it pulled away, that has ended at the level of that standstill. Without
-//!   that the probability is zero, and a half once the quiet has lasted for ten seconds. Wheels that turn during a
-//!   quiet second, or stand, change the probability for this vehicle.
+//! - **Wheels** that stand prove it, unless the inertial sensor contradicts: the vehicle shakes for seconds as only a
+//!   driven one does, or the wheels came to rest faster than a vehicle can brake (locked, or frames frozen at zero).
+//!   They are believed again once they have turned, or the sensor is quiet; wheels that stand while the vehicle speeds
+//!   up, only once they have turned.
+//! - **A quiet inertial sensor** (`inertial`) shows it where no wheel tells. A smooth road can be as quiet, so it
+//!   counts as a stop only since the start, or after the vehicle has slowed down: by a force against the one by which
+//!   it pulled away, that has ended at the level of that standstill. Without that the probability is zero, and a half
+//!   after ten seconds. Wheels that turn or stand during a quiet second change the probability for this vehicle.
 
 mod inertial;
 
@@ -18,27 +15,17 @@ use inertial::WINDOW;
 pub use inertial::{Axes, Inertial, Motion};
 
 use crate::sample::{ImuSample, Standstill, WheelSample};
-use crate::sqrt::sqrt;
 use crate::units::WheelSpeed;
+use crate::vector::{dot, norm};
 
-/// Limits of a quiet inertial sensor. The test `standstills_of_every_recording_with_a_speed` prints what they find and
-/// miss.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StandstillConfig {
-    /// Largest shake of a vehicle at rest, rad/s ([`Motion::shake`]): an idling engine stays below, any road above. For
-    /// gyros with less noise than 0.02 deg/s/sqrt(Hz).
-    pub shake: f32,
-    /// Largest change of speed within two seconds at rest, m/s.
-    pub speed_change: f32,
-    /// Least speed that the vehicle loses before a stop, m/s.
-    pub braking: f32,
-}
-
-impl StandstillConfig {
-    /// Limits for road vehicles, chosen on training drives.
-    pub const DEFAULT: Self = Self { shake: 2e-3, speed_change: 0.15, braking: 0.6 };
-}
-
+/// Largest shake of a vehicle at rest, rad/s ([`Motion::shake`]): an idling engine stays below, any road above. For gyros with
+/// less noise than 0.02 deg/s/sqrt(Hz). This and the next two are of road vehicles, chosen on training drives; the test
+/// `standstills_of_every_recording_with_a_speed` prints what they find and miss.
+const QUIET: f32 = 2e-3;
+/// Largest change of speed within two seconds at rest, m/s.
+pub const SPEED_CHANGE: f32 = 0.15;
+/// Least speed that the vehicle loses before a stop, m/s.
+const BRAKED: f32 = 0.6;
 /// Shake that contradicts standing wheels when it lasts for [`SHAKEN`], rad/s. Loading shakes a truck by 0.013.
 const DRIVEN_SHAKE: f32 = 6e-3;
 /// The number of judgements in a row, 100 ms each.
@@ -47,8 +34,7 @@ const SHAKEN: u8 = 50;
 /// within two seconds, m/s^2 and m/s; and the tenths of a second for which a vehicle rocks after it has stopped.
 const CARRIED: (f32, f32) = (0.5, 0.5);
 const ROCKS: u8 = 15;
-/// Part of a loss of speed that must be against the pull, and force along it by which a stop may differ from the
-/// standstill before, m/s^2: a slope.
+/// Part of a loss of speed that is against the pull, and the force along it that a slope explains, m/s^2.
 const AGAINST: f32 = 0.5;
 const SLOPE: f32 = 0.6;
 /// Speed of a wheel of a vehicle that drives, and does not creep at the wheels' threshold: 1 m/s.
@@ -61,8 +47,7 @@ const CALM: f32 = 1.2e-2;
 const PULL: f32 = 0.3;
 /// A speed of a wheel that shows motion: 0.3 m/s.
 const TURNS: u32 = 19_661;
-/// Largest loss of speed in 10 ms by braking, 12 m/s^2, and the speed at which passive wheel sensors go silent, 2 m/s;
-/// codes.
+/// Largest loss of speed in 10 ms, 12 m/s^2, and the speed at which passive sensors go silent, 2 m/s; codes.
 const BRAKING: u32 = 7_864;
 const DEAD_BAND: u32 = 131_072;
 /// Probability that standing wheels are a standing vehicle.
@@ -116,7 +101,6 @@ impl Standing {
 
 #[derive(Debug, Clone)]
 pub struct Judge {
-    config: StandstillConfig,
     inertial: Inertial,
     /// Judgements in a row that are quiet, and those after them in which only the gyro's mean has changed.
     quiet_for: u8,
@@ -145,35 +129,32 @@ pub struct Judge {
 }
 
 impl Judge {
-    pub const fn new(config: StandstillConfig) -> Self {
-        Self {
-            config,
-            inertial: Inertial::START,
-            quiet_for: 0,
-            lingers: 0,
-            is_stop: true,
-            has_moved: false,
-            shaken: 0,
-            are_wheels_doubted: false,
-            is_carried: false,
-            drives: false,
-            speeds_up: false,
-            is_calm: false,
-            still_for: 0,
-            rest: None,
-            pull: None,
-            speed: 0,
-            quiet: BEFORE,
-        }
-    }
+    /// The state before the first sample.
+    pub const START: Self = Self {
+        inertial: Inertial::START,
+        quiet_for: 0,
+        lingers: 0,
+        is_stop: true,
+        has_moved: false,
+        shaken: 0,
+        are_wheels_doubted: false,
+        is_carried: false,
+        drives: false,
+        speeds_up: false,
+        is_calm: false,
+        still_for: 0,
+        rest: None,
+        pull: None,
+        speed: 0,
+        quiet: BEFORE,
+    };
 
     /// Starts the inertial evidence again after a gap.
     pub fn restart(&mut self) {
         (self.inertial, self.quiet_for) = (Inertial::START, 0);
     }
 
-    /// Returns whether the vehicle drives: its wheels turn faster than they creep, or the last two seconds show a change of
-    /// speed, or a force, that no standing vehicle has.
+    /// Returns whether wheels faster than a creep, or a force or change of speed in 2 s, show that it drives.
     pub fn has_driven_off(&self) -> bool {
         self.drives || self.speeds_up
     }
@@ -236,30 +217,29 @@ impl Judge {
     /// Returns whether a change of speed before quiet is a braking that has ended.
     fn is_against_the_pull(&self, lost: Axes, force: Axes) -> bool {
         let (Some(pull), Some(rest)) = (self.pull, self.rest) else { return true };
-        let size = norm(pull);
-        dot(lost, pull) <= -AGAINST * norm(lost) * size && dot(minus(force, rest), pull) <= SLOPE * size
+        let size = norm(&pull);
+        dot(&lost, &pull) <= -AGAINST * norm(&lost) * size && dot(&minus(force, rest), &pull) <= SLOPE * size
     }
 
     fn inertial_evidence(&mut self, motion: &Motion, wheels: Standstill) {
-        let StandstillConfig { shake, speed_change, braking } = self.config;
         let left = self.rest.map(|rest| minus(motion.newest, rest));
-        let carried = left.is_some_and(|left| norm(left) >= CARRIED.0);
+        let carried = left.is_some_and(|left| norm(&left) >= CARRIED.0);
         let speeds_up = motion.speed_change >= CARRIED.1;
         self.speeds_up = speeds_up || carried;
         self.is_calm = !speeds_up && motion.shake < CALM;
-        if motion.speed_change >= speed_change || carried && self.is_stop {
+        if motion.speed_change >= SPEED_CHANGE || carried && self.is_stop {
             (self.is_stop, self.has_moved) = (false, true);
         }
-        let is_quiet = motion.shake < shake && motion.speed_change < speed_change;
+        let is_quiet = motion.shake < QUIET && motion.speed_change < SPEED_CHANGE;
         // A gyro that jumps, and a deck that begins to turn, change no speed.
-        let is_still = self.is_stop && self.quiet_for > 0 && motion.speed_change < STILL * speed_change;
+        let is_still = self.is_stop && self.quiet_for > 0 && motion.speed_change < STILL * SPEED_CHANGE;
         let is_turned = is_still && self.is_calm && self.lingers < WINDOW as u8;
         self.lingers = if is_turned && !is_quiet { self.lingers + 1 } else { 0 };
         self.quiet_for = if is_quiet || is_turned { self.quiet_for.saturating_add(1) } else { 0 };
         if is_quiet && core::mem::take(&mut self.has_moved) {
             self.is_stop |= motion
                 .speed_lost
-                .is_some_and(|lost| norm(lost) >= braking && self.is_against_the_pull(lost, motion.force));
+                .is_some_and(|lost| norm(&lost) >= BRAKED && self.is_against_the_pull(lost, motion.force));
         }
         if wheels == Standstill::Still {
             self.still_for = self.still_for.saturating_add(1);
@@ -277,7 +257,7 @@ impl Judge {
             (self.rest, self.pull) = (Some(force), None);
         } else if let (None, Some(rest)) = (self.pull, self.rest) {
             let pull = minus(motion.force, rest);
-            self.pull = (norm(pull) >= PULL).then_some(pull);
+            self.pull = (norm(&pull) >= PULL).then_some(pull);
         }
         self.shaken = if wheels == Standstill::Still && motion.shake > DRIVEN_SHAKE {
             self.shaken.saturating_add(1)
@@ -298,12 +278,4 @@ impl Judge {
 
 fn minus(one: Axes, other: Axes) -> Axes {
     core::array::from_fn(|axis| one[axis] - other[axis])
-}
-
-fn dot([a, b, c]: Axes, [x, y, z]: Axes) -> f32 {
-    a * x + b * y + c * z
-}
-
-fn norm(axes: Axes) -> f32 {
-    sqrt(dot(axes, axes))
 }

@@ -20,18 +20,24 @@
 //! | 0x85 | 2, 3 | stop and continue the recording of troubles |
 
 mod control;
+#[doc(hidden)]
 pub mod data;
 mod download;
+#[doc(hidden)]
 pub mod dtc;
+#[doc(hidden)]
 pub mod isotp;
 mod response;
 mod routines;
+#[doc(hidden)]
 pub mod security;
 mod server;
 mod services;
 mod session;
+#[doc(hidden)]
 pub mod signature;
 mod troubles;
+#[doc(hidden)]
 pub mod update;
 
 pub use response::Nrc;

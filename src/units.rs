@@ -1,8 +1,5 @@
-//! The fixed-point physical quantities of the integer pipeline.
-//!
-//! Everything between the sensor parser and the CAN payload is integer arithmetic, so that a host and a
-//! microcontroller agree to the last bit. Each quantity is a separate type around its integer code; conversions from
-//! and to physical units are explicit.
+//! The fixed-point quantities of the integer pipeline: all between the sensor parser and the CAN payload is integer
+//! arithmetic, so that every machine computes the same bits.
 
 /// Rate of the common grid that the networks see, Hz.
 pub const RATE_HZ: u32 = 100;
@@ -10,8 +7,7 @@ pub const RATE_HZ: u32 = 100;
 /// Standard gravity converts the readings of parts that measure in g, m/s^2.
 pub const STANDARD_GRAVITY: f32 = 9.806_65;
 
-/// Returns `value / DIVISOR`, rounded down, by divisions of 32 bits, which a microcontroller has in hardware. The value is
-/// below 2^63 / `DIVISOR`.
+/// Returns `value / DIVISOR`, rounded down, by hardware divisions of 32 bits; `value` below 2^63 / `DIVISOR`.
 #[inline]
 pub const fn divided<const DIVISOR: u32>(value: u64) -> u64 {
     const HIGH: u64 = 1 << 32;
@@ -96,9 +92,8 @@ impl SpecificForce {
     }
 }
 
-/// Holds an angle turned, signed 64 bit, LSB 2^-44 rad (3.3e-12 deg), range +-524,288 rad.
-///
-/// This is so fine that rounding 1000 increments a second, always in the same direction, stays below 6e-6 deg/h.
+/// An angle turned, LSB 2^-44 rad (3.3e-12 deg), up to 524,288 rad: rounding a thousand increments a second, always in
+/// one direction, stays below 6e-6 deg/h.
 #[derive(Debug, Clone, Copy, PartialEq, Hash, Eq, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Angle(pub i64);
@@ -130,8 +125,7 @@ impl Angle {
     }
 }
 
-/// Holds an accumulated yaw, signed 64 bit, LSB 2^-27 rad/s x 10 ms: the sum of emitted rates, where a step of the
-/// sensor's clock is 10 ms.
+/// An accumulated yaw, LSB 2^-27 rad/s x 10 ms: the sum of rates over steps of the sensor's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Yaw(pub i64);

@@ -1,23 +1,20 @@
-//! Translates the time stamps of a part's clock to the board's clock.
+//! Translates the time stamps of a part's clock, which started at another time and has another speed, to the board's.
 //!
-//! A time stamp is the time of a reading by a clock that started at another time and runs at another speed than the
-//! board's. The arrival is timed by the board's clock, but with a varying delay. The arrival with the least delay is
-//! the best one, so:
+//! The board's clock times the arrival, but with a varying delay. The arrival with the least delay is the best one,
+//! so:
 //!
 //! | event | rule |
 //! |---|---|
 //! | first sample | offset = arrival - time stamp |
 //! | earlier than the offset predicts | the offset is lowered to it at once |
-//! | later, within [`JUMP_US`] (jitter) | the offset creeps up, [`CREEP_PPM`] of the time passed; counted above [`JITTER_US`] |
+//! | later, within [`JUMP_US`] (jitter) | the offset creeps up, [`CREEP_PPM`] of the time passed |
 //! | later than [`JITTER_US`] throughout [`PATIENCE_US`] (a small jump) | as a clock jump |
-//! | time stamp equal to the last (duplicate) | refused, counted |
-//! | before the last, within [`JUMP_US`] (out of order) | refused, counted |
-//! | off by more than [`JUMP_US`] (clock jump, restart, lost messages that nothing counted) | new offset, counted; the caller must not connect samples across it |
+//! | time stamp equal to the last, or before it within [`JUMP_US`] | refused |
+//! | off by more than [`JUMP_US`] (clock jump, restart, lost messages) | new offset; the caller must not connect samples across it |
 //!
-//! The board's time never goes back: after the offset was lowered it advances by one microsecond a sample until it is
-//! correct again.
+//! The board's time never goes back: after the offset was lowered it advances by 1 us a sample until it is correct
+//! again.
 
-use crate::health::count;
 use crate::units::Micros;
 
 /// A time stamp that is off by more than this counts as a clock jump.
@@ -39,20 +36,6 @@ pub enum ClockError {
     OutOfOrder { last: Micros, at: Micros },
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct ClockCounters {
-    pub samples: u32,
-    /// Samples that arrived more than [`JITTER_US`] later than the least late one.
-    pub late: u32,
-    pub duplicates: u32,
-    pub out_of_order: u32,
-    pub jumps: u32,
-}
-
-impl ClockCounters {
-    pub const NONE: Self = Self { samples: 0, late: 0, duplicates: 0, out_of_order: 0, jumps: 0 };
-}
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BoardTime {
     /// The time at which the sample was taken, plus the shortest delay of the line.
@@ -67,11 +50,10 @@ pub struct PartClock {
     last: Option<(Micros, Micros, i64)>,
     /// The first arrival of the current run of late ones.
     late_since: Option<Micros>,
-    counters: ClockCounters,
 }
 
 impl PartClock {
-    pub const START: Self = Self { last: None, late_since: None, counters: ClockCounters::NONE };
+    pub const START: Self = Self { last: None, late_since: None };
 
     pub fn translate(&mut self, stamp: Micros, arrival: Micros) -> Result<BoardTime, ClockError> {
         let measured = (arrival.0 as i64).wrapping_sub(stamp.0 as i64);
@@ -79,7 +61,6 @@ impl PartClock {
             return Ok(self.take(stamp, arrival, measured, false));
         };
         if stamp == last {
-            count(&mut self.counters.duplicates, 1);
             return Err(ClockError::Duplicate { at: stamp });
         }
         let late = measured.wrapping_sub(offset);
@@ -87,28 +68,20 @@ impl PartClock {
         self.late_since = since;
         let lasting = since.is_some_and(|since| arrival.0.saturating_sub(since.0) > PATIENCE_US);
         if lasting || late.unsigned_abs() > JUMP_US {
-            count(&mut self.counters.jumps, 1);
             self.late_since = None;
             let time = Micros(arrival.0.max(board.0 + 1));
             return Ok(self.take(stamp, time, measured, true));
         }
         if stamp < last {
-            count(&mut self.counters.out_of_order, 1);
             return Err(ClockError::OutOfOrder { last, at: stamp });
         }
-        count(&mut self.counters.late, u32::from(late > JITTER_US as i64));
         let creep = (stamp.0 - last.0).saturating_mul(CREEP_PPM).div_ceil(1_000_000) as i64;
         let offset = offset.wrapping_add(late.min(creep));
         let time = Micros(stamp.0.wrapping_add_signed(offset).max(board.0 + 1));
         Ok(self.take(stamp, time, offset, false))
     }
 
-    pub fn counters(&self) -> &ClockCounters {
-        &self.counters
-    }
-
     fn take(&mut self, stamp: Micros, time: Micros, offset: i64, jumped: bool) -> BoardTime {
-        count(&mut self.counters.samples, 1);
         self.last = Some((stamp, time, offset));
         BoardTime { time, jumped }
     }

@@ -1,33 +1,24 @@
 //! Measures how fast an inertial sensor's clock runs against the board's.
 //!
-//! A sensor paces its samples by its own oscillator: that of an ICM-42688-P is up to 1.5 % off at 25 deg C and 2 %
-//! more over temperature (DS-000347, table 4). Its rate is correct in rad/s of true time, and so is the rate that is
-//! sent. Only the time between two samples is wrong: a step that the part calls 10 ms lasts 10.1 ms, and the vehicle
-//! turns by the rate times 10.1 ms in it. The accumulated yaw therefore sums [`ClockRatio::turned`] of each rate,
-//! which applies the ratio of true time to the sensor's. A receiver that multiplies the rate by the time between two
-//! messages gets the same angle.
+//! A sensor paces its samples by its own oscillator. Its rate is correct in rad/s of true time, but a step that it
+//! calls 10 ms may last 10.1 ms, in which the vehicle turns by the rate times 10.1 ms. The accumulated yaw therefore
+//! sums [`ClockRatio::turned`] of each rate. A receiver that multiplies the rate by the time between two messages gets
+//! the same angle.
 //!
-//! # The ratio
-//!
-//! A sample arrives late by a time that varies (line, tasks), and never early. The least late sample of
-//! every two seconds is taken, as a point of sensor time and board time. The ratio is the slope
-//! from the oldest of the last 17 points to the newest: 32 s, over which 3 ms of remaining jitter are
-//! 94 ppm. It is used from 8 s on; before that the ratio is one, and most of that time the vehicle
-//! still stands for static initialisation.
+//! A sample arrives late by a time that varies, and never early. The least late sample of every two seconds is taken,
+//! as a point of sensor time and board time. The ratio is the slope from the oldest of the last 17 points to the
+//! newest: 32 s, over which 3 ms of remaining jitter are 94 ppm. Before 8 s the ratio is one.
 //!
 //! | event | what is done |
 //! |---|---|
-//! | late arrivals, a burst after a stall of less than two seconds | the least late sample is taken |
 //! | the two clocks differ by less than [`JITTER_US`] over the points | one: two crystals agree, and no bit of the results changes |
 //! | the point in the middle is off the line by more than [`JITTER_US`] (a stamp that jumped, a block that was late as a whole) | the points restart with the newest; the ratio is kept |
 //! | the sensor's clock goes back, [`GAP_US`] pass on either clock between two samples (restart, silence), or a block lasts twice its time by the board's | the points restart; the ratio is kept |
-//! | the ratio departs from one by more than [`ClockRatioConfig::limit_ppm`] | one of the clocks is at fault, and it is unknown which: the ratio is one, and [`RatioEstimator::fault`] reports it |
+//! | the ratio departs from one by more than [`LIMIT_PPM`] | one of the clocks is at fault, and it is unknown which: the ratio is one, and [`RatioEstimator::fault`] reports it |
 //!
-//! A step of J in either clock, wherever it falls among the points, and a late point at either end bend the line by
-//! at least J / 2 in its middle; so an undetected step is below 2 [`JITTER_US`], 188 ppm of 32 s.
-//!
-//! Where the sensor's own time is the only one (a recording, whose bytes arrive at the host's pace)
-//! there is no estimator, and [`ClockRatio::ONE`] is used.
+//! A step of J in either clock, wherever it falls, and a late point at either end bend the line by at least J / 2 in
+//! its middle; so an undetected step is below 2 [`JITTER_US`], 188 ppm of 32 s. A recording, whose bytes arrive at the
+//! host's pace, has no estimator, but [`ClockRatio::ONE`].
 
 use crate::units::{Angle, AngularRate, Micros};
 use heapless::Deque;
@@ -42,6 +33,9 @@ const ENOUGH: usize = 5;
 pub const JITTER_US: u64 = 3_000;
 /// The points restart after this time without a sample.
 pub const GAP_US: u64 = BLOCK_US;
+/// Largest departure from one of a working oscillator, millionths: an ICM-42688-P has 3.5 % (1.5 % at 25 deg C and 2 % over
+/// temperature).
+pub const LIMIT_PPM: u32 = 40_000;
 
 /// True time over the sensor's time: LSB 2^-30, so one is 2^30.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -81,26 +75,12 @@ impl ClockRatio {
         )
     }
 
-    /// Returns the angle that a vehicle turns at `rate` in a grid step of the sensor's clock, to the
-    /// nearest code of [`crate::units::Yaw`]: the rate's own code if the ratio is one.
+    /// Returns the angle turned at `rate` in a grid step of the sensor's clock, in codes of [`crate::units::Yaw`].
     #[must_use]
     pub fn turned(self, rate: AngularRate) -> i64 {
         // Below 2^63.
         (i64::from(rate.0) * i64::from(self.0) + (1 << (Self::FRACTION_BITS - 1))) >> Self::FRACTION_BITS
     }
-}
-
-/// Configures when the two clocks contradict each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct ClockRatioConfig {
-    /// Largest departure from one of a working oscillator, millionths.
-    pub limit_ppm: u32,
-}
-
-impl ClockRatioConfig {
-    /// 4 %: an ICM-42688-P has 3.5 % (1.5 % at 25 deg C and 2 % over temperature).
-    pub const DEFAULT: Self = Self { limit_ppm: 40_000 };
 }
 
 /// The time of a sample by the sensor's clock, and of its arrival by the board's.
@@ -128,7 +108,6 @@ struct Block {
 
 #[derive(Debug, Clone)]
 pub struct RatioEstimator {
-    config: ClockRatioConfig,
     block: Option<Block>,
     points: Deque<Point, POINTS>,
     /// The slope of the points, which compares arrivals with each other even where it is not accepted as the ratio.
@@ -139,17 +118,14 @@ pub struct RatioEstimator {
 }
 
 impl RatioEstimator {
-    pub const fn new(config: ClockRatioConfig) -> Self {
-        Self {
-            config,
-            block: None,
-            points: Deque::new(),
-            slope: ClockRatio::ONE,
-            ratio: ClockRatio::ONE,
-            is_known: false,
-            fault: false,
-        }
-    }
+    pub const START: Self = Self {
+        block: None,
+        points: Deque::new(),
+        slope: ClockRatio::ONE,
+        ratio: ClockRatio::ONE,
+        is_known: false,
+        fault: false,
+    };
 
     pub fn observe(&mut self, sensor: Micros, board: Micros) {
         let point = Point { sensor: sensor.0, board: board.0 };
@@ -186,7 +162,7 @@ impl RatioEstimator {
         self.is_known
     }
 
-    /// Returns whether the clocks depart from each other by more than [`ClockRatioConfig::limit_ppm`].
+    /// Returns whether the clocks depart from each other by more than [`LIMIT_PPM`].
     pub fn fault(&self) -> bool {
         self.fault
     }
@@ -214,7 +190,7 @@ impl RatioEstimator {
             return;
         }
         self.is_known = true;
-        self.fault = slope.departure_ppm() > self.config.limit_ppm;
+        self.fault = slope.departure_ppm() > LIMIT_PPM;
         let alike = board.abs_diff(sensor) <= JITTER_US;
         self.ratio = if self.fault || alike { ClockRatio::ONE } else { slope };
     }

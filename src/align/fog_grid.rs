@@ -1,11 +1,10 @@
-//! Puts the increments of a fibre-optic gyro on a grid of the board's clock.
+//! Puts the increments of a fibre-optic gyro on a grid of the board's clock, at its multiples of 10 ms.
 //!
-//! Grid steps are the multiples of 10 ms of the board's clock. A step is emitted as soon as the increments have passed
-//! it, and at the latest [`MAX_DELAY_US`] after its time, with the increments that have arrived by then. Later ones are
-//! not used.
+//! A step is emitted as soon as the increments have passed it, and at the latest [`MAX_DELAY_US`] after its time.
+//! Later increments are not used.
 
-use super::clock::{ClockCounters, ClockError, PartClock};
-use super::increments::{IncrementCounters, Increments, Turn};
+use super::clock::{ClockError, PartClock};
+use super::increments::{Increments, Turn};
 use crate::sample::{FogSample, PERIOD_US};
 use crate::units::Micros;
 
@@ -58,8 +57,7 @@ impl FogGrid {
         })
     }
 
-    /// Returns the next step, if it is complete or due. Call it until `None` after every sample, and at least every
-    /// few milliseconds.
+    /// Returns the next step, if complete or due. Call it until `None` after every sample, and every few ms.
     #[inline(never)]
     pub fn next_step(&mut self, now: Micros) -> Option<Step> {
         let next = self.next?;
@@ -76,13 +74,5 @@ impl FogGrid {
         let time = Micros(next);
         self.next = Some(next + PERIOD_US);
         Some(Step { time, turn: self.increments.take(time) })
-    }
-
-    pub fn clock(&self) -> &ClockCounters {
-        self.clock.counters()
-    }
-
-    pub fn increments(&self) -> &IncrementCounters {
-        self.increments.counters()
     }
 }

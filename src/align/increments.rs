@@ -1,23 +1,17 @@
 //! Sums the increments of a fibre-optic gyro from one grid step to the next.
 //!
-//! The rules:
 //! - An increment belongs to the time since the one before it. One that straddles a grid step is split there in
-//!   proportion; the second part gets the rounding error of the first, so the sum over all steps is the sum of all
-//!   increments, to the last bit.
-//! - After lost messages, or where the one before ended more than one and a half spans ago, an increment belongs to
-//!   its own span only. The turn in the gap is unknown and not guessed: the step reports how much of its time is
-//!   covered.
-//! - The part of an increment whose step has already been emitted is counted and not used.
-//! - An axis that was invalid in some part of the step has no sum.
+//!   proportion, without loss: the sum over all steps is that of all increments, to the last bit.
+//! - After lost messages, or where the one before ended more than one and a half spans ago, it belongs to its own span
+//!   only. The turn in the gap is not guessed: the step reports how much of its time is covered.
+//! - What belongs to a step that is already emitted is not used. An axis that was invalid in some part has no sum.
 //! - A span longer than a grid step is refused: set the part to 100 Hz or more.
 
-use crate::health::count;
 use crate::sample::{FogSample, PERIOD_US};
 use crate::units::{Angle, Micros};
 use heapless::Deque;
 
-/// The number of increments kept: those that a 1 kHz part sends in the 20 ms that a step can wait, and half as many
-/// again.
+/// Increments kept: those of a 1 kHz part in the 20 ms that a step can wait, and half as many again.
 pub const KEPT: usize = 32;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,20 +22,7 @@ pub struct Turn {
     pub covered: u32,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct IncrementCounters {
-    pub gaps: u32,
-    pub late: u32,
-    pub too_long: u32,
-    pub dropped: u32,
-}
-
-impl IncrementCounters {
-    pub const NONE: Self = Self { gaps: 0, late: 0, too_long: 0, dropped: 0 };
-}
-
-/// An increment and the time that it belongs to. An axis that is not good has the angle zero: an `Option` for each angle
-/// would take a third more of the memory.
+/// An increment and its time; a bad axis has the angle zero, since `Option`s would take a third more memory.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     begin: u64,
@@ -55,11 +36,10 @@ struct Piece {
 pub struct Increments {
     pieces: Deque<Piece, KEPT>,
     last_end: Option<u64>,
-    counters: IncrementCounters,
 }
 
 impl Increments {
-    pub const EMPTY: Self = Self { pieces: Deque::new(), last_end: None, counters: IncrementCounters::NONE };
+    pub const EMPTY: Self = Self { pieces: Deque::new(), last_end: None };
 
     /// Adds a sample that ended at `time` by the board's clock, later than the last one.
     pub fn add(&mut self, time: Micros, sample: &FogSample) {
@@ -69,20 +49,15 @@ impl Increments {
             // Jitter moves the ends by less than half the span. A part without a sequence number shows one lost
             // message only by a distance of two spans.
             Some(last) if sample.lost == 0 && 2 * end.saturating_sub(last) <= 3 * span => last,
-            Some(last) => {
-                count(&mut self.counters.gaps, 1);
-                own.max(last)
-            }
+            Some(last) => own.max(last),
             None => own,
         };
         self.last_end = Some(end);
         if span > PERIOD_US {
-            count(&mut self.counters.too_long, 1);
             return;
         }
         if self.pieces.is_full() {
             self.pieces.pop_front();
-            count(&mut self.counters.dropped, 1);
         }
         // There is room now.
         let angle = sample.increment.map(|angle| angle.unwrap_or(Angle::ZERO));
@@ -123,7 +98,6 @@ impl Increments {
             }
             if piece.begin < begin {
                 // Its step has been emitted, and the receiver may have filled the gap.
-                count(&mut self.counters.late, 1);
                 piece = piece.split(begin.min(piece.end)).1;
             }
             covered += piece.end - piece.begin;
@@ -141,10 +115,6 @@ impl Increments {
             angle = [None; 3];
         }
         Turn { angle, covered: covered as u32 }
-    }
-
-    pub fn counters(&self) -> &IncrementCounters {
-        &self.counters
     }
 }
 

@@ -9,8 +9,7 @@ use crate::units::{Angle, AngularRate, RATE_HZ};
 /// Rotation of the Earth against the stars, rad/s (WGS 84).
 pub(crate) const EARTH_RATE: f32 = 7.292_115e-5;
 
-/// Holds a geographic latitude as the Earth's rate about the vertical there, so that the sine is computed once and not
-/// for each sample.
+/// A geographic latitude, as the Earth's rate about the vertical there: the sine is computed once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Latitude {
@@ -36,8 +35,7 @@ impl Latitude {
         self.vertical_rate
     }
 
-    /// Returns the angle that the Earth turns by about the upward vertical in a step of the grid. It is finer than the
-    /// rate: 1e-6 deg/h.
+    /// Returns the Earth's turn about the upward vertical in a grid step, finer than the rate: 1e-6 deg/h.
     pub const fn step_turn(self) -> Angle {
         self.step_turn
     }
@@ -47,8 +45,7 @@ impl Latitude {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum EarthRate {
-    /// The Earth's rate is part of the bias. This suits a gyro that is initialised at rest on each start, and whose
-    /// bias has no other use.
+    /// It is part of the bias, of a gyro that is initialised at rest on each start.
     #[default]
     LeftInBias,
     /// The Earth's rate is known, and the bias is the part's own.

@@ -1,12 +1,10 @@
 //! Static initialisation takes the gyro's bias as its mean over the first three seconds.
 //!
-//! A vehicle with its engine running shakes but goes nowhere, so stillness is judged twice:
-//! the spread inside the three seconds must stay below what an engine does, and the means of
-//! its three single seconds must agree, which they do not when the vehicle turns, rolls or
-//! speeds up. Where the judge of standstill agrees the change may be twice as large, for a vehicle that rocks when its engine
-//! starts. Where its means, which leave an engine's vibration out, are calm, the spread may be four times as large, and roll and pitch
-//! may change twice as much, for a vehicle that the wind rocks. A steady straight
-//! drive or a slow turn (a ferry, a turntable) can still look like standing: later standstills heal that
+//! An engine shakes a vehicle that goes nowhere, so stillness is judged twice: the spread must stay below what an
+//! engine does, and the means of the single seconds must agree, which they do not when the vehicle turns, rolls or
+//! speeds up. Where the judge of standstill agrees the change may be twice as large (it rocks when its engine starts).
+//! Where its means, which leave an engine out, are calm, the spread may be four times as large, and roll and pitch may
+//! change twice as much (wind). A ferry or a steady straight can still look like standing: later standstills heal that
 //! ([`super::zero_rate`]).
 
 use super::Spread;
@@ -84,7 +82,7 @@ impl Axis {
     const EMPTY: Self = Self { all: Spread::EMPTY, seconds: [0; SECONDS] };
 
     fn add(&mut self, code: i32, value: f32) {
-        self.seconds[(self.all.count() / RATE_HZ) as usize % SECONDS] += i64::from(code);
+        self.seconds[(self.all.count / RATE_HZ) as usize % SECONDS] += i64::from(code);
         self.all.add(code, value);
     }
 
@@ -132,7 +130,7 @@ impl StaticInit {
             self.accel[axis].add(force, force as f32 / SpecificForce::PER_METRE_PER_SEC2);
         }
         let [first, ..] = &self.gyro;
-        if first.all.count() < STATIC_SAMPLES {
+        if first.all.count < STATIC_SAMPLES {
             return None;
         }
         let result = self.judge(stands, calm);
@@ -140,8 +138,7 @@ impl StaticInit {
         Some(result)
     }
 
-    /// Drops the collected samples because the wheels turn. Returns the error once, not with every sample of a
-    /// drive.
+    /// Drops the samples because the wheels turn. Returns the error once, not with every sample of a drive.
     pub fn refuse_wheels(&mut self) -> Option<StaticError> {
         let refused = self.wheels_refused;
         self.restart();

@@ -1,12 +1,9 @@
 //! The gyro's bias by temperature, as standstills of earlier drives have shown it: a bias and a slope of each axis.
 //!
-//! The bias of a MEMS gyro changes with its temperature, mostly in the same way at each start. So the bias that
-//! standstills have shown is subtracted from each reading, in the sensor's own axes, and later stages see a sensor
-//! with less bias: static initialisation and the zero-rate updates find the rest. It helps where they cannot:
-//! before the first standstill, and while the sensor warms up on a drive without a standstill.
-//!
-//! A Kalman filter learns both with an offset that one start has at all temperatures. The three axes share a
-//! covariance, because they are always measured together. What real parts bend by is part of each sigma.
+//! It is subtracted from each reading, in the sensor's own axes, so that later stages see a sensor with less bias:
+//! before the first standstill, and while the sensor warms up on a drive without one. A Kalman filter learns both with
+//! an offset that one start has at all temperatures. The axes share a covariance: they are always measured together.
+//! What real parts bend by is part of each sigma.
 
 use crate::sqrt::sqrt;
 use crate::units::{AngularRate, CentiCelsius};
@@ -24,8 +21,7 @@ const BENT: f32 = 3e-5;
 const AGEING: [f32; OFFSET] = [5e-5, 8e-7];
 /// Sigma of a start's offset before starts have been compared, rad/s: 0.03 deg/s.
 const FIRST_OFFSET: f32 = 5e-4;
-/// Sigma of a mean over three seconds at rest, rad/s: four of one standstill are as good as one with the offset of a
-/// standstill ([`super::ZeroRateConfig::DEFAULT`]).
+/// Sigma of a mean over 3 s at rest, rad/s: four of one standstill are as good as one with its offset.
 const REST: f32 = 4e-4;
 /// The number of starts after which the offsets of old ones are forgotten.
 const MEMORY: u8 = 8;
@@ -57,8 +53,7 @@ impl ThermalBias {
         Self { states: [[0.0; STATES]; 3], covariance, offset_square, starts: 0 }
     };
 
-    /// Returns the bias about x, y and z at a temperature, deg C, and its sigma at a start, rad/s; `None` before the first
-    /// standstill.
+    /// Returns the bias at a temperature, deg C, and its sigma at a start, rad/s; `None` before a standstill.
     pub fn at(&self, celsius: f32) -> Option<([AngularRate; 3], f32)> {
         if self.starts == 0 {
             return None;
@@ -69,8 +64,7 @@ impl ThermalBias {
         Some((self.states.map(|states| code(dot(&states, &by))), sqrt(variance)))
     }
 
-    /// Returns the sigma of the change of the bias from one temperature to another (deg C) after the slope's share is
-    /// subtracted, rad/s.
+    /// Returns the sigma of the bias' change between two temperatures beyond the slope's share, rad/s.
     pub fn change_sigma(&self, from: f32, to: f32) -> f32 {
         libm::fabsf(warmer(to) - warmer(from)) * sqrt(self.covariance[1][1].max(0.0) + BENT * BENT)
     }

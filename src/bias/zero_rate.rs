@@ -1,26 +1,20 @@
 //! Zero-rate updates estimate, while the vehicle stands, the error of the yaw rate that the network has not removed.
 //!
-//! A Kalman filter estimates two states from one-second means of the gyro, less its static bias and its
-//! complete correction:
+//! A Kalman filter estimates two states from one-second means of the gyro, less its static bias and complete
+//! correction:
 //!
 //! - the **bias** b also holds while driving: it is a random walk, and changes with temperature;
-//! - the **offset** s holds for one standstill only: an idling engine shakes the sensor differently from
-//!   a road, which shifts the mean of gyro and network. The shift differs from stop to stop and does not
-//!   average out during a stop: without this state, a minute at a traffic light would make the filter
-//!   too certain of a bias that does not hold on the road. It is the wider the less probable the standstill is:
-//!   it may be a smooth bend, which begins and ends, so a doubtful standstill teaches little.
+//! - the **offset** s holds for one standstill only: an idling engine shakes the sensor differently from a road. It
+//!   does not average out during a stop: without it, a minute at a traffic light would make the filter too certain. It
+//!   is the wider the less probable the standstill is, so a doubtful one teaches little.
 //!
-//! The mean of a second is modelled as z = b + s + noise, with the noise taken from the spread of the ten means of
-//! [`BATCH`] samples in it: the spread of single samples would not show that an engine's vibration averages out
-//! faster than white noise, nor that a low-pass correction makes samples alike. A second counts only if the vehicle
-//! also stands in the next one, because wheel sensors show late that a car pulls away.
+//! The mean of a second is b + s + noise, the noise by the spread of its ten means of [`BATCH`] samples: single
+//! samples would not show that vibration averages out faster than white noise, nor that a low-pass makes samples
+//! alike. A second counts only if the vehicle also stands in the next one: wheels show late that a car pulls away.
 //!
-//! A second is refused whose mean is off by more than four sigma of the filter: then either the vehicle turns (a ferry,
-//! a turntable, wheels that are locked or creep below their threshold) or the bias is wrong (initialised during such a
-//! turn, or changed by a knock). From its first part on and until that is decided the difference is part of sigma
-//! (`doubt`).
-//!
-//! Static initialisation only **claims** a bias: on a deck that turns, the turn is in it (`claim`).
+//! A second is refused whose mean is off by more than four sigma: either the vehicle turns (a ferry, locked wheels) or
+//! the bias is wrong (a knock). Until that is decided the difference is part of sigma (`doubt`). Static initialisation
+//! only **claims** a bias: on a deck that turns, the turn is in it (`claim`).
 
 mod claim;
 mod config;
@@ -66,8 +60,7 @@ pub enum ZeroRateOutcome {
     Refused,
 }
 
-/// Holds the mean of a second and the variance of that mean: its own, by which it is weighed, and that of the seconds
-/// around it, by which it is refused, since its own is small or large by chance.
+/// The mean of a second, its own variance, by which it is weighed, and the usual one, by which it is refused.
 #[derive(Debug, Clone, Copy)]
 struct Measurement {
     mean: f32,
@@ -153,10 +146,9 @@ impl ZeroRate {
         (self.filter.get::<GAIN>(), (variance > 0.0).then(|| sqrt(variance)))
     }
 
-    /// Adds the remaining rate of a complete sample (gyro less static bias less the network's estimate; `None` where
-    /// that is not good). `standing` is the judgement of the standstill, and `thermal` the sigma of the change of the
-    /// bias with temperature since the last outcome [`ZeroRateOutcome::Used`], rad/s. Returns the outcome of a second
-    /// at standstill when one is complete.
+    /// Adds the remaining rate of a complete sample (gyro less static bias less correction; `None` where it is not
+    /// good). `thermal` is the sigma of the change of the bias with temperature since the last
+    /// [`ZeroRateOutcome::Used`], rad/s. Returns the outcome of a second at standstill with its last sample.
     pub fn observe(
         &mut self,
         left: Option<AngularRate>,
@@ -194,19 +186,16 @@ impl ZeroRate {
         self.batch = (0, 0);
         let mean = (sum / i64::from(BATCH)) as i32;
         self.block.add(mean, mean as f32 / AngularRate::PER_RAD_PER_SEC);
-        if self.block.count() < RATE_HZ / BATCH {
+        if self.block.count < RATE_HZ / BATCH {
             return None;
         }
         let block = core::mem::take(&mut self.block);
         Some(self.second(&block))
     }
 
-    /// Checks the newest sample's rate, less static bias, before it is complete. Returns true once when the rate
-    /// contradicts the wheels.
-    ///
-    /// A vehicle may slide with its wheels locked. The limit on the mean of a second at standstill therefore also
-    /// applies to the turn in parts of a second: when a sample exceeds it, that sample's delayed rate, which is zero
-    /// at standstill, has not been sent yet. Without wheels such a turn is part of sigma.
+    /// Checks the newest sample's rate, less static bias, and returns true once when it contradicts the wheels: they
+    /// may be locked on ice. So the limit on the mean of a second holds for the turn in its parts, too: that sample's
+    /// delayed rate, zero at standstill, has not been sent yet. Without wheels such a turn is part of sigma.
     pub fn contradicts_wheels(&mut self, rate: AngularRate) -> bool {
         let is_likely = self.standing.is_likely();
         self.is_parked |= is_likely && !self.standing.is_by_wheels();
@@ -254,8 +243,7 @@ impl ZeroRate {
         self.refused || self.distrusted_for > 0
     }
 
-    /// Returns the largest turn of a part of a second at standstill, rad: as for a second, with the shake of a vehicle
-    /// that somebody boards.
+    /// Returns the largest turn of a part of a second at rest, rad, with the shake of somebody who boards.
     fn turn_gate(&self) -> f32 {
         GATE * sqrt(self.innovation_variance(BOARDING * BOARDING))
     }
@@ -327,8 +315,7 @@ impl ZeroRate {
         self.doubt.is_some()
     }
 
-    /// Returns the variance of the bias when driving: that of the filter, and that of the change with temperature since
-    /// the last update, (rad/s)^2.
+    /// Returns the variance of the bias when driving, with that of its change with temperature, (rad/s)^2.
     fn bias_variance(&self) -> f32 {
         let largest = self.config.max_bias;
         (self.filter.variance::<BIAS>() + self.thermal * self.thermal).min(largest * largest)
@@ -392,7 +379,7 @@ impl ZeroRate {
     }
 
     fn second(&mut self, block: &Spread) -> ZeroRateOutcome {
-        let own = block.variance() / (block.count() - 1) as f32;
+        let own = block.variance() / (block.count - 1) as f32;
         let before = self.noise.unwrap_or(own);
         let usual = before + (own - before) / NOISE_SECONDS;
         self.noise = Some(usual);
@@ -435,8 +422,7 @@ impl ZeroRate {
         }
     }
 
-    /// Takes the mean of a second at a probable standstill that agrees with the bias: it withdraws the doubt, unless it is
-    /// nearer to the stops that contradict the bias.
+    /// Takes a second that agrees with the bias: it withdraws a doubt, unless the stops that contradict are nearer.
     fn agree(&mut self, mean: f32) {
         let own = self.filter.get::<BIAS>() + self.filter.get::<STOP>();
         if self.doubt.is_nearer(mean, libm::fabsf(mean - own)) {

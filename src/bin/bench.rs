@@ -28,9 +28,9 @@ mod firmware {
     use core::hint::black_box;
     use cortex_m::interrupt::Mutex;
     use cortex_m_semihosting::{debug, hprintln};
-    use gyronet::model::blob::{HIDDEN, Shape};
+    use gyronet::model::blob::Shape;
     use gyronet::model::fognet::{FogNetState, MinuteNetwork};
-    use gyronet::model::gyronet::GyroNetState;
+    use gyronet::model::gyronet::LargestState;
     use gyronet::model::seconds::{Minute, STEPS, Second};
     use gyronet::model::window::{FEATURES, Features, WINDOW};
     use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
@@ -62,7 +62,7 @@ mod firmware {
         gyronet(meter);
         cortex_m::interrupt::free(|cs| fognet(meter, &mut FOG.borrow(cs).borrow_mut()));
         kernels(meter);
-        hprintln!("gyronet/state bytes={}", size_of::<GyroNetState<HIDDEN>>());
+        hprintln!("gyronet/state bytes={}", size_of::<LargestState>());
         hprintln!("gyronet/weights bytes={}", weights::GYRONET.0.len());
         hprintln!("fognet/state bytes={}", size_of::<FogNetState>());
         hprintln!("fognet/weights bytes={}", weights::FOGNET.0.len());
@@ -74,7 +74,7 @@ mod firmware {
             return;
         };
         // Too large for the stack.
-        let Some(state) = cortex_m::singleton!(: GyroNetState<HIDDEN> = GyroNetState::ZERO) else { return };
+        let Some(state) = cortex_m::singleton!(: LargestState = LargestState::ZERO) else { return };
         sizes(meter, state);
         let Ok(mut network) = GyroNet::with_state(blob, state) else { return };
         let mut numbers = Numbers::new(9);
@@ -135,7 +135,7 @@ mod firmware {
 
     /// Measures a window of models with a linear part and 0 to 32 units, of the paper's model, and of the default
     /// one.
-    fn sizes(meter: &mut Meter, state: &mut GyroNetState<HIDDEN>) {
+    fn sizes(meter: &mut Meter, state: &mut LargestState) {
         macro_rules! model {
             ($units:literal) => {{
                 const SHAPE: Shape = Shape { units: $units, linear: true };

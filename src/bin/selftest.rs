@@ -19,9 +19,8 @@ mod firmware {
     use core::cell::RefCell;
     use cortex_m::interrupt::Mutex;
     use cortex_m_semihosting::{debug, hprintln};
-    use gyronet::model::blob::HIDDEN;
     use gyronet::model::fognet::{FogNetState, MinuteNetwork};
-    use gyronet::model::gyronet::GyroNetState;
+    use gyronet::model::gyronet::LargestState;
     use gyronet::model::seconds::{Minute, STEPS, Second};
     use gyronet::model::window::{FEATURES, Features, WINDOW};
     use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
@@ -132,7 +131,7 @@ mod firmware {
     /// Returns the CRC-32 of the corrections of sixteen random windows.
     fn hash() -> Option<u32> {
         // Too large for the stack.
-        let state = cortex_m::singleton!(: GyroNetState<HIDDEN> = GyroNetState::ZERO)?;
+        let state = cortex_m::singleton!(: LargestState = LargestState::ZERO)?;
         let mut network = GyroNet::with_state(Blob::new_checked(&weights::GYRONET.0).ok()?, state).ok()?;
         let mut numbers = Numbers::new(7);
         let mut digest = gyronet::model::blob::CRC.digest();

@@ -9,16 +9,12 @@
 //! | 4-5 | AY, u16 LE | 0.000127465 g, zero at 0x8000 |
 //! | 6, low nibble | MSG_CNT | increments every 10 ms |
 //! | 6, high nibble | AY_STAT | as YawRate_STAT |
-//! | 7 | CRC | SAE J1850 over bytes 0 to 6 |
+//! | 7 | CRC | SAE J1850 over bytes 0 to 6: our choice, since it is not published |
 //!
-//! The other two messages of the set have the same shape: [`LAYOUTS`].
+//! The other two messages of the set have the same shape: [`LAYOUTS`]. Source: Bosch's off_highway_mm7p10 receiver.
 //!
-//! Source: Bosch's off_highway_mm7p10 receiver, which uses the same layout as the MM5.10. The CRC polynomial is not
-//! published; J1850 is our choice.
-//!
-//! 0.005 deg/s is 18 deg/h: with plain rounding, a parked car would seem to turn at up to 9 deg/h indefinitely.
-//! [`YawRateSignal`] therefore carries each frame's rounding residual into the next one. The
-//! receiver's integral is then never off by more than half an LSB times one period.
+//! With plain rounding a parked car would seem to turn at up to 9 deg/h. [`YawRateSignal`] therefore carries each
+//! frame's rounding residual into the next one: the integral is never off by more than half an LSB times one period.
 
 mod set;
 
@@ -87,8 +83,7 @@ impl YawRateSignal {
     /// Starts without a rounding residual.
     pub const START: Self = Self { residual: 0 };
 
-    /// Encodes a rate, including the rounding residual of earlier rates, which an error drops: the frame is marked
-    /// bad.
+    /// Encodes a rate with the rounding residual of earlier ones, which an error drops: the frame is marked bad.
     pub fn encode(&mut self, rate: AngularRate) -> Result<u16, OutOfRange> {
         let wanted = i64::from(rate.0) * NANO_DEG_PER_CODE_Q20 + self.residual;
         // Counted from the smallest code, so that it is positive; the shift leaves at most 35 bits to divide.

@@ -2,11 +2,9 @@
 //!
 //! [`Settings`] are what a user writes; a [`Config`] holds settings that have passed the check.
 
-mod error;
 mod settings;
 
 pub use super::e2e::DataIdMode;
-pub use error::ConfigError;
 pub use settings::{BoschSettings, E2e, Settings, StatusSettings, YawSettings};
 
 use super::bosch::LAYOUTS;
@@ -28,6 +26,35 @@ pub const BIT_RATES: [u32; 4] = [125_000, 250_000, 500_000, 1_000_000];
 const MAX_BUS_LOAD: u32 = 800;
 /// Largest number of messages in a configuration.
 pub const MAX_MESSAGES: usize = 8;
+
+/// The reason why settings are refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "its messages say it")]
+pub enum ConfigError {
+    #[error("no message is configured")]
+    Empty,
+    #[error("bits_per_second: {0} is not one of {BIT_RATES:?}")]
+    BitRate(u32),
+    #[error("identifier {0} (0x{0:03x}) is above 2047, or reserved for diagnosis (0x7df to 0x7ef)")]
+    Identifier(u16),
+    #[error("identifier {0} (0x{0:03x}) is used twice")]
+    DuplicateIdentifier(u16),
+    #[error("period_ms: {0} is not a multiple of {SAMPLE_MS} up to {MAX_PERIOD_MS}")]
+    Period(u16),
+    #[error("E2E identifier {0:x} has more than 12 bits")]
+    DataId(u16),
+    /// Two messages have the same E2E identifier; a receiver would not notice if they were swapped.
+    #[error("an E2E identifier is used twice")]
+    DuplicateDataId,
+    #[error(
+        "the messages are {}.{} % of the bus at {} kbit/s, above {} %",
+        .per_mille / 10, .per_mille % 10, .bits_per_second / 1_000, MAX_BUS_LOAD / 10
+    )]
+    Overload { per_mille: u32, bits_per_second: u32 },
+}
 
 /// Checked [`Settings`]: the messages that are sent, their periods and their protection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,11 +142,6 @@ impl Config {
         let is_part = |id: StandardId| self.settings.yaw.is_some_and(|yaw| yaw.ids.contains(&id.as_raw()));
         matches!(id, Id::Standard(id) if is_part(id))
             || self.messages().iter().any(|message| message.id == id)
-    }
-
-    /// Returns the bus load of the messages in 1/1000, with the largest possible number of stuff bits.
-    pub fn bus_load_per_mille(&self) -> u32 {
-        per_mille(&self.messages(), self.settings.bits_per_second)
     }
 
     /// Returns the number of samples for each set of our own messages.

@@ -1,5 +1,5 @@
-//! AUTOSAR end-to-end protection (PRS E2E Protocol) adds a CRC and a counter to a message, so that a receiver detects
-//! lost and corrupt messages between two ECUs. The CRC also covers an identifier that is not sent.
+//! AUTOSAR end-to-end protection (PRS E2E Protocol) adds a CRC and a counter to the start of a message, so that a
+//! receiver detects lost and corrupt ones. The CRC also covers an identifier that is not sent.
 //!
 //! | profile | header | CRC | counter |
 //! |---|---|---|---|
@@ -7,13 +7,10 @@
 //! | [`P02`] | 2 bytes | 8 bit, 0x2F, start and final XOR FF | 0 to 15 |
 //! | [`P05`] | 3 bytes | 16 bit, 0x1021, start FFFF | 0 to 255 |
 //!
-//! Over 8 bytes, the CRC detects every error of one or two bits (0x1D has order
-//! 255, 0x2F 127, 0x1021 32767 bits). Two profiles are an exception, because their counter selects the identifier
-//! (P01 with [`DataIdMode::Alternating`], P02): an error in the counter also changes the identifier, and a
-//! second bit error can hide it from the CRC; the counter is then out of sequence. The counter detects
-//! every loss except that of a whole multiple of its cycle, so a receiver also needs a timeout.
-//!
-//! The header is at the start of the data in all profiles. Profile 11 sends the bytes of profile 1.
+//! Over 8 bytes, the CRC detects every error of one or two bits. In P01 with [`DataIdMode::Alternating`] and P02 the
+//! counter selects the identifier: an error in it can be hidden from the CRC by a second one, and is then out of
+//! sequence. The counter misses only the loss of a multiple of its cycle, so a receiver also needs a timeout. Profile
+//! 11 sends the bytes of profile 1.
 
 mod p01;
 mod p02;
@@ -51,13 +48,6 @@ pub enum Profile {
 }
 
 impl Profile {
-    pub const fn header_len(&self) -> usize {
-        match self {
-            Self::P01(_) | Self::P02(_) => 2,
-            Self::P05(_) => 3,
-        }
-    }
-
     /// Returns a mask of the header's bits; bit `8 * byte + bit` of the frame is the same bit of the mask.
     pub const fn header_mask(&self) -> u64 {
         match self {
@@ -122,22 +112,19 @@ pub struct Checker {
 }
 
 impl Checker {
-    /// Creates a checker. `max_delta` is the largest counter step that still counts as loss
-    /// (1: no message may be lost).
+    /// Creates a checker; counter steps up to `max_delta` count as loss (1: no message may be lost).
     pub const fn new(profile: Profile, max_delta: u8) -> Self {
         Self { profile, sequence: Sequence::new(profile.counters(), max_delta) }
     }
 
-    /// Checks one message. A corrupt message does not affect the sequence, so it counts as lost when
-    /// the next good message arrives.
+    /// Checks a message. A corrupt one counts as lost once the next good one arrives.
     pub fn check(&mut self, data: &[u8]) -> Result<Verdict, Fault> {
         let counter = self.profile.check(data)?;
         Ok(self.sequence.check(counter))
     }
 }
 
-/// The two-byte header of profiles 1 and 2: CRC in byte 0, counter in the low nibble of byte 1. The profiles differ in
-/// these limits and in what enters the CRC besides the data.
+/// The header of profiles 1 and 2, CRC and a counter of four bits; they differ in these limits and in the CRC's start.
 #[derive(Debug, Clone, Copy)]
 struct ShortHeader {
     /// Largest number of bytes that the CRC covers, header included.
@@ -168,8 +155,7 @@ impl ShortHeader {
         Ok(())
     }
 
-    /// Checks CRC and counter, and returns the counter and the high nibble of byte 1. `crc` gets the
-    /// counter and the bytes after the CRC.
+    /// Checks CRC and counter; returns the counter and the nibble beside it. `crc` gets both message parts.
     fn check(&self, data: &[u8], crc: impl FnOnce(u8, &[u8]) -> u8) -> Result<(u8, u8), Fault> {
         let [received, behind @ ..] = data else { return Err(Fault::Length(data.len())) };
         let Some(header) = behind.first() else { return Err(Fault::Length(data.len())) };

@@ -10,8 +10,7 @@ use crate::estimate::YawEstimate;
 use embedded_can::{Id, StandardId};
 use heapless::Vec;
 
-/// Encodes rate, angle and detail messages for each step, with E2E profile 1. The CAN identifier of a message is also
-/// its data identifier.
+/// Encodes rate, angle and detail for each step, with E2E profile 1 and the CAN identifier as data identifier.
 #[derive(Debug, Clone, Copy)]
 pub struct FogEncoder {
     encoder: YawEncoder,
@@ -19,8 +18,7 @@ pub struct FogEncoder {
 }
 
 impl FogEncoder {
-    /// Creates an encoder. `ids` are the identifiers (11 bits) of rate, angle and detail, by default
-    /// [`super::yaw::FOG_IDS`].
+    /// Creates an encoder with the identifiers of rate, angle and detail, by default [`super::yaw::FOG_IDS`].
     pub const fn new(ids: [u16; 3]) -> Self {
         Self { encoder: YawEncoder::new(Self::profiles(ids), 1), ids }
     }

@@ -15,12 +15,9 @@ pub struct Periodic {
 const DATA_BITS: u32 = 64;
 
 impl Periodic {
-    /// Returns the bits of one frame with the largest possible number of stuff bits, interframe space included, in
-    /// bits of the nominal rate.
-    ///
-    /// 13 bits are never stuffed (CRC delimiter, acknowledgement, end of frame, space); in the
-    /// others, of which 34 or 54 are not data, there is at most one stuff bit for every four
-    /// bits after the first (Davis et al., 2007).
+    /// Returns the bits of a frame with most stuff bits and interframe space, at the nominal rate: 13 are never
+    /// stuffed (CRC delimiter, acknowledgement, end, space); of the others, 34 or 54 besides data, every fourth after
+    /// the first may be (Davis et al., 2007).
     pub const fn worst_case_bits(&self, bits_per_second: u32) -> u32 {
         if self.is_fd {
             // 17 bits up to the switch, with their stuff bits, and the 13; ESI, DLC and data with theirs, then the stuff
@@ -41,8 +38,7 @@ impl Periodic {
     }
 }
 
-/// Returns the prescaler of a controller's clock, and both segments of a bit with its sample point at 80 %, with up to `most`
-/// quanta, which are more where that can be.
+/// Returns prescaler and both segments of a bit sampled at 80 %, of up to `most` quanta, the more the better.
 pub fn bit_time(clock_hz: u32, bits_per_second: u32, most: u32) -> (u16, u8, u8) {
     let clocks = clock_hz / bits_per_second.max(1);
     let prescaler = clocks.div_ceil(most.max(1)).max(1);

@@ -1,10 +1,7 @@
-//! A data frame that is independent of a driver's type, and a queue of frames for the bus, which drops the oldest one
-//! when it is full.
+//! A data frame that is independent of a driver's type, and a queue of frames for the bus, which never blocks.
 //!
-//! A bus that is off, overloaded or unplugged must not stop the pipeline, and a receiver has no use for stale
-//! rates after the bus has recovered. Enqueueing therefore never fails and never
-//! blocks: when the queue is full, the oldest frame is dropped and counted. A receiver sees the
-//! gap in the message counters.
+//! A bus that is off or overloaded must not stop the pipeline, and a receiver has no use for stale rates: a full queue
+//! drops the oldest frame and counts it. A receiver sees the gap in the message counters.
 
 use embedded_can::nb::Can;
 use embedded_can::{Frame, Id};
@@ -15,7 +12,6 @@ use heapless::Deque;
 pub struct TransmitQueue<F, const N: usize> {
     frames: Deque<F, N>,
     dropped: u32,
-    errors: u32,
 }
 
 impl<F, const N: usize> Default for TransmitQueue<F, N> {
@@ -28,7 +24,7 @@ impl<F, const N: usize> TransmitQueue<F, N> {
     /// Creates an empty queue.
     pub const fn new() -> Self {
         const { assert!(N > 0, "a queue holds at least one frame") };
-        Self { frames: Deque::new(), dropped: 0, errors: 0 }
+        Self { frames: Deque::new(), dropped: 0 }
     }
 
     /// Appends a frame; if the queue is full, drops the oldest one.
@@ -68,11 +64,8 @@ impl<F, const N: usize> TransmitQueue<F, N> {
         self.frames.pop_front()
     }
 
-    /// Passes frames to the controller until it accepts no more, and returns the number accepted. Never blocks.
-    ///
-    /// If the controller replaces a pending frame by a more urgent one, it returns the pending frame, which goes back
-    /// to the front of the queue. An error ends the call: the frame stays for the next call, unless newer frames
-    /// push it out before.
+    /// Passes frames to the controller until it accepts no more; returns how many. A pending frame that a more urgent
+    /// one replaced goes back to the front. After an error the frame stays, unless newer ones push it out.
     pub fn service<C: Can<Frame = F>>(&mut self, controller: &mut C) -> usize {
         let mut taken = 0;
         // At most N tries, whatever the controller returns.
@@ -88,11 +81,7 @@ impl<F, const N: usize> TransmitQueue<F, N> {
                     // Cannot fail: a place has just become free.
                     let _ = self.frames.push_front(returned);
                 }
-                Err(nb::Error::WouldBlock) => break,
-                Err(nb::Error::Other(_)) => {
-                    self.errors = self.errors.saturating_add(1);
-                    break;
-                }
+                Err(_) => break,
             }
         }
         taken
@@ -111,11 +100,6 @@ impl<F, const N: usize> TransmitQueue<F, N> {
     /// Returns the number of dropped frames.
     pub fn dropped(&self) -> u32 {
         self.dropped
-    }
-
-    /// Returns the number of calls of [`Self::service`] that ended with an error of the controller.
-    pub fn errors(&self) -> u32 {
-        self.errors
     }
 }
 

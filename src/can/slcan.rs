@@ -22,10 +22,8 @@ pub type StampedLine = Vec<u8, MAX_STAMPED_LINE>;
 /// Time stamps are milliseconds modulo one minute.
 const STAMP_MODULUS: u64 = 60_000;
 
-/// Encodes a frame as `tIIILDD..` for a standard identifier or `TIIIIIIIILDD..` for an extended one, with CR at the
-/// end.
-///
-/// Returns `None` for a frame that is not a classic data frame (remote, or more than eight bytes).
+/// Encodes a frame as `tIIILDD..` (standard) or `TIIIIIIIILDD..` (extended) and CR; `None` if it is no classic data
+/// frame.
 pub fn emit(frame: &impl Frame) -> Option<Line> {
     let mut text = [0; MAX_STAMPED_LINE];
     let length = encode(frame, None, &mut text)?;

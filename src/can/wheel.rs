@@ -1,10 +1,8 @@
-//! The receiver decodes wheel speeds from the vehicle's frames, with a configurable layout, and decides whether the
-//! vehicle stands.
+//! Decodes wheel speeds from the vehicle's frames, with a configurable layout, and decides whether the vehicle stands.
 //!
-//! Standstill is derived from the wheels because a bias estimator that relies on the gyro alone mistakes a
-//! slow turn for bias. It is reported late and withdrawn at once: all wheels must have been fresh
-//! and slow for some time, and a single wheel that moves, is stale or not valid ends it. The delay is needed because
-//! passive wheel sensors read zero below walking pace.
+//! A bias estimator that relies on the gyro alone mistakes a slow turn for bias. Standstill is reported late and
+//! withdrawn at once: all wheels must have been fresh and slow for some time, because passive sensors read zero below
+//! walking pace, and one that moves, is stale or not valid ends it.
 
 mod layout;
 mod settings;
@@ -18,7 +16,7 @@ pub use settings::{MAX_FRAMES, WheelConfigError, WheelSettings};
 
 use super::e2e::{Sequence, Verdict};
 use crate::sample::{Standstill, WHEELS, WheelSample};
-use crate::units::{Duration, Micros, WheelSpeed};
+use crate::units::{Micros, WheelSpeed};
 use embedded_can::Frame;
 
 /// Decodes frames to wheel speeds and standstill.
@@ -26,7 +24,11 @@ use embedded_can::Frame;
 pub struct WheelReceiver {
     settings: WheelSettings,
     sequences: [Sequence; MAX_FRAMES],
-    wheels: Wheels,
+    /// Wheels that have a signal.
+    expected: [bool; WHEELS],
+    /// The newest speed of each wheel, and the time since which all have been slow.
+    speeds: [Option<(WheelSpeed, Micros)>; WHEELS],
+    still_since: Option<Micros>,
     pulses: [Option<Pulses>; WHEELS],
     /// Wheels that the newest frame marked as not valid.
     invalid: [bool; WHEELS],
@@ -38,16 +40,16 @@ pub struct WheelReceiver {
 impl WheelReceiver {
     /// Checks the settings and creates a receiver.
     pub fn new(settings: WheelSettings) -> Result<Self, WheelConfigError> {
-        let WheelSettings { timeout, still_speed, still_for, .. } = settings;
-        let rule = StandstillRule { timeout, still_speed, still_for };
-        let wheels = Wheels::new(rule, settings.wheels()?);
+        let expected = settings.wheels()?;
         let sequences = settings.frames.map(|frame| {
             let counters = frame.map_or(1, |frame| frame.counters());
             // A lost frame is counted and the new one still accepted: its speed is good.
             Sequence::new(counters, u8::MAX)
         });
+        let (speeds, still_since) = ([None; WHEELS], None);
         let (pulses, invalid) = ([None; WHEELS], [false; WHEELS]);
-        Ok(Self { settings, sequences, wheels, pulses, invalid, has_received: false, lost: 0 })
+        let (has_received, lost) = (false, 0);
+        Ok(Self { settings, sequences, expected, speeds, still_since, pulses, invalid, has_received, lost })
     }
 
     /// Processes a frame received at `now`; `None` if it is not a wheel frame. After an error the wheels of the frame
@@ -56,11 +58,11 @@ impl WheelReceiver {
         let id = frame.id();
         let is_meant = |place: &Option<WheelFrame>| place.as_ref().is_some_and(|layout| layout.id == id);
         let index = self.settings.frames.iter().position(is_meant)?;
-        self.wheels.expire(now);
+        self.expire(now);
         let result = self.take(index, frame.data(), now);
-        self.wheels.judge(now);
+        self.judge(now);
         self.has_received |= matches!(result, Ok(()) | Err(WheelError::Invalid { .. }));
-        Some(result.map(|()| self.wheels.sample(now)))
+        Some(result.map(|()| self.sample(now)))
     }
 
     /// Returns whether the newest frames marked a wheel's speed as not valid, or carried an impossible one.
@@ -68,11 +70,10 @@ impl WheelReceiver {
         self.invalid.contains(&true)
     }
 
-    /// Returns the newest speeds without a new frame; `None` before the first intact frame, because a vehicle without
-    /// wheel frames is not a fault.
+    /// Returns the newest speeds without a frame; `None` before the first intact one: having none is no fault.
     pub fn poll(&mut self, now: Micros) -> Option<WheelSample> {
-        self.wheels.expire(now);
-        self.has_received.then(|| self.wheels.sample(now))
+        self.expire(now);
+        self.has_received.then(|| self.sample(now))
     }
 
     /// Returns the number of lost frames, from the message counters.
@@ -81,7 +82,7 @@ impl WheelReceiver {
     }
 
     fn take(&mut self, index: usize, data: &[u8], now: Micros) -> Result<(), WheelError> {
-        let Self { settings, sequences, wheels, pulses, invalid, lost, .. } = self;
+        let Self { settings, sequences, speeds, pulses, invalid, lost, .. } = self;
         let Some(Some(layout)) = settings.frames.get(index) else { return Ok(()) };
         if let Some(counter) = layout.check(data)?
             && let Some(sequence) = sequences.get_mut(index)
@@ -93,94 +94,57 @@ impl WheelReceiver {
             }
         }
         let mut result = Ok(());
-        let signals = settings.signals.iter().zip(pulses).zip(invalid).enumerate();
-        for (wheel, ((signal, pulses), invalid)) in signals {
+        let signals = settings.signals.iter().zip(pulses).zip(invalid).zip(speeds).enumerate();
+        for (wheel, (((signal, pulses), invalid), newest)) in signals {
             let Some(signal) = signal.as_ref().filter(|signal| usize::from(signal.frame) == index) else {
                 continue;
             };
             let speed = signal.speed(wheel, data, now, pulses);
             *invalid = speed.is_err();
             if speed != Ok(None) {
-                wheels.set(wheel, speed.ok().flatten(), now);
+                *newest = speed.ok().flatten().map(|speed| (speed, now));
             }
             result = result.and(speed.map(drop));
         }
         result
     }
-}
-
-/// The limits for a wheel that is still and for a speed that is stale.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct StandstillRule {
-    /// Age above which a speed is stale.
-    pub timeout: Duration,
-    /// Highest speed at which a wheel counts as still.
-    pub still_speed: WheelSpeed,
-    /// Time for which all wheels must be that slow.
-    pub still_for: Duration,
-}
-
-/// The newest speed of each wheel, and the time since which all have been slow.
-#[derive(Debug, Clone, Copy)]
-pub struct Wheels {
-    rule: StandstillRule,
-    /// Wheels that have a signal.
-    expected: [bool; WHEELS],
-    speeds: [Option<(WheelSpeed, Micros)>; WHEELS],
-    still_since: Option<Micros>,
-}
-
-impl Wheels {
-    /// Creates the state before the first speed.
-    pub const fn new(rule: StandstillRule, expected: [bool; WHEELS]) -> Self {
-        Self { rule, expected, speeds: [None; WHEELS], still_since: None }
-    }
-
-    /// Drops stale speeds. Call it before setting new speeds.
-    pub fn expire(&mut self, now: Micros) {
+    /// Drops stale speeds.
+    fn expire(&mut self, now: Micros) {
         for slot in &mut self.speeds {
             if let Some((_, at)) = slot
-                && now.since(*at) > self.rule.timeout
+                && now.since(*at) > self.settings.timeout
             {
                 *slot = None;
             }
         }
-        if !self.complete() {
+        if !self.is_complete() {
             self.still_since = None;
         }
     }
 
-    /// Sets the speed of a wheel; `None` if it is marked as not valid.
-    pub fn set(&mut self, wheel: usize, speed: Option<WheelSpeed>, now: Micros) {
-        if let Some(slot) = self.speeds.get_mut(wheel) {
-            *slot = speed.map(|speed| (speed, now));
-        }
-    }
-
-    /// Updates the standstill state from the speeds that have been set.
-    pub fn judge(&mut self, now: Micros) {
-        let limit = self.rule.still_speed.0.unsigned_abs();
+    /// Updates the standstill from the speeds that have been set.
+    fn judge(&mut self, now: Micros) {
+        let limit = self.settings.still_speed.0.unsigned_abs();
         let slow = self.speeds.iter().flatten().all(|(speed, _)| speed.0.unsigned_abs() <= limit);
-        if slow && self.complete() {
+        if slow && self.is_complete() {
             self.still_since.get_or_insert(now);
         } else {
             self.still_since = None;
         }
     }
 
-    /// Returns the newest speeds, and whether the vehicle stands.
-    pub fn sample(&self, now: Micros) -> WheelSample {
+    fn sample(&self, now: Micros) -> WheelSample {
         let standstill = match self.still_since {
-            Some(since) if now.since(since) >= self.rule.still_for => Standstill::Still,
+            Some(since) if now.since(since) >= self.settings.still_for => Standstill::Still,
             Some(_) => Standstill::Unknown,
-            None if self.complete() => Standstill::Moving,
+            None if self.is_complete() => Standstill::Moving,
             None => Standstill::Unknown,
         };
         WheelSample { time: now, speeds: self.speeds.map(|speed| speed.map(|(speed, _)| speed)), standstill }
     }
 
-    fn complete(&self) -> bool {
+    /// Returns whether every expected wheel has a fresh speed.
+    fn is_complete(&self) -> bool {
         self.speeds.iter().zip(self.expected).all(|(speed, expected)| speed.is_some() || !expected)
     }
 }

@@ -1,31 +1,15 @@
-//! Our own yaw messages carry rate and accumulated yaw at full resolution, with their quality.
+//! Our own yaw messages carry rate and accumulated yaw at full resolution, with their quality. `src/can/README.md` has
+//! their bytes.
 //!
-//! There are three messages of eight bytes. Bytes 0 to 2 are the header: bytes 0 and 1 belong to the E2E profile, byte 2 is
-//! the sample counter, the same in the three messages of one sample. Bytes 3 to 7, little-endian:
-//!
-//! | message | bytes | signal | scale |
-//! |---|---|---|---|
-//! | rate | 3-6 | rate, i32 | 1e-6 deg/s; -2^31 not available |
-//! | | 7, bits 0-2 | [`Source`] | |
-//! | | 7, bits 3-4 | [`Quality`] | |
-//! | angle | 3-6 | accumulated yaw, i32 | 360 deg / 2^32, wraps at half a turn |
-//! | | 7 | [`Faults`] | |
-//! | detail | 3-4 | correction that was subtracted, i16 | 2e-4 deg/s |
-//! | | 5-6 | expected error (1 sigma), u16, rounded up | 1e-5 deg/s; FFFF unknown |
-//! | | 7 | latency, u8, rounded up | 0.5 ms; FE also above, FF unknown |
-//!
-//! The accumulated yaw wraps at half a turn, so the 32-bit difference of two readings
-//! is the angle turned between them, and a receiver that missed messages loses no angle.
-//! The rate carries its rounding residual: its sum over the sensor's true periods is the
-//! accumulated yaw to half an LSB. A true period is 10 ms unless the sensor's clock is found to differ from the
-//! board's ([`crate::align::clock_ratio`]).
+//! The accumulated yaw wraps at half a turn, so the 32-bit difference of two readings is the angle turned between
+//! them, and lost messages lose no angle. The rate carries its rounding residual: its sum over the sensor's true
+//! periods ([`crate::align::clock_ratio`]) is the accumulated yaw to half an LSB.
 
 pub use crate::health::{Faults, Quality, Source};
 
 use crate::units::{AngularRate, Yaw};
 
-/// Default identifiers of the same three messages for a fibre-optic gyro, and their E2E data identifiers.
-/// They are sent from its first sample on, or from power-up if it is configured.
+/// The same of a fibre-optic gyro, and E2E data identifiers; sent from power-up if configured, else from a sample on.
 pub const FOG_IDS: [u16; 3] = [0x1A4, 0x1A5, 0x1A6];
 
 /// Rate code that means "not available".
@@ -156,11 +140,6 @@ impl DetailMessage {
             return Err(YawError::Length(bytes.len()));
         };
         Ok(Self { correction: i16::from_le_bytes([a, b]), sigma: u16::from_le_bytes([c, d]), latency })
-    }
-
-    /// Returns the latency in ms; `None` if it is unknown.
-    pub fn latency_ms(&self) -> Option<f64> {
-        (self.latency != LATENCY_UNKNOWN).then(|| f64::from(self.latency) * 0.5)
     }
 }
 

@@ -1,8 +1,10 @@
 //! Makes the three protected yaw messages (rate, angle, detail) from estimates.
+//!
+//! A constant rate would have the same rounding error every time. So each message's residual is added to the next
+//! value, to the last bit: the sum of the rates sent differs from that of the exact ones by at most half an LSB.
 
 use super::DataFrame;
 use super::e2e::{Profile, Protector};
-use super::residual::{RoundingResidual, Scale};
 use super::yaw::{
     AngleMessage, DetailMessage, Quality, RATE_NOT_AVAILABLE, RateMessage, encode_angle, encode_latency,
     encode_sigma,
@@ -11,11 +13,8 @@ use crate::estimate::YawEstimate;
 use crate::units::AngularRate;
 use embedded_can::{Frame, StandardId};
 
-/// The encoder of the three yaw messages; it emits one set per `every` samples.
-///
-/// The rate and the correction are means over those samples: a receiver that multiplies the rate by
-/// the period gets the full angle, whatever the period. A mean has the worst quality and the largest expected error of
-/// its samples ([`YawEstimate::with_earlier`]).
+/// The encoder of the yaw messages: a set per `every` samples, with their mean rate and correction, so that rate times
+/// period is the full angle, and their worst quality and largest expected error ([`YawEstimate::with_earlier`]).
 #[derive(Debug, Clone, Copy)]
 pub struct YawEncoder {
     protectors: [Protector; 3],
@@ -29,8 +28,7 @@ pub struct YawEncoder {
 }
 
 impl YawEncoder {
-    /// Creates an encoder. The profiles are those of rate, angle and detail; `every` is the number of
-    /// samples per set, at least one.
+    /// Creates an encoder with the profiles of rate, angle and detail, for sets of `every` samples, at least one.
     pub const fn new([rate, angle, detail]: [Profile; 3], every: u8) -> Self {
         Self {
             protectors: [Protector::new(rate), Protector::new(angle), Protector::new(detail)],
@@ -118,8 +116,7 @@ impl YawEncoder {
     }
 }
 
-/// The mean of some samples without loss: the remainder of the division stays in the sum, and the rounding residual
-/// in the residual.
+/// A mean without loss: the division's remainder stays in the sum, the rounding in the residual.
 #[derive(Debug, Clone, Copy)]
 struct Mean {
     sum: i64,
@@ -143,5 +140,47 @@ impl Mean {
     fn reset(&mut self) {
         self.sum = 0;
         self.residual.reset();
+    }
+}
+
+/// Converts a rate code (LSB 2^-27 rad/s) to the code of a CAN signal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Scale {
+    /// Signal LSBs per rate code, times 2^32; at most 2^31: an LSB below two codes would gain nothing.
+    factor_q32: i64,
+}
+
+impl Scale {
+    /// Scale for a signal LSB of 1e-6 deg/s: 180 / pi / 2^27 / 1e-6, too small by 2.3e-10.
+    const MICRO_DEG_PER_SEC: Self = Self { factor_q32: 1_833_464_944 };
+    /// Scale for a signal LSB of 2e-4 deg/s.
+    const FIFTH_MILLI_DEG_PER_SEC: Self = Self { factor_q32: 9_167_325 };
+}
+
+/// Carries the rounding residual of one signal to its next code.
+#[derive(Debug, Clone, Copy)]
+struct RoundingResidual {
+    scale: Scale,
+    /// Sum of the exact values minus the sum of the codes sent, in LSB x 2^-32.
+    residual: i64,
+}
+
+impl RoundingResidual {
+    const fn new(scale: Scale) -> Self {
+        Self { scale, residual: 0 }
+    }
+
+    /// Returns the code nearest to the rate plus the residual of earlier rates.
+    fn encode(&mut self, rate: AngularRate) -> i32 {
+        // At most 2^62 + 2^31.
+        let wanted = i64::from(rate.0) * self.scale.factor_q32 + self.residual;
+        let sent = (wanted + (1 << 31)) >> 32;
+        self.residual = wanted - (sent << 32);
+        sent as i32
+    }
+
+    /// Drops the residual. Call it after a message that was marked bad, or at a restart.
+    fn reset(&mut self) {
+        self.residual = 0;
     }
 }

@@ -5,8 +5,7 @@ use super::code;
 use crate::sample::RATE_HZ;
 use crate::units::AngularRate;
 
-/// Quarters of a second at standstill whose angle may still be carried: the last second and the current quarter.
-/// Wheels show late that a vehicle pulls away, but no later than this.
+/// Quarters of a second at standstill whose angle may still be carried: wheels show no later that a vehicle moves.
 const HELD_QUARTERS: usize = 5;
 
 #[derive(Debug, Clone)]

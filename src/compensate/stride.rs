@@ -36,8 +36,7 @@ impl Stride {
         if self.samples() < DELAY { self.samples() } else { DELAY }
     }
 
-    /// Returns the cycles that a window may take, so that its estimate is ready in time and three tenths of the processor
-    /// are left to the tasks of lower priority; `u32::MAX` where the clock is not known.
+    /// Returns the cycles that a window may take: in time, with three tenths of the processor left to other tasks.
     pub const fn window_cycles(self, clock_hz: u32) -> u32 {
         if clock_hz == 0 {
             return u32::MAX;

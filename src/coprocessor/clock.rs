@@ -1,8 +1,6 @@
 //! The clock of a coprocessor: an outside one, made one that never goes back, or the inertial sensor's.
 //!
-//! All limits (silence, late windows, old wheel speeds) are measured against the newest time. A clock that is set
-//! back must neither make these differences negative nor stall them until it has caught up, so its times are shifted
-//! from then on.
+//! All limits are measured against the newest time. If a clock is set back, its times are shifted from then on.
 
 use crate::units::{Duration, Micros};
 

@@ -3,7 +3,6 @@
 use super::clock::Clock;
 use crate::align::AlignError;
 use crate::align::clock::ClockError;
-use crate::align::clock_ratio::ClockRatioConfig;
 use crate::can;
 use crate::can::wheel::{WheelError, WheelReceiver};
 use crate::can::yaw::FOG_IDS;
@@ -37,16 +36,14 @@ pub struct Config {
     pub heading: Option<HeadingReceiver>,
     /// Identifiers (11 bits) of the fibre-optic gyro's messages: rate, angle, detail.
     pub fog_ids: [u16; 3],
-    /// A fibre-optic gyro is fitted: its messages are then sent from the start, and its silence is reported.
-    /// Otherwise they are sent from its first sample on.
+    /// True if a fibre-optic gyro is fitted: its messages are sent, and its silence reported, from the start.
     pub fog_expected: bool,
     /// The caller runs GyroNet. Without it no window is due, and the messages report damaged data.
     pub has_gyronet: bool,
     /// The clock that `now` comes from.
     pub clock: Clock,
-    /// The limit on the departure of the sensor's clock from an outside clock; `None` where the outside clock is no
-    /// better. It is not used with [`Clock::Sensor`].
-    pub clock_ratio: Option<ClockRatioConfig>,
+    /// An outside clock is a crystal's, against which those of the sensors are measured.
+    pub clock_is_exact: bool,
     /// Stored data that was found damaged.
     pub storage: StorageFaults,
 }
@@ -63,7 +60,7 @@ impl Config {
         fog_expected: false,
         has_gyronet: true,
         clock: Clock::Outside,
-        clock_ratio: None,
+        clock_is_exact: false,
         storage: StorageFaults { damaged: false, configuration_lost: false },
     };
 }

@@ -14,6 +14,7 @@
 //! contradicts no other, and is doubted at once.
 
 use crate::sample::{RATE_HZ, WheelSample};
+use crate::units::WheelSpeed;
 
 /// What the sources showed in the newest second in which one was alone: means, each `None` for a source that was silent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -230,9 +231,7 @@ fn force_agrees(rate: f32, lateral: f32, speed: f32) -> bool {
 
 /// The mean speed of an axle, m/s, and how much faster its right wheel is.
 pub(super) fn axle(wheels: &WheelSample) -> Option<[f32; 2]> {
-    let [front_left, front_right, rear_left, rear_right] = wheels.speeds;
-    let [left, right] = [rear_left.or(front_left)?, rear_right.or(front_right)?]
-        .map(|speed| speed.0 as f32 / (1 << crate::units::WheelSpeed::FRACTION_BITS) as f32);
+    let [left, right] = wheels.axle()?.map(|speed| speed.0 as f32 / (1 << WheelSpeed::FRACTION_BITS) as f32);
     Some([(left + right) / 2.0, right - left])
 }
 

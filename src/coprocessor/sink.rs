@@ -16,15 +16,13 @@ pub struct TimedFrame {
     pub time: Micros,
 }
 
-/// Takes the frames of a coprocessor in the order in which they are sent.
-///
-/// A closure that takes a [`TimedFrame`] is one, and so is a [`TransmitQueue`]. `()` takes none: nothing is encoded.
+/// Takes frames in the order in which they are sent: a closure, or a [`TransmitQueue`]. `()` takes none, and none is
+/// encoded.
 pub trait Sink {
     /// False where frames are dropped, so that none needs to be encoded.
     const TAKES_FRAMES: bool = true;
 
-    /// Takes a frame. It must not wait: what the bus does not accept is dropped and counted by the sink, and passed to
-    /// [`super::Coprocessor::bus`].
+    /// Takes a frame without waiting: one that the bus does not accept is counted for [`super::Coprocessor::bus`].
     fn frame(&mut self, frame: TimedFrame);
 
     /// Takes what was observed in 10 ms of the inertial sensor, or in its silence, after its frames.

@@ -31,10 +31,8 @@ pub trait Bus: Sink {
     }
 }
 
-/// A CAN controller with a queue of `N` frames before it, because it has fewer mailboxes than a sample has frames.
-///
-/// A frame that a newer one pushes out of the queue counts as lost, and so does each error of the controller at a
-/// reception.
+/// A controller with a queue of `N` frames, as it has fewer mailboxes than a sample has frames. One that newer ones
+/// push out counts as lost, and so does an error at a reception.
 #[derive(Debug)]
 pub struct QueuedCan<C: Can, const N: usize = 24> {
     can: C,
@@ -96,12 +94,10 @@ pub struct Step<E> {
 }
 
 impl Coprocessor {
-    /// Does everything that is due at `now`. Call it about every millisecond.
-    ///
-    /// Received frames are used, the waiting samples of `imu` corrected, their windows estimated by `network`, silence
-    /// reported, and the frames sent. With `None` as the network, run it in a task of lower priority
-    /// ([`Coprocessor::window`], [`Coprocessor::deliver`]); the frames are the same. All errors are counted and
-    /// reported on the bus.
+    /// Does everything that is due at `now`, about every millisecond: received frames are used, the samples of `imu`
+    /// corrected, their windows estimated by `network`, silence reported, frames sent, errors counted and reported.
+    /// With `None` as the network, run it in a task of lower priority ([`Coprocessor::window`],
+    /// [`Coprocessor::deliver`]); the frames are the same.
     pub fn step<IMU: Source<Sample = ImuSample>>(
         &mut self,
         now: Micros,

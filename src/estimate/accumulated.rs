@@ -1,9 +1,8 @@
 //! The accumulated yaw: the sum of the rates that may be used, the gaps in it, and how much may be missing.
 //!
-//! A rate that may not be used is not added: the yaw keeps its value, as across steps without a sample. What the
-//! vehicle has turned meanwhile is missing from the yaw for good. With the rates v and w before and after a gap of T
-//! seconds, taken as a random walk between them, it is likely (v + w) T / 2, with a variance of ((v - w) T / 2)^2 +
-//! q^2 T^3 / 3. The likely angles of many gaps in one turn add up; their rest does not.
+//! What the vehicle turns while no rate may be used is missing for good. With the rates v and w before and after a gap
+//! of T seconds, a random walk between them, it is likely (v + w) T / 2, with a variance of ((v - w) T / 2)^2 + q^2
+//! T^3 / 3. The likely angles of many gaps in one turn add up; their rest does not.
 
 use super::YawEstimate;
 use crate::health::Quality;

@@ -10,17 +10,15 @@ use crate::sample::{PERIOD_US, RATE_HZ};
 use crate::sqrt::sqrt;
 use crate::units::Micros;
 
-/// Difference of a step's rate that no vehicle has, rad/s and as a share of the inertial one, and the steps for which it is
-/// rejected.
+/// Difference of a step that no vehicle has, rad/s and a share of the inertial rate, and how long it is rejected.
 const LIMIT: (f32, f32) = (3.0, 0.5);
 const DOUBTED: u32 = 2 * RATE_HZ;
 /// Expected errors of the inertial gyro beyond which the difference of a second is the fibre-optic one's.
 const GATE: f32 = 3.0;
 /// Largest expected error on the bus, rad/s: 0.655 deg/s.
 const LARGEST_SIGMA: f32 = 0.0114;
-/// Shares of the rate, 1 sigma, beside the unit's own ([`super::FogErrors::scale`]): of the slope of a street where no inertial
-/// sensor shows it; and beside an inertial gyro until both have been compared in turns: of a mount that has been turned by
-/// 11 degrees since the last drive.
+/// Shares of the rate, 1 sigma, beside the unit's own: of a street's slope without an inertial sensor; and beside one
+/// before both are compared in turns, of a mount that was turned by 11 degrees since.
 const STREET_SHARE: f32 = 0.00046;
 const UNKNOWN_SHARE: f32 = 0.02;
 /// Gain of an inertial gyro, 1 sigma: the difference that says nothing about the other one.
@@ -110,8 +108,7 @@ impl Comparison {
         self.off() > LARGEST_SIGMA
     }
 
-    /// Returns by how much the mean rate of a second may be off, 1 sigma, at this rate, rad/s; `clock` is the share of the
-    /// rate by which the clock may be.
+    /// Returns by how much a second's mean rate may be off, 1 sigma; `clock` is the share by which the clock may be.
     pub fn sigma(&self, rate: f32, clock: f32) -> f32 {
         let Beside { tilted, leaning, .. } = self.beside;
         let gain = self.beside.gain();

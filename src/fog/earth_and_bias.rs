@@ -9,9 +9,8 @@ use crate::units::{Angle, AngularRate};
 
 const TILT_FRACTION_BITS: u32 = 30;
 
-/// Holds the angle between the gyro's axis and the vertical of the level vehicle. A tilted gyro measures a turn times
-/// the cosine of this angle. It also measures part of the Earth's horizontal rate, which depends on the heading and is
-/// not known.
+/// The angle between the gyro's axis and the vertical: a turn is measured times its cosine, with a part of the Earth's
+/// horizontal rate, which depends on the heading and is not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tilt {
@@ -40,8 +39,8 @@ impl Tilt {
 pub struct EarthAndBias {
     tilt: Tilt,
     tilt_rest: i128,
-    latitude: Option<Latitude>,
-    rest: RestReading,
+    pub(super) latitude: Option<Latitude>,
+    pub(super) rest: RestReading,
     /// The angle that is subtracted from each step; `None` before the first one.
     reading: Option<Angle>,
 }
@@ -62,12 +61,7 @@ impl EarthAndBias {
         self.renew();
     }
 
-    pub fn latitude(&self) -> Option<Latitude> {
-        self.latitude
-    }
-
-    /// Corrects the gyro's turn in a step, given the standstill that the wheels show. Returns the vehicle's turn
-    /// about the vertical, less the gyro's reading at rest.
+    /// Returns the vehicle's turn about the vertical in a step: the gyro's, less its reading at rest.
     pub fn correct(
         &mut self,
         turn: Option<Angle>,
@@ -82,15 +76,10 @@ impl EarthAndBias {
         (turn.map(|turn| Angle(turn.0.saturating_sub(reading.0))), outcome)
     }
 
-    /// Returns the expected error of the mean rate over a second, 1 sigma, while the vehicle turns at `rate` and shakes
-    /// by `shake`, rad/s.
+    /// Returns the expected error of a second's mean rate, 1 sigma, of a vehicle that turns and shakes, rad/s.
     pub fn sigma(&self, rate: AngularRate, shake: f32) -> AngularRate {
         let sigma = self.rest.sigma(rate.0 as f32 / AngularRate::PER_RAD_PER_SEC, shake);
         AngularRate(libm::ceilf(sigma * AngularRate::PER_RAD_PER_SEC) as i32)
-    }
-
-    pub fn rest(&self) -> &RestReading {
-        &self.rest
     }
 
     fn about_vertical(&mut self, turn: Angle) -> Angle {

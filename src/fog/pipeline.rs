@@ -1,24 +1,11 @@
-//! The pipeline computes the rate that is sent every 10 ms from a fibre-optic gyro's samples.
+//! The pipeline computes the rate that is sent every 10 ms from a fibre-optic gyro's samples. `src/can/README.md`
+//! lists its states.
 //!
-//! The gyro's increments are summed over steps of the caller's time ([`FogGrid`]). Each step uses the newest
-//! readings of inertial sensor and wheels. They are a step or two old, which hardly changes their means over a
-//! second.
-//!
-//! | state | rate | source | quality | faults |
-//! |---|---|---|---|---|
-//! | latitude and wheels are known, and a standstill or another gyro has shown unit and sign of the output | less Earth's rate and bias | Earth rate | good | |
-//! | nothing has shown them yet | the same | Earth rate | degraded | IMPLAUSIBLE where a standstill contradicts them |
-//! | the gyro's clock departs from the board's by more than the limit | the same | Earth rate | degraded | IMPLAUSIBLE |
-//! | wheels are silent, or stand while the gyro turns | the same | Earth rate | degraded | WHEELS |
-//! | the latitude on the bus contradicts the one in use | the same | Earth rate | degraded | IMPLAUSIBLE |
-//! | no latitude is known, the vehicle has stood still | less the reading at standstill | static | degraded | |
-//! | no latitude is known, and no standstill yet | uncorrected | raw | degraded | |
-//! | a step differs from the inertial gyro as no vehicle turns in 10 ms; after two seconds of that it is degraded | not available | raw | unusable | IMPLAUSIBLE |
-//! | increments are missing in the step, or none have come yet from a gyro that is expected | not available | raw | unusable | GAP |
-//! | increments repeat themselves ([`STUCK_AFTER`], [`STUCK_US`]), until one differs | not available | raw | unusable | STUCK |
-//!
-//! Increments are compared as the gyro sends them, not as they are summed. An increment that straddles two steps of
-//! the grid is split, and its rounding makes sums of equal increments differ.
+//! The gyro's increments are summed over steps of the caller's time ([`FogGrid`]). Each step uses the newest readings
+//! of inertial sensor and wheels, a step or two old. A step that differs from the inertial gyro as no vehicle turns in
+//! 10 ms is unusable, and after two seconds of that degraded (IMPLAUSIBLE). Repetition is judged by the increments as
+//! they are sent ([`STUCK_AFTER`], [`STUCK_US`]): one that straddles two steps is split, and rounding makes sums of
+//! equal ones differ.
 
 use super::beside::{Beside, Comparison};
 use super::{EarthAndBias, FogConfig, IncrementRate, RestOutcome};
@@ -36,8 +23,7 @@ use crate::units::{Angle, AngularRate, Micros, Yaw};
 /// A DSP-3000's noise in 10 ms is a hundred of its units: one increment in four hundred repeats, and four in a row do
 /// so once in years.
 pub const STUCK_AFTER: u8 = 4;
-/// Duration of these increments, microseconds: ten increments of a DSP-1760, whose noise in 1 ms is hundreds of
-/// thousands of its units and never repeats.
+/// Duration of these increments, us: ten of a DSP-1760, whose noise in 1 ms never repeats.
 pub const STUCK_US: u32 = 10_000;
 
 /// Share by which a clock may be off before it has been measured: a quarter of what is accepted.
@@ -97,16 +83,12 @@ pub struct FogPipeline {
 }
 
 impl FogPipeline {
-    /// Creates a pipeline before its first sample. Where a gyro is `expected`, rates are sent from time 0 on, and its
-    /// silence is reported.
+    /// Creates a pipeline. Where a gyro is `expected`, rates are sent from time 0 on, and its silence is reported.
     pub const fn new(config: FogConfig, expected: bool) -> Self {
         Self {
             grid: FogGrid::new(expected),
             earth_and_bias: EarthAndBias::new(config.errors, config.tilt, config.latitude),
-            clock: match config.clock_ratio {
-                Some(config) => Some(RatioEstimator::new(config)),
-                None => None,
-            },
+            clock: if config.clock_is_exact { Some(RatioEstimator::START) } else { None },
             is_confirmed: false,
             was_refused: false,
             beside: Comparison::START,
@@ -122,8 +104,7 @@ impl FogPipeline {
         }
     }
 
-    /// Sets the latitude. If the vehicle has `moved` there, the gyro's bias is kept; otherwise the latitude before
-    /// was wrong, or there was none.
+    /// Sets the latitude. The gyro's bias is kept if the vehicle has `moved` there, else the former was wrong.
     pub fn set_latitude(&mut self, latitude: Latitude, moved: bool) {
         self.earth_and_bias.set_latitude(Some(latitude), moved);
     }
@@ -154,8 +135,7 @@ impl FogPipeline {
         self.yaw.gaps()
     }
 
-    /// Adds a sample that arrived at `now`; then call [`FogPipeline::next_step`] until `None`. A refused one is
-    /// counted.
+    /// Adds a sample that arrived at `now`, or counts it; then call [`FogPipeline::next_step`] until `None`.
     pub fn add(&mut self, now: Micros, mut sample: FogSample) -> Result<(), ClockError> {
         let repeats = self.repeats.after(&sample);
         let stuck = repeats.are_stuck();
@@ -193,7 +173,7 @@ impl FogPipeline {
         let step = self.grid.next_step(now)?;
         let [.., turn] = step.turn.angle;
         let turn = turn.filter(|_| u64::from(step.turn.covered) == PERIOD_US);
-        let reading = self.earth_and_bias.rest().reading();
+        let reading = self.earth_and_bias.rest.reading();
         self.shown = turn.map(|turn| turn.0 as f32 * (RATE_HZ as f32 / Angle::PER_RAD) - reading);
         let differs = self.shown.is_some_and(|rate| self.beside.differs(rate, step.time));
         let wrong = differs && self.beside.rejects();
@@ -205,14 +185,14 @@ impl FogPipeline {
         let (kept, outcome) = self.earth_and_bias.correct(turn, standstill);
         self.count_rest(outcome);
         self.was_refused |= outcome == Some(RestOutcome::Refused);
-        self.is_confirmed |= outcome == Some(RestOutcome::Used) && self.earth_and_bias.rest().shows_unit();
+        self.is_confirmed |= outcome == Some(RestOutcome::Used) && self.earth_and_bias.rest.shows_unit();
         let is_clock_off = self.clock.as_ref().is_some_and(RatioEstimator::fault);
         let contradicts_unit = self.was_refused && !self.is_confirmed;
-        let has_rear = wheels.is_some_and(has_rear);
-        let has_latitude = self.earth_and_bias.latitude().is_some();
+        let has_rear = wheels.and_then(WheelSample::axle).is_some();
+        let has_latitude = self.earth_and_bias.latitude.is_some();
         count(&mut self.counters.gaps, u32::from(turn.is_none()));
         let latency_us = u32::try_from(now.0.saturating_sub(step.time.0)).ok();
-        let contradicted = self.earth_and_bias.rest().is_contradicted();
+        let contradicted = self.earth_and_bias.rest.is_contradicted();
         count(&mut self.counters.no_latitude, u32::from(!has_latitude));
         let faults = Faults::STUCK
             .when(stuck)
@@ -252,9 +232,9 @@ impl FogPipeline {
     }
 
     fn source(&self) -> Source {
-        match self.earth_and_bias.latitude() {
+        match self.earth_and_bias.latitude {
             Some(_) => Source::EarthRate,
-            None if self.earth_and_bias.rest().is_measured() => Source::Static,
+            None if self.earth_and_bias.rest.is_measured() => Source::Static,
             None => Source::Raw,
         }
     }
@@ -295,10 +275,4 @@ impl Repeats {
     fn are_stuck(self) -> bool {
         self.equal >= STUCK_AFTER && self.equal_us >= STUCK_US
     }
-}
-
-/// Returns whether the wheels of the rear axle, which is not steered, are known, or those of the front one.
-fn has_rear(wheels: &WheelSample) -> bool {
-    let [front_left, front_right, rear_left, rear_right] = wheels.speeds;
-    rear_left.or(front_left).is_some() && rear_right.or(front_right).is_some()
 }

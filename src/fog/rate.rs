@@ -7,8 +7,7 @@ use crate::units::{Angle, AngularRate};
 const CODES: i64 = 1 << (Angle::FRACTION_BITS - AngularRate::FRACTION_BITS);
 const FRAMES: i64 = RATE_HZ as i64;
 
-/// Computes the mean rate of each frame. Rounding residuals are carried to the next frames: the sum of
-/// the rates times 10 ms is within one code of the sum of the turns.
+/// Computes each frame's mean rate with carried residuals: the sum of rates is within one code of the turns'.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct IncrementRate {
     rest: i64,

@@ -1,22 +1,17 @@
-//! Finds the bias of a fibre-optic gyro from its readings while the wheels stand.
+//! Finds the bias of a fibre-optic gyro from its readings while the wheels stand. Two sources give the reading at
+//! rest:
 //!
-//! Two sources give the gyro's reading at rest:
-//!
-//! - **Standstills.** A Kalman filter of one state is fed with means over two seconds with triangular weights, in
-//!   which an idling engine's vibration leaves nearly nothing. Each second is part of two means, so the noise of a
-//!   mean counts as that of a plain second: the part's angle random walk, or the noise that successive means show if
-//!   that is larger. The state has the random walk of the part's bias.
+//! - **Standstills.** A Kalman filter of one state, with the random walk of the part's bias, is fed with means over
+//!   two seconds with triangular weights, in which an engine's vibration leaves nearly nothing. Each second is part of
+//!   two means, so the noise of one is that of a plain second: the part's angle random walk, or what successive means
+//!   show if that is larger.
 //! - **Latitude and data sheet.** The gyro reads the Earth's rate and a bias of the size that the data sheet states.
 //!   Without a latitude the sigma of this source is 9 deg/h.
 //!
-//! The weighted mean of both is subtracted, and its variance is reported. A latitude that becomes known, or is found
-//! to have been wrong, does not change the first source.
-//!
-//! A mean counts only if the vehicle also stands in the next second, because wheel sensors show late that a car pulls
-//! away. A mean that is off by more than ten sigma was not a standstill, whatever the wheels report.
-//!
-//! A reading at rest also shows that unit and sign of the gyro's output are those of the configuration: it is the Earth's
-//! rate to a half, or its noise is that of the part.
+//! The weighted mean is subtracted, and its variance reported. A new latitude does not change the first source. A mean
+//! counts only if the vehicle also stands in the next second: wheels show late that a car pulls away. One that is off
+//! by more than ten sigma was no standstill. A reading also shows that unit and sign are those of the configuration:
+//! it is the Earth's rate to a half, or its noise is that of the part.
 
 use super::part::FogErrors;
 use crate::bias::earth::EARTH_RATE;
@@ -37,8 +32,7 @@ const GATE: f32 = 10.0;
 const MEMORY: u8 = 64;
 /// The square of a difference is limited to this many variances, because a beginning turn is not noise.
 const LARGEST: f32 = 9.0;
-/// Noise of a gyro in its own unit over that of the data sheet, on a shaken vehicle that may turn, and at rest; degrees
-/// taken for radians are 57.
+/// Noise in a gyro's own unit over that of the data sheet, moving and at rest; degrees for radians are 57.
 const NOISY: f32 = 8.0;
 const OWN_UNIT: f32 = 16.0;
 
@@ -69,8 +63,7 @@ pub(super) struct Second {
 impl Second {
     pub const EMPTY: Self = Self { steps: 0, sum: 0, rising: 0 };
 
-    /// Adds a step, saturated far above any gyro's range. An engine shakes a standing vehicle by half a degree a
-    /// second, and a limit that clips its peaks would remove the same share of the Earth's rate.
+    /// Adds a step, hardly limited: to clip the peaks of an engine's shake would remove a share of the Earth's rate.
     pub fn add(&mut self, turn: Angle) {
         let code = turn.0.clamp(-LARGEST_CODE, LARGEST_CODE);
         self.sum += code;
@@ -135,8 +128,7 @@ impl RestReading {
         }
     }
 
-    /// Sets the Earth's rate at the vehicle's position, rad/s. If the vehicle has `moved` there, the bias is kept and
-    /// the reading at rest changes; if the latitude before was wrong, the reading is kept.
+    /// Sets the Earth's rate here, rad/s: if the vehicle has `moved` the bias is kept, else the reading at rest.
     pub fn set_earth(&mut self, earth: Option<f32>, moved: bool) {
         if let (Some(before), Some(now), true) = (self.earth, earth, moved) {
             self.measured.mean += now - before;
@@ -180,9 +172,8 @@ impl RestReading {
         self.stood = self.stood.saturating_add(1);
     }
 
-    /// Returns the rate by which a standing vehicle turns, rad/s, beyond the reading at rest: of the last second beyond its
-    /// noise, of the newest two quarters beyond an engine's swing too, or the doubt of the newest standstill. It turns, or the
-    /// gyro's bias has changed.
+    /// Returns the rate, rad/s, at which a standing vehicle turns beyond the reading at rest, or the gyro's bias has
+    /// changed: of the last second, of the newest two quarters, or the doubt of the newest standstill.
     fn against(&self) -> f32 {
         let current = self.stood.saturating_sub(1) % QUARTER + 1;
         let steps = self.stood.min(RATE_HZ + current);
@@ -204,8 +195,7 @@ impl RestReading {
         self.combined().mean
     }
 
-    /// Returns the expected error (1 sigma) of the mean rate over a second, rad/s, while the vehicle turns at `rate` and
-    /// shakes by `shake`.
+    /// Returns the expected error of a second's mean rate, 1 sigma, at this `rate` and `shake`, rad/s.
     pub fn sigma(&self, rate: f32, shake: f32) -> f32 {
         let FogErrors { angle_walk, scale, .. } = self.errors;
         let (scaled, against) = (scale * rate, self.against());

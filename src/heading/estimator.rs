@@ -1,18 +1,17 @@
 //! Learns bias and gain of the yaw gyro from a course while the vehicle drives, and holds the heading without one.
 //!
 //! Courses measure the states of `filter`, which the zero-rate updates share, so that a bias has one value and one
-//! variance, whatever has shown it. A course is the direction of travel, some time ago, with errors that last for
-//! seconds. So
+//! variance. A course is the direction of travel, some time ago, with errors that last for seconds. So
 //!
-//! - it is weighed by its accuracy, its speed and the rate: what compares straight with straight counts, and a turn
-//!   shows the lag rather than the bias;
+//! - it is weighed by its accuracy, its speed and the rate: straight compared with straight counts, a turn shows the
+//!   lag;
 //! - courses that follow each other within [`CORRELATION`] count as one;
 //! - the gain is learnt only where the vehicle turns both ways: in a steady circle a growing slip looks like a gain;
 //! - a course far from the expected heading is refused, and one at some distance has bounded influence. After
-//!   [`PATIENCE`] without a match the heading starts again from the course; bias and gain are again what they were with the
-//!   newest of [`MATCHES`] courses that matched well, unless the vehicle has stood since. Where two
-//!   such times show the same drift, the bias is wrong, and becomes uncertain by it. Courses that keep failing teach only
-//!   a heading until they have matched for [`TRUST`];
+//!   [`PATIENCE`] without a match the heading starts again from the course; bias and gain are again those of the
+//!   newest of [`MATCHES`] courses that matched well, unless the vehicle has stood since. Where two such times show
+//!   the same drift, the bias becomes uncertain by it. Courses that keep failing teach only a heading until they have
+//!   matched for [`TRUST`];
 //! - after a halt, and at low speed, a course may have jumped by half a turn, because the vehicle goes backwards.
 
 use super::filter::{BIAS, Filter, GAIN, HEADING, LAG, Measured, wrap};
@@ -85,8 +84,7 @@ const TRUST: u32 = 60 * RATE_HZ;
 const FAILURES: u8 = 3;
 /// Matching courses in a row that teach again after a failure.
 const MATCHES: u8 = 10;
-/// Drift of the heading that a wrong bias explains, rad/s, the distance at which a drift is noticed, rad, and how alike two
-/// such drifts are: a share, and rad/s.
+/// Drift of the heading by a wrong bias, rad/s, where one is noticed, rad, and how alike two are: a share, rad/s.
 const DRIFT: core::ops::Range<f32> = 2e-3..0.03;
 const NOTICED: f32 = 0.3;
 const ALIKE: [f32; 2] = [0.25, 2e-3];
@@ -101,8 +99,7 @@ const REMEMBERED: f32 = 12.0;
 const BOTH_WAYS: [f32; 2] = [1.0, 0.2];
 /// Turn during which a course that does not change has failed, rad.
 const STANDS: f32 = 0.05;
-/// A course this inaccurate teaches nothing, rad, and the least accuracy of a speed across the direction of travel, m/s,
-/// whatever a receiver states.
+/// A course this inaccurate, rad, teaches nothing; the best accuracy of a speed across that is believed, m/s.
 const INACCURATE: f32 = 0.2;
 const LEAST_ACROSS: f32 = 0.01;
 /// Longest gap that is bridged by the mean of the rates around it, samples.
@@ -154,8 +151,7 @@ struct Failing {
 }
 
 impl Failing {
-    /// Notes that the heading starts again after a course at this distance; returns the drift that two such times agree
-    /// about, rad/s.
+    /// Notes that the heading starts again at this distance; returns the drift that two such times share, rad/s.
     fn start(&mut self, tick: u32, off: f32) -> Option<f32> {
         let (since, first) = self.since.take()?;
         let drift = wrap(off - first) * RATE_HZ as f32 / tick.wrapping_sub(since).max(1) as f32;

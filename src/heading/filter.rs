@@ -119,8 +119,7 @@ impl Filter {
         combined(&heading, -rate, &lag)
     }
 
-    /// Adds a course. What is `held` (bias, gain) keeps its value and its variance, and counts as a known source of error
-    /// (the filter of Schmidt and Kalman).
+    /// Adds a course; a `held` bias or gain keeps value and variance, as a known source of error (Schmidt-Kalman).
     pub fn course(&mut self, measured: &Measured, held: [bool; 2]) {
         let with = self.with_course(measured.rate);
         let variance = with[HEADING] - measured.rate * with[LAG] + measured.variance;

@@ -48,9 +48,7 @@ impl Fix {
     pub const NONE: Self = Self { heading: Some(Heading::UNKNOWN), latitude: Ok(None) };
 }
 
-/// The parser of a line: bytes in, fixes out.
-///
-/// A damaged message is an error; the next good message is read.
+/// The parser of a line: bytes in, fixes out; a damaged message is an error, the next good one is read.
 #[derive(Debug, Clone)]
 pub struct GnssLine {
     parser: Parser,
@@ -58,7 +56,6 @@ pub struct GnssLine {
     damage: Option<HeadingError>,
     kept: Option<Read>,
     bad_checksums: u32,
-    others: u32,
 }
 
 /// The content of an intact message; `None` for one that is not used.
@@ -77,16 +74,10 @@ impl GnssLine {
             GnssProtocol::Ubx => Parser::Ubx(Framer::new()),
             GnssProtocol::Nmea => Parser::Nmea(Sentences::new()),
         };
-        Self { parser, damage: None, kept: None, bad_checksums: 0, others: 0 }
+        Self { parser, damage: None, kept: None, bad_checksums: 0 }
     }
 
-    /// Returns the number of intact messages that were not used: another kind, another talker, or VTG beside RMC.
-    pub const fn others(&self) -> u32 {
-        self.others
-    }
-
-    /// Drops the message in progress. Call it when the line has damaged or lost a byte, which a checksum of 8 bits may
-    /// miss.
+    /// Drops the message in progress: the line has lost a byte, which a checksum of 8 bits may miss.
     pub fn interrupt(&mut self) {
         match &mut self.parser {
             Parser::Ubx(framer) => *framer = Framer::new(),
@@ -120,10 +111,7 @@ impl Source for GnssLine {
                 Some(damage) => Some(Err(damage)),
                 None => self.kept.take()?,
             };
-            let Some(read) = read else {
-                count(&mut self.others, 1);
-                continue;
-            };
+            let Some(read) = read else { continue };
             count(&mut self.bad_checksums, u32::from(read == Err(HeadingError::Checksum)));
             return Some(read);
         }

@@ -1,9 +1,8 @@
 //! The latitude that the vehicle's GNSS receiver sends, for the Earth's rate.
 //!
-//! A latitude is used once [`CONFIRM`] frames in a row agree. Afterwards, a latitude that the vehicle cannot have
-//! reached is refused and counted, and the latitude in use is contested until a frame agrees with it again.
-//! [`CONFIRM`] refused frames in a row that agree with each other replace the latitude in use. If the frames stop,
-//! the latitude stays in use: an hour of driving changes the Earth's rate by 0.2 deg/h at most.
+//! It is used once [`CONFIRM`] frames in a row agree. One that the vehicle cannot have reached is refused and counted,
+//! and contests the latitude in use until a frame agrees with that; [`CONFIRM`] such frames that agree replace it. If
+//! the frames stop, it stays in use: an hour of driving changes the Earth's rate by 0.2 deg/h at most.
 
 use super::HeadingError;
 use crate::units::Micros;

@@ -1,11 +1,8 @@
 //! Sentences RMC and VTG of NMEA 0183 (IEC 61162-1), of any satellite system.
 //!
-//! A sentence is `$TTSSS,FIELD,..*HH` with CR and LF: a talker, a name, fields and, in capital digits, the exclusive or of all
-//! between `$` and `*`. Each `$` begins a sentence, so that the sentence behind a damaged
-//! one is read.
-//!
-//! RMC and VTG contain the same course: VTG is used only where RMC has none. One talker is used, because two receivers
-//! differ in latency.
+//! A sentence is `$TTSSS,FIELD,..*HH` with CR and LF; HH is the exclusive or of all between `$` and `*`. Each `$`
+//! begins a sentence, so that one behind a damaged one is read. VTG is used only where RMC has no course. One talker
+//! is used, because two receivers differ in latency.
 
 use super::gnss::{Fix, Read};
 use super::{Heading, HeadingError};
@@ -95,8 +92,7 @@ fn checked(sentence: &[u8]) -> Result<&[u8], HeadingError> {
     if [*high, *low] == [digit(sum >> 4), digit(sum & 0xF)] { Ok(body) } else { Err(HeadingError::Checksum) }
 }
 
-/// Reads time, status, latitude, N or S, longitude, E or W, speed, course, date, declination, E or W and the
-/// mode.
+/// Reads time, status, latitude, N/S, longitude, E/W, speed, course, date, declination, E/W and mode.
 fn rmc<'a>(mut fields: impl Iterator<Item = &'a [u8]>) -> Result<Fix, HeadingError> {
     let mut next = || fields.next().unwrap_or_default();
     let [_, status, latitude, side, _, _, speed, course, _, _, _, mode] = core::array::from_fn(|_| next());

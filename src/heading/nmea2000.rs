@@ -17,8 +17,7 @@ const LONG_RESERVED: i32 = i32::MAX - 2;
 const PER_RAD: f32 = 1e4;
 const PER_SPEED: f32 = 100.0;
 
-/// Reads course and speed; `None` for a frame of another group. A course from magnetic north is refused, because the
-/// declination is not known.
+/// Reads course and speed; `None` for another group. A course from magnetic north is refused.
 pub fn course_speed(frame: &impl Frame) -> Option<Result<Heading, HeadingError>> {
     Some(group(frame, COURSE_SPEED)?.and_then(|[_sequence, reference, c0, c1, s0, s1, ..]| {
         let course = word([c0, c1], RESERVED).map(|code| code / PER_RAD);
@@ -38,8 +37,7 @@ pub fn course_speed_frame<F: Frame>(heading: &Heading, sequence: u8, source: u8)
     F::new(broadcast_id(COURSE_SPEED, PRIORITY, source)?, &[sequence, 0xFC, c0, c1, s0, s1, 0xFF, 0xFF])
 }
 
-/// Reads the latitude of a position, degrees, north positive; `None` for a frame of another group, `Ok(None)` where it is
-/// not available.
+/// Reads a latitude, degrees, north positive; `None` for another group, `Ok(None)` where it is not available.
 pub fn latitude(frame: &impl Frame) -> Option<Result<Option<f32>, HeadingError>> {
     Some(group(frame, POSITION)?.map(|[a, b, c, d, ..]| {
         let code = i32::from_le_bytes([a, b, c, d]);

@@ -1,8 +1,7 @@
 //! The receiver of courses, speeds and latitudes from the frames, or the serial line, that the configuration names.
 //!
-//! Of the messages of NMEA 2000 and J1939, those of one sender are used, and those of another once that one has been
-//! silent for [`SILENT`]: two receivers on a bus differ in latency. Described values may be in frames of their own;
-//! a course counts when its frame comes, with the newest of the others that is not older than [`FRESH`].
+//! Of NMEA 2000 and J1939, one sender is used, and another once that one has been silent for [`SILENT`]: receivers
+//! differ in latency. A described course counts when its frame comes, with other values not older than [`FRESH`].
 
 use super::described::HeadingSignal;
 use super::latitude::{LatitudeJudge, ReceivedLatitude};

@@ -45,12 +45,10 @@ pub struct SlowStatus {
     pub bias: Knowledge,
     pub gain: Knowledge,
     pub mounting: Knowledge,
-    /// Sources of the yaw rate that others contradict: inertial gyro 1, fibre-optic gyro 2, wheels 4; `None` before two
-    /// have been compared.
+    /// Sources in contradiction: inertial gyro 1, fibre-optic gyro 2, wheels 4; `None` before two were compared.
     pub doubts: Option<u8>,
     /// Gaps in the accumulated yaws of both gyros; `None` before one begins.
     pub gaps: Option<u32>,
-    /// Expected error (1 sigma) of the angle that the accumulated yaw has turned in the last minute, 0.01 deg, gaps
-    /// included; `None` before it begins.
+    /// Expected error (1 sigma) of the last minute's turn, 0.01 deg, gaps included; `None` before it begins.
     pub doubt: Option<u32>,
 }

@@ -7,37 +7,24 @@ use super::Status;
 pub struct State {
     /// Status that the board reports, and the number that data 0104 has for it; `None` if the status does not change.
     pub status: Option<Status>,
-    /// Name of the state.
     pub name: &'static str,
-    /// Condition that the state begins with.
     pub entered: &'static str,
     /// Yaw rate and fault bits on CAN.
     pub rate: &'static str,
-    /// Condition that the state ends with.
     pub left: &'static str,
     /// Counter of the pipeline or of the sensor monitor that counts it, if any.
     pub counter: &'static str,
 }
 
 const fn state(
-    status: Status,
+    status: Option<Status>,
     name: &'static str,
     entered: &'static str,
     rate: &'static str,
     left: &'static str,
     counter: &'static str,
 ) -> State {
-    State { status: Some(status), name, entered, rate, left, counter }
-}
-
-const fn remark(
-    name: &'static str,
-    entered: &'static str,
-    rate: &'static str,
-    left: &'static str,
-    counter: &'static str,
-) -> State {
-    State { status: None, name, entered, rate, left, counter }
+    State { status, name, entered, rate, left, counter }
 }
 
 /// All states. In a fault state there is no yaw rate: our own messages report "not available", Bosch's set "failed".
@@ -45,7 +32,7 @@ const fn remark(
 /// From a fault the state returns to init where no bias is known, otherwise to degraded.
 pub const STATES: [State; 15] = [
     state(
-        Status::Init,
+        Some(Status::Init),
         "init",
         "the start; a jump of the clock before the bias was known",
         "gyro without correction, marked initialising",
@@ -53,7 +40,7 @@ pub const STATES: [State; 15] = [
         "`moving`",
     ),
     state(
-        Status::Degraded,
+        Some(Status::Degraded),
         "degraded",
         "the start, if earlier drives have shown the bias",
         "gyro less that bias",
@@ -61,7 +48,7 @@ pub const STATES: [State; 15] = [
         "`moving`",
     ),
     state(
-        Status::Degraded,
+        Some(Status::Degraded),
         "degraded",
         "the bias is known; a gap, a late or implausible window, saturation, damaged weights",
         "gyro less bias",
@@ -69,7 +56,7 @@ pub const STATES: [State; 15] = [
         "`missing`, `late`, `implausible`",
     ),
     state(
-        Status::Ready,
+        Some(Status::Ready),
         "ready",
         "an accepted window covers the recent samples",
         "gyro less bias and correction",
@@ -77,7 +64,7 @@ pub const STATES: [State; 15] = [
         "`windows`",
     ),
     state(
-        Status::Silent,
+        Some(Status::Silent),
         "fault: silent",
         "29 ms without a sample, by the board's clock; 2 s after the start without the first one",
         "none, every 10 ms; GAP",
@@ -85,7 +72,7 @@ pub const STATES: [State; 15] = [
         "`silences`",
     ),
     state(
-        Status::Stuck,
+        Some(Status::Stuck),
         "fault: stuck",
         "seven samples (70 ms) in which all gyro axes, all accelerometer axes, or one axis that seldom repeats \
          itself do not change; thirty in which any axis does not",
@@ -94,7 +81,7 @@ pub const STATES: [State; 15] = [
         "`stuck`",
     ),
     state(
-        Status::Clipped,
+        Some(Status::Clipped),
         "fault: saturated",
         "the sensor reports saturation",
         "none; CLIPPED",
@@ -102,7 +89,7 @@ pub const STATES: [State; 15] = [
         "`invalid`, `held`",
     ),
     state(
-        Status::Clipped,
+        Some(Status::Clipped),
         "fault: wrong",
         "a reading changes in 10 ms by more than 12 times what this axis is used to (RMS of 0.6 s), and by more than \
          0.3 rad/s in yaw, 1 rad/s in roll and pitch, 30 m/s^2",
@@ -110,35 +97,40 @@ pub const STATES: [State; 15] = [
         "a reading near the last good one, or the fourth such reading in a row",
         "`wrong`",
     ),
-    remark(
+    state(
+        None,
         "not confirmed",
         "the bias rests on the one standstill of the start, in which a ferry or a turntable may have turned; 0x1A3 says coarse",
         "as in the present state, at best degraded",
         "the vehicle drives off within 10 s of a reading at rest, which decides, or stops later and agrees",
         "",
     ),
-    remark(
+    state(
+        None,
         "late",
         "samples arrive more than 29 ms later than their time stamps let expect: the line has stalled",
         "as in the present state, at best degraded, with its latency; GAP",
         "samples that arrive in time",
         "",
     ),
-    remark(
+    state(
+        None,
         "jumped",
         "the yaw rate has jumped as no vehicle turns, and stays there",
         "as in the present state, at best degraded, the jump in the expected error; IMPLAUSIBLE",
         "it jumps back, or the vehicle stands",
         "`wrong`",
     ),
-    remark(
+    state(
+        None,
         "sensor moved",
         "its up or forward direction differs from earlier drives",
         "as in the present state, at best degraded; IMPLAUSIBLE",
         "the next start, or `calibrate forget`",
         "`moved_mounts`",
     ),
-    remark(
+    state(
+        None,
         "clock off",
         "the sensor's clock differs from the board's crystal by more than 4 %; the yaw is then accumulated by the \
          sensor's clock",
@@ -146,14 +138,16 @@ pub const STATES: [State; 15] = [
         "the clocks agree again",
         "`clock_off`",
     ),
-    remark(
+    state(
+        None,
         "rate not used",
         "the sensor sends fewer than 50 or more than 1000 samples a second",
         "none, as silent; IMPLAUSIBLE",
         "a rate between",
         "`misplaced`",
     ),
-    remark(
+    state(
+        None,
         "contradicted",
         "two seconds in which other sources (fibre-optic gyro, wheels, accelerometer) contradict the gyro; 0x1A3 names it",
         "as in the present state, at best degraded; IMPLAUSIBLE",

@@ -13,8 +13,7 @@ pub struct BackgroundCheck<'w> {
 }
 
 impl<'w> BackgroundCheck<'w> {
-    /// Creates a check that starts at the first byte of a file's content; `crc` is its checksum when the file was
-    /// loaded.
+    /// Creates a check from the first byte of a file's content; `crc` is its checksum when it was loaded.
     pub fn new(content: &'w [u8], crc: u32) -> Self {
         Self { content, stored: crc, digest: CRC.digest(), at: 0 }
     }

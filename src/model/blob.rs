@@ -43,8 +43,7 @@ impl Shape {
         [GYRONET, WINDOW as u16, FEATURES as u16, self.units, 2, outputs]
     }
 
-    /// Returns the largest cost of a window on a Cortex-M4 at zero wait states, modelled cycles (`cargo bench-target`
-    /// prints those of some shapes).
+    /// Returns a window's largest cost on a Cortex-M4, modelled cycles (`cargo bench-target` prints some).
     pub const fn window_cycles(self) -> u32 {
         let units = self.units as u32;
         let layers = if units > 0 { 20_000 + 4_400 * units + 355 * units * units } else { 0 };

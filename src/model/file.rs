@@ -1,7 +1,6 @@
-//! The weight files of all networks share a header, its checks, and typed access without a copy.
+//! The weight files of all networks share a header, its checks, and typed access in place, without a copy.
 //!
-//! All numbers are little-endian, and every field lies on a 4-byte boundary, so that a microcontroller can read it in
-//! place in flash.
+//! All numbers are little-endian, and every field lies on a 4-byte boundary.
 //!
 //! | offset | type | field |
 //! |---|---|---|
@@ -17,8 +16,8 @@
 //! | | | fields of the network: [`super::blob`], [`super::fognet_blob`] |
 //! | end - 4 | u32 | CRC-32 (ISO-HDLC, as in zip and Ethernet) of everything before it |
 //!
-//! A direction consists of its input records, then its recurrent records, as [`crate::nn::lstm`] lays them out; a row
-//! of an output layer consists of its int16 weights, then bias and multiplier.
+//! A direction has its input records, then its recurrent ones ([`crate::nn::lstm`]); an output row int16 weights,
+//! bias, multiplier.
 
 use crate::nn::lstm::{DirectionWeights, ROW_LIMIT, row_bound};
 use crate::nn::{HIDDEN_MAX, bilstm::Layer, dense::Dense, linear::Linear};
@@ -44,8 +43,7 @@ pub static CRC: crc::Crc<u32, CrcTable> = crc::Crc::<u32, CrcTable>::new(&crc::C
 #[cfg(target_endian = "big")]
 compile_error!("weights are read in place as little-endian words");
 
-/// Holds the shape that a file states: network number, window, inputs, hidden units, layers, outputs of the linear
-/// part.
+/// The shape that a file states: network, window, inputs, hidden units, layers, outputs of the linear part.
 pub type Topology = [u16; 6];
 
 /// The reason why a weight file is refused.
@@ -144,8 +142,7 @@ pub(super) struct Header<const INPUTS: usize, S> {
 }
 
 impl<const INPUTS: usize, S> Header<INPUTS, S> {
-    /// Checks header, length and checksum of a file. `shape` reads its topology; if it returns `None`, the error
-    /// reports `expected`.
+    /// Checks header, length and checksum; `shape` reads the topology, or the error reports `expected`.
     pub fn read(
         reader: &mut Reader<'_>,
         expected: Topology,

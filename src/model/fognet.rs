@@ -7,13 +7,12 @@
 //! f2, f3 -> FC4 -> correction = gyro - truth
 //! ```
 //!
-//! Section III-C of the paper describes it, but not the rate at which the window is sampled: with 1 s steps LSTM2's "N
-//! units" give 387,006 parameters, with any faster sampling millions.
+//! Section III-C of the paper describes it, but not the rate of sampling: with steps of 1 s LSTM2's "N units" give
+//! 387,006 parameters, with faster ones millions.
 //!
-//! The gyro's increments reach the result on two paths. Through the LSTMs they go as int16. Through FC3 and FC4 they go
-//! linearly, and there a correction of 1e-4 rad in a turn of 10 rad would be below the LSB of an int16. So
-//! [`FogBlob::gains`] holds FC3, FC4 and the scales multiplied out, and the linear part is computed from the increments
-//! themselves, in [`Angle`]: it is exact.
+//! Through the LSTMs the increments go as int16. Through FC3 and FC4 a correction of 1e-4 rad in a turn of 10 rad
+//! would be below an int16's LSB, so [`FogBlob::gains`] holds FC3, FC4 and the scales multiplied out, and the linear
+//! part is computed from the increments themselves, in [`Angle`]: it is exact.
 
 use super::fognet_blob::{COLUMNS, FogBlob, HIDDEN1, HIDDEN2, INPUTS};
 use super::input::load_step;
@@ -91,8 +90,7 @@ impl FogNetState {
     };
 }
 
-/// Runs the integer network. It reads the weights in place and works in the caller's state, which is too large to
-/// move on a small stack.
+/// Runs the integer network, in the caller's state: it is too large to move on a small stack.
 #[derive(Debug)]
 pub struct FogNet<'w, 's> {
     blob: FogBlob<'w>,
@@ -130,8 +128,7 @@ impl<'w, 's> FogNet<'w, 's> {
         state.stage = Stage::First(Run::new(), Scratch::ZERO);
     }
 
-    /// Runs a bounded piece of the window (two steps of one direction of one layer); returns the estimate with the
-    /// last piece, `None` before that and when no window is in progress.
+    /// Runs a piece (two steps of a direction of a layer); returns the estimate with the last one.
     pub fn advance(&mut self) -> Option<FogEstimate> {
         let Self { blob, state } = self;
         let FogNetState { input, between, f1, f2, stage, .. } = state;

@@ -13,81 +13,14 @@ use crate::nn::lstm::{DirectionWeights, Scratch};
 use crate::nn::{dense::Dense, linear::Linear};
 use crate::units::AngularRate;
 
-/// The working memory of one window, for networks of up to `UNITS` units a direction: 0, 4, 8 and so on up to
-/// [`HIDDEN`]. By default it has the size of the library's default model. With 0, a linear part alone has room.
+/// The working memory of one window, for networks of up to `U` units a direction: `W` is half of them, `R` the words of
+/// their recurrent weights. By default it has the size of the library's default model: a linear part alone.
 #[derive(Debug, Clone)]
-pub struct GyroNetState<const UNITS: usize = { weights::DEFAULT_UNITS }>(<Units<UNITS> as Size>::Arrays)
-where
-    Units<UNITS>: Size;
-
-impl<const UNITS: usize> GyroNetState<UNITS>
-where
-    Units<UNITS>: Size,
-{
-    /// A state without a window in progress. A window leaves nothing in the state for the next one. The state is all
-    /// zeros, so that it needs no initial value in flash.
-    pub const ZERO: Self = Self(<Units<UNITS> as Size>::ZERO);
-}
-
-/// A state of a network, or a reference to one.
-pub trait Memory {
-    /// The most units a direction that there is room for.
-    const UNITS: usize;
-    type Arrays: WindowRun;
-
-    fn arrays(&mut self) -> &mut Self::Arrays;
-}
-
-impl<const UNITS: usize> Memory for GyroNetState<UNITS>
-where
-    Units<UNITS>: Size,
-{
-    const UNITS: usize = UNITS;
-    type Arrays = <Units<UNITS> as Size>::Arrays;
-
-    fn arrays(&mut self) -> &mut Self::Arrays {
-        &mut self.0
-    }
-}
-
-impl<M: Memory> Memory for &mut M {
-    const UNITS: usize = M::UNITS;
-    type Arrays = M::Arrays;
-
-    fn arrays(&mut self) -> &mut M::Arrays {
-        (**self).arrays()
-    }
-}
-
-#[derive(Debug, Clone, Copy)]
-pub struct Units<const UNITS: usize>;
-
-pub trait Size {
-    type Arrays: WindowRun + Clone + core::fmt::Debug;
-    const ZERO: Self::Arrays;
-}
-
-macro_rules! sizes {
-    ($($units:literal)*) => {
-        $(impl Size for Units<$units> {
-            type Arrays = Arrays<$units, { $units / 2 }, { DirectionWeights::recurrent_words($units) }>;
-            const ZERO: Self::Arrays = Arrays::ZERO;
-        })*
-    };
-}
-sizes!(0 4 8 12 16 20 24 28 32 36 40 44 48 52 56 60);
-
-pub trait WindowRun {
-    /// Loads a window and runs the linear part on it.
-    fn start(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]);
-    /// Runs a piece of the window; returns the estimate with the last one.
-    fn advance(&mut self, blob: &Blob<'_>) -> Option<Estimate>;
-    fn stop(&mut self);
-}
-
-/// The arrays for up to `U` units a direction: `W` is half of them, `R` the words of their recurrent weights.
-#[derive(Debug, Clone)]
-pub struct Arrays<const U: usize, const W: usize, const R: usize> {
+pub struct GyroNetState<
+    const U: usize = { weights::DEFAULT_UNITS },
+    const W: usize = { weights::DEFAULT_UNITS / 2 },
+    const R: usize = { DirectionWeights::recurrent_words(weights::DEFAULT_UNITS) },
+> {
     input: [u32; WINDOW * FEATURES / 2],
     layer1: [[u32; U]; WINDOW],
     /// The projections of all steps of a direction, so that each weight of its input is read once a window.
@@ -99,27 +32,60 @@ pub struct Arrays<const U: usize, const W: usize, const R: usize> {
     /// Sums of the gyro error's row for each sample; they start from its bias.
     sums: [i32; WINDOW],
     clamped_inputs: u16,
+    /// The position in the window in progress.
     run: Run,
     under_way: bool,
 }
 
-impl<const U: usize, const W: usize, const R: usize> Arrays<U, W, R> {
-    const ZERO: Self = {
-        Self {
-            input: [0; _],
-            layer1: [[0; U]; _],
-            scratch: Scratch::ZERO,
-            recurrent: [0; R],
-            linear: [0; _],
-            sums: [0; _],
-            clamped_inputs: 0,
-            run: Run::new(),
-            under_way: false,
-        }
+/// The memory of the largest network, the paper's: 27 KB.
+pub type LargestState = GyroNetState<HIDDEN, { HIDDEN / 2 }, { DirectionWeights::recurrent_words(HIDDEN) }>;
+
+impl<const U: usize, const W: usize, const R: usize> GyroNetState<U, W, R> {
+    /// A state without a window: a window leaves nothing. All zeros, it needs no initial value in flash.
+    pub const ZERO: Self = Self {
+        input: [0; _],
+        layer1: [[0; U]; _],
+        scratch: Scratch::ZERO,
+        recurrent: [0; R],
+        linear: [0; _],
+        sums: [0; _],
+        clamped_inputs: 0,
+        run: Run::new(),
+        under_way: false,
     };
 }
 
-impl<const U: usize, const W: usize, const R: usize> WindowRun for Arrays<U, W, R> {
+/// A state of a network, or a reference to one.
+pub trait Memory {
+    /// The most units a direction that there is room for.
+    const UNITS: usize;
+
+    /// Loads a window and runs the linear part on it.
+    fn start(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]);
+    /// Runs a piece of the window; returns the estimate with the last one.
+    fn advance(&mut self, blob: &Blob<'_>) -> Option<Estimate>;
+    fn stop(&mut self);
+}
+
+impl<M: Memory> Memory for &mut M {
+    const UNITS: usize = M::UNITS;
+
+    fn start(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]) {
+        (**self).start(blob, window);
+    }
+
+    fn advance(&mut self, blob: &Blob<'_>) -> Option<Estimate> {
+        (**self).advance(blob)
+    }
+
+    fn stop(&mut self) {
+        (**self).stop();
+    }
+}
+
+impl<const U: usize, const W: usize, const R: usize> Memory for GyroNetState<U, W, R> {
+    const UNITS: usize = U;
+
     fn start(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]) {
         self.clamped_inputs = load(blob, window, &mut self.input);
         self.linear = [0; _];
@@ -162,10 +128,9 @@ impl<const U: usize, const W: usize, const R: usize> WindowRun for Arrays<U, W, 
     }
 }
 
-/// Runs the integer network. It reads the weights in place. It owns its state, or borrows the caller's (`S` a
-/// reference) where a state is too large to move on a small stack.
+/// Runs the integer network, in a state of its own or, where that is too large for the stack, the caller's.
 #[derive(Debug, Clone)]
-pub struct GyroNet<'w, S = GyroNetState<HIDDEN>> {
+pub struct GyroNet<'w, S = LargestState> {
     blob: Blob<'w>,
     state: S,
 }
@@ -185,14 +150,13 @@ impl GyroNet<'static, GyroNetState> {
 }
 
 impl<'w, S: Memory> GyroNet<'w, S> {
-    /// Creates a network over checked weights that works in the caller's state, unless that is too small. A window in
-    /// progress in that state is dropped.
+    /// Creates a network that works in the caller's state, whose window is dropped, unless it is too small.
     pub fn with_state(blob: Blob<'w>, mut state: S) -> Result<Self, BlobError> {
         let found = blob.shape.units;
         if usize::from(found) > S::UNITS {
             return Err(BlobError::Units { found, largest: S::UNITS as u16 });
         }
-        state.arrays().stop();
+        state.stop();
         Ok(Self { blob, state })
     }
 
@@ -200,16 +164,14 @@ impl<'w, S: Memory> GyroNet<'w, S> {
         &self.blob
     }
 
-    /// Loads a window and runs the linear part on it; [`GyroNet::advance`] then runs the Bi-LSTMs piece by piece. A
-    /// window in progress is dropped.
+    /// Loads a window and runs the linear part; [`GyroNet::advance`] runs the rest. One in progress is dropped.
     pub fn start(&mut self, window: &[Features; WINDOW]) {
-        self.state.arrays().start(&self.blob, window);
+        self.state.start(&self.blob, window);
     }
 
-    /// Runs a bounded piece of the window (one direction of one layer, a third of it or less); returns the estimate
-    /// with the last piece, `None` before that and when no window is in progress.
+    /// Runs a piece (one direction of a layer, a third of it or less); returns the estimate with the last one.
     pub fn advance(&mut self) -> Option<Estimate> {
-        self.state.arrays().advance(&self.blob)
+        self.state.advance(&self.blob)
     }
 }
 

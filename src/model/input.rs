@@ -3,8 +3,7 @@
 use super::file::Normalisation;
 use crate::nn::{bilstm, pack};
 
-/// Normalises the codes of a step into its place in a first layer's input; returns the number of clamped values. A
-/// row of that input has `COLUMNS` values, two in a word: an odd number of inputs is padded with a zero.
+/// Normalises a step's codes into its row of `COLUMNS`, two in a word and padded; returns how many were clamped.
 pub(super) fn load_step<const INPUTS: usize, const COLUMNS: usize>(
     input: &mut [u32],
     step: usize,

@@ -120,8 +120,7 @@ impl Minute {
         newest: 0,
     };
 
-    /// Adds the next second of the corrector and returns the window that it ends. A second whose number does not follow
-    /// the one before begins a new window, because one between was missed.
+    /// Adds the next second; returns the window that it ends. A second that was missed begins a new window.
     pub fn follow(&mut self, new: NewSecond) -> SecondsWindow<'_> {
         if new.is_first || new.number != self.newest.wrapping_add(1) {
             self.seconds.clear();

@@ -12,8 +12,7 @@ const DEFAULT_BYTES: &[u8; include_bytes!("weights/default.blob").len()] =
 /// Units a direction of the default model, as its file states them.
 pub const DEFAULT_UNITS: usize = u16::from_le_bytes([DEFAULT_BYTES[16], DEFAULT_BYTES[17]]) as usize;
 
-/// The default weight file: a linear part alone. On drives that no model was trained on it is as good as [`GYRONET`], with
-/// a 1,970th of the multiplications.
+/// The default weights, a linear part: on drives unseen as good as [`GYRONET`], with a 1,970th of the products.
 pub static DEFAULT: Aligned<[u8; DEFAULT_BYTES.len()]> = Aligned(*DEFAULT_BYTES);
 
 const GYRONET_BYTES: &[u8; include_bytes!("weights/gyronet.blob").len()] =

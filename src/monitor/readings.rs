@@ -1,10 +1,9 @@
 //! Faults that show in successive readings only: they repeat themselves, or are further apart than a vehicle moves.
 //!
-//! A working part has noise, a stuck one has none. A part without a checksum, or with a short one, passes a flipped bit on
-//! as a reading. A limit on the step between samples finds it. How far an axis steps in 10 ms depends on the vehicle and
-//! the road: an RC car shakes its sensor by 1.2 rad/s, a car in a city by 0.07. So the limit follows the axis' own steps:
-//! on the recordings of five vehicles none is beyond [`USUAL`] times their RMS but for four, of 0.05 rad/s and 1.8 m/s^2
-//! at most.
+//! A part without a checksum passes a flipped bit on as a reading, which a limit on the step finds. It follows the
+//! axis' own steps, because vehicles and roads differ: an RC car shakes its sensor by 1.2 rad/s, a car in a city by
+//! 0.07. On the recordings of five vehicles four steps are beyond [`USUAL`] times their RMS, of 0.05 rad/s and 1.8
+//! m/s^2 at most.
 
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
@@ -24,8 +23,7 @@ const AXES: usize = 6;
 /// Samples over which the frequency of repetitions is averaged, as a power of two.
 const AVERAGE: u32 = 8;
 const ALWAYS: u16 = 1 << 15;
-/// An axis whose share of repetitions is below this normally has enough noise; the share includes the last
-/// [`STUCK_AFTER`] samples.
+/// Below this share of repetitions an axis is one with noise; the last [`STUCK_AFTER`] samples count, too.
 const SELDOM: u16 = ALWAYS / 16;
 
 #[derive(Debug, Clone)]
@@ -45,8 +43,7 @@ impl Repeats {
     }
 
     pub fn observe(&mut self, sample: &ImuSample) -> bool {
-        let ([fx, fy, fz], [wx, wy, wz]) = (sample.specific_force, sample.angular_rate);
-        let axes = [fx.0, fy.0, fz.0, wx.0, wy.0, wz.0];
+        let axes = sample.codes();
         let last = self.last.replace(axes);
         let Self { equal, repeats, stuck, .. } = self;
         for axis in 0..AXES {
@@ -64,8 +61,7 @@ impl Repeats {
     }
 }
 
-/// Steps of the gyro axes x, y and z in 10 ms that are always plausible, rad/s. Yaw is summed from z alone: a wrong step
-/// of it that passes turns the vehicle by 0.2 deg.
+/// Plausible steps of the gyro's x, y and z in 10 ms, rad/s: a wrong one of z that passes turns by 0.2 deg.
 pub const JUMP_RATE: [f32; 3] = [1.0, 1.0, 0.3];
 /// Step of an accelerometer axis in 10 ms that is always plausible, m/s^2.
 pub const JUMP_FORCE: f32 = 30.0;
@@ -188,9 +184,8 @@ impl Jump {
         }
     }
 
-    /// Adds an accepted step of the yaw rate. A jump that lasts begins a shift, and further jumps add to it. The shift ends
-    /// once the jumps add up to less than a jump and the rate is near the one before it. The sum alone does not end it: with a
-    /// wrong gain the rate also changes in steps that are no jumps.
+    /// Adds a step of the yaw rate. A jump that lasts begins a shift, to which more jumps add; it ends once they add
+    /// up to less than a jump with the rate near the one before it: a wrong gain makes steps that are no jumps, too.
     fn accept(&mut self, step: f32, is_far: bool) {
         let [.., smallest] = JUMP_RATE;
         let [_, _, yaw, ..] = self.last;

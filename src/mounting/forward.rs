@@ -1,15 +1,14 @@
 //! The vehicle's forward direction shows in the specific force when the wheels change their speed.
 //!
-//! The mean specific force of a second is gravity, plus the change of speed along the forward axis, plus speed times
-//! yaw rate along the left one. Gravity hardly changes from one second to the next, so the differences of
-//! neighbouring seconds depend on the direction of the two axes alone, and least squares finds it. Slopes, bumps and
-//! slip remain in the differences and give the sigma.
+//! A second's mean force is gravity, plus the change of speed along the forward axis, plus speed times yaw rate along
+//! the left one. Gravity hardly changes in a second, so differences of neighbouring seconds depend on the two axes
+//! alone, and least squares finds them. Slopes, bumps and slip give the sigma.
 
 use super::{Rotation, metre_per_sec2};
 use crate::sample::{ImuSample, RATE_HZ, WheelSample};
 use crate::sqrt::sqrt;
 use crate::units::{AngularRate, SpecificForce, WheelSpeed};
-use crate::vector::dot;
+use crate::vector::{dot, norm};
 
 /// Slower vehicles are ignored, m/s: they may be reversing, which most wheel sensors do not show.
 const SLOWEST: f32 = 3.0;
@@ -20,8 +19,7 @@ const MEMORY: f32 = 1.0 - 1.0 / 600.0;
 const SPREAD: f32 = 1.5;
 /// The direction is not determined from fewer seconds.
 const FEWEST: f32 = 20.0;
-/// Plausible ratios of the acceleration by the accelerometer to that by the wheels: others come from slip or from
-/// another sensor.
+/// Plausible ratios of both accelerations: others come from slip or from another sensor.
 const PLAUSIBLE: [f32; 2] = [0.5, 2.0];
 
 /// Holds the forward direction of the vehicle in the sensor's axes.
@@ -36,8 +34,7 @@ pub struct Forward {
 }
 
 impl Forward {
-    /// Returns the angle from the x axis of a mounting to this direction, to the left, rad: 0 where the mounting is
-    /// right. `rest` is the specific force at rest, in the sensor's axes.
+    /// Returns the angle from a mounting's x axis to the left, rad, by the force at `rest`, in the sensor's axes.
     pub fn yaw(&self, mounting: &Rotation, rest: [SpecificForce; 3]) -> f32 {
         let level = Rotation::levelling(mounting.force(rest)).map_or(Rotation::IDENTITY, |(level, _)| level);
         // A unit vector is within the range of the code.
@@ -49,7 +46,7 @@ impl Forward {
     /// Returns the angle to another direction, rad, and its sigma.
     pub fn angle_to(&self, other: &Self) -> [f32; 2] {
         let sine = cross(&self.direction, &other.direction);
-        let angle = libm::atan2f(sqrt(dot(&sine, &sine)), dot(&self.direction, &other.direction));
+        let angle = libm::atan2f(norm(&sine), dot(&self.direction, &other.direction));
         [angle, sqrt(self.sigma * self.sigma + other.sigma * other.sigma)]
     }
 
@@ -89,8 +86,7 @@ impl ForwardEstimator {
     pub const START: Self =
         Self { second: Second::EMPTY, before: None, turned: [0.0; 3], force: 0.0, motion: 0.0, count: 0.0 };
 
-    /// Adds a sample in the sensor's axes (`None` while it is silent), the report of the wheels, and the mean
-    /// specific force at rest, which shows the vertical. Returns whether the estimate has changed.
+    /// Adds a sample in the sensor's axes, the wheels, and the force at rest; returns true for a new estimate.
     pub fn add(
         &mut self,
         sample: Option<&ImuSample>,
@@ -121,7 +117,7 @@ impl ForwardEstimator {
     fn end_second(&mut self, end: f32, rest: &[SpecificForce; 3]) -> bool {
         let Second { begin, force, turning, .. } = self.second;
         let rest = metre_per_sec2(rest);
-        let up = scaled(&rest, 1.0 / sqrt(dot(&rest, &rest)).max(1.0));
+        let up = scaled(&rest, 1.0 / norm(&rest).max(1.0));
         let mean = |sums: &[f32; 3]| scaled(sums, 1.0 / RATE_HZ as f32);
         let (force, motion) = (mean(&force), [end - begin, dot(&mean(&turning), &up)]);
         let Some((force_before, [ahead, left])) = self.before.replace((force, motion)) else { return false };
@@ -140,10 +136,9 @@ impl ForwardEstimator {
         true
     }
 
-    /// Returns the direction; `None` before the vehicle has driven for long enough, and where the accelerations of
-    /// sensor and wheels do not match.
+    /// Returns the direction; `None` before enough of a drive, and where sensor and wheels do not match.
     pub fn forward(&self) -> Option<Forward> {
-        let length = sqrt(dot(&self.turned, &self.turned));
+        let length = norm(&self.turned);
         let gain = length / self.motion;
         // A gain that is not a number is refused, too.
         if self.count < FEWEST || !(PLAUSIBLE[0]..=PLAUSIBLE[1]).contains(&gain) {

@@ -1,26 +1,23 @@
 //! The vertical in the sensor's axes, by gravity at standstills and by the axis of turns.
 //!
 //! At rest the specific force points up, but a street slopes. In a turn the angular rate points up, and the slope adds
-//! only its change from the turn's begin to its end. So each is off by a street's slope, and their mean is the vertical
-//! of the vehicle on a level street.
+//! only its change. So each is off by a street's slope, and their mean is the vertical on a level street.
 //!
-//! A single tilt may be the street's or the sensor's. Two explanations compete: the sensor is mounted as configured, or it
-//! is tilted by an unknown angle. Slopes are normal with the same sigma in both, so
-//! the ratio of their probabilities has a closed form. The first explanation starts with the better odds: only a tilt
-//! steeper than streets, or one that turns confirm, is taken off.
+//! A single tilt may be the street's or the sensor's: mounted as configured, or tilted by an unknown angle. Slopes are
+//! normal with the same sigma in both, so the ratio of their probabilities has a closed form. The first explanation
+//! has the better odds at first: only a tilt steeper than streets, or one that turns confirm, is taken off.
 //!
-//! The vertical of earlier drives is a claim. A standstill whose vertical differs from it by more than a street can slope
-//! drops the claim, because the sensor was moved. Until a turn or another standstill agrees with one of the two, the angle
-//! between them is part of the variance. So is the scatter of the standstills where it exceeds that of streets. One
-//! standstill and the turns after it may all be on one ramp, which looks like a tilt: until a second standstill has shown
-//! the tilt, its square times that probability ([`RAMP`]) is part of the variance.
+//! The vertical of earlier drives is a claim, which a standstill drops that differs by more than a street can slope.
+//! Until a turn or another standstill decides, the angle between them is part of the variance. So is the scatter of
+//! the standstills where it exceeds that of streets. A standstill and the turns after it may all be on one ramp: until
+//! a second one has shown the tilt, its square times that probability ([`RAMP`]) is part of the variance.
 
 use super::{Rotation, metre_per_sec2};
 use crate::health::slow::Knowledge;
 use crate::sample::RATE_HZ;
 use crate::sqrt::sqrt;
 use crate::units::{AngularRate, SpecificForce};
-use crate::vector::dot;
+use crate::vector::{dot, norm};
 
 /// Sigma of a street's slope, rad: 3.5 deg, that of the standstills of the five training drives.
 const SLOPE: f32 = 0.061;
@@ -83,16 +80,15 @@ impl Vertical {
         let (sum, tilt) = self.deviation();
         let [x, y, z] = sum.map(|axis| axis / (self.information + 1.0 / tilt));
         let up = [x, y, 1.0 + z];
-        let length = sqrt(dot(&up, &up)).max(f32::MIN_POSITIVE);
+        let length = norm(&up).max(f32::MIN_POSITIVE);
         up.map(|axis| axis / length)
     }
 
-    /// Returns the sigma of that direction in each axis, rad: by the slope of streets, or by the scatter of the directions
-    /// where the scatter is larger.
+    /// Returns its sigma in each axis, rad: by the slope of streets, or the scatter of the directions if larger.
     pub fn sigma(&self) -> f32 {
         let (_, tilt) = self.deviation();
         // Each direction has two axes, and a weight of at most that of a standstill but for turns.
-        let scatter = 2.0 * (self.information - sqrt(dot(&self.sum, &self.sum)));
+        let scatter = 2.0 * (self.information - norm(&self.sum));
         let expected = (2.0 * self.information * SLOPE * SLOPE).max(2.0);
         sqrt((scatter / expected).max(1.0) / (self.information + 1.0 / tilt))
     }
@@ -148,8 +144,7 @@ pub struct Judgement {
 pub struct VerticalEstimator {
     known: Vertical,
     is_tilted: bool,
-    /// Square of the angle between the vertical that a standstill has dropped and its own, rad^2; 0 once a turn or another
-    /// standstill has changed the known vertical.
+    /// Square of the angle by which a standstill has dropped a vertical, rad^2; 0 once another or a turn decides.
     disputed: f32,
     /// No second standstill has shown the tilt.
     is_one_place: bool,
@@ -183,7 +178,7 @@ impl VerticalEstimator {
     /// Adds the mean specific force of a standstill that goes on.
     pub fn rest(&mut self, force: &[SpecificForce; 3]) {
         let force = metre_per_sec2(force);
-        let length = sqrt(dot(&force, &force));
+        let length = norm(&force);
         if length > 1.0 {
             let up = force.map(|axis| axis / length);
             let before = self.known.up();
@@ -198,8 +193,7 @@ impl VerticalEstimator {
         (self.stood, self.away) = (REST, 0);
     }
 
-    /// Adds a good sample: its specific force, its angular rate less the bias, and whether the vehicle stands. Returns
-    /// true when a second is over.
+    /// Adds a good sample: force, rate less the bias, whether it stands. Returns true when a second is over.
     pub fn add(&mut self, force: &[SpecificForce; 3], rate: &[AngularRate; 3], stands: bool) -> bool {
         if stands {
             self.stood = self.stood.saturating_add(1);
@@ -252,7 +246,7 @@ impl VerticalEstimator {
         if libm::fabsf(yaw) < LEAST_TURN {
             return self.known;
         }
-        let length = sqrt(dot(&self.turn, &self.turn));
+        let length = norm(&self.turn);
         let direction = self.turn.map(|axis| axis / libm::copysignf(length, yaw));
         self.known.with(&direction, (2.0 * SLOPE * SLOPE / (yaw * yaw)).max(LEAN * LEAN))
     }
@@ -293,7 +287,7 @@ mod tests {
     /// Readings of a sensor whose up is tilted by these angles about y and x, small: at rest, and turning.
     fn readings([x, y]: [f32; 2], yaw: f32) -> ([SpecificForce; 3], [AngularRate; 3]) {
         let up = [libm::sinf(x.to_radians()), libm::sinf(y.to_radians()), 1.0];
-        let length = sqrt(dot(&up, &up));
+        let length = norm(&up);
         let up = up.map(|axis| axis / length);
         (
             up.map(|axis| SpecificForce::from_metre_per_sec2(9.81 * axis).unwrap()),

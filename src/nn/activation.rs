@@ -1,17 +1,14 @@
 //! Sigmoid and tanh are tables of straight lines, one word per segment.
 //!
-//! The input is a gate's Q14 value, saturated to 18 bits (+-8); the output is Q15 in the upper half of a word, as the
-//! halfword multiplies of the cell update expect it. An entry holds the line's base in its upper half and the slope
-//! in its lower one, and the result is `entry + slope * fraction`: one load and one multiply-accumulate. (The slope
-//! in the lower half adds less than half an LSB to the base; the table allows for that.) Each line is the chord of
-//! its segment moved by half the sagitta, so the error is shared between both sides.
+//! The input is a gate's Q14 value, saturated to 18 bits (+-8); the output is Q15 in the upper half of a word, for the
+//! cell update's halfword multiplies. An entry holds the line's base in its upper half and the slope in its lower one:
+//! `entry + slope * fraction`, one load and one multiply-accumulate. (The table allows for what the slope adds to the
+//! base.) Each line is the chord of its segment moved by half the sagitta.
 //!
-//! | function | segments | table | largest error over all 262,144 inputs |
+//! | function | segments | table | largest error over all 262,144 inputs (test `activation_error`) |
 //! |---|---|---|---|
 //! | sigmoid | 256 of 1/16 | 1 KiB | 5.4e-5 (1.75 LSB) |
 //! | tanh | 512 of 1/32 | 2 KiB | 7.6e-5 (2.5 LSB) |
-//!
-//! The errors are those of the test `activation_error`, which fails if they grow.
 
 use super::GATE_FRACTION_BITS;
 
@@ -24,8 +21,7 @@ const INPUT_MIN: i32 = -(1 << (INPUT_BITS - 1));
 pub const SIGMOID_SHIFT: u32 = 10;
 /// Fraction bits inside a tanh segment.
 pub const TANH_SHIFT: u32 = 9;
-/// The tanh slope is four times the sigmoid's: it is stored divided by four, and the fraction
-/// multiplied by four.
+/// The tanh slope, four times the sigmoid's, is stored divided by four, and the fraction multiplied by four.
 pub const TANH_FRACTION_SCALE: u32 = 2;
 const SIGMOID_LEN: usize = 1 << (INPUT_BITS - SIGMOID_SHIFT);
 const TANH_LEN: usize = 1 << (INPUT_BITS - TANH_SHIFT);

@@ -81,8 +81,7 @@ impl Pass {
         self.done < pairs
     }
 
-    /// Runs only the first step of a pass, half a pair, for callers that need no other. Passes its number and hidden
-    /// state to `emit`.
+    /// Runs only the first step of a pass, half a pair; passes its number and hidden state to `emit`.
     pub fn first<const U: usize, const W: usize, const P: usize>(
         direction: Direction,
         weights: &DirectionWeights<'_>,
@@ -111,8 +110,7 @@ pub const fn word_index(step: usize, column: usize, columns: usize) -> usize {
     (step / 2) * columns + (column / 2) * 2 + step % 2
 }
 
-/// Writes a step's hidden state (`units` of it) into a sequence of `columns` values a step,
-/// from column `offset` on: the next layer's input.
+/// Writes a step's hidden state into a sequence of `columns` values, from `offset` on: the next layer's input.
 pub fn store(sequence: &mut [u32], step: usize, offset: usize, columns: usize, units: usize, hidden: &[u32]) {
     // Of each word, the value of the pair's first step, then that of the second.
     let pairs =
@@ -125,8 +123,7 @@ pub fn store(sequence: &mut [u32], step: usize, offset: usize, columns: usize, u
     }
 }
 
-/// Runs a network of two bidirectional layers over one sequence; [`Run::advance`] runs its next bounded piece: pairs
-/// of steps in one direction of one layer.
+/// Two bidirectional layers over a sequence, in bounded pieces: pairs of steps in a direction of a layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Run {
     /// Current direction: 0 and 1 are layer 1 forward and backward, 2 and 3 layer 2.

@@ -17,10 +17,8 @@ impl Dense<'_> {
     /// Fraction bits of the multiplier.
     pub const SHIFT: u32 = 24;
 
-    /// Returns the part of the sum that one direction's hidden state gives; add both and the bias.
-    ///
-    /// `hidden` holds two units a word. The sum stays inside 32 bits: [`crate::model::Blob`] proves it for the
-    /// weights in use.
+    /// Returns the sum's part of a direction's hidden state, two units a word; add both and the bias. It stays in 32
+    /// bits, as [`crate::model::Blob`] proves.
     pub fn partial(weights: &[i16], hidden: &[u32]) -> i32 {
         // Halfwords, as the processor's multiply-accumulate reads them: no unpacking.
         let hidden: &[i16] = bytemuck::must_cast_slice(hidden);

@@ -13,8 +13,7 @@ impl<'w> Linear<'w> {
     /// The magnitudes of a row must not add up to more than this, so that no inputs can overflow a sum of 64 bits.
     pub const ROW_LIMIT: u64 = u32::MAX as u64;
 
-    /// Creates a layer over rows of `inputs` weights, in the layout of a weight file; an error is the number of the
-    /// first row that some inputs could overflow.
+    /// Creates a layer over rows of `inputs` weights of a file; or the number of a row that could overflow.
     pub fn new(inputs: usize, weights: &'w [i32]) -> Result<Self, usize> {
         let layer = Self { inputs, weights };
         let magnitude = |row: &[i32]| row.iter().map(|weight| u64::from(weight.unsigned_abs())).sum::<u64>();

@@ -65,8 +65,7 @@ impl<'w> DirectionWeights<'w> {
         self.units
     }
 
-    /// Returns whether arrays for `room` units fit the direction: it has `room` units, or fewer in whole groups of
-    /// four, because the hidden state is read in such groups.
+    /// Returns whether arrays for `room` units fit the direction, whose units are read in groups of four.
     pub const fn fits(&self, room: usize) -> bool {
         self.units == room || self.units < room && self.units.is_multiple_of(4)
     }
@@ -83,10 +82,8 @@ impl<'w> DirectionWeights<'w> {
         self.recurrent
     }
 
-    /// Returns the same direction with its recurrent records in `room`. `load` copies them there; without it, an
-    /// earlier call must have done so. Records that do not fit are read in place.
-    ///
-    /// A step reads every record once. In memory without wait states the copy pays for itself in two or three steps.
+    /// Returns the direction with its recurrent records in `room`, where `load` copies them; records that do not fit
+    /// are read in place. A copy without wait states pays for itself in two or three steps.
     pub fn through<'a>(&self, room: &'a mut [u32], load: bool) -> DirectionWeights<'a>
     where
         'w: 'a,
@@ -110,9 +107,8 @@ impl<'w> DirectionWeights<'w> {
     }
 }
 
-/// Holds state and scratch of one direction with up to `U` units, in `W` words of hidden state, with room for the
-/// projections of `P` pairs of steps. A direction of fewer units, a multiple of four, uses the first elements of each
-/// array.
+/// State and scratch of a direction of up to `U` units, in `W` words of hidden state, for `P` pairs of steps. Fewer
+/// units, in fours, use the first elements.
 #[derive(Debug, Clone)]
 pub struct Scratch<const U: usize, const W: usize, const P: usize = 1> {
     /// Cell state, Q20.
@@ -133,13 +129,8 @@ impl<const U: usize, const W: usize, const P: usize> Scratch<U, W, P> {
     };
 }
 
-/// Computes bias and input products of all units, for a pair of consecutive steps each.
-///
-/// `x` holds the inputs of all pairs; the two steps of a pair alternate word by word, and a pair has as many words as
-/// the direction has inputs.
-///
-/// Does nothing when `x` does not fit the direction, or `U` does not fit its units. That is a bug of the caller, at
-/// which debug builds panic.
+/// Computes bias and input products of all units for pairs of steps, whose words alternate in `x`. Does nothing when
+/// `x` or `U` does not fit the direction: a bug, at which debug builds panic.
 pub fn project<const U: usize>(weights: &DirectionWeights<'_>, x: &[u32], projection: &mut [Projection<U>]) {
     let fits = x.len() == weights.inputs * projection.len() && weights.fits(U);
     debug_assert!(fits);
@@ -148,12 +139,8 @@ pub fn project<const U: usize>(weights: &DirectionWeights<'_>, x: &[u32], projec
     }
 }
 
-/// Computes one recurrent step of all units: gates, cell state, hidden state.
-///
-/// `projection` belongs to this step. `previous` is the hidden state before it; `None` for the
-/// zero state that a sequence starts from.
-///
-/// Does nothing when `U` or `W` does not fit the direction's units, as [`project`].
+/// Computes a step of all units from its `projection` and the `previous` hidden state, `None` for zero: gates, cell
+/// state, hidden state. What does not fit is treated as in [`project`].
 pub fn step<const U: usize, const W: usize>(
     weights: &DirectionWeights<'_>,
     projection: &[Accumulators; U],
@@ -228,8 +215,7 @@ fn set_hidden(hidden: &mut [u32], unit: usize, h: i16) {
     };
 }
 
-/// Computes equations 7 to 12 of the paper for one unit: accumulators and cell state to new cell state and hidden
-/// state.
+/// Computes equations 7 to 12 of the paper: a unit's new cell state and hidden state.
 #[inline]
 pub(super) fn update(acc: &Accumulators, multipliers: &[u32; 2], cell_state: i32) -> (i32, i16) {
     let low = |pair: usize| scale(acc[2 * pair], unpack(multipliers[pair]).0);
@@ -261,8 +247,7 @@ fn upper(word: i32) -> i32 {
     word >> 16
 }
 
-/// Returns the largest magnitude that the accumulators of one unit can reach, for inputs up to `input_max` and any
-/// hidden state: rows i, f, g, o.
+/// Returns how large a unit's accumulators (i, f, g, o) can be, for inputs up to `input_max`.
 pub fn row_bound(weights: &DirectionWeights<'_>, unit: usize, input_max: i32) -> [i64; GATES] {
     let mut bound = [0i64; GATES];
     let records = weights.input_records().nth(unit).zip(weights.recurrent_records().nth(unit));

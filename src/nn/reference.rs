@@ -46,8 +46,7 @@ pub fn lstm<const I: usize, const H: usize, const W: usize>(
     }
 }
 
-/// Computes one time step of all units: from the input `x` (I), the hidden state `h` (H) and the cell state `s` (H) the
-/// next hidden state (H).
+/// Computes a step of all units: of input `x` (I), hidden state `h` and cell state `s` (H) the next `h`.
 fn step(weights: &LstmWeights<'_>, x: &[f32], h: &[f32], s: &mut [f32], next: &mut [f32]) {
     let units = weights.units();
     let inputs = weights.weight_ih.len() / (GATES * units).max(1);

@@ -6,7 +6,6 @@ use crate::heading::{CourseConfig, Gain};
 use crate::health::slow::Knowledge;
 use crate::mounting::{GyroMap, Rotation, Vertical};
 use crate::pipeline::UncertaintyConfig;
-use crate::standstill::StandstillConfig;
 use crate::units::SpecificForce;
 
 #[derive(Debug, Clone, Copy)]
@@ -37,8 +36,6 @@ pub struct PipelineConfig {
     pub gain: Option<Gain>,
     /// The model and map that a gain is found with ([`Gain::of`]).
     pub gain_of: u32,
-    /// Limits by which the inertial sensor shows a standstill.
-    pub standstill: StandstillConfig,
     /// Settings of the compensation, which applies the estimates to the rates.
     pub compensate: CompensateConfig,
     /// The model of a rate's expected error.
@@ -61,7 +58,6 @@ impl PipelineConfig {
         course: CourseConfig::DEFAULT,
         gain: None,
         gain_of: 0,
-        standstill: StandstillConfig::DEFAULT,
         compensate: CompensateConfig::DEFAULT,
         uncertainty: UncertaintyConfig::DEFAULT,
     };

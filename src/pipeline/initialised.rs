@@ -25,8 +25,7 @@ pub(super) struct Initialised {
 }
 
 impl Pipeline {
-    /// Adds a sample to static initialisation, of a vehicle whose wheels may turn (`moves`). Returns the reason if this
-    /// sample makes it fail.
+    /// Adds a sample to static initialisation (`moves`: the wheels may turn); returns the reason of a failure.
     #[inline(never)]
     pub(super) fn initialise(
         &mut self,

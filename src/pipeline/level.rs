@@ -7,9 +7,8 @@ use super::{Pipeline, PipelineConfig};
 use crate::bias::EarthRate;
 use crate::mounting::{Judgement, Rotation, Vertical, VerticalEstimator};
 use crate::sample::ImuSample;
-use crate::sqrt::sqrt;
 use crate::units::{AngularRate, SpecificForce};
-use crate::vector::dot;
+use crate::vector::norm;
 
 /// Samples between two steps, and the largest step: 3 degrees in a second.
 const STEP_SAMPLES: u32 = 5;
@@ -24,7 +23,7 @@ pub(super) struct Level {
     /// Up, as the sensor is mounted: where it should be, and where it is taken to be.
     goal: [f32; 3],
     up: [f32; 3],
-    rotation: Rotation,
+    pub(super) rotation: Rotation,
     /// Mean rates at rest, not levelled.
     rest: [AngularRate; 3],
     samples: u32,
@@ -34,8 +33,7 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// Starts with the rates at rest, the specific force at rest unless the vehicle moves, and what earlier drives have
-    /// shown.
+    /// Starts with the rates at rest, the force at rest unless the vehicle moves, and what earlier drives showed.
     pub(super) fn new(
         rest: [AngularRate; 3],
         force: Option<&[SpecificForce; 3]>,
@@ -71,10 +69,6 @@ impl Level {
         ZeroPoint::at_rest(self.rates_at_rest(), earth)
     }
 
-    pub(super) fn rotation(&self) -> &Rotation {
-        &self.rotation
-    }
-
     /// Adds a sample that is not levelled yet. Returns true where the rotation has changed.
     pub(super) fn add(&mut self, sample: &ImuSample, stands: bool) -> bool {
         let rates = core::array::from_fn(|axis| {
@@ -98,13 +92,13 @@ impl Level {
 
     fn follow(&mut self) -> bool {
         let way: [f32; 3] = core::array::from_fn(|axis| self.goal[axis] - self.up[axis]);
-        let length = sqrt(dot(&way, &way));
+        let length = norm(&way);
         if length <= 1e-6 {
             return false;
         }
         let part = (STEP / length).min(1.0);
         let up: [f32; 3] = core::array::from_fn(|axis| self.up[axis] + part * way[axis]);
-        let norm = sqrt(dot(&up, &up)).max(0.1);
+        let norm = norm(&up).max(0.1);
         self.up = if part < 1.0 { up.map(|axis| axis / norm) } else { self.goal };
         self.rotation = Rotation::upright(&self.up);
         true

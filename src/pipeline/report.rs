@@ -21,7 +21,7 @@ impl Pipeline {
     ) -> VehicleSample {
         (self.state.tick, self.state.silent) = (frame.tick, 0);
         let faults = self.faults(wheels, board);
-        let accepted = self.state.windows.is_accepted();
+        let accepted = self.state.windows.accepted;
         let is_early = rates.early_sigma.is_some();
         let bias = self.bias_sigma(rates.early_sigma, board.shift);
         // No window corrects it.
@@ -70,8 +70,7 @@ impl Pipeline {
         }
     }
 
-    /// Builds the message set of a silent sensor, `steps` grid steps after the last one: no rate, no force, and the
-    /// yaw unchanged.
+    /// Builds the set of a silent sensor, `steps` after the last one: no rate, no force, the yaw unchanged.
     pub fn silent(&mut self, steps: u32, board: &BoardState) -> VehicleSample {
         self.state.tick = self.state.tick.wrapping_add(steps);
         self.state.silent = self.state.silent.saturating_add(steps);
@@ -100,7 +99,7 @@ impl Pipeline {
     fn faults(&self, wheels: Option<&WheelSample>, board: &BoardState) -> Faults {
         self.state
             .windows
-            .faults()
+            .faults
             .with(Faults::GAP.when(self.state.gap_within > 0))
             .with(
                 Faults::IMPLAUSIBLE.when(self.state.moved || self.state.compensator.revisions_exceed_limit()),
@@ -121,8 +120,7 @@ impl Pipeline {
         self.zero_rate().is_none_or(ZeroRate::is_confirmed)
     }
 
-    /// Returns the sigma of what adds linearly, rad/s: of the bias (`early` before static initialisation), `shift` since a
-    /// jump, and revisions that are carried.
+    /// Returns the sigma of what adds linearly, rad/s: bias, `shift` since a jump, revisions that are carried.
     fn bias_sigma(&self, early: Option<f32>, shift: f32) -> f32 {
         let sigma = early.unwrap_or_else(|| self.zero_rate().map_or(0.0, ZeroRate::sigma));
         let carried = self.state.compensator.carried_in_a_second();

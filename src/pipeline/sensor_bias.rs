@@ -1,8 +1,7 @@
 //! The bias of a reading: what earlier drives have shown at the sensor's temperature, and what a mean at rest shows.
 //!
-//! The first is subtracted before any other stage, so that the rate can be used before the vehicle has stood. A mean at
-//! rest contains the Earth's rate: [`ZeroPoint`] holds the bias and the reading at rest separately, and the reading
-//! contains the Earth's rate exactly once.
+//! The first is subtracted before any other stage, so that the rate can be used before the vehicle has stood. A mean
+//! at rest contains the Earth's rate, once: [`ZeroPoint`] holds both.
 
 use super::PipelineConfig;
 use super::level;
@@ -13,8 +12,7 @@ use crate::units::{AngularRate, SpecificForce};
 
 /// A sensor counts as moved after this many seconds that suggest it: no braking is so hard for so long.
 const MOVED_SECONDS: u32 = 4;
-/// Each second the temperature in use changes by this part of its difference to the measured one, so that a wrong
-/// reading changes the bias little.
+/// Part of its error by which the temperature in use changes each second: a wrong reading has little effect.
 const SMOOTHING: f32 = 0.125;
 
 #[derive(Debug, Clone, Copy)]
@@ -24,11 +22,9 @@ pub(super) struct SensorBias {
     wait: u32,
     /// The bias there and its sigma, rad/s.
     newest: Option<([AngularRate; 3], f32)>,
-    /// The part of the bias that static initialisation has already found, if the first temperature was reported after
-    /// it.
+    /// The bias of static initialisation, where the first temperature was reported after it.
     found: [AngularRate; 3],
-    /// The temperature at which the zero-rate updates have found the rest of the bias, deg C, and the sigma of its change
-    /// since then, rad/s.
+    /// Temperature at which zero-rate updates have found the rest, deg C, and the sigma of its change since, rad/s.
     reference: Option<f32>,
     change_sigma: f32,
     /// The rotation beyond the configured mounting that earlier drives have shown, and the specific force at rest that
@@ -36,8 +32,7 @@ pub(super) struct SensorBias {
     early: Option<(Rotation, [SpecificForce; 3])>,
     /// Specific force of this second, codes, and its good samples.
     force: ([i64; 3], i64),
-    /// True if the last seconds show that the sensor was not moved since; and the seconds in a row that show that it
-    /// was.
+    /// True if it was not moved since, by the last seconds; and the seconds in a row that say it was.
     in_place: bool,
     elsewhere: u32,
 }
@@ -56,9 +51,8 @@ impl SensorBias {
         elsewhere: 0,
     };
 
-    /// Subtracts the learnt bias from a reading in the sensor's axes; `initialised` is true after static
-    /// initialisation. Returns whether this is the first reading that a bias is subtracted from: static
-    /// initialisation must not mix it with earlier readings.
+    /// Subtracts the learnt bias, in the sensor's axes; returns whether it is the first reading so changed, which
+    /// static initialisation must not mix with those before.
     pub(super) fn subtract(
         &mut self,
         sample: &mut ImuSample,
@@ -95,8 +89,7 @@ impl SensorBias {
         self.newest.map(|(_, sigma)| sigma)
     }
 
-    /// Compares a second's mean specific force with that of earlier drives: a single sample also shows bumps and
-    /// braking.
+    /// Compares a second's force with that of earlier drives: a single sample shows bumps and braking, too.
     fn end_second(&mut self) {
         let (sums, count) = core::mem::take(&mut self.force);
         let Some((_, before)) = self.early.filter(|_| count > 0) else { return };
@@ -135,9 +128,8 @@ impl SensorBias {
         self.change_sigma = 0.0;
     }
 
-    /// Returns the levelling and the bias' sigma, rad/s, for a reading in the sensor's axes before static initialisation;
-    /// `None` where earlier drives have shown no bias, in the first second, where the sensor was moved since, and for a
-    /// reading that is not good.
+    /// Returns levelling and sigma of the bias, rad/s, before static initialisation; `None` without a bias, in the
+    /// first second, for a sensor that was moved, and for a bad reading.
     pub(super) fn early(&self, sample: &ImuSample) -> Option<(Rotation, f32)> {
         let (levelling, _) = self.early?;
         let (_, sigma) = self.newest?;

@@ -103,8 +103,7 @@ pub struct Turning {
     pub bias: f32,
 }
 
-/// Sums over some time, rad: the turns about x, y and z, the network's correction, and the turn that standstill has set
-/// to zero.
+/// Sums, rad: turns about x, y and z, the network's correction, and what standstill has set to zero.
 type Turns = [f32; TURNS];
 const TURNS: usize = 5;
 
@@ -213,8 +212,7 @@ impl Uncertainty {
         part.square += variance;
     }
 
-    /// Returns the share of the yaw rate that is missed because the turn's axis is not the sensor's: on a slope a turn also
-    /// rolls and pitches the vehicle, for as long as it lasts.
+    /// Returns the share of the yaw rate that a slope hides while a turn lasts: it rolls and pitches, too.
     pub fn tilted(&self) -> f32 {
         let [[x, y, z, ..], [a, b, c, ..]] = [self.parts[0].turns, self.parts[1].turns];
         share([x + a, y + b, z + c], TURN)

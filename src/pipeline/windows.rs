@@ -26,8 +26,9 @@ pub(super) struct Windows {
     since: u32,
     /// Tick of the window that has been handed out, and its estimate once delivered.
     out: Option<(u32, Option<Estimate>)>,
-    accepted: bool,
-    faults: Faults,
+    /// Whether the newest estimate is in use, and its fault: it was rejected or late.
+    pub accepted: bool,
+    pub faults: Faults,
 }
 
 impl Windows {
@@ -44,8 +45,7 @@ impl Windows {
         *self = Self::START;
     }
 
-    /// Returns the window that ends with this tick, if it is full, at least `stride` samples after the last one, and no
-    /// other is handed out.
+    /// Returns the window that ends with this tick, if full, `stride` after the last one, and none is out.
     #[inline(never)]
     pub fn due(&mut self, tick: u32, stride: u32) -> Option<DueWindow> {
         if self.since < stride || self.out.is_some() {
@@ -68,34 +68,17 @@ impl Windows {
         }
     }
 
-    /// Returns the estimate that is due at this tick: `Some(None)` if it did not arrive in time, `None` if none is
-    /// due.
+    /// Returns the estimate due at this tick: `Some(None)` if it is late, `None` if none is due.
     pub fn take_estimate(&mut self, tick: u32, delay: u32) -> Option<Option<Estimate>> {
         let (_, estimate) = self.out.take_if(|(end, _)| tick.wrapping_sub(*end) >= delay)?;
         Some(estimate)
-    }
-
-    pub fn accept(&mut self) {
-        (self.accepted, self.faults) = (true, Faults::NONE);
-    }
-
-    pub fn reject(&mut self, fault: Faults) {
-        (self.accepted, self.faults) = (false, fault);
-    }
-
-    pub fn is_accepted(&self) -> bool {
-        self.accepted
-    }
-
-    pub fn faults(&self) -> Faults {
-        self.faults
     }
 }
 
 /// A window on its way to the network: the one that is due, and the one whose estimate is being computed.
 #[derive(Debug, Clone)]
 pub(crate) struct Handover {
-    has_network: bool,
+    pub has_network: bool,
     /// Samples from a window's newest one to the sample that uses its estimate.
     delay: u32,
     due: Option<DueWindow>,
@@ -107,10 +90,6 @@ impl Handover {
     /// Creates a handover before the first window; without a network no window is ever due.
     pub const fn new(has_network: bool, delay: u32) -> Self {
         Self { has_network, delay, due: None, out: None }
-    }
-
-    pub const fn has_network(&self) -> bool {
-        self.has_network
     }
 
     /// Stores a window that is due. Returns true if it replaces a window that was not taken, which is then late.

@@ -1,16 +1,13 @@
 //! Reads the Bosch BMI088 over SPI (mode 0 or 3, at most 10 MHz): two dies, each with its own chip select.
 //!
-//! [`frame`] parses what the dies send without I/O, `registers` lists their registers, and this file does the SPI transfers.
-//! Every wait is a bounded number of [`DelayNs`] delays. Each call for a sample also reads back one register of the
-//! configuration, or the gyro's report of its own drive, so that a reset, a flipped bit or a gyro that fails is detected
-//! within [`CHECKS`] calls.
+//! [`frame`] parses what the dies send without I/O, `registers` lists their registers. Every wait is a bounded number
+//! of [`DelayNs`] delays. Each call for a sample also reads back one register, or the gyro's report of its own drive,
+//! so that a reset, a flipped bit or a gyro that fails is detected within [`CHECKS`] calls.
 //!
-//! # Two dies on one time line
-//!
-//! Each die has its own oscillator, and the data sheet bounds neither. The gyro's frames have no time stamps: a sample's time
-//! is its number times 5 ms. [`crate::align::clock_ratio`] measures that clock against the board's, as any sensor's.
-//! The accelerometer has the same nominal rate. A frame of the gyro with n newer ones behind it in the FIFO goes with the
-//! acceleration that has n newer ones behind it: both FIFOs end now, so the two are of one time after a stall, too.
+//! **Two dies on one time line.** Each die has its own oscillator, and the data sheet bounds neither. The gyro's
+//! frames have no stamps: a sample's time is its number times 5 ms, a clock that [`crate::align::clock_ratio`]
+//! measures. The accelerometer has the same nominal rate. A frame of the gyro with n newer ones behind it in the FIFO
+//! goes with the acceleration that has n newer ones behind it: both FIFOs end now.
 //!
 //! | | what the second clock costs |
 //! |---|---|
@@ -18,13 +15,12 @@
 //! | a difference of 2 % | every 50th force is used twice or left out |
 //! | n frames behind | n times the difference more: 10 ms after a stall of 0.5 s at 2 % |
 //!
-//! Rate and time come from the gyro alone. A force that is older than [`OLDEST`] frames is not used
-//! ([`SpiError::NoReading`]).
+//! A force that is older than [`OLDEST`] frames is not used ([`SpiError::NoReading`]).
 //!
-//! **A full FIFO** (100 frames of the gyro, 0.5 s) is emptied, with [`SpiError::Overflow`]. The accelerometer's time,
-//! which runs on, counts the lost frames: each such gap is right within half a frame and the difference of the clocks.
-//! The gyro's FIFO stops when it is full, since in the mode that drops the oldest its axes have been seen to change places
-//! (ArduPilot's history; no data sheet says so).
+//! **A full FIFO** (100 frames of the gyro, 0.5 s) is emptied, with [`SpiError::Overflow`]. The accelerometer's time
+//! counts the lost frames: each such gap is right within half a frame and the difference of the clocks. The gyro's
+//! FIFO stops when full: in the mode that drops the oldest its axes have been seen to change places (ArduPilot's
+//! history).
 
 #[doc(hidden)]
 pub mod frame;
@@ -112,10 +108,8 @@ impl<SPI: SpiDevice> Bmi088<SPI> {
         [self.accelerometer.spi, self.gyro.spi]
     }
 
-    /// Returns the oldest sample in the FIFO, if any, and checks one register.
-    ///
-    /// # Errors
-    /// `Bus`, `Setting`, `NoReading` or `Overflow`; `SelfTest` if the gyro's drive is not in order.
+    /// Returns the oldest sample in the FIFO, if any, and checks one register: an error is also a wrong setting, or a
+    /// gyro whose drive is not in order.
     pub fn next_sample(&mut self) -> Result<Option<ImuSample>, SpiError<SPI::Error>> {
         self.check_next()?;
         let [status] = self.gyro.read(reg::GYRO_FIFO_STATUS)?;

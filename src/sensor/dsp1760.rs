@@ -6,14 +6,13 @@
 //! time is the number of messages, lost ones included, times the period. The sequence number wraps at 128, so it does not reveal a loss of 128 messages or
 //! more. The time stamps of format B reveal it, or the arrival times do ([`crate::align`]).
 
-mod format;
 mod framing;
+#[doc(hidden)]
 pub mod message;
 
 pub use framing::Kvh;
 
 use super::framer::Framer;
-use crate::health::count;
 use crate::sample::{FogSample, StampClock};
 use crate::units::{Angle, CentiCelsius, Micros};
 use framing::is_self_test;
@@ -35,22 +34,6 @@ pub enum Dsp1760Error {
     },
 }
 
-/// The event counters; they saturate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Dsp1760Counters {
-    /// Times that the sequence number advanced by more than one.
-    pub gaps: u32,
-    /// Messages missing in these gaps.
-    pub lost: u32,
-    /// Repeated messages.
-    pub repeated: u32,
-    /// Built-in-test messages skipped.
-    pub self_tests: u32,
-    /// Rotations marked as good but out of range.
-    pub implausible: u32,
-}
-
 /// The time from one message to the next, microseconds.
 const PERIOD_US: u32 = 1_000;
 /// The gyro's range ends at 490 deg/s, rad in a period. In degrees taken for radians that is 8.6 deg/s.
@@ -65,19 +48,12 @@ pub struct Dsp1760 {
     time: u64,
     /// Unwraps the time stamps of format B.
     stamps: StampClock,
-    counters: Dsp1760Counters,
 }
 
 impl Dsp1760 {
     /// Creates a parser that has received nothing.
     pub const fn new() -> Self {
-        Self {
-            framer: Framer::new(),
-            last_sequence: None,
-            time: 0,
-            stamps: StampClock::START,
-            counters: Dsp1760Counters { gaps: 0, lost: 0, repeated: 0, self_tests: 0, implausible: 0 },
-        }
+        Self { framer: Framer::new(), last_sequence: None, time: 0, stamps: StampClock::START }
     }
 
     /// Processes one byte. Call [`Dsp1760::next_sample`] until it returns `None` before passing the next byte.
@@ -86,8 +62,7 @@ impl Dsp1760 {
         self.framer.receive(byte);
     }
 
-    /// Processes one or more of `bytes`, at most to the end of a message, and returns their number. Call
-    /// [`Dsp1760::next_sample`] until it returns `None` before passing the rest.
+    /// Takes bytes, at most to the end of a message, and returns how many; then call [`Dsp1760::next_sample`].
     #[inline]
     pub fn receive_some(&mut self, bytes: &[u8]) -> usize {
         self.framer.receive_some(bytes)
@@ -105,7 +80,6 @@ impl Dsp1760 {
         loop {
             let frame = self.framer.next_frame()?;
             if is_self_test(frame) {
-                count(&mut self.counters.self_tests, 1);
                 continue;
             }
             let message = match Message::parse_checked(frame) {
@@ -121,42 +95,31 @@ impl Dsp1760 {
         self.framer.bad_checksums()
     }
 
-    /// Returns the event counters since the start.
-    pub fn counters(&self) -> &Dsp1760Counters {
-        &self.counters
-    }
-
     fn sample(&mut self, message: &Message) -> Result<FogSample, Dsp1760Error> {
         let sequence = message.sequence;
         let steps = self.last_sequence.map_or(1, |last| sequence.wrapping_sub(last) & MAX_SEQUENCE);
         if steps == 0 {
-            count(&mut self.counters.repeated, 1);
             return Err(Dsp1760Error::Repeated { sequence });
         }
         self.last_sequence = Some(sequence);
         let lost = u32::from(steps) - 1;
-        count(&mut self.counters.gaps, u32::from(lost > 0));
-        count(&mut self.counters.lost, lost);
         self.time += u64::from(u32::from(steps) * PERIOD_US);
         let (time, temperature) = match message.extra {
             Extra::Temperature(temperature) => (self.time, temperature),
             Extra::Timed { time, temperature } => (self.stamps.unwrap(time), temperature),
         };
-        let increment = self.increments(&message.rotation, message.validity);
+        let increment = increments(&message.rotation, message.validity);
         let temperature = temperature.checked_mul(100).map(CentiCelsius);
         Ok(FogSample { time: Micros(time), span: PERIOD_US, lost, increment, temperature })
     }
+}
 
-    #[inline]
-    fn increments(&mut self, rotation: &[f32; 3], validity: Validity) -> [Option<Angle>; 3] {
-        core::array::from_fn(|axis| {
-            if !validity.gyro(axis) {
-                return None;
-            }
-            let angle = rotation[axis];
-            let believed = (-MAX_INCREMENT..=MAX_INCREMENT).contains(&angle);
-            count(&mut self.counters.implausible, u32::from(!believed));
-            if believed { Angle::from_rad(angle).ok() } else { None }
-        })
-    }
+/// Returns the good rotations that are within the gyro's range.
+#[inline]
+fn increments(rotation: &[f32; 3], validity: Validity) -> [Option<Angle>; 3] {
+    core::array::from_fn(|axis| {
+        let angle = rotation[axis];
+        let is_good = validity.gyro(axis) && (-MAX_INCREMENT..=MAX_INCREMENT).contains(&angle);
+        if is_good { Angle::from_rad(angle).ok() } else { None }
+    })
 }

@@ -1,10 +1,7 @@
-//! The framer finds frames in a byte stream that may start in the middle of a frame and contain gaps and corrupt
-//! bytes.
+//! Finds frames in a byte stream that may start in the middle of one and contain gaps and corrupt bytes.
 //!
-//! A header alone does not synchronise, because its bytes may occur in a payload; only header and checksum together
-//! do. When a candidate fails its check, the search therefore continues one byte after its start, inside the bytes
-//! already received. An intact frame after a false header is thus found, and only corrupt frames are lost. The buffer
-//! holds at most one frame.
+//! A header may occur in a payload; only header and checksum together synchronise. When a candidate fails its check,
+//! the search continues one byte after its start, inside the bytes received, so only corrupt frames are lost.
 
 use heapless::Vec;
 
@@ -12,8 +9,7 @@ use heapless::Vec;
 pub trait Protocol {
     /// Number of bytes at the start of a frame that identify it and determine its length.
     const HEADER: usize;
-    /// Returns the length of the frame that begins with these [`Protocol::HEADER`] bytes, header included;
-    /// `None` if the bytes are not a header.
+    /// Returns the length of a frame, header included, by its [`Protocol::HEADER`] bytes; `None` if they are none.
     fn length(header: &[u8]) -> Option<usize>;
     /// Returns whether the checksum of a whole frame is correct.
     fn check(frame: &[u8]) -> bool;
@@ -25,24 +21,15 @@ pub struct Framer<P, const N: usize> {
     buffer: Vec<u8, N>,
     /// Number of bytes at the start of `buffer` that belong to the frame returned last.
     used: usize,
-    /// Number of bytes that `buffer` must hold before the next search, so that a header is examined once, not at
-    /// every byte.
+    /// Bytes that `buffer` must hold before the next search: a header is examined once, not at every byte.
     needed: usize,
     bad_checksums: u32,
-    skipped: u32,
     protocol: core::marker::PhantomData<P>,
 }
 
 impl<P: Protocol, const N: usize> Framer<P, N> {
     pub const fn new() -> Self {
-        Self {
-            buffer: Vec::new(),
-            used: 0,
-            needed: 0,
-            bad_checksums: 0,
-            skipped: 0,
-            protocol: core::marker::PhantomData,
-        }
+        Self { buffer: Vec::new(), used: 0, needed: 0, bad_checksums: 0, protocol: core::marker::PhantomData }
     }
 
     /// Processes one byte. Call [`Framer::next_frame`] until it returns `None` before passing the next byte.
@@ -52,16 +39,15 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
             self.release();
         }
         if self.buffer.push(byte).is_err() {
-            // The buffer is full only if the caller has not fetched all frames: drop and count the oldest byte.
-            self.skip(1);
+            // The buffer is full only if the caller has not fetched all frames.
+            self.drop_front(1);
             self.needed = 0;
             let _ = self.buffer.push(byte);
         }
     }
 
-    /// Processes as many of `bytes` as are needed before the next search, and returns their number. A frame thus
-    /// costs two calls instead of one per byte. Call [`Framer::next_frame`] until it returns `None` before passing
-    /// the rest.
+    /// Takes the bytes needed before the next search, two calls a frame instead of one a byte, and returns how many.
+    /// Call [`Framer::next_frame`] until `None` before passing the rest.
     #[inline]
     pub fn receive_some(&mut self, bytes: &[u8]) -> usize {
         if self.used > 0 {
@@ -83,8 +69,7 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         if self.is_waiting() { None } else { self.search() }
     }
 
-    /// Returns whether [`Framer::next_frame`] has nothing to return until more bytes arrive. A caller that checks
-    /// this first spends only a few instructions on most bytes.
+    /// Returns whether [`Framer::next_frame`] has nothing until more bytes come: a few instructions per byte.
     #[inline]
     pub fn is_waiting(&self) -> bool {
         self.buffer.len() < self.needed
@@ -99,11 +84,6 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
     /// Returns the number of candidates with a wrong checksum.
     pub fn bad_checksums(&self) -> u32 {
         self.bad_checksums
-    }
-
-    /// Returns the number of skipped bytes, which belonged to no intact frame.
-    pub fn skipped(&self) -> u32 {
-        self.skipped
     }
 
     fn search(&mut self) -> Option<&[u8]> {
@@ -127,7 +107,7 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
             }
             start += 1;
         };
-        self.skip(start);
+        self.drop_front(start);
         self.used = found?;
         self.needed = self.used + P::HEADER;
         self.buffer.get(..self.used)
@@ -137,11 +117,6 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         self.drop_front(self.used);
         self.needed = self.needed.saturating_sub(self.used);
         self.used = 0;
-    }
-
-    fn skip(&mut self, count: usize) {
-        self.drop_front(count);
-        self.skipped = self.skipped.saturating_add(count as u32);
     }
 
     fn drop_front(&mut self, count: usize) {

@@ -1,16 +1,14 @@
 //! Reads the TDK ICM-42688-P over SPI (mode 0 or 3, at most 24 MHz).
 //!
-//! [`packet`] parses the entries of its FIFO without I/O, [`registers`] lists its registers, and this file does the
-//! SPI transfers. Every wait is a bounded number of [`DelayNs`] delays. Each call for a sample also reads back one
-//! register of the configuration, so that a reset or a flipped bit in the sensor is detected within [`CHECKS`]
-//! calls.
+//! [`packet`] parses its FIFO without I/O, [`registers`] lists its registers. Every wait is a bounded number of
+//! [`DelayNs`] delays. Each call for a sample also reads back one register, so that a reset or a flipped bit is
+//! detected within [`CHECKS`] calls.
 
 mod config;
 #[doc(hidden)]
 pub mod packet;
 #[doc(hidden)]
 pub mod registers;
-mod sample;
 
 use super::spi::{Chip, Setting, SpiError};
 use super::stamps::Stamps;

@@ -1,10 +1,7 @@
 //! A sensor on a serial port, through the traits of `embedded-io`. Nothing here depends on a particular sensor.
 //!
-//! No read blocks: a port must report whether bytes are waiting ([`ReadReady`]), so a silent sensor costs only a
-//! bounded time.
-//!
-//! There are no async wrappers. All parsers accept bytes and do no I/O, so an async caller awaits its own read and
-//! passes the bytes, without using this module.
+//! No read blocks: a port must say whether bytes wait ([`ReadReady`]). There are no async wrappers: parsers accept
+//! bytes, so an async caller awaits its own read.
 
 use super::{ByteSource, Source};
 use embedded_io::{Read, ReadReady};

@@ -1,9 +1,8 @@
-//! What the drivers of inertial sensors on SPI share: their error, the transfers of registers, the check of a setting and
-//! the conversion of readings.
+//! What the drivers of inertial sensors on SPI share: errors, registers, the check of a setting, conversions.
 //!
-//! Each part checks its registers one after the other, one at each call for a sample, so that a reset or a flipped bit is
-//! found within as many calls as it has registers. Only two kinds of error concern the caller: those after which the part
-//! must be configured again, and those that cost one sample ([`SpiError::is_lost`]).
+//! Each part checks a register at each call for a sample, so that a flipped bit is found within as many calls as it
+//! has registers. Two kinds of error concern the caller: the part must be configured again, or a sample is lost
+//! ([`SpiError::is_lost`]).
 
 use crate::sample::{ImuSample, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, STANDARD_GRAVITY, SpecificForce};

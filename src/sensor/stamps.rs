@@ -1,8 +1,7 @@
 //! Converts the time stamps of a sensor's FIFO to microseconds that never wrap.
 //!
-//! The counts are summed unscaled, and the sum is scaled. A time is thus within half a microsecond of the exact one, however
-//! long the sensor has run, and a difference of two times within one microsecond. It is correct only if successive samples
-//! are less than the counter's range apart; a longer gap is detected by the arrival times ([`crate::align`]).
+//! The sum of the counts is scaled, so a time is within half a microsecond, however long the sensor has run. Samples
+//! must be less than the counter's range apart; a longer gap is detected by the arrival times ([`crate::align`]).
 
 use crate::units::Micros;
 use core::num::NonZeroU64;

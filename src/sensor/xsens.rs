@@ -91,8 +91,7 @@ impl Mti {
         self.framer.receive(byte);
     }
 
-    /// Processes one or more of `bytes`, at most to the end of a message, and returns their number. Call
-    /// [`Mti::next_sample`] until it returns `None` before passing the rest.
+    /// Takes bytes, at most to the end of a message, and returns how many; then call [`Mti::next_sample`].
     #[inline]
     pub fn receive_some(&mut self, bytes: &[u8]) -> usize {
         self.framer.receive_some(bytes)

@@ -1,7 +1,6 @@
 //! The device holds the stored data, and changes them on request.
 //!
-//! Some functions are marked `inline(never)`, so that their large stack frames, with requests and records, exist only
-//! while they run.
+//! Functions with large frames are `inline(never)`, so that these exist only while they run.
 
 mod firmware;
 mod start;
@@ -49,9 +48,8 @@ pub struct SupportedHardware {
     pub clock_hz: u32,
 }
 
-/// The state of the board apart from the pipeline: stored data, weights and calibration.
-///
-/// The device owns the flash: records in `R`, weight files in `W`. Both are `None` if nothing can be stored.
+/// The board's state apart from the pipeline. It owns the flash of records, `R`, and of weights, `W`; both are `None`
+/// where nothing can be stored.
 pub struct Device<R: NorFlash, W> {
     store: Option<Store<R>>,
     slots: Option<W>,
@@ -106,8 +104,7 @@ pub struct Device<R: NorFlash, W> {
 }
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
-    /// Creates a device with built-in values, for use before [`Device::begin`]. The function is `const`, so that a
-    /// `static` can hold the device.
+    /// Creates a device with built-in values, for use before [`Device::begin`], as a `static` if wanted.
     pub const fn new(supported: &'static SupportedHardware) -> Self {
         Self {
             store: None,
@@ -185,8 +182,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         core::mem::take(&mut self.mount_moved)
     }
 
-    /// Returns the forward direction in the configured axes, as an angle to the left of x, and its sigma, deg. The
-    /// angle is 0 if the configured mounting is correct.
+    /// Returns the forward direction, left of the configured x (0 if that is correct), and its sigma, deg.
     pub fn forward_deg(&self) -> Option<[f32; 2]> {
         self.learned.yaw_deg(&self.configuration.mounting.rotation()?)
     }
@@ -264,16 +260,14 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         (&self.course, if self.course.is_contradicted { Knowledge::Refused } else { gain })
     }
 
-    /// Returns how well the vertical is known; roll and pitch of the sensor in the configured axes, and their sigma,
-    /// deg.
+    /// Returns how well the vertical is known; roll and pitch in the configured axes, and their sigma, deg.
     pub fn level_deg(&self) -> (Knowledge, [f32; 3]) {
         let mounting = self.configuration.mounting.rotation().unwrap_or(Rotation::IDENTITY);
         let vertical = self.learned.vertical.turned(&mounting);
         (vertical.knowledge(), vertical.tilt_deg())
     }
 
-    /// Carries out a request, unless it interrupts the output of a vehicle that is not proven to stand, and keeps the
-    /// reason of a refusal for testers.
+    /// Carries out a request, unless it needs a proven standstill; keeps the reason of a refusal for testers.
     fn request<T>(
         &mut self,
         interrupts: bool,

@@ -1,11 +1,9 @@
-//! The learner estimates the sensor's bias over temperature at standstills that the wheels prove, and its mounting:
-//! up at standstills and in turns ([`crate::mounting::VerticalEstimator`]), forward while the vehicle drives. The gain comes
-//! from the pipeline, which learns it from courses.
+//! The learner estimates the sensor's bias over temperature at standstills that the wheels prove (without wheels a
+//! long straight can look like one), and its mounting: up at standstills and in turns
+//! ([`crate::mounting::VerticalEstimator`]), forward while the vehicle drives. The gain comes from the pipeline.
 //!
-//! Without wheels, a long straight can look like a standstill, so no bias is learnt.
-//! Learnt values are stored after the first, second, fourth, ... period of three seconds at rest, about ten times
-//! per start. It is also stored each time the sigma of the forward direction has decreased by 30 %, about six times
-//! in total.
+//! Learnt values are stored after the first, second, fourth, ... three seconds at rest, about ten times per start, and
+//! when the sigma of the forward direction has decreased by 30 %, about six times in total.
 
 use crate::bias::{Rest, StaticConfig, StaticInit};
 use crate::heading::Gain;
@@ -17,8 +15,7 @@ use crate::units::CentiCelsius;
 
 /// Largest sigma of a forward direction that is used, rad: 10 degrees. A mounting error of this size has no effect.
 const KNOWN: f32 = 0.175;
-/// Angle between the forward directions of two starts, in addition to two sigmas, above which the sensor has moved,
-/// rad: 25 degrees.
+/// Angle, besides two sigmas, between two starts' forward directions of a sensor that has moved, rad: 25 degrees.
 const MOVED: f32 = 0.436;
 /// Largest ratio of sigmas at which a new forward direction replaces the known one.
 const BETTER: f32 = 0.7;
@@ -59,8 +56,7 @@ impl Learner {
         }
     }
 
-    /// Processes a sample (`None` while the sensor is silent), the wheels and the judgement of standstill; `limits` are
-    /// those of a period at rest. Returns `true` when it detects that the sensor has moved since earlier drives.
+    /// Processes a sample or silence, wheels and standstill; `limits` are those of rest. Returns `true` for a move.
     pub fn observe(
         &mut self,
         sample: Option<&ImuSample>,
@@ -94,8 +90,7 @@ impl Learner {
         self.is_moved && !was_moved
     }
 
-    /// Learns what standstills and turns have shown of the vertical. It is stored when
-    /// it differs notably.
+    /// Learns what standstills and turns have shown of the vertical, and stores it when it differs notably.
     pub fn learn_vertical(&mut self, vertical: Vertical, learned: &mut Learned) {
         if self.is_moved {
             return;

@@ -23,11 +23,11 @@ pub enum Refusal {
     #[error("configuration layout {found}, but the board has {expected}")]
     Version { found: u8, expected: u8 },
     #[error(transparent)]
-    Store(StoreError),
+    Store(#[from] StoreError),
     #[error(transparent)]
-    Slot(SlotError),
+    Slot(#[from] SlotError),
     #[error(transparent)]
-    Firmware(FirmwareError),
+    Firmware(#[from] FirmwareError),
     #[error("calibrated with weights {found:08x}, but the board runs {runs:08x}")]
     OtherWeights { found: u32, runs: u32 },
     #[error("the board has a key, and this session has no access: give its private part with --key")]
@@ -58,24 +58,6 @@ impl Refusal {
     /// Returns whether the request was refused for lack of access: no valid proof or signature.
     pub const fn is_access_denied(&self) -> bool {
         matches!(self, Self::Locked | Self::Unsigned | Self::Answer | Self::Signature | Self::Counter { .. })
-    }
-}
-
-impl From<StoreError> for Refusal {
-    fn from(error: StoreError) -> Self {
-        Self::Store(error)
-    }
-}
-
-impl From<SlotError> for Refusal {
-    fn from(error: SlotError) -> Self {
-        Self::Slot(error)
-    }
-}
-
-impl From<FirmwareError> for Refusal {
-    fn from(error: FirmwareError) -> Self {
-        Self::Firmware(error)
     }
 }
 

@@ -40,8 +40,7 @@ pub enum Part<SPI> {
 }
 
 impl<SPI: SpiDevice> Part<SPI> {
-    /// Brings the part up. All but the ICM-42688-P test themselves if they are to, which takes up to 0.3 s and is best done
-    /// at rest.
+    /// Brings the part up; all but the ICM-42688-P may test themselves, in up to 0.3 s, best at rest.
     fn new(
         part: ImuPart,
         [first, second]: [SPI; 2],
@@ -65,11 +64,8 @@ impl<SPI: SpiDevice> Part<SPI> {
     }
 }
 
-/// The reading task's end.
-///
-/// The part's clock starts at 0 with each reset of the part, so the first sample after a reset would be older than
-/// the newest one before. That sample is placed on the sensor's grid instead, as many periods after the newest one as
-/// the board's clock has counted.
+/// The reading task's end. Each reset starts the part's clock at 0, so the first sample after it is placed on the
+/// sensor's grid, as many periods after the newest one as the board's clock has counted.
 #[derive(Debug)]
 pub struct Reader<SPI> {
     wanted: &'static Wanted,
@@ -170,8 +166,7 @@ impl<SPI: SpiDevice + Copy> BringUp<SPI> {
         Some(Self { wanted, part, spi, tried: None, is_tested: false })
     }
 
-    /// Tries to bring the part up, if it is wanted and the last attempt is long enough ago, and passes it on. `now` is in
-    /// milliseconds.
+    /// Brings the part up if wanted and long enough after the last attempt, and passes it on; `now` in ms.
     #[inline(never)]
     pub fn step(
         &mut self,

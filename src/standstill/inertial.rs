@@ -1,10 +1,9 @@
 //! The moving variance of the low-passed inertial sensor, as evidence of standstill.
 //!
-//! An engine shakes a standing vehicle at nine to some tens of hertz, a road shakes a driven one at less than five. So means
-//! over 200 ms every 100 ms, with the weights of a Hann window (at most 1 % is left from 10 Hz on), keep the road and lose
-//! the engine. The published detectors (moving variance, angular
-//! rate energy, SHOE: Skog, Handel, Nilsson and Rantakokko, IEEE Trans. Biomed. Eng. 57, 2010) take more motion for
-//! standing on raw samples (the test `standstill_detectors` prints how much).
+//! An engine shakes a standing vehicle at nine to some tens of hertz, a road a driven one at less than five. So means
+//! over 200 ms every 100 ms, weighted by a Hann window (at most 1 % is left from 10 Hz on), keep the road and lose the
+//! engine. The published detectors (Skog, Handel, Nilsson and Rantakokko, IEEE Trans. Biomed. Eng. 57, 2010) take more
+//! motion for standing on raw samples (the test `standstill_detectors` prints how much).
 
 use crate::sample::ImuSample;
 use crate::sqrt::sqrt;
@@ -28,8 +27,7 @@ pub struct Motion {
     pub shake: f32,
     /// Largest change of the speed within the window against a steady change, all axes, m/s.
     pub speed_change: f32,
-    /// Change of speed by the mean force of the 3 s before the window against that in it, m/s; `None` before there were
-    /// any.
+    /// Change of speed by the 3 s before the window against the force in it, m/s; `None` before there were any.
     pub speed_lost: Option<Axes>,
     /// Mean force of the window, and of its last half second, m/s^2.
     pub force: Axes,

@@ -5,8 +5,7 @@ use super::record::Record;
 use crate::mounting::GyroMap;
 use serde::{Deserialize, Serialize};
 
-/// The gain and misalignment of the unit's gyro, determined from a drive with a reference yaw rate
-/// (`gyronet calibrate`).
+/// The unit's gain and misalignment, from a drive with a reference yaw rate (`gyronet calibrate`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct UnitMap {
@@ -27,8 +26,7 @@ impl Calibration {
     /// Calibration of an unknown sensor.
     pub const NONE: Self = Self { unit: None };
 
-    /// Returns the map for a board that runs these weights; `None` if no map is stored, or only one for other
-    /// weights.
+    /// Returns the map for these weights; `None` if none is stored, or one for other weights.
     pub fn gyro_map(&self, weights: u32) -> Option<GyroMap> {
         self.unit.filter(|unit| unit.weights == weights).map(|unit| unit.gyro_map)
     }

@@ -118,8 +118,7 @@ impl Configuration {
 }
 
 impl Configuration {
-    /// Returns the pipeline's configuration, from this one, a calibration and what the board has learnt. The map of the
-    /// gyro is used only with the weights it was determined with.
+    /// Returns the pipeline's configuration; the calibration's map is used only with the weights it was found with.
     pub fn pipeline(&self, calibration: &Calibration, learned: &Learned, weights: u32) -> PipelineConfig {
         // The angles are finite: they have been checked.
         let mounting = self.mounting.rotation().unwrap_or(Rotation::IDENTITY);
@@ -182,8 +181,7 @@ impl Configuration {
         }
     }
 
-    /// Returns the configuration of a coprocessor that runs the weights with this checksum. The board adds the
-    /// wheels, the clock, the networks, and whether damage was found at the start.
+    /// Returns a coprocessor's configuration for these weights, to which the board adds what only it knows.
     pub fn coprocessor(
         &self,
         calibration: &Calibration,

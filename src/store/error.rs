@@ -29,43 +29,36 @@ pub enum Field {
 }
 
 impl Field {
+    /// Name as a user writes it; smallest and largest valid value, or `None` for a value that is checked in another way.
+    const fn limits(self) -> (&'static str, Option<[f32; 2]>) {
+        match self {
+            Self::LatitudeDeg => ("latitude_deg", Some([-90.0, 90.0])),
+            Self::FogTiltDeg => ("fog_gyro.tilt_deg", Some([0.0, 45.0])),
+            Self::MountingRollDeg => ("mounting.roll_deg", Some([-180.0, 180.0])),
+            Self::MountingPitchDeg => ("mounting.pitch_deg", Some([-90.0, 90.0])),
+            Self::MountingYawDeg => ("mounting.yaw_deg", Some([-180.0, 180.0])),
+            // Below the noise of a quiet part, static initialisation would never end.
+            Self::StaticGyroStd => ("static_init.gyro_std", Some([5e-4, 1.0])),
+            Self::StaticAccelStd => ("static_init.accel_std", Some([5e-3, 20.0])),
+            Self::StaticGyroDrift => ("static_init.gyro_drift", Some([2e-4, 0.1])),
+            Self::StaticAccelDrift => ("static_init.accel_drift", Some([1e-3, 2.0])),
+            Self::StaticGyroBias => ("static_init.gyro_bias", Some([5e-4, 1.0])),
+            Self::CalibrationGyroMap => ("gyro_map", None),
+            Self::ThermalBias => ("thermal_bias", None),
+            Self::Forward => ("forward", None),
+            Self::Vertical => ("vertical", None),
+            Self::Gain => ("gain", None),
+        }
+    }
+
     /// Returns the name of the field as a user writes it.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::LatitudeDeg => "latitude_deg",
-            Self::FogTiltDeg => "fog_gyro.tilt_deg",
-            Self::MountingRollDeg => "mounting.roll_deg",
-            Self::MountingPitchDeg => "mounting.pitch_deg",
-            Self::MountingYawDeg => "mounting.yaw_deg",
-            Self::StaticGyroStd => "static_init.gyro_std",
-            Self::StaticAccelStd => "static_init.accel_std",
-            Self::StaticGyroDrift => "static_init.gyro_drift",
-            Self::StaticAccelDrift => "static_init.accel_drift",
-            Self::StaticGyroBias => "static_init.gyro_bias",
-            Self::CalibrationGyroMap => "gyro_map",
-            Self::ThermalBias => "thermal_bias",
-            Self::Forward => "forward",
-            Self::Vertical => "vertical",
-            Self::Gain => "gain",
-        }
+        self.limits().0
     }
 
     /// Smallest and largest valid value; `None` for a value that is checked in another way.
     pub const fn range(self) -> Option<[f32; 2]> {
-        Some(match self {
-            Self::LatitudeDeg | Self::MountingPitchDeg => [-90.0, 90.0],
-            Self::FogTiltDeg => [0.0, 45.0],
-            Self::MountingRollDeg | Self::MountingYawDeg => [-180.0, 180.0],
-            // Below the noise of a quiet part, static initialisation would never end.
-            Self::StaticGyroStd | Self::StaticGyroBias => [5e-4, 1.0],
-            Self::StaticAccelStd => [5e-3, 20.0],
-            Self::StaticGyroDrift => [2e-4, 0.1],
-            Self::StaticAccelDrift => [1e-3, 2.0],
-            // With none at all, no estimate is ever accepted, and no revision ever carried.
-            Self::CalibrationGyroMap | Self::ThermalBias | Self::Forward | Self::Vertical | Self::Gain => {
-                return None;
-            }
-        })
+        self.limits().1
     }
 }
 
@@ -136,15 +129,9 @@ pub enum StoreError {
     #[error("the record does not decode as its layout version requires")]
     Encoding,
     #[error(transparent)]
-    Field(FieldError),
+    Field(#[from] FieldError),
     #[error("the board was reset three times within a minute of its start")]
     Resets,
     #[error("the record was damaged, and none has been stored since")]
     Lost,
-}
-
-impl From<FieldError> for StoreError {
-    fn from(error: FieldError) -> Self {
-        Self::Field(error)
-    }
 }

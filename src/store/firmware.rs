@@ -1,10 +1,9 @@
 //! Two places for firmware: which image starts, an image on trial, and the way back to the one before.
 //!
 //! An update is written to the slot that does not run, and its trailer last. The boot loader starts the newest whole
-//! image that is confirmed or still on trial. Each start on trial uses up a word of the trailer; an image that has
-//! failed uses up all of them, so that the image before it starts from then on. Nothing is ever copied or erased to go
-//! back, and all marks are words that are programmed once: whatever a power cut leaves of one, the other slot's image
-//! is untouched and starts.
+//! image that is confirmed or on trial. Each start on trial uses up a word of the trailer; an image that has failed
+//! uses up all, so that the one before it starts. Nothing is copied or erased to go back, and all marks are words that
+//! are programmed once: whatever a power cut leaves of one, the other slot's image starts.
 //!
 //! The trailer is the last 64 bytes of a slot: length of the image, its CRC-32, what it must reach on trial, its
 //! number, a check word of these, three words for trials, and one for its confirmation.
@@ -196,9 +195,8 @@ pub fn label<F: ReadNorFlash>(flash: &mut F, slot: Slot) -> Option<Label> {
     Label::parse(&bytes)
 }
 
-/// Chooses the image to start, and uses up one of its trials if it is not confirmed. `has_failed` says whether the last
-/// run has ended in a reset by the watchdog. If neither image is confirmed or on trial, a whole one that has failed is better
-/// than none.
+/// Chooses the image to start, and uses up a trial if it is not confirmed; `has_failed`: the watchdog ended the last
+/// run. Without a better one, a whole image that has failed is better than none.
 pub fn select<F: NorFlash>(flash: &mut F, has_failed: bool) -> Option<Slot> {
     let numbers = Slot::ALL.map(|slot| Trailer::read(flash, slot).map_or(0, |trailer| trailer.number));
     let newest = if Slot::B.of(numbers) > Slot::A.of(numbers) { Slot::B } else { Slot::A };
@@ -240,8 +238,7 @@ pub fn confirm<F: NorFlash>(flash: &mut F, slot: Slot) -> bool {
     mark(flash, slot, CONFIRMED)
 }
 
-/// Withdraws the image in a slot and erases it. The words of the trailer that count go first: no mixture that a cut leaves
-/// of them is valid.
+/// Withdraws and erases an image, the trailer's words that count first: a cut leaves no valid mixture.
 pub fn erase<F: NorFlash>(flash: &mut F, slot: Slot) -> Result<(), F::Error> {
     flash.write(place(slot, CHECK), &[0; 4])?;
     flash.write(place(slot, CHECK - 4), &[0; 4])?;

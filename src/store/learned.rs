@@ -56,8 +56,7 @@ impl Learned {
 }
 
 impl Learned {
-    /// Returns the angle from the x axis of a mounting to the forward direction, left positive, and its sigma, deg.
-    /// The angle is 0 if the mounting is correct.
+    /// Returns the angle from a mounting's x axis to forward, left positive (0 if correct), and its sigma, deg.
     pub fn yaw_deg(&self, mounting: &Rotation) -> Option<[f32; 2]> {
         let (forward, rest) = self.forward.zip(self.specific_force)?;
         Some([forward.yaw(mounting, rest), forward.sigma].map(f32::to_degrees))

@@ -182,14 +182,12 @@ impl<F: NorFlash> Store<F> {
         Ok(store)
     }
 
-    /// Returns whether a damaged record or sector header was found, because of a power cut or flipped bits. The
-    /// previous record is then used.
+    /// Returns whether a power cut or flipped bits have damaged a record or header; the one before is then used.
     pub fn damaged(&self) -> bool {
         self.seen.damaged || self.header_damaged
     }
 
-    /// Returns the newest intact record; `None` if there is none. One of another layout, or with a value out of
-    /// range, is an error.
+    /// Returns the newest intact record, if any; another layout or a value out of range is an error.
     pub fn get<R: Record>(&mut self) -> Result<Option<R>, StoreError> {
         let mut raw = Raw::EMPTY;
         if self.find_any(R::KEY, &mut raw)? { raw.decode().map(Some) } else { Ok(None) }
@@ -238,8 +236,7 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Writes an encoded record. It is not generic, unlike [`Store::set`], which is compiled once for each kind of
-    /// record.
+    /// Writes an encoded record. Not generic, unlike [`Store::set`], which is compiled for each kind of record.
     #[inline(never)]
     fn write(&mut self, raw: &Raw) -> Result<(), StoreError> {
         let appended = match (self.current, self.free) {
@@ -287,8 +284,7 @@ impl<F: NorFlash> Store<F> {
         Ok((content.filter(|_| copy).map(|content| u32::from_le_bytes(*content)), true))
     }
 
-    /// Reads the next intact record of a sector from offset `at` on, and returns its own offset; `at` is then behind it.
-    /// Each turn advances by a word at least.
+    /// Reads the next intact record from `at` on, a word at least, to behind it; returns its own offset.
     fn next(
         &mut self,
         sector: u32,
@@ -345,8 +341,7 @@ impl<F: NorFlash> Store<F> {
         Ok(found)
     }
 
-    /// Copies the newest intact record of a key into `newest`, and returns whether there is one. Also updates `free`
-    /// and what was seen of damage.
+    /// Copies a key's newest intact record; returns whether there is one. Updates `free` and what is damaged.
     fn find(&mut self, key: u8, newest: &mut Raw) -> Result<bool, StoreError> {
         let Some((sector, _)) = self.current else { return Ok(false) };
         let mut seen = Seen::default();
@@ -438,9 +433,8 @@ impl<F: NorFlash> Store<F> {
         Ok(at)
     }
 
-    /// Fills the other sector with the newest record of each key, including the given one, and switches to it. A mark
-    /// replaces a damaged configuration, which then reads as [`StoreError::Lost`] until a new one is stored: the
-    /// sensor's axes are unknown meanwhile.
+    /// Fills the other sector with the newest records, this one included, and switches to it. A damaged configuration
+    /// is marked, and reads as [`StoreError::Lost`] until one is stored: the axes are unknown.
     #[inline(never)]
     fn change_sector(&mut self, newest: &Raw) -> Result<(), StoreError> {
         let (sector, generation) = match self.current {

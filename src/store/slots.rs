@@ -1,9 +1,8 @@
 //! Selection of GyroNet's weight file: two slots hold one each, and a record lists the accepted files.
 //!
-//! A file is uploaded to the unused slot, checked in flash, and then accepted: the record stores its slot and
-//! checksum. At the next start, [`select`] tries in this order and uses the first file that passes all checks: the
-//! active slot, the other slot if its file was accepted, the built-in weights. An interrupted upload thus never harms
-//! the file in use. A file whose windows the processor cannot run in time is refused like a damaged one.
+//! A file is uploaded to the unused slot, checked in flash, and accepted by a record of slot and checksum. The next
+//! start [`select`]s the first that passes all checks: the active slot, the other slot if accepted, the built-in
+//! weights. A file whose windows the processor cannot run in time is refused like a damaged one.
 
 use super::error::{FieldError, FlashFault};
 use super::record::Record;
@@ -84,13 +83,7 @@ pub enum SlotError {
     #[error("a window takes {cycles} cycles, and clock and `compensate.stride` leave {available}")]
     Slow { cycles: u32, available: u32 },
     #[error(transparent)]
-    Blob(BlobError),
-}
-
-impl From<BlobError> for SlotError {
-    fn from(error: BlobError) -> Self {
-        Self::Blob(error)
-    }
+    Blob(#[from] BlobError),
 }
 
 /// Returns the bytes of the file in a slot, using the length in its header.

@@ -1,8 +1,5 @@
-//! The values behind the data identifiers (ISO 14229-1 C.1), and the list of identifiers.
-//!
-//! [`IDENTIFIERS`] lists them; `gyronet reference identifiers` prints the list.
-//!
-//! Numbers are big-endian, as is usual in ISO 14229.
+//! The values behind the data identifiers (ISO 14229-1 C.1), big-endian. `gyronet reference identifiers` prints
+//! [`IDENTIFIERS`].
 
 use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, decode, nrc, put, put_record};
@@ -23,29 +20,22 @@ use embedded_storage::nor_flash::NorFlash;
 const RETIRED_FIRST: u16 = 0x0201;
 const RETIRED_LAST: u16 = 0x021E;
 
-/// A data identifier, as a tester sees it.
 #[derive(Debug)]
 pub struct Identifier {
-    /// Number of the identifier.
     pub id: u16,
     /// Name, as in `tools/gyronet_uds.yaml`.
     pub name: &'static str,
     /// Length of each value in bytes, or its encoding.
     pub bytes: &'static str,
-    /// Meaning of the value.
     pub content: &'static str,
-    /// Services that accept the identifier.
     pub access: Access,
 }
 
 /// The services that accept an identifier; writing needs the extended session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Access {
-    /// Service 0x22.
     Read,
-    /// Services 0x22 and 0x2E.
     ReadWrite,
-    /// Service 0x2E.
     Write,
 }
 
@@ -61,7 +51,6 @@ const fn write_only(id: u16, name: &'static str, bytes: &'static str, content: &
     Identifier { access: Access::Write, ..read_only(id, name, bytes, content) }
 }
 
-/// All data identifiers.
 pub const IDENTIFIERS: [Identifier; 28] = [
     read_only(0xF186, "session", "1", "session: 1 default, 2 programming, 3 extended"),
     read_only(0xF189, "firmware_version", "1, 1, 1", "version of the firmware"),

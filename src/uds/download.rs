@@ -1,8 +1,6 @@
-//! Download (services 0x34, 0x36, 0x37) of GyroNet's weight file to address 0, which is the unused slot, and of firmware
-//! to address 2, which is the slot that does not run.
-//!
-//! Either is used from the next start on, and only after routine FF01. If a download is interrupted before that, the old
-//! one stays. Firmware is accepted only as the head of its update says ([`super::update`]).
+//! Download (services 0x34, 0x36, 0x37) of GyroNet's weight file to address 0, the unused slot, and of firmware, as
+//! the head of its update says ([`super::update`]), to address 2, the slot that does not run. Either is used from the
+//! next start on, and only after routine FF01; until then the old one stays.
 
 use super::response::{Nrc, Response, nrc, put};
 use super::signature::{self, Digest};

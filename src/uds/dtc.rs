@@ -1,9 +1,8 @@
 //! The trouble memory holds the faults that the board has had, for a workshop to read (ISO 14229-1 D.2).
 //!
-//! A fault is confirmed at once, because the pipeline has already debounced it. The fault stays in the memory until a
-//! tester clears it, even after a restart, so that intermittent faults are found, too. An operation cycle begins at the
-//! start. A fault stays pending through the next cycle; one without the fault for [`PASSED_TICKS`] ends that.
-//! [`TROUBLES`] lists them; `gyronet reference troubles` prints the list.
+//! A fault is confirmed at once, because the pipeline has debounced it, and stays until a tester clears it, also after
+//! a restart. It stays pending through the next cycle; one without it for [`PASSED_TICKS`] ends that. `gyronet
+//! reference troubles` prints [`TROUBLES`].
 
 use crate::health::{Faults, Status};
 use crate::service::Conditions;
@@ -11,19 +10,13 @@ use crate::store::{MAX_TROUBLES, Snapshot, StoredTrouble, Troubles};
 
 /// The bits of a trouble's status.
 pub mod bit {
-    /// The fault is present.
     pub const FAILED: u8 = 1;
-    /// The fault has been present since the start.
     pub const FAILED_THIS_CYCLE: u8 = 1 << 1;
     /// The fault has been present in this operation cycle, which begins at the start, or in the one before.
     pub const PENDING: u8 = 1 << 2;
-    /// The fault is in the memory.
     pub const CONFIRMED: u8 = 1 << 3;
-    /// The fault has not been tested since the memory was cleared.
     pub const UNTESTED_SINCE_CLEAR: u8 = 1 << 4;
-    /// The fault has been present since the memory was cleared.
     pub const FAILED_SINCE_CLEAR: u8 = 1 << 5;
-    /// The fault has not been tested since the start.
     pub const UNTESTED_THIS_CYCLE: u8 = 1 << 6;
     /// Mask of the bits that this server supports.
     pub const AVAILABLE: u8 = 0x7F;
@@ -32,14 +25,11 @@ pub mod bit {
 /// Length of an operation cycle without a fault that counts as passed, 10 ms: the flash is not written at each start.
 pub const PASSED_TICKS: u32 = 6_000;
 
-/// A trouble that the board can report.
 #[derive(Debug)]
 pub struct Trouble {
     /// Code (ISO 15031-6) and failure type, three bytes.
     pub code: u32,
-    /// A short name.
     pub name: &'static str,
-    /// The check for a workshop.
     pub check: &'static str,
     cause: Cause,
 }
@@ -99,7 +89,6 @@ impl Cause {
     }
 }
 
-/// All troubles.
 pub static TROUBLES: [Trouble; 19] = [
     trouble(
         0x5A01,
@@ -219,7 +208,6 @@ const fn trouble(code: u16, failure: u8, name: &'static str, check: &'static str
     Trouble { code: (code as u32) << 8 | failure as u32, name, check, cause }
 }
 
-/// The entry of one trouble in the memory.
 #[derive(Debug, Clone, Copy)]
 pub struct Entry {
     /// Status bits: see [`bit`].
@@ -258,7 +246,6 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Creates an empty memory.
     pub const fn new() -> Self {
         Self { entries: [UNTESTED; TROUBLES.len()], is_enabled: true, is_changed: false, observed: None }
     }
@@ -338,7 +325,6 @@ impl Memory {
         }
     }
 
-    /// Returns the confirmed troubles, which must be stored.
     pub fn confirmed(&self) -> Troubles {
         let mut troubles = Troubles::NONE;
         for (trouble, entry) in self.entries().filter(|(_, entry)| entry.status & bit::CONFIRMED != 0) {
@@ -350,7 +336,6 @@ impl Memory {
         troubles
     }
 
-    /// Returns each trouble with its entry.
     pub fn entries(&self) -> impl Iterator<Item = (&'static Trouble, &Entry)> {
         TROUBLES.iter().zip(&self.entries)
     }

@@ -1,11 +1,9 @@
 //! ISO 15765-2 (ISO-TP) carries diagnostic messages of more than seven bytes in CAN frames, here with normal
 //! addressing.
 //!
-//! [`Transport`] handles one exchange at a time: it assembles a request, receives the response from the caller, and
-//! splits it into frames at the pace that the tester requests. It does no I/O and has no clock; frames and the time
-//! are arguments. As receiver it grants [`BLOCK`] frames at a time, so that a queue of that length in front of it
-//! never overflows. A frame out of sequence ends the message and is counted; the next message can then begin. As sender
-//! it counts the tester's separation time from the end of a frame on the bus, which the caller reports.
+//! [`Transport`] handles one exchange at a time, without I/O or clock. As receiver it grants [`BLOCK`] frames at a
+//! time, so that a queue of that length never overflows. A frame out of sequence ends the message and is counted. As
+//! sender it counts the tester's separation time from the end of a frame on the bus, which the caller reports.
 
 use super::signature::TRAILER;
 use crate::health::count;
@@ -28,10 +26,8 @@ const MAX_WAITS: u8 = 10;
 /// Padding byte of short frames (ISO 15765-2 10.4.2.1: fewest stuff bits).
 const PADDING: u8 = 0xCC;
 
-/// The eight bytes of a frame.
 pub type Bytes = [u8; 8];
 
-/// The counters of failed transfers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TransportErrors {
     /// Frames that were unexpected, or had an invalid length, type or flow status.
@@ -63,9 +59,8 @@ enum State {
         until: u32,
         waits: u8,
     },
-    /// Consecutive frames are being sent, the next one not before `due`; `left` frames remain before the next flow
-    /// control, 0 means all. While the newest frame has not left, its separation time has not begun, and `due` is when
-    /// it must have left (N_As).
+    /// Frames are being sent, the next not before `due`, `left` of them before a flow control (0: all). Until the
+    /// newest has left, `due` is when it must have (N_As), and no separation time runs.
     Sending {
         sent: usize,
         sequence: u8,
@@ -81,7 +76,6 @@ impl State {
     const SENDING: Self = Self::Sending { sent: 0, sequence: 0, left: 0, gap_ms: 0, due: 0, has_left: true };
 }
 
-/// The transport layer of one exchange with a tester.
 #[derive(Debug)]
 pub struct Transport {
     state: State,
@@ -104,13 +98,11 @@ const WAIT: u8 = 0x31;
 const OVERFLOW: u8 = 0x32;
 
 impl Transport {
-    /// Creates an idle transport.
     pub const fn new() -> Self {
         let errors = TransportErrors { unexpected: 0, sequence: 0, overflow: 0, timeout: 0 };
         Self { state: State::Idle, request: Vec::new(), response: Vec::new(), urgent: None, errors }
     }
 
-    /// Returns the counters of failed transfers.
     pub fn errors(&self) -> TransportErrors {
         self.errors
     }
@@ -255,8 +247,7 @@ impl Transport {
         self.urgent = Some(frame(&[response.len().min(7) as u8], response));
     }
 
-    /// Begins to send a request, in the role of a tester; the response is then available as [`Self::request`].
-    /// Returns `false` if the message is longer than [`MAX_MESSAGE`].
+    /// Begins to send a tester's request, answered in [`Self::request`]; `false` if it is too long.
     pub fn send(&mut self, message: &[u8]) -> bool {
         self.response.clear();
         let fits = self.response.extend_from_slice(message).is_ok();
@@ -266,8 +257,7 @@ impl Transport {
         fits
     }
 
-    /// Calls `answer` to write the response to a complete request, and begins to send it. An empty response ends the
-    /// request without an answer. Returns whether there was a request.
+    /// Has `answer` write the response to a complete request, if any, and begins to send it unless it is empty.
     pub fn answer(&mut self, answer: impl FnOnce(&[u8], &mut Vec<u8, MAX_MESSAGE>)) -> bool {
         if self.state != State::Received {
             return false;
@@ -339,8 +329,7 @@ fn frame(head: &[u8], bytes: &[u8]) -> Bytes {
     frame
 }
 
-/// Returns the separation time in a flow control, rounded up to milliseconds; reserved codes mean the longest time
-/// (ISO 15765-2 9.6.5.5).
+/// Returns a separation time, rounded up to ms; reserved codes mean the longest (ISO 15765-2 9.6.5.5).
 fn gap_ms(code: u8) -> u32 {
     match code {
         0..=0x7F => u32::from(code),

@@ -69,8 +69,7 @@ impl Services {
         device.forget_learned().map_err(nrc)
     }
 
-    /// Checks the signature of a download, if the board has a key, and has it used from the next start on. Firmware was
-    /// signed by the head of its update.
+    /// Checks a download's signature (firmware has one in its head) and uses it from the next start on.
     fn use_download<R: NorFlash, W: MappedSlots>(
         &mut self,
         trailer: &[u8],

@@ -25,7 +25,6 @@ use crate::service::{Device, MappedSlots};
 use crate::store::Access;
 use embedded_storage::nor_flash::NorFlash;
 
-/// The random bytes of a challenge.
 pub type Seed = [u8; SEED];
 
 /// Number of successive wrong answers that cause no delay.
@@ -34,7 +33,6 @@ const FREE_ATTEMPTS: u8 = 2;
 const DELAY_MS: u32 = 10_000;
 const MAX_DOUBLINGS: u8 = 6;
 
-/// The access state of a session.
 #[derive(Debug)]
 pub(super) struct Security {
     is_unlocked: bool,
@@ -147,8 +145,7 @@ impl Security {
     }
 }
 
-/// Checks the trailer of written data, and returns the data without it, and the counter to [`use_up`]. Without a key
-/// there is no trailer.
+/// Checks and cuts off the trailer of written data, none without a key; returns the counter to [`use_up`], too.
 pub(super) fn signed<'b, R: NorFlash, W: MappedSlots>(
     target: u16,
     bytes: &'b [u8],
@@ -203,8 +200,7 @@ fn check_counter<R: NorFlash, W: MappedSlots>(
     Ok(())
 }
 
-/// Stores the counter of a signature that was checked, so that the same signature is never accepted again. Wrong answers
-/// before it are forgotten.
+/// Stores a signature's counter, so that it is not accepted again, and forgets wrong answers before it.
 pub(super) fn use_up<R: NorFlash, W: MappedSlots>(
     counter: Option<u32>,
     device: &mut Device<R, W>,

@@ -1,9 +1,8 @@
 //! The server passes requests from the transport to the services, and responses back.
 //!
-//! Before the server executes a request that may erase flash, it sends "response pending", because an erase stalls
-//! the processor for longer than a tester waits. Troubles that must be stored with an erase wait for such a request:
-//! a request that came in the middle of an erase could not be answered in time. The faults that the erase causes on
-//! the board itself are no troubles.
+//! Before a request that may erase flash it sends "response pending", because an erase stalls the processor for longer
+//! than a tester waits. Troubles that must be stored with an erase wait for such a request. The faults that the erase
+//! causes on the board itself are no troubles.
 
 use super::isotp::{Bytes, Transport};
 use super::response::Nrc;
@@ -49,8 +48,7 @@ impl Server {
         self.services.has_session()
     }
 
-    /// Sets whether the next frames are of another tester than the session's: it may read, and neither use the session
-    /// and its access, nor prolong or end it.
+    /// Sets whether the next frames are another tester's than the session's, which may only read and not end it.
     pub fn set_guest(&mut self, is_guest: bool) {
         self.services.is_guest = is_guest;
     }
@@ -60,8 +58,7 @@ impl Server {
         self.transport.refuse();
     }
 
-    /// Processes the data of a functional request, which is a single frame to all servers. While another request is
-    /// being answered, it only keeps the session alive.
+    /// Takes a request to all servers, one frame. While another is being answered, it only keeps the session.
     pub fn receive_functional(&mut self, data: &[u8], now: u32) {
         self.services.frame_received(now);
         if self.transport.is_idle() && data.first().is_some_and(|head| *head < 0x10) {
@@ -72,8 +69,7 @@ impl Server {
         }
     }
 
-    /// Records that all frames of [`Self::next_frame`] have left the board by `now`. The separation time that a tester
-    /// wants between frames begins here.
+    /// Notes that all frames have left by `now`, ms: the tester's separation time begins.
     pub fn frames_left(&mut self, now: u32) {
         self.transport.frames_left(now);
     }
@@ -98,8 +94,7 @@ impl Server {
         self.services.is_restarting && self.is_idle()
     }
 
-    /// Does the periodic work: records present faults, handles timeouts, and answers a complete request. The `counters` are
-    /// read for a request alone; `entropy` returns a random challenge, or `None` without random numbers.
+    /// Does the periodic work: faults, timeouts, a complete request; `entropy` is a random challenge, if any.
     pub fn poll<R: NorFlash, W: MappedSlots>(
         &mut self,
         device: &mut Device<R, W>,

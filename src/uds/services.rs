@@ -1,10 +1,9 @@
 //! Dispatches the services (ISO 14229-1) and holds the state between requests.
 //!
-//! A request is checked in the order of ISO 14229-1: service, session, least length, sub-function, access, length,
-//! values, conditions. The first check that fails gives the code.
-//!
-//! Services translate UDS requests to requests of the device, so that the same rules apply on all lines. A request
-//! that writes data or silences the output needs a non-default session, and a vehicle that is proven to stand.
+//! A request is checked in this order, and the first check that fails gives the code: service, session, least length,
+//! sub-function, access, length, values, conditions. Services translate requests to those of the device, so that the
+//! same rules apply on all lines. One that writes data or silences the output needs a non-default session and a
+//! standstill.
 
 use super::data::{self, Sources};
 use super::download::Download;
@@ -119,8 +118,7 @@ impl Services {
         self.settles_at = Some(now.wrapping_add(SETTLE_MS));
     }
 
-    /// Records present faults, and stores new ones; with an erase only if `may_erase`. Lets the messages of the board
-    /// resume once the vehicle may move.
+    /// Records faults, and stores new ones, erasing if `may_erase`. Ends the silence once the vehicle may move.
     #[inline(never)]
     pub fn update_troubles<R: NorFlash, W: MappedSlots>(
         &mut self,
@@ -150,8 +148,7 @@ impl Services {
         }
     }
 
-    /// Returns whether a request takes long, because it may erase flash or checks a whole file, or because troubles wait
-    /// to be stored with an erase. These do not delay "tester present", to which a tester may not listen.
+    /// Returns whether a request erases flash, checks a file or stores troubles, but not for "tester present".
     pub fn takes_long<R: NorFlash, W: MappedSlots>(&self, request: &[u8], device: &Device<R, W>) -> bool {
         let erases = || {
             let is_heard = !self.is_functional && !matches!(request, [0x3E, ..]);

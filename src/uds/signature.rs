@@ -9,15 +9,10 @@ use crate::store::access::KEY;
 use salty::{CompressedY, EdwardsPoint, Scalar};
 use sha2::{Digest as _, Sha512};
 
-/// Length of a serial number, bytes.
 pub const SERIAL: usize = 12;
-/// Length of a signature, bytes.
 pub const SIGNATURE: usize = 64;
-/// Length of a trailer, bytes.
 pub const TRAILER: usize = 1 + 4 + SIGNATURE;
-/// Length of a challenge, bytes.
 pub const SEED: usize = 32;
-/// Length of a SHA-512 hash, bytes.
 pub const DIGEST: usize = 64;
 
 const CONTENT: [u8; 17] = *b"gyronet content 1";
@@ -26,16 +21,12 @@ const ACCESS: [u8; 16] = *b"gyronet access 1";
 const CONTENT_MESSAGE: usize = CONTENT.len() + 2 + SERIAL + 4 + 4 + DIGEST;
 const ACCESS_MESSAGE: usize = ACCESS.len() + SERIAL + SEED;
 
-/// The length of a content and its SHA-512.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Digest {
-    /// Length of the content, bytes.
     pub length: u32,
-    /// SHA-512 of the content.
     pub hash: [u8; DIGEST],
 }
 
-/// Returns the digest of a content.
 #[inline(never)]
 pub fn digest(content: &[u8]) -> Digest {
     Digest { length: content.len() as u32, hash: Sha512::digest(content).into() }
@@ -75,9 +66,8 @@ pub(super) fn joined<const N: usize, const PARTS: usize>(parts: [&[u8]; PARTS]) 
     message
 }
 
-/// Returns whether a signature of a message is valid for a public key (RFC 8032 5.1.7, without the cofactor). S must
-/// be below the group's order, so that a signature is not malleable. All inputs are public, so the function need not
-/// run in constant time.
+/// Returns whether a signature is valid for a public key (RFC 8032 5.1.7, without the cofactor), with S below the
+/// order: not malleable. All inputs are public: the time need not be constant.
 #[inline(never)]
 pub fn is_valid(key: &[u8; KEY], message: &[u8], signature: &[u8; SIGNATURE]) -> bool {
     let Some((r, s)) = signature.split_first_chunk::<32>() else { return false };
@@ -93,8 +83,7 @@ pub fn is_valid(key: &[u8; KEY], message: &[u8], signature: &[u8; SIGNATURE]) ->
     sum_of_products(s, k.as_bytes(), &-&point) == *r
 }
 
-/// Returns s B + k P, encoded, with B the base point, in one pass over the bits of both scalars from the highest
-/// down.
+/// Returns s B + k P, encoded, with B the base point, in one pass over both scalars from the highest bit.
 #[inline(never)]
 fn sum_of_products(s: &[u8; 32], k: &[u8; 32], point: &EdwardsPoint) -> [u8; 32] {
     let base = EdwardsPoint::basepoint();
@@ -114,8 +103,7 @@ fn sum_of_products(s: &[u8; 32], k: &[u8; 32], point: &EdwardsPoint) -> [u8; 32]
     sum.compressed().0
 }
 
-/// Returns whether bytes are a public key: a point of the curve that is not one of the eight of low order, for which
-/// anyone can sign.
+/// Returns whether bytes are a key: a point, not one of the eight of low order, for which anyone can sign.
 #[inline(never)]
 pub fn is_key(key: &[u8; KEY]) -> bool {
     let Ok(mut point) = CompressedY(*key).decompressed() else { return false };

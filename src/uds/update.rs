@@ -10,10 +10,8 @@ use crate::store::firmware::{LABEL_SIZE, Label};
 /// the image for slot A and of that for slot B. In a file the images follow, A first.
 pub const HEAD: usize = LABEL_SIZE + 1 + 2 * (4 + DIGEST);
 
-/// The head of an update.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Head {
-    /// What the images are.
     pub label: Label,
     /// True if a version older than the board's is wanted.
     pub downgrade: bool,
@@ -31,7 +29,6 @@ impl Head {
         super::signature::joined(parts)
     }
 
-    /// Reads a head; `None` if these bytes are none.
     pub fn parse(bytes: &[u8; HEAD]) -> Option<Self> {
         let (label, rest) = bytes.split_first_chunk()?;
         let (downgrade, rest) = rest.split_first()?;

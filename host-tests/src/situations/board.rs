@@ -5,7 +5,6 @@ use super::parts::{Part, icm42688};
 use super::sensor::LATITUDE;
 use crate::ram_flash::RamFlash;
 use embedded_can::Frame;
-use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::can::DataFrame;
 use gyronet::can::config::{Config as CanConfig, Settings, StatusSettings};
 use gyronet::can::status::STATUS_ID;
@@ -92,7 +91,7 @@ impl Board {
             can: can.expect("a period of the handbook"),
             wheels: has_wheels
                 .then(|| WheelReceiver::new(WheelSettings::TOYOTA).expect("the library's settings")),
-            clock_ratio: Some(ClockRatioConfig::DEFAULT),
+            clock_is_exact: true,
             ..configuration.coprocessor(&Calibration::NONE, learned, 0)
         };
         let blob = Blob::new_checked(&weights::DEFAULT.0).expect("the library's weights");

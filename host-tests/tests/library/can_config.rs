@@ -6,7 +6,7 @@ use gyronet::can::config::{BoschSettings, Config, ConfigError, E2e, Settings, St
 use gyronet::can::e2e::DataIdMode;
 use gyronet::can::encoder::CanEncoder;
 use gyronet::can::fd::{FD_ID, Joiner};
-use gyronet::can::load::bit_time;
+use gyronet::can::load::{self, bit_time};
 use gyronet::can::status::STATUS_ID;
 use gyronet::can::yaw::Quality;
 use gyronet::estimate::VehicleSample;
@@ -31,12 +31,12 @@ fn with_e2e(e2e: E2e) -> Settings {
 fn bus_loads_equal_those_by_hand() {
     // Six frames of 135 bits a hundred times a second.
     let config = Config::new(Settings::DEFAULT).expect("checked");
-    assert_eq!(config.bus_load_per_mille(), 6 * 135 * 100 / 500);
+    assert_eq!(load::per_mille(&config.messages(), 500_000), 6 * 135 * 100 / 500);
     // 34 bits, and 278 at 2 Mbit/s.
     for (bits_per_second, per_mille) in [(250_000, 28), (500_000, 21), (1_000_000, 18)] {
         let yaw = Some(YawSettings { fd: Some(FD_ID), ..YAW });
         let config = Config::new(Settings { bits_per_second, bosch: None, yaw, ..Settings::DEFAULT });
-        assert_eq!(config.expect("checked").bus_load_per_mille(), per_mille);
+        assert_eq!(load::per_mille(&config.expect("checked").messages(), bits_per_second), per_mille);
     }
 }
 

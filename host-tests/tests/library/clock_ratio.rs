@@ -1,7 +1,7 @@
 //! A sensor's clock is held against the board's: an oscillator that is off turns by the right angle,
 //! through jitter, stalls, jumps, restarts and silence.
 
-use gyronet::align::clock_ratio::{ClockRatio, ClockRatioConfig, JITTER_US, RatioEstimator};
+use gyronet::align::clock_ratio::{ClockRatio, JITTER_US, LIMIT_PPM, RatioEstimator};
 use gyronet::sample::PERIOD_US;
 use gyronet::units::{Angle, AngularRate, Micros, Yaw};
 use gyronet_host_tests::noise::{Noise, cases};
@@ -60,10 +60,6 @@ impl Sensor {
     }
 }
 
-fn estimator() -> RatioEstimator {
-    RatioEstimator::new(ClockRatioConfig::DEFAULT)
-}
-
 fn number(ratio: ClockRatio) -> f64 {
     f64::from(ratio.0) / f64::from(ClockRatio::ONE.0)
 }
@@ -78,7 +74,7 @@ fn an_oscillator_that_is_off_turns_by_the_right_angle() {
     for off in [-0.035, -0.01, 0.001, 0.01, 0.02, 0.035] {
         for jitter_us in [0.0, 1_000.0, 5_000.0] {
             for seed in 1..=20 {
-                let (mut sensor, mut estimator) = (Sensor::new(off, jitter_us, seed), estimator());
+                let (mut sensor, mut estimator) = (Sensor::new(off, jitter_us, seed), RatioEstimator::START);
                 sensor.run(SETTLED_S, &mut estimator);
                 let (begin, turning) = (sensor.now, rate(0.5));
                 let (mut yaw, mut worst) = (Yaw::default(), 0.0f64);
@@ -103,7 +99,7 @@ fn an_oscillator_that_is_off_turns_by_the_right_angle() {
 #[test]
 fn the_ratio_is_one_for_ten_seconds_and_nearly_right_from_then_on() {
     for seed in 1..=20 {
-        let (mut sensor, mut estimator) = (Sensor::new(0.01, 5_000.0, seed), estimator());
+        let (mut sensor, mut estimator) = (Sensor::new(0.01, 5_000.0, seed), RatioEstimator::START);
         sensor.run(9.5, &mut estimator);
         assert_eq!(estimator.ratio(), ClockRatio::ONE);
         sensor.run(10.0, &mut estimator);
@@ -116,7 +112,7 @@ fn the_ratio_is_one_for_ten_seconds_and_nearly_right_from_then_on() {
 fn two_crystals_change_no_bit() {
     for off in [-60e-6, 0.0, 60e-6] {
         for jitter_us in [0.0, 1_000.0] {
-            let (mut sensor, mut estimator) = (Sensor::new(off, jitter_us, 5), estimator());
+            let (mut sensor, mut estimator) = (Sensor::new(off, jitter_us, 5), RatioEstimator::START);
             for _ in 0..600 {
                 sensor.run(1.0, &mut estimator);
                 assert_eq!(estimator.ratio(), ClockRatio::ONE, "{off} {jitter_us}");
@@ -154,7 +150,7 @@ fn a_ratio_multiplies_an_angle_of_any_size() {
 #[test]
 fn a_clock_beyond_the_limit_is_a_fault_and_changes_nothing() {
     for off in [-0.0625, -0.041, 0.041, 1.0 / 15.0] {
-        let (mut sensor, mut estimator) = (Sensor::new(off, 1_000.0, 2), estimator());
+        let (mut sensor, mut estimator) = (Sensor::new(off, 1_000.0, 2), RatioEstimator::START);
         sensor.run(SETTLED_S, &mut estimator);
         assert!(estimator.fault(), "{off}");
         assert_eq!(estimator.ratio(), ClockRatio::ONE);
@@ -169,7 +165,7 @@ fn a_clock_beyond_the_limit_is_a_fault_and_changes_nothing() {
 /// The board is busy for 1.5 s; the samples have waited in the part, or in the line, and come at once.
 #[test]
 fn a_stall_is_no_drift() {
-    let (mut sensor, mut estimator) = (Sensor::new(0.01, 1_000.0, 3), estimator());
+    let (mut sensor, mut estimator) = (Sensor::new(0.01, 1_000.0, 3), RatioEstimator::START);
     sensor.run(SETTLED_S, &mut estimator);
     for _ in 0..20 {
         sensor.arrival = (sensor.now + 1.5) * 1e6;
@@ -184,7 +180,7 @@ fn a_stall_is_no_drift() {
 fn a_step_of_either_clock_is_no_drift() {
     for step in [7_000, 20_000, 69_905, 900_000_u64] {
         for seed in 1..=10 {
-            let (mut sensor, mut estimator) = (Sensor::new(-0.01, 1_000.0, seed), estimator());
+            let (mut sensor, mut estimator) = (Sensor::new(-0.01, 1_000.0, seed), RatioEstimator::START);
             sensor.run(SETTLED_S + seed as f64, &mut estimator);
             sensor.stamp += step;
             sensor.is_followed(100, &mut estimator, 2.5e-4);
@@ -197,7 +193,7 @@ fn a_step_of_either_clock_is_no_drift() {
 
 #[test]
 fn a_restart_and_a_silence_keep_the_ratio() {
-    let (mut sensor, mut estimator) = (Sensor::new(0.012, 1_000.0, 4), estimator());
+    let (mut sensor, mut estimator) = (Sensor::new(0.012, 1_000.0, 4), RatioEstimator::START);
     sensor.run(SETTLED_S, &mut estimator);
     for stamp in [0, 500_000_000] {
         sensor.stamp = stamp;
@@ -212,7 +208,7 @@ fn a_restart_and_a_silence_keep_the_ratio() {
 
 #[test]
 fn an_oscillator_that_warms_up_is_followed() {
-    let (mut sensor, mut estimator) = (Sensor::new(0.01, 1_000.0, 6), estimator());
+    let (mut sensor, mut estimator) = (Sensor::new(0.01, 1_000.0, 6), RatioEstimator::START);
     sensor.run(SETTLED_S, &mut estimator);
     for second in 0..600 {
         // 0.2 % in ten minutes.
@@ -231,7 +227,7 @@ proptest! {
         steps in prop::collection::vec((0..3_000_000u64, 0..3_000_000u64, any::<u8>()), 1..300),
         begin in (any::<u64>(), any::<u64>()),
     ) {
-        let mut estimator = estimator();
+        let mut estimator = RatioEstimator::START;
         let (mut sensor, mut board) = begin;
         for (stamp, arrival, kind) in steps {
             (sensor, board) = match kind {
@@ -241,7 +237,7 @@ proptest! {
                 _ => (sensor.wrapping_add(stamp), board.wrapping_add(arrival)),
             };
             estimator.observe(Micros(sensor), Micros(board));
-            prop_assert!(estimator.ratio().departure_ppm() <= ClockRatioConfig::DEFAULT.limit_ppm);
+            prop_assert!(estimator.ratio().departure_ppm() <= LIMIT_PPM);
         }
     }
 }
@@ -251,7 +247,7 @@ proptest! {
 fn a_difference_counts_from_three_milliseconds_on() {
     for (off_us, counts) in [(JITTER_US - 200, false), (JITTER_US + 200, true)] {
         let off = off_us as f64 / 32e6;
-        let (mut sensor, mut estimator) = (Sensor::new(off, 0.0, 1), estimator());
+        let (mut sensor, mut estimator) = (Sensor::new(off, 0.0, 1), RatioEstimator::START);
         sensor.run(SETTLED_S, &mut estimator);
         assert_eq!(estimator.ratio() != ClockRatio::ONE, counts, "{off_us} us in 32 s");
     }

@@ -85,10 +85,9 @@ fn a_verdict_decides_what_is_used() {
 
 #[test]
 fn lengths_and_counters_that_cannot_be_are_refused() {
-    let lengths = [p01(DataIdMode::Both), p02(0, 0), p05()].map(|p| p.header_len());
-    assert_eq!(lengths, [2, 2, 3]);
     for profile in all() {
-        for len in (0..profile.header_len()).chain([65]) {
+        let header = if matches!(profile, Profile::P05(_)) { 3 } else { 2 };
+        for len in (0..header).chain([65]) {
             let mut data = vec![0; len];
             assert_eq!(profile.protect(&mut data, 0), Err(Fault::Length(len)), "{profile:?}");
             assert_eq!(profile.check(&data), Err(Fault::Length(len)), "{profile:?}");

@@ -35,7 +35,6 @@ fn increments_are_neither_lost_nor_made_up() {
             let all = (1..=2_000u64).map(|n| (n * n % 1_000_003) as i64 * 1_000_001 - 500_000_000_000);
             assert_eq!(sum, all.sum::<i64>());
         }
-        assert_eq!(grid.increments().late + grid.increments().dropped, 0);
     }
 }
 
@@ -80,7 +79,6 @@ fn lost_increments_are_marked() {
     assert_eq!(of(4), (7_000, Some(Angle(7_000))));
     assert_eq!(of(7), (10_000, None));
     assert_eq!(of(8), (10_000, Some(Angle(10_000))));
-    assert_eq!(grid.increments().gaps, 1);
 }
 
 #[test]
@@ -125,9 +123,6 @@ fn events_of_a_clock_are_reported() {
     assert_eq!(at(0, 530_000), board(530_000, true));
     assert_eq!(at(10_000, 540_000 + JUMP_US), board(540_002, false));
     assert_eq!(at(20_000, 560_000 + 2 * JUMP_US), board(560_000 + 2 * JUMP_US, true));
-    let counters = clock.counters();
-    assert_eq!((counters.samples, counters.late, counters.duplicates), (6, 2, 1));
-    assert_eq!((counters.out_of_order, counters.jumps), (1, 2));
 }
 
 #[test]
@@ -144,7 +139,6 @@ fn a_small_jump_is_found_within_a_second() {
         assert_eq!(board.jumped, n == 201, "sample {n}");
         assert!(board.time.0.abs_diff(n * 10_000) < 10 || (100..201).contains(&n), "sample {n}");
     }
-    assert_eq!(clock.counters().jumps, 1);
     // Silence is not lateness.
     assert!(!clock.translate(Micros(13_950_000), Micros(12_995_000)).expect("in order").jumped);
 }

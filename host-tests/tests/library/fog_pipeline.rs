@@ -1,6 +1,5 @@
 //! A fibre-optic gyro's messages: what they say of gaps, and of what is missing.
 
-use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::bias::Latitude;
 use gyronet::estimate::YawEstimate;
 use gyronet::fog::{FogConfig, FogPipeline};
@@ -174,11 +173,8 @@ fn a_step_that_is_partly_covered_has_no_rate() {
 /// Where the board's clock is exact, a gyro's clock that is 1 % fast turns nothing; before it is measured, sigma says so.
 #[test]
 fn a_clock_that_is_off_is_expected_until_it_is_measured() {
-    let config = FogConfig {
-        latitude: Latitude::from_degrees(0.0),
-        clock_ratio: Some(ClockRatioConfig::DEFAULT),
-        ..FogConfig::DEFAULT
-    };
+    let config =
+        FogConfig { latitude: Latitude::from_degrees(0.0), clock_is_exact: true, ..FogConfig::DEFAULT };
     let mut fog = FogPipeline::new(config, false);
     fog.confirm();
     let mut sent = Vec::new();

@@ -202,7 +202,7 @@ fn nothing_that_was_recorded_is_implausible() {
     assert!(files.len() > 40, "{}", files.len());
     let doubted = parallel::map(&files, |path| {
         let (reader, mut monitor) =
-            (Reader::new("", File::open(path).expect("it is there")), SensorMonitor::new(None));
+            (Reader::new("", File::open(path).expect("it is there")), SensorMonitor::new(false));
         for row in reader.expect("a drive") {
             monitor.judge(&row.expect("a row").sample);
         }

@@ -1,7 +1,6 @@
 //! Sensors of any rate through the coprocessor: the yaw is right, or the rate is named.
 
 use gyronet::align::AlignError;
-use gyronet::align::clock_ratio::ClockRatioConfig;
 use gyronet::coprocessor::{InputError, Observation};
 use gyronet::health::{Faults, Quality, Status};
 use gyronet::model::Estimate;
@@ -31,7 +30,7 @@ const LASTS_S: f64 = 10.0;
 /// Rests, turns and rests again; returns the turn by the live yaw over the true one, the observations and errors, and how
 /// often the clocks were off.
 fn drive(sensor: Sensor) -> (f64, Vec<Observation>, Vec<InputError>, u32) {
-    let config = Config { clock_ratio: Some(ClockRatioConfig::DEFAULT), ..Config::DEFAULT };
+    let config = Config { clock_is_exact: true, ..Config::DEFAULT };
     let (mut coprocessor, mut noise) = (Coprocessor::new(config), Noise::new(8));
     let (mut sent, mut errors, mut turned) = (Sent::default(), Vec::new(), 0.0);
     for k in 1..=((BEGINS_S + LASTS_S + 2.0) * sensor.hz) as u64 {

@@ -1,7 +1,7 @@
 //! The judge of standstill: what each source proves, and what contradicts it.
 
 use gyronet::sample::{ImuSample, Standstill, WHEELS, WheelSample};
-use gyronet::standstill::{Judge, Standing, StandstillConfig, StandstillSource};
+use gyronet::standstill::{Judge, Standing, StandstillSource};
 use gyronet::units::{AngularRate, WheelSpeed};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::synthetic::{force, rate, turning};
@@ -16,7 +16,7 @@ struct Vehicle {
 
 impl Vehicle {
     fn new() -> Self {
-        Self { judge: Judge::new(StandstillConfig::DEFAULT), noise: Noise::new(11), road: 0.0, tick: 0 }
+        Self { judge: Judge::START, noise: Noise::new(11), road: 0.0, tick: 0 }
     }
 
     /// Returns the judgement after seconds with this shake by the road, rad/s, and forward acceleration, m/s^2.

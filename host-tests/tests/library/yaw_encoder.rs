@@ -96,7 +96,6 @@ fn details_are_encoded_and_limited() {
     let [.., detail] = feed.encode(&detailed).expect("every sample");
     let detail = DetailMessage::parse(&detail).expect("a detail message");
     assert_eq!((detail.correction, detail.latency), (-110, 143));
-    assert_eq!(detail.latency_ms(), Some(71.5));
     assert!([2000, 2001].contains(&detail.sigma), "{}", detail.sigma);
     assert_eq!(encode_sigma(Some(AngularRate(1))), 1, "a small error is not none");
     assert_eq!(encode_sigma(Some(AngularRate(0))), 0);

@@ -5,7 +5,7 @@
 //! Rantakokko, IEEE Trans. Biomed. Eng. 57, 2010), and the one in use, without its condition of braking.
 
 use crate::standstill_truth::{Truth, read};
-use gyronet::standstill::{Inertial, StandstillConfig};
+use gyronet::standstill::{Inertial, SPEED_CHANGE};
 use gyronet_host_tests::{parallel, recordings};
 use gyronet_tools::drive::recording::{Recording, Row};
 
@@ -66,7 +66,7 @@ fn statistics(recording: &Recording) -> Vec<(usize, [f64; 5])> {
         let tilted = share(&|row| square(less(force(row), upright)));
         let shoe = tilted / NOISE[0].powi(2) + energy / NOISE[1].powi(2);
         let motion = newest.map_or([f64::MAX; 2], |motion| {
-            let limit = f64::from(StandstillConfig::DEFAULT.speed_change);
+            let limit = f64::from(SPEED_CHANGE);
             let shake = f64::from(motion.shake);
             [shake, if f64::from(motion.speed_change) < limit { shake } else { f64::MAX }]
         });

@@ -1,8 +1,7 @@
 //! A bias that nothing but one standstill has shown: the deck of a ferry or a turntable may have turned meanwhile.
 //!
-//! A vehicle drives off from ground that stands. So the reading decides that static initialisation would accept last, within
-//! [`CONFIRMING`] samples before the vehicle begins to move; or the next stop. Until then all that the deck may turn by is
-//! part of sigma.
+//! A vehicle drives off from ground that stands. So the last acceptable reading within [`CONFIRMING`] samples before
+//! it moves decides; or the next stop. Until then all that the deck may turn by is part of sigma.
 
 use crate::sample::RATE_HZ;
 
@@ -11,12 +10,10 @@ const CONFIRMING: u32 = 10 * RATE_HZ;
 
 #[derive(Debug, Clone)]
 pub(super) struct Claim {
-    /// What the deck may turn by: the reading at rest, and the sigma of what earlier drives or the part's kind let
-    /// expect of it, rad/s.
+    /// Reading at rest, and the sigma of what is expected of it, by earlier drives or the part's kind, rad/s.
     reading: f32,
     expected: f32,
-    /// Mean of the newest three seconds that static initialisation would accept and its sigma, rad/s, and the samples for
-    /// which they are evidence.
+    /// Mean of the newest acceptable three seconds, its sigma, rad/s, and the samples that they are evidence for.
     newest: (f32, f32),
     counts_for: u32,
     has_moved: bool,

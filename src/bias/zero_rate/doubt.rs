@@ -1,8 +1,7 @@
-//! Standstills that contradict the bias.
+//! Standstills that contradict the bias: by two seconds, or by one that is steady, since it may be pulling away.
 //!
-//! A stop contradicts it by two seconds, or by one that is steady: before one that is not the vehicle may pull away. The
-//! difference is part of sigma until a stop agrees with the bias, or until [`AGREEING_STOPS`] that contradict it and agree
-//! with each other replace it.
+//! The difference is part of sigma until a stop agrees with the bias, or [`AGREEING_STOPS`] that agree with each other
+//! replace it.
 
 /// Refused seconds that make a stop contradict the bias.
 const REFUSED_SECONDS: u8 = 2;
@@ -48,8 +47,7 @@ impl Doubt {
         off(self.mean, self.is_by_this_stop()).max(off(self.earlier, self.stops > 0))
     }
 
-    /// Ends a stop, which agrees with earlier ones if it differs by at most `gate`. Returns the bias once enough agree: one,
-    /// where the bias is only claimed.
+    /// Ends a stop; returns the bias once enough stops agree within `gate`: one, where the bias is only claimed.
     pub fn end_stop(&mut self, gate: f32, is_claim: bool) -> Option<f32> {
         let Self { mean, earlier, stops, .. } = *self;
         let contradicts = self.is_by_this_stop();

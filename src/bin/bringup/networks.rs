@@ -3,8 +3,7 @@
 use crate::report::Report;
 use core::hint::black_box;
 use cortex_m::peripheral::{DCB, DWT};
-use gyronet::model::blob::HIDDEN;
-use gyronet::model::gyronet::GyroNetState;
+use gyronet::model::gyronet::LargestState;
 use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 
@@ -14,7 +13,7 @@ pub fn count(report: &mut Report, mut dcb: DCB, mut dwt: DWT) {
     let Ok(blob) = Blob::new_checked(&weights::GYRONET.0) else {
         return report.fail("GyroNet", format_args!("the weight file is refused"));
     };
-    let Some(state) = cortex_m::singleton!(: GyroNetState<HIDDEN> = GyroNetState::ZERO) else { return };
+    let Some(state) = cortex_m::singleton!(: LargestState = LargestState::ZERO) else { return };
     let Ok(mut network) = GyroNet::with_state(blob, state) else { return };
     let features = [[0; FEATURES]; WINDOW];
     let begin = DWT::cycle_count();

@@ -106,8 +106,7 @@ mod app {
     use cortex_m::asm::dsb;
     use gyronet::coprocessor::Coprocessor;
     use gyronet::model::GyroNet;
-    use gyronet::model::blob::HIDDEN;
-    use gyronet::model::gyronet::GyroNetState;
+    use gyronet::model::gyronet::LargestState;
     use gyronet::service::message::LineCounters;
 
     #[shared]
@@ -126,12 +125,12 @@ mod app {
         gnss: serial::Handler,
         receptions: [Option<serial::Reception>; 5],
         sender: &'static mut Output,
-        network: Option<GyroNet<'static, &'static mut GyroNetState<HIDDEN>>>,
+        network: Option<GyroNet<'static, &'static mut LargestState>>,
         rest: &'static mut Idle,
     }
 
     #[init(local = [
-        network_state: GyroNetState<HIDDEN> = GyroNetState::ZERO,
+        network_state: LargestState = LargestState::ZERO,
         coprocessor_place: MaybeUninit<Coprocessor> = MaybeUninit::uninit(),
         sender_place: MaybeUninit<Output> = MaybeUninit::uninit(),
         rest_place: MaybeUninit<Idle> = MaybeUninit::uninit(),

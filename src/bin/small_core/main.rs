@@ -29,6 +29,7 @@ mod firmware {
     use gyronet::model::gyronet::GyroNetState;
     use gyronet::model::{Blob, BlobError, GyroNet, WindowNetwork};
     use gyronet::nn::Aligned;
+    use gyronet::nn::lstm::DirectionWeights;
     use panic_semihosting as _;
 
     /// Largest number of units that fits the RAM of the board.
@@ -37,7 +38,7 @@ mod firmware {
     #[cfg(feature = "lm3s6965evb")]
     const UNITS: usize = 60;
 
-    type State = GyroNetState<UNITS>;
+    type State = GyroNetState<UNITS, { UNITS / 2 }, { DirectionWeights::recurrent_words(UNITS) }>;
 
     const WINDOWS: u32 = 8;
 

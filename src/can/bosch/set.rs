@@ -6,9 +6,8 @@
 //! | TX2 | 0x178 | roll | longitudinal | - | - |
 //! | TX3 | 0x17C | pitch | vertical | HW_INDEX | - |
 //!
-//! A receiver accepts the three as one sample only if they arrive in this order with the same
-//! counter. The Bosch sensor's roll rate has the opposite sign to the right-hand rule (Bosch's receiver negates it
-//! again), so a drop-in replacement must do the same.
+//! A receiver takes the three as one sample only in this order with the same counter. The roll rate has the opposite
+//! sign to the right-hand rule, as Bosch's has (its receiver negates it again).
 
 use super::{
     CRC, MessageError, SignalStatus, TX1_ID, YawRateSignal, ZERO, encode_acceleration, encode_temperature,
@@ -112,8 +111,7 @@ impl Message {
         f64::from(i32::from(self.acceleration) - ZERO) * 0.000_127_465
     }
 
-    /// Returns the frame with a layout's identifier, in a driver's own type; `None` only if that type cannot hold
-    /// the frame.
+    /// Returns the frame with a layout's identifier; `None` only if the driver's type cannot hold it.
     pub fn frame<F: Frame>(&self, layout: &Layout) -> Option<F> {
         F::new(layout.id, &self.emit())
     }
@@ -151,8 +149,7 @@ impl SetEncoder {
     /// Starts without a rounding residual.
     pub const START: Self = Self { rates: [YawRateSignal::START; 3] };
 
-    /// Encodes the three messages of one sample, in the order of [`LAYOUTS`]. A value that does not fit its signal
-    /// is sent as the nearest limit and marked as failed.
+    /// Encodes the messages of [`LAYOUTS`]. A value that does not fit is sent as the limit and marked as failed.
     pub fn encode(&mut self, motion: &Motion) -> [Message; 3] {
         let mut messages = LAYOUTS.map(|layout| {
             let (acceleration, fits) = encode_acceleration(axis(&motion.specific_force, layout.force_axis));

@@ -1,8 +1,6 @@
-//! Profile 1 has its CRC in byte 0 and its counter in the low nibble of byte 1. It has four modes of including the
-//! identifier in the CRC.
+//! Profile 1 has its CRC in byte 0, its counter in the low nibble of byte 1, and four ways to include the identifier.
 //!
-//! AUTOSAR defines the CRC by calls of its CRC library, whose start and final XOR
-//! values cancel. The CRC on the bus has polynomial 0x1D, start 0 and no final XOR.
+//! AUTOSAR's start and final XOR values cancel: on the bus the polynomial is 0x1D, start 0, no final XOR.
 
 use super::{Fault, ShortHeader};
 

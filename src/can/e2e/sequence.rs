@@ -35,8 +35,7 @@ impl Sequence {
         Self { counters, max_delta, last: None }
     }
 
-    /// Checks the next counter and makes it the new reference, whatever the verdict. After a restart of the
-    /// sender, messages are therefore accepted again from the second one on.
+    /// Checks a counter and takes it as the reference: a sender that restarts is believed from its second message on.
     pub fn check(&mut self, counter: u8) -> Verdict {
         let Some(last) = self.last.replace(counter) else { return Verdict::First };
         let step = u16::from(counter) + self.counters - u16::from(last);

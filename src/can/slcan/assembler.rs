@@ -23,8 +23,7 @@ impl LineAssembler {
         Self { line: Vec::new(), too_long: false, done: false }
     }
 
-    /// Processes a character, and returns the line without its CR when it is complete. LF is
-    /// ignored, so that a terminal can be used.
+    /// Takes a character; returns a line that it completes, without CR. LF is ignored, for the sake of terminals.
     pub fn receive(&mut self, byte: u8) -> Option<Result<&[u8], TooLong>> {
         if core::mem::take(&mut self.done) {
             self.line.clear();

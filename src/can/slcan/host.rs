@@ -1,11 +1,8 @@
 //! A session executes the SLCAN commands of a host and generates the answers.
 //!
-//! python-can sends `C`, `S6`, an empty line and `O` and reads frames; slcand writes `C`, `S6`,
-//! `O` and passes the line to the kernel. Neither waits for the answers, but both fail on an
-//! answer in the middle of a frame. Answers are therefore whole lines, sent between frames.
-//!
-//! A session is closed until a host opens it with `O` or `L`; `C` closes it. CAN does not depend on it. `S` is confirmed
-//! only for the current bit rate of the bus, which a host cannot change.
+//! python-can and slcand do not wait for answers, but fail on one in the middle of a frame. Answers are therefore
+//! whole lines, sent between frames. A session is closed until `O` or `L`; `C` closes it. CAN does not depend on it.
+//! `S` is confirmed only for the bit rate of the bus, which a host cannot change.
 
 use super::SlcanError;
 use crate::can::DataFrame;

@@ -1,9 +1,8 @@
-//! A port is the device side of an SLCAN line: it sends frames and executes commands.
+//! The device side of an SLCAN line: it sends frames and executes commands.
 //!
-//! [`Port`] buffers the bytes. [`Port::service`] moves them to and from any serial line that
-//! reports whether it is ready (`embedded_io`'s `ReadReady` and `WriteReady`). It never blocks: bytes that
-//! the line does not accept stay buffered, and when the queue is full the oldest frame is dropped. A text line
-//! that was begun is always finished first, so a host that stalls never reads a partial frame afterwards.
+//! [`Port::service`] moves the buffered bytes to and from any serial line that says whether it is ready, without
+//! blocking. When the queue is full the oldest frame is dropped. A line of text that was begun is finished first, so a
+//! host that stalls never reads a partial frame.
 
 use super::assembler::{LineAssembler, TooLong};
 use super::host::{Session, StatusFlags};
@@ -69,14 +68,12 @@ impl<const N: usize> Port<N> {
         self.session.open()
     }
 
-    /// Appends a frame; if the queue is full, drops the oldest one. `time` is the frame's time stamp, which is sent
-    /// if the host has enabled time stamps.
+    /// Appends a frame, instead of the oldest of a full queue. `time` is sent if the host wants time stamps.
     pub fn enqueue(&mut self, frame: DataFrame, time: Micros) {
         self.queue.enqueue((frame, time));
     }
 
-    /// Processes a byte from the host; a frame that it completes goes to `take`, which returns whether the frame is
-    /// used. One that is not is refused as a wrong line is.
+    /// Takes a byte of the host; `take` gets a frame that it completes, and returns whether it is used or refused.
     pub fn receive(&mut self, byte: u8, take: impl FnOnce(DataFrame) -> bool) {
         let dropped = self.queue.dropped();
         let Some(line) = self.assembler.receive(byte) else { return };

@@ -86,8 +86,7 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// Adds a word, and returns the readings of an output that is then complete. An output that was begun and lacks a word is
-    /// an error; the word is added all the same.
+    /// Adds a word; returns the readings that it completes. An output that lacks a word is an error.
     pub fn add(&mut self, Word(number, content): Word) -> Result<Option<Readings>, Incomplete> {
         let is_next = number != self.number;
         let was_begun = self.rate.is_some() || self.force.is_some() || self.time.is_some();

@@ -1,7 +1,6 @@
 //! Finds DSP-1760 messages in a byte stream, by header and CRC.
 
-use super::message::Format;
-use crate::sensor::crc::CRC_32_MPEG_2;
+use super::message::{CRC_32_MPEG_2, Format};
 use crate::sensor::framer::Protocol;
 
 /// The framing of data messages and built-in-test messages.
@@ -13,9 +12,8 @@ pub(super) fn is_self_test(frame: &[u8]) -> bool {
     frame.get(2) == Some(&0x00)
 }
 
-/// Returns the length of header and status of a built-in-test message; its long form has eight status bytes instead
-/// of six. The checksum byte is not part of the frame, because its algorithm is unknown. The framer skips that byte,
-/// so a corrupt message of this kind cannot consume the first byte of an intact one.
+/// Returns the length of a built-in-test message without its checksum, whose algorithm is unknown: that byte is
+/// skipped, so that a corrupt message cannot take the first byte of an intact one.
 const fn bit_length(kind: u8) -> Option<usize> {
     match kind {
         0xAA => Some(4 + 6),

@@ -12,16 +12,69 @@
 //!
 //! All values are big-endian.
 
-pub use super::format::{Extra, Format, Validity};
-
-use super::format::PREFIX;
-use crate::sensor::crc::CRC_32_MPEG_2;
 use heapless::Vec;
 
-/// Length of the longest message, bytes.
+/// CRC-32/MPEG-2 of the KVH gyros: 04C11DB7, start FFFFFFFF, not reflected, no final inversion; 0 over a whole frame.
+/// A `static`, so that an image has its table (1 KB) once.
+pub static CRC_32_MPEG_2: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_MPEG_2);
 pub const MAX_MESSAGE: usize = 40;
 /// The largest sequence number; 0 follows it.
 pub const MAX_SEQUENCE: u8 = 127;
+
+/// The format of a message, selected by its fourth byte. The gyro's third one (57, with slow readings) is not read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Format {
+    A = 0x55,
+    B = 0x56,
+}
+
+impl Format {
+    pub const fn of(header: [u8; 4]) -> Option<Self> {
+        match header {
+            [0xFE, 0x81, 0xFF, code] if code == Self::A as u8 => Some(Self::A),
+            [0xFE, 0x81, 0xFF, code] if code == Self::B as u8 => Some(Self::B),
+            _ => None,
+        }
+    }
+
+    pub const fn length(self) -> usize {
+        match self {
+            Self::A => 36,
+            Self::B => 40,
+        }
+    }
+}
+
+/// The status bits of the readings, 1 for good; bits 3 and 7 are 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Validity(pub u8);
+
+impl Validity {
+    pub const GYRO: Self = Self(0x07);
+    pub const ALL: Self = Self(0x77);
+
+    /// Returns whether the gyro about `axis` (0 to 2) is good; the bit is 0 when the gyro is saturated.
+    pub const fn gyro(self, axis: usize) -> bool {
+        axis < 3 && self.0 & 1 << axis != 0
+    }
+
+    pub const fn accelerometer(self, axis: usize) -> bool {
+        axis < 3 && self.0 & 0x10 << axis != 0
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Extra {
+    Temperature(i16),
+    Timed {
+        /// Time, microseconds; it wraps.
+        time: u32,
+        temperature: i16,
+    },
+}
 
 /// The reason why bytes are not a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -47,16 +100,13 @@ pub struct Message {
     pub rotation: [f32; 3],
     /// Specific force x, y, z in g; only the 17xx units measure it, not the DSP-1760.
     pub acceleration: [f32; 3],
-    /// Fields that only this format has.
     pub extra: Extra,
-    /// Status bits of the readings.
     pub validity: Validity,
     /// Sequence number, 0 to [`MAX_SEQUENCE`].
     pub sequence: u8,
 }
 
 impl Message {
-    /// Returns the format of the message.
     pub const fn format(&self) -> Format {
         match self.extra {
             Extra::Temperature(_) => Format::A,
@@ -111,8 +161,7 @@ impl Message {
         let mut frame = Vec::new();
         // MAX_MESSAGE bytes hold every format.
         let mut put = |bytes: &[u8]| drop(frame.extend_from_slice(bytes));
-        put(&PREFIX);
-        put(&[self.format().header_byte()]);
+        put(&[0xFE, 0x81, 0xFF, self.format() as u8]);
         self.rotation.iter().chain(&self.acceleration).for_each(|reading| put(&reading.to_be_bytes()));
         let counted = [self.validity.0, self.sequence & MAX_SEQUENCE];
         match self.extra {

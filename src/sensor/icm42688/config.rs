@@ -1,17 +1,13 @@
 //! The settings of an ICM-42688-P, as register values.
 //!
-//! The sensor's filters run at 400 Hz or more, and at an output rate of 100 Hz every fourth value is output
-//! (DS-000347, 5.5). What the last filter passes above 50 Hz is therefore aliased, and vibration near 100 Hz appears
-//! as rotation. After a reset that filter is of second order, with a bandwidth of 92.3 Hz, and takes 3.8 dB off at
-//! 100 Hz. The driver selects its third order with a sixteenth of its rate (code 5): 24.3 Hz, a group delay of 16.5 ms,
-//! 18.9 dB off at 50 Hz and 36.9 dB at 100 Hz.
-//!
-//! Bandwidth and group delay are from the data sheet (tables of 5.5). It gives no attenuation: these numbers are those of
-//! a Butterworth filter of that order and bandwidth. Vibration that would be aliased at 400 Hz first passes the
+//! The sensor's filters run at 400 Hz or more, and at 100 Hz every fourth value is output (DS-000347, 5.5): what the
+//! last filter passes above 50 Hz is aliased, and vibration near 100 Hz appears as rotation. The driver selects its
+//! third order with a sixteenth of its rate (code 5): 24.3 Hz, a group delay of 16.5 ms, by a Butterworth filter 18.9
+//! dB off at 50 Hz and 36.9 dB at 100 Hz (3.8 dB after a reset). What would be aliased at 400 Hz first passes the
 //! anti-alias filter (258 Hz) and the decimation filter (104.8 Hz).
 //!
-//! A mean of ten samples at 1 kHz would have a delay of only 4.5 ms and zeros at the frequencies that are aliased,
-//! but would need ten times the SPI traffic and a decimator in the driver. At 100 Hz our filter leaves only 1.4 %.
+//! A mean of ten samples at 1 kHz would have a delay of only 4.5 ms and zeros at the frequencies that are aliased, but
+//! need ten times the SPI traffic. At 100 Hz our filter leaves only 1.4 %.
 
 use crate::sensor::spi::Setting;
 
@@ -22,8 +18,7 @@ const fn set(bank: u8, address: u8, mask: u8, value: u8) -> Setting {
 /// The low nibble of the two configuration registers: 100 samples per second.
 const RATE: u8 = 8;
 
-/// The register values in the order in which they are written: filters and ranges before gyro and accelerometer are
-/// switched on.
+/// The registers in the order of writing: filters and ranges before gyro and accelerometer are on.
 pub(super) const SETTINGS: [Setting; 17] = [
     // Counts in bytes and big-endian order, as after a reset.
     set(0, 0x4C, 0x70, 0x30),

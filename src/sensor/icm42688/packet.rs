@@ -13,6 +13,10 @@
 //! Bit 7 of the header means that the FIFO was empty. The most negative value (-524288) marks a missing reading. There
 //! is no checksum: a bit error on the bus gives a wrong reading, unless it is in the header.
 
+use crate::sample::ImuSample;
+use crate::sensor::spi;
+use crate::units::{CentiCelsius, Micros};
+
 /// Length of a packet, bytes.
 pub const PACKET: usize = 20;
 const EMPTY: u8 = 0x80;
@@ -20,6 +24,15 @@ const HEADER: u8 = 0x78;
 /// Header bits that identify the content; the two bits below signal a changed output rate.
 const CONTENT: u8 = 0xFC;
 const NO_READING: i32 = -524_288;
+/// Counts per deg/s: 131 in the range of 250 deg/s that 16 bits have, twice that because the lowest bit is always 0.
+const PER_DPS: f32 = 262.0;
+/// Counts per g: four times 8192, because the lowest two bits are always 0.
+const PER_G: f32 = 32_768.0;
+/// Counts per deg C above 25.
+const PER_DEGREE: f32 = 132.48;
+/// Readings at an end of the range. Of the 20 bits, the lowest is always 0 in a rate, and the lowest two in an
+/// acceleration. With FIFO_HOLD_LAST_DATA_EN = 0, as after a reset, lower codes mark a missing reading (DS-000347, 12.8).
+const ENDS: [i32; 2] = [-524_256, 524_284];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -82,5 +95,26 @@ impl Packet {
         let [x, y, z]: [u8; 3] =
             core::array::from_fn(|axis| ((acceleration[axis] & 15) << 4 | rate[axis] & 15) as u8);
         [HEADER, ax1, ax0, ay1, ay0, az1, az0, gx1, gx0, gy1, gy0, gz1, gz0, t1, t0, u1, u0, x, y, z]
+    }
+
+    /// Converts the readings, taken at `time`, to the pipeline's units; `None` where an axis has no reading.
+    pub fn sample(&self, time: Micros) -> Option<ImuSample> {
+        let ([Some(ax), Some(ay), Some(az)], [Some(gx), Some(gy), Some(gz)]) = (self.acceleration, self.rate)
+        else {
+            return None;
+        };
+        let (force, rate) = ([ax, ay, az], [gx, gy, gz]);
+        let is_clipped = force.iter().chain(&rate).any(|n| *n <= ENDS[0] || *n >= ENDS[1]);
+        // The temperature is at most 27,000.
+        let temperature = self
+            .temperature
+            .map(|code| CentiCelsius(libm::roundf(f32::from(code) * (100.0 / PER_DEGREE) + 2500.0) as i16));
+        spi::sample(
+            time,
+            force.map(|n| n as f32 / PER_G),
+            rate.map(|n| n as f32 / PER_DPS),
+            temperature,
+            is_clipped,
+        )
     }
 }

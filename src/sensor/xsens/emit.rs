@@ -1,7 +1,7 @@
 //! Encodes MTData2 messages as an MTi sends them, for simulations and tests.
 
 use super::mtdata2::{MID_MT_DATA2, MtData2, id};
-use super::{BUS_ID, EXTENDED_LENGTH, PREAMBLE};
+use super::{BUS_ID, PREAMBLE};
 use crate::sample::ImuSample;
 use heapless::Vec;
 
@@ -23,15 +23,14 @@ impl MtData2 {
 
     /// Encodes the whole frame; fields that are `None` are omitted.
     pub fn emit(&self) -> Vec<u8, MAX_EMITTED> {
-        frame(MID_MT_DATA2, &self.data()).unwrap_or_default()
-    }
-
-    fn data(&self) -> Vec<u8, MAX_EMITTED> {
-        let mut data = Vec::new();
+        let mut frame = Vec::new();
+        // MAX_EMITTED bytes hold all packets.
+        let mut put = |bytes: &[u8]| drop(frame.extend_from_slice(bytes));
+        put(&[PREAMBLE, BUS_ID, MID_MT_DATA2, 0]);
         let mut packet = |id: u16, bytes: &[u8]| {
-            let _ = data.extend_from_slice(&id.to_be_bytes());
-            let _ = data.push(bytes.len() as u8);
-            let _ = data.extend_from_slice(bytes);
+            put(&id.to_be_bytes());
+            put(&[bytes.len() as u8]);
+            put(bytes);
         };
         let numbers =
             |values: &[f32]| values.iter().flat_map(|value| value.to_be_bytes()).collect::<Vec<u8, 12>>();
@@ -53,17 +52,10 @@ impl MtData2 {
         if let Some(status) = self.status {
             packet(id::STATUS_WORD, &status.to_be_bytes());
         }
-        data
+        let length = frame.len().saturating_sub(4) as u8;
+        frame.iter_mut().skip(3).take(1).for_each(|place| *place = length);
+        let sum = frame.iter().skip(1).fold(0u8, |sum, byte| sum.wrapping_add(*byte));
+        let _ = frame.push(sum.wrapping_neg());
+        frame
     }
-}
-
-/// Encodes the frame of a message; `None` if it is longer than [`MAX_EMITTED`] or than an Xbus frame.
-fn frame(mid: u8, data: &[u8]) -> Option<Vec<u8, MAX_EMITTED>> {
-    let len = u8::try_from(data.len()).ok().filter(|len| *len != EXTENDED_LENGTH)?;
-    let mut frame = Vec::new();
-    frame.extend_from_slice(&[PREAMBLE, BUS_ID, mid, len]).ok()?;
-    frame.extend_from_slice(data).ok()?;
-    let sum = frame.iter().skip(1).fold(0u8, |sum, byte| sum.wrapping_add(*byte));
-    frame.push(sum.wrapping_neg()).ok()?;
-    Some(frame)
 }

@@ -158,9 +158,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         })
     }
 
-    /// Notes what has been reached, and confirms an image on trial that has reached enough. Returns whether the board
-    /// must restart, because it has not: the boot loader then starts the image before. `milliseconds` is the time since
-    /// the start; idle calls this.
+    /// Notes what has been reached, and confirms an image on trial with enough of it. Returns whether the board must
+    /// restart for the lack of it, and the boot loader start the other. Idle calls it, with the time since the start.
     pub fn firmware_trial(&mut self, is_acknowledged: bool, windows: u32, milliseconds: u32) -> bool {
         let on_trial = self.firmware.state == FirmwareState::OnTrial;
         if on_trial || milliseconds < COUNTED_MS {

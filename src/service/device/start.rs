@@ -1,15 +1,13 @@
 //! What a board needs of the device to start its coprocessor and its CAN controller.
 
 use super::{Device, MappedSlots};
-use crate::align::clock_ratio::ClockRatioConfig;
 use crate::can::wheel::WheelReceiver;
 use crate::coprocessor::{Clock, Config, Observation, StorageFaults};
 use embedded_can::Id;
 use embedded_storage::nor_flash::NorFlash;
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
-    /// Returns the coprocessor's configuration, of what is stored and the weights in use. `is_exact`: the board's clock is
-    /// good enough to measure that of the sensor.
+    /// Returns the configuration by stored data and weights; `is_exact`: the clock can measure the sensor's.
     #[inline]
     pub fn coprocessor(&self, is_exact: bool) -> Config {
         let weights = self.weights_crc.unwrap_or(0);
@@ -18,7 +16,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             wheels: WheelReceiver::new(self.wheels).ok(),
             has_gyronet: self.weights_crc.is_some(),
             clock: Clock::Outside,
-            clock_ratio: is_exact.then_some(ClockRatioConfig::DEFAULT),
+            clock_is_exact: is_exact,
             storage: StorageFaults {
                 damaged: self.stored_damaged() || of_other_weights,
                 configuration_lost: self.configuration_lost(),

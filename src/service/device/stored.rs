@@ -218,8 +218,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.may_interrupt && self.store.as_ref().is_some_and(|store| !store.has_room())
     }
 
-    /// Stores the troubles. If an erase is needed, it waits for `may_erase` and standstill. Returns `false` if the
-    /// caller must try again.
+    /// Stores the troubles; an erase waits for `may_erase` and standstill. Returns `false` to be called again.
     #[inline(never)]
     pub(crate) fn store_troubles(&mut self, troubles: &Troubles, may_erase: bool) -> bool {
         let may_erase = may_erase && self.may_interrupt;

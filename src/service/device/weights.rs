@@ -7,8 +7,7 @@ use crate::store::slots::{Selection, SlotError, WeightSource, select};
 use crate::store::{Accepted, Slot, Upload};
 use embedded_storage::nor_flash::NorFlash;
 
-/// The flash of the weight files, which is also memory-mapped for reading. Offsets are from the start of the whole
-/// flash.
+/// The flash of the weight files, memory-mapped for reading. Offsets are from the start of the flash.
 pub trait MappedSlots: NorFlash {
     /// Returns both slots, aligned to words.
     fn slots(&self) -> [&[u8]; 2];
@@ -23,8 +22,7 @@ pub trait MappedSlots: NorFlash {
         &[]
     }
 
-    /// Runs the check of a file or of a signature, which takes a tenth of a second at 168 MHz. A board may override this
-    /// to extend its watchdog timeout.
+    /// Runs a check of a file or signature, a tenth of a second at 168 MHz: a board may extend its watchdog.
     fn check<T>(&self, work: impl FnOnce() -> T) -> T {
         work()
     }
@@ -62,8 +60,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         weights
     }
 
-    /// Records that the weights in use no longer match their checksum. They are not used until the next start, which
-    /// checks all files again.
+    /// Notes that the weights in use are damaged: not used until the next start, which checks all files.
     pub fn weights_damaged(&mut self) {
         self.weights = WeightSource::None;
         self.weights_crc = None;
