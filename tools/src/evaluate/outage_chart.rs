@@ -11,9 +11,11 @@ use std::fmt::Write;
 
 const WIDTH: f64 = 480.0;
 /// Left and right margins of a panel, and the place of its axis' numbers and title.
-const MARGINS: [f64; 2] = [44.0, 12.0];
-const GAP: f64 = 44.0;
+const MARGINS: [f64; 2] = [48.0, 12.0];
+const GAP: f64 = 52.0;
 const HEIGHT: f64 = 150.0;
+/// Height of a line of the legend.
+const LINE: f64 = 20.0;
 /// The methods that are drawn, from back to front, with their colours on light and on dark ground, those of the page,
 /// where the live rate has the EKF's, and their dashes: zero-rate updates may hide static initialisation.
 const DRAWN: [(Method, &str, &str, &str); 4] = [
@@ -37,7 +39,7 @@ pub fn svg(drive: &str, which: &str, outage: &Outage, points: &[Point]) -> Strin
         "{drive}: {seconds} s without GNSS, {start_s:.0} s after the start, after {driven_s:.0} s with it: {which}"
     );
     let mut body = legend(outage);
-    let top = 58.0 + 17.0 * DRAWN.len() as f64;
+    let top = 78.0 + LINE * DRAWN.len() as f64;
     let time = (1..).map(|k| f64::from(k) * SECONDS_OF_A_POINT);
     let by_time: Vec<_> = time.zip(points.iter().map(|point| point.heading.map(f64::to_degrees))).collect();
     let mut bottom = panel(&mut body, top, &by_time, "error of the heading, degrees, by seconds");
@@ -46,17 +48,18 @@ pub fn svg(drive: &str, which: &str, outage: &Outage, points: &[Point]) -> Strin
         let axes = "distance from the reference's path, m, by metres driven";
         bottom = panel(&mut body, bottom + GAP, &by_way, axes);
     }
-    let height = bottom + GAP - 8.0;
+    let height = bottom + GAP - 6.0;
     format!(
         "<svg id=\"tunnel\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height:.0}\" \
-         font-family=\"system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif\" font-size=\"13\" role=\"img\" \
+         font-family=\"system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif\" font-size=\"15\" role=\"img\" \
          aria-label=\"{}\">\n<style>\n{}</style>\n\
-         <rect class=\"ground\" width=\"{WIDTH}\" height=\"{height:.0}\" rx=\"8\"/>\n<text x=\"12\" y=\"22\" font-weight=\"600\">\
-         {seconds} s without GNSS: {}</text><text class=\"note\" x=\"12\" y=\"40\">{}</text>\n{body}</svg>\n",
+         <rect class=\"ground\" width=\"{WIDTH}\" height=\"{height:.0}\" rx=\"8\"/>\n<text x=\"12\" y=\"24\" font-weight=\"600\">\
+         {seconds} s without GNSS</text><text class=\"note\" x=\"12\" y=\"44\">{}</text>\
+         <text class=\"note\" x=\"12\" y=\"62\">{}</text>\n{body}</svg>\n",
         escaped(&title),
         style(),
-        escaped(which),
         escaped(&format!("{drive}, {start_s:.0} s after its start")),
+        escaped(which),
     )
 }
 
@@ -80,7 +83,7 @@ fn style() -> String {
     });
     let [light, dark] = [0, 1].map(|at| rules.clone().nth(at).unwrap_or_default());
     format!(
-        "#tunnel .note{{font-size:11.5px}}#tunnel .curve{{fill:none;stroke-width:2;stroke-linejoin:round}}\n{light}\n\
+        "#tunnel .note{{font-size:14px}}#tunnel .curve{{fill:none;stroke-width:2;stroke-linejoin:round}}\n{light}\n\
          @media (prefers-color-scheme:dark){{{dark}}}\n"
     )
 }
@@ -107,15 +110,14 @@ fn legend(outage: &Outage) -> String {
     for (k, (method, ..)) in DRAWN.iter().enumerate() {
         let at = column(*method);
         let end = outage.position.map(|(driven, ends)| format!(", {:.1} m after {driven:.0} m", ends[at]));
-        let note =
-            format!("{:.1}° off at the end{}", outage.heading[at].to_degrees(), end.unwrap_or_default());
+        let note = format!("{:.1}° off{}", outage.heading[at].to_degrees(), end.unwrap_or_default());
         let name = if *method == Method::DELAYED { "gyronet" } else { method.name };
-        let y = 60.0 + 17.0 * k as f64;
+        let y = 84.0 + LINE * k as f64;
         let _ = writeln!(
             text,
             "<line class=\"curve m{k}\" x1=\"12\" x2=\"34\" y1=\"{0:.0}\" y2=\"{0:.0}\"/><text x=\"42\" y=\"{y:.0}\">{name}</text>\
-             <text class=\"note\" x=\"250\" y=\"{y:.0}\">{note}</text>",
-            y - 4.0
+             <text class=\"note\" x=\"254\" y=\"{y:.0}\">{note}</text>",
+            y - 5.0
         );
     }
     text
@@ -152,7 +154,7 @@ fn panel(body: &mut String, top: f64, errors: &[(f64, ByMethod<f64>)], axes: &st
     };
     for tick in ticks(x, 6) {
         let at = across(tick.at);
-        mark([at, at, top, bottom], "middle", [at, bottom + 15.0], &tick.label);
+        mark([at, at, top, bottom], "middle", [at, bottom + 17.0], &tick.label);
     }
     for tick in ticks(y, 5) {
         let at = up(tick.at);
@@ -170,7 +172,7 @@ fn panel(body: &mut String, top: f64, errors: &[(f64, ByMethod<f64>)], axes: &st
     let _ = writeln!(
         body,
         "</svg>\n{numbers}<text class=\"note\" x=\"{left}\" y=\"{:.0}\">{axes}</text>",
-        bottom + 32.0
+        bottom + 36.0
     );
     bottom
 }
@@ -202,12 +204,9 @@ mod tests {
             })
             .collect();
         let svg = svg("<b>", "the median of 3", &outage(60, 0.1), &points);
-        assert!(
-            svg.contains("60 s without GNSS: the median of 3<")
-                && svg.contains("&lt;b&gt;, 80 s after its start"),
-            "{svg}"
-        );
-        assert!(svg.contains("5.7° off at the end, 3.0 m after 500 m"), "{svg}");
+        for text in ["&lt;b&gt;, 80 s after its start", ">the median of 3<", "5.7° off, 3.0 m after 500 m"] {
+            assert!(svg.contains(text), "{svg}");
+        }
         assert_eq!(svg.matches("<polyline").count(), 4 + 4, "the errors of heading and position");
     }
 }
