@@ -18,6 +18,8 @@ pub struct Joiner {
     /// Identifiers of the frame, and of rate, angle and detail.
     set: Option<(Id, [Id; 3])>,
     data: [u8; LENGTH],
+    /// The part that comes next.
+    next: usize,
 }
 
 impl Joiner {
@@ -28,16 +30,22 @@ impl Joiner {
             let [rate, angle, detail] = yaw.ids.map(id);
             Some((id(yaw.fd?)?, [rate?, angle?, detail?]))
         });
-        Self { set, data: [0; LENGTH] }
+        Self { set, data: [0; LENGTH], next: 0 }
     }
 
-    /// Takes a frame, and returns identifier and data of what is to be sent now. Eight bytes are a classic frame.
+    /// Takes a frame, and returns identifier and data of what is to be sent now. Eight bytes are a classic frame. A set of
+    /// which a part is missing is not sent.
     pub fn join<'a>(&'a mut self, frame: &'a DataFrame) -> Option<(Id, &'a [u8])> {
         let part =
             self.set.and_then(|(id, parts)| Some((id, parts.iter().position(|of| *of == frame.id())?)));
         let Some((id, part)) = part else { return Some((frame.id(), frame.data())) };
+        if part != 0 && part != self.next {
+            self.next = 0;
+            return None;
+        }
         let payloads = self.data.as_chunks_mut().0;
         *payloads.get_mut(part)? = *frame.padded();
-        (part + 1 == payloads.len()).then_some((id, &self.data))
+        self.next = (part + 1) % payloads.len();
+        (self.next == 0).then_some((id, &self.data))
     }
 }

@@ -131,6 +131,18 @@ fn one_frame_of_can_fd_carries_a_set_as_it_is() {
             assert_eq!(sent, due);
         }
     }
+    // A set of which a part was lost is not sent with the part before.
+    let mut encoder = CanEncoder::new(Config::new(joined).expect("checked"));
+    let mut joiner = Joiner::new(&joined);
+    for tick in 0..12 {
+        let frames = encoder.encode(&sample(tick));
+        let set = frames.iter().rev().take(3).rev().enumerate();
+        let sent = set
+            .filter(|(part, _)| Some(*part as u32) != (tick % 4).checked_sub(1))
+            .filter_map(|(_, frame)| joiner.join(frame).map(|(id, _)| id))
+            .count();
+        assert_eq!(sent, usize::from(tick % 4 == 0), "{tick}");
+    }
 }
 
 /// The controller goes off the bus at each CAN FD frame, or, with a short circuit, at each frame.
