@@ -1,22 +1,20 @@
-//! Lists every entry point for bytes from outside, as a function that accepts any bytes and panics if the
-//! result breaks a guarantee.
-//!
-//! The fuzz targets of `host-tests/fuzz` run these under coverage; `tests/library/entrances.rs` runs them
-//! over the corpus and over damaged copies of it.
+//! Every entry point for bytes from outside, as a function that accepts any bytes and panics if the result breaks a
+//! guarantee. `host-tests/fuzz` runs them under coverage; `tests/library/entrances.rs` runs them over the corpus and over
+//! damaged copies of it.
 
 mod can;
 mod diagnosis;
-mod recording;
 pub mod records;
 mod sensors;
 mod slcan;
 mod weights;
 
+use gyronet_tools::drive::recording::{Reader, Recording};
+
 #[derive(Debug, Clone, Copy)]
 pub struct Entrance {
-    /// The name of its fuzz target and of its folder in the corpus.
+    /// Also that of its folder in the corpus.
     pub name: &'static str,
-    /// The function, which accepts any bytes.
     pub run: fn(&[u8]),
     /// The number of damaged copies that a test runs in well under a second.
     pub mutations: u64,
@@ -37,12 +35,22 @@ pub const ALL: [Entrance; 15] = [
     Entrance { name: "records", run: records::flash, mutations: 5_000 },
     Entrance { name: "gyronet_blob", run: weights::gyronet, mutations: 100 },
     Entrance { name: "fognet_blob", run: weights::fognet, mutations: 50 },
-    Entrance { name: "recording", run: recording::csv, mutations: 1_000 },
+    Entrance { name: "recording", run: recording, mutations: 1_000 },
 ];
 
-pub fn run(name: &str, data: &[u8]) {
-    let entrance = ALL.iter().find(|entrance| entrance.name == name).expect("an entrance of that name");
-    (entrance.run)(data);
+/// Reads bytes as a user's recording. The rows that are read must have rising times and finite values, and an error must
+/// name the file.
+fn recording(data: &[u8]) {
+    if let Err(error) = Recording::parse("fuzz.csv", data) {
+        assert!(error.to_string().starts_with("fuzz.csv"));
+    }
+    let Ok(reader) = Reader::new("fuzz.csv", data) else { return };
+    let mut last = None;
+    for row in reader.map_while(Result::ok) {
+        assert!(last < Some(row.sample.time));
+        assert!(row.wheels.iter().chain([&row.reference]).flatten().all(|value| value.is_finite()));
+        last = Some(row.sample.time);
+    }
 }
 
 /// Takes `len` bytes off the front, or all if there are fewer.

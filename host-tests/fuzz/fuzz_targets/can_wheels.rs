@@ -1,3 +1,0 @@
-#![no_main]
-
-libfuzzer_sys::fuzz_target!(|data: &[u8]| gyronet_host_tests::entrance::run("can_wheels", data));
