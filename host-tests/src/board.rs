@@ -29,7 +29,7 @@ use std::time::Duration;
 
 pub const PACKAGES: &[&str] = &["unicorn"];
 
-/// Returns the ELF file of an image for a board, named by its feature. The test is reported as skipped if the model
+/// The ELF file of an image for a board, named by its feature. The test is reported as skipped if the model
 /// cannot run (then nothing is built) or the image cannot be built.
 pub fn firmware(board: &str, scratch: &str, name: &str) -> Option<PathBuf> {
     require::python(PACKAGES)?;
@@ -43,12 +43,10 @@ pub enum At<'a> {
     Symbol(&'a str),
 }
 
-/// A frame as an observer of the bus sees it.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen {
     pub start: Duration,
     pub end: Duration,
-    /// True if the board has sent it.
     pub own: bool,
     pub frame: DataFrame,
 }
@@ -68,23 +66,15 @@ pub struct Board {
 }
 
 impl Board {
-    /// Returns a board without power, with the image in its flash. Reports the test as skipped if the model's
-    /// packages are missing.
+    /// A board without power, with the image in its flash; the test is reported as skipped without the model's packages.
     pub fn unpowered(image: &Path) -> Option<Self> {
         Self::of("stm32f405", image)
     }
 
-    /// Returns a board with this chip, otherwise as [`Board::unpowered`] does.
+    /// As [`Board::unpowered`], with this chip.
     pub fn of(chip: &str, image: &Path) -> Option<Self> {
         let python = require::python(PACKAGES)?;
         Some(Self { link: Link::open(&python, image, chip) })
-    }
-
-    /// Returns a board that has just been switched on.
-    pub fn boot(image: &Path) -> Option<Self> {
-        let mut board = Self::unpowered(image)?;
-        board.power_on();
-        Some(board)
     }
 
     #[track_caller]
@@ -121,22 +111,19 @@ impl Board {
 
     /// Lets board time pass until an event of this kind, and returns its time; `None` after the limit.
     pub fn run_until(&mut self, event: &str, limit: Duration) -> Option<Duration> {
-        self.run_until_any(&[json!({ "event": event })], limit).map(|(_, time)| time)
+        self.until(json!({ "event": event }), limit)
     }
 
     /// Lets board time pass until a line has this many unread bytes from the board; returns whether it has.
     pub fn run_until_sent(&mut self, usart: usize, bytes: usize, limit: Duration) -> bool {
-        self.run_until_any(&[json!({ "usart": usart, "bytes": bytes })], limit).is_some()
+        self.until(json!({ "usart": usart, "bytes": bytes }), limit).is_some()
     }
 
-    /// Lets board time pass until one of the model's conditions holds; returns its index and the time.
-    pub fn run_until_any(&mut self, conditions: &[Value], limit: Duration) -> Option<(usize, Duration)> {
-        let answer = self.ask("run", json!({ "until": conditions, "limit_us": micros(limit) }));
-        let met = usize::try_from(answer["met"].as_u64()?).ok()?;
-        Some((met, duration(&answer["time_us"])))
+    fn until(&mut self, condition: Value, limit: Duration) -> Option<Duration> {
+        let answer = self.ask("run", json!({ "until": [condition], "limit_us": micros(limit) }));
+        answer["met"].as_u64().map(|_| duration(&answer["time_us"]))
     }
 
-    /// Sends bytes to the board from now on, at the bit rate of the line.
     pub fn send(&mut self, usart: usize, bytes: &[u8]) {
         self.ask("usart_send", json!({ "usart": usart, "hex": hex(bytes) }));
     }
@@ -158,7 +145,6 @@ impl Board {
         Line::new(self, usart)
     }
 
-    /// Sends a frame of another node on the bus.
     pub fn can_send(&mut self, frame: &DataFrame) {
         self.ask("can_send", foreign(frame));
     }
@@ -176,37 +162,39 @@ impl Board {
         self.ask("can_send", json!({ "id": id, "data": hex(data), "fd": true, "fast": true, "at_us": at }));
     }
 
-    /// Takes the frames that the board has sent completely, with the time of their end.
+    /// Takes the frames that the board has sent, with the time of their end.
     pub fn can_frames(&mut self) -> Vec<(Duration, DataFrame)> {
         self.bus_log().into_iter().filter(|seen| seen.own).map(|seen| (seen.end, seen.frame)).collect()
     }
 
-    /// Takes the complete frames of the board, CAN FD among them.
-    pub fn own_frames(&mut self) -> Vec<Own> {
+    /// Takes what was on the bus and is complete.
+    fn taken(&mut self) -> Vec<Value> {
         let answer = self.ask("can_take", json!({}));
-        let own = list(&answer["frames"])
-            .iter()
-            .filter(|entry| entry["error"].is_null() && entry["source"] == "board");
-        let own = own.map(|entry| Own {
+        list(&answer["frames"]).iter().filter(|entry| entry["error"].is_null()).cloned().collect()
+    }
+
+    /// Takes the frames of the board, CAN FD among them.
+    pub fn own_frames(&mut self) -> Vec<Own> {
+        let own = self.taken().into_iter().filter(|entry| entry["source"] == "board");
+        own.map(|entry| Own {
             id: word(&entry["id"]),
             data: unhex(&entry["data"]),
             is_fast: entry["fast"] == true,
-        });
-        own.collect()
+        })
+        .collect()
     }
 
-    /// Takes all complete classic frames that were on the bus.
+    /// Takes all classic frames that were on the bus.
     pub fn bus_log(&mut self) -> Vec<Seen> {
-        let answer = self.ask("can_take", json!({}));
-        let complete =
-            list(&answer["frames"]).iter().filter(|entry| entry["error"].is_null() && entry["fd"] == false);
-        let seen = complete.map(|entry| Seen {
-            start: duration(&entry["start_us"]),
-            end: duration(&entry["time_us"]),
-            own: entry["source"] == "board",
-            frame: frame(entry),
-        });
-        seen.collect()
+        let classic = self.taken().into_iter().filter(|entry| entry["fd"] == false);
+        classic
+            .map(|entry| Seen {
+                start: duration(&entry["start_us"]),
+                end: duration(&entry["time_us"]),
+                own: entry["source"] == "board",
+                frame: frame(&entry),
+            })
+            .collect()
     }
 
     /// Sets a fault or a condition of the environment, such as `"RCC.crystal_hz"` to `null`.
@@ -243,19 +231,19 @@ impl Board {
         }
     }
 
-    /// Returns the address of a symbol and its size in bytes.
+    /// The address of a symbol, and its size in bytes.
     pub fn symbol(&mut self, name: &str) -> (u32, u32) {
         let answer = self.ask("symbol", json!({ "name": name }));
         (word(&answer["address"]), word(&answer["size"]))
     }
 
-    /// Returns a register of the processor: `r0` to `r12`, `sp`, `lr`, `pc`, `xpsr`, `msp`, `psp`, `primask`, ...
+    /// `r0` to `r12`, `sp`, `lr`, `pc`, `xpsr`, `msp`, `psp`, `primask`, ...
     pub fn register(&mut self, name: &str) -> u32 {
         let answer = self.ask("registers", json!({}));
         word(&answer["registers"][name])
     }
 
-    /// Returns the priority bytes of all exceptions, by number, as SHPR and NVIC_IPR hold them.
+    /// The priority bytes of all exceptions, by number, as SHPR and NVIC_IPR hold them.
     pub fn priorities(&mut self) -> Vec<i64> {
         let answer = self.ask("registers", json!({}));
         list(&answer["priorities"]).iter().filter_map(Value::as_i64).collect()
@@ -270,7 +258,6 @@ impl Board {
         self.ask("cut_after", json!({ "accesses": accesses, "delay_us": micros(delay) }));
     }
 
-    /// Returns instructions, board time, time asleep, and the state of power and core.
     pub fn counts(&mut self) -> Counts {
         Counts::new(&self.ask("counts", json!({})))
     }

@@ -17,7 +17,7 @@ use std::rc::Rc;
 const WORD: usize = 4;
 const BYTES: usize = 1 << 20;
 
-/// Says how a power cut hits an operation.
+/// How a power cut hits an operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cut {
     /// The cut comes just before the operation.
@@ -42,7 +42,6 @@ impl Cut {
     }
 }
 
-/// Says why an operation was not done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MockError {
     PowerCut,
@@ -64,9 +63,10 @@ enum Word {
     Erased,
     Programmed,
     Torn,
+    /// Left by anything before: programming clears bits.
+    Unknown,
 }
 
-/// Simulates the whole flash of an STM32F405.
 #[derive(Debug, Clone)]
 pub struct F405 {
     words: Vec<u32>,
@@ -91,7 +91,7 @@ impl Default for F405 {
 }
 
 impl F405 {
-    /// Returns the first so many bytes, erased: a copy of a few sectors is made faster than one of the whole part.
+    /// The first so many bytes, erased: a copy of a few sectors is made faster than one of the whole part.
     pub fn up_to(bytes: usize) -> Self {
         Self {
             words: vec![u32::MAX; bytes / WORD],
@@ -103,7 +103,7 @@ impl F405 {
         }
     }
 
-    /// Returns the number of operations (words programmed, sectors erased) so far.
+    /// Words programmed and sectors erased so far.
     pub fn operations(&self) -> u64 {
         self.operations
     }
@@ -121,6 +121,14 @@ impl F405 {
 
     pub fn bytes(&self) -> &[u8] {
         bytemuck::cast_slice(&self.words)
+    }
+
+    /// Puts bytes into erased flash, as anything before may have left them.
+    pub fn fill(&mut self, offset: u32, bytes: &[u8]) {
+        bytemuck::cast_slice_mut::<u32, u8>(&mut self.words)[offset as usize..][..bytes.len()]
+            .copy_from_slice(bytes);
+        let unknown = offset as usize / WORD..(offset as usize + bytes.len()).div_ceil(WORD);
+        self.states[unknown].fill(Word::Unknown);
     }
 
     /// Flips bits of a byte, as a fault of the part would.
@@ -141,7 +149,8 @@ impl F405 {
 
     fn program(&mut self, word: usize, value: u32) -> Result<(), MockError> {
         let (old, state) = (self.words[word], self.states[word]);
-        let at = word * WORD;
+        let (at, is_unknown) = (word * WORD, state == Word::Unknown);
+        let value = if is_unknown { value & old } else { value };
         assert!(state != Word::Programmed || value == 0, "the word at {at:#x} is programmed twice");
         assert!(value & old == value, "the word at {at:#x}: {old:08x} cannot become {value:08x}");
         let hit = self.step()?;
@@ -176,16 +185,39 @@ impl F405 {
     }
 }
 
-/// Gives access to a part of the flash whose smallest sectors are `SECTOR` bytes long; offsets count from its start.
+/// A part of the flash; offsets count from its start.
 #[derive(Debug, Clone)]
-pub struct Region<const SECTOR: usize> {
+pub struct Region {
     flash: Flash,
     range: Range<usize>,
+    /// The content after the last operation, for reading in place, because the mock's bytes are in a `RefCell`.
+    copy: Vec<u32>,
+    /// Slot of the firmware that runs.
+    running: Option<Slot>,
 }
 
-impl<const SECTOR: usize> Region<SECTOR> {
+impl Region {
     pub fn new(flash: &Flash, range: Range<u32>) -> Self {
-        Self { flash: Rc::clone(flash), range: range.start as usize..range.end as usize }
+        let range = range.start as usize..range.end as usize;
+        Self { flash: Rc::clone(flash), range, copy: Vec::new(), running: None }
+    }
+
+    /// The whole flash of a board whose boot loader has started a slot, which can also be read in place.
+    pub fn mapped(flash: &Flash, running: Option<Slot>) -> Self {
+        let copy = flash.borrow().words.clone();
+        Self { copy, running, ..Self::new(flash, 0..BYTES as u32) }
+    }
+
+    fn bytes(&self, range: Range<u32>) -> &[u8] {
+        bytemuck::cast_slice(&self.copy[range.start as usize / WORD..range.end as usize / WORD])
+    }
+
+    /// Keeps what an operation has left of a range.
+    fn keep(&mut self, range: Range<usize>) {
+        if !self.copy.is_empty() {
+            let words = range.start / WORD..range.end / WORD;
+            self.copy[words.clone()].copy_from_slice(&self.flash.borrow().words[words]);
+        }
     }
 
     fn absolute(&self, offset: u32, len: usize, unit: usize) -> Result<Range<usize>, MockError> {
@@ -196,11 +228,11 @@ impl<const SECTOR: usize> Region<SECTOR> {
     }
 }
 
-impl<const SECTOR: usize> ErrorType for Region<SECTOR> {
+impl ErrorType for Region {
     type Error = MockError;
 }
 
-impl<const SECTOR: usize> ReadNorFlash for Region<SECTOR> {
+impl ReadNorFlash for Region {
     const READ_SIZE: usize = 1;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), MockError> {
@@ -218,71 +250,40 @@ impl<const SECTOR: usize> ReadNorFlash for Region<SECTOR> {
     }
 }
 
-impl<const SECTOR: usize> NorFlash for Region<SECTOR> {
+impl NorFlash for Region {
     const WRITE_SIZE: usize = WORD;
-    const ERASE_SIZE: usize = SECTOR;
+    const ERASE_SIZE: usize = RECORD_SECTOR;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), MockError> {
-        let range = self.absolute(from, (to - from) as usize, SECTOR)?;
+        let range = self.absolute(from, (to - from) as usize, RECORD_SECTOR)?;
         let mut at = range.start;
         while at < range.end {
             let sector = sector(at as u32).expect("the start of a sector");
             assert!(sector.end as usize <= range.end, "sector {sector:x?} reaches beyond {range:x?}");
-            at = sector.end as usize;
-            self.flash.borrow_mut().erase_sector(sector.start as usize..at)?;
+            let sector = at..sector.end as usize;
+            at = sector.end;
+            let erased = self.flash.borrow_mut().erase_sector(sector.clone());
+            self.keep(sector);
+            erased?;
         }
         Ok(())
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), MockError> {
         let range = self.absolute(offset, bytes.len(), WORD)?;
-        for (word, value) in (range.start / WORD..).zip(bytes.as_chunks::<WORD>().0) {
-            self.flash.borrow_mut().program(word, u32::from_le_bytes(*value))?;
-        }
-        Ok(())
+        let mut words = (range.start / WORD..).zip(bytes.as_chunks::<WORD>().0);
+        let program = |(word, value): (usize, &[u8; WORD])| {
+            self.flash.borrow_mut().program(word, u32::from_le_bytes(*value))
+        };
+        let written = words.try_for_each(program);
+        self.keep(range);
+        written
     }
 }
 
-/// Gives access to the weight files of a flash, which can also be read in place.
-///
-/// [`MappedSlots::slots`] returns a copy of the content after the last operation, because the mock's bytes are in a
-/// `RefCell`.
-#[derive(Debug)]
-pub struct MappedRegion {
-    region: Region<RECORD_SECTOR>,
-    copy: Vec<u32>,
-    /// Slot of the firmware that runs.
-    running: Option<Slot>,
-}
-
-impl MappedRegion {
-    pub fn new(flash: &Flash) -> Self {
-        let copy = flash.borrow().words.clone();
-        Self { region: Region::new(flash, 0..BYTES as u32), copy, running: None }
-    }
-
-    /// Gives access to the flash of a board whose boot loader has started a slot.
-    pub fn of_running(flash: &Flash, running: Option<Slot>) -> Self {
-        Self { running, ..Self::new(flash) }
-    }
-
-    pub fn current(&self) -> [&[u8]; 2] {
-        self.bytes(SLOTS).split_at(SLOT_SIZE).into()
-    }
-
-    fn bytes(&self, range: Range<u32>) -> &[u8] {
-        bytemuck::cast_slice(&self.copy[range.start as usize / WORD..range.end as usize / WORD])
-    }
-
-    fn refresh(&mut self, from: u32, len: usize) {
-        let words = from as usize / WORD..(from as usize + len).min(BYTES) / WORD;
-        self.copy[words.clone()].copy_from_slice(&self.region.flash.borrow().words[words]);
-    }
-}
-
-impl MappedSlots for MappedRegion {
+impl MappedSlots for Region {
     fn slots(&self) -> [&[u8]; 2] {
-        self.current()
+        self.bytes(SLOTS).split_at(SLOT_SIZE).into()
     }
 
     fn running(&self) -> Option<Slot> {
@@ -291,38 +292,5 @@ impl MappedSlots for MappedRegion {
 
     fn firmware(&self, slot: Slot) -> &[u8] {
         self.bytes(slot.firmware())
-    }
-}
-
-impl ErrorType for MappedRegion {
-    type Error = MockError;
-}
-
-impl ReadNorFlash for MappedRegion {
-    const READ_SIZE: usize = 1;
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), MockError> {
-        self.region.read(offset, bytes)
-    }
-
-    fn capacity(&self) -> usize {
-        self.region.capacity()
-    }
-}
-
-impl NorFlash for MappedRegion {
-    const WRITE_SIZE: usize = WORD;
-    const ERASE_SIZE: usize = RECORD_SECTOR;
-
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), MockError> {
-        let result = self.region.erase(from, to);
-        self.refresh(from, (to - from) as usize);
-        result
-    }
-
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), MockError> {
-        let result = self.region.write(offset, bytes);
-        self.refresh(offset, bytes.len());
-        result
     }
 }

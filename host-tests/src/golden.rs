@@ -1,9 +1,8 @@
-//! Reads the outputs of PyTorch for some windows, layer by layer, as `gyronet_train` exports them.
+//! The outputs of PyTorch for some windows, layer by layer, as `gyronet_train` exports them.
 
 use crate::recordings::workspace;
 use safetensors::{Dtype, SafeTensors};
 
-/// Each file has this many windows.
 pub const WINDOWS: usize = 8;
 /// Allowed difference: f32 sums of a few hundred products of order 1, twice over, are summed in another order than in
 /// PyTorch. A normalised input of 20 has an LSB of 2e-6; everything else stays within 1.
@@ -13,13 +12,12 @@ const TOLERANCE: f32 = 1e-5;
 pub struct Golden(Vec<u8>);
 
 impl Golden {
-    /// Reads the tensors of a network, `gyronet` or `fognet`.
     pub fn read(network: &str) -> Self {
         let path = workspace().join(format!("tools/weights/{network}.golden.safetensors"));
         Self(std::fs::read(path).expect("the committed tensors"))
     }
 
-    /// Returns the values of a tensor, row-major.
+    /// Row-major.
     pub fn tensor(&self, name: &str, shape: &[usize]) -> Vec<f32> {
         let file = SafeTensors::deserialize(&self.0).expect("safetensors");
         let view = file.tensor(name).expect(name);

@@ -10,16 +10,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-/// Returns the ELF file of an image (`coprocessor`, `bringup`, `selftest`, `bench`) for the Netduino Plus 2; the test is
-/// reported as skipped where the target's standard library is not installed.
-///
-/// Each image is built once in a process, under `scratch` (a test's `env!("CARGO_TARGET_TMPDIR")`): the
-/// build folder of `cargo test` itself may be locked.
+/// As [`firmware_for`], for the Netduino Plus 2.
 pub fn firmware(scratch: &str, image: &str) -> Option<PathBuf> {
     firmware_for(("netduino-plus-2", bench::TARGET), scratch, image)
 }
 
-/// Returns an update of the Netduino Plus 2 to what is in this checkout.
+/// An update of the Netduino Plus 2 to what is in this checkout.
 pub fn update(scratch: &str) -> Option<Update> {
     require::wants(Need::Qemu, bench::target_installed(bench::TARGET))?;
     static BUILT: OnceLock<Update> = OnceLock::new();
@@ -30,7 +26,11 @@ pub fn update(scratch: &str) -> Option<Update> {
     Some(BUILT.get_or_init(build).clone())
 }
 
-/// Returns the ELF file of an image for another board, named by its feature, and its target.
+/// The ELF file of an image (`coprocessor`, `bringup`, `selftest`, `bench`) for a board, named by its feature, and its target;
+/// the test is reported as skipped where the target's standard library is not installed.
+///
+/// Each image is built once in a process, under `scratch` (a test's `env!("CARGO_TARGET_TMPDIR")`): the
+/// build folder of `cargo test` itself may be locked.
 pub fn firmware_for((board, target): (&str, &str), scratch: &str, image: &str) -> Option<PathBuf> {
     require::wants(Need::Qemu, bench::target_installed(target))?;
     // Images of different levels of optimisation share little: those to flash and the others are built side by side.

@@ -1,5 +1,5 @@
-//! The parts that the host tests share: how a test gets QEMU or the recordings or reports that it is
-//! skipped, the virtual board and its image, and every generator of bytes, samples, streams and weights.
+//! What the host tests share: how a test gets QEMU or the recordings or reports that it is skipped, the virtual board and
+//! its image, and every generator of bytes, samples, streams and weights.
 
 pub mod board;
 pub mod entrance;
@@ -7,13 +7,10 @@ pub mod flash;
 pub mod gnss;
 pub mod golden;
 pub mod image;
-pub mod inputs;
 pub mod models;
 pub mod noise;
 pub mod packing;
 pub mod parallel;
-pub mod qemu;
-pub mod ram_flash;
 pub mod recordings;
 pub mod replay;
 pub mod require;

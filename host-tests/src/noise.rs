@@ -1,16 +1,16 @@
-//! Generates seeded random numbers for long streams, the same on every machine and in every run, and the
+//! Seeded random numbers for long streams, the same on every machine and in every run, and the
 //! settings of the property tests, whose seeds change from run to run.
 
 use proptest::test_runner::Config;
 
-/// Returns the settings for this many cases. Failed cases are not written to files, since the message has the input.
+/// Failed cases are not written to files, since the message has the input.
 pub fn cases(count: u32) -> Config {
     // Miri checks every access of a case, so a few cases are enough there.
     let cases = if cfg!(miri) { count.min(4) } else { count };
     Config { cases, failure_persistence: None, ..Config::default() }
 }
 
-/// Generates random numbers by SplitMix64 (Steele, Lea, Flood: Fast Splittable Pseudorandom Number Generators, 2014).
+/// SplitMix64 (Steele, Lea, Flood: Fast Splittable Pseudorandom Number Generators, 2014).
 #[derive(Debug, Clone)]
 pub struct Noise(u64);
 
@@ -36,7 +36,7 @@ impl Noise {
         from + ((u128::from(self.bits()) * span) >> 64) as i64
     }
 
-    /// Returns an approximately normal number, mean 0, variance 1: the sum of twelve uniform numbers.
+    /// Approximately normal, mean 0, variance 1: the sum of twelve uniform numbers.
     pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.bits() as f64 / u64::MAX as f64).sum::<f64>() - 6.0
     }

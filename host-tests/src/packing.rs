@@ -1,25 +1,21 @@
-//! Creates LSTM weights row by row and packs them as documented in `gyronet::nn::lstm`. It was written
+//! LSTM weights row by row, packed as documented in `gyronet::nn::lstm`. It was written
 //! from that documentation, not from the quantiser, so that it can check both.
 
 use crate::noise::Noise;
 use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT};
 use gyronet::nn::{GATES, HIDDEN_MAX};
 
-/// Holds one gate row of one unit.
 #[derive(Debug, Clone, Default)]
 pub struct Row {
-    /// The bias, in accumulator units.
     pub bias: i32,
-    /// The multiplier: gate input = accumulator * multiplier / 2^16.
+    /// Gate input = accumulator * multiplier / 2^16.
     pub multiplier: i16,
     pub input: Vec<i8>,
-    /// The weights of the hidden state.
     pub recurrent: Vec<i8>,
 }
 
 impl Row {
-    /// Returns the largest sum that inputs up to `input_max` and any hidden state can give, bias
-    /// included.
+    /// The largest sum that inputs up to `input_max` and any hidden state can give, with the bias.
     pub fn bound(&self, input_max: i32) -> i64 {
         let sum = |row: &[i8], max: i32| {
             row.iter().map(|w| i64::from(w.unsigned_abs())).sum::<i64>() * i64::from(max)
@@ -27,7 +23,7 @@ impl Row {
         sum(&self.input, input_max) + sum(&self.recurrent, HIDDEN_MAX) + i64::from(self.bias.unsigned_abs())
     }
 
-    /// Returns random weights up to `largest`, thinned until the row's bound stays below `limit`; the bias may use
+    /// Random weights up to `largest`, thinned until the row's bound stays below `limit`; the bias may use
     /// all of the remaining range.
     fn random(
         noise: &mut Noise,
@@ -53,12 +49,12 @@ impl Row {
     }
 }
 
-/// Holds the rows i, f, g, o of each unit.
+/// i, f, g, o of each unit.
 #[derive(Debug, Clone)]
 pub struct Rows(pub Vec<[Row; GATES]>);
 
 impl Rows {
-    /// Returns random rows within the range of the kernel for inputs up to `input_max`.
+    /// Random rows within the range of the kernel for inputs up to `input_max`.
     pub fn random(noise: &mut Noise, inputs: usize, units: usize, input_max: i32) -> Self {
         let mut row = |gate: usize| {
             let largest = [127, 40, 3][noise.int(0, 2) as usize];
@@ -84,13 +80,12 @@ impl Rows {
     }
 }
 
-/// Packs two halfwords into a word, the first in the lower half.
 pub fn word(first: i16, second: i16) -> u32 {
     let ([a, b], [c, d]) = (first.to_le_bytes(), second.to_le_bytes());
     u32::from_le_bytes([a, b, c, d])
 }
 
-/// Appends the packed words of rows i, f, g, o, with their columns padded with zeros to a multiple.
+/// Appends rows i, f, g, o, with their columns padded with zeros to a multiple.
 fn columns(out: &mut Vec<u32>, mut rows: [Vec<i8>; GATES], multiple: usize) {
     for row in &mut rows {
         row.resize(row.len().next_multiple_of(multiple), 0);
@@ -104,7 +99,6 @@ fn columns(out: &mut Vec<u32>, mut rows: [Vec<i8>; GATES], multiple: usize) {
     }
 }
 
-/// Holds weights in reading order.
 #[derive(Debug, Clone, Default)]
 pub struct Packed {
     units: usize,
@@ -114,7 +108,6 @@ pub struct Packed {
 }
 
 impl Packed {
-    /// Returns the weights in the form that the kernel uses.
     pub fn direction(&self) -> DirectionWeights<'_> {
         DirectionWeights::new(self.units, self.inputs, &self.input, &self.recurrent)
             .expect("records of the stated size")

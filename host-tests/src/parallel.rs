@@ -1,4 +1,4 @@
-//! Processes recordings side by side, because each of them keeps a core busy for seconds.
+//! Work side by side, because each recording keeps a core busy for seconds.
 
 /// Prints a table of the lines that `judge` returns for each item, with the failures that it reports.
 pub fn table<T: Sync>(heading: &str, items: &[T], judge: impl Fn(&T) -> (String, Vec<String>) + Sync) {
@@ -8,7 +8,7 @@ pub fn table<T: Sync>(heading: &str, items: &[T], judge: impl Fn(&T) -> (String,
     assert!(failures.concat().is_empty(), "{failures:#?}\n{table}");
 }
 
-/// Returns the results of `judge` for each item in their order; each item has a thread.
+/// The results of `judge` in the items' order; each item has a thread.
 pub fn map<T: Sync, R: Send>(items: &[T], judge: impl Fn(&T) -> R + Sync) -> Vec<R> {
     std::thread::scope(|scope| {
         let judge = &judge;

@@ -4,33 +4,31 @@
 use crate::require::{self, Need};
 use std::path::{Path, PathBuf};
 
-/// The environment variable that names the folder with `wid_car/`.
 pub const VARIABLE: &str = "GYRONET_DATA";
 
 pub fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("host-tests lies in the workspace")
 }
 
-/// Returns the folder of the recordings: [`VARIABLE`], from the repository's root if relative, else `shared/data`
+/// [`VARIABLE`], from the repository's root if relative, else `shared/data`
 /// beside the repository.
 pub fn folder() -> PathBuf {
     let beside = || workspace().parent().unwrap_or(workspace()).join("shared/data");
     std::env::var_os(VARIABLE).map_or_else(beside, |folder| workspace().join(folder))
 }
 
-/// Returns a file or folder among the recordings; without it reports that the test is skipped.
+/// A file or folder among the recordings; without it the test is reported as skipped.
 pub fn found(name: &str) -> Option<PathBuf> {
     let path = folder().join(name);
     let missing = format!("no recording {} ({VARIABLE} names another folder)", path.display());
     require::wants(Need::Data, path.exists().then_some(path).ok_or(missing))
 }
 
-/// Returns the file of one drive of `wid_car`.
 pub fn trial(number: u32) -> Option<PathBuf> {
     found(&format!("wid_car/trial{number:02}_100hz.csv"))
 }
 
-/// Returns the recordings with a speed or wheels, in order; without the drives of `wid_car` reports that the test is skipped.
+/// The recordings with a speed or wheels, in order.
 pub fn with_speed() -> Option<Vec<PathBuf>> {
     found("wid_car")?;
     let sets = ["wid_car", "real_car", "rc_car", "utv", "truck", "car_mti710"];
@@ -42,7 +40,6 @@ pub fn with_speed() -> Option<Vec<PathBuf>> {
     Some(paths)
 }
 
-/// Returns the files of these drives; where one is missing, reports that the test is skipped.
 pub fn trials(numbers: &[u32]) -> Option<Vec<PathBuf>> {
     numbers.iter().map(|number| trial(*number)).collect()
 }

@@ -1,4 +1,4 @@
-//! Handles the requirements of a test beyond Rust: the test gets them, or is reported as skipped, or fails.
+//! What a test needs beyond Rust: it gets that, or is reported as skipped, or fails.
 //!
 //! `GYRONET_REQUIRE=qemu,data` makes tests that need these fail where they are missing; without it they print
 //! `SKIPPED name: why` and pass. The line goes straight to the process's standard error, which the test harness does
@@ -7,10 +7,8 @@
 use std::io::Write;
 use std::process::Command;
 
-/// The environment variable that lists the requirements that must be met, separated by commas.
-pub const VARIABLE: &str = "GYRONET_REQUIRE";
+const VARIABLE: &str = "GYRONET_REQUIRE";
 
-/// Names a requirement that not every machine meets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Need {
     /// The program qemu-system-arm and the target's standard library.
@@ -28,11 +26,11 @@ impl Need {
         [("qemu", Self::Qemu), ("data", Self::Data), ("python", Self::Python), ("gcc", Self::Gcc)];
 }
 
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Required(Vec<Need>);
+#[derive(Debug, PartialEq, Eq)]
+struct Required(Vec<Need>);
 
 impl Required {
-    pub fn parse(list: &str) -> Result<Self, String> {
+    fn parse(list: &str) -> Result<Self, String> {
         let words = list.split(',').map(str::trim).filter(|word| !word.is_empty());
         let need = |word: &str| {
             let known = Need::ALL.iter().find(|(name, _)| *name == word);
@@ -45,14 +43,8 @@ impl Required {
         Self::parse(&std::env::var(VARIABLE).unwrap_or_default()).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// Returns what was found, or `None` with a line on `out` that names the skipped test and the reason.
-    pub fn wants<T>(
-        &self,
-        test: &str,
-        need: Need,
-        found: Result<T, String>,
-        out: &mut impl Write,
-    ) -> Option<T> {
+    /// What was found, or `None` with a line on `out` that names the skipped test and the reason.
+    fn wants<T>(&self, test: &str, need: Need, found: Result<T, String>, out: &mut impl Write) -> Option<T> {
         match found {
             Ok(found) => Some(found),
             Err(why) if self.0.contains(&need) => panic!("{test}: {VARIABLE} asks for {need:?}, but {why}"),
@@ -79,17 +71,27 @@ fn say(test: &str, why: &str, out: &mut impl Write) {
     let _ = out.write_all(format!("SKIPPED {test}: {why}\n").as_bytes());
 }
 
-/// Returns what was found, or reports on standard error that this test is skipped.
+/// What was found, or `None` with a report on standard error that this test is skipped.
 pub fn wants<T>(need: Need, found: Result<T, String>) -> Option<T> {
     Required::from_env().wants(&running(), need, found, &mut std::io::stderr())
 }
 
-/// Returns the Python with these packages: `GYRONET_PYTHON`, or `python3`.
+/// A program that says its version.
+pub fn program(need: Need, name: &str) -> Option<()> {
+    let version = Command::new(name).arg("--version").output();
+    wants(need, version.map(drop).map_err(|error| format!("{name}: {error}")))
+}
+
+/// QEMU, which runs the images of the kernels.
+pub fn qemu() -> Option<()> {
+    program(Need::Qemu, "qemu-system-arm")
+}
+
+/// The Python with these packages: `GYRONET_PYTHON`, or `python3`.
 pub fn python(packages: &[&str]) -> Option<String> {
     wants(Need::Python, python_with(packages))
 }
 
-/// Returns that Python, or why there is none.
 pub fn python_with(packages: &[&str]) -> Result<String, String> {
     let python = std::env::var("GYRONET_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let packages = packages.join(", ");
@@ -111,15 +113,9 @@ mod tests {
     }
 
     #[test]
-    fn what_was_found_is_returned() {
-        let mut out = Vec::new();
-        assert_eq!(Required::default().wants("t", Need::Data, Ok(7), &mut out), Some(7));
-        assert_eq!(out, b"");
-    }
-
-    #[test]
-    fn a_skipped_test_is_reported() {
+    fn what_was_found_is_returned_and_a_skipped_test_is_reported() {
         let (mut out, required) = (Vec::new(), Required::parse("qemu,python").unwrap());
+        assert_eq!(required.wants("t", Need::Data, Ok(7), &mut out), Some(7));
         assert_eq!(required.wants("t", Need::Data, Err::<(), _>("no folder".into()), &mut out), None);
         assert_eq!(out, b"SKIPPED t: no folder\n");
     }

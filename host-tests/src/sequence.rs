@@ -1,4 +1,4 @@
-//! Simulates sequences, and does dead reckoning of them with turns from any source.
+//! Simulated sequences, and dead reckoning of them with turns from any source.
 
 use gyronet_paper::sequence::Sequence;
 use gyronet_paper::simulate::{self, Spec};
@@ -6,7 +6,7 @@ use gyronet_tools::drive::track::Track;
 use gyronet_tools::evaluate::trajectory_error::TrajectoryError;
 use tempfile::tempdir;
 
-/// Returns a sequence that is simulated, written and read back.
+/// Simulated, written and read back.
 pub fn simulate(spec: &Spec) -> Sequence {
     let parent = tempdir().expect("there is room");
     let folder = parent.path().join(&spec.name);
@@ -14,7 +14,7 @@ pub fn simulate(spec: &Spec) -> Sequence {
     Sequence::read(&folder).expect("it has just been written")
 }
 
-/// Returns the root mean square distance from the true path of dead reckoning with these turns, m.
+/// The root mean square distance from the true path of dead reckoning with these turns, m.
 pub fn path_error(sequence: &Sequence, turns: impl Iterator<Item = f64>) -> f64 {
     let yaw = sequence.steps.first().expect("it has steps").yaw;
     let mut track = Track { yaw, ..Track::default() };

@@ -1,7 +1,7 @@
 //! Random settings, each value of which is valid by itself: whether they are valid together is for the board to say.
 
 use crate::noise::Noise;
-use embedded_can::{ExtendedId, Id, StandardId};
+use crate::wire::{id11, id29};
 use gyronet::can::config::{
     BIT_RATES, BoschSettings, DataIdMode, E2e, Settings, StatusSettings, YawSettings,
 };
@@ -57,11 +57,7 @@ pub fn configuration(noise: &mut Noise) -> Configuration {
         status: maybe(noise, |noise| StatusSettings { id: one(noise, &IDS) }),
     };
     let place = |noise: &mut Noise| HeadingSignal {
-        id: if noise.int(0, 1) == 0 {
-            Id::Extended(ExtendedId::new(one(noise, &LONG_IDS)).expect("29 bits"))
-        } else {
-            Id::Standard(StandardId::new(one(noise, &IDS)).expect("11 bits"))
-        },
+        id: if noise.int(0, 1) == 0 { id29(one(noise, &LONG_IDS)) } else { id11(one(noise, &IDS)) },
         field: BitField::new(0, 32, ByteOrder::Intel, false).expect("inside the frame"),
         factor: 1e-7,
         offset: -210.0,
@@ -131,9 +127,9 @@ pub fn configuration(noise: &mut Noise) -> Configuration {
 
 pub fn wheels(noise: &mut Noise) -> WheelSettings {
     let id = match noise.int(0, 3) {
-        0 => Id::Extended(ExtendedId::new(one(noise, &LONG_IDS)).expect("29 bits")),
-        1 => Id::Standard(StandardId::new(one(noise, &[0x7DF, 0x7E0, 0x7E8])).expect("11 bits")),
-        _ => Id::Standard(StandardId::new(one(noise, &IDS)).expect("11 bits")),
+        0 => id29(one(noise, &LONG_IDS)),
+        1 => id11(one(noise, &[0x7DF, 0x7E0, 0x7E8])),
+        _ => id11(one(noise, &IDS)),
     };
     let frame = WheelSettings::TOYOTA.frames[0].map(|frame| WheelFrame { id, ..frame });
     WheelSettings { frames: [frame, None, None, None], ..WheelSettings::TOYOTA }

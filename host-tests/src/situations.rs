@@ -6,9 +6,9 @@
 
 pub mod board;
 mod damage;
+pub mod icm42688;
 pub mod judge;
 pub mod list;
-pub mod parts;
 pub mod receiver;
 pub mod recordings;
 pub mod report;

@@ -7,14 +7,14 @@ use embedded_storage::nor_flash::NorFlash;
 use gyronet::model::blob::CRC;
 use gyronet::model::weights;
 use gyronet::store::firmware::{LABEL, LABEL_SIZE, Label, MAX_IMAGE, Trailer};
-use gyronet::store::layout::{self, FLASH_BASE, RECORD_SECTOR, SLOT_SIZE};
+use gyronet::store::layout::{self, FLASH_BASE, SLOT_SIZE};
 use gyronet::store::{Accepted, Record, Slot, Store, StoreError, Upload};
 
-pub fn open(flash: &Flash) -> Result<Store<Region<RECORD_SECTOR>>, StoreError> {
+pub fn open(flash: &Flash) -> Result<Store<Region>, StoreError> {
     Store::open(Region::new(flash, layout::STORE), 0)
 }
 
-/// Returns the checksum at the end of a weight file.
+/// The checksum at the end of a weight file.
 pub fn crc(file: &[u8]) -> u32 {
     u32::from_le_bytes(*file.last_chunk().expect("a checksum"))
 }
@@ -27,7 +27,7 @@ pub fn slots(flash: &F405) -> [&[u8]; 2] {
 /// Uploads a file to a slot, checks it and accepts it, as the board does.
 pub fn upload(flash: &Flash, slot: Slot, file: &[u8]) -> Result<(), String> {
     let text = |error: &dyn std::error::Error| error.to_string();
-    let mut region = Region::<RECORD_SECTOR>::new(flash, 0..1 << 20);
+    let mut region = Region::new(flash, 0..1 << 20);
     let mut upload = Upload::begin(&mut region, slot, file.len() as u32).map_err(|e| text(&e))?;
     for (block, offset) in file.chunks(256).zip((0..).step_by(256)) {
         upload.block(&mut region, offset, block).map_err(|e| text(&e))?;
@@ -38,7 +38,7 @@ pub fn upload(flash: &Flash, slot: Slot, file: &[u8]) -> Result<(), String> {
     store.set(&accepted.with(slot, crc)).map_err(|e| text(&e))
 }
 
-/// Returns the built-in weights with these bits of the output bias flipped (within its bits 8 to 15), and a valid
+/// The built-in weights with these bits of the output bias flipped (within its bits 8 to 15), and a valid
 /// checksum.
 pub fn other_weights(bits: u8) -> Vec<u8> {
     let mut file = weights::GYRONET.0.to_vec();
@@ -50,7 +50,7 @@ pub fn other_weights(bits: u8) -> Vec<u8> {
     file
 }
 
-/// Returns an image of firmware: a label among noise.
+/// An image of firmware: a label among noise.
 pub fn image(label: &Label, seed: u64) -> Vec<u8> {
     let mut noise = Noise::new(seed);
     let mut image: Vec<u8> = (0..2_048).map(|_| noise.byte()).collect();
@@ -62,13 +62,12 @@ pub fn image(label: &Label, seed: u64) -> Vec<u8> {
 pub fn flash_image(flash: &Flash, slot: Slot, image: &[u8]) {
     let trailer =
         Trailer { is_confirmed: true, ..Trailer::new(image.len() as u32, CRC.checksum(image), 0, 1) };
-    let mut region = Region::<RECORD_SECTOR>::new(flash, 0..1 << 20);
+    let mut region = Region::new(flash, 0..1 << 20);
     let start = slot.firmware().start;
     let written = region.write(start, image).and(region.write(start + MAX_IMAGE, &trailer.bytes()));
     written.expect("it was erased");
 }
 
-/// Holds a board's flash before it starts.
 #[derive(Debug, Default)]
 pub struct Stored(Flash);
 
@@ -78,19 +77,17 @@ impl Stored {
         self
     }
 
-    /// Stores an accepted weight file; the last one is used.
+    /// Accepts a weight file; the last one is used.
     pub fn weights(self, slot: Slot, file: &[u8]) -> Self {
         upload(&self.0, slot, file).expect("it is accepted");
         self
     }
 
-    /// Flips bits of a byte at an offset into the flash.
     pub fn damaged(self, offset: u32, bits: u8) -> Self {
         self.0.borrow_mut().damage(offset as usize, bits);
         self
     }
 
-    /// Copies the content into a virtual board's flash.
     pub fn write_to(&self, board: &mut crate::board::Board) {
         let flash = self.0.borrow();
         for range in [layout::STORE, layout::SLOTS] {

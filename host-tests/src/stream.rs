@@ -1,4 +1,4 @@
-//! Runs samples through a pipeline with a network of the test's own.
+//! Samples through a pipeline with a network of the test's own.
 
 use crate::synthetic::{rate, turning};
 use gyronet::health::{Faults, Status};
@@ -14,17 +14,17 @@ pub fn new() -> Pipeline {
     Pipeline::new(PipelineConfig::DEFAULT)
 }
 
-/// Returns samples of a vehicle that stands and turns from tick [`KNOWN`] on.
+/// A vehicle that stands and turns from tick [`KNOWN`] on.
 pub fn drive(ticks: impl IntoIterator<Item = u64>) -> impl Iterator<Item = ImuSample> {
     ticks.into_iter().map(|tick| turning(tick, rate(if tick < KNOWN { 0.001 } else { 0.25 })))
 }
 
-/// Returns a network whose corrections are always the same, rad/s.
+/// A network whose corrections are always the same, rad/s.
 pub fn constant(correction: f64) -> impl FnMut(&DueWindow) -> Option<Estimate> {
     move |_| Some(Estimate { corrections: [rate(correction); WINDOW], ..Estimate::NONE })
 }
 
-/// Runs samples through a pipeline; estimates are delivered at once, and for `None` nothing is delivered.
+/// Estimates are delivered at once, and for `None` nothing is delivered.
 pub fn run(
     pipeline: &mut Pipeline,
     samples: impl IntoIterator<Item = ImuSample>,
@@ -43,7 +43,7 @@ pub fn run(
     outputs
 }
 
-/// Returns the runs of equal status of the live rate: each with its number of samples.
+/// The runs of equal status of the live rate: each with its number of samples.
 pub fn statuses(outputs: &[Output]) -> Vec<(Status, usize)> {
     outputs
         .chunk_by(|a, b| a.vehicle.live.status == b.vehicle.live.status)
@@ -51,7 +51,6 @@ pub fn statuses(outputs: &[Output]) -> Vec<(Status, usize)> {
         .collect()
 }
 
-/// Returns the runs of equal faults: each with its number of samples.
 pub fn faults(outputs: &[Output]) -> Vec<(Faults, usize)> {
     let faults = |output: &Output| output.vehicle.delayed.faults;
     outputs.chunk_by(|a, b| faults(a) == faults(b)).map(|run| (faults(&run[0]), run.len())).collect()

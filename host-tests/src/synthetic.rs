@@ -1,4 +1,4 @@
-//! Creates samples of a vehicle that stands, turns or shakes, in the pipeline's fixed-point units.
+//! Samples of a vehicle that stands, turns or shakes, in the pipeline's fixed-point units.
 
 use crate::noise::Noise;
 use gyronet::estimate::{VehicleSample, YawEstimate};
@@ -7,17 +7,15 @@ use gyronet::sample::{ImuSample, PERIOD_US, RATE_HZ, Standstill, Validity};
 use gyronet::standstill::Standing;
 use gyronet::units::{AngularRate, Micros, SpecificForce, Yaw};
 
-/// Returns a rate, rad/s, in fixed point.
 pub fn rate(rad_per_sec: f64) -> AngularRate {
     AngularRate::from_rad_per_sec(rad_per_sec as f32).expect("a gyro's range")
 }
 
-/// Returns a specific force, m/s^2, in fixed point.
 pub fn force(metre_per_sec2: f64) -> SpecificForce {
     SpecificForce::from_metre_per_sec2(metre_per_sec2 as f32).expect("an accelerometer's range")
 }
 
-/// Returns a sample of a level vehicle at grid step `tick` that turns at `yaw_rate` and does not move otherwise.
+/// A level vehicle at grid step `tick` that turns at `yaw_rate` and does not move otherwise.
 pub fn turning(tick: u64, yaw_rate: AngularRate) -> ImuSample {
     ImuSample {
         time: Micros(tick * PERIOD_US),
@@ -37,7 +35,7 @@ pub fn noisy(mut sample: ImuSample, [gyro, accelerometer]: [f64; 2], noise: &mut
     sample
 }
 
-/// Returns a sample of a vehicle that stands with its engine running: a 27 Hz shake and its overtone on every axis,
+/// A vehicle that stands with its engine running: a 27 Hz shake and its overtone on every axis,
 /// with some noise; `bias` (rad/s) on every gyro axis.
 pub fn idling(tick: u64, bias: f64, noise: &mut Noise) -> ImuSample {
     let phase = std::f64::consts::TAU * 27.0 * tick as f64 / f64::from(RATE_HZ);
@@ -61,7 +59,7 @@ pub fn estimate(rate: AngularRate, yaw: Yaw) -> YawEstimate {
     YawEstimate { rate, yaw, source: Source::Model, quality: Quality::Good, ..YawEstimate::default() }
 }
 
-/// Returns the output for a vehicle that turns at `rate`, has turned by `yaw`, and has no fault.
+/// The output for a vehicle that turns at `rate`, has turned by `yaw`, and has no fault.
 pub fn vehicle(tick: u32, rate: AngularRate, yaw: Yaw) -> VehicleSample {
     VehicleSample {
         live: YawEstimate { rate, quality: Quality::Good, ..YawEstimate::default() },

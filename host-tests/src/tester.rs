@@ -2,10 +2,8 @@
 
 use std::collections::VecDeque;
 
-/// Fills the rest of a frame.
 const PADDING: u8 = 0x55;
 
-/// Returns the frames of a message: a single frame, or a first frame and its consecutive frames.
 pub fn segment(message: &[u8]) -> Vec<[u8; 8]> {
     if message.len() <= 7 {
         return vec![frame(&[message.len() as u8], message)];
@@ -26,13 +24,12 @@ pub fn frame(head: &[u8], bytes: &[u8]) -> [u8; 8] {
 /// It waits on "response pending", and counts these responses.
 #[derive(Debug, Default)]
 pub struct Tester {
-    /// Number of "response pending" messages received.
     pub pending: usize,
 }
 
 impl Tester {
-    /// Sends a request over `exchange`, which passes frames to the server and returns the frames that it has sent.
-    /// `exchange` is called until the response is complete, at most `turns` times.
+    /// `exchange` passes frames to the server and returns those that it has sent; it is called until the response is
+    /// complete, at most `turns` times.
     pub fn ask(
         &mut self,
         request: &[u8],

@@ -1,10 +1,11 @@
-//! Creates CAN frames and bytes of an Xsens MTi, and collects the samples that a part's driver delivers for bytes.
+//! CAN frames and bytes of an Xsens MTi, and the samples that a part's driver delivers for bytes.
 
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::sample::ImuSample;
 use gyronet::sensor::ByteSource;
 use gyronet::sensor::xsens::{MtData2, Mti, XsensError};
+use gyronet_tools::drive::wheel_frames;
 use std::borrow::Borrow;
 
 pub const fn id11(raw: u16) -> Id {
@@ -15,18 +16,26 @@ pub const fn id29(raw: u32) -> Id {
     Id::Extended(ExtendedId::new(raw).expect("29 bits"))
 }
 
+/// An identifier of 11 bits; [`u16::MAX`] for one of 29.
+pub fn raw(frame: &DataFrame) -> u16 {
+    match frame.id() {
+        Id::Standard(id) => id.as_raw(),
+        Id::Extended(_) => u16::MAX,
+    }
+}
+
 pub fn data_frame(id: Id, data: &[u8]) -> DataFrame {
     DataFrame::new(id, data).expect("at most eight bytes")
 }
 
-/// Parses bytes that are written in hexadecimal, with or without spaces between them.
+/// Bytes in hexadecimal, with or without spaces between them.
 pub fn bytes(hex: &str) -> Vec<u8> {
     let digits: String = hex.split_whitespace().collect();
     let byte = |at| u8::from_str_radix(&digits[at..at + 2], 16).expect("hex");
     (0..digits.len()).step_by(2).map(byte).collect()
 }
 
-/// Returns a frame of a real MTi with 98 bytes of payload.
+/// A frame of a real MTi with 98 bytes of payload.
 pub fn real_frame() -> Vec<u8> {
     bytes(
         "fa ff 36 62 10 20 02 a9 86 10 60 04 03 14 ed 53 10 10 0c 07 44 0b e0 07 e3 01 14 0d 2f 18 37 e0 20 04 01 \
@@ -35,7 +44,7 @@ pub fn real_frame() -> Vec<u8> {
     )
 }
 
-/// Returns a made-up frame: az 9.81 m/s^2, gz 10 deg/s, counter 1, time 100, status 3.
+/// A made-up frame: az 9.81 m/s^2, gz 10 deg/s, counter 1, time 100, status 3.
 pub fn synthetic_frame() -> Vec<u8> {
     bytes(
         "fa ff 36 31 10 20 02 00 01 10 60 04 00 00 00 64 40 20 0c 00 00 00 00 00 00 00 00 41 1c f5 c3 80 20 0c 00 \
@@ -43,7 +52,7 @@ pub fn synthetic_frame() -> Vec<u8> {
     )
 }
 
-/// Returns a message whose readings differ with its time (10 kHz).
+/// A message whose readings differ with its time (10 kHz).
 pub fn message(time: u32) -> MtData2 {
     MtData2 {
         packet_counter: Some(time as u16),
@@ -55,7 +64,7 @@ pub fn message(time: u32) -> MtData2 {
     }
 }
 
-/// Returns what a part's driver delivers for these bytes.
+/// What a part's driver delivers for these bytes.
 pub fn feed<P: ByteSource>(
     part: &mut P,
     bytes: impl IntoIterator<Item = impl Borrow<u8>>,
@@ -68,7 +77,11 @@ pub fn feed<P: ByteSource>(
     samples
 }
 
-/// Returns the samples that a new driver delivers for these bytes.
 pub fn feed_new(bytes: impl IntoIterator<Item = u8>) -> Vec<Result<ImuSample, XsensError>> {
     feed(&mut Mti::new(), bytes)
+}
+
+/// The frame of wheels that all turn at this speed, km/h.
+pub fn wheels(speed: f64) -> DataFrame {
+    wheel_frames::frame([Some(speed); 4]).expect("a frame")
 }

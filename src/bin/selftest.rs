@@ -15,17 +15,15 @@ mod support;
 #[cfg(target_os = "none")]
 mod firmware {
     use crate::random_records;
-    use crate::support::Numbers;
+    use crate::support::{Numbers, hashes};
     use core::cell::RefCell;
     use cortex_m::interrupt::Mutex;
     use cortex_m_semihosting::{debug, hprintln};
-    use gyronet::model::fognet::{FogNetState, MinuteNetwork};
+    use gyronet::model::fognet::FogNetState;
     use gyronet::model::gyronet::LargestState;
-    use gyronet::model::seconds::{Minute, STEPS, Second};
-    use gyronet::model::window::{FEATURES, Features, WINDOW};
-    use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
+    use gyronet::model::seconds::Minute;
+    use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, weights};
     use gyronet::nn::lstm::{self, DirectionWeights, Scratch};
-    use gyronet::units::Angle;
     use panic_semihosting as _;
     #[expect(unused_imports, reason = "brings the interrupt vectors to the linker")]
     use stm32f4::stm32f405 as _;
@@ -51,18 +49,18 @@ mod firmware {
         failed += compare::<90, 46>("90 units, 10 inputs", &FOGNET_1.direction(90, 10), 1_024);
         failed += compare::<90, 46>("90 units, 180 inputs", &FOGNET_2.direction(90, 180), 1_024);
         failed += compare::<60, 30>("60 units, 2 inputs, far out", &EXTREME.direction(60, 2), 32_767);
-        match hash() {
-            Some(hash) => hprintln!("gyronet hash={:08x}", hash),
-            None => {
-                hprintln!("FAILED: the weight file is refused");
-                failed += 1;
-            }
-        }
-        match cortex_m::interrupt::free(|cs| fognet_hash(&mut FOG.borrow(cs).borrow_mut())) {
-            Some(hash) => hprintln!("fognet hash={:08x}", hash),
-            None => {
-                hprintln!("FAILED: FoGNet's weight file is refused");
-                failed += 1;
+        let fognet = cortex_m::interrupt::free(|cs| {
+            let (state, minute) = &mut *FOG.borrow(cs).borrow_mut();
+            let blob = FogBlob::new_checked(&weights::FOGNET.0).ok()?;
+            hashes::fognet(&mut FogNet::new(blob, state), minute)
+        });
+        for (network, hash) in [("gyronet", gyronet_hash()), ("fognet", fognet)] {
+            match hash {
+                Some(hash) => hprintln!("{} hash={:08x}", network, hash),
+                None => {
+                    hprintln!("FAILED: the weight file of {} is refused", network);
+                    failed += 1;
+                }
             }
         }
         hprintln!("{}", if failed == 0 { "selftest passed" } else { "selftest FAILED" });
@@ -128,48 +126,10 @@ mod firmware {
         differences
     }
 
-    /// Returns the CRC-32 of the corrections of sixteen random windows.
-    fn hash() -> Option<u32> {
+    fn gyronet_hash() -> Option<u32> {
         // Too large for the stack.
         let state = cortex_m::singleton!(: LargestState = LargestState::ZERO)?;
         let mut network = GyroNet::with_state(Blob::new_checked(&weights::GYRONET.0).ok()?, state).ok()?;
-        let mut numbers = Numbers::new(7);
-        let mut digest = gyronet::model::blob::CRC.digest();
-        for _ in 0..16 {
-            let mut window: [Features; WINDOW] = [[0; FEATURES]; WINDOW];
-            for features in &mut window {
-                for (k, value) in features.iter_mut().enumerate() {
-                    // +-10 m/s^2 and +-0.25 rad/s.
-                    *value = numbers.within(if k < 3 { 10 << 20 } else { 1 << 25 });
-                }
-            }
-            let estimate = network.estimate(&window);
-            for rate in estimate.corrections {
-                digest.update(&rate.0.to_le_bytes());
-            }
-        }
-        Some(digest.finalize())
-    }
-
-    /// Returns the CRC-32 of the estimates of three random windows.
-    fn fognet_hash((state, minute): &mut (FogNetState, Minute)) -> Option<u32> {
-        let mut network = FogNet::new(FogBlob::new_checked(&weights::FOGNET.0).ok()?, state);
-        let mut numbers = Numbers::new(8);
-        let mut digest = gyronet::model::blob::CRC.digest();
-        for _ in 0..3 {
-            for _ in 0..STEPS {
-                // +-10 m/s^2, +-0.25 rad/s, +-160 m/s; +-0.5 rad.
-                let features = core::array::from_fn(|k| {
-                    numbers.within(if (3..=5).contains(&k) { 1 << 25 } else { 10 << 20 })
-                });
-                let turn = Angle(i64::from(numbers.within(1 << 29)) << 14);
-                minute.add(Second { features, turn });
-            }
-            let estimate = network.estimate(&minute.window()?);
-            for angle in [estimate.correction, estimate.linear] {
-                digest.update(&angle.0.to_le_bytes());
-            }
-        }
-        Some(digest.finalize())
+        Some(hashes::gyronet(&mut network))
     }
 }

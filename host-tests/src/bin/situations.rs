@@ -59,7 +59,7 @@ fn main() -> ExitCode {
             outcomes.iter().filter(|one| one.seconds > 0).for_each(|one| outcome.add(one));
             print!("{}", line(situation.name, vehicle.name, &outcome));
             is_broken |= !outcome.broken().is_empty();
-            (good, wrong) = (good + outcome.good, wrong + outcome.wrong);
+            (good, wrong) = (good + outcome.good, wrong + outcome.second.wrong);
         }
     }
     if is_simulated {

@@ -6,15 +6,13 @@ use gyronet_tools::client::bus::Bus;
 use std::io::Result;
 use std::time::Duration;
 
-/// Board time that passes with each poll for frames.
 const TURN: Duration = Duration::from_millis(1);
 
-/// The CAN bus of a board. Receiving takes the frames that the board has sent.
 #[derive(Debug)]
 pub struct CanBus<'a>(pub(super) &'a mut Board);
 
 impl CanBus<'_> {
-    /// Lets a turn pass, and returns all frames that were on the bus.
+    /// As receiving does, with the frames of other nodes.
     pub fn observe(&mut self) -> Vec<Seen> {
         self.0.run(TURN);
         self.0.bus_log()

@@ -6,7 +6,7 @@ use std::time::Duration;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
     pub time: Duration,
-    /// Kind of the event, such as `reset`, `fault`, `lockup`, `flash_erase`, `cut`.
+    /// `reset`, `fault`, `lockup`, `flash_erase`, `cut` and others.
     pub kind: String,
     fields: Value,
 }
@@ -20,12 +20,12 @@ impl Event {
         }
     }
 
-    /// Returns a further field as text: the `cause` of a `reset`. Empty if there is no such field.
+    /// A further field: the `cause` of a `reset`. Empty if there is none.
     pub fn text(&self, name: &str) -> &str {
         self.fields[name].as_str().unwrap_or_default()
     }
 
-    /// Returns a further field as a list of whole numbers: the `sectors` of a `flash_erase`.
+    /// A further field: the `sectors` of a `flash_erase`.
     pub fn numbers(&self, name: &str) -> Vec<u64> {
         self.fields[name].as_array().into_iter().flatten().filter_map(Value::as_u64).collect()
     }
@@ -42,10 +42,6 @@ pub struct Counts {
     pub time: Duration,
     /// Board time during which the core slept.
     pub asleep: Duration,
-    /// True while there is power.
-    pub powered: bool,
-    /// True once the core has locked up after a fault in a fault handler.
-    pub locked_up: bool,
     /// Frames of other nodes that the controller's filters have stopped.
     pub frames_filtered: u64,
     /// Accesses to the flash that [`super::Board::cut_after`] still waits for.
@@ -58,8 +54,6 @@ impl Counts {
             instructions: answer["instructions"].as_u64().expect("the model counts"),
             time: super::duration(&answer["time_us"]),
             asleep: super::duration(&answer["asleep_us"]),
-            powered: answer["powered"] == true,
-            locked_up: answer["locked_up"] == true,
             frames_filtered: answer["can_filtered"].as_u64().expect("the model counts"),
             accesses_left: answer["accesses_left"].as_u64().expect("the model counts") as usize,
         }

@@ -16,7 +16,6 @@ pub struct Link {
 }
 
 impl Link {
-    /// Starts the model of a chip with an image in its flash.
     pub fn open(python: &str, image: &Path, chip: &str) -> Self {
         let mut child = Command::new(python)
             .args(["-m", "virtual_board", "--chip", chip, "--elf"])
@@ -53,7 +52,6 @@ impl Drop for Link {
     }
 }
 
-/// Returns the bytes of hexadecimal digits from the model.
 pub fn unhex(digits: &Value) -> Vec<u8> {
     bytes(digits.as_str().expect("the model gives digits"))
 }

@@ -1,4 +1,4 @@
-//! Parses frames from the vehicle bus: wheel speeds, and our own messages as a receiver parses them.
+//! Frames of the vehicle bus: wheel speeds, and our own messages as a receiver parses them.
 
 use super::{byte, take};
 use crate::wire::{data_frame, id11, id29};
@@ -20,7 +20,7 @@ const PROFILES: [Profile; 4] = [
     Profile::P01(P01 { data_id: 0x123, mode: DataIdMode::Nibble }),
 ];
 
-/// Returns settings for two signed wheel speeds from byte 3 on, with a counter in byte 7's upper half.
+/// Two signed wheel speeds from byte 3 on, with a counter in byte 7's upper half.
 fn two_wheels(checksum: Checksum) -> WheelSettings {
     let field = |start, len, signed| {
         BitField::new(start, len, ByteOrder::Intel, signed).expect("a field inside the frame")

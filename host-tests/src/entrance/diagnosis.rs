@@ -1,18 +1,18 @@
-//! Tests the diagnostic server: any frames, at any times, on a board with or without flash.
+//! The diagnostic server: any frames, at any times, on a board with or without flash.
 
-use super::records::SECTOR;
 use super::{byte, take};
+use crate::flash::{F405, Region, shared};
 use crate::noise::Noise;
-use crate::ram_flash::RamFlash;
-use crate::synthetic::idling;
-use crate::synthetic::judged;
+use crate::stored::{flash_image, image};
+use crate::synthetic::{idling, judged};
 use crate::tester::segment;
 use gyronet::health::{Faults, Status};
 use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::message::{AllCounters, Identity};
 use gyronet::service::{Device, SupportedHardware};
-use gyronet::store::layout::RECORD_SECTOR;
-use gyronet::store::{FlashFault, FogPart, ImuPart, Record as _};
+use gyronet::store::firmware::Label;
+use gyronet::store::layout::STORE;
+use gyronet::store::{FlashFault, FogPart, ImuPart, Record as _, Slot};
 use gyronet::uds::Server;
 
 const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
@@ -23,7 +23,7 @@ const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
     clock_hz: 168_000_000,
 };
 
-type Board = Device<RamFlash<SECTOR>, RamFlash<RECORD_SECTOR>>;
+type Board = Device<Region, Region>;
 
 struct Bench {
     server: Server,
@@ -32,7 +32,6 @@ struct Bench {
 }
 
 impl Bench {
-    /// Polls the server; returns the frames that it sends.
     fn poll(&mut self) -> Vec<[u8; 8]> {
         self.server.poll(&mut self.board, AllCounters::default, self.now, || Some([7; 32]));
         std::iter::from_fn(|| self.server.next_frame(self.now)).collect()
@@ -44,9 +43,15 @@ impl Bench {
 pub fn frames(mut data: &[u8]) {
     let choice = byte(&mut data);
     let mut board = Board::new(&SUPPORTED_HARDWARE);
-    let (records, slots) = (RamFlash::new(&[]), (choice & 2 != 0).then(RamFlash::for_weights));
+    let has_slots = choice & 2 != 0;
+    let flash = shared(if has_slots { F405::default() } else { F405::up_to(STORE.end as usize) });
+    let records = (choice & 4 != 0).then(|| Region::new(&flash, STORE));
+    let slots = has_slots.then(|| {
+        flash_image(&flash, Slot::A, &image(&Label::new([1, 0, 0], "a board"), 1));
+        Region::mapped(&flash, Some(Slot::A))
+    });
     let controller = if choice & 8 == 0 { Ok(()) } else { Err(FlashFault::Unlocked) };
-    board.begin((choice & 4 != 0).then_some(records), slots, controller, Identity::UNKNOWN);
+    board.begin(records, slots, controller, Identity::UNKNOWN);
     let mut noise = Noise::new(1);
     for tick in 0..if choice & 1 != 0 { 310 } else { 0 } {
         let sample = idling(tick, 0.001, &mut noise);
@@ -82,7 +87,6 @@ pub fn frames(mut data: &[u8]) {
     bench.board.configuration().check().expect("the configuration in use is valid");
 }
 
-/// Passes a frame to the server, and lets a response continue.
 fn give(bench: &mut Bench, functional: bool, frame: &[u8]) {
     match functional {
         true => bench.server.receive_functional(frame, bench.now),

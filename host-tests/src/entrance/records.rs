@@ -1,29 +1,36 @@
-//! Reads records in flash: configuration, calibration, what was learnt, and the accepted weights.
+//! Records in flash: configuration, calibration, what was learnt, and the accepted weights.
 
 use super::{byte, take};
-use crate::ram_flash::RamFlash;
+use crate::flash::{F405, Flash, shared};
 use crate::sent::Sent;
+use crate::stored::open;
 use crate::synthetic::turning;
-use embedded_storage::nor_flash::ReadNorFlash;
 use gyronet::Coprocessor;
 use gyronet::bias::ThermalBias;
 use gyronet::heading::Gain;
 use gyronet::model::blob::CRC;
 use gyronet::mounting::{Forward, GyroMap, Vertical};
 use gyronet::sample::ImuSample;
-use gyronet::store::{Accepted, Calibration, Configuration, Learned, Record, Store, UnitMap};
+use gyronet::store::layout::{RECORD_SECTOR, STORE};
+use gyronet::store::{Accepted, Calibration, Configuration, Learned, Record, UnitMap};
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
 
-/// Size of a sector, smaller than the part's, so that it is soon full.
-pub const SECTOR: usize = 1024;
-type Flash = RamFlash<SECTOR>;
-
-/// Reads bytes as the content of both sectors or, if the first byte is odd, as records (key, version, length,
-/// content) with valid lengths, headers and checksums. A record that is read must be within its ranges and usable,
-/// and a stored record must be read back.
+/// Reads bytes as the content of both sectors, a half each, or as records (key, version, length, content) with valid
+/// lengths, headers and checksums, once or until the sector is full, as the first byte says. A record that is read must
+/// be within its ranges and usable, and a stored record must be read back.
 pub fn flash(mut data: &[u8]) {
-    let flash = if byte(&mut data) & 1 == 0 { Flash::new(data) } else { Flash::new(&fitting(data)) };
-    let mut store = Store::open(flash, 0).expect("the flash answers");
+    let mut flash = F405::up_to(STORE.end as usize);
+    match byte(&mut data) % 4 {
+        kind @ (1 | 3) => flash.fill(STORE.start, &fitting(data, kind == 3)),
+        _ => {
+            let halves = data.split_at(data.len() / 2);
+            for (place, half) in (STORE.start..).step_by(RECORD_SECTOR).zip([halves.0, halves.1]) {
+                flash.fill(place, &half[..half.len().min(RECORD_SECTOR)]);
+            }
+        }
+    }
+    let flash = shared(flash);
+    let mut store = open(&flash).expect("the flash answers");
     let calibration = store.get::<Calibration>().ok().flatten().unwrap_or_default();
     calibration.check().expect("the store checks what it reads");
     let learned = store.get::<Learned>().ok().flatten().unwrap_or(Learned::NOTHING);
@@ -38,7 +45,6 @@ pub fn flash(mut data: &[u8]) {
     }
 }
 
-/// Runs a few samples through a coprocessor with this configuration.
 fn run(configuration: &Configuration, calibration: &Calibration, learned: &Learned) {
     let weights = calibration.unit.map_or(0, |unit| unit.weights);
     let mut coprocessor = Coprocessor::new(configuration.coprocessor(calibration, learned, weights));
@@ -49,10 +55,11 @@ fn run(configuration: &Configuration, calibration: &Calibration, learned: &Learn
     }
 }
 
-fn fitting(mut data: &[u8]) -> Vec<u8> {
+fn fitting(mut data: &[u8], is_full: bool) -> Vec<u8> {
     let generation = 1_u32;
     let header = CRC.checksum(&(generation ^ u32::from_le_bytes(*b"GYR1")).to_le_bytes());
-    let mut sector = [generation.to_le_bytes(), header.to_le_bytes()].concat();
+    let header = [generation.to_le_bytes(), header.to_le_bytes()].concat();
+    let mut records = Vec::new();
     while !data.is_empty() {
         let (key, version) = (byte(&mut data), byte(&mut data));
         let len = usize::from(byte(&mut data));
@@ -61,9 +68,10 @@ fn fitting(mut data: &[u8]) -> Vec<u8> {
         record.extend(content);
         record.resize(record.len().next_multiple_of(4), 0xFF);
         record.extend(CRC.checksum(&record).to_le_bytes());
-        sector.extend(record);
+        records.extend(record);
     }
-    sector
+    let times = if is_full { (RECORD_SECTOR - header.len()) / records.len().max(1) } else { 1 };
+    [header, records.repeat(times)].concat()
 }
 
 /// Its corpus, as this version of the store writes it.
@@ -79,19 +87,15 @@ pub fn seeds() -> [(&'static str, Vec<u8>); 4] {
         forward: Some(Forward { direction: [0.6, 0.8, 0.0], sigma: 0.05 }),
         gain: Some(Gain { share: 0.008, sigma: 0.001, of: 0 }),
     };
-    // The first sector, as it is in flash.
-    let mut raw = vec![0; 1 + SECTOR];
-    let mut flash = Flash::new(&[]);
-    let mut store = Store::open(&mut flash, 0);
-    if let Ok(store) = &mut store {
-        store.set(&configuration).expect("there is room");
-        store.set(&calibration).and_then(|()| store.set(&learned)).expect("there is room");
-    }
-    drop(store);
-    flash.read(0, &mut raw[1..]).expect("a range inside the flash");
-    while raw.last() == Some(&0xFF) {
-        raw.pop();
-    }
+    let flash = Flash::default();
+    let mut store = open(&flash).expect("the flash answers");
+    store.set(&configuration).expect("there is room");
+    store.set(&calibration).and_then(|()| store.set(&learned)).expect("there is room");
+    let flash = flash.borrow();
+    let sectors =
+        [0, RECORD_SECTOR].map(|sector| &flash.bytes()[STORE.start as usize + sector..][..RECORD_SECTOR]);
+    let used = sectors[0].iter().rposition(|byte| *byte != 0xFF).map_or(0, |last| last + 1);
+    let raw = [&[0], &sectors[0][..used], &sectors[1][..used]].concat();
     let record = |key: u8, version: u8, content: &[u8]| {
         [&[1, key, version, content.len() as u8][..], content].concat()
     };

@@ -1,4 +1,4 @@
-//! Passes bytes to the parsers of the sensors.
+//! The parsers of the sensors.
 
 use crate::gnss::{Pvt, sentence};
 use crate::wire::feed;
@@ -9,23 +9,29 @@ use gyronet::sensor::dsp1760::Dsp1760;
 use gyronet::sensor::dsp1760::message::CRC_32_MPEG_2;
 use gyronet::sensor::dsp1760::message::Message;
 use gyronet::sensor::icm42688::packet::{PACKET, Packet};
-use gyronet::sensor::spi;
 use gyronet::sensor::xsens::{MtData2, Mti, Xbus};
+use gyronet::sensor::{ByteSource, spi};
 use gyronet::units::Micros;
+use std::fmt::Debug;
 
-/// Passes bytes as a stream to the MTi's parser, and as the data of a message.
-pub fn xsens(data: &[u8]) {
-    let samples = feed(&mut Mti::new(), data);
-    // Received several at a time, the same bytes give the same samples.
-    let (mut rest, mut mti, mut again) = (data, Mti::new(), Vec::new());
+/// Passes bytes as a stream: received several at a time, they give the same samples as one by one.
+fn stream<P: ByteSource>(new: fn() -> P, receive_some: fn(&mut P, &[u8]) -> usize, data: &[u8])
+where
+    P::Sample: Debug,
+{
+    let samples = feed(&mut new(), data);
+    let (mut rest, mut part, mut again) = (data, new(), Vec::new());
     while !rest.is_empty() {
-        rest = &rest[mti.receive_some(rest)..];
-        again.extend(core::iter::from_fn(|| mti.next_sample()));
+        rest = &rest[receive_some(&mut part, rest)..];
+        again.extend(core::iter::from_fn(|| part.next_sample()));
     }
     assert_eq!(format!("{again:?}"), format!("{samples:?}"));
+}
+
+pub fn xsens(data: &[u8]) {
+    stream(Mti::new, Mti::receive_some, data);
     if let Ok(message) = MtData2::parse(data) {
-        // A parsed message must be parsed as the same again after it was emitted; bytes are compared, since NaN is
-        // not equal to itself.
+        // Bytes are compared, because NaN is not equal to itself.
         let frame = message.emit();
         let (_, again) = Xbus::parse(&frame).expect("an emitted frame");
         let again = MtData2::parse(again).expect("an emitted message");
@@ -33,21 +39,14 @@ pub fn xsens(data: &[u8]) {
     }
 }
 
-/// Passes bytes as a stream to the parser, as a message, and as a message with a valid checksum.
+/// Passes bytes as a stream, as a message, and as a message with a valid checksum.
 pub fn dsp1760(data: &[u8]) {
-    let samples = feed(&mut Dsp1760::new(), data);
-    let (mut rest, mut part, mut again) = (data, Dsp1760::new(), Vec::new());
-    while !rest.is_empty() {
-        rest = &rest[part.receive_some(rest)..];
-        again.extend(core::iter::from_fn(|| part.next_sample()));
-    }
-    assert_eq!(format!("{again:?}"), format!("{samples:?}"));
+    stream(Dsp1760::new, Dsp1760::receive_some, data);
     let mut frame = data.to_vec();
     frame.extend(CRC_32_MPEG_2.checksum(data).to_be_bytes());
     for frame in [data, &frame] {
         if let Ok(message) = Message::parse(frame) {
             let again = Message::parse(&message.emit()).expect("an emitted message");
-            // They are compared by their bytes, because NaN is not equal to itself.
             assert_eq!(again.emit(), message.emit());
         }
     }

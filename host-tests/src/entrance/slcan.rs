@@ -1,4 +1,4 @@
-//! Tests SLCAN: a host's commands to the board, and the bytes that a host reads from a line.
+//! SLCAN: a host's commands to the board, and the bytes that a host reads from a line.
 
 use embedded_can::{Frame, StandardId};
 use gyronet::can::DataFrame;
@@ -9,7 +9,6 @@ use gyronet_tools::client::bus::{Bus, Line, SlcanBus};
 use std::io::{Read, Result, Write};
 use std::time::Duration;
 
-/// The answers of a board besides frames.
 const ANSWERS: [&[u8]; 3] = [b"", b"V0101", b"NGYRO"];
 
 /// Receives bytes as a host's commands, while frames are sent over a line that accepts a few bytes at a time. The
@@ -48,7 +47,6 @@ pub fn board(data: &[u8]) {
     }
 }
 
-/// A line that ends after these bytes.
 struct Bytes<'a>(&'a [u8]);
 
 impl Read for Bytes<'_> {

@@ -1,4 +1,4 @@
-//! Passes weight files of both networks to the checks of an upload.
+//! Weight files of both networks, by the checks of an upload.
 
 use super::{byte, take};
 use crate::models;
@@ -7,14 +7,13 @@ use gyronet::model::fognet_blob::FogBlob;
 use gyronet::model::window::{FEATURES, WINDOW};
 use gyronet::model::{GyroNet, WindowNetwork, weights};
 
-/// Copies bytes to a word boundary.
 fn aligned(bytes: &[u8]) -> Vec<u32> {
     let mut words = vec![0; bytes.len().div_ceil(4)];
     bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
     words
 }
 
-/// Returns `file` with patches from the data (three bytes of offset, one of length up to 15, then content) and a
+/// `file` with patches from the data (three bytes of offset, one of length up to 15, then content) and a
 /// valid checksum; `None` if the data are a file themselves.
 fn patched(mut data: &[u8], file: &[u8]) -> Option<Vec<u32>> {
     if byte(&mut data) & 1 == 0 {
@@ -39,41 +38,37 @@ fn patched(mut data: &[u8], file: &[u8]) -> Option<Vec<u32>> {
 const SMALL: Shape = Shape { units: 8, linear: true };
 static SMALL_FILE: [u8; SMALL.file_len(0)] = models::file(SMALL, 5);
 
-/// Reads bytes as a file, or as patches to the built-in file or to a small one, as the first byte says. An accepted
-/// model must run at the limits of its inputs without an overflow (which panics in the builds of these checks).
+/// Reads bytes as a file, which must be refused, or as patches to `file`, as the first byte says.
+fn read(data: &[u8], file: &[u8], accepts: impl FnOnce(&[u8]) -> bool) {
+    if let Some(words) = patched(data, file) {
+        accepts(&bytemuck::cast_slice(&words)[..file.len()]);
+    } else {
+        let content = &data[data.len().min(1)..];
+        assert!(!accepts(&bytemuck::cast_slice(&aligned(content))[..content.len()]));
+    }
+}
+
+/// Patches are to the built-in file or to a small one. An accepted model must run at the limits of its inputs without an
+/// overflow (which panics in the builds of these checks).
 pub fn gyronet(data: &[u8]) {
     let file: &[u8] = match data {
         [first, ..] if first & 2 > 0 => &SMALL_FILE,
         _ => &weights::GYRONET.0,
     };
-    match patched(data, file) {
-        None => {
-            let content = &data[data.len().min(1)..];
-            assert!(Blob::new_checked(&bytemuck::cast_slice(&aligned(content))[..content.len()]).is_err());
-        }
-        Some(words) => {
-            if let Ok(blob) = Blob::new_checked(&bytemuck::cast_slice(&words)[..file.len()]) {
-                let mut network = GyroNet::new(blob);
-                let estimate = network.estimate(&[[i32::MAX; FEATURES]; WINDOW]);
-                assert!(usize::from(estimate.clamped_inputs) <= WINDOW * FEATURES);
-            }
-        }
-    }
+    read(data, file, |file| {
+        let Ok(blob) = Blob::new_checked(file) else { return false };
+        let estimate = GyroNet::new(blob).estimate(&[[i32::MAX; FEATURES]; WINDOW]);
+        assert!(usize::from(estimate.clamped_inputs) <= WINDOW * FEATURES);
+        true
+    });
 }
 
-/// Reads bytes as [`gyronet`] does, for FoGNet; its kernels are the same.
+/// The kernels are those of [`gyronet`].
 pub fn fognet(data: &[u8]) {
-    let file = &weights::FOGNET.0;
-    match patched(data, file) {
-        None => {
-            let content = &data[data.len().min(1)..];
-            assert!(FogBlob::new_checked(&bytemuck::cast_slice(&aligned(content))[..content.len()]).is_err());
-        }
-        Some(words) => {
-            if let Ok(blob) = FogBlob::new_checked(&bytemuck::cast_slice(&words)[..file.len()]) {
-                assert!(blob.input_clamp > 0);
-                let _ = (blob.spread(i32::MIN), blob.spread(i32::MAX), blob.mean_gain());
-            }
-        }
-    }
+    read(data, &weights::FOGNET.0, |file| {
+        let Ok(blob) = FogBlob::new_checked(file) else { return false };
+        assert!(blob.input_clamp > 0);
+        let _ = (blob.spread(i32::MIN), blob.spread(i32::MAX), blob.mean_gain());
+        true
+    });
 }

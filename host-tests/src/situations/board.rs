@@ -1,12 +1,11 @@
 //! The board on the host: bytes of the sensor and wheel frames in, frames out, a millisecond at a time.
 
-use super::parts::icm42688::NoDelay;
-use super::parts::{Part, icm42688};
+use super::icm42688::{self, NoDelay};
 use super::sensor::LATITUDE;
-use crate::ram_flash::RamFlash;
-use embedded_can::Frame;
+use super::vehicle::Part;
+use crate::flash::Region;
 use gyronet::can::DataFrame;
-use gyronet::can::config::{Config as CanConfig, Settings, StatusSettings};
+use gyronet::can::config::{Config as CanConfig, Settings, StatusSettings, YawSettings};
 use gyronet::can::status::STATUS_ID;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::coprocessor::{Bus, Config, Coprocessor, Sink, TimedFrame};
@@ -26,7 +25,6 @@ const HARDWARE: SupportedHardware =
 /// The board fetches at most this many packets from a FIFO at once.
 const MAX_FETCHED: usize = 32;
 
-/// The board's end of the sensor's line.
 enum Line {
     Mti(Box<Mti>),
     Fifo(Box<Icm42688<icm42688::Bus>>, icm42688::Bus),
@@ -71,7 +69,7 @@ impl Bus for Wire {
 
 pub struct Board {
     coprocessor: Box<Coprocessor>,
-    device: Box<Device<RamFlash<16384>, RamFlash<16384>>>,
+    device: Box<Device<Region, Region>>,
     network: GyroNet<'static>,
     line: Line,
     fibre_optic: Dsp1760,
@@ -80,9 +78,8 @@ pub struct Board {
 }
 
 impl Board {
-    /// Starts a board that has learnt this in earlier drives.
     pub fn new(part: Part, has_wheels: bool, period_ms: u16, learned: &Learned) -> Self {
-        let yaw = Settings::DEFAULT.yaw.map(|yaw| gyronet::can::config::YawSettings { period_ms, ..yaw });
+        let yaw = Settings::DEFAULT.yaw.map(|yaw| YawSettings { period_ms, ..yaw });
         let status = Some(StatusSettings { id: STATUS_ID });
         let can = CanConfig::new(Settings { bosch: None, yaw, status, ..Settings::DEFAULT });
         let fog = (part == Part::Dsp1760).then_some(FogPart::Dsp1760);
@@ -118,7 +115,6 @@ impl Board {
         *self.device.learned()
     }
 
-    /// Bytes of the sensor's line arrive.
     pub fn receive(&mut self, bytes: &[u8]) {
         let waiting = &mut self.waiting.0;
         match &mut self.line {
@@ -153,7 +149,6 @@ impl Board {
         self.wire.received.push_back(frame);
     }
 
-    /// Does what is due, and returns the frames that were sent.
     pub fn step(&mut self, now: Micros) -> Vec<DataFrame> {
         let Self { coprocessor, device, network, waiting, wire, .. } = self;
         if let Some(seen) = coprocessor.step(now, waiting, wire, Some(network)).observation {
@@ -163,13 +158,5 @@ impl Board {
             }
         }
         std::mem::take(&mut wire.sent)
-    }
-}
-
-/// Returns the identifier of a frame with 11 bits.
-pub fn id(frame: &DataFrame) -> u16 {
-    match frame.id() {
-        embedded_can::Id::Standard(id) => id.as_raw(),
-        embedded_can::Id::Extended(_) => u16::MAX,
     }
 }

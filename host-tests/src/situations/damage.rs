@@ -37,13 +37,8 @@ pub fn damaged(messages: Vec<Message>, damage: &[During<Damage>], random: &mut R
                 }
                 Damage::Burst(share, longest) if random.chance(share) => {
                     let from = random.below(bytes);
-                    let length = 1 + random.below(longest);
-                    message
-                        .bytes
-                        .iter_mut()
-                        .skip(from)
-                        .take(length)
-                        .for_each(|byte| *byte = random.bits() as u8);
+                    let to = bytes.min(from + 1 + random.below(longest));
+                    message.bytes[from..to].fill_with(|| random.bits() as u8);
                 }
                 Damage::Truncation(share) if random.chance(share) => {
                     message.bytes.truncate(random.below(bytes))

@@ -63,21 +63,34 @@ impl Share {
     }
 }
 
-/// The worst error of a kind, over what was allowed.
+/// The errors of a kind: how many are more than was allowed, and the worst one, over what was.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Worst {
+pub struct Errors {
+    pub wrong: usize,
     pub ratio: f64,
     /// Its time, s; the error, rad.
-    pub at: f64,
-    pub error: f64,
+    at: f64,
+    error: f64,
 }
 
-impl Worst {
+impl Errors {
     fn add(&mut self, at: f64, error: f64, allowed: f64) {
-        let ratio = error.abs() / allowed;
-        if ratio > self.ratio {
-            *self = Self { ratio, at, error };
-        }
+        self.join(Self {
+            wrong: usize::from(error.abs() > allowed),
+            ratio: error.abs() / allowed,
+            at,
+            error,
+        });
+    }
+
+    fn join(&mut self, other: Self) {
+        let wrong = self.wrong + other.wrong;
+        *self = Self { wrong, ..if other.ratio > self.ratio { other } else { *self } };
+    }
+
+    /// The worst one in sigma and deg, and its time, s.
+    fn worst(self) -> (f64, f64, f64) {
+        (SIGMAS * self.ratio, self.error.to_degrees(), self.at)
     }
 }
 
@@ -88,16 +101,12 @@ pub struct Outcome {
     pub good: usize,
     /// Least share of them that must be good.
     pub least: f64,
-    /// Good seconds inside one expected error, straight on and in turns, and those off by more than four.
+    /// Good seconds inside one expected error, straight on and in turns.
     pub inside: [Share; 2],
-    pub wrong: usize,
-    pub second: Worst,
-    /// Spans off by more than is allowed.
-    pub wrong_spans: usize,
-    pub span: Worst,
-    /// Minutes off by more than four times their doubt.
-    pub wrong_minutes: usize,
-    pub minute: Worst,
+    /// Of good seconds, spans, and minutes.
+    pub second: Errors,
+    pub span: Errors,
+    pub minute: Errors,
     /// Time for which a moving vehicle was said to stand, s.
     pub stood: f64,
     /// The last seconds are not good, and nothing says why.
@@ -114,15 +123,9 @@ impl Outcome {
             share.inside += other.inside;
             share.all += other.all;
         }
-        self.wrong += other.wrong;
-        self.wrong_spans += other.wrong_spans;
-        self.wrong_minutes += other.wrong_minutes;
-        let worst = [&mut self.second, &mut self.span, &mut self.minute];
-        for (worst, other) in worst.into_iter().zip([other.second, other.span, other.minute]) {
-            if other.ratio > worst.ratio {
-                *worst = other;
-            }
-        }
+        self.second.join(other.second);
+        self.span.join(other.span);
+        self.minute.join(other.minute);
         self.stood = self.stood.max(other.stood);
         self.is_mute |= other.is_mute;
     }
@@ -130,20 +133,18 @@ impl Outcome {
     /// The broken promises, each with a letter and in words.
     pub fn broken(&self) -> Vec<(char, String)> {
         let mut broken = Vec::new();
-        let worst = |Worst { ratio, at, error }: Worst| (SIGMAS * ratio, error.to_degrees(), at);
-        if self.wrong > self.good / CHANCE {
-            let (wrong, (sigma, error, at)) = (self.wrong, worst(self.second));
-            broken.push((
-                's',
-                format!("{wrong} good seconds off, {sigma:.1} sigma ({error:.2} deg) at {at:.0} s"),
-            ));
+        let wrong = self.second.wrong;
+        if wrong > self.good / CHANCE {
+            let (sigma, error, at) = self.second.worst();
+            let text = format!("{wrong} good seconds off, {sigma:.1} sigma ({error:.2} deg) at {at:.0} s");
+            broken.push(('s', text));
         }
-        if self.wrong_spans > 0 {
-            let (sigma, error, at) = worst(self.span);
+        if self.span.wrong > 0 {
+            let (sigma, error, at) = self.span.worst();
             broken.push(('y', format!("yaw off by {error:.2} deg, {sigma:.1} sigma, from {at:.0} s")));
         }
-        if self.wrong_minutes > 0 {
-            let (sigma, error, at) = worst(self.minute);
+        if self.minute.wrong > 0 {
+            let (sigma, error, at) = self.minute.worst();
             let text = format!("a minute off by {error:.2} deg, {sigma:.1} of its doubt, at {at:.0} s");
             broken.push(('d', text));
         }
@@ -189,7 +190,6 @@ pub fn judge(received: &Receiver, truth: &Travelled, end: f64, reference: &Refer
             // The expected error of a sample is that of the second that ends with it.
             let inside = sets[to].sigma.unwrap_or(sigma) + (allowed / SIGMAS - sigma);
             outcome.inside[usize::from(turns)].add(off.abs() <= inside);
-            outcome.wrong += usize::from(off.abs() > allowed);
         }
         for length in SPANS {
             let to = sets.partition_point(|later| later.sampled < set.sampled + length);
@@ -201,7 +201,6 @@ pub fn judge(received: &Receiver, truth: &Travelled, end: f64, reference: &Refer
             let allowed = SIGMAS * sum_of_seconds(&sets[from..=to]) + slack(set, end);
             let off = errors[to] - errors[from];
             outcome.span.add(set.sampled, off, allowed);
-            outcome.wrong_spans += usize::from(off.abs() > allowed);
         }
     }
     for slow in &received.slow {
@@ -216,11 +215,10 @@ pub fn judge(received: &Receiver, truth: &Travelled, end: f64, reference: &Refer
         let allowed = SIGMAS * doubt + slack(&sets[from], &sets[to - 1]);
         let off = errors[to - 1] - errors[from];
         outcome.minute.add(slow.at, off, allowed);
-        outcome.wrong_minutes += usize::from(off.abs() > allowed);
     }
     // Four looks a second.
     outcome.good /= 4;
-    outcome.wrong = outcome.wrong.div_ceil(4);
+    outcome.second.wrong = outcome.second.wrong.div_ceil(4);
     for pair in received.slow.windows(2).filter(|pair| pair[0].stands && pair[1].stands) {
         let moving = truth.speed(pair[0].at).abs().min(truth.speed(pair[1].at).abs()) > MOVES;
         outcome.stood += if moving { pair[1].at - pair[0].at } else { 0.0 };

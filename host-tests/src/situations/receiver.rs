@@ -1,7 +1,7 @@
 //! A receiver of the board's yaw messages and of its slow status, written from the page of the bus (src/can/README.md)
 //! without the library's decoders.
 
-use super::board::id;
+use crate::wire::raw;
 use embedded_can::Frame;
 use gyronet::can::DataFrame;
 
@@ -56,20 +56,18 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// A receiver of the messages from this identifier on.
     pub const fn new(first: u16) -> Self {
         Self { first, rate: None, angle: None, newest: None, sets: Vec::new(), slow: Vec::new() }
     }
 
-    /// Takes a frame that arrived at this time, s.
     pub fn take(&mut self, frame: &DataFrame, at: f64) {
         let Ok(data) = <[u8; 8]>::try_from(frame.data()) else { return };
         let counter = data[2];
         let word = i32::from_le_bytes([data[3], data[4], data[5], data[6]]);
-        if id(frame) == STATUS {
+        if raw(frame) == STATUS {
             return self.status(u64::from_le_bytes(data) >> 24, at);
         }
-        match id(frame).wrapping_sub(self.first) {
+        match raw(frame).wrapping_sub(self.first) {
             0 => self.rate = Some((counter, data[7] >> 3 & 3)),
             1 => self.angle = Some((counter, word, data[7])),
             2 => {

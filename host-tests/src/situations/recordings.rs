@@ -2,10 +2,10 @@
 
 use super::board::Board;
 use super::judge::{Outcome, Reference, judge};
-use super::parts::Part;
 use super::receiver::{INERTIAL, Receiver};
 use super::ride::{STEP, Travelled};
 use super::sensor::mti;
+use super::vehicle::Part;
 use gyronet::store::Learned;
 use gyronet::units::Micros;
 use gyronet_tools::drive::recording::Recording;

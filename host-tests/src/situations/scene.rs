@@ -3,11 +3,10 @@
 use super::board::Board;
 use super::damage::{Damage, damaged};
 use super::judge::{EXACT, Outcome, judge};
-use super::parts::Part;
 use super::receiver::{FIBRE_OPTIC, INERTIAL, Receiver};
 use super::ride::{Ride, STEP};
 use super::sensor::{During, Fault, Message, Sensor};
-use super::vehicle::Vehicle;
+use super::vehicle::{Part, Vehicle};
 use super::wheels::{WheelFault, frames};
 use gyronet::store::Learned;
 use gyronet::units::Micros;
@@ -64,7 +63,6 @@ impl Scene {
         self.town(blocks);
     }
 
-    /// Rides through so many blocks of a town.
     pub fn town(&mut self, blocks: usize) {
         self.ride.town(blocks, &mut self.random);
     }
@@ -74,30 +72,29 @@ impl Scene {
         self.fibre_optic.as_mut().unwrap_or(&mut self.sensor)
     }
 
-    /// The sensor has a fault from the ride's end so far, for this time.
+    /// Something that begins at the ride's end so far.
+    fn lasting<T>(&self, seconds: f64, what: T) -> During<T> {
+        let from = self.ride.end();
+        During { from, to: from + seconds, what }
+    }
+
     pub fn sensor_fault(&mut self, seconds: f64, what: Fault) {
-        let from = self.ride.end();
-        self.measures().faults.push(During { from, to: from + seconds, what });
+        let fault = self.lasting(seconds, what);
+        self.measures().faults.push(fault);
     }
 
-    /// The wheels' frames have a fault from the ride's end so far, for this time.
     pub fn wheel_fault(&mut self, seconds: f64, what: WheelFault) {
-        let from = self.ride.end();
-        self.wheels.push(During { from, to: from + seconds, what });
+        self.wheels.push(self.lasting(seconds, what));
     }
 
-    /// The sensor's line damages messages from the ride's end so far, for this time.
     pub fn line_fault(&mut self, seconds: f64, what: Damage) {
-        let from = self.ride.end();
-        self.damage.push(During { from, to: from + seconds, what });
+        self.damage.push(self.lasting(seconds, what));
     }
 
-    /// The board starts again now.
     pub fn restart(&mut self) {
         self.restarts.push(self.ride.end());
     }
 
-    /// Rides, and judges what the bus says.
     pub fn run(&self) -> Outcome {
         let random = |stream| Random::new(self.seed, stream);
         let travelled = self.ride.travel(&self.vehicle, &mut random(2));

@@ -1,8 +1,8 @@
 //! An inertial sensor on the vehicle: its errors, its clock, its faults, and the bytes that it sends.
 
-use super::parts::{Part, icm42688};
+use super::icm42688;
 use super::ride::Travelled;
-use super::vehicle::Vehicle;
+use super::vehicle::{Part, Vehicle};
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::sensor::dsp1760::message::{self as dsp1760, Extra};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};

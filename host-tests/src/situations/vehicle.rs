@@ -1,6 +1,5 @@
 //! Vehicles and their sensors: how they shake, what the part's errors are, what the wheels report.
 
-use super::parts::Part;
 use super::ride::STEP;
 use gyronet_tools::random::Random;
 use std::f64::consts::{PI, TAU};
@@ -9,6 +8,14 @@ use std::f64::consts::{PI, TAU};
 const ROAD_SPEED: f64 = 10.0;
 /// Width of a vibration's band over its frequency.
 const BANDWIDTH: f64 = 0.15;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    Xsens,
+    /// KVH DSP-1760, beside an MTi.
+    Dsp1760,
+    Icm42688,
+}
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vehicle {

@@ -1,25 +1,20 @@
 //! Who may write, on the image as flashed: keys, signatures, and challenges of the chip's random numbers.
 
-use crate::common::{self, START, id};
+use crate::common::{self, START};
 use crate::service::{self, on_bus};
-use embedded_can::Frame;
 use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
 use gyronet_tools::client::device::Authority;
 use gyronet_tools::client::device::error::DeviceError;
 use gyronet_tools::signing::PrivateKey;
+use serde_json::json;
 use std::time::Duration;
 
 fn locked() -> Option<(Board, PrivateKey)> {
-    let mut board = common::boot()?;
-    board.run(START);
+    let mut board = common::started()?;
     assert_eq!(on_bus(&mut board).access().expect("a response").state, "open");
     let key = service::lock(&mut board);
     Some((board, key))
-}
-
-fn again(key: &PrivateKey) -> Authority {
-    Authority::Key(key.clone())
 }
 
 fn challenge(board: &mut Board) -> Result<Vec<u8>, DeviceError> {
@@ -31,12 +26,10 @@ fn challenge(board: &mut Board) -> Result<Vec<u8>, DeviceError> {
 /// A board that has a key gives no challenge while its random numbers fail, in each of three ways.
 pub fn fail_with_the_generator(board: &mut Board) {
     for (setting, value, good) in [
-        ("RNG.seed_error", true.into(), false.into()),
-        ("RNG.clock_error", true.into(), false.into()),
-        ("RNG.stuck", 0x55.into(), serde_json::Value::Null),
+        ("RNG.seed_error", json!(true), json!(false)),
+        ("RNG.clock_error", json!(true), json!(false)),
+        ("RNG.stuck", json!(0x55), json!(null)),
     ] {
-        let value: serde_json::Value = value;
-        let good: serde_json::Value = good;
         board.configure(setting, value);
         match challenge(board) {
             Err(DeviceError::Negative { service: 0x27, code }) => assert_eq!(code.0, 0x22, "{setting}"),
@@ -64,7 +57,7 @@ fn challenges_never_repeat_and_fail_with_the_generator() {
     }
     fail_with_the_generator(&mut board);
     let mut device = on_bus(&mut board);
-    device.authorise(again(&key));
+    device.authorise(Authority::Key(key.clone()));
     device.restart().expect("access is proven");
 }
 
@@ -77,7 +70,7 @@ fn a_signature_is_checked_while_the_rates_go_out() {
     common::send(&mut board, &common::drive(700), now);
     board.run(Duration::from_secs(4));
     let mut device = on_bus(&mut board);
-    device.authorise(again(&key));
+    device.authorise(Authority::Key(key.clone()));
     device.set_configuration(&configuration).expect("the records' sector is erased here");
     // The next tester is on another line.
     service::enter(&mut board, 1);
@@ -85,13 +78,11 @@ fn a_signature_is_checked_while_the_rates_go_out() {
     let begin = board.counts().time;
     let _ = board.can_frames();
     let mut device = service::on_line(&mut board);
-    device.authorise(again(&key));
+    device.authorise(Authority::Key(key.clone()));
     device.set_configuration(&configuration).expect("it is signed");
     let took = board.counts().time - begin;
-    let frames = board.can_frames().into_iter();
-    let rates: Vec<Duration> =
-        frames.filter(|(_, frame)| frame.id() == id(0x1A0)).map(|(time, _)| time).collect();
-    let gap = rates.windows(2).map(|pair| pair[1] - pair[0]).max().expect("rates");
+    let rates = common::rates(&board.can_frames());
+    let gap = rates.windows(2).map(|pair| pair[1].0 - pair[0].0).max().expect("rates");
     println!("two signatures are checked and stored in {took:?}; longest gap between rates {gap:?}");
     assert!(took < Duration::from_secs(1), "{took:?}");
     assert!(gap < Duration::from_millis(15), "{gap:?}");

@@ -18,7 +18,7 @@ use gyronet::store::{Configuration, Record, Slot, StoreError};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::stored::{Stored, other_weights};
-use gyronet_host_tests::{inputs, replay, settings};
+use gyronet_host_tests::{replay, settings};
 use gyronet_tools::bundled;
 use gyronet_tools::client::bus::SlcanBus;
 use gyronet_tools::client::device::error::DeviceError;
@@ -41,14 +41,11 @@ fn iwdg(board: &mut Board) -> usize {
     common::resets(board).iter().filter(|(_, cause)| cause == "iwdg").count()
 }
 
-/// Lets the board run with its sensor and standing wheels.
 fn drive(board: &mut Board, seconds: usize) {
     for samples in common::drive(100 * seconds).chunks(100) {
         let now = board.counts().time;
-        for (k, sample) in samples.iter().enumerate() {
-            board.send_at(IMU, sample, now + SAMPLE * k as u32);
-            board.can_send_at(&inputs::wheels(0.0), now + SAMPLE * k as u32);
-        }
+        common::send(board, samples, now);
+        common::stop_wheels(board, 100, now);
         board.run(SECOND);
         board.can_frames();
     }

@@ -1,8 +1,7 @@
 //! The clock on the virtual board: a crystal that is missing, wrong, or stops.
 
-use crate::common::{
-    self, SAMPLE, SECOND, SET, SLCAN, START, boot, drive, frames, host, info, resets, unpowered,
-};
+use crate::common::{self, SAMPLE, SECOND, SET, SLCAN, START, boot, drive, frames, host, resets, unpowered};
+use crate::service;
 use gyronet::service::crash::CrashKind;
 use gyronet::service::event::{CanFault, ClockFault, ResetCause};
 use gyronet_host_tests::board::Board;
@@ -31,7 +30,7 @@ fn no_crystal_and_then_one() {
     let lines = board.sent(SLCAN).split(|byte| *byte == b'\r').filter(|line| line.starts_with(b"t")).count();
     assert!(lines >= 99 * SET, "{lines} SLCAN lines at 500000 baud");
     assert_eq!(board.can_frames().len(), 0, "16 MHz is not exact enough for CAN");
-    let identity = info(&mut board).identity;
+    let identity = service::info(&mut board).identity;
     assert_eq!((identity.clock_hz, identity.clock_fault), (16_000_000, Some(ClockFault::NoCrystal)));
     assert_eq!(identity.can_fault, Some(CanFault::Clock));
     // The board finds it by itself.
@@ -39,7 +38,7 @@ fn no_crystal_and_then_one() {
     board.configure("USART2.baud", 921_600);
     board.run(3 * SECOND);
     assert_eq!(resets(&mut board).iter().filter(|(_, cause)| cause == "software").count(), 1);
-    let identity = info(&mut board).identity;
+    let identity = service::info(&mut board).identity;
     assert_eq!((identity.clock_hz, identity.clock_fault, identity.can_fault), (168_000_000, None, None));
 }
 
@@ -67,7 +66,7 @@ fn crystal_of_another_frequency() {
         let Some(mut board) = with_crystal(hz.into()) else { return };
         board.run(SLOW_START + SECOND);
         assert_eq!(board.can_frames().len(), 0, "{hz} Hz: no frame at a wrong bit rate");
-        let identity = info(&mut board).identity;
+        let identity = service::info(&mut board).identity;
         let Some(ClockFault::CrystalFrequency { khz: measured }) = identity.clock_fault else {
             panic!("{hz} Hz: {:?}", identity.clock_fault)
         };
@@ -84,7 +83,7 @@ fn internal_oscillator_at_the_ends_of_its_tolerance() {
         board.configure("RCC.hsi_error_percent", percent);
         board.power_on();
         board.run(START);
-        assert_eq!(info(&mut board).identity.clock_fault, None, "{percent} %");
+        assert_eq!(service::info(&mut board).identity.clock_fault, None, "{percent} %");
     }
 }
 
@@ -99,7 +98,7 @@ fn crystal_that_stops() {
     board.configure("RCC.crystal_stop", true);
     board.run(SLOW_START);
     assert_eq!(board.can_frames().len(), 0, "no frame at a wrong bit rate");
-    let identity = info(&mut board).identity;
+    let identity = service::info(&mut board).identity;
     assert_eq!(identity.crash.map(|crash| (crash.kind, crash.count)), Some((CrashKind::CrystalStopped, 1)));
     assert_eq!((identity.reset, identity.clock_fault), (ResetCause::Software, Some(ClockFault::NoCrystal)));
 }
@@ -118,7 +117,7 @@ fn bootloader_that_leaves_the_pll_on() {
     let now = board.run(Duration::ZERO);
     common::send(&mut board, &samples, now);
     board.run(SAMPLE * 20);
-    let identity = info(&mut board).identity;
+    let identity = service::info(&mut board).identity;
     assert_eq!((identity.clock_hz, identity.clock_fault, identity.can_fault), (168_000_000, None, None));
     assert!(board.can_frames().len() >= 19 * SET);
     assert_eq!(resets(&mut board).len(), 1, "power-on alone");

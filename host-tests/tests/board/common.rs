@@ -1,15 +1,16 @@
 //! The board of these tests: an MTi on USART1, SLCAN on USART2 at 921600, the service line on USART6, CAN.
 
 use crate::service;
-use embedded_can::{Frame, Id};
-use gyronet::can::yaw::AngleMessage;
-use gyronet::can::{DataFrame, slcan};
+use embedded_can::Frame;
+use gyronet::can::DataFrame;
+use gyronet::can::yaw::{AngleMessage, RateMessage};
 use gyronet::health::Faults;
-use gyronet::service::message::{AllCounters, Info};
-use gyronet_host_tests::board::{self, Board};
+use gyronet::service::message::AllCounters;
+use gyronet_host_tests::board::{self, Board, Event};
 use gyronet_host_tests::recordings::workspace;
-pub use gyronet_host_tests::wire::id11 as id;
-use gyronet_host_tests::{inputs, replay, require};
+use gyronet_host_tests::wire::wheels;
+pub use gyronet_host_tests::wire::{id11 as id, raw};
+use gyronet_host_tests::{replay, require};
 use gyronet_tools::bundled;
 use std::io::Write;
 use std::path::PathBuf;
@@ -33,7 +34,6 @@ pub fn elf() -> Option<PathBuf> {
     board::firmware("netduino-plus-2", env!("CARGO_TARGET_TMPDIR"), "coprocessor")
 }
 
-/// A board with the image in its flash and without power.
 pub fn unpowered() -> Option<Board> {
     let mut board = Board::unpowered(&elf()?)?;
     board.configure("USART2.baud", 921_600);
@@ -41,14 +41,12 @@ pub fn unpowered() -> Option<Board> {
     Some(board)
 }
 
-/// A board that has just been switched on.
 pub fn boot() -> Option<Board> {
     let mut board = unpowered()?;
     board.power_on();
     Some(board)
 }
 
-/// A board that listens to all lines.
 pub fn started() -> Option<Board> {
     let mut board = boot()?;
     board.run(START);
@@ -80,39 +78,39 @@ pub fn send(board: &mut Board, samples: &[Vec<u8>], from: Duration) {
 }
 
 pub fn host(samples: &[Vec<u8>]) -> Vec<DataFrame> {
-    let lines = replay::lines(&samples.concat());
-    lines.iter().map(|line| slcan::parse(line).expect("a frame")).collect()
+    replay::frames(&samples.concat())
+}
+
+/// Messages with the rate of the inertial sensor.
+pub fn rates(timed: &[(Duration, DataFrame)]) -> Vec<(Duration, RateMessage)> {
+    let rates = timed.iter().filter(|(_, frame)| frame.id() == id(0x1A0));
+    rates.map(|(time, frame)| (*time, RateMessage::parse(frame.data()).expect("eight bytes"))).collect()
 }
 
 pub fn frames(timed: &[(Duration, DataFrame)]) -> Vec<DataFrame> {
     timed.iter().map(|(_, frame)| *frame).collect()
 }
 
-/// The identifier of a frame, without those of 29 bits.
-pub fn raw(frame: &DataFrame) -> u16 {
-    match frame.id() {
-        Id::Standard(id) => id.as_raw(),
-        Id::Extended(_) => u16::MAX,
-    }
+pub fn angles(frames: &[DataFrame]) -> impl Iterator<Item = AngleMessage> {
+    let angles = frames.iter().filter(|frame| frame.id() == id(0x1A1));
+    angles.map(|frame| AngleMessage::parse(frame.data()).expect("eight bytes"))
 }
 
-/// Faults of the angle messages.
 pub fn faults(frames: &[DataFrame]) -> Vec<Faults> {
-    let angles = frames.iter().filter(|frame| frame.id() == id(0x1A1));
-    angles.map(|frame| AngleMessage::parse(frame.data()).expect("eight bytes").faults).collect()
+    angles(frames).map(|angle| angle.faults).collect()
 }
 
 /// A vehicle that stands, with its wheels and all that the board computes, from now on.
 pub fn stand(board: &mut Board, samples: u32) {
     let now = board.counts().time;
-    for k in 0..samples {
-        board.send_at(IMU, &replay::turning(k as usize, 0.001), now + SAMPLE * k);
-        board.can_send_at(&inputs::wheels(0.0), now + SAMPLE * k);
-    }
+    let still: Vec<_> = (0..samples as usize).map(|k| replay::turning(k, 0.001)).collect();
+    send(board, &still, now);
+    stop_wheels(board, samples, now);
 }
 
-pub fn info(board: &mut Board) -> Info {
-    service::info(board)
+/// Frames of wheels that stand, one every 10 ms, from a time on.
+pub fn stop_wheels(board: &mut Board, frames: u32, from: Duration) {
+    (0..frames).for_each(|k| board.can_send_at(&wheels(0.0), from + SAMPLE * k));
 }
 
 pub fn counters(board: &mut Board) -> AllCounters {
@@ -147,4 +145,29 @@ pub fn resets(board: &mut Board) -> Vec<(Duration, String)> {
     let events = board.events();
     let resets = events.iter().filter(|event| event.kind == "reset");
     resets.map(|event| (event.time, event.text("cause").to_owned())).collect()
+}
+
+pub fn times(kind: &str, events: &[Event]) -> Vec<Duration> {
+    events.iter().filter(|event| event.kind == kind).map(|event| event.time).collect()
+}
+
+/// The times at which a controller was back that was off the bus six times in 400 ms: each time for twice as long, and for
+/// this many recessive bits at 500 kbit/s.
+pub fn back_at_growing_intervals(events: &[Event], bits: u64, late: Duration) -> Vec<Duration> {
+    let (off, back) = (times("bus_off", events), times("bus_off_ended", events));
+    println!("off at {off:?}, back at {back:?}");
+    // 10 + 20 + 40 + 80 + 160 ms and what it takes to fail again are less than 400 ms; 320 ms end after the fault.
+    assert_eq!((off.len(), back.len()), (6, 6));
+    for (k, (off, back)) in off.iter().zip(&back).enumerate() {
+        let promised = 10 * MS * (1 << k) + Duration::from_micros(2 * bits);
+        assert!((*back - *off).abs_diff(promised) < late, "{:?} for {promised:?}", *back - *off);
+    }
+    back
+}
+
+/// No register was used before its clock had come, and no pin is too slow for its bit rate.
+pub fn assert_well_set(board: &mut Board) {
+    let wrong = |kind: &str| ["early_access", "slow_pin", "ignored_write"].contains(&kind);
+    let wrong: Vec<_> = board.events().into_iter().filter(|event| wrong(&event.kind)).collect();
+    assert_eq!(wrong, []);
 }

@@ -1,7 +1,8 @@
 //! Crashes and hangs on the virtual board: each resets the chip within the watchdog's limit at the latest, and
 //! leaves its reason.
 
-use crate::common::{self, MS, SECOND, START, boot, drive, info, resets};
+use crate::common::{self, MS, SECOND, START, boot, drive, resets};
+use crate::service;
 use gyronet::service::crash::{Crash, CrashKind};
 use gyronet::service::event::ResetCause;
 use gyronet_host_tests::board::{At, Board};
@@ -12,7 +13,7 @@ use std::time::Duration;
 const HANG: &[u8] = &[0xFE, 0xE7];
 
 fn crash_of(board: &mut Board) -> Option<Crash> {
-    let identity = info(board).identity;
+    let identity = service::info(board).identity;
     assert_eq!(identity.clock_fault, None, "the board runs again");
     identity.crash
 }
@@ -60,7 +61,7 @@ fn hang_of_each_task() {
         // The service line answers at its own rate.
         board.configure("USART6.baud", 115_200);
         board.run(START);
-        let identity = info(&mut board).identity;
+        let identity = service::info(&mut board).identity;
         assert_eq!((identity.reset, identity.crash), (ResetCause::Watchdog, None), "{task}");
     }
 }

@@ -3,7 +3,7 @@
 //! | line | traffic |
 //! |---|---|
 //! | USART1 | MTi, 100 messages a second, a simulated drive |
-//! | USART3 | DSP-1760, 1000 messages a second at 921600 |
+//! | USART3 | DSP-1760, 1000 messages a second at 921600, from the drive's reference |
 //! | USART2 | all frames as SLCAN at 921600 |
 //! | CAN | the board's 900 frames a second; wheel frames at 50 Hz, and three identifiers at 50 Hz that the filters stop |
 //! | USART6 | a question every 100 ms |
@@ -16,13 +16,13 @@ use gyronet::can::yaw::FOG_IDS;
 use gyronet::can::{DataFrame, slcan};
 use gyronet::health::InputCounters;
 use gyronet::sample::ImuSample;
+use gyronet::sensor::dsp1760::message::{Extra, Message, Validity};
 use gyronet::service::message::{AllCounters, LineCounters};
 use gyronet::uds::isotp::Transport;
 use gyronet::units::AngularRate;
 use gyronet_host_tests::board::{At, Board};
-use gyronet_host_tests::inputs::Step;
 use gyronet_host_tests::tester::segment;
-use gyronet_host_tests::wire::{data_frame, id11};
+use gyronet_host_tests::wire::{data_frame, id11, wheels};
 use gyronet_host_tests::{replay, synthetic};
 use gyronet_tools::client::device::requests;
 use gyronet_tools::simulate::{self, Simulation};
@@ -34,8 +34,9 @@ const MINUTE: usize = 60;
 /// Samples in a second, and messages of the fibre-optic gyro in a sample.
 const SAMPLES: usize = 100;
 const MESSAGES: usize = 10;
-/// Bytes of one in format A.
-const MESSAGE_BYTES: usize = 36;
+/// The gyro's resolution, rad.
+const FOG_STEP: f64 = 4e-8;
+const STANDING_SAMPLES: usize = 600;
 /// Frames of the fibre-optic gyro in a sample.
 const FOG_SET: usize = 3;
 /// Time after the begin of a sample's message at which wheel frames come: the message has ended, and the next has not
@@ -62,7 +63,22 @@ fn line(data: &[u8; 8]) -> Vec<u8> {
     slcan::emit(&data_frame(id11(0x7E0), data)).expect("a data frame").to_vec()
 }
 
-/// Holds the inputs that the outside sends and the frames that the host computes from them.
+/// A message of the gyro at this rate, rad/s.
+fn fog_message(number: usize, part: usize, rate: f64) -> Vec<u8> {
+    // A gyro that repeats itself counts as stuck, so no sum of a sample equals the one before.
+    let noise = if number.is_multiple_of(2) { FOG_STEP / 4.0 } else { -FOG_STEP / 4.0 };
+    let reading = ((rate * 0.01 / MESSAGES as f64 / FOG_STEP).round() * FOG_STEP + noise) as f32;
+    let message = Message {
+        rotation: [0.0, 0.0, reading],
+        acceleration: [0.0; 3],
+        extra: Extra::Temperature(25),
+        validity: Validity::ALL,
+        sequence: ((number * MESSAGES + part) % 128) as u8,
+    };
+    message.emit().to_vec()
+}
+
+/// What the outside sends, and the frames that the host computes from that.
 struct Outside {
     drive: Simulation,
     number: usize,
@@ -70,10 +86,6 @@ struct Outside {
 }
 
 impl Outside {
-    fn new() -> Self {
-        Self { drive: Simulation::new(&simulate::Config::DEFAULT), number: 0, host: replay::Board::new() }
-    }
-
     /// Sends a sample's 10 ms of everything.
     fn sample(&mut self, board: &mut Board) {
         let number = self.number;
@@ -84,17 +96,17 @@ impl Outside {
             angular_rate: sample.angular_rate.map(synthetic::rate),
             ..synthetic::turning(number as u64, AngularRate::ZERO)
         };
-        let Step { wheels, imu, fog } = Step::new(number, &measured, sample.reference[2]);
         let begin = START + SAMPLE * number as u32;
-        let message = imu.emit();
+        let message = replay::message(number, &measured);
         board.send_at(IMU, &message, begin);
         self.host.push(&message);
-        let messages = fog.chunks(MESSAGE_BYTES);
-        let first = MESSAGES - messages.len();
-        for (place, message) in messages.enumerate() {
-            board.send_at(FOG, message, begin + MS * (first + place) as u32);
+        // At the start the last one alone, so that a message set always follows the last message of a sample.
+        let first = if number == 0 { MESSAGES - 1 } else { 0 };
+        for part in first..MESSAGES {
+            board.send_at(FOG, &fog_message(number, part, sample.reference[2]), begin + MS * part as u32);
         }
-        if let Some(wheels) = wheels {
+        if number.is_multiple_of(2) {
+            let wheels = wheels(if number < STANDING_SAMPLES { 0.0 } else { 20.0 });
             board.can_send_at(&wheels, begin + WHEELS_AFTER);
             self.host.can(&wheels);
             for id in OTHERS {
@@ -110,7 +122,7 @@ impl Outside {
     }
 }
 
-/// Checks the board's output as it arrives.
+/// The board's output, checked as it arrives.
 struct Received {
     can: Vec<DataFrame>,
     slcan: Vec<u8>,
@@ -152,16 +164,13 @@ impl Received {
                 self.fog += 1;
                 continue;
             }
-            let wanted =
-                host.lines.get(expected).map(|line| slcan::parse::<DataFrame>(line).expect("a frame"));
-            assert_eq!(Some(frame), wanted, "frame {} on CAN at {time:?}", self.own);
+            assert_eq!(Some(&frame), host.frames.get(expected), "frame {} on CAN at {time:?}", self.own);
             expected += 1;
             self.own += 1;
         }
-        host.lines.drain(..expected);
+        host.frames.drain(..expected);
         self.slcan.extend(board.sent(SLCAN));
-        let whole = self.slcan.iter().rposition(|byte| *byte == b'\r').map_or(0, |at| at + 1);
-        let text: Vec<u8> = self.slcan.drain(..whole).collect();
+        let text = whole_lines(&mut self.slcan);
         let lines = text.split(|byte| *byte == b'\r').filter(|line| !line.is_empty());
         let lines: Vec<DataFrame> = lines.map(|line| slcan::parse(line).expect("a frame")).collect();
         let both = lines.len().min(self.can.len());
@@ -172,8 +181,7 @@ impl Received {
             lines[both..].iter().flat_map(|frame| slcan::emit(frame).expect("a data frame")).collect();
         self.slcan.splice(..0, ahead);
         self.service.extend(board.sent(SERVICE));
-        let whole = self.service.iter().rposition(|byte| *byte == b'\r').map_or(0, |at| at + 1);
-        for line in self.service.drain(..whole).collect::<Vec<u8>>().split(|byte| *byte == b'\r') {
+        for line in whole_lines(&mut self.service).split(|byte| *byte == b'\r') {
             // An empty line says that a frame has been taken.
             let Ok(frame) = slcan::parse::<DataFrame>(line) else {
                 assert!(line.is_empty(), "{}", line.escape_ascii());
@@ -193,9 +201,7 @@ impl Received {
             });
         }
     }
-}
 
-impl Received {
     /// Holds everything that has come so far against what `samples` must give, of which the last ones may be under way.
     fn check(&self, samples: usize, under_way: usize) {
         let fog_sets = self.fog / FOG_SET;
@@ -223,6 +229,12 @@ impl Received {
     }
 }
 
+/// Takes the lines that have ended.
+fn whole_lines(bytes: &mut Vec<u8>) -> Vec<u8> {
+    let end = bytes.iter().rposition(|byte| *byte == b'\r').map_or(0, |at| at + 1);
+    bytes.drain(..end).collect()
+}
+
 /// Paints what the stack does not use at present.
 fn paint_stack(board: &mut Board) {
     let free = board.register("sp") - (STACK_END - STACK_SIZE);
@@ -237,7 +249,9 @@ fn stack_used(board: &mut Board) -> usize {
 
 fn run(seconds: usize) {
     let Some(mut board) = common::boot() else { return };
-    let (mut outside, mut received) = (Outside::new(), Received::new());
+    let drive = Simulation::new(&simulate::Config::DEFAULT);
+    let mut outside = Outside { drive, number: 0, host: replay::Board::default() };
+    let mut received = Received::new();
     let (begun, mut early) = (Instant::now(), None);
     board.run(START);
     board.send(SLCAN, b"O\r");
@@ -267,7 +281,7 @@ fn run(seconds: usize) {
     // What is under way comes out.
     board.run(SAMPLE * 2 - MS);
     received.take(&mut board, &mut outside.host);
-    assert_eq!(outside.host.lines, Vec::<Vec<u8>>::new(), "frames that did not come");
+    assert_eq!(outside.host.frames, [], "frames that did not come");
     received.check(seconds * SAMPLES, 0);
     let AllCounters { pipeline, fog, .. } = received.counters.expect("they were asked for");
     let (early, late) = (early.expect("a tenth has passed"), stack_used(&mut board));

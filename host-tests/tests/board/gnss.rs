@@ -3,9 +3,9 @@
 
 use crate::common::{self, IMU, MS, SAMPLE, START};
 use crate::service;
+use gyronet::can::DataFrame;
 use gyronet::can::config::{Settings, StatusSettings};
 use gyronet::can::status::STATUS_ID;
-use gyronet::can::{DataFrame, slcan};
 use gyronet::heading::{Gain, GnssProtocol, GnssSettings, HeadingSettings};
 use gyronet::model::{Blob, weights};
 use gyronet::store::{Calibration, Configuration, Learned};
@@ -54,8 +54,7 @@ fn drive(
         }
         board.run(SAMPLE * STEP as u32);
     }
-    let frames = host.lines.drain(..).map(|line| slcan::parse(&line).expect("a frame")).collect();
-    [common::frames(&board.can_frames()), frames]
+    [common::frames(&board.can_frames()), std::mem::take(&mut host.frames)]
 }
 
 fn blob() -> Blob<'static> {
@@ -70,7 +69,7 @@ fn courses_on_the_bus_are_used_as_on_the_host() {
     board.power_on();
     board.run(START);
     board.can_frames();
-    let mut host = replay::Board::configured(&configuration, blob());
+    let mut host = replay::Board::new(&configuration, &Learned::NOTHING, blob());
     let [sent, same] = drive(&mut board, &mut host, &mut Winding::new(7), [16, 4], false);
     assert!(sent.len() > common::SET * 1_998 && sent == same[..sent.len()], "{}", sent.len());
     let (.., courses) = service::on_line(&mut board).course().expect("a response");
@@ -94,7 +93,7 @@ fn a_receiver_on_its_line_teaches_what_frames_teach() {
         board.run(START);
         board.can_frames();
         let mut vehicle = Winding::new(7);
-        let mut host = replay::Board::experienced(&bus, &learned, blob());
+        let mut host = replay::Board::new(&bus, &learned, blob());
         let [sent, same] = drive(&mut board, &mut host, &mut vehicle, seconds, true);
         let samples = 100 * seconds.iter().sum::<usize>();
         println!("{} of {} frames", sent.len(), same.len());

@@ -21,7 +21,7 @@ fn sending(name: &str) -> Option<Board> {
     let sent = common::frames(&board.can_frames());
     let made = common::host(&samples);
     assert!(sent.len() >= SET * (SAMPLES - 1) && sent == made[..sent.len()], "{} frames", sent.len());
-    assert_eq!(common::info(&mut board).identity.clock_fault, None);
+    assert_eq!(service::info(&mut board).identity.clock_fault, None);
     Some(board)
 }
 
@@ -39,9 +39,7 @@ fn board_without_led_slcan_gyro_and_spi_sends_the_hosts_frames() {
     assert!(board.sent(SLCAN).is_empty());
     let counters = common::counters(&mut board);
     assert_eq!((counters.lines.unsent, counters.lines.line_errors), (0, 0));
-    let wrong = |kind: &str| ["early_access", "slow_pin", "ignored_write"].contains(&kind);
-    let wrong: Vec<_> = board.events().into_iter().filter(|event| wrong(&event.kind)).collect();
-    assert!(wrong.is_empty(), "{wrong:?}");
+    common::assert_well_set(&mut board);
     let none = Refusal::Store(StoreError::Field(FieldError::PartNotInImage));
     for configuration in [
         Configuration { imu: ImuPart::Icm42688, ..Configuration::DEFAULT },

@@ -1,10 +1,7 @@
 //! The model of the STM32F405 itself: its own tests, and the image as it is flashed running on it.
 
-use crate::common::{self, IMU, SERVICE, SLCAN, START};
-use crate::service::{self, info};
-use gyronet::service::event::ResetCause;
-use gyronet::service::message::{FlashState, Identity, Info, Origin};
-use gyronet_host_tests::board::{At, Board, PACKAGES};
+use crate::common::{self, IMU, SERVICE, SLCAN};
+use gyronet_host_tests::board::{At, PACKAGES};
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::{replay, require};
 use gyronet_tools::target::stack::priorities;
@@ -28,8 +25,7 @@ fn model_passes_its_own_tests() {
 #[test]
 fn priorities_are_those_that_the_stack_bound_rests_on() {
     let Some(elf) = common::elf() else { return };
-    let Some(mut board) = Board::boot(&elf) else { return };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     let set = board.priorities();
     let listed = priorities(&std::fs::read(&elf).expect("it was just built")).expect("a firmware image");
     assert!(!listed.is_empty());
@@ -37,24 +33,6 @@ fn priorities_are_those_that_the_stack_bound_rests_on() {
         // The STM32F4 has the upper four bits of each byte; RTIC's 1 is the least urgent, 15.
         assert_eq!(16 - (set[number] >> 4), i64::from(priority), "exception {number}");
     }
-}
-
-#[test]
-fn image_answers_on_the_service_line_and_restarts_on_request() {
-    let Some(mut board) = common::started() else { return };
-    let about = info(&mut board);
-    assert_eq!((about.flash, about.writable), (FlashState::Ready, true));
-    assert_eq!(about.configuration, Origin::BuiltIn);
-    service::restart(&mut board);
-    let causes: Vec<_> = board
-        .events()
-        .iter()
-        .filter(|event| event.kind == "reset")
-        .map(|event| event.text("cause").to_owned())
-        .collect();
-    assert_eq!(causes, ["por", "software"]);
-    let identity = Identity { reset: ResetCause::Software, ..about.identity };
-    assert_eq!(info(&mut board), Info { identity, ..about });
 }
 
 #[test]

@@ -2,12 +2,11 @@
 //! nothing old after the bus was away.
 
 use crate::access;
-use crate::common::{IMU, SAMPLE, SET, drive, faults, frames, host, id};
+use crate::common::{self, MS, SAMPLE, SET, drive, faults, frames, host, id};
 use crate::service::{answer, ask, enter, on_bus, send, storing};
 use crate::spi_sensors::FAULTS;
 use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
-use gyronet::can::yaw::RateMessage;
 use gyronet::health::Faults;
 use gyronet::service::event::ResetCause;
 use gyronet::service::message::FlashState;
@@ -15,7 +14,7 @@ use gyronet::store::banks::{BANK, RECORDS, SECTOR};
 use gyronet::store::layout::FLASH_BASE;
 use gyronet::store::{Configuration, ImuPart};
 use gyronet_host_tests::board::{At, Board};
-use gyronet_host_tests::{inputs, replay};
+use gyronet_host_tests::replay;
 use gyronet_tools::client::device::Authority;
 use gyronet_tools::client::device::update::Update;
 use gyronet_tools::signing::PrivateKey;
@@ -26,7 +25,6 @@ use std::time::Duration;
 
 /// Time from power-on to the first sample.
 const BEGIN: Duration = Duration::from_millis(100);
-const MS: Duration = Duration::from_millis(1);
 /// The records, in the second bank of the flash.
 const STORED: u32 = FLASH_BASE + BANK + RECORDS;
 
@@ -37,8 +35,8 @@ pub fn built() -> &'static (PathBuf, Update) {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("nucleo");
         let linked = Linked::build(NUCLEO, 2, &folder).unwrap_or_else(|error| panic!("{error}"));
         let elf = folder.join("nucleo.elf");
-        std::fs::write(&elf, linked.for_programmer().expect("it was linked for this"))
-            .expect("there is room");
+        let whole = linked.for_programmer().expect("it was linked for this");
+        std::fs::write(&elf, whole).expect("there is room");
         (elf, linked.update().expect("it was linked for this too"))
     })
 }
@@ -47,10 +45,15 @@ pub fn built() -> &'static (PathBuf, Update) {
 pub fn boot(samples: &[Vec<u8>]) -> Option<Board> {
     let mut board = Board::of("stm32h563", &built().0)?;
     board.power_on();
-    for (k, sample) in samples.iter().enumerate() {
-        board.send_at(IMU, sample, BEGIN + SAMPLE * k as u32);
-    }
+    common::send(&mut board, samples, BEGIN);
     Some(board)
+}
+
+/// Puts something in each sector of the records, so that all are erased before their first use.
+fn use_records(board: &mut Board) {
+    for sector in 0..16 {
+        board.patch(At::Address(STORED + SECTOR * (sector + 1) - 16), &[0x55; 16]);
+    }
 }
 
 #[test]
@@ -96,13 +99,8 @@ fn a_nucleo_stores_over_the_bus_without_a_gap() {
     const TIME: Duration = Duration::from_millis(1_500);
     let parked: Vec<_> = (0..600).map(|k| replay::turning(k, 0.0)).collect();
     let Some(mut board) = boot(&parked) else { return };
-    // Something in each sector of the records, so that all are erased before their first use.
-    for sector in 0..16 {
-        board.patch(At::Address(STORED + SECTOR * (sector + 1) - 16), &[0x55; 16]);
-    }
-    for k in 0..600 {
-        board.can_send_at(&inputs::wheels(0.0), BEGIN + SAMPLE * k + 8 * MS);
-    }
+    use_records(&mut board);
+    common::stop_wheels(&mut board, 600, BEGIN + 8 * MS);
     board.run(Duration::from_secs(4));
     let _ = board.can_frames();
     board.snapshot("parked");
@@ -151,9 +149,7 @@ fn a_nucleo_hears_wheels_and_returns_from_bus_off_at_growing_intervals() {
     let made = host(&samples);
     let last_faults =
         |board: &mut Board| *faults(&frames(&board.can_frames())).last().expect("an angle message");
-    for k in 0..50 {
-        board.can_send_at(&inputs::wheels(0.0), BEGIN + SAMPLE * k);
-    }
+    common::stop_wheels(&mut board, 50, BEGIN);
     board.run(BEGIN + 500 * MS);
     assert!(!last_faults(&mut board).contains(Faults::WHEELS));
     board.run(500 * MS);
@@ -165,16 +161,7 @@ fn a_nucleo_hears_wheels_and_returns_from_bus_off_at_growing_intervals() {
     board.configure("FDCAN1.short", serde_json::Value::Null);
     let _ = board.can_frames();
     board.run(600 * MS);
-    let events = board.events();
-    let times =
-        |kind: &str| events.iter().filter(|event| event.kind == kind).map(|event| event.time).collect();
-    let (off, back): (Vec<Duration>, Vec<Duration>) = (times("bus_off"), times("bus_off_ended"));
-    println!("off at {off:?}, back at {back:?}");
-    assert_eq!((off.len(), back.len()), (6, 6));
-    for (k, (off, back)) in off.iter().zip(&back).enumerate() {
-        let promised = 10 * MS * (1 << k) + Duration::from_micros(129 * 11 * 2);
-        assert!((*back - *off).abs_diff(promised) < 2 * MS, "{:?} for {promised:?}", *back - *off);
-    }
+    let back = common::back_at_growing_intervals(&board.events(), 129 * 11, 2 * MS);
     let sent = rates(board.can_frames());
     let (first, frame) = sent[0];
     assert!(first - back[5] < SAMPLE + 2 * MS, "{:?}", first - back[5]);
@@ -257,9 +244,7 @@ fn after_cut(board: &mut Board, cut: u32) -> (Configuration, FlashState) {
 fn a_nucleo_survives_a_power_cut_at_any_time_of_a_store() {
     const CUTS: u32 = 20;
     let Some(mut board) = boot(&[]) else { return };
-    for sector in 0..16 {
-        board.patch(At::Address(STORED + SECTOR * (sector + 1) - 16), &[0x55; 16]);
-    }
+    use_records(&mut board);
     board.run(200 * MS);
     let of = |latitude| Configuration { latitude_deg: Some(latitude), ..Configuration::DEFAULT };
     // The first store erases eight sectors, the second only appends.
@@ -295,11 +280,8 @@ fn a_nucleo_survives_a_power_cut_at_any_time_of_a_store() {
 fn second_of_rates(board: &mut Board) -> (Vec<f64>, usize) {
     let _ = board.can_frames();
     board.run(Duration::from_secs(1));
-    let frames = board.can_frames().into_iter().filter(|(_, frame)| frame.id() == id(0x1A0));
-    let rates: Vec<_> = frames
-        .map(|(_, frame)| RateMessage::parse(frame.data()).expect("eight bytes").deg_per_sec())
-        .collect();
-    (rates.iter().copied().flatten().collect(), rates.len())
+    let rates = common::rates(&board.can_frames());
+    (rates.iter().filter_map(|(_, rate)| rate.deg_per_sec()).collect(), rates.len())
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! `examples/nucleo` with `can.yaw.fd`: one CAN FD frame carries what three classic ones do, and a classic bus is left alone.
 
-use crate::common::{SAMPLE, SET, drive, host, id, logged, read_log, send};
+use crate::common::{MS, SAMPLE, SET, drive, host, id, logged, read_log, send, times};
 use crate::nucleo::boot;
 use crate::service::on_bus;
 use embedded_can::{Frame, Id};
@@ -12,7 +12,6 @@ use gyronet::store::Configuration;
 use gyronet_host_tests::board::{Board, Own};
 use std::time::Duration;
 
-const MS: Duration = Duration::from_millis(1);
 const YAW_IDS: [u16; 3] = [0x1A0, 0x1A1, 0x1A2];
 
 /// A board that has stored that it sends CAN FD, and has just been switched on.
@@ -78,8 +77,7 @@ fn a_nucleo_leaves_a_classic_bus_alone_and_says_why() {
     let Some(mut board) = with_fd() else { return };
     board.configure("FDCAN1.classic", true);
     board.run(Duration::from_secs(7));
-    let off: Vec<_> =
-        board.events().into_iter().filter(|event| event.kind == "bus_off").map(|event| event.time).collect();
+    let off = times("bus_off", &board.events());
     println!("off at {off:?}");
     assert_eq!(off.len(), 8);
     let _ = board.own_frames();

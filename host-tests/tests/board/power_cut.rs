@@ -55,16 +55,15 @@ fn used(configurations: usize) -> Option<Board> {
     Some(board)
 }
 
+/// The state before what is cut, and after it.
+const BEFORE: &str = "before";
+const AFTER: &str = "after";
+
 /// Keeps the board's state. What it has sent of the sensor's silence is not kept with it: it would be copied with every
 /// cut.
 fn keep(board: &mut Board, name: &str) {
     let _ = (board.sent(SLCAN), board.can_frames());
     board.snapshot(name);
-}
-
-struct After {
-    configuration: Configuration,
-    info: Info,
 }
 
 /// Counts the cuts, and the different contents of the flash that they left.
@@ -79,19 +78,18 @@ impl Tried {
     fn at(
         &mut self,
         board: &mut Board,
-        before: &str,
         request: &[u8],
         access: usize,
-        check: &impl Fn(&mut Board, After),
+        check: &impl Fn(&mut Board, Configuration, Info),
     ) {
-        let began = self.cut(board, before, request, (access, Duration::ZERO), check);
+        let began = self.cut(board, request, (access, Duration::ZERO), check);
         let inside = match began.as_deref() {
             Some("erase") => &INTO_ERASE[..],
             Some(_) => &INTO_WORD[..],
             None => &[],
         };
         for delay in inside {
-            self.cut(board, before, request, (access, *delay), check);
+            self.cut(board, request, (access, *delay), check);
         }
     }
 
@@ -99,12 +97,11 @@ impl Tried {
     fn cut(
         &mut self,
         board: &mut Board,
-        before: &str,
         request: &[u8],
         (access, delay): (usize, Duration),
-        check: &impl Fn(&mut Board, After),
+        check: &impl Fn(&mut Board, Configuration, Info),
     ) -> Option<String> {
-        board.restore(before);
+        board.restore(BEFORE);
         service::send(board, request);
         board.cut_after(access, delay);
         let off = board.run_until("power_off", LIMIT);
@@ -120,31 +117,31 @@ impl Tried {
         if self.seen.insert(content.finish()) {
             board.power_on();
             board.run(START);
-            let after = After { configuration: service::configuration(board), info: service::info(board) };
-            check(board, after);
+            let (configuration, info) = (service::configuration(board), service::info(board));
+            check(board, configuration, info);
         }
         interrupted
     }
 }
 
-/// The accesses that a request takes, from a kept state on; the state after it is kept as `after`.
-fn accesses(board: &mut Board, before: &str, request: &[u8], after: &str) -> usize {
-    board.restore(before);
+/// The accesses that a request takes; the state after it is kept.
+fn accesses(board: &mut Board, request: &[u8]) -> usize {
+    board.restore(BEFORE);
     service::send(board, request);
     board.cut_after(MANY, Duration::ZERO);
     let response = service::answer(board, LIMIT).expect("a response");
     assert_eq!(response[0], request[0] + 0x40, "{response:02x?}");
     let count = MANY - board.counts().accesses_left;
-    keep(board, after);
+    keep(board, AFTER);
     count
 }
 
-/// Cuts a store of configuration `k` at each access, from a kept state on.
+/// Cuts a store of configuration `k` at each access.
 fn store(board: &mut Board, k: usize) {
     let request = storing(&configuration(k));
     let (mut tried, begun) = (Tried::default(), Instant::now());
-    let count = accesses(board, "before", &request, "after");
-    let check = |board: &mut Board, After { configuration: found, info }: After| {
+    let count = accesses(board, &request);
+    let check = |board: &mut Board, found: Configuration, info: Info| {
         assert!(found == configuration(k - 1) || found == configuration(k), "{found:?}");
         assert_eq!((info.configuration, info.calibration), (Origin::Stored, Origin::Stored));
         assert_eq!(info.weights_crc, Some(crc(&other_weights(2))));
@@ -154,7 +151,7 @@ fn store(board: &mut Board, k: usize) {
         assert_eq!(service::ask(board, &request)[0], 0x6E);
     };
     for access in 1..=count {
-        tried.at(board, "before", &request, access, &check);
+        tried.at(board, &request, access, &check);
     }
     let Tried { cuts, seen } = tried;
     println!("{cuts} cuts at {count} accesses, {} contents of flash, {:.0?}", seen.len(), begun.elapsed());
@@ -164,7 +161,7 @@ fn store(board: &mut Board, k: usize) {
 fn configuration_is_the_old_or_the_new_one_after_a_cut_of_an_append() {
     let Some(mut board) = used(5) else { return };
     service::enter(&mut board, 3);
-    keep(&mut board, "before");
+    keep(&mut board, BEFORE);
     store(&mut board, 6);
 }
 
@@ -176,7 +173,7 @@ fn configuration_is_the_old_or_the_new_one_after_a_cut_of_an_erase_and_copy() {
     for k in NEARLY + 1.. {
         service::enter(&mut board, 3);
         let _ = board.events();
-        keep(&mut board, "before");
+        keep(&mut board, BEFORE);
         assert_eq!(service::ask(&mut board, &storing(&configuration(k)))[0], 0x6E);
         if board.events().iter().any(|event| event.kind == "flash_erase") {
             // The board is still the one that was started with an older configuration.
@@ -197,23 +194,23 @@ fn upload(chosen: impl Fn(usize, usize, usize) -> Vec<usize>) {
     requests.extend([vec![0x37], ACTIVATE.to_vec()]);
     let (mut tried, begun, mut total) = (Tried::default(), Instant::now(), 0);
     service::enter(&mut board, 2);
-    keep(&mut board, "before");
+    keep(&mut board, BEFORE);
     for (number, request) in requests.iter().enumerate() {
         let activates = *request == ACTIVATE;
-        let check = |_: &mut Board, After { configuration: found, info }: After| {
+        let check = |_: &mut Board, found: Configuration, info: Info| {
             let running = (info.weights, info.weights_crc);
             let before = (WeightSource::Slot(Slot::A), Some(old));
             let activated = (WeightSource::Slot(Slot::B), Some(crc(&new)));
             assert!(running == before || activates && running == activated, "{running:?} in {number}");
             assert_eq!((found, info.configuration), (configuration(3), Origin::Stored), "request {number}");
         };
-        let count = accesses(&mut board, "before", request, "after");
+        let count = accesses(&mut board, request);
         total += count;
         for access in chosen(number, requests.len(), count) {
-            tried.at(&mut board, "before", request, access, &check);
+            tried.at(&mut board, request, access, &check);
         }
-        board.restore("after");
-        keep(&mut board, "before");
+        board.restore(AFTER);
+        keep(&mut board, BEFORE);
     }
     board.power_cycle(Duration::from_millis(10));
     board.run(START);

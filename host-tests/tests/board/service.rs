@@ -29,13 +29,11 @@ pub fn on_bus(board: &mut Board) -> Device<CanBus<'_>> {
     Device::new(board.bus(), "the virtual board")
 }
 
-/// Restarts a board that stands, and waits until it listens.
 pub fn restart(board: &mut Board) {
     on_bus(board).restart().expect("a response");
     board.run(START);
 }
 
-/// Gives a board without a key one.
 pub fn lock(board: &mut Board) -> PrivateKey {
     let key = PrivateKey::generate().expect("random numbers");
     on_bus(board).set_key(&key.public()).expect("there was none");

@@ -10,9 +10,8 @@ use std::time::Duration;
 
 fn standing(board: &mut Board, samples: std::ops::Range<usize>) {
     let now = board.counts().time;
-    for (k, number) in samples.enumerate() {
-        board.send_at(common::IMU, &replay::turning(number, 0.001), now + SAMPLE * k as u32);
-    }
+    let samples: Vec<_> = samples.map(|number| replay::turning(number, 0.001)).collect();
+    common::send(board, &samples, now);
 }
 
 #[test]
@@ -58,10 +57,7 @@ fn board_answers_the_commands_of_a_host() {
 /// Case bus/11: the line is no adapter.
 #[test]
 fn a_frame_that_the_board_does_not_use_is_refused_and_counted() {
-    let Some(mut board) = common::boot() else {
-        return;
-    };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     let _ = board.sent(SLCAN);
     let before = common::counters(&mut board).lines.service_errors;
     board.send(SLCAN, b"t1232AABB\rT000001232AABB\rt0AA81A6F1A6F1A6F1A6F\r");

@@ -1,22 +1,20 @@
 //! An ICM-42688-P, a BMI088 or an ASM330LHH on SPI1, from the stored configuration to the frames on CAN.
 
-use crate::common::{self, MS, SECOND, SLCAN, START};
+use crate::common::{self, MS, SECOND, SLCAN, START, frames, raw};
 use crate::service;
-use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
 use gyronet::can::slcan::parse_stamped;
-use gyronet::can::yaw::{AngleMessage, Quality, RateMessage};
+use gyronet::can::yaw::Quality;
 use gyronet::service::event::SensorFault;
 use gyronet::service::message::AllCounters;
 use gyronet::store::{Configuration, ImuPart, Learned};
 use gyronet_host_tests::board::Board;
-use gyronet_host_tests::inputs::wheels;
 use gyronet_host_tests::stored::Stored;
+use gyronet_host_tests::wire::wheels;
 use serde_json::json;
 use std::time::Duration;
 
 const RATE: u16 = 0x1A0;
-const ANGLE: u16 = 0x1A1;
 /// The axis of yaw, as the model numbers them.
 const Z: u32 = 2;
 /// Acceleration of a level part, g.
@@ -114,7 +112,6 @@ fn equipped(fitted: &Fitted, configuration: Configuration) -> Option<Board> {
     Some(board)
 }
 
-/// Switches the board on and waits until the part is up.
 fn start(board: &mut Board, fitted: &Fitted) {
     board.power_on();
     board.run(START + fitted.up[1]);
@@ -122,16 +119,8 @@ fn start(board: &mut Board, fitted: &Fitted) {
 
 /// Rates in deg/s, `None` where there is none, with the time of their frame.
 fn rates(board: &mut Board) -> Vec<(Duration, Option<f64>)> {
-    let frames = of(board, RATE);
-    let rate = |data: &[u8]| RateMessage::parse(data).expect("eight bytes").deg_per_sec();
-    frames.iter().map(|(time, data)| (*time, rate(data))).collect()
-}
-
-/// Data of the frames with an identifier.
-fn of(board: &mut Board, id: u16) -> Vec<(Duration, Vec<u8>)> {
-    let frames = board.can_frames().into_iter();
-    let own = frames.filter(|(_, frame)| matches!(frame.id(), Id::Standard(found) if found.as_raw() == id));
-    own.map(|(time, frame)| (time, frame.data().to_vec())).collect()
+    let rates = common::rates(&board.can_frames());
+    rates.iter().map(|(time, rate)| (*time, rate.deg_per_sec())).collect()
 }
 
 fn assert_driven_well(board: &mut Board) {
@@ -152,12 +141,12 @@ fn on_the_grid(board: &mut Board, late: i64, seconds: usize) -> Vec<usize> {
         .map(|_| {
             board.run(SECOND);
             text.extend(board.sent(SLCAN));
-            of(board, RATE).len()
+            rates(board).len()
         })
         .collect();
     for line in text.split(|byte| *byte == b'\r') {
         if let Ok((frame, stamp)) = parse_stamped::<DataFrame>(line)
-            && matches!(frame.id(), Id::Standard(id) if id.as_raw() == RATE)
+            && raw(&frame) == RATE
         {
             stamps.push(i64::from(stamp));
         }
@@ -195,9 +184,7 @@ fn samples_come_at_their_rate_and_on_the_grid(fitted: &Fitted) {
 #[test]
 #[ignore = "a minute of board time takes up to three of processor time"]
 fn samples_come_for_a_minute() {
-    in_order(&ICM42688, 60);
-    in_order(&BMI088, 60);
-    in_order(&ASM330LHH, 60);
+    [&ICM42688, &BMI088, &ASM330LHH].into_iter().for_each(|fitted| in_order(fitted, 60));
 }
 
 fn vibration_above_the_bandwidth_does_not_become_a_turn(fitted: &Fitted) {
@@ -298,14 +285,6 @@ fn fault_at_the_start_is_named_gives_no_rate_and_is_tried_again() {
     }
 }
 
-/// Turned angle by the angle messages, deg.
-fn turned(angles: &[(Duration, Vec<u8>)]) -> f64 {
-    let codes = angles.iter().map(|(_, data)| AngleMessage::parse(data).expect("eight bytes").yaw);
-    let codes: Vec<i32> = codes.collect();
-    let steps = codes.windows(2).map(|pair| i64::from(pair[1].wrapping_sub(pair[0])));
-    steps.sum::<i64>() as f64 * 360.0 / 4_294_967_296.0
-}
-
 fn yaw_is_right_though_the_parts_oscillator_is_one_percent_off(fitted: &Fitted) {
     /// Deg/s, and seconds of it.
     const RATE: f64 = 30.0;
@@ -332,9 +311,10 @@ fn yaw_is_right_though_the_parts_oscillator_is_one_percent_off(fitted: &Fitted) 
     board.run(Duration::from_secs_f64(BEGINS) - SECOND / 2);
     let _ = board.can_frames();
     board.run(Duration::from_secs_f64(LASTS) + SECOND);
-    let angles = of(&mut board, ANGLE);
-    let (turned, expected) = (turned(&angles), RATE * LASTS);
-    let per_second = angles.len() as f64 / (LASTS + 1.0);
+    let codes: Vec<i32> = common::angles(&frames(&board.can_frames())).map(|angle| angle.yaw).collect();
+    let steps = codes.windows(2).map(|pair| i64::from(pair[1].wrapping_sub(pair[0])));
+    let (turned, expected) = (steps.sum::<i64>() as f64 * 360.0 / 4_294_967_296.0, RATE * LASTS);
+    let per_second = codes.len() as f64 / (LASTS + 1.0);
     println!("{turned:.4} deg of {expected}, {per_second} samples a second");
     assert!((100.5..=101.5).contains(&per_second), "{per_second}");
     assert!((turned / expected - 1.0).abs() < 1e-3, "{turned} deg of {expected}");
@@ -342,7 +322,6 @@ fn yaw_is_right_though_the_parts_oscillator_is_one_percent_off(fitted: &Fitted) 
     assert_driven_well(&mut board);
 }
 
-/// Runs with a wheel frame every 20 ms.
 fn roll(board: &mut Board, seconds: u32, speed: f64) {
     for _ in 0..50 * seconds {
         board.can_send(&wheels(speed));
@@ -352,10 +331,8 @@ fn roll(board: &mut Board, seconds: u32, speed: f64) {
 
 /// The rates of the newest frames, deg/s, and their quality.
 fn judged(board: &mut Board) -> Vec<(f64, Quality)> {
-    let frames = of(board, RATE);
-    let rate = |data: &[u8]| RateMessage::parse(data).expect("eight bytes");
-    let known = frames.iter().map(|(_, data)| rate(data));
-    known.filter_map(|rate| Some((rate.deg_per_sec()?, rate.quality))).collect()
+    let rates = common::rates(&board.can_frames());
+    rates.iter().filter_map(|(_, rate)| Some((rate.deg_per_sec()?, rate.quality))).collect()
 }
 
 fn what_a_standstill_has_shown_corrects_the_next_start_before_it_stands(fitted: &Fitted) {
@@ -388,25 +365,7 @@ fn what_a_standstill_has_shown_corrects_the_next_start_before_it_stands(fitted: 
         let is_right = (rate - 5.0).abs() < fitted.noise[0];
         assert!(is_right && *quality == Quality::Degraded, "{rate} deg/s, {quality:?}");
     }
-    assert_eq!(
-        service::on_line(&mut board).learned().expect("a response").thermal_bias,
-        learned.thermal_bias
-    );
+    let kept = service::on_line(&mut board).learned().expect("a response").thermal_bias;
+    assert_eq!(kept, learned.thermal_bias);
     assert_driven_well(&mut board);
-}
-
-#[test]
-fn rate_beyond_the_range_is_not_used() {
-    for fitted in [&BMI088, &ASM330LHH] {
-        let Some(mut board) = equipped(fitted, Configuration::DEFAULT) else { return };
-        start(&mut board, fitted);
-        board.run(SECOND / 2);
-        board.configure("SPI1.imu_rates_dps", json!([0.0, 0.0, 251.0]));
-        board.run(50 * MS);
-        let _ = board.can_frames();
-        board.run(SECOND / 2);
-        let judged = judged(&mut board);
-        assert!(judged.iter().all(|(_, quality)| *quality == Quality::Unusable), "{judged:?}");
-        assert!(common::counters(&mut board).pipeline.invalid > 40);
-    }
 }

@@ -1,13 +1,13 @@
 //! The board stores records over used sectors and signed weight files, through diagnosis and the flash
 //! controller, and works on while it erases as far as the part lets it.
 
-use crate::common::{self, IMU, MS, START};
+use crate::common::{self, MS, START};
 use crate::service::{self, on_bus};
-use gyronet::can::{DataFrame, slcan};
+use gyronet::can::DataFrame;
 use gyronet::model::{Blob, weights};
 use gyronet::service::message::{FlashState, Origin};
 use gyronet::store::slots::WeightSource;
-use gyronet::store::{Configuration, Slot};
+use gyronet::store::{Configuration, Learned, Slot};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::replay;
 use gyronet_host_tests::stored::{crc, other_weights};
@@ -84,10 +84,7 @@ fn configuration_survives_restarts_while_sectors_fill_and_are_used_again() {
 fn stale_error_flags_of_the_flash_controller_refuse_no_store() {
     /// OPERR, WRPERR, PGAERR, PGPERR and PGSERR of FLASH_SR, as an operation before this image may leave them.
     const ERRORS: u32 = 0xF2;
-    let Some(mut board) = common::boot() else {
-        return;
-    };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     board.configure("FLASH.error_flags", ERRORS);
     on_bus(&mut board).set_configuration(&latitude(3)).expect("it is stored");
     board.configure("FLASH.error_flags", ERRORS);
@@ -107,9 +104,8 @@ fn board_time_goes_on_over_an_erase() {
     assert!(took > ERASE);
     board.run(3 * BLINK);
     let events = board.events();
-    let erase = events.iter().find(|event| event.kind == "flash_erase").expect("an erase").time;
-    let edges: Vec<Duration> =
-        events.iter().filter(|event| event.kind == "pin").map(|event| event.time).collect();
+    let erase = common::times("flash_erase", &events)[0];
+    let edges = common::times("pin", &events);
     let first = edges[0];
     println!("edges {edges:?}, erase at {erase:?}");
     let late = |time: Duration| (time - first).as_micros() % BLINK.as_micros();
@@ -180,17 +176,15 @@ fn uploaded_weights_run_from_their_slot() {
     let samples = common::drive(SAMPLES);
     let begin = board.counts().time;
     let _ = board.can_frames();
-    for (k, sample) in samples.iter().enumerate() {
-        board.send_at(IMU, sample, begin + common::SAMPLE * k as u32);
-    }
+    common::send(&mut board, &samples, begin);
     board.run(common::SAMPLE * (SAMPLES as u32 + 1));
     let sent = common::frames(&board.can_frames());
     let host = |file: &[u8]| -> Vec<DataFrame> {
         let file: &'static [u8] = file.to_vec().leak();
         let blob = Blob::new_checked(file).expect("a weight file");
-        let mut host = replay::Board::configured(&Configuration::DEFAULT, blob);
+        let mut host = replay::Board::new(&Configuration::DEFAULT, &Learned::NOTHING, blob);
         host.push(&samples.concat());
-        host.lines.iter().map(|line| slcan::parse(line).expect("a frame")).collect()
+        host.frames
     };
     let (new, old) = (host(&file), host(&weights::DEFAULT.0));
     assert!(sent.len() >= common::SET * (SAMPLES - 1), "{} frames", sent.len());

@@ -1,6 +1,6 @@
 //! The supply on the virtual board: low at the start, falling while the image runs, falling during an erase.
 
-use crate::common::{SECOND, START, info, resets, started, unpowered};
+use crate::common::{SECOND, START, resets, started, unpowered};
 use crate::service;
 use gyronet::service::crash::CrashKind;
 use gyronet::service::event::ClockFault;
@@ -20,7 +20,7 @@ fn low_for_the_first_50_ms() {
     board.run(Duration::from_millis(50));
     board.configure(SUPPLY, GOOD);
     board.run(3 * SECOND);
-    let identity = info(&mut board).identity;
+    let identity = service::info(&mut board).identity;
     assert_eq!((identity.clock_fault, identity.can_fault), (None, None));
     assert!(!board.can_frames().is_empty(), "the silence of the sensor is sent");
     assert_eq!(resets(&mut board).len(), 1);
@@ -32,11 +32,11 @@ fn low_for_seconds() {
     board.configure(SUPPLY, LOW);
     board.power_on();
     board.run(3 * SECOND);
-    assert_eq!(info(&mut board).identity.clock_fault, Some(ClockFault::SupplyLow));
+    assert_eq!(service::info(&mut board).identity.clock_fault, Some(ClockFault::SupplyLow));
     assert!(board.can_frames().is_empty());
     board.configure(SUPPLY, GOOD);
     board.run(3 * SECOND);
-    let identity = info(&mut board).identity;
+    let identity = service::info(&mut board).identity;
     assert_eq!((identity.clock_fault, identity.can_fault), (None, None), "it starts again by itself");
 }
 
@@ -47,7 +47,7 @@ fn falling_while_the_image_runs() {
     board.run(START);
     board.configure(SUPPLY, GOOD);
     board.run(2 * SECOND);
-    let identity = info(&mut board).identity;
+    let identity = service::info(&mut board).identity;
     assert_eq!(identity.crash.map(|crash| crash.kind), Some(CrashKind::SupplyLow));
     assert_eq!(identity.clock_fault, None);
 }
@@ -79,7 +79,7 @@ fn falling_during_an_erase() {
     board.configure(SUPPLY, 2_700);
     // The erase ends first: the processor stands still until then. The image stops, and waits at 16 MHz.
     board.run(3 * SECOND);
-    let identity = info(&mut board).identity;
+    let identity = service::info(&mut board).identity;
     assert_eq!(identity.crash.map(|crash| crash.kind), Some(CrashKind::SupplyLow), "{identity:?}");
     // There is no CAN at a low supply.
     let refused = service::on_line(&mut board).set_configuration(&numbered(last + 1));

@@ -6,9 +6,9 @@ use crate::service;
 use embedded_can::Frame;
 use gyronet::store::Configuration;
 use gyronet::uds::data::{Access, IDENTIFIERS};
-use gyronet_host_tests::board::Board;
+use gyronet_host_tests::board::{Board, Seen};
 use gyronet_host_tests::stored::other_weights;
-use gyronet_host_tests::tester::{frame, segment};
+use gyronet_host_tests::tester::{Tester, frame, segment};
 use gyronet_host_tests::wire::{bytes, data_frame};
 use std::time::Duration;
 
@@ -31,41 +31,31 @@ struct Timed {
 
 fn timed(board: &mut Board, request: &[u8]) -> Timed {
     let _ = board.bus_log();
-    let until = board.counts().time + 2 * P2_STAR;
-    service::send(board, request);
-    let (mut asked, mut first, mut pending) = (Duration::ZERO, None, 0);
-    let mut newest = Duration::ZERO;
-    let (mut message, mut length) = (Vec::new(), 0);
-    loop {
+    let (mut asked, mut newest, mut first) = (Duration::ZERO, Duration::ZERO, None);
+    let mut tester = Tester::default();
+    let message = tester.ask(request, 10_000, |frames| {
+        frames.iter().for_each(|data| board.can_send(&data_frame(id(0x7E0), data)));
         board.run(MS);
-        assert!(board.counts().time < until, "{request:02x?}: no whole response");
         assert!(first.is_none() || board.counts().time - newest < P2_STAR, "{request:02x?}");
-        for seen in board.bus_log() {
-            let data = seen.frame.data();
-            match (raw(&seen.frame), data[0] >> 4) {
-                (0x7E0, 0..=2) => asked = seen.end,
-                (0x7E8, kind @ 0..=2) => {
-                    first.get_or_insert(seen.start - asked);
-                    newest = seen.end;
-                    match kind {
-                        0 if data[1..4] == [0x7F, request[0], 0x78] => pending += 1,
-                        0 => (message, length) = (data[1..=usize::from(data[0])].to_vec(), data[0].into()),
-                        1 => {
-                            length = usize::from(data[0] & 0xF) << 8 | usize::from(data[1]);
-                            message.extend(&data[2..]);
-                            tester(board, &[0x30, 0, 0]);
-                        }
-                        _ => message.extend(&data[1..]),
-                    }
-                }
-                _ => {}
+        let diagnosis = |seen: &Seen| (0x7E0..=0x7E8).contains(&raw(&seen.frame));
+        let mut sent = Vec::new();
+        for seen in board.bus_log().into_iter().filter(diagnosis) {
+            let data: [u8; 8] = seen.frame.data().try_into().expect("eight bytes");
+            let is_control = data[0] >> 4 == 3;
+            if seen.own {
+                sent.push(data);
+            }
+            if seen.own && !is_control {
+                first.get_or_insert(seen.start - asked);
+                newest = seen.end;
+            } else if !seen.own && !is_control {
+                asked = seen.end;
             }
         }
-        if length > 0 && message.len() >= length {
-            message.truncate(length);
-            return Timed { message, first: first.expect("it came"), pending };
-        }
-    }
+        sent
+    });
+    let message = message.unwrap_or_else(|| panic!("{request:02x?}: no whole response"));
+    Timed { message, first: first.expect("it came"), pending: tester.pending }
 }
 
 /// Case bus/04: ISO 15765-2 counts the separation time from the end of a frame to the begin of the next one.
@@ -103,9 +93,7 @@ fn separation_times_are_kept_on_the_bus() {
 /// Case bus/05: a trouble waits to be stored with an erase.
 #[test]
 fn the_first_requests_of_a_session_are_answered_in_time() {
-    let Some(mut board) = common::boot() else {
-        return;
-    };
+    let Some(mut board) = common::boot() else { return };
     board.run(START + Duration::from_secs(3));
     let mut pending = 0;
     for request in [&[0x10, 3][..], &[0x22, 0xF1, 0x86], &[0x22, 0xF1, 0x89], &[0x22, 0xF1, 0x97]] {
@@ -170,10 +158,7 @@ fn a_setting_that_is_stored_leaves_no_troubles() {
 /// Two testers at once, and one that vanishes in the middle of a response and of a request.
 #[test]
 fn a_second_tester_waits_in_silence_and_no_longer_than_a_second() {
-    let Some(mut board) = common::boot() else {
-        return;
-    };
-    board.run(START);
+    let Some(mut board) = common::started() else { return };
     service::send(&mut board, &LONG);
     board.run(5 * MS);
     // The second one, on the service line.

@@ -1,10 +1,11 @@
 //! Diagnosis on CAN with the image as flashed: a tester of ours, and udsoncan over can-isotp as they come from their
 //! authors.
 
-use crate::common::{self, START, drive, raw};
-use embedded_can::Frame;
+use crate::common::{self, START, drive};
+use crate::service::storing;
+use embedded_can::{Frame, Id};
 use gyronet::can::diagnosis::DiagnosisIds;
-use gyronet::store::{Configuration, Record};
+use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::stored::other_weights;
@@ -18,20 +19,28 @@ use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// Time that passes while a tester waits for the next frame.
 const TURN: Duration = Duration::from_millis(1);
 
-/// Sends frames to the server and returns its own of the next millisecond.
-fn exchange(board: &mut Board, frames: &[[u8; 8]]) -> Vec<[u8; 8]> {
-    frames.iter().for_each(|data| board.can_send(&data_frame(id11(0x7E0), data)));
+const REQUEST: Id = id11(0x7E0);
+const RESPONSE: Id = id11(0x7E8);
+
+/// Sends frames to the server; returns the data of its own of the next millisecond, and how many others it sent.
+fn exchange(board: &mut Board, [to, from]: [Id; 2], frames: &[[u8; 8]]) -> (Vec<[u8; 8]>, usize) {
+    frames.iter().for_each(|data| board.can_send(&data_frame(to, data)));
     board.run(TURN);
     let sent = common::frames(&board.can_frames());
-    let ours = sent.iter().filter(|frame| raw(frame) == 0x7E8);
-    ours.map(|frame| frame.data().try_into().expect("eight bytes")).collect()
+    let ours = sent.iter().filter(|frame| frame.id() == from);
+    let ours: Vec<_> = ours.map(|frame| frame.data().try_into().expect("eight bytes")).collect();
+    let others = sent.len() - ours.len();
+    (ours, others)
+}
+
+fn ask_by(board: &mut Board, ids: [Id; 2], request: &[u8], turns: usize) -> Option<Vec<u8>> {
+    Tester::default().ask(request, turns, |frames| exchange(board, ids, frames).0)
 }
 
 fn ask(board: &mut Board, request: &[u8]) -> Option<Vec<u8>> {
-    Tester::default().ask(request, 8_000, |frames| exchange(board, frames))
+    ask_by(board, [REQUEST, RESPONSE], request, 8_000)
 }
 
 #[test]
@@ -44,12 +53,9 @@ fn a_sensor_that_falls_silent_is_a_trouble_and_the_rates_keep_their_place() {
     let mut rates = 0;
     while board.counts().time < now + Duration::from_secs(1) {
         let read = Tester::default().ask(&[0x22, 1, 6], 100, |frames| {
-            frames.iter().for_each(|data| board.can_send(&data_frame(id11(0x7E0), data)));
-            board.run(TURN);
-            let sent = common::frames(&board.can_frames());
-            rates += sent.iter().filter(|frame| raw(frame) < 0x700).count();
-            let ours = sent.iter().filter(|frame| raw(frame) == 0x7E8);
-            ours.map(|frame| frame.data().try_into().expect("eight bytes")).collect()
+            let (ours, others) = exchange(&mut board, [REQUEST, RESPONSE], frames);
+            rates += others;
+            ours
         });
         assert_eq!(read.map(|bytes| bytes.len()), Some(3 + 4 * 19));
         reads += 1;
@@ -76,24 +82,15 @@ fn diagnosis_with_29_bits_is_configured_over_itself() {
     let ids =
         DiagnosisIds { extended: true, request: 0x18DA_10F1, functional: 0x18DB_33F1, response: 0x18DA_F110 };
     let configuration = Configuration { diagnosis: ids, ..Configuration::DEFAULT };
-    let record = postcard::to_stdvec(&configuration).expect("it fits");
     assert_eq!(ask(&mut board, &[0x10, 3]), Some(vec![0x50, 3, 0, 50, 0x01, 0xF4]));
-    let write = [&[0x2E, 1, 0, Configuration::VERSION][..], &record].concat();
-    assert_eq!(ask(&mut board, &write), Some(vec![0x6E, 1, 0]));
+    assert_eq!(ask(&mut board, &storing(&configuration)), Some(vec![0x6E, 1, 0]));
     assert_eq!(ask(&mut board, &[0x11, 1]), Some(vec![0x51, 1]));
     board.run(START);
-    assert_eq!(Tester::default().ask(&[0x3E, 0], 100, |frames| exchange(&mut board, frames)), None);
+    assert_eq!(ask_by(&mut board, [REQUEST, RESPONSE], &[0x3E, 0], 100), None);
     let [request, functional, response] = ids.ids().expect("they are valid");
     for (id, answer) in [(request, Some(vec![0x7E, 0])), (functional, Some(vec![0x7E, 0])), (response, None)]
     {
-        let received = Tester::default().ask(&[0x3E, 0], 100, |frames| {
-            frames.iter().for_each(|data| board.can_send(&data_frame(id, data)));
-            board.run(TURN);
-            let sent = common::frames(&board.can_frames());
-            let ours = sent.iter().filter(|frame| frame.id() == response);
-            ours.map(|frame| frame.data().try_into().expect("eight bytes")).collect()
-        });
-        assert_eq!(received, answer, "{id:?}");
+        assert_eq!(ask_by(&mut board, [id, response], &[0x3E, 0], 100), answer, "{id:?}");
     }
 }
 
@@ -101,10 +98,8 @@ fn diagnosis_with_29_bits_is_configured_over_itself() {
 #[test]
 fn udsoncan_reads_writes_downloads_and_updates() {
     let Some(python) = require::python(&["isotp", "udsoncan", "yaml"]) else { return };
-    let (Some(whole), Some(mut board)) = (image::update(env!("CARGO_TARGET_TMPDIR")), common::boot()) else {
-        return;
-    };
-    board.run(START);
+    let Some(whole) = image::update(env!("CARGO_TARGET_TMPDIR")) else { return };
+    let Some(mut board) = common::started() else { return };
     let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("uds_weights.bin");
     let weights = other_weights(2);
     std::fs::write(&file, &weights).expect("there is room");
@@ -141,16 +136,11 @@ fn udsoncan_reads_writes_downloads_and_updates() {
         };
         for text in frames.split_whitespace() {
             let (id, data) = text.split_once('#').expect("identifier#data");
-            board
-                .can_send(&data_frame(id11(u16::from_str_radix(id, 16).expect("hexadecimal")), &bytes(data)));
+            let id = u16::from_str_radix(id, 16).expect("hexadecimal");
+            board.can_send(&data_frame(id11(id), &bytes(data)));
         }
-        board.run(TURN);
-        let sent = common::frames(&board.can_frames());
-        let answers: String = sent
-            .iter()
-            .filter(|frame| raw(frame) == 0x7E8)
-            .map(|frame| frame.data().iter().map(|byte| format!("{byte:02x}")).collect::<String>() + " ")
-            .collect();
+        let (sent, _) = exchange(&mut board, [REQUEST, RESPONSE], &[]);
+        let answers: String = sent.iter().map(|data| hex(data) + " ").collect();
         // The client may have ended.
         let _ = writeln!(to_client, "{answers}");
     }

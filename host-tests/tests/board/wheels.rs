@@ -51,8 +51,8 @@ fn another_maker_s_frames_are_understood_without_a_new_image() {
         board.run(SAMPLE);
     }
     let known = faults(&frames(&board.can_frames()));
-    let without = known.iter().filter(|faults| faults.0 & Faults::WHEELS.0 != 0).count();
-    let stored = known.iter().filter(|faults| faults.0 & Faults::STORED.0 != 0).count();
+    let without = known.iter().filter(|faults| faults.contains(Faults::WHEELS)).count();
+    let stored = known.iter().filter(|faults| faults.contains(Faults::STORED)).count();
     println!("{} sets, {without} without wheels", known.len());
     assert!(known.len() >= 190 && without < 3 && stored == 0, "{without}, {stored} of {}", known.len());
     let counters = common::counters(&mut board);
@@ -71,7 +71,7 @@ fn another_maker_s_frames_are_understood_without_a_new_image() {
         board.run(SAMPLE);
     }
     let silent = faults(&frames(&board.can_frames()));
-    let without = silent.iter().filter(|faults| faults.0 & Faults::WHEELS.0 != 0).count();
+    let without = silent.iter().filter(|faults| faults.contains(Faults::WHEELS)).count();
     assert!(without > 10, "{without} of {} sets report the wheels", silent.len());
     assert_eq!(common::counters(&mut board).inputs.wheel_errors, 60);
 }

@@ -8,8 +8,8 @@ use gyronet::sample::{PERIOD_US, TestSignal};
 use gyronet::sensor::xsens::{MtData2, Mti};
 use gyronet::{GyroNet, Micros};
 use gyronet_host_tests::recordings::workspace;
+use gyronet_host_tests::require::{self, Need};
 use gyronet_host_tests::wire::{data_frame, id11};
-use gyronet_host_tests::{qemu, require};
 use gyronet_tools::target::bench;
 use gyronet_tools::target::stack::functions;
 use std::path::{Path, PathBuf};
@@ -46,7 +46,6 @@ fn c_header_is_that_of_the_source() {
     assert!(std::fs::read(path).ok() == Some(header), "stale: run this test with GYRONET_WRITE_PAGES=1");
 }
 
-/// Returns the bytes and frames of each step.
 fn inputs() -> impl Iterator<Item = (u64, Vec<[u8; 8]>, Vec<u8>)> {
     (0..STEPS).map(|step| {
         let stands = step < 400;
@@ -71,7 +70,7 @@ fn input_file() -> Vec<u8> {
     file
 }
 
-/// Returns a frame of 11 bits as the structure of C lays it out.
+/// A frame of 11 bits as the structure of C lays it out.
 fn frame_bytes(id: u32, data: &[u8]) -> [u8; 16] {
     let mut bytes = [0; 16];
     bytes[..4].copy_from_slice(&id.to_le_bytes());
@@ -134,12 +133,8 @@ fn build(scratch: &Path) -> PathBuf {
 
 #[test]
 fn a_board_in_c_sends_what_the_host_sends() {
-    let Some(()) = qemu::available() else { return };
-    let gcc = Command::new("arm-none-eabi-gcc").arg("--version").output().map(drop);
-    let Some(()) = require::wants(require::Need::Gcc, gcc.map_err(|e| format!("arm-none-eabi-gcc: {e}")))
-    else {
-        return;
-    };
+    let Some(()) = require::qemu() else { return };
+    let Some(()) = require::program(Need::Gcc, "arm-none-eabi-gcc") else { return };
     let elf = build(Path::new(env!("CARGO_TARGET_TMPDIR")));
     let symbols = functions(&std::fs::read(&elf).expect("just built")).expect("an image");
     let panics: Vec<_> = symbols.iter().filter(|name| name.contains("panic")).collect();

@@ -1,6 +1,6 @@
 //! Flash, RAM, stack and panics of the firmware image, read from its machine code.
 
-use gyronet_host_tests::{image, qemu};
+use gyronet_host_tests::{image, require};
 use gyronet_tools::target::size::{BUDGETS, ImageSize};
 use gyronet_tools::target::stack::{ImageStack, functions};
 
@@ -22,7 +22,7 @@ fn no_panic_in_the_image() {
     // The linker keeps what is reached: what is not there is reached from nowhere.
     assert_eq!(panics(&image), [""; 0], "the image can panic");
     // The bench image can panic, and that is seen. It takes 20 s to build, and only the tests in QEMU need it as well.
-    if qemu::available().is_none() {
+    if require::qemu().is_none() {
         return;
     }
     let Some(bench) = elf("bench") else { return };

@@ -4,7 +4,7 @@
 use gyronet::model::blob::Shape;
 use gyronet::model::{Blob, GyroNet, WindowNetwork};
 use gyronet::nn::Aligned;
-use gyronet_host_tests::{image, models, qemu};
+use gyronet_host_tests::{image, models, require};
 use gyronet_tools::target::bench;
 use std::fmt::Write;
 
@@ -32,7 +32,7 @@ const BOARDS: [Board; 2] = [
     },
 ];
 
-/// Returns the lines that the image prints for a model.
+/// What the image prints for a model.
 fn lines<const LEN: usize>(units: u16) -> Vec<String> {
     let file = Aligned(models::file::<LEN>(Shape { units, linear: true }, 19));
     let mut network = GyroNet::new(Blob::new_checked(&file.0).expect("a random model"));
@@ -62,7 +62,7 @@ fn expected(units: u16) -> Vec<String> {
 
 #[test]
 fn small_cores_compute_what_the_host_does() {
-    let Some(()) = qemu::available() else { return };
+    let Some(()) = require::qemu() else { return };
     for Board { name, target, hertz, models } in BOARDS {
         let elf = image::firmware_for((name, target), env!("CARGO_TARGET_TMPDIR"), "small_core");
         let Some(elf) = elf else { return };

@@ -1,12 +1,10 @@
 //! The kernels cost no more on the target than the bars that the project has set itself, counted in
 //! the emulator (instructions, and modelled cycles at zero wait states), and they are right there.
 
-use gyronet::model::fognet::{FogNetState, MinuteNetwork};
-use gyronet::model::seconds::{Minute, STEPS, Second};
-use gyronet::model::window::{Features, WINDOW};
-use gyronet::model::{Blob, FogBlob, FogNet, GyroNet, WindowNetwork, weights};
-use gyronet::units::Angle;
-use gyronet_host_tests::{image, qemu};
+use gyronet::model::fognet::FogNetState;
+use gyronet::model::seconds::Minute;
+use gyronet::model::{FogBlob, FogNet, weights};
+use gyronet_host_tests::{image, models, require};
 use gyronet_tools::target::bench;
 use gyronet_tools::target::size::ImageSize;
 
@@ -27,7 +25,7 @@ const BARS: [Bar; 4] = [
 
 #[test]
 fn kernels_cost_no_more_than_their_bars() {
-    let Some(()) = qemu::available() else { return };
+    let Some(()) = require::qemu() else { return };
     let Some(bench) = image::firmware(env!("CARGO_TARGET_TMPDIR"), bench::IMAGE) else { return };
     let counts = bench::measure(&bench::workspace(), &bench).unwrap_or_else(|error| panic!("{error}"));
     for Bar { name, instructions, cycles } in BARS {
@@ -49,9 +47,7 @@ fn kernels_cost_no_more_than_their_bars() {
 
 #[test]
 fn kernels_fit_in_8_kib() {
-    let Some(elf) = image::firmware(env!("CARGO_TARGET_TMPDIR"), "coprocessor") else {
-        return;
-    };
+    let Some(elf) = image::firmware(env!("CARGO_TARGET_TMPDIR"), "coprocessor") else { return };
     let size = ImageSize::read(&elf).expect("an ELF file");
     println!("{size:?}");
     assert!(size.kernels > 0 && size.kernels <= 8 * 1024, "{size:?}");
@@ -61,7 +57,12 @@ fn kernels_fit_in_8_kib() {
 /// the outputs of GyroNet and FoGNet there equal this host's.
 #[test]
 fn kernels_on_the_target_equal_the_hosts() {
-    let Some(()) = qemu::available() else { return };
+    let Some(()) = require::qemu() else { return };
+    let gyronet = models::hashes::gyronet(&mut models::gyronet());
+    let (mut state, mut minute) = (FogNetState::ZERO, Minute::EMPTY);
+    let blob = FogBlob::new_checked(&weights::FOGNET.0).expect("the weights are good");
+    let fognet = models::hashes::fognet(&mut FogNet::new(blob, &mut state), &mut minute);
+    let fognet = fognet.expect("minutes are full");
     let m33 = ("mps2-an505", "thumbv8m.main-none-eabihf");
     for (board, machine) in [(("netduino-plus-2", bench::TARGET), bench::MACHINE), (m33, m33.0)] {
         let scratch = env!("CARGO_TARGET_TMPDIR");
@@ -69,61 +70,7 @@ fn kernels_on_the_target_equal_the_hosts() {
         assert!(ImageSize::read(&elf).expect("an ELF file").kernels > 0, "{machine} has the DSP extension");
         let (printed, _) = bench::emulate(machine, &elf, &[]).unwrap_or_else(|error| panic!("{error}"));
         println!("{printed}");
-        assert!(printed.contains(&format!("gyronet hash={:08x}\n", hash())), "{printed}");
-        assert!(printed.contains(&format!("fognet hash={:08x}\n", fognet_hash())), "{printed}");
-    }
-}
-
-/// Returns the CRC-32 that the self-test prints: over the corrections of sixteen random windows.
-fn hash() -> u32 {
-    let mut network = GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("the weights are good"));
-    let mut digest = gyronet::model::blob::CRC.digest();
-    let mut numbers = Xorshift(7);
-    for _ in 0..16 {
-        let window: [Features; WINDOW] = std::array::from_fn(|_| {
-            std::array::from_fn(|k| numbers.within(if k < 3 { 10 << 20 } else { 1 << 25 }))
-        });
-        let estimate = network.estimate(&window);
-        for rate in estimate.corrections {
-            digest.update(&rate.0.to_le_bytes());
-        }
-    }
-    digest.finalize()
-}
-
-/// Returns the CRC-32 that the self-test prints for FoGNet: over the estimates of three random windows.
-fn fognet_hash() -> u32 {
-    let mut state = FogNetState::ZERO;
-    let blob = FogBlob::new_checked(&weights::FOGNET.0).expect("the weights are good");
-    let mut network = FogNet::new(blob, &mut state);
-    let mut minute = Minute::EMPTY;
-    let mut digest = gyronet::model::blob::CRC.digest();
-    let mut numbers = Xorshift(8);
-    for _ in 0..3 {
-        for _ in 0..STEPS {
-            let features = std::array::from_fn(|k| {
-                numbers.within(if !(3..=5).contains(&k) { 10 << 20 } else { 1 << 25 })
-            });
-            let turn = Angle(i64::from(numbers.within(1 << 29)) << 14);
-            minute.add(Second { features, turn });
-        }
-        let window = minute.window().expect("it is full");
-        let estimate = network.estimate(&window);
-        for angle in [estimate.correction, estimate.linear] {
-            digest.update(&angle.0.to_le_bytes());
-        }
-    }
-    digest.finalize()
-}
-
-/// The images' random numbers (`src/bin/support`).
-struct Xorshift(u32);
-
-impl Xorshift {
-    fn within(&mut self, limit: i32) -> i32 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 17;
-        self.0 ^= self.0 << 5;
-        (self.0 >> 1) as i32 % (2 * limit + 1) - limit
+        assert!(printed.contains(&format!("gyronet hash={gyronet:08x}\n")), "{printed}");
+        assert!(printed.contains(&format!("fognet hash={fognet:08x}\n")), "{printed}");
     }
 }

@@ -6,7 +6,7 @@ use gyronet::sensor::asm330lhh::word::{Content, Incomplete, Outputs, Readings, W
 use gyronet::sensor::asm330lhh::{Asm330lhh, CHECKS};
 use gyronet::sensor::spi::SpiError;
 use gyronet::units::{CentiCelsius, Micros};
-use gyronet_host_tests::situations::parts::icm42688::NoDelay;
+use gyronet_host_tests::situations::icm42688::NoDelay;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::convert::Infallible;

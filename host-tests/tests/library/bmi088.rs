@@ -6,7 +6,7 @@ use gyronet::sensor::bmi088::frame::{self, State};
 use gyronet::sensor::bmi088::{Bmi088, CHECKS, OLDEST};
 use gyronet::sensor::spi::{self, SpiError};
 use gyronet::units::{CentiCelsius, Micros};
-use gyronet_host_tests::situations::parts::icm42688::NoDelay;
+use gyronet_host_tests::situations::icm42688::NoDelay;
 use std::cell::RefCell;
 use std::convert::Infallible;
 use std::rc::Rc;

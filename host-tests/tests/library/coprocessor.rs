@@ -14,11 +14,10 @@ use gyronet::pipeline::DueWindow;
 use gyronet::sample::{FogSample, PERIOD_US, Standstill};
 use gyronet::units::{Angle, Duration, Micros};
 use gyronet::{Config, Coprocessor};
-use gyronet_host_tests::inputs::wheels;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::sent::Sent;
 use gyronet_host_tests::synthetic::idling;
-use gyronet_host_tests::wire::{data_frame, id11};
+use gyronet_host_tests::wire::{data_frame, id11, wheels};
 use gyronet_tools::drive::wheel_frames::receiver;
 
 /// Frames of a sample.

@@ -4,7 +4,6 @@
 use embedded_storage::nor_flash::NorFlash;
 use gyronet::model::blob::CRC;
 use gyronet::store::firmware::{self, Label, MAX_IMAGE, Trailer, confirm, select};
-use gyronet::store::layout::RECORD_SECTOR;
 use gyronet::store::{Slot, Upload};
 use gyronet_host_tests::flash::{Cut, Flash, Region, shared};
 use gyronet_host_tests::stored::{flash_image, image};
@@ -12,7 +11,7 @@ use gyronet_host_tests::stored::{flash_image, image};
 const LABEL: Label = Label::new([1, 0, 0], "a board");
 type Step = fn(&Flash);
 
-fn region(flash: &Flash) -> Region<RECORD_SECTOR> {
+fn region(flash: &Flash) -> Region {
     Region::new(flash, 0..1 << 20)
 }
 

@@ -6,7 +6,7 @@ use gyronet::sensor::icm42688::packet::{Packet, PacketError};
 use gyronet::sensor::icm42688::{CHECKS, Icm42688};
 use gyronet::sensor::spi::SpiError;
 use gyronet::units::{CentiCelsius, Micros};
-use gyronet_host_tests::situations::parts::icm42688::{Bus, NoDelay};
+use gyronet_host_tests::situations::icm42688::{Bus, NoDelay};
 use std::convert::Infallible;
 
 /// az 1 g, gz 10 deg/s, ay -4 and gy -2 counts, 30 deg C, time 1000.

@@ -7,9 +7,9 @@ use gyronet::health::Status::{Degraded, Init};
 use gyronet::pipeline::{BoardState, Output};
 use gyronet::sample::{PERIOD_US, Standstill, WheelSample};
 use gyronet::units::{Micros, WheelSpeed};
-use gyronet_host_tests::inputs;
 use gyronet_host_tests::stream::{faults, new, statuses};
 use gyronet_host_tests::synthetic::{rate, turning};
+use gyronet_host_tests::wire;
 use gyronet_tools::drive::wheel_frames::receiver;
 
 const TIMEOUT: u64 = WheelSettings::TOYOTA.timeout.0;
@@ -21,7 +21,7 @@ fn run(ticks: u64, mut wheels: impl FnMut(u64) -> Option<f64>) -> Vec<Output> {
     let step = |tick: u64| {
         let now = Micros(tick * PERIOD_US);
         if let Some(speed) = wheels(tick) {
-            receiver.decode(&inputs::wheels(speed), now).expect("a wheel frame").expect("a good one");
+            receiver.decode(&wire::wheels(speed), now).expect("a wheel frame").expect("a good one");
         }
         let known = receiver.poll(now);
         pipeline

@@ -21,13 +21,14 @@ use gyronet::service::crash::FILE;
 use gyronet::service::event::{Crash, CrashKind, ResetCause};
 use gyronet::service::message::{Identity, Info};
 use gyronet::service::{Device, SupportedHardware};
-use gyronet::store::layout::{self, RECORD_SECTOR};
+use gyronet::store::layout;
 use gyronet::store::{ImuPart, Slot};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
-use gyronet_host_tests::flash::{Flash, MappedRegion, Region};
+use gyronet_host_tests::flash::{Flash, Region};
+use gyronet_host_tests::stored::slots;
 use gyronet_host_tests::synthetic::judged;
 
-type Board = Device<Region<RECORD_SECTOR>, MappedRegion>;
+type Board = Device<Region, Region>;
 const SUPPORTED_HARDWARE: SupportedHardware = SupportedHardware {
     imus: &[ImuPart::XsensMti],
     fogs: &[],
@@ -70,10 +71,8 @@ fn fresh() -> (Flash, Board) {
 fn start_from(flash: &Flash, running: Option<Slot>) -> Board {
     let records = Region::new(flash, layout::STORE);
     let mut board = Board::new(&SUPPORTED_HARDWARE);
-    board.begin(Some(records), Some(MappedRegion::of_running(flash, running)), Ok(()), IDENTITY);
-    let slots = MappedRegion::new(flash);
-    let blob = board.weights(Some(slots.current()), &DEFAULT.0);
-    assert!(blob.is_some());
+    board.begin(Some(records), Some(Region::mapped(flash, running)), Ok(()), IDENTITY);
+    assert!(board.weights(Some(slots(&flash.borrow())), &DEFAULT.0).is_some());
     board
 }
 

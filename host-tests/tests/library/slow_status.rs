@@ -11,9 +11,9 @@ use gyronet::pipeline::{Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::units::Micros;
 use gyronet::{Config, Coprocessor};
-use gyronet_host_tests::inputs::wheels;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::synthetic::{noisy, rate, turning};
+use gyronet_host_tests::wire::wheels;
 use gyronet_tools::drive::wheel_frames::receiver;
 
 fn coprocessor(status: Option<StatusSettings>, wheels: bool) -> Coprocessor {

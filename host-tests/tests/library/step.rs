@@ -7,8 +7,7 @@ use gyronet::health::{Faults, Status};
 use gyronet::model::{GyroNet, WindowNetwork};
 use gyronet::sample::{ImuSample, PERIOD_US, Standstill, TestSignal};
 use gyronet::units::{Micros, RangeError};
-use gyronet_host_tests::inputs::wheels;
-use gyronet_host_tests::wire::data_frame;
+use gyronet_host_tests::wire::{data_frame, wheels};
 use gyronet_tools::drive::wheel_frames::receiver;
 
 /// Frames of a sample.

@@ -18,11 +18,11 @@ use gyronet_host_tests::noise::{Noise, cases};
 use gyronet_host_tests::recordings::workspace;
 use proptest::prelude::*;
 
-fn region(flash: &Flash) -> Region<RECORD_SECTOR> {
+fn region(flash: &Flash) -> Region {
     Region::new(flash, layout::STORE)
 }
 
-fn open(flash: &Flash) -> Store<Region<RECORD_SECTOR>> {
+fn open(flash: &Flash) -> Store<Region> {
     Store::open(region(flash), 0).expect("the flash answers")
 }
 
@@ -218,7 +218,7 @@ fn slots_are_checked() {
     assert_eq!(file(&a).err(), Some(SlotError::Length(u32::MAX)));
     // A file that nobody accepted is not used, however good it is.
     let shared = Flash::default();
-    Region::<SLOT_SIZE>::new(&shared, layout::SLOTS).write(0, built_in).expect("it is blank");
+    Region::new(&shared, layout::SLOTS).write(0, built_in).expect("it is blank");
     let held = shared.borrow();
     let bytes = &held.bytes()[start..];
     let slots = [&bytes[..SLOT_SIZE], &bytes[SLOT_SIZE..]];

@@ -2,7 +2,7 @@
 //! quantisation costs, the integer network against the f32 one in its output and in the yaw that comes of it.
 
 use gyronet::model::{Blob, GyroNet, weights};
-use gyronet_host_tests::{parallel, recordings};
+use gyronet_host_tests::{models, parallel, recordings};
 use gyronet_tools::board::Board;
 use gyronet_tools::calibrate::{Cut, calibrate, config};
 use gyronet_tools::drive::stream::Drive;
@@ -22,7 +22,6 @@ const OUTPUT: f64 = 0.02;
 /// A change for the worse by more than this share of the README's number fails; one for the better is worth a new number.
 const WORSE: f64 = 0.05;
 
-/// The results of one trial that both tests look at.
 struct Trial {
     number: u32,
     drive: DriveErrors,
@@ -33,12 +32,10 @@ impl Trial {
     fn new(number: u32, path: &Path) -> Self {
         let checkpoint = gyronet_tools::bundled::checkpoint().expect("the committed checkpoint");
         let recorded = Drive::open(path).expect("a recording");
-        let blob = Blob::new_checked(&weights::GYRONET.0).expect("they come with the library");
         let (mut integer, mut float, mut beside) =
-            (GyroNet::new(blob), checkpoint.network(), checkpoint.network());
+            (models::gyronet(), checkpoint.network(), checkpoint.network());
         let mut both = Both::new(&mut integer, &mut beside);
-        let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
-        let mut default = GyroNet::new(blob);
+        let mut default = GyroNet::shipped().expect("it comes with the library");
         let paper = Some([&mut float as _, &mut both as _]);
         let networks = Networks { default: &mut default, sent: None, paper };
         let drive = DriveErrors::of(&recorded, networks, |_| {}).expect("it stands first, with a reference");
@@ -46,21 +43,21 @@ impl Trial {
     }
 }
 
-/// The trials, run once for both tests; `None` without the recordings.
+/// Run once for both tests; `None` without the recordings.
 fn trials() -> Option<&'static [Trial]> {
     static RUN: OnceLock<Vec<Trial>> = OnceLock::new();
     let drives: Vec<_> = TRIALS.into_iter().zip(recordings::trials(&TRIALS)?).collect();
     Some(RUN.get_or_init(|| parallel::map(&drives, |(trial, path)| Trial::new(*trial, path))))
 }
 
-/// The rows of the page of measurements: how each begins, its method, and the place among its numbers of the ratio of both drives to static
-/// initialisation, behind which stand those of each drive.
-const ROWS: [(&str, Method, usize); 2] =
-    [("| gyronet, live rate |", Method::LIVE, 1), ("| gyronet, delayed rate |", Method::DELAYED, 1)];
+/// The rows of the page of measurements: how each begins, and its method. Its second number is the ratio of both drives to
+/// static initialisation, behind which stand those of each drive.
+const ROWS: [(&str, Method); 2] =
+    [("| gyronet, live rate |", Method::LIVE), ("| gyronet, delayed rate |", Method::DELAYED)];
 /// The README's sentence with the ratio to the best classical method, which stands before these words.
 const OVER_BEST_CLASSICAL: &str = " of the best classical method's";
 
-/// Returns the numbers in a page's row that begins so: `(0.78 (0.95 and 0.72)` gives all three.
+/// The numbers in a page's row that begins so: `(0.78 (0.95 and 0.72)` gives all three.
 fn numbers(page: &str, row: &str) -> Vec<f64> {
     let text = std::fs::read_to_string(recordings::workspace().join(page)).expect("a page");
     let line = text.lines().find_map(|line| line.strip_prefix(row));
@@ -69,7 +66,7 @@ fn numbers(page: &str, row: &str) -> Vec<f64> {
     numbers.filter(|number: &f64| number.fract() != 0.0).collect()
 }
 
-/// Returns the number before these words of the README, wherever its lines break.
+/// Wherever the lines of the README break.
 fn number_before(words: &str) -> f64 {
     let text = std::fs::read_to_string(recordings::workspace().join("README.md")).expect("a page");
     let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -77,11 +74,17 @@ fn number_before(words: &str) -> f64 {
     before.rsplit(' ').next().and_then(|word| word.parse().ok()).expect("a number")
 }
 
-/// Fails where a ratio is not the page's.
 fn hold(what: &str, ratio: f64, readme: f64) {
     println!("{what}: {ratio:.3}; the page says {readme}");
     assert!(ratio <= readme * (1.0 + WORSE), "{what}: {ratio:.3}, the page says {readme}");
     assert!(ratio >= readme * (1.0 - WORSE), "{what}: {ratio:.3} is better: the page says {readme}");
+}
+
+/// The errors of the default model alone.
+pub fn by_default(drive: &Drive) -> DriveErrors {
+    let mut default = GyroNet::shipped().expect("it comes with the library");
+    let networks = Networks { default: &mut default, sent: None, paper: None };
+    DriveErrors::of(drive, networks, |_| {}).expect("it stands first, with a reference")
 }
 
 #[test]
@@ -91,10 +94,10 @@ fn rates_are_as_good_as_the_pages_say() {
     let rows = report.mean.expect("two drives");
     let error = |rows: &PerMethod<Row>, method| rows[method].error.mean_1s_rad.expect("whole seconds");
     let to_static = |rows: &PerMethod<Row>, method| error(rows, method) / error(rows, Method::STATIC);
-    for (row, method, place) in ROWS {
+    for (row, method) in ROWS {
         let readme = numbers("tools/MEASUREMENTS.md", row);
-        hold(row, to_static(&rows, method), readme[place]);
-        for (trial, readme) in trials.iter().zip(&readme[place + 1..]) {
+        hold(row, to_static(&rows, method), readme[1]);
+        for (trial, readme) in trials.iter().zip(&readme[2..]) {
             let what = format!("trial {:02}, {method:?} to static", trial.number);
             hold(&what, to_static(&trial.drive.methods, method), *readme);
         }
@@ -121,9 +124,7 @@ fn a_calibrated_unit_is_as_good_as_the_page_says() {
         let mut drive = Drive::open(path).expect("a recording");
         [None, Some(unit.gyro_map)].map(|map| {
             drive.gyro_map = map;
-            let mut default = GyroNet::new(blob);
-            let networks = Networks { default: &mut default, sent: None, paper: None };
-            let errors = DriveErrors::of(&drive, networks, |_| {}).expect("it stands first");
+            let errors = by_default(&drive);
             let error = |method| errors.methods[method].error.mean_1s_rad.expect("whole seconds");
             [Method::STATIC, Method::LIVE, Method::DELAYED].map(error)
         })

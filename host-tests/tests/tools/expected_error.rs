@@ -1,13 +1,10 @@
 //! The errors of recorded good seconds lie inside the expected error at least as often as is said, and none is off by
 //! more than four of them.
 
-use gyronet::model::{Blob, GyroNet, weights};
+use crate::accuracy::by_default;
 use gyronet_host_tests::{parallel, recordings};
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::expected_error::{ExpectedError, Seconds};
-use gyronet_tools::evaluate::rates::Networks;
-use gyronet_tools::evaluate::report::DriveErrors;
-use std::path::Path;
 
 /// A car and a truck with two units: the drives with a yaw rate as reference that begin at rest.
 const VEHICLES: [(&str, &[&str]); 2] = [
@@ -17,15 +14,6 @@ const VEHICLES: [(&str, &[&str]); 2] = [
 /// Least share of a vehicle's seconds, straight and turning apart.
 const LEAST: f64 = 0.6;
 const LARGEST: f64 = 4.0;
-
-fn expected_error(path: &Path) -> ExpectedError {
-    let drive = Drive::open(path).expect("a recording");
-    let mut default =
-        GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library"));
-    let networks = Networks { default: &mut default, sent: None, paper: None };
-    let errors = DriveErrors::of(&drive, networks, |_| {}).expect("it stands first, with a reference");
-    errors.expected_error.expect("against a yaw rate")
-}
 
 #[test]
 fn recorded_errors_lie_inside_it() {
@@ -39,7 +27,10 @@ fn recorded_errors_lie_inside_it() {
             folder.join(format!("{drive}{rate}.csv"))
         };
         let paths: Vec<_> = drives.iter().map(named).collect();
-        let found = parallel::map(&paths, |path| expected_error(path));
+        let found = parallel::map(&paths, |path| {
+            let drive = Drive::open(path).expect("a recording");
+            by_default(&drive).expected_error.expect("against a yaw rate")
+        });
         for (drive, found) in drives.iter().zip(&found) {
             println!("{vehicle}/{drive}: {found}");
         }

@@ -101,9 +101,8 @@ fn the_heading_of_an_hour_in_kingston() {
     let yaw = yaw(&gyro, &speed, latitude);
     let (first, last) = (gyro[0][0].max(reference[0][0]), gyro.last().expect("rows")[0]);
     let from = last - TESTED * (last - first);
-    let own = |time: f64| {
-        at(&gyro.iter().zip(&yaw).map(|(row, yaw)| vec![row[0], *yaw]).collect::<Vec<_>>(), 1, time)
-    };
+    let yaw: Vec<Vec<f64>> = gyro.iter().zip(yaw).map(|(row, yaw)| vec![row[0], yaw]).collect();
+    let own = |time: f64| at(&yaw, 1, time);
     let truth = |time: f64| -at(&reference, 9, time).to_radians();
     let end = last.min(reference.last().expect("rows")[0]);
     let error = (own(end) - own(from)) - (truth(end) - truth(from));
@@ -113,9 +112,7 @@ fn the_heading_of_an_hour_in_kingston() {
     }
     let by_earth =
         turned - EARTH_RATE * latitude.to_radians().sin() * (end - from) - (truth(end) - truth(from));
-    println!(
-        "last {:.0} s: {error:+.5} rad at the end, {by_earth:+.5} by the Earth's rate alone",
-        end - from
-    );
+    let seconds = end - from;
+    println!("last {seconds:.0} s: {error:+.5} rad at the end, {by_earth:+.5} by the Earth's rate alone");
     assert!(error.abs() <= FINAL && error.abs() < by_earth.abs(), "{error} rad");
 }

@@ -37,7 +37,7 @@ fn minute(window: &Window) -> Minute {
     minute
 }
 
-/// Returns the part of a correction that is not linear, by both networks, rad.
+/// The part of a correction that is not linear, by both networks, rad.
 fn bent(integer: &mut FogNet<'_, '_>, float: &mut FogNetF32<'_>, window: &Window) -> [f64; 2] {
     let minute = minute(window);
     let window = minute.window().expect("a minute");

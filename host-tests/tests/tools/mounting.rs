@@ -1,14 +1,12 @@
 //! The mounting of the board in the vehicle must not show in the yaw rate.
 
 use gyronet::bias::StaticError;
-use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::mounting::{LevelError, Rotation};
 use gyronet::pipeline::PipelineConfig;
 use gyronet::units::SpecificForce;
 use gyronet_host_tests::noise::cases;
-use gyronet_host_tests::recordings;
-use gyronet_host_tests::stream;
 use gyronet_host_tests::synthetic::{force, rate, turning};
+use gyronet_host_tests::{models, recordings, stream};
 use gyronet_tools::bundled;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::replay::Replay;
@@ -18,7 +16,7 @@ use proptest::prelude::*;
 /// The angle by which the sensor is turned, about x, then about y, deg.
 const TURNED: f32 = 30.0;
 
-/// Returns the readings of a sensor that is turned by 30 degrees about x and y on the same drive: the inverse
+/// The readings of a sensor that is turned by 30 degrees about x and y on the same drive: the inverse
 /// of its mounting, as the transpose of a rotation is.
 fn turned(recording: &Recording) -> Recording {
     let (sin, cos) = f64::from(TURNED).to_radians().sin_cos();
@@ -41,9 +39,7 @@ fn turned(recording: &Recording) -> Recording {
 
 fn yaw_rates(recording: &Recording, mounting: Rotation, levelling: bool) -> Vec<f64> {
     let config = PipelineConfig { mounting, levelling, ..PipelineConfig::DEFAULT };
-    let mut network =
-        GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("they come with the library"));
-    let drive = Replay::run(recording, &config, WheelFrames::new(recording), &mut network);
+    let drive = Replay::run(recording, &config, WheelFrames::new(recording), &mut models::gyronet());
     drive.expect("it stands still first").delayed().map(|rate| rate.rate.rad_per_sec()).collect()
 }
 
@@ -85,17 +81,14 @@ fn a_sensor_turned_by_30_degrees_gives_the_same_yaw_on_the_simulated_drive() {
 
 #[test]
 fn a_sensor_turned_by_30_degrees_gives_the_same_yaw_on_a_real_drive() {
-    let Some(path) = recordings::trial(8) else {
-        return;
-    };
+    let Some(path) = recordings::trial(8) else { return };
     check(&Recording::read(&path).expect("a recording"), 0.0014, 0.01);
 }
 
 #[test]
 fn what_shows_no_vertical_is_refused() {
-    let config = PipelineConfig::DEFAULT;
     for (up, upside_down) in [(5.0, false), (-9.81, true)] {
-        let mut pipeline = gyronet::pipeline::Pipeline::new(config);
+        let mut pipeline = stream::new();
         let samples = (0..300).map(|tick| {
             let mut sample = turning(tick, rate(0.001));
             sample.specific_force[2] = force(up);

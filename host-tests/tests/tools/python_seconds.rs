@@ -3,7 +3,7 @@
 
 use gyronet::fog::FogConfig;
 use gyronet::model::fognet::{FogEstimate, MinuteNetwork};
-use gyronet::model::seconds::{FRAMES, STEPS, SecondsWindow};
+use gyronet::model::seconds::{FRAMES, STEPS, Second, SecondsWindow};
 use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require;
@@ -39,18 +39,12 @@ struct Windows(Vec<Vec<[f64; FEATURES]>>);
 
 impl MinuteNetwork for Windows {
     fn estimate(&mut self, window: &SecondsWindow<'_>) -> FogEstimate {
-        let row = |second: &gyronet::model::seconds::Second| {
+        let row = |second: &Second| -> [f64; FEATURES] {
             let [fx, fy, fz, wx, wy, wz, left, right] = second.features;
             let force = [fx, fy, fz].map(|code| SpecificForce(code).metre_per_sec2());
             let rate = [wx, wy, wz].map(|code| AngularRate(code).rad_per_sec());
-            let way =
-                [left, right].map(|code| f64::from(code) / f64::from(1u32 << WheelSpeed::FRACTION_BITS));
-            let mut row = [0.0; FEATURES];
-            row[..3].copy_from_slice(&force);
-            row[3..6].copy_from_slice(&rate);
-            row[6..8].copy_from_slice(&way);
-            row[8] = second.turn.rad();
-            row
+            let way = [left, right].map(|code| f64::from(code) / f64::from(1 << WheelSpeed::FRACTION_BITS));
+            [&force[..], &rate, &way, &[second.turn.rad()]].concat().try_into().expect("nine of them")
         };
         self.0.push(window.iter().map(row).collect());
         FogEstimate { correction: Angle::ZERO, linear: Angle::ZERO, gain: 0, clamped_inputs: 0 }

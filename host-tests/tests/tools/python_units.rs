@@ -2,7 +2,7 @@
 //! vehicle files, filters of the rivals, errors of trajectories. Those of the package `gyronet`: import, and the board.
 
 use gyronet::coprocessor::Config;
-use gyronet::model::{Blob, GyroNet, weights};
+use gyronet::model::GyroNet;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require;
 use gyronet_tools::board::Board;
@@ -44,7 +44,7 @@ fn the_unit_tests_of_the_python_package_pass() {
 fn replayed(folder: &Path) {
     let recording = bundled::simulated_drive().unwrap();
     let drive = Drive::from(&recording);
-    let network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).unwrap());
+    let network = GyroNet::shipped().unwrap();
     let file = |name| BufWriter::new(File::create(folder.join(name)).unwrap());
     let (mut log, mut table) = (Log::new(file("can.log")), Table::new(file("rates.csv")).unwrap());
     for step in Steps::new(&drive, Board::new(Config::DEFAULT, drive.wheels(), network)).unwrap() {

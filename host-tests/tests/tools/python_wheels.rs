@@ -36,9 +36,7 @@ fn rear_left(python: &str, dbc: &str) -> WheelSignal {
 
 #[test]
 fn the_board_accepts_what_from_dbc_writes() {
-    let Some(python) = require::python(&["cantools"]) else {
-        return;
-    };
+    let Some(python) = require::python(&["cantools"]) else { return };
     let [toyota, vw, hyundai, wide] = [TOYOTA, VW, HYUNDAI, WIDE].map(|dbc| rear_left(&python, dbc));
     let fault = toyota.valid_when.unwrap();
     assert_eq!((fault.field.start(), fault.value, toyota.field.bits()), (7, 0, 15));

@@ -4,10 +4,10 @@ use crate::standstill_truth::{Truth, read};
 use gyronet::coprocessor::{Clock, Config, Coprocessor};
 use gyronet::model::Estimate;
 use gyronet::pipeline::{BoardState, Pipeline, PipelineConfig};
-use gyronet::sample::{ImuSample, PERIOD_US, Standstill, Validity, WHEELS, WheelSample};
-use gyronet::units::{Micros, WheelSpeed};
+use gyronet::sample::{ImuSample, Standstill, WHEELS, WheelSample};
+use gyronet::units::{AngularRate, WheelSpeed};
 use gyronet_host_tests::recordings;
-use gyronet_host_tests::synthetic::{force, rate};
+use gyronet_host_tests::synthetic::{force, rate, turning};
 use gyronet_tools::board::Uncorrected;
 use gyronet_tools::drive::recording::{Recording, Row};
 use gyronet_tools::drive::wheel_frames::{self, WheelFrames};
@@ -18,20 +18,18 @@ const LARGEST_YAW: f64 = 0.2;
 /// The largest yaw with static initialisation alone, deg: what the other two are compared with.
 const DRIFT: RangeInclusive<f64> = 25.0..=40.0;
 
-/// Returns the sample of a row in g and deg/s, of a part with z down and forward x.
+/// The sample of a row in g and deg/s, of a part with z down and forward x.
 fn sample(tick: u64, line: &str) -> ImuSample {
     let fields: Vec<f64> = line.split(',').map(|field| field.parse().expect("a number")).collect();
     let &[_, ax, ay, az, gx, gy, gz] = fields.as_slice() else { panic!("seven columns: {line}") };
     ImuSample {
-        time: Micros(tick * PERIOD_US),
         specific_force: [ax, -ay, -az].map(|g| force(g * 9.806_65)),
         angular_rate: [gx, -gy, -gz].map(|dps| rate(dps.to_radians())),
-        temperature: None,
-        validity: Validity::Good,
+        ..turning(tick, AngularRate::ZERO)
     }
 }
 
-/// Returns the largest and the last yaw, deg, of half an hour at rest, and the number of zero-rate updates.
+/// The largest and the last yaw, deg, of half an hour at rest, and the number of zero-rate updates.
 fn stand(text: &str, config: PipelineConfig, wheels: bool) -> (f64, f64, u32) {
     let mut pipeline = Pipeline::new(config);
     let (mut largest, mut last) = (0.0f64, 0.0);
@@ -78,7 +76,7 @@ fn half_an_hour_at_rest_turns_by_no_more_than_the_bias_allows() {
 const CLAIMED_S: f64 = 0.5;
 const FOUND: [f64; 2] = [0.95, 0.6];
 
-/// Returns at which rows the board says that the vehicle stands.
+/// At which rows the board says that the vehicle stands.
 fn claims(recording: &Recording, with_wheels: bool) -> Option<Vec<bool>> {
     let mut wheels =
         with_wheels.then(|| WheelFrames::new(recording)).map_or(Some(None), |wheels| wheels.map(Some))?;
@@ -102,7 +100,7 @@ fn claims(recording: &Recording, with_wheels: bool) -> Option<Vec<bool>> {
 #[test]
 fn standstills_of_every_recording_with_a_speed() {
     let Some(paths) = recordings::with_speed() else { return };
-    println!("recording; with wheels, without: s of motion claimed, stops of 3 s found");
+    println!("recording, s of motion claimed, stops of 3 s found");
     let (mut stops, mut used, mut failed) = ([0; 2], [0; 2], Vec::new());
     let rows = gyronet_host_tests::parallel::map(&paths, |path| {
         let recording = read(path);
@@ -119,13 +117,10 @@ fn standstills_of_every_recording_with_a_speed() {
         Some((recording.name().to_owned(), judged))
     });
     for (name, judged) in rows.into_iter().flatten() {
-        let text = judged.map(|judged| {
-            judged.map_or("-".to_owned(), |(claimed, found, all)| format!("{claimed:.2} s, {found} of {all}"))
-        });
-        println!("{name:<28} {:<20} {}", text[0], text[1]);
-        for (kind, (claimed, found, all)) in
-            judged.into_iter().enumerate().filter_map(|(kind, judged)| Some((kind, judged?)))
-        {
+        for (kind, judged) in judged.into_iter().enumerate() {
+            let Some((claimed, found, all)) = judged else { continue };
+            let how = ["with wheels", "without"][kind];
+            println!("{name:<28} {how:<11} {claimed:.2} s, {found} of {all}");
             (stops[kind], used[kind]) = (stops[kind] + all, used[kind] + found);
             failed.extend((claimed > CLAIMED_S).then(|| format!("{name}: {claimed} s of motion claimed")));
         }

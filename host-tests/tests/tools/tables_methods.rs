@@ -53,12 +53,11 @@ impl Scratch {
     }
 }
 
-/// Simulates a sequence of two minutes.
 fn sequence(name: &str) -> Sequence {
     simulate(&Spec { name: name.into(), seconds: 120, device: 1, run: 5 })
 }
 
-/// Returns a row of the format for each step; places are from the sequence's first.
+/// A row of the format for each step; places are from the sequence's first.
 fn rows(sequence: &Sequence, pose: impl Fn(usize) -> (Point, f64)) -> Vec<String> {
     let row = |k: usize| {
         let ([x, y], yaw) = pose(k);
@@ -77,8 +76,7 @@ fn truth(sequence: &Sequence) -> Vec<String> {
 
 #[test]
 fn the_truth_has_no_error() {
-    let scratch = Scratch::new();
-    let sequence = sequence("k");
+    let (scratch, sequence) = (Scratch::new(), sequence("k"));
     // As lwoi writes: whole seconds, so a little less than the sequence.
     let mut rows = truth(&sequence);
     rows.truncate(rows.len() - 95);
@@ -90,8 +88,7 @@ fn the_truth_has_no_error() {
 
 #[test]
 fn a_known_error_is_found() {
-    let scratch = Scratch::new();
-    let sequence = sequence("k");
+    let (scratch, sequence) = (Scratch::new(), sequence("k"));
     let steps = &sequence.steps;
     let shifted = rows(&sequence, |k| {
         let ([x, y], turned) = (steps[k].position, if k > 5_000 { 0.02 } else { 0.0 });
@@ -114,8 +111,7 @@ fn a_known_error_is_found() {
 
 #[test]
 fn ten_poses_a_second_are_enough() {
-    let scratch = Scratch::new();
-    let sequence = sequence("k");
+    let (scratch, sequence) = (Scratch::new(), sequence("k"));
     let slow: Vec<String> = truth(&sequence).into_iter().step_by(10).collect();
     scratch.write(&sequence, &slow);
     let errors = scratch.compared(&sequence);
@@ -124,8 +120,7 @@ fn ten_poses_a_second_are_enough() {
 
 #[test]
 fn what_cannot_be_compared_is_left_out_and_named() {
-    let scratch = Scratch::new();
-    let sequence = sequence("k");
+    let (scratch, sequence) = (Scratch::new(), sequence("k"));
     let good = truth(&sequence);
     let steps = &sequence.steps;
     let shifted = |seconds: f64| {

@@ -1,7 +1,7 @@
 //! A tilted sensor costs little on simulated drives, whose truth is the rate about the vertical: four tilts on three
 //! drives of 20 minutes, most of it before the first turn.
 
-use gyronet::model::{Blob, GyroNet, weights};
+use gyronet::model::GyroNet;
 use gyronet::pipeline::PipelineConfig;
 use gyronet_host_tests::parallel;
 use gyronet_tools::drive::recording::Recording;
@@ -15,7 +15,7 @@ const SEEDS: [u64; 3] = [1, 2, 3];
 /// Roll and pitch of the sensor, deg.
 const TILTS: [[f64; 2]; 4] = [[7.0, 0.0], [-7.0, 0.0], [0.0, 7.0], [0.0, -7.0]];
 
-/// Returns the mean 1 s error and the RMS of the heading error over the drive, rad.
+/// The mean 1 s error and the RMS of the heading error over the drive, rad.
 fn run(seed: u64, [roll, pitch]: [f64; 2], levelling: bool) -> [f64; 2] {
     let mut config = Config { seed, seconds: SECONDS, ..Config::DEFAULT };
     config.mems.mount = [pitch, roll].map(f64::to_radians);
@@ -23,7 +23,7 @@ fn run(seed: u64, [roll, pitch]: [f64; 2], levelling: bool) -> [f64; 2] {
     csv::write(&config, &mut bytes).expect("memory");
     let recording = Recording::parse("simulated.csv", &bytes[..]).expect("a drive");
     let config = PipelineConfig { levelling, ..PipelineConfig::DEFAULT };
-    let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("built in"));
+    let mut network = GyroNet::shipped().expect("built in");
     let drive =
         Replay::run(&recording, &config, WheelFrames::new(&recording), &mut network).expect("at rest");
     let rates: Vec<f64> = drive.delayed().map(|rate| rate.rate.rad_per_sec()).collect();

@@ -3,10 +3,10 @@
 //! drives alone failed here: a turn faster than theirs was taken for an error and marked good.
 
 use gyronet::model::window::{Features, WINDOW};
-use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
+use gyronet::model::{GyroNet, WindowNetwork};
 use gyronet::pipeline::{BoardState, Pipeline, PipelineConfig};
 use gyronet::units::{AngularRate, SpecificForce};
-use gyronet_host_tests::recordings;
+use gyronet_host_tests::{models, recordings};
 use gyronet_tools::bundled;
 use gyronet_tools::drive::recording::Recording;
 
@@ -21,7 +21,7 @@ const YAW_RATE: usize = 5;
 /// Largest change of the mean correction, rad/s: 1 % of a turn of 0.1 rad/s.
 const LARGEST: f64 = 0.001;
 
-/// Returns every twentieth window of the pipeline.
+/// Every twentieth one of the pipeline.
 fn windows(recording: &Recording) -> Vec<[Features; WINDOW]> {
     let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
     let outputs =
@@ -29,7 +29,7 @@ fn windows(recording: &Recording) -> Vec<[Features; WINDOW]> {
     outputs.filter_map(|output| output.window).map(|due| due.features).step_by(20).collect()
 }
 
-/// Returns the mean correction over all windows with a turn added, rad/s.
+/// The mean correction over all windows with a turn added, rad/s.
 fn mean_correction(network: &mut GyroNet<'_>, windows: &[[Features; WINDOW]], yaw_rate: f32) -> f64 {
     let rate = AngularRate::from_rad_per_sec(yaw_rate).expect("in range").0;
     let lateral = (yaw_rate * SPEED).clamp(-LATERAL_MAX, LATERAL_MAX);
@@ -47,8 +47,7 @@ fn mean_correction(network: &mut GyroNet<'_>, windows: &[[Features; WINDOW]], ya
 }
 
 fn check(recording: &Recording) {
-    let mut network =
-        GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("they come with the library"));
+    let mut network = models::gyronet();
     let windows = windows(recording);
     assert!(windows.len() > 50, "{} windows", windows.len());
     let straight = mean_correction(&mut network, &windows, 0.0);

@@ -4,7 +4,7 @@
 
 use gyronet::can;
 use gyronet::coprocessor;
-use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
+use gyronet::model::{GyroNet, WindowNetwork};
 use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::{RATE_HZ, Standstill, WheelSample};
 use gyronet::service::Learner;
@@ -42,7 +42,6 @@ fn simulate(device: u64, trip: Trip, day: u64, seconds: u32) -> Recording {
     Recording::parse("trip.csv", &drive[..]).expect("a drive that begins at rest")
 }
 
-/// Feeds a trip to the board's learner.
 fn learn(trip: &Recording, learned: &mut Learned) {
     let (mut learner, mut slow) = (Learner::new(), 0);
     for row in &trip.rows {
@@ -60,7 +59,7 @@ fn learn(trip: &Recording, learned: &mut Learned) {
     }
 }
 
-/// Returns the heading error at the end of a drive, deg, by this board, which has no courses.
+/// The heading error at the end of a drive, deg, by this board, which has no courses.
 fn at_the_end(drive: &Drive<'_>, board: Board<impl WindowNetwork>) -> f64 {
     let steps =
         Steps::new(drive, board).expect("a drive in memory").map(|step| step.expect("a start at rest"));
@@ -70,7 +69,7 @@ fn at_the_end(drive: &Drive<'_>, board: Board<impl WindowNetwork>) -> f64 {
     off.sum::<f64>().to_degrees()
 }
 
-/// Returns the heading error of the last minute of a drive, deg, by this board, which has no courses in it.
+/// The heading error of the last minute of a drive, deg, by a board that has no courses in it.
 fn last_minute(drive: &Recording, mut board: Board<impl WindowNetwork>) -> f64 {
     let hidden = drive.rows.len() - MINUTE;
     let steps = drive.rows.iter().enumerate().filter_map(|(k, row)| {
@@ -83,10 +82,10 @@ fn last_minute(drive: &Recording, mut board: Board<impl WindowNetwork>) -> f64 {
     off.sum::<f64>().to_degrees()
 }
 
-/// Returns the heading errors of the motorway, deg, at its end and of its last minute: by zero-rate updates, and with what
+/// The heading errors of the motorway, deg, at its end and of its last minute: by zero-rate updates, and with what
 /// was learnt, in the last minute after courses until then.
 fn errors(device: u64) -> [[f64; 2]; 2] {
-    let mut network = GyroNet::new(Blob::new_checked(&weights::DEFAULT.0).expect("the built-in weights"));
+    let mut network = GyroNet::shipped().expect("the built-in weights");
     let mut learned = Learned::NOTHING;
     for day in 0..DAYS {
         learn(&simulate(device, Trip::Town, day, TOWN_S), &mut learned);

@@ -6,7 +6,7 @@ use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{Checksum, WheelFrame, WheelSettings, WheelSignal};
 use gyronet::model::weights;
 use gyronet::service::message::Refusal;
-use gyronet::store::layout::{RECORD_SECTOR, STORE};
+use gyronet::store::layout::STORE;
 use gyronet::store::{Access, Configuration, FieldError, Record, Store, StoreError};
 use gyronet::uds::signature;
 use gyronet::units::{Duration, WheelSpeed};
@@ -367,7 +367,7 @@ fn a_challenge_that_comes_twice_is_none() {
 #[test]
 fn a_record_that_cannot_be_read_locks_and_is_reported() {
     let (flash, _, _) = locked();
-    let mut store = Store::open(Region::<RECORD_SECTOR>::new(&flash, STORE), 0).expect("it is whole");
+    let mut store = Store::open(Region::new(&flash, STORE), 0).expect("it is whole");
     store.set(&Later(0)).expect("there is room");
     let mut bench = Bench::new(&flash);
     assert_eq!(access(&mut bench).0, 1);

@@ -19,7 +19,7 @@ use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Calibration, Learned, StoreError};
 use gyronet::store::{Configuration, Field, FieldError, FlashFault, FogGyro, FogPart, ImuPart, Mounting};
 use gyronet::units::SpecificForce;
-use gyronet_host_tests::flash::{Flash, MappedRegion, Region};
+use gyronet_host_tests::flash::{Flash, Region};
 
 #[test]
 fn configuration_is_kept_whole() {
@@ -132,7 +132,7 @@ fn nothing_is_written_with_an_unlocked_controller_and_the_standstill_gate_holds(
     assert_eq!(start(&flash).set_configuration(&wanted), Ok(()));
     let mut board = Board::new(&SUPPORTED_HARDWARE);
     let records = Region::new(&flash, layout::STORE);
-    board.begin(Some(records), Some(MappedRegion::new(&flash)), Err(FlashFault::Unlocked), IDENTITY);
+    board.begin(Some(records), Some(Region::mapped(&flash, None)), Err(FlashFault::Unlocked), IDENTITY);
     assert_eq!(*board.configuration(), wanted);
     let about = info(&mut board);
     assert_eq!((about.flash, about.writable), (FlashState::Ready, false));

@@ -7,7 +7,6 @@ use gyronet::service::device::{Firmware, FirmwareState};
 use gyronet::service::message::{BLOCK, Refusal};
 use gyronet::store::Slot;
 use gyronet::store::firmware::{FirmwareError, LABEL, Label, MAX_IMAGE, Trailer, select};
-use gyronet::store::layout::RECORD_SECTOR;
 use gyronet::store::slots::SlotError;
 use gyronet_host_tests::flash::{Flash, Region};
 use gyronet_host_tests::stored::{flash_image, image};
@@ -31,7 +30,7 @@ fn board() -> (Flash, Bench) {
 }
 
 fn boot(flash: &Flash, has_failed: bool) -> Option<Slot> {
-    select(&mut Region::<RECORD_SECTOR>::new(flash, 0..1 << 20), has_failed)
+    select(&mut Region::new(flash, 0..1 << 20), has_failed)
 }
 
 fn session(flash: &Flash, running: Slot) -> Bench {
@@ -252,7 +251,7 @@ fn an_interrupted_update_is_repeated_with_the_same_signature_once() {
     let mut on_trial = session(&flash, Slot::B);
     on_trial.expect(&signed, &[0x7F, 0x2E, 0x31]);
     assert_eq!(refusal(&on_trial), Some(Refusal::Counter { found: 7, newest: 7 }));
-    let mut region = Region::<RECORD_SECTOR>::new(&flash, 0..1 << 20);
+    let mut region = Region::new(&flash, 0..1 << 20);
     assert!(Trailer::read(&mut region, Slot::B).is_some_and(|trailer| trailer.number == 2));
 }
 

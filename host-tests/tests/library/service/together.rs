@@ -15,12 +15,11 @@ use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::layout::STORE;
 use gyronet::store::slots::{SlotError, WeightSource};
 use gyronet::store::{Configuration, FieldError, FogPart, ImuPart, Slot, StoreError};
-use gyronet_host_tests::flash::{Flash, MappedRegion, Region};
+use gyronet_host_tests::flash::{F405, Flash, Region, shared};
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::ram_flash::RamFlash;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::settings;
-use gyronet_host_tests::stored::{open, other_weights, upload};
+use gyronet_host_tests::stored::{open, other_weights, slots, upload};
 use std::collections::{BTreeMap, HashSet};
 
 const HZ: u32 = 168_000_000;
@@ -35,11 +34,11 @@ const HARDWARE: SupportedHardware = SupportedHardware {
 const NO_WHEELS: WheelSettings =
     WheelSettings { frames: [None; 4], signals: [None; 4], ..WheelSettings::TOYOTA };
 
-type Board = Device<RamFlash<16384>, RamFlash<16384>>;
+type Board = Device<Region, Region>;
 
 fn board(built_in: &[u8]) -> Board {
     let mut board = Board::new(&HARDWARE);
-    board.begin(Some(RamFlash::new(&[])), None, Ok(()), IDENTITY);
+    board.begin(Some(Region::new(&shared(F405::up_to(STORE.end as usize)), STORE)), None, Ok(()), IDENTITY);
     assert!(board.weights(None, built_in).is_some());
     board
 }
@@ -231,8 +230,7 @@ fn weights_that_are_too_slow_for_the_stride_are_not_activated() {
 fn started(flash: &Flash, identity: Identity) -> super::Board {
     let mut board = super::Board::new(&super::SUPPORTED_HARDWARE);
     board.begin(Some(Region::new(flash, STORE)), None, Ok(()), identity);
-    let slots = MappedRegion::new(flash);
-    assert!(board.weights(Some(slots.current()), &weights::DEFAULT.0).is_some());
+    assert!(board.weights(Some(slots(&flash.borrow())), &weights::DEFAULT.0).is_some());
     board
 }
 

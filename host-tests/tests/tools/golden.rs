@@ -1,27 +1,30 @@
-//! GyroNet on windows whose outputs PyTorch has computed: the f32 reference layer by layer, and the integer network
-//! of the built-in weight file in its output.
+//! Both networks on windows whose outputs PyTorch has computed: the f32 references layer by layer, and the integer
+//! GyroNet of the built-in weight file in its output.
 
+use gyronet::model::WindowNetwork;
 use gyronet::model::blob::HIDDEN;
+use gyronet::model::fognet_blob::{HIDDEN2, INPUTS};
+use gyronet::model::fognet_f32::FogLayerOutputs;
+use gyronet::model::gyronet_f32::LayerOutputs;
+use gyronet::model::seconds::STEPS;
 use gyronet::model::window::{FEATURES, Features, WINDOW};
-use gyronet::model::{Blob, GyroNet, WindowNetwork, weights};
 use gyronet::units::{AngularRate, SpecificForce};
 use gyronet_host_tests::golden::{Golden, WINDOWS};
+use gyronet_host_tests::models;
 use gyronet_host_tests::recordings::workspace;
-use gyronet_tools::network::checkpoint::{self, Checkpoint};
+use gyronet_tools::bundled;
+use gyronet_tools::network::checkpoint::{Checkpoint, FogNet};
 
 #[test]
-fn every_layer_equals_pytorch() {
-    let path = workspace().join("tools/weights/gyronet.safetensors");
-    let checkpoint = Checkpoint::<checkpoint::GyroNet>::read(&path).expect("the committed checkpoint");
+fn every_layer_of_gyronet_equals_pytorch() {
+    let checkpoint = bundled::checkpoint().expect("the committed checkpoint");
     let network = checkpoint.network();
     let golden = Golden::read("gyronet");
 
     let input = golden.tensor("input", &[WINDOWS, WINDOW, FEATURES]);
     let (windows, _) = input.as_chunks::<FEATURES>().0.as_chunks::<WINDOW>();
     let outputs: Vec<_> = windows.iter().map(|window| network.layers(window)).collect();
-    let flat = |layer: fn(&gyronet::model::gyronet_f32::LayerOutputs) -> Vec<f32>| {
-        outputs.iter().flat_map(layer).collect::<Vec<f32>>()
-    };
+    let flat = |layer: fn(&LayerOutputs) -> Vec<f32>| outputs.iter().flat_map(layer).collect::<Vec<f32>>();
     for (name, shape, ours) in [
         ("normalised", &[WINDOWS, WINDOW, FEATURES][..], flat(|o| o.normalised.concat())),
         ("layer1", &[WINDOWS, WINDOW, 2 * HIDDEN], flat(|o| o.layer1.concat())),
@@ -29,6 +32,35 @@ fn every_layer_equals_pytorch() {
         ("gyro_error", &[WINDOWS, WINDOW], flat(|o| o.gyro_error.to_vec())),
     ] {
         golden.compare(name, shape, &ours);
+    }
+}
+
+#[test]
+fn every_layer_of_fognet_equals_pytorch() {
+    let path = workspace().join("tools/weights/fognet.safetensors");
+    let checkpoint = Checkpoint::<FogNet>::read(&path).expect("the committed checkpoint");
+    let network = checkpoint.network();
+    let golden = Golden::read("fognet");
+
+    let input = golden.tensor("input", &[WINDOWS, STEPS, INPUTS]);
+    let (windows, _) = input.as_chunks::<INPUTS>().0.as_chunks::<STEPS>();
+    let outputs: Vec<_> = windows.iter().map(|window| network.layers(window)).collect();
+    let flat = |layer: fn(&FogLayerOutputs) -> Vec<f32>| outputs.iter().flat_map(layer).collect::<Vec<f32>>();
+    for (name, shape, ours) in [
+        ("normalised", &[WINDOWS, STEPS, INPUTS][..], flat(|o| o.normalised.concat())),
+        ("f1", &[WINDOWS, STEPS], flat(|o| o.f1.to_vec())),
+        ("layer2_last", &[WINDOWS, 2 * HIDDEN2], flat(|o| o.layer2_last.to_vec())),
+        ("f2", &[WINDOWS], flat(|o| vec![o.f2])),
+        ("f3", &[WINDOWS], flat(|o| vec![o.f3])),
+        ("correction", &[WINDOWS], flat(|o| vec![o.correction])),
+        ("prediction", &[WINDOWS], flat(|o| vec![o.prediction])),
+    ] {
+        golden.compare(name, shape, &ours);
+    }
+    // The corrections are small numbers: they must agree as parts of themselves too.
+    let theirs = golden.tensor("correction", &[WINDOWS]);
+    for (ours, theirs) in outputs.iter().zip(theirs) {
+        assert!((ours.correction - theirs).abs() <= 1e-3 * theirs.abs() + 1e-8, "{theirs}");
     }
 }
 
@@ -49,7 +81,7 @@ fn the_integer_network_equals_pytorch() {
     let input = golden.tensor("input", &[WINDOWS, WINDOW, FEATURES]);
     let error = golden.tensor("gyro_error", &[WINDOWS, WINDOW]);
     let (windows, _) = input.as_chunks::<FEATURES>().0.as_chunks::<WINDOW>();
-    let mut network = GyroNet::new(Blob::new_checked(&weights::GYRONET.0).expect("the built-in weights"));
+    let mut network = models::gyronet();
     let (mut difference, mut size, mut compared) = (0.0, 0.0, 0);
     for (window, due) in windows.iter().zip(error.as_chunks::<WINDOW>().0) {
         let estimate = network.estimate(&window.each_ref().map(codes));

@@ -1,5 +1,4 @@
-//! 20-bit FIFO packets, and a simulated SPI bus for the driver: reset, identity, settings, packets, and the register
-//! that is checked with each packet.
+//! 20-bit FIFO packets of an ICM-42688-P, and a simulated SPI bus for its driver.
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
@@ -7,10 +6,11 @@ use gyronet::sample::ImuSample;
 use gyronet::sensor::icm42688::packet::Packet;
 use gyronet::sensor::icm42688::registers as reg;
 use gyronet::sensor::spi::READ;
-use gyronet::units::{Micros, STANDARD_GRAVITY};
+use gyronet::units::STANDARD_GRAVITY;
+use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::convert::Infallible;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::rc::Rc;
 
 /// Step of a rate, 1/131 deg/s: the part uses 19 of the 20 bits.
 const RATE_STEP: f64 = std::f64::consts::PI / 180.0 / 131.0;
@@ -20,16 +20,7 @@ const FORCE_STEP: f64 = STANDARD_GRAVITY as f64 / 8192.0;
 const RATE_COUNTS: f64 = 2.0;
 const FORCE_COUNTS: f64 = 4.0;
 /// Ends of the range of an acceleration, counts; lower counts mean "no reading".
-pub const ENDS: [f64; 2] = [-524_256.0, 524_284.0];
-/// Range of the part's 16-bit time counter.
-const WRAP: u64 = 1 << 16;
-/// Time after which the counter wraps, microseconds; a count is 32/30 us.
-pub const WRAP_US: f64 = WRAP as f64 * 32.0 / 30.0;
-
-/// Returns the nearest count of the part's counter at a time, without wrapping.
-const fn counts(time: Micros) -> u64 {
-    (time.0 * 30 + 16) / 32
-}
+const ENDS: [f64; 2] = [-524_256.0, 524_284.0];
 
 /// Encodes a sample as a packet, with the readings rounded to the part's steps and clipped at the ends of the range.
 pub fn packet(sample: &ImuSample) -> Packet {
@@ -42,11 +33,11 @@ pub fn packet(sample: &ImuSample) -> Packet {
             .map(|force| reading(force.metre_per_sec2(), FORCE_STEP, FORCE_COUNTS)),
         rate: sample.angular_rate.map(|rate| reading(rate.rad_per_sec(), RATE_STEP, RATE_COUNTS)),
         temperature: sample.temperature.map(|code| (f32::from(code.0) * 1.3248 - 3312.0).round() as i16),
-        time: (counts(sample.time) % WRAP) as u16,
+        // Of 16 bits, of 32/30 us each.
+        time: ((sample.time.0 * 30 + 16) / 32) as u16,
     }
 }
 
-/// A simulated part: registers that keep what is written, and a FIFO.
 #[derive(Debug, Default)]
 struct Simulated {
     registers: std::collections::HashMap<(u8, u8), u8>,
@@ -90,30 +81,24 @@ impl Simulated {
 
 /// A simulated SPI bus; its clones share the part, so that the FIFO can be filled while the driver owns a clone.
 #[derive(Debug, Clone, Default)]
-pub struct Bus(Arc<Mutex<Simulated>>);
+pub struct Bus(Rc<RefCell<Simulated>>);
 
 impl Bus {
     pub fn fill(&self, bytes: impl IntoIterator<Item = u8>) {
-        self.part().fifo.extend(bytes);
+        self.0.borrow_mut().fifo.extend(bytes);
     }
 
     /// Sets a register as the part has it after a reset.
     pub fn set(&self, bank: u8, address: u8, value: u8) {
-        self.part().registers.insert((bank, address), value);
+        self.0.borrow_mut().registers.insert((bank, address), value);
     }
 
-    /// Bank, address and value of a register that answers this from now on, whatever is written.
     pub fn hold(&self, held: Option<(u8, u8, u8)>) {
-        self.part().held = held;
+        self.0.borrow_mut().held = held;
     }
 
-    /// What was written to the registers but that of the bank: bank, address, value.
     pub fn written(&self) -> Vec<(u8, u8, u8)> {
-        self.part().written.clone()
-    }
-
-    fn part(&self) -> MutexGuard<'_, Simulated> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.borrow().written.clone()
     }
 }
 
@@ -123,7 +108,7 @@ impl ErrorType for Bus {
 
 impl SpiDevice for Bus {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
-        let mut part = self.part();
+        let mut part = self.0.borrow_mut();
         let mut selected = 0;
         for operation in operations {
             match operation {
@@ -141,7 +126,6 @@ impl SpiDevice for Bus {
     }
 }
 
-/// A delay that does not wait.
 pub struct NoDelay;
 
 impl DelayNs for NoDelay {
