@@ -137,6 +137,7 @@ impl Output {
         // A step also follows each sent CAN frame and each estimate. Inputs other than the inertial sensor are read
         // once a tick (1 ms), or before a new sample is used. The CAN controller is refilled in every step, because
         // it accepts only three frames at a time.
+        let asked = QUIET_UNTIL.load(Ordering::Relaxed);
         let now = Micros(timer::micros());
         let tick = timer::whole_milliseconds(now.0);
         if !core::mem::replace(&mut self.joined, true) {
@@ -182,12 +183,13 @@ impl Output {
         if is_slow {
             self.report(tick, lines);
         }
-        self.rest(now, coprocessor);
+        self.rest(now, asked, coprocessor);
         has_sample || is_slow
     }
 
-    /// Lets the tick leave this task alone, where nothing waits but what will come.
-    fn rest(&self, now: Micros, coprocessor: &Coprocessor) {
+    /// Lets the tick leave this task alone, where nothing waits but what will come, and nobody has called [`attend`] since
+    /// QUIET_UNTIL was read as `asked`.
+    fn rest(&self, now: Micros, asked: u32, coprocessor: &Coprocessor) {
         let now = now.0 as u32;
         let quiet = if self.outgoing.is_sent() { QUIET_US } else { LEAVE_US as u32 };
         let is_quiet = now.wrapping_sub(self.sampled_at) < quiet
@@ -195,7 +197,7 @@ impl Output {
             && self.imu.arm_wake_up()
             && !coprocessor.is_waiting();
         let until = if is_quiet { self.sampled_at.wrapping_add(quiet) } else { now };
-        QUIET_UNTIL.store(until, Ordering::Relaxed);
+        let _ = QUIET_UNTIL.compare_exchange(asked, until, Ordering::Relaxed, Ordering::Relaxed);
     }
 
     /// Passes the waiting samples to the coprocessor, as far as they need not wait for an estimate; returns whether there
