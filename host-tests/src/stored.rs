@@ -6,7 +6,7 @@ use crate::noise::Noise;
 use embedded_storage::nor_flash::NorFlash;
 use gyronet::model::blob::CRC;
 use gyronet::model::weights;
-use gyronet::store::firmware::{LABEL, LABEL_SIZE, Label, MAX_IMAGE, Trailer};
+use gyronet::store::firmware::{LABEL, LABEL_SIZE, Label, MAX_IMAGE, Trailer, activate};
 use gyronet::store::layout::{self, FLASH_BASE, SLOT_SIZE};
 use gyronet::store::{Accepted, Record, Slot, Store, StoreError, Upload};
 
@@ -66,6 +66,15 @@ pub fn flash_image(flash: &Flash, slot: Slot, image: &[u8]) {
     let start = slot.firmware().start;
     let written = region.write(start, image).and(region.write(start + MAX_IMAGE, &trailer.bytes()));
     written.expect("it was erased");
+}
+
+/// Writes an image to a slot and has it tried at the next start, as the device does; `None` where that fails.
+pub fn install<F: NorFlash>(flash: &mut F, slot: Slot, image: &[u8], number: u32) -> Option<()> {
+    let mut upload = Upload::firmware(flash, slot, image.len() as u32).ok()?;
+    for (block, offset) in image.chunks(256).zip((0..).step_by(256)) {
+        upload.block(flash, offset, block).ok()?;
+    }
+    activate(flash, slot, &Trailer::new(image.len() as u32, CRC.checksum(image), 0, number)).ok()
 }
 
 #[derive(Debug, Default)]

@@ -168,10 +168,6 @@ fn rates_that_are_not_used_are_named_and_left_again() {
             let due = (time - PERIODS_US.start()) / PERIOD_US;
             assert!(u64::from(step.tick).abs_diff(due) <= 1, "{period} us: {} for {due}", step.tick);
         }
-        if !is_used {
-            let text = format!("a sample every {period} us: 50 to 1000 a second are used");
-            assert_eq!(error.to_string(), text);
-        }
     }
 }
 
@@ -183,9 +179,6 @@ fn duplicates_and_steps_back_leave_the_grid() {
     assert_eq!(place(&mut aligner, 1_990_000), Err(AlignError::Backwards { last, at }));
     assert_eq!(place(&mut aligner, 1_000_000), Err(AlignError::Backwards { last, at: Micros(1_000_000) }));
     assert_eq!(place(&mut aligner, 2_010_000), Ok((1, 0)));
-    let text = |error: AlignError| error.to_string();
-    assert_eq!(text(AlignError::Duplicate { at }), "duplicate sample at 1990000 us");
-    assert_eq!(text(AlignError::Backwards { last, at }), "time goes backwards, from 2000000 to 1990000 us");
 }
 
 #[test]
@@ -194,7 +187,6 @@ fn a_jump_starts_a_new_grid() {
         let mut aligner = begun(4_000_000 + 1_000_000);
         let error = AlignError::Jump { last: Micros(5_000_000), at: Micros(to) };
         assert_eq!(place(&mut aligner, to), Err(error));
-        assert_eq!(error.to_string(), format!("time jumps from 5000000 to {to} us, more than 1 s"));
         assert_eq!(place(&mut aligner, to + PERIOD_US), Ok((1, 0)), "after a jump to {to}");
     }
 }

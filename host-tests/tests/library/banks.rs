@@ -2,12 +2,11 @@
 //! downloaded, tried, confirmed and rolled back.
 
 use embedded_storage::nor_flash::{NorFlash, NorFlashErrorKind as Kind, ReadNorFlash};
-use gyronet::model::blob::CRC;
 use gyronet::store::banks::{BANK, Banks, QUAD, Records, SECTOR, Slots};
-use gyronet::store::firmware::{self, Label, Trailer, confirm, select};
-use gyronet::store::{Configuration, Slot, Store, Upload};
+use gyronet::store::firmware::{Label, Trailer, confirm, select};
+use gyronet::store::{Configuration, Slot, Store};
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::stored::image;
+use gyronet_host_tests::stored::{image, install};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::rc::Rc;
@@ -183,16 +182,11 @@ fn the_newest_records_are_found_after_a_cut_of_a_store_or_of_a_copy() {
 
 const LABEL: Label = Label::new([1, 0, 0], "a board");
 
-/// Writes an image to the upper bank, to be tried at the next start; what fails is given up.
+/// Installs an image in the upper bank.
 fn download(flash: &Flash, seed: u64, number: u32) -> Option<()> {
-    let (mut slots, image) = (Slots(flash.clone()), image(&LABEL, seed));
+    let mut slots = Slots(flash.clone());
     let slot = slots.lower().other();
-    let mut upload = Upload::firmware(&mut slots, slot, image.len() as u32).ok()?;
-    for (block, offset) in image.chunks(256).zip((0..).step_by(256)) {
-        upload.block(&mut slots, offset, block).ok()?;
-    }
-    let trailer = Trailer::new(image.len() as u32, CRC.checksum(&image), 0, number);
-    firmware::activate(&mut slots, slot, &trailer).ok()
+    install(&mut slots, slot, &image(&LABEL, seed), number)
 }
 
 /// Starts as the boot loader does, and returns the slot that runs; `None` if a cut ends that.
@@ -202,7 +196,6 @@ fn start(flash: &Flash, has_failed: bool) -> Option<Slot> {
     Some(slot)
 }
 
-/// Returns whether the lower bank holds an image of one of these seeds.
 fn holds(flash: &Flash, seeds: &[u64]) -> bool {
     let (mut slots, mut bytes) = (Slots(flash.clone()), Vec::new());
     seeds.iter().any(|seed| {
@@ -250,7 +243,6 @@ fn an_image_that_is_whole_starts_after_a_cut_whichever_bank_is_in_front() {
     assert!(cuts > 400, "{cuts}");
 }
 
-/// The image that runs, its boot loader and the records are out of reach.
 #[test]
 fn only_the_slot_that_does_not_run_is_written() {
     let flash = Flash::blank();

@@ -2,7 +2,7 @@
 
 use gyronet::model::blob::{BlobError, CRC, HEADER_LEN, HIDDEN, LINEAR_INPUTS, Shape};
 use gyronet::model::window::{FEATURES, WINDOW};
-use gyronet::model::{Blob, fognet_blob, weights};
+use gyronet::model::{Blob, weights};
 use gyronet::nn::Aligned;
 use gyronet::nn::lstm::DirectionWeights;
 use gyronet_host_tests::models;
@@ -233,30 +233,4 @@ fn every_flipped_bit_is_noticed() {
         file.bytes_mut()[bit / 8] ^= 1 << (bit % 8);
     }
     assert!(Blob::new_checked(file.bytes()).is_ok());
-}
-
-#[test]
-fn refusals_say_why() {
-    for (error, text) in [
-        (BlobError::Magic(*b"ELF!"), "it begins with [45, 4c, 46, 21], should be [47, 59, 52, 4e]"),
-        (BlobError::Version { found: 2, expected: 5 }, "format version 2, should be 5"),
-        (BlobError::Length { expected: 10, found: 9 }, "9 bytes, should be 10"),
-        (BlobError::Misaligned, "not on a 4-byte boundary"),
-        (BlobError::Crc { computed: 1, stored: 0xABCD }, "checksum is 00000001, the file has 0000abcd"),
-        (BlobError::Provenance, "provenance is not UTF-8"),
-        (BlobError::Scale, "input clamp or output row out of range"),
-        (
-            BlobError::RowBound { layer: 1, direction: 0, unit: 59 },
-            "layer 1, direction 0, unit 59 could overflow its accumulator",
-        ),
-        (
-            BlobError::Topology { found: fognet_blob::TOPOLOGY, expected: Shape::LARGEST.topology() },
-            "network 2 with window 60, 9 inputs, 90 units, 2 layers, 1 linear outputs is not GyroNet \
-             (1: 10, 6, 60, 2, 10, or fewer units in steps of 4, or no linear outputs)",
-        ),
-        (BlobError::LinearBound { output: 9 }, "output 9 of the linear part could overflow its accumulator"),
-        (BlobError::Units { found: 60, largest: 16 }, "60 units a direction, memory holds 16"),
-    ] {
-        assert_eq!(error.to_string(), format!("weight file: {text}"));
-    }
 }

@@ -1,6 +1,6 @@
 //! The configuration of the vehicle bus: what is refused, what it costs, what goes out.
 
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::Frame;
 use gyronet::can::bus_off::BusOff;
 use gyronet::can::config::{BoschSettings, Config, ConfigError, E2e, Settings, StatusSettings, YawSettings};
 use gyronet::can::e2e::DataIdMode;
@@ -12,6 +12,7 @@ use gyronet::can::yaw::Quality;
 use gyronet::estimate::VehicleSample;
 use gyronet::units::{AngularRate, Yaw};
 use gyronet_host_tests::synthetic;
+use gyronet_host_tests::wire::id11;
 
 const YAW: YawSettings = match Settings::DEFAULT.yaw {
     Some(yaw) => yaw,
@@ -114,7 +115,6 @@ fn sample(tick: u32) -> VehicleSample {
 #[test]
 fn one_frame_of_can_fd_carries_a_set_as_it_is() {
     let joined = with_yaw(YawSettings { fd: Some(FD_ID), ..YAW });
-    let id = |id| Id::Standard(StandardId::new(id).expect("11 bits"));
     for settings in [Settings::DEFAULT, joined] {
         let mut encoder = CanEncoder::new(Config::new(settings).expect("checked"));
         let mut joiner = Joiner::new(&settings);
@@ -125,8 +125,8 @@ fn one_frame_of_can_fd_carries_a_set_as_it_is() {
             let mut due: Vec<_> = frames.iter().map(|frame| (frame.id(), frame.data().to_vec())).collect();
             if settings == joined {
                 let set = due.split_off(due.len() - 3);
-                assert_eq!(set.iter().map(|(id, _)| *id).collect::<Vec<_>>(), YAW.ids.map(id));
-                due.push((id(FD_ID), set.into_iter().flat_map(|(_, data)| data).collect()));
+                assert_eq!(set.iter().map(|(id, _)| *id).collect::<Vec<_>>(), YAW.ids.map(id11));
+                due.push((id11(FD_ID), set.into_iter().flat_map(|(_, data)| data).collect()));
             }
             assert_eq!(sent, due);
         }
@@ -191,8 +191,7 @@ fn frames_go_out_as_configured() {
         }
         assert!(sent.iter().all(|frame| config.sends(frame.id()) && frame.dlc() == 8));
     }
-    let other = StandardId::new(0x123).expect("11 bits");
-    assert!(!Config::new(ALL).expect("checked").sends(Id::Standard(other)));
+    assert!(!Config::new(ALL).expect("checked").sends(id11(0x123)));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! `tools/gyronet.dbc` says what the codecs do: parsed by another's parser, decoded bit by bit.
 
 use can_dbc::{AttributeValue, ByteOrder, Dbc, Message, MessageId, NumericValue, Signal, ValueType};
-use embedded_can::{Frame, Id, StandardId};
+use embedded_can::{Frame, Id};
 use gyronet::can::DataFrame;
 use gyronet::can::bosch;
 use gyronet::can::config::{Config, Settings, StatusSettings, YawSettings};
@@ -14,6 +14,7 @@ use gyronet::can::yaw::{AngleMessage, DetailMessage, FOG_IDS, Faults, Quality, R
 use gyronet::estimate::{VehicleSample, YawEstimate};
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce, Yaw};
 use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::wire::{data_frame, id11};
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
@@ -42,7 +43,6 @@ fn number(value: NumericValue) -> f64 {
     }
 }
 
-/// A signal's raw value, one bit after the other.
 fn raw(signal: &Signal, data: &[u8]) -> i64 {
     assert_eq!(signal.byte_order, ByteOrder::LittleEndian, "{}", signal.name);
     let bit = |k: u64| i64::from(data[(k / 8) as usize] >> (k % 8) & 1);
@@ -51,7 +51,6 @@ fn raw(signal: &Signal, data: &[u8]) -> i64 {
     if signal.value_type == ValueType::Signed && value & sign != 0 { value - 2 * sign } else { value }
 }
 
-/// Returns every signal of a frame by its name, raw and physical.
 fn decode(frame: &DataFrame) -> BTreeMap<String, (i64, f64)> {
     let signals = &message(frame.id()).signals;
     let decoded = signals.iter().map(|signal| {
@@ -68,11 +67,7 @@ fn encoder() -> CanEncoder {
 #[test]
 fn the_file_has_every_message_with_its_cycle_time() {
     let config = Config::new(ALL).expect("checked");
-    let fog = FOG_IDS.map(|id| Periodic {
-        id: Id::Standard(StandardId::new(id).expect("11 bits")),
-        period_ms: 10,
-        is_fd: false,
-    });
+    let fog = FOG_IDS.map(|id| Periodic { id: id11(id), period_ms: 10, is_fd: false });
     let yaw = ALL.yaw.map(|yaw| YawSettings { fd: Some(FD_ID), ..yaw });
     let fd = Config::new(Settings { bosch: None, yaw, ..Settings::DEFAULT }).expect("checked").messages();
     assert_eq!(fd.len(), 1);
@@ -134,7 +129,7 @@ fn signals_lie_apart_and_their_ranges_are_what_their_bits_hold() {
 #[test]
 fn other_messages_have_the_layout_of_the_inertial_sensors() {
     let layout = |id: u16, start: u64| {
-        let message = message(Id::Standard(StandardId::new(id).expect("11 bits")));
+        let message = message(id11(id));
         let of = |signal: &Signal| {
             let values = DBC.value_descriptions_for_signal(message.id, &signal.name);
             let signal = Signal { start_bit: start + signal.start_bit, ..signal.clone() };
@@ -148,12 +143,13 @@ fn other_messages_have_the_layout_of_the_inertial_sensors() {
     assert_eq!(layout(FD_ID, 0), parts, "one after the other");
 }
 
+fn table(id: u16, name: &str) -> Vec<(i64, String)> {
+    let table = DBC.value_descriptions_for_signal(MessageId::Standard(id), name).expect("a table");
+    table.iter().map(|value| (value.id, value.description.to_lowercase())).collect()
+}
+
 #[test]
 fn value_tables_are_our_enumerations() {
-    let table = |id: u16, name: &str| -> Vec<(i64, String)> {
-        let table = DBC.value_descriptions_for_signal(MessageId::Standard(id), name).expect("a table");
-        table.iter().map(|value| (value.id, value.description.to_lowercase())).collect()
-    };
     let named = |code: u8, name: &str| (i64::from(code), name.to_owned());
     let sources = [Source::Raw, Source::Static, Source::Model, Source::EarthRate]
         .map(|source| named(source as u8, &format!("{source:?}").to_lowercase()));
@@ -193,8 +189,7 @@ fn each_fault_has_its_bit() {
         ("Fault_Bus", Faults::BUS),
     ] {
         let data = AngleMessage { yaw: 0, faults: fault }.emit();
-        let id = embedded_can::StandardId::new(0x1A1).expect("11 bits");
-        let decoded = decode(&DataFrame::new(id, &data).expect("eight bytes"));
+        let decoded = decode(&data_frame(id11(0x1A1), &data));
         let set: Vec<_> =
             decoded.iter().filter(|(name, (raw, _))| name.starts_with("Fault_") && *raw == 1).collect();
         assert_eq!(set.len(), 1);
@@ -205,10 +200,6 @@ fn each_fault_has_its_bit() {
 /// The file decodes each value of the slow status message, which the codes and its value tables name.
 #[test]
 fn the_slow_status_means_what_the_file_says() {
-    let table = |name: &str| -> Vec<(i64, String)> {
-        let table = DBC.value_descriptions_for_signal(MessageId::Standard(STATUS_ID), name).expect("a table");
-        table.iter().map(|value| (value.id, value.description.clone())).collect()
-    };
     let knowledge = [Knowledge::Unknown, Knowledge::Coarse, Knowledge::Fine, Knowledge::Refused];
     let verdicts = [Verdict::Unknown, Verdict::Standing, Verdict::Moving];
     let evidence = [Evidence::None, Evidence::Wheels, Evidence::Inertial];
@@ -218,7 +209,10 @@ fn the_slow_status_means_what_the_file_says() {
         let decoded = decode(&frame);
         let named = |name: &str, value: &dyn std::fmt::Debug| {
             let code = decoded[name].0;
-            assert!(table(name).contains(&(code, format!("{value:?}").to_lowercase())), "{name} {code}");
+            assert!(
+                table(STATUS_ID, name).contains(&(code, format!("{value:?}").to_lowercase())),
+                "{name} {code}"
+            );
         };
         named("Standstill", &status.verdict);
         named("StandstillEvidence", &status.evidence);
@@ -291,7 +285,6 @@ fn close(a: f64, b: f64, tolerance: f64) {
     assert!((a - b).abs() <= tolerance, "{a} is not {b}");
 }
 
-/// One message of the Bosch set against the file and against the sample it was made from.
 fn compare_bosch(frame: &DataFrame, names: [&str; 6], due: (AngularRate, SpecificForce), tick: u32) {
     let decoded = decode(frame);
     let message = bosch::Message::parse(frame.data()).expect("checksum");

@@ -107,7 +107,6 @@ fn an_estimate_for_no_window_is_an_error_and_counted() {
     assert_eq!(car.coprocessor.deliver(late.end, Estimate::NONE), missing(late.end), "its turn has passed");
     assert_eq!(car.counted().unclaimed_estimates, 4);
     assert_eq!(car.coprocessor.pipeline().counters().late, 1);
-    assert!(missing(3).is_err_and(|error: InputError| error.to_string() == "no window waits for estimate 3"));
 }
 
 #[test]

@@ -2,11 +2,10 @@
 //! is whole starts, always.
 
 use embedded_storage::nor_flash::NorFlash;
-use gyronet::model::blob::CRC;
+use gyronet::store::Slot;
 use gyronet::store::firmware::{self, Label, MAX_IMAGE, Trailer, confirm, select};
-use gyronet::store::{Slot, Upload};
 use gyronet_host_tests::flash::{Cut, Flash, Region, shared};
-use gyronet_host_tests::stored::{flash_image, image};
+use gyronet_host_tests::stored::{flash_image, image, install};
 
 const LABEL: Label = Label::new([1, 0, 0], "a board");
 type Step = fn(&Flash);
@@ -15,27 +14,14 @@ fn region(flash: &Flash) -> Region {
     Region::new(flash, 0..1 << 20)
 }
 
-/// Writes an image to a slot and has it tried at the next start, as the device does; what fails is given up.
 fn update(flash: &Flash, slot: Slot, seed: u64, number: u32) -> Option<()> {
-    write(flash, slot, &image(&LABEL, seed), number)
+    install(&mut region(flash), slot, &image(&LABEL, seed), number)
 }
 
-fn write(flash: &Flash, slot: Slot, image: &[u8], number: u32) -> Option<()> {
-    let mut region = region(flash);
-    let mut upload = Upload::firmware(&mut region, slot, image.len() as u32).ok()?;
-    for (block, offset) in image.chunks(256).zip((0..).step_by(256)) {
-        upload.block(&mut region, offset, block).ok()?;
-    }
-    let trailer = Trailer::new(image.len() as u32, CRC.checksum(image), 0, number);
-    firmware::activate(&mut region, slot, &trailer).ok()
-}
-
-/// Starts after a power cut; the image that starts.
 fn start(flash: &Flash, has_failed: bool) -> Option<Slot> {
     select(&mut region(flash), has_failed)
 }
 
-/// Returns whether an image of one of the seeds stands in a slot, whole.
 fn holds(flash: &Flash, slot: Slot, seeds: &[u64]) -> bool {
     let start = slot.firmware().start as usize;
     seeds.iter().any(|seed| {
@@ -142,7 +128,7 @@ fn a_trial_that_the_watchdog_has_ended_is_over() {
     assert!(confirm(&mut region(&flash), Slot::A));
     // Its last block is a short one.
     let short = image(&LABEL, 2);
-    assert!(write(&flash, Slot::B, &short[..short.len() - 100], 2).is_some());
+    assert!(install(&mut region(&flash), Slot::B, &short[..short.len() - 100], 2).is_some());
     assert_eq!(start(&flash, true), Some(Slot::B), "what failed was not on trial");
     assert_eq!([true, false].map(|has_failed| start(&flash, has_failed)), [Some(Slot::A); 2]);
 }

@@ -63,27 +63,38 @@ fn a_gap_is_no_rate() {
     assert_eq!(sent.last().map(|yaw| yaw.yaw), Some(Yaw(sum)));
 }
 
+/// On the grid and between: an increment that straddles two steps is in both, so that the one that holds the end of the last
+/// equal increment is stuck, too.
 #[test]
 fn a_gyro_that_says_the_same_is_stuck() {
-    let mut fog = fog(false);
-    let mut sent = run(&mut fog, 1..301, |_| true);
-    // From step 301 on it repeats what it said in step 300.
-    for step in 301..351 {
-        let repeated = FogSample { time: Micros(step * PERIOD_US), ..sample(300) };
-        fog.add(Micros(step * PERIOD_US), repeated).expect("in order");
-        let yaw = fog.next_step(Micros(step * PERIOD_US), Some(&wheels())).expect("a step");
-        sent.push(yaw);
+    for offset in [0, PERIOD_US / 2] {
+        let (mut fog, mut sent) = (fog(false), Vec::new());
+        for step in 1..700 {
+            let now = Micros(step * PERIOD_US + offset);
+            // From step 301 on it repeats what it said in step 300.
+            let said = if (301..351).contains(&step) { 300 } else { step };
+            fog.add(now, FogSample { time: now, ..sample(said) }).expect("in order");
+            sent.extend(std::iter::from_fn(|| fog.next_step(now, Some(&wheels()))));
+        }
+        // The first steps between have no increment before them.
+        let sent = if offset > 0 { &sent[10..] } else { &sent[..] };
+        let stuck = |yaw: &YawEstimate| yaw.faults.contains(Faults::STUCK);
+        let [first, last] = [sent.iter().position(stuck), sent.iter().rposition(stuck)].map(Option::unwrap);
+        if offset == 0 {
+            // The fifth equal turn is that of step 304; step 351 differs.
+            assert_eq!((first, last), (303, 349));
+            assert_eq!((fog.counters().stuck, fog.counters().gaps), (1, 47));
+        }
+        assert!((45..=50).contains(&(last - first)), "{first} to {last}");
+        for (step, yaw) in sent.iter().enumerate() {
+            let is_stuck = (first..=last).contains(&step);
+            assert_eq!((stuck(yaw), yaw.quality == Quality::Unusable), (is_stuck, is_stuck), "{step}");
+            assert!(!yaw.faults.contains(Faults::GAP) && (!is_stuck || yaw.rate.0 == 0), "{step}");
+        }
+        let after = &sent[last + 1];
+        assert_eq!((after.source, after.quality), (Source::EarthRate, Quality::Good));
+        assert_eq!(sent.last().map(|yaw| (yaw.source, yaw.faults)), Some((Source::EarthRate, Faults::NONE)));
     }
-    sent.extend(run(&mut fog, 351..700, |_| true));
-    let stuck = |yaw: &YawEstimate| yaw.faults.0 & Faults::STUCK.0 != 0;
-    // The fifth equal turn is that of step 304; step 351 differs.
-    assert_eq!(sent.iter().position(stuck), Some(303));
-    assert_eq!(sent.iter().rposition(stuck), Some(349));
-    let during = &sent[303..350];
-    assert!(during.iter().all(|yaw| stuck(yaw) && yaw.quality == Quality::Unusable && yaw.rate.0 == 0));
-    assert_eq!((sent[350].source, sent[350].quality), (Source::EarthRate, Quality::Good));
-    assert_eq!(sent.last().map(|yaw| (yaw.source, yaw.faults)), Some((Source::EarthRate, Faults::NONE)));
-    assert_eq!((fog.counters().stuck, fog.counters().gaps), (1, 47));
 }
 
 /// Equal increments have unequal sums on the grid, because one that straddles two steps is split and rounded: a
@@ -134,25 +145,6 @@ fn a_missing_input_is_reported() {
     fog.add(Micros(PERIOD_US), sample(1)).expect("the first one");
     let yaw = fog.next_step(Micros(PERIOD_US), None).expect("a step");
     assert_eq!(yaw.faults, Faults::WHEELS);
-}
-
-/// An increment that straddles two steps is in both: the one that holds the end of the last equal increment is stuck,
-/// too.
-#[test]
-fn every_step_that_holds_an_equal_increment_is_reported_as_stuck() {
-    let mut fog = fog(false);
-    let mut sent = Vec::new();
-    for step in 1..400 {
-        let now = Micros(step * PERIOD_US + PERIOD_US / 2);
-        let increment = sample(if (300..350).contains(&step) { 300 } else { step }).increment;
-        fog.add(now, FogSample { time: now, increment, ..sample(step) }).expect("in order");
-        sent.extend(std::iter::from_fn(|| fog.next_step(now, Some(&wheels()))));
-    }
-    let unusable: Vec<_> =
-        sent.iter().skip(10).filter(|yaw| yaw.quality == Quality::Unusable).map(|yaw| yaw.faults).collect();
-    assert!((45..=50).contains(&unusable.len()), "{} steps", unusable.len());
-    assert!(unusable.iter().all(|faults| faults.contains(Faults::STUCK)), "{unusable:?}");
-    assert!(unusable.iter().all(|faults| !faults.contains(Faults::GAP)), "{unusable:?}");
 }
 
 /// A gyro whose messages cover half of each 10 ms.

@@ -66,7 +66,6 @@ fn without_late(faults: Faults) -> Faults {
     Faults(faults.0 & !Faults::LATE.0)
 }
 
-/// The sample has no rate, and says why.
 fn assert_refused(output: &Observation, why: &str) {
     assert_eq!(output.vehicle.live.status, Status::Clipped, "{why}");
     assert_eq!(output.vehicle.live.quality, Quality::Unusable, "{why}");
@@ -195,7 +194,6 @@ fn a_limit_follows_the_steps_of_its_axis() {
     }
 }
 
-/// No reading of any recording is doubted.
 #[test]
 fn nothing_that_was_recorded_is_implausible() {
     let Some(files) = recordings::with_speed() else { return };

@@ -72,7 +72,6 @@ fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// Returns the targets in the round brackets of `[text](link)`.
 fn links(text: &str) -> Vec<String> {
     text.split("](")
         .skip(1)

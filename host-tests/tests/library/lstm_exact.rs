@@ -1,11 +1,11 @@
 //! The packed kernels against plain integer arithmetic, bit for bit: one row, one gate, one unit
-//! at a time, in 64 bits, written from the documentation of `gyronet::nn`.
+//! at a time, in 64 bits, written from the documentation of `gyronet::nn`; sigmoid and tanh over every input against f64.
 
-use gyronet::nn::activation::{saturate, sigmoid, tanh};
+use gyronet::nn::activation::{INPUT_BITS, saturate, sigmoid, tanh};
 use gyronet::nn::bilstm::{Direction, Layer, Run, word_index};
 use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT, Scratch, row_bound};
 use gyronet::nn::lstm::{project, step};
-use gyronet::nn::{GATES, HIDDEN_MAX};
+use gyronet::nn::{GATE_FRACTION_BITS, GATES, HIDDEN_MAX};
 use gyronet_host_tests::noise::{Noise, cases};
 use gyronet_host_tests::packing::{Row, Rows, word};
 use proptest::prelude::*;
@@ -55,7 +55,6 @@ fn words(values: &[i16]) -> Vec<u32> {
     values.chunks(2).map(|pair| word(pair[0], pair.get(1).copied().unwrap_or(0))).collect()
 }
 
-/// Two steps' inputs, word by word in turn.
 fn interleave(first: &[i16], second: &[i16]) -> Vec<u32> {
     words(first).into_iter().zip(words(second)).flat_map(|(first, second)| [first, second]).collect()
 }
@@ -172,6 +171,54 @@ fn sizes_that_do_not_fit_are_refused() {
     }
     assert!(DirectionWeights::new(4, 6, &input[1..], recurrent).is_none());
     assert!(DirectionWeights::new(4, 6, input, &recurrent[1..]).is_none());
+}
+
+const MAX: i32 = (1 << (INPUT_BITS - 1)) - 1;
+const MIN: i32 = -(1 << (INPUT_BITS - 1));
+
+fn outputs(function: fn(i32) -> i32) -> Vec<i32> {
+    (MIN..=MAX).map(|x| function(x) >> 16).collect()
+}
+
+/// Largest error in Q15 LSB, where, and the largest step down between neighbours.
+fn survey(outputs: &[i32], exact: fn(f64) -> f64) -> (f64, i32, i32) {
+    let errors = outputs.iter().zip(MIN..).map(|(y, x)| {
+        let exact = exact(f64::from(x) / f64::from(1 << GATE_FRACTION_BITS)) * 32_768.0;
+        ((f64::from(*y) - exact).abs(), x)
+    });
+    let (error, at) = errors.max_by(|a, b| a.0.total_cmp(&b.0)).expect("many inputs");
+    let down = outputs.windows(2).map(|pair| pair[0] - pair[1]).max().expect("many inputs");
+    (error, at, down)
+}
+
+#[test]
+fn errors_stay_below_their_documented_bounds() {
+    for (name, function, exact, limit) in [
+        ("sigmoid", sigmoid as fn(i32) -> i32, (|x| 1.0 / (1.0 + (-x).exp())) as fn(f64) -> f64, 1.75),
+        ("tanh", tanh, f64::tanh, 2.5),
+    ] {
+        let outputs = outputs(function);
+        assert_eq!(outputs.len(), 262_144);
+        let (error, at, down) = survey(&outputs, exact);
+        println!(
+            "{name}: largest error {error:.3} LSB of 2^-15 ({:.2e}) at input {at}, largest step down {down}",
+            error / 32_768.0
+        );
+        assert!(error <= limit, "{name}: {error} LSB");
+        assert!(down <= 1, "{name} goes down by {down}");
+        let lowest = exact(f64::from(MIN) / f64::from(1 << GATE_FRACTION_BITS)) * 32_768.0;
+        assert!((f64::from(outputs[0]) - lowest).abs() <= limit, "{name} at its lower end: {}", outputs[0]);
+        assert!(outputs.iter().all(|y| (-32_768..=32_767).contains(y)), "{name} leaves Q15");
+    }
+}
+
+#[test]
+fn inputs_beyond_the_table_saturate() {
+    for (x, y) in
+        [(MAX, MAX), (MAX + 1, MAX), (i32::MAX, MAX), (MIN, MIN), (MIN - 1, MIN), (i32::MIN, MIN), (5, 5)]
+    {
+        assert_eq!(saturate(x), y);
+    }
 }
 
 proptest! {

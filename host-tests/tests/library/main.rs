@@ -1,6 +1,5 @@
 //! Tests of the library alone: no file, no emulator and no tool is needed.
 
-mod activation;
 mod align;
 mod asm330lhh;
 mod banks;
@@ -13,7 +12,6 @@ mod can_dbc;
 mod clock_ratio;
 mod coprocessor;
 mod course;
-mod default_model;
 mod e2e;
 mod entrances;
 mod firmware_power_cut;
@@ -22,7 +20,6 @@ mod fog_earth_and_bias;
 mod fog_grid;
 mod fog_pipeline;
 mod fognet_blob;
-mod framer;
 mod gnss;
 mod heading;
 mod icm42688;
@@ -38,7 +35,6 @@ mod revisions;
 mod second_source;
 mod sensor_monitor;
 mod sensor_rates;
-mod sensor_serial;
 mod service;
 mod slcan;
 mod slcan_command;

@@ -3,7 +3,6 @@
 mod access;
 mod calibration;
 mod configuration;
-mod crash;
 mod firmware;
 mod isotp;
 mod keys;
@@ -18,8 +17,8 @@ use gyronet::health::{Faults, Status};
 use gyronet::model::weights::DEFAULT;
 use gyronet::sample::{ImuSample, PERIOD_US, Standstill, Validity, WheelSample};
 use gyronet::service::crash::FILE;
-use gyronet::service::event::{Crash, CrashKind, ResetCause};
-use gyronet::service::message::{Identity, Info};
+use gyronet::service::event::{ClockFault, Crash, CrashKind, ResetCause};
+use gyronet::service::message::Identity;
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::layout;
 use gyronet::store::{ImuPart, Slot};
@@ -76,13 +75,6 @@ fn start_from(flash: &Flash, running: Option<Slot>) -> Board {
     board
 }
 
-fn bare() -> Board {
-    let mut board = Board::new(&SUPPORTED_HARDWARE);
-    board.begin(None, None, Ok(()), IDENTITY);
-    board.weights(None, &DEFAULT.0);
-    board
-}
-
 const GOOD: (Status, Faults) = (Status::Ready, Faults::NONE);
 /// Specific force of a level sensor at rest, m/s^2.
 const LEVEL: [f32; 3] = [0.0, 0.0, 9.81];
@@ -98,10 +90,6 @@ fn observe(
     board.observe(sample, tick, state, &WheelSample::without_speeds(wheels), &judged(wheels));
 }
 
-fn info(board: &mut Board) -> Info {
-    board.info()
-}
-
 fn sample(k: u64, force: [f32; 3], rate: f32) -> ImuSample {
     ImuSample {
         time: Micros(k * PERIOD_US),
@@ -110,4 +98,28 @@ fn sample(k: u64, force: [f32; 3], rate: f32) -> ImuSample {
         temperature: Some(CentiCelsius(3_000)),
         validity: Validity::Good,
     }
+}
+
+#[test]
+fn a_crash_is_told_with_its_place() {
+    let crash = IDENTITY.crash.expect("there is one");
+    let mut panic = Crash { kind: CrashKind::Panic, place: 12, count: 3, ..crash };
+    panic.file[..11].copy_from_slice(b"src/main.rs");
+    assert_eq!(panic.to_string(), "panic in line 12 of src/main.rs, 3 since power-on");
+    let place = "hard fault at 0x08001234, called from 0x08000101, CFSR ";
+    for (status, rest) in [
+        (1 << 9, "0x00000200"),
+        (1 << 7, "0x00000080, address 0x20000004"),
+        (1 << 15, "0x00008000, address 0x20000004"),
+    ] {
+        let fault = Crash { link: 0x0800_0101, status, address: 0x2000_0004, ..crash };
+        assert_eq!(fault.to_string(), format!("{place}{rest}, 1 since power-on"));
+    }
+}
+
+#[test]
+fn a_clock_s_fault_is_told_in_words() {
+    let text = |khz| ClockFault::CrystalFrequency { khz }.to_string();
+    assert_eq!(text(25_012), "the crystal has 25.012 MHz");
+    assert_eq!(text(0), "the crystal's frequency could not be measured");
 }

@@ -41,19 +41,18 @@ fn examples_are_read_and_written() {
 }
 
 #[test]
-fn refusals_say_why() {
-    for (line, error, message) in [
-        (&b""[..], SlcanError::Kind, "not a data frame line"),
-        (b"r1740", SlcanError::Kind, "not a data frame line"),
-        (b"t1g40", SlcanError::Digit { at: 2 }, "not a hexadecimal digit at column 2"),
-        (b"t17410x", SlcanError::Digit { at: 6 }, "not a hexadecimal digit at column 6"),
-        (b"t1742AA", SlcanError::Length, "line length does not match the frame"),
-        (b"t1749112233445566778899", SlcanError::Length, "line length does not match the frame"),
-        (b"t8000", SlcanError::Identifier, "identifier out of range"),
-        (b"T200000000", SlcanError::Identifier, "identifier out of range"),
+fn bad_lines_are_refused() {
+    for (line, error) in [
+        (&b""[..], SlcanError::Kind),
+        (b"r1740", SlcanError::Kind),
+        (b"t1g40", SlcanError::Digit { at: 2 }),
+        (b"t17410x", SlcanError::Digit { at: 6 }),
+        (b"t1742AA", SlcanError::Length),
+        (b"t1749112233445566778899", SlcanError::Length),
+        (b"t8000", SlcanError::Identifier),
+        (b"T200000000", SlcanError::Identifier),
     ] {
         assert_eq!(parse(line), Err(error), "{:?}", line.escape_ascii().to_string());
-        assert_eq!(error.to_string(), message);
     }
 }
 

@@ -27,7 +27,6 @@ fn texts(sent: &[u8]) -> impl Iterator<Item = &[u8]> {
     sent.split(|byte| [b'\r', 7].contains(byte))
 }
 
-/// Frames on a line, without answers and what is not complete.
 fn frames(sent: &[u8]) -> Vec<DataFrame> {
     texts(sent).filter_map(|line| slcan::parse(line).ok()).collect()
 }

@@ -1,19 +1,19 @@
 //! The slow status message of a coprocessor: once a second where it is configured, and no more than the board knows.
 
-use embedded_can::{Frame, Id};
+use embedded_can::Frame;
 use gyronet::can::DataFrame;
 use gyronet::can::config::{self, Settings, StatusSettings};
 use gyronet::can::e2e::{Checker, DataIdMode, P01, Profile, Verdict as Received};
 use gyronet::can::status::{Evidence, Knowledge, STATUS_ID, SlowStatus, Verdict, emit};
-use gyronet::coprocessor::TimedFrame;
 use gyronet::mounting::GyroMap;
 use gyronet::pipeline::{Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, PERIOD_US};
 use gyronet::units::Micros;
 use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::noise::Noise;
+use gyronet_host_tests::sent::Sent;
 use gyronet_host_tests::synthetic::{noisy, rate, turning};
-use gyronet_host_tests::wire::wheels;
+use gyronet_host_tests::wire::{id11, wheels};
 use gyronet_tools::drive::wheel_frames::receiver;
 
 fn coprocessor(status: Option<StatusSettings>, wheels: bool) -> Coprocessor {
@@ -26,22 +26,21 @@ fn parked(tick: u64, noise: &mut Noise) -> ImuSample {
     noisy(ImuSample { angular_rate: [rate(0.001); 3], ..turning(tick, rate(0.0)) }, [0.001, 0.02], noise)
 }
 
-/// Feeds samples of a car at rest, with a wheel frame of this speed, km/h, before each where one is given; returns the status frames.
+/// Feeds samples of a car at rest, with a wheel frame of this speed, km/h, before each where one is given.
 fn run(coprocessor: &mut Coprocessor, ticks: std::ops::Range<u64>, speed: Option<f64>) -> Vec<DataFrame> {
-    let (mut noise, mut found) = (Noise::new(7), Vec::new());
+    let (mut noise, mut sent) = (Noise::new(7), Sent::default());
     for tick in ticks {
         let now = Micros((tick + 1) * PERIOD_US);
         if let Some(speed) = speed {
             coprocessor.can(&wheels(speed), now).expect("a wheel frame");
         }
-        let mut sink = |sent: TimedFrame| {
-            if matches!(sent.frame.id(), Id::Standard(id) if id.as_raw() == STATUS_ID) {
-                found.push(sent.frame);
-            }
-        };
-        coprocessor.imu(parked(tick, &mut noise), now, &mut sink).expect("in time");
+        coprocessor.imu(parked(tick, &mut noise), now, &mut sent).expect("in time");
     }
-    found
+    statuses(&sent)
+}
+
+fn statuses(sent: &Sent) -> Vec<DataFrame> {
+    sent.frames.iter().map(|sent| sent.frame).filter(|frame| frame.id() == id11(STATUS_ID)).collect()
 }
 
 /// The frame says this; the doubt of the yaw, which it alone says, is known when the yaw has begun.
@@ -98,15 +97,11 @@ fn a_silence_is_a_doubt_while_it_lasts_and_for_a_minute() {
     let before = doubt(run(&mut board, 0..1_000, None).last().expect("the newest"));
     // 7 s at a bias that nothing confirms, 5e-3 rad/s.
     assert!(before < 220, "{before}: 2.2 deg");
-    let mut found = Vec::new();
+    let mut sent = Sent::default();
     for millisecond in 0..4_000 {
-        let mut sink = |sent: TimedFrame| {
-            if matches!(sent.frame.id(), Id::Standard(id) if id.as_raw() == STATUS_ID) {
-                found.push(doubt(&sent.frame));
-            }
-        };
-        board.poll(Micros(10_010_000 + millisecond * 1_000), &mut sink).expect("time goes on");
+        board.poll(Micros(10_010_000 + millisecond * 1_000), &mut sent).expect("time goes on");
     }
+    let found: Vec<u32> = statuses(&sent).iter().map(doubt).collect();
     // In 4 s a vehicle's rate walks by 0.2 x 4^1.5 / 3^0.5 rad: 53 deg.
     assert!(found.is_sorted() && (2_500..5_500).contains(found.last().expect("statuses")), "{found:?}");
     // The grid begins again with the first sample.

@@ -19,7 +19,7 @@ impl Vehicle {
         Self { judge: Judge::START, noise: Noise::new(11), road: 0.0, tick: 0 }
     }
 
-    /// Returns the judgement after seconds with this shake by the road, rad/s, and forward acceleration, m/s^2.
+    /// The judgement after seconds with this shake by the road, rad/s, and forward acceleration, m/s^2.
     fn go(&mut self, seconds: f64, shake: f64, ahead: f64, wheels: Option<&WheelSample>) -> Standing {
         let mut standing = Standing::UNKNOWN;
         for _ in 0..(100.0 * seconds) as u64 {
@@ -123,7 +123,6 @@ fn wheels_that_stand_while_the_vehicle_speeds_up_prove_nothing_until_they_turn()
     assert_eq!(car.go(5.0, 0.0, 0.0, Some(&stands)), Standing::WHEELS);
 }
 
-/// It pulls away and goes on smoothly, then brakes and stands: only the second quiet is a stop.
 /// Passive wheel sensors show zero below 0.76 m/s, while the vehicle brakes.
 #[test]
 fn wheels_that_stand_before_the_braking_ends_are_believed_after_it() {

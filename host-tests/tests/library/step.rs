@@ -15,7 +15,6 @@ const SET: usize = 6;
 /// Places in the queue before the controller.
 const QUEUE: usize = 24;
 
-/// A controller that takes all frames.
 fn taking() -> Controller {
     Controller { then: Mood::Takes, ..Controller::default() }
 }

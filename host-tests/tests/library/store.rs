@@ -119,10 +119,6 @@ fn another_layout_is_refused_by_its_number() {
         let mut store = open(&written(version, &content));
         let refused = StoreError::Version { found: version, expected: Configuration::VERSION };
         assert_eq!(store.get::<Configuration>(), Err(refused));
-        assert_eq!(
-            refused.to_string(),
-            format!("the record has layout {version}, this firmware reads {}", Configuration::VERSION)
-        );
         // A new one takes its place.
         store.set(&Configuration::DEFAULT).expect("it is stored");
         assert_eq!(store.get(), Ok(Some(Configuration::DEFAULT)));

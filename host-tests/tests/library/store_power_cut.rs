@@ -53,7 +53,6 @@ fn starts<R: Record>(make: fn(usize) -> R) -> Vec<(F405, usize, u64)> {
     panic!("only {changes} changes of sector in 5,000 writes");
 }
 
-/// Checks that after a cut the record before or the new one is there, and all others.
 fn whole<R: Record + PartialEq + std::fmt::Debug>(flash: &Flash, make: fn(usize) -> R, k: usize, at: &str) {
     let mut store = open(flash).unwrap_or_else(|error| panic!("{at}: {error}"));
     let found = store.get::<R>().unwrap_or_else(|error| panic!("{at}: {error}"));
@@ -125,7 +124,6 @@ fn a_cut_while_a_key_is_replaced_leaves_the_old_or_the_new_one() {
     every_cut("key", access);
 }
 
-/// Returns the weights that the board would run on after a restart.
 fn running(flash: &Flash) -> (WeightSource, u32) {
     let accepted = open(flash).and_then(|mut store| store.get::<Accepted>());
     let accepted = accepted.expect("records are whole").unwrap_or(Accepted::NONE);

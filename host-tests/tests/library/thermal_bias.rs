@@ -32,19 +32,19 @@ fn known() -> PipelineConfig {
     PipelineConfig { thermal_bias, rest_force, ..PipelineConfig::DEFAULT }
 }
 
-/// Runs a sensor with this temperature at each tick; the vehicle drives straight from `moves` on. Its yaw rate
-/// is 0.1 rad/s where `turns`.
+/// Runs a sensor with this temperature at each tick; the vehicle stands where it does not drive. Its yaw rate
+/// is `turns`, rad/s, where it drives.
 fn run(
     config: PipelineConfig,
     ticks: u64,
     celsius: impl Fn(u64) -> f64,
-    moves: u64,
+    drives: impl Fn(u64) -> bool,
     turns: f64,
 ) -> (Pipeline, Vec<Output>) {
     let mut pipeline = Pipeline::new(config);
     let mut noise = Noise::new(7);
     let outputs = (0..ticks).map(|tick| {
-        let (celsius, drives) = (celsius(tick), tick >= moves);
+        let (celsius, drives) = (celsius(tick), drives(tick));
         let temperature = Some(CentiCelsius((100.0 * celsius) as i16));
         let turn = if drives { turns } else { 0.0 };
         let angular_rate = [0.0, 0.0, turn].map(|turn| rate(bias(celsius) + turn));
@@ -68,10 +68,10 @@ fn bias_sigma(output: &Output) -> f64 {
 
 #[test]
 fn a_vehicle_that_drives_off_at_once_has_a_rate_with_its_sigma() {
-    let (pipeline, without) = run(PipelineConfig::DEFAULT, 500, |_| 35.0, 0, 0.1);
+    let (pipeline, without) = run(PipelineConfig::DEFAULT, 500, |_| 35.0, |_| true, 0.1);
     assert_eq!(pipeline.status(None).bias, Knowledge::Unknown);
     assert!(without.iter().all(|output| output.vehicle.delayed.status == Status::Init));
-    let (pipeline, with) = run(known(), 500, |_| 35.0, 0, 0.1);
+    let (pipeline, with) = run(known(), 500, |_| 35.0, |_| true, 0.1);
     assert_eq!(pipeline.status(None).bias, Knowledge::Coarse);
     // The first second shows whether the sensor is where it was.
     let (first, with) = with.split_at(100);
@@ -109,22 +109,14 @@ fn hard_braking_is_no_sensor_that_was_moved() {
     assert!(statuses.skip(100).all(|status| status == Status::Degraded));
 }
 
+/// Nothing is learnt yet; the part has warmed up by 30 K before the vehicle stands for the first time, for three seconds.
 #[test]
 fn a_first_stop_shows_the_bias_at_its_own_temperature() {
-    // Nothing is learnt yet; the part has warmed up by 30 K before the vehicle stands for the first time, for three seconds.
-    let mut pipeline = Pipeline::new(PipelineConfig::DEFAULT);
-    let mut noise = Noise::new(5);
-    let mut last = None;
-    for tick in 0..3_420u64 {
-        let (celsius, stands) = ((tick / 100).min(30) as i16, (3_000..3_400).contains(&tick));
-        let sample = noisy(turning(tick, rate(bias(30.0))), NOISE, &mut noise);
-        let standstill = if stands { Standstill::Still } else { Standstill::Moving };
-        let wheels = WheelSample::without_speeds(standstill);
-        let sample = ImuSample { temperature: Some(CentiCelsius(100 * celsius)), ..sample };
-        last = Some(pipeline.correct(sample, Some(&wheels), &BoardState::GOOD).expect("a place on the grid"));
-    }
+    let celsius = |tick: u64| (tick / 100).min(30) as f64;
+    let drives = |tick| !(3_000..3_400).contains(&tick);
+    let (pipeline, outputs) = run(PipelineConfig::DEFAULT, 3_420, celsius, drives, 0.0);
     assert!(pipeline.gyro_bias().is_some(), "it has stood");
-    let sigma = last.expect("samples").vehicle.delayed.sigma.expect("known").rad_per_sec();
+    let sigma = outputs.last().expect("samples").vehicle.delayed.sigma.expect("known").rad_per_sec();
     assert!(sigma < 4e-4, "{sigma}: none of the 30 K is left in it");
 }
 
@@ -133,8 +125,8 @@ fn warming_up_turns_the_vehicle_no_more_than_the_slope_s_error() {
     // Three seconds at rest at 20 deg C, then ten minutes of driving straight, in which the sensor warms by 30 K.
     let celsius = |tick: u64| 20.0 + 30.0 * (tick as f64 / 60_000.0);
     let turned = |outputs: &[Output]| outputs.last().expect("samples").vehicle.delayed.yaw.rad().to_degrees();
-    let (_, without) = run(PipelineConfig::DEFAULT, 60_000, celsius, 400, 0.0);
-    let (_, with) = run(known(), 60_000, celsius, 400, 0.0);
+    let (_, without) = run(PipelineConfig::DEFAULT, 60_000, celsius, |tick| tick >= 400, 0.0);
+    let (_, with) = run(known(), 60_000, celsius, |tick| tick >= 400, 0.0);
     let (unknown, learnt) = (turned(&without), turned(&with));
     // 0.0013 rad/s on average for ten minutes.
     assert!((35.0..55.0).contains(&unknown), "{unknown}");
@@ -150,7 +142,7 @@ fn a_standstill_takes_the_error_of_a_wrong_bias_out() {
     let mut thermal_bias = ThermalBias::UNKNOWN;
     thermal_bias.add(true, CentiCelsius(2_000), [rate(0.03); 3]);
     let wrong = PipelineConfig { thermal_bias, ..known() };
-    let (_, outputs) = run(wrong, 2_000, |_| 20.0, 1_000, 0.1);
+    let (_, outputs) = run(wrong, 2_000, |_| 20.0, |tick| tick >= 1_000, 0.1);
     let driven = &outputs[1_100..];
     let mean = driven.iter().map(|output| output.vehicle.delayed.rate.rad_per_sec()).sum::<f64>();
     assert!((mean / driven.len() as f64 - 0.1).abs() < 2e-4, "{mean}");
@@ -160,7 +152,7 @@ fn a_standstill_takes_the_error_of_a_wrong_bias_out() {
 fn a_sensor_that_was_moved_is_reported() {
     let was = Some([force(4.9), force(0.0), force(8.5)]);
     let moved = PipelineConfig { rest_force: was, ..known() };
-    let (pipeline, outputs) = run(moved, 500, |_| 20.0, 400, 0.0);
+    let (pipeline, outputs) = run(moved, 500, |_| 20.0, |tick| tick >= 400, 0.0);
     assert_eq!(pipeline.counters().moved_mounts, 1);
     let early = outputs.iter().take(290).map(|output| output.vehicle.delayed.status);
     assert!(
@@ -169,7 +161,7 @@ fn a_sensor_that_was_moved_is_reported() {
     );
     let last = &outputs.last().expect("samples").vehicle.delayed;
     assert!(last.faults.contains(Faults::IMPLAUSIBLE));
-    let (mut pipeline, outputs) = run(known(), 500, |_| 20.0, 400, 0.0);
+    let (mut pipeline, outputs) = run(known(), 500, |_| 20.0, |tick| tick >= 400, 0.0);
     assert_eq!(pipeline.counters().moved_mounts, 0);
     // A drive has shown it.
     (0..2).for_each(|_| pipeline.mount_moved());

@@ -1,12 +1,13 @@
 //! The window model in all its sizes: the paper's shape keeps its outputs to the bit, a smaller one gives the same in
-//! any memory that holds it, and the linear part is exact.
+//! any memory that holds it, and the linear part is exact; the default one is linear and answers nothing that is constant.
 
 use gyronet::model::blob::{LINEAR_INPUTS, Shape};
 use gyronet::model::gyronet::{GyroNetState, LargestState};
-use gyronet::model::window::{Features, WINDOW};
+use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::model::{Blob, BlobError, GyroNet, WindowNetwork, weights};
 use gyronet::nn::Aligned;
 use gyronet::nn::lstm::DirectionWeights;
+use gyronet::units::AngularRate;
 use gyronet_host_tests::models;
 use gyronet_host_tests::noise::Noise;
 
@@ -57,7 +58,6 @@ fn check<const LEN: usize, const U: usize, const W: usize, const R: usize>(shape
     assert_eq!(different > 0, shape.units > 0, "the linear part alone is exact; the Bi-LSTMs add to it");
 }
 
-/// Returns the output of the linear part, computed in 128 bits.
 fn exact(blob: &Blob<'_>, window: &[Features; WINDOW]) -> [i32; WINDOW] {
     let mut outputs = [0; WINDOW];
     for (output, row) in outputs.iter_mut().zip(blob.linear.iter().flat_map(|linear| linear.rows())) {
@@ -88,7 +88,6 @@ fn a_model_that_the_memory_does_not_hold_is_refused() {
     assert_eq!(error, Err(BlobError::Units { found: 60, largest: 0 }));
 }
 
-/// The largest weights and inputs that there are do not wrap, but saturate.
 #[test]
 fn the_linear_part_saturates() {
     const SHAPE: Shape = Shape { units: 0, linear: true };
@@ -113,5 +112,29 @@ fn the_linear_part_saturates() {
         let estimate = network.estimate(&window);
         assert_eq!(estimate.corrections.map(|rate| rate.0), [output; WINDOW]);
         assert_eq!(estimate.clamped_inputs, 0);
+    }
+}
+
+/// Every row's weights of an input add up to zero, and roll and pitch rate have none: bias, gain and mounting belong to the
+/// unit, which the board and `gyronet calibrate` find.
+#[test]
+fn nothing_constant_is_corrected() {
+    let blob = Blob::new_checked(&weights::DEFAULT.0).expect("they come with the library");
+    let linear = blob.linear.expect("it is one");
+    assert_eq!((blob.shape.units, linear.rows().count()), (0, WINDOW));
+    for row in linear.rows() {
+        for feature in 0..FEATURES {
+            let weights = row.iter().skip(feature).step_by(FEATURES);
+            let is_used = weights.clone().any(|weight| *weight != 0);
+            assert_eq!(is_used, ![3, 4].contains(&feature), "feature {feature}");
+            assert_eq!(weights.map(|weight| i64::from(*weight)).sum::<i64>(), 0, "feature {feature}");
+        }
+    }
+    let (mut network, mut noise) = (GyroNet::new(blob), Noise::new(11));
+    for _ in 0..200 {
+        let constant: [i32; FEATURES] =
+            std::array::from_fn(|_| noise.int(i32::MIN.into(), i32::MAX.into()) as i32);
+        let estimate = network.estimate(&[constant; WINDOW]);
+        assert_eq!(estimate.corrections, [AngularRate::ZERO; WINDOW], "{constant:?}");
     }
 }

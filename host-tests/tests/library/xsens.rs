@@ -1,21 +1,24 @@
-//! MTData2 messages, alone and in a stream: recorded frames, bad readings and packets, damage, and time that wraps.
+//! MTData2 messages, alone and in a stream: recorded frames, bad readings and packets, damage, time that wraps, and
+//! a port that fails.
 
+use super::line::Line;
+use embedded_io::ErrorKind;
 use gyronet::sample::{ImuSample, Validity};
+use gyronet::sensor::Source;
+use gyronet::sensor::serial::{Serial, SerialError};
 use gyronet::sensor::xsens::{MID_MT_DATA2, MtData2, Mti, Xbus, XsensError};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, RangeError, SpecificForce};
 use gyronet_host_tests::wire::{bytes, feed, feed_new, message, real_frame, synthetic_frame};
 
-fn frame(packets: &[(u16, &[u8])]) -> Vec<u8> {
-    let mut data = Vec::new();
-    for (id, packet) in packets {
-        data.extend(id.to_be_bytes());
-        data.push(packet.len() as u8);
-        data.extend(*packet);
-    }
-    let mut frame = vec![0xFA, 0xFF, MID_MT_DATA2, data.len() as u8];
-    frame.extend(data);
-    frame.push(frame[1..].iter().fold(0u8, |sum, byte| sum.wrapping_sub(*byte)));
-    frame
+fn framed(mid: u8, data: &[u8]) -> Vec<u8> {
+    let frame = [&[0xFF, mid, data.len() as u8], data].concat();
+    let sum = frame.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
+    [&[0xFA], &frame[..], &[sum.wrapping_neg()]].concat()
+}
+
+/// A packet of so many zeros.
+fn packet(id: u16, len: usize) -> Vec<u8> {
+    framed(MID_MT_DATA2, &[&id.to_be_bytes()[..], &[len as u8], &vec![0; len]].concat())
 }
 
 #[test]
@@ -109,12 +112,12 @@ fn missing_packets_are_named() {
 fn packets_of_a_wrong_length_are_refused() {
     for id in [0x1020u16, 0x1060, 0x0810, 0x4020, 0x8020, 0xE020] {
         for len in [0, 1, 3, 5, 11, 13] {
-            assert_eq!(feed_new(frame(&[(id, &vec![0; len])])), [Err(XsensError::Format { id })], "{len}");
+            assert_eq!(feed_new(packet(id, len)), [Err(XsensError::Format { id })], "{len}");
         }
     }
     // FP12.20, FP16.32 and double.
     for (id, len) in [(0x4021, 12), (0x4022, 18), (0x8023, 24), (0x0811, 4)] {
-        assert_eq!(feed_new(frame(&[(id, &vec![0; len])])), [Err(XsensError::Format { id })]);
+        assert_eq!(feed_new(packet(id, len)), [Err(XsensError::Format { id })]);
     }
     assert_eq!(MtData2::parse(&[0x40, 0x20, 12, 0]), Err(XsensError::Truncated { id: 0x4020 }));
     assert_eq!(MtData2::parse(&[0x40]), Err(XsensError::Truncated { id: 0 }));
@@ -124,11 +127,6 @@ fn packets_of_a_wrong_length_are_refused() {
 /// The old protocol's data, an error message, and a message of extended length between two good ones.
 #[test]
 fn other_messages_are_named() {
-    let framed = |mid: u8, data: &[u8]| {
-        let frame = [&[0xFF, mid, data.len() as u8], data].concat();
-        let sum = frame.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
-        [&[0xFA], &frame[..], &[sum.wrapping_neg()]].concat()
-    };
     let extended = [&[0xFA, 0xFF, 0x36, 0xFF, 0x01, 0x2C][..], &[0x55; 301]].concat();
     let good = || message(1).emit().to_vec();
     let bytes = [good(), framed(0x32, &[0; 38]), framed(0x42, &[3]), extended, good()].concat();
@@ -203,4 +201,32 @@ fn time_wraps_and_steps_back() {
     let first = u64::from(u32::MAX - 149) * 100;
     let times: Vec<u64> = samples.iter().map(|sample| sample.unwrap().time.0 - first).collect();
     assert_eq!(times, [0, 10_000, 20_000, 30_000, 25_000, 40_000]);
+}
+
+#[test]
+fn an_mti_measures_over_a_port_that_loses_a_byte() {
+    // Two frames, a lost byte, a damaged frame, a frame.
+    let mut port = Line::default();
+    let bytes = [&real_frame()[..], &message(200).emit()].concat();
+    port.receive(&bytes);
+    port.lose();
+    port.receive(&[&message(300).emit()[5..], &message(400).emit()].concat());
+    let mut line = Serial::new(port, Mti::new());
+    let expected: Vec<_> =
+        feed_new(bytes).into_iter().map(|sample| Some(Ok(sample.expect("intact")))).collect();
+    assert_eq!([line.next_sample(), line.next_sample()], expected[..]);
+    assert_eq!(line.next_sample(), Some(Err(SerialError::Port(ErrorKind::Other))));
+    assert_eq!(line.next_sample().map(|sample| sample.expect("intact").time.0), Some(40_000));
+    assert_eq!(line.next_sample(), None);
+    assert_eq!(line.part().bad_checksums(), 0);
+    let (port, _) = line.destroy();
+    assert!(port.is_read());
+}
+
+#[test]
+fn a_bad_message_is_not_a_bad_port() {
+    let mut port = Line::default();
+    port.receive(&MtData2 { acceleration: None, ..message(1) }.emit());
+    let missing = XsensError::Missing { id: 0x4020 };
+    assert_eq!(Serial::new(port, Mti::new()).next_sample(), Some(Err(SerialError::Part(missing))));
 }

@@ -24,8 +24,7 @@ fn sample(rate: AngularRate, yaw: Yaw) -> YawEstimate {
     YawEstimate { rate, yaw, source: Source::Model, quality: Quality::Good, ..YawEstimate::default() }
 }
 
-/// CanEncoder rates and keeps the accounts that the pipeline keeps; gives the sum of the decoded
-/// rates times the period, the accumulated yaw as sent and as it is, in deg.
+/// The sum of the decoded rates times the period, the accumulated yaw as sent and as it is, deg.
 fn integrate(rates: impl Iterator<Item = AngularRate>, every: u8) -> (f64, f64, f64) {
     let mut feed = YawEncoder::new(p01(), every);
     let (mut micro, mut yaw, mut turned) = (0i64, Yaw::default(), 0i64);

@@ -378,7 +378,6 @@ fn a_record_that_cannot_be_read_locks_and_is_reported() {
     bench.expect(&write(&content(1), &[0; 69]), &[0x7F, 0x2E, 0x33]);
 }
 
-/// A record under the key of access.
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Later(u8);
 

@@ -1,7 +1,6 @@
 //! The configuration is stored whole, at standstill alone, and refused where it is wrong.
 
-use super::{Board, GOOD, IDENTITY, LEVEL, SUPPORTED_HARDWARE, bare, fresh, info, sample, start};
-use embedded_can::{Id, StandardId};
+use super::{Board, GOOD, IDENTITY, LEVEL, SUPPORTED_HARDWARE, fresh, sample, start};
 use gyronet::bias::{EarthRate, Latitude, StaticConfig};
 use gyronet::can::config::{Config, ConfigError, Settings, YawSettings};
 use gyronet::can::diagnosis::DiagnosisIds;
@@ -11,6 +10,7 @@ use gyronet::compensate::CompensateConfig;
 use gyronet::fog::Tilt;
 use gyronet::heading::{GnssProtocol, GnssSettings, HeadingSettings};
 use gyronet::health::{Faults, Status};
+use gyronet::model::weights::DEFAULT;
 use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::message::{FlashState, Origin, Refusal};
 use gyronet::standstill::{Standing, StandstillSource};
@@ -20,15 +20,16 @@ use gyronet::store::{Calibration, Learned, StoreError};
 use gyronet::store::{Configuration, Field, FieldError, FlashFault, FogGyro, FogPart, ImuPart, Mounting};
 use gyronet::units::SpecificForce;
 use gyronet_host_tests::flash::{Flash, Region};
+use gyronet_host_tests::wire::id11;
 
 #[test]
 fn configuration_is_kept_whole() {
     let (flash, mut board) = fresh();
-    assert_eq!(info(&mut board).configuration, Origin::BuiltIn);
+    assert_eq!(board.info().configuration, Origin::BuiltIn);
     let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
     assert_eq!(board.set_configuration(&wanted), Ok(()));
     let mut board = start(&flash);
-    assert_eq!(info(&mut board).configuration, Origin::Stored);
+    assert_eq!(board.info().configuration, Origin::Stored);
     assert_eq!(*board.configuration(), wanted);
     // Refused, and named, and the old one stays.
     let wild = Configuration { mounting: Mounting { pitch_deg: 91.0, ..Mounting::default() }, ..wanted };
@@ -39,45 +40,38 @@ fn configuration_is_kept_whole() {
         }
         other => panic!("{other:?}"),
     }
-    let refused = |error| Err(Refusal::Store(StoreError::Field(error)));
-    let other_part = Configuration { imu: ImuPart::Icm42688, ..wanted };
-    assert_eq!(board.set_configuration(&other_part), refused(FieldError::PartNotInImage));
     let slow = |bits_per_second| Settings { bits_per_second, ..wanted.can };
-    let other_rate = Configuration { can: slow(100_000), ..wanted };
-    let refusal = FieldError::Can(ConfigError::BitRate(100_000));
-    assert_eq!(board.set_configuration(&other_rate), refused(refusal));
-    assert_eq!(
-        refusal.to_string(),
-        "can: bits_per_second: 100000 is not one of [125000, 250000, 500000, 1000000]"
-    );
+    let overload = ConfigError::Overload { per_mille: 972, bits_per_second: 125_000 };
     let fog = Some(FogPart::Dsp1760);
-    let too_much = Configuration { can: slow(125_000), fog, ..wanted };
-    let refusal = FieldError::Can(ConfigError::Overload { per_mille: 972, bits_per_second: 125_000 });
-    assert_eq!(board.set_configuration(&too_much), refused(refusal));
-    assert_eq!(refusal.to_string(), "can: the messages are 97.2 % of the bus at 125 kbit/s, above 80 %");
-    let twice = Configuration { fog_ids: [0x1A0, 0x1A5, 0x1A6], ..wanted };
-    let duplicate = FieldError::Can(ConfigError::DuplicateIdentifier(0x1A0));
-    assert_eq!(board.set_configuration(&twice), refused(duplicate));
-    let with_fog = Configuration { fog, ..wanted };
-    assert_eq!(board.set_configuration(&with_fog), refused(FieldError::PartNotInImage));
     let mut with_line = wanted;
     with_line.heading.line = Some(GnssSettings { protocol: GnssProtocol::Nmea, baud: 9_600 });
-    assert_eq!(board.set_configuration(&with_line), refused(FieldError::NoLine));
     let yaw = wanted.can.yaw.map(|yaw| YawSettings { fd: Some(FD_ID), ..yaw });
-    let with_fd = Configuration { can: Settings { yaw, ..wanted.can }, ..wanted };
-    assert_eq!(board.set_configuration(&with_fd), refused(FieldError::NoFd));
+    for (configuration, error) in [
+        (Configuration { imu: ImuPart::Icm42688, ..wanted }, FieldError::PartNotInImage),
+        (Configuration { can: slow(100_000), ..wanted }, FieldError::Can(ConfigError::BitRate(100_000))),
+        (Configuration { can: slow(125_000), fog, ..wanted }, FieldError::Can(overload)),
+        (
+            Configuration { fog_ids: [0x1A0, 0x1A5, 0x1A6], ..wanted },
+            FieldError::Can(ConfigError::DuplicateIdentifier(0x1A0)),
+        ),
+        (Configuration { fog, ..wanted }, FieldError::PartNotInImage),
+        (with_line, FieldError::NoLine),
+        (Configuration { can: Settings { yaw, ..wanted.can }, ..wanted }, FieldError::NoFd),
+    ] {
+        let refused = Err(Refusal::Store(StoreError::Field(error)));
+        assert_eq!(board.set_configuration(&configuration), refused, "{configuration:?}");
+    }
     assert_eq!(*start(&flash).configuration(), wanted);
 }
 
 #[test]
 fn wheel_frames_are_kept() {
     let (flash, mut board) = fresh();
-    let known = |board: &mut Board| (info(board).wheels, *board.wheels());
+    let known = |board: &mut Board| (board.info().wheels, *board.wheels());
     let built_in = (Origin::BuiltIn, WheelSettings::TOYOTA);
     assert_eq!(known(&mut board), built_in);
     let with_id = |id: u16| {
-        let id = Id::Standard(StandardId::new(id).expect("11 bits"));
-        let frame = WheelSettings::TOYOTA.frames[0].map(|frame| WheelFrame { id, ..frame });
+        let frame = WheelSettings::TOYOTA.frames[0].map(|frame| WheelFrame { id: id11(id), ..frame });
         WheelSettings { frames: [frame, None, None, None], ..WheelSettings::TOYOTA }
     };
     assert_eq!(board.set_wheels(&with_id(0xAB)), Ok(()));
@@ -93,14 +87,14 @@ fn damaged_record_is_noted() {
     // Another record is whole.
     assert_eq!(board.set_wheels(&WheelSettings::TOYOTA), Ok(()));
     flash.borrow_mut().damage(layout::STORE.start as usize + 20, 4);
-    let mut board = start(&flash);
-    assert_eq!(info(&mut board).flash, FlashState::Damaged);
-    assert_eq!(info(&mut board).configuration, Origin::BuiltIn);
+    let board = start(&flash);
+    assert_eq!(board.info().flash, FlashState::Damaged);
+    assert_eq!(board.info().configuration, Origin::BuiltIn);
     assert!(board.stored_damaged() && board.configuration_lost());
     // At every start, whatever else is stored, until it is stored again.
     for _ in 0..2 {
         let mut board = start(&flash);
-        assert_eq!(info(&mut board).configuration, Origin::Refused(StoreError::Lost));
+        assert_eq!(board.info().configuration, Origin::Refused(StoreError::Lost));
         assert!(board.stored_damaged() && board.configuration_lost());
         assert_eq!(board.set_wheels(&WheelSettings::TOYOTA), Ok(()));
     }
@@ -134,7 +128,7 @@ fn nothing_is_written_with_an_unlocked_controller_and_the_standstill_gate_holds(
     let records = Region::new(&flash, layout::STORE);
     board.begin(Some(records), Some(Region::mapped(&flash, None)), Err(FlashFault::Unlocked), IDENTITY);
     assert_eq!(*board.configuration(), wanted);
-    let about = info(&mut board);
+    let about = board.info();
     assert_eq!((about.flash, about.writable), (FlashState::Ready, false));
     assert!(board.stored_damaged() && !board.configuration_lost());
     assert_eq!(about.stored_fault, Some(StoreError::Flash(FlashFault::Unlocked)));
@@ -151,8 +145,10 @@ fn nothing_is_written_with_an_unlocked_controller_and_the_standstill_gate_holds(
 
 #[test]
 fn nothing_is_stored_without_flash() {
-    let mut board = bare();
-    let about = info(&mut board);
+    let mut board = Board::new(&SUPPORTED_HARDWARE);
+    board.begin(None, None, Ok(()), IDENTITY);
+    board.weights(None, &DEFAULT.0);
+    let about = board.info();
     assert_eq!((about.flash, about.weights), (FlashState::Absent, WeightSource::BuiltIn));
     assert_eq!(about.identity, IDENTITY);
     let no_flash = Err(Refusal::Store(StoreError::NoFlash));

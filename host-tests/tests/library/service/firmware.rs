@@ -47,7 +47,6 @@ fn begin(length: u32) -> Vec<u8> {
     [&[0x34, 0, 0x44, 0, 0, 0, 2][..], &length.to_be_bytes()].concat()
 }
 
-/// Sends the blocks and has them checked; the response to that.
 fn send(bench: &mut Bench, image: &[u8]) -> Vec<u8> {
     bench.expect(&begin(image.len() as u32), &[0x74, 0x20, 1, 2]);
     for (block, number) in image.chunks(BLOCK).zip(1u8..) {

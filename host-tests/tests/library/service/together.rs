@@ -2,7 +2,7 @@
 
 use super::IDENTITY;
 use super::weights::upload as upload_over;
-use embedded_can::{Id, StandardId};
+use embedded_can::Id;
 use gyronet::can::config::Config;
 use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{WheelConfigError, WheelSettings};
@@ -20,6 +20,7 @@ use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::settings;
 use gyronet_host_tests::stored::{open, other_weights, slots, upload};
+use gyronet_host_tests::wire::id11;
 use std::collections::{BTreeMap, HashSet};
 
 const HZ: u32 = 168_000_000;
@@ -53,7 +54,7 @@ fn are_distinct(configuration: &Configuration, wheels: &WheelSettings) -> bool {
     let can = Config::new(configuration.can).expect("it was accepted");
     let mut seen = HashSet::new();
     let mut all: Vec<Id> = can.messages().iter().map(|message| message.id).collect();
-    all.extend(configuration.fog_ids.map(|id| Id::Standard(StandardId::new(id).expect("11 bits"))));
+    all.extend(configuration.fog_ids.map(id11));
     all.extend(configuration.diagnosis.ids().expect("they were accepted"));
     let inputs: HashSet<Id> = wheels
         .frames
@@ -131,10 +132,9 @@ fn what_is_accepted_together_can_run() {
 
 #[test]
 fn neither_order_makes_the_board_send_what_it_receives() {
-    let id = |raw: u16| Id::Standard(StandardId::new(raw).expect("11 bits"));
     let wheels = |raw: u16| {
         let mut wheels = WheelSettings::TOYOTA;
-        wheels.frames[0].as_mut().expect("a frame").id = id(raw);
+        wheels.frames[0].as_mut().expect("a frame").id = id11(raw);
         wheels
     };
     let own =
@@ -156,7 +156,7 @@ fn neither_order_makes_the_board_send_what_it_receives() {
             other => panic!("{other:?}"),
         };
     let field = BitField::new(0, 16, ByteOrder::Intel, false).expect("inside the frame");
-    let signal = |raw| HeadingSignal { id: id(raw), field, factor: 1e-4, offset: 0.0, invalid: None };
+    let signal = |raw| HeadingSignal { id: id11(raw), field, factor: 1e-4, offset: 0.0, invalid: None };
     for raw in [0x7E0, 0x7DF, 0x7E8, 0x1A0, 0x1A5] {
         let heading = HeadingSettings { speed: Some(signal(raw)), ..HeadingSettings::NONE };
         let configuration = Configuration { heading, ..Configuration::DEFAULT };

@@ -86,7 +86,6 @@ impl Bench {
         }
     }
 
-    /// Begins a session, and stands.
     pub fn enter(&mut self, session: u8) {
         self.expect(&[0x10, session], &[0x50, session, 0, 50, 0x01, 0xF4]);
         self.stand();

@@ -1,6 +1,6 @@
 //! Weights are uploaded block by block, checked, and used after the next start.
 
-use super::{Board, fresh, info, start};
+use super::{Board, fresh, start};
 use gyronet::model::weights;
 use gyronet::service::message::Refusal;
 use gyronet::store::slots::{SlotError, WeightSource};
@@ -17,7 +17,7 @@ fn weights_are_replaced() {
         assert_eq!(upload(&mut board, file), Ok(()));
         assert_eq!(board.uploaded(), Some((slot, crc(file))));
         assert_eq!(board.weights_activate(), Ok(()));
-        let about = info(&mut start(&flash));
+        let about = start(&flash).info();
         assert_eq!(
             (about.weights, about.weights_crc),
             (WeightSource::Slot(slot), Some(crc(file))),
@@ -37,11 +37,11 @@ fn weights_are_replaced() {
     let refused = upload(&mut board, &[0x55; 256]);
     assert!(matches!(refused, Err(Refusal::Slot(SlotError::Blob(_) | SlotError::Length(_)))), "{refused:?}");
     assert!(matches!(board.weights_activate(), Err(Refusal::Slot(_))));
-    assert_eq!(info(&mut start(&flash)).weights, WeightSource::Slot(Slot::A));
+    assert_eq!(start(&flash).info().weights, WeightSource::Slot(Slot::A));
     // The slot in use damaged, and nothing accepted in the other: the built-in weights, and it is named.
     flash.borrow_mut().damage(Slot::A.offset() as usize + 70_000, 0x10);
-    let mut board = start(&flash);
-    let about = info(&mut board);
+    let board = start(&flash);
+    let about = board.info();
     assert_eq!(about.weights, WeightSource::BuiltIn);
     assert!(matches!(about.refused_slots, [Some(SlotError::Blob(_)), None]), "{:?}", about.refused_slots);
 }
