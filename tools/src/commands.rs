@@ -3,6 +3,7 @@
 
 pub mod bench_target;
 pub mod calibrate;
+pub mod completions;
 pub mod demo;
 pub mod device;
 pub mod doctor;

@@ -6,7 +6,7 @@
 
 mod commands;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
@@ -69,6 +69,7 @@ enum Command {
     Wheels(commands::wheels::Args),
     Size(commands::size::Args),
     Firmware(commands::firmware::Args),
+    Completions(commands::completions::Args),
 }
 
 fn main() -> ExitCode {
@@ -97,6 +98,7 @@ fn main() -> ExitCode {
         Command::Wheels(args) => commands::wheels::run(args, common),
         Command::Size(args) => commands::size::run(args, common),
         Command::Firmware(args) => commands::firmware::run(args, common),
+        Command::Completions(args) => commands::completions::run(args, Cli::command()),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
     // The reader of our output has closed the pipe: `gyronet replay FILE | head`.

@@ -5,7 +5,7 @@ use clap::error::{ContextKind, ContextValue};
 const SITUATIONS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin situations`";
 const LEARNT: &str =
     "the board itself at its standstills (`device info`: tilt; `device calibrate show`: bias)";
-const RETIRED: [(&str, &str); 23] = [
+const RETIRED: [(&str, &str); 22] = [
     ("campaign", SITUATIONS),
     ("soak", SITUATIONS),
     ("bus", "tools/gyronet.dbc, with `gyronet device set`, which refuses what loads the bus too much,"),
@@ -34,7 +34,6 @@ const RETIRED: [(&str, &str); 23] = [
     ("--set", "`cargo paper simulate`"),
     ("--all", "`gyronet evaluate --json`"),
     ("--lags", "`compensate.lag` in a configuration of `gyronet.Coprocessor` (tools/python)"),
-    ("completions", "`gyronet help`"),
 ];
 
 /// The line about a retired name, if that is what the arguments are wrong about.

@@ -28,6 +28,14 @@ fn every_help_begins_with_one_line_and_ends_with_examples() {
 }
 
 #[test]
+fn shells_complete_every_subcommand() {
+    for shell in ["bash", "zsh", "fish"] {
+        let script = text(&gyronet(&["completions", shell]).stdout);
+        assert!(subcommands().iter().all(|name| script.contains(name)), "{shell}");
+    }
+}
+
+#[test]
 fn a_reader_that_has_gone_is_no_failure() {
     let mut child =
         command(&["reference", "states"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
