@@ -26,7 +26,6 @@ const POLL_US: u64 = 1_000;
 /// the gap is skipped.
 const SILENCE_US: u64 = 60_000_000;
 
-/// A network whose corrections are zero.
 #[derive(Debug, Clone, Copy)]
 pub struct Uncorrected;
 

@@ -54,14 +54,14 @@ mod tests {
 
     #[test]
     fn weights_are_what_quantize_makes() {
-        let (bytes, _) = crate::network::quantize::quantize(&checkpoint().unwrap()).unwrap();
+        let bytes = crate::network::quantize::quantize(&checkpoint().unwrap()).unwrap();
         assert!(bytes == gyronet::model::weights::GYRONET.0, "run: gyronet quantize");
         let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights");
         let default = Checkpoint::read(&weights.join("default.safetensors")).unwrap();
-        let (bytes, _) = crate::network::quantize::quantize(&default).unwrap();
+        let bytes = crate::network::quantize::quantize(&default).unwrap();
         assert!(bytes == gyronet::model::weights::DEFAULT.0, "run: gyronet quantize");
         let fognet = Checkpoint::read(&weights.join("fognet.safetensors")).unwrap();
-        let (bytes, _) = crate::network::quantize::fognet::quantize(&fognet).unwrap();
+        let bytes = crate::network::quantize::fognet::quantize(&fognet).unwrap();
         assert!(bytes == gyronet::model::weights::FOGNET.0, "run: gyronet quantize");
     }
 }

@@ -46,7 +46,6 @@ const LEAST_OTHER_SIDE: f64 = 0.1;
 /// time.
 const MAX_RESIDUAL_RAD: f64 = 0.05;
 
-/// The reason why a drive gives no calibration.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrateError {

@@ -54,12 +54,10 @@ impl Random {
         self.between(0.0, 1.0) < share
     }
 
-    /// Returns 1 or -1 with equal probability.
     pub fn sign(&mut self) -> f64 {
         if self.chance(0.5) { 1.0 } else { -1.0 }
     }
 
-    /// Returns a random element of a list that is not empty.
     pub fn pick<T: Copy>(&mut self, of: &[T]) -> T {
         of[self.below(of.len())]
     }

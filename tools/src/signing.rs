@@ -31,7 +31,6 @@ pub enum KeyError {
 pub struct PrivateKey(SigningKey);
 
 impl PrivateKey {
-    /// Creates a key from the system's random numbers.
     pub fn generate() -> Result<Self, KeyError> {
         let mut secret = [0; 32];
         getrandom::fill(&mut secret).map_err(KeyError::Random)?;
@@ -80,7 +79,6 @@ impl PrivateKey {
         trailer
     }
 
-    /// Returns the response to a board's challenge.
     pub fn answer(&self, serial: &[u8; SERIAL], seed: &[u8; SEED]) -> [u8; SIGNATURE] {
         self.0.sign(&signature::challenge(serial, seed)).to_bytes()
     }

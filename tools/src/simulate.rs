@@ -77,7 +77,6 @@ pub struct Sample {
     pub course: Option<gnss::Course>,
 }
 
-/// An endless iterator over the samples of a drive.
 #[derive(Debug, Clone)]
 pub struct Simulation {
     car: Car,

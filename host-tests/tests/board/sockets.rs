@@ -10,7 +10,7 @@ use gyronet::store::{ImuPart, Slot};
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::{image, require};
 use gyronet_tools::client::bus::{Bus, SlcanBus, WAIT};
-use gyronet_tools::client::connection::Connection;
+use gyronet_tools::client::connection;
 use gyronet_tools::client::device::Device;
 use gyronet_tools::signing::unhex;
 use std::io::{BufRead, BufReader, Write};
@@ -66,7 +66,7 @@ fn a_board_without_hardware_answers_on_its_sockets() {
         device.info().is_ok_and(|info| info.status == Status::Ready)
     });
     for address in [slcan, bus] {
-        let mut line = Connection::open(&address, 0, WAIT).expect("it listens");
+        let mut line = connection::open(&address, 0, WAIT).expect("it listens");
         line.write_all(b"O\r").expect("it listens");
         let mut bus = SlcanBus::new(line);
         until("a frame with the rate", &mut || {

@@ -31,7 +31,7 @@ fn settings() -> gyronet::can::wheel::WheelSettings {
             text += "order = \"intel\"\nfactor_kmh = 0.1125\noffset_kmh = 0\n";
         }
     }
-    WheelFile::parse("wheels.toml", &text).and_then(|file| file.settings("wheels.toml")).expect("settings")
+    WheelFile::parse(&text).and_then(|file| file.settings()).expect("settings")
 }
 
 #[test]

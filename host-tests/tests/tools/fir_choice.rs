@@ -31,7 +31,7 @@ impl Drive {
 
     /// 1 s error of such rates behind static initialisation.
     fn error(&self, rates: &[f64]) -> f64 {
-        let mut against = AgainstRate::new();
+        let mut against = AgainstRate::default();
         let behind = self.reference.iter().zip(rates).skip(STATIC_SAMPLES as usize);
         behind.for_each(|(truth, rate)| against.add(*rate, *truth));
         against.errors().and_then(|errors| errors.figures.mean_1s_rad).expect("whole seconds")

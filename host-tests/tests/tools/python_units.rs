@@ -8,11 +8,11 @@ use gyronet_host_tests::require;
 use gyronet_tools::board::Board;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::candump::Log;
-use gyronet_tools::drive::export::Table;
+use gyronet_tools::drive::export;
 use gyronet_tools::drive::replay::Steps;
 use gyronet_tools::drive::stream::Drive;
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::Command;
 
@@ -46,14 +46,15 @@ fn replayed(folder: &Path) {
     let drive = Drive::from(&recording);
     let network = GyroNet::shipped().unwrap();
     let file = |name| BufWriter::new(File::create(folder.join(name)).unwrap());
-    let (mut log, mut table) = (Log::new(file("can.log")), Table::new(file("rates.csv")).unwrap());
+    let (mut log, mut table) = (Log::new(file("can.log")), file("rates.csv"));
+    writeln!(table, "{}", export::HEADER).unwrap();
     for step in Steps::new(&drive, Board::new(Config::DEFAULT, drive.wheels(), network)).unwrap() {
         let step = step.unwrap();
         step.frames.iter().for_each(|sent| log.frame(sent.time, &sent.frame).unwrap());
-        table.step(&step).unwrap();
+        export::line(&step, &mut table).unwrap();
     }
     log.finish().unwrap();
-    table.finish().unwrap();
+    table.flush().unwrap();
 }
 
 /// Runs the unit tests in a folder of the command's, of which `least` must not be skipped.

@@ -30,7 +30,7 @@ fn rear_left(python: &str, dbc: &str) -> WheelSignal {
         .unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let settings = WheelFile::parse("car", &text).and_then(|file| file.settings("car"));
+    let settings = WheelFile::parse(&text).and_then(|file| file.settings());
     settings.unwrap_or_else(|error| panic!("{error}\n{text}")).signals[2].expect("a rear left wheel")
 }
 

@@ -25,7 +25,6 @@ pub struct FogReplay {
     /// Steps with a correction.
     pub corrected: u64,
     pub windows: u64,
-    pub clamped_inputs: u64,
     /// Estimates that were rejected as implausible.
     pub implausible: u64,
     pub broken: u64,
@@ -51,7 +50,6 @@ pub fn run(sequence: &Sequence, network: &mut dyn MinuteNetwork, config: FogConf
         if let Some(second) = output.due {
             let estimate = network.estimate(&minute.follow(second));
             drive.windows += 1;
-            drive.clamped_inputs += u64::from(estimate.clamped_inputs);
             corrector.deliver(second.number, estimate);
         }
         drive.turns.push(output.turn.map_or(0.0, Angle::rad));

@@ -268,7 +268,6 @@ fn numbers(value: &Bound<'_, PyAny>, name: &str, shape: &[usize]) -> PyResult<Ve
     buffer.to_vec(py)
 }
 
-/// Makes a structured array of the records.
 fn records<'p>(py: Python<'p>, bytes: &[u8]) -> PyResult<Bound<'p, PyAny>> {
     let mut fields = vec![("row", "<i8")];
     fields.extend(BYTES.map(|name| (name, "u1")));

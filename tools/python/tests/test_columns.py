@@ -1,6 +1,7 @@
 """Tables of one's own by the vehicle file's [columns], and what the report says of them."""
 
 import tomllib
+from datetime import datetime, timezone
 
 import asammdf
 import numpy as np
@@ -58,6 +59,7 @@ class Columns(made.Case):
                 for name, values in made.drive(self.folder, "again.csv").items():
                     np.testing.assert_allclose(values, drive[name], atol=2e-6, err_msg=name)
         mdf = asammdf.MDF()
+        mdf.start_time = datetime.fromtimestamp(made.START, timezone.utc)
         with open(self.path("d.csv")) as file:
             rows = np.loadtxt(file, delimiter=",", skiprows=1)
         mdf.append([asammdf.Signal(rows[:, k], rows[:, 0] / 1000, name=name) for k, name in enumerate(HEAD) if k])

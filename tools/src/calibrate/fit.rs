@@ -6,7 +6,6 @@
 use super::normal_equations::NormalEquations;
 use super::spans::Span;
 
-/// Number of reweighting iterations.
 const ROUNDS: usize = 30;
 /// Huber's constant: 95 % of the efficiency of least squares where the errors are normal.
 const HUBER: f64 = 1.345;

@@ -7,7 +7,6 @@ use crate::drive::DT;
 use gyronet::sample::RATE_HZ;
 use gyronet::units::AngularRate;
 
-/// Samples of a span: one second.
 const SPAN: usize = RATE_HZ as usize;
 
 /// The turns and the error of one piece of a drive.

@@ -19,21 +19,24 @@ pub enum ConnectError {
     NoInterfaces { name: String },
 }
 
-/// An open line. Its reads time out after the time that it was opened with.
-pub enum Connection {
-    Serial(Box<dyn serialport::SerialPort>),
-    Tcp(TcpStream),
-}
+pub trait Stream: Read + Write {}
 
-impl Connection {
-    /// Opens `host:port`, or a serial port by its name at `baud`; a read waits for at most `wait`.
-    pub fn open(name: &str, baud: u32, wait: Duration) -> Result<Self, ConnectError> {
-        if is_address(name) {
-            let named = |source| ConnectError::Tcp { name: name.into(), source };
-            return connect(name, wait).map(Self::Tcp).map_err(named);
-        }
-        let named = |source| ConnectError::Serial { name: name.into(), source };
-        serialport::new(name, baud).timeout(wait).open().map(Self::Serial).map_err(named)
+impl<S: Read + Write> Stream for S {}
+
+pub type Connection = Box<dyn Stream>;
+
+/// Opens `host:port`, or a serial port by its name at `baud`; a read waits for at most `wait`.
+pub fn open(name: &str, baud: u32, wait: Duration) -> Result<Connection, ConnectError> {
+    let name = name.to_owned();
+    if is_address(&name) {
+        return match connect(&name, wait) {
+            Ok(stream) => Ok(Box::new(stream)),
+            Err(source) => Err(ConnectError::Tcp { name, source }),
+        };
+    }
+    match serialport::new(&name, baud).timeout(wait).open() {
+        Ok(port) => Ok(Box::new(port)),
+        Err(source) => Err(ConnectError::Serial { name, source }),
     }
 }
 
@@ -63,29 +66,4 @@ fn connect(name: &str, wait: Duration) -> io::Result<TcpStream> {
 /// Returns whether an error of a read only means that no bytes arrived in time.
 pub fn is_silence(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
-}
-
-impl Read for Connection {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        match self {
-            Self::Serial(port) => port.read(bytes),
-            Self::Tcp(stream) => stream.read(bytes),
-        }
-    }
-}
-
-impl Write for Connection {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            Self::Serial(port) => port.write(bytes),
-            Self::Tcp(stream) => stream.write(bytes),
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Self::Serial(port) => port.flush(),
-            Self::Tcp(stream) => stream.flush(),
-        }
-    }
 }

@@ -31,7 +31,6 @@ const PROOF: Duration = Duration::from_secs(15);
 const RETRY: Duration = Duration::from_millis(500);
 /// Number of times that a request is sent before it fails.
 const ATTEMPTS: u32 = 3;
-/// First byte of a negative response.
 const NEGATIVE: u8 = 0x7F;
 /// Added to a service's number in a positive response.
 const POSITIVE: u8 = 0x40;
@@ -46,7 +45,6 @@ pub struct Device<B> {
     authority: Authority,
 }
 
-/// The proof of access that is sent to a board with a key.
 #[derive(Default)]
 pub enum Authority {
     /// No proof; a board with a key refuses to be written.

@@ -82,7 +82,6 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     Ok(write!(out, "{}", paint::report(&report.to_string()))?)
 }
 
-/// The outages of a drive, with its file.
 type Found<'a> = (&'a Path, Vec<Outage>);
 
 fn starts_of<'a>((_, found): &'a Found<'_>) -> &'a [Outage] {

@@ -47,16 +47,18 @@ pub struct Args {
 }
 
 /// A file that is written while the drive is read.
-struct Output<W>(W, PathBuf);
+struct Output<'a>(BufWriter<File>, &'a Path);
 
-impl<W> Output<W> {
-    fn new(path: &Path, of: impl FnOnce(BufWriter<File>) -> io::Result<W>) -> Result<Self, WriteError> {
-        let file = File::create(path).map(BufWriter::new).and_then(of).map_err(WriteError::to(path))?;
-        Ok(Self(file, path.to_owned()))
+impl<'a> Output<'a> {
+    fn new(path: &'a Path) -> Result<Self, WriteError> {
+        Ok(Self(File::create(path).map(BufWriter::new).map_err(WriteError::to(path))?, path))
     }
 
-    fn write<T>(&mut self, write: impl FnOnce(&mut W) -> io::Result<T>) -> Result<T, WriteError> {
-        write(&mut self.0).map_err(WriteError::to(&self.1))
+    fn write(
+        &mut self,
+        write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+    ) -> Result<(), WriteError> {
+        write(&mut self.0).map_err(WriteError::to(self.1))
     }
 }
 
@@ -81,14 +83,17 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
     };
     let mut log = Log::new(log);
-    let mut table = args.csv.as_deref().map(|path| Output::new(path, export::Table::new)).transpose()?;
+    let mut table = args.csv.as_deref().map(Output::new).transpose()?;
+    if let Some(table) = &mut table {
+        table.write(|out| writeln!(out, "{}", export::HEADER))?;
+    }
     let mut tum = match &args.tum {
         None => None,
         Some(path) => {
             let speeds = drive
                 .speeds()
                 .ok_or_else(|| format!("{}: --tum needs wheels, since a path needs a speed", drive.path))?;
-            Some(Output::new(path, |file| Ok(export::Tum::new(speeds, file)))?)
+            Some((export::Tum::new(speeds), Output::new(path)?))
         }
     };
 
@@ -109,20 +114,17 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             log.frame(*time, frame).map_err(log_error)?;
         }
         if let Some(table) = &mut table {
-            table.write(|table| table.step(&step))?;
+            table.write(|out| export::line(&step, out))?;
         }
-        if let Some(tum) = &mut tum {
-            tum.write(|tum| tum.step(&step))?;
+        if let Some((tum, path)) = &mut tum {
+            path.write(|out| tum.pose(&step, out))?;
         }
         statuses.entry(status_name(step.vehicle.live.status)).and_modify(|count| *count += 1);
     }
     bar.finish_and_clear();
     let frames = log.finish().map_err(log_error)?;
-    if let Some(table) = &mut table {
-        table.write(export::Table::finish)?;
-    }
-    if let Some(tum) = &mut tum {
-        tum.write(export::Tum::finish)?;
+    for mut output in table.into_iter().chain(tum.map(|(_, path)| path)) {
+        output.write(BufWriter::flush)?;
     }
     let coprocessor = steps.board().coprocessor();
     let events = events(coprocessor);

@@ -69,7 +69,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             let value = serde_json::from_str(&text()?).map_err(|error| format!("{name}: {error}"))?;
             (CONFIGURATION, requests::configuration_content(&from_value(value)?)?)
         }
-        Target::Wheels => (WHEELS, requests::content(&WheelFile::parse(&name, &text()?)?.settings(&name)?)?),
+        Target::Wheels => (WHEELS, requests::content(&WheelFile::read(&args.file)?.1)?),
         Target::Unit => (UNIT, requests::content(&Some(unit_file::read(&args.file)?))?),
         Target::Key => (KEY, read_public(&args.file)?.to_vec()),
     };

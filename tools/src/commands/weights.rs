@@ -12,7 +12,6 @@ use gyronet_tools::network::weight_file::{WeightFile, WeightFileError};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// The weights of the integer network.
 pub struct Weights {
     file: Option<WeightFile>,
 }

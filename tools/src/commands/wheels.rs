@@ -45,10 +45,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     match &args.action {
         Action::FromDbc { arguments } => super::import::python(&["wheels", "from-dbc"], arguments, common)?,
         Action::Check { file } => {
-            let path = file.display().to_string();
-            let text = std::fs::read_to_string(file).map_err(|error| format!("{path}: {error}"))?;
-            let settings = WheelFile::parse(&path, &text)?;
-            let board = Configuration::DEFAULT.check_wheels(&settings.settings(&path)?);
+            let (path, (settings, wheels)) = (file.display(), WheelFile::read(file)?);
+            let board = Configuration::DEFAULT.check_wheels(&wheels);
             board.map_err(|error| format!("{path}: {error}"))?;
             if common.json {
                 return print_json(&mut stdout().lock(), &settings);

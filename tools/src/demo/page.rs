@@ -51,7 +51,6 @@ pub fn page(demo: &Demo<'_>) -> String {
     document(&format!("gyronet demo: {name}"), &body)
 }
 
-/// Returns the few figures that matter most.
 fn facts(demo: &Demo<'_>) -> String {
     let mut facts = Vec::new();
     if let Some(errors) = demo.errors {
@@ -136,7 +135,7 @@ fn yaw(demo: &Demo<'_>) -> String {
 
 /// The errors of a method against the courses as the table has them, degrees, each at the middle of its block.
 fn by_course(rates: &Rates, method: Method, courses: &[Option<f64>]) -> Vec<(f64, f64)> {
-    let mut against = AgainstCourse::new();
+    let mut against = AgainstCourse::default();
     rates.rates[method].iter().zip(courses).for_each(|(rate, course)| against.add(*rate, *course));
     let errors = against.finish().into_iter().enumerate();
     let middle = |block: usize| {

@@ -9,7 +9,6 @@ use crate::evaluate::rates::Rates;
 use crate::evaluate::trajectory_error::{Alignment, Point, TrajectoryError};
 use serde::Serialize;
 
-/// The paths of these methods are drawn.
 const METHODS: [Method; 3] = [Method::RAW, Method::STATIC, Method::DELAYED];
 
 #[derive(Debug, Clone, PartialEq, Serialize)]

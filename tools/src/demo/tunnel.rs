@@ -58,7 +58,6 @@ impl Tunnel {
         self.outages.outage.get(&SECONDS)?.get(method.key)
     }
 
-    /// What the figures are of.
     #[must_use]
     pub fn title(&self) -> String {
         let starts = self.row(Method::DELAYED).map_or(0, |figures| figures.starts);

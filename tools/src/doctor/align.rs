@@ -11,7 +11,6 @@ pub type Rate = [(f64, f64)];
 const STEPS: [f64; 2] = [0.5, 0.01];
 /// Least overlap, s, and as a share of the shorter rate.
 const COMMON: (f64, f64) = (20.0, 0.5);
-/// Least correlation coefficient of a match.
 const LEAST: f64 = 0.8;
 /// A second peak that is further from the first than this, s, must be lower by this much.
 const RIVAL: (f64, f64) = (3.0, 0.05);
@@ -78,7 +77,6 @@ fn fine(first: &Rate, second: &Rate, near: f64) -> Option<Offset> {
     Some(Offset { seconds, coefficient: peak })
 }
 
-/// A rate in equal time steps.
 struct Grid {
     start: f64,
     values: Vec<f64>,

@@ -17,7 +17,6 @@ const FLAT: f64 = 0.664;
 /// Shortest standstill for a noise figure, s.
 const LEAST_S: f64 = 10.0;
 
-/// The Allan deviation over the averaging time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Allan {
     /// Averaging time, s, and deviation, rad/s.

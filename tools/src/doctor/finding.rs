@@ -10,7 +10,6 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Returns the word for the terminal and JSON.
     pub fn word(self) -> &'static str {
         match self {
             Self::Good => "good",

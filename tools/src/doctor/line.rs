@@ -5,7 +5,6 @@ use crate::drive::DT;
 
 /// Largest share by which a slope may differ from a confusion of units.
 const NEAR: f64 = 0.15;
-/// Kilometres per hour in a metre per second.
 pub const KMH: f64 = 3.6;
 pub const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
@@ -41,7 +40,6 @@ impl Line {
     }
 }
 
-/// Returns whether a ratio is that of a confusion of units.
 pub fn confused(ratio: f64, units: f64) -> bool {
     (ratio / units - 1.0).abs() < NEAR
 }

@@ -9,7 +9,6 @@ use std::ops::RangeInclusive;
 
 /// A longer period than this is a gap, s.
 const GAP: f64 = 0.015;
-/// Rates that the import takes.
 const IMPORTED_HZ: RangeInclusive<f64> = 24.9..=1_001.0;
 /// Sources whose rate the results depend on.
 const RESAMPLED: [&str; 4] = ["imu", "gyro", "accelerometer", "reference rate"];

@@ -17,7 +17,6 @@ const SPREAD: f64 = 1.3;
 /// Error of the rolling radius that is worth a word.
 const RADIUS: f64 = 0.02;
 
-/// The finding; `None` without a speed.
 pub fn finding(rows: &Rows) -> Option<Finding> {
     let by_wheels = |k: usize| {
         let known: Vec<f64> = rows.wheels.iter().filter_map(|wheel| wheel[k]).collect();

@@ -5,7 +5,6 @@ use embedded_can::{Frame, Id};
 use gyronet::units::Micros;
 use std::io::{self, Write};
 
-/// Interface name in the log.
 pub const INTERFACE: &str = "can0";
 
 /// A writer of CAN frames in candump format.

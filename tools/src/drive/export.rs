@@ -7,69 +7,50 @@ use crate::drive::track::Track;
 use gyronet::units::AngularRate;
 use std::io::{self, Write};
 
-/// A table with a line for each step after static initialisation: time, s; the yaw rate of the gyro, the live rate,
-/// the delayed rate and its expected error, rad/s; the yaw of the delayed rate, rad; and the status of the live
-/// rate. An empty field is unknown.
-#[derive(Debug)]
-pub struct Table<W> {
-    out: W,
-}
+/// The columns of a table with a line for each step after static initialisation: time, s; the yaw rate of the gyro, the
+/// live rate, the delayed rate and its expected error, rad/s; the yaw of the delayed rate, rad; and the status of the
+/// live rate. An empty field is unknown.
+pub const HEADER: &str = "t_s,gyro,live,delayed,sigma,yaw,status";
 
-impl<W: Write> Table<W> {
-    pub fn new(mut out: W) -> io::Result<Self> {
-        writeln!(out, "t_s,gyro,live,delayed,sigma,yaw,status")?;
-        Ok(Self { out })
+pub fn line(step: &Step, out: &mut impl Write) -> io::Result<()> {
+    if !step.is_initialised {
+        return Ok(());
     }
-
-    pub fn step(&mut self, step: &Step) -> io::Result<()> {
-        if !step.is_initialised {
-            return Ok(());
-        }
-        let [.., gyro] = step.input.sample.angular_rate;
-        let known = |value: Option<f64>| value.map(|value| format!("{value:.7}")).unwrap_or_default();
-        let sent = step.delayed;
-        writeln!(
-            self.out,
-            "{:.4},{:.7},{:.7},{},{},{},{}",
-            seconds(step.time.0),
-            gyro.rad_per_sec(),
-            step.vehicle.live.rate.rad_per_sec(),
-            known(sent.map(|sent| sent.rate.rad_per_sec())),
-            known(sent.and_then(|sent| sent.sigma).map(AngularRate::rad_per_sec)),
-            known(sent.map(|sent| sent.yaw.rad())),
-            format!("{:?}", step.vehicle.live.status).to_lowercase(),
-        )
-    }
-
-    pub fn finish(&mut self) -> io::Result<()> {
-        self.out.flush()
-    }
+    let [.., gyro] = step.input.sample.angular_rate;
+    let known = |value: Option<f64>| value.map(|value| format!("{value:.7}")).unwrap_or_default();
+    let sent = step.delayed;
+    writeln!(
+        out,
+        "{:.4},{:.7},{:.7},{},{},{},{}",
+        seconds(step.time.0),
+        gyro.rad_per_sec(),
+        step.vehicle.live.rate.rad_per_sec(),
+        known(sent.map(|sent| sent.rate.rad_per_sec())),
+        known(sent.and_then(|sent| sent.sigma).map(AngularRate::rad_per_sec)),
+        known(sent.map(|sent| sent.yaw.rad())),
+        format!("{:?}", step.vehicle.live.status).to_lowercase(),
+    )
 }
 
 /// The poses from dead reckoning with the delayed rate, from the end of static initialisation on: time of the
 /// recording, s, x forward and y left of the first pose, m, and the heading as a quaternion.
 #[derive(Debug)]
-pub struct Tum<W> {
-    out: W,
+pub struct Tum {
     speeds: Speeds,
     track: Track,
 }
 
-impl<W: Write> Tum<W> {
-    pub fn new(speeds: Speeds, out: W) -> Self {
-        Self { out, speeds, track: Track::default() }
+impl Tum {
+    pub fn new(speeds: Speeds) -> Self {
+        Self { speeds, track: Track::default() }
     }
 
-    pub fn step(&mut self, step: &Step) -> io::Result<()> {
+    pub fn pose(&mut self, step: &Step, out: &mut impl Write) -> io::Result<()> {
         let way = self.speeds.next(&step.input) * DT;
         let Some(sent) = step.delayed.filter(|_| step.is_compared) else { return Ok(()) };
         self.track.step([way; 2], sent.rate.rad_per_sec() * DT);
         let ([x, y], (sin, cos)) = (self.track.position, (0.5 * self.track.yaw).sin_cos());
-        writeln!(self.out, "{:.4} {x:.4} {y:.4} 0 0 0 {sin:.9} {cos:.9}", seconds(step.time.0))
-    }
-
-    pub fn finish(&mut self) -> io::Result<()> {
-        self.out.flush()
+        writeln!(out, "{:.4} {x:.4} {y:.4} 0 0 0 {sin:.9} {cos:.9}", seconds(step.time.0))
     }
 }
 
@@ -93,16 +74,15 @@ mod tests {
         let recording = bundled::simulated_drive().unwrap();
         let drive = Drive::from(&recording);
         let board = Board::new(Config::DEFAULT, drive.wheels(), Uncorrected);
-        let mut table = Table::new(Vec::new()).unwrap();
-        let mut path = Tum::new(drive.speeds().unwrap(), Vec::new());
+        let (mut table, mut path) = (Vec::new(), Vec::new());
+        let mut tum = Tum::new(drive.speeds().unwrap());
         for step in Steps::new(&drive, board).unwrap() {
             let step = step.unwrap();
-            table.step(&step).unwrap();
-            path.step(&step).unwrap();
+            line(&step, &mut table).unwrap();
+            tum.pose(&step, &mut path).unwrap();
         }
-        let (table, path) = (table.out, path.out);
         let table = String::from_utf8(table).unwrap();
-        let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
+        let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
         assert_eq!(rows.len(), recording.rows.len() - 300);
         assert!(rows.iter().any(|row| row[6] == "ready"));
         let unknown = rows.iter().filter(|row| row[3].is_empty()).count();

@@ -6,7 +6,6 @@ use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
 
-/// First bytes of each format.
 const FORMATS: [(&[u8], &str); 17] = [
     (b"\x89MCAP", "an MCAP file"),
     (b"#ROSBAG", "a ROS 1 bag"),

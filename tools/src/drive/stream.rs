@@ -141,7 +141,6 @@ impl Drive<'_> {
         WheelFrames::of(self.facts.wheels, self.vehicle.radius_m())
     }
 
-    /// The speed of the vehicle, from its wheels.
     pub fn speeds(&self) -> Option<Speeds> {
         Speeds::of(self.facts.wheels, self.vehicle.radius_m())
     }

@@ -55,7 +55,6 @@ impl HeadingError {
         self.mean_1s_rad.or(self.rms_rad)
     }
 
-    /// The mean of each figure over the drives that have it.
     pub fn mean(errors: &[Self]) -> Self {
         let mean = |of: fn(&Self) -> Option<f64>| mean(errors.iter().filter_map(of));
         Self {
@@ -193,17 +192,13 @@ pub struct AgainstRate {
 
 impl Default for AgainstRate {
     fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl AgainstRate {
-    pub fn new() -> Self {
         let mut changes = Changes::new(1, 1);
         changes.add(Some(0.0));
         Self { angle: 0.0, samples: 0, changes }
     }
+}
 
+impl AgainstRate {
     /// Adds a sample: the estimated and the true yaw rate, rad/s.
     pub fn add(&mut self, rate: f64, truth: f64) {
         self.angle += (rate - truth) * DT;
@@ -228,7 +223,6 @@ pub struct OffCourse {
 }
 
 impl OffCourse {
-    /// The integral of the rate.
     pub fn yaw(&self) -> f64 {
         self.yaw
     }
@@ -283,12 +277,6 @@ pub struct AgainstCourse {
 
 impl Default for AgainstCourse {
     fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl AgainstCourse {
-    pub fn new() -> Self {
         Self {
             off: OffCourse::default(),
             blocks: Blocks::default(),
@@ -301,7 +289,9 @@ impl AgainstCourse {
             changes: Changes::new(BLOCK_S, 6 * BLOCK_S),
         }
     }
+}
 
+impl AgainstCourse {
     /// Adds a sample: the estimated yaw rate, rad/s, and the course, rad.
     pub fn add(&mut self, rate: f64, course: Option<f64>) {
         let off = self.off.add(rate, course);
@@ -402,16 +392,14 @@ impl BiasByCourse {
 mod tests {
     use super::*;
 
-    /// The errors of a rate against a rate.
     fn by_rate(reference: &[f64], estimate: &[f64]) -> Option<Errors> {
-        let mut against = AgainstRate::new();
+        let mut against = AgainstRate::default();
         reference.iter().zip(estimate).for_each(|(truth, rate)| against.add(*rate, *truth));
         against.errors()
     }
 
-    /// The errors of a constant rate against a course.
     fn by_course(course: &[Option<f64>], rate: f64) -> Option<Errors> {
-        let mut against = AgainstCourse::new();
+        let mut against = AgainstCourse::default();
         course.iter().for_each(|course| against.add(rate, *course));
         against.errors()
     }

@@ -79,7 +79,6 @@ impl Method {
     pub const GYRONET_ONLINE: Self = mems("gyronet_online", "GyroNet, sent at once");
     /// GyroNet followed by zero-rate updates, delayed rate.
     pub const GYRONET_LOOP: Self = mems("gyronet_loop", "GyroNet with the bias loop");
-    /// The fibre-optic gyro without any correction.
     pub const FOG: Self = fog("fog", "FoG");
     /// The fibre-optic gyro less the Earth's rate at the latitude of the sequence.
     pub const FOG_EARTH: Self = fog("fog_earth", "FoG less Earth rate");
@@ -97,7 +96,6 @@ impl Method {
     /// FoGNet; the first minute is uncorrected.
     pub const FOGNET_NOPAD: Self = fog("fognet_nopad", "FoGNet, no padding");
 
-    /// The methods of one drive, in the order of its table.
     pub const ON_A_DRIVE: [Self; 11] = [
         Self::RAW,
         Self::STATIC,
@@ -110,27 +108,6 @@ impl Method {
         Self::GYRONET_INT,
         Self::LIVE,
         Self::DELAYED,
-    ];
-
-    /// The methods of a sequence, in the order of the paper's tables.
-    pub const ON_A_SEQUENCE: [Self; 17] = [
-        Self::RAW,
-        Self::STATIC,
-        Self::FIR,
-        Self::GYRONET,
-        Self::GYRONET_ONLINE,
-        Self::GYRONET_LOOP,
-        Self::VQF,
-        Self::VQF_VEHICLE,
-        Self::VENDOR,
-        Self::WHEELS,
-        Self::FOG,
-        Self::FOG_EARTH,
-        Self::FOG_DEFAULT,
-        Self::FOGNET,
-        Self::FOGNET_NOPAD,
-        Self::PSEUDO_FOG,
-        Self::FOG_WHEELS,
     ];
 
     pub const CLASSICAL: [Self; 6] =
@@ -178,7 +155,6 @@ impl<T> PerMethod<T> {
         &mut self.0
     }
 
-    /// The value of a method, if it was run.
     pub fn get(&self, method: Method) -> Option<&T> {
         self.each().find(|(own, _)| *own == method).map(|(_, value)| value)
     }

@@ -12,7 +12,7 @@ use crate::drive::recording::Row;
 use crate::drive::stream::Drive;
 use crate::drive::wheel_frames::Speeds;
 use crate::evaluate::angle::wrap;
-use crate::evaluate::heading_error::OffCourse;
+use crate::evaluate::heading_error::{OffCourse, median};
 use crate::evaluate::methods::Method;
 use crate::evaluate::outage_path::{Path, Point};
 use crate::evaluate::rates::silent;
@@ -42,7 +42,6 @@ pub const METHODS: [Method; 6] =
     [Method::STATIC, Method::STATIC_ZERO_RATE, Method::VQF, Method::EKF, Method::NO_MODEL, Method::DELAYED];
 pub type ByMethod<T> = [T; METHODS.len()];
 
-/// The error of every method in one outage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outage {
     /// Time driven with a course before it, s.
@@ -68,7 +67,6 @@ pub struct NoStart {
     pub seconds: usize,
 }
 
-/// A network that several boards share.
 #[derive(Clone)]
 struct Shared<'a>(Rc<RefCell<&'a mut dyn WindowNetwork>>);
 
@@ -189,9 +187,7 @@ impl Reference {
     }
 
     fn median(&self) -> Option<f64> {
-        let mut known: Vec<f64> = self.recent.iter().flatten().copied().collect();
-        known.sort_unstable_by(f64::total_cmp);
-        known.get(known.len() / 2).copied()
+        median(self.recent.iter().flatten().copied().collect())
     }
 }
 
@@ -265,7 +261,6 @@ impl<'a> Race<'a> {
         }
     }
 
-    /// Adds up the time with a course.
     fn listen(&mut self, row: &Row) {
         if row.heading.is_some_and(|heading| CourseConfig::DEFAULT.sigma(&heading).is_some()) {
             let now = row.sample.time.0;

@@ -104,7 +104,6 @@ pub fn typical<'a>(outages: impl Iterator<Item = &'a Outage> + Clone) -> Option<
     Some([(chosen.get(chosen.len() / 2)?, which("the median")), (chosen.last()?, which("the worst"))])
 }
 
-/// The names of the curves, with the errors at the end.
 fn legend(outage: &Outage) -> String {
     let mut text = String::new();
     for (k, (method, ..)) in DRAWN.iter().enumerate() {

@@ -7,7 +7,6 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// Median, 90 % and worst of some values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
     pub median: f64,
@@ -16,7 +15,6 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// `None` without values.
     pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.collect();
         values.sort_unstable_by(f64::total_cmp);
@@ -25,7 +23,6 @@ impl Spread {
     }
 }
 
-/// The errors of one method over all outages of one length.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Figures {
     /// Drives with a start, and all their starts.

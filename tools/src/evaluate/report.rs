@@ -329,7 +329,6 @@ fn table(f: &mut fmt::Formatter<'_>, ours: Option<Comparisons>, rows: &PerMethod
     writeln!(f)
 }
 
-/// The table of a drive or of a mean.
 pub struct Table<'a> {
     pub rows: &'a PerMethod<Row>,
     /// Only the gyro alone, static initialisation without and with zero-rate updates, the best classical methods, and the

@@ -44,7 +44,6 @@ impl TrajectoryError {
     }
 }
 
-/// A rotation about the origin, followed by a shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
     /// The rotation to the left, rad.

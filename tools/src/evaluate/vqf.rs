@@ -38,12 +38,10 @@ pub fn rates(filter: VQF, samples: impl Iterator<Item = ([f64; 3], [f64; 3])>) -
     samples.map(|(gyro, force)| heading.rate(gyro, force)).collect()
 }
 
-/// Returns a filter with the published parameters.
 pub fn published() -> VQF {
     VQF::new(DT, None, None, None)
 }
 
-/// Returns a filter that estimates the bias at rest only.
 pub fn on_a_vehicle() -> VQF {
     let mut filter = published();
     filter.set_motion_bias_est_enabled(false);

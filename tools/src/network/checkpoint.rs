@@ -88,7 +88,6 @@ impl<N: Network> Checkpoint<N> {
     }
 }
 
-/// Name of the tensor of GyroNet's linear part.
 const LINEAR: &str = "linear.weight";
 
 impl Checkpoint<GyroNet> {

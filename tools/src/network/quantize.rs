@@ -17,11 +17,9 @@ use gyronet::nn::{HIDDEN_MAX, dense::Dense, linear::Linear};
 use gyronet::units::{AngularRate, SpecificForce};
 use serde_json::json;
 
-/// Standard deviations to which network inputs are clamped; `gyronet quantize --drives` reports how many inputs are
-/// clamped.
+/// Standard deviations to which network inputs are clamped.
 pub const INPUT_CLAMP_STD: f64 = 24.0;
 
-/// The reason why a checkpoint cannot be quantised.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum QuantizeError {
     /// A weight of a row is beyond +-3.96, the largest that int8 and a 16-bit multiplier can hold.
@@ -43,24 +41,8 @@ pub enum QuantizeError {
     Blob(#[from] blob::BlobError),
 }
 
-#[derive(Debug, Clone, Default)]
-pub struct Report {
-    pub rows: usize,
-    /// Number of rows whose scale was raised to keep their sum within the limit.
-    pub raised: usize,
-    pub largest_raise: f64,
-    pub bytes: usize,
-}
-
-impl Report {
-    fn new() -> Self {
-        Self { largest_raise: 1.0, ..Self::default() }
-    }
-}
-
-/// Quantises a checkpoint of GyroNet; returns the weight file and its figures.
-pub fn quantize(checkpoint: &Checkpoint<GyroNet>) -> Result<(Vec<u8>, Report), QuantizeError> {
-    let mut report = Report::new();
+/// Quantises a checkpoint of GyroNet to a weight file.
+pub fn quantize(checkpoint: &Checkpoint<GyroNet>) -> Result<Vec<u8>, QuantizeError> {
     let clamp = (INPUT_CLAMP_STD * f64::from(HIDDEN_MAX)) as i32;
     let mut body = Vec::new();
     let (shape, tensors) = (checkpoint.shape(), checkpoint.tensors());
@@ -74,7 +56,7 @@ pub fn quantize(checkpoint: &Checkpoint<GyroNet>) -> Result<(Vec<u8>, Report), Q
         for (layer, input_max) in [(1, clamp), (2, HIDDEN_MAX)] {
             for backward in [false, true] {
                 let weights = checkpoint.direction(layer, backward);
-                rows::direction(&mut body, &weights, layer, input_max, &mut report)?;
+                rows::direction(&mut body, &weights, layer, input_max)?;
             }
         }
         output(&mut body, tensors)?;
@@ -85,10 +67,9 @@ pub fn quantize(checkpoint: &Checkpoint<GyroNet>) -> Result<(Vec<u8>, Report), Q
     file.extend(provenance);
     file.extend(body);
     let words = seal(&mut file);
-    report.bytes = file.len();
     // The file must pass the checks of the firmware.
     Blob::new_checked(bytemuck::cast_slice(&words))?;
-    Ok((file, report))
+    Ok(file)
 }
 
 /// Writes the rows of the linear part; `units` converts codes of each feature to rate codes. The cumulative sums of
@@ -110,7 +91,6 @@ fn linear(out: &mut Vec<u8>, weights: &[f32], units: &[f64; FEATURES]) -> Result
     Ok(())
 }
 
-/// Writes the row of the output layer.
 fn output(out: &mut Vec<u8>, tensors: &Tensors) -> Result<(), QuantizeError> {
     let [weight, bias] = ["fc.weight", "fc.bias"].map(|name| tensors.tensor(name));
     let unit = f64::from(tensors.tensor("output_scale")[0]) * f64::from(AngularRate::PER_RAD_PER_SEC);

@@ -7,7 +7,6 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The reason why a checkpoint cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     #[error("{path}: {source}")]
@@ -53,7 +52,6 @@ pub(crate) fn bilstm(name: &str, inputs: usize, units: usize, layers: usize) -> 
     tensors.collect()
 }
 
-/// Returns the tensors of a fully connected layer.
 pub(crate) fn dense(name: &str, inputs: usize, outputs: usize) -> [Shape; 2] {
     [tensor(&format!("{name}.weight"), &[outputs, inputs]), tensor(&format!("{name}.bias"), &[outputs])]
 }

@@ -3,7 +3,6 @@
 use gyronet::model::{Blob, BlobError, FogBlob};
 use std::path::Path;
 
-/// The reason why a weight file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WeightFileError {
@@ -23,12 +22,10 @@ pub struct WeightFile {
 }
 
 impl WeightFile {
-    /// Reads and checks a weight file of GyroNet.
     pub fn read(path: &Path) -> Result<Self, WeightFileError> {
         Self::parse(&path.display().to_string(), &bytes(path)?)
     }
 
-    /// Reads and checks a weight file of FoGNet.
     pub fn read_fognet(path: &Path) -> Result<Self, WeightFileError> {
         Self::parse_fognet(&path.display().to_string(), &bytes(path)?)
     }

@@ -32,7 +32,6 @@ pub fn table(class: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<St
     )
 }
 
-/// Returns text with the special characters of HTML escaped.
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -51,7 +51,6 @@ pub fn package(
     Ok(command)
 }
 
-/// The user's cache folder for gyronet.
 fn cache() -> Option<PathBuf> {
     let variable =
         |name: &str| std::env::var_os(name).filter(|value: &OsString| !value.is_empty()).map(PathBuf::from);

@@ -18,7 +18,6 @@ impl Table {
         self.rows.push(cells.map(str::to_owned).into());
     }
 
-    /// An object for each row, with the columns as keys.
     pub fn json(&self) -> Value {
         let object = |row: &Vec<String>| {
             let cells = self.columns.iter().zip(row);

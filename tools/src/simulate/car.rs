@@ -210,7 +210,6 @@ impl<W: Iterator<Item = Leg>> Car<W> {
         })
     }
 
-    /// Advances the speed and the position by 10 ms.
     fn drive(&mut self) {
         let command = match self.leg {
             Leg::Stand { seconds } => {

@@ -8,7 +8,6 @@ use std::io::{self, Write};
 pub const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_x,ref_gyr_y,ref_gyr_z,\
                           wheel1_rate,wheel2_rate,wheel3_rate,wheel4_rate";
 
-/// Writes a complete drive; returns the number of samples.
 pub fn write(config: &Config, mut out: impl Write) -> io::Result<u32> {
     let temperature = if config.warming.is_some() { ",temp_c" } else { "" };
     let gnss = if config.gnss.is_some() { ",course,course_sigma,gnss_speed" } else { "" };

@@ -33,7 +33,6 @@ pub struct Config {
     pub spoofed_from_s: Option<f64>,
 }
 
-/// A course and what the receiver says of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Course {
     /// Direction, rad clockwise from the direction at the start.

@@ -93,7 +93,6 @@ impl Triad {
     }
 }
 
-/// Simulates a part with the errors of its seed.
 #[derive(Debug, Clone)]
 pub struct Mems {
     random: Random,
@@ -106,28 +105,26 @@ pub struct Mems {
 
 impl Mems {
     pub fn new(config: &Config, seed: u64) -> Self {
-        let mut random = Purpose::Mems.stream(seed);
-        let mut triad = |noise, walk, bias| {
-            let matrix = axes(config.scale, config.misalignment, &mut random);
-            Triad::new(matrix, noise, walk, bias, &mut random)
-        };
-        let gyro = triad(config.gyro_noise, config.gyro_walk, config.gyro_bias);
-        let accel = triad(config.accel_noise, config.accel_walk, config.accel_bias);
-        Self { random, gyro, accel, gyro_of_force: [[0.0; 3]; 3], mount: config.mount }
+        Self::of(config, None, Purpose::Mems.stream(seed))
     }
 
     /// Creates the part of a device seed in one run: scale, misalignment and the gyro's sensitivity to force come
     /// from the device, bias at power-on and noise from the run.
     pub fn of_device(config: &Config, device: u64, run: u64) -> Self {
-        let mut fixed = Purpose::Device.stream(device);
-        let mut random = Purpose::Mems.stream(run);
+        Self::of(config, Some(Purpose::Device.stream(device)), Purpose::Mems.stream(run))
+    }
+
+    fn of(config: &Config, mut fixed: Option<Random>, mut random: Random) -> Self {
         let mut triad = |noise, walk, bias| {
-            let matrix = axes(config.scale, config.misalignment, &mut fixed);
+            let fixed = fixed.as_mut().unwrap_or(&mut random);
+            let matrix = axes(config.scale, config.misalignment, fixed);
             Triad::new(matrix, noise, walk, bias, &mut random)
         };
         let gyro = triad(config.gyro_noise, config.gyro_walk, config.gyro_bias);
         let accel = triad(config.accel_noise, config.accel_walk, config.accel_bias);
-        let gyro_of_force = std::array::from_fn(|_| fixed.normals().map(|n| config.gyro_per_force * n));
+        let gyro_of_force = fixed.map_or([[0.0; 3]; 3], |mut fixed| {
+            std::array::from_fn(|_| fixed.normals().map(|n| config.gyro_per_force * n))
+        });
         Self { random, gyro, accel, gyro_of_force, mount: config.mount }
     }
 

@@ -3,7 +3,6 @@
 
 use crate::random::Random;
 
-/// The purpose of a stream of random numbers.
 #[derive(Debug, Clone, Copy)]
 pub enum Purpose {
     Route,

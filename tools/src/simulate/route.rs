@@ -7,7 +7,6 @@ use super::purpose::Purpose;
 use crate::random::Random;
 use std::f64::consts::FRAC_PI_2;
 
-/// An endless iterator over the legs of a route.
 #[derive(Debug, Clone)]
 pub struct Route {
     random: Random,

@@ -10,10 +10,8 @@ use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Timeout of an image's run or a build.
 const LIMIT: Duration = Duration::from_secs(900);
 const POLL: Duration = Duration::from_millis(5);
-/// The image that is measured.
 pub const IMAGE: &str = "bench";
 /// The images that are built to be flashed, optimised for size.
 pub const FLASHED: [&str; 3] = ["boot", "coprocessor", "bringup"];
@@ -85,7 +83,6 @@ pub fn target_folder() -> PathBuf {
     cargo.map_or_else(|| workspace().join("target"), Path::to_owned)
 }
 
-/// Checks that rustc has a standard library for the target.
 pub fn target_installed(target: &str) -> Result<(), String> {
     if !workspace().join("memory.x").is_file() {
         return Err("the repository that this program was built in no longer exists".into());
@@ -120,7 +117,6 @@ pub fn build_banks(package: &Path, folder: &Path) -> Result<PathBuf, BenchError>
     Ok(folder.join(TARGET).join("release"))
 }
 
-/// Builds an image for a board, named by its features, and its target.
 pub fn build_for(
     (board, target): (&str, &str),
     workspace: &Path,

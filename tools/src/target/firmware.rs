@@ -41,7 +41,6 @@ fn boards() -> Vec<String> {
     boards.chain([NUCLEO]).map(str::to_owned).collect()
 }
 
-/// The linked images of a board.
 pub struct Linked {
     /// The boot loader.
     pub boot: Vec<u8>,
@@ -80,7 +79,6 @@ impl Linked {
         Ok(Self { boot, images: images.collect::<Result<_, _>>()?, swaps: false })
     }
 
-    /// Returns the bytes of the boot loader.
     pub fn boot_loader(&self) -> Result<Vec<u8>, FirmwareFileError> {
         flat(&self.boot, FLASH_BASE..FLASH_BASE + BOOT_SIZE)
     }
@@ -125,7 +123,6 @@ impl Linked {
     }
 }
 
-/// Returns the label of an image.
 pub fn label(image: &[u8]) -> Result<Label, FirmwareFileError> {
     let bytes = image.get(LABEL..).and_then(|rest| rest.first_chunk::<LABEL_SIZE>());
     bytes.and_then(Label::parse).ok_or(FirmwareFileError::Lacks("label"))

@@ -39,7 +39,6 @@ pub enum StackError {
 /// The functions of the deepest call chain, outermost first, each with its own stack use in bytes.
 pub type Way = Vec<(String, u32)>;
 
-/// The handler of a priority that needs the most stack.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Handler {
     /// Priority, higher is more urgent; a handler without a priority may interrupt everything.

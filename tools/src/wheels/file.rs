@@ -10,35 +10,31 @@ use gyronet::can::wheel::{MAX_FRAMES, WheelConfigError, WheelReceiver, WheelSett
 use gyronet::sample::WHEELS;
 use gyronet::units::Duration;
 use serde::{Deserialize, Serialize};
+use std::fmt::Display;
+use std::path::Path;
 
-/// The reason why a wheel settings file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WheelFileError {
-    #[error("{path}: {source}")]
-    Toml { path: String, source: Box<toml::de::Error> },
-    #[error("{path}: {found} frames, at most {MAX_FRAMES} are allowed")]
-    Frames { path: String, found: usize },
-    #[error("{path}: frame {id:#x}: not an identifier of {} bits", if *.extended { 29 } else { 11 })]
-    Identifier {
-        path: String,
-        id: u32,
-        /// True if the file declares an identifier of 29 bits.
-        extended: bool,
-    },
-    #[error("{path}: {wheel:?} has two signals")]
-    Twice { path: String, wheel: Wheel },
-    #[error("{path}: {wheel:?} needs either factor_kmh or metres_per_pulse")]
-    Scale { path: String, wheel: Wheel },
-    #[error("{path}: frame {id:#x}: {source}")]
-    Place { path: String, id: u32, source: OutsideFrame },
-    #[error("{path}: {key} = {value}: must be {range}")]
-    Range { path: String, key: &'static str, value: f64, range: &'static str },
-    #[error("{path}: {source}")]
-    Settings { path: String, source: WheelConfigError },
+    #[error(transparent)]
+    Toml(#[from] toml::de::Error),
+    #[error("{0} frames, at most {MAX_FRAMES} are allowed")]
+    Frames(usize),
+    /// `extended` is true if the file declares an identifier of 29 bits.
+    #[error("frame {id:#x}: not an identifier of {} bits", if *.extended { 29 } else { 11 })]
+    Identifier { id: u32, extended: bool },
+    #[error("{0:?} has two signals")]
+    Twice(Wheel),
+    #[error("{0:?} needs either factor_kmh or metres_per_pulse")]
+    Scale(Wheel),
+    #[error("frame {id:#x}: {source}")]
+    Place { id: u32, source: OutsideFrame },
+    #[error("{key} = {value}: must be {range}")]
+    Range { key: &'static str, value: f64, range: &'static str },
+    #[error(transparent)]
+    Settings(#[from] WheelConfigError),
 }
 
-/// The settings of a vehicle's wheel frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WheelFile {
@@ -112,7 +108,6 @@ pub enum Protection {
     },
 }
 
-/// The options of a sum of bytes: see [`ByteSum`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sum {
@@ -168,7 +163,6 @@ const fn one() -> u32 {
     1
 }
 
-/// One raw value, or a list.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Raw {
@@ -234,9 +228,17 @@ pub struct Signal {
 }
 
 impl WheelFile {
-    pub fn parse(path: &str, text: &str) -> Result<Self, WheelFileError> {
-        toml::from_str(text)
-            .map_err(|source| WheelFileError::Toml { path: path.to_owned(), source: Box::new(source) })
+    /// Reads a file with its settings; an error names the file.
+    pub fn read(path: &Path) -> Result<(Self, WheelSettings), String> {
+        let named = |error: &dyn Display| format!("{}: {error}", path.display());
+        let text = std::fs::read_to_string(path).map_err(|error| named(&error))?;
+        let file = Self::parse(&text).map_err(|error| named(&error))?;
+        let settings = file.settings().map_err(|error| named(&error))?;
+        Ok((file, settings))
+    }
+
+    pub fn parse(text: &str) -> Result<Self, WheelFileError> {
+        Ok(toml::from_str(text)?)
     }
 
     pub fn of(settings: &WheelSettings) -> Self {
@@ -252,33 +254,31 @@ impl WheelFile {
     }
 
     /// Converts to the board's settings, with the checks of the board.
-    pub fn settings(&self, path: &str) -> Result<WheelSettings, WheelFileError> {
+    pub fn settings(&self) -> Result<WheelSettings, WheelFileError> {
         let found = self.frame.len();
         if found > MAX_FRAMES {
-            return Err(WheelFileError::Frames { path: path.to_owned(), found });
+            return Err(WheelFileError::Frames(found));
         }
         let (mut frames, mut signals) = ([None; MAX_FRAMES], [None; WHEELS]);
         for ((number, place), frame) in (0..).zip(&mut frames).zip(&self.frame) {
-            *place = Some(frame.settings(path)?);
+            *place = Some(frame.settings()?);
             for signal in &frame.signal {
                 let place = &mut signals[signal.wheel as usize];
                 if place.is_some() {
-                    return Err(WheelFileError::Twice { path: path.to_owned(), wheel: signal.wheel });
+                    return Err(WheelFileError::Twice(signal.wheel));
                 }
-                *place = Some(signal.settings(path, frame.id, number)?);
+                *place = Some(signal.settings(frame.id, number)?);
             }
         }
         let settings = WheelSettings {
             frames,
             signals,
             timeout: Duration::from_millis(self.timeout_ms),
-            still_speed: speed(path, "still_speed_kmh", self.still_speed_kmh)?,
+            still_speed: speed("still_speed_kmh", self.still_speed_kmh)?,
             still_for: Duration::from_millis(self.still_for_ms),
         };
-        match WheelReceiver::new(settings) {
-            Ok(_) => Ok(settings),
-            Err(source) => Err(WheelFileError::Settings { path: path.to_owned(), source }),
-        }
+        WheelReceiver::new(settings)?;
+        Ok(settings)
     }
 }
 
@@ -298,13 +298,12 @@ signal = [
 "#;
 
     fn error(text: &str) -> String {
-        let settings = WheelFile::parse("car.toml", text).and_then(|file| file.settings("car.toml"));
-        settings.unwrap_err().to_string()
+        WheelFile::parse(text).and_then(|file| file.settings()).unwrap_err().to_string()
     }
 
     #[test]
     fn the_built_in_settings_as_a_file() {
-        let settings = WheelFile::parse("car.toml", TOYOTA).unwrap().settings("car.toml").unwrap();
+        let settings = WheelFile::parse(TOYOTA).unwrap().settings().unwrap();
         let built_in = WheelSettings::TOYOTA.signals[0].unwrap();
         let signal = settings.signals[0].unwrap();
         assert_eq!((signal.offset, signal.factor_q16), (built_in.offset, built_in.factor_q16));
@@ -325,7 +324,7 @@ signal = [
     { wheel = "front-right", start_bit = 32, bits = 14, order = "intel", metres_per_pulse = 0.02, reverse_when = { start_bit = 18 } },
 ]
 "#;
-        let settings = |text: &str| WheelFile::parse("car.toml", text).unwrap().settings("car.toml").unwrap();
+        let settings = |text: &str| WheelFile::parse(text).unwrap().settings().unwrap();
         for first in [WheelSettings::TOYOTA, settings(all)] {
             let text = toml::to_string(&WheelFile::of(&first)).unwrap();
             assert_eq!(settings(&text), first);
@@ -340,10 +339,10 @@ signal = [
 
     #[test]
     fn a_file_may_switch_wheels_off_but_not_by_omission() {
-        let settings = WheelFile::parse("none.toml", "frame = []").unwrap().settings("none.toml").unwrap();
+        let settings = WheelFile::parse("frame = []").unwrap().settings().unwrap();
         assert_eq!((settings.frames, settings.signals), ([None; MAX_FRAMES], [None; WHEELS]));
         let text = toml::to_string(&WheelFile::of(&settings)).unwrap();
-        assert_eq!(WheelFile::parse("none.toml", &text).unwrap().settings("none.toml").unwrap(), settings);
+        assert_eq!(WheelFile::parse(&text).unwrap().settings().unwrap(), settings);
         assert!(error("timeout_ms = 100").contains("missing field `frame`"));
     }
 
@@ -353,7 +352,7 @@ signal = [
         assert!(error(&unscaled).ends_with("FrontRight needs either factor_kmh or metres_per_pulse"));
         let codes = TOYOTA.replacen("0xFFFE", "1, 2, 3", 1);
         assert!(error(&codes).ends_with("invalid = 4: must be at most three codes"));
-        assert!(error("frame = 1").starts_with("car.toml: TOML parse error at line 1"));
+        assert!(error("frame = 1").starts_with("TOML parse error at line 1"));
         assert!(error(&TOYOTA.replace("start_bit = 23", "start_bit = 15")).ends_with("two values overlap"));
         assert!(
             error(&TOYOTA.replace("start_bit = 55", "start_bit = 63")).contains("do not lie inside a frame")

@@ -3,7 +3,6 @@
 use super::{column, command, gyronet, gyronet_in, scratch, text};
 use std::process::Stdio;
 
-/// Names of the subcommands, from the help itself.
 fn subcommands() -> Vec<String> {
     let help = text(&gyronet(&["--help"]).stdout);
     let (_, list) = help.split_once("Commands:\n").unwrap();

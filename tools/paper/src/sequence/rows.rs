@@ -23,7 +23,6 @@ pub(super) struct Format<const N: usize> {
     pub nominal_hz: f64,
 }
 
-/// Holds a row: its stamp, and the used fields.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row<const N: usize> {
     pub line: u64,

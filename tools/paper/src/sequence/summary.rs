@@ -44,7 +44,6 @@ pub struct StreamSummary {
     clock: Clock,
 }
 
-/// Tracks the stamps of a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Clock {
     per_second: f64,

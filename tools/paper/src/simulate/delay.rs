@@ -3,7 +3,6 @@
 use gyronet_tools::random::Random;
 use gyronet_tools::simulate::purpose::Purpose;
 
-/// Delays the messages of one part.
 #[derive(Debug, Clone)]
 pub(super) struct Delay {
     mean: f64,

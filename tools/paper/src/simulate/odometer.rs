@@ -23,7 +23,6 @@ pub struct Config {
     pub slip_stiffness: f64,
 }
 
-/// Simulates the wheels of one run.
 #[derive(Debug, Clone)]
 pub struct Odometer {
     config: Config,

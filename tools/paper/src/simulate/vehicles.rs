@@ -47,7 +47,6 @@ pub struct Vehicle {
     pub stamp_delay: f64,
 }
 
-/// The car of KAIST Complex Urban.
 pub const KAIST: Vehicle = Vehicle {
     world: world::Config {
         car: car::Config {

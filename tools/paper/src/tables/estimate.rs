@@ -12,7 +12,6 @@ pub struct Estimate {
     pub places: Places,
 }
 
-/// The source of an estimate's positions.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Places {
     /// Dead reckoning with the wheels' distances times a scale.

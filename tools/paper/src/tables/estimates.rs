@@ -143,7 +143,6 @@ impl Estimates {
         self.add(Method::VQF_VEHICLE, vqf::rates(filter, samples()));
     }
 
-    /// Adds a method from the rates of all steps, rad/s.
     fn add(&mut self, method: Method, rates: Vec<f64>) {
         self.push(method, rates[self.start..].iter().map(|rate| rate * DT).collect());
     }
@@ -159,7 +158,10 @@ impl Estimates {
 
     /// Adds another program's trajectory, or the reason why it cannot be compared.
     pub fn add_given(&mut self, sequence: &Sequence, given: &Given) {
+        let name = given.method.name;
+        let is_taken = self.methods.iter().any(|own| own.method.key == name || own.method.name == name);
         match given.estimate(sequence, self.start) {
+            _ if is_taken => self.left_out.push((given.method, "it has the name of another method".into())),
             Ok(estimate) => self.methods.push(estimate),
             Err(error) => self.left_out.push((given.method, error.to_string())),
         }

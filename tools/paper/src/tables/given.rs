@@ -36,24 +36,12 @@ pub struct Given {
     pub folder: PathBuf,
 }
 
-/// The error of a `NAME=FOLDER` that cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum NameError {
-    #[error("expected NAME=FOLDER")]
-    Form,
-    #[error("{0:?} is a method of our own")]
-    Taken(String),
-}
-
 impl FromStr for Given {
-    type Err = NameError;
+    type Err = &'static str;
 
-    fn from_str(text: &str) -> Result<Self, NameError> {
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
         let parts = text.split_once('=').filter(|(name, folder)| !name.is_empty() && !folder.is_empty());
-        let (name, folder) = parts.ok_or(NameError::Form)?;
-        if Method::ON_A_SEQUENCE.iter().any(|own| own.key == name || own.name == name) {
-            return Err(NameError::Taken(name.to_owned()));
-        }
+        let (name, folder) = parts.ok_or("expected NAME=FOLDER")?;
         Ok(Self { method: Method::given(name), folder: PathBuf::from(folder) })
     }
 }

@@ -16,7 +16,6 @@ use std::fmt;
 /// Number of steps in a span of the fit: 10 s, in which the accumulated errors exceed an encoder's resolution.
 const SPAN: usize = 1_000;
 
-/// Holds the sums of a least-squares fit.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Fit {
     turns: NormalEquations,

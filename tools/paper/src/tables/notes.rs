@@ -27,7 +27,6 @@ pub fn with_fognet(set: &[&SequenceErrors], notes: &[&str]) -> Vec<String> {
     notes.chain(fitted).chain(refused).chain(left_out(set)).collect()
 }
 
-/// Returns the remarks on Table I.
 pub fn orientation(set: &[&SequenceErrors], means: &ByMethod) -> Vec<String> {
     let mut notes: Vec<String> = [
         "The paper's figures are for KAIST Urban. Its errors are against the FoG, ours against the data set's truth.",
@@ -53,7 +52,6 @@ pub fn orientation(set: &[&SequenceErrors], means: &ByMethod) -> Vec<String> {
     notes
 }
 
-/// Returns the remarks on Table IV.
 pub fn rivals(set: &[&SequenceErrors]) -> Vec<String> {
     let own = paper::average(&paper::RINS_W);
     let printed = paper::RINS_W_AVERAGE.figures;

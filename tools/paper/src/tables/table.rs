@@ -132,7 +132,6 @@ fn by_sequence(
     set.iter().map(|s| row(name(s), &s.methods)).chain([average]).collect()
 }
 
-/// Builds Table II.
 fn urban(set: &[&SequenceErrors]) -> Table {
     let is_wanted = |method: &Method| {
         method.gyro != Gyro::Mems || [Method::STATIC.key, Method::GYRONET.key].contains(&method.key)
@@ -166,7 +165,6 @@ fn urban(set: &[&SequenceErrors]) -> Table {
     }
 }
 
-/// Builds Table IV.
 fn rivals(set: &[&SequenceErrors]) -> Table {
     let methods = methods_of(set, |method| method.gyro == Gyro::Given || method.key == Method::FOGNET.key);
     let mut paper_rows = lines(&paper::RINS_W);
@@ -208,7 +206,6 @@ fn padding(set: &[&SequenceErrors]) -> Table {
     }
 }
 
-/// Builds Table V or VII.
 fn average(set: &[&SequenceErrors], title: &str, paper: &[Line]) -> Table {
     let means = mean(set.iter().copied());
     let rows = methods_of(set, |_| true).into_iter().map(|method| Row {

@@ -20,7 +20,6 @@ impl WindowNetwork for Nothing {
     }
 }
 
-/// Returns a sequence that is simulated and read back.
 fn sequence(name: &str, seconds: u32) -> Sequence {
     let folder = tempfile::tempdir().unwrap();
     let spec = Spec { name: name.into(), seconds, device: 1, run: 3 };

@@ -1,7 +1,7 @@
 //! An SLCAN line carries frames as text over any byte stream.
 
 use super::{Bus, WAIT};
-use crate::client::connection::{ConnectError, Connection, is_silence};
+use crate::client::connection::{self, ConnectError, Connection, is_silence};
 use gyronet::can::{DataFrame, slcan};
 use std::io::{ErrorKind, Read, Result, Write};
 use std::sync::LazyLock;
@@ -33,9 +33,8 @@ pub struct SlcanBus<L> {
 }
 
 impl SlcanBus<Connection> {
-    /// Opens `host:port`, or a serial port by its name at `baud`.
     pub fn open(name: &str, baud: u32) -> std::result::Result<Self, ConnectError> {
-        Ok(Self::new(Connection::open(name, baud, WAIT)?))
+        Ok(Self::new(connection::open(name, baud, WAIT)?))
     }
 }
 

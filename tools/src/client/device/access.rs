@@ -7,7 +7,6 @@ use crate::signing::unhex;
 use gyronet::uds::Session;
 use gyronet::uds::signature::SEED;
 
-/// The state of a board's access control.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct AccessState {
     /// `open` (no key is stored), `locked`, or `unlocked` for this session.

@@ -5,7 +5,6 @@ use gyronet::service::message::Refusal;
 use gyronet::uds::Nrc;
 use std::fmt;
 
-/// The error of a request that did not get the expected response.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
     #[error(transparent)]

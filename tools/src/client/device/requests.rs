@@ -16,7 +16,6 @@ use serde::de::{DeserializeOwned, DeserializeSeed, IntoDeserializer, SeqAccess};
 
 /// Data identifier of the configuration, which follows the version of its layout.
 pub const CONFIGURATION: u16 = 0x0100;
-/// Data identifier of the wheel frames.
 pub const WHEELS: u16 = 0x0101;
 const CALIBRATION: u16 = 0x0102;
 const PIPELINE_COUNTERS: u16 = 0x0105;
@@ -27,7 +26,6 @@ const INFO: u16 = 0x010A;
 pub const UNIT: u16 = 0x010D;
 /// Data identifier of the public key that controls who may write.
 pub const KEY: u16 = 0x0110;
-/// Data identifier of the state of the access control.
 pub const ACCESS: u16 = 0x0111;
 const ACCESS_COUNTERS: u16 = 0x0113;
 const LEARNED: u16 = 0x0115;
@@ -37,7 +35,6 @@ const COURSE: u16 = 0x0119;
 const CONTRADICTION: u16 = 0x011B;
 /// Data identifier of the firmware and of the head of its update.
 pub const FIRMWARE: u16 = 0x011A;
-/// The request for the counters: one frame.
 pub const COUNTERS: [u8; 7] = {
     let [a, b] = PIPELINE_COUNTERS.to_be_bytes();
     let [c, d] = INPUT_COUNTERS.to_be_bytes();
@@ -47,7 +44,6 @@ pub const COUNTERS: [u8; 7] = {
 pub const USE_DOWNLOAD: u16 = 0xFF01;
 /// The other routines.
 const FORGET: u16 = 0x0205;
-/// The sub-function that starts a routine.
 const START: u8 = 1;
 
 type Result<T> = std::result::Result<T, DeviceError>;
@@ -58,7 +54,6 @@ impl<B: Bus> Device<B> {
         Self::with_ids(bus, name, &DiagnosisIds::DEFAULT).expect("three of 11 bits")
     }
 
-    /// Returns the board's identity and state.
     pub fn info(&mut self) -> Result<Info> {
         let record = self.read(INFO)?;
         if record.first() != Some(&PROTOCOL) {
@@ -76,7 +71,6 @@ impl<B: Bus> Device<B> {
         self.write(CONFIGURATION, &configuration_content(configuration)?)
     }
 
-    /// Returns the settings of the wheel frames that the board receives.
     pub fn wheels(&mut self) -> Result<WheelSettings> {
         decode(&self.read(WHEELS)?)
     }

@@ -47,7 +47,6 @@ pub enum SettingError {
     Json(#[from] serde_json::Error),
 }
 
-/// Converts a configuration to names and values.
 pub fn to_value(configuration: &Configuration) -> Result<Value, SettingError> {
     Ok(value(configuration)?)
 }

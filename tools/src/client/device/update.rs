@@ -10,7 +10,6 @@ use gyronet::uds::Session;
 use gyronet::uds::signature::digest;
 use gyronet::uds::update::{HEAD, Head};
 
-/// Address of the download of firmware.
 const ADDRESS: u32 = 2;
 
 /// The file of an update: its head, the image for slot A, the image for slot B.

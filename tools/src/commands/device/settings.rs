@@ -24,10 +24,7 @@ pub fn set(device: &mut Board, settings: &[String], file: Option<&Path>, json: b
                     .into(),
             );
         }
-        let name = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|e| format!("{name}: {e}"))?;
-        let wheels = WheelFile::parse(&name, &text)?.settings(&name)?;
-        device.set_wheels(&wheels)?;
+        device.set_wheels(&WheelFile::read(path)?.1)?;
         return Ok(done(json, "stored; it takes effect after a restart")?);
     }
     let mut wanted = match file {

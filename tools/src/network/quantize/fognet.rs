@@ -1,7 +1,7 @@
 //! Writes FoGNet's weight file. The part that is linear in the gyro's increments is multiplied out in f64
 //! and not quantised to int8 ([`gyronet::model::fognet`]); the LSTMs are quantised as GyroNet's.
 
-use super::{QuantizeError, Report, fixed, header, provenance, rows, seal};
+use super::{QuantizeError, fixed, header, provenance, rows, seal};
 use crate::network::checkpoint::{Checkpoint, FogNet};
 use crate::network::tensors::Tensors;
 use gyronet::model::fognet::GAIN_FRACTION_BITS;
@@ -13,9 +13,8 @@ use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 /// samples, and a lower limit leaves more room in the accumulators.
 pub const INPUT_CLAMP_STD: f64 = 16.0;
 
-/// Quantises a checkpoint of FoGNet; returns the weight file and its figures.
-pub fn quantize(checkpoint: &Checkpoint<FogNet>) -> Result<(Vec<u8>, Report), QuantizeError> {
-    let mut report = Report::new();
+/// Quantises a checkpoint of FoGNet to a weight file.
+pub fn quantize(checkpoint: &Checkpoint<FogNet>) -> Result<Vec<u8>, QuantizeError> {
     let clamp = (INPUT_CLAMP_STD * f64::from(HIDDEN_MAX)) as i32;
     let tensors = checkpoint.tensors();
     let scalar = |name| f64::from(tensors.tensor(name)[0]);
@@ -23,11 +22,11 @@ pub fn quantize(checkpoint: &Checkpoint<FogNet>) -> Result<(Vec<u8>, Report), Qu
     let [of_f2, of_f3] = [0, 1].map(|k| scale * f64::from(tensors.tensor("fc4.weight")[k]));
 
     let mut body = Vec::new();
-    let mut lstm = |body: &mut Vec<u8>, name: &str, first: usize| {
+    let lstm = |body: &mut Vec<u8>, name: &str, first: usize| {
         for (layer, input_max) in [(0, clamp), (1, HIDDEN_MAX)] {
             for backward in [false, true] {
                 let weights = tensors.direction(name, layer, backward);
-                rows::direction(body, &weights, first + layer, input_max, &mut report)?;
+                rows::direction(body, &weights, first + layer, input_max)?;
             }
         }
         Ok::<(), QuantizeError>(())
@@ -69,9 +68,8 @@ pub fn quantize(checkpoint: &Checkpoint<FogNet>) -> Result<(Vec<u8>, Report), Qu
     file.extend(provenance);
     file.extend(body);
     let words = seal(&mut file);
-    report.bytes = file.len();
     FogBlob::new_checked(bytemuck::cast_slice(&words))?;
-    Ok((file, report))
+    Ok(file)
 }
 
 /// Returns the gyro that the network was trained for, from the provenance.

@@ -1,6 +1,6 @@
 //! Writes LSTM directions and output rows in int8 and int16, in the order in which the kernels read them.
 
-use super::{QuantizeError, Report, fixed};
+use super::{QuantizeError, fixed};
 use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT};
 use gyronet::nn::reference::LstmWeights;
 use gyronet::nn::{GATES, HIDDEN_FRACTION_BITS, HIDDEN_MAX, pack};
@@ -19,11 +19,10 @@ pub(super) fn direction(
     weights: &LstmWeights<'_>,
     layer: usize,
     input_max: i32,
-    report: &mut Report,
 ) -> Result<(), QuantizeError> {
     let count = weights.bias_ih.len();
     let rows = (0..count)
-        .map(|row| quantize_row(weights, layer, row, input_max, report))
+        .map(|row| quantize_row(weights, layer, row, input_max))
         .collect::<Result<Vec<Row>, _>>()?;
     let units = count / GATES;
     let unit_rows = |unit: usize| std::array::from_fn::<&Row, GATES, _>(|gate| &rows[gate * units + unit]);
@@ -50,7 +49,6 @@ fn quantize_row(
     layer: usize,
     row: usize,
     input_max: i32,
-    report: &mut Report,
 ) -> Result<Row, QuantizeError> {
     let units = weights.bias_ih.len() / GATES;
     let inputs = weights.weight_ih.len() / weights.bias_ih.len();
@@ -64,8 +62,7 @@ fn quantize_row(
     let largest = input.iter().chain(&recurrent).fold(0.0f64, |max, w| max.max(w.abs()));
     // Gate input (Q14) = accumulator x multiplier / 2^16, and an accumulator's LSB is
     // scale x 2^-10: multiplier = scale x 2^20.
-    let first = (largest / 127.0 * f64::from(1 << 20)).ceil().max(1.0);
-    let mut multiplier = first;
+    let mut multiplier = (largest / 127.0 * f64::from(1 << 20)).ceil().max(1.0);
     loop {
         if multiplier > f64::from(i16::MAX) {
             return Err(QuantizeError::WeightTooLarge { layer, row, weight: largest });
@@ -88,9 +85,6 @@ fn quantize_row(
             + sum(&candidate.recurrent, HIDDEN_MAX)
             + i64::from(candidate.bias.unsigned_abs());
         if bound < ROW_LIMIT[row / units] {
-            report.rows += 1;
-            report.raised += usize::from(multiplier > first);
-            report.largest_raise = report.largest_raise.max(multiplier / first);
             return Ok(candidate);
         }
         multiplier += 1.0;

@@ -115,7 +115,6 @@ pub fn same_scale(x: (f64, f64), y: (f64, f64)) -> ((f64, f64), (f64, f64), f64)
     (around(x, metres * aspect / 2.0), around(y, metres / 2.0), aspect)
 }
 
-/// A labelled position on an axis.
 pub struct Tick {
     pub at: f64,
     pub label: String,

@@ -147,7 +147,6 @@ impl Code {
         self.functions.iter().filter(|(_, f)| masked(f)).map(|(address, f)| (*address, f.own)).collect()
     }
 
-    /// Returns the addresses that a function can call.
     fn targets<'a>(&'a self, function: &'a Function) -> impl Iterator<Item = u32> + 'a {
         let indirect = if function.indirect > 0 { Some(&self.taken) } else { None };
         function.calls.iter().chain(indirect.into_iter().flatten()).copied()

@@ -7,7 +7,6 @@
 use super::StackError;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Name of the section with an image's priorities.
 pub const SECTION: &str = ".priorities";
 
 /// Holds a vector table, and the priorities of its handlers.

@@ -35,20 +35,16 @@ impl Frame {
         }
     }
 
-    pub(super) fn settings(&self, path: &str) -> Result<WheelFrame, WheelFileError> {
+    pub(super) fn settings(&self) -> Result<WheelFrame, WheelFileError> {
         let Self { id, extended, .. } = *self;
         let identifier = if extended {
             ExtendedId::new(id).map(Id::Extended)
         } else {
             u16::try_from(id).ok().and_then(StandardId::new).map(Id::Standard)
         };
-        let place = |source| WheelFileError::Place { path: path.to_owned(), id, source };
+        let place = |source| WheelFileError::Place { id, source };
         Ok(WheelFrame {
-            id: identifier.ok_or_else(|| WheelFileError::Identifier {
-                path: path.to_owned(),
-                id,
-                extended,
-            })?,
+            id: identifier.ok_or(WheelFileError::Identifier { id, extended })?,
             counter: self
                 .counter
                 .map(|counter| parts(counter.low, counter.high))
@@ -63,12 +59,12 @@ impl Frame {
 }
 
 impl Signal {
-    pub(super) fn settings(&self, path: &str, id: u32, frame: u8) -> Result<WheelSignal, WheelFileError> {
-        let place = |source| WheelFileError::Place { path: path.to_owned(), id, source };
+    pub(super) fn settings(&self, id: u32, frame: u8) -> Result<WheelSignal, WheelFileError> {
+        let place = |source| WheelFileError::Place { id, source };
         let (pulses, factor_q16) = match (self.factor_kmh, self.metres_per_pulse) {
-            (Some(kmh), None) => (false, factor(path, kmh)?),
-            (None, Some(metres)) => (true, pulse(path, metres)?),
-            _ => return Err(WheelFileError::Scale { path: path.to_owned(), wheel: self.wheel }),
+            (Some(kmh), None) => (false, factor(kmh)?),
+            (None, Some(metres)) => (true, pulse(metres)?),
+            _ => return Err(WheelFileError::Scale(self.wheel)),
         };
         let codes = match &self.invalid {
             None => &[][..],
@@ -77,15 +73,16 @@ impl Signal {
         };
         let mut invalid = [None; 3];
         if codes.len() > invalid.len() {
-            let (path, value) = (path.to_owned(), codes.len() as f64);
-            return Err(WheelFileError::Range { path, key: "invalid", value, range: "at most three codes" });
+            let value = codes.len() as f64;
+            return Err(WheelFileError::Range { key: "invalid", value, range: "at most three codes" });
         }
         invalid.iter_mut().zip(codes).for_each(|(to, code)| *to = Some(*code));
-        let limit = |kmh| speed(path, "range_kmh", kmh);
-        let range = self.range_kmh.map(|[least, most]| Ok([limit(least)?, limit(most)?]));
+        let limit = |kmh| speed("range_kmh", kmh);
+        let range =
+            self.range_kmh.map(|[least, most]| Ok::<_, WheelFileError>([limit(least)?, limit(most)?]));
         Ok(WheelSignal {
             pulses,
-            offset: speed(path, "offset_kmh", self.offset_kmh)?,
+            offset: speed("offset_kmh", self.offset_kmh)?,
             invalid,
             range: range.transpose()?,
             valid_when: self.valid_when.map(Says::code).transpose().map_err(place)?,
@@ -114,23 +111,18 @@ impl Signal {
 }
 
 /// Converts a factor to the library's code. It must be below 100 km/h, and its code must not be zero.
-pub(super) fn factor(path: &str, kmh: f64) -> Result<i32, WheelFileError> {
+fn factor(kmh: f64) -> Result<i32, WheelFileError> {
     let code = (kmh * FACTORS_PER_KMH).round() as i32;
-    if kmh.abs() < 100.0 && code != 0 {
-        return Ok(code);
-    }
-    let range = "below 100 and not 0";
-    Err(WheelFileError::Range { path: path.to_owned(), key: "factor_kmh", value: kmh, range })
+    let error = WheelFileError::Range { key: "factor_kmh", value: kmh, range: "below 100 and not 0" };
+    if kmh.abs() < 100.0 && code != 0 { Ok(code) } else { Err(error) }
 }
 
-/// Converts the way of a pulse to the library's code.
-pub(super) fn pulse(path: &str, metres: f64) -> Result<i32, WheelFileError> {
+/// Converts the way of a pulse, below 0.5 m, to the library's code.
+fn pulse(metres: f64) -> Result<i32, WheelFileError> {
     let code = (metres * FACTORS_PER_METRE).round() as i32;
-    if metres.abs() < 0.5 && code != 0 {
-        return Ok(code);
-    }
-    let (path, range) = (path.to_owned(), "below 0.5 and not 0");
-    Err(WheelFileError::Range { path, key: "metres_per_pulse", value: metres, range })
+    let error =
+        WheelFileError::Range { key: "metres_per_pulse", value: metres, range: "below 0.5 and not 0" };
+    if metres.abs() < 0.5 && code != 0 { Ok(code) } else { Err(error) }
 }
 
 pub(super) fn kmh(speed: WheelSpeed) -> f64 {
@@ -147,9 +139,9 @@ fn shortest(code: i32, per_unit: f64) -> f64 {
     rounded.find(|value| (value * per_unit).round() == f64::from(code)).unwrap_or(exact)
 }
 
-pub(super) fn speed(path: &str, key: &'static str, kmh: f64) -> Result<WheelSpeed, WheelFileError> {
+pub(super) fn speed(key: &'static str, kmh: f64) -> Result<WheelSpeed, WheelFileError> {
     if kmh.abs() < 1e4 {
         return Ok(WheelSpeed((kmh * CODES_PER_KMH).round() as i32));
     }
-    Err(WheelFileError::Range { path: path.to_owned(), key, value: kmh, range: "within 10000" })
+    Err(WheelFileError::Range { key, value: kmh, range: "within 10000" })
 }
