@@ -38,7 +38,6 @@ pub const SNAP_US: u64 = 2_000;
 /// The longest run of missing steps that keeps the grid: one second.
 pub const MAX_GAP: u32 = 100;
 
-/// Usual periods that are about 100 Hz.
 const SNAPPED_US: RangeInclusive<u64> = 9_000..=11_000;
 const STEP: i64 = PERIOD_US as i64;
 /// Time ends here, so that sums of times do not overflow.
@@ -47,7 +46,6 @@ const PERIODS: usize = 8;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum AlignError {
     #[error("duplicate sample at {} us", .at.0)]
@@ -155,12 +153,10 @@ impl Aligner {
         Ok(())
     }
 
-    /// Returns whether the next sample completes a step, unless it comes early.
     pub fn is_nearly_complete(&self) -> bool {
         self.last.is_none_or(|(_, end)| self.end - end < 2 * i64::from(self.usual))
     }
 
-    /// Returns whether [`Aligner::next_frame`] may return a step.
     #[inline]
     pub fn has_piece(&self) -> bool {
         self.piece.is_some()
@@ -263,11 +259,5 @@ impl Aligner {
         } else {
             time
         }
-    }
-}
-
-impl Default for Aligner {
-    fn default() -> Self {
-        Self::START
     }
 }

@@ -45,18 +45,14 @@ pub const MAX_MEAN: AngularRate = AngularRate::from_deg_per_sec(6.0);
 const MAX_SINGLE: AngularRate = AngularRate(10 * MAX_MEAN.0);
 
 /// Configures how estimates of the gyro's error become corrected rates.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CompensateConfig {
-    /// The samples between two windows.
     pub stride: Stride,
-    /// The delay of the delayed rate, in samples.
     pub lag: Lag,
     /// Largest part of the revisions that one rate carries; no setting of a board.
-    #[cfg_attr(feature = "serde", serde(skip, default = "max_revision"))]
+    #[serde(skip, default = "max_revision")]
     pub max_revision: AngularRate,
-    /// True if the model's corrections are subtracted. Without them the rate is that of the gyro less bias, level and
-    /// gain, with the expected error of the gyro.
+    /// True if the corrections are subtracted. Otherwise the rate has the expected error of the gyro less bias.
     pub model: bool,
 }
 
@@ -84,7 +80,6 @@ const LONG: u64 = 25;
 /// The number of samples kept: the newest one, and those before it that a window can still change.
 const KEPT: usize = Lag::MAX.samples() + 1;
 
-/// Holds one sample and the best estimate for it so far.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     tick: u32,
@@ -154,14 +149,12 @@ pub struct Compensated {
     pub covered: bool,
     /// The gyro's rates about x and y, less static bias.
     pub roll_and_pitch: [AngularRate; 2],
-    /// The network's part of the correction.
     pub estimate: AngularRate,
     /// The gyro's yaw rate less the bias, where standstill has set the sent rate to zero.
     pub withheld: Option<AngularRate>,
     pub validity: Validity,
 }
 
-/// A sample that no window will change any more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Complete {
     pub tick: u32,
@@ -265,7 +258,6 @@ impl Compensator {
         }
     }
 
-    /// Returns the sample this many before the newest one.
     fn at(&self, age: usize) -> Option<&Entry> {
         self.kept.get(place(self.next, age))?.as_ref()
     }
@@ -308,13 +300,13 @@ impl Compensator {
     /// Returns whether more waits to be carried than a window revises, as after a turn on standing wheels.
     pub fn revisions_exceed_limit(&self) -> bool {
         let much = LONG * u64::from(self.config.max_revision.0.unsigned_abs());
-        self.delayed.waiting().unsigned_abs() > much
+        self.delayed.waiting.unsigned_abs() > much
     }
 
     /// Returns how much of the revisions the delayed rates carry in the next second, rad.
     pub fn carried_in_a_second(&self) -> f32 {
         let most = i64::from(RATE_HZ) * i64::from(self.config.max_revision.0).max(0);
-        let carried = self.delayed.waiting().unsigned_abs().min(most.unsigned_abs());
+        let carried = self.delayed.waiting.unsigned_abs().min(most.unsigned_abs());
         carried as f32 / (AngularRate::PER_RAD_PER_SEC * RATE_HZ as f32)
     }
 
@@ -323,7 +315,7 @@ impl Compensator {
         let waiting = (0..self.config.lag.samples()).flat_map(|age| self.at(age));
         let waiting = waiting.filter(|entry| entry.validity.is_good());
         let best = |entry: &Entry| i64::from(entry.rate().0) - entry.taken(remaining);
-        waiting.map(best).sum::<i64>() - self.delayed.waiting()
+        waiting.map(best).sum::<i64>() - self.delayed.waiting
     }
 }
 
@@ -342,7 +334,6 @@ fn mean(sum: i64, count: i32) -> i64 {
     }
 }
 
-/// Saturates at the ends of the code.
 fn code(rate: i64) -> AngularRate {
     AngularRate(rate.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
 }

@@ -99,7 +99,6 @@ pub struct Coprocessor {
     fog_encoder: FogEncoder,
     /// The newest temperature: some parts send it with one sample in a hundred.
     temperature: Option<CentiCelsius>,
-    /// Rates are withheld.
     paused: bool,
     counters: InputCounters,
 }
@@ -221,7 +220,7 @@ impl Coprocessor {
         if output.standing.is_likely() {
             self.monitor.settle();
         }
-        let late = self.monitor.late();
+        let late = self.monitor.late;
         // At fewer than 100 samples a second a step waits for the sample that completes it, at more for the next but one.
         let waited = self.timeline.sample.0.saturating_sub(sample.time.0).min(u64::from(u32::MAX)) as u32;
         if late > 0 || waited > 0 {
@@ -240,11 +239,11 @@ impl Coprocessor {
         self.second.add(&Shown {
             inertial: rate,
             fog: self.fog_rate,
-            is_fog_confirmed: self.fog.is_confirmed(),
+            confirms_fog: self.fog.is_confirmed,
             lateral: lateral.0 as f32 / SpecificForce::PER_METRE_PER_SEC2,
             wheels: wheels.as_ref().and_then(second_source::axle),
         });
-        if self.second.confirms_fog() {
+        if self.second.confirms_fog {
             self.fog.confirm();
         }
         let pipeline::Output { standing, complete, refused, vertical, .. } = output;
@@ -265,8 +264,7 @@ impl Coprocessor {
         count(&mut self.counters.imu_errors, 1);
     }
 
-    /// Processes a sample of the fibre-optic gyro that arrived at `now`; frames go to `sink`. One that is a duplicate
-    /// or out of order ([`InputError::Fog`]) is counted.
+    /// Processes a sample of the fibre-optic gyro; one that is a duplicate or out of order is an error, and counted.
     pub fn fog(&mut self, sample: FogSample, now: Micros, sink: &mut impl Sink) -> Result<(), InputError> {
         self.advance(now)?;
         let added = self.fog.add(self.timeline.time(), sample).map_err(InputError::Fog);
@@ -350,8 +348,7 @@ impl Coprocessor {
         Ok(())
     }
 
-    /// Does what is due at `now` without an input: messages of silent sensors, and of steps that have waited for an
-    /// estimate, go to `sink`.
+    /// Does what is due without an input: sets of silent sensors, and of steps that have waited for an estimate.
     pub fn poll(&mut self, now: Micros, sink: &mut impl Sink) -> Result<Option<Observation>, InputError> {
         let mut newest = None;
         self.poll_into(now, sink, &mut newest).map(|()| newest)
@@ -406,8 +403,7 @@ impl Coprocessor {
         !waits
     }
 
-    /// Returns whether a step waits for time to pass or for an estimate. If not, [`Coprocessor::poll`] has nothing to do
-    /// in the 20 ms after a sample.
+    /// Returns whether a step waits; if not, [`Coprocessor::poll`] has nothing to do for 20 ms after a sample.
     pub fn is_waiting(&self) -> bool {
         self.pipeline.has_piece() || self.fog.is_running()
     }
@@ -417,8 +413,7 @@ impl Coprocessor {
         self.handover.take()
     }
 
-    /// Accepts GyroNet's estimate of the window that ended with sample `end`. One that no window waits for is counted
-    /// ([`InputError::NoWindow`]).
+    /// Accepts the estimate of the window that ended with sample `end`, or counts it if none waits for it.
     pub fn deliver(&mut self, end: u32, estimate: Estimate) -> Result<(), InputError> {
         let wanted = self.handover.close(end) && self.pipeline.deliver(end, estimate);
         self.claim(wanted, end)
@@ -453,12 +448,12 @@ impl Coprocessor {
 
     /// Returns the fault counters of the sensor monitor.
     pub fn monitor_counters(&self) -> &MonitorCounters {
-        self.monitor.counters()
+        &self.monitor.counters
     }
 
     /// Returns the event counters of the fibre-optic gyro.
     pub fn fog_counters(&self) -> &FogCounters {
-        self.fog.counters()
+        &self.fog.counters
     }
 
     /// Withholds the rates, or sends them again. The first call that withholds them sends a message set without a
@@ -479,7 +474,7 @@ impl Coprocessor {
 
     /// Returns what the sources showed when they last contradicted each other.
     pub fn contradiction(&self) -> &Contradiction {
-        self.second.contradiction()
+        &self.second.contradiction
     }
 
     fn advance(&mut self, now: Micros) -> Result<Micros, InputError> {
@@ -507,7 +502,7 @@ impl Coprocessor {
         let time = self.timeline.time();
         while self.fog.is_due(time) {
             let wheels = self.poll_wheels();
-            let fresh = self.timeline.is_sensors() || !self.monitor.is_stale(self.timeline.now());
+            let fresh = self.timeline.is_sensors() || !self.monitor.is_stale(self.timeline.now);
             let doubted = self.second.doubts().is_some_and(|doubts| doubts.inertial);
             let inertial_rate = self.inertial_rate.filter(|_| fresh && !doubted);
             let rate = inertial_rate.map(|(at, [rate, _])| (at, rate));
@@ -515,7 +510,7 @@ impl Coprocessor {
             let (tilted, leaning) = (self.pipeline.tilted(), self.pipeline.leaning());
             self.fog.beside(Beside { rate, sigma, tilted, leaning, scale: self.second.scale() });
             let Some(mut estimate) = self.fog.next_step(time, wheels.as_ref()) else { return };
-            self.fog_rate = self.fog.shown();
+            self.fog_rate = self.fog.shown;
             if self.second.doubts().is_some_and(|doubts| doubts.fog) && self.fog_rate.is_some() {
                 estimate.quality = Quality::Degraded;
                 estimate.faults = estimate.faults.with(Faults::IMPLAUSIBLE);
@@ -550,7 +545,6 @@ impl Coprocessor {
         self.bus.reported = self.bus.lost;
     }
 
-    /// Sends a message set without a rate.
     #[inline(never)]
     fn withhold<SINK: Sink>(&mut self, time: Micros, sink: &mut SINK) {
         let vehicle = self.pipeline.silent(0, &self.board_state());
@@ -574,7 +568,7 @@ impl Coprocessor {
             }) {
                 sink.frame(TimedFrame { frame, time });
             }
-            self.counters.out_of_range = self.encoder.out_of_range();
+            self.counters.out_of_range = self.encoder.out_of_range;
         }
     }
 

@@ -40,20 +40,15 @@ use crate::units::Angle;
 /// A window's correction is spread over this many frames.
 const WINDOW_FRAMES: i64 = STEPS as i64 * FRAMES as i64;
 
-/// Configures the correction of a fibre-optic gyro.
 #[derive(Debug, Clone, Copy)]
 pub struct FogConfig {
-    /// The expected errors of the gyro.
     pub errors: FogErrors,
-    /// The latitude; `None` where it is unknown or received over the bus.
     pub latitude: Option<Latitude>,
-    /// The tilt of the gyro's axis.
     pub tilt: Tilt,
     /// Vibration left in a second's mean rate, 1 sigma, rad/s, standing and moving: no turn, its sum is zero.
     pub shake: [f32; 2],
     /// The caller's clock is a crystal's, against which that of the gyro is measured.
     pub clock_is_exact: bool,
-    /// Largest correction of a window of FoGNet that is accepted.
     pub max_correction: Angle,
 }
 
@@ -82,10 +77,8 @@ pub struct FogOutput {
     pub turn: Option<Angle>,
     pub correction: Angle,
     pub corrected: bool,
-    /// A second is over: add it to a [`Minute`](crate::model::seconds::Minute), run the window that it ends through the
-    /// network and [`FogCorrector::deliver`] the estimate under its number within a second.
+    /// A second is over: if it ends a window, [`FogCorrector::deliver`] its estimate within the next one.
     pub due: Option<NewSecond>,
-    /// The window ended here; a new one has begun.
     pub broken: Option<Incomplete>,
     pub implausible: Option<ImplausibleTurn>,
     pub late: bool,
@@ -98,7 +91,6 @@ pub struct FogCorrector {
     sums: SecondSums,
     next: u32,
     is_first: bool,
-    /// The window that is due, and its estimate once delivered.
     out: Option<(u32, Option<FogEstimate>)>,
     estimate: Option<FogEstimate>,
     /// The remainders of the divisions: of the linear part, of the spread part.

@@ -40,10 +40,8 @@ pub struct Heading {
     pub speed_sigma: Option<f32>,
 }
 
-/// The reason why a frame or message gives no heading.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum HeadingError {
     #[error("heading frame of {0} bytes is too short")]

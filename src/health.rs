@@ -7,12 +7,10 @@ pub mod states;
 
 use crate::sample::Validity;
 
-/// The state of the corrected yaw rate, as one state machine. No state needs a restart to leave it, except that with
-/// damaged weights the state is `Degraded` at best.
-/// [`states::STATES`] says when each state is entered and left.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// The state of the corrected yaw rate. None needs a restart to leave it, except that with damaged weights it is
+/// `Degraded` at best. [`states::STATES`] says when each is entered and left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Status {
     /// The bias is not known yet: the rate is sent but not good.
     #[default]
@@ -108,7 +106,6 @@ impl Faults {
         }
     }
 
-    /// Returns this fault if it is present, else none.
     #[must_use]
     pub(crate) const fn when(self, present: bool) -> Self {
         if present { self } else { Self::NONE }
@@ -187,9 +184,8 @@ pub const fn judge(status: Status) -> (Source, Quality) {
 }
 
 /// Event counters since the start. They saturate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Counters {
     /// Samples that became frames.
     pub samples: u32,
@@ -239,9 +235,8 @@ impl Counters {
 }
 
 /// Fault counters of the sensor ([`crate::monitor`]).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MonitorCounters {
     /// Times that the sensor became silent.
     pub silences: u32,
@@ -261,9 +256,8 @@ impl MonitorCounters {
 }
 
 /// Counters of inputs that were refused or replaced ([`crate::coprocessor`]). They saturate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InputCounters {
     /// Messages of the inertial sensor that were not valid samples.
     pub imu_errors: u32,

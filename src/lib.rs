@@ -82,9 +82,8 @@
 //!
 //! | feature | adds |
 //! |---|---|
-//! | `store` | [`store`]: configuration, calibration and weights in flash (serde, postcard, embedded-storage) |
+//! | `store` | [`store`]: configuration, calibration and weights in flash (postcard, embedded-storage) |
 //! | `service` | [`service`] and [`uds`]: stored data and diagnosis, and `store` (automotive_diag) |
-//! | `serde` | `Serialize` and `Deserialize` for configuration and counters |
 //! | `defmt` | `defmt::Format` for the public types |
 //!
 //! Unsafe code is denied except in one kernel file for Cortex-M with the DSP extension

@@ -1,21 +1,7 @@
 //! The monitor judges each reading of the inertial sensor and detects silence.
 //!
 //! A part can fail in ways that no single sample shows: it becomes silent, repeats its readings, or has just been
-//! saturated. Time is an argument, by an outside clock, because the part's own clock stops with the part.
-//!
-//! | fault | found when | then | over when |
-//! |---|---|---|---|
-//! | silent | no sample for [`TIMEOUT_US`], or for [`START_US`] since the start | every 10 ms a message set without a rate, [`Status::Silent`] | the next sample |
-//! | saturated | the part reports it | [`Status::Clipped`], no window, no initialisation | [`HOLD`] samples later |
-//! | stuck | [`STUCK_AFTER`] samples equal to the one before in gyro, accelerometer or one axis; [`AXIS_STUCK_AFTER`] where an axis often repeats itself | [`Status::Stuck`], no window, no initialisation | a sample that differs |
-//! | clock off | the sensor's clock departs from the outside one by more than [`LIMIT_PPM`] | fault bit `IMPLAUSIBLE`; the yaw is summed by the sensor's clock | the departure is within the limit again |
-//! | late | samples arrive more than [`TIMEOUT_US`] later than their stamps and the least late ones let expect (a line that stalled) | at best degraded, fault bit `GAP`, the latency contains it | samples that arrive in time, or a second later |
-//! | implausible | a reading is further from the last one than this axis moves in 10 ms ([`JUMP_RATE`], [`JUMP_FORCE`], [`USUAL`]) | as saturated, fault bit `IMPLAUSIBLE` | a reading near the last good one, or [`JUMP_PATIENCE`] samples later: then at best degraded, and the jump of the yaw rate is part of its expected error, until it jumps back or the vehicle stands |
-//!
-//! [`LIMIT_PPM`]: crate::align::clock_ratio::LIMIT_PPM
-//! [`Status::Silent`]: crate::health::Status::Silent
-//! [`Status::Clipped`]: crate::health::Status::Clipped
-//! [`Status::Stuck`]: crate::health::Status::Stuck
+//! saturated. [`crate::health::states::STATES`] lists the faults. Time is by an outside clock: the part's may stop.
 
 mod readings;
 
@@ -52,8 +38,8 @@ struct Arrivals {
 }
 
 impl Arrivals {
-    /// Returns by how many microseconds a sample arrives later than the least late ones, and what the sensor's clock has lost
-    /// if they all do for a second, by more than a slow clock explains: a counter that has wrapped unseen.
+    /// Returns by how much a sample is later than the least late ones, and what the sensor's clock has lost if all are
+    /// for a second, by more than a slow clock explains (a counter that has wrapped unseen), us.
     fn late(&mut self, time: Micros, now: Micros) -> (u64, u64) {
         let measured = (now.0 as i64).wrapping_sub(time.0 as i64);
         let (last, before) = self.newest.unwrap_or((time.0, measured));
@@ -81,19 +67,18 @@ pub struct SensorMonitor {
     repeats: Repeats,
     jump: Jump,
     stuck: bool,
-    /// Samples until the part has recovered from saturation.
     recovering: u8,
     /// Time stamp and arrival of the newest sample that was used.
     newest: Option<(Micros, Micros)>,
     arrivals: Arrivals,
     /// The time by which the newest sample came late, microseconds; 0 where it came in time.
-    late: u32,
+    pub late: u32,
     /// The time from which silence is counted: of that arrival, or of a later look at samples that wait.
     heard: Option<Micros>,
     /// The time at which the next message set without a sample is due.
     due: Option<u64>,
     clock: Option<RatioEstimator>,
-    counters: MonitorCounters,
+    pub counters: MonitorCounters,
 }
 
 impl SensorMonitor {
@@ -111,10 +96,6 @@ impl SensorMonitor {
             clock: if clock_is_exact { Some(RatioEstimator::START) } else { None },
             counters: MonitorCounters::NONE,
         }
-    }
-
-    pub fn counters(&self) -> &MonitorCounters {
-        &self.counters
     }
 
     /// Judges a sample. Call it once for each sample, in order of arrival.
@@ -145,10 +126,6 @@ impl SensorMonitor {
         lost
     }
 
-    pub fn late(&self) -> u32 {
-        self.late
-    }
-
     /// Returns the yaw rate by which the readings may be off since a jump, rad/s.
     pub fn shift(&self) -> f32 {
         self.jump.shift()
@@ -170,19 +147,19 @@ impl SensorMonitor {
         self.heard = Some(now);
         self.due = None;
         if let Some(clock) = &mut self.clock {
-            let before = clock.fault();
+            let before = clock.fault;
             clock.observe(time, now);
-            count(&mut self.counters.clock_off, u32::from(!before && clock.fault()));
+            count(&mut self.counters.clock_off, u32::from(!before && clock.fault));
         }
     }
 
     /// Returns the true length of a step of the sensor's clock, as the samples so far show it.
     pub fn clock_ratio(&self) -> ClockRatio {
-        self.clock.as_ref().map_or(ClockRatio::ONE, RatioEstimator::ratio)
+        self.clock.as_ref().map_or(ClockRatio::ONE, |clock| clock.ratio)
     }
 
     pub fn is_clock_off(&self) -> bool {
-        self.clock.as_ref().is_some_and(RatioEstimator::fault)
+        self.clock.as_ref().is_some_and(|clock| clock.fault)
     }
 
     /// Returns whether the newest sample is so old that its reading says nothing about `now`.

@@ -35,7 +35,6 @@ fn metre_per_sec2(force: &[SpecificForce; 3]) -> [f32; 3] {
 
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 pub enum LevelError {
     #[error("the accelerometer shows {0:.2} m/s^2 at standstill instead of gravity")]
     NotGravity(f32),
@@ -162,14 +161,12 @@ fn is_identity(rows: &[[i32; 3]; 3]) -> bool {
 
 /// Maps the gyro's rates, in the vehicle's axes, to the true ones. It is close to the identity, within
 /// [`GyroMap::MAX_GAIN`] and off the diagonal [`GyroMap::MAX_CROSS`]: more is a mounting to configure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GyroMap([[i32; 3]; 3]);
 
 impl GyroMap {
     pub const IDENTITY: Self = Self(Rotation::IDENTITY.0);
-    /// The largest plausible gain error of a unit.
     pub const MAX_GAIN: f32 = 0.05;
     /// The largest plausible share of another axis: the sine of 8.6 degrees.
     pub const MAX_CROSS: f32 = 0.15;
@@ -185,7 +182,6 @@ impl GyroMap {
         is_identity(&self.0)
     }
 
-    /// Returns the matrix, row by row.
     pub fn elements(&self) -> [[f32; 3]; 3] {
         self.0.map(|row| row.map(|element| element as f32 / ONE))
     }

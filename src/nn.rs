@@ -29,16 +29,13 @@ pub mod lstm;
 pub mod reference;
 mod simd;
 
-/// Fraction bits of network inputs and hidden states.
 pub const HIDDEN_FRACTION_BITS: u32 = 10;
 /// The hidden state's largest magnitude is 1.0.
 pub const HIDDEN_MAX: i32 = 1 << HIDDEN_FRACTION_BITS;
-/// Fraction bits of a gate's input.
 pub const GATE_FRACTION_BITS: u32 = 14;
 /// An LSTM unit has this many gates, in PyTorch's order: input, forget, cell candidate, output.
 pub const GATES: usize = 4;
 
-/// Places bytes on a 4-byte boundary, as a weight file needs.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(4))]
 pub struct Aligned<T>(pub T);

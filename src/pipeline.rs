@@ -60,14 +60,12 @@ impl BoardState {
 pub struct Output {
     /// Both rates and everything else that is sent, for [`crate::can::encoder::CanEncoder`].
     pub vehicle: VehicleSample,
-    /// The sample whose estimate is final with this one.
     pub complete: Option<Complete>,
     /// A window for the network and [`Pipeline::deliver`], within [`crate::compensate::Stride::delay`] steps.
     pub window: Option<DueWindow>,
     /// The judgement of standstill; not likely where the gyro contradicts it.
     pub standing: Standing,
     pub refused: Option<StaticError>,
-    /// The reason why the estimate due with this sample was rejected.
     pub implausible: Option<Implausible>,
     /// What standstills and turns have shown of the vertical, in the sensor's axes, where this sample has changed it.
     pub vertical: Option<Vertical>,
@@ -95,7 +93,6 @@ struct State {
     wheels_seen: [bool; WHEELS],
     /// Samples for which the vehicle has stood; zero while it moves.
     stood: u32,
-    /// The sums of the rates that were sent.
     live_yaw: AccumulatedYaw,
     delayed_yaw: AccumulatedYaw,
     /// Grid step of the newest message set, and the sets without a sample since the newest one.
@@ -103,7 +100,6 @@ struct State {
     silent: u32,
     /// Samples until the last gap is a whole window in the past.
     gap_within: u32,
-    /// The sensor is mounted differently than in earlier drives.
     moved: bool,
     stuck: bool,
     rate_refused: bool,
@@ -281,7 +277,7 @@ impl Pipeline {
 
     /// Returns the gyro's static bias beyond that of earlier drives, once known.
     pub fn gyro_bias(&self) -> Option<[AngularRate; 3]> {
-        self.state.initialised.as_ref().map(|known| known.zero.bias())
+        self.state.initialised.as_ref().map(|known| known.zero.bias)
     }
 
     /// Returns the residual bias that the zero-rate updates have found beyond the static one.
@@ -415,7 +411,7 @@ impl Pipeline {
         let zero_rate = initialised.as_mut().and_then(|known| known.zero_rate.as_mut());
         let (Some(zero_rate), Some(complete)) = (zero_rate, complete) else { return };
         course.add(zero_rate.filter(), complete.tick, complete.valid_left(), standing.is_likely());
-        match zero_rate.observe(complete.left(), standing, sensor_bias.change_sigma()) {
+        match zero_rate.observe(complete.left(), standing, sensor_bias.change_sigma) {
             Some(ZeroRateOutcome::Used) => {
                 count(&mut counters.zero_rate_updates, 1);
                 sensor_bias.refer();

@@ -102,7 +102,6 @@ pub struct FogSample {
 }
 
 impl ImuSample {
-    /// The codes of specific force and angular rate.
     pub(crate) fn codes(&self) -> [i32; 6] {
         let ([fx, fy, fz], [wx, wy, wz]) = (self.specific_force, self.angular_rate);
         [fx.0, fy.0, fz.0, wx.0, wy.0, wz.0]
@@ -170,7 +169,6 @@ impl WheelSample {
 /// Extends 32-bit stamps (71 minutes of us) to 64 bits. One that is smaller by up to half the range steps back.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct StampClock {
-    /// Last stamp and its unwrapped time.
     last: Option<(u32, u64)>,
 }
 

@@ -18,9 +18,8 @@ use crate::sample::{ImuSample, Standstill, WheelSample};
 use crate::units::WheelSpeed;
 use crate::vector::{dot, norm};
 
-/// Largest shake of a vehicle at rest, rad/s ([`Motion::shake`]): an idling engine stays below, any road above. For gyros with
-/// less noise than 0.02 deg/s/sqrt(Hz). This and the next two are of road vehicles, chosen on training drives; the test
-/// `standstills_of_every_recording_with_a_speed` prints what they find and miss.
+/// Largest shake of a vehicle at rest, rad/s, above an engine's, for gyros below 0.02 deg/s/sqrt(Hz). It and the next
+/// two were chosen on training drives (test `standstills_of_every_recording_with_a_speed`).
 const QUIET: f32 = 2e-3;
 /// Largest change of speed within two seconds at rest, m/s.
 pub const SPEED_CHANGE: f32 = 0.15;
@@ -61,9 +60,7 @@ const BEFORE: [f32; 2] = [490.0, 10.0];
 pub enum StandstillSource {
     #[default]
     None,
-    /// All wheels stand.
     Wheels,
-    /// The inertial sensor is quiet.
     Inertial,
 }
 
@@ -77,7 +74,6 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// Nothing shows a standstill.
     pub const UNKNOWN: Self =
         Self { source: StandstillSource::None, probability: 0.0, is_contradicted: false };
     pub const WHEELS: Self =
@@ -116,8 +112,7 @@ pub struct Judge {
     /// The newest motion: the wheels turn fast, the speed changes, or nothing but an engine shakes the vehicle.
     drives: bool,
     speeds_up: bool,
-    is_calm: bool,
-    /// Judgements since the wheels stand.
+    pub is_calm: bool,
     still_for: u8,
     /// Force at the last standstill, and the one by which the vehicle left it, m/s^2.
     rest: Option<Axes>,
@@ -129,7 +124,6 @@ pub struct Judge {
 }
 
 impl Judge {
-    /// The state before the first sample.
     pub const START: Self = Self {
         inertial: Inertial::START,
         quiet_for: 0,
@@ -149,7 +143,6 @@ impl Judge {
         quiet: BEFORE,
     };
 
-    /// Starts the inertial evidence again after a gap.
     pub fn restart(&mut self) {
         (self.inertial, self.quiet_for) = (Inertial::START, 0);
     }
@@ -157,11 +150,6 @@ impl Judge {
     /// Returns whether wheels faster than a creep, or a force or change of speed in 2 s, show that it drives.
     pub fn has_driven_off(&self) -> bool {
         self.drives || self.speeds_up
-    }
-
-    /// Returns whether nothing but an engine shakes the vehicle.
-    pub fn is_calm(&self) -> bool {
-        self.is_calm
     }
 
     /// Judges a sample of the 100 Hz grid; `wheels` is `None` where there are none.

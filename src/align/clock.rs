@@ -27,7 +27,6 @@ pub const JITTER_US: u64 = 2_000;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum ClockError {
     #[error("two samples carry the time stamp {} us", .at.0)]
@@ -40,7 +39,6 @@ pub enum ClockError {
 pub struct BoardTime {
     /// The time at which the sample was taken, plus the shortest delay of the line.
     pub time: Micros,
-    /// The part's clock has jumped: earlier samples are not connected to this one.
     pub jumped: bool,
 }
 

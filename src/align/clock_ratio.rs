@@ -33,8 +33,7 @@ const ENOUGH: usize = 5;
 pub const JITTER_US: u64 = 3_000;
 /// The points restart after this time without a sample.
 pub const GAP_US: u64 = BLOCK_US;
-/// Largest departure from one of a working oscillator, millionths: an ICM-42688-P has 3.5 % (1.5 % at 25 deg C and 2 % over
-/// temperature).
+/// Largest departure of a working oscillator from one, millionths: an ICM-42688-P has 3.5 %, with temperature.
 pub const LIMIT_PPM: u32 = 40_000;
 
 /// True time over the sensor's time: LSB 2^-30, so one is 2^30.
@@ -54,7 +53,6 @@ impl ClockRatio {
         u32::try_from(code).ok().map(Self)
     }
 
-    /// Returns the true time of a span of the sensor's, microseconds rounded down.
     fn true_time(self, sensor: u64) -> u64 {
         (sensor * u64::from(self.0)) >> Self::FRACTION_BITS
     }
@@ -112,9 +110,10 @@ pub struct RatioEstimator {
     points: Deque<Point, POINTS>,
     /// The slope of the points, which compares arrivals with each other even where it is not accepted as the ratio.
     slope: ClockRatio,
-    ratio: ClockRatio,
-    is_known: bool,
-    fault: bool,
+    /// In use: one before it is known, and while the clocks contradict each other.
+    pub ratio: ClockRatio,
+    pub is_known: bool,
+    pub fault: bool,
 }
 
 impl RatioEstimator {
@@ -151,20 +150,6 @@ impl RatioEstimator {
             self.block = Some(Block { first: point, last: point, best: (point, 0) });
             self.take(best);
         }
-    }
-
-    /// Returns the ratio in use: one before it is known, and while the clocks contradict each other.
-    pub fn ratio(&self) -> ClockRatio {
-        self.ratio
-    }
-
-    pub fn is_known(&self) -> bool {
-        self.is_known
-    }
-
-    /// Returns whether the clocks depart from each other by more than [`LIMIT_PPM`].
-    pub fn fault(&self) -> bool {
-        self.fault
     }
 
     fn take(&mut self, newest: Point) {

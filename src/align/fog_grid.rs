@@ -8,7 +8,6 @@ use super::increments::{Increments, Turn};
 use crate::sample::{FogSample, PERIOD_US};
 use crate::units::Micros;
 
-/// The longest time that a step waits for increments.
 pub const MAX_DELAY_US: u64 = 10_000;
 /// The time between two calls after which the grid restarts, at the next step: one second.
 pub const MAX_SILENCE_US: u64 = 1_000_000;
@@ -24,7 +23,6 @@ pub struct Step {
 pub struct FogGrid {
     clock: PartClock,
     increments: Increments,
-    /// Time of the next step; set by the first sample.
     next: Option<u64>,
 }
 

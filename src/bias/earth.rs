@@ -30,7 +30,6 @@ impl Latitude {
         Some(Self { vertical_rate, step_turn })
     }
 
-    /// Returns the Earth's rate about the upward vertical.
     pub const fn vertical_rate(self) -> AngularRate {
         self.vertical_rate
     }
@@ -41,7 +40,6 @@ impl Latitude {
     }
 }
 
-/// Says how the Earth's rotation is treated.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum EarthRate {

@@ -15,11 +15,9 @@ use crate::units::{AngularRate, SpecificForce};
 pub const STATIC_SAMPLES: u32 = 3 * RATE_HZ;
 const SECONDS: usize = (STATIC_SAMPLES / RATE_HZ) as usize;
 
-/// Limits of stillness. The test `still_stretches` holds the defaults against eight real drives:
-/// none of 656 (overlapping) stretches with standing wheels and a running engine is refused, and
-/// 3,177 of 3,247 driven ones are.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+/// Limits of stillness. By the test `still_stretches` none of 656 stretches of eight real drives with standing wheels
+/// and a running engine is refused, and 3,177 of 3,247 driven ones are.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StaticConfig {
     /// Standard deviation of each gyro axis, rad/s.
     pub gyro_std: f32,
@@ -34,7 +32,6 @@ pub struct StaticConfig {
 }
 
 impl StaticConfig {
-    /// The limits for a MEMS part on a car.
     pub const DEFAULT: Self =
         Self { gyro_std: 0.05, accel_std: 1.5, gyro_drift: 0.004, accel_drift: 0.12, gyro_bias: 0.0873 };
 }
@@ -42,7 +39,6 @@ impl StaticConfig {
 /// The sign of motion that was detected; `axis` is 0, 1, 2 for x, y, z.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum StaticError {
     #[error("the vehicle moves during static initialisation: gyro {} has a spread of {std:.4} rad/s", name(*.axis))]
@@ -96,9 +92,7 @@ impl Axis {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rest {
-    /// Mean angular rate: bias and Earth rate.
     pub angular_rate: [AngularRate; 3],
-    /// Mean specific force, which shows the vertical.
     pub specific_force: [SpecificForce; 3],
     /// Spread of the one-second means about z, rad/s.
     pub drift: f32,
@@ -118,9 +112,8 @@ impl StaticInit {
         Self { config, gyro: [Axis::EMPTY; 3], accel: [Axis::EMPTY; 3], wheels_refused: false }
     }
 
-    /// Adds a sample; the judge says whether the vehicle probably `stands`, and is `calm` but for an engine's vibration. The
-    /// last sample decides, because wheels show it late. After [`STATIC_SAMPLES`] of them it returns the readings at rest, or the reason for refusing
-    /// them, and restarts.
+    /// Adds a sample; the last one says whether the vehicle probably `stands`, and is `calm` but for an engine. After
+    /// [`STATIC_SAMPLES`] it returns the readings at rest, or the reason for refusing them, and restarts.
     pub fn add(&mut self, sample: &ImuSample, stands: bool, calm: bool) -> Option<Result<Rest, StaticError>> {
         self.wheels_refused = false;
         for axis in 0..3 {

@@ -30,17 +30,13 @@ const LARGEST: f32 = 1.0;
 /// Parts are made for these temperatures, deg C; the bias of others is that of the nearest.
 const TEMPERATURES: [f32; 2] = [-45.0, 110.0];
 
-/// Holds the gyro's bias by temperature, in the sensor's axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ThermalBias {
-    /// States about x, y and z, and their covariance.
     states: [[f32; STATES]; 3],
     covariance: [[f32; STATES]; STATES],
     /// Mean square of the offsets of starts, (rad/s)^2.
     offset_square: f32,
-    /// The number of starts with a standstill, 8 at most.
     starts: u8,
 }
 
@@ -117,7 +113,6 @@ impl ThermalBias {
         self.states.iter_mut().for_each(|states| states[OFFSET] = 0.0);
     }
 
-    /// The covariance of the states with a linear combination of them.
     fn spread(&self, by: &[f32; STATES]) -> [f32; STATES] {
         self.covariance.map(|row| dot(&row, by))
     }

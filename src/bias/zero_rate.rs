@@ -77,7 +77,6 @@ pub struct ZeroRate {
     block: Spread,
     batch: (i64, u32),
     waiting: Option<Measurement>,
-    /// Mean variance of the seconds so far.
     noise: Option<f32>,
     refused: bool,
     /// The rate by which a refused standstill contradicts the bias so far, rad/s.
@@ -140,7 +139,6 @@ impl ZeroRate {
         &mut self.filter
     }
 
-    /// Returns the learnt gain, and its sigma once it is estimated.
     pub(crate) fn gain(&self) -> (f32, Option<f32>) {
         let variance = self.filter.variance::<GAIN>();
         (self.filter.get::<GAIN>(), (variance > 0.0).then(|| sqrt(variance)))
@@ -261,8 +259,7 @@ impl ZeroRate {
         }
     }
 
-    /// Notes that the vehicle moves: what it has just stood on did not turn, so its newest reading there is the bias. A turn
-    /// before it pulled away contradicts the bias, as a standstill does.
+    /// The vehicle moves: what it stood on did not turn, so its newest reading is the bias, unless it turned before.
     pub fn moves(&mut self) {
         self.turning = 0.0;
         if core::mem::take(&mut self.is_parked) {
@@ -287,7 +284,6 @@ impl ZeroRate {
         self.claim.is_none()
     }
 
-    /// Drops the current second, which a gap has cut short.
     pub fn restart(&mut self) {
         self.block = Spread::EMPTY;
         self.batch = (0, 0);
@@ -355,7 +351,7 @@ impl ZeroRate {
         // Each stop has an offset of its own.
         let variance = standstill * standstill + noise * noise;
         // Ground on which the vehicle stops says more than what it started on.
-        let is_claim = self.claim.as_ref().is_some_and(Claim::has_moved);
+        let is_claim = self.claim.as_ref().is_some_and(|claim| claim.has_moved);
         if let Some(mean) = self.doubt.end_stop(GATE * sqrt(2.0 * variance), is_claim) {
             self.claim = None;
             self.filter.restart::<BIAS>(within(mean, max_bias), variance);
@@ -429,7 +425,7 @@ impl ZeroRate {
             return;
         }
         self.doubt = Doubt::NONE;
-        self.claim = self.claim.take().filter(|claim| !claim.has_moved());
+        self.claim = self.claim.take().filter(|claim| !claim.has_moved);
     }
 
     fn update(&mut self, measured: Measurement) {

@@ -29,7 +29,6 @@ pub const TX1_ID: StandardId = StandardId::new(0x174).unwrap();
 /// SAE J1850: polynomial 0x1D, start and final XOR 0xFF.
 pub static CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_SAE_J1850);
 
-/// Code of zero rate and of zero acceleration.
 const ZERO: i32 = 0x8000;
 /// LSB of the yaw rate, 0.005 deg/s, in units of 1e-9 deg/s x 2^-20.
 const YAW_RATE_LSB: i64 = (YAW_RATE_ODD as i64) << YAW_RATE_SHIFT;
@@ -56,10 +55,8 @@ impl SignalStatus {
     pub const INITIALISING: Self = Self(4);
 }
 
-/// The reason why a frame is not a valid message of the set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum MessageError {
     #[error("a Bosch message has {0} bytes instead of 8")]

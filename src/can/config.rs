@@ -27,11 +27,8 @@ const MAX_BUS_LOAD: u32 = 800;
 /// Largest number of messages in a configuration.
 pub const MAX_MESSAGES: usize = 8;
 
-/// The reason why settings are refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum ConfigError {
     #[error("no message is configured")]
@@ -144,7 +141,6 @@ impl Config {
             || self.messages().iter().any(|message| message.id == id)
     }
 
-    /// Returns the number of samples for each set of our own messages.
     pub(crate) const fn samples_per_yaw(&self) -> u8 {
         match &self.settings.yaw {
             // At most 1000 / 10.

@@ -3,9 +3,8 @@
 use embedded_can::{ExtendedId, Id, StandardId};
 
 /// The identifiers of diagnosis, as a user writes them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DiagnosisIds {
     /// True if all three identifiers have 29 bits instead of 11.
     pub extended: bool,
@@ -21,8 +20,7 @@ impl DiagnosisIds {
     /// The first set of identifiers in ISO 15765-4.
     pub const DEFAULT: Self = Self { extended: false, request: 0x7E0, functional: 0x7DF, response: 0x7E8 };
 
-    /// Returns the identifiers: physical requests, functional requests, responses; as an error, one that has too many
-    /// bits, or is used twice.
+    /// Returns the identifiers of physical and functional requests and responses, or a wrong or repeated one.
     pub fn ids(&self) -> Result<[Id; 3], u32> {
         let Self { extended, request, functional, response } = *self;
         let id = |raw: u32| match extended {

@@ -24,7 +24,6 @@ pub use sequence::{Sequence, Verdict};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum Fault {
     #[error("E2E: {0} bytes do not fit the profile")]
@@ -38,9 +37,8 @@ pub enum Fault {
     Counter(u8),
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Profile {
     P01(P01),
     P02(P02),
@@ -57,7 +55,6 @@ impl Profile {
         }
     }
 
-    /// Returns the number of counter values; 0 follows the last one.
     pub const fn counters(&self) -> u16 {
         match self {
             Self::P01(_) => p01::COUNTERS,
@@ -66,7 +63,6 @@ impl Profile {
         }
     }
 
-    /// Writes the header for the data that follow it.
     pub fn protect(&self, data: &mut [u8], counter: u8) -> Result<(), Fault> {
         match self {
             Self::P01(profile) => profile.protect(data, counter),
@@ -85,7 +81,6 @@ impl Profile {
     }
 }
 
-/// The sending side of one message: the profile and its counter.
 #[derive(Debug, Clone, Copy)]
 pub struct Protector {
     profile: Profile,

@@ -17,7 +17,8 @@ pub struct CanEncoder {
     bosch: SetEncoder,
     yaw: Option<YawEncoder>,
     status: Option<StatusEncoder>,
-    out_of_range: u32,
+    /// Messages marked "failed" because a value was outside its signal's range.
+    pub out_of_range: u32,
 }
 
 impl CanEncoder {
@@ -31,11 +32,6 @@ impl CanEncoder {
             None => None,
         };
         Self { config, bosch: SetEncoder::START, yaw, status, out_of_range: 0 }
-    }
-
-    /// Returns the number of messages marked "failed" because a value was outside its signal's range.
-    pub fn out_of_range(&self) -> u32 {
-        self.out_of_range
     }
 
     /// The frames of one sample, for a caller without a queue of its own.
@@ -81,8 +77,7 @@ impl CanEncoder {
     }
 }
 
-/// Collects the values of the Bosch set. The message counter is the sample's grid step, so that a receiver sees which
-/// samples are missing.
+/// Collects the values of the Bosch set; its counter is the grid step, so that a receiver sees what is missing.
 fn motion(sample: &VehicleSample, rate_status: SignalStatus, force_status: SignalStatus) -> Motion {
     Motion {
         angular_rate: [sample.roll_rate, sample.pitch_rate, sample.live.rate],

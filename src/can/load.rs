@@ -11,7 +11,6 @@ pub struct Periodic {
     pub is_fd: bool,
 }
 
-/// Data bits of a classic frame; all of ours have eight bytes.
 const DATA_BITS: u32 = 64;
 
 impl Periodic {

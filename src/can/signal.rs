@@ -1,8 +1,7 @@
 //! A bit field describes the position of a value in a frame, as in a DBC file.
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ByteOrder {
     /// Little-endian (DBC `@1`): the start bit is the lowest bit.
     Intel,
@@ -19,11 +18,9 @@ pub struct OutsideFrame {
     pub len: u8,
 }
 
-/// The position, byte order and sign of a value in a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "Place", into = "Place"))]
+#[serde(try_from = "Place", into = "Place")]
 pub struct BitField {
     /// Number of bits below the value when the frame is read in its byte order.
     shift: u8,
@@ -57,7 +54,6 @@ impl BitField {
         Ok(Self { shift, len, order, signed, bytes: end.div_ceil(8) })
     }
 
-    /// Returns the start bit, as in a DBC file.
     pub const fn start(&self) -> u8 {
         match self.order {
             ByteOrder::Intel => self.shift,
@@ -124,7 +120,6 @@ impl BitField {
 }
 
 /// The stored form of a field: the numbers of a DBC file, which are checked on deserialization.
-#[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Place {
     start: u8,
@@ -133,14 +128,12 @@ struct Place {
     signed: bool,
 }
 
-#[cfg(feature = "serde")]
 impl From<BitField> for Place {
     fn from(field: BitField) -> Self {
         Self { start: field.start(), bits: field.len, order: field.order, signed: field.signed }
     }
 }
 
-#[cfg(feature = "serde")]
 impl TryFrom<Place> for BitField {
     type Error = OutsideFrame;
 

@@ -17,21 +17,18 @@ pub type Line = Vec<u8, MAX_LINE>;
 
 /// Longest line with a time stamp of four digits.
 pub const MAX_STAMPED_LINE: usize = MAX_LINE + 4;
-/// An encoded frame with a time stamp.
-pub type StampedLine = Vec<u8, MAX_STAMPED_LINE>;
-/// Time stamps are milliseconds modulo one minute.
 const STAMP_MODULUS: u64 = 60_000;
 
-/// Encodes a frame as `tIIILDD..` (standard) or `TIIIIIIIILDD..` (extended) and CR; `None` if it is no classic data
-/// frame.
+/// Encodes a frame as `tIIILDD..` or, extended, `TIIIIIIIILDD..` and CR; `None` if it is no classic data frame.
 pub fn emit(frame: &impl Frame) -> Option<Line> {
     let mut text = [0; MAX_STAMPED_LINE];
     let length = encode(frame, None, &mut text)?;
     Line::from_slice(text.get(..length)?).ok()
 }
 
-/// Writes a frame as [`emit`] and [`emit_stamped`] encode it; returns its length.
-fn encode(frame: &impl Frame, time: Option<Micros>, text: &mut [u8; MAX_STAMPED_LINE]) -> Option<usize> {
+/// Writes a frame as [`emit`], with a time stamp of four digits if wanted (`Z1`); returns its length.
+#[doc(hidden)]
+pub fn encode(frame: &impl Frame, time: Option<Micros>, text: &mut [u8; MAX_STAMPED_LINE]) -> Option<usize> {
     let data = frame.data();
     if frame.is_remote_frame() || data.len() > 8 {
         return None;
@@ -64,14 +61,6 @@ fn encode(frame: &impl Frame, time: Option<Micros>, text: &mut [u8; MAX_STAMPED_
     Some(length + 1)
 }
 
-/// Encodes a frame as [`emit`] does, followed by a time stamp of four hexadecimal digits: milliseconds modulo one
-/// minute. A host enables time stamps with `Z1`.
-pub fn emit_stamped(frame: &impl Frame, time: Micros) -> Option<StampedLine> {
-    let mut text = [0; MAX_STAMPED_LINE];
-    let length = encode(frame, Some(time), &mut text)?;
-    StampedLine::from_slice(text.get(..length)?).ok()
-}
-
 /// Encodes a byte as two hexadecimal digits, both at once: a board encodes thousands of bytes a second.
 #[inline]
 fn hex(byte: u8) -> [u8; 2] {
@@ -81,10 +70,8 @@ fn hex(byte: u8) -> [u8; 2] {
     (digits + 0x3030 + 7 * letters).to_le_bytes()
 }
 
-/// The reason why a line is not a data frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum SlcanError {
     #[error("not a data frame line")]

@@ -8,7 +8,6 @@ mod layout;
 mod settings;
 
 use layout::Pulses;
-#[cfg(feature = "serde")]
 pub(crate) use layout::stored_id;
 pub use layout::{ByteSum, Checksum, Code, MAX_SPEED, Parts, WheelError, WheelFrame, WheelSignal};
 pub(crate) use settings::raw_id;
@@ -24,7 +23,6 @@ use embedded_can::Frame;
 pub struct WheelReceiver {
     settings: WheelSettings,
     sequences: [Sequence; MAX_FRAMES],
-    /// Wheels that have a signal.
     expected: [bool; WHEELS],
     /// The newest speed of each wheel, and the time since which all have been slow.
     speeds: [Option<(WheelSpeed, Micros)>; WHEELS],
@@ -108,7 +106,6 @@ impl WheelReceiver {
         }
         result
     }
-    /// Drops stale speeds.
     fn expire(&mut self, now: Micros) {
         for slot in &mut self.speeds {
             if let Some((_, at)) = slot
@@ -122,7 +119,6 @@ impl WheelReceiver {
         }
     }
 
-    /// Updates the standstill from the speeds that have been set.
     fn judge(&mut self, now: Micros) {
         let limit = self.settings.still_speed.0.unsigned_abs();
         let slow = self.speeds.iter().flatten().all(|(speed, _)| speed.0.unsigned_abs() <= limit);
@@ -143,7 +139,6 @@ impl WheelReceiver {
         WheelSample { time: now, speeds: self.speeds.map(|speed| speed.map(|(speed, _)| speed)), standstill }
     }
 
-    /// Returns whether every expected wheel has a fresh speed.
     fn is_complete(&self) -> bool {
         self.speeds.iter().zip(self.expected).all(|(speed, expected)| speed.is_some() || !expected)
     }

@@ -27,7 +27,6 @@ const SIGMA_PER_CODE_Q32: u64 = 183_346_494;
 /// The reason why bytes are not a yaw message. The E2E check is done before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 pub enum YawError {
     /// The frame does not have eight bytes.
     #[error("yaw message has {0} bytes instead of 8")]
@@ -157,7 +156,6 @@ pub const fn encode_sigma(sigma: Option<AngularRate>) -> u16 {
     if code < SIGMA_UNKNOWN as u64 { code as u16 } else { SIGMA_UNKNOWN - 1 }
 }
 
-/// Returns the code of a latency in microseconds, rounded up.
 #[doc(hidden)]
 pub const fn encode_latency(latency_us: Option<u32>) -> u8 {
     let Some(latency_us) = latency_us else { return LATENCY_UNKNOWN };

@@ -153,11 +153,9 @@ struct Scale {
 impl Scale {
     /// Scale for a signal LSB of 1e-6 deg/s: 180 / pi / 2^27 / 1e-6, too small by 2.3e-10.
     const MICRO_DEG_PER_SEC: Self = Self { factor_q32: 1_833_464_944 };
-    /// Scale for a signal LSB of 2e-4 deg/s.
     const FIFTH_MILLI_DEG_PER_SEC: Self = Self { factor_q32: 9_167_325 };
 }
 
-/// Carries the rounding residual of one signal to its next code.
 #[derive(Debug, Clone, Copy)]
 struct RoundingResidual {
     scale: Scale,

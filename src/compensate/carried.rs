@@ -11,10 +11,9 @@ const HELD_QUARTERS: usize = 5;
 #[derive(Debug, Clone)]
 pub(super) struct Carried {
     /// What is taken off the rates that follow, codes x samples.
-    waiting: i64,
+    pub waiting: i64,
     /// Rates that standstill has set to zero, summed over the current quarter of a second and those before it.
     held: [i64; HELD_QUARTERS],
-    /// Samples until the next quarter begins.
     held_until: u32,
 }
 
@@ -30,9 +29,8 @@ impl Carried {
         }
     }
 
-    /// Returns the rate to send for `rate`: zero at standstill, less what waits, of which one rate carries at most `most`. The
-    /// second value is the rate that standstill has withheld. A reading that is not good carries nothing, because a receiver
-    /// drops it.
+    /// Returns the rate to send: zero at standstill, less at most `most` of what waits, nothing of it where a reading
+    /// is not good and a receiver drops it; and the rate that standstill has withheld.
     pub fn send(
         &mut self,
         rate: i64,
@@ -64,9 +62,5 @@ impl Carried {
     pub fn end_standstill(&mut self) {
         self.waiting -= core::mem::take(&mut self.held).iter().sum::<i64>();
         self.held_until = 0;
-    }
-
-    pub fn waiting(&self) -> i64 {
-        self.waiting
     }
 }

@@ -1,6 +1,5 @@
 //! The slow mean of a model's corrections: a constant that belongs to the unit that it was trained with.
 
-/// The number of samples that the mean covers.
 const MEMORY: i64 = 1_280;
 const Q: u32 = 16;
 

@@ -3,9 +3,8 @@
 use crate::model::window::WINDOW;
 use crate::sample::RATE_HZ;
 
-/// An estimate is used this many samples after its window's newest one, however long the network took, so that the
-/// board's frames do not depend on its speed. With a window every sample, the estimate has to be ready with the next
-/// sample.
+/// An estimate is used this many samples after its window's newest one, so that frames do not depend on the
+/// processor's speed. With a window every sample, it has to be ready with the next one.
 pub const DELAY: u32 = 2;
 
 /// Cycles of the other tasks between two samples: health, compensation, frames.
@@ -13,9 +12,8 @@ const OUTPUT_CYCLES: u32 = 30_000;
 
 /// Samples between two windows: 1 to [`WINDOW`]. A sample's estimate is the mean of those of all windows that cover it: the
 /// newest output of a window depends only on the past and is the worst; those in the middle depend on both sides.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(try_from = "u8", into = "u8")]
 pub struct Stride(u8);
 
 impl Stride {
@@ -67,13 +65,11 @@ impl From<Stride> for u8 {
 }
 
 /// Samples from one sample to the frame with its rate: 0 to [`Lag::MAX`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[serde(try_from = "u8", into = "u8")]
 pub struct Lag(u8);
 
 impl Lag {
-    /// The rate is sent at once.
     pub const NONE: Self = Self(0);
     /// The lag from which on no window changes a sample's estimate.
     pub const MAX: Self = Self((WINDOW + DELAY as usize - 1) as u8);
@@ -102,7 +98,6 @@ impl From<Lag> for u8 {
     }
 }
 
-/// A number of samples outside its range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{} samples are not within {} to {}", .samples, .low, .high)]
 pub struct OutOfRange {

@@ -14,9 +14,8 @@ pub enum Clock {
     /// `now` is an independent clock, and inputs arrive when they are measured: a board in a vehicle.
     #[default]
     Outside,
-    /// Inputs arrive at another pace than they were measured at (a recorded drive), so only the time
-    /// stamps of the inertial sensor are meaningful. They are used for the wheels, the latitude and the fibre-optic
-    /// gyro; `now` is still used to detect a silent sensor and a late window.
+    /// Inputs arrive at another pace than they were measured at (a recording): only the inertial sensor's time stamps
+    /// count, for everything but its silence and late windows.
     Sensor,
 }
 
@@ -24,7 +23,7 @@ pub enum Clock {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Timeline {
     clock: Clock,
-    now: Micros,
+    pub now: Micros,
     shift_us: u64,
     /// Time stamp of the newest sample of the inertial sensor.
     pub sample: Micros,
@@ -49,10 +48,6 @@ impl Timeline {
     /// Returns the shifted time of the clock, never before the newest one.
     pub fn at(&self, clock: Micros) -> Micros {
         Micros(clock.0.saturating_add(self.shift_us)).min(END).max(self.now)
-    }
-
-    pub const fn now(&self) -> Micros {
-        self.now
     }
 
     /// Returns the time that is used for the wheels, the latitude and the fibre-optic gyro.

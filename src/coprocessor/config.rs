@@ -71,10 +71,8 @@ impl Default for Config {
     }
 }
 
-/// The reason why an input is not used.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum InputError {
     /// `now` is before the newest time; later times continue from the newest time.

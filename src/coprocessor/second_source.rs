@@ -17,8 +17,7 @@ use crate::sample::{RATE_HZ, WheelSample};
 use crate::units::WheelSpeed;
 
 /// What the sources showed in the newest second in which one was alone: means, each `None` for a source that was silent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Contradiction {
     /// Such seconds since the start.
@@ -39,7 +38,6 @@ pub(super) struct Doubts {
 }
 
 impl Doubts {
-    /// The code of the slow status message.
     pub fn bits(self) -> u8 {
         u8::from(self.inertial) | u8::from(self.fog) << 1 | u8::from(self.wheels) << 2
     }
@@ -52,7 +50,7 @@ pub(super) struct Shown {
     pub inertial: Option<f32>,
     pub fog: Option<f32>,
     /// A standstill or a turn has shown unit and sign of the fibre-optic gyro's output.
-    pub is_fog_confirmed: bool,
+    pub confirms_fog: bool,
     /// Lateral specific force, m/s^2, to the left.
     pub lateral: f32,
     /// Speed, and how much faster the right wheel of the rear axle is than the left one, m/s.
@@ -71,7 +69,6 @@ const FAST: f32 = 3.0;
 /// A doubt begins and ends with this many seconds in a row.
 const SECONDS: u8 = 2;
 
-/// A second in progress, and the doubts so far.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SecondSource {
     steps: u32,
@@ -84,10 +81,10 @@ pub(super) struct SecondSource {
     /// The gyros' doubts have begun, or gone on, while one of them showed no turn.
     is_bias: bool,
     judged: bool,
-    is_fog_confirmed: bool,
+    pub confirms_fog: bool,
     /// Sums over turns of the product of both gyros' rates, and of the inertial one's square.
     products: [f32; 2],
-    contradiction: Contradiction,
+    pub contradiction: Contradiction,
 }
 
 impl SecondSource {
@@ -99,14 +96,14 @@ impl SecondSource {
         doubts: [false; 3],
         is_bias: false,
         judged: false,
-        is_fog_confirmed: false,
+        confirms_fog: false,
         products: [0.0; 2],
         contradiction: Contradiction { seconds: 0, gyros: [None; 2], lateral: None, wheels: None },
     };
 
     pub fn add(&mut self, shown: &Shown) {
-        let Shown { inertial, fog, is_fog_confirmed, lateral, wheels } = *shown;
-        self.is_fog_confirmed |= is_fog_confirmed;
+        let Shown { inertial, fog, confirms_fog, lateral, wheels } = *shown;
+        self.confirms_fog |= confirms_fog;
         let [speed, difference] = wheels.map_or([None; 2], |values| values.map(Some));
         for (sum, value) in self.sums.iter_mut().zip([inertial, fog, Some(lateral), speed, difference]) {
             if let Some(value) = value {
@@ -126,15 +123,6 @@ impl SecondSource {
     pub fn doubts(&self) -> Option<Doubts> {
         let [inertial, fog, wheels] = self.doubts;
         self.judged.then_some(Doubts { inertial, fog, wheels })
-    }
-
-    pub fn contradiction(&self) -> &Contradiction {
-        &self.contradiction
-    }
-
-    /// Returns whether the gyros have agreed in a turn, or a standstill has shown the fibre-optic one's unit.
-    pub fn confirms_fog(&self) -> bool {
-        self.is_fog_confirmed
     }
 
     /// Returns how much the gains of both gyros differ, once they have been compared in turns.
@@ -163,7 +151,7 @@ impl SecondSource {
             *square += inertial * inertial - *square / TURNS;
         }
         let both_turn = gyros.iter().all(|rate| rate.is_some_and(|rate| rate.abs() > CONFIRMING));
-        self.is_fog_confirmed |= gyros_agree == Some(true) && both_turn;
+        self.confirms_fog |= gyros_agree == Some(true) && both_turn;
         let turns = gyros.map(|rate| rate.is_some_and(|rate| rate.abs() > TURN));
         // How many of the others speak for each gyro, and against it.
         let voices = |by_wheels: Option<bool>, by_force: Option<bool>| {
@@ -173,7 +161,7 @@ impl SecondSource {
         let [for_inertial, against_inertial] = voices(by_wheels[0], by_force[0]);
         let [for_fog, against_fog] = voices(by_wheels[1], by_force[1]);
         let alone = match gyros_agree {
-            Some(false) if !self.is_fog_confirmed => {
+            Some(false) if !self.confirms_fog => {
                 self.doubts[1] = true;
                 [false, true, false]
             }
@@ -242,7 +230,7 @@ mod tests {
     /// Seconds with these rates of both gyros; returns whether the inertial one is doubted.
     fn run(source: &mut SecondSource, seconds: u32, [inertial, fog]: [f32; 2]) -> bool {
         let [inertial, fog] = [Some(inertial), Some(fog)];
-        let shown = Shown { inertial, fog, is_fog_confirmed: true, ..Shown::default() };
+        let shown = Shown { inertial, fog, confirms_fog: true, ..Shown::default() };
         (0..seconds * RATE_HZ).for_each(|_| source.add(&shown));
         source.doubts().expect("two sources").inertial
     }

@@ -14,7 +14,7 @@ const WALK: f32 = 0.2;
 
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct AccumulatedYaw {
-    yaw: Yaw,
+    pub(crate) yaw: Yaw,
     gaps: u32,
     /// Tick and rate of the newest step in the yaw.
     newest: Option<(u32, AngularRate)>,
@@ -48,10 +48,6 @@ impl AccumulatedYaw {
     pub(crate) fn lose(&mut self, after: u32, steps: u32) {
         let before = self.hidden.map_or(0, |(_, steps)| steps);
         self.hidden = Some((after, before.saturating_add(steps)));
-    }
-
-    pub(crate) fn yaw(&self) -> Yaw {
-        self.yaw
     }
 
     /// The number of gaps; `None` before the yaw begins.

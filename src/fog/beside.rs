@@ -33,9 +33,7 @@ const BLOCKS: usize = (RATE_HZ / BLOCK) as usize;
 /// The rates and errors of the inertial sensor, with which the fibre-optic gyro is compared.
 #[derive(Debug, Clone, Copy)]
 pub struct Beside {
-    /// The newest yaw rate, rad/s, and its time.
     pub rate: Option<(Micros, f32)>,
-    /// Its expected error over a second, rad/s.
     pub sigma: f32,
     /// The share of a turn that a gyro misses on the present slope.
     pub tilted: f32,
@@ -63,7 +61,6 @@ impl Beside {
 #[derive(Debug, Clone)]
 pub(super) struct Comparison {
     beside: Beside,
-    /// Steps in a row that differed.
     rejected: u32,
     /// Sums of the differences, rad/s, and their numbers: the newest block first.
     blocks: [(f32, u32); BLOCKS],

@@ -9,8 +9,7 @@ use crate::units::{Angle, AngularRate};
 
 const TILT_FRACTION_BITS: u32 = 30;
 
-/// The angle between the gyro's axis and the vertical: a turn is measured times its cosine, with a part of the Earth's
-/// horizontal rate, which depends on the heading and is not known.
+/// The angle between gyro and vertical: it measures a turn's cosine, and some unknown part of the Earth's rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tilt {
@@ -18,7 +17,6 @@ pub struct Tilt {
 }
 
 impl Tilt {
-    /// The axis is vertical.
     pub const NONE: Self = Self { secant_minus_one: 0 };
 
     /// Creates a tilt of 0 to 45 degrees; `None` for anything else.

@@ -10,11 +10,9 @@ pub struct FogErrors {
     pub bias: f32,
     /// Random walk of the bias, rad/s per square root of a second.
     pub bias_walk: f32,
-    /// Relative error of the gain.
     pub scale: f32,
 }
 
-/// 1 deg/h in rad/s.
 const DEG_PER_HOUR: f32 = core::f32::consts::PI / 180.0 / 3600.0;
 /// Square root of an hour, in square roots of a second.
 const ROOT_HOUR: f32 = 60.0;

@@ -19,9 +19,8 @@ use crate::sample::{FogSample, PERIOD_US, RATE_HZ, Standstill, WheelSample};
 use crate::sqrt::sqrt;
 use crate::units::{Angle, AngularRate, Micros, Yaw};
 
-/// The gyro counts as stuck after this many increments in a row that equal the one before, if they last [`STUCK_US`].
-/// A DSP-3000's noise in 10 ms is a hundred of its units: one increment in four hundred repeats, and four in a row do
-/// so once in years.
+/// Increments that equal the one before, for [`STUCK_US`], of a stuck gyro. In a DSP-3000's noise, a hundred units in
+/// 10 ms, one in four hundred repeats, and four in a row once in years.
 pub const STUCK_AFTER: u8 = 4;
 /// Duration of these increments, us: ten of a DSP-1760, whose noise in 1 ms never repeats.
 pub const STUCK_US: u32 = 10_000;
@@ -29,9 +28,8 @@ pub const STUCK_US: u32 = 10_000;
 /// Share by which a clock may be off before it has been measured: a quarter of what is accepted.
 const CLOCK: f32 = 0.01;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FogCounters {
     pub samples: u32,
     /// Samples refused: duplicate or out of order.
@@ -41,7 +39,6 @@ pub struct FogCounters {
     pub stuck: u32,
     /// Steps without a known latitude: the Earth's rate is not subtracted.
     pub no_latitude: u32,
-    /// Seconds at standstill that updated the bias.
     pub zero_rate_updates: u32,
     /// Seconds in which the gyro contradicted that the vehicle stands.
     pub contradicted: u32,
@@ -66,20 +63,18 @@ pub struct FogPipeline {
     /// Compares the gyro's clock with the board's, where that is better.
     clock: Option<RatioEstimator>,
     /// Unit and sign of the gyro's output have been shown; a standstill has contradicted them.
-    is_confirmed: bool,
+    pub is_confirmed: bool,
     was_refused: bool,
     beside: Comparison,
-    /// The newest step's rate, rad/s.
-    shown: Option<f32>,
+    pub shown: Option<f32>,
     latitude_contested: bool,
     shake: [f32; 2],
     rate: IncrementRate,
     correction: IncrementRate,
     yaw: AccumulatedYaw,
     repeats: Repeats,
-    /// An increment of the next step was stuck.
     stuck_in_step: bool,
-    counters: FogCounters,
+    pub counters: FogCounters,
 }
 
 impl FogPipeline {
@@ -118,17 +113,8 @@ impl FogPipeline {
         self.is_confirmed = true;
     }
 
-    pub fn is_confirmed(&self) -> bool {
-        self.is_confirmed
-    }
-
     pub fn beside(&mut self, beside: Beside) {
         self.beside.take(beside);
-    }
-
-    /// Returns the rate of the newest step, whether the inertial gyro agrees or not, rad/s.
-    pub fn shown(&self) -> Option<f32> {
-        self.shown
     }
 
     pub fn gaps(&self) -> Option<u32> {
@@ -145,7 +131,7 @@ impl FogPipeline {
         }
         if let Some(clock) = &mut self.clock {
             clock.observe(sample.time, now);
-            let ratio = clock.ratio();
+            let ratio = clock.ratio;
             let turns = sample.increment.iter_mut().flatten().filter(|_| ratio != ClockRatio::ONE);
             turns.for_each(|turn| *turn = ratio.angle(*turn));
         }
@@ -186,7 +172,7 @@ impl FogPipeline {
         self.count_rest(outcome);
         self.was_refused |= outcome == Some(RestOutcome::Refused);
         self.is_confirmed |= outcome == Some(RestOutcome::Used) && self.earth_and_bias.rest.shows_unit();
-        let is_clock_off = self.clock.as_ref().is_some_and(RatioEstimator::fault);
+        let is_clock_off = self.clock.as_ref().is_some_and(|clock| clock.fault);
         let contradicts_unit = self.was_refused && !self.is_confirmed;
         let has_rear = wheels.and_then(WheelSample::axle).is_some();
         let has_latitude = self.earth_and_bias.latitude.is_some();
@@ -219,7 +205,7 @@ impl FogPipeline {
         let tick = (step.time.0 / PERIOD_US) as u32;
         let [standing, moving] = self.shake;
         let shake = if standstill == Standstill::Still { standing } else { moving };
-        let unknown = self.clock.as_ref().is_some_and(|clock| !clock.is_known());
+        let unknown = self.clock.as_ref().is_some_and(|clock| !clock.is_known);
         let clock = if unknown { CLOCK } else { 0.0 };
         let beside = self.beside.sigma(rate.0 as f32 / AngularRate::PER_RAD_PER_SEC, clock);
         let spread = sqrt(shake * shake + beside * beside);
@@ -242,10 +228,6 @@ impl FogPipeline {
     fn count_rest(&mut self, outcome: Option<RestOutcome>) {
         count(&mut self.counters.zero_rate_updates, u32::from(outcome == Some(RestOutcome::Used)));
         count(&mut self.counters.contradicted, u32::from(outcome == Some(RestOutcome::Refused)));
-    }
-
-    pub fn counters(&self) -> &FogCounters {
-        &self.counters
     }
 }
 

@@ -42,7 +42,6 @@ pub enum RestOutcome {
     Used,
     /// No mean is complete yet, or the newest one waits for the next second.
     Waits,
-    /// The gyro turns: nothing was used.
     Refused,
 }
 
@@ -190,7 +189,6 @@ impl RestReading {
         self.doubt.max(second).max(newest)
     }
 
-    /// Returns the reading at rest that is subtracted, rad/s.
     pub fn reading(&self) -> f32 {
         self.combined().mean
     }

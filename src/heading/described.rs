@@ -4,16 +4,14 @@ use super::HeadingError;
 use crate::can::signal::BitField;
 use embedded_can::{Frame, Id};
 
-/// Smallest and largest factor, and largest offset.
 const FACTORS: core::ops::RangeInclusive<f32> = 1e-10..=90.0;
 const LARGEST_OFFSET: f32 = 400.0;
 
 /// A value in a frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct HeadingSignal {
     /// Identifier of the frame.
-    #[cfg_attr(feature = "serde", serde(with = "crate::can::wheel::stored_id"))]
+    #[serde(with = "crate::can::wheel::stored_id")]
     pub id: Id,
     /// Position of the raw value.
     pub field: BitField,

@@ -165,8 +165,7 @@ impl Failing {
 }
 
 /// Counters of courses since the start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub struct CourseCounters {
     /// Courses that were used.
     pub used: u32,
@@ -211,13 +210,11 @@ pub struct Estimator {
     tick: u32,
     rate: AngularRate,
     waiting: Option<Arrived>,
-    /// The newest course, and the turn since it changed, rad.
     newest: Option<f32>,
     unchanged: f32,
     /// Ticks of the newest course, and of the newest one that was used, once the heading is known.
     last: Option<u32>,
     used: Option<u32>,
-    /// Turns to the left and to the right, rad.
     ways: [f32; 2],
     learns_gain: bool,
     is_backwards: bool,
@@ -260,8 +257,7 @@ impl Estimator {
         }
     }
 
-    /// Adds a sample: its rate less what is known of the bias; `None` where it cannot be used and may hide a turn. `stands` is true at a
-    /// standstill.
+    /// Adds a rate less the known bias; `None` where it may hide a turn. `stands` is true at a standstill.
     pub(crate) fn add(&mut self, filter: &mut Filter, tick: u32, rate: Option<AngularRate>, stands: bool) {
         let Some(rate) = rate else { return self.restart() };
         let missing = tick.wrapping_sub(core::mem::replace(&mut self.tick, tick)).wrapping_sub(1);
@@ -433,7 +429,6 @@ fn learnt(filter: &Filter) -> [f32; 4] {
     [filter.get::<BIAS>(), filter.variance::<BIAS>(), filter.get::<GAIN>(), filter.variance::<GAIN>()]
 }
 
-/// Returns what a sigma of the gain means.
 pub(crate) fn gain_knowledge(sigma: f32) -> Knowledge {
     match sigma {
         fine if fine <= FINE_GAIN => Knowledge::Fine,

@@ -26,9 +26,7 @@ type Vector = [f32; STATES];
 pub(crate) struct Measured {
     /// Course less the heading that the filter expects a lag ago, rad.
     pub off: f32,
-    /// The yaw rate a lag ago, rad/s.
     pub rate: f32,
-    /// Variance of the course, rad^2.
     pub variance: f32,
 }
 
@@ -152,7 +150,6 @@ impl Filter {
     }
 }
 
-/// Returns one vector plus `part` times another.
 fn combined(one: &Vector, part: f32, other: &Vector) -> Vector {
     let mut sum = *one;
     sum.iter_mut().zip(other).for_each(|(sum, other)| *sum += part * other);

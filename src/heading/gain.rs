@@ -12,9 +12,8 @@ pub(super) const MAX_GAIN: f32 = 0.05;
 const BETTER: f32 = 0.7;
 
 /// A gain of the yaw gyro.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gain {
     /// Share of the rate that the gyro reads too much.
     pub share: f32,

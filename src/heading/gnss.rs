@@ -11,9 +11,8 @@ use crate::sensor::framer::Framer;
 use crate::sensor::{ByteSource, Source};
 
 /// The line of a GNSS receiver.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GnssSettings {
     /// What the receiver sends. UBX may come beside NMEA, NMEA comes alone.
     pub protocol: GnssProtocol,
@@ -22,9 +21,8 @@ pub struct GnssSettings {
 }
 
 /// Messages with a course.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum GnssProtocol {
     /// UBX-NAV-PVT of u-blox, with accuracies.
     Ubx,
@@ -58,7 +56,6 @@ pub struct GnssLine {
     bad_checksums: u32,
 }
 
-/// The content of an intact message; `None` for one that is not used.
 pub(super) type Read = Option<Result<Fix, HeadingError>>;
 
 #[derive(Debug, Clone)]

@@ -20,7 +20,6 @@ const KNOT: f32 = 1852.0 / 3600.0;
 
 #[derive(Debug, Clone)]
 pub(super) struct Sentences {
-    /// The sentence so far, from its `$` on.
     bytes: Vec<u8, MAX_SENTENCE>,
     /// The talker in use, and the number of RMC and VTG of others since its newest.
     talker: Option<&'static [u8; 2]>,
@@ -52,7 +51,6 @@ impl Sentences {
         self.bytes.clear();
     }
 
-    /// Reads the sentence, if it is complete.
     pub fn read(&mut self) -> Option<Read> {
         let bytes = core::mem::take(self.bytes.ends_with(b"\n").then_some(&mut self.bytes)?);
         Some(checked(&bytes).map_or_else(|error| Some(Err(error)), |body| self.content(body)))

@@ -22,8 +22,7 @@ const BOTH: u32 = GROUP & !(3 << 8);
 const BAUDS: core::ops::RangeInclusive<u32> = 4_800..=460_800;
 
 /// The source of courses, speeds and latitudes. By default there is none.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct HeadingSettings {
     /// True if course and speed (PGN 129026) and position (129025) of NMEA 2000 are used.
     pub nmea2000: bool,
@@ -43,11 +42,8 @@ pub struct HeadingSettings {
     pub line: Option<GnssSettings>,
 }
 
-/// The reason why heading settings are refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum HeadingConfigError {
     #[error("frame {0:x} is one of our own messages, or of diagnosis")]

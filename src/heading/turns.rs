@@ -14,7 +14,6 @@ const SHIFT: u32 = 8;
 const AROUND: f32 = 2.0;
 const PER_RAD: f32 = AngularRate::PER_RAD_PER_SEC * RATE_HZ as f32;
 
-/// Sums of the readings, codes x samples.
 #[derive(Debug, Clone)]
 pub(super) struct Turns {
     /// Sum at the end of each block, the newest first; only differences have a meaning.

@@ -40,7 +40,6 @@ impl Protocol for Ubx {
     }
 }
 
-/// Reads an intact frame; `None` for another message.
 pub(super) fn read(frame: &[u8]) -> Option<Result<Fix, HeadingError>> {
     let [_, _, class, id, _, _, payload @ .., _, _] = frame else { return None };
     let of_this_version = || payload.try_into().map_err(|_| HeadingError::Length(payload.len()));

@@ -1,30 +1,23 @@
 //! States that change slowly: whether the vehicle stands, and how well the board knows its sensor.
 
-/// The verdict about standstill.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Verdict {
     /// Neither is shown, or the inertial sensor contradicts standing wheels.
     #[default]
     Unknown = 0,
-    /// The vehicle stands.
     Standing = 1,
-    /// The vehicle moves.
     Moving = 2,
 }
 
-/// The evidence for a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Evidence {
-    /// Nothing.
     #[default]
     None = 0,
-    /// The wheel speeds.
     Wheels = 1,
     /// A quiet inertial sensor, since the start or after braking.
     Inertial = 2,
 }
 
-/// How well a property of the sensor is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Knowledge {
     /// Not at all: the configured or built-in value is in use.
@@ -34,7 +27,6 @@ pub enum Knowledge {
     Coarse = 1,
     /// Measured; a mounting of which up and forward are known within 3 deg.
     Fine = 2,
-    /// Measurements contradict what was known.
     Refused = 3,
 }
 

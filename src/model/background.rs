@@ -18,7 +18,6 @@ impl<'w> BackgroundCheck<'w> {
         Self { content, stored: crc, digest: CRC.digest(), at: 0 }
     }
 
-    /// Returns the number of bytes that one round checks.
     pub fn len(&self) -> usize {
         self.content.len()
     }

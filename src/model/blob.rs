@@ -20,10 +20,8 @@ use crate::nn::{bilstm::Layer, dense::Dense, linear::Linear};
 pub const HIDDEN: usize = 60;
 /// The linear part has this many inputs: all features of a window, sample by sample, oldest first.
 pub const LINEAR_INPUTS: usize = WINDOW * FEATURES;
-/// Bytes before the provenance text.
 pub const HEADER_LEN: usize = header_len(FEATURES);
 
-/// Describes the parts of a window model and their sizes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Shape {
@@ -34,7 +32,6 @@ pub struct Shape {
 
 impl Shape {
     pub const PAPER: Self = Self { units: HIDDEN as u16, linear: false };
-    /// The largest shape that a file may have.
     pub const LARGEST: Self = Self { units: HIDDEN as u16, linear: true };
 
     /// Returns the topology that the file's header must state.
@@ -70,11 +67,8 @@ impl Shape {
 /// Gives access to a weight file that has passed all checks.
 #[derive(Debug, Clone, Copy)]
 pub struct Blob<'w> {
-    /// The provenance of the weights: JSON.
     pub provenance: &'w str,
-    /// The parts of the model and their sizes.
     pub shape: Shape,
-    /// The scaling of each feature.
     pub normalisation: [Normalisation; FEATURES],
     /// Inputs of the Bi-LSTMs are clamped to +- this, Q10.
     pub input_clamp: i16,
@@ -85,7 +79,6 @@ pub struct Blob<'w> {
     pub gyro_error: Dense<'w>,
     /// The file's own checksum, which identifies this set of weights.
     pub crc: u32,
-    /// The bytes that the checksum covers.
     pub content: &'w [u8],
 }
 

@@ -46,11 +46,8 @@ compile_error!("weights are read in place as little-endian words");
 /// The shape that a file states: network, window, inputs, hidden units, layers, outputs of the linear part.
 pub type Topology = [u16; 6];
 
-/// The reason why a weight file is refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum BlobError {
     #[error("weight file: it begins with {0:02x?}, should be {MAGIC:02x?}")]
@@ -82,7 +79,6 @@ pub enum BlobError {
     RowBound {
         /// Layer, 0 or 1; FoGNet's LSTM2 has layers 2 and 3.
         layer: u8,
-        /// Direction, 0 forward, 1 backward.
         direction: u8,
         unit: u16,
     },
@@ -211,7 +207,6 @@ pub(super) fn check_dense(row: &Dense<'_>) -> Result<(), BlobError> {
     if sum + i64::from(row.bias).abs() >= 1 << 31 { Err(BlobError::Scale) } else { Ok(()) }
 }
 
-/// Reads typed slices from the front of the file.
 pub(super) struct Reader<'w> {
     bytes: &'w [u8],
     len: usize,

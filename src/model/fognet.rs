@@ -26,7 +26,6 @@ use crate::units::{Angle, AngularRate};
 const GYRO: usize = INPUTS - 1;
 /// Shifting an [`Angle`] right by this many bits gives the [`AngularRate`] that turns it in a second.
 const ANGLE_TO_RATE: u32 = Angle::FRACTION_BITS - AngularRate::FRACTION_BITS;
-/// Fraction bits of [`FogBlob::gains`].
 pub const GAIN_FRACTION_BITS: u32 = 31;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -125,7 +124,7 @@ impl<'w, 's> FogNet<'w, 's> {
         state.linear = Angle(linear.clamp(i64::MIN.into(), i64::MAX.into()) as i64);
         state.f1 = [blob.fc1.bias; STEPS];
         state.f2 = blob.fc2.bias;
-        state.stage = Stage::First(Run::new(), Scratch::ZERO);
+        state.stage = Stage::First(Run::START, Scratch::ZERO);
     }
 
     /// Runs a piece (two steps of a direction of a layer); returns the estimate with the last one.
@@ -173,7 +172,6 @@ impl<'w, 's> FogNet<'w, 's> {
     }
 }
 
-/// Returns one direction's part of a row's sum.
 fn half(weights: &[i16], direction: Direction, hidden: &[u32]) -> i32 {
     let (forward, backward) = weights.split_at_checked(weights.len() / 2).unwrap_or_default();
     Dense::partial(if direction == Direction::Forward { forward } else { backward }, hidden)
@@ -189,7 +187,7 @@ impl FogNetState {
             let f1 = blob.fc1.scale(self.f1[step]).min(clamp).max(-clamp);
             self.input[bilstm::word_index(step, 0, 2)] = pack(f1 as i16, gyro as i16);
         }
-        self.stage = Stage::Second(Run::new(), Scratch::ZERO);
+        self.stage = Stage::Second(Run::START, Scratch::ZERO);
     }
 
     fn estimate(&self, blob: &FogBlob<'_>) -> FogEstimate {

@@ -32,18 +32,13 @@ pub const INPUTS: usize = seconds::FEATURES + 1;
 pub const COLUMNS: usize = INPUTS + 1;
 /// Fraction bits of the factor that turns FC2's sum into an angle.
 pub const CORRECTION_SHIFT: u32 = 16;
-/// Bytes before the provenance text.
 pub const HEADER_LEN: usize = header_len(INPUTS) + 4 * STEPS + 8 + 8;
 pub const TOPOLOGY: Topology = [FOGNET, STEPS as u16, INPUTS as u16, HIDDEN1 as u16, 2, 1];
 
-/// Names the source of the turns that a FoGNet corrects.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Gyro {
-    /// A KVH DSP-1760, less the Earth's rate and its bias.
     Dsp1760,
-    /// A KVH DSP-3000, less the Earth's rate and its bias.
     Dsp3000,
     /// GyroNet, the paper's pseudo-FoG.
     PseudoFog,
@@ -64,10 +59,8 @@ impl core::fmt::Display for Gyro {
     }
 }
 
-/// Says what a FoGNet was trained on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Training {
     pub gyro: Gyro,
     /// Serial number of the gyro that the network was trained for; 0 stands for any of that part.
@@ -86,7 +79,6 @@ impl core::fmt::Display for Training {
 /// Gives access to a weight file that has passed all checks.
 #[derive(Debug, Clone, Copy)]
 pub struct FogBlob<'w> {
-    /// The provenance of the weights: JSON.
     pub provenance: &'w str,
     pub training: Training,
     pub normalisation: [Normalisation; INPUTS],

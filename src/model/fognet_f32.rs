@@ -16,20 +16,15 @@ pub struct FogNetF32<'w> {
     pub correction_scale: f32,
     /// Layer 1, then layer 2; forward, backward.
     pub lstm1: [[LstmWeights<'w>; 2]; 2],
-    /// Weights (180) and bias of FC1.
     pub fc1: (&'w [f32], f32),
     pub lstm2: [[LstmWeights<'w>; 2]; 2],
-    /// Weights (120) and bias of FC2.
     pub fc2: (&'w [f32], f32),
-    /// Weights (60) and bias of FC3.
     pub fc3: (&'w [f32], f32),
-    /// Weights (2) and bias of FC4.
     pub fc4: (&'w [f32], f32),
 }
 
 #[derive(Debug, Clone)]
 pub struct FogLayerOutputs {
-    /// Features less mean, over standard deviation.
     pub normalised: [[f32; INPUTS]; STEPS],
     /// FC1 of LSTM1, in units of the gyro's normalised increments.
     pub f1: [f32; STEPS],
@@ -60,7 +55,6 @@ fn two_layers<const I: usize, const H: usize, const W: usize>(
 }
 
 impl FogNetF32<'_> {
-    /// Runs the network over features in m/s^2, rad/s, m and rad.
     pub fn layers(&self, window: &[[f32; INPUTS]; STEPS]) -> FogLayerOutputs {
         let normalised = window
             .map(|features| core::array::from_fn(|k| (features[k] - self.input_mean[k]) / self.input_std[k]));

@@ -27,12 +27,10 @@ pub struct GyroNetState<
     scratch: Scratch<U, W, { WINDOW / 2 }>,
     /// The recurrent weights of the current direction, which each step reads.
     recurrent: [u32; R],
-    /// The outputs of the linear part.
     linear: [i32; WINDOW],
     /// Sums of the gyro error's row for each sample; they start from its bias.
     sums: [i32; WINDOW],
     clamped_inputs: u16,
-    /// The position in the window in progress.
     run: Run,
     under_way: bool,
 }
@@ -50,7 +48,7 @@ impl<const U: usize, const W: usize, const R: usize> GyroNetState<U, W, R> {
         linear: [0; _],
         sums: [0; _],
         clamped_inputs: 0,
-        run: Run::new(),
+        run: Run::START,
         under_way: false,
     };
 }
@@ -60,7 +58,6 @@ pub trait Memory {
     /// The most units a direction that there is room for.
     const UNITS: usize;
 
-    /// Loads a window and runs the linear part on it.
     fn start(&mut self, blob: &Blob<'_>, window: &[Features; WINDOW]);
     /// Runs a piece of the window; returns the estimate with the last one.
     fn advance(&mut self, blob: &Blob<'_>) -> Option<Estimate>;
@@ -93,7 +90,7 @@ impl<const U: usize, const W: usize, const R: usize> Memory for GyroNetState<U, 
             *output = Linear::output(row, window.as_flattened());
         }
         self.sums = [blob.gyro_error.bias; WINDOW];
-        self.run = Run::new();
+        self.run = Run::START;
         self.under_way = true;
     }
 

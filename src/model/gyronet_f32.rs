@@ -11,45 +11,37 @@ use crate::units::{AngularRate, SpecificForce};
 pub struct GyroNetF32<'w> {
     /// Mean of each feature, m/s^2 and rad/s.
     pub input_mean: [f32; FEATURES],
-    /// Standard deviation of each feature.
     pub input_std: [f32; FEATURES],
     /// (N, N F): weights of each sample's gyro error over all features of the window, if there is a linear part.
     pub linear: Option<&'w [f32]>,
     pub network: Option<NetworkF32<'w>>,
 }
 
-/// Holds the tensors of the Bi-LSTMs and of the layer on top of them.
 #[derive(Debug, Clone, Copy)]
 pub struct NetworkF32<'w> {
     /// rad/s per unit of the last layer.
     pub output_scale: f32,
     /// Layer 1: forward, backward.
     pub lstm1: [LstmWeights<'w>; 2],
-    /// Layer 2: forward, backward.
     pub lstm2: [LstmWeights<'w>; 2],
     /// (1, 2H): the row for the gyro error.
     pub fc_weight: &'w [f32],
-    /// (1): its bias.
     pub fc_bias: f32,
 }
 
 /// Holds every layer's output for one window; the places of units that a smaller network lacks are zero.
 #[derive(Debug, Clone)]
 pub struct LayerOutputs {
-    /// Features less mean, over standard deviation.
     pub normalised: [[f32; FEATURES]; WINDOW],
     /// The linear part of the gyro error, rad/s.
     pub linear: [f32; WINDOW],
     /// Hidden states of layer 1, forward then backward.
     pub layer1: [[f32; 2 * HIDDEN]; WINDOW],
-    /// Hidden states of layer 2.
     pub layer2: [[f32; 2 * HIDDEN]; WINDOW],
-    /// Gyro error, rad/s.
     pub gyro_error: [f32; WINDOW],
 }
 
 impl GyroNetF32<'_> {
-    /// Runs the network over features in m/s^2 and rad/s.
     pub fn layers(&self, window: &[[f32; FEATURES]; WINDOW]) -> LayerOutputs {
         let normalised = window
             .map(|features| core::array::from_fn(|k| (features[k] - self.input_mean[k]) / self.input_std[k]));

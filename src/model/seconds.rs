@@ -14,10 +14,8 @@ pub const STEPS: usize = 60;
 /// A step has this many features besides the gyro's increment: specific force x, y, z; angular rate x, y, z less the
 /// static bias; distance of the left and of the right wheel.
 pub const FEATURES: usize = 8;
-/// A step has this many frames: a second.
 pub const FRAMES: u32 = RATE_HZ;
 
-/// Holds the part of a second that one 10 ms frame adds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FogFrame {
     /// Angle turned about z (up) since the frame before; `None` if part of it is unknown.
@@ -35,12 +33,9 @@ pub struct Second {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Incomplete {
     Gyro,
-    /// Less than half of the second's frames had an inertial sample.
     Inertial,
-    /// Less than half of the second's frames had wheel speeds.
     Wheels,
 }
 
@@ -152,7 +147,6 @@ impl<'m> SecondsWindow<'m> {
         self.seconds.len() == STEPS
     }
 
-    /// Returns the seconds, oldest first: [`STEPS`] of them.
     pub fn iter(&self) -> impl Iterator<Item = &'m Second> + use<'m> {
         let seconds = self.seconds;
         let filled = seconds.len();

@@ -15,7 +15,6 @@ pub fn features([fx, fy, fz]: [SpecificForce; 3], [x, y, z]: [AngularRate; 3]) -
     [fx.0, fy.0, fz.0, x.0, y.0, z.0]
 }
 
-/// Keeps the last [`WINDOW`] samples without a gap.
 pub type Window = Ring<Features, WINDOW>;
 
 impl Window {
@@ -51,13 +50,11 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         self.filled
     }
 
-    /// Returns an element by its number, 0 for the oldest.
     pub(super) fn get(&self, number: usize) -> Option<&T> {
         // A ring that is not full begins at place 0.
         self.places.get(if self.filled == N { (self.next + number) % N } else { number })
     }
 
-    /// Returns the elements, oldest first; `None` until the ring is full.
     pub fn snapshot(&self) -> Option<[T; N]> {
         (self.filled == N).then(|| core::array::from_fn(|number| self.places[(self.next + number) % N]))
     }

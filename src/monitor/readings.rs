@@ -90,7 +90,6 @@ const OLD_US: u32 = 50_000;
 pub(super) struct Jump {
     /// The last accepted reading: gyro in rad/s, accelerometer in m/s^2.
     last: [f32; AXES],
-    /// Its time, microseconds modulo 2^32.
     at: u32,
     known: bool,
     /// Mean squares of the axes' accepted steps.
@@ -104,13 +103,11 @@ pub(super) struct Jump {
     suspect: (f32, u8),
 }
 
-/// Jumps of the yaw rate that were accepted.
 #[derive(Debug, Clone, Copy)]
 struct Shift {
     /// Their sum, and the rate before the first of them, rad/s.
     sum: f32,
     before: f32,
-    /// Readings in a row near that rate.
     near: u8,
     /// Samples for which it is still reported; `None` while it lasts.
     reported_for: Option<u8>,
@@ -168,7 +165,6 @@ impl Jump {
         false
     }
 
-    /// Counts a sample for the limits that are in samples.
     fn pass_on(&mut self) {
         self.odd_ago = self.odd_ago.saturating_add(1);
         let is_odd = self.odd_for > 0 && (self.odd_ago < ODD || self.shift.is_some());

@@ -22,12 +22,9 @@ const FEWEST: f32 = 20.0;
 /// Plausible ratios of both accelerations: others come from slip or from another sensor.
 const PLAUSIBLE: [f32; 2] = [0.5, 2.0];
 
-/// Holds the forward direction of the vehicle in the sensor's axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Forward {
-    /// The direction, a unit vector.
     pub direction: [f32; 3],
     /// Sigma of its angle about the vertical, rad.
     pub sigma: f32,
@@ -70,9 +67,7 @@ pub struct ForwardEstimator {
 #[derive(Debug, Clone, Copy)]
 struct Second {
     samples: u32,
-    /// Speed at the beginning of the second, m/s.
     begin: f32,
-    /// Specific force, m/s^2.
     force: [f32; 3],
     /// Speed times angular rate about each axis, m/s^2.
     turning: [f32; 3],

@@ -23,8 +23,7 @@ use crate::vector::{dot, norm};
 const SLOPE: f32 = 0.061;
 /// Sigma of the tilt of a sensor that is not mounted as configured, rad: 8 deg.
 const TILT: f32 = 0.14;
-/// Logarithm of the odds that a sensor is mounted as configured: 2.3 to 1. With more a tilt of 7 deg costs more than 5 %,
-/// with less the standstill of a training drive on a slope is taken for one.
+/// Logarithm of the odds of the configured mounting, 2.3 to 1: more costs tilts of 7 deg 5 %, less believes slopes.
 const CONFIGURED: f32 = 0.84;
 /// Logarithm of the odds at which a tilt is no longer taken off.
 const AGAIN: f32 = 1.0;
@@ -46,12 +45,10 @@ const APART: u32 = 10 * RATE_HZ;
 const FINE_DEG: f32 = 3.0;
 
 /// The mean of directions that pointed up, each weighted with the inverse of its variance.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Vertical {
     sum: [f32; 3],
-    /// Sum of the weights, rad^-2.
     information: f32,
 }
 
@@ -105,7 +102,6 @@ impl Vertical {
         CONFIGURED + libm::logf(1.0 + information * tilt) - 0.5 * dot(&sum, &sum) / (information + 1.0 / tilt)
     }
 
-    /// Returns the same vertical in other axes.
     pub fn turned(&self, rotation: &Rotation) -> Self {
         Self { sum: rotation.vector(&self.sum), ..*self }
     }
@@ -139,7 +135,6 @@ pub struct Judgement {
     pub variance: f32,
 }
 
-/// Collects standstills and turns, in the configured axes.
 #[derive(Debug, Clone)]
 pub struct VerticalEstimator {
     known: Vertical,
@@ -147,7 +142,7 @@ pub struct VerticalEstimator {
     /// Square of the angle by which a standstill has dropped a vertical, rad^2; 0 once another or a turn decides.
     disputed: f32,
     /// No second standstill has shown the tilt.
-    is_one_place: bool,
+    pub is_one_place: bool,
     /// Sums of the current standstill, its samples, and the samples since the one before.
     force: [i64; 3],
     stood: u32,
@@ -155,7 +150,6 @@ pub struct VerticalEstimator {
     /// Sums of the current second, codes, and its samples.
     rate: [i64; 3],
     samples: u32,
-    /// The angle of the current turn, rad.
     turn: [f32; 3],
 }
 
@@ -217,7 +211,6 @@ impl VerticalEstimator {
         true
     }
 
-    /// Drops the current second and turn, because samples are missing.
     pub fn restart(&mut self) {
         (self.rate, self.samples, self.turn) = ([0; 3], 0, [0.0; 3]);
     }
@@ -240,7 +233,6 @@ impl VerticalEstimator {
         }
     }
 
-    /// Returns the vertical with the turn that goes on.
     pub fn now(&self) -> Vertical {
         let yaw = dot(&self.turn, &self.known.up());
         if libm::fabsf(yaw) < LEAST_TURN {
@@ -254,11 +246,6 @@ impl VerticalEstimator {
     /// Returns the standstills and turns that are complete.
     pub fn known(&self) -> &Vertical {
         &self.known
-    }
-
-    /// Returns whether the tilt may be that of the one ramp that it was shown on.
-    pub const fn is_one_place(&self) -> bool {
-        self.is_one_place
     }
 
     pub fn judge(&mut self) -> Judgement {

@@ -12,14 +12,11 @@
 
 use super::GATE_FRACTION_BITS;
 
-/// A saturated gate input has this many bits.
 pub const INPUT_BITS: u32 = 18;
 const INPUT_MAX: i32 = (1 << (INPUT_BITS - 1)) - 1;
 const INPUT_MIN: i32 = -(1 << (INPUT_BITS - 1));
 
-/// Fraction bits inside a sigmoid segment.
 pub const SIGMOID_SHIFT: u32 = 10;
-/// Fraction bits inside a tanh segment.
 pub const TANH_SHIFT: u32 = 9;
 /// The tanh slope, four times the sigmoid's, is stored divided by four, and the fraction multiplied by four.
 pub const TANH_FRACTION_SCALE: u32 = 2;

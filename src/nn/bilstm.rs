@@ -132,9 +132,7 @@ pub struct Run {
 }
 
 impl Run {
-    pub const fn new() -> Self {
-        Self { stage: 0, pass: Pass::new(Direction::Forward) }
-    }
+    pub const START: Self = Self { stage: 0, pass: Pass::new(Direction::Forward) };
 
     /// Runs the next piece; returns whether there are more.
     ///
@@ -174,11 +172,5 @@ impl Run {
             });
         }
         self.stage < 4
-    }
-}
-
-impl Default for Run {
-    fn default() -> Self {
-        Self::new()
     }
 }

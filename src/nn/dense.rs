@@ -5,7 +5,6 @@
 pub struct Dense<'w> {
     /// Weights of the forward half, then of the backward half.
     pub weights: &'w [i16],
-    /// The bias in accumulator units.
     pub bias: i32,
     /// Output code = (accumulator * multiplier + half) / 2^[`Dense::SHIFT`].
     pub multiplier: i32,
@@ -14,7 +13,6 @@ pub struct Dense<'w> {
 impl Dense<'_> {
     /// This row has no inputs; its output is zero.
     pub const EMPTY: Self = Self { weights: &[], bias: 0, multiplier: 0 };
-    /// Fraction bits of the multiplier.
     pub const SHIFT: u32 = 24;
 
     /// Returns the sum's part of a direction's hidden state, two units a word; add both and the bias. It stays in 32

@@ -46,8 +46,7 @@ impl<'w> DirectionWeights<'w> {
         units.next_multiple_of(4)
     }
 
-    /// Creates a direction over records in the layout of a weight file; `None` unless `units` and `inputs` are even
-    /// and not zero, `inputs` at most [`MAX_INPUTS`], and the lengths fit them.
+    /// Creates a direction over a file's records; `None` unless both are even, not zero, and the lengths fit them.
     pub const fn new(units: usize, inputs: usize, input: &'w [u32], recurrent: &'w [u32]) -> Option<Self> {
         let even = units.is_multiple_of(2) && inputs.is_multiple_of(2) && units > 0 && inputs > 0;
         if even
@@ -107,8 +106,7 @@ impl<'w> DirectionWeights<'w> {
     }
 }
 
-/// State and scratch of a direction of up to `U` units, in `W` words of hidden state, for `P` pairs of steps. Fewer
-/// units, in fours, use the first elements.
+/// State and scratch of a direction of up to `U` units in `W` words, for `P` pairs of steps; fewer use the first.
 #[derive(Debug, Clone)]
 pub struct Scratch<const U: usize, const W: usize, const P: usize = 1> {
     /// Cell state, Q20.
@@ -118,11 +116,9 @@ pub struct Scratch<const U: usize, const W: usize, const P: usize = 1> {
     pub projection: [Projection<U>; P],
 }
 
-/// Holds the input projections of two consecutive steps.
 pub type Projection<const U: usize> = [[Accumulators; U]; 2];
 
 impl<const U: usize, const W: usize, const P: usize> Scratch<U, W, P> {
-    /// Before the first step the state is all zero.
     pub const ZERO: Self = {
         assert!(2 * W == DirectionWeights::padded(U), "W is half of U, U rounded up to a multiple of four");
         Self { cell_state: [0; U], hidden: [[0; W]; 2], projection: [[[[0; GATES]; U]; 2]; P] }

@@ -12,9 +12,7 @@ pub struct LstmWeights<'w> {
     pub weight_ih: &'w [f32],
     /// (4H, H): weights of the hidden state.
     pub weight_hh: &'w [f32],
-    /// (4H)
     pub bias_ih: &'w [f32],
-    /// (4H)
     pub bias_hh: &'w [f32],
 }
 
@@ -24,11 +22,8 @@ impl LstmWeights<'_> {
     }
 }
 
-/// Runs one direction over `x` (T, I) from a zero state and writes `h` into columns
-/// `offset..offset + H` of `output` (T, W). Weights of fewer inputs and units take the first columns of each.
-///
-/// # Panics
-/// When a slice is not of the stated shape.
+/// Runs one direction over `x` (T, I) from a zero state; writes `h` into columns `offset..offset + H` of `output` (T,
+/// W). Fewer inputs and units take the first columns. Panics when a slice has another shape.
 pub fn lstm<const I: usize, const H: usize, const W: usize>(
     weights: &LstmWeights<'_>,
     x: &[[f32; I]],

@@ -10,13 +10,11 @@ use crate::units::SpecificForce;
 
 #[derive(Debug, Clone, Copy)]
 pub struct PipelineConfig {
-    /// The rotation of the board in the vehicle.
     pub mounting: Rotation,
     /// The gyro's bias by temperature, in the sensor's axes, as earlier drives have shown it.
     pub thermal_bias: ThermalBias,
     /// Mean specific force at standstill, in the sensor's axes, where earlier drives have shown it.
     pub rest_force: Option<[SpecificForce; 3]>,
-    /// How well earlier drives have shown the forward direction.
     pub forward: Knowledge,
     /// The correction of the gain and of the remaining mounting error of this unit's gyro.
     pub gyro_map: GyroMap,
@@ -24,21 +22,17 @@ pub struct PipelineConfig {
     pub vertical: Vertical,
     /// True if a tilt beyond the mounting is found and taken off.
     pub levelling: bool,
-    /// Limits of static initialisation.
     pub static_init: StaticConfig,
-    /// The treatment of the Earth's rotation.
     pub earth_rate: EarthRate,
     /// Zero-rate updates; `None` leaves the bias as static initialisation found it.
     pub zero_rate: Option<ZeroRateConfig>,
     /// Learning from courses, with the filter of the zero-rate updates.
     pub course: CourseConfig,
-    /// The gain of the yaw gyro that earlier drives have shown.
     pub gain: Option<Gain>,
     /// The model and map that a gain is found with ([`Gain::of`]).
     pub gain_of: u32,
     /// Settings of the compensation, which applies the estimates to the rates.
     pub compensate: CompensateConfig,
-    /// The model of a rate's expected error.
     pub uncertainty: UncertaintyConfig,
 }
 

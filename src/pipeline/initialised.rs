@@ -15,9 +15,7 @@ use crate::units::{AngularRate, SpecificForce};
 /// Holds the results of static initialisation, and the filter that starts from them.
 #[derive(Debug, Clone)]
 pub(super) struct Initialised {
-    /// The rotation beyond the configured mounting.
     pub(super) level: Level,
-    /// The reading at rest with that rotation.
     pub(super) zero: ZeroPoint,
     pub(super) zero_rate: Option<ZeroRate>,
     /// The bias was found in motion, and is not known well yet.
@@ -36,7 +34,7 @@ impl Pipeline {
         let judged = if moves {
             self.state.static_init.refuse_wheels().map(Err)
         } else if frame.sample.validity.is_good() {
-            self.state.static_init.add(&frame.sample, standing.is_likely(), self.state.standstill.is_calm())
+            self.state.static_init.add(&frame.sample, standing.is_likely(), self.state.standstill.is_calm)
         } else {
             // The reading says nothing about the bias; the gap it leaves has restarted the initialisation.
             None
@@ -68,7 +66,7 @@ impl Pipeline {
         let specific_force = [SpecificForce(0), SpecificForce(0), SpecificForce::STANDARD_GRAVITY];
         let angular_rate = [AngularRate::ZERO, AngularRate::ZERO, yaw];
         let sample = ImuSample { angular_rate, specific_force, ..*sample };
-        if let Some(Ok(rest)) = static_init.add(&sample, standing.is_likely(), standstill.is_calm()) {
+        if let Some(Ok(rest)) = static_init.add(&sample, standing.is_likely(), standstill.is_calm) {
             let [.., mean] = rest.angular_rate;
             zero_rate.rest(mean.0 as f32 / AngularRate::PER_RAD_PER_SEC, rest.drift);
         }

@@ -24,7 +24,6 @@ pub(super) struct Level {
     goal: [f32; 3],
     up: [f32; 3],
     pub(super) rotation: Rotation,
-    /// Mean rates at rest, not levelled.
     rest: [AngularRate; 3],
     samples: u32,
     /// Variance of the direction of the axis in use, rad^2.
@@ -59,7 +58,6 @@ impl Level {
         level
     }
 
-    /// Returns the gyro's reading at rest, levelled.
     pub(super) fn rates_at_rest(&self) -> [AngularRate; 3] {
         self.rotation.rate(self.rest)
     }
@@ -129,7 +127,7 @@ impl Pipeline {
     pub(super) fn ramp(&self) -> f32 {
         let level = self.state.initialised.as_ref().map(|known| &known.level);
         let is_one_place =
-            |level: &&Level| level.estimator.as_ref().is_some_and(VerticalEstimator::is_one_place);
+            |level: &&Level| level.estimator.as_ref().is_some_and(|estimator| estimator.is_one_place);
         level.filter(is_one_place).map_or(0.0, |level| 1.0 - level.up[2])
     }
 

@@ -88,8 +88,8 @@ impl Pipeline {
             ..YawEstimate::default()
         };
         VehicleSample {
-            live: yaw(self.state.live_yaw.yaw()),
-            delayed: yaw(self.state.delayed_yaw.yaw()),
+            live: yaw(self.state.live_yaw.yaw),
+            delayed: yaw(self.state.delayed_yaw.yaw),
             tick: self.state.tick,
             ..VehicleSample::default()
         }
@@ -108,7 +108,6 @@ impl Pipeline {
             .with(board.faults.faults())
     }
 
-    /// Returns whether a wheel has lost its speed, or no wheel has one.
     fn has_lost_wheels(&self, wheels: Option<&WheelSample>) -> bool {
         let Some(WheelSample { speeds, .. }) = wheels else { return false };
         let lost = |(speed, seen): (&Option<_>, bool)| seen && speed.is_none();
@@ -142,9 +141,8 @@ impl Pipeline {
         }
     }
 
-    /// Builds the estimate of one rate, without its yaw and its sigma, and with the fault of its own sample alone. Until a
-    /// rate exists the estimate carries the gyro's own reading, which is degraded where a bias is known early. `has_model` is
-    /// true for a rate that windows correct, and `is_ready` once they do.
+    /// Builds the estimate of one rate, without yaw and sigma. Until there is one it has the gyro's reading, degraded
+    /// where a bias is known early. `has_model`: windows correct it, `is_ready` once they do.
     fn estimate(
         &self,
         frame: &Frame,

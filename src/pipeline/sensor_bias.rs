@@ -17,7 +17,6 @@ const SMOOTHING: f32 = 0.125;
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SensorBias {
-    /// Smoothed, deg C.
     celsius: Option<f32>,
     wait: u32,
     /// The bias there and its sigma, rad/s.
@@ -26,9 +25,9 @@ pub(super) struct SensorBias {
     found: [AngularRate; 3],
     /// Temperature at which zero-rate updates have found the rest, deg C, and the sigma of its change since, rad/s.
     reference: Option<f32>,
-    change_sigma: f32,
-    /// The rotation beyond the configured mounting that earlier drives have shown, and the specific force at rest that
-    /// it belongs to, in the sensor's axes.
+    /// Of the bias with temperature since the last [`SensorBias::refer`], rad/s; 0 without a temperature.
+    pub(super) change_sigma: f32,
+    /// What earlier drives have shown: the rotation beyond the mounting, and the force at rest, in the sensor's axes.
     early: Option<(Rotation, [SpecificForce; 3])>,
     /// Specific force of this second, codes, and its good samples.
     force: ([i64; 3], i64),
@@ -116,13 +115,6 @@ impl SensorBias {
         }
     }
 
-    /// Returns the sigma of the change of the bias with temperature since the last [`SensorBias::refer`], rad/s; 0 where the
-    /// part reports no temperature.
-    pub(super) fn change_sigma(&self) -> f32 {
-        self.change_sigma
-    }
-
-    /// Notes that the bias has been found at the present temperature.
     pub(super) fn refer(&mut self) {
         self.reference = self.celsius;
         self.change_sigma = 0.0;
@@ -140,7 +132,8 @@ impl SensorBias {
 /// The reading at rest of a gyro whose z axis is vertical.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ZeroPoint {
-    bias: [AngularRate; 3],
+    /// With [`EarthRate::LeftInBias`] it contains the Earth's rate.
+    pub(super) bias: [AngularRate; 3],
     earth: AngularRate,
 }
 
@@ -160,11 +153,6 @@ impl ZeroPoint {
         let rest = self.reading();
         core::array::from_fn(|axis| AngularRate(rates[axis].0.saturating_sub(rest[axis].0)))
     }
-
-    /// Returns the part's bias; with [`EarthRate::LeftInBias`] it contains the Earth's rate.
-    pub(super) fn bias(&self) -> [AngularRate; 3] {
-        self.bias
-    }
 }
 
 #[cfg(test)]
@@ -179,8 +167,8 @@ mod tests {
         for earth in [EarthRate::LeftInBias, at_37] {
             assert_eq!(ZeroPoint::at_rest(mean, earth).reading(), mean);
         }
-        let [_, _, z] = ZeroPoint::at_rest(mean, at_37).bias();
+        let [_, _, z] = ZeroPoint::at_rest(mean, at_37).bias;
         assert_eq!(z.0, 50_000 - at_37.vertical().0);
-        assert_eq!(ZeroPoint::at_rest(mean, EarthRate::LeftInBias).bias(), mean);
+        assert_eq!(ZeroPoint::at_rest(mean, EarthRate::LeftInBias).bias, mean);
     }
 }

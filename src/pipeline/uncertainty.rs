@@ -26,7 +26,6 @@ use crate::sqrt::sqrt;
 use crate::units::AngularRate;
 use swing::Swing;
 
-/// The sizes of the errors that are not estimated while driving.
 #[derive(Debug, Clone, Copy)]
 pub struct UncertaintyConfig {
     /// Sigma of a second that the network has corrected, beside the shake, rad/s.
@@ -83,11 +82,8 @@ const PARTS: usize = (60 * RATE_HZ / PART) as usize;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
-    /// Corrected by the model.
     Network,
-    /// The gyro less its bias.
     Gyro,
-    /// Zero, because the vehicle stands.
     Standstill,
 }
 
@@ -96,7 +92,6 @@ pub struct Turning {
     pub rates: [AngularRate; 3],
     /// The network's correction of the rate about z.
     pub estimate: AngularRate,
-    /// The rate that standstill has set to zero.
     pub withheld: AngularRate,
     pub origin: Origin,
     /// Sigma of its bias, rad/s.
@@ -246,7 +241,6 @@ impl Uncertainty {
         (self.blocks[0], self.samples) = ([0.0; TURNS], 0);
     }
 
-    /// The variance of a second's own error, (rad/s)^2.
     fn own(&self, origin: Origin) -> f32 {
         let UncertaintyConfig { noise, uncorrected, .. } = self.config;
         match origin {

@@ -13,16 +13,13 @@ use crate::units::Micros;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DueWindow {
-    /// Tick of the newest sample.
     pub end: u32,
-    /// Features of the samples, oldest first.
     pub features: [Features; WINDOW],
 }
 
 #[derive(Debug, Clone)]
 pub(super) struct Windows {
     window: Window,
-    /// Samples since the last window.
     since: u32,
     /// Tick of the window that has been handed out, and its estimate once delivered.
     out: Option<(u32, Option<Estimate>)>,
@@ -40,7 +37,6 @@ impl Windows {
         self.since += 1;
     }
 
-    /// Drops the samples, the window handed out and its estimate.
     pub fn break_off(&mut self) {
         *self = Self::START;
     }

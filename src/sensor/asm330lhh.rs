@@ -44,8 +44,7 @@ pub struct Asm330lhh<SPI> {
 }
 
 impl<SPI: SpiDevice> Asm330lhh<SPI> {
-    /// Resets the sensor, checks its identity, configures it and reads every setting back, in 0.11 s. The self-test takes
-    /// 0.25 s more and deflects the masses, so the vehicle should stand.
+    /// Resets the sensor, checks and configures it, in 0.11 s. The self-test, at rest, takes 0.25 s more.
     pub fn new(spi: SPI, self_test: bool, delay: &mut impl DelayNs) -> Result<Self, SpiError<SPI::Error>> {
         let (chip, outputs) = (Chip { spi, has_dummy: false }, Outputs::default());
         let mut part =
@@ -105,8 +104,7 @@ impl<SPI: SpiDevice> Asm330lhh<SPI> {
         setting.check(held)
     }
 
-    /// Deflects the masses of both sensors, and compares by how much the readings change with the limits of a good part. The
-    /// application note tests one after the other, and the accelerometer at 52 Hz; the limits hold for both.
+    /// Deflects the masses of both at once, unlike the application note; compares with a good part's limits.
     fn test(&mut self, delay: &mut impl DelayNs) -> Result<(), SpiError<SPI::Error>> {
         self.set(reg::TEST)?;
         let mut sums = [[[0; 3]; 2]; 2];

@@ -55,7 +55,6 @@ pub struct Bmi088<SPI> {
     accelerometer: Chip<SPI>,
     gyro: Chip<SPI>,
     next_check: usize,
-    /// Number of the newest frame of the gyro.
     number: u64,
     /// Number of a frame that was the newest one when it was read, and the accelerometer's time then.
     mark: Option<(u64, u32)>,
@@ -65,8 +64,7 @@ pub struct Bmi088<SPI> {
 }
 
 impl<SPI: SpiDevice> Bmi088<SPI> {
-    /// Resets both dies, checks their identities, configures them and reads every setting back, in 0.15 s. The self-test
-    /// takes 0.1 s more and deflects the accelerometer's masses, so the vehicle should stand.
+    /// Resets both dies, checks and configures them, in 0.15 s. The self-test, at rest, takes 0.1 s more.
     pub fn new(
         [accelerometer, gyro]: [SPI; 2],
         self_test: bool,
@@ -164,7 +162,6 @@ impl<SPI: SpiDevice> Bmi088<SPI> {
         Ok(State::parse(&self.accelerometer.read(reg::ACC_SENSORTIME)?))
     }
 
-    /// Checks one register; each call checks the next one.
     fn check_next(&mut self) -> Result<(), SpiError<SPI::Error>> {
         let at = self.next_check % CHECKS;
         self.next_check = at + 1;
@@ -176,7 +173,6 @@ impl<SPI: SpiDevice> Bmi088<SPI> {
         setting.check(held)
     }
 
-    /// Lets the gyro test its drive and its electronics.
     fn test_gyro(&mut self, delay: &mut impl DelayNs) -> Result<(), SpiError<SPI::Error>> {
         self.gyro.write(reg::GYRO_SELF_TEST, reg::TEST_BEGIN)?;
         for _ in 0..TEST_POLLS {
@@ -218,7 +214,6 @@ impl<SPI: SpiDevice> Bmi088<SPI> {
         Ok(())
     }
 
-    /// Empties both FIFOs.
     fn flush(&mut self) -> Result<(), SpiError<SPI::Error>> {
         self.accelerometer.write(reg::ACC_SOFTRESET, reg::FIFO_FLUSH)?;
         self.empty_gyro()

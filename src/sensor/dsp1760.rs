@@ -21,7 +21,6 @@ use message::{Extra, MAX_MESSAGE, MAX_SEQUENCE, Message, MessageError, Validity}
 /// The reason why an intact frame gives no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 pub enum Dsp1760Error {
     /// The content of the frame is invalid.
     #[error(transparent)]
@@ -34,7 +33,6 @@ pub enum Dsp1760Error {
     },
 }
 
-/// The time from one message to the next, microseconds.
 const PERIOD_US: u32 = 1_000;
 /// The gyro's range ends at 490 deg/s, rad in a period. In degrees taken for radians that is 8.6 deg/s.
 const MAX_INCREMENT: f32 = 490.0 * core::f32::consts::PI / 180.0 * 1e-6 * PERIOD_US as f32;
@@ -46,7 +44,6 @@ pub struct Dsp1760 {
     last_sequence: Option<u8>,
     /// All messages, lost ones included, times the period, microseconds.
     time: u64,
-    /// Unwraps the time stamps of format B.
     stamps: StampClock,
 }
 
@@ -114,7 +111,6 @@ impl Dsp1760 {
     }
 }
 
-/// Returns the good rotations that are within the gyro's range.
 #[inline]
 fn increments(rotation: &[f32; 3], validity: Validity) -> [Option<Angle>; 3] {
     core::array::from_fn(|axis| {

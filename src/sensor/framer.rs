@@ -11,7 +11,6 @@ pub trait Protocol {
     const HEADER: usize;
     /// Returns the length of a frame, header included, by its [`Protocol::HEADER`] bytes; `None` if they are none.
     fn length(header: &[u8]) -> Option<usize>;
-    /// Returns whether the checksum of a whole frame is correct.
     fn check(frame: &[u8]) -> bool;
 }
 
@@ -64,7 +63,6 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         1
     }
 
-    /// Returns the next intact frame, if one is complete.
     pub fn next_frame(&mut self) -> Option<&[u8]> {
         if self.is_waiting() { None } else { self.search() }
     }
@@ -81,7 +79,6 @@ impl<P: Protocol, const N: usize> Framer<P, N> {
         self.needed.saturating_sub(self.buffer.len())
     }
 
-    /// Returns the number of candidates with a wrong checksum.
     pub fn bad_checksums(&self) -> u32 {
         self.bad_checksums
     }

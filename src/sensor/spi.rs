@@ -17,7 +17,6 @@ const RESET_POLLS: u8 = 10;
 /// The error of a sensor on SPI or of its bus. Of a BMI088, bank 0 is the accelerometer and 1 the gyro.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum SpiError<E> {
     #[error("the bus failed: {0:?}")]
@@ -73,7 +72,6 @@ impl Setting {
     }
 }
 
-/// A die behind a chip select.
 #[derive(Debug)]
 pub(super) struct Chip<SPI> {
     pub(super) spi: SPI,
@@ -130,7 +128,6 @@ pub(super) const fn passed<E>(bank: u8, has_passed: bool) -> Result<(), SpiError
     if has_passed { Ok(()) } else { Err(SpiError::SelfTest { bank }) }
 }
 
-/// Parses three readings, little-endian.
 #[doc(hidden)]
 pub fn vector(&[x0, x1, y0, y1, z0, z1]: &[u8; 6]) -> [i16; 3] {
     [[x0, x1], [y0, y1], [z0, z1]].map(i16::from_le_bytes)

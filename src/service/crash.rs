@@ -8,14 +8,12 @@ pub const FILE: usize = 24;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 pub enum CrashKind {
     Panic,
     /// A bus, usage or memory fault escalated to a hard fault.
     HardFault,
     /// An exception or interrupt without a handler was raised, with this number (ICSR.VECTACTIVE).
     Unhandled(u16),
-    /// The crystal stopped (clock security system, RM0090 7.2.7).
     CrystalStopped,
     /// The supply fell below 2.9 V.
     SupplyLow,
@@ -35,12 +33,10 @@ pub struct Crash {
     pub address: u32,
     /// End of the path of a panic's source file, padded with zeros.
     pub file: [u8; FILE],
-    /// Number of crashes since power-on.
     pub count: u32,
 }
 
 impl Crash {
-    /// Returns the end of the source file's path.
     pub fn file(&self) -> &str {
         let text = core::str::from_utf8(&self.file).unwrap_or_default();
         text.trim_end_matches('\0')

@@ -57,7 +57,6 @@ pub struct Device<R: NorFlash, W> {
     identity: Identity,
     flash: FlashState,
     writable: bool,
-    /// True if stored data were refused.
     refused: bool,
     configuration: Configuration,
     configuration_origin: Origin,
@@ -85,9 +84,7 @@ pub struct Device<R: NorFlash, W> {
     refused_slots: [Option<SlotError>; 2],
     uploading: Option<Uploading>,
     firmware: Firmware,
-    /// What the firmware has reached since the start.
     reached: u32,
-    /// True once a sample of the sensor has come.
     has_sample: bool,
     /// The output may be interrupted: no rate is valid, or the vehicle stands.
     may_interrupt: bool,
@@ -124,7 +121,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             calibration: Calibration::NONE,
             calibration_origin: Origin::BuiltIn,
             learned: Learned::NOTHING,
-            learner: Learner::new(),
+            learner: Learner::START,
             course: CourseState::START,
             mount_moved: false,
             accepted: Accepted::NONE,
@@ -176,8 +173,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         &self.learned
     }
 
-    /// Returns `true` once after the sensor was found to have moved since earlier drives, for
-    /// [`Coprocessor::mount_moved`](crate::Coprocessor::mount_moved).
+    /// Returns `true` once after the sensor was found to have moved: [`crate::Coprocessor::mount_moved`].
     pub fn take_mount_moved(&mut self) -> bool {
         core::mem::take(&mut self.mount_moved)
     }
@@ -203,9 +199,8 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         self.identity.can_fault = Some(fault);
     }
 
-    /// Processes each sample of the sensor (`None` while the sensor is silent), the status and faults of the yaw
-    /// rate, the wheels, and whether the vehicle stands. A flash erase stalls the processor for up to 2 s, so flash is
-    /// written only at standstill, or while the sensor is silent and no wheel has turned since the vehicle last stood.
+    /// Processes each sample (`None`: silence), the rate's state, the wheels and the standstill. An erase stalls the
+    /// processor for up to 2 s: only at standstill, or in silence if no wheel has turned since the vehicle stood.
     pub fn observe(
         &mut self,
         sample: Option<&ImuSample>,
@@ -389,7 +384,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     pub fn forget_learned(&mut self) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
             device.store_learned(Learned::NOTHING)?;
-            device.learner = Learner::new();
+            device.learner = Learner::START;
             device.learner.keeps_gain = false;
             Ok(())
         })

@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 /// The cause of the last reset, from the reset flags (RM0090 7.3.21).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 pub enum ResetCause {
     /// No flag is set.
     Unknown,
@@ -25,10 +24,8 @@ pub enum ResetCause {
     LowPower,
 }
 
-/// The reason why a sensor could not be set up or read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum SensorFault {
     #[error("the SPI controller did not answer")]

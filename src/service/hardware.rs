@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 /// The reason why the board runs on its internal 16 MHz oscillator, which is not accurate enough for CAN.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 pub enum ClockFault {
     /// The supply stayed below 3.0 V. The board restarts when the voltage has risen.
     SupplyLow,
@@ -24,7 +23,6 @@ pub enum ClockFault {
 /// The reason why the CAN controller did not start, or sends no CAN FD.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum CanFault {
     #[error("the clock is not exact enough")]

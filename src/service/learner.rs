@@ -27,7 +27,6 @@ pub struct Learner {
     rests: u32,
     /// True if a bias with its temperature was learnt since the start.
     has_bias: bool,
-    /// True if the specific force of this standstill has been used.
     has_stood: bool,
     forward: ForwardEstimator,
     vertical: Option<Vertical>,
@@ -40,21 +39,18 @@ pub struct Learner {
 }
 
 impl Learner {
-    /// Creates a learner without observations.
-    pub const fn new() -> Self {
-        let forward = ForwardEstimator::START;
-        Self {
-            rest: None,
-            rests: 0,
-            has_bias: false,
-            has_stood: false,
-            forward,
-            vertical: None,
-            is_moved: false,
-            is_changed: false,
-            keeps_gain: true,
-        }
-    }
+    /// A learner without observations.
+    pub const START: Self = Self {
+        rest: None,
+        rests: 0,
+        has_bias: false,
+        has_stood: false,
+        forward: ForwardEstimator::START,
+        vertical: None,
+        is_moved: false,
+        is_changed: false,
+        keeps_gain: true,
+    };
 
     /// Processes a sample or silence, wheels and standstill; `limits` are those of rest. Returns `true` for a move.
     pub fn observe(
@@ -139,11 +135,5 @@ impl Learner {
             learned.forward = Some(forward);
             self.is_changed = true;
         }
-    }
-}
-
-impl Default for Learner {
-    fn default() -> Self {
-        Self::new()
     }
 }

@@ -15,9 +15,7 @@ pub const PROTOCOL: u8 = 22;
 /// Size of a full block of a download, bytes.
 pub const BLOCK: usize = 256;
 
-/// The reason why a request is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum Refusal {
     #[error("configuration layout {found}, but the board has {expected}")]

@@ -69,16 +69,13 @@ impl<SPI: SpiDevice> Part<SPI> {
 #[derive(Debug)]
 pub struct Reader<SPI> {
     wanted: &'static Wanted,
-    /// Returns the board time, microseconds.
     now: fn() -> u64,
-    /// Returns the part that was brought up.
     passed: fn() -> Option<Part<SPI>>,
     part: Option<Part<SPI>>,
     /// Board time of the newest sample, or of the bring-up.
     heard: u64,
     /// True until the first sample after the part was brought up.
     is_fresh: bool,
-    /// Time that is added to the part's clock, microseconds.
     offset: u64,
     /// Time of the newest sample, and the board time of its arrival.
     newest: Option<(Micros, u64)>,
@@ -160,7 +157,6 @@ pub struct BringUp<SPI> {
 }
 
 impl<SPI: SpiDevice + Copy> BringUp<SPI> {
-    /// Returns this end if such a part is configured.
     pub fn new(part: ImuPart, spi: Option<[SPI; 2]>, wanted: &'static Wanted) -> Option<Self> {
         let spi = spi.filter(|_| part != ImuPart::XsensMti)?;
         Some(Self { wanted, part, spi, tried: None, is_tested: false })

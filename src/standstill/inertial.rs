@@ -18,7 +18,6 @@ const BATCH_SECONDS: f32 = 0.1;
 /// Time over which the force before the window is averaged, s.
 const BEFORE: f32 = 3.0;
 
-/// Values about or along x, y and z.
 pub type Axes = [f32; 3];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +41,6 @@ pub struct Inertial {
     gyro: [Axes; WINDOW],
     force: [Axes; WINDOW],
     filled: usize,
-    /// The current mean has its first batch.
     is_whole: bool,
     /// Mean force before the window, m/s^2.
     before: Option<Axes>,

@@ -44,16 +44,13 @@ const ERASED: [u8; QUAD] = [0xFF; QUAD];
 /// The flash, by offset into the memory map.
 #[allow(clippy::missing_errors_doc, reason = "they are the part's own, but that of `read`")]
 pub trait Banks {
-    /// Returns whether bank 2 is the lower one.
     fn is_swapped(&self) -> bool;
 
-    /// Returns flash in place.
     fn mapped(&self, range: Range<u32>) -> &[u8];
 
     /// Reads flash; a quad-word whose code does not fit is an error.
     fn read(&mut self, at: u32, bytes: &mut [u8]) -> Result<(), Kind>;
 
-    /// Erases the sector at an offset.
     fn erase(&mut self, sector: u32) -> Result<(), Kind>;
 
     fn write(&mut self, at: u32, quad: &[u8; QUAD]) -> Result<(), Kind>;
@@ -128,7 +125,6 @@ fn aligned(from: u32, to: u32, unit: u32) -> Result<(), Kind> {
     if fits { Ok(()) } else { Err(Kind::NotAligned) }
 }
 
-/// The records, by offset into them.
 pub struct Records<F>(F);
 
 impl<F: Banks> Records<F> {
@@ -208,7 +204,6 @@ impl<F: Banks> NorFlash for Records<F> {
 /// The slots for firmware, by the offsets of [`Slot::firmware`].
 pub struct Slots<F>(pub F);
 
-/// Where a part of a slot is.
 enum Place {
     Image(u32),
     Trailer(u32),

@@ -21,7 +21,6 @@ use serde::{Deserialize, Serialize};
 /// The inertial sensor that is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 pub enum ImuPart {
     /// Xsens MTi, MTData2 on a UART.
     XsensMti,
@@ -36,7 +35,6 @@ pub enum ImuPart {
 /// The fibre-optic gyro that is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 pub enum FogPart {
     /// KVH DSP-1760 or 17xx.
     Dsp1760,

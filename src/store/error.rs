@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 /// A value of a record that has a range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "named as the fields that they stand for")]
 pub enum Field {
     LatitudeDeg,
@@ -62,10 +61,8 @@ impl Field {
     }
 }
 
-/// The reason why a configuration or calibration is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum FieldError {
     #[error("{}: {value} is not within {low} to {high}", .field.name())]
@@ -96,10 +93,8 @@ pub(super) fn within(field: Field, value: f32) -> Result<(), FieldError> {
     if (low..=high).contains(&value) { Ok(()) } else { Err(FieldError::Range { field, value, low, high }) }
 }
 
-/// The reason why a flash operation failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum FlashFault {
     #[error("not the start of a word or sector")]
@@ -112,10 +107,8 @@ pub enum FlashFault {
     Unlocked,
 }
 
-/// The reason why the store has failed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum StoreError {
     #[error("the board has no flash that it may write: nothing can be stored")]

@@ -65,7 +65,6 @@ impl Label {
         Self { layout: LAYOUT, version, board }
     }
 
-    /// Returns the bytes that stand in the image.
     pub const fn bytes(&self) -> [u8; LABEL_SIZE] {
         let ([a, b, c, d], [x, y, z]) = (MAGIC, self.version);
         let [g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v] = self.board;
@@ -84,7 +83,6 @@ impl Label {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum FirmwareError {
     #[error("this image was not started by the boot loader: flash it with `cargo flash-board`")]
@@ -110,16 +108,13 @@ pub enum FirmwareError {
 /// What a trailer says about the image before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Trailer {
-    /// Length of the image, bytes.
     pub length: u32,
     pub crc: u32,
     /// Bits of what the image must reach on trial.
     pub expected: u32,
     /// Number of the update; the greatest is the newest.
     pub number: u32,
-    /// Starts on trial so far.
     pub trials: u32,
-    /// True once the image has shown that it works.
     pub is_confirmed: bool,
 }
 

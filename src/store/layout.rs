@@ -15,7 +15,6 @@
 use core::ops::Range;
 
 pub const FLASH_BASE: u32 = 0x0800_0000;
-/// Size of each sector, bytes.
 pub const SECTORS: [u32; 12] = {
     let mut sizes = [128 << 10; 12];
     let mut k = 0;
@@ -28,21 +27,14 @@ pub const SECTORS: [u32; 12] = {
 };
 /// Version of this layout. An image that expects another one is not accepted as an update.
 pub const LAYOUT: u8 = 1;
-/// Largest size of the boot loader, bytes.
 pub const BOOT_SIZE: u32 = 16 << 10;
-/// Size of a sector of records, bytes.
 pub const RECORD_SECTOR: usize = 16 << 10;
-/// Flash offsets of the records.
 pub const STORE: Range<u32> = 0x4000..0xC000;
-/// Size of a slot for firmware, bytes.
 pub const FIRMWARE_SIZE: u32 = 256 << 10;
-/// Flash offsets of firmware in slot B.
 pub const FIRMWARE_B: Range<u32> = 0x4_0000..0x4_0000 + FIRMWARE_SIZE;
 /// Flash offsets of firmware in slot A, which `cargo flash-board` writes.
 pub const FIRMWARE_A: Range<u32> = FIRMWARE_B.end..FIRMWARE_B.end + FIRMWARE_SIZE;
-/// Size of a weight slot, one sector, bytes.
 pub const SLOT_SIZE: usize = 128 << 10;
-/// Flash offsets of both weight slots.
 pub const SLOTS: Range<u32> = FIRMWARE_A.end..0x10_0000;
 
 /// Returns the number of the sector that begins at `offset`; `None` if none does.

@@ -29,9 +29,7 @@ use serde::{Serialize, de::DeserializeOwned};
 
 const WORD: usize = 4;
 const WORD_U32: u32 = WORD as u32;
-/// Length of the sector header, bytes.
 const HEADER: u32 = 2 * WORD_U32;
-/// Length of the longest encoded record, bytes.
 pub(crate) const MAX_LEN: usize = 288;
 /// Length of the longest record with its first and last word, bytes.
 const BUFFER: usize = MAX_LEN + 2 * WORD;
@@ -207,15 +205,13 @@ impl<F: NorFlash> Store<F> {
         self.room() >= BUFFER as u32
     }
 
-    /// Returns the number of free bytes in the sector in use.
     fn room(&self) -> u32 {
         let end = self.current.map(|(sector, _)| self.range(sector).end);
         self.free.zip(end).map_or(0, |(at, end)| end.saturating_sub(at))
     }
 
-    /// If little room is left, or something is damaged, erases the other sector and moves the newest records there;
-    /// completes what a power cut has left undone of a record of access. Call it at the start, when an erase disturbs
-    /// nothing: records stored while the vehicle drives must fit without an erase.
+    /// If little room is left, or something is damaged, moves the newest records to the other sector; completes what a
+    /// power cut has left of a record of access. For the start, when an erase disturbs nothing.
     pub fn make_room(&mut self) -> Result<(), StoreError> {
         let mut raw = Raw::EMPTY;
         let Some((sector, _)) = self.current else { return Ok(()) };
@@ -374,7 +370,6 @@ impl<F: NorFlash> Store<F> {
         Ok(is_lost)
     }
 
-    /// Returns whether a sector has no header.
     fn is_blank(&mut self, sector: u32) -> Result<bool, StoreError> {
         let at = self.range(sector).start;
         Ok(self.read(at)? == [0xFF; 2 * WORD])

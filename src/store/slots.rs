@@ -10,7 +10,6 @@ use super::slot::Slot;
 use crate::model::{Blob, BlobError};
 use serde::{Deserialize, Serialize};
 
-/// The record of the accepted files, and of the slot to use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Accepted {
     /// Slot to use; `None` selects the built-in weights.
@@ -57,7 +56,6 @@ impl Record for Accepted {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum SlotError {
     #[error("the board has no flash that it may write: nothing can be stored")]

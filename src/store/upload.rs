@@ -24,8 +24,7 @@ impl Upload {
         if fits { Ok(()) } else { Err(SlotError::Length(length)) }
     }
 
-    /// Begins an upload and erases its slot, which stalls the processor for one to two seconds on an F405 (its
-    /// datasheet, 128 KiB sector). Offsets in `flash` are from the start of the whole flash.
+    /// Begins an upload; the erase stalls the processor for one to two seconds. Offsets are from the flash's start.
     pub fn begin<F: NorFlash>(flash: &mut F, slot: Slot, length: u32) -> Result<Self, SlotError> {
         Self::check(slot, length)?;
         let sector = slot.range();

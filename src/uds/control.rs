@@ -12,7 +12,6 @@ const P2_MS: u16 = 50;
 const P2_STAR_10_MS: u16 = 500;
 
 impl Services {
-    /// Enters a session, which ends the previous one.
     pub(super) fn session_control(&mut self, sub: u8, rest: &[u8], out: &mut Response) -> Result<(), Nrc> {
         let session = match sub {
             1 => Session::Default,

@@ -153,7 +153,6 @@ macro_rules! words {
 pub(super) struct Sources<'a, R: NorFlash, W> {
     pub device: &'a Device<R, W>,
     pub counters: &'a AllCounters,
-    /// Number of the active session.
     pub session: u8,
     pub security: &'a Security,
     pub errors: TransportErrors,

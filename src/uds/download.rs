@@ -24,7 +24,6 @@ pub(super) struct Download {
     offset: u32,
     /// Number of the next block; it starts at 1 and wraps from 255 to 0.
     next: u8,
-    /// Digest of the whole file, once the file has been checked.
     digest: Option<Digest>,
 }
 

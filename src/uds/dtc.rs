@@ -246,9 +246,8 @@ pub struct Memory {
 }
 
 impl Memory {
-    pub const fn new() -> Self {
-        Self { entries: [UNTESTED; TROUBLES.len()], is_enabled: true, is_changed: false, observed: None }
-    }
+    pub const START: Self =
+        Self { entries: [UNTESTED; TROUBLES.len()], is_enabled: true, is_changed: false, observed: None };
 
     /// As [`Self::observe`], and does nothing where nothing has changed since.
     pub fn observe_changes(&mut self, now: &Conditions, has_stalled: bool) {
@@ -338,11 +337,5 @@ impl Memory {
 
     pub fn entries(&self) -> impl Iterator<Item = (&'static Trouble, &Entry)> {
         TROUBLES.iter().zip(&self.entries)
-    }
-}
-
-impl Default for Memory {
-    fn default() -> Self {
-        Self::new()
     }
 }

@@ -72,7 +72,6 @@ enum State {
 }
 
 impl State {
-    /// The first frame of a message is due.
     const SENDING: Self = Self::Sending { sent: 0, sequence: 0, left: 0, gap_ms: 0, due: 0, has_left: true };
 }
 
@@ -83,13 +82,7 @@ pub struct Transport {
     response: Vec<u8, MAX_MESSAGE>,
     /// Frame to send before any other: a flow control, or an interim response.
     urgent: Option<Bytes>,
-    errors: TransportErrors,
-}
-
-impl Default for Transport {
-    fn default() -> Self {
-        Self::new()
-    }
+    pub errors: TransportErrors,
 }
 
 /// Flow status, high half of the first byte included (ISO 15765-2 9.6.5).
@@ -98,14 +91,13 @@ const WAIT: u8 = 0x31;
 const OVERFLOW: u8 = 0x32;
 
 impl Transport {
-    pub const fn new() -> Self {
-        let errors = TransportErrors { unexpected: 0, sequence: 0, overflow: 0, timeout: 0 };
-        Self { state: State::Idle, request: Vec::new(), response: Vec::new(), urgent: None, errors }
-    }
-
-    pub fn errors(&self) -> TransportErrors {
-        self.errors
-    }
+    pub const IDLE: Self = Self {
+        state: State::Idle,
+        request: Vec::new(),
+        response: Vec::new(),
+        urgent: None,
+        errors: TransportErrors { unexpected: 0, sequence: 0, overflow: 0, timeout: 0 },
+    };
 
     /// Returns the request once it is complete, until it is answered.
     pub fn request(&self) -> Option<&[u8]> {
@@ -117,7 +109,6 @@ impl Transport {
         self.state == State::Idle && self.urgent.is_none()
     }
 
-    /// Counts a frame that was not accepted.
     pub fn refuse(&mut self) {
         count(&mut self.errors.unexpected, 1);
     }
@@ -165,8 +156,7 @@ impl Transport {
         self.state = State::Receiving { length, sequence: 1, granted: BLOCK, until };
     }
 
-    /// Returns whether a new request may begin. A new request replaces an incomplete one, but is refused while a
-    /// complete one waits for its response.
+    /// Returns whether a request may begin: an incomplete one gives way, one that waits for its response does not.
     fn accepts_request(&mut self) -> bool {
         if matches!(self.state, State::Receiving { .. }) {
             count(&mut self.errors.sequence, 1);
@@ -230,7 +220,6 @@ impl Transport {
         };
     }
 
-    /// Ends an exchange whose timeout has expired.
     pub fn expire(&mut self, now: u32) {
         if let State::Receiving { until, .. }
         | State::Waiting { until, .. }
@@ -271,8 +260,7 @@ impl Transport {
         true
     }
 
-    /// Records that all frames of [`Self::next_frame`] have left by `now`: the separation time begins. One millisecond
-    /// is added, because `now` may be the beginning of the millisecond.
+    /// Notes that all frames have left by `now`, perhaps the millisecond's begin: the separation time begins.
     pub fn frames_left(&mut self, now: u32) {
         if let State::Sending { gap_ms, due, has_left, .. } = &mut self.state
             && !core::mem::replace(has_left, true)

@@ -30,7 +30,6 @@ pub(super) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Nrc> {
     }
 }
 
-/// Appends a value in postcard's encoding.
 pub(super) fn put_record(out: &mut Response, record: &impl Serialize) -> Result<(), Nrc> {
     let start = out.len();
     let room = out.capacity();

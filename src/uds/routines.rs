@@ -15,8 +15,7 @@ const SELF_TEST: u16 = 0x0204;
 const FORGET: u16 = 0x0205;
 const USE_DOWNLOAD: u16 = 0xFF01;
 
-/// Returns a bit for each component that fails: 0 the processor's clock, 1 the CAN controller, 2 the inertial
-/// sensor's set-up, 3 stored data, 4 the weights, 5 the flash controller, 6 the random number generator.
+/// Bits of failures: clock, CAN, sensor's set-up, stored data, weights, flash controller, random numbers.
 fn self_test<R: NorFlash, W: MappedSlots>(device: &Device<R, W>, has_random: bool) -> u8 {
     let now = device.conditions();
     let failures = [

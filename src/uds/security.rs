@@ -5,18 +5,7 @@
 //! is answered once, and by the key that it was made for. The number of wrong answers is stored before the response is
 //! sent, so a restart does not help an attacker to guess. From the third wrong answer in a row on, a delay follows each
 //! one and doubles each time; it also runs after a restart. Signed data are not delayed, and end the delay: answers of
-//! others do not keep the owner out. Refusals are counted (data 0113) and reported as a trouble.
-//!
-//! | refusal | code |
-//! |---|---|
-//! | no access in this session | 0x33 |
-//! | an answer without a challenge | 0x24 |
-//! | a wrong answer, a wrong signature, or one for another identifier, content or board | 0x35 |
-//! | the third wrong answer in a row, and each after it | 0x36 |
-//! | the delay has not expired | 0x37 |
-//! | no trailer | 0x13 |
-//! | a counter that is not greater than that of the newest signature, or no public key | 0x31 |
-//! | no random numbers, a repeated random number, or the vehicle may move | 0x22 |
+//! others do not keep the owner out. Refusals are counted (data 0113) and reported as a trouble; `src/can/README.md` has the codes.
 
 use super::response::{Nrc, Response, exactly, nrc, put};
 use super::signature::{self, Digest, SEED, SERIAL, SIGNATURE, Statement, TRAILER};
@@ -62,7 +51,6 @@ impl Security {
         }
     }
 
-    /// Creates a challenge, or checks the answer to one.
     pub fn access<R: NorFlash, W: MappedSlots>(
         &mut self,
         sub: u8,
@@ -210,8 +198,7 @@ pub(super) fn use_up<R: NorFlash, W: MappedSlots>(
     device.store_access(Access { counter, wrong: 0, ..access }).map_err(nrc)
 }
 
-/// Appends the access state: 0 open, 1 locked, 2 unlocked; the newest counter; the number of successive wrong
-/// answers; the key's first four bytes.
+/// Appends the state (0 open, 1 locked, 2 unlocked), newest counter, wrong answers, the key's first bytes.
 pub(super) fn state<R: NorFlash, W: MappedSlots>(
     security: &Security,
     device: &Device<R, W>,

@@ -34,7 +34,7 @@ impl Server {
     /// Creates a server in the default session.
     pub const fn new() -> Self {
         let services = Services::new();
-        Self { transport: Transport::new(), services, is_pending: false, has_stalled: false }
+        Self { transport: Transport::IDLE, services, is_pending: false, has_stalled: false }
     }
 
     /// Processes the data of a frame received on this server's own identifier.
@@ -119,7 +119,7 @@ impl Server {
             self.transport.interim(&[NEGATIVE, service, pending]);
             return;
         }
-        let (is_pending, errors) = (self.is_pending, self.transport.errors());
+        let (is_pending, errors) = (self.is_pending, self.transport.errors);
         let answered = self.transport.answer(|request, out| {
             let counters = &counters();
             let surroundings = Surroundings { counters, errors, is_pending, now, entropy };

@@ -30,7 +30,6 @@ pub(super) const UPDATE: u16 = 0x011A;
 /// Bit of a sub-function that suppresses the positive response.
 const SUPPRESS: u8 = 0x80;
 
-/// First byte of a negative response.
 pub const NEGATIVE: u8 = 0x7F;
 /// Offset from the service identifier of a request to that of a positive response.
 const POSITIVE: u8 = 0x40;
@@ -40,18 +39,14 @@ pub(super) struct Services {
     session: Session,
     /// Time of the tester's last frame, or of the last response, ms.
     pub last_activity: u32,
-    /// True if the request was addressed to all servers.
     pub is_functional: bool,
     /// True if the session is another tester's: this one is served as in the default session, and cannot end it.
     pub is_guest: bool,
     pub(super) memory: Memory,
-    /// True if the memory has been restored from flash.
     is_restored: bool,
     /// Time until which faults may come from the board's own stall, ms.
     settles_at: Option<u32>,
-    /// True if the messages of the board are stopped.
     pub is_silenced: bool,
-    /// True if a tester has requested a restart.
     pub is_restarting: bool,
     pub(super) download: Option<Download>,
     /// Head of a firmware update, and the counter of its signature.
@@ -59,13 +54,10 @@ pub(super) struct Services {
     pub(super) security: Security,
 }
 
-/// The inputs of a response apart from the device.
 pub(super) struct Surroundings<'a, E> {
     pub counters: &'a AllCounters,
     pub errors: TransportErrors,
-    /// True if "response pending" has been sent.
     pub is_pending: bool,
-    /// The time, ms.
     pub now: u32,
     /// Source of an unpredictable challenge; it returns `None` if there are no random numbers.
     pub entropy: E,
@@ -78,7 +70,7 @@ impl Services {
             last_activity: 0,
             is_functional: false,
             is_guest: false,
-            memory: Memory::new(),
+            memory: Memory::START,
             is_restored: false,
             settles_at: None,
             is_silenced: false,
@@ -199,7 +191,6 @@ impl Services {
         }
     }
 
-    /// Executes a service. Returns whether a positive response is wanted.
     #[inline(never)]
     fn serve<R: NorFlash, W: MappedSlots>(
         &mut self,
@@ -351,7 +342,6 @@ impl Services {
         self.download.as_mut().ok_or(Nrc::RequestSequenceError)
     }
 
-    /// Refuses a request that needs another session.
     pub(super) fn require_session(&self, session: Session) -> Result<(), Nrc> {
         let own = self.session();
         let has = session == Session::Default

@@ -32,7 +32,6 @@ pub fn digest(content: &[u8]) -> Digest {
     Digest { length: content.len() as u32, hash: Sha512::digest(content).into() }
 }
 
-/// The scope of a signature: identifier, board and counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Statement {
     /// Data identifier that is written, or routine that activates a download.

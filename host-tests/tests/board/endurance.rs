@@ -143,7 +143,7 @@ impl Received {
             can: Vec::new(),
             slcan: Vec::new(),
             service: Vec::new(),
-            transport: Transport::new(),
+            transport: Transport::IDLE,
             checkers: FogEncoder::profiles(FOG_IDS).map(|profile| Checker::new(profile, 1)),
             own: 0,
             fog: 0,

@@ -29,7 +29,7 @@ fn place(aligner: &mut Aligner, time: u64) -> Result<(u32, u32), AlignError> {
 
 /// An aligner whose last sample was tick 0 at this time.
 fn begun(time: u64) -> Aligner {
-    let mut aligner = Aligner::default();
+    let mut aligner = Aligner::START;
     assert_eq!(place(&mut aligner, time), Ok((0, 0)));
     aligner
 }
@@ -201,7 +201,7 @@ proptest! {
         start in 0u64..10_000_000,
         period in *PERIODS_US.start()..=*PERIODS_US.end(),
     ) {
-        let mut aligner = Aligner::default();
+        let mut aligner = Aligner::START;
         for time in before.into_iter().chain(near) {
             let _ = steps(&mut aligner, sample(time, 1));
         }
@@ -216,7 +216,7 @@ proptest! {
 /// At 400 Hz a step has four samples; of jitter the next one may come early.
 #[test]
 fn a_caller_is_told_before_the_sample_that_completes_a_step() {
-    let mut aligner = Aligner::default();
+    let mut aligner = Aligner::START;
     assert!(aligner.is_nearly_complete(), "the first sample is a step");
     (0..=40).for_each(|k| drop(steps(&mut aligner, sample(k * 2_500, 0))));
     for (after, is_nearly) in [(2_500, false), (5_000, false), (7_400, true), (10_000, false)] {

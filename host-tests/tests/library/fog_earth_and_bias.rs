@@ -83,8 +83,8 @@ fn ten_straight_minutes_anywhere_on_earth() {
         // The shaking of a moving car, and little more.
         let sigma = sent[0].sigma.expect("expected error").rad_per_sec() / DEG_PER_HOUR;
         assert!((31.7..32.7).contains(&sigma), "{sigma}");
-        assert_eq!((fog.counters().no_latitude, fog.counters().contradicted), (0, 0));
-        assert!(fog.counters().zero_rate_updates > 590);
+        assert_eq!((fog.counters.no_latitude, fog.counters.contradicted), (0, 0));
+        assert!(fog.counters.zero_rate_updates > 590);
     }
 }
 
@@ -104,7 +104,7 @@ fn without_a_latitude_the_rate_is_degraded() {
     let sent = gyro.run(&mut fog, 300);
     assert!(sent.iter().all(|yaw| (yaw.source, yaw.quality) == (Source::Static, Quality::Degraded)));
     assert!(mean_deg_per_hour(&sent).abs() < 0.2, "{}", mean_deg_per_hour(&sent));
-    assert_eq!(fog.counters().no_latitude, 61_000);
+    assert_eq!(fog.counters.no_latitude, 61_000);
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn a_turn_on_standing_wheels_is_reported_and_not_learnt() {
     let sent = gyro.run(&mut fog, 60);
     let last = sent.last().expect("a step");
     assert_eq!((last.quality, last.faults), (Quality::Degraded, Faults::WHEELS));
-    assert!(fog.counters().contradicted > 55);
+    assert!(fog.counters.contradicted > 55);
     assert!((mean_deg_per_hour(&sent) - 100.0).abs() < 1.0, "{}", mean_deg_per_hour(&sent));
 }
 

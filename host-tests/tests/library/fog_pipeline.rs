@@ -83,7 +83,7 @@ fn a_gyro_that_says_the_same_is_stuck() {
         if offset == 0 {
             // The fifth equal turn is that of step 304; step 351 differs.
             assert_eq!((first, last), (303, 349));
-            assert_eq!((fog.counters().stuck, fog.counters().gaps), (1, 47));
+            assert_eq!((fog.counters.stuck, fog.counters.gaps), (1, 47));
         }
         assert!((45..=50).contains(&(last - first)), "{first} to {last}");
         for (step, yaw) in sent.iter().enumerate() {
@@ -136,7 +136,7 @@ fn a_gyro_that_is_expected_is_missed_from_the_start() {
     assert!(sent[..silent].iter().all(|yaw| yaw.faults.0 & Faults::GAP.0 != 0 && yaw.rate.0 == 0));
     // Then all is as if it had been heard from the start.
     assert_eq!(sent.last().map(|yaw| (yaw.source, yaw.faults)), Some((Source::EarthRate, Faults::NONE)));
-    assert_eq!(fog.counters().gaps as usize, silent);
+    assert_eq!(fog.counters.gaps as usize, silent);
 }
 
 #[test]

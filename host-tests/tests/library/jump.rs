@@ -204,7 +204,7 @@ fn nothing_that_was_recorded_is_implausible() {
         for row in reader.expect("a drive") {
             monitor.judge(&row.expect("a row").sample);
         }
-        monitor.counters().wrong
+        monitor.counters.wrong
     });
     let doubted: Vec<_> = files.iter().zip(doubted).filter(|(_, wrong)| *wrong > 0).collect();
     assert!(doubted.is_empty(), "{doubted:?}");

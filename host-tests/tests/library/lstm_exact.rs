@@ -132,7 +132,7 @@ fn check_run<const U: usize, const W: usize>(inputs: usize, steps: usize, seed: 
             input[word_index(step, 2 * k, inputs)] = word;
         }
     }
-    let (mut between, mut scratch, mut run) = (vec![0; steps * U], Scratch::<U, W>::ZERO, Run::new());
+    let (mut between, mut scratch, mut run) = (vec![0; steps * U], Scratch::<U, W>::ZERO, Run::START);
     // With room for a copy of the weights, and without.
     let mut room = vec![0; if seed.is_multiple_of(2) { U * (DirectionWeights::padded(U) + 2) } else { 0 }];
     let mut seen = [vec![None; steps], vec![None; steps]];

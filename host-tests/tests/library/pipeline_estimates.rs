@@ -85,7 +85,7 @@ fn a_rate_beyond_the_signal_is_marked() {
         let failed = (tx1.rate, tx1.rate_status) == (0xFFFF, SignalStatus::FAILURE);
         assert_eq!(failed, number >= 310, "{number}");
     }
-    assert_eq!(encoder.out_of_range(), 10);
+    assert_eq!(encoder.out_of_range, 10);
     // Neither do the largest codes wrap.
     let samples = (0..400).map(|tick| turning(tick, AngularRate(if tick < 300 { 1_000 } else { i32::MIN })));
     let outputs = run(&mut new(), samples, constant(0.01));

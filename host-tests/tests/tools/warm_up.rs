@@ -43,7 +43,7 @@ fn simulate(device: u64, trip: Trip, day: u64, seconds: u32) -> Recording {
 }
 
 fn learn(trip: &Recording, learned: &mut Learned) {
-    let (mut learner, mut slow) = (Learner::new(), 0);
+    let (mut learner, mut slow) = (Learner::START, 0);
     for row in &trip.rows {
         let is_slow = row.wheels.iter().all(|rate| rate.expect("wheels").abs() < WHEEL_STANDS);
         slow = if is_slow { slow + 1 } else { 0 };

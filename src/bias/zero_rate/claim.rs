@@ -16,7 +16,7 @@ pub(super) struct Claim {
     /// Mean of the newest acceptable three seconds, its sigma, rad/s, and the samples that they are evidence for.
     newest: (f32, f32),
     counts_for: u32,
-    has_moved: bool,
+    pub has_moved: bool,
 }
 
 impl Claim {
@@ -24,7 +24,6 @@ impl Claim {
         Self { reading, expected, newest: (0.0, sigma), counts_for: CONFIRMING, has_moved: false }
     }
 
-    /// Counts a sample.
     pub fn pass_on(&mut self) {
         self.counts_for = self.counts_for.saturating_sub(1);
     }
@@ -40,10 +39,6 @@ impl Claim {
     pub fn moves(&mut self) -> Option<(f32, f32)> {
         self.has_moved = true;
         (self.counts_for > 0).then_some(self.newest)
-    }
-
-    pub const fn has_moved(&self) -> bool {
-        self.has_moved
     }
 
     /// The variance of what the deck may turn by, (rad/s)^2.

@@ -1,6 +1,5 @@
 //! The configuration of the zero-rate updates is a plain value, separate from their state.
 
-/// Describes the noise of part and vehicle. All values are 1 sigma.
 #[derive(Debug, Clone, Copy)]
 pub struct ZeroRateConfig {
     /// Bias left by static initialisation, rad/s.
@@ -19,11 +18,10 @@ pub struct ZeroRateConfig {
 }
 
 impl ZeroRateConfig {
-    /// The noise of a MEMS part on a car. The walk is the one published for an Xsens MTi-100 (OpenVINS,
-    /// `config/kaist`); the noise is less than half of that part's 1.7e-4 rad/s/sqrt(Hz) over a second, so that a
-    /// better part benefits. The offset is measured: between standing and driving the mean error of the corrected
-    /// rate changes by 1.3e-4 rad/s RMS over the five training drives and the validation drive, 0.9e-4 on the latter
-    /// alone. Static initialisation may be off by 5 deg/s, so the bias may change by as much.
+    /// A MEMS part on a car. The walk is published for an Xsens MTi-100 (OpenVINS, `config/kaist`); the noise is less
+    /// than half of its 1.7e-4 rad/s/sqrt(Hz), so that a better part benefits. The offset is measured: from standing
+    /// to driving the mean error changes by 1.3e-4 rad/s RMS. Static initialisation may be off by 5 deg/s, so the bias
+    /// may change by as much.
     pub const DEFAULT: Self =
         Self { initial: 1e-4, walk: 1e-5, standstill: 1.4e-4, noise: 5e-5, mistaken: 5e-3, max_bias: 0.1 };
 

@@ -3,9 +3,7 @@
 use crate::sample::RATE_HZ;
 use crate::units::AngularRate;
 
-/// Low-order bits that are dropped.
 const SHIFT: u32 = AngularRate::FRACTION_BITS - 20;
-/// Sum of codes per rad.
 const PER_RAD: f32 = (AngularRate::PER_RAD_PER_SEC / (1 << SHIFT) as f32) * RATE_HZ as f32;
 const QUARTER: u8 = RATE_HZ as u8 / 4;
 

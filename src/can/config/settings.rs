@@ -3,9 +3,8 @@
 use crate::can::e2e::{DataIdMode, P01, Profile};
 
 /// The E2E profile of the three yaw messages, with their data identifiers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum E2e {
     /// Profile 1, whose bytes profile 11 also sends.
     P01 {
@@ -29,18 +28,16 @@ impl E2e {
 }
 
 /// The Bosch MM5.10 set; its layout fixes the period at 10 ms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BoschSettings {
     /// True if only TX1 is sent, for receivers that use only the yaw rate.
     pub tx1_only: bool,
 }
 
 /// Our own yaw messages: rate, angle, detail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct YawSettings {
     /// 11-bit identifiers of rate, angle, detail.
     pub ids: [u16; 3],
@@ -53,18 +50,16 @@ pub struct YawSettings {
 }
 
 /// The slow status message ([`crate::can::status`]), which is sent once a second.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StatusSettings {
     /// 11-bit identifier, which is also the E2E data identifier; [`crate::can::status::STATUS_ID`] is free by default.
     pub id: u16,
 }
 
 /// The messages on the bus; [`super::Config::new`] checks them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Settings {
     /// Bit rate of the bus, bit/s.
     pub bits_per_second: u32,

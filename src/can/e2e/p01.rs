@@ -22,24 +22,20 @@ pub(super) const COUNTERS: u16 = 15;
 const MAX_LEN: usize = 30;
 const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 
-/// The choice of bytes of the 16-bit identifier that enter the CRC.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum DataIdMode {
     /// Low byte, high byte (variant 1A).
     Both,
     /// Low byte with an even counter, high byte with an odd one (variant 1B).
     Alternating,
-    /// Low byte only.
     Low,
     /// Low byte, then 0; the low nibble of the high byte is sent in byte 1 (variant 1C).
     Nibble,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct P01 {
     /// Data identifier, known to both sides. With [`DataIdMode::Nibble`] it has 12 bits.
     pub data_id: u16,

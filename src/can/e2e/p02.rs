@@ -5,17 +5,14 @@ use super::{Fault, ShortHeader};
 
 /// CRC-8-AUTOSAR (8H2F): polynomial 0x2F, start and final XOR FF.
 const CRC: crc::Crc<u8> = crc::Crc::<u8>::new(&crc::CRC_8_AUTOSAR);
-/// Number of counter values: all of a nibble.
 pub(super) const COUNTERS: u16 = 16;
 /// Longest message, bytes: with the identifier at most 127 bits, the order of the polynomial.
 const MAX_LEN: usize = 14;
 const HEADER: ShortHeader = ShortHeader { max_len: MAX_LEN, counters: COUNTERS };
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct P02 {
-    /// Data identifier for each counter value.
     pub data_ids: [u8; 16],
 }
 

@@ -4,14 +4,12 @@ use super::Fault;
 
 /// CRC-16-CCITT-FALSE: polynomial 0x1021, start FFFF, no final XOR.
 const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_IBM_3740);
-/// Number of counter values: all of a byte.
 pub(super) const COUNTERS: u16 = 256;
 /// Longest message, bytes. The specification's limit of 4096 is one bit more than the CRC covers; CAN needs 64.
 const MAX_LEN: usize = 64;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct P05 {
     /// Data identifier, known to both sides; it enters the CRC last, low byte first.
     pub data_id: u16,

@@ -38,7 +38,6 @@ impl StatusFlags {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reaction {
-    /// The answer to send before the next frame.
     pub answer: Answer,
     /// A frame from the host. If the caller does not use it, [`Session::refuse`] has the answer instead.
     pub frame: Option<DataFrame>,
@@ -70,29 +69,16 @@ pub const fn bit_rate_digit(bits_per_second: u32) -> Option<u8> {
 #[derive(Debug, Clone, Copy)]
 pub struct Session {
     bit_rate: Option<u8>,
-    open: bool,
-    stamped: bool,
-    refused: u32,
+    pub open: bool,
+    pub stamped: bool,
+    /// Lines that were answered with an error.
+    pub refused: u32,
 }
 
 impl Session {
     /// Creates a closed session without time stamps, the state that hosts expect at first.
     pub const fn new(bits_per_second: u32) -> Self {
         Self { bit_rate: bit_rate_digit(bits_per_second), open: false, stamped: false, refused: 0 }
-    }
-
-    /// Returns whether the host has asked for the frames of the bus.
-    pub const fn open(&self) -> bool {
-        self.open
-    }
-
-    pub const fn stamped(&self) -> bool {
-        self.stamped
-    }
-
-    /// Returns the number of lines that were answered with an error.
-    pub const fn refused(&self) -> u32 {
-        self.refused
     }
 
     /// Executes a line, passed without its CR.

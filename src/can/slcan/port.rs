@@ -65,7 +65,7 @@ impl<const N: usize> Port<N> {
 
     /// Returns whether the host has asked for the frames of the bus; without that, answers of diagnosis alone are for it.
     pub const fn is_open(&self) -> bool {
-        self.session.open()
+        self.session.open
     }
 
     /// Appends a frame, instead of the oldest of a full queue. `time` is sent if the host wants time stamps.
@@ -110,7 +110,7 @@ impl<const N: usize> Port<N> {
         }
         while self.length == 0 {
             let (frame, time) = self.queue.front()?;
-            let time = self.session.stamped().then_some(*time);
+            let time = self.session.stamped.then_some(*time);
             let room = self.line.first_chunk_mut();
             // All our frames fit SLCAN; any other is skipped.
             self.length = room.and_then(|room| encode(frame, time, room)).unwrap_or(0);
@@ -160,6 +160,6 @@ impl<const N: usize> Port<N> {
 
     /// Returns the number of refused lines from the host plus the number of answers for which there was no room.
     pub fn refused(&self) -> u32 {
-        self.session.refused().saturating_add(self.unanswered)
+        self.session.refused.saturating_add(self.unanswered)
     }
 }

@@ -7,9 +7,8 @@ use crate::units::{Micros, WheelSpeed};
 use embedded_can::Id;
 
 /// A value of a field that says something: that a speed is valid, that a wheel turns backwards.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Code {
     /// Position of the field.
     pub field: BitField,
@@ -18,9 +17,8 @@ pub struct Code {
 }
 
 /// The position and scale of one wheel's speed in a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelSignal {
     /// Index of the frame that carries the speed, in [`WheelSettings::frames`](super::WheelSettings::frames).
     pub frame: u8,
@@ -98,12 +96,10 @@ const PULSES_US: u64 = 100_000;
 /// After this time the number of wraps is unknown.
 const WRAPS_US: u64 = 1_000_000;
 
-/// The speed of a wheel that sends its pulses.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pulses {
     raw: u32,
     at: Micros,
-    /// Codes of the newest speed.
     speed: Option<i64>,
 }
 
@@ -125,9 +121,8 @@ impl Pulses {
 }
 
 /// A number in one or two parts of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Parts {
     /// The low bits.
     pub low: BitField,
@@ -160,9 +155,8 @@ impl Parts {
 
 /// A sum of a frame's bytes as its checksum, as cars have it: `start` plus or less the sum, exclusive or `last`, as many
 /// low bits as the field has. The checksum's own bits count as zero.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ByteSum {
     /// Position of the checksum, at most 8 bits.
     pub field: Parts,
@@ -208,9 +202,8 @@ impl ByteSum {
 }
 
 /// The protection of a wheel frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Checksum {
     /// The frame is not protected.
     None,
@@ -226,11 +219,10 @@ pub enum Checksum {
 }
 
 /// One frame that carries wheel speeds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct WheelFrame {
     /// Identifier of the frame.
-    #[cfg_attr(feature = "serde", serde(with = "stored_id"))]
+    #[serde(with = "stored_id")]
     pub id: Id,
     /// Message counter of up to 8 bits that cycles through all values, if there is one.
     pub counter: Option<Parts>,
@@ -239,7 +231,6 @@ pub struct WheelFrame {
 }
 
 /// An identifier as a number; bit 31 marks an identifier of 29 bits.
-#[cfg(feature = "serde")]
 pub(crate) mod stored_id {
     use embedded_can::{ExtendedId, Id, StandardId};
     use serde::{Deserialize, Deserializer, Serializer, de::Error};
@@ -264,10 +255,8 @@ pub(crate) mod stored_id {
     }
 }
 
-/// The reason why a frame gives no wheel speeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum WheelError {
     #[error("wheel frame of {0} bytes is too short")]

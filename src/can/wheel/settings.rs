@@ -13,8 +13,7 @@ pub const MAX_FRAMES: usize = WHEELS;
 const LONGEST_US: u64 = 10_000_000;
 
 /// The settings of [`WheelReceiver`](super::WheelReceiver). Without frames and signals the board reads no wheel speeds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct WheelSettings {
     /// Frames that carry wheel speeds.
     pub frames: [Option<WheelFrame>; MAX_FRAMES],
@@ -28,11 +27,8 @@ pub struct WheelSettings {
     pub still_for: Duration,
 }
 
-/// The reason why wheel settings are refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum WheelConfigError {
     #[error("{0} wheels instead of two or four")]

@@ -1,9 +1,7 @@
 //! The kernel for Cortex-M with the DSP extension (M4, M7, M33 and up), in assembly.
 //!
-//! # Where the work is
-//! A GyroNet window is 1.12 million multiply-accumulates (1.18 by its shape, but the first step has no recurrent
-//! product), 54 % of them in input projections and 46 % in recurrent products. SMLAD does two in a cycle; the rest is
-//! unpacking int8 weights into its halfwords. Two rows share a halfword ([`crate::nn`]), which costs
+//! A GyroNet window is 1.12 million multiply-accumulates, 54 % of them in input projections. SMLAD does two in a cycle;
+//! the rest is unpacking int8 weights into its halfwords. Two rows share a halfword ([`crate::nn`]), which costs
 //!
 //! | per column pair | instructions | cycles |
 //! |---|---|---|
@@ -12,33 +10,21 @@
 //! | SXTB16: their low bytes, in place | 2 | 2 |
 //! | SMLAD over the low rows | 2 for each step | 2 |
 //!
-//! # Two shapes
-//! [`project`] has its inputs beforehand, so it computes two steps at once: 4 rows x 2 steps, 16 multiply-accumulates
-//! for 14 instructions and 15 cycles. That is as many as the registers hold: 8 accumulators, 2 words of weights, 2 of
-//! columns, 2 pointers. [`step`] must wait for the previous state: 4 rows x 1 step, two column pairs at a time, 16
-//! multiply-accumulates for 18 instructions and 19 cycles; its 4 rows are one unit's gates, so the unit is finished
-//! on the spot and no gate is ever stored. (8 rows would save an eighth of the recurrent cycles, but their
-//! accumulators and weights do not fit beside the pointers.)
-//!
+//! **Two shapes.** [`project`] computes two steps at once: 4 rows x 2 steps, 16 multiply-accumulates for 14 instructions
+//! and 15 cycles, as many as the registers hold. [`step`] must wait for the previous state: 4 rows x 1 step, two column
+//! pairs at a time, 16 for 18 instructions and 19 cycles; its rows are one unit's gates, so no gate is ever stored.
 //! Loads are adjacent, since they are pipelined (Cortex-M4 TRM 3.3.2), and use low registers, so that they need two
-//! bytes. Through a pointer 4 bytes before its words such loads reach 30 words. The last load through each pointer
-//! advances it.
+//! bytes. Through a pointer 4 bytes before its words they reach 30 words; the last one advances it.
 //!
-//! # As small as the cache
-//! Flash is read in lines of 16 bytes, six cycles each on an STM32F405 at 168 MHz, and its accelerator holds 64 of
-//! them (RM0090 3.5.2). Inner loops are unrolled [`PROJECT_UNROLL`] and [`STEP_UNROLL`] times, so that each kernel
-//! and the loop around it fit in four fifths of that: only weights are read from flash, and for several pairs of
-//! steps only once. Loops are entered in the middle where the number of columns is not a multiple of the unrolling.
-//! Where a loop reads weights from flash, it begins in the middle of a line: the load that misses is the last one in
-//! its line, when the prefetch of the next line has ended. No branch depends on data: the count of instructions is
-//! the same for all inputs.
+//! **As small as the cache.** Flash is read in lines of 16 bytes, six cycles each on an STM32F405 at 168 MHz, and its
+//! accelerator holds 64 of them (RM0090 3.5.2). Loops are unrolled [`PROJECT_UNROLL`] and [`STEP_UNROLL`] times, so that
+//! a kernel and the loop around it fit in four fifths of that; they are entered in the middle for other numbers of
+//! columns. A loop that reads weights from flash begins in the middle of a line: the load that misses is the last one in
+//! its line, when the prefetch of the next has ended. No branch depends on data.
 //!
-//! # A unit's end
-//! Sums to gate inputs: SMULWB/SMULWT with 16-bit multipliers, SSAT to 18 bits. A gate: table word by the upper bits,
-//! SMLABB by the lower ones. Cell state: SMULWT, SMULTT, QDADD. About 50 instructions and 70 cycles for four gates,
-//! cell, hidden state and the jump to the next unit.
+//! **A unit's end.** Gate inputs by SMULWB/SMULWT, SSAT to 18 bits; a gate by table word and SMLABB; the cell by SMULWT,
+//! SMULTT, QDADD: 70 cycles for four gates, cell and hidden state.
 //!
-//! # Expected and modelled cycles
 //! Modelled cycles per multiply-accumulate at zero wait states (`cargo bench-target`):
 //!
 //! | kernel | multiply-accumulates | inner loop alone | whole kernel |
@@ -57,8 +43,7 @@ use crate::nn::lstm::{Accumulators, BIAS_WORDS, DirectionWeights, MAX_INPUTS, Pr
 use core::arch::naked_asm;
 use core::mem::MaybeUninit;
 
-/// Names a core that has the extension, where it is optional in the architecture: the code of a naked function is
-/// assembled without the compiler's target features.
+/// Names a core that has the optional extension: naked functions are assembled without the target's features.
 #[cfg(gyronet_armv8m)]
 macro_rules! cpu {
     () => {
@@ -119,8 +104,7 @@ struct StepCall {
     hidden_end: *const u16,
     /// Bytes into the unrolled loop at which a unit begins, or [`NO_PREVIOUS`].
     entry: usize,
-    /// Bytes from a unit's weights back to where they would begin if the loop were entered at its top. Without a
-    /// previous state: bytes over all weights to the unit's multipliers.
+    /// Bytes from a unit's weights back to the loop's top; without a previous state, on to its multipliers.
     to_weights: isize,
     sigmoid: *const i32,
     tanh: *const i32,

@@ -12,7 +12,6 @@ const FORGETS: f32 = 4.0 * STEP;
 pub(crate) struct Swing {
     angle: f32,
     mean: f32,
-    /// Its variance, rad^2.
     pub variance: f32,
     /// The seconds over which it is averaged so far, and at most: a vibration is now more, now less.
     seconds: f32,

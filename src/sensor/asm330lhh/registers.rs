@@ -15,7 +15,6 @@ const fn set(address: u8, value: u8) -> Setting {
     Setting::new(0, address, value)
 }
 
-/// All settings, in the order in which they are written.
 pub const SETTINGS: [Setting; 10] = [
     // An address counts on in a transfer; a reading is not changed between its bytes.
     set(CTRL3_C, 0x44),
@@ -56,7 +55,6 @@ pub const OUTX_L_A: u8 = 0x28;
 pub const FIFO_STATUS1: u8 = 0x3A;
 /// Deviation of the oscillator as the maker measured it, i8, 0.15 %.
 pub const INTERNAL_FREQ_FINE: u8 = 0x63;
-/// Begins a word of the FIFO.
 pub const FIFO_DATA_OUT_TAG: u8 = 0x78;
 
 pub const IDENTITY: u8 = 0x6B;

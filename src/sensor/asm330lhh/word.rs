@@ -15,7 +15,6 @@ use crate::sample::ImuSample;
 use crate::sensor::spi;
 use crate::units::{CentiCelsius, Micros};
 
-/// Length of a word, bytes.
 pub const WORD: usize = 7;
 
 /// deg/s and g of a count in the ranges of 250 deg/s and 16 g.
@@ -115,6 +114,5 @@ impl Outputs {
     }
 }
 
-/// An output lacks its rate, its acceleration or its time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Incomplete;

@@ -14,11 +14,8 @@ use crate::sample::ImuSample;
 use crate::sensor::spi;
 use crate::units::{CentiCelsius, Micros};
 
-/// Length of a frame of the gyro, bytes.
 pub const RATE_FRAME: usize = 6;
-/// Length of an acceleration in the accelerometer's FIFO, bytes.
 pub const FORCE_FRAME: usize = 7;
-/// Length of the accelerometer's state, bytes.
 pub const STATE: usize = 14;
 pub const TIME_MASK: u32 = 0xFF_FFFF;
 
@@ -43,7 +40,6 @@ pub struct State {
     pub time: u32,
     /// Temperature, eighths of a deg C above 23; `None` is a missing one.
     pub temperature: Option<i16>,
-    /// Number of bytes in the FIFO.
     pub bytes: usize,
 }
 

@@ -9,7 +9,6 @@ use crate::sensor::spi::Setting;
 /// The two dies, as the banks of a setting and of an error.
 pub const ACCELEROMETER: u8 = 0;
 pub const GYRO: u8 = 1;
-/// Values of their identity registers.
 pub const IDENTITIES: [u8; 2] = [0x1E, 0x0F];
 
 const fn acc(address: u8, value: u8) -> Setting {
@@ -24,7 +23,6 @@ const fn gyro(address: u8, value: u8) -> Setting {
 pub const POWER: [Setting; 2] = [acc(0x7C, 0), acc(0x7D, 4)];
 /// For the accelerometer's self-test: 24 g and 1.6 kHz. The data sheet prints A7 beside bits that make AC.
 pub const TEST: [Setting; 2] = [acc(0x41, 3), acc(0x40, 0xAC)];
-/// All settings, in the order in which they are written.
 pub const SETTINGS: [Setting; 10] = [
     POWER[0],
     POWER[1],
@@ -61,7 +59,6 @@ pub const GYRO_FIFO_DATA: u8 = 0x3F;
 
 pub const RESET: u8 = 0xB6;
 pub const FIFO_FLUSH: u8 = 0xB0;
-/// The gyro's FIFO has lost frames.
 pub const OVERRUN: u8 = 0x80;
 pub const STOP_WHEN_FULL: u8 = 0x40;
 /// Bits of the gyro's self-test: begin, ended, failed, drive in order.

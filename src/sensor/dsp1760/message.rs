@@ -76,10 +76,8 @@ pub enum Extra {
     },
 }
 
-/// The reason why bytes are not a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum MessageError {
     #[error("DSP-1760: not the header of a data message")]
@@ -102,7 +100,6 @@ pub struct Message {
     pub acceleration: [f32; 3],
     pub extra: Extra,
     pub validity: Validity,
-    /// Sequence number, 0 to [`MAX_SEQUENCE`].
     pub sequence: u8,
 }
 
@@ -129,7 +126,6 @@ impl Message {
         Self::parse_checked(frame)
     }
 
-    /// Parses a frame whose CRC has already been checked.
     pub(super) fn parse_checked(frame: &[u8]) -> Result<Self, MessageError> {
         let format = frame.first_chunk().copied().and_then(Format::of).ok_or(MessageError::Header)?;
         let length = MessageError::Length { got: frame.len(), expected: format.length() };
@@ -156,7 +152,6 @@ impl Message {
         Ok(Self { rotation, acceleration, extra, validity, sequence })
     }
 
-    /// Encodes the message, CRC included.
     pub fn emit(&self) -> Vec<u8, MAX_MESSAGE> {
         let mut frame = Vec::new();
         // MAX_MESSAGE bytes hold every format.

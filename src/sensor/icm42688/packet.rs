@@ -17,7 +17,6 @@ use crate::sample::ImuSample;
 use crate::sensor::spi;
 use crate::units::{CentiCelsius, Micros};
 
-/// Length of a packet, bytes.
 pub const PACKET: usize = 20;
 const EMPTY: u8 = 0x80;
 const HEADER: u8 = 0x78;
@@ -35,7 +34,6 @@ const PER_DEGREE: f32 = 132.48;
 const ENDS: [i32; 2] = [-524_256, 524_284];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum PacketError {
     #[error("ICM-42688: the FIFO was empty")]
     Empty,
@@ -47,9 +45,7 @@ pub enum PacketError {
 /// The readings of a packet in raw counts; `None` is a missing reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Packet {
-    /// Acceleration x, y, z, 20 bits.
     pub acceleration: [Option<i32>; 3],
-    /// Rate about x, y, z, 20 bits.
     pub rate: [Option<i32>; 3],
     pub temperature: Option<i16>,
     /// Time stamp, counts of 32/30 us modulo 2^16.

@@ -5,7 +5,6 @@ use super::{BUS_ID, PREAMBLE};
 use crate::sample::ImuSample;
 use heapless::Vec;
 
-/// Length of a frame with all six packets, bytes.
 const MAX_EMITTED: usize = 72;
 
 impl MtData2 {

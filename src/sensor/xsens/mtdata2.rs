@@ -15,7 +15,6 @@ pub mod id {
     pub const PACKET_COUNTER: u16 = 0x1020;
     /// Time of the sensor: u32, 10 kHz ticks, wraps.
     pub const SAMPLE_TIME_FINE: u16 = 0x1060;
-    /// Temperature, deg C.
     pub const TEMPERATURE: u16 = 0x0810;
     /// Specific force x, y, z, m/s^2.
     pub const ACCELERATION: u16 = 0x4020;
@@ -25,10 +24,8 @@ pub mod id {
     pub const STATUS_WORD: u16 = 0xE020;
 }
 
-/// The reason why an intact MTData2 frame gives no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
 #[allow(missing_docs, reason = "its messages say it")]
 pub enum XsensError {
     /// For example one of the old protocol (MID 32), or an error (42).

@@ -10,9 +10,8 @@ use crate::store::{
 use embedded_storage::nor_flash::NorFlash;
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
-    /// Reads the stored records; records that are damaged or out of range are reported and not used. `controller` is
-    /// what the check of the flash controller has found: after a fault, which is reported as damaged stored data,
-    /// records are read but nothing is written.
+    /// Reads the stored records; damaged ones are reported and not used. After a fault that the check of the flash
+    /// `controller` has found, nothing is written.
     pub fn begin(
         &mut self,
         records: Option<R>,

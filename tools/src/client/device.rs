@@ -117,7 +117,7 @@ impl<B: Bus> Device<B> {
     /// Sends a request once; returns `None` if no response arrives in time.
     fn attempt(&mut self, request: &[u8]) -> Result<Option<Result<Vec<u8>, u8>>, DeviceError> {
         let service = request.first().copied().unwrap_or_default();
-        let mut transport = Transport::new();
+        let mut transport = Transport::IDLE;
         if !transport.send(request) {
             return Err(DeviceError::TooLong);
         }

@@ -22,7 +22,7 @@ fn long(length: usize) -> Vec<u8> {
 
 #[test]
 fn short_and_long_requests_arrive_whole() {
-    let mut transport = Transport::new();
+    let mut transport = Transport::IDLE;
     for length in (1..=MAX_MESSAGE).chain([7, 8]) {
         let request = long(length);
         let consecutive = request.len().saturating_sub(6).div_ceil(7);
@@ -32,12 +32,12 @@ fn short_and_long_requests_arrive_whole() {
         assert_eq!(transport.request(), Some(&*request), "{length}");
         assert!(transport.answer(|_, _| ()), "no response is wanted");
     }
-    assert_eq!(transport.errors(), Default::default());
+    assert_eq!(transport.errors, Default::default());
 }
 
 #[test]
 fn a_response_keeps_to_the_block_and_the_gap_that_the_tester_names() {
-    let mut transport = Transport::new();
+    let mut transport = Transport::IDLE;
     let response = long(40);
     give(&mut transport, &[0x22, 1, 2]);
     transport.answer(|_, out| out.extend_from_slice(&response).expect("it fits"));
@@ -72,7 +72,7 @@ fn a_response_keeps_to_the_block_and_the_gap_that_the_tester_names() {
 
 #[test]
 fn a_frame_out_of_order_ends_the_request_and_the_next_one_is_taken() {
-    let mut transport = Transport::new();
+    let mut transport = Transport::IDLE;
     let frames = segment(&long(60));
     for (lost, repeated) in [(Some(3), None), (None, Some(3))] {
         let broken = frames.iter().enumerate().flat_map(|(k, data)| {
@@ -86,14 +86,14 @@ fn a_frame_out_of_order_ends_the_request_and_the_next_one_is_taken() {
         assert_eq!(transport.request(), None);
         assert!(transport.is_idle());
     }
-    assert_eq!(transport.errors().sequence, 2);
+    assert_eq!(transport.errors.sequence, 2);
     give(&mut transport, &[0x3E, 0]);
     assert_eq!(transport.request(), Some(&[0x3E, 0][..]));
 }
 
 #[test]
 fn a_request_that_is_too_long_is_refused_by_its_first_frame() {
-    let mut transport = Transport::new();
+    let mut transport = Transport::IDLE;
     let [high, low] = (MAX_MESSAGE as u16 + 1).to_be_bytes();
     let too_long = [0x10 | high, low, 0, 0, 0, 0, 0, 0];
     // 4 GB less one, in the long form.
@@ -102,14 +102,14 @@ fn a_request_that_is_too_long_is_refused_by_its_first_frame() {
         transport.receive(first, 0);
         let refusal = transport.next_frame(0).expect("a flow control");
         assert_eq!(refusal[0], 0x32);
-        assert_eq!(transport.errors().overflow, k as u32 + 1);
+        assert_eq!(transport.errors.overflow, k as u32 + 1);
         assert!(transport.is_idle());
     }
 }
 
 #[test]
 fn a_tester_that_falls_silent_is_given_up_after_a_second() {
-    let mut transport = Transport::new();
+    let mut transport = Transport::IDLE;
     // The clock wraps around meanwhile.
     let start = u32::MAX - 100;
     transport.receive(&segment(&long(60))[0], start);
@@ -127,7 +127,7 @@ fn a_tester_that_falls_silent_is_given_up_after_a_second() {
         transport.receive(&frame(&[0x31, 0, 0], &[]), 0);
     }
     assert!(transport.is_idle(), "ten waits are the most");
-    assert_eq!(transport.errors().timeout, 2);
+    assert_eq!(transport.errors.timeout, 2);
     // And a frame that never leaves.
     give(&mut transport, &[0x22, 1, 2]);
     transport.answer(|_, out| out.extend_from_slice(&long(20)).expect("it fits"));
@@ -135,12 +135,12 @@ fn a_tester_that_falls_silent_is_given_up_after_a_second() {
     transport.receive(&frame(&[0x30, 0, 1], &[]), 0);
     assert!(transport.next_frame(0).is_some() && transport.next_frame(500).is_none());
     transport.expire(TIMEOUT_MS);
-    assert!(transport.is_idle() && transport.errors().timeout == 3);
+    assert!(transport.is_idle() && transport.errors.timeout == 3);
 }
 
 #[test]
 fn a_tester_that_begins_again_is_answered_for_the_new_request() {
-    let mut transport = Transport::new();
+    let mut transport = Transport::IDLE;
     for data in &segment(&long(60))[..4] {
         transport.receive(data, 0);
         let _ = transport.next_frame(0);
@@ -150,13 +150,13 @@ fn a_tester_that_begins_again_is_answered_for_the_new_request() {
     // A whole one is not replaced before it is answered.
     transport.receive(&frame(&[2], &[0x3E, 0]), 0);
     assert_eq!(transport.request(), Some(&*long(30)));
-    assert_eq!(transport.errors().sequence, 1);
-    assert_eq!(transport.errors().unexpected, 1);
+    assert_eq!(transport.errors.sequence, 1);
+    assert_eq!(transport.errors.unexpected, 1);
 }
 
 #[test]
 fn what_the_standard_does_not_have_is_counted_and_answered_by_nothing() {
-    let mut transport = Transport::new();
+    let mut transport = Transport::IDLE;
     let bad: [&[u8]; 9] = [
         &[],
         &[0x00, 0x3E, 0],
@@ -174,13 +174,13 @@ fn what_the_standard_does_not_have_is_counted_and_answered_by_nothing() {
     for (k, data) in bad.into_iter().enumerate() {
         transport.receive(data, 0);
         assert_eq!((transport.next_frame(0), transport.request()), (None, None), "{data:02x?}");
-        assert_eq!(transport.errors().unexpected, k as u32 + 1, "{data:02x?}");
+        assert_eq!(transport.errors.unexpected, k as u32 + 1, "{data:02x?}");
     }
 }
 
 #[test]
 fn a_tester_s_request_arrives_whole_and_one_that_is_too_long_is_not_sent() {
-    let (mut tester, mut board) = (Transport::new(), Transport::new());
+    let (mut tester, mut board) = (Transport::IDLE, Transport::IDLE);
     assert!(!tester.send(&long(MAX_MESSAGE + 1)));
     for length in [1, 7, 8, 300, MAX_MESSAGE] {
         let request = long(length);
@@ -203,7 +203,7 @@ fn a_tester_s_request_arrives_whole_and_one_that_is_too_long_is_not_sent() {
 #[test]
 fn a_flow_control_sets_the_gap_or_ends_the_response() {
     for (code, gap) in [(0, 0), (3, 3), (0xF1, 1), (0xF9, 1), (0xF0, 0x7F), (0xFA, 0x7F)] {
-        let mut transport = Transport::new();
+        let mut transport = Transport::IDLE;
         assert!(transport.send(&long(30)) && transport.next_frame(0).is_some());
         transport.receive(&[0x30, 0, code], 0);
         assert!(transport.next_frame(0).is_some());
@@ -211,10 +211,10 @@ fn a_flow_control_sets_the_gap_or_ends_the_response() {
         let next = (0..200).find(|now| transport.next_frame(*now).is_some());
         assert_eq!(next, Some(if gap == 0 { 0 } else { gap + 1 }), "{code:x}");
     }
-    let mut transport = Transport::new();
+    let mut transport = Transport::IDLE;
     assert!(transport.send(&long(30)) && transport.next_frame(0).is_some());
     transport.receive(&[0x42, 0, 0], 0);
     assert!(!transport.is_idle(), "no flow control");
     transport.receive(&[0x32, 0, 0], 0);
-    assert!(transport.is_idle() && transport.errors().overflow == 1);
+    assert!(transport.is_idle() && transport.errors.overflow == 1);
 }

@@ -170,7 +170,7 @@ fn how_far_a_sensor_must_be_moved_depends_on_how_well_forward_was_known() {
         learned.add_standstill(sample(0, LEVEL, 0.0).specific_force);
         let known = Forward { direction: [1.0, 0.0, 0.0], sigma: f32::to_radians(sigma_deg) };
         learned.forward = Some(known);
-        let (mut learner, limits) = (Learner::new(), StaticConfig::DEFAULT);
+        let (mut learner, limits) = (Learner::START, StaticConfig::DEFAULT);
         let reports = driven(180, turned).filter(|(sample, wheels)| {
             let standing = judged(wheels.standstill);
             learner.observe(Some(sample), wheels, &standing, &limits, &mut learned)
