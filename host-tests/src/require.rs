@@ -26,39 +26,28 @@ impl Need {
         [("qemu", Self::Qemu), ("data", Self::Data), ("python", Self::Python), ("gcc", Self::Gcc)];
 }
 
-#[derive(Debug, PartialEq, Eq)]
-struct Required(Vec<Need>);
-
-impl Required {
-    fn parse(list: &str) -> Result<Self, String> {
-        let words = list.split(',').map(str::trim).filter(|word| !word.is_empty());
-        let need = |word: &str| {
-            let known = Need::ALL.iter().find(|(name, _)| *name == word);
-            known.map(|(_, need)| *need).ok_or_else(|| format!("{VARIABLE}: unknown word {word:?}"))
-        };
-        words.map(need).collect::<Result<_, _>>().map(Self)
-    }
-
-    fn from_env() -> Self {
-        Self::parse(&std::env::var(VARIABLE).unwrap_or_default()).unwrap_or_else(|error| panic!("{error}"))
-    }
-
-    /// What was found, or `None` with a line on `out` that names the skipped test and the reason.
-    fn wants<T>(&self, test: &str, need: Need, found: Result<T, String>, out: &mut impl Write) -> Option<T> {
-        match found {
-            Ok(found) => Some(found),
-            Err(why) if self.0.contains(&need) => panic!("{test}: {VARIABLE} asks for {need:?}, but {why}"),
-            Err(why) => {
-                say(test, &why, out);
-                None
-            }
-        }
-    }
+fn parse(list: &str) -> Result<Vec<Need>, String> {
+    let words = list.split(',').map(str::trim).filter(|word| !word.is_empty());
+    let need = |word: &str| {
+        let known = Need::ALL.iter().find(|(name, _)| *name == word);
+        known.map(|(_, need)| *need).ok_or_else(|| format!("{VARIABLE}: unknown word {word:?}"))
+    };
+    words.map(need).collect()
 }
 
-/// Reports that this test is skipped on this machine, whatever is required.
-pub fn skipped(why: &str) {
-    say(&running(), why, &mut std::io::stderr());
+/// The report of a test that lacks this, which must not be required.
+fn lacking(required: &[Need], test: &str, need: Need, why: &str) -> String {
+    assert!(!required.contains(&need), "{test}: {VARIABLE} asks for {need:?}, but {why}");
+    report(test, why)
+}
+
+fn report(test: &str, why: &str) -> String {
+    format!("SKIPPED {test}: {why}\n")
+}
+
+fn say(report: &str) {
+    // Nothing is left to report to when standard error is closed.
+    let _ = std::io::stderr().write_all(report.as_bytes());
 }
 
 /// The name of the test that runs: the test harness gives its thread this name.
@@ -66,14 +55,16 @@ fn running() -> String {
     std::thread::current().name().unwrap_or("a test").to_owned()
 }
 
-fn say(test: &str, why: &str, out: &mut impl Write) {
-    // Nothing is left to report to when standard error is closed.
-    let _ = out.write_all(format!("SKIPPED {test}: {why}\n").as_bytes());
+/// Reports that this test is skipped on this machine, whatever is required.
+pub fn skipped(why: &str) {
+    say(&report(&running(), why));
 }
 
 /// What was found, or `None` with a report on standard error that this test is skipped.
 pub fn wants<T>(need: Need, found: Result<T, String>) -> Option<T> {
-    Required::from_env().wants(&running(), need, found, &mut std::io::stderr())
+    let required = parse(&std::env::var(VARIABLE).unwrap_or_default());
+    let required = required.unwrap_or_else(|error| panic!("{error}"));
+    found.map_err(|why| say(&lacking(&required, &running(), need, &why))).ok()
 }
 
 /// A program that says its version.
@@ -106,24 +97,21 @@ mod tests {
 
     #[test]
     fn a_list_names_requirements_and_nothing_else() {
-        assert_eq!(Required::parse(""), Ok(Required(vec![])));
-        assert_eq!(Required::parse("qemu, data,"), Ok(Required(vec![Need::Qemu, Need::Data])));
-        assert_eq!(Required::parse("python"), Ok(Required(vec![Need::Python])));
-        assert_eq!(Required::parse("qemu,dta"), Err("GYRONET_REQUIRE: unknown word \"dta\"".into()));
+        assert_eq!(parse(""), Ok(vec![]));
+        assert_eq!(parse("qemu, data,"), Ok(vec![Need::Qemu, Need::Data]));
+        assert_eq!(parse("python"), Ok(vec![Need::Python]));
+        assert_eq!(parse("qemu,dta"), Err("GYRONET_REQUIRE: unknown word \"dta\"".into()));
     }
 
     #[test]
-    fn what_was_found_is_returned_and_a_skipped_test_is_reported() {
-        let (mut out, required) = (Vec::new(), Required::parse("qemu,python").unwrap());
-        assert_eq!(required.wants("t", Need::Data, Ok(7), &mut out), Some(7));
-        assert_eq!(required.wants("t", Need::Data, Err::<(), _>("no folder".into()), &mut out), None);
-        assert_eq!(out, b"SKIPPED t: no folder\n");
+    fn a_skipped_test_is_reported() {
+        let report = lacking(&[Need::Qemu, Need::Python], "t", Need::Data, "no folder");
+        assert_eq!(report, "SKIPPED t: no folder\n");
     }
 
     #[test]
     #[should_panic(expected = "t: GYRONET_REQUIRE asks for Data, but no folder")]
     fn a_missing_requirement_fails_where_it_must_be_met() {
-        let required = Required::parse("data").unwrap();
-        required.wants("t", Need::Data, Err::<(), _>("no folder".into()), &mut Vec::new());
+        lacking(&[Need::Data], "t", Need::Data, "no folder");
     }
 }

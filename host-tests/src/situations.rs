@@ -11,7 +11,6 @@ pub mod judge;
 pub mod list;
 pub mod receiver;
 pub mod recordings;
-pub mod report;
 pub mod ride;
 pub mod scene;
 pub mod sensor;

@@ -2,10 +2,8 @@
 
 use clap::Parser;
 use gyronet_host_tests::parallel;
-use gyronet_host_tests::situations::judge::Outcome;
-use gyronet_host_tests::situations::list;
-use gyronet_host_tests::situations::recordings;
-use gyronet_host_tests::situations::report::{HEADING, line};
+use gyronet_host_tests::situations::judge::{HEADING, Outcome};
+use gyronet_host_tests::situations::{list, recordings};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -37,7 +35,7 @@ fn main() -> ExitCode {
     let (mut is_broken, mut good, mut wrong) = (false, 0, 0);
     println!("{HEADING}");
     for (name, outcome) in args.recordings.iter().flat_map(|folder| recordings::judged(folder, &args.name)) {
-        print!("{}", line(&name, "", &outcome));
+        print!("{}", outcome.line(&name, ""));
         is_broken |= !outcome.broken().is_empty();
     }
     let is_simulated = args.recordings.is_none();
@@ -57,7 +55,7 @@ fn main() -> ExitCode {
             });
             let mut outcome = Outcome::default();
             outcomes.iter().filter(|one| one.seconds > 0).for_each(|one| outcome.add(one));
-            print!("{}", line(situation.name, vehicle.name, &outcome));
+            print!("{}", outcome.line(situation.name, vehicle.name));
             is_broken |= !outcome.broken().is_empty();
             (good, wrong) = (good + outcome.good, wrong + outcome.second.wrong);
         }

@@ -15,6 +15,9 @@
 use super::receiver::{Receiver, Set, Slow};
 use super::ride::Travelled;
 
+/// Heading of a table of outcomes.
+pub const HEADING: &str = "situation                                        vehicle  seconds  good  in 1 sigma: straight, \
+    turning  worst second    span  minute  what is wrong";
 /// Expected errors by which yaw may be off.
 const SIGMAS: f64 = 4.0;
 /// Age of the newest sample in a set, s, and the time of a doubt, s.
@@ -58,7 +61,7 @@ impl Share {
         self.all += 1;
     }
 
-    pub fn percent(&self) -> f64 {
+    fn percent(&self) -> f64 {
         100.0 * self.inside as f64 / self.all.max(1) as f64
     }
 }
@@ -159,6 +162,20 @@ impl Outcome {
             broken.push(('m', "not good at the end, without a reason".to_owned()));
         }
         broken
+    }
+
+    /// A line of the table; the worst errors are in sigma.
+    pub fn line(&self, situation: &str, vehicle: &str) -> String {
+        let broken: Vec<String> = self.broken().into_iter().map(|(_, text)| text).collect();
+        let [straight, turning] = self.inside.map(|share| share.percent());
+        let [second, span, minute] = [self.second, self.span, self.minute].map(|errors| errors.worst().0);
+        format!(
+            "{situation:48} {vehicle:7} {:8} {:3.0} % {straight:19.0} % {turning:6.0} % {second:13.1} {span:7.1} \
+             {minute:7.1}  {}\n",
+            self.seconds,
+            100.0 * self.good as f64 / self.seconds as f64,
+            broken.join("; "),
+        )
     }
 }
 

@@ -2,8 +2,8 @@
 
 mod judge;
 
+use gyronet_host_tests::situations::judge::HEADING;
 use gyronet_host_tests::situations::list::{self, Situation};
-use gyronet_host_tests::situations::report::{HEADING, line};
 use gyronet_host_tests::situations::vehicle::Vehicle;
 use gyronet_host_tests::{parallel, recordings, situations};
 
@@ -17,7 +17,7 @@ fn no_situation_is_wrong_and_good() {
 fn judged(situation: &Situation, vehicle: &Vehicle, seed: u64) -> (String, Vec<String>) {
     let outcome = situation.run(vehicle, seed);
     let failed = outcome.broken().into_iter().map(|(_, text)| format!("{}: {text}", situation.name));
-    (line(situation.name, vehicle.name, &outcome), failed.collect())
+    (outcome.line(situation.name, vehicle.name), failed.collect())
 }
 
 /// Situations, vehicles and seeds in which an earlier version was good and off by more than four sigma.
