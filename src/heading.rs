@@ -24,7 +24,7 @@ pub use gain::Gain;
 pub use gnss::{Fix, GnssLine, GnssProtocol, GnssSettings};
 pub use receiver::{HeadingConfigError, HeadingReceiver, HeadingSettings, Received};
 
-use embedded_can::{ExtendedId, Frame, Id};
+use embedded_can::{Frame, Id};
 
 /// Course and speed over ground.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -86,11 +86,6 @@ impl Heading {
     }
 }
 
-/// Returns the identifier of a parameter group that is sent to all, for a priority of 0 to 7.
-const fn broadcast_id(group: u32, priority: u8, source: u8) -> Option<ExtendedId> {
-    ExtendedId::new((priority as u32) << 26 | group << 8 | source as u32)
-}
-
 /// Returns the eight bytes of a frame of a parameter group that is sent to all (SAE J1939-21, 5.2.5).
 fn group(frame: &impl Frame, group: u32) -> Option<Result<[u8; 8], HeadingError>> {
     let Id::Extended(id) = frame.id() else { return None };
@@ -103,11 +98,4 @@ fn group(frame: &impl Frame, group: u32) -> Option<Result<[u8; 8], HeadingError>
 fn word(bytes: [u8; 2], from: u16) -> Option<f32> {
     let code = u16::from_le_bytes(bytes);
     (code < from).then(|| f32::from(code))
-}
-
-/// Returns the code of a value, rounded to nearest; `none` without a value, or where it has no code.
-fn code(value: Option<f32>, per_unit: f32, none: u16) -> [u8; 2] {
-    let code = value.map(|value| libm::roundf(value * per_unit));
-    let code = code.filter(|code| (0.0..f32::from(none)).contains(code)).map_or(none, |code| code as u16);
-    code.to_le_bytes()
 }

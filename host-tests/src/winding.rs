@@ -4,8 +4,8 @@
 use crate::gnss::Pvt;
 use crate::noise::Noise;
 use crate::synthetic::{force, rate, turning};
+use crate::wire;
 use gyronet::can::DataFrame;
-use gyronet::heading::{Heading, nmea2000};
 use gyronet::sample::ImuSample;
 use std::f64::consts::TAU;
 
@@ -53,9 +53,7 @@ impl Winding {
     }
 
     pub fn course(&mut self) -> DataFrame {
-        let course = Some(self.direction() as f32);
-        let heading = Heading { course, speed: Some(15.0), ..Heading::default() };
-        nmea2000::course_speed_frame(&heading, 0, 0x23).expect("a frame")
+        wire::course([Some(self.direction() as f32), Some(15.0)], 0)
     }
 
     /// The same by a receiver on a line of its own.

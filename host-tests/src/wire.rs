@@ -29,6 +29,15 @@ pub fn data_frame(id: Id, data: &[u8]) -> DataFrame {
 }
 
 /// Bytes in hexadecimal, with or without spaces between them.
+/// NMEA 2000's rapid update of a course, rad clockwise from north, and a speed, m/s.
+pub fn course([course, speed]: [Option<f32>; 2], sequence: u8) -> DataFrame {
+    let code = |value: Option<f32>, per: f32| {
+        value.map_or(u16::MAX, |value| (value * per).round() as u16).to_le_bytes()
+    };
+    let ([c0, c1], [s0, s1]) = (code(course, 1e4), code(speed, 100.0));
+    data_frame(id29(0x09F8_0223), &[sequence, 0xFC, c0, c1, s0, s1, 0xFF, 0xFF])
+}
+
 pub fn bytes(hex: &str) -> Vec<u8> {
     let digits: String = hex.split_whitespace().collect();
     let byte = |at| u8::from_str_radix(&digits[at..at + 2], 16).expect("hex");

@@ -1,14 +1,13 @@
 //! Rapid updates of position and of course and speed over ground of NMEA 2000 (PGN 129025 and 129026), by the
 //! definitions of canboat.
 
-use super::{Heading, HeadingError, broadcast_id, code, group, word};
+use super::{Heading, HeadingError, group, word};
 use embedded_can::Frame;
 
 /// Parameter group of the position.
 pub const POSITION: u32 = 129_025;
 /// Parameter group of course and speed.
 pub const COURSE_SPEED: u32 = 129_026;
-const PRIORITY: u8 = 2;
 /// From here on a 16-bit code is reserved, an error or not available.
 const RESERVED: u16 = 0xFFFD;
 /// The same of 32 bits with sign.
@@ -28,13 +27,6 @@ pub fn course_speed(frame: &impl Frame) -> Option<Result<Heading, HeadingError>>
             other => Err(HeadingError::Reference(other)),
         }
     }))
-}
-
-/// Makes a frame with course and speed; accuracies have no place in it.
-pub fn course_speed_frame<F: Frame>(heading: &Heading, sequence: u8, source: u8) -> Option<F> {
-    let [c0, c1] = code(heading.course, PER_RAD, u16::MAX);
-    let [s0, s1] = code(heading.speed, PER_SPEED, u16::MAX);
-    F::new(broadcast_id(COURSE_SPEED, PRIORITY, source)?, &[sequence, 0xFC, c0, c1, s0, s1, 0xFF, 0xFF])
 }
 
 /// Reads a latitude, degrees, north positive; `None` for another group, `Ok(None)` where it is not available.

@@ -7,10 +7,9 @@
 use clap::Parser;
 use gyronet::can::DataFrame;
 use gyronet::can::slcan::port::Port;
-use gyronet::heading::nmea2000;
 use gyronet::units::Micros;
 use gyronet_host_tests::board::{self, Board, Seen};
-use gyronet_host_tests::{replay, require};
+use gyronet_host_tests::{replay, require, wire};
 use gyronet_tools::bundled;
 use gyronet_tools::drive::DT;
 use gyronet_tools::drive::candump::Log;
@@ -37,8 +36,6 @@ const BITS_PER_SECOND: u32 = 500_000;
 const WAITING: usize = 64;
 /// Board time in which a coprocessor has sent a frame.
 const SENDS: Duration = Duration::from_secs(5);
-/// Source address of the GNSS receiver on the bus.
-const RECEIVER: u8 = 0x23;
 /// Rows at the start of a drive in which the vehicle stands.
 const PARKED: usize = 350;
 /// Board time from one report of the speed to the next.
@@ -217,9 +214,9 @@ impl Vehicle {
         let Row { mut sample, heading, .. } = rows[self.row % rows.len()];
         sample.time.0 = (self.row as f64 * DT * 1e6).round() as u64;
         let wheels = self.wheels.as_mut().and_then(|wheels| wheels.next(&rows[self.row % rows.len()]));
-        let course = heading.and_then(|heading| {
+        let course = heading.map(|heading| {
             self.courses = self.courses.wrapping_add(1);
-            nmea2000::course_speed_frame(&heading, self.courses, RECEIVER)
+            wire::course([heading.course, heading.speed], self.courses)
         });
         let rates_dps = sample.angular_rate.map(|rate| rate.rad_per_sec().to_degrees());
         let acceleration_g = sample.specific_force.map(|force| force.metre_per_sec2() / 9.806_65);

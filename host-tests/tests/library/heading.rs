@@ -7,7 +7,6 @@ use gyronet::heading::{
 };
 use gyronet::units::Micros;
 use gyronet_host_tests::wire::{data_frame, id11, id29};
-use proptest::prelude::*;
 
 fn frame(id: u32, data: &[u8]) -> DataFrame {
     data_frame(id29(id), data)
@@ -107,14 +106,4 @@ fn courses_of_one_sender_are_used_until_it_is_silent() {
     };
     assert!(is_used(0x09F8_0223, 0) && !is_used(0x09F8_0224, 100) && !is_used(0x18FE_E824, 4_000));
     assert!(is_used(0x18FE_E824, 5_100) && !is_used(0x09F8_0223, 5_200) && is_used(0x09F8_0224, 5_300));
-}
-
-proptest! {
-    #[test]
-    fn what_is_sent_is_read(course in 0.0_f32..6.2, speed in 0.0_f32..60.0) {
-        let heading = Heading { course: Some(course), speed: Some(speed), ..Heading::default() };
-        let sent: DataFrame = nmea2000::course_speed_frame(&heading, 1, 0x23).unwrap();
-        let read = nmea2000::course_speed(&sent).unwrap().unwrap();
-        prop_assert!((read.course.unwrap() - course).abs() <= 0.51e-4 && (read.speed.unwrap() - speed).abs() <= 0.0051);
-    }
 }

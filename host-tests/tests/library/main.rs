@@ -30,7 +30,6 @@ mod links;
 mod lstm_exact;
 mod pipeline;
 mod pipeline_estimates;
-mod pipeline_wheels;
 mod revisions;
 mod second_source;
 mod sensor_monitor;

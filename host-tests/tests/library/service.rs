@@ -1,7 +1,6 @@
 //! The board's stored data on a mock flash: every request and every refusal, by themselves and over diagnosis.
 
 mod access;
-mod calibration;
 mod configuration;
 mod firmware;
 mod isotp;

@@ -3,7 +3,7 @@
 
 use super::uds::{Bench, bench};
 use super::{Board, GOOD, LEVEL, fresh, sample, start};
-use gyronet::bias::StaticConfig;
+use gyronet::bias::{StaticConfig, ThermalBias};
 use gyronet::heading::{CourseCounters, CourseState, Gain, Refusal};
 use gyronet::health::slow::Knowledge;
 use gyronet::health::{Faults, Status};
@@ -12,7 +12,9 @@ use gyronet::sample::{ImuSample, Standstill, Validity, WheelSample};
 use gyronet::service::Learner;
 use gyronet::standstill::Standing;
 use gyronet::store::{Calibration, Configuration, Learned};
-use gyronet::units::{CentiCelsius, WheelSpeed};
+use gyronet::uds::isotp::MAX_MESSAGE;
+use gyronet::units::{AngularRate, CentiCelsius, SpecificForce, WheelSpeed};
+use gyronet_host_tests::flash::Flash;
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::stored::open;
 use gyronet_host_tests::synthetic::judged;
@@ -377,4 +379,21 @@ fn courses_that_contradict_the_gyro_are_a_trouble() {
     bench.board.learn_course(&CourseState::START);
     bench.expect(&[0x3E, 0], &[0x7E, 0]);
     status(&mut bench, 0x2E);
+}
+
+#[test]
+fn what_was_learnt_fits_a_response_and_a_record() {
+    let mut thermal_bias = ThermalBias::UNKNOWN;
+    thermal_bias.add(true, CentiCelsius(-3_000), [AngularRate(-11_000_000); 3]);
+    let learned = Learned {
+        thermal_bias,
+        specific_force: Some([SpecificForce(-10_000_000); 3]),
+        vertical: Vertical::UNKNOWN,
+        forward: Some(Forward { direction: [-0.577; 3], sigma: 0.171 }),
+        gain: Some(Gain { share: -0.05, sigma: 0.002, of: u32::MAX }),
+    };
+    let record = postcard::to_stdvec(&learned).expect("there is room");
+    assert!(record.len() + 4 <= MAX_MESSAGE, "{} bytes", record.len());
+    let flash = Flash::default();
+    assert_eq!(open(&flash).expect("an empty flash").set(&learned), Ok(()));
 }

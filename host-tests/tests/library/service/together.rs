@@ -1,7 +1,8 @@
 //! Settings that are valid one by one and together: what is accepted can run, in whatever order it is stored.
 
-use super::IDENTITY;
+use super::uds::Bench;
 use super::weights::upload as upload_over;
+use super::{IDENTITY, fresh, start};
 use embedded_can::Id;
 use gyronet::can::config::Config;
 use gyronet::can::signal::{BitField, ByteOrder};
@@ -10,11 +11,12 @@ use gyronet::compensate::Stride;
 use gyronet::heading::{HeadingConfigError, HeadingSettings, HeadingSignal};
 use gyronet::model::blob::Shape;
 use gyronet::model::weights;
+use gyronet::mounting::GyroMap;
 use gyronet::service::message::{FAILED_STARTS, Identity, Origin, Refusal};
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::layout::STORE;
 use gyronet::store::slots::{SlotError, WeightSource};
-use gyronet::store::{Configuration, FieldError, FogPart, ImuPart, Slot, StoreError};
+use gyronet::store::{Configuration, FieldError, FogPart, ImuPart, Slot, StoreError, UnitMap};
 use gyronet_host_tests::flash::{F405, Flash, Region, shared};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::recordings::workspace;
@@ -189,7 +191,7 @@ fn a_start_uses_what_fits_and_reports_the_rest() {
     let flash = Flash::default();
     upload(&flash, Slot::A, &other_weights(1)).expect("it is stored");
     open(&flash).and_then(|mut store| store.set(&costly)).expect("it is stored");
-    let mut board = super::start(&flash);
+    let mut board = start(&flash);
     let info = board.info();
     assert_eq!((info.configuration, info.weights), (Origin::Stored, WeightSource::BuiltIn));
     let slow = |error| matches!(error, Some(SlotError::Slow { cycles, available }) if cycles > available);
@@ -211,7 +213,7 @@ fn a_start_uses_what_fits_and_reports_the_rest() {
 
 #[test]
 fn weights_that_are_too_slow_for_the_stride_are_not_activated() {
-    let (_, mut board) = super::fresh();
+    let (_, mut board) = fresh();
     let mut configuration = Configuration::DEFAULT;
     configuration.compensate.stride = Stride::new(1).expect("a sample");
     assert_eq!(board.set_configuration(&configuration), Ok(()), "with the built-in weights");
@@ -267,4 +269,26 @@ fn three_failed_starts_leave_the_bus_as_it_is_and_the_rest_built_in() {
     assert_eq!(*board.next_configuration(), stored);
     assert_eq!(board.set_configuration(&Configuration::DEFAULT), Ok(()));
     assert_eq!(*start(0).configuration(), Configuration::DEFAULT);
+}
+
+#[test]
+fn the_map_of_a_unit_is_kept_for_the_weights_it_was_found_with() {
+    let (flash, mut board) = fresh();
+    let runs = board.info().weights_crc.unwrap_or(0);
+    let elements = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.006, 0.029, 1.001]];
+    let gyro_map = GyroMap::from_elements(elements).expect("a unit's");
+    let unit = |weights| Some(UnitMap { gyro_map, weights });
+    let refused = Refusal::OtherWeights { found: runs ^ 1, runs };
+    assert_eq!(board.set_unit(unit(runs ^ 1)), Err(refused));
+    let mut tester = Bench::new(&flash);
+    tester.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    let record = postcard::to_allocvec(&unit(runs)).expect("memory");
+    tester.expect(&[&[0x2E, 1, 0x0D][..], &record].concat(), &[0x6E, 1, 0x0D]);
+    let board = start(&flash);
+    assert_eq!(board.calibration().gyro_map(runs), Some(gyro_map));
+    let of =
+        |weights| Configuration::DEFAULT.pipeline(board.calibration(), board.learned(), weights).gyro_map;
+    assert_eq!((of(runs), of(runs ^ 1)), (gyro_map, GyroMap::IDENTITY));
+    assert_eq!(GyroMap::from_elements([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.0, 1.0]]), None);
+    assert_eq!(GyroMap::from_elements([[f32::NAN, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), None);
 }
