@@ -9,7 +9,6 @@ use gyronet_tools::evaluate::outage::{self, NoStart, Outage};
 use gyronet_tools::evaluate::outage_chart;
 use gyronet_tools::evaluate::outage_table::Outages;
 use gyronet_tools::evaluate::report::Report;
-use gyronet_tools::network::checkpoint::Checkpoint;
 use indicatif::ProgressBar;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -27,8 +26,7 @@ use std::path::{Path, PathBuf};
 /// driving straight (and standing) and turning.
 ///
 /// One row for each method follows: the error over 1 s, 60 s and the drive (RMS and at the end) in degrees, in JSON in
-/// rad with the error over 10 s and the delay. The linear
-/// window is an estimate of all windows after static initialisation. The last two rows are the rates that the board
+/// rad with the delay. The linear window is an estimate of all windows after static initialisation. The last two rows are the rates that the board
 /// sends: the live rate, with the sample (Bosch TX1), and the delayed rate, in its own yaw messages.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
@@ -54,9 +52,6 @@ pub struct Args {
     /// Add rows for the paper's GyroNet, in f32 and in integers; they take twenty times as long as all others together.
     #[arg(long)]
     gyronet: bool,
-    /// Checkpoint of the f32 network (safetensors) [default: the one that comes with the tools].
-    #[arg(long, value_name = "FILE", requires = "gyronet")]
-    checkpoint: Option<PathBuf>,
     #[command(flatten)]
     unit: weights::Unit,
 }
@@ -65,9 +60,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     if !args.outage.is_empty() {
         return outages(args, common);
     }
-    let checkpoint =
-        args.gyronet.then(|| args.checkpoint.as_deref().map_or_else(bundled::checkpoint, Checkpoint::read));
-    let checkpoint = checkpoint.transpose()?;
+    let checkpoint = args.gyronet.then(bundled::checkpoint).transpose()?;
     let judge = |file: &Path, bar: &ProgressBar| {
         let drive = args.unit.drive(Drive::open_moving(file), common)?;
         bar.set_length(drive.facts.rows as u64);

@@ -5,7 +5,7 @@ use clap::error::{ContextKind, ContextValue};
 const SITUATIONS: &str = "`cargo run --profile tool -p gyronet-host-tests --bin situations`";
 const LEARNT: &str =
     "the board itself at its standstills (`device info`: tilt; `device calibrate show`: bias)";
-const RETIRED: [(&str, &str); 23] = [
+const RETIRED: [(&str, &str); 24] = [
     ("campaign", SITUATIONS),
     ("soak", SITUATIONS),
     ("bus", "tools/gyronet.dbc, with `gyronet device set`, which refuses what loads the bus too much,"),
@@ -34,6 +34,7 @@ const RETIRED: [(&str, &str); 23] = [
     ("--set", "`cargo paper simulate`"),
     ("--all", "`gyronet evaluate --json`"),
     ("quantize --drives", "`gyronet evaluate --weights`"),
+    ("--checkpoint", "`gyronet quantize`, with `gyronet evaluate --weights`,"),
     ("--lags", "`compensate.lag` in a configuration of `gyronet.Coprocessor` (tools/python)"),
 ];
 

@@ -1,8 +1,8 @@
-//! The heading error of a yaw rate over 1 s, 10 s, 60 s and a whole drive, against a reference yaw rate or a course.
+//! The heading error of a yaw rate over 1 s, 60 s and a whole drive, against a reference yaw rate or a course.
 //!
 //! A reference yaw rate gives every figure. A course over ground (GNSS) is the direction of travel, not the heading:
 //! latency, side slip and noise give it errors of 0.05 to 0.1 rad from one second to the next. So errors against a
-//! course are medians over 10 s, which still scatter by 0.02 rad. A course cannot judge 1 s and 10 s.
+//! course are medians over 10 s, which still scatter by 0.02 rad. A course cannot judge 1 s.
 //!
 //! The figures are computed sample by sample, and nothing older than a minute is kept but the medians of ten seconds
 //! against a course: means and squares are sums. Only the median error in 10 s over the whole drive
@@ -23,8 +23,6 @@ const BLOCK_VALUES: usize = 3;
 pub(super) const ALIGNED: usize = 20 * SECOND;
 /// Largest [`Errors::typical_10s`] that a bias can explain, rad.
 pub const PLAUSIBLE_10S_RAD: f64 = 0.5;
-/// Lengths of the windows over which the heading change is judged, s.
-const WINDOWS_S: [usize; 3] = [1, 10, 60];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
@@ -39,8 +37,6 @@ pub struct Errors {
 pub struct HeadingError {
     /// Mean absolute error of the heading change over 1 s; a window starts every second.
     pub mean_1s_rad: Option<f64>,
-    /// Mean absolute error of the heading change over 10 s.
-    pub mean_10s_rad: Option<f64>,
     /// Mean absolute error of the heading change over 60 s.
     pub mean_60s_rad: Option<f64>,
     /// RMS of the error over the drive.
@@ -59,7 +55,6 @@ impl HeadingError {
         let mean = |of: fn(&Self) -> Option<f64>| mean(errors.iter().filter_map(of));
         Self {
             mean_1s_rad: mean(|error| error.mean_1s_rad),
-            mean_10s_rad: mean(|error| error.mean_10s_rad),
             mean_60s_rad: mean(|error| error.mean_60s_rad),
             rms_rad: mean(|error| error.rms_rad),
             final_rad: mean(|error| error.final_rad),
@@ -74,9 +69,11 @@ struct Mean {
 }
 
 impl Mean {
-    fn add(&mut self, value: f64) {
-        self.count += 1.0;
-        self.sum += value;
+    fn add(&mut self, values: impl IntoIterator<Item = f64>) {
+        for value in values {
+            self.count += 1.0;
+            self.sum += value;
+        }
     }
 
     fn get(&self) -> Option<f64> {
@@ -86,7 +83,7 @@ impl Mean {
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut mean = Mean::default();
-    values.for_each(|value| mean.add(value));
+    mean.add(values);
     mean.get()
 }
 
@@ -132,49 +129,41 @@ impl Typical {
 struct Changes {
     /// Seconds from one error to the next.
     step_s: usize,
-    /// The shortest window that the reference can judge, s.
-    shortest_s: usize,
     /// The errors of the last minute, rad; `None` while the reference is unknown.
     recent: VecDeque<Option<f64>>,
-    windows: [Mean; WINDOWS_S.len()],
+    second: Mean,
+    minute: Mean,
     squares: Mean,
     typical: Typical,
 }
 
 impl Changes {
-    fn new(step_s: usize, shortest_s: usize) -> Self {
+    fn new(step_s: usize) -> Self {
         let (recent, typical) = (VecDeque::with_capacity(64), Typical::new());
-        Self { step_s, shortest_s, recent, windows: Default::default(), squares: Mean::default(), typical }
+        let [second, minute, squares] = [Mean::default(); 3];
+        Self { step_s, recent, second, minute, squares, typical }
     }
 
     fn add(&mut self, error: Option<f64>) {
-        for (seconds, mean) in WINDOWS_S.into_iter().zip(&mut self.windows) {
-            let Some(steps) = (seconds / self.step_s).checked_sub(1) else { continue };
-            let earlier = self.recent.iter().rev().nth(steps).copied().flatten();
-            let Some(change) = error.zip(earlier).map(|(to, from)| (to - from).abs()) else { continue };
-            mean.add(change);
-            if seconds == 10 {
-                self.typical.add(change);
-            }
-        }
-        error.into_iter().for_each(|error| self.squares.add(error * error));
+        let change = |seconds: usize| {
+            let earlier = self.recent.iter().rev().nth((seconds / self.step_s).checked_sub(1)?)?;
+            Some((error? - (*earlier)?).abs())
+        };
+        let [second, typical, minute] = [1, 10, 60].map(change);
+        self.second.add(second);
+        typical.into_iter().for_each(|change| self.typical.add(change));
+        self.minute.add(minute);
+        self.squares.add(error.map(|error| error * error));
         self.recent.push_back(error);
-        if self.recent.len() > WINDOWS_S[2] / self.step_s {
+        if self.recent.len() > 60 / self.step_s {
             self.recent.pop_front();
         }
     }
 
     fn errors(&self, last: f64) -> Errors {
-        let mut figures = self
-            .windows
-            .iter()
-            .zip(WINDOWS_S)
-            .map(|(mean, seconds)| if seconds >= self.shortest_s { mean.get() } else { None });
-        let mut next = || figures.next().flatten();
         let figures = HeadingError {
-            mean_1s_rad: next(),
-            mean_10s_rad: next(),
-            mean_60s_rad: next(),
+            mean_1s_rad: self.second.get(),
+            mean_60s_rad: self.minute.get(),
             rms_rad: self.squares.get().map(f64::sqrt),
             final_rad: Some(last.abs()),
         };
@@ -192,7 +181,7 @@ pub struct AgainstRate {
 
 impl Default for AgainstRate {
     fn default() -> Self {
-        let mut changes = Changes::new(1, 1);
+        let mut changes = Changes::new(1);
         changes.add(Some(0.0));
         Self { angle: 0.0, samples: 0, changes }
     }
@@ -286,7 +275,7 @@ impl Default for AgainstCourse {
             aligned: None,
             waiting: Vec::new(),
             errors: Vec::new(),
-            changes: Changes::new(BLOCK_S, 6 * BLOCK_S),
+            changes: Changes::new(BLOCK_S),
         }
     }
 }
@@ -419,7 +408,6 @@ mod tests {
     fn a_constant_bias_grows_with_the_window() {
         let error = by_rate(&[0.3; 12_050], &[0.301; 12_050]).expect("whole seconds").figures;
         close(error.mean_1s_rad, 0.001);
-        close(error.mean_10s_rad, 0.01);
         close(error.mean_60s_rad, 0.06);
         close(error.final_rad, 0.1205);
         let seconds = (0..=120).map(|k| 1e-6 * f64::from(k * k)).sum::<f64>() / 121.0;
@@ -429,7 +417,7 @@ mod tests {
     #[test]
     fn a_short_drive_has_no_long_window() {
         let error = by_rate(&[0.0; 500], &[0.0; 500]).expect("five seconds").figures;
-        assert_eq!((error.mean_1s_rad, error.mean_10s_rad, error.mean_60s_rad), (Some(0.0), None, None));
+        assert_eq!((error.mean_1s_rad, error.mean_60s_rad), (Some(0.0), None));
         assert_eq!(by_rate(&[0.0; 99], &[0.0; 99]), None);
     }
 
@@ -446,7 +434,7 @@ mod tests {
             })
             .collect();
         let error = by_course(&course, turn + bias).expect("enough course").figures;
-        assert_eq!((error.mean_1s_rad, error.mean_10s_rad), (None, None));
+        assert_eq!(error.mean_1s_rad, None);
         let near = |figure: Option<f64>, due: f64| {
             let figure = figure.expect("a figure");
             assert!((figure - due).abs() < 2e-3, "{figure} is not {due}");

@@ -249,10 +249,7 @@ pub struct Mean {
 }
 
 impl Mean {
-    fn new(set: &str, drives: &[&DriveErrors]) -> Option<Self> {
-        if drives.is_empty() {
-            return None;
-        }
+    fn new(set: &str, drives: &[&DriveErrors]) -> Self {
         let methods = PerMethod::new(|method| {
             let rows: Vec<Row> =
                 drives.iter().map(|drive| drive.methods.get(method).copied()).collect::<Option<_>>()?;
@@ -260,7 +257,7 @@ impl Mean {
             Some(Row { error, delay_ms: method.delay_ms() })
         });
         let over_best_classical = Comparisons::new(&methods);
-        Some(Self { set: set.to_owned(), drives: drives.len(), over_best_classical, methods })
+        Self { set: set.to_owned(), drives: drives.len(), over_best_classical, methods }
     }
 }
 
@@ -270,9 +267,6 @@ pub struct Report {
     pub drives: Vec<DriveErrors>,
     /// The mean of each folder's drives.
     pub sets: Vec<Mean>,
-    /// The mean of all drives; absent without drives.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean: Option<PerMethod<Row>>,
 }
 
 impl Report {
@@ -284,9 +278,8 @@ impl Report {
             }
         }
         let of = |set: &String| drives.iter().filter(|drive| drive.set == *set).collect::<Vec<_>>();
-        let sets = names.iter().filter_map(|set| Mean::new(set, &of(set))).collect();
-        let mean = Mean::new("all", &drives.iter().collect::<Vec<_>>()).map(|mean| mean.methods);
-        Self { drives, sets, mean }
+        let sets = names.iter().map(|set| Mean::new(set, &of(set))).collect();
+        Self { drives, sets }
     }
 }
 
@@ -370,7 +363,6 @@ mod tests {
             let rate = (reference == "ref_gyr_z").then_some(error);
             let error = HeadingError {
                 mean_1s_rad: rate,
-                mean_10s_rad: rate,
                 mean_60s_rad: Some(error),
                 rms_rad: Some(error),
                 final_rad: Some(2.0 * error),
@@ -412,14 +404,14 @@ mod tests {
         due.sort_unstable();
         assert_eq!(names, due);
         let row = json["drives"][1]["methods"]["default"].as_object().unwrap();
-        let mut due = vec!["mean_1s_rad", "mean_10s_rad", "mean_60s_rad", "rms_rad", "final_rad", "delay_ms"];
+        let mut due = vec!["mean_1s_rad", "mean_60s_rad", "rms_rad", "final_rad", "delay_ms"];
         due.sort_unstable();
         assert_eq!(row.keys().map(String::as_str).collect::<Vec<_>>(), due);
-        assert!(row["mean_1s_rad"].is_null() && row["mean_10s_rad"].is_null());
+        assert!(row["mean_1s_rad"].is_null());
         assert_eq!((&row["rms_rad"], &row["final_rad"]), (&0.5.into(), &1.0.into()));
         // A mean covers only the drives that have the figure.
-        assert_eq!(json["mean"]["raw"]["mean_1s_rad"], 2.0);
-        assert_eq!(json["mean"]["raw"]["rms_rad"], 2.0);
+        assert_eq!(json["sets"][0]["methods"]["raw"]["mean_1s_rad"], 2.0);
+        assert_eq!(json["sets"][0]["methods"]["raw"]["rms_rad"], 2.0);
         let sets = json["sets"].as_array().unwrap().iter().map(|set| (&set["set"], &set["drives"]));
         assert_eq!(sets.collect::<Vec<_>>(), [(&"a".into(), &2.into()), (&"b".into(), &1.into())]);
     }
