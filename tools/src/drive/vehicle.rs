@@ -60,6 +60,8 @@ pub struct Mounting {
     pub roll_deg: f64,
     pub pitch_deg: f64,
     pub yaw_deg: f64,
+    /// The rows of the drive are already in the vehicle's axes: so wrote older imports, instead of zero angles.
+    pub applied: bool,
 }
 
 /// The dimensions of the wheels, and the channels of their speeds.
@@ -114,7 +116,7 @@ impl Vehicle {
         if vehicle.recording.start.is_some_and(|start| !(0.0..1e11).contains(&start)) {
             return Err(error("recording.start must be a time in seconds since 1970".to_owned()));
         }
-        let Mounting { roll_deg, pitch_deg, yaw_deg } = vehicle.mounting;
+        let Mounting { roll_deg, pitch_deg, yaw_deg, .. } = vehicle.mounting;
         if [roll_deg, pitch_deg, yaw_deg].iter().any(|angle| angle.is_nan() || angle.abs() > 360.0) {
             return Err(error("the angles of mounting must be at most 360 degrees".to_owned()));
         }
@@ -127,7 +129,7 @@ impl Mounting {
     pub fn rotation(&self) -> Option<Rotation> {
         let [roll, pitch, yaw] = [self.roll_deg, self.pitch_deg, self.yaw_deg].map(|angle| angle as f32);
         let rotation = Rotation::from_mounting(roll, pitch, yaw)?;
-        (rotation != Rotation::IDENTITY).then_some(rotation)
+        (!self.applied && rotation != Rotation::IDENTITY).then_some(rotation)
     }
 
     /// The mounting that turns rows as this one and then as `next`.
@@ -145,11 +147,11 @@ impl Mounting {
             (0.0, (-m[0][1]).atan2(m[1][1]))
         };
         let [roll_deg, pitch_deg, yaw_deg] = [roll, (-m[2][0]).atan2(level), yaw].map(f64::to_degrees);
-        Self { roll_deg, pitch_deg, yaw_deg }
+        Self { roll_deg, pitch_deg, yaw_deg, applied: false }
     }
 
     fn matrix(&self) -> [[f64; 3]; 3] {
-        let angles = [self.roll_deg, self.pitch_deg, self.yaw_deg];
+        let angles = if self.applied { [0.0; 3] } else { [self.roll_deg, self.pitch_deg, self.yaw_deg] };
         let [(sr, cr), (sp, cp), (sy, cy)] = angles.map(|angle| angle.to_radians().sin_cos());
         [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
@@ -166,7 +168,12 @@ mod tests {
 
     #[test]
     fn two_mountings_are_one() {
-        let of = |[roll_deg, pitch_deg, yaw_deg]: [f64; 3]| Mounting { roll_deg, pitch_deg, yaw_deg };
+        let of = |[roll_deg, pitch_deg, yaw_deg]: [f64; 3]| Mounting {
+            roll_deg,
+            pitch_deg,
+            yaw_deg,
+            applied: false,
+        };
         for (first, second) in [
             ([12.0, -34.0, 56.0], [-170.0, 20.0, 100.0]),
             ([0.0, 90.0, 30.0], [0.0; 3]),

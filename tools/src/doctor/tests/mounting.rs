@@ -40,8 +40,10 @@ fn obeying_the_doctor_converges_in_one_step() {
     {
         let [roll, pitch, yaw] = angles;
         mounted(&csv, Rotation::from_mounting(roll, pitch, yaw).unwrap());
-        // No file, and one with a mounting that is wrong.
-        for toml in ["", "[mounting]\nroll_deg = 40\nyaw_deg = 10\n"] {
+        // No file; one of an older import, whose angles do not count; one with a mounting that is wrong.
+        for toml in
+            ["", "[mounting]\nyaw_deg = 35\napplied = true\n", "[mounting]\nroll_deg = 40\nyaw_deg = 10\n"]
+        {
             let file = csv.with_extension("toml");
             std::fs::write(&file, toml).unwrap();
             let remedies = |doctor: &Doctor| -> Vec<String> {
