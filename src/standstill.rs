@@ -189,7 +189,7 @@ impl Judge {
         let fastest = speeds.map(|WheelSpeed(speed)| speed.unsigned_abs()).max().unwrap_or(0);
         let standstill = if fastest > TURNS { Standstill::Moving } else { wheels.standstill };
         // Some frames say that the vehicle moves, and not how fast.
-        self.drives = standstill == Standstill::Moving && !(TURNS..DRIVES).contains(&fastest);
+        self.drives = standstill == Standstill::Moving && (!wheels.has_speed() || fastest >= DRIVES);
         self.speed = fastest.max(self.speed.saturating_sub(BRAKING));
         match standstill {
             Standstill::Still => self.are_wheels_doubted |= self.speed > DEAD_BAND,

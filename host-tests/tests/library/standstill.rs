@@ -72,6 +72,20 @@ fn quiet_after_braking_is_a_stop_and_a_smooth_road_is_none() {
     }
 }
 
+/// A vehicle that creeps at its wheels' threshold has no more driven off than one whose wheels stand.
+#[test]
+fn wheels_faster_than_a_creep_show_that_a_vehicle_drives_off() {
+    let moving = |speed| wheels(speed, Standstill::Moving);
+    let bare = WheelSample::without_speeds(Standstill::Moving);
+    for (report, drives) in
+        [(moving(0.03), false), (moving(0.3), false), (moving(0.9), false), (moving(1.0), true), (bare, true)]
+    {
+        let mut car = Vehicle::new();
+        car.go(5.0, 0.0, 0.0, Some(&report));
+        assert_eq!(car.judge.has_driven_off(), drives, "{report:?}");
+    }
+}
+
 #[test]
 fn one_wheel_that_turns_is_motion() {
     let mut report = wheels(0.0, Standstill::Still);

@@ -51,7 +51,7 @@ fn run(
         let sample = ImuSample { temperature, angular_rate, ..turning(tick, rate(0.0)) };
         let sample = noisy(sample, NOISE, &mut noise);
         let standstill = if drives { Standstill::Moving } else { Standstill::Still };
-        let speeds = [Some(WheelSpeed(0)); WHEELS];
+        let speeds = [Some(WheelSpeed(if drives { 65_536 } else { 0 })); WHEELS];
         let wheels = WheelSample { time: sample.time, speeds, standstill };
         pipeline.correct(sample, Some(&wheels), &BoardState::GOOD).expect("a place on the grid")
     });

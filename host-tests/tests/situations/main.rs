@@ -44,6 +44,7 @@ const CURED: &[(&str, &str, u64)] = &[
     ("one small implausible reading", "van", 303),
     ("mounted 5 deg askew", "van", 508),
     ("loading ramp", "van", 507),
+    ("creeping from the start", "truck", 902),
 ];
 
 #[test]

@@ -80,7 +80,7 @@ impl WheelSignal {
         } else {
             // The product is at most 2^32 x 2^31.
             let value = self.field.extended(raw);
-            ((value * i64::from(self.factor_q16)) >> 16) + i64::from(self.offset.0)
+            ((value * i64::from(self.factor_q16) + (1 << 15)) >> 16) + i64::from(self.offset.0)
         };
         let code = if says(self.reverse_when)? == Some(true) { -code } else { code };
         let [least, most] = self.range.unwrap_or([WheelSpeed(-MAX_SPEED.0), MAX_SPEED]);
