@@ -35,7 +35,8 @@ impl BusOff {
     /// Takes whether the controller is off the bus, and whether a node has acknowledged a frame since the last call.
     pub fn follow(&mut self, is_off: bool, has_sent: bool, now: u64) {
         if is_off != self.is_off {
-            self.refuses_fd |= is_off && self.has_taken && self.interval == LAST_US;
+            let has_sent_fd = self.takes_fd(now);
+            self.refuses_fd |= is_off && self.has_taken && has_sent_fd && self.interval == LAST_US;
             (self.is_off, self.changed, self.has_taken) = (is_off, now, false);
             self.fd_from = now + self.interval / 2;
         }

@@ -156,6 +156,8 @@ pub(super) struct Sources<'a, R: NorFlash, W> {
     pub session: u8,
     pub security: &'a Security,
     pub errors: TransportErrors,
+    /// Why this tester's last request was refused.
+    pub refusal: Option<Refusal>,
 }
 
 pub(super) fn read<R: NorFlash, W: MappedSlots>(
@@ -163,7 +165,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
     from: &Sources<'_, R, W>,
     out: &mut Response,
 ) -> Result<(), Nrc> {
-    let Sources { device, counters, session, security, errors } = from;
+    let Sources { device, counters, session, security, errors, refusal } = from;
     match id {
         0xF186 => put(out, &[*session]),
         0xF18C => device.serial().iter().try_for_each(|byte| put(out, &hex(*byte))),
@@ -225,7 +227,7 @@ pub(super) fn read<R: NorFlash, W: MappedSlots>(
             }),
         ),
         0x010A => put_record(out, &device.info()),
-        0x010B => put_record(out, &device.refusal()),
+        0x010B => put_record(out, refusal),
         0x0111 => security::state(security, device, out),
         0x0112 => put(out, &counters.fog.samples.to_be_bytes()),
         0x0113 => put_words(

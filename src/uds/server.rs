@@ -53,8 +53,12 @@ impl Server {
         self.services.is_guest = is_guest;
     }
 
-    /// Counts a frame of a tester that is refused because another tester is being served.
-    pub fn refuse(&mut self) {
+    /// Counts a frame of a tester that is refused because another tester is being served. If the session is its own, it
+    /// lasts.
+    pub fn refuse(&mut self, is_owner: bool, now: u32) {
+        if is_owner && self.has_session() {
+            self.services.last_activity = now;
+        }
         self.transport.refuse();
     }
 
@@ -65,7 +69,7 @@ impl Server {
             self.transport.receive(data, now);
             self.services.is_functional = self.transport.request().is_some();
         } else if data.get(1) != Some(&(UdsCommand::TesterPresent as u8)) {
-            self.refuse();
+            self.transport.refuse();
         }
     }
 

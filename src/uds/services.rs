@@ -201,7 +201,7 @@ impl Services {
         out: &mut Response,
     ) -> Result<bool, Nrc> {
         let command = UdsCommand::from_repr(service).ok_or(Nrc::ServiceNotSupported)?;
-        if command != UdsCommand::ReadDataByIdentifier {
+        if command != UdsCommand::ReadDataByIdentifier && !self.is_guest {
             device.forget_refusal();
         }
         let needed = session::needed(command);
@@ -213,7 +213,7 @@ impl Services {
                     | UdsCommand::ClearDiagnosticInformation
             );
         if self.is_guest && is_owners {
-            return Err(nrc(device.refuse_request(Refusal::OtherTester)));
+            return Err(nrc(Refusal::OtherTester));
         }
         self.require_session(needed)?;
         if !session::has_sub_function(command) {
@@ -263,7 +263,8 @@ impl Services {
                 let Surroundings { counters, errors, .. } = surroundings;
                 let session = self.session() as u8;
                 let security = &self.security;
-                let sources = Sources { device: &*device, counters, session, security, errors };
+                let refusal = if self.is_guest { Some(Refusal::OtherTester) } else { device.refusal() };
+                let sources = Sources { device: &*device, counters, session, security, errors, refusal };
                 for id in rest.chunks_exact(2) {
                     let before = out.len();
                     put(out, id)?;

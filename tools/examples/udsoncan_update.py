@@ -1,10 +1,11 @@
 """Updates a board's firmware over CAN with udsoncan: python udsoncan_update.py INTERFACE CHANNEL UPDATE [SIGNATURE]
 
-INTERFACE and CHANNEL are python-can's, such as `socketcan can0`. For `cargo board --parked` they are
-`slcan socket://localhost:4005`. The bus has 500 kbit/s. UPDATE is written by `cargo fw`; a board with a key needs the
-SIGNATURE of `gyronet sign` and a restart by its supply. Packages: can-isotp, python-can[serial], udsoncan.
+INTERFACE and CHANNEL are python-can's, such as `socketcan can0` (up, at the bus's bit rate; other adapters get 500 kbit/s).
+For `cargo board --parked` they are `slcan socket://localhost:4005`. UPDATE is written by `cargo fw`; a board with a key needs
+the SIGNATURE of `gyronet sign` and a restart by its supply. Packages: can-isotp, python-can[serial], udsoncan.
 """
 
+import logging
 import sys
 import time
 from pathlib import Path
@@ -15,8 +16,9 @@ from udsoncan import DidCodec, MemoryLocation
 from udsoncan.client import Client
 from udsoncan.configs import default_client_config
 from udsoncan.connections import PythonIsoTpConnection
-from udsoncan.exceptions import NegativeResponseException
+from udsoncan.exceptions import NegativeResponseException, TimeoutException
 
+REQUEST, RESPONSE = 0x7E0, 0x7E8  # often those of the engine: `gyronet device get` shows the board's
 FIRMWARE, ADDRESS, USE = 0x011A, 2, 0xFF01
 HEAD, LENGTH_OF_A = 161, slice(25, 29)
 PROGRAMMING, HARD_RESET, CONDITIONS_NOT_CORRECT = 2, 1, 0x22
@@ -34,13 +36,14 @@ class Bytes(DidCodec):
 
 
 def transfer(client, number, block):
-    """Sends a block again while the board proves its standstill, which it does anew after an erase."""
+    """Sends a block again while the board proves its standstill, as after an erase, or answers another tester."""
     until = time.monotonic() + 30
     while True:
         try:
             return client.transfer_data(number & 0xFF, block)
-        except NegativeResponseException as refused:
-            if refused.response.code != CONDITIONS_NOT_CORRECT or time.monotonic() > until:
+        except (NegativeResponseException, TimeoutException) as error:
+            code = getattr(error, "response", None) and error.response.code
+            if code not in (None, CONDITIONS_NOT_CORRECT) or time.monotonic() > until:
                 raise
             time.sleep(0.5)
 
@@ -59,8 +62,10 @@ def update(client, file, signature):
             print(f"{start} of {len(image)} bytes", flush=True)
     client.request_transfer_exit()
     client.start_routine(USE)
-    print("the image starts on trial with the next start", flush=True)
-    if not signature:
+    print("the image starts on trial; `gyronet device info` says within a minute whether it is confirmed", flush=True)
+    if signature:
+        print("switch the supply off and on")
+    else:
         client.ecu_reset(HARD_RESET)
 
 
@@ -71,11 +76,15 @@ def main():
     file, signature = [*(Path(name).read_bytes() for name in names), b""][:2]
     # The board answers within 50 ms (P2); this computer and its adapter take a time of their own.
     config = default_client_config | {"data_identifiers": {FIRMWARE: Bytes}, "use_server_timing": False}
-    address = isotp.Address(isotp.AddressingMode.Normal_11bits, txid=0x7E0, rxid=0x7E8)
+    address = isotp.Address(isotp.AddressingMode.Normal_11bits, txid=REQUEST, rxid=RESPONSE)
     with can.Bus(interface=interface, channel=channel, bitrate=500_000) as bus:
         layer = isotp.CanStack(bus, address=address, params={"tx_padding": 0xAA})
         with Client(PythonIsoTpConnection(layer), config=config) as client:
-            update(client, file, signature)
+            client.logger.setLevel(logging.CRITICAL)  # a block that is refused once is no alarm
+            try:
+                update(client, file, signature)
+            except (NegativeResponseException, TimeoutException) as error:
+                sys.exit(f"{names[0]}: {error} (src/can/README.md says what to do where a request is refused)")
 
 
 if __name__ == "__main__":

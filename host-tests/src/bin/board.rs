@@ -19,7 +19,7 @@ use std::error::Error;
 use std::fs::File;
 use std::io::{self, ErrorKind, LineWriter, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -132,7 +132,7 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         .map(|path| File::create(path).map_err(|error| format!("{}: {error}", path.display())));
     let mut log = log.transpose()?.map(|file| Log::new(LineWriter::new(file)));
     let (mut vehicle, began) = (Vehicle::new(drive), Instant::now());
-    let (mut due, mut report, mut is_silent) = (began, REPORT, true);
+    let (mut due, mut report, mut sent_at) = (began, REPORT, Some(Duration::ZERO));
     for turn in (0..TURNS).cycle() {
         if turn == 0 {
             let sent = vehicle.next();
@@ -158,17 +158,22 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
             line.socket.write(&bytes);
         }
         for Seen { end, own, frame, .. } in board.bus_log() {
-            is_silent &= !own;
+            if own {
+                sent_at = Some(end);
+            }
             if let Some(log) = &mut log {
-                log.frame(Micros(end.as_micros() as u64), &frame)?;
+                let written = log.frame(Micros(end.as_micros() as u64), &frame);
+                written.map_err(|error| {
+                    format!("{}: {error}", args.log.as_deref().unwrap_or(Path::new("")).display())
+                })?;
             }
             adapter.seen(end, &frame);
         }
         adapter.write();
-        if now >= SENDS && std::mem::take(&mut is_silent) {
+        if sent_at.take_if(|at| now >= *at + SENDS).is_some() {
             eprintln!(
-                "{NAME}: no frame within {} s: is it a coprocessor for the STM32F405, with a crystal of {} Hz \
-                 (--crystal-hz)?",
+                "{NAME}: no frame for {} s: is it a coprocessor for the STM32F405, with a crystal of {} Hz \
+                 (--crystal-hz), at {BITS_PER_SECOND} bit/s?",
                 SENDS.as_secs(),
                 args.crystal_hz
             );
@@ -242,7 +247,7 @@ impl Line {
 struct Adapter {
     socket: Socket,
     port: Port<WAITING>,
-    /// What the client has sent, which it does not get back.
+    /// What the client has sent and the bus has not carried yet; the client does not get it back.
     sent: Vec<DataFrame>,
 }
 
@@ -255,22 +260,22 @@ impl Adapter {
     /// Takes what the client sends, for the bus.
     fn read(&mut self) -> io::Result<Vec<DataFrame>> {
         let bytes = self.socket.read()?;
-        if self.socket.client.is_none() {
+        if std::mem::take(&mut self.socket.is_new) {
             (self.port, self.sent) = (Port::new(BITS_PER_SECOND), Vec::new());
         }
-        let mut frames = Vec::new();
+        let sent = &mut self.sent;
+        let had = sent.len();
         for byte in bytes {
             self.port.receive(byte, |frame| {
-                frames.push(frame);
-                true
+                let has_room = sent.len() < WAITING;
+                sent.extend(has_room.then_some(frame));
+                has_room
             });
         }
+        let frames = sent[had..].to_vec();
         if !frames.is_empty() && !self.port.is_open() {
             b"O\r".iter().for_each(|byte| self.port.receive(*byte, |_| false));
         }
-        self.sent.extend(&frames);
-        // What the bus refuses does not come back.
-        self.sent.drain(..self.sent.len().saturating_sub(WAITING));
         Ok(frames)
     }
 
@@ -298,6 +303,7 @@ struct Socket {
     name: &'static str,
     listener: TcpListener,
     client: Option<TcpStream>,
+    is_new: bool,
 }
 
 impl Socket {
@@ -306,31 +312,32 @@ impl Socket {
             .map_err(|error| io::Error::new(error.kind(), format!("{name}: port {port}: {error}")))?;
         listener.set_nonblocking(true)?;
         println!("{name}: localhost:{}", listener.local_addr()?.port());
-        Ok(Self { name, listener, client: None })
+        Ok(Self { name, listener, client: None, is_new: false })
     }
 
-    /// Returns what the client has sent since the last call.
+    /// Returns what the client has sent since the last call, and takes the next client once it has gone.
     fn read(&mut self) -> io::Result<Vec<u8>> {
-        if self.client.is_none() {
-            match self.listener.accept() {
-                Ok((client, _)) => {
-                    client.set_nonblocking(true)?;
-                    client.set_nodelay(true)?;
-                    self.client = Some(client);
-                }
-                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
-                Err(error) => return Err(error),
-            }
-        }
-        let Some(client) = &mut self.client else { return Ok(Vec::new()) };
-        let mut bytes = [0; 512];
-        match client.read(&mut bytes) {
+        let mut bytes = vec![0; 512];
+        let read = self.client.as_mut().map_or(Ok(0), |client| client.read(&mut bytes));
+        match read {
             Ok(0) => self.client = None,
-            Ok(length) => return Ok(bytes[..length].to_vec()),
-            Err(error) if error.kind() == ErrorKind::WouldBlock => {}
-            Err(_) => self.client = None,
+            Err(ref error) if error.kind() != ErrorKind::WouldBlock => self.client = None,
+            _ => {}
         }
-        Ok(Vec::new())
+        bytes.truncate(read.unwrap_or(0));
+        match self.listener.accept() {
+            Ok(_) if self.client.is_some() => {
+                eprintln!("{}: has a client; another one is refused", self.name)
+            }
+            Ok((client, _)) => {
+                client.set_nonblocking(true)?;
+                client.set_nodelay(true)?;
+                (self.client, self.is_new) = (Some(client), true);
+            }
+            Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+            Err(error) => return Err(error),
+        }
+        Ok(bytes)
     }
 
     /// Sends to the client, if there is one; a client that does not read is disconnected.

@@ -20,7 +20,7 @@ use gyronet_tools::drive::recording::Recording;
 use std::time::{Duration, Instant};
 
 /// Age at which a frame no longer goes out, with the time that the frames before it take.
-const STALE: Duration = Duration::from_millis(25);
+const STALE: Duration = Duration::from_millis(21);
 const ANGLE: u16 = 0x1A1;
 
 /// Frames that went out when their sample was older than [`STALE`], with their place among the host's. An angle
@@ -223,6 +223,22 @@ fn nothing_old_goes_out_when_the_bus_takes_frames_again() {
         let dropped = counters(&mut run.board).lines.unsent as usize;
         let missing = run.made.len() - run.before.len() - run.after.len();
         assert!(dropped.abs_diff(missing) <= SET, "{setting}: {dropped} counted, {missing} missing");
+    }
+}
+
+/// The page's 20 ms, a tick and the frame itself.
+#[test]
+fn a_frame_waits_no_longer_than_its_age_allows() {
+    for lasts in 22..34 {
+        let Some(run) = disturbed(lasts * MS, ("CAN1.babble", true.into()), false.into()) else { return };
+        let first = |frame: &DataFrame| frame.id() == id(0x174);
+        let made: Vec<_> = run.made.iter().filter(|frame| first(frame)).collect();
+        let before: Vec<_> = run.before.iter().filter(|(_, frame)| first(frame)).collect();
+        let (at, frame) = run.after.iter().find(|(_, frame)| first(frame)).expect("the bus is free");
+        let ago = (0..6).find(|ago| made[before.len() + ago] == frame).expect("of these samples");
+        let usual = before[before.len() - 1].0 + SAMPLE * (ago as u32 + 1);
+        let late = at.saturating_sub(usual);
+        assert!(late <= 21 * MS + MS / 2, "{lasts} ms: {late:?}");
     }
 }
 

@@ -145,26 +145,33 @@ fn one_frame_of_can_fd_carries_a_set_as_it_is() {
     }
 }
 
-/// The controller goes off the bus at each CAN FD frame, or, with a short circuit, at each frame.
+/// The controller goes off the bus at each CAN FD frame, with a short circuit at each frame, or, with a loose connector, some
+/// time after each return.
 #[test]
 fn can_fd_frames_end_where_they_alone_take_the_board_off_the_bus() {
-    for (takes_fd, short_until) in [(false, 0), (true, 0), (true, 20_000)] {
+    const FOREVER: u64 = u64::MAX;
+    for (takes_fd, short_until, stays) in
+        [(false, 0, FOREVER), (true, 0, FOREVER), (true, 20_000, FOREVER), (true, 0, 100)]
+    {
         let mut bus = BusOff::new(0);
-        let (mut is_off, mut times_off, mut sent_at) = (false, 0, 0);
+        let (mut is_off, mut times_off, mut sent_at, mut returned) = (false, 0, 0, 0);
         for now in 0..30_000 {
             let is_short = now < short_until;
             let has_sent = !is_off && !is_short && now % 10 == 0;
             bus.follow(is_off, has_sent, 1_000 * now);
             if bus.is_off() && bus.returns(1_000 * now) {
-                is_off = false;
+                (is_off, returned) = (false, now);
             } else if now % 10 == 5 && !is_off {
                 let is_sent = bus.takes_fd(1_000 * now);
-                is_off = is_short || is_sent && !takes_fd;
+                is_off = is_short || is_sent && !takes_fd || now - returned >= stays;
                 times_off += u32::from(is_off);
                 sent_at = if is_sent && !is_off { now } else { sent_at };
             }
         }
         assert_eq!(bus.refuses_fd(), !takes_fd);
+        if stays < FOREVER {
+            continue;
+        }
         assert!(bus.is_off() == is_off && !is_off);
         if takes_fd {
             assert_eq!(sent_at, 29_995);

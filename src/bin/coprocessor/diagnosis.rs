@@ -172,7 +172,7 @@ impl Tester {
         }
         // A tester on another line has to wait.
         if self.line != line {
-            return self.server.refuse();
+            return self.server.refuse(self.owner == line, now);
         }
         if !self.server.has_session() {
             self.owner = line;

@@ -181,12 +181,16 @@ mod app {
             reception.as_mut().is_some_and(|reception| reception.count(elapsed))
         };
         let [imu, slcan, fog, gnss, service] = cx.local.receptions;
-        let has_work = is_due(now) | count(imu) | count(slcan) | count(fog) | count(gnss);
+        let has_work = is_due(now) | count(imu);
+        let has_input = count(slcan) | count(fog) | count(gnss);
         if count(service) {
             attend();
         }
         report(Task::Tick);
-        if has_work {
+        if has_input {
+            // The task may have run in this millisecond already, and then leaves these lines to the next.
+            attend_output();
+        } else if has_work {
             rtic::pend(Interrupt::SPI3);
         }
         dsb();

@@ -95,6 +95,8 @@ pub struct Output {
     outgoing: Outgoing,
     /// Time of the last sample, us.
     sampled_at: u32,
+    /// True if frames of an earlier sample still waited then: their age is watched.
+    is_behind: bool,
     /// Millisecond of the last poll of the other lines.
     polled_at: u32,
     /// Millisecond of the last report.
@@ -120,6 +122,7 @@ impl OutputParts {
             receiver: self.gnss.map(|line| GnssLine::new(line.protocol)),
             outgoing: Outgoing::new(slcan, self.bits_per_second, can),
             sampled_at: 0,
+            is_behind: false,
             polled_at: 0,
             reported_at: 0,
             joined: false,
@@ -165,9 +168,10 @@ impl Output {
             announce();
         }
         let is_slow = has_ticked && tick.wrapping_sub(self.reported_at) >= SLOW_MS;
+        let is_behind = !self.outgoing.is_sent();
         let has_sample = self.imu.has_input() && self.take_samples(coprocessor, now, is_polled);
         if has_sample {
-            self.sampled_at = now.0 as u32;
+            (self.sampled_at, self.is_behind) = (now.0 as u32, is_behind);
         }
         if !has_ticked && !has_sample {
             self.outgoing.refill();
@@ -191,7 +195,11 @@ impl Output {
     /// QUIET_UNTIL was read as `asked`.
     fn rest(&self, now: Micros, asked: u32, coprocessor: &Coprocessor) {
         let now = now.0 as u32;
-        let quiet = if self.outgoing.is_sent() { QUIET_US } else { LEAVE_US as u32 };
+        let quiet = match self.outgoing.is_sent() {
+            true => QUIET_US,
+            false if self.is_behind => 0,
+            false => LEAVE_US as u32,
+        };
         let is_quiet = now.wrapping_sub(self.sampled_at) < quiet
             && self.outgoing.is_at_rest()
             && self.imu.arm_wake_up()

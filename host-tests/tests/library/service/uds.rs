@@ -205,14 +205,20 @@ fn a_second_tester_neither_uses_nor_ends_the_session_of_the_first() {
     bench.expect(&[0x22, 0xF1, 0x86], &[0x62, 0xF1, 0x86, 1]);
     for request in ["2E010000", "2701", "1003", "1101", "14FFFFFF"].map(bytes) {
         bench.expect(&request, &[0x7F, request[0], 0x22]);
-        assert_eq!(bench.board.refusal(), Some(Refusal::OtherTester));
+        let reason = postcard::to_stdvec(&Some(Refusal::OtherTester)).expect("short");
+        bench.expect(&[0x22, 1, 0x0B], &[&[0x62, 1, 0x0B], &reason[..]].concat());
     }
     bench.server.set_guest(false);
     bench.expect(&[0x22, 0xF1, 0x86], &[0x62, 0xF1, 0x86, 3]);
     bench.fail(Status::Ready, Faults::NONE);
-    bench.now += 4_900;
-    bench.server.set_guest(true);
-    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    for refused_owner in [true, false] {
+        bench.now += 4_900;
+        bench.server.set_guest(true);
+        bench.expect(&[0x3E, 0], &[0x7E, 0]);
+        // The owner's frames are refused while the other is served.
+        bench.server.refuse(refused_owner, bench.now);
+        assert!(bench.server.has_session());
+    }
     bench.now += 200;
     bench.expect(&[0x3E, 0], &[0x7E, 0]);
     assert!(!bench.server.has_session(), "nor keeps it");
