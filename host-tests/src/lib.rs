@@ -1,4 +1,4 @@
-//! What the host tests share: how a test gets QEMU or the recordings or reports that it is skipped, the virtual board and
+//! Code that the host tests share: how a test gets QEMU or the recordings or reports that it is skipped, the virtual board and
 //! its image, and every generator of bytes, samples, streams and weights.
 
 pub mod board;

@@ -1,4 +1,4 @@
-//! What a test needs beyond Rust: it gets that, or is reported as skipped, or fails.
+//! Requirements of a test beyond Rust. A test without them is reported as skipped, or fails.
 //!
 //! `GYRONET_REQUIRE=qemu,data` makes tests that need these fail where they are missing; without it they print
 //! `SKIPPED name: why` and pass. The line goes straight to the process's standard error, which the test harness does
@@ -60,7 +60,7 @@ pub fn skipped(why: &str) {
     say(&report(&running(), why));
 }
 
-/// What was found, or `None` with a report on standard error that this test is skipped.
+/// Returns the requirement, or `None` with a report on standard error that this test is skipped.
 pub fn wants<T>(need: Need, found: Result<T, String>) -> Option<T> {
     let required = parse(&std::env::var(VARIABLE).unwrap_or_default());
     let required = required.unwrap_or_else(|error| panic!("{error}"));

@@ -1,4 +1,4 @@
-//! What a coprocessor has sent and observed, kept for a test.
+//! Frames and observations of a coprocessor, kept for a test.
 
 use gyronet::coprocessor::{Observation, Sink, TimedFrame};
 use gyronet::estimate::YawEstimate;

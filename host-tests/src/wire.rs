@@ -73,7 +73,7 @@ pub fn message(time: u32) -> MtData2 {
     }
 }
 
-/// What a part's driver delivers for these bytes.
+/// Results of a part's driver for these bytes.
 pub fn feed<P: ByteSource>(
     part: &mut P,
     bytes: impl IntoIterator<Item = impl Borrow<u8>>,

@@ -3,7 +3,7 @@
 //! It is subtracted from each reading, in the sensor's own axes, so that later stages see a sensor with less bias:
 //! before the first standstill, and while the sensor warms up on a drive without one. A Kalman filter learns both with
 //! an offset that one start has at all temperatures. The axes share a covariance: they are always measured together.
-//! What real parts bend by is part of each sigma.
+//! The curvature of real parts is part of each sigma.
 
 use crate::sqrt::sqrt;
 use crate::units::{AngularRate, CentiCelsius};

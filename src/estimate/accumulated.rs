@@ -1,6 +1,6 @@
 //! The accumulated yaw: the sum of the rates that may be used, the gaps in it, and how much may be missing.
 //!
-//! What the vehicle turns while no rate may be used is missing for good. With the rates v and w before and after a gap
+//! The angle turned while no rate may be used is missing for good. With the rates v and w before and after a gap
 //! of T seconds, a random walk between them, it is likely (v + w) T / 2, with a variance of ((v - w) T / 2)^2 + q^2
 //! T^3 / 3. The likely angles of many gaps in one turn add up; their rest does not.
 

@@ -1,6 +1,6 @@
 //! The receiver of courses, speeds and latitudes from the frames, or the serial line, that the configuration names.
 //!
-//! Of NMEA 2000 and J1939, one sender is used, and another once that one has been silent for [`SILENT`]: receivers
+//! One sender of NMEA 2000 or J1939 is used, and another once that one has been silent for [`SILENT`]: receivers
 //! differ in latency. A described course counts when its frame comes, with other values not older than [`FRESH`].
 
 use super::described::HeadingSignal;

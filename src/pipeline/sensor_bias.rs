@@ -25,9 +25,9 @@ pub(super) struct SensorBias {
     found: [AngularRate; 3],
     /// Temperature at which zero-rate updates have found the rest, deg C, and the sigma of its change since, rad/s.
     reference: Option<f32>,
-    /// Of the bias with temperature since the last [`SensorBias::refer`], rad/s; 0 without a temperature.
+    /// Sigma of the change of bias with temperature since the last [`SensorBias::refer`], rad/s; 0 without a temperature.
     pub(super) change_sigma: f32,
-    /// What earlier drives have shown: the rotation beyond the mounting, and the force at rest, in the sensor's axes.
+    /// Results of earlier drives: the rotation beyond the mounting, and the force at rest, in the sensor's axes.
     early: Option<(Rotation, [SpecificForce; 3])>,
     /// Specific force of this second, codes, and its good samples.
     force: ([i64; 3], i64),

@@ -23,7 +23,7 @@ pub(super) struct Windows {
     since: u32,
     /// Tick of the window that has been handed out, and its estimate once delivered.
     out: Option<(u32, Option<Estimate>)>,
-    /// Whether the newest estimate is in use, and its fault: it was rejected or late.
+    /// True if the newest estimate is in use; otherwise `faults` says that it was rejected or late.
     pub accepted: bool,
     pub faults: Faults,
 }

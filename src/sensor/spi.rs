@@ -1,4 +1,4 @@
-//! What the drivers of inertial sensors on SPI share: errors, registers, the check of a setting, conversions.
+//! Code that the drivers of inertial sensors on SPI share: errors, registers, the check of a setting, conversions.
 //!
 //! Each part checks a register at each call for a sample, so that a flipped bit is found within as many calls as it
 //! has registers. Two kinds of error concern the caller: the part must be configured again, or a sample is lost

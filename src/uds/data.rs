@@ -156,7 +156,7 @@ pub(super) struct Sources<'a, R: NorFlash, W> {
     pub session: u8,
     pub security: &'a Security,
     pub errors: TransportErrors,
-    /// Why this tester's last request was refused.
+    /// Reason of the last refusal: the owner's, or for a guest [`Refusal::OtherTester`].
     pub refusal: Option<Refusal>,
 }
 

@@ -247,7 +247,7 @@ impl Line {
 struct Adapter {
     socket: Socket,
     port: Port<WAITING>,
-    /// What the client has sent and the bus has not carried yet; the client does not get it back.
+    /// Frames of the client that the bus has not carried yet. They are not sent back to the client.
     sent: Vec<DataFrame>,
 }
 

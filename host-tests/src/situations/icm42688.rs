@@ -33,7 +33,7 @@ pub fn packet(sample: &ImuSample) -> Packet {
             .map(|force| reading(force.metre_per_sec2(), FORCE_STEP, FORCE_COUNTS)),
         rate: sample.angular_rate.map(|rate| reading(rate.rad_per_sec(), RATE_STEP, RATE_COUNTS)),
         temperature: sample.temperature.map(|code| (f32::from(code.0) * 1.3248 - 3312.0).round() as i16),
-        // Of 16 bits, of 32/30 us each.
+        // Time stamps have 16 bits of 32/30 us.
         time: ((sample.time.0 * 30 + 16) / 32) as u16,
     }
 }

@@ -106,7 +106,7 @@ pub struct Outcome {
     pub least: f64,
     /// Good seconds inside one expected error, straight on and in turns.
     pub inside: [Share; 2],
-    /// Of good seconds, spans, and minutes.
+    /// Errors of good seconds, spans, and minutes.
     pub second: Errors,
     pub span: Errors,
     pub minute: Errors,

@@ -78,7 +78,7 @@ fn fog_message(number: usize, part: usize, rate: f64) -> Vec<u8> {
     message.emit().to_vec()
 }
 
-/// What the outside sends, and the frames that the host computes from that.
+/// Input of all lines, and the frames that the host computes from it.
 struct Outside {
     drive: Simulation,
     number: usize,

@@ -48,7 +48,7 @@ impl Started {
         self.frames.iter().filter(move |frame| frame.id() == id).map(Frame::data)
     }
 
-    /// Whether the messages report that something stored is damaged: from the first one on, or never.
+    /// True if the messages report damaged stored data: from the first one on, or never.
     fn flagged(&self) -> bool {
         let faults = self.of(RATE + 1).map(|data| AngleMessage::parse(data).expect("eight bytes").faults);
         let flags: Vec<bool> = faults.map(|faults| faults.contains(Faults::STORED)).collect();

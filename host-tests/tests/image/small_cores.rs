@@ -32,7 +32,7 @@ const BOARDS: [Board; 2] = [
     },
 ];
 
-/// What the image prints for a model.
+/// Output of the image for a model.
 fn lines<const LEN: usize>(units: u16) -> Vec<String> {
     let file = Aligned(models::file::<LEN>(Shape { units, linear: true }, 19));
     let mut network = GyroNet::new(Blob::new_checked(&file.0).expect("a random model"));

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 #[derive(Debug, Default)]
 pub struct Line {
-    /// What arrives; `None` is a byte that the port has lost.
+    /// Received bytes; `None` is a byte that the port has lost.
     received: VecDeque<Option<u8>>,
     /// Bytes that it still takes.
     pub room: usize,

@@ -24,7 +24,7 @@ use gyronet::service::message::LineCounters;
 use gyronet::store::ImuPart;
 use gyronet::units::Micros;
 
-/// For so long after a sample the task runs only if something has come, us. A silent sensor is noticed later than that.
+/// Time after a sample in which the tick runs the task for received bytes only, us. A sensor counts as silent later.
 const QUIET_US: u32 = 20_000;
 static QUIET_UNTIL: AtomicU32 = AtomicU32::new(0);
 

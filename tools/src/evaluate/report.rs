@@ -55,7 +55,7 @@ pub struct Row {
     pub delay_ms: u64,
 }
 
-/// What the table shows, and its columns after the methods' names.
+/// Title of the table, which heads the methods' names, and headings of all columns.
 pub const TITLE: &str = "heading error, deg";
 pub const HEADINGS: [&str; 5] = [TITLE, "in 1 s", "in 60 s", "RMS", "at the end"];
 /// A method has failed whose error is so many times that of static initialisation.
