@@ -10,11 +10,7 @@ pub mod fognet;
 #[doc(hidden)]
 pub mod fognet_blob;
 #[doc(hidden)]
-pub mod fognet_f32;
-#[doc(hidden)]
 pub mod gyronet;
-#[doc(hidden)]
-pub mod gyronet_f32;
 mod input;
 #[doc(hidden)]
 pub mod seconds;

@@ -1,4 +1,4 @@
-//! Recurrent networks in integers, so that every machine gets the same bits, and in f32 as the reference.
+//! Recurrent networks in integers, so that every machine gets the same bits.
 //!
 //! Weights are immutable slices, separate from the state, which the caller owns. The number formats:
 //!
@@ -26,7 +26,6 @@ pub mod bilstm;
 pub mod dense;
 pub mod linear;
 pub mod lstm;
-pub mod reference;
 mod simd;
 
 pub const HIDDEN_FRACTION_BITS: u32 = 10;

@@ -3,13 +3,13 @@
 
 use gyronet::model::fognet::{FogNetState, MinuteNetwork};
 use gyronet::model::fognet_blob::INPUTS;
-use gyronet::model::fognet_f32::FogNetF32;
 use gyronet::model::seconds::{Minute, STEPS, Second};
 use gyronet::model::{FogBlob, FogNet, weights};
 use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 use gyronet_host_tests::golden::{Golden, WINDOWS};
 use gyronet_host_tests::recordings::workspace;
 use gyronet_tools::network::checkpoint::{self, Checkpoint};
+use gyronet_tools::network::reference::fognet::FogNetF32;
 
 /// Features in m/s^2, rad/s, m and rad.
 type Window = [[f32; INPUTS]; STEPS];

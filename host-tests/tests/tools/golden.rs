@@ -4,8 +4,6 @@
 use gyronet::model::WindowNetwork;
 use gyronet::model::blob::HIDDEN;
 use gyronet::model::fognet_blob::{HIDDEN2, INPUTS};
-use gyronet::model::fognet_f32::FogLayerOutputs;
-use gyronet::model::gyronet_f32::LayerOutputs;
 use gyronet::model::seconds::STEPS;
 use gyronet::model::window::{FEATURES, Features, WINDOW};
 use gyronet::units::{AngularRate, SpecificForce};
@@ -14,6 +12,8 @@ use gyronet_host_tests::models;
 use gyronet_host_tests::recordings::workspace;
 use gyronet_tools::bundled;
 use gyronet_tools::network::checkpoint::{Checkpoint, FogNet};
+use gyronet_tools::network::reference::fognet::FogLayerOutputs;
+use gyronet_tools::network::reference::gyronet::LayerOutputs;
 
 #[test]
 fn every_layer_of_gyronet_equals_pytorch() {

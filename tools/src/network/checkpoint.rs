@@ -2,14 +2,14 @@
 
 pub use super::tensors::CheckpointError;
 
+use super::reference::LstmWeights;
+use super::reference::fognet::FogNetF32;
+use super::reference::gyronet::{GyroNetF32, NetworkF32};
 use super::tensors::{Found, Shape, Tensors, bilstm, dense, tensor};
 use gyronet::model::blob::{self, HIDDEN, LINEAR_INPUTS};
 use gyronet::model::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
-use gyronet::model::fognet_f32::FogNetF32;
-use gyronet::model::gyronet_f32::{GyroNetF32, NetworkF32};
 use gyronet::model::seconds::STEPS;
 use gyronet::model::window::{FEATURES, WINDOW};
-use gyronet::nn::reference::LstmWeights;
 use std::marker::PhantomData;
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! Reads a checkpoint file (safetensors) and checks that a network's tensors exist, fit and are
 //! finite.
 
-use gyronet::nn::reference::LstmWeights;
+use super::reference::LstmWeights;
 use safetensors::{Dtype, SafeTensors};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;

@@ -1,8 +1,8 @@
 //! Writes LSTM directions and output rows in int8 and int16, in the order in which the kernels read them.
 
 use super::{QuantizeError, fixed};
+use crate::network::reference::LstmWeights;
 use gyronet::nn::lstm::{DirectionWeights, ROW_LIMIT};
-use gyronet::nn::reference::LstmWeights;
 use gyronet::nn::{GATES, HIDDEN_FRACTION_BITS, HIDDEN_MAX, pack};
 
 #[derive(Debug, Clone)]

@@ -1,10 +1,10 @@
 //! Computes FoGNet in f32 from PyTorch's tensors; it defines what the integer network approximates.
 
-use super::fognet::{FogEstimate, GAIN_FRACTION_BITS, MinuteNetwork};
-use super::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
-use crate::model::seconds::{STEPS, SecondsWindow};
-use crate::nn::reference::{LstmWeights, dense, lstm};
-use crate::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
+use super::{LstmWeights, dense, lstm};
+use gyronet::model::fognet::{FogEstimate, GAIN_FRACTION_BITS, MinuteNetwork};
+use gyronet::model::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
+use gyronet::model::seconds::{STEPS, SecondsWindow};
+use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 
 /// Holds FoGNet's tensors, with the names and layouts of the checkpoint.
 #[derive(Debug, Clone, Copy)]

@@ -1,9 +1,12 @@
-//! Computes the layers in plain f32, the reference for the integer code; it is never optimised.
+//! Computes the networks in plain f32, the reference for the integer code; it is never optimised.
 //!
 //! It follows equations 7 to 12 of Zhao et al., with the weights as PyTorch lays them out: the rows of `weight_ih` (4H,
 //! I) and `weight_hh` (4H, H) are the gates i, f, g, o in that order, H rows each, and there are two bias vectors (4H).
 
-use super::GATES;
+pub mod fognet;
+pub mod gyronet;
+
+use ::gyronet::nn::GATES;
 
 /// Holds the weights of one direction of an LSTM layer, in PyTorch's layout, row-major.
 #[derive(Debug, Clone, Copy)]

@@ -1,10 +1,9 @@
 //! Computes GyroNet in f32 from the tensors of training; it defines what the integer network approximates.
 
-use super::blob::{HIDDEN, LINEAR_INPUTS};
-use super::{Estimate, WindowNetwork};
-use crate::model::window::{FEATURES, Features, WINDOW};
-use crate::nn::reference::{LstmWeights, dense, lstm};
-use crate::units::{AngularRate, SpecificForce};
+use super::{LstmWeights, dense, lstm};
+use gyronet::model::blob::{HIDDEN, LINEAR_INPUTS};
+use gyronet::model::{Estimate, FEATURES, Features, WINDOW, WindowNetwork};
+use gyronet::units::{AngularRate, SpecificForce};
 
 /// Holds GyroNet's tensors, with the names and layouts of the checkpoint.
 #[derive(Debug, Clone, Copy)]
