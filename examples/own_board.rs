@@ -3,41 +3,33 @@
 //!
 //! `cargo run -p gyronet-images --example own_board --features stm32f405 --target thumbv7em-none-eabihf` runs it in QEMU: four
 //! seconds of a parked car; the exit status reports whether every frame was sent.
-#![cfg_attr(target_os = "none", no_std, no_main)]
+#![no_std]
+#![no_main]
 
-#[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!("this example runs on a Cortex-M: add --features stm32f405 --target thumbv7em-none-eabihf");
-}
-
-#[cfg(target_os = "none")]
 mod parked_car;
 
-#[cfg(target_os = "none")]
-mod firmware {
-    use crate::parked_car::{Controller, PERIOD_US, Port, exit_at_the_end};
-    use gyronet::can::wheel::{WheelReceiver, WheelSettings};
-    use gyronet::coprocessor::QueuedCan;
-    use gyronet::sensor::{serial::Serial, xsens::Mti};
-    use gyronet::{Config, Coprocessor, GyroNet, Micros};
-    use panic_semihosting as _;
-    #[expect(unused_imports, reason = "links the interrupt vectors")]
-    use stm32f4::stm32f405 as _;
+use crate::parked_car::{Controller, PERIOD_US, Port, exit_at_the_end};
+use gyronet::can::wheel::{WheelReceiver, WheelSettings};
+use gyronet::coprocessor::QueuedCan;
+use gyronet::sensor::{serial::Serial, xsens::Mti};
+use gyronet::{Config, Coprocessor, GyroNet, Micros};
+use panic_semihosting as _;
+#[expect(unused_imports, reason = "links the interrupt vectors")]
+use stm32f4::stm32f405 as _;
 
-    #[cortex_m_rt::entry]
-    fn main() -> ! {
-        let wheels = Some(WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings"));
-        let mut coprocessor = Coprocessor::new(Config { wheels, ..Config::DEFAULT });
-        let mut network = GyroNet::shipped().expect("it comes with the library");
-        let mut imu = Serial::new(Port::default(), Mti::new());
-        let mut can = QueuedCan::<_>::new(Controller::default());
-        let mut now = Micros(0);
-        loop {
-            // Received frames, samples, windows, silence, frames to send. Errors are counted and reported on the bus.
-            coprocessor.step(now, &mut imu, &mut can, Some(&mut network));
-            exit_at_the_end(now, can.controller(), coprocessor.input_counters());
-            // A board reads its timer here, and steps about every millisecond.
-            now.0 += PERIOD_US;
-        }
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let wheels = Some(WheelReceiver::new(WheelSettings::TOYOTA).expect("checked settings"));
+    let mut coprocessor = Coprocessor::new(Config { wheels, ..Config::DEFAULT });
+    let mut network = GyroNet::shipped().expect("it comes with the library");
+    let mut imu = Serial::new(Port::default(), Mti::new());
+    let mut can = QueuedCan::<_>::new(Controller::default());
+    let mut now = Micros(0);
+    loop {
+        // Received frames, samples, windows, silence, frames to send. Errors are counted and reported on the bus.
+        coprocessor.step(now, &mut imu, &mut can, Some(&mut network));
+        exit_at_the_end(now, can.controller(), coprocessor.input_counters());
+        // A board reads its timer here, and steps about every millisecond.
+        now.0 += PERIOD_US;
     }
 }

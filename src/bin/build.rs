@@ -25,10 +25,15 @@ fn main() {
         println!("cargo:rerun-if-changed={input}");
     }
     EMULATED.iter().for_each(|(_, map)| println!("cargo:rerun-if-changed={map}"));
+    let has = |feature: &str| env::var_os(feature).is_some();
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
+        let is_image = has("CARGO_FEATURE_STM32F405") || has("CARGO_FEATURE_SMALL_CORE");
+        assert!(
+            !is_image,
+            "an image is built for its processor: with `cargo fw`, `bringup`, `bench-target` or `selftest`"
+        );
         return;
     }
-    let has = |feature: &str| env::var_os(feature).is_some();
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     println!("cargo:rustc-link-search={}", out.display());
     // cortex-m-rt's link.x includes memory.x from the search path, and memory.x includes regions.x.

@@ -5,67 +5,51 @@
 //! no bus and no host. It uses the coprocessor's drivers. In the last check the watchdog resets the chip, so the
 //! image starts twice and reports that check the second time. It erases nothing but the last sector, and only if the
 //! first 64 bytes of that sector are blank.
-#![cfg_attr(target_os = "none", no_std, no_main)]
+#![no_std]
+#![no_main]
 
-#[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!("this is a firmware image: run it with `cargo bringup`");
-}
-
-#[cfg(target_os = "none")]
 #[path = "../boards/mod.rs"]
 #[allow(dead_code, reason = "loopback needs no pins")]
 mod boards;
-#[cfg(target_os = "none")]
 mod brownout;
-#[cfg(target_os = "none")]
 mod lines;
-#[cfg(target_os = "none")]
 mod networks;
-#[cfg(target_os = "none")]
 mod peripherals;
-#[cfg(target_os = "none")]
 mod report;
-#[cfg(target_os = "none")]
 mod reset;
-#[cfg(target_os = "none")]
 #[path = "../stm32f405/mod.rs"]
 #[allow(dead_code, reason = "the drivers are the coprocessor's, which uses all of them")]
 mod stm32f405;
 
-#[cfg(target_os = "none")]
-mod firmware {
-    use crate::boards::BOARD;
-    use crate::report::Report;
-    use crate::stm32f405::{Chip, pac, watchdog};
-    use crate::{lines, networks, peripherals, reset};
-    use core::panic::PanicInfo;
+use crate::boards::BOARD;
+use crate::report::Report;
+use crate::stm32f405::{Chip, pac, watchdog};
+use core::panic::PanicInfo;
 
-    #[cortex_m_rt::entry]
-    fn main() -> ! {
-        let Some(p) = pac::Peripherals::take() else { cortex_m::peripheral::SCB::sys_reset() };
-        let Some(core) = cortex_m::Peripherals::take() else { cortex_m::peripheral::SCB::sys_reset() };
-        let chip = Chip::start(&p, BOARD.crystal_hz);
-        let mut report = Report::start(&chip);
-        if let Some(elapsed_us) = reset::elapsed(chip.reset) {
-            reset::report_result(&mut report, elapsed_us);
-            report.end();
-        }
-        peripherals::led(&mut report, &chip.clocks);
-        peripherals::clock(&mut report, &chip);
-        peripherals::supply(&mut report, &p.FLASH);
-        peripherals::can(&mut report, &chip, p.CAN1);
-        peripherals::sensor(&mut report, &p.SPI1);
-        lines::check_all(&mut report, &chip.clocks);
-        peripherals::flash(&mut report, p.FLASH);
-        networks::count(&mut report, core.DCB, core.DWT);
-        watchdog::feed();
-        reset::wait_for_watchdog(&mut report)
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let Some(p) = pac::Peripherals::take() else { cortex_m::peripheral::SCB::sys_reset() };
+    let Some(core) = cortex_m::Peripherals::take() else { cortex_m::peripheral::SCB::sys_reset() };
+    let chip = Chip::start(&p, BOARD.crystal_hz);
+    let mut report = Report::start(&chip);
+    if let Some(elapsed_us) = reset::elapsed(chip.reset) {
+        reset::report_result(&mut report, elapsed_us);
+        report.end();
     }
+    peripherals::led(&mut report, &chip.clocks);
+    peripherals::clock(&mut report, &chip);
+    peripherals::supply(&mut report, &p.FLASH);
+    peripherals::can(&mut report, &chip, p.CAN1);
+    peripherals::sensor(&mut report, &p.SPI1);
+    lines::check_all(&mut report, &chip.clocks);
+    peripherals::flash(&mut report, p.FLASH);
+    networks::count(&mut report, core.DCB, core.DWT);
+    watchdog::feed();
+    reset::wait_for_watchdog(&mut report)
+}
 
-    #[panic_handler]
-    fn panic(info: &PanicInfo<'_>) -> ! {
-        Report::attach().fail("bringup", format_args!("{info}"));
-        cortex_m::peripheral::SCB::sys_reset()
-    }
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    Report::attach().fail("bringup", format_args!("{info}"));
+    cortex_m::peripheral::SCB::sys_reset()
 }

@@ -26,47 +26,28 @@
 //! `output`, `window` and `idle` share the library's `Coprocessor`; everything else is passed on in queues of fixed
 //! length, and what does not fit is counted. An estimate is used two samples after its window, so the time at which
 //! it is ready changes no frame. A crash records its reason in RAM and resets the chip.
-#![cfg_attr(target_os = "none", no_std, no_main)]
+#![no_std]
+#![no_main]
 
-#[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!("this is a firmware image: build it with `cargo fw`");
-}
-
-#[cfg(target_os = "none")]
 mod board;
-#[cfg(target_os = "none")]
 #[path = "../boards/mod.rs"]
 mod boards;
-#[cfg(target_os = "none")]
 mod copy;
-#[cfg(target_os = "none")]
 mod crash;
-#[cfg(target_os = "none")]
 mod diagnosis;
-#[cfg(target_os = "none")]
 mod frames;
-#[cfg(target_os = "none")]
 mod idle;
-#[cfg(target_os = "none")]
 mod imu;
-#[cfg(target_os = "none")]
 mod output;
-#[cfg(target_os = "none")]
 mod regions;
-#[cfg(target_os = "none")]
 mod ring;
-#[cfg(target_os = "none")]
 mod serial;
-#[cfg(target_os = "none")]
 mod start;
-#[cfg(target_os = "none")]
 #[path = "../stm32f405/mod.rs"]
 mod stm32f405;
 
 /// Vector and priority of each task below as data, because the stack analysis reads them there and RTIC encodes them
 /// only in instructions. A test compares them with the running image.
-#[cfg(target_os = "none")]
 #[allow(unsafe_code, reason = "a section that is not loaded")]
 #[used]
 #[unsafe(link_section = ".priorities")]
@@ -91,7 +72,6 @@ static PRIORITIES: [[u8; 2]; 12] = {
 };
 
 // This image does not use SPI3 and UART5; software pends their interrupts to run `output` and `window`.
-#[cfg(target_os = "none")]
 #[allow(unsafe_code, reason = "what RTIC generates; nothing in here is written with it")]
 #[rtic::app(device = crate::stm32f405::pac, peripherals = true)]
 mod app {

@@ -62,7 +62,8 @@ pub fn wait_until(polls: u32, is_ready: impl Fn() -> bool) -> bool {
     (0..polls).any(|_| is_ready())
 }
 
-fn enable_peripherals(rcc: &pac::RCC) {
+/// Switches on the clocks of all peripherals in use.
+pub fn enable_peripherals(rcc: &pac::RCC) {
     rcc.ahb1enr().modify(|_, w| {
         w.gpioaen().enabled().gpioben().enabled().gpiocen().enabled().gpioden().enabled().gpioeen().enabled();
         w.dma1en().enabled().dma2en().enabled()
