@@ -3,15 +3,15 @@
 
 use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, decode, nrc, put, put_record};
-use super::security::{self, Security};
-use super::services::UPDATE;
+use super::security::Seed;
+use super::services::{Exchange, UPDATE};
 use crate::coprocessor::Contradiction;
 use crate::fog::FogCounters;
 use crate::heading::CourseCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters};
+use crate::service::MappedSlots;
 use crate::service::device::Firmware;
-use crate::service::message::{AccessCounters, AllCounters, LineCounters, Refusal};
-use crate::service::{Device, MappedSlots};
+use crate::service::message::{AccessCounters, LineCounters, Refusal};
 use crate::store::slots::WeightSource;
 use crate::store::{Calibration, Configuration, Record, Slot};
 use embedded_storage::nor_flash::NorFlash;
@@ -150,181 +150,169 @@ macro_rules! words {
     }};
 }
 
-pub(super) struct Sources<'a, R: NorFlash, W> {
-    pub device: &'a Device<R, W>,
-    pub counters: &'a AllCounters,
-    pub session: u8,
-    pub security: &'a Security,
-    pub errors: TransportErrors,
-    /// Reason of the last refusal: the owner's, or for a guest [`Refusal::OtherTester`].
-    pub refusal: Option<Refusal>,
-}
-
-pub(super) fn read<R: NorFlash, W: MappedSlots>(
-    id: u16,
-    from: &Sources<'_, R, W>,
-    out: &mut Response,
-) -> Result<(), Nrc> {
-    let Sources { device, counters, session, security, errors, refusal } = from;
-    match id {
-        0xF186 => put(out, &[*session]),
-        0xF18C => device.serial().iter().try_for_each(|byte| put(out, &hex(*byte))),
-        0xF189 => put(out, &device.info().identity.firmware),
-        0xF197 => put(out, b"gyronet"),
-        0x0100 => {
-            put(out, &[Configuration::VERSION])?;
-            put_record(out, device.configuration())
-        }
-        0x0101 => put_record(out, device.wheels()),
-        0x0102 => {
-            put(out, &[Calibration::VERSION])?;
-            put_record(out, device.calibration())
-        }
-        0x0103 => {
-            let info = device.info();
-            let source = match info.weights {
-                WeightSource::None => 0,
-                WeightSource::BuiltIn => 1,
-                WeightSource::Slot(Slot::A) => 2,
-                WeightSource::Slot(Slot::B) => 3,
-            };
-            put(out, &[source])?;
-            put(out, &info.weights_crc.unwrap_or(0).to_be_bytes())
-        }
-        0x0104 => {
-            let now = device.conditions();
-            put(out, &[now.status as u8, now.faults.0])
-        }
-        0x0105 => put_words(
-            out,
-            &words!(counters.pipeline => Counters {
-                samples, missing, misplaced, clock_jumps, invalid, moving, windows, clamped_inputs, implausible, late,
-                zero_rate_updates, contradicted, moved_mounts
-            }),
-        ),
-        0x0106 => {
-            let monitor =
-                words!(counters.watch => MonitorCounters { silences, stuck, held, wrong, clock_off });
-            let inputs = words!(counters.inputs => InputCounters {
-                imu_errors, fog_errors, wheel_errors, latitude_errors, heading_errors, clock_back, unclaimed_estimates,
-                replaced_windows, out_of_range
-            });
-            let lines = words!(counters.lines => LineCounters {
-                unsent, line_errors, overruns, service_errors, frames_lost
-            });
-            put_words(out, &monitor)?;
-            put_words(out, &inputs)?;
-            put_words(out, &lines)
-        }
-        0x0107 => {
-            put_words(out, &words!(*errors => TransportErrors { unexpected, sequence, overflow, timeout }))
-        }
-        0x0108 => put(out, &device.conditions().tick.to_be_bytes()),
-        0x0109 => put_words(
-            out,
-            &words!(counters.fog => FogCounters {
-                samples, misplaced, gaps, stuck, no_latitude, zero_rate_updates, contradicted
-            }),
-        ),
-        0x010A => put_record(out, &device.info()),
-        0x010B => put_record(out, refusal),
-        0x0111 => security::state(security, device, out),
-        0x0112 => put(out, &counters.fog.samples.to_be_bytes()),
-        0x0113 => put_words(
-            out,
-            &words!(device.access_counters() => AccessCounters {
-                locked, unsigned, answers, signatures, replayed
-            }),
-        ),
-        0x0115 => put_record(out, device.learned()),
-        0x0116 => {
-            let known = device.forward_deg();
-            let [yaw, sigma] = known.unwrap_or_default().map(|angle| libm::roundf(100.0 * angle) as i16);
-            put(out, &[device.forward_knowledge() as u8])?;
-            put(out, &yaw.to_be_bytes())?;
-            put(out, &sigma.to_be_bytes())
-        }
-        0x0118 => {
-            let (knowledge, angles) = device.level_deg();
-            put(out, &[knowledge as u8])?;
-            angles
-                .into_iter()
-                .try_for_each(|angle| put(out, &(libm::roundf(100.0 * angle) as i16).to_be_bytes()))
-        }
-        0x0119 => {
-            let (course, knowledge) = device.course();
-            let codes = course.gain.map_or([0.0, 0.0], |gain| [gain.share, gain.sigma]);
-            put(out, &[knowledge as u8])?;
-            codes.iter().try_for_each(|share| put(out, &(libm::roundf(1e5 * share) as i16).to_be_bytes()))?;
-            put_words(out, &words!(course.counters => CourseCounters { used, refused, restarts }))?;
-            put(out, &[course.refusal.map_or(0, |refusal| refusal as u8)])
-        }
-        0x011B => {
-            let Contradiction { seconds, gyros: [inertial, fog], lateral, wheels } = counters.contradiction;
-            put(out, &seconds.to_be_bytes())?;
-            let [speed, difference] = wheels.map_or([None; 2], |values| values.map(Some));
-            [inertial, fog, lateral, speed, difference]
-                .into_iter()
-                .try_for_each(|code: Option<i16>| put(out, &code.unwrap_or(i16::MAX).to_be_bytes()))
-        }
-        0x011A => {
-            let Firmware { slot, crc, state } = device.firmware();
-            put(out, &[slot.map_or(0xFF, |slot| slot as u8), state as u8])?;
-            put(out, &crc.unwrap_or(0).to_be_bytes())
-        }
-        0x0117 => {
-            let (wheels, stands) = device.standing();
-            for speed in wheels.speeds {
-                let code = speed.map_or(i16::MAX, |speed| ((i64::from(speed.0) * 100) >> 16) as i16);
-                put(out, &code.to_be_bytes())?;
+impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W, E> {
+    pub(super) fn read(&mut self, id: u16) -> Result<(), Nrc> {
+        let Self { services, device, out, counters, errors, .. } = self;
+        match id {
+            0xF186 => put(out, &[services.session() as u8]),
+            0xF18C => device.serial().iter().try_for_each(|byte| put(out, &hex(*byte))),
+            0xF189 => put(out, &device.info().identity.firmware),
+            0xF197 => put(out, b"gyronet"),
+            0x0100 => {
+                put(out, &[Configuration::VERSION])?;
+                put_record(out, device.configuration())
             }
-            put(out, &[wheels.standstill as u8, u8::from(stands)])
+            0x0101 => put_record(out, device.wheels()),
+            0x0102 => {
+                put(out, &[Calibration::VERSION])?;
+                put_record(out, device.calibration())
+            }
+            0x0103 => {
+                let info = device.info();
+                let source = match info.weights {
+                    WeightSource::None => 0,
+                    WeightSource::BuiltIn => 1,
+                    WeightSource::Slot(Slot::A) => 2,
+                    WeightSource::Slot(Slot::B) => 3,
+                };
+                put(out, &[source])?;
+                put(out, &info.weights_crc.unwrap_or(0).to_be_bytes())
+            }
+            0x0104 => {
+                let now = device.conditions();
+                put(out, &[now.status as u8, now.faults.0])
+            }
+            0x0105 => put_words(
+                out,
+                &words!(counters.pipeline => Counters {
+                    samples, missing, misplaced, clock_jumps, invalid, moving, windows, clamped_inputs, implausible, late,
+                    zero_rate_updates, contradicted, moved_mounts
+                }),
+            ),
+            0x0106 => {
+                let monitor =
+                    words!(counters.watch => MonitorCounters { silences, stuck, held, wrong, clock_off });
+                let inputs = words!(counters.inputs => InputCounters {
+                    imu_errors, fog_errors, wheel_errors, latitude_errors, heading_errors, clock_back, unclaimed_estimates,
+                    replaced_windows, out_of_range
+                });
+                let lines = words!(counters.lines => LineCounters {
+                    unsent, line_errors, overruns, service_errors, frames_lost
+                });
+                put_words(out, &monitor)?;
+                put_words(out, &inputs)?;
+                put_words(out, &lines)
+            }
+            0x0107 => put_words(
+                out,
+                &words!(*errors => TransportErrors { unexpected, sequence, overflow, timeout }),
+            ),
+            0x0108 => put(out, &device.conditions().tick.to_be_bytes()),
+            0x0109 => put_words(
+                out,
+                &words!(counters.fog => FogCounters {
+                    samples, misplaced, gaps, stuck, no_latitude, zero_rate_updates, contradicted
+                }),
+            ),
+            0x010A => put_record(out, &device.info()),
+            0x010B => put_record(
+                out,
+                &if services.is_guest { Some(Refusal::OtherTester) } else { device.refusal() },
+            ),
+            0x0111 => self.access_state(),
+            0x0112 => put(out, &counters.fog.samples.to_be_bytes()),
+            0x0113 => put_words(
+                out,
+                &words!(device.access_counters() => AccessCounters {
+                    locked, unsigned, answers, signatures, replayed
+                }),
+            ),
+            0x0115 => put_record(out, device.learned()),
+            0x0116 => {
+                let known = device.forward_deg();
+                let [yaw, sigma] = known.unwrap_or_default().map(|angle| libm::roundf(100.0 * angle) as i16);
+                put(out, &[device.forward_knowledge() as u8])?;
+                put(out, &yaw.to_be_bytes())?;
+                put(out, &sigma.to_be_bytes())
+            }
+            0x0118 => {
+                let (knowledge, angles) = device.level_deg();
+                put(out, &[knowledge as u8])?;
+                angles
+                    .into_iter()
+                    .try_for_each(|angle| put(out, &(libm::roundf(100.0 * angle) as i16).to_be_bytes()))
+            }
+            0x0119 => {
+                let (course, knowledge) = device.course();
+                let codes = course.gain.map_or([0.0, 0.0], |gain| [gain.share, gain.sigma]);
+                put(out, &[knowledge as u8])?;
+                codes
+                    .iter()
+                    .try_for_each(|share| put(out, &(libm::roundf(1e5 * share) as i16).to_be_bytes()))?;
+                put_words(out, &words!(course.counters => CourseCounters { used, refused, restarts }))?;
+                put(out, &[course.refusal.map_or(0, |refusal| refusal as u8)])
+            }
+            0x011B => {
+                let Contradiction { seconds, gyros: [inertial, fog], lateral, wheels } =
+                    counters.contradiction;
+                put(out, &seconds.to_be_bytes())?;
+                let [speed, difference] = wheels.map_or([None; 2], |values| values.map(Some));
+                [inertial, fog, lateral, speed, difference]
+                    .into_iter()
+                    .try_for_each(|code: Option<i16>| put(out, &code.unwrap_or(i16::MAX).to_be_bytes()))
+            }
+            0x011A => {
+                let Firmware { slot, crc, state } = device.firmware();
+                put(out, &[slot.map_or(0xFF, |slot| slot as u8), state as u8])?;
+                put(out, &crc.unwrap_or(0).to_be_bytes())
+            }
+            0x0117 => {
+                let (wheels, stands) = device.standing();
+                for speed in wheels.speeds {
+                    let code = speed.map_or(i16::MAX, |speed| ((i64::from(speed.0) * 100) >> 16) as i16);
+                    put(out, &code.to_be_bytes())?;
+                }
+                put(out, &[wheels.standstill as u8, u8::from(stands)])
+            }
+            _ => Err(Nrc::RequestOutOfRange),
         }
-        _ => Err(Nrc::RequestOutOfRange),
+    }
+
+    /// Writes the value of an identifier. Each record has its own function, so that only one record is on the stack.
+    pub(super) fn write(&mut self, id: u16, bytes: &[u8]) -> Result<(), Nrc> {
+        match id {
+            0x0100 => self.write_configuration(bytes),
+            0x0101 => self.write_wheels(bytes),
+            0x010D => self.write_unit(bytes),
+            RETIRED_FIRST..=RETIRED_LAST => Err(self.refuse(Refusal::SingleSetting)),
+            _ => Err(Nrc::RequestOutOfRange),
+        }
+    }
+
+    #[inline(never)]
+    fn write_configuration(&mut self, bytes: &[u8]) -> Result<(), Nrc> {
+        let (&found, record) = bytes.split_first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
+        let expected = Configuration::VERSION;
+        if found != expected {
+            return Err(self.refuse(Refusal::Version { found, expected }));
+        }
+        self.device.set_configuration(&decode(record)?).map_err(nrc)
+    }
+
+    #[inline(never)]
+    fn write_wheels(&mut self, bytes: &[u8]) -> Result<(), Nrc> {
+        self.device.set_wheels(&decode(bytes)?).map_err(nrc)
+    }
+
+    #[inline(never)]
+    fn write_unit(&mut self, bytes: &[u8]) -> Result<(), Nrc> {
+        self.device.set_unit(decode(bytes)?).map_err(nrc)
     }
 }
 
 /// Returns whether an identifier can be written, or could be by earlier versions.
 pub(super) fn is_writable(id: u16) -> bool {
     matches!(id, 0x0100 | 0x0101 | 0x010D | 0x0110 | UPDATE | RETIRED_FIRST..=RETIRED_LAST)
-}
-
-/// Writes the value of an identifier. Each record has its own function, so that only one record is on the stack.
-pub(super) fn write<R: NorFlash, W: MappedSlots>(
-    id: u16,
-    bytes: &[u8],
-    device: &mut Device<R, W>,
-) -> Result<(), Nrc> {
-    match id {
-        0x0100 => write_configuration(bytes, device),
-        0x0101 => write_wheels(bytes, device),
-        0x010D => write_unit(bytes, device),
-        RETIRED_FIRST..=RETIRED_LAST => Err(nrc(device.refuse_request(Refusal::SingleSetting))),
-        _ => Err(Nrc::RequestOutOfRange),
-    }
-}
-
-#[inline(never)]
-fn write_configuration<R: NorFlash, W: MappedSlots>(
-    bytes: &[u8],
-    device: &mut Device<R, W>,
-) -> Result<(), Nrc> {
-    let (&found, record) = bytes.split_first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
-    let expected = Configuration::VERSION;
-    if found != expected {
-        return Err(nrc(device.refuse_request(Refusal::Version { found, expected })));
-    }
-    device.set_configuration(&decode(record)?).map_err(nrc)
-}
-
-#[inline(never)]
-fn write_wheels<R: NorFlash, W: MappedSlots>(bytes: &[u8], device: &mut Device<R, W>) -> Result<(), Nrc> {
-    device.set_wheels(&decode(bytes)?).map_err(nrc)
-}
-
-#[inline(never)]
-fn write_unit<R: NorFlash, W: MappedSlots>(bytes: &[u8], device: &mut Device<R, W>) -> Result<(), Nrc> {
-    device.set_unit(decode(bytes)?).map_err(nrc)
 }
 
 fn hex(byte: u8) -> [u8; 2] {

@@ -2,12 +2,12 @@
 //! the head of its update says ([`super::update`]), to address 2, the slot that does not run. Either is used from the
 //! next start on, and only after routine FF01; until then the old one stays.
 
-use super::response::{Nrc, Response, nrc, put};
+use super::response::{Nrc, nrc, put};
+use super::security::Seed;
+use super::services::Exchange;
 use super::signature::{self, Digest};
-use super::update::Head;
+use crate::service::MappedSlots;
 use crate::service::message::{BLOCK, Refusal};
-use crate::service::{Device, MappedSlots};
-use crate::store::Slot;
 use crate::store::firmware::{FirmwareError, Label};
 use embedded_storage::nor_flash::NorFlash;
 
@@ -27,14 +27,9 @@ pub(super) struct Download {
     digest: Option<Digest>,
 }
 
-impl Download {
+impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W, E> {
     /// Begins a download with the parameters of 0x34: no compression, the address, the length of the file.
-    pub fn begin<R: NorFlash, W: MappedSlots>(
-        parameters: &[u8],
-        head: Option<&Head>,
-        device: &mut Device<R, W>,
-        out: &mut Response,
-    ) -> Result<Self, Nrc> {
+    pub fn begin_download(&mut self, parameters: &[u8]) -> Result<Download, Nrc> {
         let [format, sizes, rest @ ..] = parameters else {
             return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
         };
@@ -50,86 +45,72 @@ impl Download {
         let (address, length) = (number(address), number(length));
         let image = match address {
             WEIGHTS => {
-                device.weights_begin(length).map_err(nrc)?;
+                self.device.weights_begin(length).map_err(nrc)?;
                 None
             }
-            FOGNET => return Err(nrc(device.refuse_request(Refusal::FogNet))),
+            FOGNET => return Err(self.refuse(Refusal::FogNet)),
             FIRMWARE => {
-                let refused =
-                    |device: &mut Device<R, W>, error| nrc(device.refuse_request(Refusal::Firmware(error)));
-                let Some(head) = head else { return Err(refused(device, FirmwareError::NoHead)) };
-                let slot = device.firmware_check(&head.label, head.downgrade).map_err(nrc)?;
+                let (head, _) = self.services.update.ok_or_else(|| self.refuse(FirmwareError::NoHead))?;
+                let slot = self.device.firmware_check(&head.label, head.downgrade).map_err(nrc)?;
                 let image = slot.of(head.images);
                 if image.length != length {
-                    return Err(refused(device, FirmwareError::Length(length)));
+                    return Err(self.refuse(FirmwareError::Length(length)));
                 }
-                device.firmware_begin(slot, length).map_err(nrc)?;
+                self.device.firmware_begin(slot, length).map_err(nrc)?;
                 Some((head.label, image))
             }
             _ => return Err(Nrc::RequestOutOfRange),
         };
         let [high, low] = (BLOCK as u16 + 2).to_be_bytes();
-        put(out, &[0x20, high, low])?;
-        Ok(Self { image, length, offset: 0, next: 1, digest: None })
+        put(self.out, &[0x20, high, low])?;
+        Ok(Download { image, length, offset: 0, next: 1, digest: None })
     }
 
     /// Writes a block. A repeated block is answered again, because its response may have been lost.
-    pub fn block<R: NorFlash, W: MappedSlots>(
-        &mut self,
-        number: u8,
-        bytes: &[u8],
-        device: &mut Device<R, W>,
-        out: &mut Response,
-    ) -> Result<(), Nrc> {
-        put(out, &[number])?;
-        if number == self.next.wrapping_sub(1) && self.offset > 0 {
+    pub fn download_block(&mut self, number: u8, bytes: &[u8]) -> Result<(), Nrc> {
+        let download = self.services.download.as_mut().ok_or(Nrc::RequestSequenceError)?;
+        put(self.out, &[number])?;
+        if number == download.next.wrapping_sub(1) && download.offset > 0 {
             return Ok(());
         }
-        if self.digest.is_some() {
+        if download.digest.is_some() {
             return Err(Nrc::RequestSequenceError);
         }
-        if number != self.next {
+        if number != download.next {
             return Err(Nrc::WrongBlockSequenceCounter);
         }
-        let left = self.length - self.offset;
+        let left = download.length - download.offset;
         let expected = left.min(BLOCK as u32) as usize;
         if bytes.len() != expected || expected == 0 {
             return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
         }
-        device.weights_block(self.offset, bytes).map_err(nrc)?;
-        self.offset += expected as u32;
-        self.next = self.next.wrapping_add(1);
+        self.device.weights_block(download.offset, bytes).map_err(nrc)?;
+        download.offset += expected as u32;
+        download.next = download.next.wrapping_add(1);
         Ok(())
     }
 
     /// Checks the whole file in flash. The response holds its slot (0 A, 1 B) and its checksum.
-    pub fn finish<R: NorFlash, W: MappedSlots>(
-        &mut self,
-        device: &mut Device<R, W>,
-        out: &mut Response,
-    ) -> Result<(), Nrc> {
-        let digest = match &self.image {
-            Some((label, expected)) => device.firmware_verify(label, |image| {
+    pub fn finish_download(&mut self) -> Result<(), Nrc> {
+        let download = self.services.download.as_mut().ok_or(Nrc::RequestSequenceError)?;
+        let digest = match &download.image {
+            Some((label, expected)) => self.device.firmware_verify(label, |image| {
                 Some(signature::digest(image)).filter(|digest| digest == expected)
             }),
-            None => device.weights_verify(signature::digest),
+            None => self.device.weights_verify(signature::digest),
         };
         let digest = digest.map_err(nrc)?;
-        let (slot, crc) = device.uploaded().ok_or(Nrc::GeneralProgrammingFailure)?;
-        put(
-            out,
-            &[match slot {
-                Slot::A => 0,
-                Slot::B => 1,
-            }],
-        )?;
-        put(out, &crc.to_be_bytes())?;
-        self.digest = Some(digest);
+        let (slot, crc) = self.device.uploaded().ok_or(Nrc::GeneralProgrammingFailure)?;
+        put(self.out, &[slot as u8])?;
+        put(self.out, &crc.to_be_bytes())?;
+        download.digest = Some(digest);
         Ok(())
     }
+}
 
+impl Download {
     /// Returns the digest of the file, once the file has been checked, and whether it is firmware.
-    pub fn checked(&self) -> Option<(&Digest, bool)> {
-        Some((self.digest.as_ref()?, self.image.is_some()))
+    pub fn checked(&self) -> Option<(Digest, bool)> {
+        Some((self.digest?, self.image.is_some()))
     }
 }

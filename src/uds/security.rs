@@ -7,10 +7,11 @@
 //! one and doubles each time; it also runs after a restart. Signed data are not delayed, and end the delay: answers of
 //! others do not keep the owner out. Refusals are counted (data 0113) and reported as a trouble; `src/can/README.md` has the codes.
 
-use super::response::{Nrc, Response, exactly, nrc, put};
+use super::response::{Nrc, exactly, nrc, put};
+use super::services::Exchange;
 use super::signature::{self, Digest, SEED, SERIAL, SIGNATURE, Statement, TRAILER};
+use crate::service::MappedSlots;
 use crate::service::message::Refusal;
-use crate::service::{Device, MappedSlots};
 use crate::store::Access;
 use embedded_storage::nor_flash::NorFlash;
 
@@ -41,28 +42,24 @@ impl Security {
         self.is_unlocked = false;
         self.seed = None;
     }
+}
 
+impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W, E> {
     /// Refuses a request if the board has a key and this session is not unlocked.
-    pub fn check<R: NorFlash, W: MappedSlots>(&self, device: &mut Device<R, W>) -> Result<(), Nrc> {
-        match device.access() {
+    pub fn require_access(&mut self) -> Result<(), Nrc> {
+        match self.device.access() {
             Some(Access { key: None, .. }) => Ok(()),
-            _ if self.is_unlocked => Ok(()),
-            _ => Err(nrc(device.refuse_request(Refusal::Locked))),
+            _ if self.services.security.is_unlocked => Ok(()),
+            _ => Err(self.refuse(Refusal::Locked)),
         }
     }
 
-    pub fn access<R: NorFlash, W: MappedSlots>(
-        &mut self,
-        sub: u8,
-        answer: &[u8],
-        device: &mut Device<R, W>,
-        (now, entropy): (u32, impl FnOnce() -> Option<Seed>),
-        out: &mut Response,
-    ) -> Result<(), Nrc> {
-        let access = device.access().ok_or(Nrc::SecurityAccessDenied)?;
+    pub fn access(&mut self, sub: u8, answer: &[u8]) -> Result<(), Nrc> {
+        let security = &mut self.services.security;
+        let access = self.device.access().ok_or(Nrc::SecurityAccessDenied)?;
         let beyond = access.wrong.saturating_sub(FREE_ATTEMPTS);
         let delay = DELAY_MS << beyond.saturating_sub(1).min(MAX_DOUBLINGS);
-        if beyond > 0 && now.wrapping_sub(self.wrong_at) < delay {
+        if beyond > 0 && self.now.wrapping_sub(security.wrong_at) < delay {
             return Err(Nrc::RequiredTimeDelayNotExpired);
         }
         match sub {
@@ -70,34 +67,34 @@ impl Security {
                 let [] = exactly(answer)?;
                 // The challenge is zero if no answer is needed.
                 let seed = match access.key {
-                    Some(_) if !self.is_unlocked => {
-                        let seed = entropy().filter(|seed| *seed != self.newest);
+                    Some(_) if !security.is_unlocked => {
+                        let seed = (self.entropy)().filter(|seed| *seed != security.newest);
                         let seed = seed.ok_or(Nrc::ConditionsNotCorrect)?;
-                        (self.seed, self.newest) = (Some(seed), seed);
+                        (security.seed, security.newest) = (Some(seed), seed);
                         seed
                     }
                     _ => [0; SEED],
                 };
-                put(out, &seed)
+                put(self.out, &seed)
             }
             2 => {
                 let answer = exactly::<SIGNATURE>(answer)?;
-                if !device.may_interrupt() {
-                    return Err(nrc(device.refuse_request(Refusal::Moving)));
+                if !self.device.may_interrupt() {
+                    return Err(self.refuse(Refusal::Moving));
                 }
-                let (seed, key) = self.seed.take().zip(access.key).ok_or(Nrc::RequestSequenceError)?;
-                let message = signature::challenge(device.serial(), &seed);
-                let is_right = device.long(|| signature::is_valid(&key, &message, &answer));
+                let (seed, key) = security.seed.take().zip(access.key).ok_or(Nrc::RequestSequenceError)?;
+                let message = signature::challenge(self.device.serial(), &seed);
+                let is_right = self.device.long(|| signature::is_valid(&key, &message, &answer));
                 let wrong = if is_right { 0 } else { access.wrong.saturating_add(1) };
                 if wrong != access.wrong {
-                    device.store_access(Access { wrong, ..access }).map_err(nrc)?;
+                    self.device.store_access(Access { wrong, ..access }).map_err(nrc)?;
                 }
                 if is_right {
-                    self.is_unlocked = true;
+                    security.is_unlocked = true;
                     return Ok(());
                 }
-                self.wrong_at = now;
-                device.refuse_request(Refusal::Answer);
+                security.wrong_at = self.now;
+                self.device.refuse_request(Refusal::Answer);
                 Err(if wrong > FREE_ATTEMPTS { Nrc::ExceedNumberOfAttempts } else { Nrc::InvalidKey })
             }
             _ => Err(Nrc::SubFunctionNotSupported),
@@ -105,115 +102,92 @@ impl Security {
     }
 
     /// Stores a key. The caller has checked that the request is signed with the previous key, if there was one. Zeros
-    /// remove the key. A board without random numbers (`entropy`) takes no key: it could never make a challenge.
-    pub fn write_key<R: NorFlash, W: MappedSlots>(
-        &mut self,
-        bytes: &[u8],
-        device: &mut Device<R, W>,
-        entropy: impl FnOnce() -> Option<Seed>,
-    ) -> Result<(), Nrc> {
+    /// remove the key. A board without random numbers takes no key: it could never make a challenge.
+    pub fn write_key(&mut self, bytes: &[u8]) -> Result<(), Nrc> {
         let key: [u8; 32] = exactly(bytes)?;
-        if !device.may_interrupt() {
-            return Err(nrc(device.refuse_request(Refusal::Moving)));
+        if !self.device.may_interrupt() {
+            return Err(self.refuse(Refusal::Moving));
         }
-        let access = device.access().ok_or(Nrc::SecurityAccessDenied)?;
+        let access = self.device.access().ok_or(Nrc::SecurityAccessDenied)?;
         let key = Some(key).filter(|key| *key != [0; 32]);
-        if key.as_ref().is_some_and(|key| !device.long(|| signature::is_key(key))) {
+        if key.as_ref().is_some_and(|key| !self.device.long(|| signature::is_key(key))) {
             return Err(Nrc::RequestOutOfRange);
         }
-        if key.is_some() && entropy().is_none() {
+        if key.is_some() && (self.entropy)().is_none() {
             return Err(Nrc::ConditionsNotCorrect);
         }
-        device.store_access(Access { key, ..access }).map_err(nrc)?;
+        self.device.store_access(Access { key, ..access }).map_err(nrc)?;
         // The session that stores the first key has access. One that replaces a key has not: a signature does not prove
         // that its sender has a private key, and an answer proves the key before.
-        self.end();
-        self.is_unlocked = key.is_some() && access.key.is_none();
+        self.services.security.end();
+        self.services.security.is_unlocked = key.is_some() && access.key.is_none();
         Ok(())
     }
-}
 
-/// Checks and cuts off the trailer of written data, none without a key; returns the counter to [`use_up`], too.
-pub(super) fn signed<'b, R: NorFlash, W: MappedSlots>(
-    target: u16,
-    bytes: &'b [u8],
-    device: &mut Device<R, W>,
-) -> Result<(&'b [u8], Option<u32>), Nrc> {
-    if let Some(Access { key: None, .. }) = device.access() {
-        return Ok((bytes, None));
+    /// Checks and cuts off the trailer of written data, none without a key; returns the counter to [`use_up`], too.
+    pub fn signed<'b>(&mut self, target: u16, bytes: &'b [u8]) -> Result<(&'b [u8], Option<u32>), Nrc> {
+        if let Some(Access { key: None, .. }) = self.device.access() {
+            return Ok((bytes, None));
+        }
+        let Some((content, trailer)) = bytes.split_last_chunk::<TRAILER>() else {
+            return Err(self.refuse(Refusal::Unsigned));
+        };
+        Ok((content, self.check(target, &signature::digest(content), trailer)?))
     }
-    let Some((content, trailer)) = bytes.split_last_chunk::<TRAILER>() else {
-        return Err(nrc(device.refuse_request(Refusal::Unsigned)));
-    };
-    Ok((content, check(target, &signature::digest(content), trailer, device)?))
-}
 
-#[inline(never)]
-pub(super) fn check<R: NorFlash, W: MappedSlots>(
-    target: u16,
-    digest: &Digest,
-    trailer: &[u8; TRAILER],
-    device: &mut Device<R, W>,
-) -> Result<Option<u32>, Nrc> {
-    let Some(access) = device.access() else { return Err(Nrc::SecurityAccessDenied) };
-    let Some(key) = access.key else { return Ok(None) };
-    let [scope, a, b, c, d, signature @ ..] = trailer;
-    let counter = u32::from_be_bytes([*a, *b, *c, *d]);
-    let serial = match scope {
-        0 => *device.serial(),
-        1 => [0; SERIAL],
-        // The end of long data without a signature.
-        _ => return Err(nrc(device.refuse_request(Refusal::Unsigned))),
-    };
-    if !device.may_interrupt() {
-        return Err(nrc(device.refuse_request(Refusal::Moving)));
+    #[inline(never)]
+    pub fn check(
+        &mut self,
+        target: u16,
+        digest: &Digest,
+        trailer: &[u8; TRAILER],
+    ) -> Result<Option<u32>, Nrc> {
+        let Some(access) = self.device.access() else { return Err(Nrc::SecurityAccessDenied) };
+        let Some(key) = access.key else { return Ok(None) };
+        let [scope, a, b, c, d, signature @ ..] = trailer;
+        let counter = u32::from_be_bytes([*a, *b, *c, *d]);
+        let serial = match scope {
+            0 => *self.device.serial(),
+            1 => [0; SERIAL],
+            // The end of long data without a signature.
+            _ => return Err(self.refuse(Refusal::Unsigned)),
+        };
+        if !self.device.may_interrupt() {
+            return Err(self.refuse(Refusal::Moving));
+        }
+        self.check_counter(counter, access)?;
+        let message = signature::message(&Statement { target, serial, counter }, digest);
+        if !self.device.long(|| signature::is_valid(&key, &message, signature)) {
+            return Err(self.refuse(Refusal::Signature));
+        }
+        Ok(Some(counter))
     }
-    check_counter(counter, access, device)?;
-    let message = signature::message(&Statement { target, serial, counter }, digest);
-    if !device.long(|| signature::is_valid(&key, &message, signature)) {
-        return Err(nrc(device.refuse_request(Refusal::Signature)));
+
+    fn check_counter(&mut self, found: u32, access: Access) -> Result<(), Nrc> {
+        let newest = access.counter;
+        if found <= newest { Err(self.refuse(Refusal::Counter { found, newest })) } else { Ok(()) }
     }
-    Ok(Some(counter))
-}
 
-fn check_counter<R: NorFlash, W: MappedSlots>(
-    counter: u32,
-    access: Access,
-    device: &mut Device<R, W>,
-) -> Result<(), Nrc> {
-    if counter <= access.counter {
-        let refusal = Refusal::Counter { found: counter, newest: access.counter };
-        return Err(nrc(device.refuse_request(refusal)));
+    /// Stores a signature's counter, so that it is not accepted again, and forgets wrong answers before it.
+    pub fn use_up(&mut self, counter: Option<u32>) -> Result<(), Nrc> {
+        let Some((counter, access)) = counter.zip(self.device.access()) else { return Ok(()) };
+        self.check_counter(counter, access)?;
+        self.device.store_access(Access { counter, wrong: 0, ..access }).map_err(nrc)
     }
-    Ok(())
-}
 
-/// Stores a signature's counter, so that it is not accepted again, and forgets wrong answers before it.
-pub(super) fn use_up<R: NorFlash, W: MappedSlots>(
-    counter: Option<u32>,
-    device: &mut Device<R, W>,
-) -> Result<(), Nrc> {
-    let Some((counter, access)) = counter.zip(device.access()) else { return Ok(()) };
-    check_counter(counter, access, device)?;
-    device.store_access(Access { counter, wrong: 0, ..access }).map_err(nrc)
-}
-
-/// Appends the state (0 open, 1 locked, 2 unlocked), newest counter, wrong answers, the key's first bytes.
-pub(super) fn state<R: NorFlash, W: MappedSlots>(
-    security: &Security,
-    device: &Device<R, W>,
-    out: &mut Response,
-) -> Result<(), Nrc> {
-    let access = device.access();
-    let key = access.and_then(|access| access.key);
-    let state = match (access, security.is_unlocked) {
-        (Some(Access { key: None, .. }), _) => 0,
-        (_, false) => 1,
-        (_, true) => 2,
-    };
-    let Access { counter, wrong, .. } = access.unwrap_or(Access::OPEN);
-    put(out, &[state])?;
-    put(out, &counter.to_be_bytes())?;
-    put(out, &[wrong])?;
-    put(out, key.as_ref().and_then(|key| key.first_chunk::<4>()).unwrap_or(&[0; 4]))
+    /// Appends the state (0 open, 1 locked, 2 unlocked), newest counter, wrong answers, the key's first bytes.
+    pub fn access_state(&mut self) -> Result<(), Nrc> {
+        let access = self.device.access();
+        let key = access.and_then(|access| access.key);
+        let state = match (access, self.services.security.is_unlocked) {
+            (Some(Access { key: None, .. }), _) => 0,
+            (_, false) => 1,
+            (_, true) => 2,
+        };
+        let Access { counter, wrong, .. } = access.unwrap_or(Access::OPEN);
+        put(self.out, &[state])?;
+        put(self.out, &counter.to_be_bytes())?;
+        put(self.out, &[wrong])?;
+        put(self.out, key.as_ref().and_then(|key| key.first_chunk::<4>()).unwrap_or(&[0; 4]))
+    }
 }

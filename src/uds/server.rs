@@ -7,7 +7,7 @@
 use super::isotp::{Bytes, Transport};
 use super::response::Nrc;
 use super::security::Seed;
-use super::services::{NEGATIVE, Services, Surroundings};
+use super::services::{Exchange, NEGATIVE, Services};
 use crate::service::message::AllCounters;
 use crate::service::{Device, MappedSlots};
 use automotive_diag::uds::UdsCommand;
@@ -104,7 +104,7 @@ impl Server {
         device: &mut Device<R, W>,
         counters: impl FnOnce() -> AllCounters,
         now: u32,
-        entropy: impl FnOnce() -> Option<Seed>,
+        entropy: impl FnMut() -> Option<Seed>,
     ) {
         self.transport.expire(now);
         let services = &mut self.services;
@@ -126,8 +126,7 @@ impl Server {
         let (is_pending, errors) = (self.is_pending, self.transport.errors);
         let answered = self.transport.answer(|request, out| {
             let counters = &counters();
-            let surroundings = Surroundings { counters, errors, is_pending, now, entropy };
-            services.answer(request, device, surroundings, out);
+            Exchange { services, device, out, counters, errors, is_pending, now, entropy }.answer(request);
         });
         if answered {
             self.has_stalled = core::mem::take(&mut self.is_pending);

@@ -5,16 +5,15 @@
 //! same rules apply on all lines. One that writes data or silences the output needs a non-default session and a
 //! standstill.
 
-use super::data::{self, Sources};
 use super::download::Download;
 use super::dtc::Memory;
 use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, exactly, nrc, put};
-use super::security::{self, Security, Seed};
+use super::security::{Security, Seed};
 use super::session::{self, Session};
 use super::signature::{Digest, SIGNATURE};
-use super::troubles;
 use super::update::Head;
+use super::{data, troubles};
 use crate::service::message::{AllCounters, Refusal};
 use crate::service::{Device, MappedSlots};
 use crate::store::firmware::{FirmwareError, MAX_IMAGE};
@@ -54,7 +53,11 @@ pub(super) struct Services {
     pub(super) security: Security,
 }
 
-pub(super) struct Surroundings<'a, E> {
+/// A request that is answered: what the services work on.
+pub(super) struct Exchange<'a, R: NorFlash, W, E> {
+    pub services: &'a mut Services,
+    pub device: &'a mut Device<R, W>,
+    pub out: &'a mut Response,
     pub counters: &'a AllCounters,
     pub errors: TransportErrors,
     pub is_pending: bool,
@@ -156,26 +159,29 @@ impl Services {
             ) || erases())
     }
 
+    pub(super) fn require_session(&self, session: Session) -> Result<(), Nrc> {
+        let own = self.session();
+        let has = session == Session::Default
+            || own == session
+            || (own, session) == (Session::Programming, Session::Extended);
+        if has { Ok(()) } else { Err(Nrc::ServiceNotSupportedInActiveSession) }
+    }
+}
+
+impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W, E> {
     /// Writes the response to a request; leaves `out` empty if no response is wanted.
-    pub fn answer<R: NorFlash, W: MappedSlots>(
-        &mut self,
-        request: &[u8],
-        device: &mut Device<R, W>,
-        surroundings: Surroundings<'_, impl FnOnce() -> Option<Seed>>,
-        out: &mut Response,
-    ) {
+    pub fn answer(&mut self, request: &[u8]) {
         let Some((&service, rest)) = request.split_first() else { return };
-        let is_pending = surroundings.is_pending;
         // Cannot fail: the response is empty.
-        let _ = out.push(service.wrapping_add(POSITIVE));
-        match self.serve(service, rest, device, surroundings, out) {
+        let _ = self.out.push(service.wrapping_add(POSITIVE));
+        match self.serve(service, rest) {
             Ok(true) => {}
             // After "response pending", a response must follow.
-            Ok(false) if is_pending => {}
-            Ok(false) => out.clear(),
+            Ok(false) if self.is_pending => {}
+            Ok(false) => self.out.clear(),
             Err(nrc) => {
-                out.clear();
-                let is_silent = self.is_functional
+                self.out.clear();
+                let is_silent = self.services.is_functional
                     && matches!(
                         nrc,
                         Nrc::ServiceNotSupported
@@ -184,25 +190,24 @@ impl Services {
                             | Nrc::SubFunctionNotSupportedInActiveSession
                             | Nrc::ServiceNotSupportedInActiveSession
                     );
-                if !is_silent || is_pending {
-                    let _ = out.extend_from_slice(&[NEGATIVE, service, nrc as u8]);
+                if !is_silent || self.is_pending {
+                    let _ = self.out.extend_from_slice(&[NEGATIVE, service, nrc as u8]);
                 }
             }
         }
     }
 
+    /// Keeps the reason why a request is refused, and returns the code of the response.
+    pub(super) fn refuse(&mut self, refusal: impl Into<Refusal>) -> Nrc {
+        nrc(self.device.refuse_request(refusal.into()))
+    }
+
     #[inline(never)]
-    fn serve<R: NorFlash, W: MappedSlots>(
-        &mut self,
-        service: u8,
-        rest: &[u8],
-        device: &mut Device<R, W>,
-        surroundings: Surroundings<'_, impl FnOnce() -> Option<Seed>>,
-        out: &mut Response,
-    ) -> Result<bool, Nrc> {
+    fn serve(&mut self, service: u8, rest: &[u8]) -> Result<bool, Nrc> {
         let command = UdsCommand::from_repr(service).ok_or(Nrc::ServiceNotSupported)?;
-        if command != UdsCommand::ReadDataByIdentifier && !self.is_guest {
-            device.forget_refusal();
+        let is_guest = self.services.is_guest;
+        if command != UdsCommand::ReadDataByIdentifier && !is_guest {
+            self.device.forget_refusal();
         }
         let needed = session::needed(command);
         let is_owners = needed != Session::Default
@@ -212,24 +217,23 @@ impl Services {
                     | UdsCommand::ECUReset
                     | UdsCommand::ClearDiagnosticInformation
             );
-        if self.is_guest && is_owners {
+        if is_guest && is_owners {
             return Err(nrc(Refusal::OtherTester));
         }
-        self.require_session(needed)?;
+        self.services.require_session(needed)?;
         if !session::has_sub_function(command) {
-            return self.serve_data(command, rest, device, surroundings, out).map(|()| true);
+            return self.serve_data(command, rest).map(|()| true);
         }
         let (&sub, rest) = rest.split_first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
         let (sub, is_wanted) = (sub & !SUPPRESS, sub & SUPPRESS == 0);
-        put(out, &[sub])?;
-        let Surroundings { now, entropy, .. } = surroundings;
+        put(self.out, &[sub])?;
         match command {
-            UdsCommand::DiagnosticSessionControl => self.session_control(sub, rest, out),
-            UdsCommand::ECUReset => self.reset(sub, rest, device),
+            UdsCommand::DiagnosticSessionControl => self.session_control(sub, rest),
+            UdsCommand::ECUReset => self.reset(sub, rest),
             UdsCommand::TesterPresent => Self::tester_present(sub, rest),
-            UdsCommand::CommunicationControl => self.communication_control(sub, rest, device),
-            UdsCommand::ControlDTCSetting => self.dtc_setting(sub, device),
-            UdsCommand::ReadDTCInformation => troubles::read(&self.memory, sub, rest, out),
+            UdsCommand::CommunicationControl => self.communication_control(sub, rest),
+            UdsCommand::ControlDTCSetting => self.dtc_setting(sub),
+            UdsCommand::ReadDTCInformation => troubles::read(&self.services.memory, sub, rest, self.out),
             UdsCommand::SecurityAccess => {
                 let length = match sub {
                     1 => 0,
@@ -239,43 +243,30 @@ impl Services {
                 if rest.len() != length {
                     return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
                 }
-                self.security.access(sub, rest, device, (now, entropy), out)
+                self.access(sub, rest)
             }
-            _ => self.routine(sub, rest, device, entropy, out),
+            _ => self.routine(sub, rest),
         }?;
         Ok(is_wanted)
     }
 
-    fn serve_data<R: NorFlash, W: MappedSlots, E: FnOnce() -> Option<Seed>>(
-        &mut self,
-        command: UdsCommand,
-        rest: &[u8],
-        device: &mut Device<R, W>,
-        surroundings: Surroundings<'_, E>,
-        out: &mut Response,
-    ) -> Result<(), Nrc> {
+    fn serve_data(&mut self, command: UdsCommand, rest: &[u8]) -> Result<(), Nrc> {
         match command {
-            UdsCommand::ClearDiagnosticInformation => self.clear_troubles(rest, device),
+            UdsCommand::ClearDiagnosticInformation => self.clear_troubles(rest),
             UdsCommand::ReadDataByIdentifier => {
                 if rest.is_empty() || !rest.len().is_multiple_of(2) {
                     return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
                 }
-                let Surroundings { counters, errors, .. } = surroundings;
-                let session = self.session() as u8;
-                let security = &self.security;
-                let refusal = if self.is_guest { Some(Refusal::OtherTester) } else { device.refusal() };
-                let sources = Sources { device: &*device, counters, session, security, errors, refusal };
                 for id in rest.chunks_exact(2) {
-                    let before = out.len();
-                    put(out, id)?;
-                    let id = id.try_into().map_or(0, u16::from_be_bytes);
-                    match data::read(id, &sources, out) {
+                    let before = self.out.len();
+                    put(self.out, id)?;
+                    match self.read(id.try_into().map_or(0, u16::from_be_bytes)) {
                         // An unknown identifier is left out, unless all are unknown.
-                        Err(Nrc::RequestOutOfRange) => out.truncate(before),
+                        Err(Nrc::RequestOutOfRange) => self.out.truncate(before),
                         read => read?,
                     }
                 }
-                if out.len() > 1 { Ok(()) } else { Err(Nrc::RequestOutOfRange) }
+                if self.out.len() > 1 { Ok(()) } else { Err(Nrc::RequestOutOfRange) }
             }
             UdsCommand::WriteDataByIdentifier => {
                 let id = rest.split_first_chunk().filter(|(_, bytes)| !bytes.is_empty());
@@ -284,35 +275,34 @@ impl Services {
                 if !data::is_writable(id) {
                     return Err(Nrc::RequestOutOfRange);
                 }
-                let (content, counter) = security::signed(id, bytes, device)?;
+                let (content, counter) = self.signed(id, bytes)?;
                 match id {
-                    UPDATE => self.begin_update(content, counter, device)?,
+                    UPDATE => self.begin_update(content, counter)?,
                     0x0110 => {
-                        self.update = None;
-                        security::use_up(counter, device)?;
-                        self.security.write_key(content, device, surroundings.entropy)?;
+                        self.services.update = None;
+                        self.use_up(counter)?;
+                        self.write_key(content)?;
                     }
                     _ => {
-                        security::use_up(counter, device)?;
-                        data::write(id, content, device)?;
+                        self.use_up(counter)?;
+                        self.write(id, content)?;
                     }
                 }
-                put(out, &[*high, *low])
+                put(self.out, &[*high, *low])
             }
             UdsCommand::RequestDownload => {
-                self.download = None;
-                let head = self.update.as_ref().map(|(head, _)| head);
-                self.download = Some(Download::begin(rest, head, device, out)?);
+                self.services.download = None;
+                self.services.download = Some(self.begin_download(rest)?);
                 Ok(())
             }
             UdsCommand::TransferData => {
                 let (&number, bytes) =
                     rest.split_first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;
-                self.under_way()?.block(number, bytes, device, out)
+                self.download_block(number, bytes)
             }
             UdsCommand::RequestTransferExit => {
                 let [] = exactly(rest)?;
-                self.under_way()?.finish(device, out)
+                self.finish_download()
             }
             _ => Err(Nrc::ServiceNotSupported),
         }
@@ -320,34 +310,16 @@ impl Services {
 
     /// Checks the head of a firmware update, and keeps it for the download.
     #[inline(never)]
-    fn begin_update<R: NorFlash, W: MappedSlots>(
-        &mut self,
-        head: &[u8],
-        counter: Option<u32>,
-        device: &mut Device<R, W>,
-    ) -> Result<(), Nrc> {
-        (self.download, self.update) = (None, None);
-        let Some(head) = head.try_into().ok().and_then(Head::parse) else {
-            return Err(nrc(device.refuse_request(FirmwareError::NotAnUpdate.into())));
-        };
-        let slot = device.firmware_check(&head.label, head.downgrade).map_err(nrc)?;
+    fn begin_update(&mut self, head: &[u8], counter: Option<u32>) -> Result<(), Nrc> {
+        (self.services.download, self.services.update) = (None, None);
+        let head = head.try_into().ok().and_then(Head::parse);
+        let head = head.ok_or_else(|| self.refuse(FirmwareError::NotAnUpdate))?;
+        let slot = self.device.firmware_check(&head.label, head.downgrade).map_err(nrc)?;
         let Digest { length, .. } = slot.of(head.images);
         if length > MAX_IMAGE {
-            return Err(nrc(device.refuse_request(FirmwareError::Length(length).into())));
+            return Err(self.refuse(FirmwareError::Length(length)));
         }
-        self.update = Some((head, counter));
+        self.services.update = Some((head, counter));
         Ok(())
-    }
-
-    fn under_way(&mut self) -> Result<&mut Download, Nrc> {
-        self.download.as_mut().ok_or(Nrc::RequestSequenceError)
-    }
-
-    pub(super) fn require_session(&self, session: Session) -> Result<(), Nrc> {
-        let own = self.session();
-        let has = session == Session::Default
-            || own == session
-            || (own, session) == (Session::Programming, Session::Extended);
-        if has { Ok(()) } else { Err(Nrc::ServiceNotSupportedInActiveSession) }
     }
 }
