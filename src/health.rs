@@ -2,13 +2,11 @@
 
 #[doc(hidden)]
 pub mod slow;
-#[doc(hidden)]
-pub mod states;
 
 use crate::sample::Validity;
 
 /// The state of the corrected yaw rate. None needs a restart to leave it, except that with damaged weights it is
-/// `Degraded` at best. [`states::STATES`] says when each is entered and left.
+/// `Degraded` at best. `gyronet reference states` prints when each is entered and left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Status {

@@ -1,7 +1,7 @@
 //! The monitor judges each reading of the inertial sensor and detects silence.
 //!
 //! A part can fail in ways that no single sample shows: it becomes silent, repeats its readings, or has just been
-//! saturated. [`crate::health::states::STATES`] lists the faults. Time is by an outside clock: the part's may stop.
+//! saturated. `gyronet reference states` prints the faults. Time is by an outside clock: the part's may stop.
 
 mod readings;
 

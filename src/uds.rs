@@ -9,10 +9,10 @@
 //! | 0x10 | any | sessions 1, 2, 3; back to 1 after 5 s of silence |
 //! | 0x11 | any | restart (1, 3), at standstill |
 //! | 0x14, 0x19 | any | troubles: clear; count (01), list (02, 0A), snapshot (04), occurrences (06) |
-//! | 0x22 | any | [data by identifier](data) |
+//! | 0x22 | any | data by identifier (`gyronet reference identifiers`) |
 //! | 0x27 | 2, 3 | [access](security) by challenge (1) and response (2), where a key is stored |
 //! | 0x28 | 2, 3 | stop (1) and continue (0) the messages of the board, at standstill |
-//! | 0x2E | 2, 3 | write [data by identifier](data) where permitted, at standstill |
+//! | 0x2E | 2, 3 | write data by identifier where permitted, at standstill |
 //! | 0x31 | 2, 3 | 0204 tests the board: a bit for each part that fails, see the YAML |
 //! | 0x31 | 2 | FF01 uses the download |
 //! | 0x34, 0x36, 0x37 | 2 | download of a weight file to address 0, of [firmware](update) to address 2 |
@@ -20,8 +20,7 @@
 //! | 0x85 | 2, 3 | stop and continue the recording of troubles |
 
 mod control;
-#[doc(hidden)]
-pub mod data;
+mod data;
 mod download;
 #[doc(hidden)]
 pub mod dtc;

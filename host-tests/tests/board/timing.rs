@@ -5,11 +5,11 @@ use crate::common::{self, MS, SAMPLE, START, drive, id, raw, stand};
 use crate::service;
 use embedded_can::Frame;
 use gyronet::store::Configuration;
-use gyronet::uds::data::{Access, IDENTIFIERS};
 use gyronet_host_tests::board::{Board, Seen};
 use gyronet_host_tests::stored::other_weights;
 use gyronet_host_tests::tester::{Tester, frame, segment};
 use gyronet_host_tests::wire::{bytes, data_frame};
+use gyronet_tools::reference::identifiers::{Access, IDENTIFIERS};
 use std::time::Duration;
 
 /// P2 and P2* of the standard, as the board's answer to 10 03 has them.

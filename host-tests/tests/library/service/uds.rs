@@ -12,7 +12,6 @@ use gyronet::service::message::{AllCounters, Refusal};
 use gyronet::standstill::Standing;
 use gyronet::store::{Configuration, Field, FieldError, Record, StoreError};
 use gyronet::uds::Server;
-use gyronet::uds::data::{Access, IDENTIFIERS, Identifier};
 use gyronet::uds::dtc::{PASSED_TICKS, TROUBLES, bit};
 use gyronet::units::WheelSpeed;
 use gyronet_host_tests::flash::Flash;
@@ -21,6 +20,7 @@ use gyronet_host_tests::stored::{crc, other_weights};
 use gyronet_host_tests::synthetic::judged;
 use gyronet_host_tests::tester::{Tester, frame};
 use gyronet_host_tests::wire::bytes;
+use gyronet_tools::reference::identifiers::{Access, IDENTIFIERS, Identifier};
 
 /// A board with its server, and the time in milliseconds.
 pub struct Bench {

@@ -1,37 +1,17 @@
 //! The states of the corrected yaw rate, as the board reports them.
 
-use super::Status;
+use super::Table;
+use gyronet::health::Status;
 
-/// A state, or a condition that leaves the state as it is.
-#[derive(Debug)]
-pub struct State {
-    /// Status that the board reports, and the number that data 0104 has for it; `None` if the status does not change.
-    pub status: Option<Status>,
-    pub name: &'static str,
-    pub entered: &'static str,
-    /// Yaw rate and fault bits on CAN.
-    pub rate: &'static str,
-    pub left: &'static str,
-    /// Counter of the pipeline or of the sensor monitor that counts it, if any.
-    pub counter: &'static str,
-}
-
-const fn state(
-    status: Option<Status>,
-    name: &'static str,
-    entered: &'static str,
-    rate: &'static str,
-    left: &'static str,
-    counter: &'static str,
-) -> State {
-    State { status, name, entered, rate, left, counter }
-}
+/// A state, or a condition that leaves the state as it is: the status that the board reports, if it changes; name; when it is
+/// entered; yaw rate and fault bits on CAN; until when; the counter of the pipeline or of the sensor monitor.
+type State = (Option<Status>, &'static str, &'static str, &'static str, &'static str, &'static str);
 
 /// All states. In a fault state there is no yaw rate: our own messages report "not available", Bosch's set "failed".
 ///
 /// From a fault the state returns to init where no bias is known, otherwise to degraded.
-pub const STATES: [State; 15] = [
-    state(
+const STATES: [State; 15] = [
+    (
         Some(Status::Init),
         "init",
         "the start; a jump of the clock before the bias was known",
@@ -39,7 +19,7 @@ pub const STATES: [State; 15] = [
         "3 s at rest",
         "`moving`",
     ),
-    state(
+    (
         Some(Status::Degraded),
         "degraded",
         "the start, if earlier drives have shown the bias",
@@ -47,7 +27,7 @@ pub const STATES: [State; 15] = [
         "3 s at rest",
         "`moving`",
     ),
-    state(
+    (
         Some(Status::Degraded),
         "degraded",
         "the bias is known; a gap, a late or implausible window, saturation, damaged weights",
@@ -55,7 +35,7 @@ pub const STATES: [State; 15] = [
         "a window is accepted",
         "`missing`, `late`, `implausible`",
     ),
-    state(
+    (
         Some(Status::Ready),
         "ready",
         "an accepted window covers the recent samples",
@@ -63,7 +43,7 @@ pub const STATES: [State; 15] = [
         "one of the other states",
         "`windows`",
     ),
-    state(
+    (
         Some(Status::Silent),
         "fault: silent",
         "29 ms without a sample, by the board's clock; 2 s after the start without the first one",
@@ -71,7 +51,7 @@ pub const STATES: [State; 15] = [
         "the next sample",
         "`silences`",
     ),
-    state(
+    (
         Some(Status::Stuck),
         "fault: stuck",
         "seven samples (70 ms) in which all gyro axes, all accelerometer axes, or one axis that seldom repeats \
@@ -80,7 +60,7 @@ pub const STATES: [State; 15] = [
         "a sample that differs",
         "`stuck`",
     ),
-    state(
+    (
         Some(Status::Clipped),
         "fault: saturated",
         "the sensor reports saturation",
@@ -88,7 +68,7 @@ pub const STATES: [State; 15] = [
         "50 ms after the last such sample",
         "`invalid`, `held`",
     ),
-    state(
+    (
         Some(Status::Clipped),
         "fault: wrong",
         "a reading changes in 10 ms by more than 12 times what this axis is used to (RMS of 0.6 s), and by more than \
@@ -97,7 +77,7 @@ pub const STATES: [State; 15] = [
         "a reading near the last good one, or the fourth such reading in a row",
         "`wrong`",
     ),
-    state(
+    (
         None,
         "not confirmed",
         "the bias rests on the one standstill of the start, in which a ferry or a turntable may have turned; 0x1A3 says coarse",
@@ -105,7 +85,7 @@ pub const STATES: [State; 15] = [
         "the vehicle drives off within 10 s of a reading at rest, which decides, or stops later and agrees",
         "",
     ),
-    state(
+    (
         None,
         "late",
         "samples arrive more than 29 ms later than their time stamps let expect: the line has stalled",
@@ -113,7 +93,7 @@ pub const STATES: [State; 15] = [
         "samples that arrive in time",
         "",
     ),
-    state(
+    (
         None,
         "jumped",
         "the yaw rate has jumped as no vehicle turns, and stays there",
@@ -121,7 +101,7 @@ pub const STATES: [State; 15] = [
         "it jumps back, or the vehicle stands",
         "`wrong`",
     ),
-    state(
+    (
         None,
         "sensor moved",
         "its up or forward direction differs from earlier drives",
@@ -129,7 +109,7 @@ pub const STATES: [State; 15] = [
         "the next start, or `calibrate forget`",
         "`moved_mounts`",
     ),
-    state(
+    (
         None,
         "clock off",
         "the sensor's clock differs from the board's crystal by more than 4 %; the yaw is then accumulated by the \
@@ -138,7 +118,7 @@ pub const STATES: [State; 15] = [
         "the clocks agree again",
         "`clock_off`",
     ),
-    state(
+    (
         None,
         "rate not used",
         "the sensor sends fewer than 50 or more than 1000 samples a second",
@@ -146,7 +126,7 @@ pub const STATES: [State; 15] = [
         "a rate between",
         "`misplaced`",
     ),
-    state(
+    (
         None,
         "contradicted",
         "two seconds in which other sources (fibre-optic gyro, wheels, accelerometer) contradict the gyro; 0x1A3 names it",
@@ -155,3 +135,13 @@ pub const STATES: [State; 15] = [
         "",
     ),
 ];
+
+pub fn states() -> Table {
+    let mut table =
+        Table::new(&["state", "status in data 0104", "when", "yaw rate on CAN", "until", "counter"]);
+    for (status, name, entered, rate, left, counter) in STATES {
+        let number = status.map(|status| (status as u8).to_string()).unwrap_or_default();
+        table.row([name, &number, entered, rate, left, counter]);
+    }
+    table
+}
