@@ -29,8 +29,8 @@ pub fn upload(flash: &Flash, slot: Slot, file: &[u8]) -> Result<(), String> {
     let text = |error: &dyn std::error::Error| error.to_string();
     let mut region = Region::new(flash, 0..1 << 20);
     let mut upload = Upload::begin(&mut region, slot, file.len() as u32).map_err(|e| text(&e))?;
-    for (block, offset) in file.chunks(256).zip((0..).step_by(256)) {
-        upload.block(&mut region, offset, block).map_err(|e| text(&e))?;
+    for block in file.chunks(256) {
+        upload.block(&mut region, block).map_err(|e| text(&e))?;
     }
     let crc = upload.verify(slots(&flash.borrow())).map_err(|e| text(&e))?.1.crc;
     let mut store = open(flash).map_err(|e| text(&e))?;
@@ -71,8 +71,8 @@ pub fn flash_image(flash: &Flash, slot: Slot, image: &[u8]) {
 /// Writes an image to a slot and has it tried at the next start, as the device does; `None` where that fails.
 pub fn install<F: NorFlash>(flash: &mut F, slot: Slot, image: &[u8], number: u32) -> Option<()> {
     let mut upload = Upload::firmware(flash, slot, image.len() as u32).ok()?;
-    for (block, offset) in image.chunks(256).zip((0..).step_by(256)) {
-        upload.block(flash, offset, block).ok()?;
+    for block in image.chunks(256) {
+        upload.block(flash, block).ok()?;
     }
     activate(flash, slot, &Trailer::new(image.len() as u32, CRC.checksum(image), 0, number)).ok()
 }

@@ -13,7 +13,7 @@ pub use weights::MappedSlots;
 use super::conditions::Conditions;
 use super::event::{CanFault, SensorFault};
 use super::learner::Learner;
-use super::message::{AccessCounters, FAILED_STARTS, FlashState, Identity, Info, Origin, PROTOCOL, Refusal};
+use super::message::{AccessCounters, FAILED_STARTS, Info, Refusal};
 use super::not_good::NotGood;
 use crate::can::wheel::WheelSettings;
 use crate::heading::{CourseState, gain_knowledge};
@@ -22,9 +22,9 @@ use crate::health::{Faults, Quality, Status};
 use crate::mounting::{Rotation, Vertical};
 use crate::sample::{ImuSample, Standstill, WheelSample};
 use crate::standstill::Standing;
-use crate::store::slots::{SlotError, WeightSource};
+use crate::store::slots::WeightSource;
 use crate::store::{
-    Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Learned, Record, Slot, Store, StoreError,
+    Accepted, Access, Calibration, Configuration, FogPart, ImuPart, Learned, Slot, Store, StoreError,
     Troubles,
 };
 use embedded_storage::nor_flash::NorFlash;
@@ -54,19 +54,14 @@ pub struct Device<R: NorFlash, W> {
     store: Option<Store<R>>,
     slots: Option<W>,
     supported: &'static SupportedHardware,
-    identity: Identity,
-    flash: FlashState,
-    writable: bool,
+    info: Info,
     refused: bool,
     configuration: Configuration,
-    configuration_origin: Origin,
     next_configuration: Configuration,
     wheels: WheelSettings,
-    wheels_origin: Origin,
     next_wheels: WheelSettings,
     wheels_seen: WheelSample,
     calibration: Calibration,
-    calibration_origin: Origin,
     learned: Learned,
     learner: Learner,
     course: CourseState,
@@ -77,26 +72,18 @@ pub struct Device<R: NorFlash, W> {
     /// `None` if the record could not be read; nobody may write then.
     access: Option<Access>,
     access_counters: AccessCounters,
-    weights: WeightSource,
-    weights_crc: Option<u32>,
     /// Cost of a window of the weights that a start on the crystal will use, cycles.
     next_window: u32,
-    refused_slots: [Option<SlotError>; 2],
     uploading: Option<Uploading>,
-    firmware: Firmware,
     reached: u32,
     has_sample: bool,
     /// The output may be interrupted: no rate is valid, or the vehicle stands.
     may_interrupt: bool,
     /// True from a wheel that turns until the wheels stand, also while they are silent.
     has_turned: bool,
-    sensor: Option<SensorFault>,
-    status: Status,
     faults: Faults,
     not_good: NotGood,
     tick: u32,
-    /// The newest reason why stored data were refused, or could not be stored by the board itself.
-    stored_fault: Option<StoreError>,
     refusal: Option<Refusal>,
 }
 
@@ -107,19 +94,14 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             store: None,
             slots: None,
             supported,
-            identity: Identity::UNKNOWN,
-            flash: FlashState::Absent,
-            writable: false,
+            info: Info::UNKNOWN,
             refused: false,
             configuration: Configuration::DEFAULT,
-            configuration_origin: Origin::BuiltIn,
             next_configuration: Configuration::DEFAULT,
             wheels: WheelSettings::TOYOTA,
-            wheels_origin: Origin::BuiltIn,
             next_wheels: WheelSettings::TOYOTA,
             wheels_seen: WheelSample::without_speeds(Standstill::Unknown),
             calibration: Calibration::NONE,
-            calibration_origin: Origin::BuiltIn,
             learned: Learned::NOTHING,
             learner: Learner::START,
             course: CourseState::START,
@@ -128,22 +110,15 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             troubles: Troubles::NONE,
             access: Some(Access::OPEN),
             access_counters: AccessCounters::NONE,
-            weights: WeightSource::None,
-            weights_crc: None,
             next_window: 0,
-            refused_slots: [None; 2],
             uploading: None,
-            firmware: Firmware::ALONE,
             reached: 0,
             has_sample: false,
             may_interrupt: true,
             has_turned: false,
-            sensor: None,
-            status: Status::Init,
             faults: Faults::NONE,
             not_good: NotGood::START,
             tick: 0,
-            stored_fault: None,
             refusal: None,
         }
     }
@@ -191,12 +166,12 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     /// Records the result of setting up the sensor.
     pub fn sensor(&mut self, result: Result<(), SensorFault>) {
-        self.sensor = result.err();
+        self.info.sensor = result.err();
     }
 
     /// Records a fault of the CAN controller that was found after the start.
     pub fn can_fault(&mut self, fault: CanFault) {
-        self.identity.can_fault = Some(fault);
+        self.info.identity.can_fault = Some(fault);
     }
 
     /// Processes each sample (`None`: silence), the rate's state, the wheels and the standstill. An erase stalls the
@@ -224,7 +199,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         {
             self.mount_moved = true;
         }
-        self.status = status;
+        self.info.status = status;
     }
 
     /// Takes the quality of each rate, after [`Device::observe`].
@@ -291,7 +266,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     /// Returns the serial number of the board.
     pub fn serial(&self) -> &[u8; 12] {
-        &self.identity.serial
+        &self.info.identity.serial
     }
 
     /// Returns the access record: the key, and the counters stored with it; `None` if it could not be read.
@@ -325,7 +300,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     /// Returns whether the starts before this one have failed, so that what is stored is not used.
     fn has_failed(&self) -> bool {
-        self.identity.failed_starts >= FAILED_STARTS
+        self.info.identity.failed_starts >= FAILED_STARTS
     }
 
     /// Runs work that takes long, as [`MappedSlots::check`] does.
@@ -338,44 +313,28 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     fn refuse(&mut self, error: StoreError) {
         self.refused = true;
-        self.stored_fault = Some(error);
+        self.info.stored_fault = Some(error);
     }
 
     /// Returns the board's identity and state.
     pub fn info(&self) -> Info {
-        Info {
-            protocol: PROTOCOL,
-            identity: self.identity,
-            record_versions: [Configuration::VERSION, Calibration::VERSION],
-            flash: self.flash,
-            writable: self.writable,
-            configuration: self.configuration_origin,
-            wheels: self.wheels_origin,
-            calibration: self.calibration_origin,
-            weights: self.weights,
-            weights_crc: self.weights_crc,
-            sensor: self.sensor,
-            refused_slots: self.refused_slots,
-            firmware: self.firmware,
-            stored_fault: self.stored_fault,
-            status: self.status,
-        }
+        self.info
     }
 
     pub(crate) fn conditions(&self) -> Conditions {
         Conditions {
-            status: self.status,
+            status: self.info.status,
             faults: self.faults,
-            no_weights: self.weights == WeightSource::None,
-            sensor_refused: self.sensor.is_some(),
-            clock_fault: self.identity.clock_fault.is_some(),
+            no_weights: self.info.weights == WeightSource::None,
+            sensor_refused: self.info.sensor.is_some(),
+            clock_fault: self.info.identity.clock_fault.is_some(),
             tick: self.tick,
-            can_fault: self.identity.can_fault.is_some(),
-            crashed: self.identity.crash.is_some() || self.has_failed(),
+            can_fault: self.info.identity.can_fault.is_some(),
+            crashed: self.info.identity.crash.is_some() || self.has_failed(),
             course_contradicts: self.course.is_contradicted,
             course_silent: self.course.is_silent,
             not_good_for_long: self.not_good.is_long(),
-            firmware_refused: self.firmware.is_refused(),
+            firmware_refused: self.info.firmware.is_refused(),
             access_refused: self.refusal.is_some_and(|refusal| refusal.is_access_denied()),
         }
     }

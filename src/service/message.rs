@@ -5,13 +5,13 @@ use super::event::{CanFault, ClockFault, Crash, ResetCause, SensorFault};
 use crate::coprocessor::{Contradiction, Coprocessor};
 use crate::fog::FogCounters;
 use crate::health::{Counters, InputCounters, MonitorCounters, Status};
-use crate::store::StoreError;
 use crate::store::firmware::FirmwareError;
 use crate::store::slots::{SlotError, WeightSource};
+use crate::store::{Calibration, Configuration, Record, StoreError};
 use serde::{Deserialize, Serialize};
 
 /// Version of the encoding of these types; every change of a type increments it.
-pub const PROTOCOL: u8 = 22;
+pub const PROTOCOL: u8 = 23;
 /// Size of a full block of a download, bytes.
 pub const BLOCK: usize = 256;
 
@@ -157,6 +157,27 @@ pub struct Info {
     pub stored_fault: Option<StoreError>,
     /// Status of the corrected yaw rate.
     pub status: Status,
+}
+
+impl Info {
+    /// Identity and state before the start.
+    pub const UNKNOWN: Self = Self {
+        protocol: PROTOCOL,
+        identity: Identity::UNKNOWN,
+        record_versions: [Configuration::VERSION, Calibration::VERSION],
+        flash: FlashState::Absent,
+        writable: false,
+        configuration: Origin::BuiltIn,
+        wheels: Origin::BuiltIn,
+        calibration: Origin::BuiltIn,
+        weights: WeightSource::None,
+        weights_crc: None,
+        sensor: None,
+        refused_slots: [None; 2],
+        firmware: Firmware::ALONE,
+        stored_fault: None,
+        status: Status::Init,
+    };
 }
 
 /// All event counters since the start.

@@ -66,11 +66,6 @@ pub enum SlotError {
     Empty,
     #[error("{0} bytes are too many, or not a whole number of words")]
     Length(u32),
-    #[error("the next block must begin at {expected}")]
-    Offset {
-        /// Offset at which the next block must begin; all bytes before it are written.
-        expected: u32,
-    },
     #[error("no upload is in progress")]
     NotBegun,
     #[error("only {written} bytes have been received")]

@@ -50,12 +50,9 @@ impl Upload {
     }
 
     /// Writes the next block, a whole number of words. After an error of the flash the upload must begin again.
-    pub fn block<F: NorFlash>(&mut self, flash: &mut F, offset: u32, bytes: &[u8]) -> Result<(), SlotError> {
-        if offset != self.written {
-            return Err(SlotError::Offset { expected: self.written });
-        }
+    pub fn block<F: NorFlash>(&mut self, flash: &mut F, bytes: &[u8]) -> Result<(), SlotError> {
         let len = bytes.len() as u32;
-        if !len.is_multiple_of(4) || len > self.length - self.written {
+        if !len.is_multiple_of(4) || len > self.missing() {
             return Err(SlotError::Length(len));
         }
         let at = self.start + self.written;
@@ -76,6 +73,11 @@ impl Upload {
     /// Returns the slot of the file.
     pub const fn slot(&self) -> Slot {
         self.slot
+    }
+
+    /// Returns the number of bytes that are missing.
+    pub const fn missing(&self) -> u32 {
+        self.length - self.written
     }
 
     /// Returns the number of bytes written.

@@ -9,6 +9,7 @@ use super::signature::{self, Digest};
 use crate::service::MappedSlots;
 use crate::service::message::{BLOCK, Refusal};
 use crate::store::firmware::{FirmwareError, Label};
+use crate::store::slots::SlotError;
 use embedded_storage::nor_flash::NorFlash;
 
 const WEIGHTS: u32 = 0;
@@ -20,8 +21,6 @@ const FIRMWARE: u32 = 2;
 pub(super) struct Download {
     /// Label, length and hash of the image, if this is firmware.
     image: Option<(Label, Digest)>,
-    length: u32,
-    offset: u32,
     /// Number of the next block; it starts at 1 and wraps from 255 to 0.
     next: u8,
     digest: Option<Digest>,
@@ -63,14 +62,15 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
         };
         let [high, low] = (BLOCK as u16 + 2).to_be_bytes();
         put(self.out, &[0x20, high, low])?;
-        Ok(Download { image, length, offset: 0, next: 1, digest: None })
+        Ok(Download { image, next: 1, digest: None })
     }
 
     /// Writes a block. A repeated block is answered again, because its response may have been lost.
     pub fn download_block(&mut self, number: u8, bytes: &[u8]) -> Result<(), Nrc> {
         let download = self.services.download.as_mut().ok_or(Nrc::RequestSequenceError)?;
         put(self.out, &[number])?;
-        if number == download.next.wrapping_sub(1) && download.offset > 0 {
+        let Some(upload) = self.device.upload() else { return Err(self.refuse(SlotError::NotBegun)) };
+        if number == download.next.wrapping_sub(1) && upload.written() > 0 {
             return Ok(());
         }
         if download.digest.is_some() {
@@ -79,13 +79,11 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
         if number != download.next {
             return Err(Nrc::WrongBlockSequenceCounter);
         }
-        let left = download.length - download.offset;
-        let expected = left.min(BLOCK as u32) as usize;
+        let expected = upload.missing().min(BLOCK as u32) as usize;
         if bytes.len() != expected || expected == 0 {
             return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
         }
-        self.device.weights_block(download.offset, bytes).map_err(nrc)?;
-        download.offset += expected as u32;
+        self.device.upload_block(bytes).map_err(nrc)?;
         download.next = download.next.wrapping_add(1);
         Ok(())
     }

@@ -91,110 +91,95 @@ impl Cause {
 
 pub static TROUBLES: [Trouble; 19] = [
     trouble(
-        0x5A01,
-        0x31,
+        0x5A0131,
         "inertial sensor: no signal",
         "supply and wires of the sensor, setting `imu`",
         Cause::Status(Status::Silent),
     ),
-    trouble(0x5A01, 0x2A, "inertial sensor: readings are stuck", "the sensor", Cause::Status(Status::Stuck)),
+    trouble(0x5A012A, "inertial sensor: readings are stuck", "the sensor", Cause::Status(Status::Stuck)),
     trouble(
-        0x5A01,
-        0x22,
+        0x5A0122,
         "inertial sensor: saturated",
         "its range, its mechanical mounting",
         Cause::Status(Status::Clipped),
     ),
     trouble(
-        0x5A01,
-        0x62,
+        0x5A0162,
         "inertial sensor: implausible, or its clock or rate is off",
         "its output rate (50 to 1000 Hz), the mounting, settings `mounting`",
         Cause::Fault(Faults::IMPLAUSIBLE),
     ),
     trouble(
-        0x5A01,
-        0x49,
+        0x5A0149,
         "inertial sensor: could not be set up or read, or its self-test has failed",
         "`device info` has the reason: wires of SPI, the sensor's output messages",
         Cause::SensorRefused,
     ),
     trouble(
-        0x5A01,
-        0x38,
+        0x5A0138,
         "inertial sensor: samples are missing",
         "its wires, its output rate",
         Cause::Fault(Faults::GAP),
     ),
     trouble(
-        0x5A01,
-        0x54,
+        0x5A0154,
         "yaw rate: no bias in ten minutes of driving",
         "let it stand for 3 s; limits in `static_init`; a course on the bus",
         Cause::NoBias,
     ),
     trouble(
-        0x5A01,
-        0x92,
+        0x5A0192,
         "yaw rate: degraded for ten minutes of driving, without a fault",
         "0x1A3: a coarse bias needs another stop; `device counters`: late or missing windows",
         Cause::NotGood,
     ),
     trouble(
-        0x5A02,
-        0x44,
+        0x5A0244,
         "stored data are damaged",
         "`device info` says which; store the missing data again",
         Cause::Fault(Faults::STORED),
     ),
-    trouble(0x5A02, 0x46, "no weights that can be used", "`device info`; upload weights", Cause::NoWeights),
-    trouble(0x5A03, 0x47, "the software crashed", "`device info` has the reason", Cause::Crash),
+    trouble(0x5A0246, "no weights that can be used", "`device info`; upload weights", Cause::NoWeights),
+    trouble(0x5A0347, "the software crashed", "`device info` has the reason", Cause::Crash),
     trouble(
-        0x5A03,
-        0x52,
+        0x5A0352,
         "the firmware update was rolled back, or is damaged",
         "what `device info` says of the firmware; update again",
         Cause::Firmware,
     ),
-    trouble(0x5A03, 0x38, "the processor's clock is not the crystal's", "the crystal", Cause::Clock),
+    trouble(0x5A0338, "the processor's clock is not the crystal's", "the crystal", Cause::Clock),
     trouble(
-        0xDA01,
-        0x88,
+        0xDA0188,
         "CAN: no bus, or frames were lost",
         "wires, terminators, bit rate",
         Cause::Fault(Faults::BUS),
     ),
     trouble(
-        0xDA01,
-        0x49,
+        0xDA0149,
         "CAN: the controller does not start, or no node takes CAN FD",
         "`device info` has the reason: the transceiver, setting `can.yaw.fd`",
         Cause::Can,
     ),
     trouble(
-        0xDA02,
-        0x87,
+        0xDA0287,
         "wheels: silent, or they contradict the gyro",
         "wheel frames, radius, slip",
         Cause::Fault(Faults::WHEELS),
     ),
     trouble(
-        0xDA04,
-        0x62,
+        0xDA0462,
         "course: contradicts the gyro",
         "the GNSS receiver, its antenna; who else sends courses",
         Cause::Course,
     ),
     trouble(
-        0xDA04,
-        0x87,
+        0xDA0487,
         "course: its source is silent",
         "the GNSS receiver, its wires, bit rate and messages; setting `heading`",
         Cause::NoCourse,
     ),
     trouble(
-        0xDA03,
-        0x81,
+        0xDA0381,
         "diagnosis: a request was refused: no access",
         "the counters in data 0113",
         Cause::AccessRefused,
@@ -203,9 +188,9 @@ pub static TROUBLES: [Trouble; 19] = [
 
 const _: () = assert!(TROUBLES.len() <= MAX_TROUBLES, "the record has room for all troubles");
 
-/// Creates a trouble from a code (0x5A01 is C1A01, 0xDA01 is U1A01) and a failure type.
-const fn trouble(code: u16, failure: u8, name: &'static str, check: &'static str, cause: Cause) -> Trouble {
-    Trouble { code: (code as u32) << 8 | failure as u32, name, check, cause }
+/// Creates a trouble from code and failure type: 0x5A0131 is C1A01-31, 0xDA0188 is U1A01-88.
+const fn trouble(code: u32, name: &'static str, check: &'static str, cause: Cause) -> Trouble {
+    Trouble { code, name, check, cause }
 }
 
 #[derive(Debug, Clone, Copy)]

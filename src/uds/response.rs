@@ -44,37 +44,21 @@ pub(super) fn nrc(refusal: Refusal) -> Nrc {
     match refusal {
         Refusal::Moving
         | Refusal::OtherTester
-        | Refusal::Firmware(FirmwareError::NoBootLoader | FirmwareError::OnTrial) => {
-            Nrc::ConditionsNotCorrect
-        }
-        Refusal::Firmware(FirmwareError::NoHead) => Nrc::RequestSequenceError,
-        Refusal::Firmware(FirmwareError::Content) => Nrc::GeneralProgrammingFailure,
-        Refusal::Firmware(_) => Nrc::RequestOutOfRange,
-        Refusal::Version { .. } | Refusal::OtherWeights { .. } | Refusal::SingleSetting | Refusal::FogNet => {
-            Nrc::RequestOutOfRange
-        }
-        Refusal::Store(
-            StoreError::Field(_)
-            | StoreError::Version { .. }
-            | StoreError::Encoding
-            | StoreError::Lost
-            | StoreError::Resets,
-        )
-        | Refusal::Slot(SlotError::Slow { .. }) => Nrc::RequestOutOfRange,
+        | Refusal::Firmware(FirmwareError::NoBootLoader | FirmwareError::OnTrial)
+        | Refusal::Store(StoreError::NoFlash)
+        | Refusal::Slot(SlotError::NoFlash) => Nrc::ConditionsNotCorrect,
+        Refusal::Firmware(FirmwareError::NoHead)
+        | Refusal::Slot(SlotError::NotBegun | SlotError::Incomplete { .. }) => Nrc::RequestSequenceError,
+        Refusal::Firmware(FirmwareError::Content)
+        | Refusal::Store(StoreError::Flash(_) | StoreError::Full)
+        | Refusal::Slot(
+            SlotError::Flash(_) | SlotError::Empty | SlotError::NotAccepted(_) | SlotError::Blob(_),
+        ) => Nrc::GeneralProgrammingFailure,
         Refusal::Locked => Nrc::SecurityAccessDenied,
         Refusal::Unsigned => Nrc::IncorrectMessageLengthOrInvalidFormat,
         Refusal::Answer | Refusal::Signature => Nrc::InvalidKey,
-        Refusal::Counter { .. } => Nrc::RequestOutOfRange,
-        Refusal::Store(StoreError::NoFlash) | Refusal::Slot(SlotError::NoFlash) => Nrc::ConditionsNotCorrect,
-        Refusal::Store(StoreError::Flash(_) | StoreError::Full) | Refusal::Slot(SlotError::Flash(_)) => {
-            Nrc::GeneralProgrammingFailure
-        }
-        Refusal::Slot(SlotError::NotBegun | SlotError::Offset { .. } | SlotError::Incomplete { .. }) => {
-            Nrc::RequestSequenceError
-        }
         Refusal::Slot(SlotError::Length(_)) => Nrc::UploadDownloadNotAccepted,
-        Refusal::Slot(SlotError::Empty | SlotError::NotAccepted(_) | SlotError::Blob(_)) => {
-            Nrc::GeneralProgrammingFailure
-        }
+        // A value that this board does not take.
+        _ => Nrc::RequestOutOfRange,
     }
 }

@@ -69,9 +69,7 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
             let [] = exactly(trailer)?;
             let (_, counter) = self.services.update.ok_or(Nrc::RequestSequenceError)?;
             // A refused request uses up no signature.
-            if !self.device.may_interrupt() {
-                return Err(self.refuse(Refusal::Moving));
-            }
+            self.require_standstill()?;
             self.use_up(counter)?;
             self.services.update = None;
             return self.device.firmware_activate().map_err(nrc);

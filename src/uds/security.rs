@@ -54,7 +54,13 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
         }
     }
 
-    pub fn access(&mut self, sub: u8, answer: &[u8]) -> Result<(), Nrc> {
+    /// Makes a challenge (1), or checks the answer to it (2).
+    pub fn access(&mut self, sub: u8, rest: &[u8]) -> Result<(), Nrc> {
+        let answer = match sub {
+            1 => exactly(rest).map(|[]: [u8; 0]| None)?,
+            2 => Some(exactly::<SIGNATURE>(rest)?),
+            _ => return Err(Nrc::SubFunctionNotSupported),
+        };
         let security = &mut self.services.security;
         let access = self.device.access().ok_or(Nrc::SecurityAccessDenied)?;
         let beyond = access.wrong.saturating_sub(FREE_ATTEMPTS);
@@ -62,52 +68,44 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
         if beyond > 0 && self.now.wrapping_sub(security.wrong_at) < delay {
             return Err(Nrc::RequiredTimeDelayNotExpired);
         }
-        match sub {
-            1 => {
-                let [] = exactly(answer)?;
-                // The challenge is zero if no answer is needed.
-                let seed = match access.key {
-                    Some(_) if !security.is_unlocked => {
-                        let seed = (self.entropy)().filter(|seed| *seed != security.newest);
-                        let seed = seed.ok_or(Nrc::ConditionsNotCorrect)?;
-                        (security.seed, security.newest) = (Some(seed), seed);
-                        seed
-                    }
-                    _ => [0; SEED],
-                };
-                put(self.out, &seed)
+        let Some(answer) = answer else {
+            // The challenge is zero if no answer is needed.
+            let mut seed = [0; SEED];
+            if access.key.is_some() && !security.is_unlocked {
+                let new = (self.entropy)().filter(|seed| *seed != security.newest);
+                seed = new.ok_or(Nrc::ConditionsNotCorrect)?;
+                (security.seed, security.newest) = (Some(seed), seed);
             }
-            2 => {
-                let answer = exactly::<SIGNATURE>(answer)?;
-                if !self.device.may_interrupt() {
-                    return Err(self.refuse(Refusal::Moving));
-                }
-                let (seed, key) = security.seed.take().zip(access.key).ok_or(Nrc::RequestSequenceError)?;
-                let message = signature::challenge(self.device.serial(), &seed);
-                let is_right = self.device.long(|| signature::is_valid(&key, &message, &answer));
-                let wrong = if is_right { 0 } else { access.wrong.saturating_add(1) };
-                if wrong != access.wrong {
-                    self.device.store_access(Access { wrong, ..access }).map_err(nrc)?;
-                }
-                if is_right {
-                    security.is_unlocked = true;
-                    return Ok(());
-                }
-                security.wrong_at = self.now;
-                self.device.refuse_request(Refusal::Answer);
-                Err(if wrong > FREE_ATTEMPTS { Nrc::ExceedNumberOfAttempts } else { Nrc::InvalidKey })
-            }
-            _ => Err(Nrc::SubFunctionNotSupported),
+            return put(self.out, &seed);
+        };
+        self.require_standstill()?;
+        let security = &mut self.services.security;
+        let (seed, key) = security.seed.take().zip(access.key).ok_or(Nrc::RequestSequenceError)?;
+        let message = signature::challenge(self.device.serial(), &seed);
+        let is_right = self.device.long(|| signature::is_valid(&key, &message, &answer));
+        let wrong = if is_right { 0 } else { access.wrong.saturating_add(1) };
+        if wrong != access.wrong {
+            self.device.store_access(Access { wrong, ..access }).map_err(nrc)?;
         }
+        if is_right {
+            security.is_unlocked = true;
+            return Ok(());
+        }
+        security.wrong_at = self.now;
+        self.device.refuse_request(Refusal::Answer);
+        Err(if wrong > FREE_ATTEMPTS { Nrc::ExceedNumberOfAttempts } else { Nrc::InvalidKey })
+    }
+
+    /// Refuses a request unless the vehicle is proven to stand.
+    pub fn require_standstill(&mut self) -> Result<(), Nrc> {
+        if self.device.may_interrupt() { Ok(()) } else { Err(self.refuse(Refusal::Moving)) }
     }
 
     /// Stores a key. The caller has checked that the request is signed with the previous key, if there was one. Zeros
     /// remove the key. A board without random numbers takes no key: it could never make a challenge.
     pub fn write_key(&mut self, bytes: &[u8]) -> Result<(), Nrc> {
         let key: [u8; 32] = exactly(bytes)?;
-        if !self.device.may_interrupt() {
-            return Err(self.refuse(Refusal::Moving));
-        }
+        self.require_standstill()?;
         let access = self.device.access().ok_or(Nrc::SecurityAccessDenied)?;
         let key = Some(key).filter(|key| *key != [0; 32]);
         if key.as_ref().is_some_and(|key| !self.device.long(|| signature::is_key(key))) {
@@ -152,9 +150,7 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
             // The end of long data without a signature.
             _ => return Err(self.refuse(Refusal::Unsigned)),
         };
-        if !self.device.may_interrupt() {
-            return Err(self.refuse(Refusal::Moving));
-        }
+        self.require_standstill()?;
         self.check_counter(counter, access)?;
         let message = signature::message(&Statement { target, serial, counter }, digest);
         if !self.device.long(|| signature::is_valid(&key, &message, signature)) {

@@ -11,7 +11,7 @@ use super::isotp::TransportErrors;
 use super::response::{Nrc, Response, exactly, nrc, put};
 use super::security::{Security, Seed};
 use super::session::{self, Session};
-use super::signature::{Digest, SIGNATURE};
+use super::signature::Digest;
 use super::update::Head;
 use super::{data, troubles};
 use crate::service::message::{AllCounters, Refusal};
@@ -234,17 +234,7 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
             UdsCommand::CommunicationControl => self.communication_control(sub, rest),
             UdsCommand::ControlDTCSetting => self.dtc_setting(sub),
             UdsCommand::ReadDTCInformation => troubles::read(&self.services.memory, sub, rest, self.out),
-            UdsCommand::SecurityAccess => {
-                let length = match sub {
-                    1 => 0,
-                    2 => SIGNATURE,
-                    _ => return Err(Nrc::SubFunctionNotSupported),
-                };
-                if rest.len() != length {
-                    return Err(Nrc::IncorrectMessageLengthOrInvalidFormat);
-                }
-                self.access(sub, rest)
-            }
+            UdsCommand::SecurityAccess => self.access(sub, rest),
             _ => self.routine(sub, rest),
         }?;
         Ok(is_wanted)

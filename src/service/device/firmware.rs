@@ -52,7 +52,7 @@ pub struct Firmware {
 }
 
 impl Firmware {
-    pub(super) const ALONE: Self = Self { slot: None, crc: None, state: FirmwareState::Alone };
+    pub(in crate::service) const ALONE: Self = Self { slot: None, crc: None, state: FirmwareState::Alone };
 
     pub(super) fn of<W: MappedSlots>(flash: &mut W) -> Self {
         let Some(slot) = flash.running() else { return Self::ALONE };
@@ -74,15 +74,10 @@ impl Firmware {
 }
 
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
-    /// Returns the running firmware.
-    pub fn firmware(&self) -> Firmware {
-        self.firmware
-    }
-
     /// Checks what an update is, and returns the slot that it goes to, which does not run.
     pub fn firmware_check(&mut self, label: &Label, downgrade: bool) -> Result<Slot, Refusal> {
         self.request(false, |device| {
-            let running = device.firmware.slot.zip(device.slots.as_mut());
+            let running = device.info.firmware.slot.zip(device.slots.as_mut());
             let own = running.and_then(|(slot, flash)| Some((slot, firmware::label(flash, slot)?)));
             let (slot, own) = own.ok_or(FirmwareError::NoBootLoader)?;
             let refused = if label.board != own.board {
@@ -91,7 +86,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
                 FirmwareError::Layout { found: label.layout, expected: own.layout }
             } else if label.version < own.version && !downgrade {
                 FirmwareError::Older
-            } else if device.firmware.state == FirmwareState::OnTrial {
+            } else if device.info.firmware.state == FirmwareState::OnTrial {
                 FirmwareError::OnTrial
             } else {
                 return Ok(slot.other());
@@ -107,7 +102,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             if length == 0 || length > MAX_IMAGE || !length.is_multiple_of(4) {
                 return Err(FirmwareError::Length(length).into());
             }
-            if device.firmware.slot != Some(slot.other()) {
+            if device.info.firmware.slot != Some(slot.other()) {
                 return Err(FirmwareError::NoBootLoader.into());
             }
             device.uploading = None;
@@ -161,18 +156,19 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// Notes what has been reached, and confirms an image on trial with enough of it. Returns whether the board must
     /// restart for the lack of it, and the boot loader start the other. Idle calls it, with the time since the start.
     pub fn firmware_trial(&mut self, is_acknowledged: bool, windows: u32, milliseconds: u32) -> bool {
-        let on_trial = self.firmware.state == FirmwareState::OnTrial;
+        let on_trial = self.info.firmware.state == FirmwareState::OnTrial;
         if on_trial || milliseconds < COUNTED_MS {
             self.reached |= if is_acknowledged { CAN } else { 0 } | if windows > 0 { WINDOW } else { 0 };
             self.reached |= if self.has_sample { SENSOR } else { 0 };
         }
-        let Some((slot, flash)) = self.firmware.slot.filter(|_| on_trial).zip(self.slots.as_mut()) else {
+        let Some((slot, flash)) = self.info.firmware.slot.filter(|_| on_trial).zip(self.slots.as_mut())
+        else {
             return false;
         };
         let trailer = Trailer::read(flash, slot);
         let expected = trailer.map_or(u32::MAX, |trailer| trailer.expected);
         if milliseconds >= LEAST_MS && expected & !self.reached == 0 && firmware::confirm(flash, slot) {
-            self.firmware.state = FirmwareState::Confirmed;
+            self.info.firmware.state = FirmwareState::Confirmed;
             return false;
         }
         let has_failed = milliseconds >= LONGEST_MS;

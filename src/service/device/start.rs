@@ -10,11 +10,11 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// Returns the configuration by stored data and weights; `is_exact`: the clock can measure the sensor's.
     #[inline]
     pub fn coprocessor(&self, is_exact: bool) -> Config {
-        let weights = self.weights_crc.unwrap_or(0);
+        let weights = self.info.weights_crc.unwrap_or(0);
         let of_other_weights = self.calibration.unit.is_some_and(|unit| unit.weights != weights);
         Config {
             wheels: WheelReceiver::new(self.wheels).ok(),
-            has_gyronet: self.weights_crc.is_some(),
+            has_gyronet: self.info.weights_crc.is_some(),
             clock: Clock::Outside,
             clock_is_exact: is_exact,
             storage: StorageFaults {

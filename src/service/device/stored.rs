@@ -19,24 +19,24 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         controller: Result<(), FlashFault>,
         identity: Identity,
     ) {
-        self.identity = identity;
-        self.writable = controller.is_ok() && records.is_some();
+        self.info.identity = identity;
+        self.info.writable = controller.is_ok() && records.is_some();
         // After a fault, records are read only here, and nothing is kept for writing.
         self.slots = slots.filter(|_| controller.is_ok());
-        self.firmware = self.slots.as_mut().map_or(Firmware::ALONE, Firmware::of);
+        self.info.firmware = self.slots.as_mut().map_or(Firmware::ALONE, Firmware::of);
         if let Err(fault) = controller {
             self.refuse(StoreError::Flash(fault));
         }
         if let Some(records) = records {
             match Store::open(records, 0) {
                 Ok(store) => self.load(store),
-                Err(error) => (self.flash, self.access) = (FlashState::Failed(error), None),
+                Err(error) => (self.info.flash, self.access) = (FlashState::Failed(error), None),
             }
         }
     }
 
     fn records_damaged(&self) -> bool {
-        matches!(self.flash, FlashState::Damaged | FlashState::Failed(_))
+        matches!(self.info.flash, FlashState::Damaged | FlashState::Failed(_))
     }
 
     /// Returns whether any stored data are damaged or refused: [`crate::health::Faults::STORED`].
@@ -46,7 +46,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
 
     /// Returns whether a stored configuration could not be used; the sensor's axes are then unknown.
     pub fn configuration_lost(&self) -> bool {
-        match self.configuration_origin {
+        match self.info.configuration {
             Origin::BuiltIn => self.records_damaged(),
             Origin::Stored => false,
             Origin::Refused(_) => true,
@@ -58,42 +58,42 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         let supported = |found: Configuration| self.check_supported(&found).map(|()| found);
         let found = found.and_then(|found| found.map(supported).transpose());
         let (configuration, origin) = self.take(found);
-        (self.configuration, self.configuration_origin) =
+        (self.configuration, self.info.configuration) =
             (configuration.unwrap_or(Configuration::DEFAULT), origin);
         self.next_configuration = self.configuration;
         let (wheels, origin) = self.take(store.get());
-        (self.wheels, self.wheels_origin) = (wheels.unwrap_or(WheelSettings::TOYOTA), origin);
+        (self.wheels, self.info.wheels) = (wheels.unwrap_or(WheelSettings::TOYOTA), origin);
         self.next_wheels = self.wheels;
         if let Err(error) = self.configuration.check_wheels(&self.wheels) {
             let (_, origin) = self.take::<()>(Err(error.into()));
-            (self.wheels, self.wheels_origin) = (WheelSettings::NONE, origin);
+            (self.wheels, self.info.wheels) = (WheelSettings::NONE, origin);
         }
         if self.has_failed() {
             let (_, origin) = self.take::<()>(Err(StoreError::Resets));
-            (self.configuration, self.configuration_origin) = (self.configuration.bus_alone(), origin);
+            (self.configuration, self.info.configuration) = (self.configuration.bus_alone(), origin);
             self.wheels = WheelSettings::NONE;
         }
         let (calibration, origin) = self.take(store.get());
-        (self.calibration, self.calibration_origin) = (calibration.unwrap_or(Calibration::NONE), origin);
+        (self.calibration, self.info.calibration) = (calibration.unwrap_or(Calibration::NONE), origin);
         let (learned, _) = self.take(store.get());
         self.learned = learned.unwrap_or(Learned::NOTHING);
         let (accepted, _) = self.take(store.get());
         self.accepted = accepted.unwrap_or(Accepted::NONE);
         match store.get() {
             Ok(troubles) => self.troubles = troubles.unwrap_or(Troubles::NONE),
-            Err(error) => self.stored_fault = Some(error),
+            Err(error) => self.info.stored_fault = Some(error),
         }
         self.access = match self.take(store.get()) {
             (_, Origin::Refused(_)) => None,
             (access, _) => Some(access.unwrap_or(Access::OPEN)),
         };
-        self.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
-        if self.writable
+        self.info.flash = if store.damaged() { FlashState::Damaged } else { FlashState::Ready };
+        if self.info.writable
             && let Err(error) = store.make_room()
         {
             self.refuse(error);
         }
-        self.store = self.writable.then_some(store);
+        self.store = self.info.writable.then_some(store);
     }
 
     /// Returns the record that was read, if valid, and its origin.
@@ -161,7 +161,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     #[inline(never)]
     pub fn set_unit(&mut self, unit: Option<UnitMap>) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
-            let runs = device.weights_crc.unwrap_or(0);
+            let runs = device.info.weights_crc.unwrap_or(0);
             if let Some(UnitMap { weights: found, .. }) = unit
                 && found != runs
             {
@@ -185,7 +185,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         let store = self.store.as_mut().ok_or(StoreError::NoFlash)?;
         store.set(&calibration)?;
         self.calibration = calibration;
-        self.calibration_origin = Origin::Stored;
+        self.info.calibration = Origin::Stored;
         Ok(())
     }
 
@@ -207,7 +207,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
             // If the flash refuses the record, do not try again each time.
             self.learner.is_changed = false;
             if let Err(Refusal::Store(error)) = self.store_learned(self.learned) {
-                self.stored_fault = Some(error);
+                self.info.stored_fault = Some(error);
             }
         }
     }
@@ -227,7 +227,7 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         }
         // If the flash refuses the record, do not try again each time.
         if let Err(error) = store.set(troubles) {
-            self.stored_fault = Some(error);
+            self.info.stored_fault = Some(error);
         }
         true
     }

@@ -44,31 +44,31 @@ pub(super) struct Checked {
 impl<R: NorFlash, W: MappedSlots> Device<R, W> {
     /// Selects the weights to run from `slots`, as the processor reads them, else from the image itself.
     pub fn weights<'w>(&mut self, slots: Option<[&'w [u8]; 2]>, built_in: &'w [u8]) -> Option<Blob<'w>> {
-        let available = self.configuration.compensate.stride.window_cycles(self.identity.clock_hz);
+        let available = self.configuration.compensate.stride.window_cycles(self.info.identity.clock_hz);
         let accepted = if self.has_failed() { &Accepted::NONE } else { &self.accepted };
         let Selection { weights, source, refused } =
             select(accepted, slots.unwrap_or_default(), built_in, available);
-        self.weights = source;
-        self.weights_crc = weights.map(|blob| blob.crc);
+        self.info.weights = source;
+        self.info.weights_crc = weights.map(|blob| blob.crc);
         let slow = refused.into_iter().flatten().find_map(|error| match error {
             SlotError::Slow { cycles, .. } => Some(cycles),
             _ => None,
         });
         self.next_window = slow.or(weights.map(|blob| blob.shape.window_cycles())).unwrap_or(0);
-        self.refused_slots = refused;
+        self.info.refused_slots = refused;
         self.refused |= refused.iter().any(Option::is_some) || source == WeightSource::None;
         weights
     }
 
     /// Notes that the weights in use are damaged: not used until the next start, which checks all files.
     pub fn weights_damaged(&mut self) {
-        self.weights = WeightSource::None;
-        self.weights_crc = None;
+        self.info.weights = WeightSource::None;
+        self.info.weights_crc = None;
     }
 
     /// Returns the slot to overwrite: one that GyroNet does not run on.
     fn unused_slot(&self) -> Slot {
-        match self.weights {
+        match self.info.weights {
             WeightSource::Slot(slot) => slot.other(),
             // GyroNet runs on neither slot; keep the file that was accepted last.
             WeightSource::BuiltIn | WeightSource::None => self.accepted.active.map_or(Slot::A, Slot::other),
@@ -98,12 +98,17 @@ impl<R: NorFlash, W: MappedSlots> Device<R, W> {
         })
     }
 
-    /// Writes a block of the file, a whole number of words, at its offset.
-    pub fn weights_block(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
+    /// Returns the upload of a file or an image that is in progress.
+    pub fn upload(&self) -> Option<&Upload> {
+        self.uploading.as_ref().map(|uploading| &uploading.upload)
+    }
+
+    /// Writes the next block of the file or image, a whole number of words.
+    pub fn upload_block(&mut self, bytes: &[u8]) -> Result<(), Refusal> {
         self.request(INTERRUPTS, |device| {
             let flash = device.slots.as_mut().ok_or(SlotError::NoFlash)?;
             let uploading = device.uploading.as_mut().ok_or(SlotError::NotBegun)?;
-            uploading.upload.block(flash, offset, bytes).map_err(|error| {
+            uploading.upload.block(flash, bytes).map_err(|error| {
                 if let SlotError::Flash(_) = error {
                     device.uploading = None;
                 }

@@ -231,7 +231,7 @@ fn flash_is_written_at_standstill_alone() {
         |board| board.set_wheels(&WheelSettings::TOYOTA),
         |board| board.set_unit(None),
         |board| board.weights_begin(64),
-        |board| board.weights_block(0, &[]),
+        |board| board.upload_block(&[]),
         Board::weights_activate,
         Board::forget_learned,
         Board::restart,

@@ -26,9 +26,7 @@ fn weights_are_replaced() {
     }
     let mut board = start(&flash);
     assert_eq!(board.weights_begin(file.len() as u32), Ok(()));
-    assert_eq!(board.weights_block(0, &file[..256]), Ok(()));
-    let expected = Err(Refusal::Slot(SlotError::Offset { expected: 256 }));
-    assert_eq!([0, 4_096].map(|offset| board.weights_block(offset, &file[..256])), [expected; 2]);
+    assert_eq!(board.upload_block(&file[..256]), Ok(()));
     let early = Err(Refusal::Slot(SlotError::Incomplete { written: 256 }));
     assert_eq!([board.weights_verify(|_| ()), board.weights_activate()], [early; 2]);
     assert_eq!(board.uploaded(), None);
@@ -49,9 +47,7 @@ fn weights_are_replaced() {
 /// Sends a file in blocks, and has it checked.
 pub fn upload(board: &mut Board, file: &[u8]) -> Result<(), Refusal> {
     board.weights_begin(file.len() as u32)?;
-    for (block, offset) in file.chunks(256).zip((0u32..).step_by(256)) {
-        board.weights_block(offset, block)?;
-    }
+    file.chunks(256).try_for_each(|block| board.upload_block(block))?;
     board.weights_verify(|_| ())
 }
 
