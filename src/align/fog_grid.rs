@@ -63,7 +63,6 @@ impl FogGrid {
         if waited > MAX_SILENCE_US {
             // The caller has not asked for a step for a second, so these steps are useless by now.
             self.next = Some(now.0.next_multiple_of(PERIOD_US));
-            self.increments.clear();
             return None;
         }
         if !self.is_due(now) {

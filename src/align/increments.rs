@@ -70,11 +70,6 @@ impl Increments {
         self.last_end = None;
     }
 
-    pub fn clear(&mut self) {
-        self.pieces.clear();
-        self.last_end = None;
-    }
-
     pub fn has_reached(&self, time: Micros) -> bool {
         self.last_end.is_some_and(|end| end >= time.0)
     }

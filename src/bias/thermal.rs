@@ -225,6 +225,16 @@ mod tests {
         }
     }
 
+    /// A bend adds nothing where standstills have shown the bias, and 0.75 mrad/s at 25 K from there.
+    #[test]
+    fn a_bend_counts_from_where_the_bias_is_known_best() {
+        for cold in [-20.0, 50.0] {
+            let learned = learned(&[(cold, 0.0)], |_| 0.001);
+            let [at, beside] = [cold + 7.5, cold + 32.5].map(|celsius| learned.at(celsius).unwrap().1);
+            assert!(at < 8e-4 && (1e-3..1.5e-3).contains(&beside), "{cold}: {at} {beside}");
+        }
+    }
+
     #[test]
     fn what_no_part_is_made_for_is_bounded_or_refused() {
         let learned = learned(&[(20.0, 0.0)], |_| 0.001);

@@ -143,3 +143,23 @@ pub(super) fn early(config: &PipelineConfig) -> Rotation {
     let judged = VerticalEstimator::new(known).judge();
     judged.up.filter(|_| config.levelling).map_or(Rotation::IDENTITY, |up| Rotation::upright(&up))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_axis_turns_by_three_degrees_a_second_until_it_is_upright() {
+        let mut level = Level::new([AngularRate::ZERO; 3], None, None);
+        assert!(!level.follow(), "it is upright");
+        let angle = 10f32.to_radians();
+        level.goal = [libm::sinf(angle), 0.0, libm::cosf(angle)];
+        for step in 1..=67 {
+            assert!(level.follow() && level.up != level.goal);
+            // By chords, which are that much shorter than the arc.
+            let share = libm::atan2f(level.up[0], level.up[2]) / (STEP * step as f32);
+            assert!((0.995..1.0).contains(&share) && (norm(&level.up) - 1.0).abs() < 1e-6, "{step}: {share}");
+        }
+        assert!(level.follow() && level.up == level.goal && !level.follow());
+    }
+}

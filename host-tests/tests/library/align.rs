@@ -172,6 +172,19 @@ fn rates_that_are_not_used_are_named_and_left_again() {
 }
 
 #[test]
+fn no_step_holds_samples_of_before_and_after_a_rate_that_is_not_used() {
+    let (mut aligner, mut time, mut means) = (Aligner::START, 0, Vec::new());
+    for (period, samples, rate) in [(2_500, 103, 1_000), (30_000, 40, 0), (2_500, 100, 3_000)] {
+        for _ in 0..samples {
+            time += period;
+            let frames = steps(&mut aligner, sample(time, rate)).unwrap_or_default();
+            means.extend(frames.iter().map(|frame| frame.sample.angular_rate[2].0).filter(|_| rate == 3_000));
+        }
+    }
+    assert!(means.len() > 10 && means.iter().all(|mean| *mean == 3_000), "{means:?}");
+}
+
+#[test]
 fn duplicates_and_steps_back_leave_the_grid() {
     let mut aligner = begun(2_000_000);
     let (last, at) = (Micros(2_000_000), Micros(1_990_000));

@@ -66,6 +66,21 @@ fn motion_is_refused() {
     }
 }
 
+/// Whoever boards a vehicle, and the wind, rocks it and does not turn it.
+#[test]
+fn a_calm_vehicle_may_be_rocked_and_not_turned() {
+    let rocked = 1.5 * f64::from(StaticConfig::DEFAULT.gyro_drift);
+    for (axis, is_calm, is_taken) in [(0, false, false), (0, true, true), (1, true, true), (2, true, false)] {
+        let mut init = StaticInit::new(StaticConfig::DEFAULT);
+        let verdict = (0..u64::from(STATIC_SAMPLES)).find_map(|tick| {
+            let mut sample = turning(tick, AngularRate(0));
+            sample.angular_rate[axis] = rate(if tick < 100 { rocked } else { 0.0 });
+            init.add(&sample, false, is_calm)
+        });
+        assert_eq!(verdict.expect("a verdict").is_ok(), is_taken, "axis {axis}, calm: {is_calm}");
+    }
+}
+
 #[test]
 fn numbers_in_a_refusal_are_right() {
     let Err(StaticError::GyroNoise { axis: 2, std }) =

@@ -1,7 +1,7 @@
 //! The configuration of the vehicle bus: what is refused, what it costs, what goes out.
 
 use embedded_can::Frame;
-use gyronet::can::bus_off::BusOff;
+use gyronet::can::bus_off::{BusOff, LAST_US};
 use gyronet::can::config::{BoschSettings, Config, ConfigError, E2e, Settings, StatusSettings, YawSettings};
 use gyronet::can::e2e::DataIdMode;
 use gyronet::can::encoder::CanEncoder;
@@ -182,6 +182,44 @@ fn can_fd_frames_end_where_they_alone_take_the_board_off_the_bus() {
 }
 
 #[test]
+fn a_controller_returns_at_growing_intervals_until_it_stays() {
+    let (mut bus, mut now) = (BusOff::new(0), 0);
+    let waited = [10, 10, 1_270, 1_290, 10, 10, 10, 10, 10, 10, 10, 10].map(|stays| {
+        let off_at = now;
+        bus.follow(true, false, now);
+        while !bus.returns(now) {
+            now += 1_000;
+            bus.follow(true, false, now);
+        }
+        let waited = (now - off_at) / 1_000;
+        bus.follow(false, true, now);
+        assert!(!bus.returns(now + LAST_US), "it is on the bus");
+        now += 1_000 * stays;
+        bus.follow(false, true, now);
+        waited
+    });
+    assert_eq!(waited, [10, 20, 40, 80, 10, 20, 40, 80, 160, 320, 640, 1_280]);
+}
+
+#[test]
+fn can_fd_frames_are_blamed_only_where_classic_ones_were_taken() {
+    for is_taken in [true, false] {
+        let (mut bus, mut now) = (BusOff::new(0), 0);
+        for _ in 0..10 {
+            bus.follow(true, false, now);
+            while !bus.returns(now) {
+                now += 1_000;
+            }
+            bus.follow(false, is_taken, now);
+            bus.follow(false, true, now + 700_000);
+            now += 800_000;
+        }
+        bus.follow(true, false, now);
+        assert_eq!(bus.refuses_fd(), is_taken);
+    }
+}
+
+#[test]
 fn frames_go_out_as_configured() {
     let slow = Settings::DEFAULT.yaw.map(|yaw| YawSettings { period_ms: 50, ..yaw });
     for settings in [Settings::DEFAULT, Settings { yaw: slow, ..Settings::DEFAULT }] {
@@ -196,7 +234,9 @@ fn frames_go_out_as_configured() {
             assert_eq!(count, 1000 / usize::from(message.period_ms), "{message:?}");
             assert!(config.sends(message.id));
         }
-        assert!(sent.iter().all(|frame| config.sends(frame.id()) && frame.dlc() == 8));
+        assert!(
+            sent.iter().all(|frame| config.sends(frame.id()) && !frame.is_extended() && frame.dlc() == 8)
+        );
     }
     assert!(!Config::new(ALL).expect("checked").sends(id11(0x123)));
 }

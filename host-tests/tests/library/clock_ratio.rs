@@ -15,7 +15,8 @@ const SETTLED_S: f64 = 40.0;
 /// A sample takes at least so long to arrive.
 const LINE_US: f64 = 1_700.0;
 
-/// A sensor whose periods of 10 ms last longer by `off`, and a line that is late by up to `jitter_us`.
+/// A sensor whose periods of 10 ms last longer by `off`, and a line that is late by up to `jitter_us`, seldom by ten times
+/// as much.
 struct Sensor {
     off: f64,
     jitter_us: f64,
@@ -36,7 +37,8 @@ impl Sensor {
     fn sample(&mut self) -> (Micros, Micros) {
         self.now += (1.0 + self.off) * PERIOD_US as f64 * 1e-6;
         self.stamp += PERIOD_US;
-        let arrival = self.now * 1e6 + LINE_US + self.noise.int(0, self.jitter_us as i64) as f64;
+        let seldom = if self.noise.int(0, 300) == 0 { 10.0 } else { 1.0 };
+        let arrival = self.now * 1e6 + LINE_US + seldom * self.noise.int(0, self.jitter_us as i64) as f64;
         self.arrival = self.arrival.max(arrival);
         (Micros(self.stamp), Micros(self.arrival as u64))
     }

@@ -129,9 +129,12 @@ fn true_course(second: usize, headings: &[f64]) -> Option<f64> {
 fn a_vehicle_that_never_stands_is_usable_in_20_s_and_good_in_60() {
     let course = |second, headings: &[f64]| true_course(second, headings).filter(|_| second < 90);
     for is_lossy in [false, true] {
-        let part = Part { noise: Noise::new(7), gain: GAIN, walk: 0.0, speed: fast, is_lossy };
         let moving = Drive { stands: 0, creeps: 0.0, turn: &road, course: &course };
-        let (pipeline, outputs, headings) = drive_with(PipelineConfig::DEFAULT, part, 150, &moving);
+        let driven = |seconds| {
+            let part = Part { noise: Noise::new(7), gain: GAIN, walk: 0.0, speed: fast, is_lossy };
+            drive_with(PipelineConfig::DEFAULT, part, seconds, &moving)
+        };
+        let (pipeline, outputs, headings) = driven(150);
         let first = |wanted: &dyn Fn(&Output) -> bool| {
             outputs.iter().find(|output| wanted(output)).map(|output| f64::from(output.vehicle.tick) * 0.01)
         };
@@ -139,6 +142,9 @@ fn a_vehicle_that_never_stands_is_usable_in_20_s_and_good_in_60() {
         let good = first(&|output| output.vehicle.delayed.quality == Quality::Good).expect("a good rate");
         println!("usable after {usable} s, good after {good} s, {:?}", pipeline.course_counters());
         assert!(usable <= 20.0 && good <= 60.0);
+        // No rate is good whose bias is coarse.
+        let known = [good - 1.0, good + 2.0].map(|at| driven(at as usize).0.status(None).bias);
+        assert_eq!(known, [Knowledge::Coarse, Knowledge::Fine]);
         let held = error(&outputs, &headings, 58).to_degrees();
         println!("heading held for a minute: {held:.3} deg");
         assert!(held.abs() < 0.6, "{held} deg");

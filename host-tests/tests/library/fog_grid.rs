@@ -60,6 +60,30 @@ proptest! {
     }
 }
 
+/// Ends jitter by less than half a span; where one is lost or later than that, its time stays uncovered.
+#[test]
+fn an_increment_begins_where_the_one_before_ended() {
+    for (lost, late, covered) in [(0, 0, 10_000), (0, 450, 10_000), (0, 600, 9_400), (1, 450, 9_550)] {
+        let mut increments = Increments::default();
+        for n in 1..=11u64 {
+            let end = Micros(n * 1_000 + if n >= 5 { late } else { 0 });
+            increments.add(end, &FogSample { lost: if n == 5 { lost } else { 0 }, ..fog(end.0, 1_000) });
+        }
+        assert_eq!(increments.take(Micros(PERIOD_US)).covered, covered, "{lost} lost, {late} us late");
+    }
+}
+
+#[test]
+fn an_increment_after_a_jump_covers_its_own_span() {
+    let mut grid = FogGrid::new(false);
+    assert!(!grid.is_running());
+    grid.add(Micros(5_000), fog(5_000, 1)).expect("the first");
+    assert!(grid.is_running() && !grid.is_due(Micros(19_999)));
+    grid.add(Micros(6_400), fog(900_000, 1)).expect("its clock has jumped");
+    let covered: Vec<u32> = drain(&mut grid, 20_000).iter().map(|step| step.turn.covered).collect();
+    assert_eq!(covered, [2_000]);
+}
+
 #[test]
 fn lost_increments_are_marked() {
     let mut grid = FogGrid::new(false);

@@ -2,6 +2,7 @@
 
 use gyronet::bias::{ZeroRate, ZeroRateConfig, ZeroRateOutcome};
 use gyronet::estimate::YawEstimate;
+use gyronet::health::slow::{Evidence, Knowledge, SlowStatus, Verdict};
 use gyronet::health::{Faults, Status};
 use gyronet::pipeline::{BoardState, Output, Pipeline, PipelineConfig};
 use gyronet::sample::{ImuSample, RATE_HZ, Standstill, Validity, WHEELS, WheelSample};
@@ -158,6 +159,8 @@ fn a_turntable_is_a_turn_whatever_the_wheels_say() {
         // What remains open is part of sigma: the vehicle turns, or the bias was wrong.
         assert!(sigma(&outputs[7_999]) > 0.9 * speed);
         assert!(pipeline.bias().rad_per_sec().abs() < 2e-4, "it is not learnt");
+        let SlowStatus { bias, verdict, evidence, .. } = pipeline.status(Some(Standstill::Still));
+        assert_eq!((bias, verdict, evidence), (Knowledge::Refused, Verdict::Unknown, Evidence::Wheels));
     }
 }
 
@@ -355,6 +358,7 @@ fn the_last_reading_before_driving_off_is_the_bias_where_it_differs_by_more_than
         let due = if is_taken { f64::from(share * gate) } else { 0.0 };
         let bias = zero_rate.bias().rad_per_sec();
         assert!((bias - due).abs() < 1e-7 && zero_rate.is_confirmed(), "{share} of the gate: {bias}");
+        assert!((zero_rate.sigma() - initial).abs() < 1e-3 * initial, "{}", zero_rate.sigma());
     }
 }
 
