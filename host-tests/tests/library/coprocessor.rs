@@ -4,7 +4,6 @@ use embedded_can::Frame;
 use gyronet::align::AlignError;
 use gyronet::align::clock::ClockError;
 use gyronet::can::DataFrame;
-use gyronet::can::wheel::WheelError;
 use gyronet::can::yaw::FOG_IDS;
 use gyronet::compensate::DELAY;
 use gyronet::coprocessor::{Clock, InputError, Observation, StorageFaults};
@@ -17,7 +16,7 @@ use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::sent::Sent;
 use gyronet_host_tests::synthetic::idling;
-use gyronet_host_tests::wire::{data_frame, id11, wheels};
+use gyronet_host_tests::wire::{id11, wheels};
 use gyronet_tools::drive::wheel_frames::receiver;
 
 /// Frames of a sample.
@@ -179,19 +178,6 @@ fn the_next_sample_waits_for_the_estimate_until_it_is_late() {
     assert!(car.coprocessor.is_ready(late));
     // A sensor whose samples wait is not silent.
     assert_eq!(waited.poll(Micros(now.0 + 10), &mut ()), Ok(None));
-}
-
-#[test]
-fn wheel_frames_that_are_damaged_are_errors_and_others_are_passed_over() {
-    let mut coprocessor = Coprocessor::new(Config { wheels: Some(receiver()), ..Config::DEFAULT });
-    assert_eq!(coprocessor.can(&wheels(0.0), at(1)), Ok(true));
-    assert_eq!(
-        coprocessor.can(&data_frame(id11(0xAA), &[0x1A; 3]), at(1)),
-        Err(InputError::Wheels(WheelError::Short(3)))
-    );
-    let other = data_frame(id11(0x123), &[0; 8]);
-    assert_eq!(coprocessor.can(&other, at(1)), Ok(false));
-    assert_eq!(coprocessor.input_counters().wheel_errors, 1);
 }
 
 /// Standstill takes, with a clock of the board's own, half a second of that clock, with the sensor's of the samples.

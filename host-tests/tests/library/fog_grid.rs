@@ -85,27 +85,6 @@ fn an_increment_after_a_jump_covers_its_own_span() {
 }
 
 #[test]
-fn lost_increments_are_marked() {
-    let mut grid = FogGrid::new(false);
-    let mut steps = Vec::new();
-    for n in 1..=100u64 {
-        if (43..=45).contains(&n) {
-            continue;
-        }
-        let lost = if n == 46 { 3 } else { 0 };
-        let increment = if n == 77 { [None; 3] } else { fog(0, 1_000).increment };
-        let sample = FogSample { lost, increment, ..fog(n * 1_000, 1_000) };
-        grid.add(Micros(n * 1_000), sample).expect("in order");
-        steps.extend(drain(&mut grid, n * 1_000));
-    }
-    let of = |k: usize| (steps[k].turn.covered, steps[k].turn.angle[2]);
-    assert_eq!(of(3), (10_000, Some(Angle(10_000))));
-    assert_eq!(of(4), (7_000, Some(Angle(7_000))));
-    assert_eq!(of(7), (10_000, None));
-    assert_eq!(of(8), (10_000, Some(Angle(10_000))));
-}
-
-#[test]
 fn no_step_is_later_than_ten_milliseconds() {
     // The gyro is silent for every other 100 ms.
     let mut grid = FogGrid::new(false);
@@ -123,12 +102,6 @@ fn no_step_is_later_than_ten_milliseconds() {
     assert!(worst <= MAX_DELAY_US);
     assert!(steps.windows(2).all(|pair| pair[1].time.0 - pair[0].time.0 == PERIOD_US));
     assert!(steps.len() >= 198);
-    // Silence is marked, no turn is made up.
-    let at = |ms: u64| steps.iter().find(|step| step.time.0 == ms * 1_000).expect("a step");
-    assert!(at(50).turn.covered == 10_000 && at(250).turn.covered == 10_000);
-    for silent in [150, 350] {
-        assert!(at(silent).turn.covered == 0 && at(silent).turn.angle == [None; 3], "{silent} ms");
-    }
 }
 
 #[test]
@@ -165,22 +138,6 @@ fn a_small_jump_is_found_within_a_second() {
     }
     // Silence is not lateness.
     assert!(!clock.translate(Micros(13_950_000), Micros(12_995_000)).expect("in order").jumped);
-}
-
-#[test]
-fn a_slow_clock_is_followed() {
-    // 100 ppm slow, arrivals jitter by up to 1.5 ms: after a minute the stamps are 6 ms behind.
-    let mut clock = PartClock::default();
-    let mut worst = 0;
-    for n in 1..=6_000u64 {
-        let truth = n * 10_000;
-        let stamp = truth - truth / 10_000;
-        let arrival = truth + 500 + n * 7_919 % 1_500;
-        let board = clock.translate(Micros(stamp), Micros(arrival)).expect("in order").time;
-        worst = worst.max(board.0.abs_diff(truth + 500));
-    }
-    println!("100 ppm slow with 1.5 ms of jitter: at most {worst} us off");
-    assert!(worst <= 1_500);
 }
 
 proptest! {

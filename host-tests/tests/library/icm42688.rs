@@ -23,13 +23,9 @@ fn packet_4() -> Packet {
 }
 
 #[test]
-fn a_packet_is_read_as_the_data_sheet_says() {
+fn a_packet_is_read_as_the_data_sheet_says_and_invalid_marks_are_no_readings() {
     assert_eq!(Packet::parse(&PACKET_4), Ok(packet_4()));
     assert_eq!(packet_4().emit(), PACKET_4);
-}
-
-#[test]
-fn invalid_marks_are_no_readings() {
     let mut bytes = PACKET_4;
     bytes[0] |= 0x80;
     assert_eq!(Packet::parse(&bytes), Err(PacketError::Empty));

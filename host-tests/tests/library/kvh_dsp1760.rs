@@ -169,17 +169,6 @@ fn a_number_that_is_none_is_not_valid() {
 }
 
 #[test]
-fn time_stamps_wrap() {
-    let timed = |sequence, time| {
-        Message { extra: Extra::Timed { time, temperature: 0 }, ..message(sequence, 0.0) }.emit()
-    };
-    let part = &mut Dsp1760::new();
-    feed(part, timed(0, u32::MAX - 499));
-    let after = feed(part, timed(1, 500))[0].expect("a sample");
-    assert_eq!(after.time, Micros(u64::from(u32::MAX) + 501));
-}
-
-#[test]
 fn errors_say_where() {
     let mut frame = bytes(RECORDED);
     assert_eq!(Message::parse(&frame[1..]), Err(MessageError::Header));

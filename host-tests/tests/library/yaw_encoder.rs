@@ -7,7 +7,6 @@ use gyronet::can::yaw::{
 };
 use gyronet::can::yaw_encoder::YawEncoder;
 use gyronet::estimate::YawEstimate;
-use gyronet::health::{Status, judge};
 use gyronet::units::{AngularRate, Yaw};
 
 const PERIOD_S: f64 = 0.01;
@@ -75,16 +74,9 @@ fn many_turns_wrap_as_an_angle_does() {
 }
 
 #[test]
-fn each_status_has_its_source_and_quality_and_others_are_not_read() {
-    assert_eq!(judge(Status::Init), (Source::Raw, Quality::Initialising));
-    assert_eq!(judge(Status::Degraded), (Source::Static, Quality::Degraded));
-    assert_eq!(judge(Status::Ready), (Source::Model, Quality::Good));
+fn details_are_encoded_and_limited() {
     assert_eq!(RateMessage::parse(&[7; 8]), Err(YawError::Source(7)));
     assert_eq!(RateMessage::parse(&[0; 7]), Err(YawError::Length(7)));
-}
-
-#[test]
-fn details_are_encoded_and_limited() {
     let mut feed = YawEncoder::new(p01(), 1);
     let detailed = YawEstimate {
         correction: rate(-0.022),
