@@ -38,28 +38,32 @@ fn idling_with(channel: usize, added: impl Fn(f64) -> f64) -> Verdict {
 }
 
 #[test]
-fn an_engine_is_no_motion() {
-    let bias = idling_with(0, |_| 0.0).expect("it stands");
-    for axis in bias {
-        // 0.02 rad/s of shake leaves less than 0.0005 rad/s in the mean of 300 samples.
-        assert!((axis.rad_per_sec() - 0.002).abs() < 5e-4, "{axis:?}");
-    }
-}
-
-#[test]
 fn motion_is_refused() {
+    let near = |found: f32, due: f32| (found / due - 1.0).abs() < 0.05;
     for axis in 0..3u8 {
         let (gyro, accel) = (usize::from(axis), usize::from(axis) + 3);
         // Starts to turn, and brakes, within the three seconds.
         let turn = idling_with(gyro, |t| 0.02 * (t - 1.0).max(0.0));
-        assert!(matches!(turn, Err(StaticError::GyroDrift { axis: a, .. }) if a == axis), "{turn:?}");
+        assert!(
+            matches!(turn, Err(StaticError::GyroDrift { axis: a, spread }) if a == axis && near(spread, 0.03)),
+            "{turn:?}"
+        );
         let brake = idling_with(accel, |t| -0.3 * (t - 1.0).max(0.0));
-        assert!(matches!(brake, Err(StaticError::AccelDrift { axis: a, .. }) if a == axis), "{brake:?}");
+        assert!(
+            matches!(brake, Err(StaticError::AccelDrift { axis: a, spread }) if a == axis && near(spread, 0.45)),
+            "{brake:?}"
+        );
         // Is shaken, by hand or by the road.
         let shaken = idling_with(gyro, |t| 0.12 * (30.0 * t).sin());
-        assert!(matches!(shaken, Err(StaticError::GyroNoise { axis: a, .. }) if a == axis), "{shaken:?}");
+        assert!(
+            matches!(shaken, Err(StaticError::GyroNoise { axis: a, std }) if a == axis && near(std, 0.086)),
+            "{shaken:?}"
+        );
         let road = idling_with(accel, |t| 3.0 * (70.0 * t).sin());
-        assert!(matches!(road, Err(StaticError::AccelNoise { axis: a, .. }) if a == axis), "{road:?}");
+        assert!(
+            matches!(road, Err(StaticError::AccelNoise { axis: a, std }) if a == axis && near(std, 2.2)),
+            "{road:?}"
+        );
         // Turns steadily, by more than any bias.
         let steady = idling_with(gyro, |_| -0.1);
         assert!(matches!(steady, Err(StaticError::GyroBias { axis: a, mean }) if a == axis && mean < -0.09));
@@ -79,35 +83,6 @@ fn a_calm_vehicle_may_be_rocked_and_not_turned() {
         });
         assert_eq!(verdict.expect("a verdict").is_ok(), is_taken, "axis {axis}, calm: {is_calm}");
     }
-}
-
-#[test]
-fn numbers_in_a_refusal_are_right() {
-    let Err(StaticError::GyroNoise { axis: 2, std }) =
-        judge_new(|tick| turning(tick, rate(if tick % 2 == 0 { 0.08 } else { -0.06 })))
-    else {
-        panic!("a spread of 0.07 rad/s is no standing still")
-    };
-    assert!((std - 0.07).abs() < 1e-5, "{std}");
-    let second = |tick| [0.001, 0.0, 0.0055][tick as usize / 100];
-    let Err(StaticError::GyroDrift { axis: 2, spread }) = judge_new(|tick| turning(tick, rate(second(tick))))
-    else {
-        panic!("a spread of 0.0055 rad/s between seconds is no standing still")
-    };
-    assert!((spread - 0.0055).abs() < 1e-6, "{spread}");
-}
-
-#[test]
-fn initialisation_starts_again_after_a_verdict_and_on_restart() {
-    let mut init = StaticInit::new(StaticConfig::DEFAULT);
-    let still = |tick| turning(tick, rate(0.01));
-    assert!(judge(&mut init, |tick| turning(tick, rate(0.2))).is_err());
-    assert_eq!(judge(&mut init, still), Ok([AngularRate(0), AngularRate(0), rate(0.01)]));
-    for tick in 0..u64::from(STATIC_SAMPLES) - 1 {
-        assert_eq!(init.add(&turning(tick, rate(0.2)), false, false), None);
-    }
-    init.restart();
-    assert_eq!(judge(&mut init, still), Ok([AngularRate(0), AngularRate(0), rate(0.01)]));
 }
 
 /// Limits that refuse nothing: for what the mean is, not whether it is believed.
@@ -132,14 +107,6 @@ fn exact_mean(codes: impl Fn(u64) -> [i32; 3]) {
     assert_eq!(bias, Ok([mean(0), mean(1), mean(2)]));
 }
 
-#[test]
-fn mean_of_extremes_is_exact() {
-    for code in [i32::MIN, i32::MAX, -1, 0, 1] {
-        exact_mean(|_| [code; 3]);
-    }
-    exact_mean(|tick| if tick % 2 == 0 { [i32::MIN, i32::MAX, -1] } else { [i32::MAX, i32::MIN, 0] });
-}
-
 proptest! {
     #![proptest_config(cases(256))]
 
@@ -149,5 +116,6 @@ proptest! {
         let codes: Vec<[i32; 3]> =
             (0..STATIC_SAMPLES).map(|_| std::array::from_fn(|_| noise.bits() as i32 >> shift)).collect();
         exact_mean(|tick| codes[tick as usize]);
+        exact_mean(|tick| if tick < seed % 300 { [i32::MIN, i32::MAX, -1] } else { [i32::MAX, i32::MAX, 0] });
     }
 }

@@ -1,7 +1,7 @@
 //! A sensor's clock is held against the board's: an oscillator that is off turns by the right angle,
 //! through jitter, stalls, jumps, restarts and silence.
 
-use gyronet::align::clock_ratio::{ClockRatio, JITTER_US, LIMIT_PPM, RatioEstimator};
+use gyronet::align::clock_ratio::{ClockRatio, LIMIT_PPM, RatioEstimator};
 use gyronet::sample::PERIOD_US;
 use gyronet::units::{Angle, AngularRate, Micros, Yaw};
 use gyronet_host_tests::noise::{Noise, cases};
@@ -77,7 +77,13 @@ fn an_oscillator_that_is_off_turns_by_the_right_angle() {
         for jitter_us in [0.0, 1_000.0, 5_000.0] {
             for seed in 1..=20 {
                 let (mut sensor, mut estimator) = (Sensor::new(off, jitter_us, seed), RatioEstimator::START);
-                sensor.run(SETTLED_S, &mut estimator);
+                sensor.run(9.5, &mut estimator);
+                assert_eq!(estimator.ratio, ClockRatio::ONE, "for ten seconds");
+                sensor.run(10.0, &mut estimator);
+                // 3 ms of 8 s, once it is known at all.
+                let early = error(&estimator, off);
+                assert!(off < 0.01 || early < 4e-4, "{off} {jitter_us} {seed}: {early}");
+                sensor.run(SETTLED_S - 19.5, &mut estimator);
                 let (begin, turning) = (sensor.now, rate(0.5));
                 let (mut yaw, mut worst) = (Yaw::default(), 0.0f64);
                 while sensor.now < begin + 300.0 {
@@ -95,18 +101,6 @@ fn an_oscillator_that_is_off_turns_by_the_right_angle() {
                 assert!(!estimator.fault);
             }
         }
-    }
-}
-
-#[test]
-fn the_ratio_is_one_for_ten_seconds_and_nearly_right_from_then_on() {
-    for seed in 1..=20 {
-        let (mut sensor, mut estimator) = (Sensor::new(0.01, 5_000.0, seed), RatioEstimator::START);
-        sensor.run(9.5, &mut estimator);
-        assert_eq!(estimator.ratio, ClockRatio::ONE);
-        sensor.run(10.0, &mut estimator);
-        // 3 ms of 8 s.
-        assert!(error(&estimator, 0.01) < 4e-4, "{seed}: {}", error(&estimator, 0.01));
     }
 }
 
@@ -164,18 +158,6 @@ fn a_clock_beyond_the_limit_is_a_fault_and_changes_nothing() {
     }
 }
 
-/// The board is busy for 1.5 s; the samples have waited in the part, or in the line, and come at once.
-#[test]
-fn a_stall_is_no_drift() {
-    let (mut sensor, mut estimator) = (Sensor::new(0.01, 1_000.0, 3), RatioEstimator::START);
-    sensor.run(SETTLED_S, &mut estimator);
-    for _ in 0..20 {
-        sensor.arrival = (sensor.now + 1.5) * 1e6;
-        sensor.is_followed(10, &mut estimator, BAR);
-    }
-    assert!(!estimator.fault);
-}
-
 /// A counter of 16 bits that has turned once more than was seen; an offset that is new after a stall of
 /// the line.
 #[test]
@@ -194,7 +176,7 @@ fn a_step_of_either_clock_is_no_drift() {
 }
 
 #[test]
-fn a_restart_and_a_silence_keep_the_ratio() {
+fn a_restart_a_silence_and_a_stall_keep_the_ratio() {
     let (mut sensor, mut estimator) = (Sensor::new(0.012, 1_000.0, 4), RatioEstimator::START);
     sensor.run(SETTLED_S, &mut estimator);
     for stamp in [0, 500_000_000] {
@@ -206,6 +188,12 @@ fn a_restart_and_a_silence_keep_the_ratio() {
         sensor.stamp += 10_000_000;
         sensor.is_followed(60, &mut estimator, BAR);
     }
+    // The board is busy for 1.5 s; the samples have waited in the part, or in the line, and come at once.
+    for _ in 0..20 {
+        sensor.arrival = (sensor.now + 1.5) * 1e6;
+        sensor.is_followed(10, &mut estimator, BAR);
+    }
+    assert!(!estimator.fault);
 }
 
 #[test]
@@ -241,16 +229,5 @@ proptest! {
             estimator.observe(Micros(sensor), Micros(board));
             prop_assert!(estimator.ratio.departure_ppm() <= LIMIT_PPM);
         }
-    }
-}
-
-/// A slope of two crystals counts only where jitter cannot explain it.
-#[test]
-fn a_difference_counts_from_three_milliseconds_on() {
-    for (off_us, counts) in [(JITTER_US - 200, false), (JITTER_US + 200, true)] {
-        let off = off_us as f64 / 32e6;
-        let (mut sensor, mut estimator) = (Sensor::new(off, 0.0, 1), RatioEstimator::START);
-        sensor.run(SETTLED_S, &mut estimator);
-        assert_eq!(estimator.ratio != ClockRatio::ONE, counts, "{off_us} us in 32 s");
     }
 }

@@ -137,7 +137,12 @@ fn the_fourth_reading_in_a_row_is_believed_wherever_it_is() {
 }
 
 #[test]
-fn a_reading_near_the_last_good_one_ends_it() {
+fn readings_are_held_against_the_last_good_one_and_one_near_it_ends_it() {
+    let mut drive = Drive::new();
+    assert_refused(&drive.off_by(2, 2 * RATE_LIMIT), "two limits off");
+    // One limit from the refused one, three from the last that was believed.
+    assert_refused(&drive.off_by(2, 3 * RATE_LIMIT), "three limits off");
+    assert_believed(&drive.off_by(2, RATE_LIMIT - 100), "one limit off");
     let mut drive = Drive::new();
     for _ in 0..2 {
         assert_refused(&drive.off_by(2, 4 * RATE_LIMIT), "off");
@@ -145,15 +150,6 @@ fn a_reading_near_the_last_good_one_ends_it() {
         assert_believed(&drive.off_by(2, 1_000), "near the one before");
     }
     assert_eq!(drive.coprocessor.monitor_counters().wrong, 4);
-}
-
-#[test]
-fn a_refused_reading_is_not_what_the_next_one_is_held_against() {
-    let mut drive = Drive::new();
-    assert_refused(&drive.off_by(2, 2 * RATE_LIMIT), "two limits off");
-    // One limit from the refused one, three from the last that was believed.
-    assert_refused(&drive.off_by(2, 3 * RATE_LIMIT), "three limits off");
-    assert_believed(&drive.off_by(2, RATE_LIMIT - 100), "one limit off");
 }
 
 /// The last reading says nothing of the next one after 50 ms without a sample.

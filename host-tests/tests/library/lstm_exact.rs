@@ -223,17 +223,10 @@ fn inputs_beyond_the_table_saturate() {
 
 proptest! {
     #![proptest_config(cases(100))]
-
-    #[test]
-    fn gyronet_layer_1(seed: u64) { check_step::<60, 30>(6, seed); }
     #[test]
     fn gyronet_layer_2(seed: u64) { check_step::<60, 30>(120, seed); }
     #[test]
-    fn fognet_lstm1_layer_1(seed: u64) { check_step::<90, 46>(10, seed); }
-    #[test]
     fn fognet_lstm1_layer_2(seed: u64) { check_step::<90, 46>(180, seed); }
-    #[test]
-    fn fognet_lstm2_layer_1(seed: u64) { check_step::<60, 30>(2, seed); }
     #[test]
     fn smallest(seed: u64) { check_step::<4, 2>(2, seed); check_step::<2, 2>(4, seed); check_step::<6, 4>(10, seed); }
     #[test]

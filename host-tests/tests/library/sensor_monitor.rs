@@ -41,6 +41,11 @@ fn sample(coprocessor: &mut Coprocessor, sample: ImuSample, tick: u64) -> Observ
 
 #[test]
 fn silence_has_no_rate_and_ends_with_a_sample() {
+    // A part has time to start.
+    let mut started = coprocessor();
+    assert_eq!(started.poll(Micros(START_US - 1), &mut ()), Ok(None));
+    let set = started.poll(Micros(START_US), &mut ()).expect("time goes on").expect("a set");
+    assert_eq!(set.vehicle.delayed.quality, Quality::Unusable);
     let (mut coprocessor, mut noise) = fed(399);
     let last = sample(&mut coprocessor, idling(399, 0.001, &mut noise), 399).vehicle.delayed;
     assert_ne!(last.yaw.0, 0);
@@ -61,6 +66,11 @@ fn silence_has_no_rate_and_ends_with_a_sample() {
     let set = sample(&mut coprocessor, idling(412, 0.001, &mut noise), 412).vehicle;
     assert_eq!((set.live.tick, set.live.status), (412, Status::Degraded), "the bias is kept");
     assert_eq!(coprocessor.poll(at(413), &mut ()), Ok(None));
+    // Nobody has time for a set that should have gone out earlier, and it is of no use later.
+    let late = at(412).0 + TIMEOUT_US + 45_000;
+    let sets = [0, 1, 5_000, 9_999, PERIOD_US]
+        .map(|after| coprocessor.poll(Micros(late + after), &mut ()).expect("time goes on").is_some());
+    assert_eq!(sets, [true, false, false, false, true]);
 }
 
 /// The counter of an ICM-42688-P wraps every 69.9 ms, so that its stamps show a gap of 80 ms as one of 10 ms: for a second
@@ -89,14 +99,6 @@ fn a_stall_with_a_slow_clock_loses_nothing() {
         coprocessor.imu(sample, Micros(now), &mut ()).expect("in order");
     }
     assert_eq!(coprocessor.pipeline().counters().missing, 0);
-}
-
-#[test]
-fn a_part_has_time_to_start() {
-    let mut coprocessor = coprocessor();
-    assert_eq!(coprocessor.poll(Micros(START_US - 1), &mut ()), Ok(None));
-    let set = coprocessor.poll(Micros(START_US), &mut ()).expect("time goes on").expect("a set");
-    assert_eq!(set.vehicle.delayed.quality, Quality::Unusable);
 }
 
 /// All axes with the accelerometer's, the gyro alone, or one axis beside axes that move.
@@ -164,29 +166,4 @@ fn every_round_of_the_background_check_sees_a_flipped_bit() {
     damaged[middle] ^= 1;
     let mut check = BackgroundCheck::new(&damaged, blob.crc);
     assert!(matches!(round(&mut check), Err(BlobError::Crc { stored, .. }) if stored == blob.crc));
-}
-
-/// Nobody has time for a set that should have gone out earlier, and it is of no use later.
-#[test]
-fn a_late_poll_sends_one_set_and_catches_up_none() {
-    let (mut coprocessor, _) = fed(400);
-    let late = at(399).0 + TIMEOUT_US + 45_000;
-    let mut sets = |now| usize::from(coprocessor.poll(Micros(now), &mut ()).expect("time goes on").is_some());
-    assert_eq!(sets(late), 1);
-    assert_eq!([1, 5_000, 9_999].map(|after| sets(late + after)), [0; 3]);
-    assert_eq!(sets(late + PERIOD_US), 1);
-}
-
-#[test]
-fn a_part_that_is_stuck_while_it_recovers_is_reported_as_stuck() {
-    let (mut coprocessor, mut noise) = fed(400);
-    let held = idling(400, 0.001, &mut noise);
-    let saturated = usize::from(STUCK_AFTER) - 3;
-    let mut validities = (0..saturated + 4).zip(400..).map(|(number, tick)| {
-        let validity = Validity::reported(number < saturated);
-        sample(&mut coprocessor, ImuSample { validity, ..held }, tick).sample.expect("a sample").validity
-    });
-    assert!(validities.by_ref().take(saturated).all(|validity| validity == Validity::reported(true)));
-    let [recovering @ .., last] = [(); 4].map(|()| validities.next().expect("four more"));
-    assert_eq!((recovering, last), ([Validity::Recovering; 3], Validity::Stuck));
 }

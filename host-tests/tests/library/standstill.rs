@@ -49,14 +49,6 @@ fn wheels(speed: f64, standstill: Standstill) -> WheelSample {
 }
 
 #[test]
-fn a_car_that_idles_since_the_start_stands() {
-    let mut car = Vehicle::new();
-    assert_eq!(car.go(1.9, 0.0, 0.0, None), Standing::UNKNOWN, "two seconds are wanted");
-    let standing = car.go(10.0, 0.0, 0.0, None);
-    assert!(standing.source == StandstillSource::Inertial && standing.is_likely(), "{standing:?}");
-}
-
-#[test]
 fn quiet_after_braking_is_a_stop_and_a_smooth_road_is_none() {
     for (braking, stops) in [(-1.5, true), (0.0, false)] {
         let mut car = Vehicle::new();

@@ -4,7 +4,7 @@ use super::transmit_queue::{Controller, Mood};
 use embedded_can::Frame;
 use gyronet::coprocessor::{Bus, Config, Coprocessor, QueuedCan, Step};
 use gyronet::health::{Faults, Status};
-use gyronet::model::{GyroNet, WindowNetwork};
+use gyronet::model::GyroNet;
 use gyronet::sample::{ImuSample, PERIOD_US, Standstill, TestSignal};
 use gyronet::units::{Micros, RangeError};
 use gyronet_host_tests::wire::{data_frame, wheels};
@@ -55,23 +55,6 @@ fn constant_readings_of_a_test_become_good_rates() {
     assert_eq!((live.status, live.faults, last.imu_error), (Status::Ready, Faults::NONE, None));
     assert!(live.rate.rad_per_sec().abs() < 1e-4, "{}", live.rate.rad_per_sec());
     assert_eq!(can.controller().sent.len(), 400 * SET);
-}
-
-#[test]
-fn the_network_may_run_elsewhere() {
-    let (mut here, mut elsewhere) = (Car::new(), Car::new());
-    let mut buses = [0, 1].map(|_| QueuedCan::<_>::new(taking()));
-    for number in 0..500 {
-        here.sample(&mut buses[0]);
-        let mut reading: Reading = Some(Ok(TestSignal::turning(0.5).sample(number)));
-        let now = Micros(u64::from(number) * PERIOD_US);
-        elsewhere.coprocessor.step(now, &mut reading, &mut buses[1], None);
-        if let Some(due) = elsewhere.coprocessor.window() {
-            let estimate = elsewhere.network.estimate(&due.features);
-            elsewhere.coprocessor.deliver(due.end, estimate).expect("in time");
-        }
-    }
-    assert_eq!(buses[0].controller().sent, buses[1].controller().sent);
 }
 
 #[test]

@@ -57,19 +57,6 @@ fn root(squares: &[f64]) -> f64 {
     squares.iter().map(|value| value * value).sum::<f64>().sqrt()
 }
 
-#[test]
-fn a_turn_is_as_uncertain_as_gain_and_mounting_until_they_are_known() {
-    for (known, [gain, mounting]) in [(false, [0.01, 0.02]), (true, [0.001, 0.002])] {
-        let mut uncertainty = Uncertainty::new(ERRORS);
-        uncertainty.calibrated(known);
-        turn(&mut uncertainty, 2.0, [0.3, -0.4, -0.05, 0.0]);
-        let due = root(&[3e-4, gain * 0.05, mounting * 0.5]);
-        assert_sigma(uncertainty.sigma(Origin::Gyro, 0.0), due, "turning");
-        let minute = root(&[3e-4 * 2f64.sqrt(), 2e-4, gain * 0.1, mounting * 1.0]);
-        assert_ratio(uncertainty.minute(Missed::NOTHING).into(), minute, 1e-4);
-    }
-}
-
 /// A rate that a network corrects by this much, and nothing else.
 fn corrected(estimate: f64) -> Turning {
     let [none, estimate] = [0.0, estimate].map(rate);
@@ -154,22 +141,6 @@ fn a_rate_that_standstill_hides_may_be_an_error_as_a_whole() {
     assert_ratio(uncertainty.minute(Missed::NOTHING).into(), 9.85 * root(&[4e-3, 1e-4]), 0.02);
 }
 
-/// A banked turn pitches the vehicle for as long as it lasts: a gyro about z misses 1 - cos of it, half of which is sigma.
-#[test]
-fn a_turn_on_a_bank_is_as_uncertain_as_what_its_axis_misses() {
-    let mut uncertainty = Uncertainty::new(ERRORS);
-    turn(&mut uncertainty, 2.0, [0.0, 0.1, 0.5, 0.0]);
-    let due = root(&[3e-4, 0.01 * 0.5, 0.02 * 0.1, 0.5 * 0.02 * 0.5]);
-    assert_ratio(uncertainty.sigma(Origin::Gyro, 0.0).rad_per_sec(), due, 1e-5);
-    // Also where the turn began before the newest of the parts that a minute is counted in.
-    turn(&mut uncertainty, 30.0, [0.0, 0.1, 0.5, 0.0]);
-    for _ in 0..10 {
-        turn(&mut uncertainty, 1.0, [0.0, 0.1, 0.5, 0.0]);
-        let tilted = f64::from(uncertainty.tilted());
-        assert!((tilted - 0.02).abs() < 1e-5, "{tilted}: 1 - cos of 0.2 rad");
-    }
-}
-
 /// A gyro beside this one is not levelled: on what may be a ramp it misses a share of a turn.
 #[test]
 fn a_tilt_that_one_standstill_has_shown_may_be_a_ramp_to_a_gyro_beside() {
@@ -229,6 +200,10 @@ fn a_minute_of_a_banked_turn_misses_the_same_share_throughout() {
     turn(&mut uncertainty, 100.0, [0.0, 0.1, 0.5, 0.0]);
     let due = root(&[3e-4 * 60f64.sqrt(), root(&[1e-4, 0.5 * 0.02 * 0.5]) * 60.0, 0.01 * 30.0, 0.02 * 6.0]);
     assert_ratio(uncertainty.minute(Missed::NOTHING).into(), due, 1e-3);
+    let tilted = f64::from(uncertainty.tilted());
+    assert!((tilted - 0.02).abs() < 1e-5, "{tilted}: 1 - cos of 0.2 rad");
+    let due = root(&[3e-4, 0.01 * 0.5, 0.02 * 0.1, 0.5 * 0.02 * 0.5]);
+    assert_ratio(uncertainty.sigma(Origin::Gyro, 0.0).rad_per_sec(), due, 1e-5);
 }
 
 /// The angles that many gaps leave out of one turn add up.
@@ -272,21 +247,4 @@ fn a_sigma_is_rounded_up_and_ends_with_its_code() {
     let config = UncertaintyConfig { uncorrected, ..UncertaintyConfig::DEFAULT };
     assert_eq!(Uncertainty::new(config).sigma(Origin::Gyro, 0.0), AngularRate(2));
     assert_eq!(Uncertainty::new(config).sigma(Origin::Gyro, 1e9), AngularRate(i32::MAX));
-}
-
-/// The pipeline sends this very number: before the first window, that of an uncorrected rate and of the
-/// bias' own uncertainty; without updates of the bias, of the rate alone.
-#[test]
-fn the_pipeline_sends_the_expected_error() {
-    let mut pipeline = Pipeline::new(PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT });
-    let mut noise = Noise::new(1);
-    for tick in 0..u64::from(STATIC_SAMPLES) + 5 {
-        let output =
-            pipeline.correct(idling(tick, 0.001, &mut noise), None, &BoardState::GOOD).expect("in time");
-        let known = tick >= u64::from(STATIC_SAMPLES);
-        assert_eq!(output.vehicle.live.sigma.is_some(), known, "sample {tick}");
-        if let Some(sigma) = output.vehicle.live.sigma {
-            assert_sigma(sigma, 2.5e-4, "not corrected yet");
-        }
-    }
 }
