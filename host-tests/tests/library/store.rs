@@ -13,7 +13,7 @@ use gyronet::store::{
     StoreError,
 };
 use gyronet::units::{AngularRate, CentiCelsius, SpecificForce};
-use gyronet_host_tests::flash::{F405, Flash, Region, shared};
+use gyronet_host_tests::flash::{F405, Flash, Region};
 use gyronet_host_tests::noise::{Noise, cases};
 use gyronet_host_tests::recordings::workspace;
 use proptest::prelude::*;
@@ -137,49 +137,6 @@ fn written(version: u8, content: &[u8]) -> Flash {
     flash
 }
 
-/// A newer firmware may have stored one.
-#[test]
-fn a_stored_part_that_is_unknown_is_refused() {
-    let default = postcard::to_stdvec(&Configuration::DEFAULT).expect("it fits");
-    let content = |parts: &[u8]| [parts, &default[2..]].concat();
-    let stored = |parts| open(&written(Configuration::VERSION, &content(parts))).get::<Configuration>();
-    assert_eq!(stored(&[4, 0]), Err(StoreError::Encoding));
-    assert_eq!(stored(&[0, 1, 1]), Err(StoreError::Encoding));
-    assert_eq!(
-        open(&written(Configuration::VERSION, &[200; 3])).get::<Configuration>(),
-        Err(StoreError::Encoding)
-    );
-    let known = stored(&[0, 1, 0]).expect("the parts are known");
-    assert_eq!(known.and_then(|known| known.fog), Some(gyronet::store::FogPart::Dsp1760));
-}
-
-#[test]
-fn no_flipped_bit_is_believed() {
-    let flash = Flash::default();
-    let (old, new) = (
-        Configuration { latitude_deg: Some(1.0), ..Configuration::DEFAULT },
-        Configuration { latitude_deg: Some(2.0), ..Configuration::DEFAULT },
-    );
-    let mut store = open(&flash);
-    store.set(&old).expect("it is stored");
-    let from = layout::STORE.start as usize;
-    store.set(&new).expect("it is stored");
-    let end = flash.borrow().bytes()[..layout::STORE.end as usize].iter().rposition(|byte| *byte != 0xFF);
-    let mut flips = 0;
-    for offset in from..=end.expect("something is stored") {
-        for bit in 0..8 {
-            let damaged = shared(flash.borrow().clone());
-            damaged.borrow_mut().damage(offset, 1 << bit);
-            let mut store = open(&damaged);
-            let found = store.get::<Configuration>();
-            assert!(store.damaged(), "byte {offset} bit {bit} is noticed");
-            assert!([Ok(Some(old)), Ok(Some(new)), Ok(None)].contains(&found), "{offset} {bit}: {found:?}");
-            flips += 1;
-        }
-    }
-    println!("{flips} flipped bits, none believed");
-}
-
 proptest! {
     #![proptest_config(cases(200))]
 
@@ -266,17 +223,6 @@ fn sectors_of_zeros_are_damaged() {
     let mut store = open(&flash);
     assert!(store.make_room().is_ok() && !store.damaged() && !open(&flash).damaged());
     assert_eq!(store.get::<Access>(), Err(StoreError::Lost));
-}
-
-#[test]
-fn a_damaged_header_heals_with_the_next_record() {
-    let flash = Flash::default();
-    open(&flash).set(&Configuration::DEFAULT).expect("it is stored");
-    flash.borrow_mut().damage(layout::STORE.start as usize + 1, 4);
-    let mut store = open(&flash);
-    assert!(store.damaged() && store.get() == Ok(Some(Configuration::DEFAULT)), "a copy stands for it");
-    store.set(&Configuration::DEFAULT).expect("it is stored");
-    assert!(!store.damaged() && store.has_room() && !open(&flash).damaged());
 }
 
 #[test]

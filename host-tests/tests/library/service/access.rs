@@ -6,11 +6,10 @@ use gyronet::can::signal::{BitField, ByteOrder};
 use gyronet::can::wheel::{Checksum, WheelFrame, WheelSettings, WheelSignal};
 use gyronet::model::weights;
 use gyronet::service::message::Refusal;
-use gyronet::store::layout::STORE;
-use gyronet::store::{Access, Configuration, FieldError, Record, Store, StoreError};
+use gyronet::store::{Access, Configuration, Record};
 use gyronet::uds::signature;
 use gyronet::units::{Duration, WheelSpeed};
-use gyronet_host_tests::flash::{Cut, Flash, Region, shared};
+use gyronet_host_tests::flash::{Cut, Flash, shared};
 use gyronet_host_tests::stored::{crc, other_weights};
 use gyronet_host_tests::wire::id29;
 use gyronet_tools::signing::{PrivateKey, unhex};
@@ -361,33 +360,6 @@ fn a_challenge_that_comes_twice_is_none() {
     assert_eq!(bench.ask(&[0x27, 0x81]), None);
     bench.expect(&[&[0x27, 0x82][..], &key.answer(&SERIAL, &[8; 32])].concat(), &[0x67, 2]);
     assert_eq!(access(&mut bench).0, 2);
-}
-
-/// A record of a later firmware, for one: nobody may write, and the board reports why.
-#[test]
-fn a_record_that_cannot_be_read_locks_and_is_reported() {
-    let (flash, _, _) = locked();
-    let mut store = Store::open(Region::new(&flash, STORE), 0).expect("it is whole");
-    store.set(&Later(0)).expect("there is room");
-    let mut bench = Bench::new(&flash);
-    assert_eq!(access(&mut bench).0, 1);
-    assert!(bench.board.stored_damaged());
-    let refused = StoreError::Version { found: 200, expected: Access::VERSION };
-    assert_eq!(bench.board.info().stored_fault, Some(refused));
-    bench.enter(3);
-    bench.expect(&write(&content(1), &[0; 69]), &[0x7F, 0x2E, 0x33]);
-}
-
-#[derive(serde::Serialize, serde::Deserialize)]
-struct Later(u8);
-
-impl Record for Later {
-    const KEY: u8 = Access::KEY;
-    const VERSION: u8 = 200;
-
-    fn check(&self) -> Result<(), FieldError> {
-        Ok(())
-    }
 }
 
 /// Four frames of 29 bits with the longest protection, and the largest numbers.

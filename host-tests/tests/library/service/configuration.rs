@@ -120,7 +120,7 @@ fn a_torn_record_of_something_else_heals_at_the_next_start() {
 }
 
 #[test]
-fn nothing_is_written_with_an_unlocked_controller_and_the_standstill_gate_holds() {
+fn nothing_is_written_without_flash_or_with_an_unlocked_controller_and_the_standstill_gate_holds() {
     let flash = Flash::default();
     let wanted = Configuration { latitude_deg: Some(-33.9), ..Configuration::DEFAULT };
     assert_eq!(start(&flash).set_configuration(&wanted), Ok(()));
@@ -141,22 +141,14 @@ fn nothing_is_written_with_an_unlocked_controller_and_the_standstill_gate_holds(
     assert!(!storable(&mut board));
     assert_eq!(board.restart(), Err(Refusal::Moving));
     assert_eq!(flash.borrow().operations(), before);
-}
-
-#[test]
-fn nothing_is_stored_without_flash() {
-    let mut board = Board::new(&SUPPORTED_HARDWARE);
-    board.begin(None, None, Ok(()), IDENTITY);
-    board.weights(None, &DEFAULT.0);
-    let about = board.info();
+    let mut absent = Board::new(&SUPPORTED_HARDWARE);
+    absent.begin(None, None, Ok(()), IDENTITY);
+    absent.weights(None, &DEFAULT.0);
+    let about = absent.info();
     assert_eq!((about.flash, about.weights), (FlashState::Absent, WeightSource::BuiltIn));
-    assert_eq!(about.identity, IDENTITY);
-    let no_flash = Err(Refusal::Store(StoreError::NoFlash));
-    assert_eq!(board.set_configuration(&Configuration::DEFAULT), no_flash);
-    let no_slot = Err(Refusal::Slot(SlotError::NoFlash));
-    assert_eq!(board.weights_begin(64), no_slot);
-    assert_eq!(board.weights_verify(|_| ()), no_slot);
-    assert_eq!(board.weights_activate(), Err(Refusal::Slot(SlotError::NotBegun)));
+    assert_eq!(absent.set_configuration(&Configuration::DEFAULT), no_flash);
+    assert_eq!([absent.weights_begin(64), absent.weights_verify(|_| ())], [no_slot; 2]);
+    assert_eq!(absent.weights_activate(), Err(Refusal::Slot(SlotError::NotBegun)));
 }
 
 #[test]

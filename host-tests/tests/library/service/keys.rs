@@ -100,16 +100,6 @@ fn wrong_answers_of_others_do_not_keep_the_owner_out() {
     assert_eq!(super::start(&flash).access(), Some(Access { key: Some(key.public()), counter: 1, wrong: 0 }));
 }
 
-/// It could never make a challenge.
-#[test]
-fn a_board_without_random_numbers_takes_no_key() {
-    let (flash, mut bench) = bench();
-    bench.enter(3);
-    bench.is_random = false;
-    bench.expect(&write_key(a_key().public(), &[]), &[0x7F, 0x2E, 0x22]);
-    assert_eq!(super::start(&flash).access(), Some(Access::OPEN));
-}
-
 /// No byte of the flash changes while the vehicle moves, whatever is asked with a good key.
 #[test]
 fn nothing_is_written_in_motion_whoever_asks() {

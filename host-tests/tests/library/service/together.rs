@@ -237,17 +237,6 @@ fn started(flash: &Flash, identity: Identity) -> super::Board {
 }
 
 #[test]
-fn a_model_is_refused_by_name_at_a_clock_that_is_too_slow() {
-    let flash = Flash::default();
-    upload(&flash, Slot::A, &other_weights(1)).expect("it is stored");
-    let start = |clock_hz| started(&flash, Identity { clock_hz, ..IDENTITY }).info();
-    assert_eq!(start(HZ).weights, WeightSource::Slot(Slot::A));
-    let slow = start(16_000_000);
-    assert_eq!(slow.weights, WeightSource::BuiltIn);
-    assert!(matches!(slow.refused_slots, [Some(SlotError::Slow { .. }), None]), "{slow:?}");
-}
-
-#[test]
 fn three_failed_starts_leave_the_bus_as_it_is_and_the_rest_built_in() {
     let flash = Flash::default();
     let mut stored = Configuration { latitude_deg: Some(48.0), ..Configuration::DEFAULT };

@@ -10,7 +10,7 @@ use gyronet::sample::{Standstill, WheelSample};
 use gyronet::service::event::SensorFault;
 use gyronet::service::message::{AllCounters, Refusal};
 use gyronet::standstill::Standing;
-use gyronet::store::{Configuration, Field, FieldError, Record, StoreError};
+use gyronet::store::{Configuration, Record};
 use gyronet::uds::Server;
 use gyronet::uds::dtc::{PASSED_TICKS, TROUBLES, bit};
 use gyronet::units::WheelSpeed;
@@ -473,42 +473,6 @@ fn messages_are_stopped_at_standstill_and_for_the_length_of_a_session() {
     assert!(!bench.server.is_silenced(), "the session has ended");
 }
 
-#[test]
-fn a_configuration_is_read_changed_and_written_at_standstill() {
-    let (flash, mut bench) = bench();
-    let read = bench.ask(&[0x22, 1, 0]).expect("the configuration");
-    assert_eq!(read[..4], [0x62, 1, 0, Configuration::VERSION]);
-    let found: Configuration = postcard::from_bytes(&read[4..]).expect("as it is stored");
-    let changed = Configuration { latitude_deg: Some(-33.9), ..found };
-    let mut write = vec![0x2E, 1, 0, Configuration::VERSION];
-    write.extend(postcard::to_stdvec(&changed).expect("it fits"));
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    bench.turn();
-    bench.expect(&write, &[0x7F, 0x2E, 0x22]);
-    bench.stand();
-    bench.expect(&write, &[0x6E, 1, 0]);
-    assert_eq!(bench.tester.pending, 2, "a write may erase");
-    assert_eq!(start(&flash).configuration(), &changed);
-    write[3] += 1;
-    bench.expect(&write, &[0x7F, 0x2E, 0x31]);
-    let expected = Configuration::VERSION;
-    assert_eq!(bench.board.refusal(), Some(Refusal::Version { found: expected + 1, expected }));
-    write[3] = expected;
-    let far = Configuration { latitude_deg: Some(99.0), ..found };
-    write.truncate(4);
-    write.extend(postcard::to_stdvec(&far).expect("it fits"));
-    bench.expect(&write, &[0x7F, 0x2E, 0x31]);
-    // Why, in the board's own words; the next request that is no reading ends them.
-    let range = FieldError::Range { field: Field::LatitudeDeg, value: 99.0, low: -90.0, high: 90.0 };
-    let refusal = |bench: &mut Bench| -> Option<Refusal> {
-        let read = bench.ask(&[0x22, 1, 0x0B]).expect("the reason");
-        postcard::from_bytes(&read[3..]).expect("as it is documented")
-    };
-    assert_eq!(refusal(&mut bench), Some(Refusal::Store(StoreError::Field(range))));
-    bench.expect(&[0x3E, 0], &[0x7E, 0]);
-    assert_eq!(refusal(&mut bench), None);
-}
-
 /// Downloads a file; returns the response to the last step.
 pub fn download(bench: &mut Bench, file: &[u8]) -> Vec<u8> {
     bench.enter(2);
@@ -545,21 +509,6 @@ fn weights_are_downloaded_and_used_after_a_restart() {
 }
 
 #[test]
-fn a_damaged_file_is_not_used() {
-    let (flash, mut bench) = bench();
-    let mut file = other_weights(1);
-    file[5_000] ^= 4;
-    assert_eq!(download(&mut bench, &file), [0x7F, 0x37, 0x72]);
-    bench.expect(&[0x31, 1, 0xFF, 1], &[0x7F, 0x31, 0x24]);
-    // And a session that ends takes the download with it.
-    bench.now += 6_000;
-    bench.expect(&[0x10, 2], &[0x50, 2, 0, 50, 0x01, 0xF4]);
-    bench.expect(&[0x36, 1, 0], &[0x7F, 0x36, 0x24]);
-    let mut after = Bench::new(&flash);
-    after.expect(&[0x22, 1, 3], &[&[0x62, 1, 3, 1][..], &crc(&weights::DEFAULT.0).to_be_bytes()].concat());
-}
-
-#[test]
 fn a_single_setting_is_refused_and_the_successor_named() {
     let (_, mut bench) = bench();
     bench.enter(3);
@@ -570,6 +519,13 @@ fn a_single_setting_is_refused_and_the_successor_named() {
         assert_eq!(refusal, Refusal::SingleSetting);
         assert!(refusal.to_string().contains("device set"), "{refusal}");
     }
+    // A configuration of another version is refused by its number, until the next request that is no reading.
+    let (found, expected) = (Configuration::VERSION + 1, Configuration::VERSION);
+    bench.expect(&[0x2E, 1, 0, found, 0], &[0x7F, 0x2E, 0x31]);
+    let reason = postcard::to_stdvec(&Some(Refusal::Version { found, expected })).expect("short");
+    bench.expect(&[0x22, 1, 0x0B], &[&[0x62, 1, 0x0B], &reason[..]].concat());
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
+    assert_eq!(bench.board.refusal(), None);
     // Neither was ever one.
     for id in [0x00, 0x1F] {
         bench.expect(&[0x2E, 2, id, 0], &[0x7F, 0x2E, 0x31]);
