@@ -49,6 +49,9 @@ pub struct Outage {
     pub seconds: usize,
     /// Its start, s from the start of the drive.
     pub start_s: f64,
+    /// Whether a rest had shown the bias by then; if not, static initialisation, zero-rate updates and VQF have no rate,
+    /// and get the gyro's.
+    pub is_rested: bool,
     /// Errors of the heading, rad.
     pub heading: ByMethod<f64>,
     /// Distance by the wheels, m, and what the errors of the heading move its end by, m.
@@ -162,6 +165,7 @@ struct Running<'a> {
 struct Begun {
     ekf: ekf::Filter,
     median: f64,
+    is_rested: bool,
 }
 
 /// The gyro's sum less the true heading.
@@ -304,7 +308,8 @@ impl<'a> Race<'a> {
             let Some(Some([own_no_model, own])) = copies.next() else { return false };
             if own.row <= outage.start {
                 if own.row == outage.start {
-                    outage.begun = median.map(|median| Begun { ekf: self.ekf.clone(), median });
+                    let is_rested = self.static_bias.is_some();
+                    outage.begun = median.map(|median| Begun { ekf: self.ekf.clone(), median, is_rested });
                 }
                 return own.row < outage.start || outage.begun.is_some();
             }
@@ -333,6 +338,7 @@ impl<'a> Race<'a> {
                     driven_s: outage.driven_s,
                     seconds,
                     start_s: outage.start as f64 * DT,
+                    is_rested: begun.is_rested,
                     heading: heading.map(|off| wrap(off).abs()),
                     position,
                 });

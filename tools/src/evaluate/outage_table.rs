@@ -29,6 +29,10 @@ pub struct Figures {
     pub drives: usize,
     pub starts: usize,
     pub heading_deg: Spread,
+    /// Starts before which a rest had shown the bias, and the errors after these alone.
+    pub rested_starts: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rested_heading_deg: Option<Spread>,
     /// What the heading moves the end of the path by wheels, m; absent without wheels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_m: Option<Spread>,
@@ -56,12 +60,16 @@ impl Outages {
                 let with_one = drives.clone().filter(|drive| drive.iter().any(|one| is_of(&one))).count();
                 for (k, method) in METHODS.iter().enumerate() {
                     let moved = chosen.clone().filter_map(|one| one.position);
-                    let heading_deg = Spread::of(chosen.clone().map(|one| one.heading[k].to_degrees()));
+                    let heading = |one: &Outage| one.heading[k].to_degrees();
+                    let heading_deg = Spread::of(chosen.clone().map(heading));
+                    let rested = chosen.clone().filter(|one| one.is_rested);
                     methods.extend(heading_deg.map(|heading_deg| {
                         let figures = Figures {
                             drives: with_one,
                             starts: chosen.clone().count(),
                             heading_deg,
+                            rested_starts: rested.clone().count(),
+                            rested_heading_deg: Spread::of(rested.map(heading)),
                             position_m: Spread::of(moved.map(|(_, ends)| ends[k])),
                         };
                         (method.key, figures)
@@ -115,10 +123,33 @@ impl fmt::Display for Outages {
                 if METHODS.into_iter().any(has_failed) {
                     writeln!(f, "  ? failed: {FAILED} times static initialisation's median error")?;
                 }
+                write_rested(f, methods)?;
             }
         }
         Ok(())
     }
+}
+
+/// Says at how many starts the methods that need a rest had none, and how the others went.
+fn write_rested(f: &mut fmt::Formatter<'_>, methods: &BTreeMap<&'static str, Figures>) -> fmt::Result {
+    let Some(Figures { starts, rested_starts, .. }) = methods.values().next() else { return Ok(()) };
+    if rested_starts == starts {
+        return Ok(());
+    }
+    writeln!(
+        f,
+        "  no rest had shown a bias before {} of {starts} starts: static, zero-rate updates and VQF get the gyro's rate there",
+        starts - rested_starts
+    )?;
+    for method in [Method::STATIC_ZERO_RATE, Method::EKF, Method::DELAYED] {
+        if let Some(Spread { median, p90, worst }) =
+            methods.get(method.key).and_then(|figures| figures.rested_heading_deg)
+        {
+            let name = format!("{}, at the other {rested_starts}", method.name);
+            writeln!(f, "  {name:<42}{median:>9.2}{p90:>8.2}{worst:>8.2}")?;
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -131,6 +162,7 @@ mod tests {
             driven_s,
             seconds,
             start_s: 0.0,
+            is_rested: seconds == 60 && driven_s > 80.0,
             heading: std::array::from_fn(|k| error * (k + 1) as f64),
             position: None,
         };
@@ -154,6 +186,10 @@ mod tests {
         let failing = Outage { heading: [0.1, 0.1, 1.1, 0.1, 0.1, 0.1], ..outage(70.0, 60, 0.1) };
         let text = Outages::new("x", &[60], std::iter::once(&[failing][..])).to_string();
         assert!(text.contains("VQF filter ?") && text.matches("? failed: 10 times").count() == 2, "{text}");
+        assert!(text.contains("  no rest had shown a bias before 1 of 1 start"), "{text}");
+        let text = table.to_string();
+        assert!(text.contains("  no rest had shown a bias before 1 of 2 starts: static"), "{text}");
+        assert!(text.contains("  static, zero-rate updates, at the other 1     22.92"), "{text}");
         let heading = of(&table.outage_after_20_s, 60).heading_deg;
         assert!((heading.median - 0.2f64.to_degrees()).abs() < 1e-9, "{heading:?}");
         assert!((heading.worst - 0.3f64.to_degrees()).abs() < 1e-9, "{heading:?}");
