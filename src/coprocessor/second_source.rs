@@ -169,7 +169,7 @@ impl SecondSource {
             _ => {
                 let wheels = by_wheels.contains(&Some(false));
                 let gyro = against_inertial > 1 && for_inertial == 0;
-                [gyro || wheels && against_inertial > for_inertial, against_fog > for_fog, wheels && !gyro]
+                [wheels && against_inertial > for_inertial, against_fog > for_fog, wheels && !gyro]
             }
         };
         if alone.contains(&true) {
@@ -194,8 +194,8 @@ impl SecondSource {
         for source in 0..3 {
             self.alone[source] = if alone[source] { self.alone[source].saturating_add(1) } else { 0 };
             // Seconds that show nothing do not end a row of agreement.
-            let doubtful = alone[source] || !agreed[source] && self.alone[source] > 0;
-            self.agreed[source] = if doubtful { 0 } else { self.agreed[source] + u8::from(agreed[source]) };
+            self.agreed[source] =
+                if alone[source] { 0 } else { self.agreed[source] + u8::from(agreed[source]) };
             self.doubts[source] |= self.alone[source] >= SECONDS;
             if self.agreed[source] >= SECONDS {
                 (self.doubts[source], self.agreed[source]) = (false, 0);
@@ -221,28 +221,4 @@ fn force_agrees(rate: f32, lateral: f32, speed: f32) -> bool {
 pub(super) fn axle(wheels: &WheelSample) -> Option<[f32; 2]> {
     let [left, right] = wheels.axle()?.map(|speed| speed.0 as f32 / (1 << WheelSpeed::FRACTION_BITS) as f32);
     Some([(left + right) / 2.0, right - left])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Seconds with these rates of both gyros; returns whether the inertial one is doubted.
-    fn run(source: &mut SecondSource, seconds: u32, [inertial, fog]: [f32; 2]) -> bool {
-        let [inertial, fog] = [Some(inertial), Some(fog)];
-        let shown = Shown { inertial, fog, confirms_fog: true, ..Shown::default() };
-        (0..seconds * RATE_HZ).for_each(|_| source.add(&shown));
-        source.doubts().expect("two sources").inertial
-    }
-
-    #[test]
-    fn a_bias_that_is_mended_is_believed_straight_on_and_a_gain_in_a_turn() {
-        // A bias found on a turntable, then at rest.
-        let mut source = SecondSource::START;
-        assert!(run(&mut source, 3, [-0.087, 0.0]) && !run(&mut source, 2, [0.0, 0.0]));
-        // The straight after a turn says nothing of a gain; the next turn does.
-        let mut source = SecondSource::START;
-        assert!(run(&mut source, 3, [0.3, 0.4]) && run(&mut source, 5, [0.0, 0.0]));
-        assert!(!run(&mut source, 2, [0.4, 0.4]));
-    }
 }

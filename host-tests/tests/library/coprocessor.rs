@@ -9,6 +9,7 @@ use gyronet::compensate::DELAY;
 use gyronet::coprocessor::{Clock, InputError, Observation, StorageFaults};
 use gyronet::health::{Faults, InputCounters, Quality, Status};
 use gyronet::model::Estimate;
+use gyronet::monitor::TIMEOUT_US;
 use gyronet::pipeline::DueWindow;
 use gyronet::sample::{FogSample, PERIOD_US, Standstill};
 use gyronet::units::{Angle, Duration, Micros};
@@ -177,7 +178,7 @@ fn the_next_sample_waits_for_the_estimate_until_it_is_late() {
     let late = Micros(now.0 + u64::from(DELAY) * PERIOD_US);
     assert!(car.coprocessor.is_ready(late));
     // A sensor whose samples wait is not silent.
-    assert_eq!(waited.poll(Micros(now.0 + 10), &mut ()), Ok(None));
+    assert_eq!(waited.poll(Micros(now.0 + TIMEOUT_US), &mut ()), Ok(None));
 }
 
 /// Standstill takes, with a clock of the board's own, half a second of that clock, with the sensor's of the samples.

@@ -4,10 +4,10 @@
 use gyronet::coprocessor::{Config, Coprocessor, Observation};
 use gyronet::health::{Faults, Quality, Status};
 use gyronet::monitor::SensorMonitor;
-use gyronet::sample::{ImuSample, PERIOD_US};
+use gyronet::sample::{ImuSample, PERIOD_US, Validity};
 use gyronet::units::Micros;
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::synthetic::idling;
+use gyronet_host_tests::synthetic::{force, idling, noisy, rate, turning};
 use gyronet_host_tests::{parallel, recordings};
 use gyronet_tools::drive::recording::Reader;
 use std::fs::File;
@@ -102,13 +102,120 @@ fn a_step_that_is_plausible_and_unusual_is_part_of_sigma_for_a_second() {
     let mut drive = Drive::new();
     let sigma = |output: &Observation| output.vehicle.live.sigma.expect("a rate").rad_per_sec();
     let before = sigma(&drive.shaken(2, 0));
-    let found = sigma(&drive.shaken(2, RATE_LIMIT / 2));
-    assert!((found / before.hypot(1.5e-3) - 1.0).abs() < 0.1, "0.15 rad/s for 10 ms: {found}");
-    for _ in 0..100 {
-        assert!(sigma(&drive.shaken(2, 0)) > 1.4e-3);
+    let mut grown = |codes: i32| {
+        let sigma = sigma(&drive.shaken(2, codes));
+        (sigma * sigma - before * before).max(0.0).sqrt()
+    };
+    let found = grown(RATE_LIMIT / 10 * 9);
+    assert!((2e-3..3.2e-3).contains(&found), "0.27 rad/s, and the engine, for 10 ms: {found}");
+    assert!((0..100).all(|_| grown(0) > 0.9 * found));
+    let after = (0..20).map(|_| grown(0)).last().expect("a sample");
+    assert!(after < 2e-4, "{after}");
+}
+
+/// The monitor alone, with a yaw rate that shakes by 1e-3 rad/s.
+struct Shown {
+    monitor: SensorMonitor,
+    noise: Noise,
+    tick: u64,
+    rate: f64,
+    forward: f64,
+}
+
+impl Shown {
+    /// After samples at this rate.
+    fn new(rate: f64, samples: u32) -> Self {
+        let (monitor, noise) = (SensorMonitor::new(false), Noise::new(7));
+        let mut shown = Self { monitor, noise, tick: 0, rate, forward: 0.0 };
+        (0..samples).for_each(|_| assert_eq!(shown.read(rate, 5e-4), Validity::Good));
+        shown
     }
-    let after = (0..20).map(|_| sigma(&drive.shaken(2, 0))).last().expect("a sample");
-    assert!(after < 1.2 * before, "{after}");
+
+    /// Reaches a rate in this many samples, and keeps it for others; returns what the last one is worth.
+    fn go(&mut self, to: f64, within: u32, kept: u32) -> Validity {
+        let from = self.rate;
+        let ramp = (1..=within).map(|step| from + (to - from) * f64::from(step) / f64::from(within));
+        ramp.chain((0..kept).map(|_| to)).map(|rate| self.read(rate, 5e-4)).last().expect("samples")
+    }
+
+    fn read(&mut self, to: f64, shake: f64) -> Validity {
+        (self.rate, self.tick) = (to, self.tick + 1);
+        let shake = if self.tick.is_multiple_of(2) { shake } else { -shake };
+        let mut sample = turning(self.tick, rate(to + shake));
+        sample.specific_force[0] = force(self.forward);
+        self.monitor.judge(&noisy(sample, [1e-5, 1e-4], &mut self.noise))
+    }
+}
+
+/// Where it begins to shake by 0.29 rad/s, at the start or after a wrong reading.
+#[test]
+fn an_axis_gets_used_to_steps_but_not_in_the_second_after_a_wrong_reading() {
+    for (glitch, jump, validity) in [(false, 2.0, Validity::Good), (true, 1.0, Validity::Implausible)] {
+        let mut shown = Shown::new(0.0, if glitch { 200 } else { 0 });
+        if glitch {
+            assert_eq!(shown.read(1.0, 0.0), Validity::Implausible);
+        }
+        assert!((0..60).all(|_| shown.read(0.0, 0.145) == Validity::Good));
+        assert_eq!(shown.read(jump, 0.0), validity, "{jump} rad/s");
+    }
+}
+
+#[test]
+fn a_step_is_suspect_beyond_six_times_the_usual_ones_for_a_second() {
+    for (by, suspect) in [(0.08, 0.0), (0.13, 1.5e-3), (-0.17, 1.5e-3)] {
+        let mut shown = Shown::new(0.0, 1);
+        (0..200).for_each(|_| assert_eq!(shown.read(0.0, 0.01), Validity::Good));
+        let mut after = |samples: u32| {
+            (0..samples).for_each(|_| assert_eq!(shown.read(by, 0.01), Validity::Good));
+            f64::from(shown.monitor.suspect())
+        };
+        // From -0.01 to 0.01 rad/s beside the new rate.
+        let found = [after(1), after(111), after(2)];
+        assert!(
+            found.iter().zip([suspect, suspect, 0.0]).all(|(found, due)| (found - due).abs() < 1e-5),
+            "{by}: {found:?}"
+        );
+    }
+}
+
+/// Rates (rad/s, samples to reach it, samples that keep it), and the shift that is reported then.
+#[test]
+fn a_jump_that_lasts_is_a_shift_until_jumps_have_taken_it_back() {
+    type Moves<'a> = &'a [(f64, u32, u32, f32)];
+    let scenes: [(&str, Moves<'_>); 4] = [
+        ("it goes back, and the vehicle turns", &[(1.4, 0, 40, 1.0), (0.4, 0, 40, 0.0), (0.9, 50, 10, 0.0)]),
+        (
+            "by two jumps, back by one",
+            &[(1.4, 0, 10, 1.0), (2.4, 0, 10, 2.0), (0.4, 0, 40, 0.0), (0.9, 50, 10, 0.0)],
+        ),
+        ("a turn that takes it back is none", &[(1.4, 0, 10, 1.0), (0.6, 80, 40, 1.0)]),
+        (
+            "back by steps that are no jumps",
+            &[(0.9, 0, 10, 0.5), (0.65, 0, 5, 0.25), (0.4, 0, 40, 0.0), (0.9, 50, 10, 0.0)],
+        ),
+    ];
+    for (name, moves) in scenes {
+        let mut shown = Shown::new(0.4, 200);
+        for (to, within, kept, shift) in moves {
+            shown.go(*to, *within, *kept);
+            let found = shown.monitor.shift();
+            assert!((found - shift).abs() < 5e-3, "{name}: {found} at {to} rad/s");
+        }
+    }
+    // What stands is right, and the rates of the samples before are sent later.
+    let mut shown = Shown::new(0.4, 200);
+    shown.go(1.4, 0, 10);
+    shown.monitor.settle();
+    shown.go(1.4, 0, 11);
+    assert!(shown.monitor.shift() > 0.9);
+    shown.go(1.4, 0, 1);
+    assert_eq!(shown.monitor.shift(), 0.0);
+    // Another axis that jumps shifts no yaw.
+    let mut shown = Shown::new(0.4, 200);
+    shown.forward = 100.0;
+    shown.go(0.4, 0, 6);
+    shown.go(0.9, 5, 3);
+    assert_eq!(shown.monitor.shift(), 0.0);
 }
 
 #[test]

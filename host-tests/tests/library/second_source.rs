@@ -1,6 +1,9 @@
 //! Sources of the yaw rate that contradict each other: the one that is alone is doubted, and no other.
 
+use embedded_can::Frame;
 use gyronet::bias::Latitude;
+use gyronet::can::config::{self, Settings, StatusSettings};
+use gyronet::can::status::STATUS_ID;
 use gyronet::coprocessor::Contradiction;
 use gyronet::estimate::YawEstimate;
 use gyronet::fog::FogConfig;
@@ -11,122 +14,192 @@ use gyronet::{Config, Coprocessor};
 use gyronet_host_tests::noise::Noise;
 use gyronet_host_tests::sent::Sent;
 use gyronet_host_tests::synthetic::{force, noisy, rate, turning};
+use gyronet_host_tests::wire::id11;
 use gyronet_tools::drive::wheel_frames::{frame, receiver};
-
-/// Factors on what each source reads of a turn of 5 deg/s at 15 m/s: inertial gyro, fibre-optic gyro (0: none), and
-/// left and right wheel.
-struct Read {
-    inertial: f64,
-    fog: f64,
-    wheels: [f64; 2],
-}
 
 /// The Earth's rate at 48 deg north, rad/s.
 const EARTH: f64 = 5.419e-5;
 
-const TRUE: Read = Read { inertial: 1.0, fog: 1.0, wheels: [1.0; 2] };
+/// What the sources show: yaw rates of the inertial and the fibre-optic gyro, rad/s, lateral force, m/s^2, the speed and how
+/// much faster the right wheels are, m/s.
+type Shown = ([Option<f64>; 2], f64, [f64; 2]);
 
-/// The last rates of both gyros after 8 s of turn.
-fn turned(read: &Read) -> (YawEstimate, Option<YawEstimate>) {
-    shown(read).0
+/// A turn of 0.2 rad/s at 10 m/s.
+const TURN: Shown = ([Some(0.2), Some(0.2)], 2.0, [10.0, 0.3]);
+const STRAIGHT: Shown = ([Some(0.0), Some(0.0)], 0.0, [10.0, 0.0]);
+const SLOW: Shown = ([Some(0.1), Some(0.1)], 0.2, [2.0, 0.1]);
+
+struct Board {
+    coprocessor: Coprocessor,
+    noise: Noise,
+    tick: u64,
+    sent: Sent,
 }
 
-/// Also what the sources showed when they last contradicted each other.
-fn shown(read: &Read) -> ((YawEstimate, Option<YawEstimate>), Contradiction) {
-    let fog = FogConfig { latitude: Latitude::from_degrees(48.0), ..FogConfig::DEFAULT };
-    let config = Config { wheels: Some(receiver()), fog, fog_expected: read.fog != 0.0, ..Config::DEFAULT };
-    let (mut coprocessor, mut noise, mut sent) = (Coprocessor::new(config), Noise::new(3), Sent::default());
-    for tick in 1..=1_300 {
-        let now = Micros(tick * PERIOD_US);
-        let (speed, yaw) = if tick > 500 { (15.0, 5_f64.to_radians()) } else { (0.0, 0.0) };
-        let axle = [-0.75, 0.75].map(|side| speed + side * yaw);
-        let [left, right] = [0, 1].map(|wheel| axle[wheel] * read.wheels[wheel]);
-        let wheels = frame([left, right, left, right].map(|speed| Some(3.6 * speed))).expect("all are known");
-        coprocessor.can(&wheels, now).expect("a good frame");
-        let mut sample = turning(tick, rate(0.001 + yaw * read.inertial));
-        sample.specific_force[1] = force(speed * yaw);
-        coprocessor.imu(noisy(sample, [2e-4, 2e-3], &mut noise), now, &mut sent).expect("in time");
-        if read.fog != 0.0 {
-            let angle = Angle::from_rad(((yaw + EARTH) * read.fog * 0.01 + 1e-7 * noise.normal()) as f32)
-                .expect("in range");
-            let increment = [None, None, Some(angle)];
+impl Board {
+    /// Stands for 6 s, by the fibre-optic gyro, too, if `is_confirmed`.
+    fn stands(is_confirmed: bool) -> Self {
+        let status = Some(StatusSettings { id: STATUS_ID });
+        let can = config::Config::new(Settings { status, ..Settings::DEFAULT }).expect("checked");
+        let fog = FogConfig { latitude: Latitude::from_degrees(48.0), ..FogConfig::DEFAULT };
+        let coprocessor = Coprocessor::new(Config { wheels: Some(receiver()), can, fog, ..Config::DEFAULT });
+        let mut board = Self { coprocessor, noise: Noise::new(3), tick: 0, sent: Sent::default() };
+        board.show(6, ([Some(0.0), is_confirmed.then_some(0.0)], 0.0, [0.0; 2]));
+        board
+    }
+
+    fn show(&mut self, seconds: u64, shown: Shown) -> YawEstimate {
+        (0..100 * seconds).for_each(|_| self.step(shown));
+        self.sent.fog.last().copied().unwrap_or_default()
+    }
+
+    fn step(&mut self, ([inertial, fog], lateral, [speed, difference]): Shown) {
+        self.tick += 1;
+        let now = Micros(self.tick * PERIOD_US);
+        let [left, right] = [-0.5, 0.5].map(|side| Some(3.6 * (speed + side * difference)));
+        let wheels = frame([left, right, left, right]).expect("all are known");
+        self.coprocessor.can(&wheels, now).expect("a good frame");
+        if let Some(fog) = fog {
+            let turn = 0.01 * (fog + EARTH) + 1e-7 * self.noise.normal();
+            let increment = [None, None, Some(Angle::from_rad(turn as f32).expect("in range"))];
             let sample = FogSample { time: now, span: 10_000, lost: 0, increment, temperature: None };
-            coprocessor.fog(sample, now, &mut sent).expect("in order");
+            self.coprocessor.fog(sample, now, &mut self.sent).expect("in order");
+        }
+        if let Some(inertial) = inertial {
+            let mut sample = turning(self.tick, rate(0.001 + inertial));
+            sample.specific_force[1] = force(lateral);
+            let sample = noisy(sample, [2e-4, 2e-3], &mut self.noise);
+            self.coprocessor.imu(sample, now, &mut self.sent).expect("in time");
         }
     }
-    let rates = (sent.seen.last().expect("a step").vehicle.live, sent.fog.last().copied());
-    (rates, *coprocessor.contradiction())
-}
 
-const DOUBTED: (bool, bool) = (true, true);
-const GOOD: (bool, bool) = (false, false);
-
-/// Implausible, and not good, by any fault but the late window of a board without a network.
-fn doubted(estimate: &YawEstimate) -> (bool, bool) {
-    (estimate.faults.contains(Faults::IMPLAUSIBLE), estimate.quality != Quality::Good)
-}
-
-#[test]
-fn sources_that_agree_are_not_doubted() {
-    for wheels in [[1.0; 2], [1.01, 0.99]] {
-        let (inertial, fog) = turned(&Read { wheels, ..TRUE });
-        assert!(!inertial.faults.contains(Faults::IMPLAUSIBLE), "{inertial:?}");
-        assert!(!inertial.faults.contains(Faults::WHEELS), "{inertial:?}");
-        assert_eq!(doubted(&fog.expect("a rate")), GOOD);
-    }
-}
-
-/// The gyro is set to degrees, to the other direction, or has lost its scale.
-#[test]
-fn a_fibre_optic_gyro_that_is_alone_is_doubted() {
-    for factor in [57.295_78, -1.0, 0.5, 1.5] {
-        let (inertial, fog) = turned(&Read { fog: factor, ..TRUE });
-        assert_eq!(doubted(&fog.expect("a rate")), DOUBTED, "{factor}");
-        assert_eq!(
-            inertial.faults.contains(Faults::IMPLAUSIBLE),
-            factor.abs() < 2.0 && factor > 0.0,
-            "{factor}"
+    /// The doubts that the next status message says: inertial gyro 1, fibre-optic gyro 2, wheels 4. The rates say the same.
+    fn doubts(&self) -> u8 {
+        let Self { coprocessor, noise, tick, .. } = self;
+        let (coprocessor, noise) = (coprocessor.clone(), noise.clone());
+        let mut next = Self { coprocessor, noise, tick: *tick, sent: Sent::default() };
+        next.step(STRAIGHT);
+        let mut frames = next.sent.frames.iter().map(|sent| sent.frame);
+        let status = frames.find(|frame| frame.id() == id11(STATUS_ID)).expect("one a second");
+        let doubts = status.data()[4] >> 5;
+        let faults = next.sent.seen.last().expect("a step").vehicle.live.faults;
+        assert_eq!(faults.contains(Faults::IMPLAUSIBLE), doubts & 1 > 0, "{faults:?}");
+        assert_eq!(faults.contains(Faults::WHEELS), doubts & 4 > 0, "{faults:?}");
+        let fog = next.sent.fog.last().filter(|_| doubts & 2 > 0);
+        assert!(
+            fog.is_none_or(|fog| fog.faults.contains(Faults::IMPLAUSIBLE) && fog.quality != Quality::Good)
         );
+        doubts
     }
 }
 
-/// In a turn of 5 deg/s at 15 m/s the gyro shows half; the wheels are 1.5 m apart, the lateral force is 1.31 m/s^2.
+#[test]
+fn a_doubt_begins_with_the_second_second_and_ends_where_its_source_agrees() {
+    let alone = |(gyros, lateral, wheels): Shown| ([gyros[0], None], lateral, wheels);
+    let gyros = |inertial, fog, (_, lateral, wheels): Shown| ([Some(inertial), Some(fog)], lateral, wheels);
+    let [turn, straight] = [TURN, STRAIGHT].map(alone);
+    type Rows<'a> = &'a [(u64, Shown, u8)];
+    let scenes: &[(&str, bool, Rows<'_>)] = &[
+        (
+            "all agree, within their errors",
+            true,
+            &[(8, TURN, 0), (3, (TURN.0, 2.0, [10.0, 0.2]), 0), (3, (STRAIGHT.0, 0.0, [20.0, 0.35]), 0)],
+        ),
+        (
+            "wheels and accelerometer against the inertial gyro, and what ends it",
+            false,
+            &[
+                (1, ([Some(-0.2), None], 2.0, [10.0, 0.5]), 0),
+                (1, ([Some(-0.2), None], 2.0, [10.0, 0.5]), 1),
+                (3, straight, 1),
+                (3, ([Some(0.2), None], -2.0, [10.0, 0.3]), 1),
+                (1, turn, 1),
+                (1, straight, 1),
+                (1, turn, 0),
+            ],
+        ),
+        (
+            "the wheels alone, on a bank",
+            false,
+            &[(2, ([Some(0.2), None], 4.5, [10.0, -0.5]), 4), (3, straight, 4), (2, turn, 0)],
+        ),
+        ("a wheel that stands, against both gyros", true, &[(2, (TURN.0, 2.0, [5.0, -10.0]), 4)]),
+        ("a wheel that slips, against both gyros", true, &[(2, (TURN.0, 2.0, [11.0, 3.0]), 4)]),
+        ("wheels and accelerometer against both gyros", true, &[(2, ([Some(-0.2); 2], 2.0, [10.0, 0.5]), 7)]),
+        ("the inertial gyro alone", true, &[(2, gyros(-0.2, 0.2, TURN), 1)]),
+        (
+            "the fibre-optic gyro alone",
+            true,
+            &[
+                (1, gyros(0.2, -0.2, TURN), 0),
+                (1, gyros(0.2, -0.2, TURN), 2),
+                (2, TURN, 0),
+                (2, gyros(0.2, 11.5, TURN), 2),
+            ],
+        ),
+        (
+            "both gyros, with no judge: a gain",
+            true,
+            &[(2, gyros(0.1, 0.2, SLOW), 3), (3, STRAIGHT, 3), (1, TURN, 3), (1, TURN, 0)],
+        ),
+        ("both gyros, with whom the others agree", true, &[(6, gyros(0.2, 0.1, TURN), 3)]),
+        ("both gyros, a bias", true, &[(3, gyros(-0.087, 0.0, STRAIGHT), 3), (2, STRAIGHT, 0)]),
+        (
+            "a fibre-optic gyro that nothing has confirmed",
+            false,
+            &[(1, gyros(0.1, 0.2, SLOW), 2), (3, gyros(0.1, 0.2, SLOW), 2)],
+        ),
+    ];
+    for (name, is_confirmed, rows) in scenes {
+        let mut board = Board::stands(*is_confirmed);
+        for (number, (seconds, shown, doubts)) in rows.iter().enumerate() {
+            board.show(*seconds, *shown);
+            assert_eq!(board.doubts(), *doubts, "{name}: row {number}");
+        }
+    }
+    let mut board = Board::stands(true);
+    board.show(1, gyros(0.0, 7.0, STRAIGHT));
+}
+
 #[test]
 fn a_contradiction_leaves_its_numbers() {
-    let (_, Contradiction { seconds, gyros, lateral, wheels }) = shown(&Read { fog: 0.5, ..TRUE });
-    let near = |code: Option<i16>, shown: f64, within: f64| {
-        let code = f64::from(code.expect("it was shown")) / 100.0;
-        assert!((code - shown).abs() <= within, "{code}, {shown} was shown");
-    };
-    assert!((6..=8).contains(&seconds), "{seconds}");
-    near(gyros[0], 5.0, 0.06);
-    near(gyros[1], 2.5, 0.06);
-    near(lateral, 1.31, 0.02);
-    near(wheels.map(|[speed, _]| speed), 15.0, 0.02);
-    near(wheels.map(|[_, difference]| difference), 0.13, 0.02);
-    assert_eq!(shown(&TRUE).1, Contradiction::default());
-}
-
-#[test]
-fn an_inertial_gyro_that_is_alone_is_doubted() {
-    for factor in [-1.0, 20.0] {
-        let (inertial, fog) = turned(&Read { inertial: factor, ..TRUE });
-        assert!(inertial.faults.contains(Faults::IMPLAUSIBLE), "{factor}");
-        assert_eq!(doubted(&fog.expect("a rate")), GOOD, "{factor}");
+    let mut board = Board::stands(true);
+    board.show(2, TURN);
+    assert_eq!(*board.coprocessor.contradiction(), Contradiction::default());
+    board.show(3, ([Some(0.2), Some(7.0)], 2.0, [10.0, 0.3]));
+    let Contradiction { seconds, gyros, lateral, wheels } = *board.coprocessor.contradiction();
+    let [inertial, fog] = gyros;
+    // The largest code is that of a silent source.
+    assert_eq!((seconds, fog), (3, Some(i16::MAX - 1)));
+    let [speed, difference] = wheels.expect("they were asked");
+    for (code, shown) in [(inertial, 1_146), (lateral, 200), (Some(speed), 1_000), (Some(difference), 30)] {
+        assert!(code.is_some_and(|code| (code - shown).abs() <= 6), "{code:?}, {shown} was shown");
     }
-    // Without a fibre-optic gyro wheels and accelerometer contradict it.
-    let (inertial, _) = turned(&Read { inertial: 20.0, fog: 0.0, ..TRUE });
-    assert!(inertial.faults.contains(Faults::IMPLAUSIBLE));
 }
 
 #[test]
-fn wheels_that_are_alone_are_doubted() {
-    for wheels in [[1.0, 0.0], [1.0, 1.3], [1.3, 1.0]] {
-        for fog in [0.0, 1.0] {
-            let (inertial, fog) = turned(&Read { wheels, fog, ..TRUE });
-            assert!(inertial.faults.contains(Faults::WHEELS), "{wheels:?}");
-            assert!(!inertial.faults.contains(Faults::IMPLAUSIBLE), "{wheels:?}");
-            assert!(fog.is_none_or(|fog| !fog.faults.contains(Faults::IMPLAUSIBLE)), "{wheels:?}");
-        }
+fn a_turn_in_which_both_gyros_agree_confirms_the_fibre_optic_one() {
+    let mut board = Board::stands(false);
+    for (rate, quality) in [(0.0, Quality::Degraded), (0.09, Quality::Degraded), (0.15, Quality::Good)] {
+        let found = board.show(3, ([Some(rate); 2], 10.0 * rate, [10.0, rate]));
+        assert_eq!(found.quality, quality, "{rate}: {found:?}");
+    }
+}
+
+#[test]
+fn a_difference_of_the_gyros_is_part_of_sigma() {
+    let sigma = |estimate: YawEstimate| estimate.sigma.expect("a rate").rad_per_sec();
+    // Straight on, by more than the inertial gyro explains, and by more than sigma can say on the bus.
+    for (off, doubted) in [(0.009, false), (0.015, true)] {
+        let found = Board::stands(true).show(2, ([Some(0.0), Some(off)], 0.0, [10.0, 0.0]));
+        assert!((sigma(found) / off - 1.0).abs() < 0.05, "{off}: {found:?}");
+        assert_eq!(found.faults.contains(Faults::IMPLAUSIBLE), doubted, "{off}");
+    }
+    // In turns as a share of the rate, and for as long as the inertial sensor is silent; slow turns are not compared.
+    for (rate, share) in [(0.2, 0.0199), (0.09, 0.0)] {
+        let mut board = Board::stands(true);
+        board.show(10, ([Some(rate), Some(1.02 * rate)], 10.0 * rate, [10.0, rate]));
+        let alone = sigma(board.show(2, ([None, Some(rate)], 0.0, [10.0, rate])));
+        assert!((alone / rate - share).abs() < 2.5e-3, "{rate}: {alone}");
     }
 }

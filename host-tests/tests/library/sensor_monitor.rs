@@ -1,15 +1,17 @@
 //! The sensor monitor in the coprocessor: silence by the outside clock, readings that repeat themselves,
 //! saturation, implausible readings; and the weights' checksum in the background.
 
-use gyronet::coprocessor::{Config, Coprocessor, Observation};
+use gyronet::coprocessor::{Clock, Config, Coprocessor, Observation};
 use gyronet::health::{Faults, Quality, Source, Status};
 use gyronet::model::background::BackgroundCheck;
-use gyronet::model::{Blob, BlobError, weights};
-use gyronet::monitor::{AXIS_STUCK_AFTER, HOLD, START_US, STUCK_AFTER, TIMEOUT_US};
+use gyronet::model::{Blob, BlobError, Estimate, weights};
+use gyronet::monitor::{AXIS_STUCK_AFTER, HOLD, START_US, STUCK_AFTER, SensorMonitor, TIMEOUT_US};
 use gyronet::sample::{ImuSample, PERIOD_US, Validity};
 use gyronet::units::Micros;
 use gyronet_host_tests::noise::Noise;
-use gyronet_host_tests::synthetic::idling;
+use gyronet_host_tests::sent::Sent;
+use gyronet_host_tests::synthetic::{idling, rate};
+use gyronet_host_tests::wire::wheels;
 use gyronet_tools::drive::wheel_frames::receiver;
 
 /// Both clocks agree, but for an offset.
@@ -51,10 +53,12 @@ fn silence_has_no_rate_and_ends_with_a_sample() {
     assert_ne!(last.yaw.0, 0);
     let quiet = at(399).0;
     assert_eq!(coprocessor.poll(Micros(quiet + TIMEOUT_US - 1), &mut ()), Ok(None));
-    let mut sets = Vec::new();
+    let (mut sets, mut sent) = (Vec::new(), Sent::default());
     for millisecond in TIMEOUT_US / 1_000..TIMEOUT_US / 1_000 + 100 {
-        sets.extend(coprocessor.poll(Micros(quiet + millisecond * 1_000), &mut ()).expect("time goes on"));
+        sets.extend(coprocessor.poll(Micros(quiet + millisecond * 1_000), &mut sent).expect("time goes on"));
     }
+    let last_set = sent.frames.last().expect("ten sets").time;
+    assert_eq!(last_set, Micros(399 * PERIOD_US + TIMEOUT_US + 90_000), "by the sensor's clock");
     assert_eq!(sets.len(), 10, "one every 10 ms");
     for (Observation { sample, vehicle: set, .. }, tick) in sets.into_iter().zip(402..) {
         let rate = set.delayed;
@@ -82,7 +86,8 @@ fn a_gap_that_the_stamps_do_not_show_is_found_by_the_arrivals() {
     for tick in 407..520 {
         let time = Micros(tick * PERIOD_US - WRAP_US);
         let sample = ImuSample { time, ..idling(tick, 0.001, &mut noise) };
-        let set = coprocessor.imu(sample, at(tick), &mut ()).expect("in order").expect("a step").vehicle;
+        let now = Micros(at(tick).0 + tick % 7);
+        let set = coprocessor.imu(sample, now, &mut ()).expect("in order").expect("a step").vehicle;
         assert_ne!(set.live.quality, Quality::Good, "{tick}");
     }
     assert_eq!(coprocessor.pipeline().counters().missing, 7);
@@ -99,6 +104,51 @@ fn a_stall_with_a_slow_clock_loses_nothing() {
         coprocessor.imu(sample, Micros(now), &mut ()).expect("in order");
     }
     assert_eq!(coprocessor.pipeline().counters().missing, 0);
+}
+
+/// By how much a sample of a vehicle with a good rate is late, us, beyond what a slow clock explains.
+#[test]
+fn a_sample_that_comes_late_is_older_and_beyond_29_ms_not_good() {
+    let cases = [
+        (Clock::Outside, 5_000, 0, Quality::Good),
+        (Clock::Outside, 5_001, 5_001, Quality::Good),
+        (Clock::Outside, 29_000, 29_000, Quality::Good),
+        (Clock::Outside, 29_001, 29_001, Quality::Degraded),
+        (Clock::Sensor, 29_001, 0, Quality::Good),
+    ];
+    for (clock, late, older, quality) in cases {
+        let config = Config { clock, wheels: Some(receiver()), ..Config::DEFAULT };
+        let (mut coprocessor, mut noise, mut sent) =
+            (Coprocessor::new(config), Noise::new(3), Sent::default());
+        for tick in 0..501 {
+            let late = if tick == 500 { late + PERIOD_US / 16 } else { 0 };
+            let now = Micros(at(tick).0 + late);
+            let speed = if tick < 350 { 0.0 } else { 36.0 };
+            coprocessor.can(&wheels(speed), now).expect("a wheel frame");
+            coprocessor.imu(idling(tick, 0.001, &mut noise), now, &mut sent).expect("in order");
+            if let Some(window) = coprocessor.window() {
+                coprocessor.deliver(window.end, Estimate::NONE).expect("the window that is due");
+            }
+        }
+        let [.., before, after] = &sent.seen[..] else { panic!("steps") };
+        let (before, after) = (before.vehicle, after.vehicle);
+        for (before, after) in [(before.live, after.live), (before.delayed, after.delayed)] {
+            assert_eq!(before.quality, Quality::Good);
+            let latency = before.latency_us.map(|latency| latency + older);
+            assert_eq!((after.latency_us, after.quality), (latency, quality), "{late} us");
+            assert_eq!(after.faults.contains(Faults::GAP), quality != Quality::Good);
+        }
+    }
+}
+
+#[test]
+fn a_step_between_samples_is_as_old_as_the_time_that_it_has_waited() {
+    let (mut coprocessor, mut noise, mut sent) = (coprocessor(), Noise::new(3), Sent::default());
+    for tick in (0..200).step_by(2) {
+        coprocessor.imu(idling(tick, 0.001, &mut noise), at(tick), &mut sent).expect("in order");
+    }
+    let [.., between, newest] = sent.seen[..] else { panic!("steps") };
+    assert_eq!([between, newest].map(|seen| seen.vehicle.live.latency_us), [Some(10_000), Some(0)]);
 }
 
 /// All axes with the accelerometer's, the gyro alone, or one axis beside axes that move.
@@ -134,11 +184,31 @@ fn stuck_from_the_seventh_equal_sample_to_the_first_that_differs() {
 }
 
 #[test]
+fn an_axis_that_seldom_repeats_a_reading_is_stuck_after_seven_and_another_after_thirty() {
+    for (holds, after) in [(1, STUCK_AFTER), (2, AXIS_STUCK_AFTER)] {
+        let (mut monitor, mut noise, mut last) = (SensorMonitor::new(false), Noise::new(3), rate(0.0));
+        for tick in 0..1_100 {
+            let mut sample = idling(tick, 0.001, &mut noise);
+            if tick > 1_000 || tick % holds > 0 {
+                sample.angular_rate[2] = last;
+            }
+            last = sample.angular_rate[2];
+            let is_stuck = monitor.judge(&sample) == Validity::Stuck;
+            assert_eq!(is_stuck, tick >= 1_000 + u64::from(after), "{after}: {tick}");
+        }
+    }
+}
+
+#[test]
 fn saturation_is_held_for_50_ms() {
     let (mut coprocessor, mut noise) = fed(400);
     for tick in 400..420 {
-        let reading =
+        let mut reading =
             ImuSample { validity: Validity::reported(tick < 402), ..idling(tick, 0.001, &mut noise) };
+        if (402..407).contains(&tick) {
+            // Its filter recovers.
+            reading.angular_rate[2] = rate(2.0);
+        }
         let observation = sample(&mut coprocessor, reading, tick);
         let (validity, status) = match tick {
             ..402 => (Validity::Saturated, Status::Clipped),
@@ -148,7 +218,8 @@ fn saturation_is_held_for_50_ms() {
         let judged = observation.sample.expect("a sample").validity;
         assert_eq!((judged, observation.vehicle.live.status), (validity, status), "sample {tick}");
     }
-    assert_eq!(coprocessor.monitor_counters().held, u32::from(HOLD));
+    let counters = coprocessor.monitor_counters();
+    assert_eq!((counters.held, counters.wrong), (u32::from(HOLD), 0));
 }
 
 #[test]
