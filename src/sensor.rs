@@ -1,13 +1,13 @@
 //! Decoders of the bytes of a sensor into samples.
 //!
-//! The pipeline sees only the samples of a part: [`ImuSample`] or [`FogSample`], in fixed point, with the part's own
-//! time unwrapped. [`Source`] is the common interface of all parts, so that firmware can be generic over the part.
-//! The image selects one of its parts at the start, by configuration.
+//! The pipeline sees only the samples of a part: [`ImuSample`] or [`FogSample`](crate::sample::FogSample), in fixed
+//! point, with the part's own time unwrapped. [`Source`] is the common interface of all parts, so that firmware can be
+//! generic over the part. The image selects one of its parts at the start, by configuration.
 //!
 //! | part | line | type | sample |
 //! |---|---|---|---|
 //! | Xsens MTi | UART | [`xsens::Mti`] | [`ImuSample`] |
-//! | KVH DSP-1760, 17xx | RS-422 | [`dsp1760::Dsp1760`] | [`FogSample`] |
+//! | KVH DSP-1760, 17xx | RS-422 | [`dsp1760::Dsp1760`] | `FogSample` |
 //! | TDK ICM-42688-P | SPI | [`icm42688::Icm42688`] | [`ImuSample`] |
 //! | Bosch BMI088 | SPI, two chip selects | [`bmi088::Bmi088`] | [`ImuSample`] |
 //! | ST ASM330LHH | SPI | [`asm330lhh::Asm330lhh`] | [`ImuSample`] |
@@ -40,14 +40,14 @@ pub mod spi;
 mod stamps;
 pub mod xsens;
 
-use crate::sample::{FogSample, ImuSample};
+use crate::sample::ImuSample;
 use asm330lhh::Asm330lhh;
 use bmi088::Bmi088;
 use icm42688::Icm42688;
 
 /// Delivers the samples of a part.
 pub trait Source {
-    /// The type of the part's samples: [`ImuSample`] or [`FogSample`].
+    /// The type of the part's samples: [`ImuSample`] or [`FogSample`](crate::sample::FogSample).
     type Sample;
     /// The error of a frame or a transfer.
     type Error: core::error::Error;
@@ -72,34 +72,6 @@ pub trait ByteSource: Source {
     fn receive(&mut self, byte: u8);
     /// Returns the number of candidate frames whose checksum did not match.
     fn bad_checksums(&self) -> u32;
-}
-
-macro_rules! byte_sources {
-    ($($part:ty: $sample:ty, $error:ty;)*) => {$(
-        impl Source for $part {
-            type Sample = $sample;
-            type Error = $error;
-
-            fn next_sample(&mut self) -> Option<Result<$sample, $error>> {
-                self.next_sample()
-            }
-        }
-
-        impl ByteSource for $part {
-            fn receive(&mut self, byte: u8) {
-                self.receive(byte);
-            }
-
-            fn bad_checksums(&self) -> u32 {
-                self.bad_checksums()
-            }
-        }
-    )*};
-}
-
-byte_sources! {
-    xsens::Mti: ImuSample, xsens::XsensError;
-    dsp1760::Dsp1760: FogSample, dsp1760::Dsp1760Error;
 }
 
 macro_rules! spi_sources {

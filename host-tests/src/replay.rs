@@ -6,6 +6,7 @@ use gyronet::coprocessor::{self, Clock, Coprocessor, TimedFrame};
 use gyronet::model::{Blob, GyroNet, weights};
 use gyronet::sample::ImuSample;
 use gyronet::sensor::xsens::{MtData2, Mti};
+use gyronet::sensor::{ByteSource, Source};
 use gyronet::store::{Calibration, Configuration, Learned};
 use gyronet::units::Micros;
 use gyronet_tools::drive::wheel_frames::receiver;

@@ -13,6 +13,7 @@ pub mod message;
 pub use framing::Kvh;
 
 use super::framer::Framer;
+use super::{ByteSource, Source};
 use crate::sample::{FogSample, StampClock};
 use crate::units::{Angle, CentiCelsius, Micros};
 use framing::is_self_test;
@@ -53,23 +54,10 @@ impl Dsp1760 {
         Self { framer: Framer::new(), last_sequence: None, time: 0, stamps: StampClock::START }
     }
 
-    /// Processes one byte. Call [`Dsp1760::next_sample`] until it returns `None` before passing the next byte.
-    #[inline]
-    pub fn receive(&mut self, byte: u8) {
-        self.framer.receive(byte);
-    }
-
     /// Takes bytes, at most to the end of a message, and returns how many; then call [`Dsp1760::next_sample`].
     #[inline]
     pub fn receive_some(&mut self, bytes: &[u8]) -> usize {
         self.framer.receive_some(bytes)
-    }
-
-    /// Returns the next sample, or the reason why an intact frame gives none. Built-in-test messages are skipped.
-    #[inline]
-    pub fn next_sample(&mut self) -> Option<Result<FogSample, Dsp1760Error>> {
-        // Only one byte in 36 ends a message, so most calls return early.
-        if self.framer.is_waiting() { None } else { self.next_message() }
     }
 
     #[inline(never)]
@@ -85,11 +73,6 @@ impl Dsp1760 {
             };
             return Some(self.sample(&message));
         }
-    }
-
-    /// Returns the number of frame candidates with a wrong checksum.
-    pub fn bad_checksums(&self) -> u32 {
-        self.framer.bad_checksums()
     }
 
     fn sample(&mut self, message: &Message) -> Result<FogSample, Dsp1760Error> {
@@ -108,6 +91,29 @@ impl Dsp1760 {
         let increment = increments(&message.rotation, message.validity);
         let temperature = temperature.checked_mul(100).map(CentiCelsius);
         Ok(FogSample { time: Micros(time), span: PERIOD_US, lost, increment, temperature })
+    }
+}
+
+impl Source for Dsp1760 {
+    type Sample = FogSample;
+    type Error = Dsp1760Error;
+
+    /// Built-in-test messages are skipped.
+    #[inline]
+    fn next_sample(&mut self) -> Option<Result<FogSample, Dsp1760Error>> {
+        // Only one byte in 36 ends a message, so most calls return early.
+        if self.framer.is_waiting() { None } else { self.next_message() }
+    }
+}
+
+impl ByteSource for Dsp1760 {
+    #[inline]
+    fn receive(&mut self, byte: u8) {
+        self.framer.receive(byte);
+    }
+
+    fn bad_checksums(&self) -> u32 {
+        self.framer.bad_checksums()
     }
 }
 

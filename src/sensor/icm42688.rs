@@ -4,7 +4,6 @@
 //! [`DelayNs`] delays. Each call for a sample also reads back one register, so that a reset or a flipped bit is
 //! detected within [`CHECKS`] calls.
 
-mod config;
 #[doc(hidden)]
 pub mod packet;
 #[doc(hidden)]
@@ -13,7 +12,6 @@ pub mod registers;
 use super::spi::{Chip, Setting, SpiError};
 use super::stamps::Stamps;
 use crate::sample::ImuSample;
-use config::SETTINGS;
 use core::num::NonZeroU64;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::SpiDevice;
@@ -21,7 +19,7 @@ use packet::{PACKET, Packet, PacketError};
 use registers as reg;
 
 /// Number of registers that are set, and checked one after the other.
-pub const CHECKS: usize = SETTINGS.len();
+pub const CHECKS: usize = reg::SETTINGS.len();
 /// Start-up time of the gyro until its readings are valid, ms.
 const START_MS: u32 = 45;
 /// Without a clock on CLKIN the sensor counts in units of 32/30 us, although TMST_RES is 1 us (DS-000347, 12.7): the 10 ms
@@ -45,7 +43,7 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
         part.chip.write(reg::DEVICE_CONFIG, reg::RESET)?;
         part.chip.wait_for_reset(reg::DEVICE_CONFIG, reg::RESET, delay)?;
         part.chip.identify(0, reg::WHO_AM_I, reg::IDENTITY)?;
-        for Setting { bank, address, mask, value } in SETTINGS {
+        for Setting { bank, address, mask, value } in reg::SETTINGS {
             part.in_bank(bank, |chip| {
                 let [held] = chip.read(address)?;
                 chip.write(address, held & !mask | value)
@@ -86,7 +84,7 @@ impl<SPI: SpiDevice> Icm42688<SPI> {
 
     /// Checks one register of the configuration; each call checks the next one.
     fn check_next_setting(&mut self) -> Result<(), SpiError<SPI::Error>> {
-        let setting = SETTINGS[self.next_check % CHECKS];
+        let setting = reg::SETTINGS[self.next_check % CHECKS];
         self.next_check = (self.next_check + 1) % CHECKS;
         let [held] = self.in_bank(setting.bank, |chip| chip.read(setting.address))?;
         setting.check(held)

@@ -9,6 +9,7 @@ mod mtdata2;
 pub use mtdata2::{MID_MT_DATA2, MtData2, XsensError};
 
 use super::framer::{Framer, Protocol};
+use super::{ByteSource, Source};
 use crate::sample::{ImuSample, NO_STAMP, StampClock, Validity};
 use crate::units::{AngularRate, CentiCelsius, Micros, SpecificForce};
 use mtdata2::id;
@@ -85,23 +86,10 @@ impl Mti {
         Self { framer: Framer::new(), stamps: StampClock::START }
     }
 
-    /// Processes one byte. Call [`Mti::next_sample`] until it returns `None` before passing the next byte.
-    #[inline]
-    pub fn receive(&mut self, byte: u8) {
-        self.framer.receive(byte);
-    }
-
     /// Takes bytes, at most to the end of a message, and returns how many; then call [`Mti::next_sample`].
     #[inline]
     pub fn receive_some(&mut self, bytes: &[u8]) -> usize {
         self.framer.receive_some(bytes)
-    }
-
-    /// Returns the next sample, or the reason why an intact message gives none.
-    #[inline]
-    pub fn next_sample(&mut self) -> Option<Result<ImuSample, XsensError>> {
-        // Only one byte in 54 ends a message, so most calls return early.
-        if self.framer.is_waiting() { None } else { self.next_message() }
     }
 
     #[inline(never)]
@@ -118,11 +106,6 @@ impl Mti {
     #[inline]
     pub fn missing(&self) -> usize {
         self.framer.missing()
-    }
-
-    /// Returns the number of frame candidates with a wrong checksum.
-    pub fn bad_checksums(&self) -> u32 {
-        self.framer.bad_checksums()
     }
 
     fn sample(&mut self, message: &MtData2) -> Result<ImuSample, XsensError> {
@@ -143,6 +126,28 @@ impl Mti {
             validity: Validity::reported(message.status.is_some_and(|status| status & STATUS_CLIPPED != 0)),
             time: message.sample_time_fine.map_or(NO_STAMP, |ticks| Micros(self.stamps.unwrap(ticks) * 100)),
         })
+    }
+}
+
+impl Source for Mti {
+    type Sample = ImuSample;
+    type Error = XsensError;
+
+    #[inline]
+    fn next_sample(&mut self) -> Option<Result<ImuSample, XsensError>> {
+        // Only one byte in 54 ends a message, so most calls return early.
+        if self.framer.is_waiting() { None } else { self.next_message() }
+    }
+}
+
+impl ByteSource for Mti {
+    #[inline]
+    fn receive(&mut self, byte: u8) {
+        self.framer.receive(byte);
+    }
+
+    fn bad_checksums(&self) -> u32 {
+        self.framer.bad_checksums()
     }
 }
 

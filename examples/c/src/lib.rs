@@ -20,7 +20,7 @@ use gyronet::estimate::YawEstimate;
 use gyronet::model::GyroNetState;
 use gyronet::mounting::Rotation;
 use gyronet::sample::{ImuSample, NO_STAMP, Validity};
-use gyronet::sensor::xsens::Mti;
+use gyronet::sensor::{Source, xsens::Mti};
 use gyronet::units::{CentiCelsius, SpecificForce, WheelSpeed};
 use gyronet::{AngularRate, Config, Coprocessor, GyroNet, Micros, Sink, TimedFrame, TransmitQueue};
 

@@ -6,6 +6,7 @@ use gyronet::can::wheel::{WheelReceiver, WheelSettings};
 use gyronet::coprocessor::{Config, Coprocessor, TimedFrame};
 use gyronet::sample::{PERIOD_US, TestSignal};
 use gyronet::sensor::xsens::{MtData2, Mti};
+use gyronet::sensor::{ByteSource, Source};
 use gyronet::{GyroNet, Micros};
 use gyronet_host_tests::recordings::workspace;
 use gyronet_host_tests::require::{self, Need};

@@ -1,10 +1,10 @@
 //! KVH DSP-1760: recorded and constructed frames, damage, lost messages, commands.
 
 use gyronet::sample::FogSample;
-use gyronet::sensor::ByteSource;
 use gyronet::sensor::dsp1760::message::CRC_32_MPEG_2;
 use gyronet::sensor::dsp1760::message::{Extra, Message, MessageError, Validity};
 use gyronet::sensor::dsp1760::{Dsp1760, Dsp1760Error};
+use gyronet::sensor::{ByteSource, Source};
 use gyronet::units::{Angle, CentiCelsius, Micros};
 use gyronet_host_tests::wire::{bytes, feed};
 

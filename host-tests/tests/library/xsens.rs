@@ -4,9 +4,9 @@
 use super::line::Line;
 use embedded_io::ErrorKind;
 use gyronet::sample::{ImuSample, Validity};
-use gyronet::sensor::Source;
 use gyronet::sensor::serial::{Serial, SerialError};
 use gyronet::sensor::xsens::{MID_MT_DATA2, MtData2, Mti, Xbus, XsensError};
+use gyronet::sensor::{ByteSource, Source};
 use gyronet::units::{AngularRate, CentiCelsius, Micros, RangeError, SpecificForce};
 use gyronet_host_tests::wire::{feed, feed_new, message, real_frame, synthetic_frame};
 
