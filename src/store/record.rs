@@ -52,8 +52,10 @@ pub trait Record: Serialize + DeserializeOwned {
     /// Version of the layout; every change increments it.
     const VERSION: u8;
 
-    /// Checks that all values are inside their ranges; the error names the first that is not.
-    fn check(&self) -> Result<(), FieldError>;
+    /// Checks that all values are inside their ranges; the error names the first that is not. By default, all are valid.
+    fn check(&self) -> Result<(), FieldError> {
+        Ok(())
+    }
 }
 
 #[derive(Clone, Copy)]

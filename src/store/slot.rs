@@ -29,10 +29,7 @@ impl Slot {
 
     /// Returns the flash offset of the slot.
     pub const fn offset(self) -> u32 {
-        match self {
-            Self::A => SLOTS.start,
-            Self::B => SLOTS.start + SLOT_SIZE as u32,
-        }
+        SLOTS.start + self as u32 * SLOT_SIZE as u32
     }
 
     /// Returns the flash offsets of the slot: a whole sector.
@@ -41,11 +38,8 @@ impl Slot {
     }
 
     /// Returns this slot's element of a pair (A, B).
-    pub(crate) const fn of<T: Copy>(self, [a, b]: [T; 2]) -> T {
-        match self {
-            Self::A => a,
-            Self::B => b,
-        }
+    pub(crate) const fn of<T: Copy>(self, pair: [T; 2]) -> T {
+        pair[self as usize]
     }
 }
 

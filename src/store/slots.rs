@@ -4,7 +4,7 @@
 //! start [`select`]s the first that passes all checks: the active slot, the other slot if accepted, the built-in
 //! weights. A file whose windows the processor cannot run in time is refused like a damaged one.
 
-use super::error::{FieldError, FlashFault};
+use super::error::FlashFault;
 use super::record::Record;
 use super::slot::Slot;
 use crate::model::{Blob, BlobError};
@@ -24,22 +24,14 @@ impl Accepted {
     /// Returns the record without the file in a slot, which is being replaced.
     #[must_use]
     pub const fn without(mut self, slot: Slot) -> Self {
-        let [a, b] = self.files;
-        self.files = match slot {
-            Slot::A => [None, b],
-            Slot::B => [a, None],
-        };
+        self.files[slot as usize] = None;
         self
     }
 
     /// Returns the record with the checksum `file` for a slot, which becomes the one to use.
     #[must_use]
     pub const fn with(mut self, slot: Slot, file: u32) -> Self {
-        let [a, b] = self.files;
-        self.files = match slot {
-            Slot::A => [Some(file), b],
-            Slot::B => [a, Some(file)],
-        };
+        self.files[slot as usize] = Some(file);
         self.active = Some(slot);
         self
     }
@@ -48,10 +40,6 @@ impl Accepted {
 impl Record for Accepted {
     const KEY: u8 = 3;
     const VERSION: u8 = 3;
-
-    fn check(&self) -> Result<(), FieldError> {
-        Ok(())
-    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
@@ -137,14 +125,15 @@ pub fn select<'w>(
     let order = accepted.active.map(|active| [active, active.other()]);
     for slot in order.into_iter().flatten() {
         let Some(accepted) = slot.of(accepted.files) else { continue };
-        match file(slot.of(slots)) {
-            Ok(blob) if blob.crc != accepted => refuse(&mut refused, slot, SlotError::NotAccepted(blob.crc)),
+        let error = match file(slot.of(slots)) {
+            Ok(blob) if blob.crc != accepted => SlotError::NotAccepted(blob.crc),
             Ok(blob) => match slow(&blob) {
                 None => return Selection { weights: Some(blob), source: WeightSource::Slot(slot), refused },
-                Some(error) => refuse(&mut refused, slot, error),
+                Some(error) => error,
             },
-            Err(error) => refuse(&mut refused, slot, error),
-        }
+            Err(error) => error,
+        };
+        refused[slot as usize] = Some(error);
     }
     let weights = Blob::new_checked(built_in).ok().filter(|blob| slow(blob).is_none());
     let source = if weights.is_some() { WeightSource::BuiltIn } else { WeightSource::None };
@@ -155,12 +144,4 @@ pub fn select<'w>(
 #[inline(never)]
 fn fits(cycles: u32, available: u32) -> bool {
     cycles <= available
-}
-
-fn refuse(refused: &mut [Option<SlotError>; 2], slot: Slot, error: SlotError) {
-    let [a, b] = refused;
-    *match slot {
-        Slot::A => a,
-        Slot::B => b,
-    } = Some(error);
 }

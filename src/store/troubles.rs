@@ -1,6 +1,5 @@
 //! The record of the troubles that a workshop has not cleared yet, so that they survive a restart.
 
-use super::error::FieldError;
 use super::record::Record;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -47,9 +46,4 @@ impl Troubles {
 impl Record for Troubles {
     const KEY: u8 = 5;
     const VERSION: u8 = 2;
-
-    /// Any value is valid.
-    fn check(&self) -> Result<(), FieldError> {
-        Ok(())
-    }
 }
