@@ -10,7 +10,6 @@ use super::yaw::{
     encode_sigma,
 };
 use crate::estimate::YawEstimate;
-use crate::units::AngularRate;
 use embedded_can::{Frame, StandardId};
 
 /// The encoder of the yaw messages: a set per `every` samples, with their mean rate and correction, so that rate times
@@ -35,8 +34,8 @@ impl YawEncoder {
             sample_counter: 0,
             every: if every == 0 { 1 } else { every },
             samples: 0,
-            rate: Mean::new(Scale::MICRO_DEG_PER_SEC),
-            correction: Mean::new(Scale::FIFTH_MILLI_DEG_PER_SEC),
+            rate: Mean::new(MICRO_DEG_PER_SEC_Q32),
+            correction: Mean::new(FIFTH_MILLI_DEG_PER_SEC_Q32),
             together: None,
         }
     }
@@ -116,69 +115,40 @@ impl YawEncoder {
     }
 }
 
-/// A mean without loss: the division's remainder stays in the sum, the rounding in the residual.
+/// Signal LSBs per rate code (2^-27 rad/s), times 2^32, for an LSB of 1e-6 deg/s, 180 / pi / 2^27 / 1e-6, too small by
+/// 2.3e-10, and of 2e-4 deg/s. At most 2^31: an LSB below two codes would gain nothing.
+const MICRO_DEG_PER_SEC_Q32: i64 = 1_833_464_944;
+const FIFTH_MILLI_DEG_PER_SEC_Q32: i64 = 9_167_325;
+
+/// A mean without loss: the division's remainder stays in the sum, the rounding to the signal's code in the residual.
 #[derive(Debug, Clone, Copy)]
 struct Mean {
+    factor_q32: i64,
     sum: i64,
-    residual: RoundingResidual,
+    /// Sum of the exact values minus the sum of the codes sent, in LSB x 2^-32.
+    residual: i64,
 }
 
 impl Mean {
-    const fn new(scale: Scale) -> Self {
-        Self { sum: 0, residual: RoundingResidual::new(scale) }
+    const fn new(factor_q32: i64) -> Self {
+        Self { factor_q32, sum: 0, residual: 0 }
     }
 
+    /// Returns the code nearest to the mean plus the residual of earlier ones.
     fn take(&mut self, samples: u8) -> i32 {
         // Of one sample it is the sample. The processor divides 32 bits alone in hardware.
         let mean =
             if samples == 1 { self.sum } else { self.sum.checked_div_euclid(samples.into()).unwrap_or(0) };
         self.sum -= mean * i64::from(samples);
-        // The mean of i32 values fits an i32.
-        self.residual.encode(AngularRate(mean as i32))
-    }
-
-    fn reset(&mut self) {
-        self.sum = 0;
-        self.residual.reset();
-    }
-}
-
-/// Converts a rate code (LSB 2^-27 rad/s) to the code of a CAN signal.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Scale {
-    /// Signal LSBs per rate code, times 2^32; at most 2^31: an LSB below two codes would gain nothing.
-    factor_q32: i64,
-}
-
-impl Scale {
-    /// Scale for a signal LSB of 1e-6 deg/s: 180 / pi / 2^27 / 1e-6, too small by 2.3e-10.
-    const MICRO_DEG_PER_SEC: Self = Self { factor_q32: 1_833_464_944 };
-    const FIFTH_MILLI_DEG_PER_SEC: Self = Self { factor_q32: 9_167_325 };
-}
-
-#[derive(Debug, Clone, Copy)]
-struct RoundingResidual {
-    scale: Scale,
-    /// Sum of the exact values minus the sum of the codes sent, in LSB x 2^-32.
-    residual: i64,
-}
-
-impl RoundingResidual {
-    const fn new(scale: Scale) -> Self {
-        Self { scale, residual: 0 }
-    }
-
-    /// Returns the code nearest to the rate plus the residual of earlier rates.
-    fn encode(&mut self, rate: AngularRate) -> i32 {
-        // At most 2^62 + 2^31.
-        let wanted = i64::from(rate.0) * self.scale.factor_q32 + self.residual;
+        // The mean of i32 values fits an i32: at most 2^62 + 2^31.
+        let wanted = mean * self.factor_q32 + self.residual;
         let sent = (wanted + (1 << 31)) >> 32;
         self.residual = wanted - (sent << 32);
         sent as i32
     }
 
-    /// Drops the residual. Call it after a message that was marked bad, or at a restart.
+    /// Drops sum and residual, after a message that was marked bad.
     fn reset(&mut self) {
-        self.residual = 0;
+        (self.sum, self.residual) = (0, 0);
     }
 }

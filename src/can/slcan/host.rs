@@ -28,8 +28,6 @@ impl StatusFlags {
     pub const TRANSMIT_FULL: Self = Self(1 << 1);
     /// The bus has many errors.
     pub const ERROR_WARNING: Self = Self(1 << 2);
-    /// Bytes from the host were lost.
-    pub const OVERRUN: Self = Self(1 << 3);
     /// The controller is error passive.
     pub const ERROR_PASSIVE: Self = Self(1 << 5);
     /// The bus is off.
