@@ -8,8 +8,6 @@ mod conditions;
 pub mod crash;
 pub mod device;
 pub mod event;
-#[doc(hidden)]
-pub mod hardware;
 mod learner;
 pub mod message;
 mod not_good;

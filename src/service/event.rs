@@ -1,7 +1,6 @@
 //! What may have happened to the board: the cause of its last reset, a crash, and the faults of its hardware.
 
 pub use super::crash::{Crash, CrashKind};
-pub use super::hardware::{CanFault, ClockFault};
 use serde::{Deserialize, Serialize};
 
 /// The cause of the last reset, from the reset flags (RM0090 7.3.21).
@@ -40,4 +39,44 @@ pub enum SensorFault {
     Identity(u8),
     #[error("register {address:#04x} of bank {bank} holds {got:#04x}, not what was written")]
     Setting { bank: u8, address: u8, got: u8 },
+}
+
+/// The reason why the board runs on its internal 16 MHz oscillator, which is not accurate enough for CAN.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[allow(missing_docs, reason = "its messages say it")]
+pub enum ClockFault {
+    /// The board restarts when the voltage has risen.
+    #[error("the supply is below 3.0 V")]
+    SupplyLow,
+    /// The board restarts when the crystal runs.
+    #[error("the crystal did not start")]
+    NoCrystal,
+    /// Measured frequency, kHz, as accurate as the internal oscillator; 0 if it could not be measured.
+    #[error(fmt = crystal)]
+    CrystalFrequency { khz: u16 },
+    #[error("the PLL did not lock")]
+    Pll,
+}
+
+fn crystal(khz: &u16, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+    match khz {
+        0 => f.write_str("the crystal's frequency could not be measured"),
+        _ => write!(f, "the crystal has {}.{:03} MHz", khz / 1_000, khz % 1_000),
+    }
+}
+
+/// The reason why the CAN controller did not start, or sends no CAN FD.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[allow(missing_docs, reason = "its messages say it")]
+pub enum CanFault {
+    #[error("the clock is not exact enough")]
+    Clock,
+    #[error("the controller does not wake up")]
+    Sleeping,
+    #[error("the controller does not enter initialisation mode")]
+    NotInitialising,
+    #[error("no node takes CAN FD frames, so they are no longer sent")]
+    Fd,
 }

@@ -209,7 +209,7 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
         if command != UdsCommand::ReadDataByIdentifier && !is_guest {
             self.device.forget_refusal();
         }
-        let needed = session::needed(command);
+        let (needed, has_sub_function) = session::rules(command);
         let is_owners = needed != Session::Default
             || matches!(
                 command,
@@ -221,7 +221,7 @@ impl<R: NorFlash, W: MappedSlots, E: FnMut() -> Option<Seed>> Exchange<'_, R, W,
             return Err(nrc(Refusal::OtherTester));
         }
         self.services.require_session(needed)?;
-        if !session::has_sub_function(command) {
+        if !has_sub_function {
             return self.serve_data(command, rest).map(|()| true);
         }
         let (&sub, rest) = rest.split_first().ok_or(Nrc::IncorrectMessageLengthOrInvalidFormat)?;

@@ -14,31 +14,22 @@ pub enum Session {
     Extended = 3,
 }
 
-pub(super) fn needed(command: UdsCommand) -> Session {
+/// Returns the session that a service needs, and whether it has a sub-function, the first byte of its request and of its
+/// response.
+pub(super) fn rules(command: UdsCommand) -> (Session, bool) {
     match command {
+        UdsCommand::DiagnosticSessionControl
+        | UdsCommand::ECUReset
+        | UdsCommand::TesterPresent
+        | UdsCommand::ReadDTCInformation => (Session::Default, true),
         UdsCommand::CommunicationControl
         | UdsCommand::ControlDTCSetting
-        | UdsCommand::WriteDataByIdentifier
         | UdsCommand::SecurityAccess
-        | UdsCommand::RoutineControl => Session::Extended,
+        | UdsCommand::RoutineControl => (Session::Extended, true),
+        UdsCommand::WriteDataByIdentifier => (Session::Extended, false),
         UdsCommand::RequestDownload | UdsCommand::TransferData | UdsCommand::RequestTransferExit => {
-            Session::Programming
+            (Session::Programming, false)
         }
-        _ => Session::Default,
+        _ => (Session::Default, false),
     }
-}
-
-/// Returns whether a service has a sub-function, the first byte of its request and of its response.
-pub(super) fn has_sub_function(command: UdsCommand) -> bool {
-    matches!(
-        command,
-        UdsCommand::DiagnosticSessionControl
-            | UdsCommand::ECUReset
-            | UdsCommand::TesterPresent
-            | UdsCommand::CommunicationControl
-            | UdsCommand::ControlDTCSetting
-            | UdsCommand::ReadDTCInformation
-            | UdsCommand::SecurityAccess
-            | UdsCommand::RoutineControl
-    )
 }
