@@ -118,14 +118,15 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let (board, handlers) = board::Board::start(cx.device, cx.core.SYST);
         let Some(parts) = start::parts(&board) else { cortex_m::peripheral::SCB::sys_reset() };
-        let start::Parts { output, config, weights, device } = parts;
+        let start::Parts { part, bits_per_second, line, config, weights, device } = parts;
         let coprocessor = start::init_static(cx.local.coprocessor_place, || Coprocessor::new(*config));
         let network = weights.and_then(|blob| GyroNet::with_state(blob, cx.local.network_state).ok());
         let service = board.service;
-        let (bits_per_second, bring_up) = (output.bits_per_second, BringUp::new(output.part, board.spi));
-        let (gnss, gnss_reception, gnss_port) = board::gnss(&board.clocks, output.gnss);
+        let bring_up = BringUp::new(part, board.spi);
+        let (gnss, gnss_reception, gnss_port) = board::gnss(&board.clocks, line);
         let ports = ([board.imu, board.fog, board.slcan, gnss_port], board.can);
-        let sender = start::init_static(cx.local.sender_place, || output.connect(ports));
+        let sender =
+            start::init_static(cx.local.sender_place, || Output::new(part, bits_per_second, line, ports));
         let rest = start::init_static(cx.local.rest_place, || {
             let diagnosis = Diagnosis::new(service, bits_per_second);
             Idle::new(device, diagnosis, bring_up, board.clocks.fault)

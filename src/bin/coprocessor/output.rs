@@ -77,13 +77,6 @@ pub fn report(task: Task) {
     REPORTS.fetch_or(task as u8, Ordering::Relaxed);
 }
 
-pub struct OutputParts {
-    pub part: ImuPart,
-    pub bits_per_second: u32,
-    /// The line of a GNSS receiver, if it is used.
-    pub gnss: Option<GnssSettings>,
-}
-
 pub struct Output {
     imu: Imu,
     fog: serial::Port,
@@ -110,17 +103,24 @@ pub struct Output {
 
 type Ports = ([serial::Port; 4], Option<Can>);
 
-impl OutputParts {
+// The coprocessor counts the inputs that it refuses, so the task ignores its errors.
+impl Output {
+    /// Creates the task's state for the configured part, bit rate, and line of a GNSS receiver, if it is used.
     #[inline]
-    pub fn connect(self, ([imu, fog, slcan, gnss], can): Ports) -> Output {
-        Output {
-            imu: Imu::new(self.part, imu),
+    pub fn new(
+        part: ImuPart,
+        bits_per_second: u32,
+        line: Option<GnssSettings>,
+        ([imu, fog, slcan, gnss], can): Ports,
+    ) -> Self {
+        Self {
+            imu: Imu::new(part, imu),
             fog,
             dsp1760: Dsp1760::new(),
             gnss,
             gnss_lost: 0,
-            receiver: self.gnss.map(|line| GnssLine::new(line.protocol)),
-            outgoing: Outgoing::new(slcan, self.bits_per_second, can),
+            receiver: line.map(|line| GnssLine::new(line.protocol)),
+            outgoing: Outgoing::new(slcan, bits_per_second, can),
             sampled_at: 0,
             is_behind: false,
             polled_at: 0,
@@ -130,10 +130,7 @@ impl OutputParts {
             unread: 0,
         }
     }
-}
 
-// The coprocessor counts the inputs that it refuses, so the task ignores its errors.
-impl Output {
     /// Returns whether the window's task is to run: a sample may have made one due, and it reports to the watchdog.
     #[inline(never)]
     pub fn step(&mut self, coprocessor: &mut Coprocessor, lines: &mut LineCounters) -> bool {

@@ -13,14 +13,6 @@ use gyronet::store::layout::{
     FIRMWARE_A, FIRMWARE_B, FLASH_BASE, RECORD_SECTOR, SLOT_SIZE, SLOTS, STORE, sector,
 };
 
-/// Returns the range of `len` bytes from an offset into the flash, if it lies in one of the regions.
-fn inside(regions: &[Range<u32>], offset: u32, len: usize) -> Result<Range<u32>, FlashError> {
-    let end =
-        u32::try_from(len).ok().and_then(|len| offset.checked_add(len)).ok_or(FlashError::OutOfBounds)?;
-    let holds = |region: &Range<u32>| region.start <= offset && end <= region.end;
-    if regions.iter().any(holds) { Ok(offset..end) } else { Err(FlashError::OutOfBounds) }
-}
-
 /// Returns the range, if both of its ends are multiples of a unit.
 fn aligned(range: Range<u32>, unit: usize) -> Result<Range<u32>, FlashError> {
     let fits = (range.start as usize).is_multiple_of(unit) && range.len().is_multiple_of(unit);
@@ -44,65 +36,72 @@ fn erase(flash: &Flash, range: Range<u32>) -> Result<(), FlashError> {
     })
 }
 
-macro_rules! region {
-    ($name:ident, $base:expr, $regions:expr, $smallest:expr, $doc:literal) => {
-        #[doc = $doc]
-        pub struct $name(pub &'static Flash);
-
-        impl $name {
-            fn inside(offset: u32, len: usize) -> Result<Range<u32>, FlashError> {
-                inside(&$regions, offset.checked_add($base).ok_or(FlashError::OutOfBounds)?, len)
-            }
-        }
-
-        impl ErrorType for $name {
-            type Error = FlashError;
-        }
-
-        impl ReadNorFlash for $name {
-            const READ_SIZE: usize = 1;
-
-            fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
-                self.0.read(Self::inside(offset, bytes.len())?.start, bytes);
-                Ok(())
-            }
-
-            fn capacity(&self) -> usize {
-                $regions.iter().map(|region| (region.end - $base) as usize).max().unwrap_or(0)
-            }
-        }
-
-        impl NorFlash for $name {
-            const WRITE_SIZE: usize = WORD;
-            const ERASE_SIZE: usize = $smallest;
-
-            fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
-                let len = to.checked_sub(from).ok_or(FlashError::OutOfBounds)? as usize;
-                erase(self.0, Self::inside(from, len)?)
-            }
-
-            fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
-                let range = aligned(Self::inside(offset, bytes.len())?, WORD)?;
-                self.0.write(range.start, bytes)
-            }
-        }
-    };
+/// Ranges of the flash, whose sectors are at least `ERASE` bytes; offsets count from `base`.
+pub struct Region<const ERASE: usize> {
+    flash: &'static Flash,
+    base: u32,
+    ranges: &'static [Range<u32>],
 }
 
-region!(
-    Records,
-    STORE.start,
-    [STORE],
-    RECORD_SECTOR,
-    "The sectors of the records; offsets count from their start."
-);
-region!(
-    Weights,
-    0,
-    [SLOTS, FIRMWARE_A, FIRMWARE_B],
-    SLOT_SIZE,
-    "The slots for weights and firmware, by offset into the flash."
-);
+/// The sectors of the records.
+pub type Records = Region<RECORD_SECTOR>;
+/// The slots for weights and firmware, by offset into the flash.
+pub type Weights = Region<SLOT_SIZE>;
+
+impl Records {
+    pub const fn records(flash: &'static Flash) -> Self {
+        Self { flash, base: STORE.start, ranges: &[STORE] }
+    }
+}
+
+impl Weights {
+    pub const fn weights(flash: &'static Flash) -> Self {
+        Self { flash, base: 0, ranges: &[SLOTS, FIRMWARE_A, FIRMWARE_B] }
+    }
+}
+
+impl<const ERASE: usize> Region<ERASE> {
+    /// Returns the range of `len` bytes from an offset, if it lies in one of the region's.
+    fn inside(&self, offset: u32, len: usize) -> Result<Range<u32>, FlashError> {
+        let start = offset.checked_add(self.base);
+        let range = start.and_then(|start| Some(start..start.checked_add(u32::try_from(len).ok()?)?));
+        let range = range.ok_or(FlashError::OutOfBounds)?;
+        let holds = |region: &Range<u32>| region.start <= range.start && range.end <= region.end;
+        if self.ranges.iter().any(holds) { Ok(range) } else { Err(FlashError::OutOfBounds) }
+    }
+}
+
+impl<const ERASE: usize> ErrorType for Region<ERASE> {
+    type Error = FlashError;
+}
+
+impl<const ERASE: usize> ReadNorFlash for Region<ERASE> {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+        self.flash.read(self.inside(offset, bytes.len())?.start, bytes);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.ranges.iter().map(|range| (range.end - self.base) as usize).max().unwrap_or(0)
+    }
+}
+
+impl<const ERASE: usize> NorFlash for Region<ERASE> {
+    const WRITE_SIZE: usize = WORD;
+    const ERASE_SIZE: usize = ERASE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        let len = to.checked_sub(from).ok_or(FlashError::OutOfBounds)? as usize;
+        erase(self.flash, self.inside(from, len)?)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        let range = aligned(self.inside(offset, bytes.len())?, WORD)?;
+        self.flash.write(range.start, bytes)
+    }
+}
 
 impl MappedSlots for Weights {
     fn slots(&self) -> [&[u8]; 2] {

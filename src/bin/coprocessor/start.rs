@@ -5,11 +5,11 @@ use crate::board::Board;
 use crate::boards::BOARD;
 use crate::diagnosis;
 use crate::idle::Stored;
-use crate::output::OutputParts;
 use crate::regions::{self, Records, Weights};
 use crate::stm32f405::{clocks::FULL_HZ, flash::Flash, pac};
 use core::mem::MaybeUninit;
 use gyronet::coprocessor::Config;
+use gyronet::heading::GnssSettings;
 use gyronet::model::background::BackgroundCheck;
 use gyronet::model::{Blob, weights};
 use gyronet::service::{Device, SupportedHardware};
@@ -45,7 +45,10 @@ fn receive(board: &Board, device: &Device<Records, Weights>) {
 }
 
 pub struct Parts {
-    pub output: OutputParts,
+    pub part: ImuPart,
+    pub bits_per_second: u32,
+    /// The line of a GNSS receiver, if it is used.
+    pub line: Option<GnssSettings>,
     pub config: &'static Config,
     pub weights: Option<Blob<'static>>,
     pub device: Stored,
@@ -59,7 +62,7 @@ pub fn parts(board: &Board) -> Option<Parts> {
     let flash = &*cortex_m::singleton!(: Flash = Flash::new(registers))?;
     let device =
         cortex_m::singleton!(: Device<Records, Weights> = const { Device::new(&SUPPORTED_HARDWARE) })?;
-    device.begin(Some(Records(flash)), Some(Weights(flash)), flash.check(), board.identity);
+    device.begin(Some(Records::records(flash)), Some(Weights::weights(flash)), flash.check(), board.identity);
     // Without valid weights the pipeline still runs: the status says degraded, and the rate is the gyro's minus its
     // static bias.
     let blob = device.weights(Some(regions::slots_at_start()), BUILT_IN);
@@ -69,12 +72,8 @@ pub fn parts(board: &Board) -> Option<Parts> {
     let config = &*cortex_m::singleton!(: Config = device.coprocessor(board.clocks.exact()))?;
     receive(board, device);
     let (part, bits_per_second) = (configuration.imu, config.can.settings().bits_per_second);
-    Some(Parts {
-        output: OutputParts { part, bits_per_second, gnss: configuration.heading.line },
-        config,
-        weights: blob,
-        device: (device, check),
-    })
+    let line = configuration.heading.line;
+    Some(Parts { part, bits_per_second, line, config, weights: blob, device: (device, check) })
 }
 
 /// Creates a value in its static. Not inlined, so that the stack that `make` uses is freed afterwards.

@@ -135,9 +135,26 @@ impl Can {
         self.registers.btr().modify(|_, w| unsafe { w.brp().bits(prescaler(bits_per_second) - 1) });
     }
 
-    /// Receives the frames that agree with one of up to 14 identifiers in the bits of its mask, and nothing else.
+    /// Receives the frames that agree with one of up to 14 identifiers in the bits of its mask, and nothing else: a filter
+    /// bank for each, and no remote frames.
     pub fn receive_only(&self, filters: impl Iterator<Item = (Id, u32)>) {
-        receive_only(&self.registers, filters);
+        let can = &self.registers;
+        can.fmr().modify(|_, w| w.finit().set_bit());
+        // SAFETY: one bit for each bank that CAN1 has; `take` keeps to them.
+        unsafe {
+            can.fa1r().write(|w| w.bits(0));
+            let mut banks = 0;
+            for (k, (bank, (id, mask))) in can.fb_iter().zip(filters).take(14).enumerate() {
+                bank.fr1().write(|w| w.bits(word(id)));
+                bank.fr2().write(|w| w.bits(compared(id, mask)));
+                banks |= 1 << k;
+            }
+            can.fm1r().write(|w| w.bits(0));
+            can.fs1r().write(|w| w.bits(banks));
+            can.ffa1r().write(|w| w.bits(0));
+            can.fa1r().write(|w| w.bits(banks));
+        }
+        can.fmr().modify(|_, w| w.finit().clear_bit());
     }
 
     /// Joins the bus. The controller waits for 11 recessive bits by itself. Called once received frames can be taken:
@@ -244,26 +261,6 @@ const fn prescaler(bits_per_second: u32) -> u16 {
         Some(clocks @ 1..=1024) => clocks as u16,
         _ => 1024,
     }
-}
-
-/// Sets one filter bank for each identifier, with its mask; other frames are not received, nor remote ones.
-fn receive_only(can: &pac::CAN1, filters: impl Iterator<Item = (Id, u32)>) {
-    can.fmr().modify(|_, w| w.finit().set_bit());
-    // SAFETY: one bit for each bank that CAN1 has; `take` keeps to them.
-    unsafe {
-        can.fa1r().write(|w| w.bits(0));
-        let mut banks = 0;
-        for (k, (bank, (id, mask))) in can.fb_iter().zip(filters).take(14).enumerate() {
-            bank.fr1().write(|w| w.bits(word(id)));
-            bank.fr2().write(|w| w.bits(compared(id, mask)));
-            banks |= 1 << k;
-        }
-        can.fm1r().write(|w| w.bits(0));
-        can.fs1r().write(|w| w.bits(banks));
-        can.ffa1r().write(|w| w.bits(0));
-        can.fa1r().write(|w| w.bits(banks));
-    }
-    can.fmr().modify(|_, w| w.finit().clear_bit());
 }
 
 /// Returns an identifier in the layout of mailboxes and filters (RM0090 32.9.3).
