@@ -64,3 +64,23 @@ impl Carried {
         self.held_until = 0;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_end_of_a_standstill_is_carried() {
+        let mut carried = Carried::NONE;
+        for _ in 0..60 * RATE_HZ {
+            assert_eq!(
+                carried.send(7, true, true, AngularRate(100)),
+                (AngularRate::ZERO, Some(AngularRate(7)))
+            );
+        }
+        carried.end_standstill();
+        // Four whole quarters of a second, and the one that has begun.
+        let samples = -carried.waiting / 7;
+        assert!((i64::from(RATE_HZ)..=125).contains(&samples), "{samples}");
+    }
+}

@@ -161,5 +161,17 @@ mod tests {
             assert!((0.995..1.0).contains(&share) && (norm(&level.up) - 1.0).abs() < 1e-6, "{step}: {share}");
         }
         assert!(level.follow() && level.up == level.goal && !level.follow());
+        // One step for five samples, while the vehicle moves, too.
+        level.estimator = Some(VerticalEstimator::new(Vertical::UNKNOWN));
+        level.goal = Z;
+        let sample = ImuSample {
+            time: crate::sample::NO_STAMP,
+            specific_force: [SpecificForce(0); 3],
+            angular_rate: [AngularRate::ZERO; 3],
+            temperature: None,
+            validity: crate::sample::Validity::Good,
+        };
+        let turned = (0..50).filter(|_| level.add(&sample, false)).count();
+        assert_eq!(turned, 10);
     }
 }

@@ -7,7 +7,7 @@ use gyronet::can::bosch::{Message, SignalStatus};
 use gyronet::can::config::Config;
 use gyronet::can::encoder::CanEncoder;
 use gyronet::can::wheel::WheelSettings;
-use gyronet::compensate::{CompensateConfig, MAX_MEAN};
+use gyronet::compensate::{CompensateConfig, Compensator, MAX_MEAN};
 use gyronet::estimate::YawEstimate;
 use gyronet::health::Status::{Degraded, Init, Ready};
 use gyronet::health::{Faults, Quality, Source};
@@ -40,6 +40,12 @@ fn an_implausible_estimate_is_not_believed() {
     assert_eq!(faults(&outputs), [(Faults::NONE, 356), (Faults::IMPLAUSIBLE, 44)]);
     let last = outputs[399].vehicle.live;
     assert_eq!((last.correction, pipeline.pending()), (AngularRate(0), waiting(&last)));
+    // One of ten times the mean's limit is vibration, more is not.
+    for (largest, is_used) in [(10 * limit.0, true), (10 * limit.0 + 1, false)] {
+        let mut estimate = Estimate::NONE;
+        estimate.corrections[3] = AngularRate(-largest);
+        assert_eq!(Compensator::new(CompensateConfig::DEFAULT).revise(&estimate).is_ok(), is_used);
+    }
 }
 
 #[test]

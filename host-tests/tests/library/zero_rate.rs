@@ -318,6 +318,11 @@ fn the_last_reading_before_driving_off_is_the_bias_where_it_differs_by_more_than
 /// A first reading that changed while it was taken: a turn had begun.
 #[test]
 fn a_bad_first_reading_leaves_the_later_ones_their_weight() {
+    let initial = ZeroRateConfig::DEFAULT.initial;
+    for (changed, sigma) in [(0.0, initial), (6.0 * initial, initial), (0.006, 0.006 - 5.0 * initial)] {
+        let stated = ZeroRate::claimed(ZeroRateConfig::DEFAULT, 0.0, Some(0.0), changed).sigma();
+        assert!((stated - sigma).abs() < 1e-3 * sigma, "changed by {changed}: {stated}");
+    }
     let mut zero_rate = ZeroRate::claimed(ZeroRateConfig::DEFAULT, 0.0, Some(0.0), 0.006);
     for _ in 0..20 * RATE_HZ {
         zero_rate.observe(Some(AngularRate::ZERO), Standing::WHEELS, 0.0);
