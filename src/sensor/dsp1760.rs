@@ -67,7 +67,7 @@ impl Dsp1760 {
             if is_self_test(frame) {
                 continue;
             }
-            let message = match Message::parse_checked(frame) {
+            let message = match Message::parse(frame) {
                 Ok(message) => message,
                 Err(error) => return Some(Err(Dsp1760Error::Message(error))),
             };

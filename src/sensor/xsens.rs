@@ -31,7 +31,7 @@ const STATUS_SELF_TEST: u32 = 1;
 
 /// The framing of Xbus messages.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Xbus;
+struct Xbus;
 
 impl Protocol for Xbus {
     const HEADER: usize = 4;
@@ -57,18 +57,6 @@ impl Protocol for Xbus {
         });
         let sum = (sums as u8).wrapping_add((sums >> 16) as u8);
         rest.iter().fold(sum, |sum, byte| sum.wrapping_add(*byte)) == 0
-    }
-}
-
-impl Xbus {
-    /// Returns the message identifier and the data of an intact frame.
-    pub fn parse(frame: &[u8]) -> Option<(u8, &[u8])> {
-        match frame {
-            [PREAMBLE, BUS_ID, mid, len, data @ .., _] if usize::from(*len) == data.len() => {
-                Xbus::check(frame).then_some((*mid, data))
-            }
-            _ => None,
-        }
     }
 }
 

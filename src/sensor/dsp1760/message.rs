@@ -84,8 +84,6 @@ pub enum MessageError {
     Header,
     #[error("DSP-1760: {got} bytes where the header announces {expected}")]
     Length { got: usize, expected: usize },
-    #[error("DSP-1760: CRC {computed:08x}, but the message carries {stored:08x}")]
-    Crc { computed: u32, stored: u32 },
     #[error("DSP-1760: sequence number {got}, above {MAX_SEQUENCE}")]
     Sequence { got: u8 },
 }
@@ -111,22 +109,8 @@ impl Message {
         }
     }
 
-    /// Parses a whole message. The valid bit of a reading that is not finite is cleared.
+    /// Parses a whole message, whose CRC the framer has checked. The valid bit of a reading that is not finite is cleared.
     pub fn parse(frame: &[u8]) -> Result<Self, MessageError> {
-        let format = frame.first_chunk().copied().and_then(Format::of).ok_or(MessageError::Header)?;
-        let length = MessageError::Length { got: frame.len(), expected: format.length() };
-        if frame.len() != format.length() {
-            return Err(length);
-        }
-        let (content, stored) = frame.split_last_chunk::<4>().ok_or(length)?;
-        let (computed, stored) = (CRC_32_MPEG_2.checksum(content), u32::from_be_bytes(*stored));
-        if computed != stored {
-            return Err(MessageError::Crc { computed, stored });
-        }
-        Self::parse_checked(frame)
-    }
-
-    pub(super) fn parse_checked(frame: &[u8]) -> Result<Self, MessageError> {
         let format = frame.first_chunk().copied().and_then(Format::of).ok_or(MessageError::Header)?;
         let length = MessageError::Length { got: frame.len(), expected: format.length() };
         let (content, _) = frame.split_last_chunk::<4>().ok_or(length)?;
