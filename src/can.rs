@@ -12,6 +12,8 @@ pub mod fd;
 #[doc(hidden)]
 pub mod fog_encoder;
 #[doc(hidden)]
+pub mod identifier;
+#[doc(hidden)]
 pub mod load;
 #[doc(hidden)]
 pub mod queue;

@@ -28,7 +28,6 @@ mod slot;
 pub mod slots;
 mod troubles;
 mod upload;
-mod wheels;
 
 pub use access::Access;
 pub use calibration::{Calibration, UnitMap};

@@ -2,8 +2,8 @@
 //! from power-up if a FOG is configured.
 
 use super::DataFrame;
-use super::config::SAMPLE_MS;
-use super::e2e::{DataIdMode, P01, Profile};
+use super::config::{E2e, SAMPLE_MS};
+use super::e2e::{DataIdMode, Profile};
 use super::load::Periodic;
 use super::yaw_encoder::YawEncoder;
 use crate::estimate::YawEstimate;
@@ -23,11 +23,8 @@ impl FogEncoder {
         Self { encoder: YawEncoder::new(Self::profiles(ids), 1), ids }
     }
 
-    pub const fn profiles([rate, angle, detail]: [u16; 3]) -> [Profile; 3] {
-        const fn profile(data_id: u16) -> Profile {
-            Profile::P01(P01 { data_id, mode: DataIdMode::Both })
-        }
-        [profile(rate), profile(angle), profile(detail)]
+    pub const fn profiles(data_ids: [u16; 3]) -> [Profile; 3] {
+        E2e::P01 { mode: DataIdMode::Both, data_ids }.profiles()
     }
 
     /// Returns every message of the gyro, without those whose identifier has more than 11 bits.

@@ -8,9 +8,7 @@ mod layout;
 mod settings;
 
 use layout::Pulses;
-pub(crate) use layout::stored_id;
 pub use layout::{ByteSum, Checksum, Code, MAX_SPEED, Parts, WheelError, WheelFrame, WheelSignal};
-pub(crate) use settings::raw_id;
 pub use settings::{MAX_FRAMES, WheelConfigError, WheelSettings};
 
 use super::e2e::{Sequence, Verdict};

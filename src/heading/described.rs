@@ -11,7 +11,7 @@ const LARGEST_OFFSET: f32 = 400.0;
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct HeadingSignal {
     /// Identifier of the frame.
-    #[serde(with = "crate::can::wheel::stored_id")]
+    #[serde(with = "crate::can::identifier")]
     pub id: Id,
     /// Position of the raw value.
     pub field: BitField,

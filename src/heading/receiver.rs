@@ -6,7 +6,7 @@
 use super::described::HeadingSignal;
 use super::latitude::{LatitudeJudge, ReceivedLatitude};
 use super::{Fix, GnssSettings, Heading, HeadingError, j1939, nmea2000};
-use crate::can::wheel::raw_id;
+use crate::can::identifier::{self, EXTENDED, packed};
 use crate::units::{Duration, Micros};
 use embedded_can::{ExtendedId, Frame, Id};
 
@@ -97,7 +97,7 @@ impl HeadingSettings {
     /// Checks the settings beside the identifiers that are taken already.
     pub fn check(&self, taken: impl Iterator<Item = Id>) -> Result<(), HeadingConfigError> {
         if let Some(signal) = self.signals().iter().flatten().find(|signal| !signal.is_plausible()) {
-            return Err(HeadingConfigError::Scale(raw_id(signal.id)));
+            return Err(HeadingConfigError::Scale(identifier::raw(signal.id)));
         }
         if self.course.is_some() && self.speed.is_none() {
             return Err(HeadingConfigError::NoSpeed);
@@ -110,12 +110,9 @@ impl HeadingSettings {
                 return Err(HeadingConfigError::Baud(baud));
             }
         }
-        let matches = |id: Id, (own, mask): (Id, u32)| {
-            let is_extended = |id| matches!(id, Id::Extended(_));
-            is_extended(id) == is_extended(own) && raw_id(id) & mask == raw_id(own) & mask
-        };
+        let matches = |id, (own, mask)| (packed(id) ^ packed(own)) & (mask | EXTENDED) == 0;
         let mut taken = taken.filter(|id| self.filters().any(|own| matches(*id, own)));
-        taken.next().map_or(Ok(()), |id| Err(HeadingConfigError::Own(raw_id(id))))
+        taken.next().map_or(Ok(()), |id| Err(HeadingConfigError::Own(identifier::raw(id))))
     }
 }
 
@@ -190,7 +187,7 @@ impl HeadingReceiver {
     }
 
     fn is_sender(&mut self, id: Id, now: Micros) -> bool {
-        let address = raw_id(id) as u8;
+        let address = identifier::raw(id) as u8;
         let is_other =
             self.sender.is_some_and(|(known, newest)| known != address && now.since(newest) <= SILENT);
         if !is_other {

@@ -7,7 +7,8 @@ use super::{Calibration, Learned};
 use crate::bias::{EarthRate, Latitude, StaticConfig};
 use crate::can::config::{Config, Settings};
 use crate::can::diagnosis::DiagnosisIds;
-use crate::can::wheel::{WheelConfigError, WheelSettings, raw_id};
+use crate::can::identifier;
+use crate::can::wheel::{WheelConfigError, WheelReceiver, WheelSettings};
 use crate::can::yaw::FOG_IDS;
 use crate::compensate::CompensateConfig;
 use crate::coprocessor;
@@ -167,7 +168,7 @@ impl Configuration {
         let ids = || wheels.frames.iter().flatten().map(|frame| frame.id);
         let diagnosis = self.diagnosis.ids().map_err(FieldError::Diagnosis)?;
         let taken = ids().find(|id| diagnosis.contains(id)).or_else(|| self.own_identifier(ids()));
-        taken.map_or(Ok(()), |id| Err(FieldError::Wheels(WheelConfigError::Own(raw_id(id)))))
+        taken.map_or(Ok(()), |id| Err(FieldError::Wheels(WheelConfigError::Own(identifier::raw(id)))))
     }
 
     fn fog(&self) -> FogConfig {
@@ -236,5 +237,15 @@ impl Record for Configuration {
             within(field, value)?;
         }
         Ok(())
+    }
+}
+
+// Records of their own, so that another vehicle needs new settings instead of a new image.
+impl Record for WheelSettings {
+    const KEY: u8 = 4;
+    const VERSION: u8 = 2;
+
+    fn check(&self) -> Result<(), FieldError> {
+        WheelReceiver::new(*self).map(drop).map_err(FieldError::Wheels)
     }
 }

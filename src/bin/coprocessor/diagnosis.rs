@@ -13,9 +13,10 @@ use crate::serial;
 use crate::stm32f405::{can, rng, timer};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
-use embedded_can::{ExtendedId, Frame, Id, StandardId};
+use embedded_can::{Frame, Id};
 use embedded_io::Write;
 use gyronet::can::DataFrame;
+use gyronet::can::identifier::{packed, unpacked};
 use gyronet::can::slcan::port::Port;
 use gyronet::health::count;
 use gyronet::service::Device;
@@ -40,38 +41,22 @@ pub static RESPONSES: Ring<(Line, DataFrame), 16> =
     // SAFETY: idle writes, the output task reads.
     unsafe { Ring::new() };
 
-/// Identifiers of requests to this board, of requests to all servers, and of this board's responses, as [`pack`]
-/// encodes them. Set before any task runs.
+/// Identifiers of requests to this board, of requests to all servers, and of this board's responses, [`packed`].
+/// Set before any task runs.
 static IDS: [AtomicU32; 3] = [const { AtomicU32::new(u32::MAX) }; 3];
 
 pub fn set_ids(ids: [Id; 3]) {
-    IDS.iter().zip(ids).for_each(|(place, id)| place.store(pack(id), Ordering::Relaxed));
+    IDS.iter().zip(ids).for_each(|(place, id)| place.store(packed(id), Ordering::Relaxed));
 }
 
 pub fn is_request(id: Id) -> bool {
     let [request, functional, _] = ids();
-    [request, functional].contains(&pack(id))
+    [request, functional].contains(&packed(id))
 }
 
 fn ids() -> [u32; 3] {
     let [request, functional, response] = &IDS;
     [request, functional, response].map(|id| id.load(Ordering::Relaxed))
-}
-
-const EXTENDED: u32 = 1 << 31;
-
-fn pack(id: Id) -> u32 {
-    match id {
-        Id::Standard(id) => u32::from(id.as_raw()),
-        Id::Extended(id) => id.as_raw() | EXTENDED,
-    }
-}
-
-fn unpack(packed: u32) -> Option<Id> {
-    match packed & EXTENDED {
-        0 => StandardId::new(packed as u16).map(Id::Standard),
-        _ => ExtendedId::new(packed & !EXTENDED).map(Id::Extended),
-    }
 }
 
 /// Serves one tester at a time, on any line.
@@ -148,7 +133,7 @@ impl Diagnosis {
         } && let Some(data) = server.next_frame(now)
         {
             let [.., response] = ids();
-            let Some(frame) = unpack(response).and_then(|id| DataFrame::new(id, &data)) else { continue };
+            let Some(frame) = unpacked(response).and_then(|id| DataFrame::new(id, &data)) else { continue };
             match line {
                 Line::Service => port.enqueue(frame, Micros(1_000 * u64::from(now))),
                 Line::Can | Line::Slcan => {
@@ -179,7 +164,7 @@ impl Tester {
         }
         self.server.set_guest(self.owner != line);
         let [_, functional, _] = ids();
-        if pack(frame.id()) == functional {
+        if packed(frame.id()) == functional {
             self.server.receive_functional(frame.data(), now);
         } else {
             self.server.receive(frame.data(), now);

@@ -2,6 +2,7 @@
 
 use crate::can::bosch;
 use crate::can::e2e::{Fault, Profile};
+use crate::can::identifier;
 use crate::can::signal::BitField;
 use crate::units::{Micros, WheelSpeed};
 use embedded_can::Id;
@@ -190,7 +191,7 @@ impl ByteSum {
         let counter = frame.counter.filter(|_| self.without_counter).map_or(0, |counter| counter.mask());
         let cleared = (self.field.mask() | counter).to_le_bytes();
         let own = data.iter().zip(cleared).map(|(byte, cleared)| byte & !cleared);
-        let id = if self.with_id { super::raw_id(frame.id).to_be_bytes() } else { [0; 4] };
+        let id = if self.with_id { identifier::raw(frame.id).to_be_bytes() } else { [0; 4] };
         let length = if self.with_length { data.len() as u8 } else { 0 };
         let sum = own.chain(id).chain([length]).fold(0_u8, |sum, byte| {
             let byte = if self.nibbles { (byte & 0xF) + (byte >> 4) } else { byte };
@@ -222,37 +223,12 @@ pub enum Checksum {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct WheelFrame {
     /// Identifier of the frame.
-    #[serde(with = "stored_id")]
+    #[serde(with = "crate::can::identifier")]
     pub id: Id,
     /// Message counter of up to 8 bits that cycles through all values, if there is one.
     pub counter: Option<Parts>,
     /// Protection of the frame.
     pub checksum: Checksum,
-}
-
-/// An identifier as a number; bit 31 marks an identifier of 29 bits.
-pub(crate) mod stored_id {
-    use embedded_can::{ExtendedId, Id, StandardId};
-    use serde::{Deserialize, Deserializer, Serializer, de::Error};
-
-    const EXTENDED: u32 = 1 << 31;
-
-    pub fn serialize<S: Serializer>(id: &Id, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_u32(match id {
-            Id::Standard(id) => id.as_raw().into(),
-            Id::Extended(id) => id.as_raw() | EXTENDED,
-        })
-    }
-
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Id, D::Error> {
-        let raw = u32::deserialize(deserializer)?;
-        let id = if raw & EXTENDED != 0 {
-            ExtendedId::new(raw & !EXTENDED).map(Id::Extended)
-        } else {
-            u16::try_from(raw).ok().and_then(StandardId::new).map(Id::Standard)
-        };
-        id.ok_or_else(|| D::Error::custom("no identifier"))
-    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

@@ -1,6 +1,7 @@
 //! The settings describe the frames that carry the wheel speeds, and when the vehicle counts as standing.
 
 use super::layout::{Checksum, Code, WheelFrame, WheelSignal, nearest};
+use crate::can::identifier;
 use crate::can::signal::{BitField, ByteOrder};
 use crate::sample::WHEELS;
 use crate::units::{Duration, WheelSpeed};
@@ -78,7 +79,7 @@ impl WheelSettings {
         let frames = || self.frames.iter().flatten();
         for (k, frame) in frames().enumerate() {
             if frames().take(k).any(|earlier| earlier.id == frame.id) {
-                return Err(WheelConfigError::DuplicateIdentifier(raw_id(frame.id)));
+                return Err(WheelConfigError::DuplicateIdentifier(identifier::raw(frame.id)));
             }
             if let Some(counter) = frame.counter
                 && counter.bits() > 8
@@ -122,7 +123,7 @@ impl WheelSettings {
 
 fn take(taken: &mut u64, mask: u64, frame: Option<WheelFrame>) -> Result<(), WheelConfigError> {
     if *taken & mask != 0 {
-        return Err(WheelConfigError::Overlap(frame.map_or(0, |frame| raw_id(frame.id))));
+        return Err(WheelConfigError::Overlap(frame.map_or(0, |frame| identifier::raw(frame.id))));
     }
     *taken |= mask;
     Ok(())
@@ -141,11 +142,4 @@ const fn toyota(start: u8) -> Option<WheelSignal> {
         valid_when: Some(Code { field: fault, value: 0 }),
         ..WheelSignal::new(0, field, WheelSignal::per_bit_kmh(0.01))
     })
-}
-
-pub(crate) fn raw_id(id: Id) -> u32 {
-    match id {
-        Id::Standard(id) => id.as_raw().into(),
-        Id::Extended(id) => id.as_raw(),
-    }
 }
