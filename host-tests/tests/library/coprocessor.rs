@@ -107,6 +107,12 @@ fn an_estimate_for_no_window_is_an_error_and_counted() {
     assert_eq!(car.coprocessor.deliver(late.end, Estimate::NONE), missing(late.end), "its turn has passed");
     assert_eq!(car.counted().unclaimed_estimates, 4);
     assert_eq!(car.coprocessor.pipeline().counters().late, 1);
+    // A window that nobody takes is replaced.
+    while car.counted().replaced_windows == 0 {
+        car.sample();
+    }
+    assert_eq!(u64::from(car.coprocessor.window().expect("the newest one").end), car.tick - 1);
+    assert_eq!(car.coprocessor.pipeline().counters().late, 2);
 }
 
 #[test]
@@ -148,17 +154,6 @@ fn a_clock_that_goes_back_is_an_error_and_followed_from_there() {
         let _ = car.coprocessor.fog(fog(time % 1_000), Micros(time), &mut ());
         let _ = car.coprocessor.can(&wheels(0.0), Micros(time));
     }
-}
-
-#[test]
-fn a_window_that_nobody_takes_is_replaced_and_counted() {
-    let mut car = Car::new(Config::DEFAULT);
-    while car.counted().replaced_windows == 0 {
-        car.sample();
-    }
-    let window = car.coprocessor.window().expect("the newest one");
-    assert_eq!(u64::from(window.end), car.tick - 1, "the newest one");
-    assert_eq!(car.coprocessor.pipeline().counters().late, 1);
 }
 
 /// Samples that come faster than 100 times a second wait for the estimate that they want, until it is late.

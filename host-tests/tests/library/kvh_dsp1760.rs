@@ -167,18 +167,14 @@ fn a_number_that_is_none_is_not_valid() {
     assert_eq!(feed_new(&message(0, 1.0).emit())[0].expect("a sample").increment[2], None);
 }
 
+/// A CRC of 32 bits finds every single flipped bit.
 #[test]
-fn errors_say_where() {
+fn damage_is_refused_and_errors_say_where() {
     let mut frame = bytes(RECORDED);
     assert_eq!(Message::parse(&frame[1..]), Err(MessageError::Header));
     assert_eq!(Message::parse(&frame[..35]), Err(MessageError::Length { got: 35, expected: 36 }));
     frame[29] = 128;
     assert_eq!(Message::parse(&frame), Err(MessageError::Sequence { got: 128 }));
-}
-
-/// A CRC of 32 bits finds every single flipped bit.
-#[test]
-fn damage_is_refused() {
     for frame in [bytes(RECORDED), bytes(TIMED)] {
         for length in 0..frame.len() {
             assert!(feed_new(&frame[..length]).is_empty());

@@ -29,6 +29,10 @@ fn a_rate_that_the_network_corrects_has_less_noise_and_a_bias_adds_in_squares() 
     {
         assert_sigma(uncertainty.sigma(origin, bias), due, "at rest");
     }
+    // It is rounded up and ends with its code.
+    let uncorrected = 1.5 / AngularRate::PER_RAD_PER_SEC;
+    let rounded = Uncertainty::new(UncertaintyConfig { uncorrected, ..UncertaintyConfig::DEFAULT });
+    assert_eq!([0.0, 1e9].map(|bias| rounded.sigma(Origin::Gyro, bias).0), [2, i32::MAX]);
 }
 
 /// Errors that are easy to tell apart.
@@ -239,12 +243,4 @@ fn a_minute_adds_each_error_by_its_rule_and_forgets_older_ones() {
     turn(&mut uncertainty, 6.0, [0.0; 4]);
     // Over a minute later.
     assert_ratio(minute(&uncertainty, 0.0), root(&noise(60.0)), 1e-3);
-}
-
-#[test]
-fn a_sigma_is_rounded_up_and_ends_with_its_code() {
-    let uncorrected = 1.5 / AngularRate::PER_RAD_PER_SEC;
-    let config = UncertaintyConfig { uncorrected, ..UncertaintyConfig::DEFAULT };
-    assert_eq!(Uncertainty::new(config).sigma(Origin::Gyro, 0.0), AngularRate(2));
-    assert_eq!(Uncertainty::new(config).sigma(Origin::Gyro, 1e9), AngularRate(i32::MAX));
 }

@@ -60,11 +60,19 @@ fn a_standstill_that_the_wheels_prove_is_learnt_from() {
 }
 
 #[test]
-fn what_was_learnt_survives_a_restart_and_is_used_where_the_configuration_wants_it() {
+fn what_was_learnt_is_stored_at_a_stop_used_where_the_configuration_wants_it_and_forgotten() {
     let (flash, mut bench) = bench();
     // Without anything stored yet an erase would be needed, which only a session may ask for.
     assert_eq!(bench.board.set_configuration(&Configuration::DEFAULT), Ok(()));
+    // The troubles of this start are stored first.
+    bench.expect(&[0x3E, 0], &[0x7E, 0]);
     stand(&mut bench.board);
+    moves(&mut bench, Faults::NONE);
+    let before = flash.borrow().operations();
+    let record = postcard::to_stdvec(bench.board.learned()).expect("memory");
+    bench.expect(&[0x22, 0x01, 0x15], &[&[0x62, 0x01, 0x15][..], &record].concat());
+    assert_eq!(flash.borrow().operations(), before, "in motion nothing is written");
+    observe(&mut bench.board, 1, (0.01, 20), LEVEL, Standstill::Still);
     bench.expect(&[0x3E, 0], &[0x7E, 0]);
     let mut bench = Bench::new(&flash);
     assert!(is_near(learned(&bench.board, 20.0), 0.01));
@@ -75,24 +83,15 @@ fn what_was_learnt_survives_a_restart_and_is_used_where_the_configuration_wants_
     assert!(is_near(used(Configuration::DEFAULT, &bench.board), 0.01));
     let off = Configuration { learn: false, ..Configuration::DEFAULT };
     assert_eq!(used(off, &bench.board), None);
+    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
+    bench.expect(&[0x31, 1, 0x02, 0x05], &[0x71, 1, 0x02, 0x05]);
+    assert_eq!([&bench.board, &start(&flash)].map(|board| learned(board, 20.0)), [None; 2]);
+    assert_eq!(bench.board.forget_learned(), Ok(()));
     assert_eq!(bench.board.set_configuration(&off), Ok(()));
     let (mut board, before) = (start(&flash), *bench.board.learned());
     observe(&mut board, 4, (0.05, 40), LEVEL, Standstill::Still);
     drive(&mut board, 120, 20.0);
     assert_eq!((*board.learned(), board.forward_deg()), (before, None), "off");
-}
-
-#[test]
-fn a_tester_reads_what_was_learnt_and_has_it_forgotten() {
-    let (flash, mut bench) = bench();
-    stand(&mut bench.board);
-    let record = postcard::to_stdvec(bench.board.learned()).expect("memory");
-    bench.expect(&[0x22, 0x01, 0x15], &[&[0x62, 0x01, 0x15][..], &record].concat());
-    bench.expect(&[0x10, 3], &[0x50, 3, 0, 50, 0x01, 0xF4]);
-    bench.expect(&[0x31, 1, 0x02, 0x05], &[0x71, 1, 0x02, 0x05]);
-    assert_eq!(learned(&bench.board, 20.0), None);
-    assert_eq!(learned(&start(&flash), 20.0), None);
-    assert_eq!(bench.board.forget_learned(), Ok(()));
 }
 
 /// A drive with the sensor's x axis this far to the left of forward, deg: speed and yaw rate change in waves.
@@ -215,22 +214,6 @@ fn bad_readings_and_a_contradicted_standstill_teach_nothing() {
 fn moves(bench: &mut Bench, faults: Faults) {
     let (wheels, moving) = (WheelSample::without_speeds(Standstill::Moving), sample(0, LEVEL, 0.01));
     bench.board.observe(Some(&moving), 0, (Status::Ready, faults), &wheels, &Standing::UNKNOWN);
-}
-
-#[test]
-fn what_was_learnt_waits_for_the_next_stop() {
-    let (flash, mut bench) = bench();
-    assert_eq!(bench.board.set_configuration(&Configuration::DEFAULT), Ok(()));
-    // The troubles of this start are stored first.
-    bench.expect(&[0x3E, 0], &[0x7E, 0]);
-    stand(&mut bench.board);
-    moves(&mut bench, Faults::NONE);
-    let before = flash.borrow().operations();
-    bench.expect(&[0x3E, 0], &[0x7E, 0]);
-    assert_eq!(flash.borrow().operations(), before, "in motion nothing is written");
-    observe(&mut bench.board, 1, (0.01, 20), LEVEL, Standstill::Still);
-    bench.expect(&[0x3E, 0], &[0x7E, 0]);
-    assert!(flash.borrow().operations() > before && is_near(learned(&start(&flash), 20.0), 0.01));
 }
 
 /// Troubles may be appended at any time; where that needs an erase, a workshop waits for the vehicle to stand.
