@@ -104,12 +104,6 @@ mod tests {
     }
 
     #[test]
-    fn a_skipped_test_is_reported() {
-        let report = lacking(&[Need::Qemu, Need::Python], "t", Need::Data, "no folder");
-        assert_eq!(report, "SKIPPED t: no folder\n");
-    }
-
-    #[test]
     #[should_panic(expected = "t: GYRONET_REQUIRE asks for Data, but no folder")]
     fn a_missing_requirement_fails_where_it_must_be_met() {
         lacking(&[Need::Data], "t", Need::Data, "no folder");

@@ -15,8 +15,7 @@ use crate::units::{AngularRate, SpecificForce};
 pub const STATIC_SAMPLES: u32 = 3 * RATE_HZ;
 const SECONDS: usize = (STATIC_SAMPLES / RATE_HZ) as usize;
 
-/// Limits of stillness. By the test `still_stretches` none of 656 stretches of eight real drives with standing wheels
-/// and a running engine is refused, and 3,177 of 3,247 driven ones are.
+/// Limits of stillness.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StaticConfig {
     /// Standard deviation of each gyro axis, rad/s.

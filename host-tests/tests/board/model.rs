@@ -1,12 +1,11 @@
 //! The model of the STM32F405 itself: its own tests, and the image as it is flashed running on it.
 
-use crate::common::{self, IMU, SERVICE, SLCAN};
-use gyronet_host_tests::board::{At, PACKAGES};
+use crate::common;
+use gyronet_host_tests::board::PACKAGES;
 use gyronet_host_tests::recordings::workspace;
-use gyronet_host_tests::{replay, require};
+use gyronet_host_tests::require;
 use gyronet_tools::target::stack::priorities;
 use std::process::Command;
-use std::time::Duration;
 
 #[test]
 fn model_passes_its_own_tests() {
@@ -33,24 +32,4 @@ fn priorities_are_those_that_the_stack_bound_rests_on() {
         // The STM32F4 has the upper four bits of each byte; RTIC's 1 is the least urgent, 15.
         assert_eq!(16 - (set[number] >> 4), i64::from(priority), "exception {number}");
     }
-}
-
-#[test]
-fn board_does_the_same_again_after_a_snapshot_is_restored() {
-    let Some(mut board) = common::started() else { return };
-    board.snapshot("started");
-    let mut runs = Vec::new();
-    for _ in 0..2 {
-        board.restore("started");
-        board.send(IMU, &replay::turning(0, 0.1));
-        board.send(SERVICE, &[0]);
-        board.run(Duration::from_millis(50));
-        runs.push((
-            board.counts(),
-            board.sent(SLCAN),
-            board.register("pc"),
-            board.read(At::Address(0x2000_0000), 1 << 17),
-        ));
-    }
-    assert_eq!(runs[0], runs[1]);
 }

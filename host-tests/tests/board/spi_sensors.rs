@@ -161,30 +161,17 @@ fn on_the_grid(board: &mut Board, late: i64, seconds: usize) -> Vec<usize> {
     per_second
 }
 
-/// A part in order for so many seconds: each sample is a message set, on the grid, and nothing is counted that should
-/// not be.
-fn in_order(fitted: &Fitted, seconds: usize) {
+/// Each sample of a part in order is a message set, on the grid, and nothing is counted that should not be.
+fn samples_come_at_their_rate_and_on_the_grid(fitted: &Fitted) {
     let Some(mut board) = equipped(fitted, Configuration::DEFAULT) else { return };
     start(&mut board, fitted);
     assert_eq!(service::info(&mut board).sensor, None);
-    let per_second = on_the_grid(&mut board, fitted.late, seconds);
+    let per_second = on_the_grid(&mut board, fitted.late, 4);
     assert!(per_second.iter().all(|samples| (99..=101).contains(samples)), "{per_second:?}");
     let AllCounters { pipeline, watch, inputs, .. } = common::counters(&mut board);
-    println!("{} samples in {seconds} s", per_second.iter().sum::<usize>());
     assert_eq!([pipeline.missing, pipeline.misplaced, pipeline.clock_jumps, inputs.imu_errors], [0; 4]);
     assert_eq!([watch.silences, watch.stuck, watch.clock_off], [0; 3]);
     assert_driven_well(&mut board);
-}
-
-fn samples_come_at_their_rate_and_on_the_grid(fitted: &Fitted) {
-    in_order(fitted, 4);
-}
-
-/// `cargo test -p gyronet-host-tests --test board spi_sensors -- --ignored --nocapture`
-#[test]
-#[ignore = "a minute of board time takes up to three of processor time"]
-fn samples_come_for_a_minute() {
-    [&ICM42688, &BMI088, &ASM330LHH].into_iter().for_each(|fitted| in_order(fitted, 60));
 }
 
 fn vibration_above_the_bandwidth_does_not_become_a_turn(fitted: &Fitted) {

@@ -3,8 +3,6 @@
 use gyronet_host_tests::situations::judge::{EXACT, Outcome, judge};
 use gyronet_host_tests::situations::receiver::{INERTIAL, Receiver, Set, Slow};
 use gyronet_host_tests::situations::ride::{Ride, Travelled};
-use gyronet_host_tests::situations::scene::Scene;
-use gyronet_host_tests::situations::sensor::Sensor;
 use gyronet_host_tests::situations::vehicle::{CAR, Vehicle};
 use gyronet_tools::random::Random;
 
@@ -42,32 +40,6 @@ fn the_truth_is_what_the_ride_says_and_what_a_perfect_gyro_sums_up() {
     assert!((travelled.mean(1.0, 2.0)[5] - 9.80665).abs() < 1e-6);
     let left = travelled.mean(12.4, 12.6)[4];
     assert!((left - 10.0 * travelled.rate(12.5)).abs() < 0.4, "{left}");
-}
-
-#[test]
-fn a_sensors_bytes_hold_its_readings() {
-    let (_, travelled) = ride();
-    let sensor = Sensor::new(&PERFECT, &mut Random::new(1, 1));
-    let messages = sensor.messages(&travelled, &mut Random::new(1, 3));
-    assert_eq!(messages.len(), 3_000);
-    // The manual's preamble, bus identifier, MTData2 and length; all bytes after the preamble sum to zero.
-    let bytes = &messages[1_249].bytes;
-    assert_eq!(bytes[..4], [0xFA, 0xFF, 0x36, 56]);
-    assert_eq!(bytes[1..].iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte)), 0);
-    let rate = f32::from_be_bytes(bytes[49..53].try_into().expect("four bytes"));
-    assert!((f64::from(rate) - travelled.rate(12.495)).abs() < 2e-3, "{rate}");
-}
-
-#[test]
-fn the_same_seed_gives_the_same_outcome_and_another_seed_another_one() {
-    let run = |seed| {
-        let mut scene = Scene::new(&CAR, seed);
-        scene.start(1);
-        scene.run()
-    };
-    let [one, again, other] = [run(1), run(1), run(2)];
-    assert_eq!((one.good, one.second.ratio), (again.good, again.second.ratio));
-    assert_ne!(one.second.ratio, other.second.ratio);
 }
 
 /// The letters of the promises that are broken by right messages after a change.

@@ -1,48 +1,18 @@
-//! Real drives that training has not seen: the README's ratios to static initialisation, drive by drive, and what
-//! quantisation costs in yaw, the integer network against the f32 one.
+//! Real drives that training has not seen: the README's ratios to static initialisation, drive by drive.
 
 use gyronet::model::{Blob, GyroNet, weights};
-use gyronet_host_tests::{models, parallel, recordings};
+use gyronet_host_tests::{parallel, recordings};
 use gyronet_tools::board::Board;
 use gyronet_tools::calibrate::{Cut, calibrate, config};
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::methods::{Method, PerMethod};
 use gyronet_tools::evaluate::rates::Networks;
 use gyronet_tools::evaluate::report::{DriveErrors, Report, Row};
-use std::path::Path;
-use std::sync::OnceLock;
 
 const TRIALS: [u32; 2] = [9, 11];
-/// Largest departure of the integer network's 1 s yaw error from the f32 network's.
-const YAW_ERROR: f64 = 0.03;
 
 /// A change for the worse by more than this share of the README's number fails; one for the better is worth a new number.
 const WORSE: f64 = 0.05;
-
-struct Trial {
-    number: u32,
-    drive: DriveErrors,
-}
-
-impl Trial {
-    fn new(number: u32, path: &Path) -> Self {
-        let checkpoint = gyronet_tools::bundled::checkpoint().expect("the committed checkpoint");
-        let recorded = Drive::open(path).expect("a recording");
-        let (mut float, mut integer) = (checkpoint.network(), models::gyronet());
-        let mut default = GyroNet::shipped().expect("it comes with the library");
-        let paper = Some([&mut float as _, &mut integer as _]);
-        let networks = Networks { default: &mut default, sent: None, paper };
-        let drive = DriveErrors::of(&recorded, networks, |_| {}).expect("it stands first, with a reference");
-        Self { number, drive }
-    }
-}
-
-/// Run once for both tests; `None` without the recordings.
-fn trials() -> Option<&'static [Trial]> {
-    static RUN: OnceLock<Vec<Trial>> = OnceLock::new();
-    let drives: Vec<_> = TRIALS.into_iter().zip(recordings::trials(&TRIALS)?).collect();
-    Some(RUN.get_or_init(|| parallel::map(&drives, |(trial, path)| Trial::new(*trial, path))))
-}
 
 /// The rows of the page of measurements: how each begins, and its method. Its second number is the ratio of both drives to
 /// static initialisation, behind which stand those of each drive.
@@ -83,17 +53,18 @@ pub fn by_default(drive: &Drive) -> DriveErrors {
 
 #[test]
 fn rates_are_as_good_as_the_pages_say() {
-    let Some(trials) = trials() else { return };
-    let report = Report::new(trials.iter().map(|trial| trial.drive.clone()).collect());
+    let Some(paths) = recordings::trials(&TRIALS) else { return };
+    let drives = parallel::map(&paths, |path| by_default(&Drive::open(path).expect("a recording")));
+    let report = Report::new(drives.clone());
     let rows = &report.sets[0].methods;
     let error = |rows: &PerMethod<Row>, method| rows[method].error.mean_1s_rad.expect("whole seconds");
     let to_static = |rows: &PerMethod<Row>, method| error(rows, method) / error(rows, Method::STATIC);
     for (row, method) in ROWS {
         let readme = numbers("tools/MEASUREMENTS.md", row);
         hold(row, to_static(rows, method), readme[1]);
-        for (trial, readme) in trials.iter().zip(&readme[2..]) {
-            let what = format!("trial {:02}, {method:?} to static", trial.number);
-            hold(&what, to_static(&trial.drive.methods, method), *readme);
+        for ((trial, drive), readme) in TRIALS.iter().zip(&drives).zip(&readme[2..]) {
+            let what = format!("trial {trial:02}, {method:?} to static");
+            hold(&what, to_static(&drive.methods, method), *readme);
         }
     }
     let ours = report.sets[0].over_best_classical.expect("two drives").default;
@@ -132,16 +103,5 @@ fn a_calibrated_unit_is_as_good_as_the_page_says() {
         for (drive, page) in errors.iter().zip(&page[2..]) {
             hold(row, drive[1][at] / drive[0][0], *page);
         }
-    }
-}
-
-#[test]
-fn the_integer_network_is_as_good_as_f32_on_real_drives() {
-    let Some(trials) = trials() else { return };
-    for Trial { number, drive } in trials {
-        let error = |method| drive.methods[method].error.mean_1s_rad.expect("whole seconds");
-        let ratio = error(Method::GYRONET_INT) / error(Method::GYRONET_F32);
-        println!("trial {number:02}: 1 s error {ratio:.4} times that of f32");
-        assert!((ratio - 1.0).abs() <= YAW_ERROR, "trial {number:02}: 1 s yaw errors differ");
     }
 }

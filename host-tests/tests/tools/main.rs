@@ -17,7 +17,6 @@ mod python_wheels;
 mod standstill;
 mod standstill_detectors;
 mod standstill_truth;
-mod still_stretches;
 mod tables_methods;
 mod tilt;
 mod turns;
