@@ -198,6 +198,7 @@ fn false_courses_teach_nothing_and_are_counted() {
         let (pipeline, ..) = drive(300, &Drive { course, ..known });
         let moved = (pipeline.bias().rad_per_sec() - without.bias().rad_per_sec()).to_degrees() * 60.0;
         println!("{name}: bias moved by {moved:+.3} deg/min, {:?}", pipeline.course_counters());
+        assert_eq!(pipeline.status(None).gain, Knowledge::Refused, "{name}");
         assert!(pipeline.course_counters().refused > 20, "{name}: {:?}", pipeline.course_counters());
         assert!(moved.abs() < 0.01 && pipeline.gain().0 == 0.0, "{name}: bias moved by {moved} deg/min");
     }
