@@ -184,6 +184,31 @@ fn the_gain_is_learnt_where_the_vehicle_turns_both_ways() {
 }
 
 #[test]
+fn a_gain_replaces_one_that_is_less_accurate_or_that_it_contradicts() {
+    let gain = |share, sigma, of| Gain { share, sigma, of };
+    let stored = gain(0.01, 1.9e-3, 7);
+    for (new, replaces) in [
+        (gain(0.01, 1.4e-3, 7), false),
+        (gain(0.01, 1.3e-3, 7), true),
+        (gain(0.0115, 1.9e-3, 7), false),
+        (gain(0.0125, 1.9e-3, 7), true),
+        (gain(0.01, 1.9e-3, 8), true),
+        (gain(0.01, 2.1e-3, 8), false),
+    ] {
+        assert_eq!(new.replaces(Some(&stored)), replaces, "{new:?}");
+    }
+    for (share, sigma, is_plausible) in [
+        (0.05, 2e-3, true),
+        (-0.05, 1e-4, true),
+        (0.051, 1e-3, false),
+        (0.01, 0.0, false),
+        (0.01, 2.1e-3, false),
+    ] {
+        assert_eq!(gain(share, sigma, 0).is_plausible(), is_plausible, "{share}, {sigma}");
+    }
+}
+
+#[test]
 fn false_courses_teach_nothing_and_are_counted() {
     let bad: [(&str, &Course<'_>); 5] = [
         ("stands", &|_, _| Some(1.0)),

@@ -5,7 +5,7 @@ use gyronet::bias::Latitude;
 use gyronet::can::DataFrame;
 use gyronet::coprocessor::{Config, Coprocessor, InputError};
 use gyronet::estimate::YawEstimate;
-use gyronet::fog::{FogConfig, FogErrors, FogPipeline};
+use gyronet::fog::{FogConfig, FogErrors, FogPipeline, RestReading};
 use gyronet::heading::latitude::CONFIRM;
 use gyronet::heading::{HeadingError, HeadingReceiver, HeadingSettings, Received};
 use gyronet::health::{Faults, Quality, Source};
@@ -120,23 +120,105 @@ fn a_turn_on_standing_wheels_is_reported_and_not_learnt() {
     assert!((mean_deg_per_hour(&sent) - 100.0).abs() < 1.0, "{}", mean_deg_per_hour(&sent));
 }
 
-/// The accumulated yaw is off at once, so the expected errors of its seconds must add up as fast.
-#[test]
-fn a_turn_on_standing_wheels_is_part_of_sigma_before_a_second_is_over() {
-    let mut gyro = Gyro::new(4, 60.0, 0.0);
-    let mut fog = at_latitude(Some(60.0));
-    gyro.run(&mut fog, 60);
-    gyro.rate += 0.01;
-    let mut summed = 0.0;
-    for (step, sent) in gyro.run(&mut fog, 1).iter().enumerate().map(|(step, sent)| (step as f64, sent)) {
-        summed += 0.01 * sent.sigma.expect("a rate").rad_per_sec();
-        assert!(step < 25.0 || 1e-4 * step < 4.0 * summed, "{step}: {summed}");
+/// The reading at rest of a part whose bias may be large, alone.
+struct Rest {
+    reading: RestReading,
+    gyro: Gyro,
+}
+
+impl Rest {
+    const ERRORS: FogErrors = FogErrors { bias: 1e-2, bias_walk: 1e-6, ..FogErrors::DSP1760 };
+
+    fn new(earth: Option<f32>, rate: f64) -> Self {
+        let reading = RestReading::new(Self::ERRORS, earth);
+        Self { reading, gyro: Gyro { rate, ..Gyro::new(9, 0.0, 0.0) } }
+    }
+
+    /// Steps of the gyro, whose noise is so many times the part's, with a rate by the seconds since the first one.
+    fn go(&mut self, steps: u32, unit: f64, rate: impl Fn(f64) -> f64) {
+        let usual = self.gyro.rate;
+        for step in 0..steps {
+            self.gyro.rate = (usual + rate(0.01 * f64::from(step))) / unit;
+            let [.., turn] = self.gyro.sample().increment;
+            let turn = turn.map(|Angle(code)| Angle((code as f64 * unit) as i64));
+            self.reading.observe(turn, self.gyro.standstill);
+        }
+        self.gyro.rate = usual;
+    }
+
+    fn sigma(&self) -> f64 {
+        self.reading.sigma(0.0, 0.0).into()
     }
 }
 
-/// Reads J1939's position.
-fn receiver() -> HeadingReceiver {
-    HeadingReceiver::new(HeadingSettings { j1939: true, ..HeadingSettings::NONE }, None)
+/// By the Earth's rate after one mean, or by the noise, in units of the part's, after three.
+#[test]
+fn a_reading_shows_unit_and_sign() {
+    let earth = 5.4e-5;
+    let cases = [
+        (Some(earth), 1.0, 1.0, 3..60, true),
+        (Some(earth), -1.0, 1.0, 3..4, false),
+        (None, 1.0, 1.0, 3..4, false),
+        (None, 1.0, 1.0, 4..60, true),
+        (None, 0.0, 8.0, 10..60, true),
+        (None, 0.0, 57.3, 12..60, false),
+    ];
+    for (known, share, unit, seconds, shows) in cases {
+        let mut rest = Rest::new(known, share * f64::from(earth));
+        for second in 1..seconds.end {
+            rest.go(100, unit, |_| 0.0);
+            let is_due = seconds.contains(&second);
+            assert!(!is_due || rest.reading.shows_unit() == shows, "{known:?}, {share}, {unit}: {second} s");
+        }
+    }
+    // A deck that turns to and fro is no noise.
+    let mut rest = Rest::new(None, 0.0);
+    rest.go(1_000, 1.0, |_| 0.0);
+    rest.go(3_000, 1.0, |second| if second % 2.0 < 1.0 { 1e-3 } else { -1e-3 });
+    assert!(rest.reading.shows_unit());
+}
+
+#[test]
+fn the_expected_error_at_rest_is_the_parts_until_it_turns_or_drives() {
+    let (mut rest, part) = (Rest::new(None, 5e-3), f64::from(Rest::ERRORS.angle_walk));
+    rest.go(1_000, 1.0, |_| 0.0);
+    for step in 0..5_000 {
+        rest.go(1, 1.0, |_| 0.0);
+        assert!((part..1.3 * part).contains(&rest.sigma()), "{step}: {}", rest.sigma() / part);
+    }
+    for (rate, shake, due) in [(0.5, 0.0, 1e-4), (0.0, 2e-4, 2e-4), (0.5, 2e-4, 2.236e-4)] {
+        let found = rest.reading.sigma(rate, shake);
+        assert!((found / due - 1.0).abs() < 0.01, "{rate}, {shake}: {found}");
+    }
+    // At first less what an engine may turn it to and fro; then the angle of a second and a quarter.
+    for (steps, share) in [(10, 0.215), (30, 0.7), (210, 1.25)] {
+        rest.go(steps, 1.0, |_| 0.01);
+        assert!((rest.sigma() / (0.01 * share) - 1.0).abs() < 0.03, "{steps}: {}", rest.sigma());
+    }
+    assert!(rest.reading.is_contradicted());
+    rest.gyro.standstill = Standstill::Moving;
+    rest.go(1, 1.0, |_| 0.0);
+    assert!(!rest.reading.is_contradicted());
+    // A bias walks while it drives.
+    let mut rest = Rest::new(None, 5e-3);
+    rest.go(6_000, 1.0, |_| 0.0);
+    rest.gyro.standstill = Standstill::Moving;
+    rest.go(100_000, 1.0, |_| 0.0);
+    assert!((rest.sigma() / 3.2e-5 - 1.0).abs() < 0.05, "{}", rest.sigma());
+}
+
+/// An engine turns it to and fro by 2e-4 rad.
+#[test]
+fn the_first_reading_is_free_of_vibration() {
+    let mut rest = Rest::new(None, 5e-3);
+    rest.go(300, 1.0, |second| 0.02 * (std::f64::consts::TAU * 13.7 * second).sin());
+    let found = rest.reading.reading();
+    assert!((found - 5e-3).abs() < 3e-5, "{found}");
+}
+
+/// Reads J1939's position, with a latitude that is known before.
+fn known(latitude: Option<f32>) -> HeadingReceiver {
+    HeadingReceiver::new(HeadingSettings { j1939: true, ..HeadingSettings::NONE }, latitude)
 }
 
 /// J1939's vehicle position: 1e-7 deg from -210.
@@ -147,7 +229,7 @@ fn position(degrees: f64) -> DataFrame {
 
 #[test]
 fn a_latitude_over_can_is_used_when_it_is_confirmed() {
-    let mut receiver = receiver();
+    let mut receiver = known(None);
     let mut now = 0;
     let mut take = |receiver: &mut HeadingReceiver, degrees: f64| {
         now += 100_000;
@@ -181,9 +263,21 @@ fn a_latitude_over_can_is_used_when_it_is_confirmed() {
     assert_eq!(receiver.decode(&short, Micros(now)), Some(Err(HeadingError::Short(3))));
 }
 
+/// 0.02 deg, and 400 km/h since the last one, up to a degree.
+#[test]
+fn a_latitude_that_a_vehicle_can_have_reached_is_used() {
+    for (seconds, by, is_reached) in
+        [(0, 0.021, false), (60, 0.079, true), (60, 0.081, false), (3_600, 1.021, false)]
+    {
+        let mut receiver = known(Some(48.0));
+        let read = receiver.decode(&position(48.0 + by), Micros(seconds * 1_000_000)).expect("its frame");
+        assert_eq!(read.is_ok_and(|read| read.latitude.is_ok()), is_reached, "{by} deg in {seconds} s");
+    }
+}
+
 #[test]
 fn the_coprocessor_takes_the_latitude_from_the_bus() {
-    let mut coprocessor = Coprocessor::new(Config { heading: Some(receiver()), ..Config::DEFAULT });
+    let mut coprocessor = Coprocessor::new(Config { heading: Some(known(None)), ..Config::DEFAULT });
     let mut gyro = Gyro::new(7, -34.0, 0.0);
     let (mut rates, mut sources) = (Sent::default(), Vec::new());
     for step in 0..400 {

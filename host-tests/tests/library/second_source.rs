@@ -75,13 +75,18 @@ impl Board {
 
     /// The doubts that the next status message says: inertial gyro 1, fibre-optic gyro 2, wheels 4. The rates say the same.
     fn doubts(&self) -> u8 {
+        self.status()[4] >> 5
+    }
+
+    fn status(&self) -> [u8; 8] {
         let Self { coprocessor, noise, tick, .. } = self;
         let (coprocessor, noise) = (coprocessor.clone(), noise.clone());
         let mut next = Self { coprocessor, noise, tick: *tick, sent: Sent::default() };
         next.step(STRAIGHT);
         let mut frames = next.sent.frames.iter().map(|sent| sent.frame);
         let status = frames.find(|frame| frame.id() == id11(STATUS_ID)).expect("one a second");
-        let doubts = status.data()[4] >> 5;
+        let status: [u8; 8] = status.data().try_into().expect("eight bytes");
+        let doubts = status[4] >> 5;
         let faults = next.sent.seen.last().expect("a step").vehicle.live.faults;
         assert_eq!(faults.contains(Faults::IMPLAUSIBLE), doubts & 1 > 0, "{faults:?}");
         assert_eq!(faults.contains(Faults::WHEELS), doubts & 4 > 0, "{faults:?}");
@@ -89,7 +94,7 @@ impl Board {
         assert!(
             fog.is_none_or(|fog| fog.faults.contains(Faults::IMPLAUSIBLE) && fog.quality != Quality::Good)
         );
-        doubts
+        status
     }
 }
 
@@ -175,6 +180,15 @@ fn a_contradiction_leaves_its_numbers() {
     for (code, shown) in [(inertial, 1_146), (lateral, 200), (Some(speed), 1_000), (Some(difference), 30)] {
         assert!(code.is_some_and(|code| (code - shown).abs() <= 6), "{code:?}, {shown} was shown");
     }
+}
+
+#[test]
+fn a_gap_in_either_yaw_is_counted() {
+    let mut board = Board::stands(true);
+    assert_eq!(board.status()[5], 0);
+    (0..5).for_each(|_| board.step(([Some(0.0), None], 0.0, [0.0; 2])));
+    (0..95).for_each(|_| board.step(([Some(0.0); 2], 0.0, [0.0; 2])));
+    assert_eq!(board.status()[5], 1);
 }
 
 #[test]
