@@ -9,7 +9,7 @@ use gyronet_host_tests::board::{Board, Seen};
 use gyronet_host_tests::stored::other_weights;
 use gyronet_host_tests::tester::{Tester, frame, segment};
 use gyronet_host_tests::wire::{bytes, data_frame};
-use gyronet_tools::reference::identifiers::{Access, IDENTIFIERS};
+use gyronet_tools::reference::identifiers;
 use std::time::Duration;
 
 /// P2 and P2* of the standard, as the board's answer to 10 03 has them.
@@ -113,8 +113,8 @@ fn no_response_is_later_than_p2_without_a_wait() {
     let Some(mut board) = common::started() else { return };
     stand(&mut board, 3_500);
     board.run(Duration::from_secs(5));
-    let reads = IDENTIFIERS.iter().filter(|identifier| identifier.access != Access::Write);
-    let reads = reads.map(|identifier| [&[0x22][..], &identifier.id.to_be_bytes()].concat());
+    let reads = identifiers().rows.into_iter().filter(|row| row[4].starts_with("0x22"));
+    let reads = reads.map(|row| bytes(&format!("22{}", row[0])));
     let others = "1003 3E00 1901FF 1902FF 190A 14FFFFFF 8502 8501 280301 280001 31010204 2701";
     let others = others.split(' ').map(bytes);
     let stores = service::storing(&Configuration { latitude_deg: Some(48.0), ..Configuration::DEFAULT });

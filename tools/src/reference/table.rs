@@ -5,23 +5,24 @@ use std::fmt;
 
 /// Rows of text under column names; displayed as Markdown.
 pub struct Table {
-    columns: &'static [&'static str],
-    rows: Vec<Vec<String>>,
+    columns: Vec<String>,
+    pub rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    pub(super) const fn new(columns: &'static [&'static str]) -> Self {
-        Self { columns, rows: Vec::new() }
-    }
-
-    pub(super) fn row<const N: usize>(&mut self, cells: [&str; N]) {
-        self.rows.push(cells.map(str::to_owned).into());
+    /// Reads the names of the columns in the first line, and a row in each other one, which may lack its last cells.
+    pub(super) fn parse(text: &str) -> Self {
+        let mut lines = text.lines().map(|line| line.split('|').map(|cell| cell.trim().to_owned()).collect());
+        let columns: Vec<String> = lines.next().unwrap_or_default();
+        let mut rows: Vec<Vec<String>> = lines.collect();
+        rows.iter_mut().for_each(|row| row.resize(columns.len(), String::new()));
+        Self { columns, rows }
     }
 
     pub fn json(&self) -> Value {
         let object = |row: &Vec<String>| {
-            let cells = self.columns.iter().zip(row);
-            cells.map(|(column, cell)| ((*column).to_owned(), cell.clone().into())).collect::<Map<_, _>>()
+            let cells = self.columns.iter().cloned().zip(row.iter().map(|cell| cell.clone().into()));
+            cells.collect::<Map<_, _>>()
         };
         self.rows.iter().map(object).map(Value::Object).collect()
     }
