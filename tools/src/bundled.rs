@@ -2,7 +2,7 @@
 
 use crate::drive::error::DataError;
 use crate::drive::recording::Recording;
-use crate::network::checkpoint::{Checkpoint, CheckpointError, GyroNet};
+use crate::network::checkpoint::{Checkpoint, GyroNet};
 use crate::simulate::{Config, csv, gnss};
 
 /// The drive that `gyronet simulate --seconds 90 --seed 1` writes.
@@ -27,7 +27,7 @@ pub fn demo_drive(with_gnss: bool) -> Result<Recording, DataError> {
     Recording::parse("simulated_drive.csv", &bytes[..])
 }
 
-pub fn checkpoint() -> Result<Checkpoint<GyroNet>, CheckpointError> {
+pub fn checkpoint() -> Result<Checkpoint<GyroNet>, DataError> {
     Checkpoint::parse("gyronet.safetensors", CHECKPOINT)
 }
 

@@ -24,7 +24,7 @@ pub mod size;
 mod weights;
 pub mod wheels;
 
-use gyronet_tools::drive::error::DataError;
+use gyronet_tools::drive::error::{DataError, named};
 use gyronet_tools::drive::stream::Drive;
 use std::error::Error;
 
@@ -61,18 +61,4 @@ pub struct Common {
     /// Print results as JSON on standard output.
     #[arg(long, global = true)]
     pub json: bool,
-}
-
-#[derive(Debug, thiserror::Error)]
-#[error("{path}: {source}")]
-struct WriteError {
-    path: String,
-    source: std::io::Error,
-}
-
-impl WriteError {
-    fn to(path: &std::path::Path) -> impl Fn(std::io::Error) -> Self {
-        let path = path.display().to_string();
-        move |source| Self { path: path.clone(), source }
-    }
 }

@@ -2,10 +2,11 @@
 //!
 //! The private key stays in its file on this computer; the board stores the public key.
 
+use crate::drive::error::{DataError, named, read_text};
 use ed25519_dalek::{Signer, SigningKey};
 use gyronet::uds::signature::{self, SEED, SERIAL, SIGNATURE, Statement, TRAILER};
 use std::fmt::Write as _;
-use std::fs::{self, OpenOptions};
+use std::fs::OpenOptions;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -13,36 +14,23 @@ use std::path::{Path, PathBuf};
 const PRIVATE: &str = "gyronet private key 1";
 const PUBLIC: &str = "gyronet public key 1";
 
-/// The reason why a key cannot be generated, read or written.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum KeyError {
-    #[error("{}: {source}", path.display())]
-    File { path: PathBuf, source: std::io::Error },
-    #[error("{}: it exists, and a key is never overwritten: give another name", path.display())]
-    Exists { path: PathBuf },
-    #[error("{}: not a {what}", path.display())]
-    Content { path: PathBuf, what: &'static str },
-    #[error("the system gives no random numbers: {0}")]
-    Random(getrandom::Error),
-}
-
 #[derive(Clone)]
 pub struct PrivateKey(SigningKey);
 
 impl PrivateKey {
-    pub fn generate() -> Result<Self, KeyError> {
+    pub fn generate() -> Result<Self, DataError> {
         let mut secret = [0; 32];
-        getrandom::fill(&mut secret).map_err(KeyError::Random)?;
+        getrandom::fill(&mut secret)
+            .map_err(|error| DataError::because("the system's random numbers", error))?;
         Ok(Self(SigningKey::from_bytes(&secret)))
     }
 
-    pub fn read(path: &Path) -> Result<Self, KeyError> {
+    pub fn read(path: &Path) -> Result<Self, DataError> {
         Ok(Self(SigningKey::from_bytes(&read(path, PRIVATE)?)))
     }
 
     /// Writes `NAME.key`, which only its owner can read, and `NAME.pub`. Neither file may exist.
-    pub fn write(&self, name: &Path) -> Result<[PathBuf; 2], KeyError> {
+    pub fn write(&self, name: &Path) -> Result<[PathBuf; 2], DataError> {
         let paths = ["key", "pub"].map(|end| {
             let mut path = name.as_os_str().to_owned();
             path.push(".");
@@ -51,7 +39,8 @@ impl PrivateKey {
         });
         let [private, public] = &paths;
         if let Some(path) = paths.iter().find(|path| path.exists()) {
-            return Err(KeyError::Exists { path: path.clone() });
+            let reason = "it exists, and a key is never overwritten: give another name";
+            return Err(DataError::because(path.display(), reason));
         }
         create(private, PRIVATE, &self.0.to_bytes())?;
         create(public, PUBLIC, &self.public())?;
@@ -84,7 +73,7 @@ impl PrivateKey {
     }
 }
 
-pub fn read_public(path: &Path) -> Result<[u8; 32], KeyError> {
+pub fn read_public(path: &Path) -> Result<[u8; 32], DataError> {
     read(path, PUBLIC)
 }
 
@@ -104,13 +93,12 @@ pub fn unhex<const N: usize>(text: &str) -> Option<[u8; N]> {
     if text.trim().len() == 2 * N { bytes.try_into().ok() } else { None }
 }
 
-fn read(path: &Path, what: &'static str) -> Result<[u8; 32], KeyError> {
-    let text = fs::read_to_string(path).map_err(|source| KeyError::File { path: path.into(), source })?;
-    let key = text.strip_prefix(what).and_then(unhex);
-    key.ok_or_else(|| KeyError::Content { path: path.into(), what })
+fn read(path: &Path, what: &'static str) -> Result<[u8; 32], DataError> {
+    let key = read_text(path)?.strip_prefix(what).and_then(unhex);
+    key.ok_or_else(|| DataError::because(path.display(), format!("not a {what}")))
 }
 
-fn create(path: &Path, what: &str, key: &[u8; 32]) -> Result<(), KeyError> {
+fn create(path: &Path, what: &str, key: &[u8; 32]) -> Result<(), DataError> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
     #[cfg(unix)]
@@ -118,7 +106,7 @@ fn create(path: &Path, what: &str, key: &[u8; 32]) -> Result<(), KeyError> {
         std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
     }
     let written = options.open(path).and_then(|mut file| writeln!(file, "{what}\n{}", hex(key)));
-    written.map_err(|source| KeyError::File { path: path.into(), source })
+    written.map_err(named(path))
 }
 
 #[cfg(test)]
@@ -133,12 +121,13 @@ mod tests {
         let [private, public] = key.write(&name).expect("it is new");
         assert_eq!(PrivateKey::read(&private).expect("as written").public(), key.public());
         assert_eq!(read_public(&public).expect("as written"), key.public());
-        assert!(matches!(key.write(&name), Err(KeyError::Exists { .. })), "none is overwritten");
-        assert!(matches!(PrivateKey::read(&public), Err(KeyError::Content { .. })));
+        assert!(key.write(&name).unwrap_err().to_string().contains("it exists"), "none is overwritten");
+        let Err(error) = PrivateKey::read(&public) else { panic!("a public key is no private one") };
+        assert!(error.to_string().ends_with("fleet.pub: not a gyronet private key 1"), "{error}");
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
-            let mode = fs::metadata(&private).expect("it is there").permissions().mode();
+            let mode = std::fs::metadata(&private).expect("it is there").permissions().mode();
             assert_eq!(mode & 0o777, 0o600);
         }
         assert_ne!(PrivateKey::generate().expect("random numbers").public(), key.public());

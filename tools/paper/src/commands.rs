@@ -5,6 +5,7 @@ pub mod quantize;
 pub mod simulate;
 pub mod tables;
 
+use gyronet_tools::drive::error::named;
 use std::error::Error;
 use std::fs;
 use std::io::Write;
@@ -21,10 +22,6 @@ fn print_json(value: &impl serde::Serialize) -> Result {
 
 fn remark(line: std::fmt::Arguments<'_>) -> std::io::Result<()> {
     writeln!(std::io::stderr(), "{line}")
-}
-
-fn named(path: &Path) -> impl Fn(std::io::Error) -> String {
-    move |error| format!("{}: {error}", path.display())
 }
 
 fn write(path: &Path, content: impl AsRef<[u8]>) -> Result {

@@ -1,6 +1,7 @@
 //! The calibration file of a unit holds the map for the board and the uncertainty of the map.
 
 use super::{Cut, Share, fit::Fit};
+use crate::drive::error::{DataError, read_text};
 use gyronet::mounting::GyroMap;
 use gyronet::store::UnitMap;
 use serde::{Deserialize, Serialize};
@@ -26,25 +27,6 @@ pub struct DriveFit {
     pub yaw_rate_bias_rad_per_s: f64,
     /// The robust standard deviation of the spans' angles from the fit, rad; `None` by a course.
     pub deviation_rad: Option<f64>,
-}
-
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum UnitFileError {
-    #[error("{path}: {source}")]
-    Read { path: String, source: std::io::Error },
-    #[error("{path}: not a calibration file, as `gyronet calibrate --out` writes it: {source}")]
-    Json { path: String, source: serde_json::Error },
-    #[error("{path}: gyro_map: an element is too far from the identity")]
-    Implausible { path: String },
-    #[error("{path}: computed with the weights {found:08x}, but {runs:08x} are in use")]
-    OtherWeights {
-        path: String,
-        /// The checksum of the weights that the calibration was computed with.
-        found: u32,
-        /// The checksum of the weights in use.
-        runs: u32,
-    },
 }
 
 #[derive(Serialize, Deserialize)]
@@ -74,25 +56,21 @@ impl UnitFile {
     }
 }
 
-pub fn read(path: &Path) -> Result<UnitMap, UnitFileError> {
-    let name = || path.display().to_string();
-    let text =
-        std::fs::read_to_string(path).map_err(|source| UnitFileError::Read { path: name(), source })?;
-    let content: Content =
-        serde_json::from_str(&text).map_err(|source| UnitFileError::Json { path: name(), source })?;
+pub fn read(path: &Path) -> Result<UnitMap, DataError> {
+    let refused = |reason: String| DataError::because(path.display(), reason);
+    let content: Content = serde_json::from_str(&read_text(path)?).map_err(|error| {
+        refused(format!("not a calibration file, as `gyronet calibrate --out` writes it: {error}"))
+    })?;
     let gyro_map = GyroMap::from_elements(content.gyro_map)
-        .ok_or_else(|| UnitFileError::Implausible { path: name() })?;
+        .ok_or_else(|| refused("gyro_map: an element is too far from the identity".into()))?;
     Ok(UnitMap { gyro_map, weights: content.weights })
 }
 
 /// Reads the map of a file, which must have been computed with weights of the checksum `runs`.
-pub fn read_for(path: &Path, runs: u32) -> Result<GyroMap, UnitFileError> {
+pub fn read_for(path: &Path, runs: u32) -> Result<GyroMap, DataError> {
     let UnitMap { gyro_map, weights: found } = read(path)?;
-    if found == runs {
-        Ok(gyro_map)
-    } else {
-        Err(UnitFileError::OtherWeights { path: path.display().to_string(), found, runs })
-    }
+    let reason = || format!("computed with the weights {found:08x}, but {runs:08x} are in use");
+    (found == runs).then_some(gyro_map).ok_or_else(|| DataError::because(path.display(), reason()))
 }
 
 pub(super) fn drives(drives: &[Cut], fit: &Fit) -> Vec<DriveFit> {

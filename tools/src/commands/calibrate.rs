@@ -1,7 +1,7 @@
 //! `gyronet calibrate` fits gain and mounting of a unit's gyro to drives with a reference yaw rate or course.
 
 use super::weights::Sent;
-use super::{Common, WriteError, print_json, progress, remarked};
+use super::{Common, named, print_json, progress, remarked};
 use gyronet::model::{Blob, GyroNet};
 use gyronet_tools::board::Board;
 use gyronet_tools::calibrate::{Cut, Share, calibrate, config};
@@ -46,7 +46,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let found = unit.shares.iter().any(|share| share.refused.is_none());
     if let Some(path) = args.out.as_ref().filter(|_| found) {
         let text = serde_json::to_string_pretty(&unit.json())? + "\n";
-        std::fs::write(path, text).map_err(WriteError::to(path))?;
+        std::fs::write(path, text).map_err(named(path))?;
     }
     let mut out = stdout().lock();
     if common.json {

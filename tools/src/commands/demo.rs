@@ -1,6 +1,6 @@
 //! `gyronet demo`: all results of one drive.
 
-use super::{Common, WriteError, paint, print_json, progress, remarked, weights};
+use super::{Common, named, paint, print_json, progress, remarked, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
 use gyronet_tools::demo::{Demo, Tunnel, write_log};
@@ -86,14 +86,14 @@ fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -
     let drive = rested.as_ref().unwrap_or(&drive);
 
     let folder = args.out.clone().unwrap_or_else(|| "target/demo".into());
-    std::fs::create_dir_all(&folder).map_err(WriteError::to(&folder))?;
+    std::fs::create_dir_all(&folder).map_err(named(&folder))?;
     let [log, page] = ["can.log", "demo.html"].map(|name| folder.join(name));
-    let file = File::create(&log).map_err(WriteError::to(&log))?;
+    let file = File::create(&log).map_err(named(&log))?;
     let frames = write_log(drive, GyroNet::new(weights.blob()?), BufWriter::new(file))?;
     let simulated = args.file.is_none();
     let tunnel = tunnel().map_err(|error| -> Box<dyn Error> { error })?;
     let demo = Demo::new(drive, simulated, &rates, errors.as_ref(), tunnel.as_ref(), frames);
-    std::fs::write(&page, demo.page()).map_err(WriteError::to(&page))?;
+    std::fs::write(&page, demo.page()).map_err(named(&page))?;
 
     let mut out = std::io::stdout().lock();
     if common.json {

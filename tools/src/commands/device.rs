@@ -16,6 +16,7 @@ use gyronet_tools::client::device::settings::{flat, value as value_of};
 use gyronet_tools::client::device::update::{Update, update};
 use gyronet_tools::client::device::upload::upload;
 use gyronet_tools::client::device::{AccessState, Authority, Device};
+use gyronet_tools::drive::error::read;
 use gyronet_tools::signing::{self, PrivateKey};
 use serde::Serialize;
 use std::io::{self, Write};
@@ -141,8 +142,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     device.authorise(match (&args.key, &args.signature) {
         (Some(path), _) => Authority::Key(PrivateKey::read(path)?),
         (None, Some(path)) => {
-            let bytes = std::fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
-            let trailer = bytes.try_into().map_err(|_| format!("{}: not a signature", path.display()))?;
+            let trailer =
+                read(path)?.try_into().map_err(|_| format!("{}: not a signature", path.display()))?;
             Authority::Signature(trailer)
         }
         (None, None) => Authority::None,
@@ -283,7 +284,7 @@ fn print_course((state, [gain, sigma], counters): (u8, [f32; 2], CourseCounters)
 }
 
 fn weights(device: &mut Board, path: &std::path::Path, json: bool, common: Common) -> super::Result {
-    let file = std::fs::read(path).map_err(super::WriteError::to(path))?;
+    let file = read(path)?;
     // Run the board's own check here, before the board erases its flash.
     let words: Vec<u32> = file.chunks(4).map(|word| word.try_into().map_or(0, u32::from_le_bytes)).collect();
     let words = bytemuck::cast_slice(&words);
@@ -313,7 +314,7 @@ fn update_firmware(
     json: bool,
     common: Common,
 ) -> super::Result {
-    let file = std::fs::read(path).map_err(super::WriteError::to(path))?;
+    let file = read(path)?;
     let mut file = Update::parse(&file).map_err(|error| format!("{}: {error}", path.display()))?;
     file.head.downgrade = downgrade;
     let bar = super::progress::bar(common, None, "update");

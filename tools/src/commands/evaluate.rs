@@ -1,6 +1,6 @@
 //! `gyronet evaluate` computes the heading errors of each method on recorded drives.
 
-use super::{Common, drives, paint, print_json, progress, weights};
+use super::{Common, drives, named, paint, print_json, progress, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::recording;
@@ -139,7 +139,7 @@ fn pictures<'a>(
 ) -> super::Result {
     let all = drives.clone().flat_map(|(_, found)| found);
     let chosen = outage_chart::typical(all).ok_or("no outage to draw: too little course or reference")?;
-    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    std::fs::create_dir_all(folder).map_err(named(folder))?;
     for ((outage, which), name) in chosen.into_iter().zip(["median.svg", "worst.svg"]) {
         let is_of = |(_, found): &&Found<'_>| found.iter().any(|own| std::ptr::eq(own, outage));
         let Some((file, _)) = drives.clone().find(is_of) else { continue };
@@ -147,8 +147,7 @@ fn pictures<'a>(
         let points = outage::trace(&drive, network, outage)?;
         let title = format!("{}, drive {}", recording::set(file), drive.name());
         let file = folder.join(name);
-        std::fs::write(&file, outage_chart::svg(&title, &which, outage, &points))
-            .map_err(|error| format!("{}: {error}", file.display()))?;
+        std::fs::write(&file, outage_chart::svg(&title, &which, outage, &points)).map_err(named(&file))?;
     }
     Ok(())
 }

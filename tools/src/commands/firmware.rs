@@ -1,6 +1,6 @@
 //! `gyronet firmware` builds the firmware of a board.
 
-use super::{Common, WriteError};
+use super::{Common, named};
 use gyronet::model::blob::CRC;
 use gyronet_tools::target::bench;
 use gyronet_tools::target::firmware::{Linked, NUCLEO};
@@ -38,7 +38,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let linked = Linked::build(&args.board, if args.flash { 1 } else { 2 }, &folder)?;
     let board = Path::new(&args.board).file_name().unwrap_or_default().display();
     let [elf, update] = ["elf", "update"].map(|end| folder.join(format!("{board}.{end}")));
-    std::fs::write(&elf, linked.for_programmer()?).map_err(WriteError::to(&elf))?;
+    std::fs::write(&elf, linked.for_programmer()?).map_err(named(&elf))?;
     if args.flash {
         let chip = if args.board == NUCLEO { "STM32H563ZITx" } else { "STM32F405RGTx" };
         let status = Command::new("probe-rs")
@@ -49,7 +49,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         return if status.success() { Ok(()) } else { Err(format!("probe-rs: {status}").into()) };
     }
     let file = linked.update()?;
-    std::fs::write(&update, file.bytes()).map_err(WriteError::to(&update))?;
+    std::fs::write(&update, file.bytes()).map_err(named(&update))?;
     let (boot, image) = (linked.boot_loader()?.len(), file.images[0].len());
     let [a, b] = [0, 1].map(|slot: usize| format!("{:08x}", CRC.checksum(&file.images[slot])));
     let out = &mut io::stdout().lock();

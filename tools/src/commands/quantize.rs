@@ -1,6 +1,6 @@
 //! `gyronet quantize` converts an f32 checkpoint to a weight file for the integer kernels.
 
-use super::{Common, WriteError, print_json};
+use super::{Common, named, print_json};
 use gyronet_tools::network::checkpoint::{self, Checkpoint};
 use gyronet_tools::network::quantize::quantize;
 use std::io::Write;
@@ -24,7 +24,7 @@ pub struct Args {
 
 pub fn run(args: &Args, common: Common) -> super::Result {
     let bytes = quantize(&Checkpoint::<checkpoint::GyroNet>::read(&args.checkpoint)?)?;
-    std::fs::write(&args.out, &bytes).map_err(WriteError::to(&args.out))?;
+    std::fs::write(&args.out, &bytes).map_err(named(&args.out))?;
     let mut out = std::io::stdout().lock();
     if common.json {
         return print_json(&mut out, &serde_json::json!({ "path": args.out, "bytes": bytes.len() }));

@@ -1,12 +1,13 @@
 //! `gyronet replay` runs a drive through the board's code and writes its CAN log.
 
 use super::weights::Unit;
-use super::{Common, WriteError, print_json, progress};
+use super::{Common, named, print_json, progress};
 use gyronet::coprocessor::{Config, Coprocessor, TimedFrame};
 use gyronet::health::Status;
 use gyronet::model::GyroNet;
 use gyronet_tools::board::{Board, Step};
 use gyronet_tools::drive::candump::Log;
+use gyronet_tools::drive::error::DataError;
 use gyronet_tools::drive::export;
 use gyronet_tools::drive::replay::{Steps, initialise};
 use gyronet_tools::drive::stream::Drive;
@@ -50,15 +51,12 @@ pub struct Args {
 struct Output<'a>(BufWriter<File>, &'a Path);
 
 impl<'a> Output<'a> {
-    fn new(path: &'a Path) -> Result<Self, WriteError> {
-        Ok(Self(File::create(path).map(BufWriter::new).map_err(WriteError::to(path))?, path))
+    fn new(path: &'a Path) -> Result<Self, DataError> {
+        Ok(Self(File::create(path).map(BufWriter::new).map_err(named(path))?, path))
     }
 
-    fn write(
-        &mut self,
-        write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-    ) -> Result<(), WriteError> {
-        write(&mut self.0).map_err(WriteError::to(self.1))
+    fn write(&mut self, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), DataError> {
+        write(&mut self.0).map_err(named(self.1))
     }
 }
 
@@ -72,13 +70,13 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     }
     let writes_elsewhere = [&args.csv, &args.tum].into_iter().any(Option::is_some);
     let log: Box<dyn Write> = match &args.out {
-        Some(path) => Box::new(BufWriter::new(File::create(path).map_err(WriteError::to(path))?)),
+        Some(path) => Box::new(BufWriter::new(File::create(path).map_err(named(path))?)),
         None if writes_elsewhere => Box::new(io::sink()),
         None => Box::new(BufWriter::new(io::stdout().lock())),
     };
     let log_error = |error: io::Error| -> Box<dyn std::error::Error> {
         match &args.out {
-            Some(path) => WriteError::to(path)(error).into(),
+            Some(path) => named(path)(error).into(),
             None => error.into(),
         }
     };

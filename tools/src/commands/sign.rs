@@ -8,6 +8,7 @@ use gyronet_tools::client::device::requests::{
 };
 use gyronet_tools::client::device::settings::from_value;
 use gyronet_tools::client::device::update::Update;
+use gyronet_tools::drive::error::{read, read_text};
 use gyronet_tools::signing::{PrivateKey, read_public, unhex};
 use gyronet_tools::wheels::WheelFile;
 use std::io::{self, Write};
@@ -56,17 +57,16 @@ enum Target {
 
 pub fn run(args: &Args, common: Common) -> super::Result {
     let name = args.file.display().to_string();
-    let read = || std::fs::read(&args.file).map_err(|error| format!("{name}: {error}"));
-    let text = || std::fs::read_to_string(&args.file).map_err(|error| format!("{name}: {error}"));
     let (target, content) = match args.target {
-        Target::Weights => (USE_DOWNLOAD, read()?),
+        Target::Weights => (USE_DOWNLOAD, read(&args.file)?),
         Target::Firmware => {
-            let Update { mut head, .. } = Update::parse(&read()?)?;
+            let Update { mut head, .. } = Update::parse(&read(&args.file)?)?;
             head.downgrade = args.downgrade;
             (FIRMWARE, head.bytes().to_vec())
         }
         Target::Configuration => {
-            let value = serde_json::from_str(&text()?).map_err(|error| format!("{name}: {error}"))?;
+            let value =
+                serde_json::from_str(&read_text(&args.file)?).map_err(|error| format!("{name}: {error}"))?;
             (CONFIGURATION, requests::configuration_content(&from_value(value)?)?)
         }
         Target::Wheels => (WHEELS, requests::content(&WheelFile::read(&args.file)?.1)?),
@@ -75,7 +75,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     };
     let serial = args.serial.as_deref().map(|text| unhex(text).ok_or("--serial: not 24 hexadecimal digits"));
     let trailer = PrivateKey::read(&args.key)?.trailer(target, serial.transpose()?, args.counter, &content);
-    std::fs::write(&args.out, trailer).map_err(super::WriteError::to(&args.out))?;
+    std::fs::write(&args.out, trailer).map_err(super::named(&args.out))?;
     let out = &mut io::stdout().lock();
     if common.json {
         return super::print_json(

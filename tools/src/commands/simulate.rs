@@ -1,6 +1,6 @@
 //! `gyronet simulate` writes simulated drives.
 
-use super::{Common, WriteError, print_json, remark};
+use super::{Common, named, print_json, remark};
 use gyronet_tools::simulate::warming::{self, Trip};
 use gyronet_tools::simulate::{Config, csv, gnss};
 use std::fs::File;
@@ -65,7 +65,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         [roll, pitch] => [pitch, roll].map(f64::to_radians),
         _ => return Err("--tilt takes two angles, ROLL,PITCH".into()),
     };
-    let error = WriteError::to(&args.out);
+    let error = named(&args.out);
     let file = File::create(&args.out).map_err(&error)?;
     let samples = csv::write(&config, BufWriter::new(file)).map_err(&error)?;
     let (path, seed) = (args.out.display(), args.seed);

@@ -1,6 +1,7 @@
 //! `gyronet size` compares the sizes of the firmware image with their budgets.
 
 use super::Common;
+use gyronet_tools::drive::error::{DataError, read};
 use gyronet_tools::target::bench;
 use gyronet_tools::target::size::{BUDGETS, ImageSize};
 use gyronet_tools::target::stack::{Handler, ImageStack, Way};
@@ -26,8 +27,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         Some(elf) => elf.clone(),
         None => bench::build(&workspace, "coprocessor", &bench::target_folder())?,
     };
-    let size = ImageSize::read(&elf)?;
-    let stack = ImageStack::read(&std::fs::read(&elf)?)?;
+    let image = read(&elf)?;
+    let size = ImageSize::read(&image).map_err(|error| DataError::because(elf.display(), error))?;
+    let stack = ImageStack::read(&image)?;
     let measured = [size.flash, size.static_ram, stack.worst().into()];
     let rows: Vec<Row> = ["flash", "static_ram", "stack"].into_iter().zip(measured).zip(BUDGETS).collect();
     let out = &mut io::stdout().lock();

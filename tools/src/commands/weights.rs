@@ -8,27 +8,9 @@ use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::rates::{Networks, Sample};
 use gyronet_tools::evaluate::report::DriveErrors;
 use gyronet_tools::network::checkpoint::{Checkpoint, GyroNet};
-use gyronet_tools::network::weight_file::{WeightFile, WeightFileError};
+use gyronet_tools::network::weight_file::WeightFile;
 use std::error::Error;
-use std::path::{Path, PathBuf};
-
-pub struct Weights {
-    file: Option<WeightFile>,
-}
-
-impl Weights {
-    pub fn open(path: Option<&Path>) -> Result<Self, WeightFileError> {
-        Ok(Self { file: path.map(WeightFile::read).transpose()? })
-    }
-
-    pub fn blob(&self) -> Result<Blob<'_>, WeightFileError> {
-        match &self.file {
-            Some(file) => file.blob(),
-            None => Blob::new_checked(&weights::DEFAULT.0)
-                .map_err(|source| WeightFileError::Blob { path: String::from("built-in weights"), source }),
-        }
-    }
-}
+use std::path::PathBuf;
 
 /// The weights of the rates that the board sends.
 #[derive(Debug, Clone, clap::Args)]
@@ -65,8 +47,14 @@ impl Unit {
 }
 
 impl Sent {
-    pub fn open(&self) -> Result<Weights, WeightFileError> {
-        Weights::open(self.weights.as_deref())
+    /// Opens the weights and checks them.
+    pub fn open(&self) -> Result<WeightFile, DataError> {
+        let file = match &self.weights {
+            Some(path) => WeightFile::read(path)?,
+            None => WeightFile::new("built-in weights", &weights::DEFAULT.0),
+        };
+        file.blob()?;
+        Ok(file)
     }
 
     /// Runs every method on a drive ([`DriveErrors::of`]). The linear part always has the library's weights; only the

@@ -1,7 +1,9 @@
-//! The errors of recorded drives and of data sets. They name the file and, if known, the line and the column.
+//! The errors of files: recorded drives, data sets, weights, keys and others. They name the file and, if known, the line
+//! and the column.
 
 use super::recording::Turning;
 use std::fmt;
+use std::path::Path;
 
 /// An error in a file: where it is, and what is wrong.
 #[derive(Debug)]
@@ -18,6 +20,14 @@ impl DataError {
     /// Returns an error that concerns a whole file.
     pub fn of(path: impl fmt::Display, fault: DataFault) -> Self {
         Self { path: path.to_string(), line: None, column: None, fault }
+    }
+
+    /// Returns an error of another kind that concerns a whole file.
+    pub fn because(
+        path: impl fmt::Display,
+        reason: impl Into<Box<dyn std::error::Error + Send + Sync>>,
+    ) -> Self {
+        Self::of(path, DataFault::Other(reason.into()))
     }
 
     pub fn at(path: impl fmt::Display, line: u64, fault: DataFault) -> Self {
@@ -42,6 +52,19 @@ impl DataError {
 }
 
 impl std::error::Error for DataError {}
+
+/// Returns what names a file in an error of reading or writing it.
+pub fn named(path: &Path) -> impl Fn(std::io::Error) -> DataError {
+    move |source| DataError::of(path.display(), source.into())
+}
+
+pub fn read(path: &Path) -> Result<Vec<u8>, DataError> {
+    std::fs::read(path).map_err(named(path))
+}
+
+pub fn read_text(path: &Path) -> Result<String, DataError> {
+    std::fs::read_to_string(path).map_err(named(path))
+}
 
 impl fmt::Display for DataError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -1,11 +1,10 @@
 //! Reads the f32 checkpoints of GyroNet and FoGNet that `gyronet_train` exports.
 
-pub use super::tensors::CheckpointError;
-
 use super::reference::LstmWeights;
 use super::reference::fognet::FogNetF32;
 use super::reference::gyronet::{GyroNetF32, NetworkF32};
 use super::tensors::{Found, Shape, Tensors, bilstm, dense, tensor};
+use crate::drive::error::{DataError, read};
 use gyronet::model::blob::{self, HIDDEN, LINEAR_INPUTS};
 use gyronet::model::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
 use gyronet::model::seconds::STEPS;
@@ -71,11 +70,11 @@ pub struct Checkpoint<N> {
 }
 
 impl<N: Network> Checkpoint<N> {
-    pub fn read(path: &Path) -> Result<Self, CheckpointError> {
-        Ok(Self { tensors: Tensors::read(path, N::shapes)?, network: PhantomData })
+    pub fn read(path: &Path) -> Result<Self, DataError> {
+        Self::parse(&path.display().to_string(), &read(path)?)
     }
 
-    pub fn parse(name: &str, bytes: &[u8]) -> Result<Self, CheckpointError> {
+    pub fn parse(name: &str, bytes: &[u8]) -> Result<Self, DataError> {
         Ok(Self { tensors: Tensors::parse(name, bytes, N::shapes)?, network: PhantomData })
     }
 

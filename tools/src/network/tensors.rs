@@ -2,26 +2,10 @@
 //! finite.
 
 use super::reference::LstmWeights;
+use crate::drive::error::DataError;
 use safetensors::{Dtype, SafeTensors};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-
-#[derive(Debug, thiserror::Error)]
-pub enum CheckpointError {
-    #[error("{path}: {source}")]
-    Io { path: PathBuf, source: std::io::Error },
-    #[error("{name}: not a safetensors file: {source}")]
-    Format { name: String, source: safetensors::SafeTensorError },
-    #[error("{name}: the network has no {}: quantising would leave them out", tensors.join(", "))]
-    Unused { name: String, tensors: Vec<String> },
-    #[error("{name}: tensor {tensor} is missing")]
-    Missing { name: String, tensor: String },
-    #[error("{name}: tensor {tensor} is {found}, should be F32 {expected:?}")]
-    Shape { name: String, tensor: String, found: String, expected: Vec<usize> },
-    #[error("{name}: tensor {tensor} holds a value that is not finite, at {at}")]
-    NotFinite { name: String, tensor: String, at: usize },
-}
 
 /// Name and shape of a tensor, as in PyTorch.
 pub type Shape = (String, Vec<usize>);
@@ -65,18 +49,13 @@ pub struct Tensors {
 }
 
 impl Tensors {
-    pub(crate) fn read(path: &Path, shapes: fn(Found<'_>) -> Vec<Shape>) -> Result<Self, CheckpointError> {
-        let bytes =
-            std::fs::read(path).map_err(|source| CheckpointError::Io { path: path.to_owned(), source })?;
-        Self::parse(&path.display().to_string(), &bytes, shapes)
-    }
-
     pub(crate) fn parse(
         name: &str,
         bytes: &[u8],
         shapes: fn(Found<'_>) -> Vec<Shape>,
-    ) -> Result<Self, CheckpointError> {
-        let format = |source| CheckpointError::Format { name: name.to_owned(), source };
+    ) -> Result<Self, DataError> {
+        let refused = |reason: String| DataError::because(name, reason);
+        let format = |error| refused(format!("not a safetensors file: {error}"));
         let (_, header) = SafeTensors::read_metadata(bytes).map_err(format)?;
         let file = SafeTensors::deserialize(bytes).map_err(format)?;
         let provenance =
@@ -84,24 +63,23 @@ impl Tensors {
         let mut views: BTreeMap<_, _> = file.iter().collect();
         let mut tensors = BTreeMap::new();
         for (tensor, shape) in shapes(&|tensor| views.get(tensor).map(|view| view.shape().to_vec())) {
-            let name = || name.to_owned();
-            let view = views
-                .remove(tensor.as_str())
-                .ok_or_else(|| CheckpointError::Missing { name: name(), tensor: tensor.clone() })?;
-            if view.dtype() != Dtype::F32 || view.shape() != shape {
-                let found = format!("{:?} {:?}", view.dtype(), view.shape());
-                return Err(CheckpointError::Shape { name: name(), tensor, found, expected: shape });
+            let view = views.remove(tensor.as_str());
+            let view = view.ok_or_else(|| refused(format!("tensor {tensor} is missing")))?;
+            let (kind, found) = (view.dtype(), view.shape());
+            if kind != Dtype::F32 || found != shape {
+                let reason = format!("tensor {tensor} is {kind:?} {found:?}, should be F32 {shape:?}");
+                return Err(refused(reason));
             }
             let values: Vec<f32> =
                 view.data().as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
             if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-                return Err(CheckpointError::NotFinite { name: name(), tensor, at });
+                return Err(refused(format!("tensor {tensor} holds a value that is not finite, at {at}")));
             }
             tensors.insert(tensor, values);
         }
         if !views.is_empty() {
-            let tensors = views.into_keys().map(str::to_owned).collect();
-            return Err(CheckpointError::Unused { name: name.to_owned(), tensors });
+            let unused = views.into_keys().collect::<Vec<_>>().join(", ");
+            return Err(refused(format!("the network has no {unused}: quantising would leave them out")));
         }
         let sha256 = format!("{:x}", Sha256::digest(bytes));
         Ok(Self { tensors, provenance, sha256 })

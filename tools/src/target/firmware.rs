@@ -6,6 +6,7 @@
 
 use super::bench::{self, BenchError, TARGET};
 use crate::client::device::update::Update;
+use crate::drive::error::{DataError, read};
 use gyronet::model::blob::CRC;
 use gyronet::store::Slot;
 use gyronet::store::banks;
@@ -13,14 +14,14 @@ use gyronet::store::firmware::{LABEL, LABEL_SIZE, Label, MAX_IMAGE, Trailer};
 use gyronet::store::layout::{BOOT_SIZE, FLASH_BASE};
 use object::{Object, ObjectSection, ObjectSegment};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 #[derive(Debug, thiserror::Error)]
 pub enum FirmwareFileError {
     #[error(transparent)]
     Build(#[from] BenchError),
-    #[error("{}: {source}", path.display())]
-    Io { path: PathBuf, source: std::io::Error },
+    #[error(transparent)]
+    File(#[from] DataError),
     #[error("not a linked image: {0}")]
     Format(#[from] object::Error),
     #[error("no board {name}, but {}", boards.join(", "))]
@@ -52,26 +53,24 @@ pub struct Linked {
 impl Linked {
     /// Builds the boot loader, and the image for the first `slots` slots, for a board, named by its features.
     pub fn build(board: &str, slots: usize, folder: &Path) -> Result<Self, FirmwareFileError> {
-        let read =
-            |path: PathBuf| std::fs::read(&path).map_err(|source| FirmwareFileError::Io { path, source });
         let package = if board == NUCLEO {
             bench::workspace().join("examples/nucleo")
         } else {
             std::path::absolute(board).unwrap_or_default()
         };
         if package.join("Cargo.toml").is_file() {
-            let manifest = String::from_utf8_lossy(&read(package.join("Cargo.toml"))?).into_owned();
+            let manifest = String::from_utf8_lossy(&read(&package.join("Cargo.toml"))?).into_owned();
             let name = manifest.lines().find_map(|line| line.strip_prefix("name = \"")?.strip_suffix('"'));
             let built = bench::build_banks(&package, folder)?;
-            let image = read(built.join(name.unwrap_or_default()))?;
-            return Ok(Self { boot: read(built.join("boot"))?, images: vec![image; slots], swaps: true });
+            let image = read(&built.join(name.unwrap_or_default()))?;
+            return Ok(Self { boot: read(&built.join("boot"))?, images: vec![image; slots], swaps: true });
         }
         let boards = boards();
         if !boards.iter().any(|known| known == board) {
             return Err(FirmwareFileError::Board { name: board.to_owned(), boards });
         }
-        let build = |features: &str, image: &str| {
-            read(bench::build_for((features, TARGET), &bench::workspace(), image, folder)?)
+        let build = |features: &str, image: &str| -> Result<Vec<u8>, FirmwareFileError> {
+            Ok(read(&bench::build_for((features, TARGET), &bench::workspace(), image, folder)?)?)
         };
         let boot = build(board, "boot")?;
         let features = [board.to_owned(), format!("{board},slot-b")];

@@ -1,7 +1,6 @@
 //! Reads the flash and RAM of a firmware image from its ELF file.
 
 use object::{Object, ObjectSection, ObjectSymbol};
-use std::path::Path;
 
 /// Budgets of an image, bytes: flash (sectors 8 and 9), static RAM, stack.
 pub const BUDGETS: [u64; 3] = [256 << 10, 96 << 10, 13 << 10];
@@ -18,20 +17,9 @@ pub struct ImageSize {
     pub ccm: u64,
 }
 
-#[derive(Debug, thiserror::Error)]
-pub enum SizeError {
-    #[error("{path}: {source}")]
-    Io { path: String, source: std::io::Error },
-    #[error("{path}: {source}")]
-    Format { path: String, source: object::Error },
-}
-
 impl ImageSize {
-    pub fn read(path: &Path) -> Result<Self, SizeError> {
-        let name = || path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|source| SizeError::Io { path: name(), source })?;
-        let file =
-            object::File::parse(&*bytes).map_err(|source| SizeError::Format { path: name(), source })?;
+    pub fn read(elf: &[u8]) -> object::Result<Self> {
+        let file = object::File::parse(elf)?;
         let mut size = Self::default();
         for section in file.sections() {
             match section.name() {

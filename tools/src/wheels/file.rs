@@ -3,6 +3,7 @@
 mod frame;
 mod protection;
 
+use crate::drive::error::{DataError, read_text};
 use frame::{kmh, speed};
 use gyronet::can::e2e::DataIdMode;
 use gyronet::can::signal::OutsideFrame;
@@ -10,7 +11,6 @@ use gyronet::can::wheel::{MAX_FRAMES, WheelConfigError, WheelReceiver, WheelSett
 use gyronet::sample::WHEELS;
 use gyronet::units::Duration;
 use serde::{Deserialize, Serialize};
-use std::fmt::Display;
 use std::path::Path;
 
 #[derive(Debug, thiserror::Error)]
@@ -229,12 +229,11 @@ pub struct Signal {
 
 impl WheelFile {
     /// Reads a file with its settings; an error names the file.
-    pub fn read(path: &Path) -> Result<(Self, WheelSettings), String> {
-        let named = |error: &dyn Display| format!("{}: {error}", path.display());
-        let text = std::fs::read_to_string(path).map_err(|error| named(&error))?;
-        let file = Self::parse(&text).map_err(|error| named(&error))?;
-        let settings = file.settings().map_err(|error| named(&error))?;
-        Ok((file, settings))
+    pub fn read(path: &Path) -> Result<(Self, WheelSettings), DataError> {
+        let text = read_text(path)?;
+        let read = Self::parse(&text).and_then(|file| Ok((file.settings()?, file)));
+        read.map(|(settings, file)| (file, settings))
+            .map_err(|error| DataError::because(path.display(), error))
     }
 
     pub fn parse(text: &str) -> Result<Self, WheelFileError> {

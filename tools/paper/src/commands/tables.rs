@@ -79,13 +79,13 @@ pub fn run(args: &Args, json: bool) -> super::Result {
     }
     let weights = match &args.weights {
         Some(path) => WeightFile::read(path)?,
-        None => WeightFile::parse("built-in weights", &GYRONET.0)?,
+        None => WeightFile::new("built-in weights", &GYRONET.0),
     };
     let fog_weights = match &args.fog_weights {
-        Some(path) => WeightFile::read_fognet(path)?,
-        None => WeightFile::parse_fognet("built-in weights", &FOGNET.0)?,
+        Some(path) => WeightFile::read(path)?,
+        None => WeightFile::new("built-in weights", &FOGNET.0),
     };
-    let pseudo_weights = args.pseudo_fog_weights.as_deref().map(WeightFile::read_fognet).transpose()?;
+    let pseudo_weights = args.pseudo_fog_weights.as_deref().map(WeightFile::read).transpose()?;
     let mut network = GyroNet::new(weights.blob()?);
     let fog_blob = fog_weights.fog_blob()?;
     let pseudo_blob = pseudo_weights.as_ref().unwrap_or(&fog_weights).fog_blob()?;

@@ -3,6 +3,7 @@
 use super::{Board, done};
 use gyronet::store::{Configuration, Record};
 use gyronet_tools::client::device::settings::{assign, from_value, to_value};
+use gyronet_tools::drive::error::read_text;
 use gyronet_tools::wheels::WheelFile;
 use std::path::Path;
 
@@ -29,8 +30,7 @@ pub fn set(device: &mut Board, settings: &[String], file: Option<&Path>, json: b
     }
     let mut wanted = match file {
         Some(path) => {
-            let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-            serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?
+            serde_json::from_str(&read_text(path)?).map_err(|e| format!("{}: {e}", path.display()))?
         }
         None => to_value(&device.configuration()?)?,
     };
