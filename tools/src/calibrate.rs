@@ -17,7 +17,8 @@ pub mod unit_file;
 pub use normal_equations::NormalEquations;
 
 use crate::board::Board;
-use crate::drive::replay::{ReplayError, Steps, initialise};
+use crate::drive::error::DataError;
+use crate::drive::replay::{Steps, initialise};
 use crate::drive::stream::Drive;
 use by_course::Learnt;
 use fit::Fit;
@@ -46,29 +47,9 @@ const LEAST_OTHER_SIDE: f64 = 0.1;
 /// time.
 const MAX_RESIDUAL_RAD: f64 = 0.05;
 
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CalibrateError {
-    #[error(transparent)]
-    Replay(#[from] ReplayError),
-    #[error("{path}: no {columns}: a calibration needs one of these columns")]
-    NoReference { path: String, columns: &'static str },
-    #[error("{path}: only {seconds:.0} s with a reference; a calibration needs {SHORTEST_S:.0} s")]
-    TooShort {
-        path: String,
-        /// The time with a reference, s.
-        seconds: f64,
-    },
-    #[error(
-        "{path}: reference and gyro differ by {rad:.3} rad from span to span: a wrong unit or clock, or another drive; `gyronet doctor` says which"
-    )]
-    Contradiction { path: String, rad: f64 },
-    #[error(
-        "{path}: the gyro contradicts {refused} of the courses and fits {used}: `gyronet doctor` says why"
-    )]
-    Refused { path: String, used: u32, refused: u32 },
-    #[error("{what} {value:+.4} is too large for any unit; configure how the sensor is mounted")]
-    Implausible { what: &'static str, value: f64 },
+fn too_short(path: &str, seconds: f64) -> DataError {
+    let reason = format!("only {seconds:.0} s with a reference; a calibration needs {SHORTEST_S:.0} s");
+    DataError::because(path, reason)
 }
 
 /// A share that the fit has found, with its sigma.
@@ -114,7 +95,7 @@ impl Cut {
         drive: &Drive<'_>,
         board: Board<impl WindowNetwork>,
         mut tick: impl FnMut(),
-    ) -> Result<Self, CalibrateError> {
+    ) -> Result<Self, DataError> {
         let (path, name) = (drive.path.clone(), drive.name().to_owned());
         if !drive.facts.has_rate {
             let learnt = by_course::learn(drive, board, tick)?;
@@ -143,7 +124,7 @@ const SHARES: [(&str, f64, &str); 3] = [
     ),
 ];
 
-pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, CalibrateError> {
+pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, DataError> {
     let by_rate: Vec<&Cut> = drives.iter().filter(|drive| drive.by_course.is_none()).collect();
     let spans: Vec<&[Span]> = by_rate.iter().map(|drive| drive.spans.as_slice()).collect();
     // A share that the drives hardly show makes the others uncertain, so the least certain one is removed first.
@@ -185,8 +166,11 @@ pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, CalibrateErro
     });
     for (drive, deviation) in by_rate.iter().zip(&fit.deviations) {
         if *deviation > MAX_RESIDUAL_RAD {
-            let path = drive.path.clone();
-            return Err(CalibrateError::Contradiction { path, rad: *deviation });
+            let reason = format!(
+                "reference and gyro differ by {deviation:.3} rad from span to span: a wrong unit or clock, or another drive; \
+                 `gyronet doctor` says which"
+            );
+            return Err(DataError::because(&drive.path, reason));
         }
     }
     let [roll, pitch, gain] = shares.map(|share| share.value);
@@ -195,7 +179,8 @@ pub fn calibrate(drives: &[Cut], weights: u32) -> Result<UnitFile, CalibrateErro
     let gyro_map = gyro_map.ok_or_else(|| {
         let farthest = shares.iter().max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()));
         let (what, value) = farthest.map_or(("map", 0.0), |share| (share.name, share.value));
-        CalibrateError::Implausible { what, value }
+        let reason = "is too large for any unit; configure how the sensor is mounted";
+        DataError::because("calibration", format!("{what} {value:+.4} {reason}"))
     })?;
     Ok(UnitFile { gyro_map, shares, weights, drives: unit_file::drives(drives, &fit) })
 }
@@ -225,7 +210,7 @@ mod tests {
 
     /// Simulates 20 minutes of a unit that reads 2 % too much about z. The reference is a course once a second with a
     /// sigma of 0.02 rad, times `sign`. It is missing for a minute, and ends at the sample `end`.
-    fn by_course(end: usize, sign: f64) -> Result<UnitFile, CalibrateError> {
+    fn by_course(end: usize, sign: f64) -> Result<UnitFile, DataError> {
         let mut bytes = Vec::new();
         csv::write(&simulate::Config { seconds: 1_200, seed: 5, ..simulate::Config::DEFAULT }, &mut bytes)
             .unwrap();
@@ -281,13 +266,13 @@ mod tests {
 
     #[test]
     fn half_a_minute_of_course_is_too_short() {
-        let unit = by_course(3_000, 1.0);
-        assert!(matches!(unit, Err(CalibrateError::TooShort { .. })), "{unit:?}");
+        let error = by_course(3_000, 1.0).unwrap_err().to_string();
+        assert!(error.contains(" s with a reference; a calibration needs 30 s"), "{error}");
     }
 
     #[test]
     fn a_course_of_the_wrong_sign_is_refused() {
-        let unit = by_course(usize::MAX, -1.0);
-        assert!(matches!(unit, Err(CalibrateError::Refused { .. })), "{unit:?}");
+        let error = by_course(usize::MAX, -1.0).unwrap_err().to_string();
+        assert!(error.contains("the gyro contradicts"), "{error}");
     }
 }

@@ -2,11 +2,12 @@
 //! that cannot be used.
 
 use gyronet_tools::board::Uncorrected;
+use gyronet_tools::drive::error::DataError;
 use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::rates::{Networks, Rates, Sample};
-use gyronet_tools::evaluate::report::{DriveErrors, EvaluateError};
+use gyronet_tools::evaluate::report::DriveErrors;
 use std::fmt::Write;
 
 /// Two minutes, rows.
@@ -38,13 +39,13 @@ fn drive(still: usize, sign: f64, column: &str) -> Recording {
     Recording::parse("made/up.csv", text.as_bytes()).expect("a drive")
 }
 
-fn run(recording: &Recording, visit: impl FnMut(&Sample)) -> Result<DriveErrors, EvaluateError> {
+fn run(recording: &Recording, visit: impl FnMut(&Sample)) -> Result<DriveErrors, DataError> {
     let mut default = Uncorrected;
     let networks = Networks { default: &mut default, sent: None, paper: None };
     DriveErrors::of(&Drive::from(recording), networks, visit)
 }
 
-fn errors(recording: &Recording) -> Result<DriveErrors, EvaluateError> {
+fn errors(recording: &Recording) -> Result<DriveErrors, DataError> {
     run(recording, |_| {})
 }
 

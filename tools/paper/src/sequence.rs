@@ -7,7 +7,6 @@
 //! interpolated as sums, so that nothing is lost or counted twice.
 
 mod export;
-mod fault;
 mod kaist;
 mod rows;
 mod summary;
@@ -16,10 +15,10 @@ mod utm;
 
 pub use export::{HEADER, write_csv, write_whole};
 pub(super) use kaist::yaw;
+pub(super) use rows::columns;
 pub use summary::{Seen, StreamSummary};
 
 use crate::simulate::{MARKER, Spec, vehicles::KAIST};
-pub use fault::SequenceFault;
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::{ImuSample, PERIOD_US, Validity};
 use gyronet::units::{AngularRate, Micros, SpecificForce};
@@ -106,7 +105,8 @@ fn is_sequence(folder: &Path) -> bool {
 }
 
 fn unknown(folder: &Path) -> DataError {
-    let fault = fs::metadata(folder).map_or_else(DataFault::Io, |_| SequenceFault::UnknownLayout.into());
+    let reason = "no KAIST Urban sequence, which is a folder with sensor_data in it";
+    let fault = fs::metadata(folder).map_or_else(DataFault::Io, |_| DataFault::Other(reason.into()));
     DataError::of(folder.display(), fault)
 }
 
@@ -144,8 +144,8 @@ impl Sequence {
         }
         let seconds = steps.len() as f64 * DT;
         if seconds < NEEDED {
-            let fault = SequenceFault::TooLittleInCommon { seconds, needed: NEEDED }.into();
-            return Err(DataError::of(folder.display(), fault));
+            let reason = format!("its files have {seconds:.2} s in common, needed are {NEEDED} s");
+            return Err(DataError::because(folder.display(), reason));
         }
         let [x, y] = steps.first().map_or([0.0; 2], |step: &Step| step.position);
         let latitude = utm::latitude_deg([x, y]);
@@ -239,14 +239,19 @@ impl Sequence {
     pub fn needs_standstill(&self) -> Result<(), DataError> {
         let steps = self.steps.iter().take(STATIC_SAMPLES as usize);
         let metres = steps.map(|step| (step.wheels[0] + step.wheels[1]) / 2.0).sum::<f64>().abs();
-        let fault = SequenceFault::Rolling { metres, most: STANDING }.into();
-        if metres > STANDING { Err(DataError::of(self.path.display(), fault)) } else { Ok(()) }
+        let reason = format!(
+            "starts moving: its wheels roll {metres:.2} m in the first 3 s; at most {STANDING} m count as standing"
+        );
+        if metres > STANDING { Err(DataError::because(self.path.display(), reason)) } else { Ok(()) }
     }
 
     pub fn needs_gyro(&self) -> Result<(), DataError> {
-        self.has_gyro
-            .then_some(())
-            .ok_or_else(|| DataError::of(self.path.display(), SequenceFault::NoGyro.into()))
+        self.has_gyro.then_some(()).ok_or_else(|| {
+            DataError::because(
+                self.path.display(),
+                "xsens_imu.csv has 8 columns: no gyro and no accelerometer",
+            )
+        })
     }
 }
 
@@ -302,9 +307,9 @@ fn marker(folder: &Path) -> Result<Option<Spec>, DataError> {
     let path = folder.join(MARKER);
     let error = |fault| DataError::of(path.display(), fault);
     match fs::read(&path) {
-        Ok(bytes) => serde_json::from_slice(&bytes)
-            .map(Some)
-            .map_err(|source| error(SequenceFault::Marker(source).into())),
+        Ok(bytes) => {
+            serde_json::from_slice(&bytes).map(Some).map_err(|source| error(DataFault::Other(source.into())))
+        }
         Err(source) if source.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(source) => Err(error(source.into())),
     }

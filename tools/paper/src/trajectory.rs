@@ -2,8 +2,7 @@
 //! `time x y z qx qy qz qw`, separated by spaces: time in s since 1970, ascending, position in m, and attitude as a
 //! quaternion. Rows that begin with # are comments.
 
-use super::sequence::yaw;
-use crate::sequence::SequenceFault;
+use super::sequence::{columns, yaw};
 use gyronet_tools::drive::error::{DataError, DataFault, ValueError};
 use gyronet_tools::evaluate::angle::wrap;
 use gyronet_tools::evaluate::trajectory_error::Point;
@@ -57,8 +56,9 @@ impl Trajectory {
 fn pose(path: &str, line: u64, row: &str, last: Option<&Pose>) -> Result<Pose, DataError> {
     let fault = |fault| DataError::at(path, line, fault);
     let fields: Vec<&str> = row.split_whitespace().collect();
-    let columns = || SequenceFault::Columns { found: fields.len(), expected: COLUMNS.len() }.into();
-    let fields: [&str; COLUMNS.len()] = fields.as_slice().try_into().map_err(|_| fault(columns()))?;
+    let other = |reason: String| fault(DataFault::Other(reason.into()));
+    let columns = || other(columns(fields.len(), COLUMNS.len()));
+    let fields: [&str; COLUMNS.len()] = fields.as_slice().try_into().map_err(|_| columns())?;
     let mut values = [0.0; COLUMNS.len()];
     for ((value, text), column) in values.iter_mut().zip(fields).zip(COLUMNS) {
         *value = number(text).map_err(|error| DataError::value(path, line, column, text, error))?;
@@ -66,7 +66,7 @@ fn pose(path: &str, line: u64, row: &str, last: Option<&Pose>) -> Result<Pose, D
     let [time, x, y, _, qx, qy, qz, qw] = values;
     let norm = libm::sqrt(qx * qx + qy * qy + qz * qz + qw * qw);
     if (norm - 1.0).abs() > NORM_TOLERANCE {
-        return Err(fault(SequenceFault::Quaternion { norm }.into()));
+        return Err(other(format!("a quaternion of norm {norm:.3}, which is no attitude")));
     }
     if let Some(last) = last.filter(|last| time <= last.time) {
         return Err(fault(DataFault::Time { last_s: last.time, at_s: time }));

@@ -1,11 +1,11 @@
 //! The gain of a unit by the courses of a drive: the board itself learns it from them while it runs the drive.
 
-use super::{CalibrateError, SHORTEST_S};
+use super::{SHORTEST_S, too_short};
 use crate::board::Board;
+use crate::drive::error::DataError;
 use crate::drive::recording::Row;
-use crate::drive::replay::ReplayError;
 use crate::drive::stream::Drive;
-use gyronet::heading::{CourseConfig, Heading};
+use gyronet::heading::{CourseConfig, CourseCounters, Heading};
 use gyronet::model::WindowNetwork;
 use gyronet::units::AngularRate;
 use std::f64::consts::TAU;
@@ -28,12 +28,11 @@ pub fn learn(
     drive: &Drive<'_>,
     mut board: Board<impl WindowNetwork>,
     mut tick: impl FnMut(),
-) -> Result<Learnt, CalibrateError> {
+) -> Result<Learnt, DataError> {
     board.take_courses();
-    let path = || drive.path.clone();
     let (mut seconds, mut next, mut is_reference) = (0.0, 0, false);
-    for row in drive.rows().map_err(ReplayError::Data)? {
-        let row = row.map_err(ReplayError::Data)?;
+    for row in drive.rows()? {
+        let row = row?;
         tick();
         let heading = row.course.map(reference).or(row.heading.filter(|_| !is_reference));
         is_reference |= row.course.is_some();
@@ -45,14 +44,17 @@ pub fn learn(
         let _ = board.row(&Row { heading, ..row });
     }
     let pipeline = board.coprocessor().pipeline();
-    let counters = pipeline.course_counters();
+    let CourseCounters { used, refused, .. } = pipeline.course_counters();
     if !is_reference && !drive.facts.has_course {
-        return Err(CalibrateError::NoReference { path: path(), columns: "ref_gyr_z, ref_yaw or course" });
+        let reason = "no ref_gyr_z, ref_yaw or course: a calibration needs one of these columns";
+        return Err(DataError::because(&drive.path, reason));
     } else if seconds < SHORTEST_S {
-        return Err(CalibrateError::TooShort { path: path(), seconds });
-    } else if counters.refused > counters.used {
-        let (used, refused) = (counters.used, counters.refused);
-        return Err(CalibrateError::Refused { path: path(), used, refused });
+        return Err(too_short(&drive.path, seconds));
+    } else if refused > used {
+        let reason = format!(
+            "the gyro contradicts {refused} of the courses and fits {used}: `gyronet doctor` says why"
+        );
+        return Err(DataError::because(&drive.path, reason));
     }
     let (share, sigma) = pipeline.gain();
     let gyro_bias = pipeline.gyro_bias().unwrap_or_default().map(AngularRate::rad_per_sec);

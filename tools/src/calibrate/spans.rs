@@ -1,9 +1,10 @@
 //! Spans are pieces of a drive for which the reference gives the angle turned. Over a second or more the noise of the
 //! reference is small compared with the errors that are fitted.
 
-use super::{CalibrateError, SHORTEST_S, STRAIGHT_RAD};
+use super::{SHORTEST_S, STRAIGHT_RAD, too_short};
 use crate::board::Step;
 use crate::drive::DT;
+use crate::drive::error::DataError;
 use gyronet::sample::RATE_HZ;
 use gyronet::units::AngularRate;
 
@@ -60,10 +61,10 @@ impl Spans {
         self.turned
     }
 
-    pub fn finish(self, path: &str) -> Result<Vec<Span>, CalibrateError> {
+    pub fn finish(self, path: &str) -> Result<Vec<Span>, DataError> {
         let seconds = self.spans.iter().map(|span| span.seconds).sum::<f64>();
         if seconds < SHORTEST_S {
-            return Err(CalibrateError::TooShort { path: path.to_owned(), seconds });
+            return Err(too_short(path, seconds));
         }
         Ok(self.spans)
     }

@@ -4,11 +4,12 @@ use super::{Common, named, paint, print_json, progress, remarked, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
 use gyronet_tools::demo::{Demo, Tunnel, write_log};
+use gyronet_tools::drive::error::{DataError, DataFault};
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::drive::word;
 use gyronet_tools::evaluate::outage::EVERY_S;
 use gyronet_tools::evaluate::rates::Rates;
-use gyronet_tools::evaluate::report::{EvaluateError, MARKS, Table};
+use gyronet_tools::evaluate::report::{MARKS, Table};
 use gyronet_tools::evaluate::rest;
 use gyronet_tools::plot::page::grouped;
 use std::error::Error;
@@ -76,7 +77,11 @@ fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -
     let errors = match errors {
         Ok(errors) => Some(errors),
         // A drive without a reference still has its log and its page.
-        Err(error) if matches!(error.downcast_ref(), Some(EvaluateError::NoReference { .. })) => None,
+        Err(error)
+            if matches!(error.downcast_ref(), Some(DataError { fault: DataFault::NoReference, .. })) =>
+        {
+            None
+        }
         Err(error) => return Err(error),
     };
 

@@ -2,6 +2,7 @@
 //! and the column.
 
 use super::recording::Turning;
+use gyronet::bias::StaticError;
 use std::fmt;
 use std::path::Path;
 
@@ -108,6 +109,18 @@ pub enum DataFault {
         .0.line, .0.wheel, .0.rate
     )]
     Moving(Turning),
+    #[error("starts moving: line {line}: {source}")]
+    StartsMoving {
+        /// The line at which the three seconds ended.
+        line: u64,
+        source: StaticError,
+    },
+    #[error("never holds 3 s without a gap, so static initialisation cannot finish")]
+    NeverInitialised,
+    #[error(
+        "no reference to evaluate against: neither a yaw rate (ref_gyr_z, in every row) nor a course (ref_yaw)"
+    )]
+    NoReference,
     #[error("not a valid vehicle file: {reason}")]
     Vehicle { reason: String },
     #[error("{format}, not a drive; import it first: {command}")]

@@ -4,11 +4,10 @@ pub use crate::board::Step;
 
 use crate::board::Board;
 use crate::board::Uncorrected;
-use crate::drive::error::DataError;
+use crate::drive::error::{DataError, DataFault};
 use crate::drive::recording::Recording;
 use crate::drive::stream::{Drive, Rows};
 use crate::drive::wheel_frames::WheelFrames;
-use gyronet::bias::StaticError;
 use gyronet::coprocessor::Config;
 use gyronet::estimate::YawEstimate;
 use gyronet::health::Counters;
@@ -17,23 +16,6 @@ use gyronet::pipeline::PipelineConfig;
 use gyronet::units::{AngularRate, Yaw};
 use std::ops::Range;
 
-/// The reason why a drive cannot be replayed.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ReplayError {
-    #[error(transparent)]
-    Data(#[from] DataError),
-    #[error("{path}: starts moving: line {line}: {source}")]
-    StartsMoving {
-        path: String,
-        /// The line at which the three seconds ended.
-        line: u64,
-        source: StaticError,
-    },
-    #[error("{path}: never holds 3 s without a gap, so static initialisation cannot finish")]
-    NeverInitialised { path: String },
-}
-
 pub struct Steps<'d, N> {
     path: &'d str,
     rows: std::iter::Fuse<Rows<'d>>,
@@ -41,7 +23,7 @@ pub struct Steps<'d, N> {
 }
 
 impl<'d, N: WindowNetwork> Steps<'d, N> {
-    pub fn new(drive: &'d Drive<'_>, board: Board<N>) -> Result<Self, ReplayError> {
+    pub fn new(drive: &'d Drive<'_>, board: Board<N>) -> Result<Self, DataError> {
         Ok(Self { path: &drive.path, rows: drive.rows()?.fuse(), board })
     }
 
@@ -51,16 +33,14 @@ impl<'d, N: WindowNetwork> Steps<'d, N> {
 }
 
 impl<N: WindowNetwork> Iterator for Steps<'_, N> {
-    type Item = Result<Step, ReplayError>;
+    type Item = Result<Step, DataError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
             let Some(row) = self.rows.next() else { return self.board.end().map(Ok) };
-            let step = row.map_err(ReplayError::Data).and_then(|row| {
-                self.board.row(&row).map_err(|source| {
-                    let path = self.path.to_owned();
-                    ReplayError::StartsMoving { path, line: row.line, source }
-                })
+            let step = row.and_then(|row| {
+                let fault = |source| DataFault::StartsMoving { line: row.line, source };
+                self.board.row(&row).map_err(|source| DataError::of(self.path, fault(source)))
             });
             if let Some(step) = step.transpose() {
                 return Some(step);
@@ -70,13 +50,13 @@ impl<N: WindowNetwork> Iterator for Steps<'_, N> {
 }
 
 /// Replays the beginning of a drive until static initialisation has finished, and returns the gyro's bias.
-pub fn initialise(drive: &Drive<'_>) -> Result<[AngularRate; 3], ReplayError> {
+pub fn initialise(drive: &Drive<'_>) -> Result<[AngularRate; 3], DataError> {
     let mut steps = Steps::new(drive, Board::new(Config::DEFAULT, drive.wheels(), Uncorrected))?;
     loop {
         let ended = steps.next().transpose()?.is_none();
         match steps.board.coprocessor().pipeline().gyro_bias() {
             Some(bias) => return Ok(bias),
-            None if ended => return Err(ReplayError::NeverInitialised { path: drive.path.clone() }),
+            None if ended => return Err(DataError::of(&drive.path, DataFault::NeverInitialised)),
             None => {}
         }
     }
@@ -102,7 +82,7 @@ impl Replay {
         config: &PipelineConfig,
         wheels: Option<WheelFrames>,
         network: &mut impl WindowNetwork,
-    ) -> Result<Self, ReplayError> {
+    ) -> Result<Self, DataError> {
         let config = Config { pipeline: *config, ..Config::DEFAULT };
         let drive = Drive::from(recording);
         let mut replayed = Steps::new(&drive, Board::new(config, wheels, network))?;
@@ -110,7 +90,7 @@ impl Replay {
         let pipeline = replayed.board.coprocessor().pipeline();
         let gyro_bias = pipeline
             .gyro_bias()
-            .ok_or_else(|| ReplayError::NeverInitialised { path: recording.path.clone() })?;
+            .ok_or_else(|| DataError::of(&recording.path, DataFault::NeverInitialised))?;
         let start = steps.iter().position(|step| step.is_initialised).unwrap_or(steps.len());
         let (pending, counters) = (pipeline.pending(), *pipeline.counters());
         Ok(Self { steps, start, gyro_bias, pending, counters })
@@ -204,7 +184,10 @@ mod tests {
     fn starting_in_a_turn_is_refused() {
         let recording = recording(1_000, |k| 0.001 * k as f64, usize::MAX);
         let error = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant).unwrap_err();
-        assert!(matches!(error, ReplayError::StartsMoving { line: 301, .. }), "{error:?}");
+        assert!(
+            matches!(error, DataError { fault: DataFault::StartsMoving { line: 301, .. }, .. }),
+            "{error:?}"
+        );
         assert!(error.to_string().starts_with("a.csv: starts moving: line 301: "), "{error}");
     }
 
@@ -213,6 +196,6 @@ mod tests {
         let mut recording = recording(400, |_| 0.01, usize::MAX);
         recording.rows.drain(200..230);
         let error = Replay::run(&recording, &PipelineConfig::DEFAULT, None, &mut Constant).unwrap_err();
-        assert!(matches!(error, ReplayError::NeverInitialised { .. }), "{error:?}");
+        assert!(matches!(error, DataError { fault: DataFault::NeverInitialised, .. }), "{error:?}");
     }
 }

@@ -6,8 +6,9 @@
 //! in motion is read once more before that, for the best constant bias (`rest`).
 
 use crate::board::{Board, Step, Uncorrected};
+use crate::drive::error::{DataError, DataFault};
 use crate::drive::recording::between;
-use crate::drive::replay::{ReplayError, initialise};
+use crate::drive::replay::initialise;
 use crate::drive::stream::Drive;
 use crate::drive::wheel_frames::Speeds;
 use crate::evaluate::angle::integral;
@@ -64,8 +65,8 @@ pub fn run(
     drive: &Drive<'_>,
     networks: Networks<'_>,
     mut visit: impl FnMut(&Sample),
-) -> Result<Comparison, ReplayError> {
-    let at_rest = drive.facts.check_rest(&drive.path).map_err(ReplayError::Data);
+) -> Result<Comparison, DataError> {
+    let at_rest = drive.facts.check_rest(&drive.path);
     let (drive, bias, simulated_rest) = match at_rest.and_then(|()| initialise(drive)) {
         Ok(bias) => (Cow::Borrowed(drive), bias, false),
         Err(error) => {
@@ -88,7 +89,7 @@ pub fn run(
     loop {
         let row = rows.next().transpose()?;
         let refused =
-            |line| move |source| ReplayError::StartsMoving { path: drive.path.clone(), line, source };
+            |line| move |source| DataError::of(&drive.path, DataFault::StartsMoving { line, source });
         let next = |board: &mut Board<_>| match &row {
             Some(row) => board.row(row).map_err(refused(row.line)),
             None => Ok(board.end()),

@@ -1,8 +1,8 @@
 //! The errors and costs of each method on each drive, as a table and as JSON.
 
 use crate::drive::DT;
+use crate::drive::error::{DataError, DataFault};
 use crate::drive::recording;
-use crate::drive::replay::ReplayError;
 use crate::drive::stream::Drive;
 use crate::evaluate::expected_error::ExpectedError;
 use crate::evaluate::heading_error::{AgainstCourse, AgainstRate, Errors, HeadingError, PLAUSIBLE_10S_RAD};
@@ -11,42 +11,6 @@ use crate::evaluate::rates::{self, Networks, Sample};
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
-
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum EvaluateError {
-    #[error(transparent)]
-    Replay(#[from] ReplayError),
-    #[error(
-        "{path}: line {line}: no reference to evaluate against: neither a yaw rate (ref_gyr_z, in every row) nor a \
-        course (ref_yaw)"
-    )]
-    NoReference {
-        path: String,
-        /// The first line without a reference.
-        line: u64,
-    },
-    #[error(
-        "{path}: {column} is known for too short a time in the {seconds:.2} s after static initialisation: at least 1 s of \
-        yaw rate or 20 s of course is needed"
-    )]
-    TooShort {
-        path: String,
-        column: &'static str,
-        /// Length of the drive after static initialisation, s.
-        seconds: f64,
-    },
-    #[error(
-        "{path}: {column} disagrees with the gyro by {rad:.2} rad in 10 s: a wrong unit, sign or clock, or another drive; \
-        `gyronet doctor` says which"
-    )]
-    Disagrees {
-        path: String,
-        column: &'static str,
-        /// The typical difference in 10 s, rad.
-        rad: f64,
-    },
-}
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Row {
@@ -156,13 +120,13 @@ impl DriveErrors {
         drive: &Drive<'_>,
         networks: Networks<'_>,
         mut visit: impl FnMut(&Sample),
-    ) -> Result<Self, EvaluateError> {
+    ) -> Result<Self, DataError> {
         let mut judges = Judges::default();
         let comparison = rates::run(drive, networks, |sample| {
             judges.add(sample);
             visit(sample);
         })?;
-        let path = || drive.path.clone();
+        let refused = |reason: String| Err(DataError::because(&drive.path, reason));
         let Judges { samples, without_rate, has_course, methods, expected_error } = judges;
         let seconds = samples as f64 * DT;
         let (reference, judged): (_, [Option<Errors>; _]) = match without_rate {
@@ -170,14 +134,20 @@ impl DriveErrors {
             Some(_) if has_course => {
                 ("ref_yaw", methods.each_ref().map(|method| method.course.clone().errors()))
             }
-            Some(line) => return Err(EvaluateError::NoReference { path: path(), line }),
+            Some(line) => return Err(DataError::at(&drive.path, line, DataFault::NoReference)),
         };
         let errors = PerMethod::of(judged);
         let Some(still) = errors.get(Method::STATIC) else {
-            return Err(EvaluateError::TooShort { path: path(), column: reference, seconds });
+            return refused(format!(
+                "{reference} is known for too short a time in the {seconds:.2} s after static initialisation: at least 1 s \
+                 of yaw rate or 20 s of course is needed"
+            ));
         };
         if let Some(rad) = still.typical_10s.filter(|rad| *rad > PLAUSIBLE_10S_RAD) {
-            return Err(EvaluateError::Disagrees { path: path(), column: reference, rad });
+            return refused(format!(
+                "{reference} disagrees with the gyro by {rad:.2} rad in 10 s: a wrong unit, sign or clock, or another \
+                 drive; `gyronet doctor` says which"
+            ));
         }
         let methods = PerMethod::new(|method| {
             Some(Row { error: errors.get(method)?.figures, delay_ms: method.delay_ms() })

@@ -9,7 +9,6 @@ use super::Files;
 use super::rows::{Format, Row, Rows};
 use super::summary::StreamSummary;
 use super::track::{Stream, Track, Unwrap};
-use crate::sequence::SequenceFault;
 use gyronet::sample::RATE_HZ;
 use gyronet_tools::drive::error::DataError;
 use std::f64::consts::PI;
@@ -150,7 +149,7 @@ impl EncoderParameters {
                 .and_then(|line| line.split_whitespace().last())
                 .and_then(|word| word.parse().ok())
                 .filter(|value: &f64| value.is_finite() && *value > 0.0);
-            value.ok_or_else(|| DataError::of(&name, SequenceFault::Parameter(parameter).into()))
+            value.ok_or_else(|| DataError::because(&name, format!("no usable parameter {parameter:?}")))
         };
         Ok(Self {
             resolution: number("Encoder resolution", "resolution:")?,

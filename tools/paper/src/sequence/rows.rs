@@ -1,9 +1,8 @@
 //! Reads rows of numbers from a file without a header, one row at a time. A row is a stamp and fields.
 
 use super::summary::StreamSummary;
-use crate::sequence::SequenceFault;
 use csv::ByteRecord;
-use gyronet_tools::drive::error::{DataError, ValueError};
+use gyronet_tools::drive::error::{DataError, DataFault, ValueError};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -79,8 +78,7 @@ impl<const N: usize> Rows<N> {
             }
             let found = self.record.len();
             if found != self.format.columns {
-                let fault = SequenceFault::Columns { found, expected: self.format.columns }.into();
-                return Err(DataError::at(&self.path, line, fault));
+                return Err(self.refused(line, columns(found, self.format.columns)));
             }
             let stamp: i64 = self.field(line, 0)?;
             if stamp < 0 {
@@ -103,22 +101,25 @@ impl<const N: usize> Rows<N> {
                     continue;
                 }
                 if stamp < last {
-                    return Err(DataError::at(
-                        &self.path,
-                        line,
-                        SequenceFault::Backwards { last, at: stamp }.into(),
-                    ));
+                    return Err(self.refused(line, format!("time goes backwards from {last} to {stamp}")));
                 }
                 let seconds = self.seconds(stamp - last);
                 if seconds > MAX_SILENCE {
-                    let fault = SequenceFault::Silent { seconds, most: MAX_SILENCE }.into();
-                    return Err(DataError::at(&self.path, line, fault));
+                    // The rows after it belong to another drive.
+                    let most = format!("a gap of a drive is at most {MAX_SILENCE} s long");
+                    return Err(
+                        self.refused(line, format!("silent for {seconds:.0} s before this row; {most}"))
+                    );
                 }
             }
             self.last = Some(stamp);
             self.summary.row(stamp);
             return Ok(Some(Row { line, stamp, fields }));
         }
+    }
+
+    fn refused(&self, line: u64, reason: String) -> DataError {
+        DataError::at(&self.path, line, DataFault::Other(reason.into()))
     }
 
     fn field<T: std::str::FromStr>(&self, line: u64, column: usize) -> Result<T, DataError> {
@@ -135,6 +136,10 @@ impl<const N: usize> Rows<N> {
         let text = String::from_utf8_lossy(self.bytes(column));
         DataError::value(&self.path, line, column + 1, &text, error)
     }
+}
+
+pub(crate) fn columns(found: usize, expected: usize) -> String {
+    format!("{found} columns, expected {expected}")
 }
 
 /// Returns the length of a file whose last byte is not the end of a line.

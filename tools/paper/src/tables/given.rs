@@ -8,10 +8,9 @@
 
 use super::estimate::{Estimate, Places};
 use crate::sequence::Sequence;
-use crate::sequence::SequenceFault;
 use crate::trajectory::{Pose, Trajectory};
 use gyronet_tools::drive::DT;
-use gyronet_tools::drive::error::DataError;
+use gyronet_tools::drive::error::{DataError, DataFault};
 use gyronet_tools::evaluate::angle::wrap;
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::trajectory_error::Point;
@@ -61,7 +60,8 @@ fn compared(
     sequence: &Sequence,
     start: usize,
 ) -> Result<(Vec<f64>, Vec<Point>), DataError> {
-    let fault = |line, fault| DataError::at(&trajectory.path, line, fault);
+    let refused =
+        |line, reason: String| DataError::at(&trajectory.path, line, DataFault::Other(reason.into()));
     let time = |step: usize| sequence.start_s + step as f64 * DT;
     let first = start.saturating_sub(1);
     let end = time(sequence.steps.len().saturating_sub(1)) - MISSING_END;
@@ -79,7 +79,9 @@ fn compared(
         }
         let seconds = after.time - before.time;
         if seconds > MAX_STEP {
-            return Err(fault(after.line, SequenceFault::FarApart { seconds, most: MAX_STEP }.into()));
+            let late =
+                format!("{seconds:.2} s after the previous pose; at most {MAX_STEP} s can be interpolated");
+            return Err(refused(after.line, late));
         }
         let pose = between(before, after, now);
         let place = [0, 1].map(|axis| pose.position[axis] - sequence.origin[axis]);
@@ -87,16 +89,22 @@ fn compared(
         if number == first {
             let turned = wrap(pose.yaw - truth.yaw);
             if metres > START_TOLERANCE.0 || turned.abs() > START_TOLERANCE.1 {
-                return Err(fault(
+                let degrees = turned.abs().to_degrees();
+                return Err(refused(
                     pose.line,
-                    SequenceFault::Frame { metres, degrees: turned.abs().to_degrees() }.into(),
+                    format!(
+                        "{metres:.2} m and {degrees:.1} deg from the truth at the start: the frames differ"
+                    ),
                 ));
             }
             last = pose.yaw - turned;
             continue;
         }
         if metres > most {
-            return Err(fault(after.line, SequenceFault::Diverged { metres, most }.into()));
+            let far = format!(
+                "{metres:.0} m from the truth, where at most {most:.0} m are possible: it has diverged"
+            );
+            return Err(refused(after.line, far));
         }
         turns.push(pose.yaw - std::mem::replace(&mut last, pose.yaw));
         places.push(place);
@@ -105,8 +113,11 @@ fn compared(
     if places.is_empty() || covered < end {
         let span = |poses: &[Pose]| Some((poses.first()?.time, poses.last()?.time));
         let (from_s, to_s) = span(&trajectory.poses).unwrap_or_default();
-        let fault = SequenceFault::Span { from_s, to_s, begin_s: time(first), end_s: end }.into();
-        return Err(DataError::of(&trajectory.path, fault));
+        let reason = format!(
+            "has poses from {from_s:.2} to {to_s:.2} s, but {:.2} to {end:.2} s are needed: wrong length or clock",
+            time(first)
+        );
+        return Err(DataError::because(&trajectory.path, reason));
     }
     Ok((turns, places))
 }
