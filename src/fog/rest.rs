@@ -35,6 +35,8 @@ const LARGEST: f32 = 9.0;
 /// Noise in a gyro's own unit over that of the data sheet, moving and at rest; degrees for radians are 57.
 const NOISY: f32 = 8.0;
 const OWN_UNIT: f32 = 16.0;
+/// Differences by which the noise of a gyro in another unit has grown beyond that.
+const SETTLED: u8 = 20;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RestOutcome {
@@ -213,7 +215,7 @@ impl RestReading {
         let (earth, Estimate { mean, variance }) = (self.earth.unwrap_or(0.0), self.measured);
         let by_earth = 4.0 * sqrt(variance) + (mean - earth).abs() < 0.5 * earth.abs();
         let usual = OWN_UNIT * self.errors.angle_walk;
-        let by_noise = self.differences > 2 && self.noise <= usual * usual;
+        let by_noise = self.differences > SETTLED && self.noise <= usual * usual;
         self.is_measured() && (by_earth || by_noise)
     }
 

@@ -151,17 +151,18 @@ impl Rest {
     }
 }
 
-/// By the Earth's rate after one mean, or by the noise, in units of the part's, after three.
+/// By the Earth's rate after one mean, or by the noise, in units of the part's, after 20.
 #[test]
 fn a_reading_shows_unit_and_sign() {
     let earth = 5.4e-5;
     let cases = [
         (Some(earth), 1.0, 1.0, 3..60, true),
         (Some(earth), -1.0, 1.0, 3..4, false),
-        (None, 1.0, 1.0, 3..4, false),
-        (None, 1.0, 1.0, 4..60, true),
-        (None, 0.0, 8.0, 10..60, true),
-        (None, 0.0, 57.3, 12..60, false),
+        (None, 1.0, 1.0, 3..22, false),
+        (None, 1.0, 1.0, 22..60, true),
+        (None, 0.0, 8.0, 22..60, true),
+        (None, 0.0, 57.3, 3..60, false),
+        (Some(0.0), 0.0, 57.3, 3..60, false),
     ];
     for (known, share, unit, seconds, shows) in cases {
         let mut rest = Rest::new(known, share * f64::from(earth));
