@@ -1,7 +1,6 @@
 //! Builds the firmware images as `cargo fw` does, so that the tests run the same code as a board: the product with its
 //! boot loader.
 
-use crate::recordings::workspace;
 use crate::require::{self, Need};
 use gyronet_tools::client::device::update::Update;
 use gyronet_tools::target::bench;
@@ -51,7 +50,7 @@ pub fn firmware_for((board, target): (&str, &str), scratch: &str, image: &str) -
         let whole = linked.for_programmer().expect("it was linked for this");
         std::fs::write(&elf, whole).expect("there is room");
     } else {
-        let fresh = bench::build_for((board, target), workspace(), image, &scratch.join(folder));
+        let fresh = bench::build_for((board, target), image, &scratch.join(folder));
         std::fs::copy(fresh.unwrap_or_else(|error| panic!("{error}")), &elf).expect("there is room");
     }
     built.insert(name, elf.clone());

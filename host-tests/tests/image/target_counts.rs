@@ -27,7 +27,7 @@ const BARS: [Bar; 4] = [
 fn kernels_cost_no_more_than_their_bars() {
     let Some(()) = require::qemu() else { return };
     let Some(bench) = image::firmware(env!("CARGO_TARGET_TMPDIR"), bench::IMAGE) else { return };
-    let counts = bench::measure(&bench::workspace(), &bench).unwrap_or_else(|error| panic!("{error}"));
+    let counts = bench::measure(&bench).unwrap_or_else(|error| panic!("{error}"));
     for Bar { name, instructions, cycles } in BARS {
         let count = counts.get(name).expect(name);
         println!("{count:?}");

@@ -28,7 +28,7 @@ use gyronet_tools::drive::recording::{Recording, Row as RecordingRow};
 use gyronet_tools::drive::vehicle::Vehicle;
 use std::fs;
 use std::path::{Path, PathBuf};
-use track::Stream;
+use track::Track;
 
 /// A value interpolated across a longer gap than this is marked, s.
 pub const MAX_GAP: f64 = 0.1;
@@ -91,10 +91,10 @@ pub struct Sequence {
 struct Files {
     /// Time zero of the streams, s since 1970.
     epoch_s: f64,
-    imu: Box<dyn Stream<7>>,
-    fog: Box<dyn Stream<1>>,
-    wheels: Box<dyn Stream<2>>,
-    truth: Box<dyn Stream<3>>,
+    imu: Track<7>,
+    fog: Track<1>,
+    wheels: Track<2>,
+    truth: Track<3>,
     has_gyro: bool,
     has_vendor: bool,
     wheel_base: Option<f64>,
@@ -284,8 +284,8 @@ impl Values {
 impl Files {
     /// Returns the time of the first row of the inertial sensor for which all files have data.
     fn begin(&mut self) -> Result<f64, DataError> {
-        let others = [self.fog.first(), self.wheels.first(), self.truth.first()];
-        let begin = others.into_iter().fold(self.imu.first(), f64::max);
+        let others = [self.fog.first, self.wheels.first, self.truth.first];
+        let begin = others.into_iter().fold(self.imu.first, f64::max);
         self.imu.at(begin)?;
         Ok(self.imu.reached().max(begin))
     }

@@ -28,14 +28,13 @@ struct Run {
 }
 
 impl Run {
-    fn new(set: &str, names: &[&str]) -> Self {
+    fn new(names: &[&str]) -> Self {
         let run = Self { folder: tempfile::tempdir().unwrap() };
         let program = run.path("program");
         fs::write(&program, PROGRAM).unwrap();
         Command::new("chmod").args(["+x", &program]).status().unwrap();
         for name in names {
-            let inner = if set == "kaist" { "sensor_data/fog.csv" } else { "kvh.csv" };
-            let file = PathBuf::from(run.path("data")).join(name).join(inner);
+            let file = PathBuf::from(run.path("data")).join(name).join("sensor_data/fog.csv");
             fs::create_dir_all(file.parent().unwrap()).unwrap();
             fs::write(file, "1").unwrap();
         }
@@ -46,13 +45,13 @@ impl Run {
         self.folder.path().join(name).display().to_string()
     }
 
-    fn make(&self, set: &str, failing: &str) -> Option<(Output, Vec<String>)> {
+    fn make(&self, failing: &str) -> Option<(Output, Vec<String>)> {
         let (ran, program) = (self.path("ran"), self.path("program"));
         fs::write(&ran, "").unwrap();
         let output = Command::new("make")
             .args(["-k", "-f", concat!(env!("CARGO_MANIFEST_DIR"), "/Makefile")])
             .args([
-                format!("SET={set}"),
+                "SET=kaist".into(),
                 format!("DATA={}", self.path("data")),
                 format!("OUT={}", self.path("out")),
             ])
@@ -79,8 +78,8 @@ const KAIST: [&str; 6] = ["urban06", "urban07-city", "urban14", "urban18", "urba
 
 #[test]
 fn steps_run_once_and_again_for_what_has_changed() {
-    let run = Run::new("kaist", &KAIST);
-    let Some((output, ran)) = run.make("kaist", "") else { return };
+    let run = Run::new(&KAIST);
+    let Some((output, ran)) = run.make("") else { return };
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert!(text(&output.stdout).contains("urban08 urban09"), "missing ones are named");
     let find = |start: &str| ran.iter().find(|line| line.starts_with(start)).expect(start).as_str();
@@ -96,13 +95,13 @@ fn steps_run_once_and_again_for_what_has_changed() {
     assert_eq!((ran.len(), rates), (17, 3), "{ran:#?}");
     assert!(!ran.iter().any(|line| line.contains("urban38")), "not in the paper");
 
-    let (_, again) = run.make("kaist", "").unwrap();
+    let (_, again) = run.make("").unwrap();
     assert!(again.is_empty(), "{again:#?}");
     // A test sequence: nothing of ours is trained on it.
     let changed = run.path("data/urban18/sensor_data/fog.csv");
     let later = std::time::SystemTime::now() + std::time::Duration::from_secs(1);
     fs::File::options().append(true).open(changed).unwrap().set_modified(later).unwrap();
-    let (_, again) = run.make("kaist", "").unwrap();
+    let (_, again) = run.make("").unwrap();
     let starts: Vec<_> = again.iter().map(|line| line.split(" --").next().unwrap()).collect();
     assert!(again[0].starts_with("import data/urban18"), "{again:#?}");
     assert!(starts.contains(&"-m gyronet_train.lwoi") && !starts.contains(&"-m gyronet_train.fognet"));
@@ -110,8 +109,8 @@ fn steps_run_once_and_again_for_what_has_changed() {
 
 #[test]
 fn a_failed_step_is_named_and_the_others_go_on() {
-    let run = Run::new("kaist", &KAIST);
-    let Some((output, ran)) = run.make("kaist", "--stem fognet") else { return };
+    let run = Run::new(&KAIST);
+    let Some((output, ran)) = run.make("--stem fognet") else { return };
     let error = text(&output.stderr);
     assert!(
         !output.status.success() && error.contains("out/networks/fognet.safetensors] Error 1"),
@@ -121,14 +120,14 @@ fn a_failed_step_is_named_and_the_others_go_on() {
         assert!(ran.iter().any(|line| line.starts_with(step)), "{step}: {ran:#?}");
     }
     assert!(!ran.iter().any(|line| line.starts_with("tables")), "{ran:#?}");
-    let (output, ran) = run.make("kaist", "").unwrap();
+    let (output, ran) = run.make("").unwrap();
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert_eq!(ran.len(), 3, "FoGNet, its weights, the tables: {ran:#?}");
 }
 
 #[test]
 fn a_set_needs_its_roles() {
-    let Some((output, _)) = Run::new("kaist", &["urban06"]).make("kaist", "") else { return };
+    let Some((output, _)) = Run::new(&["urban06"]).make("") else { return };
     assert!(
         text(&output.stderr).contains("one of urban14 urban15 urban16 urban17"),
         "{}",

@@ -26,12 +26,11 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let workspace = bench::workspace();
     let folder = bench::target_folder();
     if let Some(sources) = &args.cmsis_nn {
-        return compare(&workspace, &folder, sources, common);
+        return compare(&folder, sources, common);
     }
-    let counts = measure(&workspace, &folder)?;
+    let counts = measure(&folder)?;
     let out = &mut io::stdout().lock();
     let written = if common.json { writeln!(out, "{}", json(&counts)) } else { print(out, &counts) };
     // A failed check is reported even if the output could not be written.
@@ -41,8 +40,8 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     Ok(written?)
 }
 
-fn measure(workspace: &Path, folder: &Path) -> Result<Counts, bench::BenchError> {
-    bench::measure(workspace, &bench::build(workspace, bench::IMAGE, folder)?)
+fn measure(folder: &Path) -> Result<Counts, bench::BenchError> {
+    bench::measure(&bench::build(bench::IMAGE, folder)?)
 }
 
 fn print(out: &mut impl Write, counts: &Counts) -> io::Result<()> {
@@ -61,10 +60,10 @@ fn json(counts: &Counts) -> serde_json::Value {
 }
 
 /// Prints GyroNet's window by our kernels and by CMSIS-NN's.
-fn compare(workspace: &Path, folder: &Path, sources: &Path, common: Common) -> super::Result {
+fn compare(folder: &Path, sources: &Path, common: Common) -> super::Result {
     // CMSIS-NN first: where its sources or its compiler are missing, nothing of ours is built.
-    let (theirs, compiler) = cmsis_nn::measure(workspace, sources)?;
-    let counts = measure(workspace, folder)?;
+    let (theirs, compiler) = cmsis_nn::measure(sources)?;
+    let counts = measure(folder)?;
     let ours = counts.get("gyronet/window").ok_or("the bench image has printed no window")?;
     let Count { name, instructions, cycles, .. } = ours;
     let out = &mut io::stdout().lock();

@@ -22,10 +22,9 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, common: Common) -> super::Result {
-    let workspace = bench::workspace();
     let elf = match &args.elf {
         Some(elf) => elf.clone(),
-        None => bench::build(&workspace, "coprocessor", &bench::target_folder())?,
+        None => bench::build("coprocessor", &bench::target_folder())?,
     };
     let image = read(&elf)?;
     let size = ImageSize::read(&image).map_err(|error| DataError::because(elf.display(), error))?;

@@ -33,6 +33,7 @@ pub use survey::{Facts, Survey};
 
 use crate::drive::error::DataError;
 use crate::drive::foreign;
+use crate::drive::stream::Drive;
 use crate::drive::vehicle::Vehicle;
 use gyronet::heading::Heading;
 use gyronet::sample::ImuSample;
@@ -85,21 +86,10 @@ impl Recording {
     }
 
     fn of(path: &str, input: impl std::io::Read, vehicle: Vehicle) -> Result<Self, DataError> {
-        let (mut survey, mut rows) = (Survey::default(), Vec::new());
-        for row in Reader::new(path, input)?.mounted(&vehicle) {
-            let row = row?;
-            survey.row(&row);
-            rows.push(row);
-        }
-        let mut facts = survey.finish(path)?;
-        if facts.is_off_grid {
-            rows = resampled(path, rows.into_iter().map(Ok)).collect::<Result<_, _>>()?;
-            facts = Survey::of(&rows).finish(path)?;
-        }
-        facts.check_rest(path)?;
-        let bias = facts.reference_bias.unwrap_or_default();
-        rows.iter_mut().for_each(|row| row.reference = row.reference.map(|rate| rate - bias));
-        Ok(Self { path: path.to_owned(), rows, missing: facts.missing, vehicle })
+        let drive = Drive::of(path, input, vehicle, None)?;
+        drive.facts.check_rest(path)?;
+        let (rows, missing) = (drive.rows()?.collect::<Result<_, _>>()?, drive.facts.missing);
+        Ok(Self { path: path.to_owned(), rows, missing, vehicle: drive.vehicle.into_owned() })
     }
 
     pub fn facts(&self) -> Facts {

@@ -34,7 +34,7 @@ pub struct Drive<'a> {
 
 /// Where the rows come from.
 #[derive(Debug, Clone)]
-enum Source<'a> {
+pub(super) enum Source<'a> {
     File(PathBuf),
     Memory(Cow<'a, [Row]>),
 }
@@ -56,23 +56,32 @@ impl Drive<'static> {
 
     /// Opens a drive that may begin in motion.
     pub fn open_moving(path: &Path) -> Result<Self, DataError> {
-        let name = path.display().to_string();
         let file = foreign::open(path)?;
-        let vehicle = Vehicle::of_drive(path)?;
         let again = file.metadata().is_ok_and(|metadata| metadata.is_file());
+        let again = again.then(|| Source::File(path.to_owned()));
+        Self::of(&path.display().to_string(), file, Vehicle::of_drive(path)?, again)
+    }
+
+    /// Reads a drive from an input, which is kept in memory unless it can be read `again`.
+    pub(super) fn of(
+        path: &str,
+        input: impl std::io::Read,
+        vehicle: Vehicle,
+        again: Option<Source<'static>>,
+    ) -> Result<Self, DataError> {
         let (mut survey, mut kept) = (Survey::default(), Vec::new());
-        for row in Reader::new(&name, file)?.mounted(&vehicle) {
+        for row in Reader::new(path, input)?.mounted(&vehicle) {
             let row = row?;
             survey.row(&row);
-            if !again {
+            if again.is_none() {
                 kept.push(row);
             }
         }
-        let facts = survey.finish(&name)?;
-        let source = if again { Source::File(path.to_owned()) } else { Source::Memory(Cow::Owned(kept)) };
-        let (vehicle, before) = (Cow::Owned(vehicle), Vec::new());
-        let is_off_grid = facts.is_off_grid;
-        let mut drive = Self { path: name, vehicle, facts, is_off_grid, gyro_map: None, before, source };
+        let facts = survey.finish(path)?;
+        let source = again.unwrap_or(Source::Memory(Cow::Owned(kept)));
+        let (vehicle, before, is_off_grid) = (Cow::Owned(vehicle), Vec::new(), facts.is_off_grid);
+        let path = path.to_owned();
+        let mut drive = Self { path, vehicle, facts, is_off_grid, gyro_map: None, before, source };
         if is_off_grid {
             let mut survey = Survey::default();
             drive.facts.reference_bias = None;

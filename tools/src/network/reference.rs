@@ -25,23 +25,26 @@ impl LstmWeights<'_> {
     }
 }
 
-/// Runs one direction over `x` (T, I) from a zero state; writes `h` into columns `offset..offset + H` of `output` (T,
-/// W). Fewer inputs and units take the first columns. Panics when a slice has another shape.
-pub fn lstm<const I: usize, const H: usize, const W: usize>(
-    weights: &LstmWeights<'_>,
-    x: &[[f32; I]],
-    backward: bool,
-    output: &mut [[f32; W]],
-    offset: usize,
-) {
-    let units = weights.units();
-    let [mut h, mut next, mut s] = [[0.0; H]; 3];
-    for n in 0..x.len() {
-        let t = if backward { x.len() - 1 - n } else { n };
-        step(weights, &x[t], &h, &mut s, &mut next);
-        h = next;
-        output[t][offset..offset + units].copy_from_slice(&h[..units]);
+/// Runs both directions, forward and backward, over `x` (T, I) from a zero state; returns the hidden states (T, W), those of
+/// the backward direction behind those of the forward one. Fewer inputs and units take the first columns. Panics when a
+/// slice has another shape.
+pub fn bilstm<const I: usize, const H: usize, const W: usize, const T: usize>(
+    directions: &[LstmWeights<'_>; 2],
+    x: &[[f32; I]; T],
+) -> [[f32; W]; T] {
+    let mut output = [[0.0; W]; T];
+    for (weights, backward) in directions.iter().zip([false, true]) {
+        let units = weights.units();
+        let offset = if backward { units } else { 0 };
+        let [mut h, mut next, mut s] = [[0.0; H]; 3];
+        for n in 0..T {
+            let t = if backward { T - 1 - n } else { n };
+            step(weights, &x[t], &h, &mut s, &mut next);
+            h = next;
+            output[t][offset..offset + units].copy_from_slice(&h[..units]);
+        }
     }
+    output
 }
 
 /// Computes a step of all units: of input `x` (I), hidden state `h` and cell state `s` (H) the next `h`.

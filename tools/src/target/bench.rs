@@ -102,8 +102,8 @@ pub fn target_installed(target: &str) -> Result<(), String> {
 }
 
 /// Builds an image of the firmware for the emulated board under `folder` and returns its path.
-pub fn build(workspace: &Path, image: &str, folder: &Path) -> Result<PathBuf, BenchError> {
-    build_for(("netduino-plus-2", TARGET), workspace, image, folder)
+pub fn build(image: &str, folder: &Path) -> Result<PathBuf, BenchError> {
+    build_for(("netduino-plus-2", TARGET), image, folder)
 }
 
 /// Builds image and boot loader of `package`, the NUCLEO-H563ZI's folder or a copy of it, under `folder`, and returns the
@@ -117,14 +117,9 @@ pub fn build_banks(package: &Path, folder: &Path) -> Result<PathBuf, BenchError>
     Ok(folder.join(TARGET).join("release"))
 }
 
-pub fn build_for(
-    (board, target): (&str, &str),
-    workspace: &Path,
-    image: &str,
-    folder: &Path,
-) -> Result<PathBuf, BenchError> {
+pub fn build_for((board, target): (&str, &str), image: &str, folder: &Path) -> Result<PathBuf, BenchError> {
     let mut cargo = Command::new(std::env::var_os("CARGO").as_deref().unwrap_or(OsStr::new("cargo")));
-    cargo.current_dir(workspace).args([
+    cargo.current_dir(workspace()).args([
         "build",
         "--release",
         "--quiet",
@@ -143,8 +138,8 @@ pub fn build_for(
 }
 
 /// Runs the bench image with the plugin and combines its output with the plugin's counts.
-pub fn measure(workspace: &Path, image: &Path) -> Result<Counts, BenchError> {
-    let (stdout, mut regions) = regions(workspace, MACHINE, image)?;
+pub fn measure(image: &Path) -> Result<Counts, BenchError> {
+    let (stdout, mut regions) = regions(MACHINE, image)?;
     let mut counts = Counts::default();
     for line in stdout.lines() {
         let unexpected = || BenchError::Line(line.to_owned());
@@ -162,20 +157,19 @@ pub fn measure(workspace: &Path, image: &Path) -> Result<Counts, BenchError> {
 
 /// Runs an image with the plugin; returns the image's output, and instructions and cycles of each region.
 pub(super) fn regions(
-    workspace: &Path,
     machine: &str,
     image: &Path,
 ) -> Result<(String, impl Iterator<Item = (u64, u64)>), BenchError> {
-    let plugin = plugin(workspace)?;
+    let plugin = plugin()?;
     let (stdout, stderr) = emulate(machine, image, &["-plugin", &plugin.display().to_string()])?;
     let counts = stderr.lines().filter(|line| line.starts_with("REGION"));
     let counts = counts.filter_map(|line| Some((field(line, "insns=")?, field(line, "m4cycles~")?)));
     Ok((stdout, counts.collect::<Vec<_>>().into_iter()))
 }
 
-fn plugin(workspace: &Path) -> Result<PathBuf, BenchError> {
-    let library = scratch(workspace)?.join("m4count.so");
-    let source = workspace.join("tools/bench/m4count.c");
+fn plugin() -> Result<PathBuf, BenchError> {
+    let library = scratch()?.join("m4count.so");
+    let source = workspace().join("tools/bench/m4count.c");
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_owned());
     let mut cc = Command::new(compiler);
     cc.args(["-O2", "-shared", "-fPIC", "-o"]).arg(&library).arg(source);
@@ -184,8 +178,8 @@ fn plugin(workspace: &Path) -> Result<PathBuf, BenchError> {
 }
 
 /// Returns the folder for what the bench compiles from C.
-pub(super) fn scratch(workspace: &Path) -> Result<PathBuf, BenchError> {
-    let folder = workspace.join("target");
+pub(super) fn scratch() -> Result<PathBuf, BenchError> {
+    let folder = workspace().join("target");
     let program = || format!("a bench in {}", folder.display());
     std::fs::create_dir_all(&folder).map_err(|source| BenchError::Start { program: program(), source })?;
     Ok(folder)

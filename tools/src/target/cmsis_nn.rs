@@ -56,8 +56,8 @@ pub struct Region {
 }
 
 /// Builds and runs the image from the CMSIS-NN in `folder`; returns its regions and the compiler's version.
-pub fn measure(workspace: &Path, folder: &Path) -> Result<(Vec<Region>, String), CmsisError> {
-    let bench = workspace.join("tools/bench");
+pub fn measure(folder: &Path) -> Result<(Vec<Region>, String), CmsisError> {
+    let bench = bench::workspace().join("tools/bench");
     let mut gcc = Command::new(COMPILER);
     gcc.args([
         "-O3",
@@ -80,9 +80,9 @@ pub fn measure(workspace: &Path, folder: &Path) -> Result<(Vec<Region>, String),
         Command::new(COMPILER).arg("-dumpfullversion").output().map_err(|_| CmsisError::NoCompiler)?;
     // Vectors and code at the start of the board's flash, data in its RAM.
     gcc.args(["-Wl,--section-start=.vectors=0", "-Wl,-Ttext=0x100", "-Wl,-Tdata=0x20000000", "-Wl,-e,reset"]);
-    let image = bench::scratch(workspace)?.join("cmsis_nn.elf");
+    let image = bench::scratch()?.join("cmsis_nn.elf");
     bench::run(gcc.arg("-o").arg(&image))?;
-    let (printed, counts) = bench::regions(workspace, MACHINE, &image)?;
+    let (printed, counts) = bench::regions(MACHINE, &image)?;
     let names: Vec<&str> = printed.lines().collect();
     let counts: Vec<(u64, u64)> = counts.collect();
     if names.len() != counts.len() || names.iter().any(|name| name.starts_with("FAILED")) {

@@ -70,7 +70,7 @@ impl Linked {
             return Err(FirmwareFileError::Board { name: board.to_owned(), boards });
         }
         let build = |features: &str, image: &str| -> Result<Vec<u8>, FirmwareFileError> {
-            Ok(read(&bench::build_for((features, TARGET), &bench::workspace(), image, folder)?)?)
+            Ok(read(&bench::build_for((features, TARGET), image, folder)?)?)
         };
         let boot = build(board, "boot")?;
         let features = [board.to_owned(), format!("{board},slot-b")];

@@ -6,9 +6,8 @@
 //! Sources: the readers irapkaist/file_player and tsyxyz/kaist2bag, and the data set's page.
 
 use super::Files;
-use super::rows::{Format, Row, Rows};
-use super::summary::StreamSummary;
-use super::track::{Stream, Track, Unwrap};
+use super::rows::{Format, Rows};
+use super::track::{Track, Unwrap};
 use gyronet::sample::RATE_HZ;
 use gyronet_tools::drive::error::DataError;
 use std::f64::consts::PI;
@@ -18,21 +17,20 @@ use std::path::Path;
 
 const NANOS: f64 = 1e9;
 /// The used columns are the quaternion x, y, z, w, and, after the Euler angles, angular rate and specific force.
-const IMU: Format<10> = Format {
+const IMU: Format = Format {
     columns: 17,
-    used: [1, 2, 3, 4, 8, 9, 10, 11, 12, 13],
+    used: &[1, 2, 3, 4, 8, 9, 10, 11, 12, 13],
     stamps_per_second: NANOS,
     nominal_hz: RATE_HZ as f64,
 };
 /// The early sequences have only the vendor's orientation.
-const ORIENTATION: Format<4> =
-    Format { columns: 8, used: [1, 2, 3, 4], stamps_per_second: NANOS, nominal_hz: RATE_HZ as f64 };
+const ORIENTATION: Format =
+    Format { columns: 8, used: &[1, 2, 3, 4], stamps_per_second: NANOS, nominal_hz: RATE_HZ as f64 };
 /// The used column is the yaw increment.
-const FOG: Format<1> = Format { columns: 4, used: [3], stamps_per_second: NANOS, nominal_hz: 1000.0 };
-const ENCODER: Format<2> = Format { columns: 3, used: [1, 2], stamps_per_second: NANOS, nominal_hz: 100.0 };
+const FOG: Format = Format { columns: 4, used: &[3], stamps_per_second: NANOS, nominal_hz: 1000.0 };
+const ENCODER: Format = Format { columns: 3, used: &[1, 2], stamps_per_second: NANOS, nominal_hz: 100.0 };
 /// The used columns are r11, r21, x and y of three rows of rotation and position.
-const POSE: Format<4> =
-    Format { columns: 13, used: [1, 5, 4, 8], stamps_per_second: NANOS, nominal_hz: 100.0 };
+const POSE: Format = Format { columns: 13, used: &[1, 5, 4, 8], stamps_per_second: NANOS, nominal_hz: 100.0 };
 /// A wheel speed above this means that the wheel's counter was reset, m/s.
 const IMPOSSIBLE_SPEED: f64 = 100.0;
 
@@ -44,73 +42,36 @@ pub(super) fn open(folder: &Path) -> Result<Files, DataError> {
     let [imu, fog, encoder, pose] = PATHS.map(|path| folder.join(path));
     let parameters = EncoderParameters::read(&folder.join(CALIBRATION))?;
     let has_gyro = columns(&imu)? != ORIENTATION.columns;
-    let (imu, first) = if has_gyro { whole(&imu)? } else { orientation(&imu)? };
-    let epoch = Some(first);
-    let mut turned = 0.0;
-    let fog = Track::new(
-        Rows::open(&fog, FOG)?,
-        epoch,
-        Box::new(move |row: &Row<1>, _, _| {
-            turned += row.fields[0];
-            [turned]
-        }),
-    )?;
-    let mut wheels = Encoder::new(parameters);
-    let encoder = Track::new(
-        Rows::open(&encoder, ENCODER)?,
-        epoch,
-        Box::new(move |row: &Row<2>, time, summary| {
-            let (metres, reset) = wheels.metres(row.fields, time);
-            if reset {
-                summary.resets.count(row.line);
-            }
-            metres
-        }),
-    )?;
-    let mut heading = Unwrap::default();
-    let truth = Track::new(
-        Rows::open(&pose, POSE)?,
-        epoch,
-        Box::new(move |row: &Row<4>, _, _| {
-            let [r11, r21, x, y] = row.fields;
-            // The nearest proper rotation has the same quotient of the two, however few digits are printed.
-            [x, y, heading.angle(libm::atan2(r21, r11))]
-        }),
-    )?;
-    Ok(Files {
-        epoch_s: first as f64 / NANOS,
-        imu,
-        fog: Box::new(fog),
-        wheels: Box::new(encoder),
-        truth: Box::new(truth),
-        has_gyro,
-        has_vendor: true,
-        wheel_base: Some(parameters.base),
-    })
-}
-
-/// The stream of the inertial sensor, and its first stamp.
-type Imu = (Box<dyn Stream<7>>, i64);
-
-fn whole(path: &Path) -> Result<Imu, DataError> {
     let mut vendor = Unwrap::default();
-    let convert = move |row: &Row<10>, _: f64, _: &mut StreamSummary| {
+    // Without a gyro the fields behind the attitude are zeros.
+    let imu = Rows::open(&imu, if has_gyro { IMU } else { ORIENTATION })?;
+    let imu = Track::new(imu, None, move |row, _, _| {
         let [qx, qy, qz, qw, wx, wy, wz, fx, fy, fz] = row.fields;
         [fx, fy, fz, wx, wy, wz, vendor.angle(yaw([qx, qy, qz, qw]))]
-    };
-    let track = Track::new(Rows::open(path, IMU)?, None, Box::new(convert))?;
-    let epoch = track.epoch();
-    Ok((Box::new(track), epoch))
-}
-
-fn orientation(path: &Path) -> Result<Imu, DataError> {
-    let mut vendor = Unwrap::default();
-    let convert = move |row: &Row<4>, _: f64, _: &mut StreamSummary| {
-        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, vendor.angle(yaw(row.fields))]
-    };
-    let track = Track::new(Rows::open(path, ORIENTATION)?, None, Box::new(convert))?;
-    let epoch = track.epoch();
-    Ok((Box::new(track), epoch))
+    })?;
+    let epoch = Some(imu.epoch);
+    let mut turned = 0.0;
+    let fog = Track::new(Rows::open(&fog, FOG)?, epoch, move |row, _, _| {
+        turned += row.fields[0];
+        [turned]
+    })?;
+    let mut wheels = Encoder::new(parameters);
+    let encoder = Track::new(Rows::open(&encoder, ENCODER)?, epoch, move |row, time, summary| {
+        let [left, right, ..] = row.fields;
+        let (metres, reset) = wheels.metres([left, right], time);
+        if reset {
+            summary.resets.count(row.line);
+        }
+        metres
+    })?;
+    let mut heading = Unwrap::default();
+    let truth = Track::new(Rows::open(&pose, POSE)?, epoch, move |row, _, _| {
+        let [r11, r21, x, y, ..] = row.fields;
+        // The nearest proper rotation has the same quotient of the two, however few digits are printed.
+        [x, y, heading.angle(libm::atan2(r21, r11))]
+    })?;
+    let (epoch_s, wheel_base) = (imu.epoch as f64 / NANOS, Some(parameters.base));
+    Ok(Files { epoch_s, imu, fog, wheels: encoder, truth, has_gyro, has_vendor: true, wheel_base })
 }
 
 pub(crate) fn yaw([x, y, z, w]: [f64; 4]) -> f64 {

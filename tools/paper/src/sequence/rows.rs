@@ -11,27 +11,30 @@ use std::path::Path;
 const MAX_VALUE: f64 = 1e12;
 /// A file with a longer gap is not a single drive, s.
 const MAX_SILENCE: f64 = 600.0;
+/// Most columns of a file that are used.
+const MOST: usize = 10;
 
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Format<const N: usize> {
+pub(super) struct Format {
     /// Number of columns, including that of the stamp.
     pub columns: usize,
     /// Indices of the used columns; the stamp is column 0.
-    pub used: [usize; N],
+    pub used: &'static [usize],
     pub stamps_per_second: f64,
     pub nominal_hz: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Row<const N: usize> {
+pub(super) struct Row {
     pub line: u64,
     pub stamp: i64,
-    pub fields: [f64; N],
+    /// The used columns, and zeros.
+    pub fields: [f64; MOST],
 }
 
-pub(super) struct Rows<const N: usize> {
+pub(super) struct Rows {
     path: String,
-    format: Format<N>,
+    format: Format,
     csv: csv::Reader<File>,
     record: ByteRecord,
     last: Option<i64>,
@@ -40,8 +43,8 @@ pub(super) struct Rows<const N: usize> {
     pub summary: StreamSummary,
 }
 
-impl<const N: usize> Rows<N> {
-    pub fn open(path: &Path, format: Format<N>) -> Result<Self, DataError> {
+impl Rows {
+    pub fn open(path: &Path, format: Format) -> Result<Self, DataError> {
         let name = path.display().to_string();
         let cut_at = File::open(path).and_then(cut).map_err(|source| DataError::open(&name, source))?;
         let file = File::open(path).map_err(|source| DataError::open(&name, source))?;
@@ -65,7 +68,7 @@ impl<const N: usize> Rows<N> {
     }
 
     /// Returns the next good row. Skipped rows are counted in the summary.
-    pub fn next_row(&mut self) -> Result<Option<Row<N>>, DataError> {
+    pub fn next_row(&mut self) -> Result<Option<Row>, DataError> {
         loop {
             let io = |error: csv::Error| DataError::of(&self.path, std::io::Error::other(error).into());
             if !self.csv.read_byte_record(&mut self.record).map_err(io)? {
@@ -84,9 +87,9 @@ impl<const N: usize> Rows<N> {
             if stamp < 0 {
                 return Err(self.value(line, 0, ValueError::OutOfRange));
             }
-            let mut fields = [0.0_f64; N];
+            let mut fields = [0.0_f64; MOST];
             for (field, column) in fields.iter_mut().zip(self.format.used) {
-                *field = self.field(line, column)?;
+                *field = self.field(line, *column)?;
             }
             if fields.iter().any(|field| !field.is_finite()) {
                 self.summary.not_finite.count(line);

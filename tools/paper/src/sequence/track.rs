@@ -9,19 +9,7 @@ use super::summary::StreamSummary;
 use gyronet_tools::drive::error::{DataError, DataFault};
 
 /// Converts a row's fields, at a time in s, to the interpolated values; the function may keep state between rows.
-pub(super) type Convert<const N: usize, const M: usize> =
-    Box<dyn FnMut(&Row<N>, f64, &mut StreamSummary) -> [f64; M]>;
-
-/// A stream of M values of a file, read at ascending times.
-pub(super) trait Stream<const M: usize> {
-    /// Returns the time of the first row, s since the epoch.
-    fn first(&self) -> f64;
-    /// Returns the value at a time, s since the epoch; `None` beyond the end of the file.
-    fn at(&mut self, time: f64) -> Result<Option<Value<M>>, DataError>;
-    /// Returns the time of the newest row that was read.
-    fn reached(&self) -> f64;
-    fn finish(self: Box<Self>) -> Result<StreamSummary, DataError>;
-}
+type Convert<const M: usize> = Box<dyn FnMut(&Row, f64, &mut StreamSummary) -> [f64; M]>;
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Value<const M: usize> {
@@ -30,30 +18,32 @@ pub(super) struct Value<const M: usize> {
     pub gap: f64,
 }
 
-/// Interpolates M values from N fields of a file.
-pub(super) struct Track<const N: usize, const M: usize> {
-    rows: Rows<N>,
-    convert: Convert<N, M>,
-    epoch: i64,
-    first: f64,
+/// A stream of M values of a file, read at ascending times.
+pub(super) struct Track<const M: usize> {
+    rows: Rows,
+    convert: Convert<M>,
+    /// The stamp of time zero.
+    pub epoch: i64,
+    /// The time of the first row, s since the epoch.
+    pub first: f64,
     before: (f64, [f64; M]),
     after: (f64, [f64; M]),
 }
 
-impl<const N: usize, const M: usize> Track<N, M> {
+impl<const M: usize> Track<M> {
     /// Reads the first row; without an epoch, its stamp becomes the epoch.
-    pub fn new(mut rows: Rows<N>, epoch: Option<i64>, mut convert: Convert<N, M>) -> Result<Self, DataError> {
+    pub fn new(
+        mut rows: Rows,
+        epoch: Option<i64>,
+        convert: impl FnMut(&Row, f64, &mut StreamSummary) -> [f64; M] + 'static,
+    ) -> Result<Self, DataError> {
         let first = rows.next_row()?;
         let Some(row) = first else { return Err(DataError::of(rows.path(), DataFault::Empty)) };
         let epoch = epoch.unwrap_or(row.stamp);
         let time = rows.seconds(row.stamp - epoch);
+        let mut convert: Convert<M> = Box::new(convert);
         let now = (time, convert(&row, time, &mut rows.summary));
         Ok(Self { rows, convert, epoch, first: time, before: now, after: now })
-    }
-
-    /// Returns the stamp of time zero.
-    pub fn epoch(&self) -> i64 {
-        self.epoch
     }
 
     fn advance(&mut self) -> Result<bool, DataError> {
@@ -63,14 +53,9 @@ impl<const N: usize, const M: usize> Track<N, M> {
         self.after = (time, (self.convert)(&row, time, &mut self.rows.summary));
         Ok(true)
     }
-}
 
-impl<const N: usize, const M: usize> Stream<M> for Track<N, M> {
-    fn first(&self) -> f64 {
-        self.first
-    }
-
-    fn at(&mut self, time: f64) -> Result<Option<Value<M>>, DataError> {
+    /// Returns the value at a time, s since the epoch; `None` beyond the end of the file.
+    pub fn at(&mut self, time: f64) -> Result<Option<Value<M>>, DataError> {
         while self.after.0 < time {
             if !self.advance()? {
                 return Ok(None);
@@ -83,11 +68,12 @@ impl<const N: usize, const M: usize> Stream<M> for Track<N, M> {
         Ok(Some(Value { values, gap: span }))
     }
 
-    fn reached(&self) -> f64 {
+    /// Returns the time of the newest row that was read.
+    pub fn reached(&self) -> f64 {
         self.after.0
     }
 
-    fn finish(mut self: Box<Self>) -> Result<StreamSummary, DataError> {
+    pub fn finish(mut self) -> Result<StreamSummary, DataError> {
         while self.advance()? {}
         Ok(self.rows.summary)
     }

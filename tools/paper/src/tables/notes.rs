@@ -54,7 +54,7 @@ pub fn orientation(set: &[&SequenceErrors], means: &ByMethod) -> Vec<String> {
 
 pub fn rivals(set: &[&SequenceErrors]) -> Vec<String> {
     let own = paper::average(&paper::RINS_W);
-    let printed = paper::RINS_W_AVERAGE.figures;
+    let (_, printed) = paper::RINS_W_AVERAGE;
     let averages = format!(
         "The paper's averages of RINS-W do not follow from its rows: those give {:.1} and {:.1}, printed are {} and {}.",
         own[0], own[1], printed[0], printed[1]

@@ -54,7 +54,7 @@ pub fn tables(results: &Results) -> Vec<Table> {
     let with_rivals: Vec<&SequenceErrors> = first
         .iter()
         .copied()
-        .filter(|s| s.simulated || paper::RINS_W.iter().any(|line| line.name == s.name))
+        .filter(|s| s.simulated || paper::RINS_W.iter().any(|(name, _)| *name == s.name))
         .collect();
     tables.extend(some(&with_rivals, rivals).filter(|table| !table.columns.is_empty()));
     for (group, what) in [
@@ -83,9 +83,9 @@ fn methods_of(set: &[&SequenceErrors], is_wanted: impl Fn(&Method) -> bool) -> V
 }
 
 fn lines(lines: &[Line]) -> Vec<Row> {
-    let row = |line: &Line| Row {
-        name: line.name.to_owned(),
-        figures: line.figures.iter().copied().map(Some).collect(),
+    let row = |(name, figures): &Line| Row {
+        name: (*name).to_owned(),
+        figures: figures.iter().copied().map(Some).collect(),
     };
     lines.iter().map(row).collect()
 }

@@ -1,6 +1,6 @@
 //! Computes FoGNet in f32 from PyTorch's tensors; it defines what the integer network approximates.
 
-use super::{LstmWeights, dense, lstm};
+use super::{LstmWeights, bilstm, dense};
 use gyronet::model::fognet::{FogEstimate, GAIN_FRACTION_BITS, MinuteNetwork};
 use gyronet::model::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
 use gyronet::model::seconds::{STEPS, SecondsWindow};
@@ -39,19 +39,10 @@ pub struct FogLayerOutputs {
 }
 
 fn two_layers<const I: usize, const H: usize, const W: usize>(
-    weights: &[[LstmWeights<'_>; 2]; 2],
+    [first, second]: &[[LstmWeights<'_>; 2]; 2],
     x: &[[f32; I]; STEPS],
 ) -> [[f32; W]; STEPS] {
-    let mut between = [[0.0; W]; STEPS];
-    let mut output = [[0.0; W]; STEPS];
-    let [first, second] = weights;
-    for (direction, backward) in [false, true].into_iter().enumerate() {
-        lstm::<I, H, W>(&first[direction], x, backward, &mut between, direction * H);
-    }
-    for (direction, backward) in [false, true].into_iter().enumerate() {
-        lstm::<W, H, W>(&second[direction], &between, backward, &mut output, direction * H);
-    }
-    output
+    bilstm::<W, H, W, STEPS>(second, &bilstm::<I, H, W, STEPS>(first, x))
 }
 
 impl FogNetF32<'_> {

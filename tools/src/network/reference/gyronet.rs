@@ -1,6 +1,6 @@
 //! Computes GyroNet in f32 from the tensors of training; it defines what the integer network approximates.
 
-use super::{LstmWeights, dense, lstm};
+use super::{LstmWeights, bilstm, dense};
 use gyronet::model::blob::{HIDDEN, LINEAR_INPUTS};
 use gyronet::model::{Estimate, FEATURES, Features, WINDOW, WindowNetwork};
 use gyronet::units::{AngularRate, SpecificForce};
@@ -60,19 +60,8 @@ impl GyroNetF32<'_> {
 impl NetworkF32<'_> {
     fn run(&self, outputs: &mut LayerOutputs) {
         let LayerOutputs { normalised, layer1, layer2, gyro_error, .. } = outputs;
-        let units = self.lstm1[0].units();
-        for (direction, backward) in [false, true].into_iter().enumerate() {
-            lstm::<FEATURES, HIDDEN, _>(
-                &self.lstm1[direction],
-                normalised,
-                backward,
-                layer1,
-                direction * units,
-            );
-        }
-        for (direction, backward) in [false, true].into_iter().enumerate() {
-            lstm::<_, HIDDEN, _>(&self.lstm2[direction], layer1, backward, layer2, direction * units);
-        }
+        *layer1 = bilstm::<FEATURES, HIDDEN, _, WINDOW>(&self.lstm1, normalised);
+        *layer2 = bilstm::<_, HIDDEN, _, WINDOW>(&self.lstm2, layer1);
         for (error, h) in gyro_error.iter_mut().zip(&*layer2) {
             *error += dense(self.fc_weight, self.fc_bias, h) * self.output_scale;
         }
