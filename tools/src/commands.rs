@@ -37,6 +37,13 @@ fn print_json(out: &mut impl std::io::Write, value: &impl serde::Serialize) -> R
     Ok(writeln!(out)?)
 }
 
+/// Prints a result as JSON or as text.
+fn print(common: Common, json: &impl serde::Serialize, text: impl std::fmt::Display) -> Result {
+    use std::io::Write;
+    let out = &mut std::io::stdout().lock();
+    if common.json { print_json(out, json) } else { Ok(writeln!(out, "{text}")?) }
+}
+
 /// Writes a remark to standard error, unless --quiet is given.
 fn remark(common: Common, line: std::fmt::Arguments<'_>) -> std::io::Result<()> {
     use std::io::Write;

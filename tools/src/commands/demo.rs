@@ -3,7 +3,7 @@
 use super::{Common, named, paint, print_json, progress, remarked, weights};
 use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
-use gyronet_tools::demo::{Demo, Tunnel, write_log};
+use gyronet_tools::demo::{Demo, Trajectories, Tunnel, write_log};
 use gyronet_tools::drive::error::{DataError, DataFault};
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::drive::word;
@@ -97,12 +97,13 @@ fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -
     let frames = write_log(drive, GyroNet::new(weights.blob()?), BufWriter::new(file))?;
     let simulated = args.file.is_none();
     let tunnel = tunnel().map_err(|error| -> Box<dyn Error> { error })?;
-    let demo = Demo::new(drive, simulated, &rates, errors.as_ref(), tunnel.as_ref(), frames);
+    let (errors, tunnel, trajectories) = (errors.as_ref(), tunnel.as_ref(), Trajectories::new(drive, &rates));
+    let demo = Demo { drive, simulated, rates: &rates, errors, trajectories, tunnel, frames };
     std::fs::write(&page, demo.page()).map_err(named(&page))?;
 
     let mut out = std::io::stdout().lock();
     if common.json {
-        let mut json = serde_json::to_value(demo.summary())?;
+        let mut json = demo.summary();
         json["files"] = serde_json::json!({ "page": page, "log": log });
         print_json(&mut out, &json)?;
         return Ok(());
@@ -119,14 +120,14 @@ fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -
         let note = if starts_moving { "; starts in motion: 3 s at rest are simulated before it" } else { "" };
         writeln!(out, "{}, {seconds:.0} s{note}\n", drive.name())?;
     }
-    match &errors {
+    match errors {
         Some(errors) => {
             let table = Table { rows: &errors.methods, few: true };
             writeln!(out, "{}  {MARKS}\n", paint::report(&table.to_string()))?;
         }
         None => writeln!(out, "No reference (ref_gyr_z or ref_yaw), so no errors.\n")?,
     }
-    match (&tunnel, &args.file) {
+    match (tunnel, &args.file) {
         (Some(tunnel), _) => writeln!(out, "{}", paint::report(&tunnel.to_string()))?,
         (None, Some(file)) => {
             let file = word(file);

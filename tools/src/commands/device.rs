@@ -14,7 +14,7 @@ use gyronet::service::message::{AccessCounters, Info};
 use gyronet_tools::client::bus::{self, Bus};
 use gyronet_tools::client::device::settings::{flat, value as value_of};
 use gyronet_tools::client::device::update::{Update, update};
-use gyronet_tools::client::device::upload::upload;
+use gyronet_tools::client::device::upload::{Uploaded, upload};
 use gyronet_tools::client::device::{AccessState, Authority, Device};
 use gyronet_tools::drive::error::read;
 use gyronet_tools::signing::{self, PrivateKey};
@@ -148,63 +148,54 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         }
         (None, None) => Authority::None,
     });
-    let json = common.json;
     match &args.action {
         Action::Info => {
             let info = device.info()?;
-            if json {
-                print_json(&info)?;
+            if common.json {
+                super::print_json(&mut io::stdout().lock(), &info)?;
             } else {
                 print_info(&info, device.access()?.state)?;
                 print_tilt(device.level_deg()?)?;
                 print_course(device.course()?)?;
             }
         }
-        Action::Get => settings::print(&device.configuration()?, json)?,
-        Action::Set { settings, file } => settings::set(&mut device, settings, file.as_deref(), json)?,
-        Action::Wheels => settings::print_wheels(&mut device, json)?,
-        Action::Calibrate { what, file } => calibration::run(&mut device, *what, file.as_deref(), json)?,
+        Action::Get => settings::print(&device.configuration()?, common)?,
+        Action::Set { settings, file } => settings::set(&mut device, settings, file.as_deref(), common)?,
+        Action::Wheels => settings::print_wheels(&mut device, common)?,
+        Action::Calibrate { what, file } => calibration::run(&mut device, *what, file.as_deref(), common)?,
         Action::Counters => {
             let counters = device.counters()?;
-            print_value(&counters, json)?;
+            print_value(&counters, common)?;
         }
-        Action::Weights { file } => weights(&mut device, file, json, common)?,
-        Action::Update { file, downgrade } => update_firmware(&mut device, file, *downgrade, json, common)?,
+        Action::Weights { file } => weights(&mut device, file, common)?,
+        Action::Update { file, downgrade } => update_firmware(&mut device, file, *downgrade, common)?,
         Action::Access => {
             let access = Access { access: device.access()?, refused: device.access_counters()? };
-            print_value(&access, json)?;
+            print_value(&access, common)?;
         }
         Action::SetKey { public } => {
             let public = if public.as_os_str() == "none" { [0; 32] } else { signing::read_public(public)? };
             device.set_key(&public)?;
-            done(json, "stored; it is in force now")?;
+            done(common, "stored; it is in force now")?;
         }
         Action::Restart => {
             device.restart()?;
-            done(json, "the board is restarting")?;
+            done(common, "the board is restarting")?;
         }
     }
     Ok(())
 }
 
-fn done(json: bool, what: &str) -> io::Result<()> {
-    let out = &mut io::stdout().lock();
-    if json { writeln!(out, "{}", serde_json::json!({ "done": what })) } else { writeln!(out, "{what}") }
+fn done(common: Common, what: &str) -> super::Result {
+    // One line, as scripts read it.
+    let json = serde_json::json!({ "done": what }).to_string();
+    Ok(writeln!(io::stdout(), "{}", if common.json { &json } else { what })?)
 }
 
-fn print_json(value: &impl Serialize) -> super::Result {
-    super::print_json(&mut io::stdout().lock(), value)
-}
-
-fn print_value(value: &impl Serialize, json: bool) -> super::Result {
-    if json {
-        return print_json(value);
-    }
-    let out = &mut io::stdout().lock();
-    for (name, value) in flat(&value_of(value)?) {
-        writeln!(out, "{name} = {value}")?;
-    }
-    Ok(())
+fn print_value(value: &impl Serialize, common: Common) -> super::Result {
+    let lines = flat(&value_of(value)?);
+    let lines: Vec<String> = lines.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+    super::print(common, value, lines.join("\n"))
 }
 
 fn print_info(info: &Info, access: &str) -> io::Result<()> {
@@ -283,7 +274,7 @@ fn print_course((state, [gain, sigma], counters): (u8, [f32; 2], CourseCounters)
     writeln!(io::stdout().lock(), "course        {text}")
 }
 
-fn weights(device: &mut Board, path: &std::path::Path, json: bool, common: Common) -> super::Result {
+fn weights(device: &mut Board, path: &std::path::Path, common: Common) -> super::Result {
     let file = read(path)?;
     // Run the board's own check here, before the board erases its flash.
     let words: Vec<u32> = file.chunks(4).map(|word| word.try_into().map_or(0, u32::from_le_bytes)).collect();
@@ -299,19 +290,15 @@ fn weights(device: &mut Board, path: &std::path::Path, json: bool, common: Commo
     let bar = super::progress::bar(common, file.len(), "upload");
     let uploaded = upload(device, &file, |written| bar.set_position(written as u64))?;
     bar.finish_and_clear();
-    if json {
-        print_json(&serde_json::json!({ "slot": uploaded.slot, "crc": uploaded.crc }))
-    } else {
-        let (slot, crc) = (uploaded.slot, uploaded.crc);
-        Ok(writeln!(io::stdout(), "slot {slot} holds file {crc:08x}; the board uses it after a restart")?)
-    }
+    let Uploaded { slot, crc } = uploaded;
+    let text = format_args!("slot {slot} holds file {crc:08x}; the board uses it after a restart");
+    super::print(common, &serde_json::json!({ "slot": slot, "crc": crc }), text)
 }
 
 fn update_firmware(
     device: &mut Board,
     path: &std::path::Path,
     downgrade: bool,
-    json: bool,
     common: Common,
 ) -> super::Result {
     let file = read(path)?;
@@ -323,11 +310,8 @@ fn update_firmware(
         bar.set_position(sent as u64);
     })?;
     bar.finish_and_clear();
-    let [major, minor, patch] = file.head.label.version;
-    if json {
-        return print_json(&serde_json::json!({ "slot": slot, "version": file.head.label.version }));
-    }
+    let version @ [major, minor, patch] = file.head.label.version;
     let text =
         format!("slot {slot} holds firmware {major}.{minor}.{patch}; it starts on trial after a restart");
-    Ok(writeln!(io::stdout(), "{text}")?)
+    super::print(common, &serde_json::json!({ "slot": slot, "version": version }), text)
 }

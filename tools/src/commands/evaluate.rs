@@ -5,7 +5,7 @@ use gyronet::model::GyroNet;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::recording;
 use gyronet_tools::drive::stream::Drive;
-use gyronet_tools::evaluate::outage::{self, NoStart, Outage};
+use gyronet_tools::evaluate::outage::{self, Outage};
 use gyronet_tools::evaluate::outage_chart;
 use gyronet_tools::evaluate::outage_table::Outages;
 use gyronet_tools::evaluate::report::Report;
@@ -109,7 +109,7 @@ fn outages(args: &Args, common: Common) -> super::Result {
         }
     }
     if sets.is_empty() {
-        return Err(NoStart { seconds: lengths.into_iter().min().unwrap_or_default() }.into());
+        return Err(outage::no_start(lengths.into_iter().min().unwrap_or_default()).into());
     }
     let drives = sets.iter().flat_map(|(_, drives)| drives);
     if let Some(folder) = &args.pictures {

@@ -4,7 +4,6 @@ use super::{Common, named};
 use gyronet::model::blob::CRC;
 use gyronet_tools::target::bench;
 use gyronet_tools::target::firmware::{Linked, NUCLEO};
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -52,19 +51,13 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     std::fs::write(&update, file.bytes()).map_err(named(&update))?;
     let (boot, image) = (linked.boot_loader()?.len(), file.images[0].len());
     let [a, b] = [0, 1].map(|slot: usize| format!("{:08x}", CRC.checksum(&file.images[slot])));
-    let out = &mut io::stdout().lock();
-    if common.json {
-        return super::print_json(
-            out,
-            &serde_json::json!({
-                "elf": elf, "update": update, "boot_bytes": boot, "image_bytes": image, "crc": [a, b],
-            }),
-        );
-    }
-    writeln!(out, "{}: for a debug probe, boot loader of {boot} bytes", elf.display())?;
-    Ok(writeln!(
-        out,
-        "{}: for `device update`, image of {image} bytes, CRC {a} in slot A, {b} in slot B",
-        update.display()
-    )?)
+    let json = serde_json::json!({
+        "elf": elf, "update": update, "boot_bytes": boot, "image_bytes": image, "crc": [a, b],
+    });
+    let (elf, update) = (elf.display(), update.display());
+    let text = format_args!(
+        "{elf}: for a debug probe, boot loader of {boot} bytes\n\
+         {update}: for `device update`, image of {image} bytes, CRC {a} in slot A, {b} in slot B"
+    );
+    super::print(common, &json, text)
 }

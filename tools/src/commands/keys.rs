@@ -2,7 +2,6 @@
 
 use super::Common;
 use gyronet_tools::signing::{PrivateKey, hex};
-use std::io::{self, Write};
 use std::path::PathBuf;
 
 /// Create a key pair for writing to boards and for signing files.
@@ -22,15 +21,11 @@ pub struct Args {
 pub fn run(args: &Args, common: Common) -> super::Result {
     let key = PrivateKey::generate()?;
     let [private, public] = key.write(&args.name)?;
-    let out = &mut io::stdout().lock();
-    if common.json {
-        let found = serde_json::json!({ "private": private, "public": public, "key": hex(&key.public()) });
-        return super::print_json(out, &found);
-    }
-    writeln!(
-        out,
-        "{}: keep this file secret; anyone who has it can write to every board with this key",
-        private.display()
-    )?;
-    Ok(writeln!(out, "{}: gyronet device --port PORT set-key {}", public.display(), public.display())?)
+    let json = serde_json::json!({ "private": private, "public": public, "key": hex(&key.public()) });
+    let (private, public) = (private.display(), public.display());
+    let text = format_args!(
+        "{private}: keep this file secret; anyone who has it can write to every board with this key\n\
+         {public}: gyronet device --port PORT set-key {public}"
+    );
+    super::print(common, &json, text)
 }

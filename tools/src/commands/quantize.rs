@@ -1,9 +1,8 @@
 //! `gyronet quantize` converts an f32 checkpoint to a weight file for the integer kernels.
 
-use super::{Common, named, print_json};
+use super::{Common, named, print};
 use gyronet_tools::network::checkpoint::{self, Checkpoint};
 use gyronet_tools::network::quantize::quantize;
-use std::io::Write;
 use std::path::PathBuf;
 
 /// Convert an f32 checkpoint to an int8 weight file for the board.
@@ -25,9 +24,7 @@ pub struct Args {
 pub fn run(args: &Args, common: Common) -> super::Result {
     let bytes = quantize(&Checkpoint::<checkpoint::GyroNet>::read(&args.checkpoint)?)?;
     std::fs::write(&args.out, &bytes).map_err(named(&args.out))?;
-    let mut out = std::io::stdout().lock();
-    if common.json {
-        return print_json(&mut out, &serde_json::json!({ "path": args.out, "bytes": bytes.len() }));
-    }
-    Ok(writeln!(out, "{}: {} bytes", args.out.display(), bytes.len())?)
+    let (path, bytes) = (&args.out, bytes.len());
+    let json = serde_json::json!({ "path": path, "bytes": bytes });
+    print(common, &json, format_args!("{}: {bytes} bytes", path.display()))
 }

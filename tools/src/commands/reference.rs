@@ -3,7 +3,6 @@
 use super::Common;
 use clap::ValueEnum;
 use gyronet_tools::reference;
-use std::io::{self, Write};
 
 /// Print a Markdown table of settings, data identifiers, troubles or states.
 #[derive(Debug, clap::Args)]
@@ -35,6 +34,5 @@ pub fn run(args: &Args, common: Common) -> super::Result {
         Name::Troubles => reference::troubles(),
         Name::States => reference::states(),
     };
-    let out = &mut io::stdout().lock();
-    if common.json { super::print_json(out, &table.json()) } else { Ok(write!(out, "{table}")?) }
+    super::print(common, &table.json(), table.to_string().trim_end())
 }

@@ -11,7 +11,6 @@ use gyronet_tools::client::device::update::Update;
 use gyronet_tools::drive::error::{read, read_text};
 use gyronet_tools::signing::{PrivateKey, read_public, unhex};
 use gyronet_tools::wheels::WheelFile;
-use std::io::{self, Write};
 use std::path::PathBuf;
 
 /// Sign a file for boards that store your public key.
@@ -76,12 +75,7 @@ pub fn run(args: &Args, common: Common) -> super::Result {
     let serial = args.serial.as_deref().map(|text| unhex(text).ok_or("--serial: not 24 hexadecimal digits"));
     let trailer = PrivateKey::read(&args.key)?.trailer(target, serial.transpose()?, args.counter, &content);
     std::fs::write(&args.out, trailer).map_err(super::named(&args.out))?;
-    let out = &mut io::stdout().lock();
-    if common.json {
-        return super::print_json(
-            out,
-            &serde_json::json!({ "signature": args.out, "counter": args.counter }),
-        );
-    }
-    Ok(writeln!(out, "{}: signature {} of {name}", args.out.display(), args.counter)?)
+    let (path, counter) = (&args.out, args.counter);
+    let json = serde_json::json!({ "signature": path, "counter": counter });
+    super::print(common, &json, format_args!("{}: signature {counter} of {name}", path.display()))
 }

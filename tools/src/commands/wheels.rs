@@ -1,10 +1,9 @@
 //! `gyronet wheels` creates and checks the settings of a vehicle's wheel frames.
 
-use super::{Common, print_json};
+use super::{Common, print};
 use gyronet::store::Configuration;
 use gyronet_tools::wheels::WheelFile;
 use std::ffi::OsString;
-use std::io::{Write, stdout};
 use std::path::PathBuf;
 
 /// Create or check the settings of a vehicle's wheel frames.
@@ -48,11 +47,9 @@ pub fn run(args: &Args, common: Common) -> super::Result {
             let (path, (settings, wheels)) = (file.display(), WheelFile::read(file)?);
             let board = Configuration::DEFAULT.check_wheels(&wheels);
             board.map_err(|error| format!("{path}: {error}"))?;
-            if common.json {
-                return print_json(&mut stdout().lock(), &settings);
-            }
             let wheels: usize = settings.frame.iter().map(|frame| frame.signal.len()).sum();
-            writeln!(stdout().lock(), "{path}: {wheels} wheels in {} frames", settings.frame.len())?;
+            let text = format_args!("{path}: {wheels} wheels in {} frames", settings.frame.len());
+            print(common, &settings, text)?;
         }
     }
     Ok(())

@@ -58,16 +58,16 @@ pub struct Outage {
     pub position: Option<(f64, ByMethod<f64>)>,
 }
 
-/// No outage has an error: no drive has what it takes.
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "no start of an outage: a drive needs {} s with a course every 2 s (columns course and gnss_speed, or gnss_lat and \
-     gnss_lon; below {} m/s a course_sigma of {:.3} rad at most), then {seconds} s, and a reference (ref_gyr_z or ref_yaw)",
-    AFTER_S[1], CourseConfig::DEFAULT.slowest, CourseConfig::DEFAULT.across / CourseConfig::DEFAULT.slowest
-)]
-pub struct NoStart {
-    /// Length of the shortest outage.
-    pub seconds: usize,
+/// Returns why no outage has an error: what a drive lacks for one of so many seconds.
+pub fn no_start(seconds: usize) -> String {
+    let CourseConfig { slowest, across, .. } = CourseConfig::DEFAULT;
+    format!(
+        "no start of an outage: a drive needs {} s with a course every 2 s (columns course and gnss_speed, or gnss_lat and \
+         gnss_lon; below {slowest} m/s a course_sigma of {:.3} rad at most), then {seconds} s, and a reference (ref_gyr_z or \
+         ref_yaw)",
+        AFTER_S[1],
+        across / slowest
+    )
 }
 
 #[derive(Clone)]

@@ -92,27 +92,22 @@ impl<B: Bus> Device<B> {
     /// Returns the forward direction in the configured axes, deg to the left of x, and its sigma; `None` until drives
     /// have shown it.
     pub fn forward_deg(&mut self) -> Result<Option<[f32; 2]>> {
-        match *self.read(FORWARD)?.as_slice() {
-            [0, ..] => Ok(None),
-            [_, a, b, c, d] => {
-                let angles = [[a, b], [c, d]].map(i16::from_be_bytes);
-                Ok(Some(angles.map(|angle| f32::from(angle) / 100.0)))
-            }
-            _ => Err(DeviceError::Mismatch),
-        }
+        self.angles_deg(FORWARD)
     }
 
     /// Returns roll and pitch of the sensor beyond the configured mounting and their sigma, deg; `None` before the first
     /// standstill.
     pub fn level_deg(&mut self) -> Result<Option<[f32; 3]>> {
-        match *self.read(LEVEL)?.as_slice() {
-            [0, ..] => Ok(None),
-            [_, a, b, c, d, e, f] => {
-                let angles = [[a, b], [c, d], [e, f]].map(i16::from_be_bytes);
-                Ok(Some(angles.map(|angle| f32::from(angle) / 100.0)))
-            }
-            _ => Err(DeviceError::Mismatch),
-        }
+        self.angles_deg(LEVEL)
+    }
+
+    /// Reads angles behind a state, which is 0 where they are not known.
+    fn angles_deg<const N: usize>(&mut self, id: u16) -> Result<Option<[f32; N]>> {
+        let content = self.read(id)?;
+        let (state, codes) = content.split_first().ok_or(DeviceError::Mismatch)?;
+        let angles = codes.as_chunks::<2>().0.iter().map(|code| f32::from(i16::from_be_bytes(*code)) / 100.0);
+        let angles: Option<[f32; N]> = angles.collect::<Vec<_>>().try_into().ok();
+        if *state == 0 { Ok(None) } else { angles.map(Some).ok_or(DeviceError::Mismatch) }
     }
 
     /// Returns how well the gain is known by courses, its code, the gain and its sigma, and the counters of courses.

@@ -1,6 +1,7 @@
 //! Reads and changes the calibration of a board, and what it has learnt.
 
 use super::{Board, print_value};
+use crate::commands::Common;
 use clap::ValueEnum;
 use gyronet_tools::calibrate::unit_file;
 use gyronet_tools::client::device::calibration::to_value;
@@ -18,7 +19,7 @@ pub enum What {
     Show,
 }
 
-pub fn run(device: &mut Board, what: What, file: Option<&Path>, json: bool) -> crate::commands::Result {
+pub fn run(device: &mut Board, what: What, file: Option<&Path>, common: Common) -> crate::commands::Result {
     match what {
         What::Show => {}
         What::Unit => {
@@ -29,5 +30,5 @@ pub fn run(device: &mut Board, what: What, file: Option<&Path>, json: bool) -> c
         What::Forget => device.forget_learned()?,
     }
     let (forward, tilt) = (device.forward_deg()?, device.level_deg()?);
-    print_value(&to_value(&device.calibration()?, &device.learned()?, forward, tilt), json)
+    print_value(&to_value(&device.calibration()?, &device.learned()?, forward, tilt), common)
 }

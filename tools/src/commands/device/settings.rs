@@ -1,20 +1,19 @@
 //! Reads and changes the configuration of a board.
 
 use super::{Board, done};
+use crate::commands::{self, Common, Result};
 use gyronet::store::{Configuration, Record};
 use gyronet_tools::client::device::settings::{assign, from_value, to_value};
 use gyronet_tools::drive::error::read_text;
 use gyronet_tools::wheels::WheelFile;
 use std::path::Path;
 
-type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
-
-pub fn print(configuration: &Configuration, json: bool) -> Result<()> {
-    super::print_value(&to_value(configuration)?, json)
+pub fn print(configuration: &Configuration, common: Common) -> Result {
+    super::print_value(&to_value(configuration)?, common)
 }
 
 /// Changes single values of the board's configuration, replaces it by a file, or writes wheel frames.
-pub fn set(device: &mut Board, settings: &[String], file: Option<&Path>, json: bool) -> Result<()> {
+pub fn set(device: &mut Board, settings: &[String], file: Option<&Path>, common: Common) -> Result {
     if settings.is_empty() && file.is_none() {
         return Err("nothing to set: give NAME=VALUE, or --file".into());
     }
@@ -26,7 +25,7 @@ pub fn set(device: &mut Board, settings: &[String], file: Option<&Path>, json: b
             );
         }
         device.set_wheels(&WheelFile::read(path)?.1)?;
-        return Ok(done(json, "stored; it takes effect after a restart")?);
+        return done(common, "stored; it takes effect after a restart");
     }
     let mut wanted = match file {
         Some(path) => {
@@ -40,14 +39,11 @@ pub fn set(device: &mut Board, settings: &[String], file: Option<&Path>, json: b
     let configuration = from_value(wanted)?;
     configuration.check()?;
     device.set_configuration(&configuration)?;
-    Ok(done(json, "stored; it takes effect after a restart")?)
+    done(common, "stored; it takes effect after a restart")
 }
 
 /// Prints the settings of the wheel frames as a file for `set --file`.
-pub fn print_wheels(device: &mut Board, json: bool) -> Result<()> {
+pub fn print_wheels(device: &mut Board, common: Common) -> Result {
     let file = WheelFile::of(&device.wheels()?);
-    if json {
-        return super::print_json(&file);
-    }
-    Ok(std::io::Write::write_all(&mut std::io::stdout().lock(), toml::to_string(&file)?.as_bytes())?)
+    commands::print(common, &file, toml::to_string(&file)?.trim_end())
 }
