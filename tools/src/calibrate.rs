@@ -195,18 +195,9 @@ fn combined([one, sigma]: [f64; 2], [other, other_sigma]: [f64; 2]) -> [f64; 2] 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::board::Uncorrected;
     use crate::drive::recording::Recording;
     use crate::simulate::{self, csv};
-    use gyronet::model::Estimate;
-    use gyronet::model::window::{Features, WINDOW};
-
-    struct Nothing;
-
-    impl WindowNetwork for Nothing {
-        fn estimate(&mut self, _window: &[Features; WINDOW]) -> Estimate {
-            Estimate::NONE
-        }
-    }
 
     /// Simulates 20 minutes of a unit that reads 2 % too much about z. The reference is a course once a second with a
     /// sigma of 0.02 rad, times `sign`. It is missing for a minute, and ends at the sample `end`.
@@ -225,7 +216,7 @@ mod tests {
             let yaw_rate = &mut row.sample.angular_rate[2];
             *yaw_rate = AngularRate((f64::from(yaw_rate.0) * 1.02) as i32);
         }
-        calibrate(&[Cut::new(&Drive::from(&recording), Board::new(config(), None, Nothing), || {})?], 0)
+        calibrate(&[Cut::new(&Drive::from(&recording), Board::new(config(), None, Uncorrected), || {})?], 0)
     }
 
     #[test]

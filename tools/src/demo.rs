@@ -1,7 +1,6 @@
 //! The results of one drive, for the summary that `gyronet demo` prints and for its page.
 
 mod page;
-mod sent;
 mod trajectory;
 mod tunnel;
 
@@ -10,7 +9,6 @@ use crate::evaluate::rates::Rates;
 use crate::evaluate::report::DriveErrors;
 use serde_json::Value;
 
-pub use sent::write_log;
 pub use trajectory::{Path, Trajectories};
 pub use tunnel::Tunnel;
 

@@ -2,13 +2,14 @@
 
 pub mod package;
 
+use crate::drive::error::DataError;
 use std::path::PathBuf;
 
 /// The reason why no Python interpreter can run a step.
 #[derive(Debug, thiserror::Error)]
 pub enum PythonError {
-    #[error("{}: {source}", program.display())]
-    Start { program: PathBuf, source: std::io::Error },
+    #[error(transparent)]
+    File(#[from] DataError),
     #[error(
         "logs are read by Python, and python3 cannot be started ({source}): install Python 3.11 or later, or set GYRONET_PYTHON"
     )]
@@ -22,8 +23,6 @@ pub enum PythonError {
          pip install ./tools/python in a checkout", python.display()
     )]
     NoPackage { python: PathBuf, version: &'static str },
-    #[error("{}: {source}", folder.display())]
-    Folder { folder: PathBuf, source: std::io::Error },
     #[error(
         "the Python packages that read logs could not be installed: {step}: {reason} (without a network: pip install -r tools/requirements.txt from a mirror, and GYRONET_PYTHON)"
     )]

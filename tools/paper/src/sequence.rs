@@ -221,16 +221,7 @@ impl Sequence {
             let [left, right] = self.wheel_rates(step).map(Some);
             let wheels = [None, right, None, left];
             let reference = Some(turn / DT);
-            Some(RecordingRow {
-                line: k as u64 + 1,
-                sample,
-                reference,
-                course: None,
-                wheels,
-                speed: None,
-                heading: None,
-                place: None,
-            })
+            Some(RecordingRow { reference, wheels, ..RecordingRow::of(k as u64 + 1, sample) })
         });
         let path = self.path.display().to_string();
         Ok(Recording { path, rows: rows.collect(), missing: 0, vehicle: Vehicle::default() })

@@ -208,8 +208,7 @@ impl Coprocessor {
             self.board.take_courses();
             self.track.heading(sample.time, gnss.map(finite))
         });
-        let [reference, course, speed] = [None; 3];
-        let row = Row { line: number, sample, reference, course, wheels, speed, heading, place: None };
+        let row = Row { wheels, heading, ..Row::of(number, sample) };
         self.board.row(&row).map_err(|error| refused(format!("row {number}: {error}")))
     }
 

@@ -1,10 +1,14 @@
 //! `gyronet demo`: all results of one drive.
 
 use super::{Common, named, paint, print_json, progress, remarked, weights};
+use gyronet::coprocessor::{Config, TimedFrame};
 use gyronet::model::GyroNet;
+use gyronet_tools::board::Board;
 use gyronet_tools::bundled;
-use gyronet_tools::demo::{Demo, Trajectories, Tunnel, write_log};
+use gyronet_tools::demo::{Demo, Trajectories, Tunnel};
+use gyronet_tools::drive::candump::Log;
 use gyronet_tools::drive::error::{DataError, DataFault};
+use gyronet_tools::drive::replay::Steps;
 use gyronet_tools::drive::stream::Drive;
 use gyronet_tools::drive::word;
 use gyronet_tools::evaluate::outage::EVERY_S;
@@ -94,7 +98,14 @@ fn results(args: &Args, common: Common, tunnel: impl FnOnce() -> TunnelResult) -
     std::fs::create_dir_all(&folder).map_err(named(&folder))?;
     let [log, page] = ["can.log", "demo.html"].map(|name| folder.join(name));
     let file = File::create(&log).map_err(named(&log))?;
-    let frames = write_log(drive, GyroNet::new(weights.blob()?), BufWriter::new(file))?;
+    let mut log_file = Log::new(BufWriter::new(file));
+    let board = Board::new(Config::DEFAULT, drive.wheels(), GyroNet::new(weights.blob()?));
+    for step in Steps::new(drive, board)? {
+        for TimedFrame { frame, time } in &step?.frames {
+            log_file.frame(*time, frame)?;
+        }
+    }
+    let frames = log_file.finish()?;
     let simulated = args.file.is_none();
     let tunnel = tunnel().map_err(|error| -> Box<dyn Error> { error })?;
     let (errors, tunnel, trajectories) = (errors.as_ref(), tunnel.as_ref(), Trajectories::new(drive, &rates));

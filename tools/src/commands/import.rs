@@ -1,7 +1,6 @@
 //! `gyronet import` converts logs of other tools to one drive, in Python.
 
-use super::{Common, remark};
-use gyronet_tools::python::PythonError;
+use super::{Common, named, remark};
 use gyronet_tools::python::package::package;
 use gyronet_tools::target::bench::workspace;
 use std::ffi::{OsStr, OsString};
@@ -74,8 +73,7 @@ pub fn python(command: &[&str], arguments: &[OsString], common: Common) -> super
     let options = [("--json", common.json), ("--quiet", common.quiet)];
     python.args(options.into_iter().filter(|(_, given)| *given).map(|(option, _)| OsStr::new(option)));
     let started = python.env("GYRONET_COMMAND", "gyronet").status();
-    let status =
-        started.map_err(|source| PythonError::Start { program: python.get_program().into(), source })?;
+    let status = started.map_err(named(python.get_program().as_ref()))?;
     if status.success() {
         return Ok(());
     }

@@ -112,14 +112,12 @@ pub fn finding(noise: Option<&[Option<Noise>; 3]>, standstill: Option<&Range<usi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand_chacha::ChaCha8Rng;
-    use rand_chacha::rand_core::SeedableRng;
-    use rand_distr::{Distribution, Normal};
+    use crate::random::Random;
 
     #[test]
     fn white_noise_has_its_random_walk_and_no_bottom() {
-        let (mut random, normal) = (ChaCha8Rng::seed_from_u64(3), Normal::new(0.5, 0.01).unwrap());
-        let rates: Vec<f64> = (0..60_000).map(|_| normal.sample(&mut random)).collect();
+        let mut random = Random::new(3, 0);
+        let rates: Vec<f64> = (0..60_000).map(|_| 0.5 + 0.01 * random.normal()).collect();
         let noise = Allan::new(&rates).noise().unwrap();
         // 0.01 rad/s at 100 Hz.
         assert!((noise.random_walk / 1e-3 - 1.0).abs() < 0.05, "{noise:?}");
@@ -128,12 +126,11 @@ mod tests {
 
     #[test]
     fn a_bias_that_walks_has_a_bottom() {
-        let (mut random, normal) = (ChaCha8Rng::seed_from_u64(3), Normal::new(0.0, 1.0).unwrap());
-        let mut bias = 0.0;
+        let (mut random, mut bias) = (Random::new(3, 0), 0.0);
         let rates: Vec<f64> = (0..100_000)
             .map(|_| {
-                bias += 1e-5 * normal.sample(&mut random);
-                bias + 0.01 * normal.sample(&mut random)
+                bias += 1e-5 * random.normal();
+                bias + 0.01 * random.normal()
             })
             .collect();
         let (instability, tau) = Allan::new(&rates).noise().unwrap().instability.unwrap();

@@ -6,15 +6,13 @@ mod mounting;
 use super::line::{DEGREES, KMH};
 use super::*;
 use crate::drive::recording::Reader;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, Normal};
+use crate::random::Random;
 use std::fmt::Write;
 
 /// Examines a drive of a car that rests for 20 s, turns for 40 s and rests for 20 s. `edit` changes a row's time,
 /// force, rate, wheels 2 and 4, and reference; it returns false to drop the row.
 fn doctor(edit: impl Fn(usize, &mut [f64; 10]) -> bool) -> Doctor {
-    let (mut random, normal) = (ChaCha8Rng::seed_from_u64(1), Normal::new(0.0, 0.002).unwrap());
+    let mut random = Random::new(1, 0);
     let mut text =
         String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,wheel2_rate,wheel4_rate,ref_gyr_z\n");
     for k in 0..8_000 {
@@ -22,7 +20,7 @@ fn doctor(edit: impl Fn(usize, &mut [f64; 10]) -> bool) -> Doctor {
         let moves = (2_000..6_000).contains(&k);
         let yaw = if moves { 0.4 * (0.21 * time).sin() * (0.05 * time + 0.4).cos() } else { 0.0 };
         let speed = if moves { 20.0 } else { 0.0 };
-        let mut noise = || normal.sample(&mut random);
+        let mut noise = || 0.002 * random.normal();
         let shakes = if moves { 10.0 } else { 1.0 };
         let mut row = [
             time,
@@ -180,12 +178,12 @@ fn a_drive_that_starts_moving_is_told_where_it_can_start() {
         (1.0, 9_000, "first mend the unit, below."),
     ];
     for (gravity, rows, end) in cases {
-        let (mut random, normal) = (ChaCha8Rng::seed_from_u64(1), Normal::new(0.0, 0.002).unwrap());
+        let mut random = Random::new(1, 0);
         let mut text = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\n");
         for k in 0..rows {
             let time = 0.01 * f64::from(k);
             let shakes = if (2_030..2_700).contains(&k) { 1.0 } else { 20.0 };
-            let mut noise = || shakes * normal.sample(&mut random);
+            let mut noise = || shakes * (0.002 * random.normal());
             let yaw = if shakes > 1.0 { 0.3 * time.sin() } else { 0.0 };
             let row = [noise(), noise(), gravity + noise(), noise(), noise(), yaw + noise()];
             writeln!(text, "{time:.2},{}", row.map(|value| format!("{value:.6}")).join(",")).unwrap();

@@ -62,6 +62,14 @@ pub struct Row {
     pub place: Option<[f64; 2]>,
 }
 
+impl Row {
+    /// Returns a row that has a sample and nothing else.
+    pub fn of(line: u64, sample: ImuSample) -> Self {
+        let [reference, course, speed] = [None; 3];
+        Self { line, sample, reference, course, wheels: [None; WHEELS], speed, heading: None, place: None }
+    }
+}
+
 /// A complete drive in memory; [`super::stream::Drive`] is for drives of any length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
@@ -94,15 +102,6 @@ impl Recording {
 
     pub fn facts(&self) -> Facts {
         Facts::of(&self.rows)
-    }
-
-    /// Returns the file's name without folder and extension, for tables.
-    pub fn name(&self) -> &str {
-        name(&self.path)
-    }
-
-    pub fn seconds(&self) -> f64 {
-        self.facts().seconds()
     }
 }
 

@@ -49,14 +49,5 @@ fn at_rest(first: &Row, k: u32, force: [f64; 3], bias: [f64; 3]) -> Option<Row> 
         ..first.sample
     };
     let wheels = first.wheels.map(|rate| rate.map(|_| 0.0));
-    Some(Row {
-        line: first.line,
-        sample,
-        reference: None,
-        course: None,
-        wheels,
-        speed: None,
-        heading: None,
-        place: None,
-    })
+    Some(Row { wheels, ..Row::of(first.line, sample) })
 }

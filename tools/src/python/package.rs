@@ -5,6 +5,7 @@
 //! outdated environment is made. The board needs the package as `pip` installs it, which compiles it.
 
 use super::{PythonError, last_line};
+use crate::drive::error::named;
 use std::ffi::OsString;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -82,17 +83,17 @@ fn make(environment: &Path) -> Result<PathBuf, PythonError> {
     if !old.map_err(|source| PythonError::NoPython { source })?.success() {
         return Err(PythonError::OldPython);
     }
-    let folder = |source| PythonError::Folder { folder: environment.to_owned(), source };
+    let folder = named(environment);
     let parent = environment.parent().unwrap_or(environment);
-    std::fs::create_dir_all(parent).map_err(folder)?;
-    let lock = File::create(environment.with_extension("lock")).map_err(folder)?;
-    lock.lock().map_err(folder)?;
+    std::fs::create_dir_all(parent).map_err(&folder)?;
+    let lock = File::create(environment.with_extension("lock")).map_err(&folder)?;
+    lock.lock().map_err(&folder)?;
     let python = interpreter(environment);
     if is_current(environment) {
         return Ok(python);
     }
     if environment.exists() {
-        std::fs::remove_dir_all(environment).map_err(folder)?;
+        std::fs::remove_dir_all(environment).map_err(&folder)?;
     }
     let result = install(environment, &python);
     if result.is_err() {
@@ -102,9 +103,9 @@ fn make(environment: &Path) -> Result<PathBuf, PythonError> {
 }
 
 fn install(environment: &Path, python: &Path) -> Result<(), PythonError> {
-    let folder = |source| PythonError::Folder { folder: environment.to_owned(), source };
-    let run = |step, command: &mut Command| {
-        let output = command.output().map_err(folder)?;
+    let folder = named(environment);
+    let run = |step, command: &mut Command| -> Result<(), PythonError> {
+        let output = command.output().map_err(&folder)?;
         let said = [output.stdout, output.stderr].concat();
         let failed = || PythonError::Install { step, reason: last_line(&said) };
         output.status.success().then_some(()).ok_or_else(failed)
@@ -114,7 +115,7 @@ fn install(environment: &Path, python: &Path) -> Result<(), PythonError> {
         Command::new("python3").args(["-m", "venv"]).arg(environment),
     )?;
     let requirements = environment.join("requirements.txt");
-    std::fs::write(&requirements, REQUIREMENTS).map_err(folder)?;
+    std::fs::write(&requirements, REQUIREMENTS).map_err(&folder)?;
     let pip = [
         "-m",
         "pip",
@@ -127,7 +128,7 @@ fn install(environment: &Path, python: &Path) -> Result<(), PythonError> {
         "-r",
     ];
     run("pip install", Command::new(python).args(pip).arg(&requirements))?;
-    std::fs::rename(&requirements, environment.join(STAMP)).map_err(folder)
+    Ok(std::fs::rename(&requirements, environment.join(STAMP)).map_err(&folder)?)
 }
 
 #[cfg(test)]

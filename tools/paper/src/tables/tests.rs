@@ -6,19 +6,10 @@ use super::results::{Results, SequenceErrors};
 use super::{estimates, table};
 use crate::sequence::{Sequence, Step, StreamSummary};
 use crate::simulate::{self, Spec};
-use gyronet::model::window::{Features, WINDOW};
-use gyronet::model::{Estimate as WindowEstimate, WindowNetwork};
+use gyronet_tools::board::Uncorrected;
 use gyronet_tools::drive::track::Track;
 use gyronet_tools::evaluate::methods::Method;
 use std::path::PathBuf;
-
-struct Nothing;
-
-impl WindowNetwork for Nothing {
-    fn estimate(&mut self, _window: &[Features; WINDOW]) -> WindowEstimate {
-        WindowEstimate::NONE
-    }
-}
 
 fn sequence(name: &str, seconds: u32) -> Sequence {
     let folder = tempfile::tempdir().unwrap();
@@ -82,7 +73,7 @@ fn the_truth_has_no_error() {
 #[test]
 fn each_method_does_what_it_says() {
     let sequence = exact();
-    let estimates = estimates::run(&sequence, &mut Nothing);
+    let estimates = estimates::run(&sequence, &mut Uncorrected);
     let errors = SequenceErrors::new(&sequence, &estimates);
     let final_rad = |key: &str| errors.methods[key].final_unwrapped_rad;
     let seconds = 57.0;
@@ -106,13 +97,13 @@ fn wheels_alone_turn_by_their_difference() {
         let [left, right] = &mut step.wheels;
         (*left, *right) = (*left - 0.75 * step.fog, *right + 0.75 * step.fog);
     }
-    let estimates = estimates::run(&sequence, &mut Nothing);
+    let estimates = estimates::run(&sequence, &mut Uncorrected);
     let errors = SequenceErrors::new(&sequence, &estimates);
     let wheels = errors.methods["wheels"];
     assert!(wheels.final_unwrapped_rad < 1e-9 && wheels.ate_m < 1e-6, "{wheels:?}");
     // A wheel base that is wrong by a tenth makes the turn wrong by a tenth.
     sequence.wheel_base = Some(1.5 / 1.1);
-    let estimates = estimates::run(&sequence, &mut Nothing);
+    let estimates = estimates::run(&sequence, &mut Uncorrected);
     let errors = SequenceErrors::new(&sequence, &estimates);
     let turned: f64 = sequence.turns()[300..].iter().sum();
     assert!((errors.methods["wheels"].final_unwrapped_rad - 0.1 * turned.abs()).abs() < 1e-9, "{errors:?}");
@@ -146,7 +137,7 @@ fn wheels_and_gyro_are_fitted_together() {
     assert!((joint.way * longer - 1.0).abs() < 1e-6, "{joint:?}");
 
     let tested = worse(&training);
-    let mut estimates = estimates::run(&tested, &mut Nothing);
+    let mut estimates = estimates::run(&tested, &mut Uncorrected);
     estimates.add_joint(&tested, &joint);
     let errors = SequenceErrors::new(&tested, &estimates);
     assert!(errors.methods["fog"].ate_m > 0.1, "{errors:?}");
@@ -162,7 +153,7 @@ fn what_needs_to_stand_still_is_left_out_when_it_does_not() {
     for (k, step) in sequence.steps.iter_mut().enumerate().take(400) {
         step.angular_rate[2] = 0.002 * k as f32;
     }
-    let estimates = estimates::run(&sequence, &mut Nothing);
+    let estimates = estimates::run(&sequence, &mut Uncorrected);
     let errors = SequenceErrors::new(&sequence, &estimates);
     assert!(
         !errors.methods.contains_key(Method::STATIC.key) && !errors.methods.contains_key(Method::GYRONET.key)
@@ -175,7 +166,7 @@ fn what_needs_to_stand_still_is_left_out_when_it_does_not() {
 fn sequences_of_the_paper_get_the_tables_that_it_has_for_them() {
     let of = |name: &str| {
         let sequence = Sequence { name: name.into(), ..exact() };
-        let estimates = estimates::run(&sequence, &mut Nothing);
+        let estimates = estimates::run(&sequence, &mut Uncorrected);
         let mut errors = SequenceErrors::new(&sequence, &estimates);
         let fognet = errors.methods["fog"];
         errors.methods.insert(Method::FOGNET.key, fognet);
@@ -203,7 +194,7 @@ fn sequences_of_the_paper_get_the_tables_that_it_has_for_them() {
 fn json_and_tables_of_simulated_sequences() {
     let of = |name: &str| {
         let sequence = sequence(name, 60);
-        SequenceErrors::new(&sequence, &estimates::run(&sequence, &mut Nothing))
+        SequenceErrors::new(&sequence, &estimates::run(&sequence, &mut Uncorrected))
     };
     let results = Results::new(vec![of("k"), of("n")]);
     let json = serde_json::to_value(&results).unwrap();

@@ -6,9 +6,7 @@ use super::super::{Doctor, Verdict};
 use super::found;
 use crate::drive::recording::Reader;
 use crate::drive::vehicle::Vehicle;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, Normal};
+use crate::random::Random;
 use std::fmt::Write;
 
 /// A car that rests for 10 s and then drives with turns of both sides, in a drive with a course and a speed by GNSS.
@@ -16,9 +14,7 @@ use std::fmt::Write;
 fn with_course(gyro: f64, wheels: f64, late: usize, toml: &str) -> Doctor {
     let mut text =
         String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,wheel2_rate,wheel4_rate,ref_yaw,gnss_speed\n");
-    let (mut random, normal) = (ChaCha8Rng::seed_from_u64(2), Normal::new(0.0, 0.002).unwrap());
-    let mut courses = Vec::new();
-    let mut angle = 0.0;
+    let (mut random, mut courses, mut angle) = (Random::new(2, 0), Vec::new(), 0.0);
     for k in 0..9_000 {
         let time = 0.01 * f64::from(k);
         let speed = (1.5 * (time - 10.0)).clamp(0.0, 12.0);
@@ -29,7 +25,7 @@ fn with_course(gyro: f64, wheels: f64, late: usize, toml: &str) -> Doctor {
         };
         angle += 0.01 * turn;
         courses.push((speed > 1.0).then_some((angle, speed)));
-        let mut noise = || normal.sample(&mut random);
+        let mut noise = || 0.002 * random.normal();
         let (rate, wheel) = (gyro * (turn + noise()), wheels * speed / 0.289);
         let side = speed * turn + noise();
         write!(

@@ -28,10 +28,9 @@ fn parse(text: &str) -> Result<Recording, DataError> {
 #[test]
 fn reads_what_is_there() {
     let recording = parse(&unedited(400)).unwrap();
-    assert_eq!(recording.name(), "a");
     assert_eq!(recording.rows.len(), 400);
     assert_eq!(recording.missing, 0);
-    assert!((recording.seconds() - 4.0).abs() < 1e-9);
+    assert!((recording.facts().seconds() - 4.0).abs() < 1e-9);
     let row = recording.rows[1];
     assert_eq!(row.line, 3);
     assert_eq!(row.sample.time.0, 12_010_000);
