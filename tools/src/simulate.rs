@@ -36,7 +36,6 @@ pub struct Config {
     /// Seed of the route, the road and the part.
     pub seed: u64,
     pub car: car::Config,
-    pub vibration: vibration::Config,
     pub mems: mems::Config,
     /// A trip on which the part warms up; it replaces the part's bias.
     pub warming: Option<warming::Config>,
@@ -49,7 +48,6 @@ impl Config {
         seconds: 90,
         seed: 1,
         car: car::Config::DEFAULT,
-        vibration: vibration::Config::DEFAULT,
         mems: mems::Config::DEFAULT,
         warming: None,
         gnss: None,
@@ -96,7 +94,7 @@ impl Simulation {
         };
         Self {
             car: Car::on(&config.car, route, seed),
-            vibration: Vibration::new(&config.vibration, seed),
+            vibration: Vibration::new(seed),
             mems: match warming {
                 Some(warming) => Mems::of_device(&warming::PART, warming.device, seed),
                 None => Mems::new(&config.mems, seed),

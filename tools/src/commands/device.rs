@@ -7,7 +7,6 @@ use super::Common;
 use clap::Subcommand;
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::heading::CourseCounters;
-use gyronet::model::Blob;
 use gyronet::model::fognet_blob::FOGNET;
 use gyronet::service::event::CanFault;
 use gyronet::service::message::{AccessCounters, Info};
@@ -17,6 +16,7 @@ use gyronet_tools::client::device::update::{Update, update};
 use gyronet_tools::client::device::upload::{Uploaded, upload};
 use gyronet_tools::client::device::{AccessState, Authority, Device};
 use gyronet_tools::drive::error::read;
+use gyronet_tools::network::weight_file::WeightFile;
 use gyronet_tools::signing::{self, PrivateKey};
 use serde::Serialize;
 use std::io::{self, Write};
@@ -277,8 +277,6 @@ fn print_course((state, [gain, sigma], counters): (u8, [f32; 2], CourseCounters)
 fn weights(device: &mut Board, path: &std::path::Path, common: Common) -> super::Result {
     let file = read(path)?;
     // Run the board's own check here, before the board erases its flash.
-    let words: Vec<u32> = file.chunks(4).map(|word| word.try_into().map_or(0, u32::from_le_bytes)).collect();
-    let words = bytemuck::cast_slice(&words);
     if file.get(6..8) == Some(&FOGNET.to_le_bytes()[..]) {
         let name = path.display();
         return Err(format!(
@@ -286,7 +284,7 @@ fn weights(device: &mut Board, path: &std::path::Path, common: Common) -> super:
         )
         .into());
     }
-    Blob::new_checked(words).map_err(|error| format!("{}: {error}", path.display()))?;
+    WeightFile::new(&path.display().to_string(), &file).blob()?;
     let bar = super::progress::bar(common, file.len(), "upload");
     let uploaded = upload(device, &file, |written| bar.set_position(written as u64))?;
     bar.finish_and_clear();

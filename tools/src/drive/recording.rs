@@ -103,6 +103,11 @@ impl Recording {
     pub fn facts(&self) -> Facts {
         Facts::of(&self.rows)
     }
+
+    /// Returns the file's name without folder and extension.
+    pub fn name(&self) -> &str {
+        name(&self.path)
+    }
 }
 
 /// The name of a file without folder and extension.

@@ -11,64 +11,53 @@ use crate::random::Random;
 use std::f64::consts::{PI, TAU};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Source {
+struct Source {
     /// Centre frequency of the band, Hz.
-    pub hz: f64,
+    hz: f64,
     /// Width of the band, Hz.
-    pub bandwidth: f64,
+    bandwidth: f64,
     /// Standard deviation of the angular rate, rad/s.
-    pub angular_rate: [f64; 3],
+    angular_rate: [f64; 3],
     /// Standard deviation of the specific force, m/s^2.
-    pub specific_force: [f64; 3],
+    specific_force: [f64; 3],
 }
 
-/// Holds all sources of vibration. The amplitudes are those of the recordings: 0.006 to 0.009 rad/s and 0.1 to 0.45
-/// m/s^2 at standstill, about 0.02 rad/s and 0.5 m/s^2 in motion. The bands are the peaks of their spectra.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Config {
-    /// Vibration from the engine, equally strong at standstill and in motion.
-    pub engine: Source,
-    /// Vibration from the road at [`Config::road_speed`]; it is proportional to the speed.
-    pub road: [Source; 3],
-    /// Speed for which `road` is given, m/s.
-    pub road_speed: f64,
-}
+// A small diesel on town roads. The amplitudes are those of the recordings: 0.006 to 0.009 rad/s and 0.1 to 0.45 m/s^2 at
+// standstill, about 0.02 rad/s and 0.5 m/s^2 in motion. The bands are the peaks of their spectra.
 
-impl Config {
-    /// The default is a small diesel on town roads.
-    pub const DEFAULT: Self = Self {
-        engine: Source {
-            hz: 23.4,
-            bandwidth: 0.8,
-            angular_rate: [0.0062, 0.0075, 0.0055],
-            specific_force: [0.40, 0.09, 0.10],
-        },
-        road: [
-            // The body on its springs.
-            Source {
-                hz: 1.6,
-                bandwidth: 0.8,
-                angular_rate: [0.010, 0.010, 0.0004],
-                specific_force: [0.10, 0.15, 0.25],
-            },
-            // The wheels on their tyres.
-            Source {
-                hz: 17.0,
-                bandwidth: 3.0,
-                angular_rate: [0.020, 0.022, 0.011],
-                specific_force: [0.20, 0.20, 0.20],
-            },
-            // Floor panels.
-            Source {
-                hz: 30.0,
-                bandwidth: 4.0,
-                angular_rate: [0.008, 0.008, 0.008],
-                specific_force: [0.25, 0.20, 0.35],
-            },
-        ],
-        road_speed: 10.0,
-    };
-}
+/// Vibration from the engine, equally strong at standstill and in motion.
+const ENGINE: Source = Source {
+    hz: 23.4,
+    bandwidth: 0.8,
+    angular_rate: [0.0062, 0.0075, 0.0055],
+    specific_force: [0.40, 0.09, 0.10],
+};
+/// Vibration from the road at [`ROAD_SPEED`]; it is proportional to the speed.
+const ROAD: [Source; 3] = [
+    // The body on its springs.
+    Source {
+        hz: 1.6,
+        bandwidth: 0.8,
+        angular_rate: [0.010, 0.010, 0.0004],
+        specific_force: [0.10, 0.15, 0.25],
+    },
+    // The wheels on their tyres.
+    Source {
+        hz: 17.0,
+        bandwidth: 3.0,
+        angular_rate: [0.020, 0.022, 0.011],
+        specific_force: [0.20, 0.20, 0.20],
+    },
+    // Floor panels.
+    Source {
+        hz: 30.0,
+        bandwidth: 4.0,
+        angular_rate: [0.008, 0.008, 0.008],
+        specific_force: [0.25, 0.20, 0.35],
+    },
+];
+/// Speed for which [`ROAD`] is given, m/s.
+const ROAD_SPEED: f64 = 10.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Shake {
@@ -133,16 +122,15 @@ pub struct Vibration {
     random: Random,
     engine: Shaker,
     road: [Shaker; 3],
-    road_speed: f64,
 }
 
 impl Vibration {
     /// Starts with the engine running.
-    pub fn new(config: &Config, seed: u64) -> Self {
+    pub fn new(seed: u64) -> Self {
         let mut random = Purpose::Vibration.stream(seed);
-        let engine = Shaker::new(config.engine, &mut random);
-        let road = config.road.map(|source| Shaker::new(source, &mut random));
-        let mut vibration = Self { random, engine, road, road_speed: config.road_speed };
+        let engine = Shaker::new(ENGINE, &mut random);
+        let road = ROAD.map(|source| Shaker::new(source, &mut random));
+        let mut vibration = Self { random, engine, road };
         // The first angle has no predecessor to compute a rate from, so discard the first step.
         vibration.step(0.0);
         vibration
@@ -153,7 +141,7 @@ impl Vibration {
         let mut shake = Shake::default();
         self.engine.step(1.0, &mut self.random, &mut shake);
         for shaker in &mut self.road {
-            shaker.step(speed / self.road_speed, &mut self.random, &mut shake);
+            shaker.step(speed / ROAD_SPEED, &mut self.random, &mut shake);
         }
         shake
     }
@@ -165,7 +153,7 @@ mod tests {
 
     #[test]
     fn shaking_turns_the_car_nowhere() {
-        let mut vibration = Vibration::new(&Config::DEFAULT, 1);
+        let mut vibration = Vibration::new(1);
         let mut yaw = 0.0f64;
         for _ in 0..100_000 {
             let [.., rate] = vibration.step(10.0).angular_rate;
@@ -176,13 +164,12 @@ mod tests {
 
     #[test]
     fn sizes_are_as_configured() {
-        let mut vibration = Vibration::new(&Config::DEFAULT, 2);
+        let mut vibration = Vibration::new(2);
         let shakes: Vec<Shake> = (0..200_000).map(|_| vibration.step(0.0)).collect();
         let rms = |of: fn(&Shake) -> f64| {
             (shakes.iter().map(|s| of(s) * of(s)).sum::<f64>() / shakes.len() as f64).sqrt()
         };
-        let engine = Config::DEFAULT.engine;
-        assert!((rms(|s| s.angular_rate[2]) / engine.angular_rate[2] - 1.0).abs() < 0.05);
-        assert!((rms(|s| s.specific_force[0]) / engine.specific_force[0] - 1.0).abs() < 0.05);
+        assert!((rms(|s| s.angular_rate[2]) / ENGINE.angular_rate[2] - 1.0).abs() < 0.05);
+        assert!((rms(|s| s.specific_force[0]) / ENGINE.specific_force[0] - 1.0).abs() < 0.05);
     }
 }

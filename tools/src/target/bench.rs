@@ -3,6 +3,7 @@
 //! QEMU's plugin `tools/bench/m4count.c` counts instructions exactly and models Cortex-M4 cycles at zero wait states. It
 //! is built with the C compiler that Rust's linker needs anyway.
 
+use super::cmsis_nn::{COMPILER, FETCH};
 use std::ffi::OsStr;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -26,8 +27,12 @@ pub enum BenchError {
     Failed { program: String, output: String },
     #[error("{program} did not end within {LIMIT:?}")]
     TooLong { program: String },
-    #[error("the bench image printed an unexpected line: {0}")]
+    #[error("the image printed an unexpected line: {0}")]
     Line(String),
+    #[error("{0} is not there: the folder does not hold CMSIS-NN (fetch it with `{FETCH}`)")]
+    NoSources(String),
+    #[error("{COMPILER} is not installed (Debian and Ubuntu: apt install gcc-arm-none-eabi)")]
+    NoCompiler,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::Command;
 
 pub const FETCH: &str = "git clone --depth 1 https://github.com/ARM-software/CMSIS-NN";
-const COMPILER: &str = "arm-none-eabi-gcc";
+pub const COMPILER: &str = "arm-none-eabi-gcc";
 const MACHINE: &str = "mps2-an386";
 
 /// Integer kernels of an LSTM and of a dense layer.
@@ -34,18 +34,6 @@ const SOURCES: [&str; 18] = [
     "FullyConnectedFunctions/arm_fully_connected_s16.c",
 ];
 
-#[derive(Debug, thiserror::Error)]
-pub enum CmsisError {
-    #[error("{0} is not there: the folder does not hold CMSIS-NN (fetch it with `{FETCH}`)")]
-    Missing(String),
-    #[error("{COMPILER} is not installed (Debian and Ubuntu: apt install gcc-arm-none-eabi)")]
-    NoCompiler,
-    #[error(transparent)]
-    Bench(#[from] BenchError),
-    #[error("CMSIS-NN's image printed {0:?}")]
-    Output(String),
-}
-
 #[derive(Debug)]
 pub struct Region {
     /// The width of the activations, such as `cmsis-nn/s8/window`.
@@ -56,7 +44,7 @@ pub struct Region {
 }
 
 /// Builds and runs the image from the CMSIS-NN in `folder`; returns its regions and the compiler's version.
-pub fn measure(folder: &Path) -> Result<(Vec<Region>, String), CmsisError> {
+pub fn measure(folder: &Path) -> Result<(Vec<Region>, String), BenchError> {
     let bench = bench::workspace().join("tools/bench");
     let mut gcc = Command::new(COMPILER);
     gcc.args([
@@ -72,12 +60,12 @@ pub fn measure(folder: &Path) -> Result<(Vec<Region>, String), CmsisError> {
     for source in SOURCES {
         let path = folder.join("Source").join(source);
         if !path.is_file() {
-            return Err(CmsisError::Missing(path.display().to_string()));
+            return Err(BenchError::NoSources(path.display().to_string()));
         }
         gcc.arg(path);
     }
     let version =
-        Command::new(COMPILER).arg("-dumpfullversion").output().map_err(|_| CmsisError::NoCompiler)?;
+        Command::new(COMPILER).arg("-dumpfullversion").output().map_err(|_| BenchError::NoCompiler)?;
     // Vectors and code at the start of the board's flash, data in its RAM.
     gcc.args(["-Wl,--section-start=.vectors=0", "-Wl,-Ttext=0x100", "-Wl,-Tdata=0x20000000", "-Wl,-e,reset"]);
     let image = bench::scratch()?.join("cmsis_nn.elf");
@@ -86,7 +74,7 @@ pub fn measure(folder: &Path) -> Result<(Vec<Region>, String), CmsisError> {
     let names: Vec<&str> = printed.lines().collect();
     let counts: Vec<(u64, u64)> = counts.collect();
     if names.len() != counts.len() || names.iter().any(|name| name.starts_with("FAILED")) {
-        return Err(CmsisError::Output(printed));
+        return Err(BenchError::Line(printed));
     }
     let regions = names.into_iter().zip(counts).map(|(name, (instructions, cycles))| Region {
         name: format!("cmsis-nn/{name}"),

@@ -22,12 +22,12 @@
 //! | acceleration, braking, comfort in corners | 2.0, 1.8, 2.0 m/s^2 | as [`gyronet_tools::simulate::car::Config::DEFAULT`]; calm drivers |
 //! | grade, bank | 0.03, 0.015 rad | streets are drained by 1.5 to 2 % of bank; grades up to 3 % (A) |
 //! | wavelengths of the bank | 223 and 71 m | (A): different from the grade's, see [`gyronet_tools::simulate::car::Config::bank_waves`] |
-//! | vibration | [`gyronet_tools::simulate::vibration::Config::DEFAULT`] | measured on a car (WID recordings) |
+//! | vibration | [`gyronet_tools::simulate::vibration`] | measured on a car (WID recordings) |
 //! | KAIST latitude | 36.37 deg N | Daejeon |
 //! | KAIST delay of a stamp | 0.1 ms, exponential | (A): it is small in the paper's Fig. 11 |
 
 use super::{fog, odometer, town, world};
-use gyronet_tools::simulate::{car, mems, vibration};
+use gyronet_tools::simulate::{car, mems};
 
 /// 1 deg/h in rad/s.
 const DEG_PER_HOUR: f64 = std::f64::consts::PI / 180.0 / 3600.0;
@@ -57,7 +57,6 @@ pub const KAIST: Vehicle = Vehicle {
             bank_waves: [223.0, 71.0],
             ..car::Config::DEFAULT
         },
-        vibration: vibration::Config::DEFAULT,
         cornering_stiffness: 20.0,
         latitude_deg: 36.37,
     },

@@ -10,7 +10,7 @@
 use super::town::Town;
 use gyronet_tools::drive::DT;
 use gyronet_tools::simulate::car::{self, Car, GRAVITY, Motion};
-use gyronet_tools::simulate::vibration::{self, Shake, Vibration};
+use gyronet_tools::simulate::vibration::{Shake, Vibration};
 
 /// Rotation rate of the Earth, rad/s (WGS 84).
 pub const EARTH_RATE: f64 = 7.292_115e-5;
@@ -18,7 +18,6 @@ pub const EARTH_RATE: f64 = 7.292_115e-5;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     pub car: car::Config,
-    pub vibration: vibration::Config,
     /// Normalised cornering stiffness of the rear axle: lateral acceleration over g for 1 rad.
     pub cornering_stiffness: f64,
     pub latitude_deg: f64,
@@ -67,7 +66,7 @@ impl World {
         Self {
             config: *config,
             car: Car::on(&config.car, way, run),
-            vibration: Vibration::new(&config.vibration, run),
+            vibration: Vibration::new(run),
             tick: 0,
             position: [0.0; 3],
             yaw,
