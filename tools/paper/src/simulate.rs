@@ -83,7 +83,7 @@ struct Drive {
 impl Drive {
     fn new(spec: &Spec) -> Self {
         let vehicle = &vehicles::KAIST;
-        let way = Town::new(&vehicle.town, spec.run);
+        let way = Town::new(spec.run);
         let heading = Purpose::Stamps.stream(spec.run).between(0.0, std::f64::consts::TAU);
         Self {
             world: World::new(&vehicle.world, way, heading, spec.run),

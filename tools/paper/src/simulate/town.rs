@@ -9,52 +9,45 @@ use gyronet_tools::simulate::purpose::Purpose;
 use std::collections::VecDeque;
 use std::f64::consts::FRAC_PI_2;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Config {
-    /// Speed limits, m/s, each with the share of the streets that have it.
-    pub limits: [(f64, f64); 3],
-    /// Smallest and largest length of a block in the slowest streets, m; faster streets have longer blocks.
-    pub block: [f64; 2],
-    /// Share of the blocks that are curved.
-    pub bends: f64,
-    /// Share of the junctions where the driver waits.
-    pub stops: f64,
-    /// Shortest and longest wait, s.
-    pub wait: [f64; 2],
-    /// Shares of the junctions where the driver turns left, and right.
-    pub turns: [f64; 2],
-    /// Smallest and largest length of a left corner and of a right corner, m.
-    pub corner: [[f64; 2]; 2],
-    /// Comfortable lateral acceleration, m/s^2.
-    pub lateral: f64,
-    /// Shortest and longest time at rest before the vehicle sets off, s.
-    pub before: [f64; 2],
-}
+/// Speed limits, m/s, each with the share of the streets that have it.
+const LIMITS: [(f64, f64); 3] = [(8.33, 0.35), (13.89, 0.45), (19.44, 0.2)];
+/// Smallest and largest length of a block in the slowest streets, m; faster streets have longer blocks.
+const BLOCK: [f64; 2] = [60.0, 180.0];
+/// Share of the blocks that are curved.
+const BENDS: f64 = 0.4;
+/// Share of the junctions where the driver waits, and the shortest and longest wait, s.
+const STOPS: f64 = 0.4;
+const WAIT: [f64; 2] = [5.0, 45.0];
+/// Shares of the junctions where the driver turns left, and right.
+const TURNS: [f64; 2] = [0.25, 0.3];
+/// Smallest and largest length of a left corner and of a right corner, m.
+const CORNER: [[f64; 2]; 2] = [[25.0, 35.0], [15.0, 22.0]];
+/// Comfortable lateral acceleration, m/s^2.
+const LATERAL: f64 = 2.0;
+/// Shortest and longest time at rest before the vehicle sets off, s.
+const BEFORE: [f64; 2] = [8.0, 15.0];
 
 /// An endless iterator over the legs of a route through a town.
 #[derive(Debug, Clone)]
 pub struct Town {
-    config: Config,
     random: Random,
     legs: VecDeque<Leg>,
 }
 
 impl Town {
-    pub fn new(config: &Config, seed: u64) -> Self {
+    pub fn new(seed: u64) -> Self {
         let mut random = Purpose::Route.stream(seed);
-        let [from, to] = config.before;
+        let [from, to] = BEFORE;
         let first = Leg::Stand { seconds: random.between(from, to) };
-        Self { config: *config, random, legs: VecDeque::from([first]) }
+        Self { random, legs: VecDeque::from([first]) }
     }
 
     fn block(&mut self) {
-        let Config { limits, block: [from, to], bends, stops, wait, turns, corner, lateral, .. } =
-            self.config;
         let random = &mut self.random;
         let pick = random.between(0.0, 1.0);
-        let slowest = limits[0].0;
+        let slowest = LIMITS[0].0;
         let (mut share, mut limit) = (0.0, slowest);
-        for (speed, part) in limits {
+        for (speed, part) in LIMITS {
             if pick >= share {
                 limit = speed;
             }
@@ -62,27 +55,27 @@ impl Town {
         }
         // Drivers deviate from the limit, and from each other.
         let speed = limit * random.between(0.85, 1.05);
-        let metres = random.between(from, to) * limit / slowest;
-        let bent = random.between(0.0, 1.0) < bends;
+        let metres = random.between(BLOCK[0], BLOCK[1]) * limit / slowest;
+        let bent = random.between(0.0, 1.0) < BENDS;
         let sign = if random.between(0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
         // A bend must be drivable at the street's speed.
-        let sharpest = 0.5 * lateral * metres / (2.0 * speed * speed);
+        let sharpest = 0.5 * LATERAL * metres / (2.0 * speed * speed);
         let turn = if bent { sign * random.between(0.1, 0.9) * sharpest.min(1.0) } else { 0.0 };
         self.legs.push_back(Leg::Road { metres, speed, turn });
-        if random.between(0.0, 1.0) < stops {
-            self.legs.push_back(Leg::Stand { seconds: random.between(wait[0], wait[1]) });
+        if random.between(0.0, 1.0) < STOPS {
+            self.legs.push_back(Leg::Stand { seconds: random.between(WAIT[0], WAIT[1]) });
         }
         let pick = random.between(0.0, 1.0);
-        let side = if pick < turns[0] {
+        let side = if pick < TURNS[0] {
             0
-        } else if pick < turns[0] + turns[1] {
+        } else if pick < TURNS[0] + TURNS[1] {
             1
         } else {
             return;
         };
-        let metres = random.between(corner[side][0], corner[side][1]);
+        let metres = random.between(CORNER[side][0], CORNER[side][1]);
         let turn = FRAC_PI_2 * random.between(0.9, 1.1);
-        let speed = (lateral * metres / (2.0 * turn)).sqrt() * random.between(0.8, 1.0);
+        let speed = (LATERAL * metres / (2.0 * turn)).sqrt() * random.between(0.8, 1.0);
         self.legs.push_back(Leg::Road { metres, speed, turn: if side == 0 { turn } else { -turn } });
     }
 }

@@ -1,7 +1,7 @@
 //! Defines the simulated vehicle and its sensors, with the source of every parameter.
 //!
-//! No parameter was tuned to a result. (M) marks values recalled from a data sheet that was not available; (A) marks
-//! assumptions where nothing is published.
+//! Those of the route are in [`super::town`]. No parameter was tuned to a result. (M) marks values recalled from a data
+//! sheet that was not available; (A) marks assumptions where nothing is published.
 //!
 //! | what | value | source |
 //! |---|---|---|
@@ -26,7 +26,7 @@
 //! | KAIST latitude | 36.37 deg N | Daejeon |
 //! | KAIST delay of a stamp | 0.1 ms, exponential | (A): it is small in the paper's Fig. 11 |
 
-use super::{fog, odometer, town, world};
+use super::{fog, odometer, world};
 use gyronet_tools::simulate::{car, mems};
 
 /// 1 deg/h in rad/s.
@@ -39,7 +39,6 @@ const ROOT_HOUR: f64 = 60.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vehicle {
     pub world: world::Config,
-    pub town: town::Config,
     pub mems: mems::Config,
     pub fog: fog::Config,
     pub wheels: odometer::Config,
@@ -59,17 +58,6 @@ pub const KAIST: Vehicle = Vehicle {
         },
         cornering_stiffness: 20.0,
         latitude_deg: 36.37,
-    },
-    town: town::Config {
-        limits: [(8.33, 0.35), (13.89, 0.45), (19.44, 0.2)],
-        block: [60.0, 180.0],
-        bends: 0.4,
-        stops: 0.4,
-        wait: [5.0, 45.0],
-        turns: [0.25, 0.3],
-        corner: [[25.0, 35.0], [15.0, 22.0]],
-        lateral: 2.0,
-        before: [8.0, 15.0],
     },
     mems: mems::Config {
         gyro_bias: 0.25 * DEG,
