@@ -18,6 +18,7 @@ pub mod sent;
 pub mod sequence;
 pub mod settings;
 pub mod situations;
+pub mod spi;
 pub mod stored;
 pub mod stream;
 pub mod synthetic;

@@ -1,9 +1,10 @@
 //! The board on the host: bytes of the sensor and wheel frames in, frames out, a millisecond at a time.
 
-use super::icm42688::{self, NoDelay};
+use super::icm42688::Simulated;
 use super::sensor::LATITUDE;
 use super::vehicle::Part;
 use crate::flash::Region;
+use crate::spi::{NoDelay, Select};
 use gyronet::can::DataFrame;
 use gyronet::can::config::{Config as CanConfig, Settings, StatusSettings, YawSettings};
 use gyronet::can::status::STATUS_ID;
@@ -18,7 +19,9 @@ use gyronet::sensor::{ByteSource, Source};
 use gyronet::service::{Device, SupportedHardware};
 use gyronet::store::{Calibration, Configuration, FogPart, ImuPart, Learned};
 use gyronet::units::Micros;
+use std::cell::RefCell;
 use std::collections::VecDeque;
+use std::rc::Rc;
 
 const HARDWARE: SupportedHardware =
     SupportedHardware { imus: &[ImuPart::XsensMti], fogs: &[], gnss: false, fd: false, clock_hz: 0 };
@@ -27,7 +30,7 @@ const MAX_FETCHED: usize = 32;
 
 enum Line {
     Mti(Box<Mti>),
-    Fifo(Box<Icm42688<icm42688::Bus>>, icm42688::Bus),
+    Fifo(Box<Icm42688<Select<Simulated>>>, Rc<RefCell<Simulated>>),
 }
 
 /// The samples that wait for the coprocessor; `None` where bytes gave none.
@@ -94,9 +97,9 @@ impl Board {
         let blob = Blob::new_checked(&weights::DEFAULT.0).expect("the library's weights");
         let line = match part {
             Part::Icm42688 => {
-                let bus = icm42688::Bus::default();
-                let driver = Icm42688::new(bus.clone(), &mut NoDelay);
-                Line::Fifo(Box::new(driver.expect("a simulated part that is well")), bus)
+                let part = Rc::default();
+                let driver = Icm42688::new(Select(Rc::clone(&part), 0), &mut NoDelay);
+                Line::Fifo(Box::new(driver.expect("a simulated part that is well")), part)
             }
             Part::Xsens | Part::Dsp1760 => Line::Mti(Box::default()),
         };
@@ -124,8 +127,8 @@ impl Board {
                     waiting.extend(std::iter::from_fn(|| mti.next_sample()).map(Result::ok));
                 }
             }
-            Line::Fifo(driver, bus) => {
-                bus.fill(bytes.iter().copied());
+            Line::Fifo(driver, part) => {
+                part.borrow_mut().fifo.extend(bytes);
                 let samples = std::iter::from_fn(|| driver.next_sample().transpose()).take(MAX_FETCHED);
                 waiting.extend(samples.map(Result::ok));
             }

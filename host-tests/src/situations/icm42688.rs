@@ -1,16 +1,11 @@
-//! 20-bit FIFO packets of an ICM-42688-P, and a simulated SPI bus for its driver.
+//! 20-bit FIFO packets of an ICM-42688-P, and a simulated part for its driver.
 
-use embedded_hal::delay::DelayNs;
-use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use crate::spi::Part;
 use gyronet::sample::ImuSample;
 use gyronet::sensor::icm42688::packet::Packet;
 use gyronet::sensor::icm42688::registers as reg;
-use gyronet::sensor::spi::READ;
 use gyronet::units::STANDARD_GRAVITY;
-use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::convert::Infallible;
-use std::rc::Rc;
 
 /// Step of a rate, 1/131 deg/s: the part uses 19 of the 20 bits.
 const RATE_STEP: f64 = std::f64::consts::PI / 180.0 / 131.0;
@@ -39,18 +34,19 @@ pub fn packet(sample: &ImuSample) -> Packet {
 }
 
 #[derive(Debug, Default)]
-struct Simulated {
-    registers: std::collections::HashMap<(u8, u8), u8>,
+pub struct Simulated {
+    /// By bank and address.
+    pub registers: std::collections::HashMap<(u8, u8), u8>,
     bank: u8,
-    fifo: VecDeque<u8>,
+    pub fifo: VecDeque<u8>,
     /// What was written to the registers but that of the bank: bank, address, value.
-    written: Vec<(u8, u8, u8)>,
+    pub written: Vec<(u8, u8, u8)>,
     /// A register that answers this, whatever is written.
-    held: Option<(u8, u8, u8)>,
+    pub held: Option<(u8, u8, u8)>,
 }
 
-impl Simulated {
-    fn write(&mut self, address: u8, value: u8) {
+impl Part for Simulated {
+    fn write(&mut self, _: usize, address: u8, value: u8) {
         if address == reg::BANK_SEL {
             self.bank = value;
             return;
@@ -63,7 +59,7 @@ impl Simulated {
         }
     }
 
-    fn read(&mut self, address: u8, to: &mut [u8]) {
+    fn read(&mut self, _: usize, address: u8, to: &mut [u8]) {
         if let Some((.., held)) = self.held.filter(|(bank, at, _)| (*bank, *at) == (self.bank, address)) {
             return to.fill(held);
         }
@@ -77,57 +73,4 @@ impl Simulated {
             };
         }
     }
-}
-
-/// A simulated SPI bus; its clones share the part, so that the FIFO can be filled while the driver owns a clone.
-#[derive(Debug, Clone, Default)]
-pub struct Bus(Rc<RefCell<Simulated>>);
-
-impl Bus {
-    pub fn fill(&self, bytes: impl IntoIterator<Item = u8>) {
-        self.0.borrow_mut().fifo.extend(bytes);
-    }
-
-    /// Sets a register as the part has it after a reset.
-    pub fn set(&self, bank: u8, address: u8, value: u8) {
-        self.0.borrow_mut().registers.insert((bank, address), value);
-    }
-
-    pub fn hold(&self, held: Option<(u8, u8, u8)>) {
-        self.0.borrow_mut().held = held;
-    }
-
-    pub fn written(&self) -> Vec<(u8, u8, u8)> {
-        self.0.borrow().written.clone()
-    }
-}
-
-impl ErrorType for Bus {
-    type Error = Infallible;
-}
-
-impl SpiDevice for Bus {
-    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
-        let mut part = self.0.borrow_mut();
-        let mut selected = 0;
-        for operation in operations {
-            match operation {
-                Operation::Write(bytes) => match **bytes {
-                    [address] => selected = address & !READ,
-                    [address, value] => part.write(address, value),
-                    _ => {}
-                },
-                Operation::Read(to) => part.read(selected, to),
-                // The driver does not use these operations.
-                Operation::Transfer(..) | Operation::TransferInPlace(_) | Operation::DelayNs(_) => {}
-            }
-        }
-        Ok(())
-    }
-}
-
-pub struct NoDelay;
-
-impl DelayNs for NoDelay {
-    fn delay_ns(&mut self, _ns: u32) {}
 }

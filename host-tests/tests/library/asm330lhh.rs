@@ -1,12 +1,11 @@
 //! ASM330LHH: words of the FIFO, and the driver on a simulated bus.
 
-use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::sensor::asm330lhh::word::{Incomplete, Outputs, Readings, Word};
 use gyronet::sensor::asm330lhh::{Asm330lhh, CHECKS};
 use gyronet::sensor::spi::SpiError;
 use gyronet::units::{CentiCelsius, Micros};
-use gyronet_host_tests::situations::icm42688::NoDelay;
+use gyronet_host_tests::spi::{self, NoDelay, Select};
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::convert::Infallible;
@@ -116,31 +115,27 @@ struct Part {
     deflected: [[i16; 3]; 2],
 }
 
-#[derive(Clone)]
-struct Bus(Rc<RefCell<Part>>);
+type Bus = Rc<RefCell<Part>>;
 
-impl Bus {
-    fn new() -> Self {
-        let deflected = [[2_143, -10_000, 5_000], [328, -13_934, 1_000]];
-        let (held, fifo) = (Vec::new(), VecDeque::new());
-        Self(Rc::new(RefCell::new(Part { registers: [0; 128], held, fifo, has_lost: false, deflected })))
-    }
-
-    fn fill(&self, words: impl IntoIterator<Item = [u8; 7]>) {
-        self.0.borrow_mut().fifo.extend(words);
-    }
-
-    fn hold(&self, held: &[(u8, u8)]) {
-        self.0.borrow_mut().held = held.to_vec();
-    }
-
-    fn start(&self, self_test: bool) -> Result<Asm330lhh<Self>, SpiError<Infallible>> {
-        Asm330lhh::new(self.clone(), self_test, &mut NoDelay)
-    }
+fn new() -> Bus {
+    let deflected = [[2_143, -10_000, 5_000], [328, -13_934, 1_000]];
+    let (held, fifo) = (Vec::new(), VecDeque::new());
+    Rc::new(RefCell::new(Part { registers: [0; 128], held, fifo, has_lost: false, deflected }))
 }
 
-impl Part {
-    fn answer(&mut self, address: u8, to: &mut [u8]) {
+fn start(bus: &Bus, self_test: bool) -> Result<Asm330lhh<Select<Part>>, SpiError<Infallible>> {
+    Asm330lhh::new(Select(Rc::clone(bus), 0), self_test, &mut NoDelay)
+}
+
+impl spi::Part for Part {
+    fn write(&mut self, _: usize, address: u8, value: u8) {
+        match (address, value) {
+            (0x12, 0x05) => self.registers = [0; 128],
+            _ => self.registers[usize::from(address)] = value,
+        }
+    }
+
+    fn read(&mut self, _: usize, address: u8, to: &mut [u8]) {
         if let Some((_, held)) = self.held.iter().find(|(at, _)| *at == address) {
             return to.fill(*held);
         }
@@ -165,36 +160,17 @@ impl Part {
     }
 }
 
-impl ErrorType for Bus {
-    type Error = Infallible;
-}
-
-impl SpiDevice for Bus {
-    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
-        let mut part = self.0.borrow_mut();
-        match operations {
-            [Operation::Write([0x12, 0x05])] => part.registers = [0; 128],
-            [Operation::Write([address, value])] => part.registers[usize::from(*address)] = *value,
-            [Operation::Write([address]), Operation::Read(to)] if *address >= 0x80 => {
-                part.answer(address & 0x7F, to);
-            }
-            other => panic!("{other:?}"),
-        }
-        Ok(())
-    }
-}
-
 #[test]
 fn a_self_test_out_of_its_limits_is_named() {
-    let bus = Bus::new();
-    assert_eq!(bus.start(true).err(), None);
+    let bus = new();
+    assert_eq!(start(&bus, true).err(), None);
     for (sensor, limits) in [[2_143, 10_000], [328, 13_934]].into_iter().enumerate() {
         for (axis, wrong) in (0..3).flat_map(|axis| [(axis, limits[0] - 1), (axis, limits[1] + 1), (axis, 0)])
         {
-            let bus = Bus::new();
-            bus.0.borrow_mut().deflected[sensor][axis] = wrong;
-            assert_eq!(bus.start(true).err(), Some(SpiError::SelfTest { bank: 0 }), "{axis} {wrong}");
-            assert_eq!(bus.start(false).err(), None);
+            let bus = new();
+            bus.borrow_mut().deflected[sensor][axis] = wrong;
+            assert_eq!(start(&bus, true).err(), Some(SpiError::SelfTest { bank: 0 }), "{axis} {wrong}");
+            assert_eq!(start(&bus, false).err(), None);
         }
     }
 }
@@ -202,32 +178,32 @@ fn a_self_test_out_of_its_limits_is_named() {
 /// At the start and later.
 #[test]
 fn a_setting_that_does_not_read_back_is_named() {
-    let bus = Bus::new();
-    let mut part = bus.start(true).expect("a good part");
+    let bus = new();
+    let mut part = start(&bus, true).expect("a good part");
     for (address, expected) in REGISTERS {
-        assert_eq!(bus.0.borrow().registers[usize::from(address)], expected, "{address:02x}");
+        assert_eq!(bus.borrow().registers[usize::from(address)], expected, "{address:02x}");
         let got = expected ^ 0x40;
-        bus.hold(&[(address, got)]);
+        bus.borrow_mut().held = vec![(address, got)];
         let changed = Some(SpiError::Setting { bank: 0, address, got, expected });
         assert_eq!((0..CHECKS).find_map(|_| part.next_sample().err()), changed);
-        assert_eq!(bus.start(false).err(), changed);
+        assert_eq!(start(&bus, false).err(), changed);
     }
     assert!(SpiError::<Infallible>::Reset.is_lost() && !SpiError::<Infallible>::NoReading.is_lost());
 }
 
-fn sample(part: &mut Asm330lhh<Bus>) -> ImuSample {
+fn sample(part: &mut Asm330lhh<Select<Part>>) -> ImuSample {
     part.next_sample().expect("good").expect("one waits")
 }
 
 #[test]
 fn outputs_are_read_one_by_one_and_what_is_missing_is_named() {
-    let bus = Bus::new();
-    let mut part = bus.start(false).expect("a good part");
+    let bus = new();
+    let mut part = start(&bus, false).expect("a good part");
     assert_eq!(part.next_sample(), Ok(None));
     let [rate, force, time] = output(1, 192);
-    bus.fill([rate, force]);
+    bus.borrow_mut().fifo.extend([rate, force]);
     assert_eq!(part.next_sample(), Ok(None));
-    bus.fill([time].into_iter().chain(output(2, 384)));
+    bus.borrow_mut().fifo.extend([time].into_iter().chain(output(2, 384)));
     // The first one has a temperature, too: 25 deg C.
     let first = sample(&mut part);
     assert_eq!((first.time, first.temperature), (Micros(4_800), Some(CentiCelsius(2_500))));
@@ -236,15 +212,15 @@ fn outputs_are_read_one_by_one_and_what_is_missing_is_named() {
     // A damaged tag: its word is left out, and then its output.
     let mut damaged = output(3, 576);
     damaged[1][0] ^= 0x20;
-    bus.fill(damaged.into_iter().chain(output(0, 768)));
+    bus.borrow_mut().fifo.extend(damaged.into_iter().chain(output(0, 768)));
     assert_eq!(part.next_sample(), Err(SpiError::Packet { got: damaged[1][0] }));
     assert_eq!(part.next_sample(), Err(SpiError::NoReading));
     assert_eq!(sample(&mut part).time, Micros(19_200));
     // A full FIFO: what was begun is not put together with words of a later output of the same number.
-    bus.fill([rate]);
+    bus.borrow_mut().fifo.extend([rate]);
     assert_eq!(part.next_sample(), Ok(None));
-    bus.fill([force, time].into_iter().chain(output(2, 400_000)));
-    bus.0.borrow_mut().has_lost = true;
+    bus.borrow_mut().fifo.extend([force, time].into_iter().chain(output(2, 400_000)));
+    bus.borrow_mut().has_lost = true;
     assert_eq!(part.next_sample(), Err(SpiError::Overflow));
     assert_eq!(part.next_sample(), Err(SpiError::NoReading));
     assert_eq!(sample(&mut part).time, Micros(10_000_000));
@@ -253,11 +229,11 @@ fn outputs_are_read_one_by_one_and_what_is_missing_is_named() {
 #[test]
 fn time_stamps_have_the_measured_deviation_of_the_oscillator() {
     for (fine, us) in [(0_i8, 25_000_000.0), (7, 25_000_000.0 / 1.0105), (-128, 25_000_000.0 / 0.808)] {
-        let bus = Bus::new();
-        bus.hold(&[(0x63, fine as u8)]);
-        let mut part = bus.start(false).expect("a good part");
+        let bus = new();
+        bus.borrow_mut().held = vec![(0x63, fine as u8)];
+        let mut part = start(&bus, false).expect("a good part");
         // A counter that wraps on the way.
-        bus.fill(output(1, u32::MAX - 499_999).into_iter().chain(output(2, 500_000)));
+        bus.borrow_mut().fifo.extend(output(1, u32::MAX - 499_999).into_iter().chain(output(2, 500_000)));
         let [first, second] = [sample(&mut part).time.0, sample(&mut part).time.0];
         assert!(((second - first) as f64 - us).abs() <= 1.0, "{fine}: {first} {second}");
     }

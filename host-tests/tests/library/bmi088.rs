@@ -1,12 +1,11 @@
 //! BMI088: frames, and the driver and its two clocks on a simulated bus.
 
-use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use gyronet::sample::{ImuSample, Validity};
 use gyronet::sensor::bmi088::frame::{self, State};
 use gyronet::sensor::bmi088::{Bmi088, CHECKS, OLDEST};
 use gyronet::sensor::spi::{self, SpiError};
 use gyronet::units::{CentiCelsius, Micros};
-use gyronet_host_tests::situations::icm42688::NoDelay;
+use gyronet_host_tests::spi::{NoDelay, Part, Select};
 use std::cell::RefCell;
 use std::convert::Infallible;
 use std::rc::Rc;
@@ -187,8 +186,15 @@ impl Dies {
         let at = (self.read[die] as f64 * self.period_us[die] / 100.0) as u64 % 32_768;
         [at as i16; 3].map(i16::to_le_bytes).concat().try_into().expect("six bytes")
     }
+}
 
-    fn answer(&mut self, die: usize, address: u8, to: &mut [u8]) {
+impl Part for Dies {
+    /// The accelerometer sends one byte before the value.
+    fn dummies(die: usize) -> usize {
+        usize::from(die == ACC)
+    }
+
+    fn read(&mut self, die: usize, address: u8, to: &mut [u8]) {
         if let Some((.., held)) = self.held.iter().find(|(of, at, _)| (*of, *at) == (die, address)) {
             return to.fill(*held);
         }
@@ -234,30 +240,7 @@ impl Dies {
     }
 }
 
-#[derive(Clone)]
-struct Select(Rc<RefCell<Dies>>, usize);
-
-impl ErrorType for Select {
-    type Error = Infallible;
-}
-
-impl SpiDevice for Select {
-    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
-        let (mut dies, die) = (self.0.borrow_mut(), self.1);
-        match operations {
-            [Operation::Write([address, value])] => dies.write(die, *address, *value),
-            // The accelerometer sends one byte before the value.
-            [Operation::Write([address, dummy @ ..]), Operation::Read(to)] if dummy.len() == 1 - die => {
-                assert!(*address >= 0x80);
-                dies.answer(die, address & 0x7F, to);
-            }
-            other => panic!("{other:?}"),
-        }
-        Ok(())
-    }
-}
-
-fn start(dies: &Rc<RefCell<Dies>>, self_test: bool) -> Result<Bmi088<Select>, SpiError<Infallible>> {
+fn start(dies: &Rc<RefCell<Dies>>, self_test: bool) -> Result<Bmi088<Select<Dies>>, SpiError<Infallible>> {
     Bmi088::new([ACC, GYRO].map(|die| Select(dies.clone(), die)), self_test, &mut NoDelay)
 }
 

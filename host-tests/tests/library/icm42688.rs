@@ -6,8 +6,11 @@ use gyronet::sensor::icm42688::packet::{Packet, PacketError};
 use gyronet::sensor::icm42688::{CHECKS, Icm42688};
 use gyronet::sensor::spi::SpiError;
 use gyronet::units::{CentiCelsius, Micros};
-use gyronet_host_tests::situations::icm42688::{Bus, NoDelay};
+use gyronet_host_tests::situations::icm42688::Simulated;
+use gyronet_host_tests::spi::{NoDelay, Select};
+use std::cell::RefCell;
 use std::convert::Infallible;
+use std::rc::Rc;
 
 /// az 1 g, gz 10 deg/s, ay -4 and gy -2 counts, 30 deg C, time 1000.
 const PACKET_4: [u8; 20] =
@@ -83,21 +86,24 @@ const REGISTERS: [(u8, u8, u8, u8); 17] = [
     (0, 0x4E, 0x00, 0x0F),
 ];
 
-fn start(bus: &Bus) -> Result<Icm42688<Bus>, SpiError<Infallible>> {
-    Icm42688::new(bus.clone(), &mut NoDelay)
+type Bus = Rc<RefCell<Simulated>>;
+
+fn start(bus: &Bus) -> Result<Icm42688<Select<Simulated>>, SpiError<Infallible>> {
+    Icm42688::new(Select(Rc::clone(bus), 0), &mut NoDelay)
 }
 
 #[test]
 fn the_driver_configures_and_checks_each_register() {
     let bus = Bus::default();
-    REGISTERS.iter().for_each(|(bank, address, after_reset, _)| bus.set(*bank, *address, *after_reset));
+    let after_reset = REGISTERS.map(|(bank, address, after_reset, _)| ((bank, address), after_reset));
+    bus.borrow_mut().registers.extend(after_reset);
     let mut part = start(&bus).expect("a good part");
     let mut written = vec![(0, 0x11, 1)];
     written.extend(REGISTERS.map(|(bank, address, _, value)| (bank, address, value)));
     written.push((0, 0x4B, 0x02));
-    assert_eq!(bus.written(), written);
+    assert_eq!(bus.borrow().written, written);
     for (bank, address, _, value) in REGISTERS {
-        bus.hold(Some((bank, address, !value)));
+        bus.borrow_mut().held = Some((bank, address, !value));
         let is_named = |error| {
             let Some(SpiError::Setting { bank: of, address: at, got, expected }) = error else {
                 return false;
@@ -106,7 +112,7 @@ fn the_driver_configures_and_checks_each_register() {
         };
         assert!(is_named((0..CHECKS).find_map(|_| part.next_sample().err())), "{bank} {address:02x}");
         assert!(is_named(start(&bus).err()), "{bank} {address:02x}");
-        bus.hold(None);
+        bus.borrow_mut().held = None;
     }
 }
 
@@ -114,11 +120,11 @@ fn the_driver_configures_and_checks_each_register() {
 fn packets_are_read_one_by_one() {
     let bus = Bus::default();
     let mut part = start(&bus).expect("a good part");
-    bus.fill(PACKET_4[..19].iter().copied());
+    bus.borrow_mut().fifo.extend(PACKET_4[..19].iter().copied());
     assert_eq!(part.next_sample(), Ok(None));
-    bus.fill([PACKET_4[19]]);
-    bus.fill(Packet { time: 999, ..packet_4() }.emit());
-    bus.fill(Packet { rate: [None; 3], ..packet_4() }.emit());
+    bus.borrow_mut().fifo.extend([PACKET_4[19]]);
+    bus.borrow_mut().fifo.extend(Packet { time: 999, ..packet_4() }.emit());
+    bus.borrow_mut().fifo.extend(Packet { rate: [None; 3], ..packet_4() }.emit());
     let sample = Source::next_sample(&mut part).expect("one waits").expect("good");
     assert!((sample.angular_rate[2].rad_per_sec() - 10f64.to_radians()).abs() < 2e-8);
     assert!((sample.specific_force[2].metre_per_sec2() - 9.806_65).abs() < 2e-6);
@@ -128,19 +134,19 @@ fn packets_are_read_one_by_one() {
     assert_eq!(part.next_sample().expect("good").expect("one waits").time.0, 70_971);
     assert_eq!(part.next_sample(), Err(SpiError::NoReading));
     // Another packet than was set empties the FIFO; the last one is empty after all.
-    bus.fill([0x68; 40]);
+    bus.borrow_mut().fifo.extend([0x68; 40]);
     assert_eq!(part.next_sample(), Err(SpiError::Packet { got: 0x68 }));
-    bus.fill([0x80; 20]);
+    bus.borrow_mut().fifo.extend([0x80; 20]);
     assert_eq!(part.next_sample(), Ok(None));
 }
 
 #[test]
 fn another_part_or_none_is_named() {
     let bus = Bus::default();
-    bus.hold(Some((0, 0x75, 0x42)));
+    bus.borrow_mut().held = Some((0, 0x75, 0x42));
     let wrong = SpiError::Identity { bank: 0, got: 0x42, expected: 0x47 };
     assert_eq!(start(&bus).err(), Some(wrong));
     // A line that is always high: the reset bit never goes; the wait is bounded.
-    bus.hold(Some((0, 0x11, 0xFF)));
+    bus.borrow_mut().held = Some((0, 0x11, 0xFF));
     assert_eq!(start(&bus).err(), Some(SpiError::Reset));
 }
