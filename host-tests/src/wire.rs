@@ -28,7 +28,6 @@ pub fn data_frame(id: Id, data: &[u8]) -> DataFrame {
     DataFrame::new(id, data).expect("at most eight bytes")
 }
 
-/// Bytes in hexadecimal, with or without spaces between them.
 /// NMEA 2000's rapid update of a course, rad clockwise from north, and a speed, m/s.
 pub fn course([course, speed]: [Option<f32>; 2], sequence: u8) -> DataFrame {
     let code = |value: Option<f32>, per: f32| {
@@ -38,6 +37,7 @@ pub fn course([course, speed]: [Option<f32>; 2], sequence: u8) -> DataFrame {
     data_frame(id29(0x09F8_0223), &[sequence, 0xFC, c0, c1, s0, s1, 0xFF, 0xFF])
 }
 
+/// Bytes in hexadecimal, with or without spaces between them.
 pub fn bytes(hex: &str) -> Vec<u8> {
     let digits: String = hex.split_whitespace().collect();
     let byte = |at| u8::from_str_radix(&digits[at..at + 2], 16).expect("hex");

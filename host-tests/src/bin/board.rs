@@ -122,8 +122,8 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     }
     board.power_on();
     let mut lines = [
-        Line::open("service line (USART6)", SERVICE, args.service)?,
-        Line::open("SLCAN (USART2)", SLCAN, args.slcan)?,
+        (SERVICE, Socket::open("service line (USART6)", args.service)?),
+        (SLCAN, Socket::open("SLCAN (USART2)", args.slcan)?),
     ];
     let mut adapter = Adapter::open(args.can)?;
     let log = args
@@ -145,17 +145,16 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
             // Nobody else takes what the model keeps.
             board.events();
         }
-        for line in &mut lines {
-            let bytes = line.socket.read()?;
+        for (usart, socket) in &mut lines {
+            let bytes = socket.read()?;
             if !bytes.is_empty() {
-                board.send(line.usart, &bytes);
+                board.send(*usart, &bytes);
             }
         }
         adapter.read()?.iter().for_each(|frame| board.can_send(frame));
         let now = board.run(TURN);
-        for line in &mut lines {
-            let bytes = board.sent(line.usart);
-            line.socket.write(&bytes);
+        for (usart, socket) in &mut lines {
+            socket.write(&board.sent(*usart));
         }
         for Seen { end, own, frame, .. } in board.bus_log() {
             if own {
@@ -228,18 +227,6 @@ impl Vehicle {
         let sample = replay::message(self.row, &sample);
         self.row += 1;
         Sent { sample, rates_dps, acceleration_g, frames: wheels.into_iter().chain(course).collect() }
-    }
-}
-
-/// A line of the board, and its socket.
-struct Line {
-    usart: usize,
-    socket: Socket,
-}
-
-impl Line {
-    fn open(name: &'static str, usart: usize, port: u16) -> io::Result<Self> {
-        Socket::open(name, port).map(|socket| Self { usart, socket })
     }
 }
 
