@@ -7,6 +7,7 @@
 use clap::Parser;
 use gyronet::can::DataFrame;
 use gyronet::can::slcan::port::Port;
+use gyronet::sample::ImuSample;
 use gyronet::units::Micros;
 use gyronet_host_tests::board::{self, Board, Seen};
 use gyronet_host_tests::{replay, require, wire};
@@ -135,13 +136,15 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let (mut due, mut report, mut sent_at) = (began, REPORT, Some(Duration::ZERO));
     for turn in (0..TURNS).cycle() {
         if turn == 0 {
-            let sent = vehicle.next();
-            board.send(IMU, &sent.sample);
+            let (number, sample, frames) = vehicle.next();
+            board.send(IMU, &replay::message(number, &sample));
             if args.spi.is_some() {
-                board.configure("SPI1.imu_rates_dps", sent.rates_dps.to_vec());
-                board.configure("SPI1.imu_acceleration_g", sent.acceleration_g.to_vec());
+                let rates = sample.angular_rate.map(|rate| rate.rad_per_sec().to_degrees());
+                let forces = sample.specific_force.map(|force| force.metre_per_sec2() / 9.806_65);
+                board.configure("SPI1.imu_rates_dps", rates.to_vec());
+                board.configure("SPI1.imu_acceleration_g", forces.to_vec());
             }
-            sent.frames.iter().for_each(|frame| board.can_send(frame));
+            frames.iter().for_each(|frame| board.can_send(frame));
             // Nobody else takes what the model keeps.
             board.events();
         }
@@ -189,16 +192,6 @@ fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What the vehicle sends in 10 ms.
-struct Sent {
-    /// The bytes of the MTi.
-    sample: Vec<u8>,
-    /// What the part on SPI measures.
-    rates_dps: [f64; 3],
-    acceleration_g: [f64; 3],
-    frames: Vec<DataFrame>,
-}
-
 /// Drives a drive again and again.
 struct Vehicle {
     drive: Recording,
@@ -213,7 +206,8 @@ impl Vehicle {
         Self { drive, wheels, row: 0, courses: 0 }
     }
 
-    fn next(&mut self) -> Sent {
+    /// What is measured and sent in 10 ms: the number of the sample, the sample, and the frames of the bus.
+    fn next(&mut self) -> (usize, ImuSample, Vec<DataFrame>) {
         let rows = &self.drive.rows;
         let Row { mut sample, heading, .. } = rows[self.row % rows.len()];
         sample.time.0 = (self.row as f64 * DT * 1e6).round() as u64;
@@ -222,11 +216,8 @@ impl Vehicle {
             self.courses = self.courses.wrapping_add(1);
             wire::course([heading.course, heading.speed], self.courses)
         });
-        let rates_dps = sample.angular_rate.map(|rate| rate.rad_per_sec().to_degrees());
-        let acceleration_g = sample.specific_force.map(|force| force.metre_per_sec2() / 9.806_65);
-        let sample = replay::message(self.row, &sample);
         self.row += 1;
-        Sent { sample, rates_dps, acceleration_g, frames: wheels.into_iter().chain(course).collect() }
+        (self.row - 1, sample, wheels.into_iter().chain(course).collect())
     }
 }
 

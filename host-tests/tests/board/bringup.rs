@@ -5,16 +5,12 @@ use gyronet::store::layout::{FLASH_BASE, SLOT_SIZE, SLOTS};
 use gyronet_host_tests::board::{self, At, Board};
 use std::time::Duration;
 
+const NETDUINO: &str = "netduino-plus-2";
 const REPORT: usize = 6;
 const SPARE: u32 = FLASH_BASE + SLOTS.start + SLOT_SIZE as u32;
 
-/// As [`lines_of`], for the Netduino.
-fn lines(prepare: impl FnOnce(&mut Board)) -> Option<(Board, Vec<String>)> {
-    lines_of("netduino-plus-2", prepare)
-}
-
 /// Runs a board's image to its end and gives its lines.
-fn lines_of(feature: &str, prepare: impl FnOnce(&mut Board)) -> Option<(Board, Vec<String>)> {
+fn lines(feature: &str, prepare: impl FnOnce(&mut Board)) -> Option<(Board, Vec<String>)> {
     let elf = board::firmware(feature, env!("CARGO_TARGET_TMPDIR"), "bringup")?;
     let mut board = Board::unpowered(&elf)?;
     board.configure("USART2.baud", 921_600);
@@ -41,7 +37,7 @@ fn check<'l>(lines: &'l [String], name: &str) -> (&'l str, &'l str) {
 
 #[test]
 fn board_in_order() {
-    let Some((mut board, lines)) = lines(|_| ()) else { return };
+    let Some((mut board, lines)) = lines(NETDUINO, |_| ()) else { return };
     assert!(
         lines[0].starts_with("gyronet bringup") && lines[0].ends_with("started by power on"),
         "{lines:?}"
@@ -83,31 +79,21 @@ fn board_in_order() {
 
 #[test]
 fn crystal_that_is_not_the_board_s() {
-    let wrong = |board: &mut Board| {
-        board.configure("RCC.crystal_hz", 16_000_000);
-        board.configure("SPI1.part", "Bmi088");
-    };
-    let Some((_, lines)) = lines(wrong) else { return };
-    assert_eq!(check(&lines, "SPI1"), ("PASS", "a BMI088 answers"));
-    assert_eq!(check(&lines, "clock"), ("FAIL", "16 MHz: the crystal has 16.000 MHz"));
-    assert_eq!(check(&lines, "CAN"), ("FAIL", "the clock is not exact enough"));
-    assert_eq!(lines.last().map(String::as_str), Some("2 checks failed"));
-}
-
-#[test]
-fn olimex_board_in_order() {
-    let crystal = |board: &mut Board| {
-        board.configure("RCC.crystal_hz", 8_000_000);
-        board.configure("SPI1.part", "Asm330lhh");
-    };
-    let Some((_, lines)) = lines_of("olimex-stm32-h405", crystal) else { return };
-    assert_eq!(check(&lines, "SPI1"), ("PASS", "an ASM330LHH answers"));
-    assert!(lines[0].contains("Olimex STM32-H405"), "{}", lines[0]);
-    assert_eq!(
-        check(&lines, "clock"),
-        ("PASS", "168 MHz; the crystal has 8.00 MHz by the internal oscillator")
-    );
-    assert_eq!(lines.last().map(String::as_str), Some("0 checks failed"));
+    for (feature, title, part, answer) in [
+        (NETDUINO, "Netduino Plus 2", "Bmi088", "a BMI088 answers"),
+        ("olimex-stm32-h405", "Olimex STM32-H405", "Asm330lhh", "an ASM330LHH answers"),
+    ] {
+        let wrong = |board: &mut Board| {
+            board.configure("RCC.crystal_hz", 16_000_000);
+            board.configure("SPI1.part", part);
+        };
+        let Some((_, lines)) = lines(feature, wrong) else { return };
+        assert!(lines[0].contains(title), "{}", lines[0]);
+        assert_eq!(check(&lines, "SPI1"), ("PASS", answer));
+        assert_eq!(check(&lines, "clock"), ("FAIL", "16 MHz: the crystal has 16.000 MHz"));
+        assert_eq!(check(&lines, "CAN"), ("FAIL", "the clock is not exact enough"));
+        assert_eq!(lines.last().map(String::as_str), Some("2 checks failed"));
+    }
 }
 
 #[test]
@@ -116,7 +102,7 @@ fn sensor_missing_and_sector_in_use() {
         board.configure("SPI1.fitted", false);
         board.patch(At::Address(SPARE), b"weights");
     };
-    let Some((_, lines)) = lines(prepare) else { return };
+    let Some((_, lines)) = lines(NETDUINO, prepare) else { return };
     let (verdict, text) = check(&lines, "SPI1");
     assert!(verdict == "----" && text.starts_with("no sensor answers"), "{verdict} {text}");
     assert_eq!(check(&lines, "flash"), ("----", "sector 11 holds a weight file: not tried"));
@@ -127,7 +113,7 @@ fn panic_leaves_its_reason_on_the_line_and_starts_again() {
     /// A place in memory that the image does not use, for the panic's location: file, its length, line, column.
     const LOCATION: u32 = 0x1000_0000;
     const FILE: &[u8] = b"src/provoked.rs";
-    let Some(elf) = board::firmware("netduino-plus-2", env!("CARGO_TARGET_TMPDIR"), "bringup") else {
+    let Some(elf) = board::firmware(NETDUINO, env!("CARGO_TARGET_TMPDIR"), "bringup") else {
         return;
     };
     let Some(mut board) = Board::unpowered(&elf) else { return };

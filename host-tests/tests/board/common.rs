@@ -87,6 +87,13 @@ pub fn rates(timed: &[(Duration, DataFrame)]) -> Vec<(Duration, RateMessage)> {
     rates.map(|(time, frame)| (*time, RateMessage::parse(frame.data()).expect("eight bytes"))).collect()
 }
 
+/// Longest time between two rates, of at least so many.
+pub fn gap(timed: &[(Duration, DataFrame)], least: usize) -> Duration {
+    let rates = rates(timed);
+    assert!(rates.len() >= least, "{} rates", rates.len());
+    rates.windows(2).map(|pair| pair[1].0 - pair[0].0).max().expect("rates")
+}
+
 pub fn frames(timed: &[(Duration, DataFrame)]) -> Vec<DataFrame> {
     timed.iter().map(|(_, frame)| *frame).collect()
 }

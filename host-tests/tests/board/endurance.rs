@@ -282,6 +282,7 @@ fn run(seconds: usize) {
     board.run(SAMPLE * 2 - MS);
     received.take(&mut board, &mut outside.host);
     assert_eq!(outside.host.frames, [], "frames that did not come");
+    assert_eq!(board.counts().frames_filtered as usize, OTHERS.len() * seconds * SAMPLES / 2);
     received.check(seconds * SAMPLES, 0);
     let AllCounters { pipeline, fog, .. } = received.counters.expect("they were asked for");
     let (early, late) = (early.expect("a tenth has passed"), stack_used(&mut board));

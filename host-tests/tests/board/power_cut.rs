@@ -182,9 +182,10 @@ fn configuration_is_the_old_or_the_new_one_after_a_cut_of_an_erase_and_copy() {
     }
 }
 
-/// Cuts an upload at the accesses of each request that `chosen` picks by the request's number, the number of requests,
-/// and the accesses that it takes.
-fn upload(chosen: impl Fn(usize, usize, usize) -> Vec<usize>) {
+/// Cuts an upload at each access of its first and last requests, and at one of every sixteenth block: all of its 100,000 accesses
+/// take six hours. `library::store_power_cut` cuts at each operation.
+#[test]
+fn old_weights_stay_usable_until_the_new_ones_are_activated() {
     let Some(mut board) = used(3) else { return };
     let (old, new) = (crc(&other_weights(2)), other_weights(1));
     let begin = [&[0x34, 0, 0x44, 0, 0, 0, 0][..], &(new.len() as u32).to_be_bytes()].concat();
@@ -206,8 +207,11 @@ fn upload(chosen: impl Fn(usize, usize, usize) -> Vec<usize>) {
         };
         let count = accesses(&mut board, request);
         total += count;
-        for access in chosen(number, requests.len(), count) {
-            tried.at(&mut board, request, access, &check);
+        let is_edge = number <= 1 || number + 3 >= requests.len();
+        for access in 1..=count {
+            if is_edge || number % 16 == 0 && access == 1 + number * 37 % count {
+                tried.at(&mut board, request, access, &check);
+            }
         }
         board.restore(AFTER);
         keep(&mut board, BEFORE);
@@ -218,30 +222,4 @@ fn upload(chosen: impl Fn(usize, usize, usize) -> Vec<usize>) {
     assert_ne!(crc(&new), crc(&weights::DEFAULT.0));
     let Tried { cuts, seen } = tried;
     println!("{cuts} cuts in {total} accesses, {} contents of flash, {:.0?}", seen.len(), begun.elapsed());
-}
-
-#[test]
-fn old_weights_stay_usable_until_the_new_ones_are_activated() {
-    /// Blocks from one sample to the next.
-    const EVERY: usize = 16;
-    upload(|number, requests, accesses| {
-        let edge = number <= 1 || number + 3 >= requests;
-        if edge {
-            (1..=accesses).collect()
-        } else if number % EVERY == 0 {
-            vec![1 + number * 37 % accesses]
-        } else {
-            Vec::new()
-        }
-    });
-}
-
-/// An upload takes 102,490 accesses, and a cut 0.2 s of processor time (402 cuts in 93 s): all of them take six hours.
-/// A test of two minutes has time for some 500, which is why the one above samples the blocks.
-///
-/// `cargo test -p gyronet-host-tests --test board each_access -- --ignored --nocapture`
-#[test]
-#[ignore = "a cut at each access of an upload takes six hours"]
-fn old_weights_stay_usable_after_a_cut_at_each_access() {
-    upload(|_, _, accesses| (1..=accesses).collect());
 }

@@ -3,23 +3,18 @@
 
 use crate::common::{self, SAMPLE, START, frames};
 use crate::service::{self, on_bus};
-use embedded_can::Frame;
 use gyronet::can::DataFrame;
-use gyronet::can::config::{Settings, YawSettings};
-use gyronet::can::yaw::{AngleMessage, FOG_IDS, Quality, RateMessage};
 use gyronet::health::Faults;
 use gyronet::service::message::{FlashState, Info, Origin, Refusal};
 use gyronet::store::layout::{FLASH_BASE, SLOT_SIZE, STORE};
 use gyronet::store::slots::{SlotError, WeightSource};
-use gyronet::store::{Configuration, FlashFault, FogPart, Slot, StoreError};
+use gyronet::store::{Configuration, FlashFault, Slot, StoreError};
 use gyronet_host_tests::board::{At, Board};
 use gyronet_host_tests::stored::{Stored, other_weights};
-use gyronet_host_tests::wire::id11;
 use gyronet_tools::client::device::error::DeviceError;
 use std::time::Duration;
 
 const SAMPLES: usize = 20;
-const RATE: u16 = 0x1A0;
 /// Time from power-on until the image listens, where its start has mended a sector of the records.
 const MENDED: Duration = START.saturating_add(Duration::from_millis(300));
 
@@ -43,38 +38,13 @@ impl Started {
         Some(Self { board, frames, info })
     }
 
-    fn of(&self, id: u16) -> impl Iterator<Item = &[u8]> {
-        let id = id11(id);
-        self.frames.iter().filter(move |frame| frame.id() == id).map(Frame::data)
-    }
-
     /// True if the messages report damaged stored data: from the first one on, or never.
     fn flagged(&self) -> bool {
-        let faults = self.of(RATE + 1).map(|data| AngleMessage::parse(data).expect("eight bytes").faults);
+        let faults = common::faults(&self.frames).into_iter();
         let flags: Vec<bool> = faults.map(|faults| faults.contains(Faults::STORED)).collect();
         assert!(flags.len() >= SAMPLES - 1 && flags.windows(2).all(|pair| pair[0] == pair[1]), "{flags:?}");
         flags[0]
     }
-}
-
-#[test]
-fn a_stored_configuration_takes_effect() {
-    const OTHER: u16 = 0x2B0;
-    let yaw = Settings::DEFAULT.yaw.map(|yaw| YawSettings { ids: [OTHER, OTHER + 1, OTHER + 2], ..yaw });
-    let configuration = Configuration {
-        can: Settings { yaw, bosch: None, ..Settings::DEFAULT },
-        fog: Some(FogPart::Dsp1760),
-        ..Configuration::DEFAULT
-    };
-    let stored = Stored::default().record(&configuration);
-    let Some(started) = Started::with(&stored, |_| ()) else { return };
-    assert_eq!(started.info.configuration, Origin::Stored);
-    assert_eq!(started.of(RATE).count(), 0);
-    assert!(started.of(OTHER).count() >= SAMPLES - 1);
-    // No byte of the fibre-optic gyro has come: the bus says so every 10 ms.
-    let missed = started.of(FOG_IDS[0]).map(|data| RateMessage::parse(data).expect("a rate").quality);
-    let missed: Vec<Quality> = missed.collect();
-    assert!(missed.len() >= SAMPLES - 2 && missed.iter().all(|is| *is == Quality::Unusable), "{missed:?}");
 }
 
 /// What a start makes of each damage is in `library::service::configuration` and `weights`; here the image reports it.

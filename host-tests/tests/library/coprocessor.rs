@@ -4,7 +4,7 @@ use embedded_can::Frame;
 use gyronet::align::AlignError;
 use gyronet::align::clock::ClockError;
 use gyronet::can::DataFrame;
-use gyronet::can::yaw::FOG_IDS;
+use gyronet::can::yaw::{FOG_IDS, RateMessage};
 use gyronet::compensate::DELAY;
 use gyronet::coprocessor::{Clock, InputError, Observation, StorageFaults};
 use gyronet::health::{Faults, InputCounters, Quality, Status};
@@ -243,6 +243,19 @@ fn a_fibre_optic_gyro_sends_its_own_messages() {
     assert_eq!(sent, 3 * 599, "a set of three messages every 10 ms");
     let estimate = *car.sent.fog.last().expect("it was heard");
     assert_eq!(estimate.faults, Faults::NONE);
+}
+
+#[test]
+fn a_fibre_optic_gyro_that_is_configured_and_never_heard_is_reported_every_10_ms() {
+    let mut coprocessor = Coprocessor::new(Config { fog_expected: true, ..Config::DEFAULT });
+    let mut sent = Sent::default();
+    for ms in 1..1_000 {
+        coprocessor.poll(Micros(ms * 1_000), &mut sent).expect("the time goes on");
+    }
+    let rates = sent.frames.iter().filter(|sent| sent.frame.id() == id11(FOG_IDS[0]));
+    let rates: Vec<_> =
+        rates.map(|sent| RateMessage::parse(sent.frame.data()).expect("a rate").quality).collect();
+    assert!(rates.len() >= 95 && rates.iter().all(|rate| *rate == Quality::Unusable), "{rates:?}");
 }
 
 /// An inertial sensor, or wheels, that have fallen silent are not taken for those of the gyro's step.
