@@ -1,7 +1,7 @@
 //! Testers of the virtual board, with limits of board time: a test does the same however busy the host is.
 
-use crate::common::{SERVICE, START};
-use embedded_can::Frame;
+use crate::common::{self, MS, SERVICE, START};
+use embedded_can::{Frame, Id};
 use gyronet::service::message::Info;
 use gyronet::store::{Configuration, Record};
 use gyronet_host_tests::board::{Board, CanBus, Line};
@@ -12,8 +12,8 @@ use gyronet_tools::client::device::Device;
 use gyronet_tools::signing::PrivateKey;
 use std::time::Duration;
 
-const REQUEST: u16 = 0x7E0;
-const RESPONSE: u16 = 0x7E8;
+/// Identifiers of requests and of responses.
+pub const IDS: [Id; 2] = [id11(0x7E0), id11(0x7E8)];
 /// The frames of a request that the board grants at a time, and the time that they take and are granted in.
 const BLOCK: usize = 8;
 const BLOCK_TIME: Duration = Duration::from_millis(5);
@@ -58,7 +58,7 @@ pub fn send(board: &mut Board, request: &[u8]) {
     let frames = segment(request);
     let last = frames.len() - 1;
     for (number, data) in frames.iter().enumerate() {
-        board.can_send(&data_frame(id11(REQUEST), data));
+        board.can_send(&data_frame(IDS[0], data));
         // The board grants the frames behind the first one, and behind each block.
         if number % BLOCK == 0 && number < last {
             board.run(BLOCK_TIME);
@@ -66,21 +66,23 @@ pub fn send(board: &mut Board, request: &[u8]) {
     }
 }
 
+/// Sends frames to a server; returns the data of its own of the next millisecond.
+pub fn exchange(board: &mut Board, [to, from]: [Id; 2], frames: &[[u8; 8]]) -> Vec<[u8; 8]> {
+    frames.iter().for_each(|data| board.can_send(&data_frame(to, data)));
+    board.run(MS);
+    let sent = common::frames(&board.can_frames());
+    let own = sent.iter().filter(|frame| frame.id() == from);
+    own.map(|frame| frame.data().try_into().expect("eight bytes")).collect()
+}
+
 /// Waits for the response to the request that was sent, which must fit a frame; `None` when none comes within the limit.
 pub fn answer(board: &mut Board, limit: Duration) -> Option<Vec<u8>> {
-    let until = board.counts().time + limit;
-    while board.counts().time < until {
-        board.run(Duration::from_millis(1));
-        let own = id11(RESPONSE);
-        let frames = board.can_frames().into_iter().map(|(_, frame)| frame).filter(|frame| frame.id() == own);
-        let messages = frames.filter(|frame| frame.data()[0] < 8);
-        let mut messages = messages.map(|frame| frame.data()[1..=usize::from(frame.data()[0])].to_vec());
+    (0..limit.as_millis()).find_map(|_| {
+        let frames = exchange(board, IDS, &[]).into_iter().filter(|data| data[0] < 8);
+        let mut messages = frames.map(|data| data[1..=usize::from(data[0])].to_vec());
         // "Response pending" is waited out.
-        if let Some(message) = messages.find(|message| !matches!(message[..], [0x7F, _, 0x78])) {
-            return Some(message);
-        }
-    }
-    None
+        messages.find(|message| !matches!(message[..], [0x7F, _, 0x78]))
+    })
 }
 
 /// Sends a request over CAN and returns the response, which must fit a frame.

@@ -2,8 +2,8 @@
 //! authors.
 
 use crate::common::{self, START};
-use crate::service::storing;
-use embedded_can::{Frame, Id};
+use crate::service::{IDS, ask, exchange, storing};
+use embedded_can::Id;
 use gyronet::can::diagnosis::DiagnosisIds;
 use gyronet::store::Configuration;
 use gyronet_host_tests::board::Board;
@@ -17,28 +17,9 @@ use gyronet_tools::client::device::update::Update;
 use gyronet_tools::signing::{PrivateKey, hex};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
-use std::time::Duration;
-
-const TURN: Duration = Duration::from_millis(1);
-
-const REQUEST: Id = id11(0x7E0);
-const RESPONSE: Id = id11(0x7E8);
-
-/// Sends frames to the server; returns the data of its own of the next millisecond.
-fn exchange(board: &mut Board, [to, from]: [Id; 2], frames: &[[u8; 8]]) -> Vec<[u8; 8]> {
-    frames.iter().for_each(|data| board.can_send(&data_frame(to, data)));
-    board.run(TURN);
-    let sent = common::frames(&board.can_frames());
-    let ours = sent.iter().filter(|frame| frame.id() == from);
-    ours.map(|frame| frame.data().try_into().expect("eight bytes")).collect()
-}
 
 fn ask_by(board: &mut Board, ids: [Id; 2], request: &[u8], turns: usize) -> Option<Vec<u8>> {
     Tester::default().ask(request, turns, |frames| exchange(board, ids, frames))
-}
-
-fn ask(board: &mut Board, request: &[u8]) -> Option<Vec<u8>> {
-    ask_by(board, [REQUEST, RESPONSE], request, 8_000)
 }
 
 #[test]
@@ -47,11 +28,11 @@ fn diagnosis_with_29_bits_is_configured_over_itself() {
     let ids =
         DiagnosisIds { extended: true, request: 0x18DA_10F1, functional: 0x18DB_33F1, response: 0x18DA_F110 };
     let configuration = Configuration { diagnosis: ids, ..Configuration::DEFAULT };
-    assert_eq!(ask(&mut board, &[0x10, 3]), Some(vec![0x50, 3, 0, 50, 0x01, 0xF4]));
-    assert_eq!(ask(&mut board, &storing(&configuration)), Some(vec![0x6E, 1, 0]));
-    assert_eq!(ask(&mut board, &[0x11, 1]), Some(vec![0x51, 1]));
+    assert_eq!(ask(&mut board, &[0x10, 3]), [0x50, 3, 0, 50, 0x01, 0xF4]);
+    assert_eq!(ask(&mut board, &storing(&configuration)), [0x6E, 1, 0]);
+    assert_eq!(ask(&mut board, &[0x11, 1]), [0x51, 1]);
     board.run(START);
-    assert_eq!(ask_by(&mut board, [REQUEST, RESPONSE], &[0x3E, 0], 100), None);
+    assert_eq!(ask_by(&mut board, IDS, &[0x3E, 0], 100), None);
     let [request, functional, response] = ids.ids().expect("they are valid");
     for (id, answer) in [(request, Some(vec![0x7E, 0])), (functional, Some(vec![0x7E, 0])), (response, None)]
     {
@@ -104,7 +85,7 @@ fn udsoncan_reads_writes_downloads_and_updates() {
             let id = u16::from_str_radix(id, 16).expect("hexadecimal");
             board.can_send(&data_frame(id11(id), &bytes(data)));
         }
-        let sent = exchange(&mut board, [REQUEST, RESPONSE], &[]);
+        let sent = exchange(&mut board, IDS, &[]);
         let answers: String = sent.iter().map(|data| hex(data) + " ").collect();
         // The client may have ended.
         let _ = writeln!(to_client, "{answers}");
