@@ -294,14 +294,3 @@ fn run(seconds: usize) {
 fn all_lines_busy_for_seconds() {
     run(8);
 }
-
-/// Names how many seconds of board time [`all_lines_busy_for_an_hour`] takes instead.
-const SECONDS: &str = "GYRONET_ENDURANCE_S";
-
-/// `cargo test -p gyronet-host-tests --test board endurance -- --ignored --nocapture`
-#[test]
-#[ignore = "an hour of board time"]
-fn all_lines_busy_for_an_hour() {
-    let seconds = std::env::var(SECONDS).map_or(3_600, |text| text.parse().expect("whole seconds"));
-    run(seconds);
-}

@@ -21,6 +21,7 @@ use std::time::Duration;
 const S: Duration = Duration::from_secs(1);
 const RATE: u16 = 0x1A0;
 /// What an image has reached: a frame that was acknowledged.
+const SENSOR: u32 = 1;
 const CAN: u32 = 2;
 /// Time on trial at the end of which an image gives up, and the most until the boot loader has started the one before.
 const TRIAL: Duration = Duration::from_secs(60);
@@ -148,10 +149,10 @@ fn try_on(expected: u32, spoil: impl FnOnce(&mut Board, &mut Vec<u8>)) -> Option
     Some(board)
 }
 
-/// Puts instructions at the beginning of a function of the image for slot B. The linker may order that image a little otherwise
-/// than the one for slot A: the function is found near its place there by its first instructions.
-fn replace(board: &mut Board, image: &mut [u8], name: &str, code: &[u8]) {
-    let start = board.symbol(name).0;
+/// A function's code in the image for slot B. The linker may order that image a little otherwise than the one for slot A:
+/// the function is found near its place there by its first instructions.
+fn function<'a>(board: &mut Board, image: &'a mut [u8], name: &str) -> &'a mut [u8] {
+    let (start, size) = board.symbol(name);
     let begins = board.read(At::Address(start), 12);
     let near = (start - address(Slot::A)) as usize;
     let places = (near.saturating_sub(256)..near + 256).step_by(2);
@@ -162,7 +163,12 @@ fn replace(board: &mut Board, image: &mut [u8], name: &str, code: &[u8]) {
         [] if name == "Reset" => near,
         _ => panic!("{name} at {near:#x}: {places:x?}"),
     };
-    image[place..place + code.len()].copy_from_slice(code);
+    &mut image[place..place + size as usize]
+}
+
+/// Puts instructions at the beginning of a function of the image for slot B.
+fn replace(board: &mut Board, image: &mut [u8], name: &str, code: &[u8]) {
+    function(board, image, name)[..code.len()].copy_from_slice(code);
 }
 
 /// Checks that the image before runs again, and says why.
@@ -221,6 +227,26 @@ fn an_image_without_can_is_rolled_back_after_its_trial() {
     assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::OnTrial));
     board.run(TRIAL - BACK);
     assert_eq!(resets(&mut board), []);
+    board.run(2 * BACK);
+    assert_eq!(resets(&mut board).len(), 1);
+    rolled_back(&mut board);
+}
+
+#[test]
+fn an_image_that_lacks_the_sensor_is_rolled_back_after_its_trial() {
+    // It waits for another preamble: cmp r_, #FA becomes cmp r_, #FB.
+    let spoil = |board: &mut Board, image: &mut Vec<u8>| {
+        let function = function(board, image, "sensor::xsens::Mti::next_message");
+        let compares = |code: &&mut [u8]| code[0] == 0xFA && (0x28..0x30).contains(&code[1]);
+        let places: Vec<_> = function.chunks_mut(2).filter(compares).collect();
+        assert_eq!(places.len(), 1, "where the preamble is compared");
+        places.into_iter().for_each(|code| code[0] = 0xFB);
+    };
+    let Some(mut board) = try_on(SENSOR | CAN, spoil) else { return };
+    let _ = board.events();
+    stand(&mut board, 6_200);
+    board.run(TRIAL - BACK);
+    assert_eq!(firmware(&mut board), (Some(Slot::B), FirmwareState::OnTrial));
     board.run(2 * BACK);
     assert_eq!(resets(&mut board).len(), 1);
     rolled_back(&mut board);

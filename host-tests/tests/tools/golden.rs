@@ -24,15 +24,13 @@ fn every_layer_of_gyronet_equals_pytorch() {
     let input = golden.tensor("input", &[WINDOWS, WINDOW, FEATURES]);
     let (windows, _) = input.as_chunks::<FEATURES>().0.as_chunks::<WINDOW>();
     let outputs: Vec<_> = windows.iter().map(|window| network.layers(window)).collect();
-    let flat = |layer: fn(&LayerOutputs) -> Vec<f32>| outputs.iter().flat_map(layer).collect::<Vec<f32>>();
-    for (name, shape, ours) in [
-        ("normalised", &[WINDOWS, WINDOW, FEATURES][..], flat(|o| o.normalised.concat())),
-        ("layer1", &[WINDOWS, WINDOW, 2 * HIDDEN], flat(|o| o.layer1.concat())),
-        ("layer2", &[WINDOWS, WINDOW, 2 * HIDDEN], flat(|o| o.layer2.concat())),
-        ("gyro_error", &[WINDOWS, WINDOW], flat(|o| o.gyro_error.to_vec())),
-    ] {
-        golden.compare(name, shape, &ours);
-    }
+    let layer = |name, shape: &[usize], layer: fn(&LayerOutputs) -> Vec<f32>| {
+        golden.compare(name, shape, &outputs.iter().flat_map(layer).collect::<Vec<f32>>());
+    };
+    layer("normalised", &[WINDOWS, WINDOW, FEATURES], |o| o.normalised.concat());
+    layer("layer1", &[WINDOWS, WINDOW, 2 * HIDDEN], |o| o.layer1.concat());
+    layer("layer2", &[WINDOWS, WINDOW, 2 * HIDDEN], |o| o.layer2.concat());
+    layer("gyro_error", &[WINDOWS, WINDOW], |o| o.gyro_error.to_vec());
 }
 
 #[test]
@@ -45,18 +43,16 @@ fn every_layer_of_fognet_equals_pytorch() {
     let input = golden.tensor("input", &[WINDOWS, STEPS, INPUTS]);
     let (windows, _) = input.as_chunks::<INPUTS>().0.as_chunks::<STEPS>();
     let outputs: Vec<_> = windows.iter().map(|window| network.layers(window)).collect();
-    let flat = |layer: fn(&FogLayerOutputs) -> Vec<f32>| outputs.iter().flat_map(layer).collect::<Vec<f32>>();
-    for (name, shape, ours) in [
-        ("normalised", &[WINDOWS, STEPS, INPUTS][..], flat(|o| o.normalised.concat())),
-        ("f1", &[WINDOWS, STEPS], flat(|o| o.f1.to_vec())),
-        ("layer2_last", &[WINDOWS, 2 * HIDDEN2], flat(|o| o.layer2_last.to_vec())),
-        ("f2", &[WINDOWS], flat(|o| vec![o.f2])),
-        ("f3", &[WINDOWS], flat(|o| vec![o.f3])),
-        ("correction", &[WINDOWS], flat(|o| vec![o.correction])),
-        ("prediction", &[WINDOWS], flat(|o| vec![o.prediction])),
-    ] {
-        golden.compare(name, shape, &ours);
-    }
+    let layer = |name, shape: &[usize], layer: fn(&FogLayerOutputs) -> Vec<f32>| {
+        golden.compare(name, shape, &outputs.iter().flat_map(layer).collect::<Vec<f32>>());
+    };
+    layer("normalised", &[WINDOWS, STEPS, INPUTS], |o| o.normalised.concat());
+    layer("f1", &[WINDOWS, STEPS], |o| o.f1.to_vec());
+    layer("layer2_last", &[WINDOWS, 2 * HIDDEN2], |o| o.layer2_last.to_vec());
+    layer("f2", &[WINDOWS], |o| vec![o.f2]);
+    layer("f3", &[WINDOWS], |o| vec![o.f3]);
+    layer("correction", &[WINDOWS], |o| vec![o.correction]);
+    layer("prediction", &[WINDOWS], |o| vec![o.prediction]);
     // The corrections are small numbers: they must agree as parts of themselves too.
     let theirs = golden.tensor("correction", &[WINDOWS]);
     for (ours, theirs) in outputs.iter().zip(theirs) {

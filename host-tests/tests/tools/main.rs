@@ -4,7 +4,6 @@ mod accuracy;
 mod course_reference;
 mod doctor;
 mod expected_error;
-mod fir_choice;
 mod fog_default;
 mod fog_kingston;
 mod fognet_integer;
