@@ -20,14 +20,11 @@ pub struct Demo<'a> {
     pub errors: Option<&'a DriveErrors>,
     /// The path of the vehicle by each method, where the drive has wheels.
     pub trajectories: Option<Trajectories>,
-    /// The tunnels, where the drive has courses.
     pub tunnel: Option<&'a Tunnel>,
-    /// Messages of the whole drive.
     pub frames: u64,
 }
 
 impl Demo<'_> {
-    /// Returns the results as JSON: those that the drive has.
     pub fn summary(&self) -> Value {
         let mut json = serde_json::json!({
             "name": self.drive.name(),

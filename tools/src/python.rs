@@ -5,7 +5,6 @@ pub mod package;
 use crate::drive::error::DataError;
 use std::path::PathBuf;
 
-/// The reason why no Python interpreter can run a step.
 #[derive(Debug, thiserror::Error)]
 pub enum PythonError {
     #[error(transparent)]

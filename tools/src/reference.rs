@@ -1,5 +1,5 @@
 //! Tables for the pages: settings, data identifiers, troubles and states. What the library knows of them (defaults,
-//! ranges, numbers, troubles) is the library's; names and words are in the files beside [`table`].
+//! ranges, numbers, troubles) is the library's; names and words are in the files beside `table.rs`.
 
 mod table;
 

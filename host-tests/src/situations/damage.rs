@@ -8,12 +8,10 @@ use gyronet_tools::random::Random;
 pub enum Damage {
     /// This share of the messages is lost.
     Drop(f64),
-    /// They come twice.
     Twice(f64),
     BitFlip(f64),
     /// Up to this many bytes are noise.
     Burst(f64, usize),
-    /// The end is missing.
     Truncation(f64),
     /// The next message overtakes.
     Late(f64),

@@ -15,7 +15,6 @@
 use super::receiver::{Receiver, Set, Slow};
 use super::ride::Travelled;
 
-/// Heading of a table of outcomes.
 pub const HEADING: &str = "situation                                        vehicle  seconds  good  in 1 sigma: straight, \
     turning  worst second    span  minute  what is wrong";
 /// Expected errors by which yaw may be off.
@@ -117,7 +116,6 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Counts the ride of another seed.
     pub fn add(&mut self, other: &Self) {
         self.seconds += other.seconds;
         self.good += other.good;

@@ -247,7 +247,6 @@ impl Travelled {
         (at as usize, at.fract())
     }
 
-    /// The true heading, rad.
     pub fn heading(&self, time: f64) -> f64 {
         let (at, share) = self.place(time);
         self.heading[at] + share * (self.heading[at + 1] - self.heading[at])

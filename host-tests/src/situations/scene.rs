@@ -23,13 +23,11 @@ pub struct Scene {
     /// A gyro beside the sensor, which then has the sensor's faults instead.
     pub fibre_optic: Option<Sensor>,
     pub wheels: Vec<During<WheelFault>>,
-    /// Period of the yaw messages.
     pub period_ms: u16,
     /// Times at which the board starts again, with what it has learnt.
     pub restarts: Vec<f64>,
     /// The reading of the board's clock at the start, s.
     pub epoch: f64,
-    /// Damage to the messages of the sensor's line.
     pub damage: Vec<During<Damage>>,
     /// Least share of the seconds that must be good.
     pub least: f64,

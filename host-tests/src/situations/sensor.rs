@@ -39,11 +39,9 @@ pub enum Fault {
     Stuck(&'static [usize]),
     /// A reading is shifted, rad/s or m/s^2.
     Shift(usize, f64),
-    /// A reading is multiplied.
     Gain(usize, f64),
     /// The part is turned in its mount about x, y, z, rad.
     Moved([f64; 3]),
-    /// No valid number comes for an axis.
     NoNumber(usize),
     /// The time stamps jump by this, s.
     ClockJump(f64),

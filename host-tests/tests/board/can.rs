@@ -34,7 +34,6 @@ fn stale(sent: &[(Duration, DataFrame)], made: &[DataFrame]) -> Vec<(Duration, u
         .collect()
 }
 
-/// A drive, with something done to the bus from one time to another.
 struct Disturbed {
     board: Board,
     before: Vec<(Duration, DataFrame)>,

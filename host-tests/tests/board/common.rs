@@ -17,7 +17,6 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// Lines of the board.
 pub const IMU: usize = 1;
 pub const SLCAN: usize = 2;
 pub const SERVICE: usize = 6;
@@ -26,7 +25,6 @@ pub const SECOND: Duration = Duration::from_secs(1);
 pub const SAMPLE: Duration = Duration::from_millis(10);
 /// Time from power-on until the image listens to all lines: the boot loader checks the image for 170 ms.
 pub const START: Duration = Duration::from_millis(300);
-/// Frames of a sample.
 pub const SET: usize = 6;
 
 /// The image that is flashed, for a test that is skipped (aloud) where it cannot be built.

@@ -86,7 +86,6 @@ struct Outside {
 }
 
 impl Outside {
-    /// Sends a sample's 10 ms of everything.
     fn sample(&mut self, board: &mut Board) {
         let number = self.number;
         self.number += 1;
@@ -122,7 +121,6 @@ impl Outside {
     }
 }
 
-/// The board's output, checked as it arrives.
 struct Received {
     can: Vec<DataFrame>,
     slcan: Vec<u8>,
@@ -229,7 +227,6 @@ impl Received {
     }
 }
 
-/// Takes the lines that have ended.
 fn whole_lines(bytes: &mut Vec<u8>) -> Vec<u8> {
     let end = bytes.iter().rposition(|byte| *byte == b'\r').map_or(0, |at| at + 1);
     bytes.drain(..end).collect()

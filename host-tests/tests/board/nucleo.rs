@@ -23,12 +23,10 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Duration;
 
-/// Time from power-on to the first sample.
 const BEGIN: Duration = Duration::from_millis(100);
 /// The records, in the second bank of the flash.
 const STORED: u32 = FLASH_BASE + BANK + RECORDS;
 
-/// What a programmer flashes, and the update to the same.
 pub fn built() -> &'static (PathBuf, Update) {
     static BUILT: OnceLock<(PathBuf, Update)> = OnceLock::new();
     BUILT.get_or_init(|| {

@@ -26,7 +26,6 @@ fn with_fd() -> Option<Board> {
     Some(board)
 }
 
-/// The classic frames that carry the same.
 fn parted(sent: &[Own]) -> Vec<DataFrame> {
     let frame = |id, data: &[u8]| DataFrame::new(id, data).expect("eight bytes");
     let parts = |own: &Own| match own.is_fast {

@@ -12,7 +12,6 @@ use gyronet_tools::client::device::Device;
 use gyronet_tools::signing::PrivateKey;
 use std::time::Duration;
 
-/// Identifiers of requests and of responses.
 pub const IDS: [Id; 2] = [id11(0x7E0), id11(0x7E8)];
 /// The frames of a request that the board grants at a time, and the time that they take and are granted in.
 const BLOCK: usize = 8;

@@ -21,7 +21,6 @@ use std::time::{Duration, Instant};
 /// Time of this computer until the board has answered.
 const LIMIT: Duration = Duration::from_secs(120);
 
-/// Ends the program with the test.
 struct Running(Child);
 
 impl Drop for Running {

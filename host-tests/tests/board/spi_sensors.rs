@@ -40,7 +40,6 @@ pub const FAULTS: [&str; 14] = [
 /// A part and what its data sheet says of it.
 struct Fitted {
     part: ImuPart,
-    /// Name of the model.
     model: &'static str,
     /// Bandwidth in hertz to which the image sets its gyro.
     bandwidth: f64,

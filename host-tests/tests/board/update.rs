@@ -281,7 +281,6 @@ fn an_image_that_is_damaged_after_its_confirmation_gives_way_and_without_any_the
     assert_eq!(firmware(&mut board).0, Some(Slot::A));
 }
 
-/// Cuts of the power while a board is updated.
 pub struct Cuts<'a> {
     /// Cuts in a step at most, at accesses to the flash.
     pub most: usize,
@@ -358,7 +357,6 @@ impl Cuts<'_> {
     }
 }
 
-/// Cuts the power at this many accesses in each step.
 fn cut_power(most: usize, delays: &[Duration]) {
     let (Some(file), Some(mut board)) = (built(), common::boot()) else { return };
     board.run(3 * S);

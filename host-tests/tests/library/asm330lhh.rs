@@ -16,7 +16,6 @@ const RATE: [i16; 3] = [0, -2, 1143];
 const FORCE: [i16; 3] = [0, -4, 2049];
 const AT: u32 = 0x0403_0201;
 
-/// A word whose tag has its parity.
 fn word(output: u8, sensor: u8, data: &[u8]) -> [u8; 7] {
     let tag = sensor << 3 | (output & 3) << 1;
     let mut word = [0; 7];

@@ -32,7 +32,6 @@ struct Sample {
 }
 
 impl Sample {
-    /// Returns its best estimate as known now.
     fn estimate(&self) -> i64 {
         self.estimates.iter().sum::<i64>().checked_div(self.estimates.len() as i64).unwrap_or(0)
     }
@@ -138,7 +137,6 @@ fn check(compensate: CompensateConfig, faults: Faults, seed: u64) -> (u32, u32) 
     (bounded, complete)
 }
 
-/// Strides with every kind of lag.
 fn configs() -> impl Iterator<Item = CompensateConfig> {
     let lags = [0, 2, 7, 11].into_iter().filter_map(Lag::new);
     let with = |stride, lag| CompensateConfig { stride, lag, ..CompensateConfig::DEFAULT };

@@ -63,7 +63,6 @@ fn run_with(
     (pipeline, outputs)
 }
 
-/// The expected error of the live rate, rad/s.
 fn sigma(output: &Output) -> f64 {
     output.vehicle.live.sigma.expect("a rate").rad_per_sec()
 }

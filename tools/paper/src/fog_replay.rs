@@ -60,7 +60,6 @@ pub fn run(sequence: &Sequence, network: &mut dyn MinuteNetwork, config: FogConf
     drive
 }
 
-/// Returns the default configuration for a sequence's gyro and latitude.
 fn default_config(sequence: &Sequence) -> FogConfig {
     let latitude = Latitude::from_degrees(sequence.latitude_deg() as f32);
     FogConfig { errors: FogErrors::DSP1760, latitude, ..FogConfig::DEFAULT }

@@ -96,7 +96,6 @@ impl<B: Bus> Device<B> {
         }
     }
 
-    /// Returns the board's reason for the last refusal.
     fn refusal(&mut self) -> Result<Option<Refusal>, DeviceError> {
         let [high, low] = REFUSAL;
         let Ok(response) = self.exchange(&[0x22, high, low])? else { return Ok(None) };

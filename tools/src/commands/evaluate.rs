@@ -131,7 +131,6 @@ fn outages(args: &Args, common: Common) -> super::Result {
     Ok(())
 }
 
-/// Writes the pictures of the median and of the worst outage.
 fn pictures<'a>(
     folder: &Path,
     drives: impl Iterator<Item = &'a Found<'a>> + Clone,

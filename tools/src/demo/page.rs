@@ -68,7 +68,6 @@ fn facts(demo: &Demo<'_>) -> String {
     format!("<dl class=\"facts\">\n{}</dl>\n", rows.collect::<String>())
 }
 
-/// Returns the charts of the yaw and, with a reference, of each method's error.
 fn yaw(demo: &Demo<'_>) -> String {
     let rates = demo.rates;
     // Where the value is known.

@@ -18,7 +18,6 @@ const MOST: usize = 8_640_000;
 #[derive(Debug)]
 pub struct Rows {
     pub name: String,
-    /// The path of the file, as in the command.
     pub file: String,
     /// Median of the first periods, s; if it is not that of 100 Hz and is used, the rows are brought to 100 Hz.
     pub period: Option<f64>,
@@ -37,7 +36,6 @@ pub struct Rows {
     /// Number of rows that were not used, and why the first one could not be read.
     pub bad: u64,
     pub first_bad: Option<String>,
-    /// Contents of the vehicle file beside the recording.
     pub vehicle: Vehicle,
 }
 
@@ -118,7 +116,6 @@ impl Rows {
         (0..self.len()).filter_map(|row| Some((self.seconds[row], of(row)?))).collect()
     }
 
-    /// Returns the mean of the gyro about z, rad/s.
     pub fn mean_yaw_rate(&self, span: Range<usize>) -> f64 {
         let rates = &self.rate[span];
         rates.iter().map(|rate| rate[2]).sum::<f64>() / rates.len() as f64

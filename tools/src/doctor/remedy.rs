@@ -36,12 +36,10 @@ pub fn channel<'r>(rows: &'r Rows, role: &str, column: &'r str) -> &'r str {
     rows.vehicle.signals.get(role).map_or(column, String::as_str)
 }
 
-/// The words on an IMU whose unit is not ours.
 pub fn imu(rows: &Rows, its: &str) -> String {
     unit(rows, channel(rows, "imu", "imu"), its)
 }
 
-/// The words on a channel whose unit is not ours.
 pub fn unit(rows: &Rows, channel: &str, unit: &str) -> String {
     format!("{channel} is in {unit}; {}", import(rows, &format!("--unit {channel}={unit}")))
 }

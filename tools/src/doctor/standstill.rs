@@ -40,7 +40,6 @@ pub fn find(rows: &Rows) -> (Vec<Range<usize>>, usize) {
     (standstills, driven.len())
 }
 
-/// Returns the root of the sum of the three axes' variances.
 fn spread(rates: &[[f64; 3]]) -> f64 {
     let variance = |axis: usize| {
         let mean = rates.iter().map(|rate| rate[axis]).sum::<f64>() / rates.len() as f64;

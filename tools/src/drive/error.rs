@@ -6,13 +6,11 @@ use gyronet::bias::StaticError;
 use std::fmt;
 use std::path::Path;
 
-/// An error in a file: where it is, and what is wrong.
 #[derive(Debug)]
 pub struct DataError {
     pub path: String,
     /// The line number, from 1.
     pub line: Option<u64>,
-    /// The name or the number of the column.
     pub column: Option<String>,
     pub fault: DataFault,
 }

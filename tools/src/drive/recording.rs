@@ -73,7 +73,6 @@ impl Row {
 /// A complete drive in memory; [`super::stream::Drive`] is for drives of any length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
-    /// The path of the file, for messages.
     pub path: String,
     pub rows: Vec<Row>,
     /// Number of rows that are missing in gaps.
@@ -104,7 +103,6 @@ impl Recording {
         Facts::of(&self.rows)
     }
 
-    /// Returns the file's name without folder and extension.
     pub fn name(&self) -> &str {
         name(&self.path)
     }

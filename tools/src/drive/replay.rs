@@ -62,7 +62,6 @@ pub fn initialise(drive: &Drive<'_>) -> Result<[AngularRate; 3], DataError> {
     }
 }
 
-/// A whole drive in memory with its corrected yaw rates.
 #[derive(Debug, Clone)]
 pub struct Replay {
     /// One step for each row that has a place on the grid.

@@ -21,7 +21,6 @@ pub struct Drive<'a> {
     pub path: String,
     /// Contents of the vehicle file beside the drive; the rows are in the vehicle's axes.
     pub vehicle: Cow<'a, Vehicle>,
-    /// Found by the first reading.
     pub facts: Facts,
     /// True if the rows are brought to 100 Hz.
     is_off_grid: bool,
@@ -32,7 +31,6 @@ pub struct Drive<'a> {
     source: Source<'a>,
 }
 
-/// Where the rows come from.
 #[derive(Debug, Clone)]
 pub(super) enum Source<'a> {
     File(PathBuf),
@@ -140,7 +138,6 @@ impl Drive<'_> {
         Ok(Box::new(self.before.iter().copied().map(Ok).chain(placed)))
     }
 
-    /// The file's name without folder and extension, for tables.
     pub fn name(&self) -> &str {
         name(&self.path)
     }

@@ -21,7 +21,6 @@ impl LowPass {
     /// Corner frequency of the chosen filter, Hz.
     pub const CORNER_HZ: f64 = 5.0;
 
-    /// Creates the filter that the tables use.
     pub fn chosen() -> Self {
         Self::new(Self::HALF, Self::CORNER_HZ)
     }

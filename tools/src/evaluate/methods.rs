@@ -8,11 +8,8 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gyro {
-    /// The gyro of the inertial sensor.
     Mems,
-    /// The fibre-optic gyro.
     Fog,
-    /// No gyro: the wheels alone.
     Wheels,
     /// The gyro of another program, whose trajectory is given.
     Given,

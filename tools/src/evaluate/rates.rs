@@ -174,7 +174,6 @@ impl SideBySide {
         self.complete(filtered)
     }
 
-    /// Returns the next sample after the last step, until `None`.
     fn end(&mut self) -> Option<Sample> {
         let filtered = [self.fir[0].end(), self.fir[1].end()];
         self.complete(filtered)

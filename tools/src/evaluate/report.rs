@@ -231,11 +231,9 @@ impl Mean {
     }
 }
 
-/// The results of the methods on several drives, and their means.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     pub drives: Vec<DriveErrors>,
-    /// The mean of each folder's drives.
     pub sets: Vec<Mean>,
 }
 

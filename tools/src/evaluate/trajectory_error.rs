@@ -71,7 +71,6 @@ impl Alignment {
         Some(Self { shift: [to[0] - x, to[1] - y], ..turned })
     }
 
-    /// Returns the aligned position of a point of the estimate.
     pub fn apply(&self, [x, y]: Point) -> Point {
         let (sin, cos) = (libm::sin(self.yaw), libm::cos(self.yaw));
         [x * cos - y * sin + self.shift[0], x * sin + y * cos + self.shift[1]]

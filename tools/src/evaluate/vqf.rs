@@ -12,7 +12,6 @@ use super::angle::wrap;
 use crate::drive::DT;
 use vqf_rs::{Quaternion, VQF};
 
-/// A filter at work, and its newest heading.
 pub struct Heading {
     filter: VQF,
     yaw: Option<f64>,

@@ -115,7 +115,6 @@ impl Checkpoint<GyroNet> {
         self.tensors.direction(&format!("lstm{layer}"), 0, backward)
     }
 
-    /// Returns the f32 network over these tensors.
     pub fn network(&self) -> GyroNetF32<'_> {
         GyroNetF32 {
             input_mean: self.features("input_mean"),
@@ -127,7 +126,6 @@ impl Checkpoint<GyroNet> {
 }
 
 impl Checkpoint<FogNet> {
-    /// Returns the f32 network over these tensors.
     pub fn network(&self) -> FogNetF32<'_> {
         let dense = |name: &str| {
             let [weight, bias] =

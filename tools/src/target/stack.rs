@@ -23,7 +23,6 @@ const RESET: &str = "Reset";
 /// End of the name of the function that RTIC runs with interrupts off; its last step switches them on.
 const MASKED: &str = "__rtic_init_resources";
 
-/// The reason why no bound of an image's stack can be computed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StackError {
     #[error("not a firmware image: {0}")]

@@ -8,7 +8,6 @@ use gyronet_tools::simulate::car::GRAVITY;
 use gyronet_tools::simulate::purpose::Purpose;
 use std::f64::consts::PI;
 
-/// Holds the calibration and the sizes of its errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
     /// Diameters as calibrated, left and right, m.

@@ -104,7 +104,6 @@ impl Estimates {
         self.push(Method::PSEUDO_FOG, drive.turns[self.start..].to_vec());
     }
 
-    /// Runs the methods that start from the inertial sensor.
     fn inertial(&mut self, sequence: &Sequence, recording: &Recording, network: &mut impl WindowNetwork) {
         let gyro: Vec<f64> = sequence.steps.iter().map(|step| f64::from(step.angular_rate[2])).collect();
         let constant = |rate: f64| gyro.iter().map(|z| z - rate).collect::<Vec<f64>>();

@@ -27,7 +27,6 @@ pub const START_TOLERANCE: (f64, f64) = (1.0, 0.1);
 /// vehicle's length reaches it.
 pub const DIVERGED: f64 = 100.0;
 
-/// Holds the folder of another program's trajectories.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Given {
     /// The method's name in tables and in JSON.

@@ -147,7 +147,6 @@ pub fn mean<'a>(sequences: impl Iterator<Item = &'a SequenceErrors>) -> ByMethod
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Results {
-    /// Says whether at least one sequence is simulated.
     pub simulated: bool,
     pub sequences: Vec<SequenceErrors>,
     /// The means over all sequences, for the methods that were run on all of them.

@@ -49,7 +49,6 @@ const START: u8 = 1;
 type Result<T> = std::result::Result<T, DeviceError>;
 
 impl<B: Bus> Device<B> {
-    /// Creates a device with the default identifiers; `name` is the line's name in errors.
     pub fn new(bus: B, name: &str) -> Self {
         Self::with_ids(bus, name, &DiagnosisIds::DEFAULT).expect("three of 11 bits")
     }

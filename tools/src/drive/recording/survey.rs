@@ -17,7 +17,6 @@ pub struct Facts {
     pub last: Micros,
     /// Number of rows that are missing in gaps.
     pub missing: u64,
-    /// True if the rows are not 10 ms apart.
     pub is_off_grid: bool,
     /// True if each wheel is recorded in any row.
     pub wheels: [bool; WHEELS],

@@ -6,7 +6,6 @@ use gyronet::model::fognet_blob::{HIDDEN1, HIDDEN2, INPUTS};
 use gyronet::model::seconds::{STEPS, SecondsWindow};
 use gyronet::units::{Angle, AngularRate, SpecificForce, WheelSpeed};
 
-/// Holds FoGNet's tensors, with the names and layouts of the checkpoint.
 #[derive(Debug, Clone, Copy)]
 pub struct FogNetF32<'w> {
     /// Mean of each feature: m/s^2, rad/s, m, rad.

@@ -5,7 +5,6 @@ use gyronet::model::blob::{HIDDEN, LINEAR_INPUTS};
 use gyronet::model::{Estimate, FEATURES, Features, WINDOW, WindowNetwork};
 use gyronet::units::{AngularRate, SpecificForce};
 
-/// Holds GyroNet's tensors, with the names and layouts of the checkpoint.
 #[derive(Debug, Clone, Copy)]
 pub struct GyroNetF32<'w> {
     /// Mean of each feature, m/s^2 and rad/s.

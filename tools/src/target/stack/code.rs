@@ -17,7 +17,6 @@ pub struct Function {
 #[derive(Debug, Default)]
 pub struct Code {
     pub functions: BTreeMap<u32, Function>,
-    /// Functions whose address is taken somewhere.
     taken: BTreeSet<u32>,
     pub vectors: Vectors,
 }

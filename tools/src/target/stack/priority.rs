@@ -9,7 +9,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 pub const SECTION: &str = ".priorities";
 
-/// Holds a vector table, and the priorities of its handlers.
 #[derive(Debug, Default)]
 pub struct Vectors {
     /// Address of the handler of each exception number, if the vector points to a function.
