@@ -1,6 +1,6 @@
 //! Defines the simulated vehicle and its sensors, with the source of every parameter.
 //!
-//! Those of the route are in [`super::town`]. No parameter was tuned to a result. (M) marks values recalled from a data
+//! Those of the route are in `town.rs`. No parameter was tuned to a result. (M) marks values recalled from a data
 //! sheet that was not available; (A) marks assumptions where nothing is published.
 //!
 //! | what | value | source |
