@@ -1,19 +1,17 @@
 //! Code that the host tests share: how a test gets QEMU or the recordings or reports that it is skipped, the virtual board and
 //! its image, and every generator of bytes, samples, streams and weights.
 
-pub mod board;
+pub use gyronet_board::{board, image, recordings, require, wire};
+
 pub mod entrance;
 pub mod flash;
 pub mod gnss;
 pub mod golden;
-pub mod image;
 pub mod models;
 pub mod noise;
 pub mod packing;
 pub mod parallel;
-pub mod recordings;
 pub mod replay;
-pub mod require;
 pub mod sent;
 pub mod sequence;
 pub mod settings;
@@ -24,4 +22,3 @@ pub mod stream;
 pub mod synthetic;
 pub mod tester;
 pub mod winding;
-pub mod wire;

@@ -23,7 +23,6 @@ impl Verdict {
 pub struct Finding {
     pub what: &'static str,
     pub verdict: Verdict,
-    /// One sentence with its numbers.
     pub text: String,
 }
 

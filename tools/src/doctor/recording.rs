@@ -10,7 +10,6 @@ use std::ops::Range;
 use std::path::Path;
 
 pub const SECOND: usize = 100;
-/// Rows by which the rate is judged.
 const FIRST: usize = 1_000;
 /// Most rows that are kept: a day at 100 Hz.
 const MOST: usize = 8_640_000;
@@ -21,7 +20,6 @@ pub struct Rows {
     pub file: String,
     /// Median of the first periods, s; if it is not that of 100 Hz and is used, the rows are brought to 100 Hz.
     pub period: Option<f64>,
-    /// Seconds since the first row.
     pub seconds: Vec<f64>,
     /// Specific force, m/s^2, and angular rate, rad/s.
     pub force: Vec<[f64; 3]>,

@@ -9,7 +9,6 @@ use std::path::Path;
 #[derive(Debug)]
 pub struct DataError {
     pub path: String,
-    /// The line number, from 1.
     pub line: Option<u64>,
     pub column: Option<String>,
     pub fault: DataFault,

@@ -22,7 +22,6 @@ pub struct Drive<'a> {
     /// Contents of the vehicle file beside the drive; the rows are in the vehicle's axes.
     pub vehicle: Cow<'a, Vehicle>,
     pub facts: Facts,
-    /// True if the rows are brought to 100 Hz.
     is_off_grid: bool,
     /// A map that is applied to the gyro of each row.
     pub gyro_map: Option<GyroMap>,

@@ -259,7 +259,6 @@ pub struct AgainstCourse {
     aligned: Option<f64>,
     /// Medians of blocks that wait for the alignment.
     waiting: Vec<Option<f64>>,
-    /// The errors, one for each block.
     errors: Vec<Option<f64>>,
     changes: Changes,
 }

@@ -52,7 +52,6 @@ pub struct Outage {
     /// Whether a rest had shown the bias by then; if not, static initialisation, zero-rate updates and VQF have no rate,
     /// and get the gyro's.
     pub is_rested: bool,
-    /// Errors of the heading, rad.
     pub heading: ByMethod<f64>,
     /// Distance by the wheels, m, and what the errors of the heading move its end by, m.
     pub position: Option<(f64, ByMethod<f64>)>,
@@ -140,7 +139,6 @@ struct Race<'a> {
     running: Vec<Running<'a>>,
     found: Vec<Outage>,
     starts: Starts,
-    /// The way from the only start on.
     trace: Vec<Point>,
 }
 

@@ -6,7 +6,6 @@ use crate::evaluate::outage::ByMethod;
 /// Where the methods are at one time of an outage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// Errors of the heading, rad.
     pub heading: ByMethod<f64>,
     /// The distance driven, and that of each method's place from the reference's, m; absent without wheels.
     pub position: Option<(f64, ByMethod<f64>)>,

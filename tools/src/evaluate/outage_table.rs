@@ -38,7 +38,6 @@ pub struct Figures {
     pub position_m: Option<Spread>,
 }
 
-/// By length of the outage, s, and by method.
 pub type ByLength = BTreeMap<usize, BTreeMap<&'static str, Figures>>;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]

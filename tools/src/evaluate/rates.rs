@@ -40,7 +40,6 @@ pub struct Networks<'a> {
 
 #[derive(Debug, Clone)]
 pub struct Sample {
-    /// The step of the board whose rates are sent.
     pub step: Step,
     /// The rates by each method, rad/s.
     pub rates: PerMethod<f64>,

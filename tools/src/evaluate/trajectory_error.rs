@@ -48,7 +48,6 @@ impl TrajectoryError {
 pub struct Alignment {
     /// The rotation to the left, rad.
     pub yaw: f64,
-    /// The shift, m.
     pub shift: Point,
 }
 

@@ -47,9 +47,7 @@ pub struct Count {
 
 #[derive(Debug, Clone, Default)]
 pub struct Counts {
-    /// The regions in the order in which they ran.
     pub regions: Vec<Count>,
-    /// The sizes: name and bytes.
     pub sizes: Vec<(String, u64)>,
 }
 
