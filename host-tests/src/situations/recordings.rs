@@ -3,9 +3,9 @@
 use super::board::Board;
 use super::judge::{Outcome, Reference, judge};
 use super::receiver::{INERTIAL, Receiver};
-use super::ride::{STEP, Travelled};
+use super::ride::Travelled;
 use super::sensor::mti;
-use super::vehicle::Part;
+use super::vehicle::{Part, STEP};
 use gyronet::store::Learned;
 use gyronet::units::Micros;
 use gyronet_tools::drive::recording::Recording;

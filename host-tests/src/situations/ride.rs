@@ -4,12 +4,10 @@
 //! order (Rajamani, Vehicle Dynamics and Control, chapter 2). Rates and forces are kept as integrals, so that the mean
 //! between any two times is exact.
 
-use super::vehicle::{Shaking, Vehicle};
+use super::vehicle::{STEP, Shaking, Vehicle};
 use gyronet_tools::random::Random;
 use std::f64::consts::TAU;
 
-/// Length of a step, s.
-pub const STEP: f64 = 1e-3;
 const GRAVITY: f64 = 9.80665;
 /// Share of a turn in which the steering moves in, and again out.
 const STEERING: f64 = 0.3;

@@ -1,9 +1,10 @@
 //! Vehicles and their sensors: how they shake, what the part's errors are, what the wheels report.
 
-use super::ride::STEP;
 use gyronet_tools::random::Random;
 use std::f64::consts::{PI, TAU};
 
+/// Length of a step of a ride, s.
+pub const STEP: f64 = 1e-3;
 /// Speed for which the vibration of the road is given, m/s.
 const ROAD_SPEED: f64 = 10.0;
 /// Width of a vibration's band over its frequency.
