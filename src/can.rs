@@ -17,6 +17,7 @@ pub mod identifier;
 pub mod load;
 #[doc(hidden)]
 pub mod queue;
+mod settings;
 #[doc(hidden)]
 pub mod signal;
 pub mod slcan;

@@ -2,10 +2,8 @@
 //!
 //! [`Settings`] are what a user writes; a [`Config`] holds settings that have passed the check.
 
-mod settings;
-
 pub use super::e2e::DataIdMode;
-pub use settings::{BoschSettings, E2e, Settings, StatusSettings, YawSettings};
+pub use super::settings::{BoschSettings, E2e, Settings, StatusSettings, YawSettings};
 
 use super::bosch::LAYOUTS;
 use super::load::{Periodic, per_mille};

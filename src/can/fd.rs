@@ -2,7 +2,7 @@
 //! own counter and CRC. A board joins the frames of a set before its controller.
 
 use super::DataFrame;
-use super::config::Settings;
+use super::settings::Settings;
 use embedded_can::{Frame, Id, StandardId};
 
 /// Default identifier.

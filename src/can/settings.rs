@@ -1,6 +1,6 @@
-//! Defines the bus settings that a user can change.
+//! The bus settings that a user can change.
 
-use crate::can::e2e::{DataIdMode, P01, Profile};
+use super::e2e::{DataIdMode, P01, Profile};
 
 /// The E2E profile of the three yaw messages, with their data identifiers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -57,7 +57,7 @@ pub struct StatusSettings {
     pub id: u16,
 }
 
-/// The messages on the bus; [`super::Config::new`] checks them.
+/// The messages on the bus; [`super::config::Config::new`] checks them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
