@@ -21,7 +21,7 @@ pub use described::HeadingSignal;
 pub(crate) use estimator::{BRIDGED, FINE_BIAS, gain_knowledge};
 pub use estimator::{CourseConfig, CourseCounters, CourseState, Estimator, Refusal};
 pub use gain::Gain;
-pub use gnss::{Fix, GnssLine, GnssProtocol, GnssSettings};
+pub use gnss::{GnssLine, GnssProtocol, GnssSettings};
 pub use receiver::{HeadingConfigError, HeadingReceiver, HeadingSettings, Received};
 
 use embedded_can::{Frame, Id};
@@ -39,6 +39,24 @@ pub struct Heading {
     /// Accuracy of the speed, 1 sigma, m/s.
     pub speed_sigma: Option<f32>,
 }
+
+/// What a message of a GNSS receiver says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Fix {
+    /// Course and speed; `None` if the message has neither.
+    pub heading: Option<Heading>,
+    /// Degrees, north positive. The course is used even if the latitude is an error.
+    pub latitude: Result<Option<f32>, HeadingError>,
+}
+
+impl Fix {
+    /// A message without a fix: the receiver sees too few satellites.
+    pub const NONE: Self = Self { heading: Some(Heading::UNKNOWN), latitude: Ok(None) };
+}
+
+/// What a message gives; `None` if it is one that is not used.
+type Read = Option<Result<Fix, HeadingError>>;
 
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

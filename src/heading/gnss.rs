@@ -5,7 +5,7 @@
 
 use super::nmea::Sentences;
 use super::ubx::{self, Ubx};
-use super::{Heading, HeadingError};
+use super::{Fix, HeadingError, Read};
 use crate::health::count;
 use crate::sensor::framer::Framer;
 use crate::sensor::{ByteSource, Source};
@@ -31,21 +31,6 @@ pub enum GnssProtocol {
     Nmea,
 }
 
-/// What a message of a receiver says.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Fix {
-    /// Course and speed; `None` if the message has neither.
-    pub heading: Option<Heading>,
-    /// Degrees, north positive. The course is used even if the latitude is an error.
-    pub latitude: Result<Option<f32>, HeadingError>,
-}
-
-impl Fix {
-    /// A message without a fix: the receiver sees too few satellites.
-    pub const NONE: Self = Self { heading: Some(Heading::UNKNOWN), latitude: Ok(None) };
-}
-
 /// The parser of a line: bytes in, fixes out; a damaged message is an error, the next good one is read.
 #[derive(Debug, Clone)]
 pub struct GnssLine {
@@ -55,8 +40,6 @@ pub struct GnssLine {
     kept: Option<Read>,
     bad_checksums: u32,
 }
-
-pub(super) type Read = Option<Result<Fix, HeadingError>>;
 
 #[derive(Debug, Clone)]
 enum Parser {

@@ -4,8 +4,7 @@
 //! begins a sentence, so that one behind a damaged one is read. VTG is used only where RMC has no course. One talker
 //! is used, because two receivers differ in latency.
 
-use super::gnss::{Fix, Read};
-use super::{Heading, HeadingError};
+use super::{Fix, Heading, HeadingError, Read};
 use heapless::Vec;
 
 /// Length of the longest sentence, bytes. The standard allows 82, and receivers of high precision send a little more.

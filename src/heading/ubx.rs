@@ -3,8 +3,7 @@
 //! A frame is `B5 62 CLASS ID LENGTH PAYLOAD CK_A CK_B`; the checksum is Fletcher's of eight bits over what lies between
 //! the first two bytes and itself. Its numbers are little-endian.
 
-use super::gnss::Fix;
-use super::{Heading, HeadingError};
+use super::{Fix, Heading, HeadingError, Read};
 use crate::sensor::framer::Protocol;
 use core::f32::consts::PI;
 
@@ -40,7 +39,7 @@ impl Protocol for Ubx {
     }
 }
 
-pub(super) fn read(frame: &[u8]) -> Option<Result<Fix, HeadingError>> {
+pub(super) fn read(frame: &[u8]) -> Read {
     let [_, _, class, id, _, _, payload @ .., _, _] = frame else { return None };
     let of_this_version = || payload.try_into().map_err(|_| HeadingError::Length(payload.len()));
     ([*class, *id] == NAV_PVT).then(|| of_this_version().and_then(nav_pvt))
