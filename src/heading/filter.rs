@@ -13,6 +13,8 @@
 //!
 //! Without a course the last three are independent of the first two, and nothing is computed with them.
 
+use super::Gain;
+
 pub(crate) const BIAS: usize = 0;
 pub(crate) const STOP: usize = 1;
 pub(crate) const GAIN: usize = 2;
@@ -75,6 +77,13 @@ impl Filter {
         self.covariance[STATE] = [0.0; STATES];
         self.covariance[STATE][STATE] = variance;
         self.state[STATE] = value;
+    }
+
+    /// Starts with the gain that earlier drives have shown.
+    pub fn give_back(&mut self, gain: Option<Gain>) {
+        if let Some(Gain { share, sigma, .. }) = gain {
+            self.restart::<GAIN>(share, sigma * sigma);
+        }
     }
 
     pub fn standstill(&mut self, mean: f32, variance: f32) {

@@ -62,7 +62,7 @@ impl Pipeline {
         if course.state().counters.used == 0 {
             let sigma = early.map_or(zero_rate.max_bias, |(_, sigma)| sigma);
             *start = Start { filter: Filter::new(sigma * sigma, 0.0), ..Start::EMPTY };
-            give_back(&mut start.filter, self.config.gain);
+            start.filter.give_back(self.config.gain);
         }
         let [x, y, z] = frame.sample.angular_rate;
         let is_good = frame.sample.validity.is_good();
@@ -133,11 +133,5 @@ impl Pipeline {
     pub(super) fn remaining(&self) -> Remaining {
         let gain = self.zero_rate().map_or(0.0, |known| known.gain().0);
         Remaining { bias: self.bias(), gain }
-    }
-}
-
-pub(super) fn give_back(filter: &mut Filter, gain: Option<Gain>) {
-    if let Some(Gain { share, sigma, .. }) = gain {
-        filter.restart::<GAIN>(share, sigma * sigma);
     }
 }

@@ -1,7 +1,6 @@
 //! Static initialisation finds the bias and the tilt, or a course the bias of a vehicle that moves; this module holds both
 //! once one has succeeded.
 
-use super::course::give_back;
 use super::level::Level;
 use super::sensor_bias::ZeroPoint;
 use super::{Pipeline, PipelineConfig, State};
@@ -93,7 +92,7 @@ impl Pipeline {
         self.state.initialised = Some(Initialised { level, zero, zero_rate, is_coarse: false });
         let gain = self.config.gain;
         if let Some(zero_rate) = self.zero_rate_mut() {
-            give_back(zero_rate.filter(), gain);
+            zero_rate.filter().give_back(gain);
         }
         self.state.course.restart();
         Ok(())

@@ -138,12 +138,6 @@ impl Pipeline {
     }
 }
 
-pub(super) fn early(config: &PipelineConfig) -> Rotation {
-    let known = config.vertical.turned(&config.mounting);
-    let judged = VerticalEstimator::new(known).judge();
-    judged.up.filter(|_| config.levelling).map_or(Rotation::IDENTITY, |up| Rotation::upright(&up))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,9 +4,8 @@
 //! at rest contains the Earth's rate, once: [`ZeroPoint`] holds both.
 
 use super::PipelineConfig;
-use super::level;
 use crate::bias::EarthRate;
-use crate::mounting::{Rotation, is_moved};
+use crate::mounting::{Rotation, VerticalEstimator, is_moved};
 use crate::sample::{ImuSample, RATE_HZ};
 use crate::units::{AngularRate, SpecificForce};
 
@@ -111,7 +110,7 @@ impl SensorBias {
         let reference = *self.reference.get_or_insert(now);
         self.change_sigma = config.thermal_bias.change_sigma(reference, now);
         if self.early.is_none() {
-            self.early = config.rest_force.map(|force| (level::early(config), force));
+            self.early = config.rest_force.map(|force| (levelling(config), force));
         }
     }
 
@@ -127,6 +126,13 @@ impl SensorBias {
         let (_, sigma) = self.newest?;
         (self.in_place && sample.validity.is_good()).then_some((levelling, sigma))
     }
+}
+
+/// Returns the levelling by what earlier drives have shown.
+fn levelling(config: &PipelineConfig) -> Rotation {
+    let known = config.vertical.turned(&config.mounting);
+    let judged = VerticalEstimator::new(known).judge();
+    judged.up.filter(|_| config.levelling).map_or(Rotation::IDENTITY, |up| Rotation::upright(&up))
 }
 
 /// The reading at rest of a gyro whose z axis is vertical.
