@@ -13,8 +13,7 @@ use crate::drive::stream::Drive;
 use crate::drive::wheel_frames::Speeds;
 use crate::evaluate::angle::wrap;
 use crate::evaluate::heading_error::{OffCourse, median};
-use crate::evaluate::methods::Method;
-use crate::evaluate::outage_path::{Path, Point};
+use crate::evaluate::outage_path::{ByMethod, Path, Point};
 use crate::evaluate::rates::silent;
 use crate::evaluate::{ekf, vqf};
 use gyronet::heading::CourseConfig;
@@ -36,11 +35,6 @@ const APART_S: f64 = 2.1;
 /// Samples over whose median the reference is taken.
 const MEDIAN: usize = 3 * SECOND;
 const SECOND: usize = RATE_HZ as usize;
-
-/// The compared methods, in the order of the table.
-pub const METHODS: [Method; 6] =
-    [Method::STATIC, Method::STATIC_ZERO_RATE, Method::VQF, Method::EKF, Method::NO_MODEL, Method::DELAYED];
-pub type ByMethod<T> = [T; METHODS.len()];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outage {

@@ -2,8 +2,8 @@
 //! the heading by time, and how far off each path is.
 
 use crate::evaluate::methods::Method;
-use crate::evaluate::outage::{AFTER_S, ByMethod, METHODS, Outage};
-use crate::evaluate::outage_path::Point;
+use crate::evaluate::outage::{AFTER_S, Outage};
+use crate::evaluate::outage_path::{ByMethod, METHODS, Point};
 use crate::plot::curve::range;
 use crate::plot::page::chart::{part, ticks};
 use crate::plot::page::escaped;

@@ -1,7 +1,12 @@
 //! The path of every method since the start of an outage, from its rates and the speed of the wheels.
 
 use crate::drive::DT;
-use crate::evaluate::outage::ByMethod;
+use crate::evaluate::methods::Method;
+
+/// The compared methods, in the order of the table.
+pub const METHODS: [Method; 6] =
+    [Method::STATIC, Method::STATIC_ZERO_RATE, Method::VQF, Method::EKF, Method::NO_MODEL, Method::DELAYED];
+pub type ByMethod<T> = [T; METHODS.len()];
 
 /// Where the methods are at one time of an outage.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,8 @@
 //! The errors of many outages, as a table and as JSON: median, 90 % and worst of each method.
 
 use super::methods::Method;
-use super::outage::{AFTER_S, METHODS, Outage};
+use super::outage::{AFTER_S, Outage};
+use super::outage_path::METHODS;
 use super::report::FAILED;
 use serde::Serialize;
 use std::collections::BTreeMap;
