@@ -9,7 +9,8 @@ mod sensors;
 mod slcan;
 mod weights;
 
-use gyronet_tools::drive::recording::{Reader, Recording};
+use gyronet_tools::drive::recording::Reader;
+use gyronet_tools::drive::stream::Recording;
 
 #[derive(Debug, Clone, Copy)]
 pub struct Entrance {

@@ -1,7 +1,7 @@
 //! Data built into the binary, so that it runs from any folder: the simulated drive and the f32 checkpoint of GyroNet.
 
 use crate::drive::error::DataError;
-use crate::drive::recording::Recording;
+use crate::drive::stream::Recording;
 use crate::network::checkpoint::{Checkpoint, GyroNet};
 use crate::simulate::{Config, csv, gnss};
 

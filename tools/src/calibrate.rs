@@ -196,7 +196,7 @@ fn combined([one, sigma]: [f64; 2], [other, other_sigma]: [f64; 2]) -> [f64; 2] 
 mod tests {
     use super::*;
     use crate::board::Uncorrected;
-    use crate::drive::recording::Recording;
+    use crate::drive::stream::Recording;
     use crate::simulate::{self, csv};
 
     /// Simulates 20 minutes of a unit that reads 2 % too much about z. The reference is a course once a second with a

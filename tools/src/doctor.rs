@@ -26,9 +26,9 @@ pub use mounting::Mounting;
 
 use crate::drive::error::DataError;
 use crate::drive::foreign;
-use crate::drive::recording::{Reader, Recording};
+use crate::drive::recording::Reader;
 use crate::drive::replay::initialise;
-use crate::drive::stream::Drive;
+use crate::drive::stream::{Drive, Recording};
 use crate::drive::vehicle::Vehicle;
 use recording::Rows;
 use std::path::Path;

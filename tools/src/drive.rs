@@ -1,5 +1,5 @@
-//! Recorded drives. [`stream`] reads a drive row by row, [`recording`] keeps one in memory, [`vehicle`] reads the
-//! vehicle file beside it, and [`wheel_frames`] turns wheel speeds into CAN frames. [`replay`] runs the drive through
+//! Recorded drives. [`recording`] reads the rows of a file, [`stream`] whole drives, [`vehicle`] the
+//! vehicle file beside one, and [`wheel_frames`] turns wheel speeds into CAN frames. [`replay`] runs the drive through
 //! the board. [`track`] is its path. [`candump`] writes the frames that were sent, [`export`] tables and
 //! paths.
 

@@ -8,8 +8,7 @@ use super::sensor::mti;
 use super::vehicle::{Part, STEP};
 use gyronet::store::Learned;
 use gyronet::units::Micros;
-use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::wheel_frames::WheelFrames;
+use gyronet_tools::drive::stream::Recording;
 use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
 
@@ -48,7 +47,7 @@ pub fn judged(folder: &Path, wanted: &str) -> Vec<(String, Outcome)> {
 fn run(recording: &Recording, reference: &Reference) -> Option<Outcome> {
     let truth = truth(recording)?;
     let first = recording.rows.first()?.sample.time.0;
-    let mut frames = WheelFrames::new(recording);
+    let mut frames = recording.wheels();
     let mut board = Board::new(Part::Xsens, frames.is_some(), 10, &Learned::NOTHING);
     let mut received = Receiver::new(INERTIAL);
     let mut rows = recording.rows.iter().zip(0..).peekable();

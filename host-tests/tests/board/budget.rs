@@ -24,7 +24,6 @@ use gyronet_tools::client::bus::SlcanBus;
 use gyronet_tools::client::device::error::DeviceError;
 use gyronet_tools::client::device::upload::upload;
 use gyronet_tools::client::device::{Authority, Device};
-use gyronet_tools::drive::wheel_frames::WheelFrames;
 use gyronet_tools::signing::PrivateKey;
 
 /// Clocks of an instruction that the virtual board assumes.
@@ -59,7 +58,7 @@ fn a_moving_vehicle_costs_what_the_page_says() {
     const SAMPLES: [usize; 2] = [1_200, 300];
     let Some(mut board) = common::started() else { return };
     let drive = bundled::simulated_drive().expect("it comes with the tools");
-    let mut wheels = WheelFrames::new(&drive).expect("it has wheels");
+    let mut wheels = drive.wheels().expect("it has wheels");
     let mut before = board.counts();
     for (k, row) in drive.rows.iter().take(SAMPLES.iter().sum()).enumerate() {
         if k == SAMPLES[0] {

@@ -13,7 +13,7 @@ use gyronet_host_tests::board::Board;
 use gyronet_host_tests::recordings;
 use gyronet_host_tests::replay;
 use gyronet_host_tests::stored::Stored;
-use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::stream::Recording;
 use std::time::{Duration, Instant};
 
 /// Age at which a frame no longer goes out, with the time that the frames before it take.

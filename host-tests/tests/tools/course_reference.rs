@@ -3,8 +3,7 @@
 
 use gyronet_tools::board::Uncorrected;
 use gyronet_tools::drive::error::DataError;
-use gyronet_tools::drive::recording::Recording;
-use gyronet_tools::drive::stream::Drive;
+use gyronet_tools::drive::stream::{Drive, Recording};
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::rates::{Networks, Rates, Sample};
 use gyronet_tools::evaluate::report::DriveErrors;

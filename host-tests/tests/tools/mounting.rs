@@ -8,9 +8,8 @@ use gyronet_host_tests::noise::cases;
 use gyronet_host_tests::synthetic::{force, rate, turning};
 use gyronet_host_tests::{models, recordings, stream};
 use gyronet_tools::bundled;
-use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::replay::Replay;
-use gyronet_tools::drive::wheel_frames::WheelFrames;
+use gyronet_tools::drive::stream::Recording;
 use proptest::prelude::*;
 
 /// The angle by which the sensor is turned, about x, then about y, deg.
@@ -39,7 +38,7 @@ fn turned(recording: &Recording) -> Recording {
 
 fn yaw_rates(recording: &Recording, mounting: Rotation, levelling: bool) -> Vec<f64> {
     let config = PipelineConfig { mounting, levelling, ..PipelineConfig::DEFAULT };
-    let drive = Replay::run(recording, &config, WheelFrames::new(recording), &mut models::gyronet());
+    let drive = Replay::run(recording, &config, recording.wheels(), &mut models::gyronet());
     drive.expect("it stands still first").delayed().map(|rate| rate.rate.rad_per_sec()).collect()
 }
 

@@ -10,7 +10,7 @@ use gyronet_host_tests::require;
 use gyronet_paper::fog_replay;
 use gyronet_paper::sequence::{self, Sequence};
 use gyronet_paper::simulate::{self, Spec};
-use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::stream::Recording;
 use serde::Deserialize;
 use std::fs::File;
 use std::io::BufWriter;

@@ -9,8 +9,9 @@ use gyronet::units::{AngularRate, WheelSpeed};
 use gyronet_host_tests::recordings;
 use gyronet_host_tests::synthetic::{force, rate, turning};
 use gyronet_tools::board::Uncorrected;
-use gyronet_tools::drive::recording::{Recording, Row};
-use gyronet_tools::drive::wheel_frames::{self, WheelFrames};
+use gyronet_tools::drive::recording::Row;
+use gyronet_tools::drive::stream::Recording;
+use gyronet_tools::drive::wheel_frames;
 use std::ops::RangeInclusive;
 
 /// The largest yaw in half an hour at rest while the wheels are known to stand, deg.
@@ -78,8 +79,7 @@ const FOUND: [f64; 2] = [0.95, 0.6];
 
 /// At which rows the board says that the vehicle stands.
 fn claims(recording: &Recording, with_wheels: bool) -> Option<Vec<bool>> {
-    let mut wheels =
-        with_wheels.then(|| WheelFrames::new(recording)).map_or(Some(None), |wheels| wheels.map(Some))?;
+    let mut wheels = with_wheels.then(|| recording.wheels()).map_or(Some(None), |wheels| wheels.map(Some))?;
     let receiver = wheels.as_ref().map(|_| wheel_frames::receiver());
     let config = Config { wheels: receiver, clock: Clock::Sensor, ..Config::DEFAULT };
     let mut board = Coprocessor::new(config);

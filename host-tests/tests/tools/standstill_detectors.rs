@@ -7,7 +7,8 @@
 use crate::standstill_truth::{Truth, read};
 use gyronet::standstill::{Inertial, SPEED_CHANGE};
 use gyronet_host_tests::{parallel, recordings};
-use gyronet_tools::drive::recording::{Recording, Row};
+use gyronet_tools::drive::recording::Row;
+use gyronet_tools::drive::stream::Recording;
 
 const WINDOW: usize = 200;
 const STEP: usize = 10;

@@ -1,6 +1,7 @@
 //! The recordings with a speed, and when their vehicles move and stand.
 
-use gyronet_tools::drive::recording::{Reader, Recording, Row};
+use gyronet_tools::drive::recording::{Reader, Row};
+use gyronet_tools::drive::stream::Recording;
 use gyronet_tools::drive::vehicle::Vehicle;
 use std::path::Path;
 

@@ -4,9 +4,8 @@
 use gyronet::model::GyroNet;
 use gyronet::pipeline::PipelineConfig;
 use gyronet_host_tests::parallel;
-use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::replay::Replay;
-use gyronet_tools::drive::wheel_frames::WheelFrames;
+use gyronet_tools::drive::stream::Recording;
 use gyronet_tools::evaluate::heading_error::AgainstRate;
 use gyronet_tools::simulate::{Config, csv};
 
@@ -24,8 +23,7 @@ fn run(seed: u64, [roll, pitch]: [f64; 2], levelling: bool) -> [f64; 2] {
     let recording = Recording::parse("simulated.csv", &bytes[..]).expect("a drive");
     let config = PipelineConfig { levelling, ..PipelineConfig::DEFAULT };
     let mut network = GyroNet::shipped().expect("built in");
-    let drive =
-        Replay::run(&recording, &config, WheelFrames::new(&recording), &mut network).expect("at rest");
+    let drive = Replay::run(&recording, &config, recording.wheels(), &mut network).expect("at rest");
     let rates: Vec<f64> = drive.delayed().map(|rate| rate.rate.rad_per_sec()).collect();
     let steps = &drive.steps[drive.compared()];
     let truth: Vec<f64> = steps.iter().map(|step| recording.rows[step.row].reference.expect("one")).collect();

@@ -8,7 +8,7 @@ use gyronet::pipeline::{BoardState, Pipeline, PipelineConfig};
 use gyronet::units::{AngularRate, SpecificForce};
 use gyronet_host_tests::{models, recordings};
 use gyronet_tools::bundled;
-use gyronet_tools::drive::recording::Recording;
+use gyronet_tools::drive::stream::Recording;
 
 /// Yaw rates added, rad/s: up to 57 deg/s, more than a car turns at.
 const YAW_RATES: [f32; 10] = [-1.0, -0.7, -0.5, -0.3, -0.1, 0.1, 0.3, 0.5, 0.7, 1.0];

@@ -12,9 +12,9 @@ use gyronet::store::{Calibration, Configuration, Learned};
 use gyronet_host_tests::parallel;
 use gyronet_host_tests::synthetic::judged;
 use gyronet_tools::board::{Board, Uncorrected};
-use gyronet_tools::drive::recording::{Recording, Row, WHEEL_STANDS};
+use gyronet_tools::drive::recording::{Row, WHEEL_STANDS};
 use gyronet_tools::drive::replay::Steps;
-use gyronet_tools::drive::stream::Drive;
+use gyronet_tools::drive::stream::{Drive, Recording};
 use gyronet_tools::simulate::warming::{self, Trip};
 use gyronet_tools::simulate::{Config, csv, gnss};
 

@@ -15,7 +15,8 @@ use gyronet::units::Micros;
 use gyronet_tools::bundled;
 use gyronet_tools::drive::DT;
 use gyronet_tools::drive::candump::Log;
-use gyronet_tools::drive::recording::{Recording, Row};
+use gyronet_tools::drive::recording::Row;
+use gyronet_tools::drive::stream::Recording;
 use gyronet_tools::drive::wheel_frames::WheelFrames;
 use std::error::Error;
 use std::fs::File;
@@ -204,7 +205,7 @@ struct Vehicle {
 
 impl Vehicle {
     fn new(drive: Recording) -> Self {
-        let wheels = WheelFrames::new(&drive);
+        let wheels = drive.wheels();
         Self { drive, wheels, row: 0, courses: 0 }
     }
 

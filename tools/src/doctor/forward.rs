@@ -1,9 +1,8 @@
 //! Finds the sensor's forward direction with the library's estimator, from wheels and accelerometer.
 
-use super::Mounting;
 use super::finding::Finding;
 use super::recording::Rows;
-use super::remedy;
+use super::{Mounting, remedy};
 use gyronet::mounting::{Forward, ForwardEstimator, Rotation};
 use gyronet::sample::{ImuSample, Standstill, Validity, WheelSample};
 use gyronet::units::{AngularRate, Micros, SpecificForce, WheelSpeed};

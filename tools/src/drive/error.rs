@@ -1,7 +1,6 @@
 //! The errors of files: recorded drives, data sets, weights, keys and others. They name the file and, if known, the line
 //! and the column.
 
-use super::recording::Turning;
 use gyronet::bias::StaticError;
 use std::fmt;
 use std::path::Path;
@@ -124,6 +123,14 @@ pub enum DataFault {
     Foreign { format: &'static str, command: String },
     #[error(transparent)]
     Other(Box<dyn std::error::Error + Send + Sync>),
+}
+
+/// A wheel, counted from 1, that turns at this mean rate in a second, rad/s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turning {
+    pub line: u64,
+    pub wheel: usize,
+    pub rate: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

@@ -28,13 +28,8 @@ mod survey;
 pub use position::{Track, between};
 pub use reader::Reader;
 pub use resampled::resampled;
-pub use rest::Turning;
 pub use survey::{Facts, Survey};
 
-use crate::drive::error::DataError;
-use crate::drive::foreign;
-use crate::drive::stream::Drive;
-use crate::drive::vehicle::Vehicle;
 use gyronet::heading::Heading;
 use gyronet::sample::ImuSample;
 use std::path::Path;
@@ -48,7 +43,7 @@ pub struct Row {
     /// Line number in the file; the header is line 1.
     pub line: u64,
     pub sample: ImuSample,
-    /// The true yaw rate, rad/s, less [`Facts::reference_bias`] in a [`Recording`] or [`super::stream::Drive`].
+    /// The true yaw rate, rad/s, less [`Facts::reference_bias`] in a [`Recording`](super::stream::Recording) or [`Drive`](super::stream::Drive).
     pub reference: Option<f64>,
     /// The true course, rad, positive to the left, from any zero direction, wrapped or not.
     pub course: Option<f64>,
@@ -67,44 +62,6 @@ impl Row {
     pub fn of(line: u64, sample: ImuSample) -> Self {
         let [reference, course, speed] = [None; 3];
         Self { line, sample, reference, course, wheels: [None; WHEELS], speed, heading: None, place: None }
-    }
-}
-
-/// A complete drive in memory; [`super::stream::Drive`] is for drives of any length.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Recording {
-    pub path: String,
-    pub rows: Vec<Row>,
-    /// Number of rows that are missing in gaps.
-    pub missing: u64,
-    /// Contents of the vehicle file beside the recording; the rows are in the vehicle's axes.
-    pub vehicle: Vehicle,
-}
-
-impl Recording {
-    /// Reads a file, and the vehicle file beside it.
-    pub fn read(path: &Path) -> Result<Self, DataError> {
-        let name = path.display().to_string();
-        Self::of(&name, foreign::open(path)?, Vehicle::of_drive(path)?)
-    }
-
-    pub fn parse(path: &str, input: impl std::io::Read) -> Result<Self, DataError> {
-        Self::of(path, input, Vehicle::default())
-    }
-
-    fn of(path: &str, input: impl std::io::Read, vehicle: Vehicle) -> Result<Self, DataError> {
-        let drive = Drive::of(path, input, vehicle, None)?;
-        drive.facts.check_rest(path)?;
-        let (rows, missing) = (drive.rows()?.collect::<Result<_, _>>()?, drive.facts.missing);
-        Ok(Self { path: path.to_owned(), rows, missing, vehicle: drive.vehicle.into_owned() })
-    }
-
-    pub fn facts(&self) -> Facts {
-        Facts::of(&self.rows)
-    }
-
-    pub fn name(&self) -> &str {
-        name(&self.path)
     }
 }
 

@@ -2,11 +2,9 @@
 
 pub use crate::board::Step;
 
-use crate::board::Board;
-use crate::board::Uncorrected;
+use crate::board::{Board, Uncorrected};
 use crate::drive::error::{DataError, DataFault};
-use crate::drive::recording::Recording;
-use crate::drive::stream::{Drive, Rows};
+use crate::drive::stream::{Drive, Recording, Rows};
 use crate::drive::wheel_frames::WheelFrames;
 use gyronet::coprocessor::Config;
 use gyronet::estimate::YawEstimate;

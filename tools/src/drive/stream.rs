@@ -1,9 +1,9 @@
-//! A drive whose rows are read from its file each time they are needed, so that a long drive takes no more memory than
-//! a short one.
+//! Whole drives. The rows of a [`Drive`] are read from its file each time they are needed, so that a long drive takes no
+//! more memory than a short one; a [`Recording`] is in memory.
 
 use super::error::DataError;
 use super::foreign;
-use super::recording::{Facts, Reader, Recording, Row, Survey, name, resampled};
+use super::recording::{Facts, Reader, Row, Survey, name, resampled};
 use super::vehicle::Vehicle;
 use super::wheel_frames::{Speeds, WheelFrames};
 use gyronet::mounting::GyroMap;
@@ -31,7 +31,7 @@ pub struct Drive<'a> {
 }
 
 #[derive(Debug, Clone)]
-pub(super) enum Source<'a> {
+enum Source<'a> {
     File(PathBuf),
     Memory(Cow<'a, [Row]>),
 }
@@ -60,7 +60,7 @@ impl Drive<'static> {
     }
 
     /// Reads a drive from an input, which is kept in memory unless it can be read `again`.
-    pub(super) fn of(
+    fn of(
         path: &str,
         input: impl std::io::Read,
         vehicle: Vehicle,
@@ -88,6 +88,49 @@ impl Drive<'static> {
             drive.facts = survey.finish(&drive.path)?;
         }
         Ok(drive)
+    }
+}
+
+/// A complete drive in memory; [`Drive`] is for drives of any length.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    pub path: String,
+    pub rows: Vec<Row>,
+    /// Number of rows that are missing in gaps.
+    pub missing: u64,
+    /// Contents of the vehicle file beside the recording; the rows are in the vehicle's axes.
+    pub vehicle: Vehicle,
+}
+
+impl Recording {
+    /// Reads a file, and the vehicle file beside it.
+    pub fn read(path: &Path) -> Result<Self, DataError> {
+        let name = path.display().to_string();
+        Self::of(&name, foreign::open(path)?, Vehicle::of_drive(path)?)
+    }
+
+    pub fn parse(path: &str, input: impl std::io::Read) -> Result<Self, DataError> {
+        Self::of(path, input, Vehicle::default())
+    }
+
+    fn of(path: &str, input: impl std::io::Read, vehicle: Vehicle) -> Result<Self, DataError> {
+        let drive = Drive::of(path, input, vehicle, None)?;
+        drive.facts.check_rest(path)?;
+        let (rows, missing) = (drive.rows()?.collect::<Result<_, _>>()?, drive.facts.missing);
+        Ok(Self { path: path.to_owned(), rows, missing, vehicle: drive.vehicle.into_owned() })
+    }
+
+    pub fn facts(&self) -> Facts {
+        Facts::of(&self.rows)
+    }
+
+    /// The wheels of the vehicle's bus, as the recording has them.
+    pub fn wheels(&self) -> Option<WheelFrames> {
+        WheelFrames::of(self.facts().wheels, self.vehicle.radius_m())
+    }
+
+    pub fn name(&self) -> &str {
+        name(&self.path)
     }
 }
 

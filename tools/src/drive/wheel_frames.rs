@@ -1,6 +1,6 @@
 //! Creates wheel speed CAN frames, of a recorded drive or of given speeds.
 
-use crate::drive::recording::{Recording, Row, WHEEL_STANDS};
+use crate::drive::recording::{Row, WHEEL_STANDS};
 use embedded_can::{Frame, StandardId};
 use gyronet::can::DataFrame;
 use gyronet::can::wheel::{WheelReceiver, WheelSettings};
@@ -47,11 +47,7 @@ pub struct WheelFrames {
 }
 
 impl WheelFrames {
-    /// Creates the encoder, before the first row; `None` if the recording has no wheels.
-    pub fn new(recording: &Recording) -> Option<Self> {
-        Self::of(recording.facts().wheels, recording.vehicle.radius_m())
-    }
-
+    /// Creates the encoder, before the first row; `None` if the drive has no wheels.
     pub fn of(wheels: [bool; WHEELS], radius: f64) -> Option<Self> {
         let recorded = |wheel: &usize| wheels[*wheel];
         let any = (0..WHEELS).find(recorded)?;
@@ -118,19 +114,24 @@ impl Speeds {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::drive::recording::Reader;
     use crate::drive::vehicle::RADIUS;
     use gyronet::sample::Standstill;
+
+    fn rows(text: &str) -> impl Iterator<Item = Row> {
+        Reader::new("a.csv", text.as_bytes()).unwrap().map(Result::unwrap)
+    }
 
     fn standstills(wheel2: impl Fn(usize) -> String) -> Vec<Standstill> {
         let mut text = String::from("t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,wheel1_rate,wheel2_rate\n");
         for k in 0..500 {
             text += &format!("{:.2},0,0,9.8,0,0,0,0.04,{}\n", 0.01 * k as f64, wheel2(k));
         }
-        let recording = Recording::parse("a.csv", text.as_bytes()).unwrap();
-        let (mut frames, mut receiver) = (WheelFrames::new(&recording).unwrap(), receiver());
-        let known = recording.rows.iter().map(|row| {
+        let mut frames = WheelFrames::of([true, true, false, false], RADIUS).unwrap();
+        let mut receiver = receiver();
+        let known = rows(&text).map(|row| {
             let now = row.sample.time;
-            if let Some(frame) = frames.next(row) {
+            if let Some(frame) = frames.next(&row) {
                 receiver.decode(&frame, now).unwrap().unwrap();
             }
             receiver.poll(now).map_or(Standstill::Unknown, |wheels| wheels.standstill)
@@ -155,9 +156,8 @@ mod tests {
             format!("{:.2},0,0,9.8,0,0,0,{one},{two},{four}\n", 0.01 * k as f64)
         };
         let text = (0..402).map(row).fold(text, |text, row| text + &row);
-        let recording = Recording::parse("a.csv", text.as_bytes()).unwrap();
-        let mut speeds = Speeds::of(recording.facts().wheels, RADIUS).unwrap();
-        let all: Vec<f64> = recording.rows.iter().map(|row| speeds.next(row)).collect();
+        let mut speeds = Speeds::of([true, true, false, true], RADIUS).unwrap();
+        let all: Vec<f64> = rows(&text).map(|row| speeds.next(&row)).collect();
         assert_eq!((speeds.wheels(), all[399]), (2, 0.0));
         assert_eq!(all[400..], [RADIUS * 6.0 / 2.0; 2]);
     }

@@ -42,7 +42,7 @@ fn row(sample: &Sample, out: &mut impl Write) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drive::recording::Recording;
+    use crate::drive::stream::Recording;
     use crate::simulate::gnss;
     use crate::simulate::warming::{self, Trip};
     use gyronet::heading::Heading;

@@ -23,9 +23,8 @@ use gyronet::pipeline::PipelineConfig;
 use gyronet::sample::PERIOD_US;
 use gyronet::units::AngularRate;
 use gyronet_tools::drive::DT;
-use gyronet_tools::drive::recording::Recording;
 use gyronet_tools::drive::replay::{Replay, Step};
-use gyronet_tools::drive::wheel_frames::WheelFrames;
+use gyronet_tools::drive::stream::Recording;
 use gyronet_tools::evaluate::fir::LowPass;
 use gyronet_tools::evaluate::methods::Method;
 use gyronet_tools::evaluate::vqf;
@@ -110,7 +109,7 @@ impl Estimates {
         // This is the paper's network alone, without zero-rate updates.
         let config = PipelineConfig { zero_rate: None, ..PipelineConfig::DEFAULT };
         let drive = Replay::run(recording, &config, None, network);
-        let wheels = WheelFrames::new(recording);
+        let wheels = recording.wheels();
         let looped = Replay::run(recording, &PipelineConfig::DEFAULT, wheels, network);
         self.add(Method::RAW, constant(0.0));
         match drive.and_then(|drive| Ok((drive, looped?))) {

@@ -72,7 +72,7 @@ impl Columns {
     }
 }
 
-/// An iterator over the rows of a recording. It checks each row, and that time increases; [`super::Recording`] checks
+/// An iterator over the rows of a recording. It checks each row, and that time increases; [`super::Survey`] checks
 /// the drive as a whole.
 pub struct Reader<R> {
     path: String,

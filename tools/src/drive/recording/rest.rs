@@ -2,6 +2,7 @@
 //! reference rate.
 
 use super::{Row, WHEEL_STANDS, WHEELS};
+use crate::drive::error::Turning;
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::RATE_HZ;
 
@@ -10,14 +11,6 @@ const SECOND: usize = RATE_HZ as usize;
 const NEEDED: usize = STATIC_SAMPLES as usize / SECOND;
 /// Longest rest that is taken for the bias, s.
 const LONGEST: usize = 600;
-
-/// A wheel, counted from 1, that turns at this mean rate in a second, rad/s.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Turning {
-    pub line: u64,
-    pub wheel: usize,
-    pub rate: f64,
-}
 
 /// The seconds from the start of a drive in which the wheels stand. Each is checked on its own, so that a car that pulls
 /// away in the last one of static initialisation is found.

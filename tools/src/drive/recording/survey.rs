@@ -1,9 +1,9 @@
 //! The first reading of a drive: it checks the drive as a whole, and notes what a replay must know before its first
 //! row.
 
-use super::rest::{Rest, Turning};
+use super::rest::Rest;
 use super::{Row, WHEELS};
-use crate::drive::error::{DataError, DataFault};
+use crate::drive::error::{DataError, DataFault, Turning};
 use gyronet::align::{PERIODS_US, SNAP_US};
 use gyronet::bias::STATIC_SAMPLES;
 use gyronet::sample::{PERIOD_US, RATE_HZ};

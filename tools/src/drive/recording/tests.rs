@@ -1,7 +1,8 @@
 //! These tests provoke each typed error with a suitable recording.
 
 use super::*;
-use crate::drive::error::DataFault;
+use crate::drive::error::{DataError, DataFault};
+use crate::drive::stream::Recording;
 use std::fmt::Write;
 
 const HEADER: &str = "t_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z,ref_gyr_z,wheel1_rate,wheel3_rate,remark";
